@@ -1,0 +1,33 @@
+#pragma once
+/// \file Rotations: exponential, logarithm and their right Jacobians.
+///
+/// Right Jacobians (Sola, Deray, Atchuthan, "A micro Lie theory", eqs. 143-144):
+///     Exp(w + dw) = Exp(w) Exp(Jr(w) dw),    Log(R Exp(dw)) = Log(R) + Jr^{-1}(Log R) dw.
+/// With t = |w|, every function is even in t and is evaluated by its series where t^2 < 1e-6: the truncated terms are below
+/// rounding there.
+#include <Eigen/Geometry>
+
+#include "bielle/math/types.h"
+
+namespace bielle {
+
+/// [w x], 3x3.
+inline Matrix3d skew(const Vector3d& w) {
+  Matrix3d S;
+  S << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
+  return S;
+}
+
+/// Rotation matrix of the rotation vector w (rad).
+Matrix3d exp3(const Vector3d& w);
+
+/// Rotation vector of R, |w| in [0, pi]. Well conditioned on the whole range, the angle pi included.
+Vector3d log3(const Matrix3d& R);
+
+/// Right Jacobian of exp3 at w, 3x3.
+Matrix3d calcRightJacobian3(const Vector3d& w);
+
+/// Inverse of the right Jacobian at w: the Jacobian of log3 at exp3(w), 3x3. Singular at |w| = 2 pi.
+Matrix3d calcRightJacobianInverse3(const Vector3d& w);
+
+}  // namespace bielle

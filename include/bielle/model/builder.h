@@ -1,0 +1,66 @@
+#pragma once
+/// \file Builds and validates a Model.
+#include <string>
+#include <vector>
+
+#include "bielle/model/error.h"
+#include "bielle/model/model.h"
+
+namespace bielle {
+
+struct JointLimits {
+  VectorXd lower, upper, velocity;  ///< per dof of the joint, or empty for none; rad, m, rad/s, m/s
+};
+
+/// Collects bodies, joints, closures, motors and frames, then checks and freezes them.
+/// Bodies are referred to by the name of the link; "world" is the ground. Every add* may be called in any order that
+/// declares a link before it is used; build() throws ModelError naming the element and the remedy.
+class ModelBuilder {
+ public:
+  explicit ModelBuilder(std::string name, std::string source = "");
+
+  /// Adds a link carried by a joint. A Fixed joint merges the link into its parent and leaves a frame of its name.
+  /// \param joint kind, placement and axes; its parent index and q/v indices are filled here
+  void addLink(const std::string& link, const std::string& parent_link, Joint joint, const Inertia& inertia,
+               const JointLimits& limits = {});
+  /// Inertia added to a link (several may be given).
+  void addInertia(const std::string& link, const Inertia& inertia);
+  void addFrame(const std::string& name, const std::string& link, const SE3& X_LF);
+  /// Closure between two frames (links are frames too).
+  void addClosure(const std::string& name, ClosureKind kind, const std::string& frame1, const std::string& frame2,
+                  const Vector3d& axis = Vector3d::UnitZ(), double kp = 0, double kd = 0);
+  void addMotor(const std::string& joint, double armature = 0,
+                double effort_limit = std::numeric_limits<double>::infinity(),
+                double velocity_limit = std::numeric_limits<double>::infinity());
+  void addContact(const std::string& name, const std::string& frame, ContactKind kind, double half_length,
+                  double half_width);
+  void addReference(Reference reference);
+  void addVisual(const std::string& link, Visual visual);
+  void addSerialJoint(const std::string& joint);
+  void setGravity(const Vector3d& gravity);
+  /// Rotor inertia on every dof of a joint that no motor drives.
+  void setArmature(const std::string& joint, double armature);
+
+  /// Validates and freezes. Things possible but implausible are appended to `warnings` when given.
+  Model build(std::vector<std::string>* warnings = nullptr) const;
+
+ private:
+  struct FramePlace {
+    int body;
+    SE3 X_BF;
+  };
+  FramePlace getFrame(const std::string& name, const std::string& element) const;
+  [[noreturn]] void fail(const std::string& element, const std::string& problem, const std::string& remedy) const;
+  void finishDofs(Model& model) const;
+  void finishClosures(Model& model) const;
+  void checkInertias(std::vector<std::string>* warnings) const;
+
+  std::string source_;
+  Model model_;
+  std::map<std::string, FramePlace> frames_;  ///< links and frames
+  std::vector<std::pair<std::string, Inertia>> link_inertias_;
+  std::vector<JointLimits> limits_;
+  std::map<std::string, double> joint_armature_;
+};
+
+}  // namespace bielle

@@ -1,0 +1,16 @@
+#pragma once
+/// \file The one exception thrown for data that cannot be a robot.
+#include <stdexcept>
+#include <string>
+
+namespace bielle {
+
+/// Bad input at the boundary. what() reads "file: element: what is wrong; remedy".
+class ModelError : public std::runtime_error {
+ public:
+  /// \param source file (or "" for a model built in code)   \param element e.g. `joint 'knee'`
+  ModelError(const std::string& source, const std::string& element, const std::string& problem,
+             const std::string& remedy = "");
+};
+
+}  // namespace bielle

@@ -1,0 +1,53 @@
+#pragma once
+/// \file Joint kinds, their configuration manifolds and motion subspaces.
+///
+/// Every joint is seen as a sequence of axes ("dofs"). The motion subspace S (6 x nv, child frame) is constant for all
+/// kinds but the universal joint, whose first axis turns in the child frame when its second angle changes:
+///     universal:  R = Exp(a1 q1) Exp(a2 q2),   S = [0, 0; Exp(a2 q2)^T a1, a2].
+#include <limits>
+#include <string>
+
+#include "bielle/math/se3.h"
+
+namespace bielle {
+
+enum class JointKind { Fixed, Revolute, Continuous, Prismatic, Spherical, Universal, Planar, FreeFlyer };
+
+/// Name as used in messages and files ("revolute", "free-flyer", ...).
+const char* getName(JointKind kind);
+/// Sizes of q and v of a joint kind.
+int getNq(JointKind kind);
+int getNv(JointKind kind);
+
+/// A joint between a parent body and the body of the same index as the joint.
+struct Joint {
+  std::string name;
+  JointKind kind = JointKind::Fixed;
+  int parent = 0;                       ///< body index of the parent
+  SE3 X_PJ;                             ///< placement of the joint frame (child frame at neutral q) in the parent body
+  Vector3d axis = Vector3d::UnitZ();    ///< unit axis; normal of a planar joint; first axis of a universal joint
+  Vector3d axis2 = Vector3d::UnitY();   ///< second axis of a universal joint
+  int idx_q = 0, nq = 0, idx_v = 0, nv = 0;
+};
+
+/// Placement of the child in the joint frame; q is the joint's own segment (nq).
+SE3 calcJointPlacement(const Joint& joint, ConstVectorRef q);
+
+/// Motion subspace in the child frame, written to the first nv columns of S (6 x nv).
+void calcJointSubspace(const Joint& joint, ConstVectorRef q, Eigen::Ref<Matrix6Xd> S);
+
+/// q_out = q (+) dv (segments of the joint). Quaternions come out normalised.
+void integrateJoint(const Joint& joint, ConstVectorRef q, ConstVectorRef dv, VectorRef q_out);
+/// dv with q0 (+) dv = q1.
+void calcJointDifference(const Joint& joint, ConstVectorRef q0, ConstVectorRef q1, VectorRef dv);
+/// Jacobians of (q, dv) -> q (+) dv in tangent coordinates: of the result with respect to q and to dv (nv x nv each).
+void calcJointIntegrateJacobians(const Joint& joint, ConstVectorRef dv, MatrixRef J_q, MatrixRef J_dv);
+/// Jacobian of dv = q1 (-) q0 with respect to q1, as a function of dv (nv x nv): the inverse of J_dv above.
+void calcJointDifferenceJacobian(const Joint& joint, ConstVectorRef dv, MatrixRef J_q1);
+/// Neutral configuration of a joint kind, written to q (nq).
+void setNeutral(JointKind kind, VectorRef q);
+
+/// Axes of the plane of a planar joint with unit normal n: right-handed (e1, e2, n), (x, y, z) for n = z.
+Matrix3d makePlaneBasis(const Vector3d& normal);
+
+}  // namespace bielle

@@ -1,0 +1,174 @@
+#pragma once
+/// \file The immutable model of a robot: a spanning tree of bodies and joints, closed by closures.
+#include <map>
+#include <string>
+#include <vector>
+
+#include "bielle/math/inertia.h"
+#include "bielle/model/joint.h"
+
+namespace bielle {
+
+/// A rigid body; body i > 0 is carried by joint i, body 0 is the world.
+struct Body {
+  std::string name;
+  Inertia inertia;  ///< in the body frame (the child frame of its joint), links merged through fixed joints included
+};
+
+/// A named frame fixed in a body.
+struct Frame {
+  std::string name;
+  int body = 0;
+  SE3 X_BF;
+};
+
+enum class ClosureKind { Weld6D, Ball3D, Hinge5D };
+const char* getName(ClosureKind kind);
+/// Number of scalar constraints: 6, 3, 5.
+int getRows(ClosureKind kind);
+
+/// Ties frame 1 on body 1 to frame 2 on body 2; notation.h defines residual, velocity, acceleration and force.
+struct Closure {
+  std::string name;
+  ClosureKind kind = ClosureKind::Weld6D;
+  int body1 = 0, body2 = 0;
+  SE3 X_B1, X_B2;                      ///< placements of the frames in their bodies
+  Vector3d axis = Vector3d::UnitZ();   ///< free axis of a hinge, in frame 1 (and in frame 2)
+  double kp = 0, kd = 0;               ///< stabilisation gains, 1/s^2 and 1/s; zero as in the paper
+  /// Dofs that move one frame and not the other, in increasing order, with +1 where they move frame 1, -1 frame 2.
+  /// The relative placement of the frames depends on these alone. Filled by the builder.
+  std::vector<int> dofs, signs;
+};
+
+/// Closures that share dofs, directly or through other closures: the unit in which loops are eliminated.
+struct LoopCluster {
+  std::vector<int> closures;  ///< indices of closures
+  std::vector<int> dofs;      ///< union of their dofs, increasing
+  int rows = 0;               ///< sum of their scalar constraints
+};
+
+/// An actuator on one dof.
+struct Motor {
+  std::string name;        ///< name of its joint
+  int joint = 0;           ///< body/joint index
+  int dof = 0;             ///< index into v
+  double armature = 0;     ///< rotor inertia seen at the joint, kg m^2 (kg for a prismatic joint)
+  double effort_limit = std::numeric_limits<double>::infinity();    ///< N m or N
+  double velocity_limit = std::numeric_limits<double>::infinity();  ///< rad/s or m/s
+};
+
+enum class ContactKind { Point3D, Surface6D };
+
+/// A place of a body that may touch the ground; z is the outward normal of the ground when in contact.
+struct ContactFrame {
+  std::string name;
+  int body = 0;
+  SE3 X_BF;
+  ContactKind kind = ContactKind::Surface6D;
+  double half_length = 0, half_width = 0;  ///< of the sole, along x and y, m
+};
+
+/// One target of a reference configuration, by name, as read from a robot file.
+struct Reference {
+  std::string name;
+  std::map<std::string, std::vector<double>> joints;  ///< joint name -> its q
+  /// Height of a frame over the soles, feet flat on the ground under their own hips; empty frame: joints alone.
+  std::string height_frame;
+  double height = 0;                                   ///< m
+  std::map<std::string, Vector3d> feet;                ///< contact frame -> position of its origin, m (world)
+};
+
+/// What is drawn of a body, from the visuals of the URDF.
+struct Visual {
+  enum class Shape { Box, Cylinder, Sphere, Mesh } shape = Shape::Box;
+  int body = 0;
+  SE3 X_BV;
+  Vector3d size = Vector3d::Zero();  ///< box: edges; cylinder: radius, length, 0; sphere: radius, 0, 0; mesh: scale
+  std::string mesh;                  ///< file name as written in the URDF
+  Eigen::Vector4d rgba = {0.7, 0.7, 0.7, 1};
+};
+
+/// One scalar velocity coordinate.
+struct Dof {
+  int joint = 0;      ///< joint/body that carries it
+  int parent = -1;    ///< dof just before it on the path to the root, -1 at the root
+  /// Dofs j of the same joint for which the axis of this one does not move: only the first axis of a universal joint
+  /// ignores its second one. All the axes of other joints move with the whole joint (child-frame coordinates).
+  bool first_of_universal = false;
+  bool second_of_universal = false;
+};
+
+/// Immutable description of a robot. Made by ModelBuilder::build or loadRobot.
+class Model {
+ public:
+  const std::string& name() const { return name_; }
+  int nq() const { return nq_; }
+  int nv() const { return nv_; }
+  int nu() const { return static_cast<int>(motors_.size()); }
+  int numBodies() const { return static_cast<int>(bodies_.size()); }  ///< with the world
+  const std::vector<Body>& bodies() const { return bodies_; }
+  const std::vector<Joint>& joints() const { return joints_; }  ///< joints()[0] is a placeholder for the world
+  const std::vector<Dof>& dofs() const { return dofs_; }
+  const std::vector<Frame>& frames() const { return frames_; }
+  const std::vector<Closure>& closures() const { return closures_; }
+  const std::vector<LoopCluster>& clusters() const { return clusters_; }
+  const std::vector<Motor>& motors() const { return motors_; }
+  const std::vector<ContactFrame>& contacts() const { return contacts_; }
+  const std::vector<Reference>& references() const { return references_; }
+  const std::vector<Visual>& visuals() const { return visuals_; }
+  /// Dofs of the joints of the equivalent serial chain (hips, knee, ankles), as joint indices.
+  const std::vector<int>& serialJoints() const { return serial_joints_; }
+  const VectorXd& lowerLimits() const { return lower_; }       ///< per dof, -inf where there is none
+  const VectorXd& upperLimits() const { return upper_; }
+  const VectorXd& velocityLimits() const { return velocity_limit_; }
+  const VectorXd& armature() const { return armature_; }        ///< per dof, added to the diagonal of M
+  double mass() const { return mass_; }                         ///< kg, without the world
+  const Vector3d& gravity() const { return gravity_; }
+  bool hasFreeFlyer() const { return numBodies() > 1 && joints_[1].kind == JointKind::FreeFlyer; }
+  int numClosureRows() const { return closure_rows_; }
+
+  /// Dofs that move a body, from the root to the body, in increasing order.
+  const std::vector<int>& supportDofs(int body) const { return support_[body]; }
+  /// Whether body a is body b or one of its ancestors.
+  bool isAncestorOrSelf(int a, int b) const;
+
+  /// Index by name, -1 when absent.
+  int findJoint(const std::string& name) const;
+  int findFrame(const std::string& name) const;
+  int findMotor(const std::string& name) const;
+  int findContact(const std::string& name) const;
+  int findClosure(const std::string& name) const;
+
+  /// Neutral configuration (nq).
+  VectorXd makeNeutral() const;
+  /// q (+) dv, dv of size nv.
+  void integrate(ConstVectorRef q, ConstVectorRef dv, VectorRef q_out) const;
+  VectorXd integrate(ConstVectorRef q, ConstVectorRef dv) const;
+  /// dv with q0 (+) dv = q1.
+  void difference(ConstVectorRef q0, ConstVectorRef q1, VectorRef dv) const;
+  VectorXd difference(ConstVectorRef q0, ConstVectorRef q1) const;
+  /// Quaternions scaled to unit length.
+  void normalize(VectorRef q) const;
+
+ private:
+  friend class ModelBuilder;
+  std::string name_;
+  int nq_ = 0, nv_ = 0, closure_rows_ = 0;
+  double mass_ = 0;
+  Vector3d gravity_{0, 0, -9.81};
+  std::vector<Body> bodies_;
+  std::vector<Joint> joints_;
+  std::vector<Dof> dofs_;
+  std::vector<Frame> frames_;
+  std::vector<Closure> closures_;
+  std::vector<LoopCluster> clusters_;
+  std::vector<Motor> motors_;
+  std::vector<ContactFrame> contacts_;
+  std::vector<Reference> references_;
+  std::vector<Visual> visuals_;
+  std::vector<int> serial_joints_;
+  std::vector<std::vector<int>> support_;
+  VectorXd lower_, upper_, velocity_limit_, armature_;
+};
+
+}  // namespace bielle

@@ -1,0 +1,57 @@
+#pragma once
+/// \file
+/// Frames, orders, signs and units, once. Nothing else in Bielle redefines them. (Documentation only.)
+///
+/// ## Units and world
+/// SI units and radians. The world frame W has z up; gravity is (0, 0, -9.81) m/s^2.
+///
+/// ## Placements and spatial vectors
+/// `X_AB` is the placement of frame B in frame A: `p_A = X_AB.R * p_B + X_AB.p`. `p_AB_C` is the vector from the origin
+/// of A to that of B, in the coordinates of C. Body 0 of a model is the world, body i > 0 is carried by joint i.
+/// Spatial vectors put the linear part first: a twist is (v, w), a wrench (f, n). A twist *in frame A* has the velocity of
+/// the material point at the origin of A as its linear part, in the coordinates of A.
+/// Cross products: `crossMotion(v, m)` is [v x] m, `crossForce(v, f)` is [v x*] f = -[v x]^T f.
+///
+/// ## Configurations q and velocities v, joint after joint in the order of the model
+/// | joint      | q (nq)                                        | v (nv)                                             |
+/// |------------|-----------------------------------------------|----------------------------------------------------|
+/// | revolute   | angle (1)                                     | its rate (1)                                       |
+/// | continuous | angle, not wrapped (1)                        | its rate (1)                                       |
+/// | prismatic  | length (1)                                    | its rate (1)                                       |
+/// | spherical  | quaternion x y z w (4)                        | angular velocity in the child frame (3)            |
+/// | universal  | angle about axis 1, then about axis 2 (2)     | their rates (2)                                    |
+/// | planar     | x, y in the plane, angle about its normal (3) | v_x, v_y, rate, all in the child frame (3)         |
+/// | free-flyer | position, quaternion x y z w (7)              | twist of the child in its own frame (6)            |
+/// | fixed      | - (0): its body is merged into the parent     | - (0)                                              |
+///
+/// Free-flyer and spherical joints follow Pinocchio, so trajectories can be exchanged by joint name. A continuous joint
+/// is one angle here where Pinocchio stores (cos, sin); a planar joint is an angle here, (cos, sin) there.
+/// The tangent vector of a configuration has the size and frames of v: `integrate(q, dq)` is q (+) dq, `difference(q0, q1)`
+/// the dq with q0 (+) dq = q1.
+///
+/// ## Dynamics
+///     M(q) a + b(q, v) = B u + J(q)^T lambda            (1)
+/// a is the time derivative of v, b holds Coriolis, centrifugal and gravity terms, u the motor torques (or forces).
+///
+/// ## Closures and contacts
+/// A closure ties frame 1 (on body 1) to frame 2 (on body 2). With the placement X_12 of frame 2 in frame 1:
+/// - residual  6D: Log6(X_12);  3D: the origin p_12;  5D: p_12 and the angle vector between the two hinge axes, in the
+///   plane normal to the axis;
+/// - velocity  nu_c = V_1 - X_12 V_2, both body twists carried to frame 1 (the paper's eq. 8), of which a 3D closure keeps
+///   the linear rows and a 5D closure the linear rows and the two angular rows normal to its axis;
+/// - acceleration  a_c = A_1 - X_12 A_2 + [V_1 x] X_12 V_2 (the paper's eq. 9), the derivative of nu_c in frame 1;
+/// - lambda is the wrench, in frame 1, that acts **on body 1**; body 2 gets the opposite one. So J = d nu_c / d v enters (1)
+///   with a plus sign and positive power of lambda is power given to the mechanism.
+/// A foot contact is a closure whose frame 1 is the contact frame and whose body 2 is the world: its lambda is the wrench
+/// of the ground on the foot, in the foot's frame. Contact frames have z along the outward normal of the ground and x
+/// forward when the sole rests on flat ground.
+///
+/// ## Errata of the paper ("Optimal Control of Walkers with Parallel Actuation", 2024)
+/// Each sign below was derived anew and is held by finite differences in the tests. Equation numbers are the paper's.
+/// - eqs. 2, 4, 6: the force enters eq. 2 as +J^T lambda on the right; the KKT matrix of eq. 4 and ID in eq. 6 write it on
+///   the left with the same sign, so that their lambda is the opposite one. Here (1) holds everywhere: ID = M a + b - J^T lambda.
+/// - eq. 5: the derivative needs a minus, dy/dz = -K^{-1} [d a_c/dz; d ID/dz], both taken at fixed acceleration and fixed
+///   lambda; a_0 there stands for the whole constraint acceleration a_c, not only for its velocity part.
+/// - eqs. 7, 8: d/dt Log6(X_12) = -nu_c at a closed configuration. The spring of a stabilised closure is a_c + k_d nu_c - k_p r = 0.
+/// - eq. 9: gamma_1 is A_1 in frame 1 (the second line prints the index of body 2).
+/// - eq. 19: with phi_2 = -X* lambda (eq. 18), d phi_2/dq = -[X* lambda]* (J_2 - X J_1); the printed sign is the opposite.

@@ -1,0 +1,63 @@
+#pragma once
+/// \file The optimal control problem as a solver sees it (the paper's eq. 1), on manifolds.
+///
+///     min  sum_k l_k(x_k, u_k) + l_N(x_N)    s.t.  x_0 given,  x_{k+1} = f_k(x_k, u_k),   k = 0 .. N-1
+///
+/// A state x is a vector of numbers (quaternions, say) that stands for a point of a manifold; the tangent space at node k
+/// has its own dimension. The solver knows no robot: it asks for steps, differences and quadratic models.
+#include <vector>
+
+#include "bielle/math/types.h"
+
+namespace bielle {
+
+/// Quadratic model of one stage about (x_k, u_k), in tangent coordinates at x_k and at the node state x_{k+1}:
+///     dx_{k+1} = Fx dx_k + Fu du_k + gap
+///     l = cost + lx.dx + lu.du + 1/2 (dx.lxx.dx + 2 du.lux.dx + du.luu.du)
+/// The terminal node fills cost, lx and lxx only.
+struct StageModel {
+  MatrixXd Fx;   ///< ndx_{k+1} x ndx_k
+  MatrixXd Fu;   ///< ndx_{k+1} x nu_k
+  VectorXd gap;  ///< ndx_{k+1}: difference(x_{k+1}, f_k(x_k, u_k))
+  double cost = 0;
+  VectorXd lx;   ///< ndx_k
+  VectorXd lu;   ///< nu_k
+  MatrixXd lxx;  ///< ndx_k x ndx_k, symmetric
+  MatrixXd lux;  ///< nu_k x ndx_k
+  MatrixXd luu;  ///< nu_k x nu_k, symmetric
+  void resize(int ndx, int nu, int ndx_next);
+};
+
+/// Result of a step or of a cost evaluation. A numerical failure is a value, never an exception or a NaN handed on.
+enum class StepStatus { Ok, Failed };
+
+class ShootingProblem {
+ public:
+  virtual ~ShootingProblem() = default;
+
+  virtual int numStages() const = 0;             ///< N; there are N + 1 nodes
+  virtual int stateSize() const = 0;             ///< numbers in a state, the same at every node
+  virtual int tangentSize(int node) const = 0;   ///< node in [0, N]
+  virtual int controlSize(int stage) const = 0;  ///< stage in [0, N)
+  virtual const VectorXd& initialState() const = 0;
+
+  /// x_out = x (+) dx. x_out may alias x.
+  virtual void integrate(int node, ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) const = 0;
+  /// dx with x0 (+) dx = x1.
+  virtual void difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const = 0;
+
+  /// x_next = f_k(x, u) and the running cost l_k(x, u).
+  /// Calls for different stages may run at the same time; those of one stage may not.
+  virtual StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) = 0;
+  virtual StepStatus calcTerminalCost(ConstVectorRef x, double& cost) = 0;
+
+  /// Quadratic model of stage k about (x, u) with the gap to the node state x_next_node. Same threading rule as step().
+  virtual StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
+                               StageModel& out) = 0;
+  virtual StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) = 0;
+
+  /// Bounds of the controls of a stage (nu each), infinite where there are none.
+  virtual void getControlBounds(int stage, VectorRef lower, VectorRef upper) const;
+};
+
+}  // namespace bielle

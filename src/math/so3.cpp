@@ -1,0 +1,63 @@
+#include "bielle/math/so3.h"
+
+#include <cmath>
+
+namespace bielle {
+namespace {
+
+constexpr double kSmallAngleSquared = 1e-6;
+
+// The even functions of the angle t that the exponential and its Jacobian are made of.
+struct AngleFunctions {
+  double sinc;        // sin t / t
+  double cosc;        // (1 - cos t) / t^2
+  double sinc_minus;  // (t - sin t) / t^3
+};
+
+AngleFunctions calcAngleFunctions(double t2) {
+  if (t2 < kSmallAngleSquared)
+    return {1 - t2 / 6 * (1 - t2 / 20), 0.5 - t2 / 24 * (1 - t2 / 30), 1.0 / 6 - t2 / 120 * (1 - t2 / 42)};
+  const double t = std::sqrt(t2);
+  const double half = std::sin(0.5 * t);
+  return {std::sin(t) / t, 2 * half * half / t2, (t - std::sin(t)) / (t2 * t)};
+}
+
+}  // namespace
+
+Matrix3d exp3(const Vector3d& w) {
+  const AngleFunctions f = calcAngleFunctions(w.squaredNorm());
+  const Matrix3d S = skew(w);
+  return Matrix3d::Identity() + f.sinc * S + f.cosc * S * S;
+}
+
+Vector3d log3(const Matrix3d& R) {
+  // Through the quaternion: its vector part is sin(t/2) times the axis, which stays well conditioned near t = pi.
+  Eigen::Quaterniond quat(R);
+  quat.normalize();
+  if (quat.w() < 0) quat.coeffs() *= -1;
+  const double s = quat.vec().norm();
+  if (s < 1e-8) return 2 * quat.vec() / quat.w();
+  return 2 * std::atan2(s, quat.w()) / s * quat.vec();
+}
+
+Matrix3d calcRightJacobian3(const Vector3d& w) {
+  const AngleFunctions f = calcAngleFunctions(w.squaredNorm());
+  const Matrix3d S = skew(w);
+  return Matrix3d::Identity() - f.cosc * S + f.sinc_minus * S * S;
+}
+
+Matrix3d calcRightJacobianInverse3(const Vector3d& w) {
+  const double t2 = w.squaredNorm();
+  // (1/t^2) (1 - (t/2) cot(t/2)), by its series for small angles.
+  double c;
+  if (t2 < kSmallAngleSquared) {
+    c = 1.0 / 12 + t2 / 720 + t2 * t2 / 30240;
+  } else {
+    const double t = std::sqrt(t2);
+    c = (1 - 0.5 * t / std::tan(0.5 * t)) / t2;
+  }
+  const Matrix3d S = skew(w);
+  return Matrix3d::Identity() + 0.5 * S + c * S * S;
+}
+
+}  // namespace bielle

@@ -1,0 +1,207 @@
+#include "bielle/model/joint.h"
+
+#include <cmath>
+
+namespace bielle {
+namespace {
+
+using ConstQuaternionMap = Eigen::Map<const Eigen::Quaterniond>;
+
+// Planar joints live on SE(2), embedded in SE(3) through the basis of their plane.
+Vector6d embedPlanar(const Joint& joint, ConstVectorRef dv) {
+  const Matrix3d B = makePlaneBasis(joint.axis);
+  Vector6d twist;
+  twist << B.leftCols<2>() * dv.head<2>(), B.col(2) * dv[2];
+  return twist;
+}
+
+void writeQuaternion(const Matrix3d& R, VectorRef q) {
+  Eigen::Quaterniond quat(R);
+  quat.normalize();
+  q = quat.coeffs();
+}
+
+// Projection of a 6x6 Jacobian on the tangent of the plane.
+void projectPlanar(const Joint& joint, const Matrix6d& J, MatrixRef out) {
+  const Matrix3d B = makePlaneBasis(joint.axis);
+  Eigen::Matrix<double, 6, 3> E = Eigen::Matrix<double, 6, 3>::Zero();
+  E.topLeftCorner<3, 2>() = B.leftCols<2>();
+  E.bottomRightCorner<3, 1>() = B.col(2);
+  out = E.transpose() * J * E;
+}
+
+}  // namespace
+
+const char* getName(JointKind kind) {
+  switch (kind) {
+    case JointKind::Fixed: return "fixed";
+    case JointKind::Revolute: return "revolute";
+    case JointKind::Continuous: return "continuous";
+    case JointKind::Prismatic: return "prismatic";
+    case JointKind::Spherical: return "spherical";
+    case JointKind::Universal: return "universal";
+    case JointKind::Planar: return "planar";
+    case JointKind::FreeFlyer: return "free-flyer";
+  }
+  return "?";
+}
+
+int getNq(JointKind kind) {
+  switch (kind) {
+    case JointKind::Fixed: return 0;
+    case JointKind::Spherical: return 4;
+    case JointKind::Universal: return 2;
+    case JointKind::Planar: return 3;
+    case JointKind::FreeFlyer: return 7;
+    default: return 1;
+  }
+}
+
+int getNv(JointKind kind) {
+  switch (kind) {
+    case JointKind::Fixed: return 0;
+    case JointKind::Spherical: return 3;
+    case JointKind::Universal: return 2;
+    case JointKind::Planar: return 3;
+    case JointKind::FreeFlyer: return 6;
+    default: return 1;
+  }
+}
+
+Matrix3d makePlaneBasis(const Vector3d& normal) {
+  Matrix3d B;
+  B.col(2) = normal;
+  const Vector3d seed = std::abs(normal.x()) < 0.9 ? Vector3d::UnitX() : Vector3d::UnitY();
+  B.col(0) = (seed - seed.dot(normal) * normal).normalized();
+  B.col(1) = normal.cross(B.col(0));
+  return B;
+}
+
+SE3 calcJointPlacement(const Joint& joint, ConstVectorRef q) {
+  switch (joint.kind) {
+    case JointKind::Fixed: return {};
+    case JointKind::Revolute:
+    case JointKind::Continuous: return {exp3(joint.axis * q[0]), Vector3d::Zero()};
+    case JointKind::Prismatic: return {Matrix3d::Identity(), joint.axis * q[0]};
+    case JointKind::Spherical: return {ConstQuaternionMap(q.data()).toRotationMatrix(), Vector3d::Zero()};
+    case JointKind::Universal: return {exp3(joint.axis * q[0]) * exp3(joint.axis2 * q[1]), Vector3d::Zero()};
+    case JointKind::Planar: {
+      const Matrix3d B = makePlaneBasis(joint.axis);
+      return {exp3(joint.axis * q[2]), B.leftCols<2>() * q.head<2>()};
+    }
+    case JointKind::FreeFlyer: return {ConstQuaternionMap(q.data() + 3).toRotationMatrix(), q.head<3>()};
+  }
+  return {};
+}
+
+void calcJointSubspace(const Joint& joint, ConstVectorRef q, Eigen::Ref<Matrix6Xd> S) {
+  S.setZero();
+  switch (joint.kind) {
+    case JointKind::Fixed: break;
+    case JointKind::Revolute:
+    case JointKind::Continuous: S.col(0).tail<3>() = joint.axis; break;
+    case JointKind::Prismatic: S.col(0).head<3>() = joint.axis; break;
+    case JointKind::Spherical: S.bottomLeftCorner<3, 3>().setIdentity(); break;
+    case JointKind::Universal:
+      S.col(0).tail<3>() = exp3(-joint.axis2 * q[1]) * joint.axis;
+      S.col(1).tail<3>() = joint.axis2;
+      break;
+    case JointKind::Planar: {
+      const Matrix3d B = makePlaneBasis(joint.axis);
+      S.topLeftCorner<3, 2>() = B.leftCols<2>();
+      S.col(2).tail<3>() = B.col(2);
+      break;
+    }
+    case JointKind::FreeFlyer: S.topLeftCorner<6, 6>().setIdentity(); break;
+  }
+}
+
+void integrateJoint(const Joint& joint, ConstVectorRef q, ConstVectorRef dv, VectorRef q_out) {
+  switch (joint.kind) {
+    case JointKind::Spherical: {
+      const Eigen::Quaterniond product = ConstQuaternionMap(q.data()) * Eigen::Quaterniond(exp3(dv));
+      q_out = product.normalized().coeffs();
+      break;
+    }
+    case JointKind::Planar: {
+      const SE3 step = exp6(embedPlanar(joint, dv));
+      const Matrix3d B = makePlaneBasis(joint.axis);
+      const Vector3d p = B.leftCols<2>() * q.head<2>() + exp3(joint.axis * q[2]) * step.p;
+      const double angle = q[2] + dv[2];
+      q_out.head<2>() = B.leftCols<2>().transpose() * p;
+      q_out[2] = angle;
+      break;
+    }
+    case JointKind::FreeFlyer: {
+      const SE3 step = exp6(dv);
+      const ConstQuaternionMap quat(q.data() + 3);
+      const Vector3d p = q.head<3>() + quat.toRotationMatrix() * step.p;
+      const Eigen::Quaterniond product = quat * Eigen::Quaterniond(step.R);
+      q_out.head<3>() = p;
+      q_out.tail<4>() = product.normalized().coeffs();
+      break;
+    }
+    default: q_out = q + dv;
+  }
+}
+
+void calcJointDifference(const Joint& joint, ConstVectorRef q0, ConstVectorRef q1, VectorRef dv) {
+  switch (joint.kind) {
+    case JointKind::Spherical: {
+      const Matrix3d R0 = ConstQuaternionMap(q0.data()).toRotationMatrix();
+      dv = log3(R0.transpose() * ConstQuaternionMap(q1.data()).toRotationMatrix());
+      break;
+    }
+    case JointKind::Planar: {
+      // The angle is not wrapped, so the translation is undone by the inverse of the exponential at that very angle.
+      const double angle = q1[2] - q0[2];
+      const Matrix3d B = makePlaneBasis(joint.axis);
+      const Vector3d dp = exp3(-joint.axis * q0[2]) * (B.leftCols<2>() * (q1.head<2>() - q0.head<2>()));
+      const Vector3d rho = calcRightJacobianInverse3(-joint.axis * angle) * dp;
+      dv.head<2>() = B.leftCols<2>().transpose() * rho;
+      dv[2] = angle;
+      break;
+    }
+    case JointKind::FreeFlyer: dv = log6(calcJointPlacement(joint, q0).inverseTimes(calcJointPlacement(joint, q1))); break;
+    default: dv = q1 - q0;
+  }
+}
+
+void calcJointIntegrateJacobians(const Joint& joint, ConstVectorRef dv, MatrixRef J_q, MatrixRef J_dv) {
+  switch (joint.kind) {
+    case JointKind::Spherical:
+      J_q = exp3(dv).transpose();
+      J_dv = calcRightJacobian3(dv);
+      break;
+    case JointKind::Planar: {
+      const Vector6d twist = embedPlanar(joint, dv);
+      projectPlanar(joint, exp6(twist).inverse().toActionMatrix(), J_q);
+      projectPlanar(joint, calcRightJacobian6(twist), J_dv);
+      break;
+    }
+    case JointKind::FreeFlyer:
+      J_q = exp6(dv).inverse().toActionMatrix();
+      J_dv = calcRightJacobian6(dv);
+      break;
+    default:
+      J_q.setIdentity();
+      J_dv.setIdentity();
+  }
+}
+
+void calcJointDifferenceJacobian(const Joint& joint, ConstVectorRef dv, MatrixRef J_q1) {
+  switch (joint.kind) {
+    case JointKind::Spherical: J_q1 = calcRightJacobianInverse3(dv); break;
+    case JointKind::Planar: projectPlanar(joint, calcLogJacobian6(exp6(embedPlanar(joint, dv))), J_q1); break;
+    case JointKind::FreeFlyer: J_q1 = calcLogJacobian6(exp6(dv)); break;
+    default: J_q1.setIdentity();
+  }
+}
+
+void setNeutral(JointKind kind, VectorRef q) {
+  q.setZero();
+  if (kind == JointKind::Spherical) q[3] = 1;
+  if (kind == JointKind::FreeFlyer) q[6] = 1;
+}
+
+}  // namespace bielle

@@ -1,0 +1,87 @@
+#include "bielle/model/model.h"
+
+namespace bielle {
+namespace {
+
+template <typename Items>
+int findByName(const Items& items, const std::string& name) {
+  for (size_t i = 0; i < items.size(); ++i)
+    if (items[i].name == name) return static_cast<int>(i);
+  return -1;
+}
+
+}  // namespace
+
+const char* getName(ClosureKind kind) {
+  switch (kind) {
+    case ClosureKind::Weld6D: return "6d";
+    case ClosureKind::Ball3D: return "3d";
+    case ClosureKind::Hinge5D: return "5d";
+  }
+  return "?";
+}
+
+int getRows(ClosureKind kind) {
+  switch (kind) {
+    case ClosureKind::Weld6D: return 6;
+    case ClosureKind::Ball3D: return 3;
+    case ClosureKind::Hinge5D: return 5;
+  }
+  return 0;
+}
+
+bool Model::isAncestorOrSelf(int a, int b) const {
+  while (b > a) b = joints_[b].parent;
+  return a == b;
+}
+
+int Model::findJoint(const std::string& name) const {
+  const int index = findByName(joints_, name);
+  return index == 0 ? -1 : index;  // the world is no joint
+}
+int Model::findFrame(const std::string& name) const { return findByName(frames_, name); }
+int Model::findMotor(const std::string& name) const { return findByName(motors_, name); }
+int Model::findContact(const std::string& name) const { return findByName(contacts_, name); }
+int Model::findClosure(const std::string& name) const { return findByName(closures_, name); }
+
+VectorXd Model::makeNeutral() const {
+  VectorXd q(nq_);
+  for (const Joint& joint : joints_)
+    if (joint.nq) setNeutral(joint.kind, q.segment(joint.idx_q, joint.nq));
+  return q;
+}
+
+void Model::integrate(ConstVectorRef q, ConstVectorRef dv, VectorRef q_out) const {
+  for (const Joint& joint : joints_)
+    if (joint.nv)
+      integrateJoint(joint, q.segment(joint.idx_q, joint.nq), dv.segment(joint.idx_v, joint.nv),
+                     q_out.segment(joint.idx_q, joint.nq));
+}
+
+VectorXd Model::integrate(ConstVectorRef q, ConstVectorRef dv) const {
+  VectorXd out(nq_);
+  integrate(q, dv, out);
+  return out;
+}
+
+void Model::difference(ConstVectorRef q0, ConstVectorRef q1, VectorRef dv) const {
+  for (const Joint& joint : joints_)
+    if (joint.nv)
+      calcJointDifference(joint, q0.segment(joint.idx_q, joint.nq), q1.segment(joint.idx_q, joint.nq),
+                          dv.segment(joint.idx_v, joint.nv));
+}
+
+VectorXd Model::difference(ConstVectorRef q0, ConstVectorRef q1) const {
+  VectorXd out(nv_);
+  difference(q0, q1, out);
+  return out;
+}
+
+void Model::normalize(VectorRef q) const {
+  for (const Joint& joint : joints_) {
+    if (joint.kind == JointKind::Spherical) q.segment<4>(joint.idx_q).normalize();
+    if (joint.kind == JointKind::FreeFlyer) q.segment<4>(joint.idx_q + 3).normalize();
+  }
+}
+
+}  // namespace bielle

@@ -1,0 +1,113 @@
+// Oracle: central differences on the group, and the group axioms.
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "bielle/math/se3.h"
+#include "bielle/model/joint.h"
+
+using namespace bielle;
+
+namespace {
+
+std::mt19937 rng(7);
+
+VectorXd random(int n, double scale) {
+  std::normal_distribution<double> normal(0, scale);
+  return VectorXd::NullaryExpr(n, [&](Eigen::Index) { return normal(rng); });
+}
+
+// Largest error of a 6x6 right Jacobian of exp6 against central differences.
+double calcJacobianError(const Vector6d& twist, const Matrix6d& J) {
+  const double h = 1e-5;
+  Matrix6d numeric;
+  const SE3 X = exp6(twist);
+  for (int k = 0; k < 6; ++k) {
+    const Vector6d d = h * Vector6d::Unit(k);
+    numeric.col(k) = (log6(X.inverseTimes(exp6(twist + d))) - log6(X.inverseTimes(exp6(twist - d)))) / (2 * h);
+  }
+  return (numeric - J).cwiseAbs().maxCoeff() / (1 + J.cwiseAbs().maxCoeff());
+}
+
+}  // namespace
+
+TEST_CASE("exp6 and log6 are inverse on small, large and nearly flat rotations") {
+  for (double angle : {0.0, 1e-9, 1e-5, 1e-3, 0.09, 0.11, 1.0, 3.0, 3.141592}) {
+    Vector6d twist = random(6, 1);
+    twist.tail<3>() *= angle / twist.tail<3>().norm();
+    CAPTURE(angle);
+    CHECK((log6(exp6(twist)) - twist).norm() < 1e-9);
+    CHECK((exp6(twist).R * exp6(twist).R.transpose() - Matrix3d::Identity()).norm() < 1e-14);
+  }
+}
+
+TEST_CASE("Jacobians of exp6 and log6 agree with central differences, and a poisoned entry is seen") {
+  for (double angle : {0.0, 1e-6, 1e-4, 1e-2, 0.099, 0.101, 0.7, 2.0, 2.9}) {
+    Vector6d twist = random(6, 1);
+    twist.tail<3>() *= angle / twist.tail<3>().norm();
+    CAPTURE(angle);
+    Matrix6d J = calcRightJacobian6(twist);
+    CHECK(calcJacobianError(twist, J) < 1e-9);
+    CHECK((calcLogJacobian6(exp6(twist)) * J - Matrix6d::Identity()).norm() < 1e-9);
+    J(1, 4) += 1e-5;
+    CHECK(calcJacobianError(twist, J) > 1e-6);
+  }
+}
+
+TEST_CASE("spatial cross products are the derivative of the adjoint actions") {
+  const Vector6d v = random(6, 1), m = random(6, 1), f = random(6, 1);
+  const double h = 1e-6;
+  CHECK(((exp6(h * v).actMotion(m) - exp6(-h * v).actMotion(m)) / (2 * h) - crossMotion(v, m)).norm() < 1e-8);
+  CHECK(((exp6(h * v).actForce(f) - exp6(-h * v).actForce(f)) / (2 * h) - crossForce(v, f)).norm() < 1e-8);
+  CHECK((makeCrossMotionMatrix(v) * m - crossMotion(v, m)).norm() < 1e-14);
+  const SE3 X = exp6(v);
+  CHECK(X.actMotion(m).dot(X.actForce(f)) == Approx(m.dot(f)));
+  CHECK((X.toActionMatrix() * m - X.actMotion(m)).norm() < 1e-14);
+}
+
+TEST_CASE("every joint kind: integrate, difference, their Jacobians and the motion subspace are consistent") {
+  using K = JointKind;
+  for (K kind : {K::Revolute, K::Continuous, K::Prismatic, K::Spherical, K::Universal, K::Planar, K::FreeFlyer}) {
+    CAPTURE(getName(kind));
+    Joint joint;
+    joint.kind = kind;
+    joint.axis = random(3, 1).normalized();
+    joint.axis2 = random(3, 1).normalized();
+    joint.nq = getNq(kind);
+    joint.nv = getNv(kind);
+    VectorXd q0(joint.nq), q(joint.nq), q1(joint.nq), back(joint.nv);
+    setNeutral(kind, q0);
+    integrateJoint(joint, q0, random(joint.nv, 0.5), q);
+    const VectorXd dv = random(joint.nv, 0.5);
+    integrateJoint(joint, q, dv, q1);
+    calcJointDifference(joint, q, q1, back);
+    CHECK((back - dv).norm() < 1e-12);
+
+    Matrix6Xd S(6, joint.nv);
+    calcJointSubspace(joint, q, S);
+    MatrixXd Jq(joint.nv, joint.nv), Jv(joint.nv, joint.nv), Jd(joint.nv, joint.nv);
+    calcJointIntegrateJacobians(joint, dv, Jq, Jv);
+    calcJointDifferenceJacobian(joint, dv, Jd);
+    CHECK((Jd * Jv - MatrixXd::Identity(joint.nv, joint.nv)).norm() < 1e-10);
+    const double h = 1e-6;
+    for (int k = 0; k < joint.nv; ++k) {
+      const VectorXd d = h * VectorXd::Unit(joint.nv, k);
+      VectorXd qp(joint.nq), qm(joint.nq), dp(joint.nv), dm(joint.nv), rp(joint.nq), rm(joint.nq);
+      integrateJoint(joint, q, d, qp);
+      integrateJoint(joint, q, -d, qm);
+      const SE3 X = calcJointPlacement(joint, q);
+      const Vector6d twist = (log6(X.inverseTimes(calcJointPlacement(joint, qp))) -
+                              log6(X.inverseTimes(calcJointPlacement(joint, qm)))) / (2 * h);
+      CHECK((twist - S.col(k)).norm() < 1e-8);
+      integrateJoint(joint, qp, dv, rp);
+      integrateJoint(joint, qm, dv, rm);
+      calcJointDifference(joint, q1, rp, dp);
+      calcJointDifference(joint, q1, rm, dm);
+      CHECK(((dp - dm) / (2 * h) - Jq.col(k)).norm() < 1e-8);
+      integrateJoint(joint, q, dv + d, rp);
+      integrateJoint(joint, q, dv - d, rm);
+      calcJointDifference(joint, q1, rp, dp);
+      calcJointDifference(joint, q1, rm, dm);
+      CHECK(((dp - dm) / (2 * h) - Jv.col(k)).norm() < 1e-8);
+    }
+  }
+}
