@@ -1,0 +1,1 @@
+bielle_test(lq SOURCES test_lq.cpp LIBS bielle_solve)
