@@ -105,7 +105,10 @@ void ModelBuilder::addClosure(const std::string& name, ClosureKind kind, const s
   if (f1.body == f2.body)
     fail(element, "frames '" + frame1 + "' and '" + frame2 + "' are on the same rigid body",
          "a closure needs a joint between its frames");
-  if (!(axis.norm() > 1e-12)) fail(element, "its hinge axis is not a direction", "give a non-zero vector");
+  if (!(axis.norm() > 1e-12) || !axis.allFinite())
+    fail(element, "its hinge axis is not a direction", "give a non-zero vector");
+  if (!(kp >= 0) || !(kd >= 0) || std::isinf(kp) || std::isinf(kd))
+    fail(element, "a stabilisation gain is not a finite number of 0 or more", "correct kp and kd");
   Closure closure;
   closure.name = name;
   closure.kind = kind;
@@ -122,14 +125,16 @@ void ModelBuilder::addClosure(const std::string& name, ClosureKind kind, const s
 void ModelBuilder::addMotor(const std::string& joint, double armature, double effort_limit, double velocity_limit) {
   const std::string element = "motor '" + joint + "'";
   const int index = model_.findJoint(joint);
-  if (index < 0) fail(element, "there is no joint of this name", "name a moving joint of the robot");
+  if (index < 0) fail(element, "there is no moving joint of this name", "name a joint of the robot that is not fixed");
   const Joint& j = model_.joints_[index];
   if (j.nv != 1)
     fail(element, "it is on a " + std::string(getName(j.kind)) + " joint of " + std::to_string(j.nv) +
                       " coordinates", "motors drive revolute, continuous or prismatic joints");
   if (model_.findMotor(joint) >= 0) fail(element, "the joint has two motors", "list it once");
-  if (!(armature >= 0)) fail(element, "its armature is negative", "give a rotor inertia of 0 or more");
+  if (!(armature >= 0) || std::isinf(armature))
+    fail(element, "its armature is not a finite number of 0 or more", "give a rotor inertia");
   if (!(effort_limit > 0)) fail(element, "its effort limit is not positive", "give a positive limit or none");
+  if (!(velocity_limit > 0)) fail(element, "its velocity limit is not positive", "give a positive limit or none");
   model_.motors_.push_back({joint, index, j.idx_v, armature, effort_limit, velocity_limit});
 }
 
@@ -138,11 +143,41 @@ void ModelBuilder::addContact(const std::string& name, const std::string& frame,
   const std::string element = "contact '" + name + "'";
   if (model_.findContact(name) >= 0) fail(element, "it is declared twice", "rename one of them");
   const FramePlace place = getFrame(frame, element);
-  if (!(half_length >= 0) || !(half_width >= 0)) fail(element, "the sole has a negative size", "give sizes in metres");
+  if (!(half_length >= 0) || !(half_width >= 0) || !std::isfinite(half_length + half_width))
+    fail(element, "its sole is not made of two sizes of 0 or more", "give length and width in metres");
   model_.contacts_.push_back({name, place.body, place.X_BF, kind, half_length, half_width});
 }
 
-void ModelBuilder::addReference(Reference reference) { model_.references_.push_back(std::move(reference)); }
+void ModelBuilder::addReference(Reference reference) {
+  checkReference(reference);
+  model_.references_.push_back(std::move(reference));
+}
+
+void ModelBuilder::checkReference(const Reference& reference) const {
+  const std::string element = "reference '" + reference.name + "'";
+  for (const Reference& other : model_.references_)
+    if (other.name == reference.name) fail(element, "two references have this name", "rename one of them");
+  for (const auto& [name, q] : reference.joints) {
+    const int index = model_.findJoint(name);
+    if (index < 0) fail(element, "there is no moving joint '" + name + "'", "correct the name");
+    const Joint& joint = model_.joints_[index];
+    const Eigen::Map<const VectorXd> values(q.data(), static_cast<Eigen::Index>(q.size()));
+    if (values.size() != joint.nq)
+      fail(element, "it gives " + std::to_string(q.size()) + " value(s) to joint '" + name + "', a " +
+                        getName(joint.kind) + " joint of " + std::to_string(joint.nq), "give that many");
+    if (!values.allFinite()) fail(element, "joint '" + name + "' has a value that is not finite", "correct it");
+    const bool has_quaternion = joint.kind == JointKind::Spherical || joint.kind == JointKind::FreeFlyer;
+    if (has_quaternion && std::abs(values.tail<4>().norm() - 1) > 1e-3)
+      fail(element, "the quaternion (x y z w) of joint '" + name + "' is not of unit length", "normalise it");
+  }
+  for (const auto& [contact, position] : reference.feet) {
+    if (model_.findContact(contact) < 0) fail(element, "there is no contact '" + contact + "'", "correct the name");
+    if (!position.allFinite()) fail(element, "the place of contact '" + contact + "' is not finite", "correct it");
+  }
+  if (reference.height_frame.empty()) return;
+  getFrame(reference.height_frame, element);
+  if (!std::isfinite(reference.height)) fail(element, "its height is not finite", "give a height in metres");
+}
 
 void ModelBuilder::addVisual(const std::string& link, Visual visual) {
   const FramePlace place = getFrame(link, "visual of link '" + link + "'");
@@ -153,15 +188,22 @@ void ModelBuilder::addVisual(const std::string& link, Visual visual) {
 
 void ModelBuilder::addSerialJoint(const std::string& joint) {
   const int index = model_.findJoint(joint);
-  if (index < 0) fail("serial joint '" + joint + "'", "there is no joint of this name", "name a moving joint");
+  if (index < 0) fail("serial joint '" + joint + "'", "there is no moving joint of this name", "name a joint of the robot that is not fixed");
+  const std::vector<int>& listed = model_.serial_joints_;
+  if (std::find(listed.begin(), listed.end(), index) != listed.end())
+    fail("serial joint '" + joint + "'", "it is listed twice", "list it once");
   model_.serial_joints_.push_back(index);
 }
 
-void ModelBuilder::setGravity(const Vector3d& gravity) { model_.gravity_ = gravity; }
+void ModelBuilder::setGravity(const Vector3d& gravity) {
+  if (!gravity.allFinite()) fail("gravity", "it is not finite", "give three numbers in m/s^2");
+  model_.gravity_ = gravity;
+}
 
 void ModelBuilder::setArmature(const std::string& joint, double armature) {
-  if (model_.findJoint(joint) < 0) fail("armature of '" + joint + "'", "there is no joint of this name", "name a moving joint");
-  if (!(armature >= 0)) fail("armature of '" + joint + "'", "it is negative", "give 0 or more");
+  if (model_.findJoint(joint) < 0) fail("armature of '" + joint + "'", "there is no moving joint of this name", "name a joint of the robot that is not fixed");
+  if (!(armature >= 0) || std::isinf(armature))
+    fail("armature of '" + joint + "'", "it is not a finite number of 0 or more", "give a rotor inertia");
   joint_armature_[joint] = armature;
 }
 
@@ -190,7 +232,7 @@ void ModelBuilder::checkInertias(std::vector<std::string>* warnings) const {
     if (inertia.mass == 0 && moments[2] > slack)
       fail(element, "it has rotational inertia but no mass", "give it a mass, or no inertia");
     if (warnings && inertia.mass >= 1000)
-      warnings->push_back(element + ": a mass of " + std::to_string(inertia.mass) + " kg is implausible for a leg");
+      warnings->push_back((source_.empty() ? "" : source_ + ": ") + element + ": a mass of " + std::to_string(inertia.mass) + " kg is implausible for a leg");
   }
 }
 
@@ -221,10 +263,15 @@ void ModelBuilder::finishDofs(Model& model) const {
       if (!(model.lower_[k] <= model.upper_[k]))
         fail("joint '" + joint.name + "'", "its lower limit is above its upper limit", "swap them");
   }
-  for (const Motor& motor : model.motors_) model.armature_[motor.dof] = motor.armature;
+  for (const Motor& motor : model.motors_) {
+    model.armature_[motor.dof] = motor.armature;
+    model.velocity_limit_[motor.dof] = std::min(model.velocity_limit_[motor.dof], motor.velocity_limit);
+  }
   for (const auto& [name, armature] : joint_armature_) {
+    if (model.findMotor(name) >= 0)
+      fail("armature of '" + name + "'", "the joint has a motor", "give the armature with the motor");
     const Joint& joint = model.joints_[model.findJoint(name)];
-    model.armature_.segment(joint.idx_v, joint.nv).array() += armature;
+    model.armature_.segment(joint.idx_v, joint.nv).setConstant(armature);
   }
 }
 

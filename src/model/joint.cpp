@@ -15,12 +15,6 @@ Vector6d embedPlanar(const Joint& joint, ConstVectorRef dv) {
   return twist;
 }
 
-void writeQuaternion(const Matrix3d& R, VectorRef q) {
-  Eigen::Quaterniond quat(R);
-  quat.normalize();
-  q = quat.coeffs();
-}
-
 // Projection of a 6x6 Jacobian on the tangent of the plane.
 void projectPlanar(const Joint& joint, const Matrix6d& J, MatrixRef out) {
   const Matrix3d B = makePlaneBasis(joint.axis);
@@ -149,7 +143,7 @@ void calcJointDifference(const Joint& joint, ConstVectorRef q0, ConstVectorRef q
   switch (joint.kind) {
     case JointKind::Spherical: {
       const Matrix3d R0 = ConstQuaternionMap(q0.data()).toRotationMatrix();
-      dv = log3(R0.transpose() * ConstQuaternionMap(q1.data()).toRotationMatrix());
+      dv.head<3>() = log3(R0.transpose() * ConstQuaternionMap(q1.data()).toRotationMatrix());
       break;
     }
     case JointKind::Planar: {
@@ -162,7 +156,7 @@ void calcJointDifference(const Joint& joint, ConstVectorRef q0, ConstVectorRef q
       dv[2] = angle;
       break;
     }
-    case JointKind::FreeFlyer: dv = log6(calcJointPlacement(joint, q0).inverseTimes(calcJointPlacement(joint, q1))); break;
+    case JointKind::FreeFlyer: dv.head<6>() = log6(calcJointPlacement(joint, q0).inverseTimes(calcJointPlacement(joint, q1))); break;
     default: dv = q1 - q0;
   }
 }

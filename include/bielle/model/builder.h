@@ -19,6 +19,9 @@ class ModelBuilder {
  public:
   explicit ModelBuilder(std::string name, std::string source = "");
 
+  /// File named by the errors of whatever is added from now on.
+  void setSource(const std::string& source) { source_ = source; }
+
   /// Adds a link carried by a joint. A Fixed joint merges the link into its parent and leaves a frame of its name.
   /// \param joint kind, placement and axes; its parent index and q/v indices are filled here
   void addLink(const std::string& link, const std::string& parent_link, Joint joint, const Inertia& inertia,
@@ -34,11 +37,12 @@ class ModelBuilder {
                 double velocity_limit = std::numeric_limits<double>::infinity());
   void addContact(const std::string& name, const std::string& frame, ContactKind kind, double half_length,
                   double half_width);
+  /// Its joints, contacts and frame are declared before it.
   void addReference(Reference reference);
   void addVisual(const std::string& link, Visual visual);
   void addSerialJoint(const std::string& joint);
   void setGravity(const Vector3d& gravity);
-  /// Rotor inertia on every dof of a joint that no motor drives.
+  /// Rotor inertia on every dof of a joint that no motor drives (a motor has its own).
   void setArmature(const std::string& joint, double armature);
 
   /// Validates and freezes. Things possible but implausible are appended to `warnings` when given.
@@ -54,6 +58,7 @@ class ModelBuilder {
   void finishDofs(Model& model) const;
   void finishClosures(Model& model) const;
   void checkInertias(std::vector<std::string>* warnings) const;
+  void checkReference(const Reference& reference) const;
 
   std::string source_;
   Model model_;

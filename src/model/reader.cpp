@@ -1,0 +1,145 @@
+// Puts the two files of a robot together.
+#include "bielle/model/reader.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "bielle/model/builder.h"
+#include "bielle/model/error.h"
+#include "robot_files.h"
+
+namespace bielle {
+namespace {
+
+template <typename Joints>
+auto findJoint(Joints& joints, const std::string& name) {
+  return std::find_if(joints.begin(), joints.end(), [&name](const UrdfJoint& j) { return j.joint.name == name; });
+}
+
+// The kinds that the YAML file gives to joints of the URDF.
+void retypeJoints(const YamlFile& yaml, UrdfFile& urdf) {
+  for (const auto& [name, type] : yaml.joint_types) {
+    const auto it = findJoint(urdf.joints, name);
+    if (it == urdf.joints.end()) {
+      urdf.warnings.push_back(yaml.path + ": key 'joint_name': a listed joint that is absent from the URDF, '" + name +
+                              "', is skipped; correct its name or remove it");
+      continue;
+    }
+    // The limits of the file belong to its own coordinate.
+    if (getNv(type.kind) != getNv(it->joint.kind)) it->lower = it->upper = it->effort = it->velocity = std::nullopt;
+    it->joint.kind = type.kind;
+    if (type.kind != JointKind::Universal) continue;
+    it->joint.axis = type.axis;
+    it->joint.axis2 = type.axis2;
+  }
+}
+
+// The root link: carried by a free-flyer, or part of the ground. A root named "world" is the ground itself.
+void addRoot(const UrdfFile& urdf, BaseKind base, ModelBuilder& builder) {
+  if (urdf.root == "world") return;
+  Joint joint;
+  joint.name = "root_joint";
+  joint.kind = base == BaseKind::Free ? JointKind::FreeFlyer : JointKind::Fixed;
+  builder.addLink(urdf.root, "world", joint, urdf.links.at(urdf.root).inertia);
+}
+
+void addJoints(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {
+  for (const UrdfJoint& j : urdf.joints) {
+    JointLimits limits;
+    std::optional<double> velocity = j.velocity;
+    for (const MotorSpec& motor : yaml.motors)
+      if (motor.joint == j.joint.name && motor.velocity) velocity = motor.velocity;
+    if (getNv(j.joint.kind) == 1) {
+      if (j.lower) limits.lower = VectorXd::Constant(1, *j.lower);
+      if (j.upper) limits.upper = VectorXd::Constant(1, *j.upper);
+      if (velocity) limits.velocity = VectorXd::Constant(1, *velocity);
+    }
+    builder.addLink(j.child, j.parent, j.joint, urdf.links.at(j.child).inertia, limits);
+  }
+  for (const auto& [name, link] : urdf.links)
+    for (const Visual& visual : link.visuals) builder.addVisual(name, visual);
+}
+
+void addMotors(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  std::map<std::string, double> armature = yaml.armature;
+  for (const MotorSpec& motor : yaml.motors) {
+    const auto joint = findJoint(urdf.joints, motor.joint);
+    const bool found = joint != urdf.joints.end();
+    if (motor.armature && armature.count(motor.joint))
+      throw ModelError(yaml.path, "motor '" + motor.joint + "'", "'motors' and 'armature' both give its armature",
+                       "keep one of them");
+    const double from_map = armature.count(motor.joint) ? armature[motor.joint] : yaml.motor_armature.value_or(0);
+    armature.erase(motor.joint);
+    builder.addMotor(motor.joint, motor.armature.value_or(from_map),
+                     motor.effort.value_or(found ? joint->effort.value_or(inf) : inf),
+                     motor.velocity.value_or(found ? joint->velocity.value_or(inf) : inf));
+  }
+  for (const auto& [joint, value] : armature) builder.setArmature(joint, value);
+}
+
+class FrameResolver {
+ public:
+  FrameResolver(const UrdfFile& urdf, const YamlFile& yaml) : urdf_(urdf), yaml_(yaml) {}
+
+  /// A link, or the child of a joint when no link has this name.
+  std::string find(const std::string& name, const std::string& element) const {
+    if (name == "world" || urdf_.links.count(name)) return name;
+    const auto joint = findJoint(urdf_.joints, name);
+    if (joint == urdf_.joints.end())
+      throw ModelError(yaml_.path, element, "there is no link or joint '" + name + "' in the URDF", "correct the name");
+    return joint->child;
+  }
+
+ private:
+  const UrdfFile& urdf_;
+  const YamlFile& yaml_;
+};
+
+// What refers to the tree by name.
+void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {
+  const FrameResolver frames(urdf, yaml);
+  for (const ClosureSpec& c : yaml.closures) {
+    const std::string element = "closure '" + c.name + "'";
+    builder.addClosure(c.name, c.kind, frames.find(c.frame1, element), frames.find(c.frame2, element), c.axis, c.kp,
+                       c.kd);
+  }
+  for (const ContactSpec& c : yaml.contacts)
+    builder.addContact(c.name, frames.find(c.frame, "contact '" + c.name + "'"), c.kind, c.half_length, c.half_width);
+  for (const std::string& joint : yaml.serial_joints) builder.addSerialJoint(joint);
+  for (Reference reference : yaml.references) {
+    if (!reference.height_frame.empty())
+      reference.height_frame = frames.find(reference.height_frame, "reference '" + reference.name + "'");
+    builder.addReference(reference);
+  }
+  if (yaml.gravity) builder.setGravity(*yaml.gravity);
+}
+
+}  // namespace
+
+LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options) {
+  const std::filesystem::path path = findUrdf(name_or_path);
+  UrdfFile urdf = readUrdf(path.string());
+  YamlFile yaml;
+  std::filesystem::path settings = path;
+  settings.replace_extension(".yaml");
+  if (std::filesystem::exists(settings)) yaml = readYaml(settings.string());
+  retypeJoints(yaml, urdf);
+
+  ModelBuilder builder(urdf.name, urdf.path);
+  addRoot(urdf, options.base.value_or(yaml.base.value_or(BaseKind::Free)), builder);
+  addJoints(urdf, yaml, builder);
+  builder.setSource(yaml.path);
+  addMotors(urdf, yaml, builder);
+  addNamed(urdf, yaml, builder);
+  builder.setSource(urdf.path);
+
+  LoadedRobot robot;
+  robot.warnings = urdf.warnings;
+  robot.warnings.insert(robot.warnings.end(), yaml.warnings.begin(), yaml.warnings.end());
+  robot.model = builder.build(&robot.warnings);
+  robot.directory = path.has_parent_path() ? path.parent_path().string() : ".";
+  return robot;
+}
+
+}  // namespace bielle

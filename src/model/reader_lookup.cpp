@@ -1,0 +1,114 @@
+// Where robots are.
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include "bielle/model/error.h"
+#include "robot_files.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle {
+namespace {
+
+std::string join(const std::vector<std::string>& items) {
+  std::string text;
+  for (const std::string& item : items) text += (text.empty() ? "" : ", ") + item;
+  return text.empty() ? "none" : text;
+}
+
+bool isFile(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+bool isDirectory(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
+// robot.urdf, else the one named as the directory, else the only one.
+std::string findUrdfInDirectory(const fs::path& directory) {
+  const fs::path named = fs::absolute(directory).lexically_normal();
+  const std::string stem = (named.has_filename() ? named : named.parent_path()).filename().string();
+  for (const std::string& candidate : {std::string("robot"), stem})
+    if (isFile(directory / (candidate + ".urdf"))) return (directory / (candidate + ".urdf")).string();
+  std::vector<std::string> found;
+  std::error_code error;
+  for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error))
+    if (it->path().extension() == ".urdf" && isFile(it->path())) found.push_back(it->path().string());
+  if (found.size() == 1) return found.front();
+  std::sort(found.begin(), found.end());
+  throw ModelError(directory.string(), "directory",
+                   found.empty() ? "it holds no .urdf file" : "it holds several .urdf files: " + join(found),
+                   found.empty() ? "put robot.urdf there" : "give one of them by its path");
+}
+
+}  // namespace
+
+std::string readText(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  if (!file.is_open() || file.bad() || isDirectory(path))
+    throw ModelError(path, "file", "it cannot be read", "check the path and its permissions");
+  return text;
+}
+
+std::vector<std::string> getRobotDirectories() {
+  std::vector<std::string> directories;
+  const auto add = [&directories](const std::string& directory) {
+    if (!directory.empty() && std::find(directories.begin(), directories.end(), directory) == directories.end())
+      directories.push_back(directory);
+  };
+  if (const char* variable = std::getenv("BIELLE_ROBOTS")) {
+    const std::string list = variable;
+    for (size_t begin = 0, end = 0; begin <= list.size(); begin = end + 1) {
+      end = std::min(list.find(':', begin), list.size());
+      add(list.substr(begin, end - begin));
+    }
+  }
+  // Beside the running program first: an installed program must not see the source tree it came from.
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  if (!error) {
+    const fs::path beside = program.parent_path().parent_path() / "share/bielle/robots";
+    if (isDirectory(beside)) add(beside.string());
+  }
+  add(BIELLE_SOURCE_ROBOTS);
+  add(BIELLE_INSTALL_ROBOTS);
+  return directories;
+}
+
+std::vector<std::string> listRobots() {
+  std::set<std::string> names;
+  for (const std::string& directory : getRobotDirectories()) {
+    std::error_code error;
+    for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
+      const std::string name = it->path().filename().string();
+      if (isFile(it->path() / (name + ".urdf"))) names.insert(name);
+    }
+  }
+  return {names.begin(), names.end()};
+}
+
+std::string findUrdf(const std::string& name_or_path) {
+  const fs::path path = name_or_path;
+  const bool is_name =
+      !name_or_path.empty() && name_or_path.find('/') == std::string::npos && path.extension() != ".urdf";
+  if (is_name)
+    for (const std::string& directory : getRobotDirectories()) {
+      const fs::path file = fs::path(directory) / path / (name_or_path + ".urdf");
+      if (isFile(file)) return file.string();
+    }
+  if (isDirectory(path)) return findUrdfInDirectory(path);
+  if (isFile(path)) return name_or_path;
+  throw ModelError("", "robot '" + name_or_path + "'",
+                   is_name ? "there is none of this name in " + join(getRobotDirectories()) + ", nor such a path"
+                           : "there is no such file or directory",
+                   "give a path, or one of the known names: " + join(listRobots()));
+}
+
+}  // namespace bielle

@@ -1,0 +1,321 @@
+// The only file that knows urdfdom. TinyXML, which urdfdom reads with, is asked first for what urdfdom forgets or lets
+// through: the order of the joints, links with two parents, detached cycles, mimic joints, the place of a bad number.
+#include <console_bridge/console.h>
+#include <tinyxml.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include <cctype>
+#include <cmath>
+#include <locale>
+#include <mutex>
+#include <set>
+#include <sstream>
+
+#include "bielle/model/error.h"
+#include "robot_files.h"
+
+namespace bielle {
+namespace {
+
+constexpr int kMaxDepth = 200;  // of nested elements; TinyXML recurses without a bound of its own
+
+struct NumberRule {
+  const char *tag, *attribute;
+  int count;
+};
+constexpr NumberRule kNumbers[] = {
+    {"origin", "xyz", 3},   {"origin", "rpy", 3},      {"axis", "xyz", 3},         {"mass", "value", 1},
+    {"inertia", "ixx", 1},  {"inertia", "ixy", 1},     {"inertia", "ixz", 1},      {"inertia", "iyy", 1},
+    {"inertia", "iyz", 1},  {"inertia", "izz", 1},     {"limit", "lower", 1},      {"limit", "upper", 1},
+    {"limit", "effort", 1}, {"limit", "velocity", 1},  {"dynamics", "damping", 1}, {"dynamics", "friction", 1},
+    {"box", "size", 3},     {"cylinder", "radius", 1}, {"cylinder", "length", 1},  {"sphere", "radius", 1},
+    {"mesh", "scale", 3},   {"color", "rgba", 4}};
+
+const std::map<std::string, JointKind> kKinds = {
+    {"revolute", JointKind::Revolute}, {"continuous", JointKind::Continuous}, {"prismatic", JointKind::Prismatic},
+    {"fixed", JointKind::Fixed},       {"floating", JointKind::FreeFlyer},    {"planar", JointKind::Planar}};
+
+struct Tree {
+  std::string robot, root;
+  std::vector<std::pair<std::string, JointKind>> joints;  // depth first
+  std::vector<std::string> warnings;
+};
+
+// Catches what urdfdom would print. console_bridge has one handler per process, hence the lock.
+class LogCapture : public console_bridge::OutputHandler {
+ public:
+  LogCapture() : lock_(mutex()) { console_bridge::useOutputHandler(this); }
+  ~LogCapture() override { console_bridge::restorePreviousOutputHandler(); }
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_WARN) text_ += (text_.empty() ? "" : ", ") + text;
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex instance;
+    return instance;
+  }
+  std::lock_guard<std::mutex> lock_;
+  std::string text_;
+};
+
+void checkDepth(const std::string& xml, const std::string& path) {
+  int depth = 0;
+  for (size_t i = 0; i + 1 < xml.size(); ++i) {
+    if (xml[i] == '<' && std::isalpha(static_cast<unsigned char>(xml[i + 1]))) ++depth;
+    if ((xml[i] == '<' && xml[i + 1] == '/') || (xml[i] == '/' && xml[i + 1] == '>')) --depth;
+    if (depth > kMaxDepth)
+      throw ModelError(path, "element 'robot'", "elements are nested deeper than " + std::to_string(kMaxDepth),
+                       "close them; a URDF needs five levels");
+  }
+}
+
+bool areFiniteNumbers(const std::string& text, int count) {
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  double value;
+  int n = 0;
+  while (stream >> value) n += std::isfinite(value);
+  return stream.eof() && n == count;
+}
+
+void checkNumbers(const TiXmlElement& element, const std::string& owner, const std::string& path) {
+  for (const NumberRule& rule : kNumbers) {
+    const char* text = element.ValueStr() == rule.tag ? element.Attribute(rule.attribute) : nullptr;
+    if (text && !areFiniteNumbers(text, rule.count))
+      throw ModelError(path, owner,
+                       "<" + element.ValueStr() + " " + rule.attribute + "=\"" + text + "\"> (line " +
+                           std::to_string(element.Row()) + ") is not made of " + std::to_string(rule.count) +
+                           " finite number(s)",
+                       "correct it");
+  }
+  for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement())
+    checkNumbers(*e, owner, path);
+}
+
+std::string getAttribute(const TiXmlElement* element, const char* attribute) {
+  const char* text = element ? element->Attribute(attribute) : nullptr;
+  return text ? text : "";
+}
+
+// Names of the links or of the joints; their numbers are checked in passing.
+std::set<std::string> collectNames(const TiXmlElement& robot, const std::string& tag, const std::string& path) {
+  std::set<std::string> names;
+  for (const TiXmlElement* e = robot.FirstChildElement(tag); e; e = e->NextSiblingElement(tag)) {
+    const std::string name = getAttribute(e, "name"), line = " (line " + std::to_string(e->Row()) + ")";
+    if (name.empty()) throw ModelError(path, tag + line, "it has no name", "give it a name attribute");
+    const std::string element = tag + " '" + name + "'";
+    if (!names.insert(name).second)
+      throw ModelError(path, element, "it is declared twice" + line, "rename one of them");
+    checkNumbers(*e, element, path);
+  }
+  return names;
+}
+
+// What urdfdom lets through in one joint.
+void checkJoint(const TiXmlElement& joint, const std::string& path, std::vector<std::string>& warnings) {
+  const std::string element = "joint '" + getAttribute(&joint, "name") + "'", type = getAttribute(&joint, "type");
+  if (!kKinds.count(type)) {
+    std::string known;
+    for (const auto& [name, kind] : kKinds) known += (known.empty() ? "" : ", ") + name;
+    throw ModelError(path, element, "its type '" + type + "' is unknown", "use one of " + known);
+  }
+  if (joint.FirstChildElement("mimic"))
+    throw ModelError(path, element, "it mimics another joint, which Bielle does not model",
+                     "model the coupling as a closure, or make the joint free or fixed");
+  const TiXmlElement* dynamics = joint.FirstChildElement("dynamics");
+  for (const char* attribute : {"damping", "friction"}) {
+    double value = 0;
+    if (dynamics && dynamics->QueryDoubleAttribute(attribute, &value) == TIXML_SUCCESS && value != 0)
+      warnings.push_back(path + ": " + element + ": its " + attribute + " is ignored, joints are frictionless");
+  }
+}
+
+const TiXmlElement& getRobot(const TiXmlDocument& document, const std::string& path) {
+  if (document.Error())
+    throw ModelError(path, "line " + std::to_string(document.ErrorRow()),
+                     std::string("it is not well-formed XML: ") + document.ErrorDesc(), "correct the syntax");
+  const TiXmlElement* robot = document.RootElement();
+  if (!robot || robot->ValueStr() != "robot")
+    throw ModelError(path, "document", "its outermost element is not <robot>", "give a URDF file");
+  if (getAttribute(robot, "name").empty())
+    throw ModelError(path, "element 'robot'", "it has no name", "give it a name attribute");
+  return *robot;
+}
+
+struct Edge {
+  std::string joint, parent, child;
+  JointKind kind;
+};
+
+// All joints in the order of the file, their links checked to exist and to have one parent at most.
+std::vector<Edge> collectEdges(const TiXmlElement& robot, const std::set<std::string>& links, const std::string& path,
+                               std::vector<std::string>& warnings) {
+  std::vector<Edge> edges;
+  std::map<std::string, std::string> carrier;  // link -> the joint that carries it
+  for (const TiXmlElement* j = robot.FirstChildElement("joint"); j; j = j->NextSiblingElement("joint")) {
+    checkJoint(*j, path, warnings);
+    const Edge edge = {getAttribute(j, "name"), getAttribute(j->FirstChildElement("parent"), "link"),
+                       getAttribute(j->FirstChildElement("child"), "link"), kKinds.at(getAttribute(j, "type"))};
+    for (const auto& [end, link] : {std::pair("parent", edge.parent), std::pair("child", edge.child)})
+      if (!links.count(link))
+        throw ModelError(path, "joint '" + edge.joint + "'",
+                         std::string("its ") + end + " link '" + link + "' does not exist",
+                         "declare the link or correct the name");
+    const auto [other, is_first] = carrier.emplace(edge.child, edge.joint);
+    if (!is_first)
+      throw ModelError(path, "link '" + edge.child + "'",
+                       "it is the child of two joints, '" + other->second + "' and '" + edge.joint + "'",
+                       "cut the loop there and declare it as a closure");
+    edges.push_back(edge);
+  }
+  return edges;
+}
+
+Tree makeTree(const std::string& xml, const std::string& path) {
+  checkDepth(xml, path);
+  TiXmlDocument document;
+  document.Parse(xml.c_str());
+  const TiXmlElement& robot = getRobot(document, path);
+  const std::set<std::string> links = collectNames(robot, "link", path);
+  if (links.empty()) throw ModelError(path, "element 'robot'", "it has no link", "declare at least one");
+  collectNames(robot, "joint", path);
+  Tree tree;
+  tree.robot = getAttribute(&robot, "name");
+  const std::vector<Edge> edges = collectEdges(robot, links, path, tree.warnings);
+
+  std::set<std::string> unreached = links;
+  std::map<std::string, std::vector<const Edge*>> below;  // link -> the joints that hang under it
+  for (const Edge& edge : edges) {
+    unreached.erase(edge.child);
+    below[edge.parent].push_back(&edge);
+  }
+  if (unreached.size() > 1)
+    throw ModelError(path, "link '" + *unreached.rbegin() + "'",
+                     "it is a second root beside '" + *unreached.begin() + "'", "connect it by a joint, or remove it");
+  if (!unreached.empty()) tree.root = *unreached.begin();
+  unreached = links;
+  unreached.erase(tree.root);
+  const std::vector<const Edge*>& first = below[tree.root];
+  std::vector<const Edge*> stack(first.rbegin(), first.rend());
+  while (!stack.empty()) {
+    const Edge& edge = *stack.back();
+    stack.pop_back();
+    tree.joints.emplace_back(edge.joint, edge.kind);
+    unreached.erase(edge.child);
+    const std::vector<const Edge*>& next = below[edge.child];
+    stack.insert(stack.end(), next.rbegin(), next.rend());
+  }
+  if (!unreached.empty())
+    throw ModelError(path, "link '" + *unreached.begin() + "'", "the joints over it form a cycle that no root carries",
+                     "cut the loop and declare it as a closure");
+  return tree;
+}
+
+Vector3d toEigen(const urdf::Vector3& v) { return {v.x, v.y, v.z}; }
+
+SE3 toSE3(const urdf::Pose& pose) {
+  const urdf::Rotation& r = pose.rotation;
+  return {Eigen::Quaterniond(r.w, r.x, r.y, r.z).normalized().toRotationMatrix(), toEigen(pose.position)};
+}
+
+Visual makeVisual(const urdf::Visual& visual, const std::string& link, const std::string& path) {
+  Visual out;
+  out.X_BV = toSE3(visual.origin);
+  if (!visual.geometry)
+    throw ModelError(path, "link '" + link + "'", "a visual has no geometry", "give one or remove it");
+  switch (visual.geometry->type) {
+    case urdf::Geometry::BOX:
+      out.shape = Visual::Shape::Box;
+      out.size = toEigen(static_cast<const urdf::Box&>(*visual.geometry).dim);
+      break;
+    case urdf::Geometry::CYLINDER: {
+      const auto& cylinder = static_cast<const urdf::Cylinder&>(*visual.geometry);
+      out.shape = Visual::Shape::Cylinder;
+      out.size = {cylinder.radius, cylinder.length, 0};
+      break;
+    }
+    case urdf::Geometry::SPHERE:
+      out.shape = Visual::Shape::Sphere;
+      out.size = {static_cast<const urdf::Sphere&>(*visual.geometry).radius, 0, 0};
+      break;
+    case urdf::Geometry::MESH: {
+      const auto& mesh = static_cast<const urdf::Mesh&>(*visual.geometry);
+      out.shape = Visual::Shape::Mesh;
+      out.size = toEigen(mesh.scale);
+      out.mesh = mesh.filename;
+      break;
+    }
+  }
+  if (visual.material) {
+    const urdf::Color& color = visual.material->color;
+    out.rgba = {color.r, color.g, color.b, color.a};
+  }
+  return out;
+}
+
+UrdfLink makeLink(const urdf::Link& link, const std::string& path) {
+  UrdfLink out;
+  out.name = link.name;
+  if (link.inertial) {
+    const urdf::Inertial& in = *link.inertial;
+    Matrix3d I;
+    I << in.ixx, in.ixy, in.ixz, in.ixy, in.iyy, in.iyz, in.ixz, in.iyz, in.izz;
+    out.inertia = Inertia{in.mass, Vector3d::Zero(), I}.transformed(toSE3(in.origin));
+  }
+  for (const auto& visual : link.visual_array) out.visuals.push_back(makeVisual(*visual, link.name, path));
+  return out;
+}
+
+UrdfJoint makeJoint(const urdf::Joint& joint, JointKind kind, const std::string& path) {
+  UrdfJoint out;
+  out.parent = joint.parent_link_name;
+  out.child = joint.child_link_name;
+  out.joint.name = joint.name;
+  out.joint.kind = kind;
+  out.joint.X_PJ = toSE3(joint.parent_to_joint_origin_transform);
+  if (kind == JointKind::Revolute || kind == JointKind::Continuous || kind == JointKind::Prismatic ||
+      kind == JointKind::Planar)
+    out.joint.axis = toEigen(joint.axis);
+  if (!joint.limits) return out;
+  const urdf::JointLimits& limits = *joint.limits;
+  if (limits.effort < 0 || limits.velocity < 0)
+    throw ModelError(path, "joint '" + joint.name + "'", "its effort or velocity limit is negative",
+                     "give a positive limit, or 0 for none");
+  if ((limits.lower != 0 || limits.upper != 0) && kind != JointKind::Continuous) {
+    out.lower = limits.lower;
+    out.upper = limits.upper;
+  }
+  if (limits.effort > 0) out.effort = limits.effort;
+  if (limits.velocity > 0) out.velocity = limits.velocity;
+  return out;
+}
+
+}  // namespace
+
+UrdfFile readUrdf(const std::string& path) {
+  const std::string xml = readText(path);
+  Tree tree = makeTree(xml, path);
+  urdf::ModelInterfaceSharedPtr model;
+  std::string complaints;
+  {
+    LogCapture capture;
+    model = urdf::parseURDF(xml);
+    complaints = capture.text();
+  }
+  // urdfdom goes on after some of its errors (a link whose inertial it could not read has none), we do not.
+  if (!model || !complaints.empty())
+    throw ModelError(path, "robot '" + tree.robot + "'", "urdfdom cannot read it: " + complaints,
+                     "correct the element");
+  UrdfFile file;
+  file.path = path;
+  file.name = tree.robot;
+  file.root = tree.root;
+  file.warnings = std::move(tree.warnings);
+  for (const auto& [name, link] : model->links_) file.links[name] = makeLink(*link, path);
+  for (const auto& [name, kind] : tree.joints) file.joints.push_back(makeJoint(*model->joints_.at(name), kind, path));
+  return file;
+}
+
+}  // namespace bielle

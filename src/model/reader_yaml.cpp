@@ -1,0 +1,308 @@
+// The only file that knows yaml-cpp. Every key of every map is known or refused.
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <set>
+
+#include "bielle/model/error.h"
+#include "robot_files.h"
+
+namespace bielle {
+namespace {
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+// A place in the file: its value and its name for messages.
+class Entry {
+ public:
+  Entry(std::string path, std::string element, YAML::Node node)
+      : path_(std::move(path)), element_(std::move(element)), node_(std::move(node)) {}
+
+  [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const {
+    const int line = node_.IsDefined() ? node_.Mark().line : -1;
+    throw ModelError(
+        path_,
+        (element_.empty() ? "document" : element_) + (line >= 0 ? " (line " + std::to_string(line + 1) + ")" : ""),
+        problem, remedy);
+  }
+  const std::string& element() const { return element_; }
+  bool isMap() const { return node_.IsMap(); }
+  bool isList() const { return node_.IsSequence(); }
+
+  std::string getText() const {
+    if (!node_.IsScalar() || node_.Scalar().empty()) fail("it is not a name", "give one word");
+    return node_.Scalar();
+  }
+  double getNumber(bool may_be_infinite = false) const {
+    double value = 0;
+    if (!node_.IsScalar() || !YAML::convert<double>::decode(node_, value))
+      fail("it is not a number", "give one number");
+    if (std::isnan(value) || (std::isinf(value) && !may_be_infinite)) fail("it is not finite", "give a finite number");
+    return value;
+  }
+  /// Elements of a list; `count` < 0: of any length.
+  std::vector<Entry> getList(int count = -1) const {
+    if (!isList()) fail("it is not a list", "write it as [a, b, ...]");
+    if (count >= 0 && static_cast<int>(node_.size()) != count)
+      fail("it has " + std::to_string(node_.size()) + " elements", "give " + std::to_string(count));
+    std::vector<Entry> entries;
+    for (const YAML::Node& item : node_)
+      entries.emplace_back(path_, element_ + "[" + std::to_string(entries.size()) + "]", item);
+    return entries;
+  }
+  std::vector<std::string> getTexts(int count = -1) const {
+    std::vector<std::string> out;
+    for (const Entry& entry : getList(count)) out.push_back(entry.getText());
+    return out;
+  }
+  std::vector<double> getNumbers(int count = -1) const {
+    std::vector<double> out;
+    for (const Entry& entry : getList(count)) out.push_back(entry.getNumber());
+    return out;
+  }
+  Vector3d getVector3() const { return Eigen::Map<const Vector3d>(getNumbers(3).data()); }
+  /// Pairs of a map in the order of the file; nothing written counts as an empty map.
+  std::vector<std::pair<std::string, Entry>> getMap() const {
+    std::vector<std::pair<std::string, Entry>> pairs;
+    if (node_.IsNull()) return pairs;
+    if (!isMap()) fail("it is not a map", "write it as {name: value, ...}");
+    std::set<std::string> seen;
+    for (const auto& pair : node_) {
+      if (!pair.first.IsScalar()) fail("one of its keys is not a name", "use plain words as keys");
+      const std::string key = pair.first.Scalar();
+      if (!seen.insert(key).second) fail("key '" + key + "' is given twice", "keep one");
+      pairs.emplace_back(
+          key, Entry(path_, element_.empty() ? "key '" + key + "'" : element_ + ": key '" + key + "'", pair.second));
+    }
+    return pairs;
+  }
+  /// The map by key, all keys among the known ones.
+  std::map<std::string, Entry> getFields(const std::vector<std::string>& known) const {
+    std::map<std::string, Entry> fields;
+    for (const auto& [key, entry] : getMap()) {
+      if (std::find(known.begin(), known.end(), key) == known.end()) {
+        std::string names;
+        for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
+        entry.fail("it is unknown", "known keys are " + names);
+      }
+      fields.emplace(key, entry);
+    }
+    return fields;
+  }
+
+ private:
+  std::string path_, element_;
+  YAML::Node node_;
+};
+
+using Fields = std::map<std::string, Entry>;
+
+const Entry* find(const Fields& fields, const std::string& key) {
+  const auto it = fields.find(key);
+  return it == fields.end() ? nullptr : &it->second;
+}
+
+const Entry& require(const Fields& fields, const std::string& key, const Entry& owner) {
+  const Entry* entry = find(fields, key);
+  if (!entry) owner.fail("it has no '" + key + "'", "add it");
+  return *entry;
+}
+
+ClosureKind readClosureKind(const Entry& entry) {
+  for (ClosureKind kind : {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D})
+    if (lower(entry.getText()) == getName(kind)) return kind;
+  entry.fail("closure type '" + entry.getText() + "' is unknown", "use 6d (weld), 5d (hinge) or 3d (ball)");
+}
+
+JointRetyping readJointType(const Entry& entry) {
+  static const std::map<std::string, JointKind> kinds = {
+      {"spherical", JointKind::Spherical},   {"fixed", JointKind::Fixed},         {"revolute", JointKind::Revolute},
+      {"continuous", JointKind::Continuous}, {"prismatic", JointKind::Prismatic}, {"planar", JointKind::Planar},
+      {"floating", JointKind::FreeFlyer}};
+  const std::string type = lower(entry.getText());
+  if (const auto it = kinds.find(type); it != kinds.end()) return {it->second, Vector3d::UnitZ(), Vector3d::UnitY()};
+  const auto isAxis = [](char c) { return c >= 'x' && c <= 'z'; };
+  if (type.size() == 9 && type.compare(0, 7, "ujoint_") == 0 && isAxis(type[7]) && isAxis(type[8]) &&
+      type[7] != type[8])
+    return {JointKind::Universal, Vector3d::Unit(type[7] - 'x'), Vector3d::Unit(type[8] - 'x')};
+  entry.fail(
+      "joint type '" + entry.getText() + "' is unknown",
+      "use SPHERICAL, UJOINT_ and two different axes (UJOINT_XY), FIXED, REVOLUTE, CONTINUOUS, PRISMATIC, PLANAR "
+      "or FLOATING");
+}
+
+// "knee_A" and "knee_B" are the ends of "knee"; other pairs get both names.
+std::string makeClosureName(const std::string& a, const std::string& b) {
+  const std::string stem = a.substr(0, a.size() - 1);
+  const char end_a = std::toupper(static_cast<unsigned char>(a.back())),
+             end_b = std::toupper(static_cast<unsigned char>(b.back()));
+  const bool ends = (end_a == 'A' && end_b == 'B') || (end_a == 'B' && end_b == 'A');
+  if (!ends || a.size() != b.size() || b.compare(0, stem.size(), stem) != 0) return a + "--" + b;
+  const size_t last = stem.find_last_not_of("_-. ");
+  return last == std::string::npos ? a + "--" + b : stem.substr(0, last + 1);
+}
+
+// closed_loop, type, closure_name: the published lists.
+void readPublishedClosures(const Fields& fields, const Entry& root, YamlFile& file) {
+  const Entry *loops = find(fields, "closed_loop"), *types = find(fields, "type"),
+              *names = find(fields, "closure_name");
+  if (!loops) {
+    if (types || names)
+      (types ? types : names)->fail("there is no closed_loop", "list the frames of each closure there");
+    return;
+  }
+  const std::vector<Entry> pairs = loops->getList();
+  const int n = static_cast<int>(pairs.size());
+  const std::vector<Entry> kinds = require(fields, "type", root).getList(n);
+  const std::vector<std::string> given = names ? names->getTexts(n) : std::vector<std::string>();
+  for (int i = 0; i < n; ++i) {
+    const std::vector<std::string> frames = pairs[i].getTexts(2);
+    ClosureSpec closure;
+    closure.name = names ? given[i] : makeClosureName(frames[0], frames[1]);
+    closure.frame1 = frames[0];
+    closure.frame2 = frames[1];
+    closure.kind = readClosureKind(kinds[i]);
+    file.closures.push_back(closure);
+  }
+}
+
+void readClosures(const Entry& list, YamlFile& file) {
+  for (const Entry& entry : list.getList()) {
+    const Fields fields = entry.getFields({"name", "frames", "type", "axis", "kp", "kd"});
+    const std::vector<std::string> frames = require(fields, "frames", entry).getTexts(2);
+    ClosureSpec closure;
+    const Entry* name = find(fields, "name");
+    closure.name = name ? name->getText() : makeClosureName(frames[0], frames[1]);
+    closure.frame1 = frames[0];
+    closure.frame2 = frames[1];
+    closure.kind = readClosureKind(require(fields, "type", entry));
+    if (const Entry* axis = find(fields, "axis")) {
+      if (closure.kind != ClosureKind::Hinge5D) axis->fail("only a hinge has an axis", "use type 5d or remove it");
+      closure.axis = axis->getVector3();
+    }
+    if (const Entry* kp = find(fields, "kp")) closure.kp = kp->getNumber();
+    if (const Entry* kd = find(fields, "kd")) closure.kd = kd->getNumber();
+    file.closures.push_back(closure);
+  }
+}
+
+void readJointTypes(const Fields& fields, YamlFile& file) {
+  const Entry *names = find(fields, "joint_name"), *types = find(fields, "joint_type");
+  if (!names && !types) return;
+  if (!names || !types)
+    (names ? names : types)->fail(names ? "there is no joint_type" : "there is no joint_name", "give both lists");
+  const std::vector<std::string> joints = names->getTexts();
+  const std::vector<Entry> kinds = types->getList(static_cast<int>(joints.size()));
+  std::set<std::string> seen;
+  for (size_t i = 0; i < joints.size(); ++i) {
+    if (!seen.insert(joints[i]).second) names->fail("joint '" + joints[i] + "' is listed twice", "list it once");
+    file.joint_types.emplace_back(joints[i], readJointType(kinds[i]));
+  }
+}
+
+void readMotors(const Fields& fields, YamlFile& file) {
+  const Entry *names = find(fields, "name_mot"), *motors = find(fields, "motors");
+  if (motors) {
+    if (names) file.warnings.push_back(file.path + ": key 'name_mot': it is ignored, 'motors' lists the motors");
+    for (const auto& [joint, entry] : motors->getMap()) {
+      const Fields f = entry.getFields({"armature", "effort", "velocity"});
+      MotorSpec motor;
+      motor.joint = joint;
+      if (const Entry* e = find(f, "armature")) motor.armature = e->getNumber();
+      if (const Entry* e = find(f, "effort")) motor.effort = e->getNumber(true);
+      if (const Entry* e = find(f, "velocity")) motor.velocity = e->getNumber(true);
+      file.motors.push_back(motor);
+    }
+  } else if (names) {
+    for (const std::string& joint : names->getTexts()) file.motors.push_back({joint, {}, {}, {}});
+  }
+  if (const Entry* armature = find(fields, "armature")) {
+    if (!armature->isMap()) {
+      file.motor_armature = armature->getNumber();
+    } else {
+      for (const auto& [joint, entry] : armature->getMap()) file.armature[joint] = entry.getNumber();
+    }
+  }
+}
+
+void readContacts(const Entry& map, YamlFile& file) {
+  for (const auto& [name, entry] : map.getMap()) {
+    const Fields fields = entry.getFields({"frame", "type", "sole"});
+    ContactSpec contact;
+    contact.name = name;
+    contact.frame = require(fields, "frame", entry).getText();
+    const Entry& type = require(fields, "type", entry);
+    const std::string kind = lower(type.getText());
+    if (kind != "6d" && kind != "3d")
+      type.fail("contact type '" + kind + "' is unknown", "use 6d (sole) or 3d (point)");
+    contact.kind = kind == "6d" ? ContactKind::Surface6D : ContactKind::Point3D;
+    if (const Entry* sole = find(fields, "sole")) {
+      if (contact.kind == ContactKind::Point3D) sole->fail("a point has no sole", "use type 6d or remove it");
+      const std::vector<double> size = sole->getNumbers(2);
+      contact.half_length = size[0] / 2;
+      contact.half_width = size[1] / 2;
+    }
+    file.contacts.push_back(contact);
+  }
+}
+
+void readReferences(const Entry& map, YamlFile& file) {
+  for (const auto& [name, entry] : map.getMap()) {
+    const Fields fields = entry.getFields({"joints", "height", "feet"});
+    Reference reference;
+    reference.name = name;
+    if (const Entry* joints = find(fields, "joints"))
+      for (const auto& [joint, value] : joints->getMap())
+        reference.joints[joint] = value.isList() ? value.getNumbers() : std::vector<double>{value.getNumber()};
+    if (const Entry* height = find(fields, "height")) {
+      const Fields f = height->getFields({"frame", "value"});
+      reference.height_frame = require(f, "frame", *height).getText();
+      reference.height = require(f, "value", *height).getNumber();
+    }
+    if (const Entry* feet = find(fields, "feet"))
+      for (const auto& [contact, value] : feet->getMap()) reference.feet[contact] = value.getVector3();
+    file.references.push_back(reference);
+  }
+}
+
+BaseKind readBase(const Entry& entry) {
+  const std::string base = entry.getText();
+  if (base != "free" && base != "fixed") entry.fail("base '" + base + "' is unknown", "use free or fixed");
+  return base == "free" ? BaseKind::Free : BaseKind::Fixed;
+}
+
+void readRoot(const Entry& root, YamlFile& file) {
+  const Fields fields =
+      root.getFields({"closed_loop", "type", "closure_name", "closures", "name_mot", "motors", "armature", "joint_name",
+                      "joint_type", "base", "contacts", "references", "serial_joints", "gravity"});
+  readPublishedClosures(fields, root, file);
+  readJointTypes(fields, file);
+  readMotors(fields, file);
+  if (const Entry* entry = find(fields, "closures")) readClosures(*entry, file);
+  if (const Entry* entry = find(fields, "contacts")) readContacts(*entry, file);
+  if (const Entry* entry = find(fields, "references")) readReferences(*entry, file);
+  if (const Entry* entry = find(fields, "serial_joints")) file.serial_joints = entry->getTexts();
+  if (const Entry* entry = find(fields, "gravity")) file.gravity = entry->getVector3();
+  if (const Entry* entry = find(fields, "base")) file.base = readBase(*entry);
+}
+
+}  // namespace
+
+YamlFile readYaml(const std::string& path) {
+  YamlFile file;
+  file.path = path;
+  try {
+    readRoot(Entry(path, "", YAML::Load(readText(path))), file);
+  } catch (const YAML::Exception& e) {
+    throw ModelError(path, "line " + std::to_string(e.mark.line + 1), "it is not well-formed YAML: " + e.msg,
+                     "correct the syntax");
+  }
+  return file;
+}
+
+}  // namespace bielle

@@ -1,0 +1,85 @@
+#pragma once
+/// \file What the two files of a robot say, before they are put together (private to the reader).
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bielle/model/model.h"
+#include "bielle/model/reader.h"
+
+namespace bielle {
+
+struct UrdfLink {
+  std::string name;
+  Inertia inertia;  ///< in the link frame; zero without an <inertial> element
+  std::vector<Visual> visuals;
+};
+
+struct UrdfJoint {
+  std::string parent, child;  ///< links
+  Joint joint;                ///< name, kind, X_PJ, axis
+  std::optional<double> lower, upper, effort, velocity;
+};
+
+/// A URDF file, checked to be one tree. Joints are depth first, the children of a link in the order of the file.
+struct UrdfFile {
+  std::string path, name, root;
+  std::map<std::string, UrdfLink> links;
+  std::vector<UrdfJoint> joints;
+  std::vector<std::string> warnings;
+};
+
+/// \throws ModelError for anything that is not one tree of named links with finite numbers
+UrdfFile readUrdf(const std::string& path);
+
+/// Kind that replaces the one of the URDF; the axes are the new ones of a universal joint, in the joint's frame.
+struct JointRetyping {
+  JointKind kind = JointKind::Fixed;
+  Vector3d axis = Vector3d::UnitZ(), axis2 = Vector3d::UnitY();
+};
+
+struct ClosureSpec {
+  std::string name, frame1, frame2;
+  ClosureKind kind = ClosureKind::Weld6D;
+  Vector3d axis = Vector3d::UnitZ();
+  double kp = 0, kd = 0;
+};
+
+struct MotorSpec {
+  std::string joint;
+  std::optional<double> armature, effort, velocity;
+};
+
+struct ContactSpec {
+  std::string name, frame;
+  ContactKind kind = ContactKind::Surface6D;
+  double half_length = 0, half_width = 0;
+};
+
+/// A robot's YAML file. Names are not resolved yet.
+struct YamlFile {
+  std::string path;
+  std::optional<BaseKind> base;
+  std::vector<std::pair<std::string, JointRetyping>> joint_types;  ///< in the order of the file
+  std::vector<ClosureSpec> closures;
+  std::vector<MotorSpec> motors;
+  std::map<std::string, double> armature;  ///< joint -> kg m^2
+  std::optional<double> motor_armature;    ///< of every motor
+  std::vector<ContactSpec> contacts;
+  std::vector<Reference> references;
+  std::vector<std::string> serial_joints;
+  std::optional<Vector3d> gravity;
+  std::vector<std::string> warnings;
+};
+
+/// \throws ModelError for unknown keys, wrong types, lists that do not match
+YamlFile readYaml(const std::string& path);
+
+/// File whole. \throws ModelError when it cannot be read
+std::string readText(const std::string& path);
+
+/// Finds the URDF of a robot. \throws ModelError listing where it looked and which robots there are
+std::string findUrdf(const std::string& name_or_path);
+
+}  // namespace bielle
