@@ -1,0 +1,68 @@
+#pragma once
+/// \file Closing a configuration: find q on all closures that also meets given targets.
+///
+/// Hard conditions h(q) = 0 (closures, frame targets) and a soft wish (stay near preferred joint values) are met by
+/// Newton steps in the tangent space: with H = dh/dq and N a basis of its null space,
+///     dq = H^+ (-h) + N z,    z = argmin || W (dq - d) ||,    d = q_ref (-) q,                                        (1)
+/// H^+ truncates small singular values and is damped far from the solution; steps are clamped, and halved while |h| grows.
+/// When this stalls, the conditions are approached by continuation: h(q) = (1 - t) h(q_0), t from 0 to 1.
+#include <string>
+#include <vector>
+
+#include "bielle/dynamics/closure.h"
+
+namespace bielle {
+
+/// A frame to be placed: rows 0-2 its position in the world, rows 3-5 its orientation; rows with mask 0 are free.
+struct FrameTarget {
+  std::string name;
+  int body = 0;
+  SE3 X_BF;
+  SE3 X_WT;
+  Eigen::Matrix<bool, 6, 1> mask = Eigen::Matrix<bool, 6, 1>::Constant(true);
+};
+
+struct AssemblyProblem {
+  VectorXd q_ref;              ///< nq, start and preferred configuration
+  VectorXd weights;            ///< nv, of the wish to stay near q_ref; empty: all one
+  std::vector<FrameTarget> frames;
+};
+
+struct AssemblyOptions {
+  double tolerance = 1e-12;    ///< on every closure and target, m and rad
+  double step_limit = 0.2;     ///< largest change of a coordinate per step, m or rad
+  int max_iterations = 200;    ///< per continuation step
+  int continuation_steps = 20;
+  double rank_tolerance = 1e-7;  ///< singular values of H below this, relative to the largest, count as zero
+};
+
+enum class AssemblyStatus { Closed, NotClosed };
+
+struct AssemblyResult {
+  AssemblyStatus status = AssemblyStatus::NotClosed;
+  VectorXd q;             ///< nq, the best found
+  std::string message;    ///< names the worst loop or target and its gap when not closed
+  int iterations = 0;
+  double gap = 0;         ///< largest closure residual, m or rad
+  std::string worst;      ///< name of the closure or target with the largest residual
+};
+
+AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, const AssemblyOptions& options = {});
+
+/// Nearest closed configuration to q, no other target.
+AssemblyResult closeConfiguration(const Model& model, ConstVectorRef q, const AssemblyOptions& options = {});
+
+/// The assembly problem of a reference of the robot's file: joint wishes, feet flat at their places, height.
+AssemblyProblem makeReferenceProblem(const Model& model, const Reference& reference);
+/// Assembled reference by name.
+/// \throws ModelError when there is no such reference
+AssemblyResult assembleReference(const Model& model, const std::string& name, const AssemblyOptions& options = {});
+
+/// Closest velocity (in the least-squares sense over v) that keeps all closures of the set closed.
+VectorXd projectVelocity(const Model& model, Workspace& ws, const ConstraintSet& constraints, ConstVectorRef q,
+                         ConstVectorRef v);
+
+/// Largest residual of the loops of the set at the workspace's q; the name of its closure when asked.
+double calcLargestGap(const Workspace& ws, const ConstraintSet& constraints, std::string* worst = nullptr);
+
+}  // namespace bielle

@@ -1,0 +1,264 @@
+#include "bielle/dynamics/assembly.h"
+
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+// The hard conditions of Eq. (1): residual and Jacobian, with the name of every row's origin.
+class HardConditions {
+ public:
+  HardConditions(const Model& model, const AssemblyProblem& problem)
+      : model_(model), problem_(problem), set_(makeConstraintSet(model)), ws_(model) {
+    rows_ = set_.rows;
+    for (const FrameTarget& target : problem.frames) rows_ += static_cast<int>(target.mask.count());
+    H.setZero(rows_, model.nv());
+    h.setZero(rows_);
+  }
+
+  int rows() const { return rows_; }
+
+  void update(const VectorXd& q) {
+    updatePositions(model_, ws_, q);
+    for (size_t c = 0; c < set_.closures.size(); ++c) {
+      const Closure& closure = set_.closures[c];
+      const int row = set_.offsets[c], n = getRows(closure.kind);
+      h.segment(row, n) = calcClosureResidual(ws_, closure);
+      const RowsBy6 rate = calcClosureResidualRate(ws_, closure);
+      const SE3 X_W1 = getPlacement(ws_, closure.body1, closure.X_B1);
+      for (size_t i = 0; i < closure.dofs.size(); ++i)
+        H.block(row, closure.dofs[i], n, 1) =
+            closure.signs[i] * (rate * X_W1.actInvMotion(ws_.J.col(closure.dofs[i])));
+    }
+    int row = set_.rows;
+    for (const FrameTarget& target : problem_.frames) row = updateTarget(target, row);
+  }
+
+  // Name and size of the worst violated condition.
+  std::pair<std::string, double> findWorst() const {
+    std::pair<std::string, double> worst{"", -1};
+    const auto consider = [&worst](const std::string& name, double value) {
+      if (!(value <= worst.second)) worst = {name, value};
+    };
+    for (size_t c = 0; c < set_.closures.size(); ++c)
+      consider("closure '" + set_.closures[c].name + "'",
+               h.segment(set_.offsets[c], getRows(set_.closures[c].kind)).cwiseAbs().maxCoeff());
+    int row = set_.rows;
+    for (const FrameTarget& target : problem_.frames) {
+      const int n = static_cast<int>(target.mask.count());
+      if (n) consider("target '" + target.name + "'", h.segment(row, n).cwiseAbs().maxCoeff());
+      row += n;
+    }
+    return worst;
+  }
+
+  double calcLoopGap() const { return calcLargestGap(ws_, set_); }
+
+  MatrixXd H;
+  VectorXd h;
+
+ private:
+  int updateTarget(const FrameTarget& target, int row) {
+    const SE3 X = getPlacement(ws_, target.body, target.X_BF);
+    Vector6d error;
+    error.head<3>() = X.p - target.X_WT.p;
+    error.tail<3>() = log3(target.X_WT.R.transpose() * X.R);
+    const Matrix3d dlog = calcRightJacobianInverse3(error.tail<3>());
+    Matrix6Xd J = calcFrameJacobian(model_, ws_, target.body, target.X_BF);
+    J.topRows<3>() = (X.R * J.topRows<3>()).eval();
+    J.bottomRows<3>() = (dlog * J.bottomRows<3>()).eval();
+    for (int i = 0; i < 6; ++i) {
+      if (!target.mask[i]) continue;
+      h[row] = error[i];
+      H.row(row++) = J.row(i);
+    }
+    return row;
+  }
+
+  const Model& model_;
+  const AssemblyProblem& problem_;
+  ConstraintSet set_;
+  Workspace ws_;
+  int rows_ = 0;
+};
+
+// Eq. (1). `damping` shrinks the part along weak singular directions.
+VectorXd calcStep(const MatrixXd& H, const VectorXd& h, const VectorXd& wish, const VectorXd& weights, double damping,
+                  double rank_tolerance) {
+  if (h.size() == 0) return wish;
+  const Eigen::JacobiSVD<MatrixXd> svd(H, Eigen::ComputeThinU | Eigen::ComputeFullV);
+  const VectorXd& sigma = svd.singularValues();
+  const int rank = static_cast<int>((sigma.array() > rank_tolerance * std::max(sigma[0], 1e-12)).count());
+  const VectorXd gains = sigma.head(rank).array() / (sigma.head(rank).array().square() + damping * damping);
+  VectorXd step = svd.matrixV().leftCols(rank) * gains.cwiseProduct(svd.matrixU().leftCols(rank).transpose() * -h);
+  const MatrixXd N = svd.matrixV().rightCols(H.cols() - rank);
+  if (N.cols() == 0) return step;
+  const MatrixXd WN = weights.asDiagonal() * N;
+  step += N * WN.colPivHouseholderQr().solve(weights.cwiseProduct(wish - step));
+  return step;
+}
+
+// Newton iterations towards h(q) = offset; true when met.
+bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyOptions& options, const VectorXd& offset,
+             HardConditions& conditions, AssemblyResult& result) {
+  const VectorXd weights = problem.weights.size() ? problem.weights : VectorXd::Ones(model.nv());
+  conditions.update(result.q);
+  double error = (conditions.h - offset).norm();
+  for (int i = 0; i < options.max_iterations; ++i, ++result.iterations) {
+    const VectorXd wish = model.difference(result.q, problem.q_ref);
+    const double damping = std::min(0.1, error);
+    VectorXd step = calcStep(conditions.H, conditions.h - offset, wish, weights, error < 1e-3 ? 0.0 : 0.3 * damping,
+                             options.rank_tolerance);
+    const double largest = step.size() ? step.cwiseAbs().maxCoeff() : 0;
+    if (!std::isfinite(largest)) return false;
+    const bool met = conditions.rows() == 0 || (conditions.h - offset).cwiseAbs().maxCoeff() <= options.tolerance;
+    if (met && largest < 1e-9) return true;
+    if (largest > options.step_limit) step *= options.step_limit / largest;
+    // Halve while the conditions get much worse; a little worse is allowed, as the wish bends the path.
+    VectorXd q_new;
+    for (int halving = 0; halving < 8; ++halving, step *= 0.5) {
+      q_new = model.integrate(result.q, step);
+      conditions.update(q_new);
+      if ((conditions.h - offset).norm() <= 1.5 * error + 1e-3) break;
+    }
+    result.q = q_new;
+    error = (conditions.h - offset).norm();
+  }
+  return conditions.rows() == 0 || (conditions.h - offset).cwiseAbs().maxCoeff() <= options.tolerance;
+}
+
+}  // namespace
+
+AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, const AssemblyOptions& options) {
+  HardConditions conditions(model, problem);
+  AssemblyResult result;
+  result.q = problem.q_ref;
+  model.normalize(result.q);
+  bool closed = iterate(model, problem, options, VectorXd::Zero(conditions.rows()), conditions, result);
+  if (!closed) {
+    AssemblyResult best = result;
+    conditions.update(problem.q_ref);
+    const VectorXd start = conditions.h;
+    result.q = problem.q_ref;
+    for (int step = 1; step <= options.continuation_steps; ++step) {
+      const double t = static_cast<double>(step) / options.continuation_steps;
+      closed = iterate(model, problem, options, (1 - t) * start, conditions, result);
+      if (!closed) break;
+    }
+    if (!closed) {  // report the closer of the two attempts
+      conditions.update(result.q);
+      const double error = conditions.h.norm();
+      conditions.update(best.q);
+      if (conditions.h.norm() < error || !std::isfinite(error)) result.q = best.q;
+    }
+  }
+  conditions.update(result.q);
+  const auto [worst, gap] = conditions.findWorst();
+  result.worst = worst;
+  result.gap = conditions.calcLoopGap();
+  result.status = closed ? AssemblyStatus::Closed : AssemblyStatus::NotClosed;
+  if (closed) {
+    result.message = "closed";
+  } else {
+    std::ostringstream text;
+    text << worst << " stays open by " << gap << " (m or rad) after " << result.iterations
+         << " iterations; the targets may be out of reach, or the start on the wrong branch of the mechanism";
+    result.message = text.str();
+  }
+  return result;
+}
+
+AssemblyResult closeConfiguration(const Model& model, ConstVectorRef q, const AssemblyOptions& options) {
+  AssemblyProblem problem;
+  problem.q_ref = q;
+  return assemble(model, problem, options);
+}
+
+AssemblyProblem makeReferenceProblem(const Model& model, const Reference& reference) {
+  AssemblyProblem problem;
+  problem.q_ref = model.makeNeutral();
+  // Listed joints are wishes; the others follow from the closures, with a weight that only settles ties.
+  problem.weights = VectorXd::Constant(model.nv(), 1e-3);
+  for (const auto& [name, values] : reference.joints) {
+    const int index = model.findJoint(name);
+    const std::string element = "reference '" + reference.name + "'";
+    if (index < 0) throw ModelError(model.name(), element, "there is no joint '" + name + "'", "name a moving joint");
+    const Joint& joint = model.joints()[index];
+    if (static_cast<int>(values.size()) != joint.nq)
+      throw ModelError(model.name(), element, "joint '" + name + "' has " + std::to_string(joint.nq) + " values, not " +
+                       std::to_string(values.size()), "give its q as notation.h orders it");
+    problem.q_ref.segment(joint.idx_q, joint.nq) = Eigen::Map<const VectorXd>(values.data(), joint.nq);
+    problem.weights.segment(joint.idx_v, joint.nv).setOnes();
+  }
+  if (model.hasFreeFlyer()) problem.weights.head<6>().setOnes();
+  for (const auto& [name, position] : reference.feet) {
+    const int index = model.findContact(name);
+    if (index < 0) throw ModelError(model.name(), "reference '" + reference.name + "'", "there is no contact '" + name + "'",
+                                    "name one of the contacts of the file");
+    const ContactFrame& contact = model.contacts()[index];
+    FrameTarget target;
+    target.name = name;
+    target.body = contact.body;
+    target.X_BF = contact.X_BF;
+    target.X_WT.p = position;
+    if (contact.kind == ContactKind::Point3D) target.mask.tail<3>().setConstant(false);
+    problem.frames.push_back(target);
+  }
+  if (!reference.height_frame.empty()) {
+    const int index = model.findFrame(reference.height_frame);
+    if (index < 0) throw ModelError(model.name(), "reference '" + reference.name + "'",
+                                    "there is no frame '" + reference.height_frame + "'", "name a link or frame");
+    FrameTarget target;
+    target.name = "height of " + reference.height_frame;
+    target.body = model.frames()[index].body;
+    target.X_BF = model.frames()[index].X_BF;
+    target.X_WT.p.z() = reference.height;
+    target.mask << false, false, true, false, false, false;
+    problem.frames.push_back(target);
+    if (model.hasFreeFlyer()) problem.q_ref[2] = reference.height - target.X_BF.p.z();
+  }
+  return problem;
+}
+
+AssemblyResult assembleReference(const Model& model, const std::string& name, const AssemblyOptions& options) {
+  std::string known;
+  for (const Reference& reference : model.references()) {
+    if (reference.name == name) return assemble(model, makeReferenceProblem(model, reference), options);
+    known += (known.empty() ? "" : ", ") + reference.name;
+  }
+  throw ModelError(model.name(), "reference '" + name + "'", "the robot has no such reference",
+                   known.empty() ? "add one under `references` in its YAML file" : "it has: " + known);
+}
+
+VectorXd projectVelocity(const Model& model, Workspace& ws, const ConstraintSet& constraints, ConstVectorRef q,
+                         ConstVectorRef v) {
+  updatePositions(model, ws, q);
+  MatrixXd J = MatrixXd::Zero(constraints.rows, model.nv());
+  for (size_t c = 0; c < constraints.closures.size(); ++c)
+    calcClosureJacobian(ws, constraints.closures[c],
+                        J.middleRows(constraints.offsets[c], getRows(constraints.closures[c].kind)));
+  if (constraints.rows == 0) return v;
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
+  decomposition.setThreshold(1e-8);
+  decomposition.compute(J);
+  return v - decomposition.solve(J * v);
+}
+
+double calcLargestGap(const Workspace& ws, const ConstraintSet& constraints, std::string* worst) {
+  double gap = 0;
+  for (int c = 0; c < constraints.num_loops; ++c) {
+    const double value = calcClosureResidual(ws, constraints.closures[c]).cwiseAbs().maxCoeff();
+    if (value > gap && worst) *worst = constraints.closures[c].name;
+    gap = std::max(gap, value);
+  }
+  return gap;
+}
+
+}  // namespace bielle

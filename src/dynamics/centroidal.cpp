@@ -1,0 +1,65 @@
+#include "bielle/dynamics/centroidal.h"
+
+namespace bielle {
+namespace {
+
+Vector6d calcMomentumAboutOrigin(const Model& model, const Workspace& ws) {
+  Vector6d h = Vector6d::Zero();
+  for (int i = 1; i < model.numBodies(); ++i) h += ws.h[i];
+  return h;
+}
+
+}  // namespace
+
+Vector3d calcCom(const Model& model, const Workspace& ws) {
+  requireStage(ws, WorkspaceStage::Position, "calcCom", "updatePositions");
+  Vector3d sum = Vector3d::Zero();
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Inertia& inertia = model.bodies()[i].inertia;
+    sum += inertia.mass * ws.X_WB[i].act(inertia.com);
+  }
+  return sum / model.mass();
+}
+
+Vector3d calcComVelocity(const Model& model, const Workspace& ws) {
+  requireStage(ws, WorkspaceStage::Velocity, "calcComVelocity", "updateVelocities");
+  return calcMomentumAboutOrigin(model, ws).head<3>() / model.mass();
+}
+
+void calcComJacobian(const Model& model, const Workspace& ws, Eigen::Ref<Eigen::Matrix3Xd> J) {
+  requireStage(ws, WorkspaceStage::Position, "calcComJacobian", "updatePositions");
+  // A dof moves its subtree rigidly: momentum Yc J_k.
+  J = ws.YJ.topRows<3>() / model.mass();
+}
+
+void calcComVelocityDerivative(const Model& model, const Workspace& ws, Eigen::Ref<Eigen::Matrix3Xd> dv_dq) {
+  requireStage(ws, WorkspaceStage::Velocity, "calcComVelocityDerivative", "updateVelocities");
+  // d h_i / dq_k in the world is Y_i dV_k + J_k x* h_i (Eq. (2) of rnea.h), summed over the subtree of k.
+  std::vector<Vector6d> h = ws.h;
+  for (int i = model.numBodies() - 1; i > 0; --i) {
+    const Joint& joint = model.joints()[i];
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k)
+      dv_dq.col(k) = (ws.Yc[i] * ws.dV.col(k) + crossForce(ws.J.col(k), h[i])).head<3>() / model.mass();
+    if (joint.parent > 0) h[joint.parent] += h[i];
+  }
+}
+
+Vector6d calcCentroidalMomentum(const Model& model, const Workspace& ws) {
+  requireStage(ws, WorkspaceStage::Velocity, "calcCentroidalMomentum", "updateVelocities");
+  Vector6d h = calcMomentumAboutOrigin(model, ws);
+  h.tail<3>() -= calcCom(model, ws).cross(h.head<3>());
+  return h;
+}
+
+double calcKineticEnergy(const Model& model, const Workspace& ws) {
+  requireStage(ws, WorkspaceStage::Velocity, "calcKineticEnergy", "updateVelocities");
+  double energy = 0.5 * model.armature().dot(ws.v.cwiseAbs2());
+  for (int i = 1; i < model.numBodies(); ++i) energy += 0.5 * ws.V[i].dot(ws.h[i]);
+  return energy;
+}
+
+double calcPotentialEnergy(const Model& model, const Workspace& ws) {
+  return -model.mass() * model.gravity().dot(calcCom(model, ws));
+}
+
+}  // namespace bielle

@@ -1,0 +1,165 @@
+#include "bielle/dynamics/closure.h"
+
+#include <cmath>
+
+namespace bielle {
+namespace {
+
+SE3 getFrame1(const Workspace& ws, const Closure& c) { return ws.X_WB[c.body1] * c.X_B1; }
+
+SE3 calcRelativePlacement(const Workspace& ws, const Closure& c) {
+  return getFrame1(ws, c).inverseTimes(ws.X_WB[c.body2] * c.X_B2);
+}
+
+// The two unit vectors normal to the hinge axis, as columns.
+Eigen::Matrix<double, 3, 2> getHingeNormals(const Closure& c) { return makePlaneBasis(c.axis).leftCols<2>(); }
+
+// g = theta / sin(theta) of the angle between the hinge axes, and dg/dcos(theta).
+struct HingeAngle {
+  double g, dg;
+};
+HingeAngle calcHingeAngle(double sine, double cosine) {
+  const double theta = std::atan2(sine, cosine);
+  if (theta < 1e-3) return {1 + theta * theta / 6, -1.0 / 3 - 2 * theta * theta / 15};
+  const double s = std::max(sine, 1e-12);
+  // dg/dtheta = (sin - theta cos) / sin^2 and dtheta = -dcos / sin
+  return {theta / s, -(s - theta * cosine) / (s * s * s)};
+}
+
+}  // namespace
+
+ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTarget>& contacts) {
+  ConstraintSet set;
+  set.closures = model.closures();
+  set.num_loops = static_cast<int>(set.closures.size());
+  for (const ContactTarget& target : contacts) {
+    const ContactFrame& frame = model.contacts()[target.contact];
+    Closure closure;
+    closure.name = frame.name;
+    closure.kind = frame.kind == ContactKind::Surface6D ? ClosureKind::Weld6D : ClosureKind::Ball3D;
+    closure.body1 = frame.body;
+    closure.X_B1 = frame.X_BF;
+    closure.X_B2 = target.X_WT;
+    closure.kp = target.kp;
+    closure.kd = target.kd;
+    closure.dofs = model.supportDofs(frame.body);
+    closure.signs.assign(closure.dofs.size(), 1);
+    set.closures.push_back(closure);
+  }
+  for (const Closure& closure : set.closures) {
+    set.offsets.push_back(set.rows);
+    set.rows += getRows(closure.kind);
+  }
+  return set;
+}
+
+RowVectorUpTo6 selectRows(const Closure& c, const Vector6d& full) {
+  switch (c.kind) {
+    case ClosureKind::Weld6D: return full;
+    case ClosureKind::Ball3D: return full.head<3>();
+    case ClosureKind::Hinge5D: break;
+  }
+  RowVectorUpTo6 rows(5);
+  rows << full.head<3>(), getHingeNormals(c).transpose() * full.tail<3>();
+  return rows;
+}
+
+Vector6d expandRows(const Closure& c, ConstVectorRef lambda) {
+  Vector6d full = Vector6d::Zero();
+  full.head<3>() = lambda.head<3>();
+  if (c.kind == ClosureKind::Weld6D) full.tail<3>() = lambda.tail<3>();
+  if (c.kind == ClosureKind::Hinge5D) full.tail<3>() = getHingeNormals(c) * lambda.tail<2>();
+  return full;
+}
+
+RowVectorUpTo6 calcClosureResidual(const Workspace& ws, const Closure& c) {
+  requireStage(ws, WorkspaceStage::Position, "calcClosureResidual", "updatePositions");
+  const SE3 X = calcRelativePlacement(ws, c);
+  if (c.kind == ClosureKind::Weld6D) return log6(X);
+  if (c.kind == ClosureKind::Ball3D) return X.p;
+  const Vector3d n2 = X.R * c.axis, cross = c.axis.cross(n2);
+  RowVectorUpTo6 rows(5);
+  rows << X.p, getHingeNormals(c).transpose() * (calcHingeAngle(cross.norm(), c.axis.dot(n2)).g * cross);
+  return rows;
+}
+
+RowsBy6 calcClosureResidualRate(const Workspace& ws, const Closure& c) {
+  requireStage(ws, WorkspaceStage::Position, "calcClosureResidualRate", "updatePositions");
+  const SE3 X = calcRelativePlacement(ws, c);
+  // Frame 2 moves in frame 1 with the twist -nu_c.
+  if (c.kind == ClosureKind::Weld6D) return -calcLogJacobian6(X) * X.inverse().toActionMatrix();
+  RowsBy6 rate = RowsBy6::Zero(getRows(c.kind), 6);
+  rate.topLeftCorner<3, 3>() = -Matrix3d::Identity();
+  rate.topRightCorner<3, 3>() = skew(X.p);
+  if (c.kind == ClosureKind::Hinge5D) {
+    const Vector3d n2 = X.R * c.axis, cross = c.axis.cross(n2);
+    const HingeAngle angle = calcHingeAngle(cross.norm(), c.axis.dot(n2));
+    const Matrix3d dn2 = skew(n2);  // d n2 = -nu_ang x n2 = [n2 x] nu_ang
+    const Matrix3d dr = angle.g * skew(c.axis) * dn2 + angle.dg * cross * (c.axis.transpose() * dn2);
+    rate.bottomRightCorner<2, 3>() = getHingeNormals(c).transpose() * dr;
+  }
+  return rate;
+}
+
+RowVectorUpTo6 calcClosureVelocity(const Workspace& ws, const Closure& c) {
+  requireStage(ws, WorkspaceStage::Velocity, "calcClosureVelocity", "updateVelocities");
+  return selectRows(c, getFrame1(ws, c).actInvMotion(ws.V[c.body1] - ws.V[c.body2]));
+}
+
+RowVectorUpTo6 calcClosureAcceleration(const Workspace& ws, const Closure& c) {
+  const Vector6d a = ws.A[c.body1] - ws.A[c.body2] + crossMotion(ws.V[c.body1], ws.V[c.body2]);
+  return selectRows(c, getFrame1(ws, c).actInvMotion(a));
+}
+
+RowVectorUpTo6 calcClosureStabilization(const Workspace& ws, const Closure& c) {
+  RowVectorUpTo6 rows = RowVectorUpTo6::Zero(getRows(c.kind));
+  if (c.kd != 0) rows += c.kd * calcClosureVelocity(ws, c);
+  if (c.kp != 0) rows -= c.kp * calcClosureResidual(ws, c);
+  return rows;
+}
+
+void calcClosureJacobian(const Workspace& ws, const Closure& c, MatrixRef J) {
+  const SE3 X_W1 = getFrame1(ws, c);
+  for (size_t i = 0; i < c.dofs.size(); ++i)
+    J.col(c.dofs[i]) = c.signs[i] * selectRows(c, X_W1.actInvMotion(ws.J.col(c.dofs[i])));
+}
+
+void calcClosureDerivatives(const Workspace& ws, const Closure& c, MatrixRef da_dq, MatrixRef da_dv) {
+  requireStage(ws, WorkspaceStage::Acceleration, "calcClosureDerivatives", "updateAccelerations");
+  const SE3 X_W1 = getFrame1(ws, c);
+  const Vector6d &V1 = ws.V[c.body1], &V2 = ws.V[c.body2], &A2 = ws.A[c.body2];
+  const Vector6d V12 = V1 + V2;
+  RowsBy6 rate;
+  if (c.kp != 0) rate = calcClosureResidualRate(ws, c);
+  for (size_t i = 0; i < c.dofs.size(); ++i) {
+    const int k = c.dofs[i];
+    const double s = c.signs[i];
+    const Vector6d J = ws.J.col(k), dV = ws.dV.col(k);
+    const Vector6d J_V2 = crossMotion(J, V2);
+    Vector6d dq = ws.dA.col(k) - crossMotion(V12, dV) + crossMotion(J, A2) - crossMotion(V1, J_V2);  // Eq. (1)
+    Vector6d dv = ws.dJ.col(k) + dV - crossMotion(V12, J);                                           // Eq. (2)
+    if (c.kd != 0) {
+      dq += c.kd * (dV + J_V2);  // Eq. (3)
+      dv += c.kd * J;            // Eq. (4)
+    }
+    da_dq.col(k) = s * selectRows(c, X_W1.actInvMotion(dq));
+    da_dv.col(k) = s * selectRows(c, X_W1.actInvMotion(dv));
+    if (c.kp != 0) da_dq.col(k) -= (c.kp * s) * (rate * X_W1.actInvMotion(J));
+  }
+}
+
+Vector6d calcClosureWrench(const Workspace& ws, const Closure& c, ConstVectorRef lambda) {
+  return getFrame1(ws, c).actForce(expandRows(c, lambda));
+}
+
+void addClosureForceDerivative(const Model& model, const Workspace& ws, const Closure& c, const Vector6d& wrench,
+                               MatrixRef dID_dq) {
+  if (c.body2 == 0) return;  // the world feels nothing
+  for (size_t i = 0; i < c.dofs.size(); ++i) {
+    const int k = c.dofs[i];
+    const Vector6d moved = c.signs[i] * crossForce(ws.J.col(k), wrench);
+    for (int j : model.supportDofs(c.body2)) dID_dq(j, k) += ws.J.col(j).dot(moved);  // Eq. (5)
+  }
+}
+
+}  // namespace bielle

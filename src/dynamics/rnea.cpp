@@ -1,0 +1,125 @@
+#include "bielle/dynamics/rnea.h"
+
+#include "bielle/dynamics/kinematics.h"
+
+namespace bielle {
+namespace {
+
+// Force of body i, without external forces: Y A + V x* Y V.
+Vector6d calcBodyForce(const Workspace& ws, int i, const Vector6d& A) {
+  return ws.Y[i] * A + crossForce(ws.V[i], ws.h[i]);
+}
+
+// B of Eq. (6) for body i.
+void calcB(const Workspace& ws, int i, Matrix6d& B) {
+  const Matrix6d Vx = makeCrossMotionMatrix(ws.V[i]);
+  Matrix6d YVx;
+  YVx.noalias() = ws.Y[i] * Vx;
+  // V x* = -(V x)^T, hence V x* Y = -(Y V x)^T
+  B = -YVx - YVx.transpose();
+  const Matrix3d f = skew(ws.h[i].head<3>());
+  B.topRightCorner<3, 3>() -= f;
+  B.bottomLeftCorner<3, 3>() -= f;
+  B.bottomRightCorner<3, 3>() -= skew(ws.h[i].tail<3>());
+}
+
+// Whether the axis of dof j moves when the coordinate of dof k of the same joint changes, Eq. (7) or (8).
+bool movesWithinJoint(const Dof& j, const Dof& k) { return !(j.first_of_universal && k.second_of_universal); }
+
+}  // namespace
+
+void updateMassMatrix(const Model& model, Workspace& ws) {
+  requireStage(ws, WorkspaceStage::Position, "updateMassMatrix", "updatePositions");
+  for (int i = 1; i < model.numBodies(); ++i) ws.Yc[i] = ws.Y[i];
+  for (int i = model.numBodies() - 1; i > 0; --i) {
+    const Joint& joint = model.joints()[i];
+    if (joint.parent > 0) ws.Yc[joint.parent] += ws.Yc[i];
+    for (int j = joint.idx_v; j < joint.idx_v + joint.nv; ++j) {
+      ws.YJ.col(j).noalias() = ws.Yc[i] * ws.J.col(j);
+      for (int k = j; k >= 0; k = model.dofs()[k].parent) {
+        const double m = ws.YJ.col(j).dot(ws.J.col(k));
+        ws.M(j, k) = m;
+        ws.M(k, j) = m;
+      }
+    }
+  }
+  ws.M.diagonal() += model.armature();
+}
+
+void updateBias(const Model& model, Workspace& ws) {
+  requireStage(ws, WorkspaceStage::Velocity, "updateBias", "updateVelocities");
+  ws.A[0] << -model.gravity(), Vector3d::Zero();
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    Vector6d& A = ws.A[i];
+    A = ws.A[joint.parent];
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) A += ws.dJ.col(k) * ws.v[k];
+    ws.F[i] = calcBodyForce(ws, i, A);
+  }
+  for (int i = model.numBodies() - 1; i > 0; --i) {
+    const Joint& joint = model.joints()[i];
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) ws.b[k] = ws.J.col(k).dot(ws.F[i]);
+    if (joint.parent > 0) ws.F[joint.parent] += ws.F[i];
+  }
+  ws.stage = WorkspaceStage::Velocity;  // the accelerations written here are those of a = 0
+}
+
+VectorXd calcInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef q, ConstVectorRef v, ConstVectorRef a) {
+  updatePositions(model, ws, q);
+  updateVelocities(model, ws, v);
+  updateAccelerations(model, ws, a);
+  VectorXd tau = model.armature().cwiseProduct(a);
+  for (int i = 1; i < model.numBodies(); ++i) ws.F[i] = calcBodyForce(ws, i, ws.A[i]);
+  for (int i = model.numBodies() - 1; i > 0; --i) {
+    const Joint& joint = model.joints()[i];
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) tau[k] += ws.J.col(k).dot(ws.F[i]);
+    if (joint.parent > 0) ws.F[joint.parent] += ws.F[i];
+  }
+  return tau;
+}
+
+void updateInverseDynamicsDerivatives(const Model& model, Workspace& ws, const std::vector<Vector6d>& f_ext) {
+  requireStage(ws, WorkspaceStage::Acceleration, "updateInverseDynamicsDerivatives", "updateAccelerations");
+  for (int i = 1; i < model.numBodies(); ++i) {
+    ws.F[i] = calcBodyForce(ws, i, ws.A[i]);
+    if (!f_ext.empty()) ws.F[i] -= f_ext[i];
+    ws.Yc[i] = ws.Y[i];
+    calcB(ws, i, ws.Bc[i]);
+  }
+  const std::vector<Dof>& dofs = model.dofs();
+  for (int i = model.numBodies() - 1; i > 0; --i) {
+    const Joint& joint = model.joints()[i];
+    const int begin = joint.idx_v, end = joint.idx_v + joint.nv;
+    for (int j = begin; j < end; ++j) {
+      const Vector6d J = ws.J.col(j);
+      ws.YJ.col(j).noalias() = ws.Yc[i] * J;
+      ws.BtJ.col(j).noalias() = ws.Bc[i].transpose() * J;
+      ws.Gv.col(j).noalias() = ws.Yc[i] * (ws.dJ.col(j) + ws.dV.col(j));
+      ws.Gv.col(j).noalias() += ws.Bc[i] * J;
+      ws.Gq.col(j).noalias() = ws.Yc[i] * ws.dA.col(j);
+      ws.Gq.col(j).noalias() += ws.Bc[i] * ws.dV.col(j);
+      ws.Gq.col(j) += crossForce(J, ws.F[i]);
+    }
+    for (int j = begin; j < end; ++j) {
+      for (int k = begin; k < end; ++k) {  // same joint
+        ws.dID_dv(j, k) = ws.J.col(j).dot(ws.Gv.col(k));
+        ws.dID_dq(j, k) = movesWithinJoint(dofs[j], dofs[k])
+                              ? ws.YJ.col(j).dot(ws.dA.col(k)) + ws.BtJ.col(j).dot(ws.dV.col(k))  // Eq. (7)
+                              : ws.J.col(j).dot(ws.Gq.col(k));                                    // Eq. (8)
+      }
+      for (int k = dofs[begin].parent; k >= 0; k = dofs[k].parent) {
+        ws.dID_dq(j, k) = ws.YJ.col(j).dot(ws.dA.col(k)) + ws.BtJ.col(j).dot(ws.dV.col(k));             // Eq. (7)
+        ws.dID_dv(j, k) = ws.YJ.col(j).dot(ws.dJ.col(k) + ws.dV.col(k)) + ws.BtJ.col(j).dot(ws.J.col(k));  // Eq. (9)
+        ws.dID_dq(k, j) = ws.J.col(k).dot(ws.Gq.col(j));                                                // Eq. (8)
+        ws.dID_dv(k, j) = ws.J.col(k).dot(ws.Gv.col(j));                                                // Eq. (9)
+      }
+    }
+    if (joint.parent > 0) {
+      ws.F[joint.parent] += ws.F[i];
+      ws.Yc[joint.parent] += ws.Yc[i];
+      ws.Bc[joint.parent] += ws.Bc[i];
+    }
+  }
+}
+
+}  // namespace bielle

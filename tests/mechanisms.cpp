@@ -1,0 +1,151 @@
+#include "mechanisms.h"
+
+#include <cmath>
+
+#include "bielle/dynamics/kinematics.h"
+
+namespace bielle::testing {
+
+VectorXd randomVector(std::mt19937& rng, int n, double scale) {
+  std::uniform_real_distribution<double> uniform(-scale, scale);
+  return VectorXd::NullaryExpr(n, [&](Eigen::Index) { return uniform(rng); });
+}
+
+SE3 randomPlacement(std::mt19937& rng) { return {exp3(randomVector(rng, 3, 1.5)), randomVector(rng, 3, 0.4)}; }
+
+Inertia randomInertia(std::mt19937& rng) {
+  // A few random point masses make a possible body.
+  Inertia sum;
+  for (int i = 0; i < 5; ++i) {
+    Inertia point;
+    point.mass = 0.2 + std::abs(randomVector(rng, 1)[0]);
+    point.com = randomVector(rng, 3, 0.3);
+    sum = sum + point;
+  }
+  return sum;
+}
+
+namespace {
+
+void addRandomLink(ModelBuilder& builder, std::mt19937& rng, const std::string& name, const std::string& parent,
+                   JointKind kind) {
+  Joint joint;
+  joint.name = "joint_" + name;
+  joint.kind = kind;
+  joint.X_PJ = randomPlacement(rng);
+  joint.axis = randomVector(rng, 3).normalized();
+  joint.axis2 = joint.axis.cross(Vector3d(randomVector(rng, 3))).normalized() + 0.2 * joint.axis;
+  builder.addLink(name, parent, joint, randomInertia(rng));
+}
+
+}  // namespace
+
+Mechanism makeRandomMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, double kp,
+                              double kd) {
+  ModelBuilder builder("random");
+  std::string root = "root";
+  if (base == MechanismBase::FreeFlyer) {
+    addRandomLink(builder, rng, root, "world", JointKind::FreeFlyer);
+    addRandomLink(builder, rng, "side", root, JointKind::Universal);
+  } else {
+    addRandomLink(builder, rng, root, "world", JointKind::Revolute);
+  }
+  const int per_branch = 3;
+  for (const std::string side : {"a", "b"}) {
+    std::string parent = root;
+    for (int i = 0; i < per_branch; ++i) {
+      const std::string name = side + std::to_string(i);
+      addRandomLink(builder, rng, name, parent, JointKind::Revolute);
+      addRandomLink(builder, rng, name + "k", name, kind);
+      parent = name + "k";
+    }
+  }
+  const Model tree = builder.build();
+  Mechanism out{tree, tree.integrate(tree.makeNeutral(), randomVector(rng, tree.nv(), 0.8))};
+  Workspace ws(tree);
+  updatePositions(tree, ws, out.q_closed);
+  const auto place = [&](const std::string& link) { return ws.X_WB[tree.frames()[tree.findFrame(link)].body]; };
+  const SE3 X_B1 = randomPlacement(rng);
+  builder.addFrame("tip1", "a2k", X_B1);
+  builder.addFrame("tip2", "b2k", place("b2k").inverseTimes(place("a2k") * X_B1));
+  builder.addClosure("loop", closure, "tip1", "tip2", randomVector(rng, 3).normalized(), kp, kd);
+  builder.addMotor("joint_a0", 0.1);
+  builder.addMotor("joint_b0", 0.1);
+  builder.addContact("foot", "a1", ContactKind::Surface6D, 0.1, 0.05);
+  builder.addContact("point", "b1", ContactKind::Point3D, 0, 0);
+  out.model = builder.build();
+  return out;
+}
+
+Mechanism makePlanarFourBar(double ground, double crank, double coupler, double rocker, double angle) {
+  ModelBuilder builder("fourbar");
+  const auto rod = [](double length) {
+    Inertia inertia;
+    inertia.mass = length;
+    inertia.com = {length / 2, 0, 0};
+    const double i = inertia.mass * length * length / 12;
+    inertia.I_com = Eigen::Vector3d(1e-4, i, i).asDiagonal();
+    return inertia;
+  };
+  const auto hinge = [](const std::string& name, double x) {
+    Joint joint;
+    joint.name = name;
+    joint.kind = JointKind::Revolute;
+    joint.axis = Vector3d::UnitY();
+    joint.X_PJ.p = {x, 0, 0};
+    return joint;
+  };
+  builder.addLink("crank", "world", hinge("j_crank", 0), rod(crank));
+  builder.addLink("coupler", "crank", hinge("j_coupler", crank), rod(coupler));
+  builder.addLink("rocker", "coupler", hinge("j_rocker", coupler), rod(rocker));
+  builder.addLink("pin", "rocker", hinge("j_pin", rocker), {});
+  builder.addFrame("anchor", "world", {Matrix3d::Identity(), {ground, 0, 0}});
+  builder.addClosure("loop", ClosureKind::Weld6D, "pin", "anchor");
+  builder.addMotor("j_crank");
+  builder.setArmature("j_pin", 1e-4);
+  Mechanism out{builder.build(), {}};
+  // Angles about y turn x towards -z; solve the triangle crank tip - anchor with the law of cosines.
+  const Eigen::Vector2d tip = crank * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+  const Eigen::Vector2d d = Eigen::Vector2d(ground, 0) - tip;
+  const double distance = d.norm(), heading = std::atan2(d.y(), d.x());
+  const double inner = std::acos((coupler * coupler + distance * distance - rocker * rocker) / (2 * coupler * distance));
+  const double coupler_angle = heading + inner;
+  const Eigen::Vector2d joint = tip + coupler * Eigen::Vector2d(std::cos(coupler_angle), std::sin(coupler_angle));
+  const double rocker_angle = std::atan2(-joint.y(), ground - joint.x());
+  out.q_closed.resize(4);
+  out.q_closed << -angle, -(coupler_angle - angle), -(rocker_angle - coupler_angle), rocker_angle;
+  return out;
+}
+
+namespace {
+
+MatrixXd differentiateAlong(int n, double h, const std::function<VectorXd(int, double)>& f) {
+  MatrixXd out;
+  for (int k = 0; k < n; ++k) {
+    const VectorXd d1 = (f(k, h) - f(k, -h)) / (2 * h), d2 = (f(k, 2 * h) - f(k, -2 * h)) / (4 * h);
+    if (k == 0) out.resize(d1.size(), n);
+    out.col(k) = (4 * d1 - d2) / 3;
+  }
+  return out;
+}
+
+}  // namespace
+
+MatrixXd differentiateTangent(const Model& model, const VectorXd& q, double h,
+                              const std::function<VectorXd(const VectorXd&)>& f) {
+  return differentiateAlong(model.nv(), h, [&](int k, double step) {
+    return f(model.integrate(q, step * VectorXd::Unit(model.nv(), k)));
+  });
+}
+
+MatrixXd differentiate(const VectorXd& x, double h, const std::function<VectorXd(const VectorXd&)>& f) {
+  return differentiateAlong(static_cast<int>(x.size()), h,
+                            [&](int k, double step) { return f(x + step * VectorXd::Unit(x.size(), k)); });
+}
+
+double calcRelativeError(const MatrixXd& a, const MatrixXd& b) {
+  if (a.size() == 0) return 0;
+  return (a - b).cwiseAbs().maxCoeff() / std::max(b.cwiseAbs().maxCoeff(), 1e-6);
+}
+
+}  // namespace bielle::testing

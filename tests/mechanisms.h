@@ -1,0 +1,36 @@
+#pragma once
+// Random closed-chain mechanisms and central differences, shared by the tests and the validation against Simbody.
+#include <functional>
+#include <random>
+
+#include "bielle/model/builder.h"
+
+namespace bielle::testing {
+
+VectorXd randomVector(std::mt19937& rng, int n, double scale = 1);
+SE3 randomPlacement(std::mt19937& rng);
+Inertia randomInertia(std::mt19937& rng);
+
+struct Mechanism {
+  Model model;
+  VectorXd q_closed;  ///< a configuration on the closure
+};
+
+/// Two branches from a common body, every other joint of the given kind (revolutes between), their tips tied by a closure of
+/// the given kind that holds at q_closed, with mobility left. With `base` a free-flyer, a universal and a side branch come along.
+enum class MechanismBase { Fixed, FreeFlyer };
+Mechanism makeRandomMechanism(std::mt19937& rng, JointKind joint, ClosureKind closure, MechanismBase base,
+                              double kp = 0, double kd = 0);
+
+/// Planar four-bar (four parallel hinges about y) closed by a 6D weld: rank 3 of 6 rows. Lengths in metres.
+Mechanism makePlanarFourBar(double ground, double crank, double coupler, double rocker, double crank_angle);
+
+/// Central differences of f (n values) in the tangent of q, per column with Richardson extrapolation: error O(h^4).
+MatrixXd differentiateTangent(const Model& model, const VectorXd& q, double h,
+                              const std::function<VectorXd(const VectorXd&)>& f);
+MatrixXd differentiate(const VectorXd& x, double h, const std::function<VectorXd(const VectorXd&)>& f);
+
+/// Largest entry of |a - b| over the largest of |b| (or 1 when b is tiny).
+double calcRelativeError(const MatrixXd& a, const MatrixXd& b);
+
+}  // namespace bielle::testing

@@ -1,0 +1,170 @@
+// Oracles: central differences in tangent space (fourth order, step 1e-3: relative error reached about 1e-9), power balance,
+// closed-form mechanisms. Every derivative test also sees a poisoned entry.
+#include <catch2/catch.hpp>
+#include <set>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/centroidal.h"
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "mechanisms.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic, JointKind::Spherical,
+                                 JointKind::Universal, JointKind::Planar,     JointKind::FreeFlyer};
+constexpr ClosureKind kClosures[] = {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D};
+constexpr double kStep = 1e-3;
+constexpr double kTolerance = 1e-6;
+
+// Passes when close, and when adding a thousandth of the largest entry anywhere would be seen.
+void checkDerivative(const MatrixXd& analytic, const MatrixXd& numeric) {
+  CHECK(calcRelativeError(analytic, numeric) < kTolerance);
+  MatrixXd poisoned = analytic;
+  poisoned(poisoned.rows() / 2, poisoned.cols() / 2) += 1e-3 * std::max(1e-6, numeric.cwiseAbs().maxCoeff());
+  CHECK(calcRelativeError(poisoned, numeric) > kTolerance);
+}
+
+}  // namespace
+
+TEST_CASE("inverse dynamics: M, b and RNEA agree, and its derivatives agree with differences") {
+  std::mt19937 rng(1);
+  for (JointKind kind : kJoints) {
+    CAPTURE(getName(kind));
+    const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Weld6D, MechanismBase::FreeFlyer);
+    const Model& model = mechanism.model;
+    Workspace ws(model);
+    const VectorXd& q = mechanism.q_closed;
+    const VectorXd v = randomVector(rng, model.nv(), 2), a = randomVector(rng, model.nv(), 5);
+    const VectorXd tau = calcInverseDynamics(model, ws, q, v, a);
+    updateInverseDynamicsDerivatives(model, ws, {});
+    const MatrixXd dq = ws.dID_dq, dv = ws.dID_dv;
+    updateMassMatrix(model, ws);
+    updateBias(model, ws);
+    CHECK(calcRelativeError(ws.M * a + ws.b, tau) < 1e-12);
+    CHECK(0.5 * v.dot(ws.M * v) == Approx(calcKineticEnergy(model, ws)).epsilon(1e-12));
+    checkDerivative(dq, differentiateTangent(model, q, kStep, [&](const VectorXd& x) {
+                      return calcInverseDynamics(model, ws, x, v, a);
+                    }));
+    checkDerivative(dv, differentiate(v, kStep, [&](const VectorXd& x) { return calcInverseDynamics(model, ws, q, x, a); }));
+  }
+}
+
+TEST_CASE("centre of mass: Jacobian and velocity derivative") {
+  std::mt19937 rng(2);
+  for (JointKind kind : kJoints) {
+    CAPTURE(getName(kind));
+    const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer);
+    const Model& model = mechanism.model;
+    Workspace ws(model);
+    const VectorXd v = randomVector(rng, model.nv(), 2);
+    updatePositions(model, ws, mechanism.q_closed);
+    updateVelocities(model, ws, v);
+    updateMassMatrix(model, ws);
+    Eigen::Matrix3Xd J(3, model.nv()), dv_dq(3, model.nv());
+    calcComJacobian(model, ws, J);
+    calcComVelocityDerivative(model, ws, dv_dq);
+    CHECK((J * v - calcComVelocity(model, ws)).norm() < 1e-12);
+    Workspace other(model);
+    checkDerivative(J, differentiateTangent(model, mechanism.q_closed, kStep, [&](const VectorXd& x) {
+                      updatePositions(model, other, x);
+                      return VectorXd(calcCom(model, other));
+                    }));
+    checkDerivative(dv_dq, differentiateTangent(model, mechanism.q_closed, kStep, [&](const VectorXd& x) {
+                      updatePositions(model, other, x);
+                      updateVelocities(model, other, v);
+                      return VectorXd(calcComVelocity(model, other));
+                    }));
+  }
+}
+
+TEST_CASE("closures: residual rate, velocity and acceleration are time derivatives of one another") {
+  std::mt19937 rng(3);
+  for (ClosureKind closure_kind : kClosures) {
+    for (bool open : {false, true}) {
+      CAPTURE(getName(closure_kind), open);
+      const Mechanism mechanism = makeRandomMechanism(rng, JointKind::Spherical, closure_kind, MechanismBase::FreeFlyer);
+      const Model& model = mechanism.model;
+      Workspace ws(model);
+      const ConstraintSet set = makeConstraintSet(model);
+      const Closure& closure = set.closures[0];
+      VectorXd q = mechanism.q_closed;
+      updatePositions(model, ws, q);
+      CHECK(calcClosureResidual(ws, closure).norm() < 1e-13);
+      if (open) q = model.integrate(q, randomVector(rng, model.nv(), 0.2));
+      const VectorXd v = randomVector(rng, model.nv(), 1), a = randomVector(rng, model.nv(), 1);
+      // Along q(t) = q (+) (t v + t^2/2 a') the velocity is v and its derivative a, for joints where the exponential commutes to
+      // second order: take v(t) = v + t a as the definition and move q by the midpoint rule.
+      const auto state = [&](double t) {
+        const VectorXd qt = model.integrate(q, t * (v + 0.5 * t * a));
+        updatePositions(model, ws, qt);
+        updateVelocities(model, ws, v + t * a);
+      };
+      const auto derive = [&](const std::function<VectorXd()>& f) {
+        return differentiate(VectorXd::Zero(1), 1e-3, [&](const VectorXd& t) {
+          state(t[0]);
+          return f();
+        });
+      };
+      const VectorXd residual_rate = derive([&] { return VectorXd(calcClosureResidual(ws, closure)); });
+      const VectorXd acceleration = derive([&] { return VectorXd(calcClosureVelocity(ws, closure)); });
+      state(0);
+      Vector6d nu = (ws.X_WB[closure.body1] * closure.X_B1).actInvMotion(ws.V[closure.body1] - ws.V[closure.body2]);
+      CHECK(calcRelativeError(calcClosureResidualRate(ws, closure) * nu, residual_rate) < 1e-8);
+      updateAccelerations(model, ws, a);
+      CHECK(calcRelativeError(calcClosureAcceleration(ws, closure), acceleration) < 1e-6);
+      if (!open)  // at a closed configuration the residual moves with minus the velocity
+        CHECK(calcRelativeError(-calcClosureVelocity(ws, closure), residual_rate) < 1e-8);
+    }
+  }
+}
+
+TEST_CASE("constrained dynamics: every joint kind times every closure kind, closed and open, against differences") {
+  std::mt19937 rng(4);
+  for (JointKind kind : kJoints)
+    for (ClosureKind closure : kClosures)
+      for (bool open : {false, true})
+        for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
+          CAPTURE(getName(kind), getName(closure), open, base == MechanismBase::Fixed);
+          const double kp = open ? 3 : 0, kd = open ? 2 : 0;
+          const Mechanism mechanism = makeRandomMechanism(rng, kind, closure, base, kp, kd);
+          const Model& model = mechanism.model;
+          std::vector<ContactTarget> contacts;
+          if (base == MechanismBase::FreeFlyer) contacts = {{0, randomPlacement(rng), 5, 4}, {1, randomPlacement(rng), 0, 10}};
+          const ConstraintSet set = makeConstraintSet(model, contacts);
+          VectorXd q = mechanism.q_closed;
+          if (open) q = model.integrate(q, randomVector(rng, model.nv(), 0.1));
+          const VectorXd v = randomVector(rng, model.nv(), 1), tau = randomVector(rng, model.nv(), 10);
+          Workspace ws(model);
+          ConstrainedWorkspace cws;
+          REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == DynamicsStatus::Ok);
+          REQUIRE(!cws.redundant);
+          CHECK(cws.residual < 1e-9 * (1 + cws.gamma.cwiseAbs().maxCoeff()));
+          CHECK(calcRelativeError(ws.M * cws.a + ws.b - cws.J.transpose() * cws.lambda, tau) < 1e-9);
+          CHECK(cws.lambda.cwiseAbs().minCoeff() > 0);
+          REQUIRE(updateConstrainedDerivatives(model, ws, cws, set) == DynamicsStatus::Ok);
+          const int nv = model.nv();
+          Workspace other(model);
+          ConstrainedWorkspace ocws;
+          const auto solve = [&](const VectorXd& x, const VectorXd& y, const VectorXd& t) {
+            updateConstrainedDynamics(model, other, ocws, set, x, y, t);
+            VectorXd out(nv + set.rows);
+            out << ocws.a, ocws.lambda;
+            return out;
+          };
+          const double h = 2e-4;
+          MatrixXd numeric = differentiateTangent(model, q, h, [&](const VectorXd& x) { return solve(x, v, tau); });
+          checkDerivative(cws.da_dq, numeric.topRows(nv));
+          checkDerivative(cws.dlambda_dq, numeric.bottomRows(set.rows));
+          numeric = differentiate(v, h, [&](const VectorXd& x) { return solve(q, x, tau); });
+          checkDerivative(cws.da_dv, numeric.topRows(nv));
+          checkDerivative(cws.dlambda_dv, numeric.bottomRows(set.rows));
+          numeric = differentiate(tau, h, [&](const VectorXd& x) { return solve(q, v, x); });
+          checkDerivative(cws.da_dtau, numeric.topRows(nv));
+          checkDerivative(cws.dlambda_dtau, numeric.bottomRows(set.rows));
+        }
+}
