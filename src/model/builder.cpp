@@ -1,11 +1,10 @@
 #include "bielle/model/builder.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <set>
-
-#include <Eigen/Eigenvalues>
 
 namespace bielle {
 
@@ -41,7 +40,8 @@ void ModelBuilder::addLink(const std::string& link, const std::string& parent_li
                            const JointLimits& limits) {
   const std::string element = "joint '" + joint.name + "'";
   if (link.empty()) fail(element, "its child link has no name", "name it");
-  if (frames_.count(link)) fail("link '" + link + "'", "it is declared twice", "give every link and frame its own name");
+  if (frames_.count(link))
+    fail("link '" + link + "'", "it is declared twice", "give every link and frame its own name");
   const FramePlace parent = getFrame(parent_link, element);
   if (joint.kind == JointKind::Fixed) {
     const SE3 X_BF = parent.X_BF * joint.X_PJ;
@@ -69,8 +69,10 @@ void ModelBuilder::addLink(const std::string& link, const std::string& parent_li
   model_.nv_ += joint.nv;
   for (const VectorXd* bound : {&limits.lower, &limits.upper, &limits.velocity})
     if (bound->size() != 0 && bound->size() != joint.nv)
-      fail(element, "its limits have " + std::to_string(bound->size()) + " entries, its velocity has " +
-                        std::to_string(joint.nv), "give one limit per velocity coordinate, or none");
+      fail(
+          element,
+          "its limits have " + std::to_string(bound->size()) + " entries, its velocity has " + std::to_string(joint.nv),
+          "give one limit per velocity coordinate, or none");
   const int body = model_.numBodies();
   model_.joints_.push_back(joint);
   model_.bodies_.push_back({link, {}});
@@ -89,7 +91,8 @@ void ModelBuilder::addInertia(const std::string& link, const Inertia& inertia) {
 }
 
 void ModelBuilder::addFrame(const std::string& name, const std::string& link, const SE3& X_LF) {
-  if (frames_.count(name)) fail("frame '" + name + "'", "it is declared twice", "give every link and frame its own name");
+  if (frames_.count(name))
+    fail("frame '" + name + "'", "it is declared twice", "give every link and frame its own name");
   const FramePlace place = getFrame(link, "frame '" + name + "'");
   frames_[name] = {place.body, place.X_BF * X_LF};
   model_.frames_.push_back({name, place.body, place.X_BF * X_LF});
@@ -128,8 +131,8 @@ void ModelBuilder::addMotor(const std::string& joint, double armature, double ef
   if (index < 0) fail(element, "there is no moving joint of this name", "name a joint of the robot that is not fixed");
   const Joint& j = model_.joints_[index];
   if (j.nv != 1)
-    fail(element, "it is on a " + std::string(getName(j.kind)) + " joint of " + std::to_string(j.nv) +
-                      " coordinates", "motors drive revolute, continuous or prismatic joints");
+    fail(element, "it is on a " + std::string(getName(j.kind)) + " joint of " + std::to_string(j.nv) + " coordinates",
+         "motors drive revolute, continuous or prismatic joints");
   if (model_.findMotor(joint) >= 0) fail(element, "the joint has two motors", "list it once");
   if (!(armature >= 0) || std::isinf(armature))
     fail(element, "its armature is not a finite number of 0 or more", "give a rotor inertia");
@@ -163,8 +166,10 @@ void ModelBuilder::checkReference(const Reference& reference) const {
     const Joint& joint = model_.joints_[index];
     const Eigen::Map<const VectorXd> values(q.data(), static_cast<Eigen::Index>(q.size()));
     if (values.size() != joint.nq)
-      fail(element, "it gives " + std::to_string(q.size()) + " value(s) to joint '" + name + "', a " +
-                        getName(joint.kind) + " joint of " + std::to_string(joint.nq), "give that many");
+      fail(element,
+           "it gives " + std::to_string(q.size()) + " value(s) to joint '" + name + "', a " + getName(joint.kind) +
+               " joint of " + std::to_string(joint.nq),
+           "give that many");
     if (!values.allFinite()) fail(element, "joint '" + name + "' has a value that is not finite", "correct it");
     const bool has_quaternion = joint.kind == JointKind::Spherical || joint.kind == JointKind::FreeFlyer;
     if (has_quaternion && std::abs(values.tail<4>().norm() - 1) > 1e-3)
@@ -188,7 +193,9 @@ void ModelBuilder::addVisual(const std::string& link, Visual visual) {
 
 void ModelBuilder::addSerialJoint(const std::string& joint) {
   const int index = model_.findJoint(joint);
-  if (index < 0) fail("serial joint '" + joint + "'", "there is no moving joint of this name", "name a joint of the robot that is not fixed");
+  if (index < 0)
+    fail("serial joint '" + joint + "'", "there is no moving joint of this name",
+         "name a joint of the robot that is not fixed");
   const std::vector<int>& listed = model_.serial_joints_;
   if (std::find(listed.begin(), listed.end(), index) != listed.end())
     fail("serial joint '" + joint + "'", "it is listed twice", "list it once");
@@ -201,7 +208,9 @@ void ModelBuilder::setGravity(const Vector3d& gravity) {
 }
 
 void ModelBuilder::setArmature(const std::string& joint, double armature) {
-  if (model_.findJoint(joint) < 0) fail("armature of '" + joint + "'", "there is no moving joint of this name", "name a joint of the robot that is not fixed");
+  if (model_.findJoint(joint) < 0)
+    fail("armature of '" + joint + "'", "there is no moving joint of this name",
+         "name a joint of the robot that is not fixed");
   if (!(armature >= 0) || std::isinf(armature))
     fail("armature of '" + joint + "'", "it is not a finite number of 0 or more", "give a rotor inertia");
   joint_armature_[joint] = armature;
@@ -222,17 +231,22 @@ void ModelBuilder::checkInertias(std::vector<std::string>* warnings) const {
     const std::string element = "link '" + link + "'";
     if (!std::isfinite(inertia.mass) || !inertia.com.allFinite() || !inertia.I_com.allFinite())
       fail(element, "its inertia is not a finite number", "correct the <inertial> element");
-    if (inertia.mass < 0) fail(element, "its mass is negative (" + std::to_string(inertia.mass) + " kg)", "give 0 or more");
-    const Vector3d moments = Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia.I_com, Eigen::EigenvaluesOnly).eigenvalues();
-    // A body's principal moments are sums of two non-negative second moments: none negative, none above the sum of the others.
+    if (inertia.mass < 0)
+      fail(element, "its mass is negative (" + std::to_string(inertia.mass) + " kg)", "give 0 or more");
+    const Vector3d moments =
+        Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia.I_com, Eigen::EigenvaluesOnly).eigenvalues();
+    // A body's principal moments are sums of two non-negative second moments: none negative, none above the sum of the
+    // others.
     const double slack = 1e-6 * moments.cwiseAbs().maxCoeff() + 1e-12;
     if (moments[0] < -slack) fail(element, "its inertia matrix has a negative principal moment", "correct <inertia>");
     if (moments[2] > moments[0] + moments[1] + slack)
-      fail(element, "its principal moments break the triangle inequality, no body has such an inertia", "correct <inertia>");
+      fail(element, "its principal moments break the triangle inequality, no body has such an inertia",
+           "correct <inertia>");
     if (inertia.mass == 0 && moments[2] > slack)
       fail(element, "it has rotational inertia but no mass", "give it a mass, or no inertia");
     if (warnings && inertia.mass >= 1000)
-      warnings->push_back((source_.empty() ? "" : source_ + ": ") + element + ": a mass of " + std::to_string(inertia.mass) + " kg is implausible for a leg");
+      warnings->push_back((source_.empty() ? "" : source_ + ": ") + element + ": a mass of " +
+                          std::to_string(inertia.mass) + " kg is implausible for a leg");
   }
 }
 

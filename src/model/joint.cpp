@@ -156,7 +156,9 @@ void calcJointDifference(const Joint& joint, ConstVectorRef q0, ConstVectorRef q
       dv[2] = angle;
       break;
     }
-    case JointKind::FreeFlyer: dv.head<6>() = log6(calcJointPlacement(joint, q0).inverseTimes(calcJointPlacement(joint, q1))); break;
+    case JointKind::FreeFlyer:
+      dv.head<6>() = log6(calcJointPlacement(joint, q0).inverseTimes(calcJointPlacement(joint, q1)));
+      break;
     default: dv = q1 - q0;
   }
 }

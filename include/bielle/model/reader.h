@@ -1,5 +1,40 @@
 #pragma once
-/// \file Robots from files: a URDF and a YAML file of closures, motors and Bielle's own keys.
+/// \file
+/// Robots from files: a URDF, and beside it a YAML file of the same stem for what a URDF cannot say. (The YAML is
+/// optional.)
+///
+/// ## The URDF
+/// Links and joints of one tree. Bodies are added depth first, the children of a link in the order in which their
+/// joints stand in the file. A link without <inertial> has no mass. A root named "world" is the ground; any other root
+/// is carried by a free-flyer named "root_joint", or merged into the ground when the base is fixed.
+/// - <limit>: `effort` and `velocity` go to the motor and to the joint (published files often hold placeholders there:
+///   override them by `motors`); 0 means none. `lower` = `upper` = 0, as a missing pair reads, means none. Joints that
+///   the YAML gives another number of coordinates have no limits.
+/// - <mimic> is refused (model the coupling as a closure), <dynamics> is ignored with a warning, meshes need not
+///   exist.
+/// - Attributes are finite numbers; inertias are those of a body (no negative mass, triangle inequality), up to 1e-6
+///   of rounding.
+///
+/// ## The YAML, published keys (example-parallel-robots)
+/// - `closed_loop: [[A, B], ...]` frames 1 and 2 of each closure: links, or joints, which stand for the frame of their
+///   child (a link wins); `type: [6d, ...]`, one per pair, 6d | 5d | 3d in any case. `closure_name: [...]` (ours)
+///   names them; otherwise `knee_A`, `knee_B` make `knee`, and other pairs `A--B`.
+/// - `name_mot: [joint, ...]` the motors, in the order of u.
+/// - `joint_name: [...]`, `joint_type: [...]` other kinds for joints of the URDF, in any case: SPHERICAL, UJOINT_ and
+///   two different axes of the joint's own frame in their order (UJOINT_XY), FIXED, REVOLUTE, CONTINUOUS, PRISMATIC,
+///   PLANAR, FLOATING. An absent joint is a warning.
+///
+/// ## The YAML, our keys (all optional; an unknown key is an error)
+/// - `base: free | fixed`
+/// - `closures: [{name, frames: [A, B], type, axis, kp, kd}, ...]` after those of `closed_loop`; `axis` of a 5d hinge,
+///   in frame 1 (default z); kp in 1/s^2, kd in 1/s (default 0)
+/// - `motors: {joint: {armature, effort, velocity}, ...}` in place of `name_mot`, its limits (.inf for none) in place
+///   of the URDF's
+/// - `armature: {joint: kg m^2, ...}`, or one number for all motors that `motors` gives none
+/// - `contacts: {name: {frame, type: 6d | 3d, sole: [length, width]}, ...}`; the sole is centred on its frame, length
+///   along x, m
+/// - `references: {name: {joints: {joint: number or list}, height: {frame, value}, feet: {contact: [x, y, z]}}, ...}`
+/// - `serial_joints: [joint, ...]`, `gravity: [x, y, z]` (m/s^2)
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,16 +51,18 @@ struct LoadOptions {
 
 struct LoadedRobot {
   Model model;
-  std::vector<std::string> warnings;
-  std::string directory;  ///< where the files were found
+  std::vector<std::string> warnings;  ///< "file: element: what", possible but worth a look
+  std::string directory;              ///< where the files were found
 };
 
-/// Loads a robot by name (`bipetto`: looked up in the directories of getRobotDirectories()), directory (holding one
-/// .urdf and an optional .yaml of the same stem, robot.urdf first) or file (.urdf).
-/// \throws ModelError naming the file, the element and the remedy
+/// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf in the directories of getRobotDirectories()), by
+/// directory (its robot.urdf, else the .urdf named as the directory, else its only .urdf) or by .urdf file. \throws
+/// ModelError naming the file, the element and the remedy; nothing else, whatever the files hold
 LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options = {});
 
-/// Directories searched for robots by name: $BIELLE_ROBOTS, the source tree's robots/ for a build tree, the installed share/.
+/// Directories searched for robots by name, in this order: those of $BIELLE_ROBOTS (separated by colons),
+/// share/bielle/robots of the installation that the running program belongs to, robots/ of the source tree, the
+/// configured installation.
 std::vector<std::string> getRobotDirectories();
 
 /// Names of the robots found there, sorted.
