@@ -86,6 +86,7 @@ void LqSweep::updateQuadratic(const StageModel& model, const Node& next, const L
 // Eqs. (5) to (7).
 LqStatus LqSweep::updateGains(Node& node, double& change) {
   const Eigen::Index n = node.Vx.size(), nu = node.Qu.size();
+  if (nu == 0) return LqStatus::Ok;
   Eigen::Ref<MatrixXd> L = shape(Quu_, nu, nu);
   if (!L.diagonal().allFinite() || !node.Qu.allFinite()) return LqStatus::NotFinite;
   if (Eigen::LLT<Eigen::Ref<MatrixXd>>(L).info() != Eigen::Success) return LqStatus::Indefinite;
@@ -121,7 +122,9 @@ LqStatus LqSweep::updateBoxedGains(const ControlBox& box, Node& node, double& ch
   for (Eigen::Index j = 0; j < nu; ++j) change += 0.5 * node.k[j] * Quu.col(j).dot(node.k);
 
   // The free rows move to the top of the buffer, in place: a free index is never smaller than its rank.
+  node.K.setZero();
   const int num_free = box_qp_.getNumFree();
+  if (num_free == 0) return LqStatus::Ok;
   for (int i = 0; i < num_free; ++i) {
     if (box_qp_.getFreeIndex(i) != i) Qux.row(i) = Qux.row(box_qp_.getFreeIndex(i));
   }
@@ -130,7 +133,6 @@ LqStatus LqSweep::updateBoxedGains(const ControlBox& box, Node& node, double& ch
   L.triangularView<Lower>().solveInPlace(Y);
   node.Vxx.selfadjointView<Lower>().rankUpdate(Y.transpose(), -1.0);
   L.triangularView<Lower>().transpose().solveInPlace(Y);
-  node.K.setZero();
   for (int i = 0; i < num_free; ++i) node.K.row(box_qp_.getFreeIndex(i)) = -Y.row(i);
   return LqStatus::Ok;
 }

@@ -1,0 +1,135 @@
+#pragma once
+/// \file Feasibility-driven differential dynamic programming (FDDP) and its bounded variant.
+///
+/// Mastalli et al., "Crocoddyl: An Efficient and Versatile Framework for Multi-Contact Optimal Control", ICRA 2020; the
+/// bounds after Tassa, Mansard, Todorov, "Control-Limited Differential Dynamic Programming", ICRA 2014.
+///
+/// One iteration, from node states xs and controls us that need not obey the dynamics:
+/// 1. Linearize every stage about (xs_k, us_k); gap_k = difference(xs_{k+1}, f_k(xs_k, us_k)).
+/// 2. The LQ sweep (lq_sweep.h, its eqs. 2 to 7) gives k, K, and what the models foresee for a step of length alpha,
+///        change(alpha) = alpha slope + 1/2 alpha^2 curvature.                                                     (1)
+/// 3. Nonlinear rollout with x'_0 = xs_0 and, for k = 0 .. N-1, all tangent vectors in the coordinates of xs:
+///        u'_k = us_k + alpha k_k + K_k dx_k               (projected on the bounds when they are enforced)         (2)
+///        dx_{k+1} = difference(xs_{k+1}, f_k(x'_k, u'_k)) + (alpha - 1) gap_k,   x'_{k+1} = xs_{k+1} (+) dx_{k+1} (3)
+///    so that the gaps contract to (1 - alpha) gap_k; a full step closes them and x'_{k+1} = f_k(x'_k, u'_k) exactly.
+///    The paper integrates (alpha - 1) gap_k from f_k(x'_k, u'_k) instead: the same on a vector space, but there the
+///    gap would be a tangent vector at another point than its own, whose coordinates need not be the same.
+/// 4. Line search over alpha on the merit function J + nu c, with J the cost and c = sum_k |gap_k|_1. Its foreseen
+/// decrease is
+///        decrease(alpha) = -change(alpha) + nu alpha c, (4)
+///    positive on the whole of (0, 1] for rho = 1/2 and
+///        nu = max(0, (slope + 1/2 max(0, curvature)) / ((1 - rho) c)). (5)
+///    alpha is accepted if the merit really decreases by `acceptance` times (4). Since gaps never grow, nu may be
+///    chosen anew in every iteration without any risk of cycling.
+/// 5. If no alpha is accepted, or a Quu is indefinite, the regularization grows and the sweep is repeated.
+///
+/// Stationarity is measured by the projected gradient, with [lower, upper] the bounds of du (infinite if ignored):
+///     gradient = sum_k | clamp(-Qu_k, lower_k, upper_k) |^2. (6)
+#include <atomic>
+#include <functional>
+#include <iosfwd>
+#include <memory>
+#include <string>
+
+#include "bielle/solve/lq_sweep.h"
+
+namespace bielle {
+
+/// Node states (N + 1) and controls (N) of a shooting problem.
+struct ShootingTrajectory {
+  std::vector<VectorXd> xs, us;
+};
+
+enum class ControlBounds { Ignore, Enforce };
+
+struct FddpOptions {
+  int max_iterations = 200;
+  double gradient_tolerance =
+      1e-9;                      ///< converged if Eq. (6) is below (units of cost per control, squared) and c is closed
+  double gap_tolerance = 1e-10;  ///< c is closed if every gap is below, in the tangent's units
+  double cost_tolerance = 1e-13;  ///< converged too if the least regularized, full step changes J by less, times |J|
+
+  double initial_regularization = 1e-9;  ///< mu_u; tried again from here in every solve
+  double min_regularization = 1e-9;
+  double max_regularization = 1e9;      ///< given up above
+  double regularization_increase = 10;  ///< factor on a failed sweep or line search, or a step of at most `short_step`
+  double regularization_decrease = 10;  ///< divisor after a step of more than `long_step`
+  double state_regularization_ratio = 1;  ///< mu_x / mu_u
+  double long_step = 0.5;
+  double short_step = 0.01;
+
+  int num_step_lengths = 10;  ///< alpha = 1, 1/2, ..., 2^(1 - num_step_lengths)
+  double acceptance = 0.1;    ///< share of the foreseen decrease of the merit that must be real
+
+  ControlBounds bounds = ControlBounds::Ignore;
+  int threads = 0;  ///< of the linearization, 0: all. The result does not depend on it by a single bit.
+};
+
+/// One line of the log: the iterate that iteration started from and the step it took.
+struct FddpIteration {
+  int iteration = 0;
+  double cost = 0;            ///< J before the step
+  double gap = 0;             ///< max_k |gap_k|_inf before the step
+  double gradient = 0;        ///< Eq. (6)
+  double step = 0;            ///< alpha; 0: none was taken, the iterate is the result
+  double regularization = 0;  ///< mu_u of the sweep
+  double seconds = 0;         ///< since the start
+};
+
+enum class FddpTermination {
+  Converged,
+  MaxIterations,
+  RegularizationMax,  ///< no acceptable step even at the largest regularization
+  Interrupted,        ///< by the flag or the callback
+  Failed              ///< the problem failed, or returned values that are not finite, at the current iterate
+};
+const char* getName(FddpTermination termination);
+
+struct FddpSummary {
+  FddpTermination termination = FddpTermination::Failed;
+  std::string message;
+  double cost = 0;  ///< J of the returned trajectory
+  double gap = 0;   ///< max_k |gap_k|_inf of the returned trajectory
+  int iterations = 0;
+  double seconds = 0;
+  std::vector<FddpIteration> log;
+};
+
+enum class FddpAction { Continue, Stop };
+
+/// How to watch and stop a solve. Stopping leaves the current iterate, the best one so far, in the trajectory.
+struct FddpObserver {
+  /// Called after each iteration; the trajectory passed to solve() is then the new iterate.
+  std::function<FddpAction(const FddpIteration&)> callback;
+  /// Polled before each sweep and each rollout, so that a signal handler can set it.
+  const std::atomic<bool>* interrupt = nullptr;
+};
+
+/// The solver owns its memory: it can be kept for problems of the same sizes, and an iteration after the first
+/// allocates nothing. It calls integrate() and difference() only from the node states of the last linearization.
+class Fddp {
+ public:
+  struct Workspace;  ///< what a solve writes, kept between solves
+
+  explicit Fddp(const FddpOptions& options = {});
+  ~Fddp();
+  Fddp(Fddp&&) noexcept;
+  Fddp& operator=(Fddp&&) noexcept;
+
+  /// trajectory: initial guess in, xs_0 is replaced by the initial state and controls are projected on enforced bounds;
+  /// current iterate during and after. Throws std::invalid_argument if its sizes do not fit the problem.
+  FddpSummary solve(ShootingProblem& problem, ShootingTrajectory& trajectory, const FddpObserver& observer = {});
+
+  /// Gains and value function of the last sweep, about the last linearized trajectory.
+  const LqSweep& getSweep() const;
+
+ private:
+  FddpOptions options_;
+  std::unique_ptr<Workspace> work_;
+};
+
+/// The log as a table: its header, and one line per iteration.
+void printFddpHeader(std::ostream& out);
+void printFddpIteration(std::ostream& out, const FddpIteration& line);
+
+}  // namespace bielle

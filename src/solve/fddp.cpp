@@ -1,0 +1,385 @@
+#include "bielle/solve/fddp.h"
+
+#include <omp.h>
+
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+namespace bielle {
+
+namespace {
+
+constexpr double kPenaltyMargin = 0.5;  // rho of Eq. (5)
+// Differences of costs below this share of the cost are rounding: they neither accept nor refuse a step.
+constexpr double kCostRounding = 1e-14;
+
+bool hasSizes(const StageModel& m, int ndx, int nu, int ndx_next) {
+  return m.Fx.rows() == ndx_next && m.Fx.cols() == ndx && m.Fu.rows() == ndx_next && m.Fu.cols() == nu &&
+         m.gap.size() == ndx_next && m.lx.size() == ndx && m.lu.size() == nu && m.lxx.rows() == ndx &&
+         m.lxx.cols() == ndx && m.lux.rows() == nu && m.lux.cols() == ndx && m.luu.rows() == nu && m.luu.cols() == nu;
+}
+
+[[noreturn]] void throwSize(const std::string& what, int index, Eigen::Index size, int expected) {
+  throw std::invalid_argument("Fddp: " + what + " " + std::to_string(index) + " has size " + std::to_string(size) +
+                              ", the problem expects " + std::to_string(expected));
+}
+
+void checkSizes(const ShootingProblem& problem, const ShootingTrajectory& trajectory) {
+  const int N = problem.numStages();
+  if (N < 1) throw std::invalid_argument("Fddp: the problem has no stage");
+  if (static_cast<int>(trajectory.xs.size()) != N + 1 || static_cast<int>(trajectory.us.size()) != N) {
+    throw std::invalid_argument("Fddp: the guess has " + std::to_string(trajectory.xs.size()) + " states and " +
+                                std::to_string(trajectory.us.size()) + " controls, the problem needs " +
+                                std::to_string(N + 1) + " and " + std::to_string(N));
+  }
+  for (int k = 0; k <= N; ++k) {
+    if (trajectory.xs[k].size() != problem.stateSize()) {
+      throwSize("state", k, trajectory.xs[k].size(), problem.stateSize());
+    }
+    if (k < N && trajectory.us[k].size() != problem.controlSize(k)) {
+      throwSize("control", k, trajectory.us[k].size(), problem.controlSize(k));
+    }
+  }
+}
+
+}  // namespace
+
+struct Fddp::Workspace {
+  std::vector<StageModel> models;     // N + 1
+  std::vector<std::string> failures;  // N + 1: why a node could not be linearized, empty if it could
+  LqSweep sweep;
+  std::vector<VectorXd> dx, du;      // the models' full step
+  ShootingTrajectory trial;          // of a rollout
+  std::vector<VectorXd> deviations;  // N + 1: dx of Eq. (3)
+  std::vector<ControlBox> bounds;    // of u, N or none
+  std::vector<ControlBox> boxes;     // of du, N or none
+
+  void resize(const ShootingProblem& problem, const FddpOptions& options);
+};
+
+void Fddp::Workspace::resize(const ShootingProblem& problem, const FddpOptions& options) {
+  const int N = problem.numStages();
+  models.resize(N + 1);
+  failures.resize(N + 1);
+  deviations.resize(N + 1);
+  trial.xs.assign(N + 1, VectorXd::Zero(problem.stateSize()));
+  trial.us.resize(N);
+  bounds.resize(options.bounds == ControlBounds::Enforce ? N : 0);
+  for (int k = 0; k <= N; ++k) {
+    const int nu = k < N ? problem.controlSize(k) : 0;
+    models[k].resize(problem.tangentSize(k), nu, k < N ? problem.tangentSize(k + 1) : 0);
+    deviations[k].setZero(problem.tangentSize(k));
+    if (k < N) trial.us[k].setZero(nu);
+    if (bounds.empty() || k == N) continue;
+    bounds[k].lower.resize(nu);
+    bounds[k].upper.resize(nu);
+    problem.getControlBounds(k, bounds[k].lower, bounds[k].upper);
+    if (!(bounds[k].lower.array() <= bounds[k].upper.array()).all()) {
+      throw std::invalid_argument("Fddp: a lower control bound of stage " + std::to_string(k) + " exceeds the upper");
+    }
+  }
+  boxes = bounds;
+}
+
+namespace {
+
+/// One call of solve(): the numbers of the current iterate and of the step searched from it.
+class Run {
+ public:
+  Run(const FddpOptions& options, ShootingProblem& problem, ShootingTrajectory& trajectory,
+      const FddpObserver& observer, Fddp::Workspace& work)
+      : options_(options), problem_(problem), trajectory_(trajectory), observer_(observer), work_(work) {}
+
+  FddpSummary solve();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  /// Why the iterations end, if they do.
+  using End = std::optional<FddpTermination>;
+
+  void start();
+  End linearize();
+  void linearizeNode(int k);
+  End findStep();
+  End updateBackwardPass();
+  bool searchLine();
+  std::optional<double> rollOut(double alpha);
+  std::optional<double> rollOutUnguarded(double alpha);
+  void acceptStep();
+  End raiseRegularization();
+  End checkProgress();
+  FddpSummary finish(FddpTermination termination);
+
+  bool isInterrupted() const { return observer_.interrupt && observer_.interrupt->load(); }
+  bool isFeasible() const { return line_.gap <= options_.gap_tolerance; }
+  double calcGradient() const;
+
+  const FddpOptions& options_;
+  ShootingProblem& problem_;
+  ShootingTrajectory& trajectory_;
+  const FddpObserver& observer_;
+  Fddp::Workspace& work_;
+
+  int N_ = 0;
+  Clock::time_point start_ = Clock::now();
+  FddpIteration line_;                // the iteration under way
+  double gap_sum_ = 0;                // c, zero once the gaps are closed
+  double slope_ = 0, curvature_ = 0;  // Eq. (1)
+  double regularization_ = 0;
+  double trial_cost_ = 0;
+  FddpSummary summary_;
+};
+
+FddpSummary Run::solve() {
+  start();
+  while (true) {
+    if (const End end = linearize()) return finish(*end);
+    if (const End end = findStep()) return finish(*end);
+    acceptStep();
+    if (const End end = checkProgress()) return finish(*end);
+  }
+}
+
+void Run::start() {
+  N_ = problem_.numStages();
+  checkSizes(problem_, trajectory_);
+  work_.resize(problem_, options_);
+  trajectory_.xs[0] = problem_.initialState();
+  for (size_t k = 0; k < work_.bounds.size(); ++k) {
+    trajectory_.us[k] = trajectory_.us[k].cwiseMax(work_.bounds[k].lower).cwiseMin(work_.bounds[k].upper);
+  }
+  regularization_ = options_.initial_regularization;
+  summary_.log.reserve(std::min(options_.max_iterations + 1, 10000));
+}
+
+Run::End Run::linearize() {
+  const int threads = options_.threads > 0 ? options_.threads : omp_get_max_threads();
+  line_ = FddpIteration();
+  line_.iteration = summary_.iterations + 1;
+#pragma omp parallel for num_threads(threads) schedule(dynamic)
+  for (int k = 0; k <= N_; ++k) linearizeNode(k);
+
+  gap_sum_ = 0;
+  for (int k = 0; k <= N_; ++k) {
+    if (!work_.failures[k].empty()) {
+      summary_.message = "node " + std::to_string(k) + ": " + work_.failures[k];
+      return FddpTermination::Failed;
+    }
+    const StageModel& model = work_.models[k];
+    line_.cost += model.cost;
+    if (k == N_ || model.gap.size() == 0) continue;
+    line_.gap = std::max(line_.gap, model.gap.lpNorm<Eigen::Infinity>());
+    gap_sum_ += model.gap.lpNorm<1>();
+  }
+  summary_.cost = line_.cost;
+  summary_.gap = line_.gap;
+  if (isFeasible()) gap_sum_ = 0;
+  for (size_t k = 0; k < work_.boxes.size(); ++k) {
+    work_.boxes[k].lower = work_.bounds[k].lower - trajectory_.us[k];
+    work_.boxes[k].upper = work_.bounds[k].upper - trajectory_.us[k];
+  }
+  return {};
+}
+
+// Runs in parallel: nothing may leave but through its own entries of the workspace.
+void Run::linearizeNode(int k) {
+  StageModel& model = work_.models[k];
+  std::string& failure = work_.failures[k];
+  failure.clear();
+  try {
+    const auto& xs = trajectory_.xs;
+    const StepStatus status = k < N_ ? problem_.linearize(k, xs[k], trajectory_.us[k], xs[k + 1], model)
+                                     : problem_.linearizeTerminal(xs[N_], model);
+    const int ndx_next = k < N_ ? problem_.tangentSize(k + 1) : 0;
+    if (status != StepStatus::Ok) {
+      failure = "the problem could not be linearized";
+    } else if (!hasSizes(model, problem_.tangentSize(k), k < N_ ? problem_.controlSize(k) : 0, ndx_next)) {
+      failure = "the quadratic model has other sizes than the problem says";
+    } else if (!std::isfinite(model.cost) || !model.gap.allFinite()) {
+      failure = "the cost or the gap is not finite";
+    }
+  } catch (const std::exception& error) {
+    failure = std::string("the linearization threw: ") + error.what();
+  } catch (...) {
+    failure = "the linearization threw";
+  }
+}
+
+// Ends with an acceptable trial, unless the current iterate is where the iterations end.
+Run::End Run::findStep() {
+  while (true) {
+    if (isInterrupted()) return FddpTermination::Interrupted;
+    if (const End end = updateBackwardPass()) return end;
+    if (line_.gradient <= options_.gradient_tolerance && isFeasible()) return FddpTermination::Converged;
+    if (searchLine()) return {};
+    if (const End end = raiseRegularization()) return end;
+  }
+}
+
+// The sweep, at the least regularization from the current one on for which it goes through.
+Run::End Run::updateBackwardPass() {
+  while (true) {
+    const LqRegularization mu{regularization_, regularization_ * options_.state_regularization_ratio};
+    const LqResult result = work_.sweep.update(work_.models, mu, work_.boxes);
+    if (result.status == LqStatus::NotFinite) {
+      summary_.message = "node " + std::to_string(result.node) + ": the quadratic models are not finite";
+      return FddpTermination::Failed;
+    }
+    line_.regularization = regularization_;
+    if (result.status == LqStatus::Ok) {
+      slope_ = work_.sweep.calcStep(work_.models, work_.dx, work_.du);
+      curvature_ = 2 * (result.expected_change - slope_);  // Eq. (8) of the sweep
+      line_.gradient = calcGradient();
+      return {};
+    }
+    if (const End end = raiseRegularization()) return end;
+  }
+}
+
+// Eq. (6)
+double Run::calcGradient() const {
+  double gradient = 0;
+  for (int k = 0; k < N_; ++k) {
+    const VectorXd& Qu = work_.sweep.getNodes()[k].Qu;
+    if (work_.boxes.empty()) {
+      gradient += Qu.squaredNorm();
+    } else {
+      gradient += (-Qu).cwiseMax(work_.boxes[k].lower).cwiseMin(work_.boxes[k].upper).squaredNorm();
+    }
+  }
+  return gradient;
+}
+
+// Eqs. (4) and (5). The gaps of a trial are known beforehand, only its cost is not.
+bool Run::searchLine() {
+  const double penalized = std::max(0.0, slope_ + 0.5 * std::max(0.0, curvature_));
+  const double nu = gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0;
+  double alpha = 1;
+  for (int i = 0; i < options_.num_step_lengths; ++i, alpha *= 0.5) {
+    if (isInterrupted()) return false;
+    const std::optional<double> cost = rollOut(alpha);
+    if (!cost) continue;
+    const double foreseen = -alpha * slope_ - 0.5 * alpha * alpha * curvature_ + nu * alpha * gap_sum_;
+    const double real = line_.cost - *cost + nu * alpha * gap_sum_;
+    if (real < options_.acceptance * foreseen - kCostRounding * std::abs(line_.cost)) continue;
+    line_.step = alpha;
+    trial_cost_ = *cost;
+    return true;
+  }
+  return false;
+}
+
+// The cost of a trial of length alpha, nothing if the problem fails or the numbers overflow on the way.
+std::optional<double> Run::rollOut(double alpha) {
+  try {
+    return rollOutUnguarded(alpha);
+  } catch (...) {  // a problem that throws on a wild trial has failed on it, no more
+    return {};
+  }
+}
+
+// Eqs. (2) and (3)
+std::optional<double> Run::rollOutUnguarded(double alpha) {
+  const bool contract = alpha < 1 && !isFeasible();
+  ShootingTrajectory& trial = work_.trial;
+  auto& dx = work_.deviations;
+  double total = 0, cost = 0;
+  trial.xs[0] = trajectory_.xs[0];
+  dx[0].setZero();
+  for (int k = 0; k < N_; ++k) {
+    const LqSweep::Node& gains = work_.sweep.getNodes()[k];
+    VectorXd& u = trial.us[k];
+    u = trajectory_.us[k] + alpha * gains.k;
+    u.noalias() += gains.K * dx[k];
+    if (!work_.bounds.empty()) u = u.cwiseMax(work_.bounds[k].lower).cwiseMin(work_.bounds[k].upper);
+    if (problem_.step(k, trial.xs[k], u, trial.xs[k + 1], cost) != StepStatus::Ok) return {};
+    total += cost;
+    if (!std::isfinite(total) || !trial.xs[k + 1].allFinite()) return {};
+    problem_.difference(k + 1, trajectory_.xs[k + 1], trial.xs[k + 1], dx[k + 1]);
+    if (!contract) continue;
+    dx[k + 1] += (alpha - 1) * work_.models[k].gap;
+    problem_.integrate(k + 1, trajectory_.xs[k + 1], dx[k + 1], trial.xs[k + 1]);
+  }
+  if (problem_.calcTerminalCost(trial.xs[N_], cost) != StepStatus::Ok) return {};
+  total += cost;
+  return std::isfinite(total) ? std::optional<double>(total) : std::nullopt;
+}
+
+void Run::acceptStep() {
+  std::swap(trajectory_, work_.trial);
+  summary_.cost = trial_cost_;
+  summary_.gap = line_.step < 1 && !isFeasible() ? (1 - line_.step) * line_.gap : 0;
+  ++summary_.iterations;
+}
+
+Run::End Run::raiseRegularization() {
+  if (isInterrupted()) return FddpTermination::Interrupted;
+  regularization_ = std::max(regularization_, options_.min_regularization) * options_.regularization_increase;
+  if (regularization_ <= options_.max_regularization) return {};
+  summary_.message = "no acceptable step even at the largest regularization";
+  return FddpTermination::RegularizationMax;
+}
+
+// After an accepted step: logs it, adapts the regularization to its length, and looks whether to go on.
+Run::End Run::checkProgress() {
+  line_.seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+  summary_.log.push_back(line_);
+  if (observer_.callback && observer_.callback(line_) == FddpAction::Stop) return FddpTermination::Interrupted;
+
+  const bool newton = line_.step == 1 && line_.regularization <= options_.min_regularization;
+  if (newton && isFeasible() &&
+      std::abs(line_.cost - summary_.cost) <= options_.cost_tolerance * std::abs(line_.cost)) {
+    summary_.message = "the cost no longer decreases";
+    return FddpTermination::Converged;
+  }
+  if (summary_.iterations >= options_.max_iterations) return FddpTermination::MaxIterations;
+  if (line_.step > options_.long_step) {
+    regularization_ = std::max(options_.min_regularization, regularization_ / options_.regularization_decrease);
+  } else if (line_.step <= options_.short_step) {
+    return raiseRegularization();
+  }
+  return {};
+}
+
+FddpSummary Run::finish(FddpTermination termination) {
+  summary_.termination = termination;
+  summary_.seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+  if (line_.step == 0) {  // the last iterate, from which no step was taken
+    line_.seconds = summary_.seconds;
+    summary_.log.push_back(line_);
+    if (observer_.callback) observer_.callback(line_);
+  }
+  if (!summary_.message.empty()) return std::move(summary_);
+  switch (termination) {
+    case FddpTermination::Converged:
+      summary_.message = "the gradient vanishes and the gaps are closed";
+      break;
+    case FddpTermination::MaxIterations:
+      summary_.message = "the largest number of iterations is reached";
+      break;
+    case FddpTermination::Interrupted:
+      summary_.message = "stopped from outside";
+      break;
+    case FddpTermination::RegularizationMax:
+    case FddpTermination::Failed:
+      break;
+  }
+  return std::move(summary_);
+}
+
+}  // namespace
+
+Fddp::Fddp(const FddpOptions& options) : options_(options), work_(std::make_unique<Workspace>()) {}
+Fddp::~Fddp() = default;
+Fddp::Fddp(Fddp&&) noexcept = default;
+Fddp& Fddp::operator=(Fddp&&) noexcept = default;
+
+FddpSummary Fddp::solve(ShootingProblem& problem, ShootingTrajectory& trajectory, const FddpObserver& observer) {
+  return Run(options_, problem, trajectory, observer, *work_).solve();
+}
+
+const LqSweep& Fddp::getSweep() const { return work_->sweep; }
+
+}  // namespace bielle

@@ -1,0 +1,38 @@
+#include <cstdio>
+#include <ostream>
+
+#include "bielle/solve/fddp.h"
+
+namespace bielle {
+
+const char* getName(FddpTermination termination) {
+  switch (termination) {
+    case FddpTermination::Converged:
+      return "converged";
+    case FddpTermination::MaxIterations:
+      return "maximum of iterations";
+    case FddpTermination::RegularizationMax:
+      return "maximum of regularization";
+    case FddpTermination::Interrupted:
+      return "interrupted";
+    case FddpTermination::Failed:
+      return "failed";
+  }
+  return "";
+}
+
+void printFddpHeader(std::ostream& out) {
+  char text[128];
+  std::snprintf(text, sizeof text, "%5s %15s %10s %10s %10s %10s %9s\n", "iter", "cost", "gap", "gradient", "step",
+                "regul.", "time [s]");
+  out << text;
+}
+
+void printFddpIteration(std::ostream& out, const FddpIteration& line) {
+  char text[128];
+  std::snprintf(text, sizeof text, "%5d %15.8e %10.3e %10.3e %10.3e %10.3e %9.3f\n", line.iteration, line.cost,
+                line.gap, line.gradient, line.step, line.regularization, line.seconds);
+  out << text;
+}
+
+}  // namespace bielle
