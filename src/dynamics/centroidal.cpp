@@ -1,15 +1,6 @@
 #include "bielle/dynamics/centroidal.h"
 
 namespace bielle {
-namespace {
-
-Vector6d calcMomentumAboutOrigin(const Model& model, const Workspace& ws) {
-  Vector6d h = Vector6d::Zero();
-  for (int i = 1; i < model.numBodies(); ++i) h += ws.h[i];
-  return h;
-}
-
-}  // namespace
 
 Vector3d calcCom(const Model& model, const Workspace& ws) {
   requireStage(ws, WorkspaceStage::Position, "calcCom", "updatePositions");
@@ -23,7 +14,7 @@ Vector3d calcCom(const Model& model, const Workspace& ws) {
 
 Vector3d calcComVelocity(const Model& model, const Workspace& ws) {
   requireStage(ws, WorkspaceStage::Velocity, "calcComVelocity", "updateVelocities");
-  return calcMomentumAboutOrigin(model, ws).head<3>() / model.mass();
+  return ws.hc[0].head<3>() / model.mass();
 }
 
 void calcComJacobian(const Model& model, const Workspace& ws, Eigen::Ref<Eigen::Matrix3Xd> J) {
@@ -35,18 +26,15 @@ void calcComJacobian(const Model& model, const Workspace& ws, Eigen::Ref<Eigen::
 void calcComVelocityDerivative(const Model& model, const Workspace& ws, Eigen::Ref<Eigen::Matrix3Xd> dv_dq) {
   requireStage(ws, WorkspaceStage::Velocity, "calcComVelocityDerivative", "updateVelocities");
   // d h_i / dq_k in the world is Y_i dV_k + J_k x* h_i (Eq. (2) of rnea.h), summed over the subtree of k.
-  std::vector<Vector6d> h = ws.h;
-  for (int i = model.numBodies() - 1; i > 0; --i) {
-    const Joint& joint = model.joints()[i];
-    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k)
-      dv_dq.col(k) = (ws.Yc[i] * ws.dV.col(k) + crossForce(ws.J.col(k), h[i])).head<3>() / model.mass();
-    if (joint.parent > 0) h[joint.parent] += h[i];
+  for (int k = 0; k < model.nv(); ++k) {
+    const int i = model.dofs()[k].joint;
+    dv_dq.col(k) = (ws.Yc[i] * ws.dV.col(k) + crossForce(ws.J.col(k), ws.hc[i])).head<3>() / model.mass();
   }
 }
 
 Vector6d calcCentroidalMomentum(const Model& model, const Workspace& ws) {
   requireStage(ws, WorkspaceStage::Velocity, "calcCentroidalMomentum", "updateVelocities");
-  Vector6d h = calcMomentumAboutOrigin(model, ws);
+  Vector6d h = ws.hc[0];
   h.tail<3>() -= calcCom(model, ws).cross(h.head<3>());
   return h;
 }

@@ -16,8 +16,10 @@ void resize(const Model& model, ConstrainedWorkspace& cws, int rows) {
   cws.a.setZero(nv);
   cws.force.setZero(nv);
   for (VectorXd* v : {&cws.lambda, &cws.D, &cws.rhs, &cws.correction}) v->setZero(rows);
-  for (MatrixXd* m : {&cws.da_dq, &cws.da_dv, &cws.da_dtau}) m->setZero(nv, nv);
-  for (MatrixXd* m : {&cws.dlambda_dq, &cws.dlambda_dv, &cws.dlambda_dtau, &cws.dc_dq, &cws.dc_dv}) m->setZero(rows, nv);
+  for (MatrixXd* m : {&cws.da_dq, &cws.da_dv}) m->setZero(nv, nv);
+  for (MatrixXd* m : {&cws.dlambda_dq, &cws.dlambda_dv, &cws.dc_dq, &cws.dc_dv}) m->setZero(rows, nv);
+  cws.da_du.setZero(nv, model.nu());
+  cws.dlambda_du.setZero(rows, model.nu());
   cws.W.setZero(nv, rows);
   for (MatrixXd* m : {&cws.G, &cws.Ginv, &cws.T1, &cws.T3}) m->setZero(rows, rows);
   cws.T2.setZero(rows, nv);

@@ -21,13 +21,14 @@ void calcDelassusInverse(ConstrainedWorkspace& cws, const ConstrainedOptions& op
   }
 }
 
-// Eq. (4) for one argument: dID (nv x nv) is overwritten by da; dc holds the derivative of the constraint acceleration.
-void solveDerivative(ConstrainedWorkspace& cws, const MatrixXd& dc, MatrixXd& dlambda, MatrixXd& dID_to_da) {
+// Eq. (4) for one argument: dID is overwritten by da; dc is the derivative of the constraint acceleration, null for zero.
+void solveDerivative(ConstrainedWorkspace& cws, const MatrixXd* dc, MatrixXd& dlambda, MatrixXd& dID_to_da) {
   // In the coordinates of L: W = L^{-1} J^T D and X = L^{-1} dID give J M^{-1} dID = D^{-1} W^T X.
   cws.M_llt.matrixL().solveInPlace(dID_to_da);
-  cws.T2.noalias() = cws.W.transpose() * dID_to_da;
-  cws.T2 -= cws.D.asDiagonal() * dc;
-  dlambda.noalias() = cws.Ginv * cws.T2;
+  auto rhs = cws.T2.leftCols(dID_to_da.cols());
+  rhs.noalias() = cws.W.transpose() * dID_to_da;
+  if (dc) rhs -= cws.D.asDiagonal() * *dc;
+  dlambda.noalias() = cws.Ginv * rhs;
   dID_to_da *= -1;
   dID_to_da.noalias() += cws.W * dlambda;
   cws.M_llt.matrixU().solveInPlace(dID_to_da);
@@ -58,22 +59,18 @@ DynamicsStatus updateConstrainedDerivatives(const Model& model, Workspace& ws, C
     addClosureForceDerivative(model, ws, closure, W, cws.da_dq);
     calcClosureDerivatives(ws, closure, cws.dc_dq.middleRows(row, n), cws.dc_dv.middleRows(row, n));
   }
-  cws.da_dtau.setZero();
-  cws.da_dtau.diagonal().setConstant(-1);
+  cws.da_du.setZero();  // the torques enter ID with a minus
+  for (int m = 0; m < model.nu(); ++m) cws.da_du(model.motors()[m].dof, m) = -1;
   if (constraints.rows == 0) {
-    for (MatrixXd* m : {&cws.da_dq, &cws.da_dv, &cws.da_dtau}) {
+    for (MatrixXd* m : {&cws.da_dq, &cws.da_dv, &cws.da_du}) {
       *m *= -1;
       cws.M_llt.solveInPlace(*m);
     }
   } else {
     calcDelassusInverse(cws, options);
-    solveDerivative(cws, cws.dc_dq, cws.dlambda_dq, cws.da_dq);
-    solveDerivative(cws, cws.dc_dv, cws.dlambda_dv, cws.da_dv);
-    // The torques enter ID with a minus and the constraint not at all.
-    cws.T2.setZero();
-    MatrixXd& zero = cws.dc_dq;
-    zero.setZero();
-    solveDerivative(cws, zero, cws.dlambda_dtau, cws.da_dtau);
+    solveDerivative(cws, &cws.dc_dq, cws.dlambda_dq, cws.da_dq);
+    solveDerivative(cws, &cws.dc_dv, cws.dlambda_dv, cws.da_dv);
+    solveDerivative(cws, nullptr, cws.dlambda_du, cws.da_du);
   }
   const bool finite = cws.da_dq.allFinite() && cws.da_dv.allFinite() && cws.dlambda_dq.allFinite();
   return finite ? DynamicsStatus::Ok : DynamicsStatus::NotFinite;

@@ -51,6 +51,8 @@ void updateVelocities(const Model& model, Workspace& ws, ConstVectorRef v) {
     }
     ws.h[i].noalias() = ws.Y[i] * ws.V[i];
   }
+  ws.hc = ws.h;
+  for (int i = model.numBodies() - 1; i > 0; --i) ws.hc[model.joints()[i].parent] += ws.hc[i];
   ws.stage = WorkspaceStage::Velocity;
 }
 

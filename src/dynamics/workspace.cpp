@@ -13,6 +13,7 @@ Workspace::Workspace(const Model& model) {
   a.setZero(nv);
   V.assign(nb, Vector6d::Zero());
   h.assign(nb, Vector6d::Zero());
+  hc.assign(nb, Vector6d::Zero());
   A.assign(nb, Vector6d::Zero());
   F.assign(nb, Vector6d::Zero());
   Yc.assign(nb, Matrix6d::Zero());

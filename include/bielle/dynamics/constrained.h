@@ -38,9 +38,9 @@ struct ConstrainedWorkspace {
   bool redundant = false;        ///< whether Eq. (3) was needed
 
   MatrixXd da_dq, da_dv;            ///< nv x nv
-  MatrixXd da_dtau;                 ///< nv x nv, symmetric
+  MatrixXd da_du;                   ///< nv x nu
   MatrixXd dlambda_dq, dlambda_dv;  ///< rows x nv
-  MatrixXd dlambda_dtau;            ///< rows x nv
+  MatrixXd dlambda_du;              ///< rows x nu
 
   // Intermediate
   Eigen::LLT<MatrixXd> M_llt, G_llt;
@@ -50,7 +50,8 @@ struct ConstrainedWorkspace {
   VectorXd D;      ///< rows
   VectorXd rhs, correction, force;
   MatrixXd dc_dq, dc_dv;  ///< rows x nv, derivatives of the constraint acceleration
-  MatrixXd T1, T2, T3;
+  MatrixXd T1, T3;        ///< rows x rows
+  MatrixXd T2;            ///< rows x nv
   std::vector<Vector6d> f_ext;  ///< nb
 };
 

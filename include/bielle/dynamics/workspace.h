@@ -31,6 +31,7 @@ struct Workspace {
   Matrix6Xd dJ;                 ///< 6 x nv, dJ_k/dt = w_k x J_k
   Matrix6Xd dV;                 ///< 6 x nv, w-_k x J_k
   std::vector<Vector6d> h;      ///< nb, momenta Y V
+  std::vector<Vector6d> hc;     ///< nb, their sums over subtrees
 
   // Writer: updateAccelerations. Gravity is included: the world accelerates at -g.
   VectorXd a;                   ///< nv

@@ -1,0 +1,46 @@
+#pragma once
+/// \file Costs: a residual under an activation, and the diagonal costs of state and control.
+#include "bielle/ocp/residual.h"
+
+namespace bielle {
+
+enum class ActivationKind { Quadratic, Barrier };
+
+/// Scalar function of a residual r (n).
+///   Quadratic:  1/2 sum_i w_i r_i^2
+///   Barrier:    1/2 sum_i w_i (max(0, lower_i - r_i)^2 + max(0, r_i - upper_i)^2)
+struct Activation {
+  ActivationKind kind = ActivationKind::Quadratic;
+  VectorXd weights;       ///< n
+  VectorXd lower, upper;  ///< n, barrier only
+
+  static Activation makeQuadratic(const VectorXd& weights);
+  static Activation makeBarrier(const VectorXd& weights, const VectorXd& lower, const VectorXd& upper);
+  double calc(ConstVectorRef r) const;
+  /// Gradient (n) and diagonal of the Hessian (n) with respect to r.
+  void calcDerivatives(ConstVectorRef r, VectorRef gradient, VectorRef hessian) const;
+};
+
+/// weight * activation(residual), by name for reports and for `--set`.
+struct Cost {
+  std::string name;
+  double weight = 1;
+  Activation activation;
+  std::unique_ptr<Residual> residual;
+};
+
+/// 1/2 weight sum_i w_i d_i^2 with d the tangent difference of the state to a reference, (q (-) q_ref, v - v_ref) (2 nv).
+struct StateCost {
+  double weight = 0;
+  VectorXd q_ref, v_ref;  ///< nq, nv
+  VectorXd weights;       ///< 2 nv
+};
+
+/// 1/2 weight sum_i w_i (u_i - u_ref_i)^2.
+struct ControlCost {
+  double weight = 0;
+  VectorXd reference;  ///< nu
+  VectorXd weights;    ///< nu
+};
+
+}  // namespace bielle

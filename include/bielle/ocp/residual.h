@@ -1,0 +1,75 @@
+#pragma once
+/// \file Residuals r(q, v, u, lambda) of costs, with analytic derivatives.
+///
+/// A residual is a small vector with sparse partial derivatives with respect to the tangent of q, to v, to the motor torques u
+/// and to the constraint forces lambda; the stage applies the chain rule through the dynamics. Frame residuals are written in
+/// world axes.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bielle/dynamics/constrained.h"
+
+namespace bielle {
+
+/// What a residual may look at: one node with its kinematics (and, at a stage, its dynamics) up to date.
+struct NodeView {
+  const Model& model;
+  const Workspace& ws;               ///< at least velocities and updateMassMatrix
+  const ConstraintSet& constraints;  ///< closures and contacts in force
+  const VectorXd& u;                 ///< nu, empty at the terminal node
+  const VectorXd& lambda;            ///< rows of the constraints, empty at the terminal node
+};
+
+/// Row block of the stacked residual Jacobians of a node. Entries never written stay zero.
+struct ResidualRows {
+  MatrixRef q, v;    ///< n x nv
+  MatrixRef lambda;  ///< n x rows
+};
+
+class Residual {
+ public:
+  virtual ~Residual() = default;
+  virtual int size() const = 0;
+  virtual bool needsForces() const { return false; }
+  virtual void calc(const NodeView& node, VectorRef r) const = 0;
+  /// Writes all entries that may be non-zero at some state.
+  virtual void calcJacobian(const NodeView& node, ResidualRows rows) const = 0;
+};
+
+/// A frame on a body, as the frame residuals use it.
+struct BodyFrame {
+  int body = 0;
+  SE3 X_BF;
+};
+/// \throws ModelError when the robot has no such link, frame or contact
+BodyFrame getBodyFrame(const Model& model, const std::string& name);
+
+/// Centre of mass minus a reference (3), m.
+std::unique_ptr<Residual> makeComPosition(const Vector3d& reference);
+/// Velocity of the centre of mass minus a reference (3), m/s.
+std::unique_ptr<Residual> makeComVelocity(const Vector3d& reference);
+/// Log6(X_WT^{-1} X_WF) (6), m and rad, in the axes of the target.
+std::unique_ptr<Residual> makeFramePlacement(const BodyFrame& frame, const SE3& X_WT);
+/// Position of the frame's origin minus a reference (3), m.
+std::unique_ptr<Residual> makeFrameTranslation(const BodyFrame& frame, const Vector3d& reference);
+/// Log3(R_WT^T R_WF) (3), rad.
+std::unique_ptr<Residual> makeFrameRotation(const BodyFrame& frame, const Matrix3d& R_WT);
+/// Velocity of the frame's origin and angular velocity, in world axes, minus a reference (6), m/s and rad/s.
+std::unique_ptr<Residual> makeFrameVelocity(const BodyFrame& frame, const Vector6d& reference = Vector6d::Zero());
+/// Fly high: horizontal velocity of the frame's origin times exp(-slope z) (2), z its height over `ground`, m/s; slope in 1/m.
+std::unique_ptr<Residual> makeFlyHigh(const BodyFrame& frame, double slope, double ground);
+/// Horizontal distance between two frames (1), m.
+std::unique_ptr<Residual> makeFrameDistance(const BodyFrame& a, const BodyFrame& b);
+/// Rows of the force of a contact minus a reference, N and N m, in the contact frame (6 or 3). `constraint` is the index in the ConstraintSet.
+std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference);
+/// Centre of pressure of a 6D contact in its frame (x, y) (2), m.
+std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint);
+/// Friction pyramid of a contact: mu f_z - |f_x| and mu f_z - |f_y| as four rows mu f_z -+ f_{x,y} (4), N; inside when positive.
+std::unique_ptr<Residual> makeFrictionPyramid(const ConstraintSet& set, int constraint, double mu);
+/// Coordinates of joints with one dof (all with finite limits when `dofs` is empty) (n), rad or m.
+std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs);
+/// Velocity coordinates (n), rad/s or m/s.
+std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs);
+
+}  // namespace bielle

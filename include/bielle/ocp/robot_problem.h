@@ -1,0 +1,74 @@
+#pragma once
+/// \file The shooting problem of a robot: constrained dynamics under Euler steps, and costs.
+///
+/// Full formulation (the paper): x = (q, v) of the spanning tree, tangent size 2 nv. One step of length h:
+///     a = constrained dynamics (q, v, u),    v+ = v + h a,    q+ = q (+) h v+                                          (1)
+/// with derivatives (J_q, J_d those of (+) at d = h v+)
+///     dv+ = dv + h da,                       dq+ = J_q dq + h J_d dv+                                                  (2)
+/// Running cost of a stage: h times the sum of its costs; the terminal node has no h.
+/// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and so on.
+#include <string>
+#include <vector>
+
+#include "bielle/dynamics/constrained.h"
+#include "bielle/ocp/cost.h"
+#include "bielle/ocp/shooting_problem.h"
+
+namespace bielle {
+
+/// One stage of the horizon (or the terminal node, where dt and constraints are not used).
+struct StageSpec {
+  double dt = 0.015;           ///< s
+  ConstraintSet constraints;
+  StateCost state;
+  ControlCost control;
+  std::vector<Cost> costs;
+};
+
+/// Value of one cost at one node, for reports.
+struct CostValue {
+  std::string name;
+  double value = 0;
+};
+
+class RobotProblem : public ShootingProblem {
+ public:
+  /// \param stages N running stages and the terminal one at the end. The model must outlive the problem.
+  /// \throws ModelError on sizes that do not fit
+  RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages);
+  ~RobotProblem() override;
+
+  int numStages() const override { return static_cast<int>(specs_.size()) - 1; }
+  int stateSize() const override { return model_.nq() + model_.nv(); }
+  int tangentSize(int) const override { return 2 * model_.nv(); }
+  int controlSize(int) const override { return model_.nu(); }
+  const VectorXd& initialState() const override { return x0_; }
+  void integrate(int node, ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) const override;
+  void difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override;
+  StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override;
+  StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override;
+  StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node, StageModel& out) override;
+  StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override;
+  void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override;
+
+  const Model& model() const { return model_; }
+  const StageSpec& spec(int node) const { return specs_[node]; }
+  /// Accelerations (nv) and constraint forces (rows) of a stage at (x, u).
+  StepStatus calcDynamics(int stage, ConstVectorRef x, ConstVectorRef u, VectorXd& a, VectorXd& lambda);
+  /// Costs by name at a node (u empty at the terminal node).
+  std::vector<CostValue> calcCosts(int node, ConstVectorRef x, ConstVectorRef u);
+
+ private:
+  struct Node;
+  StepStatus evaluate(int stage, ConstVectorRef x, ConstVectorRef u);
+  double sumCosts(int node_index, std::vector<CostValue>* values = nullptr);
+  void addStateCost(int node_index, double scale, StageModel& out) const;
+  void addResidualCosts(int node_index, double scale, StageModel& out);
+
+  const Model& model_;
+  std::vector<StageSpec> specs_;
+  std::vector<Node> nodes_;
+  VectorXd x0_;
+};
+
+}  // namespace bielle

@@ -1,0 +1,160 @@
+#include <cmath>
+
+#include "bielle/dynamics/centroidal.h"
+#include "bielle/ocp/residual.h"
+
+namespace bielle {
+namespace {
+
+class ComPosition : public Residual {
+ public:
+  explicit ComPosition(const Vector3d& reference) : reference_(reference) {}
+  int size() const override { return 3; }
+  void calc(const NodeView& node, VectorRef r) const override { r = calcCom(node.model, node.ws) - reference_; }
+  void calcJacobian(const NodeView& node, ResidualRows rows) const override {
+    rows.q = node.ws.YJ.topRows<3>() / node.model.mass();
+  }
+
+ private:
+  Vector3d reference_;
+};
+
+class ComVelocity : public Residual {
+ public:
+  explicit ComVelocity(const Vector3d& reference) : reference_(reference) {}
+  int size() const override { return 3; }
+  void calc(const NodeView& node, VectorRef r) const override { r = calcComVelocity(node.model, node.ws) - reference_; }
+  void calcJacobian(const NodeView& node, ResidualRows rows) const override {
+    calcComVelocityDerivative(node.model, node.ws, rows.q);
+    rows.v = node.ws.YJ.topRows<3>() / node.model.mass();
+  }
+
+ private:
+  Vector3d reference_;
+};
+
+// Residuals linear or smooth in the force of one contact.
+class ForceResidual : public Residual {
+ public:
+  ForceResidual(const ConstraintSet& set, int constraint)
+      : row_(set.offsets[constraint]), rows_(getRows(set.closures[constraint].kind)) {}
+  bool needsForces() const override { return true; }
+
+ protected:
+  ConstVectorRef getForce(const NodeView& node) const { return node.lambda.segment(row_, rows_); }
+  int row_, rows_;
+};
+
+class ContactForce : public ForceResidual {
+ public:
+  ContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference)
+      : ForceResidual(set, constraint), reference_(reference) {}
+  int size() const override { return rows_; }
+  void calc(const NodeView& node, VectorRef r) const override { r = getForce(node) - reference_; }
+  void calcJacobian(const NodeView&, ResidualRows rows) const override { rows.lambda.middleCols(row_, rows_).setIdentity(); }
+
+ private:
+  VectorXd reference_;
+};
+
+class CenterOfPressure : public ForceResidual {
+ public:
+  using ForceResidual::ForceResidual;
+  int size() const override { return 2; }
+  void calc(const NodeView& node, VectorRef r) const override {
+    const auto f = getForce(node);
+    const double fz = limit(f[2]);
+    r[0] = -f[4] / fz;
+    r[1] = f[3] / fz;
+  }
+  void calcJacobian(const NodeView& node, ResidualRows rows) const override {
+    const auto f = getForce(node);
+    const double fz = limit(f[2]);
+    const bool free = fz == f[2];
+    rows.lambda(0, row_ + 4) = -1 / fz;
+    rows.lambda(1, row_ + 3) = 1 / fz;
+    rows.lambda(0, row_ + 2) = free ? f[4] / (fz * fz) : 0;
+    rows.lambda(1, row_ + 2) = free ? -f[3] / (fz * fz) : 0;
+  }
+
+ private:
+  // Under 1 N of load there is no centre of pressure to speak of.
+  static double limit(double fz) { return std::max(fz, 1.0); }
+};
+
+class FrictionPyramid : public ForceResidual {
+ public:
+  FrictionPyramid(const ConstraintSet& set, int constraint, double mu) : ForceResidual(set, constraint), mu_(mu) {}
+  int size() const override { return 4; }
+  void calc(const NodeView& node, VectorRef r) const override {
+    const auto f = getForce(node);
+    r << mu_ * f[2] - f[0], mu_ * f[2] + f[0], mu_ * f[2] - f[1], mu_ * f[2] + f[1];
+  }
+  void calcJacobian(const NodeView&, ResidualRows rows) const override {
+    rows.lambda.col(row_ + 2).setConstant(mu_);
+    rows.lambda(0, row_) = -1;
+    rows.lambda(1, row_) = 1;
+    rows.lambda(2, row_ + 1) = -1;
+    rows.lambda(3, row_ + 1) = 1;
+  }
+
+ private:
+  double mu_;
+};
+
+class JointPosition : public Residual {
+ public:
+  JointPosition(const Model& model, std::vector<int> dofs) : dofs_(std::move(dofs)) {
+    if (dofs_.empty())
+      for (int k = 0; k < model.nv(); ++k)
+        if (std::isfinite(model.lowerLimits()[k]) || std::isfinite(model.upperLimits()[k])) dofs_.push_back(k);
+  }
+  int size() const override { return static_cast<int>(dofs_.size()); }
+  void calc(const NodeView& node, VectorRef r) const override {
+    for (size_t i = 0; i < dofs_.size(); ++i) {
+      const Joint& joint = node.model.joints()[node.model.dofs()[dofs_[i]].joint];
+      r[i] = node.ws.q[joint.idx_q + dofs_[i] - joint.idx_v];
+    }
+  }
+  void calcJacobian(const NodeView&, ResidualRows rows) const override {
+    for (size_t i = 0; i < dofs_.size(); ++i) rows.q(i, dofs_[i]) = 1;
+  }
+
+ private:
+  std::vector<int> dofs_;
+};
+
+class JointVelocity : public Residual {
+ public:
+  explicit JointVelocity(std::vector<int> dofs) : dofs_(std::move(dofs)) {}
+  int size() const override { return static_cast<int>(dofs_.size()); }
+  void calc(const NodeView& node, VectorRef r) const override {
+    for (size_t i = 0; i < dofs_.size(); ++i) r[i] = node.ws.v[dofs_[i]];
+  }
+  void calcJacobian(const NodeView&, ResidualRows rows) const override {
+    for (size_t i = 0; i < dofs_.size(); ++i) rows.v(i, dofs_[i]) = 1;
+  }
+
+ private:
+  std::vector<int> dofs_;
+};
+
+}  // namespace
+
+std::unique_ptr<Residual> makeComPosition(const Vector3d& reference) { return std::make_unique<ComPosition>(reference); }
+std::unique_ptr<Residual> makeComVelocity(const Vector3d& reference) { return std::make_unique<ComVelocity>(reference); }
+std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference) {
+  return std::make_unique<ContactForce>(set, constraint, reference);
+}
+std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint) {
+  return std::make_unique<CenterOfPressure>(set, constraint);
+}
+std::unique_ptr<Residual> makeFrictionPyramid(const ConstraintSet& set, int constraint, double mu) {
+  return std::make_unique<FrictionPyramid>(set, constraint, mu);
+}
+std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs) {
+  return std::make_unique<JointPosition>(model, dofs);
+}
+std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs) { return std::make_unique<JointVelocity>(dofs); }
+
+}  // namespace bielle
