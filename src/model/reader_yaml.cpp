@@ -49,7 +49,7 @@ class Entry {
   std::vector<Entry> getList(int count = -1) const {
     if (!isList()) fail("it is not a list", "write it as [a, b, ...]");
     if (count >= 0 && static_cast<int>(node_.size()) != count)
-      fail("it has " + std::to_string(node_.size()) + " elements", "give " + std::to_string(count));
+      fail("it has " + std::to_string(node_.size()) + " element(s)", "give " + std::to_string(count));
     std::vector<Entry> entries;
     for (const YAML::Node& item : node_)
       entries.emplace_back(path_, element_ + "[" + std::to_string(entries.size()) + "]", item);

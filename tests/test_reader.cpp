@@ -1,0 +1,253 @@
+// What the files say is what the model has: the published format, our own keys, warnings, and where robots are found.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <filesystem>
+
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "robot_directory.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+const Joint& getJoint(const Model& model, const std::string& name) {
+  REQUIRE(model.findJoint(name) >= 0);
+  return model.joints()[model.findJoint(name)];
+}
+
+Model load(const std::string& urdf, const std::string& yaml, const LoadOptions& options = {}) {
+  const RobotDirectory directory;
+  return loadRobot(directory.writeRobot(urdf, yaml), options).model;
+}
+
+std::vector<std::string> getJointNames(const Model& model) {
+  std::vector<std::string> names;
+  for (int i = 1; i < model.numBodies(); ++i) names.push_back(model.joints()[i].name);
+  return names;
+}
+
+// The toy with two more lines of YAML.
+Model loadWith(const std::string& yaml) { return load(kToyUrdf, std::string(kToyYaml) + yaml); }
+
+// $BIELLE_ROBOTS for the time of a test.
+class RobotsVariable {
+ public:
+  explicit RobotsVariable(const std::string& value) { setenv("BIELLE_ROBOTS", value.c_str(), 1); }
+  ~RobotsVariable() { unsetenv("BIELLE_ROBOTS"); }
+};
+
+}  // namespace
+
+TEST_CASE("the toy robot has what its files say") {
+  const Model model = load(kToyUrdf, kToyYaml);
+  CHECK(model.name() == "toy");
+  CHECK(getJointNames(model) == std::vector<std::string>{"root_joint", "shoulder", "rod_joint"});
+  CHECK(model.nv() == 8);
+  CHECK(model.mass() == Approx(4.5));
+  const Joint& shoulder = getJoint(model, "shoulder");
+  CHECK(shoulder.kind == JointKind::Revolute);
+  CHECK((shoulder.axis - Vector3d::UnitY()).norm() == 0);
+  CHECK((shoulder.X_PJ.p - Vector3d(0, 0, 0.5)).norm() == 0);
+  CHECK(model.lowerLimits()[shoulder.idx_v] == -1);
+  CHECK(model.upperLimits()[shoulder.idx_v] == 2);
+  CHECK(model.velocityLimits()[shoulder.idx_v] == 7);
+  CHECK(model.upperLimits()[getJoint(model, "rod_joint").idx_v] == kInf);
+  REQUIRE(model.nu() == 1);
+  CHECK(model.motors()[0].effort_limit == 5);
+  CHECK(model.motors()[0].velocity_limit == 7);
+  // The inertial frame is turned by a quarter about z: x and y moments change places.
+  const Inertia& arm = model.bodies()[model.findJoint("shoulder")].inertia;
+  CHECK((arm.com - Vector3d(0.1, 0, 0)).norm() < 1e-15);
+  CHECK((arm.I_com.diagonal() - Vector3d(0.02, 0.01, 0.025)).norm() < 1e-15);
+  REQUIRE(model.closures().size() == 1);
+  CHECK(model.closures()[0].kind == ClosureKind::Weld6D);
+  CHECK(model.closures()[0].name == "hand--rod");
+  CHECK((model.closures()[0].X_B1.p - Vector3d(0.2, 0, 0)).norm() == 0);
+  REQUIRE(model.visuals().size() == 1);
+  CHECK(model.visuals()[0].shape == Visual::Shape::Box);
+  CHECK(model.visuals()[0].size == Vector3d(0.2, 0.02, 0.02));
+  CHECK(model.visuals()[0].rgba == Eigen::Vector4d(1, 0, 0, 1));
+}
+
+TEST_CASE("bodies come depth first, children in the order of the file, not of the alphabet") {
+  const std::string links = "<link name='r'/><link name='z'/><link name='a'/><link name='zz'/>";
+  const auto joint = [](const std::string& parent, const std::string& child) {
+    return "<joint name='to_" + child + "' type='continuous'><parent link='" + parent + "'/><child link='" + child +
+           "'/></joint>";
+  };
+  const std::string urdf =
+      "<robot name='t'>" + links + joint("z", "zz") + joint("r", "z") + joint("r", "a") + "</robot>";
+  CHECK(getJointNames(load(urdf, "base: fixed")) == std::vector<std::string>{"to_z", "to_zz", "to_a"});
+}
+
+TEST_CASE("the base is free, fixed by the file, or what the caller says") {
+  CHECK(load(kToyUrdf, kToyYaml).hasFreeFlyer());
+  CHECK(loadWith("base: fixed").nv() == 2);
+  CHECK(load(kToyUrdf, std::string(kToyYaml) + "base: fixed", {BaseKind::Free}).nv() == 8);
+  CHECK(load(kToyUrdf, kToyYaml, {BaseKind::Fixed}).mass() == Approx(1.5));
+  std::string grounded = kToyUrdf;
+  for (size_t at; (at = grounded.find("\"base\"")) != std::string::npos;) grounded.replace(at, 6, "\"world\"");
+  CHECK(load(grounded, kToyYaml).nv() == 2);
+}
+
+TEST_CASE(
+    "joint types of the YAML replace those of the URDF, in any case, with the axes of universal joints in order") {
+  const auto retype = [](const std::string& type) {
+    return load(kToyUrdf, "joint_name: [shoulder]\njoint_type: [" + type + "]\n");
+  };
+  CHECK(getJoint(retype("SPHERICAL"), "shoulder").kind == JointKind::Spherical);
+  CHECK(retype("Spherical").upperLimits().maxCoeff() == kInf);
+  CHECK(retype("fixed").findJoint("shoulder") == -1);
+  CHECK(retype("prismatic").upperLimits().minCoeff() == 2);
+  const std::string letters = "XYZ";
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      if (i == j) continue;
+      const Model model = retype(std::string("UJOINT_") + letters[i] + letters[j]);
+      const Joint& joint = getJoint(model, "shoulder");
+      CHECK(joint.kind == JointKind::Universal);
+      CHECK((joint.axis - Vector3d::Unit(i)).norm() == 0);
+      CHECK((joint.axis2 - Vector3d::Unit(j)).norm() == 0);
+    }
+}
+
+TEST_CASE("closures: joints stand for their child, pairs for their common name, gains and axes arrive") {
+  const Model by_joint = load(kToyUrdf, "closed_loop: [[wrist, rod_joint]]\ntype: ['3D']\nclosure_name: [tip]");
+  REQUIRE(by_joint.closures().size() == 1);
+  CHECK(by_joint.closures()[0].name == "tip");
+  CHECK(by_joint.closures()[0].kind == ClosureKind::Ball3D);
+  CHECK((by_joint.closures()[0].X_B1.p - Vector3d(0.2, 0, 0)).norm() == 0);
+  CHECK(by_joint.closures()[0].body2 == by_joint.findJoint("rod_joint"));
+
+  // A link named as another joint wins over the joint's child.
+  const std::string shadow = replaceOnce(replaceOnce(kToyUrdf, "<link name=\"rod\"/>", "<link name=\"wrist\"/>"),
+                                         "<child link=\"rod\"/>", "<child link=\"wrist\"/>");
+  const Model by_link = load(shadow, "closed_loop: [[wrist, hand]]\ntype: [6d]");
+  CHECK(by_link.closures()[0].body1 == by_link.findJoint("rod_joint"));
+
+  std::string ends = replaceOnce(kToyUrdf, "<link name=\"hand\"/>", "<link name=\"loop_1A\"/>");
+  ends = replaceOnce(replaceOnce(ends, "<child link=\"hand\"/>", "<child link=\"loop_1A\"/>"), "<link name=\"rod\"/>",
+                     "<link name=\"loop_1B\"/>");
+  ends = replaceOnce(ends, "<child link=\"rod\"/>", "<child link=\"loop_1B\"/>");
+  CHECK(load(ends, "closed_loop: [[loop_1B, loop_1A]]\ntype: [6d]").findClosure("loop_1") == 0);
+
+  const Model ours = load(kToyUrdf,
+                          "closures:\n  - {name: pin, frames: [hand, rod], type: 5d, axis: [0, 2, 0], kp: 3, kd: 4}\n"
+                          "  - {frames: [rod, world], type: 3d}");
+  REQUIRE(ours.closures().size() == 2);
+  const Closure& pin = ours.closures()[0];
+  CHECK(pin.name == "pin");
+  CHECK((pin.axis - Vector3d::UnitY()).norm() == 0);
+  CHECK(pin.kp == 3);
+  CHECK(pin.kd == 4);
+  CHECK(ours.closures()[1].body2 == 0);
+}
+
+TEST_CASE("motors, armature, contacts, references, serial joints and gravity arrive") {
+  const Model model = load(kToyUrdf, R"(motors: {shoulder: {effort: .inf, velocity: 9}, rod_joint: }
+armature: 0.25
+contacts: {toe: {frame: hand, type: 6d, sole: [0.2, 0.1]}, heel: {frame: rod, type: 3D}}
+serial_joints: [rod_joint, shoulder]
+gravity: [0, 0, -1.62]
+references:
+  up: {joints: {shoulder: 1, root_joint: [0, 0, 1, 0, 0, 0, 1]}, height: {frame: wrist, value: 0.4}, feet: {toe: [1, 2, 3]}}
+)");
+  REQUIRE(model.nu() == 2);
+  const int shoulder = getJoint(model, "shoulder").idx_v, rod = getJoint(model, "rod_joint").idx_v;
+  CHECK(model.motors()[0].effort_limit == kInf);
+  CHECK(model.motors()[0].velocity_limit == 9);
+  CHECK(model.velocityLimits()[shoulder] == 9);
+  CHECK(model.motors()[1].dof == rod);
+  CHECK(model.armature().sum() == 0.5);
+  REQUIRE(model.contacts().size() == 2);
+  CHECK(model.contacts()[0].half_length == 0.1);
+  CHECK(model.contacts()[0].half_width == 0.05);
+  CHECK((model.contacts()[0].X_BF.p - Vector3d(0.2, 0, 0)).norm() == 0);
+  CHECK(model.contacts()[1].kind == ContactKind::Point3D);
+  CHECK(model.serialJoints() == std::vector<int>{model.findJoint("rod_joint"), model.findJoint("shoulder")});
+  CHECK((model.gravity() - Vector3d(0, 0, -1.62)).norm() == 0);
+  REQUIRE(model.references().size() == 1);
+  const Reference& up = model.references()[0];
+  CHECK(up.joints.at("shoulder") == std::vector<double>{1});
+  CHECK(up.height_frame == "hand");
+  CHECK(up.height == 0.4);
+  CHECK((up.feet.at("toe") - Vector3d(1, 2, 3)).norm() == 0);
+
+  const Model by_joint = loadWith("armature: {shoulder: 2, rod_joint: 3}");
+  CHECK(by_joint.motors()[0].armature == 2);
+  CHECK(by_joint.armature()[getJoint(by_joint, "rod_joint").idx_v] == 3);
+  CHECK(by_joint.armature().sum() == 5);
+}
+
+TEST_CASE("what is possible but odd is a warning") {
+  const RobotDirectory directory;
+  const auto warn = [&directory](const std::string& urdf, const std::string& yaml) {
+    const std::vector<std::string> warnings = loadRobot(directory.writeRobot(urdf, yaml)).warnings;
+    REQUIRE(warnings.size() == 1);
+    return warnings[0];
+  };
+  using Catch::Contains;
+  const std::string urdf = directory.path() + "/robot.urdf: ", yaml = directory.path() + "/robot.yaml: ";
+  CHECK_THAT(warn(kToyUrdf, "joint_name: [elbow]\njoint_type: [SPHERICAL]"),
+             Contains(yaml + "key 'joint_name'") && Contains("absent") && Contains("'elbow'"));
+  CHECK_THAT(warn(replaceOnce(kToyUrdf, "<mass value=\"3\"/>", "<mass value=\"1000\"/>"), kToyYaml),
+             Contains(urdf + "link 'base': a mass of 1000"));
+  CHECK_THAT(
+      warn(replaceOnce(kToyUrdf, "<axis xyz=\"0 0 1\"/>", "<dynamics damping=\"0.1\" friction=\"0\"/>"), kToyYaml),
+      Contains(urdf + "joint 'rod_joint'") && Contains("damping is ignored"));
+  CHECK_THAT(warn(kToyUrdf, "name_mot: [shoulder]\nmotors: {rod_joint: {}}"), Contains(yaml + "key 'name_mot'"));
+}
+
+TEST_CASE("robots are found by name, directory and file, and a robot that is nowhere is told where it was sought") {
+  const RobotDirectory first, second;
+  second.write("toy/toy.urdf", kToyUrdf);
+  second.write("toy/toy.yaml", kToyYaml);
+  second.write("toy/other.urdf", "<broken>");
+  second.write("lonely/any.urdf", kToyUrdf);
+  second.write("pair/a.urdf", kToyUrdf);
+  second.write("pair/b.urdf", kToyUrdf);
+  second.write("empty/readme.txt", "");
+  const RobotsVariable variable(first.path() + "::" + second.path());
+  const std::vector<std::string> directories = getRobotDirectories();
+  REQUIRE(directories.size() >= 3);
+  CHECK(directories[0] == first.path());
+  CHECK(directories[1] == second.path());
+
+  const LoadedRobot by_name = loadRobot("toy");
+  CHECK(by_name.directory == second.path() + "/toy");
+  CHECK(by_name.model.nu() == 1);
+  first.write("toy/toy.urdf", kToyUrdf);  // an earlier directory wins; it has no YAML
+  CHECK(loadRobot("toy").directory == first.path() + "/toy");
+  CHECK(loadRobot("toy").model.nu() == 0);
+  CHECK(loadRobot(second.path() + "/toy").model.nu() == 1);
+  CHECK(loadRobot(second.path() + "/toy/").model.nu() == 1);
+  CHECK(loadRobot(second.path() + "/toy/toy.urdf").model.nu() == 1);
+  CHECK(loadRobot(second.path() + "/lonely").model.name() == "toy");
+
+  using Catch::Contains;
+  const auto say = [](const std::string& name) {
+    std::string what;
+    try {
+      loadRobot(name);
+    } catch (const ModelError& error) {
+      what = error.what();
+    }
+    return what;
+  };
+  CHECK_THAT(say("unicorn"), Contains("robot 'unicorn'") && Contains(first.path()) && Contains(second.path()) &&
+                                 Contains("known names: ") && Contains("bipetto, ") && Contains("toy"));
+  CHECK_THAT(say(second.path() + "/none"), Contains("no such file or directory") && Contains("known names"));
+  CHECK_THAT(say(second.path() + "/none.urdf"), Contains("no such file or directory"));
+  CHECK_THAT(say(second.path() + "/pair"), Contains("several .urdf files") && Contains("a.urdf"));
+  CHECK_THAT(say(second.path() + "/empty"), Contains("no .urdf file"));
+  CHECK_THAT(say(""), Contains("robot ''"));
+  const std::vector<std::string> names = listRobots();
+  for (const char* name : {"bipetto", "fivebar", "fourbar", "toy"})
+    CHECK(std::find(names.begin(), names.end(), name) != names.end());
+  CHECK(std::is_sorted(names.begin(), names.end()));
+}

@@ -1,0 +1,216 @@
+// Every way a robot file can be wrong: the error names the file, the element and a remedy.
+#include <catch2/catch.hpp>
+#include <iostream>
+#include <sstream>
+
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "robot_directory.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+// What loadRobot says about it; empty when it loads.
+std::string getError(const std::string& name_or_path) {
+  try {
+    loadRobot(name_or_path);
+  } catch (const ModelError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+struct Mistake {
+  std::string from, to;          // in the toy's file
+  std::string element, problem;  // expected
+  std::string remedy;
+};
+
+// The message must read "file: element: ... problem ...; ... remedy ...".
+void checkError(const std::string& error, const std::string& file, const Mistake& m) {
+  CAPTURE(error, m.to);
+  REQUIRE(!error.empty());
+  CHECK(error.compare(0, file.size() + 2, file + ": ") == 0);
+  const size_t element = error.find(m.element, file.size());
+  CHECK(element == file.size() + 2);
+  const size_t problem = error.find(m.problem, file.size() + 2 + m.element.size());
+  CHECK(problem != std::string::npos);
+  const size_t separator = error.rfind("; ");
+  REQUIRE(separator != std::string::npos);
+  CHECK(error.find(m.remedy, separator) != std::string::npos);
+}
+
+const std::string kSecondArm = "<link name=\"arm\"/></robot>";
+
+const std::vector<Mistake> kUrdfMistakes = {
+    {"</robot>", "", "line ", "not well-formed XML", "syntax"},
+    {"<robot name=\"toy\">", "<robot name=\"toy>", "line ", "not well-formed XML", "syntax"},
+    {"<robot name=\"toy\">", "<robot>", "element 'robot'", "no name", "name attribute"},
+    {"</robot>", kSecondArm, "link 'arm'", "declared twice (line 40)", "rename"},
+    {"name=\"wrist\"", "name=\"shoulder\"", "joint 'shoulder'", "declared twice", "rename"},
+    {"name=\"wrist\"", "", "joint (line 30)", "no name", "name attribute"},
+    {"<child link=\"hand\"/>", "<child link=\"nail\"/>", "joint 'wrist'", "child link 'nail' does not exist",
+     "declare"},
+    {"<parent link=\"arm\"/>", "", "joint 'wrist'", "parent link '' does not exist", "declare"},
+    {"<child link=\"hand\"/>", "<child link=\"rod\"/>", "link 'rod'", "child of two joints, 'wrist' and 'rod_joint'",
+     "closure"},
+    {"</robot>", "<link name=\"other\"/></robot>", "link 'other'", "second root beside 'base'", "joint"},
+    {"<parent link=\"arm\"/>", "<parent link=\"hand\"/>", "link 'hand'", "cycle", "closure"},
+    {"<mass value=\"3\"/>", "<mass value=\"nan\"/>", "link 'base'", "<mass value=\"nan\"> (line 5)", "correct"},
+    {"<mass value=\"3\"/>", "<mass value=\"1e999\"/>", "link 'base'", "finite", "correct"},
+    {"<mass value=\"3\"/>", "<mass value=\"three\"/>", "link 'base'", "<mass value=\"three\">", "correct"},
+    {"<mass value=\"3\"/>", "<mass value=\"-3\"/>", "link 'base'", "mass is negative (-3", "0 or more"},
+    {"<mass value=\"3\"/>", "", "robot 'toy'", "Link [base]", "correct"},
+    {"<mass value=\"3\"/>", "<mass value=\"0\"/>", "link 'base'", "rotational inertia but no mass", "mass"},
+    {"ixx=\"0.01\"", "ixx=\"0.001\"", "link 'arm'", "triangle inequality", "correct <inertia>"},
+    {"ixx=\"0.01\"", "ixx=\"-0.01\"", "link 'arm'", "negative principal moment", "correct <inertia>"},
+    {"ixx=\"0.01\"", "", "robot 'toy'", "Link [arm]", "correct"},
+    {"xyz=\"0.2 0 0\"", "xyz=\"0.2 0\"", "joint 'wrist'", "<origin xyz=\"0.2 0\"> (line 31)", "correct"},
+    {"xyz=\"0 1 0\"", "xyz=\"0 0 0\"", "joint 'shoulder'", "axis is not a direction", "non-zero"},
+    {"type=\"continuous\"", "type=\"hinge\"", "joint 'rod_joint'", "type 'hinge' is unknown", "revolute"},
+    {"type=\"continuous\"", "", "joint 'rod_joint'", "type '' is unknown", "revolute"},
+    {"lower=\"-1\" upper=\"2\"", "lower=\"2\" upper=\"-1\"", "joint 'shoulder'", "lower limit is above", "swap"},
+    {"effort=\"5\"", "effort=\"-5\"", "joint 'shoulder'", "limit is negative", "0 for none"},
+    {"effort=\"5\"", "effort=\"inf\"", "joint 'shoulder'", "<limit effort=\"inf\">", "correct"},
+    {"<axis xyz=\"0 0 1\"/>", "<mimic joint=\"shoulder\"/>", "joint 'rod_joint'", "mimics", "closure"},
+    {"<box size=\"0.2 0.02 0.02\"/>", "", "robot 'toy'", "Link [arm]", "correct"},
+    {"<limit lower=\"-1\" upper=\"2\" effort=\"5\" velocity=\"7\"/>", "", "robot 'toy'", "limits", "correct"},
+    {"name=\"hand\"/>", "name=\"world\"/>", "joint 'wrist'", "child link 'hand' does not exist", "declare"},
+    {"name=\"rod_joint\"", "name=\"root_joint\"", "joint 'root_joint'", "two joints have this name", "rename"},
+};
+
+const std::string kLoops = "closed_loop: [[hand, rod]]", kType = "type: [6D]", kMotors = "name_mot: [shoulder]";
+
+const std::vector<Mistake> kYamlMistakes = {
+    {kType, "type: [6D", "line ", "not well-formed YAML", "syntax"},
+    {kMotors, "name_mot [shoulder]", "key 'name_mot [shoulder]' (line 3)", "unknown", "name_mot, motors"},
+    {kType, "typo: [6D]", "key 'typo' (line 2)", "unknown", "known keys are closed_loop, type"},
+    {kType, "type: [6D]\ntype: [3D]", "document", "key 'type' is given twice", "keep one"},
+    {kType, "type: [7d]", "key 'type'[0] (line 2)", "'7d' is unknown", "6d (weld)"},
+    {kType, "type: [6d, 6d]", "key 'type' (line 2)", "2 element(s)", "give 1"},
+    {kType, "", "document", "no 'type'", "add it"},
+    {kLoops, "", "key 'type'", "no closed_loop", "frames"},
+    {kType, kType + "\nclosure_name: [a, b]", "key 'closure_name'", "2 element(s)", "give 1"},
+    {kLoops, "closed_loop: [[hand]]", "key 'closed_loop'[0] (line 1)", "1 element(s)", "give 2"},
+    {kLoops, "closed_loop: hand", "key 'closed_loop'", "not a list", "[a, b, ...]"},
+    {kLoops, "closed_loop: [[hand, foot]]", "closure 'hand--foot'", "no link or joint 'foot'", "name"},
+    {kLoops, "closed_loop: [[hand, hand]]", "closure 'hand--hand'", "with itself", "two frames"},
+    {kLoops, "closed_loop: [[hand, arm]]", "closure 'hand--arm'", "same rigid body", "joint between"},
+    {kLoops, "closed_loop: [[hand, rod], [arm, rod]]", "key 'type' (line 2)", "1 element(s)", "give 2"},
+    {kType, kType + "\nclosures: [{name: hand--rod, frames: [hand, rod], type: 3d}]", "closure 'hand--rod'",
+     "two closures", "rename"},
+    {kType, kType + "\nclosures: [{frames: [arm, rod], type: 6d, axis: [0, 0, 1]}]", "key 'closures'[0]: key 'axis'",
+     "only a hinge", "5d"},
+    {kType, kType + "\nclosures: [{frames: [arm, rod], type: 5d, axis: [0, 0, 0]}]", "closure 'arm--rod'",
+     "not a direction", "non-zero"},
+    {kType, kType + "\nclosures: [{frames: [arm, rod], type: 6d, kp: -1}]", "closure 'arm--rod'", "gain", "kp and kd"},
+    {kType, kType + "\nclosures: [{frames: [arm, rod]}]", "key 'closures'[0]", "no 'type'", "add it"},
+    {kType, kType + "\nclosures: [{frames: [arm, rod], type: 6d, stiffness: 1}]", "key 'closures'[0]: key 'stiffness'",
+     "unknown", "name, frames, type, axis, kp, kd"},
+    {kMotors, "name_mot: [elbow]", "motor 'elbow'", "no moving joint", "name a joint"},
+    {kMotors, "name_mot: [wrist]", "motor 'wrist'", "no moving joint", "not fixed"},
+    {kMotors, "name_mot: [shoulder, shoulder]", "motor 'shoulder'", "two motors", "once"},
+    {kMotors, kMotors + "\njoint_name: [shoulder]\njoint_type: [SPHERICAL]", "motor 'shoulder'", "3 coordinates",
+     "revolute"},
+    {kMotors, "motors: {shoulder: {effort: 0}}", "motor 'shoulder'", "effort limit", "positive"},
+    {kMotors, "motors: {shoulder: {velocity: -1}}", "motor 'shoulder'", "velocity limit", "positive"},
+    {kMotors, "motors: {shoulder: {armature: -1}}", "motor 'shoulder'", "armature", "inertia"},
+    {kMotors, "motors: {shoulder: {effort: .nan}}", "key 'motors': key 'shoulder': key 'effort' (line 3)", "not finite",
+     "finite"},
+    {kMotors, "motors: {shoulder: {torque: 1}}", "key 'motors': key 'shoulder': key 'torque'", "unknown", "effort"},
+    {kMotors, "motors: [shoulder]", "key 'motors'", "not a map", "{name: value, ...}"},
+    {kMotors, "motors: {shoulder: {armature: 1}}\narmature: {shoulder: 2}", "motor 'shoulder'", "both", "keep one"},
+    {kMotors, "armature: {elbow: 2}", "armature of 'elbow'", "no moving joint", "name a joint"},
+    {kMotors, "armature: {rod_joint: -2}", "armature of 'rod_joint'", "0 or more", "inertia"},
+    {kMotors, "armature: [1]", "key 'armature'", "not a number", "number"},
+    {kMotors, "joint_name: [shoulder]", "key 'joint_name'", "no joint_type", "both"},
+    {kMotors, "joint_name: [shoulder]\njoint_type: [FIXED, FIXED]", "key 'joint_type'", "2 element(s)", "give 1"},
+    {kMotors, "joint_name: [shoulder]\njoint_type: [UJOINT_XX]", "key 'joint_type'[0]", "'UJOINT_XX' is unknown",
+     "UJOINT_XY"},
+    {kMotors, "joint_name: [shoulder]\njoint_type: [UJOINT_XW]", "key 'joint_type'[0]", "unknown", "SPHERICAL"},
+    {kMotors, "joint_name: [shoulder, shoulder]\njoint_type: [FIXED, FIXED]", "key 'joint_name'", "listed twice",
+     "once"},
+    {kMotors, "base: floating", "key 'base'", "'floating' is unknown", "free or fixed"},
+    {kMotors, "gravity: [0, 0]", "key 'gravity'", "2 element(s)", "give 3"},
+    {kMotors, "gravity: [0, 0, down]", "key 'gravity'[2]", "not a number", "number"},
+    {kMotors, "serial_joints: [elbow]", "serial joint 'elbow'", "no moving joint", "name"},
+    {kMotors, "serial_joints: [shoulder, shoulder]", "serial joint 'shoulder'", "twice", "once"},
+    {kMotors, "contacts: {toe: {frame: foot, type: 6d}}", "contact 'toe'", "no link or joint 'foot'", "name"},
+    {kMotors, "contacts: {toe: {frame: hand, type: 5d}}", "key 'contacts': key 'toe': key 'type'", "unknown", "3d"},
+    {kMotors, "contacts: {toe: {frame: hand, type: 3d, sole: [1, 1]}}", "key 'contacts': key 'toe': key 'sole'",
+     "no sole", "6d"},
+    {kMotors, "contacts: {toe: {frame: hand, type: 6d, sole: [-1, 1]}}", "contact 'toe'", "sole", "length and width"},
+    {kMotors, "contacts: {toe: {type: 6d}}", "key 'contacts': key 'toe'", "no 'frame'", "add it"},
+    {kMotors, "references: {up: {joints: {elbow: 1}}}", "reference 'up'", "no moving joint 'elbow'", "name"},
+    {kMotors, "references: {up: {joints: {shoulder: [1, 2]}}}", "reference 'up'", "2 value(s)", "that many"},
+    {kMotors, "references: {up: {joints: {root_joint: [0, 0, 0, 0, 0, 0, 2]}}}", "reference 'up'", "unit length",
+     "normalise"},
+    {kMotors, "references: {up: {feet: {toe: [0, 0, 0]}}}", "reference 'up'", "no contact 'toe'", "name"},
+    {kMotors, "references: {up: {height: {frame: head, value: 1}}}", "reference 'up'", "no link or joint 'head'",
+     "name"},
+    {kMotors, "references: {up: {height: {frame: hand}}}", "key 'references': key 'up': key 'height'", "no 'value'",
+     "add it"},
+    {kMotors, "references: {up: {pose: 1}}", "key 'references': key 'up': key 'pose'", "unknown", "joints, height"},
+};
+
+}  // namespace
+
+TEST_CASE("the toy robot itself loads without a word") {
+  const RobotDirectory directory;
+  const LoadedRobot robot = loadRobot(directory.writeRobot(kToyUrdf, kToyYaml));
+  CHECK(robot.warnings.empty());
+}
+
+TEST_CASE("a wrong URDF is an error that names file, element and remedy, and urdfdom keeps silent") {
+  const RobotDirectory directory;
+  std::ostringstream captured;
+  std::streambuf* const terminal = std::cerr.rdbuf(captured.rdbuf());
+  std::vector<std::string> errors;
+  for (const Mistake& m : kUrdfMistakes)
+    errors.push_back(getError(directory.writeRobot(replaceOnce(kToyUrdf, m.from, m.to), kToyYaml)));
+  std::cerr.rdbuf(terminal);
+  for (size_t i = 0; i < errors.size(); ++i) checkError(errors[i], directory.path() + "/robot.urdf", kUrdfMistakes[i]);
+  CHECK(captured.str().empty());
+}
+
+TEST_CASE("a wrong YAML is an error that names file, element and remedy") {
+  const RobotDirectory directory;
+  for (const Mistake& m : kYamlMistakes)
+    checkError(getError(directory.writeRobot(kToyUrdf, replaceOnce(kToyYaml, m.from, m.to))),
+               directory.path() + "/robot.yaml", m);
+}
+
+TEST_CASE("files that are no robot at all are errors") {
+  const RobotDirectory directory;
+  CHECK(getError(directory.writeRobot("", "")).find("not well-formed XML") != std::string::npos);
+  CHECK(getError(directory.writeRobot("<world/>", "")).find("not <robot>") != std::string::npos);
+  CHECK(getError(directory.writeRobot("<robot name='a'/>", "")).find("no link") != std::string::npos);
+  CHECK(getError(directory.writeRobot("<robot name='a'><link name='b'/></robot>", "base: fixed"))
+            .find("no moving joint; declare") != std::string::npos);
+  CHECK(getError(directory.writeRobot(kToyUrdf, "- a list")).find("document (line 1): it is not a map") !=
+        std::string::npos);
+  std::string deep = "<robot name='a'>";
+  for (int i = 0; i < 100000; ++i) deep += "<a>";
+  CHECK(getError(directory.writeRobot(deep, "")).find("nested deeper") != std::string::npos);
+  CHECK(getError(directory.writeRobot(kToyUrdf, std::string(100000, '['))).find("robot.yaml") != std::string::npos);
+}
+
+// Whatever the bytes, loadRobot answers with a model or a ModelError.
+TEST_CASE("truncated and corrupted files never do worse than a ModelError") {
+  const RobotDirectory directory;
+  const std::string urdf = kToyUrdf, yaml = std::string(kToyYaml) + "contacts: {toe: {frame: hand, type: 6d}}\n";
+  int refused = 0, tried = 0;
+  const auto attempt = [&](const std::string& u, const std::string& y) {
+    ++tried;
+    refused += !getError(directory.writeRobot(u, y)).empty();
+  };
+  for (size_t n = 0; n < urdf.size(); n += 3) attempt(urdf.substr(0, n), yaml);
+  for (size_t n = 1; n < yaml.size(); ++n) attempt(urdf, yaml.substr(0, n));
+  for (char c : {'<', '"', '\0', '&', '\xef', '-'}) {
+    for (size_t i = 0; i < urdf.size(); i += 7) attempt(std::string(urdf).replace(i, 1, 1, c), yaml);
+    for (size_t i = 0; i < yaml.size(); ++i) attempt(urdf, std::string(yaml).replace(i, 1, 1, c));
+  }
+  CHECK(refused > tried / 2);
+}
