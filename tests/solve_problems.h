@@ -145,6 +145,46 @@ inline PlantProblem<Linear> makeLinear() {
   return p;
 }
 
+/// A point x pushed out of the crest of a double well, x+ = x + dt u, with the cost 1/2 dt r u^2 and (x^2 - 1)^2 at the
+/// end, whose exact Hessian is negative about the crest.
+class DoubleWell : public ShootingProblem {
+ public:
+  double dt = 0.1, control_weight = 1e-3;
+  VectorXd start = VectorXd::Constant(1, 0.1);
+
+  int numStages() const override { return 10; }
+  int stateSize() const override { return 1; }
+  int tangentSize(int) const override { return 1; }
+  int controlSize(int) const override { return 1; }
+  const VectorXd& initialState() const override { return start; }
+  void integrate(int, ConstVectorRef x, ConstVectorRef dx, VectorRef out) const override { out = x + dx; }
+  void difference(int, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override { dx = x1 - x0; }
+  StepStatus step(int, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override {
+    x_next = x + dt * u;
+    cost = 0.5 * dt * control_weight * u.squaredNorm();
+    return StepStatus::Ok;
+  }
+  StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override {
+    cost = std::pow(x[0] * x[0] - 1, 2);
+    return StepStatus::Ok;
+  }
+  StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
+                       StageModel& out) override {
+    step(stage, x, u, out.gap, out.cost);
+    out.gap -= x_next_node;
+    out.Fx(0, 0) = 1;
+    out.Fu(0, 0) = dt;
+    out.lu = dt * control_weight * u;
+    out.luu(0, 0) = dt * control_weight;
+    return StepStatus::Ok;
+  }
+  StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override {
+    out.lx[0] = 4 * x[0] * (x[0] * x[0] - 1);
+    out.lxx(0, 0) = 12 * x[0] * x[0] - 4;
+    return calcTerminalCost(x, out.cost);
+  }
+};
+
 /// A body turned by torques from one attitude to another. x = (quaternion x y z w, angular velocity w in the body):
 ///     w+ = w + dt I^{-1} (u - w x I w),    q+ = q (+) dt w+,
 /// with the cost 1/2 dt (w_r |q (-) q_goal|^2 + |w|^2 + r |u|^2), and 1/2 P (|q (-) q_goal|^2 + |w|^2) at the end.

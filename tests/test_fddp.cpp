@@ -199,7 +199,7 @@ TEST_CASE("a body turns on SO(3), from a guess that jumps about") {
   checkOptimal(problem, Fddp(makeTightOptions()).solve(problem, t), t);
 }
 
-TEST_CASE("the gaps contract by 1 - alpha, the foreseen slope is that of the cost, and the log tells so") {
+TEST_CASE("the gaps contract by 1 - alpha, and the log tells so") {
   auto problem = makeCartPole();
   ShootingTrajectory t = makeLine(problem);
   FddpOptions options;
@@ -263,6 +263,21 @@ TEST_CASE("the number of threads does not change one bit of the result") {
   CHECK(first.cost == second.cost);
   CHECK(one.xs == two.xs);
   CHECK(one.us == two.us);
+}
+
+TEST_CASE("one solver serves problems of other sizes without remembering them") {
+  auto cart_pole = makeCartPole();
+  auto linear = makeLinear();
+  Fddp fddp;
+  std::vector<ShootingTrajectory> results;
+  for (int i = 0; i < 2; ++i) {
+    ShootingTrajectory t = makeLine(cart_pole), other = makeLine(linear);
+    CHECK(fddp.solve(cart_pole, t).termination == FddpTermination::Converged);
+    CHECK(fddp.solve(linear, other).termination == FddpTermination::Converged);
+    results.push_back(t);
+  }
+  CHECK(results[0].xs == results[1].xs);
+  CHECK(results[0].us == results[1].us);
 }
 
 TEST_CASE("an iteration after the first allocates nothing") {
@@ -368,6 +383,16 @@ TEST_CASE("trials on which the problem fails, throws or gives NaN are only too l
   checkOptimal(inner, summary, t);
 }
 
+TEST_CASE("an indefinite problem is regularized until it can be solved") {
+  DoubleWell problem;
+  ShootingTrajectory t = makeGuess(problem);
+  const FddpSummary summary = Fddp(makeTightOptions()).solve(problem, t);
+  checkOptimal(problem, summary, t);
+  CHECK(t.xs.back()[0] == Approx(1).margin(0.01));
+  CHECK(summary.log.front().regularization > 1e-4);
+  CHECK(summary.log.back().regularization < 1e-3 * summary.log.front().regularization);
+}
+
 TEST_CASE("a problem nothing can improve ends at the largest regularization") {
   auto inner = makeCartPole();
   SpoiledProblem problem(inner);
@@ -376,6 +401,16 @@ TEST_CASE("a problem nothing can improve ends at the largest regularization") {
   const FddpSummary summary = Fddp().solve(problem, t);
   CHECK(summary.termination == FddpTermination::RegularizationMax);
   CHECK(summary.iterations == 0);
+  CHECK(summary.message == "no step is acceptable even at the largest regularization");
+}
+
+TEST_CASE("options without sense are refused by name") {
+  FddpOptions options;
+  options.min_regularization = 0;
+  CHECK_THROWS_WITH(Fddp(options), Catch::Contains("min_regularization"));
+  options = FddpOptions();
+  options.regularization_increase = 1;
+  CHECK_THROWS_WITH(Fddp(options), Catch::Contains("regularization_increase"));
 }
 
 TEST_CASE("guesses of wrong sizes are refused with the sizes") {

@@ -21,6 +21,21 @@ bool hasSizes(const StageModel& m, int ndx, int nu, int ndx_next) {
          m.lxx.cols() == ndx && m.lux.rows() == nu && m.lux.cols() == ndx && m.luu.rows() == nu && m.luu.cols() == nu;
 }
 
+void checkOptions(const FddpOptions& o) {
+  const auto require = [](bool holds, const char* what) {
+    if (!holds) throw std::invalid_argument(std::string("FddpOptions: ") + what);
+  };
+  require(o.max_iterations >= 1, "max_iterations must be at least 1");
+  require(o.num_step_lengths >= 1, "num_step_lengths must be at least 1");
+  require(o.min_regularization > 0, "min_regularization must be positive, or it could never be raised");
+  require(o.initial_regularization >= o.min_regularization && o.initial_regularization <= o.max_regularization,
+          "initial_regularization must lie between min_regularization and max_regularization");
+  require(o.regularization_increase > 1 && o.regularization_decrease >= 1,
+          "regularization_increase must exceed 1, regularization_decrease must not be below");
+  require(o.state_regularization_ratio >= 0, "state_regularization_ratio must not be negative");
+  require(o.acceptance > 0 && o.acceptance < 1, "acceptance must lie between 0 and 1");
+}
+
 [[noreturn]] void throwSize(const std::string& what, int index, Eigen::Index size, int expected) {
   throw std::invalid_argument("Fddp: " + what + " " + std::to_string(index) + " has size " + std::to_string(size) +
                               ", the problem expects " + std::to_string(expected));
@@ -108,7 +123,7 @@ class Run {
   std::optional<double> rollOut(double alpha);
   std::optional<double> rollOutUnguarded(double alpha);
   void acceptStep();
-  End raiseRegularization();
+  End raiseRegularization(const char* reason);
   End checkProgress();
   FddpSummary finish(FddpTermination termination);
 
@@ -214,7 +229,7 @@ Run::End Run::findStep() {
     if (const End end = updateBackwardPass()) return end;
     if (line_.gradient <= options_.gradient_tolerance && isFeasible()) return FddpTermination::Converged;
     if (searchLine()) return {};
-    if (const End end = raiseRegularization()) return end;
+    if (const End end = raiseRegularization("no step is acceptable")) return end;
   }
 }
 
@@ -234,7 +249,7 @@ Run::End Run::updateBackwardPass() {
       line_.gradient = calcGradient();
       return {};
     }
-    if (const End end = raiseRegularization()) return end;
+    if (const End end = raiseRegularization("a control Hessian Quu is indefinite")) return end;
   }
 }
 
@@ -263,7 +278,8 @@ bool Run::searchLine() {
     if (!cost) continue;
     const double foreseen = -alpha * slope_ - 0.5 * alpha * alpha * curvature_ + nu * alpha * gap_sum_;
     const double real = line_.cost - *cost + nu * alpha * gap_sum_;
-    if (real < options_.acceptance * foreseen - kCostRounding * std::abs(line_.cost)) continue;
+    const double required = options_.acceptance * std::max(0.0, foreseen);  // boxes make Eq. (4) an approximation
+    if (real < required - kCostRounding * std::abs(line_.cost)) continue;
     line_.step = alpha;
     trial_cost_ = *cost;
     return true;
@@ -314,11 +330,11 @@ void Run::acceptStep() {
   ++summary_.iterations;
 }
 
-Run::End Run::raiseRegularization() {
+Run::End Run::raiseRegularization(const char* reason) {
   if (isInterrupted()) return FddpTermination::Interrupted;
-  regularization_ = std::max(regularization_, options_.min_regularization) * options_.regularization_increase;
+  regularization_ *= options_.regularization_increase;
   if (regularization_ <= options_.max_regularization) return {};
-  summary_.message = "no acceptable step even at the largest regularization";
+  summary_.message = std::string(reason) + " even at the largest regularization";
   return FddpTermination::RegularizationMax;
 }
 
@@ -338,7 +354,7 @@ Run::End Run::checkProgress() {
   if (line_.step > options_.long_step) {
     regularization_ = std::max(options_.min_regularization, regularization_ / options_.regularization_decrease);
   } else if (line_.step <= options_.short_step) {
-    return raiseRegularization();
+    regularization_ = std::min(options_.max_regularization, regularization_ * options_.regularization_increase);
   }
   return {};
 }
@@ -346,7 +362,8 @@ Run::End Run::checkProgress() {
 FddpSummary Run::finish(FddpTermination termination) {
   summary_.termination = termination;
   summary_.seconds = std::chrono::duration<double>(Clock::now() - start_).count();
-  if (line_.step == 0) {  // the last iterate, from which no step was taken
+  const bool judged = termination == FddpTermination::Converged || termination == FddpTermination::RegularizationMax;
+  if (judged && line_.step == 0) {  // the iterate from which no step was taken
     line_.seconds = summary_.seconds;
     summary_.log.push_back(line_);
     if (observer_.callback) observer_.callback(line_);
@@ -371,7 +388,9 @@ FddpSummary Run::finish(FddpTermination termination) {
 
 }  // namespace
 
-Fddp::Fddp(const FddpOptions& options) : options_(options), work_(std::make_unique<Workspace>()) {}
+Fddp::Fddp(const FddpOptions& options) : options_(options), work_(std::make_unique<Workspace>()) {
+  checkOptions(options_);
+}
 Fddp::~Fddp() = default;
 Fddp::Fddp(Fddp&&) noexcept = default;
 Fddp& Fddp::operator=(Fddp&&) noexcept = default;

@@ -111,6 +111,7 @@ class Fddp {
  public:
   struct Workspace;  ///< what a solve writes, kept between solves
 
+  /// Throws std::invalid_argument on options that make no sense, naming them.
   explicit Fddp(const FddpOptions& options = {});
   ~Fddp();
   Fddp(Fddp&&) noexcept;
