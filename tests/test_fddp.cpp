@@ -251,6 +251,21 @@ TEST_CASE("enforced bounds hold, and the controls on them press outwards") {
   check(cart_pole, makeGuess(cart_pole));
 }
 
+TEST_CASE("enforced bounds that are infinite change nothing but rounding") {
+  TurningBody problem;
+  problem.goal << 0.6, 0.4, -0.3, 0.2;
+  problem.goal.normalize();
+  ShootingTrajectory free = makeGuess(problem), boxed = free;
+  FddpOptions options;
+  options.gradient_tolerance = 1e-16;
+  const FddpSummary first = Fddp(options).solve(problem, free);
+  options.bounds = ControlBounds::Enforce;
+  const FddpSummary second = Fddp(options).solve(problem, boxed);
+  CHECK(first.iterations == second.iterations);
+  CHECK(first.cost == Approx(second.cost).epsilon(1e-12));
+  for (size_t k = 0; k < free.us.size(); ++k) CHECK((free.us[k] - boxed.us[k]).norm() < 1e-6);
+}
+
 TEST_CASE("the number of threads does not change one bit of the result") {
   auto problem = makeCartPole();
   ShootingTrajectory one = makeLine(problem), two = one;

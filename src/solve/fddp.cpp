@@ -345,8 +345,7 @@ Run::End Run::checkProgress() {
   if (observer_.callback && observer_.callback(line_) == FddpAction::Stop) return FddpTermination::Interrupted;
 
   const bool newton = line_.step == 1 && line_.regularization <= options_.min_regularization;
-  if (newton && isFeasible() &&
-      std::abs(line_.cost - summary_.cost) <= options_.cost_tolerance * std::abs(line_.cost)) {
+  if (newton && isFeasible() && std::abs(line_.cost - summary_.cost) < options_.cost_tolerance * std::abs(line_.cost)) {
     summary_.message = "the cost no longer decreases";
     return FddpTermination::Converged;
   }

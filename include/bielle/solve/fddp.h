@@ -11,16 +11,16 @@
 /// 3. Nonlinear rollout with x'_0 = xs_0 and, for k = 0 .. N-1, all tangent vectors in the coordinates of xs:
 ///        u'_k = us_k + alpha k_k + K_k dx_k               (projected on the bounds when they are enforced)         (2)
 ///        dx_{k+1} = difference(xs_{k+1}, f_k(x'_k, u'_k)) + (alpha - 1) gap_k,   x'_{k+1} = xs_{k+1} (+) dx_{k+1} (3)
-///    so that the gaps contract to (1 - alpha) gap_k; a full step closes them and x'_{k+1} = f_k(x'_k, u'_k) exactly.
-///    The paper integrates (alpha - 1) gap_k from f_k(x'_k, u'_k) instead: the same on a vector space, but there the
-///    gap would be a tangent vector at another point than its own, whose coordinates need not be the same.
-/// 4. Line search over alpha on the merit function J + nu c, with J the cost and c = sum_k |gap_k|_1. Its foreseen
-/// decrease is
-///        decrease(alpha) = -change(alpha) + nu alpha c, (4)
+///    so that the gaps contract to (1 - alpha) gap_k (to first order on a curved manifold); a full step closes them and
+///    x'_{k+1} = f_k(x'_k, u'_k) exactly. The paper integrates (alpha - 1) gap_k from f_k(x'_k, u'_k) instead: the same
+///    on a vector space, but elsewhere the gap would be used at another point than the one whose coordinates it has.
+/// 4. Line search over alpha on the merit function J + nu c, with J the cost and c = sum_k |gap_k|_1, which should fall
+/// by
+///        decrease(alpha) = -change(alpha) + nu alpha c,                                                            (4)
 ///    positive on the whole of (0, 1] for rho = 1/2 and
 ///        nu = max(0, (slope + 1/2 max(0, curvature)) / ((1 - rho) c)). (5)
-///    alpha is accepted if the merit really decreases by `acceptance` times (4). Since gaps never grow, nu may be
-///    chosen anew in every iteration without any risk of cycling.
+///    alpha is accepted if the merit really falls by `acceptance` times (4), c by alpha c. Since c falls in every
+///    iteration, nu may be chosen anew in each of them: the iterations cannot cycle.
 /// 5. If no alpha is accepted, or a Quu is indefinite, the regularization grows and the sweep is repeated.
 ///
 /// Stationarity is measured by the projected gradient, with [lower, upper] the bounds of du (infinite if ignored):
@@ -44,22 +44,24 @@ enum class ControlBounds { Ignore, Enforce };
 
 struct FddpOptions {
   int max_iterations = 200;
-  double gradient_tolerance =
-      1e-9;                      ///< converged if Eq. (6) is below (units of cost per control, squared) and c is closed
-  double gap_tolerance = 1e-10;  ///< c is closed if every gap is below, in the tangent's units
-  double cost_tolerance = 1e-13;  ///< converged too if the least regularized, full step changes J by less, times |J|
+  /// Converged if Eq. (6) is below, in (units of cost per unit of control)^2, and the gaps are closed.
+  double gradient_tolerance = 1e-9;
+  /// The gaps are closed if every entry is below, in units of the tangent space.
+  double gap_tolerance = 1e-10;
+  /// Converged too if a full step at the smallest regularization changes J by less than this times |J|; 0: never.
+  double cost_tolerance = 1e-13;
 
-  double initial_regularization = 1e-9;  ///< mu_u; tried again from here in every solve
+  double initial_regularization = 1e-9;  ///< mu_u of the first sweep
   double min_regularization = 1e-9;
-  double max_regularization = 1e9;      ///< given up above
-  double regularization_increase = 10;  ///< factor on a failed sweep or line search, or a step of at most `short_step`
-  double regularization_decrease = 10;  ///< divisor after a step of more than `long_step`
+  double max_regularization = 1e9;        ///< the solve is given up above
+  double regularization_increase = 10;    ///< factor after a failed sweep or line search or a short step
+  double regularization_decrease = 10;    ///< divisor after a long step
   double state_regularization_ratio = 1;  ///< mu_x / mu_u
-  double long_step = 0.5;
-  double short_step = 0.01;
+  double long_step = 0.5;                 ///< alpha is long above
+  double short_step = 0.01;               ///< alpha is short up to here
 
   int num_step_lengths = 10;  ///< alpha = 1, 1/2, ..., 2^(1 - num_step_lengths)
-  double acceptance = 0.1;    ///< share of the foreseen decrease of the merit that must be real
+  double acceptance = 0.1;    ///< share of Eq. (4) by which the merit must really fall, in (0, 1)
 
   ControlBounds bounds = ControlBounds::Ignore;
   int threads = 0;  ///< of the linearization, 0: all. The result does not depend on it by a single bit.
@@ -89,7 +91,7 @@ struct FddpSummary {
   FddpTermination termination = FddpTermination::Failed;
   std::string message;
   double cost = 0;  ///< J of the returned trajectory
-  double gap = 0;   ///< max_k |gap_k|_inf of the returned trajectory
+  double gap = 0;   ///< max_k |gap_k|_inf of the returned trajectory (after a last step alpha < 1: by Eq. 3)
   int iterations = 0;
   double seconds = 0;
   std::vector<FddpIteration> log;
