@@ -75,14 +75,14 @@ TEST_CASE("the toy robot has what its files say") {
 }
 
 TEST_CASE("bodies come depth first, children in the order of the file, not of the alphabet") {
-  const std::string links = "<link name='r'/><link name='z'/><link name='a'/><link name='zz'/>";
+  const std::string links = "<link name='r'/><link name='z'/><link name='a'/><link name='zz'/><link name='b'/>";
   const auto joint = [](const std::string& parent, const std::string& child) {
     return "<joint name='to_" + child + "' type='continuous'><parent link='" + parent + "'/><child link='" + child +
            "'/></joint>";
   };
   const std::string urdf =
-      "<robot name='t'>" + links + joint("z", "zz") + joint("r", "z") + joint("r", "a") + "</robot>";
-  CHECK(getJointNames(load(urdf, "base: fixed")) == std::vector<std::string>{"to_z", "to_zz", "to_a"});
+      "<robot name='t'>" + links + joint("z", "zz") + joint("r", "z") + joint("r", "a") + joint("z", "b") + "</robot>";
+  CHECK(getJointNames(load(urdf, "base: fixed")) == std::vector<std::string>{"to_z", "to_zz", "to_b", "to_a"});
 }
 
 TEST_CASE("the base is free, fixed by the file, or what the caller says") {
