@@ -155,7 +155,8 @@ contacts: {toe: {frame: hand, type: 6d, sole: [0.2, 0.1]}, heel: {frame: rod, ty
 serial_joints: [rod_joint, shoulder]
 gravity: [0, 0, -1.62]
 references:
-  up: {joints: {shoulder: 1, root_joint: [0, 0, 1, 0, 0, 0, 1]}, height: {frame: wrist, value: 0.4}, feet: {toe: [1, 2, 3]}}
+  up: {joints: {shoulder: 1, root_joint: [0, 0, 1, 0, 0, 0, 1]}, height: {frame: wrist, value: 0.4},
+       feet: {toe: [1, 2, 3]}}
 )");
   REQUIRE(model.nu() == 2);
   const int shoulder = getJoint(model, "shoulder").idx_v, rod = getJoint(model, "rod_joint").idx_v;
