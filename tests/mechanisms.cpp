@@ -108,7 +108,8 @@ Mechanism makePlanarFourBar(double ground, double crank, double coupler, double 
   const Eigen::Vector2d tip = crank * Eigen::Vector2d(std::cos(angle), std::sin(angle));
   const Eigen::Vector2d d = Eigen::Vector2d(ground, 0) - tip;
   const double distance = d.norm(), heading = std::atan2(d.y(), d.x());
-  const double inner = std::acos((coupler * coupler + distance * distance - rocker * rocker) / (2 * coupler * distance));
+  const double inner =
+      std::acos((coupler * coupler + distance * distance - rocker * rocker) / (2 * coupler * distance));
   const double coupler_angle = heading + inner;
   const Eigen::Vector2d joint = tip + coupler * Eigen::Vector2d(std::cos(coupler_angle), std::sin(coupler_angle));
   const double rocker_angle = std::atan2(-joint.y(), ground - joint.x());
@@ -133,9 +134,8 @@ MatrixXd differentiateAlong(int n, double h, const std::function<VectorXd(int, d
 
 MatrixXd differentiateTangent(const Model& model, const VectorXd& q, double h,
                               const std::function<VectorXd(const VectorXd&)>& f) {
-  return differentiateAlong(model.nv(), h, [&](int k, double step) {
-    return f(model.integrate(q, step * VectorXd::Unit(model.nv(), k)));
-  });
+  return differentiateAlong(
+      model.nv(), h, [&](int k, double step) { return f(model.integrate(q, step * VectorXd::Unit(model.nv(), k))); });
 }
 
 MatrixXd differentiate(const VectorXd& x, double h, const std::function<VectorXd(const VectorXd&)>& f) {

@@ -16,8 +16,9 @@ struct Mechanism {
   VectorXd q_closed;  ///< a configuration on the closure
 };
 
-/// Two branches from a common body, every other joint of the given kind (revolutes between), their tips tied by a closure of
-/// the given kind that holds at q_closed, with mobility left. With `base` a free-flyer, a universal and a side branch come along.
+/// Two branches from a common body, every other joint of the given kind (revolutes between), their tips tied by a
+/// closure of the given kind that holds at q_closed, with mobility left. With `base` a free-flyer, a universal and a
+/// side branch come along.
 enum class MechanismBase { Fixed, FreeFlyer };
 Mechanism makeRandomMechanism(std::mt19937& rng, JointKind joint, ClosureKind closure, MechanismBase base,
                               double kp = 0, double kd = 0);

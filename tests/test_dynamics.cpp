@@ -1,5 +1,5 @@
-// Oracles: central differences in tangent space (fourth order, step 1e-3: relative error reached about 1e-9), power balance,
-// closed-form mechanisms. Every derivative test also sees a poisoned entry.
+// Oracles: central differences in tangent space (fourth order, step 1e-3: relative error reached about 1e-9), power
+// balance, closed-form mechanisms. Every derivative test also sees a poisoned entry.
 #include <catch2/catch.hpp>
 #include <set>
 
@@ -15,8 +15,9 @@ using namespace bielle::testing;
 
 namespace {
 
-constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic, JointKind::Spherical,
-                                 JointKind::Universal, JointKind::Planar,     JointKind::FreeFlyer};
+constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
+                                 JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
+                                 JointKind::FreeFlyer};
 constexpr ClosureKind kClosures[] = {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D};
 constexpr double kStep = 1e-3;
 constexpr double kTolerance = 1e-6;
@@ -50,7 +51,8 @@ TEST_CASE("inverse dynamics: M, b and RNEA agree, and its derivatives agree with
     checkDerivative(dq, differentiateTangent(model, q, kStep, [&](const VectorXd& x) {
                       return calcInverseDynamics(model, ws, x, v, a);
                     }));
-    checkDerivative(dv, differentiate(v, kStep, [&](const VectorXd& x) { return calcInverseDynamics(model, ws, q, x, a); }));
+    checkDerivative(
+        dv, differentiate(v, kStep, [&](const VectorXd& x) { return calcInverseDynamics(model, ws, q, x, a); }));
   }
 }
 
@@ -87,7 +89,8 @@ TEST_CASE("closures: residual rate, velocity and acceleration are time derivativ
   for (ClosureKind closure_kind : kClosures) {
     for (bool open : {false, true}) {
       CAPTURE(getName(closure_kind), open);
-      const Mechanism mechanism = makeRandomMechanism(rng, JointKind::Spherical, closure_kind, MechanismBase::FreeFlyer);
+      const Mechanism mechanism =
+          makeRandomMechanism(rng, JointKind::Spherical, closure_kind, MechanismBase::FreeFlyer);
       const Model& model = mechanism.model;
       Workspace ws(model);
       const ConstraintSet set = makeConstraintSet(model);
@@ -97,8 +100,8 @@ TEST_CASE("closures: residual rate, velocity and acceleration are time derivativ
       CHECK(calcClosureResidual(ws, closure).norm() < 1e-13);
       if (open) q = model.integrate(q, randomVector(rng, model.nv(), 0.2));
       const VectorXd v = randomVector(rng, model.nv(), 1), a = randomVector(rng, model.nv(), 1);
-      // Along q(t) = q (+) (t v + t^2/2 a') the velocity is v and its derivative a, for joints where the exponential commutes to
-      // second order: take v(t) = v + t a as the definition and move q by the midpoint rule.
+      // Along q(t) = q (+) (t v + t^2/2 a') the velocity is v and its derivative a, for joints where the exponential
+      // commutes to second order: take v(t) = v + t a as the definition and move q by the midpoint rule.
       const auto state = [&](double t) {
         const VectorXd qt = model.integrate(q, t * (v + 0.5 * t * a));
         updatePositions(model, ws, qt);
@@ -134,7 +137,8 @@ TEST_CASE("constrained dynamics: every joint kind times every closure kind, clos
           const Mechanism mechanism = makeRandomMechanism(rng, kind, closure, base, kp, kd);
           const Model& model = mechanism.model;
           std::vector<ContactTarget> contacts;
-          if (base == MechanismBase::FreeFlyer) contacts = {{0, randomPlacement(rng), 5, 4}, {1, randomPlacement(rng), 0, 10}};
+          if (base == MechanismBase::FreeFlyer)
+            contacts = {{0, randomPlacement(rng), 5, 4}, {1, randomPlacement(rng), 0, 10}};
           const ConstraintSet set = makeConstraintSet(model, contacts);
           VectorXd q = mechanism.q_closed;
           if (open) q = model.integrate(q, randomVector(rng, model.nv(), 0.1));

@@ -95,8 +95,9 @@ TEST_CASE("every joint kind: integrate, difference, their Jacobians and the moti
       integrateJoint(joint, q, d, qp);
       integrateJoint(joint, q, -d, qm);
       const SE3 X = calcJointPlacement(joint, q);
-      const Vector6d twist = (log6(X.inverseTimes(calcJointPlacement(joint, qp))) -
-                              log6(X.inverseTimes(calcJointPlacement(joint, qm)))) / (2 * h);
+      const Vector6d twist =
+          (log6(X.inverseTimes(calcJointPlacement(joint, qp))) - log6(X.inverseTimes(calcJointPlacement(joint, qm)))) /
+          (2 * h);
       CHECK((twist - S.col(k)).norm() < 1e-8);
       integrateJoint(joint, qp, dv, rp);
       integrateJoint(joint, qm, dv, rm);

@@ -34,8 +34,7 @@ class HardConditions {
       const RowsBy6 rate = calcClosureResidualRate(ws_, closure);
       const SE3 X_W1 = getPlacement(ws_, closure.body1, closure.X_B1);
       for (size_t i = 0; i < closure.dofs.size(); ++i)
-        H.block(row, closure.dofs[i], n, 1) =
-            closure.signs[i] * (rate * X_W1.actInvMotion(ws_.J.col(closure.dofs[i])));
+        H.block(row, closure.dofs[i], n, 1) = closure.signs[i] * (rate * X_W1.actInvMotion(ws_.J.col(closure.dofs[i])));
     }
     int row = set_.rows;
     for (const FrameTarget& target : problem_.frames) row = updateTarget(target, row);
@@ -192,16 +191,19 @@ AssemblyProblem makeReferenceProblem(const Model& model, const Reference& refere
     if (index < 0) throw ModelError(model.name(), element, "there is no joint '" + name + "'", "name a moving joint");
     const Joint& joint = model.joints()[index];
     if (static_cast<int>(values.size()) != joint.nq)
-      throw ModelError(model.name(), element, "joint '" + name + "' has " + std::to_string(joint.nq) + " values, not " +
-                       std::to_string(values.size()), "give its q as notation.h orders it");
+      throw ModelError(
+          model.name(), element,
+          "joint '" + name + "' has " + std::to_string(joint.nq) + " values, not " + std::to_string(values.size()),
+          "give its q as notation.h orders it");
     problem.q_ref.segment(joint.idx_q, joint.nq) = Eigen::Map<const VectorXd>(values.data(), joint.nq);
     problem.weights.segment(joint.idx_v, joint.nv).setOnes();
   }
   if (model.hasFreeFlyer()) problem.weights.head<6>().setOnes();
   for (const auto& [name, position] : reference.feet) {
     const int index = model.findContact(name);
-    if (index < 0) throw ModelError(model.name(), "reference '" + reference.name + "'", "there is no contact '" + name + "'",
-                                    "name one of the contacts of the file");
+    if (index < 0)
+      throw ModelError(model.name(), "reference '" + reference.name + "'", "there is no contact '" + name + "'",
+                       "name one of the contacts of the file");
     const ContactFrame& contact = model.contacts()[index];
     FrameTarget target;
     target.name = name;
@@ -213,8 +215,9 @@ AssemblyProblem makeReferenceProblem(const Model& model, const Reference& refere
   }
   if (!reference.height_frame.empty()) {
     const int index = model.findFrame(reference.height_frame);
-    if (index < 0) throw ModelError(model.name(), "reference '" + reference.name + "'",
-                                    "there is no frame '" + reference.height_frame + "'", "name a link or frame");
+    if (index < 0)
+      throw ModelError(model.name(), "reference '" + reference.name + "'",
+                       "there is no frame '" + reference.height_frame + "'", "name a link or frame");
     FrameTarget target;
     target.name = "height of " + reference.height_frame;
     target.body = model.frames()[index].body;

@@ -55,9 +55,12 @@ ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTar
 
 RowVectorUpTo6 selectRows(const Closure& c, const Vector6d& full) {
   switch (c.kind) {
-    case ClosureKind::Weld6D: return full;
-    case ClosureKind::Ball3D: return full.head<3>();
-    case ClosureKind::Hinge5D: break;
+    case ClosureKind::Weld6D:
+      return full;
+    case ClosureKind::Ball3D:
+      return full.head<3>();
+    case ClosureKind::Hinge5D:
+      break;
   }
   RowVectorUpTo6 rows(5);
   rows << full.head<3>(), getHingeNormals(c).transpose() * full.tail<3>();

@@ -78,10 +78,12 @@ void solveDelassus(ConstrainedWorkspace& cws, const ConstrainedOptions& options)
 
 const char* getMessage(DynamicsStatus status) {
   switch (status) {
-    case DynamicsStatus::Ok: return "ok";
+    case DynamicsStatus::Ok:
+      return "ok";
     case DynamicsStatus::MassMatrixSingular:
       return "the mass matrix is singular: a joint moves no inertia; give its links a mass or the joint an armature";
-    case DynamicsStatus::NotFinite: return "the accelerations are not finite";
+    case DynamicsStatus::NotFinite:
+      return "the accelerations are not finite";
   }
   return "?";
 }

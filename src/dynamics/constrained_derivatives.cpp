@@ -21,7 +21,8 @@ void calcDelassusInverse(ConstrainedWorkspace& cws, const ConstrainedOptions& op
   }
 }
 
-// Eq. (4) for one argument: dID is overwritten by da; dc is the derivative of the constraint acceleration, null for zero.
+// Eq. (4) for one argument: dID is overwritten by da; dc is the derivative of the constraint acceleration, null for
+// zero.
 void solveDerivative(ConstrainedWorkspace& cws, const MatrixXd* dc, MatrixXd& dlambda, MatrixXd& dID_to_da) {
   // In the coordinates of L: W = L^{-1} J^T D and X = L^{-1} dID give J M^{-1} dID = D^{-1} W^T X.
   cws.M_llt.matrixL().solveInPlace(dID_to_da);

@@ -108,10 +108,10 @@ void updateInverseDynamicsDerivatives(const Model& model, Workspace& ws, const s
                               : ws.J.col(j).dot(ws.Gq.col(k));                                    // Eq. (8)
       }
       for (int k = dofs[begin].parent; k >= 0; k = dofs[k].parent) {
-        ws.dID_dq(j, k) = ws.YJ.col(j).dot(ws.dA.col(k)) + ws.BtJ.col(j).dot(ws.dV.col(k));             // Eq. (7)
+        ws.dID_dq(j, k) = ws.YJ.col(j).dot(ws.dA.col(k)) + ws.BtJ.col(j).dot(ws.dV.col(k));                // Eq. (7)
         ws.dID_dv(j, k) = ws.YJ.col(j).dot(ws.dJ.col(k) + ws.dV.col(k)) + ws.BtJ.col(j).dot(ws.J.col(k));  // Eq. (9)
-        ws.dID_dq(k, j) = ws.J.col(k).dot(ws.Gq.col(j));                                                // Eq. (8)
-        ws.dID_dv(k, j) = ws.J.col(k).dot(ws.Gv.col(j));                                                // Eq. (9)
+        ws.dID_dq(k, j) = ws.J.col(k).dot(ws.Gq.col(j));                                                   // Eq. (8)
+        ws.dID_dv(k, j) = ws.J.col(k).dot(ws.Gv.col(j));                                                   // Eq. (9)
       }
     }
     if (joint.parent > 0) {

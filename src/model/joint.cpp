@@ -28,37 +28,57 @@ void projectPlanar(const Joint& joint, const Matrix6d& J, MatrixRef out) {
 
 const char* getName(JointKind kind) {
   switch (kind) {
-    case JointKind::Fixed: return "fixed";
-    case JointKind::Revolute: return "revolute";
-    case JointKind::Continuous: return "continuous";
-    case JointKind::Prismatic: return "prismatic";
-    case JointKind::Spherical: return "spherical";
-    case JointKind::Universal: return "universal";
-    case JointKind::Planar: return "planar";
-    case JointKind::FreeFlyer: return "free-flyer";
+    case JointKind::Fixed:
+      return "fixed";
+    case JointKind::Revolute:
+      return "revolute";
+    case JointKind::Continuous:
+      return "continuous";
+    case JointKind::Prismatic:
+      return "prismatic";
+    case JointKind::Spherical:
+      return "spherical";
+    case JointKind::Universal:
+      return "universal";
+    case JointKind::Planar:
+      return "planar";
+    case JointKind::FreeFlyer:
+      return "free-flyer";
   }
   return "?";
 }
 
 int getNq(JointKind kind) {
   switch (kind) {
-    case JointKind::Fixed: return 0;
-    case JointKind::Spherical: return 4;
-    case JointKind::Universal: return 2;
-    case JointKind::Planar: return 3;
-    case JointKind::FreeFlyer: return 7;
-    default: return 1;
+    case JointKind::Fixed:
+      return 0;
+    case JointKind::Spherical:
+      return 4;
+    case JointKind::Universal:
+      return 2;
+    case JointKind::Planar:
+      return 3;
+    case JointKind::FreeFlyer:
+      return 7;
+    default:
+      return 1;
   }
 }
 
 int getNv(JointKind kind) {
   switch (kind) {
-    case JointKind::Fixed: return 0;
-    case JointKind::Spherical: return 3;
-    case JointKind::Universal: return 2;
-    case JointKind::Planar: return 3;
-    case JointKind::FreeFlyer: return 6;
-    default: return 1;
+    case JointKind::Fixed:
+      return 0;
+    case JointKind::Spherical:
+      return 3;
+    case JointKind::Universal:
+      return 2;
+    case JointKind::Planar:
+      return 3;
+    case JointKind::FreeFlyer:
+      return 6;
+    default:
+      return 1;
   }
 }
 
@@ -73,17 +93,23 @@ Matrix3d makePlaneBasis(const Vector3d& normal) {
 
 SE3 calcJointPlacement(const Joint& joint, ConstVectorRef q) {
   switch (joint.kind) {
-    case JointKind::Fixed: return {};
+    case JointKind::Fixed:
+      return {};
     case JointKind::Revolute:
-    case JointKind::Continuous: return {exp3(joint.axis * q[0]), Vector3d::Zero()};
-    case JointKind::Prismatic: return {Matrix3d::Identity(), joint.axis * q[0]};
-    case JointKind::Spherical: return {ConstQuaternionMap(q.data()).toRotationMatrix(), Vector3d::Zero()};
-    case JointKind::Universal: return {exp3(joint.axis * q[0]) * exp3(joint.axis2 * q[1]), Vector3d::Zero()};
+    case JointKind::Continuous:
+      return {exp3(joint.axis * q[0]), Vector3d::Zero()};
+    case JointKind::Prismatic:
+      return {Matrix3d::Identity(), joint.axis * q[0]};
+    case JointKind::Spherical:
+      return {ConstQuaternionMap(q.data()).toRotationMatrix(), Vector3d::Zero()};
+    case JointKind::Universal:
+      return {exp3(joint.axis * q[0]) * exp3(joint.axis2 * q[1]), Vector3d::Zero()};
     case JointKind::Planar: {
       const Matrix3d B = makePlaneBasis(joint.axis);
       return {exp3(joint.axis * q[2]), B.leftCols<2>() * q.head<2>()};
     }
-    case JointKind::FreeFlyer: return {ConstQuaternionMap(q.data() + 3).toRotationMatrix(), q.head<3>()};
+    case JointKind::FreeFlyer:
+      return {ConstQuaternionMap(q.data() + 3).toRotationMatrix(), q.head<3>()};
   }
   return {};
 }
@@ -91,11 +117,18 @@ SE3 calcJointPlacement(const Joint& joint, ConstVectorRef q) {
 void calcJointSubspace(const Joint& joint, ConstVectorRef q, Eigen::Ref<Matrix6Xd> S) {
   S.setZero();
   switch (joint.kind) {
-    case JointKind::Fixed: break;
+    case JointKind::Fixed:
+      break;
     case JointKind::Revolute:
-    case JointKind::Continuous: S.col(0).tail<3>() = joint.axis; break;
-    case JointKind::Prismatic: S.col(0).head<3>() = joint.axis; break;
-    case JointKind::Spherical: S.bottomLeftCorner<3, 3>().setIdentity(); break;
+    case JointKind::Continuous:
+      S.col(0).tail<3>() = joint.axis;
+      break;
+    case JointKind::Prismatic:
+      S.col(0).head<3>() = joint.axis;
+      break;
+    case JointKind::Spherical:
+      S.bottomLeftCorner<3, 3>().setIdentity();
+      break;
     case JointKind::Universal:
       S.col(0).tail<3>() = exp3(-joint.axis2 * q[1]) * joint.axis;
       S.col(1).tail<3>() = joint.axis2;
@@ -106,7 +139,9 @@ void calcJointSubspace(const Joint& joint, ConstVectorRef q, Eigen::Ref<Matrix6X
       S.col(2).tail<3>() = B.col(2);
       break;
     }
-    case JointKind::FreeFlyer: S.topLeftCorner<6, 6>().setIdentity(); break;
+    case JointKind::FreeFlyer:
+      S.topLeftCorner<6, 6>().setIdentity();
+      break;
   }
 }
 
@@ -135,7 +170,8 @@ void integrateJoint(const Joint& joint, ConstVectorRef q, ConstVectorRef dv, Vec
       q_out.tail<4>() = product.normalized().coeffs();
       break;
     }
-    default: q_out = q + dv;
+    default:
+      q_out = q + dv;
   }
 }
 
@@ -159,7 +195,8 @@ void calcJointDifference(const Joint& joint, ConstVectorRef q0, ConstVectorRef q
     case JointKind::FreeFlyer:
       dv.head<6>() = log6(calcJointPlacement(joint, q0).inverseTimes(calcJointPlacement(joint, q1)));
       break;
-    default: dv = q1 - q0;
+    default:
+      dv = q1 - q0;
   }
 }
 
@@ -187,10 +224,17 @@ void calcJointIntegrateJacobians(const Joint& joint, ConstVectorRef dv, MatrixRe
 
 void calcJointDifferenceJacobian(const Joint& joint, ConstVectorRef dv, MatrixRef J_q1) {
   switch (joint.kind) {
-    case JointKind::Spherical: J_q1 = calcRightJacobianInverse3(dv); break;
-    case JointKind::Planar: projectPlanar(joint, calcLogJacobian6(exp6(embedPlanar(joint, dv))), J_q1); break;
-    case JointKind::FreeFlyer: J_q1 = calcLogJacobian6(exp6(dv)); break;
-    default: J_q1.setIdentity();
+    case JointKind::Spherical:
+      J_q1 = calcRightJacobianInverse3(dv);
+      break;
+    case JointKind::Planar:
+      projectPlanar(joint, calcLogJacobian6(exp6(embedPlanar(joint, dv))), J_q1);
+      break;
+    case JointKind::FreeFlyer:
+      J_q1 = calcLogJacobian6(exp6(dv));
+      break;
+    default:
+      J_q1.setIdentity();
   }
 }
 

@@ -14,18 +14,24 @@ int findByName(const Items& items, const std::string& name) {
 
 const char* getName(ClosureKind kind) {
   switch (kind) {
-    case ClosureKind::Weld6D: return "6d";
-    case ClosureKind::Ball3D: return "3d";
-    case ClosureKind::Hinge5D: return "5d";
+    case ClosureKind::Weld6D:
+      return "6d";
+    case ClosureKind::Ball3D:
+      return "3d";
+    case ClosureKind::Hinge5D:
+      return "5d";
   }
   return "?";
 }
 
 int getRows(ClosureKind kind) {
   switch (kind) {
-    case ClosureKind::Weld6D: return 6;
-    case ClosureKind::Ball3D: return 3;
-    case ClosureKind::Hinge5D: return 5;
+    case ClosureKind::Weld6D:
+      return 6;
+    case ClosureKind::Ball3D:
+      return 3;
+    case ClosureKind::Hinge5D:
+      return 5;
   }
   return 0;
 }

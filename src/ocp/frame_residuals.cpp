@@ -7,7 +7,9 @@
 namespace bielle {
 namespace {
 
-SE3 getPlacement(const NodeView& node, const BodyFrame& frame) { return bielle::getPlacement(node.ws, frame.body, frame.X_BF); }
+SE3 getPlacement(const NodeView& node, const BodyFrame& frame) {
+  return bielle::getPlacement(node.ws, frame.body, frame.X_BF);
+}
 
 // Velocity of the world point p carried by a spatial world velocity V: v + w x p.
 Vector3d calcPointVelocity(const Vector6d& V, const Vector3d& p) { return V.head<3>() + V.tail<3>().cross(p); }
@@ -16,7 +18,9 @@ class FramePlacement : public Residual {
  public:
   FramePlacement(const BodyFrame& frame, const SE3& X_WT) : frame_(frame), X_WT_(X_WT) {}
   int size() const override { return 6; }
-  void calc(const NodeView& node, VectorRef r) const override { r = log6(X_WT_.inverseTimes(getPlacement(node, frame_))); }
+  void calc(const NodeView& node, VectorRef r) const override {
+    r = log6(X_WT_.inverseTimes(getPlacement(node, frame_)));
+  }
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
     const SE3 X_WF = getPlacement(node, frame_);
     const Matrix6d dlog = calcLogJacobian6(X_WT_.inverseTimes(X_WF));
@@ -47,7 +51,9 @@ class FrameRotation : public Residual {
  public:
   FrameRotation(const BodyFrame& frame, const Matrix3d& R_WT) : frame_(frame), R_WT_(R_WT) {}
   int size() const override { return 3; }
-  void calc(const NodeView& node, VectorRef r) const override { r = log3(R_WT_.transpose() * getPlacement(node, frame_).R); }
+  void calc(const NodeView& node, VectorRef r) const override {
+    r = log3(R_WT_.transpose() * getPlacement(node, frame_).R);
+  }
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
     const Matrix3d R = getPlacement(node, frame_).R;
     const Matrix3d dlog = calcRightJacobianInverse3(log3(R_WT_.transpose() * R)) * R.transpose();

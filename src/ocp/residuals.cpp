@@ -51,7 +51,9 @@ class ContactForce : public ForceResidual {
       : ForceResidual(set, constraint), reference_(reference) {}
   int size() const override { return rows_; }
   void calc(const NodeView& node, VectorRef r) const override { r = getForce(node) - reference_; }
-  void calcJacobian(const NodeView&, ResidualRows rows) const override { rows.lambda.middleCols(row_, rows_).setIdentity(); }
+  void calcJacobian(const NodeView&, ResidualRows rows) const override {
+    rows.lambda.middleCols(row_, rows_).setIdentity();
+  }
 
  private:
   VectorXd reference_;
@@ -141,8 +143,12 @@ class JointVelocity : public Residual {
 
 }  // namespace
 
-std::unique_ptr<Residual> makeComPosition(const Vector3d& reference) { return std::make_unique<ComPosition>(reference); }
-std::unique_ptr<Residual> makeComVelocity(const Vector3d& reference) { return std::make_unique<ComVelocity>(reference); }
+std::unique_ptr<Residual> makeComPosition(const Vector3d& reference) {
+  return std::make_unique<ComPosition>(reference);
+}
+std::unique_ptr<Residual> makeComVelocity(const Vector3d& reference) {
+  return std::make_unique<ComVelocity>(reference);
+}
 std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference) {
   return std::make_unique<ContactForce>(set, constraint, reference);
 }
@@ -155,6 +161,8 @@ std::unique_ptr<Residual> makeFrictionPyramid(const ConstraintSet& set, int cons
 std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs) {
   return std::make_unique<JointPosition>(model, dofs);
 }
-std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs) { return std::make_unique<JointVelocity>(dofs); }
+std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs) {
+  return std::make_unique<JointVelocity>(dofs);
+}
 
 }  // namespace bielle

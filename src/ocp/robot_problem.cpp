@@ -28,9 +28,10 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index) {
     require(spec.control.reference.size() == model.nu() && spec.control.weights.size() == model.nu(),
             "the control cost has wrong sizes", "reference and weights: nu");
   for (const Cost& cost : spec.costs)
-    require(cost.residual && cost.activation.weights.size() == cost.residual->size(),
-            "cost '" + cost.name + "' has " + std::to_string(cost.activation.weights.size()) + " weights for another size",
-            "give one weight per row of the residual");
+    require(
+        cost.residual && cost.activation.weights.size() == cost.residual->size(),
+        "cost '" + cost.name + "' has " + std::to_string(cost.activation.weights.size()) + " weights for another size",
+        "give one weight per row of the residual");
 }
 
 }  // namespace
@@ -58,15 +59,16 @@ struct RobotProblem::Node {
   ConstrainedWorkspace cws;
   VectorXd x, u, x_next, tau;
   bool valid = false;
-  VectorXd r, gradient, hessian;            // stacked residuals
-  MatrixXd Rq, Rv, Rlambda;                 // their partial derivatives
-  MatrixXd Rx, Ru, scaled_x, scaled_u;      // total derivatives; the same times the Hessian
+  VectorXd r, gradient, hessian;        // stacked residuals
+  MatrixXd Rq, Rv, Rlambda;             // their partial derivatives
+  MatrixXd Rx, Ru, scaled_x, scaled_u;  // total derivatives; the same times the Hessian
   VectorXd difference;
 };
 
 RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages)
     : model_(model), specs_(std::move(stages)) {
-  if (specs_.empty()) throw ModelError(model.name(), "shooting problem", "it has no stage", "give at least the terminal one");
+  if (specs_.empty())
+    throw ModelError(model.name(), "shooting problem", "it has no stage", "give at least the terminal one");
   if (q0.size() != model.nq() || v0.size() != model.nv())
     throw ModelError(model.name(), "shooting problem", "the initial state has a wrong size", "q0: nq, v0: nv");
   for (size_t k = 0; k < specs_.size(); ++k) checkSpec(model, specs_[k], k);
@@ -245,8 +247,8 @@ void RobotProblem::addStateCost(int index, double scale, StageModel& out) const 
     if (joint.nv == 0) continue;
     const int i = joint.idx_v, n = joint.nv;
     const auto weights = w * state.weights.segment(i, n);
-    calcJointDifference(joint, state.q_ref.segment(joint.idx_q, joint.nq), node.x.head(nq).segment(joint.idx_q, joint.nq),
-                        d.head(n));
+    calcJointDifference(joint, state.q_ref.segment(joint.idx_q, joint.nq),
+                        node.x.head(nq).segment(joint.idx_q, joint.nq), d.head(n));
     weighted.head(n) = weights.cwiseProduct(d.head(n));
     if (!isCurved(joint)) {
       out.lx.segment(i, n) += weighted.head(n);
@@ -273,7 +275,8 @@ void RobotProblem::addResidualCosts(int index, double scale, StageModel& out) {
     const int n = cost.residual->size();
     cost.residual->calcJacobian(
         view, {node.Rq.middleRows(row, n), node.Rv.middleRows(row, n), node.Rlambda.middleRows(row, n)});
-    cost.activation.calcDerivatives(node.r.segment(row, n), node.gradient.segment(row, n), node.hessian.segment(row, n));
+    cost.activation.calcDerivatives(node.r.segment(row, n), node.gradient.segment(row, n),
+                                    node.hessian.segment(row, n));
     node.gradient.segment(row, n) *= scale * cost.weight;
     node.hessian.segment(row, n) *= scale * cost.weight;
     auto Rx = node.Rx.middleRows(row, n);

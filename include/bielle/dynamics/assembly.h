@@ -3,9 +3,9 @@
 ///
 /// Hard conditions h(q) = 0 (closures, frame targets) and a soft wish (stay near preferred joint values) are met by
 /// Newton steps in the tangent space: with H = dh/dq and N a basis of its null space,
-///     dq = H^+ (-h) + N z,    z = argmin || W (dq - d) ||,    d = q_ref (-) q,                                        (1)
-/// H^+ truncates small singular values and is damped far from the solution; steps are clamped, and halved while |h| grows.
-/// When this stalls, the conditions are approached by continuation: h(q) = (1 - t) h(q_0), t from 0 to 1.
+///     dq = H^+ (-h) + N z,    z = argmin || W (dq - d) ||,    d = q_ref (-) q, (1)
+/// H^+ truncates small singular values and is damped far from the solution; steps are clamped, and halved while |h|
+/// grows. When this stalls, the conditions are approached by continuation: h(q) = (1 - t) h(q_0), t from 0 to 1.
 #include <string>
 #include <vector>
 
@@ -23,15 +23,15 @@ struct FrameTarget {
 };
 
 struct AssemblyProblem {
-  VectorXd q_ref;              ///< nq, start and preferred configuration
-  VectorXd weights;            ///< nv, of the wish to stay near q_ref; empty: all one
+  VectorXd q_ref;    ///< nq, start and preferred configuration
+  VectorXd weights;  ///< nv, of the wish to stay near q_ref; empty: all one
   std::vector<FrameTarget> frames;
 };
 
 struct AssemblyOptions {
-  double tolerance = 1e-12;    ///< on every closure and target, m and rad
-  double step_limit = 0.2;     ///< largest change of a coordinate per step, m or rad
-  int max_iterations = 200;    ///< per continuation step
+  double tolerance = 1e-12;  ///< on every closure and target, m and rad
+  double step_limit = 0.2;   ///< largest change of a coordinate per step, m or rad
+  int max_iterations = 200;  ///< per continuation step
   int continuation_steps = 20;
   double rank_tolerance = 1e-7;  ///< singular values of H below this, relative to the largest, count as zero
 };
@@ -40,11 +40,11 @@ enum class AssemblyStatus { Closed, NotClosed };
 
 struct AssemblyResult {
   AssemblyStatus status = AssemblyStatus::NotClosed;
-  VectorXd q;             ///< nq, the best found
-  std::string message;    ///< names the worst loop or target and its gap when not closed
+  VectorXd q;           ///< nq, the best found
+  std::string message;  ///< names the worst loop or target and its gap when not closed
   int iterations = 0;
-  double gap = 0;         ///< largest closure residual, m or rad
-  std::string worst;      ///< name of the closure or target with the largest residual
+  double gap = 0;     ///< largest closure residual, m or rad
+  std::string worst;  ///< name of the closure or target with the largest residual
 };
 
 AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, const AssemblyOptions& options = {});

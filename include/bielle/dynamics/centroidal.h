@@ -10,11 +10,12 @@ Vector3d calcCom(const Model& model, const Workspace& ws);
 /// Velocity of the centre of mass, m/s; needs updateVelocities.
 Vector3d calcComVelocity(const Model& model, const Workspace& ws);
 
-/// Jacobian of the centre of mass, 3 x nv (derivative with respect to the tangent of q, and of its velocity with respect to v);
-/// needs updateMassMatrix (composite inertias).
+/// Jacobian of the centre of mass, 3 x nv (derivative with respect to the tangent of q, and of its velocity with
+/// respect to v); needs updateMassMatrix (composite inertias).
 void calcComJacobian(const Model& model, const Workspace& ws, Eigen::Ref<Eigen::Matrix3Xd> J);
 
-/// Derivative of the velocity of the centre of mass with respect to q, 3 x nv; needs updateVelocities, and updateMassMatrix.
+/// Derivative of the velocity of the centre of mass with respect to q, 3 x nv; needs updateVelocities, and
+/// updateMassMatrix.
 void calcComVelocityDerivative(const Model& model, const Workspace& ws, Eigen::Ref<Eigen::Matrix3Xd> dv_dq);
 
 /// Momentum about the centre of mass in world axes (linear, angular), kg m/s and kg m^2/s; needs updateVelocities.

@@ -1,15 +1,16 @@
 #pragma once
-/// \file Closures and contacts: residual, velocity, Jacobian, acceleration and their derivatives (the paper's section III).
+/// \file Closures and contacts: residual, velocity, Jacobian, acceleration and their derivatives (the paper's section
+/// III).
 ///
-/// With world spatial vectors, nu_c = V_1 - V_2 and a_c = A_1 - A_2 + V_1 x V_2 (the paper's eqs. 8 and 9), read in frame 1.
-/// For a dof k that moves frame 1 only (s = +1) or frame 2 only (s = -1), in the coordinates of frame 1,
-///     d a_c/dq_k = s (dA_k - (V_1 + V_2) x dV_k + J_k x A_2 - V_1 x (J_k x V_2))                                      (1)
-///     d a_c/dv_k = s (dJ_k + dV_k - (V_1 + V_2) x J_k)                                                                (2)
-///     d nu_c/dq_k = s (dV_k + J_k x V_2)                                                                              (3)
-///     d nu_c/dv_k = d a_c/da_k = s J_k                                                                                (4)
-/// where dV, dA, dJ are those of rnea.h; a dof that moves both frames changes nothing. (1) gathers the derivatives of the paper's
-/// gamma_1, gamma_2 and gamma_3 (its eqs. 11 to 15): gamma_1 gives dA_k - V_1 x dV_k, gamma_2 gives dA_k - V_2 x dV_k and, as frame 1 turns,
-/// J_k x A_2; the rest is gamma_3.
+/// With world spatial vectors, nu_c = V_1 - V_2 and a_c = A_1 - A_2 + V_1 x V_2 (the paper's eqs. 8 and 9), read in
+/// frame 1. For a dof k that moves frame 1 only (s = +1) or frame 2 only (s = -1), in the coordinates of frame 1,
+///     d a_c/dq_k = s (dA_k - (V_1 + V_2) x dV_k + J_k x A_2 - V_1 x (J_k x V_2)) (1) d a_c/dv_k = s (dJ_k + dV_k -
+///     (V_1 + V_2) x J_k)                                                                (2) d nu_c/dq_k = s (dV_k +
+///     J_k x V_2)                                                                              (3) d nu_c/dv_k = d
+///     a_c/da_k = s J_k                                                                                (4)
+/// where dV, dA, dJ are those of rnea.h; a dof that moves both frames changes nothing. (1) gathers the derivatives of
+/// the paper's gamma_1, gamma_2 and gamma_3 (its eqs. 11 to 15): gamma_1 gives dA_k - V_1 x dV_k, gamma_2 gives dA_k -
+/// V_2 x dV_k and, as frame 1 turns, J_k x A_2; the rest is gamma_3.
 #include "bielle/dynamics/workspace.h"
 
 namespace bielle {
@@ -20,10 +21,10 @@ using RowsBy6 = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::ColMajor, 6, 6>;
 
 /// A foot on the ground (or on a step) at a given place.
 struct ContactTarget {
-  int contact = 0;     ///< index into Model::contacts()
-  SE3 X_WT;            ///< where the contact frame belongs; matters only with kp > 0
-  double kp = 0;       ///< 1/s^2
-  double kd = 0;       ///< 1/s
+  int contact = 0;  ///< index into Model::contacts()
+  SE3 X_WT;         ///< where the contact frame belongs; matters only with kp > 0
+  double kp = 0;    ///< 1/s^2
+  double kd = 0;    ///< 1/s
 };
 
 /// The closures in force: those of the model, then contacts as closures to the world, in the order given.
@@ -31,7 +32,7 @@ struct ConstraintSet {
   std::vector<Closure> closures;
   std::vector<int> offsets;  ///< first row of each
   int rows = 0;
-  int num_loops = 0;         ///< the first num_loops closures are the model's
+  int num_loops = 0;  ///< the first num_loops closures are the model's
 };
 ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTarget>& contacts = {});
 
@@ -39,27 +40,32 @@ ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTar
 RowVectorUpTo6 selectRows(const Closure& closure, const Vector6d& full);
 Vector6d expandRows(const Closure& closure, ConstVectorRef lambda);
 
-/// Closing error: zero if and only if closed (a hinge turned by pi about a normal excepted: its residual is the angle pi). m and rad.
+/// Closing error: zero if and only if closed (a hinge turned by pi about a normal excepted: its residual is the angle
+/// pi). m and rad.
 RowVectorUpTo6 calcClosureResidual(const Workspace& ws, const Closure& closure);
-/// Matrix R (rows x 6) with d residual/dt = R nu_c for the full velocity nu_c in frame 1. Exact at open configurations too.
+/// Matrix R (rows x 6) with d residual/dt = R nu_c for the full velocity nu_c in frame 1. Exact at open configurations
+/// too.
 RowsBy6 calcClosureResidualRate(const Workspace& ws, const Closure& closure);
 
 /// Velocity rows; needs updateVelocities.
 RowVectorUpTo6 calcClosureVelocity(const Workspace& ws, const Closure& closure);
-/// Acceleration rows for the accelerations held by the workspace (those of a = 0 after updateBias), without stabilisation.
+/// Acceleration rows for the accelerations held by the workspace (those of a = 0 after updateBias), without
+/// stabilisation.
 RowVectorUpTo6 calcClosureAcceleration(const Workspace& ws, const Closure& closure);
 /// Right-hand offset of the stabilised constraint, kd nu_c - kp r (zero gains: zero).
 RowVectorUpTo6 calcClosureStabilization(const Workspace& ws, const Closure& closure);
 
 /// Jacobian rows, written to the columns closure.dofs of J (rows x nv), Eq. (4); other columns are left alone.
 void calcClosureJacobian(const Workspace& ws, const Closure& closure, MatrixRef J);
-/// Derivatives of the stabilised acceleration rows, Eqs. (1) and (2), to the columns closure.dofs; needs updateAccelerations.
+/// Derivatives of the stabilised acceleration rows, Eqs. (1) and (2), to the columns closure.dofs; needs
+/// updateAccelerations.
 void calcClosureDerivatives(const Workspace& ws, const Closure& closure, MatrixRef da_dq, MatrixRef da_dv);
 
 /// World wrench of a closure force on body 1.
 Vector6d calcClosureWrench(const Workspace& ws, const Closure& closure, ConstVectorRef lambda);
-/// Adds to dID_dq what updateInverseDynamicsDerivatives leaves out: the wrench on body 2 moves with frame 1 (the paper's eq. 19),
-///     d ID_j/dq_k += s J_j . (J_k x* W)   for j in the support of body 2, k in closure.dofs                           (5)
+/// Adds to dID_dq what updateInverseDynamicsDerivatives leaves out: the wrench on body 2 moves with frame 1 (the
+/// paper's eq. 19),
+///     d ID_j/dq_k += s J_j . (J_k x* W)   for j in the support of body 2, k in closure.dofs (5)
 void addClosureForceDerivative(const Model& model, const Workspace& ws, const Closure& closure, const Vector6d& wrench,
                                MatrixRef dID_dq);
 

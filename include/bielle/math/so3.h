@@ -3,8 +3,8 @@
 ///
 /// Right Jacobians (Sola, Deray, Atchuthan, "A micro Lie theory", eqs. 143-144):
 ///     Exp(w + dw) = Exp(w) Exp(Jr(w) dw),    Log(R Exp(dw)) = Log(R) + Jr^{-1}(Log R) dw.
-/// With t = |w|, every function is even in t and is evaluated by its series where t^2 < 1e-6: the truncated terms are below
-/// rounding there.
+/// With t = |w|, every function is even in t and is evaluated by its series where t^2 < 1e-6: the truncated terms are
+/// below rounding there.
 #include <Eigen/Geometry>
 
 #include "bielle/math/types.h"

@@ -23,10 +23,10 @@ int getNv(JointKind kind);
 struct Joint {
   std::string name;
   JointKind kind = JointKind::Fixed;
-  int parent = 0;                       ///< body index of the parent
-  SE3 X_PJ;                             ///< placement of the joint frame (child frame at neutral q) in the parent body
-  Vector3d axis = Vector3d::UnitZ();    ///< unit axis; normal of a planar joint; first axis of a universal joint
-  Vector3d axis2 = Vector3d::UnitY();   ///< second axis of a universal joint
+  int parent = 0;                      ///< body index of the parent
+  SE3 X_PJ;                            ///< placement of the joint frame (child frame at neutral q) in the parent body
+  Vector3d axis = Vector3d::UnitZ();   ///< unit axis; normal of a planar joint; first axis of a universal joint
+  Vector3d axis2 = Vector3d::UnitY();  ///< second axis of a universal joint
   int idx_q = 0, nq = 0, idx_v = 0, nv = 0;
 };
 

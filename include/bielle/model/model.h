@@ -32,9 +32,9 @@ struct Closure {
   std::string name;
   ClosureKind kind = ClosureKind::Weld6D;
   int body1 = 0, body2 = 0;
-  SE3 X_B1, X_B2;                      ///< placements of the frames in their bodies
-  Vector3d axis = Vector3d::UnitZ();   ///< free axis of a hinge, in frame 1 (and in frame 2)
-  double kp = 0, kd = 0;               ///< stabilisation gains, 1/s^2 and 1/s; zero as in the paper
+  SE3 X_B1, X_B2;                     ///< placements of the frames in their bodies
+  Vector3d axis = Vector3d::UnitZ();  ///< free axis of a hinge, in frame 1 (and in frame 2)
+  double kp = 0, kd = 0;              ///< stabilisation gains, 1/s^2 and 1/s; zero as in the paper
   /// Dofs that move one frame and not the other, in increasing order, with +1 where they move frame 1, -1 frame 2.
   /// The relative placement of the frames depends on these alone. Filled by the builder.
   std::vector<int> dofs, signs;
@@ -49,10 +49,10 @@ struct LoopCluster {
 
 /// An actuator on one dof.
 struct Motor {
-  std::string name;        ///< name of its joint
-  int joint = 0;           ///< body/joint index
-  int dof = 0;             ///< index into v
-  double armature = 0;     ///< rotor inertia seen at the joint, kg m^2 (kg for a prismatic joint)
+  std::string name;     ///< name of its joint
+  int joint = 0;        ///< body/joint index
+  int dof = 0;          ///< index into v
+  double armature = 0;  ///< rotor inertia seen at the joint, kg m^2 (kg for a prismatic joint)
   double effort_limit = std::numeric_limits<double>::infinity();    ///< N m or N
   double velocity_limit = std::numeric_limits<double>::infinity();  ///< rad/s or m/s
 };
@@ -74,8 +74,8 @@ struct Reference {
   std::map<std::string, std::vector<double>> joints;  ///< joint name -> its q
   /// Height of a frame over the soles, feet flat on the ground under their own hips; empty frame: joints alone.
   std::string height_frame;
-  double height = 0;                                   ///< m
-  std::map<std::string, Vector3d> feet;                ///< contact frame -> position of its origin, m (world)
+  double height = 0;                     ///< m
+  std::map<std::string, Vector3d> feet;  ///< contact frame -> position of its origin, m (world)
 };
 
 /// What is drawn of a body, from the visuals of the URDF.
@@ -90,8 +90,8 @@ struct Visual {
 
 /// One scalar velocity coordinate.
 struct Dof {
-  int joint = 0;      ///< joint/body that carries it
-  int parent = -1;    ///< dof just before it on the path to the root, -1 at the root
+  int joint = 0;    ///< joint/body that carries it
+  int parent = -1;  ///< dof just before it on the path to the root, -1 at the root
   /// Dofs j of the same joint for which the axis of this one does not move: only the first axis of a universal joint
   /// ignores its second one. All the axes of other joints move with the whole joint (child-frame coordinates).
   bool first_of_universal = false;
@@ -118,11 +118,11 @@ class Model {
   const std::vector<Visual>& visuals() const { return visuals_; }
   /// Dofs of the joints of the equivalent serial chain (hips, knee, ankles), as joint indices.
   const std::vector<int>& serialJoints() const { return serial_joints_; }
-  const VectorXd& lowerLimits() const { return lower_; }       ///< per dof, -inf where there is none
+  const VectorXd& lowerLimits() const { return lower_; }  ///< per dof, -inf where there is none
   const VectorXd& upperLimits() const { return upper_; }
   const VectorXd& velocityLimits() const { return velocity_limit_; }
-  const VectorXd& armature() const { return armature_; }        ///< per dof, added to the diagonal of M
-  double mass() const { return mass_; }                         ///< kg, without the world
+  const VectorXd& armature() const { return armature_; }  ///< per dof, added to the diagonal of M
+  double mass() const { return mass_; }                   ///< kg, without the world
   const Vector3d& gravity() const { return gravity_; }
   bool hasFreeFlyer() const { return numBodies() > 1 && joints_[1].kind == JointKind::FreeFlyer; }
   int numClosureRows() const { return closure_rows_; }

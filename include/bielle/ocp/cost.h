@@ -29,7 +29,8 @@ struct Cost {
   std::unique_ptr<Residual> residual;
 };
 
-/// 1/2 weight sum_i w_i d_i^2 with d the tangent difference of the state to a reference, (q (-) q_ref, v - v_ref) (2 nv).
+/// 1/2 weight sum_i w_i d_i^2 with d the tangent difference of the state to a reference, (q (-) q_ref, v - v_ref) (2
+/// nv).
 struct StateCost {
   double weight = 0;
   VectorXd q_ref, v_ref;  ///< nq, nv

@@ -1,9 +1,9 @@
 #pragma once
 /// \file Residuals r(q, v, u, lambda) of costs, with analytic derivatives.
 ///
-/// A residual is a small vector with sparse partial derivatives with respect to the tangent of q, to v, to the motor torques u
-/// and to the constraint forces lambda; the stage applies the chain rule through the dynamics. Frame residuals are written in
-/// world axes.
+/// A residual is a small vector with sparse partial derivatives with respect to the tangent of q, to v, to the motor
+/// torques u and to the constraint forces lambda; the stage applies the chain rule through the dynamics. Frame
+/// residuals are written in world axes.
 #include <memory>
 #include <string>
 #include <vector>
@@ -57,15 +57,18 @@ std::unique_ptr<Residual> makeFrameTranslation(const BodyFrame& frame, const Vec
 std::unique_ptr<Residual> makeFrameRotation(const BodyFrame& frame, const Matrix3d& R_WT);
 /// Velocity of the frame's origin and angular velocity, in world axes, minus a reference (6), m/s and rad/s.
 std::unique_ptr<Residual> makeFrameVelocity(const BodyFrame& frame, const Vector6d& reference = Vector6d::Zero());
-/// Fly high: horizontal velocity of the frame's origin times exp(-slope z) (2), z its height over `ground`, m/s; slope in 1/m.
+/// Fly high: horizontal velocity of the frame's origin times exp(-slope z) (2), z its height over `ground`, m/s; slope
+/// in 1/m.
 std::unique_ptr<Residual> makeFlyHigh(const BodyFrame& frame, double slope, double ground);
 /// Horizontal distance between two frames (1), m.
 std::unique_ptr<Residual> makeFrameDistance(const BodyFrame& a, const BodyFrame& b);
-/// Rows of the force of a contact minus a reference, N and N m, in the contact frame (6 or 3). `constraint` is the index in the ConstraintSet.
+/// Rows of the force of a contact minus a reference, N and N m, in the contact frame (6 or 3). `constraint` is the
+/// index in the ConstraintSet.
 std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference);
 /// Centre of pressure of a 6D contact in its frame (x, y) (2), m.
 std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint);
-/// Friction pyramid of a contact: mu f_z - |f_x| and mu f_z - |f_y| as four rows mu f_z -+ f_{x,y} (4), N; inside when positive.
+/// Friction pyramid of a contact: mu f_z - |f_x| and mu f_z - |f_y| as four rows mu f_z -+ f_{x,y} (4), N; inside when
+/// positive.
 std::unique_ptr<Residual> makeFrictionPyramid(const ConstraintSet& set, int constraint, double mu);
 /// Coordinates of joints with one dof (all with finite limits when `dofs` is empty) (n), rad or m.
 std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs);

@@ -2,9 +2,9 @@
 /// \file The shooting problem of a robot: constrained dynamics under Euler steps, and costs.
 ///
 /// Full formulation (the paper): x = (q, v) of the spanning tree, tangent size 2 nv. One step of length h:
-///     a = constrained dynamics (q, v, u),    v+ = v + h a,    q+ = q (+) h v+                                          (1)
+///     a = constrained dynamics (q, v, u),    v+ = v + h a,    q+ = q (+) h v+ (1)
 /// with derivatives (J_q, J_d those of (+) at d = h v+)
-///     dv+ = dv + h da,                       dq+ = J_q dq + h J_d dv+                                                  (2)
+///     dv+ = dv + h da,                       dq+ = J_q dq + h J_d dv+ (2)
 /// Running cost of a stage: h times the sum of its costs; the terminal node has no h.
 /// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and so on.
 #include <string>
@@ -18,7 +18,7 @@ namespace bielle {
 
 /// One stage of the horizon (or the terminal node, where dt and constraints are not used).
 struct StageSpec {
-  double dt = 0.015;           ///< s
+  double dt = 0.015;  ///< s
   ConstraintSet constraints;
   StateCost state;
   ControlCost control;
@@ -47,7 +47,8 @@ class RobotProblem : public ShootingProblem {
   void difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override;
   StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override;
   StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override;
-  StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node, StageModel& out) override;
+  StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
+                       StageModel& out) override;
   StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override;
   void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override;
 

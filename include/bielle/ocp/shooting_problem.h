@@ -3,8 +3,8 @@
 ///
 ///     min  sum_k l_k(x_k, u_k) + l_N(x_N)    s.t.  x_0 given,  x_{k+1} = f_k(x_k, u_k),   k = 0 .. N-1
 ///
-/// A state x is a vector of numbers (quaternions, say) that stands for a point of a manifold; the tangent space at node k
-/// has its own dimension. The solver knows no robot: it asks for steps, differences and quadratic models.
+/// A state x is a vector of numbers (quaternions, say) that stands for a point of a manifold; the tangent space at node
+/// k has its own dimension. The solver knows no robot: it asks for steps, differences and quadratic models.
 #include <vector>
 
 #include "bielle/math/types.h"

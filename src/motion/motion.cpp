@@ -1,0 +1,90 @@
+#include "bielle/motion/motion.h"
+
+#include <Eigen/QR>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "bielle/model/error.h"
+
+namespace bielle {
+
+void setOption(const std::vector<OptionEntry>& options, const std::string& name, double value) {
+  std::string known;
+  for (const OptionEntry& option : options) {
+    if (option.name == name) {
+      *option.value = value;
+      return;
+    }
+    known += (known.empty() ? "" : ", ") + option.name;
+  }
+  throw ModelError("", "option '" + name + "'", "there is no such option", "choose one of: " + known);
+}
+
+StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constraints, ConstVectorRef q) {
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  updateVelocities(model, ws, VectorXd::Zero(model.nv()));
+  updateBias(model, ws);
+  // Unknowns (u, lambda / scale): forces weigh less than torques of the same number, so that the ground carries the
+  // robot.
+  const double scale = std::max(1.0, model.mass() * model.gravity().norm());
+  MatrixXd A = MatrixXd::Zero(model.nv(), model.nu() + constraints.rows);
+  for (int m = 0; m < model.nu(); ++m) A(model.motors()[m].dof, m) = 1;
+  MatrixXd J = MatrixXd::Zero(constraints.rows, model.nv());
+  for (size_t c = 0; c < constraints.closures.size(); ++c)
+    calcClosureJacobian(ws, constraints.closures[c],
+                        J.middleRows(constraints.offsets[c], getRows(constraints.closures[c].kind)));
+  A.rightCols(constraints.rows) = scale * J.transpose();
+  const VectorXd solution = A.completeOrthogonalDecomposition().solve(ws.b);
+  return {solution.head(model.nu()), (A * solution - ws.b).cwiseAbs().maxCoeff()};
+}
+
+VectorXd makeStandingPosture(const Model& model) {
+  if (model.references().empty())
+    throw ModelError(model.name(), "references", "the robot has no reference posture to start from",
+                     "add `references: {half_sitting: ...}` to its YAML file");
+  std::string name = model.references().front().name;
+  for (const Reference& reference : model.references())
+    if (reference.name == "half_sitting") name = reference.name;
+  const AssemblyResult result = assembleReference(model, name);
+  if (result.status != AssemblyStatus::Closed)
+    throw ModelError(model.name(), "reference '" + name + "'", result.message, "correct its targets");
+  return result.q;
+}
+
+std::vector<ContactTarget> makeContactTargets(const Model& model, ConstVectorRef q, const std::vector<int>& contacts,
+                                              double kp, double kd) {
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  std::vector<ContactTarget> targets;
+  for (int c : contacts)
+    targets.push_back({c, getPlacement(ws, model.contacts()[c].body, model.contacts()[c].X_BF), kp, kd});
+  return targets;
+}
+
+VectorXd makeStateWeights(const Model& model) {
+  const int nv = model.nv();
+  VectorXd importance = VectorXd::Zero(2 * nv);
+  if (model.hasFreeFlyer()) {
+    importance.segment<6>(0) << 0, 0, 0, 50, 50, 0;
+    importance.segment<6>(nv) << 0, 0, 0, 3, 3, 1;
+  }
+  std::vector<int> joints = model.serialJoints();
+  if (joints.empty())
+    for (int i = 1; i < model.numBodies(); ++i)
+      if (model.joints()[i].kind != JointKind::FreeFlyer) joints.push_back(i);
+  for (int i : joints) {
+    const Joint& joint = model.joints()[i];
+    // Hips as in the paper's walk: yaw 10, pitch 3, roll 1 for the position, 5, 3, 1 for the velocity; knees and
+    // ankles 1.
+    double position = 1, velocity = 1;
+    if (joint.name.rfind("hipz", 0) == 0) position = 10, velocity = 5;
+    if (joint.name.rfind("hipx", 0) == 0) position = 3, velocity = 3;
+    importance.segment(joint.idx_v, joint.nv).setConstant(position);
+    importance.segment(nv + joint.idx_v, joint.nv).setConstant(velocity);
+  }
+  return importance.cwiseAbs2();
+}
+
+}  // namespace bielle

@@ -1,0 +1,134 @@
+#include "bielle/motion/squat.h"
+
+#include <cmath>
+
+#include "bielle/dynamics/centroidal.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+void require(bool ok, const std::string& option, const std::string& problem, const std::string& remedy) {
+  if (!ok) throw ModelError("", "option '" + option + "'", problem, remedy);
+}
+
+void check(const Model& model, const SquatOptions& o) {
+  require(o.depth >= 0.05 && o.depth <= 2, "depth", "it is outside 0.05 .. 2",
+          "give the lowest height of the centre of mass over its initial height, e.g. 0.7");
+  require(o.duration > 0 && std::isfinite(o.duration), "duration", "it is not positive", "give seconds");
+  require(o.settle >= 0 && std::isfinite(o.settle), "settle", "it is negative", "give seconds, or 0");
+  require(o.time_step > 0 && o.time_step <= o.duration / 4, "time_step",
+          "it is not positive, or over a quarter of the motion", "give seconds, e.g. 0.015");
+  if (model.contacts().empty())
+    throw ModelError(model.name(), "contacts", "a squat needs feet, the robot names no contact frame",
+                     "add `contacts` to its YAML file");
+}
+
+StageSpec makeStage(const Model& model, const SquatOptions& o, const std::vector<ContactTarget>& contacts,
+                    const VectorXd& q0, const Vector3d& com) {
+  StageSpec stage;
+  stage.dt = o.time_step;
+  stage.constraints = makeConstraintSet(model, contacts);
+  for (int c = 0; c < stage.constraints.num_loops; ++c) {
+    stage.constraints.closures[c].kp = o.closure_kp;
+    stage.constraints.closures[c].kd = o.closure_kd;
+  }
+  stage.state = {o.state_weight, q0, VectorXd::Zero(model.nv()), makeStateWeights(model)};
+  if (model.hasFreeFlyer()) stage.state.weights.segment<2>(3).setConstant(o.torso_weight);
+  for (const Motor& motor : model.motors())  // linkage motors would be free to shake
+    stage.state.weights[model.nv() + motor.dof] = std::max(stage.state.weights[model.nv() + motor.dof], o.motor_weight);
+  stage.control = {o.control_weight, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
+  stage.costs.push_back(
+      {"com height", o.com_weight, Activation::makeQuadratic(Vector3d::UnitZ()), makeComPosition(com)});
+  const double weight = model.mass() * model.gravity().norm();
+  for (size_t i = 0; i < contacts.size(); ++i) {
+    const ContactFrame& contact = model.contacts()[contacts[i].contact];
+    const int constraint = stage.constraints.num_loops + static_cast<int>(i);
+    const int rows = getRows(stage.constraints.closures[constraint].kind);
+    VectorXd reference = VectorXd::Zero(rows);
+    reference[2] = weight / contacts.size();
+    stage.costs.push_back({"force " + contact.name, o.force_weight / (weight * weight),
+                           Activation::makeQuadratic(VectorXd::Ones(rows)),
+                           makeContactForce(stage.constraints, constraint, reference)});
+    stage.costs.push_back({"friction " + contact.name, o.friction_weight,
+                           Activation::makeBarrier(VectorXd::Ones(4), VectorXd::Zero(4), VectorXd::Constant(4, 1e12)),
+                           makeFrictionPyramid(stage.constraints, constraint, o.friction)});
+    if (rows == 6 && contact.half_length > 0 && contact.half_width > 0) {
+      const Eigen::Vector2d half(contact.half_length, contact.half_width);
+      stage.costs.push_back({"pressure " + contact.name, o.pressure_weight,
+                             Activation::makeQuadratic(half.cwiseAbs2().cwiseInverse()),
+                             makeCenterOfPressure(stage.constraints, constraint)});
+    }
+  }
+  return stage;
+}
+
+}  // namespace
+
+std::vector<OptionEntry> listOptions(SquatOptions& o) {
+  return {{"depth", &o.depth, "1", "lowest height of the centre of mass over its initial height"},
+          {"duration", &o.duration, "s", "time to go down and come back"},
+          {"settle", &o.settle, "s", "time at rest before and after"},
+          {"time_step", &o.time_step, "s", "length of a shooting stage"},
+          {"com_weight", &o.com_weight, "1/m^2", "follow the height of the centre of mass"},
+          {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
+          {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
+          {"motor_weight", &o.motor_weight, "1", "keep motors slow, within the state regularization"},
+          {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
+          {"force_weight", &o.force_weight, "1", "share the weight evenly between the feet, over (m g)^2"},
+          {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
+          {"friction_weight", &o.friction_weight, "1/N^2", "stay inside the friction pyramid"},
+          {"friction", &o.friction, "1", "friction coefficient"},
+          {"terminal_weight", &o.terminal_weight, "1", "end at rest"},
+          {"contact_kp", &o.contact_kp, "1/s^2", "stabilisation of the contacts, position"},
+          {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity"},
+          {"closure_kp", &o.closure_kp, "1/s^2", "stabilisation of the closures, position"},
+          {"closure_kd", &o.closure_kd, "1/s", "stabilisation of the closures, velocity"}};
+}
+
+double calcSquatHeight(const SquatOptions& o, double t) {
+  const double s = (t - o.settle) / o.duration;
+  if (s <= 0 || s >= 1) return 1;
+  return 1 - (1 - o.depth) * 0.5 * (1 - std::cos(2 * kPi * s));
+}
+
+Motion makeSquat(const Model& model, const SquatOptions& options) {
+  check(model, options);
+  const VectorXd q0 = makeStandingPosture(model), v0 = VectorXd::Zero(model.nv());
+  std::vector<int> feet;
+  for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
+  const std::vector<ContactTarget> contacts =
+      makeContactTargets(model, q0, feet, options.contact_kp, options.contact_kd);
+  Workspace ws(model);
+  updatePositions(model, ws, q0);
+  const Vector3d com0 = calcCom(model, ws);
+
+  Motion motion;
+  motion.name = "squat";
+  const int nodes = static_cast<int>(std::ceil((options.duration + 2 * options.settle) / options.time_step - 1e-9));
+  motion.schedule = {options.time_step, {{"double support", nodes, contacts}}};
+  std::vector<StageSpec> stages;
+  for (int k = 0; k <= nodes; ++k) {
+    const Vector3d com(com0.x(), com0.y(), com0.z() * calcSquatHeight(options, k * options.time_step));
+    stages.push_back(makeStage(model, options, contacts, q0, com));
+  }
+  StageSpec& terminal = stages.back();
+  terminal.constraints = {};
+  terminal.control.weight = 0;
+  terminal.costs.resize(1);  // the height; forces have no meaning at the terminal node
+  terminal.state.weight = options.terminal_weight;
+  terminal.state.weights.head(model.nv()).setZero();
+  motion.problem = std::make_unique<RobotProblem>(model, q0, v0, std::move(stages));
+
+  const VectorXd u0 = calcStaticTorques(model, makeConstraintSet(model, contacts), q0).u;
+  motion.guess.xs.assign(nodes + 1, motion.problem->initialState());
+  motion.guess.us.assign(nodes, u0);
+  SquatOptions copy = options;
+  for (const OptionEntry& entry : listOptions(copy)) motion.requested.emplace_back(entry.name, *entry.value);
+  return motion;
+}
+
+}  // namespace bielle
