@@ -1,0 +1,54 @@
+#include "model_copy.h"
+
+#include <Eigen/Eigenvalues>
+
+#include "bielle/model/builder.h"
+
+namespace bielle::validation {
+
+Model copyModel(const Model& model, const ModelChanges& changes) {
+  ModelBuilder builder(model.name());
+  builder.setGravity(model.gravity());
+  const auto link = [&model](int body) { return body == 0 ? std::string("world") : model.bodies()[body].name; };
+  for (int i = 1; i < model.numBodies(); ++i) {
+    Inertia inertia = model.bodies()[i].inertia;
+    if (changes.inertia) changes.inertia(i, inertia);
+    builder.addLink(link(i), link(model.joints()[i].parent), model.joints()[i], inertia);
+  }
+  for (int c = 0; c < static_cast<int>(model.closures().size()); ++c) {
+    Closure closure = model.closures()[c];
+    if (changes.closure) changes.closure(c, closure);
+    const std::string frame1 = closure.name + "/frame1", frame2 = closure.name + "/frame2";
+    builder.addFrame(frame1, link(closure.body1), closure.X_B1);
+    builder.addFrame(frame2, link(closure.body2), closure.X_B2);
+    builder.addClosure(closure.name, closure.kind, frame1, frame2, closure.axis, closure.kp, closure.kd);
+  }
+  for (const ContactFrame& contact : model.contacts()) {
+    builder.addFrame(contact.name + "/frame", link(contact.body), contact.X_BF);
+    builder.addContact(contact.name, contact.name + "/frame", contact.kind, contact.half_length, contact.half_width);
+  }
+  for (const Motor& motor : model.motors())
+    builder.addMotor(motor.name, changes.armature_scale * motor.armature, motor.effort_limit, motor.velocity_limit);
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    if (joint.nv > 0 && model.findMotor(joint.name) < 0)
+      builder.setArmature(joint.name, changes.armature_scale * model.armature()[joint.idx_v]);
+  }
+  return builder.build();
+}
+
+Model makeModelWithoutArmature(const Model& model, double least) {
+  ModelChanges changes;
+  changes.armature_scale = 0;
+  changes.inertia = [least](int, Inertia& inertia) {
+    const Eigen::SelfAdjointEigenSolver<Matrix3d> moments(inertia.I_com, Eigen::EigenvaluesOnly);
+    if (moments.eigenvalues()[0] > least) return;
+    Inertia ballast;
+    ballast.mass = 0.01;
+    ballast.I_com = 1e-4 * Matrix3d::Identity();
+    inertia = inertia + ballast;
+  };
+  return copyModel(model, changes);
+}
+
+}  // namespace bielle::validation

@@ -1,0 +1,168 @@
+// Simbody against random mechanisms of every joint and closure kind, with fixed and free bases; wrong models must be
+// seen.
+#include <catch2/catch.hpp>
+#include <set>
+#include <sstream>
+
+#include "bielle/dynamics/assembly.h"
+#include "mechanisms.h"
+#include "model_copy.h"
+#include "motion.h"
+#include "simbody_bridge.h"
+#include "validate.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+using namespace bielle::validation;
+
+namespace {
+
+constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
+                                 JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
+                                 JointKind::FreeFlyer};
+constexpr ClosureKind kClosures[] = {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D};
+
+std::string print(const ValidationReport& report) {
+  std::ostringstream text;
+  printReport(text, report);
+  return text.str();
+}
+
+}  // namespace
+
+TEST_CASE("every joint kind with every closure kind agrees with Simbody") {
+  std::mt19937 rng(11);
+  ValidationOptions options;
+  options.samples = 3;
+  double worst = 0, worst_derivative = 0;
+  for (JointKind joint : kJoints)
+    for (ClosureKind closure : kClosures)
+      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
+        const Mechanism mechanism = makeRandomMechanism(rng, joint, closure, base);
+        options.start = mechanism.q_closed;
+        const ValidationReport report = validateRobot(mechanism.model, options);
+        CAPTURE(getName(joint), getName(closure), base == MechanismBase::FreeFlyer);
+        INFO(print(report));
+        CHECK(report.passed());
+        for (const char* quantity : {"mass matrix", "accelerations, Simbody solver", "closure forces, Simbody solver",
+                                     "accelerations, with rotors", "da/dq along the closures"})
+          CHECK(report.findRow(quantity) != nullptr);
+        for (const ValidationRow& row : report.rows) {
+          double& largest = row.tolerance == options.tolerance ? worst : worst_derivative;
+          largest = std::max(largest, row.difference);
+        }
+      }
+  WARN("largest relative differences: " << worst << ", derivatives " << worst_derivative);
+}
+
+TEST_CASE("the planar four-bar, with redundant rows, agrees with Simbody in accelerations and generalized forces") {
+  const Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.45, 0.3, 0.7);
+  ValidationOptions options;
+  options.start = mechanism.q_closed;
+  const ValidationReport report = validateRobot(mechanism.model, options);
+  INFO(print(report));
+  CHECK(report.passed());
+  CHECK(report.redundant_states == options.samples);
+  for (const char* label : {"with rotors", "Simbody solver"}) {
+    CHECK(report.findRow(std::string("accelerations, ") + label)->samples == options.samples);
+    CHECK(report.findRow(std::string("constraint forces J'lambda, ") + label)->samples == options.samples);
+    CHECK(report.findRow(std::string("closure forces, ") + label) == nullptr);  // not determined
+  }
+}
+
+TEST_CASE("a wrong inertia, a moved closure and a turned hinge axis are each seen") {
+  std::mt19937 rng(12);
+  const Mechanism mechanism =
+      makeRandomMechanism(rng, JointKind::Spherical, ClosureKind::Hinge5D, MechanismBase::FreeFlyer);
+  const Model& model = mechanism.model;
+  ValidationOptions options;
+  options.samples = 2;
+  options.start = mechanism.q_closed;
+  CHECK(validateAgainst(model, copyModel(model), options).passed());
+  const auto expectFailure = [&](const ModelChanges& changes, const std::set<std::string>& quantities) {
+    const ValidationReport report = validateAgainst(model, copyModel(model, changes), options);
+    INFO(print(report));
+    CHECK(report.failure.empty());
+    CHECK(!report.passed());
+    for (const std::string& quantity : quantities) {
+      CAPTURE(quantity);
+      CHECK(!report.findRow(quantity)->passed());
+    }
+  };
+  ModelChanges changes;
+  changes.inertia = [](int body, Inertia& inertia) {
+    if (body == 5) inertia.I_com *= 1 + 1e-6;
+  };
+  expectFailure(changes, {"mass matrix", "bias", "kinetic energy", "accelerations, with rotors",
+                          "accelerations, Simbody solver", "closure forces, Simbody solver"});
+  changes = {};
+  changes.inertia = [](int body, Inertia& inertia) {
+    if (body == 5) inertia.com.x() += 1e-6;
+  };
+  expectFailure(changes, {"mass matrix", "potential energy", "accelerations, Simbody solver"});
+  changes = {};
+  changes.closure = [](int, Closure& closure) { closure.X_B2.p += Vector3d(1e-6, 0, 0); };
+  expectFailure(changes,
+                {"accelerations, with rotors", "accelerations, Simbody solver", "closure forces, with rotors"});
+  changes = {};
+  changes.closure = [](int, Closure& closure) {
+    closure.X_B2.R = closure.X_B2.R * exp3(1e-6 * closure.axis.unitOrthogonal());
+  };
+  expectFailure(changes,
+                {"accelerations, with rotors", "accelerations, Simbody solver", "closure forces, with rotors"});
+  changes = {};
+  changes.armature_scale = 1.001;
+  expectFailure(changes, {"mass matrix", "kinetic energy", "accelerations, with rotors"});
+}
+
+TEST_CASE("derivatives of a slightly different robot are seen as different") {
+  std::mt19937 rng(13);
+  const Mechanism mechanism =
+      makeRandomMechanism(rng, JointKind::Planar, ClosureKind::Weld6D, MechanismBase::FreeFlyer);
+  ValidationOptions options;
+  options.samples = 1;
+  options.start = mechanism.q_closed;
+  ModelChanges changes;
+  changes.inertia = [](int body, Inertia& inertia) {
+    if (body == 5) inertia.mass *= 1.001;
+  };
+  const ValidationReport report = validateAgainst(mechanism.model, copyModel(mechanism.model, changes), options);
+  INFO(print(report));
+  for (const std::string quantity : {"da/dq along the closures", "da/dv along the closures", "da/du",
+                                     "dlambda/dq along the closures", "dlambda/dv along the closures", "dlambda/du"}) {
+    CAPTURE(quantity);
+    REQUIRE(report.findRow(quantity));
+    CHECK(!report.findRow(quantity)->passed());
+  }
+}
+
+TEST_CASE("closed chains move freely for two seconds with Simbody, at the order of the scheme") {
+  std::mt19937 rng(14);
+  const std::pair<JointKind, ClosureKind> kinds[] = {{JointKind::Spherical, ClosureKind::Hinge5D},
+                                                     {JointKind::Planar, ClosureKind::Weld6D},
+                                                     {JointKind::Universal, ClosureKind::Ball3D}};
+  for (const auto& [joint, closure] : kinds) {
+    const Mechanism mechanism = makeRandomMechanism(rng, joint, closure, MechanismBase::FreeFlyer);
+    const Model model = makeModelWithoutArmature(mechanism.model);
+    Workspace ws(model);
+    const ConstraintSet set = makeConstraintSet(model);
+    const VectorXd v = projectVelocity(model, ws, set, mechanism.q_closed, randomVector(rng, model.nv(), 1));
+    MotionOptions options;
+    options.step = 1e-2;
+    const MotionReport coarse = compareMotion(model, mechanism.q_closed, v, options);
+    options.step = 5e-3;
+    const MotionReport fine = compareMotion(model, mechanism.q_closed, v, options);
+    CAPTURE(getName(joint), getName(closure), coarse.distance, fine.distance, coarse.energy_error, fine.energy_error,
+            fine.travelled, fine.gap);
+    REQUIRE(coarse.ok);
+    REQUIRE(fine.ok);
+    CHECK(fine.travelled > 1);
+    CHECK(fine.gap < 1e-12);
+    CHECK(fine.distance < 1e-6 * fine.travelled);
+    CHECK(fine.energy_error < 1e-6 * fine.kinetic_energy);
+    CHECK(coarse.distance > 12 * fine.distance);  // 16 by the order of the scheme
+    CHECK(coarse.energy_error > 12 * fine.energy_error);
+    WARN("ratios " << coarse.distance / fine.distance << " " << coarse.energy_error / fine.energy_error << " distance "
+                   << fine.distance << " E " << fine.energy_error << " sE " << fine.energy_error_simbody);
+  }
+}

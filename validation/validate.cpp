@@ -1,0 +1,334 @@
+#include "validate.h"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <iomanip>
+#include <limits>
+#include <random>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/centroidal.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "model_copy.h"
+#include "motion.h"
+#include "simbody_bridge.h"
+
+namespace bielle::validation {
+namespace {
+
+// Part of the response without constraints that counts as the least size, see Comparison::add. With redundant rows the
+// derivatives carry rounding amplified by the proximal term, 1e-16 / 1e-7 of that response: a derivative of zero shows
+// it.
+constexpr double kFloor = 1e-2;
+
+struct Sample {
+  VectorXd q, v, tau, a;
+  std::vector<ContactTarget> contacts;
+};
+
+// Wrenches of a range of closures, 6 x n.
+MatrixXd stack(const std::vector<Vector6d>& wrenches, size_t begin, size_t end) {
+  MatrixXd out(6, end - begin);
+  for (size_t i = begin; i < end; ++i) out.col(i - begin) = wrenches[i];
+  return out;
+}
+
+std::vector<Vector6d> expandForces(const ConstraintSet& set, ConstVectorRef lambda) {
+  std::vector<Vector6d> out;
+  for (size_t c = 0; c < set.closures.size(); ++c)
+    out.push_back(expandRows(set.closures[c], lambda.segment(set.offsets[c], getRows(set.closures[c].kind))));
+  return out;
+}
+
+// df/dt at t = 0, with Richardson's extrapolation.
+VectorXd differentiate(double h, const std::function<VectorXd(double)>& f) {
+  const VectorXd d1 = (f(h) - f(-h)) / (2 * h), d2 = (f(2 * h) - f(-2 * h)) / (4 * h);
+  return (4 * d1 - d2) / 3;
+}
+
+class SampleSource {
+ public:
+  SampleSource(const Model& model, const ValidationOptions& options)
+      : model_(model), options_(options), rng_(options.seed) {
+    const bool given = options.start.size() > 0 || model.references().empty();
+    AssemblyResult start =
+        given ? closeConfiguration(model, options.start.size() > 0 ? options.start : model.makeNeutral())
+              : assembleReference(model, model.references()[0].name);
+    if (start.status != AssemblyStatus::Closed) start = closeConfiguration(model, model.makeNeutral());
+    if (start.status != AssemblyStatus::Closed) failure = "no closed configuration was found: " + start.message;
+    q_ref_ = start.q;
+  }
+
+  std::string failure;
+
+  Sample draw() {
+    Sample sample;
+    sample.q = q_ref_;
+    double scale = options_.perturbation;
+    for (int attempt = 0; attempt < 8; ++attempt, scale /= 2) {
+      const AssemblyResult result = closeConfiguration(model_, model_.integrate(q_ref_, random(model_.nv(), scale)));
+      if (result.status != AssemblyStatus::Closed) continue;
+      sample.q = result.q;
+      break;
+    }
+    Workspace ws(model_);
+    updatePositions(model_, ws, sample.q);
+    for (int c = 0; c < static_cast<int>(model_.contacts().size()); ++c) {
+      const ContactFrame& contact = model_.contacts()[c];
+      if (random(1, 1)[0] > 0) sample.contacts.push_back({c, getPlacement(ws, contact.body, contact.X_BF), 0, 0});
+    }
+    const ConstraintSet set = makeConstraintSet(model_, sample.contacts);
+    sample.v = projectVelocity(model_, ws, set, sample.q, random(model_.nv(), options_.velocity));
+    sample.tau = random(model_.nv(), options_.force);
+    sample.a = random(model_.nv(), options_.force);
+    return sample;
+  }
+
+ private:
+  VectorXd random(int n, double scale) {
+    std::uniform_real_distribution<double> uniform(-scale, scale);
+    return VectorXd::NullaryExpr(n, [&](Eigen::Index) { return uniform(rng_); });
+  }
+
+  const Model& model_;
+  const ValidationOptions& options_;
+  std::mt19937 rng_;
+  VectorXd q_ref_;
+};
+
+class Comparison {
+ public:
+  Comparison(const Model& model, const Model& oracle, const ValidationOptions& options, ValidationReport& report)
+      : model_(model),
+        oracle_(oracle),
+        plain_(makeModelWithoutArmature(model)),
+        plain_oracle_(makeModelWithoutArmature(oracle)),
+        options_(options),
+        report_(report) {}
+
+  void compare(const Sample& sample, bool with_derivatives) {
+    const ConstraintSet set = makeConstraintSet(model_, sample.contacts);
+    SimbodyBridge simbody(oracle_, makeConstraintSet(oracle_, sample.contacts).closures);
+    simbody.setState(sample.q, sample.v, sample.tau);
+    compareKinematics(sample, simbody);
+    compareUnconstrained(sample, simbody);
+    const bool redundant = compareForward(model_, sample, set, simbody.solveWithArmature(), "with rotors");
+    ++report_.states;
+    report_.redundant_states += redundant;
+    if (with_derivatives) compareDerivatives(sample, set, redundant, simbody);
+
+    SimbodyBridge plain(plain_oracle_, makeConstraintSet(plain_oracle_, sample.contacts).closures);
+    plain.setState(sample.q, sample.v, sample.tau);
+    compareForward(plain_, sample, set, plain.solveBySimbody(), "Simbody solver");
+  }
+
+  // Contacts do not hold in a free motion, closures do.
+  void compareFreeMotion(const Sample& sample) {
+    MotionOptions options;
+    options.duration = options_.motion_duration;
+    options.step = options_.motion_step;
+    const MotionReport motion = compareMotion(plain_, sample.q, sample.v, options);
+    const double failed = std::numeric_limits<double>::infinity();
+    report_.rows.push_back({"free motion, distance at the end", motion.ok ? motion.distance / motion.travelled : failed,
+                            options_.motion_tolerance, 1});
+    report_.rows.push_back({"free motion, energy error",
+                            motion.ok ? motion.energy_error / motion.kinetic_energy : failed, options_.motion_tolerance,
+                            1});
+  }
+
+ private:
+  // `floor` is the least size by which a difference is divided: what constraints cancel to zero is zero up to rounding
+  // of that size.
+  void add(const std::string& quantity, const MatrixXd& ours, const MatrixXd& theirs, double floor, double tolerance) {
+    if (theirs.size() == 0) return;
+    auto row = std::find_if(report_.rows.begin(), report_.rows.end(),
+                            [&](const ValidationRow& r) { return r.quantity == quantity; });
+    if (row == report_.rows.end()) row = report_.rows.insert(row, {quantity, 0, tolerance, 0});
+    double difference = (ours - theirs).cwiseAbs().maxCoeff() / std::max(theirs.cwiseAbs().maxCoeff(), floor);
+    if (!ours.allFinite() || !theirs.allFinite()) difference = std::numeric_limits<double>::infinity();
+    row->difference = std::max(row->difference, difference);
+    ++row->samples;
+  }
+  void add(const std::string& quantity, const MatrixXd& ours, const MatrixXd& theirs, double floor = 1e-6) {
+    add(quantity, ours, theirs, floor, options_.tolerance);
+  }
+
+  void compareKinematics(const Sample& sample, const SimbodyBridge& simbody) {
+    Workspace ws(model_);
+    updatePositions(model_, ws, sample.q);
+    updateVelocities(model_, ws, sample.v);
+    const int n = model_.numBodies() - 1;
+    MatrixXd X(3, 4 * n), X_s(3, 4 * n), V(6, n), V_s(6, n);
+    for (int i = 0; i < n; ++i) {
+      const SE3 placement = simbody.getPlacement(i + 1);
+      X.middleCols(4 * i, 4) << ws.X_WB[i + 1].R, ws.X_WB[i + 1].p;
+      X_s.middleCols(4 * i, 4) << placement.R, placement.p;
+      V.col(i) = calcFrameVelocity(ws, i + 1, SE3::Identity());
+      V_s.col(i) = simbody.calcTwist(i + 1);
+    }
+    add("body placements", X, X_s);
+    add("body velocities", V, V_s);
+    const auto scalar = [](double value) { return MatrixXd::Constant(1, 1, value); };
+    add("kinetic energy", scalar(calcKineticEnergy(model_, ws)), scalar(simbody.calcKineticEnergy()));
+    add("potential energy", scalar(calcPotentialEnergy(model_, ws)), scalar(simbody.calcPotentialEnergy()));
+  }
+
+  void compareUnconstrained(const Sample& sample, const SimbodyBridge& simbody) {
+    Workspace ws(model_);
+    updatePositions(model_, ws, sample.q);
+    updateVelocities(model_, ws, sample.v);
+    updateMassMatrix(model_, ws);
+    updateBias(model_, ws);
+    add("mass matrix", ws.M, simbody.calcMassMatrix());
+    add("bias", ws.b, simbody.calcBias());
+    add("inverse dynamics", calcInverseDynamics(model_, ws, sample.q, sample.v, sample.a),
+        simbody.calcInverseDynamics(sample.a));
+  }
+
+  // Returns whether the rows were redundant.
+  bool compareForward(const Model& model, const Sample& sample, const ConstraintSet& set, const OracleSolution& theirs,
+                      const std::string& label) {
+    Workspace ws(model);
+    ConstrainedWorkspace cws;
+    const DynamicsStatus status = updateConstrainedDynamics(model, ws, cws, set, sample.q, sample.v, sample.tau);
+    if (status != DynamicsStatus::Ok) cws.a.setConstant(std::numeric_limits<double>::quiet_NaN());
+    const std::string suffix = ", " + label;
+    const VectorXd free_force = sample.tau - ws.b, free = cws.M_llt.solve(free_force);
+    const double force = kFloor * free_force.cwiseAbs().maxCoeff();
+    add("accelerations" + suffix, cws.a, theirs.a, kFloor * free.cwiseAbs().maxCoeff());
+    if (set.rows == 0) return false;
+    add("constraint forces J'lambda" + suffix, cws.J.transpose() * cws.lambda, theirs.constraint_force, force);
+    if (cws.redundant) return true;
+    const std::vector<Vector6d> ours = expandForces(set, cws.lambda);
+    add("closure forces" + suffix, stack(ours, 0, set.num_loops), stack(theirs.wrenches, 0, set.num_loops), force);
+    add("foot forces" + suffix, stack(ours, set.num_loops, ours.size()),
+        stack(theirs.wrenches, set.num_loops, ours.size()), force);
+    return false;
+  }
+
+  // Directions that keep closures and contacts, nv x n.
+  static MatrixXd calcNullSpace(const MatrixXd& J, int nv) {
+    if (J.rows() == 0) return MatrixXd::Identity(nv, nv);
+    const Eigen::JacobiSVD<MatrixXd> svd(J, Eigen::ComputeFullV);
+    const auto& sigma = svd.singularValues();
+    return svd.matrixV().rightCols(nv - (sigma.array() > 1e-8 * sigma[0]).count());
+  }
+
+  void compareDerivatives(const Sample& sample, const ConstraintSet& set, bool redundant, SimbodyBridge& simbody) {
+    const int nv = model_.nv(), nu = model_.nu(), nw = redundant ? 0 : 6 * static_cast<int>(set.closures.size());
+    Workspace ws(model_), other(model_);
+    ConstrainedWorkspace cws;
+    if (updateConstrainedDynamics(model_, ws, cws, set, sample.q, sample.v, sample.tau) != DynamicsStatus::Ok ||
+        updateConstrainedDerivatives(model_, ws, cws, set) != DynamicsStatus::Ok)
+      return;  // the row of the accelerations tells
+    // Accelerations, then wrenches.
+    const auto solve = [&](const VectorXd& q, const VectorXd& v, const VectorXd& tau) {
+      simbody.setState(q, v, tau);
+      const OracleSolution solution = simbody.solveWithArmature();
+      VectorXd out(nv + nw);
+      out << solution.a, stack(solution.wrenches, 0, nw / 6).reshaped();
+      return out;
+    };
+    const auto expand = [&](const VectorXd& da, const VectorXd& dlambda) {
+      VectorXd out(nv + nw);
+      out.head(nv) = da;
+      if (nw > 0) out.tail(nw) = stack(expandForces(set, dlambda), 0, nw / 6).reshaped();
+      return out;
+    };
+    const MatrixXd N = calcNullSpace(cws.J, nv);
+    const int n = static_cast<int>(N.cols());
+    MatrixXd dq(nv + nw, n), dq_s(dq), dv(dq), dv_s(dq), du(nv + nw, nu), du_s(du);
+    for (int k = 0; k < n; ++k) {
+      const VectorXd direction = N.col(k);
+      const VectorXd rate = differentiate(options_.derivative_step, [&](double t) {
+        VectorXd q = model_.integrate(sample.q, t * direction);
+        retract(model_, other, set, q);
+        const VectorXd v = projectVelocity(model_, other, set, q, sample.v);
+        VectorXd out(3 * nv + nw);
+        out << model_.difference(sample.q, q), v, solve(q, v, sample.tau);
+        return out;
+      });
+      const VectorXd q_rate = rate.head(nv), v_rate = rate.segment(nv, nv);
+      dq_s.col(k) = rate.tail(nv + nw);
+      dq.col(k) = expand(cws.da_dq * q_rate + cws.da_dv * v_rate, cws.dlambda_dq * q_rate + cws.dlambda_dv * v_rate);
+      dv.col(k) = expand(cws.da_dv * direction, cws.dlambda_dv * direction);
+      dv_s.col(k) = differentiate(options_.derivative_step,
+                                  [&](double t) { return solve(sample.q, sample.v + t * direction, sample.tau); });
+    }
+    for (int m = 0; m < nu; ++m) {  // linear in the torques: any step is exact
+      du.col(m) = expand(cws.da_du.col(m), cws.dlambda_du.col(m));
+      const VectorXd torque = VectorXd::Unit(nv, model_.motors()[m].dof);
+      du_s.col(m) = differentiate(1, [&](double t) { return solve(sample.q, sample.v, sample.tau + t * torque); });
+    }
+    const double tolerance = options_.derivative_tolerance;
+    MatrixXd B = MatrixXd::Zero(nv, nu);
+    for (int m = 0; m < nu; ++m) B(model_.motors()[m].dof, m) = 1;
+    const double response = nu > 0 ? kFloor * MatrixXd(cws.M_llt.solve(B)).cwiseAbs().maxCoeff() : 0;
+    const double a = kFloor * cws.a.cwiseAbs().maxCoeff(), force = kFloor * (sample.tau - ws.b).cwiseAbs().maxCoeff();
+    add("da/dq along the closures", dq.topRows(nv), dq_s.topRows(nv), a, tolerance);
+    add("da/dv along the closures", dv.topRows(nv), dv_s.topRows(nv), a, tolerance);
+    add("da/du", du.topRows(nv), du_s.topRows(nv), response, tolerance);
+    add("dlambda/dq along the closures", dq.bottomRows(nw), dq_s.bottomRows(nw), force, tolerance);
+    add("dlambda/dv along the closures", dv.bottomRows(nw), dv_s.bottomRows(nw), force, tolerance);
+    add("dlambda/du", du.bottomRows(nw), du_s.bottomRows(nw), kFloor, tolerance);
+  }
+
+  const Model &model_, &oracle_;
+  const Model plain_, plain_oracle_;
+  const ValidationOptions& options_;
+  ValidationReport& report_;
+};
+
+}  // namespace
+
+bool ValidationReport::passed() const {
+  return failure.empty() && !rows.empty() &&
+         std::all_of(rows.begin(), rows.end(), [](const ValidationRow& row) { return row.passed(); });
+}
+
+const ValidationRow* ValidationReport::findRow(const std::string& quantity) const {
+  const auto row =
+      std::find_if(rows.begin(), rows.end(), [&](const ValidationRow& r) { return r.quantity == quantity; });
+  return row == rows.end() ? nullptr : &*row;
+}
+
+ValidationReport validateAgainst(const Model& model, const Model& oracle, const ValidationOptions& options) {
+  ValidationReport report;
+  report.robot = model.name();
+  try {
+    SampleSource source(model, options);
+    report.failure = source.failure;
+    if (!report.failure.empty()) return report;
+    Comparison comparison(model, oracle, options, report);
+    for (int i = 0; i < options.samples; ++i) {
+      const Sample sample = source.draw();
+      comparison.compare(sample, i < options.derivative_samples);
+      if (i == 0 && options.motion_duration > 0) comparison.compareFreeMotion(sample);
+    }
+  } catch (const std::exception& error) {  // Simbody throws on what it cannot solve
+    report.failure = error.what();
+  }
+  return report;
+}
+
+ValidationReport validateRobot(const Model& model, const ValidationOptions& options) {
+  return validateAgainst(model, model, options);
+}
+
+void printReport(std::ostream& out, const ValidationReport& report) {
+  out << report.robot << ": " << report.states << " states";
+  if (report.redundant_states > 0) out << ", " << report.redundant_states << " with redundant constraint rows";
+  out << (report.passed() ? ", agrees with Simbody\n" : ", DISAGREES with Simbody\n");
+  if (!report.failure.empty()) out << "  " << report.failure << "\n";
+  for (const ValidationRow& row : report.rows) {
+    out << "  " << std::left << std::setw(44) << row.quantity << std::right << std::scientific << std::setprecision(1)
+        << std::setw(9) << row.difference << "  (" << row.tolerance << ")" << std::setw(6) << row.samples << "  "
+        << (row.passed() ? "pass" : "FAIL") << "\n";
+  }
+  out << std::defaultfloat;
+}
+
+}  // namespace bielle::validation

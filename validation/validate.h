@@ -1,0 +1,72 @@
+#pragma once
+/// \file Bielle's dynamics against Simbody's, quantity by quantity, on random closed states of a robot.
+///
+/// A state is drawn around a start (the robot's first reference, or its neutral configuration): a random tangent step,
+/// closed again by closeConfiguration; random velocities projected on the closures and on a random set of contacts in
+/// force; random generalized forces on all joints. Every row holds the largest difference over the samples of a vector
+/// or matrix, relative to the largest entry of Simbody's (or to a hundredth of the mechanism's response without
+/// constraints, where these leave less than that).
+///
+/// Forward dynamics are compared twice. "Simbody solver": Simbody's own realize(Acceleration), on both sides without
+/// rotors (makeModelWithoutArmature). "With rotors": the robot as it is, against SimbodyBridge::solveWithArmature.
+/// Where constraint rows are redundant, the single forces are not determined; accelerations and generalized forces J^T
+/// lambda are.
+///
+/// Derivatives are those along the closed manifold, where alone both formulations must agree: along curves q(t), v(t)
+/// that keep closures and contacts,  da/dt = da_dq q' + da_dv v'  against central differences (with Richardson
+/// extrapolation, error O(h^4)) of Simbody's a; likewise the forces; and da_du column by column.
+///
+/// When asked, a free motion of the robot without rotors is integrated by both programs.
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "bielle/model/model.h"
+
+namespace bielle::validation {
+
+struct ValidationOptions {
+  int samples = 10;
+  unsigned seed = 1;
+  double tolerance = 1e-9;             ///< relative, of every row but the derivatives
+  int derivative_samples = 1;          ///< how many of the samples have their derivatives checked
+  double derivative_tolerance = 1e-6;  ///< relative
+  double derivative_step = 1e-3;       ///< h of the central differences, s
+  VectorXd start;                      ///< nq, where states are drawn around; empty: the first reference, or neutral
+  double perturbation = 0.3;           ///< largest change of a coordinate before closing, m or rad
+  double velocity = 1;                 ///< largest coordinate of the velocity before projection, m/s or rad/s
+  double force = 10;                   ///< largest generalized force, N m or N
+  double motion_duration = 0;  ///< s of a free motion from the first state to integrate by both, 0 for none (motion.h)
+  double motion_step = 1e-3;   ///< s, of our integrator
+  double motion_tolerance =
+      1e-6;  ///< of the distance at the end relative to the way gone, and of the energy to the kinetic one
+};
+
+struct ValidationRow {
+  std::string quantity;
+  double difference = 0;  ///< largest relative difference; infinity when a number is not finite
+  double tolerance = 0;
+  int samples = 0;  ///< how many were compared
+  bool passed() const { return difference <= tolerance; }
+};
+
+struct ValidationReport {
+  std::string robot;
+  int states = 0;            ///< samples drawn
+  int redundant_states = 0;  ///< of which had redundant constraint rows
+  std::vector<ValidationRow> rows;
+  std::string failure;  ///< why nothing could be compared, or empty
+  bool passed() const;
+  const ValidationRow* findRow(const std::string& quantity) const;
+};
+
+/// Compares the model with its Simbody twin.
+ValidationReport validateRobot(const Model& model, const ValidationOptions& options = {});
+
+/// The same with Simbody's system made from another model of the same joints, closures and contacts: to see that a
+/// wrong model fails.
+ValidationReport validateAgainst(const Model& model, const Model& oracle, const ValidationOptions& options = {});
+
+void printReport(std::ostream& out, const ValidationReport& report);
+
+}  // namespace bielle::validation
