@@ -87,6 +87,7 @@ OracleSolution SimbodyBridge::solveBySimbody() {
   OracleSolution out;
   out.a = s_->T.inverse() * (s_->gather(s_->state.getUDot()) - s_->Tdot_v);
   s_->readForces(s_->state.getMultipliers(), out);
+  out.rounding = s_->calcRounding();
   return out;
 }
 

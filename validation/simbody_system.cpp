@@ -1,6 +1,9 @@
 #include "simbody_system.h"
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace bielle::validation {
 namespace {
@@ -189,6 +192,20 @@ void SimbodyBridge::System::scatter(const VectorXd& ours, SimTK::Vector& u) cons
 
 VectorXd SimbodyBridge::System::gather(const SimTK::Vector& u) const {
   return VectorXd::NullaryExpr(model.nv(), [&](Eigen::Index k) { return u[u_index[k]]; });
+}
+
+double SimbodyBridge::System::calcRounding() const {
+  SimTK::Matrix delassus;
+  matter.calcProjectedMInv(state, delassus);
+  const int m = delassus.nrow();
+  if (m == 0) return 0;
+  const MatrixXd W = MatrixXd::NullaryExpr(m, m, [&](Eigen::Index i, Eigen::Index j) { return delassus(i, j); });
+  const VectorXd sigma = Eigen::SelfAdjointEigenSolver<MatrixXd>(W, Eigen::EigenvaluesOnly).eigenvalues();
+  const double largest = sigma[m - 1];
+  double least = largest;
+  for (double s : sigma)
+    if (s > 1e-11 * largest) least = std::min(least, s);
+  return std::numeric_limits<double>::epsilon() * largest / least;
 }
 
 void SimbodyBridge::System::readForces(const SimTK::Vector& multipliers, OracleSolution& out) const {

@@ -52,6 +52,8 @@ struct SimbodyBridge::System {
   VectorXd gather(const SimTK::Vector& u) const;
   // Constraint forces of Simbody's multipliers.
   void readForces(const SimTK::Vector& multipliers, OracleSolution& out) const;
+  // OracleSolution::rounding of Simbody's solver.
+  double calcRounding() const;
 
  private:
   void addBody(int i);

@@ -34,7 +34,6 @@ TEST_CASE("every joint kind with every closure kind agrees with Simbody") {
   std::mt19937 rng(11);
   ValidationOptions options;
   options.samples = 3;
-  double worst = 0, worst_derivative = 0;
   for (JointKind joint : kJoints)
     for (ClosureKind closure : kClosures)
       for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
@@ -47,12 +46,9 @@ TEST_CASE("every joint kind with every closure kind agrees with Simbody") {
         for (const char* quantity : {"mass matrix", "accelerations, Simbody solver", "closure forces, Simbody solver",
                                      "accelerations, with rotors", "da/dq along the closures"})
           CHECK(report.findRow(quantity) != nullptr);
-        for (const ValidationRow& row : report.rows) {
-          double& largest = row.tolerance == options.tolerance ? worst : worst_derivative;
-          largest = std::max(largest, row.difference);
-        }
+        for (const ValidationRow& row : report.rows)  // Simbody's own rounding does not excuse these mechanisms
+          if (row.tolerance < options.derivative_tolerance) CHECK(row.difference < 1e-9);
       }
-  WARN("largest relative differences: " << worst << ", derivatives " << worst_derivative);
 }
 
 TEST_CASE("the planar four-bar, with redundant rows, agrees with Simbody in accelerations and generalized forces") {
@@ -162,7 +158,5 @@ TEST_CASE("closed chains move freely for two seconds with Simbody, at the order 
     CHECK(fine.energy_error < 1e-6 * fine.kinetic_energy);
     CHECK(coarse.distance > 12 * fine.distance);  // 16 by the order of the scheme
     CHECK(coarse.energy_error > 12 * fine.energy_error);
-    WARN("ratios " << coarse.distance / fine.distance << " " << coarse.energy_error / fine.energy_error << " distance "
-                   << fine.distance << " E " << fine.energy_error << " sE " << fine.energy_error_simbody);
   }
 }

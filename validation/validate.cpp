@@ -57,7 +57,8 @@ class SampleSource {
     AssemblyResult start =
         given ? closeConfiguration(model, options.start.size() > 0 ? options.start : model.makeNeutral())
               : assembleReference(model, model.references()[0].name);
-    if (start.status != AssemblyStatus::Closed) start = closeConfiguration(model, model.makeNeutral());
+    for (int attempt = 0; attempt < 20 && start.status != AssemblyStatus::Closed; ++attempt)
+      start = closeConfiguration(model, model.integrate(model.makeNeutral(), random(model.nv(), 0.1 * attempt)));
     if (start.status != AssemblyStatus::Closed) failure = "no closed configuration was found: " + start.message;
     q_ref_ = start.q;
   }
@@ -140,6 +141,7 @@ class Comparison {
   }
 
  private:
+  // The largest difference and tolerance of the samples are kept.
   // `floor` is the least size by which a difference is divided: what constraints cancel to zero is zero up to rounding
   // of that size.
   void add(const std::string& quantity, const MatrixXd& ours, const MatrixXd& theirs, double floor, double tolerance) {
@@ -150,6 +152,7 @@ class Comparison {
     double difference = (ours - theirs).cwiseAbs().maxCoeff() / std::max(theirs.cwiseAbs().maxCoeff(), floor);
     if (!ours.allFinite() || !theirs.allFinite()) difference = std::numeric_limits<double>::infinity();
     row->difference = std::max(row->difference, difference);
+    row->tolerance = std::max(row->tolerance, tolerance);
     ++row->samples;
   }
   void add(const std::string& quantity, const MatrixXd& ours, const MatrixXd& theirs, double floor = 1e-6) {
@@ -198,14 +201,17 @@ class Comparison {
     const std::string suffix = ", " + label;
     const VectorXd free_force = sample.tau - ws.b, free = cws.M_llt.solve(free_force);
     const double force = kFloor * free_force.cwiseAbs().maxCoeff();
-    add("accelerations" + suffix, cws.a, theirs.a, kFloor * free.cwiseAbs().maxCoeff());
+    const double tolerance = std::max(options_.tolerance, theirs.rounding);
+    add("accelerations" + suffix, cws.a, theirs.a, kFloor * free.cwiseAbs().maxCoeff(), tolerance);
     if (set.rows == 0) return false;
-    add("constraint forces J'lambda" + suffix, cws.J.transpose() * cws.lambda, theirs.constraint_force, force);
+    add("constraint forces J'lambda" + suffix, cws.J.transpose() * cws.lambda, theirs.constraint_force, force,
+        tolerance);
     if (cws.redundant) return true;
     const std::vector<Vector6d> ours = expandForces(set, cws.lambda);
-    add("closure forces" + suffix, stack(ours, 0, set.num_loops), stack(theirs.wrenches, 0, set.num_loops), force);
+    add("closure forces" + suffix, stack(ours, 0, set.num_loops), stack(theirs.wrenches, 0, set.num_loops), force,
+        tolerance);
     add("foot forces" + suffix, stack(ours, set.num_loops, ours.size()),
-        stack(theirs.wrenches, set.num_loops, ours.size()), force);
+        stack(theirs.wrenches, set.num_loops, ours.size()), force, tolerance);
     return false;
   }
 

@@ -1,16 +1,17 @@
 #pragma once
 /// \file Bielle's dynamics against Simbody's, quantity by quantity, on random closed states of a robot.
 ///
-/// A state is drawn around a start (the robot's first reference, or its neutral configuration): a random tangent step,
-/// closed again by closeConfiguration; random velocities projected on the closures and on a random set of contacts in
-/// force; random generalized forces on all joints. Every row holds the largest difference over the samples of a vector
-/// or matrix, relative to the largest entry of Simbody's (or to a hundredth of the mechanism's response without
-/// constraints, where these leave less than that).
+/// A state is drawn around a start (the robot's first reference, or its neutral configuration, or a closed one near
+/// that): a random tangent step, closed again by closeConfiguration; random velocities projected on the closures and on
+/// a random set of contacts in force; random generalized forces on all joints. Every row holds the largest difference
+/// over the samples of a vector or matrix, relative to the largest entry of Simbody's (or to a hundredth of the
+/// mechanism's response without constraints, where these leave less than that).
 ///
 /// Forward dynamics are compared twice. "Simbody solver": Simbody's own realize(Acceleration), on both sides without
 /// rotors (makeModelWithoutArmature). "With rotors": the robot as it is, against SimbodyBridge::solveWithArmature.
-/// Where constraint rows are redundant, the single forces are not determined; accelerations and generalized forces J^T
-/// lambda are.
+/// The rows of Simbody's own solver allow for its rounding where that is larger than the tolerance
+/// (OracleSolution::rounding). Where constraint rows are redundant, the single forces are not determined; accelerations
+/// and generalized forces J^T lambda are.
 ///
 /// Derivatives are those along the closed manifold, where alone both formulations must agree: along curves q(t), v(t)
 /// that keep closures and contacts,  da/dt = da_dq q' + da_dv v'  against central differences (with Richardson
