@@ -206,7 +206,7 @@ class Comparison {
     if (set.rows == 0) return false;
     add("constraint forces J'lambda" + suffix, cws.J.transpose() * cws.lambda, theirs.constraint_force, force,
         tolerance);
-    if (cws.redundant) return true;
+    if (cws.saddle_point.isRedundant()) return true;
     const std::vector<Vector6d> ours = expandForces(set, cws.lambda);
     add("closure forces" + suffix, stack(ours, 0, set.num_loops), stack(theirs.wrenches, 0, set.num_loops), force,
         tolerance);

@@ -1,40 +1,25 @@
 #pragma once
 /// \file Forward dynamics under closures and contacts, and its derivatives (the paper's eqs. 4 to 6).
 ///
-///     M a - J^T lambda = tau - b,     J a = -gamma (1) G lambda = -gamma - J M^{-1} (tau - b),    G = J M^{-1} J^T (2)
-/// where gamma gathers the drift and the stabilisation of the closures. Rows may be redundant: with D = diag(G)^{-1/2}
-/// the system (D G D) y = D rhs is solved by proximal iterations (Carpentier, Budhiraja, Mansard, RSS 2021)
-///     y <- y + (D G D + mu I)^{-1} (D rhs - D G D y), (3)
-/// which converge to the least-squares, minimum-norm y; lambda = D y. Accelerations and generalized constraint forces
-/// J^T lambda do not depend on the choice of rows. Where D G D is well conditioned it is factorised directly.
-///
-/// Derivatives: at fixed a and lambda let dID = d(M a + b - J^T lambda - tau)/dz and da_c = d a_c/dz. Then
-///     dlambda/dz = G^+ (J M^{-1} dID - da_c),     da/dz = M^{-1} (J^T dlambda/dz - dID). (4)
-/// With redundant rows dlambda/dz is right up to the null space of J^T.
-#include <Eigen/Cholesky>
-
+///     M a - J^T lambda = tau - b,     J a = -gamma (1)
+/// where gamma gathers the drift and the stabilisation of the closures: the system of saddle_point.h, redundant rows
+/// included. Its derivatives take dID = d(M a + b - J^T lambda - tau)/dz and da_c = d(J a + gamma)/dz at fixed a,
+/// lambda.
 #include "bielle/dynamics/closure.h"
+#include "bielle/dynamics/saddle_point.h"
 
 namespace bielle {
-
-struct ConstrainedOptions {
-  double proximal = 1e-7;          ///< mu of Eq. (3), relative to the unit diagonal of D G D
-  int max_iterations = 30;         ///< of Eq. (3)
-  double tolerance = 1e-13;        ///< stop when a correction is below this, relative to the solution
-  double direct_threshold = 1e-5;  ///< smallest pivot of D G D for which it is factorised directly
-};
 
 enum class DynamicsStatus { Ok, MassMatrixSingular, NotFinite };
 const char* getMessage(DynamicsStatus status);
 
 /// Memory of one constrained solve; sized for a constraint set at first use, reused without allocation afterwards.
 struct ConstrainedWorkspace {
-  MatrixXd J;              ///< rows x nv
-  VectorXd gamma;          ///< rows
-  VectorXd a;              ///< nv, accelerations
-  VectorXd lambda;         ///< rows, closure and contact forces, each in its frame 1
-  double residual = 0;     ///< largest |J a + gamma|: not small when redundant rows contradict each other
-  bool redundant = false;  ///< whether Eq. (3) was needed
+  MatrixXd J;           ///< rows x nv
+  VectorXd gamma;       ///< rows
+  VectorXd a;           ///< nv, accelerations
+  VectorXd lambda;      ///< rows, closure and contact forces, each in its frame 1
+  double residual = 0;  ///< largest |J a + gamma|: not small when redundant rows contradict each other
 
   MatrixXd da_dq, da_dv;            ///< nv x nv
   MatrixXd da_du;                   ///< nv x nu
@@ -42,26 +27,20 @@ struct ConstrainedWorkspace {
   MatrixXd dlambda_du;              ///< rows x nu
 
   // Intermediate
-  Eigen::LLT<MatrixXd> M_llt, G_llt;
-  MatrixXd W;     ///< nv x rows: L^{-1} J^T D, L the Cholesky factor of M
-  MatrixXd G;     ///< rows x rows: D G D
-  MatrixXd Ginv;  ///< rows x rows, (pseudo-)inverse of D G D
-  VectorXd D;     ///< rows
-  VectorXd rhs, correction, force;
-  MatrixXd dc_dq, dc_dv;        ///< rows x nv, derivatives of the constraint acceleration
-  MatrixXd T1, T3;              ///< rows x rows
-  MatrixXd T2;                  ///< rows x nv
+  SaddlePoint saddle_point;
+  VectorXd force;               ///< nv
+  VectorXd violation;           ///< rows, J a + gamma
   std::vector<Vector6d> f_ext;  ///< nb
 };
 
 /// Accelerations and forces for generalized forces tau (nv) at (q, v). Fills `ws` up to the accelerations.
 DynamicsStatus updateConstrainedDynamics(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
                                          const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v,
-                                         ConstVectorRef tau, const ConstrainedOptions& options = {});
+                                         ConstVectorRef tau, const SaddlePointOptions& options = {});
 
-/// Derivatives (4) at the solution held by the workspaces; to be called after updateConstrainedDynamics.
+/// Derivatives at the solution held by the workspaces; to be called after updateConstrainedDynamics.
 DynamicsStatus updateConstrainedDerivatives(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
-                                            const ConstraintSet& constraints, const ConstrainedOptions& options = {});
+                                            const ConstraintSet& constraints);
 
 /// Generalized forces of motor torques u (nu).
 void calcMotorForces(const Model& model, ConstVectorRef u, VectorRef tau);

@@ -1,0 +1,100 @@
+#include "bielle/dynamics/saddle_point.h"
+
+namespace bielle {
+
+void SaddlePoint::resize(int n, int m) {
+  if (J_.rows() == m && J_.cols() == n) return;
+  J_.setZero(m, n);
+  W_.setZero(n, m);
+  for (MatrixXd* matrix : {&G_, &Ginv_, &T1_, &T2_}) matrix->setZero(m, m);
+  for (VectorXd* v : {&D_, &rhs_, &correction_}) v->setZero(m);
+  M_llt_ = Eigen::LLT<MatrixXd>(n);
+  G_llt_ = Eigen::LLT<MatrixXd>(m);
+}
+
+SaddlePointStatus SaddlePoint::factorize(const MatrixXd& M, const MatrixXd& J, const SaddlePointOptions& options) {
+  options_ = options;
+  M_llt_.compute(M);
+  if (M_llt_.info() != Eigen::Success) return SaddlePointStatus::MassMatrixSingular;
+  if (J.rows() == 0) return SaddlePointStatus::Ok;
+  J_ = J;
+  W_ = J.transpose();
+  M_llt_.matrixL().solveInPlace(W_);
+  for (Eigen::Index i = 0; i < W_.cols(); ++i) {
+    const double norm = W_.col(i).norm();
+    D_[i] = norm > 1e-14 ? 1 / norm : 0;  // a row that nothing moves has no force
+    W_.col(i) *= D_[i];
+  }
+  G_.noalias() = W_.transpose() * W_;
+  G_llt_.compute(G_);
+  const double pivot = G_llt_.info() == Eigen::Success ? G_llt_.matrixLLT().diagonal().array().square().minCoeff() : 0;
+  redundant_ = !(pivot > options.direct_threshold);
+  if (redundant_) {
+    T1_ = G_;
+    T1_.diagonal().array() += options.proximal;
+    G_llt_.compute(T1_);
+  }
+  return SaddlePointStatus::Ok;
+}
+
+void SaddlePoint::solve(const VectorXd& f, const VectorXd& g, VectorXd& a, VectorXd& lambda) {
+  a = f;
+  M_llt_.solveInPlace(a);  // free accelerations
+  if (J_.rows() == 0) return;
+  rhs_ = -g;
+  rhs_.noalias() -= J_ * a;
+  rhs_ = rhs_.cwiseProduct(D_).eval();
+  lambda = rhs_;
+  G_llt_.solveInPlace(lambda);
+  const int iterations = redundant_ ? options_.max_iterations : 2;  // a direct solution is refined once
+  for (int i = 1; i < iterations; ++i) {
+    correction_ = rhs_;
+    correction_.noalias() -= G_ * lambda;
+    G_llt_.solveInPlace(correction_);
+    lambda += correction_;  // Eq. (3)
+    if (correction_.norm() <= options_.tolerance * lambda.norm()) break;
+  }
+  lambda = lambda.cwiseProduct(D_).eval();
+  a = f;
+  a.noalias() += J_.transpose() * lambda;
+  M_llt_.solveInPlace(a);
+}
+
+// Inverse of D G D, or its pseudo-inverse as the limit of Eq. (3): with P = (DGD + mu I)^{-1} and E = mu P, the sum
+// P (I + E + E^2 + ...) is doubled at each pass, P_{2k} = P_k + E^k P_k.
+void SaddlePoint::updateInverse() {
+  if (J_.rows() == 0) return;
+  Ginv_.setIdentity();
+  G_llt_.solveInPlace(Ginv_);
+  if (!redundant_) return;
+  constexpr int kDoublings = 3;  // eight proximal steps
+  T1_ = options_.proximal * Ginv_;
+  for (int i = 0; i < kDoublings; ++i) {
+    T2_ = Ginv_;
+    T2_.noalias() += T1_ * Ginv_;
+    Ginv_.swap(T2_);
+    T2_.noalias() = T1_ * T1_;
+    T1_.swap(T2_);
+  }
+}
+
+void SaddlePoint::solveDerivatives(MatrixRef X, MatrixRef dlambda) {
+  if (J_.rows() == 0) {
+    X *= -1;
+    M_llt_.solveInPlace(X);
+    return;
+  }
+  // In the coordinates of L: W = L^{-1} J^T D and L^{-1} dID give J M^{-1} dID = D^{-1} W^T L^{-1} dID.
+  M_llt_.matrixL().solveInPlace(X);
+  if (buffer_.rows() != dlambda.rows() || buffer_.cols() < X.cols()) buffer_.resize(dlambda.rows(), X.cols());
+  auto rhs = buffer_.leftCols(X.cols());
+  rhs.noalias() = W_.transpose() * X;
+  rhs -= D_.asDiagonal() * dlambda;
+  dlambda.noalias() = Ginv_ * rhs;
+  X *= -1;
+  X.noalias() += W_ * dlambda;
+  M_llt_.matrixU().solveInPlace(X);
+  dlambda = D_.asDiagonal() * dlambda;
+}
+
+}  // namespace bielle
