@@ -5,23 +5,11 @@
 #include <sstream>
 
 #include "bielle/solve/fddp.h"
+#include "count_allocations.h"
 #include "solve_problems.h"
 
 using namespace bielle;
 using namespace bielle::test;
-
-// The linker leads malloc (Eigen) and operator new (the standard library) through these counters.
-static std::atomic<long> num_allocations{0};
-extern "C" void* __real_malloc(size_t size);
-extern "C" void* __wrap_malloc(size_t size) {
-  ++num_allocations;
-  return __real_malloc(size);
-}
-extern "C" void* __real__Znwm(size_t size);
-extern "C" void* __wrap__Znwm(size_t size) {
-  ++num_allocations;
-  return __real__Znwm(size);
-}
 
 namespace {
 

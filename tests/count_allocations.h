@@ -1,0 +1,17 @@
+#pragma once
+// Counts allocations: the linker leads malloc (Eigen) and operator new (the standard library) through these counters.
+// Include in one source of an executable linked with -Wl,--wrap=malloc -Wl,--wrap=_Znwm.
+#include <atomic>
+#include <cstddef>
+
+static std::atomic<long> num_allocations{0};
+extern "C" void* __real_malloc(size_t size);
+extern "C" void* __wrap_malloc(size_t size) {
+  ++num_allocations;
+  return __real_malloc(size);
+}
+extern "C" void* __real__Znwm(size_t size);
+extern "C" void* __wrap__Znwm(size_t size) {
+  ++num_allocations;
+  return __real__Znwm(size);
+}

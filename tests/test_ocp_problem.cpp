@@ -1,0 +1,329 @@
+// Oracles: central differences of step() and of its cost through the public interface; the Gauss-Newton Hessian from
+// residuals that the test evaluates and differentiates itself. Every derivative test also sees a poisoned entry.
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/squat.h"
+#include "check_derivative.h"
+#include "count_allocations.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
+                                 JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
+                                 JointKind::FreeFlyer};
+
+struct Point {
+  VectorXd x, u, x_node;  ///< state, controls, state of the next node
+};
+
+StateCost makeRandomStateCost(std::mt19937& rng, const Model& model, const VectorXd& q) {
+  return {0.7, model.integrate(q, randomVector(rng, model.nv(), 0.6)), randomVector(rng, model.nv()),
+          randomVector(rng, 2 * model.nv()).cwiseAbs()};
+}
+
+// A stage with a cost of every sort that looks at q, v, u and the forces; the barrier is crossed by some rows only.
+StageSpec makeStage(std::mt19937& rng, const Model& model, const VectorXd& q,
+                    const std::vector<ContactTarget>& contacts) {
+  StageSpec stage;
+  stage.dt = 0.02;
+  stage.constraints = makeConstraintSet(model, contacts);
+  stage.state = makeRandomStateCost(rng, model, q);
+  stage.control = {0.3, randomVector(rng, model.nu()), randomVector(rng, model.nu()).cwiseAbs()};
+  const auto quadratic = [&](int n) { return Activation::makeQuadratic(randomVector(rng, n).cwiseAbs()); };
+  stage.costs.push_back({"com", 2, quadratic(3), makeComPosition(randomVector(rng, 3))});
+  stage.costs.push_back({"com velocity", 2, quadratic(3), makeComVelocity(randomVector(rng, 3))});
+  const BodyFrame frame{model.numBodies() - 1, randomPlacement(rng)};
+  stage.costs.push_back({"velocity", 1, quadratic(6), makeFrameVelocity(frame, randomVector(rng, 6))});
+  for (int c = 0; c < static_cast<int>(stage.constraints.closures.size()); ++c) {
+    const int rows = getRows(stage.constraints.closures[c].kind);
+    stage.costs.push_back(
+        {"force", 1e-2, quadratic(rows), makeContactForce(stage.constraints, c, randomVector(rng, rows, 5))});
+    stage.costs.push_back({"friction", 1e-2,
+                           Activation::makeBarrier(VectorXd::Ones(4), VectorXd::Zero(4), VectorXd::Constant(4, 1e12)),
+                           makeFrictionPyramid(stage.constraints, c, 0.5)});
+  }
+  return stage;
+}
+
+StageSpec makeTerminal(std::mt19937& rng, const Model& model, const VectorXd& q) {
+  StageSpec stage = makeStage(rng, model, q, {});
+  stage.constraints = {};
+  stage.costs.resize(3);
+  return stage;
+}
+
+RobotProblem makeProblem(std::mt19937& rng, const Model& model, const VectorXd& q,
+                         const std::vector<ContactTarget>& contacts) {
+  std::vector<StageSpec> stages;
+  stages.push_back(makeStage(rng, model, q, contacts));
+  stages.push_back(makeTerminal(rng, model, q));
+  return RobotProblem(model, q, VectorXd::Zero(model.nv()), std::move(stages));
+}
+
+VectorXd join(const VectorXd& q, const VectorXd& v) {
+  VectorXd x(q.size() + v.size());
+  x << q, v;
+  return x;
+}
+
+VectorXd move(const RobotProblem& problem, int node, const VectorXd& x, const VectorXd& dx) {
+  VectorXd out(x.size());
+  problem.integrate(node, x, dx, out);
+  return out;
+}
+
+VectorXd calcDifference(const RobotProblem& problem, int node, const VectorXd& x0, const VectorXd& x1) {
+  VectorXd dx(problem.tangentSize(node));
+  problem.difference(node, x0, x1, dx);
+  return dx;
+}
+
+struct Step {
+  VectorXd gap;
+  double cost;
+};
+Step calcStep(RobotProblem& problem, int stage, const Point& point, const VectorXd& dx, const VectorXd& du) {
+  VectorXd next(problem.stateSize());
+  double cost = 0;
+  REQUIRE(problem.step(stage, move(problem, stage, point.x, dx), point.u + du, next, cost) == StepStatus::Ok);
+  return {calcDifference(problem, stage + 1, point.x_node, next), cost};
+}
+
+// Everything that is weighted and squared, each row times the root of its weight as it is at (x, u).
+VectorXd calcWeightedResiduals(RobotProblem& problem, int node, const VectorXd& x, const VectorXd& u,
+                               const VectorXd& curvature) {
+  const Model& model = problem.model();
+  const StageSpec& spec = problem.spec(node);
+  const bool running = node < problem.numStages();
+  VectorXd a, lambda;
+  if (running) REQUIRE(problem.calcDynamics(node, x, u, a, lambda) == StepStatus::Ok);
+  Workspace ws(model);
+  updatePositions(model, ws, x.head(model.nq()));
+  updateVelocities(model, ws, x.tail(model.nv()));
+  updateMassMatrix(model, ws);
+  std::vector<double> rows;
+  const VectorXd dq = model.difference(spec.state.q_ref, x.head(model.nq()));
+  for (int i = 0; i < model.nv(); ++i) rows.push_back(dq[i]);
+  for (int i = 0; i < model.nv(); ++i) rows.push_back(x[model.nq() + i] - spec.state.v_ref[i]);
+  for (int i = 0; running && i < model.nu(); ++i) rows.push_back(u[i] - spec.control.reference[i]);
+  for (const Cost& cost : spec.costs) {
+    VectorXd r(cost.residual->size());
+    cost.residual->calc({model, ws, spec.constraints, u, lambda}, r);
+    rows.insert(rows.end(), r.data(), r.data() + r.size());
+  }
+  VectorXd out = Eigen::Map<VectorXd>(rows.data(), static_cast<Eigen::Index>(rows.size()));
+  return curvature.size() ? VectorXd(out.cwiseProduct(curvature.cwiseSqrt())) : out;
+}
+
+// Second derivative of every row's activation at the residuals r, with all its weights.
+VectorXd calcCurvature(const RobotProblem& problem, int node, const VectorXd& r) {
+  const Model& model = problem.model();
+  const StageSpec& spec = problem.spec(node);
+  const bool running = node < problem.numStages();
+  VectorXd out(r.size());
+  int row = 2 * model.nv();
+  out.head(row) = spec.state.weight * spec.state.weights;
+  if (running) {
+    out.segment(row, model.nu()) = spec.control.weight * spec.control.weights;
+    row += model.nu();
+  }
+  for (const Cost& cost : spec.costs)
+    for (int i = 0; i < cost.residual->size(); ++i, ++row) {
+      const Activation& activation = cost.activation;
+      const bool active =
+          activation.kind == ActivationKind::Quadratic || r[row] < activation.lower[i] || r[row] > activation.upper[i];
+      out[row] = active ? cost.weight * activation.weights[i] : 0;
+    }
+  REQUIRE(row == r.size());
+  return (running ? spec.dt : 1) * out;
+}
+
+void checkGaussNewton(RobotProblem& problem, int node, const Point& point, const StageModel& model, double h) {
+  const int ndx = problem.tangentSize(node), nu = static_cast<int>(point.u.size());
+  const VectorXd curvature = calcCurvature(problem, node, calcWeightedResiduals(problem, node, point.x, point.u, {}));
+  MatrixXd J(curvature.size(), ndx + nu);
+  J.leftCols(ndx) = differentiate(VectorXd::Zero(ndx), h, [&](const VectorXd& dx) {
+    return calcWeightedResiduals(problem, node, move(problem, node, point.x, dx), point.u, curvature);
+  });
+  if (nu > 0)
+    J.rightCols(nu) = differentiate(
+        point.u, 1, [&](const VectorXd& u) { return calcWeightedResiduals(problem, node, point.x, u, curvature); });
+  const MatrixXd H = J.transpose() * J;
+  checkDerivative(model.lxx, H.topLeftCorner(ndx, ndx));
+  CHECK((model.lxx - model.lxx.transpose()).cwiseAbs().maxCoeff() <= 1e-14 * model.lxx.cwiseAbs().maxCoeff());
+  if (nu == 0) return;
+  checkDerivative(model.lux, H.bottomLeftCorner(nu, ndx));
+  checkDerivative(model.luu, H.bottomRightCorner(nu, nu));
+}
+
+// h: step in x; the one in u can be longer, as forces are linear in it.
+void checkStage(RobotProblem& problem, const Point& point, double h) {
+  StageModel model;
+  REQUIRE(problem.linearize(0, point.x, point.u, point.x_node, model) == StepStatus::Ok);
+  const VectorXd no_dx = VectorXd::Zero(problem.tangentSize(0)), no_du = VectorXd::Zero(point.u.size());
+  const Step here = calcStep(problem, 0, point, no_dx, no_du);
+  CHECK(model.cost == Approx(here.cost).epsilon(1e-13));
+  CHECK((model.gap - here.gap).cwiseAbs().maxCoeff() <= 1e-14 * (1 + here.gap.cwiseAbs().maxCoeff()));
+  const auto both = [](const Step& step) { return join(step.gap, VectorXd::Constant(1, step.cost)); };
+  const int n = problem.tangentSize(1);
+  const MatrixXd dx =
+      differentiate(no_dx, h, [&](const VectorXd& d) { return both(calcStep(problem, 0, point, d, no_du)); });
+  const MatrixXd du =
+      differentiate(no_du, 0.1, [&](const VectorXd& d) { return both(calcStep(problem, 0, point, no_dx, d)); });
+  checkDerivative(model.Fx.topRows(n / 2), dx.topRows(n / 2));
+  checkDerivative(model.Fx.bottomRows(n / 2), dx.middleRows(n / 2, n / 2));
+  checkDerivative(model.Fu.topRows(n / 2), du.topRows(n / 2));
+  checkDerivative(model.Fu.bottomRows(n / 2), du.middleRows(n / 2, n / 2));
+  checkDerivative(model.lx.transpose(), dx.bottomRows(1));
+  checkDerivative(model.lu.transpose(), du.bottomRows(1));
+  checkGaussNewton(problem, 0, point, model, h);
+}
+
+void checkTerminal(RobotProblem& problem, const VectorXd& x, double h) {
+  StageModel model;
+  const int node = problem.numStages();
+  REQUIRE(problem.linearizeTerminal(x, model) == StepStatus::Ok);
+  checkDerivative(model.lx.transpose(),
+                  differentiate(VectorXd::Zero(problem.tangentSize(node)), h, [&](const VectorXd& dx) {
+                    double cost = 0;
+                    REQUIRE(problem.calcTerminalCost(move(problem, node, x, dx), cost) == StepStatus::Ok);
+                    return VectorXd::Constant(1, cost);
+                  }));
+  checkGaussNewton(problem, node, {x, {}, {}}, model, h);
+}
+
+// The next node's state: where the step leads, moved away by `gap` in every coordinate.
+VectorXd makeNextNode(std::mt19937& rng, RobotProblem& problem, const VectorXd& x, const VectorXd& u, double gap) {
+  VectorXd next(problem.stateSize());
+  double cost = 0;
+  REQUIRE(problem.step(0, x, u, next, cost) == StepStatus::Ok);
+  return move(problem, 1, next, randomVector(rng, problem.tangentSize(1), gap));
+}
+
+}  // namespace
+
+TEST_CASE("shooting problem: random mechanisms of every joint kind, gaps closed, small and large") {
+  std::mt19937 rng(21);
+  for (JointKind kind : kJoints) {
+    const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer, 3, 2);
+    const Model& model = mechanism.model;
+    RobotProblem problem = makeProblem(rng, model, mechanism.q_closed, {{0, randomPlacement(rng), 5, 4}});
+    const VectorXd q = model.integrate(mechanism.q_closed, randomVector(rng, model.nv(), 0.1));
+    const VectorXd x = join(q, randomVector(rng, model.nv())), u = randomVector(rng, model.nu(), 5);
+    for (double gap : {0.0, 1e-3, 0.6}) {
+      CAPTURE(getName(kind), gap);
+      checkStage(problem, {x, u, makeNextNode(rng, problem, x, u, gap)}, 2e-4);
+    }
+    CAPTURE(getName(kind));
+    checkTerminal(problem, x, 5e-4);
+  }
+}
+
+TEST_CASE("shooting problem: a redundant planar four-bar") {
+  std::mt19937 rng(22);
+  const Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 0.7);
+  const Model& model = mechanism.model;
+  StageSpec stage;
+  stage.constraints = makeConstraintSet(model);
+  stage.state = makeRandomStateCost(rng, model, mechanism.q_closed);
+  stage.control = {0.3, VectorXd::Zero(1), VectorXd::Ones(1)};
+  StageSpec terminal = makeTerminal(rng, model, mechanism.q_closed);
+  std::vector<StageSpec> stages;
+  stages.push_back(std::move(stage));
+  stages.push_back(std::move(terminal));
+  RobotProblem problem(model, mechanism.q_closed, VectorXd::Zero(4), std::move(stages));
+  Workspace ws(model);
+  // Off the closures too: the four angles keep the loop planar, so the redundant rows never contradict one another.
+  const VectorXd v = randomVector(rng, 4), u = VectorXd::Constant(1, 0.4);
+  const VectorXd x = join(mechanism.q_closed, v);
+  checkStage(problem, {x, u, makeNextNode(rng, problem, x, u, 0.3)}, 2e-4);
+  checkTerminal(problem, x, 5e-4);
+}
+
+TEST_CASE("shooting problem: the squat of Bipetto, half sitting with velocities on the closures") {
+  std::mt19937 rng(23);
+  const Model model = loadRobot("bipetto").model;
+  SquatOptions options;
+  options.duration = 0.3;
+  const Motion motion = makeSquat(model, options);
+  RobotProblem& problem = *motion.problem;
+  const VectorXd q = problem.initialState().head(model.nq());
+  Workspace ws(model);
+  const VectorXd v = projectVelocity(model, ws, problem.spec(0).constraints, q, randomVector(rng, model.nv(), 0.5));
+  CHECK(v.norm() > 0.1);
+  const VectorXd x = join(q, v), u = motion.guess.us[0] + randomVector(rng, model.nu(), 1);
+  for (double gap : {0.0, 0.3}) {
+    CAPTURE(gap);
+    checkStage(problem, {x, u, makeNextNode(rng, problem, x, u, gap)}, 5e-5);
+  }
+  checkTerminal(problem, x, 5e-4);
+}
+
+TEST_CASE("shooting problem: steps and linearizations allocate nothing after the first") {
+  std::mt19937 rng(24);
+  const Model model = loadRobot("bipetto").model;
+  const VectorXd q = makeStandingPosture(model);
+  RobotProblem problem = makeProblem(rng, model, q, makeContactTargets(model, q, {0, 1}, 0, 100));
+  const VectorXd x = problem.initialState();
+  const VectorXd u = randomVector(rng, model.nu(), 1);
+  VectorXd x2 = move(problem, 0, x, randomVector(rng, 2 * model.nv(), 1e-3)), next = x, dx(2 * model.nv());
+  StageModel out, terminal;
+  double cost = 0;
+  const auto runAll = [&](const VectorXd& at) {
+    std::vector<long> counts(6, 0);
+    const auto measure = [&](int i, auto&& f) {
+      const long before = num_allocations;
+      f();
+      counts[i] = num_allocations - before;
+    };
+    measure(0, [&] { problem.step(0, at, u, next, cost); });
+    measure(1, [&] { problem.linearize(0, at, u, x, out); });
+    measure(2, [&] { problem.calcTerminalCost(at, cost); });
+    measure(3, [&] { problem.linearizeTerminal(at, terminal); });
+    measure(4, [&] { problem.difference(1, x, at, dx); });
+    measure(5, [&] { problem.integrate(1, x, dx, next); });
+    return counts;
+  };
+  const long before = num_allocations;
+  const VectorXd counted(100);
+  REQUIRE(num_allocations == before + 1);
+  runAll(x);
+  CHECK(runAll(x2) == std::vector<long>(6, 0));
+}
+
+TEST_CASE("shooting problem: what does not fit is refused, what is not finite fails") {
+  std::mt19937 rng(25);
+  const Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 0.7);
+  const Model& model = mechanism.model;
+  const VectorXd v = VectorXd::Zero(4);
+  const auto make = [&](const std::function<void(StageSpec&)>& spoil) {
+    std::vector<StageSpec> stages;
+    stages.push_back(makeTerminal(rng, model, mechanism.q_closed));
+    stages.push_back(makeTerminal(rng, model, mechanism.q_closed));
+    spoil(stages[0]);
+    return RobotProblem(model, mechanism.q_closed, v, std::move(stages));
+  };
+  CHECK_NOTHROW(make([](StageSpec&) {}));
+  CHECK_THROWS_AS(make([](StageSpec& s) { s.dt = 0; }), ModelError);
+  CHECK_THROWS_AS(make([](StageSpec& s) { s.state.weights.resize(3); }), ModelError);
+  CHECK_THROWS_AS(make([](StageSpec& s) { s.control.reference.resize(0); }), ModelError);
+  CHECK_THROWS_AS(make([](StageSpec& s) { s.costs[0].activation.weights.resize(2); }), ModelError);
+  CHECK_THROWS_AS(RobotProblem(model, mechanism.q_closed, VectorXd::Zero(3), {}), ModelError);
+  CHECK_THROWS_AS(RobotProblem(model, mechanism.q_closed, v, {}), ModelError);
+  RobotProblem problem = make([](StageSpec&) {});
+  VectorXd x = problem.initialState(), next = x;
+  const VectorXd u = VectorXd::Zero(1);
+  double cost = 0;
+  CHECK(problem.step(0, x, u, next, cost) == StepStatus::Ok);
+  x[1] = std::numeric_limits<double>::quiet_NaN();
+  CHECK(problem.step(0, x, u, next, cost) == StepStatus::Failed);
+  StageModel out;
+  CHECK(problem.linearize(0, x, u, next, out) == StepStatus::Failed);
+  CHECK(problem.calcTerminalCost(x, cost) == StepStatus::Failed);
+  CHECK(problem.linearizeTerminal(x, out) == StepStatus::Failed);
+}

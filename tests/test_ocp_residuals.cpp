@@ -1,0 +1,220 @@
+// Oracles: central differences in tangent space (fourth order), time derivatives, exponentials of what the residuals
+// take the logarithm of, a force applied at a known point. Every derivative test also sees a poisoned entry.
+#include <memory>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "bielle/model/reader.h"
+#include "bielle/ocp/cost.h"
+#include "check_derivative.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
+                                 JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
+                                 JointKind::FreeFlyer};
+constexpr double kStep = 5e-4;
+
+// A node at (q, v) with forces lambda.
+struct TestNode {
+  explicit TestNode(const Model& model, const ConstraintSet& set)
+      : model(model), set(set), ws(model), lambda(VectorXd::Zero(set.rows)) {}
+  VectorXd calc(const Residual& residual, const VectorXd& q, const VectorXd& v, const VectorXd& forces) {
+    move(q, v, forces);
+    VectorXd r(residual.size());
+    residual.calc(view(), r);
+    return r;
+  }
+  void move(const VectorXd& q, const VectorXd& v, const VectorXd& forces) {
+    updatePositions(model, ws, q);
+    updateVelocities(model, ws, v);
+    updateMassMatrix(model, ws);
+    lambda = forces;
+  }
+  NodeView view() const { return {model, ws, set, u, lambda}; }
+
+  const Model& model;
+  const ConstraintSet& set;
+  Workspace ws;
+  VectorXd u, lambda;
+};
+
+struct NamedResidual {
+  std::string name;
+  std::unique_ptr<Residual> residual;
+};
+
+// One of every kind. Two contacts are in force; `dofs` have one coordinate each.
+std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, const ConstraintSet& set,
+                                         const BodyFrame& a, const BodyFrame& b, const std::vector<int>& dofs) {
+  std::vector<NamedResidual> out;
+  const auto add = [&out](const std::string& name, std::unique_ptr<Residual> residual) {
+    out.push_back({name, std::move(residual)});
+  };
+  add("com position", makeComPosition(randomVector(rng, 3)));
+  add("com velocity", makeComVelocity(randomVector(rng, 3)));
+  add("frame placement", makeFramePlacement(a, randomPlacement(rng)));
+  add("frame translation", makeFrameTranslation(a, randomVector(rng, 3)));
+  add("frame rotation", makeFrameRotation(a, randomPlacement(rng).R));
+  add("frame velocity", makeFrameVelocity(a, randomVector(rng, 6)));
+  add("fly high", makeFlyHigh(a, 5, 0.1));
+  add("frame distance", makeFrameDistance(a, b));
+  for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
+    const int rows = getRows(set.closures[c].kind);
+    add("contact force", makeContactForce(set, c, randomVector(rng, rows, 10)));
+    add("friction pyramid", makeFrictionPyramid(set, c, 0.6));
+    if (rows == 6) add("centre of pressure", makeCenterOfPressure(set, c));
+  }
+  add("joint position", makeJointPosition(model, dofs));
+  add("joint velocity", makeJointVelocity(dofs));
+  return out;
+}
+
+void checkResidual(const Model& model, const ConstraintSet& set, const Residual& residual, const VectorXd& q,
+                   const VectorXd& v, const VectorXd& lambda) {
+  const int n = residual.size(), nv = model.nv();
+  MatrixXd dq = MatrixXd::Zero(n, nv), dv = dq, dlambda = MatrixXd::Zero(n, set.rows);
+  TestNode node(model, set);
+  // The Jacobian is written over that of another state: what it does not write must be zero everywhere.
+  std::mt19937 rng(99);
+  node.move(model.integrate(q, randomVector(rng, nv, 0.5)), v + randomVector(rng, nv), 2 * lambda);
+  residual.calcJacobian(node.view(), {dq, dv, dlambda});
+  node.move(q, v, lambda);
+  residual.calcJacobian(node.view(), {dq, dv, dlambda});
+  checkDerivative(
+      dq, differentiateTangent(model, q, kStep, [&](const VectorXd& x) { return node.calc(residual, x, v, lambda); }));
+  checkDerivative(dv, differentiate(v, kStep, [&](const VectorXd& x) { return node.calc(residual, q, x, lambda); }));
+  checkDerivative(dlambda,
+                  differentiate(lambda, 1e-2, [&](const VectorXd& x) { return node.calc(residual, q, v, x); }));
+  if (dlambda.cwiseAbs().maxCoeff() > 0) CHECK(residual.needsForces());
+}
+
+VectorXd makeForces(std::mt19937& rng, const ConstraintSet& set) {
+  VectorXd lambda = randomVector(rng, set.rows, 20);
+  for (size_t c = set.num_loops; c < set.closures.size(); ++c) lambda[set.offsets[c] + 2] = 50;
+  return lambda;
+}
+
+}  // namespace
+
+TEST_CASE("every residual against differences, on mechanisms of every joint kind") {
+  std::mt19937 rng(11);
+  for (JointKind kind : kJoints) {
+    const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer);
+    const Model& model = mechanism.model;
+    const ConstraintSet set = makeConstraintSet(model, {{0, {}, 0, 0}, {1, {}, 0, 0}});
+    const std::vector<int> dofs = {model.joints()[model.findJoint("joint_a1")].idx_v,
+                                   model.joints()[model.findJoint("joint_b2")].idx_v};
+    const BodyFrame a{model.frames()[model.findFrame("a2k")].body, randomPlacement(rng)};
+    const BodyFrame b{model.frames()[model.findFrame("b1k")].body, randomPlacement(rng)};
+    const VectorXd q = model.integrate(mechanism.q_closed, randomVector(rng, model.nv(), 0.1));
+    const VectorXd v = randomVector(rng, model.nv(), 1), lambda = makeForces(rng, set);
+    for (const NamedResidual& entry : makeResiduals(rng, model, set, a, b, dofs)) {
+      CAPTURE(getName(kind), entry.name);
+      checkResidual(model, set, *entry.residual, q, v, lambda);
+    }
+  }
+}
+
+TEST_CASE("every residual against differences, on Bipetto in motion") {
+  std::mt19937 rng(12);
+  const Model model = loadRobot("bipetto").model;
+  const ConstraintSet set = makeConstraintSet(model, {{0, {}, 0, 0}, {1, {}, 0, 0}});
+  const VectorXd q = assembleReference(model, "half_sitting").q;
+  const VectorXd v = randomVector(rng, model.nv(), 1), lambda = makeForces(rng, set);
+  const BodyFrame left = getBodyFrame(model, "foot_left"), right = getBodyFrame(model, "foot_right");
+  for (const NamedResidual& entry : makeResiduals(rng, model, set, left, right, {})) {
+    CAPTURE(entry.name);
+    if (entry.residual->size() > 0) checkResidual(model, set, *entry.residual, q, v, lambda);
+  }
+}
+
+TEST_CASE("frame residuals: exponentials give the placement back, velocities are time derivatives") {
+  std::mt19937 rng(13);
+  const Mechanism mechanism =
+      makeRandomMechanism(rng, JointKind::Spherical, ClosureKind::Ball3D, MechanismBase::FreeFlyer);
+  const Model& model = mechanism.model;
+  const ConstraintSet set = makeConstraintSet(model);
+  const BodyFrame frame = getBodyFrame(model, "tip2");
+  const VectorXd q = mechanism.q_closed, v = randomVector(rng, model.nv()), lambda = VectorXd::Zero(set.rows);
+  const SE3 X_WT = randomPlacement(rng);
+  TestNode node(model, set);
+  const VectorXd placement = node.calc(*makeFramePlacement(frame, X_WT), q, v, lambda);
+  const SE3 X_WF = getPlacement(node.ws, frame.body, frame.X_BF), again = X_WT * exp6(placement);
+  CHECK((again.p - X_WF.p).norm() < 1e-12);
+  CHECK((again.R - X_WF.R).norm() < 1e-12);
+  const Vector3d rotation = node.calc(*makeFrameRotation(frame, X_WT.R), q, v, lambda);
+  CHECK((X_WT.R * exp3(rotation) - X_WF.R).norm() < 1e-12);
+  const VectorXd offset = node.calc(*makeFrameTranslation(frame, X_WT.p), q, v, lambda);
+  CHECK((offset - (X_WF.p - X_WT.p)).norm() < 1e-14);
+
+  const VectorXd velocity = node.calc(*makeFrameVelocity(frame), q, v, lambda);
+  const auto along = [&](const Residual& residual) {
+    return VectorXd(differentiate(VectorXd::Zero(1), 1e-3, [&](const VectorXd& t) {
+      return node.calc(residual, model.integrate(q, t[0] * v), v, lambda);
+    }));
+  };
+  CHECK(calcRelativeError(velocity.head<3>(), along(*makeFrameTranslation(frame, X_WT.p))) < 1e-9);
+  // With the target at the present rotation, the rate of Log3 is the angular velocity in the axes of the frame.
+  CHECK(calcRelativeError(velocity.tail<3>(), X_WF.R * along(*makeFrameRotation(frame, X_WF.R))) < 1e-9);
+  CHECK(calcRelativeError(node.calc(*makeComVelocity(Vector3d::Zero()), q, v, lambda),
+                          along(*makeComPosition(Vector3d::Zero()))) < 1e-9);
+  const VectorXd flight = node.calc(*makeFlyHigh(frame, 5, 0.1), q, v, lambda);
+  CHECK((flight - velocity.head<2>() * std::exp(-5 * (X_WF.p.z() - 0.1))).norm() < 1e-12);
+}
+
+TEST_CASE("force residuals: a force at a known point of the sole") {
+  const Model model = loadRobot("bipetto").model;
+  const ConstraintSet set = makeConstraintSet(model, {{0, {}, 0, 0}, {1, {}, 0, 0}});
+  const int constraint = set.num_loops + 1, row = set.offsets[constraint];
+  const Vector3d point(0.03, -0.02, 0), force(-20, 10, 100);
+  VectorXd lambda = VectorXd::Constant(set.rows, 7);  // the other feet and loops do not matter
+  lambda.segment<3>(row) = force;
+  lambda.segment<3>(row + 3) = point.cross(force);
+  TestNode node(model, set);
+  const VectorXd q = model.makeNeutral(), v = VectorXd::Zero(model.nv());
+  const VectorXd pressure = node.calc(*makeCenterOfPressure(set, constraint), q, v, lambda);
+  CHECK((pressure - point.head<2>()).norm() < 1e-14);
+  const VectorXd pyramid = node.calc(*makeFrictionPyramid(set, constraint, 0.5), q, v, lambda);
+  CHECK((pyramid - Eigen::Vector4d(70, 30, 40, 60)).norm() < 1e-12);
+  lambda[row + 2] = 0.5;  // hardly loaded: bounded, and its derivative follows
+  CHECK(node.calc(*makeCenterOfPressure(set, constraint), q, v, lambda).allFinite());
+  checkResidual(model, set, *makeCenterOfPressure(set, constraint), q, v, lambda);
+}
+
+TEST_CASE("joint positions without a list are those of the joints with finite limits") {
+  const Model model = loadRobot("bipetto").model;
+  const auto residual = makeJointPosition(model, {});
+  int limited = 0;
+  for (int k = 0; k < model.nv(); ++k)
+    limited += std::isfinite(model.lowerLimits()[k]) || std::isfinite(model.upperLimits()[k]);
+  CHECK(limited > 0);
+  CHECK(residual->size() == limited);
+}
+
+TEST_CASE("activations: derivatives against differences, a barrier is flat inside") {
+  const VectorXd weights = Eigen::Vector4d(1, 2, 0.5, 3);
+  const VectorXd lower = Eigen::Vector4d(-1, -1, -1, -std::numeric_limits<double>::infinity());
+  const VectorXd upper = Eigen::Vector4d(1, 1, 1, 2);
+  const VectorXd r = Eigen::Vector4d(0.5, 1.5, -2, 3);
+  for (const Activation& activation :
+       {Activation::makeQuadratic(weights), Activation::makeBarrier(weights, lower, upper)}) {
+    VectorXd gradient(4), hessian(4), unused(4);
+    activation.calcDerivatives(r, gradient, hessian);
+    checkDerivative(gradient.transpose(), differentiate(r, 1e-2, [&](const VectorXd& x) {
+                      return VectorXd::Constant(1, activation.calc(x));
+                    }));
+    checkDerivative(hessian.asDiagonal(), differentiate(r, 1e-2, [&](const VectorXd& x) {
+                      VectorXd g(4);
+                      activation.calcDerivatives(x, g, unused);
+                      return g;
+                    }));
+  }
+  const Activation barrier = Activation::makeBarrier(weights, lower, upper);
+  CHECK(barrier.calc(r) == Approx(0.5 * (2 * 0.25 + 0.5 * 1 + 3 * 1)));
+  CHECK(barrier.calc(Eigen::Vector4d(-1, 1, 0, -1e9)) == 0);
+}
