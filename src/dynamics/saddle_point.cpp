@@ -43,7 +43,7 @@ void SaddlePoint::solve(const VectorXd& f, const VectorXd& g, VectorXd& a, Vecto
   if (J_.rows() == 0) return;
   rhs_ = -g;
   rhs_.noalias() -= J_ * a;
-  rhs_ = rhs_.cwiseProduct(D_).eval();
+  rhs_.array() *= D_.array();
   lambda = rhs_;
   G_llt_.solveInPlace(lambda);
   const int iterations = redundant_ ? options_.max_iterations : 2;  // a direct solution is refined once
@@ -54,7 +54,7 @@ void SaddlePoint::solve(const VectorXd& f, const VectorXd& g, VectorXd& a, Vecto
     lambda += correction_;  // Eq. (3)
     if (correction_.norm() <= options_.tolerance * lambda.norm()) break;
   }
-  lambda = lambda.cwiseProduct(D_).eval();
+  lambda.array() *= D_.array();
   a = f;
   a.noalias() += J_.transpose() * lambda;
   M_llt_.solveInPlace(a);
