@@ -43,6 +43,16 @@ std::vector<Vector6d> expandForces(const ConstraintSet& set, ConstVectorRef lamb
   return out;
 }
 
+// Orthonormal basis of the x with A x = 0.
+MatrixXd calcNullSpace(const MatrixXd& A) {
+  if (A.rows() == 0) return MatrixXd::Identity(A.cols(), A.cols());
+  const Eigen::JacobiSVD<MatrixXd> svd(A, Eigen::ComputeFullV);
+  const auto& sigma = svd.singularValues();
+  return svd.matrixV().rightCols(A.cols() - (sigma.array() > 1e-7 * sigma[0]).count());
+}
+
+bool isRedundant(const MatrixXd& J) { return calcNullSpace(J.transpose()).cols() > 0; }
+
 // df/dt at t = 0, with Richardson's extrapolation.
 VectorXd differentiate(double h, const std::function<VectorXd(double)>& f) {
   const VectorXd d1 = (f(h) - f(-h)) / (2 * h), d2 = (f(2 * h) - f(-2 * h)) / (4 * h);
@@ -199,28 +209,20 @@ class Comparison {
     const DynamicsStatus status = updateConstrainedDynamics(model, ws, cws, set, sample.q, sample.v, sample.tau);
     if (status != DynamicsStatus::Ok) cws.a.setConstant(std::numeric_limits<double>::quiet_NaN());
     const std::string suffix = ", " + label;
-    const VectorXd free_force = sample.tau - ws.b, free = cws.M_llt.solve(free_force);
+    const VectorXd free_force = sample.tau - ws.b, free = ws.M.llt().solve(free_force);
     const double force = kFloor * free_force.cwiseAbs().maxCoeff();
     const double tolerance = std::max(options_.tolerance, theirs.rounding);
     add("accelerations" + suffix, cws.a, theirs.a, kFloor * free.cwiseAbs().maxCoeff(), tolerance);
     if (set.rows == 0) return false;
     add("constraint forces J'lambda" + suffix, cws.J.transpose() * cws.lambda, theirs.constraint_force, force,
         tolerance);
-    if (cws.saddle_point.isRedundant()) return true;
+    if (isRedundant(cws.J)) return true;
     const std::vector<Vector6d> ours = expandForces(set, cws.lambda);
     add("closure forces" + suffix, stack(ours, 0, set.num_loops), stack(theirs.wrenches, 0, set.num_loops), force,
         tolerance);
     add("foot forces" + suffix, stack(ours, set.num_loops, ours.size()),
         stack(theirs.wrenches, set.num_loops, ours.size()), force, tolerance);
     return false;
-  }
-
-  // Directions that keep closures and contacts, nv x n.
-  static MatrixXd calcNullSpace(const MatrixXd& J, int nv) {
-    if (J.rows() == 0) return MatrixXd::Identity(nv, nv);
-    const Eigen::JacobiSVD<MatrixXd> svd(J, Eigen::ComputeFullV);
-    const auto& sigma = svd.singularValues();
-    return svd.matrixV().rightCols(nv - (sigma.array() > 1e-8 * sigma[0]).count());
   }
 
   void compareDerivatives(const Sample& sample, const ConstraintSet& set, bool redundant, SimbodyBridge& simbody) {
@@ -244,7 +246,7 @@ class Comparison {
       if (nw > 0) out.tail(nw) = stack(expandForces(set, dlambda), 0, nw / 6).reshaped();
       return out;
     };
-    const MatrixXd N = calcNullSpace(cws.J, nv);
+    const MatrixXd N = calcNullSpace(cws.J);
     const int n = static_cast<int>(N.cols());
     MatrixXd dq(nv + nw, n), dq_s(dq), dv(dq), dv_s(dq), du(nv + nw, nu), du_s(du);
     for (int k = 0; k < n; ++k) {
@@ -272,7 +274,7 @@ class Comparison {
     const double tolerance = options_.derivative_tolerance;
     MatrixXd B = MatrixXd::Zero(nv, nu);
     for (int m = 0; m < nu; ++m) B(model_.motors()[m].dof, m) = 1;
-    const double response = nu > 0 ? kFloor * MatrixXd(cws.M_llt.solve(B)).cwiseAbs().maxCoeff() : 0;
+    const double response = nu > 0 ? kFloor * MatrixXd(ws.M.llt().solve(B)).cwiseAbs().maxCoeff() : 0;
     const double a = kFloor * cws.a.cwiseAbs().maxCoeff(), force = kFloor * (sample.tau - ws.b).cwiseAbs().maxCoeff();
     add("da/dq along the closures", dq.topRows(nv), dq_s.topRows(nv), a, tolerance);
     add("da/dv along the closures", dv.topRows(nv), dv_s.topRows(nv), a, tolerance);

@@ -1,5 +1,7 @@
 #include "bielle/dynamics/saddle_point.h"
 
+#include <cmath>
+
 namespace bielle {
 
 void SaddlePoint::resize(int n, int m) {
@@ -20,9 +22,10 @@ SaddlePointStatus SaddlePoint::factorize(const MatrixXd& M, const MatrixXd& J, c
   J_ = J;
   W_ = J.transpose();
   M_llt_.matrixL().solveInPlace(W_);
+  const double largest = std::sqrt(W_.colwise().squaredNorm().maxCoeff());
   for (Eigen::Index i = 0; i < W_.cols(); ++i) {
     const double norm = W_.col(i).norm();
-    D_[i] = norm > 1e-14 ? 1 / norm : 0;  // a row that nothing moves has no force
+    D_[i] = norm > 1e-11 * largest ? 1 / norm : 0;  // a row that nothing moves, up to rounding, has no force
     W_.col(i) *= D_[i];
   }
   G_.noalias() = W_.transpose() * W_;
