@@ -2,6 +2,7 @@
 // An analytic derivative against differences, for Catch2 tests.
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <string>
 
 #include "mechanisms.h"
 
@@ -10,7 +11,8 @@ namespace bielle::testing {
 constexpr double kDerivativeTolerance = 1e-6;
 
 /// Passes when close, and when adding a thousandth of the largest entry anywhere would be seen.
-inline void checkDerivative(const MatrixXd& analytic, const MatrixXd& numeric) {
+inline void checkDerivative(const MatrixXd& analytic, const MatrixXd& numeric, const std::string& name = "") {
+  CAPTURE(name);
   REQUIRE(analytic.rows() == numeric.rows());
   REQUIRE(analytic.cols() == numeric.cols());
   if (numeric.size() == 0) return;

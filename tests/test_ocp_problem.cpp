@@ -152,13 +152,13 @@ void checkGaussNewton(RobotProblem& problem, int node, const Point& point, const
   });
   if (nu > 0)
     J.rightCols(nu) = differentiate(
-        point.u, 1, [&](const VectorXd& u) { return calcWeightedResiduals(problem, node, point.x, u, curvature); });
+        point.u, 0.05, [&](const VectorXd& u) { return calcWeightedResiduals(problem, node, point.x, u, curvature); });
   const MatrixXd H = J.transpose() * J;
-  checkDerivative(model.lxx, H.topLeftCorner(ndx, ndx));
+  checkDerivative(model.lxx, H.topLeftCorner(ndx, ndx), "lxx");
   CHECK((model.lxx - model.lxx.transpose()).cwiseAbs().maxCoeff() <= 1e-14 * model.lxx.cwiseAbs().maxCoeff());
   if (nu == 0) return;
-  checkDerivative(model.lux, H.bottomLeftCorner(nu, ndx));
-  checkDerivative(model.luu, H.bottomRightCorner(nu, nu));
+  checkDerivative(model.lux, H.bottomLeftCorner(nu, ndx), "lux");
+  checkDerivative(model.luu, H.bottomRightCorner(nu, nu), "luu");
 }
 
 // h: step in x; the one in u can be longer, as forces are linear in it.
@@ -175,12 +175,12 @@ void checkStage(RobotProblem& problem, const Point& point, double h) {
       differentiate(no_dx, h, [&](const VectorXd& d) { return both(calcStep(problem, 0, point, d, no_du)); });
   const MatrixXd du =
       differentiate(no_du, 0.1, [&](const VectorXd& d) { return both(calcStep(problem, 0, point, no_dx, d)); });
-  checkDerivative(model.Fx.topRows(n / 2), dx.topRows(n / 2));
-  checkDerivative(model.Fx.bottomRows(n / 2), dx.middleRows(n / 2, n / 2));
-  checkDerivative(model.Fu.topRows(n / 2), du.topRows(n / 2));
-  checkDerivative(model.Fu.bottomRows(n / 2), du.middleRows(n / 2, n / 2));
-  checkDerivative(model.lx.transpose(), dx.bottomRows(1));
-  checkDerivative(model.lu.transpose(), du.bottomRows(1));
+  checkDerivative(model.Fx.topRows(n / 2), dx.topRows(n / 2), "Fx, q");
+  checkDerivative(model.Fx.bottomRows(n / 2), dx.middleRows(n / 2, n / 2), "Fx, v");
+  checkDerivative(model.Fu.topRows(n / 2), du.topRows(n / 2), "Fu, q");
+  checkDerivative(model.Fu.bottomRows(n / 2), du.middleRows(n / 2, n / 2), "Fu, v");
+  checkDerivative(model.lx.transpose(), dx.bottomRows(1), "lx");
+  checkDerivative(model.lu.transpose(), du.bottomRows(1), "lu");
   checkGaussNewton(problem, 0, point, model, h);
 }
 
