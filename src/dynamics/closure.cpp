@@ -151,6 +151,16 @@ void calcClosureDerivatives(const Workspace& ws, const Closure& c, MatrixRef da_
   }
 }
 
+void calcClosureVelocityDerivative(const Workspace& ws, const Closure& c, MatrixRef dnu_dq) {
+  requireStage(ws, WorkspaceStage::Velocity, "calcClosureVelocityDerivative", "updateVelocities");
+  const SE3 X_W1 = getFrame1(ws, c);
+  for (size_t i = 0; i < c.dofs.size(); ++i) {
+    const int k = c.dofs[i];
+    const Vector6d dnu = ws.dV.col(k) + crossMotion(ws.J.col(k), ws.V[c.body2]);  // Eq. (3)
+    dnu_dq.col(k) = c.signs[i] * selectRows(c, X_W1.actInvMotion(dnu));
+  }
+}
+
 Vector6d calcClosureWrench(const Workspace& ws, const Closure& c, ConstVectorRef lambda) {
   return getFrame1(ws, c).actForce(expandRows(c, lambda));
 }
@@ -162,6 +172,24 @@ void addClosureForceDerivative(const Model& model, const Workspace& ws, const Cl
     const int k = c.dofs[i];
     const Vector6d moved = c.signs[i] * crossForce(ws.J.col(k), wrench);
     for (int j : model.supportDofs(c.body2)) dID_dq(j, k) += ws.J.col(j).dot(moved);  // Eq. (5)
+  }
+}
+
+void addGeneralizedForceDerivative(const Model& model, const Workspace& ws, const Closure& c, const Vector6d& wrench,
+                                   MatrixRef out) {
+  const std::vector<Dof>& dofs = model.dofs();
+  for (size_t ik = 0; ik < c.dofs.size(); ++ik) {
+    const int k = c.dofs[ik];
+    const Vector6d moved = crossForce(ws.J.col(k), wrench);
+    const bool moves_frame1 = c.signs[ik] > 0;
+    for (size_t ij = 0; ij < c.dofs.size(); ++ij) {
+      const int j = c.dofs[ij];
+      const bool same_joint = dofs[j].joint == dofs[k].joint;
+      const bool moves_axis = same_joint ? !(dofs[j].first_of_universal && dofs[k].second_of_universal)
+                                         : model.isAncestorOrSelf(dofs[k].joint, dofs[j].joint);
+      if (moves_frame1 != moves_axis)
+        out(j, k) += (moves_frame1 ? c.signs[ij] : -c.signs[ij]) * ws.J.col(j).dot(moved);  // Eq. (6)
+    }
   }
 }
 

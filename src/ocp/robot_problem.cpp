@@ -2,17 +2,12 @@
 
 #include <cmath>
 
-#include "bielle/dynamics/kinematics.h"
-#include "bielle/dynamics/rnea.h"
+#include "bielle/dynamics/reduction.h"
 #include "bielle/model/error.h"
+#include "node_model.h"
 
 namespace bielle {
 namespace {
-
-// Joints whose configuration is not a vector: their blocks of the manifold Jacobians differ from the identity.
-bool isCurved(const Joint& joint) {
-  return joint.kind == JointKind::Spherical || joint.kind == JointKind::Planar || joint.kind == JointKind::FreeFlyer;
-}
 
 void checkSpec(const Model& model, const StageSpec& spec, size_t index) {
   const std::string element = "stage " + std::to_string(index);
@@ -36,85 +31,69 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index) {
 
 }  // namespace
 
-// Memory of one node: the last evaluated point and everything computed there.
+const char* getName(Formulation formulation) { return formulation == Formulation::Full ? "full" : "reduced"; }
+
+// The point a node was last evaluated at, its dynamics and its stacked residuals.
 struct RobotProblem::Node {
-  Node(const Model& model, const StageSpec& spec) : ws(model) {
-    int rows = 0;
-    for (const Cost& cost : spec.costs) rows += cost.residual->size();
-    r.setZero(rows);
-    gradient.setZero(rows);
-    hessian.setZero(rows);
-    Rq.setZero(rows, model.nv());
-    Rv.setZero(rows, model.nv());
-    Rlambda.setZero(rows, spec.constraints.rows);
-    Rx.setZero(rows, 2 * model.nv());
-    Ru.setZero(rows, model.nu());
-    scaled_x.setZero(rows, 2 * model.nv());
-    scaled_u.setZero(rows, model.nu());
-    tau.setZero(model.nv());
-    difference.setZero(model.nv());
-    x_next.setZero(model.nq() + model.nv());
-  }
-  Workspace ws;
-  ConstrainedWorkspace cws;
-  VectorXd x, u, x_next, tau;
+  VectorXd x, u;
   bool valid = false;
-  VectorXd r, gradient, hessian;        // stacked residuals
-  MatrixXd Rq, Rv, Rlambda;             // their partial derivatives
-  MatrixXd Rx, Ru, scaled_x, scaled_u;  // total derivatives; the same times the Hessian
+  std::unique_ptr<NodeModel> dynamics;
+  ResidualStack stack;
   VectorXd difference;
 };
 
-RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages)
-    : model_(model), specs_(std::move(stages)) {
+RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages,
+                           Formulation formulation)
+    : model_(model), formulation_(formulation), specs_(std::move(stages)) {
   if (specs_.empty())
     throw ModelError(model.name(), "shooting problem", "it has no stage", "give at least the terminal one");
   if (q0.size() != model.nq() || v0.size() != model.nv())
     throw ModelError(model.name(), "shooting problem", "the initial state has a wrong size", "q0: nq, v0: nv");
   for (size_t k = 0; k < specs_.size(); ++k) checkSpec(model, specs_[k], k);
-  nodes_.reserve(specs_.size());
-  for (const StageSpec& spec : specs_) nodes_.emplace_back(model, spec);
+  if (formulation == Formulation::Reduced) reduction_ = std::make_unique<Reduction>(makeReduction(model, q0));
+  nodes_.resize(specs_.size());
+  for (size_t k = 0; k < specs_.size(); ++k) {
+    const StageSpec& spec = specs_[k];
+    Node& node = nodes_[k];
+    node.dynamics = reduction_ ? makeReducedNode(model, *reduction_, spec) : makeFullNode(model, spec);
+    node.difference.setZero(model.nv());
+    int rows = 0;
+    for (const Cost& cost : spec.costs) rows += cost.residual->size();
+    for (VectorXd* v : {&node.stack.r, &node.stack.gradient, &node.stack.hessian}) v->setZero(rows);
+    for (MatrixXd* m : {&node.stack.q, &node.stack.v}) m->setZero(rows, model.nv());
+    node.stack.lambda.setZero(rows, spec.constraints.rows);
+  }
+  tangent_size_ = nodes_.front().dynamics->tangentSize();
   x0_.resize(stateSize());
   x0_ << q0, v0;
 }
 
 RobotProblem::~RobotProblem() = default;
 
-void RobotProblem::integrate(int, ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) const {
-  model_.integrate(x.head(model_.nq()), dx.head(model_.nv()), x_out.head(model_.nq()));
-  x_out.tail(model_.nv()) = x.tail(model_.nv()) + dx.tail(model_.nv());
+void RobotProblem::integrate(int node, ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) const {
+  nodes_[node].dynamics->integrate(x, dx, x_out);
 }
 
-void RobotProblem::difference(int, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const {
-  model_.difference(x0.head(model_.nq()), x1.head(model_.nq()), dx.head(model_.nv()));
-  dx.tail(model_.nv()) = x1.tail(model_.nv()) - x0.tail(model_.nv());
+void RobotProblem::difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const {
+  nodes_[node].dynamics->difference(x0, x1, dx);
 }
 
 // Dynamics and next state at (x, u), unless they are already there.
 StepStatus RobotProblem::evaluate(int stage, ConstVectorRef x, ConstVectorRef u) {
   Node& node = nodes_[stage];
-  const StageSpec& spec = specs_[stage];
   if (node.valid && node.x == x && node.u == u) return StepStatus::Ok;
   node.valid = false;
   node.x = x;
   node.u = u;
   if (!x.allFinite() || !u.allFinite()) return StepStatus::Failed;
-  const int nq = model_.nq(), nv = model_.nv();
-  calcMotorForces(model_, u, node.tau);
-  if (updateConstrainedDynamics(model_, node.ws, node.cws, spec.constraints, x.head(nq), x.tail(nv), node.tau) !=
-      DynamicsStatus::Ok)
-    return StepStatus::Failed;
-  node.x_next.tail(nv) = x.tail(nv) + spec.dt * node.cws.a;  // Eq. (1)
-  node.tau = spec.dt * node.x_next.tail(nv);
-  model_.integrate(x.head(nq), node.tau, node.x_next.head(nq));
-  if (!node.x_next.allFinite()) return StepStatus::Failed;
+  if (!node.dynamics->updateStep(x, u) || !node.dynamics->x_next().allFinite()) return StepStatus::Failed;
   node.valid = true;
   return StepStatus::Ok;
 }
 
 StepStatus RobotProblem::step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) {
   if (evaluate(stage, x, u) != StepStatus::Ok) return StepStatus::Failed;
-  x_next = nodes_[stage].x_next;
+  x_next = nodes_[stage].dynamics->x_next();
   cost = specs_[stage].dt * sumCosts(stage);
   return std::isfinite(cost) ? StepStatus::Ok : StepStatus::Failed;
 }
@@ -124,10 +103,8 @@ StepStatus RobotProblem::calcTerminalCost(ConstVectorRef x, double& cost) {
   if (!x.allFinite()) return StepStatus::Failed;
   if (!node.valid || node.x != x) {
     node.x = x;
-    updatePositions(model_, node.ws, x.head(model_.nq()));
-    updateVelocities(model_, node.ws, x.tail(model_.nv()));
-    updateMassMatrix(model_, node.ws);
-    node.valid = true;
+    node.valid = node.dynamics->updateState(x);
+    if (!node.valid) return StepStatus::Failed;
   }
   cost = sumCosts(numStages());
   return std::isfinite(cost) ? StepStatus::Ok : StepStatus::Failed;
@@ -150,10 +127,10 @@ double RobotProblem::sumCosts(int index, std::vector<CostValue>* values) {
   }
   if (spec.control.weight != 0 && node.u.size())
     add("control", 0.5 * spec.control.weight * (node.u - spec.control.reference).cwiseAbs2().dot(spec.control.weights));
-  const NodeView view{model_, node.ws, spec.constraints, node.u, node.cws.lambda};
+  const NodeView view{model_, node.dynamics->workspace(), spec.constraints, node.u, node.dynamics->lambda()};
   int row = 0;
   for (const Cost& cost : spec.costs) {
-    auto r = node.r.segment(row, cost.residual->size());
+    auto r = node.stack.r.segment(row, cost.residual->size());
     cost.residual->calc(view, r);
     add(cost.name, cost.weight * cost.activation.calc(r));
     row += cost.residual->size();
@@ -163,141 +140,59 @@ double RobotProblem::sumCosts(int index, std::vector<CostValue>* values) {
 
 StepStatus RobotProblem::linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
                                    StageModel& out) {
-  const StageSpec& spec = specs_[stage];
-  Node& node = nodes_[stage];
-  const int nv = model_.nv(), nq = model_.nq();
   if (evaluate(stage, x, u) != StepStatus::Ok) return StepStatus::Failed;
-  if (updateConstrainedDerivatives(model_, node.ws, node.cws, spec.constraints) != DynamicsStatus::Ok)
-    return StepStatus::Failed;
-  if (out.Fx.rows() != 2 * nv || out.Fu.cols() != model_.nu()) out.resize(2 * nv, model_.nu(), 2 * nv);
-
-  // Eq. (2), for joints whose configuration is a vector: J_q and J_d are the identity.
-  const double h = spec.dt;
-  auto Fv_q = out.Fx.bottomLeftCorner(nv, nv), Fv_v = out.Fx.bottomRightCorner(nv, nv);
-  Fv_q = h * node.cws.da_dq;
-  Fv_v = h * node.cws.da_dv;
-  Fv_v.diagonal().array() += 1;
-  out.Fu.bottomRows(nv) = h * node.cws.da_du;
-  out.Fx.topRows(nv) = h * out.Fx.bottomRows(nv);
-  out.Fx.topLeftCorner(nv, nv).diagonal().array() += 1;
-  out.Fu.topRows(nv) = h * out.Fu.bottomRows(nv);
-  difference(stage + 1, x_next_node, node.x_next, out.gap);
-  // Curved joints, and the Jacobian of the difference to the node state where a gap is open.
-  Matrix6d Jq, Jd, Jdiff;
-  for (const Joint& joint : model_.joints()) {
-    if (!isCurved(joint)) continue;
-    const int i = joint.idx_v, n = joint.nv;
-    auto q = Jq.topLeftCorner(n, n), d = Jd.topLeftCorner(n, n), diff = Jdiff.topLeftCorner(n, n);
-    const Vector6d step_full = [&] {
-      Vector6d s = Vector6d::Zero();
-      s.head(n) = h * node.x_next.segment(nq + i, n);
-      return s;
-    }();
-    calcJointIntegrateJacobians(joint, step_full.head(n), q, d);
-    calcJointDifferenceJacobian(joint, out.gap.segment(i, n), diff);
-    const Matrix6d product = [&] {
-      Matrix6d p = Matrix6d::Zero();
-      p.topLeftCorner(n, n) = h * diff * d;
-      return p;
-    }();
-    out.Fx.middleRows(i, n).noalias() = product.topLeftCorner(n, n) * out.Fx.middleRows(nv + i, n);
-    out.Fx.block(i, i, n, n) += diff * q;
-    out.Fu.middleRows(i, n).noalias() = product.topLeftCorner(n, n) * out.Fu.middleRows(nv + i, n);
-  }
-
+  if (out.Fx.rows() != tangent_size_ || out.Fu.cols() != model_.nu())
+    out.resize(tangent_size_, model_.nu(), tangent_size_);
+  if (!nodes_[stage].dynamics->linearizeStep(x_next_node, out)) return StepStatus::Failed;
+  const double h = specs_[stage].dt;
   out.cost = h * sumCosts(stage);
   out.lx.setZero();
   out.lu.setZero();
   out.lxx.setZero();
   out.lux.setZero();
   out.luu.setZero();
-  addStateCost(stage, h, out);
-  if (spec.control.weight != 0) {
-    const double w = h * spec.control.weight;
-    out.lu += w * spec.control.weights.cwiseProduct(u - spec.control.reference);
-    out.luu.diagonal() += w * spec.control.weights;
+  const ControlCost& control = specs_[stage].control;
+  if (control.weight != 0) {
+    const double w = h * control.weight;
+    out.lu += w * control.weights.cwiseProduct(u - control.reference);
+    out.luu.diagonal() += w * control.weights;
   }
-  addResidualCosts(stage, h, out);
+  addCosts(stage, h, out);
   return out.Fx.allFinite() && out.lxx.allFinite() ? StepStatus::Ok : StepStatus::Failed;
 }
 
 StepStatus RobotProblem::linearizeTerminal(ConstVectorRef x, StageModel& out) {
   double cost = 0;
   if (calcTerminalCost(x, cost) != StepStatus::Ok) return StepStatus::Failed;
-  if (out.lx.size() != 2 * model_.nv()) out.resize(2 * model_.nv(), 0, 0);
+  if (out.lx.size() != tangent_size_) out.resize(tangent_size_, 0, 0);
+  nodes_.back().dynamics->linearizeState();
   out.cost = cost;
   out.lx.setZero();
   out.lxx.setZero();
-  addStateCost(numStages(), 1, out);
-  addResidualCosts(numStages(), 1, out);
+  addCosts(numStages(), 1, out);
   return out.lxx.allFinite() ? StepStatus::Ok : StepStatus::Failed;
 }
 
-void RobotProblem::addStateCost(int index, double scale, StageModel& out) const {
-  const StateCost& state = specs_[index].state;
-  if (state.weight == 0) return;
-  const Node& node = nodes_[index];
-  const int nv = model_.nv(), nq = model_.nq();
-  const double w = scale * state.weight;
-  out.lx.tail(nv) += w * state.weights.tail(nv).cwiseProduct(node.x.tail(nv) - state.v_ref);
-  out.lxx.diagonal().tail(nv) += w * state.weights.tail(nv);
-  Vector6d d = Vector6d::Zero(), weighted = Vector6d::Zero();
-  Matrix6d J, WJ;
-  for (const Joint& joint : model_.joints()) {
-    if (joint.nv == 0) continue;
-    const int i = joint.idx_v, n = joint.nv;
-    const auto weights = w * state.weights.segment(i, n);
-    calcJointDifference(joint, state.q_ref.segment(joint.idx_q, joint.nq),
-                        node.x.head(nq).segment(joint.idx_q, joint.nq), d.head(n));
-    weighted.head(n) = weights.cwiseProduct(d.head(n));
-    if (!isCurved(joint)) {
-      out.lx.segment(i, n) += weighted.head(n);
-      out.lxx.diagonal().segment(i, n) += weights;
-      continue;
-    }
-    calcJointDifferenceJacobian(joint, d.head(n), J.topLeftCorner(n, n));
-    out.lx.segment(i, n).noalias() += J.topLeftCorner(n, n).transpose() * weighted.head(n);
-    WJ.topLeftCorner(n, n) = weights.asDiagonal() * J.topLeftCorner(n, n);
-    out.lxx.block(i, i, n, n).noalias() += J.topLeftCorner(n, n).transpose().lazyProduct(WJ.topLeftCorner(n, n));
-  }
-}
-
-void RobotProblem::addResidualCosts(int index, double scale, StageModel& out) {
+// Gradient and Hessian of the state cost and of the residual costs, the residuals being those of the last sumCosts().
+void RobotProblem::addCosts(int index, double scale, StageModel& out) {
   Node& node = nodes_[index];
   const StageSpec& spec = specs_[index];
+  if (spec.state.weight != 0) node.dynamics->addStateCost(spec.state, scale, out);
   if (spec.costs.empty()) return;
-  const int nv = model_.nv();
-  const bool running = index < numStages();
-  const NodeView view{model_, node.ws, spec.constraints, node.u, node.cws.lambda};
-  node.Ru.setZero();
+  const NodeView view{model_, node.dynamics->workspace(), spec.constraints, node.u, node.dynamics->lambda()};
+  ResidualStack& stack = node.stack;
   int row = 0;
   for (const Cost& cost : spec.costs) {
     const int n = cost.residual->size();
     cost.residual->calcJacobian(
-        view, {node.Rq.middleRows(row, n), node.Rv.middleRows(row, n), node.Rlambda.middleRows(row, n)});
-    cost.activation.calcDerivatives(node.r.segment(row, n), node.gradient.segment(row, n),
-                                    node.hessian.segment(row, n));
-    node.gradient.segment(row, n) *= scale * cost.weight;
-    node.hessian.segment(row, n) *= scale * cost.weight;
-    auto Rx = node.Rx.middleRows(row, n);
-    Rx.leftCols(nv) = node.Rq.middleRows(row, n);
-    Rx.rightCols(nv) = node.Rv.middleRows(row, n);
-    if (running && cost.residual->needsForces()) {
-      const auto Rl = node.Rlambda.middleRows(row, n);
-      Rx.leftCols(nv).noalias() += Rl * node.cws.dlambda_dq;
-      Rx.rightCols(nv).noalias() += Rl * node.cws.dlambda_dv;
-      node.Ru.middleRows(row, n).noalias() = Rl * node.cws.dlambda_du;
-    }
+        view, {stack.q.middleRows(row, n), stack.v.middleRows(row, n), stack.lambda.middleRows(row, n)});
+    cost.activation.calcDerivatives(stack.r.segment(row, n), stack.gradient.segment(row, n),
+                                    stack.hessian.segment(row, n));
+    stack.gradient.segment(row, n) *= scale * cost.weight;
+    stack.hessian.segment(row, n) *= scale * cost.weight;
     row += n;
   }
-  out.lx.noalias() += node.Rx.transpose() * node.gradient;
-  node.scaled_x = node.hessian.asDiagonal() * node.Rx;
-  out.lxx.noalias() += node.Rx.transpose() * node.scaled_x;
-  if (!running) return;
-  node.scaled_u = node.hessian.asDiagonal() * node.Ru;
-  out.lu.noalias() += node.Ru.transpose() * node.gradient;
-  out.luu.noalias() += node.Ru.transpose() * node.scaled_u;
-  out.lux.noalias() += node.Ru.transpose() * node.scaled_x;
+  node.dynamics->addResiduals(stack, index < numStages(), out);
 }
 
 void RobotProblem::getControlBounds(int, VectorRef lower, VectorRef upper) const {
@@ -308,9 +203,13 @@ void RobotProblem::getControlBounds(int, VectorRef lower, VectorRef upper) const
 }
 
 StepStatus RobotProblem::calcDynamics(int stage, ConstVectorRef x, ConstVectorRef u, VectorXd& a, VectorXd& lambda) {
-  if (evaluate(stage, x, u) != StepStatus::Ok) return StepStatus::Failed;
-  a = nodes_[stage].cws.a;
-  lambda = nodes_[stage].cws.lambda;
+  Workspace ws(model_);
+  ConstrainedWorkspace cws;
+  if (updateConstrainedDynamics(model_, ws, cws, specs_[stage].constraints, x.head(model_.nq()), x.tail(model_.nv()),
+                                calcMotorForces(model_, u)) != DynamicsStatus::Ok)
+    return StepStatus::Failed;
+  a = cws.a;
+  lambda = cws.lambda;
   return StepStatus::Ok;
 }
 

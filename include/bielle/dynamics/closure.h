@@ -61,6 +61,9 @@ void calcClosureJacobian(const Workspace& ws, const Closure& closure, MatrixRef 
 /// updateAccelerations.
 void calcClosureDerivatives(const Workspace& ws, const Closure& closure, MatrixRef da_dq, MatrixRef da_dv);
 
+/// Derivative of the velocity rows with respect to q at fixed v, Eq. (3), to the columns closure.dofs; needs updateVelocities.
+void calcClosureVelocityDerivative(const Workspace& ws, const Closure& closure, MatrixRef dnu_dq);
+
 /// World wrench of a closure force on body 1.
 Vector6d calcClosureWrench(const Workspace& ws, const Closure& closure, ConstVectorRef lambda);
 /// Adds to dID_dq what updateInverseDynamicsDerivatives leaves out: the wrench on body 2 moves with frame 1 (the
@@ -68,5 +71,9 @@ Vector6d calcClosureWrench(const Workspace& ws, const Closure& closure, ConstVec
 ///     d ID_j/dq_k += s J_j . (J_k x* W)   for j in the support of body 2, k in closure.dofs (5)
 void addClosureForceDerivative(const Model& model, const Workspace& ws, const Closure& closure, const Vector6d& wrench,
                                MatrixRef dID_dq);
+/// Adds to out (nv x nv) the derivative of the generalized force J^T lambda with respect to q, the wrench W being fixed in frame 1:
+///     d (J^T lambda)_j/dq_k = s_j J_j . (J_k x* W) ([k moves frame 1] - [k moves the axis j]),   j, k in closure.dofs   (6)
+void addGeneralizedForceDerivative(const Model& model, const Workspace& ws, const Closure& closure,
+                                   const Vector6d& wrench, MatrixRef out);
 
 }  // namespace bielle

@@ -5,6 +5,11 @@
 ///     a = constrained dynamics (q, v, u),    v+ = v + h a,    q+ = q (+) h v+ (1)
 /// with derivatives (J_q, J_d those of (+) at d = h v+)
 ///     dv+ = dv + h da,                       dq+ = J_q dq + h J_d dv+ (2)
+/// Reduced formulation (ours): every state is closed and its velocity keeps it so; tangent size 2 (nv - rank), about an
+/// orthonormal basis N(q) per node and loop cluster (reduction.h). With a as in (1), loops eliminated before anything
+/// of full size,
+///     w = v + h a,    q+ = q (+) h w',  w' = w - J^T zeta with q+ closed,    v+ = (I - J^+ J)(q+) w' (3)
+/// Its derivatives stand in reduced_node.cpp. As h vanishes both formulations have the same optimum.
 /// Running cost of a stage: h times the sum of its costs; the terminal node has no h.
 /// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and so on.
 #include <string>
@@ -31,16 +36,26 @@ struct CostValue {
   double value = 0;
 };
 
+/// The state space of a problem.
+enum class Formulation { Full, Reduced };
+const char* getName(Formulation formulation);
+
+class NodeModel;
+struct ResidualStack;
+struct Reduction;
+
 class RobotProblem : public ShootingProblem {
  public:
+  /// \param q0, v0 initial state; closed, with a velocity that keeps it closed, for the reduced formulation
   /// \param stages N running stages and the terminal one at the end. The model must outlive the problem.
-  /// \throws ModelError on sizes that do not fit
-  RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages);
+  /// \throws ModelError on sizes that do not fit, or an open configuration for the reduced formulation
+  RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages,
+               Formulation formulation = Formulation::Full);
   ~RobotProblem() override;
 
   int numStages() const override { return static_cast<int>(specs_.size()) - 1; }
   int stateSize() const override { return model_.nq() + model_.nv(); }
-  int tangentSize(int) const override { return 2 * model_.nv(); }
+  int tangentSize(int) const override { return tangent_size_; }
   int controlSize(int) const override { return model_.nu(); }
   const VectorXd& initialState() const override { return x0_; }
   void integrate(int node, ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) const override;
@@ -53,6 +68,7 @@ class RobotProblem : public ShootingProblem {
   void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override;
 
   const Model& model() const { return model_; }
+  Formulation formulation() const { return formulation_; }
   const StageSpec& spec(int node) const { return specs_[node]; }
   /// Accelerations (nv) and constraint forces (rows) of a stage at (x, u).
   StepStatus calcDynamics(int stage, ConstVectorRef x, ConstVectorRef u, VectorXd& a, VectorXd& lambda);
@@ -63,12 +79,14 @@ class RobotProblem : public ShootingProblem {
   struct Node;
   StepStatus evaluate(int stage, ConstVectorRef x, ConstVectorRef u);
   double sumCosts(int node_index, std::vector<CostValue>* values = nullptr);
-  void addStateCost(int node_index, double scale, StageModel& out) const;
-  void addResidualCosts(int node_index, double scale, StageModel& out);
+  void addCosts(int node_index, double scale, StageModel& out);
 
   const Model& model_;
+  Formulation formulation_;
   std::vector<StageSpec> specs_;
+  std::unique_ptr<Reduction> reduction_;
   std::vector<Node> nodes_;
+  int tangent_size_ = 0;
   VectorXd x0_;
 };
 

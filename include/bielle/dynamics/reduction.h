@@ -1,0 +1,98 @@
+#pragma once
+/// \file Reduced coordinates: the manifold of closed configurations, loop cluster by loop cluster.
+///
+/// A cluster of loops touches few dofs (Bipetto's knee: 7, with 6 closure rows). Seen from the body that carries it, it
+/// is a small mechanism of its own, here a `LoopBlock` with its own massless Model whose world is that body. At a
+/// closed configuration, with J the closure Jacobian of the block (rows x n), independent rows J_r (rank x n) chosen by
+/// pivoting and
+///     J_r^T = [Q_1 N] [R; 0],    J_r^+ = Q_1 R^{-T} (1)
+/// N (n x (n - rank)) is an orthonormal basis of the tangent space. Its choice is free at every point: no chart is
+/// left, and a dead point of a linkage, where motor or joint coordinates break down, is nothing special. Only a change
+/// of rank is.
+///
+/// Moving on the manifold from a point q_0: for a displacement d (n), close along the rows of the start,
+///     q = q_0 (+) (d - J_r(q_0)^T zeta)    with zeta such that q is closed (2)
+/// so that N(q_0)^T (q (-) q_0) = N(q_0)^T d: (2) inverts the difference in reduced coordinates exactly.
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <vector>
+
+#include "bielle/dynamics/closure.h"
+
+namespace bielle {
+
+/// One cluster of loops as a mechanism of its own.
+struct LoopBlock {
+  Model model;                        ///< joints and closures of the cluster, massless, over their common root
+  ConstraintSet closures;             ///< of `model`, without stabilisation
+  std::vector<int> cluster_closures;  ///< their indices in the whole model
+  std::vector<int> joints;            ///< joint indices in the whole model, in the order of `model`
+  std::vector<int> dofs;              ///< velocity coordinates in the whole model (n)
+  int rank = 0;                       ///< of the closure Jacobian
+  int offset = 0, size = 0;           ///< reduced coordinates [offset, offset + size), size = n - rank
+};
+
+/// How the velocity coordinates of a model split into blocks and free dofs.
+struct Reduction {
+  std::vector<LoopBlock> blocks;
+  std::vector<int> free_joints;   ///< joints outside all loops
+  std::vector<int> free_offsets;  ///< first reduced coordinate of each
+  int size = 0;                   ///< reduced coordinates: the mobility of the robot
+};
+
+/// \param q closed configuration at which ranks are taken
+/// \throws ModelError when q is not closed (to 1e-8) or a loop leaves no mobility anywhere
+Reduction makeReduction(const Model& model, ConstVectorRef q);
+
+/// Bases (1) at a closed configuration of a block.
+struct BlockBasis {
+  VectorXd q;             ///< nq of the block
+  MatrixXd N;             ///< n x size
+  MatrixXd J;             ///< rank x n, independent rows
+  std::vector<int> rows;  ///< which closure rows J holds
+};
+
+/// A closed configuration of a block with everything computed there. No allocation once made.
+class BlockPoint {
+ public:
+  explicit BlockPoint(const LoopBlock& block);
+
+  /// Kinematics, Jacobian and bases (1) at q (block's nq). False when the rank is not that of the block.
+  bool update(const LoopBlock& block, ConstVectorRef q);
+  /// Closes from `start` as Eq. (2) and updates everything there. False when it does not close or the rank changes.
+  bool close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d);
+
+  const BlockBasis& basis() const { return basis_; }
+  const MatrixXd& Jplus() const { return Jplus_; }  ///< n x rank
+  const VectorXd& zeta() const { return zeta_; }    ///< rank, of the last close()
+  const VectorXd& step() const { return step_; }    ///< n, d - J_r(q_0)^T zeta of the last close()
+  double gap() const { return gap_; }               ///< largest closure residual
+  Workspace& workspace() { return ws_; }
+  const Workspace& workspace() const { return ws_; }
+  /// Independent rows out of all rows (m x k -> rank x k).
+  void selectIndependent(const MatrixXd& all, MatrixXd& out) const;
+
+ private:
+  void updateJacobian(const LoopBlock& block);
+  void updateResidual(const LoopBlock& block);
+  bool updateBases(const LoopBlock& block);
+
+  BlockBasis basis_;
+  Workspace ws_;
+  VectorXd residual_, zeta_, step_, correction_, independent_residual_, work_;
+  MatrixXd J_all_, Jplus_, Q_, A_;
+  Eigen::ColPivHouseholderQR<MatrixXd> qr_;
+  Eigen::PartialPivLU<MatrixXd> lu_;
+  double gap_ = 0;
+};
+
+/// Forces on all rows (m) of forces on the independent ones.
+void expandIndependent(const BlockBasis& basis, ConstVectorRef independent, VectorRef all);
+
+/// Segments of a block in vectors of the whole model.
+void gatherConfiguration(const Model& model, const LoopBlock& block, ConstVectorRef q, VectorRef q_block);
+void scatterConfiguration(const Model& model, const LoopBlock& block, ConstVectorRef q_block, VectorRef q);
+void gatherVelocity(const LoopBlock& block, ConstVectorRef v, VectorRef v_block);
+void scatterVelocity(const LoopBlock& block, ConstVectorRef v_block, VectorRef v);
+
+}  // namespace bielle

@@ -1,0 +1,208 @@
+#include "bielle/dynamics/reduction.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/builder.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kClosedTolerance = 1e-13;    // what close() aims at
+constexpr double kAcceptedTolerance = 1e-11;  // what it accepts when rounding stops it
+constexpr double kRankTolerance = 1e-6;       // pivots of (1) relative to the first
+
+// The cluster's joints over their common root, which becomes the world of the block.
+Model makeBlockModel(const Model& model, const LoopCluster& cluster, const std::vector<int>& joints) {
+  ModelBuilder builder("loops of " + model.name());
+  builder.setGravity(Vector3d::Zero());
+  std::vector<std::string> links(model.numBodies(), "world");
+  for (int i : joints) {
+    Joint joint = model.joints()[i];
+    links[i] = model.bodies()[i].name;
+    builder.addLink(links[i], links[joint.parent], joint, {});
+  }
+  for (int c : cluster.closures) {
+    const Closure& closure = model.closures()[c];
+    builder.addFrame(closure.name + "|1", links[closure.body1], closure.X_B1);
+    builder.addFrame(closure.name + "|2", links[closure.body2], closure.X_B2);
+    builder.addClosure(closure.name, closure.kind, closure.name + "|1", closure.name + "|2", closure.axis);
+  }
+  return builder.build();
+}
+
+}  // namespace
+
+Reduction makeReduction(const Model& model, ConstVectorRef q) {
+  Reduction out;
+  std::vector<int> owner(model.numBodies(), -1);
+  for (const LoopCluster& cluster : model.clusters()) {
+    LoopBlock block;
+    block.dofs = cluster.dofs;
+    for (int k : cluster.dofs)
+      if (block.joints.empty() || block.joints.back() != model.dofs()[k].joint)
+        block.joints.push_back(model.dofs()[k].joint);
+    for (int i : block.joints) owner[i] = static_cast<int>(out.blocks.size());
+    block.model = makeBlockModel(model, cluster, block.joints);
+    block.closures = makeConstraintSet(block.model);
+    block.cluster_closures = cluster.closures;
+    VectorXd q_block(block.model.nq());
+    gatherConfiguration(model, block, q, q_block);
+    const Mobility mobility = calcMobility(block.model, q_block, kRankTolerance);
+    block.rank = mobility.rank;
+    block.size = mobility.mobility;
+    Workspace ws(block.model);
+    updatePositions(block.model, ws, q_block);
+    for (const Closure& closure : block.closures.closures)
+      if (!(calcClosureResidual(ws, closure).cwiseAbs().maxCoeff() < 1e-8))
+        throw ModelError(model.name(), "closure '" + closure.name + "'", "it is open at the given configuration",
+                         "close the configuration first (assemble, closeConfiguration)");
+    out.blocks.push_back(std::move(block));
+  }
+  // Reduced coordinates in the order of the first dof of each free joint or block.
+  std::vector<bool> placed(out.blocks.size(), false);
+  for (int i = 1; i < model.numBodies(); ++i) {
+    if (owner[i] < 0) {
+      out.free_joints.push_back(i);
+      out.free_offsets.push_back(out.size);
+      out.size += model.joints()[i].nv;
+    } else if (!placed[owner[i]]) {
+      placed[owner[i]] = true;
+      out.blocks[owner[i]].offset = out.size;
+      out.size += out.blocks[owner[i]].size;
+    }
+  }
+  if (out.size == 0)
+    throw ModelError(model.name(), "closures", "they leave the robot no mobility", "see `bielle info` for ranks");
+  return out;
+}
+
+BlockPoint::BlockPoint(const LoopBlock& block) : ws_(block.model) {
+  const int n = block.model.nv(), m = block.closures.rows;
+  basis_.q.setZero(block.model.nq());
+  residual_.setZero(m);
+  for (VectorXd* v : {&zeta_, &correction_, &independent_residual_}) v->setZero(block.rank);
+  step_.setZero(n);
+  work_.setZero(std::max(n, m));
+  J_all_.setZero(m, n);
+  basis_.J.setZero(block.rank, n);
+  basis_.N.setZero(n, block.size);
+  basis_.rows.resize(block.rank);
+  Jplus_.setZero(n, block.rank);
+  Q_.setZero(n, n);
+  A_.setZero(block.rank, block.rank);
+  qr_ = Eigen::ColPivHouseholderQR<MatrixXd>(n, m);
+  lu_ = Eigen::PartialPivLU<MatrixXd>(block.rank);
+}
+
+void BlockPoint::updateJacobian(const LoopBlock& block) {
+  const ConstraintSet& set = block.closures;
+  for (size_t c = 0; c < set.closures.size(); ++c)
+    calcClosureJacobian(ws_, set.closures[c], J_all_.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
+}
+
+void BlockPoint::updateResidual(const LoopBlock& block) {
+  const ConstraintSet& set = block.closures;
+  for (size_t c = 0; c < set.closures.size(); ++c)
+    residual_.segment(set.offsets[c], getRows(set.closures[c].kind)) = calcClosureResidual(ws_, set.closures[c]);
+  gap_ = residual_.size() ? residual_.cwiseAbs().maxCoeff() : 0;
+}
+
+void BlockPoint::selectIndependent(const MatrixXd& all, MatrixXd& out) const {
+  for (size_t i = 0; i < basis_.rows.size(); ++i) out.row(i) = all.row(basis_.rows[i]);
+}
+
+// Eq. (1).
+bool BlockPoint::updateBases(const LoopBlock& block) {
+  const int rank = block.rank;
+  qr_.compute(J_all_.transpose());
+  const auto& R = qr_.matrixQR();
+  const double first = std::abs(R(0, 0));
+  if (rank > 0 && !(std::abs(R(rank - 1, rank - 1)) > kRankTolerance * first)) return false;  // a rank is lost
+  if (rank < std::min(R.rows(), R.cols()) && std::abs(R(rank, rank)) > 1e-3 * kRankTolerance * first &&
+      std::abs(R(rank, rank)) > kRankTolerance * std::abs(R(rank - 1, rank - 1)))
+    return false;  // a rank is gained
+  Q_.setIdentity();
+  qr_.householderQ().applyThisOnTheLeft(Q_, work_);
+  basis_.N = Q_.rightCols(block.size);
+  for (int i = 0; i < rank; ++i) basis_.rows[i] = qr_.colsPermutation().indices()[i];
+  selectIndependent(J_all_, basis_.J);
+  // J^+ = Q_1 R^{-T}: solve X R^T = Q_1 from the right.
+  Jplus_ = Q_.leftCols(rank);
+  R.topLeftCorner(rank, rank).triangularView<Eigen::Upper>().transpose().solveInPlace<Eigen::OnTheRight>(Jplus_);
+  return true;
+}
+
+bool BlockPoint::update(const LoopBlock& block, ConstVectorRef q) {
+  basis_.q = q;
+  updatePositions(block.model, ws_, basis_.q);
+  updateResidual(block);
+  updateJacobian(block);
+  return updateBases(block);
+}
+
+bool BlockPoint::close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d) {
+  // Newton on zeta with the matrix J(q) J_r(q_0)^T of the independent rows, refreshed while it pays.
+  zeta_.setZero();
+  step_ = d;
+  double previous = 0;
+  constexpr int kMaxIterations = 30;
+  for (int i = 0; i <= kMaxIterations; ++i) {
+    block.model.integrate(start.q, step_, basis_.q);
+    updatePositions(block.model, ws_, basis_.q);
+    updateResidual(block);
+    if (!std::isfinite(gap_)) return false;
+    const bool stalled = i > 0 && gap_ > 0.5 * previous;
+    if (gap_ <= kClosedTolerance || (stalled && gap_ <= kAcceptedTolerance)) break;
+    if (i == kMaxIterations) return false;
+    if (i == 0 || gap_ > 0.05 * previous) {
+      updateJacobian(block);
+      for (size_t r = 0; r < start.rows.size(); ++r) basis_.J.row(r) = J_all_.row(start.rows[r]);
+      A_.noalias() = basis_.J * start.J.transpose();
+      lu_.compute(A_);
+    }
+    previous = gap_;
+    for (size_t r = 0; r < start.rows.size(); ++r) independent_residual_[r] = residual_[start.rows[r]];
+    // The residual falls by J dq (notation.h), and dq = -J_r(q_0)^T dzeta.
+    correction_ = lu_.solve(independent_residual_);
+    zeta_ -= correction_;
+    step_.noalias() += start.J.transpose() * correction_;
+  }
+  updateJacobian(block);
+  return updateBases(block);
+}
+
+void expandIndependent(const BlockBasis& basis, ConstVectorRef independent, VectorRef all) {
+  all.setZero();
+  for (size_t i = 0; i < basis.rows.size(); ++i) all[basis.rows[i]] = independent[i];
+}
+
+void gatherConfiguration(const Model& model, const LoopBlock& block, ConstVectorRef q, VectorRef q_block) {
+  int at = 0;
+  for (int i : block.joints) {
+    const Joint& joint = model.joints()[i];
+    q_block.segment(at, joint.nq) = q.segment(joint.idx_q, joint.nq);
+    at += joint.nq;
+  }
+}
+
+void scatterConfiguration(const Model& model, const LoopBlock& block, ConstVectorRef q_block, VectorRef q) {
+  int at = 0;
+  for (int i : block.joints) {
+    const Joint& joint = model.joints()[i];
+    q.segment(joint.idx_q, joint.nq) = q_block.segment(at, joint.nq);
+    at += joint.nq;
+  }
+}
+
+void gatherVelocity(const LoopBlock& block, ConstVectorRef v, VectorRef v_block) {
+  for (size_t k = 0; k < block.dofs.size(); ++k) v_block[k] = v[block.dofs[k]];
+}
+
+void scatterVelocity(const LoopBlock& block, ConstVectorRef v_block, VectorRef v) {
+  for (size_t k = 0; k < block.dofs.size(); ++k) v[block.dofs[k]] = v_block[k];
+}
+
+}  // namespace bielle

@@ -1,0 +1,63 @@
+#pragma once
+// The state space and the step of one node, behind RobotProblem: FullNode (the paper's spanning tree) or ReducedNode
+// (closed configurations only). A node owns all memory of its point, so that different nodes may work at the same time.
+#include <memory>
+
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/reduction.h"
+#include "bielle/ocp/robot_problem.h"
+
+namespace bielle {
+
+// Stacked residuals of a node with their partial derivatives and the weights that the activations give them.
+struct ResidualStack {
+  VectorXd r, gradient, hessian;
+  MatrixXd q, v, lambda;  // partial derivatives, rows x nv, nv, constraint rows
+};
+
+class NodeModel {
+ public:
+  NodeModel(const Model& model, const StageSpec& spec);
+  virtual ~NodeModel() = default;
+
+  virtual int tangentSize() const = 0;
+  virtual void integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) = 0;
+  virtual void difference(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) = 0;
+
+  // Kinematics at x alone (terminal node).
+  virtual bool updateState(ConstVectorRef x) = 0;
+  // Dynamics at (x, u) and the next state, in x_next().
+  virtual bool updateStep(ConstVectorRef x, ConstVectorRef u) = 0;
+  // Fx, Fu and gap about the last updateStep(); the derivatives that addResiduals() needs.
+  virtual bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) = 0;
+  // To be called after updateState() at the terminal node in place of linearizeStep().
+  virtual void linearizeState() = 0;
+  virtual void addStateCost(const StateCost& cost, double scale, StageModel& out) = 0;
+  // Gauss-Newton terms; at a running stage forces and controls take part.
+  virtual void addResiduals(const ResidualStack& stack, bool running, StageModel& out) = 0;
+
+  const Workspace& workspace() const { return ws_; }
+  const VectorXd& lambda() const { return lambda_; }
+  const VectorXd& x_next() const { return x_next_; }
+
+ protected:
+  const Model& model_;
+  const StageSpec& spec_;
+  Workspace ws_;
+  VectorXd lambda_;  // rows of the constraints; the reduced node leaves those of loops at zero
+  VectorXd x_next_;
+};
+
+std::unique_ptr<NodeModel> makeFullNode(const Model& model, const StageSpec& spec);
+std::unique_ptr<NodeModel> makeReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec);
+
+// Joints whose configuration is not a vector: their blocks of the manifold Jacobians differ from the identity.
+inline bool isCurved(const Joint& joint) {
+  return joint.kind == JointKind::Spherical || joint.kind == JointKind::Planar || joint.kind == JointKind::FreeFlyer;
+}
+
+// Small square matrices of one joint, without allocation.
+using JointMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
+using JointVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1>;
+
+}  // namespace bielle

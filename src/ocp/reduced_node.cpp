@@ -1,0 +1,645 @@
+// The reduced formulation: robot_problem.h Eq. (3) and its derivatives. Written for one block of loops with bases N, J,
+// J^+ (reduction.h) at q and N', J', J'^+ at q+; a free joint is the case N = N' = I without rows.
+//
+// A tangent vector (dy, dy_v) at the state means
+//     dq = N dy,   dv = N dy_v + Z dy,   Z = -J^+ d(J v)/dq N (a)
+// since J v = 0 is kept. Dynamics: with a = N y' + a_d, a_d = -J^+ gamma, and hats for projections by N^T from both
+// sides,
+//     M^ y' - (J_c N)^T lambda_c = N^T (tau - b - M a_d),    (J_c N) y' = -gamma_c - J_c a_d (b)
+// where c are the contacts. The loop forces, which N^T hides, balance what is left: J^T lambda_l = M a + b - tau -
+// J_c^T lambda_c. Derivatives at fixed lambda_l, lambda_c, with D the full derivatives of ID and C those of the closure
+// accelerations:
+//     da = N dy' + d_y dy + d_v dy_v,   d_y = -J^+ (C_q N + C_v Z),   d_v = -J^+ C_v N (c) dID_y = N^T (D_q N + D_v Z +
+//     M d_y),   dID_v = N^T (D_v N + M d_v),   likewise for the contact rows             (d)
+// Step: w = v + h a; e is the displacement before closing, A = h J' J_d J^T, H = d(J^T zeta)/dq, S = N'^T d(J'^T mu)/dq
+// N':
+//     e = (J_q - h J_d H) dq + h J_d dw (e) dq+ = e - h J_d J^T A^{-1} J' e,     dw' = dw - H dq - J^T A^{-1} J' e (f)
+//     dy+ = N'^T dq+,   dy_v+ = N'^T dw' - S dy+,   mu = J'^{+T} w' (g)
+// S is there because the projection of w' turns with q+. With a gap, the result is read about the node state's own
+// basis.
+#include <Eigen/LU>
+
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "node_model.h"
+
+namespace bielle {
+namespace {
+
+// A block of loops at one node.
+struct Block {
+  explicit Block(const LoopBlock& l) : loop(l), at(l), next(l), scratch(l), chart(at.basis()) {
+    const int n = l.model.nv(), m = l.closures.rows, r = l.size;
+    q.setZero(l.model.nq());
+    for (VectorXd* v : {&this->v, &a, &d, &w, &v_next}) v->setZero(n);
+    for (VectorXd* v : {&gamma, &mu, &independent}) v->setZero(l.rank);
+    rows.setZero(m);
+    for (MatrixXd* x : {&Z, &dy, &dv}) x->setZero(n, r);
+    for (MatrixXd* x : {&Cq, &Cv, &K}) x->setZero(m, n);
+    for (MatrixXd* x : {&Cq_r, &Cv_r, &K_r}) x->setZero(l.rank, n);
+    for (MatrixXd* x : {&Jq, &Jd, &H}) x->setZero(n, n);
+    lu = Eigen::PartialPivLU<MatrixXd>(l.rank);
+  }
+  const LoopBlock& loop;
+  BlockPoint at, next, scratch;  // at the state; at q+; for integrate() and open gaps
+  BlockBasis chart;              // at the last linearized state
+  VectorXd q, v, a, d, w, v_next;
+  VectorXd gamma, mu, independent, rows;
+  MatrixXd Z, dy, dv;                   // n x r, Eqs. (a), (c)
+  MatrixXd Cq, Cv, K, Cq_r, Cv_r, K_r;  // closure derivatives, all rows and the independent ones
+  MatrixXd Jq, Jd, H;                   // n x n, Eqs. (e), (f)
+  Eigen::PartialPivLU<MatrixXd> lu;     // of A
+};
+
+class ReducedNode : public NodeModel {
+ public:
+  ReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec)
+      : NodeModel(model, spec), reduction_(reduction) {
+    for (const LoopBlock& block : reduction.blocks) blocks_.emplace_back(block);
+    const int nv = model.nv(), nr = reduction.size, nu = model.nu();
+    num_loops_ = spec.constraints.num_loops;
+    loop_rows_ = 0;
+    for (int c = 0; c < num_loops_; ++c) loop_rows_ += getRows(spec.constraints.closures[c].kind);
+    contact_rows_ = spec.constraints.rows - loop_rows_;
+    for (VectorXd* v : {&tau_, &a_, &a_d_, &w_, &force_}) v->setZero(nv);
+    for (VectorXd* v : {&ydd_, &f_}) v->setZero(nr);
+    for (VectorXd* v : {&gamma_, &lambda_c_}) v->setZero(contact_rows_);
+    Jc_.setZero(contact_rows_, nv);
+    JcN_.setZero(contact_rows_, nr);
+    for (MatrixXd* m : {&Cc_q_, &Cc_v_}) m->setZero(contact_rows_, nv);
+    dlambda_.setZero(contact_rows_, 2 * nr + nu);
+    dydd_.setZero(nr, 2 * nr + nu);
+    for (MatrixXd* m : {&left_, &left_v_}) m->setZero(nv, nr);
+    M_.setZero(nr, nr);
+    saddle_point_.resize(nr, contact_rows_);
+    f_ext_.assign(model.numBodies(), Vector6d::Zero());
+    chart_x_.setConstant(model.nq() + nv, std::numeric_limits<double>::quiet_NaN());
+  }
+
+  int tangentSize() const override { return 2 * reduction_.size; }
+
+  void integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) override {
+    if (!updateChart(x)) {
+      x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
+      return;
+    }
+    const int nq = model_.nq(), nr = reduction_.size;
+    for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+      const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+      const int at = reduction_.free_offsets[i], n = joint.nv;
+      JointVector d = dx.segment(at, n);
+      integrateJoint(joint, x.segment(joint.idx_q, joint.nq), d, x_out.segment(joint.idx_q, joint.nq));
+      x_out.segment(nq + joint.idx_v, n) = x.segment(nq + joint.idx_v, n) + dx.segment(nr + at, n);
+    }
+    for (Block& b : blocks_) {
+      const LoopBlock& loop = b.loop;
+      b.d.noalias() = b.chart.N * dx.segment(loop.offset, loop.size);
+      if (!b.scratch.close(loop, b.chart, b.d)) {
+        x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
+        return;
+      }
+      // The velocity at the new point whose coordinates about the old one are N^T v + dy_v.
+      gatherVelocity(loop, x.tail(model_.nv()), b.v);
+      const JointVectorR target = b.chart.N.transpose() * b.v + dx.segment(nr + loop.offset, loop.size);
+      const JointMatrixR mixed = b.chart.N.transpose() * b.scratch.basis().N;
+      b.v.noalias() = b.scratch.basis().N * mixed.partialPivLu().solve(target);
+      scatterConfiguration(model_, loop, b.scratch.basis().q, x_out.head(nq));
+      scatterVelocity(loop, b.v, x_out.tail(model_.nv()));
+    }
+  }
+
+  void difference(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) override {
+    if (!updateChart(x0)) {
+      dx.setConstant(std::numeric_limits<double>::quiet_NaN());
+      return;
+    }
+    for (Block& b : blocks_) differenceAbout(b, b.chart, x0, x1, dx);
+    differenceFree(x0, x1, dx);
+  }
+
+  bool updateState(ConstVectorRef x) override {
+    const int nq = model_.nq(), nv = model_.nv();
+    updatePositions(model_, ws_, x.head(nq));
+    updateVelocities(model_, ws_, x.tail(nv));
+    updateMassMatrix(model_, ws_);
+    for (Block& b : blocks_) {
+      gatherConfiguration(model_, b.loop, x.head(nq), b.q);
+      gatherVelocity(b.loop, x.tail(nv), b.v);
+      if (!b.at.update(b.loop, b.q)) return false;
+      updateVelocities(b.loop.model, b.at.workspace(), b.v);
+    }
+    return true;
+  }
+
+  bool updateStep(ConstVectorRef x, ConstVectorRef u) override {
+    if (!updateState(x)) return false;
+    updateBias(model_, ws_);
+    a_d_.setZero();
+    for (Block& b : blocks_) {
+      b.a.setZero();
+      updateAccelerations(b.loop.model, b.at.workspace(), b.a);
+      const ConstraintSet& set = b.loop.closures;
+      for (size_t c = 0; c < set.closures.size(); ++c)
+        b.rows.segment(set.offsets[c], getRows(set.closures[c].kind)) =
+            calcClosureAcceleration(b.at.workspace(), set.closures[c]);
+      for (int i = 0; i < b.loop.rank; ++i) b.gamma[i] = b.rows[b.at.basis().rows[i]];
+      b.a.noalias() = -b.at.Jplus() * b.gamma;
+      scatterVelocity(b.loop, b.a, a_d_);
+    }
+    // Eq. (b)
+    calcMotorForces(model_, u, tau_);
+    force_ = tau_ - ws_.b;
+    force_.noalias() -= ws_.M * a_d_;
+    projectVector(force_, f_);
+    left_.setZero();
+    addColumns(ws_.M, &BlockBasisN, left_);
+    projectRows(left_, M_);
+    if (contact_rows_ > 0) updateContacts();
+    if (saddle_point_.factorize(M_, JcN_) != SaddlePointStatus::Ok) return false;
+    saddle_point_.solve(f_, gamma_, ydd_, lambda_c_);
+    lambda_.tail(contact_rows_) = lambda_c_;
+    a_ = a_d_;
+    addFromReduced(ydd_, a_);
+    return closeStep(x);
+  }
+
+  bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
+  void linearizeState() override {
+    for (Block& b : blocks_) updateVelocityLift(b);
+    storeChart();
+  }
+  void addStateCost(const StateCost& cost, double scale, StageModel& out) override;
+  void addResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
+
+ private:
+  // Reduced sizes of one block are small, but no bound is known: fixed storage up to this many coordinates.
+  static constexpr int kMaxBlock = 12;
+  using JointVectorR = Eigen::Matrix<double, Eigen::Dynamic, 1>;
+  using JointMatrixR = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
+  static const MatrixXd& BlockBasisN(const Block& b) { return b.at.basis().N; }
+  static const MatrixXd& BlockZ(const Block& b) { return b.Z; }
+  static const MatrixXd& BlockDy(const Block& b) { return b.dy; }
+  static const MatrixXd& BlockDv(const Block& b) { return b.dv; }
+  using Accessor = const MatrixXd& (*)(const Block&);
+
+  // out += A X, with X the block matrix that `accessor` names; free dofs are the identity for N and zero for the
+  // others.
+  void addColumns(const MatrixXd& A, Accessor accessor, MatrixRef out) const {
+    if (accessor == &BlockBasisN)
+      for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+        const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+        out.middleCols(reduction_.free_offsets[i], joint.nv) += A.middleCols(joint.idx_v, joint.nv);
+      }
+    for (const Block& b : blocks_) {
+      const MatrixXd& X = accessor(b);
+      for (int c = 0; c < b.loop.size; ++c)
+        for (size_t k = 0; k < b.loop.dofs.size(); ++k) out.col(b.loop.offset + c) += X(k, c) * A.col(b.loop.dofs[k]);
+    }
+  }
+
+  // out = N^T A
+  void projectRows(const MatrixXd& A, MatrixRef out) const {
+    for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+      const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+      out.middleRows(reduction_.free_offsets[i], joint.nv) = A.middleRows(joint.idx_v, joint.nv);
+    }
+    for (const Block& b : blocks_) {
+      const MatrixXd& N = b.at.basis().N;
+      for (Eigen::Index col = 0; col < A.cols(); ++col)
+        for (int c = 0; c < b.loop.size; ++c) {
+          double sum = 0;
+          for (size_t k = 0; k < b.loop.dofs.size(); ++k) sum += N(k, c) * A(b.loop.dofs[k], col);
+          out(b.loop.offset + c, col) = sum;
+        }
+    }
+  }
+
+  void projectVector(const VectorXd& x, VectorXd& out) const {
+    for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+      const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+      out.segment(reduction_.free_offsets[i], joint.nv) = x.segment(joint.idx_v, joint.nv);
+    }
+    for (const Block& b : blocks_)
+      for (int c = 0; c < b.loop.size; ++c) {
+        double sum = 0;
+        for (size_t k = 0; k < b.loop.dofs.size(); ++k) sum += b.at.basis().N(k, c) * x[b.loop.dofs[k]];
+        out[b.loop.offset + c] = sum;
+      }
+  }
+
+  // x += N y
+  void addFromReduced(const VectorXd& y, VectorXd& x) const {
+    for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+      const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+      x.segment(joint.idx_v, joint.nv) += y.segment(reduction_.free_offsets[i], joint.nv);
+    }
+    for (const Block& b : blocks_)
+      for (size_t k = 0; k < b.loop.dofs.size(); ++k)
+        x[b.loop.dofs[k]] += b.at.basis().N.row(k).dot(y.segment(b.loop.offset, b.loop.size));
+  }
+
+  void updateContacts();
+  bool closeStep(ConstVectorRef x);
+  void updateVelocityLift(Block& b);
+  void updateBlockDerivatives(Block& b);
+  void updateForces();
+  void linearizeDynamics();
+  bool linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out);
+  void linearizeFreeJoints(ConstVectorRef x_next_node, StageModel& out);
+  void differenceAbout(Block& b, const BlockBasis& basis, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
+  void differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
+  bool updateChart(ConstVectorRef x);
+  void storeChart();
+
+  const Reduction& reduction_;
+  std::vector<Block> blocks_;
+  int num_loops_ = 0, loop_rows_ = 0, contact_rows_ = 0;
+  VectorXd tau_, a_, a_d_, w_, force_, ydd_, f_, gamma_, lambda_c_;
+  MatrixXd Jc_, JcN_, Cc_q_, Cc_v_;  // contact rows
+  MatrixXd M_, left_, left_v_;
+  MatrixXd dydd_, dlambda_;  // derivatives of y' and lambda_c with respect to (dy, dy_v, u)
+  MatrixXd Rx_, Ru_, scaled_, Ru_scaled_;
+  SaddlePoint saddle_point_;
+  std::vector<Vector6d> f_ext_;
+  VectorXd chart_x_;
+};
+
+void ReducedNode::updateContacts() {
+  const ConstraintSet& set = spec_.constraints;
+  for (size_t c = num_loops_; c < set.closures.size(); ++c) {
+    const Closure& contact = set.closures[c];
+    const int row = set.offsets[c] - loop_rows_, n = getRows(contact.kind);
+    calcClosureJacobian(ws_, contact, Jc_.middleRows(row, n));
+    gamma_.segment(row, n) = calcClosureAcceleration(ws_, contact) + calcClosureStabilization(ws_, contact);
+  }
+  gamma_.noalias() += Jc_ * a_d_;
+  JcN_.setZero();
+  addColumns(Jc_, &BlockBasisN, JcN_);
+}
+
+// robot_problem.h Eq. (3)
+bool ReducedNode::closeStep(ConstVectorRef x) {
+  const int nq = model_.nq(), nv = model_.nv();
+  const double h = spec_.dt;
+  w_ = x.tail(nv) + h * a_;
+  for (int i : reduction_.free_joints) {
+    const Joint& joint = model_.joints()[i];
+    const JointVector d = h * w_.segment(joint.idx_v, joint.nv);
+    integrateJoint(joint, x.segment(joint.idx_q, joint.nq), d, x_next_.segment(joint.idx_q, joint.nq));
+  }
+  x_next_.tail(nv) = w_;
+  for (Block& b : blocks_) {
+    gatherVelocity(b.loop, w_, b.d);
+    b.d *= h;
+    if (!b.next.close(b.loop, b.at.basis(), b.d)) return false;
+    b.w = b.next.step() / h;
+    b.independent.noalias() = b.next.basis().J * b.w;
+    b.v_next = b.w;
+    b.v_next.noalias() -= b.next.Jplus() * b.independent;
+    scatterConfiguration(model_, b.loop, b.next.basis().q, x_next_.head(nq));
+    scatterVelocity(b.loop, b.v_next, x_next_.tail(nv));
+  }
+  return true;
+}
+
+// Z of Eq. (a).
+void ReducedNode::updateVelocityLift(Block& b) {
+  const ConstraintSet& set = b.loop.closures;
+  for (size_t c = 0; c < set.closures.size(); ++c)
+    calcClosureVelocityDerivative(b.at.workspace(), set.closures[c],
+                                  b.K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
+  b.at.selectIndependent(b.K, b.K_r);
+  b.Z.noalias() = -b.at.Jplus() * (b.K_r * b.at.basis().N).eval();
+}
+
+// d_y and d_v of Eq. (c).
+void ReducedNode::updateBlockDerivatives(Block& b) {
+  updateVelocityLift(b);
+  gatherVelocity(b.loop, a_, b.a);
+  updateAccelerations(b.loop.model, b.at.workspace(), b.a);
+  const ConstraintSet& set = b.loop.closures;
+  for (size_t c = 0; c < set.closures.size(); ++c) {
+    const int row = set.offsets[c], n = getRows(set.closures[c].kind);
+    calcClosureDerivatives(b.at.workspace(), set.closures[c], b.Cq.middleRows(row, n), b.Cv.middleRows(row, n));
+  }
+  b.at.selectIndependent(b.Cq, b.Cq_r);
+  b.at.selectIndependent(b.Cv, b.Cv_r);
+  b.dy.noalias() = -b.at.Jplus() * (b.Cq_r * b.at.basis().N + b.Cv_r * b.Z).eval();
+  b.dv.noalias() = -b.at.Jplus() * (b.Cv_r * b.at.basis().N).eval();
+}
+
+// Loop forces, and the wrenches of loops and contacts on the bodies.
+void ReducedNode::updateForces() {
+  force_ = ws_.b - tau_;
+  force_.noalias() += ws_.M * a_;
+  force_.noalias() -= Jc_.transpose() * lambda_c_;
+  const ConstraintSet& set = spec_.constraints;
+  for (Block& b : blocks_) {
+    gatherVelocity(b.loop, force_, b.d);
+    b.independent.noalias() = b.at.Jplus().transpose() * b.d;
+    expandIndependent(b.at.basis(), b.independent, b.rows);
+    for (size_t c = 0; c < b.loop.cluster_closures.size(); ++c) {
+      const int whole = b.loop.cluster_closures[c], n = getRows(set.closures[whole].kind);
+      lambda_.segment(set.offsets[whole], n) = b.rows.segment(b.loop.closures.offsets[c], n);
+    }
+  }
+  for (Vector6d& f : f_ext_) f.setZero();
+  for (size_t c = 0; c < set.closures.size(); ++c) {
+    const Closure& closure = set.closures[c];
+    const Vector6d W = calcClosureWrench(ws_, closure, lambda_.segment(set.offsets[c], getRows(closure.kind)));
+    f_ext_[closure.body1] += W;
+    f_ext_[closure.body2] -= W;
+  }
+}
+
+// Eqs. (c), (d) and the derivatives of y' and lambda_c.
+void ReducedNode::linearizeDynamics() {
+  const int nr = reduction_.size;
+  updateAccelerations(model_, ws_, a_);
+  for (Block& b : blocks_) updateBlockDerivatives(b);
+  updateForces();
+  updateInverseDynamicsDerivatives(model_, ws_, f_ext_);
+  const ConstraintSet& set = spec_.constraints;
+  for (int c = 0; c < num_loops_; ++c) {
+    const Closure& closure = set.closures[c];
+    const Vector6d W = calcClosureWrench(ws_, closure, lambda_.segment(set.offsets[c], getRows(closure.kind)));
+    addClosureForceDerivative(model_, ws_, closure, W, ws_.dID_dq);
+  }
+  left_.setZero();
+  left_v_.setZero();
+  addColumns(ws_.dID_dq, &BlockBasisN, left_);
+  addColumns(ws_.dID_dv, &BlockZ, left_);
+  addColumns(ws_.M, &BlockDy, left_);
+  addColumns(ws_.dID_dv, &BlockBasisN, left_v_);
+  addColumns(ws_.M, &BlockDv, left_v_);
+  projectRows(left_, dydd_.leftCols(nr));
+  projectRows(left_v_, dydd_.middleCols(nr, nr));
+  dydd_.rightCols(model_.nu()).setZero();
+  for (int m = 0; m < model_.nu(); ++m) {  // -N^T B
+    tau_.setZero();
+    tau_[model_.motors()[m].dof] = -1;
+    projectVector(tau_, f_);
+    dydd_.col(2 * nr + m) = f_;
+  }
+  dlambda_.setZero();
+  for (size_t c = num_loops_; c < set.closures.size(); ++c) {
+    const int row = set.offsets[c] - loop_rows_, n = getRows(set.closures[c].kind);
+    calcClosureDerivatives(ws_, set.closures[c], Cc_q_.middleRows(row, n), Cc_v_.middleRows(row, n));
+  }
+  addColumns(Cc_q_, &BlockBasisN, dlambda_.leftCols(nr));
+  addColumns(Cc_v_, &BlockZ, dlambda_.leftCols(nr));
+  addColumns(Jc_, &BlockDy, dlambda_.leftCols(nr));
+  addColumns(Cc_v_, &BlockBasisN, dlambda_.middleCols(nr, nr));
+  addColumns(Jc_, &BlockDv, dlambda_.middleCols(nr, nr));
+  saddle_point_.updateInverse();
+  saddle_point_.solveDerivatives(dydd_, dlambda_);
+}
+
+bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
+  linearizeDynamics();
+  out.Fx.setZero();
+  for (Block& b : blocks_)
+    if (!linearizeBlock(b, x_next_node, out)) return false;
+  linearizeFreeJoints(x_next_node, out);
+  storeChart();
+  return true;
+}
+
+// Eqs. (e) to (g) for one block, rows [offset, offset + size) of Fx, Fu and gap.
+bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out) {
+  const LoopBlock& loop = b.loop;
+  const int nr = reduction_.size, nu = model_.nu(), r = loop.size, o = loop.offset;
+  const double h = spec_.dt;
+  const BlockBasis &base = b.at.basis(), &next = b.next.basis();
+  const MatrixXd &N = base.N, &Nn = next.N;
+
+  b.H.setZero();
+  expandIndependent(base, b.next.zeta() / h, b.rows);  // close() moves by h w', so its zeta is h times that of Eq. (3)
+  const ConstraintSet& set = loop.closures;
+  for (size_t c = 0; c < set.closures.size(); ++c) {
+    const Closure& closure = set.closures[c];
+    const Vector6d W =
+        calcClosureWrench(b.at.workspace(), closure, b.rows.segment(set.offsets[c], getRows(closure.kind)));
+    addGeneralizedForceDerivative(loop.model, b.at.workspace(), closure, W, b.H);
+  }
+  b.Jq.setIdentity();
+  b.Jd.setIdentity();
+  for (const Joint& joint : loop.model.joints()) {
+    if (!isCurved(joint)) continue;
+    const int i = joint.idx_v, n = joint.nv;
+    const JointVector d = b.next.step().segment(i, n);
+    calcJointIntegrateJacobians(joint, d, b.Jq.block(i, i, n, n), b.Jd.block(i, i, n, n));
+  }
+  const MatrixXd JdJt = b.Jd * base.J.transpose();                        // n x rank
+  b.lu.compute(h * (next.J * JdJt));                                      // A
+  const MatrixXd P = b.lu.solve(next.J);                                  // A^{-1} J'
+  const MatrixXd L = Nn.transpose() - h * ((Nn.transpose() * JdJt) * P);  // dy+ = L e
+  const MatrixXd T = (Nn.transpose() * base.J.transpose()) * P;           // N'^T J^T A^{-1} J'
+  const MatrixXd HN = b.H * N, EN = b.Jq * N - h * b.Jd * HN;             // e = EN dy + h J_d dw
+  // S of Eq. (g)
+  b.mu.noalias() = b.next.Jplus().transpose() * b.w;
+  expandIndependent(next, b.mu, b.rows);
+  b.H.setZero();
+  for (size_t c = 0; c < set.closures.size(); ++c) {
+    const Closure& closure = set.closures[c];
+    const Vector6d W =
+        calcClosureWrench(b.next.workspace(), closure, b.rows.segment(set.offsets[c], getRows(closure.kind)));
+    addGeneralizedForceDerivative(loop.model, b.next.workspace(), closure, W, b.H);
+  }
+  const MatrixXd S = Nn.transpose() * b.H * Nn;
+
+  // dw = (N + h d_v) dy_v + (Z + h d_y) dy + h N dy'
+  const MatrixXd wy = b.Z + h * b.dy, wv = N + h * b.dv;
+  const MatrixXd LJ = h * L * b.Jd, beta = Nn.transpose() - h * T * b.Jd;
+  MatrixXd q_y = L * EN + LJ * wy, q_v = LJ * wv, q_a = h * LJ * N;
+  MatrixXd v_y = beta * wy - Nn.transpose() * HN - T * EN - S * q_y, v_v = beta * wv - S * q_v,
+           v_a = h * beta * N - S * q_a;
+
+  // About the node state, where a gap is open.
+  gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), b.q);
+  gatherVelocity(loop, x_next_node.tail(model_.nv()), b.d);
+  if (b.q != next.q || b.d != b.v_next) {
+    if (!b.scratch.update(loop, b.q)) return false;
+    updateVelocities(loop.model, b.next.workspace(), b.v_next);
+    for (size_t c = 0; c < set.closures.size(); ++c)
+      calcClosureVelocityDerivative(b.next.workspace(), set.closures[c],
+                                    b.K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
+    b.next.selectIndependent(b.K, b.K_r);
+    const MatrixXd Zn = -b.next.Jplus() * (b.K_r * Nn);
+    const MatrixXd& Nnode = b.scratch.basis().N;
+    VectorXd gap(loop.model.nv());
+    loop.model.difference(b.q, next.q, gap);
+    MatrixXd Jdiff = MatrixXd::Identity(gap.size(), gap.size());
+    for (const Joint& joint : loop.model.joints()) {
+      if (!isCurved(joint)) continue;
+      const JointVector d = gap.segment(joint.idx_v, joint.nv);
+      calcJointDifferenceJacobian(joint, d, Jdiff.block(joint.idx_v, joint.idx_v, joint.nv, joint.nv));
+    }
+    out.gap.segment(o, r) = Nnode.transpose() * gap;
+    out.gap.segment(nr + o, r) = Nnode.transpose() * (b.v_next - b.d);
+    const MatrixXd Pq = Nnode.transpose() * Jdiff * Nn, Pv = Nnode.transpose() * Nn, Pz = Nnode.transpose() * Zn;
+    v_y = (Pv * v_y + Pz * q_y).eval();
+    v_v = (Pv * v_v + Pz * q_v).eval();
+    v_a = (Pv * v_a + Pz * q_a).eval();
+    q_y = (Pq * q_y).eval();
+    q_v = (Pq * q_v).eval();
+    q_a = (Pq * q_a).eval();
+  } else {
+    out.gap.segment(o, r).setZero();
+    out.gap.segment(nr + o, r).setZero();
+  }
+  const auto dydd = dydd_.middleRows(o, r);
+  out.Fx.middleRows(o, r).noalias() = q_a * dydd.leftCols(2 * nr);
+  out.Fx.middleRows(nr + o, r).noalias() = v_a * dydd.leftCols(2 * nr);
+  out.Fu.middleRows(o, r).noalias() = q_a * dydd.rightCols(nu);
+  out.Fu.middleRows(nr + o, r).noalias() = v_a * dydd.rightCols(nu);
+  out.Fx.block(o, o, r, r) += q_y;
+  out.Fx.block(o, nr + o, r, r) += q_v;
+  out.Fx.block(nr + o, o, r, r) += v_y;
+  out.Fx.block(nr + o, nr + o, r, r) += v_v;
+  return true;
+}
+
+void ReducedNode::linearizeFreeJoints(ConstVectorRef x_next_node, StageModel& out) {
+  const int nq = model_.nq(), nr = reduction_.size, nu = model_.nu();
+  const double h = spec_.dt;
+  differenceFree(x_next_node, x_next_, out.gap);
+  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+    const int o = reduction_.free_offsets[i], n = joint.nv;
+    const auto dydd = dydd_.middleRows(o, n);
+    out.Fx.middleRows(nr + o, n) = h * dydd.leftCols(2 * nr);
+    out.Fx.block(nr + o, nr + o, n, n).diagonal().array() += 1;
+    out.Fu.middleRows(nr + o, n) = h * dydd.rightCols(nu);
+    JointMatrix Jq(n, n), Jd(n, n), Jdiff(n, n);
+    const JointVector d = h * x_next_.segment(nq + joint.idx_v, n), gap = out.gap.segment(o, n);
+    calcJointIntegrateJacobians(joint, d, Jq, Jd);
+    calcJointDifferenceJacobian(joint, gap, Jdiff);
+    const JointMatrix dv = h * Jdiff * Jd, dq = Jdiff * Jq;
+    out.Fx.middleRows(o, n).noalias() = dv * out.Fx.middleRows(nr + o, n);
+    out.Fx.block(o, o, n, n) += dq;
+    out.Fu.middleRows(o, n).noalias() = dv * out.Fu.middleRows(nr + o, n);
+  }
+}
+
+void ReducedNode::addStateCost(const StateCost& state, double scale, StageModel& out) {
+  const int nv = model_.nv(), nr = reduction_.size;
+  const double w = scale * state.weight;
+  const auto addJoint = [&](const Joint& whole, const Joint& local, MatrixRef gradient_q, MatrixRef Wq) {
+    const int n = whole.nv;
+    JointVector d(n);
+    calcJointDifference(whole, state.q_ref.segment(whole.idx_q, whole.nq), ws_.q.segment(whole.idx_q, whole.nq), d);
+    JointMatrix J(n, n);
+    calcJointDifferenceJacobian(whole, d, J);
+    const JointVector weights = w * state.weights.segment(whole.idx_v, n);
+    const JointMatrix WJ = weights.asDiagonal() * J;
+    gradient_q.block(local.idx_v, 0, n, 1) = WJ.transpose() * d;
+    Wq.block(local.idx_v, local.idx_v, n, n) = J.transpose() * WJ;
+  };
+  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+    const int o = reduction_.free_offsets[i], n = joint.nv, k = joint.idx_v;
+    Joint local = joint;
+    local.idx_v = 0;
+    JointMatrix gradient = JointMatrix::Zero(n, 1), Wq = JointMatrix::Zero(n, n);
+    MatrixXd g = gradient, W = Wq;
+    addJoint(joint, local, g, W);
+    out.lx.segment(o, n) += g.col(0);
+    out.lxx.block(o, o, n, n) += W;
+    const JointVector weights = w * state.weights.segment(nv + k, n);
+    out.lx.segment(nr + o, n) += weights.cwiseProduct(ws_.v.segment(k, n) - state.v_ref.segment(k, n));
+    out.lxx.block(nr + o, nr + o, n, n).diagonal() += weights;
+  }
+  for (Block& b : blocks_) {
+    const int n = b.loop.model.nv(), o = b.loop.offset, r = b.loop.size;
+    MatrixXd g = MatrixXd::Zero(n, 1), Wq = MatrixXd::Zero(n, n);
+    for (size_t j = 0; j < b.loop.joints.size(); ++j)
+      addJoint(model_.joints()[b.loop.joints[j]], b.loop.model.joints()[j + 1], g, Wq);
+    VectorXd Wv(n), gv(n);
+    for (int k = 0; k < n; ++k) {
+      const int dof = b.loop.dofs[k];
+      Wv[k] = w * state.weights[nv + dof];
+      gv[k] = Wv[k] * (ws_.v[dof] - state.v_ref[dof]);
+    }
+    const MatrixXd& N = b.at.basis().N;
+    const MatrixXd WvN = Wv.asDiagonal() * N;
+    out.lx.segment(o, r) += N.transpose() * g.col(0) + b.Z.transpose() * gv;
+    out.lx.segment(nr + o, r) += N.transpose() * gv;
+    out.lxx.block(o, o, r, r) += N.transpose() * Wq * N + b.Z.transpose() * Wv.asDiagonal() * b.Z;
+    const MatrixXd cross = b.Z.transpose() * WvN;
+    out.lxx.block(o, nr + o, r, r) += cross;
+    out.lxx.block(nr + o, o, r, r) += cross.transpose();
+    out.lxx.block(nr + o, nr + o, r, r) += N.transpose() * WvN;
+  }
+}
+
+void ReducedNode::addResiduals(const ResidualStack& stack, bool running, StageModel& out) {
+  const int nr = reduction_.size, rows = static_cast<int>(stack.r.size()), nu = model_.nu();
+  if (Rx_.rows() != rows) {
+    Rx_.setZero(rows, 2 * nr);
+    Ru_.setZero(rows, nu);
+  }
+  Rx_.setZero();
+  addColumns(stack.q, &BlockBasisN, Rx_.leftCols(nr));
+  addColumns(stack.v, &BlockZ, Rx_.leftCols(nr));
+  addColumns(stack.v, &BlockBasisN, Rx_.rightCols(nr));
+  if (running && contact_rows_ > 0) {
+    Rx_.noalias() += stack.lambda.rightCols(contact_rows_) * dlambda_.leftCols(2 * nr);
+    Ru_.noalias() = stack.lambda.rightCols(contact_rows_) * dlambda_.rightCols(nu);
+  }
+  scaled_ = stack.hessian.asDiagonal() * Rx_;
+  out.lx.noalias() += Rx_.transpose() * stack.gradient;
+  out.lxx.noalias() += Rx_.transpose() * scaled_;
+  if (!running) return;
+  Ru_scaled_ = stack.hessian.asDiagonal() * Ru_;
+  out.lu.noalias() += Ru_.transpose() * stack.gradient;
+  out.luu.noalias() += Ru_.transpose() * Ru_scaled_;
+  out.lux.noalias() += Ru_.transpose() * scaled_;
+}
+
+void ReducedNode::differenceAbout(Block& b, const BlockBasis& basis, ConstVectorRef x0, ConstVectorRef x1,
+                                  VectorRef dx) const {
+  const int nq = model_.nq(), nv = model_.nv(), nr = reduction_.size;
+  gatherConfiguration(model_, b.loop, x1.head(nq), b.q);
+  b.loop.model.difference(basis.q, b.q, b.d);
+  dx.segment(b.loop.offset, b.loop.size).noalias() = basis.N.transpose() * b.d;
+  for (size_t k = 0; k < b.loop.dofs.size(); ++k) b.d[k] = x1[nq + b.loop.dofs[k]] - x0[nq + b.loop.dofs[k]];
+  dx.segment(nr + b.loop.offset, b.loop.size).noalias() = basis.N.transpose() * b.d;
+  (void)nv;
+}
+
+void ReducedNode::differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const {
+  const int nq = model_.nq(), nr = reduction_.size;
+  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+    const int o = reduction_.free_offsets[i], n = joint.nv, k = joint.idx_v;
+    calcJointDifference(joint, x0.segment(joint.idx_q, joint.nq), x1.segment(joint.idx_q, joint.nq), dx.segment(o, n));
+    dx.segment(nr + o, n) = x1.segment(nq + k, n) - x0.segment(nq + k, n);
+  }
+}
+
+// Bases at x for integrate() and difference(): those of the last linearization, unless x is another point.
+bool ReducedNode::updateChart(ConstVectorRef x) {
+  if (chart_x_ == x) return true;
+  for (Block& b : blocks_) {
+    gatherConfiguration(model_, b.loop, x.head(model_.nq()), b.q);
+    if (!b.scratch.update(b.loop, b.q)) return false;
+    b.chart = b.scratch.basis();
+  }
+  chart_x_ = x;
+  return true;
+}
+
+void ReducedNode::storeChart() {
+  for (Block& b : blocks_) b.chart = b.at.basis();
+  chart_x_.head(model_.nq()) = ws_.q;
+  chart_x_.tail(model_.nv()) = ws_.v;
+}
+
+}  // namespace
+
+std::unique_ptr<NodeModel> makeReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec) {
+  return std::make_unique<ReducedNode>(model, reduction, spec);
+}
+
+}  // namespace bielle

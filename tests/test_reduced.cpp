@@ -1,0 +1,187 @@
+// The reduced formulation. Oracles: central differences of the step itself in the tangent space of closed states, the
+// full formulation's accelerations, closing errors.
+#include <catch2/catch.hpp>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/reduction.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/motion.h"
+#include "bielle/ocp/robot_problem.h"
+#include "check_derivative.h"
+#include "mechanisms.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+// A stage with every cost that has a meaning on a mechanism with these contacts, and a terminal node with the kinematic
+// ones.
+std::vector<StageSpec> makeStages(const Model& model, const std::vector<ContactTarget>& contacts, const VectorXd& q_ref,
+                                  std::mt19937& rng) {
+  std::vector<StageSpec> stages(2);
+  for (size_t k = 0; k < 2; ++k) {
+    StageSpec& stage = stages[k];
+    stage.dt = 0.01;
+    if (k == 0) stage.constraints = makeConstraintSet(model, contacts);
+    stage.state = {0.7, q_ref, randomVector(rng, model.nv()), randomVector(rng, 2 * model.nv()).cwiseAbs()};
+    stage.control = {0.3, randomVector(rng, model.nu()), VectorXd::Ones(model.nu())};
+    stage.costs.push_back({"com", 2, Activation::makeQuadratic(Vector3d(1, 2, 3)), makeComPosition(Vector3d(1, 0, 2))});
+    stage.costs.push_back(
+        {"com velocity", 2, Activation::makeQuadratic(Vector3d(1, 2, 3)), makeComVelocity(Vector3d(1, 0, 2))});
+    const BodyFrame frame{model.numBodies() - 1, randomPlacement(rng)};
+    stage.costs.push_back(
+        {"frame velocity", 0.5, Activation::makeQuadratic(VectorXd::Ones(6)), makeFrameVelocity(frame)});
+    if (k > 0) continue;
+    for (size_t c = 0; c < contacts.size(); ++c) {
+      const int index = stage.constraints.num_loops + static_cast<int>(c);
+      const int rows = getRows(stage.constraints.closures[index].kind);
+      stage.costs.push_back({"force", 1e-2, Activation::makeQuadratic(VectorXd::Ones(rows)),
+                             makeContactForce(stage.constraints, index, VectorXd::Ones(rows))});
+    }
+  }
+  return stages;
+}
+
+struct State {
+  VectorXd q, v;
+  VectorXd x() const {
+    VectorXd out(q.size() + v.size());
+    out << q, v;
+    return out;
+  }
+};
+
+// A closed state near q with a random velocity that keeps it closed.
+State makeClosedState(const Model& model, const VectorXd& q, double distance, double speed, std::mt19937& rng) {
+  const AssemblyResult result = closeConfiguration(model, model.integrate(q, randomVector(rng, model.nv(), distance)));
+  REQUIRE(result.status == AssemblyStatus::Closed);
+  Workspace ws(model);
+  return {result.q,
+          projectVelocity(model, ws, makeConstraintSet(model), result.q, randomVector(rng, model.nv(), speed))};
+}
+
+double calcGap(const Model& model, const VectorXd& x) {
+  Workspace ws(model);
+  updatePositions(model, ws, x.head(model.nq()));
+  return calcLargestGap(ws, makeConstraintSet(model));
+}
+
+// Largest closure velocity of a state.
+double calcClosureSpeed(const Model& model, const VectorXd& x) {
+  Workspace ws(model);
+  return (x.tail(model.nv()) -
+          projectVelocity(model, ws, makeConstraintSet(model), x.head(model.nq()), x.tail(model.nv())))
+      .cwiseAbs()
+      .maxCoeff();
+}
+
+// Every block of the linearization of stage 0 about (state, u) against differences of the step, with a node state some
+// way off.
+void checkLinearization(const Model& model, const std::vector<ContactTarget>& contacts, const State& state,
+                        const VectorXd& x_node, std::mt19937& rng) {
+  RobotProblem problem(model, state.q, state.v, makeStages(model, contacts, state.q, rng), Formulation::Reduced);
+  const VectorXd x = state.x(), u = randomVector(rng, model.nu(), 5);
+  const int ndx = problem.tangentSize(0);
+  StageModel stage;
+  REQUIRE(problem.linearize(0, x, u, x_node, stage) == StepStatus::Ok);
+  const StageModel linear = stage;
+  const auto step = [&](const VectorXd& at, const VectorXd& control) {
+    VectorXd x_next(x.size()), dx(ndx), out(ndx + 1);
+    double cost = 0;
+    REQUIRE(problem.step(0, at, control, x_next, cost) == StepStatus::Ok);
+    CHECK(calcGap(model, x_next) < 1e-10);
+    CHECK(calcClosureSpeed(model, x_next) < 1e-9);
+    problem.difference(1, x_node, x_next, dx);
+    out << dx, cost;
+    return out;
+  };
+  const VectorXd at_x = step(x, u);
+  CHECK((at_x.head(ndx) - linear.gap).cwiseAbs().maxCoeff() < 1e-10);
+  const auto along = [&](const VectorXd& dx) {
+    VectorXd moved(x.size());
+    problem.integrate(0, x, dx, moved);
+    CHECK(calcGap(model, moved) < 1e-10);
+    VectorXd back(ndx);
+    problem.difference(0, x, moved, back);
+    CHECK((back - dx).cwiseAbs().maxCoeff() < 1e-9);
+    return step(moved, u);
+  };
+  const MatrixXd dx = differentiate(VectorXd::Zero(ndx), 1e-4, along);
+  checkDerivative(linear.Fx, dx.topRows(ndx));
+  checkDerivative(linear.lx.transpose(), dx.bottomRows(1));
+  const MatrixXd du = differentiate(u, 1e-2, [&](const VectorXd& control) { return step(x, control); });
+  checkDerivative(linear.Fu, du.topRows(ndx));
+  checkDerivative(linear.lu.transpose(), du.bottomRows(1));
+}
+
+}  // namespace
+
+TEST_CASE("reduced step: random mechanisms, every joint kind times every closure kind") {
+  std::mt19937 rng(11);
+  for (JointKind kind : {JointKind::Revolute, JointKind::Prismatic, JointKind::Spherical, JointKind::Universal,
+                         JointKind::Planar, JointKind::FreeFlyer})
+    for (ClosureKind closure : {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D})
+      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
+        CAPTURE(getName(kind), getName(closure), base == MechanismBase::Fixed);
+        const Mechanism mechanism = makeRandomMechanism(rng, kind, closure, base);
+        const Model& model = mechanism.model;
+        std::vector<ContactTarget> contacts;
+        if (base == MechanismBase::FreeFlyer) contacts = {{1, {}, 0, 10}};
+        const State state = makeClosedState(model, mechanism.q_closed, 0, 1, rng);
+        RobotProblem problem(model, state.q, state.v, makeStages(model, contacts, state.q, rng), Formulation::Reduced);
+        VectorXd x_next(state.x().size());
+        double cost = 0;
+        REQUIRE(problem.step(0, state.x(), VectorXd::Zero(model.nu()), x_next, cost) == StepStatus::Ok);
+        SECTION(std::string("no gap ") + getName(kind) + getName(closure) +
+                (base == MechanismBase::Fixed ? "x" : "f")) {
+          checkLinearization(model, contacts, state, x_next, rng);
+        }
+        SECTION(std::string("open gap ") + getName(kind) + getName(closure) +
+                (base == MechanismBase::Fixed ? "x" : "f")) {
+          const State node = makeClosedState(model, x_next.head(model.nq()), 0.05, 1, rng);
+          checkLinearization(model, contacts, state, node.x(), rng);
+        }
+      }
+}
+
+TEST_CASE("reduced step: Bipetto, four-bar, five-bar, redundant planar four-bar") {
+  std::mt19937 rng(12);
+  for (const std::string name : {"bipetto", "fourbar", "fivebar", "planar"}) {
+    CAPTURE(name);
+    Mechanism mechanism;
+    if (name == "planar") {
+      mechanism = makePlanarFourBar(1, 0.4, 0.9, 0.8, 0.7);
+    } else {
+      mechanism.model = loadRobot(name).model;
+      mechanism.q_closed = makeStandingPosture(mechanism.model);
+    }
+    const Model& model = mechanism.model;
+    std::vector<ContactTarget> contacts;
+    if (name == "bipetto") contacts = {{0, {}, 0, 100}, {1, {}, 0, 100}};
+    for (double distance : {0.0, 0.05}) {
+      const State state = makeClosedState(model, mechanism.q_closed, distance, 1, rng);
+      const State node = makeClosedState(model, mechanism.q_closed, distance + 0.02, 1, rng);
+      checkLinearization(model, contacts, state, node.x(), rng);
+    }
+  }
+}
+
+TEST_CASE("reduced accelerations are those of the full formulation") {
+  std::mt19937 rng(13);
+  const Model model = loadRobot("bipetto").model;
+  const State state = makeClosedState(model, makeStandingPosture(model), 0.05, 1, rng);
+  const std::vector<ContactTarget> contacts = {{0, {}, 0, 0}, {1, {}, 0, 0}};
+  const double h = 1e-5;
+  std::vector<StageSpec> stages = makeStages(model, contacts, state.q, rng);
+  for (StageSpec& stage : stages) stage.dt = h;
+  RobotProblem problem(model, state.q, state.v, std::move(stages), Formulation::Reduced);
+  const VectorXd u = randomVector(rng, model.nu(), 5);
+  VectorXd x_next(state.x().size()), a, lambda;
+  double cost = 0;
+  REQUIRE(problem.step(0, state.x(), u, x_next, cost) == StepStatus::Ok);
+  REQUIRE(problem.calcDynamics(0, state.x(), u, a, lambda) == StepStatus::Ok);
+  // The projection moves the velocity by O(h^2), the acceleration seen by O(h).
+  CHECK(((x_next.tail(model.nv()) - state.v) / h - a).norm() < 1e-2 * a.norm());
+}
