@@ -77,11 +77,6 @@ VectorXd SimbodyBridge::calcInverseDynamics(ConstVectorRef a) const {
 
 VectorXd SimbodyBridge::calcBias() const { return calcInverseDynamics(VectorXd::Zero(s_->model.nv())); }
 
-double SimbodyBridge::calcConstraintError() const {
-  const VectorXd error = toEigen(s_->state.getQErr());  // unit lengths of quaternions, then constraints
-  return error.size() ? error.cwiseAbs().maxCoeff() : 0;
-}
-
 OracleSolution SimbodyBridge::solveBySimbody() {
   s_->system.realize(s_->state, Stage::Acceleration);
   OracleSolution out;
@@ -104,7 +99,7 @@ OracleSolution SimbodyBridge::solveWithArmature() const {
   s_->scatter(s_->Tdot_v, udot);
   s_->matter.calcConstraintAccelerationErrors(s_->state, udot, drift);
 
-  // Eq. (2) with unit diagonal of M: a = D y, m = E z. One scale for all rows, as some may be nothing but rounding.
+  // With unit diagonal of M: a = D y, m = E z. One scale for all rows, as some may be nothing but rounding.
   const MatrixXd M = calcMassMatrix();
   const VectorXd D = M.diagonal().cwiseSqrt().cwiseInverse();
   const MatrixXd JD = J * D.asDiagonal();

@@ -2,23 +2,24 @@
 /// \file A Model as a Simbody multibody system: the independent oracle of Bielle's dynamics.
 ///
 /// The tree becomes Simbody's own mobilizers, the closures its own constraints; kinematics, forces and accelerations
-/// are Simbody's. Of Bielle only the model's data and the conventions of notation.h are used: | joint                |
-/// mobilizer | u of Simbody from our v                                                          |
-/// |----------------------|-----------|----------------------------------------------------------------------------------|
-/// | revolute, continuous | Pin       | u = v | | prismatic            | Slider    | u = v | | spherical            |
-/// Ball      | u = R w (angular velocity in the parent's frame F; R = R_FM)                     | | universal |
-/// Universal | u = v; axes that are not perpendicular: two Pins about a massless body, u = v    | | planar | Planar | u
-/// = (rate, R2 (v_x, v_y)), R2 the rotation by the joint's angle                  | | free-flyer           | Free | u =
-/// (R w, R v_lin)                                                               |
+/// are Simbody's. Of Bielle only the model's data and the conventions of notation.h are used.
+///
+/// | joint                | mobilizer | u of Simbody from our v                                                     |
+/// |----------------------|-----------|-----------------------------------------------------------------------------|
+/// | revolute, continuous | Pin       | u = v                                                                       |
+/// | prismatic            | Slider    | u = v                                                                       |
+/// | spherical            | Ball      | u = R w, angular velocity in the parent's frame F; R = R_FM                 |
+/// | universal            | Universal | u = v; axes not perpendicular: two Pins about a massless body, u = v        |
+/// | planar               | Planar    | u = (rate, R2 (v_x, v_y)), R2 the rotation by the joint's angle             |
+/// | free-flyer           | Free      | u = (R w, R v_lin)                                                          |
 ///
 /// 6D closure: Weld. 3D: Ball. 5D: Ball and two ConstantAngle constraints, the axis in body 2 normal to two directions
-/// of body 1. With u = T(q) v (in the order of our dofs), the quantities of Simbody are handed out in our coordinates:
-///     M = T' M_s T,    b = T' (b_s + M_s dT/dt v),    J = G T,    tau_s = T^{-T} tau,    a = T^{-1} (udot - dT/dt v).
-///     (1)
+/// of body 1. With u = T(q) v, in the order of our dofs, Simbody's quantities are handed out in our coordinates:
+///     M = T' M_s T,    b = T' (b_s + M_s dT/dt v),    J = G T,    tau_s = T^{-T} tau,    a = T^{-1} (udot - dT/dt v)
 /// Simbody writes M udot + G' m = f: its constraint forces have the opposite sign, turned here.
 ///
 /// Simbody has no rotor inertia. solveBySimbody() therefore ignores the armature; solveWithArmature() solves
-///     [M + diag(armature), J'; J, 0] [a; m] = [tau - b; -(dJ/dt v)] (2)
+///     [M + diag(armature), J'; J, 0] [a; m] = [tau - b; -(dJ/dt v)]
 /// by a dense rank-revealing factorisation, all its terms being Simbody's.
 #include <memory>
 
@@ -54,18 +55,15 @@ class SimbodyBridge {
   VectorXd calcBias() const;           ///< nv
   /// Generalized forces of accelerations a (nv), constraints ignored, armature included.
   VectorXd calcInverseDynamics(ConstVectorRef a) const;
-  /// Largest position error of Simbody's constraints, m or rad or their sine.
-  double calcConstraintError() const;
-
   /// Simbody's realize(Acceleration); the armature is not seen.
   /// \throws std::exception of Simbody, for a mass matrix that is singular without armature
   OracleSolution solveBySimbody();
-  /// Eq. (2).
+  /// The system with armature, above.
   OracleSolution solveWithArmature() const;
 
-  /// Integrates Simbody's equations (Runge-Kutta-Merson, constraints projected at every step) from the state set, tau
-  /// held; q and v are overwritten with the final ones. Armature is not seen. \param accuracy relative local error
-  /// asked of the integrator, also the constraint tolerance
+  /// Integrates Simbody's equations from the state set, tau held, by Runge-Kutta-Merson with projection of the
+  /// constraints at every step; q and v are overwritten with the final ones. Armature is not seen.
+  /// \param accuracy relative local error asked of the integrator, also the constraint tolerance
   void integrate(double duration, double accuracy, VectorXd& q, VectorXd& v);
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// The Simbody objects behind a SimbodyBridge, and the maps between its coordinates and ours (simbody_bridge.h, Eq. 1).
+// The Simbody objects behind a SimbodyBridge, and the maps between its coordinates and ours (simbody_bridge.h).
 #include <Simbody.h>
 
 #include "simbody_bridge.h"
@@ -37,7 +37,7 @@ struct SimbodyBridge::System {
   std::vector<int> u_index;                                 // per dof, index into Simbody's u
   SimTK::State state;
 
-  // At the state set last, Eq. (1).
+  // At the state set last: u = T v.
   VectorXd v;       // nv
   VectorXd tau;     // nv
   MatrixXd T;       // nv x nv

@@ -30,17 +30,17 @@ struct ValidationOptions {
   int samples = 10;
   unsigned seed = 1;
   double tolerance = 1e-9;             ///< relative, of every row but the derivatives
-  int derivative_samples = 1;          ///< how many of the samples have their derivatives checked
+  int derivative_samples = 3;          ///< how many of the samples have their derivatives checked
   double derivative_tolerance = 1e-6;  ///< relative
   double derivative_step = 1e-3;       ///< h of the central differences, s
   VectorXd start;                      ///< nq, where states are drawn around; empty: the first reference, or neutral
   double perturbation = 0.3;           ///< largest change of a coordinate before closing, m or rad
   double velocity = 1;                 ///< largest coordinate of the velocity before projection, m/s or rad/s
   double force = 10;                   ///< largest generalized force, N m or N
-  double motion_duration = 0;  ///< s of a free motion from the first state to integrate by both, 0 for none (motion.h)
-  double motion_step = 1e-3;   ///< s, of our integrator
-  double motion_tolerance =
-      1e-6;  ///< of the distance at the end relative to the way gone, and of the energy to the kinetic one
+  double motion_duration = 0;          ///< s, of a free motion from the first state (motion.h); 0 for none
+  double motion_step = 1e-3;           ///< s, of our integrator
+  /// Of the distance at the end relative to the way gone, and of the energy error relative to the kinetic energy.
+  double motion_tolerance = 1e-6;
 };
 
 struct ValidationRow {
