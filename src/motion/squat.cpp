@@ -95,7 +95,7 @@ double calcSquatHeight(const SquatOptions& o, double t) {
   return 1 - (1 - o.depth) * 0.5 * (1 - std::cos(2 * kPi * s));
 }
 
-Motion makeSquat(const Model& model, const SquatOptions& options) {
+Motion makeSquat(const Model& model, const SquatOptions& options, Formulation formulation) {
   check(model, options);
   const VectorXd q0 = makeStandingPosture(model), v0 = VectorXd::Zero(model.nv());
   std::vector<int> feet;
@@ -121,7 +121,7 @@ Motion makeSquat(const Model& model, const SquatOptions& options) {
   terminal.costs.resize(1);  // the height; forces have no meaning at the terminal node
   terminal.state.weight = options.terminal_weight;
   terminal.state.weights.head(model.nv()).setZero();
-  motion.problem = std::make_unique<RobotProblem>(model, q0, v0, std::move(stages));
+  motion.problem = std::make_unique<RobotProblem>(model, q0, v0, std::move(stages), formulation);
 
   const VectorXd u0 = calcStaticTorques(model, makeConstraintSet(model, contacts), q0).u;
   motion.guess.xs.assign(nodes + 1, motion.problem->initialState());

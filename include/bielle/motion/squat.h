@@ -20,7 +20,7 @@ struct SquatOptions {
   double friction_weight = 1e-2;  ///< of leaving the friction pyramid, 1/N^2
   double friction = 0.7;          ///< friction coefficient, 1
   double terminal_weight = 1e3;   ///< of the final velocities
-  double contact_kp = 0;          ///< stabilisation of the contacts, 1/s^2
+  double contact_kp = 400;        ///< stabilisation of the contacts, 1/s^2
   double contact_kd = 100;        ///< 1/s
   double closure_kp = 0;          ///< stabilisation of the closures, 1/s^2
   double closure_kd = 0;          ///< 1/s
@@ -31,7 +31,7 @@ std::vector<OptionEntry> listOptions(SquatOptions& options);
 
 /// Squat on all contacts of the robot, from its standing posture.
 /// \throws ModelError when the request is impossible (depth, durations, no contact)
-Motion makeSquat(const Model& model, const SquatOptions& options = {});
+Motion makeSquat(const Model& model, const SquatOptions& options = {}, Formulation formulation = Formulation::Reduced);
 
 /// Height of the CoM at time t over its initial height: 1 at rest, `depth` at mid-motion.
 double calcSquatHeight(const SquatOptions& options, double t);
