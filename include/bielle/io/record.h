@@ -1,0 +1,43 @@
+#pragma once
+/// \file A solved motion as numbers: what happens at every node, column by named column.
+#include <string>
+#include <vector>
+
+#include "bielle/motion/motion.h"
+
+namespace bielle {
+
+using RowMatrixXd = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// N stages, N + 1 nodes; one row per node or, for what a stage does from its node to the next, one row per stage.
+/// SI units, orders and frames of notation.h. Numbers of a stage whose dynamics could not be computed are NaN.
+struct MotionRecord {
+  std::vector<std::string> q_names, v_names;  ///< of coordinates, as names.h gives them
+  std::vector<std::string> u_names;           ///< of motors
+  std::vector<std::string> closure_names, contact_names;
+
+  VectorXd time;                 ///< N + 1, s
+  RowMatrixXd q, v;              ///< N + 1 x nq, N + 1 x nv
+  RowMatrixXd a;                 ///< N x nv
+  RowMatrixXd u;                 ///< N x nu, N m or N
+  RowMatrixXd closure_wrenches;  ///< N x 6 per closure, on body 1, in frame 1
+  RowMatrixXd contact_wrenches;  ///< N x 6 per contact, of the ground on the foot, in its frame; zero in the air
+  RowMatrixXd com;               ///< N + 1 x 3, m
+  RowMatrixXd gap;               ///< N + 1 x 2, largest closing error: norms of position (m) and of angle (rad)
+};
+
+MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajectory);
+
+/// One row per node under one header: time, q.<name>, v.<name>, a.<name>, u.<motor>, closure.<name>.<entry>,
+/// contact.<name>.<entry>, com.x, com.y, com.z, gap.position, gap.angle. The last node is no stage: the cells of a, u
+/// and of the wrenches are empty there. Numbers are the shortest that read back to the same bits.
+void writeCsv(const std::string& path, const MotionRecord& record);
+
+/// NumPy archive of the members above by the same names; wrenches are N x closures x 6 and N x contacts x 6.
+void writeNpz(const std::string& path, const MotionRecord& record);
+
+/// Reads what the functions above wrote; the extension (.csv, .npz) tells which.
+/// \throws ModelError naming the file and what is wrong with it, as the writers do when they cannot write
+MotionRecord readRecord(const std::string& path);
+
+}  // namespace bielle

@@ -1,0 +1,50 @@
+#pragma once
+/// \file What a solve gave, as three files in a directory.
+#include <string>
+#include <vector>
+
+#include "bielle/io/record.h"
+
+namespace bielle {
+
+/// How the motion was asked for.
+struct RunInfo {
+  std::string robot;                 ///< name or path, as given
+  std::string formulation = "full";  ///< of the dynamics
+  std::vector<std::string> command;  ///< the command line, or empty
+};
+
+struct MotionResult {
+  RunInfo run;
+  std::string motion;
+  std::vector<std::pair<std::string, double>> requested;  ///< every option by name
+  FddpSummary solver;
+  MotionRecord record;
+
+  std::vector<std::pair<std::string, double>> peak_torques;  ///< largest |u| by motor, largest first, N m or N
+  double gap_position = 0, gap_angle = 0;                    ///< largest closing error of the motion, m and rad
+  double slip_position = 0, slip_angle = 0;  ///< farthest a foot went from where it touched down, m and rad
+  double com_start = 0, com_lowest = 0;      ///< height of the centre of mass, m
+
+  bool converged() const { return solver.termination == FddpTermination::Converged; }
+  bool interrupted() const { return solver.termination == FddpTermination::Interrupted; }
+};
+
+MotionResult makeResult(const RunInfo& run, const Motion& motion, const ShootingTrajectory& trajectory,
+                        const FddpSummary& summary);
+
+/// Creates the directory, with its parents, and makes sure that files can be written there.
+/// \throws ModelError naming the directory and why
+void makeOutputDirectory(const std::string& directory);
+
+/// Writes trajectory.csv, trajectory.npz and summary.json. Each is written aside and renamed when all are whole,
+/// summary.json last. Returns their paths. \throws ModelError naming the file and why
+std::vector<std::string> writeResult(const std::string& directory, const MotionResult& result);
+
+/// Versions this library was built from and with.
+struct BuildInfo {
+  std::string bielle, eigen, compiler;
+};
+BuildInfo getBuildInfo();
+
+}  // namespace bielle

@@ -1,0 +1,38 @@
+#include "io/aside_file.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+
+#include "bielle/model/error.h"
+
+namespace bielle {
+
+void failToWrite(const std::string& path, const std::string& why) {
+  throw ModelError(path, "file", "it cannot be written: " + why,
+                   "check the directory, its permissions and the space left");
+}
+
+AsideFile::AsideFile(const std::string& path) : path_(path), aside_(path + ".part" + std::to_string(getpid())) {}
+
+AsideFile::~AsideFile() {
+  if (!aside_.empty()) std::remove(aside_.c_str());
+}
+
+void AsideFile::write(const std::string& text) {
+  errno = 0;
+  std::ofstream file(aside_, std::ios::binary | std::ios::trunc);
+  file.write(text.data(), static_cast<std::streamsize>(text.size()));
+  file.close();
+  if (!file) failToWrite(path_, std::strerror(errno));
+}
+
+void AsideFile::commit() {
+  if (std::rename(aside_.c_str(), path_.c_str()) != 0) failToWrite(path_, std::strerror(errno));
+  aside_.clear();
+}
+
+}  // namespace bielle

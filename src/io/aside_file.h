@@ -1,0 +1,29 @@
+#pragma once
+// A file written aside and renamed when it is whole.
+#include <string>
+
+namespace bielle {
+
+class AsideFile {
+ public:
+  explicit AsideFile(const std::string& path);
+  /// Removes what was not committed.
+  ~AsideFile();
+  AsideFile(const AsideFile&) = delete;
+  AsideFile& operator=(const AsideFile&) = delete;
+
+  /// Where to write.
+  const std::string& aside() const { return aside_; }
+  /// \throws ModelError when the text cannot be written
+  void write(const std::string& text);
+  /// Puts the file in its place, over the one that may be there. \throws ModelError when it cannot
+  void commit();
+
+ private:
+  std::string path_, aside_;
+};
+
+/// \throws ModelError "path: file: it cannot be written: why; ..."
+[[noreturn]] void failToWrite(const std::string& path, const std::string& why);
+
+}  // namespace bielle

@@ -1,0 +1,115 @@
+#include "bielle/io/record.h"
+
+#include <limits>
+
+#include "bielle/dynamics/centroidal.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/io/names.h"
+#include "bielle/model/error.h"
+#include "io/aside_file.h"
+#include "io/record_tables.h"
+
+namespace bielle {
+namespace {
+
+void recordNode(const Model& model, Workspace& ws, const VectorXd& x, int k, MotionRecord& record) {
+  record.q.row(k) = x.head(model.nq());
+  record.v.row(k) = x.tail(model.nv());
+  updatePositions(model, ws, x.head(model.nq()));
+  record.com.row(k) = calcCom(model, ws);
+  record.gap.row(k).setZero();
+  for (const Closure& closure : model.closures()) {
+    const RowVectorUpTo6 r = calcClosureResidual(ws, closure);
+    record.gap(k, 0) = std::max(record.gap(k, 0), r.head(3).norm());
+    record.gap(k, 1) = std::max(record.gap(k, 1), r.tail(r.size() - 3).norm());
+  }
+}
+
+void recordStage(RobotProblem& problem, const VectorXd& x, const VectorXd& u, int k, MotionRecord& record) {
+  const Model& model = problem.model();
+  record.u.row(k) = u;
+  record.closure_wrenches.row(k).setZero();
+  record.contact_wrenches.row(k).setZero();
+  VectorXd a, lambda;
+  if (problem.calcDynamics(k, x, u, a, lambda) != StepStatus::Ok) {
+    for (RowMatrixXd* table : {&record.a, &record.closure_wrenches, &record.contact_wrenches})
+      table->row(k).setConstant(std::numeric_limits<double>::quiet_NaN());
+    return;
+  }
+  record.a.row(k) = a;
+  const ConstraintSet& set = problem.spec(k).constraints;
+  for (int c = 0; c < static_cast<int>(set.closures.size()); ++c) {
+    const Closure& closure = set.closures[c];
+    const bool loop = c < set.num_loops;
+    const int index = loop ? c : model.findContact(closure.name);
+    (loop ? record.closure_wrenches : record.contact_wrenches).block<1, 6>(k, 6 * index) =
+        expandRows(closure, lambda.segment(set.offsets[c], getRows(closure.kind)));
+  }
+}
+
+}  // namespace
+
+void resizeRecord(int stages, MotionRecord& record) {
+  record.time.resize(stages + 1);
+  for (const RecordTable& table : listTables(record))
+    (record.*table.data).resize(stages + (table.per == RecordTable::Per::Node ? 1 : 0), table.columns.size());
+}
+
+std::vector<RecordTable> listTables(const MotionRecord& r) {
+  using Per = RecordTable::Per;
+  using R = MotionRecord;
+  return {{"q", "q", Per::Node, r.q_names, &R::q, 0},
+          {"v", "v", Per::Node, r.v_names, &R::v, 0},
+          {"a", "a", Per::Stage, r.v_names, &R::a, 0},
+          {"u", "u", Per::Stage, r.u_names, &R::u, 0},
+          {"closure_wrenches", "closure", Per::Stage, makeWrenchNames(r.closure_names), &R::closure_wrenches, 6},
+          {"contact_wrenches", "contact", Per::Stage, makeWrenchNames(r.contact_names), &R::contact_wrenches, 6},
+          {"com", "com", Per::Node, {"x", "y", "z"}, &R::com, 0},
+          {"gap", "gap", Per::Node, {"position", "angle"}, &R::gap, 0}};
+}
+
+MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajectory) {
+  RobotProblem& problem = *motion.problem;
+  const Model& model = problem.model();
+  const int stages = problem.numStages();
+  MotionRecord record;
+  record.q_names = makePositionNames(model);
+  record.v_names = makeVelocityNames(model);
+  record.u_names = getNames(model.motors());
+  record.closure_names = getNames(model.closures());
+  record.contact_names = getNames(model.contacts());
+  resizeRecord(stages, record);
+  Workspace ws(model);
+  double time = 0;
+  for (int k = 0; k <= stages; ++k) {
+    record.time[k] = time;
+    recordNode(model, ws, trajectory.xs[k], k, record);
+    if (k == stages) break;
+    recordStage(problem, trajectory.xs[k], trajectory.us[k], k, record);
+    time += problem.spec(k).dt;
+  }
+  return record;
+}
+
+void writeCsv(const std::string& path, const MotionRecord& record) {
+  AsideFile file(path);
+  file.write(formatCsv(record));
+  file.commit();
+}
+
+void writeNpz(const std::string& path, const MotionRecord& record) {
+  AsideFile file(path);
+  file.write(formatNpz(record));
+  file.commit();
+}
+
+MotionRecord readRecord(const std::string& path) {
+  const auto endsWith = [&path](const std::string& end) {
+    return path.size() >= end.size() && path.compare(path.size() - end.size(), end.size(), end) == 0;
+  };
+  if (endsWith(".csv")) return readCsv(path);
+  if (endsWith(".npz")) return readNpz(path);
+  throw ModelError(path, "file", "it is neither .csv nor .npz", "give a trajectory that Bielle wrote");
+}
+
+}  // namespace bielle

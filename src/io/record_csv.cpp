@@ -1,0 +1,132 @@
+// Trajectories as comma-separated values.
+#include <charconv>
+#include <fstream>
+#include <iterator>
+
+#include "bielle/model/error.h"
+#include "io/record_tables.h"
+
+namespace bielle {
+namespace {
+
+[[noreturn]] void fail(const std::string& path, const std::string& element, const std::string& problem) {
+  throw ModelError(path, element, problem, "give a trajectory that Bielle wrote");
+}
+
+// A name with a comma, a quote or a line break is quoted, as usual in CSV.
+std::string quote(const std::string& name) {
+  if (name.find_first_of(",\"\n\r") == std::string::npos) return name;
+  std::string text = "\"";
+  for (char c : name) text += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return text + "\"";
+}
+
+void append(double value, std::string& text) {
+  char digits[32];
+  text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
+}
+
+std::vector<std::string> makeHeader(const MotionRecord& record) {
+  std::vector<std::string> header = {"time"};
+  for (const RecordTable& table : listTables(record))
+    for (const std::string& column : table.columns) header.push_back(table.prefix + "." + column);
+  return header;
+}
+
+// The cells of the line that begins at `at`, which moves to the next line.
+std::vector<std::string> readLine(const std::string& text, size_t& at) {
+  std::vector<std::string> cells(1);
+  bool quoted = false;
+  for (; at < text.size(); ++at) {
+    const char c = text[at];
+    if (c == '"' && quoted && at + 1 < text.size() && text[at + 1] == '"')
+      cells.back() += text[++at];
+    else if (c == '"')
+      quoted = !quoted;
+    else if (c == ',' && !quoted)
+      cells.emplace_back();
+    else if (c == '\n' && !quoted)
+      break;
+    else if (c != '\r' || quoted)
+      cells.back() += c;
+  }
+  ++at;
+  return cells;
+}
+
+// Names from the columns of one prefix; of a wrench, the first of its six entries gives the name.
+void addName(const std::string& column, MotionRecord& record) {
+  const size_t dot = column.find('.');
+  if (dot == std::string::npos) return;
+  const std::string prefix = column.substr(0, dot), name = column.substr(dot + 1);
+  if (prefix == "q") record.q_names.push_back(name);
+  if (prefix == "v") record.v_names.push_back(name);
+  if (prefix == "u") record.u_names.push_back(name);
+  const bool first_entry = name.size() > 3 && name.compare(name.size() - 3, 3, ".fx") == 0;
+  if (prefix == "closure" && first_entry) record.closure_names.push_back(name.substr(0, name.size() - 3));
+  if (prefix == "contact" && first_entry) record.contact_names.push_back(name.substr(0, name.size() - 3));
+}
+
+}  // namespace
+
+std::string formatCsv(const MotionRecord& record) {
+  std::string text;
+  for (const std::string& column : makeHeader(record)) text += (text.empty() ? "" : ",") + quote(column);
+  const std::vector<RecordTable> tables = listTables(record);
+  for (int k = 0; k < record.time.size(); ++k) {
+    text += "\n";
+    append(record.time[k], text);
+    for (const RecordTable& table : tables) {
+      const RowMatrixXd& data = record.*table.data;
+      for (int i = 0; i < data.cols(); ++i) {
+        text += ",";
+        if (k < data.rows()) append(data(k, i), text);
+      }
+    }
+  }
+  return text + "\n";
+}
+
+MotionRecord readCsv(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  if (!file.is_open() || file.bad()) fail(path, "file", "it cannot be read");
+  size_t at = 0;
+  MotionRecord record;
+  const std::vector<std::string> header = readLine(text, at);
+  for (const std::string& column : header) addName(column, record);
+  if (makeHeader(record) != header) fail(path, "header", "its columns are not those of a trajectory");
+  std::vector<std::vector<std::string>> rows;
+  while (at < text.size()) rows.push_back(readLine(text, at));
+  if (rows.empty()) fail(path, "file", "it has no node");
+
+  resizeRecord(static_cast<int>(rows.size()) - 1, record);
+  const std::vector<RecordTable> tables = listTables(record);
+  for (size_t k = 0; k < rows.size(); ++k) {
+    const std::string line = "line " + std::to_string(k + 2);
+    if (rows[k].size() != header.size())
+      fail(path, line, std::to_string(rows[k].size()) + " cells for " + std::to_string(header.size()) + " columns");
+    size_t column = 0;
+    const auto read = [&](double& value) {
+      const std::string& cell = rows[k][column];
+      const char* end = cell.data() + cell.size();
+      const auto [stop, error] = std::from_chars(cell.data(), end, value);
+      if (error != std::errc() || stop != end)
+        fail(path, line + ", column '" + header[column] + "'", "'" + cell + "' is not a number");
+      ++column;
+    };
+    read(record.time[k]);
+    for (const RecordTable& table : tables) {
+      RowMatrixXd& data = record.*table.data;
+      for (int i = 0; i < data.cols(); ++i) {
+        if (static_cast<int>(k) < data.rows())
+          read(data(k, i));
+        else if (!rows[k][column++].empty())
+          fail(path, line, "the last node holds values of a stage");
+      }
+    }
+  }
+  return record;
+}
+
+}  // namespace bielle

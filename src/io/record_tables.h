@@ -1,0 +1,26 @@
+#pragma once
+// The tables of a record, in the order of the files: what the CSV and the NumPy formats have in common.
+#include "bielle/io/record.h"
+
+namespace bielle {
+
+struct RecordTable {
+  enum class Per { Node, Stage };
+  std::string array;   // name in the NumPy archive
+  std::string prefix;  // of the columns of the CSV
+  Per per;
+  std::vector<std::string> columns;
+  RowMatrixXd MotionRecord::*data;
+  int entries;  // columns that belong together and make the last axis of a three-dimensional array, 0: none
+};
+std::vector<RecordTable> listTables(const MotionRecord& record);
+
+// Gives every table its size; the names must be there.
+void resizeRecord(int stages, MotionRecord& record);
+
+std::string formatCsv(const MotionRecord& record);
+std::string formatNpz(const MotionRecord& record);
+MotionRecord readCsv(const std::string& path);
+MotionRecord readNpz(const std::string& path);
+
+}  // namespace bielle

@@ -1,0 +1,142 @@
+#include "bielle/io/result.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/math/so3.h"
+#include "bielle/model/error.h"
+#include "io/aside_file.h"
+#include "io/json_text.h"
+#include "io/record_tables.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle {
+namespace {
+
+// How far each foot went from where it stood when its contact began.
+void calcSlip(const Motion& motion, const ShootingTrajectory& trajectory, MotionResult& result) {
+  const Model& model = motion.problem->model();
+  Workspace ws(model);
+  std::vector<std::optional<SE3>> touch_down(model.contacts().size());
+  for (size_t k = 0; k < trajectory.xs.size(); ++k) {
+    updatePositions(model, ws, trajectory.xs[k].head(model.nq()));
+    std::vector<bool> stands(model.contacts().size(), false);
+    for (const ContactTarget& target : motion.schedule.getPhase(static_cast<int>(k)).contacts) {
+      const ContactFrame& contact = model.contacts()[target.contact];
+      const SE3 X_WF = getPlacement(ws, contact.body, contact.X_BF);
+      std::optional<SE3>& start = touch_down[target.contact];
+      if (!start) start = X_WF;
+      const SE3 moved = start->inverseTimes(X_WF);
+      result.slip_position = std::max(result.slip_position, moved.p.norm());
+      if (contact.kind == ContactKind::Surface6D) result.slip_angle = std::max(result.slip_angle, log3(moved.R).norm());
+      stands[target.contact] = true;
+    }
+    for (size_t c = 0; c < stands.size(); ++c)
+      if (!stands[c]) touch_down[c].reset();
+  }
+}
+
+Json listByName(const std::vector<std::pair<std::string, double>>& values) {
+  Json json = Json::object();
+  for (const auto& [name, value] : values) json[name] = value;
+  return json;
+}
+
+Json makeSummary(const MotionResult& result) {
+  const BuildInfo build = getBuildInfo();
+  Json log = Json::array();
+  for (const FddpIteration& line : result.solver.log)
+    log.push_back({line.iteration, line.cost, line.gap, line.gradient, line.step, line.regularization, line.seconds});
+  const VectorXd& time = result.record.time;
+  return {{"motion", result.motion},
+          {"robot", result.run.robot},
+          {"formulation", result.run.formulation},
+          {"command", result.run.command},
+          {"requested", listByName(result.requested)},
+          {"versions", {{"bielle", build.bielle}, {"eigen", build.eigen}, {"compiler", build.compiler}}},
+          {"converged", result.converged()},
+          {"interrupted", result.interrupted()},
+          {"termination", getName(result.solver.termination)},
+          {"message", result.solver.message},
+          {"cost", result.solver.cost},
+          {"iterations", result.solver.iterations},
+          {"seconds", result.solver.seconds},
+          {"solver_gap", result.solver.gap},
+          {"nodes", time.size()},
+          {"duration_s", time[time.size() - 1]},
+          {"closure_gap", {{"position_m", result.gap_position}, {"angle_rad", result.gap_angle}}},
+          {"contact_slip", {{"position_m", result.slip_position}, {"angle_rad", result.slip_angle}}},
+          {"com_height", {{"start_m", result.com_start}, {"lowest_m", result.com_lowest}}},
+          {"peak_torques", listByName(result.peak_torques)},
+          {"log_columns", {"iteration", "cost", "gap", "gradient", "step", "regularization", "seconds"}},
+          {"log", log}};
+}
+
+}  // namespace
+
+MotionResult makeResult(const RunInfo& run, const Motion& motion, const ShootingTrajectory& trajectory,
+                        const FddpSummary& summary) {
+  MotionResult result;
+  result.run = run;
+  result.motion = motion.name;
+  result.requested = motion.requested;
+  result.solver = summary;
+  result.record = makeRecord(motion, trajectory);
+  const MotionRecord& record = result.record;
+  for (size_t m = 0; m < record.u_names.size(); ++m)
+    result.peak_torques.emplace_back(record.u_names[m], record.u.rows() ? record.u.col(m).cwiseAbs().maxCoeff() : 0);
+  std::stable_sort(result.peak_torques.begin(), result.peak_torques.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
+  result.gap_position = record.gap.col(0).maxCoeff();
+  result.gap_angle = record.gap.col(1).maxCoeff();
+  result.com_start = record.com(0, 2);
+  result.com_lowest = record.com.col(2).minCoeff();
+  calcSlip(motion, trajectory, result);
+  return result;
+}
+
+void makeOutputDirectory(const std::string& directory) {
+  const auto fail = [&directory](const std::string& why) {
+    throw ModelError(directory, "directory", "results cannot be written there: " + why,
+                     "give another one, or correct its permissions");
+  };
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error) fail(error.message());
+  if (!fs::is_directory(directory, error)) fail("it is a file");
+  if (access(directory.c_str(), W_OK | X_OK) != 0) fail(std::strerror(errno));
+}
+
+std::vector<std::string> writeResult(const std::string& directory, const MotionResult& result) {
+  makeOutputDirectory(directory);
+  std::vector<std::string> paths;
+  for (const char* name : {"trajectory.csv", "trajectory.npz", "summary.json"})
+    paths.push_back((fs::path(directory) / name).string());
+  AsideFile csv(paths[0]), npz(paths[1]), summary(paths[2]);
+  csv.write(formatCsv(result.record));
+  npz.write(formatNpz(result.record));
+  summary.write(formatJson(makeSummary(result)) + "\n");
+  for (AsideFile* file : {&csv, &npz, &summary}) file->commit();
+  return paths;
+}
+
+BuildInfo getBuildInfo() {
+#ifdef __clang__
+  const std::string compiler = __VERSION__;
+#else
+  const std::string compiler = "GCC " __VERSION__;
+#endif
+  return {BIELLE_VERSION,
+          std::to_string(EIGEN_WORLD_VERSION) + "." + std::to_string(EIGEN_MAJOR_VERSION) + "." +
+              std::to_string(EIGEN_MINOR_VERSION),
+          compiler};
+}
+
+}  // namespace bielle

@@ -1,0 +1,275 @@
+// Oracles: Python's own reader of ZIP files and numbers, the dynamics called directly, files read back to the last bit.
+#include <catch2/catch.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/centroidal.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/io/names.h"
+#include "bielle/io/result.h"
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/squat.h"
+
+namespace fs = std::filesystem;
+using namespace bielle;
+
+namespace {
+
+class TemporaryDirectory {
+ public:
+  TemporaryDirectory() {
+    std::string pattern = (fs::temp_directory_path() / "bielle_io_XXXXXX").string();
+    path_ = mkdtemp(pattern.data());
+  }
+  ~TemporaryDirectory() { fs::remove_all(path_); }
+  std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  fs::path path_;
+};
+
+std::string readText(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+void writeText(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
+
+// A short squat and its guess, moved so that nothing is zero by chance.
+struct ShortSquat {
+  ShortSquat() : robot(loadRobot("bipetto")) {
+    SquatOptions options;
+    options.duration = 0.12;
+    options.settle = 0;
+    options.time_step = 0.03;
+    motion = makeSquat(robot.model, options);
+    for (size_t k = 0; k < motion.guess.xs.size(); ++k) {
+      VectorXd& x = motion.guess.xs[k];
+      VectorXd dx = VectorXd::LinSpaced(2 * robot.model.nv(), -0.01, 0.02) * (0.3 + k);
+      motion.problem->integrate(static_cast<int>(k), VectorXd(x), dx, x);
+      if (k < motion.guess.us.size()) motion.guess.us[k] += VectorXd::LinSpaced(robot.model.nu(), 0.1, 1.7 / 3);
+    }
+  }
+  LoadedRobot robot;
+  Motion motion;
+};
+
+bool areEqual(const RowMatrixXd& a, const RowMatrixXd& b) {
+  return a.rows() == b.rows() && a.cols() == b.cols() && (a.array() == b.array()).all();
+}
+
+void checkEqual(const MotionRecord& a, const MotionRecord& b) {
+  CHECK(a.q_names == b.q_names);
+  CHECK(a.v_names == b.v_names);
+  CHECK(a.u_names == b.u_names);
+  CHECK(a.closure_names == b.closure_names);
+  CHECK(a.contact_names == b.contact_names);
+  CHECK(areEqual(a.time, b.time));
+  CHECK(areEqual(a.q, b.q));
+  CHECK(areEqual(a.v, b.v));
+  CHECK(areEqual(a.a, b.a));
+  CHECK(areEqual(a.u, b.u));
+  CHECK(areEqual(a.closure_wrenches, b.closure_wrenches));
+  CHECK(areEqual(a.contact_wrenches, b.contact_wrenches));
+  CHECK(areEqual(a.com, b.com));
+  CHECK(areEqual(a.gap, b.gap));
+}
+
+std::string getErrorOfReading(const std::string& path) {
+  try {
+    readRecord(path);
+  } catch (const ModelError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("coordinate names have the sizes of q and v, and name one-coordinate joints by themselves") {
+  const Model model = loadRobot("bipetto").model;
+  const std::vector<std::string> q = makePositionNames(model), v = makeVelocityNames(model);
+  REQUIRE(static_cast<int>(q.size()) == model.nq());
+  REQUIRE(static_cast<int>(v.size()) == model.nv());
+  CHECK(q[0] == "root_joint.x");
+  CHECK(q[6] == "root_joint.qw");
+  CHECK(v[3] == "root_joint.wx");
+  const Joint& knee = model.joints()[model.findJoint("knee_right")];
+  CHECK(q[knee.idx_q] == "knee_right");
+  const Joint& rod = model.joints()[model.findJoint("transmission_knee_right")];
+  CHECK(q[rod.idx_q + 3] == "transmission_knee_right.qw");
+  CHECK(v[rod.idx_v + 2] == "transmission_knee_right.wz");
+}
+
+TEST_CASE("a record holds what the dynamics say at each node") {
+  const ShortSquat squat;
+  const Model& model = squat.robot.model;
+  const MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
+  const int stages = squat.motion.problem->numStages();
+  REQUIRE(record.time.size() == stages + 1);
+  CHECK(record.time[stages] == Approx(0.12));
+  const int k = 2;
+  const VectorXd x = squat.motion.guess.xs[k], q = x.head(model.nq()), v = x.tail(model.nv());
+  Workspace ws(model);
+  ConstrainedWorkspace cws;
+  const ConstraintSet& set = squat.motion.problem->spec(k).constraints;
+  REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, calcMotorForces(model, squat.motion.guess.us[k])) ==
+          DynamicsStatus::Ok);
+  CHECK((record.a.row(k).transpose() - cws.a).norm() < 1e-9 * cws.a.norm());
+  CHECK(record.closure_wrenches.cols() == 36);
+  // The wrenches by name do the work of the rows of lambda.
+  VectorXd forces = VectorXd::Zero(model.nv());
+  for (size_t c = 0; c < set.closures.size(); ++c) {
+    const bool loop = static_cast<int>(c) < set.num_loops;
+    const auto& names = loop ? record.closure_names : record.contact_names;
+    const auto index = std::find(names.begin(), names.end(), set.closures[c].name) - names.begin();
+    const Vector6d wrench =
+        (loop ? record.closure_wrenches : record.contact_wrenches).row(k).segment<6>(6 * index).transpose();
+    MatrixXd J = MatrixXd::Zero(getRows(set.closures[c].kind), model.nv());
+    calcClosureJacobian(ws, set.closures[c], J);
+    forces += J.transpose() * wrench;
+  }
+  const VectorXd expected = cws.J.transpose() * cws.lambda;
+  CHECK((forces - expected).norm() < 1e-9 * expected.norm());
+  CHECK((record.com.row(k).transpose() - calcCom(model, ws)).norm() < 1e-14);
+  CHECK(record.gap.row(k).maxCoeff() >= calcLargestGap(ws, makeConstraintSet(model)));
+}
+
+TEST_CASE("trajectories come back from CSV and NumPy files to the last bit") {
+  const TemporaryDirectory directory;
+  const ShortSquat squat;
+  MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
+  record.v(0, 0) = 1.0 / 3;
+  record.v(0, 1) = -0.0;
+  record.v(0, 2) = 5e-324;
+  record.v(0, 3) = 1.7976931348623157e308;
+  record.closure_names[0] = "a, \"quoted\" name";
+  record.closure_names[1] = "bièlle";
+  writeCsv(directory / "t.csv", record);
+  writeNpz(directory / "t.npz", record);
+  checkEqual(readRecord(directory / "t.csv"), record);
+  checkEqual(readRecord(directory / "t.npz"), record);
+  MotionRecord other = record;
+  other.u(1, 1) = std::nextafter(other.u(1, 1), 1e9);
+  CHECK_FALSE(areEqual(other.u, record.u));  // the comparison sees the last bit
+}
+
+TEST_CASE("a robot without closures, motors or feet gives files that can be read back") {
+  const TemporaryDirectory directory;
+  MotionRecord record;
+  record.q_names = record.v_names = {"pendulum"};
+  record.time = VectorXd::LinSpaced(2, 0, 1);
+  record.q = record.v = RowMatrixXd::Constant(2, 1, 0.5);
+  record.a = RowMatrixXd::Constant(1, 1, 0.25);
+  record.u = record.closure_wrenches = record.contact_wrenches = RowMatrixXd(1, 0);
+  record.com = RowMatrixXd::Zero(2, 3);
+  record.gap = RowMatrixXd::Zero(2, 2);
+  writeCsv(directory / "t.csv", record);
+  writeNpz(directory / "t.npz", record);
+  checkEqual(readRecord(directory / "t.csv"), record);
+  checkEqual(readRecord(directory / "t.npz"), record);
+}
+
+TEST_CASE("Python reads the NumPy archive and finds the numbers of the CSV") {
+  const TemporaryDirectory directory;
+  const ShortSquat squat;
+  const MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
+  writeCsv(directory / "t.csv", record);
+  writeNpz(directory / "t.npz", record);
+  const auto compare = [&] {
+    const std::string command = std::string(BIELLE_PYTHON) + " " + BIELLE_SOURCE_DIR +
+                                "/tests/compare_trajectories.py " + (directory / "t.csv") + " " +
+                                (directory / "t.npz") + " > /dev/null 2>&1";
+    return std::system(command.c_str());
+  };
+  CHECK(compare() == 0);
+  MotionRecord poisoned = record;
+  poisoned.contact_wrenches(2, 7) += 1e-9;
+  writeNpz(directory / "t.npz", poisoned);
+  CHECK(compare() != 0);
+}
+
+TEST_CASE("files that are no trajectories are refused with the file and the place") {
+  const TemporaryDirectory directory;
+  const ShortSquat squat;
+  writeCsv(directory / "good.csv", makeRecord(squat.motion, squat.motion.guess));
+  writeNpz(directory / "good.npz", makeRecord(squat.motion, squat.motion.guess));
+  const std::string csv = readText(directory / "good.csv"), npz = readText(directory / "good.npz");
+
+  CHECK_THAT(getErrorOfReading(directory / "none.csv"), Catch::Contains("none.csv: file: it cannot be read"));
+  CHECK_THAT(getErrorOfReading(directory / "none.npz"), Catch::Contains("none.npz: file: it cannot be read"));
+  CHECK_THAT(getErrorOfReading(directory / "none.txt"), Catch::Contains("neither .csv nor .npz"));
+  writeText(directory / "a.csv", "");
+  CHECK_THAT(getErrorOfReading(directory / "a.csv"), Catch::Contains("header"));
+  writeText(directory / "a.csv", csv.substr(0, csv.find('\n') + 1));
+  CHECK_THAT(getErrorOfReading(directory / "a.csv"), Catch::Contains("no node"));
+  writeText(directory / "a.csv", csv.substr(0, csv.size() / 2));
+  CHECK_THAT(getErrorOfReading(directory / "a.csv"), Catch::Contains("line "));
+  std::string wrong = csv;
+  wrong.replace(wrong.find('\n') + 1, 1, "x");
+  writeText(directory / "a.csv", wrong);
+  CHECK_THAT(getErrorOfReading(directory / "a.csv"), Catch::Contains("line 2, column 'time': 'x' is not a number"));
+  writeText(directory / "a.csv", "q.a,time\n1,2\n");
+  CHECK_THAT(getErrorOfReading(directory / "a.csv"), Catch::Contains("columns"));
+  for (size_t size : {size_t(0), size_t(100), npz.size() / 2, npz.size() - 1}) {
+    writeText(directory / "a.npz", npz.substr(0, size));
+    CHECK_THAT(getErrorOfReading(directory / "a.npz"), Catch::Contains("a.npz: "));
+  }
+}
+
+TEST_CASE("a result is three whole files, written again over the old ones") {
+  const TemporaryDirectory directory;
+  ShortSquat squat;
+  FddpSummary summary;
+  summary.termination = FddpTermination::Interrupted;
+  summary.cost = 2.5;
+  summary.log.resize(3);
+  const MotionResult result =
+      makeResult({"bipetto", "full", {"bielle", "solve"}}, squat.motion, squat.motion.guess, summary);
+  CHECK(result.interrupted());
+  CHECK_FALSE(result.converged());
+  for (size_t m = 1; m < result.peak_torques.size(); ++m)
+    CHECK(result.peak_torques[m - 1].second >= result.peak_torques[m].second);
+  CHECK(result.gap_position == result.record.gap.col(0).maxCoeff());
+  CHECK(result.slip_position > 1e-3);  // the moved guess does not stand still
+  const std::string place = directory / "deep/er";
+  for (int repetition = 0; repetition < 2; ++repetition) {
+    const std::vector<std::string> paths = writeResult(place, result);
+    CHECK(paths.size() == 3);
+    CHECK(std::distance(fs::directory_iterator(place), fs::directory_iterator()) == 3);
+    checkEqual(readRecord(paths[0]), result.record);
+    checkEqual(readRecord(paths[1]), result.record);
+    CHECK_THAT(readText(paths[2]), Catch::Contains("\"termination\": \"interrupted\"") &&
+                                       Catch::Contains("\"interrupted\": true") && Catch::Contains("\"cost\": 2.5"));
+  }
+}
+
+TEST_CASE("the slip is zero for feet that stand still") {
+  const LoadedRobot robot = loadRobot("bipetto");
+  SquatOptions options;
+  options.duration = 0.12;
+  Motion motion = makeSquat(robot.model, options);
+  const MotionResult result = makeResult({}, motion, motion.guess, {});
+  CHECK(result.slip_position == 0);
+  CHECK(result.slip_angle < 1e-15);
+  CHECK(result.gap_position < 1e-12);
+}
+
+TEST_CASE("a place that cannot be written to is an error that says why") {
+  const TemporaryDirectory directory;
+  writeText(directory / "file", "");
+  CHECK_THROWS_WITH(makeOutputDirectory(directory / "file"), Catch::Contains("file: directory: results cannot be"));
+  CHECK_THROWS_WITH(makeOutputDirectory(directory / "file/below"), Catch::Contains("Not a directory"));
+  CHECK_THROWS_AS(makeOutputDirectory("/proc/bielle"), ModelError);
+  ShortSquat squat;
+  const MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
+  CHECK_THROWS_WITH(writeCsv(directory / "none/t.csv", record), Catch::Contains("No such file or directory"));
+  fs::create_directory(directory / "t.npz");
+  CHECK_THROWS_WITH(writeNpz(directory / "t.npz", record), Catch::Contains("Is a directory"));
+  CHECK(std::distance(fs::directory_iterator(directory / ""), fs::directory_iterator()) == 2);  // nothing half written
+}
