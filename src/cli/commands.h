@@ -1,0 +1,39 @@
+#pragma once
+// The subcommands of `bielle`, one per file. Each adds itself to the parser and, if it was called, leaves its action.
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+#include "bielle/model/reader.h"
+
+namespace bielle::cli {
+
+// Exit statuses.
+constexpr int kOk = 0, kFailed = 1, kBadInput = 2;
+
+using Action = std::function<int()>;  // returns the exit status
+
+void addSolve(CLI::App& app, Action& action);
+void addInfo(CLI::App& app, Action& action);
+void addEval(CLI::App& app, Action& action);
+void addRobots(CLI::App& app, Action& action);
+
+// Only the line of the help: its arguments are those of another program.
+void addValidate(CLI::App& app);
+// Becomes bielle-validate; returns only when it cannot. `arguments` ends with a null pointer and begins with a name.
+int runValidate(char** arguments);
+
+// What every command with a robot asks for.
+struct RobotArgument {
+  std::string name;
+  bool fixed_base = false;
+  // Loads the robot and prints its warnings to the standard error.
+  LoadedRobot load() const;
+};
+void addFixedBase(CLI::App& command, RobotArgument& robot);
+
+// The whole command line, for the record.
+void setCommandLine(int argc, char** argv);
+const std::vector<std::string>& getCommandLine();
+
+}  // namespace bielle::cli

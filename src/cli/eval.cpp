@@ -1,0 +1,141 @@
+// bielle eval: the constrained dynamics at one state, and their derivatives.
+#include <iostream>
+
+#include "bielle/dynamics/centroidal.h"
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/io/names.h"
+#include "bielle/model/error.h"
+#include "bielle/motion/motion.h"
+#include "cli/commands.h"
+#include "cli/eval_state.h"
+#include "io/json_text.h"
+
+namespace bielle::cli {
+namespace {
+
+struct EvalArguments {
+  RobotArgument robot;
+  std::string state;
+  bool derivatives = false;
+};
+
+// The dynamics at a state, up to date.
+struct Evaluation {
+  Evaluation(const Model& model, const EvalState& state)
+      : constraints(makeConstraintSet(model, makeContactTargets(model, state.q, state.contacts, 0, 0))), ws(model) {
+    status = updateConstrainedDynamics(model, ws, cws, constraints, state.q, state.v, calcMotorForces(model, state.u));
+  }
+  ConstraintSet constraints;
+  Workspace ws;
+  ConstrainedWorkspace cws;
+  DynamicsStatus status;
+};
+
+Json listNumbers(const VectorXd& vector) { return std::vector<double>(vector.begin(), vector.end()); }
+
+Json listRows(const MatrixXd& matrix) {
+  Json rows = Json::array();
+  for (int i = 0; i < matrix.rows(); ++i) rows.push_back(listNumbers(matrix.row(i)));
+  return rows;
+}
+
+// Six rows per constraint, whatever its kind, of rows of forces.
+MatrixXd expandForces(const ConstraintSet& constraints, const MatrixXd& rows) {
+  MatrixXd wrenches(6 * constraints.closures.size(), rows.cols());
+  for (size_t c = 0; c < constraints.closures.size(); ++c) {
+    const Closure& closure = constraints.closures[c];
+    for (int i = 0; i < rows.cols(); ++i)
+      wrenches.block<6, 1>(6 * c, i) =
+          expandRows(closure, rows.col(i).segment(constraints.offsets[c], getRows(closure.kind)));
+  }
+  return wrenches;
+}
+
+Json describe(const Model& model, const EvalState& state, const Evaluation& at) {
+  Json accelerations = Json::object(), loops = Json::object(), contacts = Json::object(), residuals = Json::object();
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    accelerations[joint.name] = listNumbers(at.cws.a.segment(joint.idx_v, joint.nv));
+  }
+  const MatrixXd wrenches = expandForces(at.constraints, at.cws.lambda);
+  for (size_t c = 0; c < at.constraints.closures.size(); ++c) {
+    const Closure& closure = at.constraints.closures[c];
+    const bool loop = static_cast<int>(c) < at.constraints.num_loops;
+    (loop ? loops : contacts)[closure.name] = listNumbers(wrenches.col(0).segment<6>(6 * c));
+    if (loop) residuals[closure.name] = listNumbers(calcClosureResidual(at.ws, closure));
+  }
+  const Mobility mobility = calcMobility(model, state.q);
+  return {{"robot", model.name()},
+          {"order",
+           {{"q", makePositionNames(model)},
+            {"v", makeVelocityNames(model)},
+            {"u", getNames(model.motors())},
+            {"lambda", makeWrenchNames(getNames(at.constraints.closures))}}},
+          {"q", listNumbers(state.q)},
+          {"v", listNumbers(state.v)},
+          {"u", listNumbers(state.u)},
+          {"accelerations", accelerations},
+          {"closure_wrenches", loops},
+          {"contact_wrenches", contacts},
+          {"closure_residuals", residuals},
+          {"rank", mobility.rank},
+          {"mobility", mobility.mobility},
+          {"constraint_error", at.cws.residual},
+          {"mass", model.mass()},
+          {"com", listNumbers(calcCom(model, at.ws))},
+          {"kinetic_energy", calcKineticEnergy(model, at.ws)},
+          {"potential_energy", calcPotentialEnergy(model, at.ws)},
+          {"mass_matrix_diagonal", listNumbers(at.ws.M.diagonal())},
+          {"bias", listNumbers(at.ws.b)}};
+}
+
+void requireOk(DynamicsStatus status) {
+  if (status != DynamicsStatus::Ok) throw std::runtime_error(getMessage(status));
+}
+
+int evaluate(const EvalArguments& arguments) {
+  const LoadedRobot robot = arguments.robot.load();
+  const EvalState state = readState(robot.model, arguments.state);
+  Evaluation at(robot.model, state);
+  requireOk(at.status);
+  Json json = describe(robot.model, state, at);
+  if (arguments.derivatives) {
+    requireOk(updateConstrainedDerivatives(robot.model, at.ws, at.cws, at.constraints));
+    const ConstrainedWorkspace& cws = at.cws;
+    json["da_dq"] = listRows(cws.da_dq);
+    json["da_dv"] = listRows(cws.da_dv);
+    json["da_du"] = listRows(cws.da_du);
+    json["dlambda_dq"] = listRows(expandForces(at.constraints, cws.dlambda_dq));
+    json["dlambda_dv"] = listRows(expandForces(at.constraints, cws.dlambda_dv));
+    json["dlambda_du"] = listRows(expandForces(at.constraints, cws.dlambda_du));
+  }
+  std::cout << formatJson(json) << "\n";
+  return kOk;
+}
+
+}  // namespace
+
+void addEval(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("eval", "Compute accelerations, forces and derivatives at one state");
+  const auto arguments = std::make_shared<EvalArguments>();
+  command.add_option("ROBOT", arguments->robot.name, "name, directory or .urdf file")->required();
+  command.add_option("--state", arguments->state, "JSON file of the state, - for the standard input")->required();
+  command.add_flag("--derivatives", arguments->derivatives, "add the derivatives by q, v and u");
+  addFixedBase(command, arguments->robot);
+  command.footer(
+      std::string(kStateHelp) +
+      "The answer is JSON on the standard output: accelerations by joint (rates of v); wrenches of closures and "
+      "contacts\n(fx fy fz nx ny nz, N and N m, in frame 1, on body 1; for a contact: of the ground on the foot); "
+      "closure residuals; rank and\nmobility of the closures; mass, com, energies, the diagonal of the mass matrix and "
+      "the bias; with --derivatives row-major\nmatrices. Rows and columns are named by `order`: da_* has rows v, "
+      "dlambda_* rows lambda; *_dq has columns v (the tangent of q),\n*_du columns u. The state is taken as it is: "
+      "give "
+      "one that is closed. Where closures are redundant, forces are those of least norm.\n"
+      "Examples:\n"
+      "  bielle eval bipetto --state state.json --derivatives\n"
+      "  echo '{\"torques\": {\"crank_joint\": 1}}' | bielle eval fourbar --state -");
+  command.callback([&action, arguments] { action = [arguments] { return evaluate(*arguments); }; });
+}
+
+}  // namespace bielle::cli

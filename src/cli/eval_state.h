@@ -1,0 +1,21 @@
+#pragma once
+// The state of `bielle eval`: a JSON object of joints, torques and contacts, by name.
+#include <string>
+#include <vector>
+
+#include "bielle/model/model.h"
+
+namespace bielle::cli {
+
+struct EvalState {
+  VectorXd q, v, u;           // nq, nv, nu
+  std::vector<int> contacts;  // indices of the contacts in force, as listed
+};
+
+// Reads a file, or the standard input for "-". \throws ModelError naming the file and the element
+EvalState readState(const Model& model, const std::string& path);
+
+// The part of eval's help that says how a state is written.
+extern const char* const kStateHelp;
+
+}  // namespace bielle::cli

@@ -1,0 +1,183 @@
+// bielle info: what a robot is made of, and whether it closes.
+#include <cmath>
+#include <iostream>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/io/names.h"
+#include "cli/commands.h"
+#include "cli/table.h"
+
+namespace bielle::cli {
+namespace {
+
+struct Posture {
+  std::string name;
+  VectorXd q;
+  bool closed;
+  std::string message;
+};
+
+// The neutral configuration as it is, and every reference as far as it can be closed.
+std::vector<Posture> makePostures(const Model& model) {
+  std::vector<Posture> postures = {{"neutral", model.makeNeutral(), true, ""}};
+  for (const Reference& reference : model.references()) {
+    const AssemblyResult result = assembleReference(model, reference.name);
+    postures.push_back({reference.name, result.q, result.status == AssemblyStatus::Closed, result.message});
+  }
+  return postures;
+}
+
+Json orNull(double limit) { return std::isfinite(limit) ? Json(limit) : Json(nullptr); }
+
+std::string findFrameName(const Model& model, int body, const SE3& X_BF) {
+  for (const Frame& frame : model.frames())
+    if (frame.body == body && frame.X_BF.p == X_BF.p && frame.X_BF.R == X_BF.R) return frame.name;
+  return model.bodies()[body].name;
+}
+
+Json describeClosures(const Model& model, const std::vector<Posture>& postures) {
+  Json closures = Json::array();
+  for (const Closure& closure : model.closures())
+    closures.push_back({{"name", closure.name},
+                        {"kind", getName(closure.kind)},
+                        {"frame1", findFrameName(model, closure.body1, closure.X_B1)},
+                        {"frame2", findFrameName(model, closure.body2, closure.X_B2)},
+                        {"rows", getRows(closure.kind)},
+                        {"loop_dofs", closure.dofs.size()}});
+  Workspace ws(model);
+  for (const Posture& posture : postures) {
+    updatePositions(model, ws, posture.q);
+    for (size_t c = 0; c < closures.size(); ++c) {
+      const RowVectorUpTo6 r = calcClosureResidual(ws, model.closures()[c]);
+      closures[c]["gap " + posture.name] = {r.head(3).norm(), r.tail(r.size() - 3).norm()};
+    }
+  }
+  return closures;
+}
+
+// At the first reference that closes, else at the closed configuration nearest to neutral.
+Json describeMobility(const Model& model, const std::vector<Posture>& postures) {
+  std::string place = "closed neutral";
+  AssemblyResult neutral = closeConfiguration(model, model.makeNeutral());
+  VectorXd q = neutral.q;
+  bool closed = neutral.status == AssemblyStatus::Closed;
+  for (size_t i = postures.size(); i-- > 1;)
+    if (postures[i].closed) place = postures[i].name, q = postures[i].q, closed = true;
+  const Mobility mobility = calcMobility(model, q);
+  return {{"posture", place},
+          {"closed", closed},
+          {"rows", mobility.rows},
+          {"rank", mobility.rank},
+          {"mobility", mobility.mobility}};
+}
+
+Json describe(const LoadedRobot& robot) {
+  const Model& model = robot.model;
+  const std::vector<Posture> postures = makePostures(model);
+  Json json = {{"name", model.name()},
+               {"directory", robot.directory},
+               {"base", model.hasFreeFlyer() ? "free" : "fixed"},
+               {"mass", model.mass()},
+               {"nq", model.nq()},
+               {"nv", model.nv()},
+               {"nu", model.nu()},
+               {"closure_rows", model.numClosureRows()},
+               {"mobility", describeMobility(model, postures)},
+               {"joints", Json::array()},
+               {"closures", describeClosures(model, postures)},
+               {"clusters", Json::array()},
+               {"motors", Json::array()},
+               {"contacts", Json::array()},
+               {"references", Json::array()},
+               {"warnings", robot.warnings}};
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    json["joints"].push_back({{"name", joint.name},
+                              {"kind", getName(joint.kind)},
+                              {"parent", model.bodies()[joint.parent].name},
+                              {"child", model.bodies()[i].name},
+                              {"nq", joint.nq},
+                              {"nv", joint.nv}});
+  }
+  for (const LoopCluster& cluster : model.clusters()) {
+    Json names = Json::array();
+    for (int c : cluster.closures) names.push_back(model.closures()[c].name);
+    json["clusters"].push_back({{"closures", names}, {"rows", cluster.rows}, {"dofs", cluster.dofs.size()}});
+  }
+  for (const Motor& motor : model.motors())
+    json["motors"].push_back({{"name", motor.name},
+                              {"armature", motor.armature},
+                              {"effort_limit", orNull(motor.effort_limit)},
+                              {"velocity_limit", orNull(motor.velocity_limit)}});
+  for (const ContactFrame& contact : model.contacts())
+    json["contacts"].push_back({{"name", contact.name},
+                                {"kind", contact.kind == ContactKind::Surface6D ? "6d" : "3d"},
+                                {"body", model.bodies()[contact.body].name},
+                                {"sole", {2 * contact.half_length, 2 * contact.half_width}}});
+  for (size_t i = 1; i < postures.size(); ++i)
+    json["references"].push_back(
+        {{"name", postures[i].name}, {"closed", postures[i].closed}, {"message", postures[i].message}});
+  return json;
+}
+
+void printSection(const Json& robot, const char* key, const char* title, std::vector<std::string> columns) {
+  if (robot[key].empty()) return;
+  for (const auto& item : robot[key].front().items())  // one column per posture
+    if (item.key().rfind("gap ", 0) == 0) columns.push_back(item.key());
+  std::cout << "\n" << title << "\n";
+  printTable(std::cout, robot[key], columns);
+}
+
+void printInfo(const Json& robot) {
+  const auto count = [&robot](const char* key) { return std::to_string(robot[key].get<int>()); };
+  const Json& mobility = robot["mobility"];
+  std::cout << robot["name"].get<std::string>() << " (" << robot["directory"].get<std::string>() << ")\n";
+  printTable(std::cout,
+             std::vector<Row>{{"mass", formatNumber(robot["mass"]) + " kg"},
+                              {"base", robot["base"].get<std::string>()},
+                              {"coordinates", "nq " + count("nq") + ", nv " + count("nv")},
+                              {"motors", count("nu")},
+                              {"closure rows", count("closure_rows") + ", rank " + mobility["rank"].dump() + " at " +
+                                                   mobility["posture"].get<std::string>() +
+                                                   (mobility["closed"].get<bool>() ? "" : ", which is not closed")},
+                              {"mobility", mobility["mobility"].dump()}});
+  printSection(robot, "joints", "joints", {"name", "kind", "parent", "child", "nq", "nv"});
+  printSection(robot, "closures", "closures (gaps in m and rad)",
+               {"name", "kind", "frame1", "frame2", "rows", "loop_dofs"});
+  printSection(robot, "clusters", "clusters of closures", {"closures", "rows", "dofs"});
+  printSection(robot, "motors", "motors", {"name", "armature", "effort_limit", "velocity_limit"});
+  printSection(robot, "contacts", "contacts (length and width in m)", {"name", "kind", "body", "sole"});
+  printSection(robot, "references", "references", {"name", "closed", "message"});
+}
+
+}  // namespace
+
+void addInfo(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("info", "Describe a robot: joints, closures, motors, feet, mobility");
+  const auto robot = std::make_shared<RobotArgument>();
+  const auto as_json = std::make_shared<bool>(false);
+  command.add_option("ROBOT", robot->name, "name, directory or .urdf file")->required();
+  addFixedBase(command, *robot);
+  command.add_flag("--json", *as_json, "print JSON");
+  command.footer(
+      "The gap of a closure is given at the neutral configuration and at each reference: the distance of its frames in "
+      "m "
+      "and\nthe angle between them in rad. Warnings about the files go to the standard error.\n"
+      "Examples:\n"
+      "  bielle info bipetto\n"
+      "  bielle info path/to/my_robot.urdf --fixed-base --json");
+  command.callback([&action, robot, as_json] {
+    action = [=] {
+      const Json json = describe(robot->load());
+      if (*as_json)
+        std::cout << formatJson(json) << "\n";
+      else
+        printInfo(json);
+      return kOk;
+    };
+  });
+}
+
+}  // namespace bielle::cli

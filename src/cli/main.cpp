@@ -1,0 +1,61 @@
+// The command `bielle`.
+#include <algorithm>
+#include <exception>
+#include <iostream>
+
+#include "bielle/io/result.h"
+#include "bielle/model/error.h"
+#include "cli/commands.h"
+
+namespace {
+
+int fail(std::string message, int status) {
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::cerr << "bielle: error: " << message << std::endl;
+  return status;
+}
+
+std::string describeVersion() {
+  const bielle::BuildInfo build = bielle::getBuildInfo();
+  return "bielle " + build.bielle + " (Eigen " + build.eigen + ", " + build.compiler + ")";
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace bielle::cli;
+  setCommandLine(argc, argv);
+  if (argc > 1 && std::string(argv[1]) == "validate") return runValidate(argv + 1);
+
+  CLI::App app{"Legged robots driven through linkages: their dynamics, and motions by optimal control."};
+  app.name("bielle");
+  app.set_version_flag("--version", describeVersion());
+  app.footer(
+      "Examples:\n"
+      "  bielle robots\n"
+      "  bielle info bipetto\n"
+      "  bielle solve squat --robot bipetto --depth 0.7 -o squat\n"
+      "Each command has its own --help. Exit status: 0 done, 1 not converged or a failed check, 2 bad input.");
+  Action action;
+  addSolve(app, action);
+  addInfo(app, action);
+  addEval(app, action);
+  addRobots(app, action);
+  addValidate(app);
+  app.callback([&action] {
+    if (!action) throw CLI::RequiredError("A command");
+  });
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);
+    return fail(std::string(error.what()) + "; see --help", kBadInput);
+  }
+  try {
+    return action();
+  } catch (const bielle::ModelError& error) {
+    return fail(error.what(), kBadInput);
+  } catch (const std::exception& error) {
+    return fail(error.what(), kFailed);
+  }
+}

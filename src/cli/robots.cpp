@@ -1,0 +1,41 @@
+// bielle robots: the names that can be given, and where they lead.
+#include <filesystem>
+#include <iostream>
+
+#include "cli/commands.h"
+#include "cli/table.h"
+
+namespace bielle::cli {
+namespace {
+
+int listKnownRobots() {
+  const std::vector<std::string> directories = getRobotDirectories();
+  std::vector<Row> rows;
+  for (const std::string& name : listRobots())
+    for (const std::string& directory : directories) {
+      const auto file = std::filesystem::path(directory) / name / (name + ".urdf");
+      std::error_code error;
+      if (!std::filesystem::is_regular_file(file, error)) continue;
+      rows.push_back({name, file.string()});
+      break;
+    }
+  printTable(std::cout, rows, "");
+  if (!rows.empty()) return kOk;
+  std::cerr << "bielle: no robot was found in:\n";
+  for (const std::string& directory : directories) std::cerr << "  " << directory << "\n";
+  return kFailed;
+}
+
+}  // namespace
+
+void addRobots(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("robots", "List the robots known by name");
+  command.footer(
+      "Robots are looked for in the directories of $BIELLE_ROBOTS (separated by colons), then in those of Bielle.\n"
+      "Examples:\n"
+      "  bielle robots\n"
+      "  BIELLE_ROBOTS=$HOME/robots bielle robots");
+  command.callback([&action] { action = listKnownRobots; });
+}
+
+}  // namespace bielle::cli

@@ -1,0 +1,157 @@
+// bielle solve MOTION: makes the problem, solves it, writes the result.
+#include <atomic>
+#include <charconv>
+#include <cmath>
+#include <csignal>
+#include <iostream>
+#include <sstream>
+
+#include "bielle/io/result.h"
+#include "bielle/model/error.h"
+#include "cli/commands.h"
+#include "cli/motion_registry.h"
+#include "cli/table.h"
+
+namespace bielle::cli {
+namespace {
+
+struct SolveArguments {
+  RobotArgument robot;
+  std::string directory;
+  std::string formulation = "full";
+  std::vector<std::string> settings;  // name=value
+  FddpOptions solver;
+  bool quiet = false;
+};
+
+std::atomic<bool> interrupted{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
+
+// The first signal asks the solver to stop, the second one has its usual effect.
+void watchSignals() {
+  struct sigaction action = {};
+  action.sa_handler = [](int) { interrupted = true; };
+  action.sa_flags = SA_RESETHAND | SA_RESTART;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+void applySetting(const std::string& setting, const std::vector<OptionEntry>& options) {
+  const size_t equals = setting.find('=');
+  double value = 0;
+  const char* end = setting.data() + setting.size();
+  const char* begin = equals == std::string::npos ? end : setting.data() + equals + 1;
+  const auto [stop, error] = std::from_chars(begin, end, value);
+  if (error != std::errc() || stop != end)
+    throw ModelError("", "--set '" + setting + "'", "it is not of the form name=number", "e.g. --set com_weight=1e5");
+  setOption(options, setting.substr(0, equals), value);
+}
+
+std::string formatOptionList(const MotionEntry& motion) {
+  std::vector<Row> rows;
+  const MotionRequest request = motion.makeRequest();
+  for (const OptionEntry& option : request.options)
+    rows.push_back({option.name, formatNumber(*option.value), "[" + option.unit + "]", option.help});
+  std::ostringstream text;
+  printTable(text, rows);
+  return text.str();
+}
+
+void printResult(const MotionResult& result, const std::vector<std::string>& paths) {
+  const FddpSummary& solver = result.solver;
+  std::string torques;
+  for (size_t i = 0; i < std::min<size_t>(4, result.peak_torques.size()); ++i)
+    torques +=
+        (i ? ", " : "") + result.peak_torques[i].first + " " + formatNumber(result.peak_torques[i].second, "%.2f");
+  const auto pair = [](double position, double angle) {
+    return formatNumber(position, "%.2e") + " m, " + formatNumber(angle, "%.2e") + " rad";
+  };
+  std::cout << "\n" << result.motion << " of " << result.run.robot << ": " << getName(solver.termination);
+  if (!solver.message.empty()) std::cout << " (" << solver.message << ")";
+  std::cout << "\n";
+  printTable(std::cout,
+             std::vector<Row>{{"cost", formatNumber(solver.cost, "%.6f")},
+                              {"iterations", std::to_string(solver.iterations)},
+                              {"time", formatNumber(solver.seconds, "%.2f") + " s"},
+                              {"centre of mass", formatNumber(result.com_start, "%.4f") + " m high, lowest at " +
+                                                     formatNumber(result.com_lowest, "%.4f") + " m"},
+                              {"closure gap", pair(result.gap_position, result.gap_angle)},
+                              {"contact slip", pair(result.slip_position, result.slip_angle)},
+                              {"peak torques [N m]", torques}});
+  for (const std::string& path : paths) std::cout << "  " << path << "\n";
+}
+
+int solve(const SolveArguments& arguments, const MotionRequest& request) {
+  for (const std::string& setting : arguments.settings) applySetting(setting, request.options);
+  for (const OptionEntry& option : request.options)
+    if (!std::isfinite(*option.value))
+      throw ModelError("", "option '" + option.name + "'", "it is not finite", "give a number");
+  const LoadedRobot robot = arguments.robot.load();
+  Motion motion = request.make(robot.model);
+  makeOutputDirectory(arguments.directory);
+
+  watchSignals();
+  FddpObserver observer;
+  observer.interrupt = &interrupted;
+  if (!arguments.quiet) {
+    printFddpHeader(std::cout);
+    observer.callback = [](const FddpIteration& line) {
+      printFddpIteration(std::cout, line);
+      std::cout.flush();
+      return FddpAction::Continue;
+    };
+  }
+  const FddpSummary summary = Fddp(arguments.solver).solve(*motion.problem, motion.guess, observer);
+  const RunInfo run{arguments.robot.name, arguments.formulation, getCommandLine()};
+  const MotionResult result = makeResult(run, motion, motion.guess, summary);
+  printResult(result, writeResult(arguments.directory, result));
+  return result.converged() ? kOk : kFailed;
+}
+
+void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
+  CLI::App& sub = *command.add_subcommand(motion.name, motion.help);
+  const auto arguments = std::make_shared<SolveArguments>();
+  const auto request = std::make_shared<MotionRequest>(motion.makeRequest());
+  sub.add_option("--robot", arguments->robot.name, "name, directory or .urdf file")->required();
+  sub.add_option("-o,--output", arguments->directory,
+                 "directory for trajectory.csv, trajectory.npz and summary.json; made if need be")
+      ->required();
+  for (const OptionEntry& option : request->options)
+    if (std::find(motion.flags.begin(), motion.flags.end(), option.name) != motion.flags.end())
+      sub.add_option("--" + option.name, *option.value, option.help + " [" + option.unit + "]")->capture_default_str();
+  sub.add_option("--set", arguments->settings, "name=value of one of the options below; may be repeated")
+      ->allow_extra_args(false);
+  sub.add_option("--formulation", arguments->formulation, "state of the dynamics: all joints of the spanning tree")
+      ->check(CLI::IsMember({"full"}))
+      ->capture_default_str();
+  sub.add_option("--max-iterations", arguments->solver.max_iterations, "the solver stops there")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  sub.add_option("--threads", arguments->solver.threads, "0: all; results do not depend on it")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  sub.add_flag("--quiet", arguments->quiet, "no line per iteration");
+  sub.footer(
+      "Options of --set, with default and unit:\n" + formatOptionList(motion) + "Examples:\n  " + motion.example +
+      "\n  " + motion.example + " --set com_weight=2e5 --max-iterations 50\n" +
+      "Ctrl-C stops the solver; the iterate it has by then is written, and marked as interrupted. Exit status: 0 "
+      "converged,\n1 not converged (results are written all the same), 2 bad input.");
+  sub.callback([&action, arguments, request] { action = [=] { return solve(*arguments, *request); }; });
+}
+
+}  // namespace
+
+void addSolve(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("solve", "Make a motion by optimal control");
+  command.callback([&action] {
+    if (!action) throw CLI::RequiredError("A motion");
+  });
+  std::string examples = "Examples:\n";
+  for (const MotionEntry& motion : getMotions()) {
+    addMotion(command, motion, action);
+    examples += "  " + motion.example + "\n";
+  }
+  command.footer(examples + "`bielle solve MOTION --help` lists what can be set.");
+}
+
+}  // namespace bielle::cli
