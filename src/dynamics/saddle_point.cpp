@@ -79,6 +79,13 @@ void SaddlePoint::updateInverse() {
     T2_.noalias() = T1_ * T1_;
     T1_.swap(T2_);
   }
+  // G P G loses what is not in the range of G, rounding of the size of 1/mu above all; one Newton-Schulz step then gains
+  // what eigenvalues near mu still lack.
+  T1_.noalias() = G_ * Ginv_;
+  T2_.noalias() = Ginv_ * T1_;
+  T1_.noalias() = G_ * T2_;
+  Ginv_ = 2 * T2_;
+  Ginv_.noalias() -= T2_ * T1_;
 }
 
 void SaddlePoint::solveDerivatives(MatrixRef X, MatrixRef dlambda) {
