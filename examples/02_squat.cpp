@@ -1,0 +1,76 @@
+/// \file A squat of Bipetto, whose knees and ankles are driven through connecting rods.
+///
+/// The state is x = (q, v) of the spanning tree; motors give u, closures and soles the forces lambda:
+///     M(q) a + b(q, v) = B u + J(q)^T lambda,    d/dt (J(q) v) = 0                                            (1)
+/// for 6 closures of 6 rows and 2 feet of 6 rows. With steps of length h, v+ = v + h a, q+ = q (+) h v+, find
+///     min over u   sum_k h l_k(x_k, u_k, lambda_k) + l_N(x_N),                                                (2)
+/// where l asks the centre of mass to follow
+///     c_z(t) = c_z(0) (1 - (1 - depth) (1 - cos 2 pi t / T) / 2),                                             (3)
+/// the feet to share the weight, the robot to stay upright, and motors to work little. FDDP solves (2).
+///
+/// Usage: 02_squat [DIRECTORY [DURATION]]   writes trajectory.csv, trajectory.npz and summary.json
+#include <cstdio>
+#include <cstdlib>
+#include <iostream>
+
+#include "bielle/io/result.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/squat.h"
+
+using namespace bielle;
+
+namespace {
+
+int indexOf(const std::vector<std::string>& names, const std::string& name) {
+  for (size_t i = 0; i < names.size(); ++i)
+    if (names[i] == name) return static_cast<int>(i);
+  std::fprintf(stderr, "there is no %s\n", name.c_str());
+  std::exit(1);
+}
+
+// What the knee and its motor do at some nodes: the rods change both the angle and the torque.
+void printMotion(const MotionResult& result, const SquatOptions& options) {
+  const MotionRecord& record = result.record;
+  const int knee = indexOf(record.q_names, "knee_right"), crank = indexOf(record.q_names, "motor_knee_right");
+  const int motor = indexOf(record.u_names, "motor_knee_right"), foot = indexOf(record.contact_names, "foot_right");
+  const int stages = static_cast<int>(record.time.size()) - 1;
+  std::printf("\n%7s %10s %10s %11s %12s %13s %13s\n", "t [s]", "CoM [m]", "Eq. 3 [m]", "knee [rad]", "motor [rad]",
+              "motor [N m]", "right sole [N]");
+  for (int i = 0; i <= 8; ++i) {
+    const int k = std::min(i * stages / 8, stages - 1);  // the last node has no torque
+    std::printf("%7.3f %10.4f %10.4f %11.4f %12.4f %13.3f %13.2f\n", record.time[k], record.com(k, 2),
+                record.com(0, 2) * calcSquatHeight(options, record.time[k]), record.q(k, knee), record.q(k, crank),
+                record.u(k, motor), record.contact_wrenches(k, 6 * foot + 2));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string directory = argc > 1 ? argv[1] : "squat";
+  SquatOptions options;
+  options.depth = 0.7;
+  if (argc > 2) options.duration = std::atof(argv[2]);
+
+  const LoadedRobot robot = loadRobot("bipetto");
+  Motion motion = makeSquat(robot.model, options);
+  std::printf("%d stages, %d velocities, %d motors\n", motion.problem->numStages(), robot.model.nv(), robot.model.nu());
+
+  FddpObserver observer;
+  observer.callback = [](const FddpIteration& line) {
+    printFddpIteration(std::cout, line);
+    return FddpAction::Continue;
+  };
+  printFddpHeader(std::cout);
+  ShootingTrajectory trajectory = motion.guess;
+  const FddpSummary summary = Fddp().solve(*motion.problem, trajectory, observer);
+  const MotionResult result = makeResult({"bipetto", "full", {}}, motion, trajectory, summary);
+  printMotion(result, options);
+
+  std::printf("\n%s after %d iterations and %.2f s, cost %.6f\n", getName(summary.termination), summary.iterations,
+              summary.seconds, summary.cost);
+  std::printf("closures open by at most %.1e m and %.1e rad: Eq. (1) holds accelerations, steps drift\n",
+              result.gap_position, result.gap_angle);
+  for (const std::string& path : writeResult(directory, result)) std::printf("%s\n", path.c_str());
+  return result.converged() ? 0 : 1;
+}

@@ -1,0 +1,29 @@
+// Loads an installed robot and solves a squat of few nodes.
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+#include <bielle/io/result.h>
+#include <bielle/model/reader.h>
+#include <bielle/motion/squat.h>
+
+int main(int argc, char** argv) {
+  setenv("BIELLE_ROBOTS", ROBOTS, 1);
+  const bielle::LoadedRobot robot = bielle::loadRobot("bipetto");
+  if (robot.directory.rfind(ROBOTS, 0) != 0) {
+    std::fprintf(stderr, "the robot is that of %s\n", robot.directory.c_str());
+    return 1;
+  }
+  bielle::SquatOptions options;
+  options.depth = 0.95;
+  options.duration = 0.6;
+  options.settle = 0;
+  options.time_step = 0.05;
+  bielle::Motion motion = bielle::makeSquat(robot.model, options);
+  const bielle::FddpSummary summary = bielle::Fddp().solve(*motion.problem, motion.guess);
+  const bielle::MotionResult result = bielle::makeResult({"bipetto", "full", {}}, motion, motion.guess, summary);
+  bielle::writeResult(argc > 1 ? argv[1] : "squat", result);
+  std::printf("%s after %d iterations, lowest at %.4f m\n", getName(summary.termination), summary.iterations,
+              result.com_lowest);
+  return result.converged() ? 0 : 1;
+}
