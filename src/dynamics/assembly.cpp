@@ -12,6 +12,9 @@
 namespace bielle {
 namespace {
 
+// Iterations before the soft wish of Eq. (1) starts to fade.
+constexpr int kFullWishIterations = 30;
+
 // The hard conditions of Eq. (1): residual and Jacobian, with the name of every row's origin.
 class HardConditions {
  public:
@@ -88,9 +91,9 @@ class HardConditions {
   int rows_ = 0;
 };
 
-// Eq. (1). `damping` shrinks the part along weak singular directions.
-VectorXd calcStep(const MatrixXd& H, const VectorXd& h, const VectorXd& wish, const VectorXd& weights, double damping,
-                  double rank_tolerance) {
+// Eq. (1). `damping` shrinks the part along weak singular directions, `wish_gain` the second term.
+VectorXd calcStep(const MatrixXd& H, const VectorXd& h, const VectorXd& wish, double wish_gain, const VectorXd& weights,
+                  double damping, double rank_tolerance) {
   if (h.size() == 0) return wish;
   const Eigen::JacobiSVD<MatrixXd> svd(H, Eigen::ComputeThinU | Eigen::ComputeFullV);
   const VectorXd& sigma = svd.singularValues();
@@ -100,7 +103,7 @@ VectorXd calcStep(const MatrixXd& H, const VectorXd& h, const VectorXd& wish, co
   const MatrixXd N = svd.matrixV().rightCols(H.cols() - rank);
   if (N.cols() == 0) return step;
   const MatrixXd WN = weights.asDiagonal() * N;
-  step += N * WN.colPivHouseholderQr().solve(weights.cwiseProduct(wish - step));
+  step += wish_gain * (N * WN.colPivHouseholderQr().solve(weights.cwiseProduct(wish - step)));
   return step;
 }
 
@@ -113,8 +116,10 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
   for (int i = 0; i < options.max_iterations; ++i, ++result.iterations) {
     const VectorXd wish = model.difference(result.q, problem.q_ref);
     const double damping = std::min(0.1, error);
-    VectorXd step = calcStep(conditions.H, conditions.h - offset, wish, weights, error < 1e-3 ? 0.0 : 0.3 * damping,
-                             options.rank_tolerance);
+    // A wish far from where the conditions allow (a leg asked to stretch) can make the iterates circle: it fades.
+    const double wish_gain = std::pow(0.8, std::max(0, i - kFullWishIterations));
+    VectorXd step = calcStep(conditions.H, conditions.h - offset, wish, wish_gain, weights,
+                             error < 1e-3 ? 0.0 : 0.3 * damping, options.rank_tolerance);
     const double largest = step.size() ? step.cwiseAbs().maxCoeff() : 0;
     if (!std::isfinite(largest)) return false;
     const bool met = conditions.rows() == 0 || (conditions.h - offset).cwiseAbs().maxCoeff() <= options.tolerance;

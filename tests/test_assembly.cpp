@@ -1,0 +1,143 @@
+// Oracles: the placements asked for, measured by kinematics of the assembled configuration, and closed-form linkages.
+#include <catch2/catch.hpp>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/reader.h"
+#include "mechanisms.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+Model loadOwn(const std::string& name) { return loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/" + name).model; }
+
+SE3 getFrame(const Model& model, const Workspace& ws, const std::string& name) {
+  REQUIRE(model.findFrame(name) >= 0);
+  const Frame& frame = model.frames()[model.findFrame(name)];
+  return getPlacement(ws, frame.body, frame.X_BF);
+}
+
+double calcGap(const Model& model, Workspace& ws, const VectorXd& q) {
+  updatePositions(model, ws, q);
+  return calcLargestGap(ws, makeConstraintSet(model));
+}
+
+}  // namespace
+
+TEST_CASE("assembly: Bipetto half sitting, from scratch") {
+  const Model model = loadOwn("bipetto");
+  Workspace ws(model);
+  REQUIRE(calcGap(model, ws, model.makeNeutral()) > 1e-3);  // there is something to close
+  const AssemblyResult result = assembleReference(model, "half_sitting");
+  CAPTURE(result.message);
+  REQUIRE(result.status == AssemblyStatus::Closed);
+  CHECK(calcGap(model, ws, result.q) < 1e-12);
+  CHECK(result.gap < 1e-12);
+  CHECK(std::abs(getFrame(model, ws, "torso").p.z() - 0.575) < 1e-12);
+  for (const auto& [foot, y] : {std::pair<std::string, double>{"foot_left", 0.125}, {"foot_right", -0.125}}) {
+    CAPTURE(foot);
+    const SE3 X = getFrame(model, ws, foot);
+    CHECK((X.p - Vector3d(0, y, 0)).norm() < 1e-12);
+    CHECK((X.R - Matrix3d::Identity()).norm() < 1e-12);
+  }
+  // Knees bend as wished, not the other way; the wish is soft.
+  for (const auto& [joint, angle] : {std::pair<std::string, double>{"knee_left", -0.4890}, {"knee_right", 0.4913}})
+    CHECK(std::abs(result.q[model.joints()[model.findJoint(joint)].idx_q] - angle) < 0.02);
+}
+
+TEST_CASE("assembly: the torso at every height within reach; far outside, what stays open is named") {
+  const Model model = loadOwn("bipetto");
+  Reference reference = model.references().front();
+  Workspace ws(model);
+  for (double height : {0.45, 0.5, 0.55, 0.6, 0.62}) {
+    reference.height = height;
+    const AssemblyResult result = assemble(model, makeReferenceProblem(model, reference));
+    CAPTURE(height, result.message);
+    REQUIRE(result.status == AssemblyStatus::Closed);
+    CHECK(calcGap(model, ws, result.q) < 1e-12);
+    CHECK(std::abs(getFrame(model, ws, "torso").p.z() - height) < 1e-12);
+  }
+  for (double height : {0.9, 2.0}) {
+    reference.height = height;
+    const AssemblyResult result = assemble(model, makeReferenceProblem(model, reference));
+    CAPTURE(height, result.message);
+    CHECK(result.status == AssemblyStatus::NotClosed);
+    CHECK(result.q.allFinite());
+    CHECK(!result.worst.empty());
+    CHECK(result.message.find(result.worst) != std::string::npos);
+    CHECK(result.message.find("stays open by") != std::string::npos);
+    CHECK(result.gap == Approx(calcGap(model, ws, result.q)));
+  }
+  CHECK_THROWS_AS(assembleReference(model, "lotus"), ModelError);
+}
+
+TEST_CASE("assembly: a four-bar against its closed form over the full turn of the crank") {
+  const double ground = 0.4, crank = 0.15, coupler = 0.35, rocker = 0.3;
+  const Mechanism start = makePlanarFourBar(ground, crank, coupler, rocker, 0);
+  const Model& model = start.model;
+  const int steps = 24;
+  AssemblyProblem problem;
+  problem.q_ref = start.q_closed;
+  problem.weights = VectorXd::Unit(4, 0);  // the crank leads, the others follow
+  for (int i = 1; i <= steps; ++i) {
+    CAPTURE(i);
+    problem.q_ref[0] -= 2 * kPi / steps;
+    const AssemblyResult result = assemble(model, problem);
+    REQUIRE(result.status == AssemblyStatus::Closed);
+    CHECK(result.q[0] == Approx(problem.q_ref[0]).margin(1e-12));
+    const VectorXd exact = makePlanarFourBar(ground, crank, coupler, rocker, -result.q[0]).q_closed;
+    // Angles up to whole turns.
+    for (int k = 0; k < 4; ++k) CHECK(std::abs(std::remainder(result.q[k] - exact[k], 2 * kPi)) < 1e-10);
+    problem.q_ref = result.q;
+  }
+}
+
+TEST_CASE("assembly: a loop too short to close is named, with its gap") {
+  // The rods reach 0.2 m, the pins are 0.4 m apart.
+  ModelBuilder builder("short");
+  Joint joint;
+  joint.kind = JointKind::Revolute;
+  joint.axis = Vector3d::UnitY();
+  Inertia inertia;
+  inertia.mass = 1;
+  inertia.I_com = Matrix3d::Identity() * 1e-2;
+  joint.name = "first";
+  builder.addLink("rod1", "world", joint, inertia);
+  joint.name = "second";
+  joint.X_PJ.p.x() = 0.1;
+  builder.addLink("rod2", "rod1", joint, inertia);
+  builder.addFrame("tip", "rod2", {Matrix3d::Identity(), {0.1, 0, 0}});
+  builder.addFrame("pin", "world", {Matrix3d::Identity(), {0.4, 0, 0}});
+  builder.addClosure("gap to the pin", ClosureKind::Ball3D, "tip", "pin");
+  const Model model = builder.build();
+  const AssemblyResult result = closeConfiguration(model, Eigen::Vector2d(0.4, 0.3));
+  CAPTURE(result.message);
+  CHECK(result.status == AssemblyStatus::NotClosed);
+  CHECK(result.worst.find("gap to the pin") != std::string::npos);
+  CHECK(result.message.find("gap to the pin") != std::string::npos);
+  CHECK(result.gap >= 0.2 - 1e-9);
+  CHECK(result.gap < 0.4);
+}
+
+TEST_CASE("assembly: velocities are projected on the closures, and stay when they are there") {
+  std::mt19937 rng(31);
+  for (const bool redundant : {false, true}) {
+    const Mechanism mechanism =
+        redundant ? makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 0.7)
+                  : makeRandomMechanism(rng, JointKind::Spherical, ClosureKind::Hinge5D, MechanismBase::FreeFlyer);
+    const Model& model = mechanism.model;
+    const ConstraintSet set = makeConstraintSet(model);
+    Workspace ws(model);
+    const VectorXd v = projectVelocity(model, ws, set, mechanism.q_closed, randomVector(rng, model.nv()));
+    CHECK(v.norm() > 1e-2);
+    updatePositions(model, ws, mechanism.q_closed);
+    updateVelocities(model, ws, v);
+    CHECK(calcClosureVelocity(ws, set.closures[0]).norm() < 1e-12);
+    CHECK((projectVelocity(model, ws, set, mechanism.q_closed, v) - v).norm() < 1e-12);
+  }
+}
