@@ -250,7 +250,7 @@ TEST_CASE("shooting problem: the squat of Bipetto, half sitting with velocities 
   const Model model = loadRobot("bipetto").model;
   SquatOptions options;
   options.duration = 0.3;
-  const Motion motion = makeSquat(model, options);
+  const Motion motion = makeSquat(model, options, Formulation::Full);
   RobotProblem& problem = *motion.problem;
   const VectorXd q = problem.initialState().head(model.nq());
   Workspace ws(model);
