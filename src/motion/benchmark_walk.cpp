@@ -138,7 +138,7 @@ StageSpec makeTerminalStage(const Scene& scene) {
 
 }  // namespace
 
-Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o) {
+Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o, Formulation formulation) {
   const std::vector<Phase> phases = makePhases(model, o);
   Scene scene{model,
               o,
@@ -170,7 +170,8 @@ Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o) {
   }
   stages.push_back(makeTerminalStage(scene));
   const size_t num_nodes = stages.size();
-  motion.problem = std::make_unique<RobotProblem>(model, scene.q0, VectorXd::Zero(model.nv()), std::move(stages));
+  motion.problem =
+      std::make_unique<RobotProblem>(model, scene.q0, VectorXd::Zero(model.nv()), std::move(stages), formulation);
   motion.guess.xs.assign(num_nodes, motion.problem->initialState());
   motion.requested = {{"speed", o.speed}, {"step_height", o.step_height}, {"total_nodes", double(o.total_nodes)}};
   return motion;

@@ -39,6 +39,7 @@ struct BenchmarkWalkOptions {
 };
 
 /// \throws ModelError when the robot lacks a foot, or the schedule does not fit into total_nodes
-Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& options = {});
+Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& options = {},
+                         Formulation formulation = Formulation::Reduced);
 
 }  // namespace bielle
