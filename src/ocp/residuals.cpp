@@ -107,9 +107,12 @@ class FrictionPyramid : public ForceResidual {
 class JointPosition : public Residual {
  public:
   JointPosition(const Model& model, std::vector<int> dofs) : dofs_(std::move(dofs)) {
-    if (dofs_.empty())
-      for (int k = 0; k < model.nv(); ++k)
-        if (std::isfinite(model.lowerLimits()[k]) || std::isfinite(model.upperLimits()[k])) dofs_.push_back(k);
+    if (!dofs_.empty()) return;
+    for (int k = 0; k < model.nv(); ++k) {
+      const bool limited = std::isfinite(model.lowerLimits()[k]) || std::isfinite(model.upperLimits()[k]);
+      // Of a joint with more dofs, limits bound no coordinate whose rate is a velocity coordinate.
+      if (limited && model.joints()[model.dofs()[k].joint].nv == 1) dofs_.push_back(k);
+    }
   }
   int size() const override { return static_cast<int>(dofs_.size()); }
   void calc(const NodeView& node, VectorRef r) const override {
