@@ -166,9 +166,12 @@ void checkStage(RobotProblem& problem, const Point& point, double h) {
   StageModel model;
   REQUIRE(problem.linearize(0, point.x, point.u, point.x_node, model) == StepStatus::Ok);
   const VectorXd no_dx = VectorXd::Zero(problem.tangentSize(0)), no_du = VectorXd::Zero(point.u.size());
-  const Step here = calcStep(problem, 0, point, no_dx, no_du);
+  Step here;  // not through integrate(), which closes reduced states anew, to rounding
+  VectorXd next(problem.stateSize());
+  REQUIRE(problem.step(0, point.x, point.u, next, here.cost) == StepStatus::Ok);
+  here.gap = calcDifference(problem, 1, point.x_node, next);
   CHECK(model.cost == Approx(here.cost).epsilon(1e-13));
-  CHECK((model.gap - here.gap).cwiseAbs().maxCoeff() <= 1e-14 * (1 + here.gap.cwiseAbs().maxCoeff()));
+  CHECK((model.gap - here.gap).cwiseAbs().maxCoeff() <= 1e-13 * (1 + here.gap.cwiseAbs().maxCoeff()));
   const auto both = [](const Step& step) { return join(step.gap, VectorXd::Constant(1, step.cost)); };
   const int n = problem.tangentSize(1);
   const MatrixXd dx =
@@ -246,20 +249,22 @@ TEST_CASE("shooting problem: a redundant planar four-bar") {
 }
 
 TEST_CASE("shooting problem: the squat of Bipetto, half sitting with velocities on the closures") {
+  const auto formulation = GENERATE(Formulation::Full, Formulation::Reduced);
+  CAPTURE(getName(formulation));
   std::mt19937 rng(23);
   const Model model = loadRobot("bipetto").model;
   SquatOptions options;
   options.duration = 0.3;
-  const Motion motion = makeSquat(model, options, Formulation::Full);
+  const Motion motion = makeSquat(model, options, formulation);
   RobotProblem& problem = *motion.problem;
   const VectorXd q = problem.initialState().head(model.nq());
   Workspace ws(model);
   const VectorXd v = projectVelocity(model, ws, problem.spec(0).constraints, q, randomVector(rng, model.nv(), 0.5));
   CHECK(v.norm() > 0.1);
   const VectorXd x = join(q, v), u = motion.guess.us[0] + randomVector(rng, model.nu(), 1);
-  for (double gap : {0.0, 0.3}) {
+  for (double gap : {0.0, 0.2}) {
     CAPTURE(gap);
-    checkStage(problem, {x, u, makeNextNode(rng, problem, x, u, gap)}, 5e-5);
+    checkStage(problem, {x, u, makeNextNode(rng, problem, x, u, gap)}, 2e-4);
   }
   checkTerminal(problem, x, 5e-4);
 }
