@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
@@ -82,18 +83,18 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
 BlockPoint::BlockPoint(const LoopBlock& block) : ws_(block.model) {
   const int n = block.model.nv(), m = block.closures.rows;
   basis_.q.setZero(block.model.nq());
-  residual_.setZero(m);
-  for (VectorXd* v : {&zeta_, &correction_, &independent_residual_}) v->setZero(block.rank);
-  step_.setZero(n);
-  work_.setZero(std::max(n, m));
-  J_all_.setZero(m, n);
   basis_.J.setZero(block.rank, n);
   basis_.N.setZero(n, block.size);
   basis_.rows.resize(block.rank);
-  Jplus_.setZero(n, block.rank);
-  Q_.setZero(n, n);
+  residual_.setZero(m);
+  for (VectorXd* v : {&zeta_, &correction_}) v->setZero(block.rank);
+  step_.setZero(n);
+  J_all_.setZero(m, n);
+  eliminated_.setZero(m, n);
   A_.setZero(block.rank, block.rank);
-  qr_ = Eigen::ColPivHouseholderQR<MatrixXd>(n, m);
+  row_order_.resize(m);
+  col_order_.resize(n);
+  gram_ = Eigen::LLT<MatrixXd>(block.rank);
   lu_ = Eigen::PartialPivLU<MatrixXd>(block.rank);
 }
 
@@ -114,25 +115,59 @@ void BlockPoint::selectIndependent(const MatrixXd& all, MatrixXd& out) const {
   for (size_t i = 0; i < basis_.rows.size(); ++i) out.row(i) = all.row(basis_.rows[i]);
 }
 
-// Eq. (1).
-bool BlockPoint::updateBases(const LoopBlock& block) {
-  const int rank = block.rank;
-  qr_.compute(J_all_.transpose());
-  const auto& R = qr_.matrixQR();
-  const double first = std::abs(R(0, 0));
-  if (rank > 0 && !(std::abs(R(rank - 1, rank - 1)) > kRankTolerance * first)) return false;  // a rank is lost
-  if (rank < std::min(R.rows(), R.cols()) && std::abs(R(rank, rank)) > 1e-3 * kRankTolerance * first &&
-      std::abs(R(rank, rank)) > kRankTolerance * std::abs(R(rank - 1, rank - 1)))
-    return false;  // a rank is gained
-  Q_.setIdentity();
-  qr_.householderQ().applyThisOnTheLeft(Q_, work_);
-  basis_.N = Q_.rightCols(block.size);
-  for (int i = 0; i < rank; ++i) basis_.rows[i] = qr_.colsPermutation().indices()[i];
-  selectIndependent(J_all_, basis_.J);
-  // J^+ = Q_1 R^{-T}: solve X R^T = Q_1 from the right.
-  Jplus_ = Q_.leftCols(rank);
-  R.topLeftCorner(rank, rank).triangularView<Eigen::Upper>().transpose().solveInPlace<Eigen::OnTheRight>(Jplus_);
+// Gauss-Jordan elimination of J with complete pivoting. Leaves [I, J_d^{-1} J_i] in the columns of `eliminated_`, by
+// col_order_: first the `rank` dependent coordinates d, then the independent ones i. False when the rank is another.
+bool BlockPoint::eliminate(int rank) {
+  MatrixXd& E = eliminated_;
+  E = J_all_;
+  const int m = static_cast<int>(E.rows()), n = static_cast<int>(E.cols());
+  std::iota(row_order_.begin(), row_order_.end(), 0);
+  std::iota(col_order_.begin(), col_order_.end(), 0);
+  double first = 0, last = 0;
+  for (int p = 0; p <= rank; ++p) {
+    int row = p, col = p;
+    double best = -1;
+    for (int c = p; c < n; ++c)
+      for (int r = p; r < m; ++r)
+        if (std::abs(E(r, c)) > best) best = std::abs(E(r, c)), row = r, col = c;
+    if (p == 0) first = best;
+    if (p == rank)  // what is left must be nothing but rounding
+      return best <= kRankTolerance * last || best <= 1e-3 * kRankTolerance * first;
+    if (!(best > kRankTolerance * first)) return false;
+    last = best;
+    if (row != p) E.row(p).swap(E.row(row)), std::swap(row_order_[p], row_order_[row]);
+    if (col != p) E.col(p).swap(E.col(col)), std::swap(col_order_[p], col_order_[col]);
+    double* pivot = E.col(p).data();
+    const double inverse = 1 / pivot[p];
+    for (int c = p + 1; c < n; ++c) {
+      double* column = E.col(c).data();
+      const double factor = column[p] * inverse;
+      for (int r = 0; r < m; ++r) column[r] -= factor * pivot[r];
+      column[p] = factor;
+    }
+  }
   return true;
+}
+
+// Eq. (1): the columns [-J_d^{-1} J_i; I], made orthonormal by Gram-Schmidt, twice for good measure.
+bool BlockPoint::updateBases(const LoopBlock& block) {
+  const int rank = block.rank, size = block.size;
+  if (!eliminate(rank)) return false;
+  MatrixXd& N = basis_.N;
+  N.setZero();
+  for (int c = 0; c < size; ++c) {
+    for (int r = 0; r < rank; ++r) N(col_order_[r], c) = -eliminated_(r, rank + c);
+    N(col_order_[rank + c], c) = 1;
+    for (int pass = 0; pass < 2; ++pass)
+      for (int k = 0; k < c; ++k) N.col(c) -= N.col(k).dot(N.col(c)) * N.col(k);
+    N.col(c).normalize();
+  }
+  std::copy(row_order_.begin(), row_order_.begin() + rank, basis_.rows.begin());
+  std::sort(basis_.rows.begin(), basis_.rows.end());
+  selectIndependent(J_all_, basis_.J);
+  A_.noalias() = basis_.J * basis_.J.transpose();
+  gram_.compute(A_);
+  return gram_.info() == Eigen::Success;
 }
 
 bool BlockPoint::update(const LoopBlock& block, ConstVectorRef q) {
@@ -143,33 +178,40 @@ bool BlockPoint::update(const LoopBlock& block, ConstVectorRef q) {
   return updateBases(block);
 }
 
-bool BlockPoint::close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d) {
-  // Newton on zeta with the matrix J(q) J_r(q_0)^T of the independent rows, refreshed while it pays.
-  zeta_.setZero();
+bool BlockPoint::close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d, const VectorXd& zeta_guess) {
+  // Newton on zeta with the matrix J(q) J(q_0)^T of the independent rows, refreshed while it pays.
   step_ = d;
+  if (zeta_guess.size()) {
+    zeta_ = zeta_guess;
+    step_.noalias() -= start.J.transpose() * zeta_;
+  } else {
+    zeta_.setZero();
+  }
   double previous = 0;
   constexpr int kMaxIterations = 30;
   for (int i = 0; i <= kMaxIterations; ++i) {
     block.model.integrate(start.q, step_, basis_.q);
-    updatePositions(block.model, ws_, basis_.q);
+    updatePlacements(block.model, ws_, basis_.q);
     updateResidual(block);
     if (!std::isfinite(gap_)) return false;
     const bool stalled = i > 0 && gap_ > 0.5 * previous;
     if (gap_ <= kClosedTolerance || (stalled && gap_ <= kAcceptedTolerance)) break;
     if (i == kMaxIterations) return false;
     if (i == 0 || gap_ > 0.05 * previous) {
+      updateColumns(block.model, ws_);
       updateJacobian(block);
       for (size_t r = 0; r < start.rows.size(); ++r) basis_.J.row(r) = J_all_.row(start.rows[r]);
       A_.noalias() = basis_.J * start.J.transpose();
       lu_.compute(A_);
     }
     previous = gap_;
-    for (size_t r = 0; r < start.rows.size(); ++r) independent_residual_[r] = residual_[start.rows[r]];
-    // The residual falls by J dq (notation.h), and dq = -J_r(q_0)^T dzeta.
-    correction_ = lu_.solve(independent_residual_);
+    for (size_t r = 0; r < start.rows.size(); ++r) correction_[r] = residual_[start.rows[r]];
+    // The residual falls by J dq (notation.h), and dq = -J(q_0)^T dzeta.
+    correction_ = lu_.solve(correction_);
     zeta_ -= correction_;
     step_.noalias() += start.J.transpose() * correction_;
   }
+  updateColumns(block.model, ws_);
   updateJacobian(block);
   return updateBases(block);
 }

@@ -32,7 +32,7 @@ struct Block {
     const int n = l.model.nv(), m = l.closures.rows, r = l.size;
     q.setZero(l.model.nq());
     for (VectorXd* v : {&this->v, &a, &d, &w, &v_next}) v->setZero(n);
-    for (VectorXd* v : {&gamma, &mu, &independent}) v->setZero(l.rank);
+    for (VectorXd* v : {&gamma, &mu, &independent, &zeta}) v->setZero(l.rank);
     rows.setZero(m);
     for (MatrixXd* x : {&Z, &dy, &dv}) x->setZero(n, r);
     for (MatrixXd* x : {&Cq, &Cv, &K}) x->setZero(m, n);
@@ -44,12 +44,18 @@ struct Block {
   BlockPoint at, next, scratch;  // at the state; at q+; for integrate() and open gaps
   BlockBasis chart;              // at the last linearized state
   VectorXd q, v, a, d, w, v_next;
-  VectorXd gamma, mu, independent, rows;
+  VectorXd gamma, mu, independent, zeta, rows;
   MatrixXd Z, dy, dv;                   // n x r, Eqs. (a), (c)
   MatrixXd Cq, Cv, K, Cq_r, Cv_r, K_r;  // closure derivatives, all rows and the independent ones
   MatrixXd Jq, Jd, H;                   // n x n, Eqs. (e), (f)
   Eigen::PartialPivLU<MatrixXd> lu;     // of A
 };
+
+// out = -J^+ X
+void applyPlus(const BlockPoint& point, MatrixXd X, MatrixXd& out) {
+  point.solveGram(X);
+  out.noalias() = -point.basis().J.transpose() * X;
+}
 
 class ReducedNode : public NodeModel {
  public:
@@ -94,7 +100,7 @@ class ReducedNode : public NodeModel {
     for (Block& b : blocks_) {
       const LoopBlock& loop = b.loop;
       b.d.noalias() = b.chart.N * dx.segment(loop.offset, loop.size);
-      if (!b.scratch.close(loop, b.chart, b.d)) {
+      if (!b.scratch.close(loop, b.chart, b.d, {})) {
         x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
         return;
       }
@@ -143,7 +149,9 @@ class ReducedNode : public NodeModel {
         b.rows.segment(set.offsets[c], getRows(set.closures[c].kind)) =
             calcClosureAcceleration(b.at.workspace(), set.closures[c]);
       for (int i = 0; i < b.loop.rank; ++i) b.gamma[i] = b.rows[b.at.basis().rows[i]];
-      b.a.noalias() = -b.at.Jplus() * b.gamma;
+      b.independent = b.gamma;
+      b.at.solveGram(b.independent);
+      b.a.noalias() = -b.at.basis().J.transpose() * b.independent;
       scatterVelocity(b.loop, b.a, a_d_);
     }
     // Eq. (b)
@@ -291,11 +299,14 @@ bool ReducedNode::closeStep(ConstVectorRef x) {
   for (Block& b : blocks_) {
     gatherVelocity(b.loop, w_, b.d);
     b.d *= h;
-    if (!b.next.close(b.loop, b.at.basis(), b.d)) return false;
+    // To second order the closures open by h^2/2 gamma along h w: J J^T zeta = h^2/2 gamma, with the zeta of close().
+    b.zeta = (0.5 * h * h) * b.independent;
+    if (!b.next.close(b.loop, b.at.basis(), b.d, b.zeta)) return false;
     b.w = b.next.step() / h;
-    b.independent.noalias() = b.next.basis().J * b.w;
+    b.mu.noalias() = b.next.basis().J * b.w;
+    b.next.solveGram(b.mu);
     b.v_next = b.w;
-    b.v_next.noalias() -= b.next.Jplus() * b.independent;
+    b.v_next.noalias() -= b.next.basis().J.transpose() * b.mu;
     scatterConfiguration(model_, b.loop, b.next.basis().q, x_next_.head(nq));
     scatterVelocity(b.loop, b.v_next, x_next_.tail(nv));
   }
@@ -309,7 +320,7 @@ void ReducedNode::updateVelocityLift(Block& b) {
     calcClosureVelocityDerivative(b.at.workspace(), set.closures[c],
                                   b.K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
   b.at.selectIndependent(b.K, b.K_r);
-  b.Z.noalias() = -b.at.Jplus() * (b.K_r * b.at.basis().N).eval();
+  applyPlus(b.at, b.K_r * b.at.basis().N, b.Z);
 }
 
 // d_y and d_v of Eq. (c).
@@ -324,8 +335,8 @@ void ReducedNode::updateBlockDerivatives(Block& b) {
   }
   b.at.selectIndependent(b.Cq, b.Cq_r);
   b.at.selectIndependent(b.Cv, b.Cv_r);
-  b.dy.noalias() = -b.at.Jplus() * (b.Cq_r * b.at.basis().N + b.Cv_r * b.Z).eval();
-  b.dv.noalias() = -b.at.Jplus() * (b.Cv_r * b.at.basis().N).eval();
+  applyPlus(b.at, b.Cq_r * b.at.basis().N + b.Cv_r * b.Z, b.dy);
+  applyPlus(b.at, b.Cv_r * b.at.basis().N, b.dv);
 }
 
 // Loop forces, and the wrenches of loops and contacts on the bodies.
@@ -336,7 +347,8 @@ void ReducedNode::updateForces() {
   const ConstraintSet& set = spec_.constraints;
   for (Block& b : blocks_) {
     gatherVelocity(b.loop, force_, b.d);
-    b.independent.noalias() = b.at.Jplus().transpose() * b.d;
+    b.independent.noalias() = b.at.basis().J * b.d;
+    b.at.solveGram(b.independent);
     expandIndependent(b.at.basis(), b.independent, b.rows);
     for (size_t c = 0; c < b.loop.cluster_closures.size(); ++c) {
       const int whole = b.loop.cluster_closures[c], n = getRows(set.closures[whole].kind);
@@ -437,7 +449,6 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   const MatrixXd T = (Nn.transpose() * base.J.transpose()) * P;           // N'^T J^T A^{-1} J'
   const MatrixXd HN = b.H * N, EN = b.Jq * N - h * b.Jd * HN;             // e = EN dy + h J_d dw
   // S of Eq. (g)
-  b.mu.noalias() = b.next.Jplus().transpose() * b.w;
   expandIndependent(next, b.mu, b.rows);
   b.H.setZero();
   for (size_t c = 0; c < set.closures.size(); ++c) {
@@ -465,7 +476,8 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
       calcClosureVelocityDerivative(b.next.workspace(), set.closures[c],
                                     b.K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
     b.next.selectIndependent(b.K, b.K_r);
-    const MatrixXd Zn = -b.next.Jplus() * (b.K_r * Nn);
+    MatrixXd Zn(loop.model.nv(), r);
+    applyPlus(b.next, b.K_r * Nn, Zn);
     const MatrixXd& Nnode = b.scratch.basis().N;
     VectorXd gap(loop.model.nv());
     loop.model.difference(b.q, next.q, gap);
