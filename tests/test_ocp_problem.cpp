@@ -264,6 +264,33 @@ TEST_CASE("shooting problem: the squat of Bipetto, half sitting with velocities 
   checkTerminal(problem, x, 5e-4);
 }
 
+TEST_CASE("shooting problem: a linearization does not depend on what was computed before") {
+  const auto formulation = GENERATE(Formulation::Full, Formulation::Reduced);
+  CAPTURE(getName(formulation));
+  std::mt19937 rng(26);
+  const Model model = loadRobot("bipetto").model;
+  const auto make = [&] { return makeSquat(model, {}, formulation); };
+  const Motion used = make(), fresh = make();
+  RobotProblem& problem = *used.problem;
+  const VectorXd x0 = problem.initialState(), u = used.guess.us[0];
+  const VectorXd x = move(problem, 0, x0, randomVector(rng, problem.tangentSize(0), 0.05));
+  StageModel once, again, other;
+  REQUIRE(fresh.problem->linearize(0, x, u, x0, once) == StepStatus::Ok);
+  for (int i = 0; i < 3; ++i) {  // elsewhere, with other forces and velocities
+    const VectorXd away = move(problem, 0, x0, randomVector(rng, problem.tangentSize(0), 0.1));
+    REQUIRE(problem.linearize(0, away, u + randomVector(rng, model.nu(), 20), x0, other) == StepStatus::Ok);
+  }
+  for (int i = 0; i < 2; ++i) {  // the second time nothing is new
+    REQUIRE(problem.linearize(0, x, u, x0, again) == StepStatus::Ok);
+    CHECK(calcRelativeError(again.Fx, once.Fx) < 1e-9);
+    CHECK(calcRelativeError(again.Fu, once.Fu) < 1e-9);
+    CHECK(calcRelativeError(again.lx, once.lx) < 1e-9);
+    CHECK(calcRelativeError(again.lxx, once.lxx) < 1e-9);
+    CHECK(calcRelativeError(again.lux, once.lux) < 1e-9);
+  }
+  CHECK(calcRelativeError(other.Fx, once.Fx) > 1e-3);
+}
+
 TEST_CASE("shooting problem: steps and linearizations allocate nothing after the first") {
   std::mt19937 rng(24);
   const Model model = loadRobot("bipetto").model;

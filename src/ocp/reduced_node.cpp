@@ -265,6 +265,7 @@ class ReducedNode : public NodeModel {
   VectorXd tau_, a_, a_d_, w_, force_, ydd_, f_, gamma_, lambda_c_;
   MatrixXd Jc_, JcN_, Cc_q_, Cc_v_;  // contact rows
   MatrixXd M_, left_, left_v_;
+  MatrixXd D_q_;  // nv x nv, Eq. (d)
   MatrixXd dydd_, dlambda_;  // derivatives of y' and lambda_c with respect to (dy, dy_v, u)
   MatrixXd Rx_, Ru_, scaled_, Ru_scaled_;
   SaddlePoint saddle_point_;
@@ -371,15 +372,17 @@ void ReducedNode::linearizeDynamics() {
   for (Block& b : blocks_) updateBlockDerivatives(b);
   updateForces();
   updateInverseDynamicsDerivatives(model_, ws_, f_ext_);
+  // A copy: the workspace's own entries between branches are never written again, and would add up.
+  D_q_ = ws_.dID_dq;
   const ConstraintSet& set = spec_.constraints;
   for (int c = 0; c < num_loops_; ++c) {
     const Closure& closure = set.closures[c];
     const Vector6d W = calcClosureWrench(ws_, closure, lambda_.segment(set.offsets[c], getRows(closure.kind)));
-    addClosureForceDerivative(model_, ws_, closure, W, ws_.dID_dq);
+    addClosureForceDerivative(model_, ws_, closure, W, D_q_);
   }
   left_.setZero();
   left_v_.setZero();
-  addColumns(ws_.dID_dq, &BlockBasisN, left_);
+  addColumns(D_q_, &BlockBasisN, left_);
   addColumns(ws_.dID_dv, &BlockZ, left_);
   addColumns(ws_.M, &BlockDy, left_);
   addColumns(ws_.dID_dv, &BlockBasisN, left_v_);
@@ -388,9 +391,9 @@ void ReducedNode::linearizeDynamics() {
   projectRows(left_v_, dydd_.middleCols(nr, nr));
   dydd_.rightCols(model_.nu()).setZero();
   for (int m = 0; m < model_.nu(); ++m) {  // -N^T B
-    tau_.setZero();
-    tau_[model_.motors()[m].dof] = -1;
-    projectVector(tau_, f_);
+    force_.setZero();  // not tau_: another linearization at the same point needs it
+    force_[model_.motors()[m].dof] = -1;
+    projectVector(force_, f_);
     dydd_.col(2 * nr + m) = f_;
   }
   dlambda_.setZero();

@@ -1,28 +1,84 @@
 #include "bielle/solve/lq_sweep.h"
 
-#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "small_product.h"
 
 namespace bielle {
 
 namespace {
 
-using Eigen::Lower;
+using Eigen::Index;
+using PaddedMap = Eigen::Map<MatrixXd, 0, Eigen::OuterStride<>>;
 
-// The first rows x cols numbers of a buffer as a matrix.
-Eigen::Map<MatrixXd> shape(VectorXd& buffer, Eigen::Index rows, Eigen::Index cols) {
-  return Eigen::Map<MatrixXd>(buffer.data(), rows, cols);
+// The beginning of a buffer as a matrix whose rows are padded.
+PaddedMap shape(VectorXd& buffer, Index rows, Index cols) {
+  return PaddedMap(buffer.data(), rows, cols, Eigen::OuterStride<>(roundUpToLane(rows)));
+}
+
+PaddedMatrix pad(PaddedMap A, Index row = 0, Index col = 0) {
+  return {A.data() + row + col * A.outerStride(), A.outerStride()};
+}
+
+// Padding rows take part in products: they must hold numbers.
+void clearPadding(PaddedMap A) {
+  for (Index j = 0; j < A.cols(); ++j) {
+    for (Index i = A.rows(); i < A.outerStride(); ++i) A.data()[i + j * A.outerStride()] = 0;
+  }
 }
 
 // By blocks: a strided copy of whole rows would cost a tenth of the sweep.
-void copyLowerToUpper(MatrixXd& A) {
-  constexpr Eigen::Index kBlock = 16;
-  for (Eigen::Index c = 0; c < A.cols(); c += kBlock) {
-    const Eigen::Index width = std::min(kBlock, A.cols() - c), below = A.cols() - c - width;
-    A.block(c, c + width, width, below) = A.block(c + width, c, below, width).transpose();
-    for (Eigen::Index j = c; j < c + width; ++j) {
-      for (Eigen::Index i = j + 1; i < c + width; ++i) A(j, i) = A(i, j);
+template <class A, class B>
+void copyTransposed(const A& from, B&& to) {
+  constexpr Index kBlock = 8;
+  for (Index c = 0; c < from.cols(); c += kBlock) {
+    for (Index r = 0; r < from.rows(); r += kBlock) {
+      const Index width = std::min(kBlock, from.cols() - c), height = std::min(kBlock, from.rows() - r);
+      if (width == kBlock && height == kBlock) {
+        to.template block<kBlock, kBlock>(c, r) = from.template block<kBlock, kBlock>(r, c).transpose();
+      } else {
+        to.block(c, r, width, height) = from.block(r, c, height, width).transpose();
+      }
     }
   }
+}
+
+void copyLowerToUpper(MatrixXd& A) {
+  constexpr Index kBlock = 8;
+  for (Index c = 0; c < A.cols(); c += kBlock) {
+    const Index width = std::min(kBlock, A.cols() - c), below = A.cols() - c - width;
+    copyTransposed(A.block(c + width, c, below, width), A.block(c, c + width, width, below));
+    for (Index j = c; j < c + width; ++j) {
+      for (Index i = j + 1; i < c + width; ++i) A(j, i) = A(i, j);
+    }
+  }
+}
+
+// H(i, j) += sign sum_k A(i, k) B(j, k) for i >= j >= begin, k < depth. Full lanes: entries above the diagonal change.
+void addLowerProduct(Index begin, Index depth, double sign, PaddedMap A, PaddedMap B, PaddedMap H) {
+  for (Index j = begin, end; j < H.cols(); j = end) {
+    end = std::min((j / kLane + 1) * kLane, H.cols());
+    const Index i = j / kLane * kLane;
+    addProduct(H.rows() - i, end - j, depth, sign, pad(A, i), {B.data() + j, B.outerStride(), 1}, pad(H, i, j));
+  }
+}
+
+// Cholesky elimination of the first `num` unknowns: their columns of H become L over Y^T, the rest of H stays.
+bool factorizeColumns(PaddedMap H, Index num) {
+  for (Index j = 0; j < num; ++j) {
+    const Index i = j / kLane * kLane;
+    addProduct(H.rows() - i, 1, j, -1, pad(H, i), {H.data() + j, H.outerStride(), 1}, pad(H, i, j));
+    if (!(H(j, j) > 0)) return false;
+    H.col(j).tail(H.rows() - j) /= std::sqrt(H(j, j));
+  }
+  return true;
+}
+
+bool hasFiniteLower(PaddedMap H, Index size) {
+  for (Index j = 0; j < size; ++j) {
+    if (!H.col(j).segment(j, size - j).allFinite()) return false;
+  }
+  return true;
 }
 
 // A value that is not finite in the models of a node reaches Vx or the diagonal of Vxx there, or one node earlier.
@@ -32,32 +88,47 @@ bool isFinite(const LqSweep::Node& node) { return node.Vx.allFinite() && node.Vx
 
 LqResult LqSweep::update(const std::vector<StageModel>& models, const LqRegularization& regularization,
                          const std::vector<ControlBox>& boxes) {
-  resize(models);
+  start(models, regularization);
   const int N = static_cast<int>(models.size()) - 1;
-  LqResult result;
-  Node& terminal = nodes_[N];
-  terminal.Vx = models[N].lx;
-  terminal.Vxx = models[N].lxx;
-  terminal.Vxx.diagonal().array() += regularization.state;
-  copyLowerToUpper(terminal.Vxx);
-  for (int k = N - 1; k >= 0; --k) {
-    Node& node = nodes_[k];
-    updateQuadratic(models[k], nodes_[k + 1], regularization, node);
-    if (!node.Vx.allFinite()) return {LqStatus::NotFinite, k, 0};
-    double change = nodes_[k + 1].Vx.dot(models[k].gap) + 0.5 * models[k].gap.dot(Vxx_gap_.head(models[k].gap.size()));
-    const LqStatus status = boxes.empty() ? updateGains(node, change) : updateBoxedGains(boxes[k], node, change);
-    if (status != LqStatus::Ok) return {status, k, 0};
-    copyLowerToUpper(node.Vxx);
-    if (!isFinite(node)) return {LqStatus::NotFinite, k, 0};
-    result.expected_change += change;
+  for (int k = N; k >= 0; --k) {
+    const ControlBox* box = k < N && !boxes.empty() ? &boxes[k] : nullptr;
+    if (updateNode(k, models[k], box) != LqStatus::Ok) break;
   }
-  return result;
+  return result_;
 }
 
-// Eqs. (2) to (4). Vx, Vxx (lower triangle) and Y_ hold Qx, Qxx and Qux from here to the gains.
-void LqSweep::updateQuadratic(const StageModel& model, const Node& next, const LqRegularization& regularization,
-                              Node& node) {
-  const Eigen::Index n = model.Fx.cols(), nu = model.Fu.cols(), n_next = model.Fx.rows();
+void LqSweep::start(const std::vector<StageModel>& models, const LqRegularization& regularization) {
+  resize(models);
+  regularization_ = regularization;
+  result_ = LqResult();
+}
+
+LqStatus LqSweep::updateNode(int k, const StageModel& model, const ControlBox* box) {
+  Node& node = nodes_[k];
+  if (k + 1 == static_cast<int>(nodes_.size())) {
+    node.Vx = model.lx;
+    node.Vxx = model.lxx;
+    node.Vxx.diagonal().array() += regularization_.state;
+    copyLowerToUpper(node.Vxx);
+    return LqStatus::Ok;
+  }
+  const LqStatus status = updateStage(model, nodes_[k + 1], box, node);
+  if (status != LqStatus::Ok) result_ = {status, k, 0};
+  return status;
+}
+
+LqStatus LqSweep::updateStage(const StageModel& model, const Node& next, const ControlBox* box, Node& node) {
+  updateQuadratic(model, next, node);
+  if (!node.Vx.allFinite()) return LqStatus::NotFinite;
+  result_.expected_change += next.Vx.dot(model.gap) + 0.5 * model.gap.dot(Vxx_gap_.head(model.gap.size()));
+  const LqStatus status = box ? eliminateBoxedControls(*box, node) : eliminateControls(node);
+  if (status != LqStatus::Ok) return status;
+  return isFinite(node) ? LqStatus::Ok : LqStatus::NotFinite;
+}
+
+// Eqs. (2) to (4). Vx holds Qx from here to the elimination.
+void LqSweep::updateQuadratic(const StageModel& model, const Node& next, Node& node) {
+  const Index n = model.Fx.cols(), nu = model.Fu.cols(), n_next = model.Fx.rows();
   auto p = p_.head(n_next), Vxx_gap = Vxx_gap_.head(n_next);
   Vxx_gap.noalias() = next.Vxx * model.gap;
   p = next.Vx + Vxx_gap;
@@ -66,48 +137,44 @@ void LqSweep::updateQuadratic(const StageModel& model, const Node& next, const L
   node.Qu = model.lu;
   node.Qu.noalias() += model.Fu.transpose() * p;
 
-  auto Vxx_Fu = shape(Vxx_F_, n_next, nu);
-  Vxx_Fu.noalias() = next.Vxx * model.Fu;
-  auto Quu = shape(Quu_, nu, nu);
-  Quu = model.luu;
-  Quu.noalias() += model.Fu.transpose() * Vxx_Fu;
-  Quu.diagonal().array() += regularization.control;
-
-  auto Vxx_Fx = shape(Vxx_F_, n_next, n);
-  Vxx_Fx.noalias() = next.Vxx * model.Fx;
-  auto Qux = shape(Y_, nu, n);
-  Qux = model.lux;
-  Qux.noalias() += model.Fu.transpose() * Vxx_Fx;
-  node.Vxx = model.lxx;
-  node.Vxx.diagonal().array() += regularization.state;
-  node.Vxx.triangularView<Lower>() += model.Fx.transpose() * Vxx_Fx;
+  auto Ft = shape(Ft_, nu + n, n_next), Ft_Vxx = shape(Ft_Vxx_, nu + n, n_next), H = shape(H_, nu + n, nu + n);
+  copyTransposed(model.Fu, Ft.topRows(nu));
+  copyTransposed(model.Fx, Ft.bottomRows(n));
+  clearPadding(Ft);
+  Ft_Vxx_.head(Ft.outerStride() * n_next).setZero();
+  addProduct(nu + n, n_next, n_next, 1, pad(Ft), {next.Vxx.data(), 1, n_next}, pad(Ft_Vxx));
+  H.topLeftCorner(nu, nu) = model.luu;
+  H.topRightCorner(nu, n).setZero();
+  copyTransposed(model.lux, H.bottomLeftCorner(n, nu));
+  H.bottomRightCorner(n, n) = model.lxx;
+  clearPadding(H);
+  H.diagonal().head(nu).array() += regularization_.control;
+  H.diagonal().tail(n).array() += regularization_.state;
+  addLowerProduct(0, n_next, 1, Ft, Ft_Vxx, H);
 }
 
 // Eqs. (5) to (7).
-LqStatus LqSweep::updateGains(Node& node, double& change) {
-  const Eigen::Index n = node.Vx.size(), nu = node.Qu.size();
-  if (nu == 0) return LqStatus::Ok;
-  Eigen::Ref<MatrixXd> L = shape(Quu_, nu, nu);
-  if (!L.diagonal().allFinite() || !node.Qu.allFinite()) return LqStatus::NotFinite;
-  if (Eigen::LLT<Eigen::Ref<MatrixXd>>(L).info() != Eigen::Success) return LqStatus::Indefinite;
-  auto Y = shape(Y_, nu, n);
-  L.triangularView<Lower>().solveInPlace(Y);
+LqStatus LqSweep::eliminateControls(Node& node) {
+  const Index n = node.Vx.size(), nu = node.Qu.size();
+  auto H = shape(H_, nu + n, nu + n);
+  if (!hasFiniteLower(H, nu) || !node.Qu.allFinite()) return LqStatus::NotFinite;
+  if (!factorizeColumns(H, nu)) return LqStatus::Indefinite;
+  const auto L = H.topLeftCorner(nu, nu).triangularView<Eigen::Lower>();
   node.k = -node.Qu;
-  L.triangularView<Lower>().solveInPlace(node.k);
-  node.Vx.noalias() += Y.transpose() * node.k;  // Qux^T k = Y^T (-L^{-1} Qu)
-  L.triangularView<Lower>().transpose().solveInPlace(node.k);
-  node.K = -Y;
-  L.triangularView<Lower>().transpose().solveInPlace(node.K);
-  node.Vxx.selfadjointView<Lower>().rankUpdate(Y.transpose(), -1.0);
-  change += 0.5 * node.Qu.dot(node.k);
+  L.solveInPlace(node.k);
+  node.Vx.noalias() += H.bottomLeftCorner(n, nu) * node.k;  // Qux^T k = Y^T (-L^{-1} Qu)
+  L.transpose().solveInPlace(node.k);
+  result_.expected_change += 0.5 * node.Qu.dot(node.k);
+  updateGains(static_cast<int>(nu), node);
+  node.K = shape(Kt_, n, nu).transpose();
   return LqStatus::Ok;
 }
 
 // Eqs. (5) to (7) with the box.
-LqStatus LqSweep::updateBoxedGains(const ControlBox& box, Node& node, double& change) {
-  const Eigen::Index n = node.Vx.size(), nu = node.Qu.size();
-  const auto Quu = shape(Quu_, nu, nu);
-  auto Qux = shape(Y_, nu, n);
+LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, Node& node) {
+  const Index n = node.Vx.size(), nu = node.Qu.size();
+  auto H = shape(H_, nu + n, nu + n);
+  const auto Quu = H.topLeftCorner(nu, nu);
   node.k.setZero();
   switch (box_qp_.solve(Quu, node.Qu, box.lower, box.upper, node.k)) {
     case BoxQpStatus::Ok:
@@ -115,26 +182,41 @@ LqStatus LqSweep::updateBoxedGains(const ControlBox& box, Node& node, double& ch
     case BoxQpStatus::Indefinite:
       return LqStatus::Indefinite;
     case BoxQpStatus::NotConverged:
-      return Quu.allFinite() ? LqStatus::Indefinite : LqStatus::NotFinite;
+      return hasFiniteLower(H, nu) ? LqStatus::Indefinite : LqStatus::NotFinite;
   }
-  node.Vx.noalias() += Qux.transpose() * node.k;
-  change += node.Qu.dot(node.k);
-  for (Eigen::Index j = 0; j < nu; ++j) change += 0.5 * node.k[j] * Quu.col(j).dot(node.k);
+  node.Vx.noalias() += H.bottomLeftCorner(n, nu) * node.k;
+  auto Quu_k = Kt_.head(nu);
+  Quu_k.noalias() = Quu.selfadjointView<Eigen::Lower>() * node.k;
+  result_.expected_change += node.Qu.dot(node.k) + 0.5 * node.k.dot(Quu_k);
 
-  // The free rows move to the top of the buffer, in place: a free index is never smaller than its rank.
-  node.K.setZero();
+  // The free rows and columns move to the front, in place: a free index is never smaller than its rank.
   const int num_free = box_qp_.getNumFree();
-  if (num_free == 0) return LqStatus::Ok;
-  for (int i = 0; i < num_free; ++i) {
-    if (box_qp_.getFreeIndex(i) != i) Qux.row(i) = Qux.row(box_qp_.getFreeIndex(i));
+  for (int j = 0; j < num_free; ++j) {
+    const int free = box_qp_.getFreeIndex(j);
+    if (free == j) continue;
+    H.col(j) = H.col(free);
+    for (int i = j; i < num_free; ++i) H(i, j) = H(box_qp_.getFreeIndex(i), j);
   }
-  auto Y = Qux.topRows(num_free);
-  const auto L = box_qp_.getFreeFactor();
-  L.triangularView<Lower>().solveInPlace(Y);
-  node.Vxx.selfadjointView<Lower>().rankUpdate(Y.transpose(), -1.0);
-  L.triangularView<Lower>().transpose().solveInPlace(Y);
-  for (int i = 0; i < num_free; ++i) node.K.row(box_qp_.getFreeIndex(i)) = -Y.row(i);
+  if (!factorizeColumns(H, num_free)) return LqStatus::Indefinite;
+  updateGains(num_free, node);
+  node.K.setZero();
+  for (int i = 0; i < num_free; ++i) node.K.row(box_qp_.getFreeIndex(i)) = shape(Kt_, n, nu).col(i).transpose();
   return LqStatus::Ok;
+}
+
+// Vxx of Eq. (6), and K^T of Eq. (5) of the free controls, from L and Y^T in the first columns of H.
+void LqSweep::updateGains(int num_free, Node& node) {
+  const Index n = node.Vx.size(), nu = node.Qu.size();
+  auto H = shape(H_, nu + n, nu + n), Kt = shape(Kt_, n, nu);
+  addLowerProduct(nu, num_free, -1, H, H, H);
+  node.Vxx = H.bottomRightCorner(n, n);
+  copyLowerToUpper(node.Vxx);
+  Kt.leftCols(num_free) = -H.bottomLeftCorner(n, num_free);
+  clearPadding(Kt);
+  for (Index j = num_free - 1; j >= 0; --j) {
+    addProduct(n, 1, num_free - 1 - j, -1, pad(Kt, 0, j + 1), {&H(j + 1, j), 1, 0}, pad(Kt, 0, j));
+    Kt.col(j) /= H(j, j);
+  }
 }
 
 double LqSweep::calcStep(const std::vector<StageModel>& models, std::vector<VectorXd>& dx,
@@ -168,11 +250,13 @@ void LqSweep::resize(const std::vector<StageModel>& models) {
     max_n = std::max(max_n, n);
     max_nu = std::max(max_nu, nu);
   }
+  const Index rows = roundUpToLane(max_n + max_nu);
   p_.resize(max_n);
   Vxx_gap_.resize(max_n);
-  Vxx_F_.resize(max_n * std::max(max_n, max_nu));
-  Quu_.resize(max_nu * max_nu);
-  Y_.resize(max_nu * max_n);
+  Ft_.resize(rows * max_n);
+  Ft_Vxx_.resize(rows * max_n);
+  H_.setZero(rows * (max_n + max_nu));
+  Kt_.resize(roundUpToLane(max_n) * max_nu);
 }
 
 }  // namespace bielle

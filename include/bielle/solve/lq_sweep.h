@@ -51,8 +51,7 @@ struct LqResult {
   double expected_change = 0;  ///< v_0, Eq. (7)
 };
 
-/// Owns everything a sweep writes. Sized by the first update() and kept: later ones of the same sizes allocate nothing
-/// (tangent sizes up to 128: beyond, Eigen's matrix product takes its own buffers from the heap).
+/// Owns everything a sweep writes. Sized by the first update() and kept: later ones of the same sizes allocate nothing.
 class LqSweep {
  public:
   /// What the sweep knows at node k; at the terminal node Vx and Vxx only.
@@ -68,6 +67,13 @@ class LqSweep {
   LqResult update(const std::vector<StageModel>& models, const LqRegularization& regularization,
                   const std::vector<ControlBox>& boxes = {});
 
+  /// The same node by node, for models that come one after the other: start(), then updateNode(k) for k = N .. 0 as
+  /// long as the status is Ok. start() reads only the sizes of the models.
+  void start(const std::vector<StageModel>& models, const LqRegularization& regularization);
+  LqStatus updateNode(int k, const StageModel& model, const ControlBox* box = nullptr);
+  /// Result of the nodes updated so far.
+  const LqResult& getResult() const { return result_; }
+
   const std::vector<Node>& getNodes() const { return nodes_; }
 
   /// The solution of (1) of the last update() on the same models: dx_k (N + 1) and du_k (N), resized if need be.
@@ -76,14 +82,19 @@ class LqSweep {
 
  private:
   void resize(const std::vector<StageModel>& models);
-  void updateQuadratic(const StageModel& model, const Node& next, const LqRegularization& regularization, Node& node);
-  LqStatus updateGains(Node& node, double& change);
-  LqStatus updateBoxedGains(const ControlBox& box, Node& node, double& change);
+  LqStatus updateStage(const StageModel& model, const Node& next, const ControlBox* box, Node& node);
+  void updateQuadratic(const StageModel& model, const Node& next, Node& node);
+  LqStatus eliminateControls(Node& node);
+  LqStatus eliminateBoxedControls(const ControlBox& box, Node& node);
+  void updateGains(int num_free, Node& node);
 
   std::vector<Node> nodes_;
+  LqRegularization regularization_;
+  LqResult result_;
   BoxQp box_qp_;
-  // Buffers of one node, sized for the largest: p and Vxx' gap of Eq. (2), Vxx' Fx or Vxx' Fu, Quu (then L), Y.
-  VectorXd p_, Vxx_gap_, Vxx_F_, Quu_, Y_;
+  // Buffers of one node, sized for the largest, their rows padded to full lanes (small_product.h). With F = [Fu Fx]:
+  // F^T, F^T Vxx', the Hessian [Quu . ; Qxu Qxx] whose first columns become those of L over Y^T, and K^T.
+  VectorXd p_, Vxx_gap_, Ft_, Ft_Vxx_, H_, Kt_;
 };
 
 }  // namespace bielle

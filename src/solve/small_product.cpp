@@ -1,0 +1,69 @@
+#include "small_product.h"
+
+#include <algorithm>
+
+namespace bielle {
+
+namespace {
+
+// A vector of kLane numbers anywhere in memory; the compiler splits it if the processor's registers are shorter.
+typedef double Lane __attribute__((vector_size(kLane * sizeof(double)), aligned(sizeof(double)), may_alias));
+
+// With L lanes and C columns, L C sums, L vectors of A and one number of B are to fit into 32 registers.
+#ifdef __AVX512F__
+constexpr int kMaxLanes = 6;
+#else
+constexpr int kMaxLanes = 1;
+#endif
+constexpr int kColumns = 4;
+
+template <int L, int C>
+void addBlock(Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B, PaddedMatrix out) {
+  Lane sums[C][L] = {};
+  const double *a = A.data, *b = B.data;
+  for (Eigen::Index k = 0; k < depth; ++k, a += A.stride, b += B.row_stride) {
+    Lane column[L];
+#pragma GCC unroll 8
+    for (int i = 0; i < L; ++i) column[i] = *reinterpret_cast<const Lane*>(a + i * kLane);
+#pragma GCC unroll 8
+    for (int j = 0; j < C; ++j) {
+      const double factor = b[j * B.col_stride];
+#pragma GCC unroll 8
+      for (int i = 0; i < L; ++i) sums[j][i] += column[i] * factor;
+    }
+  }
+#pragma GCC unroll 8
+  for (int j = 0; j < C; ++j) {
+#pragma GCC unroll 8
+    for (int i = 0; i < L; ++i) *reinterpret_cast<Lane*>(out.data + j * out.stride + i * kLane) += sign * sums[j][i];
+  }
+}
+
+template <int L>
+void addRows(Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B, PaddedMatrix C) {
+  Eigen::Index j = 0;
+  const auto addColumns = [&](auto block, Eigen::Index width) {
+    for (; j + width <= cols; j += width) {
+      block(depth, sign, A, {B.data + j * B.col_stride, B.row_stride, B.col_stride}, {C.data + j * C.stride, C.stride});
+    }
+  };
+  addColumns(addBlock<L, kColumns>, kColumns);
+  addColumns(addBlock<L, 1>, 1);
+}
+
+// As many lanes at a time as there are, up to L.
+template <int L>
+void addLanes(Eigen::Index lanes, Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B,
+              PaddedMatrix C) {
+  for (; lanes >= L; lanes -= L, A.data += L * kLane, C.data += L * kLane) addRows<L>(cols, depth, sign, A, B, C);
+  if constexpr (L > 1) addLanes<L - 1>(lanes, cols, depth, sign, A, B, C);
+}
+
+}  // namespace
+
+void addProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B,
+                PaddedMatrix C) {
+  addLanes<kMaxLanes>(roundUpToLane(rows) / kLane, cols, depth, sign, A, B, C);
+}
+
+}  // namespace bielle

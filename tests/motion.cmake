@@ -1,0 +1,1 @@
+bielle_test(motion SOURCES test_motion.cpp LIBS bielle_motion)

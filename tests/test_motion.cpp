@@ -1,0 +1,190 @@
+// The motions as their results: what the trajectory does, measured by kinematics, not by what the solver says.
+#include <catch2/catch.hpp>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/centroidal.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/benchmark_walk.h"
+#include "bielle/motion/squat.h"
+
+using namespace bielle;
+
+namespace {
+
+Model loadOwn(const std::string& name) { return loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/" + name).model; }
+
+struct Outcome {
+  double gap = 0;                                 ///< largest closure residual at any node, m or rad
+  double slide = 0;                               ///< largest displacement of a contact, m
+  double lowest = 1e9, highest = -1e9, last = 0;  ///< height of the CoM over its initial height
+  double worst_height = 0;                        ///< largest distance of the CoM from the height asked for, m
+};
+
+Outcome measure(const Model& model, const SquatOptions& options, const std::vector<VectorXd>& xs) {
+  Workspace ws(model);
+  const ConstraintSet set = makeConstraintSet(model);
+  Outcome out;
+  std::vector<Vector3d> places;
+  double initial = 0;
+  for (size_t k = 0; k < xs.size(); ++k) {
+    updatePositions(model, ws, xs[k].head(model.nq()));
+    out.gap = std::max(out.gap, calcLargestGap(ws, set));
+    for (size_t c = 0; c < model.contacts().size(); ++c) {
+      const Vector3d p = getPlacement(ws, model.contacts()[c].body, model.contacts()[c].X_BF).p;
+      if (k == 0) places.push_back(p);
+      out.slide = std::max(out.slide, (p - places[c]).norm());
+    }
+    const double height = calcCom(model, ws).z();
+    if (k == 0) initial = height;
+    out.lowest = std::min(out.lowest, height / initial);
+    out.highest = std::max(out.highest, height / initial);
+    out.last = height / initial;
+    out.worst_height =
+        std::max(out.worst_height, std::abs(height - initial * calcSquatHeight(options, k * options.time_step)));
+  }
+  return out;
+}
+
+// Largest |x_{k+1} - f(x_k, u_k)| by stepping again.
+double calcDefect(RobotProblem& problem, const ShootingTrajectory& t) {
+  double defect = 0, cost = 0;
+  VectorXd next(problem.stateSize());
+  for (int k = 0; k < problem.numStages(); ++k) {
+    VectorXd dx(problem.tangentSize(k + 1));
+    REQUIRE(problem.step(k, t.xs[k], t.us[k], next, cost) == StepStatus::Ok);
+    problem.difference(k + 1, t.xs[k + 1], next, dx);
+    defect = std::max(defect, dx.cwiseAbs().maxCoeff());
+  }
+  return defect;
+}
+
+}  // namespace
+
+TEST_CASE("squat: Bipetto goes down or up as asked, loops closed, feet in place") {
+  const Model model = loadOwn("bipetto");
+  struct Row {
+    Formulation formulation;
+    double depth;
+    double gap;               // of the loops, m or rad
+    double height_tolerance;  // m
+  };
+  for (const Row& row : {Row{Formulation::Full, 0.7, 1e-3, 3e-3}, Row{Formulation::Full, 0.9, 1e-3, 2e-3},
+                         Row{Formulation::Full, 1.1, 1e-3, 2e-3}, Row{Formulation::Reduced, 0.7, 1e-10, 3e-3},
+                         Row{Formulation::Reduced, 0.9, 1e-10, 2e-3}, Row{Formulation::Reduced, 1.1, 1e-10, 2e-3}}) {
+    CAPTURE(getName(row.formulation), row.depth);
+    SquatOptions options;
+    options.depth = row.depth;
+    Motion motion = makeSquat(model, options, row.formulation);
+    FddpOptions solver;
+    solver.max_iterations = 100;
+    const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
+    CAPTURE(summary.message, summary.iterations);
+    CHECK(summary.termination == FddpTermination::Converged);
+    CHECK(calcDefect(*motion.problem, motion.guess) < 1e-9);
+    const Outcome outcome = measure(model, options, motion.guess.xs);
+    CHECK(outcome.gap < row.gap);
+    CHECK(outcome.slide < 2e-3);
+    CHECK(outcome.worst_height < row.height_tolerance);
+    CHECK((row.depth < 1 ? outcome.lowest : outcome.highest) == Approx(row.depth).epsilon(0.01));
+    CHECK(outcome.last == Approx(1).epsilon(2e-3));
+  }
+}
+
+TEST_CASE("squat: far out of reach, it says so or misses, and stays finite") {
+  const Model model = loadOwn("bipetto");
+  for (double depth : {0.1, 1.9}) {
+    CAPTURE(depth);
+    SquatOptions options;
+    options.depth = depth;
+    Motion motion = makeSquat(model, options);
+    FddpOptions solver;
+    solver.max_iterations = 60;
+    const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
+    CAPTURE(summary.message, summary.cost);
+    CHECK(std::isfinite(summary.cost));
+    for (const VectorXd& x : motion.guess.xs) REQUIRE(x.allFinite());
+    for (const VectorXd& u : motion.guess.us) REQUIRE(u.allFinite());
+    const Outcome outcome = measure(model, options, motion.guess.xs);
+    CHECK((summary.termination != FddpTermination::Converged || outcome.worst_height > 0.02));
+  }
+}
+
+TEST_CASE("squat: impossible options are refused, unknown ones are named") {
+  const Model model = loadOwn("bipetto");
+  const auto make = [&](const std::string& option, double value) {
+    SquatOptions options;
+    setOption(listOptions(options), option, value);
+    return makeSquat(model, options);
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  CHECK_NOTHROW(make("depth", 0.8));
+  for (const auto& [option, value] : std::vector<std::pair<std::string, double>>{{"depth", 3},
+                                                                                 {"depth", -1},
+                                                                                 {"depth", nan},
+                                                                                 {"duration", 0},
+                                                                                 {"duration", nan},
+                                                                                 {"settle", -0.1},
+                                                                                 {"time_step", 0},
+                                                                                 {"time_step", 1},
+                                                                                 {"depht", 0.7}}) {
+    CAPTURE(option, value);
+    CHECK_THROWS_AS(make(option, value), ModelError);
+    CHECK_THROWS_WITH(make(option, value), Catch::Contains(option));
+  }
+  CHECK_THROWS_AS(makeSquat(loadOwn("fourbar"), {}), ModelError);  // no feet
+}
+
+TEST_CASE("benchmark walk: the schedule that speed is measured on") {
+  const Model model = loadOwn("bipetto");
+  const auto formulation = GENERATE(Formulation::Full, Formulation::Reduced);
+  CAPTURE(getName(formulation));
+  Motion motion = makeBenchmarkWalk(model, {}, formulation);
+  RobotProblem& problem = *motion.problem;
+  REQUIRE(problem.numStages() == 250);
+  REQUIRE(motion.schedule.numStages() == 250);
+  const int left = model.findContact("foot_left"), right = model.findContact("foot_right");
+  int node = 0;
+  const auto expect = [&](int nodes, const std::vector<int>& stance, size_t costs) {
+    for (int i = 0; i < nodes; ++i, ++node) {
+      CAPTURE(node);
+      const StageSpec& spec = problem.spec(node);
+      CHECK(spec.dt == 0.015);
+      CHECK(spec.costs.size() == costs);
+      CHECK((spec.state.weights.array() > 0).all());
+      const ConstraintSet& set = spec.constraints;
+      REQUIRE(set.closures.size() == 6 + stance.size());
+      for (size_t c = 0; c < stance.size(); ++c) {
+        const Closure& closure = set.closures[6 + c];
+        CHECK(closure.body1 == model.contacts()[stance[c]].body);
+        CHECK(closure.kp == 0);
+        CHECK(closure.kd == 100);
+      }
+    }
+  };
+  expect(13, {left, right}, 3);
+  for (int i = 0; i < 4; ++i) {
+    expect(26, {right}, 3);
+    expect(1, {left, right}, 5);
+    expect(26, {left}, 3);
+    expect(1, {left, right}, 5);
+  }
+  expect(21, {left, right}, 3);
+  CHECK(node == 250);
+
+  FddpOptions solver;
+  solver.max_iterations = 60;
+  const FddpSummary summary = Fddp(solver).solve(problem, motion.guess);
+  CAPTURE(summary.message);
+  CHECK(summary.termination == FddpTermination::Converged);
+  CHECK(calcDefect(problem, motion.guess) < 1e-9);
+  Workspace ws(model);
+  updatePositions(model, ws, motion.guess.xs.back().head(model.nq()));
+  CHECK(calcCom(model, ws).x() > 0.5);  // 8 steps at 0.2 m/s
+
+  BenchmarkWalkOptions options;
+  options.total_nodes = 100;
+  CHECK_THROWS_AS(makeBenchmarkWalk(model, options), ModelError);
+  CHECK_THROWS_AS(makeBenchmarkWalk(loadOwn("fourbar")), ModelError);
+}
