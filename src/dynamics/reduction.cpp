@@ -34,6 +34,24 @@ Model makeBlockModel(const Model& model, const LoopCluster& cluster, const std::
   return builder.build();
 }
 
+// Parent, path and outer coordinates of a unit carried by body `root`.
+void connectUnit(const Model& model, const Reduction& reduction, int parent, int root, ReducedUnit& unit) {
+  unit.parent = parent;
+  const ReducedUnit& up = reduction.units[parent];
+  unit.outer = up.outer;
+  for (int k = 0; k < up.size; ++k) unit.outer.push_back(up.offset + k);
+  std::vector<int> dofs;
+  if (up.block >= 0) {
+    dofs = reduction.blocks[up.block].dofs;
+  } else {
+    const Joint& joint = model.joints()[up.joint];
+    for (int k = 0; k < joint.nv; ++k) dofs.push_back(joint.idx_v + k);
+  }
+  const std::vector<int>& support = model.supportDofs(root);
+  for (size_t k = 0; k < dofs.size(); ++k)
+    if (std::binary_search(support.begin(), support.end(), dofs[k])) unit.path.push_back(static_cast<int>(k));
+}
+
 }  // namespace
 
 Reduction makeReduction(const Model& model, ConstVectorRef q) {
@@ -62,18 +80,32 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
                          "close the configuration first (assemble, closeConfiguration)");
     out.blocks.push_back(std::move(block));
   }
-  // Reduced coordinates in the order of the first dof of each free joint or block.
-  std::vector<bool> placed(out.blocks.size(), false);
+  // Units and their reduced coordinates, in the order of the first joint of each.
+  std::vector<int> unit_of(model.numBodies(), -1), block_unit(out.blocks.size(), -1);
   for (int i = 1; i < model.numBodies(); ++i) {
+    if (owner[i] >= 0 && block_unit[owner[i]] >= 0) {
+      unit_of[i] = block_unit[owner[i]];
+      continue;
+    }
+    ReducedUnit unit;
+    unit.offset = out.size;
+    unit_of[i] = static_cast<int>(out.units.size());
     if (owner[i] < 0) {
+      unit.joint = i;
+      unit.size = model.joints()[i].nv;
       out.free_joints.push_back(i);
       out.free_offsets.push_back(out.size);
-      out.size += model.joints()[i].nv;
-    } else if (!placed[owner[i]]) {
-      placed[owner[i]] = true;
+    } else {
+      unit.block = owner[i];
+      block_unit[owner[i]] = unit_of[i];
       out.blocks[owner[i]].offset = out.size;
-      out.size += out.blocks[owner[i]].size;
+      unit.size = out.blocks[owner[i]].size;
     }
+    // The first joint of a block hangs on the body that carries the whole block.
+    const int root = model.joints()[i].parent;
+    if (root > 0) connectUnit(model, out, unit_of[root], root, unit);
+    out.size += unit.size;
+    out.units.push_back(unit);
   }
   if (out.size == 0)
     throw ModelError(model.name(), "closures", "they leave the robot no mobility", "see `bielle info` for ranks");

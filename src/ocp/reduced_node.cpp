@@ -20,6 +20,7 @@
 #include <Eigen/LU>
 
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/reduced_derivatives.h"
 #include "bielle/dynamics/rnea.h"
 #include "node_model.h"
 
@@ -60,7 +61,7 @@ void applyPlus(const BlockPoint& point, MatrixXd X, MatrixXd& out) {
 class ReducedNode : public NodeModel {
  public:
   ReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec)
-      : NodeModel(model, spec), reduction_(reduction) {
+      : NodeModel(model, spec), reduction_(reduction), derivatives_(model, reduction) {
     for (const LoopBlock& block : reduction.blocks) blocks_.emplace_back(block);
     const int nv = model.nv(), nr = reduction.size, nu = model.nu();
     num_loops_ = spec.constraints.num_loops;
@@ -75,7 +76,8 @@ class ReducedNode : public NodeModel {
     for (MatrixXd* m : {&Cc_q_, &Cc_v_}) m->setZero(contact_rows_, nv);
     dlambda_.setZero(contact_rows_, 2 * nr + nu);
     dydd_.setZero(nr, 2 * nr + nu);
-    for (MatrixXd* m : {&left_, &left_v_}) m->setZero(nv, nr);
+    left_.setZero(nv, nr);
+    lifts_.resize(blocks_.size());
     M_.setZero(nr, nr);
     saddle_point_.resize(nr, contact_rows_);
     f_ext_.assign(model.numBodies(), Vector6d::Zero());
@@ -251,6 +253,7 @@ class ReducedNode : public NodeModel {
   void updateVelocityLift(Block& b);
   void updateBlockDerivatives(Block& b);
   void updateForces();
+  static void updateForceDerivative(Block& b, const BlockPoint& point, const VectorXd& force);
   void linearizeDynamics();
   bool linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out);
   void linearizeFreeJoints(ConstVectorRef x_next_node, StageModel& out);
@@ -264,8 +267,9 @@ class ReducedNode : public NodeModel {
   int num_loops_ = 0, loop_rows_ = 0, contact_rows_ = 0;
   VectorXd tau_, a_, a_d_, w_, force_, ydd_, f_, gamma_, lambda_c_;
   MatrixXd Jc_, JcN_, Cc_q_, Cc_v_;  // contact rows
-  MatrixXd M_, left_, left_v_;
-  MatrixXd D_q_;  // nv x nv, Eq. (d)
+  MatrixXd M_, left_;
+  ReducedDerivatives derivatives_;
+  std::vector<BlockLift> lifts_;
   MatrixXd dydd_, dlambda_;  // derivatives of y' and lambda_c with respect to (dy, dy_v, u)
   MatrixXd Rx_, Ru_, scaled_, Ru_scaled_;
   SaddlePoint saddle_point_;
@@ -350,18 +354,25 @@ void ReducedNode::updateForces() {
     gatherVelocity(b.loop, force_, b.d);
     b.independent.noalias() = b.at.basis().J * b.d;
     b.at.solveGram(b.independent);
-    expandIndependent(b.at.basis(), b.independent, b.rows);
-    for (size_t c = 0; c < b.loop.cluster_closures.size(); ++c) {
-      const int whole = b.loop.cluster_closures[c], n = getRows(set.closures[whole].kind);
-      lambda_.segment(set.offsets[whole], n) = b.rows.segment(b.loop.closures.offsets[c], n);
-    }
+    updateForceDerivative(b, b.at, b.independent);
   }
   for (Vector6d& f : f_ext_) f.setZero();
+  for (size_t c = num_loops_; c < set.closures.size(); ++c) {
+    const Closure& contact = set.closures[c];
+    f_ext_[contact.body1] +=
+        calcClosureWrench(ws_, contact, lambda_.segment(set.offsets[c], getRows(contact.kind)));
+  }
+}
+
+// H = d(J^T f)/dq at a point of the block, for forces f on its independent rows.
+void ReducedNode::updateForceDerivative(Block& b, const BlockPoint& point, const VectorXd& force) {
+  expandIndependent(point.basis(), force, b.rows);
+  b.H.setZero();
+  const ConstraintSet& set = b.loop.closures;
   for (size_t c = 0; c < set.closures.size(); ++c) {
     const Closure& closure = set.closures[c];
-    const Vector6d W = calcClosureWrench(ws_, closure, lambda_.segment(set.offsets[c], getRows(closure.kind)));
-    f_ext_[closure.body1] += W;
-    f_ext_[closure.body2] -= W;
+    const Vector6d W = calcClosureWrench(point.workspace(), closure, b.rows.segment(set.offsets[c], getRows(closure.kind)));
+    addGeneralizedForceDerivative(b.loop.model, point.workspace(), closure, W, b.H);
   }
 }
 
@@ -371,24 +382,12 @@ void ReducedNode::linearizeDynamics() {
   updateAccelerations(model_, ws_, a_);
   for (Block& b : blocks_) updateBlockDerivatives(b);
   updateForces();
-  updateInverseDynamicsDerivatives(model_, ws_, f_ext_);
-  // A copy: the workspace's own entries between branches are never written again, and would add up.
-  D_q_ = ws_.dID_dq;
-  const ConstraintSet& set = spec_.constraints;
-  for (int c = 0; c < num_loops_; ++c) {
-    const Closure& closure = set.closures[c];
-    const Vector6d W = calcClosureWrench(ws_, closure, lambda_.segment(set.offsets[c], getRows(closure.kind)));
-    addClosureForceDerivative(model_, ws_, closure, W, D_q_);
+  for (size_t i = 0; i < blocks_.size(); ++i) {
+    const Block& b = blocks_[i];
+    lifts_[i] = {&b.at.basis().N, &b.Z, &b.dy, &b.dv, &b.H};
   }
-  left_.setZero();
-  left_v_.setZero();
-  addColumns(D_q_, &BlockBasisN, left_);
-  addColumns(ws_.dID_dv, &BlockZ, left_);
-  addColumns(ws_.M, &BlockDy, left_);
-  addColumns(ws_.dID_dv, &BlockBasisN, left_v_);
-  addColumns(ws_.M, &BlockDv, left_v_);
-  projectRows(left_, dydd_.leftCols(nr));
-  projectRows(left_v_, dydd_.middleCols(nr, nr));
+  derivatives_.update(ws_, f_ext_, lifts_, dydd_.leftCols(nr), dydd_.middleCols(nr, nr));
+  const ConstraintSet& set = spec_.constraints;
   dydd_.rightCols(model_.nu()).setZero();
   for (int m = 0; m < model_.nu(); ++m) {  // -N^T B
     force_.setZero();  // not tau_: another linearization at the same point needs it
@@ -428,15 +427,8 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   const BlockBasis &base = b.at.basis(), &next = b.next.basis();
   const MatrixXd &N = base.N, &Nn = next.N;
 
-  b.H.setZero();
-  expandIndependent(base, b.next.zeta() / h, b.rows);  // close() moves by h w', so its zeta is h times that of Eq. (3)
-  const ConstraintSet& set = loop.closures;
-  for (size_t c = 0; c < set.closures.size(); ++c) {
-    const Closure& closure = set.closures[c];
-    const Vector6d W =
-        calcClosureWrench(b.at.workspace(), closure, b.rows.segment(set.offsets[c], getRows(closure.kind)));
-    addGeneralizedForceDerivative(loop.model, b.at.workspace(), closure, W, b.H);
-  }
+  b.zeta = b.next.zeta() / h;  // close() moves by h w', so its zeta is h times that of Eq. (3)
+  updateForceDerivative(b, b.at, b.zeta);
   b.Jq.setIdentity();
   b.Jd.setIdentity();
   for (const Joint& joint : loop.model.joints()) {
@@ -452,14 +444,7 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   const MatrixXd T = (Nn.transpose() * base.J.transpose()) * P;           // N'^T J^T A^{-1} J'
   const MatrixXd HN = b.H * N, EN = b.Jq * N - h * b.Jd * HN;             // e = EN dy + h J_d dw
   // S of Eq. (g)
-  expandIndependent(next, b.mu, b.rows);
-  b.H.setZero();
-  for (size_t c = 0; c < set.closures.size(); ++c) {
-    const Closure& closure = set.closures[c];
-    const Vector6d W =
-        calcClosureWrench(b.next.workspace(), closure, b.rows.segment(set.offsets[c], getRows(closure.kind)));
-    addGeneralizedForceDerivative(loop.model, b.next.workspace(), closure, W, b.H);
-  }
+  updateForceDerivative(b, b.next, b.mu);
   const MatrixXd S = Nn.transpose() * b.H * Nn;
 
   // dw = (N + h d_v) dy_v + (Z + h d_y) dy + h N dy'
@@ -475,6 +460,7 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   if (b.q != next.q || b.d != b.v_next) {
     if (!b.scratch.update(loop, b.q)) return false;
     updateVelocities(loop.model, b.next.workspace(), b.v_next);
+    const ConstraintSet& set = loop.closures;
     for (size_t c = 0; c < set.closures.size(); ++c)
       calcClosureVelocityDerivative(b.next.workspace(), set.closures[c],
                                     b.K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));

@@ -30,11 +30,21 @@ struct LoopBlock {
   int offset = 0, size = 0;           ///< reduced coordinates [offset, offset + size), size = n - rank
 };
 
+/// A free joint or a block: what a coordinate of the reduced tree belongs to. Units come parents first.
+struct ReducedUnit {
+  int joint = -1, block = -1;        ///< one of them: joint of the whole model, or index into Reduction::blocks
+  int offset = 0, size = 0;          ///< reduced coordinates
+  int parent = -1;                   ///< unit that carries it, -1: the world
+  std::vector<int> path;             ///< dofs of the parent unit that move it: positions among the parent's dofs
+  std::vector<int> outer;            ///< reduced coordinates of all units before it on the way to the root
+};
+
 /// How the velocity coordinates of a model split into blocks and free dofs.
 struct Reduction {
   std::vector<LoopBlock> blocks;
   std::vector<int> free_joints;   ///< joints outside all loops
   std::vector<int> free_offsets;  ///< first reduced coordinate of each
+  std::vector<ReducedUnit> units;
   int size = 0;                   ///< reduced coordinates: the mobility of the robot
 };
 
