@@ -23,8 +23,7 @@ void updatePlacements(const Model& model, Workspace& ws, ConstVectorRef q) {
   ws.q = q;
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
-    ws.X_WB[i] =
-        ws.X_WB[joint.parent] * (joint.X_PJ * calcJointPlacement(joint, q.segment(joint.idx_q, joint.nq)));
+    ws.X_WB[i] = ws.X_WB[joint.parent] * (joint.X_PJ * calcJointPlacement(joint, q.segment(joint.idx_q, joint.nq)));
   }
   ws.stage = WorkspaceStage::Placement;
 }

@@ -197,7 +197,8 @@ bool BlockPoint::updateBases(const LoopBlock& block) {
   std::copy(row_order_.begin(), row_order_.begin() + rank, basis_.rows.begin());
   std::sort(basis_.rows.begin(), basis_.rows.end());
   selectIndependent(J_all_, basis_.J);
-  A_.noalias() = basis_.J * basis_.J.transpose();
+  A_.setZero();
+  addSmallProduct(basis_.J, basis_.J.transpose(), A_);
   gram_.compute(A_);
   return gram_.info() == Eigen::Success;
 }
@@ -233,7 +234,8 @@ bool BlockPoint::close(const LoopBlock& block, const BlockBasis& start, ConstVec
       updateColumns(block.model, ws_);
       updateJacobian(block);
       for (size_t r = 0; r < start.rows.size(); ++r) basis_.J.row(r) = J_all_.row(start.rows[r]);
-      A_.noalias() = basis_.J * start.J.transpose();
+      A_.setZero();
+      addSmallProduct(basis_.J, start.J.transpose(), A_);
       lu_.compute(A_);
     }
     previous = gap_;

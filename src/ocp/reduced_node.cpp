@@ -17,8 +17,6 @@
 //     dy+ = N'^T dq+,   dy_v+ = N'^T dw' - S dy+,   mu = J'^{+T} w' (g)
 // S is there because the projection of w' turns with q+. With a gap, the result is read about the node state's own
 // basis.
-#include <Eigen/LU>
-
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/reduced_derivatives.h"
 #include "bielle/dynamics/rnea.h"
@@ -38,24 +36,32 @@ struct Block {
     for (MatrixXd* x : {&Z, &dy, &dv}) x->setZero(n, r);
     for (MatrixXd* x : {&Cq, &Cv, &K}) x->setZero(m, n);
     for (MatrixXd* x : {&Cq_r, &Cv_r, &K_r}) x->setZero(l.rank, n);
-    for (MatrixXd* x : {&Jq, &Jd, &H}) x->setZero(n, n);
-    lu = Eigen::PartialPivLU<MatrixXd>(l.rank);
+    for (MatrixXd* x : {&Jd, &H}) x->setZero(n, n);
+    for (MatrixXd* x : {&HN, &HnNn, &EN, &L, &T, &LJ, &beta, &wy, &wv}) x->setZero(n, r);
+    X.setZero(l.rank, r);
+    Y.setZero(l.rank, 2 * r);
+    G.setZero(l.rank, n);
+    At.setZero(l.rank, l.rank);
+    for (MatrixXd* x : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a, &S}) x->setZero(r, r);
   }
   const LoopBlock& loop;
   BlockPoint at, next, scratch;  // at the state; at q+; for integrate() and open gaps
   BlockBasis chart;              // at the last linearized state
   VectorXd q, v, a, d, w, v_next;
   VectorXd gamma, mu, independent, zeta, rows;
-  MatrixXd Z, dy, dv;                   // n x r, Eqs. (a), (c)
-  MatrixXd Cq, Cv, K, Cq_r, Cv_r, K_r;  // closure derivatives, all rows and the independent ones
-  MatrixXd Jq, Jd, H;                   // n x n, Eqs. (e), (f)
-  Eigen::PartialPivLU<MatrixXd> lu;     // of A
+  MatrixXd Z, dy, dv;                             // n x r, Eqs. (a), (c)
+  MatrixXd Cq, Cv, K, Cq_r, Cv_r, K_r;            // closure derivatives, all rows and the independent ones
+  MatrixXd Jd, H;                                 // n x n, Eqs. (e), (f); of J_d the blocks of curved joints
+  MatrixXd HN, HnNn, EN, L, T, LJ, beta, wy, wv;  // n x r
+  MatrixXd X, Y, G, At;                           // rank x r, 2 r, n, rank
+  MatrixXd q_y, q_v, q_a, v_y, v_v, v_a, S;       // r x r: dq+ and dv+ by dy, dy_v, dy'; S of Eq. (g)
 };
 
-// out = -J^+ X
-void applyPlus(const BlockPoint& point, MatrixXd X, MatrixXd& out) {
+// out = -J^+ X; X is overwritten.
+void applyPlus(const BlockPoint& point, MatrixXd& X, MatrixXd& out) {
   point.solveGram(X);
-  out.noalias() = -point.basis().J.transpose() * X;
+  out.setZero();
+  addSmallProductTransposed(point.basis().J, X, out, -1);
 }
 
 class ReducedNode : public NodeModel {
@@ -325,7 +331,9 @@ void ReducedNode::updateVelocityLift(Block& b) {
     calcClosureVelocityDerivative(b.at.workspace(), set.closures[c],
                                   b.K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
   b.at.selectIndependent(b.K, b.K_r);
-  applyPlus(b.at, b.K_r * b.at.basis().N, b.Z);
+  b.X.setZero();
+  addSmallProduct(b.K_r, b.at.basis().N, b.X);
+  applyPlus(b.at, b.X, b.Z);
 }
 
 // d_y and d_v of Eq. (c).
@@ -340,8 +348,13 @@ void ReducedNode::updateBlockDerivatives(Block& b) {
   }
   b.at.selectIndependent(b.Cq, b.Cq_r);
   b.at.selectIndependent(b.Cv, b.Cv_r);
-  applyPlus(b.at, b.Cq_r * b.at.basis().N + b.Cv_r * b.Z, b.dy);
-  applyPlus(b.at, b.Cv_r * b.at.basis().N, b.dv);
+  b.X.setZero();
+  addSmallProduct(b.Cq_r, b.at.basis().N, b.X);
+  addSmallProduct(b.Cv_r, b.Z, b.X);
+  applyPlus(b.at, b.X, b.dy);
+  b.X.setZero();
+  addSmallProduct(b.Cv_r, b.at.basis().N, b.X);
+  applyPlus(b.at, b.X, b.dv);
 }
 
 // Loop forces, and the wrenches of loops and contacts on the bodies.
@@ -359,8 +372,7 @@ void ReducedNode::updateForces() {
   for (Vector6d& f : f_ext_) f.setZero();
   for (size_t c = num_loops_; c < set.closures.size(); ++c) {
     const Closure& contact = set.closures[c];
-    f_ext_[contact.body1] +=
-        calcClosureWrench(ws_, contact, lambda_.segment(set.offsets[c], getRows(contact.kind)));
+    f_ext_[contact.body1] += calcClosureWrench(ws_, contact, lambda_.segment(set.offsets[c], getRows(contact.kind)));
   }
 }
 
@@ -371,7 +383,8 @@ void ReducedNode::updateForceDerivative(Block& b, const BlockPoint& point, const
   const ConstraintSet& set = b.loop.closures;
   for (size_t c = 0; c < set.closures.size(); ++c) {
     const Closure& closure = set.closures[c];
-    const Vector6d W = calcClosureWrench(point.workspace(), closure, b.rows.segment(set.offsets[c], getRows(closure.kind)));
+    const Vector6d W =
+        calcClosureWrench(point.workspace(), closure, b.rows.segment(set.offsets[c], getRows(closure.kind)));
     addGeneralizedForceDerivative(b.loop.model, point.workspace(), closure, W, b.H);
   }
 }
@@ -390,7 +403,7 @@ void ReducedNode::linearizeDynamics() {
   const ConstraintSet& set = spec_.constraints;
   dydd_.rightCols(model_.nu()).setZero();
   for (int m = 0; m < model_.nu(); ++m) {  // -N^T B
-    force_.setZero();  // not tau_: another linearization at the same point needs it
+    force_.setZero();                      // not tau_: another linearization at the same point needs it
     force_[model_.motors()[m].dof] = -1;
     projectVector(force_, f_);
     dydd_.col(2 * nr + m) = f_;
@@ -429,30 +442,65 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
 
   b.zeta = b.next.zeta() / h;  // close() moves by h w', so its zeta is h times that of Eq. (3)
   updateForceDerivative(b, b.at, b.zeta);
-  b.Jq.setIdentity();
-  b.Jd.setIdentity();
+  b.HN.setZero();
+  addSmallProduct(b.H, N, b.HN);
+  updateForceDerivative(b, b.next, b.mu);
+  b.HnNn.setZero();
+  addSmallProduct(b.H, Nn, b.HnNn);
+
+  // J_q and J_d are the identity but for the blocks of curved joints. EN: e = EN dy + h J_d dw.
+  b.EN = N - h * b.HN;
+  b.G = base.J;  // J J_d^T
   for (const Joint& joint : loop.model.joints()) {
     if (!isCurved(joint)) continue;
     const int i = joint.idx_v, n = joint.nv;
     const JointVector d = b.next.step().segment(i, n);
-    calcJointIntegrateJacobians(joint, d, b.Jq.block(i, i, n, n), b.Jd.block(i, i, n, n));
+    JointMatrix Jq(n, n), Jd(n, n);
+    calcJointIntegrateJacobians(joint, d, Jq, Jd);
+    b.Jd.block(i, i, n, n) = Jd;
+    b.EN.middleRows(i, n) = Jq.lazyProduct(N.middleRows(i, n)) - h * Jd.lazyProduct(b.HN.middleRows(i, n));
+    b.G.middleCols(i, n) = base.J.middleCols(i, n).lazyProduct(Jd.transpose());
   }
-  const MatrixXd JdJt = b.Jd * base.J.transpose();                        // n x rank
-  b.lu.compute(h * (next.J * JdJt));                                      // A
-  const MatrixXd P = b.lu.solve(next.J);                                  // A^{-1} J'
-  const MatrixXd L = Nn.transpose() - h * ((Nn.transpose() * JdJt) * P);  // dy+ = L e
-  const MatrixXd T = (Nn.transpose() * base.J.transpose()) * P;           // N'^T J^T A^{-1} J'
-  const MatrixXd HN = b.H * N, EN = b.Jq * N - h * b.Jd * HN;             // e = EN dy + h J_d dw
-  // S of Eq. (g)
-  updateForceDerivative(b, b.next, b.mu);
-  const MatrixXd S = Nn.transpose() * b.H * Nn;
-
+  // Y = A^{-T} [J J_d^T N', J N'], with A^T = h J J_d^T J'^T
+  b.At.setZero();
+  addSmallProduct(b.G, next.J.transpose(), b.At, h);
+  b.Y.setZero();
+  addSmallProduct(b.G, Nn, b.Y.leftCols(r));
+  addSmallProduct(base.J, Nn, b.Y.rightCols(r));
+  if (!solveSmall(b.At, b.Y)) return false;
+  // dy+ = L^T e, and T^T = N'^T J^T A^{-1} J'
+  b.L = Nn;
+  addSmallProductTransposed(next.J, b.Y.leftCols(r), b.L, -h);
+  b.T.setZero();
+  addSmallProductTransposed(next.J, b.Y.rightCols(r), b.T);
+  // h J_d^T L and beta = N' - h J_d^T T
+  b.LJ = h * b.L;
+  b.beta = Nn - h * b.T;
+  for (const Joint& joint : loop.model.joints()) {
+    if (!isCurved(joint)) continue;
+    const int i = joint.idx_v, n = joint.nv;
+    const auto Jd = b.Jd.block(i, i, n, n);
+    b.LJ.middleRows(i, n) = h * Jd.transpose().lazyProduct(b.L.middleRows(i, n));
+    b.beta.middleRows(i, n) = Nn.middleRows(i, n) - h * Jd.transpose().lazyProduct(b.T.middleRows(i, n));
+  }
   // dw = (N + h d_v) dy_v + (Z + h d_y) dy + h N dy'
-  const MatrixXd wy = b.Z + h * b.dy, wv = N + h * b.dv;
-  const MatrixXd LJ = h * L * b.Jd, beta = Nn.transpose() - h * T * b.Jd;
-  MatrixXd q_y = L * EN + LJ * wy, q_v = LJ * wv, q_a = h * LJ * N;
-  MatrixXd v_y = beta * wy - Nn.transpose() * HN - T * EN - S * q_y, v_v = beta * wv - S * q_v,
-           v_a = h * beta * N - S * q_a;
+  b.wy = b.Z + h * b.dy;
+  b.wv = N + h * b.dv;
+  MatrixXd &q_y = b.q_y, &q_v = b.q_v, &q_a = b.q_a, &v_y = b.v_y, &v_v = b.v_v, &v_a = b.v_a, &S = b.S;
+  for (MatrixXd* m : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a, &S}) m->setZero();
+  addSmallProductTransposed(Nn, b.HnNn, S);
+  addSmallProductTransposed(b.L, b.EN, q_y);
+  addSmallProductTransposed(b.LJ, b.wy, q_y);
+  addSmallProductTransposed(b.LJ, b.wv, q_v);
+  addSmallProductTransposed(b.LJ, N, q_a, h);
+  addSmallProductTransposed(b.beta, b.wy, v_y);
+  addSmallProductTransposed(Nn, b.HN, v_y, -1);
+  addSmallProductTransposed(b.T, b.EN, v_y, -1);
+  addSmallProductTransposed(b.beta, b.wv, v_v);
+  addSmallProductTransposed(b.beta, N, v_a, h);
+  addSmallProduct(S, q_y, v_y, -1);
+  addSmallProduct(S, q_v, v_v, -1);
+  addSmallProduct(S, q_a, v_a, -1);
 
   // About the node state, where a gap is open.
   gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), b.q);
@@ -466,7 +514,8 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
                                     b.K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
     b.next.selectIndependent(b.K, b.K_r);
     MatrixXd Zn(loop.model.nv(), r);
-    applyPlus(b.next, b.K_r * Nn, Zn);
+    b.X.noalias() = b.K_r * Nn;
+    applyPlus(b.next, b.X, Zn);
     const MatrixXd& Nnode = b.scratch.basis().N;
     VectorXd gap(loop.model.nv());
     loop.model.difference(b.q, next.q, gap);
@@ -490,10 +539,10 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
     out.gap.segment(nr + o, r).setZero();
   }
   const auto dydd = dydd_.middleRows(o, r);
-  out.Fx.middleRows(o, r).noalias() = q_a * dydd.leftCols(2 * nr);
-  out.Fx.middleRows(nr + o, r).noalias() = v_a * dydd.leftCols(2 * nr);
-  out.Fu.middleRows(o, r).noalias() = q_a * dydd.rightCols(nu);
-  out.Fu.middleRows(nr + o, r).noalias() = v_a * dydd.rightCols(nu);
+  out.Fx.middleRows(o, r) = q_a.lazyProduct(dydd.leftCols(2 * nr));
+  out.Fx.middleRows(nr + o, r) = v_a.lazyProduct(dydd.leftCols(2 * nr));
+  out.Fu.middleRows(o, r) = q_a.lazyProduct(dydd.rightCols(nu));
+  out.Fu.middleRows(nr + o, r) = v_a.lazyProduct(dydd.rightCols(nu));
   out.Fx.block(o, o, r, r) += q_y;
   out.Fx.block(o, nr + o, r, r) += q_v;
   out.Fx.block(nr + o, o, r, r) += v_y;

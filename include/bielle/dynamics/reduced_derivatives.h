@@ -37,9 +37,9 @@ class ReducedDerivatives {
  private:
   struct Unit {
     std::vector<int> dofs;
-    Matrix6Xd J, dV, dA, dW;      // 6 x (outer + own): Eq. (1) of the outer coordinates
-    Matrix6Xd YJ, BtJ, Gy, Gv;    // 6 x size, Eq. (2)
-    MatrixXd Dq, Dv, DqN, DvN;    // n x n, n x size
+    Matrix6Xd J, dV, dA, dW;    // 6 x (outer + own): Eq. (1) of the outer coordinates
+    Matrix6Xd YJ, BtJ, Gy, Gv;  // 6 x size, Eq. (2)
+    MatrixXd Dq, Dv, DqN, DvN;  // n x n, n x size
   };
   void updateOuter(const Workspace& ws, const std::vector<BlockLift>& lifts, int index);
   void updateInner(const Workspace& ws, const BlockLift* lift, Unit& unit) const;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "bielle/dynamics/closure.h"
+#include "bielle/math/small_dense.h"
 
 namespace bielle {
 
@@ -32,11 +33,11 @@ struct LoopBlock {
 
 /// A free joint or a block: what a coordinate of the reduced tree belongs to. Units come parents first.
 struct ReducedUnit {
-  int joint = -1, block = -1;        ///< one of them: joint of the whole model, or index into Reduction::blocks
-  int offset = 0, size = 0;          ///< reduced coordinates
-  int parent = -1;                   ///< unit that carries it, -1: the world
-  std::vector<int> path;             ///< dofs of the parent unit that move it: positions among the parent's dofs
-  std::vector<int> outer;            ///< reduced coordinates of all units before it on the way to the root
+  int joint = -1, block = -1;  ///< one of them: joint of the whole model, or index into Reduction::blocks
+  int offset = 0, size = 0;    ///< reduced coordinates
+  int parent = -1;             ///< unit that carries it, -1: the world
+  std::vector<int> path;       ///< dofs of the parent unit that move it: positions among the parent's dofs
+  std::vector<int> outer;      ///< reduced coordinates of all units before it on the way to the root
 };
 
 /// How the velocity coordinates of a model split into blocks and free dofs.
@@ -45,7 +46,7 @@ struct Reduction {
   std::vector<int> free_joints;   ///< joints outside all loops
   std::vector<int> free_offsets;  ///< first reduced coordinate of each
   std::vector<ReducedUnit> units;
-  int size = 0;                   ///< reduced coordinates: the mobility of the robot
+  int size = 0;  ///< reduced coordinates: the mobility of the robot
 };
 
 /// \param q closed configuration at which ranks are taken
@@ -78,7 +79,7 @@ class BlockPoint {
   Workspace& workspace() { return ws_; }
   const Workspace& workspace() const { return ws_; }
   /// (J J^T)^{-1} X in place (rank x k); J^T times it is J^+ X.
-  void solveGram(MatrixRef X) const { gram_.solveInPlace(X); }
+  void solveGram(MatrixRef X) const { solveSmallCholesky(gram_.matrixLLT(), X); }
   /// Independent rows out of all rows (m x k -> rank x k).
   void selectIndependent(const MatrixXd& all, MatrixXd& out) const;
 

@@ -52,9 +52,9 @@ inline DerivativeEntry calcDerivativeEntry(const Model& model, const Workspace& 
   const Dof &dj = model.dofs()[j], &dk = model.dofs()[k];
   const bool moves = dj.joint == dk.joint ? !(dj.first_of_universal && dk.second_of_universal) : k < j;
   if (moves)
-    return {ws.YJ.col(j).dot(ws.dA.col(k)) + ws.BtJ.col(j).dot(ws.dV.col(k)),                    // Eq. (7)
+    return {ws.YJ.col(j).dot(ws.dA.col(k)) + ws.BtJ.col(j).dot(ws.dV.col(k)),                 // Eq. (7)
             ws.YJ.col(j).dot(ws.dJ.col(k) + ws.dV.col(k)) + ws.BtJ.col(j).dot(ws.J.col(k))};  // Eq. (9)
-  return {ws.J.col(j).dot(ws.Gq.col(k)), ws.J.col(j).dot(ws.Gv.col(k))};                         // Eqs. (8), (9)
+  return {ws.J.col(j).dot(ws.Gq.col(k)), ws.J.col(j).dot(ws.Gv.col(k))};                      // Eqs. (8), (9)
 }
 
 }  // namespace bielle
