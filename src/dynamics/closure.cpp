@@ -76,7 +76,7 @@ Vector6d expandRows(const Closure& c, ConstVectorRef lambda) {
 }
 
 RowVectorUpTo6 calcClosureResidual(const Workspace& ws, const Closure& c) {
-  requireStage(ws, WorkspaceStage::Position, "calcClosureResidual", "updatePositions");
+  requireStage(ws, WorkspaceStage::Placement, "calcClosureResidual", "updatePlacements or updatePositions");
   const SE3 X = calcRelativePlacement(ws, c);
   if (c.kind == ClosureKind::Weld6D) return log6(X);
   if (c.kind == ClosureKind::Ball3D) return X.p;

@@ -19,16 +19,42 @@ void calcWorldInertia(const Inertia& inertia, const SE3& X_WB, Matrix6d& Y) {
 
 }  // namespace
 
-void updatePositions(const Model& model, Workspace& ws, ConstVectorRef q) {
+void updatePlacements(const Model& model, Workspace& ws, ConstVectorRef q) {
   ws.q = q;
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    ws.X_WB[i] = ws.X_WB[joint.parent] * (joint.X_PJ * calcJointPlacement(joint, q.segment(joint.idx_q, joint.nq)));
+  }
+  ws.stage = WorkspaceStage::Placement;
+}
+
+void updatePositions(const Model& model, Workspace& ws, ConstVectorRef q) {
+  updatePlacements(model, ws, q);
+  updateColumns(model, ws);
+}
+
+void updateColumns(const Model& model, Workspace& ws) {
+  requireStage(ws, WorkspaceStage::Placement, "updateColumns", "updatePlacements");
   Matrix6d S;
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
-    const auto qi = q.segment(joint.idx_q, joint.nq);
-    ws.X_WB[i] = ws.X_WB[joint.parent] * (joint.X_PJ * calcJointPlacement(joint, qi));
-    calcJointSubspace(joint, qi, S.leftCols(joint.nv));
-    for (int k = 0; k < joint.nv; ++k) ws.J.col(joint.idx_v + k) = ws.X_WB[i].actMotion(S.col(k));
-    calcWorldInertia(model.bodies()[i].inertia, ws.X_WB[i], ws.Y[i]);
+    const SE3& X = ws.X_WB[i];
+    auto J = ws.J.middleCols(joint.idx_v, joint.nv);
+    switch (joint.kind) {
+      case JointKind::Revolute:
+      case JointKind::Continuous:
+        J.col(0).tail<3>().noalias() = X.R * joint.axis;
+        J.col(0).head<3>() = X.p.cross(J.col(0).tail<3>());
+        break;
+      case JointKind::Spherical:
+        J.bottomRows<3>() = X.R;
+        for (int k = 0; k < 3; ++k) J.col(k).head<3>() = X.p.cross(X.R.col(k));
+        break;
+      default:
+        calcJointSubspace(joint, ws.q.segment(joint.idx_q, joint.nq), S.leftCols(joint.nv));
+        for (int k = 0; k < joint.nv; ++k) J.col(k) = X.actMotion(S.col(k));
+    }
+    if (model.bodies()[i].inertia.mass > 0) calcWorldInertia(model.bodies()[i].inertia, X, ws.Y[i]);
   }
   ws.stage = WorkspaceStage::Position;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
@@ -33,6 +34,24 @@ Model makeBlockModel(const Model& model, const LoopCluster& cluster, const std::
   return builder.build();
 }
 
+// Parent, path and outer coordinates of a unit carried by body `root`.
+void connectUnit(const Model& model, const Reduction& reduction, int parent, int root, ReducedUnit& unit) {
+  unit.parent = parent;
+  const ReducedUnit& up = reduction.units[parent];
+  unit.outer = up.outer;
+  for (int k = 0; k < up.size; ++k) unit.outer.push_back(up.offset + k);
+  std::vector<int> dofs;
+  if (up.block >= 0) {
+    dofs = reduction.blocks[up.block].dofs;
+  } else {
+    const Joint& joint = model.joints()[up.joint];
+    for (int k = 0; k < joint.nv; ++k) dofs.push_back(joint.idx_v + k);
+  }
+  const std::vector<int>& support = model.supportDofs(root);
+  for (size_t k = 0; k < dofs.size(); ++k)
+    if (std::binary_search(support.begin(), support.end(), dofs[k])) unit.path.push_back(static_cast<int>(k));
+}
+
 }  // namespace
 
 Reduction makeReduction(const Model& model, ConstVectorRef q) {
@@ -61,18 +80,32 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
                          "close the configuration first (assemble, closeConfiguration)");
     out.blocks.push_back(std::move(block));
   }
-  // Reduced coordinates in the order of the first dof of each free joint or block.
-  std::vector<bool> placed(out.blocks.size(), false);
+  // Units and their reduced coordinates, in the order of the first joint of each.
+  std::vector<int> unit_of(model.numBodies(), -1), block_unit(out.blocks.size(), -1);
   for (int i = 1; i < model.numBodies(); ++i) {
+    if (owner[i] >= 0 && block_unit[owner[i]] >= 0) {
+      unit_of[i] = block_unit[owner[i]];
+      continue;
+    }
+    ReducedUnit unit;
+    unit.offset = out.size;
+    unit_of[i] = static_cast<int>(out.units.size());
     if (owner[i] < 0) {
+      unit.joint = i;
+      unit.size = model.joints()[i].nv;
       out.free_joints.push_back(i);
       out.free_offsets.push_back(out.size);
-      out.size += model.joints()[i].nv;
-    } else if (!placed[owner[i]]) {
-      placed[owner[i]] = true;
+    } else {
+      unit.block = owner[i];
+      block_unit[owner[i]] = unit_of[i];
       out.blocks[owner[i]].offset = out.size;
-      out.size += out.blocks[owner[i]].size;
+      unit.size = out.blocks[owner[i]].size;
     }
+    // The first joint of a block hangs on the body that carries the whole block.
+    const int root = model.joints()[i].parent;
+    if (root > 0) connectUnit(model, out, unit_of[root], root, unit);
+    out.size += unit.size;
+    out.units.push_back(unit);
   }
   if (out.size == 0)
     throw ModelError(model.name(), "closures", "they leave the robot no mobility", "see `bielle info` for ranks");
@@ -82,18 +115,18 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
 BlockPoint::BlockPoint(const LoopBlock& block) : ws_(block.model) {
   const int n = block.model.nv(), m = block.closures.rows;
   basis_.q.setZero(block.model.nq());
-  residual_.setZero(m);
-  for (VectorXd* v : {&zeta_, &correction_, &independent_residual_}) v->setZero(block.rank);
-  step_.setZero(n);
-  work_.setZero(std::max(n, m));
-  J_all_.setZero(m, n);
   basis_.J.setZero(block.rank, n);
   basis_.N.setZero(n, block.size);
   basis_.rows.resize(block.rank);
-  Jplus_.setZero(n, block.rank);
-  Q_.setZero(n, n);
+  residual_.setZero(m);
+  for (VectorXd* v : {&zeta_, &correction_}) v->setZero(block.rank);
+  step_.setZero(n);
+  J_all_.setZero(m, n);
+  eliminated_.setZero(m, n);
   A_.setZero(block.rank, block.rank);
-  qr_ = Eigen::ColPivHouseholderQR<MatrixXd>(n, m);
+  row_order_.resize(m);
+  col_order_.resize(n);
+  gram_ = Eigen::LLT<MatrixXd>(block.rank);
   lu_ = Eigen::PartialPivLU<MatrixXd>(block.rank);
 }
 
@@ -114,25 +147,60 @@ void BlockPoint::selectIndependent(const MatrixXd& all, MatrixXd& out) const {
   for (size_t i = 0; i < basis_.rows.size(); ++i) out.row(i) = all.row(basis_.rows[i]);
 }
 
-// Eq. (1).
-bool BlockPoint::updateBases(const LoopBlock& block) {
-  const int rank = block.rank;
-  qr_.compute(J_all_.transpose());
-  const auto& R = qr_.matrixQR();
-  const double first = std::abs(R(0, 0));
-  if (rank > 0 && !(std::abs(R(rank - 1, rank - 1)) > kRankTolerance * first)) return false;  // a rank is lost
-  if (rank < std::min(R.rows(), R.cols()) && std::abs(R(rank, rank)) > 1e-3 * kRankTolerance * first &&
-      std::abs(R(rank, rank)) > kRankTolerance * std::abs(R(rank - 1, rank - 1)))
-    return false;  // a rank is gained
-  Q_.setIdentity();
-  qr_.householderQ().applyThisOnTheLeft(Q_, work_);
-  basis_.N = Q_.rightCols(block.size);
-  for (int i = 0; i < rank; ++i) basis_.rows[i] = qr_.colsPermutation().indices()[i];
-  selectIndependent(J_all_, basis_.J);
-  // J^+ = Q_1 R^{-T}: solve X R^T = Q_1 from the right.
-  Jplus_ = Q_.leftCols(rank);
-  R.topLeftCorner(rank, rank).triangularView<Eigen::Upper>().transpose().solveInPlace<Eigen::OnTheRight>(Jplus_);
+// Gauss-Jordan elimination of J with complete pivoting. Leaves [I, J_d^{-1} J_i] in the columns of `eliminated_`, by
+// col_order_: first the `rank` dependent coordinates d, then the independent ones i. False when the rank is another.
+bool BlockPoint::eliminate(int rank) {
+  MatrixXd& E = eliminated_;
+  E = J_all_;
+  const int m = static_cast<int>(E.rows()), n = static_cast<int>(E.cols());
+  std::iota(row_order_.begin(), row_order_.end(), 0);
+  std::iota(col_order_.begin(), col_order_.end(), 0);
+  double first = 0, last = 0;
+  for (int p = 0; p <= rank; ++p) {
+    int row = p, col = p;
+    double best = -1;
+    for (int c = p; c < n; ++c)
+      for (int r = p; r < m; ++r)
+        if (std::abs(E(r, c)) > best) best = std::abs(E(r, c)), row = r, col = c;
+    if (p == 0) first = best;
+    if (p == rank)  // what is left must be nothing but rounding
+      return best <= kRankTolerance * last || best <= 1e-3 * kRankTolerance * first;
+    if (!(best > kRankTolerance * first)) return false;
+    last = best;
+    if (row != p) E.row(p).swap(E.row(row)), std::swap(row_order_[p], row_order_[row]);
+    if (col != p) E.col(p).swap(E.col(col)), std::swap(col_order_[p], col_order_[col]);
+    double* pivot = E.col(p).data();
+    const double inverse = 1 / pivot[p];
+    for (int c = p + 1; c < n; ++c) {
+      double* column = E.col(c).data();
+      const double factor = column[p] * inverse;
+      for (int r = 0; r < m; ++r) column[r] -= factor * pivot[r];
+      column[p] = factor;
+    }
+  }
   return true;
+}
+
+// Eq. (1): the columns [-J_d^{-1} J_i; I], made orthonormal by Gram-Schmidt, twice for good measure.
+bool BlockPoint::updateBases(const LoopBlock& block) {
+  const int rank = block.rank, size = block.size;
+  if (!eliminate(rank)) return false;
+  MatrixXd& N = basis_.N;
+  N.setZero();
+  for (int c = 0; c < size; ++c) {
+    for (int r = 0; r < rank; ++r) N(col_order_[r], c) = -eliminated_(r, rank + c);
+    N(col_order_[rank + c], c) = 1;
+    for (int pass = 0; pass < 2; ++pass)
+      for (int k = 0; k < c; ++k) N.col(c) -= N.col(k).dot(N.col(c)) * N.col(k);
+    N.col(c).normalize();
+  }
+  std::copy(row_order_.begin(), row_order_.begin() + rank, basis_.rows.begin());
+  std::sort(basis_.rows.begin(), basis_.rows.end());
+  selectIndependent(J_all_, basis_.J);
+  A_.setZero();
+  addSmallProduct(basis_.J, basis_.J.transpose(), A_);
+  gram_.compute(A_);
+  return gram_.info() == Eigen::Success;
 }
 
 bool BlockPoint::update(const LoopBlock& block, ConstVectorRef q) {
@@ -143,33 +211,41 @@ bool BlockPoint::update(const LoopBlock& block, ConstVectorRef q) {
   return updateBases(block);
 }
 
-bool BlockPoint::close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d) {
-  // Newton on zeta with the matrix J(q) J_r(q_0)^T of the independent rows, refreshed while it pays.
-  zeta_.setZero();
+bool BlockPoint::close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d, const VectorXd& zeta_guess) {
+  // Newton on zeta with the matrix J(q) J(q_0)^T of the independent rows, refreshed while it pays.
   step_ = d;
+  if (zeta_guess.size()) {
+    zeta_ = zeta_guess;
+    step_.noalias() -= start.J.transpose() * zeta_;
+  } else {
+    zeta_.setZero();
+  }
   double previous = 0;
   constexpr int kMaxIterations = 30;
   for (int i = 0; i <= kMaxIterations; ++i) {
     block.model.integrate(start.q, step_, basis_.q);
-    updatePositions(block.model, ws_, basis_.q);
+    updatePlacements(block.model, ws_, basis_.q);
     updateResidual(block);
     if (!std::isfinite(gap_)) return false;
     const bool stalled = i > 0 && gap_ > 0.5 * previous;
     if (gap_ <= kClosedTolerance || (stalled && gap_ <= kAcceptedTolerance)) break;
     if (i == kMaxIterations) return false;
     if (i == 0 || gap_ > 0.05 * previous) {
+      updateColumns(block.model, ws_);
       updateJacobian(block);
       for (size_t r = 0; r < start.rows.size(); ++r) basis_.J.row(r) = J_all_.row(start.rows[r]);
-      A_.noalias() = basis_.J * start.J.transpose();
+      A_.setZero();
+      addSmallProduct(basis_.J, start.J.transpose(), A_);
       lu_.compute(A_);
     }
     previous = gap_;
-    for (size_t r = 0; r < start.rows.size(); ++r) independent_residual_[r] = residual_[start.rows[r]];
-    // The residual falls by J dq (notation.h), and dq = -J_r(q_0)^T dzeta.
-    correction_ = lu_.solve(independent_residual_);
+    for (size_t r = 0; r < start.rows.size(); ++r) correction_[r] = residual_[start.rows[r]];
+    // The residual falls by J dq (notation.h), and dq = -J(q_0)^T dzeta.
+    correction_ = lu_.solve(correction_);
     zeta_ -= correction_;
     step_.noalias() += start.J.transpose() * correction_;
   }
+  updateColumns(block.model, ws_);
   updateJacobian(block);
   return updateBases(block);
 }

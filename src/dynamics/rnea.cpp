@@ -23,9 +23,6 @@ void calcB(const Workspace& ws, int i, Matrix6d& B) {
   B.bottomRightCorner<3, 3>() -= skew(ws.h[i].tail<3>());
 }
 
-// Whether the axis of dof j moves when the coordinate of dof k of the same joint changes, Eq. (7) or (8).
-bool movesWithinJoint(const Dof& j, const Dof& k) { return !(j.first_of_universal && k.second_of_universal); }
-
 }  // namespace
 
 void updateMassMatrix(const Model& model, Workspace& ws) {
@@ -78,41 +75,23 @@ VectorXd calcInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef q
   return tau;
 }
 
-void updateInverseDynamicsDerivatives(const Model& model, Workspace& ws, const std::vector<Vector6d>& f_ext) {
-  requireStage(ws, WorkspaceStage::Acceleration, "updateInverseDynamicsDerivatives", "updateAccelerations");
+void updateInverseDynamicsFactors(const Model& model, Workspace& ws, const std::vector<Vector6d>& f_ext) {
+  requireStage(ws, WorkspaceStage::Acceleration, "updateInverseDynamicsFactors", "updateAccelerations");
   for (int i = 1; i < model.numBodies(); ++i) {
     ws.F[i] = calcBodyForce(ws, i, ws.A[i]);
     if (!f_ext.empty()) ws.F[i] -= f_ext[i];
     ws.Yc[i] = ws.Y[i];
     calcB(ws, i, ws.Bc[i]);
   }
-  const std::vector<Dof>& dofs = model.dofs();
   for (int i = model.numBodies() - 1; i > 0; --i) {
     const Joint& joint = model.joints()[i];
-    const int begin = joint.idx_v, end = joint.idx_v + joint.nv;
-    for (int j = begin; j < end; ++j) {
-      const Vector6d J = ws.J.col(j);
+    for (int j = joint.idx_v; j < joint.idx_v + joint.nv; ++j) {
+      const Vector6d J = ws.J.col(j), dV = ws.dV.col(j);
       ws.YJ.col(j).noalias() = ws.Yc[i] * J;
       ws.BtJ.col(j).noalias() = ws.Bc[i].transpose() * J;
-      ws.Gv.col(j).noalias() = ws.Yc[i] * (ws.dJ.col(j) + ws.dV.col(j));
-      ws.Gv.col(j).noalias() += ws.Bc[i] * J;
-      ws.Gq.col(j).noalias() = ws.Yc[i] * ws.dA.col(j);
-      ws.Gq.col(j).noalias() += ws.Bc[i] * ws.dV.col(j);
+      ws.Gv.col(j).noalias() = ws.Yc[i] * (ws.dJ.col(j) + dV) + ws.Bc[i] * J;
+      ws.Gq.col(j).noalias() = ws.Yc[i] * ws.dA.col(j) + ws.Bc[i] * dV;
       ws.Gq.col(j) += crossForce(J, ws.F[i]);
-    }
-    for (int j = begin; j < end; ++j) {
-      for (int k = begin; k < end; ++k) {  // same joint
-        ws.dID_dv(j, k) = ws.J.col(j).dot(ws.Gv.col(k));
-        ws.dID_dq(j, k) = movesWithinJoint(dofs[j], dofs[k])
-                              ? ws.YJ.col(j).dot(ws.dA.col(k)) + ws.BtJ.col(j).dot(ws.dV.col(k))  // Eq. (7)
-                              : ws.J.col(j).dot(ws.Gq.col(k));                                    // Eq. (8)
-      }
-      for (int k = dofs[begin].parent; k >= 0; k = dofs[k].parent) {
-        ws.dID_dq(j, k) = ws.YJ.col(j).dot(ws.dA.col(k)) + ws.BtJ.col(j).dot(ws.dV.col(k));                // Eq. (7)
-        ws.dID_dv(j, k) = ws.YJ.col(j).dot(ws.dJ.col(k) + ws.dV.col(k)) + ws.BtJ.col(j).dot(ws.J.col(k));  // Eq. (9)
-        ws.dID_dq(k, j) = ws.J.col(k).dot(ws.Gq.col(j));                                                   // Eq. (8)
-        ws.dID_dv(k, j) = ws.J.col(k).dot(ws.Gv.col(j));                                                   // Eq. (9)
-      }
     }
     if (joint.parent > 0) {
       ws.F[joint.parent] += ws.F[i];
@@ -120,6 +99,24 @@ void updateInverseDynamicsDerivatives(const Model& model, Workspace& ws, const s
       ws.Bc[joint.parent] += ws.Bc[i];
     }
   }
+}
+
+void updateInverseDynamicsDerivatives(const Model& model, Workspace& ws, const std::vector<Vector6d>& f_ext) {
+  requireStage(ws, WorkspaceStage::Acceleration, "updateInverseDynamicsDerivatives", "updateAccelerations");
+  updateInverseDynamicsFactors(model, ws, f_ext);
+  const auto write = [&](int j, int k) {
+    const DerivativeEntry entry = calcDerivativeEntry(model, ws, j, k);
+    ws.dID_dq(j, k) = entry.q;
+    ws.dID_dv(j, k) = entry.v;
+  };
+  for (const Joint& joint : model.joints())
+    for (int j = joint.idx_v; j < joint.idx_v + joint.nv; ++j) {
+      for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) write(j, k);
+      for (int k = model.dofs()[joint.idx_v].parent; k >= 0; k = model.dofs()[k].parent) {
+        write(j, k);
+        write(k, j);
+      }
+    }
 }
 
 }  // namespace bielle

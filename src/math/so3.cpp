@@ -30,6 +30,23 @@ Matrix3d exp3(const Vector3d& w) {
   return Matrix3d::Identity() + f.sinc * S + f.cosc * S * S;
 }
 
+Matrix3d makeAxisRotation(const Vector3d& axis, double angle) {
+  const double s = std::sin(angle), c = std::cos(angle);
+  const Vector3d sa = s * axis, ca = (1 - c) * axis;
+  Matrix3d R;
+  R(0, 0) = ca.x() * axis.x() + c;
+  R(1, 1) = ca.y() * axis.y() + c;
+  R(2, 2) = ca.z() * axis.z() + c;
+  const double xy = ca.x() * axis.y(), xz = ca.x() * axis.z(), yz = ca.y() * axis.z();
+  R(0, 1) = xy - sa.z();
+  R(1, 0) = xy + sa.z();
+  R(0, 2) = xz + sa.y();
+  R(2, 0) = xz - sa.y();
+  R(1, 2) = yz - sa.x();
+  R(2, 1) = yz + sa.x();
+  return R;
+}
+
 Vector3d log3(const Matrix3d& R) {
   // Through the quaternion: its vector part is sin(t/2) times the axis, which stays well conditioned near t = pi.
   Eigen::Quaterniond quat(R);

@@ -97,16 +97,16 @@ SE3 calcJointPlacement(const Joint& joint, ConstVectorRef q) {
       return {};
     case JointKind::Revolute:
     case JointKind::Continuous:
-      return {exp3(joint.axis * q[0]), Vector3d::Zero()};
+      return {makeAxisRotation(joint.axis, q[0]), Vector3d::Zero()};
     case JointKind::Prismatic:
       return {Matrix3d::Identity(), joint.axis * q[0]};
     case JointKind::Spherical:
       return {ConstQuaternionMap(q.data()).toRotationMatrix(), Vector3d::Zero()};
     case JointKind::Universal:
-      return {exp3(joint.axis * q[0]) * exp3(joint.axis2 * q[1]), Vector3d::Zero()};
+      return {makeAxisRotation(joint.axis, q[0]) * makeAxisRotation(joint.axis2, q[1]), Vector3d::Zero()};
     case JointKind::Planar: {
       const Matrix3d B = makePlaneBasis(joint.axis);
-      return {exp3(joint.axis * q[2]), B.leftCols<2>() * q.head<2>()};
+      return {makeAxisRotation(joint.axis, q[2]), B.leftCols<2>() * q.head<2>()};
     }
     case JointKind::FreeFlyer:
       return {ConstQuaternionMap(q.data() + 3).toRotationMatrix(), q.head<3>()};
@@ -130,7 +130,7 @@ void calcJointSubspace(const Joint& joint, ConstVectorRef q, Eigen::Ref<Matrix6X
       S.bottomLeftCorner<3, 3>().setIdentity();
       break;
     case JointKind::Universal:
-      S.col(0).tail<3>() = exp3(-joint.axis2 * q[1]) * joint.axis;
+      S.col(0).tail<3>() = makeAxisRotation(joint.axis2, -q[1]) * joint.axis;
       S.col(1).tail<3>() = joint.axis2;
       break;
     case JointKind::Planar: {
@@ -155,7 +155,7 @@ void integrateJoint(const Joint& joint, ConstVectorRef q, ConstVectorRef dv, Vec
     case JointKind::Planar: {
       const SE3 step = exp6(embedPlanar(joint, dv));
       const Matrix3d B = makePlaneBasis(joint.axis);
-      const Vector3d p = B.leftCols<2>() * q.head<2>() + exp3(joint.axis * q[2]) * step.p;
+      const Vector3d p = B.leftCols<2>() * q.head<2>() + makeAxisRotation(joint.axis, q[2]) * step.p;
       const double angle = q[2] + dv[2];
       q_out.head<2>() = B.leftCols<2>().transpose() * p;
       q_out[2] = angle;
@@ -186,7 +186,7 @@ void calcJointDifference(const Joint& joint, ConstVectorRef q0, ConstVectorRef q
       // The angle is not wrapped, so the translation is undone by the inverse of the exponential at that very angle.
       const double angle = q1[2] - q0[2];
       const Matrix3d B = makePlaneBasis(joint.axis);
-      const Vector3d dp = exp3(-joint.axis * q0[2]) * (B.leftCols<2>() * (q1.head<2>() - q0.head<2>()));
+      const Vector3d dp = makeAxisRotation(joint.axis, -q0[2]) * (B.leftCols<2>() * (q1.head<2>() - q0.head<2>()));
       const Vector3d rho = calcRightJacobianInverse3(-joint.axis * angle) * dp;
       dv.head<2>() = B.leftCols<2>().transpose() * rho;
       dv[2] = angle;

@@ -17,9 +17,8 @@
 //     dy+ = N'^T dq+,   dy_v+ = N'^T dw' - S dy+,   mu = J'^{+T} w' (g)
 // S is there because the projection of w' turns with q+. With a gap, the result is read about the node state's own
 // basis.
-#include <Eigen/LU>
-
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/reduced_derivatives.h"
 #include "bielle/dynamics/rnea.h"
 #include "node_model.h"
 
@@ -32,29 +31,43 @@ struct Block {
     const int n = l.model.nv(), m = l.closures.rows, r = l.size;
     q.setZero(l.model.nq());
     for (VectorXd* v : {&this->v, &a, &d, &w, &v_next}) v->setZero(n);
-    for (VectorXd* v : {&gamma, &mu, &independent}) v->setZero(l.rank);
+    for (VectorXd* v : {&gamma, &mu, &independent, &zeta}) v->setZero(l.rank);
     rows.setZero(m);
     for (MatrixXd* x : {&Z, &dy, &dv}) x->setZero(n, r);
     for (MatrixXd* x : {&Cq, &Cv, &K}) x->setZero(m, n);
     for (MatrixXd* x : {&Cq_r, &Cv_r, &K_r}) x->setZero(l.rank, n);
-    for (MatrixXd* x : {&Jq, &Jd, &H}) x->setZero(n, n);
-    lu = Eigen::PartialPivLU<MatrixXd>(l.rank);
+    for (MatrixXd* x : {&Jd, &H}) x->setZero(n, n);
+    for (MatrixXd* x : {&HN, &HnNn, &EN, &L, &T, &LJ, &beta, &wy, &wv}) x->setZero(n, r);
+    X.setZero(l.rank, r);
+    Y.setZero(l.rank, 2 * r);
+    G.setZero(l.rank, n);
+    At.setZero(l.rank, l.rank);
+    for (MatrixXd* x : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a, &S}) x->setZero(r, r);
   }
   const LoopBlock& loop;
   BlockPoint at, next, scratch;  // at the state; at q+; for integrate() and open gaps
   BlockBasis chart;              // at the last linearized state
   VectorXd q, v, a, d, w, v_next;
-  VectorXd gamma, mu, independent, rows;
-  MatrixXd Z, dy, dv;                   // n x r, Eqs. (a), (c)
-  MatrixXd Cq, Cv, K, Cq_r, Cv_r, K_r;  // closure derivatives, all rows and the independent ones
-  MatrixXd Jq, Jd, H;                   // n x n, Eqs. (e), (f)
-  Eigen::PartialPivLU<MatrixXd> lu;     // of A
+  VectorXd gamma, mu, independent, zeta, rows;
+  MatrixXd Z, dy, dv;                             // n x r, Eqs. (a), (c)
+  MatrixXd Cq, Cv, K, Cq_r, Cv_r, K_r;            // closure derivatives, all rows and the independent ones
+  MatrixXd Jd, H;                                 // n x n, Eqs. (e), (f); of J_d the blocks of curved joints
+  MatrixXd HN, HnNn, EN, L, T, LJ, beta, wy, wv;  // n x r
+  MatrixXd X, Y, G, At;                           // rank x r, 2 r, n, rank
+  MatrixXd q_y, q_v, q_a, v_y, v_v, v_a, S;       // r x r: dq+ and dv+ by dy, dy_v, dy'; S of Eq. (g)
 };
+
+// out = -J^+ X; X is overwritten.
+void applyPlus(const BlockPoint& point, MatrixXd& X, MatrixXd& out) {
+  point.solveGram(X);
+  out.setZero();
+  addSmallProductTransposed(point.basis().J, X, out, -1);
+}
 
 class ReducedNode : public NodeModel {
  public:
   ReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec)
-      : NodeModel(model, spec), reduction_(reduction) {
+      : NodeModel(model, spec), reduction_(reduction), derivatives_(model, reduction) {
     for (const LoopBlock& block : reduction.blocks) blocks_.emplace_back(block);
     const int nv = model.nv(), nr = reduction.size, nu = model.nu();
     num_loops_ = spec.constraints.num_loops;
@@ -69,7 +82,8 @@ class ReducedNode : public NodeModel {
     for (MatrixXd* m : {&Cc_q_, &Cc_v_}) m->setZero(contact_rows_, nv);
     dlambda_.setZero(contact_rows_, 2 * nr + nu);
     dydd_.setZero(nr, 2 * nr + nu);
-    for (MatrixXd* m : {&left_, &left_v_}) m->setZero(nv, nr);
+    left_.setZero(nv, nr);
+    lifts_.resize(blocks_.size());
     M_.setZero(nr, nr);
     saddle_point_.resize(nr, contact_rows_);
     f_ext_.assign(model.numBodies(), Vector6d::Zero());
@@ -94,7 +108,7 @@ class ReducedNode : public NodeModel {
     for (Block& b : blocks_) {
       const LoopBlock& loop = b.loop;
       b.d.noalias() = b.chart.N * dx.segment(loop.offset, loop.size);
-      if (!b.scratch.close(loop, b.chart, b.d)) {
+      if (!b.scratch.close(loop, b.chart, b.d, {})) {
         x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
         return;
       }
@@ -143,7 +157,9 @@ class ReducedNode : public NodeModel {
         b.rows.segment(set.offsets[c], getRows(set.closures[c].kind)) =
             calcClosureAcceleration(b.at.workspace(), set.closures[c]);
       for (int i = 0; i < b.loop.rank; ++i) b.gamma[i] = b.rows[b.at.basis().rows[i]];
-      b.a.noalias() = -b.at.Jplus() * b.gamma;
+      b.independent = b.gamma;
+      b.at.solveGram(b.independent);
+      b.a.noalias() = -b.at.basis().J.transpose() * b.independent;
       scatterVelocity(b.loop, b.a, a_d_);
     }
     // Eq. (b)
@@ -243,6 +259,7 @@ class ReducedNode : public NodeModel {
   void updateVelocityLift(Block& b);
   void updateBlockDerivatives(Block& b);
   void updateForces();
+  static void updateForceDerivative(Block& b, const BlockPoint& point, const VectorXd& force);
   void linearizeDynamics();
   bool linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out);
   void linearizeFreeJoints(ConstVectorRef x_next_node, StageModel& out);
@@ -256,8 +273,9 @@ class ReducedNode : public NodeModel {
   int num_loops_ = 0, loop_rows_ = 0, contact_rows_ = 0;
   VectorXd tau_, a_, a_d_, w_, force_, ydd_, f_, gamma_, lambda_c_;
   MatrixXd Jc_, JcN_, Cc_q_, Cc_v_;  // contact rows
-  MatrixXd M_, left_, left_v_;
-  MatrixXd D_q_;  // nv x nv, Eq. (d)
+  MatrixXd M_, left_;
+  ReducedDerivatives derivatives_;
+  std::vector<BlockLift> lifts_;
   MatrixXd dydd_, dlambda_;  // derivatives of y' and lambda_c with respect to (dy, dy_v, u)
   MatrixXd Rx_, Ru_, scaled_, Ru_scaled_;
   SaddlePoint saddle_point_;
@@ -292,11 +310,14 @@ bool ReducedNode::closeStep(ConstVectorRef x) {
   for (Block& b : blocks_) {
     gatherVelocity(b.loop, w_, b.d);
     b.d *= h;
-    if (!b.next.close(b.loop, b.at.basis(), b.d)) return false;
+    // To second order the closures open by h^2/2 gamma along h w: J J^T zeta = h^2/2 gamma, with the zeta of close().
+    b.zeta = (0.5 * h * h) * b.independent;
+    if (!b.next.close(b.loop, b.at.basis(), b.d, b.zeta)) return false;
     b.w = b.next.step() / h;
-    b.independent.noalias() = b.next.basis().J * b.w;
+    b.mu.noalias() = b.next.basis().J * b.w;
+    b.next.solveGram(b.mu);
     b.v_next = b.w;
-    b.v_next.noalias() -= b.next.Jplus() * b.independent;
+    b.v_next.noalias() -= b.next.basis().J.transpose() * b.mu;
     scatterConfiguration(model_, b.loop, b.next.basis().q, x_next_.head(nq));
     scatterVelocity(b.loop, b.v_next, x_next_.tail(nv));
   }
@@ -310,7 +331,9 @@ void ReducedNode::updateVelocityLift(Block& b) {
     calcClosureVelocityDerivative(b.at.workspace(), set.closures[c],
                                   b.K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
   b.at.selectIndependent(b.K, b.K_r);
-  b.Z.noalias() = -b.at.Jplus() * (b.K_r * b.at.basis().N).eval();
+  b.X.setZero();
+  addSmallProduct(b.K_r, b.at.basis().N, b.X);
+  applyPlus(b.at, b.X, b.Z);
 }
 
 // d_y and d_v of Eq. (c).
@@ -325,8 +348,13 @@ void ReducedNode::updateBlockDerivatives(Block& b) {
   }
   b.at.selectIndependent(b.Cq, b.Cq_r);
   b.at.selectIndependent(b.Cv, b.Cv_r);
-  b.dy.noalias() = -b.at.Jplus() * (b.Cq_r * b.at.basis().N + b.Cv_r * b.Z).eval();
-  b.dv.noalias() = -b.at.Jplus() * (b.Cv_r * b.at.basis().N).eval();
+  b.X.setZero();
+  addSmallProduct(b.Cq_r, b.at.basis().N, b.X);
+  addSmallProduct(b.Cv_r, b.Z, b.X);
+  applyPlus(b.at, b.X, b.dy);
+  b.X.setZero();
+  addSmallProduct(b.Cv_r, b.at.basis().N, b.X);
+  applyPlus(b.at, b.X, b.dv);
 }
 
 // Loop forces, and the wrenches of loops and contacts on the bodies.
@@ -337,19 +365,27 @@ void ReducedNode::updateForces() {
   const ConstraintSet& set = spec_.constraints;
   for (Block& b : blocks_) {
     gatherVelocity(b.loop, force_, b.d);
-    b.independent.noalias() = b.at.Jplus().transpose() * b.d;
-    expandIndependent(b.at.basis(), b.independent, b.rows);
-    for (size_t c = 0; c < b.loop.cluster_closures.size(); ++c) {
-      const int whole = b.loop.cluster_closures[c], n = getRows(set.closures[whole].kind);
-      lambda_.segment(set.offsets[whole], n) = b.rows.segment(b.loop.closures.offsets[c], n);
-    }
+    b.independent.noalias() = b.at.basis().J * b.d;
+    b.at.solveGram(b.independent);
+    updateForceDerivative(b, b.at, b.independent);
   }
   for (Vector6d& f : f_ext_) f.setZero();
+  for (size_t c = num_loops_; c < set.closures.size(); ++c) {
+    const Closure& contact = set.closures[c];
+    f_ext_[contact.body1] += calcClosureWrench(ws_, contact, lambda_.segment(set.offsets[c], getRows(contact.kind)));
+  }
+}
+
+// H = d(J^T f)/dq at a point of the block, for forces f on its independent rows.
+void ReducedNode::updateForceDerivative(Block& b, const BlockPoint& point, const VectorXd& force) {
+  expandIndependent(point.basis(), force, b.rows);
+  b.H.setZero();
+  const ConstraintSet& set = b.loop.closures;
   for (size_t c = 0; c < set.closures.size(); ++c) {
     const Closure& closure = set.closures[c];
-    const Vector6d W = calcClosureWrench(ws_, closure, lambda_.segment(set.offsets[c], getRows(closure.kind)));
-    f_ext_[closure.body1] += W;
-    f_ext_[closure.body2] -= W;
+    const Vector6d W =
+        calcClosureWrench(point.workspace(), closure, b.rows.segment(set.offsets[c], getRows(closure.kind)));
+    addGeneralizedForceDerivative(b.loop.model, point.workspace(), closure, W, b.H);
   }
 }
 
@@ -359,27 +395,15 @@ void ReducedNode::linearizeDynamics() {
   updateAccelerations(model_, ws_, a_);
   for (Block& b : blocks_) updateBlockDerivatives(b);
   updateForces();
-  updateInverseDynamicsDerivatives(model_, ws_, f_ext_);
-  // A copy: the workspace's own entries between branches are never written again, and would add up.
-  D_q_ = ws_.dID_dq;
-  const ConstraintSet& set = spec_.constraints;
-  for (int c = 0; c < num_loops_; ++c) {
-    const Closure& closure = set.closures[c];
-    const Vector6d W = calcClosureWrench(ws_, closure, lambda_.segment(set.offsets[c], getRows(closure.kind)));
-    addClosureForceDerivative(model_, ws_, closure, W, D_q_);
+  for (size_t i = 0; i < blocks_.size(); ++i) {
+    const Block& b = blocks_[i];
+    lifts_[i] = {&b.at.basis().N, &b.Z, &b.dy, &b.dv, &b.H};
   }
-  left_.setZero();
-  left_v_.setZero();
-  addColumns(D_q_, &BlockBasisN, left_);
-  addColumns(ws_.dID_dv, &BlockZ, left_);
-  addColumns(ws_.M, &BlockDy, left_);
-  addColumns(ws_.dID_dv, &BlockBasisN, left_v_);
-  addColumns(ws_.M, &BlockDv, left_v_);
-  projectRows(left_, dydd_.leftCols(nr));
-  projectRows(left_v_, dydd_.middleCols(nr, nr));
+  derivatives_.update(ws_, f_ext_, lifts_, dydd_.leftCols(nr), dydd_.middleCols(nr, nr));
+  const ConstraintSet& set = spec_.constraints;
   dydd_.rightCols(model_.nu()).setZero();
   for (int m = 0; m < model_.nu(); ++m) {  // -N^T B
-    force_.setZero();  // not tau_: another linearization at the same point needs it
+    force_.setZero();                      // not tau_: another linearization at the same point needs it
     force_[model_.motors()[m].dof] = -1;
     projectVector(force_, f_);
     dydd_.col(2 * nr + m) = f_;
@@ -416,47 +440,67 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   const BlockBasis &base = b.at.basis(), &next = b.next.basis();
   const MatrixXd &N = base.N, &Nn = next.N;
 
-  b.H.setZero();
-  expandIndependent(base, b.next.zeta() / h, b.rows);  // close() moves by h w', so its zeta is h times that of Eq. (3)
-  const ConstraintSet& set = loop.closures;
-  for (size_t c = 0; c < set.closures.size(); ++c) {
-    const Closure& closure = set.closures[c];
-    const Vector6d W =
-        calcClosureWrench(b.at.workspace(), closure, b.rows.segment(set.offsets[c], getRows(closure.kind)));
-    addGeneralizedForceDerivative(loop.model, b.at.workspace(), closure, W, b.H);
-  }
-  b.Jq.setIdentity();
-  b.Jd.setIdentity();
+  b.zeta = b.next.zeta() / h;  // close() moves by h w', so its zeta is h times that of Eq. (3)
+  updateForceDerivative(b, b.at, b.zeta);
+  b.HN.setZero();
+  addSmallProduct(b.H, N, b.HN);
+  updateForceDerivative(b, b.next, b.mu);
+  b.HnNn.setZero();
+  addSmallProduct(b.H, Nn, b.HnNn);
+
+  // J_q and J_d are the identity but for the blocks of curved joints. EN: e = EN dy + h J_d dw.
+  b.EN = N - h * b.HN;
+  b.G = base.J;  // J J_d^T
   for (const Joint& joint : loop.model.joints()) {
     if (!isCurved(joint)) continue;
     const int i = joint.idx_v, n = joint.nv;
     const JointVector d = b.next.step().segment(i, n);
-    calcJointIntegrateJacobians(joint, d, b.Jq.block(i, i, n, n), b.Jd.block(i, i, n, n));
+    JointMatrix Jq(n, n), Jd(n, n);
+    calcJointIntegrateJacobians(joint, d, Jq, Jd);
+    b.Jd.block(i, i, n, n) = Jd;
+    b.EN.middleRows(i, n) = Jq.lazyProduct(N.middleRows(i, n)) - h * Jd.lazyProduct(b.HN.middleRows(i, n));
+    b.G.middleCols(i, n) = base.J.middleCols(i, n).lazyProduct(Jd.transpose());
   }
-  const MatrixXd JdJt = b.Jd * base.J.transpose();                        // n x rank
-  b.lu.compute(h * (next.J * JdJt));                                      // A
-  const MatrixXd P = b.lu.solve(next.J);                                  // A^{-1} J'
-  const MatrixXd L = Nn.transpose() - h * ((Nn.transpose() * JdJt) * P);  // dy+ = L e
-  const MatrixXd T = (Nn.transpose() * base.J.transpose()) * P;           // N'^T J^T A^{-1} J'
-  const MatrixXd HN = b.H * N, EN = b.Jq * N - h * b.Jd * HN;             // e = EN dy + h J_d dw
-  // S of Eq. (g)
-  b.mu.noalias() = b.next.Jplus().transpose() * b.w;
-  expandIndependent(next, b.mu, b.rows);
-  b.H.setZero();
-  for (size_t c = 0; c < set.closures.size(); ++c) {
-    const Closure& closure = set.closures[c];
-    const Vector6d W =
-        calcClosureWrench(b.next.workspace(), closure, b.rows.segment(set.offsets[c], getRows(closure.kind)));
-    addGeneralizedForceDerivative(loop.model, b.next.workspace(), closure, W, b.H);
+  // Y = A^{-T} [J J_d^T N', J N'], with A^T = h J J_d^T J'^T
+  b.At.setZero();
+  addSmallProduct(b.G, next.J.transpose(), b.At, h);
+  b.Y.setZero();
+  addSmallProduct(b.G, Nn, b.Y.leftCols(r));
+  addSmallProduct(base.J, Nn, b.Y.rightCols(r));
+  if (!solveSmall(b.At, b.Y)) return false;
+  // dy+ = L^T e, and T^T = N'^T J^T A^{-1} J'
+  b.L = Nn;
+  addSmallProductTransposed(next.J, b.Y.leftCols(r), b.L, -h);
+  b.T.setZero();
+  addSmallProductTransposed(next.J, b.Y.rightCols(r), b.T);
+  // h J_d^T L and beta = N' - h J_d^T T
+  b.LJ = h * b.L;
+  b.beta = Nn - h * b.T;
+  for (const Joint& joint : loop.model.joints()) {
+    if (!isCurved(joint)) continue;
+    const int i = joint.idx_v, n = joint.nv;
+    const auto Jd = b.Jd.block(i, i, n, n);
+    b.LJ.middleRows(i, n) = h * Jd.transpose().lazyProduct(b.L.middleRows(i, n));
+    b.beta.middleRows(i, n) = Nn.middleRows(i, n) - h * Jd.transpose().lazyProduct(b.T.middleRows(i, n));
   }
-  const MatrixXd S = Nn.transpose() * b.H * Nn;
-
   // dw = (N + h d_v) dy_v + (Z + h d_y) dy + h N dy'
-  const MatrixXd wy = b.Z + h * b.dy, wv = N + h * b.dv;
-  const MatrixXd LJ = h * L * b.Jd, beta = Nn.transpose() - h * T * b.Jd;
-  MatrixXd q_y = L * EN + LJ * wy, q_v = LJ * wv, q_a = h * LJ * N;
-  MatrixXd v_y = beta * wy - Nn.transpose() * HN - T * EN - S * q_y, v_v = beta * wv - S * q_v,
-           v_a = h * beta * N - S * q_a;
+  b.wy = b.Z + h * b.dy;
+  b.wv = N + h * b.dv;
+  MatrixXd &q_y = b.q_y, &q_v = b.q_v, &q_a = b.q_a, &v_y = b.v_y, &v_v = b.v_v, &v_a = b.v_a, &S = b.S;
+  for (MatrixXd* m : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a, &S}) m->setZero();
+  addSmallProductTransposed(Nn, b.HnNn, S);
+  addSmallProductTransposed(b.L, b.EN, q_y);
+  addSmallProductTransposed(b.LJ, b.wy, q_y);
+  addSmallProductTransposed(b.LJ, b.wv, q_v);
+  addSmallProductTransposed(b.LJ, N, q_a, h);
+  addSmallProductTransposed(b.beta, b.wy, v_y);
+  addSmallProductTransposed(Nn, b.HN, v_y, -1);
+  addSmallProductTransposed(b.T, b.EN, v_y, -1);
+  addSmallProductTransposed(b.beta, b.wv, v_v);
+  addSmallProductTransposed(b.beta, N, v_a, h);
+  addSmallProduct(S, q_y, v_y, -1);
+  addSmallProduct(S, q_v, v_v, -1);
+  addSmallProduct(S, q_a, v_a, -1);
 
   // About the node state, where a gap is open.
   gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), b.q);
@@ -464,11 +508,14 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   if (b.q != next.q || b.d != b.v_next) {
     if (!b.scratch.update(loop, b.q)) return false;
     updateVelocities(loop.model, b.next.workspace(), b.v_next);
+    const ConstraintSet& set = loop.closures;
     for (size_t c = 0; c < set.closures.size(); ++c)
       calcClosureVelocityDerivative(b.next.workspace(), set.closures[c],
                                     b.K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
     b.next.selectIndependent(b.K, b.K_r);
-    const MatrixXd Zn = -b.next.Jplus() * (b.K_r * Nn);
+    MatrixXd Zn(loop.model.nv(), r);
+    b.X.noalias() = b.K_r * Nn;
+    applyPlus(b.next, b.X, Zn);
     const MatrixXd& Nnode = b.scratch.basis().N;
     VectorXd gap(loop.model.nv());
     loop.model.difference(b.q, next.q, gap);
@@ -492,10 +539,10 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
     out.gap.segment(nr + o, r).setZero();
   }
   const auto dydd = dydd_.middleRows(o, r);
-  out.Fx.middleRows(o, r).noalias() = q_a * dydd.leftCols(2 * nr);
-  out.Fx.middleRows(nr + o, r).noalias() = v_a * dydd.leftCols(2 * nr);
-  out.Fu.middleRows(o, r).noalias() = q_a * dydd.rightCols(nu);
-  out.Fu.middleRows(nr + o, r).noalias() = v_a * dydd.rightCols(nu);
+  out.Fx.middleRows(o, r) = q_a.lazyProduct(dydd.leftCols(2 * nr));
+  out.Fx.middleRows(nr + o, r) = v_a.lazyProduct(dydd.leftCols(2 * nr));
+  out.Fu.middleRows(o, r) = q_a.lazyProduct(dydd.rightCols(nu));
+  out.Fu.middleRows(nr + o, r) = v_a.lazyProduct(dydd.rightCols(nu));
   out.Fx.block(o, o, r, r) += q_y;
   out.Fx.block(o, nr + o, r, r) += q_v;
   out.Fx.block(nr + o, o, r, r) += v_y;

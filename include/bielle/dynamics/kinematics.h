@@ -7,6 +7,12 @@ namespace bielle {
 /// Placements, Jacobian columns and inertias at q (nq).
 void updatePositions(const Model& model, Workspace& ws, ConstVectorRef q);
 
+/// The placements X_WB at q alone: enough for getPlacement and closure residuals.
+void updatePlacements(const Model& model, Workspace& ws, ConstVectorRef q);
+
+/// Jacobian columns and inertias at the placements of the workspace: what updatePositions adds to updatePlacements.
+void updateColumns(const Model& model, Workspace& ws);
+
 /// Body velocities at v (nv); needs updatePositions.
 void updateVelocities(const Model& model, Workspace& ws, ConstVectorRef v);
 

@@ -3,21 +3,20 @@
 ///
 /// A cluster of loops touches few dofs (Bipetto's knee: 7, with 6 closure rows). Seen from the body that carries it, it
 /// is a small mechanism of its own, here a `LoopBlock` with its own massless Model whose world is that body. At a
-/// closed configuration, with J the closure Jacobian of the block (rows x n), independent rows J_r (rank x n) chosen by
-/// pivoting and
-///     J_r^T = [Q_1 N] [R; 0],    J_r^+ = Q_1 R^{-T} (1)
-/// N (n x (n - rank)) is an orthonormal basis of the tangent space. Its choice is free at every point: no chart is
-/// left, and a dead point of a linkage, where motor or joint coordinates break down, is nothing special. Only a change
-/// of rank is.
+/// closed configuration, let J (rank x n) be the independent rows of its closure Jacobian, chosen by complete pivoting, and
+///     J N = 0,   N^T N = I,   J^+ = J^T (J J^T)^{-1}                                                                  (1)
+/// N (n x (n - rank)) is an orthonormal basis of the tangent space. Its choice is free at every point: no chart is left,
+/// and a dead point of a linkage, where motor or joint coordinates break down, is nothing special. Only a change of rank is.
 ///
 /// Moving on the manifold from a point q_0: for a displacement d (n), close along the rows of the start,
-///     q = q_0 (+) (d - J_r(q_0)^T zeta)    with zeta such that q is closed (2)
+///     q = q_0 (+) (d - J(q_0)^T zeta)    with zeta such that q is closed                                              (2)
 /// so that N(q_0)^T (q (-) q_0) = N(q_0)^T d: (2) inverts the difference in reduced coordinates exactly.
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <vector>
 
 #include "bielle/dynamics/closure.h"
+#include "bielle/math/small_dense.h"
 
 namespace bielle {
 
@@ -32,12 +31,22 @@ struct LoopBlock {
   int offset = 0, size = 0;           ///< reduced coordinates [offset, offset + size), size = n - rank
 };
 
+/// A free joint or a block: what a coordinate of the reduced tree belongs to. Units come parents first.
+struct ReducedUnit {
+  int joint = -1, block = -1;  ///< one of them: joint of the whole model, or index into Reduction::blocks
+  int offset = 0, size = 0;    ///< reduced coordinates
+  int parent = -1;             ///< unit that carries it, -1: the world
+  std::vector<int> path;       ///< dofs of the parent unit that move it: positions among the parent's dofs
+  std::vector<int> outer;      ///< reduced coordinates of all units before it on the way to the root
+};
+
 /// How the velocity coordinates of a model split into blocks and free dofs.
 struct Reduction {
   std::vector<LoopBlock> blocks;
   std::vector<int> free_joints;   ///< joints outside all loops
   std::vector<int> free_offsets;  ///< first reduced coordinate of each
-  int size = 0;                   ///< reduced coordinates: the mobility of the robot
+  std::vector<ReducedUnit> units;
+  int size = 0;  ///< reduced coordinates: the mobility of the robot
 };
 
 /// \param q closed configuration at which ranks are taken
@@ -60,15 +69,17 @@ class BlockPoint {
   /// Kinematics, Jacobian and bases (1) at q (block's nq). False when the rank is not that of the block.
   bool update(const LoopBlock& block, ConstVectorRef q);
   /// Closes from `start` as Eq. (2) and updates everything there. False when it does not close or the rank changes.
-  bool close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d);
+  /// \param zeta_guess  rank, where zeta is expected, or empty
+  bool close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d, const VectorXd& zeta_guess);
 
   const BlockBasis& basis() const { return basis_; }
-  const MatrixXd& Jplus() const { return Jplus_; }  ///< n x rank
-  const VectorXd& zeta() const { return zeta_; }    ///< rank, of the last close()
-  const VectorXd& step() const { return step_; }    ///< n, d - J_r(q_0)^T zeta of the last close()
-  double gap() const { return gap_; }               ///< largest closure residual
+  const VectorXd& zeta() const { return zeta_; }  ///< rank, of the last close()
+  const VectorXd& step() const { return step_; }  ///< n, d - J(q_0)^T zeta of the last close()
+  double gap() const { return gap_; }             ///< largest closure residual
   Workspace& workspace() { return ws_; }
   const Workspace& workspace() const { return ws_; }
+  /// (J J^T)^{-1} X in place (rank x k); J^T times it is J^+ X.
+  void solveGram(MatrixRef X) const { solveSmallCholesky(gram_.matrixLLT(), X); }
   /// Independent rows out of all rows (m x k -> rank x k).
   void selectIndependent(const MatrixXd& all, MatrixXd& out) const;
 
@@ -76,12 +87,14 @@ class BlockPoint {
   void updateJacobian(const LoopBlock& block);
   void updateResidual(const LoopBlock& block);
   bool updateBases(const LoopBlock& block);
+  bool eliminate(int rank);
 
   BlockBasis basis_;
   Workspace ws_;
-  VectorXd residual_, zeta_, step_, correction_, independent_residual_, work_;
-  MatrixXd J_all_, Jplus_, Q_, A_;
-  Eigen::ColPivHouseholderQR<MatrixXd> qr_;
+  VectorXd residual_, zeta_, step_, correction_;
+  MatrixXd J_all_, eliminated_, A_;
+  std::vector<int> row_order_, col_order_;
+  Eigen::LLT<MatrixXd> gram_;
   Eigen::PartialPivLU<MatrixXd> lu_;
   double gap_ = 0;
 };

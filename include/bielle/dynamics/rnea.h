@@ -35,9 +35,26 @@ void updateBias(const Model& model, Workspace& ws);
 /// Generalized forces of the motion (q, v, a), all given (updates positions, velocities and accelerations).
 VectorXd calcInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef q, ConstVectorRef v, ConstVectorRef a);
 
+/// The per-dof factors of Eqs. (7) to (9) and the subtree sums behind them (fields F, Yc, Bc, YJ, BtJ, Gq, Gv); needs
+/// updateAccelerations.
+/// \param f_ext per body (nb), world wrenches that move with their body, or empty
+void updateInverseDynamicsFactors(const Model& model, Workspace& ws, const std::vector<Vector6d>& f_ext);
+
 /// Derivatives of ID(q, v, a) - sum_i J_i^T f_ext,i with respect to q (tangent) and v, at the state and acceleration of
-/// the workspace; needs updateAccelerations. \param f_ext per body (nb), world wrenches that move with their body, or
-/// empty
+/// the workspace; needs updateAccelerations. Arguments as above.
 void updateInverseDynamicsDerivatives(const Model& model, Workspace& ws, const std::vector<Vector6d>& f_ext);
+
+/// Entry (j, k) of the derivatives with respect to q and v, for dofs of one path to the root (or one joint), from the factors.
+struct DerivativeEntry {
+  double q, v;
+};
+inline DerivativeEntry calcDerivativeEntry(const Model& model, const Workspace& ws, int j, int k) {
+  const Dof &dj = model.dofs()[j], &dk = model.dofs()[k];
+  const bool moves = dj.joint == dk.joint ? !(dj.first_of_universal && dk.second_of_universal) : k < j;
+  if (moves)
+    return {ws.YJ.col(j).dot(ws.dA.col(k)) + ws.BtJ.col(j).dot(ws.dV.col(k)),                 // Eq. (7)
+            ws.YJ.col(j).dot(ws.dJ.col(k) + ws.dV.col(k)) + ws.BtJ.col(j).dot(ws.J.col(k))};  // Eq. (9)
+  return {ws.J.col(j).dot(ws.Gq.col(k)), ws.J.col(j).dot(ws.Gv.col(k))};                      // Eqs. (8), (9)
+}
 
 }  // namespace bielle

@@ -8,7 +8,7 @@ namespace bielle {
 
 /// How far a workspace has been filled for the present (q, v, a). Each update* function sets its stage, and a function
 /// that needs an earlier stage calls requireStage(), which throws std::logic_error naming the missing call.
-enum class WorkspaceStage { Empty, Position, Velocity, Acceleration };
+enum class WorkspaceStage { Empty, Placement, Position, Velocity, Acceleration };
 
 /// All spatial quantities are in world coordinates about the world origin, so that recursions only add.
 /// Shapes: nb = numBodies (world first), nv = velocity coordinates. "Writer" is the function that fills a field.

@@ -21,6 +21,9 @@ inline Matrix3d skew(const Vector3d& w) {
 /// Rotation matrix of the rotation vector w (rad).
 Matrix3d exp3(const Vector3d& w);
 
+/// Rotation by an angle (rad) about a unit axis.
+Matrix3d makeAxisRotation(const Vector3d& axis, double angle);
+
 /// Rotation vector of R, |w| in [0, pi]. Well conditioned on the whole range, the angle pi included.
 Vector3d log3(const Matrix3d& R);
 
