@@ -1,8 +1,8 @@
 /// \file A squat of Bipetto, whose knees and ankles are driven through connecting rods.
 ///
-/// The state is x = (q, v) of the spanning tree; motors give u, closures and soles the forces lambda:
+/// The state is x = (q, v) of the spanning tree, with every loop closed; motors give u, closures and soles the forces:
 ///     M(q) a + b(q, v) = B u + J(q)^T lambda,    d/dt (J(q) v) = 0                                            (1)
-/// for 6 closures of 6 rows and 2 feet of 6 rows. With steps of length h, v+ = v + h a, q+ = q (+) h v+, find
+/// for 6 closures of 6 rows and 2 feet of 6 rows. With steps of length h that end on the closures again, find
 ///     min over u   sum_k h l_k(x_k, u_k, lambda_k) + l_N(x_N),                                                (2)
 /// where l asks the centre of mass to follow
 ///     c_z(t) = c_z(0) (1 - (1 - depth) (1 - cos 2 pi t / T) / 2),                                             (3)
@@ -64,13 +64,13 @@ int main(int argc, char** argv) {
   printFddpHeader(std::cout);
   ShootingTrajectory trajectory = motion.guess;
   const FddpSummary summary = Fddp().solve(*motion.problem, trajectory, observer);
-  const MotionResult result = makeResult({"bipetto", "full", {}}, motion, trajectory, summary);
+  const MotionResult result = makeResult({"bipetto", {}}, motion, trajectory, summary);
   printMotion(result, options);
 
   std::printf("\n%s after %d iterations and %.2f s, cost %.6f\n", getName(summary.termination), summary.iterations,
               summary.seconds, summary.cost);
-  std::printf("closures open by at most %.1e m and %.1e rad: Eq. (1) holds accelerations, steps drift\n",
-              result.gap_position, result.gap_angle);
+  std::printf("closures open by at most %.1e m and %.1e rad, feet slip by at most %.1e m\n", result.gap_position,
+              result.gap_angle, result.slip_position);
   for (const std::string& path : writeResult(directory, result)) std::printf("%s\n", path.c_str());
   return result.converged() ? 0 : 1;
 }

@@ -50,7 +50,7 @@ struct ShortSquat {
     motion = makeSquat(robot.model, options);
     for (size_t k = 0; k < motion.guess.xs.size(); ++k) {
       VectorXd& x = motion.guess.xs[k];
-      VectorXd dx = VectorXd::LinSpaced(2 * robot.model.nv(), -0.01, 0.02) * (0.3 + k);
+      VectorXd dx = VectorXd::LinSpaced(motion.problem->tangentSize(k), -0.01, 0.02) * (0.3 + k);
       motion.problem->integrate(static_cast<int>(k), VectorXd(x), dx, x);
       if (k < motion.guess.us.size()) motion.guess.us[k] += VectorXd::LinSpaced(robot.model.nu(), 0.1, 1.7 / 3);
     }
@@ -229,8 +229,7 @@ TEST_CASE("a result is three whole files, written again over the old ones") {
   summary.termination = FddpTermination::Interrupted;
   summary.cost = 2.5;
   summary.log.resize(3);
-  const MotionResult result =
-      makeResult({"bipetto", "full", {"bielle", "solve"}}, squat.motion, squat.motion.guess, summary);
+  const MotionResult result = makeResult({"bipetto", {"bielle", "solve"}}, squat.motion, squat.motion.guess, summary);
   CHECK(result.interrupted());
   CHECK_FALSE(result.converged());
   for (size_t m = 1; m < result.peak_torques.size(); ++m)

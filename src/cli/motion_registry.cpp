@@ -7,10 +7,12 @@ namespace {
 
 // The request owns its options; listOptions() is found by their type.
 template <typename Options>
-std::function<MotionRequest()> makeRequests(Motion (*make)(const Model&, const Options&)) {
+std::function<MotionRequest()> makeRequests(Motion (*make)(const Model&, const Options&, Formulation)) {
   return [make] {
     const auto options = std::make_shared<Options>();
-    return MotionRequest{listOptions(*options), [options, make](const Model& model) { return make(model, *options); }};
+    return MotionRequest{listOptions(*options), [options, make](const Model& model, Formulation formulation) {
+                           return make(model, *options, formulation);
+                         }};
   };
 }
 

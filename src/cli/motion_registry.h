@@ -12,7 +12,7 @@ namespace bielle::cli {
 // One request: the numbers that can be set, and what makes the motion of them.
 struct MotionRequest {
   std::vector<OptionEntry> options;
-  std::function<Motion(const Model&)> make;
+  std::function<Motion(const Model&, Formulation)> make;
 };
 
 struct MotionEntry {

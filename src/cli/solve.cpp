@@ -18,7 +18,7 @@ namespace {
 struct SolveArguments {
   RobotArgument robot;
   std::string directory;
-  std::string formulation = "full";
+  Formulation formulation = Formulation::Reduced;
   std::vector<std::string> settings;  // name=value
   FddpOptions solver;
   bool quiet = false;
@@ -87,7 +87,7 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
     if (!std::isfinite(*option.value))
       throw ModelError("", "option '" + option.name + "'", "it is not finite", "give a number");
   const LoadedRobot robot = arguments.robot.load();
-  Motion motion = request.make(robot.model);
+  Motion motion = request.make(robot.model, arguments.formulation);
   makeOutputDirectory(arguments.directory);
 
   watchSignals();
@@ -102,7 +102,7 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
     };
   }
   const FddpSummary summary = Fddp(arguments.solver).solve(*motion.problem, motion.guess, observer);
-  const RunInfo run{arguments.robot.name, arguments.formulation, getCommandLine()};
+  const RunInfo run{arguments.robot.name, getCommandLine()};
   const MotionResult result = makeResult(run, motion, motion.guess, summary);
   printResult(result, writeResult(arguments.directory, result));
   return result.converged() ? kOk : kFailed;
@@ -121,9 +121,14 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
       sub.add_option("--" + option.name, *option.value, option.help + " [" + option.unit + "]")->capture_default_str();
   sub.add_option("--set", arguments->settings, "name=value of one of the options below; may be repeated")
       ->allow_extra_args(false);
-  sub.add_option("--formulation", arguments->formulation, "state of the dynamics: all joints of the spanning tree")
-      ->check(CLI::IsMember({"full"}))
-      ->capture_default_str();
+  sub.add_option_function<std::string>(
+         "--formulation",
+         [arguments](const std::string& name) {
+           arguments->formulation = name == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
+         },
+         "reduced: loops are closed at every node; full: all joints of the spanning tree, closures by accelerations")
+      ->check(CLI::IsMember({getName(Formulation::Full), getName(Formulation::Reduced)}))
+      ->default_str(getName(arguments->formulation));
   sub.add_option("--max-iterations", arguments->solver.max_iterations, "the solver stops there")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();

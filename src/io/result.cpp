@@ -57,7 +57,7 @@ Json makeSummary(const MotionResult& result) {
   const VectorXd& time = result.record.time;
   return {{"motion", result.motion},
           {"robot", result.run.robot},
-          {"formulation", result.run.formulation},
+          {"formulation", getName(result.formulation)},
           {"command", result.run.command},
           {"requested", listByName(result.requested)},
           {"versions", {{"bielle", build.bielle}, {"eigen", build.eigen}, {"compiler", build.compiler}}},
@@ -86,6 +86,7 @@ MotionResult makeResult(const RunInfo& run, const Motion& motion, const Shooting
   MotionResult result;
   result.run = run;
   result.motion = motion.name;
+  result.formulation = motion.problem->formulation();
   result.requested = motion.requested;
   result.solver = summary;
   result.record = makeRecord(motion, trajectory);

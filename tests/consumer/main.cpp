@@ -1,11 +1,11 @@
 // Loads an installed robot and solves a squat of few nodes.
-#include <cstdio>
-#include <cstdlib>
-#include <string>
-
 #include <bielle/io/result.h>
 #include <bielle/model/reader.h>
 #include <bielle/motion/squat.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <string>
 
 int main(int argc, char** argv) {
   setenv("BIELLE_ROBOTS", ROBOTS, 1);
@@ -18,10 +18,10 @@ int main(int argc, char** argv) {
   options.depth = 0.95;
   options.duration = 0.6;
   options.settle = 0;
-  options.time_step = 0.05;
+  options.time_step = 0.02;
   bielle::Motion motion = bielle::makeSquat(robot.model, options);
   const bielle::FddpSummary summary = bielle::Fddp().solve(*motion.problem, motion.guess);
-  const bielle::MotionResult result = bielle::makeResult({"bipetto", "full", {}}, motion, motion.guess, summary);
+  const bielle::MotionResult result = bielle::makeResult({"bipetto", {}}, motion, motion.guess, summary);
   bielle::writeResult(argc > 1 ? argv[1] : "squat", result);
   std::printf("%s after %d iterations, lowest at %.4f m\n", getName(summary.termination), summary.iterations,
               result.com_lowest);

@@ -10,13 +10,13 @@ namespace bielle {
 /// How the motion was asked for.
 struct RunInfo {
   std::string robot;                 ///< name or path, as given
-  std::string formulation = "full";  ///< of the dynamics
   std::vector<std::string> command;  ///< the command line, or empty
 };
 
 struct MotionResult {
   RunInfo run;
   std::string motion;
+  Formulation formulation = Formulation::Full;
   std::vector<std::pair<std::string, double>> requested;  ///< every option by name
   FddpSummary solver;
   MotionRecord record;
