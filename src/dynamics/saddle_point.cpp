@@ -10,8 +10,9 @@ void SaddlePoint::resize(int n, int m) {
   W_.setZero(n, m);
   for (MatrixXd* matrix : {&G_, &Ginv_, &T1_, &T2_}) matrix->setZero(m, m);
   for (VectorXd* v : {&D_, &rhs_, &correction_}) v->setZero(m);
-  M_llt_ = Eigen::LLT<MatrixXd>(n);
-  G_llt_ = Eigen::LLT<MatrixXd>(m);
+  // Of something, so that their status is not read before it is set when they are copied.
+  M_llt_.compute(MatrixXd::Identity(n, n));
+  G_llt_.compute(MatrixXd::Identity(m, m));
 }
 
 SaddlePointStatus SaddlePoint::factorize(const MatrixXd& M, const MatrixXd& J, const SaddlePointOptions& options) {
