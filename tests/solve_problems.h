@@ -190,6 +190,7 @@ class DoubleWell : public ShootingProblem {
 /// with the cost 1/2 dt (w_r |q (-) q_goal|^2 + |w|^2 + r |u|^2), and 1/2 P (|q (-) q_goal|^2 + |w|^2) at the end.
 class TurningBody : public ShootingProblem {
  public:
+  int stages = 60;
   double dt = 0.05, attitude_weight = 1, control_weight = 0.1, terminal_weight = 100;
   Vector3d inertia{0.5, 1, 2};
   VectorXd start = VectorXd::Unit(7, 3), goal = VectorXd::Unit(4, 3);
@@ -199,7 +200,7 @@ class TurningBody : public ShootingProblem {
     joint_.nq = 4;
     joint_.nv = 3;
   }
-  int numStages() const override { return 60; }
+  int numStages() const override { return stages; }
   int stateSize() const override { return 7; }
   int tangentSize(int) const override { return 6; }
   int controlSize(int) const override { return 3; }

@@ -256,7 +256,7 @@ TEST_CASE("enforced bounds that are infinite change nothing but rounding") {
 
 TEST_CASE("the number of threads does not change one bit of the result") {
   auto problem = makeCartPole();
-  ShootingTrajectory one = makeLine(problem), two = one;
+  ShootingTrajectory one = GENERATE(0, 1) ? makeLine(problem) : makeGuess(problem), two = one;
   FddpOptions options;
   options.threads = 1;
   const FddpSummary first = Fddp(options).solve(problem, one);
@@ -266,6 +266,88 @@ TEST_CASE("the number of threads does not change one bit of the result") {
   CHECK(first.cost == second.cost);
   CHECK(one.xs == two.xs);
   CHECK(one.us == two.us);
+}
+
+TEST_CASE("a rollout in segments leads to the same optimum in about as many iterations") {
+  const auto check = [](auto& problem, const ShootingTrajectory& guess) {
+    FddpOptions options;
+    options.gradient_tolerance = 1e-14;
+    options.cost_tolerance = 0;
+    options.rollout_segments = 1;
+    ShootingTrajectory one = guess;
+    const FddpSummary whole = Fddp(options).solve(problem, one);
+    checkOptimal(problem, whole, one);
+    for (const int segments : {2, 3, 5}) {
+      options.rollout_segments = segments;
+      ShootingTrajectory t = guess;
+      const FddpSummary summary = Fddp(options).solve(problem, t);
+      CAPTURE(segments, whole.iterations);
+      checkOptimal(problem, summary, t);
+      CHECK(summary.iterations <= whole.iterations + 2 + whole.iterations / 5);
+      CHECK(summary.cost == Approx(whole.cost).epsilon(1e-9));
+    }
+  };
+  auto pendulum = makePendulum();
+  check(pendulum, makeGuess(pendulum));
+  auto cart_pole = makeCartPole();
+  check(cart_pole, makeGuess(cart_pole));
+  TurningBody body;
+  body.stages = 100;
+  body.goal << 0.6, 0.4, -0.3, -0.2;
+  body.goal.normalize();
+  check(body, makeGuess(body));
+}
+
+TEST_CASE("the gaps that segments open are there, known, and closed by the last iteration allowed") {
+  TurningBody problem;
+  problem.stages = 100;
+  problem.goal << 0.6, 0.4, -0.3, -0.2;
+  problem.goal.normalize();
+  problem.start.tail(3) << 0.3, -0.5, 1;
+  FddpOptions options;
+  options.threads = GENERATE(1, 2);
+  ShootingTrajectory t = makeGuess(problem);
+  std::vector<double> gaps;
+  FddpObserver observer;
+  observer.callback = [&](const FddpIteration&) {
+    gaps.push_back(calcLargestGap(problem, t));
+    return FddpAction::Continue;
+  };
+  options.max_iterations = 4;
+  const FddpSummary summary = Fddp(options).solve(problem, t, observer);
+  REQUIRE(summary.termination == FddpTermination::MaxIterations);
+  double largest = 0;
+  for (size_t i = 1; i < summary.log.size(); ++i) {
+    REQUIRE(summary.log[i - 1].step == 1);
+    // gaps[i - 1] is read about the new node states, as linearizing does.
+    CHECK(summary.log[i].gap == Approx(gaps[i - 1]).epsilon(1e-9).margin(1e-13));
+    largest = std::max(largest, gaps[i - 1]);
+  }
+  CHECK(largest > 1e-6);
+  CHECK(gaps.back() < 1e-13);
+  CHECK(summary.gap == 0);
+
+  // Stopped in between, the summary tells the open gap: to first order about the old node states.
+  ShootingTrajectory stopped = makeGuess(problem);
+  observer.callback = [&](const FddpIteration& line) {
+    return line.iteration == 2 ? FddpAction::Stop : FddpAction::Continue;
+  };
+  const FddpSummary open = Fddp(options).solve(problem, stopped, observer);
+  const double actual = calcLargestGap(problem, stopped);
+  REQUIRE(actual > 1e-6);
+  CHECK(open.gap == Approx(actual).epsilon(0.3));
+}
+
+TEST_CASE("the seconds of linearization, sweeps and rollouts make up those of the solve on one thread") {
+  auto problem = makeCartPole();
+  FddpOptions options;
+  options.threads = 1;
+  ShootingTrajectory t = makeGuess(problem);
+  const FddpSummary summary = Fddp(options).solve(problem, t);
+  const double parts = summary.linearize_seconds + summary.sweep_seconds + summary.rollout_seconds;
+  CHECK(std::min({summary.linearize_seconds, summary.sweep_seconds, summary.rollout_seconds}) > 0);
+  CHECK(parts <= summary.seconds);
+  CHECK(parts > 0.5 * summary.seconds);
 }
 
 TEST_CASE("one solver serves problems of other sizes without remembering them") {

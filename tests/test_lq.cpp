@@ -143,6 +143,21 @@ TEST_CASE("the sweep solves the dense program, whatever the sizes, gaps and regu
   }
 }
 
+TEST_CASE("the sweep solves the dense program of larger sizes, with every number of lanes and columns left over") {
+  LqSweep sweep;
+  std::uniform_int_distribution<int> size(1, 63), control_size(0, 17);
+  for (int trial = 0; trial < 12; ++trial) {
+    std::vector<int> ndx, nu;
+    for (int k = 0; k < 4; ++k) ndx.push_back(size(rng));
+    for (int k = 0; k < 3; ++k) nu.push_back(control_size(rng));
+    CAPTURE(ndx, nu);
+    const auto models = makeModels(ndx, nu);
+    const DenseProgram dense(models, {});
+    CHECK(calcStepError(sweep, models, dense, {}) < 1e-9);
+    for (const LqSweep::Node& node : sweep.getNodes()) CHECK(node.Vxx == node.Vxx.transpose());
+  }
+}
+
 TEST_CASE("without gaps the expected change is half the slope, the sum of Qu.k") {
   auto models = makeModels(kTangents, kControls);
   for (StageModel& m : models) m.gap.setZero();

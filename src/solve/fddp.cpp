@@ -7,6 +7,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "rollout.h"
+
 namespace bielle {
 
 namespace {
@@ -14,6 +16,12 @@ namespace {
 constexpr double kPenaltyMargin = 0.5;  // rho of Eq. (5)
 // Differences of costs below this share of the cost are rounding: they neither accept nor refuse a step.
 constexpr double kCostRounding = 1e-14;
+constexpr double kClosingShare = 0.5;  // of Eq. (4): the most that Eq. (8) may be
+constexpr int kShortestSegment = 20;   // stages
+
+double calcSecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
 
 bool hasSizes(const StageModel& m, int ndx, int nu, int ndx_next) {
   return m.Fx.rows() == ndx_next && m.Fx.cols() == ndx && m.Fu.rows() == ndx_next && m.Fu.cols() == nu &&
@@ -33,6 +41,7 @@ void checkOptions(const FddpOptions& o) {
   require(o.regularization_increase > 1 && o.regularization_decrease >= 1,
           "regularization_increase must exceed 1, regularization_decrease must not be below");
   require(o.state_regularization_ratio >= 0, "state_regularization_ratio must not be negative");
+  require(o.rollout_segments >= 1, "rollout_segments must be at least 1");
   require(o.acceptance > 0 && o.acceptance < 1, "acceptance must lie between 0 and 1");
 }
 
@@ -65,11 +74,11 @@ struct Fddp::Workspace {
   std::vector<StageModel> models;     // N + 1
   std::vector<std::string> failures;  // N + 1: why a node could not be linearized, empty if it could
   LqSweep sweep;
-  std::vector<VectorXd> dx, du;      // the models' full step
-  ShootingTrajectory trial;          // of a rollout
-  std::vector<VectorXd> deviations;  // N + 1: dx of Eq. (3)
-  std::vector<ControlBox> bounds;    // of u, N or none
-  std::vector<ControlBox> boxes;     // of du, N or none
+  std::vector<VectorXd> dx, du;  // the models' full step
+  Rollout rollout;
+  std::vector<ControlBox> bounds;             // of u, N or none
+  std::vector<ControlBox> boxes;              // of du, N or none
+  std::vector<std::atomic<bool>> linearized;  // N + 1: the model is there for the sweep
 
   void resize(const ShootingProblem& problem, const FddpOptions& options);
 };
@@ -78,15 +87,12 @@ void Fddp::Workspace::resize(const ShootingProblem& problem, const FddpOptions& 
   const int N = problem.numStages();
   models.resize(N + 1);
   failures.resize(N + 1);
-  deviations.resize(N + 1);
-  trial.xs.assign(N + 1, VectorXd::Zero(problem.stateSize()));
-  trial.us.resize(N);
+  linearized = std::vector<std::atomic<bool>>(N + 1);
+  rollout.resize(problem, options.rollout_segments);
   bounds.resize(options.bounds == ControlBounds::Enforce ? N : 0);
   for (int k = 0; k <= N; ++k) {
     const int nu = k < N ? problem.controlSize(k) : 0;
     models[k].resize(problem.tangentSize(k), nu, k < N ? problem.tangentSize(k + 1) : 0);
-    deviations[k].setZero(problem.tangentSize(k));
-    if (k < N) trial.us[k].setZero(nu);
     if (bounds.empty() || k == N) continue;
     bounds[k].lower.resize(nu);
     bounds[k].upper.resize(nu);
@@ -116,12 +122,15 @@ class Run {
 
   void start();
   End linearize();
+  void linearizeAndSweep();
   void linearizeNode(int k);
+  void sweepReadyNodes();
+  LqRegularization getRegularization() const;
   End findStep();
   End updateBackwardPass();
   bool searchLine();
-  std::optional<double> rollOut(double alpha);
-  std::optional<double> rollOutUnguarded(double alpha);
+  int chooseSegments() const;
+  bool isAcceptable(double alpha, double nu) const;
   void acceptStep();
   End raiseRegularization(const char* reason);
   End checkProgress();
@@ -143,7 +152,10 @@ class Run {
   double gap_sum_ = 0;                // c, zero once the gaps are closed
   double slope_ = 0, curvature_ = 0;  // Eq. (1)
   double regularization_ = 0;
-  double trial_cost_ = 0;
+  int threads_ = 1;
+  int sweep_node_ = 0;                        // the next one of a sweep that goes along with the linearization
+  bool swept_ = false;                        // that sweep is still to be looked at
+  double last_gradient_ = 0, last_step_ = 0;  // of the iteration before
   FddpSummary summary_;
 };
 
@@ -165,17 +177,21 @@ void Run::start() {
   for (size_t k = 0; k < work_.bounds.size(); ++k) {
     trajectory_.us[k] = trajectory_.us[k].cwiseMax(work_.bounds[k].lower).cwiseMin(work_.bounds[k].upper);
   }
+  threads_ = options_.threads > 0 ? options_.threads : omp_get_max_threads();
   regularization_ = options_.initial_regularization;
   summary_.log.reserve(std::min(options_.max_iterations + 1, 10000));
 }
 
 Run::End Run::linearize() {
-  const int threads = options_.threads > 0 ? options_.threads : omp_get_max_threads();
+  last_gradient_ = line_.gradient;
+  last_step_ = line_.step;
   line_ = FddpIteration();
   line_.iteration = summary_.iterations + 1;
-#pragma omp parallel for num_threads(threads) schedule(dynamic)
-  for (int k = 0; k <= N_; ++k) linearizeNode(k);
-
+  for (size_t k = 0; k < work_.boxes.size(); ++k) {
+    work_.boxes[k].lower = work_.bounds[k].lower - trajectory_.us[k];
+    work_.boxes[k].upper = work_.bounds[k].upper - trajectory_.us[k];
+  }
+  linearizeAndSweep();
   gap_sum_ = 0;
   for (int k = 0; k <= N_; ++k) {
     if (!work_.failures[k].empty()) {
@@ -191,11 +207,50 @@ Run::End Run::linearize() {
   summary_.cost = line_.cost;
   summary_.gap = line_.gap;
   if (isFeasible()) gap_sum_ = 0;
-  for (size_t k = 0; k < work_.boxes.size(); ++k) {
-    work_.boxes[k].lower = work_.bounds[k].lower - trajectory_.us[k];
-    work_.boxes[k].upper = work_.bounds[k].upper - trajectory_.us[k];
-  }
   return {};
+}
+
+// The sweep needs one node after the other, from the last on, and so it goes along with the linearization: whoever has
+// finished a node sweeps as far as models are there, unless somebody does so already. What is left is swept at the end.
+void Run::linearizeAndSweep() {
+  for (std::atomic<bool>& linearized : work_.linearized) linearized.store(false, std::memory_order_relaxed);
+  work_.sweep.start(work_.models, getRegularization());
+  sweep_node_ = N_;
+  swept_ = true;
+  std::atomic<int> next{N_};
+  std::atomic_flag sweeping = ATOMIC_FLAG_INIT;
+  double linearize_seconds = 0, sweep_seconds = 0;
+#pragma omp parallel num_threads(threads_) reduction(+ : linearize_seconds, sweep_seconds)
+  {
+    for (int k; (k = next.fetch_sub(1, std::memory_order_relaxed)) >= 0;) {
+      const Clock::time_point start = Clock::now();
+      linearizeNode(k);
+      linearize_seconds += calcSecondsSince(start);
+      if (sweeping.test_and_set(std::memory_order_acquire)) continue;
+      const Clock::time_point start_sweep = Clock::now();
+      sweepReadyNodes();
+      sweep_seconds += calcSecondsSince(start_sweep);
+      sweeping.clear(std::memory_order_release);
+    }
+  }
+  const Clock::time_point start_rest = Clock::now();
+  sweepReadyNodes();
+  summary_.linearize_seconds += linearize_seconds;
+  summary_.sweep_seconds += sweep_seconds + calcSecondsSince(start_rest);
+}
+
+// Stops for good at a node that could not be linearized or swept.
+void Run::sweepReadyNodes() {
+  while (sweep_node_ >= 0 && work_.sweep.getResult().status == LqStatus::Ok &&
+         work_.linearized[sweep_node_].load(std::memory_order_acquire)) {
+    const ControlBox* box = sweep_node_ < N_ && !work_.boxes.empty() ? &work_.boxes[sweep_node_] : nullptr;
+    work_.sweep.updateNode(sweep_node_, work_.models[sweep_node_], box);
+    --sweep_node_;
+  }
+}
+
+LqRegularization Run::getRegularization() const {
+  return {regularization_, regularization_ * options_.state_regularization_ratio};
 }
 
 // Runs in parallel: nothing may leave but through its own entries of the workspace.
@@ -220,6 +275,7 @@ void Run::linearizeNode(int k) {
   } catch (...) {
     failure = "the linearization threw";
   }
+  if (failure.empty()) work_.linearized[k].store(true, std::memory_order_release);
 }
 
 // Ends with an acceptable trial, unless the current iterate is where the iterations end.
@@ -236,8 +292,10 @@ Run::End Run::findStep() {
 // The sweep, at the least regularization from the current one on for which it goes through.
 Run::End Run::updateBackwardPass() {
   while (true) {
-    const LqRegularization mu{regularization_, regularization_ * options_.state_regularization_ratio};
-    const LqResult result = work_.sweep.update(work_.models, mu, work_.boxes);
+    const Clock::time_point start = Clock::now();
+    if (!swept_) work_.sweep.update(work_.models, getRegularization(), work_.boxes);
+    swept_ = false;
+    const LqResult result = work_.sweep.getResult();
     if (result.status == LqStatus::NotFinite) {
       summary_.message = "node " + std::to_string(result.node) + ": the quadratic models are not finite";
       return FddpTermination::Failed;
@@ -245,6 +303,7 @@ Run::End Run::updateBackwardPass() {
     line_.regularization = regularization_;
     if (result.status == LqStatus::Ok) {
       slope_ = work_.sweep.calcStep(work_.models, work_.dx, work_.du);
+      summary_.sweep_seconds += calcSecondsSince(start);
       curvature_ = 2 * (result.expected_change - slope_);  // Eq. (8) of the sweep
       line_.gradient = calcGradient();
       return {};
@@ -267,66 +326,47 @@ double Run::calcGradient() const {
   return gradient;
 }
 
-// Eqs. (4) and (5). The gaps of a trial are known beforehand, only its cost is not.
+// The steps that should close the gaps for good are rolled out in one piece: the last one allowed, and those after which
+// the gradient vanishes if it goes on as it came. So are those that follow a shortened step.
+int Run::chooseSegments() const {
+  const bool last = line_.iteration >= options_.max_iterations;
+  const bool converging =
+      line_.gradient * line_.gradient <= options_.gradient_tolerance * std::max(line_.gradient, last_gradient_);
+  if (last || converging || last_step_ < 1) return 1;
+  return std::max(1, std::min(options_.rollout_segments, N_ / kShortestSegment));
+}
+
 bool Run::searchLine() {
   const double penalized = std::max(0.0, slope_ + 0.5 * std::max(0.0, curvature_));
-  const double nu = gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0;
+  const double nu = gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0;  // Eq. (5)
+  const RolloutInput input{problem_, trajectory_, work_.models, work_.sweep, work_.dx, work_.bounds, isFeasible()};
+  int segments = chooseSegments();
   double alpha = 1;
   for (int i = 0; i < options_.num_step_lengths; ++i, alpha *= 0.5) {
     if (isInterrupted()) return false;
-    const std::optional<double> cost = rollOut(alpha);
-    if (!cost) continue;
-    const double foreseen = -alpha * slope_ - 0.5 * alpha * alpha * curvature_ + nu * alpha * gap_sum_;
-    const double real = line_.cost - *cost + nu * alpha * gap_sum_;
-    const double required = options_.acceptance * std::max(0.0, foreseen);  // boxes make Eq. (4) an approximation
-    if (real < required - kCostRounding * std::abs(line_.cost)) continue;
+    if (!work_.rollout.update(input, {alpha, segments, threads_})) continue;
+    if (!isAcceptable(alpha, nu)) continue;
     line_.step = alpha;
-    trial_cost_ = *cost;
     return true;
   }
   return false;
 }
 
-// The cost of a trial of length alpha, nothing if the problem fails or the numbers overflow on the way.
-std::optional<double> Run::rollOut(double alpha) {
-  try {
-    return rollOutUnguarded(alpha);
-  } catch (...) {  // a problem that throws on a wild trial has failed on it, no more
-    return {};
-  }
-}
-
-// Eqs. (2) and (3)
-std::optional<double> Run::rollOutUnguarded(double alpha) {
-  const bool contract = alpha < 1 && !isFeasible();
-  ShootingTrajectory& trial = work_.trial;
-  auto& dx = work_.deviations;
-  double total = 0, cost = 0;
-  trial.xs[0] = trajectory_.xs[0];
-  dx[0].setZero();
-  for (int k = 0; k < N_; ++k) {
-    const LqSweep::Node& gains = work_.sweep.getNodes()[k];
-    VectorXd& u = trial.us[k];
-    u = trajectory_.us[k] + alpha * gains.k;
-    u.noalias() += gains.K * dx[k];
-    if (!work_.bounds.empty()) u = u.cwiseMax(work_.bounds[k].lower).cwiseMin(work_.bounds[k].upper);
-    if (problem_.step(k, trial.xs[k], u, trial.xs[k + 1], cost) != StepStatus::Ok) return {};
-    total += cost;
-    if (!std::isfinite(total) || !trial.xs[k + 1].allFinite()) return {};
-    problem_.difference(k + 1, trajectory_.xs[k + 1], trial.xs[k + 1], dx[k + 1]);
-    if (!contract) continue;
-    dx[k + 1] += (alpha - 1) * work_.models[k].gap;
-    problem_.integrate(k + 1, trajectory_.xs[k + 1], dx[k + 1], trial.xs[k + 1]);
-  }
-  if (problem_.calcTerminalCost(trial.xs[N_], cost) != StepStatus::Ok) return {};
-  total += cost;
-  return std::isfinite(total) ? std::optional<double>(total) : std::nullopt;
+// Whether the merit of the trial has fallen enough, Eqs. (4) and (8).
+bool Run::isAcceptable(double alpha, double nu) const {
+  const Rollout& trial = work_.rollout;
+  const double foreseen = -alpha * slope_ - 0.5 * alpha * alpha * curvature_ + nu * alpha * gap_sum_;
+  const double real = line_.cost - trial.getCost() - trial.getClosingCost() + nu * (gap_sum_ - trial.getGapSum());
+  const double rounding = kCostRounding * std::abs(line_.cost);
+  const double decrease = std::max(0.0, foreseen);  // boxes make Eq. (4) an approximation
+  return real >= options_.acceptance * decrease - rounding &&
+         std::abs(trial.getClosingCost()) <= kClosingShare * decrease + rounding;
 }
 
 void Run::acceptStep() {
-  std::swap(trajectory_, work_.trial);
-  summary_.cost = trial_cost_;
-  summary_.gap = line_.step < 1 && !isFeasible() ? (1 - line_.step) * line_.gap : 0;
+  std::swap(trajectory_, work_.rollout.getTrial());
+  summary_.cost = work_.rollout.getCost();
+  summary_.gap = work_.rollout.getGapMax();
   ++summary_.iterations;
 }
 
@@ -340,12 +380,13 @@ Run::End Run::raiseRegularization(const char* reason) {
 
 // After an accepted step: logs it, adapts the regularization to its length, and looks whether to go on.
 Run::End Run::checkProgress() {
-  line_.seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+  line_.seconds = calcSecondsSince(start_);
   summary_.log.push_back(line_);
   if (observer_.callback && observer_.callback(line_) == FddpAction::Stop) return FddpTermination::Interrupted;
 
   const bool newton = line_.step == 1 && line_.regularization <= options_.min_regularization;
-  if (newton && isFeasible() && std::abs(line_.cost - summary_.cost) < options_.cost_tolerance * std::abs(line_.cost)) {
+  const bool closed = isFeasible() && summary_.gap <= options_.gap_tolerance;
+  if (newton && closed && std::abs(line_.cost - summary_.cost) < options_.cost_tolerance * std::abs(line_.cost)) {
     summary_.message = "the cost no longer decreases";
     return FddpTermination::Converged;
   }
@@ -360,7 +401,8 @@ Run::End Run::checkProgress() {
 
 FddpSummary Run::finish(FddpTermination termination) {
   summary_.termination = termination;
-  summary_.seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+  summary_.seconds = calcSecondsSince(start_);
+  summary_.rollout_seconds = work_.rollout.getSeconds();
   const bool judged = termination == FddpTermination::Converged || termination == FddpTermination::RegularizationMax;
   if (judged && line_.step == 0) {  // the iterate from which no step was taken
     line_.seconds = summary_.seconds;

@@ -23,6 +23,17 @@
 ///    iteration, nu may be chosen anew in each of them: the iterations cannot cycle.
 /// 5. If no alpha is accepted, or a Quu is indefinite, the regularization grows and the sweep is repeated.
 ///
+/// A rollout can be cut into segments that run at the same time. The segment that starts at node j starts from where
+/// the models see it,
+///     dx_j = alpha dx*_j,   x'_j = xs_j (+) dx_j,    dx* the full step of the sweep,                               (7)
+/// and opens a new gap there, g_j = difference(xs_j, f_{j-1}(x'_{j-1}, u'_{j-1})) + (alpha - 1) gap_{j-1} - dx_j, of
+/// second order in the step, which later iterations close like any other. Its part in c of the trial counts, and its
+/// part in J is that the value function foresees the trial to cost, once the gap is closed,
+///     closing = sum_j Vx_j.g_j + (Vxx_j dx_j).g_j + 1/2 g_j.Vxx_j.g_j                                              (8)
+/// more. (The penalty nu c alone would not do: gaps and decrease are both of second order, so that it would refuse full
+/// steps however close to the solution.) A trial for which (8) exceeds half of (4) is refused, whatever its merit. The
+/// last steps, which must close the gaps, are rolled out in one piece.
+///
 /// Stationarity is measured by the projected gradient, with [lower, upper] the bounds of du (infinite if ignored):
 ///     gradient = sum_k | clamp(-Qu_k, lower_k, upper_k) |^2. (6)
 #include <atomic>
@@ -64,7 +75,10 @@ struct FddpOptions {
   double acceptance = 0.1;    ///< share of Eq. (4) by which the merit must really fall, in (0, 1)
 
   ControlBounds bounds = ControlBounds::Ignore;
-  int threads = 0;  ///< of the linearization, 0: all. The result does not depend on it by a single bit.
+  /// Segments of a rollout, Eq. (7), at most: none is shorter than 20 stages. The result depends on it to the
+  /// tolerances, so choose it for the processor, but never by it.
+  int rollout_segments = 4;
+  int threads = 0;  ///< 0: all. The result does not depend on it by a single bit.
 };
 
 /// One line of the log: the iterate that iteration started from and the step it took.
@@ -94,6 +108,8 @@ struct FddpSummary {
   double gap = 0;   ///< max_k |gap_k|_inf of the returned trajectory (after a last step alpha < 1: by Eq. 3)
   int iterations = 0;
   double seconds = 0;
+  // Where the time went, s, summed over the threads: with one thread they add up to almost `seconds`.
+  double linearize_seconds = 0, sweep_seconds = 0, rollout_seconds = 0;
   std::vector<FddpIteration> log;
 };
 

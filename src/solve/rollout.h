@@ -1,0 +1,60 @@
+#pragma once
+// The nonlinear rollout of one trial step (fddp.h, Eqs. 2, 3, 7 and 8).
+#include "bielle/solve/fddp.h"
+
+namespace bielle {
+
+/// What a rollout reads: the linearized trajectory, its models, the sweep over them and the step it foresees.
+struct RolloutInput {
+  ShootingProblem& problem;
+  const ShootingTrajectory& nodes;
+  const std::vector<StageModel>& models;
+  const LqSweep& sweep;
+  const std::vector<VectorXd>& dx;        ///< N + 1, of the full step
+  const std::vector<ControlBox>& bounds;  ///< of u, N or none
+  bool feasible;                          ///< the gaps count as closed
+};
+
+/// Length of the step, segments of the horizon, and the threads they are shared by.
+struct RolloutOptions {
+  double alpha = 1;
+  int segments = 1;
+  int threads = 1;
+};
+
+/// A trial trajectory, kept between rollouts.
+class Rollout {
+ public:
+  void resize(const ShootingProblem& problem, int max_segments);
+
+  /// Returns whether a trial of finite numbers came out.
+  bool update(const RolloutInput& input, const RolloutOptions& options);
+
+  ShootingTrajectory& getTrial() { return trial_; }
+  double getCost() const { return cost_; }
+  /// c of the trial, and its largest entry.
+  double getGapSum() const { return gap_sum_; }
+  double getGapMax() const { return gap_max_; }
+  /// Eq. (8).
+  double getClosingCost() const { return closing_cost_; }
+  /// Of all rollouts since resize(), summed over the threads.
+  double getSeconds() const { return seconds_; }
+
+ private:
+  struct Segment {
+    int begin = 0, end = 0;  // its stages
+    VectorXd end_state;      // f of its last stage, if another segment follows
+    double cost = 0, seconds = 0;
+    bool ok = false;
+  };
+  bool rollOut(const RolloutInput& input, double alpha, Segment& segment);
+  bool updateGaps(const RolloutInput& input, const RolloutOptions& options);
+
+  ShootingTrajectory trial_;
+  std::vector<VectorXd> deviations_;  // N + 1: dx of Eq. (3), at a joint the one its segment starts from
+  std::vector<Segment> segments_;
+  VectorXd joint_gap_, joint_slope_;
+  double cost_ = 0, gap_sum_ = 0, gap_max_ = 0, closing_cost_ = 0, seconds_ = 0;
+};
+
+}  // namespace bielle
