@@ -1,0 +1,56 @@
+#include "fddp_checks.h"
+
+#include <stdexcept>
+
+namespace bielle {
+
+namespace {
+
+[[noreturn]] void throwSize(const std::string& what, int index, Eigen::Index size, int expected) {
+  throw std::invalid_argument("Fddp: " + what + " " + std::to_string(index) + " has size " + std::to_string(size) +
+                              ", the problem expects " + std::to_string(expected));
+}
+
+}  // namespace
+
+void checkOptions(const FddpOptions& o) {
+  const auto require = [](bool holds, const char* what) {
+    if (!holds) throw std::invalid_argument(std::string("FddpOptions: ") + what);
+  };
+  require(o.max_iterations >= 1, "max_iterations must be at least 1");
+  require(o.num_step_lengths >= 1, "num_step_lengths must be at least 1");
+  require(o.min_regularization > 0, "min_regularization must be positive, or it could never be raised");
+  require(o.initial_regularization >= o.min_regularization && o.initial_regularization <= o.max_regularization,
+          "initial_regularization must lie between min_regularization and max_regularization");
+  require(o.regularization_increase > 1 && o.regularization_decrease >= 1,
+          "regularization_increase must exceed 1, regularization_decrease must not be below");
+  require(o.state_regularization_ratio >= 0, "state_regularization_ratio must not be negative");
+  require(o.rollout_segments >= 1, "rollout_segments must be at least 1");
+  require(o.acceptance > 0 && o.acceptance < 1, "acceptance must lie between 0 and 1");
+}
+
+void checkSizes(const ShootingProblem& problem, const ShootingTrajectory& trajectory) {
+  const int N = problem.numStages();
+  if (N < 1) throw std::invalid_argument("Fddp: the problem has no stage");
+  if (static_cast<int>(trajectory.xs.size()) != N + 1 || static_cast<int>(trajectory.us.size()) != N) {
+    throw std::invalid_argument("Fddp: the guess has " + std::to_string(trajectory.xs.size()) + " states and " +
+                                std::to_string(trajectory.us.size()) + " controls, the problem needs " +
+                                std::to_string(N + 1) + " and " + std::to_string(N));
+  }
+  for (int k = 0; k <= N; ++k) {
+    if (trajectory.xs[k].size() != problem.stateSize()) {
+      throwSize("state", k, trajectory.xs[k].size(), problem.stateSize());
+    }
+    if (k < N && trajectory.us[k].size() != problem.controlSize(k)) {
+      throwSize("control", k, trajectory.us[k].size(), problem.controlSize(k));
+    }
+  }
+}
+
+bool hasSizes(const StageModel& m, int ndx, int nu, int ndx_next) {
+  return m.Fx.rows() == ndx_next && m.Fx.cols() == ndx && m.Fu.rows() == ndx_next && m.Fu.cols() == nu &&
+         m.gap.size() == ndx_next && m.lx.size() == ndx && m.lu.size() == nu && m.lxx.rows() == ndx &&
+         m.lxx.cols() == ndx && m.lux.rows() == nu && m.lux.cols() == ndx && m.luu.rows() == nu && m.luu.cols() == nu;
+}
+
+}  // namespace bielle

@@ -1,0 +1,13 @@
+#pragma once
+// What a solve demands of its input.
+#include "bielle/solve/fddp.h"
+
+namespace bielle {
+
+/// Throws std::invalid_argument on options that make no sense, naming them.
+void checkOptions(const FddpOptions& options);
+/// Throws std::invalid_argument if the sizes of the trajectory are not those of the problem.
+void checkSizes(const ShootingProblem& problem, const ShootingTrajectory& trajectory);
+bool hasSizes(const StageModel& model, int ndx, int nu, int ndx_next);
+
+}  // namespace bielle
