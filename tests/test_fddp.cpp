@@ -43,6 +43,18 @@ double calcCost(ShootingProblem& problem, const std::vector<VectorXd>& us) {
   return total + cost;
 }
 
+// Of the node states as they are, whatever the gaps between them.
+double calcCostAlong(ShootingProblem& problem, const ShootingTrajectory& t) {
+  VectorXd next = t.xs[0];
+  double total = 0, cost = 0;
+  for (size_t k = 0; k < t.us.size(); ++k) {
+    problem.step(static_cast<int>(k), t.xs[k], t.us[k], next, cost);
+    total += cost;
+  }
+  problem.calcTerminalCost(t.xs.back(), cost);
+  return total + cost;
+}
+
 // dJ/du of the rollout from the initial state, stage after stage.
 VectorXd calcShootingGradient(ShootingProblem& problem, std::vector<VectorXd> us) {
   const double h = 1e-5;
@@ -102,7 +114,7 @@ class SpoiledProblem : public ShootingProblem {
   Fault fault = Fault::Status;
   int bad_stage = -1;            ///< linearize() of this stage is spoiled
   double largest_state = 1e300;  ///< step() is spoiled where a state is larger
-  int num_spoiled = 0;
+  std::atomic<int> num_spoiled{0};
 
   int numStages() const override { return inner_.numStages(); }
   int stateSize() const override { return inner_.stateSize(); }
@@ -414,6 +426,8 @@ TEST_CASE("sweeps of the full size allocate nothing after the first, stages with
 
 TEST_CASE("an interrupted solve keeps the iterate it had, by the flag as by the callback") {
   const bool by_flag = GENERATE(true, false);
+  FddpOptions options;
+  options.rollout_segments = GENERATE(1, 4);
   auto problem = makeCartPole();
   ShootingTrajectory t = makeGuess(problem), seen;
   std::atomic<bool> interrupt{false};
@@ -428,12 +442,14 @@ TEST_CASE("an interrupted solve keeps the iterate it had, by the flag as by the 
     return FddpAction::Continue;
   };
   const double start = calcCost(problem, t.us);
-  const FddpSummary summary = Fddp().solve(problem, t, observer);
+  const FddpSummary summary = Fddp(options).solve(problem, t, observer);
   CHECK(summary.termination == FddpTermination::Interrupted);
   CHECK(summary.iterations == 5);
   CHECK(t.xs == seen.xs);
   CHECK(t.us == seen.us);
-  CHECK(calcCost(problem, t.us) == Approx(summary.cost));
+  CHECK(calcCostAlong(problem, t) == Approx(summary.cost));
+  CHECK(calcLargestGap(problem, t) == Approx(summary.gap).margin(1e-12));
+  if (options.rollout_segments == 1) CHECK(calcCost(problem, t.us) == Approx(summary.cost));
   CHECK(summary.cost < start);
 }
 

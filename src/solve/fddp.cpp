@@ -111,7 +111,7 @@ class Run {
   int threads_ = 1;
   int sweep_node_ = 0;                        // the next one of a sweep that goes along with the linearization
   bool swept_ = false;                        // that sweep is still to be looked at
-  double last_gradient_ = 0, last_step_ = 0;  // of the iteration before
+  double last_gradient_ = 0, last_step_ = 1;  // of the iteration before
   FddpSummary summary_;
 };
 
@@ -139,8 +139,10 @@ void Run::start() {
 }
 
 Run::End Run::linearize() {
-  last_gradient_ = line_.gradient;
-  last_step_ = line_.step;
+  if (summary_.iterations > 0) {
+    last_gradient_ = line_.gradient;
+    last_step_ = line_.step;
+  }
   line_ = FddpIteration();
   line_.iteration = summary_.iterations + 1;
   for (size_t k = 0; k < work_.boxes.size(); ++k) {
@@ -283,7 +285,8 @@ double Run::calcGradient() const {
 }
 
 // The steps that should close the gaps for good are rolled out in one piece: the last one allowed, and those after which
-// the gradient vanishes if it goes on as it came. So are those that follow a shortened step.
+// the gradient vanishes if it goes on as it came. So are those that follow a shortened step: had the gaps at the joints
+// shortened it, the next step is free of them.
 int Run::chooseSegments() const {
   const bool last = line_.iteration >= options_.max_iterations;
   const bool converging =

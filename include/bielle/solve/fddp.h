@@ -19,8 +19,8 @@
 ///        decrease(alpha) = -change(alpha) + nu alpha c,                                                            (4)
 ///    positive on the whole of (0, 1] for rho = 1/2 and
 ///        nu = max(0, (slope + 1/2 max(0, curvature)) / ((1 - rho) c)). (5)
-///    alpha is accepted if the merit really falls by `acceptance` times (4), c by alpha c. Since c falls in every
-///    iteration, nu may be chosen anew in each of them: the iterations cannot cycle.
+///    alpha is accepted if the merit really falls by `acceptance` times (4), c by alpha c. As long as c falls in every
+///    iteration (it does but for Eq. 7), nu may be chosen anew in each of them: the iterations cannot cycle.
 /// 5. If no alpha is accepted, or a Quu is indefinite, the regularization grows and the sweep is repeated.
 ///
 /// A rollout can be cut into segments that run at the same time. The segment that starts at node j starts from where
@@ -31,8 +31,8 @@
 /// part in J is that the value function foresees the trial to cost, once the gap is closed,
 ///     closing = sum_j Vx_j.g_j + (Vxx_j dx_j).g_j + 1/2 g_j.Vxx_j.g_j                                              (8)
 /// more. (The penalty nu c alone would not do: gaps and decrease are both of second order, so that it would refuse full
-/// steps however close to the solution.) A trial for which (8) exceeds half of (4) is refused, whatever its merit. The
-/// last steps, which must close the gaps, are rolled out in one piece.
+/// steps however close to the solution.) A trial for which (8) exceeds half of (4) is refused, whatever its merit. Steps
+/// that follow a shortened one are rolled out in one piece, and so are the last ones, which must close the gaps.
 ///
 /// Stationarity is measured by the projected gradient, with [lower, upper] the bounds of du (infinite if ignored):
 ///     gradient = sum_k | clamp(-Qu_k, lower_k, upper_k) |^2. (6)
@@ -75,8 +75,8 @@ struct FddpOptions {
   double acceptance = 0.1;    ///< share of Eq. (4) by which the merit must really fall, in (0, 1)
 
   ControlBounds bounds = ControlBounds::Ignore;
-  /// Segments of a rollout, Eq. (7), at most: none is shorter than 20 stages. The result depends on it to the
-  /// tolerances, so choose it for the processor, but never by it.
+  /// Segments of a rollout, Eq. (7), at most: none is shorter than 20 stages. Results depend on it, within the
+  /// tolerances, and therefore it is not the number of threads.
   int rollout_segments = 4;
   int threads = 0;  ///< 0: all. The result does not depend on it by a single bit.
 };
@@ -115,7 +115,8 @@ struct FddpSummary {
 
 enum class FddpAction { Continue, Stop };
 
-/// How to watch and stop a solve. Stopping leaves the current iterate, the best one so far, in the trajectory.
+/// How to watch and stop a solve. Stopping leaves the current iterate, the best one so far, in the trajectory; gaps that
+/// are open in it stand in the summary.
 struct FddpObserver {
   /// Called after each iteration; the trajectory passed to solve() is then the new iterate.
   std::function<FddpAction(const FddpIteration&)> callback;
