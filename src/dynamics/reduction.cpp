@@ -204,6 +204,7 @@ bool BlockPoint::updateBases(const LoopBlock& block) {
 }
 
 bool BlockPoint::update(const LoopBlock& block, ConstVectorRef q) {
+  closed_ = true;
   basis_.q = q;
   updatePositions(block.model, ws_, basis_.q);
   updateResidual(block);
@@ -212,6 +213,7 @@ bool BlockPoint::update(const LoopBlock& block, ConstVectorRef q) {
 }
 
 bool BlockPoint::close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d, const VectorXd& zeta_guess) {
+  closed_ = false;
   // Newton on zeta with the matrix J(q) J(q_0)^T of the independent rows, refreshed while it pays.
   step_ = d;
   if (zeta_guess.size()) {
@@ -245,9 +247,24 @@ bool BlockPoint::close(const LoopBlock& block, const BlockBasis& start, ConstVec
     zeta_ -= correction_;
     step_.noalias() += start.J.transpose() * correction_;
   }
+  closed_ = true;
   updateColumns(block.model, ws_);
   updateJacobian(block);
   return updateBases(block);
+}
+
+std::string BlockPoint::describeFailure(const LoopBlock& block) const {
+  const ConstraintSet& set = block.closures;
+  if (closed_)
+    return "closure '" + set.closures.front().name + "': the rank of its loops is no longer " +
+           std::to_string(block.rank) + ": a configuration where they can move in other ways";
+  size_t worst = 0;
+  double largest = -1;
+  for (size_t c = 0; c < set.closures.size(); ++c) {
+    const double gap = residual_.segment(set.offsets[c], getRows(set.closures[c].kind)).cwiseAbs().maxCoeff();
+    if (gap > largest) largest = gap, worst = c;
+  }
+  return "closure '" + set.closures[worst].name + "' does not close: the step is too large, or out of its reach";
 }
 
 void expandIndependent(const BlockBasis& basis, ConstVectorRef independent, VectorRef all) {

@@ -40,9 +40,13 @@ class FullNode : public NodeModel {
   bool updateStep(ConstVectorRef x, ConstVectorRef u) override {
     const int nq = model_.nq(), nv = model_.nv();
     calcMotorForces(model_, u, tau_);
-    if (updateConstrainedDynamics(model_, ws_, cws_, spec_.constraints, x.head(nq), x.tail(nv), tau_) !=
-        DynamicsStatus::Ok)
+    failure_.clear();
+    const DynamicsStatus status =
+        updateConstrainedDynamics(model_, ws_, cws_, spec_.constraints, x.head(nq), x.tail(nv), tau_);
+    if (status != DynamicsStatus::Ok) {
+      failure_ = getMessage(status);
       return false;
+    }
     lambda_ = cws_.lambda;
     x_next_.tail(nv) = x.tail(nv) + spec_.dt * cws_.a;  // robot_problem.h Eq. (1)
     displacement_ = spec_.dt * x_next_.tail(nv);

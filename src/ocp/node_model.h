@@ -2,6 +2,7 @@
 // The state space and the step of one node, behind RobotProblem: FullNode (the paper's spanning tree) or ReducedNode
 // (closed configurations only). A node owns all memory of its point, so that different nodes may work at the same time.
 #include <memory>
+#include <string>
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/reduction.h"
@@ -39,6 +40,8 @@ class NodeModel {
   const Workspace& workspace() const { return ws_; }
   const VectorXd& lambda() const { return lambda_; }
   const VectorXd& x_next() const { return x_next_; }
+  // Why the last function that failed did so; empty after one of the update functions went through.
+  const std::string& failure() const { return failure_; }
 
  protected:
   const Model& model_;
@@ -46,6 +49,7 @@ class NodeModel {
   Workspace ws_;
   VectorXd lambda_;  // rows of the constraints; the reduced node leaves those of loops at zero
   VectorXd x_next_;
+  std::string failure_;
 };
 
 std::unique_ptr<NodeModel> makeFullNode(const Model& model, const StageSpec& spec);

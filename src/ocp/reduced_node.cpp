@@ -109,6 +109,7 @@ class ReducedNode : public NodeModel {
       const LoopBlock& loop = b.loop;
       b.d.noalias() = b.chart.N * dx.segment(loop.offset, loop.size);
       if (!b.scratch.close(loop, b.chart, b.d, {})) {
+        fail(b, b.scratch);
         x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
         return;
       }
@@ -133,13 +134,14 @@ class ReducedNode : public NodeModel {
 
   bool updateState(ConstVectorRef x) override {
     const int nq = model_.nq(), nv = model_.nv();
+    failure_.clear();
     updatePositions(model_, ws_, x.head(nq));
     updateVelocities(model_, ws_, x.tail(nv));
     updateMassMatrix(model_, ws_);
     for (Block& b : blocks_) {
       gatherConfiguration(model_, b.loop, x.head(nq), b.q);
       gatherVelocity(b.loop, x.tail(nv), b.v);
-      if (!b.at.update(b.loop, b.q)) return false;
+      if (!b.at.update(b.loop, b.q)) return fail(b, b.at);
       updateVelocities(b.loop.model, b.at.workspace(), b.v);
     }
     return true;
@@ -171,7 +173,10 @@ class ReducedNode : public NodeModel {
     addColumns(ws_.M, &BlockBasisN, left_);
     projectRows(left_, M_);
     if (contact_rows_ > 0) updateContacts();
-    if (saddle_point_.factorize(M_, JcN_) != SaddlePointStatus::Ok) return false;
+    if (saddle_point_.factorize(M_, JcN_) != SaddlePointStatus::Ok) {
+      failure_ = "the mass matrix is singular";
+      return false;
+    }
     saddle_point_.solve(f_, gamma_, ydd_, lambda_c_);
     lambda_.tail(contact_rows_) = lambda_c_;
     a_ = a_d_;
@@ -254,6 +259,10 @@ class ReducedNode : public NodeModel {
         x[b.loop.dofs[k]] += b.at.basis().N.row(k).dot(y.segment(b.loop.offset, b.loop.size));
   }
 
+  bool fail(const Block& b, const BlockPoint& point) {
+    failure_ = point.describeFailure(b.loop);
+    return false;
+  }
   void updateContacts();
   bool closeStep(ConstVectorRef x);
   void updateVelocityLift(Block& b);
@@ -312,7 +321,7 @@ bool ReducedNode::closeStep(ConstVectorRef x) {
     b.d *= h;
     // To second order the closures open by h^2/2 gamma along h w: J J^T zeta = h^2/2 gamma, with the zeta of close().
     b.zeta = (0.5 * h * h) * b.independent;
-    if (!b.next.close(b.loop, b.at.basis(), b.d, b.zeta)) return false;
+    if (!b.next.close(b.loop, b.at.basis(), b.d, b.zeta)) return fail(b, b.next);
     b.w = b.next.step() / h;
     b.mu.noalias() = b.next.basis().J * b.w;
     b.next.solveGram(b.mu);
@@ -467,7 +476,10 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   b.Y.setZero();
   addSmallProduct(b.G, Nn, b.Y.leftCols(r));
   addSmallProduct(base.J, Nn, b.Y.rightCols(r));
-  if (!solveSmall(b.At, b.Y)) return false;
+  if (!solveSmall(b.At, b.Y)) {
+    failure_ = "closure '" + loop.closures.closures.front().name + "': the step turns its loops too far";
+    return false;
+  }
   // dy+ = L^T e, and T^T = N'^T J^T A^{-1} J'
   b.L = Nn;
   addSmallProductTransposed(next.J, b.Y.leftCols(r), b.L, -h);
@@ -506,7 +518,7 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), b.q);
   gatherVelocity(loop, x_next_node.tail(model_.nv()), b.d);
   if (b.q != next.q || b.d != b.v_next) {
-    if (!b.scratch.update(loop, b.q)) return false;
+    if (!b.scratch.update(loop, b.q)) return fail(b, b.scratch);
     updateVelocities(loop.model, b.next.workspace(), b.v_next);
     const ConstraintSet& set = loop.closures;
     for (size_t c = 0; c < set.closures.size(); ++c)
@@ -673,7 +685,7 @@ bool ReducedNode::updateChart(ConstVectorRef x) {
   if (chart_x_ == x) return true;
   for (Block& b : blocks_) {
     gatherConfiguration(model_, b.loop, x.head(model_.nq()), b.q);
-    if (!b.scratch.update(b.loop, b.q)) return false;
+    if (!b.scratch.update(b.loop, b.q)) return fail(b, b.scratch);
     b.chart = b.scratch.basis();
   }
   chart_x_ = x;

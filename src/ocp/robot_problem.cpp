@@ -195,6 +195,8 @@ void RobotProblem::addCosts(int index, double scale, StageModel& out) {
   node.dynamics->addResiduals(stack, index < numStages(), out);
 }
 
+std::string RobotProblem::getFailure(int node) const { return nodes_[node].dynamics->failure(); }
+
 void RobotProblem::getControlBounds(int, VectorRef lower, VectorRef upper) const {
   for (int m = 0; m < model_.nu(); ++m) {
     upper[m] = model_.motors()[m].effort_limit;

@@ -20,4 +20,6 @@ void ShootingProblem::getControlBounds(int, VectorRef lower, VectorRef upper) co
   upper.setConstant(std::numeric_limits<double>::infinity());
 }
 
+std::string ShootingProblem::getFailure(int) const { return {}; }
+
 }  // namespace bielle

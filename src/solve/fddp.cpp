@@ -223,6 +223,8 @@ void Run::linearizeNode(int k) {
     const int ndx_next = k < N_ ? problem_.tangentSize(k + 1) : 0;
     if (status != StepStatus::Ok) {
       failure = "the problem could not be linearized";
+      const std::string reason = problem_.getFailure(k);
+      if (!reason.empty()) failure += ": " + reason;
     } else if (!hasSizes(model, problem_.tangentSize(k), k < N_ ? problem_.controlSize(k) : 0, ndx_next)) {
       failure = "the quadratic model has other sizes than the problem says";
     } else if (!std::isfinite(model.cost) || !model.gap.allFinite()) {
@@ -334,6 +336,12 @@ Run::End Run::raiseRegularization(const char* reason) {
   regularization_ *= options_.regularization_increase;
   if (regularization_ <= options_.max_regularization) return {};
   summary_.message = std::string(reason) + " even at the largest regularization";
+  for (int k = 0; k <= N_; ++k) {
+    const std::string failure = problem_.getFailure(k);
+    if (failure.empty()) continue;
+    summary_.message += "; node " + std::to_string(k) + ": " + failure;
+    break;
+  }
   return FddpTermination::RegularizationMax;
 }
 

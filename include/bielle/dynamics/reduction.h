@@ -13,6 +13,7 @@
 /// so that N(q_0)^T (q (-) q_0) = N(q_0)^T d: (2) inverts the difference in reduced coordinates exactly.
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <string>
 #include <vector>
 
 #include "bielle/dynamics/closure.h"
@@ -76,6 +77,8 @@ class BlockPoint {
   const VectorXd& zeta() const { return zeta_; }  ///< rank, of the last close()
   const VectorXd& step() const { return step_; }  ///< n, d - J(q_0)^T zeta of the last close()
   double gap() const { return gap_; }             ///< largest closure residual
+  /// Why the last update() or close() returned false, naming a loop.
+  std::string describeFailure(const LoopBlock& block) const;
   Workspace& workspace() { return ws_; }
   const Workspace& workspace() const { return ws_; }
   /// (J J^T)^{-1} X in place (rank x k); J^T times it is J^+ X.
@@ -97,6 +100,7 @@ class BlockPoint {
   Eigen::LLT<MatrixXd> gram_;
   Eigen::PartialPivLU<MatrixXd> lu_;
   double gap_ = 0;
+  bool closed_ = false;  // the last close() got as far as the bases
 };
 
 /// Forces on all rows (m) of forces on the independent ones.

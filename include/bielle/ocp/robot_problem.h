@@ -66,6 +66,7 @@ class RobotProblem : public ShootingProblem {
                        StageModel& out) override;
   StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override;
   void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override;
+  std::string getFailure(int node) const override;
 
   const Model& model() const { return model_; }
   Formulation formulation() const { return formulation_; }

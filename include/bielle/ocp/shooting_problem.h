@@ -5,6 +5,7 @@
 ///
 /// A state x is a vector of numbers (quaternions, say) that stands for a point of a manifold; the tangent space at node
 /// k has its own dimension. The solver knows no robot: it asks for steps, differences and quadratic models.
+#include <string>
 #include <vector>
 
 #include "bielle/math/types.h"
@@ -58,6 +59,9 @@ class ShootingProblem {
 
   /// Bounds of the controls of a stage (nu each), infinite where there are none.
   virtual void getControlBounds(int stage, VectorRef lower, VectorRef upper) const;
+
+  /// Why the last call at a node failed, for messages; empty when it did not, or nothing is known.
+  virtual std::string getFailure(int node) const;
 };
 
 }  // namespace bielle
