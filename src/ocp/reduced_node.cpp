@@ -131,22 +131,11 @@ class ReducedNode : public NodeModel {
     differenceFree(x0, x1, dx);
   }
 
-  bool updateState(ConstVectorRef x) override {
-    const int nq = model_.nq(), nv = model_.nv();
-    updatePositions(model_, ws_, x.head(nq));
-    updateVelocities(model_, ws_, x.tail(nv));
-    updateMassMatrix(model_, ws_);
-    for (Block& b : blocks_) {
-      gatherConfiguration(model_, b.loop, x.head(nq), b.q);
-      gatherVelocity(b.loop, x.tail(nv), b.v);
-      if (!b.at.update(b.loop, b.q)) return false;
-      updateVelocities(b.loop.model, b.at.workspace(), b.v);
-    }
-    return true;
-  }
+  bool updateState(ConstVectorRef x) override { return updateState(x, nullptr); }
 
-  bool updateStep(ConstVectorRef x, ConstVectorRef u) override {
-    if (!updateState(x)) return false;
+  bool updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override {
+    const bool follows = previous && previous->x_next() == x;
+    if (!updateState(x, follows ? static_cast<const ReducedNode*>(previous) : nullptr)) return false;
     updateBias(model_, ws_);
     a_d_.setZero();
     for (Block& b : blocks_) {
@@ -188,6 +177,26 @@ class ReducedNode : public NodeModel {
   void addResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
 
  private:
+  // Kinematics at x; the blocks are those that `previous` has closed there, if given.
+  bool updateState(ConstVectorRef x, const ReducedNode* previous) {
+    const int nq = model_.nq(), nv = model_.nv();
+    updatePositions(model_, ws_, x.head(nq));
+    updateVelocities(model_, ws_, x.tail(nv));
+    updateMassMatrix(model_, ws_);
+    for (size_t i = 0; i < blocks_.size(); ++i) {
+      Block& b = blocks_[i];
+      if (previous) {
+        b.at = previous->blocks_[i].next;
+      } else {
+        gatherConfiguration(model_, b.loop, x.head(nq), b.q);
+        if (!b.at.update(b.loop, b.q)) return false;
+      }
+      gatherVelocity(b.loop, x.tail(nv), b.v);
+      updateVelocities(b.loop.model, b.at.workspace(), b.v);
+    }
+    return true;
+  }
+
   // Reduced sizes of one block are small, but no bound is known: fixed storage up to this many coordinates.
   static constexpr int kMaxBlock = 12;
   using JointVectorR = Eigen::Matrix<double, Eigen::Dynamic, 1>;

@@ -61,6 +61,7 @@ class RobotProblem : public ShootingProblem {
   void integrate(int node, ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) const override;
   void difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override;
   StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override;
+  StepStatus continueStep(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override;
   StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override;
   StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
                        StageModel& out) override;
@@ -77,7 +78,8 @@ class RobotProblem : public ShootingProblem {
 
  private:
   struct Node;
-  StepStatus evaluate(int stage, ConstVectorRef x, ConstVectorRef u);
+  StepStatus evaluate(int stage, ConstVectorRef x, ConstVectorRef u, const NodeModel* previous = nullptr);
+  StepStatus finishStep(int stage, VectorRef x_next, double& cost);
   double sumCosts(int node_index, std::vector<CostValue>* values = nullptr);
   void addCosts(int node_index, double scale, StageModel& out);
 
