@@ -8,7 +8,7 @@
 /// Reduced formulation (ours): every state is closed and its velocity keeps it so; tangent size 2 (nv - rank), about an
 /// orthonormal basis N(q) per node and loop cluster (reduction.h). With a as in (1), loops eliminated before anything
 /// of full size,
-///     w = v + h a,    q+ = q (+) h w',  w' = w - J^T zeta with q+ closed,    v+ = (I - J^+ J)(q+) w' (3)
+///     w = v + h a,    q+ = q (+) h w',  w' = w - W^{-1} J^T zeta with q+ closed,    v+ = (I - J^+ J)(q+) w' (3)
 /// Its derivatives stand in reduced_node.cpp. As h vanishes both formulations have the same optimum.
 /// Running cost of a stage: h times the sum of its costs; the terminal node has no h.
 /// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and so on.
