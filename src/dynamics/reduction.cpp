@@ -6,6 +6,7 @@
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
 #include "bielle/model/builder.h"
 
 namespace bielle {
@@ -34,6 +35,15 @@ Model makeBlockModel(const Model& model, const LoopCluster& cluster, const std::
   return builder.build();
 }
 
+// W: the inertia of each dof, with a floor that keeps (1) well conditioned. A mechanism without inertia has no preference.
+VectorXd makeMetric(const Workspace& ws, const std::vector<int>& dofs) {
+  constexpr double kFloor = 1e-3;
+  VectorXd metric(dofs.size());
+  for (size_t k = 0; k < dofs.size(); ++k) metric[k] = ws.M(dofs[k], dofs[k]);
+  const double largest = metric.maxCoeff();
+  return largest > 0 ? VectorXd((metric / largest).cwiseMax(kFloor)) : VectorXd::Ones(metric.size());
+}
+
 // Parent, path and outer coordinates of a unit carried by body `root`.
 void connectUnit(const Model& model, const Reduction& reduction, int parent, int root, ReducedUnit& unit) {
   unit.parent = parent;
@@ -56,6 +66,9 @@ void connectUnit(const Model& model, const Reduction& reduction, int parent, int
 
 Reduction makeReduction(const Model& model, ConstVectorRef q) {
   Reduction out;
+  Workspace whole(model);
+  updatePositions(model, whole, q);
+  updateMassMatrix(model, whole);
   std::vector<int> owner(model.numBodies(), -1);
   for (const LoopCluster& cluster : model.clusters()) {
     LoopBlock block;
@@ -72,6 +85,7 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
     const Mobility mobility = calcMobility(block.model, q_block, kRankTolerance);
     block.rank = mobility.rank;
     block.size = mobility.mobility;
+    block.metric = makeMetric(whole, block.dofs);
     Workspace ws(block.model);
     updatePositions(block.model, ws, q_block);
     for (const Closure& closure : block.closures.closures)
@@ -115,8 +129,8 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
 BlockPoint::BlockPoint(const LoopBlock& block) : ws_(block.model) {
   const int n = block.model.nv(), m = block.closures.rows;
   basis_.q.setZero(block.model.nq());
-  basis_.J.setZero(block.rank, n);
-  basis_.N.setZero(n, block.size);
+  for (MatrixXd* m : {&basis_.J, &basis_.JW}) m->setZero(block.rank, n);
+  for (MatrixXd* m : {&basis_.N, &basis_.WN}) m->setZero(n, block.size);
   basis_.rows.resize(block.rank);
   residual_.setZero(m);
   for (VectorXd* v : {&zeta_, &correction_}) v->setZero(block.rank);
@@ -181,24 +195,28 @@ bool BlockPoint::eliminate(int rank) {
   return true;
 }
 
-// Eq. (1): the columns [-J_d^{-1} J_i; I], made orthonormal by Gram-Schmidt, twice for good measure.
+// Eq. (1): the columns [-J_d^{-1} J_i; I], made orthonormal in W by Gram-Schmidt, twice for good measure.
 bool BlockPoint::updateBases(const LoopBlock& block) {
   const int rank = block.rank, size = block.size;
   if (!eliminate(rank)) return false;
-  MatrixXd& N = basis_.N;
+  MatrixXd &N = basis_.N, &WN = basis_.WN;
   N.setZero();
   for (int c = 0; c < size; ++c) {
     for (int r = 0; r < rank; ++r) N(col_order_[r], c) = -eliminated_(r, rank + c);
     N(col_order_[rank + c], c) = 1;
     for (int pass = 0; pass < 2; ++pass)
-      for (int k = 0; k < c; ++k) N.col(c) -= N.col(k).dot(N.col(c)) * N.col(k);
-    N.col(c).normalize();
+      for (int k = 0; k < c; ++k) N.col(c) -= WN.col(k).dot(N.col(c)) * N.col(k);
+    WN.col(c) = block.metric.cwiseProduct(N.col(c));
+    const double norm = std::sqrt(WN.col(c).dot(N.col(c)));
+    N.col(c) /= norm;
+    WN.col(c) /= norm;
   }
   std::copy(row_order_.begin(), row_order_.begin() + rank, basis_.rows.begin());
   std::sort(basis_.rows.begin(), basis_.rows.end());
   selectIndependent(J_all_, basis_.J);
+  basis_.JW = basis_.J * block.metric.cwiseInverse().asDiagonal();
   A_.setZero();
-  addSmallProduct(basis_.J, basis_.J.transpose(), A_);
+  addSmallProduct(basis_.J, basis_.JW.transpose(), A_);
   gram_.compute(A_);
   return gram_.info() == Eigen::Success;
 }
@@ -214,11 +232,11 @@ bool BlockPoint::update(const LoopBlock& block, ConstVectorRef q) {
 
 bool BlockPoint::close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d, const VectorXd& zeta_guess) {
   closed_ = false;
-  // Newton on zeta with the matrix J(q) J(q_0)^T of the independent rows, refreshed while it pays.
+  // Newton on zeta with the matrix J(q) W^{-1} J(q_0)^T of the independent rows, refreshed while it pays.
   step_ = d;
   if (zeta_guess.size()) {
     zeta_ = zeta_guess;
-    step_.noalias() -= start.J.transpose() * zeta_;
+    step_.noalias() -= start.JW.transpose() * zeta_;
   } else {
     zeta_.setZero();
   }
@@ -237,15 +255,15 @@ bool BlockPoint::close(const LoopBlock& block, const BlockBasis& start, ConstVec
       updateJacobian(block);
       for (size_t r = 0; r < start.rows.size(); ++r) basis_.J.row(r) = J_all_.row(start.rows[r]);
       A_.setZero();
-      addSmallProduct(basis_.J, start.J.transpose(), A_);
+      addSmallProduct(basis_.J, start.JW.transpose(), A_);
       lu_.compute(A_);
     }
     previous = gap_;
     for (size_t r = 0; r < start.rows.size(); ++r) correction_[r] = residual_[start.rows[r]];
-    // The residual falls by J dq (notation.h), and dq = -J(q_0)^T dzeta.
+    // The residual falls by J dq (notation.h), and dq = -W^{-1} J(q_0)^T dzeta.
     correction_ = lu_.solve(correction_);
     zeta_ -= correction_;
-    step_.noalias() += start.J.transpose() * correction_;
+    step_.noalias() += start.JW.transpose() * correction_;
   }
   closed_ = true;
   updateColumns(block.model, ws_);

@@ -22,6 +22,9 @@ void check(const Model& model, const SquatOptions& o) {
   require(o.settle >= 0 && std::isfinite(o.settle), "settle", "it is negative", "give seconds, or 0");
   require(o.time_step > 0 && o.time_step <= o.duration / 4, "time_step",
           "it is not positive, or over a quarter of the motion", "give seconds, e.g. 0.015");
+  // An Euler step turns a contact velocity e into (1 - kd h) e.
+  require(o.contact_kd >= 0 && o.contact_kd * o.time_step < 2, "contact_kd",
+          "times the time step it is not below 2: the contacts would vibrate", "lower it, or the time step");
   if (model.contacts().empty())
     throw ModelError(model.name(), "contacts", "a squat needs feet, the robot names no contact frame",
                      "add `contacts` to its YAML file");

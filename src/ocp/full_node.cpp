@@ -37,7 +37,7 @@ class FullNode : public NodeModel {
     return true;
   }
 
-  bool updateStep(ConstVectorRef x, ConstVectorRef u) override {
+  bool updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel*) override {
     const int nq = model_.nq(), nv = model_.nv();
     calcMotorForces(model_, u, tau_);
     failure_.clear();

@@ -27,8 +27,9 @@ class NodeModel {
 
   // Kinematics at x alone (terminal node).
   virtual bool updateState(ConstVectorRef x) = 0;
-  // Dynamics at (x, u) and the next state, in x_next().
-  virtual bool updateStep(ConstVectorRef x, ConstVectorRef u) = 0;
+  // Dynamics at (x, u) and the next state, in x_next(). `previous`, if any, is a node of the same kind that may have x as
+  // its next state.
+  virtual bool updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) = 0;
   // Fx, Fu and gap about the last updateStep(); the derivatives that addResiduals() needs.
   virtual bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) = 0;
   // To be called after updateState() at the terminal node in place of linearizeStep().

@@ -1,22 +1,20 @@
-// The reduced formulation: robot_problem.h Eq. (3) and its derivatives. Written for one block of loops with bases N, J,
-// J^+ (reduction.h) at q and N', J', J'^+ at q+; a free joint is the case N = N' = I without rows.
+// The reduced formulation: robot_problem.h Eq. (3) and its derivatives. Written for one block of loops with bases N, J, J^+
+// and metric W (reduction.h) at q, and N', J', J'^+ at q+; a free joint is the case N = N' = W = I without rows.
 //
 // A tangent vector (dy, dy_v) at the state means
-//     dq = N dy,   dv = N dy_v + Z dy,   Z = -J^+ d(J v)/dq N (a)
-// since J v = 0 is kept. Dynamics: with a = N y' + a_d, a_d = -J^+ gamma, and hats for projections by N^T from both
-// sides,
-//     M^ y' - (J_c N)^T lambda_c = N^T (tau - b - M a_d),    (J_c N) y' = -gamma_c - J_c a_d (b)
-// where c are the contacts. The loop forces, which N^T hides, balance what is left: J^T lambda_l = M a + b - tau -
-// J_c^T lambda_c. Derivatives at fixed lambda_l, lambda_c, with D the full derivatives of ID and C those of the closure
-// accelerations:
-//     da = N dy' + d_y dy + d_v dy_v,   d_y = -J^+ (C_q N + C_v Z),   d_v = -J^+ C_v N (c) dID_y = N^T (D_q N + D_v Z +
-//     M d_y),   dID_v = N^T (D_v N + M d_v),   likewise for the contact rows             (d)
-// Step: w = v + h a; e is the displacement before closing, A = h J' J_d J^T, H = d(J^T zeta)/dq, S = N'^T d(J'^T mu)/dq
-// N':
-//     e = (J_q - h J_d H) dq + h J_d dw (e) dq+ = e - h J_d J^T A^{-1} J' e,     dw' = dw - H dq - J^T A^{-1} J' e (f)
-//     dy+ = N'^T dq+,   dy_v+ = N'^T dw' - S dy+,   mu = J'^{+T} w' (g)
-// S is there because the projection of w' turns with q+. With a gap, the result is read about the node state's own
-// basis.
+//     dq = N dy,   dv = N dy_v + Z dy,   Z = -J^+ d(J v)/dq N                                                         (a)
+// since J v = 0 is kept. Dynamics: with a = N y' + a_d, a_d = -J^+ gamma, and hats for projections by N^T from both sides,
+//     M^ y' - (J_c N)^T lambda_c = N^T (tau - b - M a_d),    (J_c N) y' = -gamma_c - J_c a_d                          (b)
+// where c are the contacts. The loop forces, which N^T hides, balance what is left: J^T lambda_l = M a + b - tau - J_c^T lambda_c.
+// Derivatives at fixed lambda_l, lambda_c, with C the derivatives of the closure accelerations:
+//     da = N dy' + d_y dy + d_v dy_v,   d_y = -J^+ (C_q N + C_v Z),   d_v = -J^+ C_v N                                (c)
+// and those of inverse dynamics in these coordinates (reduced_derivatives.h); likewise for the contact rows.          (d)
+// Step: w = v + h a; e is the displacement before closing, A = h J' J_d W^{-1} J^T, H = d(J^T zeta)/dq,
+// S = N'^T d(J'^T mu)/dq N':
+//     e = (J_q - h J_d W^{-1} H) dq + h J_d dw                                                                        (e)
+//     dq+ = e - h J_d W^{-1} J^T A^{-1} J' e,     dw' = dw - W^{-1} H dq - W^{-1} J^T A^{-1} J' e                     (f)
+//     dy+ = (W N')^T dq+,   dy_v+ = (W N')^T dw' - S dy+,   mu = J'^{+T} W w'                                         (g)
+// S is there because the projection of w' turns with q+. With a gap, the result is read about the node state's own basis.
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/reduced_derivatives.h"
 #include "bielle/dynamics/rnea.h"
@@ -37,7 +35,7 @@ struct Block {
     for (MatrixXd* x : {&Cq, &Cv, &K}) x->setZero(m, n);
     for (MatrixXd* x : {&Cq_r, &Cv_r, &K_r}) x->setZero(l.rank, n);
     for (MatrixXd* x : {&Jd, &H}) x->setZero(n, n);
-    for (MatrixXd* x : {&HN, &HnNn, &EN, &L, &T, &LJ, &beta, &wy, &wv}) x->setZero(n, r);
+    for (MatrixXd* x : {&HN, &WHN, &HnNn, &EN, &L, &T, &LJ, &beta, &wy, &wv}) x->setZero(n, r);
     X.setZero(l.rank, r);
     Y.setZero(l.rank, 2 * r);
     G.setZero(l.rank, n);
@@ -49,19 +47,19 @@ struct Block {
   BlockBasis chart;              // at the last linearized state
   VectorXd q, v, a, d, w, v_next;
   VectorXd gamma, mu, independent, zeta, rows;
-  MatrixXd Z, dy, dv;                             // n x r, Eqs. (a), (c)
-  MatrixXd Cq, Cv, K, Cq_r, Cv_r, K_r;            // closure derivatives, all rows and the independent ones
-  MatrixXd Jd, H;                                 // n x n, Eqs. (e), (f); of J_d the blocks of curved joints
-  MatrixXd HN, HnNn, EN, L, T, LJ, beta, wy, wv;  // n x r
-  MatrixXd X, Y, G, At;                           // rank x r, 2 r, n, rank
-  MatrixXd q_y, q_v, q_a, v_y, v_v, v_a, S;       // r x r: dq+ and dv+ by dy, dy_v, dy'; S of Eq. (g)
+  MatrixXd Z, dy, dv;                                  // n x r, Eqs. (a), (c)
+  MatrixXd Cq, Cv, K, Cq_r, Cv_r, K_r;                 // closure derivatives, all rows and the independent ones
+  MatrixXd Jd, H;                                      // n x n, Eqs. (e), (f); of J_d the blocks of curved joints
+  MatrixXd HN, WHN, HnNn, EN, L, T, LJ, beta, wy, wv;  // n x r
+  MatrixXd X, Y, G, At;                                // rank x r, 2 r, n, rank
+  MatrixXd q_y, q_v, q_a, v_y, v_v, v_a, S;            // r x r: dq+ and dv+ by dy, dy_v, dy'; S of Eq. (g)
 };
 
 // out = -J^+ X; X is overwritten.
 void applyPlus(const BlockPoint& point, MatrixXd& X, MatrixXd& out) {
   point.solveGram(X);
   out.setZero();
-  addSmallProductTransposed(point.basis().J, X, out, -1);
+  addSmallProductTransposed(point.basis().JW, X, out, -1);
 }
 
 class ReducedNode : public NodeModel {
@@ -115,8 +113,8 @@ class ReducedNode : public NodeModel {
       }
       // The velocity at the new point whose coordinates about the old one are N^T v + dy_v.
       gatherVelocity(loop, x.tail(model_.nv()), b.v);
-      const JointVectorR target = b.chart.N.transpose() * b.v + dx.segment(nr + loop.offset, loop.size);
-      const JointMatrixR mixed = b.chart.N.transpose() * b.scratch.basis().N;
+      const JointVectorR target = b.chart.WN.transpose() * b.v + dx.segment(nr + loop.offset, loop.size);
+      const JointMatrixR mixed = b.chart.WN.transpose() * b.scratch.basis().N;
       b.v.noalias() = b.scratch.basis().N * mixed.partialPivLu().solve(target);
       scatterConfiguration(model_, loop, b.scratch.basis().q, x_out.head(nq));
       scatterVelocity(loop, b.v, x_out.tail(model_.nv()));
@@ -132,23 +130,11 @@ class ReducedNode : public NodeModel {
     differenceFree(x0, x1, dx);
   }
 
-  bool updateState(ConstVectorRef x) override {
-    const int nq = model_.nq(), nv = model_.nv();
-    failure_.clear();
-    updatePositions(model_, ws_, x.head(nq));
-    updateVelocities(model_, ws_, x.tail(nv));
-    updateMassMatrix(model_, ws_);
-    for (Block& b : blocks_) {
-      gatherConfiguration(model_, b.loop, x.head(nq), b.q);
-      gatherVelocity(b.loop, x.tail(nv), b.v);
-      if (!b.at.update(b.loop, b.q)) return fail(b, b.at);
-      updateVelocities(b.loop.model, b.at.workspace(), b.v);
-    }
-    return true;
-  }
+  bool updateState(ConstVectorRef x) override { return updateState(x, nullptr); }
 
-  bool updateStep(ConstVectorRef x, ConstVectorRef u) override {
-    if (!updateState(x)) return false;
+  bool updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override {
+    const bool follows = previous && previous->x_next() == x;
+    if (!updateState(x, follows ? static_cast<const ReducedNode*>(previous) : nullptr)) return false;
     updateBias(model_, ws_);
     a_d_.setZero();
     for (Block& b : blocks_) {
@@ -161,7 +147,7 @@ class ReducedNode : public NodeModel {
       for (int i = 0; i < b.loop.rank; ++i) b.gamma[i] = b.rows[b.at.basis().rows[i]];
       b.independent = b.gamma;
       b.at.solveGram(b.independent);
-      b.a.noalias() = -b.at.basis().J.transpose() * b.independent;
+      b.a.noalias() = -b.at.basis().JW.transpose() * b.independent;
       scatterVelocity(b.loop, b.a, a_d_);
     }
     // Eq. (b)
@@ -193,6 +179,27 @@ class ReducedNode : public NodeModel {
   void addResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
 
  private:
+  // Kinematics at x; the blocks are those that `previous` has closed there, if given.
+  bool updateState(ConstVectorRef x, const ReducedNode* previous) {
+    const int nq = model_.nq(), nv = model_.nv();
+    failure_.clear();
+    updatePositions(model_, ws_, x.head(nq));
+    updateVelocities(model_, ws_, x.tail(nv));
+    updateMassMatrix(model_, ws_);
+    for (size_t i = 0; i < blocks_.size(); ++i) {
+      Block& b = blocks_[i];
+      if (previous) {
+        b.at = previous->blocks_[i].next;
+      } else {
+        gatherConfiguration(model_, b.loop, x.head(nq), b.q);
+        if (!b.at.update(b.loop, b.q)) return fail(b, b.at);
+      }
+      gatherVelocity(b.loop, x.tail(nv), b.v);
+      updateVelocities(b.loop.model, b.at.workspace(), b.v);
+    }
+    return true;
+  }
+
   // Reduced sizes of one block are small, but no bound is known: fixed storage up to this many coordinates.
   static constexpr int kMaxBlock = 12;
   using JointVectorR = Eigen::Matrix<double, Eigen::Dynamic, 1>;
@@ -326,7 +333,7 @@ bool ReducedNode::closeStep(ConstVectorRef x) {
     b.mu.noalias() = b.next.basis().J * b.w;
     b.next.solveGram(b.mu);
     b.v_next = b.w;
-    b.v_next.noalias() -= b.next.basis().J.transpose() * b.mu;
+    b.v_next.noalias() -= b.next.basis().JW.transpose() * b.mu;
     scatterConfiguration(model_, b.loop, b.next.basis().q, x_next_.head(nq));
     scatterVelocity(b.loop, b.v_next, x_next_.tail(nv));
   }
@@ -374,7 +381,7 @@ void ReducedNode::updateForces() {
   const ConstraintSet& set = spec_.constraints;
   for (Block& b : blocks_) {
     gatherVelocity(b.loop, force_, b.d);
-    b.independent.noalias() = b.at.basis().J * b.d;
+    b.independent.noalias() = b.at.basis().JW * b.d;
     b.at.solveGram(b.independent);
     updateForceDerivative(b, b.at, b.independent);
   }
@@ -447,19 +454,20 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   const int nr = reduction_.size, nu = model_.nu(), r = loop.size, o = loop.offset;
   const double h = spec_.dt;
   const BlockBasis &base = b.at.basis(), &next = b.next.basis();
-  const MatrixXd &N = base.N, &Nn = next.N;
+  const MatrixXd &N = base.N, &Nn = next.N, &WNn = next.WN;
 
   b.zeta = b.next.zeta() / h;  // close() moves by h w', so its zeta is h times that of Eq. (3)
   updateForceDerivative(b, b.at, b.zeta);
   b.HN.setZero();
   addSmallProduct(b.H, N, b.HN);
+  b.WHN = b.loop.metric.cwiseInverse().asDiagonal() * b.HN;
   updateForceDerivative(b, b.next, b.mu);
   b.HnNn.setZero();
   addSmallProduct(b.H, Nn, b.HnNn);
 
   // J_q and J_d are the identity but for the blocks of curved joints. EN: e = EN dy + h J_d dw.
-  b.EN = N - h * b.HN;
-  b.G = base.J;  // J J_d^T
+  b.EN = N - h * b.WHN;
+  b.G = base.JW;  // J W^{-1} J_d^T
   for (const Joint& joint : loop.model.joints()) {
     if (!isCurved(joint)) continue;
     const int i = joint.idx_v, n = joint.nv;
@@ -467,33 +475,33 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
     JointMatrix Jq(n, n), Jd(n, n);
     calcJointIntegrateJacobians(joint, d, Jq, Jd);
     b.Jd.block(i, i, n, n) = Jd;
-    b.EN.middleRows(i, n) = Jq.lazyProduct(N.middleRows(i, n)) - h * Jd.lazyProduct(b.HN.middleRows(i, n));
-    b.G.middleCols(i, n) = base.J.middleCols(i, n).lazyProduct(Jd.transpose());
+    b.EN.middleRows(i, n) = Jq.lazyProduct(N.middleRows(i, n)) - h * Jd.lazyProduct(b.WHN.middleRows(i, n));
+    b.G.middleCols(i, n) = base.JW.middleCols(i, n).lazyProduct(Jd.transpose());
   }
-  // Y = A^{-T} [J J_d^T N', J N'], with A^T = h J J_d^T J'^T
+  // Y = A^{-T} [J W^{-1} J_d^T W N', J W^{-1} W N'], with A^T = h J W^{-1} J_d^T J'^T
   b.At.setZero();
   addSmallProduct(b.G, next.J.transpose(), b.At, h);
   b.Y.setZero();
-  addSmallProduct(b.G, Nn, b.Y.leftCols(r));
-  addSmallProduct(base.J, Nn, b.Y.rightCols(r));
+  addSmallProduct(b.G, WNn, b.Y.leftCols(r));
+  addSmallProduct(base.JW, WNn, b.Y.rightCols(r));
   if (!solveSmall(b.At, b.Y)) {
     failure_ = "closure '" + loop.closures.closures.front().name + "': the step turns its loops too far";
     return false;
   }
   // dy+ = L^T e, and T^T = N'^T J^T A^{-1} J'
-  b.L = Nn;
+  b.L = WNn;
   addSmallProductTransposed(next.J, b.Y.leftCols(r), b.L, -h);
   b.T.setZero();
   addSmallProductTransposed(next.J, b.Y.rightCols(r), b.T);
   // h J_d^T L and beta = N' - h J_d^T T
   b.LJ = h * b.L;
-  b.beta = Nn - h * b.T;
+  b.beta = WNn - h * b.T;
   for (const Joint& joint : loop.model.joints()) {
     if (!isCurved(joint)) continue;
     const int i = joint.idx_v, n = joint.nv;
     const auto Jd = b.Jd.block(i, i, n, n);
     b.LJ.middleRows(i, n) = h * Jd.transpose().lazyProduct(b.L.middleRows(i, n));
-    b.beta.middleRows(i, n) = Nn.middleRows(i, n) - h * Jd.transpose().lazyProduct(b.T.middleRows(i, n));
+    b.beta.middleRows(i, n) = WNn.middleRows(i, n) - h * Jd.transpose().lazyProduct(b.T.middleRows(i, n));
   }
   // dw = (N + h d_v) dy_v + (Z + h d_y) dy + h N dy'
   b.wy = b.Z + h * b.dy;
@@ -528,7 +536,7 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
     MatrixXd Zn(loop.model.nv(), r);
     b.X.noalias() = b.K_r * Nn;
     applyPlus(b.next, b.X, Zn);
-    const MatrixXd& Nnode = b.scratch.basis().N;
+    const MatrixXd& WNnode = b.scratch.basis().WN;
     VectorXd gap(loop.model.nv());
     loop.model.difference(b.q, next.q, gap);
     MatrixXd Jdiff = MatrixXd::Identity(gap.size(), gap.size());
@@ -537,9 +545,9 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
       const JointVector d = gap.segment(joint.idx_v, joint.nv);
       calcJointDifferenceJacobian(joint, d, Jdiff.block(joint.idx_v, joint.idx_v, joint.nv, joint.nv));
     }
-    out.gap.segment(o, r) = Nnode.transpose() * gap;
-    out.gap.segment(nr + o, r) = Nnode.transpose() * (b.v_next - b.d);
-    const MatrixXd Pq = Nnode.transpose() * Jdiff * Nn, Pv = Nnode.transpose() * Nn, Pz = Nnode.transpose() * Zn;
+    out.gap.segment(o, r) = WNnode.transpose() * gap;
+    out.gap.segment(nr + o, r) = WNnode.transpose() * (b.v_next - b.d);
+    const MatrixXd Pq = WNnode.transpose() * Jdiff * Nn, Pv = WNnode.transpose() * Nn, Pz = WNnode.transpose() * Zn;
     v_y = (Pv * v_y + Pz * q_y).eval();
     v_v = (Pv * v_v + Pz * q_v).eval();
     v_a = (Pv * v_a + Pz * q_a).eval();
@@ -664,9 +672,9 @@ void ReducedNode::differenceAbout(Block& b, const BlockBasis& basis, ConstVector
   const int nq = model_.nq(), nv = model_.nv(), nr = reduction_.size;
   gatherConfiguration(model_, b.loop, x1.head(nq), b.q);
   b.loop.model.difference(basis.q, b.q, b.d);
-  dx.segment(b.loop.offset, b.loop.size).noalias() = basis.N.transpose() * b.d;
+  dx.segment(b.loop.offset, b.loop.size).noalias() = basis.WN.transpose() * b.d;
   for (size_t k = 0; k < b.loop.dofs.size(); ++k) b.d[k] = x1[nq + b.loop.dofs[k]] - x0[nq + b.loop.dofs[k]];
-  dx.segment(nr + b.loop.offset, b.loop.size).noalias() = basis.N.transpose() * b.d;
+  dx.segment(nr + b.loop.offset, b.loop.size).noalias() = basis.WN.transpose() * b.d;
   (void)nv;
 }
 

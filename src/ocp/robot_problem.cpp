@@ -78,21 +78,30 @@ void RobotProblem::difference(int node, ConstVectorRef x0, ConstVectorRef x1, Ve
   nodes_[node].dynamics->difference(x0, x1, dx);
 }
 
-// Dynamics and next state at (x, u), unless they are already there.
-StepStatus RobotProblem::evaluate(int stage, ConstVectorRef x, ConstVectorRef u) {
+// Dynamics and next state at (x, u), unless they are already there. `previous` is the node whose next state x is, if any.
+StepStatus RobotProblem::evaluate(int stage, ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) {
   Node& node = nodes_[stage];
   if (node.valid && node.x == x && node.u == u) return StepStatus::Ok;
   node.valid = false;
   node.x = x;
   node.u = u;
   if (!x.allFinite() || !u.allFinite()) return StepStatus::Failed;
-  if (!node.dynamics->updateStep(x, u) || !node.dynamics->x_next().allFinite()) return StepStatus::Failed;
+  if (!node.dynamics->updateStep(x, u, previous) || !node.dynamics->x_next().allFinite()) return StepStatus::Failed;
   node.valid = true;
   return StepStatus::Ok;
 }
 
 StepStatus RobotProblem::step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) {
   if (evaluate(stage, x, u) != StepStatus::Ok) return StepStatus::Failed;
+  return finishStep(stage, x_next, cost);
+}
+
+StepStatus RobotProblem::continueStep(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) {
+  if (evaluate(stage, x, u, nodes_[stage - 1].dynamics.get()) != StepStatus::Ok) return StepStatus::Failed;
+  return finishStep(stage, x_next, cost);
+}
+
+StepStatus RobotProblem::finishStep(int stage, VectorRef x_next, double& cost) {
   x_next = nodes_[stage].dynamics->x_next();
   cost = specs_[stage].dt * sumCosts(stage);
   return std::isfinite(cost) ? StepStatus::Ok : StepStatus::Failed;

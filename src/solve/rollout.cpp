@@ -72,7 +72,10 @@ bool Rollout::rollOut(const RolloutInput& input, double alpha, Segment& segment)
     if (!input.bounds.empty()) u = u.cwiseMax(input.bounds[k].lower).cwiseMin(input.bounds[k].upper);
     const bool at_joint = k + 1 == segment.end && k + 1 < N;
     VectorXd& next = at_joint ? segment.end_state : trial_.xs[k + 1];
-    if (problem.step(k, trial_.xs[k], u, next, cost) != StepStatus::Ok) return false;
+    const bool continues = k > segment.begin && !contract;
+    const StepStatus status = continues ? problem.continueStep(k, trial_.xs[k], u, next, cost)
+                                        : problem.step(k, trial_.xs[k], u, next, cost);
+    if (status != StepStatus::Ok) return false;
     segment.cost += cost;
     if (!std::isfinite(segment.cost) || !next.allFinite()) return false;
     if (at_joint) return true;

@@ -3,14 +3,19 @@
 ///
 /// A cluster of loops touches few dofs (Bipetto's knee: 7, with 6 closure rows). Seen from the body that carries it, it
 /// is a small mechanism of its own, here a `LoopBlock` with its own massless Model whose world is that body. At a
-/// closed configuration, let J (rank x n) be the independent rows of its closure Jacobian, chosen by complete pivoting, and
-///     J N = 0,   N^T N = I,   J^+ = J^T (J J^T)^{-1}                                                                  (1)
-/// N (n x (n - rank)) is an orthonormal basis of the tangent space. Its choice is free at every point: no chart is left,
-/// and a dead point of a linkage, where motor or joint coordinates break down, is nothing special. Only a change of rank is.
+/// closed configuration, let J (rank x n) be the independent rows of its closure Jacobian, chosen by complete pivoting, W
+/// the metric of the block (diagonal, constant), and
+///     J N = 0,   N^T W N = I,   J^+ = W^{-1} J^T (J W^{-1} J^T)^{-1}                                                  (1)
+/// N (n x (n - rank)) is an orthonormal basis of the tangent space and (W N)^T reads its coordinates. Its choice is free at
+/// every point: no chart is left, and a dead point of a linkage, where motor or joint coordinates break down, is nothing
+/// special. Only a change of rank is.
 ///
 /// Moving on the manifold from a point q_0: for a displacement d (n), close along the rows of the start,
-///     q = q_0 (+) (d - J(q_0)^T zeta)    with zeta such that q is closed                                              (2)
-/// so that N(q_0)^T (q (-) q_0) = N(q_0)^T d: (2) inverts the difference in reduced coordinates exactly.
+///     q = q_0 (+) (d - W^{-1} J(q_0)^T zeta)    with zeta such that q is closed                                       (2)
+/// so that (W N)(q_0)^T (q (-) q_0) = (W N)(q_0)^T d: (2) inverts the difference in reduced coordinates exactly.
+///
+/// W is the inertia that each dof moves at the configuration of the reduction: corrections go where they cost least, to
+/// light rods rather than to legs, as constraint impulses do. It also settles what a metre is worth against a radian.
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <string>
@@ -28,6 +33,7 @@ struct LoopBlock {
   std::vector<int> cluster_closures;  ///< their indices in the whole model
   std::vector<int> joints;            ///< joint indices in the whole model, in the order of `model`
   std::vector<int> dofs;              ///< velocity coordinates in the whole model (n)
+  VectorXd metric;                    ///< n, diagonal of W
   int rank = 0;                       ///< of the closure Jacobian
   int offset = 0, size = 0;           ///< reduced coordinates [offset, offset + size), size = n - rank
 };
@@ -58,7 +64,9 @@ Reduction makeReduction(const Model& model, ConstVectorRef q);
 struct BlockBasis {
   VectorXd q;             ///< nq of the block
   MatrixXd N;             ///< n x size
+  MatrixXd WN;            ///< n x size
   MatrixXd J;             ///< rank x n, independent rows
+  MatrixXd JW;            ///< rank x n, J W^{-1}
   std::vector<int> rows;  ///< which closure rows J holds
 };
 
@@ -75,13 +83,13 @@ class BlockPoint {
 
   const BlockBasis& basis() const { return basis_; }
   const VectorXd& zeta() const { return zeta_; }  ///< rank, of the last close()
-  const VectorXd& step() const { return step_; }  ///< n, d - J(q_0)^T zeta of the last close()
+  const VectorXd& step() const { return step_; }  ///< n, d - W^{-1} J(q_0)^T zeta of the last close()
   double gap() const { return gap_; }             ///< largest closure residual
   /// Why the last update() or close() returned false, naming a loop.
   std::string describeFailure(const LoopBlock& block) const;
   Workspace& workspace() { return ws_; }
   const Workspace& workspace() const { return ws_; }
-  /// (J J^T)^{-1} X in place (rank x k); J^T times it is J^+ X.
+  /// (J W^{-1} J^T)^{-1} X in place (rank x k); JW^T times it is J^+ X.
   void solveGram(MatrixRef X) const { solveSmallCholesky(gram_.matrixLLT(), X); }
   /// Independent rows out of all rows (m x k -> rank x k).
   void selectIndependent(const MatrixXd& all, MatrixXd& out) const;

@@ -8,7 +8,7 @@
 /// Reduced formulation (ours): every state is closed and its velocity keeps it so; tangent size 2 (nv - rank), about an
 /// orthonormal basis N(q) per node and loop cluster (reduction.h). With a as in (1), loops eliminated before anything
 /// of full size,
-///     w = v + h a,    q+ = q (+) h w',  w' = w - J^T zeta with q+ closed,    v+ = (I - J^+ J)(q+) w' (3)
+///     w = v + h a,    q+ = q (+) h w',  w' = w - W^{-1} J^T zeta with q+ closed,    v+ = (I - J^+ J)(q+) w' (3)
 /// Its derivatives stand in reduced_node.cpp. As h vanishes both formulations have the same optimum.
 /// Running cost of a stage: h times the sum of its costs; the terminal node has no h.
 /// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and so on.
@@ -61,6 +61,7 @@ class RobotProblem : public ShootingProblem {
   void integrate(int node, ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) const override;
   void difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override;
   StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override;
+  StepStatus continueStep(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override;
   StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override;
   StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
                        StageModel& out) override;
@@ -78,7 +79,8 @@ class RobotProblem : public ShootingProblem {
 
  private:
   struct Node;
-  StepStatus evaluate(int stage, ConstVectorRef x, ConstVectorRef u);
+  StepStatus evaluate(int stage, ConstVectorRef x, ConstVectorRef u, const NodeModel* previous = nullptr);
+  StepStatus finishStep(int stage, VectorRef x_next, double& cost);
   double sumCosts(int node_index, std::vector<CostValue>* values = nullptr);
   void addCosts(int node_index, double scale, StageModel& out);
 

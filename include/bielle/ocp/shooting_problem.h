@@ -50,6 +50,11 @@ class ShootingProblem {
   /// x_next = f_k(x, u) and the running cost l_k(x, u).
   /// Calls for different stages may run at the same time; those of one stage may not.
   virtual StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) = 0;
+  /// step() for an x that step() or continueStep() of the stage before returned just now, to the same thread: a problem may
+  /// take over what it computed there.
+  virtual StepStatus continueStep(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) {
+    return step(stage, x, u, x_next, cost);
+  }
   virtual StepStatus calcTerminalCost(ConstVectorRef x, double& cost) = 0;
 
   /// Quadratic model of stage k about (x, u) with the gap to the node state x_next_node. Same threading rule as step().
