@@ -17,6 +17,7 @@ void addSolve(CLI::App& app, Action& action);
 void addInfo(CLI::App& app, Action& action);
 void addEval(CLI::App& app, Action& action);
 void addRobots(CLI::App& app, Action& action);
+void addBench(CLI::App& app, Action& action);
 
 // Only the line of the help: its arguments are those of another program.
 void addValidate(CLI::App& app);

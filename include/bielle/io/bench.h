@@ -1,0 +1,92 @@
+#pragma once
+/// \file How fast it is, here: the benchmark walk (benchmark_walk.h) taken apart, whole solves, a receding horizon, and how
+/// times grow with the size of a chain and with the length of the horizon.
+///
+/// All times are wall clock, s. They are read in a unit that survives machines: one product of two 108 x 108 matrices of
+/// doubles by Eigen, on one thread, measured before and after everything else; the least is taken. Others who use the
+/// processor lengthen all of them: where a work is repeated, its least time is taken, unless the text says otherwise.
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bielle/motion/motion.h"
+
+namespace bielle {
+
+enum class BenchExtent {
+  Whole,  ///< about a minute
+  Quick   ///< few repetitions and small sizes: to see that it works
+};
+
+struct BenchOptions {
+  int threads = 2;  ///< compared with one thread
+  BenchExtent extent = BenchExtent::Whole;
+  std::function<void(const std::string&)> progress;  ///< called with what comes next, if set
+};
+
+/// The benchmark walk on one thread, s per node, along the third iterate from the standing guess. Each work contains
+/// those above it, but for sweep and rollout. (In an iteration the linearization finds the dynamics already done by the
+/// rollout.)
+struct NodeTimes {
+  Formulation formulation = Formulation::Full;
+  int tangent_size = 0;    ///< of a state
+  double dynamics = 0;     ///< one step: accelerations, forces, next state
+  double derivatives = 0;  ///< and its linearization
+  double linearize = 0;    ///< and costs with their gradients and Hessians
+  double sweep = 0;        ///< backward pass
+  double rollout = 0;      ///< one rollout, with cost values
+};
+
+/// Ten FDDP iterations from the standing guess of the walk.
+struct IterationTimes {
+  Formulation formulation = Formulation::Full;
+  int threads = 1;
+  double seconds = 0;                            ///< one iteration per node
+  double rollouts = 0;                           ///< tried per iteration
+  double linearize = 0, sweep = 0, rollout = 0;  ///< shares of the work of all threads, 1; the rest is the solver's own
+};
+
+/// From the command to the converged motion: problem made, guess made, solved. One run.
+struct SolveTime {
+  std::string motion;
+  Formulation formulation = Formulation::Full;
+  int threads = 1, iterations = 0;
+  double seconds = 0;
+  bool converged = false;
+};
+
+/// The walk on a horizon of 100 nodes that moves on by one stage before each single FDDP iteration: the plan shifted, its
+/// new last stage holding still. The first plan is made without haste. The next state is the step's, disturbed by noise of
+/// 1e-4 rad and m, 1e-3 rad/s and m/s, on closed loops and with a velocity that keeps loops and stance feet.
+struct RecedingHorizon {
+  Formulation formulation = Formulation::Full;
+  int threads = 1, shifts = 0;
+  double seconds = 0;       ///< of one shift and iteration, median
+  double worst = 0;         ///< the longest of them, s
+  double least_height = 0;  ///< of the first body over its initial height, 1
+  double largest_tilt = 0;  ///< of the first body from where it was upright, rad
+  bool up = false;          ///< all solves went through, height over 0.8, tilt below 0.5 rad
+};
+
+/// How a time grows: s per node.
+struct SizeTime {
+  Formulation formulation = Formulation::Full;
+  int size = 0;  ///< four-bars in the chain, or nodes of the horizon
+  double seconds = 0;
+};
+
+struct BenchReport {
+  std::string robot, processor, compiler, flags;
+  double unit = 0;  ///< s
+  std::vector<NodeTimes> nodes;
+  std::vector<IterationTimes> iterations;
+  std::vector<SolveTime> solves;
+  std::vector<RecedingHorizon> receding;
+  std::vector<SizeTime> chains;    ///< dynamics with derivatives of fourbar_chain.h, all with motors, no costs
+  std::vector<SizeTime> horizons;  ///< linearization, sweep and one rollout of a walk of this many nodes
+};
+
+/// \throws ModelError when the robot has no feet to walk on
+BenchReport runBench(const Model& model, const BenchOptions& options = {});
+
+}  // namespace bielle

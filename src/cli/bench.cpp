@@ -1,0 +1,168 @@
+// bielle bench: how fast it is on this machine.
+#include "bielle/io/bench.h"
+
+#include <cmath>
+#include <iostream>
+
+#include "cli/commands.h"
+#include "cli/table.h"
+
+namespace bielle::cli {
+namespace {
+
+double round3(double value) {  // three significant digits: more are not in a measurement
+  if (value == 0 || !std::isfinite(value)) return value;
+  const double scale = std::pow(10, 2 - std::floor(std::log10(std::abs(value))));
+  return std::round(value * scale) / scale;
+}
+
+// A time per node, under two names: microseconds and units.
+void addTime(Json& json, const std::string& name, double seconds, double unit) {
+  json[name + " [us]"] = round3(1e6 * seconds);
+  json[name + " [units]"] = round3(seconds / unit);
+}
+
+Json describeNodes(const BenchReport& report) {
+  Json list = Json::array();
+  for (const NodeTimes& t : report.nodes) {
+    const auto add = [&](const char* work, double seconds) {
+      Json json = {{"formulation", getName(t.formulation)}, {"tangent size", t.tangent_size}, {"work", work}};
+      addTime(json, "time", seconds, report.unit);
+      list.push_back(json);
+    };
+    add("dynamics (step)", t.dynamics);
+    add("dynamics with derivatives", t.derivatives);
+    add("linearize (with costs)", t.linearize);
+    add("sweep", t.sweep);
+    add("rollout", t.rollout);
+  }
+  return list;
+}
+
+Json describeIterations(const BenchReport& report) {
+  Json list = Json::array();
+  double single = 0;
+  for (const IterationTimes& t : report.iterations) {
+    if (t.threads == 1) single = t.seconds;
+    Json json = {{"formulation", getName(t.formulation)}, {"threads", t.threads}};
+    addTime(json, "time", t.seconds, report.unit);
+    json["ratio to 1 thread"] = round3(single / t.seconds);
+    json["rollouts"] = round3(t.rollouts);
+    json["linearize [%]"] = round3(100 * t.linearize);
+    json["sweep [%]"] = round3(100 * t.sweep);
+    json["rollout [%]"] = round3(100 * t.rollout);
+    list.push_back(json);
+  }
+  return list;
+}
+
+Json describeSolves(const BenchReport& report) {
+  Json list = Json::array();
+  for (const SolveTime& t : report.solves)
+    list.push_back({{"motion", t.motion},
+                    {"formulation", getName(t.formulation)},
+                    {"threads", t.threads},
+                    {"time [s]", round3(t.seconds)},
+                    {"iterations", t.iterations},
+                    {"converged", t.converged}});
+  return list;
+}
+
+Json describeReceding(const BenchReport& report) {
+  Json list = Json::array();
+  for (const RecedingHorizon& t : report.receding)
+    list.push_back({{"formulation", getName(t.formulation)},
+                    {"threads", t.threads},
+                    {"shifts", t.shifts},
+                    {"median [ms]", round3(1e3 * t.seconds)},
+                    {"worst [ms]", round3(1e3 * t.worst)},
+                    {"rate [Hz]", round3(1 / t.seconds)},
+                    {"least height", round3(t.least_height)},
+                    {"largest tilt [rad]", round3(t.largest_tilt)},
+                    {"up", t.up}});
+  return list;
+}
+
+Json describeSizes(const BenchReport& report, const std::vector<SizeTime>& times, const char* size, bool per_size) {
+  Json list = Json::array();
+  for (const SizeTime& t : times) {
+    Json json = {{"formulation", getName(t.formulation)}, {size, t.size}};
+    addTime(json, "time", t.seconds, report.unit);
+    if (per_size) json["time / size [us]"] = round3(1e6 * t.seconds / t.size);
+    list.push_back(json);
+  }
+  return list;
+}
+
+Json describe(const BenchReport& report) {
+  return {{"robot", report.robot},
+          {"processor", report.processor},
+          {"compiler", report.compiler},
+          {"flags", report.flags},
+          {"unit [us]", round3(1e6 * report.unit)},
+          {"walk, per node", describeNodes(report)},
+          {"walk, FDDP iteration per node", describeIterations(report)},
+          {"cold start to converged", describeSolves(report)},
+          {"receding horizon", describeReceding(report)},
+          {"chains of four-bars, per node", describeSizes(report, report.chains, "four-bars", true)},
+          {"horizons, per node", describeSizes(report, report.horizons, "nodes", false)}};
+}
+
+void printReport(const Json& json) {
+  std::vector<Row> head;
+  for (const auto& [key, item] : json.items())
+    if (!item.is_array()) head.push_back({key, item.is_string() ? item.get<std::string>() : item.dump()});
+  printTable(std::cout, head, "");
+  for (const auto& [key, item] : json.items()) {
+    if (!item.is_array()) continue;
+    std::vector<std::string> columns;
+    for (const auto& column : item.front().items()) columns.push_back(column.key());
+    std::cout << "\n" << key << "\n";
+    printTable(std::cout, item, columns);
+  }
+}
+
+}  // namespace
+
+void addBench(CLI::App& app, Action& action) {
+  struct Arguments {
+    RobotArgument robot;
+    BenchOptions options;
+    bool as_json = false, quick = false;
+  };
+  CLI::App& command = *app.add_subcommand("bench", "Measure speed: per node, whole solves, receding horizon, growth");
+  const auto arguments = std::make_shared<Arguments>();
+  arguments->robot.name = "bipetto";
+  command.add_option("--robot", arguments->robot.name, "name, directory or .urdf file of a robot with two feet")
+      ->capture_default_str();
+  command.add_option("--threads", arguments->options.threads, "compared with one thread")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command.add_flag("--quick", arguments->quick, "small sizes, measured once: only to see that it works");
+  command.add_flag("--json", arguments->as_json, "print JSON");
+  command.footer(
+      "A unit is one product of two 108 x 108 matrices by Eigen, on one thread, in the same run. Times are the least "
+      "of "
+      "some\nrepetitions, but for whole solves (one run) and the receding horizon (median). What is measured now is "
+      "told "
+      "on the\nstandard error. Takes about a minute.\n"
+      "Examples:\n"
+      "  bielle bench\n"
+      "  bielle bench --threads 4 --json > bench.json");
+  command.callback([&action, arguments] {
+    action = [=] {
+      const LoadedRobot robot = arguments->robot.load();
+      BenchOptions& options = arguments->options;
+      if (arguments->quick) options.extent = BenchExtent::Quick;
+      options.progress = [](const std::string& what) { std::cerr << "bielle: measuring " << what << std::endl; };
+      const Json json = describe(runBench(robot.model, options));
+      if (arguments->as_json)
+        std::cout << formatJson(json) << "\n";
+      else
+        printReport(json);
+      return kOk;
+    };
+  });
+}
+
+}  // namespace bielle::cli

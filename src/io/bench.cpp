@@ -1,0 +1,277 @@
+#include "bielle/io/bench.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/io/result.h"
+#include "bielle/model/fourbar_chain.h"
+#include "bielle/motion/benchmark_walk.h"
+#include "bielle/motion/squat.h"
+#include "io/receding_horizon.h"
+
+namespace bielle {
+namespace {
+
+constexpr Formulation kFormulations[] = {Formulation::Full, Formulation::Reduced};
+
+double calcSeconds(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+double calcLeastSeconds(int repetitions, const std::function<void()>& work) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < repetitions; ++i) least = std::min(least, calcSeconds(work));
+  return least;
+}
+
+double calcUnit() {
+  const MatrixXd a = MatrixXd::Random(108, 108), b = MatrixXd::Random(108, 108);
+  MatrixXd c = MatrixXd::Zero(108, 108);
+  constexpr int kProducts = 10;
+  const double seconds = calcLeastSeconds(200, [&] {
+    for (int i = 0; i < kProducts; ++i) c.noalias() += a * b;
+  });
+  return c.allFinite() ? seconds / kProducts : 0;  // c is used: the products cannot be left out
+}
+
+std::string readProcessor() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);)
+    if (line.rfind("model name", 0) == 0 && line.find(": ") != std::string::npos)
+      return line.substr(line.find(": ") + 2);
+  return "unknown";
+}
+
+// The same stages with nothing but their dynamics.
+std::unique_ptr<RobotProblem> makeWithoutCosts(const RobotProblem& problem) {
+  const Model& model = problem.model();
+  std::vector<StageSpec> stages(problem.numStages() + 1);
+  for (size_t k = 0; k < stages.size(); ++k) {
+    stages[k].dt = problem.spec(static_cast<int>(k)).dt;
+    stages[k].constraints = problem.spec(static_cast<int>(k)).constraints;
+  }
+  const VectorXd& x0 = problem.initialState();
+  return std::make_unique<RobotProblem>(model, x0.head(model.nq()), x0.tail(model.nv()), std::move(stages),
+                                        problem.formulation());
+}
+
+// All stages of a problem along a trajectory. Every pass has other controls, so that nothing is found already done.
+class Passes {
+ public:
+  Passes(RobotProblem& problem, const ShootingTrajectory& trajectory)
+      : problem_(problem), trajectory_(trajectory), models_(trajectory.xs.size()), next_(trajectory.xs.front()) {}
+  void step() {
+    run([](int) {});
+  }
+  // About the end of each step: gaps are closed, as in most iterations.
+  void linearize() {
+    run([this](int k) { problem_.linearize(k, trajectory_.xs[k], trajectory_.us[k], next_, models_[k]); });
+    problem_.linearizeTerminal(trajectory_.xs.back(), models_.back());
+  }
+  const std::vector<StageModel>& models() const { return models_; }
+
+ private:
+  template <typename AfterStep>
+  void run(const AfterStep& afterStep) {
+    double cost = 0;
+    for (int k = 0; k < problem_.numStages(); ++k) {
+      trajectory_.us[k].array() += 1e-3;
+      problem_.step(k, trajectory_.xs[k], trajectory_.us[k], next_, cost);
+      afterStep(k);
+    }
+  }
+  RobotProblem& problem_;
+  ShootingTrajectory trajectory_;
+  std::vector<StageModel> models_;
+  VectorXd next_;
+};
+
+// Every crank at about 1 rad/s.
+VectorXd makeChainVelocity(const FourBarChain& chain) {
+  VectorXd v = VectorXd::Zero(chain.model.nv());
+  for (const Motor& motor : chain.model.motors()) v[motor.dof] = 1;
+  Workspace ws(chain.model);
+  return projectVelocity(chain.model, ws, makeConstraintSet(chain.model), chain.q_closed, v);
+}
+
+double countRollouts(const FddpSummary& summary) {
+  double rollouts = 0;
+  for (const FddpIteration& line : summary.log)
+    if (line.step > 0) rollouts += 1 - std::log2(line.step);
+  return std::max(1.0, rollouts);
+}
+
+// Iterations from the guess, at most that many. The trajectory is left where asked.
+FddpSummary iterate(Motion& motion, int iterations, int threads, ShootingTrajectory* result = nullptr) {
+  FddpOptions options;
+  options.max_iterations = iterations;
+  options.threads = threads;
+  ShootingTrajectory trajectory = motion.guess;
+  const FddpSummary summary = Fddp(options).solve(*motion.problem, trajectory);
+  if (result) *result = std::move(trajectory);
+  return summary;
+}
+
+class Bench {
+ public:
+  Bench(const Model& model, const BenchOptions& options)
+      : model_(model), options_(options), whole_(options.extent == BenchExtent::Whole) {}
+
+  BenchReport run() {
+    report_.robot = model_.name();
+    report_.processor = readProcessor();
+    report_.compiler = getBuildInfo().compiler;
+    report_.flags = BIELLE_FLAGS;
+    measureUnit();
+    for (Formulation formulation : kFormulations) measureWalk(formulation);
+    for (Formulation formulation : kFormulations) measureSolves(formulation);
+    for (Formulation formulation : kFormulations) measureReceding(formulation);
+    for (Formulation formulation : kFormulations) measureChains(formulation);
+    for (Formulation formulation : kFormulations) measureHorizons(formulation);
+    measureUnit();
+    return report_;
+  }
+
+ private:
+  void tell(const std::string& what, Formulation formulation) const {
+    if (options_.progress) options_.progress(what + ", " + getName(formulation) + " formulation");
+  }
+  std::vector<int> getThreads() const {
+    return options_.threads > 1 ? std::vector<int>{1, options_.threads} : std::vector<int>{1};
+  }
+
+  void measureUnit() {
+    const double unit = calcUnit();
+    report_.unit = report_.unit > 0 ? std::min(report_.unit, unit) : unit;
+  }
+
+  void measureWalk(Formulation formulation) {
+    tell("benchmark walk", formulation);
+    Motion motion = makeBenchmarkWalk(model_, {}, formulation);
+    const int n = motion.problem->numStages(), repetitions = whole_ ? 5 : 1;
+    NodeTimes times;
+    times.formulation = formulation;
+    times.tangent_size = motion.problem->tangentSize(0);
+    const std::unique_ptr<RobotProblem> bare = makeWithoutCosts(*motion.problem);
+    ShootingTrajectory walking;
+    iterate(motion, 3, 1, &walking);
+    Passes dynamics(*bare, walking), all(*motion.problem, walking);
+    dynamics.linearize();  // sizes the memory
+    all.linearize();
+    times.dynamics = calcLeastSeconds(repetitions, [&] { dynamics.step(); }) / n;
+    times.derivatives = calcLeastSeconds(repetitions, [&] { dynamics.linearize(); }) / n;
+    times.linearize = calcLeastSeconds(repetitions, [&] { all.linearize(); }) / n;
+    LqSweep sweep;
+    const LqRegularization regularization{1e-9, 1e-9};
+    sweep.update(all.models(), regularization);
+    times.sweep = calcLeastSeconds(repetitions, [&] { sweep.update(all.models(), regularization); }) / n;
+    times.rollout = std::numeric_limits<double>::infinity();
+    for (int threads : getThreads()) measureIterations(motion, threads, times);
+    report_.nodes.push_back(times);
+  }
+
+  void measureIterations(Motion& motion, int threads, NodeTimes& times) {
+    const int n = motion.problem->numStages();
+    FddpSummary best;
+    for (int i = 0; i < (whole_ ? 3 : 1); ++i) {
+      const FddpSummary summary = iterate(motion, whole_ ? 10 : 2, threads);
+      if (i == 0 || summary.seconds < best.seconds) best = summary;
+    }
+    const double rollouts = countRollouts(best);
+    if (threads == 1) times.rollout = best.rollout_seconds / rollouts / n;
+    const double work =
+        std::max(best.seconds * (threads == 1), best.linearize_seconds + best.sweep_seconds + best.rollout_seconds);
+    IterationTimes iteration;
+    iteration.formulation = motion.problem->formulation();
+    iteration.threads = threads;
+    iteration.seconds = best.seconds / best.iterations / n;
+    iteration.rollouts = rollouts / best.iterations;
+    iteration.linearize = best.linearize_seconds / work;
+    iteration.sweep = best.sweep_seconds / work;
+    iteration.rollout = best.rollout_seconds / work;
+    report_.iterations.push_back(iteration);
+  }
+
+  void measureSolve(const std::string& name, Formulation formulation, const std::function<Motion()>& make) {
+    for (int threads : getThreads()) {
+      SolveTime time;
+      time.motion = name;
+      time.formulation = formulation;
+      time.threads = threads;
+      time.seconds = calcSeconds([&] {
+        Motion motion = make();
+        const FddpSummary summary = iterate(motion, whole_ ? 200 : 3, threads);
+        time.iterations = summary.iterations;
+        time.converged = summary.termination == FddpTermination::Converged;
+      });
+      report_.solves.push_back(time);
+    }
+  }
+  void measureSolves(Formulation formulation) {
+    tell("squat from a cold start", formulation);
+    measureSolve("squat", formulation, [&] { return makeSquat(model_, {}, formulation); });
+    tell("benchmark walk from a cold start", formulation);
+    measureSolve("benchmark walk", formulation, [&] { return makeBenchmarkWalk(model_, {}, formulation); });
+  }
+
+  void measureReceding(Formulation formulation) {
+    tell("receding horizon", formulation);
+    for (int threads : getThreads())
+      report_.receding.push_back(runRecedingHorizon(model_, formulation, threads, whole_ ? 150 : 5));
+  }
+
+  void measureChains(Formulation formulation) {
+    tell("chains of four-bars", formulation);
+    for (int count = 1; count <= (whole_ ? 64 : 4); count *= 2) {
+      FourBarChainOptions options;
+      options.count = count;
+      const FourBarChain chain = makeFourBarChain(options);
+      constexpr int kStages = 4;
+      std::vector<StageSpec> stages(kStages + 1);
+      for (StageSpec& stage : stages) {
+        stage.dt = 1e-3;
+        stage.constraints = makeConstraintSet(chain.model);
+      }
+      RobotProblem problem(chain.model, chain.q_closed, makeChainVelocity(chain), std::move(stages), formulation);
+      Passes passes(problem, {std::vector<VectorXd>(kStages + 1, problem.initialState()),
+                              std::vector<VectorXd>(kStages, VectorXd::Zero(count))});
+      passes.linearize();
+      const int repetitions = whole_ ? std::max(4, 200 / count) : 2;
+      const double seconds = calcLeastSeconds(repetitions, [&] { passes.linearize(); }) / kStages;
+      report_.chains.push_back({formulation, count, seconds});
+    }
+  }
+
+  void measureHorizons(Formulation formulation) {
+    tell("horizons", formulation);
+    for (int nodes : whole_ ? std::vector<int>{50, 100, 200, 500, 1000} : std::vector<int>{50, 100}) {
+      BenchmarkWalkOptions options;
+      options.cycles = (nodes - options.start_nodes) / (2 * (options.swing_nodes + options.switch_nodes));
+      options.total_nodes = nodes;
+      Motion motion = makeBenchmarkWalk(model_, options, formulation);
+      double seconds = std::numeric_limits<double>::infinity();
+      for (int i = 0; i < (whole_ ? 3 : 1); ++i) {
+        const FddpSummary summary = iterate(motion, 1, 1);
+        seconds = std::min(seconds, summary.linearize_seconds + summary.sweep_seconds +
+                                        summary.rollout_seconds / countRollouts(summary));
+      }
+      report_.horizons.push_back({formulation, nodes, seconds / nodes});
+    }
+  }
+
+  const Model& model_;
+  const BenchOptions& options_;
+  const bool whole_;
+  BenchReport report_;
+};
+
+}  // namespace
+
+BenchReport runBench(const Model& model, const BenchOptions& options) { return Bench(model, options).run(); }
+
+}  // namespace bielle
