@@ -253,6 +253,10 @@ void ModelBuilder::checkInertias(std::vector<std::string>* warnings) const {
 void ModelBuilder::finishDofs(Model& model) const {
   model.dofs_.resize(model.nv_);
   model.support_.resize(model.numBodies());
+  const size_t bodies = model.numBodies();
+  model.ancestry_.assign(bodies * bodies, 0);
+  for (size_t b = 0; b < bodies; ++b)
+    for (int a = static_cast<int>(b); a >= 0; a = model.joints_[a].parent) model.ancestry_[a * bodies + b] = 1;
   const double inf = std::numeric_limits<double>::infinity();
   model.lower_ = VectorXd::Constant(model.nv_, -inf);
   model.upper_ = VectorXd::Constant(model.nv_, inf);

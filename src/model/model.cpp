@@ -36,11 +36,6 @@ int getRows(ClosureKind kind) {
   return 0;
 }
 
-bool Model::isAncestorOrSelf(int a, int b) const {
-  while (b > a) b = joints_[b].parent;
-  return a == b;
-}
-
 int Model::findJoint(const std::string& name) const {
   const int index = findByName(joints_, name);
   return index == 0 ? -1 : index;  // the world is no joint

@@ -28,7 +28,7 @@ struct Block {
   explicit Block(const LoopBlock& l) : loop(l), at(l), next(l), scratch(l), chart(at.basis()) {
     const int n = l.model.nv(), m = l.closures.rows, r = l.size;
     q.setZero(l.model.nq());
-    for (VectorXd* v : {&this->v, &a, &d, &w, &v_next}) v->setZero(n);
+    for (VectorXd* v : {&this->v, &a, &d, &w, &v_next, &gradient_q, &gradient_v}) v->setZero(n);
     for (VectorXd* v : {&gamma, &mu, &independent, &zeta}) v->setZero(l.rank);
     rows.setZero(m);
     for (MatrixXd* x : {&Z, &dy, &dv}) x->setZero(n, r);
@@ -45,7 +45,7 @@ struct Block {
   const LoopBlock& loop;
   BlockPoint at, next, scratch;  // at the state; at q+; for integrate() and open gaps
   BlockBasis chart;              // at the last linearized state
-  VectorXd q, v, a, d, w, v_next;
+  VectorXd q, v, a, d, w, v_next, gradient_q, gradient_v;
   VectorXd gamma, mu, independent, zeta, rows;
   MatrixXd Z, dy, dv;                                  // n x r, Eqs. (a), (c)
   MatrixXd Cq, Cv, K, Cq_r, Cv_r, K_r;                 // closure derivatives, all rows and the independent ones
@@ -62,11 +62,19 @@ void applyPlus(const BlockPoint& point, MatrixXd& X, MatrixXd& out) {
   addSmallProductTransposed(point.basis().JW, X, out, -1);
 }
 
+// A joint outside all loops at one node: what dq+ makes of dy and of dv+.
+struct FreeJoint {
+  int joint = 0, offset = 0;
+  JointMatrix q_y, q_v;  // nv x nv of the joint
+};
+
 class ReducedNode : public NodeModel {
  public:
   ReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec)
       : NodeModel(model, spec), reduction_(reduction), derivatives_(model, reduction) {
     for (const LoopBlock& block : reduction.blocks) blocks_.emplace_back(block);
+    for (size_t i = 0; i < reduction.free_joints.size(); ++i)
+      free_joints_.push_back({reduction.free_joints[i], reduction.free_offsets[i], {}, {}});
     const int nv = model.nv(), nr = reduction.size, nu = model.nu();
     num_loops_ = spec.constraints.num_loops;
     loop_rows_ = 0;
@@ -270,6 +278,8 @@ class ReducedNode : public NodeModel {
     failure_ = point.describeFailure(b.loop);
     return false;
   }
+  void calcJointCost(const StateCost& state, double w, const Joint& joint, JointVector& gradient,
+                     JointMatrix& hessian) const;
   void updateContacts();
   bool closeStep(ConstVectorRef x);
   void updateVelocityLift(Block& b);
@@ -278,7 +288,9 @@ class ReducedNode : public NodeModel {
   static void updateForceDerivative(Block& b, const BlockPoint& point, const VectorXd& force);
   void linearizeDynamics();
   bool linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out);
-  void linearizeFreeJoints(ConstVectorRef x_next_node, StageModel& out);
+  void linearizeFreeJoint(FreeJoint& free, const StageModel& out) const;
+  void assembleStep(StageModel& out) const;
+  void addMotorColumns(MatrixRef out) const;
   void differenceAbout(Block& b, const BlockBasis& basis, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
   void differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
   bool updateChart(ConstVectorRef x);
@@ -286,6 +298,7 @@ class ReducedNode : public NodeModel {
 
   const Reduction& reduction_;
   std::vector<Block> blocks_;
+  std::vector<FreeJoint> free_joints_;
   int num_loops_ = 0, loop_rows_ = 0, contact_rows_ = 0;
   VectorXd tau_, a_, a_d_, w_, force_, ydd_, f_, gamma_, lambda_c_;
   MatrixXd Jc_, JcN_, Cc_q_, Cc_v_;  // contact rows
@@ -418,12 +431,7 @@ void ReducedNode::linearizeDynamics() {
   derivatives_.update(ws_, f_ext_, lifts_, dydd_.leftCols(nr), dydd_.middleCols(nr, nr));
   const ConstraintSet& set = spec_.constraints;
   dydd_.rightCols(model_.nu()).setZero();
-  for (int m = 0; m < model_.nu(); ++m) {  // -N^T B
-    force_.setZero();                      // not tau_: another linearization at the same point needs it
-    force_[model_.motors()[m].dof] = -1;
-    projectVector(force_, f_);
-    dydd_.col(2 * nr + m) = f_;
-  }
+  addMotorColumns(dydd_.rightCols(model_.nu()));
   dlambda_.setZero();
   for (size_t c = num_loops_; c < set.closures.size(); ++c) {
     const int row = set.offsets[c] - loop_rows_, n = getRows(set.closures[c].kind);
@@ -438,12 +446,28 @@ void ReducedNode::linearizeDynamics() {
   saddle_point_.solveDerivatives(dydd_, dlambda_);
 }
 
+// out (size x nu) += -N^T B
+void ReducedNode::addMotorColumns(MatrixRef out) const {
+  for (int m = 0; m < model_.nu(); ++m) {
+    const int dof = model_.motors()[m].dof;
+    for (const FreeJoint& free : free_joints_) {
+      const Joint& joint = model_.joints()[free.joint];
+      if (dof >= joint.idx_v && dof < joint.idx_v + joint.nv) out(free.offset + dof - joint.idx_v, m) -= 1;
+    }
+    for (const Block& b : blocks_)
+      for (size_t k = 0; k < b.loop.dofs.size(); ++k)
+        if (b.loop.dofs[k] == dof)
+          out.col(m).segment(b.loop.offset, b.loop.size) -= b.at.basis().N.row(k).transpose();
+  }
+}
+
 bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
   linearizeDynamics();
-  out.Fx.setZero();
   for (Block& b : blocks_)
     if (!linearizeBlock(b, x_next_node, out)) return false;
-  linearizeFreeJoints(x_next_node, out);
+  differenceFree(x_next_node, x_next_, out.gap);
+  for (FreeJoint& free : free_joints_) linearizeFreeJoint(free, out);
+  assembleStep(out);
   storeChart();
   return true;
 }
@@ -558,88 +582,132 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
     out.gap.segment(o, r).setZero();
     out.gap.segment(nr + o, r).setZero();
   }
-  const auto dydd = dydd_.middleRows(o, r);
-  out.Fx.middleRows(o, r) = q_a.lazyProduct(dydd.leftCols(2 * nr));
-  out.Fx.middleRows(nr + o, r) = v_a.lazyProduct(dydd.leftCols(2 * nr));
-  out.Fu.middleRows(o, r) = q_a.lazyProduct(dydd.rightCols(nu));
-  out.Fu.middleRows(nr + o, r) = v_a.lazyProduct(dydd.rightCols(nu));
-  out.Fx.block(o, o, r, r) += q_y;
-  out.Fx.block(o, nr + o, r, r) += q_v;
-  out.Fx.block(nr + o, o, r, r) += v_y;
-  out.Fx.block(nr + o, nr + o, r, r) += v_v;
   return true;
 }
 
-void ReducedNode::linearizeFreeJoints(ConstVectorRef x_next_node, StageModel& out) {
-  const int nq = model_.nq(), nr = reduction_.size, nu = model_.nu();
+// The same for a joint outside all loops, where N and J^T vanish from Eqs. (e) to (g).
+void ReducedNode::linearizeFreeJoint(FreeJoint& free, const StageModel& out) const {
+  const Joint& joint = model_.joints()[free.joint];
+  const int n = joint.nv;
   const double h = spec_.dt;
-  differenceFree(x_next_node, x_next_, out.gap);
-  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
-    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
-    const int o = reduction_.free_offsets[i], n = joint.nv;
-    const auto dydd = dydd_.middleRows(o, n);
-    out.Fx.middleRows(nr + o, n) = h * dydd.leftCols(2 * nr);
-    out.Fx.block(nr + o, nr + o, n, n).diagonal().array() += 1;
-    out.Fu.middleRows(nr + o, n) = h * dydd.rightCols(nu);
+  free.q_y.setIdentity(n, n);
+  free.q_v = h * JointMatrix::Identity(n, n);
+  if (isCurved(joint)) {
     JointMatrix Jq(n, n), Jd(n, n), Jdiff(n, n);
-    const JointVector d = h * x_next_.segment(nq + joint.idx_v, n), gap = out.gap.segment(o, n);
+    const JointVector d = h * x_next_.segment(model_.nq() + joint.idx_v, n), gap = out.gap.segment(free.offset, n);
     calcJointIntegrateJacobians(joint, d, Jq, Jd);
     calcJointDifferenceJacobian(joint, gap, Jdiff);
-    const JointMatrix dv = h * Jdiff * Jd, dq = Jdiff * Jq;
-    out.Fx.middleRows(o, n).noalias() = dv * out.Fx.middleRows(nr + o, n);
-    out.Fx.block(o, o, n, n) += dq;
-    out.Fu.middleRows(o, n).noalias() = dv * out.Fu.middleRows(nr + o, n);
+    free.q_y.noalias() = Jdiff * Jq;
+    free.q_v.noalias() = h * Jdiff * Jd;
   }
+}
+
+// Fx and Fu, column by column, out of the derivatives of y' and what each unit makes of them.
+void ReducedNode::assembleStep(StageModel& out) const {
+  const int nr = reduction_.size, nu = model_.nu();
+  const double h = spec_.dt;
+  for (int c = 0; c < 2 * nr + nu; ++c) {
+    const double* ydd = &dydd_(0, c);
+    double* column = c < 2 * nr ? &out.Fx(0, c) : &out.Fu(0, c - 2 * nr);
+    for (const FreeJoint& free : free_joints_) {
+      const int n = static_cast<int>(free.q_v.rows()), o = free.offset;
+      for (int i = 0; i < n; ++i) column[nr + o + i] = h * ydd[o + i];
+      if (n == 1) {
+        column[o] = h * free.q_v(0, 0) * ydd[o];
+        continue;
+      }
+      for (int i = 0; i < n; ++i) column[o + i] = 0;
+      for (int k = 0; k < n; ++k)
+        for (int i = 0; i < n; ++i) column[o + i] += free.q_v(i, k) * (h * ydd[o + k]);
+    }
+    for (const Block& b : blocks_) {
+      const int o = b.loop.offset, r = b.loop.size;
+      for (int i = 0; i < r; ++i) {
+        double q = 0, v = 0;
+        for (int k = 0; k < r; ++k) {
+          q += b.q_a(i, k) * ydd[o + k];
+          v += b.v_a(i, k) * ydd[o + k];
+        }
+        column[o + i] = q;
+        column[nr + o + i] = v;
+      }
+    }
+  }
+  for (const FreeJoint& free : free_joints_) {
+    const int n = static_cast<int>(free.q_v.rows()), o = free.offset;
+    out.Fx.block(o, o, n, n) += free.q_y;
+    out.Fx.block(o, nr + o, n, n) += free.q_v;
+    out.Fx.block(nr + o, nr + o, n, n).diagonal().array() += 1;
+  }
+  for (const Block& b : blocks_) {
+    const int o = b.loop.offset, r = b.loop.size;
+    out.Fx.block(o, o, r, r) += b.q_y;
+    out.Fx.block(o, nr + o, r, r) += b.q_v;
+    out.Fx.block(nr + o, o, r, r) += b.v_y;
+    out.Fx.block(nr + o, nr + o, r, r) += b.v_v;
+  }
+}
+
+// Gradient and Hessian of a state cost with respect to the dofs of one joint.
+void ReducedNode::calcJointCost(const StateCost& state, double w, const Joint& joint, JointVector& gradient,
+                                JointMatrix& hessian) const {
+  const int n = joint.nv;
+  const JointVector weights = w * state.weights.segment(joint.idx_v, n);
+  JointVector d(n);
+  calcJointDifference(joint, state.q_ref.segment(joint.idx_q, joint.nq), ws_.q.segment(joint.idx_q, joint.nq), d);
+  if (!isCurved(joint)) {
+    gradient = weights.cwiseProduct(d);
+    hessian = weights.asDiagonal();
+    return;
+  }
+  JointMatrix J(n, n);
+  calcJointDifferenceJacobian(joint, d, J);
+  const JointMatrix WJ = weights.asDiagonal() * J;
+  gradient.noalias() = WJ.transpose() * d;
+  hessian.noalias() = J.transpose() * WJ;
 }
 
 void ReducedNode::addStateCost(const StateCost& state, double scale, StageModel& out) {
   const int nv = model_.nv(), nr = reduction_.size;
   const double w = scale * state.weight;
-  const auto addJoint = [&](const Joint& whole, const Joint& local, MatrixRef gradient_q, MatrixRef Wq) {
-    const int n = whole.nv;
-    JointVector d(n);
-    calcJointDifference(whole, state.q_ref.segment(whole.idx_q, whole.nq), ws_.q.segment(whole.idx_q, whole.nq), d);
-    JointMatrix J(n, n);
-    calcJointDifferenceJacobian(whole, d, J);
-    const JointVector weights = w * state.weights.segment(whole.idx_v, n);
-    const JointMatrix WJ = weights.asDiagonal() * J;
-    gradient_q.block(local.idx_v, 0, n, 1) = WJ.transpose() * d;
-    Wq.block(local.idx_v, local.idx_v, n, n) = J.transpose() * WJ;
-  };
-  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
-    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
-    const int o = reduction_.free_offsets[i], n = joint.nv, k = joint.idx_v;
-    Joint local = joint;
-    local.idx_v = 0;
-    JointMatrix gradient = JointMatrix::Zero(n, 1), Wq = JointMatrix::Zero(n, n);
-    MatrixXd g = gradient, W = Wq;
-    addJoint(joint, local, g, W);
-    out.lx.segment(o, n) += g.col(0);
-    out.lxx.block(o, o, n, n) += W;
+  JointVector gradient;
+  JointMatrix hessian;
+  for (const FreeJoint& free : free_joints_) {
+    const Joint& joint = model_.joints()[free.joint];
+    const int o = free.offset, n = joint.nv, k = joint.idx_v;
+    calcJointCost(state, w, joint, gradient, hessian);
+    out.lx.segment(o, n) += gradient;
+    out.lxx.block(o, o, n, n) += hessian;
     const JointVector weights = w * state.weights.segment(nv + k, n);
     out.lx.segment(nr + o, n) += weights.cwiseProduct(ws_.v.segment(k, n) - state.v_ref.segment(k, n));
     out.lxx.block(nr + o, nr + o, n, n).diagonal() += weights;
   }
   for (Block& b : blocks_) {
-    const int n = b.loop.model.nv(), o = b.loop.offset, r = b.loop.size;
-    MatrixXd g = MatrixXd::Zero(n, 1), Wq = MatrixXd::Zero(n, n);
-    for (size_t j = 0; j < b.loop.joints.size(); ++j)
-      addJoint(model_.joints()[b.loop.joints[j]], b.loop.model.joints()[j + 1], g, Wq);
-    VectorXd Wv(n), gv(n);
-    for (int k = 0; k < n; ++k) {
-      const int dof = b.loop.dofs[k];
-      Wv[k] = w * state.weights[nv + dof];
-      gv[k] = Wv[k] * (ws_.v[dof] - state.v_ref[dof]);
-    }
+    // Changes of q are N dy, of v N dy_v + Z dy: gradients by dof, and Hessians times N and Z.
+    const int o = b.loop.offset, r = b.loop.size;
     const MatrixXd& N = b.at.basis().N;
-    const MatrixXd WvN = Wv.asDiagonal() * N;
-    out.lx.segment(o, r) += N.transpose() * g.col(0) + b.Z.transpose() * gv;
-    out.lx.segment(nr + o, r) += N.transpose() * gv;
-    out.lxx.block(o, o, r, r) += N.transpose() * Wq * N + b.Z.transpose() * Wv.asDiagonal() * b.Z;
-    const MatrixXd cross = b.Z.transpose() * WvN;
-    out.lxx.block(o, nr + o, r, r) += cross;
-    out.lxx.block(nr + o, o, r, r) += cross.transpose();
-    out.lxx.block(nr + o, nr + o, r, r) += N.transpose() * WvN;
+    for (size_t j = 0; j < b.loop.joints.size(); ++j) {
+      const Joint& joint = model_.joints()[b.loop.joints[j]];
+      const int at = b.loop.model.joints()[j + 1].idx_v, n = joint.nv;
+      calcJointCost(state, w, joint, gradient, hessian);
+      b.gradient_q.segment(at, n) = gradient;
+      b.HN.middleRows(at, n) = hessian.lazyProduct(N.middleRows(at, n));
+    }
+    for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
+      const int dof = b.loop.dofs[k];
+      const double weight = w * state.weights[nv + dof];
+      b.gradient_v[k] = weight * (ws_.v[dof] - state.v_ref[dof]);
+      b.wy.row(k) = weight * b.Z.row(k);
+      b.wv.row(k) = weight * N.row(k);
+    }
+    addSmallProductTransposed(N, b.gradient_q, out.lx.segment(o, r));
+    addSmallProductTransposed(b.Z, b.gradient_v, out.lx.segment(o, r));
+    addSmallProductTransposed(N, b.gradient_v, out.lx.segment(nr + o, r));
+    addSmallProductTransposed(N, b.HN, out.lxx.block(o, o, r, r));
+    addSmallProductTransposed(b.Z, b.wy, out.lxx.block(o, o, r, r));
+    addSmallProductTransposed(b.Z, b.wv, out.lxx.block(o, nr + o, r, r));
+    addSmallProductTransposed(b.wv, b.Z, out.lxx.block(nr + o, o, r, r));
+    addSmallProductTransposed(N, b.wv, out.lxx.block(nr + o, nr + o, r, r));
   }
 }
 

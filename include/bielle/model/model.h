@@ -130,7 +130,7 @@ class Model {
   /// Dofs that move a body, from the root to the body, in increasing order.
   const std::vector<int>& supportDofs(int body) const { return support_[body]; }
   /// Whether body a is body b or one of its ancestors.
-  bool isAncestorOrSelf(int a, int b) const;
+  bool isAncestorOrSelf(int a, int b) const { return ancestry_[a * bodies_.size() + b] != 0; }
 
   /// Index by name, -1 when absent.
   int findJoint(const std::string& name) const;
@@ -168,6 +168,7 @@ class Model {
   std::vector<Visual> visuals_;
   std::vector<int> serial_joints_;
   std::vector<std::vector<int>> support_;
+  std::vector<char> ancestry_;  // numBodies() x numBodies(), row: the ancestor
   VectorXd lower_, upper_, velocity_limit_, armature_;
 };
 
