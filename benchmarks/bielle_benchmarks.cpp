@@ -13,6 +13,7 @@
 #include <random>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/model/fourbar_chain.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/benchmark_walk.h"
 #include "bielle/solve/fddp.h"
@@ -213,6 +214,41 @@ void addWalk(Formulation formulation) {
   add(name + "FDDP iteration", 4, [=](benchmark::State& state) { measureFddp(state, formulation); });
 }
 
+// Step and linearization of one node of a chain of four-bars, every crank at about 1 rad/s; no costs.
+void measureChain(benchmark::State& state, Formulation formulation, int count) {
+  FourBarChainOptions options;
+  options.count = count;
+  const FourBarChain chain = makeFourBarChain(options);
+  const Model& model = chain.model;
+  VectorXd v = VectorXd::Zero(model.nv());
+  for (const Motor& motor : model.motors()) v[motor.dof] = 1;
+  std::vector<StageSpec> stages(2);
+  for (StageSpec& stage : stages) stage.constraints = makeConstraintSet(model);
+  Workspace ws(model);
+  RobotProblem problem(model, chain.q_closed, projectVelocity(model, ws, makeConstraintSet(model), chain.q_closed, v),
+                       std::move(stages), formulation);
+  const VectorXd& x = problem.initialState();
+  VectorXd u = VectorXd::Zero(count), next = x;
+  StageModel out;
+  constexpr int kRepetitions = 10;
+  run(state, kRepetitions, [&] {
+    return calcSeconds([&] {
+      double cost = 0;
+      for (int i = 0; i < kRepetitions; ++i) {
+        u.array() += 1e-3;
+        problem.step(0, x, u, next, cost);
+        problem.linearize(0, x, u, next, out);
+      }
+    });
+  });
+}
+
+void addChains(Formulation formulation) {
+  for (int count = 1; count <= 64; count *= 2)
+    add("chain of " + std::to_string(count) + " four-bars, " + getName(formulation) + ": step and linearize", 20,
+        [=](benchmark::State& state) { measureChain(state, formulation, count); });
+}
+
 void addAll() {
   add("unit: product 108 x 108", 200, measureUnit);
   add("node, double support, warm: dynamics", 200,
@@ -221,6 +257,8 @@ void addAll() {
       [](benchmark::State& state) { measureNode(state, Depth::Derivatives); });
   addWalk(Formulation::Full);
   addWalk(Formulation::Reduced);
+  addChains(Formulation::Full);
+  addChains(Formulation::Reduced);
 }
 
 }  // namespace
