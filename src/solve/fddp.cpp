@@ -301,14 +301,18 @@ bool Run::searchLine() {
   const double penalized = std::max(0.0, slope_ + 0.5 * std::max(0.0, curvature_));
   const double nu = gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0;  // Eq. (5)
   const RolloutInput input{problem_, trajectory_, work_.models, work_.sweep, work_.dx, work_.bounds, isFeasible()};
-  int segments = chooseSegments();
+  const auto accept = [&](double alpha, int segments) {
+    if (!work_.rollout.update(input, {alpha, segments, threads_}) || !isAcceptable(alpha, nu)) return false;
+    line_.step = alpha;
+    return true;
+  };
+  // Segments start where linear models foresee it: what they cannot reach, one piece may.
+  const int segments = chooseSegments();
+  if (segments > 1 && accept(1, segments)) return true;
   double alpha = 1;
   for (int i = 0; i < options_.num_step_lengths; ++i, alpha *= 0.5) {
     if (isInterrupted()) return false;
-    if (!work_.rollout.update(input, {alpha, segments, threads_})) continue;
-    if (!isAcceptable(alpha, nu)) continue;
-    line_.step = alpha;
-    return true;
+    if (accept(alpha, 1)) return true;
   }
   return false;
 }

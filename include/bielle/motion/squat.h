@@ -20,8 +20,8 @@ struct SquatOptions {
   double friction_weight = 1e-2;  ///< of leaving the friction pyramid, 1/N^2
   double friction = 0.7;          ///< friction coefficient, 1
   double terminal_weight = 1e3;   ///< of the final velocities
-  double contact_kp = 400;        ///< stabilisation of the contacts, 1/s^2
-  double contact_kd = 100;        ///< 1/s
+  double contact_kp = 400;        ///< stabilisation of the contacts, 1/s^2; limited to 1/(4 h^2), h the time step
+  double contact_kd = 100;        ///< 1/s; limited to 1/h
   double closure_kp = 0;          ///< stabilisation of the closures, 1/s^2
   double closure_kd = 0;          ///< 1/s
 };

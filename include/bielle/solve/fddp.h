@@ -31,8 +31,9 @@
 /// part in J is that the value function foresees the trial to cost, once the gap is closed,
 ///     closing = sum_j Vx_j.g_j + (Vxx_j dx_j).g_j + 1/2 g_j.Vxx_j.g_j                                              (8)
 /// more. (The penalty nu c alone would not do: gaps and decrease are both of second order, so that it would refuse full
-/// steps however close to the solution.) A trial for which (8) exceeds half of (4) is refused, whatever its merit. Steps
-/// that follow a shortened one are rolled out in one piece, and so are the last ones, which must close the gaps.
+/// steps however close to the solution.) A trial for which (8) exceeds half of (4) is refused, whatever its merit; a full
+/// step that is refused in segments is tried again in one piece, and so are all shorter ones. Steps that follow a
+/// shortened one are rolled out in one piece, and so are the last ones, which must close the gaps.
 ///
 /// Stationarity is measured by the projected gradient, with [lower, upper] the bounds of du (infinite if ignored):
 ///     gradient = sum_k | clamp(-Qu_k, lower_k, upper_k) |^2. (6)
