@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/centroidal.h"
@@ -137,6 +138,24 @@ TEST_CASE("bad input is one line of error and status 2") {
   checkRefused(run({"solve", "squat", "--robot", "fourbar", "-o", directory.str()}), "needs feet");
   CHECK_FALSE(fs::exists(directory.str()));
   checkRefused(run(makeShortSquat("/dev/null/results")), "results cannot be written there");
+}
+
+TEST_CASE("a loop that cannot be closed is refused with the file, the closure and its gap") {
+  const OutputDirectory directory;
+  fs::create_directories(directory.str());
+  const fs::path robot = fs::path(BIELLE_SOURCE_DIR) / "robots/fourbar/fourbar";
+  std::ifstream original(robot.string() + ".urdf");
+  std::stringstream text;
+  text << original.rdbuf();
+  std::string urdf = text.str();
+  const std::string pivot = "<origin xyz=\"0.4 0 0\"/>";  // of the rocker; the bars reach 0.8 m
+  REQUIRE(urdf.find(pivot) != std::string::npos);
+  urdf.replace(urdf.find(pivot), pivot.size(), "<origin xyz=\"2.4 0 0\"/>");
+  std::ofstream(directory.str() + "/stretched.urdf") << urdf;
+  fs::copy_file(robot.string() + ".yaml", directory.str() + "/stretched.yaml");
+  const CommandResult result = run({"info", directory.str()});
+  checkRefused(result, "closure 'coupler': its loop cannot be closed");
+  CHECK_THAT(result.err, Catch::Contains(directory.str()));
 }
 
 TEST_CASE("robots are listed with their places") {

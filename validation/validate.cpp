@@ -63,12 +63,8 @@ class SampleSource {
  public:
   SampleSource(const Model& model, const ValidationOptions& options)
       : model_(model), options_(options), rng_(options.seed) {
-    const bool given = options.start.size() > 0 || model.references().empty();
-    AssemblyResult start =
-        given ? closeConfiguration(model, options.start.size() > 0 ? options.start : model.makeNeutral())
-              : assembleReference(model, model.references()[0].name);
-    for (int attempt = 0; attempt < 20 && start.status != AssemblyStatus::Closed; ++attempt)
-      start = closeConfiguration(model, model.integrate(model.makeNeutral(), random(model.nv(), 0.1 * attempt)));
+    const AssemblyResult start =
+        options.start.size() > 0 ? closeConfiguration(model, options.start) : findClosedConfiguration(model);
     if (start.status != AssemblyStatus::Closed) failure = "no closed configuration was found: " + start.message;
     q_ref_ = start.q;
   }

@@ -1,5 +1,8 @@
 #include <iostream>
+#include <sstream>
 
+#include "bielle/dynamics/assembly.h"
+#include "bielle/model/error.h"
 #include "cli/commands.h"
 
 namespace bielle::cli {
@@ -14,6 +17,13 @@ LoadedRobot RobotArgument::load() const {
   if (fixed_base) options.base = BaseKind::Fixed;
   LoadedRobot robot = loadRobot(name, options);
   for (const std::string& warning : robot.warnings) std::cerr << "bielle: warning: " << warning << "\n";
+  const AssemblyResult closed = findClosedConfiguration(robot.model);
+  if (closed.status != AssemblyStatus::Closed) {
+    std::ostringstream gap;
+    gap << "its loop cannot be closed: from no start does it come nearer than " << closed.gap << " (m or rad)";
+    throw ModelError(robot.directory, closed.worst, gap.str(),
+                     "check the lengths and frames along the loop, or give a reference posture near a closed one");
+  }
   return robot;
 }
 

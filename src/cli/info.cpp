@@ -57,12 +57,12 @@ Json describeClosures(const Model& model, const std::vector<Posture>& postures) 
   return closures;
 }
 
-// At the first reference that closes, else at the closed configuration nearest to neutral.
+// At the first reference that closes, else at a closed configuration near neutral.
 Json describeMobility(const Model& model, const std::vector<Posture>& postures) {
   std::string place = "closed neutral";
-  AssemblyResult neutral = closeConfiguration(model, model.makeNeutral());
-  VectorXd q = neutral.q;
-  bool closed = neutral.status == AssemblyStatus::Closed;
+  const AssemblyResult found = findClosedConfiguration(model);
+  VectorXd q = found.q;
+  bool closed = found.status == AssemblyStatus::Closed;
   for (size_t i = postures.size(); i-- > 1;)
     if (postures[i].closed) place = postures[i].name, q = postures[i].q, closed = true;
   const Mobility mobility = calcMobility(model, q);

@@ -4,6 +4,8 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <random>
 #include <sstream>
 
 #include "bielle/dynamics/kinematics.h"
@@ -183,6 +185,28 @@ AssemblyResult closeConfiguration(const Model& model, ConstVectorRef q, const As
   AssemblyProblem problem;
   problem.q_ref = q;
   return assemble(model, problem, options);
+}
+
+AssemblyResult findClosedConfiguration(const Model& model, const AssemblyOptions& options) {
+  constexpr int kStarts = 20;
+  constexpr double kSpread = 0.1;  // rad or m per start
+  AssemblyResult best;
+  best.gap = std::numeric_limits<double>::infinity();
+  const auto closes = [&](const AssemblyResult& result) {
+    if (result.status == AssemblyStatus::Closed || result.gap < best.gap) best = result;
+    return result.status == AssemblyStatus::Closed;
+  };
+  for (const Reference& reference : model.references())
+    if (closes(assemble(model, makeReferenceProblem(model, reference), options))) return best;
+  const VectorXd neutral = model.makeNeutral();
+  if (closes(closeConfiguration(model, neutral, options))) return best;
+  std::mt19937 rng(1);
+  for (int start = 1; start <= kStarts; ++start) {
+    std::uniform_real_distribution<double> uniform(-kSpread * start, kSpread * start);
+    const VectorXd step = VectorXd::NullaryExpr(model.nv(), [&](Eigen::Index) { return uniform(rng); });
+    if (closes(closeConfiguration(model, model.integrate(neutral, step), options))) return best;
+  }
+  return best;
 }
 
 AssemblyProblem makeReferenceProblem(const Model& model, const Reference& reference) {

@@ -5,7 +5,8 @@
 /// Newton steps in the tangent space: with H = dh/dq and N a basis of its null space,
 ///     dq = H^+ (-h) + N z,    z = argmin || W (dq - d) ||,    d = q_ref (-) q, (1)
 /// H^+ truncates small singular values and is damped far from the solution; steps are clamped, and halved while |h|
-/// grows. When this stalls, the conditions are approached by continuation: h(q) = (1 - t) h(q_0), t from 0 to 1.
+/// grows. The wish fades after some iterations: far from what the conditions allow, it can make the iterates circle.
+/// When all this stalls, the conditions are approached by continuation: h(q) = (1 - t) h(q_0), t from 0 to 1.
 #include <string>
 #include <vector>
 
@@ -51,6 +52,10 @@ AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, cons
 
 /// Nearest closed configuration to q, no other target.
 AssemblyResult closeConfiguration(const Model& model, ConstVectorRef q, const AssemblyOptions& options = {});
+
+/// Some closed configuration of the robot: its references, the configuration nearest to neutral, then starts ever farther
+/// from neutral (the same at every call) are tried in turn. When none closes, the attempt that came nearest.
+AssemblyResult findClosedConfiguration(const Model& model, const AssemblyOptions& options = {});
 
 /// The assembly problem of a reference of the robot's file: joint wishes, feet flat at their places, height.
 AssemblyProblem makeReferenceProblem(const Model& model, const Reference& reference);
