@@ -15,6 +15,8 @@
 //     dq+ = e - h J_d W^{-1} J^T A^{-1} J' e,     dw' = dw - W^{-1} H dq - W^{-1} J^T A^{-1} J' e                     (f)
 //     dy+ = (W N')^T dq+,   dy_v+ = (W N')^T dw' - S dy+,   mu = J'^{+T} W w'                                         (g)
 // S is there because the projection of w' turns with q+. With a gap, the result is read about the node state's own basis.
+#include <Eigen/LU>
+
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/reduced_derivatives.h"
 #include "bielle/dynamics/rnea.h"
@@ -40,6 +42,7 @@ struct Block {
     Y.setZero(l.rank, 2 * r);
     G.setZero(l.rank, n);
     At.setZero(l.rank, l.rank);
+    pivots.resize(l.rank);
     for (MatrixXd* x : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a, &S}) x->setZero(r, r);
   }
   const LoopBlock& loop;
@@ -52,6 +55,7 @@ struct Block {
   MatrixXd Jd, H;                                      // n x n, Eqs. (e), (f); of J_d the blocks of curved joints
   MatrixXd HN, WHN, HnNn, EN, L, T, LJ, beta, wy, wv;  // n x r
   MatrixXd X, Y, G, At;                                // rank x r, 2 r, n, rank
+  std::vector<int> pivots;                             // of At
   MatrixXd q_y, q_v, q_a, v_y, v_v, v_a, S;            // r x r: dq+ and dv+ by dy, dy_v, dy'; S of Eq. (g)
 };
 
@@ -508,10 +512,11 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   b.Y.setZero();
   addSmallProduct(b.G, WNn, b.Y.leftCols(r));
   addSmallProduct(base.JW, WNn, b.Y.rightCols(r));
-  if (!solveSmall(b.At, b.Y)) {
+  if (!factorizeSmall(b.At, b.pivots)) {
     failure_ = "closure '" + loop.closures.closures.front().name + "': the step turns its loops too far";
     return false;
   }
+  solveFactorized(b.At, b.pivots, b.Y);
   // dy+ = L^T e, and T^T = N'^T J^T A^{-1} J'
   b.L = WNn;
   addSmallProductTransposed(next.J, b.Y.leftCols(r), b.L, -h);

@@ -1,6 +1,8 @@
 #pragma once
 /// \file Products and triangular solves of matrices of a few rows, where a general routine spends more on its own
 /// administration than on arithmetic. Column-major; inner loops run down columns, so that the compiler vectorizes them.
+#include <vector>
+
 #include "bielle/math/types.h"
 
 namespace bielle {
@@ -37,24 +39,32 @@ inline void addSmallProductTransposed(const A_& A, const B_& B, C_&& out, double
 /// Solves L L^T X = B in place, L the lower triangle of `factor` (n x n), X (n x m).
 template <typename L_, typename X_>
 inline void solveSmallCholesky(const L_& factor, X_&& X) {
-  const Eigen::Index n = factor.rows(), m = X.cols();
-  for (Eigen::Index c = 0; c < m; ++c) {
-    double* __restrict x = X.data() + c * X.outerStride();
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const double* __restrict l = factor.data() + k * factor.outerStride();
-      const double f = x[k] /= l[k];
+  const Eigen::Index n = factor.rows(), m = X.cols(), stride = X.outerStride();
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double* __restrict l = factor.data() + k * factor.outerStride();
+    const double inverse = 1 / l[k];
+    double* __restrict x = X.data();
+    for (Eigen::Index c = 0; c < m; ++c, x += stride) {
+      const double f = x[k] *= inverse;
       for (Eigen::Index r = k + 1; r < n; ++r) x[r] -= f * l[r];
     }
-    for (Eigen::Index k = n - 1; k >= 0; --k) {
-      const double* __restrict l = factor.data() + k * factor.outerStride();
+  }
+  for (Eigen::Index k = n - 1; k >= 0; --k) {
+    const double* __restrict l = factor.data() + k * factor.outerStride();
+    const double inverse = 1 / l[k];
+    double* __restrict x = X.data();
+    for (Eigen::Index c = 0; c < m; ++c, x += stride) {
       double sum = x[k];
       for (Eigen::Index r = k + 1; r < n; ++r) sum -= l[r] * x[r];
-      x[k] = sum / l[k];
+      x[k] = sum * inverse;
     }
   }
 }
 
-/// Solves A X = B in place by elimination with partial pivoting, A (n x n) is destroyed, X (n x m). False when A is singular.
-bool solveSmall(MatrixRef A, MatrixRef X);
+/// Factors of A (n x n) in place by elimination with partial pivoting; `pivots` (n) holds the row each was swapped with.
+/// False when A is singular.
+bool factorizeSmall(MatrixRef A, std::vector<int>& pivots);
+/// Solves A X = B in place with the factors of A, X (n x m).
+void solveFactorized(ConstMatrixRef factors, const std::vector<int>& pivots, MatrixRef X);
 
 }  // namespace bielle
