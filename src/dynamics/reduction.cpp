@@ -16,6 +16,10 @@ constexpr double kClosedTolerance = 1e-13;    // what close() aims at
 constexpr double kAcceptedTolerance = 1e-11;  // what it accepts when rounding stops it
 constexpr double kRankTolerance = 1e-6;       // diagonal of L, relative to its first entry
 
+// Rows of a factorization that one operation works on.
+constexpr int kLane = 8;
+using Lane = Eigen::Array<double, kLane, 1>;
+
 // The cluster's joints over their common root, which becomes the world of the block.
 Model makeBlockModel(const Model& model, const LoopCluster& cluster, const std::vector<int>& joints) {
   ModelBuilder builder("loops of " + model.name());
@@ -137,9 +141,9 @@ BlockPoint::BlockPoint(const LoopBlock& block) : ws_(block.model) {
   for (VectorXd* v : {&zeta_, &correction_}) v->setZero(block.rank);
   step_.setZero(n);
   J_all_.setZero(m, n);
-  factor_.setZero(m, n);
+  factor_.setZero((m + kLane - 1) / kLane * kLane, n);
   reflectors_.setZero(n, block.rank);
-  for (VectorXd* v : {&rest_, &reflected_}) v->setZero(m);
+  rest_.setZero(m);
   newton_.setZero(block.rank, block.rank);
   pivots_.resize(block.rank);
   row_order_.resize(m);
@@ -167,9 +171,9 @@ void BlockPoint::selectIndependent(const MatrixXd& all, MatrixXd& out) const {
 // Rows are taken by what the ones before leave of them, largest first. False when the rank is another than the block's.
 bool BlockPoint::factorize(const LoopBlock& block) {
   MatrixXd& E = factor_;
-  const int m = static_cast<int>(E.rows()), n = static_cast<int>(E.cols()), rank = block.rank;
-  for (int k = 0; k < n; ++k) E.col(k) = J_all_.col(k) * block.inverse_root[k];
-  rest_ = E.rowwise().squaredNorm();
+  const int m = static_cast<int>(residual_.size()), n = static_cast<int>(E.cols()), rank = block.rank;
+  E.topRows(m) = J_all_ * block.inverse_root.asDiagonal();
+  rest_ = E.topRows(m).rowwise().squaredNorm();
   std::iota(row_order_.begin(), row_order_.end(), 0);
   double first = 0, last = 0;
   for (int p = 0; p < rank; ++p) {
@@ -177,7 +181,7 @@ bool BlockPoint::factorize(const LoopBlock& block) {
     for (int r = p + 1; r < m; ++r)
       if (rest_[r] > rest_[row]) row = r;
     if (row != p) {
-      E.row(p).swap(E.row(row));
+      for (int k = 0; k < n; ++k) std::swap(E(p, k), E(row, k));
       std::swap(row_order_[p], row_order_[row]);
       std::swap(rest_[p], rest_[row]);
     }
@@ -193,16 +197,13 @@ bool BlockPoint::factorize(const LoopBlock& block) {
     last = norm;
     const double scale = 1 / std::sqrt(norm * (norm + std::abs(v[p])));
     v[p] -= pivot;
-    reflected_.setZero();
-    for (int k = p; k < n; ++k) {
-      v[k] *= scale;
-      reflected_ += v[k] * E.col(k);
+    for (int k = p; k < n; ++k) v[k] *= scale;
+    for (Eigen::Index lane = 0; lane < E.rows(); lane += kLane) {
+      Lane sum = Lane::Zero();
+      for (int k = p; k < n; ++k) sum += v[k] * Eigen::Map<const Lane>(&E(lane, k));
+      for (int k = p; k < n; ++k) Eigen::Map<Lane>(&E(lane, k)) -= v[k] * sum;
     }
-    for (int k = p; k < n; ++k) {
-      E.col(k) -= v[k] * reflected_;
-      E(p, k) = 0;
-    }
-    E(p, p) = pivot;
+    for (int k = p + 1; k < n; ++k) E(p, k) = 0;
     for (int r = p + 1; r < m; ++r) rest_[r] -= E(r, p) * E(r, p);
   }
   // What is left must be nothing but rounding.
@@ -234,6 +235,17 @@ bool BlockPoint::updateBases(const LoopBlock& block) {
   selectIndependent(J_all_, basis_.J);
   for (int k = 0; k < n; ++k) basis_.JW.col(k) = basis_.J.col(k) / block.metric[k];
   return true;
+}
+
+void BlockPoint::assign(const BlockPoint& other) {
+  basis_ = other.basis_;
+  factor_ = other.factor_;
+  gap_ = other.gap_;
+  closed_ = other.closed_;
+  ws_.q = other.ws_.q;
+  ws_.X_WB = other.ws_.X_WB;
+  ws_.J = other.ws_.J;
+  ws_.stage = WorkspaceStage::Position;
 }
 
 bool BlockPoint::update(const LoopBlock& block, ConstVectorRef q) {

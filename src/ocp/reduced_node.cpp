@@ -15,8 +15,6 @@
 //     dq+ = e - h J_d W^{-1} J^T A^{-1} J' e,     dw' = dw - W^{-1} H dq - W^{-1} J^T A^{-1} J' e                     (f)
 //     dy+ = (W N')^T dq+,   dy_v+ = (W N')^T dw' - S dy+,   mu = J'^{+T} W w'                                         (g)
 // S is there because the projection of w' turns with q+. With a gap, the result is read about the node state's own basis.
-#include <Eigen/LU>
-
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/reduced_derivatives.h"
 #include "bielle/dynamics/rnea.h"
@@ -43,7 +41,9 @@ struct Block {
     G.setZero(l.rank, n);
     At.setZero(l.rank, l.rank);
     pivots.resize(l.rank);
-    for (MatrixXd* x : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a, &S}) x->setZero(r, r);
+    for (MatrixXd* x : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a, &S, &mixed, &Pq, &Pv, &Pz}) x->setZero(r, r);
+    target.setZero(r);
+    mixed_pivots.resize(r);
   }
   const LoopBlock& loop;
   BlockPoint at, next, scratch;  // at the state; at q+; for integrate() and open gaps
@@ -57,6 +57,9 @@ struct Block {
   MatrixXd X, Y, G, At;                                // rank x r, 2 r, n, rank
   std::vector<int> pivots;                             // of At
   MatrixXd q_y, q_v, q_a, v_y, v_v, v_a, S;            // r x r: dq+ and dv+ by dy, dy_v, dy'; S of Eq. (g)
+  MatrixXd mixed, Pq, Pv, Pz;                          // r x r: change of basis, of integrate() and at open gaps
+  VectorXd target;                                     // r
+  std::vector<int> mixed_pivots;
 };
 
 // out = -J^+ X; X is overwritten.
@@ -125,9 +128,17 @@ class ReducedNode : public NodeModel {
       }
       // The velocity at the new point whose coordinates about the old one are N^T v + dy_v.
       gatherVelocity(loop, x.tail(model_.nv()), b.v);
-      const JointVectorR target = b.chart.WN.transpose() * b.v + dx.segment(nr + loop.offset, loop.size);
-      const JointMatrixR mixed = b.chart.WN.transpose() * b.scratch.basis().N;
-      b.v.noalias() = b.scratch.basis().N * mixed.partialPivLu().solve(target);
+      b.target = dx.segment(nr + loop.offset, loop.size);
+      addSmallProductTransposed(b.chart.WN, b.v, b.target);
+      b.mixed.setZero();
+      addSmallProductTransposed(b.chart.WN, b.scratch.basis().N, b.mixed);
+      if (!factorizeSmall(b.mixed, b.mixed_pivots)) {
+        failure_ = "closure '" + loop.closures.closures.front().name + "': the step turns its loops too far";
+        x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
+        return;
+      }
+      solveFactorized(b.mixed, b.mixed_pivots, b.target);
+      b.v.noalias() = b.scratch.basis().N * b.target;
       scatterConfiguration(model_, loop, b.scratch.basis().q, x_out.head(nq));
       scatterVelocity(loop, b.v, x_out.tail(model_.nv()));
     }
@@ -184,7 +195,7 @@ class ReducedNode : public NodeModel {
 
   bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
   void linearizeState() override {
-    for (Block& b : blocks_) updateVelocityLift(b);
+    for (Block& b : blocks_) calcVelocityLift(b, b.at, b.Z);
     storeChart();
   }
   void addStateCost(const StateCost& cost, double scale, StageModel& out) override;
@@ -201,7 +212,7 @@ class ReducedNode : public NodeModel {
     for (size_t i = 0; i < blocks_.size(); ++i) {
       Block& b = blocks_[i];
       if (previous) {
-        b.at = previous->blocks_[i].next;
+        b.at.assign(previous->blocks_[i].next);
       } else {
         gatherConfiguration(model_, b.loop, x.head(nq), b.q);
         if (!b.at.update(b.loop, b.q)) return fail(b, b.at);
@@ -212,10 +223,6 @@ class ReducedNode : public NodeModel {
     return true;
   }
 
-  // Reduced sizes of one block are small, but no bound is known: fixed storage up to this many coordinates.
-  static constexpr int kMaxBlock = 12;
-  using JointVectorR = Eigen::Matrix<double, Eigen::Dynamic, 1>;
-  using JointMatrixR = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
   static const MatrixXd& BlockBasisN(const Block& b) { return b.at.basis().N; }
   static const MatrixXd& BlockZ(const Block& b) { return b.Z; }
   static const MatrixXd& BlockDy(const Block& b) { return b.dy; }
@@ -286,7 +293,8 @@ class ReducedNode : public NodeModel {
                      JointMatrix& hessian) const;
   void updateContacts();
   bool closeStep(ConstVectorRef x);
-  void updateVelocityLift(Block& b);
+  static void calcVelocityLift(Block& b, BlockPoint& point, MatrixXd& Z);
+  bool moveToNodeState(Block& b, StageModel& out);
   void updateBlockDerivatives(Block& b);
   void updateForces();
   static void updateForceDerivative(Block& b, const BlockPoint& point, const VectorXd& force);
@@ -357,21 +365,21 @@ bool ReducedNode::closeStep(ConstVectorRef x) {
   return true;
 }
 
-// Z of Eq. (a).
-void ReducedNode::updateVelocityLift(Block& b) {
+// Z of Eq. (a) at a point of the block whose velocities are there.
+void ReducedNode::calcVelocityLift(Block& b, BlockPoint& point, MatrixXd& Z) {
   const ConstraintSet& set = b.loop.closures;
   for (size_t c = 0; c < set.closures.size(); ++c)
-    calcClosureVelocityDerivative(b.at.workspace(), set.closures[c],
+    calcClosureVelocityDerivative(point.workspace(), set.closures[c],
                                   b.K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
-  b.at.selectIndependent(b.K, b.K_r);
+  point.selectIndependent(b.K, b.K_r);
   b.X.setZero();
-  addSmallProduct(b.K_r, b.at.basis().N, b.X);
-  applyPlus(b.at, b.X, b.Z);
+  addSmallProduct(b.K_r, point.basis().N, b.X);
+  applyPlus(point, b.X, Z);
 }
 
 // d_y and d_v of Eq. (c).
 void ReducedNode::updateBlockDerivatives(Block& b) {
-  updateVelocityLift(b);
+  calcVelocityLift(b, b.at, b.Z);
   gatherVelocity(b.loop, a_, b.a);
   updateAccelerations(b.loop.model, b.at.workspace(), b.a);
   const ConstraintSet& set = b.loop.closures;
@@ -554,38 +562,47 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   // About the node state, where a gap is open.
   gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), b.q);
   gatherVelocity(loop, x_next_node.tail(model_.nv()), b.d);
-  if (b.q != next.q || b.d != b.v_next) {
-    if (!b.scratch.update(loop, b.q)) return fail(b, b.scratch);
-    updateVelocities(loop.model, b.next.workspace(), b.v_next);
-    const ConstraintSet& set = loop.closures;
-    for (size_t c = 0; c < set.closures.size(); ++c)
-      calcClosureVelocityDerivative(b.next.workspace(), set.closures[c],
-                                    b.K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
-    b.next.selectIndependent(b.K, b.K_r);
-    MatrixXd Zn(loop.model.nv(), r);
-    b.X.noalias() = b.K_r * Nn;
-    applyPlus(b.next, b.X, Zn);
-    const MatrixXd& WNnode = b.scratch.basis().WN;
-    VectorXd gap(loop.model.nv());
-    loop.model.difference(b.q, next.q, gap);
-    MatrixXd Jdiff = MatrixXd::Identity(gap.size(), gap.size());
-    for (const Joint& joint : loop.model.joints()) {
-      if (!isCurved(joint)) continue;
-      const JointVector d = gap.segment(joint.idx_v, joint.nv);
-      calcJointDifferenceJacobian(joint, d, Jdiff.block(joint.idx_v, joint.idx_v, joint.nv, joint.nv));
-    }
-    out.gap.segment(o, r) = WNnode.transpose() * gap;
-    out.gap.segment(nr + o, r) = WNnode.transpose() * (b.v_next - b.d);
-    const MatrixXd Pq = WNnode.transpose() * Jdiff * Nn, Pv = WNnode.transpose() * Nn, Pz = WNnode.transpose() * Zn;
-    v_y = (Pv * v_y + Pz * q_y).eval();
-    v_v = (Pv * v_v + Pz * q_v).eval();
-    v_a = (Pv * v_a + Pz * q_a).eval();
-    q_y = (Pq * q_y).eval();
-    q_v = (Pq * q_v).eval();
-    q_a = (Pq * q_a).eval();
-  } else {
-    out.gap.segment(o, r).setZero();
-    out.gap.segment(nr + o, r).setZero();
+  if (b.q != next.q || b.d != b.v_next) return moveToNodeState(b, out);
+  out.gap.segment(o, r).setZero();
+  out.gap.segment(nr + o, r).setZero();
+  return true;
+}
+
+// The gap of a block to the node state (b.q, b.d), and its derivatives read there.
+bool ReducedNode::moveToNodeState(Block& b, StageModel& out) {
+  const LoopBlock& loop = b.loop;
+  const int nr = reduction_.size, r = loop.size, o = loop.offset;
+  if (!b.scratch.update(loop, b.q)) return fail(b, b.scratch);
+  const MatrixXd &WN = b.scratch.basis().WN, &Nn = b.next.basis().N;
+  updateVelocities(loop.model, b.next.workspace(), b.v_next);
+  calcVelocityLift(b, b.next, b.T);
+  loop.model.difference(b.q, b.next.basis().q, b.a);
+  b.w = b.v_next - b.d;
+  b.L = Nn;  // becomes J_diff N'
+  for (const Joint& joint : loop.model.joints()) {
+    if (!isCurved(joint)) continue;
+    const int i = joint.idx_v, n = joint.nv;
+    JointMatrix Jdiff(n, n);
+    calcJointDifferenceJacobian(joint, b.a.segment(i, n), Jdiff);
+    b.L.middleRows(i, n) = Jdiff.lazyProduct(Nn.middleRows(i, n));
+  }
+  out.gap.segment(o, r).setZero();
+  out.gap.segment(nr + o, r).setZero();
+  addSmallProductTransposed(WN, b.a, out.gap.segment(o, r));
+  addSmallProductTransposed(WN, b.w, out.gap.segment(nr + o, r));
+  for (MatrixXd* P : {&b.Pq, &b.Pv, &b.Pz}) P->setZero();
+  addSmallProductTransposed(WN, b.L, b.Pq);
+  addSmallProductTransposed(WN, Nn, b.Pv);
+  addSmallProductTransposed(WN, b.T, b.Pz);
+  const std::pair<MatrixXd*, MatrixXd*> derivatives[] = {{&b.q_y, &b.v_y}, {&b.q_v, &b.v_v}, {&b.q_a, &b.v_a}};
+  for (const auto& [dq, dv] : derivatives) {
+    b.S.setZero();
+    addSmallProduct(b.Pv, *dv, b.S);
+    addSmallProduct(b.Pz, *dq, b.S);
+    dv->swap(b.S);
+    b.S.setZero();
+    addSmallProduct(b.Pq, *dq, b.S);
+    dq->swap(b.S);
   }
   return true;
 }

@@ -80,6 +80,9 @@ class BlockPoint {
   /// \param zeta_guess  rank, where zeta is expected, or empty
   bool close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d, const VectorXd& zeta_guess);
 
+  /// Takes over the configuration of another point of the same block, its columns and bases; velocities are not.
+  void assign(const BlockPoint& other);
+
   const BlockBasis& basis() const { return basis_; }
   const VectorXd& zeta() const { return zeta_; }  ///< rank, of the last close()
   const VectorXd& step() const { return step_; }  ///< n, d - W^{-1} J(q_0)^T zeta of the last close()
@@ -103,8 +106,8 @@ class BlockPoint {
   Workspace ws_;
   VectorXd residual_, zeta_, step_, correction_;
   MatrixXd J_all_;
-  MatrixXd factor_, reflectors_;  // of J W^{-1/2}: L in the first columns, Householder vectors
-  VectorXd rest_, reflected_;     // what is left of each row; one column
+  MatrixXd factor_, reflectors_;  // of J W^{-1/2}: L in the first columns, rows padded; Householder vectors
+  VectorXd rest_;                 // squared norms of what is left of the rows
   MatrixXd newton_;               // factors of the matrix of close()
   std::vector<int> row_order_, pivots_;
   double gap_ = 0;
