@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
@@ -141,12 +141,15 @@ BlockPoint::BlockPoint(const LoopBlock& block) : ws_(block.model) {
   for (VectorXd* v : {&zeta_, &correction_}) v->setZero(block.rank);
   step_.setZero(n);
   J_all_.setZero(m, n);
-  factor_.setZero((m + kLane - 1) / kLane * kLane, n);
+  const int padded = (m + kLane - 1) / kLane * kLane;
+  reflected_.setZero(padded, n);
+  products_.setZero(padded);
+  beta_.setZero(block.rank);
+  L_.setZero(block.rank, block.rank);
   reflectors_.setZero(n, block.rank);
   rest_.setZero(m);
   newton_.setZero(block.rank, block.rank);
   pivots_.resize(block.rank);
-  row_order_.resize(m);
 }
 
 void BlockPoint::updateJacobian(const LoopBlock& block) {
@@ -167,48 +170,48 @@ void BlockPoint::selectIndependent(const MatrixXd& all, MatrixXd& out) const {
     for (size_t i = 0; i < basis_.rows.size(); ++i) out(i, k) = all(basis_.rows[i], k);
 }
 
-// J W^{-1/2} = [L, 0] Q^T with the Householder vectors of Q = H_1 H_2 ... in the columns of `reflectors_`, H = I - v v^T.
-// Rows are taken by what the ones before leave of them, largest first. False when the rank is another than the block's.
+// J W^{-1/2} = [L, 0] Q^T with Q = H_1 H_2 ..., H = I - beta v v^T, the v in the columns of `reflectors_`. Rows are taken
+// by what the ones before leave of them, largest first. False when the rank is another than the block's.
 bool BlockPoint::factorize(const LoopBlock& block) {
-  MatrixXd& E = factor_;
-  const int m = static_cast<int>(residual_.size()), n = static_cast<int>(E.cols()), rank = block.rank;
+  MatrixXd& E = reflected_;
+  const int m = static_cast<int>(rest_.size()), n = static_cast<int>(E.cols()), rank = block.rank;
   E.topRows(m) = J_all_ * block.inverse_root.asDiagonal();
   rest_ = E.topRows(m).rowwise().squaredNorm();
-  std::iota(row_order_.begin(), row_order_.end(), 0);
   double first = 0, last = 0;
   for (int p = 0; p < rank; ++p) {
-    int row = p;
-    for (int r = p + 1; r < m; ++r)
+    int row = 0;
+    for (int r = 1; r < m; ++r)
       if (rest_[r] > rest_[row]) row = r;
-    if (row != p) {
-      for (int k = 0; k < n; ++k) std::swap(E(p, k), E(row, k));
-      std::swap(row_order_[p], row_order_[row]);
-      std::swap(rest_[p], rest_[row]);
-    }
+    basis_.rows[p] = row;
     double* v = &reflectors_(0, p);
-    double squares = 0;
-    for (int k = p; k < n; ++k) {
-      v[k] = E(p, k);
-      squares += v[k] * v[k];
-    }
-    const double norm = std::sqrt(squares), pivot = v[p] > 0 ? -norm : norm;
-    if (p == 0) first = norm;
-    if (!(norm > kRankTolerance * first)) return false;
-    last = norm;
-    const double scale = 1 / std::sqrt(norm * (norm + std::abs(v[p])));
-    v[p] -= pivot;
-    for (int k = p; k < n; ++k) v[k] *= scale;
+    for (int k = p; k < n; ++k) v[k] = E(row, k);
+    // E x for the row x, |x|^2 among it, and with v = x - pivot e_p from it E v.
     for (Eigen::Index lane = 0; lane < E.rows(); lane += kLane) {
       Lane sum = Lane::Zero();
       for (int k = p; k < n; ++k) sum += v[k] * Eigen::Map<const Lane>(&E(lane, k));
-      for (int k = p; k < n; ++k) Eigen::Map<Lane>(&E(lane, k)) -= v[k] * sum;
+      products_.segment<kLane>(lane).array() = sum;
     }
-    for (int k = p + 1; k < n; ++k) E(p, k) = 0;
-    for (int r = p + 1; r < m; ++r) rest_[r] -= E(r, p) * E(r, p);
+    const double norm = std::sqrt(products_[row]), pivot = v[p] > 0 ? -norm : norm;
+    if (p == 0) first = norm;
+    if (!(norm > kRankTolerance * first)) return false;
+    last = norm;
+    const double beta = 1 / (norm * (norm + std::abs(v[p])));
+    beta_[p] = beta;
+    v[p] -= pivot;
+    for (Eigen::Index lane = 0; lane < E.rows(); lane += kLane) {
+      const Lane Ev = products_.segment<kLane>(lane).array() - pivot * Eigen::Map<const Lane>(&E(lane, p));
+      const Lane scaled = beta * Ev;
+      for (int k = p; k < n; ++k) Eigen::Map<Lane>(&E(lane, k)) -= v[k] * scaled;
+    }
+    for (int r = 0; r < m; ++r) rest_[r] -= E(r, p) * E(r, p);
+    rest_[row] = -std::numeric_limits<double>::infinity();
   }
+  for (int k = 0; k < rank; ++k)
+    for (int p = k; p < rank; ++p) L_(p, k) = E(basis_.rows[p], k);
   // What is left must be nothing but rounding.
   double left = 0;
-  for (int r = rank; r < m; ++r) left = std::max(left, E.row(r).tail(n - rank).norm());
+  for (int r = 0; r < m; ++r)
+    if (std::isfinite(rest_[r])) left = std::max(left, E.row(r).tail(n - rank).norm());
   return left <= kRankTolerance * last || left <= 1e-3 * kRankTolerance * first;
 }
 
@@ -216,30 +219,31 @@ bool BlockPoint::factorize(const LoopBlock& block) {
 bool BlockPoint::updateBases(const LoopBlock& block) {
   const int rank = block.rank, size = block.size, n = static_cast<int>(block.metric.size());
   if (!factorize(block)) return false;
-  for (int c = 0; c < size; ++c) {
-    double *x = &basis_.N(0, c), *Wx = &basis_.WN(0, c);
-    std::fill(x, x + n, 0.0);
-    x[rank + c] = 1;
-    for (int p = rank - 1; p >= 0; --p) {
-      const double* v = &reflectors_(0, p);
+  MatrixXd& N = basis_.N;
+  N.setZero();
+  for (int c = 0; c < size; ++c) N(rank + c, c) = 1;
+  for (int p = rank - 1; p >= 0; --p) {
+    const double* v = &reflectors_(0, p);
+    for (int c = 0; c < size; ++c) {
       double dot = 0;
-      for (int k = p; k < n; ++k) dot += v[k] * x[k];
-      for (int k = p; k < n; ++k) x[k] -= dot * v[k];
-    }
-    for (int k = 0; k < n; ++k) {
-      Wx[k] = x[k] / block.inverse_root[k];
-      x[k] *= block.inverse_root[k];
+      for (int k = p; k < n; ++k) dot += v[k] * N(k, c);
+      dot *= beta_[p];
+      for (int k = p; k < n; ++k) N(k, c) -= dot * v[k];
     }
   }
-  std::copy(row_order_.begin(), row_order_.begin() + rank, basis_.rows.begin());
+  for (int c = 0; c < size; ++c)
+    for (int k = 0; k < n; ++k) {
+      N(k, c) *= block.inverse_root[k];
+      basis_.WN(k, c) = block.metric[k] * N(k, c);
+    }
   selectIndependent(J_all_, basis_.J);
-  for (int k = 0; k < n; ++k) basis_.JW.col(k) = basis_.J.col(k) / block.metric[k];
+  for (int k = 0; k < n; ++k) basis_.JW.col(k) = basis_.J.col(k) * (block.inverse_root[k] * block.inverse_root[k]);
   return true;
 }
 
 void BlockPoint::assign(const BlockPoint& other) {
   basis_ = other.basis_;
-  factor_ = other.factor_;
+  L_ = other.L_;
   gap_ = other.gap_;
   closed_ = other.closed_;
   ws_.q = other.ws_.q;

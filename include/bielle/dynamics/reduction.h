@@ -92,7 +92,7 @@ class BlockPoint {
   Workspace& workspace() { return ws_; }
   const Workspace& workspace() const { return ws_; }
   /// (J W^{-1} J^T)^{-1} X in place (rank x k); JW^T times it is J^+ X.
-  void solveGram(MatrixRef X) const { solveSmallCholesky(factor_.topLeftCorner(newton_.rows(), newton_.rows()), X); }
+  void solveGram(MatrixRef X) const { solveSmallCholesky(L_, X); }
   /// Independent rows out of all rows (m x k -> rank x k).
   void selectIndependent(const MatrixXd& all, MatrixXd& out) const;
 
@@ -106,10 +106,11 @@ class BlockPoint {
   Workspace ws_;
   VectorXd residual_, zeta_, step_, correction_;
   MatrixXd J_all_;
-  MatrixXd factor_, reflectors_;  // of J W^{-1/2}: L in the first columns, rows padded; Householder vectors
-  VectorXd rest_;                 // squared norms of what is left of the rows
+  MatrixXd L_;                         // rank x rank, Cholesky factor of J W^{-1} J^T
+  MatrixXd reflected_, reflectors_;    // of J W^{-1/2}, rows padded; Householder vectors
+  VectorXd beta_, products_, rest_;    // their scales; scratch; squared norms of what is left of the rows
   MatrixXd newton_;               // factors of the matrix of close()
-  std::vector<int> row_order_, pivots_;
+  std::vector<int> pivots_;
   double gap_ = 0;
   bool closed_ = false;  // the last close() got as far as the bases
 };
