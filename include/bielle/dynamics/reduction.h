@@ -106,10 +106,10 @@ class BlockPoint {
   Workspace ws_;
   VectorXd residual_, zeta_, step_, correction_;
   MatrixXd J_all_;
-  MatrixXd L_;                         // rank x rank, Cholesky factor of J W^{-1} J^T
-  MatrixXd reflected_, reflectors_;    // of J W^{-1/2}, rows padded; Householder vectors
-  VectorXd beta_, products_, rest_;    // their scales; scratch; squared norms of what is left of the rows
-  MatrixXd newton_;               // factors of the matrix of close()
+  MatrixXd L_;                       // rank x rank, Cholesky factor of J W^{-1} J^T
+  MatrixXd reflected_, reflectors_;  // of J W^{-1/2}, rows padded; Householder vectors
+  VectorXd beta_, products_, rest_;  // their scales; scratch; squared norms of what is left of the rows
+  MatrixXd newton_;                  // factors of the matrix of close()
   std::vector<int> pivots_;
   double gap_ = 0;
   bool closed_ = false;  // the last close() got as far as the bases

@@ -13,7 +13,8 @@ inline void addSmallColumns(const A_& A, const B_& B, Eigen::Index column, Eigen
   using Rows_ = Eigen::Array<double, Rows, 1>;
   Rows_ sum = Rows_::Zero();
   const double* a = A.data() + row;
-  for (Eigen::Index k = 0; k < A.cols(); ++k, a += A.outerStride()) sum += B.coeff(k, column) * Eigen::Map<const Rows_>(a);
+  for (Eigen::Index k = 0; k < A.cols(); ++k, a += A.outerStride())
+    sum += B.coeff(k, column) * Eigen::Map<const Rows_>(a);
   Eigen::Map<Rows_>(out + row) += s * sum;
 }
 

@@ -1,0 +1,93 @@
+// Costs in the coordinates of reduced_node.h.
+#include "reduced_node.h"
+
+namespace bielle {
+
+// Gradient and Hessian of a state cost with respect to the dofs of one joint.
+void ReducedNode::calcJointCost(const StateCost& state, double w, const Joint& joint, JointVector& gradient,
+                                JointMatrix& hessian) const {
+  const int n = joint.nv;
+  const JointVector weights = w * state.weights.segment(joint.idx_v, n);
+  JointVector d(n);
+  calcJointDifference(joint, state.q_ref.segment(joint.idx_q, joint.nq), ws_.q.segment(joint.idx_q, joint.nq), d);
+  if (!isCurved(joint)) {
+    gradient = weights.cwiseProduct(d);
+    hessian = weights.asDiagonal();
+    return;
+  }
+  JointMatrix J(n, n);
+  calcJointDifferenceJacobian(joint, d, J);
+  const JointMatrix WJ = weights.asDiagonal() * J;
+  gradient.noalias() = WJ.transpose() * d;
+  hessian.noalias() = J.transpose() * WJ;
+}
+
+void ReducedNode::addStateCost(const StateCost& state, double scale, StageModel& out) {
+  const int nv = model_.nv(), nr = reduction_.size;
+  const double w = scale * state.weight;
+  JointVector gradient;
+  JointMatrix hessian;
+  for (const FreeJoint& free : free_joints_) {
+    const Joint& joint = model_.joints()[free.joint];
+    const int o = free.offset, n = joint.nv, k = joint.idx_v;
+    calcJointCost(state, w, joint, gradient, hessian);
+    out.lx.segment(o, n) += gradient;
+    out.lxx.block(o, o, n, n) += hessian;
+    const JointVector weights = w * state.weights.segment(nv + k, n);
+    out.lx.segment(nr + o, n) += weights.cwiseProduct(ws_.v.segment(k, n) - state.v_ref.segment(k, n));
+    out.lxx.block(nr + o, nr + o, n, n).diagonal() += weights;
+  }
+  for (Block& b : blocks_) {
+    // Changes of q are N dy, of v N dy_v + Z dy: gradients by dof, and Hessians times N and Z.
+    const int o = b.loop.offset, r = b.loop.size;
+    const MatrixXd& N = b.at.basis().N;
+    for (size_t j = 0; j < b.loop.joints.size(); ++j) {
+      const Joint& joint = model_.joints()[b.loop.joints[j]];
+      const int at = b.loop.model.joints()[j + 1].idx_v, n = joint.nv;
+      calcJointCost(state, w, joint, gradient, hessian);
+      b.gradient_q.segment(at, n) = gradient;
+      b.HN.middleRows(at, n) = hessian.lazyProduct(N.middleRows(at, n));
+    }
+    for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
+      const int dof = b.loop.dofs[k];
+      const double weight = w * state.weights[nv + dof];
+      b.gradient_v[k] = weight * (ws_.v[dof] - state.v_ref[dof]);
+      b.wy.row(k) = weight * b.Z.row(k);
+      b.wv.row(k) = weight * N.row(k);
+    }
+    addSmallProductTransposed(N, b.gradient_q, out.lx.segment(o, r));
+    addSmallProductTransposed(b.Z, b.gradient_v, out.lx.segment(o, r));
+    addSmallProductTransposed(N, b.gradient_v, out.lx.segment(nr + o, r));
+    addSmallProductTransposed(N, b.HN, out.lxx.block(o, o, r, r));
+    addSmallProductTransposed(b.Z, b.wy, out.lxx.block(o, o, r, r));
+    addSmallProductTransposed(b.Z, b.wv, out.lxx.block(o, nr + o, r, r));
+    addSmallProductTransposed(b.wv, b.Z, out.lxx.block(nr + o, o, r, r));
+    addSmallProductTransposed(N, b.wv, out.lxx.block(nr + o, nr + o, r, r));
+  }
+}
+
+void ReducedNode::addResiduals(const ResidualStack& stack, bool running, StageModel& out) {
+  const int nr = reduction_.size, rows = static_cast<int>(stack.r.size()), nu = model_.nu();
+  if (Rx_.rows() != rows) {
+    Rx_.setZero(rows, 2 * nr);
+    Ru_.setZero(rows, nu);
+  }
+  Rx_.setZero();
+  addColumns(stack.q, &BlockBasisN, Rx_.leftCols(nr));
+  addColumns(stack.v, &BlockZ, Rx_.leftCols(nr));
+  addColumns(stack.v, &BlockBasisN, Rx_.rightCols(nr));
+  if (running && contact_rows_ > 0) {
+    Rx_.noalias() += stack.lambda.rightCols(contact_rows_) * dlambda_.leftCols(2 * nr);
+    Ru_.noalias() = stack.lambda.rightCols(contact_rows_) * dlambda_.rightCols(nu);
+  }
+  scaled_ = stack.hessian.asDiagonal() * Rx_;
+  out.lx.noalias() += Rx_.transpose() * stack.gradient;
+  out.lxx.noalias() += Rx_.transpose() * scaled_;
+  if (!running) return;
+  Ru_scaled_ = stack.hessian.asDiagonal() * Ru_;
+  out.lu.noalias() += Ru_.transpose() * stack.gradient;
+  out.luu.noalias() += Ru_.transpose() * Ru_scaled_;
+  out.lux.noalias() += Ru_.transpose() * scaled_;
+}
+
+}  // namespace bielle
