@@ -82,7 +82,8 @@ void ReducedNode::addResiduals(const ResidualStack& stack, bool running, StageMo
   }
   scaled_ = stack.hessian.asDiagonal() * Rx_;
   out.lx.noalias() += Rx_.transpose() * stack.gradient;
-  out.lxx.noalias() += Rx_.transpose() * scaled_;
+  out.lxx.triangularView<Eigen::Lower>() += Rx_.transpose() * scaled_;
+  out.lxx.triangularView<Eigen::StrictlyUpper>() = out.lxx.transpose();
   if (!running) return;
   Ru_scaled_ = stack.hessian.asDiagonal() * Ru_;
   out.lu.noalias() += Ru_.transpose() * stack.gradient;
