@@ -12,6 +12,42 @@ void applyPlus(const BlockPoint& point, MatrixXd& X, MatrixXd& out) {
   addSmallProductTransposed(point.basis().JW, X, out, -1);
 }
 
+// Rows of a unit with `size` coordinates from `offset` on: q_a and v_a (size x size) times the derivatives of y'. Sizes
+// known to the compiler make a few instructions of a column.
+template <typename Size>
+void assembleRows(Size size, const double* __restrict q_a, const double* __restrict v_a, int offset, ConstMatrixRef dydd,
+                  MatrixXd& F) {
+  for (Eigen::Index c = 0; c < F.cols(); ++c) {
+    const double* ydd = dydd.data() + c * dydd.outerStride() + offset;
+    double *__restrict q = &F(offset, c), *__restrict v = q + F.rows() / 2;
+    for (int i = 0; i < size; ++i) q[i] = v[i] = 0;
+    for (int k = 0; k < size; ++k) {
+      const double y = ydd[k];
+      for (int i = 0; i < size; ++i) {
+        q[i] += q_a[k * size + i] * y;
+        v[i] += v_a[k * size + i] * y;
+      }
+    }
+  }
+}
+
+template <typename Matrix>
+void assembleUnit(const Matrix& q_a, const Matrix& v_a, int offset, ConstMatrixRef dydd, MatrixXd& F) {
+  const auto assemble = [&](auto size) { assembleRows(size, q_a.data(), v_a.data(), offset, dydd, F); };
+  switch (q_a.rows()) {
+    case 1:
+      return assemble(std::integral_constant<int, 1>());
+    case 2:
+      return assemble(std::integral_constant<int, 2>());
+    case 3:
+      return assemble(std::integral_constant<int, 3>());
+    case 6:
+      return assemble(std::integral_constant<int, 6>());
+    default:
+      return assemble(static_cast<int>(q_a.rows()));
+  }
+}
+
 }  // namespace
 
 // Z of Eq. (a) at a point of the block whose velocities are there.
@@ -270,38 +306,21 @@ void ReducedNode::linearizeFreeJoint(FreeJoint& free, const StageModel& out) con
     free.q_y.noalias() = Jdiff * Jq;
     free.q_v.noalias() = h * Jdiff * Jd;
   }
+  free.q_a = h * free.q_v;
+  free.v_a = h * JointMatrix::Identity(n, n);
 }
 
-// Fx and Fu, column by column, out of the derivatives of y' and what each unit makes of them.
+// Fx and Fu out of the derivatives of y' and what each unit makes of them.
 void ReducedNode::assembleStep(StageModel& out) const {
-  const int nr = reduction_.size, nu = model_.nu();
-  const double h = spec_.dt;
-  for (int c = 0; c < 2 * nr + nu; ++c) {
-    const double* ydd = &dydd_(0, c);
-    double* column = c < 2 * nr ? &out.Fx(0, c) : &out.Fu(0, c - 2 * nr);
-    for (const FreeJoint& free : free_joints_) {
-      const int n = static_cast<int>(free.q_v.rows()), o = free.offset;
-      for (int i = 0; i < n; ++i) column[nr + o + i] = h * ydd[o + i];
-      if (n == 1) {
-        column[o] = h * free.q_v(0, 0) * ydd[o];
-        continue;
-      }
-      for (int i = 0; i < n; ++i) column[o + i] = 0;
-      for (int k = 0; k < n; ++k)
-        for (int i = 0; i < n; ++i) column[o + i] += free.q_v(i, k) * (h * ydd[o + k]);
-    }
-    for (const Block& b : blocks_) {
-      const int o = b.loop.offset, r = b.loop.size;
-      for (int i = 0; i < r; ++i) {
-        double q = 0, v = 0;
-        for (int k = 0; k < r; ++k) {
-          q += b.q_a(i, k) * ydd[o + k];
-          v += b.v_a(i, k) * ydd[o + k];
-        }
-        column[o + i] = q;
-        column[nr + o + i] = v;
-      }
-    }
+  const int nr = reduction_.size;
+  const auto state = dydd_.leftCols(2 * nr), control = dydd_.rightCols(model_.nu());
+  for (const FreeJoint& free : free_joints_) {
+    assembleUnit(free.q_a, free.v_a, free.offset, state, out.Fx);
+    assembleUnit(free.q_a, free.v_a, free.offset, control, out.Fu);
+  }
+  for (const Block& b : blocks_) {
+    assembleUnit(b.q_a, b.v_a, b.loop.offset, state, out.Fx);
+    assembleUnit(b.q_a, b.v_a, b.loop.offset, control, out.Fu);
   }
   for (const FreeJoint& free : free_joints_) {
     const int n = static_cast<int>(free.q_v.rows()), o = free.offset;

@@ -60,10 +60,10 @@ struct ReducedBlock {
   std::vector<int> mixed_pivots;
 };
 
-// A joint outside all loops at one node: what dq+ makes of dy and of dv+.
+// A joint outside all loops at one node: what dq+ makes of dy and of dv+, dq+ and dv+ of dy'.
 struct FreeJoint {
   int joint = 0, offset = 0;
-  JointMatrix q_y, q_v;  // nv x nv of the joint
+  JointMatrix q_y, q_v, q_a, v_a;  // nv x nv of the joint
 };
 
 class ReducedNode : public NodeModel {
