@@ -45,50 +45,56 @@ void ReducedNode::addStateCost(const StateCost& state, double scale, StageModel&
       const Joint& joint = model_.joints()[b.loop.joints[j]];
       const int at = b.loop.model.joints()[j + 1].idx_v, n = joint.nv;
       calcJointCost(state, w, joint, gradient, hessian);
-      b.gradient_q.segment(at, n) = gradient;
-      b.HN.middleRows(at, n) = hessian.lazyProduct(N.middleRows(at, n));
+      b.work->gradient_q.segment(at, n) = gradient;
+      b.work->HN.middleRows(at, n) = hessian.lazyProduct(N.middleRows(at, n));
     }
     for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
       const int dof = b.loop.dofs[k];
       const double weight = w * state.weights[nv + dof];
-      b.gradient_v[k] = weight * (ws_.v[dof] - state.v_ref[dof]);
-      b.wy.row(k) = weight * b.Z.row(k);
-      b.wv.row(k) = weight * N.row(k);
+      b.work->gradient_v[k] = weight * (ws_.v[dof] - state.v_ref[dof]);
+      b.work->wy.row(k) = weight * b.work->Z.row(k);
+      b.work->wv.row(k) = weight * N.row(k);
     }
-    addSmallProductTransposed(N, b.gradient_q, out.lx.segment(o, r));
-    addSmallProductTransposed(b.Z, b.gradient_v, out.lx.segment(o, r));
-    addSmallProductTransposed(N, b.gradient_v, out.lx.segment(nr + o, r));
-    addSmallProductTransposed(N, b.HN, out.lxx.block(o, o, r, r));
-    addSmallProductTransposed(b.Z, b.wy, out.lxx.block(o, o, r, r));
-    addSmallProductTransposed(b.Z, b.wv, out.lxx.block(o, nr + o, r, r));
-    addSmallProductTransposed(b.wv, b.Z, out.lxx.block(nr + o, o, r, r));
-    addSmallProductTransposed(N, b.wv, out.lxx.block(nr + o, nr + o, r, r));
+    addSmallProductTransposed(N, b.work->gradient_q, out.lx.segment(o, r));
+    addSmallProductTransposed(b.work->Z, b.work->gradient_v, out.lx.segment(o, r));
+    addSmallProductTransposed(N, b.work->gradient_v, out.lx.segment(nr + o, r));
+    addSmallProductTransposed(N, b.work->HN, out.lxx.block(o, o, r, r));
+    addSmallProductTransposed(b.work->Z, b.work->wy, out.lxx.block(o, o, r, r));
+    addSmallProductTransposed(b.work->Z, b.work->wv, out.lxx.block(o, nr + o, r, r));
+    addSmallProductTransposed(b.work->wv, b.work->Z, out.lxx.block(nr + o, o, r, r));
+    addSmallProductTransposed(N, b.work->wv, out.lxx.block(nr + o, nr + o, r, r));
   }
 }
 
 void ReducedNode::addResiduals(const ResidualStack& stack, bool running, StageModel& out) {
   const int nr = reduction_.size, rows = static_cast<int>(stack.r.size()), nu = model_.nu();
-  if (Rx_.rows() != rows) {
-    Rx_.setZero(rows, 2 * nr);
-    Ru_.setZero(rows, nu);
+  if (work_->Rx.rows() < rows) {
+    work_->Rx.setZero(rows, 2 * nr);
+    work_->Ru.setZero(rows, nu);
+    work_->scaled.setZero(rows, 2 * nr);
+    work_->Ru_scaled.setZero(rows, nu);
   }
-  Rx_.setZero();
-  addColumns(stack.q, &BlockBasisN, Rx_.leftCols(nr));
-  addColumns(stack.v, &BlockZ, Rx_.leftCols(nr));
-  addColumns(stack.v, &BlockBasisN, Rx_.rightCols(nr));
+  auto Rx = work_->Rx.topRows(rows), Ru = work_->Ru.topRows(rows);
+  auto scaled = work_->scaled.topRows(rows), Ru_scaled = work_->Ru_scaled.topRows(rows);
+  Rx.setZero();
+  addColumns(stack.q, &BlockBasisN, Rx.leftCols(nr));
+  addColumns(stack.v, &BlockZ, Rx.leftCols(nr));
+  addColumns(stack.v, &BlockBasisN, Rx.rightCols(nr));
   if (running && contact_rows_ > 0) {
-    Rx_.noalias() += stack.lambda.rightCols(contact_rows_) * dlambda_.leftCols(2 * nr);
-    Ru_.noalias() = stack.lambda.rightCols(contact_rows_) * dlambda_.rightCols(nu);
+    Rx.noalias() += stack.lambda.rightCols(contact_rows_) * dlambda_.leftCols(2 * nr);
+    Ru.noalias() = stack.lambda.rightCols(contact_rows_) * dlambda_.rightCols(nu);
+  } else {
+    Ru.setZero();
   }
-  scaled_ = stack.hessian.asDiagonal() * Rx_;
-  out.lx.noalias() += Rx_.transpose() * stack.gradient;
-  out.lxx.triangularView<Eigen::Lower>() += Rx_.transpose() * scaled_;
+  scaled = stack.hessian.asDiagonal() * Rx;
+  out.lx.noalias() += Rx.transpose() * stack.gradient;
+  out.lxx.triangularView<Eigen::Lower>() += Rx.transpose() * scaled;
   out.lxx.triangularView<Eigen::StrictlyUpper>() = out.lxx.transpose();
   if (!running) return;
-  Ru_scaled_ = stack.hessian.asDiagonal() * Ru_;
-  out.lu.noalias() += Ru_.transpose() * stack.gradient;
-  out.luu.noalias() += Ru_.transpose() * Ru_scaled_;
-  out.lux.noalias() += Ru_.transpose() * scaled_;
+  Ru_scaled = stack.hessian.asDiagonal() * Ru;
+  out.lu.noalias() += Ru.transpose() * stack.gradient;
+  out.luu.noalias() += Ru.transpose() * Ru_scaled;
+  out.lux.noalias() += Ru.transpose() * scaled;
 }
 
 }  // namespace bielle

@@ -15,11 +15,11 @@ void applyPlus(const BlockPoint& point, MatrixXd& X, MatrixXd& out) {
 // Rows of a unit with `size` coordinates from `offset` on: q_a and v_a (size x size) times the derivatives of y'. Sizes
 // known to the compiler make a few instructions of a column.
 template <typename Size>
-void assembleRows(Size size, const double* __restrict q_a, const double* __restrict v_a, int offset, ConstMatrixRef dydd,
-                  MatrixXd& F) {
+void assembleRows(Size size, const double* __restrict q_a, const double* __restrict v_a, int offset,
+                  ConstMatrixRef dydd, MatrixXd& F) {
   for (Eigen::Index c = 0; c < F.cols(); ++c) {
     const double* ydd = dydd.data() + c * dydd.outerStride() + offset;
-    double *__restrict q = &F(offset, c), *__restrict v = q + F.rows() / 2;
+    double* __restrict q = &F(offset, c), * __restrict v = q + F.rows() / 2;
     for (int i = 0; i < size; ++i) q[i] = v[i] = 0;
     for (int k = 0; k < size; ++k) {
       const double y = ydd[k];
@@ -55,32 +55,33 @@ void ReducedNode::calcVelocityLift(Block& b, BlockPoint& point, MatrixXd& Z) {
   const ConstraintSet& set = b.loop.closures;
   for (size_t c = 0; c < set.closures.size(); ++c)
     calcClosureVelocityDerivative(point.workspace(), set.closures[c],
-                                  b.K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
-  point.selectIndependent(b.K, b.K_r);
-  b.X.setZero();
-  addSmallProduct(b.K_r, point.basis().N, b.X);
-  applyPlus(point, b.X, Z);
+                                  b.work->K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
+  point.selectIndependent(b.work->K, b.work->K_r);
+  b.work->X.setZero();
+  addSmallProduct(b.work->K_r, point.basis().N, b.work->X);
+  applyPlus(point, b.work->X, Z);
 }
 
 // d_y and d_v of Eq. (c).
 void ReducedNode::updateBlockDerivatives(Block& b) {
-  calcVelocityLift(b, b.at, b.Z);
-  gatherVelocity(b.loop, a_, b.a);
-  updateAccelerations(b.loop.model, b.at.workspace(), b.a);
+  calcVelocityLift(b, b.at, b.work->Z);
+  gatherVelocity(b.loop, a_, b.work->a);
+  updateAccelerations(b.loop.model, b.at.workspace(), b.work->a);
   const ConstraintSet& set = b.loop.closures;
   for (size_t c = 0; c < set.closures.size(); ++c) {
     const int row = set.offsets[c], n = getRows(set.closures[c].kind);
-    calcClosureDerivatives(b.at.workspace(), set.closures[c], b.Cq.middleRows(row, n), b.Cv.middleRows(row, n));
+    calcClosureDerivatives(b.at.workspace(), set.closures[c], b.work->Cq.middleRows(row, n),
+                           b.work->Cv.middleRows(row, n));
   }
-  b.at.selectIndependent(b.Cq, b.Cq_r);
-  b.at.selectIndependent(b.Cv, b.Cv_r);
-  b.X.setZero();
-  addSmallProduct(b.Cq_r, b.at.basis().N, b.X);
-  addSmallProduct(b.Cv_r, b.Z, b.X);
-  applyPlus(b.at, b.X, b.dy);
-  b.X.setZero();
-  addSmallProduct(b.Cv_r, b.at.basis().N, b.X);
-  applyPlus(b.at, b.X, b.dv);
+  b.at.selectIndependent(b.work->Cq, b.work->Cq_r);
+  b.at.selectIndependent(b.work->Cv, b.work->Cv_r);
+  b.work->X.setZero();
+  addSmallProduct(b.work->Cq_r, b.at.basis().N, b.work->X);
+  addSmallProduct(b.work->Cv_r, b.work->Z, b.work->X);
+  applyPlus(b.at, b.work->X, b.work->dy);
+  b.work->X.setZero();
+  addSmallProduct(b.work->Cv_r, b.at.basis().N, b.work->X);
+  applyPlus(b.at, b.work->X, b.work->dv);
 }
 
 // Loop forces, and the wrenches of loops and contacts on the bodies.
@@ -90,10 +91,10 @@ void ReducedNode::updateForces() {
   force_.noalias() -= Jc_.transpose() * lambda_c_;
   const ConstraintSet& set = spec_.constraints;
   for (Block& b : blocks_) {
-    gatherVelocity(b.loop, force_, b.d);
-    b.independent.noalias() = b.at.basis().JW * b.d;
-    b.at.solveGram(b.independent);
-    updateForceDerivative(b, b.at, b.independent);
+    gatherVelocity(b.loop, force_, b.work->d);
+    b.work->independent.noalias() = b.at.basis().JW * b.work->d;
+    b.at.solveGram(b.work->independent);
+    updateForceDerivative(b, b.at, b.work->independent);
   }
   for (Vector6d& f : f_ext_) f.setZero();
   for (size_t c = num_loops_; c < set.closures.size(); ++c) {
@@ -104,14 +105,14 @@ void ReducedNode::updateForces() {
 
 // H = d(J^T f)/dq at a point of the block, for forces f on its independent rows.
 void ReducedNode::updateForceDerivative(Block& b, const BlockPoint& point, const VectorXd& force) {
-  expandIndependent(point.basis(), force, b.rows);
-  b.H.setZero();
+  expandIndependent(point.basis(), force, b.work->rows);
+  b.work->H.setZero();
   const ConstraintSet& set = b.loop.closures;
   for (size_t c = 0; c < set.closures.size(); ++c) {
     const Closure& closure = set.closures[c];
     const Vector6d W =
-        calcClosureWrench(point.workspace(), closure, b.rows.segment(set.offsets[c], getRows(closure.kind)));
-    addGeneralizedForceDerivative(b.loop.model, point.workspace(), closure, W, b.H);
+        calcClosureWrench(point.workspace(), closure, b.work->rows.segment(set.offsets[c], getRows(closure.kind)));
+    addGeneralizedForceDerivative(b.loop.model, point.workspace(), closure, W, b.work->H);
   }
 }
 
@@ -123,12 +124,12 @@ void ReducedNode::linearizeDynamics() {
   updateForces();
   for (size_t i = 0; i < blocks_.size(); ++i) {
     const Block& b = blocks_[i];
-    lifts_[i] = {&b.at.basis().N, &b.Z, &b.dy, &b.dv, &b.H};
+    work_->lifts[i] = {&b.at.basis().N, &b.work->Z, &b.work->dy, &b.work->dv, &b.work->H};
   }
-  derivatives_.update(ws_, f_ext_, lifts_, dydd_.leftCols(nr), dydd_.middleCols(nr, nr));
+  work_->derivatives.update(ws_, f_ext_, work_->lifts, work_->dydd.leftCols(nr), work_->dydd.middleCols(nr, nr));
   const ConstraintSet& set = spec_.constraints;
-  dydd_.rightCols(model_.nu()).setZero();
-  addMotorColumns(dydd_.rightCols(model_.nu()));
+  work_->dydd.rightCols(model_.nu()).setZero();
+  addMotorColumns(work_->dydd.rightCols(model_.nu()));
   dlambda_.setZero();
   for (size_t c = num_loops_; c < set.closures.size(); ++c) {
     const int row = set.offsets[c] - loop_rows_, n = getRows(set.closures[c].kind);
@@ -140,7 +141,7 @@ void ReducedNode::linearizeDynamics() {
   addColumns(Cc_v_, &BlockBasisN, dlambda_.middleCols(nr, nr));
   addColumns(Jc_, &BlockDv, dlambda_.middleCols(nr, nr));
   saddle_point_.updateInverse();
-  saddle_point_.solveDerivatives(dydd_, dlambda_);
+  saddle_point_.solveDerivatives(work_->dydd, dlambda_);
 }
 
 // out (size x nu) += -N^T B
@@ -158,6 +159,7 @@ void ReducedNode::addMotorColumns(MatrixRef out) const {
 }
 
 bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
+  takeWork();
   linearizeDynamics();
   for (Block& b : blocks_)
     if (!linearizeBlock(b, x_next_node, out)) return false;
@@ -176,117 +178,119 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   const BlockBasis &base = b.at.basis(), &next = b.next.basis();
   const MatrixXd &N = base.N, &Nn = next.N, &WNn = next.WN;
 
-  b.zeta = b.next.zeta() / h;  // close() moves by h w', so its zeta is h times that of Eq. (3)
-  updateForceDerivative(b, b.at, b.zeta);
-  b.HN.setZero();
-  addSmallProduct(b.H, N, b.HN);
-  b.WHN = b.loop.metric.cwiseInverse().asDiagonal() * b.HN;
+  b.work->zeta = b.next.zeta() / h;  // close() moves by h w', so its zeta is h times that of Eq. (3)
+  updateForceDerivative(b, b.at, b.work->zeta);
+  b.work->HN.setZero();
+  addSmallProduct(b.work->H, N, b.work->HN);
+  b.work->WHN = b.loop.metric.cwiseInverse().asDiagonal() * b.work->HN;
   updateForceDerivative(b, b.next, b.mu);
-  b.HnNn.setZero();
-  addSmallProduct(b.H, Nn, b.HnNn);
+  b.work->HnNn.setZero();
+  addSmallProduct(b.work->H, Nn, b.work->HnNn);
 
   // J_q and J_d are the identity but for the blocks of curved joints. EN: e = EN dy + h J_d dw.
-  b.EN = N - h * b.WHN;
-  b.G = base.JW;  // J W^{-1} J_d^T
+  b.work->EN = N - h * b.work->WHN;
+  b.work->G = base.JW;  // J W^{-1} J_d^T
   for (const Joint& joint : loop.model.joints()) {
     if (!isCurved(joint)) continue;
     const int i = joint.idx_v, n = joint.nv;
     const JointVector d = b.next.step().segment(i, n);
     JointMatrix Jq(n, n), Jd(n, n);
     calcJointIntegrateJacobians(joint, d, Jq, Jd);
-    b.Jd.block(i, i, n, n) = Jd;
-    b.EN.middleRows(i, n) = Jq.lazyProduct(N.middleRows(i, n)) - h * Jd.lazyProduct(b.WHN.middleRows(i, n));
-    b.G.middleCols(i, n) = base.JW.middleCols(i, n).lazyProduct(Jd.transpose());
+    b.work->Jd.block(i, i, n, n) = Jd;
+    b.work->EN.middleRows(i, n) = Jq.lazyProduct(N.middleRows(i, n)) - h * Jd.lazyProduct(b.work->WHN.middleRows(i, n));
+    b.work->G.middleCols(i, n) = base.JW.middleCols(i, n).lazyProduct(Jd.transpose());
   }
   // Y = A^{-T} [J W^{-1} J_d^T W N', J W^{-1} W N'], with A^T = h J W^{-1} J_d^T J'^T
-  b.At.setZero();
-  addSmallProduct(b.G, next.J.transpose(), b.At, h);
-  b.Y.setZero();
-  addSmallProduct(b.G, WNn, b.Y.leftCols(r));
-  addSmallProduct(base.JW, WNn, b.Y.rightCols(r));
-  if (!factorizeSmall(b.At, b.pivots)) {
+  b.work->At.setZero();
+  addSmallProduct(b.work->G, next.J.transpose(), b.work->At, h);
+  b.work->Y.setZero();
+  addSmallProduct(b.work->G, WNn, b.work->Y.leftCols(r));
+  addSmallProduct(base.JW, WNn, b.work->Y.rightCols(r));
+  if (!factorizeSmall(b.work->At, b.work->pivots)) {
     failure_ = "closure '" + loop.closures.closures.front().name + "': the step turns its loops too far";
     return false;
   }
-  solveFactorized(b.At, b.pivots, b.Y);
+  solveFactorized(b.work->At, b.work->pivots, b.work->Y);
   // dy+ = L^T e, and T^T = N'^T J^T A^{-1} J'
-  b.L = WNn;
-  addSmallProductTransposed(next.J, b.Y.leftCols(r), b.L, -h);
-  b.T.setZero();
-  addSmallProductTransposed(next.J, b.Y.rightCols(r), b.T);
+  b.work->L = WNn;
+  addSmallProductTransposed(next.J, b.work->Y.leftCols(r), b.work->L, -h);
+  b.work->T.setZero();
+  addSmallProductTransposed(next.J, b.work->Y.rightCols(r), b.work->T);
   // h J_d^T L and beta = N' - h J_d^T T
-  b.LJ = h * b.L;
-  b.beta = WNn - h * b.T;
+  b.work->LJ = h * b.work->L;
+  b.work->beta = WNn - h * b.work->T;
   for (const Joint& joint : loop.model.joints()) {
     if (!isCurved(joint)) continue;
     const int i = joint.idx_v, n = joint.nv;
-    const auto Jd = b.Jd.block(i, i, n, n);
-    b.LJ.middleRows(i, n) = h * Jd.transpose().lazyProduct(b.L.middleRows(i, n));
-    b.beta.middleRows(i, n) = WNn.middleRows(i, n) - h * Jd.transpose().lazyProduct(b.T.middleRows(i, n));
+    const auto Jd = b.work->Jd.block(i, i, n, n);
+    b.work->LJ.middleRows(i, n) = h * Jd.transpose().lazyProduct(b.work->L.middleRows(i, n));
+    b.work->beta.middleRows(i, n) = WNn.middleRows(i, n) - h * Jd.transpose().lazyProduct(b.work->T.middleRows(i, n));
   }
   // dw = (N + h d_v) dy_v + (Z + h d_y) dy + h N dy'
-  b.wy = b.Z + h * b.dy;
-  b.wv = N + h * b.dv;
-  MatrixXd &q_y = b.q_y, &q_v = b.q_v, &q_a = b.q_a, &v_y = b.v_y, &v_v = b.v_v, &v_a = b.v_a, &S = b.S;
+  b.work->wy = b.work->Z + h * b.work->dy;
+  b.work->wv = N + h * b.work->dv;
+  MatrixXd &q_y = b.work->q_y, &q_v = b.work->q_v, &q_a = b.work->q_a, &v_y = b.work->v_y, &v_v = b.work->v_v,
+           &v_a = b.work->v_a, &S = b.work->S;
   for (MatrixXd* m : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a, &S}) m->setZero();
-  addSmallProductTransposed(Nn, b.HnNn, S);
-  addSmallProductTransposed(b.L, b.EN, q_y);
-  addSmallProductTransposed(b.LJ, b.wy, q_y);
-  addSmallProductTransposed(b.LJ, b.wv, q_v);
-  addSmallProductTransposed(b.LJ, N, q_a, h);
-  addSmallProductTransposed(b.beta, b.wy, v_y);
-  addSmallProductTransposed(Nn, b.HN, v_y, -1);
-  addSmallProductTransposed(b.T, b.EN, v_y, -1);
-  addSmallProductTransposed(b.beta, b.wv, v_v);
-  addSmallProductTransposed(b.beta, N, v_a, h);
+  addSmallProductTransposed(Nn, b.work->HnNn, S);
+  addSmallProductTransposed(b.work->L, b.work->EN, q_y);
+  addSmallProductTransposed(b.work->LJ, b.work->wy, q_y);
+  addSmallProductTransposed(b.work->LJ, b.work->wv, q_v);
+  addSmallProductTransposed(b.work->LJ, N, q_a, h);
+  addSmallProductTransposed(b.work->beta, b.work->wy, v_y);
+  addSmallProductTransposed(Nn, b.work->HN, v_y, -1);
+  addSmallProductTransposed(b.work->T, b.work->EN, v_y, -1);
+  addSmallProductTransposed(b.work->beta, b.work->wv, v_v);
+  addSmallProductTransposed(b.work->beta, N, v_a, h);
   addSmallProduct(S, q_y, v_y, -1);
   addSmallProduct(S, q_v, v_v, -1);
   addSmallProduct(S, q_a, v_a, -1);
 
   // About the node state, where a gap is open.
-  gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), b.q);
-  gatherVelocity(loop, x_next_node.tail(model_.nv()), b.d);
-  if (b.q != next.q || b.d != b.v_next) return moveToNodeState(b, out);
+  gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), b.work->q);
+  gatherVelocity(loop, x_next_node.tail(model_.nv()), b.work->d);
+  if (b.work->q != next.q || b.work->d != b.v_next) return moveToNodeState(b, out);
   out.gap.segment(o, r).setZero();
   out.gap.segment(nr + o, r).setZero();
   return true;
 }
 
-// The gap of a block to the node state (b.q, b.d), and its derivatives read there.
+// The gap of a block to the node state (b.work->q, b.work->d), and its derivatives read there.
 bool ReducedNode::moveToNodeState(Block& b, StageModel& out) {
   const LoopBlock& loop = b.loop;
   const int nr = reduction_.size, r = loop.size, o = loop.offset;
-  if (!b.scratch.update(loop, b.q)) return fail(b, b.scratch);
-  const MatrixXd &WN = b.scratch.basis().WN, &Nn = b.next.basis().N;
+  if (!b.work->scratch.update(loop, b.work->q)) return fail(b, b.work->scratch);
+  const MatrixXd &WN = b.work->scratch.basis().WN, &Nn = b.next.basis().N;
   updateVelocities(loop.model, b.next.workspace(), b.v_next);
-  calcVelocityLift(b, b.next, b.T);
-  loop.model.difference(b.q, b.next.basis().q, b.a);
-  b.w = b.v_next - b.d;
-  b.L = Nn;  // becomes J_diff N'
+  calcVelocityLift(b, b.next, b.work->T);
+  loop.model.difference(b.work->q, b.next.basis().q, b.work->a);
+  b.work->w = b.v_next - b.work->d;
+  b.work->L = Nn;  // becomes J_diff N'
   for (const Joint& joint : loop.model.joints()) {
     if (!isCurved(joint)) continue;
     const int i = joint.idx_v, n = joint.nv;
     JointMatrix Jdiff(n, n);
-    calcJointDifferenceJacobian(joint, b.a.segment(i, n), Jdiff);
-    b.L.middleRows(i, n) = Jdiff.lazyProduct(Nn.middleRows(i, n));
+    calcJointDifferenceJacobian(joint, b.work->a.segment(i, n), Jdiff);
+    b.work->L.middleRows(i, n) = Jdiff.lazyProduct(Nn.middleRows(i, n));
   }
   out.gap.segment(o, r).setZero();
   out.gap.segment(nr + o, r).setZero();
-  addSmallProductTransposed(WN, b.a, out.gap.segment(o, r));
-  addSmallProductTransposed(WN, b.w, out.gap.segment(nr + o, r));
-  for (MatrixXd* P : {&b.Pq, &b.Pv, &b.Pz}) P->setZero();
-  addSmallProductTransposed(WN, b.L, b.Pq);
-  addSmallProductTransposed(WN, Nn, b.Pv);
-  addSmallProductTransposed(WN, b.T, b.Pz);
-  const std::pair<MatrixXd*, MatrixXd*> derivatives[] = {{&b.q_y, &b.v_y}, {&b.q_v, &b.v_v}, {&b.q_a, &b.v_a}};
+  addSmallProductTransposed(WN, b.work->a, out.gap.segment(o, r));
+  addSmallProductTransposed(WN, b.work->w, out.gap.segment(nr + o, r));
+  for (MatrixXd* P : {&b.work->Pq, &b.work->Pv, &b.work->Pz}) P->setZero();
+  addSmallProductTransposed(WN, b.work->L, b.work->Pq);
+  addSmallProductTransposed(WN, Nn, b.work->Pv);
+  addSmallProductTransposed(WN, b.work->T, b.work->Pz);
+  const std::pair<MatrixXd*, MatrixXd*> derivatives[] = {
+      {&b.work->q_y, &b.work->v_y}, {&b.work->q_v, &b.work->v_v}, {&b.work->q_a, &b.work->v_a}};
   for (const auto& [dq, dv] : derivatives) {
-    b.S.setZero();
-    addSmallProduct(b.Pv, *dv, b.S);
-    addSmallProduct(b.Pz, *dq, b.S);
-    dv->swap(b.S);
-    b.S.setZero();
-    addSmallProduct(b.Pq, *dq, b.S);
-    dq->swap(b.S);
+    b.work->S.setZero();
+    addSmallProduct(b.work->Pv, *dv, b.work->S);
+    addSmallProduct(b.work->Pz, *dq, b.work->S);
+    dv->swap(b.work->S);
+    b.work->S.setZero();
+    addSmallProduct(b.work->Pq, *dq, b.work->S);
+    dq->swap(b.work->S);
   }
   return true;
 }
@@ -313,14 +317,14 @@ void ReducedNode::linearizeFreeJoint(FreeJoint& free, const StageModel& out) con
 // Fx and Fu out of the derivatives of y' and what each unit makes of them.
 void ReducedNode::assembleStep(StageModel& out) const {
   const int nr = reduction_.size;
-  const auto state = dydd_.leftCols(2 * nr), control = dydd_.rightCols(model_.nu());
+  const auto state = work_->dydd.leftCols(2 * nr), control = work_->dydd.rightCols(model_.nu());
   for (const FreeJoint& free : free_joints_) {
     assembleUnit(free.q_a, free.v_a, free.offset, state, out.Fx);
     assembleUnit(free.q_a, free.v_a, free.offset, control, out.Fu);
   }
   for (const Block& b : blocks_) {
-    assembleUnit(b.q_a, b.v_a, b.loop.offset, state, out.Fx);
-    assembleUnit(b.q_a, b.v_a, b.loop.offset, control, out.Fu);
+    assembleUnit(b.work->q_a, b.work->v_a, b.loop.offset, state, out.Fx);
+    assembleUnit(b.work->q_a, b.work->v_a, b.loop.offset, control, out.Fu);
   }
   for (const FreeJoint& free : free_joints_) {
     const int n = static_cast<int>(free.q_v.rows()), o = free.offset;
@@ -330,15 +334,16 @@ void ReducedNode::assembleStep(StageModel& out) const {
   }
   for (const Block& b : blocks_) {
     const int o = b.loop.offset, r = b.loop.size;
-    out.Fx.block(o, o, r, r) += b.q_y;
-    out.Fx.block(o, nr + o, r, r) += b.q_v;
-    out.Fx.block(nr + o, o, r, r) += b.v_y;
-    out.Fx.block(nr + o, nr + o, r, r) += b.v_v;
+    out.Fx.block(o, o, r, r) += b.work->q_y;
+    out.Fx.block(o, nr + o, r, r) += b.work->q_v;
+    out.Fx.block(nr + o, o, r, r) += b.work->v_y;
+    out.Fx.block(nr + o, nr + o, r, r) += b.work->v_v;
   }
 }
 
 void ReducedNode::linearizeState() {
-  for (Block& b : blocks_) calcVelocityLift(b, b.at, b.Z);
+  takeWork();
+  for (Block& b : blocks_) calcVelocityLift(b, b.at, b.work->Z);
   storeChart();
 }
 

@@ -6,8 +6,23 @@
 
 namespace bielle {
 
-ReducedNode::ReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec)
-    : NodeModel(model, spec), reduction_(reduction), derivatives_(model, reduction) {
+ReducedWork::ReducedWork(const Model& model, const Reduction& reduction) : derivatives(model, reduction) {
+  for (const LoopBlock& block : reduction.blocks) blocks.emplace_back(block);
+  lifts.resize(blocks.size());
+  left.setZero(model.nv(), reduction.size);
+  dydd.setZero(reduction.size, 2 * reduction.size + model.nu());
+}
+
+ReducedWork& ReducedWorkPool::get() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::unique_ptr<ReducedWork>& work = works_[std::this_thread::get_id()];
+  if (!work) work = std::make_unique<ReducedWork>(model_, reduction_);
+  return *work;
+}
+
+ReducedNode::ReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec,
+                         std::shared_ptr<ReducedWorkPool> pool)
+    : NodeModel(model, spec), reduction_(reduction), pool_(std::move(pool)) {
   for (const LoopBlock& block : reduction.blocks) blocks_.emplace_back(block);
   for (size_t i = 0; i < reduction.free_joints.size(); ++i)
     free_joints_.push_back({reduction.free_joints[i], reduction.free_offsets[i], {}, {}});
@@ -23,16 +38,19 @@ ReducedNode::ReducedNode(const Model& model, const Reduction& reduction, const S
   JcN_.setZero(contact_rows_, nr);
   for (MatrixXd* m : {&Cc_q_, &Cc_v_}) m->setZero(contact_rows_, nv);
   dlambda_.setZero(contact_rows_, 2 * nr + nu);
-  dydd_.setZero(nr, 2 * nr + nu);
-  left_.setZero(nv, nr);
-  lifts_.resize(blocks_.size());
   M_.setZero(nr, nr);
   saddle_point_.resize(nr, contact_rows_);
   f_ext_.assign(model.numBodies(), Vector6d::Zero());
   chart_x_.setConstant(model.nq() + nv, std::numeric_limits<double>::quiet_NaN());
 }
 
+void ReducedNode::takeWork() {
+  work_ = &pool_->get();
+  for (size_t i = 0; i < blocks_.size(); ++i) blocks_[i].work = &work_->blocks[i];
+}
+
 void ReducedNode::integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) {
+  takeWork();
   if (!updateChart(x)) {
     x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
     return;
@@ -47,37 +65,43 @@ void ReducedNode::integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out
   }
   for (Block& b : blocks_) {
     const LoopBlock& loop = b.loop;
-    b.d.noalias() = b.chart.N * dx.segment(loop.offset, loop.size);
-    if (!b.scratch.close(loop, b.chart, b.d, {})) {
-      fail(b, b.scratch);
+    b.work->d.noalias() = b.chart.N * dx.segment(loop.offset, loop.size);
+    if (!b.work->scratch.close(loop, b.chart, b.work->d, {})) {
+      fail(b, b.work->scratch);
       x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
       return;
     }
     // The velocity at the new point whose coordinates about the old one are N^T v + dy_v.
-    gatherVelocity(loop, x.tail(model_.nv()), b.v);
-    b.target = dx.segment(nr + loop.offset, loop.size);
-    addSmallProductTransposed(b.chart.WN, b.v, b.target);
-    b.mixed.setZero();
-    addSmallProductTransposed(b.chart.WN, b.scratch.basis().N, b.mixed);
-    if (!factorizeSmall(b.mixed, b.mixed_pivots)) {
+    gatherVelocity(loop, x.tail(model_.nv()), b.work->v);
+    b.work->target = dx.segment(nr + loop.offset, loop.size);
+    addSmallProductTransposed(b.chart.WN, b.work->v, b.work->target);
+    b.work->mixed.setZero();
+    addSmallProductTransposed(b.chart.WN, b.work->scratch.basis().N, b.work->mixed);
+    if (!factorizeSmall(b.work->mixed, b.work->mixed_pivots)) {
       failure_ = "closure '" + loop.closures.closures.front().name + "': the step turns its loops too far";
       x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
       return;
     }
-    solveFactorized(b.mixed, b.mixed_pivots, b.target);
-    b.v.noalias() = b.scratch.basis().N * b.target;
-    scatterConfiguration(model_, loop, b.scratch.basis().q, x_out.head(nq));
-    scatterVelocity(loop, b.v, x_out.tail(model_.nv()));
+    solveFactorized(b.work->mixed, b.work->mixed_pivots, b.work->target);
+    b.work->v.noalias() = b.work->scratch.basis().N * b.work->target;
+    scatterConfiguration(model_, loop, b.work->scratch.basis().q, x_out.head(nq));
+    scatterVelocity(loop, b.work->v, x_out.tail(model_.nv()));
   }
 }
 
 void ReducedNode::difference(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) {
+  takeWork();
   if (!updateChart(x0)) {
     dx.setConstant(std::numeric_limits<double>::quiet_NaN());
     return;
   }
   for (Block& b : blocks_) differenceAbout(b, b.chart, x0, x1, dx);
   differenceFree(x0, x1, dx);
+}
+
+bool ReducedNode::updateState(ConstVectorRef x) {
+  takeWork();
+  return updateState(x, nullptr);
 }
 
 bool ReducedNode::updateState(ConstVectorRef x, const ReducedNode* previous) {
@@ -91,41 +115,42 @@ bool ReducedNode::updateState(ConstVectorRef x, const ReducedNode* previous) {
     if (previous) {
       b.at.assign(previous->blocks_[i].next);
     } else {
-      gatherConfiguration(model_, b.loop, x.head(nq), b.q);
-      if (!b.at.update(b.loop, b.q)) return fail(b, b.at);
+      gatherConfiguration(model_, b.loop, x.head(nq), b.work->q);
+      if (!b.at.update(b.loop, b.work->q)) return fail(b, b.at);
     }
-    gatherVelocity(b.loop, x.tail(nv), b.v);
-    updateVelocities(b.loop.model, b.at.workspace(), b.v);
+    gatherVelocity(b.loop, x.tail(nv), b.work->v);
+    updateVelocities(b.loop.model, b.at.workspace(), b.work->v);
   }
   return true;
 }
 
 bool ReducedNode::updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) {
+  takeWork();
   const bool follows = previous && previous->x_next() == x;
   if (!updateState(x, follows ? static_cast<const ReducedNode*>(previous) : nullptr)) return false;
   updateBias(model_, ws_);
   a_d_.setZero();
   for (Block& b : blocks_) {
-    b.a.setZero();
-    updateAccelerations(b.loop.model, b.at.workspace(), b.a);
+    b.work->a.setZero();
+    updateAccelerations(b.loop.model, b.at.workspace(), b.work->a);
     const ConstraintSet& set = b.loop.closures;
     for (size_t c = 0; c < set.closures.size(); ++c)
-      b.rows.segment(set.offsets[c], getRows(set.closures[c].kind)) =
+      b.work->rows.segment(set.offsets[c], getRows(set.closures[c].kind)) =
           calcClosureAcceleration(b.at.workspace(), set.closures[c]);
-    for (int i = 0; i < b.loop.rank; ++i) b.gamma[i] = b.rows[b.at.basis().rows[i]];
-    b.independent = b.gamma;
-    b.at.solveGram(b.independent);
-    b.a.noalias() = -b.at.basis().JW.transpose() * b.independent;
-    scatterVelocity(b.loop, b.a, a_d_);
+    for (int i = 0; i < b.loop.rank; ++i) b.work->gamma[i] = b.work->rows[b.at.basis().rows[i]];
+    b.work->independent = b.work->gamma;
+    b.at.solveGram(b.work->independent);
+    b.work->a.noalias() = -b.at.basis().JW.transpose() * b.work->independent;
+    scatterVelocity(b.loop, b.work->a, a_d_);
   }
   // Eq. (b)
   calcMotorForces(model_, u, tau_);
   force_ = tau_ - ws_.b;
   force_.noalias() -= ws_.M * a_d_;
   projectVector(force_, f_);
-  left_.setZero();
-  addColumns(ws_.M, &BlockBasisN, left_);
-  projectRows(left_, M_);
+  work_->left.setZero();
+  addColumns(ws_.M, &BlockBasisN, work_->left);
+  projectRows(work_->left, M_);
   if (contact_rows_ > 0) updateContacts();
   if (saddle_point_.factorize(M_, JcN_) != SaddlePointStatus::Ok) {
     failure_ = "the mass matrix is singular";
@@ -215,15 +240,15 @@ bool ReducedNode::closeStep(ConstVectorRef x) {
   }
   x_next_.tail(nv) = w_;
   for (Block& b : blocks_) {
-    gatherVelocity(b.loop, w_, b.d);
-    b.d *= h;
+    gatherVelocity(b.loop, w_, b.work->d);
+    b.work->d *= h;
     // To second order the closures open by h^2/2 gamma along h w: J J^T zeta = h^2/2 gamma, with the zeta of close().
-    b.zeta = (0.5 * h * h) * b.independent;
-    if (!b.next.close(b.loop, b.at.basis(), b.d, b.zeta)) return fail(b, b.next);
-    b.w = b.next.step() / h;
-    b.mu.noalias() = b.next.basis().J * b.w;
+    b.work->zeta = (0.5 * h * h) * b.work->independent;
+    if (!b.next.close(b.loop, b.at.basis(), b.work->d, b.work->zeta)) return fail(b, b.next);
+    b.work->w = b.next.step() / h;
+    b.mu.noalias() = b.next.basis().J * b.work->w;
     b.next.solveGram(b.mu);
-    b.v_next = b.w;
+    b.v_next = b.work->w;
     b.v_next.noalias() -= b.next.basis().JW.transpose() * b.mu;
     scatterConfiguration(model_, b.loop, b.next.basis().q, x_next_.head(nq));
     scatterVelocity(b.loop, b.v_next, x_next_.tail(nv));
@@ -234,11 +259,11 @@ bool ReducedNode::closeStep(ConstVectorRef x) {
 void ReducedNode::differenceAbout(Block& b, const BlockBasis& basis, ConstVectorRef x0, ConstVectorRef x1,
                                   VectorRef dx) const {
   const int nq = model_.nq(), nv = model_.nv(), nr = reduction_.size;
-  gatherConfiguration(model_, b.loop, x1.head(nq), b.q);
-  b.loop.model.difference(basis.q, b.q, b.d);
-  dx.segment(b.loop.offset, b.loop.size).noalias() = basis.WN.transpose() * b.d;
-  for (size_t k = 0; k < b.loop.dofs.size(); ++k) b.d[k] = x1[nq + b.loop.dofs[k]] - x0[nq + b.loop.dofs[k]];
-  dx.segment(nr + b.loop.offset, b.loop.size).noalias() = basis.WN.transpose() * b.d;
+  gatherConfiguration(model_, b.loop, x1.head(nq), b.work->q);
+  b.loop.model.difference(basis.q, b.work->q, b.work->d);
+  dx.segment(b.loop.offset, b.loop.size).noalias() = basis.WN.transpose() * b.work->d;
+  for (size_t k = 0; k < b.loop.dofs.size(); ++k) b.work->d[k] = x1[nq + b.loop.dofs[k]] - x0[nq + b.loop.dofs[k]];
+  dx.segment(nr + b.loop.offset, b.loop.size).noalias() = basis.WN.transpose() * b.work->d;
   (void)nv;
 }
 
@@ -256,9 +281,9 @@ void ReducedNode::differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef
 bool ReducedNode::updateChart(ConstVectorRef x) {
   if (chart_x_ == x) return true;
   for (Block& b : blocks_) {
-    gatherConfiguration(model_, b.loop, x.head(model_.nq()), b.q);
-    if (!b.scratch.update(b.loop, b.q)) return fail(b, b.scratch);
-    b.chart = b.scratch.basis();
+    gatherConfiguration(model_, b.loop, x.head(model_.nq()), b.work->q);
+    if (!b.work->scratch.update(b.loop, b.work->q)) return fail(b, b.work->scratch);
+    b.chart = b.work->scratch.basis();
   }
   chart_x_ = x;
   return true;
@@ -270,8 +295,13 @@ void ReducedNode::storeChart() {
   chart_x_.tail(model_.nv()) = ws_.v;
 }
 
-std::unique_ptr<NodeModel> makeReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec) {
-  return std::make_unique<ReducedNode>(model, reduction, spec);
+std::shared_ptr<ReducedWorkPool> makeReducedWorkPool(const Model& model, const Reduction& reduction) {
+  return std::make_shared<ReducedWorkPool>(model, reduction);
+}
+
+std::unique_ptr<NodeModel> makeReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec,
+                                           std::shared_ptr<ReducedWorkPool> pool) {
+  return std::make_unique<ReducedNode>(model, reduction, spec, std::move(pool));
 }
 
 }  // namespace bielle

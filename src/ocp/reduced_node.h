@@ -16,18 +16,23 @@
 //     dq+ = e - h J_d W^{-1} J^T A^{-1} J' e,     dw' = dw - W^{-1} H dq - W^{-1} J^T A^{-1} J' e                     (f)
 //     dy+ = (W N')^T dq+,   dy_v+ = (W N')^T dw' - S dy+,   mu = J'^{+T} W w'                                         (g)
 // S is there because the projection of w' turns with q+. With a gap, the result is read about the node state's own basis.
+#include <map>
+#include <memory>
+#include <mutex>
+#include <thread>
+
 #include "bielle/dynamics/reduced_derivatives.h"
 #include "node_model.h"
 
 namespace bielle {
 
-// A block of loops at one node.
-struct ReducedBlock {
-  explicit ReducedBlock(const LoopBlock& l) : loop(l), at(l), next(l), scratch(l), chart(at.basis()) {
+// What a block needs within a call, n = nv, m rows of the closures, r reduced coordinates.
+struct BlockWork {
+  explicit BlockWork(const LoopBlock& l) : scratch(l) {
     const int n = l.model.nv(), m = l.closures.rows, r = l.size;
     q.setZero(l.model.nq());
-    for (VectorXd* v : {&this->v, &a, &d, &w, &v_next, &gradient_q, &gradient_v}) v->setZero(n);
-    for (VectorXd* v : {&gamma, &mu, &independent, &zeta}) v->setZero(l.rank);
+    for (VectorXd* x : {&v, &a, &d, &w, &gradient_q, &gradient_v}) x->setZero(n);
+    for (VectorXd* x : {&gamma, &independent, &zeta}) x->setZero(l.rank);
     rows.setZero(m);
     for (MatrixXd* x : {&Z, &dy, &dv}) x->setZero(n, r);
     for (MatrixXd* x : {&Cq, &Cv, &K}) x->setZero(m, n);
@@ -43,11 +48,9 @@ struct ReducedBlock {
     target.setZero(r);
     mixed_pivots.resize(r);
   }
-  const LoopBlock& loop;
-  BlockPoint at, next, scratch;  // at the state; at q+; for integrate() and open gaps
-  BlockBasis chart;              // at the last linearized state
-  VectorXd q, v, a, d, w, v_next, gradient_q, gradient_v;
-  VectorXd gamma, mu, independent, zeta, rows;
+  BlockPoint scratch;  // for integrate() and open gaps
+  VectorXd q, v, a, d, w, gradient_q, gradient_v;
+  VectorXd gamma, independent, zeta, rows;
   MatrixXd Z, dy, dv;                                  // n x r, Eqs. (a), (c)
   MatrixXd Cq, Cv, K, Cq_r, Cv_r, K_r;                 // closure derivatives, all rows and the independent ones
   MatrixXd Jd, H;                                      // n x n, Eqs. (e), (f); of J_d the blocks of curved joints
@@ -60,6 +63,43 @@ struct ReducedBlock {
   std::vector<int> mixed_pivots;
 };
 
+// What a node needs within a call of RobotProblem. All nodes that one thread works on share it: it stays in the cache.
+struct ReducedWork {
+  ReducedWork(const Model& model, const Reduction& reduction);
+  std::vector<BlockWork> blocks;
+  ReducedDerivatives derivatives;
+  std::vector<BlockLift> lifts;
+  MatrixXd left;                       // nv x size
+  MatrixXd dydd;                       // size x (2 size + nu), derivatives of y' with respect to (dy, dy_v, u)
+  MatrixXd Rx, Ru, scaled, Ru_scaled;  // residuals, with room for those of any node
+};
+
+// One for each thread that asks.
+class ReducedWorkPool {
+ public:
+  ReducedWorkPool(const Model& model, const Reduction& reduction) : model_(model), reduction_(reduction) {}
+  ReducedWork& get();
+
+ private:
+  const Model& model_;
+  const Reduction& reduction_;
+  std::mutex mutex_;
+  std::map<std::thread::id, std::unique_ptr<ReducedWork>> works_;
+};
+
+// A block of loops at one node: what lasts from call to call.
+struct ReducedBlock {
+  explicit ReducedBlock(const LoopBlock& l) : loop(l), at(l), next(l), chart(at.basis()) {
+    v_next.setZero(l.model.nv());
+    mu.setZero(l.rank);
+  }
+  const LoopBlock& loop;
+  BlockPoint at, next;  // at the state; at q+
+  BlockBasis chart;     // at the last linearized state
+  VectorXd v_next, mu;
+  BlockWork* work = nullptr;  // within a call
+};
+
 // A joint outside all loops at one node: what dq+ makes of dy and of dv+, dq+ and dv+ of dy'.
 struct FreeJoint {
   int joint = 0, offset = 0;
@@ -70,12 +110,13 @@ class ReducedNode : public NodeModel {
  public:
   using Block = ReducedBlock;
 
-  ReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec);
+  ReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec,
+              std::shared_ptr<ReducedWorkPool> pool);
 
   int tangentSize() const override { return 2 * reduction_.size; }
   void integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) override;
   void difference(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) override;
-  bool updateState(ConstVectorRef x) override { return updateState(x, nullptr); }
+  bool updateState(ConstVectorRef x) override;
   bool updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override;
   bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
   void linearizeState() override;
@@ -87,9 +128,9 @@ class ReducedNode : public NodeModel {
   bool updateState(ConstVectorRef x, const ReducedNode* previous);
 
   static const MatrixXd& BlockBasisN(const Block& b) { return b.at.basis().N; }
-  static const MatrixXd& BlockZ(const Block& b) { return b.Z; }
-  static const MatrixXd& BlockDy(const Block& b) { return b.dy; }
-  static const MatrixXd& BlockDv(const Block& b) { return b.dv; }
+  static const MatrixXd& BlockZ(const Block& b) { return b.work->Z; }
+  static const MatrixXd& BlockDy(const Block& b) { return b.work->dy; }
+  static const MatrixXd& BlockDv(const Block& b) { return b.work->dv; }
   using Accessor = const MatrixXd& (*)(const Block&);
 
   // out += A X, with X the block matrix that `accessor` names; free dofs are the identity for N and zero for the
@@ -123,17 +164,19 @@ class ReducedNode : public NodeModel {
   bool updateChart(ConstVectorRef x);
   void storeChart();
 
+  // The memory of this thread; every function called from outside takes it first.
+  void takeWork();
+
   const Reduction& reduction_;
+  std::shared_ptr<ReducedWorkPool> pool_;
+  ReducedWork* work_ = nullptr;
   std::vector<ReducedBlock> blocks_;
   std::vector<FreeJoint> free_joints_;
   int num_loops_ = 0, loop_rows_ = 0, contact_rows_ = 0;
   VectorXd tau_, a_, a_d_, w_, force_, ydd_, f_, gamma_, lambda_c_;
   MatrixXd Jc_, JcN_, Cc_q_, Cc_v_;  // contact rows
-  MatrixXd M_, left_;
-  ReducedDerivatives derivatives_;
-  std::vector<BlockLift> lifts_;
-  MatrixXd dydd_, dlambda_;  // derivatives of y' and lambda_c with respect to (dy, dy_v, u)
-  MatrixXd Rx_, Ru_, scaled_, Ru_scaled_;
+  MatrixXd M_;
+  MatrixXd dlambda_;  // derivatives of lambda_c with respect to (dy, dy_v, u)
   SaddlePoint saddle_point_;
   std::vector<Vector6d> f_ext_;
   VectorXd chart_x_;

@@ -53,11 +53,13 @@ RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorX
     throw ModelError(model.name(), "shooting problem", "the initial state has a wrong size", "q0: nq, v0: nv");
   for (size_t k = 0; k < specs_.size(); ++k) checkSpec(model, specs_[k], k);
   if (formulation == Formulation::Reduced) reduction_ = std::make_unique<Reduction>(makeReduction(model, q0));
+  std::shared_ptr<ReducedWorkPool> pool;
+  if (reduction_) pool = makeReducedWorkPool(model, *reduction_);
   nodes_.resize(specs_.size());
   for (size_t k = 0; k < specs_.size(); ++k) {
     const StageSpec& spec = specs_[k];
     Node& node = nodes_[k];
-    node.dynamics = reduction_ ? makeReducedNode(model, *reduction_, spec) : makeFullNode(model, spec);
+    node.dynamics = reduction_ ? makeReducedNode(model, *reduction_, spec, pool) : makeFullNode(model, spec);
     node.difference.setZero(model.nv());
     int rows = 0;
     for (const Cost& cost : spec.costs) rows += cost.residual->size();
