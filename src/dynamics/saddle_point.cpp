@@ -109,7 +109,7 @@ void SaddlePoint::solveDerivatives(MatrixRef X, MatrixRef dlambda) {
   solveTransposedFromRight(M_llt_.matrixLLT(), Xt);
   for (Eigen::Index i = 0; i < D_.size(); ++i) rhs.col(i) = -D_[i] * dlambda.row(i).transpose();
   rhs.noalias() += Xt * W_.transpose();
-  dlambda_t.noalias() = rhs * Ginv_;
+  dlambda_t.noalias() = rhs * Ginv_.transpose();  // symmetric but for rounding, which redundant rows magnify
   Xt *= -1;
   Xt.noalias() += dlambda_t * W_;
   solveFromRight(M_llt_.matrixLLT(), Xt);
