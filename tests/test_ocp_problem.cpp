@@ -58,11 +58,11 @@ StageSpec makeTerminal(std::mt19937& rng, const Model& model, const VectorXd& q)
 }
 
 RobotProblem makeProblem(std::mt19937& rng, const Model& model, const VectorXd& q,
-                         const std::vector<ContactTarget>& contacts) {
+                         const std::vector<ContactTarget>& contacts, Formulation formulation = Formulation::Full) {
   std::vector<StageSpec> stages;
   stages.push_back(makeStage(rng, model, q, contacts));
   stages.push_back(makeTerminal(rng, model, q));
-  return RobotProblem(model, q, VectorXd::Zero(model.nv()), std::move(stages));
+  return RobotProblem(model, q, VectorXd::Zero(model.nv()), std::move(stages), formulation);
 }
 
 VectorXd join(const VectorXd& q, const VectorXd& v) {
@@ -300,10 +300,13 @@ TEST_CASE("shooting problem: steps and linearizations allocate nothing after the
   std::mt19937 rng(24);
   const Model model = loadRobot("bipetto").model;
   const VectorXd q = makeStandingPosture(model);
-  RobotProblem problem = makeProblem(rng, model, q, makeContactTargets(model, q, {0, 1}, 0, 100));
+  const Formulation formulation = GENERATE(Formulation::Full, Formulation::Reduced);
+  CAPTURE(getName(formulation));
+  RobotProblem problem = makeProblem(rng, model, q, makeContactTargets(model, q, {0, 1}, 0, 100), formulation);
   const VectorXd x = problem.initialState();
   const VectorXd u = randomVector(rng, model.nu(), 1);
-  VectorXd x2 = move(problem, 0, x, randomVector(rng, 2 * model.nv(), 1e-3)), next = x, dx(2 * model.nv());
+  VectorXd x2 = move(problem, 0, x, randomVector(rng, problem.tangentSize(0), 1e-3)), next = x;
+  VectorXd dx(problem.tangentSize(0));
   StageModel out, terminal;
   double cost = 0;
   const auto runAll = [&](const VectorXd& at) {

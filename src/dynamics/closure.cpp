@@ -26,6 +26,31 @@ HingeAngle calcHingeAngle(double sine, double cosine) {
   return {theta / s, -(s - theta * cosine) / (s * s * s)};
 }
 
+// Writes rows of full vectors in world coordinates, read in frame 1, to columns of a matrix.
+class RowWriter {
+ public:
+  RowWriter(const Workspace& ws, const Closure& c) : kind_(c.kind), X_W1_(getFrame1(ws, c)) {
+    if (kind_ == ClosureKind::Hinge5D) normals_ = getHingeNormals(c);
+  }
+
+  // out = s times the rows of `full`.
+  void write(double s, const Vector6d& full, double* out) const {
+    const Vector6d local = X_W1_.actInvMotion(full);
+    for (int i = 0; i < 3; ++i) out[i] = s * local[i];
+    if (kind_ == ClosureKind::Ball3D) return;
+    if (kind_ == ClosureKind::Weld6D) {
+      for (int i = 3; i < 6; ++i) out[i] = s * local[i];
+    } else {
+      for (int i = 0; i < 2; ++i) out[3 + i] = s * normals_.col(i).dot(local.tail<3>());
+    }
+  }
+
+ private:
+  ClosureKind kind_;
+  SE3 X_W1_;
+  Eigen::Matrix<double, 3, 2> normals_;
+};
+
 }  // namespace
 
 ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTarget>& contacts) {
@@ -122,18 +147,21 @@ RowVectorUpTo6 calcClosureStabilization(const Workspace& ws, const Closure& c) {
 }
 
 void calcClosureJacobian(const Workspace& ws, const Closure& c, MatrixRef J) {
-  const SE3 X_W1 = getFrame1(ws, c);
-  for (size_t i = 0; i < c.dofs.size(); ++i)
-    J.col(c.dofs[i]) = c.signs[i] * selectRows(c, X_W1.actInvMotion(ws.J.col(c.dofs[i])));
+  const RowWriter rows(ws, c);
+  for (size_t i = 0; i < c.dofs.size(); ++i) rows.write(c.signs[i], ws.J.col(c.dofs[i]), &J(0, c.dofs[i]));
 }
 
 void calcClosureDerivatives(const Workspace& ws, const Closure& c, MatrixRef da_dq, MatrixRef da_dv) {
   requireStage(ws, WorkspaceStage::Acceleration, "calcClosureDerivatives", "updateAccelerations");
-  const SE3 X_W1 = getFrame1(ws, c);
+  const RowWriter rows(ws, c);
   const Vector6d &V1 = ws.V[c.body1], &V2 = ws.V[c.body2], &A2 = ws.A[c.body2];
   const Vector6d V12 = V1 + V2;
   RowsBy6 rate;
-  if (c.kp != 0) rate = calcClosureResidualRate(ws, c);
+  SE3 X_W1;
+  if (c.kp != 0) {
+    rate = calcClosureResidualRate(ws, c);
+    X_W1 = getFrame1(ws, c);
+  }
   for (size_t i = 0; i < c.dofs.size(); ++i) {
     const int k = c.dofs[i];
     const double s = c.signs[i];
@@ -145,19 +173,19 @@ void calcClosureDerivatives(const Workspace& ws, const Closure& c, MatrixRef da_
       dq += c.kd * (dV + J_V2);  // Eq. (3)
       dv += c.kd * J;            // Eq. (4)
     }
-    da_dq.col(k) = s * selectRows(c, X_W1.actInvMotion(dq));
-    da_dv.col(k) = s * selectRows(c, X_W1.actInvMotion(dv));
+    rows.write(s, dq, &da_dq(0, k));
+    rows.write(s, dv, &da_dv(0, k));
     if (c.kp != 0) da_dq.col(k) -= (c.kp * s) * (rate * X_W1.actInvMotion(J));
   }
 }
 
 void calcClosureVelocityDerivative(const Workspace& ws, const Closure& c, MatrixRef dnu_dq) {
   requireStage(ws, WorkspaceStage::Velocity, "calcClosureVelocityDerivative", "updateVelocities");
-  const SE3 X_W1 = getFrame1(ws, c);
+  const RowWriter rows(ws, c);
   for (size_t i = 0; i < c.dofs.size(); ++i) {
     const int k = c.dofs[i];
     const Vector6d dnu = ws.dV.col(k) + crossMotion(ws.J.col(k), ws.V[c.body2]);  // Eq. (3)
-    dnu_dq.col(k) = c.signs[i] * selectRows(c, X_W1.actInvMotion(dnu));
+    rows.write(c.signs[i], dnu, &dnu_dq(0, k));
   }
 }
 

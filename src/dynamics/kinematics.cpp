@@ -75,7 +75,7 @@ void updateVelocities(const Model& model, Workspace& ws, ConstVectorRef v) {
       ws.dJ.col(k) = joint.nv == 1 || sequential ? Vector6d(ws.dV.col(k)) : crossMotion(ws.V[i], ws.J.col(k));
       if (sequential) ws.V[i] += ws.J.col(k) * v[k];
     }
-    ws.h[i].noalias() = ws.Y[i] * ws.V[i];
+    if (model.bodies()[i].inertia.mass > 0) ws.h[i].noalias() = ws.Y[i] * ws.V[i];
   }
   ws.hc = ws.h;
   for (int i = model.numBodies() - 1; i > 0; --i) ws.hc[model.joints()[i].parent] += ws.hc[i];

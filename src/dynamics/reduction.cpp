@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
@@ -14,7 +14,11 @@ namespace {
 
 constexpr double kClosedTolerance = 1e-13;    // what close() aims at
 constexpr double kAcceptedTolerance = 1e-11;  // what it accepts when rounding stops it
-constexpr double kRankTolerance = 1e-6;       // pivots of (1) relative to the first
+constexpr double kRankTolerance = 1e-6;       // diagonal of L, relative to its first entry
+
+// Rows of a factorization that one operation works on.
+constexpr int kLane = 8;
+using Lane = Eigen::Array<double, kLane, 1>;
 
 // The cluster's joints over their common root, which becomes the world of the block.
 Model makeBlockModel(const Model& model, const LoopCluster& cluster, const std::vector<int>& joints) {
@@ -86,6 +90,7 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
     block.rank = mobility.rank;
     block.size = mobility.mobility;
     block.metric = makeMetric(whole, block.dofs);
+    block.inverse_root = block.metric.cwiseSqrt().cwiseInverse();
     Workspace ws(block.model);
     updatePositions(block.model, ws, q_block);
     for (const Closure& closure : block.closures.closures)
@@ -136,12 +141,15 @@ BlockPoint::BlockPoint(const LoopBlock& block) : ws_(block.model) {
   for (VectorXd* v : {&zeta_, &correction_}) v->setZero(block.rank);
   step_.setZero(n);
   J_all_.setZero(m, n);
-  eliminated_.setZero(m, n);
-  A_.setZero(block.rank, block.rank);
-  row_order_.resize(m);
-  col_order_.resize(n);
-  gram_ = Eigen::LLT<MatrixXd>(block.rank);
-  lu_ = Eigen::PartialPivLU<MatrixXd>(block.rank);
+  const int padded = (m + kLane - 1) / kLane * kLane;
+  reflected_.setZero(padded, n);
+  products_.setZero(padded);
+  beta_.setZero(block.rank);
+  L_.setZero(block.rank, block.rank);
+  reflectors_.setZero(n, block.rank);
+  rest_.setZero(m);
+  newton_.setZero(block.rank, block.rank);
+  pivots_.resize(block.rank);
 }
 
 void BlockPoint::updateJacobian(const LoopBlock& block) {
@@ -158,67 +166,90 @@ void BlockPoint::updateResidual(const LoopBlock& block) {
 }
 
 void BlockPoint::selectIndependent(const MatrixXd& all, MatrixXd& out) const {
-  for (size_t i = 0; i < basis_.rows.size(); ++i) out.row(i) = all.row(basis_.rows[i]);
+  for (Eigen::Index k = 0; k < all.cols(); ++k)
+    for (size_t i = 0; i < basis_.rows.size(); ++i) out(i, k) = all(basis_.rows[i], k);
 }
 
-// Gauss-Jordan elimination of J with complete pivoting. Leaves [I, J_d^{-1} J_i] in the columns of `eliminated_`, by
-// col_order_: first the `rank` dependent coordinates d, then the independent ones i. False when the rank is another.
-bool BlockPoint::eliminate(int rank) {
-  MatrixXd& E = eliminated_;
-  E = J_all_;
-  const int m = static_cast<int>(E.rows()), n = static_cast<int>(E.cols());
-  std::iota(row_order_.begin(), row_order_.end(), 0);
-  std::iota(col_order_.begin(), col_order_.end(), 0);
+// J W^{-1/2} = [L, 0] Q^T with Q = H_1 H_2 ..., H = I - beta v v^T, the v in the columns of `reflectors_`. Rows are taken
+// by what the ones before leave of them, largest first. False when the rank is another than the block's.
+bool BlockPoint::factorize(const LoopBlock& block) {
+  MatrixXd& E = reflected_;
+  const int m = static_cast<int>(rest_.size()), n = static_cast<int>(E.cols()), rank = block.rank;
+  E.topRows(m) = J_all_ * block.inverse_root.asDiagonal();
+  rest_ = E.topRows(m).rowwise().squaredNorm();
   double first = 0, last = 0;
-  for (int p = 0; p <= rank; ++p) {
-    int row = p, col = p;
-    double best = -1;
-    for (int c = p; c < n; ++c)
-      for (int r = p; r < m; ++r)
-        if (std::abs(E(r, c)) > best) best = std::abs(E(r, c)), row = r, col = c;
-    if (p == 0) first = best;
-    if (p == rank)  // what is left must be nothing but rounding
-      return best <= kRankTolerance * last || best <= 1e-3 * kRankTolerance * first;
-    if (!(best > kRankTolerance * first)) return false;
-    last = best;
-    if (row != p) E.row(p).swap(E.row(row)), std::swap(row_order_[p], row_order_[row]);
-    if (col != p) E.col(p).swap(E.col(col)), std::swap(col_order_[p], col_order_[col]);
-    double* pivot = E.col(p).data();
-    const double inverse = 1 / pivot[p];
-    for (int c = p + 1; c < n; ++c) {
-      double* column = E.col(c).data();
-      const double factor = column[p] * inverse;
-      for (int r = 0; r < m; ++r) column[r] -= factor * pivot[r];
-      column[p] = factor;
+  for (int p = 0; p < rank; ++p) {
+    int row = 0;
+    for (int r = 1; r < m; ++r)
+      if (rest_[r] > rest_[row]) row = r;
+    basis_.rows[p] = row;
+    double* v = &reflectors_(0, p);
+    for (int k = p; k < n; ++k) v[k] = E(row, k);
+    // E x for the row x, |x|^2 among it, and with v = x - pivot e_p from it E v.
+    for (Eigen::Index lane = 0; lane < E.rows(); lane += kLane) {
+      Lane sum = Lane::Zero();
+      for (int k = p; k < n; ++k) sum += v[k] * Eigen::Map<const Lane>(&E(lane, k));
+      products_.segment<kLane>(lane).array() = sum;
+    }
+    const double norm = std::sqrt(products_[row]), pivot = v[p] > 0 ? -norm : norm;
+    if (p == 0) first = norm;
+    if (!(norm > kRankTolerance * first)) return false;
+    last = norm;
+    const double beta = 1 / (norm * (norm + std::abs(v[p])));
+    beta_[p] = beta;
+    v[p] -= pivot;
+    for (Eigen::Index lane = 0; lane < E.rows(); lane += kLane) {
+      const Lane Ev = products_.segment<kLane>(lane).array() - pivot * Eigen::Map<const Lane>(&E(lane, p));
+      const Lane scaled = beta * Ev;
+      for (int k = p; k < n; ++k) Eigen::Map<Lane>(&E(lane, k)) -= v[k] * scaled;
+    }
+    for (int r = 0; r < m; ++r) rest_[r] -= E(r, p) * E(r, p);
+    rest_[row] = -std::numeric_limits<double>::infinity();
+  }
+  for (int k = 0; k < rank; ++k)
+    for (int p = k; p < rank; ++p) L_(p, k) = E(basis_.rows[p], k);
+  // What is left must be nothing but rounding.
+  double left = 0;
+  for (int r = 0; r < m; ++r)
+    if (std::isfinite(rest_[r])) left = std::max(left, E.row(r).tail(n - rank).norm());
+  return left <= kRankTolerance * last || left <= 1e-3 * kRankTolerance * first;
+}
+
+// Eq. (1): N = W^{-1/2} Q_2 with the last columns of Q, and L L^T = J W^{-1} J^T.
+bool BlockPoint::updateBases(const LoopBlock& block) {
+  const int rank = block.rank, size = block.size, n = static_cast<int>(block.metric.size());
+  if (!factorize(block)) return false;
+  MatrixXd& N = basis_.N;
+  N.setZero();
+  for (int c = 0; c < size; ++c) N(rank + c, c) = 1;
+  for (int p = rank - 1; p >= 0; --p) {
+    const double* v = &reflectors_(0, p);
+    for (int c = 0; c < size; ++c) {
+      double dot = 0;
+      for (int k = p; k < n; ++k) dot += v[k] * N(k, c);
+      dot *= beta_[p];
+      for (int k = p; k < n; ++k) N(k, c) -= dot * v[k];
     }
   }
+  for (int c = 0; c < size; ++c)
+    for (int k = 0; k < n; ++k) {
+      N(k, c) *= block.inverse_root[k];
+      basis_.WN(k, c) = block.metric[k] * N(k, c);
+    }
+  selectIndependent(J_all_, basis_.J);
+  for (int k = 0; k < n; ++k) basis_.JW.col(k) = basis_.J.col(k) * (block.inverse_root[k] * block.inverse_root[k]);
   return true;
 }
 
-// Eq. (1): the columns [-J_d^{-1} J_i; I], made orthonormal in W by Gram-Schmidt, twice for good measure.
-bool BlockPoint::updateBases(const LoopBlock& block) {
-  const int rank = block.rank, size = block.size;
-  if (!eliminate(rank)) return false;
-  MatrixXd &N = basis_.N, &WN = basis_.WN;
-  N.setZero();
-  for (int c = 0; c < size; ++c) {
-    for (int r = 0; r < rank; ++r) N(col_order_[r], c) = -eliminated_(r, rank + c);
-    N(col_order_[rank + c], c) = 1;
-    for (int pass = 0; pass < 2; ++pass)
-      for (int k = 0; k < c; ++k) N.col(c) -= WN.col(k).dot(N.col(c)) * N.col(k);
-    WN.col(c) = block.metric.cwiseProduct(N.col(c));
-    const double norm = std::sqrt(WN.col(c).dot(N.col(c)));
-    N.col(c) /= norm;
-    WN.col(c) /= norm;
-  }
-  std::copy(row_order_.begin(), row_order_.begin() + rank, basis_.rows.begin());
-  std::sort(basis_.rows.begin(), basis_.rows.end());
-  selectIndependent(J_all_, basis_.J);
-  basis_.JW = basis_.J * block.metric.cwiseInverse().asDiagonal();
-  A_.setZero();
-  addSmallProduct(basis_.J, basis_.JW.transpose(), A_);
-  gram_.compute(A_);
-  return gram_.info() == Eigen::Success;
+void BlockPoint::assign(const BlockPoint& other) {
+  basis_ = other.basis_;
+  L_ = other.L_;
+  gap_ = other.gap_;
+  closed_ = other.closed_;
+  ws_.q = other.ws_.q;
+  ws_.X_WB = other.ws_.X_WB;
+  ws_.J = other.ws_.J;
+  ws_.stage = WorkspaceStage::Position;
 }
 
 bool BlockPoint::update(const LoopBlock& block, ConstVectorRef q) {
@@ -253,15 +284,16 @@ bool BlockPoint::close(const LoopBlock& block, const BlockBasis& start, ConstVec
     if (i == 0 || gap_ > 0.05 * previous) {
       updateColumns(block.model, ws_);
       updateJacobian(block);
-      for (size_t r = 0; r < start.rows.size(); ++r) basis_.J.row(r) = J_all_.row(start.rows[r]);
-      A_.setZero();
-      addSmallProduct(basis_.J, start.JW.transpose(), A_);
-      lu_.compute(A_);
+      for (Eigen::Index k = 0; k < J_all_.cols(); ++k)
+        for (size_t r = 0; r < start.rows.size(); ++r) basis_.J(r, k) = J_all_(start.rows[r], k);
+      newton_.setZero();
+      addSmallProduct(basis_.J, start.JW.transpose(), newton_);
+      if (!factorizeSmall(newton_, pivots_)) return false;
     }
     previous = gap_;
     for (size_t r = 0; r < start.rows.size(); ++r) correction_[r] = residual_[start.rows[r]];
     // The residual falls by J dq (notation.h), and dq = -W^{-1} J(q_0)^T dzeta.
-    correction_ = lu_.solve(correction_);
+    solveFactorized(newton_, pivots_, correction_);
     zeta_ -= correction_;
     step_.noalias() += start.JW.transpose() * correction_;
   }

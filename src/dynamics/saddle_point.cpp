@@ -2,12 +2,14 @@
 
 #include <cmath>
 
+#include "bielle/math/small_dense.h"
+
 namespace bielle {
 
 void SaddlePoint::resize(int n, int m) {
   if (J_.rows() == m && J_.cols() == n) return;
   J_.setZero(m, n);
-  W_.setZero(n, m);
+  W_.setZero(m, n);
   for (MatrixXd* matrix : {&G_, &Ginv_, &T1_, &T2_}) matrix->setZero(m, m);
   for (VectorXd* v : {&D_, &rhs_, &correction_}) v->setZero(m);
   // Of something, so that their status is not read before it is set when they are copied.
@@ -21,15 +23,15 @@ SaddlePointStatus SaddlePoint::factorize(const MatrixXd& M, const MatrixXd& J, c
   if (M_llt_.info() != Eigen::Success) return SaddlePointStatus::MassMatrixSingular;
   if (J.rows() == 0) return SaddlePointStatus::Ok;
   J_ = J;
-  W_ = J.transpose();
-  M_llt_.matrixL().solveInPlace(W_);
-  const double largest = std::sqrt(W_.colwise().squaredNorm().maxCoeff());
-  for (Eigen::Index i = 0; i < W_.cols(); ++i) {
-    const double norm = W_.col(i).norm();
+  W_ = J;
+  solveTransposedFromRight(M_llt_.matrixLLT(), W_);
+  const double largest = std::sqrt(W_.rowwise().squaredNorm().maxCoeff());
+  for (Eigen::Index i = 0; i < W_.rows(); ++i) {
+    const double norm = W_.row(i).norm();
     D_[i] = norm > 1e-11 * largest ? 1 / norm : 0;  // a row that nothing moves, up to rounding, has no force
-    W_.col(i) *= D_[i];
+    W_.row(i) *= D_[i];
   }
-  G_.noalias() = W_.transpose() * W_;
+  G_.noalias() = W_ * W_.transpose();
   G_llt_.compute(G_);
   const double pivot = G_llt_.info() == Eigen::Success ? G_llt_.matrixLLT().diagonal().array().square().minCoeff() : 0;
   redundant_ = !(pivot > options.direct_threshold);
@@ -95,17 +97,24 @@ void SaddlePoint::solveDerivatives(MatrixRef X, MatrixRef dlambda) {
     M_llt_.solveInPlace(X);
     return;
   }
-  // In the coordinates of L: W = L^{-1} J^T D and L^{-1} dID give J M^{-1} dID = D^{-1} W^T L^{-1} dID.
-  M_llt_.matrixL().solveInPlace(X);
-  if (buffer_.rows() != dlambda.rows() || buffer_.cols() < X.cols()) buffer_.resize(dlambda.rows(), X.cols());
-  auto rhs = buffer_.leftCols(X.cols());
-  rhs.noalias() = W_.transpose() * X;
-  rhs -= D_.asDiagonal() * dlambda;
-  dlambda.noalias() = Ginv_ * rhs;
-  X *= -1;
-  X.noalias() += W_ * dlambda;
-  M_llt_.matrixU().solveInPlace(X);
-  dlambda = D_.asDiagonal() * dlambda;
+  // In the coordinates of L: W = D J L^{-T} and L^{-1} dID give J M^{-1} dID = D^{-1} W L^{-1} dID. All is done on
+  // transposes, whose columns are long.
+  const Eigen::Index columns = X.cols();
+  if (X_.rows() < columns || X_.cols() != X.rows() || rhs_t_.cols() != J_.rows()) {
+    X_.resize(columns, X.rows());
+    for (MatrixXd* m : {&rhs_t_, &dlambda_t_}) m->resize(columns, J_.rows());
+  }
+  auto Xt = X_.topRows(columns), rhs = rhs_t_.topRows(columns), dlambda_t = dlambda_t_.topRows(columns);
+  Xt = X.transpose();
+  solveTransposedFromRight(M_llt_.matrixLLT(), Xt);
+  for (Eigen::Index i = 0; i < D_.size(); ++i) rhs.col(i) = -D_[i] * dlambda.row(i).transpose();
+  rhs.noalias() += Xt * W_.transpose();
+  dlambda_t.noalias() = rhs * Ginv_.transpose();  // symmetric but for rounding, which redundant rows magnify
+  Xt *= -1;
+  Xt.noalias() += dlambda_t * W_;
+  solveFromRight(M_llt_.matrixLLT(), Xt);
+  X = Xt.transpose();
+  for (Eigen::Index i = 0; i < D_.size(); ++i) dlambda.row(i) = D_[i] * dlambda_t.col(i).transpose();
 }
 
 }  // namespace bielle

@@ -30,6 +30,20 @@ Matrix3d exp3(const Vector3d& w) {
   return Matrix3d::Identity() + f.sinc * S + f.cosc * S * S;
 }
 
+Eigen::Quaterniond exp3AsQuaternion(const Vector3d& w) {
+  const double t2 = w.squaredNorm();
+  double sine, cosine;  // sin(t/2) / t, cos(t/2)
+  if (t2 < kSmallAngleSquared) {
+    sine = 0.5 - t2 / 48 * (1 - t2 / 80);
+    cosine = 1 - t2 / 8 * (1 - t2 / 48);
+  } else {
+    const double t = std::sqrt(t2);
+    sine = std::sin(0.5 * t) / t;
+    cosine = std::cos(0.5 * t);
+  }
+  return {cosine, sine * w.x(), sine * w.y(), sine * w.z()};
+}
+
 Matrix3d makeAxisRotation(const Vector3d& axis, double angle) {
   const double s = std::sin(angle), c = std::cos(angle);
   const Vector3d sa = s * axis, ca = (1 - c) * axis;

@@ -148,7 +148,7 @@ void calcJointSubspace(const Joint& joint, ConstVectorRef q, Eigen::Ref<Matrix6X
 void integrateJoint(const Joint& joint, ConstVectorRef q, ConstVectorRef dv, VectorRef q_out) {
   switch (joint.kind) {
     case JointKind::Spherical: {
-      const Eigen::Quaterniond product = ConstQuaternionMap(q.data()) * Eigen::Quaterniond(exp3(dv));
+      const Eigen::Quaterniond product = ConstQuaternionMap(q.data()) * exp3AsQuaternion(dv);
       q_out = product.normalized().coeffs();
       break;
     }

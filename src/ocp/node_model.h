@@ -1,6 +1,6 @@
 #pragma once
 // The state space and the step of one node, behind RobotProblem: FullNode (the paper's spanning tree) or ReducedNode
-// (closed configurations only). A node owns all memory of its point, so that different nodes may work at the same time.
+// (closed configurations only). A node owns all memory that lasts, so that different nodes may work at the same time.
 #include <memory>
 #include <string>
 
@@ -54,7 +54,11 @@ class NodeModel {
 };
 
 std::unique_ptr<NodeModel> makeFullNode(const Model& model, const StageSpec& spec);
-std::unique_ptr<NodeModel> makeReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec);
+// Memory that the reduced nodes of a problem share, one piece for each thread; the reduction must outlive it.
+class ReducedWorkPool;
+std::shared_ptr<ReducedWorkPool> makeReducedWorkPool(const Model& model, const Reduction& reduction);
+std::unique_ptr<NodeModel> makeReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec,
+                                           std::shared_ptr<ReducedWorkPool> pool);
 
 // Joints whose configuration is not a vector: their blocks of the manifold Jacobians differ from the identity.
 inline bool isCurved(const Joint& joint) {

@@ -36,7 +36,9 @@ const char* getName(Formulation formulation) { return formulation == Formulation
 // The point a node was last evaluated at, its dynamics and its stacked residuals.
 struct RobotProblem::Node {
   VectorXd x, u;
-  bool valid = false;
+  bool valid = false;     // dynamics (kinematics at the terminal node) are there
+  bool has_cost = false;  // and so are the residuals of the stack and their cost
+  double cost = 0;
   std::unique_ptr<NodeModel> dynamics;
   ResidualStack stack;
   VectorXd difference;
@@ -51,11 +53,13 @@ RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorX
     throw ModelError(model.name(), "shooting problem", "the initial state has a wrong size", "q0: nq, v0: nv");
   for (size_t k = 0; k < specs_.size(); ++k) checkSpec(model, specs_[k], k);
   if (formulation == Formulation::Reduced) reduction_ = std::make_unique<Reduction>(makeReduction(model, q0));
+  std::shared_ptr<ReducedWorkPool> pool;
+  if (reduction_) pool = makeReducedWorkPool(model, *reduction_);
   nodes_.resize(specs_.size());
   for (size_t k = 0; k < specs_.size(); ++k) {
     const StageSpec& spec = specs_[k];
     Node& node = nodes_[k];
-    node.dynamics = reduction_ ? makeReducedNode(model, *reduction_, spec) : makeFullNode(model, spec);
+    node.dynamics = reduction_ ? makeReducedNode(model, *reduction_, spec, pool) : makeFullNode(model, spec);
     node.difference.setZero(model.nv());
     int rows = 0;
     for (const Cost& cost : spec.costs) rows += cost.residual->size();
@@ -82,7 +86,7 @@ void RobotProblem::difference(int node, ConstVectorRef x0, ConstVectorRef x1, Ve
 StepStatus RobotProblem::evaluate(int stage, ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) {
   Node& node = nodes_[stage];
   if (node.valid && node.x == x && node.u == u) return StepStatus::Ok;
-  node.valid = false;
+  node.valid = node.has_cost = false;
   node.x = x;
   node.u = u;
   if (!x.allFinite() || !u.allFinite()) return StepStatus::Failed;
@@ -112,6 +116,7 @@ StepStatus RobotProblem::calcTerminalCost(ConstVectorRef x, double& cost) {
   if (!x.allFinite()) return StepStatus::Failed;
   if (!node.valid || node.x != x) {
     node.x = x;
+    node.has_cost = false;
     node.valid = node.dynamics->updateState(x);
     if (!node.valid) return StepStatus::Failed;
   }
@@ -121,6 +126,7 @@ StepStatus RobotProblem::calcTerminalCost(ConstVectorRef x, double& cost) {
 
 double RobotProblem::sumCosts(int index, std::vector<CostValue>* values) {
   Node& node = nodes_[index];
+  if (node.has_cost && !values) return node.cost;
   const StageSpec& spec = specs_[index];
   double sum = 0;
   const auto add = [&](const std::string& name, double value) {
@@ -144,6 +150,8 @@ double RobotProblem::sumCosts(int index, std::vector<CostValue>* values) {
     add(cost.name, cost.weight * cost.activation.calc(r));
     row += cost.residual->size();
   }
+  node.cost = sum;
+  node.has_cost = true;
   return sum;
 }
 

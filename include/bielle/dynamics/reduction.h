@@ -3,8 +3,8 @@
 ///
 /// A cluster of loops touches few dofs (Bipetto's knee: 7, with 6 closure rows). Seen from the body that carries it, it
 /// is a small mechanism of its own, here a `LoopBlock` with its own massless Model whose world is that body. At a
-/// closed configuration, let J (rank x n) be the independent rows of its closure Jacobian, chosen by complete pivoting, W
-/// the metric of the block (diagonal, constant), and
+/// closed configuration, let J (rank x n) be independent rows of its closure Jacobian, chosen by pivoting, W the metric
+/// of the block (diagonal, constant), and
 ///     J N = 0,   N^T W N = I,   J^+ = W^{-1} J^T (J W^{-1} J^T)^{-1}                                                  (1)
 /// N (n x (n - rank)) is an orthonormal basis of the tangent space and (W N)^T reads its coordinates. Its choice is free at
 /// every point: no chart is left, and a dead point of a linkage, where motor or joint coordinates break down, is nothing
@@ -16,8 +16,6 @@
 ///
 /// W is the inertia that each dof moves at the configuration of the reduction: corrections go where they cost least, to
 /// light rods rather than to legs, as constraint impulses do. It also settles what a metre is worth against a radian.
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <string>
 #include <vector>
 
@@ -34,6 +32,7 @@ struct LoopBlock {
   std::vector<int> joints;            ///< joint indices in the whole model, in the order of `model`
   std::vector<int> dofs;              ///< velocity coordinates in the whole model (n)
   VectorXd metric;                    ///< n, diagonal of W
+  VectorXd inverse_root;              ///< n, diagonal of W^{-1/2}
   int rank = 0;                       ///< of the closure Jacobian
   int offset = 0, size = 0;           ///< reduced coordinates [offset, offset + size), size = n - rank
 };
@@ -81,6 +80,9 @@ class BlockPoint {
   /// \param zeta_guess  rank, where zeta is expected, or empty
   bool close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d, const VectorXd& zeta_guess);
 
+  /// Takes over the configuration of another point of the same block, its columns and bases; velocities are not.
+  void assign(const BlockPoint& other);
+
   const BlockBasis& basis() const { return basis_; }
   const VectorXd& zeta() const { return zeta_; }  ///< rank, of the last close()
   const VectorXd& step() const { return step_; }  ///< n, d - W^{-1} J(q_0)^T zeta of the last close()
@@ -90,7 +92,7 @@ class BlockPoint {
   Workspace& workspace() { return ws_; }
   const Workspace& workspace() const { return ws_; }
   /// (J W^{-1} J^T)^{-1} X in place (rank x k); JW^T times it is J^+ X.
-  void solveGram(MatrixRef X) const { solveSmallCholesky(gram_.matrixLLT(), X); }
+  void solveGram(MatrixRef X) const { solveSmallCholesky(L_, X); }
   /// Independent rows out of all rows (m x k -> rank x k).
   void selectIndependent(const MatrixXd& all, MatrixXd& out) const;
 
@@ -98,15 +100,17 @@ class BlockPoint {
   void updateJacobian(const LoopBlock& block);
   void updateResidual(const LoopBlock& block);
   bool updateBases(const LoopBlock& block);
-  bool eliminate(int rank);
+  bool factorize(const LoopBlock& block);
 
   BlockBasis basis_;
   Workspace ws_;
   VectorXd residual_, zeta_, step_, correction_;
-  MatrixXd J_all_, eliminated_, A_;
-  std::vector<int> row_order_, col_order_;
-  Eigen::LLT<MatrixXd> gram_;
-  Eigen::PartialPivLU<MatrixXd> lu_;
+  MatrixXd J_all_;
+  MatrixXd L_;                       // rank x rank, Cholesky factor of J W^{-1} J^T
+  MatrixXd reflected_, reflectors_;  // of J W^{-1/2}, rows padded; Householder vectors
+  VectorXd beta_, products_, rest_;  // their scales; scratch; squared norms of what is left of the rows
+  MatrixXd newton_;                  // factors of the matrix of close()
+  std::vector<int> pivots_;
   double gap_ = 0;
   bool closed_ = false;  // the last close() got as far as the bases
 };

@@ -47,11 +47,12 @@ class SaddlePoint {
   SaddlePointOptions options_;
   Eigen::LLT<MatrixXd> M_llt_, G_llt_;
   MatrixXd J_;     ///< m x n
-  MatrixXd W_;     ///< n x m: L^{-1} J^T D, L the Cholesky factor of M
+  MatrixXd W_;     ///< m x n: D J L^{-T}, L the Cholesky factor of M
   MatrixXd G_;     ///< m x m: D G D
   MatrixXd Ginv_;  ///< m x m, its (pseudo-)inverse
   VectorXd D_, rhs_, correction_;
-  MatrixXd T1_, T2_, buffer_;
+  MatrixXd T1_, T2_;
+  MatrixXd X_, rhs_t_, dlambda_t_;  ///< transposes within solveDerivatives()
   bool redundant_ = false;
 };
 

@@ -20,6 +20,8 @@ inline Matrix3d skew(const Vector3d& w) {
 
 /// Rotation matrix of the rotation vector w (rad).
 Matrix3d exp3(const Vector3d& w);
+/// The same as a unit quaternion.
+Eigen::Quaterniond exp3AsQuaternion(const Vector3d& w);
 
 /// Rotation by an angle (rad) about a unit axis.
 Matrix3d makeAxisRotation(const Vector3d& axis, double angle);
