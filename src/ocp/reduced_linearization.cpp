@@ -173,7 +173,7 @@ bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
 // Eqs. (e) to (g) for one block, rows [offset, offset + size) of Fx, Fu and gap.
 bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out) {
   const LoopBlock& loop = b.loop;
-  const int nr = reduction_.size, nu = model_.nu(), r = loop.size, o = loop.offset;
+  const int nr = reduction_.size, r = loop.size, o = loop.offset;
   const double h = spec_.dt;
   const BlockBasis &base = b.at.basis(), &next = b.next.basis();
   const MatrixXd &N = base.N, &Nn = next.N, &WNn = next.WN;

@@ -24,8 +24,11 @@ ReducedNode::ReducedNode(const Model& model, const Reduction& reduction, const S
                          std::shared_ptr<ReducedWorkPool> pool)
     : NodeModel(model, spec), reduction_(reduction), pool_(std::move(pool)) {
   for (const LoopBlock& block : reduction.blocks) blocks_.emplace_back(block);
-  for (size_t i = 0; i < reduction.free_joints.size(); ++i)
-    free_joints_.push_back({reduction.free_joints[i], reduction.free_offsets[i], {}, {}});
+  for (size_t i = 0; i < reduction.free_joints.size(); ++i) {
+    free_joints_.emplace_back();
+    free_joints_.back().joint = reduction.free_joints[i];
+    free_joints_.back().offset = reduction.free_offsets[i];
+  }
   const int nv = model.nv(), nr = reduction.size, nu = model.nu();
   num_loops_ = spec.constraints.num_loops;
   loop_rows_ = 0;
