@@ -85,7 +85,8 @@ std::vector<OptionEntry> listOptions(SquatOptions& o) {
           {"friction_weight", &o.friction_weight, "1/N^2", "stay inside the friction pyramid"},
           {"friction", &o.friction, "1", "friction coefficient"},
           {"terminal_weight", &o.terminal_weight, "1", "end at rest"},
-          {"contact_kp", &o.contact_kp, "1/s^2", "stabilisation of the contacts, position (limited to 1/(4 h^2), h the time step)"},
+          {"contact_kp", &o.contact_kp, "1/s^2",
+           "stabilisation of the contacts, position (limited to 1/(4 h^2), h the time step)"},
           {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"},
           {"closure_kp", &o.closure_kp, "1/s^2", "stabilisation of the closures, position"},
           {"closure_kd", &o.closure_kd, "1/s", "stabilisation of the closures, velocity"}};

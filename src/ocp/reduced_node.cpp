@@ -261,13 +261,12 @@ bool ReducedNode::closeStep(ConstVectorRef x) {
 
 void ReducedNode::differenceAbout(Block& b, const BlockBasis& basis, ConstVectorRef x0, ConstVectorRef x1,
                                   VectorRef dx) const {
-  const int nq = model_.nq(), nv = model_.nv(), nr = reduction_.size;
+  const int nq = model_.nq(), nr = reduction_.size;
   gatherConfiguration(model_, b.loop, x1.head(nq), b.work->q);
   b.loop.model.difference(basis.q, b.work->q, b.work->d);
   dx.segment(b.loop.offset, b.loop.size).noalias() = basis.WN.transpose() * b.work->d;
   for (size_t k = 0; k < b.loop.dofs.size(); ++k) b.work->d[k] = x1[nq + b.loop.dofs[k]] - x0[nq + b.loop.dofs[k]];
   dx.segment(nr + b.loop.offset, b.loop.size).noalias() = basis.WN.transpose() * b.work->d;
-  (void)nv;
 }
 
 void ReducedNode::differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const {

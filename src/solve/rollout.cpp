@@ -73,8 +73,8 @@ bool Rollout::rollOut(const RolloutInput& input, double alpha, Segment& segment)
     const bool at_joint = k + 1 == segment.end && k + 1 < N;
     VectorXd& next = at_joint ? segment.end_state : trial_.xs[k + 1];
     const bool continues = k > segment.begin && !contract;
-    const StepStatus status = continues ? problem.continueStep(k, trial_.xs[k], u, next, cost)
-                                        : problem.step(k, trial_.xs[k], u, next, cost);
+    const StepStatus status =
+        continues ? problem.continueStep(k, trial_.xs[k], u, next, cost) : problem.step(k, trial_.xs[k], u, next, cost);
     if (status != StepStatus::Ok) return false;
     segment.cost += cost;
     if (!std::isfinite(segment.cost) || !next.allFinite()) return false;
