@@ -12,6 +12,9 @@ namespace {
 
 using SimTK::Stage;
 
+// Rows, and pivots of scaled rows, below this part of the largest one are rounding of redundant rows.
+constexpr double kRankThreshold = 1e-10;
+
 VectorXd toEigen(const SimTK::Vector& v) {
   VectorXd out(v.size());
   for (int i = 0; i < v.size(); ++i) out[i] = v[i];
@@ -99,27 +102,37 @@ OracleSolution SimbodyBridge::solveWithArmature() const {
   s_->scatter(s_->Tdot_v, udot);
   s_->matter.calcConstraintAccelerationErrors(s_->state, udot, drift);
 
-  // With unit diagonal of M: a = D y, m = E z. One scale for all rows, as some may be nothing but rounding.
+  // With unit diagonal of D M D and rows E J D of unit length (links of a few milligrams beside others of kilograms are
+  // usual): a = D z, m = E y. By the null space N of E J D, z = z_J + N w with E J D z_J = -E drift; N^T then leaves
+  //     N^T D M D N w = N^T D (tau - b - M D z_J),    (E J D)^T y = D (tau - b - M D z).
+  // In extended precision, as differences in time are taken of the result.
+  using Real = long double;
+  using MatrixXr = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
+  using VectorXr = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
   const MatrixXd M = calcMassMatrix();
   const VectorXd D = M.diagonal().cwiseSqrt().cwiseInverse();
-  const MatrixXd JD = J * D.asDiagonal();
-  const double E = m > 0 ? 1 / JD.rowwise().norm().maxCoeff() : 1;
-  MatrixXd K = MatrixXd::Zero(nv + m, nv + m);
-  K.topLeftCorner(nv, nv) = D.asDiagonal() * M * D.asDiagonal();
-  K.bottomLeftCorner(m, nv) = E * JD;
-  K.topRightCorner(nv, m) = E * JD.transpose();
-  VectorXd rhs(nv + m);
-  rhs << D.cwiseProduct(s_->tau - calcBias()), -E * toEigen(drift);
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factor;
-  factor.setThreshold(1e-11);
-  factor.compute(K);
-  VectorXd solution = factor.solve(rhs);
-  solution += factor.solve(rhs - K * solution);
+  VectorXr E = J.rowwise().norm().cast<Real>();
+  const Real largest = m > 0 ? E.maxCoeff() : 0;
+  for (int i = 0; i < m; ++i) E[i] = E[i] > kRankThreshold * largest ? 1 / (J.row(i) * D.asDiagonal()).norm() : 0;
+  const auto scale = D.cast<Real>().asDiagonal();
+  const MatrixXr DMD = scale * M.cast<Real>() * scale, EJD = E.asDiagonal() * J.cast<Real>() * scale;
+  const VectorXr force = scale * (s_->tau - calcBias()).cast<Real>();
+  VectorXr z = VectorXr::Zero(nv), y = VectorXr::Zero(m);
+  MatrixXr N = MatrixXr::Identity(nv, nv);
+  Eigen::CompleteOrthogonalDecomposition<MatrixXr> rows, columns;
+  for (auto* factor : {&rows, &columns}) factor->setThreshold(kRankThreshold);
+  if (m > 0) {
+    columns.compute(EJD.transpose());
+    N = MatrixXr(columns.householderQ()).rightCols(nv - columns.rank());
+    z = rows.compute(EJD).solve(-(E.asDiagonal() * toEigen(drift).cast<Real>()));
+  }
+  z += N * (N.transpose() * DMD * N).ldlt().solve(N.transpose() * (force - DMD * z));
+  if (m > 0) y = columns.solve(force - DMD * z);
 
   OracleSolution out;
-  out.a = D.cwiseProduct(solution.head(nv));
+  out.a = D.cwiseProduct(z.cast<double>());
   SimTK::Vector multipliers(m);
-  for (int i = 0; i < m; ++i) multipliers[i] = E * solution[nv + i];
+  for (int i = 0; i < m; ++i) multipliers[i] = static_cast<double>(E[i] * y[i]);
   s_->readForces(multipliers, out);
   return out;
 }

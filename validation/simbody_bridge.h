@@ -20,7 +20,7 @@
 ///
 /// Simbody has no rotor inertia. solveBySimbody() therefore ignores the armature; solveWithArmature() solves
 ///     [M + diag(armature), J'; J, 0] [a; m] = [tau - b; -(dJ/dt v)]
-/// by a dense rank-revealing factorisation, all its terms being Simbody's.
+/// by the null space of the scaled rows, dense, rank revealing and in extended precision; all terms are Simbody's.
 #include <memory>
 
 #include "bielle/model/model.h"

@@ -1,11 +1,13 @@
 // Simbody against random mechanisms of every joint and closure kind, with fixed and free bases; wrong models must be
 // seen.
 #include <catch2/catch.hpp>
+#include <filesystem>
 #include <set>
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/model/reader.h"
 #include "mechanisms.h"
 #include "model_copy.h"
 #include "motion.h"
@@ -65,6 +67,27 @@ TEST_CASE("the planar four-bar, with redundant rows, agrees with Simbody in acce
     CHECK(report.findRow(std::string("constraint forces J'lambda, ") + label)->samples == options.samples);
     CHECK(report.findRow(std::string("closure forces, ") + label) == nullptr);  // not determined
   }
+}
+
+TEST_CASE("published closed-chain models agree with Simbody, on a free and on a fixed base") {
+  const std::string directory = std::string(BIELLE_SOURCE_DIR) + "/../shared/robots";
+  int robots = 0;
+  if (std::filesystem::is_directory(directory))
+    for (const auto& entry : std::filesystem::directory_iterator(directory)) {
+      if (!entry.is_directory()) continue;
+      ++robots;
+      for (const BaseKind base : {BaseKind::Free, BaseKind::Fixed}) {
+        LoadOptions load;
+        load.base = base;
+        ValidationOptions options;
+        options.samples = 4;
+        const ValidationReport report = validateRobot(loadRobot(entry.path().string(), load).model, options);
+        CAPTURE(entry.path().filename().string(), base == BaseKind::Free);
+        INFO(print(report));
+        CHECK(report.passed());
+      }
+    }
+  if (robots == 0) WARN("skipped: the published models are not at hand");
 }
 
 TEST_CASE("a wrong inertia, a moved closure and a turned hinge axis are each seen") {

@@ -51,12 +51,14 @@ MatrixXd calcNullSpace(const MatrixXd& A) {
   return svd.matrixV().rightCols(A.cols() - (sigma.array() > 1e-7 * sigma[0]).count());
 }
 
+// Accelerations are compared as M_ii^(1/2) a_i: the rounding of the forces of a linkage spins its lightest link fast.
+VectorXd getInertiaWeights(const Workspace& ws) { return ws.M.diagonal().cwiseSqrt(); }
+
 bool isRedundant(const MatrixXd& J) { return calcNullSpace(J.transpose()).cols() > 0; }
 
-// df/dt at t = 0, with Richardson's extrapolation.
+// df/dt at t = 0, by central differences of the sixth order.
 VectorXd differentiate(double h, const std::function<VectorXd(double)>& f) {
-  const VectorXd d1 = (f(h) - f(-h)) / (2 * h), d2 = (f(2 * h) - f(-2 * h)) / (4 * h);
-  return (4 * d1 - d2) / 3;
+  return (45 * (f(h) - f(-h)) - 9 * (f(2 * h) - f(-2 * h)) + (f(3 * h) - f(-3 * h))) / (60 * h);
 }
 
 class SampleSource {
@@ -89,7 +91,11 @@ class SampleSource {
     }
     const ConstraintSet set = makeConstraintSet(model_, sample.contacts);
     sample.v = projectVelocity(model_, ws, set, sample.q, random(model_.nv(), options_.velocity));
-    sample.tau = random(model_.nv(), options_.force);
+    updateMassMatrix(model_, ws);
+    // A link of milligrams under a force for kilograms would accelerate until nothing but rounding is left to compare.
+    constexpr double kLargestAcceleration = 1e5;
+    const VectorXd force = (kLargestAcceleration * ws.M.diagonal()).cwiseMin(options_.force);
+    sample.tau = random(model_.nv(), 1).cwiseProduct(force);
     sample.a = random(model_.nv(), options_.force);
     return sample;
   }
@@ -208,7 +214,9 @@ class Comparison {
     const VectorXd free_force = sample.tau - ws.b, free = ws.M.llt().solve(free_force);
     const double force = kFloor * free_force.cwiseAbs().maxCoeff();
     const double tolerance = std::max(options_.tolerance, theirs.rounding);
-    add("accelerations" + suffix, cws.a, theirs.a, kFloor * free.cwiseAbs().maxCoeff(), tolerance);
+    const VectorXd weight = getInertiaWeights(ws);
+    add("accelerations" + suffix, weight.cwiseProduct(cws.a), weight.cwiseProduct(theirs.a),
+        kFloor * weight.cwiseProduct(free).cwiseAbs().maxCoeff(), tolerance);
     if (set.rows == 0) return false;
     add("constraint forces J'lambda" + suffix, cws.J.transpose() * cws.lambda, theirs.constraint_force, force,
         tolerance);
@@ -270,11 +278,14 @@ class Comparison {
     const double tolerance = options_.derivative_tolerance;
     MatrixXd B = MatrixXd::Zero(nv, nu);
     for (int m = 0; m < nu; ++m) B(model_.motors()[m].dof, m) = 1;
-    const double response = nu > 0 ? kFloor * MatrixXd(ws.M.llt().solve(B)).cwiseAbs().maxCoeff() : 0;
-    const double a = kFloor * cws.a.cwiseAbs().maxCoeff(), force = kFloor * (sample.tau - ws.b).cwiseAbs().maxCoeff();
-    add("da/dq along the closures", dq.topRows(nv), dq_s.topRows(nv), a, tolerance);
-    add("da/dv along the closures", dv.topRows(nv), dv_s.topRows(nv), a, tolerance);
-    add("da/du", du.topRows(nv), du_s.topRows(nv), response, tolerance);
+    const VectorXd weight = getInertiaWeights(ws);
+    const auto weigh = [&](const MatrixXd& da) -> MatrixXd { return weight.asDiagonal() * da.topRows(nv); };
+    const double response = nu > 0 ? kFloor * weigh(ws.M.llt().solve(B)).cwiseAbs().maxCoeff() : 0;
+    const double a = kFloor * weigh(cws.a).cwiseAbs().maxCoeff(),
+                 force = kFloor * (sample.tau - ws.b).cwiseAbs().maxCoeff();
+    add("da/dq along the closures", weigh(dq), weigh(dq_s), a, tolerance);
+    add("da/dv along the closures", weigh(dv), weigh(dv_s), a, tolerance);
+    add("da/du", weigh(du), weigh(du_s), response, tolerance);
     add("dlambda/dq along the closures", dq.bottomRows(nw), dq_s.bottomRows(nw), force, tolerance);
     add("dlambda/dv along the closures", dv.bottomRows(nw), dv_s.bottomRows(nw), force, tolerance);
     add("dlambda/du", du.bottomRows(nw), du_s.bottomRows(nw), kFloor, tolerance);

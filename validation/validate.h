@@ -5,7 +5,8 @@
 /// that): a random tangent step, closed again by closeConfiguration; random velocities projected on the closures and on
 /// a random set of contacts in force; random generalized forces on all joints. Every row holds the largest difference
 /// over the samples of a vector or matrix, relative to the largest entry of Simbody's (or to a hundredth of the
-/// mechanism's response without constraints, where these leave less than that).
+/// mechanism's response without constraints, where these leave less than that). Accelerations and their derivatives are
+/// weighted by M_ii^(1/2) beforehand: the lightest link of a mechanism, spun by roundings, is not the measure of all.
 ///
 /// Forward dynamics are compared twice. "Simbody solver": Simbody's own realize(Acceleration), on both sides without
 /// rotors (makeModelWithoutArmature). "With rotors": the robot as it is, against SimbodyBridge::solveWithArmature.
@@ -14,8 +15,8 @@
 /// and generalized forces J^T lambda are.
 ///
 /// Derivatives are those along the closed manifold, where alone both formulations must agree: along curves q(t), v(t)
-/// that keep closures and contacts,  da/dt = da_dq q' + da_dv v'  against central differences (with Richardson
-/// extrapolation, error O(h^4)) of Simbody's a; likewise the forces; and da_du column by column.
+/// that keep closures and contacts,  da/dt = da_dq q' + da_dv v'  against central differences of the sixth
+/// order of Simbody's a; likewise the forces; and da_du column by column.
 ///
 /// When asked, a free motion of the robot without rotors is integrated by both programs.
 #include <ostream>
@@ -36,9 +37,9 @@ struct ValidationOptions {
   VectorXd start;                      ///< nq, where states are drawn around; empty: the first reference, or neutral
   double perturbation = 0.3;           ///< largest change of a coordinate before closing, m or rad
   double velocity = 1;                 ///< largest coordinate of the velocity before projection, m/s or rad/s
-  double force = 10;                   ///< largest generalized force, N m or N
-  double motion_duration = 0;          ///< s, of a free motion from the first state (motion.h); 0 for none
-  double motion_step = 1e-3;           ///< s, of our integrator
+  double force = 10;  ///< largest generalized force, N m or N; less on dofs that it would accelerate beyond 1e5 m/s^2
+  double motion_duration = 0;  ///< s, of a free motion from the first state (motion.h); 0 for none
+  double motion_step = 1e-3;   ///< s, of our integrator
   /// Of the distance at the end relative to the way gone, and of the energy error relative to the kinetic energy.
   double motion_tolerance = 1e-6;
 };

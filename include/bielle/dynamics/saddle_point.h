@@ -41,7 +41,6 @@ class SaddlePoint {
   void solveDerivatives(MatrixRef X, MatrixRef dlambda);
   /// Whether the rows needed Eq. (3).
   bool isRedundant() const { return redundant_; }
-  const MatrixXd& getScaledDelassus() const { return G_; }
 
  private:
   SaddlePointOptions options_;
