@@ -64,7 +64,7 @@ int main(int argc, char** argv) {
   printFddpHeader(std::cout);
   ShootingTrajectory trajectory = motion.guess;
   const FddpSummary summary = Fddp().solve(*motion.problem, trajectory, observer);
-  const MotionResult result = makeResult({"bipetto", {}}, motion, trajectory, summary);
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, trajectory, summary);
   printMotion(result, options);
 
   std::printf("\n%s after %d iterations and %.2f s, cost %.6f\n", getName(summary.termination), summary.iterations,

@@ -229,7 +229,8 @@ TEST_CASE("a result is three whole files, written again over the old ones") {
   summary.termination = FddpTermination::Interrupted;
   summary.cost = 2.5;
   summary.log.resize(3);
-  const MotionResult result = makeResult({"bipetto", {"bielle", "solve"}}, squat.motion, squat.motion.guess, summary);
+  const MotionResult result =
+      makeResult({"bipetto", "/r.urdf", {"bielle", "solve"}}, squat.motion, squat.motion.guess, summary);
   CHECK(result.interrupted());
   CHECK_FALSE(result.converged());
   for (size_t m = 1; m < result.peak_torques.size(); ++m)
@@ -246,6 +247,52 @@ TEST_CASE("a result is three whole files, written again over the old ones") {
     CHECK_THAT(readText(paths[2]), Catch::Contains("\"termination\": \"interrupted\"") &&
                                        Catch::Contains("\"interrupted\": true") && Catch::Contains("\"cost\": 2.5"));
   }
+}
+
+TEST_CASE("a summary reads back: phases, stances, ground; what is none is refused with its file") {
+  const TemporaryDirectory directory;
+  ShortSquat squat;
+  squat.motion.ground.height = -0.25;
+  squat.motion.ground.steps.push_back({Vector3d(0.5, 0.1, 0.15), 0.3, 0.6, 0.2});
+  const MotionResult result = makeResult({"bipetto", "/r.urdf", {}}, squat.motion, squat.motion.guess, {});
+  writeResult(directory / "", result);
+  const MotionSummary summary = readSummary(directory / "");
+  CHECK(summary.motion == "squat");
+  CHECK(summary.robot_file == "/r.urdf");
+  CHECK(summary.formulation == result.formulation);
+  CHECK_FALSE(summary.converged);
+  CHECK(summary.requested == result.requested);
+  CHECK(summary.time_step == result.schedule.dt);
+  REQUIRE(summary.phases.size() == 1);
+  CHECK(summary.phases[0].nodes == squat.motion.problem->numStages());
+  REQUIRE(summary.phases[0].stances.size() == 2);
+  for (int c = 0; c < 2; ++c) {
+    const ContactTarget& target = squat.motion.schedule.phases[0].contacts[c];
+    const MotionSummary::Stance& stance = summary.phases[0].stances[c];
+    CHECK(stance.contact == result.record.contact_names[target.contact]);
+    CHECK(stance.X_WT.p == target.X_WT.p);
+    CHECK(stance.X_WT.R.isApprox(target.X_WT.R, 1e-15));
+  }
+  CHECK(summary.ground.height == -0.25);
+  CHECK(summary.ground.friction == result.ground.friction);
+  REQUIRE(summary.ground.steps.size() == 1);
+  CHECK(summary.ground.calcHeight(0.5, 0.1) == 0.15);
+  CHECK(summary.ground.calcHeight(0.5, 0.5) == -0.25);
+
+  const auto getError = [&](const std::string& text) -> std::string {
+    writeText(directory / "summary.json", text);
+    try {
+      readSummary(directory / "");
+    } catch (const ModelError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  CHECK_THAT(getError(""), Catch::Contains("summary.json: file: "));
+  CHECK_THAT(getError("{}"), Catch::Contains("'motion'"));
+  CHECK_THAT(getError("[1]"), Catch::Contains("summary.json"));
+  fs::remove(directory / "summary.json");
+  CHECK_THROWS_WITH(readSummary(directory / ""), Catch::Contains("it cannot be read"));
 }
 
 TEST_CASE("the slip is zero for feet that stand still") {

@@ -102,7 +102,7 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
     };
   }
   const FddpSummary summary = Fddp(arguments.solver).solve(*motion.problem, motion.guess, observer);
-  const RunInfo run{arguments.robot.name, getCommandLine()};
+  const RunInfo run{arguments.robot.name, robot.file, getCommandLine()};
   const MotionResult result = makeResult(run, motion, motion.guess, summary);
   printResult(result, writeResult(arguments.directory, result));
   return result.converged() ? kOk : kFailed;

@@ -49,6 +49,34 @@ Json listByName(const std::vector<std::pair<std::string, double>>& values) {
   return json;
 }
 
+Json makePhases(const MotionResult& result) {
+  Json phases = Json::array();
+  int start = 0;
+  for (const ContactPhase& phase : result.schedule.phases) {
+    Json contacts = Json::array();
+    for (const ContactTarget& target : phase.contacts) {
+      const Vector3d& p = target.X_WT.p;
+      const Eigen::Quaterniond r(target.X_WT.R);
+      contacts.push_back({{"name", result.record.contact_names[target.contact]},
+                          {"position", {p.x(), p.y(), p.z()}},
+                          {"quaternion", {r.x(), r.y(), r.z(), r.w()}}});
+    }
+    phases.push_back({{"name", phase.name}, {"start_node", start}, {"nodes", phase.nodes}, {"contacts", contacts}});
+    start += phase.nodes;
+  }
+  return phases;
+}
+
+Json makeGround(const Ground& ground) {
+  Json steps = Json::array();
+  for (const GroundStep& step : ground.steps)
+    steps.push_back({{"top", {step.top.x(), step.top.y(), step.top.z()}},
+                     {"length", step.length},
+                     {"width", step.width},
+                     {"yaw", step.yaw}});
+  return {{"height", ground.height}, {"friction", ground.friction}, {"steps", steps}};
+}
+
 Json makeSummary(const MotionResult& result) {
   const BuildInfo build = getBuildInfo();
   Json log = Json::array();
@@ -57,6 +85,7 @@ Json makeSummary(const MotionResult& result) {
   const VectorXd& time = result.record.time;
   return {{"motion", result.motion},
           {"robot", result.run.robot},
+          {"robot_file", result.run.robot_file},
           {"formulation", getName(result.formulation)},
           {"command", result.run.command},
           {"requested", listByName(result.requested)},
@@ -75,6 +104,9 @@ Json makeSummary(const MotionResult& result) {
           {"contact_slip", {{"position_m", result.slip_position}, {"angle_rad", result.slip_angle}}},
           {"com_height", {{"start_m", result.com_start}, {"lowest_m", result.com_lowest}}},
           {"peak_torques", listByName(result.peak_torques)},
+          {"time_step_s", result.schedule.dt},
+          {"phases", makePhases(result)},
+          {"ground", makeGround(result.ground)},
           {"log_columns", {"iteration", "cost", "gap", "gradient", "step", "regularization", "seconds"}},
           {"log", log}};
 }
@@ -88,6 +120,8 @@ MotionResult makeResult(const RunInfo& run, const Motion& motion, const Shooting
   result.motion = motion.name;
   result.formulation = motion.problem->formulation();
   result.requested = motion.requested;
+  result.schedule = motion.schedule;
+  result.ground = motion.ground;
   result.solver = summary;
   result.record = makeRecord(motion, trajectory);
   const MotionRecord& record = result.record;

@@ -138,6 +138,7 @@ LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& option
   robot.warnings = urdf.warnings;
   robot.warnings.insert(robot.warnings.end(), yaml.warnings.begin(), yaml.warnings.end());
   robot.model = builder.build(&robot.warnings);
+  robot.file = std::filesystem::absolute(path).lexically_normal().string();
   robot.directory = path.has_parent_path() ? path.parent_path().string() : ".";
   return robot;
 }

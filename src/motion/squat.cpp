@@ -113,6 +113,7 @@ Motion makeSquat(const Model& model, const SquatOptions& options, Formulation fo
 
   Motion motion;
   motion.name = "squat";
+  motion.ground.friction = options.friction;
   const int nodes = static_cast<int>(std::ceil((options.duration + 2 * options.settle) / options.time_step - 1e-9));
   motion.schedule = {options.time_step, {{"double support", nodes, contacts}}};
   std::vector<StageSpec> stages;

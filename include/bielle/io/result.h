@@ -10,6 +10,7 @@ namespace bielle {
 /// How the motion was asked for.
 struct RunInfo {
   std::string robot;                 ///< name or path, as given
+  std::string robot_file;            ///< its .urdf, absolute
   std::vector<std::string> command;  ///< the command line, or empty
 };
 
@@ -18,6 +19,8 @@ struct MotionResult {
   std::string motion;
   Formulation formulation = Formulation::Full;
   std::vector<std::pair<std::string, double>> requested;  ///< every option by name
+  ContactSchedule schedule;
+  Ground ground;
   FddpSummary solver;
   MotionRecord record;
 
@@ -32,6 +35,30 @@ struct MotionResult {
 
 MotionResult makeResult(const RunInfo& run, const Motion& motion, const ShootingTrajectory& trajectory,
                         const FddpSummary& summary);
+
+/// What the summary.json of a result tells of the motion.
+struct MotionSummary {
+  struct Stance {
+    std::string contact;
+    SE3 X_WT;  ///< where its frame belongs
+  };
+  struct Phase {
+    std::string name;
+    int start_node = 0, nodes = 0;
+    std::vector<Stance> stances;
+  };
+  std::string file;  ///< that was read
+  std::string motion, robot, robot_file;
+  Formulation formulation = Formulation::Full;
+  bool converged = false;
+  std::vector<std::pair<std::string, double>> requested;
+  double time_step = 0;  ///< s
+  std::vector<Phase> phases;
+  Ground ground;
+};
+
+/// \throws ModelError naming the file, the entry and what is wrong with it
+MotionSummary readSummary(const std::string& directory);
 
 /// Creates the directory, with its parents, and makes sure that files can be written there.
 /// \throws ModelError naming the directory and why

@@ -53,6 +53,7 @@ struct LoadedRobot {
   Model model;
   std::vector<std::string> warnings;  ///< "file: element: what", possible but worth a look
   std::string directory;              ///< where the files were found
+  std::string file;                   ///< the .urdf, absolute
 };
 
 /// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf in the directories of getRobotDirectories()), by

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "bielle/ocp/contact_schedule.h"
+#include "bielle/ocp/ground.h"
 #include "bielle/ocp/robot_problem.h"
 #include "bielle/solve/fddp.h"
 
@@ -26,6 +27,7 @@ void setOption(const std::vector<OptionEntry>& options, const std::string& name,
 struct Motion {
   std::string name;
   ContactSchedule schedule;
+  Ground ground;
   std::unique_ptr<RobotProblem> problem;
   ShootingTrajectory guess;                               ///< quasi-static
   std::vector<std::pair<std::string, double>> requested;  ///< what was asked, by option name

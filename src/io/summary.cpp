@@ -1,0 +1,66 @@
+#include <filesystem>
+#include <fstream>
+
+#include "bielle/io/result.h"
+#include "bielle/model/error.h"
+#include "io/json_text.h"
+
+namespace bielle {
+namespace {
+
+Vector3d readVector(const Json& json) {
+  return Vector3d(json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>());
+}
+
+SE3 readPlacement(const Json& json) {
+  const Json& r = json.at("quaternion");
+  const Eigen::Quaterniond quaternion(r.at(3), r.at(0), r.at(1), r.at(2));
+  if (!(std::abs(quaternion.norm() - 1) < 1e-6)) throw std::runtime_error("a quaternion is not of unit length");
+  return {quaternion.normalized().toRotationMatrix(), readVector(json.at("position"))};
+}
+
+Ground readGround(const Json& json) {
+  Ground ground;
+  ground.height = json.at("height");
+  ground.friction = json.at("friction");
+  for (const Json& step : json.at("steps"))
+    ground.steps.push_back({readVector(step.at("top")), step.at("length"), step.at("width"), step.at("yaw")});
+  return ground;
+}
+
+MotionSummary read(const Json& json) {
+  MotionSummary summary;
+  summary.motion = json.at("motion");
+  summary.robot = json.at("robot");
+  summary.robot_file = json.at("robot_file");
+  const std::string formulation = json.at("formulation");
+  summary.formulation = formulation == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
+  summary.converged = json.at("converged");
+  for (const auto& [name, value] : json.at("requested").items()) summary.requested.emplace_back(name, value);
+  summary.time_step = json.at("time_step_s");
+  for (const Json& entry : json.at("phases")) {
+    MotionSummary::Phase phase{entry.at("name"), entry.at("start_node"), entry.at("nodes"), {}};
+    for (const Json& contact : entry.at("contacts"))
+      phase.stances.push_back({contact.at("name"), readPlacement(contact)});
+    summary.phases.push_back(phase);
+  }
+  summary.ground = readGround(json.at("ground"));
+  return summary;
+}
+
+}  // namespace
+
+MotionSummary readSummary(const std::string& directory) {
+  const std::string path = (std::filesystem::path(directory) / "summary.json").string();
+  std::ifstream file(path);
+  if (!file) throw ModelError(path, "file", "it cannot be read", "give a directory that `bielle solve` wrote");
+  try {
+    MotionSummary summary = read(Json::parse(file));
+    summary.file = path;
+    return summary;
+  } catch (const std::exception& error) {
+    throw ModelError(path, "file", error.what(), "make it anew with `bielle solve`");
+  }
+}
+
+}  // namespace bielle
