@@ -4,10 +4,10 @@
 ///
 /// With world spatial vectors, nu_c = V_1 - V_2 and a_c = A_1 - A_2 + V_1 x V_2 (the paper's eqs. 8 and 9), read in
 /// frame 1. For a dof k that moves frame 1 only (s = +1) or frame 2 only (s = -1), in the coordinates of frame 1,
-///     d a_c/dq_k = s (dA_k - (V_1 + V_2) x dV_k + J_k x A_2 - V_1 x (J_k x V_2)) (1) d a_c/dv_k = s (dJ_k + dV_k -
-///     (V_1 + V_2) x J_k)                                                                (2) d nu_c/dq_k = s (dV_k +
-///     J_k x V_2)                                                                              (3) d nu_c/dv_k = d
-///     a_c/da_k = s J_k                                                                                (4)
+///     d a_c/dq_k  = s (dA_k - (V_1 + V_2) x dV_k + J_k x A_2 - V_1 x (J_k x V_2))                                   (1)
+///     d a_c/dv_k  = s (dJ_k + dV_k - (V_1 + V_2) x J_k)                                                             (2)
+///     d nu_c/dq_k = s (dV_k + J_k x V_2)                                                                            (3)
+///     d nu_c/dv_k = d a_c/da_k = s J_k                                                                              (4)
 /// where dV, dA, dJ are those of rnea.h; a dof that moves both frames changes nothing. (1) gathers the derivatives of
 /// the paper's gamma_1, gamma_2 and gamma_3 (its eqs. 11 to 15): gamma_1 gives dA_k - V_1 x dV_k, gamma_2 gives dA_k -
 /// V_2 x dV_k and, as frame 1 turns, J_k x A_2; the rest is gamma_3.

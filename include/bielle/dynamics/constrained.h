@@ -1,9 +1,10 @@
 #pragma once
 /// \file Forward dynamics under closures and contacts, and its derivatives (the paper's eqs. 4 to 6).
 ///
-///     M a - J^T lambda = tau - b,     J a = -gamma (1)
+///     M a - J^T lambda = tau - b,     J a = -gamma                                                                   (1)
+///
 /// where gamma gathers the drift and the stabilisation of the closures: the system of saddle_point.h, redundant rows
-/// included. Its derivatives take dID = d(M a + b - J^T lambda - tau)/dz and da_c = d(J a + gamma)/dz at fixed a,
+/// included. Its derivatives take dID = d(M a + b - J^T lambda - tau)/dz and da_c = d(J a + gamma)/dz at fixed a and
 /// lambda.
 #include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/saddle_point.h"

@@ -1,16 +1,22 @@
 #pragma once
 /// \file The symmetric system behind constrained dynamics (the paper's eq. 4), with rows that may be redundant.
 ///
-///     M a - J^T lambda = f,     J a = -g (1) G lambda = -g - J M^{-1} f,    G = J M^{-1} J^T (2)
+///     M a - J^T lambda = f,     J a = -g                                                                             (1)
+///     G lambda = -g - J M^{-1} f,     G = J M^{-1} J^T                                                               (2)
+///
 /// With D = diag(G)^{-1/2} the system (D G D) y = D rhs is factorised directly where it is well conditioned, and solved
 /// by proximal iterations (Carpentier, Budhiraja, Mansard, RSS 2021) otherwise,
-///     y <- y + (D G D + mu I)^{-1} (D rhs - D G D y), (3)
+///
+///     y <- y + (D G D + mu I)^{-1} (D rhs - D G D y),                                                                (3)
+///
 /// which converge to the least-squares, minimum-norm y; lambda = D y. Neither a nor J^T lambda depends on the choice of
 /// rows.
 ///
 /// Derivatives along any argument: with dID the derivative of M a - J^T lambda - f and dc that of J a + g, both at
 /// fixed a and lambda,
-///     dlambda = G^+ (J M^{-1} dID - dc),     da = M^{-1} (J^T dlambda - dID). (4)
+///
+///     dlambda = G^+ (J M^{-1} dID - dc),     da = M^{-1} (J^T dlambda - dID).                                        (4)
+///
 /// With redundant rows dlambda is right up to the null space of J^T.
 #include <Eigen/Cholesky>
 

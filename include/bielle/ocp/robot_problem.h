@@ -2,13 +2,19 @@
 /// \file The shooting problem of a robot: constrained dynamics under Euler steps, and costs.
 ///
 /// Full formulation (the paper): x = (q, v) of the spanning tree, tangent size 2 nv. One step of length h:
-///     a = constrained dynamics (q, v, u),    v+ = v + h a,    q+ = q (+) h v+ (1)
+///
+///     a = constrained dynamics (q, v, u),    v+ = v + h a,    q+ = q (+) h v+                                        (1)
+///
 /// with derivatives (J_q, J_d those of (+) at d = h v+)
-///     dv+ = dv + h da,                       dq+ = J_q dq + h J_d dv+ (2)
+///
+///     dv+ = dv + h da,                       dq+ = J_q dq + h J_d dv+                                                (2)
+///
 /// Reduced formulation (ours): every state is closed and its velocity keeps it so; tangent size 2 (nv - rank), about an
 /// orthonormal basis N(q) per node and loop cluster (reduction.h). With a as in (1), loops eliminated before anything
 /// of full size,
-///     w = v + h a,    q+ = q (+) h w',  w' = w - W^{-1} J^T zeta with q+ closed,    v+ = (I - J^+ J)(q+) w' (3)
+///
+///     w = v + h a,    q+ = q (+) h w',  w' = w - W^{-1} J^T zeta with q+ closed,    v+ = (I - J^+ J)(q+) w'          (3)
+///
 /// Its derivatives stand in reduced_node.cpp. As h vanishes both formulations have the same optimum.
 /// Running cost of a stage: h times the sum of its costs; the terminal node has no h.
 /// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and so on.
