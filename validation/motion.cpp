@@ -80,10 +80,7 @@ double retract(const Model& model, Workspace& ws, const ConstraintSet& constrain
       const Closure& closure = constraints.closures[c];
       const int row = constraints.offsets[c], n = getRows(closure.kind);
       h.segment(row, n) = calcClosureResidual(ws, closure);
-      const RowsBy6 rate = calcClosureResidualRate(ws, closure);
-      const SE3 X_W1 = getPlacement(ws, closure.body1, closure.X_B1);
-      for (size_t i = 0; i < closure.dofs.size(); ++i)
-        H.block(row, closure.dofs[i], n, 1) = closure.signs[i] * (rate * X_W1.actInvMotion(ws.J.col(closure.dofs[i])));
+      calcClosureResidualJacobian(ws, closure, H.middleRows(row, n));
     }
     const double gap = h.cwiseAbs().maxCoeff();
     if (gap < 1e-14 || iteration == 4) return gap;

@@ -36,10 +36,7 @@ class HardConditions {
       const Closure& closure = set_.closures[c];
       const int row = set_.offsets[c], n = getRows(closure.kind);
       h.segment(row, n) = calcClosureResidual(ws_, closure);
-      const RowsBy6 rate = calcClosureResidualRate(ws_, closure);
-      const SE3 X_W1 = getPlacement(ws_, closure.body1, closure.X_B1);
-      for (size_t i = 0; i < closure.dofs.size(); ++i)
-        H.block(row, closure.dofs[i], n, 1) = closure.signs[i] * (rate * X_W1.actInvMotion(ws_.J.col(closure.dofs[i])));
+      calcClosureResidualJacobian(ws_, closure, H.middleRows(row, n));
     }
     int row = set_.rows;
     for (const FrameTarget& target : problem_.frames) row = updateTarget(target, row);

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "bielle/dynamics/kinematics.h"
+
 namespace bielle {
 namespace {
 
@@ -127,6 +129,13 @@ RowsBy6 calcClosureResidualRate(const Workspace& ws, const Closure& c) {
     rate.bottomRightCorner<2, 3>() = getHingeNormals(c).transpose() * dr;
   }
   return rate;
+}
+
+void calcClosureResidualJacobian(const Workspace& ws, const Closure& closure, MatrixRef H) {
+  const RowsBy6 rate = calcClosureResidualRate(ws, closure);
+  const SE3 X_W1 = getPlacement(ws, closure.body1, closure.X_B1);
+  for (size_t i = 0; i < closure.dofs.size(); ++i)
+    H.col(closure.dofs[i]) = closure.signs[i] * (rate * X_W1.actInvMotion(ws.J.col(closure.dofs[i])));
 }
 
 RowVectorUpTo6 calcClosureVelocity(const Workspace& ws, const Closure& c) {

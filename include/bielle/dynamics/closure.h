@@ -46,6 +46,9 @@ RowVectorUpTo6 calcClosureResidual(const Workspace& ws, const Closure& closure);
 /// Matrix R (rows x 6) with d residual/dt = R nu_c for the full velocity nu_c in frame 1. Exact at open configurations
 /// too.
 RowsBy6 calcClosureResidualRate(const Workspace& ws, const Closure& closure);
+/// Jacobian of the residual, R times that of nu_c, written to the columns closure.dofs of H (rows x nv); needs
+/// updatePositions.
+void calcClosureResidualJacobian(const Workspace& ws, const Closure& closure, MatrixRef H);
 
 /// Velocity rows; needs updateVelocities.
 RowVectorUpTo6 calcClosureVelocity(const Workspace& ws, const Closure& closure);
