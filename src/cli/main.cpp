@@ -41,6 +41,7 @@ int main(int argc, char** argv) {
   addInfo(app, action);
   addEval(app, action);
   addRobots(app, action);
+  addRatio(app, action);
   addBench(app, action);
   addValidate(app);
   app.callback([&action] {

@@ -1,0 +1,113 @@
+// bielle ratio: how fast the motors of a linkage turn for its joints, and where that breaks down.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/io/result.h"
+#include "bielle/model/error.h"
+#include "cli/commands.h"
+#include "cli/ratio_report.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::cli {
+namespace {
+
+// Of the virtual work: what the dynamics leave unbalanced, relative.
+constexpr double kBalanceTolerance = 1e-8;
+
+struct RatioArguments {
+  RobotArgument robot;
+  std::vector<std::string> joints;
+  std::string reference, directory;
+  int grid = 25;
+  SweepOptions sweep;
+  bool json = false;
+};
+
+VectorXd findStart(const LoadedRobot& robot, const std::string& reference) {
+  if (reference.empty()) return findClosedConfiguration(robot.model).q;
+  const AssemblyResult result = assembleReference(robot.model, reference);
+  if (result.status != AssemblyStatus::Closed)
+    throw ModelError(robot.directory, "reference '" + reference + "'", result.message, "start from another one");
+  return result.q;
+}
+
+double calcLargestBalanceError(const Model& model, const RatioReport& report, VectorXd q) {
+  double largest = 0;
+  for (const RatioSample& sample : report.sweep.samples) {
+    if (sample.dead == DeadPointKind::Joint) continue;
+    if (!report.linkage.isDirect()) scatterConfiguration(model, report.linkage.block, sample.q, q);
+    largest = std::max(largest, calcBalanceError(model, report.linkage, q, sample.ratio.R));
+  }
+  return largest;
+}
+
+int run(const RatioArguments& arguments) {
+  const LoadedRobot robot = arguments.robot.load();
+  const Model& model = robot.model;
+  RatioReport report;
+  report.robot = arguments.robot.name;
+  const VectorXd q = findStart(robot, arguments.reference);
+  report.linkage = makeLinkage(model, makeReduction(model, q), arguments.joints);
+  report.sweep = sweepRatio(model, report.linkage, q, 0, arguments.sweep);
+  if (report.linkage.size() == 2) report.map = mapRatio(model, report.linkage, q, arguments.grid, arguments.sweep);
+  report.balance_error = calcLargestBalanceError(model, report, q);
+  std::vector<std::string> written;
+  if (!arguments.directory.empty()) {
+    makeOutputDirectory(arguments.directory);
+    written = writeReport(arguments.directory, report);
+  }
+  if (arguments.json)
+    std::cout << formatJson(describeReport(report)) << "\n";
+  else
+    printReport(std::cout, report);
+  for (const std::string& line : written) (arguments.json ? std::cerr : std::cout) << "  " << line << "\n";
+  return report.balance_error < kBalanceTolerance ? kOk : kFailed;
+}
+
+}  // namespace
+
+void addRatio(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("ratio", "Reduction ratio between motors and a joint along its range");
+  const auto arguments = std::make_shared<RatioArguments>();
+  command.add_option("ROBOT", arguments->robot.name, "name, directory or .urdf file")->required();
+  command
+      .add_option("--joint", arguments->joints,
+                  "joint that is swept; then the others of its linkage, unless the robot's serial joints tell them")
+      ->required();
+  command.add_option("--reference", arguments->reference, "start from this reference of the robot; default: the first");
+  command.add_option("-o,--output", arguments->directory,
+                     "directory for ratio.csv, ratio.json, ratio.svg (and map.csv)");
+  command.add_option("--step", arguments->sweep.step, "largest step along the linkage, all its joints together [rad]")
+      ->check(CLI::Range(1e-4, 0.2))
+      ->capture_default_str();
+  command.add_option("--grid", arguments->grid, "angles of the first joint in the map of a linkage with two motors")
+      ->check(CLI::Range(2, 500))
+      ->capture_default_str();
+  command.add_flag("--json", arguments->json, "print JSON");
+  addFixedBase(command, arguments->robot);
+  command.footer(
+      "The ratio R is the speed of a motor over that of a joint [rad/rad], v_motor = R v_joint; motor torques u give "
+      "the\n"
+      "joint torques R^T u. dR is its derivative with respect to the angle that is swept [1/rad]. The linkage is "
+      "followed\n"
+      "from its start until a joint limit, a loss of rank, or a full turn, through its dead points:\n"
+      "  joint  the joint stands still while the motor turns: R is infinite, the angle turns back, another branch "
+      "begins\n"
+      "  motor  the motor stands still while the joint turns: R is zero (singular), the motor does not hold the joint\n"
+      "A linkage with two motors gets a 2 x 2 R, its condition number, and a map over both joints, up to the first "
+      "dead\n"
+      "points. Virtual work is checked by the constrained dynamics of the whole robot at every sample. Figures are "
+      "drawn\n"
+      "by gnuplot, if there is one. Exit status: 0 done, 1 the virtual work does not balance, 2 bad input.\n"
+      "Examples:\n"
+      "  bielle ratio bipetto --joint knee_right\n"
+      "  bielle ratio bipetto --joint ankley_right -o ankle\n"
+      "  bielle ratio fivebar --joint elbow_left elbow_right --json");
+  command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
+}
+
+}  // namespace bielle::cli

@@ -1,0 +1,208 @@
+#include "cli/ratio_report.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <ostream>
+
+#include "cli/ratio_figure.h"
+#include "cli/table.h"
+#include "io/aside_file.h"
+#include "io/figure.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::cli {
+namespace {
+
+constexpr size_t kTableRows = 24;
+
+// "motor" for one motor and one joint, else "motor/joint".
+std::vector<std::string> makeEntryNames(const Linkage& linkage) {
+  std::vector<std::string> names;
+  for (const std::string& motor : linkage.motor_names)
+    for (const std::string& joint : linkage.joint_names) names.push_back(motor + "/" + joint);
+  return names;
+}
+
+std::vector<double> listEntries(const MatrixXd& R) {
+  std::vector<double> entries;
+  for (Eigen::Index i = 0; i < R.rows(); ++i)
+    for (Eigen::Index j = 0; j < R.cols(); ++j) entries.push_back(R(i, j));
+  return entries;
+}
+
+Json listNumbers(const std::vector<double>& numbers) {  // JSON knows no infinity
+  Json list = Json::array();
+  for (const double x : numbers) list.push_back(std::isfinite(x) ? Json(x) : Json(nullptr));
+  return list;
+}
+
+Json describeSample(const RatioSample& sample, int swept) {
+  return {
+      {"s", sample.s},
+      {"branch", sample.branch},
+      {"joints", listNumbers({sample.joints.begin(), sample.joints.end()})},
+      {"motors", listNumbers({sample.motors.begin(), sample.motors.end()})},
+      {"R", listNumbers(listEntries(sample.ratio.R))},
+      {"dR", sample.dead == DeadPointKind::Joint ? Json(nullptr) : listNumbers(listEntries(sample.ratio.dR[swept]))},
+      {"condition", listNumbers({sample.ratio.condition})[0]},
+      {"dead", getName(sample.dead)}};
+}
+
+Json describeSamples(const std::vector<RatioSample>& samples, int swept) {
+  Json list = Json::array();
+  for (const RatioSample& sample : samples) list.push_back(describeSample(sample, swept));
+  return list;
+}
+
+// The shortest text that reads back to the same number; nothing for infinity.
+std::string formatExact(double value) {
+  if (!std::isfinite(value)) return "";
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
+}
+
+std::string formatCsv(const Linkage& linkage, const std::vector<RatioSample>& samples, int swept) {
+  std::string text = "s,branch";
+  for (const std::string& name : linkage.joint_names) text += ",q." + name;
+  for (const std::string& name : linkage.motor_names) text += ",q." + name;
+  for (const std::string& name : makeEntryNames(linkage)) text += ",R." + name;
+  for (const std::string& name : makeEntryNames(linkage)) text += ",dR." + name;
+  text += ",condition,dead\n";
+  for (const RatioSample& sample : samples) {
+    text += formatExact(sample.s) + "," + std::to_string(sample.branch);
+    for (const double x : sample.joints) text += "," + formatExact(x);
+    for (const double x : sample.motors) text += "," + formatExact(x);
+    for (const double x : listEntries(sample.ratio.R)) text += "," + formatExact(x);
+    const bool infinite = sample.dead == DeadPointKind::Joint;
+    for (const double x : listEntries(sample.ratio.dR[swept])) text += "," + (infinite ? "" : formatExact(x));
+    text += "," + formatExact(sample.ratio.condition) + "," + getName(sample.dead) + "\n";
+  }
+  return text;
+}
+
+void printSamples(std::ostream& out, const Linkage& linkage, const std::vector<RatioSample>& samples, int swept) {
+  Row header = {"branch"};
+  for (const std::string& name : linkage.joint_names) header.push_back(name);
+  for (const std::string& name : linkage.motor_names) header.push_back(name);
+  const bool one = linkage.size() == 1;
+  for (const std::string& name : makeEntryNames(linkage)) header.push_back(one ? "R" : "R " + name);
+  if (one) header.push_back("dR");
+  if (!one) header.push_back("condition");
+  header.push_back("dead point");
+  std::vector<Row> rows = {header};
+  const auto format = [](double x) { return std::isfinite(x) && std::abs(x) < 1e8 ? formatNumber(x, "%.4f") : "inf"; };
+  for (const RatioSample& sample : samples) {
+    const bool infinite = sample.dead == DeadPointKind::Joint;
+    Row row = {std::to_string(sample.branch)};
+    for (const double x : sample.joints) row.push_back(formatNumber(x, "%.6f"));
+    for (const double x : sample.motors) row.push_back(formatNumber(x, "%.6f"));
+    for (const double x : listEntries(sample.ratio.R)) row.push_back(format(x));
+    if (one) row.push_back(infinite ? "inf" : format(sample.ratio.dR[swept](0, 0)));
+    if (!one) row.push_back(format(sample.ratio.condition));
+    row.push_back(getName(sample.dead));
+    rows.push_back(row);
+  }
+  printTable(out, rows);
+}
+
+// Some samples of the main branch, all dead points.
+std::vector<RatioSample> thinOut(const std::vector<RatioSample>& samples) {
+  size_t main = 0;
+  for (const RatioSample& sample : samples) main += sample.branch == 0;
+  const size_t stride = std::max<size_t>(1, (main + kTableRows - 1) / kTableRows);
+  std::vector<RatioSample> some;
+  size_t count = 0;
+  for (const RatioSample& sample : samples)
+    if (sample.dead != DeadPointKind::None || sample.s == 0 || (sample.branch == 0 && count++ % stride == 0))
+      some.push_back(sample);
+  return some;
+}
+
+std::string join(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
+Json describeReport(const RatioReport& report) {
+  const RatioSweep& sweep = report.sweep;
+  Json json = {{"robot", report.robot},
+               {"joints", report.linkage.joint_names},
+               {"motors", report.linkage.motor_names},
+               {"swept", report.linkage.joint_names[sweep.joint]},
+               {"begin", sweep.begin},
+               {"end", sweep.end},
+               {"full_turn", sweep.full_turn},
+               {"balance_error", report.balance_error},
+               {"dead_points", describeSamples(sweep.getDeadPoints(), sweep.joint)},
+               {"samples", describeSamples(sweep.samples, sweep.joint)}};
+  if (!report.map) return json;
+  Json rows = Json::array();
+  for (const std::vector<RatioSample>& row : report.map->rows) rows.push_back(describeSamples(row, sweep.joint));
+  json["map"] = {{"first", report.map->first},
+                 {"second", report.map->second},
+                 {"rows", rows},
+                 {"dead_points", describeSamples(report.map->dead_points, sweep.joint)}};
+  return json;
+}
+
+void printReport(std::ostream& out, const RatioReport& report) {
+  const RatioSweep& sweep = report.sweep;
+  double low = INFINITY, high = -INFINITY;
+  for (const RatioSample& sample : sweep.samples) {
+    if (sample.branch != 0) continue;
+    low = std::min(low, sample.joints[sweep.joint]);
+    high = std::max(high, sample.joints[sweep.joint]);
+  }
+  out << report.robot << ": " << join(report.linkage.joint_names) << " driven by " << join(report.linkage.motor_names)
+      << "\n";
+  printTable(out, std::vector<Row>{
+                      {"range of " + report.linkage.joint_names[sweep.joint],
+                       formatNumber(low, "%.6f") + " to " + formatNumber(high, "%.6f") + " (rad, or m), first branch"},
+                      {"ends", sweep.full_turn ? "none: a full turn" : sweep.begin + "; " + sweep.end},
+                      {"dead points", std::to_string(sweep.getDeadPoints().size())},
+                      {"virtual work", "off by " + formatNumber(report.balance_error, "%.1e") + " at most, relative"}});
+  out << "\nratio R = motor speed / joint speed" << (report.linkage.isDirect() ? ": the motor sits on the joint" : "")
+      << "\n";
+  printSamples(out, report.linkage, thinOut(sweep.samples), sweep.joint);
+  if (!report.map) return;
+  double worst = 1, best = INFINITY;
+  size_t reached = 0;
+  for (const std::vector<RatioSample>& row : report.map->rows)
+    for (const RatioSample& sample : row) {
+      worst = std::max(worst, sample.ratio.condition);
+      best = std::min(best, sample.ratio.condition);
+      ++reached;
+    }
+  out << "\nmap over both joints, up to the first dead points: " << reached << " postures, condition number of R from "
+      << formatNumber(best, "%.3f") << " to " << formatNumber(worst, "%.3f") << "\n";
+}
+
+std::vector<std::string> writeReport(const std::string& directory, const RatioReport& report) {
+  const auto place = [&directory](const char* name) { return (fs::path(directory) / name).string(); };
+  std::vector<std::string> written = {place("ratio.csv"), place("ratio.json")};
+  AsideFile csv(written[0]), json(written[1]);
+  csv.write(formatCsv(report.linkage, report.sweep.samples, report.sweep.joint));
+  json.write(formatJson(describeReport(report)) + "\n");
+  csv.commit();
+  if (report.map) {
+    std::vector<RatioSample> all;
+    for (const std::vector<RatioSample>& row : report.map->rows) all.insert(all.end(), row.begin(), row.end());
+    AsideFile map(place("map.csv"));
+    map.write(formatCsv(report.linkage, all, report.sweep.joint));
+    map.commit();
+    written.push_back(place("map.csv"));
+  }
+  json.commit();
+  written.push_back(drawSvg(place("ratio.svg"), makeRatioScript(report))
+                        ? place("ratio.svg")
+                        : "no figure: gnuplot is not installed (Debian: gnuplot-nox)");
+  return written;
+}
+
+}  // namespace bielle::cli

@@ -1,0 +1,27 @@
+#pragma once
+// What `bielle ratio` says of a linkage: text, JSON, CSV and a figure.
+#include <iosfwd>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bielle/transmission/ratio_sweep.h"
+#include "io/json_text.h"
+
+namespace bielle::cli {
+
+struct RatioReport {
+  std::string robot;
+  Linkage linkage;
+  RatioSweep sweep;
+  std::optional<RatioMap> map;  // of a linkage of mobility two
+  double balance_error = 0;     // largest of calcBalanceError
+};
+
+Json describeReport(const RatioReport& report);
+void printReport(std::ostream& out, const RatioReport& report);
+
+// ratio.csv, ratio.json, ratio.svg and, with a map, map.csv. Returns the paths, or notes on what could not be drawn.
+std::vector<std::string> writeReport(const std::string& directory, const RatioReport& report);
+
+}  // namespace bielle::cli

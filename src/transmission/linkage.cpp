@@ -1,0 +1,196 @@
+#include "bielle/transmission/linkage.h"
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+std::string join(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none" : text;
+}
+
+int findScalarJoint(const Model& model, const std::string& name) {
+  const std::string element = "joint '" + name + "'";
+  const int index = model.findJoint(name);
+  if (index < 0)
+    throw ModelError(
+        model.name(), element, "there is no moving joint of this name",
+        "`bielle info` lists the joints; the serial ones are: " + [&model] {
+          std::vector<std::string> serial;
+          for (int i : model.serialJoints()) serial.push_back(model.joints()[i].name);
+          return join(serial);
+        }());
+  const Joint& joint = model.joints()[index];
+  if (joint.nv != 1)
+    throw ModelError(
+        model.name(), element,
+        "it is a " + std::string(getName(joint.kind)) + " joint of " + std::to_string(joint.nv) + " coordinates",
+        "a ratio needs joints of one coordinate");
+  return index;
+}
+
+bool contains(const std::vector<int>& list, int value) {
+  return std::find(list.begin(), list.end(), value) != list.end();
+}
+
+// Places of the joint with index i of the whole model within the block.
+void addPlaces(const Linkage& linkage, int i, std::vector<int>& dofs, std::vector<int>& positions) {
+  const std::vector<int>& joints = linkage.block.joints;
+  const int at = static_cast<int>(std::find(joints.begin(), joints.end(), i) - joints.begin());
+  const Joint& joint = linkage.block.model.joints()[at + 1];  // the first one is the world
+  dofs.push_back(joint.idx_v);
+  positions.push_back(joint.idx_q);
+}
+
+Linkage makeDirectLinkage(const Model& model, int joint) {
+  Linkage linkage;
+  const int motor = model.findMotor(model.joints()[joint].name);
+  if (motor < 0)
+    throw ModelError(model.name(), "joint '" + model.joints()[joint].name + "'",
+                     "nothing drives it: it is in no loop and has no motor", "name a joint that a motor moves");
+  linkage.joints = {joint};
+  linkage.motors = {motor};
+  return linkage;
+}
+
+Linkage makeLoopLinkage(const Model& model, const LoopBlock& block, std::vector<int> joints) {
+  Linkage linkage;
+  linkage.block = block;
+  linkage.block.metric.setOnes();  // geometry alone: what is light must not move far per step
+  linkage.block.inverse_root.setOnes();
+  const std::string element = "joint '" + model.joints()[joints.front()].name + "'";
+  for (int i : model.serialJoints())
+    if (static_cast<int>(joints.size()) < block.size && contains(block.joints, i) && !contains(joints, i) &&
+        model.joints()[i].nv == 1)
+      joints.push_back(i);
+  std::vector<std::string> motor_names;
+  for (int m = 0; m < model.nu(); ++m)
+    if (contains(block.joints, model.motors()[m].joint)) {
+      linkage.motors.push_back(m);
+      motor_names.push_back(model.motors()[m].name);
+    }
+  const std::string mobility = "its linkage has mobility " + std::to_string(block.size);
+  if (static_cast<int>(linkage.motors.size()) != block.size)
+    throw ModelError(model.name(), element,
+                     mobility + " and " + std::to_string(linkage.motors.size()) + " motors (" + join(motor_names) + ")",
+                     "a ratio needs as many motors as mobility");
+  if (static_cast<int>(joints.size()) != block.size)
+    throw ModelError(model.name(), element,
+                     mobility + ", driven by " + join(motor_names) + "; " + std::to_string(joints.size()) +
+                         " joint(s) of it are named or listed as serial joints",
+                     "name " + std::to_string(block.size) + " joints of this linkage");
+  linkage.joints = std::move(joints);
+  for (int i : linkage.joints) addPlaces(linkage, i, linkage.joint_dofs, linkage.joint_positions);
+  for (int m : linkage.motors) addPlaces(linkage, model.motors()[m].joint, linkage.motor_dofs, linkage.motor_positions);
+  return linkage;
+}
+
+MatrixXd selectRowsOf(const MatrixXd& N, const std::vector<int>& dofs) {
+  MatrixXd rows(dofs.size(), N.cols());
+  for (size_t i = 0; i < dofs.size(); ++i) rows.row(i) = N.row(dofs[i]);
+  return rows;
+}
+
+}  // namespace
+
+Linkage makeLinkage(const Model& model, const Reduction& reduction, const std::vector<std::string>& names) {
+  std::vector<int> joints;
+  int block = -1;
+  for (const std::string& name : names) {
+    const int joint = findScalarJoint(model, name);
+    int owner = -1;
+    for (size_t b = 0; b < reduction.blocks.size(); ++b)
+      if (contains(reduction.blocks[b].joints, joint)) owner = static_cast<int>(b);
+    if (!joints.empty() && (owner != block || owner < 0))
+      throw ModelError(model.name(), "joint '" + name + "'",
+                       "it is not in the linkage of '" + model.joints()[joints.front()].name + "'",
+                       "ask for joints of one linkage at a time");
+    if (contains(joints, joint)) throw ModelError(model.name(), "joint '" + name + "'", "it is named twice", "");
+    block = owner;
+    joints.push_back(joint);
+  }
+  if (joints.empty()) throw ModelError(model.name(), "joints", "none is named", "name a joint");
+  Linkage linkage = block < 0 ? makeDirectLinkage(model, joints.front())
+                              : makeLoopLinkage(model, reduction.blocks[block], std::move(joints));
+  for (int i : linkage.joints) linkage.joint_names.push_back(model.joints()[i].name);
+  for (int m : linkage.motors) linkage.motor_names.push_back(model.motors()[m].name);
+  return linkage;
+}
+
+bool calcLinkageRatio(const Linkage& linkage, BlockPoint& point, LinkageRatio& out) {
+  const int m = linkage.size();
+  out.R = MatrixXd::Identity(m, m);
+  out.dR.assign(m, MatrixXd::Zero(m, m));
+  out.condition = 1;
+  if (linkage.isDirect()) return true;
+  const LoopBlock& block = linkage.block;
+  const BlockBasis& basis = point.basis();
+  const Eigen::FullPivLU<MatrixXd> N_J(selectRowsOf(basis.N, linkage.joint_dofs));
+  if (!N_J.isInvertible()) return false;
+  const MatrixXd T = basis.N * N_J.inverse();
+  out.R = selectRowsOf(T, linkage.motor_dofs);  // Eq. (1)
+  const Eigen::JacobiSVD<MatrixXd> svd(out.R);
+  out.condition = svd.singularValues()[0] / svd.singularValues()[m - 1];
+
+  // Motor accelerations of Eq. (2) at joint speeds w.
+  Workspace& ws = point.workspace();
+  const auto calcMotorAcceleration = [&](const VectorXd& w) {
+    updateVelocities(block.model, ws, T * w);
+    updateAccelerations(block.model, ws, VectorXd::Zero(block.model.nv()));
+    MatrixXd gamma(block.closures.rows, 1), independent(block.rank, 1);
+    for (size_t c = 0; c < block.closures.closures.size(); ++c) {
+      const Closure& closure = block.closures.closures[c];
+      gamma.block(block.closures.offsets[c], 0, getRows(closure.kind), 1) = calcClosureAcceleration(ws, closure);
+    }
+    point.selectIndependent(gamma, independent);
+    point.solveGram(independent);
+    VectorXd a = -(basis.JW.transpose() * independent);
+    a -= T * selectRowsOf(a, linkage.joint_dofs);
+    return VectorXd(selectRowsOf(a, linkage.motor_dofs));
+  };
+  std::vector<VectorXd> alone;
+  for (int j = 0; j < m; ++j) alone.push_back(calcMotorAcceleration(VectorXd::Unit(m, j)));
+  for (int j = 0; j < m; ++j)
+    for (int k = 0; k <= j; ++k) {  // Eq. (3), symmetric in j and k
+      const VectorXd mixed = calcMotorAcceleration(VectorXd::Unit(m, j) + VectorXd::Unit(m, k));
+      out.dR[k].col(j) = (mixed - alone[j] - alone[k]) / 2;
+      out.dR[j].col(k) = out.dR[k].col(j);
+    }
+  return out.R.allFinite();
+}
+
+double calcBalanceError(const Model& model, const Linkage& linkage, ConstVectorRef q, const MatrixXd& R) {
+  Workspace ws(model);
+  ConstrainedWorkspace cws;
+  const ConstraintSet loops = makeConstraintSet(model);
+  const VectorXd rest = VectorXd::Zero(model.nv());
+  updatePositions(model, ws, q);
+  updateVelocities(model, ws, rest);
+  updateBias(model, ws);
+  const VectorXd gravity = ws.b;
+  const auto calcAcceleration = [&](const VectorXd& tau) {
+    const bool ok = updateConstrainedDynamics(model, ws, cws, loops, q, rest, gravity + tau) == DynamicsStatus::Ok;
+    return ok ? cws.a : VectorXd::Constant(model.nv(), std::numeric_limits<double>::infinity());
+  };
+  double error = 0;
+  for (int i = 0; i < linkage.size(); ++i) {
+    VectorXd motor = rest, joints = rest;
+    motor[model.motors()[linkage.motors[i]].dof] = 1;
+    for (int j = 0; j < linkage.size(); ++j) joints[model.joints()[linkage.joints[j]].idx_v] -= R(i, j);
+    const double alone = std::max(calcAcceleration(motor).norm(), calcAcceleration(joints).norm());
+    // A motor on its own joint balances itself, with nothing left to compare.
+    if (alone > 0) error = std::max(error, calcAcceleration(motor + joints).norm() / alone);
+  }
+  return error;
+}
+
+}  // namespace bielle

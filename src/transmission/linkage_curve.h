@@ -1,0 +1,51 @@
+#pragma once
+// The curve of ratio_sweep.h, step by step.
+#include <functional>
+#include <string>
+
+#include "bielle/transmission/ratio_sweep.h"
+
+namespace bielle {
+
+struct CurvePoint {
+  VectorXd q;        // of the block, closed
+  VectorXd tangent;  // n, of unit length in the metric of the block
+  double s = 0;
+  double joint_rate = 0, motor_rate = 0;  // Eq. (2)
+};
+
+class LinkageCurve {
+ public:
+  // From the configuration of the block, along increasing angles of the joint.
+  LinkageCurve(const Linkage& linkage, int joint, ConstVectorRef q_block);
+
+  // False when the rank is not the block's, or the held joints cannot be held; why() says which.
+  bool start(CurvePoint& point);
+  // The point at a distance h (of either sign) along the tangent of `from`.
+  bool advance(const CurvePoint& from, double h, CurvePoint& to);
+  // The step in [0, h] from `from` where f is zero; f changes its sign there.
+  double findRoot(const CurvePoint& from, double h, double tolerance,
+                  const std::function<double(const CurvePoint&)>& f);
+
+  // Whether the loops lose rank within the step h from `from`, which advance() may have jumped over: the curve has another
+  // one crossing it there. Then `h` becomes the step up to that point.
+  bool findRankLoss(const CurvePoint& from, const CurvePoint& to, double& h);
+
+  RatioSample makeSample(const CurvePoint& point, DeadPointKind dead = DeadPointKind::None);
+  const std::string& why() const { return why_; }
+  const LoopBlock& block() const { return linkage_.block; }
+
+ private:
+  bool finishPoint(const VectorXd& direction, CurvePoint& point);
+  MatrixXd getHeldRows() const;
+  MatrixXd calcJacobian(const VectorXd& q);
+
+  const Linkage& linkage_;
+  int joint_;
+  std::vector<int> held_;  // of the linkage's joints
+  VectorXd q_start_, held_angles_;
+  BlockPoint from_, point_;
+  std::string why_;
+};
+
+}  // namespace bielle

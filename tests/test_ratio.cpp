@@ -1,0 +1,269 @@
+// Reduction ratios. Oracles: the four-bar on paper, virtual work in the constrained dynamics, differences, and dead points
+// found without any Jacobian.
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/model/error.h"
+#include "bielle/model/fourbar_chain.h"
+#include "bielle/model/reader.h"
+#include "bielle/transmission/ratio_sweep.h"
+#include "check_derivative.h"
+#include "robot_directory.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kA = 0.15, kB = 0.35, kC = 0.30, kD = 0.40;  // robots/fourbar/README.md
+
+struct Robot {
+  explicit Robot(const std::string& name, const std::vector<std::string>& joints)
+      : model(loadRobot(name).model),
+        q(findClosedConfiguration(model).q),
+        linkage(makeLinkage(model, makeReduction(model, q), joints)) {}
+  VectorXd getWhole(const RatioSample& sample) const {
+    VectorXd whole = q;
+    scatterConfiguration(model, linkage.block, sample.q, whole);
+    return whole;
+  }
+  Model model;
+  VectorXd q;
+  Linkage linkage;
+};
+
+// dtheta2 / dtheta4 from the derivative of Freudenstein's equation.
+double calcFourBarRatio(double theta2, double theta4) {
+  const double sine = std::sin(theta2 - theta4);
+  return (kD / kA * std::sin(theta4) + sine) / (kD / kC * std::sin(theta2) + sine);
+}
+
+// Angle of the rocker with crank and coupler aligned, their sum or difference `reach` long.
+double calcExtremeRocker(double reach) { return kPi - std::acos((kC * kC + kD * kD - reach * reach) / (2 * kC * kD)); }
+
+// Closed with one joint at an angle: it is pulled there, the others follow.
+VectorXd closeAt(const Model& model, const VectorXd& q, const std::string& joint, double angle) {
+  const Joint& pulled = model.joints()[model.findJoint(joint)];
+  AssemblyProblem problem;
+  problem.q_ref = q;
+  problem.q_ref[pulled.idx_q] = angle;
+  problem.weights = VectorXd::Constant(model.nv(), 1e-7);
+  problem.weights[pulled.idx_v] = 1;
+  const AssemblyResult result = assemble(model, problem);
+  REQUIRE(result.status == AssemblyStatus::Closed);
+  REQUIRE(std::abs(result.q[pulled.idx_q] - angle) < 1e-10);
+  return result.q;
+}
+
+void checkRatioDerivatives(const Robot& robot, const RatioSample& sample) {
+  const LoopBlock& block = robot.linkage.block;
+  const int m = robot.linkage.size();
+  BlockPoint center(block), moved(block);
+  LinkageRatio ratio, side;
+  REQUIRE(center.update(block, sample.q));
+  REQUIRE(calcLinkageRatio(robot.linkage, center, ratio));
+  const auto move = [&](const VectorXd& dq, VectorXd& joints) {
+    REQUIRE(moved.close(block, center.basis(), dq, VectorXd()));
+    joints.resize(m);
+    for (int j = 0; j < m; ++j) joints[j] = moved.basis().q[robot.linkage.joint_positions[j]];
+    REQUIRE(calcLinkageRatio(robot.linkage, moved, side));
+    return side.R;
+  };
+  const double h = 1e-4;
+  for (int k = 0; k < m; ++k) {
+    // Richardson's extrapolation in the length of the step, the steps of all joints being measured.
+    MatrixXd numeric[2], analytic[2];
+    for (int i : {0, 1}) {
+      const VectorXd dq = (i + 1) * h * center.basis().N.col(k);
+      VectorXd up, down;
+      const MatrixXd R_up = move(dq, up), R_down = move(-dq, down);
+      numeric[i] = (R_up - R_down) / (2 * (i + 1) * h);
+      analytic[i] = MatrixXd::Zero(m, m);
+      for (int j = 0; j < m; ++j) analytic[i] += ratio.dR[j] * (up[j] - down[j]) / (2 * (i + 1) * h);
+    }
+    checkDerivative((4 * analytic[0] - analytic[1]) / 3, (4 * numeric[0] - numeric[1]) / 3);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("four-bar: the ratio on paper, over both branches of a full turn") {
+  const Robot robot("fourbar", {"rocker_joint"});
+  const RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);
+  CHECK(sweep.full_turn);
+  int branches[2] = {0, 0};
+  double last = -1e9;
+  for (const RatioSample& sample : sweep.samples) {
+    CHECK(sample.s > last);
+    last = sample.s;
+    if (sample.dead != DeadPointKind::None) continue;
+    const double expected = calcFourBarRatio(sample.motors[0], sample.joints[0]);
+    CHECK(std::abs(sample.ratio.R(0, 0) - expected) < 1e-9 * (1 + expected * expected));
+    REQUIRE((sample.branch == 0 || sample.branch == 1));
+    ++branches[sample.branch];
+  }
+  CHECK(branches[0] > 50);
+  CHECK(branches[1] > 50);
+  // The crank has turned once.
+  CHECK(sweep.samples.back().motors[0] - sweep.samples.front().motors[0] == Approx(2 * kPi).margin(0.05));
+
+  const std::vector<RatioSample> dead = sweep.getDeadPoints();
+  REQUIRE(dead.size() == 2);
+  CHECK(dead[0].dead == DeadPointKind::Joint);
+  CHECK(dead[1].dead == DeadPointKind::Joint);
+  CHECK(std::abs(dead[0].joints[0] - calcExtremeRocker(kB + kA)) < 1e-11);
+  CHECK(std::abs(dead[1].joints[0] - calcExtremeRocker(kB - kA)) < 1e-11);
+  CHECK(std::isinf(dead[0].ratio.R(0, 0)));
+}
+
+TEST_CASE("four-bar driven by its rocker: the dead points are the motor's") {
+  FourBarChainOptions options;
+  options.motor = FourBarMotor::Rocker;
+  const FourBarChain chain = makeFourBarChain(options);
+  const Linkage linkage = makeLinkage(chain.model, makeReduction(chain.model, chain.q_closed), {"crank1"});
+  const RatioSweep sweep = sweepRatio(chain.model, linkage, chain.q_closed);
+  CHECK(sweep.full_turn);
+  const std::vector<RatioSample> dead = sweep.getDeadPoints();
+  REQUIRE(dead.size() == 2);
+  for (const RatioSample& sample : dead) {
+    CHECK(sample.dead == DeadPointKind::Motor);
+    CHECK(std::abs(sample.ratio.R(0, 0)) < 1e-10);
+  }
+  const double low = std::min(dead[0].motors[0], dead[1].motors[0]);
+  const double high = std::max(dead[0].motors[0], dead[1].motors[0]);
+  CHECK(std::abs(low - calcExtremeRocker(kB + kA)) < 1e-11);
+  CHECK(std::abs(high - calcExtremeRocker(kB - kA)) < 1e-11);
+}
+
+TEST_CASE("virtual work balances in the constrained dynamics, and a wrong ratio does not") {
+  const std::vector<std::pair<std::string, std::vector<std::string>>> cases = {
+      {"fourbar", {"rocker_joint"}}, {"fivebar", {"elbow_left", "elbow_right"}},
+      {"bipetto", {"knee_right"}},   {"bipetto", {"knee_left"}},
+      {"bipetto", {"ankley_right"}}, {"bipetto", {"anklex_left", "ankley_left"}}};
+  for (const auto& [name, joints] : cases) {
+    CAPTURE(name, joints.front());
+    const Robot robot(name, joints);
+    const RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);
+    for (size_t i = 0; i < sweep.samples.size(); i += 40) {
+      const RatioSample& sample = sweep.samples[i];
+      if (sample.dead == DeadPointKind::Joint) continue;
+      MatrixXd R = sample.ratio.R;
+      CHECK(calcBalanceError(robot.model, robot.linkage, robot.getWhole(sample), R) < 1e-10);
+      R(0, 0) += 1e-3 * R.cwiseAbs().maxCoeff();
+      CHECK(calcBalanceError(robot.model, robot.linkage, robot.getWhole(sample), R) > 1e-6);
+      if (sample.ratio.R.cwiseAbs().maxCoeff() < 10) checkRatioDerivatives(robot, sample);
+    }
+  }
+}
+
+TEST_CASE("the knee of Bipetto folds as far as its motor takes it") {
+  const Robot robot("bipetto", {"knee_right"});
+  const RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);
+  const RatioSample* dead = nullptr;
+  for (const RatioSample& sample : sweep.samples)
+    if (sample.dead == DeadPointKind::Joint && sample.joints[0] > 0) dead = &sample;
+  REQUIRE(dead);
+  CHECK(dead->joints[0] == Approx(1.325).margin(1e-3));
+  // The largest knee angle over the motor's angle, by golden section.
+  const int knee = robot.model.joints()[robot.model.findJoint("knee_right")].idx_q;
+  VectorXd q = robot.q;
+  for (double angle = 0.9; angle < 2; angle += 0.1) q = closeAt(robot.model, q, "motor_knee_right", angle);
+  double low = 1.9, high = 2.4;
+  const double golden = (std::sqrt(5.0) - 1) / 2;
+  while (high - low > 1e-5) {
+    const double a = high - golden * (high - low), b = low + golden * (high - low);
+    if (closeAt(robot.model, q, "motor_knee_right", a)[knee] > closeAt(robot.model, q, "motor_knee_right", b)[knee])
+      high = b;
+    else
+      low = a;
+  }
+  CHECK(std::abs(dead->joints[0] - closeAt(robot.model, q, "motor_knee_right", low)[knee]) < 1e-8);
+  CHECK(dead->motors[0] == Approx(low).margin(1e-3));
+}
+
+TEST_CASE("the map of an ankle: the other joint is held, rows end at dead points") {
+  const Robot robot("bipetto", {"ankley_right"});
+  CHECK(robot.linkage.joint_names == std::vector<std::string>{"ankley_right", "anklex_right"});
+  const RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);
+  for (const RatioSample& sample : sweep.samples)
+    CHECK(std::abs(sample.joints[1] - sweep.samples.front().joints[1]) < 1e-10);
+  int motor_dead = 0;
+  for (const RatioSample& sample : sweep.getDeadPoints()) {
+    if (sample.dead != DeadPointKind::Motor) continue;
+    ++motor_dead;
+    CHECK(sample.ratio.condition > 1e8);
+  }
+  CHECK(motor_dead > 0);
+
+  const RatioMap map = mapRatio(robot.model, robot.linkage, robot.q, 8);
+  REQUIRE(map.rows.size() == 8);
+  for (size_t i = 0; i < map.rows.size(); ++i) {
+    REQUIRE_FALSE(map.rows[i].empty());
+    for (const RatioSample& sample : map.rows[i]) {
+      CHECK(std::abs(sample.joints[0] - map.first[i]) < 1e-10);
+      const auto same = [&](double angle) { return std::abs(sample.joints[1] - angle) < 1e-10; };
+      CHECK(std::count_if(map.second.begin(), map.second.end(), same) == 1);
+      CHECK(calcBalanceError(robot.model, robot.linkage, robot.getWhole(sample), sample.ratio.R) < 1e-10);
+      const Eigen::JacobiSVD<MatrixXd> svd(sample.ratio.R);
+      CHECK(sample.ratio.condition == Approx(svd.singularValues()[0] / svd.singularValues()[1]));
+    }
+  }
+  CHECK(map.dead_points.size() == 2 + 2 * map.rows.size());
+}
+
+TEST_CASE("a sweep ends at joint limits, and where loops lose rank") {
+  const std::string place = std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar/fourbar";
+  const auto read = [](const std::string& path) {
+    std::ifstream file(path);
+    std::stringstream text;
+    text << file.rdbuf();
+    return text.str();
+  };
+  const std::string before = "<child link=\"crank\"/>\n    <axis xyz=\"0 -1 0\"/>\n    <limit ";
+  const RobotDirectory directory;
+  directory.writeRobot(replaceOnce(read(place + ".urdf"), before, before + "lower=\"0.8\" upper=\"1.5\" "),
+                       read(place + ".yaml"));
+  const Robot robot(directory.path(), {"rocker_joint"});
+  const RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);
+  CHECK_FALSE(sweep.full_turn);
+  CHECK(sweep.begin == "limit of joint 'crank_joint'");
+  CHECK(sweep.end == "limit of joint 'crank_joint'");
+  CHECK(std::abs(sweep.samples.front().motors[0] - 0.8) < 1e-10);
+  CHECK(std::abs(sweep.samples.back().motors[0] - 1.5) < 1e-10);
+
+  FourBarChainOptions parallelogram;
+  parallelogram.ground = parallelogram.coupler = 0.4;
+  parallelogram.crank = parallelogram.rocker = 0.2;
+  const FourBarChain chain = makeFourBarChain(parallelogram);
+  const Linkage linkage = makeLinkage(chain.model, makeReduction(chain.model, chain.q_closed), {"rocker1"});
+  const RatioSweep folded = sweepRatio(chain.model, linkage, chain.q_closed);
+  CHECK_FALSE(folded.full_turn);
+  CHECK_THAT(folded.begin + folded.end, Catch::Contains("'loop1'"));
+  for (const RatioSample& sample : folded.samples) CHECK(sample.ratio.R(0, 0) == Approx(1).margin(1e-6));
+  CHECK(folded.samples.front().motors[0] == Approx(0).margin(1e-3));
+  CHECK(folded.samples.back().motors[0] == Approx(kPi).margin(1e-3));
+}
+
+TEST_CASE("joints without a linkage of their own: direct, or refused") {
+  const Robot robot("bipetto", {"hipx_left"});
+  CHECK(robot.linkage.isDirect());
+  const RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);
+  REQUIRE(sweep.samples.size() == 2);
+  CHECK(sweep.samples[0].ratio.R(0, 0) == 1);
+  CHECK(sweep.samples[0].joints[0] == Approx(-kPi / 6).epsilon(1e-3));
+  CHECK(calcBalanceError(robot.model, robot.linkage, robot.q, sweep.samples[0].ratio.R) < 1e-12);
+
+  const auto refuse = [](const std::string& name, const std::vector<std::string>& joints, const std::string& text) {
+    CHECK_THROWS_WITH(Robot(name, joints), Catch::Contains(text));
+    CHECK_THROWS_AS(Robot(name, joints), ModelError);
+  };
+  refuse("bipetto", {"knee"}, "there is no moving joint of this name");
+  refuse("bipetto", {"free_knee_left"}, "universal joint of 2 coordinates");
+  refuse("bipetto", {"knee_left", "knee_right"}, "not in the linkage of 'knee_left'");
+  refuse("bipetto", {"ankley_left", "ankley_left"}, "named twice");
+  refuse("fivebar", {"elbow_left"}, "name 2 joints of this linkage");
+  refuse("bipetto", {}, "none is named");
+}
