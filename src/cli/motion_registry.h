@@ -9,9 +9,16 @@
 
 namespace bielle::cli {
 
+// Values of many options under one name (`--weights NAME`).
+struct MotionPreset {
+  std::string name, help;
+  std::function<void()> apply;
+};
+
 // One request: the numbers that can be set, and what makes the motion of them.
 struct MotionRequest {
   std::vector<OptionEntry> options;
+  std::vector<MotionPreset> presets;
   std::function<Motion(const Model&, Formulation)> make;
 };
 

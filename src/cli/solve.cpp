@@ -1,4 +1,5 @@
 // bielle solve MOTION: makes the problem, solves it, writes the result.
+#include <algorithm>
 #include <atomic>
 #include <charconv>
 #include <cmath>
@@ -108,6 +109,31 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   return result.converged() ? kOk : kFailed;
 }
 
+// Added before the single options, so that those given as well have the last word.
+void addPresets(CLI::App& sub, const std::shared_ptr<MotionRequest>& request) {
+  if (request->presets.empty()) return;
+  std::vector<std::string> names;
+  std::string help = "weights by name:";
+  for (const MotionPreset& preset : request->presets) {
+    names.push_back(preset.name);
+    help += " " + preset.name + " (" + preset.help + ")";
+  }
+  sub.add_option_function<std::string>(
+         "--weights",
+         [request](const std::string& name) {
+           for (const MotionPreset& preset : request->presets)
+             if (preset.name == name) preset.apply();
+         },
+         help)
+      ->check(CLI::IsMember(names));
+}
+
+// Flags are written with hyphens.
+std::string makeFlag(std::string option) {
+  std::replace(option.begin(), option.end(), '_', '-');
+  return "--" + option;
+}
+
 void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   CLI::App& sub = *command.add_subcommand(motion.name, motion.help);
   const auto arguments = std::make_shared<SolveArguments>();
@@ -116,9 +142,11 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   sub.add_option("-o,--output", arguments->directory,
                  "directory for trajectory.csv, trajectory.npz and summary.json; made if need be")
       ->required();
+  addPresets(sub, request);
   for (const OptionEntry& option : request->options)
     if (std::find(motion.flags.begin(), motion.flags.end(), option.name) != motion.flags.end())
-      sub.add_option("--" + option.name, *option.value, option.help + " [" + option.unit + "]")->capture_default_str();
+      sub.add_option(makeFlag(option.name), *option.value, option.help + " [" + option.unit + "]")
+          ->capture_default_str();
   sub.add_option("--set", arguments->settings, "name=value of one of the options below; may be repeated")
       ->allow_extra_args(false);
   sub.add_option_function<std::string>(

@@ -1,0 +1,58 @@
+#pragma once
+/// \file Where the feet go: a sequence of footholds, and what can be said of it without dynamics.
+///
+/// A walk is commanded by the displacement of the middle frame P of the two feet per step, in its own axes,
+///     P_i = P_{i-1} D_i,    D_i = Rz(yaw / 2) (forward, lateral) Rz(yaw / 2)                                    (1)
+/// and the foot of step i lands where it would stand about P_i in the starting posture. A lateral displacement is made
+/// whole by every other step: the foot on that side opens the stance by twice the amount, the other one closes it. The
+/// last step brings the feet together.
+#include <array>
+#include <string>
+#include <vector>
+
+#include "bielle/model/model.h"
+#include "bielle/ocp/ground.h"
+
+namespace bielle {
+
+enum class Side { Left = 0, Right = 1 };
+inline Side getOther(Side side) { return side == Side::Left ? Side::Right : Side::Left; }
+inline const char* getName(Side side) { return side == Side::Left ? "left foot" : "right foot"; }
+
+struct Footstep {
+  Side side = Side::Left;
+  SE3 X_WF;  ///< placement of the contact frame on the ground
+};
+
+/// An option that counts steps.
+/// \throws ModelError when it is no whole number from 2 to 200
+int countSteps(const std::string& option, double value);
+
+/// The two feet where they stand, and the steps they take in turn.
+struct FootstepPlan {
+  std::array<SE3, 2> start;  ///< left, right
+  std::vector<Footstep> steps;
+
+  /// Placements of both feet (left, right) after `count` steps.
+  std::array<SE3, 2> getStance(int count) const;
+};
+
+/// Displacement of P in its own axes.
+struct StepCommand {
+  double forward = 0, lateral = 0;  ///< m, to the left
+  double yaw = 0;                   ///< rad, to the left
+};
+
+/// Heading of a placement: of its x seen from above, rad.
+double calcHeading(const SE3& X);
+
+/// Pose of the middle of the two feet: level, heading halfway between theirs.
+SE3 calcMiddle(const SE3& left, const SE3& right);
+
+/// `steps` steps by Eq. (1) on level ground, the first one with the foot `first`; the last one brings the feet together.
+FootstepPlan planFootsteps(const SE3& left, const SE3& right, const StepCommand& command, int steps, Side first);
+
+/// Distance between two soles as rectangles seen from above, m; negative: they overlap (by a lower bound of the depth).
+double calcSoleDistance(const ContactFrame& a, const SE3& X_Wa, const ContactFrame& b, const SE3& X_Wb);
+
+}  // namespace bielle

@@ -1,0 +1,79 @@
+#pragma once
+/// \file Steps as an optimal control problem: what walk, side walk, turn and stairs share.
+///
+/// Costs of a stage; those of weight zero are left out. References of body and feet are those of gait.h.
+/// - state regularization about the standing posture at rest, the base heading as the feet do; motor torques;
+/// - centre of mass: position and velocity;
+/// - swing foot: placement along its path, and (instead) fly high: its horizontal velocity near the ground;
+/// - landing, at the first node of a double support: placement and velocity of the foot that came down, over h;
+/// - forces of stance feet: share of the weight, centre of pressure, friction pyramid;
+/// - feet not nearer than `feet_distance`.
+/// The terminal node has the centre of mass, the posture and rest.
+#include "bielle/motion/gait.h"
+#include "bielle/motion/motion.h"
+
+namespace bielle {
+
+struct LocomotionOptions {
+  GaitTiming timing;
+  SwingShape swing;
+  double friction = 0.7;  ///< coefficient, 1
+
+  double state_weight = 0.1;             ///< of the state regularization
+  double torso_weight = 1e4;             ///< of the torso's roll and pitch within the state regularization
+  double heading_weight = 1e3;           ///< of its heading within the state regularization
+  double motor_weight = 1;               ///< of motor velocities within the state regularization
+  double control_weight = 1e-3;          ///< of the motor torques, 1/(N m)^2
+  double com_weight = 100;               ///< of the horizontal position of the CoM, 1/m^2
+  double com_height_weight = 3e3;        ///< of its height, 1/m^2
+  double com_velocity_weight = 0;        ///< of its horizontal velocity, s^2/m^2
+  double swing_weight = 1e4;             ///< of the path of the swing foot, 1/m^2
+  double swing_velocity_weight = 200;    ///< of its velocity, s^2/m^2 (and s^2)
+  double swing_rotation_weight = 1e3;    ///< of its orientation, 1
+  double fly_high_weight = 0;            ///< s^2/m^2
+  double fly_high_slope = 75;            ///< 1/m
+  double landing_foothold_weight = 1e5;  ///< horizontal place of a landing foot, times h, 1/m^2
+  double landing_height_weight = 1e5;    ///< its height, times h, 1/m^2
+  double landing_rotation_weight = 1e4;  ///< its orientation, times h, 1
+  double landing_velocity_weight = 1e3;  ///< its velocity, times h, s^2/m^2
+  double force_weight = 10;              ///< of the contact force reference, over (m g)^2
+  double pressure_weight = 10;           ///< of the centre of pressure, over the half size of the sole squared
+  double friction_weight = 1e-2;         ///< of leaving the friction pyramid, 1/N^2
+  double feet_distance = 0.2;            ///< least distance of the feet, m
+  double feet_distance_weight = 0;       ///< of coming nearer, 1/m^2
+  double terminal_weight = 1e3;          ///< of the final velocities, and of the final place of the CoM
+  double contact_kp = 1e4;  ///< stabilisation of the contacts, 1/s^2; limited to 1/(2 h^2), h the time step
+  double contact_kd = 100;  ///< 1/s; limited to 1/h
+
+  std::string left = "foot_left", right = "foot_right";  ///< contact frames
+};
+
+std::vector<OptionEntry> listOptions(LocomotionOptions& options);
+
+/// Weights and durations of the paper's walk (its example code), on its structure: the CoM's velocity in place of its
+/// position, fly high and impacts in place of foot paths and footholds.
+void setPaperWeights(LocomotionOptions& options);
+
+/// The robot as it stands before the first step.
+struct Stance {
+  VectorXd q;                     ///< nq, standing posture
+  Vector3d com;                   ///< m
+  std::array<int, 2> contacts{};  ///< indices of the left and right foot
+  std::array<SE3, 2> feet;        ///< their placements
+};
+/// \throws ModelError when the robot lacks a foot, or a posture
+Stance makeStance(const Model& model, const LocomotionOptions& options);
+
+/// What is to be done.
+struct LocomotionTask {
+  std::string name;
+  FootstepPlan plan;
+  Ground ground;
+  Vector3d com_velocity = Vector3d::Zero();  ///< at steady steps, m/s
+};
+
+/// \throws ModelError when the request is impossible: footholds out of the legs' reach, soles that collide, durations
+Motion makeLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
+                      const LocomotionOptions& options, Formulation formulation);
+
+}  // namespace bielle

@@ -1,0 +1,42 @@
+#pragma once
+/// \file Walking on level ground: forward, sideways, on the spot and along an arc.
+///
+/// All four are footholds by footsteps.h Eq. (1) from the standing posture, and end standing at rest.
+#include "bielle/motion/locomotion.h"
+
+namespace bielle {
+
+struct WalkOptions {
+  double speed = 0.5;  ///< forward, of the steady steps; negative: backward, m/s
+  double steps = 6;    ///< the last one brings the feet together
+  LocomotionOptions gait;
+};
+
+struct SideWalkOptions {
+  double speed = 0.2;  ///< to the left, of the steady steps; negative: to the right, m/s
+  double steps = 6;    ///< every other one opens the stance, the next one closes it
+  LocomotionOptions gait;
+};
+
+struct TurnOptions {
+  double angle = 1.57;  ///< to the left; negative: to the right, rad
+  double radius = 0;    ///< of the arc that the middle of the feet follows; 0: on the spot, m
+  double steps = 8;     ///< the last one brings the feet together
+  LocomotionOptions gait;
+};
+
+std::vector<OptionEntry> listOptions(WalkOptions& options);
+std::vector<OptionEntry> listOptions(SideWalkOptions& options);
+std::vector<OptionEntry> listOptions(TurnOptions& options);
+
+/// Weights and durations of the paper's walk and side walk.
+void setPaperWeights(WalkOptions& options);
+void setPaperWeights(SideWalkOptions& options);
+
+/// \throws ModelError when the request is impossible (see locomotion.h)
+Motion makeWalk(const Model& model, const WalkOptions& options = {}, Formulation formulation = Formulation::Reduced);
+Motion makeSideWalk(const Model& model, const SideWalkOptions& options = {},
+                    Formulation formulation = Formulation::Reduced);
+Motion makeTurn(const Model& model, const TurnOptions& options = {}, Formulation formulation = Formulation::Reduced);
+
+}  // namespace bielle

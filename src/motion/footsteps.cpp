@@ -1,0 +1,64 @@
+#include "bielle/motion/footsteps.h"
+
+#include <cmath>
+
+#include "bielle/math/so3.h"
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+SE3 makeTurn(double yaw) { return {makeAxisRotation(Vector3d::UnitZ(), yaw), Vector3d::Zero()}; }
+
+// Largest gap between two rectangles along the axes of the first.
+double calcGapAlong(const ContactFrame& a, const SE3& X_Wa, const ContactFrame& b, const SE3& X_Wb) {
+  const SE3 X_ab = X_Wa.inverseTimes(X_Wb);
+  const Eigen::Vector2d reach = X_ab.R.topLeftCorner<2, 2>().cwiseAbs() * Eigen::Vector2d(b.half_length, b.half_width);
+  return std::max(std::abs(X_ab.p.x()) - a.half_length - reach.x(), std::abs(X_ab.p.y()) - a.half_width - reach.y());
+}
+
+}  // namespace
+
+double calcHeading(const SE3& X) { return std::atan2(X.R(1, 0), X.R(0, 0)); }
+
+int countSteps(const std::string& option, double value) {
+  if (!(value >= 2 && value <= 200 && value == std::floor(value)))
+    throw ModelError("", "option '" + option + "'", "it is not a whole number from 2 to 200", "give a number of steps");
+  return static_cast<int>(value);
+}
+
+std::array<SE3, 2> FootstepPlan::getStance(int count) const {
+  std::array<SE3, 2> stance = start;
+  for (int i = 0; i < count; ++i) stance[static_cast<int>(steps[i].side)] = steps[i].X_WF;
+  return stance;
+}
+
+SE3 calcMiddle(const SE3& left, const SE3& right) {
+  const double turn = std::remainder(calcHeading(left) - calcHeading(right), 2 * kPi);
+  SE3 middle = makeTurn(calcHeading(right) + turn / 2);
+  middle.p = (left.p + right.p) / 2;
+  return middle;
+}
+
+FootstepPlan planFootsteps(const SE3& left, const SE3& right, const StepCommand& command, int steps, Side first) {
+  FootstepPlan plan{{left, right}, {}};
+  SE3 P = calcMiddle(left, right);
+  const SE3 X_PF[2] = {P.inverseTimes(left), P.inverseTimes(right)};
+  const Side opening = command.lateral > 0 ? Side::Left : Side::Right;
+  Side side = first;
+  for (int i = 0; i < steps; ++i, side = getOther(side)) {
+    const bool last = i + 1 == steps;
+    const Vector3d move(command.forward, side == opening ? 2 * command.lateral : 0, 0);
+    if (!last) P = P * makeTurn(command.yaw / 2) * SE3{Matrix3d::Identity(), move} * makeTurn(command.yaw / 2);
+    plan.steps.push_back({side, P * X_PF[static_cast<int>(side)]});
+  }
+  return plan;
+}
+
+double calcSoleDistance(const ContactFrame& a, const SE3& X_Wa, const ContactFrame& b, const SE3& X_Wb) {
+  return std::max(calcGapAlong(a, X_Wa, b, X_Wb), calcGapAlong(b, X_Wb, a, X_Wa));
+}
+
+}  // namespace bielle

@@ -1,0 +1,343 @@
+#include "bielle/motion/locomotion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/centroidal.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/math/so3.h"
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+// What all stages share.
+struct Scene {
+  const Model& model;
+  const Stance& stance;
+  const LocomotionTask& task;
+  const LocomotionOptions& options;
+  Gait gait;
+  VectorXd state_weights;  // 2 nv
+};
+
+void check(const LocomotionOptions& options) {
+  LocomotionOptions copy = options;
+  for (const OptionEntry& option : listOptions(copy))
+    if (!(*option.value >= 0)) throw ModelError("", "option '" + option.name + "'", "it is negative", "give 0 or more");
+  const auto require = [](bool ok, const char* option, const char* problem, const char* remedy) {
+    if (!ok) throw ModelError("", std::string("option '") + option + "'", problem, remedy);
+  };
+  const SwingShape& swing = options.swing;
+  require(options.friction > 0, "friction", "it is not positive", "give a coefficient, e.g. 0.7");
+  require(swing.apex > 0 && swing.apex < 1, "swing_apex", "it is not between 0 and 1", "e.g. 0.5");
+  require(swing.leave < swing.arrive, "swing_leave", "it is not before swing_arrive", "e.g. 0 and 1");
+  require(swing.arrive <= 1, "swing_arrive", "it is over 1", "give a part of the swing, e.g. 1");
+}
+
+// What no choice of motor torques can do.
+void check(const Scene& scene) {
+  constexpr double kStretch = 1.15, kCrouch = 0.6;  // of the legs, over their length in the standing posture
+  const Model& model = scene.model;
+  const ContactFrame& left = model.contacts()[scene.stance.contacts[0]];
+  const ContactFrame& right = model.contacts()[scene.stance.contacts[1]];
+  const auto refuse = [&](int step, const std::string& problem, const std::string& remedy) {
+    throw ModelError(model.name(), "step " + std::to_string(step) + " of the " + scene.task.name, problem, remedy);
+  };
+  for (const GaitNode& node : scene.gait.nodes) {
+    const GaitPhase& phase = scene.gait.phases[node.phase];
+    std::array<SE3, 2> feet = scene.task.plan.getStance(phase.steps_done);
+    if (phase.swings) feet[static_cast<int>(scene.task.plan.steps[phase.steps_done].side)] = node.X_WF;
+    if (calcSoleDistance(left, feet[0], right, feet[1]) <= 0)
+      refuse(phase.steps_done + 1, "the feet would collide: the stance is too narrow for the soles on this path",
+             "turn or step less at a time, with more steps");
+  }
+  // Legs as struts from the middle of the hips' plane, half way between the feet at touchdown.
+  const double strut = (scene.stance.com - scene.stance.feet[0].p).norm(),
+               height = scene.stance.com.z() - scene.stance.feet[0].p.z();
+  for (int i = 1; i <= static_cast<int>(scene.task.plan.steps.size()); ++i) {
+    const auto feet = scene.task.plan.getStance(i);
+    const Vector3d apart = feet[0].p - feet[1].p;
+    if (std::hypot(apart.head<2>().norm() / 2, kCrouch * height + std::abs(apart.z()) / 2) > kStretch * strut)
+      refuse(i,
+             "its foothold is out of the legs' reach: the feet would be " + std::to_string(apart.norm()) + " m apart",
+             "ask for a lower speed, or for shorter, lower or more steps");
+  }
+}
+
+BodyFrame getFoot(const Scene& scene, Side side) {
+  const ContactFrame& contact = scene.model.contacts()[scene.stance.contacts[static_cast<int>(side)]];
+  return {contact.body, contact.X_BF};
+}
+
+VectorXd makeWeights(const Model& model, const LocomotionOptions& o) {
+  const int nv = model.nv();
+  VectorXd weights = makeStateWeights(model);
+  weights.segment<3>(3) << o.torso_weight, o.torso_weight, o.heading_weight;
+  for (const Motor& motor : model.motors())  // linkage motors would be free to shake
+    weights[nv + motor.dof] = std::max(weights[nv + motor.dof], o.motor_weight);
+  return weights;
+}
+
+std::vector<ContactTarget> makeTargets(const Scene& scene, const GaitPhase& phase) {
+  // With kd = 1 / h, an Euler step turns a contact velocity e into nothing, and a displacement e into (1 - kp h^2) e.
+  const LocomotionOptions& o = scene.options;
+  const double h = o.timing.time_step, kp = std::min(o.contact_kp, 0.5 / (h * h)), kd = std::min(o.contact_kd, 1 / h);
+  const auto feet = scene.task.plan.getStance(phase.steps_done);
+  std::vector<ContactTarget> targets;
+  for (Side side : {Side::Left, Side::Right}) {
+    const int i = static_cast<int>(side);
+    if (phase.swings && scene.task.plan.steps[phase.steps_done].side == side) continue;
+    targets.push_back({scene.stance.contacts[i], feet[i], kp, kd});
+  }
+  return targets;
+}
+
+std::string nameOf(const Scene& scene, const GaitPhase& phase) {
+  return phase.swings ? getName(getOther(scene.task.plan.steps[phase.steps_done].side)) : "double support";
+}
+
+// Quaternion (x y z w) of the base, as at the start but for its heading.
+Eigen::Vector4d makeHeading(const Scene& scene, const GaitNode& node) {
+  const Eigen::Quaterniond start(Eigen::Vector4d(scene.stance.q.segment<4>(3)));
+  return (Eigen::Quaterniond(Eigen::AngleAxisd(node.heading, Vector3d::UnitZ())) * start).coeffs();
+}
+
+StageSpec makeRegularizedStage(const Scene& scene, const GaitNode& node) {
+  const Model& model = scene.model;
+  StageSpec stage;
+  stage.dt = scene.options.timing.time_step;
+  stage.state = {scene.options.state_weight, scene.stance.q, VectorXd::Zero(model.nv()), scene.state_weights};
+  stage.state.q_ref.segment<4>(3) = makeHeading(scene, node);
+  stage.state.v_ref[5] = node.heading_rate;
+  stage.control = {scene.options.control_weight, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
+  return stage;
+}
+
+void addCost(StageSpec& stage, const std::string& name, double weight, const VectorXd& weights,
+             std::unique_ptr<Residual> residual) {
+  if (weight != 0 && !weights.isZero(0))
+    stage.costs.push_back({name, weight, Activation::makeQuadratic(weights), std::move(residual)});
+}
+
+void addComCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
+  const LocomotionOptions& o = scene.options;
+  addCost(stage, "com", 1, Vector3d(o.com_weight, o.com_weight, o.com_height_weight), makeComPosition(node.com));
+  const Vector3d direction = scene.task.com_velocity.cwiseAbs() / std::max(1e-12, scene.task.com_velocity.norm());
+  addCost(stage, "com velocity", o.com_velocity_weight, direction, makeComVelocity(scene.task.com_velocity));
+}
+
+void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
+  const LocomotionOptions& o = scene.options;
+  const Model& model = scene.model;
+  const double weight = model.mass() * model.gravity().norm();
+  for (size_t c = stage.constraints.num_loops; c < stage.constraints.closures.size(); ++c) {
+    const int constraint = static_cast<int>(c);
+    const std::string& name = stage.constraints.closures[c].name;
+    const bool left = model.findContact(name) == scene.stance.contacts[0];
+    const ContactFrame& contact = model.contacts()[scene.stance.contacts[left ? 0 : 1]];
+    const int rows = getRows(stage.constraints.closures[c].kind);
+    VectorXd reference = VectorXd::Zero(rows);
+    reference[2] = std::max(1.0, weight * node.load[left ? 0 : 1]);
+    addCost(stage, "force " + name, o.force_weight / (weight * weight), VectorXd::Ones(rows),
+            makeContactForce(stage.constraints, constraint, reference));
+    if (o.friction_weight != 0)
+      stage.costs.push_back({"friction " + name, o.friction_weight,
+                             Activation::makeBarrier(VectorXd::Ones(4), VectorXd::Zero(4), VectorXd::Constant(4, 1e12)),
+                             makeFrictionPyramid(stage.constraints, constraint, o.friction / std::sqrt(2))});
+    if (rows == 6 && contact.half_length > 0 && contact.half_width > 0) {
+      const Eigen::Vector2d half(contact.half_length, contact.half_width);
+      addCost(stage, "pressure " + name, o.pressure_weight, half.cwiseAbs2().cwiseInverse(),
+              makeCenterOfPressure(stage.constraints, constraint));
+    }
+  }
+}
+
+Vector6d makeVector(double x, double z, double rotation) {
+  return (Vector6d() << x, x, z, Vector3d::Constant(rotation)).finished();
+}
+
+void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& step, StageSpec& stage) {
+  const LocomotionOptions& o = scene.options;
+  const BodyFrame foot = getFoot(scene, step.side);
+  addCost(stage, "swing", 1, makeVector(o.swing_weight, o.swing_weight, o.swing_rotation_weight),
+          makeFramePlacement(foot, node.X_WF));
+  addCost(stage, "swing velocity", 1,
+          makeVector(o.swing_velocity_weight, o.swing_velocity_weight, o.swing_velocity_weight),
+          makeFrameVelocity(foot, node.V_F));
+  addCost(stage, "fly high", o.fly_high_weight, Eigen::Vector2d::Ones(),
+          makeFlyHigh(foot, o.fly_high_slope, step.X_WF.p.z()));
+}
+
+void addLandingCosts(const Scene& scene, const Footstep& step, StageSpec& stage) {
+  const LocomotionOptions& o = scene.options;
+  const double h = stage.dt;
+  const BodyFrame foot = getFoot(scene, step.side);
+  addCost(stage, "landing", 1 / h,
+          makeVector(o.landing_foothold_weight, o.landing_height_weight, o.landing_rotation_weight),
+          makeFramePlacement(foot, step.X_WF));
+  addCost(stage, "landing velocity", o.landing_velocity_weight / h, Vector6d::Ones(), makeFrameVelocity(foot));
+}
+
+StageSpec makeStage(const Scene& scene, const GaitNode& node, const std::vector<ContactTarget>& contacts) {
+  const LocomotionOptions& o = scene.options;
+  const GaitPhase& phase = scene.gait.phases[node.phase];
+  StageSpec stage = makeRegularizedStage(scene, node);
+  stage.constraints = makeConstraintSet(scene.model, contacts);
+  addComCosts(scene, node, stage);
+  addForceCosts(scene, node, stage);
+  if (phase.swings) addSwingCosts(scene, node, scene.task.plan.steps[phase.steps_done], stage);
+  if (node.lands) addLandingCosts(scene, scene.task.plan.steps[phase.steps_done - 1], stage);
+  if (o.feet_distance_weight != 0)
+    stage.costs.push_back({"feet distance", o.feet_distance_weight,
+                           Activation::makeBarrier(VectorXd::Ones(1), VectorXd::Constant(1, o.feet_distance),
+                                                   VectorXd::Constant(1, 1e12)),
+                           makeFrameDistance(getFoot(scene, Side::Left), getFoot(scene, Side::Right))});
+  return stage;
+}
+
+// The standing posture, carried along.
+VectorXd makeGuess(const Scene& scene, const GaitNode& node) {
+  const Model& model = scene.model;
+  VectorXd x = VectorXd::Zero(model.nq() + model.nv());
+  x.head(model.nq()) = scene.stance.q;
+  const Matrix3d turn = makeAxisRotation(Vector3d::UnitZ(), node.heading);
+  x.head<3>() = node.com + turn * (scene.stance.q.head<3>() - scene.stance.com);
+  x.segment<4>(3) = makeHeading(scene, node);
+  return x;
+}
+
+StageSpec makeTerminalStage(const Scene& scene) {
+  const GaitNode& node = scene.gait.nodes.back();
+  const int nv = scene.model.nv();
+  StageSpec stage = makeRegularizedStage(scene, node);
+  stage.control.weight = 0;
+  stage.state.weight = 1;
+  stage.state.weights.head(nv) *= scene.options.state_weight;
+  stage.state.weights.tail(nv).setConstant(scene.options.terminal_weight);
+  addCost(stage, "com", scene.options.terminal_weight, Vector3d::Ones(), makeComPosition(node.com));
+  return stage;
+}
+
+}  // namespace
+
+std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
+  return {
+      {"start_support", &o.timing.start, "s", "double support before the first step"},
+      {"single_support", &o.timing.single, "s", "one foot on the ground"},
+      {"double_support", &o.timing.both, "s", "both feet on the ground between two steps"},
+      {"end_support", &o.timing.end, "s", "double support after the last step"},
+      {"time_step", &o.timing.time_step, "s", "length of a shooting stage"},
+      {"swing_height", &o.swing.height, "m", "apex of the swing foot over the higher end of its path"},
+      {"swing_apex", &o.swing.apex, "1", "when it is reached, from 0 to 1"},
+      {"swing_leave", &o.swing.leave, "1", "when the swing foot starts to move horizontally, from 0 to 1"},
+      {"swing_arrive", &o.swing.arrive, "1", "when it is over its foothold, from 0 to 1"},
+      {"friction", &o.friction, "1", "friction coefficient"},
+      {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
+      {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
+      {"heading_weight", &o.heading_weight, "1", "head where the feet do, within the state regularization"},
+      {"motor_weight", &o.motor_weight, "1", "keep motors slow, within the state regularization"},
+      {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
+      {"com_weight", &o.com_weight, "1/m^2", "horizontal position of the centre of mass"},
+      {"com_height_weight", &o.com_height_weight, "1/m^2", "height of the centre of mass"},
+      {"com_velocity_weight", &o.com_velocity_weight, "s^2/m^2", "velocity of the centre of mass, along the way"},
+      {"swing_weight", &o.swing_weight, "1/m^2", "path of the swing foot"},
+      {"swing_velocity_weight", &o.swing_velocity_weight, "s^2/m^2", "velocity of the swing foot along its path"},
+      {"swing_rotation_weight", &o.swing_rotation_weight, "1", "orientation of the swing foot"},
+      {"fly_high_weight", &o.fly_high_weight, "s^2/m^2", "no horizontal velocity of the swing foot near the ground"},
+      {"fly_high_slope", &o.fly_high_slope, "1/m", "how that fades with height"},
+      {"landing_foothold_weight", &o.landing_foothold_weight, "1/m^2", "horizontal place of a landing foot"},
+      {"landing_height_weight", &o.landing_height_weight, "1/m^2", "height of a landing foot"},
+      {"landing_rotation_weight", &o.landing_rotation_weight, "1", "a landing foot is flat"},
+      {"landing_velocity_weight", &o.landing_velocity_weight, "s^2/m^2", "a landing foot is still"},
+      {"force_weight", &o.force_weight, "1", "pass the weight evenly from foot to foot, over (m g)^2"},
+      {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
+      {"friction_weight", &o.friction_weight, "1/N^2", "stay inside the friction pyramid"},
+      {"feet_distance", &o.feet_distance, "m", "least distance of the feet"},
+      {"feet_distance_weight", &o.feet_distance_weight, "1/m^2", "feet do not come nearer"},
+      {"terminal_weight", &o.terminal_weight, "1", "end at rest, in place"},
+      {"contact_kp", &o.contact_kp, "1/s^2",
+       "stabilisation of the contacts, position (limited to 1/(2 h^2), h the time step)"},
+      {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"}};
+}
+
+void setPaperWeights(LocomotionOptions& o) {
+  o.timing.start = o.timing.end = 0.2;
+  o.timing.single = 0.4;
+  o.timing.both = o.timing.time_step;
+  o.state_weight = 1;
+  o.torso_weight = 2500;
+  o.heading_weight = 0;
+  o.motor_weight = 0;
+  o.control_weight = 0.02;
+  o.com_weight = 0;
+  o.com_height_weight = 1000;
+  o.com_velocity_weight = 100;
+  o.swing_weight = o.swing_rotation_weight = o.swing_velocity_weight = 0;
+  o.fly_high_weight = 100;
+  o.fly_high_slope = 75;
+  o.landing_foothold_weight = 0;
+  o.landing_height_weight = o.landing_rotation_weight = o.landing_velocity_weight = 1e4;
+  o.force_weight = 10;
+  o.pressure_weight = 10;
+  o.feet_distance_weight = 100;
+  o.terminal_weight = 1e4;
+  o.contact_kp = 0;
+  o.contact_kd = 100;
+}
+
+Stance makeStance(const Model& model, const LocomotionOptions& options) {
+  if (!model.hasFreeFlyer())
+    throw ModelError(model.name(), "root joint", "the robot cannot walk, its base is fixed",
+                     "load it with a free base");
+  Stance stance;
+  stance.q = makeStandingPosture(model);
+  Workspace ws(model);
+  updatePositions(model, ws, stance.q);
+  stance.com = calcCom(model, ws);
+  for (int i = 0; i < 2; ++i) {
+    const std::string& name = i == 0 ? options.left : options.right;
+    stance.contacts[i] = model.findContact(name);
+    if (stance.contacts[i] < 0)
+      throw ModelError(model.name(), "contact '" + name + "'", "a walk needs it, the robot has no such contact",
+                       "name the contacts of its left and right foot");
+    const ContactFrame& contact = model.contacts()[stance.contacts[i]];
+    stance.feet[i] = getPlacement(ws, contact.body, contact.X_BF);
+  }
+  return stance;
+}
+
+Motion makeLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
+                      const LocomotionOptions& options, Formulation formulation) {
+  check(options);
+  Scene scene{model,
+              stance,
+              task,
+              options,
+              makeGait(task.plan, options.timing, options.swing, stance.com, model.gravity().norm()),
+              makeWeights(model, options)};
+  check(scene);
+  Motion motion;
+  motion.name = task.name;
+  motion.schedule.dt = options.timing.time_step;
+  motion.ground = task.ground;
+  motion.ground.friction = options.friction;
+  std::vector<StageSpec> stages;
+  for (const GaitPhase& phase : scene.gait.phases) {
+    const std::vector<ContactTarget> contacts = makeTargets(scene, phase);
+    motion.schedule.phases.push_back({nameOf(scene, phase), phase.nodes, contacts});
+    const VectorXd u = calcStaticTorques(model, makeConstraintSet(model, contacts), stance.q).u;
+    for (int i = 0; i < phase.nodes; ++i) {
+      stages.push_back(makeStage(scene, scene.gait.nodes[stages.size()], contacts));
+      motion.guess.us.push_back(u);
+    }
+  }
+  stages.push_back(makeTerminalStage(scene));
+  motion.problem =
+      std::make_unique<RobotProblem>(model, stance.q, VectorXd::Zero(model.nv()), std::move(stages), formulation);
+  for (const GaitNode& node : scene.gait.nodes) motion.guess.xs.push_back(makeGuess(scene, node));
+  return motion;
+}
+
+}  // namespace bielle

@@ -1,0 +1,217 @@
+// Walking motions as their results: where the feet go and what carries them, measured by kinematics and dynamics.
+#include <catch2/catch.hpp>
+
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/walk.h"
+#include "measure_steps.h"
+
+using namespace bielle;
+
+namespace {
+
+const Model& getBipetto() {
+  static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
+  return robot.model;
+}
+
+struct Solved {
+  FddpSummary summary;
+  StepMeasures measures;
+};
+
+Solved solve(Motion motion) {
+  FddpOptions options;
+  options.max_iterations = 100;
+  Solved solved;
+  solved.summary = Fddp(options).solve(*motion.problem, motion.guess);
+  solved.measures = StepMeter(motion, motion.guess).measure();
+  return solved;
+}
+
+// Velocity of the centre of mass from the second touchdown to the last but two.
+Vector3d calcSpeed(const StepMeasures& m) {
+  const size_t first = 1, last = m.touchdown_times.size() - 3;
+  return (m.touchdown_coms[last] - m.touchdown_coms[first]) / (m.touchdown_times[last] - m.touchdown_times[first]);
+}
+
+// What every motion on steps has to satisfy.
+void checkSteps(const Solved& solved) {
+  const StepMeasures& m = solved.measures;
+  CAPTURE(solved.summary.message, solved.summary.iterations);
+  CHECK(solved.summary.termination == FddpTermination::Converged);
+  CHECK(m.slip < 2e-3);
+  CHECK(m.slip_angle < 6e-3);
+  CHECK(m.penetration < 1.5e-3);
+  CHECK(m.lowest > -1e-3);
+  CHECK(m.clearance > 0.01);
+  CHECK(m.foothold < 2e-3);
+  CHECK(m.tilt_at_landing < 0.01);
+  CHECK(m.feet > 0.05);
+  CHECK(m.pressure < 1);
+  CHECK(m.friction < 0.7);
+  CHECK(m.load > 5);
+  CHECK(m.tilt < 0.15);
+  CHECK(m.bend > 0.3);
+  CHECK(m.torque < 80);
+  CHECK(m.final_speed < 2e-3);
+}
+
+const SE3 kLeft{Matrix3d::Identity(), Vector3d(0, 0.1, 0)}, kRight{Matrix3d::Identity(), Vector3d(0, -0.1, 0)};
+
+}  // namespace
+
+TEST_CASE("footsteps: forward, sideways and turning, counted by hand") {
+  const FootstepPlan forward = planFootsteps(kLeft, kRight, {0.2, 0, 0}, 4, Side::Right);
+  const std::vector<Vector3d> expected{{0.2, -0.1, 0}, {0.4, 0.1, 0}, {0.6, -0.1, 0}, {0.6, 0.1, 0}};
+  for (size_t i = 0; i < 4; ++i) {
+    CHECK((forward.steps[i].X_WF.p - expected[i]).norm() < 1e-12);
+    CHECK(forward.steps[i].side == (i % 2 == 0 ? Side::Right : Side::Left));
+  }
+  CHECK((forward.getStance(2)[0].p - expected[1]).norm() < 1e-12);
+  CHECK((forward.getStance(2)[1].p - expected[0]).norm() < 1e-12);
+
+  // To the left: the left foot goes away by twice the step, the right one follows.
+  const FootstepPlan side = planFootsteps(kLeft, kRight, {0, 0.1, 0}, 4, Side::Left);
+  const std::vector<double> ys{0.3, 0.1, 0.5, 0.3};
+  for (size_t i = 0; i < 4; ++i) CHECK(side.steps[i].X_WF.p.y() == Approx(ys[i]));
+
+  // A quarter of a circle of radius 1 to the left ends at (1, 1).
+  const double yaw = 0.1, angle = 1.5707963267948966;
+  const int steps = 17;
+  const double exact = angle / (steps - 1);
+  const FootstepPlan arc = planFootsteps(kLeft, kRight, {2 * std::sin(exact / 2), 0, exact}, steps, Side::Left);
+  const SE3 end = calcMiddle(arc.getStance(steps)[0], arc.getStance(steps)[1]);
+  CHECK((end.p - Vector3d(1, 1, 0)).norm() < 1e-12);
+  CHECK(calcHeading(end) == Approx(angle));
+  const FootstepPlan spot = planFootsteps(kLeft, kRight, {0, 0, yaw}, 3, Side::Left);
+  for (const Footstep& step : spot.steps) CHECK(step.X_WF.p.norm() == Approx(0.1));
+}
+
+TEST_CASE("footsteps: distance of soles seen from above") {
+  ContactFrame sole;
+  sole.half_length = 0.1;
+  sole.half_width = 0.05;
+  CHECK(calcSoleDistance(sole, kLeft, sole, kRight) == Approx(0.1));
+  CHECK(calcSoleDistance(sole, kLeft, sole, {Matrix3d::Identity(), Vector3d(0.3, 0.1, 0)}) == Approx(0.1));
+  CHECK(calcSoleDistance(sole, kLeft, sole, {Matrix3d::Identity(), Vector3d(0.05, 0.02, 0)}) < 0);
+  const SE3 turned{makeAxisRotation(Vector3d::UnitZ(), 1.5707963267948966), Vector3d(0, -0.1, 0)};
+  CHECK(calcSoleDistance(sole, kLeft, sole, turned) == Approx(0.05));
+}
+
+TEST_CASE("gait: swings start and end at rest, the pendulum's zero-moment point is under the stance foot") {
+  const SE3 end{makeAxisRotation(Vector3d::UnitZ(), 0.4), Vector3d(0.3, 0.1, 0.05)};
+  SwingShape shape;
+  shape.height = 0.03;
+  CHECK((calcSwing(shape, kLeft, end, 0).p - kLeft.p).norm() < 1e-12);
+  CHECK((calcSwing(shape, kLeft, end, 1).p - end.p).norm() < 1e-12);
+  CHECK(calcHeading(calcSwing(shape, kLeft, end, 1)) == Approx(0.4));
+  CHECK(calcSwing(shape, kLeft, end, shape.apex).p.z() == Approx(0.08));
+  CHECK((calcSwing(shape, kLeft, end, 1e-3).p - kLeft.p).norm() < 1e-7);
+  CHECK((calcSwing(shape, kLeft, end, 1 - 1e-3).p - end.p).norm() < 1e-7);
+
+  const FootstepPlan plan = planFootsteps(kLeft, kRight, {0.2, 0, 0}, 5, Side::Right);
+  const GaitTiming timing;
+  const Vector3d com(0.01, 0, 0.5);
+  const double g = 9.81, h = timing.time_step;
+  const Gait gait = makeGait(plan, timing, shape, com, g);
+  CHECK((gait.nodes.front().com - com).norm() < 1e-12);
+  CHECK((gait.nodes.back().com - com - Vector3d(0.8, 0, 0)).norm() < 1e-12);
+  for (size_t k = 1; k + 1 < gait.nodes.size(); ++k) {
+    const GaitNode& node = gait.nodes[k];
+    CHECK(node.load[0] + node.load[1] == Approx(1));
+    CHECK(node.com.z() == Approx(0.5));
+    const GaitPhase& phase = gait.phases[node.phase];
+    if (!phase.swings) continue;
+    const int stance = static_cast<int>(getOther(plan.steps[phase.steps_done].side));
+    const Vector3d zmp = node.com - 0.5 / (g * h * h) * (gait.nodes[k - 1].com - 2 * node.com + gait.nodes[k + 1].com);
+    CHECK((zmp - plan.getStance(phase.steps_done)[stance].p).head<2>().norm() < 1e-9);
+  }
+}
+
+TEST_CASE("walk: Bipetto walks as fast as asked, on its feet") {
+  for (double speed : {0.3, 0.5, 0.8, 1.0}) {
+    CAPTURE(speed);
+    WalkOptions options;
+    options.speed = speed;
+    const Solved solved = solve(makeWalk(getBipetto(), options));
+    checkSteps(solved);
+    const Vector3d velocity = calcSpeed(solved.measures);
+    CHECK(velocity.x() == Approx(speed).epsilon(0.05));
+    CHECK(std::abs(solved.measures.end.y() - solved.measures.start.y()) < 0.02);
+    CHECK(solved.measures.touchdown < 0.25 * speed + 0.1);
+    if (speed > 0.5) continue;
+    CHECK(solved.summary.iterations < 40);
+    CHECK(solved.measures.slip < 1e-3);
+    CHECK(solved.measures.base_high - solved.measures.base_low < 0.03);
+    CHECK(solved.measures.heading < 0.05);
+  }
+}
+
+TEST_CASE("side walk and turns: where they were asked to go") {
+  SideWalkOptions side;
+  side.speed = -0.4;
+  const Solved right = solve(makeSideWalk(getBipetto(), side));
+  checkSteps(right);
+  CHECK(calcSpeed(right.measures).y() == Approx(-0.4).epsilon(0.05));
+  CHECK(std::abs(right.measures.end.x() - right.measures.start.x()) < 0.02);
+
+  TurnOptions turn;
+  turn.angle = -1.2;
+  turn.radius = 0.4;
+  turn.steps = 6;
+  Motion motion = makeTurn(getBipetto(), turn);
+  const ContactPhase last = motion.schedule.phases.back();
+  const Solved arc = solve(std::move(motion));
+  checkSteps(arc);
+  const Vector3d moved = arc.measures.end - arc.measures.start;
+  CHECK(moved.x() == Approx(0.4 * std::sin(1.2)).margin(0.02));
+  CHECK(moved.y() == Approx(-0.4 * (1 - std::cos(1.2))).margin(0.02));
+  for (const ContactTarget& foot : last.contacts) CHECK(calcHeading(foot.X_WT) == Approx(-1.2).margin(0.01));
+}
+
+TEST_CASE("walk: with the published weights the feet land where they like") {
+  WalkOptions options;
+  setPaperWeights(options);
+  const Solved solved = solve(makeWalk(getBipetto(), options));
+  CAPTURE(solved.summary.message, solved.summary.iterations);
+  CHECK(solved.summary.termination == FddpTermination::Converged);
+  const double speed = calcSpeed(solved.measures).x();
+  CHECK(speed > 0.25);
+  CHECK(speed < 0.5);  // the velocity is one wish among others
+  CHECK(solved.measures.foothold > 0.02);
+  CHECK(solved.measures.slip < 5e-3);
+  CHECK(solved.measures.load > 5);
+}
+
+TEST_CASE("walk: what cannot be done is refused by name") {
+  const auto make = [](const std::string& option, double value) {
+    WalkOptions options;
+    setOption(listOptions(options), option, value);
+    return makeWalk(getBipetto(), options);
+  };
+  CHECK_NOTHROW(make("speed", -0.3));
+  for (const auto& [option, value, word] :
+       std::vector<std::tuple<std::string, double, std::string>>{{"speed", 3, "reach"},
+                                                                 {"steps", 1, "steps"},
+                                                                 {"steps", 4.5, "steps"},
+                                                                 {"single_support", 0, "single_support"},
+                                                                 {"double_support", -1, "double_support"},
+                                                                 {"time_step", 0, "time_step"},
+                                                                 {"friction", 0, "friction"},
+                                                                 {"swing_height", -0.1, "swing_height"},
+                                                                 {"com_weight", -1, "com_weight"},
+                                                                 {"swing_apex", 1, "swing_apex"}}) {
+    CAPTURE(option, value);
+    CHECK_THROWS_AS(make(option, value), ModelError);
+    CHECK_THROWS_WITH(make(option, value), Catch::Contains(word));
+  }
+  TurnOptions turn;
+  turn.angle = 6;
+  turn.steps = 3;
+  CHECK_THROWS_WITH(makeTurn(getBipetto(), turn), Catch::Contains("collide"));
+  turn.radius = -1;
+  CHECK_THROWS_WITH(makeTurn(getBipetto(), turn), Catch::Contains("radius"));
+  const LoadedRobot fourbar = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar");
+  CHECK_THROWS_AS(makeWalk(fourbar.model), ModelError);
+}
