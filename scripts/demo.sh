@@ -9,5 +9,6 @@ build build/demo -DCMAKE_BUILD_TYPE=Release -DBIELLE_BUILD_TESTS=OFF -DBIELLE_BU
   -DBIELLE_BUILD_VALIDATION=OFF -DBIELLE_BUILD_BENCHMARKS=OFF
 build/demo/bin/bielle solve squat --robot bipetto --depth 0.7 -o demo/squat
 echo
-echo "The motion is in $bielle_root/demo/squat: trajectory.csv, trajectory.npz (NumPy) and summary.json."
+echo "Look at it: open $bielle_root/demo/squat/report.html with a browser."
+echo "Beside it: trajectory.csv, trajectory.npz (NumPy) and summary.json."
 echo "The command is $bielle_root/build/demo/bin/bielle; try it with --help."

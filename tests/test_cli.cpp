@@ -51,9 +51,9 @@ class OutputDirectory {
   ~OutputDirectory() { fs::remove_all(path_); }
   std::string str() const { return (path_ / "result").string(); }
   json readSummary() const { return json::parse(std::ifstream(path_ / "result/summary.json")); }
-  // The three files and no other, the two trajectories whole and the same.
+  // The three files, the report and no other, the two trajectories whole and the same.
   MotionRecord readTrajectory() const {
-    CHECK(std::distance(fs::directory_iterator(path_ / "result"), fs::directory_iterator()) == 3);
+    CHECK(std::distance(fs::directory_iterator(path_ / "result"), fs::directory_iterator()) == 4);
     const MotionRecord npz = readRecord(str() + "/trajectory.npz"), csv = readRecord(str() + "/trajectory.csv");
     CHECK(npz.q == csv.q);
     return npz;

@@ -14,6 +14,7 @@ constexpr int kOk = 0, kFailed = 1, kBadInput = 2;
 using Action = std::function<int()>;  // returns the exit status
 
 void addSolve(CLI::App& app, Action& action);
+void addReport(CLI::App& app, Action& action);
 void addInfo(CLI::App& app, Action& action);
 void addEval(CLI::App& app, Action& action);
 void addRobots(CLI::App& app, Action& action);

@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
       "Each command has its own --help. Exit status: 0 done, 1 not converged or a failed check, 2 bad input.");
   Action action;
   addSolve(app, action);
+  addReport(app, action);
   addInfo(app, action);
   addEval(app, action);
   addRobots(app, action);

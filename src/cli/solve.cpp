@@ -4,11 +4,13 @@
 #include <charconv>
 #include <cmath>
 #include <csignal>
+#include <filesystem>
 #include <iostream>
 #include <sstream>
 
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
+#include "bielle/report/report.h"
 #include "cli/commands.h"
 #include "cli/motion_registry.h"
 #include "cli/table.h"
@@ -22,7 +24,7 @@ struct SolveArguments {
   Formulation formulation = Formulation::Reduced;
   std::vector<std::string> settings;  // name=value
   FddpOptions solver;
-  bool quiet = false;
+  bool quiet = false, no_report = false;
 };
 
 std::atomic<bool> interrupted{false};
@@ -82,6 +84,17 @@ void printResult(const MotionResult& result, const std::vector<std::string>& pat
   for (const std::string& path : paths) std::cout << "  " << path << "\n";
 }
 
+// The page beside the other files. Without it the result is still whole.
+void addReport(const std::string& directory, std::vector<std::string>& paths) {
+  const std::string path = (std::filesystem::path(directory) / "report.html").string();
+  try {
+    writeReport(path, {directory});
+    paths.push_back(path);
+  } catch (const std::exception& error) {
+    std::cerr << "bielle: warning: no report was written: " << error.what() << "\n";
+  }
+}
+
 int solve(const SolveArguments& arguments, const MotionRequest& request) {
   for (const std::string& setting : arguments.settings) applySetting(setting, request.options);
   for (const OptionEntry& option : request.options)
@@ -105,7 +118,9 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   const FddpSummary summary = Fddp(arguments.solver).solve(*motion.problem, motion.guess, observer);
   const RunInfo run{arguments.robot.name, robot.file, getCommandLine()};
   const MotionResult result = makeResult(run, motion, motion.guess, summary);
-  printResult(result, writeResult(arguments.directory, result));
+  std::vector<std::string> paths = writeResult(arguments.directory, result);
+  if (!arguments.no_report) addReport(arguments.directory, paths);
+  printResult(result, paths);
   return result.converged() ? kOk : kFailed;
 }
 
@@ -140,7 +155,7 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   const auto request = std::make_shared<MotionRequest>(motion.makeRequest());
   sub.add_option("--robot", arguments->robot.name, "name, directory or .urdf file")->required();
   sub.add_option("-o,--output", arguments->directory,
-                 "directory for trajectory.csv, trajectory.npz and summary.json; made if need be")
+                 "directory for trajectory.csv, trajectory.npz, summary.json and report.html; made if need be")
       ->required();
   addPresets(sub, request);
   for (const OptionEntry& option : request->options)
@@ -164,6 +179,7 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   sub.add_flag("--quiet", arguments->quiet, "no line per iteration");
+  sub.add_flag("--no-report", arguments->no_report, "no report.html");
   sub.footer(
       "Options of --set, with default and unit:\n" + formatOptionList(motion) + "Examples:\n  " + motion.example +
       "\n  " + motion.example + " --set com_weight=2e5 --max-iterations 50\n" +

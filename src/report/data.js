@@ -1,0 +1,101 @@
+'use strict';
+// The data of the page: tables of numbers, and runs over time.
+
+// Rows of float32, as the page holds them: {rows, cols, data: base64 of little-endian numbers}.
+class Table {
+  constructor(json) {
+    this.rows = json.rows;
+    this.cols = json.cols;
+    const bytes = decodeBase64(json.data), view = new DataView(bytes.buffer);
+    this.data = new Float32Array(bytes.length / 4);
+    for (let i = 0; i < this.data.length; ++i) this.data[i] = view.getFloat32(4 * i, true);
+  }
+
+  get(row, col) {
+    return this.data[row * this.cols + col];
+  }
+
+  getColumn(col) {
+    const out = new Float32Array(this.rows);
+    for (let k = 0; k < this.rows; ++k) out[k] = this.get(k, col);
+    return out;
+  }
+}
+
+function decodeBase64(text) {
+  const characters = atob(text), bytes = new Uint8Array(characters.length);
+  for (let i = 0; i < characters.length; ++i) bytes[i] = characters.charCodeAt(i);
+  return bytes;
+}
+
+// Told apart by colour in the replay and by the pattern of their lines in the plots.
+const RUN_COLORS = ['#1f5fbf', '#e8590c', '#2b8a3e', '#9c36b5', '#0b7285', '#a61e4d'];
+const RUN_BORDERS = ['solid', 'dashed', 'dotted', 'double', 'dashed', 'dotted'];
+const RUN_PATTERNS = [null, [7, 4], [2, 3], [9, 3, 2, 3], [12, 4], [1, 2]];
+
+// One solved motion.
+class Run {
+  constructor(json, index) {
+    this.index = index;
+    this.label = json.label;
+    this.summary = json.summary;
+    this.check = json.check;
+    this.robot = json.robot;
+    this.color = RUN_COLORS[index % RUN_COLORS.length];
+    this.pattern = RUN_PATTERNS[index % RUN_PATTERNS.length];
+    for (const [name, value] of Object.entries(json.motion)) this[name] = value.data === undefined ? value : new Table(value);
+    this.time = this.time.data;
+    this.end = this.time[this.time.length - 1];
+  }
+
+  // The last node that is not after t, among those a stage starts from.
+  getStage(t) {
+    let low = 0, high = Math.max(0, this.time.length - 2);
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.time[middle] <= t + 1e-6) low = middle;
+      else high = middle - 1;
+    }
+    return low;
+  }
+
+  // The node before t and the share of its stage that has passed.
+  locate(t) {
+    const k = this.getStage(t), next = Math.min(k + 1, this.time.length - 1);
+    const span = this.time[next] - this.time[k];
+    return {k, next, share: span > 0 ? Math.min(1, Math.max(0, (t - this.time[k]) / span)) : 0};
+  }
+
+  getPhases() {
+    const phases = Array.isArray(this.summary.phases) ? this.summary.phases : [];
+    return phases.map(phase => {
+      const first = Math.min(phase.start_node, this.time.length - 1);
+      const last = Math.min(phase.start_node + phase.nodes, this.time.length - 1);
+      return {name: phase.name, start: this.time[first], end: this.time[last]};
+    });
+  }
+
+  getPhaseName(t) {
+    const phase = this.getPhases().find(p => t < p.end) || this.getPhases().pop();
+    return phase ? phase.name : '';
+  }
+}
+
+// Elements of the page. Texts of files go in as text, never as markup.
+function makeElement(tag, className, text) {
+  const element = document.createElement(tag);
+  if (className) element.className = className;
+  if (text !== undefined) element.textContent = text;
+  return element;
+}
+
+function addElement(parent, tag, className, text) {
+  return parent.appendChild(makeElement(tag, className, text));
+}
+
+function formatNumber(value, digits = 4) {
+  if (value === null || value === undefined || Number.isNaN(value)) return '–';
+  if (value === 0) return '0';
+  const size = Math.abs(value);
+  return size >= 1e5 || size < 1e-3 ? value.toExponential(Math.max(0, digits - 2)) : String(Number(value.toPrecision(digits)));
+}

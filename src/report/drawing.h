@@ -1,0 +1,12 @@
+#pragma once
+// What is drawn of a robot: the shapes of its file; for bodies that have none, rods between what is fastened to them.
+#include "bielle/model/reader.h"
+#include "io/json_text.h"
+
+namespace bielle {
+
+// {"visuals": [{body, shape, pose, size, rgba, mesh}], "meshes": [base64 of an STL file]}. `mesh` counts in "meshes".
+// Meshes that are not on the disk, not STL or too large (3 MB each, 12 MB all) are left out.
+Json describeDrawing(const LoadedRobot& robot);
+
+}  // namespace bielle

@@ -1,0 +1,154 @@
+#include <cmath>
+#include <limits>
+
+#include "bielle/dynamics/closure.h"
+#include "bielle/dynamics/kinematics.h"
+#include "report/drawing.h"
+#include "report/pack.h"
+#include "report/run.h"
+
+namespace bielle {
+namespace {
+
+const double kNone = std::numeric_limits<double>::quiet_NaN();
+
+Json describeJoints(const Model& model) {
+  Json joints = Json::array();
+  for (int j = 1; j < model.numBodies(); ++j) {
+    const Joint& joint = model.joints()[j];
+    const auto& serial = model.serialJoints();
+    joints.push_back({{"name", joint.name},
+                      {"kind", getName(joint.kind)},
+                      {"q", joint.idx_q},
+                      {"v", joint.idx_v},
+                      {"nv", joint.nv},
+                      {"serial", std::find(serial.begin(), serial.end(), j) != serial.end()}});
+    if (joint.nv != 1) continue;
+    joints.back()["lower"] = packNumber(model.lowerLimits()[joint.idx_v]);
+    joints.back()["upper"] = packNumber(model.upperLimits()[joint.idx_v]);
+    joints.back()["velocity"] = packNumber(model.velocityLimits()[joint.idx_v]);
+  }
+  return joints;
+}
+
+Json describeContacts(const Model& model) {
+  Json contacts = Json::array();
+  for (const ContactFrame& contact : model.contacts())
+    contacts.push_back({{"name", contact.name},
+                        {"body", contact.body},
+                        {"pose", packPose(contact.X_BF)},
+                        {"surface", contact.kind == ContactKind::Surface6D},
+                        {"half_length", contact.half_length},
+                        {"half_width", contact.half_width}});
+  return contacts;
+}
+
+// Whether the ground holds a contact during a stage.
+bool isLoaded(const MotionRecord& record, int stage, int contact) {
+  return !record.contact_wrenches.row(stage).segment<6>(6 * contact).isZero(0);
+}
+
+// Roll, pitch and yaw of a rotation R = Rz(yaw) Ry(pitch) Rx(roll).
+Eigen::RowVector3d calcRollPitchYaw(const Matrix3d& R) {
+  return {std::atan2(R(2, 1), R(2, 2)), std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0))),
+          std::atan2(R(1, 0), R(0, 0))};
+}
+
+// What follows from the placements of one node after the other.
+struct NodeTables {
+  RowMatrixXd placements;  // bodies x 7
+  RowMatrixXd tilt;        // roll, pitch, yaw of the first body since the first node, about the axes of the world
+  RowMatrixXd feet;        // position (3) of every contact
+  RowMatrixXd gaps;        // of every closure: norms of position and angle
+  Json footprints = Json::array();  // placement of a contact where the ground began to hold it
+};
+
+NodeTables makeNodeTables(const Model& model, const MotionRecord& record) {
+  const int nodes = static_cast<int>(record.time.size()), contacts = static_cast<int>(model.contacts().size());
+  NodeTables tables;
+  tables.placements.resize(nodes, 7 * model.numBodies());
+  tables.tilt.resize(nodes, model.numBodies() > 1 ? 3 : 0);
+  tables.feet.resize(nodes, 3 * contacts);
+  tables.gaps.resize(nodes, 2 * model.closures().size());
+  Workspace ws(model);
+  Matrix3d R_start = Matrix3d::Identity();
+  for (int k = 0; k < nodes; ++k) {
+    updatePlacements(model, ws, record.q.row(k).transpose());
+    for (int i = 0; i < model.numBodies(); ++i) tables.placements.row(k).segment<7>(7 * i) = makePoseRow(ws.X_WB[i]);
+    if (k == 0 && model.numBodies() > 1) R_start = ws.X_WB[1].R;
+    if (model.numBodies() > 1) tables.tilt.row(k) = calcRollPitchYaw(ws.X_WB[1].R * R_start.transpose());
+    for (size_t c = 0; c < model.closures().size(); ++c) {
+      const RowVectorUpTo6 r = calcClosureResidual(ws, model.closures()[c]);
+      tables.gaps(k, 2 * c) = r.head(3).norm();
+      tables.gaps(k, 2 * c + 1) = r.tail(r.size() - 3).norm();
+    }
+    for (int c = 0; c < contacts; ++c) {
+      const SE3 X_WF = getPlacement(ws, model.contacts()[c].body, model.contacts()[c].X_BF);
+      tables.feet.row(k).segment<3>(3 * c) = X_WF.p;
+      if (k + 1 < nodes && isLoaded(record, k, c) && (k == 0 || !isLoaded(record, k - 1, c)))
+        tables.footprints.push_back({{"contact", c}, {"pose", packPose(X_WF)}, {"time", record.time[k]}});
+    }
+  }
+  return tables;
+}
+
+// Centres of pressure in the frames of the contacts, x and y; none without a force or with a point contact.
+RowMatrixXd makePressureCentres(const Model& model, const MotionRecord& record) {
+  const int contacts = static_cast<int>(model.contacts().size());
+  RowMatrixXd centres = RowMatrixXd::Constant(record.u.rows(), 2 * contacts, kNone);
+  for (int k = 0; k < record.u.rows(); ++k)
+    for (int c = 0; c < contacts; ++c) {
+      const auto wrench = record.contact_wrenches.row(k).segment<6>(6 * c);
+      if (model.contacts()[c].kind != ContactKind::Surface6D || !(wrench[2] > 1e-6)) continue;
+      centres(k, 2 * c) = -wrench[4] / wrench[2];
+      centres(k, 2 * c + 1) = wrench[3] / wrench[2];
+    }
+  return centres;
+}
+
+}  // namespace
+
+Json describeRobot(const LoadedRobot& robot) {
+  const Model& model = robot.model;
+  Json motors = Json::array(), closures = Json::array();
+  for (const Motor& motor : model.motors())
+    motors.push_back({{"name", motor.name},
+                      {"joint", motor.joint - 1},
+                      {"effort", packNumber(motor.effort_limit)},
+                      {"velocity", packNumber(motor.velocity_limit)}});
+  for (const Closure& closure : model.closures())
+    closures.push_back({{"name", closure.name},
+                        {"kind", getName(closure.kind)},
+                        {"body", closure.body1},
+                        {"pose", packPose(closure.X_B1)}});
+  Json json = describeDrawing(robot);
+  json.update({{"name", model.name()},
+               {"mass", model.mass()},
+               {"gravity", model.gravity().norm()},
+               {"free", model.hasFreeFlyer()},
+               {"joints", describeJoints(model)},
+               {"motors", motors},
+               {"closures", closures},
+               {"contacts", describeContacts(model)}});
+  return json;
+}
+
+Json describeMotion(const ReportRun& run) {
+  const MotionRecord& record = run.record;
+  const NodeTables tables = makeNodeTables(run.robot.model, record);
+  return {{"time", packTable(record.time)},
+          {"placements", packTable(tables.placements)},
+          {"tilt", packTable(tables.tilt)},
+          {"feet", packTable(tables.feet)},
+          {"footprints", tables.footprints},
+          {"gaps", packTable(tables.gaps)},
+          {"q", packTable(record.q)},
+          {"v", packTable(record.v)},
+          {"u", packTable(record.u)},
+          {"closure_wrenches", packTable(record.closure_wrenches)},
+          {"contact_wrenches", packTable(record.contact_wrenches)},
+          {"pressure", packTable(makePressureCentres(run.robot.model, record))},
+          {"com", packTable(record.com)}};
+}
+
+}  // namespace bielle

@@ -1,0 +1,26 @@
+#pragma once
+// Numbers for the page: base64 of little-endian float32, row after row.
+#include <string>
+
+#include "bielle/io/record.h"
+#include "bielle/math/se3.h"
+#include "io/json_text.h"
+
+namespace bielle {
+
+std::string encodeBase64(const std::string& bytes);
+
+// {"rows", "cols", "data"}
+Json packTable(const RowMatrixXd& table);
+
+// Position and quaternion x y z w.
+using PoseRow = Eigen::Matrix<double, 1, 7>;
+PoseRow makePoseRow(const SE3& X);
+Json packPose(const SE3& X);
+
+Json packVector(const VectorXd& vector);
+
+// A number, or null when it is not finite (a limit that is none).
+Json packNumber(double value);
+
+}  // namespace bielle

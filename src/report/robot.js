@@ -1,0 +1,272 @@
+'use strict';
+// A robot in the scene: its bodies, and what is drawn on top of them at a given time.
+
+const UP = new THREE.Vector3(0, 0, 1);
+
+function setPose(object, pose) {
+  object.position.set(pose[0], pose[1], pose[2]);
+  object.quaternion.set(pose[3], pose[4], pose[5], pose[6]);
+  return object;
+}
+
+function makeColor(css) {
+  return new THREE.Color(css).convertSRGBToLinear();
+}
+
+function makeGeometry(visual, meshes) {
+  const [a, b, c] = visual.size;
+  switch (visual.shape) {
+    case 'box': return new THREE.BoxBufferGeometry(a, b, c);
+    case 'cylinder': return new THREE.CylinderBufferGeometry(a, a, b, 32).rotateX(Math.PI / 2);
+    case 'sphere': return new THREE.SphereBufferGeometry(a, 32, 20);
+    default: return new THREE.STLLoader().parse(decodeBase64(meshes[visual.mesh]).buffer).scale(a, b, c);
+  }
+}
+
+// An arrow of a unit length along z; scaled by its length.
+class Arrow {
+  constructor(color, radius) {
+    const material = new THREE.MeshStandardMaterial({color: makeColor(color), roughness: 0.5});
+    this.object = new THREE.Group();
+    this.shaft = new THREE.Mesh(new THREE.CylinderBufferGeometry(radius, radius, 1, 12).rotateX(Math.PI / 2).translate(0, 0, 0.5), material);
+    this.head = new THREE.Mesh(new THREE.ConeBufferGeometry(2.4 * radius, 6 * radius, 16).rotateX(Math.PI / 2), material);
+    this.headLength = 6 * radius;
+    this.object.add(this.shaft, this.head);
+  }
+
+  // A vector in the frame of the arrow's parent, from a point of it.
+  set(vector, x, y, z) {
+    const length = vector.length();
+    this.object.visible = length > 1e-4 && Number.isFinite(length);
+    if (!this.object.visible) return;
+    this.object.position.set(x, y, z);
+    this.object.quaternion.setFromUnitVectors(UP, vector.clone().normalize());
+    const head = Math.min(this.headLength, 0.5 * length);
+    this.shaft.scale.z = Math.max(1e-6, length - head);
+    this.head.scale.setScalar(head / this.headLength);
+    this.head.position.z = length - head / 2;
+  }
+}
+
+// A padlock that faces the camera.
+function makeLockTexture() {
+  const canvas = makeElement('canvas');
+  canvas.width = canvas.height = 64;
+  const pen = canvas.getContext('2d');
+  const draw = (color, grow) => {
+    pen.strokeStyle = pen.fillStyle = color;
+    pen.lineWidth = 7 + 2 * grow;
+    pen.beginPath();
+    pen.arc(32, 26, 12, Math.PI, 0);
+    pen.moveTo(20, 26);
+    pen.lineTo(20, 36);
+    pen.moveTo(44, 26);
+    pen.lineTo(44, 36);
+    pen.stroke();
+    pen.fillRect(14 - grow, 30 - grow, 36 + 2 * grow, 26 + 2 * grow);
+  };
+  draw('#20242c', 3);
+  draw('#ffffff', 0);
+  pen.fillStyle = '#20242c';
+  pen.beginPath();
+  pen.arc(32, 41, 4.5, 0, 7);
+  pen.fill();
+  pen.fillRect(30, 41, 4, 9);
+  return new THREE.CanvasTexture(canvas);
+}
+
+// Green below a micrometre, yellow at a tenth of a millimetre, red from a centimetre.
+function getGapColor(gap) {
+  const share = Math.min(1, Math.max(0, (Math.log10(Math.max(gap, 1e-12)) + 6) / 4));
+  return new THREE.Color().setHSL(0.36 * (1 - share), 0.75, 0.48).convertSRGBToLinear();
+}
+
+function makeLine(points, color, options) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute('position', new THREE.BufferAttribute(points, 3));
+  return new THREE.Line(geometry, new THREE.LineBasicMaterial(Object.assign({color: makeColor(color)}, options)));
+}
+
+const FOOT_COLORS = ['#c2255c', '#1971c2', '#5f3dc4', '#2f9e44'];
+
+class RobotView {
+  constructor(run) {
+    this.run = run;
+    this.root = new THREE.Group();
+    this.materials = [];
+    this.bodies = [];
+    for (let i = 0; i < run.placements.cols / 7; ++i) this.bodies.push(this.add(this.root, new THREE.Group()));
+    for (const visual of run.robot.visuals) this.addVisual(visual);
+    this.setPlacements(0);
+    this.root.updateMatrixWorld(true);
+    this.box = new THREE.Box3().setFromObject(this.root);
+    this.size = this.box.isEmpty() ? 1 : this.box.getSize(new THREE.Vector3()).length();
+    this.layers = {};
+    for (const name of ['locks', 'contactForces', 'closureForces', 'com', 'traces', 'footprints']) this.layers[name] = [];
+    this.addSteps();
+    this.addClosures();
+    this.addContacts();
+    this.addCom();
+    this.addTraces();
+  }
+
+  add(parent, object, layer) {
+    parent.add(object);
+    if (layer) this.layers[layer].push(object);
+    return object;
+  }
+
+  addVisual(visual) {
+    const [r, g, b, a] = visual.rgba;
+    const color = new THREE.Color(r, g, b).convertSRGBToLinear();
+    const material = new THREE.MeshStandardMaterial({color, roughness: 0.62, metalness: 0.08});
+    this.materials.push({material, color, opacity: a > 0 ? a : 1});
+    const mesh = setPose(new THREE.Mesh(makeGeometry(visual, this.run.robot.meshes), material), visual.pose);
+    mesh.castShadow = mesh.receiveShadow = true;
+    this.bodies[visual.body].add(mesh);
+  }
+
+  // How the bodies look: the share of the run's colour, and how solid they are.
+  setLook(tint, opacity) {
+    const shade = makeColor(this.run.color);
+    for (const entry of this.materials) {
+      entry.material.color.copy(entry.color).lerp(shade, tint);
+      entry.material.opacity = entry.opacity * opacity;
+      entry.material.transparent = entry.material.opacity < 1;
+      entry.material.polygonOffset = this.run.index > 0;  // two robots in one place do not flicker
+      entry.material.polygonOffsetFactor = entry.material.polygonOffsetUnits = 2 * this.run.index;
+      entry.material.depthWrite = !entry.material.transparent;
+      entry.material.needsUpdate = true;
+    }
+    this.root.traverse(object => {
+      if (object.isMesh && object.parent && this.bodies.includes(object.parent)) object.castShadow = opacity > 0.5;
+    });
+  }
+
+  addSteps() {
+    const ground = this.run.summary.ground;
+    for (const step of (ground && ground.steps) || []) {
+      const [x, y, top] = step.center, [lx, ly, height] = step.size;
+      const geometry = new THREE.BoxBufferGeometry(lx, ly, height);
+      const box = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({color: makeColor('#cfd6df'), roughness: 0.9}));
+      box.add(new THREE.LineSegments(new THREE.EdgesGeometry(geometry), new THREE.LineBasicMaterial({color: makeColor('#8d99a8')})));
+      box.position.set(x, y, top - height / 2);
+      box.rotation.z = step.yaw || 0;
+      box.castShadow = box.receiveShadow = true;
+      this.root.add(box);
+    }
+  }
+
+  addClosures() {
+    const texture = makeLockTexture(), size = 0.045 * this.size;
+    this.largestClosureForce = 0;
+    for (const f of this.listForces(this.run.closure_wrenches)) this.largestClosureForce = Math.max(this.largestClosureForce, f);
+    this.closures = this.run.robot.closures.map(closure => {
+      const frame = setPose(this.add(this.bodies[closure.body], new THREE.Group()), closure.pose);
+      const lock = new THREE.Sprite(new THREE.SpriteMaterial({map: texture, depthTest: false, transparent: true}));
+      lock.scale.set(size, size, 1);
+      lock.renderOrder = 2;
+      this.add(frame, lock, 'locks');
+      const arrow = new Arrow('#7048e8', 0.0045 * this.size);
+      this.add(this.add(frame, new THREE.Group(), 'closureForces'), arrow.object);
+      return {lock, arrow};
+    });
+  }
+
+  addContacts() {
+    this.contacts = this.run.robot.contacts.map((contact, c) => {
+      const frame = setPose(this.add(this.bodies[contact.body], new THREE.Group()), contact.pose);
+      const layer = this.add(frame, new THREE.Group(), 'contactForces');
+      const arrow = new Arrow('#2f9e44', 0.006 * this.size);
+      const centre = new THREE.Mesh(new THREE.SphereBufferGeometry(0.011 * this.size, 16, 12), new THREE.MeshBasicMaterial({color: makeColor('#2b8a3e')}));
+      layer.add(arrow.object, centre);
+      return {arrow, centre};
+    });
+    this.footprints = this.run.footprints.map(print => {
+      const contact = this.run.robot.contacts[print.contact], l = contact.half_length, w = contact.half_width;
+      const corners = new Float32Array([l, w, 0, -l, w, 0, -l, -w, 0, l, -w, 0, l, w, 0]);
+      const line = setPose(makeLine(corners, FOOT_COLORS[print.contact % FOOT_COLORS.length]), print.pose);
+      line.translateZ(0.002);
+      const group = this.add(this.root, new THREE.Group(), 'footprints');
+      group.add(line);
+      return {line, time: print.time};
+    });
+  }
+
+  addCom() {
+    const size = 0.022 * this.size, colors = [makeColor('#14181f'), makeColor('#ffd43b')];
+    this.com = this.add(this.root, new THREE.Group(), 'com');
+    for (let i = 0; i < 8; ++i) {  // the usual mark: eighths of a sphere in two colours
+      const part = new THREE.SphereBufferGeometry(size, 10, 8, (i % 4) * Math.PI / 2, Math.PI / 2, i < 4 ? 0 : Math.PI / 2, Math.PI / 2);
+      const mesh = new THREE.Mesh(part, new THREE.MeshBasicMaterial({color: colors[(i + (i < 4 ? 0 : 1)) % 2], depthTest: false}));
+      mesh.renderOrder = 3;
+      this.com.add(mesh);
+    }
+    this.plumb = this.add(this.root, new THREE.Mesh(new THREE.RingBufferGeometry(0.6 * size, size, 24),
+        new THREE.MeshBasicMaterial({color: makeColor('#14181f'), side: THREE.DoubleSide})), 'com');
+  }
+
+  // Paths of the centre of mass and of the feet: whole and pale, done and strong.
+  addTraces() {
+    this.traces = [];
+    const add = (points, color) => {
+      const group = this.add(this.root, new THREE.Group(), 'traces');
+      group.add(makeLine(points, color, {transparent: true, opacity: 0.3}));
+      const done = makeLine(points, color);
+      group.add(done);
+      this.traces.push(done);
+    };
+    add(this.run.com.data, '#e67700');
+    this.run.robot.contacts.forEach((contact, c) => {
+      const points = new Float32Array(3 * this.run.feet.rows);
+      for (let k = 0; k < this.run.feet.rows; ++k)
+        for (let i = 0; i < 3; ++i) points[3 * k + i] = this.run.feet.get(k, 3 * c + i) + (i === 2 ? 0.003 : 0);
+      add(points, FOOT_COLORS[c % FOOT_COLORS.length]);
+    });
+  }
+
+  * listForces(wrenches) {
+    for (let k = 0; k < wrenches.rows; ++k)
+      for (let c = 0; c < wrenches.cols; c += 6) {
+        const force = Math.hypot(wrenches.get(k, c), wrenches.get(k, c + 1), wrenches.get(k, c + 2));
+        if (Number.isFinite(force)) yield force;
+      }
+  }
+
+  setLayer(name, visible) {
+    for (const object of this.layers[name]) object.visible = visible;
+  }
+
+  setPlacements(t) {
+    const {k, next, share} = this.run.locate(t), table = this.run.placements;
+    const goal = new THREE.Quaternion();
+    this.bodies.forEach((body, i) => {
+      const a = k * table.cols + 7 * i, b = next * table.cols + 7 * i, d = table.data;
+      body.position.set(...[0, 1, 2].map(j => d[a + j] + share * (d[b + j] - d[a + j])));
+      body.quaternion.set(d[a + 3], d[a + 4], d[a + 5], d[a + 6]).slerp(goal.set(d[b + 3], d[b + 4], d[b + 5], d[b + 6]), share);
+    });
+  }
+
+  // `scales`: metres per newton of contact and closure forces. `ground`: its height.
+  setTime(t, scales, ground) {
+    this.setPlacements(t);
+    const run = this.run, {k, next, share} = run.locate(t);
+    const read = (table, row, col) => new THREE.Vector3(table.get(row, col), table.get(row, col + 1), table.get(row, col + 2));
+    this.closures.forEach(({lock, arrow}, c) => {
+      lock.material.color.copy(getGapColor(run.gaps.get(share < 0.5 ? k : next, 2 * c)));
+      if (run.closure_wrenches.rows) arrow.set(read(run.closure_wrenches, k, 6 * c).multiplyScalar(scales.closure), 0, 0, 0);
+    });
+    this.contacts.forEach(({arrow, centre}, c) => {
+      if (!run.contact_wrenches.rows) return;
+      const force = read(run.contact_wrenches, k, 6 * c);
+      const x = run.pressure.get(k, 2 * c) || 0, y = run.pressure.get(k, 2 * c + 1) || 0;
+      arrow.set(force.clone().multiplyScalar(scales.contact), x, y, 0);
+      centre.visible = force.length() > 1e-6;
+      centre.position.set(x, y, 0);
+    });
+    this.com.position.copy(read(run.com, k, 0).lerp(read(run.com, next, 0), share));
+    this.plumb.position.set(this.com.position.x, this.com.position.y, ground + 0.004);
+    for (const trace of this.traces) trace.geometry.setDrawRange(0, (share > 0.999 ? next : k) + 1);
+    for (const {line, time} of this.footprints) line.visible = time <= t + 1e-6;
+  }
+}

@@ -1,0 +1,64 @@
+#include "report/run.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include "bielle/io/names.h"
+#include "bielle/model/error.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle {
+namespace {
+
+Json readJson(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file.is_open())
+    throw ModelError(path.string(), "file", "it cannot be read", "give a directory that `bielle solve` wrote");
+  try {
+    Json json = Json::parse(file);
+    if (json.is_object()) return json;
+  } catch (const Json::exception& error) {
+    throw ModelError(path.string(), "JSON", error.what(), "make it again");
+  }
+  throw ModelError(path.string(), "JSON", "it is no object", "make it again");
+}
+
+std::string getText(const Json& json, const char* key) {
+  const auto it = json.find(key);
+  return it != json.end() && it->is_string() ? it->get<std::string>() : std::string();
+}
+
+LoadedRobot loadRobotOf(const Json& summary, const fs::path& path) {
+  const std::string file = getText(summary, "robot_file"), name = getText(summary, "robot");
+  std::error_code error;
+  if (!file.empty() && fs::exists(file, error)) return loadRobot(file);
+  if (name.empty())
+    throw ModelError(path.string(), "key 'robot'", "it is missing", "give a directory that `bielle solve` wrote");
+  return loadRobot(name);
+}
+
+}  // namespace
+
+ReportRun readRun(const std::string& directory) {
+  const fs::path place = directory;
+  ReportRun run;
+  run.directory = directory;
+  run.summary = readJson(place / "summary.json");
+  std::error_code error;
+  if (fs::exists(place / "check.json", error)) run.check = readJson(place / "check.json");
+  const fs::path archive = place / "trajectory.npz", table = place / "trajectory.csv";
+  const fs::path trajectory = fs::exists(archive, error) ? archive : table;
+  run.record = readRecord(trajectory.string());
+  run.robot = loadRobotOf(run.summary, place / "summary.json");
+  const Model& model = run.robot.model;
+  const MotionRecord& record = run.record;
+  if (record.q_names != makePositionNames(model) || record.v_names != makeVelocityNames(model) ||
+      record.u_names != getNames(model.motors()) || record.closure_names != getNames(model.closures()) ||
+      record.contact_names != getNames(model.contacts()))
+    throw ModelError(trajectory.string(), "columns", "they are not those of the robot in " + run.robot.directory,
+                     "solve again, or bring back the robot as it was");
+  return run;
+}
+
+}  // namespace bielle

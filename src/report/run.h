@@ -1,0 +1,27 @@
+#pragma once
+// One solved motion as its directory holds it, and as the page wants it.
+#include <string>
+
+#include "bielle/io/record.h"
+#include "bielle/model/reader.h"
+#include "io/json_text.h"
+
+namespace bielle {
+
+struct ReportRun {
+  std::string directory;
+  Json summary, check;  // check: null when there is none
+  MotionRecord record;
+  LoadedRobot robot;
+};
+
+// \throws ModelError naming the file and what is wrong
+ReportRun readRun(const std::string& directory);
+
+// The robot: what is drawn of it (drawing.h), joints, motors, closures, contacts.
+Json describeRobot(const LoadedRobot& robot);
+
+// What happens at every node and stage; placements of all bodies and of the feet come from q.
+Json describeMotion(const ReportRun& run);
+
+}  // namespace bielle

@@ -1,0 +1,8 @@
+bielle_test(report SOURCES test_report.cpp robot_directory.cpp LIBS bielle_report)
+target_link_libraries(test_report PRIVATE nlohmann_json::nlohmann_json)
+# In a browser; skipped where there is no Chromium.
+if(TARGET bielle_command)
+  add_test(NAME report_page COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_report_page.py
+    $<TARGET_FILE:bielle_command>)
+  set_tests_properties(report_page PROPERTIES LABELS system SKIP_RETURN_CODE 77 TIMEOUT 600)
+endif()

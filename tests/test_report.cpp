@@ -1,0 +1,239 @@
+// The page of a report, read as text: what stands in it. (test_report_page.py looks at it in a browser.)
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "bielle/io/result.h"
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/squat.h"
+#include "bielle/report/report.h"
+#include "robot_directory.h"
+
+namespace fs = std::filesystem;
+using namespace bielle;
+using namespace bielle::testing;
+using nlohmann::json;
+
+namespace {
+
+json getData(const std::string& page) {
+  const std::string open = "<script type=\"application/json\" id=\"data\">";
+  const size_t begin = page.find(open) + open.size();
+  return json::parse(page.substr(begin, page.find("</script>", begin) - begin));
+}
+
+// An independent reading of the tables of the page.
+RowMatrixXd readTable(const json& table) {
+  const std::string text = table["data"];
+  const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string bytes;
+  unsigned bits = 0;
+  int count = 0;
+  for (char c : text) {
+    if (c == '=') break;
+    bits = (bits << 6 | static_cast<unsigned>(digits.find(c))) & 0xffffff;
+    count += 6;
+    if (count < 8) continue;
+    count -= 8;
+    bytes += static_cast<char>(bits >> count & 255);
+  }
+  RowMatrixXd out(table["rows"].get<int>(), table["cols"].get<int>());
+  REQUIRE(bytes.size() == 4 * static_cast<size_t>(out.size()));
+  for (int i = 0; i < out.size(); ++i) {
+    float value;
+    std::memcpy(&value, bytes.data() + 4 * i, 4);
+    out.data()[i] = value;
+  }
+  return out;
+}
+
+void writeShortSquat(const std::string& directory) {
+  const LoadedRobot robot = loadRobot("bipetto");
+  SquatOptions options;
+  options.duration = 0.12;
+  options.settle = 0;
+  options.time_step = 0.03;
+  const Motion motion = makeSquat(robot.model, options);
+  FddpSummary summary;
+  summary.log.resize(2);
+  writeResult(directory, makeResult({"bipetto", {"bielle"}}, motion, motion.guess, summary));
+}
+
+// A record of two nodes that fits any robot with names of its own.
+void writeStillResult(const std::string& directory, const std::string& robot, const MotionRecord& names,
+                      const json& summary = json::object()) {
+  MotionRecord record = names;
+  const auto count = [](const auto& list) { return static_cast<Eigen::Index>(list.size()); };
+  record.time = VectorXd::LinSpaced(2, 0, 1);
+  record.q = RowMatrixXd::Zero(2, count(names.q_names));
+  record.v = RowMatrixXd::Zero(2, count(names.v_names));
+  record.a = RowMatrixXd::Zero(1, count(names.v_names));
+  record.u = RowMatrixXd::Zero(1, count(names.u_names));
+  record.closure_wrenches = RowMatrixXd::Zero(1, 6 * count(names.closure_names));
+  record.contact_wrenches = RowMatrixXd::Zero(1, 6 * count(names.contact_names));
+  record.com = RowMatrixXd::Zero(2, 3);
+  record.gap = RowMatrixXd::Zero(2, 2);
+  fs::create_directories(directory);
+  writeNpz(directory + "/trajectory.npz", record);
+  json whole = {{"robot", robot}, {"motion", "rest"}};
+  whole.update(summary);
+  std::ofstream(directory + "/summary.json") << whole.dump();
+}
+
+const char* const kArm = R"(<robot name="arm"><link name="world"/>
+  <link name="a"><inertial><origin xyz="0.5 0 0"/><mass value="1"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="shoulder" type="continuous"><parent link="world"/><child link="a"/><axis xyz="0 1 0"/></joint></robot>)";
+
+MotionRecord getArmNames() {
+  MotionRecord names;
+  names.q_names = names.v_names = {"shoulder"};
+  return names;
+}
+
+}  // namespace
+
+TEST_CASE("the page holds the placements of the bodies, seen by the centre of mass and the feet") {
+  const RobotDirectory directory;
+  const std::string place = directory.path() + "/squat";
+  writeShortSquat(place);
+  const MotionRecord record = readRecord(place + "/trajectory.npz");
+  const Model model = loadRobot("bipetto").model;
+  const json run = getData(makeReport({place}))["runs"][0];
+  const RowMatrixXd placements = readTable(run["motion"]["placements"]);
+  REQUIRE(placements.cols() == 7 * model.numBodies());
+  for (int k = 0; k < placements.rows(); ++k) {
+    Vector3d moment = Vector3d::Zero();
+    for (int i = 1; i < model.numBodies(); ++i) {
+      const auto row = placements.row(k).segment<7>(7 * i);
+      const Eigen::Quaterniond turn(row[6], row[3], row[4], row[5]);
+      const Inertia& inertia = model.bodies()[i].inertia;
+      moment += inertia.mass * (row.head<3>().transpose() + turn * inertia.com);
+    }
+    CHECK((moment / model.mass() - record.com.row(k).transpose()).norm() < 1e-6);
+  }
+  const RowMatrixXd feet = readTable(run["motion"]["feet"]);
+  CHECK(std::abs(feet(0, 1) - 0.125) < 1e-6);  // where bipetto.yaml puts them
+  CHECK(std::abs(feet(0, 4) + 0.125) < 1e-6);
+  CHECK(run["motion"]["footprints"].size() == 2);
+  CHECK((readTable(run["motion"]["u"]) - record.u).norm() < 1e-5);
+  // The force of each foot acts at its centre of pressure: there it has no moment but about the vertical.
+  const RowMatrixXd pressure = readTable(run["motion"]["pressure"]);
+  for (int k = 0; k < record.u.rows(); ++k)
+    for (int c = 0; c < 2; ++c) {
+      const auto wrench = record.contact_wrenches.row(k).segment<6>(6 * c);
+      const Vector3d force = wrench.head<3>(), moment = wrench.tail<3>();
+      const Vector3d rest = moment - Vector3d(pressure(k, 2 * c), pressure(k, 2 * c + 1), 0).cross(force);
+      CHECK(rest.head<2>().norm() < 1e-4);
+    }
+}
+
+TEST_CASE("several results stand on one page, with labels that tell them apart") {
+  const RobotDirectory directory;
+  directory.write("arm.urdf", kArm);
+  const std::string robot = directory.path() + "/arm.urdf";
+  for (const char* place : {"/one/squat", "/two/squat", "/jump"})
+    writeStillResult(directory.path() + place, robot, getArmNames());
+  const json data = getData(
+      makeReport({directory.path() + "/one/squat/", directory.path() + "/two/squat", directory.path() + "/jump"}));
+  REQUIRE(data["runs"].size() == 3);
+  CHECK(data["runs"][0]["label"] == "one/squat");
+  CHECK(data["runs"][1]["label"] == "two/squat");
+  CHECK(data["runs"][2]["label"] == "jump");
+  CHECK(data["runs"][0]["check"].is_null());
+  CHECK(getData(makeReport({directory.path() + "/jump", directory.path() + "/jump"}))["runs"].size() == 2);
+}
+
+TEST_CASE("no name can leave the data of the page") {
+  const RobotDirectory directory;
+  const std::string evil = "</script><script>alert(1)</script><!--{data}-->\xff";
+  directory.write("arm.urdf", kArm);
+  writeStillResult(directory.path() + "/r", directory.path() + "/arm.urdf", getArmNames());
+  const auto countScripts = [&] {
+    const std::string page = makeReport({directory.path() + "/r"});
+    size_t count = 0;
+    for (size_t at = 0; (at = page.find("</script", at)) != std::string::npos; ++at) ++count;
+    return count;
+  };
+  const size_t scripts = countScripts();
+  CHECK(scripts > 5);
+  writeStillResult(directory.path() + "/r", directory.path() + "/arm.urdf", getArmNames(),
+                   {{"motion", evil.substr(0, evil.size() - 1)}, {evil.substr(0, 9), 1}});
+  CHECK(countScripts() == scripts);
+  const json run = getData(makeReport({directory.path() + "/r"}))["runs"][0];
+  CHECK(run["summary"]["motion"] == evil.substr(0, evil.size() - 1));
+  // Names that are no UTF-8 are shown as well as may be.
+  fs::create_directories(directory.path() + "/" + evil.substr(evil.size() - 4));
+  writeStillResult(directory.path() + "/" + evil.substr(evil.size() - 4), directory.path() + "/arm.urdf",
+                   getArmNames());
+  CHECK_NOTHROW(makeReport({directory.path() + "/" + evil.substr(evil.size() - 4)}));
+}
+
+TEST_CASE("bodies without shapes are drawn as rods, meshes as they are on the disk") {
+  const RobotDirectory directory;
+  directory.write("arm.urdf", kArm);
+  writeStillResult(directory.path() + "/r", directory.path() + "/arm.urdf", getArmNames());
+  const auto getRobot = [&] { return getData(makeReport({directory.path() + "/r"}))["runs"][0]["robot"]; };
+  const json bare = getRobot();
+  // A ball at the joint and a rod to the centre of mass.
+  REQUIRE(bare["visuals"].size() == 2);
+  CHECK(bare["visuals"][0]["shape"] == "sphere");
+  CHECK(bare["visuals"][1]["shape"] == "cylinder");
+  CHECK(bare["visuals"][1]["size"][1].get<double>() == Approx(0.5));
+  CHECK(bare["visuals"][1]["pose"][0].get<double>() == Approx(0.25));
+
+  for (const char* name : {"meshes/a.stl", "package://thing/meshes/a.STL", "package://meshes/a.stl"}) {
+    CAPTURE(name);
+    const std::string visual =
+        std::string("<visual><geometry><mesh filename=\"") + name + "\"/></geometry></visual></link>";
+    directory.write("arm.urdf", replaceOnce(kArm, "</inertial></link>", "</inertial>" + visual));
+    fs::remove_all(directory.path() + "/meshes");
+    fs::remove_all(directory.path() + "/thing");
+    CHECK(getRobot()["meshes"].empty());
+    CHECK(getRobot()["visuals"] == bare["visuals"]);
+    directory.write("meshes/a.stl", "solid a");
+    directory.write("thing/meshes/a.STL", "solid a");
+    const json robot = getRobot();
+    REQUIRE(robot["meshes"].size() == 1);
+    CHECK(robot["meshes"][0] == "c29saWQgYQ==");
+    CHECK(robot["visuals"].size() == 1);
+    directory.write("meshes/a.stl", std::string(3'100'000, 'x'));
+    directory.write("thing/meshes/a.STL", std::string(3'100'000, 'x'));
+    CHECK(getRobot()["meshes"].empty());
+  }
+}
+
+TEST_CASE("a directory that is none of ours is refused with the file and the remedy") {
+  const RobotDirectory directory;
+  directory.write("arm.urdf", kArm);
+  const std::string place = directory.path() + "/r", robot = directory.path() + "/arm.urdf";
+  const auto refuse = [&](const std::string& text) {
+    CHECK_THROWS_AS(makeReport({place}), ModelError);
+    CHECK_THROWS_WITH(makeReport({place}), Catch::Contains(text));
+  };
+  refuse("summary.json: file: it cannot be read");
+  writeStillResult(place, robot, getArmNames());
+  directory.write("r/summary.json", "{");
+  refuse("summary.json: JSON: ");
+  directory.write("r/summary.json", "[]");
+  refuse("it is no object");
+  directory.write("r/summary.json", "{}");
+  refuse("key 'robot'");
+  directory.write("r/summary.json", R"({"robot": 3})");
+  refuse("key 'robot'");
+  MotionRecord other = getArmNames();
+  other.q_names = {"elbow"};
+  writeStillResult(place, robot, other);
+  refuse("not those of the robot");
+  writeStillResult(place, "nobody", getArmNames());
+  refuse("nobody");
+  writeStillResult(place, "nobody", getArmNames(), {{"robot_file", robot}});
+  CHECK_NOTHROW(makeReport({place}));
+  fs::remove(place + "/trajectory.npz");
+  refuse("trajectory.csv: file: it cannot be read");
+  CHECK_THROWS_AS(makeReport({}), ModelError);
+  CHECK_THROWS_WITH(writeReport("/nonexistent/report.html", {place}), Catch::Contains("trajectory.csv"));
+}

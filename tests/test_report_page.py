@@ -1,0 +1,191 @@
+"""Reports in a browser: they open without complaint, the robot moves, the plots follow, names stay text.
+
+usage: test_report_page.py BIELLE. Ends with status 77 where there is no Chromium.
+"""
+import csv
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+from browser import Browser
+
+BIELLE = sys.argv.pop(1)
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+HOSTILE = "<script>window.hacked=1</script><img src=x onerror=window.hacked=2>\"'&amp;</style>"
+
+# What the canvas of the replay shows, as a list of levels of grey on a grid.
+PICTURE = """(() => {
+  const small = document.createElement('canvas');
+  small.width = small.height = 256;
+  const pen = small.getContext('2d');
+  report.draw();
+  pen.drawImage(document.getElementById('canvas'), 0, 0, 256, 256);
+  return Array.from(pen.getImageData(0, 0, 256, 256).data).filter((x, i) => i % 4 === 0);
+})()"""
+
+# How many points of its canvas each plot has drawn on.
+INK = """Array.from(document.querySelectorAll('.plot')).map(plot => {
+  const canvas = plot.querySelector('canvas');
+  const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+  return data.filter((x, i) => i % 4 === 3 && x > 0).length;
+})"""
+
+
+def run(*arguments, status=0):
+    result = subprocess.run([BIELLE, *map(str, arguments)], capture_output=True, text=True)
+    assert result.returncode == status, result.stdout + result.stderr
+    return result
+
+
+def escape(text):
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace('"', "&quot;")
+
+
+def write_hostile_result(directory):
+    """A pendulum of one swing, every name of which wants to be markup."""
+    directory.mkdir()
+    name = escape(HOSTILE)
+    (directory / "robot.urdf").write_text(f"""<robot name="{name}"><link name="world"/>
+      <link name="bob"><inertial><mass value="1"/><origin xyz="0 0 -1"/>
+        <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+      <joint name="{name}" type="continuous"><parent link="world"/><child link="bob"/><axis xyz="0 1 0"/></joint>
+      </robot>""")
+    with open(directory / "trajectory.csv", "w", newline="") as file:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(["time", "q." + HOSTILE, "v." + HOSTILE, "a." + HOSTILE, "com.x", "com.y", "com.z",
+                      "gap.position", "gap.angle"])
+        for k in range(11):
+            out.writerow([k / 10, k / 20, 0.5, "" if k == 10 else 0, 0, 0, -1, 0, 0])
+    summary = {"robot": str(directory / "robot.urdf"), "motion": HOSTILE, "termination": HOSTILE,
+               "message": "</script>" + HOSTILE, "requested": {HOSTILE: 1}, "command": [HOSTILE],
+               "log_columns": ["iteration", "cost", HOSTILE], "log": [[0, 1, 2], [1, 0.5, 3]],
+               "phases": [{"name": HOSTILE, "start_node": 0, "nodes": 10}]}
+    (directory / "summary.json").write_text(json.dumps(summary))
+    check = {"pass": False, "rows": [{"name": HOSTILE, "value": 1, "bound": 2, "unit": HOSTILE, "pass": False,
+                                      "note": HOSTILE}]}
+    (directory / "check.json").write_text(json.dumps(check))
+
+
+def differ(a, b):
+    """How many of the points changed visibly."""
+    return sum(abs(x - y) > 5 for x, y in zip(a, b))
+
+
+class ReportPage(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.place = tempfile.TemporaryDirectory()
+        cls.root = pathlib.Path(cls.place.name)
+        cls.addClassCleanup(cls.place.cleanup)
+        cls.squat = cls.root / "squat"
+        run("solve", "squat", "--robot", "bipetto", "--set", "duration=0.6", "--set", "settle=0", "--set",
+            "time_step=0.02", "--depth", "0.8", "--quiet", "-o", cls.squat)
+        write_hostile_result(cls.root / "hostile")
+        cls.browser = Browser(CHROMIUM)
+        cls.addClassCleanup(cls.browser.close)
+
+    def setUp(self):
+        self.browser.complaints.clear()
+
+    def tearDown(self):
+        self.assertEqual(self.browser.complaints, [])
+
+    def picture(self, t):
+        self.browser.evaluate(f"report.transport.setTime({t})")
+        return self.browser.evaluate(PICTURE)
+
+    def test_replay_moves(self):
+        self.browser.open(self.squat / "report.html")
+        start, lowest = self.picture(0), self.picture(0.3)
+        self.assertEqual(differ(start, self.picture(0)), 0)
+        self.assertGreater(differ(start, lowest), 600)
+        self.assertGreater(len(set(start)), 20)  # more than a ground
+        self.picture(0)
+        self.browser.evaluate("report.transport.setPlaying(true)")
+        deadline = time.monotonic() + 60
+        while self.browser.evaluate("report.transport.time") < 0.2 and time.monotonic() < deadline:
+            time.sleep(0.05)
+        self.assertGreaterEqual(self.browser.evaluate("report.transport.time"), 0.2)
+        self.browser.evaluate("report.transport.setPlaying(false)")
+        self.assertGreater(differ(start, self.browser.evaluate(PICTURE)), 600)
+
+    def test_layers_show_and_hide(self):
+        self.browser.open(self.squat / "report.html", "#hide=locks,contactForces,com,traces,footprints")
+        bare = self.browser.evaluate(PICTURE)
+        for layer in ("locks", "contactForces", "closureForces", "com", "traces"):
+            self.browser.evaluate(f"report.scene.setLayer('{layer}', true)")
+            self.assertGreater(differ(bare, self.browser.evaluate(PICTURE)), 0, layer)
+            self.browser.evaluate(f"report.scene.setLayer('{layer}', false)")
+            self.assertEqual(differ(bare, self.browser.evaluate(PICTURE)), 0, layer)
+
+    def test_plots_follow(self):
+        self.browser.open(self.squat / "report.html", "#t=0.2")
+        self.assertAlmostEqual(self.browser.evaluate("report.transport.time"), 0.2)
+        ink = self.browser.evaluate(INK)
+        self.assertGreaterEqual(len(ink), 14)
+        for count in ink:
+            self.assertGreater(count, 300)
+        titles = self.browser.evaluate("Array.from(document.querySelectorAll('.plot h2')).map(h => h.textContent)")
+        for title in ("Centre of mass", "Motor torques", "Closure gaps", "Contact forces", "Centres of pressure"):
+            self.assertIn(title, titles)
+        # A click at the middle of a plot goes to that time, and the cursors of all plots go with it.
+        box = self.browser.evaluate("""(() => { const area = document.querySelector('.plot .area');
+          area.scrollIntoView({block: 'center', behavior: 'instant'});
+          const r = area.getBoundingClientRect(), g = report.plots.plots[0].graph;
+          return [r.left + g.toDomXCoord(0.4), r.top + 60]; })()""")
+        for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
+            self.browser.call("Input.dispatchMouseEvent", type=kind, x=box[0], y=box[1], button="left", clickCount=1)
+        self.assertAlmostEqual(self.browser.evaluate("report.transport.time"), 0.4, delta=0.02)
+        for shift in self.browser.evaluate("""report.plots.plots.map(
+            plot => plot.graph.toDataXCoord(parseFloat(plot.cursor.style.left)) - report.transport.time)"""):
+            self.assertAlmostEqual(shift, 0, delta=1e-4)
+
+    def test_numbers_are_those_of_the_files(self):
+        self.browser.open(self.squat / "report.html")
+        with open(self.squat / "trajectory.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        motor = self.browser.evaluate("report.plots.plots.find(p => p.definition.title === 'Motor torques')"
+                                      ".definition.series.map(s => [s.name, Array.from(s.lines[0])])")
+        self.assertEqual(len(motor), 12)
+        for name, values in motor:
+            for row, value in zip(rows, values):
+                self.assertAlmostEqual(float(row["u." + name]), value, delta=1e-5)
+
+    def test_two_runs(self):
+        page = self.root / "both.html"
+        run("report", self.squat, self.root / "hostile", "-o", page)
+        self.browser.open(page)
+        self.assertEqual(self.browser.evaluate("report.scene.robots.length"), 2)
+        apart = self.browser.evaluate(PICTURE)
+        self.browser.evaluate("report.scene.setSideBySide(false)")
+        self.assertGreater(differ(apart, self.browser.evaluate(PICTURE)), 600)
+
+    def test_hostile_names_are_text(self):
+        run("report", self.root / "hostile")
+        self.browser.open(self.root / "hostile/report.html")
+        self.assertIsNone(self.browser.evaluate("window.hacked"))
+        self.assertEqual(self.browser.evaluate("document.querySelectorAll('img').length"), 0)
+        self.assertIn(HOSTILE, self.browser.evaluate("document.title"))
+        text = self.browser.evaluate("document.body.innerText")
+        self.assertGreater(text.count(HOSTILE), 8)
+        self.assertIn("FAIL", text)
+
+    def test_complaints_are_heard(self):
+        """The instrument itself: what it must catch, it catches."""
+        page = self.root / "bad.html"
+        page.write_text("<script>console.error('a'); throw new Error('b')</script><img src='http://127.0.0.1:9/x'>")
+        self.browser.open(page)
+        self.assertGreaterEqual(len(self.browser.complaints), 3)
+        self.browser.complaints.clear()
+
+
+if __name__ == "__main__":
+    if not CHROMIUM:
+        print("skipped: there is no chromium on the PATH")
+        sys.exit(77)
+    unittest.main(verbosity=2)
