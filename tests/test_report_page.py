@@ -64,7 +64,9 @@ def write_hostile_result(directory):
     summary = {"robot": str(directory / "robot.urdf"), "motion": HOSTILE, "termination": HOSTILE,
                "message": "</script>" + HOSTILE, "requested": {HOSTILE: 1}, "command": [HOSTILE],
                "log_columns": ["iteration", "cost", HOSTILE], "log": [[0, 1, 2], [1, 0.5, 3]],
-               "phases": [{"name": HOSTILE, "start_node": 0, "nodes": 10}]}
+               "phases": [{"name": HOSTILE, "start_node": 0, "nodes": 10}],
+               "ground": {"height": -1.2, "friction": 0.6, "steps": [
+                   {"top": [0.5, 0, -1.1], "length": 0.3, "width": 0.6, "yaw": 0.1}]}}
     (directory / "summary.json").write_text(json.dumps(summary))
     check = {"pass": False, "rows": [{"name": HOSTILE, "value": 1, "bound": 2, "unit": HOSTILE, "pass": False,
                                       "note": HOSTILE}]}

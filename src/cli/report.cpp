@@ -1,26 +1,98 @@
-// bielle report DIR...: the page of one or several results.
+// bielle report DIR...: the page of one or several results, and pictures and films of it.
 #include "bielle/report/report.h"
 
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 
+#include "bielle/io/record.h"
+#include "bielle/model/error.h"
 #include "cli/commands.h"
+#include "cli/film.h"
+
+namespace fs = std::filesystem;
 
 namespace bielle::cli {
 namespace {
 
 struct ReportArguments {
   std::vector<std::string> directories;
-  std::string output;
+  std::string output, png, mp4;
+  std::string size = "480x480";
+  double rate = 30;
+  bool ghosts = false;
+  FilmOptions film;
 };
 
+// Duration of the longest motion, s.
+double calcDuration(const std::vector<std::string>& directories) {
+  double end = 0;
+  for (const std::string& directory : directories) {
+    const fs::path archive = fs::path(directory) / "trajectory.npz";
+    const MotionRecord record =
+        readRecord((fs::exists(archive) ? archive : fs::path(directory) / "trajectory.csv").string());
+    end = std::max(end, record.time[record.time.size() - 1]);
+  }
+  return end;
+}
+
+std::vector<double> makeTimes(double end, int count) {
+  std::vector<double> times;
+  for (int i = 0; i < count; ++i) times.push_back(count > 1 ? end * i / (count - 1) : 0);
+  return times;
+}
+
+void readSize(const std::string& text, FilmOptions& film) {
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%dx%d%c", &film.width, &film.height, &rest) != 2 || film.width < 16 ||
+      film.height < 16 || film.width > 8192 || film.height > 8192)
+    throw ModelError("", "--size '" + text + "'", "it is not of the form WIDTHxHEIGHT, from 16 to 8192 pixels",
+                     "e.g. --size 640x480");
+}
+
 int report(const ReportArguments& arguments) {
-  const auto first = std::filesystem::path(arguments.directories.front());
-  const std::string path = arguments.output.empty() ? (first / "report.html").string() : arguments.output;
-  writeReport(path, arguments.directories);
-  std::cout << path << "\n";
+  FilmOptions film = arguments.film;
+  readSize(arguments.size, film);
+  film.side_by_side = !arguments.ghosts;
+  const auto first = fs::path(arguments.directories.front());
+  const std::string page = arguments.output.empty() ? (first / "report.html").string() : arguments.output;
+  writeReport(page, arguments.directories);
+  std::cout << page << "\n";
+  if (!arguments.png.empty()) {
+    if (film.times.empty()) film.times = makeTimes(calcDuration(arguments.directories), 6);
+    writeStrip(page, film, arguments.png);
+    std::cout << arguments.png << "\n";
+  }
+  if (!arguments.mp4.empty()) {
+    const double end = calcDuration(arguments.directories);
+    film.times = makeTimes(end, 1 + static_cast<int>(std::lround(end * arguments.rate)));
+    writeFilm(page, film, arguments.rate, arguments.mp4);
+    std::cout << arguments.mp4 << "\n";
+  }
   return kOk;
+}
+
+void addFilmOptions(CLI::App& command, ReportArguments& arguments) {
+  const std::string layers = " (locks, contactForces, closureForces, com, traces, footprints; with commas)";
+  command.add_option("--png", arguments.png, "also draws still pictures, side by side in this file; needs chromium");
+  command.add_option("--times", arguments.film.times, "of the pictures [s], with commas; default: six over the motion")
+      ->delimiter(',')
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("--columns", arguments.film.columns, "pictures in a row; default: all, at most six")
+      ->check(CLI::Range(1, 100));
+  command.add_option("--mp4", arguments.mp4, "also makes a film in real time; needs chromium and ffmpeg");
+  command.add_option("--rate", arguments.rate, "of the film [1/s]")
+      ->check(CLI::Range(1.0, 240.0))
+      ->capture_default_str();
+  command.add_option("--size", arguments.size, "of one picture, pixels")->capture_default_str();
+  command.add_option("--view", arguments.film.view, "from where")
+      ->check(CLI::IsMember({"oblique", "front", "side", "top"}))
+      ->capture_default_str();
+  command.add_flag("--ghosts", arguments.ghosts, "several robots in one place, not side by side");
+  command.add_flag("--see-through", arguments.film.see_through, "bodies are transparent");
+  command.add_option("--show", arguments.film.show, "layers to show" + layers);
+  command.add_option("--hide", arguments.film.hide, "layers to hide");
 }
 
 }  // namespace
@@ -30,11 +102,14 @@ void addReport(CLI::App& app, Action& action) {
   const auto arguments = std::make_shared<ReportArguments>();
   command.add_option("directories", arguments->directories, "of `bielle solve`; several are compared")->required();
   command.add_option("-o,--output", arguments->output, "the page; default: report.html in the first directory");
+  addFilmOptions(command, *arguments);
   command.footer(
       "The page holds all it needs: open it with a browser, send it to others, no network. Space plays and pauses.\n"
       "Examples:\n"
       "  bielle report squat\n"
-      "  bielle report squat-closed squat-serial -o comparison.html");
+      "  bielle report squat-closed squat-serial -o comparison.html\n"
+      "  bielle report squat --png squat.png --times 0,0.5,1 --view side --show closureForces\n"
+      "  bielle report squat --mp4 squat.mp4 --size 960x720");
   command.callback([&action, arguments] { action = [=] { return report(*arguments); }; });
 }
 

@@ -12,7 +12,7 @@ class Report {
     fillBadges(document.getElementById('badges'), this.runs);
     this.openScene();
     if (this.scene && this.options.film.length) {
-      makeFilm(this.scene, this.camera, this.runs, this.options);
+      new Film(this.scene, this.camera, this.runs, this.options).show();
       return;
     }
     this.fillPanels(json);

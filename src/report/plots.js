@@ -86,7 +86,7 @@ function listPower(run) {
 }
 
 function listFriction(run) {
-  const friction = typeof run.summary.friction === 'number' ? run.summary.friction : run.summary.requested && run.summary.requested.friction;
+  const friction = run.summary.ground && run.summary.ground.friction;
   return listContactSeries(run, (contact, c) => {
     const tangential = normOfColumns(run.contact_wrenches, 6 * c, 2);
     const values = tangential.map((f, k) => (run.contact_wrenches.get(k, 6 * c + 2) > 1 ? f / run.contact_wrenches.get(k, 6 * c + 2) : NaN));

@@ -146,8 +146,8 @@ class RobotView {
   addSteps() {
     const ground = this.run.summary.ground;
     for (const step of (ground && ground.steps) || []) {
-      const [x, y, top] = step.center, [lx, ly, height] = step.size;
-      const geometry = new THREE.BoxBufferGeometry(lx, ly, height);
+      const [x, y, top] = step.top, height = Math.max(1e-3, top - ground.height);
+      const geometry = new THREE.BoxBufferGeometry(step.length, step.width, height);
       const box = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({color: makeColor('#cfd6df'), roughness: 0.9}));
       box.add(new THREE.LineSegments(new THREE.EdgesGeometry(geometry), new THREE.LineBasicMaterial({color: makeColor('#8d99a8')})));
       box.position.set(x, y, top - height / 2);

@@ -49,7 +49,7 @@ function fillSummary(parent, runs) {
     ['centre of mass, lowest', run => units(dig(run.summary, 'com_height', 'lowest_m'), 'm high')],
     ['largest closure gap', run => units(dig(run.summary, 'closure_gap', 'position_m'), 'm')],
     ['largest slip of a foot', run => units(dig(run.summary, 'contact_slip', 'position_m'), 'm')],
-    ['friction coefficient', run => run.summary.friction],
+    ['friction coefficient', run => dig(run.summary, 'ground', 'friction')],
     ['peak torques', run => Object.entries(run.summary.peak_torques || {}).slice(0, 4).map(([name, value]) => name + ' ' + formatNumber(value)).join(', ')]
   ];
   const rows = get.map(([name, read]) => [name, ...runs.map(read)]).filter(row => row.slice(1).some(value => value !== undefined && value !== ''));

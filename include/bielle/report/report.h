@@ -3,7 +3,7 @@
 ///
 /// It replays the robot in three dimensions and plots what happens over time, out of the files that a result leaves in
 /// its directory (result.h): trajectory.npz, else trajectory.csv; summary.json; check.json if it is there. Keys of
-/// summary.json beyond those of a bare run are used when present: `robot_file`, `phases`, `ground`, `friction`. Several
+/// summary.json beyond those of a bare run are used when present: `robot_file`, `phases`, `ground`. Several
 /// directories are compared on one page. Names found in the files are shown as text, whatever characters they hold.
 #include <string>
 #include <vector>

@@ -1,0 +1,145 @@
+#include "cli/film.h"
+
+#include <cctype>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "bielle/model/error.h"
+#include "cli/subprocess.h"
+#include "cli/table.h"
+#include "io/aside_file.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::cli {
+namespace {
+
+class ScratchDirectory {
+ public:
+  ScratchDirectory() {
+    std::string pattern = (fs::temp_directory_path() / "bielle_film_XXXXXX").string();
+    if (!mkdtemp(pattern.data())) failToWrite(pattern, "no scratch directory can be made");
+    path_ = pattern;
+  }
+  ~ScratchDirectory() {
+    std::error_code error;
+    fs::remove_all(path_, error);
+  }
+  ScratchDirectory(const ScratchDirectory&) = delete;
+  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
+  fs::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  fs::path path_;
+};
+
+std::string findBrowser() {
+  for (const char* name : {"chromium", "chromium-browser", "google-chrome"})
+    if (isOnPath(name)) return name;
+  throw ModelError("", "browser", "no Chromium is on the PATH, which draws the pictures",
+                   "install it (Debian: chromium), or open the page with any browser");
+}
+
+// Characters that would mean something in an address, by their codes.
+std::string escapeUrl(const std::string& text) {
+  std::string out;
+  for (unsigned char c : text) {
+    char code[4];
+    std::snprintf(code, sizeof code, "%%%02X", c);
+    out += std::isalnum(c) || std::string("/._-,").find(static_cast<char>(c)) != std::string::npos
+               ? std::string(1, static_cast<char>(c))
+               : code;
+  }
+  return out;
+}
+
+std::string makeAddress(const std::string& page, const FilmOptions& options, bool separate) {
+  std::string times;
+  for (double t : options.times) times += (times.empty() ? "" : ",") + formatNumber(t, "%.4f");
+  std::string address = "file://" + escapeUrl(fs::absolute(page).string()) + "#film=" + times +
+                        "&size=" + std::to_string(options.width) + "x" + std::to_string(options.height) +
+                        "&view=" + escapeUrl(options.view) + "&columns=" + std::to_string(options.columns);
+  if (separate) address += "&separate=1";
+  if (!options.side_by_side) address += "&apart=0";
+  if (options.see_through) address += "&through=1";
+  if (!options.show.empty()) address += "&show=" + escapeUrl(options.show);
+  if (!options.hide.empty()) address += "&hide=" + escapeUrl(options.hide);
+  return address;
+}
+
+std::string decodeBase64(const std::string& text) {
+  static const std::string kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string bytes;
+  unsigned bits = 0;
+  int count = 0;
+  for (char c : text) {
+    const size_t digit = kDigits.find(c);
+    if (digit == std::string::npos) break;
+    bits = (bits << 6 | static_cast<unsigned>(digit)) & 0xffffff;
+    count += 6;
+    if (count < 8) continue;
+    count -= 8;
+    bytes += static_cast<char>(bits >> count & 255);
+  }
+  return bytes;
+}
+
+// The images that the page leaves in its document (film.js), as bytes of their formats.
+std::vector<std::string> takePictures(const std::string& page, const FilmOptions& options, bool separate) {
+  const ScratchDirectory scratch;
+  const double seconds = 60 + 4.0 * static_cast<double>(options.times.size());
+  const SubprocessResult result = runSubprocess(
+      {findBrowser(), "--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader",
+       "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking",
+       "--disable-component-update", "--disable-sync", "--user-data-dir=" + (scratch / "profile").string(),
+       "--timeout=" + std::to_string(static_cast<int>(1000 * seconds)), "--dump-dom",
+       makeAddress(page, options, separate)},
+      seconds);
+  std::vector<std::string> pictures;
+  const std::string mark = ";base64,", begin = "<img class=\"film\" src=\"data:image/";
+  for (size_t at = 0; (at = result.out.find(begin, at)) != std::string::npos;) {
+    at = result.out.find(mark, at) + mark.size();
+    const size_t end = result.out.find('"', at);
+    pictures.push_back(decodeBase64(result.out.substr(at, end - at)));
+  }
+  if (pictures.size() != (separate ? options.times.size() : 1))
+    throw ModelError(page, "pictures", "the browser drew none of them, or not all",
+                     "open the page to see whether the browser offers WebGL; ask for fewer or smaller pictures");
+  return pictures;
+}
+
+}  // namespace
+
+void writeStrip(const std::string& page, const FilmOptions& options, const std::string& path) {
+  AsideFile file(path);
+  file.write(takePictures(page, options, false).front());
+  file.commit();
+}
+
+void writeFilm(const std::string& page, const FilmOptions& options, double rate, const std::string& path) {
+  if (!isOnPath("ffmpeg"))
+    throw ModelError("", "ffmpeg", "it is not on the PATH, and makes films of pictures", "install it (Debian: ffmpeg)");
+  const std::vector<std::string> pictures = takePictures(page, options, true);
+  const ScratchDirectory scratch;
+  for (size_t i = 0; i < pictures.size(); ++i) {
+    char name[32];
+    std::snprintf(name, sizeof name, "%06zu.jpg", i);
+    std::ofstream(scratch / name, std::ios::binary) << pictures[i];
+  }
+  const std::string made = (scratch / "film.mp4").string();
+  const SubprocessResult result = runSubprocess(
+      {"ffmpeg", "-loglevel", "error", "-framerate", formatNumber(rate), "-i", (scratch / "%06d.jpg").string(), "-c:v",
+       "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", made},
+      600);
+  std::error_code error;
+  if (result.status != 0 || fs::file_size(made, error) == 0 || error)
+    throw ModelError(path, "film", "ffmpeg could not make it", "check that it knows libx264; give an even size");
+  std::ifstream film(made, std::ios::binary);
+  AsideFile file(path);
+  file.write({std::istreambuf_iterator<char>(film), std::istreambuf_iterator<char>()});
+  file.commit();
+}
+
+}  // namespace bielle::cli

@@ -1,0 +1,24 @@
+#pragma once
+// Pictures and films of a report's page, taken by a browser without a window.
+#include <string>
+#include <vector>
+
+namespace bielle::cli {
+
+struct FilmOptions {
+  std::vector<double> times;      // s
+  int width = 480, height = 480;  // of one picture
+  int columns = 0;                // of a strip; 0: as it fits
+  std::string view = "oblique";
+  bool side_by_side = true;  // several robots; otherwise in one place
+  bool see_through = false;
+  std::string show, hide;  // layers, separated by commas
+};
+
+// One PNG with a picture per time. \throws ModelError when there is no browser, or it fails
+void writeStrip(const std::string& page, const FilmOptions& options, const std::string& path);
+
+// H.264, `rate` pictures per second of real time. \throws ModelError when there is no browser or no ffmpeg, or one fails
+void writeFilm(const std::string& page, const FilmOptions& options, double rate, const std::string& path);
+
+}  // namespace bielle::cli
