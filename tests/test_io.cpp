@@ -5,11 +5,13 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
+#include "bielle/io/opensim.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
@@ -192,6 +194,44 @@ TEST_CASE("Python reads the NumPy archive and finds the numbers of the CSV") {
   poisoned.contact_wrenches(2, 7) += 1e-9;
   writeNpz(directory / "t.npz", poisoned);
   CHECK(compare() != 0);
+}
+
+TEST_CASE("files of OpenSim have the rows and columns that their header tells, and no empty cell") {
+  const ShortSquat squat;
+  MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
+  record.u_names[0] = "two words\tand more";
+  const auto nodes = static_cast<size_t>(record.time.size());
+  const auto split = [](const std::string& text, char mark) {
+    std::vector<std::string> parts;
+    std::istringstream stream(text);
+    for (std::string part; std::getline(stream, part, mark);) parts.push_back(part);
+    return parts;
+  };
+  for (bool all : {false, true}) {
+    const std::vector<std::string> lines = split(all ? formatSto(record) : formatMot(record), '\n');
+    const size_t columns = 1 + record.q_names.size() +
+                           (all ? 2 * record.v_names.size() + record.u_names.size() + 6 * record.closure_names.size() +
+                                      6 * record.contact_names.size() + 5
+                                : 0);
+    REQUIRE(lines.size() == 7 + nodes);
+    CHECK(lines[2] == "nRows=" + std::to_string(nodes));
+    CHECK(lines[3] == "nColumns=" + std::to_string(columns));
+    CHECK(lines[4] == "inDegrees=no");
+    CHECK(lines[5] == "endheader");
+    const std::vector<std::string> labels = split(lines[6], '\t');
+    REQUIRE(labels.size() == columns);
+    CHECK(labels[0] == "time");
+    for (size_t k = 0; k < nodes; ++k) {
+      const std::vector<std::string> cells = split(lines[7 + k], '\t');
+      REQUIRE(cells.size() == columns);
+      CHECK(std::stod(cells[0]) == record.time[k]);
+      for (size_t i = 1; i <= record.q_names.size(); ++i) CHECK(std::stod(cells[i]) == record.q(k, i - 1));
+      if (!all) continue;
+      const auto motor = std::find(labels.begin(), labels.end(), "u." + record.u_names[1]) - labels.begin();
+      CHECK(labels[motor - 1] == "u.two_words_and_more");
+      CHECK(std::stod(cells[motor]) == record.u(std::min<Eigen::Index>(k, record.u.rows() - 1), 1));
+    }
+  }
 }
 
 TEST_CASE("files that are no trajectories are refused with the file and the place") {

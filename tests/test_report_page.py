@@ -177,6 +177,32 @@ class ReportPage(unittest.TestCase):
         self.assertGreater(text.count(HOSTILE), 8)
         self.assertIn("FAIL", text)
 
+    def test_sliders_keep_loops_closed_or_say_so(self):
+        page = self.root / "view.html"
+        run("view", "bipetto", "-o", page)
+        self.browser.open(page)
+        start = self.browser.evaluate(PICTURE)
+        move = """((index, share) => {
+          const slider = document.querySelectorAll('.motor input')[index], low = Number(slider.min);
+          slider.value = low + share * (slider.max - low);
+          slider.dispatchEvent(new Event('input'));
+          return [report.viewer.getLargestGap(), slider.closest('.card').querySelector('.status').textContent];
+        })"""
+        count = self.browser.evaluate("document.querySelectorAll('.motor input').length")
+        self.assertEqual(count, 12)
+        closed = refused = 0
+        for index in range(count):
+            before = self.browser.evaluate(PICTURE)
+            for share in (0.45, 0.55, 0.3, 0.7, 0, 1):
+                gap, status = self.browser.evaluate(f"{move}({index}, {share})")
+                self.assertLess(gap, 2e-3)  # of the interpolation
+                closed, refused = closed + (status == ""), refused + (status != "")
+            self.assertGreater(differ(before, self.browser.evaluate(PICTURE)), 100, index)
+        self.assertGreater(closed, 48)
+        self.assertGreater(refused, 0)  # the knee's linkage has a dead point
+        self.browser.evaluate("document.querySelector('#sliders > button').click()")
+        self.assertLess(differ(start, self.browser.evaluate(PICTURE)), 200)
+
     def test_complaints_are_heard(self):
         """The instrument itself: what it must catch, it catches."""
         page = self.root / "bad.html"

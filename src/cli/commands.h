@@ -15,6 +15,8 @@ using Action = std::function<int()>;  // returns the exit status
 
 void addSolve(CLI::App& app, Action& action);
 void addReport(CLI::App& app, Action& action);
+void addView(CLI::App& app, Action& action);
+void addExport(CLI::App& app, Action& action);
 void addInfo(CLI::App& app, Action& action);
 void addEval(CLI::App& app, Action& action);
 void addRobots(CLI::App& app, Action& action);

@@ -39,6 +39,8 @@ int main(int argc, char** argv) {
   Action action;
   addSolve(app, action);
   addReport(app, action);
+  addView(app, action);
+  addExport(app, action);
   addInfo(app, action);
   addEval(app, action);
   addRobots(app, action);

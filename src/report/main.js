@@ -15,6 +15,10 @@ class Report {
       new Film(this.scene, this.camera, this.runs, this.options).show();
       return;
     }
+    if (json.view) {
+      this.showRobot(json);
+      return;
+    }
     this.fillPanels(json);
     this.transport = new Transport(this.runs, t => this.setTime(t));
     if (this.scene) this.addViewerControls();
@@ -41,6 +45,25 @@ class Report {
     this.scene.setTime(this.options.time);
     this.camera = new Camera(this.scene, canvas);
     this.camera.controls.addEventListener('change', () => { this.isStale = true; });
+  }
+
+  // A robot with sliders instead of a motion.
+  showRobot(json) {
+    document.body.className = 'view';
+    document.getElementById('title').textContent = this.runs[0].robot.name;
+    document.title = this.runs[0].robot.name + ' – Bielle';
+    if (!this.scene) return;
+    this.addViewerControls();
+    const caption = document.getElementById('caption');
+    const update = () => {
+      this.isStale = true;
+      caption.textContent = this.runs[0].robot.closures.length ? 'largest gap of a loop ' + formatNumber(this.viewer.getLargestGap(), 2) + ' m' : '';
+    };
+    this.viewer = new RobotViewer(this.scene, this.runs[0], json.view, update);
+    this.viewer.addControls(document.getElementById('sliders'));
+    this.viewer.place();
+    const tick = () => { if (this.isStale) this.draw(); requestAnimationFrame(tick); };
+    tick();
   }
 
   isLayer(name) {

@@ -120,7 +120,9 @@ Json describeRobot(const LoadedRobot& robot) {
     closures.push_back({{"name", closure.name},
                         {"kind", getName(closure.kind)},
                         {"body", closure.body1},
-                        {"pose", packPose(closure.X_B1)}});
+                        {"pose", packPose(closure.X_B1)},
+                        {"body2", closure.body2},
+                        {"pose2", packPose(closure.X_B2)}});
   Json json = describeDrawing(robot);
   json.update({{"name", model.name()},
                {"mass", model.mass()},

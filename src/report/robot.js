@@ -32,6 +32,7 @@ class Arrow {
     this.head = new THREE.Mesh(new THREE.ConeBufferGeometry(2.4 * radius, 6 * radius, 16).rotateX(Math.PI / 2), material);
     this.headLength = 6 * radius;
     this.object.add(this.shaft, this.head);
+    this.object.visible = false;
   }
 
   // A vector in the frame of the arrow's parent, from a point of it.
@@ -180,6 +181,7 @@ class RobotView {
       const arrow = new Arrow('#2f9e44', 0.006 * this.size);
       const centre = new THREE.Mesh(new THREE.SphereBufferGeometry(0.011 * this.size, 16, 12), new THREE.MeshBasicMaterial({color: makeColor('#2b8a3e')}));
       layer.add(arrow.object, centre);
+      centre.visible = false;
       return {arrow, centre};
     });
     this.footprints = this.run.footprints.map(print => {

@@ -1,0 +1,54 @@
+// bielle export DIR: a trajectory in the format of another program.
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "bielle/io/opensim.h"
+#include "cli/commands.h"
+#include "io/aside_file.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::cli {
+namespace {
+
+struct ExportArguments {
+  std::string directory, format = "sto", output;
+};
+
+int exportTrajectory(const ExportArguments& arguments) {
+  const fs::path place = arguments.directory;
+  const MotionRecord record = readRecord((place / "trajectory.npz").string());
+  const fs::path path =
+      arguments.output.empty() ? place / ("trajectory." + arguments.format) : fs::path(arguments.output);
+  AsideFile file(path.string());
+  file.write(arguments.format == "mot" ? formatMot(record) : formatSto(record));
+  file.commit();
+  std::cout << path.string() << "\n";
+  return kOk;
+}
+
+}  // namespace
+
+void addExport(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("export", "Write a trajectory in the format of another program");
+  const auto arguments = std::make_shared<ExportArguments>();
+  command.add_option("directory", arguments->directory, "of `bielle solve`")->required();
+  command
+      .add_option("--format", arguments->format,
+                  "mot: coordinates over time (OpenSim); sto: everything over time (OpenSim)")
+      ->check(CLI::IsMember({"mot", "sto"}))
+      ->capture_default_str();
+  command.add_option("-o,--output", arguments->output, "the file; default: trajectory.FORMAT in the directory");
+  command.footer(
+      "SI units, radians. Without export: trajectory.csv has one named column per quantity and a column 'time', as\n"
+      "PlotJuggler and spreadsheets read it; trajectory.npz holds arrays q and v with Pinocchio's frames and orders "
+      "within\n"
+      "a joint, and q_names and v_names to sort the joints by.\n"
+      "Examples:\n"
+      "  bielle export squat --format mot\n"
+      "  bielle export squat --format sto -o squat.sto");
+  command.callback([&action, arguments] { action = [=] { return exportTrajectory(*arguments); }; });
+}
+
+}  // namespace bielle::cli

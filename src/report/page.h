@@ -1,0 +1,9 @@
+#pragma once
+// The page around the data that its scripts draw.
+#include "io/json_text.h"
+
+namespace bielle {
+
+std::string makePage(const Json& data);
+
+}  // namespace bielle

@@ -1,0 +1,142 @@
+'use strict';
+// A robot with a slider for each motor. Closed configurations come as grids of samples; between them is interpolated.
+
+const LIMIT_TEXT = 'the linkage does not close there';
+
+// Closed configurations over the motors of one group: {motors: [{motor, low, high, start}], count, bodies, closed, poses}.
+class Grid {
+  constructor(json) {
+    Object.assign(this, json);
+    this.poses = new Table(json.poses);
+    this.values = this.motors.map(motor => motor.start);
+  }
+
+  // The corners of the cell around the values and their weights: [{node, weight}].
+  listCorners(values) {
+    let corners = [{node: 0, weight: 1}], stride = 1;
+    this.motors.forEach((motor, i) => {
+      const place = (values[i] - motor.low) / (motor.high - motor.low) * (this.count - 1);
+      const cell = Math.min(this.count - 2, Math.max(0, Math.floor(place))), share = Math.min(1, Math.max(0, place - cell));
+      const next = [];
+      for (const {node, weight} of corners)
+        for (const [step, part] of [[cell, 1 - share], [cell + 1, share]])
+          if (part > 1e-9) next.push({node: node + step * stride, weight: weight * part});
+      corners = next;
+      stride *= this.count;
+    });
+    return corners;
+  }
+
+  // Whether the loops close all around the values.
+  isClosed(values) {
+    return this.listCorners(values).every(({node}) => this.closed[node]);
+  }
+
+  // Placement of a body in its parent, averaged over the corners.
+  calcPose(corners, b) {
+    const out = [0, 0, 0, 0, 0, 0, 0];
+    const first = 7 * b + corners[0].node * this.poses.cols;
+    for (const {node, weight} of corners) {
+      const at = node * this.poses.cols + 7 * b, d = this.poses.data;
+      const dot = [3, 4, 5, 6].reduce((sum, j) => sum + d[first + j] * d[at + j], 0);
+      for (let j = 0; j < 7; ++j) out[j] += weight * (j >= 3 && dot < 0 ? -d[at + j] : d[at + j]);
+    }
+    return out;
+  }
+}
+
+class RobotViewer {
+  constructor(scene, run, view, onChange) {
+    Object.assign(this, {scene, run, onChange, parents: view.parents});
+    this.grids = view.groups.map(group => new Grid(group));
+    this.local = this.parents.map((parent, body) => this.readLocal(body));
+    this.status = [];
+  }
+
+  // Placements of bodies in the world, one after the other, to those in their parents.
+  readWorld(body) {
+    const d = this.run.placements.data, at = 7 * body;
+    const quaternion = new THREE.Quaternion(d[at + 3], d[at + 4], d[at + 5], d[at + 6]).normalize();
+    return new THREE.Matrix4().compose(new THREE.Vector3(d[at], d[at + 1], d[at + 2]), quaternion, new THREE.Vector3(1, 1, 1));
+  }
+
+  readLocal(body) {
+    const world = this.readWorld(body);
+    return body === 0 ? world : new THREE.Matrix4().getInverse(this.readWorld(this.parents[body])).multiply(world);
+  }
+
+  // Tries new values for a grid; they stay as they were when the loops do not close.
+  setValues(index, values) {
+    const grid = this.grids[index], closes = grid.isClosed(values);
+    if (closes) {
+      grid.values = values;
+      const corners = grid.listCorners(values), scratch = new THREE.Object3D();
+      grid.bodies.forEach((body, b) => {
+        setPose(scratch, grid.calcPose(corners, b));
+        scratch.quaternion.normalize();
+        scratch.updateMatrix();
+        this.local[body].copy(scratch.matrix);
+      });
+      this.place();
+    }
+    return closes;
+  }
+
+  // Bodies and gaps of closures from the placements in the parents.
+  place() {
+    const d = this.run.placements.data, worlds = [];
+    const position = new THREE.Vector3(), quaternion = new THREE.Quaternion(), scale = new THREE.Vector3();
+    this.local.forEach((local, body) => {
+      worlds.push(body === 0 ? local.clone() : worlds[this.parents[body]].clone().multiply(local));
+      worlds[body].decompose(position, quaternion, scale);
+      [position.x, position.y, position.z, quaternion.x, quaternion.y, quaternion.z, quaternion.w].forEach((x, j) => { d[7 * body + j] = x; });
+    });
+    this.run.robot.closures.forEach((closure, c) => {
+      const ends = [[closure.body, closure.pose], [closure.body2, closure.pose2]].map(
+          ([body, pose]) => new THREE.Vector3(pose[0], pose[1], pose[2]).applyMatrix4(worlds[body]));
+      this.run.gaps.data[2 * c] = ends[0].distanceTo(ends[1]);
+    });
+    this.scene.setTime(0);
+    this.onChange();
+  }
+
+  getLargestGap() {
+    return this.run.robot.closures.reduce((gap, closure, c) => Math.max(gap, this.run.gaps.get(0, 2 * c)), 0);
+  }
+
+  addControls(parent) {
+    const robot = this.run.robot;
+    this.sliders = [];
+    this.grids.forEach((grid, g) => {
+      const card = addElement(parent, 'div', 'card motors');
+      const sliders = grid.motors.map(entry => this.addSlider(card, robot.motors[entry.motor].name, entry));
+      const status = addElement(card, 'p', 'status', '');
+      const change = () => {
+        const closes = this.setValues(g, sliders.map(slider => Number(slider.value)));
+        status.textContent = closes ? '' : LIMIT_TEXT + '; the last closed posture is shown';
+        status.className = closes ? 'status' : 'status fail';
+      };
+      sliders.forEach(slider => slider.addEventListener('input', change));
+      this.sliders.push({sliders, change});
+    });
+    const missing = robot.motors.filter((motor, m) => !this.grids.some(grid => grid.motors.some(entry => entry.motor === m)));
+    if (missing.length) addElement(parent, 'p', 'status', 'No slider, for their loops have too many motors: ' + missing.map(motor => motor.name).join(', '));
+    const reset = addElement(parent, 'button', '', 'back to the start');
+    reset.onclick = () => this.grids.forEach((grid, g) => {
+      grid.motors.forEach((entry, i) => { this.sliders[g].sliders[i].value = entry.start; this.sliders[g].sliders[i].show(); });
+      this.sliders[g].change();
+    });
+  }
+
+  addSlider(card, name, entry) {
+    const row = addElement(card, 'label', 'motor');
+    addElement(row, 'span', 'name', name);
+    const slider = addElement(row, 'input');
+    Object.assign(slider, {type: 'range', min: entry.low, max: entry.high, step: 'any', value: entry.start});
+    const value = addElement(row, 'output');
+    slider.show = () => { value.textContent = Number(slider.value).toFixed(3); };
+    slider.addEventListener('input', slider.show);
+    slider.show();
+    return slider;
+  }
+}
