@@ -9,7 +9,7 @@ class Report {
     this.options = readFragment();
     document.title = makeTitle(this.runs) + ' – Bielle';
     document.getElementById('title').textContent = makeTitle(this.runs);
-    fillBadges(document.getElementById('badges'), this.runs);
+    if (!json.view) fillBadges(document.getElementById('badges'), this.runs);
     this.openScene();
     if (this.scene && this.options.film.length) {
       new Film(this.scene, this.camera, this.runs, this.options).show();
@@ -53,7 +53,8 @@ class Report {
     document.getElementById('title').textContent = this.runs[0].robot.name;
     document.title = this.runs[0].robot.name + ' – Bielle';
     if (!this.scene) return;
-    this.addViewerControls();
+    for (const [layer] of LAYERS) this.scene.setLayer(layer, layer === 'locks');
+    this.addViewerControls(['locks']);
     const caption = document.getElementById('caption');
     const update = () => {
       this.isStale = true;
@@ -81,7 +82,7 @@ class Report {
         'drag the robot to turn it, with the right button to move it. Space plays, arrows step.';
   }
 
-  addViewerControls() {
+  addViewerControls(layers = LAYERS.map(([layer]) => layer)) {
     const views = document.getElementById('views');
     for (const name of Object.keys(VIEWS)) addElement(views, 'button', '', name).onclick = () => this.camera.setView(name);
     const toggle = (text, on, action) => {
@@ -93,7 +94,7 @@ class Report {
     };
     const {show, hide} = this.options;
     for (const [layer, text, visible] of LAYERS)
-      if (this.scene.robots.some(robot => robot.layers[layer].length))
+      if (layers.includes(layer) && this.scene.robots.some(robot => robot.layers[layer].length))
         toggle(text, (visible || show.includes(layer)) && !hide.includes(layer), on => this.scene.setLayer(layer, on));
     toggle('see through', this.options.seeThrough, on => this.scene.setSeeThrough(on));
     toggle('follow', true, on => { this.camera.following = on; });
