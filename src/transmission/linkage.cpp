@@ -153,7 +153,7 @@ bool calcLinkageRatio(const Linkage& linkage, BlockPoint& point, LinkageRatio& o
     }
     point.selectIndependent(gamma, independent);
     point.solveGram(independent);
-    VectorXd a = -(basis.JW.transpose() * independent);
+    VectorXd a = -(block.inverse_metric.asDiagonal() * (basis.J.transpose() * independent));
     a -= T * selectRowsOf(a, linkage.joint_dofs);
     return VectorXd(selectRowsOf(a, linkage.motor_dofs));
   };
