@@ -148,6 +148,12 @@ TEST_CASE("walk: Bipetto walks as fast as asked, on its feet") {
   }
 }
 
+TEST_CASE("walk: the full formulation walks alike") {
+  const Solved full = solve(makeWalk(getBipetto(), {}, Formulation::Full));
+  checkSteps(full);
+  CHECK(calcSpeed(full.measures).x() == Approx(0.5).epsilon(0.05));
+}
+
 TEST_CASE("side walk and turns: where they were asked to go") {
   SideWalkOptions side;
   side.speed = -0.4;

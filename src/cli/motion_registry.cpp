@@ -1,6 +1,7 @@
 #include "cli/motion_registry.h"
 
 #include "bielle/motion/squat.h"
+#include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
 
 namespace bielle::cli {
@@ -53,6 +54,11 @@ const std::vector<MotionEntry>& getMotions() {
        "bielle solve turn --robot bipetto --angle 1.57 --radius 0.5 -o turn",
        {"angle", "radius", "steps", "single_support", "double_support", "swing_height"},
        makeRequests<TurnOptions>(makeTurn)},
+      {"stairs",
+       "up or down stairs, one foot per step",
+       "bielle solve stairs --robot bipetto --height 0.06 --stairs 4 -o stairs",
+       {"height", "depth", "stairs", "speed", "width", "double_support", "swing_height"},
+       makeRequests<StairsOptions>(makeStairs, {{"paper", kPaper, setPaperWeights}})},
   };
   return motions;
 }

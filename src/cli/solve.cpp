@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "bielle/io/result.h"
+#include "bielle/io/warm_start.h"
 #include "bielle/model/error.h"
 #include "bielle/report/report.h"
 #include "cli/commands.h"
@@ -24,6 +25,7 @@ struct SolveArguments {
   Formulation formulation = Formulation::Reduced;
   std::vector<std::string> settings;  // name=value
   FddpOptions solver;
+  std::string warm_start;  // directory of a result, or empty
   bool quiet = false, no_report = false;
 };
 
@@ -102,6 +104,7 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
       throw ModelError("", "option '" + option.name + "'", "it is not finite", "give a number");
   const LoadedRobot robot = arguments.robot.load();
   Motion motion = request.make(robot.model, arguments.formulation);
+  if (!arguments.warm_start.empty()) setGuess(readResultRecord(arguments.warm_start), motion);
   makeOutputDirectory(arguments.directory);
 
   watchSignals();
@@ -178,6 +181,8 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   sub.add_option("--threads", arguments->solver.threads, "0: all; results do not depend on it")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
+  sub.add_option("--warm-start", arguments->warm_start,
+                 "directory of another result of this robot to start from, resampled if its length differs");
   sub.add_flag("--quiet", arguments->quiet, "no line per iteration");
   sub.add_flag("--no-report", arguments->no_report, "no report.html");
   sub.footer(

@@ -80,10 +80,13 @@ VectorXd makeWeights(const Model& model, const LocomotionOptions& o) {
   return weights;
 }
 
+// With kd = 1 / h, an Euler step leaves nothing of a velocity, and (1 - kp h^2) e of a displacement e.
+double limitKp(double kp, double h) { return std::min(kp, 0.5 / (h * h)); }
+double limitKd(double kd, double h) { return std::min(kd, 1 / h); }
+
 std::vector<ContactTarget> makeTargets(const Scene& scene, const GaitPhase& phase) {
-  // With kd = 1 / h, an Euler step turns a contact velocity e into nothing, and a displacement e into (1 - kp h^2) e.
   const LocomotionOptions& o = scene.options;
-  const double h = o.timing.time_step, kp = std::min(o.contact_kp, 0.5 / (h * h)), kd = std::min(o.contact_kd, 1 / h);
+  const double h = o.timing.time_step, kp = limitKp(o.contact_kp, h), kd = limitKd(o.contact_kd, h);
   const auto feet = scene.task.plan.getStance(phase.steps_done);
   std::vector<ContactTarget> targets;
   for (Side side : {Side::Left, Side::Right}) {
@@ -185,6 +188,10 @@ StageSpec makeStage(const Scene& scene, const GaitNode& node, const std::vector<
   const GaitPhase& phase = scene.gait.phases[node.phase];
   StageSpec stage = makeRegularizedStage(scene, node);
   stage.constraints = makeConstraintSet(scene.model, contacts);
+  for (int c = 0; c < stage.constraints.num_loops; ++c) {
+    stage.constraints.closures[c].kp = limitKp(o.closure_kp, stage.dt);
+    stage.constraints.closures[c].kd = limitKd(o.closure_kd, stage.dt);
+  }
   addComCosts(scene, node, stage);
   addForceCosts(scene, node, stage);
   if (phase.swings) addSwingCosts(scene, node, scene.task.plan.steps[phase.steps_done], stage);
@@ -259,7 +266,9 @@ std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
       {"terminal_weight", &o.terminal_weight, "1", "end at rest, in place"},
       {"contact_kp", &o.contact_kp, "1/s^2",
        "stabilisation of the contacts, position (limited to 1/(2 h^2), h the time step)"},
-      {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"}};
+      {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"},
+      {"closure_kp", &o.closure_kp, "1/s^2", "stabilisation of the closures, position (full formulation)"},
+      {"closure_kd", &o.closure_kd, "1/s", "stabilisation of the closures, velocity (full formulation)"}};
 }
 
 void setPaperWeights(LocomotionOptions& o) {
@@ -285,6 +294,7 @@ void setPaperWeights(LocomotionOptions& o) {
   o.terminal_weight = 1e4;
   o.contact_kp = 0;
   o.contact_kd = 100;
+  o.closure_kp = o.closure_kd = 0;
 }
 
 Stance makeStance(const Model& model, const LocomotionOptions& options) {

@@ -44,6 +44,8 @@ struct LocomotionOptions {
   double terminal_weight = 1e3;          ///< of the final velocities, and of the final place of the CoM
   double contact_kp = 1e4;  ///< stabilisation of the contacts, 1/s^2; limited to 1/(2 h^2), h the time step
   double contact_kd = 100;  ///< 1/s; limited to 1/h
+  double closure_kp = 1e4;  ///< stabilisation of the closures, limited like that of the contacts; it matters in the
+  double closure_kd = 100;  ///< full formulation alone
 
   std::string left = "foot_left", right = "foot_right";  ///< contact frames
 };

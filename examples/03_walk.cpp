@@ -1,0 +1,97 @@
+/// \file Bipetto walks: footholds first, then everything else.
+///
+/// A command of v m/s, with steps of duration T, moves the middle of the feet by v T per step, which gives the foothold of
+/// every step. Carried by one foot at p, a mass that stays at height z over it moves like a pendulum upside down,
+///     c'' = g / z (c - p),                                                                                     (1)
+/// unstable: of all its motions, only one stays near a given sequence of p. gait.h finds it by a tridiagonal system. The
+/// robot is no such pendulum, its legs swing and have masses; so (1) is a wish, and the dynamics with 6 closed loops decide:
+///     min over u   sum_k h l_k(x_k, u_k, lambda_k) + l_N(x_N)    s.t.   x_{k+1} = f_k(x_k, u_k),               (2)
+/// where f_k has the foot on the ground that the schedule of stage k says, and l_k asks the centre of mass to follow (1),
+/// the swing foot to follow its path, stance feet to carry their share in the middle of their soles, and the torso to
+/// stay upright. We solve (2), and compare speed, footholds and the path of the centre of mass with what was asked.
+///
+/// Usage: 03_walk [DIRECTORY [SPEED [STEPS]]]   writes trajectory.csv, trajectory.npz and summary.json
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <iostream>
+
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/io/result.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/walk.h"
+
+using namespace bielle;
+
+namespace {
+
+// Where each foot stands, phase by phase, and how far that is from its foothold.
+double printFootholds(const Motion& motion, const ShootingTrajectory& trajectory) {
+  const Model& model = motion.problem->model();
+  Workspace ws(model);
+  std::printf("\n%7s  %-14s %-10s %9s %9s %13s\n", "t [s]", "phase", "foot", "x [m]", "y [m]", "off by [mm]");
+  double worst = 0;
+  int k = 0;
+  for (const ContactPhase& phase : motion.schedule.phases) {
+    updatePositions(model, ws, trajectory.xs[k].head(model.nq()));
+    for (const ContactTarget& target : phase.contacts) {
+      const ContactFrame& foot = model.contacts()[target.contact];
+      const Vector3d p = getPlacement(ws, foot.body, foot.X_BF).p;
+      const double error = (p - target.X_WT.p).norm();
+      std::printf("%7.3f  %-14s %-10s %9.4f %9.4f %13.3f\n", k * motion.schedule.dt, phase.name.c_str(),
+                  foot.name.c_str(), p.x(), p.y(), 1e3 * error);
+      worst = std::max(worst, error);
+    }
+    k += phase.nodes;
+  }
+  return worst;
+}
+
+// Mean velocity of the centre of mass between the ends of two steps, counted from the first one.
+double calcSpeed(const Motion& motion, const MotionRecord& record, int first, int last) {
+  int k = 0, step = 0, from = 0, to = 0;
+  for (const ContactPhase& phase : motion.schedule.phases) {
+    if (k > 0 && phase.contacts.size() == 2) {
+      if (step == first) from = k;
+      if (step == last) to = k;
+      ++step;
+    }
+    k += phase.nodes;
+  }
+  return (record.com(to, 0) - record.com(from, 0)) / (record.time[to] - record.time[from]);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string directory = argc > 1 ? argv[1] : "walk";
+  WalkOptions options;
+  if (argc > 2) options.speed = std::atof(argv[2]);
+  if (argc > 3) options.steps = std::atof(argv[3]);
+
+  const LoadedRobot robot = loadRobot("bipetto");
+  Motion motion = makeWalk(robot.model, options);
+  std::printf("%d stages, %zu phases, steps of %.3f m every %.3f s\n", motion.problem->numStages(),
+              motion.schedule.phases.size(), options.speed * options.gait.timing.stepDuration(),
+              options.gait.timing.stepDuration());
+
+  FddpObserver observer;
+  observer.callback = [](const FddpIteration& line) {
+    printFddpIteration(std::cout, line);
+    return FddpAction::Continue;
+  };
+  printFddpHeader(std::cout);
+  ShootingTrajectory trajectory = motion.guess;
+  const FddpSummary summary = Fddp().solve(*motion.problem, trajectory, observer);
+  const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, trajectory, summary);
+
+  const double worst = printFootholds(motion, trajectory);
+  const int steps = static_cast<int>(options.steps);
+  if (steps >= 5)  // the first two and the last two are not steady
+    std::printf("\n%.4f m/s asked, %.4f m/s walked\n", options.speed, calcSpeed(motion, result.record, 1, steps - 3));
+  std::printf("%s after %d iterations and %.2f s, feet within %.2f mm of their footholds, slip %.2f mm\n",
+              getName(summary.termination), summary.iterations, summary.seconds, 1e3 * worst,
+              1e3 * result.slip_position);
+  for (const std::string& path : writeResult(directory, result)) std::printf("%s\n", path.c_str());
+  return result.converged() ? 0 : 1;
+}

@@ -1,0 +1,35 @@
+#pragma once
+/// \file Climbing and going down stairs, one foot per step.
+///
+/// Step i is a box whose top is i times the height over (or under) the ground that the robot starts from; its middle is
+/// i times the depth ahead of the starting feet. Foot i lands on the middle of step i, the last foot joins it on the top
+/// one, which is long enough to stand on.
+#include "bielle/motion/locomotion.h"
+
+namespace bielle {
+
+struct StairsOptions {
+  double height = 0.06;  ///< of a step; negative: down, m
+  double depth = 0.2;    ///< of a step, m
+  double stairs = 4;     ///< number of steps of the stairs
+  double speed = 0.3;    ///< forward velocity of the CoM, which with the depth gives the duration of a step, m/s
+  double width = 0.8;    ///< of the stairs, m
+  LocomotionOptions gait = makeGaitDefaults();
+
+  static LocomotionOptions makeGaitDefaults();
+};
+
+/// The duration of single support is not among them: it follows from depth and speed.
+std::vector<OptionEntry> listOptions(StairsOptions& options);
+
+/// Weights and durations of the paper's stairs.
+void setPaperWeights(StairsOptions& options);
+
+/// The stairs in front of feet that start with the middle of their soles at x = `start`.
+Ground makeStairsGround(const StairsOptions& options, const Vector3d& start);
+
+/// \throws ModelError when the request is impossible (see locomotion.h)
+Motion makeStairs(const Model& model, const StairsOptions& options = {},
+                  Formulation formulation = Formulation::Reduced);
+
+}  // namespace bielle

@@ -1,0 +1,55 @@
+#include "bielle/io/warm_start.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include "bielle/io/names.h"
+#include "bielle/model/error.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle {
+namespace {
+
+// Row of `rows` at the place of row i of `count`.
+int matchRow(int i, int count, Eigen::Index rows) {
+  if (count <= 1) return 0;
+  return static_cast<int>(std::lround(static_cast<double>(i) * static_cast<double>(rows - 1) / (count - 1)));
+}
+
+void requireSame(const std::vector<std::string>& recorded, const std::vector<std::string>& names, const char* what) {
+  if (recorded != names)
+    throw ModelError("", "warm start", std::string("the recorded motion has other ") + what + " than the robot",
+                     "give a result of the same robot");
+}
+
+}  // namespace
+
+void setGuess(const MotionRecord& record, Motion& motion) {
+  const Model& model = motion.problem->model();
+  requireSame(record.q_names, makePositionNames(model), "coordinates");
+  requireSame(record.v_names, makeVelocityNames(model), "velocities");
+  requireSame(record.u_names, getNames(model.motors()), "motors");
+  if (record.q.rows() < 2 || record.u.rows() < 1 || !record.q.allFinite() || !record.v.allFinite() ||
+      !record.u.allFinite())
+    throw ModelError("", "warm start", "the recorded motion is empty or has numbers that are not finite",
+                     "give the result of a solve that went through");
+  const int nodes = motion.problem->numStages() + 1;
+  for (int k = 0; k < nodes; ++k) {
+    const int row = matchRow(k, nodes, record.q.rows());
+    motion.guess.xs[k] << record.q.row(row).transpose(), record.v.row(row).transpose();
+    if (k + 1 < nodes) motion.guess.us[k] = record.u.row(matchRow(k, nodes - 1, record.u.rows())).transpose();
+  }
+}
+
+MotionRecord readResultRecord(const std::string& directory) {
+  for (const char* name : {"trajectory.npz", "trajectory.csv"}) {
+    const fs::path path = fs::path(directory) / name;
+    std::error_code error;
+    if (fs::exists(path, error)) return readRecord(path.string());
+  }
+  throw ModelError(directory, "directory", "there is neither trajectory.npz nor trajectory.csv in it",
+                   "give the output directory of a solve");
+}
+
+}  // namespace bielle

@@ -1,0 +1,112 @@
+#include "bielle/motion/stairs.h"
+
+#include <cmath>
+
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+void require(bool ok, const std::string& option, const std::string& problem, const std::string& remedy) {
+  if (!ok) throw ModelError("", "option '" + option + "'", problem, remedy);
+}
+
+int check(const Model& model, const Stance& stance, const StairsOptions& o) {
+  const ContactFrame& foot = model.contacts()[stance.contacts[0]];
+  require(std::isfinite(o.height), "height", "it is not finite", "give metres, e.g. 0.06, or -0.06 to go down");
+  require(o.depth > 2 * foot.half_length, "depth", "the sole is longer than a step", "give metres, e.g. 0.2");
+  require(o.stairs >= 1 && o.stairs <= 100 && o.stairs == std::floor(o.stairs), "stairs",
+          "it is not a whole number from 1 to 100", "give a number of steps");
+  require(o.speed > 0, "speed", "it is not positive", "give m/s, e.g. 0.3");
+  require(o.width > stance.feet[0].p.y() - stance.feet[1].p.y() + 2 * foot.half_width, "width",
+          "the feet do not fit on the stairs", "give metres, e.g. 0.8");
+  const double single = o.depth / o.speed - o.gait.timing.both;
+  require(single >= 0.2 && single <= 3, "speed",
+          "a step of this depth would be " + std::to_string(single) + " s on one foot, outside 0.2 .. 3 s",
+          "change speed, depth or double_support");
+  return static_cast<int>(o.stairs);
+}
+
+// Foot i on step i; both end on the last one.
+FootstepPlan planStairs(const Stance& stance, const StairsOptions& o, int stairs) {
+  FootstepPlan plan{stance.feet, {}};
+  Side side = Side::Right;
+  for (int i = 1; i <= stairs + 1; ++i, side = getOther(side)) {
+    SE3 X = stance.feet[static_cast<int>(side)];
+    X.p += std::min(i, stairs) * Vector3d(o.depth, 0, o.height);
+    plan.steps.push_back({side, X});
+  }
+  return plan;
+}
+
+}  // namespace
+
+LocomotionOptions StairsOptions::makeGaitDefaults() {
+  LocomotionOptions gait;
+  gait.timing.both = 0.09;
+  gait.swing.height = 0.03;
+  gait.swing.leave = 0.1;
+  gait.swing.arrive = 0.9;
+  gait.com_height_weight = 1e3;
+  return gait;
+}
+
+std::vector<OptionEntry> listOptions(StairsOptions& o) {
+  std::vector<OptionEntry> entries = {
+      {"height", &o.height, "m", "of a step; negative: down"},
+      {"depth", &o.depth, "m", "of a step"},
+      {"stairs", &o.stairs, "1", "number of steps of the stairs"},
+      {"speed", &o.speed, "m/s", "forward velocity; with the depth it gives the duration of a step"},
+      {"width", &o.width, "m", "of the stairs"}};
+  for (OptionEntry& entry : listOptions(o.gait))
+    if (entry.name != "single_support") entries.push_back(std::move(entry));
+  return entries;
+}
+
+void setPaperWeights(StairsOptions& o) {
+  setPaperWeights(o.gait);
+  o.gait.timing.start = 0.1;
+  o.gait.timing.both = 0.105;
+  o.gait.timing.end = 0.5;
+  o.gait.state_weight = 0.05;
+  o.gait.control_weight = 0.002;
+  o.gait.com_height_weight = 0;
+  o.gait.com_velocity_weight = 1e3;
+  o.gait.pressure_weight = 1;
+  o.gait.feet_distance_weight = 0;
+  o.gait.fly_high_weight = 50;
+}
+
+Ground makeStairsGround(const StairsOptions& o, const Vector3d& start) {
+  constexpr double kLanding = 1;  // length of the level part behind the robot, or at the end, m
+  const int stairs = static_cast<int>(o.stairs);
+  Ground ground;
+  ground.height = std::min(0.0, stairs * o.height);
+  const auto add = [&](double from, double to, double z) {
+    ground.steps.push_back({Vector3d((from + to) / 2, start.y(), z), to - from, o.width, 0});
+  };
+  const double edge = start.x() + o.depth / 2;
+  if (o.height < 0) add(start.x() - kLanding, edge, 0);
+  for (int i = 1; i <= stairs; ++i) {
+    const double from = edge + (i - 1) * o.depth;
+    add(from, i < stairs ? from + o.depth : from + kLanding, i * o.height);
+  }
+  return ground;
+}
+
+Motion makeStairs(const Model& model, const StairsOptions& options, Formulation formulation) {
+  StairsOptions o = options;
+  const Stance stance = makeStance(model, o.gait);
+  const int stairs = check(model, stance, o);
+  o.gait.timing.single = o.depth / o.speed - o.gait.timing.both;
+  LocomotionTask task;
+  task.name = "stairs";
+  task.plan = planStairs(stance, o, stairs);
+  task.ground = makeStairsGround(o, calcMiddle(stance.feet[0], stance.feet[1]).p);
+  task.com_velocity = Vector3d(o.speed, 0, 0);
+  Motion motion = makeLocomotion(model, stance, task, o.gait, formulation);
+  for (const OptionEntry& entry : listOptions(o)) motion.requested.emplace_back(entry.name, *entry.value);
+  return motion;
+}
+
+}  // namespace bielle

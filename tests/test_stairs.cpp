@@ -1,0 +1,93 @@
+// Stairs: the feet land on the steps and stay over them, up and down.
+#include <catch2/catch.hpp>
+
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/stairs.h"
+#include "measure_steps.h"
+
+using namespace bielle;
+
+namespace {
+
+const Model& getBipetto() {
+  static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
+  return robot.model;
+}
+
+}  // namespace
+
+TEST_CASE("stairs: Bipetto goes up and down, every foot on its step") {
+  for (double height : {0.06, -0.06}) {
+    CAPTURE(height);
+    StairsOptions options;
+    options.height = height;
+    options.stairs = 3;
+    Motion motion = makeStairs(getBipetto(), options);
+    for (const ContactPhase& phase : motion.schedule.phases)
+      for (const ContactTarget& foot : phase.contacts)
+        CHECK(motion.ground.calcHeight(foot.X_WT.p.x(), foot.X_WT.p.y()) == Approx(foot.X_WT.p.z()).margin(1e-9));
+    FddpOptions solver;
+    solver.max_iterations = 100;
+    const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
+    CAPTURE(summary.message, summary.iterations);
+    CHECK(summary.termination == FddpTermination::Converged);
+    const StepMeasures m = StepMeter(motion, motion.guess).measure();
+    CHECK(m.end.x() - m.start.x() == Approx(3 * options.depth).margin(0.01));
+    CHECK(m.end.z() - m.start.z() == Approx(3 * height).margin(0.01));
+    CHECK(m.slip < 1e-3);
+    CHECK(m.penetration < 1e-3);
+    CHECK(m.lowest > -1e-3);
+    CHECK(m.clearance > 0.01);
+    CHECK(m.foothold < 2e-3);
+    CHECK(m.touchdown < 0.2);
+    CHECK(m.pressure < 1);
+    CHECK(m.friction < 0.7);
+    CHECK(m.load > 5);
+    CHECK(m.tilt < 0.15);
+    CHECK(m.bend > 0.3);
+    CHECK(m.velocity_jump < 5);
+    CHECK(m.feet > 0.05);
+  }
+}
+
+TEST_CASE("stairs: the ground is where it was asked for") {
+  StairsOptions options;
+  options.height = 0.05;
+  options.depth = 0.2;
+  options.stairs = 3;
+  const Ground up = makeStairsGround(options, Vector3d(1, 0, 0));
+  CHECK(up.calcHeight(1, 0) == 0);
+  CHECK(up.calcHeight(1.09, 0) == 0);
+  CHECK(up.calcHeight(1.11, 0) == Approx(0.05));
+  CHECK(up.calcHeight(1.4, 0.3) == Approx(0.1));
+  CHECK(up.calcHeight(1.4, 0.5) == 0);
+  CHECK(up.calcHeight(1.9, 0) == Approx(0.15));
+  options.height = -0.05;
+  const Ground down = makeStairsGround(options, Vector3d(1, 0, 0));
+  CHECK(down.calcHeight(1, 0) == Approx(0).margin(1e-12));
+  CHECK(down.calcHeight(1.2, 0) == Approx(-0.05));
+  CHECK(down.calcHeight(1.9, 0) == Approx(-0.15));
+}
+
+TEST_CASE("stairs: what cannot be done is refused by name") {
+  const auto make = [](const std::string& option, double value) {
+    StairsOptions options;
+    setOption(listOptions(options), option, value);
+    return makeStairs(getBipetto(), options);
+  };
+  for (const auto& [option, value, word] :
+       std::vector<std::tuple<std::string, double, std::string>>{{"height", 0.6, "reach"},
+                                                                 {"height", -0.6, "reach"},
+                                                                 {"depth", 0.08, "depth"},
+                                                                 {"depth", 1.2, "speed"},
+                                                                 {"stairs", 2.5, "stairs"},
+                                                                 {"speed", 0, "speed"},
+                                                                 {"speed", 2, "speed"},
+                                                                 {"width", 0.2, "width"},
+                                                                 {"single_support", 0.4, "no such option"}}) {
+    CAPTURE(option, value);
+    CHECK_THROWS_AS(make(option, value), ModelError);
+    CHECK_THROWS_WITH(make(option, value), Catch::Contains(word));
+  }
+}
