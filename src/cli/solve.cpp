@@ -23,6 +23,7 @@ struct SolveArguments {
   std::vector<std::string> settings;  // name=value
   FddpOptions solver;
   bool quiet = false;
+  bool no_check = false;
 };
 
 std::atomic<bool> interrupted{false};
@@ -82,6 +83,13 @@ void printResult(const MotionResult& result, const std::vector<std::string>& pat
   for (const std::string& path : paths) std::cout << "  " << path << "\n";
 }
 
+// Whether the motion passes bielle-check, or could not be checked.
+bool checkResult(const std::string& directory) {
+  const std::optional<int> status = runCompanion("bielle-check", {"--brief", directory});
+  if (!status) std::cout << "  not checked: bielle-check is not built (-DBIELLE_BUILD_VALIDATION=ON)\n";
+  return status != kFailed;
+}
+
 int solve(const SolveArguments& arguments, const MotionRequest& request) {
   for (const std::string& setting : arguments.settings) applySetting(setting, request.options);
   for (const OptionEntry& option : request.options)
@@ -106,7 +114,8 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   const RunInfo run{arguments.robot.name, robot.file, getCommandLine()};
   const MotionResult result = makeResult(run, motion, motion.guess, summary);
   printResult(result, writeResult(arguments.directory, result));
-  return result.converged() ? kOk : kFailed;
+  const bool failed = !arguments.no_check && !checkResult(arguments.directory);
+  return result.converged() && !failed ? kOk : kFailed;
 }
 
 // Added before the single options, so that those given as well have the last word.
@@ -164,11 +173,12 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   sub.add_flag("--quiet", arguments->quiet, "no line per iteration");
+  sub.add_flag("--no-check", arguments->no_check, "do not run `bielle check` on the result");
   sub.footer(
       "Options of --set, with default and unit:\n" + formatOptionList(motion) + "Examples:\n  " + motion.example +
       "\n  " + motion.example + " --set com_weight=2e5 --max-iterations 50\n" +
       "Ctrl-C stops the solver; the iterate it has by then is written, and marked as interrupted. Exit status: 0 "
-      "converged,\n1 not converged (results are written all the same), 2 bad input.");
+      "converged\nand checked, 1 not converged or a check failed (results are written all the same), 2 bad input.");
   sub.callback([&action, arguments, request] { action = [=] { return solve(*arguments, *request); }; });
 }
 
