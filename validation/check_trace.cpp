@@ -147,7 +147,9 @@ class Tracer {
     stage.velocity_rest = projectOnTangent(d / h - v - h * a);
 
     const MatrixXd M = simbody.calcMassMatrix();
-    const VectorXd a_simbody = simbody.solveWithArmature(Precision::Double).a;
+    VectorXd rows = simbody.calcConstraintAcceleration(a);
+    rows.head(loop_rows_).setZero();
+    const VectorXd a_simbody = simbody.solveWithArmature(Precision::Double, rows).a;
     stage.acceleration = calcNorm(M, a_simbody);
     stage.acceleration_error = calcNorm(M, a - a_simbody);
     stage.finite_difference = calcNorm(M, (next - v) / h - a_simbody);

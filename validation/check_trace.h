@@ -15,11 +15,11 @@ struct NodeTrace {
 /// A stage, from its node to the next.
 struct StageTrace {
   VectorXd balance;               ///< nv, M a + b - B u - J^T lambda of what is recorded, Eq. (1) of check.h
-  VectorXd velocity_rest;         ///< nv, the first of Eqs. (3) over h: what is left along the closures, m/s or rad/s
-  VectorXd position_rest;         ///< nv, the second of Eqs. (3), m or rad
+  VectorXd velocity_rest;         ///< nv, the first of Eqs. (2) over h: what is left along the closures, m/s or rad/s
+  VectorXd position_rest;         ///< nv, the second of Eqs. (2), m or rad
   double acceleration = 0;        ///< sqrt(a^T M a), a Simbody's own
   double acceleration_error = 0;  ///< the same norm of the recorded a less Simbody's
-  double finite_difference = 0;   ///< sqrt(e^T M e) of Eq. (5)
+  double finite_difference = 0;   ///< sqrt(e^T M e) of Eq. (4)
   double motor_work = 0;          ///< over the interval, J
   double exchanged = 0;           ///< sum of the sizes of the work of each motor, J
   double contact_work = 0;        ///< of feet that slip, J

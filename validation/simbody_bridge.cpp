@@ -158,12 +158,17 @@ OracleSolution SimbodyBridge::solveBySimbody() {
   return out;
 }
 
-OracleSolution SimbodyBridge::solveWithArmature(Precision precision) const {
-  const MatrixXd J = calcConstraintJacobian();
-  SimTK::Vector udot(s_->model.nv()), drift;
-  s_->scatter(s_->Tdot_v, udot);
-  s_->matter.calcConstraintAccelerationErrors(s_->state, udot, drift);
-  const SaddleTerms terms{calcMassMatrix(), J, s_->tau - calcBias(), -toEigen(drift)};
+VectorXd SimbodyBridge::calcConstraintAcceleration(ConstVectorRef a) const {
+  SimTK::Vector udot(s_->model.nv()), rows;
+  s_->scatter(s_->T * a + s_->Tdot_v, udot);
+  s_->matter.calcConstraintAccelerationErrors(s_->state, udot, rows);
+  return toEigen(rows);
+}
+
+OracleSolution SimbodyBridge::solveWithArmature(Precision precision, const VectorXd& rows) const {
+  SaddleTerms terms{calcMassMatrix(), calcConstraintJacobian(), s_->tau - calcBias(),
+                    -calcConstraintAcceleration(VectorXd::Zero(s_->model.nv()))};
+  if (rows.size() > 0) terms.target += rows;
   OracleSolution out;
   VectorXd m;
   if (precision == Precision::Double)

@@ -65,8 +65,11 @@ class SimbodyBridge {
   /// Simbody's realize(Acceleration); the armature is not seen.
   /// \throws std::exception of Simbody, for a mass matrix that is singular without armature
   OracleSolution solveBySimbody();
+  /// Simbody's rows J a + dJ/dt v, in the order of calcConstraintJacobian.
+  VectorXd calcConstraintAcceleration(ConstVectorRef a) const;
   /// The system with armature, above.
-  OracleSolution solveWithArmature(Precision precision = Precision::Extended) const;
+  /// \param rows  what J a + dJ/dt v shall be, empty: zero
+  OracleSolution solveWithArmature(Precision precision = Precision::Extended, const VectorXd& rows = VectorXd()) const;
 
   /// Integrates Simbody's equations from the state set, tau held, by Runge-Kutta-Merson with projection of the
   /// constraints at every step; q and v are overwritten with the final ones. Armature is not seen.

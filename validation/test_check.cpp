@@ -142,15 +142,19 @@ CheckedMotion makeFourBarMotion(double h, Formulation formulation) {
   const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar").model;
   const VectorXd q0 = findClosedConfiguration(model).q;
   const int stages = static_cast<int>(std::lround(0.5 / h));
-  StageSpec stage;
-  stage.dt = h;
-  stage.constraints = makeConstraintSet(model);
-  stage.state = {0, q0, VectorXd::Zero(model.nv()), VectorXd::Zero(2 * model.nv())};
-  stage.control = {0, VectorXd::Zero(model.nu()), VectorXd::Zero(model.nu())};
+  const auto makeStage = [&] {
+    StageSpec stage;
+    stage.dt = h;
+    stage.constraints = makeConstraintSet(model);
+    stage.state = {0, q0, VectorXd::Zero(model.nv()), VectorXd::Zero(2 * model.nv())};
+    stage.control = {0, VectorXd::Zero(model.nu()), VectorXd::Zero(model.nu())};
+    return stage;
+  };
+  std::vector<StageSpec> specs;
+  for (int k = 0; k <= stages; ++k) specs.push_back(makeStage());
   Motion motion;
   motion.schedule = {h, {{"free", stages, {}}}};
-  motion.problem = std::make_unique<RobotProblem>(model, q0, VectorXd::Zero(model.nv()),
-                                                  std::vector<StageSpec>(stages + 1, stage), formulation);
+  motion.problem = std::make_unique<RobotProblem>(model, q0, VectorXd::Zero(model.nv()), std::move(specs), formulation);
   ShootingTrajectory trajectory;
   trajectory.xs = {motion.problem->initialState()};
   double cost = 0;
