@@ -86,9 +86,9 @@ json makeState(const Model& model, const VectorXd& q, const VectorXd& v, const V
   return state;
 }
 
-const std::vector<std::string> kShortSquat = {"solve",        "squat", "--robot",  "bipetto", "--set",
-                                              "duration=0.6", "--set", "settle=0", "--set",   "time_step=0.02",
-                                              "--depth",      "0.95",  "-o"};
+const std::vector<std::string> kShortSquat = {"solve",        "squat", "--robot",    "bipetto", "--set",
+                                              "duration=0.6", "--set", "settle=0",   "--set",   "time_step=0.02",
+                                              "--depth",      "0.95",  "--no-check", "-o"};
 
 std::vector<std::string> makeShortSquat(const std::string& directory, const std::vector<std::string>& more = {}) {
   std::vector<std::string> arguments = kShortSquat;
@@ -349,6 +349,29 @@ TEST_CASE("solve writes a converged squat and says so") {
   CHECK(directory.readTrajectory().u == record.u);  // whatever the number of threads
 }
 
+TEST_CASE("solve ends by the check of its result, whose failure is its own") {
+  const OutputDirectory directory;
+  fs::create_directory(directory.str());
+  const std::string copy = directory.str() + "/bielle", checker = directory.str() + "/bielle-check";
+  fs::copy_file(BIELLE_COMMAND, copy);
+  std::vector<std::string> arguments = makeShortSquat(directory.str() + "/motion");
+  arguments.erase(std::find(arguments.begin(), arguments.end(), "--no-check"));
+  arguments.insert(arguments.begin(), copy);
+  const std::string path = std::getenv("PATH");
+  setenv("PATH", "/nonexistent", 1);
+  const CommandResult absent = runCommand(arguments);
+  setenv("PATH", path.c_str(), 1);
+  CHECK(absent.status == 0);
+  CHECK_THAT(absent.out, Catch::Contains("not checked: bielle-check is not built"));
+  for (const int status : {0, 1, 2}) {
+    std::ofstream(checker) << "#!/bin/sh\necho \"<$@>\"\nexit " << status << "\n";
+    fs::permissions(checker, fs::perms::owner_all);
+    const CommandResult result = runCommand(arguments);
+    CHECK(result.status == (status == 1 ? 1 : 0));
+    CHECK_THAT(result.out, Catch::EndsWith("<--brief " + directory.str() + "/motion>\n"));
+  }
+}
+
 TEST_CASE("in the full formulation velocities follow accelerations") {
   const OutputDirectory directory;
   CHECK(run(makeShortSquat(directory.str(), {"--formulation", "full"})).status == 0);
@@ -372,8 +395,8 @@ TEST_CASE("a squat that does not converge is written, marked, and status 1") {
 TEST_CASE("an interrupted squat leaves whole files that say so") {
   const OutputDirectory directory;
   // Long enough that the signal comes first.
-  Command command(
-      {BIELLE_COMMAND, "solve", "squat", "--robot", "bipetto", "--set", "duration=30", "-o", directory.str()});
+  Command command({BIELLE_COMMAND, "solve", "squat", "--robot", "bipetto", "--set", "duration=30", "--no-check", "-o",
+                   directory.str()});
   REQUIRE(command.waitForOutput("\n    1 ", 60));
   command.sendSignal(SIGINT);
   const CommandResult result = command.wait();

@@ -21,6 +21,45 @@ VectorXd toEigen(const SimTK::Vector& v) {
   return out;
 }
 
+// M a + J^T m = force, J a = target.
+struct SaddleTerms {
+  MatrixXd M, J;
+  VectorXd force, target;
+};
+
+// With unit diagonal of D M D and rows E J D of unit length (links of a few milligrams beside others of kilograms are
+// usual): a = D z, m = E y. By the null space N of E J D, z = z_J + N w with E J D z_J = E target; N^T then leaves
+//     N^T D M D N w = N^T D (force - M D z_J),    (E J D)^T y = D (force - M D z).
+template <typename Real>
+void solveSaddle(const SaddleTerms& terms, VectorXd& a, VectorXd& multipliers) {
+  using MatrixXr = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
+  using VectorXr = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
+  const MatrixXd &M = terms.M, &J = terms.J;
+  const int nv = static_cast<int>(M.rows()), m = static_cast<int>(J.rows());
+  const VectorXd D = M.diagonal().cwiseSqrt().cwiseInverse();
+  VectorXr E = J.rowwise().norm().template cast<Real>();
+  const Real largest = m > 0 ? E.maxCoeff() : 0;
+  for (int i = 0; i < m; ++i) E[i] = E[i] > kRankThreshold * largest ? 1 / (J.row(i) * D.asDiagonal()).norm() : 0;
+  const VectorXr D_r = D.template cast<Real>();
+  const auto scale = D_r.asDiagonal();
+  const MatrixXr DMD = scale * M.template cast<Real>() * scale;
+  const MatrixXr EJD = E.asDiagonal() * J.template cast<Real>() * scale;
+  const VectorXr force = scale * terms.force.template cast<Real>();
+  VectorXr z = VectorXr::Zero(nv), y = VectorXr::Zero(m);
+  MatrixXr N = MatrixXr::Identity(nv, nv);
+  Eigen::CompleteOrthogonalDecomposition<MatrixXr> rows, columns;
+  for (auto* factor : {&rows, &columns}) factor->setThreshold(kRankThreshold);
+  if (m > 0) {
+    columns.compute(EJD.transpose());
+    N = MatrixXr(columns.householderQ()).rightCols(nv - columns.rank());
+    z = rows.compute(EJD).solve(E.asDiagonal() * terms.target.template cast<Real>());
+  }
+  z += N * (N.transpose() * DMD * N).ldlt().solve(N.transpose() * (force - DMD * z));
+  if (m > 0) y = columns.solve(force - DMD * z);
+  a = D.cwiseProduct(z.template cast<double>());
+  multipliers = E.cwiseProduct(y).template cast<double>();
+}
+
 }  // namespace
 
 SimbodyBridge::SimbodyBridge(const Model& model, const std::vector<Closure>& closures)
@@ -80,6 +119,36 @@ VectorXd SimbodyBridge::calcInverseDynamics(ConstVectorRef a) const {
 
 VectorXd SimbodyBridge::calcBias() const { return calcInverseDynamics(VectorXd::Zero(s_->model.nv())); }
 
+MatrixXd SimbodyBridge::calcConstraintJacobian() const {
+  const int nv = s_->model.nv();
+  SimTK::Matrix G_s;
+  s_->matter.calcG(s_->state, G_s);
+  MatrixXd J(G_s.nrow(), nv);
+  for (int i = 0; i < J.rows(); ++i)
+    for (int j = 0; j < nv; ++j) J(i, j) = G_s(i, s_->u_index[j]);
+  return J * s_->T;
+}
+
+VectorXd SimbodyBridge::calcWrenchForces(const std::vector<Vector6d>& wrenches) const {
+  // Simbody: moment first, about the origin of the body, world axes.
+  SimTK::Vector_<SimTK::SpatialVec> body_forces(s_->matter.getNumBodies(), SimTK::SpatialVec(SimTK::Vec3(0)));
+  for (size_t c = 0; c < s_->closures.size(); ++c) {
+    const Closure& closure = s_->closures[c];
+    const SE3 X_W1 = getPlacement(closure.body1) * closure.X_B1;
+    const Vector3d force = X_W1.R * wrenches[c].head<3>(), moment = X_W1.R * wrenches[c].tail<3>();
+    const auto apply = [&](int body, double sign) {
+      const Vector3d arm = X_W1.p - getPlacement(body).p;
+      body_forces[s_->bodies[body].getMobilizedBodyIndex()] +=
+          SimTK::SpatialVec(toSimTK(sign * (moment + arm.cross(force))), toSimTK(sign * force));
+    };
+    apply(closure.body1, 1);
+    apply(closure.body2, -1);
+  }
+  SimTK::Vector generalized;
+  s_->matter.multiplyBySystemJacobianTranspose(s_->state, body_forces, generalized);
+  return s_->T.transpose() * s_->gather(generalized);
+}
+
 OracleSolution SimbodyBridge::solveBySimbody() {
   s_->system.realize(s_->state, Stage::Acceleration);
   OracleSolution out;
@@ -89,50 +158,25 @@ OracleSolution SimbodyBridge::solveBySimbody() {
   return out;
 }
 
-OracleSolution SimbodyBridge::solveWithArmature() const {
-  const int nv = s_->model.nv();
-  SimTK::Matrix G_s;
-  s_->matter.calcG(s_->state, G_s);
-  const int m = G_s.nrow();
-  MatrixXd J(m, nv);
-  for (int i = 0; i < m; ++i)
-    for (int j = 0; j < nv; ++j) J(i, j) = G_s(i, s_->u_index[j]);
-  J *= s_->T;
-  SimTK::Vector udot(nv), drift;
-  s_->scatter(s_->Tdot_v, udot);
-  s_->matter.calcConstraintAccelerationErrors(s_->state, udot, drift);
+VectorXd SimbodyBridge::calcConstraintAcceleration(ConstVectorRef a) const {
+  SimTK::Vector udot(s_->model.nv()), rows;
+  s_->scatter(s_->T * a + s_->Tdot_v, udot);
+  s_->matter.calcConstraintAccelerationErrors(s_->state, udot, rows);
+  return toEigen(rows);
+}
 
-  // With unit diagonal of D M D and rows E J D of unit length (links of a few milligrams beside others of kilograms are
-  // usual): a = D z, m = E y. By the null space N of E J D, z = z_J + N w with E J D z_J = -E drift; N^T then leaves
-  //     N^T D M D N w = N^T D (tau - b - M D z_J),    (E J D)^T y = D (tau - b - M D z).
-  // In extended precision, as differences in time are taken of the result.
-  using Real = long double;
-  using MatrixXr = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
-  using VectorXr = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
-  const MatrixXd M = calcMassMatrix();
-  const VectorXd D = M.diagonal().cwiseSqrt().cwiseInverse();
-  VectorXr E = J.rowwise().norm().cast<Real>();
-  const Real largest = m > 0 ? E.maxCoeff() : 0;
-  for (int i = 0; i < m; ++i) E[i] = E[i] > kRankThreshold * largest ? 1 / (J.row(i) * D.asDiagonal()).norm() : 0;
-  const auto scale = D.cast<Real>().asDiagonal();
-  const MatrixXr DMD = scale * M.cast<Real>() * scale, EJD = E.asDiagonal() * J.cast<Real>() * scale;
-  const VectorXr force = scale * (s_->tau - calcBias()).cast<Real>();
-  VectorXr z = VectorXr::Zero(nv), y = VectorXr::Zero(m);
-  MatrixXr N = MatrixXr::Identity(nv, nv);
-  Eigen::CompleteOrthogonalDecomposition<MatrixXr> rows, columns;
-  for (auto* factor : {&rows, &columns}) factor->setThreshold(kRankThreshold);
-  if (m > 0) {
-    columns.compute(EJD.transpose());
-    N = MatrixXr(columns.householderQ()).rightCols(nv - columns.rank());
-    z = rows.compute(EJD).solve(-(E.asDiagonal() * toEigen(drift).cast<Real>()));
-  }
-  z += N * (N.transpose() * DMD * N).ldlt().solve(N.transpose() * (force - DMD * z));
-  if (m > 0) y = columns.solve(force - DMD * z);
-
+OracleSolution SimbodyBridge::solveWithArmature(Precision precision, const VectorXd& rows) const {
+  SaddleTerms terms{calcMassMatrix(), calcConstraintJacobian(), s_->tau - calcBias(),
+                    -calcConstraintAcceleration(VectorXd::Zero(s_->model.nv()))};
+  if (rows.size() > 0) terms.target += rows;
   OracleSolution out;
-  out.a = D.cwiseProduct(z.cast<double>());
-  SimTK::Vector multipliers(m);
-  for (int i = 0; i < m; ++i) multipliers[i] = static_cast<double>(E[i] * y[i]);
+  VectorXd m;
+  if (precision == Precision::Double)
+    solveSaddle<double>(terms, out.a, m);
+  else
+    solveSaddle<long double>(terms, out.a, m);
+  SimTK::Vector multipliers(static_cast<int>(m.size()));
+  for (int i = 0; i < m.size(); ++i) multipliers[i] = m[i];
   s_->readForces(multipliers, out);
   return out;
 }

@@ -20,7 +20,8 @@
 ///
 /// Simbody has no rotor inertia. solveBySimbody() therefore ignores the armature; solveWithArmature() solves
 ///     [M + diag(armature), J'; J, 0] [a; m] = [tau - b; -(dJ/dt v)]
-/// by the null space of the scaled rows, dense, rank revealing and in extended precision; all terms are Simbody's.
+/// by the null space of the scaled rows, dense and rank revealing; all terms are Simbody's. Extended precision is for
+/// those who take differences of the result.
 #include <memory>
 
 #include "bielle/model/model.h"
@@ -35,6 +36,8 @@ struct OracleSolution {
   /// counted down to 1e-11), which Simbody's solver forms; zero for solveWithArmature.
   double rounding = 0;
 };
+
+enum class Precision { Double, Extended };
 
 class SimbodyBridge {
  public:
@@ -55,11 +58,18 @@ class SimbodyBridge {
   VectorXd calcBias() const;           ///< nv
   /// Generalized forces of accelerations a (nv), constraints ignored, armature included.
   VectorXd calcInverseDynamics(ConstVectorRef a) const;
+  /// Generalized forces J^T lambda (nv) of wrenches on body 1 in frame 1, body 2 taking the opposite ones, per closure.
+  VectorXd calcWrenchForces(const std::vector<Vector6d>& wrenches) const;
+  /// Simbody's constraint rows x nv, those of a closure one after the other (notation.h has other signs and rows).
+  MatrixXd calcConstraintJacobian() const;
   /// Simbody's realize(Acceleration); the armature is not seen.
   /// \throws std::exception of Simbody, for a mass matrix that is singular without armature
   OracleSolution solveBySimbody();
+  /// Simbody's rows J a + dJ/dt v, in the order of calcConstraintJacobian.
+  VectorXd calcConstraintAcceleration(ConstVectorRef a) const;
   /// The system with armature, above.
-  OracleSolution solveWithArmature() const;
+  /// \param rows  what J a + dJ/dt v shall be, empty: zero
+  OracleSolution solveWithArmature(Precision precision = Precision::Extended, const VectorXd& rows = VectorXd()) const;
 
   /// Integrates Simbody's equations from the state set, tau held, by Runge-Kutta-Merson with projection of the
   /// constraints at every step; q and v are overwritten with the final ones. Armature is not seen.

@@ -2,6 +2,7 @@
 // The subcommands of `bielle`, one per file. Each adds itself to the parser and, if it was called, leaves its action.
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "bielle/model/reader.h"
@@ -24,10 +25,12 @@ void addBench(CLI::App& app, Action& action);
 void addRatio(CLI::App& app, Action& action);
 void addLift(CLI::App& app, Action& action);
 
-// Only the line of the help: its arguments are those of another program.
-void addValidate(CLI::App& app);
-// Becomes bielle-validate; returns only when it cannot. `arguments` ends with a null pointer and begins with a name.
-int runValidate(char** arguments);
+// bielle validate and bielle check: only their lines of the help, their arguments are those of other programs.
+void addCompanions(CLI::App& app);
+// Becomes that program; returns only when it cannot. `arguments` ends with a null pointer and begins with a name.
+int becomeCompanion(const std::string& name, char** arguments);
+// Runs it to its end. Its exit status, or nothing when it is not there.
+std::optional<int> runCompanion(const std::string& name, std::vector<std::string> arguments);
 
 // What every command with a robot asks for.
 struct RobotArgument {

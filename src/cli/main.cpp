@@ -25,7 +25,8 @@ std::string describeVersion() {
 int main(int argc, char** argv) {
   using namespace bielle::cli;
   setCommandLine(argc, argv);
-  if (argc > 1 && std::string(argv[1]) == "validate") return runValidate(argv + 1);
+  const std::string first = argc > 1 ? argv[1] : "";
+  if (first == "validate" || first == "check") return becomeCompanion("bielle-" + first, argv + 1);
 
   CLI::App app{"Legged robots driven through linkages: their dynamics, and motions by optimal control."};
   app.name("bielle");
@@ -47,7 +48,7 @@ int main(int argc, char** argv) {
   addRatio(app, action);
   addLift(app, action);
   addBench(app, action);
-  addValidate(app);
+  addCompanions(app);
   app.callback([&action] {
     if (!action) throw CLI::RequiredError("A command");
   });

@@ -30,7 +30,7 @@ struct SolveArguments {
   std::vector<std::string> settings;  // name=value
   FddpOptions solver;
   std::string warm_start;  // directory of a result, or empty
-  bool quiet = false, no_report = false;
+  bool quiet = false, no_check = false, no_report = false;
 };
 
 std::atomic<bool> interrupted{false};
@@ -91,11 +91,11 @@ void printResult(const MotionResult& result, const std::vector<std::string>& pat
 }
 
 // The page beside the other files. Without it the result is still whole.
-void addReport(const std::string& directory, std::vector<std::string>& paths) {
+void addReport(const std::string& directory) {
   const std::string path = (std::filesystem::path(directory) / "report.html").string();
   try {
     writeReport(path, {directory});
-    paths.push_back(path);
+    std::cout << "  " << path << "\n";
   } catch (const std::exception& error) {
     std::cerr << "bielle: warning: no report was written: " << error.what() << "\n";
   }
@@ -131,6 +131,13 @@ void printSerialModel(const SerialModel& serial) {
   std::cout << "\n";
 }
 
+// Whether the motion passes bielle-check, or could not be checked.
+bool checkResult(const std::string& directory) {
+  const std::optional<int> status = runCompanion("bielle-check", {"--brief", directory});
+  if (!status) std::cout << "  not checked: bielle-check is not built (-DBIELLE_BUILD_VALIDATION=ON)\n";
+  return status != kFailed;
+}
+
 int solve(const SolveArguments& arguments, const MotionRequest& request) {
   for (const std::string& setting : arguments.settings) applySetting(setting, request.options);
   for (const OptionEntry& option : request.options)
@@ -160,10 +167,10 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   const FddpSummary summary = Fddp(arguments.solver).solve(*motion.problem, motion.guess, observer);
   const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed"};
   const MotionResult result = makeResult(run, motion, motion.guess, summary);
-  std::vector<std::string> paths = writeResult(arguments.directory, result);
-  if (!arguments.no_report) addReport(arguments.directory, paths);
-  printResult(result, paths);
-  return result.converged() ? kOk : kFailed;
+  printResult(result, writeResult(arguments.directory, result));
+  const bool failed = !arguments.no_check && !checkResult(arguments.directory);
+  if (!arguments.no_report) addReport(arguments.directory);  // the check is part of it
+  return result.converged() && !failed ? kOk : kFailed;
 }
 
 // Added before the single options, so that those given as well have the last word.
@@ -233,11 +240,12 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
                  "directory of another result of this robot to start from, resampled if its length differs");
   sub.add_flag("--quiet", arguments->quiet, "no line per iteration");
   sub.add_flag("--no-report", arguments->no_report, "no report.html");
+  sub.add_flag("--no-check", arguments->no_check, "do not run `bielle check` on the result");
   sub.footer(
       "Options of --set, with default and unit:\n" + formatOptionList(motion) + "Examples:\n  " + motion.example +
       "\n  " + motion.example + " --set com_weight=2e5 --max-iterations 50\n" +
       "Ctrl-C stops the solver; the iterate it has by then is written, and marked as interrupted. Exit status: 0 "
-      "converged,\n1 not converged (results are written all the same), 2 bad input.");
+      "converged\nand checked, 1 not converged or a check failed (results are written all the same), 2 bad input.");
   sub.callback([&action, arguments, request] { action = [=] { return solve(*arguments, *request); }; });
 }
 

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 
 namespace bielle {
@@ -33,6 +34,12 @@ void AsideFile::write(const std::string& text) {
 void AsideFile::commit() {
   if (std::rename(aside_.c_str(), path_.c_str()) != 0) failToWrite(path_, std::strerror(errno));
   aside_.clear();
+}
+
+void writeTextFile(const std::string& path, const std::string& text) {
+  AsideFile file(path);
+  file.write(text);
+  file.commit();
 }
 
 }  // namespace bielle

@@ -1,0 +1,10 @@
+#pragma once
+/// \file Text written aside and renamed when it is whole, as all results are.
+#include <string>
+
+namespace bielle {
+
+/// \throws ModelError naming the file and why it cannot be written
+void writeTextFile(const std::string& path, const std::string& text);
+
+}  // namespace bielle

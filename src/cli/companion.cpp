@@ -1,0 +1,56 @@
+// The programs beside `bielle` that alone know Simbody: bielle-validate and bielle-check.
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <iostream>
+
+#include "cli/commands.h"
+
+extern char** environ;
+
+namespace bielle::cli {
+namespace {
+
+// Beside this program, else by its name alone, for which the PATH is searched.
+std::string findCompanion(const std::string& program) {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path beside = self.parent_path() / program;
+  return !error && access(beside.c_str(), X_OK) == 0 ? beside.string() : program;
+}
+
+}  // namespace
+
+void addCompanions(CLI::App& app) {
+  app.add_subcommand("validate", "Compare the dynamics with Simbody's (see bielle validate --help)");
+  app.add_subcommand("check", "Check a motion by its files and Simbody (see bielle check --help)");
+}
+
+int becomeCompanion(const std::string& name, char** arguments) {
+  std::string program = findCompanion(name);
+  arguments[0] = program.data();
+  execvp(program.c_str(), arguments);
+  std::cerr << "bielle: error: " << name
+            << " is neither beside this program nor on the PATH; build Bielle with -DBIELLE_BUILD_VALIDATION=ON (it "
+               "needs Simbody)"
+            << std::endl;
+  return kBadInput;
+}
+
+std::optional<int> runCompanion(const std::string& name, std::vector<std::string> arguments) {
+  std::string program = findCompanion(name);
+  std::vector<char*> argv = {program.data()};
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  std::cout.flush();
+  pid_t child = 0;
+  if (posix_spawnp(&child, program.c_str(), nullptr, nullptr, argv.data(), environ) != 0) return {};
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0)
+    if (errno != EINTR) return {};
+  return WIFEXITED(status) ? WEXITSTATUS(status) : kFailed;
+}
+
+}  // namespace bielle::cli

@@ -1,0 +1,127 @@
+#include "check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <iomanip>
+#include <nlohmann/json.hpp>
+#include <ostream>
+
+#include "check_rows.h"
+
+namespace bielle::validation {
+namespace {
+
+// The first number that is not finite, or nothing when all are.
+Worst findNotFinite(const CheckedMotion& motion) {
+  const MotionRecord& record = motion.record;
+  const std::pair<const char*, const RowMatrixXd*> tables[] = {{"q", &record.q},
+                                                               {"v", &record.v},
+                                                               {"a", &record.a},
+                                                               {"u", &record.u},
+                                                               {"closure_wrenches", &record.closure_wrenches},
+                                                               {"contact_wrenches", &record.contact_wrenches}};
+  Worst worst;
+  int count = 0;
+  for (const auto& [name, table] : tables)
+    for (Eigen::Index k = 0; k < table->rows(); ++k) {
+      const int bad = static_cast<int>(table->cols() - table->row(k).array().isFinite().count());
+      count += bad;
+      if (bad > 0) worst.add(count, static_cast<int>(k), name);
+    }
+  for (Eigen::Index k = 0; k < record.time.size(); ++k)
+    if (!std::isfinite(record.time[k])) worst.add(++count, static_cast<int>(k), "time");
+  return worst;
+}
+
+}  // namespace
+
+std::string formatNumber(double value) {
+  char text[32];
+  const bool plain = value == 0 || (std::abs(value) >= 1e-3 && std::abs(value) < 1e4);
+  std::snprintf(text, sizeof text, plain ? "%.4f" : "%.2e", value);
+  return text;
+}
+
+std::string Worst::describePlace(const CheckedMotion& motion) const {
+  char text[64];
+  std::snprintf(text, sizeof text, "node %d, %.3f s", node_, motion.record.time[node_]);
+  return text + (what_.empty() ? "" : ", " + what_);
+}
+
+CheckRow Worst::makeRow(const std::string& name, const std::string& unit, double bound, const CheckedMotion& motion,
+                        const std::string& nothing) const {
+  CheckRow row{name, kind_, {}, bound, unit, nothing};
+  if (empty()) return row;
+  row.value = value_;
+  row.note = describePlace(motion);
+  return row;
+}
+
+bool CheckRow::passed() const {
+  if (kind == Kind::Note || !value) return true;
+  return kind == Kind::AtMost ? *value <= bound : *value >= bound;  // false for what is not a number
+}
+
+bool CheckReport::passed() const {
+  return std::all_of(rows.begin(), rows.end(), [](const CheckRow& row) { return row.passed(); });
+}
+
+const CheckRow* CheckReport::findRow(const std::string& name) const {
+  for (const CheckRow& row : rows)
+    if (row.name == name) return &row;
+  return nullptr;
+}
+
+CheckReport checkMotion(const CheckedMotion& motion, const CheckBounds& bounds) {
+  checkConsistency(motion);
+  CheckReport report{motion.summary.motion, motion.summary.robot, static_cast<int>(motion.record.time.size()), {}};
+  const Worst not_finite = findNotFinite(motion);
+  CheckRow numbers = not_finite.makeRow("numbers not finite", "", 0, motion);
+  if (not_finite.empty())
+    numbers.value = 0;
+  else
+    numbers.note += "; nothing else was checked";
+  report.rows.push_back(numbers);
+  if (!not_finite.empty()) return report;
+  const MotionTrace trace = traceMotion(motion);
+  CheckContext context{motion, trace, bounds, report.rows};
+  addDynamicsRows(context);
+  addEnergyRows(context);
+  addStanceRows(context);
+  addSwingRows(context);
+  addForceRows(context);
+  addLimitRows(context);
+  return report;
+}
+
+void printReport(std::ostream& out, const CheckReport& report, CheckPrint print) {
+  const auto failed =
+      std::count_if(report.rows.begin(), report.rows.end(), [](const auto& row) { return !row.passed(); });
+  out << "check of " << report.motion << ", " << report.robot << ", " << report.nodes << " nodes: "
+      << (failed == 0 ? "passed" : "FAILED by " + std::to_string(failed) + (failed == 1 ? " row" : " rows")) << "\n";
+  for (const CheckRow& row : report.rows) {
+    if (print == CheckPrint::Failures && row.passed()) continue;
+    const bool judged = row.kind != CheckRow::Kind::Note && row.value;
+    const std::string bound = (row.kind == CheckRow::Kind::AtMost ? "<= " : ">= ") + formatNumber(row.bound);
+    out << "  " << std::left << std::setw(34) << row.name << std::right << std::setw(9)
+        << (row.value ? formatNumber(*row.value) : "-") << "  " << std::left << std::setw(12) << (judged ? bound : "")
+        << std::setw(12) << (row.value ? row.unit : "") << std::setw(6)
+        << (judged ? row.passed() ? "pass" : "FAIL" : "") << row.note << "\n";
+  }
+}
+
+std::string formatReport(const CheckReport& report) {
+  using Json = nlohmann::ordered_json;
+  Json rows = Json::array();
+  for (const CheckRow& row : report.rows)
+    rows.push_back({{"name", row.name},
+                    {"value", row.value ? Json(*row.value) : Json()},
+                    {"bound", row.kind == CheckRow::Kind::Note ? Json() : Json(row.bound)},
+                    {"unit", row.unit},
+                    {"pass", row.passed()},
+                    {"note", row.note}});
+  return Json{{"rows", rows}, {"pass", report.passed()}}.dump(2) + "\n";
+}
+
+}  // namespace bielle::validation

@@ -1,0 +1,140 @@
+// Rows of the feet: where they stand, how they swing and land.
+#include <algorithm>
+#include <array>
+#include <optional>
+
+#include "bielle/math/so3.h"
+#include "check_rows.h"
+
+namespace bielle::validation {
+namespace {
+
+using Corners = std::array<Vector3d, 4>;
+
+// In the world, one after the other around the sole; four times the origin for a contact without a sole.
+Corners calcCorners(const ContactFrame& contact, const SE3& X_WF) {
+  const double l = contact.half_length, w = contact.half_width;
+  Corners corners = {Vector3d(l, w, 0), Vector3d(-l, w, 0), Vector3d(-l, -w, 0), Vector3d(l, -w, 0)};
+  for (Vector3d& corner : corners) corner = X_WF.act(corner);
+  return corners;
+}
+
+// Height of the lowest corner over what is under it, m.
+double calcClearance(const Ground& ground, const Corners& corners) {
+  double least = corners[0].z() - ground.calcHeight(corners[0].x(), corners[0].y());
+  for (const Vector3d& c : corners) least = std::min(least, c.z() - ground.calcHeight(c.x(), c.y()));
+  return least;
+}
+
+// Largest speed of a corner, m/s; the twist in the contact's frame.
+double calcCornerSpeed(const ContactFrame& contact, const Vector6d& twist) {
+  double largest = 0;
+  for (const Vector3d& corner : calcCorners(contact, SE3()))
+    largest = std::max(largest, (twist.head<3>() + twist.tail<3>().cross(corner)).norm());
+  return largest;
+}
+
+// Seen from above, the widest gap between two soles across an edge of one of them; negative where they overlap.
+double calcGapAcrossEdges(const Corners& a, const Corners& b) {
+  double widest = -std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 4; ++i) {
+    const Eigen::Vector2d edge = (a[(i + 1) % 4] - a[i]).head<2>();
+    if (edge.norm() < 1e-9) continue;
+    const Eigen::Vector2d normal = Eigen::Vector2d(edge.y(), -edge.x()).normalized();
+    const auto along = [&normal](const Vector3d& corner) { return normal.dot(corner.head<2>()); };
+    double end = along(a[0]), begin_b = along(b[0]), begin = end, end_b = begin_b;
+    for (int j = 1; j < 4; ++j) {
+      begin = std::min(begin, along(a[j])), end = std::max(end, along(a[j]));
+      begin_b = std::min(begin_b, along(b[j])), end_b = std::max(end_b, along(b[j]));
+    }
+    widest = std::max({widest, begin_b - end, begin - end_b});
+  }
+  return widest;
+}
+
+bool hasSole(const ContactFrame& contact) { return contact.half_length > 0 && contact.half_width > 0; }
+
+// Nodes [begin, end) during which a contact is in the air.
+struct Flight {
+  int contact = 0, begin = 0, end = 0;
+};
+
+std::vector<Flight> listFlights(const CheckedMotion& motion) {
+  std::vector<Flight> flights;
+  for (int c = 0; c < static_cast<int>(motion.model.contacts().size()); ++c)
+    for (int k = 0, begin = -1; k <= motion.numStages() + 1; ++k) {
+      const bool flies = k <= motion.numStages() && !motion.stands(c, k);
+      if (flies && begin < 0) begin = k;
+      if (!flies && begin >= 0) {
+        flights.push_back({c, begin, k});
+        begin = -1;
+      }
+    }
+  return flights;
+}
+
+}  // namespace
+
+void addStanceRows(CheckContext& context) {
+  const Model& model = context.model();
+  const CheckBounds& bounds = context.bounds;
+  Worst slip, angle, height, landing;
+  for (int c = 0; c < static_cast<int>(model.contacts().size()); ++c) {
+    const ContactFrame& contact = model.contacts()[c];
+    std::optional<SE3> touch_down;
+    for (int k = 0; k <= context.motion.numStages(); ++k) {
+      if (!context.motion.stands(c, k)) {
+        touch_down.reset();
+        continue;
+      }
+      const NodeTrace& node = context.trace.nodes[k];
+      if (!touch_down) {
+        if (k > 0) landing.add(calcCornerSpeed(contact, node.foot_twists[c]), k, contact.name);
+        touch_down = node.feet[c];
+      }
+      const SE3 moved = touch_down->inverseTimes(node.feet[c]);
+      slip.add(moved.p.norm(), k, contact.name);
+      if (contact.kind == ContactKind::Surface6D) angle.add(log3(moved.R).norm(), k, contact.name);
+      height.add(std::abs(calcClearance(context.motion.summary.ground, calcCorners(contact, node.feet[c]))), k,
+                 contact.name);
+    }
+  }
+  const std::string nothing = "no foot stands";
+  context.add(slip, "standing feet: slip", "m", bounds.slip, nothing);
+  context.add(angle, "standing feet: slip, angle", "rad", bounds.slip_angle, nothing);
+  context.add(height, "standing feet: off the ground", "m", bounds.sole_height, nothing);
+  context.add(landing, "landing velocity", "m/s", bounds.landing_velocity, "no foot lands");
+}
+
+void addSwingRows(CheckContext& context) {
+  const Model& model = context.model();
+  const CheckBounds& bounds = context.bounds;
+  Worst clearance(CheckRow::Kind::AtLeast), below(CheckRow::Kind::AtLeast), distance(CheckRow::Kind::AtLeast);
+  const auto getCorners = [&](int contact, int node) {
+    return calcCorners(model.contacts()[contact], context.trace.nodes[node].feet[contact]);
+  };
+  for (const Flight& flight : listFlights(context.motion)) {
+    const std::string& name = model.contacts()[flight.contact].name;
+    const double quarter = 0.25 * (flight.end - flight.begin);
+    const bool steps = flight.begin > 0 && flight.end <= context.motion.numStages();  // from the ground to the ground
+    for (int k = flight.begin; k < flight.end; ++k) {
+      const double height = calcClearance(context.motion.summary.ground, getCorners(flight.contact, k));
+      below.add(height, k, name);
+      if (steps && k >= flight.begin + quarter && k <= flight.end - quarter) clearance.add(height, k, name);
+    }
+  }
+  const std::vector<ContactFrame>& contacts = model.contacts();
+  for (int k = 0; k <= context.motion.numStages(); ++k)
+    for (int a = 0; a < static_cast<int>(contacts.size()); ++a)
+      for (int b = 0; b < a; ++b) {
+        if (!hasSole(contacts[a]) || !hasSole(contacts[b]) || contacts[a].body == contacts[b].body) continue;
+        const Corners first = getCorners(a, k), second = getCorners(b, k);
+        distance.add(std::max(calcGapAcrossEdges(first, second), calcGapAcrossEdges(second, first)), k,
+                     contacts[b].name + " and " + contacts[a].name);
+      }
+  context.add(clearance, "swinging feet: clearance", "m", bounds.clearance, "no foot swings");
+  context.add(below, "swinging feet: least height", "m", -bounds.below_ground, "no foot swings");
+  context.add(distance, "distance of the soles", "m", bounds.feet_distance, "there are no two soles");
+}
+
+}  // namespace bielle::validation

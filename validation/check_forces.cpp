@@ -1,0 +1,97 @@
+// Rows of contact forces and of the limits of joints and motors.
+#include <algorithm>
+#include <cmath>
+
+#include "check_rows.h"
+
+namespace bielle::validation {
+namespace {
+
+// A foot that carries less than this part of the weight is judged as if it carried so much: ratios of nearly nothing by
+// nearly nothing say nothing.
+constexpr double kLeastLoad = 0.01;
+
+struct ContactForces {
+  Worst normal{CheckRow::Kind::AtLeast}, friction, pressure, torsion{CheckRow::Kind::Note}, in_air;
+};
+
+void addWrench(const ContactFrame& contact, const Vector6d& wrench, double least_load, int node, ContactForces& out) {
+  const Vector3d f = wrench.head<3>(), n = wrench.tail<3>();
+  const double load = std::max(f.z(), least_load);
+  out.normal.add(f.z(), node, contact.name);
+  out.friction.add(f.head<2>().norm() / load, node, contact.name);
+  if (contact.kind != ContactKind::Surface6D) return;
+  // The centre of pressure is (-n_y, n_x) / f_z; the vertical moment about it is what the sole must hold by twisting.
+  const double x = -n.y() / load, y = n.x() / load;
+  out.torsion.add(std::abs(n.z() - (x * f.y() - y * f.x())) / load, node, contact.name);
+  if (contact.half_length > 0 && contact.half_width > 0)
+    out.pressure.add(std::max(std::abs(x) - contact.half_length, std::abs(y) - contact.half_width), node, contact.name);
+}
+
+// Largest |value| / limit of the motors that have a limit, with both in the note.
+class LimitUse {
+ public:
+  void add(double value, double limit, const std::string& unit, int node, const std::string& name) {
+    if (!std::isfinite(limit)) return;
+    const double use = std::abs(value) / limit;
+    worst_.add(use, node, name + " " + formatNumber(std::abs(value)) + " of " + formatNumber(limit) + " " + unit);
+  }
+  const Worst& worst() const { return worst_; }
+
+ private:
+  Worst worst_;
+};
+
+}  // namespace
+
+void addForceRows(CheckContext& context) {
+  const Model& model = context.model();
+  const double least_load = std::max(kLeastLoad * model.mass() * model.gravity().norm(), 1e-9);
+  ContactForces forces;
+  for (int k = 0; k < context.motion.numStages(); ++k)
+    for (int c = 0; c < static_cast<int>(model.contacts().size()); ++c) {
+      const ContactFrame& contact = model.contacts()[c];
+      const Vector6d wrench = context.motion.record.contact_wrenches.block<1, 6>(k, 6 * c).transpose();
+      if (context.motion.stands(c, k))
+        addWrench(contact, wrench, least_load, k, forces);
+      else
+        forces.in_air.add(wrench.cwiseAbs().maxCoeff(), k, contact.name);
+    }
+  const std::string nothing = "no foot stands";
+  context.add(forces.normal, "contact: least normal force", "N", 0, nothing);
+  context.add(forces.friction, "contact: tangential over normal", "1", context.motion.summary.ground.friction, nothing);
+  context.add(forces.pressure, "contact: pressure beyond the sole", "m", context.bounds.pressure, "no sole stands");
+  context.add(forces.torsion, "contact: twisting over normal", "m", 0, "no sole stands");
+  context.add(forces.in_air, "contact: force in the air", "N, N m", context.bounds.force_in_air, "no foot swings");
+}
+
+void addLimitRows(CheckContext& context) {
+  const Model& model = context.model();
+  const MotionRecord& record = context.motion.record;
+  Worst range;
+  for (int k = 0; k <= context.motion.numStages(); ++k)
+    for (int i = 1; i < model.numBodies(); ++i) {
+      const Joint& joint = model.joints()[i];
+      if (joint.nq != joint.nv) continue;
+      for (int j = 0; j < joint.nv; ++j) {
+        const double lower = model.lowerLimits()[joint.idx_v + j], upper = model.upperLimits()[joint.idx_v + j];
+        if (!std::isfinite(lower) && !std::isfinite(upper)) continue;
+        const double q = record.q(k, joint.idx_q + j);
+        range.add(std::max(lower - q, q - upper), k, record.q_names[joint.idx_q + j]);
+      }
+    }
+  LimitUse effort, velocity;
+  for (int k = 0; k <= context.motion.numStages(); ++k)
+    for (int m = 0; m < model.nu(); ++m) {
+      const Motor& motor = model.motors()[m];
+      const bool slides = model.joints()[motor.joint].kind == JointKind::Prismatic;
+      if (k < context.motion.numStages())
+        effort.add(record.u(k, m), motor.effort_limit, slides ? "N" : "N m", k, motor.name);
+      velocity.add(record.v(k, motor.dof), motor.velocity_limit, slides ? "m/s" : "rad/s", k, motor.name);
+    }
+  context.add(range, "joints: beyond their range", "rad, m", context.bounds.range, "no limits given");
+  context.add(effort.worst(), "motors: effort over limit", "1", 1, "no limits given");
+  context.add(velocity.worst(), "motors: velocity over limit", "1", 1, "no limits given");
+}
+
+}  // namespace bielle::validation

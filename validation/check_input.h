@@ -1,0 +1,33 @@
+#pragma once
+/// \file A motion as its files tell it.
+#include <string>
+#include <vector>
+
+#include "bielle/io/result.h"
+#include "bielle/model/model.h"
+
+namespace bielle::validation {
+
+/// A trajectory, its summary and its robot, which fit each other.
+struct CheckedMotion {
+  Model model;
+  MotionSummary summary;
+  MotionRecord record;
+
+  int numStages() const { return static_cast<int>(record.time.size()) - 1; }
+  /// Index of the phase of a node; the last node belongs to the last phase.
+  int findPhase(int node) const;
+  /// The contacts of a phase, in the order of the summary.
+  std::vector<ContactTarget> getContacts(int phase) const;
+  /// Whether a contact of the model stands on the ground at a node.
+  bool stands(int contact, int node) const;
+};
+
+/// Reads DIR/summary.json, DIR/trajectory.npz and the robot, from its file or, when that is gone, by its name.
+/// \throws ModelError naming the file, the entry and what is wrong with it
+CheckedMotion readMotion(const std::string& directory);
+
+/// \throws ModelError when names, sizes, phases or contacts of the parts contradict each other
+void checkConsistency(const CheckedMotion& motion);
+
+}  // namespace bielle::validation

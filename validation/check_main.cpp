@@ -1,0 +1,50 @@
+// bielle-check: a motion by its files and Simbody.
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iostream>
+
+#include "bielle/io/text_file.h"
+#include "bielle/model/error.h"
+#include "check.h"
+
+using namespace bielle;
+using namespace bielle::validation;
+
+namespace {
+
+constexpr int kPasses = 0, kFails = 1, kBadInput = 2;
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Checks a motion that `bielle solve` wrote, from its files alone: forces and energies by Simbody's dynamics, "
+      "steps, "
+      "loops, feet, friction, limits. Status 0: passes; 1: a check fails; 2: bad input."};
+  app.name("bielle check");
+  std::string directory;
+  bool json = false, brief = false;
+  app.add_option("DIR", directory, "with trajectory.npz and summary.json; check.json is written there")->required();
+  app.add_flag("--json", json, "print JSON instead of the table");
+  app.add_flag("--brief", brief, "print one line, and what fails")->excludes("--json");
+  app.footer("Example:\n  bielle solve squat --robot bipetto --depth 0.7 -o squat && bielle check squat");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kPasses : kBadInput;
+  }
+  try {
+    const CheckReport report = checkMotion(readMotion(directory));
+    writeTextFile((std::filesystem::path(directory) / "check.json").string(), formatReport(report));
+    if (json)
+      std::cout << formatReport(report);
+    else
+      printReport(std::cout, report, brief ? CheckPrint::Failures : CheckPrint::All);
+    return report.passed() ? kPasses : kFails;
+  } catch (const ModelError& error) {
+    std::cerr << "bielle: error: " << error.what() << std::endl;
+  } catch (const std::exception& error) {  // of Simbody, for a robot it cannot take
+    std::cerr << "bielle: error: " << directory << ": Simbody: " << error.what() << std::endl;
+  }
+  return kBadInput;
+}

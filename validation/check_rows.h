@@ -1,0 +1,60 @@
+#pragma once
+// Pieces of checkMotion: where a quantity is worst, and groups of rows.
+#include <limits>
+
+#include "check.h"
+#include "check_trace.h"
+
+namespace bielle::validation {
+
+// The worst of many values and where it was: the largest for a bound from above, the least for one from below.
+class Worst {
+ public:
+  explicit Worst(CheckRow::Kind kind = CheckRow::Kind::AtMost) : kind_(kind) {}
+
+  void add(double value, int node, const std::string& what = "") {
+    if (node_ >= 0 && !(kind_ == CheckRow::Kind::AtLeast ? value < value_ : value > value_)) return;
+    value_ = value;
+    node_ = node;
+    what_ = what;
+  }
+  bool empty() const { return node_ < 0; }
+  double value() const { return value_; }
+
+  // "node 96, 1.440 s, knee_left"
+  std::string describePlace(const CheckedMotion& motion) const;
+  // `nothing`: the note of a row without value, when nothing was added.
+  CheckRow makeRow(const std::string& name, const std::string& unit, double bound, const CheckedMotion& motion,
+                   const std::string& nothing = "") const;
+
+ private:
+  CheckRow::Kind kind_;
+  double value_ = 0;
+  int node_ = -1;
+  std::string what_;
+};
+
+// What a group of rows is made from and put into.
+struct CheckContext {
+  const CheckedMotion& motion;
+  const MotionTrace& trace;
+  const CheckBounds& bounds;
+  std::vector<CheckRow>& rows;
+
+  const Model& model() const { return motion.model; }
+  void add(const Worst& worst, const std::string& name, const std::string& unit, double bound,
+           const std::string& nothing = "") {
+    rows.push_back(worst.makeRow(name, unit, bound, motion, nothing));
+  }
+};
+
+void addDynamicsRows(CheckContext& context);
+void addEnergyRows(CheckContext& context);
+void addStanceRows(CheckContext& context);
+void addSwingRows(CheckContext& context);
+void addForceRows(CheckContext& context);
+void addLimitRows(CheckContext& context);
+
+std::string formatNumber(double value);
+
+}  // namespace bielle::validation

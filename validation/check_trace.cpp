@@ -1,0 +1,177 @@
+#include "check_trace.h"
+
+#include <Eigen/QR>
+#include <map>
+#include <memory>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/reduction.h"
+#include "bielle/math/so3.h"
+#include "simbody_bridge.h"
+
+namespace bielle::validation {
+namespace {
+
+constexpr double kRankThreshold = 1e-8;  // of scaled closure rows: what is below is redundant
+
+// Of frame 2 in frame 1; the angle about the axis of a hinge is free, all angles of a ball are.
+Vector6d calcGap(const Closure& closure, const SE3& X_12) {
+  Vector6d gap = Vector6d::Zero();
+  gap.head<3>() = X_12.p;
+  if (closure.kind == ClosureKind::Weld6D) gap.tail<3>() = log3(X_12.R);
+  if (closure.kind == ClosureKind::Hinge5D) {
+    const Vector3d axis2 = X_12.R * closure.axis, normal = closure.axis.cross(axis2);
+    gap.tail<3>() = std::atan2(normal.norm(), closure.axis.dot(axis2)) * normal.normalized();
+  }
+  return gap;
+}
+
+Vector6d dropFreeAxes(const Closure& closure, Vector6d rate) {
+  if (closure.kind == ClosureKind::Ball3D) rate.tail<3>().setZero();
+  if (closure.kind == ClosureKind::Hinge5D) rate.tail<3>() -= closure.axis.dot(rate.tail<3>()) * closure.axis;
+  return rate;
+}
+
+// Diagonal of W of check.h, one for joints outside the loops; empty for the full formulation.
+VectorXd calcMetric(const CheckedMotion& motion) {
+  if (motion.summary.formulation == Formulation::Full || motion.model.closures().empty()) return {};
+  VectorXd metric = VectorXd::Ones(motion.model.nv());
+  // A start that is open is told by other rows; what it should have been is good enough here.
+  const AssemblyResult start = closeConfiguration(motion.model, motion.record.q.row(0).transpose());
+  if (start.status != AssemblyStatus::Closed) return metric;
+  for (const LoopBlock& block : makeReduction(motion.model, start.q).blocks)
+    for (size_t i = 0; i < block.dofs.size(); ++i) metric[block.dofs[i]] = block.metric[i];
+  return metric;
+}
+
+double calcNorm(const MatrixXd& M, const VectorXd& a) { return std::sqrt(std::max(0.0, a.dot(M * a))); }
+
+class Tracer {
+ public:
+  explicit Tracer(const CheckedMotion& motion) : motion_(motion), metric_(calcMetric(motion)) {
+    for (const Closure& closure : motion.model.closures()) loop_rows_ += getRows(closure.kind);
+  }
+
+  MotionTrace trace() {
+    MotionTrace out;
+    const int stages = motion_.numStages();
+    out.stages.resize(stages);
+    for (int k = 0; k <= stages; ++k) {
+      const VectorXd q = motion_.record.q.row(k), v = motion_.record.v.row(k);
+      const VectorXd u = k < stages ? VectorXd(motion_.record.u.row(k)) : VectorXd::Zero(motion_.model.nu());
+      SimbodyBridge& simbody = getBridge(motion_.findPhase(k));
+      simbody.setState(q, v, calcMotorForces(motion_.model, u));
+      out.nodes.push_back(traceNode(simbody));
+      updateTangent(simbody);
+      if (k > 0) traceArrival(k - 1, out.stages[k - 1]);
+      if (k < stages) traceStage(simbody, k, out.stages[k]);
+    }
+    return out;
+  }
+
+ private:
+  // One per set of contacts.
+  SimbodyBridge& getBridge(int phase) {
+    const std::vector<ContactTarget> contacts = motion_.getContacts(phase);
+    std::vector<int> key;
+    for (const ContactTarget& target : contacts) key.push_back(target.contact);
+    std::unique_ptr<SimbodyBridge>& bridge = bridges_[key];
+    if (!bridge)
+      bridge = std::make_unique<SimbodyBridge>(motion_.model, makeConstraintSet(motion_.model, contacts).closures);
+    return *bridge;
+  }
+
+  NodeTrace traceNode(const SimbodyBridge& simbody) const {
+    NodeTrace node;
+    for (const ContactFrame& contact : motion_.model.contacts()) {
+      node.feet.push_back(simbody.getPlacement(contact.body) * contact.X_BF);
+      node.foot_twists.push_back(contact.X_BF.actInvMotion(simbody.calcTwist(contact.body)));
+    }
+    for (const Closure& closure : motion_.model.closures()) {
+      const SE3 X_12 = (simbody.getPlacement(closure.body1) * closure.X_B1)
+                           .inverseTimes(simbody.getPlacement(closure.body2) * closure.X_B2);
+      const Vector6d V1 = closure.X_B1.actInvMotion(simbody.calcTwist(closure.body1));
+      const Vector6d V2 = closure.X_B2.actInvMotion(simbody.calcTwist(closure.body2));
+      node.gaps.push_back(calcGap(closure, X_12));
+      node.gap_rates.push_back(dropFreeAxes(closure, V1 - X_12.actMotion(V2)));
+    }
+    node.kinetic = simbody.calcKineticEnergy();
+    node.potential = simbody.calcPotentialEnergy();
+    return node;
+  }
+
+  // Directions along the closures at a node: of x, what no correction W^{-1} J^T y can have made.
+  void updateTangent(const SimbodyBridge& simbody) {
+    if (!metric_.size()) return;
+    const VectorXd inverse_root = metric_.cwiseSqrt().cwiseInverse();
+    const MatrixXd J = simbody.calcConstraintJacobian().topRows(loop_rows_) * inverse_root.asDiagonal();
+    Eigen::ColPivHouseholderQR<MatrixXd> factors;
+    factors.setThreshold(kRankThreshold);
+    factors.compute(J.transpose());
+    const int n = motion_.model.nv();
+    const MatrixXd Q = factors.householderQ();
+    N_ = inverse_root.asDiagonal() * Q.rightCols(n - factors.rank());
+  }
+  VectorXd projectOnTangent(const VectorXd& x) const {
+    if (!metric_.size()) return x;
+    return N_ * (N_.transpose() * metric_.cwiseProduct(x));
+  }
+
+  // What is judged along the closures of the next node.
+  void traceArrival(int k, StageTrace& stage) const {
+    const double h = motion_.summary.time_step;
+    stage.position_rest = projectOnTangent(calcStep(k) - h * motion_.record.v.row(k + 1).transpose());
+  }
+
+  VectorXd calcStep(int k) const {
+    return motion_.model.difference(motion_.record.q.row(k).transpose(), motion_.record.q.row(k + 1).transpose());
+  }
+
+  std::vector<Vector6d> gatherWrenches(int k) const {
+    const MotionRecord& record = motion_.record;
+    std::vector<Vector6d> wrenches;
+    const int loops = static_cast<int>(motion_.model.closures().size());
+    for (int c = 0; c < loops; ++c) wrenches.push_back(record.closure_wrenches.block<1, 6>(k, 6 * c).transpose());
+    for (const ContactTarget& target : motion_.getContacts(motion_.findPhase(k)))
+      wrenches.push_back(record.contact_wrenches.block<1, 6>(k, 6 * target.contact).transpose());
+    return wrenches;
+  }
+
+  void traceStage(const SimbodyBridge& simbody, int k, StageTrace& stage) const {
+    const MotionRecord& record = motion_.record;
+    const double h = motion_.summary.time_step;
+    const VectorXd v = record.v.row(k), a = record.a.row(k), next = record.v.row(k + 1), d = calcStep(k);
+    const VectorXd motors = calcMotorForces(motion_.model, record.u.row(k).transpose());
+    std::vector<Vector6d> wrenches = gatherWrenches(k);
+    stage.balance = simbody.calcInverseDynamics(a) - motors - simbody.calcWrenchForces(wrenches);
+    stage.velocity_rest = projectOnTangent(d / h - v - h * a);
+
+    const MatrixXd M = simbody.calcMassMatrix();
+    VectorXd rows = simbody.calcConstraintAcceleration(a);
+    rows.head(loop_rows_).setZero();
+    const VectorXd a_simbody = simbody.solveWithArmature(Precision::Double, rows).a;
+    stage.acceleration = calcNorm(M, a_simbody);
+    stage.acceleration_error = calcNorm(M, a - a_simbody);
+    stage.finite_difference = calcNorm(M, (next - v) / h - a_simbody);
+
+    const VectorXd moved = h / 2 * (v + next);
+    stage.motor_work = motors.dot(moved);
+    stage.exchanged = motors.cwiseProduct(moved).cwiseAbs().sum();
+    const double all_work = simbody.calcWrenchForces(wrenches).dot(moved);
+    std::fill_n(wrenches.begin(), motion_.model.closures().size(), Vector6d::Zero());
+    stage.contact_work = simbody.calcWrenchForces(wrenches).dot(moved);
+    stage.closure_work = all_work - stage.contact_work;
+  }
+
+  const CheckedMotion& motion_;
+  VectorXd metric_;  // nv, diagonal of W, or empty
+  MatrixXd N_;       // nv x mobility at the node traced last, N^T W N = 1
+  int loop_rows_ = 0;
+  std::map<std::vector<int>, std::unique_ptr<SimbodyBridge>> bridges_;
+};
+
+}  // namespace
+
+MotionTrace traceMotion(const CheckedMotion& motion) { return Tracer(motion).trace(); }
+
+}  // namespace bielle::validation

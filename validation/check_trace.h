@@ -1,0 +1,37 @@
+#pragma once
+/// \file What Simbody says at every node of a motion: the measurements behind the rows of check.h.
+#include "check_input.h"
+
+namespace bielle::validation {
+
+struct NodeTrace {
+  std::vector<SE3> feet;              ///< per contact of the model, placement of its frame in the world
+  std::vector<Vector6d> foot_twists;  ///< of that frame, in its own coordinates
+  std::vector<Vector6d> gaps;  ///< per closure: position and angle vector of frame 2 in frame 1, free axes left out
+  std::vector<Vector6d> gap_rates;    ///< the same of its velocity
+  double kinetic = 0, potential = 0;  ///< energies, of bodies and rotors, J
+};
+
+/// A stage, from its node to the next.
+struct StageTrace {
+  VectorXd balance;               ///< nv, M a + b - B u - J^T lambda of what is recorded, Eq. (1) of check.h
+  VectorXd velocity_rest;         ///< nv, the first of Eqs. (2) over h: what is left along the closures, m/s or rad/s
+  VectorXd position_rest;         ///< nv, the second of Eqs. (2), m or rad
+  double acceleration = 0;        ///< sqrt(a^T M a), a Simbody's own
+  double acceleration_error = 0;  ///< the same norm of the recorded a less Simbody's
+  double finite_difference = 0;   ///< sqrt(e^T M e) of Eq. (4)
+  double motor_work = 0;          ///< over the interval, J
+  double exchanged = 0;           ///< sum of the sizes of the work of each motor, J
+  double contact_work = 0;        ///< of feet that slip, J
+  double closure_work = 0;        ///< of loops that open, J
+};
+
+struct MotionTrace {
+  std::vector<NodeTrace> nodes;    ///< N + 1
+  std::vector<StageTrace> stages;  ///< N
+};
+
+/// The motion must be consistent and its numbers finite.
+MotionTrace traceMotion(const CheckedMotion& motion);
+
+}  // namespace bielle::validation

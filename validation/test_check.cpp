@@ -1,0 +1,355 @@
+// Oracles: a pendulum integrated by its own formula, motions poisoned one number at a time, files that lie.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+#include <sstream>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/io/names.h"
+#include "bielle/model/builder.h"
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/squat.h"
+#include "check.h"
+#include "robot_directory.h"
+#include "run_command.h"
+
+namespace fs = std::filesystem;
+using namespace bielle;
+using namespace bielle::testing;
+using namespace bielle::validation;
+
+namespace {
+
+using Names = std::set<std::string>;
+
+std::string print(const CheckReport& report) {
+  std::ostringstream text;
+  printReport(text, report);
+  return text.str();
+}
+
+Names getFailures(const CheckReport& report) {
+  Names names;
+  for (const CheckRow& row : report.rows)
+    if (!row.passed()) names.insert(row.name);
+  return names;
+}
+
+double getValue(const CheckReport& report, const std::string& name) {
+  const CheckRow* row = report.findRow(name);
+  REQUIRE(row != nullptr);
+  REQUIRE(row->value);
+  return *row->value;
+}
+
+std::string findBipetto() { return std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto"; }
+
+// As solved, written and read back. Solved once.
+struct SolvedSquat {
+  explicit SolvedSquat(Formulation formulation) {
+    const LoadedRobot robot = loadRobot(findBipetto());
+    Motion motion = makeSquat(robot.model, {}, formulation);
+    summary = Fddp().solve(*motion.problem, motion.guess);
+    writeResult(directory.path(), makeResult({"bipetto", robot.file, {}}, motion, motion.guess, summary));
+    checked = readMotion(directory.path());
+  }
+  RobotDirectory directory;
+  FddpSummary summary;
+  CheckedMotion checked;
+};
+
+const SolvedSquat& getSquat(Formulation formulation = Formulation::Reduced) {
+  static const SolvedSquat reduced(Formulation::Reduced), full(Formulation::Full);
+  return formulation == Formulation::Reduced ? reduced : full;
+}
+
+// A motion without contacts from its states and torques.
+CheckedMotion makeFreeMotion(const Model& model, double h, Formulation formulation, int stages) {
+  CheckedMotion motion;
+  motion.model = model;
+  motion.summary.file = "memory";
+  motion.summary.motion = "free motion";
+  motion.summary.robot = model.name();
+  motion.summary.formulation = formulation;
+  motion.summary.time_step = h;
+  motion.summary.phases = {{"free", 0, stages, {}}};
+  MotionRecord& record = motion.record;
+  record.q_names = makePositionNames(model);
+  record.v_names = makeVelocityNames(model);
+  record.u_names = getNames(model.motors());
+  record.closure_names = getNames(model.closures());
+  record.time = VectorXd::LinSpaced(stages + 1, 0, stages * h);
+  record.q.setZero(stages + 1, model.nq());
+  record.v.setZero(stages + 1, model.nv());
+  record.a.setZero(stages, model.nv());
+  record.u.setZero(stages, model.nu());
+  record.closure_wrenches.setZero(stages, 6 * model.closures().size());
+  record.contact_wrenches.setZero(stages, 0);
+  return motion;
+}
+
+// A rod of length l and mass m on a hinge: (m l^2 / 3) q'' = -m g (l / 2) sin q, q from hanging down.
+constexpr double kLength = 0.7, kGravity = 9.81;
+double calcPendulumAcceleration(double q) { return -1.5 * kGravity / kLength * std::sin(q); }
+
+Model makePendulum() {
+  ModelBuilder builder("pendulum");
+  Joint joint;
+  joint.name = "hinge";
+  joint.kind = JointKind::Revolute;
+  joint.axis = Vector3d::UnitY();
+  Inertia inertia;
+  inertia.mass = 1.3;
+  inertia.com = Vector3d(0, 0, -kLength / 2);
+  inertia.I_com = 1.3 * kLength * kLength / 12 * Eigen::Vector3d(1, 1, 1e-3).asDiagonal();
+  builder.addLink("rod", "world", joint, inertia);
+  builder.addMotor("hinge");
+  return builder.build();
+}
+
+// By Euler steps of h, or exactly (classical Runge-Kutta steps of h / 100).
+CheckedMotion makePendulumMotion(double h, bool exact) {
+  const int stages = static_cast<int>(std::lround(1 / h));
+  CheckedMotion motion = makeFreeMotion(makePendulum(), h, Formulation::Full, stages);
+  Eigen::Vector2d x(1.2, 0);
+  const auto rate = [](const Eigen::Vector2d& y) { return Eigen::Vector2d(y[1], calcPendulumAcceleration(y[0])); };
+  for (int k = 0; k <= stages; ++k) {
+    motion.record.q(k, 0) = x[0];
+    motion.record.v(k, 0) = x[1];
+    if (k == stages) break;
+    motion.record.a(k, 0) = calcPendulumAcceleration(x[0]);
+    if (!exact) {
+      x[1] += h * motion.record.a(k, 0);
+      x[0] += h * x[1];
+    }
+    for (int i = 0; exact && i < 100; ++i) {
+      const double s = h / 100;
+      const Eigen::Vector2d k1 = rate(x), k2 = rate(x + s / 2 * k1), k3 = rate(x + s / 2 * k2), k4 = rate(x + s * k3);
+      x += s / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+    }
+  }
+  return motion;
+}
+
+// The four-bar swinging from rest, by the steps of a formulation.
+CheckedMotion makeFourBarMotion(double h, Formulation formulation) {
+  const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar").model;
+  const VectorXd q0 = findClosedConfiguration(model).q;
+  const int stages = static_cast<int>(std::lround(0.5 / h));
+  const auto makeStage = [&] {
+    StageSpec stage;
+    stage.dt = h;
+    stage.constraints = makeConstraintSet(model);
+    stage.state = {0, q0, VectorXd::Zero(model.nv()), VectorXd::Zero(2 * model.nv())};
+    stage.control = {0, VectorXd::Zero(model.nu()), VectorXd::Zero(model.nu())};
+    return stage;
+  };
+  std::vector<StageSpec> specs;
+  for (int k = 0; k <= stages; ++k) specs.push_back(makeStage());
+  Motion motion;
+  motion.schedule = {h, {{"free", stages, {}}}};
+  motion.problem = std::make_unique<RobotProblem>(model, q0, VectorXd::Zero(model.nv()), std::move(specs), formulation);
+  ShootingTrajectory trajectory;
+  trajectory.xs = {motion.problem->initialState()};
+  double cost = 0;
+  for (int k = 0; k < stages; ++k) {
+    trajectory.us.push_back(VectorXd::Constant(model.nu(), 0.3));
+    VectorXd next(trajectory.xs[0].size());
+    REQUIRE(motion.problem->step(k, trajectory.xs[k], trajectory.us[k], next, cost) == StepStatus::Ok);
+    trajectory.xs.push_back(next);
+  }
+  CheckedMotion checked = makeFreeMotion(model, h, formulation, stages);
+  checked.record = makeRecord(motion, trajectory);
+  return checked;
+}
+
+}  // namespace
+
+TEST_CASE("check: the squat of Bipetto passes at its defaults, in both formulations") {
+  for (const Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
+    const SolvedSquat& squat = getSquat(formulation);
+    CHECK(squat.summary.termination == FddpTermination::Converged);
+    const CheckReport report = checkMotion(squat.checked);
+    INFO(print(report));
+    CHECK(getFailures(report) == Names());
+    CHECK(getValue(report, "equations of motion") > 0);
+    CHECK(getValue(report, "energy, whole motion") > 0);
+  }
+}
+
+TEST_CASE("check: a pendulum by Euler steps passes; the exact one keeps all but them, at first order") {
+  const CheckReport steps = checkMotion(makePendulumMotion(1e-3, false));
+  INFO(print(steps));
+  CHECK(steps.passed());
+  const CheckReport coarse = checkMotion(makePendulumMotion(2e-3, true)),
+                    fine = checkMotion(makePendulumMotion(1e-3, true));
+  INFO(print(fine));
+  CHECK(getFailures(fine) == Names{"steps of the velocity", "steps of the configuration"});
+  for (const char* name : {"finite differences of the velocity", "steps of the velocity"})
+    CHECK(getValue(coarse, name) == Approx(2 * getValue(fine, name)).epsilon(0.02));
+}
+
+TEST_CASE("check: a swinging four-bar passes, its defect shrinks with the step") {
+  for (const Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
+    const CheckReport coarse = checkMotion(makeFourBarMotion(2e-3, formulation));
+    const CheckReport fine = checkMotion(makeFourBarMotion(1e-3, formulation));
+    INFO(print(coarse) << print(fine));
+    CHECK(coarse.passed());
+    CHECK(fine.passed());
+    const std::string name = formulation == Formulation::Reduced ? "finite differences of the velocity" : "loops: gap";
+    CHECK(getValue(fine, name) < 0.6 * getValue(coarse, name));
+    CHECK(getValue(fine, "energy, whole motion") < 0.6 * getValue(coarse, "energy, whole motion"));
+  }
+}
+
+TEST_CASE("check: each poisoned number makes its rows fail and no other") {
+  const CheckedMotion good = getSquat().checked;
+  const auto expect = [&good](const Names& names, const std::function<void(CheckedMotion&)>& poison) {
+    CheckedMotion motion = good;
+    poison(motion);
+    const CheckReport report = checkMotion(motion);
+    INFO(print(report));
+    CHECK(getFailures(report) == names);
+  };
+  const Model& model = good.model;
+  const int node = 100;
+  const Joint& hip = model.joints()[model.findJoint("hipy_left")];
+  const int knee = model.joints()[model.findJoint("motor_knee_left")].idx_q;
+  const int foot = 6 * model.findContact("foot_left");
+  const Names steps = {"equations of motion", "steps of the velocity", "steps of the configuration"};
+  expect(steps, [&](CheckedMotion& m) { m.record.q(node, hip.idx_q) += 1e-4; });
+  expect(steps, [&](CheckedMotion& m) { m.record.v(node, hip.idx_v) += 1e-4; });
+  expect({"equations of motion", "steps of the velocity"},
+         [&](CheckedMotion& m) { m.record.a(node, hip.idx_v) += 1e-3; });
+  expect({"equations of motion"}, [&](CheckedMotion& m) { m.record.u(node, 3) += 1e-3; });
+  expect({"equations of motion"}, [&](CheckedMotion& m) { m.record.contact_wrenches(node, foot + 2) += 0.1; });
+  expect({"equations of motion"}, [&](CheckedMotion& m) { m.record.closure_wrenches(node, 1) += 0.1; });
+  expect({"equations of motion", "steps of the velocity", "steps of the configuration", "loops: gap",
+          "loops: gap, angle", "loops: opening velocity"},
+         [&](CheckedMotion& m) { m.record.q(node, knee) += 1e-4; });
+  expect({"time between nodes"}, [&](CheckedMotion& m) { m.record.time[node] += 1e-6; });
+  expect({"contact: tangential over normal"}, [&](CheckedMotion& m) { m.summary.ground.friction = 1e-4; });
+  expect({"standing feet: off the ground"}, [&](CheckedMotion& m) { m.summary.ground.height = 3e-3; });
+  expect({"contact: least normal force", "equations of motion"},
+         [&](CheckedMotion& m) { m.record.contact_wrenches(node, foot + 2) = -0.1; });
+  expect({"contact: pressure beyond the sole", "equations of motion"},
+         [&](CheckedMotion& m) { m.record.contact_wrenches(node, foot + 4) = 10; });
+  expect({"numbers not finite"}, [&](CheckedMotion& m) { m.record.v(node, 3) = std::nan(""); });
+}
+
+TEST_CASE("check: a foot that slides, and one that is said to be in the air") {
+  CheckedMotion sliding = getSquat().checked;
+  for (int k = 0; k <= sliding.numStages(); ++k) sliding.record.q(k, 0) += 2e-5 * k;  // 4 mm, at a speed that v lacks
+  const CheckReport slid = checkMotion(sliding);
+  INFO(print(slid));
+  CHECK(getFailures(slid) == Names{"standing feet: slip", "steps of the velocity", "steps of the configuration"});
+
+  CheckedMotion lifted = getSquat().checked;
+  const auto stances = lifted.summary.phases[0].stances;
+  lifted.summary.phases = {
+      {"both", 0, 80, stances}, {"one", 80, 40, {stances[0]}}, {"both", 120, lifted.numStages() - 120, stances}};
+  const CheckReport report = checkMotion(lifted);
+  INFO(print(report));
+  for (const char* name : {"swinging feet: clearance", "contact: force in the air", "equations of motion"})
+    CHECK(getFailures(report).count(name) == 1);
+  CHECK(std::abs(getValue(report, "swinging feet: least height")) < 1e-3);
+  CHECK(getValue(report, "landing velocity") < 0.02);
+}
+
+TEST_CASE("check: limits of joints and motors, and soles that overlap") {
+  const auto read = [](const char* name) {
+    std::ifstream file(findBipetto() + "/" + name);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  const auto check = [](const std::string& urdf, const std::string& yaml) {
+    const RobotDirectory directory;
+    CheckedMotion motion = getSquat().checked;
+    motion.model = loadRobot(directory.writeRobot(urdf, yaml)).model;
+    return checkMotion(motion);
+  };
+  const std::string urdf = read("bipetto.urdf"), yaml = read("bipetto.yaml");
+  const std::regex motors("effort=\"0\" velocity=\"0\""), range("upper=\"0.523599\""), sole("sole: \\[0.10, 0.10\\]");
+  CHECK(getFailures(check(std::regex_replace(urdf, motors, "effort=\"20\" velocity=\"30\""), yaml)) == Names());
+  CHECK(getFailures(check(std::regex_replace(urdf, motors, "effort=\"14\" velocity=\"30\""), yaml)) ==
+        Names{"motors: effort over limit"});
+  CHECK(getFailures(check(std::regex_replace(urdf, motors, "effort=\"20\" velocity=\"1\""), yaml)) ==
+        Names{"motors: velocity over limit"});
+  CHECK(getFailures(check(std::regex_replace(urdf, range, "upper=\"0.0001\""), yaml)) ==
+        Names{"joints: beyond their range"});
+  CHECK(getFailures(check(urdf, std::regex_replace(yaml, sole, "sole: [0.10, 0.40]"))) ==
+        Names{"distance of the soles"});
+}
+
+TEST_CASE("check: files that are missing, broken or of another robot are refused") {
+  const RobotDirectory directory;
+  const auto refuse = [&directory](const std::string& what) {
+    CHECK_THROWS_WITH(readMotion(directory.path()), Catch::Contains(what));
+    CHECK_THROWS_AS(readMotion(directory.path()), ModelError);
+  };
+  refuse("summary.json");
+  using Json = nlohmann::json;
+  const fs::path solved = getSquat().directory.path();
+  const Json good = Json::parse(std::ifstream(solved / "summary.json"));
+  const auto write = [&directory](const Json& json) { directory.write("summary.json", json.dump()); };
+  write(good);
+  refuse("trajectory.npz");
+  fs::copy(solved / "trajectory.npz", directory.path());
+  CHECK_NOTHROW(readMotion(directory.path()));
+  const auto poison = [&](const char* pointer, const Json& value, const std::string& what) {
+    Json bad = good;
+    bad[Json::json_pointer(pointer)] = value;
+    write(bad);
+    refuse(what);
+  };
+  poison("/phases/0/start_node", 1, "does not start");
+  poison("/phases/0/nodes", 199, "not as long");
+  poison("/phases/0/nodes", 201, "do not fit");
+  poison("/phases/0/nodes", -3, "do not fit");
+  poison("/phases", Json::array(), "not as long");
+  poison("/phases/0/contacts/0/name", "hand", "no contact 'hand'");
+  poison("/phases/0/contacts/0/name", "foot_right", "stands twice");
+  poison("/time_step_s", 0, "time_step_s");
+  poison("/time_step_s", "soon", "summary.json");
+  poison("/ground/friction", -1, "friction");
+  poison("/ground", 7, "summary.json");
+  poison("/model", "serial", "model");
+  poison("/robot_file", std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar/fourbar.urdf", "not those of the robot");
+  directory.write("summary.json", "{");
+  refuse("summary.json");
+  write(good);
+  directory.write("trajectory.npz", "PK but no archive");
+  refuse("trajectory.npz");
+}
+
+TEST_CASE("check: the program writes check.json and tells by its status") {
+  const RobotDirectory directory;
+  const fs::path solved = getSquat().directory.path();
+  for (const char* name : {"summary.json", "trajectory.npz"}) fs::copy(solved / name, directory.path());
+  const CommandResult passed = runCommand({BIELLE_CHECK, directory.path(), "--json"});
+  INFO(passed.out << passed.err);
+  CHECK(passed.status == 0);
+  const auto json = nlohmann::json::parse(passed.out);
+  CHECK(json == nlohmann::json::parse(std::ifstream(fs::path(directory.path()) / "check.json")));
+  CHECK(json.at("pass") == true);
+  for (const auto& row : json.at("rows"))
+    for (const char* key : {"name", "value", "bound", "unit", "pass", "note"}) CHECK(row.contains(key));
+
+  auto summary = nlohmann::json::parse(std::ifstream(solved / "summary.json"));
+  summary["ground"]["friction"] = 0;
+  directory.write("summary.json", summary.dump());
+  const CommandResult failed = runCommand({BIELLE_CHECK, directory.path(), "--brief"});
+  CHECK(failed.status == 1);
+  CHECK_THAT(failed.out, Catch::Contains("FAIL") && Catch::Contains("tangential"));
+  CHECK(nlohmann::json::parse(std::ifstream(fs::path(directory.path()) / "check.json")).at("pass") == false);
+
+  const CommandResult refused = runCommand({BIELLE_CHECK, directory.path() + "/nowhere"});
+  CHECK(refused.status == 2);
+  CHECK(refused.out.empty());
+  CHECK_THAT(refused.err, Catch::StartsWith("bielle: error: "));
+}
