@@ -1,5 +1,6 @@
 #include "cli/motion_registry.h"
 
+#include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
 
@@ -53,6 +54,11 @@ const std::vector<MotionEntry>& getMotions() {
        "bielle solve turn --robot bipetto --angle 1.57 --radius 0.5 -o turn",
        {"angle", "radius", "steps", "single_support", "double_support", "swing_height"},
        makeRequests<TurnOptions>(makeTurn)},
+      {"jump",
+       "push, fly for a given time, land: the height of the centre of mass at mid-flight follows from the time",
+       "bielle solve jump --robot bipetto --flight 0.3 --length 0.2 -o jump",
+       {"flight", "length"},
+       makeRequests<JumpOptions>(makeJump)},
   };
   return motions;
 }
