@@ -19,11 +19,15 @@ namespace {
 // A stage with every cost that has a meaning on a mechanism with these contacts, and a terminal node with the kinematic
 // ones.
 std::vector<StageSpec> makeStages(const Model& model, const std::vector<ContactTarget>& contacts, const VectorXd& q_ref,
-                                  std::mt19937& rng) {
+                                  std::mt19937& rng, StageKind kind = StageKind::Dynamics) {
   std::vector<StageSpec> stages(2);
   for (size_t k = 0; k < 2; ++k) {
     StageSpec& stage = stages[k];
     stage.dt = 0.01;
+    if (k == 0 && kind == StageKind::Impact) {
+      stage.kind = kind;
+      stage.dt = 0;
+    }
     if (k == 0) stage.constraints = makeConstraintSet(model, contacts);
     stage.state = {0.7, q_ref, randomVector(rng, model.nv()), randomVector(rng, 2 * model.nv()).cwiseAbs()};
     stage.control = {0.3, randomVector(rng, model.nu()), VectorXd::Ones(model.nu())};
@@ -80,8 +84,10 @@ double calcClosureSpeed(const Model& model, const VectorXd& x) {
 // Every block of the linearization of stage 0 about (state, u) against differences of the step, with a node state some
 // way off.
 void checkLinearization(const Model& model, const std::vector<ContactTarget>& contacts, const State& state,
-                        const VectorXd& x_node, std::mt19937& rng) {
-  RobotProblem problem(model, state.q, state.v, makeStages(model, contacts, state.q, rng), Formulation::Reduced);
+                        const VectorXd& x_node, std::mt19937& rng, StageKind kind = StageKind::Dynamics,
+                        Formulation formulation = Formulation::Reduced) {
+  const bool reduced = formulation == Formulation::Reduced;
+  RobotProblem problem(model, state.q, state.v, makeStages(model, contacts, state.q, rng, kind), formulation);
   const VectorXd x = state.x(), u = randomVector(rng, model.nu(), 5);
   const int ndx = problem.tangentSize(0);
   StageModel stage;
@@ -91,8 +97,8 @@ void checkLinearization(const Model& model, const std::vector<ContactTarget>& co
     VectorXd x_next(x.size()), dx(ndx), out(ndx + 1);
     double cost = 0;
     REQUIRE(problem.step(0, at, control, x_next, cost) == StepStatus::Ok);
-    CHECK(calcGap(model, x_next) < 1e-10);
-    CHECK(calcClosureSpeed(model, x_next) < 1e-9);
+    if (reduced) CHECK(calcGap(model, x_next) < 1e-10);
+    if (reduced) CHECK(calcClosureSpeed(model, x_next) < 1e-9);
     problem.difference(1, x_node, x_next, dx);
     out << dx, cost;
     return out;
@@ -102,7 +108,7 @@ void checkLinearization(const Model& model, const std::vector<ContactTarget>& co
   const auto along = [&](const VectorXd& dx) {
     VectorXd moved(x.size());
     problem.integrate(0, x, dx, moved);
-    CHECK(calcGap(model, moved) < 1e-10);
+    if (reduced) CHECK(calcGap(model, moved) < 1e-10);
     VectorXd back(ndx);
     problem.difference(0, x, moved, back);
     CHECK((back - dx).cwiseAbs().maxCoeff() < 1e-9);
@@ -112,7 +118,10 @@ void checkLinearization(const Model& model, const std::vector<ContactTarget>& co
   checkDerivative(linear.Fx, dx.topRows(ndx));
   checkDerivative(linear.lx.transpose(), dx.bottomRows(1));
   const MatrixXd du = differentiate(u, 1e-2, [&](const VectorXd& control) { return step(x, control); });
-  checkDerivative(linear.Fu, du.topRows(ndx));
+  if (kind == StageKind::Impact)
+    CHECK(linear.Fu.isZero(0));
+  else
+    checkDerivative(linear.Fu, du.topRows(ndx));
   checkDerivative(linear.lu.transpose(), du.bottomRows(1));
 }
 
@@ -166,6 +175,37 @@ TEST_CASE("reduced step: Bipetto, four-bar, five-bar, redundant planar four-bar"
       checkLinearization(model, contacts, state, node.x(), rng);
     }
   }
+}
+
+TEST_CASE("impact stages, in both formulations: random mechanisms and Bipetto, with and without a gap") {
+  std::mt19937 rng(14);
+  std::vector<Mechanism> mechanisms;
+  for (JointKind kind : {JointKind::Spherical, JointKind::Universal, JointKind::Planar})
+    for (ClosureKind closure : {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D})
+      mechanisms.push_back(makeRandomMechanism(rng, kind, closure, MechanismBase::FreeFlyer));
+  mechanisms.emplace_back();
+  mechanisms.back().model = loadRobot("bipetto").model;
+  mechanisms.back().q_closed = makeStandingPosture(mechanisms.back().model);
+  for (const Mechanism& mechanism : mechanisms)
+    for (const Formulation formulation : {Formulation::Full, Formulation::Reduced}) {
+      const Model& model = mechanism.model;
+      CAPTURE(model.name(), getName(formulation));
+      const std::vector<ContactTarget> contacts = {{1, {}, 0, 10}};
+      const State state = makeClosedState(model, mechanism.q_closed, 0, 1, rng);
+      RobotProblem problem(model, state.q, state.v, makeStages(model, contacts, state.q, rng, StageKind::Impact),
+                           formulation);
+      VectorXd x_next(state.x().size());
+      double cost = 0;
+      REQUIRE(problem.step(0, state.x(), VectorXd::Zero(model.nu()), x_next, cost) == StepStatus::Ok);
+      CHECK(x_next.head(model.nq()) == state.q);
+      Workspace ws(model);
+      const VectorXd v_next = x_next.tail(model.nv());
+      CHECK((v_next - projectVelocity(model, ws, makeConstraintSet(model, contacts), state.q, v_next)).norm() < 1e-9);
+      CHECK((v_next - state.v).norm() > 1e-2);
+      checkLinearization(model, contacts, state, x_next, rng, StageKind::Impact, formulation);
+      const State node = makeClosedState(model, state.q, 0.05, 1, rng);
+      checkLinearization(model, contacts, state, node.x(), rng, StageKind::Impact, formulation);
+    }
 }
 
 TEST_CASE("reduced accelerations are those of the full formulation") {

@@ -68,6 +68,7 @@ class NodeModel {
   std::string failure_;
 };
 
+// Of the kind that the stage says.
 std::unique_ptr<NodeModel> makeFullNode(const Model& model, const StageSpec& spec);
 // Memory that the reduced nodes of a problem share, one piece for each thread; the reduction must outlive it.
 class ReducedWorkPool;

@@ -1,11 +1,10 @@
 // State space and step of reduced_node.h.
-#include "reduced_node.h"
-
 #include <algorithm>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/math/lane_product.h"
+#include "impact_nodes.h"
 
 namespace bielle {
 
@@ -57,6 +56,7 @@ ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const R
   for (VectorXd* x : {&f, &ydd}) x->setZero(nr);
   dydd.setZero(nr, 2 * nr + nu);
   dlambda.setZero(sizes.rows, 2 * nr + nu);
+  dlambda_turned.setZero(2 * nr + nu, sizes.rows);
   for (MatrixXd* m : {&jacobians.q, &jacobians.v}) m->setZero(sizes.residuals, nv);
   jacobians.lambda.setZero(sizes.residuals, sizes.constraints);
   const Eigen::Index padded = roundUpToLane(2 * nr + nu);
@@ -386,6 +386,8 @@ std::shared_ptr<ReducedWorkPool> makeReducedWorkPool(const Model& model, const R
 
 std::unique_ptr<NodeModel> makeReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec,
                                            std::shared_ptr<ReducedWorkPool> pool) {
+  if (spec.kind == StageKind::Impact)
+    return std::make_unique<ReducedImpactNode>(model, reduction, spec, std::move(pool));
   return std::make_unique<ReducedNode>(model, reduction, spec, std::move(pool));
 }
 

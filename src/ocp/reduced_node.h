@@ -79,6 +79,7 @@ struct ReducedWork {
   VectorXd f, ydd;                      // size
   MatrixXd dydd;                        // size x (2 size + nu), derivatives of y' with respect to (dy, dy_v, u)
   MatrixXd dlambda;                     // largest contact rows x the same
+  MatrixXd dlambda_turned;              // its transpose, for impacts
   ResidualJacobians jacobians;
   VectorXd Rt, Rt_scaled, dlambda_t, H;  // of addResiduals(), with room for any node
 };
@@ -140,7 +141,7 @@ class ReducedNode : public NodeModel {
   void addStateCost(const StateCost& cost, const VectorXd& difference, double scale, StageModel& out) override;
   void addResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
 
- private:
+ protected:
   // Kinematics at x; the blocks are those that `previous` has closed there, if given.
   bool updateState(ConstVectorRef x, const ReducedNode* previous);
   void updateWholePlacements();

@@ -14,7 +14,10 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index) {
   const auto require = [&](bool ok, const std::string& what, const std::string& remedy) {
     if (!ok) throw ModelError(model.name(), element, what, remedy);
   };
-  require(spec.dt > 0 && std::isfinite(spec.dt), "its time step is not positive", "give seconds, e.g. 0.015");
+  if (spec.kind == StageKind::Impact)
+    require(spec.dt == 0, "an impact that takes time", "give it a time step of 0");
+  else
+    require(spec.dt > 0 && std::isfinite(spec.dt), "its time step is not positive", "give seconds, e.g. 0.015");
   if (spec.state.weight != 0)
     require(spec.state.q_ref.size() == model.nq() && spec.state.v_ref.size() == model.nv() &&
                 spec.state.weights.size() == 2 * model.nv(),
@@ -28,6 +31,9 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index) {
         "cost '" + cost.name + "' has " + std::to_string(cost.activation.weights.size()) + " weights for another size",
         "give one weight per row of the residual");
 }
+
+// What the costs of a running stage are multiplied by.
+double getScale(const StageSpec& spec) { return spec.kind == StageKind::Impact ? 1 : spec.dt; }
 
 // As allFinite(), but vectorized: a value that is not finite makes the sum one too.
 bool isFinite(const MatrixXd& A) { return (0 * A).sum() == 0; }
@@ -117,7 +123,7 @@ StepStatus RobotProblem::continueStep(int stage, ConstVectorRef x, ConstVectorRe
 
 StepStatus RobotProblem::finishStep(int stage, VectorRef x_next, double& cost) {
   x_next = nodes_[stage].dynamics->x_next();
-  cost = specs_[stage].dt * sumCosts(stage);
+  cost = getScale(specs_[stage]) * sumCosts(stage);
   return std::isfinite(cost) ? StepStatus::Ok : StepStatus::Failed;
 }
 
@@ -173,7 +179,7 @@ StepStatus RobotProblem::linearize(int stage, ConstVectorRef x, ConstVectorRef u
   if (out.Fx.rows() != tangent_size_ || out.Fu.cols() != model_.nu())
     out.resize(tangent_size_, model_.nu(), tangent_size_);
   if (!nodes_[stage].dynamics->linearizeStep(x_next_node, out)) return StepStatus::Failed;
-  const double h = specs_[stage].dt;
+  const double h = getScale(specs_[stage]);
   out.cost = h * sumCosts(stage);
   out.lx.setZero();
   out.lu.setZero();

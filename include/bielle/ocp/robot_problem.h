@@ -27,9 +27,15 @@
 
 namespace bielle {
 
-/// One stage of the horizon (or the terminal node, where dt and constraints are not used).
+/// What a stage does: an Euler step of the dynamics, or a rigid impact (impact.h): (q, v) becomes (q, v+) in no time, the
+/// constraints being those in force afterwards. At an impact lambda is impulses, motors have no say, and the running cost
+/// is the sum of the costs as it stands.
+enum class StageKind { Dynamics, Impact };
+
+/// One stage of the horizon (or the terminal node, where kind, dt and constraints are not used).
 struct StageSpec {
-  double dt = 0.015;  ///< s
+  StageKind kind = StageKind::Dynamics;
+  double dt = 0.015;  ///< s; 0 for an impact
   ConstraintSet constraints;
   StateCost state;
   ControlCost control;
