@@ -30,6 +30,10 @@ void recordStage(RobotProblem& problem, const VectorXd& x, const VectorXd& u, in
   record.u.row(k) = u;
   record.closure_wrenches.row(k).setZero();
   record.contact_wrenches.row(k).setZero();
+  if (problem.spec(k).kind == StageKind::Impact) {  // no time, so no forces
+    record.a.row(k).setZero();
+    return;
+  }
   VectorXd a, lambda;
   if (problem.calcDynamics(k, x, u, a, lambda) != StepStatus::Ok) {
     for (RowMatrixXd* table : {&record.a, &record.closure_wrenches, &record.contact_wrenches})

@@ -107,6 +107,7 @@ Json makeSummary(const MotionResult& result) {
           {"peak_torques", listByName(result.peak_torques)},
           {"time_step_s", result.schedule.dt},
           {"phases", makePhases(result)},
+          {"impacts", result.impacts},
           {"ground", makeGround(result.ground)},
           {"log_columns", {"iteration", "cost", "gap", "gradient", "step", "regularization", "seconds"}},
           {"log", log}};
@@ -122,6 +123,8 @@ MotionResult makeResult(const RunInfo& run, const Motion& motion, const Shooting
   result.formulation = motion.problem->formulation();
   result.requested = motion.requested;
   result.schedule = motion.schedule;
+  for (int k = 0; k < motion.problem->numStages(); ++k)
+    if (motion.problem->spec(k).kind == StageKind::Impact) result.impacts.push_back(k);
   result.ground = motion.ground;
   result.solver = summary;
   result.record = makeRecord(motion, trajectory);

@@ -45,6 +45,7 @@ MotionSummary read(const Json& json) {
       phase.stances.push_back({contact.at("name"), readPlacement(contact)});
     summary.phases.push_back(phase);
   }
+  for (const Json& stage : json.at("impacts")) summary.impacts.push_back(stage);
   summary.ground = readGround(json.at("ground"));
   return summary;
 }

@@ -10,7 +10,7 @@ namespace bielle {
 using RowMatrixXd = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// N stages, N + 1 nodes; one row per node or, for what a stage does from its node to the next, one row per stage.
-/// SI units, orders and frames of notation.h. Numbers of a stage whose dynamics could not be computed are NaN.
+/// An impact is a stage that takes no time: two rows of equal time, between them no acceleration and no forces. SI units, orders and frames of notation.h. Numbers of a stage whose dynamics could not be computed are NaN.
 struct MotionRecord {
   std::vector<std::string> q_names, v_names;  ///< of coordinates, as names.h gives them
   std::vector<std::string> u_names;           ///< of motors

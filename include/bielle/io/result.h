@@ -21,6 +21,7 @@ struct MotionResult {
   Formulation formulation = Formulation::Full;
   std::vector<std::pair<std::string, double>> requested;  ///< every option by name
   ContactSchedule schedule;
+  std::vector<int> impacts;  ///< stages that are rigid impacts
   Ground ground;
   FddpSummary solver;
   MotionRecord record;
@@ -56,6 +57,7 @@ struct MotionSummary {
   std::vector<std::pair<std::string, double>> requested;
   double time_step = 0;  ///< s
   std::vector<Phase> phases;
+  std::vector<int> impacts;  ///< stages that are rigid impacts
   Ground ground;
 };
 
