@@ -1,0 +1,75 @@
+// A solve that starts from the result of another one.
+#include <catch2/catch.hpp>
+
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/io/warm_start.h"
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/walk.h"
+
+using namespace bielle;
+
+namespace {
+
+const Model& getBipetto() {
+  static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
+  return robot.model;
+}
+
+Motion makeShortWalk(double speed, double end = 0.3) {
+  WalkOptions options;
+  options.speed = speed;
+  options.steps = 3;
+  options.gait.timing.end = end;
+  return makeWalk(getBipetto(), options);
+}
+
+}  // namespace
+
+TEST_CASE("warm start: a result is its own solution, and near that of a walk a little faster") {
+  Motion motion = makeShortWalk(0.4);
+  const FddpSummary cold = Fddp().solve(*motion.problem, motion.guess);
+  REQUIRE(cold.termination == FddpTermination::Converged);
+  const MotionRecord record = makeRecord(motion, motion.guess);
+
+  Motion same = makeShortWalk(0.4);
+  setGuess(record, same);
+  const FddpSummary again = Fddp().solve(*same.problem, same.guess);
+  CHECK(again.termination == FddpTermination::Converged);
+  CHECK(again.iterations <= 2);
+  CHECK(again.cost == Approx(cold.cost).epsilon(1e-8));
+
+  Motion faster = makeShortWalk(0.48), warm = makeShortWalk(0.48);
+  const FddpSummary faster_cold = Fddp().solve(*faster.problem, faster.guess);
+  setGuess(record, warm);
+  const FddpSummary faster_warm = Fddp().solve(*warm.problem, warm.guess);
+  CHECK(faster_warm.termination == FddpTermination::Converged);
+  CHECK(faster_warm.iterations < faster_cold.iterations);
+  CHECK(faster_warm.cost == Approx(faster_cold.cost).epsilon(1e-6));
+}
+
+TEST_CASE("warm start: other lengths are resampled, feet carried to their places, other robots refused") {
+  Motion motion = makeShortWalk(0.4);
+  MotionRecord record = makeRecord(motion, motion.guess);
+  Motion longer = makeShortWalk(0.6, 0.6);
+  REQUIRE(longer.problem->numStages() == motion.problem->numStages() + 20);
+  setGuess(record, longer);
+  const Model& model = getBipetto();
+  Workspace ws(model);
+  for (size_t k = 0; k < longer.guess.xs.size(); ++k) {
+    updatePositions(model, ws, longer.guess.xs[k].head(model.nq()));
+    Vector3d error = Vector3d::Zero();
+    for (const ContactTarget& target : longer.schedule.getPhase(static_cast<int>(k)).contacts) {
+      const ContactFrame& foot = model.contacts()[target.contact];
+      error += getPlacement(ws, foot.body, foot.X_BF).p - target.X_WT.p;
+    }
+    CHECK(error.norm() < 1e-12);
+  }
+  CHECK((longer.guess.us.back() - motion.guess.us.back()).norm() == 0);
+
+  record.u(3, 0) = std::numeric_limits<double>::quiet_NaN();
+  CHECK_THROWS_WITH(setGuess(record, motion), Catch::Contains("finite"));
+  record.u_names.front() = "other";
+  CHECK_THROWS_WITH(setGuess(record, motion), Catch::Contains("motors"));
+  CHECK_THROWS_AS(readResultRecord("/nowhere/at/all"), ModelError);
+}
