@@ -4,8 +4,10 @@ usage: test_report_page.py BIELLE. Ends with status 77 where there is no Chromiu
 """
 import csv
 import json
+import os
 import pathlib
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -202,6 +204,21 @@ class ReportPage(unittest.TestCase):
         self.assertGreater(refused, 0)  # the knee's linkage has a dead point
         self.browser.evaluate("document.querySelector('#sliders > button').click()")
         self.assertLess(differ(start, self.browser.evaluate(PICTURE)), 200)
+
+    def test_stills_have_the_size_asked_for(self):
+        picture = self.root / "stills.png"
+        run("report", self.squat, "--png", picture, "--times", "0,0.3,0.6", "--size", "96x80", "--columns", "2")
+        data = picture.read_bytes()
+        self.assertEqual(data[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(struct.unpack(">II", data[16:24]), (192, 160))
+        self.assertGreater(len(data), 8000)
+
+    def test_stills_need_a_browser(self):
+        result = subprocess.run([BIELLE, "report", str(self.squat), "--png", str(self.root / "none.png")],
+                                capture_output=True, text=True, env={**os.environ, "PATH": "/nonexistent"})
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("no Chromium is on the PATH", result.stderr)
+        self.assertFalse((self.root / "none.png").exists())
 
     def test_complaints_are_heard(self):
         """The instrument itself: what it must catch, it catches."""

@@ -131,7 +131,7 @@ class Plot {
       addElement(chip, 'span', 'swatch').style.borderColor = series.color;
       addElement(chip, 'span', 'name', series.name);
       this.values.push(addElement(chip, 'span', 'value'));
-      if (series.limits) chip.title = 'limits: ' + series.limits.map(limit => formatNumber(limit)).join(' … ');
+      chip.title = series.name + (series.limits ? ', limits: ' + series.limits.map(limit => formatNumber(limit)).join(' … ') : '');
       chip.onclick = () => { this.visible[s] = !this.visible[s]; this.updateVisibility(); };
       chip.onmouseenter = () => { const line = this.lines.findIndex(l => l.series === s); if (this.visible[s] && line >= 0) this.graph.setSelection(0, 'line' + line, true); };
       chip.onmouseleave = () => this.graph.clearSelection();

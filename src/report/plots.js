@@ -90,7 +90,7 @@ function listFriction(run) {
   return listContactSeries(run, (contact, c) => {
     const tangential = normOfColumns(run.contact_wrenches, 6 * c, 2);
     const values = tangential.map((f, k) => (run.contact_wrenches.get(k, 6 * c + 2) > 1 ? f / run.contact_wrenches.get(k, 6 * c + 2) : NaN));
-    return [{name: contact.name, values, limits: typeof friction === 'number' ? [0, friction] : undefined}];
+    return [{name: contact.name, values, limits: typeof friction === 'number' ? [null, friction] : undefined}];
   });
 }
 

@@ -18,7 +18,7 @@ class Scene {
     this.three.background = makeColor('#eef1f5');
     this.robots = runs.map(run => new RobotView(run));
     this.size = Math.max(...this.robots.map(robot => robot.size));
-    this.ground = (runs[0].summary.ground && runs[0].summary.ground.height) || 0;
+    this.ground = this.findGround(runs[0].summary.ground);
     this.scales = this.makeScales(runs);
     this.seeThrough = false;
     for (const robot of this.robots) this.three.add(robot.root);
@@ -26,6 +26,12 @@ class Scene {
     this.addLights();
     for (const [name, , visible] of LAYERS) this.setLayer(name, visible);
     this.setSideBySide(true);
+  }
+
+  // A robot that knows of no ground may hang: then the floor is below it.
+  findGround(ground) {
+    if (ground && typeof ground.height === 'number') return ground.height;
+    return Math.min(0, ...this.robots.map(robot => (robot.box.isEmpty() ? 0 : robot.box.min.z)));
   }
 
   // The weight is drawn half as long as the robot is large, the largest closure force two fifths.
