@@ -19,8 +19,23 @@ function makeGeometry(visual, meshes) {
     case 'box': return new THREE.BoxBufferGeometry(a, b, c);
     case 'cylinder': return new THREE.CylinderBufferGeometry(a, a, b, 32).rotateX(Math.PI / 2);
     case 'sphere': return new THREE.SphereBufferGeometry(a, 32, 20);
-    default: return new THREE.STLLoader().parse(decodeBase64(meshes[visual.mesh]).buffer).scale(a, b, c);
+    default: {
+      const mesh = readMesh(meshes[visual.mesh]);
+      return mesh && mesh.scale(a, b, c);
+    }
   }
+}
+
+// Of an STL file; null when the file is none, whatever its name says.
+function readMesh(text) {
+  try {
+    const geometry = new THREE.STLLoader().parse(decodeBase64(text).buffer);
+    const numbers = geometry.getAttribute('position').array;
+    if (numbers.length && numbers.every(Number.isFinite)) return geometry;
+  } catch (error) {
+    console.warn('a mesh cannot be read: ' + error);
+  }
+  return null;
 }
 
 // An arrow of a unit length along z; scaled by its length.
@@ -118,11 +133,13 @@ class RobotView {
   }
 
   addVisual(visual) {
+    const geometry = makeGeometry(visual, this.run.robot.meshes);
+    if (!geometry) return;
     const [r, g, b, a] = visual.rgba;
     const color = new THREE.Color(r, g, b).convertSRGBToLinear();
     const material = new THREE.MeshStandardMaterial({color, roughness: 0.62, metalness: 0.08});
     this.materials.push({material, color, opacity: a > 0 ? a : 1});
-    const mesh = setPose(new THREE.Mesh(makeGeometry(visual, this.run.robot.meshes), material), visual.pose);
+    const mesh = setPose(new THREE.Mesh(geometry, material), visual.pose);
     mesh.castShadow = mesh.receiveShadow = true;
     this.bodies[visual.body].add(mesh);
   }
