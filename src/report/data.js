@@ -43,7 +43,8 @@ class Run {
     this.robot = json.robot;
     this.color = RUN_COLORS[index % RUN_COLORS.length];
     this.pattern = RUN_PATTERNS[index % RUN_PATTERNS.length];
-    for (const [name, value] of Object.entries(json.motion)) this[name] = value.data === undefined ? value : new Table(value);
+    for (const [name, value] of Object.entries(json.motion))
+      this[name] = value.data === undefined ? value : new Table(value);
     this.time = this.time.data;
     this.end = this.time[this.time.length - 1];
   }
@@ -53,8 +54,10 @@ class Run {
     let low = 0, high = Math.max(0, this.time.length - 2);
     while (low < high) {
       const middle = (low + high + 1) >> 1;
-      if (this.time[middle] <= t + 1e-6) low = middle;
-      else high = middle - 1;
+      if (this.time[middle] <= t + 1e-6)
+        low = middle;
+      else
+        high = middle - 1;
     }
     return low;
   }
@@ -97,5 +100,6 @@ function formatNumber(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return '–';
   if (value === 0) return '0';
   const size = Math.abs(value);
-  return size >= 1e5 || size < 1e-3 ? value.toExponential(Math.max(0, digits - 2)) : String(Number(value.toPrecision(digits)));
+  return size >= 1e5 || size < 1e-3 ? value.toExponential(Math.max(0, digits - 2)) :
+                                      String(Number(value.toPrecision(digits)));
 }

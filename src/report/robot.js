@@ -16,9 +16,12 @@ function makeColor(css) {
 function makeGeometry(visual, meshes) {
   const [a, b, c] = visual.size;
   switch (visual.shape) {
-    case 'box': return new THREE.BoxBufferGeometry(a, b, c);
-    case 'cylinder': return new THREE.CylinderBufferGeometry(a, a, b, 32).rotateX(Math.PI / 2);
-    case 'sphere': return new THREE.SphereBufferGeometry(a, 32, 20);
+    case 'box':
+      return new THREE.BoxBufferGeometry(a, b, c);
+    case 'cylinder':
+      return new THREE.CylinderBufferGeometry(a, a, b, 32).rotateX(Math.PI / 2);
+    case 'sphere':
+      return new THREE.SphereBufferGeometry(a, 32, 20);
     default: {
       const mesh = readMesh(meshes[visual.mesh]);
       return mesh && mesh.scale(a, b, c);
@@ -43,8 +46,10 @@ class Arrow {
   constructor(color, radius) {
     const material = new THREE.MeshStandardMaterial({color: makeColor(color), roughness: 0.5});
     this.object = new THREE.Group();
-    this.shaft = new THREE.Mesh(new THREE.CylinderBufferGeometry(radius, radius, 1, 12).rotateX(Math.PI / 2).translate(0, 0, 0.5), material);
-    this.head = new THREE.Mesh(new THREE.ConeBufferGeometry(2.4 * radius, 6 * radius, 16).rotateX(Math.PI / 2), material);
+    this.shaft = new THREE.Mesh(
+        new THREE.CylinderBufferGeometry(radius, radius, 1, 12).rotateX(Math.PI / 2).translate(0, 0, 0.5), material);
+    this.head =
+        new THREE.Mesh(new THREE.ConeBufferGeometry(2.4 * radius, 6 * radius, 16).rotateX(Math.PI / 2), material);
     this.headLength = 6 * radius;
     this.object.add(this.shaft, this.head);
     this.object.visible = false;
@@ -118,7 +123,8 @@ class RobotView {
     this.box = new THREE.Box3().setFromObject(this.root);
     this.size = this.box.isEmpty() ? 1 : this.box.getSize(new THREE.Vector3()).length();
     this.layers = {};
-    for (const name of ['locks', 'contactForces', 'closureForces', 'com', 'traces', 'footprints']) this.layers[name] = [];
+    for (const name of ['locks', 'contactForces', 'closureForces', 'com', 'traces', 'footprints'])
+      this.layers[name] = [];
     this.addSteps();
     this.addClosures();
     this.addContacts();
@@ -166,8 +172,10 @@ class RobotView {
     for (const step of (ground && ground.steps) || []) {
       const [x, y, top] = step.top, height = Math.max(1e-3, top - ground.height);
       const geometry = new THREE.BoxBufferGeometry(step.length, step.width, height);
-      const box = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({color: makeColor('#cfd6df'), roughness: 0.9}));
-      box.add(new THREE.LineSegments(new THREE.EdgesGeometry(geometry), new THREE.LineBasicMaterial({color: makeColor('#8d99a8')})));
+      const box =
+          new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({color: makeColor('#cfd6df'), roughness: 0.9}));
+      box.add(new THREE.LineSegments(
+          new THREE.EdgesGeometry(geometry), new THREE.LineBasicMaterial({color: makeColor('#8d99a8')})));
       box.position.set(x, y, top - height / 2);
       box.rotation.z = step.yaw || 0;
       box.castShadow = box.receiveShadow = true;
@@ -178,7 +186,8 @@ class RobotView {
   addClosures() {
     const texture = makeLockTexture(), size = 0.045 * this.size;
     this.largestClosureForce = 0;
-    for (const f of this.listForces(this.run.closure_wrenches)) this.largestClosureForce = Math.max(this.largestClosureForce, f);
+    for (const f of this.listForces(this.run.closure_wrenches))
+      this.largestClosureForce = Math.max(this.largestClosureForce, f);
     this.closures = this.run.robot.closures.map(closure => {
       const frame = setPose(this.add(this.bodies[closure.body], new THREE.Group()), closure.pose);
       const lock = new THREE.Sprite(new THREE.SpriteMaterial({map: texture, depthTest: false, transparent: true}));
@@ -196,7 +205,9 @@ class RobotView {
       const frame = setPose(this.add(this.bodies[contact.body], new THREE.Group()), contact.pose);
       const layer = this.add(frame, new THREE.Group(), 'contactForces');
       const arrow = new Arrow('#2f9e44', 0.006 * this.size);
-      const centre = new THREE.Mesh(new THREE.SphereBufferGeometry(0.011 * this.size, 16, 12), new THREE.MeshBasicMaterial({color: makeColor('#2b8a3e')}));
+      const centre = new THREE.Mesh(
+          new THREE.SphereBufferGeometry(0.011 * this.size, 16, 12),
+          new THREE.MeshBasicMaterial({color: makeColor('#2b8a3e')}));
       layer.add(arrow.object, centre);
       centre.visible = false;
       return {arrow, centre};
@@ -216,13 +227,19 @@ class RobotView {
     const size = 0.022 * this.size, colors = [makeColor('#14181f'), makeColor('#ffd43b')];
     this.com = this.add(this.root, new THREE.Group(), 'com');
     for (let i = 0; i < 8; ++i) {  // the usual mark: eighths of a sphere in two colours
-      const part = new THREE.SphereBufferGeometry(size, 10, 8, (i % 4) * Math.PI / 2, Math.PI / 2, i < 4 ? 0 : Math.PI / 2, Math.PI / 2);
-      const mesh = new THREE.Mesh(part, new THREE.MeshBasicMaterial({color: colors[(i + (i < 4 ? 0 : 1)) % 2], depthTest: false}));
+      const part = new THREE.SphereBufferGeometry(
+          size, 10, 8, (i % 4) * Math.PI / 2, Math.PI / 2, i < 4 ? 0 : Math.PI / 2, Math.PI / 2);
+      const mesh = new THREE.Mesh(
+          part, new THREE.MeshBasicMaterial({color: colors[(i + (i < 4 ? 0 : 1)) % 2], depthTest: false}));
       mesh.renderOrder = 3;
       this.com.add(mesh);
     }
-    this.plumb = this.add(this.root, new THREE.Mesh(new THREE.RingBufferGeometry(0.6 * size, size, 24),
-        new THREE.MeshBasicMaterial({color: makeColor('#14181f'), side: THREE.DoubleSide})), 'com');
+    this.plumb = this.add(
+        this.root,
+        new THREE.Mesh(
+            new THREE.RingBufferGeometry(0.6 * size, size, 24),
+            new THREE.MeshBasicMaterial({color: makeColor('#14181f'), side: THREE.DoubleSide})),
+        'com');
   }
 
   // Paths of the centre of mass and of the feet: whole and pale, done and strong.
@@ -262,7 +279,8 @@ class RobotView {
     this.bodies.forEach((body, i) => {
       const a = k * table.cols + 7 * i, b = next * table.cols + 7 * i, d = table.data;
       body.position.set(...[0, 1, 2].map(j => d[a + j] + share * (d[b + j] - d[a + j])));
-      body.quaternion.set(d[a + 3], d[a + 4], d[a + 5], d[a + 6]).slerp(goal.set(d[b + 3], d[b + 4], d[b + 5], d[b + 6]), share);
+      body.quaternion.set(d[a + 3], d[a + 4], d[a + 5], d[a + 6])
+          .slerp(goal.set(d[b + 3], d[b + 4], d[b + 5], d[b + 6]), share);
     });
   }
 
@@ -270,10 +288,12 @@ class RobotView {
   setTime(t, scales, ground) {
     this.setPlacements(t);
     const run = this.run, {k, next, share} = run.locate(t);
-    const read = (table, row, col) => new THREE.Vector3(table.get(row, col), table.get(row, col + 1), table.get(row, col + 2));
+    const read = (table, row, col) =>
+        new THREE.Vector3(table.get(row, col), table.get(row, col + 1), table.get(row, col + 2));
     this.closures.forEach(({lock, arrow}, c) => {
       lock.material.color.copy(getGapColor(run.gaps.get(share < 0.5 ? k : next, 2 * c)));
-      if (run.closure_wrenches.rows) arrow.set(read(run.closure_wrenches, k, 6 * c).multiplyScalar(scales.closure), 0, 0, 0);
+      if (run.closure_wrenches.rows)
+        arrow.set(read(run.closure_wrenches, k, 6 * c).multiplyScalar(scales.closure), 0, 0, 0);
     });
     this.contacts.forEach(({arrow, centre}, c) => {
       if (!run.contact_wrenches.rows) return;
