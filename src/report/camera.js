@@ -38,13 +38,12 @@ class Camera {
     this.controls.update();
   }
 
-  // On the floor below the centres of mass; the height is that of the middle of the robots when they stand.
+  // Level with the middle of the robots as they stand at first, up and down with their footholds.
   getWishedTarget() {
     const focus = this.scene.calcFocus(), boxes = this.scene.robots.map(robot => robot.box);
     const middle =
         boxes.reduce((sum, box) => sum + (box.isEmpty() ? 0 : (box.min.z + box.max.z) / 2), 0) / boxes.length;
-    const first = this.scene.robots[0], start = first.run.com.get(0, 2);
-    focus.z = middle + (this.climb ? focus.z - start : 0);
+    focus.z = middle + this.scene.robots[0].run.calcClimb(this.scene.time);
     return focus;
   }
 

@@ -69,6 +69,20 @@ class Run {
     return {k, next, share: span > 0 ? Math.min(1, Math.max(0, (t - this.time[k]) / span)) : 0};
   }
 
+  // How much higher the feet stand than at the start, m: through the footholds, straight in between.
+  calcClimb(t) {
+    const knots = new Map(), heights = new Map();
+    for (const print of this.footprints) {
+      heights.set(print.contact, print.pose[2]);
+      knots.set(print.time, Array.from(heights.values()).reduce((sum, z) => sum + z, 0) / heights.size);
+    }
+    const times = Array.from(knots.keys()), values = Array.from(knots.values());
+    const next = times.findIndex(time => time > t);
+    if (next <= 0) return times.length ? values[next < 0 ? values.length - 1 : 0] - values[0] : 0;
+    const share = (t - times[next - 1]) / (times[next] - times[next - 1]);
+    return values[next - 1] + share * (values[next] - values[next - 1]) - values[0];
+  }
+
   getPhases() {
     const phases = Array.isArray(this.summary.phases) ? this.summary.phases : [];
     return phases.map(phase => {

@@ -183,6 +183,17 @@ class RobotView {
     }
   }
 
+  // Height of what is below the centre of mass.
+  findFloor(floor) {
+    const ground = this.run.summary.ground, at = this.com.position;
+    for (const step of (ground && ground.steps) || []) {
+      const dx = at.x - step.top[0], dy = at.y - step.top[1], c = Math.cos(step.yaw || 0), s = Math.sin(step.yaw || 0);
+      if (Math.abs(c * dx + s * dy) <= step.length / 2 && Math.abs(c * dy - s * dx) <= step.width / 2)
+        floor = Math.max(floor, step.top[2]);
+    }
+    return floor;
+  }
+
   addClosures() {
     const texture = makeLockTexture(), size = 0.045 * this.size;
     this.largestClosureForce = 0;
@@ -304,7 +315,7 @@ class RobotView {
       centre.position.set(x, y, 0);
     });
     this.com.position.copy(read(run.com, k, 0).lerp(read(run.com, next, 0), share));
-    this.plumb.position.set(this.com.position.x, this.com.position.y, ground + 0.004);
+    this.plumb.position.set(this.com.position.x, this.com.position.y, this.findFloor(ground) + 0.004);
     for (const trace of this.traces) trace.geometry.setDrawRange(0, (share > 0.999 ? next : k) + 1);
     for (const {line, time} of this.footprints) line.visible = time <= t + 1e-6;
   }

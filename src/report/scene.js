@@ -125,6 +125,7 @@ class Scene {
   }
 
   setTime(t) {
+    this.time = t;
     for (const robot of this.robots) robot.setTime(Math.min(t, robot.run.end), this.scales, this.ground);
   }
 
