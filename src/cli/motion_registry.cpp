@@ -1,5 +1,6 @@
 #include "cli/motion_registry.h"
 
+#include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
@@ -59,6 +60,11 @@ const std::vector<MotionEntry>& getMotions() {
        "bielle solve stairs --robot bipetto --height 0.06 --stairs 4 -o stairs",
        {"height", "depth", "stairs", "speed", "width", "double_support", "swing_height"},
        makeRequests<StairsOptions>(makeStairs, {{"paper", kPaper, setPaperWeights}})},
+      {"jump",
+       "push, fly for a given time, land: the height of the centre of mass at mid-flight follows from the time",
+       "bielle solve jump --robot bipetto --flight 0.3 --length 0.2 -o jump",
+       {"flight", "length"},
+       makeRequests<JumpOptions>(makeJump)},
   };
   return motions;
 }

@@ -72,11 +72,9 @@ BodyFrame getFoot(const Scene& scene, Side side) {
 }
 
 VectorXd makeWeights(const Model& model, const LocomotionOptions& o) {
-  const int nv = model.nv();
   VectorXd weights = makeStateWeights(model);
   weights.segment<3>(3) << o.torso_weight, o.torso_weight, o.heading_weight;
-  for (const Motor& motor : model.motors())  // linkage motors would be free to shake
-    weights[nv + motor.dof] = std::max(weights[nv + motor.dof], o.motor_weight);
+  raiseMotorWeights(model, o.motor_weight, weights);
   return weights;
 }
 
@@ -133,28 +131,16 @@ void addComCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
 
 void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
   const LocomotionOptions& o = scene.options;
-  const Model& model = scene.model;
-  const double weight = model.mass() * model.gravity().norm();
-  for (size_t c = stage.constraints.num_loops; c < stage.constraints.closures.size(); ++c) {
-    const int constraint = static_cast<int>(c);
-    const std::string& name = stage.constraints.closures[c].name;
-    const bool left = model.findContact(name) == scene.stance.contacts[0];
-    const ContactFrame& contact = model.contacts()[scene.stance.contacts[left ? 0 : 1]];
-    const int rows = getRows(stage.constraints.closures[c].kind);
-    VectorXd reference = VectorXd::Zero(rows);
-    reference[2] = std::max(1.0, weight * node.load[left ? 0 : 1]);
-    addCost(stage, "force " + name, o.force_weight / (weight * weight), VectorXd::Ones(rows),
-            makeContactForce(stage.constraints, constraint, reference));
-    if (o.friction_weight != 0)
-      stage.costs.push_back({"friction " + name, o.friction_weight,
-                             Activation::makeBarrier(VectorXd::Ones(4), VectorXd::Zero(4), VectorXd::Constant(4, 1e12)),
-                             makeFrictionPyramid(stage.constraints, constraint, o.friction / std::sqrt(2))});
-    if (rows == 6 && contact.half_length > 0 && contact.half_width > 0) {
-      const Eigen::Vector2d half(contact.half_length, contact.half_width);
-      addCost(stage, "pressure " + name, o.pressure_weight, half.cwiseAbs2().cwiseInverse(),
-              makeCenterOfPressure(stage.constraints, constraint));
-    }
+  const double weight = scene.model.mass() * scene.model.gravity().norm();
+  const ConstraintSet& set = stage.constraints;
+  VectorXd loads(set.closures.size() - set.num_loops);
+  for (int i = 0; i < loads.size(); ++i) {
+    const bool left = scene.model.findContact(set.closures[set.num_loops + i].name) == scene.stance.contacts[0];
+    loads[i] = std::max(1.0, weight * node.load[left ? 0 : 1]);
   }
+  // The pyramid within the cone.
+  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, o.friction_weight, o.friction / std::sqrt(2)}, loads,
+                 stage);
 }
 
 Vector6d makeVector(double x, double z, double rotation) {

@@ -21,6 +21,10 @@ void setOption(const std::vector<OptionEntry>& options, const std::string& name,
   throw ModelError("", "option '" + name + "'", "there is no such option", "choose one of: " + known);
 }
 
+void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy) {
+  if (!ok) throw ModelError("", "option '" + option + "'", problem, remedy);
+}
+
 StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constraints, ConstVectorRef q) {
   Workspace ws(model);
   updatePositions(model, ws, q);
@@ -51,6 +55,10 @@ VectorXd makeStandingPosture(const Model& model) {
   if (result.status != AssemblyStatus::Closed)
     throw ModelError(model.name(), "reference '" + name + "'", result.message, "correct its targets");
   return result.q;
+}
+
+ContactGains limitContactGains(const ContactGains& gains, double h) {
+  return {std::min(gains.kp, 0.25 / (h * h)), std::min(gains.kd, 1 / h)};
 }
 
 std::vector<ContactTarget> makeContactTargets(const Model& model, ConstVectorRef q, const std::vector<int>& contacts,
@@ -85,6 +93,35 @@ VectorXd makeStateWeights(const Model& model) {
     importance.segment(nv + joint.idx_v, joint.nv).setConstant(velocity);
   }
   return importance.cwiseAbs2();
+}
+
+void raiseMotorWeights(const Model& model, double weight, VectorXd& weights) {
+  for (const Motor& motor : model.motors()) {
+    double& w = weights[model.nv() + motor.dof];
+    w = std::max(w, weight);
+  }
+}
+
+void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd& loads, StageSpec& stage) {
+  const ConstraintSet& set = stage.constraints;
+  const double weight = model.mass() * model.gravity().norm();
+  for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
+    const ContactFrame& contact = model.contacts()[model.findContact(set.closures[c].name)];
+    const int rows = getRows(set.closures[c].kind);
+    VectorXd reference = VectorXd::Zero(rows);
+    reference[2] = loads[c - set.num_loops];
+    if (costs.force_weight != 0)
+      stage.costs.push_back({"force " + contact.name, costs.force_weight / (weight * weight),
+                             Activation::makeQuadratic(VectorXd::Ones(rows)), makeContactForce(set, c, reference)});
+    if (costs.friction_weight != 0)
+      stage.costs.push_back({"friction " + contact.name, costs.friction_weight,
+                             Activation::makeBarrier(VectorXd::Ones(4), VectorXd::Zero(4), VectorXd::Constant(4, 1e12)),
+                             makeFrictionPyramid(set, c, costs.friction)});
+    if (costs.pressure_weight == 0 || rows != 6 || contact.half_length <= 0 || contact.half_width <= 0) continue;
+    const Eigen::Vector2d half(contact.half_length, contact.half_width);
+    stage.costs.push_back({"pressure " + contact.name, costs.pressure_weight,
+                           Activation::makeQuadratic(half.cwiseAbs2().cwiseInverse()), makeCenterOfPressure(set, c)});
+  }
 }
 
 }  // namespace bielle

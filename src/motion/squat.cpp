@@ -11,19 +11,15 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-void require(bool ok, const std::string& option, const std::string& problem, const std::string& remedy) {
-  if (!ok) throw ModelError("", "option '" + option + "'", problem, remedy);
-}
-
 void check(const Model& model, const SquatOptions& o) {
-  require(o.depth >= 0.05 && o.depth <= 2, "depth", "it is outside 0.05 .. 2",
-          "give the lowest height of the centre of mass over its initial height, e.g. 0.7");
-  require(o.duration > 0 && std::isfinite(o.duration), "duration", "it is not positive", "give seconds");
-  require(o.settle >= 0 && std::isfinite(o.settle), "settle", "it is negative", "give seconds, or 0");
-  require(o.time_step > 0 && o.time_step <= o.duration / 4, "time_step",
-          "it is not positive, or over a quarter of the motion", "give seconds, e.g. 0.015");
-  require(o.contact_kp >= 0, "contact_kp", "it is negative", "give 0 or more, 1/s^2");
-  require(o.contact_kd >= 0, "contact_kd", "it is negative", "give 0 or more, 1/s");
+  requireOption(o.depth >= 0.05 && o.depth <= 2, "depth", "it is outside 0.05 .. 2",
+                "give the lowest height of the centre of mass over its initial height, e.g. 0.7");
+  requireOption(o.duration > 0 && std::isfinite(o.duration), "duration", "it is not positive", "give seconds");
+  requireOption(o.settle >= 0 && std::isfinite(o.settle), "settle", "it is negative", "give seconds, or 0");
+  requireOption(o.time_step > 0 && o.time_step <= o.duration / 4, "time_step",
+                "it is not positive, or over a quarter of the motion", "give seconds, e.g. 0.015");
+  requireOption(o.contact_kp >= 0, "contact_kp", "it is negative", "give 0 or more, 1/s^2");
+  requireOption(o.contact_kd >= 0, "contact_kd", "it is negative", "give 0 or more, 1/s");
   if (model.contacts().empty())
     throw ModelError(model.name(), "contacts", "a squat needs feet, the robot names no contact frame",
                      "add `contacts` to its YAML file");
@@ -40,31 +36,13 @@ StageSpec makeStage(const Model& model, const SquatOptions& o, const std::vector
   }
   stage.state = {o.state_weight, q0, VectorXd::Zero(model.nv()), makeStateWeights(model)};
   if (model.hasFreeFlyer()) stage.state.weights.segment<2>(3).setConstant(o.torso_weight);
-  for (const Motor& motor : model.motors())  // linkage motors would be free to shake
-    stage.state.weights[model.nv() + motor.dof] = std::max(stage.state.weights[model.nv() + motor.dof], o.motor_weight);
+  raiseMotorWeights(model, o.motor_weight, stage.state.weights);
   stage.control = {o.control_weight, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
   stage.costs.push_back(
       {"com height", o.com_weight, Activation::makeQuadratic(Vector3d::UnitZ()), makeComPosition(com)});
   const double weight = model.mass() * model.gravity().norm();
-  for (size_t i = 0; i < contacts.size(); ++i) {
-    const ContactFrame& contact = model.contacts()[contacts[i].contact];
-    const int constraint = stage.constraints.num_loops + static_cast<int>(i);
-    const int rows = getRows(stage.constraints.closures[constraint].kind);
-    VectorXd reference = VectorXd::Zero(rows);
-    reference[2] = weight / contacts.size();
-    stage.costs.push_back({"force " + contact.name, o.force_weight / (weight * weight),
-                           Activation::makeQuadratic(VectorXd::Ones(rows)),
-                           makeContactForce(stage.constraints, constraint, reference)});
-    stage.costs.push_back({"friction " + contact.name, o.friction_weight,
-                           Activation::makeBarrier(VectorXd::Ones(4), VectorXd::Zero(4), VectorXd::Constant(4, 1e12)),
-                           makeFrictionPyramid(stage.constraints, constraint, o.friction)});
-    if (rows == 6 && contact.half_length > 0 && contact.half_width > 0) {
-      const Eigen::Vector2d half(contact.half_length, contact.half_width);
-      stage.costs.push_back({"pressure " + contact.name, o.pressure_weight,
-                             Activation::makeQuadratic(half.cwiseAbs2().cwiseInverse()),
-                             makeCenterOfPressure(stage.constraints, constraint)});
-    }
-  }
+  addGroundCosts(model, {o.force_weight, o.pressure_weight, o.friction_weight, o.friction},
+                 VectorXd::Constant(contacts.size(), weight / contacts.size()), stage);
   return stage;
 }
 
@@ -103,10 +81,8 @@ Motion makeSquat(const Model& model, const SquatOptions& options, Formulation fo
   const VectorXd q0 = makeStandingPosture(model), v0 = VectorXd::Zero(model.nv());
   std::vector<int> feet;
   for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
-  // An Euler step turns a contact velocity e into (1 - kd h) e: beyond 1 / h it would swing back.
-  const double h = options.time_step;
-  const std::vector<ContactTarget> contacts = makeContactTargets(
-      model, q0, feet, std::min(options.contact_kp, 0.25 / (h * h)), std::min(options.contact_kd, 1 / h));
+  const ContactGains gains = limitContactGains({options.contact_kp, options.contact_kd}, options.time_step);
+  const std::vector<ContactTarget> contacts = makeContactTargets(model, q0, feet, gains.kp, gains.kd);
   Workspace ws(model);
   updatePositions(model, ws, q0);
   const Vector3d com0 = calcCom(model, ws);

@@ -23,6 +23,9 @@ struct OptionEntry {
 /// \throws ModelError naming the options there are
 void setOption(const std::vector<OptionEntry>& options, const std::string& name, double value);
 
+/// \throws ModelError naming the option, unless ok
+void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy);
+
 /// A problem ready to be solved, with what reports need to know about it.
 struct Motion {
   std::string name;
@@ -46,6 +49,13 @@ StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constra
 /// \throws ModelError when there is none, or it cannot be closed
 VectorXd makeStandingPosture(const Model& model);
 
+/// Stabilisation of contacts, 1/s^2 and 1/s, limited to 1/(4 h^2) and 1/h with h the time step: one Euler step turns a
+/// contact velocity e into (1 - kd h) e, beyond 1/h it would swing back.
+struct ContactGains {
+  double kp = 0, kd = 0;
+};
+ContactGains limitContactGains(const ContactGains& gains, double time_step);
+
 /// Contacts of the robot held at their places in q.
 std::vector<ContactTarget> makeContactTargets(const Model& model, ConstVectorRef q, const std::vector<int>& contacts,
                                               double kp, double kd);
@@ -53,5 +63,18 @@ std::vector<ContactTarget> makeContactTargets(const Model& model, ConstVectorRef
 /// Weights of the state regularization, as the paper's example code gives them (ocp-figures: importance vectors,
 /// squared): joints of the equivalent serial chain as listed, linkage joints zero, base position free.
 VectorXd makeStateWeights(const Model& model);
+
+/// Motor velocities weigh at least `weight` (weights: 2 nv): motors of linkages would be free to shake.
+void raiseMotorWeights(const Model& model, double weight, VectorXd& weights);
+
+/// What feet on the ground should do, for all motions.
+struct GroundCosts {
+  double force_weight = 10;       ///< of the force reference, over (m g)^2
+  double pressure_weight = 1;     ///< of the centre of pressure, over the half size of the sole squared
+  double friction_weight = 1e-2;  ///< of leaving the friction pyramid, 1/N^2
+  double friction = 0.7;          ///< coefficient, 1
+};
+/// Adds the costs of every contact in force at the stage. \param loads  vertical force of each, in their order, N
+void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd& loads, StageSpec& stage);
 
 }  // namespace bielle

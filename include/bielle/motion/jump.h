@@ -1,0 +1,77 @@
+#pragma once
+/// \file The jump of the paper (its section IV-B): stand, push, fly for a given time, land, settle.
+///
+/// In flight the centre of mass is a thrown stone. It takes the time T between take-off and touchdown at the same height
+/// z1, so that (the paper deduces the height from the time)
+///     v0 = g T / 2,    z(T / 2) = z1 + g T^2 / 8,    z1 = z0 + `stretch`,                                      (1)
+/// with z0 the height at the start. While pushing, for D seconds, it follows the polynomial of fifth degree that leaves z0
+/// at rest and arrives at z1 with v0, both without acceleration: down first, then up; while landing, its mirror image.
+/// Feet on the ground carry the load
+///     f = m (g + z''),    on average m g (1 + v0 / (g D)),                                                     (2)
+/// and in flight they follow
+///     z_f(t) = max(g T^2 / 8, `clearance`) p^2 (2 - p),    p = 4 t/T (1 - t/T),                                        (3)
+/// at rest at both ends (forward: by a smooth step). The body rises by g T^2 / 8 p: legs stretch by 4/27 of the rise.
+/// Costs of a stage, h the time step:
+/// - state regularization about the posture at the start, at rest; motor torques;
+/// - height of the CoM: at mid-flight (over h; the paper asks for no more), and less so on the ground;
+/// - feet on the ground: force by Eq. (2), shared evenly, centre of pressure, friction pyramid;
+/// - feet in flight: placement by Eq. (3);
+/// - touchdown, at the first node of the landing: placement and velocity of the feet, over h. The velocity is asked to
+///   vanish: the legs fold as fast as the body falls.
+/// The terminal node has the velocities, the posture, and the centre of mass over the feet as at the start.
+#include "bielle/motion/motion.h"
+
+namespace bielle {
+
+struct JumpOptions {
+  double flight = 0.3;       ///< time in the air, s; rounded to an even number of time steps
+  double length = 0;         ///< how far ahead the feet land, m
+  double stand = 0.15;       ///< before the push, s
+  double push = 0.3;         ///< D, s
+  double land = 0.3;         ///< s
+  double settle = 0.4;       ///< until the end, s
+  double stretch = 0.02;     ///< height of the CoM at take-off and touchdown over that at the start, m
+  double clearance = 0.04;   ///< least height of the soles at mid-flight, m
+  double friction = 0.7;     ///< coefficient, 1
+  double time_step = 0.005;  ///< s
+
+  double apex_weight = 1e4;                 ///< of the CoM's height at mid-flight, over h, 1/m^2
+  double com_weight = 1e3;                  ///< of the CoM's height on the ground, 1/m^2
+  double state_weight = 0.02;               ///< of the state regularization
+  double torso_weight = 2000;               ///< of the torso's rotation within the state regularization
+  double motor_weight = 1;                  ///< of motor velocities within the state regularization
+  double control_weight = 3e-3;             ///< of the motor torques, 1/(N m)^2
+  double force_weight = 30;                 ///< of the contact force reference, over (m g)^2
+  double pressure_weight = 1;               ///< of the centre of pressure, over the half size of the sole squared
+  double friction_weight = 1e-2;            ///< of leaving the friction pyramid, 1/N^2
+  double swing_weight = 1e4;                ///< of the feet's path in flight, 1/m^2
+  double swing_rotation_weight = 1e2;       ///< of their orientation, 1
+  double touchdown_placement_weight = 1e4;  ///< over h, 1/m^2 and 1
+  double touchdown_velocity_weight = 1e2;   ///< over h, s^2/m^2
+  double terminal_weight = 1e3;             ///< of the final velocities and of the final place of the CoM
+  double contact_kp = 1e4;                  ///< stabilisation of the contacts, 1/s^2; limited to 1/(4 h^2)
+  double contact_kd = 200;                  ///< 1/s; limited to 1/h
+};
+
+/// Every number of the options by name, pointing into `options`.
+std::vector<OptionEntry> listOptions(JumpOptions& options);
+
+/// What a jump is in numbers, Eq. (1), with the durations that fit the time step.
+struct JumpFigures {
+  double stand = 0, push = 0, flight = 0, land = 0;  ///< s
+  double take_off = 0;                               ///< v0, m/s
+  double rise = 0;                                   ///< of the centre of mass from take-off to mid-flight, m
+};
+JumpFigures calcJumpFigures(const JumpOptions& options, double gravity);
+
+/// Height of the CoM over its height at the start (m) and its acceleration (m/s^2), t seconds after the start.
+struct JumpHeight {
+  double height = 0, acceleration = 0;
+};
+JumpHeight calcJumpHeight(const JumpOptions& options, double gravity, double t);
+
+/// Jump with all contacts of the robot at once, from its standing posture.
+/// \throws ModelError when the request is impossible (durations, lengths, no contact)
+Motion makeJump(const Model& model, const JumpOptions& options = {}, Formulation formulation = Formulation::Reduced);
+
+}  // namespace bielle

@@ -1,0 +1,284 @@
+#include "bielle/motion/jump.h"
+
+#include <cmath>
+
+#include "bielle/dynamics/centroidal.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+// What all stages share.
+struct Scene {
+  const Model& model;
+  const JumpOptions& options;
+  JumpFigures figures;
+  VectorXd q0;                        // posture at the start
+  VectorXd state_weights;             // 2 nv
+  Vector3d com, shift;                // CoM at the start; how far the jump goes
+  std::vector<ContactTarget> before;  // feet where they start and
+  std::vector<ContactTarget> after;   // where they land
+};
+
+enum class Phase { Stand, Push, Flight, Land, Settle };
+
+int countNodes(double seconds, double time_step, int least) {
+  return std::max(least, static_cast<int>(std::lround(seconds / time_step)));
+}
+
+int countNodes(const JumpOptions& o, Phase phase) {
+  switch (phase) {
+    case Phase::Stand:
+      return countNodes(o.stand, o.time_step, 0);
+    case Phase::Push:
+      return countNodes(o.push, o.time_step, 1);
+    case Phase::Flight:
+      return 2 * countNodes(o.flight / 2, o.time_step, 1);
+    case Phase::Land:
+      return countNodes(o.land, o.time_step, 1);
+    case Phase::Settle:
+      return countNodes(o.settle, o.time_step, 0);
+  }
+  return 0;
+}
+
+const char* getName(Phase phase) {
+  switch (phase) {
+    case Phase::Stand:
+      return "stand";
+    case Phase::Push:
+      return "push";
+    case Phase::Flight:
+      return "flight";
+    case Phase::Land:
+      return "land";
+    case Phase::Settle:
+      return "settle";
+  }
+  return "";
+}
+
+StageSpec makeStage(const Scene& scene, const std::vector<ContactTarget>& contacts) {
+  const Model& model = scene.model;
+  const JumpOptions& o = scene.options;
+  StageSpec stage;
+  stage.dt = o.time_step;
+  stage.constraints = makeConstraintSet(model, contacts);
+  stage.state = {o.state_weight, scene.q0, VectorXd::Zero(model.nv()), scene.state_weights};
+  stage.control = {o.control_weight, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
+  return stage;
+}
+
+// Eq. (3) at the progress s of the flight.
+Vector3d calcFootOffset(const Scene& scene, double s) {
+  const double p = 4 * s * (1 - s), height = std::max(scene.figures.rise, scene.options.clearance);
+  return s * s * (3 - 2 * s) * scene.shift + height * p * p * (2 - p) * Vector3d::UnitZ();
+}
+
+void addSwingCosts(const Scene& scene, double s, StageSpec& stage) {
+  const JumpOptions& o = scene.options;
+  const Vector3d p = Vector3d::Constant(o.swing_weight), r = Vector3d::Constant(o.swing_rotation_weight);
+  for (const ContactTarget& start : scene.before) {
+    const ContactFrame& contact = scene.model.contacts()[start.contact];
+    SE3 target = start.X_WT;
+    target.p += calcFootOffset(scene, s);
+    stage.costs.push_back({"swing " + contact.name, 1, Activation::makeQuadratic((Vector6d() << p, r).finished()),
+                           makeFramePlacement({contact.body, contact.X_BF}, target)});
+  }
+}
+
+void addHeightCost(const Scene& scene, const std::string& name, double weight, double height, StageSpec& stage) {
+  stage.costs.push_back({name, weight, Activation::makeQuadratic(Vector3d::UnitZ()),
+                         makeComPosition(scene.com + height * Vector3d::UnitZ())});
+}
+
+void addTouchdownCosts(const Scene& scene, StageSpec& stage) {
+  const JumpOptions& o = scene.options;
+  for (const ContactTarget& target : scene.after) {
+    const ContactFrame& contact = scene.model.contacts()[target.contact];
+    const BodyFrame foot{contact.body, contact.X_BF};
+    stage.costs.push_back({"touchdown " + contact.name, o.touchdown_placement_weight / o.time_step,
+                           Activation::makeQuadratic(Vector6d::Ones()), makeFramePlacement(foot, target.X_WT)});
+    stage.costs.push_back({"touchdown velocity " + contact.name, o.touchdown_velocity_weight / o.time_step,
+                           Activation::makeQuadratic(Vector6d::Ones()), makeFrameVelocity(foot)});
+  }
+}
+
+StageSpec makeTerminalStage(const Scene& scene) {
+  const JumpOptions& o = scene.options;
+  StageSpec stage = makeStage(scene, {});
+  stage.constraints = {};
+  stage.control.weight = 0;
+  stage.state.weight = 1;
+  stage.state.weights.head(scene.model.nv()) *= o.state_weight;
+  stage.state.weights.tail(scene.model.nv()).setConstant(o.terminal_weight);
+  stage.costs.push_back({"com", o.terminal_weight, Activation::makeQuadratic(Vector3d::Ones()),
+                         makeComPosition(scene.com + scene.shift)});
+  return stage;
+}
+
+Scene makeScene(const Model& model, const JumpOptions& o) {
+  Scene scene{
+      model, o, calcJumpFigures(o, model.gravity().norm()), makeStandingPosture(model), makeStateWeights(model), {}, {},
+      {},    {}};
+  if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3).setConstant(o.torso_weight);
+  raiseMotorWeights(model, o.motor_weight, scene.state_weights);
+  std::vector<int> feet;
+  for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
+  const ContactGains gains = limitContactGains({o.contact_kp, o.contact_kd}, o.time_step);
+  scene.before = makeContactTargets(model, scene.q0, feet, gains.kp, gains.kd);
+  scene.after = scene.before;
+  Vector3d forward = Vector3d::Zero();
+  for (const ContactTarget& foot : scene.before) forward += foot.X_WT.R.col(0);
+  scene.shift = o.length * Vector3d(forward.x(), forward.y(), 0).normalized();
+  for (ContactTarget& foot : scene.after) foot.X_WT.p += scene.shift;
+  Workspace ws(model);
+  updatePositions(model, ws, scene.q0);
+  scene.com = calcCom(model, ws);
+  return scene;
+}
+
+// The posture of the start, thrown by Eq. (1).
+VectorXd makeGuess(const Scene& scene, Phase phase, double t) {
+  const Model& model = scene.model;
+  VectorXd x(model.nq() + model.nv());
+  x << scene.q0, VectorXd::Zero(model.nv());
+  if (!model.hasFreeFlyer()) return x;
+  const JumpFigures& f = scene.figures;
+  if (phase == Phase::Land || phase == Phase::Settle) x.head<3>() += scene.shift;
+  if (phase != Phase::Flight) return x;
+  const double g = model.gravity().norm();
+  x.head<3>() += scene.shift * t / f.flight + (f.take_off * t - 0.5 * g * t * t) * Vector3d::UnitZ();
+  const Vector3d velocity = scene.shift / f.flight + (f.take_off - g * t) * Vector3d::UnitZ();
+  x.segment<3>(model.nq()) = Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(&scene.q0[3])).conjugate() * velocity;
+  return x;
+}
+
+void check(const Model& model, const JumpOptions& o) {
+  requireOption(o.time_step > 0 && std::isfinite(o.time_step), "time_step", "it is not positive",
+                "give seconds, e.g. 0.015");
+  requireOption(o.push > 0 && std::isfinite(o.push), "push", "it is not positive", "give seconds, e.g. 0.3");
+  requireOption(o.land > 0 && std::isfinite(o.land), "land", "it is not positive", "give seconds, e.g. 0.3");
+  requireOption(o.flight >= 2 * o.time_step && o.flight <= 2, "flight", "it is outside two time steps .. 2 s",
+                "give seconds, e.g. 0.3");
+  const std::pair<const char*, double> durations[] = {
+      {"stand", o.stand}, {"push", o.push}, {"land", o.land}, {"settle", o.settle}};
+  for (const auto& [name, value] : durations)
+    requireOption(value >= 0 && std::isfinite(value), name, "it is negative", "give seconds");
+  requireOption(std::abs(o.length) <= 2, "length", "it is not within 2 m", "give metres, negative to jump backwards");
+  requireOption(o.stretch >= 0 && std::isfinite(o.stretch), "stretch", "it is negative", "give metres, e.g. 0.02");
+  requireOption(o.clearance >= 0 && std::isfinite(o.clearance), "clearance", "it is negative",
+                "give metres, e.g. 0.04");
+  requireOption(o.friction > 0 && std::isfinite(o.friction), "friction", "it is not positive", "e.g. 0.7");
+  requireOption(o.contact_kp >= 0, "contact_kp", "it is negative", "give 0 or more, 1/s^2");
+  requireOption(o.contact_kd >= 0, "contact_kd", "it is negative", "give 0 or more, 1/s");
+  if (model.contacts().empty())
+    throw ModelError(model.name(), "contacts", "a jump needs feet, the robot names no contact frame",
+                     "add `contacts` to its YAML file");
+}
+
+}  // namespace
+
+JumpFigures calcJumpFigures(const JumpOptions& o, double gravity) {
+  const auto last = [&o](Phase phase) { return countNodes(o, phase) * o.time_step; };
+  JumpFigures f{last(Phase::Stand), last(Phase::Push), last(Phase::Flight), last(Phase::Land), 0, 0};
+  f.take_off = 0.5 * gravity * f.flight;
+  f.rise = gravity * f.flight * f.flight / 8;
+  return f;
+}
+
+JumpHeight calcJumpHeight(const JumpOptions& o, double gravity, double t) {
+  const JumpFigures f = calcJumpFigures(o, gravity);
+  // From (0, 0, 0) at s = 0 to (height, velocity, 0) at s = 1.
+  const auto follow = [&](double s, double duration) {
+    const double z = o.stretch, v = f.take_off * duration;
+    const double a = 10 * z - 4 * v, b = -15 * z + 7 * v, c = 6 * z - 3 * v;
+    return JumpHeight{s * s * s * (a + s * (b + s * c)),
+                      s * (6 * a + s * (12 * b + s * 20 * c)) / (duration * duration)};
+  };
+  t -= f.stand - 1e-6 * o.time_step;  // a node on the border of two phases belongs to the later one
+  if (t <= 0) return {};
+  if (t < f.push) return follow(t / f.push, f.push);
+  t -= f.push;
+  if (t < f.flight) return {o.stretch + f.take_off * t - 0.5 * gravity * t * t, -gravity};
+  t -= f.flight;
+  if (t < f.land) return follow(1 - t / f.land, f.land);
+  return {};
+}
+
+std::vector<OptionEntry> listOptions(JumpOptions& o) {
+  return {{"flight", &o.flight, "s", "time in the air, rounded to an even number of time steps; the height follows"},
+          {"length", &o.length, "m", "how far ahead the feet land"},
+          {"stand", &o.stand, "s", "before the push"},
+          {"push", &o.push, "s", "feet on the ground, faster and faster"},
+          {"land", &o.land, "s", "feet on the ground again, until the body is caught"},
+          {"settle", &o.settle, "s", "back to rest"},
+          {"stretch", &o.stretch, "m", "height of the centre of mass at take-off and touchdown over that at the start"},
+          {"clearance", &o.clearance, "m", "least height of the soles at mid-flight"},
+          {"friction", &o.friction, "1", "friction coefficient"},
+          {"time_step", &o.time_step, "s", "length of a shooting stage"},
+          {"apex_weight", &o.apex_weight, "1/m^2", "height of the centre of mass at mid-flight"},
+          {"com_weight", &o.com_weight, "1/m^2", "height of the centre of mass on the ground"},
+          {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
+          {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
+          {"motor_weight", &o.motor_weight, "1", "keep motors slow, within the state regularization"},
+          {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
+          {"force_weight", &o.force_weight, "1", "share the load evenly between feet and in time, over (m g)^2"},
+          {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
+          {"friction_weight", &o.friction_weight, "1/N^2", "stay inside the friction pyramid"},
+          {"swing_weight", &o.swing_weight, "1/m^2", "path of the feet in flight"},
+          {"swing_rotation_weight", &o.swing_rotation_weight, "1", "soles stay level in flight"},
+          {"touchdown_placement_weight", &o.touchdown_placement_weight, "1/m^2", "feet land flat, where they should"},
+          {"touchdown_velocity_weight", &o.touchdown_velocity_weight, "s^2/m^2", "feet land without speed"},
+          {"terminal_weight", &o.terminal_weight, "1", "end at rest, in place"},
+          {"contact_kp", &o.contact_kp, "1/s^2",
+           "stabilisation of the contacts, position (limited to 1/(4 h^2), h the time step)"},
+          {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"}};
+}
+
+Motion makeJump(const Model& model, const JumpOptions& options, Formulation formulation) {
+  check(model, options);
+  const Scene scene = makeScene(model, options);
+  Motion motion;
+  motion.name = "jump";
+  motion.schedule.dt = options.time_step;
+  motion.ground.friction = options.friction;
+  std::vector<StageSpec> stages;
+  const double g = model.gravity().norm();
+  const GroundCosts ground{options.force_weight, options.pressure_weight, options.friction_weight,
+                           options.friction / std::sqrt(2)};  // the pyramid within the cone
+  for (Phase phase : {Phase::Stand, Phase::Push, Phase::Flight, Phase::Land, Phase::Settle}) {
+    const bool over = phase == Phase::Land || phase == Phase::Settle;
+    const std::vector<ContactTarget> none,
+        &contacts = phase == Phase::Flight ? none : (over ? scene.after : scene.before);
+    const int nodes = countNodes(options, phase);
+    if (nodes == 0) continue;
+    motion.schedule.phases.push_back({getName(phase), nodes, contacts});
+    const VectorXd u = contacts.empty() ? VectorXd::Zero(model.nu()).eval()
+                                        : calcStaticTorques(model, makeConstraintSet(model, contacts), scene.q0).u;
+    for (int i = 0; i < nodes; ++i) {
+      const JumpHeight com = calcJumpHeight(options, g, stages.size() * options.time_step);
+      stages.push_back(makeStage(scene, contacts));
+      StageSpec& stage = stages.back();
+      const double load = model.mass() * (g + com.acceleration);  // Eq. (2)
+      addGroundCosts(model, ground, VectorXd::Constant(contacts.size(), load / contacts.size()), stage);
+      if (phase != Phase::Flight) addHeightCost(scene, "com height", options.com_weight, com.height, stage);
+      if (phase == Phase::Flight && 2 * i == nodes)
+        addHeightCost(scene, "apex", options.apex_weight / options.time_step, com.height, stage);
+      if (phase == Phase::Flight && i > 0) addSwingCosts(scene, static_cast<double>(i) / nodes, stage);
+      if (phase == Phase::Land && i == 0) addTouchdownCosts(scene, stage);
+      motion.guess.xs.push_back(makeGuess(scene, phase, i * options.time_step));
+      motion.guess.us.push_back(u);
+    }
+  }
+  stages.push_back(makeTerminalStage(scene));
+  motion.guess.xs.push_back(makeGuess(scene, Phase::Settle, 0));
+  motion.problem =
+      std::make_unique<RobotProblem>(model, scene.q0, VectorXd::Zero(model.nv()), std::move(stages), formulation);
+  JumpOptions copy = options;
+  for (const OptionEntry& entry : listOptions(copy)) motion.requested.emplace_back(entry.name, *entry.value);
+  return motion;
+}
+
+}  // namespace bielle
