@@ -4,8 +4,8 @@ bielle_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
 # What Bielle is built with, on Debian 12 without anything else; gnuplot draws its figures.
 bielle_packages=(g++ cmake ninja-build libeigen3-dev liburdfdom-dev liburdfdom-headers-dev libconsole-bridge-dev
-  libtinyxml-dev libyaml-cpp-dev nlohmann-json3-dev libcli11-dev libzip-dev gnuplot-nox
-  libjs-three libjs-dygraphs)
+  libtinyxml-dev libyaml-cpp-dev nlohmann-json3-dev libcli11-dev libzip-dev libnlopt-dev
+  libnlopt-cxx-dev gnuplot-nox libjs-three libjs-dygraphs)
 # What its tests need besides: Catch2, Simbody to compare with, Google Benchmark, Python to read NumPy archives, a browser
 # to look at reports.
 bielle_test_packages=(catch2 libsimbody-dev libbenchmark-dev python3 chromium)

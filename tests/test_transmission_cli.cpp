@@ -136,3 +136,42 @@ TEST_CASE("ratio refuses what has none") {
   checkRefused(run({"ratio", "bipetto", "--joint", "knee_left", "--reference", "lying"}), "reference 'lying'");
   checkRefused(run({"ratio", "bipetto", "--joint", "knee_left", "-o", "/dev/null/x"}), "results cannot be written");
 }
+
+TEST_CASE("solve --model serial tells what it leaves out, lift carries the motion over") {
+  const OutputDirectory directory;
+  const std::vector<std::string> squat = {"solve", "squat",          "--robot",  "bipetto", "--depth",
+                                          "0.95",  "--set",          "settle=0", "--set",   "duration=0.6",
+                                          "--set", "time_step=0.02", "--quiet"};
+  std::vector<std::string> serial = squat;
+  serial.insert(serial.end(), {"--model", "serial", "-o", directory.str("serial")});
+  const CommandResult solved = run(serial);
+  INFO(solved.out << solved.err);
+  REQUIRE(solved.status == 0);
+  CHECK_THAT(solved.out, Catch::Contains("closures dropped") && Catch::Contains("free_knee_left") &&
+                             Catch::Contains("motor_knee_left -> knee_left") && Catch::Contains("converged"));
+  CHECK(json::parse(readFile(directory.str("serial") + "/summary.json"))["model"] == "serial");
+
+  for (const std::string method : {"newton", "nlopt"}) {
+    const CommandResult result =
+        run({"lift", directory.str("serial"), "-o", directory.str(method), "--method", method});
+    INFO(result.out << result.err);
+    CHECK(result.status == 0);
+    CHECK_THAT(result.out, Catch::Contains("lifted: all 31 nodes") && Catch::Contains("motor_knee_left"));
+    CHECK(directory.list(method) ==
+          std::vector<std::string>{"lift.json", "summary.json", "trajectory.csv", "trajectory.npz"});
+    const json summary = json::parse(readFile(directory.str(method) + "/summary.json"));
+    CHECK(summary["model"] == "closed");
+    CHECK(summary["converged"] == true);
+    CHECK(summary["closure_gap"]["position_m"].get<double>() < 1e-9);
+    CHECK(summary["peak_torques"].contains("motor_knee_left"));
+    const json lifted = json::parse(readFile(directory.str(method) + "/lift.json"));
+    CHECK(lifted["lifted"] == true);
+    CHECK(lifted["nodes"].size() == 31);
+  }
+  checkRefused(run({"lift", directory.str("newton"), "-o", directory.str("again")}),
+               "not a motion of the serial model");
+  checkRefused(run({"lift", "/no/such/place", "-o", directory.str("again")}), "cannot be read");
+  std::vector<std::string> wrong = squat;
+  wrong.insert(wrong.end(), {"--model", "serial", "--serial-armature", "much", "-o", directory.str("again")});
+  checkRefused(run(wrong), "--serial-armature 'much'");
+}

@@ -22,6 +22,7 @@ void addEval(CLI::App& app, Action& action);
 void addRobots(CLI::App& app, Action& action);
 void addBench(CLI::App& app, Action& action);
 void addRatio(CLI::App& app, Action& action);
+void addLift(CLI::App& app, Action& action);
 
 // Only the line of the help: its arguments are those of another program.
 void addValidate(CLI::App& app);

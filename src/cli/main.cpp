@@ -45,6 +45,7 @@ int main(int argc, char** argv) {
   addEval(app, action);
   addRobots(app, action);
   addRatio(app, action);
+  addLift(app, action);
   addBench(app, action);
   addValidate(app);
   app.callback([&action] {

@@ -6,12 +6,14 @@
 #include <csignal>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <sstream>
 
 #include "bielle/io/result.h"
 #include "bielle/io/warm_start.h"
 #include "bielle/model/error.h"
 #include "bielle/report/report.h"
+#include "bielle/transmission/serial_model.h"
 #include "cli/commands.h"
 #include "cli/motion_registry.h"
 #include "cli/table.h"
@@ -23,6 +25,8 @@ struct SolveArguments {
   RobotArgument robot;
   std::string directory;
   Formulation formulation = Formulation::Reduced;
+  bool serial = false;
+  std::string serial_armature = "1e-3";
   std::vector<std::string> settings;  // name=value
   FddpOptions solver;
   std::string warm_start;  // directory of a result, or empty
@@ -97,13 +101,48 @@ void addReport(const std::string& directory, std::vector<std::string>& paths) {
   }
 }
 
+SerialModelOptions readArmature(const std::string& text) {
+  SerialModelOptions options;
+  if (text == "reflected") {
+    options.armature_kind = SerialModelOptions::Armature::Reflected;
+    return options;
+  }
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, options.armature);
+  if (error != std::errc() || stop != end)
+    throw ModelError("", "--serial-armature '" + text + "'", "it is neither a number nor 'reflected'", "e.g. 1e-3");
+  return options;
+}
+
+// What the serial model leaves out: nothing goes silently.
+void printSerialModel(const SerialModel& serial) {
+  const auto join = [](const std::vector<std::string>& names) {
+    std::string text;
+    for (const std::string& name : names) text += (text.empty() ? "" : " ") + name;
+    return text;
+  };
+  std::cout << "serial model: " << serial.frozen_joints.size() << " joints frozen, " << serial.dropped_closures.size()
+            << " closures dropped\n";
+  std::vector<Row> rows = {{"frozen", join(serial.frozen_joints)}, {"dropped", join(serial.dropped_closures)}};
+  for (const SerialModel::Replacement& replacement : serial.replacements)
+    rows.push_back({"motors", join(replacement.motors) + " -> " + join(replacement.joints)});
+  if (!serial.dropped_targets.empty()) rows.push_back({"targets", join(serial.dropped_targets) + " (not asked for)"});
+  printTable(std::cout, rows);
+  std::cout << "\n";
+}
+
 int solve(const SolveArguments& arguments, const MotionRequest& request) {
   for (const std::string& setting : arguments.settings) applySetting(setting, request.options);
   for (const OptionEntry& option : request.options)
     if (!std::isfinite(*option.value))
       throw ModelError("", "option '" + option.name + "'", "it is not finite", "give a number");
   const LoadedRobot robot = arguments.robot.load();
-  Motion motion = request.make(robot.model, arguments.formulation);
+  std::optional<SerialModel> serial;
+  if (arguments.serial) {
+    serial = makeSerialModel(robot.model, makeStandingPosture(robot.model), readArmature(arguments.serial_armature));
+    printSerialModel(*serial);
+  }
+  Motion motion = request.make(serial ? serial->model : robot.model, arguments.formulation);
   if (!arguments.warm_start.empty()) setGuess(readResultRecord(arguments.warm_start), motion);
   makeOutputDirectory(arguments.directory);
 
@@ -119,7 +158,7 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
     };
   }
   const FddpSummary summary = Fddp(arguments.solver).solve(*motion.problem, motion.guess, observer);
-  const RunInfo run{arguments.robot.name, robot.file, getCommandLine()};
+  const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed"};
   const MotionResult result = makeResult(run, motion, motion.guess, summary);
   std::vector<std::string> paths = writeResult(arguments.directory, result);
   if (!arguments.no_report) addReport(arguments.directory, paths);
@@ -175,6 +214,15 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
          "reduced: loops are closed at every node; full: all joints of the spanning tree, closures by accelerations")
       ->check(CLI::IsMember({getName(Formulation::Full), getName(Formulation::Reduced)}))
       ->default_str(getName(arguments->formulation));
+  sub.add_option_function<std::string>(
+         "--model", [arguments](const std::string& name) { arguments->serial = name == "serial"; },
+         "closed: with its linkages; serial: linkages frozen at the standing posture, motors on the serial joints")
+      ->check(CLI::IsMember({"closed", "serial"}))
+      ->default_str("closed");
+  sub.add_option("--serial-armature", arguments->serial_armature,
+                 "of the motors on serial joints [kg m^2], or `reflected`: what the rotors weigh there at the standing "
+                 "posture")
+      ->capture_default_str();
   sub.add_option("--max-iterations", arguments->solver.max_iterations, "the solver stops there")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();

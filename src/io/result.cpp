@@ -86,6 +86,7 @@ Json makeSummary(const MotionResult& result) {
   return {{"motion", result.motion},
           {"robot", result.run.robot},
           {"robot_file", result.run.robot_file},
+          {"model", result.run.model},
           {"formulation", getName(result.formulation)},
           {"command", result.run.command},
           {"requested", listByName(result.requested)},

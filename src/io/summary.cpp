@@ -33,6 +33,7 @@ MotionSummary read(const Json& json) {
   summary.motion = json.at("motion");
   summary.robot = json.at("robot");
   summary.robot_file = json.at("robot_file");
+  summary.model = json.value("model", "closed");
   const std::string formulation = json.at("formulation");
   summary.formulation = formulation == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
   summary.converged = json.at("converged");

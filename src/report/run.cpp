@@ -5,6 +5,8 @@
 
 #include "bielle/io/names.h"
 #include "bielle/model/error.h"
+#include "bielle/motion/motion.h"
+#include "bielle/transmission/serial_model.h"
 
 namespace fs = std::filesystem;
 
@@ -51,6 +53,8 @@ ReportRun readRun(const std::string& directory) {
   const fs::path trajectory = fs::exists(archive, error) ? archive : table;
   run.record = readRecord(trajectory.string());
   run.robot = loadRobotOf(run.summary, place / "summary.json");
+  if (getText(run.summary, "model") == "serial")
+    run.robot.model = makeSerialModel(run.robot.model, makeStandingPosture(run.robot.model)).model;
   const Model& model = run.robot.model;
   const MotionRecord& record = run.record;
   if (record.q_names != makePositionNames(model) || record.v_names != makeVelocityNames(model) ||

@@ -1,6 +1,5 @@
 #include "bielle/transmission/linkage.h"
 
-#include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
 
@@ -11,6 +10,8 @@
 
 namespace bielle {
 namespace {
+
+constexpr double kSingular = 1e-12;  // singular values of N_J, whose rows are at most of unit length
 
 std::string join(const std::vector<std::string>& names) {
   std::string text;
@@ -100,6 +101,23 @@ MatrixXd selectRowsOf(const MatrixXd& N, const std::vector<int>& dofs) {
   return rows;
 }
 
+// a of Eq. (2) at the velocity v = T w of the block (n).
+VectorXd calcDriftAcceleration(const Linkage& linkage, BlockPoint& point, const MatrixXd& T, const VectorXd& v) {
+  const LoopBlock& block = linkage.block;
+  Workspace& ws = point.workspace();
+  updateVelocities(block.model, ws, v);
+  updateAccelerations(block.model, ws, VectorXd::Zero(block.model.nv()));
+  MatrixXd gamma(block.closures.rows, 1), independent(block.rank, 1);
+  for (size_t c = 0; c < block.closures.closures.size(); ++c) {
+    const Closure& closure = block.closures.closures[c];
+    gamma.block(block.closures.offsets[c], 0, getRows(closure.kind), 1) = calcClosureAcceleration(ws, closure);
+  }
+  point.selectIndependent(gamma, independent);
+  point.solveGram(independent);
+  const VectorXd a = -(point.basis().JW.transpose() * independent);
+  return a - T * selectRowsOf(a, linkage.joint_dofs);
+}
+
 }  // namespace
 
 Linkage makeLinkage(const Model& model, const Reduction& reduction, const std::vector<std::string>& names) {
@@ -126,36 +144,30 @@ Linkage makeLinkage(const Model& model, const Reduction& reduction, const std::v
   return linkage;
 }
 
+bool calcLinkageTangent(const Linkage& linkage, const BlockPoint& point, MatrixXd& T, double* margin) {
+  const MatrixXd& N = point.basis().N;
+  const Eigen::JacobiSVD<MatrixXd> svd(selectRowsOf(N, linkage.joint_dofs), Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const VectorXd& sigma = svd.singularValues();
+  if (margin) *margin = sigma[sigma.size() - 1];
+  if (!(sigma[sigma.size() - 1] > kSingular)) return false;
+  T = N * (svd.matrixV() * sigma.cwiseInverse().asDiagonal() * svd.matrixU().transpose());
+  return true;
+}
+
 bool calcLinkageRatio(const Linkage& linkage, BlockPoint& point, LinkageRatio& out) {
   const int m = linkage.size();
   out.R = MatrixXd::Identity(m, m);
   out.dR.assign(m, MatrixXd::Zero(m, m));
   out.condition = 1;
   if (linkage.isDirect()) return true;
-  const LoopBlock& block = linkage.block;
-  const BlockBasis& basis = point.basis();
-  const Eigen::FullPivLU<MatrixXd> N_J(selectRowsOf(basis.N, linkage.joint_dofs));
-  if (!N_J.isInvertible()) return false;
-  const MatrixXd T = basis.N * N_J.inverse();
+  MatrixXd T;
+  if (!calcLinkageTangent(linkage, point, T)) return false;
   out.R = selectRowsOf(T, linkage.motor_dofs);  // Eq. (1)
   const Eigen::JacobiSVD<MatrixXd> svd(out.R);
   out.condition = svd.singularValues()[0] / svd.singularValues()[m - 1];
 
-  // Motor accelerations of Eq. (2) at joint speeds w.
-  Workspace& ws = point.workspace();
   const auto calcMotorAcceleration = [&](const VectorXd& w) {
-    updateVelocities(block.model, ws, T * w);
-    updateAccelerations(block.model, ws, VectorXd::Zero(block.model.nv()));
-    MatrixXd gamma(block.closures.rows, 1), independent(block.rank, 1);
-    for (size_t c = 0; c < block.closures.closures.size(); ++c) {
-      const Closure& closure = block.closures.closures[c];
-      gamma.block(block.closures.offsets[c], 0, getRows(closure.kind), 1) = calcClosureAcceleration(ws, closure);
-    }
-    point.selectIndependent(gamma, independent);
-    point.solveGram(independent);
-    VectorXd a = -(basis.JW.transpose() * independent);
-    a -= T * selectRowsOf(a, linkage.joint_dofs);
-    return VectorXd(selectRowsOf(a, linkage.motor_dofs));
+    return VectorXd(selectRowsOf(calcDriftAcceleration(linkage, point, T, T * w), linkage.motor_dofs));
   };
   std::vector<VectorXd> alone;
   for (int j = 0; j < m; ++j) alone.push_back(calcMotorAcceleration(VectorXd::Unit(m, j)));
@@ -166,6 +178,15 @@ bool calcLinkageRatio(const Linkage& linkage, BlockPoint& point, LinkageRatio& o
       out.dR[j].col(k) = out.dR[k].col(j);
     }
   return out.R.allFinite();
+}
+
+bool calcLinkageMotion(const Linkage& linkage, BlockPoint& point, ConstVectorRef v_J, ConstVectorRef a_J, VectorXd& v,
+                       VectorXd& a) {
+  MatrixXd T;
+  if (!calcLinkageTangent(linkage, point, T)) return false;
+  v = T * v_J;
+  a = T * a_J + calcDriftAcceleration(linkage, point, T, v);
+  return true;
 }
 
 double calcBalanceError(const Model& model, const Linkage& linkage, ConstVectorRef q, const MatrixXd& R) {

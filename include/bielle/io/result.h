@@ -12,6 +12,7 @@ struct RunInfo {
   std::string robot;                 ///< name or path, as given
   std::string robot_file;            ///< its .urdf, absolute
   std::vector<std::string> command;  ///< the command line, or empty
+  std::string model = "closed";      ///< or "serial": the robot's linkages were frozen (transmission/serial_model.h)
 };
 
 struct MotionResult {
@@ -49,6 +50,7 @@ struct MotionSummary {
   };
   std::string file;  ///< that was read
   std::string motion, robot, robot_file;
+  std::string model = "closed";  ///< or "serial"
   Formulation formulation = Formulation::Full;
   bool converged = false;
   std::vector<std::pair<std::string, double>> requested;

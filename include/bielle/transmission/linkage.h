@@ -48,6 +48,16 @@ struct LinkageRatio {
 /// Eqs. (1) to (3) at a point of the block. False at a dead point of the joint, where R is not finite.
 bool calcLinkageRatio(const Linkage& linkage, BlockPoint& point, LinkageRatio& out);
 
+/// Velocities and accelerations of all dofs of the block (n) that go with those of its joints (m each): v = T v_J and, by
+/// Eq. (2), a = T a_J + a(v_J). False at a dead point of the joint.
+bool calcLinkageMotion(const Linkage& linkage, BlockPoint& point, ConstVectorRef v_J, ConstVectorRef a_J, VectorXd& v,
+                       VectorXd& a);
+
+/// Tangent T = N N_J^{-1} (n x m) of unit joint speeds. False at a dead point of the joint.
+/// \param margin  smallest singular value of N_J: the least that the joints move in a unit motion of the block; zero at a dead
+/// point of the joint
+bool calcLinkageTangent(const Linkage& linkage, const BlockPoint& point, MatrixXd& T, double* margin = nullptr);
+
 /// How far the constrained dynamics of the whole robot are from Eq. (1): at rest, a unit torque of each motor is balanced by
 /// -R^T of it on the joints, on top of what holds gravity. Returns the largest acceleration that remains over those that
 /// either side alone would give.

@@ -1,0 +1,140 @@
+// bielle lift: a motion of the serial model on the closed robot.
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+
+#include "bielle/io/lift_files.h"
+#include "bielle/model/error.h"
+#include "cli/commands.h"
+#include "cli/motion_registry.h"
+#include "cli/table.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::cli {
+namespace {
+
+struct LiftArguments {
+  std::string serial_directory, directory;
+  LiftOptions options;
+};
+
+Motion remakeMotion(const MotionSummary& summary, const Model& serial) {
+  for (const MotionEntry& entry : getMotions()) {
+    if (entry.name != summary.motion) continue;
+    const MotionRequest request = entry.makeRequest();
+    for (const auto& [name, value] : summary.requested) setOption(request.options, name, value);
+    return request.make(serial, summary.formulation);
+  }
+  throw ModelError(summary.file, "motion '" + summary.motion + "'", "there is no such motion", "make it anew");
+}
+
+void printOutcome(const LiftArguments& arguments, const LiftResult& lifted, const MotionResult* result, int stages) {
+  const std::vector<LiftNode>& nodes = lifted.nodes;
+  LiftNode worst = nodes.front();
+  for (const LiftNode& node : nodes) {
+    worst.position_error = std::max(worst.position_error, node.position_error);
+    worst.velocity_error = std::max(worst.velocity_error, node.velocity_error);
+    worst.acceleration_error = std::max(worst.acceleration_error, node.acceleration_error);
+    worst.margin = std::min(worst.margin, node.margin);
+  }
+  if (lifted.lifted())
+    std::cout << "lifted: all " << nodes.size() << " nodes";
+  else
+    std::cout << "not lifted: node " << nodes.size() - 1 << " of " << stages << ", " << getName(nodes.back().status)
+              << ": " << nodes.back().message;
+  std::cout << " (" << getName(arguments.options.method) << ")\n";
+  std::vector<Row> rows = {{"position error", formatNumber(worst.position_error, "%.2e") + " rad or m"},
+                           {"velocity error", formatNumber(worst.velocity_error, "%.2e") + " rad/s or m/s"},
+                           {"acceleration error", formatNumber(worst.acceleration_error, "%.2e") + " rad/s^2 or m/s^2"},
+                           {"smallest margin", formatNumber(worst.margin, "%.4f") + " (0: dead point of a joint)"}};
+  if (result) {
+    rows.push_back({"closure gap", formatNumber(result->gap_position, "%.2e") + " m"});
+    rows.push_back({"contact slip", formatNumber(result->slip_position, "%.2e") + " m"});
+  }
+  printTable(std::cout, rows);
+  if (!result) return;
+  const MotionRecord& record = result->record;
+  std::vector<Row> motors = {{"motor", "peak torque [N m]", "peak speed [rad/s]"}};
+  for (size_t m = 0; m < record.u_names.size(); ++m) {
+    const auto at = std::find(record.v_names.begin(), record.v_names.end(), record.u_names[m]) - record.v_names.begin();
+    motors.push_back({record.u_names[m], formatNumber(record.u.col(m).cwiseAbs().maxCoeff(), "%.3f"),
+                      formatNumber(record.v.col(at).cwiseAbs().maxCoeff(), "%.3f")});
+  }
+  printTable(std::cout, motors);
+}
+
+int run(const LiftArguments& arguments) {
+  const MotionSummary summary = readSummary(arguments.serial_directory);
+  if (summary.model != "serial")
+    throw ModelError(summary.file, "model '" + summary.model + "'", "it is not a motion of the serial model",
+                     "make one with `bielle solve " + summary.motion + " --model serial`");
+  const MotionRecord record = readRecord((fs::path(arguments.serial_directory) / "trajectory.npz").string());
+  RobotArgument robot_argument;
+  std::error_code error;
+  robot_argument.name = fs::is_regular_file(summary.robot_file, error) ? summary.robot_file : summary.robot;
+  const LoadedRobot robot = robot_argument.load();
+  const SerialModel serial = makeSerialModel(robot.model, makeStandingPosture(robot.model));
+  const Motion motion = remakeMotion(summary, serial.model);
+  const SerialTrajectory trajectory = makeSerialTrajectory(motion, record);
+  makeOutputDirectory(arguments.directory);
+
+  const auto start = std::chrono::steady_clock::now();
+  const LiftResult lifted = lift(robot.model, serial, trajectory, arguments.options);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  std::optional<MotionResult> result;
+  if (!lifted.trajectory.us.empty())
+    result = makeLiftedResult({summary.robot, robot.file, getCommandLine()}, robot.model, motion, lifted, seconds);
+  const MotionResult* written = result ? &*result : nullptr;
+  printOutcome(arguments, lifted, written, static_cast<int>(trajectory.a.size()));
+  for (const std::string& path : writeLift(arguments.directory, arguments.options.method, lifted, written))
+    std::cout << "  " << path << "\n";
+  return lifted.lifted() ? kOk : kFailed;
+}
+
+}  // namespace
+
+void addLift(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("lift", "Carry a motion of the serial model over to the closed robot");
+  const auto arguments = std::make_shared<LiftArguments>();
+  command.add_option("DIR", arguments->serial_directory, "result of `bielle solve MOTION --model serial`")->required();
+  command
+      .add_option("-o,--output", arguments->directory,
+                  "directory for lift.json, trajectory.csv, trajectory.npz and summary.json; made if need be")
+      ->required();
+  command
+      .add_option_function<std::string>(
+          "--method",
+          [arguments](const std::string& name) {
+            arguments->options.method = name == "nlopt" ? LiftMethod::Nlopt : LiftMethod::Newton;
+          },
+          "newton: each node by itself, torques from inverse dynamics; nlopt: one step of the closed dynamics after "
+          "the "
+          "other, torques by SLSQP, as in the paper's appendix")
+      ->check(CLI::IsMember({"newton", "nlopt"}))
+      ->default_str("newton");
+  command.add_option("--singular", arguments->options.singular, "margin below which a linkage is at a dead point [1]")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command.add_option("--position-tolerance", arguments->options.position_tolerance, "of nlopt's states [rad, m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command.add_option("--velocity-tolerance", arguments->options.velocity_tolerance, "of nlopt's states [rad/s, m/s]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command.footer(
+      "The closed robot takes the postures, velocities and accelerations of the serial one where its linkages can; "
+      "motor\n"
+      "torques follow. A lift that fails says at which node and why, and writes what was lifted. Exit status: 0 "
+      "lifted,\n"
+      "1 not lifted, 2 bad input.\n"
+      "Examples:\n"
+      "  bielle solve squat --robot bipetto --depth 0.8 --model serial -o serial\n"
+      "  bielle lift serial -o lifted\n"
+      "  bielle lift serial -o lifted --method nlopt");
+  command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
+}
+
+}  // namespace bielle::cli

@@ -1,0 +1,46 @@
+#pragma once
+// The closed robot at a given serial state: configuration, velocity and acceleration (lift.h).
+#include <string>
+#include <vector>
+
+#include "bielle/transmission/lift.h"
+#include "bielle/transmission/linkage.h"
+
+namespace bielle {
+
+class PostureLift {
+ public:
+  PostureLift(const Model& closed, const SerialModel& serial);
+
+  // Closes the loops on the serial joints of q_s, from the configuration of the call before. On failure, why() tells.
+  LiftStatus setConfiguration(const VectorXd& q_s, double singular);
+  // Takes over a closed configuration.
+  LiftStatus setClosedConfiguration(const VectorXd& q, double singular);
+
+  const VectorXd& q() const { return q_; }
+  // The closed velocity and acceleration with the serial ones.
+  VectorXd liftVelocity(const VectorXd& v_s);
+  void liftMotion(const VectorXd& v_s, const VectorXd& a_s, VectorXd& v, VectorXd& a);
+  // nv x nv of the serial model: the tangent of unit serial speeds.
+  MatrixXd calcTangent() const;
+  double margin() const { return margin_; }
+  const std::string& why() const { return why_; }
+
+ private:
+  struct Unit {
+    Linkage linkage;
+    BlockPoint here, next;
+    std::vector<int> serial_positions, serial_dofs;  // of the linkage's joints in the serial model
+  };
+  LiftStatus closeUnit(Unit& unit, const VectorXd& target);
+  LiftStatus checkMargin(double singular);
+
+  const Model &closed_, &serial_;
+  std::vector<Unit> units_;
+  std::vector<std::pair<int, int>> free_joints_;  // outside loops: in the closed and in the serial model
+  VectorXd q_;
+  double margin_ = 1;
+  std::string why_;
+};
+
+}  // namespace bielle

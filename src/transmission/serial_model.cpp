@@ -1,0 +1,210 @@
+#include "bielle/transmission/serial_model.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "bielle/model/builder.h"
+#include "bielle/transmission/linkage.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kSmallestMargin = 1e-6;  // of a linkage that its joints determine
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::string join(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none" : text;
+}
+
+bool contains(const std::vector<int>& list, int value) {
+  return std::find(list.begin(), list.end(), value) != list.end();
+}
+
+// The linkages of the robot with their serial joints; each must be determined by them.
+std::vector<Linkage> listLinkages(const Model& closed, const Reduction& reduction) {
+  std::vector<Linkage> linkages;
+  for (const LoopBlock& block : reduction.blocks) {
+    std::vector<std::string> closures, joints;
+    for (int c : block.cluster_closures) closures.push_back(closed.closures()[c].name);
+    int coordinates = 0;
+    for (int i : closed.serialJoints())
+      if (contains(block.joints, i)) {
+        joints.push_back(closed.joints()[i].name);
+        coordinates += closed.joints()[i].nv;
+      }
+    if (joints.empty() || coordinates != block.size)
+      throw ModelError(closed.name(), "closures " + join(closures),
+                       "there is no equivalent serial chain: their linkage has mobility " + std::to_string(block.size) +
+                           ", the serial joints in it (" + join(joints) + ") have " + std::to_string(coordinates) +
+                           " coordinates",
+                       "list serial joints that determine the linkage, or use the closed model");
+    linkages.push_back(makeLinkage(closed, reduction, joints));
+  }
+  return linkages;
+}
+
+void addBodies(const Model& closed, ConstVectorRef q, const std::vector<bool>& frozen, ModelBuilder& builder) {
+  for (int i = 1; i < closed.numBodies(); ++i) {
+    Joint joint = closed.joints()[i];
+    JointLimits limits;
+    if (frozen[i]) {
+      joint.X_PJ = joint.X_PJ * calcJointPlacement(joint, q.segment(joint.idx_q, joint.nq));
+      joint.kind = JointKind::Fixed;
+    } else {
+      limits = {closed.lowerLimits().segment(joint.idx_v, joint.nv),
+                closed.upperLimits().segment(joint.idx_v, joint.nv),
+                closed.velocityLimits().segment(joint.idx_v, joint.nv)};
+    }
+    builder.addLink(closed.bodies()[i].name, closed.bodies()[joint.parent].name, joint, closed.bodies()[i].inertia,
+                    limits);
+  }
+}
+
+// Everything that hangs on bodies. Placements are those of the closed bodies, which are links or fixed frames now.
+void addAttachments(const Model& closed, ModelBuilder& builder) {
+  std::set<std::string> links;
+  for (const Body& body : closed.bodies()) links.insert(body.name);
+  for (const Frame& frame : closed.frames())
+    if (!links.count(frame.name)) builder.addFrame(frame.name, closed.bodies()[frame.body].name, frame.X_BF);
+  for (const ContactFrame& contact : closed.contacts()) {
+    std::string name;
+    for (const Frame& frame : closed.frames())
+      if (frame.body == contact.body && frame.X_BF.p == contact.X_BF.p && frame.X_BF.R == contact.X_BF.R)
+        name = frame.name;
+    if (name.empty())
+      builder.addFrame(name = "contact " + contact.name, closed.bodies()[contact.body].name, contact.X_BF);
+    builder.addContact(contact.name, name, contact.kind, contact.half_length, contact.half_width);
+  }
+  for (const Visual& visual : closed.visuals()) builder.addVisual(closed.bodies()[visual.body].name, visual);
+  builder.setGravity(closed.gravity());
+}
+
+// One motor on a serial joint in place of those of its linkage, Eq. (1).
+void addSerialMotor(const Model& closed, const Linkage& linkage, const MatrixXd& R, int j,
+                    const SerialModelOptions& options, ModelBuilder& builder) {
+  const Eigen::FullPivLU<MatrixXd> lu(R);
+  const MatrixXd inverse =
+      lu.isInvertible() ? MatrixXd(lu.inverse()) : MatrixXd::Constant(R.rows(), R.cols(), kInfinity);
+  double effort = 0, velocity = 0, armature = 0;
+  const auto addLimit = [](double& sum, double factor, double limit) {
+    if (factor != 0) sum += std::abs(factor) * limit;
+  };
+  for (int i = 0; i < linkage.size(); ++i) {
+    const Motor& motor = closed.motors()[linkage.motors[i]];
+    addLimit(effort, R(i, j), motor.effort_limit);
+    addLimit(velocity, inverse(j, i), motor.velocity_limit);
+    armature += R(i, j) * R(i, j) * motor.armature;
+  }
+  if (options.armature_kind == SerialModelOptions::Armature::Given) armature = options.armature;
+  builder.addMotor(linkage.joint_names[j], armature, effort, velocity);
+}
+
+// Motors in the order of the closed model, those of a linkage where its first motor stood.
+void addMotors(const Model& closed, const std::vector<Linkage>& linkages, const SerialModelOptions& options,
+               SerialModel& out, ModelBuilder& builder) {
+  std::vector<bool> done(linkages.size(), false);
+  for (int m = 0; m < closed.nu(); ++m) {
+    const auto owner = std::find_if(linkages.begin(), linkages.end(),
+                                    [m](const Linkage& linkage) { return contains(linkage.motors, m); });
+    const Motor& motor = closed.motors()[m];
+    if (owner == linkages.end()) {
+      builder.addMotor(motor.name, motor.armature, motor.effort_limit, motor.velocity_limit);
+      continue;
+    }
+    const size_t index = owner - linkages.begin();
+    if (done[index]) continue;
+    done[index] = true;
+    const MatrixXd& R = out.replacements[index].R;
+    for (int j = 0; j < owner->size(); ++j) addSerialMotor(closed, *owner, R, j, options, builder);
+  }
+}
+
+void addReferences(const Model& closed, const std::vector<bool>& frozen, SerialModel& out, ModelBuilder& builder) {
+  for (Reference reference : closed.references()) {
+    for (auto it = reference.joints.begin(); it != reference.joints.end();) {
+      const bool drop = frozen[closed.findJoint(it->first)];
+      if (drop) out.dropped_targets.push_back(reference.name + ": " + it->first);
+      it = drop ? reference.joints.erase(it) : std::next(it);
+    }
+    builder.addReference(std::move(reference));
+  }
+}
+
+// Calls copy(from's joint, model's joint) for the joints that both have.
+template <typename Copy>
+void forCommonJoints(const Model& from, const Model& model, const Copy& copy) {
+  for (const Joint& joint : model.joints()) {
+    if (joint.nv == 0) continue;
+    const int index = from.findJoint(joint.name);
+    if (index < 0 || from.joints()[index].kind != joint.kind)
+      throw ModelError(from.name(), "joint '" + joint.name + "'", "the other model has no such joint",
+                       "map between a closed model and the serial one made of it");
+    copy(from.joints()[index], joint);
+  }
+}
+
+}  // namespace
+
+SerialModel makeSerialModel(const Model& closed, ConstVectorRef q, const SerialModelOptions& options) {
+  SerialModel out;
+  out.q_reference = q;
+  const Reduction reduction = makeReduction(closed, q);
+  const std::vector<Linkage> linkages = listLinkages(closed, reduction);
+  std::vector<bool> frozen(closed.numBodies(), false);
+  for (const LoopBlock& block : reduction.blocks)
+    for (int i : block.joints) frozen[i] = !contains(closed.serialJoints(), i);
+  for (const Linkage& linkage : linkages) {
+    BlockPoint point(linkage.block);
+    VectorXd q_block(linkage.block.model.nq());
+    gatherConfiguration(closed, linkage.block, q, q_block);
+    LinkageRatio ratio;
+    MatrixXd T;
+    double margin = 0;
+    if (!point.update(linkage.block, q_block) || !calcLinkageTangent(linkage, point, T, &margin) ||
+        margin < kSmallestMargin || !calcLinkageRatio(linkage, point, ratio))
+      throw ModelError(closed.name(), "joints " + join(linkage.joint_names),
+                       "their linkage is at a dead point at the reference, they do not determine it",
+                       "freeze it at another configuration");
+    out.replacements.push_back({linkage.motor_names, linkage.joint_names, ratio.R});
+  }
+  for (int i = 1; i < closed.numBodies(); ++i)
+    if (frozen[i]) out.frozen_joints.push_back(closed.joints()[i].name);
+  for (const Closure& closure : closed.closures()) out.dropped_closures.push_back(closure.name);
+
+  ModelBuilder builder(closed.name());
+  addBodies(closed, q, frozen, builder);
+  addAttachments(closed, builder);
+  addMotors(closed, linkages, options, out, builder);
+  for (int i : closed.serialJoints()) builder.addSerialJoint(closed.joints()[i].name);
+  const Model driven = builder.build();
+  for (const Joint& joint : driven.joints()) {
+    if (joint.nv == 0 || driven.findMotor(joint.name) >= 0) continue;
+    const double armature = closed.armature()[closed.joints()[closed.findJoint(joint.name)].idx_v];
+    if (armature > 0) builder.setArmature(joint.name, armature);
+  }
+  addReferences(closed, frozen, out, builder);
+  out.model = builder.build();
+  return out;
+}
+
+VectorXd restrictConfiguration(const Model& from, const Model& model, ConstVectorRef q) {
+  VectorXd out(model.nq());
+  forCommonJoints(from, model, [&](const Joint& source, const Joint& target) {
+    out.segment(target.idx_q, target.nq) = q.segment(source.idx_q, source.nq);
+  });
+  return out;
+}
+
+VectorXd restrictVelocity(const Model& from, const Model& model, ConstVectorRef v) {
+  VectorXd out(model.nv());
+  forCommonJoints(from, model, [&](const Joint& source, const Joint& target) {
+    out.segment(target.idx_v, target.nv) = v.segment(source.idx_v, source.nv);
+  });
+  return out;
+}
+
+}  // namespace bielle

@@ -1,0 +1,26 @@
+#pragma once
+// Smooth minimization by NLopt's SLSQP (Kraft, 1994). NLopt stands behind slsqp.cpp alone.
+#include <functional>
+#include <string>
+
+#include "bielle/math/types.h"
+
+namespace bielle {
+
+struct SlsqpOptions {
+  double tolerance = 1e-12;  // of every variable
+  int max_evaluations = 100;
+};
+
+struct SlsqpResult {
+  VectorXd x;
+  double value = 0;
+  int evaluations = 0;
+};
+
+// The objective writes its gradient when it is asked for (not null).
+using SlsqpObjective = std::function<double(const VectorXd& x, VectorXd* gradient)>;
+// The best point met, whatever ends the search.
+SlsqpResult minimizeBySlsqp(const VectorXd& start, const SlsqpObjective& objective, const SlsqpOptions& options = {});
+
+}  // namespace bielle
