@@ -34,7 +34,8 @@ class Transport {
   }
 
   handleKey(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === 'SELECT') return;
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest('select')) return;
+    if (event.key === ' ' && event.target.closest('button, input[type=checkbox], summary, a')) return;  // theirs
     const actions = {
       ' ': () => this.setPlaying(!this.playing),
       ArrowLeft: () => this.step(-1),
