@@ -54,9 +54,14 @@ def write_hostile_result(directory):
     name = escape(HOSTILE)
     (directory / "robot.urdf").write_text(f"""<robot name="{name}"><link name="world"/>
       <link name="bob"><inertial><mass value="1"/><origin xyz="0 0 -1"/>
-        <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+        <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+        <visual><geometry><mesh filename="part.stl" scale="2 2 2"/></geometry></visual>
+        <visual><geometry><mesh filename="torn.stl"/></geometry></visual></link>
       <joint name="{name}" type="continuous"><parent link="world"/><child link="bob"/><axis xyz="0 1 0"/></joint>
       </robot>""")
+    corners = struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)
+    (directory / "part.stl").write_bytes(bytes(80) + struct.pack("<I", 2) + corners + corners)
+    (directory / "torn.stl").write_bytes(bytes(80) + struct.pack("<I", 2000) + corners)
     with open(directory / "trajectory.csv", "w", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["time", "q." + HOSTILE, "v." + HOSTILE, "a." + HOSTILE, "com.x", "com.y", "com.z",
@@ -177,6 +182,10 @@ class ReportPage(unittest.TestCase):
         self.assertIn(HOSTILE, self.browser.evaluate("document.title"))
         text = self.browser.evaluate("document.body.innerText")
         self.assertGreater(text.count(HOSTILE), 8)
+        meshes = self.browser.evaluate("report.scene.robots[0].bodies[1].children.filter(c => c.isMesh)"
+                                       ".map(c => Array.from(c.geometry.getAttribute('position').array))")
+        self.assertEqual(meshes[0][:9], [0, 0, 0, 2, 0, 0, 0, 2, 0])
+        self.assertEqual([len(mesh) for mesh in meshes], [18])
         self.assertIn("FAIL", text)
 
     def test_sliders_keep_loops_closed_or_say_so(self):

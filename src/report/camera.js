@@ -2,7 +2,12 @@
 // The camera: orbits about what it looks at, and goes with it.
 
 // Direction from the robot to the camera.
-const VIEWS = {oblique: [1, -0.85, 0.45], front: [1, 0, 0.08], side: [0, -1, 0.08], top: [0.001, 0, 1]};
+const VIEWS = {
+  oblique: [1, -0.85, 0.45],
+  front: [1, 0, 0.08],
+  side: [0, -1, 0.08],
+  top: [0.001, 0, 1]
+};
 
 class Camera {
   constructor(scene, canvas) {
@@ -26,18 +31,19 @@ class Camera {
   setView(name) {
     const focus = this.getWishedTarget(), direction = new THREE.Vector3(...(VIEWS[name] || VIEWS.oblique)).normalize();
     const height = this.scene.size, width = 0.62 * this.scene.size + this.scene.spread * (name === 'side' ? 0.2 : 1);
-    const distance = Math.max(height, width / this.three.aspect) / 2 / Math.tan(this.three.fov * Math.PI / 360) + this.scene.spread / 4;
+    const distance = Math.max(height, width / this.three.aspect) / 2 / Math.tan(this.three.fov * Math.PI / 360) +
+        this.scene.spread / 4;
     this.controls.target.copy(focus);
     this.three.position.copy(focus).addScaledVector(direction, distance * 1.1);
     this.controls.update();
   }
 
-  // On the floor below the centres of mass; the height is that of the middle of the robots when they stand.
+  // Level with the middle of the robots as they stand at first, up and down with their footholds.
   getWishedTarget() {
     const focus = this.scene.calcFocus(), boxes = this.scene.robots.map(robot => robot.box);
-    const middle = boxes.reduce((sum, box) => sum + (box.isEmpty() ? 0 : (box.min.z + box.max.z) / 2), 0) / boxes.length;
-    const first = this.scene.robots[0], start = first.run.com.get(0, 2);
-    focus.z = middle + (this.climb ? focus.z - start : 0);
+    const middle =
+        boxes.reduce((sum, box) => sum + (box.isEmpty() ? 0 : (box.min.z + box.max.z) / 2), 0) / boxes.length;
+    focus.z = middle + this.scene.robots[0].run.calcClimb(this.scene.time);
     return focus;
   }
 

@@ -43,7 +43,8 @@ class Run {
     this.robot = json.robot;
     this.color = RUN_COLORS[index % RUN_COLORS.length];
     this.pattern = RUN_PATTERNS[index % RUN_PATTERNS.length];
-    for (const [name, value] of Object.entries(json.motion)) this[name] = value.data === undefined ? value : new Table(value);
+    for (const [name, value] of Object.entries(json.motion))
+      this[name] = value.data === undefined ? value : new Table(value);
     this.time = this.time.data;
     this.end = this.time[this.time.length - 1];
   }
@@ -53,8 +54,10 @@ class Run {
     let low = 0, high = Math.max(0, this.time.length - 2);
     while (low < high) {
       const middle = (low + high + 1) >> 1;
-      if (this.time[middle] <= t + 1e-6) low = middle;
-      else high = middle - 1;
+      if (this.time[middle] <= t + 1e-6)
+        low = middle;
+      else
+        high = middle - 1;
     }
     return low;
   }
@@ -64,6 +67,20 @@ class Run {
     const k = this.getStage(t), next = Math.min(k + 1, this.time.length - 1);
     const span = this.time[next] - this.time[k];
     return {k, next, share: span > 0 ? Math.min(1, Math.max(0, (t - this.time[k]) / span)) : 0};
+  }
+
+  // How much higher the feet stand than at the start, m: through the footholds, straight in between.
+  calcClimb(t) {
+    const knots = new Map(), heights = new Map();
+    for (const print of this.footprints) {
+      heights.set(print.contact, print.pose[2]);
+      knots.set(print.time, Array.from(heights.values()).reduce((sum, z) => sum + z, 0) / heights.size);
+    }
+    const times = Array.from(knots.keys()), values = Array.from(knots.values());
+    const next = times.findIndex(time => time > t);
+    if (next <= 0) return times.length ? values[next < 0 ? values.length - 1 : 0] - values[0] : 0;
+    const share = (t - times[next - 1]) / (times[next] - times[next - 1]);
+    return values[next - 1] + share * (values[next] - values[next - 1]) - values[0];
   }
 
   getPhases() {
@@ -97,5 +114,6 @@ function formatNumber(value, digits = 4) {
   if (value === null || value === undefined || Number.isNaN(value)) return '–';
   if (value === 0) return '0';
   const size = Math.abs(value);
-  return size >= 1e5 || size < 1e-3 ? value.toExponential(Math.max(0, digits - 2)) : String(Number(value.toPrecision(digits)));
+  return size >= 1e5 || size < 1e-3 ? value.toExponential(Math.max(0, digits - 2)) :
+                                      String(Number(value.toPrecision(digits)));
 }

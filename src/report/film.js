@@ -52,12 +52,15 @@ class Film {
 
   // Leaves <img class="film"> elements in the document.
   show() {
-    const times = this.options.film, columns = this.options.separate ? 1 : this.options.columns || Math.min(times.length, 6);
+    const times = this.options.film,
+          columns = this.options.separate ? 1 : this.options.columns || Math.min(times.length, 6);
     const canvas = this.makeCanvas(columns, this.options.separate ? 1 : Math.ceil(times.length / columns));
     const pen = canvas.getContext('2d');
     document.body.textContent = '';
     document.body.className = 'film';
-    const finish = type => { addElement(document.body, 'img', 'film').src = canvas.toDataURL(type, 0.93); };
+    const finish = type => {
+      addElement(document.body, 'img', 'film').src = canvas.toDataURL(type, 0.93);
+    };
     times.forEach((t, i) => {
       this.draw(pen, t, (i % columns) * this.width, this.options.separate ? 0 : Math.floor(i / columns) * this.height);
       if (this.options.separate) finish('image/jpeg');

@@ -34,17 +34,22 @@ class Report {
       this.scene = new Scene(canvas, this.runs);
     } catch (error) {
       this.trouble = String(error);
-      canvas.replaceWith(makeElement('p', 'trouble', 'The replay needs WebGL, which this browser does not offer: ' + error.message));
+      canvas.replaceWith(
+          makeElement('p', 'trouble', 'The replay needs WebGL, which this browser does not offer: ' + error.message));
       return;
     }
     const {apart, seeThrough, show, hide} = this.options;
     this.scene.setSideBySide(apart);
     this.scene.setSeeThrough(seeThrough);
-    for (const layer of show) if (this.isLayer(layer)) this.scene.setLayer(layer, true);
-    for (const layer of hide) if (this.isLayer(layer)) this.scene.setLayer(layer, false);
+    for (const layer of show)
+      if (this.isLayer(layer)) this.scene.setLayer(layer, true);
+    for (const layer of hide)
+      if (this.isLayer(layer)) this.scene.setLayer(layer, false);
     this.scene.setTime(this.options.time);
     this.camera = new Camera(this.scene, canvas);
-    this.camera.controls.addEventListener('change', () => { this.isStale = true; });
+    this.camera.controls.addEventListener('change', () => {
+      this.isStale = true;
+    });
   }
 
   // A robot with sliders instead of a motion.
@@ -58,12 +63,17 @@ class Report {
     const caption = document.getElementById('caption');
     const update = () => {
       this.isStale = true;
-      caption.textContent = this.runs[0].robot.closures.length ? 'largest gap of a loop ' + formatNumber(this.viewer.getLargestGap(), 2) + ' m' : '';
+      caption.textContent = this.runs[0].robot.closures.length ?
+          'largest gap of a loop ' + formatNumber(this.viewer.getLargestGap(), 2) + ' m' :
+          '';
     };
     this.viewer = new RobotViewer(this.scene, this.runs[0], json.view, update);
     this.viewer.addControls(document.getElementById('sliders'));
     this.viewer.place();
-    const tick = () => { if (this.isStale) this.draw(); requestAnimationFrame(tick); };
+    const tick = () => {
+      if (this.isStale) this.draw();
+      requestAnimationFrame(tick);
+    };
     tick();
   }
 
@@ -84,12 +94,16 @@ class Report {
 
   addViewerControls(layers = LAYERS.map(([layer]) => layer)) {
     const views = document.getElementById('views');
-    for (const name of Object.keys(VIEWS)) addElement(views, 'button', '', name).onclick = () => this.camera.setView(name);
+    for (const name of Object.keys(VIEWS))
+      addElement(views, 'button', '', name).onclick = () => this.camera.setView(name);
     const toggle = (text, on, action) => {
       const label = addElement(document.getElementById('toggles'), 'label'), box = addElement(label, 'input');
       box.type = 'checkbox';
       box.checked = on;
-      box.onchange = () => { action(box.checked); this.isStale = true; };
+      box.onchange = () => {
+        action(box.checked);
+        this.isStale = true;
+      };
       label.append(text);
     };
     const {show, hide} = this.options;
@@ -97,8 +111,14 @@ class Report {
       if (layers.includes(layer) && this.scene.robots.some(robot => robot.layers[layer].length))
         toggle(text, (visible || show.includes(layer)) && !hide.includes(layer), on => this.scene.setLayer(layer, on));
     toggle('see through', this.options.seeThrough, on => this.scene.setSeeThrough(on));
-    toggle('follow', true, on => { this.camera.following = on; });
-    if (this.runs.length > 1) toggle('side by side', this.options.apart, on => { this.scene.setSideBySide(on); this.camera.setView('oblique'); });
+    toggle('follow', true, on => {
+      this.camera.following = on;
+    });
+    if (this.runs.length > 1)
+      toggle('side by side', this.options.apart, on => {
+        this.scene.setSideBySide(on);
+        this.camera.setView('oblique');
+      });
     const newtons = scale => formatNumber(0.1 / scale, 2) + ' N';
     document.getElementById('scales').textContent = 'Arrows of 10 cm: contact ' + newtons(this.scene.scales.contact) +
         (this.runs.some(run => run.robot.closures.length) ? ', closure ' + newtons(this.scene.scales.closure) : '') +
@@ -136,7 +156,9 @@ class Report {
     if (this.runs.length < 2) return;
     for (const run of this.runs) {
       const label = addElement(caption, 'div', 'label');
-      Object.assign(addElement(label, 'span', 'swatch').style, {borderColor: run.color, borderTopStyle: RUN_BORDERS[run.index % RUN_BORDERS.length]});
+      Object.assign(
+          addElement(label, 'span', 'swatch').style,
+          {borderColor: run.color, borderTopStyle: RUN_BORDERS[run.index % RUN_BORDERS.length]});
       label.append(run.label);
     }
   }

@@ -1,7 +1,10 @@
 'use strict';
 // One plot over time (or over iterations): several series, each with one line per run.
 
-const PALETTE = ['#1971c2', '#e8590c', '#2f9e44', '#9c36b5', '#c2255c', '#0c8599', '#a47c00', '#5c677d', '#6741d9', '#d6336c', '#66a80f', '#3b5bdb'];
+const PALETTE = [
+  '#1971c2', '#e8590c', '#2f9e44', '#9c36b5', '#c2255c', '#0c8599', '#a47c00', '#5c677d', '#6741d9', '#d6336c',
+  '#66a80f', '#3b5bdb'
+];
 
 // The left and the right one of a pair share a hue; the right one is darker.
 function pickColors(names) {
@@ -54,7 +57,10 @@ class Plot {
     this.visible = definition.series.map(series => !series.hidden);
     this.makeGraph();
     this.addChips();
-    new ResizeObserver(() => { this.graph.resize(); this.placeCursor(); }).observe(area);
+    new ResizeObserver(() => {
+      this.graph.resize();
+      this.placeCursor();
+    }).observe(area);
   }
 
   addHead() {
@@ -62,8 +68,10 @@ class Plot {
     addElement(head, 'h2', '', this.definition.title);
     addElement(head, 'span', 'unit', this.definition.unit ? '[' + this.definition.unit + ']' : '');
     const tools = addElement(head, 'span', 'tools');
-    const button = (text, title, action) => Object.assign(addElement(tools, 'button', '', text), {title, onclick: action});
-    if (this.definition.series.some(series => series.limits)) button('limits', 'make room for the limits', () => this.toggleLimits());
+    const button = (text, title, action) =>
+        Object.assign(addElement(tools, 'button', '', text), {title, onclick: action});
+    if (this.definition.series.some(series => series.limits))
+      button('limits', 'make room for the limits', () => this.toggleLimits());
     if (this.definition.series.length > 1) {
       button('all', 'show all', () => this.setAll(true));
       button('none', 'hide all', () => this.setAll(false));
@@ -84,11 +92,28 @@ class Plot {
       series[labels[i]] = {color: definition.series[line.series].color, strokePattern: pattern};
     });
     this.graph = new Dygraph(this.area, this.makeRows(), {
-      labels: ['x', ...labels], series, legend: 'never', labelsUTC: true, stepPlot: !!definition.stairs, connectSeparatedPoints: true,
-      logscale: !!definition.log, strokeWidth: 1.6, gridLineColor: '#e6e9ef', axisLineColor: '#c4cbd6',
-      drawPoints: !!definition.points, pointSize: 2, highlightCircleSize: 3, highlightSeriesBackgroundAlpha: 1, highlightSeriesOpts: {strokeWidth: 3},
-      visibility: this.lines.map(line => this.visible[line.series]), yRangePad: 6, xRangePad: 2,
-      axes: {x: {axisLabelWidth: 46, pixelsPerLabel: 56}, y: {axisLabelWidth: 52, axisLabelFormatter: y => formatNumber(y, 3)}},
+      labels: ['x', ...labels],
+      series,
+      legend: 'never',
+      labelsUTC: true,
+      stepPlot: !!definition.stairs,
+      connectSeparatedPoints: true,
+      logscale: !!definition.log,
+      strokeWidth: 1.6,
+      gridLineColor: '#e6e9ef',
+      axisLineColor: '#c4cbd6',
+      drawPoints: !!definition.points,
+      pointSize: 2,
+      highlightCircleSize: 3,
+      highlightSeriesBackgroundAlpha: 1,
+      highlightSeriesOpts: {strokeWidth: 3},
+      visibility: this.lines.map(line => this.visible[line.series]),
+      yRangePad: 6,
+      xRangePad: 2,
+      axes: {
+        x: {axisLabelWidth: 46, pixelsPerLabel: 56},
+        y: {axisLabelWidth: 52, axisLabelFormatter: y => formatNumber(y, 3)}
+      },
       clickCallback: (event, x) => owner.onPick && owner.onPick(x),
       highlightCallback: (event, x, points, row, name) => this.mark(name),
       unhighlightCallback: () => this.mark(null),
@@ -131,9 +156,16 @@ class Plot {
       addElement(chip, 'span', 'swatch').style.borderColor = series.color;
       addElement(chip, 'span', 'name', series.name);
       this.values.push(addElement(chip, 'span', 'value'));
-      chip.title = series.name + (series.limits ? ', limits: ' + series.limits.map(limit => formatNumber(limit)).join(' … ') : '');
-      chip.onclick = () => { this.visible[s] = !this.visible[s]; this.updateVisibility(); };
-      chip.onmouseenter = () => { const line = this.lines.findIndex(l => l.series === s); if (this.visible[s] && line >= 0) this.graph.setSelection(0, 'line' + line, true); };
+      chip.title = series.name +
+          (series.limits ? ', limits: ' + series.limits.map(limit => formatNumber(limit)).join(' … ') : '');
+      chip.onclick = () => {
+        this.visible[s] = !this.visible[s];
+        this.updateVisibility();
+      };
+      chip.onmouseenter = () => {
+        const line = this.lines.findIndex(l => l.series === s);
+        if (this.visible[s] && line >= 0) this.graph.setSelection(0, 'line' + line, true);
+      };
       chip.onmouseleave = () => this.graph.clearSelection();
       chip.classList.toggle('off', !this.visible[s]);
     });
@@ -162,9 +194,16 @@ class Plot {
 
   calcLimitRange() {
     let low = Infinity, high = -Infinity;
-    const include = y => { if (y !== null && Number.isFinite(y)) { low = Math.min(low, y); high = Math.max(high, y); } };
+    const include = y => {
+      if (y !== null && Number.isFinite(y)) {
+        low = Math.min(low, y);
+        high = Math.max(high, y);
+      }
+    };
     this.lines.filter(line => this.visible[line.series]).forEach(line => line.values.forEach(include));
-    this.definition.series.forEach((series, s) => { if (this.visible[s] && series.limits) series.limits.forEach(include); });
+    this.definition.series.forEach((series, s) => {
+      if (this.visible[s] && series.limits) series.limits.forEach(include);
+    });
     const pad = 0.05 * (high - low || 1);
     return low <= high ? [low - pad, high + pad] : [null, null];
   }

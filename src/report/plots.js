@@ -6,12 +6,15 @@ function collectSeries(runs, list) {
   const series = new Map();
   runs.forEach((run, r) => {
     for (const item of list(run)) {
-      if (!series.has(item.name)) series.set(item.name, {name: item.name, hidden: item.hidden, limits: item.limits, lines: runs.map(() => null)});
+      if (!series.has(item.name))
+        series.set(item.name, {name: item.name, hidden: item.hidden, limits: item.limits, lines: runs.map(() => null)});
       series.get(item.name).lines[r] = item.values;
     }
   });
   const all = Array.from(series.values()), colors = pickColors(all.map(item => item.name));
-  all.forEach((item, i) => { item.color = item.color || colors[i]; });
+  all.forEach((item, i) => {
+    item.color = item.color || colors[i];
+  });
   return all;
 }
 
@@ -25,7 +28,11 @@ function hasLimit(limits) {
 function listJoints(run, table, select, makeLimits) {
   return run.robot.joints.filter(joint => joint.nv === 1 && select(joint)).map(joint => {
     const limits = makeLimits(joint);
-    return {name: joint.name, values: table.getColumn(joint[table === run.q ? 'q' : 'v']), limits: hasLimit(limits) ? limits : undefined};
+    return {
+      name: joint.name,
+      values: table.getColumn(joint[table === run.q ? 'q' : 'v']),
+      limits: hasLimit(limits) ? limits : undefined
+    };
   });
 }
 
@@ -50,20 +57,94 @@ function listPlots(runs) {
   const range = joint => [joint.lower, joint.upper], speed = joint => [negate(joint.velocity), joint.velocity];
   const hasSerial = runs.some(run => run.robot.joints.some(joint => joint.serial));
   return [
-    {title: 'Centre of mass', unit: 'm', list: run => AXES.map((axis, i) => ({name: axis, values: run.com.getColumn(i)}))},
-    {title: 'Trunk tilt since the start', unit: 'rad', list: run => (run.robot.free ? ['roll', 'pitch', 'yaw'] : []).map((name, i) => ({name, values: run.tilt.getColumn(i)}))},
-    {title: 'Feet', unit: 'm', list: run => listContactSeries(run, (contact, c) => AXES.map((axis, i) => ({name: contact.name + ' ' + axis, values: run.feet.getColumn(3 * c + i), hidden: i !== 2})))},
-    {title: 'Contact forces', unit: 'N', stairs: true, list: run => listContactSeries(run, (contact, c) => AXES.map((axis, i) => ({name: contact.name + ' f' + axis, values: run.contact_wrenches.getColumn(6 * c + i), hidden: i !== 2})))},
-    {title: 'Friction used', unit: 'tangential / normal', stairs: true, list: listFriction},
-    {title: 'Centres of pressure', unit: 'm', stairs: true, list: run => listContactSeries(run, (contact, c) => !contact.surface ? [] : [0, 1].map(i => ({name: contact.name + ' ' + AXES[i], values: run.pressure.getColumn(2 * c + i), limits: [-1, 1].map(sign => sign * [contact.half_length, contact.half_width][i])})))},
-    {title: 'Motor torques', unit: 'N m', stairs: true, list: run => run.robot.motors.map((motor, m) => ({name: motor.name, values: run.u.getColumn(m), limits: hasLimit([motor.effort]) ? [negate(motor.effort), motor.effort] : undefined}))},
-    {title: 'Motor velocities', unit: 'rad/s', list: run => run.robot.motors.map(motor => ({name: motor.name, values: run.v.getColumn(run.robot.joints[motor.joint].v), limits: hasLimit([motor.velocity]) ? [negate(motor.velocity), motor.velocity] : undefined}))},
+    {
+      title: 'Centre of mass',
+      unit: 'm',
+      list: run => AXES.map((axis, i) => ({name: axis, values: run.com.getColumn(i)}))
+    },
+    {
+      title: 'Trunk tilt since the start',
+      unit: 'rad',
+      list: run =>
+          (run.robot.free ? ['roll', 'pitch', 'yaw'] : []).map((name, i) => ({name, values: run.tilt.getColumn(i)}))
+    },
+    {
+      title: 'Feet',
+      unit: 'm',
+      list: run => listContactSeries(
+          run,
+          (contact, c) => AXES.map(
+              (axis, i) => ({name: contact.name + ' ' + axis, values: run.feet.getColumn(3 * c + i), hidden: i !== 2})))
+    },
+    {
+      title: 'Contact forces',
+      unit: 'N',
+      stairs: true,
+      list: run => listContactSeries(run, (contact, c) => AXES.map((axis, i) => ({
+                                                                     name: contact.name + ' f' + axis,
+                                                                     values: run.contact_wrenches.getColumn(6 * c + i),
+                                                                     hidden: i !== 2
+                                                                   })))
+    },
+    {title: 'Friction used', unit: 'tangential / normal', stairs: true, list: listFriction}, {
+      title: 'Centres of pressure',
+      unit: 'm',
+      stairs: true,
+      list: run => listContactSeries(
+          run,
+          (contact, c) => !contact.surface ?
+              [] :
+              [0, 1].map(i => ({
+                           name: contact.name + ' ' + AXES[i],
+                           values: run.pressure.getColumn(2 * c + i),
+                           limits: [-1, 1].map(sign => sign * [contact.half_length, contact.half_width][i])
+                         })))
+    },
+    {
+      title: 'Motor torques',
+      unit: 'N m',
+      stairs: true,
+      list: run =>
+          run.robot.motors.map((motor, m) => ({
+                                 name: motor.name,
+                                 values: run.u.getColumn(m),
+                                 limits: hasLimit([motor.effort]) ? [negate(motor.effort), motor.effort] : undefined
+                               }))
+    },
+    {
+      title: 'Motor velocities',
+      unit: 'rad/s',
+      list: run => run.robot.motors.map(
+          motor => ({
+            name: motor.name,
+            values: run.v.getColumn(run.robot.joints[motor.joint].v),
+            limits: hasLimit([motor.velocity]) ? [negate(motor.velocity), motor.velocity] : undefined
+          }))
+    },
     {title: 'Motor power', unit: 'W', stairs: true, list: listPower},
-    {title: 'Motor angles', unit: 'rad', list: run => listJoints(run, run.q, joint => isMotor(run, joint), range)},
-    {title: 'Joint angles', unit: 'rad', list: run => listJoints(run, run.q, joint => (hasSerial ? joint.serial : !isMotor(run, joint)), range)},
-    {title: 'Joint velocities', unit: 'rad/s', list: run => listJoints(run, run.v, joint => (hasSerial ? joint.serial : !isMotor(run, joint)), speed)},
-    {title: 'Closure gaps', unit: 'm', log: true, list: run => run.robot.closures.map((closure, c) => ({name: closure.name, values: run.gaps.getColumn(2 * c)}))},
-    {title: 'Closure forces', unit: 'N', stairs: true, list: run => run.robot.closures.map((closure, c) => ({name: closure.name, values: normOfColumns(run.closure_wrenches, 6 * c, 3)}))}
+    {title: 'Motor angles', unit: 'rad', list: run => listJoints(run, run.q, joint => isMotor(run, joint), range)}, {
+      title: 'Joint angles',
+      unit: 'rad',
+      list: run => listJoints(run, run.q, joint => (hasSerial ? joint.serial : !isMotor(run, joint)), range)
+    },
+    {
+      title: 'Joint velocities',
+      unit: 'rad/s',
+      list: run => listJoints(run, run.v, joint => (hasSerial ? joint.serial : !isMotor(run, joint)), speed)
+    },
+    {
+      title: 'Closure gaps',
+      unit: 'm',
+      log: true,
+      list: run => run.robot.closures.map((closure, c) => ({name: closure.name, values: run.gaps.getColumn(2 * c)}))
+    },
+    {
+      title: 'Closure forces',
+      unit: 'N',
+      stairs: true,
+      list: run => run.robot.closures.map(
+          (closure, c) => ({name: closure.name, values: normOfColumns(run.closure_wrenches, 6 * c, 3)}))
+    }
   ];
 }
 
@@ -89,7 +170,8 @@ function listFriction(run) {
   const friction = run.summary.ground && run.summary.ground.friction;
   return listContactSeries(run, (contact, c) => {
     const tangential = normOfColumns(run.contact_wrenches, 6 * c, 2);
-    const values = tangential.map((f, k) => (run.contact_wrenches.get(k, 6 * c + 2) > 1 ? f / run.contact_wrenches.get(k, 6 * c + 2) : NaN));
+    const values = tangential.map(
+        (f, k) => (run.contact_wrenches.get(k, 6 * c + 2) > 1 ? f / run.contact_wrenches.get(k, 6 * c + 2) : NaN));
     return [{name: contact.name, values, limits: typeof friction === 'number' ? [null, friction] : undefined}];
   });
 }
@@ -97,7 +179,8 @@ function listFriction(run) {
 class Plots {
   // `onPick(t)`: a time was clicked.
   constructor(parent, runs, onPick) {
-    const owner = {runs, onPick, onZoom: (plot, window) => this.zoom(plot, window), getBands: () => runs[0].getPhases()};
+    const owner =
+        {runs, onPick, onZoom: (plot, window) => this.zoom(plot, window), getBands: () => runs[0].getPhases()};
     this.plots = [];
     for (const definition of listPlots(runs)) {
       const series = collectSeries(runs, definition.list);
@@ -110,7 +193,8 @@ class Plots {
 
   zoom(source, [low, high]) {
     const whole = low <= 1e-6 && high >= this.end - 1e-6;
-    for (const plot of this.plots) if (plot !== source || whole) plot.setWindow(whole ? null : [low, high]);
+    for (const plot of this.plots)
+      if (plot !== source || whole) plot.setWindow(whole ? null : [low, high]);
     source.placeCursor();
   }
 

@@ -16,11 +16,29 @@ function makeColor(css) {
 function makeGeometry(visual, meshes) {
   const [a, b, c] = visual.size;
   switch (visual.shape) {
-    case 'box': return new THREE.BoxBufferGeometry(a, b, c);
-    case 'cylinder': return new THREE.CylinderBufferGeometry(a, a, b, 32).rotateX(Math.PI / 2);
-    case 'sphere': return new THREE.SphereBufferGeometry(a, 32, 20);
-    default: return new THREE.STLLoader().parse(decodeBase64(meshes[visual.mesh]).buffer).scale(a, b, c);
+    case 'box':
+      return new THREE.BoxBufferGeometry(a, b, c);
+    case 'cylinder':
+      return new THREE.CylinderBufferGeometry(a, a, b, 32).rotateX(Math.PI / 2);
+    case 'sphere':
+      return new THREE.SphereBufferGeometry(a, 32, 20);
+    default: {
+      const mesh = readMesh(meshes[visual.mesh]);
+      return mesh && mesh.scale(a, b, c);
+    }
   }
+}
+
+// Of an STL file; null when the file is none, whatever its name says.
+function readMesh(text) {
+  try {
+    const geometry = new THREE.STLLoader().parse(decodeBase64(text).buffer);
+    const numbers = geometry.getAttribute('position').array;
+    if (numbers.length && numbers.every(Number.isFinite)) return geometry;
+  } catch (error) {
+    console.warn('a mesh cannot be read: ' + error);
+  }
+  return null;
 }
 
 // An arrow of a unit length along z; scaled by its length.
@@ -28,8 +46,10 @@ class Arrow {
   constructor(color, radius) {
     const material = new THREE.MeshStandardMaterial({color: makeColor(color), roughness: 0.5});
     this.object = new THREE.Group();
-    this.shaft = new THREE.Mesh(new THREE.CylinderBufferGeometry(radius, radius, 1, 12).rotateX(Math.PI / 2).translate(0, 0, 0.5), material);
-    this.head = new THREE.Mesh(new THREE.ConeBufferGeometry(2.4 * radius, 6 * radius, 16).rotateX(Math.PI / 2), material);
+    this.shaft = new THREE.Mesh(
+        new THREE.CylinderBufferGeometry(radius, radius, 1, 12).rotateX(Math.PI / 2).translate(0, 0, 0.5), material);
+    this.head =
+        new THREE.Mesh(new THREE.ConeBufferGeometry(2.4 * radius, 6 * radius, 16).rotateX(Math.PI / 2), material);
     this.headLength = 6 * radius;
     this.object.add(this.shaft, this.head);
     this.object.visible = false;
@@ -103,7 +123,8 @@ class RobotView {
     this.box = new THREE.Box3().setFromObject(this.root);
     this.size = this.box.isEmpty() ? 1 : this.box.getSize(new THREE.Vector3()).length();
     this.layers = {};
-    for (const name of ['locks', 'contactForces', 'closureForces', 'com', 'traces', 'footprints']) this.layers[name] = [];
+    for (const name of ['locks', 'contactForces', 'closureForces', 'com', 'traces', 'footprints'])
+      this.layers[name] = [];
     this.addSteps();
     this.addClosures();
     this.addContacts();
@@ -118,11 +139,13 @@ class RobotView {
   }
 
   addVisual(visual) {
+    const geometry = makeGeometry(visual, this.run.robot.meshes);
+    if (!geometry) return;
     const [r, g, b, a] = visual.rgba;
     const color = new THREE.Color(r, g, b).convertSRGBToLinear();
     const material = new THREE.MeshStandardMaterial({color, roughness: 0.62, metalness: 0.08});
     this.materials.push({material, color, opacity: a > 0 ? a : 1});
-    const mesh = setPose(new THREE.Mesh(makeGeometry(visual, this.run.robot.meshes), material), visual.pose);
+    const mesh = setPose(new THREE.Mesh(geometry, material), visual.pose);
     mesh.castShadow = mesh.receiveShadow = true;
     this.bodies[visual.body].add(mesh);
   }
@@ -149,8 +172,10 @@ class RobotView {
     for (const step of (ground && ground.steps) || []) {
       const [x, y, top] = step.top, height = Math.max(1e-3, top - ground.height);
       const geometry = new THREE.BoxBufferGeometry(step.length, step.width, height);
-      const box = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({color: makeColor('#cfd6df'), roughness: 0.9}));
-      box.add(new THREE.LineSegments(new THREE.EdgesGeometry(geometry), new THREE.LineBasicMaterial({color: makeColor('#8d99a8')})));
+      const box =
+          new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({color: makeColor('#cfd6df'), roughness: 0.9}));
+      box.add(new THREE.LineSegments(
+          new THREE.EdgesGeometry(geometry), new THREE.LineBasicMaterial({color: makeColor('#8d99a8')})));
       box.position.set(x, y, top - height / 2);
       box.rotation.z = step.yaw || 0;
       box.castShadow = box.receiveShadow = true;
@@ -158,10 +183,22 @@ class RobotView {
     }
   }
 
+  // Height of what is below the centre of mass.
+  findFloor(floor) {
+    const ground = this.run.summary.ground, at = this.com.position;
+    for (const step of (ground && ground.steps) || []) {
+      const dx = at.x - step.top[0], dy = at.y - step.top[1], c = Math.cos(step.yaw || 0), s = Math.sin(step.yaw || 0);
+      if (Math.abs(c * dx + s * dy) <= step.length / 2 && Math.abs(c * dy - s * dx) <= step.width / 2)
+        floor = Math.max(floor, step.top[2]);
+    }
+    return floor;
+  }
+
   addClosures() {
     const texture = makeLockTexture(), size = 0.045 * this.size;
     this.largestClosureForce = 0;
-    for (const f of this.listForces(this.run.closure_wrenches)) this.largestClosureForce = Math.max(this.largestClosureForce, f);
+    for (const f of this.listForces(this.run.closure_wrenches))
+      this.largestClosureForce = Math.max(this.largestClosureForce, f);
     this.closures = this.run.robot.closures.map(closure => {
       const frame = setPose(this.add(this.bodies[closure.body], new THREE.Group()), closure.pose);
       const lock = new THREE.Sprite(new THREE.SpriteMaterial({map: texture, depthTest: false, transparent: true}));
@@ -179,7 +216,9 @@ class RobotView {
       const frame = setPose(this.add(this.bodies[contact.body], new THREE.Group()), contact.pose);
       const layer = this.add(frame, new THREE.Group(), 'contactForces');
       const arrow = new Arrow('#2f9e44', 0.006 * this.size);
-      const centre = new THREE.Mesh(new THREE.SphereBufferGeometry(0.011 * this.size, 16, 12), new THREE.MeshBasicMaterial({color: makeColor('#2b8a3e')}));
+      const centre = new THREE.Mesh(
+          new THREE.SphereBufferGeometry(0.011 * this.size, 16, 12),
+          new THREE.MeshBasicMaterial({color: makeColor('#2b8a3e')}));
       layer.add(arrow.object, centre);
       centre.visible = false;
       return {arrow, centre};
@@ -199,13 +238,19 @@ class RobotView {
     const size = 0.022 * this.size, colors = [makeColor('#14181f'), makeColor('#ffd43b')];
     this.com = this.add(this.root, new THREE.Group(), 'com');
     for (let i = 0; i < 8; ++i) {  // the usual mark: eighths of a sphere in two colours
-      const part = new THREE.SphereBufferGeometry(size, 10, 8, (i % 4) * Math.PI / 2, Math.PI / 2, i < 4 ? 0 : Math.PI / 2, Math.PI / 2);
-      const mesh = new THREE.Mesh(part, new THREE.MeshBasicMaterial({color: colors[(i + (i < 4 ? 0 : 1)) % 2], depthTest: false}));
+      const part = new THREE.SphereBufferGeometry(
+          size, 10, 8, (i % 4) * Math.PI / 2, Math.PI / 2, i < 4 ? 0 : Math.PI / 2, Math.PI / 2);
+      const mesh = new THREE.Mesh(
+          part, new THREE.MeshBasicMaterial({color: colors[(i + (i < 4 ? 0 : 1)) % 2], depthTest: false}));
       mesh.renderOrder = 3;
       this.com.add(mesh);
     }
-    this.plumb = this.add(this.root, new THREE.Mesh(new THREE.RingBufferGeometry(0.6 * size, size, 24),
-        new THREE.MeshBasicMaterial({color: makeColor('#14181f'), side: THREE.DoubleSide})), 'com');
+    this.plumb = this.add(
+        this.root,
+        new THREE.Mesh(
+            new THREE.RingBufferGeometry(0.6 * size, size, 24),
+            new THREE.MeshBasicMaterial({color: makeColor('#14181f'), side: THREE.DoubleSide})),
+        'com');
   }
 
   // Paths of the centre of mass and of the feet: whole and pale, done and strong.
@@ -245,7 +290,8 @@ class RobotView {
     this.bodies.forEach((body, i) => {
       const a = k * table.cols + 7 * i, b = next * table.cols + 7 * i, d = table.data;
       body.position.set(...[0, 1, 2].map(j => d[a + j] + share * (d[b + j] - d[a + j])));
-      body.quaternion.set(d[a + 3], d[a + 4], d[a + 5], d[a + 6]).slerp(goal.set(d[b + 3], d[b + 4], d[b + 5], d[b + 6]), share);
+      body.quaternion.set(d[a + 3], d[a + 4], d[a + 5], d[a + 6])
+          .slerp(goal.set(d[b + 3], d[b + 4], d[b + 5], d[b + 6]), share);
     });
   }
 
@@ -253,10 +299,12 @@ class RobotView {
   setTime(t, scales, ground) {
     this.setPlacements(t);
     const run = this.run, {k, next, share} = run.locate(t);
-    const read = (table, row, col) => new THREE.Vector3(table.get(row, col), table.get(row, col + 1), table.get(row, col + 2));
+    const read = (table, row, col) =>
+        new THREE.Vector3(table.get(row, col), table.get(row, col + 1), table.get(row, col + 2));
     this.closures.forEach(({lock, arrow}, c) => {
       lock.material.color.copy(getGapColor(run.gaps.get(share < 0.5 ? k : next, 2 * c)));
-      if (run.closure_wrenches.rows) arrow.set(read(run.closure_wrenches, k, 6 * c).multiplyScalar(scales.closure), 0, 0, 0);
+      if (run.closure_wrenches.rows)
+        arrow.set(read(run.closure_wrenches, k, 6 * c).multiplyScalar(scales.closure), 0, 0, 0);
     });
     this.contacts.forEach(({arrow, centre}, c) => {
       if (!run.contact_wrenches.rows) return;
@@ -267,7 +315,7 @@ class RobotView {
       centre.position.set(x, y, 0);
     });
     this.com.position.copy(read(run.com, k, 0).lerp(read(run.com, next, 0), share));
-    this.plumb.position.set(this.com.position.x, this.com.position.y, ground + 0.004);
+    this.plumb.position.set(this.com.position.x, this.com.position.y, this.findFloor(ground) + 0.004);
     for (const trace of this.traces) trace.geometry.setDrawRange(0, (share > 0.999 ? next : k) + 1);
     for (const {line, time} of this.footprints) line.visible = time <= t + 1e-6;
   }

@@ -56,18 +56,20 @@ class Scene {
     const box = this.calcExtent(), centre = box.getCenter(new THREE.Vector3());
     const span = Math.max(box.max.x - box.min.x, box.max.y - box.min.y) + 8 * this.size;
     this.three.fog = new THREE.Fog(makeColor('#eef1f5'), 3.5 * this.size, 6 * this.size + span / 2);
-    const plane = new THREE.Mesh(new THREE.PlaneBufferGeometry(4 * span, 4 * span),
+    const plane = new THREE.Mesh(
+        new THREE.PlaneBufferGeometry(4 * span, 4 * span),
         new THREE.MeshStandardMaterial({color: makeColor('#ffffff'), roughness: 1}));
     plane.position.set(centre.x, centre.y, this.ground - 0.001);
     plane.receiveShadow = true;
     const cell = this.size > 3 ? 1 : this.size > 0.5 ? 0.1 : 0.02, count = 10 * Math.ceil(span / cell / 10);
-    const [fine, coarse] = [['#e0e5ec', cell, count], ['#c3ccd8', 10 * cell, count / 10]].map(([color, step, number]) => {
-      const grid = new THREE.GridHelper(number * step, number, makeColor(color), makeColor(color));
-      grid.rotation.x = Math.PI / 2;
-      const snap = x => 10 * cell * Math.round(x / (10 * cell));
-      grid.position.set(snap(centre.x), snap(centre.y), this.ground);
-      return grid;
-    });
+    const [fine, coarse] =
+        [['#e0e5ec', cell, count], ['#c3ccd8', 10 * cell, count / 10]].map(([color, step, number]) => {
+          const grid = new THREE.GridHelper(number * step, number, makeColor(color), makeColor(color));
+          grid.rotation.x = Math.PI / 2;
+          const snap = x => 10 * cell * Math.round(x / (10 * cell));
+          grid.position.set(snap(centre.x), snap(centre.y), this.ground);
+          return grid;
+        });
     fine.position.z -= 0.0005;
     this.cell = cell;
     this.groundObjects = [plane, fine, coarse];
@@ -123,6 +125,7 @@ class Scene {
   }
 
   setTime(t) {
+    this.time = t;
     for (const robot of this.robots) robot.setTime(Math.min(t, robot.run.end), this.scales, this.ground);
   }
 

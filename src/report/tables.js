@@ -10,8 +10,12 @@ function addTable(parent, head, rows) {
   const body = addElement(table, 'tbody');
   for (const row of rows) {
     const line = addElement(body, 'tr');
-    for (const cell of row) addElement(line, 'td', (cell && cell.className) || (typeof cell === 'number' ? 'number' : ''),
-        typeof cell === 'number' ? formatNumber(cell, 6) : (cell && cell.text !== undefined) ? cell.text : String(cell === null || cell === undefined ? '–' : cell));
+    for (const cell of row)
+      addElement(
+          line, 'td', (cell && cell.className) || (typeof cell === 'number' ? 'number' : ''),
+          typeof cell === 'number'              ? formatNumber(cell, 6) :
+              (cell && cell.text !== undefined) ? cell.text :
+                                                  String(cell === null || cell === undefined ? '–' : cell));
   }
   return table;
 }
@@ -30,7 +34,10 @@ function fillBadges(parent, runs) {
   for (const run of runs) {
     const text = (runs.length > 1 ? run.label + ': ' : '') + (run.summary.termination || 'unknown');
     addElement(parent, 'span', 'badge ' + (run.summary.converged ? 'good' : 'bad'), text);
-    if (run.check) addElement(parent, 'span', 'badge ' + (run.check.pass ? 'good' : 'bad'), run.check.pass ? 'check passed' : 'check failed');
+    if (run.check)
+      addElement(
+          parent, 'span', 'badge ' + (run.check.pass ? 'good' : 'bad'),
+          run.check.pass ? 'check passed' : 'check failed');
   }
 }
 
@@ -38,10 +45,8 @@ function fillSummary(parent, runs) {
   const units = (value, unit) => (typeof value === 'number' ? formatNumber(value) + ' ' + unit : undefined);
   const get = [
     ['outcome', run => run.summary.termination + (run.summary.message ? ': ' + run.summary.message : '')],
-    ['cost', run => run.summary.cost],
-    ['iterations', run => run.summary.iterations],
-    ['solver time', run => units(run.summary.seconds, 's')],
-    ['model', run => run.summary.model],
+    ['cost', run => run.summary.cost], ['iterations', run => run.summary.iterations],
+    ['solver time', run => units(run.summary.seconds, 's')], ['model', run => run.summary.model],
     ['formulation', run => run.summary.formulation],
     ['duration', run => units(run.summary.duration_s, 's') + ', ' + run.summary.nodes + ' nodes'],
     ['mass', run => units(run.robot.mass, 'kg')],
@@ -50,9 +55,16 @@ function fillSummary(parent, runs) {
     ['largest closure gap', run => units(dig(run.summary, 'closure_gap', 'position_m'), 'm')],
     ['largest slip of a foot', run => units(dig(run.summary, 'contact_slip', 'position_m'), 'm')],
     ['friction coefficient', run => dig(run.summary, 'ground', 'friction')],
-    ['peak torques', run => Object.entries(run.summary.peak_torques || {}).slice(0, 4).map(([name, value]) => name + ' ' + formatNumber(value)).join(', ')]
+    [
+      'peak torques',
+      run => Object.entries(run.summary.peak_torques || {})
+                 .slice(0, 4)
+                 .map(([name, value]) => name + ' ' + formatNumber(value))
+                 .join(', ')
+    ]
   ];
-  const rows = get.map(([name, read]) => [name, ...runs.map(read)]).filter(row => row.slice(1).some(value => value !== undefined && value !== ''));
+  const rows = get.map(([name, read]) => [name, ...runs.map(read)])
+                   .filter(row => row.slice(1).some(value => value !== undefined && value !== ''));
   addTable(parent, runs.length > 1 ? ['', ...runs.map(run => run.label)] : null, rows);
 }
 
@@ -60,8 +72,12 @@ function fillCheck(parent, runs) {
   for (const run of runs.filter(r => r.check)) {
     parent.hidden = false;
     if (runs.length > 1) addElement(parent, 'h2', '', run.label);
-    const rows = (run.check.rows || []).map(row => [row.name, row.value, row.bound === null || row.bound === undefined ? '–' : row.bound, row.unit || '',
-      {text: row.pass ? 'pass' : 'FAIL', className: row.pass ? 'pass' : 'fail'}, row.note || '']);
+    const rows = (run.check.rows || [])
+                     .map(
+                         row =>
+                             [row.name, row.value, row.bound === null || row.bound === undefined ? '–' : row.bound,
+                              row.unit || '', {text: row.pass ? 'pass' : 'FAIL', className: row.pass ? 'pass' : 'fail'},
+                              row.note || '']);
     addTable(parent, ['what', 'value', 'bound', 'unit', '', ''], rows);
   }
 }
@@ -71,19 +87,30 @@ function fillIterations(parent, runs) {
   const logs = runs.map(run => (Array.isArray(run.summary.log) ? run.summary.log : []));
   if (logs.every(log => log.length === 0)) return;
   const columns = runs.map(run => run.summary.log_columns || []);
-  const column = (r, name) => { const at = columns[r].indexOf(name); return at < 0 ? null : logs[r].map(line => line[at]); };
-  const series = ['cost', 'gap', 'gradient'].map((name, i) => ({name, color: PALETTE[i], lines: runs.map((run, r) => column(r, name))}));
-  new Plot(parent, {title: '', unit: '', log: true, points: true, xs: runs.map((run, r) => column(r, 'iteration') || []), series}, {runs}).root.classList.remove('card');
+  const column = (r, name) => {
+    const at = columns[r].indexOf(name);
+    return at < 0 ? null : logs[r].map(line => line[at]);
+  };
+  const series = ['cost', 'gap', 'gradient'].map(
+      (name, i) => ({name, color: PALETTE[i], lines: runs.map((run, r) => column(r, name))}));
+  new Plot(
+      parent,
+      {title: '', unit: '', log: true, points: true, xs: runs.map((run, r) => column(r, 'iteration') || []), series},
+      {runs})
+      .root.classList.remove('card');
   runs.forEach((run, r) => {
     const details = addElement(parent, 'details');
-    addElement(details, 'summary', '', 'All ' + logs[r].length + ' iterations' + (runs.length > 1 ? ' of ' + run.label : ''));
+    addElement(
+        details, 'summary', '', 'All ' + logs[r].length + ' iterations' + (runs.length > 1 ? ' of ' + run.label : ''));
     addTable(details, columns[r], logs[r]);
   });
 }
 
 function fillAsked(parent, runs) {
   const names = Array.from(new Set([].concat(...runs.map(run => Object.keys(run.summary.requested || {})))));
-  addTable(parent, runs.length > 1 ? ['', ...runs.map(run => run.label)] : null, names.map(name => [name, ...runs.map(run => dig(run.summary, 'requested', name))]));
+  addTable(
+      parent, runs.length > 1 ? ['', ...runs.map(run => run.label)] : null,
+      names.map(name => [name, ...runs.map(run => dig(run.summary, 'requested', name))]));
   for (const run of runs) {
     const command = run.summary.command;
     if (Array.isArray(command) && command.length) addElement(addElement(parent, 'p'), 'code', '', command.join(' '));

@@ -28,13 +28,21 @@ class Transport {
     const select = document.getElementById('speed');
     for (const speed of SPEEDS) addElement(select, 'option', '', speed + '×').value = speed;
     select.value = this.speed;
-    select.onchange = () => { this.speed = Number(select.value); };
+    select.onchange = () => {
+      this.speed = Number(select.value);
+    };
   }
 
   handleKey(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === 'SELECT') return;
-    const actions = {' ': () => this.setPlaying(!this.playing), ArrowLeft: () => this.step(-1), ArrowRight: () => this.step(1),
-                     Home: () => this.setTime(0), End: () => this.setTime(this.end)};
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest('select')) return;
+    if (event.key === ' ' && event.target.closest('button, input[type=checkbox], summary, a')) return;  // theirs
+    const actions = {
+      ' ': () => this.setPlaying(!this.playing),
+      ArrowLeft: () => this.step(-1),
+      ArrowRight: () => this.step(1),
+      Home: () => this.setTime(0),
+      End: () => this.setTime(this.end)
+    };
     if (!actions[event.key]) return;
     event.preventDefault();
     actions[event.key]();
@@ -68,8 +76,10 @@ class Transport {
     if (this.playing && this.last !== undefined) {
       const next = this.time + this.speed * Math.min(0.1, (now - this.last) / 1000);
       this.rest = this.time >= this.end ? (this.rest || 0) + (now - this.last) : 0;
-      if (this.time < this.end) this.setTime(next);
-      else if (this.rest > 700) this.setTime(0);
+      if (this.time < this.end)
+        this.setTime(next);
+      else if (this.rest > 700)
+        this.setTime(0);
     }
     this.last = now;
   }

@@ -16,7 +16,8 @@ class Grid {
     let corners = [{node: 0, weight: 1}], stride = 1;
     this.motors.forEach((motor, i) => {
       const place = (values[i] - motor.low) / (motor.high - motor.low) * (this.count - 1);
-      const cell = Math.min(this.count - 2, Math.max(0, Math.floor(place))), share = Math.min(1, Math.max(0, place - cell));
+      const cell = Math.min(this.count - 2, Math.max(0, Math.floor(place))),
+            share = Math.min(1, Math.max(0, place - cell));
       const next = [];
       for (const {node, weight} of corners)
         for (const [step, part] of [[cell, 1 - share], [cell + 1, share]])
@@ -57,7 +58,8 @@ class RobotViewer {
   readWorld(body) {
     const d = this.run.placements.data, at = 7 * body;
     const quaternion = new THREE.Quaternion(d[at + 3], d[at + 4], d[at + 5], d[at + 6]).normalize();
-    return new THREE.Matrix4().compose(new THREE.Vector3(d[at], d[at + 1], d[at + 2]), quaternion, new THREE.Vector3(1, 1, 1));
+    return new THREE.Matrix4().compose(
+        new THREE.Vector3(d[at], d[at + 1], d[at + 2]), quaternion, new THREE.Vector3(1, 1, 1));
   }
 
   readLocal(body) {
@@ -89,7 +91,9 @@ class RobotViewer {
     this.local.forEach((local, body) => {
       worlds.push(body === 0 ? local.clone() : worlds[this.parents[body]].clone().multiply(local));
       worlds[body].decompose(position, quaternion, scale);
-      [position.x, position.y, position.z, quaternion.x, quaternion.y, quaternion.z, quaternion.w].forEach((x, j) => { d[7 * body + j] = x; });
+      [position.x, position.y, position.z, quaternion.x, quaternion.y, quaternion.z, quaternion.w].forEach((x, j) => {
+        d[7 * body + j] = x;
+      });
     });
     this.run.robot.closures.forEach((closure, c) => {
       const ends = [[closure.body, closure.pose], [closure.body2, closure.pose2]].map(
@@ -119,11 +123,18 @@ class RobotViewer {
       sliders.forEach(slider => slider.addEventListener('input', change));
       this.sliders.push({sliders, change});
     });
-    const missing = robot.motors.filter((motor, m) => !this.grids.some(grid => grid.motors.some(entry => entry.motor === m)));
-    if (missing.length) addElement(parent, 'p', 'status', 'No slider, for their loops have too many motors: ' + missing.map(motor => motor.name).join(', '));
+    const missing =
+        robot.motors.filter((motor, m) => !this.grids.some(grid => grid.motors.some(entry => entry.motor === m)));
+    if (missing.length)
+      addElement(
+          parent, 'p', 'status',
+          'No slider, for their loops have too many motors: ' + missing.map(motor => motor.name).join(', '));
     const reset = addElement(parent, 'button', '', 'back to the start');
     reset.onclick = () => this.grids.forEach((grid, g) => {
-      grid.motors.forEach((entry, i) => { this.sliders[g].sliders[i].value = entry.start; this.sliders[g].sliders[i].show(); });
+      grid.motors.forEach((entry, i) => {
+        this.sliders[g].sliders[i].value = entry.start;
+        this.sliders[g].sliders[i].show();
+      });
       this.sliders[g].change();
     });
   }
@@ -134,7 +145,9 @@ class RobotViewer {
     const slider = addElement(row, 'input');
     Object.assign(slider, {type: 'range', min: entry.low, max: entry.high, step: 'any', value: entry.start});
     const value = addElement(row, 'output');
-    slider.show = () => { value.textContent = Number(slider.value).toFixed(3); };
+    slider.show = () => {
+      value.textContent = Number(slider.value).toFixed(3);
+    };
     slider.addEventListener('input', slider.show);
     slider.show();
     return slider;
