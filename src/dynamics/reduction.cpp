@@ -49,9 +49,10 @@ VectorXd makeMetric(const Workspace& ws, const std::vector<int>& dofs) {
 }
 
 // Parent, path and outer coordinates of a unit carried by body `root`.
-void connectUnit(const Model& model, const Reduction& reduction, int parent, int root, ReducedUnit& unit) {
-  unit.parent = parent;
-  const ReducedUnit& up = reduction.units[parent];
+void connectUnit(const Model& model, const Reduction& reduction, int root, ReducedUnit& unit) {
+  if (root == 0) return;
+  unit.parent = reduction.unit_of_body[root];
+  const ReducedUnit& up = reduction.units[unit.parent];
   unit.outer = up.outer;
   for (int k = 0; k < up.size; ++k) unit.outer.push_back(up.offset + k);
   std::vector<int> dofs;
@@ -64,6 +65,33 @@ void connectUnit(const Model& model, const Reduction& reduction, int parent, int
   const std::vector<int>& support = model.supportDofs(root);
   for (size_t k = 0; k < dofs.size(); ++k)
     if (std::binary_search(support.begin(), support.end(), dofs[k])) unit.path.push_back(static_cast<int>(k));
+}
+
+// What the paths through a block are made of.
+void addGroups(LoopBlock& block) {
+  std::vector<int> last_group(block.model.numBodies(), -1);
+  block.body_dof.assign(block.model.numBodies(), -1);
+  for (int i = 1; i < block.model.numBodies(); ++i) {
+    const Joint& joint = block.model.joints()[i];
+    last_group[i] = last_group[joint.parent];
+    block.body_dof[i] = block.body_dof[joint.parent];
+    const int step = joint.kind == JointKind::Universal ? 1 : joint.nv;
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; k += step) {
+      block.groups.push_back({k, k + step, block.body_dof[i], last_group[i]});
+      block.body_dof[i] = k + step - 1;
+      last_group[i] = static_cast<int>(block.groups.size()) - 1;
+    }
+  }
+}
+
+// The closures of a block for someone who looks at the whole model.
+void placeClosures(const Model& model, LoopBlock& block) {
+  block.placed = block.closures.closures;
+  for (size_t c = 0; c < block.placed.size(); ++c) {
+    const Closure& whole = model.closures()[block.cluster_closures[c]];
+    block.placed[c].body1 = whole.body1;
+    block.placed[c].body2 = whole.body2;
+  }
 }
 
 }  // namespace
@@ -90,7 +118,12 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
     block.rank = mobility.rank;
     block.size = mobility.mobility;
     block.metric = makeMetric(whole, block.dofs);
+    block.inverse_metric = block.metric.cwiseInverse();
     block.inverse_root = block.metric.cwiseSqrt().cwiseInverse();
+    for (size_t k = 0; k < block.dofs.size(); ++k) block.own_dofs.push_back(static_cast<int>(k));
+    block.root = model.joints()[block.joints.front()].parent;
+    addGroups(block);
+    placeClosures(model, block);
     Workspace ws(block.model);
     updatePositions(block.model, ws, q_block);
     for (const Closure& closure : block.closures.closures)
@@ -100,7 +133,9 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
     out.blocks.push_back(std::move(block));
   }
   // Units and their reduced coordinates, in the order of the first joint of each.
-  std::vector<int> unit_of(model.numBodies(), -1), block_unit(out.blocks.size(), -1);
+  std::vector<int> block_unit(out.blocks.size(), -1);
+  std::vector<int>& unit_of = out.unit_of_body;
+  unit_of.assign(model.numBodies(), -1);
   for (int i = 1; i < model.numBodies(); ++i) {
     if (owner[i] >= 0 && block_unit[owner[i]] >= 0) {
       unit_of[i] = block_unit[owner[i]];
@@ -121,8 +156,7 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
       unit.size = out.blocks[owner[i]].size;
     }
     // The first joint of a block hangs on the body that carries the whole block.
-    const int root = model.joints()[i].parent;
-    if (root > 0) connectUnit(model, out, unit_of[root], root, unit);
+    connectUnit(model, out, model.joints()[i].parent, unit);
     out.size += unit.size;
     out.units.push_back(unit);
   }
@@ -131,103 +165,139 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
   return out;
 }
 
-BlockPoint::BlockPoint(const LoopBlock& block) : ws_(block.model) {
-  const int n = block.model.nv(), m = block.closures.rows;
-  basis_.q.setZero(block.model.nq());
-  for (MatrixXd* m : {&basis_.J, &basis_.JW}) m->setZero(block.rank, n);
-  for (MatrixXd* m : {&basis_.N, &basis_.WN}) m->setZero(n, block.size);
-  basis_.rows.resize(block.rank);
-  residual_.setZero(m);
-  for (VectorXd* v : {&zeta_, &correction_}) v->setZero(block.rank);
-  step_.setZero(n);
-  J_all_.setZero(m, n);
+ReducedUnit makeTip(const Model& model, const Reduction& reduction, int body) {
+  ReducedUnit tip;
+  connectUnit(model, reduction, body, tip);
+  return tip;
+}
+
+BlockBasis::BlockBasis(const LoopBlock& block) {
+  const int n = block.model.nv();
+  q.setZero(block.model.nq());
+  N.setZero(n, block.size);
+  WN.setZero(n, block.size);
+  J.setZero(block.rank, n);
+  L.setZero(block.rank, block.rank);
+  rows.resize(block.rank);
+}
+
+BlockScratch::BlockScratch(const LoopBlock& block) : ws(block.model) {
+  const int n = block.model.nv(), m = block.closures.rows, rank = block.rank;
+  residual.setZero(m);
+  correction.setZero(rank);
+  J_all.setZero(m, n);
+  J.setZero(rank, n);
+  JW.setZero(rank, n);
+  newton.setZero(rank, rank);
+  pivots.resize(rank);
   const int padded = (m + kLane - 1) / kLane * kLane;
-  reflected_.setZero(padded, n);
-  products_.setZero(padded);
-  beta_.setZero(block.rank);
-  L_.setZero(block.rank, block.rank);
-  reflectors_.setZero(n, block.rank);
-  rest_.setZero(m);
-  newton_.setZero(block.rank, block.rank);
-  pivots_.resize(block.rank);
+  reflected.setZero(padded, n);
+  reflectors.setZero(n, rank);
+  products.setZero(padded);
+  beta.setZero(rank);
+  rest.setZero(m);
 }
 
-void BlockPoint::updateJacobian(const LoopBlock& block) {
+BlockPoint::BlockPoint(const LoopBlock& block) : basis_(block), placements_(block.model.numBodies()) {
+  zeta_.setZero(block.rank);
+  step_.setZero(block.model.nv());
+}
+
+void applyPseudoInverse(const LoopBlock& block, const BlockBasis& basis, double s, MatrixRef X, MatrixRef out) {
+  solveGram(basis, X);
+  out.setZero();
+  addSmallProductTransposed(basis.J, X, out, s);
+  out.array().colwise() *= block.inverse_metric.array();
+}
+
+namespace {
+
+void updateJacobian(const LoopBlock& block, BlockScratch& scratch) {
   const ConstraintSet& set = block.closures;
   for (size_t c = 0; c < set.closures.size(); ++c)
-    calcClosureJacobian(ws_, set.closures[c], J_all_.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
+    calcClosureJacobian(scratch.ws, set.closures[c],
+                        scratch.J_all.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
 }
 
-void BlockPoint::updateResidual(const LoopBlock& block) {
+// Returns the largest entry.
+double updateResidual(const LoopBlock& block, BlockScratch& scratch) {
   const ConstraintSet& set = block.closures;
   for (size_t c = 0; c < set.closures.size(); ++c)
-    residual_.segment(set.offsets[c], getRows(set.closures[c].kind)) = calcClosureResidual(ws_, set.closures[c]);
-  gap_ = residual_.size() ? residual_.cwiseAbs().maxCoeff() : 0;
+    scratch.residual.segment(set.offsets[c], getRows(set.closures[c].kind)) =
+        calcClosureResidual(scratch.ws, set.closures[c]);
+  return scratch.residual.size() ? scratch.residual.cwiseAbs().maxCoeff() : 0;
 }
 
-void BlockPoint::selectIndependent(const MatrixXd& all, MatrixXd& out) const {
+// Rows of a matrix that are named.
+void selectRows(const MatrixXd& all, const std::vector<int>& rows, MatrixXd& out) {
   for (Eigen::Index k = 0; k < all.cols(); ++k)
-    for (size_t i = 0; i < basis_.rows.size(); ++i) out(i, k) = all(basis_.rows[i], k);
+    for (size_t i = 0; i < rows.size(); ++i) out(i, k) = all(rows[i], k);
 }
 
-// J W^{-1/2} = [L, 0] Q^T with Q = H_1 H_2 ..., H = I - beta v v^T, the v in the columns of `reflectors_`. Rows are taken
+// J W^{-1/2} = [L, 0] Q^T with Q = H_1 H_2 ..., H = I - beta v v^T, the v in the columns of `reflectors`. Rows are taken
 // by what the ones before leave of them, largest first. False when the rank is another than the block's.
-bool BlockPoint::factorize(const LoopBlock& block) {
-  MatrixXd& E = reflected_;
-  const int m = static_cast<int>(rest_.size()), n = static_cast<int>(E.cols()), rank = block.rank;
-  E.topRows(m) = J_all_ * block.inverse_root.asDiagonal();
-  rest_ = E.topRows(m).rowwise().squaredNorm();
+bool factorize(const LoopBlock& block, BlockScratch& scratch, BlockBasis& basis) {
+  MatrixXd& E = scratch.reflected;
+  VectorXd &rest = scratch.rest, &products = scratch.products;
+  const int m = static_cast<int>(rest.size()), n = static_cast<int>(E.cols()), rank = block.rank;
+  E.topRows(m) = scratch.J_all * block.inverse_root.asDiagonal();
+  rest = E.topRows(m).rowwise().squaredNorm();
   double first = 0, last = 0;
   for (int p = 0; p < rank; ++p) {
     int row = 0;
     for (int r = 1; r < m; ++r)
-      if (rest_[r] > rest_[row]) row = r;
-    basis_.rows[p] = row;
-    double* v = &reflectors_(0, p);
+      if (rest[r] > rest[row]) row = r;
+    basis.rows[p] = row;
+    double* v = &scratch.reflectors(0, p);
     for (int k = p; k < n; ++k) v[k] = E(row, k);
     // E x for the row x, |x|^2 among it, and with v = x - pivot e_p from it E v.
     for (Eigen::Index lane = 0; lane < E.rows(); lane += kLane) {
       Lane sum = Lane::Zero();
       for (int k = p; k < n; ++k) sum += v[k] * Eigen::Map<const Lane>(&E(lane, k));
-      products_.segment<kLane>(lane).array() = sum;
+      products.segment<kLane>(lane).array() = sum;
     }
-    const double norm = std::sqrt(products_[row]), pivot = v[p] > 0 ? -norm : norm;
+    const double norm = std::sqrt(products[row]), pivot = v[p] > 0 ? -norm : norm;
     if (p == 0) first = norm;
     if (!(norm > kRankTolerance * first)) return false;
     last = norm;
     const double beta = 1 / (norm * (norm + std::abs(v[p])));
-    beta_[p] = beta;
+    scratch.beta[p] = beta;
     v[p] -= pivot;
     for (Eigen::Index lane = 0; lane < E.rows(); lane += kLane) {
-      const Lane Ev = products_.segment<kLane>(lane).array() - pivot * Eigen::Map<const Lane>(&E(lane, p));
+      const Lane Ev = products.segment<kLane>(lane).array() - pivot * Eigen::Map<const Lane>(&E(lane, p));
       const Lane scaled = beta * Ev;
       for (int k = p; k < n; ++k) Eigen::Map<Lane>(&E(lane, k)) -= v[k] * scaled;
     }
-    for (int r = 0; r < m; ++r) rest_[r] -= E(r, p) * E(r, p);
-    rest_[row] = -std::numeric_limits<double>::infinity();
+    for (int r = 0; r < m; ++r) rest[r] -= E(r, p) * E(r, p);
+    rest[row] = -std::numeric_limits<double>::infinity();
   }
   for (int k = 0; k < rank; ++k)
-    for (int p = k; p < rank; ++p) L_(p, k) = E(basis_.rows[p], k);
+    for (int p = k; p < rank; ++p) basis.L(p, k) = E(basis.rows[p], k);
   // What is left must be nothing but rounding.
   double left = 0;
   for (int r = 0; r < m; ++r)
-    if (std::isfinite(rest_[r])) left = std::max(left, E.row(r).tail(n - rank).norm());
+    if (std::isfinite(rest[r])) left = std::max(left, E.row(r).tail(n - rank).norm());
   return left <= kRankTolerance * last || left <= 1e-3 * kRankTolerance * first;
 }
 
+}  // namespace
+
 // Eq. (1): N = W^{-1/2} Q_2 with the last columns of Q, and L L^T = J W^{-1} J^T.
-bool BlockPoint::updateBases(const LoopBlock& block) {
+bool BlockPoint::updateBases(const LoopBlock& block, BlockScratch& scratch) {
   const int rank = block.rank, size = block.size, n = static_cast<int>(block.metric.size());
-  if (!factorize(block)) return false;
+  placements_ = scratch.ws.X_WB;
+  updateColumns(block.model, scratch.ws);
+  updateJacobian(block, scratch);
+  if (!factorize(block, scratch, basis_)) return false;
   MatrixXd& N = basis_.N;
   N.setZero();
   for (int c = 0; c < size; ++c) N(rank + c, c) = 1;
   for (int p = rank - 1; p >= 0; --p) {
-    const double* v = &reflectors_(0, p);
+    const double* v = &scratch.reflectors(0, p);
     for (int c = 0; c < size; ++c) {
       double dot = 0;
       for (int k = p; k < n; ++k) dot += v[k] * N(k, c);
-      dot *= beta_[p];
+      dot *= scratch.beta[p];
       for (int k = p; k < n; ++k) N(k, c) -= dot * v[k];
     }
   }
@@ -236,74 +306,66 @@ bool BlockPoint::updateBases(const LoopBlock& block) {
       N(k, c) *= block.inverse_root[k];
       basis_.WN(k, c) = block.metric[k] * N(k, c);
     }
-  selectIndependent(J_all_, basis_.J);
-  for (int k = 0; k < n; ++k) basis_.JW.col(k) = basis_.J.col(k) * (block.inverse_root[k] * block.inverse_root[k]);
+  selectRows(scratch.J_all, basis_.rows, basis_.J);
   return true;
 }
 
-void BlockPoint::assign(const BlockPoint& other) {
-  basis_ = other.basis_;
-  L_ = other.L_;
-  gap_ = other.gap_;
-  closed_ = other.closed_;
-  ws_.q = other.ws_.q;
-  ws_.X_WB = other.ws_.X_WB;
-  ws_.J = other.ws_.J;
-  ws_.stage = WorkspaceStage::Position;
+void BlockPoint::load(const LoopBlock& block, BlockScratch& scratch) const {
+  scratch.ws.q = basis_.q;
+  scratch.ws.X_WB = placements_;
+  scratch.ws.stage = WorkspaceStage::Placement;
+  updateColumns(block.model, scratch.ws);
 }
 
-bool BlockPoint::update(const LoopBlock& block, ConstVectorRef q) {
+bool BlockPoint::update(const LoopBlock& block, BlockScratch& scratch, ConstVectorRef q) {
   closed_ = true;
   basis_.q = q;
-  updatePositions(block.model, ws_, basis_.q);
-  updateResidual(block);
-  updateJacobian(block);
-  return updateBases(block);
+  updatePlacements(block.model, scratch.ws, basis_.q);
+  return updateBases(block, scratch);
 }
 
-bool BlockPoint::close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d, const VectorXd& zeta_guess) {
+bool BlockPoint::close(const LoopBlock& block, BlockScratch& scratch, const BlockBasis& start, ConstVectorRef d,
+                       const VectorXd& zeta_guess) {
   closed_ = false;
   // Newton on zeta with the matrix J(q) W^{-1} J(q_0)^T of the independent rows, refreshed while it pays.
+  scratch.JW.noalias() = start.J * block.inverse_metric.asDiagonal();
   step_ = d;
   if (zeta_guess.size()) {
     zeta_ = zeta_guess;
-    step_.noalias() -= start.JW.transpose() * zeta_;
+    step_.noalias() -= scratch.JW.transpose() * zeta_;
   } else {
     zeta_.setZero();
   }
-  double previous = 0;
+  double gap = 0, previous = 0;
   constexpr int kMaxIterations = 30;
   for (int i = 0; i <= kMaxIterations; ++i) {
     block.model.integrate(start.q, step_, basis_.q);
-    updatePlacements(block.model, ws_, basis_.q);
-    updateResidual(block);
-    if (!std::isfinite(gap_)) return false;
-    const bool stalled = i > 0 && gap_ > 0.5 * previous;
-    if (gap_ <= kClosedTolerance || (stalled && gap_ <= kAcceptedTolerance)) break;
+    updatePlacements(block.model, scratch.ws, basis_.q);
+    gap = updateResidual(block, scratch);
+    if (!std::isfinite(gap)) return false;
+    const bool stalled = i > 0 && gap > 0.5 * previous;
+    if (gap <= kClosedTolerance || (stalled && gap <= kAcceptedTolerance)) break;
     if (i == kMaxIterations) return false;
-    if (i == 0 || gap_ > 0.05 * previous) {
-      updateColumns(block.model, ws_);
-      updateJacobian(block);
-      for (Eigen::Index k = 0; k < J_all_.cols(); ++k)
-        for (size_t r = 0; r < start.rows.size(); ++r) basis_.J(r, k) = J_all_(start.rows[r], k);
-      newton_.setZero();
-      addSmallProduct(basis_.J, start.JW.transpose(), newton_);
-      if (!factorizeSmall(newton_, pivots_)) return false;
+    if (i == 0 || gap > 0.05 * previous) {
+      updateColumns(block.model, scratch.ws);
+      updateJacobian(block, scratch);
+      selectRows(scratch.J_all, start.rows, scratch.J);
+      scratch.newton.setZero();
+      addSmallProduct(scratch.J, scratch.JW.transpose(), scratch.newton);
+      if (!factorizeSmall(scratch.newton, scratch.pivots)) return false;
     }
-    previous = gap_;
-    for (size_t r = 0; r < start.rows.size(); ++r) correction_[r] = residual_[start.rows[r]];
+    previous = gap;
+    for (size_t r = 0; r < start.rows.size(); ++r) scratch.correction[r] = scratch.residual[start.rows[r]];
     // The residual falls by J dq (notation.h), and dq = -W^{-1} J(q_0)^T dzeta.
-    solveFactorized(newton_, pivots_, correction_);
-    zeta_ -= correction_;
-    step_.noalias() += start.JW.transpose() * correction_;
+    solveFactorized(scratch.newton, scratch.pivots, scratch.correction);
+    zeta_ -= scratch.correction;
+    step_.noalias() += scratch.JW.transpose() * scratch.correction;
   }
   closed_ = true;
-  updateColumns(block.model, ws_);
-  updateJacobian(block);
-  return updateBases(block);
+  return updateBases(block, scratch);
 }
 
-std::string BlockPoint::describeFailure(const LoopBlock& block) const {
+std::string BlockPoint::describeFailure(const LoopBlock& block, const BlockScratch& scratch) const {
   const ConstraintSet& set = block.closures;
   if (closed_)
     return "closure '" + set.closures.front().name + "': the rank of its loops is no longer " +
@@ -311,7 +373,7 @@ std::string BlockPoint::describeFailure(const LoopBlock& block) const {
   size_t worst = 0;
   double largest = -1;
   for (size_t c = 0; c < set.closures.size(); ++c) {
-    const double gap = residual_.segment(set.offsets[c], getRows(set.closures[c].kind)).cwiseAbs().maxCoeff();
+    const double gap = scratch.residual.segment(set.offsets[c], getRows(set.closures[c].kind)).cwiseAbs().maxCoeff();
     if (gap > largest) largest = gap, worst = c;
   }
   return "closure '" + set.closures[worst].name + "' does not close: the step is too large, or out of its reach";

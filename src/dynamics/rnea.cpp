@@ -23,56 +23,77 @@ void calcB(const Workspace& ws, int i, Matrix6d& B) {
   B.bottomRightCorner<3, 3>() -= skew(ws.h[i].tail<3>());
 }
 
+// Generalized forces of the accelerations of the bodies, rotors left out.
+void sumForces(const Model& model, Workspace& ws, VectorXd& out) {
+  for (int i = 1; i < model.numBodies(); ++i) ws.F[i] = calcBodyForce(ws, i, ws.A[i]);
+  for (int i = model.numBodies() - 1; i > 0; --i) {
+    const Joint& joint = model.joints()[i];
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) out[k] = ws.J.col(k).dot(ws.F[i]);
+    if (joint.parent > 0) ws.F[joint.parent] += ws.F[i];
+  }
+}
+
 }  // namespace
 
-void updateMassMatrix(const Model& model, Workspace& ws) {
-  requireStage(ws, WorkspaceStage::Position, "updateMassMatrix", "updatePositions");
+void updateCompositeInertias(const Model& model, Workspace& ws) {
+  requireStage(ws, WorkspaceStage::Position, "updateCompositeInertias", "updatePositions");
   for (int i = 1; i < model.numBodies(); ++i) ws.Yc[i] = ws.Y[i];
   for (int i = model.numBodies() - 1; i > 0; --i) {
     const Joint& joint = model.joints()[i];
     if (joint.parent > 0) ws.Yc[joint.parent] += ws.Yc[i];
-    for (int j = joint.idx_v; j < joint.idx_v + joint.nv; ++j) {
-      ws.YJ.col(j).noalias() = ws.Yc[i] * ws.J.col(j);
-      for (int k = j; k >= 0; k = model.dofs()[k].parent) {
-        const double m = ws.YJ.col(j).dot(ws.J.col(k));
-        ws.M(j, k) = m;
-        ws.M(k, j) = m;
-      }
-    }
+    for (int j = joint.idx_v; j < joint.idx_v + joint.nv; ++j) ws.YJ.col(j).noalias() = ws.Yc[i] * ws.J.col(j);
   }
+}
+
+void updateMassMatrix(const Model& model, Workspace& ws) {
+  updateCompositeInertias(model, ws);
+  for (int j = model.nv() - 1; j >= 0; --j)
+    for (int k = j; k >= 0; k = model.dofs()[k].parent) {
+      const double m = ws.YJ.col(j).dot(ws.J.col(k));
+      ws.M(j, k) = m;
+      ws.M(k, j) = m;
+    }
   ws.M.diagonal() += model.armature();
 }
 
-void updateBias(const Model& model, Workspace& ws) {
-  requireStage(ws, WorkspaceStage::Velocity, "updateBias", "updateVelocities");
+void updateDrift(const Model& model, Workspace& ws) {
+  requireStage(ws, WorkspaceStage::Velocity, "updateDrift", "updateVelocities");
   ws.A[0] << -model.gravity(), Vector3d::Zero();
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
-    Vector6d& A = ws.A[i];
-    A = ws.A[joint.parent];
+    Vector6d A = ws.A[joint.parent];
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) A += ws.dJ.col(k) * ws.v[k];
-    ws.F[i] = calcBodyForce(ws, i, A);
-  }
-  for (int i = model.numBodies() - 1; i > 0; --i) {
-    const Joint& joint = model.joints()[i];
-    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) ws.b[k] = ws.J.col(k).dot(ws.F[i]);
-    if (joint.parent > 0) ws.F[joint.parent] += ws.F[i];
+    ws.A[i] = A;
   }
   ws.stage = WorkspaceStage::Velocity;  // the accelerations written here are those of a = 0
+}
+
+void updateBias(const Model& model, Workspace& ws) {
+  updateDrift(model, ws);
+  sumForces(model, ws, ws.b);
+}
+
+void updateInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef a) {
+  requireStage(ws, WorkspaceStage::Velocity, "updateInverseDynamics", "updateVelocities");
+  ws.A[0] << -model.gravity(), Vector3d::Zero();
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    Vector6d A = ws.A[joint.parent];
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) A += ws.J.col(k) * a[k] + ws.dJ.col(k) * ws.v[k];
+    ws.A[i] = A;
+  }
+  sumForces(model, ws, ws.b);
+  ws.b += model.armature().cwiseProduct(a);
+  ws.stage = WorkspaceStage::Velocity;
 }
 
 VectorXd calcInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef q, ConstVectorRef v, ConstVectorRef a) {
   updatePositions(model, ws, q);
   updateVelocities(model, ws, v);
   updateAccelerations(model, ws, a);
-  VectorXd tau = model.armature().cwiseProduct(a);
-  for (int i = 1; i < model.numBodies(); ++i) ws.F[i] = calcBodyForce(ws, i, ws.A[i]);
-  for (int i = model.numBodies() - 1; i > 0; --i) {
-    const Joint& joint = model.joints()[i];
-    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) tau[k] += ws.J.col(k).dot(ws.F[i]);
-    if (joint.parent > 0) ws.F[joint.parent] += ws.F[i];
-  }
-  return tau;
+  VectorXd tau(model.nv());
+  sumForces(model, ws, tau);
+  return tau + model.armature().cwiseProduct(a);
 }
 
 void updateInverseDynamicsFactors(const Model& model, Workspace& ws, const std::vector<Vector6d>& f_ext) {

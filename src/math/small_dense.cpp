@@ -28,12 +28,13 @@ bool factorizeSmall(MatrixRef A, std::vector<int>& pivots) {
 
 void solveFactorized(ConstMatrixRef factors, const std::vector<int>& pivots, MatrixRef X) {
   const Eigen::Index n = factors.rows(), m = X.cols();
+  for (Eigen::Index p = 0; p < n; ++p)  // all of them first: rows of L were swapped as a whole
+    if (pivots[p] != p) X.row(p).swap(X.row(pivots[p]));
   for (Eigen::Index p = 0; p < n; ++p) {
     const double* __restrict column = factors.data() + p * factors.outerStride();
     const double inverse = 1 / column[p];
     for (Eigen::Index c = 0; c < m; ++c) {
       double* __restrict x = &X(0, c);
-      std::swap(x[p], x[pivots[p]]);
       const double f = x[p] *= inverse;
       for (Eigen::Index r = p + 1; r < n; ++r) x[r] -= f * column[r];
     }

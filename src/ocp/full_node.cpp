@@ -4,19 +4,32 @@
 
 namespace bielle {
 
-NodeModel::NodeModel(const Model& model, const StageSpec& spec) : model_(model), spec_(spec), ws_(model) {
+NodeModel::NodeModel(const Model& model, const StageSpec& spec) : model_(model), spec_(spec) {
   lambda_.setZero(spec.constraints.rows);
   x_next_.setZero(model.nq() + model.nv());
+}
+
+int countResidualRows(const StageSpec& spec) {
+  int rows = 0;
+  for (const Cost& cost : spec.costs) rows += cost.residual->size();
+  return rows;
 }
 
 namespace {
 
 class FullNode : public NodeModel {
  public:
-  FullNode(const Model& model, const StageSpec& spec) : NodeModel(model, spec) {
+  FullNode(const Model& model, const StageSpec& spec) : NodeModel(model, spec), ws_(model) {
     tau_.setZero(model.nv());
     displacement_.setZero(model.nv());
+    const int rows = countResidualRows(spec);
+    for (MatrixXd* m : {&jacobians_.q, &jacobians_.v}) m->setZero(rows, model.nv());
+    jacobians_.lambda.setZero(rows, spec.constraints.rows);
   }
+
+  void restore() override {}
+  const Workspace& workspace() const override { return ws_; }
+  ResidualJacobians& jacobians() override { return jacobians_; }
 
   int tangentSize() const override { return 2 * model_.nv(); }
 
@@ -114,12 +127,12 @@ class FullNode : public NodeModel {
       Ru_.setZero(rows, model_.nu());
       scaled_ = Rx_;
     }
-    Rx_.leftCols(nv) = stack.q;
-    Rx_.rightCols(nv) = stack.v;
+    Rx_.leftCols(nv) = jacobians_.q;
+    Rx_.rightCols(nv) = jacobians_.v;
     if (running) {
-      Rx_.leftCols(nv).noalias() += stack.lambda * cws_.dlambda_dq;
-      Rx_.rightCols(nv).noalias() += stack.lambda * cws_.dlambda_dv;
-      Ru_.noalias() = stack.lambda * cws_.dlambda_du;
+      Rx_.leftCols(nv).noalias() += jacobians_.lambda * cws_.dlambda_dq;
+      Rx_.rightCols(nv).noalias() += jacobians_.lambda * cws_.dlambda_dv;
+      Ru_.noalias() = jacobians_.lambda * cws_.dlambda_du;
     }
     scaled_ = stack.hessian.asDiagonal() * Rx_;
     out.lx.noalias() += Rx_.transpose() * stack.gradient;
@@ -132,7 +145,9 @@ class FullNode : public NodeModel {
   }
 
  private:
+  Workspace ws_;
   ConstrainedWorkspace cws_;
+  ResidualJacobians jacobians_;
   VectorXd tau_, displacement_;
   MatrixXd Rx_, Ru_, scaled_, Ru_scaled_;  // total derivatives of the residuals; the same times the Hessian
 };

@@ -10,11 +10,20 @@
 
 namespace bielle {
 
-// Stacked residuals of a node with their partial derivatives and the weights that the activations give them.
+// Stacked residuals of a node and the weights that the activations give them.
 struct ResidualStack {
   VectorXd r, gradient, hessian;
-  MatrixXd q, v, lambda;  // partial derivatives, rows x nv, nv, constraint rows
 };
+
+// Partial derivatives of stacked residuals, rows x nv, nv, constraint rows; with room for those of other nodes.
+struct ResidualJacobians {
+  MatrixXd q, v, lambda;
+  ResidualRows getRows(int row, int rows, int constraint_rows) {
+    return {q.middleRows(row, rows), v.middleRows(row, rows), lambda.block(row, 0, rows, constraint_rows)};
+  }
+};
+
+int countResidualRows(const StageSpec& spec);
 
 class NodeModel {
  public:
@@ -30,6 +39,12 @@ class NodeModel {
   // Dynamics at (x, u) and the next state, in x_next(). `previous`, if any, is a node of the same kind that may have x as
   // its next state.
   virtual bool updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) = 0;
+  // Brings workspace() back to the last update, if other nodes have used it since.
+  virtual void restore() = 0;
+  // Kinematics of the last function called, until another node of the same thread is worked on.
+  virtual const Workspace& workspace() const = 0;
+  // Where the derivatives of this node's residuals are to be written, before addResiduals().
+  virtual ResidualJacobians& jacobians() = 0;
   // Fx, Fu and gap about the last updateStep(); the derivatives that addResiduals() needs.
   virtual bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) = 0;
   // To be called after updateState() at the terminal node in place of linearizeStep().
@@ -38,7 +53,6 @@ class NodeModel {
   // Gauss-Newton terms; at a running stage forces and controls take part.
   virtual void addResiduals(const ResidualStack& stack, bool running, StageModel& out) = 0;
 
-  const Workspace& workspace() const { return ws_; }
   const VectorXd& lambda() const { return lambda_; }
   const VectorXd& x_next() const { return x_next_; }
   // Why the last function that failed did so; empty after one of the update functions went through.
@@ -47,7 +61,6 @@ class NodeModel {
  protected:
   const Model& model_;
   const StageSpec& spec_;
-  Workspace ws_;
   VectorXd lambda_;  // rows of the constraints; the reduced node leaves those of loops at zero
   VectorXd x_next_;
   std::string failure_;
@@ -56,7 +69,8 @@ class NodeModel {
 std::unique_ptr<NodeModel> makeFullNode(const Model& model, const StageSpec& spec);
 // Memory that the reduced nodes of a problem share, one piece for each thread; the reduction must outlive it.
 class ReducedWorkPool;
-std::shared_ptr<ReducedWorkPool> makeReducedWorkPool(const Model& model, const Reduction& reduction);
+std::shared_ptr<ReducedWorkPool> makeReducedWorkPool(const Model& model, const Reduction& reduction,
+                                                     const std::vector<StageSpec>& specs);
 std::unique_ptr<NodeModel> makeReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec,
                                            std::shared_ptr<ReducedWorkPool> pool);
 

@@ -9,7 +9,7 @@ void ReducedNode::calcJointCost(const StateCost& state, double w, const Joint& j
   const int n = joint.nv;
   const JointVector weights = w * state.weights.segment(joint.idx_v, n);
   JointVector d(n);
-  calcJointDifference(joint, state.q_ref.segment(joint.idx_q, joint.nq), ws_.q.segment(joint.idx_q, joint.nq), d);
+  calcJointDifference(joint, state.q_ref.segment(joint.idx_q, joint.nq), work_->ws.q.segment(joint.idx_q, joint.nq), d);
   if (!isCurved(joint)) {
     gradient = weights.cwiseProduct(d);
     hessian = weights.asDiagonal();
@@ -34,13 +34,13 @@ void ReducedNode::addStateCost(const StateCost& state, double scale, StageModel&
     out.lx.segment(o, n) += gradient;
     out.lxx.block(o, o, n, n) += hessian;
     const JointVector weights = w * state.weights.segment(nv + k, n);
-    out.lx.segment(nr + o, n) += weights.cwiseProduct(ws_.v.segment(k, n) - state.v_ref.segment(k, n));
+    out.lx.segment(nr + o, n) += weights.cwiseProduct(work_->ws.v.segment(k, n) - state.v_ref.segment(k, n));
     out.lxx.block(nr + o, nr + o, n, n).diagonal() += weights;
   }
   for (Block& b : blocks_) {
     // Changes of q are N dy, of v N dy_v + Z dy: gradients by dof, and Hessians times N and Z.
     const int o = b.loop.offset, r = b.loop.size;
-    const MatrixXd& N = b.at.basis().N;
+    const MatrixXd& N = b.at.N;
     for (size_t j = 0; j < b.loop.joints.size(); ++j) {
       const Joint& joint = model_.joints()[b.loop.joints[j]];
       const int at = b.loop.model.joints()[j + 1].idx_v, n = joint.nv;
@@ -51,38 +51,35 @@ void ReducedNode::addStateCost(const StateCost& state, double scale, StageModel&
     for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
       const int dof = b.loop.dofs[k];
       const double weight = w * state.weights[nv + dof];
-      b.work->gradient_v[k] = weight * (ws_.v[dof] - state.v_ref[dof]);
-      b.work->wy.row(k) = weight * b.work->Z.row(k);
+      b.work->gradient_v[k] = weight * (work_->ws.v[dof] - state.v_ref[dof]);
+      b.work->wy.row(k) = weight * b.work->motion.Z.row(k);
       b.work->wv.row(k) = weight * N.row(k);
     }
     addSmallProductTransposed(N, b.work->gradient_q, out.lx.segment(o, r));
-    addSmallProductTransposed(b.work->Z, b.work->gradient_v, out.lx.segment(o, r));
+    addSmallProductTransposed(b.work->motion.Z, b.work->gradient_v, out.lx.segment(o, r));
     addSmallProductTransposed(N, b.work->gradient_v, out.lx.segment(nr + o, r));
     addSmallProductTransposed(N, b.work->HN, out.lxx.block(o, o, r, r));
-    addSmallProductTransposed(b.work->Z, b.work->wy, out.lxx.block(o, o, r, r));
-    addSmallProductTransposed(b.work->Z, b.work->wv, out.lxx.block(o, nr + o, r, r));
-    addSmallProductTransposed(b.work->wv, b.work->Z, out.lxx.block(nr + o, o, r, r));
+    addSmallProductTransposed(b.work->motion.Z, b.work->wy, out.lxx.block(o, o, r, r));
+    addSmallProductTransposed(b.work->motion.Z, b.work->wv, out.lxx.block(o, nr + o, r, r));
+    addSmallProductTransposed(b.work->wv, b.work->motion.Z, out.lxx.block(nr + o, o, r, r));
     addSmallProductTransposed(N, b.work->wv, out.lxx.block(nr + o, nr + o, r, r));
   }
 }
 
 void ReducedNode::addResiduals(const ResidualStack& stack, bool running, StageModel& out) {
   const int nr = reduction_.size, rows = static_cast<int>(stack.r.size()), nu = model_.nu();
-  if (work_->Rx.rows() < rows) {
-    work_->Rx.setZero(rows, 2 * nr);
-    work_->Ru.setZero(rows, nu);
-    work_->scaled.setZero(rows, 2 * nr);
-    work_->Ru_scaled.setZero(rows, nu);
-  }
+  const ResidualJacobians& jacobians = work_->jacobians;
   auto Rx = work_->Rx.topRows(rows), Ru = work_->Ru.topRows(rows);
   auto scaled = work_->scaled.topRows(rows), Ru_scaled = work_->Ru_scaled.topRows(rows);
   Rx.setZero();
-  addColumns(stack.q, &BlockBasisN, Rx.leftCols(nr));
-  addColumns(stack.v, &BlockZ, Rx.leftCols(nr));
-  addColumns(stack.v, &BlockBasisN, Rx.rightCols(nr));
+  addColumns(jacobians.q.topRows(rows), Lift::N, Rx.leftCols(nr));
+  addColumns(jacobians.v.topRows(rows), Lift::Z, Rx.leftCols(nr));
+  addColumns(jacobians.v.topRows(rows), Lift::N, Rx.rightCols(nr));
   if (running && contact_rows_ > 0) {
-    Rx.noalias() += stack.lambda.rightCols(contact_rows_) * dlambda_.leftCols(2 * nr);
-    Ru.noalias() = stack.lambda.rightCols(contact_rows_) * dlambda_.rightCols(nu);
+    const auto by_forces = jacobians.lambda.block(0, loop_rows_, rows, contact_rows_);
+    const auto dlambda = work_->dlambda.topRows(contact_rows_);
+    Rx.noalias() += by_forces * dlambda.leftCols(2 * nr);
+    Ru.noalias() = by_forces * dlambda.rightCols(nu);
   } else {
     Ru.setZero();
   }

@@ -1,16 +1,10 @@
 // Derivatives of the reduced step: Eqs. (a) to (g) of reduced_node.h.
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
 #include "reduced_node.h"
 
 namespace bielle {
 namespace {
-
-// out = -J^+ X; X is overwritten.
-void applyPlus(const BlockPoint& point, MatrixXd& X, MatrixXd& out) {
-  point.solveGram(X);
-  out.setZero();
-  addSmallProductTransposed(point.basis().JW, X, out, -1);
-}
 
 // Rows of a unit with `size` coordinates from `offset` on: q_a and v_a (size x size) times the derivatives of y'. Sizes
 // known to the compiler make a few instructions of a column.
@@ -50,98 +44,79 @@ void assembleUnit(const Matrix& q_a, const Matrix& v_a, int offset, ConstMatrixR
 
 }  // namespace
 
-// Z of Eq. (a) at a point of the block whose velocities are there.
-void ReducedNode::calcVelocityLift(Block& b, BlockPoint& point, MatrixXd& Z) {
-  const ConstraintSet& set = b.loop.closures;
-  for (size_t c = 0; c < set.closures.size(); ++c)
-    calcClosureVelocityDerivative(point.workspace(), set.closures[c],
-                                  b.work->K.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
-  point.selectIndependent(b.work->K, b.work->K_r);
-  b.work->X.setZero();
-  addSmallProduct(b.work->K_r, point.basis().N, b.work->X);
-  applyPlus(point, b.work->X, Z);
-}
-
-// d_y and d_v of Eq. (c).
-void ReducedNode::updateBlockDerivatives(Block& b) {
-  calcVelocityLift(b, b.at, b.work->Z);
-  gatherVelocity(b.loop, a_, b.work->a);
-  updateAccelerations(b.loop.model, b.at.workspace(), b.work->a);
-  const ConstraintSet& set = b.loop.closures;
-  for (size_t c = 0; c < set.closures.size(); ++c) {
-    const int row = set.offsets[c], n = getRows(set.closures[c].kind);
-    calcClosureDerivatives(b.at.workspace(), set.closures[c], b.work->Cq.middleRows(row, n),
-                           b.work->Cv.middleRows(row, n));
-  }
-  b.at.selectIndependent(b.work->Cq, b.work->Cq_r);
-  b.at.selectIndependent(b.work->Cv, b.work->Cv_r);
-  b.work->X.setZero();
-  addSmallProduct(b.work->Cq_r, b.at.basis().N, b.work->X);
-  addSmallProduct(b.work->Cv_r, b.work->Z, b.work->X);
-  applyPlus(b.at, b.work->X, b.work->dy);
-  b.work->X.setZero();
-  addSmallProduct(b.work->Cv_r, b.at.basis().N, b.work->X);
-  applyPlus(b.at, b.work->X, b.work->dv);
-}
-
-// Loop forces, and the wrenches of loops and contacts on the bodies.
+// H N of the loop forces, and the wrenches of the contacts on the bodies. The forces that the loops are left with are
+// those through their joints.
 void ReducedNode::updateForces() {
-  force_ = ws_.b - tau_;
-  force_.noalias() += ws_.M * a_;
-  force_.noalias() -= Jc_.transpose() * lambda_c_;
+  ReducedWork& work = *work_;
   const ConstraintSet& set = spec_.constraints;
-  for (Block& b : blocks_) {
-    gatherVelocity(b.loop, force_, b.work->d);
-    b.work->independent.noalias() = b.at.basis().JW * b.work->d;
-    b.at.solveGram(b.work->independent);
-    updateForceDerivative(b, b.at, b.work->independent);
-  }
-  for (Vector6d& f : f_ext_) f.setZero();
+  for (Vector6d& f : work.f_ext) f.setZero();
   for (size_t c = num_loops_; c < set.closures.size(); ++c) {
     const Closure& contact = set.closures[c];
-    f_ext_[contact.body1] += calcClosureWrench(ws_, contact, lambda_.segment(set.offsets[c], getRows(contact.kind)));
+    work.f_ext[contact.body1] +=
+        calcClosureWrench(work.ws, contact, lambda_.segment(set.offsets[c], getRows(contact.kind)));
+  }
+  updateInverseDynamicsFactors(model_, work.ws, work.f_ext);
+  for (Block& b : blocks_) {
+    for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
+      const int dof = b.loop.dofs[k];
+      const double left =
+          work.ws.J.col(dof).dot(work.ws.F[model_.dofs()[dof].joint]) + model_.armature()[dof] * a_[dof] - tau_[dof];
+      b.work->d[k] = b.loop.inverse_metric[k] * left;
+    }
+    b.work->independent.noalias() = b.at.J * b.work->d;
+    solveGram(b.at, b.work->independent);
+    expandIndependent(b.at, b.work->independent, b.work->rows);
+    calcForceLift(getPlacedView(b.loop, work.ws), b.work->motion, b.work->rows, b.work->HN);
   }
 }
 
-// H = d(J^T f)/dq at a point of the block, for forces f on its independent rows.
-void ReducedNode::updateForceDerivative(Block& b, const BlockPoint& point, const VectorXd& force) {
-  expandIndependent(point.basis(), force, b.work->rows);
-  b.work->H.setZero();
-  const ConstraintSet& set = b.loop.closures;
-  for (size_t c = 0; c < set.closures.size(); ++c) {
-    const Closure& closure = set.closures[c];
-    const Vector6d W =
-        calcClosureWrench(point.workspace(), closure, b.work->rows.segment(set.offsets[c], getRows(closure.kind)));
-    addGeneralizedForceDerivative(b.loop.model, point.workspace(), closure, W, b.work->H);
-  }
-}
-
-// Eqs. (c), (d) and the derivatives of y' and lambda_c.
-void ReducedNode::linearizeDynamics() {
+// Eq. (c): the right-hand sides of the contact rows.
+void ReducedNode::calcContactDerivatives() {
+  ReducedWork& work = *work_;
   const int nr = reduction_.size;
-  updateAccelerations(model_, ws_, a_);
-  for (Block& b : blocks_) updateBlockDerivatives(b);
-  updateForces();
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    const Block& b = blocks_[i];
-    work_->lifts[i] = {&b.at.basis().N, &b.work->Z, &b.work->dy, &b.work->dv, &b.work->H};
-  }
-  work_->derivatives.update(ws_, f_ext_, work_->lifts, work_->dydd.leftCols(nr), work_->dydd.middleCols(nr, nr));
   const ConstraintSet& set = spec_.constraints;
-  work_->dydd.rightCols(model_.nu()).setZero();
-  addMotorColumns(work_->dydd.rightCols(model_.nu()));
-  dlambda_.setZero();
+  auto dlambda = work.dlambda.topRows(contact_rows_);
+  dlambda.setZero();
   for (size_t c = num_loops_; c < set.closures.size(); ++c) {
-    const int row = set.offsets[c] - loop_rows_, n = getRows(set.closures[c].kind);
-    calcClosureDerivatives(ws_, set.closures[c], Cc_q_.middleRows(row, n), Cc_v_.middleRows(row, n));
+    const Closure& contact = set.closures[c];
+    const int row = set.offsets[c] - loop_rows_, n = getRows(contact.kind);
+    const SE3 X_WF = getPlacement(work.ws, contact.body1, contact.X_B1);
+    const Vector6d &V1 = work.ws.V[contact.body1], &A2 = work.ws.A[contact.body2];
+    const ReducedTree::Columns& tip = work.tree.getTip(contact_tips_[c - num_loops_]);
+    RowsBy6 rate;
+    if (contact.kp != 0) rate = calcClosureResidualRate(work.ws, contact);
+    for (size_t o = 0; o < tip.outer.size(); ++o) {
+      const Vector6d J = tip.J.col(o), dV = tip.dV.col(o);
+      const Vector6d dq = tip.dA.col(o) - crossMotion(V1, dV) + crossMotion(J, A2) + contact.kd * dV;
+      const Vector6d dv = tip.dW.col(o) - crossMotion(V1, J) + contact.kd * J;
+      auto da_dy = dlambda.col(tip.outer[o]).segment(row, n);
+      da_dy = selectRows(contact, X_WF.actInvMotion(dq));
+      if (contact.kp != 0) da_dy -= contact.kp * (rate * X_WF.actInvMotion(J));
+      dlambda.col(nr + tip.outer[o]).segment(row, n) = selectRows(contact, X_WF.actInvMotion(dv));
+    }
   }
-  addColumns(Cc_q_, &BlockBasisN, dlambda_.leftCols(nr));
-  addColumns(Cc_v_, &BlockZ, dlambda_.leftCols(nr));
-  addColumns(Jc_, &BlockDy, dlambda_.leftCols(nr));
-  addColumns(Cc_v_, &BlockBasisN, dlambda_.middleCols(nr, nr));
-  addColumns(Jc_, &BlockDv, dlambda_.middleCols(nr, nr));
-  saddle_point_.updateInverse();
-  saddle_point_.solveDerivatives(work_->dydd, dlambda_);
+}
+
+// Derivatives of y' and lambda_c.
+void ReducedNode::linearizeDynamics() {
+  ReducedWork& work = *work_;
+  const int nr = reduction_.size;
+  updateAccelerations(model_, work.ws, a_);
+  for (Block& b : blocks_) {
+    const BlockView view = getPlacedView(b.loop, work.ws);
+    updateTwists(view, b.at, b.work->motion);
+    updateVelocityLift(view, b.work->motion);
+    updateAccelerationLift(view, b.work->motion);
+  }
+  updateForces();
+  work.tree.updateDerivatives(work.ws, work.lifts, work.dydd.leftCols(nr), work.dydd.middleCols(nr, nr));
+  work.dydd.rightCols(model_.nu()).setZero();
+  addMotorColumns(work.dydd.rightCols(model_.nu()));
+  calcContactDerivatives();
+  SaddlePoint& saddle_point = work.contacts.at(contact_rows_).saddle_point;
+  saddle_point.factorize(M_, JcN_);
+  saddle_point.updateInverse();
+  saddle_point.solveDerivatives(work.dydd, work.dlambda.topRows(contact_rows_));
 }
 
 // out (size x nu) += -N^T B
@@ -154,12 +129,12 @@ void ReducedNode::addMotorColumns(MatrixRef out) const {
     }
     for (const Block& b : blocks_)
       for (size_t k = 0; k < b.loop.dofs.size(); ++k)
-        if (b.loop.dofs[k] == dof) out.col(m).segment(b.loop.offset, b.loop.size) -= b.at.basis().N.row(k).transpose();
+        if (b.loop.dofs[k] == dof) out.col(m).segment(b.loop.offset, b.loop.size) -= b.at.N.row(k).transpose();
   }
 }
 
 bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
-  takeWork();
+  restore();
   linearizeDynamics();
   for (Block& b : blocks_)
     if (!linearizeBlock(b, x_next_node, out)) return false;
@@ -170,86 +145,65 @@ bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
   return true;
 }
 
-// Eqs. (e) to (g) for one block, rows [offset, offset + size) of Fx, Fu and gap.
+// Eqs. (d) to (g) for one block, rows [offset, offset + size) of Fx, Fu and gap.
 bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out) {
   const LoopBlock& loop = b.loop;
-  const int nr = reduction_.size, r = loop.size, o = loop.offset;
+  BlockWork& work = *b.work;
+  const int nr = reduction_.size, o = loop.offset, r = loop.size;
   const double h = spec_.dt;
-  const BlockBasis &base = b.at.basis(), &next = b.next.basis();
-  const MatrixXd &N = base.N, &Nn = next.N, &WNn = next.WN;
+  const BlockBasis &base = b.at, &next = b.next.basis();
 
-  b.work->zeta = b.next.zeta() / h;  // close() moves by h w', so its zeta is h times that of Eq. (3)
-  updateForceDerivative(b, b.at, b.work->zeta);
-  b.work->HN.setZero();
-  addSmallProduct(b.work->H, N, b.work->HN);
-  b.work->WHN = b.loop.metric.cwiseInverse().asDiagonal() * b.work->HN;
-  updateForceDerivative(b, b.next, b.mu);
-  b.work->HnNn.setZero();
-  addSmallProduct(b.work->H, Nn, b.work->HnNn);
+  work.zeta = b.next.zeta() / h;  // close() moves by h w', so its zeta is h times that of Eq. (3)
+  expandIndependent(base, work.zeta, work.rows);
+  calcForceLift(getPlacedView(loop, work_->ws), work.motion, work.rows, work.HN);
+  b.next.load(loop, work.scratch);
+  const BlockView ahead = getOwnView(loop, work.scratch.ws);
+  updateTwists(ahead, next, work.ahead);
+  expandIndependent(next, b.mu, work.rows);
+  calcForceLift(ahead, work.ahead, work.rows, work.HnNn);
 
-  // J_q and J_d are the identity but for the blocks of curved joints. EN: e = EN dy + h J_d dw.
-  b.work->EN = N - h * b.work->WHN;
-  b.work->G = base.JW;  // J W^{-1} J_d^T
+  // J_q N, J_d^{-T} W N and J_d^{-T} W N': the identity but for the blocks of curved joints.
+  work.JqN = base.N;
+  work.P = base.WN;
+  work.Pn = next.WN;
   for (const Joint& joint : loop.model.joints()) {
     if (!isCurved(joint)) continue;
     const int i = joint.idx_v, n = joint.nv;
     const JointVector d = b.next.step().segment(i, n);
     JointMatrix Jq(n, n), Jd(n, n);
     calcJointIntegrateJacobians(joint, d, Jq, Jd);
-    b.work->Jd.block(i, i, n, n) = Jd;
-    b.work->EN.middleRows(i, n) = Jq.lazyProduct(N.middleRows(i, n)) - h * Jd.lazyProduct(b.work->WHN.middleRows(i, n));
-    b.work->G.middleCols(i, n) = base.JW.middleCols(i, n).lazyProduct(Jd.transpose());
+    work.JqN.middleRows(i, n) = Jq.lazyProduct(base.N.middleRows(i, n));
+    calcJointDifferenceJacobian(joint, d, Jd);  // the inverse of J_d
+    work.P.middleRows(i, n) = Jd.transpose().lazyProduct(base.WN.middleRows(i, n));
+    work.Pn.middleRows(i, n) = Jd.transpose().lazyProduct(next.WN.middleRows(i, n));
   }
-  // Y = A^{-T} [J W^{-1} J_d^T W N', J W^{-1} W N'], with A^T = h J W^{-1} J_d^T J'^T
-  b.work->At.setZero();
-  addSmallProduct(b.work->G, next.J.transpose(), b.work->At, h);
-  b.work->Y.setZero();
-  addSmallProduct(b.work->G, WNn, b.work->Y.leftCols(r));
-  addSmallProduct(base.JW, WNn, b.work->Y.rightCols(r));
-  if (!factorizeSmall(b.work->At, b.work->pivots)) {
+  // Eq. (g)
+  MatrixXd &X = work.X, &Xn = work.Xn, &E = work.E, &En = work.En;
+  for (MatrixXd* m : {&work.mixed, &work.mixed_next, &E, &En, &work.S}) m->setZero();
+  addSmallProductTransposed(work.P, next.N, work.mixed);
+  addSmallProductTransposed(work.Pn, next.N, work.mixed_next);
+  addSmallProductTransposed(work.P, work.JqN, E);
+  addSmallProductTransposed(base.N, work.HN, E, -h);
+  addSmallProductTransposed(work.Pn, work.JqN, En);
+  addSmallProductTransposed(next.N, work.HnNn, work.S);
+  X.setIdentity();
+  if (!factorizeSmall(work.mixed, work.mixed_pivots)) {
     failure_ = "closure '" + loop.closures.closures.front().name + "': the step turns its loops too far";
     return false;
   }
-  solveFactorized(b.work->At, b.work->pivots, b.work->Y);
-  // dy+ = L^T e, and T^T = N'^T J^T A^{-1} J'
-  b.work->L = WNn;
-  addSmallProductTransposed(next.J, b.work->Y.leftCols(r), b.work->L, -h);
-  b.work->T.setZero();
-  addSmallProductTransposed(next.J, b.work->Y.rightCols(r), b.work->T);
-  // h J_d^T L and beta = N' - h J_d^T T
-  b.work->LJ = h * b.work->L;
-  b.work->beta = WNn - h * b.work->T;
-  for (const Joint& joint : loop.model.joints()) {
-    if (!isCurved(joint)) continue;
-    const int i = joint.idx_v, n = joint.nv;
-    const auto Jd = b.work->Jd.block(i, i, n, n);
-    b.work->LJ.middleRows(i, n) = h * Jd.transpose().lazyProduct(b.work->L.middleRows(i, n));
-    b.work->beta.middleRows(i, n) = WNn.middleRows(i, n) - h * Jd.transpose().lazyProduct(b.work->T.middleRows(i, n));
-  }
-  // dw = (N + h d_v) dy_v + (Z + h d_y) dy + h N dy'
-  b.work->wy = b.work->Z + h * b.work->dy;
-  b.work->wv = N + h * b.work->dv;
-  MatrixXd &q_y = b.work->q_y, &q_v = b.work->q_v, &q_a = b.work->q_a, &v_y = b.work->v_y, &v_v = b.work->v_v,
-           &v_a = b.work->v_a, &S = b.work->S;
-  for (MatrixXd* m : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a, &S}) m->setZero();
-  addSmallProductTransposed(Nn, b.work->HnNn, S);
-  addSmallProductTransposed(b.work->L, b.work->EN, q_y);
-  addSmallProductTransposed(b.work->LJ, b.work->wy, q_y);
-  addSmallProductTransposed(b.work->LJ, b.work->wv, q_v);
-  addSmallProductTransposed(b.work->LJ, N, q_a, h);
-  addSmallProductTransposed(b.work->beta, b.work->wy, v_y);
-  addSmallProductTransposed(Nn, b.work->HN, v_y, -1);
-  addSmallProductTransposed(b.work->T, b.work->EN, v_y, -1);
-  addSmallProductTransposed(b.work->beta, b.work->wv, v_v);
-  addSmallProductTransposed(b.work->beta, N, v_a, h);
-  addSmallProduct(S, q_y, v_y, -1);
-  addSmallProduct(S, q_v, v_v, -1);
-  addSmallProduct(S, q_a, v_a, -1);
+  solveFactorized(work.mixed, work.mixed_pivots, X);
+  Xn = work.mixed_next.lazyProduct(X);
+  work.q_y = X.lazyProduct(E);
+  work.q_v = h * X;
+  work.q_a = (h * h) * X;
+  work.v_y = (Xn.lazyProduct(E) - En) / h - work.S.lazyProduct(work.q_y);
+  work.v_v = Xn - work.S.lazyProduct(work.q_v);
+  work.v_a = h * work.v_v;
 
   // About the node state, where a gap is open.
-  gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), b.work->q);
-  gatherVelocity(loop, x_next_node.tail(model_.nv()), b.work->d);
-  if (b.work->q != next.q || b.work->d != b.v_next) return moveToNodeState(b, out);
+  gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), work.q);
+  gatherVelocity(loop, x_next_node.tail(model_.nv()), work.d);
+  if (work.q != next.q || work.d != b.v_next) return moveToNodeState(b, out);
   out.gap.segment(o, r).setZero();
   out.gap.segment(nr + o, r).setZero();
   return true;
@@ -259,28 +213,29 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
 bool ReducedNode::moveToNodeState(Block& b, StageModel& out) {
   const LoopBlock& loop = b.loop;
   const int nr = reduction_.size, r = loop.size, o = loop.offset;
-  if (!b.work->scratch.update(loop, b.work->q)) return fail(b, b.work->scratch);
-  const MatrixXd &WN = b.work->scratch.basis().WN, &Nn = b.next.basis().N;
-  updateVelocities(loop.model, b.next.workspace(), b.v_next);
-  calcVelocityLift(b, b.next, b.work->T);
+  // Of the point ahead, whose positions are in the scratch.
+  updateVelocities(loop.model, b.work->scratch.ws, b.v_next);
+  updateVelocityLift(getOwnView(loop, b.work->scratch.ws), b.work->ahead);
+  if (!b.work->point.update(loop, b.work->scratch, b.work->q)) return fail(b, b.work->point);
+  const MatrixXd &WN = b.work->point.basis().WN, &Nn = b.next.basis().N;
   loop.model.difference(b.work->q, b.next.basis().q, b.work->a);
   b.work->w = b.v_next - b.work->d;
-  b.work->L = Nn;  // becomes J_diff N'
+  b.work->diff_N = Nn;  // becomes J_diff N'
   for (const Joint& joint : loop.model.joints()) {
     if (!isCurved(joint)) continue;
     const int i = joint.idx_v, n = joint.nv;
     JointMatrix Jdiff(n, n);
     calcJointDifferenceJacobian(joint, b.work->a.segment(i, n), Jdiff);
-    b.work->L.middleRows(i, n) = Jdiff.lazyProduct(Nn.middleRows(i, n));
+    b.work->diff_N.middleRows(i, n) = Jdiff.lazyProduct(Nn.middleRows(i, n));
   }
   out.gap.segment(o, r).setZero();
   out.gap.segment(nr + o, r).setZero();
   addSmallProductTransposed(WN, b.work->a, out.gap.segment(o, r));
   addSmallProductTransposed(WN, b.work->w, out.gap.segment(nr + o, r));
   for (MatrixXd* P : {&b.work->Pq, &b.work->Pv, &b.work->Pz}) P->setZero();
-  addSmallProductTransposed(WN, b.work->L, b.work->Pq);
+  addSmallProductTransposed(WN, b.work->diff_N, b.work->Pq);
   addSmallProductTransposed(WN, Nn, b.work->Pv);
-  addSmallProductTransposed(WN, b.work->T, b.work->Pz);
+  addSmallProductTransposed(WN, b.work->ahead.Z, b.work->Pz);
   const std::pair<MatrixXd*, MatrixXd*> derivatives[] = {
       {&b.work->q_y, &b.work->v_y}, {&b.work->q_v, &b.work->v_v}, {&b.work->q_a, &b.work->v_a}};
   for (const auto& [dq, dv] : derivatives) {
@@ -295,7 +250,7 @@ bool ReducedNode::moveToNodeState(Block& b, StageModel& out) {
   return true;
 }
 
-// The same for a joint outside all loops, where N and J^T vanish from Eqs. (e) to (g).
+// The same for a joint outside all loops, where N and J^T vanish.
 void ReducedNode::linearizeFreeJoint(FreeJoint& free, const StageModel& out) const {
   const Joint& joint = model_.joints()[free.joint];
   const int n = joint.nv;
@@ -342,8 +297,13 @@ void ReducedNode::assembleStep(StageModel& out) const {
 }
 
 void ReducedNode::linearizeState() {
-  takeWork();
-  for (Block& b : blocks_) calcVelocityLift(b, b.at, b.work->Z);
+  restore();
+  updateCompositeInertias(model_, work_->ws);
+  for (Block& b : blocks_) {
+    const BlockView view = getPlacedView(b.loop, work_->ws);
+    updateTwists(view, b.at, b.work->motion);
+    updateVelocityLift(view, b.work->motion);
+  }
   storeChart();
 }
 

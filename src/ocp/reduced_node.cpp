@@ -1,22 +1,71 @@
 // State space and step of reduced_node.h.
 #include "reduced_node.h"
 
+#include <algorithm>
+
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 
 namespace bielle {
 
-ReducedWork::ReducedWork(const Model& model, const Reduction& reduction) : derivatives(model, reduction) {
-  for (const LoopBlock& block : reduction.blocks) blocks.emplace_back(block);
-  lifts.resize(blocks.size());
-  left.setZero(model.nv(), reduction.size);
-  dydd.setZero(reduction.size, 2 * reduction.size + model.nu());
+BlockWork::BlockWork(const LoopBlock& l) : scratch(l), start(l), point(l), motion(l), ahead(l) {
+  const int n = l.model.nv(), r = l.size, rank = l.rank;
+  q.setZero(l.model.nq());
+  for (VectorXd* x : {&v, &a, &d, &w, &gradient_q, &gradient_v}) x->setZero(n);
+  for (VectorXd* x : {&independent, &zeta}) x->setZero(rank);
+  rows.setZero(l.closures.rows);
+  for (MatrixXd* x : {&HN, &wy, &wv, &HnNn, &JqN, &P, &Pn, &diff_N}) x->setZero(n, r);
+  for (MatrixXd* x : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a, &S}) x->setZero(r, r);
+  for (MatrixXd* x : {&X, &Xn, &E, &En, &mixed, &mixed_next, &Pq, &Pv, &Pz}) x->setZero(r, r);
+  target.setZero(r);
+  mixed_pivots.resize(r);
+}
+
+ReducedSizes::ReducedSizes(const std::vector<StageSpec>& specs) {
+  const auto add = [](int value, std::vector<int>& list) {
+    if (std::find(list.begin(), list.end(), value) == list.end()) list.push_back(value);
+  };
+  for (const StageSpec& spec : specs) {
+    const ConstraintSet& set = spec.constraints;
+    int loop_rows = 0;
+    for (int c = 0; c < set.num_loops; ++c) loop_rows += getRows(set.closures[c].kind);
+    for (size_t c = set.num_loops; c < set.closures.size(); ++c) add(set.closures[c].body1, tips);
+    add(set.rows - loop_rows, contact_rows);
+    rows = std::max(rows, contact_rows.back());
+    rows = std::max(rows, set.rows - loop_rows);
+    constraints = std::max(constraints, set.rows);
+    residuals = std::max(residuals, countResidualRows(spec));
+  }
+}
+
+ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const ReducedSizes& sizes)
+    : ws(model), tree(model, reduction, sizes.tips) {
+  const int nv = model.nv(), nr = reduction.size, nu = model.nu();
+  blocks.reserve(reduction.blocks.size());  // lifts point into them
+  for (const LoopBlock& block : reduction.blocks) {
+    blocks.emplace_back(block);
+    lifts.push_back({&blocks.back().motion, &blocks.back().HN});
+  }
+  for (int rows : sizes.contact_rows) {
+    ContactWork& work = contacts[rows];
+    work.saddle_point.resize(nr, rows);
+    for (VectorXd* x : {&work.gamma, &work.lambda}) x->setZero(rows);
+  }
+  f_ext.assign(model.numBodies(), Vector6d::Zero());
+  for (VectorXd* x : {&a_d, &w, &force}) x->setZero(nv);
+  for (VectorXd* x : {&f, &ydd}) x->setZero(nr);
+  dydd.setZero(nr, 2 * nr + nu);
+  dlambda.setZero(sizes.rows, 2 * nr + nu);
+  for (MatrixXd* m : {&jacobians.q, &jacobians.v}) m->setZero(sizes.residuals, nv);
+  jacobians.lambda.setZero(sizes.residuals, sizes.constraints);
+  for (MatrixXd* m : {&Rx, &scaled}) m->setZero(sizes.residuals, 2 * nr);
+  for (MatrixXd* m : {&Ru, &Ru_scaled}) m->setZero(sizes.residuals, nu);
 }
 
 ReducedWork& ReducedWorkPool::get() {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::unique_ptr<ReducedWork>& work = works_[std::this_thread::get_id()];
-  if (!work) work = std::make_unique<ReducedWork>(model_, reduction_);
+  if (!work) work = std::make_unique<ReducedWork>(model_, reduction_, sizes_);
   return *work;
 }
 
@@ -29,21 +78,21 @@ ReducedNode::ReducedNode(const Model& model, const Reduction& reduction, const S
     free_joints_.back().joint = reduction.free_joints[i];
     free_joints_.back().offset = reduction.free_offsets[i];
   }
-  const int nv = model.nv(), nr = reduction.size, nu = model.nu();
-  num_loops_ = spec.constraints.num_loops;
+  const int nv = model.nv(), nr = reduction.size;
+  const ConstraintSet& set = spec.constraints;
+  num_loops_ = set.num_loops;
   loop_rows_ = 0;
-  for (int c = 0; c < num_loops_; ++c) loop_rows_ += getRows(spec.constraints.closures[c].kind);
-  contact_rows_ = spec.constraints.rows - loop_rows_;
-  for (VectorXd* v : {&tau_, &a_, &a_d_, &w_, &force_}) v->setZero(nv);
-  for (VectorXd* v : {&ydd_, &f_}) v->setZero(nr);
-  for (VectorXd* v : {&gamma_, &lambda_c_}) v->setZero(contact_rows_);
-  Jc_.setZero(contact_rows_, nv);
+  for (int c = 0; c < num_loops_; ++c) loop_rows_ += getRows(set.closures[c].kind);
+  contact_rows_ = set.rows - loop_rows_;
+  const std::vector<int>& tips = pool_->sizes().tips;
+  for (size_t c = num_loops_; c < set.closures.size(); ++c)
+    contact_tips_.push_back(
+        static_cast<int>(std::find(tips.begin(), tips.end(), set.closures[c].body1) - tips.begin()));
+  X_WB_.resize(model.numBodies());
+  q_.setZero(model.nq());
+  for (VectorXd* v : {&v_, &tau_, &a_}) v->setZero(nv);
   JcN_.setZero(contact_rows_, nr);
-  for (MatrixXd* m : {&Cc_q_, &Cc_v_}) m->setZero(contact_rows_, nv);
-  dlambda_.setZero(contact_rows_, 2 * nr + nu);
   M_.setZero(nr, nr);
-  saddle_point_.resize(nr, contact_rows_);
-  f_ext_.assign(model.numBodies(), Vector6d::Zero());
   chart_x_.setConstant(model.nq() + nv, std::numeric_limits<double>::quiet_NaN());
 }
 
@@ -54,10 +103,6 @@ void ReducedNode::takeWork() {
 
 void ReducedNode::integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) {
   takeWork();
-  if (!updateChart(x)) {
-    x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
-    return;
-  }
   const int nq = model_.nq(), nr = reduction_.size;
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];
@@ -68,27 +113,35 @@ void ReducedNode::integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out
   }
   for (Block& b : blocks_) {
     const LoopBlock& loop = b.loop;
-    b.work->d.noalias() = b.chart.N * dx.segment(loop.offset, loop.size);
-    if (!b.work->scratch.close(loop, b.chart, b.work->d, {})) {
-      fail(b, b.work->scratch);
+    BlockWork& work = *b.work;
+    gatherConfiguration(model_, loop, x.head(nq), work.q);
+    if (!work.start.update(loop, work.scratch, work.q)) {
+      fail(b, work.start);
+      x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
+      return;
+    }
+    const BlockBasis &from = work.start.basis(), &to = work.point.basis();
+    work.d.noalias() = from.N * dx.segment(loop.offset, loop.size);
+    if (!work.point.close(loop, work.scratch, from, work.d, {})) {
+      fail(b, work.point);
       x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
       return;
     }
     // The velocity at the new point whose coordinates about the old one are N^T v + dy_v.
-    gatherVelocity(loop, x.tail(model_.nv()), b.work->v);
-    b.work->target = dx.segment(nr + loop.offset, loop.size);
-    addSmallProductTransposed(b.chart.WN, b.work->v, b.work->target);
-    b.work->mixed.setZero();
-    addSmallProductTransposed(b.chart.WN, b.work->scratch.basis().N, b.work->mixed);
-    if (!factorizeSmall(b.work->mixed, b.work->mixed_pivots)) {
+    gatherVelocity(loop, x.tail(model_.nv()), work.v);
+    work.target = dx.segment(nr + loop.offset, loop.size);
+    addSmallProductTransposed(from.WN, work.v, work.target);
+    work.mixed.setZero();
+    addSmallProductTransposed(from.WN, to.N, work.mixed);
+    if (!factorizeSmall(work.mixed, work.mixed_pivots)) {
       failure_ = "closure '" + loop.closures.closures.front().name + "': the step turns its loops too far";
       x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
       return;
     }
-    solveFactorized(b.work->mixed, b.work->mixed_pivots, b.work->target);
-    b.work->v.noalias() = b.work->scratch.basis().N * b.work->target;
-    scatterConfiguration(model_, loop, b.work->scratch.basis().q, x_out.head(nq));
-    scatterVelocity(loop, b.work->v, x_out.tail(model_.nv()));
+    solveFactorized(work.mixed, work.mixed_pivots, work.target);
+    work.v.noalias() = to.N * work.target;
+    scatterConfiguration(model_, loop, to.q, x_out.head(nq));
+    scatterVelocity(loop, work.v, x_out.tail(model_.nv()));
   }
 }
 
@@ -108,90 +161,99 @@ bool ReducedNode::updateState(ConstVectorRef x) {
 }
 
 bool ReducedNode::updateState(ConstVectorRef x, const ReducedNode* previous) {
-  const int nq = model_.nq(), nv = model_.nv();
+  const int nq = model_.nq();
   failure_.clear();
-  updatePositions(model_, ws_, x.head(nq));
-  updateVelocities(model_, ws_, x.tail(nv));
-  updateMassMatrix(model_, ws_);
+  q_ = x.head(nq);
+  v_ = x.tail(model_.nv());
   for (size_t i = 0; i < blocks_.size(); ++i) {
     Block& b = blocks_[i];
-    if (previous) {
-      b.at.assign(previous->blocks_[i].next);
-    } else {
-      gatherConfiguration(model_, b.loop, x.head(nq), b.work->q);
-      if (!b.at.update(b.loop, b.work->q)) return fail(b, b.at);
+    BlockPoint& point = b.work->point;
+    const BlockPoint* source = previous ? &previous->blocks_[i].next : &point;
+    if (!previous) {
+      gatherConfiguration(model_, b.loop, q_, b.work->q);
+      if (!point.update(b.loop, b.work->scratch, b.work->q)) return fail(b, point);
     }
-    gatherVelocity(b.loop, x.tail(nv), b.work->v);
-    updateVelocities(b.loop.model, b.at.workspace(), b.work->v);
+    b.at = source->basis();
+    for (size_t j = 0; j < b.loop.joints.size(); ++j) X_WB_[b.loop.joints[j]] = source->placements()[j + 1];
   }
+  updateWholePlacements();
+  restore();
+  updateCompositeInertias(model_, work_->ws);
   return true;
+}
+
+// World placements, where those of blocks are still seen from the body that carries the block.
+void ReducedNode::updateWholePlacements() {
+  for (int i = 1; i < model_.numBodies(); ++i) {
+    const ReducedUnit& unit = reduction_.units[reduction_.unit_of_body[i]];
+    const Joint& joint = model_.joints()[i];
+    if (unit.block >= 0) {
+      X_WB_[i] = X_WB_[reduction_.blocks[unit.block].root] * X_WB_[i];
+    } else {
+      X_WB_[i] = X_WB_[joint.parent] * (joint.X_PJ * calcJointPlacement(joint, q_.segment(joint.idx_q, joint.nq)));
+    }
+  }
+}
+
+void ReducedNode::restore() {
+  takeWork();
+  Workspace& ws = work_->ws;
+  ws.q = q_;
+  ws.X_WB = X_WB_;
+  ws.stage = WorkspaceStage::Placement;
+  updateColumns(model_, ws);
+  updateVelocities(model_, ws, v_);
 }
 
 bool ReducedNode::updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) {
   takeWork();
   const bool follows = previous && previous->x_next() == x;
   if (!updateState(x, follows ? static_cast<const ReducedNode*>(previous) : nullptr)) return false;
-  updateBias(model_, ws_);
-  a_d_.setZero();
-  for (Block& b : blocks_) {
-    b.work->a.setZero();
-    updateAccelerations(b.loop.model, b.at.workspace(), b.work->a);
-    const ConstraintSet& set = b.loop.closures;
-    for (size_t c = 0; c < set.closures.size(); ++c)
-      b.work->rows.segment(set.offsets[c], getRows(set.closures[c].kind)) =
-          calcClosureAcceleration(b.at.workspace(), set.closures[c]);
-    for (int i = 0; i < b.loop.rank; ++i) b.work->gamma[i] = b.work->rows[b.at.basis().rows[i]];
-    b.work->independent = b.work->gamma;
-    b.at.solveGram(b.work->independent);
-    b.work->a.noalias() = -b.at.basis().JW.transpose() * b.work->independent;
-    scatterVelocity(b.loop, b.work->a, a_d_);
-  }
+  ReducedWork& work = *work_;
+  updateDriftAccelerations();
+  updateInverseDynamics(model_, work.ws, work.a_d);
   // Eq. (b)
   calcMotorForces(model_, u, tau_);
-  force_ = tau_ - ws_.b;
-  force_.noalias() -= ws_.M * a_d_;
-  projectVector(force_, f_);
-  work_->left.setZero();
-  addColumns(ws_.M, &BlockBasisN, work_->left);
-  projectRows(work_->left, M_);
-  if (contact_rows_ > 0) updateContacts();
-  if (saddle_point_.factorize(M_, JcN_) != SaddlePointStatus::Ok) {
+  work.force = tau_ - work.ws.b;
+  projectVector(work.force, work.f);
+  for (Block& b : blocks_) updateTwists(getPlacedView(b.loop, work.ws), b.at, b.work->motion);
+  work.tree.updateMassMatrix(work.ws, work.lifts, M_);
+  updateContacts();
+  ContactWork& contacts = work.contacts.at(contact_rows_);
+  if (contacts.saddle_point.factorize(M_, JcN_) != SaddlePointStatus::Ok) {
     failure_ = "the mass matrix is singular";
     return false;
   }
-  saddle_point_.solve(f_, gamma_, ydd_, lambda_c_);
-  lambda_.tail(contact_rows_) = lambda_c_;
-  a_ = a_d_;
-  addFromReduced(ydd_, a_);
+  contacts.saddle_point.solve(work.f, contacts.gamma, work.ydd, contacts.lambda);
+  lambda_.tail(contact_rows_) = contacts.lambda;
+  a_ = work.a_d;
+  addFromReduced(work.ydd, a_);
   return closeStep(x);
 }
 
-void ReducedNode::addColumns(const MatrixXd& A, Accessor accessor, MatrixRef out) const {
-  if (accessor == &BlockBasisN)
+// a_d = -J^+ gamma of the loops.
+void ReducedNode::updateDriftAccelerations() {
+  ReducedWork& work = *work_;
+  updateDrift(model_, work.ws);
+  work.a_d.setZero();
+  for (Block& b : blocks_) {
+    calcBlockDrift(getPlacedView(b.loop, work.ws), b.loop, b.at, b.work->rows, b.work->zeta);
+    b.work->independent = b.work->zeta;
+    applyPseudoInverse(b.loop, b.at, -1, b.work->independent, b.work->a);
+    scatterVelocity(b.loop, b.work->a, work.a_d);
+  }
+}
+
+void ReducedNode::addColumns(ConstMatrixRef A, Lift lift, MatrixRef out) const {
+  if (lift == Lift::N)
     for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
       const Joint& joint = model_.joints()[reduction_.free_joints[i]];
       out.middleCols(reduction_.free_offsets[i], joint.nv) += A.middleCols(joint.idx_v, joint.nv);
     }
   for (const Block& b : blocks_) {
-    const MatrixXd& X = accessor(b);
+    const MatrixXd& X = lift == Lift::N ? b.at.N : b.work->motion.Z;
     for (int c = 0; c < b.loop.size; ++c)
       for (size_t k = 0; k < b.loop.dofs.size(); ++k) out.col(b.loop.offset + c) += X(k, c) * A.col(b.loop.dofs[k]);
-  }
-}
-
-void ReducedNode::projectRows(const MatrixXd& A, MatrixRef out) const {
-  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
-    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
-    out.middleRows(reduction_.free_offsets[i], joint.nv) = A.middleRows(joint.idx_v, joint.nv);
-  }
-  for (const Block& b : blocks_) {
-    const MatrixXd& N = b.at.basis().N;
-    for (Eigen::Index col = 0; col < A.cols(); ++col)
-      for (int c = 0; c < b.loop.size; ++c) {
-        double sum = 0;
-        for (size_t k = 0; k < b.loop.dofs.size(); ++k) sum += N(k, c) * A(b.loop.dofs[k], col);
-        out(b.loop.offset + c, col) = sum;
-      }
   }
 }
 
@@ -203,7 +265,7 @@ void ReducedNode::projectVector(const VectorXd& x, VectorXd& out) const {
   for (const Block& b : blocks_)
     for (int c = 0; c < b.loop.size; ++c) {
       double sum = 0;
-      for (size_t k = 0; k < b.loop.dofs.size(); ++k) sum += b.at.basis().N(k, c) * x[b.loop.dofs[k]];
+      for (size_t k = 0; k < b.loop.dofs.size(); ++k) sum += b.at.N(k, c) * x[b.loop.dofs[k]];
       out[b.loop.offset + c] = sum;
     }
 }
@@ -215,58 +277,69 @@ void ReducedNode::addFromReduced(const VectorXd& y, VectorXd& x) const {
   }
   for (const Block& b : blocks_)
     for (size_t k = 0; k < b.loop.dofs.size(); ++k)
-      x[b.loop.dofs[k]] += b.at.basis().N.row(k).dot(y.segment(b.loop.offset, b.loop.size));
+      x[b.loop.dofs[k]] += b.at.N.row(k).dot(y.segment(b.loop.offset, b.loop.size));
 }
 
+// J_c N and gamma_c + J_c a_d; the accelerations of the workspace are those of a_d.
 void ReducedNode::updateContacts() {
+  ReducedWork& work = *work_;
   const ConstraintSet& set = spec_.constraints;
+  VectorXd& gamma = work.contacts.at(contact_rows_).gamma;
+  JcN_.setZero();
   for (size_t c = num_loops_; c < set.closures.size(); ++c) {
     const Closure& contact = set.closures[c];
     const int row = set.offsets[c] - loop_rows_, n = getRows(contact.kind);
-    calcClosureJacobian(ws_, contact, Jc_.middleRows(row, n));
-    gamma_.segment(row, n) = calcClosureAcceleration(ws_, contact) + calcClosureStabilization(ws_, contact);
+    gamma.segment(row, n) = calcClosureAcceleration(work.ws, contact) + calcClosureStabilization(work.ws, contact);
+    const SE3 X_WF = getPlacement(work.ws, contact.body1, contact.X_B1);
+    const ReducedTree::Columns& tip = work.tree.getTip(contact_tips_[c - num_loops_]);
+    for (size_t o = 0; o < tip.outer.size(); ++o)
+      JcN_.col(tip.outer[o]).segment(row, n) = selectRows(contact, X_WF.actInvMotion(tip.J.col(o)));
   }
-  gamma_.noalias() += Jc_ * a_d_;
-  JcN_.setZero();
-  addColumns(Jc_, &BlockBasisN, JcN_);
 }
 
 // robot_problem.h Eq. (3)
 bool ReducedNode::closeStep(ConstVectorRef x) {
   const int nq = model_.nq(), nv = model_.nv();
   const double h = spec_.dt;
-  w_ = x.tail(nv) + h * a_;
+  VectorXd& w = work_->w;
+  w = x.tail(nv) + h * a_;
   for (int i : reduction_.free_joints) {
     const Joint& joint = model_.joints()[i];
-    const JointVector d = h * w_.segment(joint.idx_v, joint.nv);
+    const JointVector d = h * w.segment(joint.idx_v, joint.nv);
     integrateJoint(joint, x.segment(joint.idx_q, joint.nq), d, x_next_.segment(joint.idx_q, joint.nq));
   }
-  x_next_.tail(nv) = w_;
+  x_next_.tail(nv) = w;
   for (Block& b : blocks_) {
-    gatherVelocity(b.loop, w_, b.work->d);
-    b.work->d *= h;
+    BlockWork& work = *b.work;
+    gatherVelocity(b.loop, w, work.d);
+    work.d *= h;
     // To second order the closures open by h^2/2 gamma along h w: J J^T zeta = h^2/2 gamma, with the zeta of close().
-    b.work->zeta = (0.5 * h * h) * b.work->independent;
-    if (!b.next.close(b.loop, b.at.basis(), b.work->d, b.work->zeta)) return fail(b, b.next);
-    b.work->w = b.next.step() / h;
-    b.mu.noalias() = b.next.basis().J * b.work->w;
-    b.next.solveGram(b.mu);
-    b.v_next = b.work->w;
-    b.v_next.noalias() -= b.next.basis().JW.transpose() * b.mu;
-    scatterConfiguration(model_, b.loop, b.next.basis().q, x_next_.head(nq));
+    work.zeta = (0.5 * h * h) * work.independent;
+    if (!b.next.close(b.loop, work.scratch, b.at, work.d, work.zeta)) return fail(b, b.next);
+    const BlockBasis& next = b.next.basis();
+    work.w = b.next.step() / h;
+    b.mu.noalias() = next.J * work.w;
+    work.independent = b.mu;
+    applyPseudoInverse(b.loop, next, -1, work.independent, b.v_next);
+    b.mu = work.independent;
+    b.v_next += work.w;
+    scatterConfiguration(model_, b.loop, next.q, x_next_.head(nq));
     scatterVelocity(b.loop, b.v_next, x_next_.tail(nv));
   }
   return true;
 }
 
-void ReducedNode::differenceAbout(Block& b, const BlockBasis& basis, ConstVectorRef x0, ConstVectorRef x1,
+void ReducedNode::differenceAbout(Block& b, const MatrixXd& WN, ConstVectorRef x0, ConstVectorRef x1,
                                   VectorRef dx) const {
   const int nq = model_.nq(), nr = reduction_.size;
-  gatherConfiguration(model_, b.loop, x1.head(nq), b.work->q);
-  b.loop.model.difference(basis.q, b.work->q, b.work->d);
-  dx.segment(b.loop.offset, b.loop.size).noalias() = basis.WN.transpose() * b.work->d;
+  for (size_t j = 0; j < b.loop.joints.size(); ++j) {
+    const Joint& joint = model_.joints()[b.loop.joints[j]];
+    calcJointDifference(joint, x0.segment(joint.idx_q, joint.nq), x1.segment(joint.idx_q, joint.nq),
+                        b.work->d.segment(b.loop.model.joints()[j + 1].idx_v, joint.nv));
+  }
+  dx.segment(b.loop.offset, b.loop.size).noalias() = WN.transpose() * b.work->d;
   for (size_t k = 0; k < b.loop.dofs.size(); ++k) b.work->d[k] = x1[nq + b.loop.dofs[k]] - x0[nq + b.loop.dofs[k]];
-  dx.segment(nr + b.loop.offset, b.loop.size).noalias() = basis.WN.transpose() * b.work->d;
+  dx.segment(nr + b.loop.offset, b.loop.size).noalias() = WN.transpose() * b.work->d;
 }
 
 void ReducedNode::differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const {
@@ -279,26 +352,27 @@ void ReducedNode::differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef
   }
 }
 
-// Bases at x for integrate() and difference(): those of the last linearization, unless x is another point.
+// Bases at x for difference(): those of the last linearization, unless x is another point.
 bool ReducedNode::updateChart(ConstVectorRef x) {
   if (chart_x_ == x) return true;
   for (Block& b : blocks_) {
     gatherConfiguration(model_, b.loop, x.head(model_.nq()), b.work->q);
-    if (!b.work->scratch.update(b.loop, b.work->q)) return fail(b, b.work->scratch);
-    b.chart = b.work->scratch.basis();
+    if (!b.work->point.update(b.loop, b.work->scratch, b.work->q)) return fail(b, b.work->point);
+    b.chart = b.work->point.basis().WN;
   }
   chart_x_ = x;
   return true;
 }
 
 void ReducedNode::storeChart() {
-  for (Block& b : blocks_) b.chart = b.at.basis();
-  chart_x_.head(model_.nq()) = ws_.q;
-  chart_x_.tail(model_.nv()) = ws_.v;
+  for (Block& b : blocks_) b.chart = b.at.WN;
+  chart_x_.head(model_.nq()) = q_;
+  chart_x_.tail(model_.nv()) = v_;
 }
 
-std::shared_ptr<ReducedWorkPool> makeReducedWorkPool(const Model& model, const Reduction& reduction) {
-  return std::make_shared<ReducedWorkPool>(model, reduction);
+std::shared_ptr<ReducedWorkPool> makeReducedWorkPool(const Model& model, const Reduction& reduction,
+                                                     const std::vector<StageSpec>& specs) {
+  return std::make_shared<ReducedWorkPool>(model, reduction, specs);
 }
 
 std::unique_ptr<NodeModel> makeReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec,

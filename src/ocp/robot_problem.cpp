@@ -54,18 +54,14 @@ RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorX
   for (size_t k = 0; k < specs_.size(); ++k) checkSpec(model, specs_[k], k);
   if (formulation == Formulation::Reduced) reduction_ = std::make_unique<Reduction>(makeReduction(model, q0));
   std::shared_ptr<ReducedWorkPool> pool;
-  if (reduction_) pool = makeReducedWorkPool(model, *reduction_);
+  if (reduction_) pool = makeReducedWorkPool(model, *reduction_, specs_);
   nodes_.resize(specs_.size());
   for (size_t k = 0; k < specs_.size(); ++k) {
     const StageSpec& spec = specs_[k];
     Node& node = nodes_[k];
     node.dynamics = reduction_ ? makeReducedNode(model, *reduction_, spec, pool) : makeFullNode(model, spec);
     node.difference.setZero(model.nv());
-    int rows = 0;
-    for (const Cost& cost : spec.costs) rows += cost.residual->size();
-    for (VectorXd* v : {&node.stack.r, &node.stack.gradient, &node.stack.hessian}) v->setZero(rows);
-    for (MatrixXd* m : {&node.stack.q, &node.stack.v}) m->setZero(rows, model.nv());
-    node.stack.lambda.setZero(rows, spec.constraints.rows);
+    for (VectorXd* v : {&node.stack.r, &node.stack.gradient, &node.stack.hessian}) v->setZero(countResidualRows(spec));
   }
   tangent_size_ = nodes_.front().dynamics->tangentSize();
   x0_.resize(stateSize());
@@ -126,7 +122,10 @@ StepStatus RobotProblem::calcTerminalCost(ConstVectorRef x, double& cost) {
 
 double RobotProblem::sumCosts(int index, std::vector<CostValue>* values) {
   Node& node = nodes_[index];
-  if (node.has_cost && !values) return node.cost;
+  if (node.has_cost) {
+    if (!values) return node.cost;
+    node.dynamics->restore();
+  }
   const StageSpec& spec = specs_[index];
   double sum = 0;
   const auto add = [&](const std::string& name, double value) {
@@ -201,8 +200,11 @@ void RobotProblem::addCosts(int index, double scale, StageModel& out) {
   int row = 0;
   for (const Cost& cost : spec.costs) {
     const int n = cost.residual->size();
-    cost.residual->calcJacobian(
-        view, {stack.q.middleRows(row, n), stack.v.middleRows(row, n), stack.lambda.middleRows(row, n)});
+    ResidualRows rows = node.dynamics->jacobians().getRows(row, n, spec.constraints.rows);
+    rows.q.setZero();
+    rows.v.setZero();
+    rows.lambda.setZero();
+    cost.residual->calcJacobian(view, rows);
     cost.activation.calcDerivatives(stack.r.segment(row, n), stack.gradient.segment(row, n),
                                     stack.hessian.segment(row, n));
     stack.gradient.segment(row, n) *= scale * cost.weight;

@@ -24,14 +24,27 @@
 
 namespace bielle {
 
+/// Dofs [begin, end) of a block that move each other's axes: those of one joint, or one of a universal joint.
+struct DofGroup {
+  int begin = 0, end = 0;
+  int parent = -1;        ///< last dof of the group before it on the path to the root, -1: none
+  int parent_group = -1;  ///< that group
+};
+
 /// One cluster of loops as a mechanism of its own.
 struct LoopBlock {
   Model model;                        ///< joints and closures of the cluster, massless, over their common root
   ConstraintSet closures;             ///< of `model`, without stabilisation
   std::vector<int> cluster_closures;  ///< their indices in the whole model
+  std::vector<Closure> placed;        ///< the same closures with the bodies of the whole model, dofs those of `model`
+  int root = 0;                       ///< body of the whole model that carries the block
   std::vector<int> joints;            ///< joint indices in the whole model, in the order of `model`
   std::vector<int> dofs;              ///< velocity coordinates in the whole model (n)
+  std::vector<int> own_dofs;          ///< 0, 1, .. n - 1
+  std::vector<DofGroup> groups;       ///< parents first
+  std::vector<int> body_dof;          ///< per body of `model`, the last dof on its path, -1 for the root
   VectorXd metric;                    ///< n, diagonal of W
+  VectorXd inverse_metric;            ///< n, diagonal of W^{-1}
   VectorXd inverse_root;              ///< n, diagonal of W^{-1/2}
   int rank = 0;                       ///< of the closure Jacobian
   int offset = 0, size = 0;           ///< reduced coordinates [offset, offset + size), size = n - rank
@@ -52,66 +65,76 @@ struct Reduction {
   std::vector<int> free_joints;   ///< joints outside all loops
   std::vector<int> free_offsets;  ///< first reduced coordinate of each
   std::vector<ReducedUnit> units;
-  int size = 0;  ///< reduced coordinates: the mobility of the robot
+  std::vector<int> unit_of_body;  ///< per body of the whole model, -1 for the world
+  int size = 0;                   ///< reduced coordinates: the mobility of the robot
 };
 
 /// \param q closed configuration at which ranks are taken
 /// \throws ModelError when q is not closed (to 1e-8) or a loop leaves no mobility anywhere
 Reduction makeReduction(const Model& model, ConstVectorRef q);
 
+/// Parent, path and outer coordinates of something fixed to a body (no coordinates of its own).
+ReducedUnit makeTip(const Model& model, const Reduction& reduction, int body);
+
 /// Bases (1) at a closed configuration of a block.
 struct BlockBasis {
+  explicit BlockBasis(const LoopBlock& block);
   VectorXd q;             ///< nq of the block
   MatrixXd N;             ///< n x size
   MatrixXd WN;            ///< n x size
   MatrixXd J;             ///< rank x n, independent rows
-  MatrixXd JW;            ///< rank x n, J W^{-1}
+  MatrixXd L;             ///< rank x rank, Cholesky factor of J W^{-1} J^T
   std::vector<int> rows;  ///< which closure rows J holds
 };
 
-/// A closed configuration of a block with everything computed there. No allocation once made.
+/// (J W^{-1} J^T)^{-1} X in place (rank x k).
+template <typename Matrix>
+void solveGram(const BlockBasis& basis, Matrix&& X) {
+  solveSmallCholesky(basis.L, X);
+}
+/// out = s J^+ X = s W^{-1} J^T (J W^{-1} J^T)^{-1} X for X (rank x k), which is overwritten; out n x k.
+void applyPseudoInverse(const LoopBlock& block, const BlockBasis& basis, double s, MatrixRef X, MatrixRef out);
+
+/// What updates and closings of a block need for a moment: one per thread.
+struct BlockScratch {
+  explicit BlockScratch(const LoopBlock& block);
+  Workspace ws;  ///< of the block's model
+  VectorXd residual, correction;
+  MatrixXd J_all, J, JW;  // all rows; at the iterate of a closing; J W^{-1} where it starts
+  MatrixXd newton;        // factors of the matrix of close()
+  std::vector<int> pivots;
+  MatrixXd reflected, reflectors;  // of J W^{-1/2}, rows padded; Householder vectors
+  VectorXd beta, products, rest;   // their scales; scratch; squared norms of what is left of the rows
+};
+
+/// A closed configuration of a block with what was computed there. No allocation once made.
 class BlockPoint {
  public:
   explicit BlockPoint(const LoopBlock& block);
 
-  /// Kinematics, Jacobian and bases (1) at q (block's nq). False when the rank is not that of the block.
-  bool update(const LoopBlock& block, ConstVectorRef q);
+  /// Kinematics, Jacobian and bases (1) at q (block's nq), which stay in the scratch too. False when the rank is not that
+  /// of the block.
+  bool update(const LoopBlock& block, BlockScratch& scratch, ConstVectorRef q);
   /// Closes from `start` as Eq. (2) and updates everything there. False when it does not close or the rank changes.
   /// \param zeta_guess  rank, where zeta is expected, or empty
-  bool close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d, const VectorXd& zeta_guess);
-
-  /// Takes over the configuration of another point of the same block, its columns and bases; velocities are not.
-  void assign(const BlockPoint& other);
+  bool close(const LoopBlock& block, BlockScratch& scratch, const BlockBasis& start, ConstVectorRef d,
+             const VectorXd& zeta_guess);
+  /// Placements and columns of this point back into the scratch.
+  void load(const LoopBlock& block, BlockScratch& scratch) const;
 
   const BlockBasis& basis() const { return basis_; }
-  const VectorXd& zeta() const { return zeta_; }  ///< rank, of the last close()
+  const std::vector<SE3>& placements() const { return placements_; }  ///< of the block's bodies, seen from its root
+  const VectorXd& zeta() const { return zeta_; }                      ///< rank, of the last close()
   const VectorXd& step() const { return step_; }  ///< n, d - W^{-1} J(q_0)^T zeta of the last close()
-  double gap() const { return gap_; }             ///< largest closure residual
-  /// Why the last update() or close() returned false, naming a loop.
-  std::string describeFailure(const LoopBlock& block) const;
-  Workspace& workspace() { return ws_; }
-  const Workspace& workspace() const { return ws_; }
-  /// (J W^{-1} J^T)^{-1} X in place (rank x k); JW^T times it is J^+ X.
-  void solveGram(MatrixRef X) const { solveSmallCholesky(L_, X); }
-  /// Independent rows out of all rows (m x k -> rank x k).
-  void selectIndependent(const MatrixXd& all, MatrixXd& out) const;
+  /// Why the last update() or close() returned false, naming a loop; with the scratch as they left it.
+  std::string describeFailure(const LoopBlock& block, const BlockScratch& scratch) const;
 
  private:
-  void updateJacobian(const LoopBlock& block);
-  void updateResidual(const LoopBlock& block);
-  bool updateBases(const LoopBlock& block);
-  bool factorize(const LoopBlock& block);
+  bool updateBases(const LoopBlock& block, BlockScratch& scratch);
 
   BlockBasis basis_;
-  Workspace ws_;
-  VectorXd residual_, zeta_, step_, correction_;
-  MatrixXd J_all_;
-  MatrixXd L_;                       // rank x rank, Cholesky factor of J W^{-1} J^T
-  MatrixXd reflected_, reflectors_;  // of J W^{-1/2}, rows padded; Householder vectors
-  VectorXd beta_, products_, rest_;  // their scales; scratch; squared norms of what is left of the rows
-  MatrixXd newton_;                  // factors of the matrix of close()
-  std::vector<int> pivots_;
-  double gap_ = 0;
+  std::vector<SE3> placements_;
+  VectorXd zeta_, step_;
   bool closed_ = false;  // the last close() got as far as the bases
 };
 

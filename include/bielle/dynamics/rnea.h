@@ -29,8 +29,17 @@ namespace bielle {
 /// Mass matrix by composite inertias, Eq. (10), armature on its diagonal; needs updatePositions.
 void updateMassMatrix(const Model& model, Workspace& ws);
 
+/// Composite inertias and momenta of the dofs (fields Yc, YJ) alone; needs updatePositions.
+void updateCompositeInertias(const Model& model, Workspace& ws);
+
 /// Bias b(q, v), gravity included; needs updateVelocities.
 void updateBias(const Model& model, Workspace& ws);
+
+/// Accelerations (field A) for a = 0 alone; needs updateVelocities.
+void updateDrift(const Model& model, Workspace& ws);
+
+/// M a + b(q, v) in the field b, and the accelerations that go with a (nv); needs updateVelocities.
+void updateInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef a);
 
 /// Generalized forces of the motion (q, v, a), all given (updates positions, velocities and accelerations).
 VectorXd calcInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef q, ConstVectorRef v, ConstVectorRef a);

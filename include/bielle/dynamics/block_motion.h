@@ -1,0 +1,57 @@
+#pragma once
+/// \file How a block of loops moves with its reduced coordinates, to first order.
+///
+/// A change (dy, dy_v) of the reduced state of a block moves its dofs by
+///     dq = N dy,   dv = N dy_v + Z dy,   Z = -J^+ d(J v)/dq N                                                         (1)
+/// since J v = 0 is kept, and its accelerations, at fixed reduced accelerations, by
+///     da = d_y dy + d_v dy_v,   d_y = -J^+ (C_q N + C_v Z),   d_v = -J^+ C_v N                                        (2)
+/// with C_q, C_v the derivatives of the closure accelerations. With the columns of rnea.h summed over the path to a dof,
+///     J~ = sum J_k N_k,                          dV~ = sum dV_k N_k + J_k Z_k,
+///     dA~ = sum dA_k N_k + (dJ + dV)_k Z_k + J_k d_y,k,      dW~ = sum (dJ + dV)_k N_k + J_k d_v,k                    (3)
+/// is what the coordinate does to everything after that dof, in the coordinates of what it moves. A dof acts on a closure
+/// through the frame that it moves: the derivatives of closure.h, Eqs. (1) to (3), along a coordinate are those of its
+/// columns with J_k, dV_k, .. replaced by the difference of (3) between body 1 and body 2. So the work grows with the
+/// number of dofs, and not with its square.
+#include "bielle/dynamics/reduction.h"
+
+namespace bielle {
+
+/// A block seen in the workspace of the whole model or in one of its own.
+struct BlockView {
+  const Workspace& ws;
+  const std::vector<Closure>& closures;  ///< with the bodies of the workspace
+  const std::vector<int>& dofs;          ///< n, in the workspace
+};
+inline BlockView getPlacedView(const LoopBlock& block, const Workspace& whole) {
+  return {whole, block.placed, block.dofs};
+}
+inline BlockView getOwnView(const LoopBlock& block, const Workspace& own) {
+  return {own, block.closures.closures, block.own_dofs};
+}
+
+/// First-order motion of a block; n dofs, r reduced coordinates. Column n c + k of a sum (3) belongs to coordinate c at
+/// dof k, dofs of one group having the sum of all of them.
+struct BlockMotion {
+  explicit BlockMotion(const LoopBlock& block);
+  const LoopBlock& block;
+  const BlockBasis* basis = nullptr;
+  MatrixXd Z, dy, dv;       ///< n x r, Eqs. (1), (2)
+  Matrix6Xd J, dV, dA, dW;  ///< 6 x (n r), Eq. (3)
+  MatrixXd K_q, K_v;        // m x r, derivatives of the closure rows
+  MatrixXd X;               // rank x r
+};
+
+/// N and J~ at the bases of a point; needs the positions of the view.
+void updateTwists(const BlockView& view, const BlockBasis& basis, BlockMotion& motion);
+/// Z and dV~; needs updateTwists and the velocities of the view.
+void updateVelocityLift(const BlockView& view, BlockMotion& motion);
+/// d_y, d_v, dA~ and dW~; needs updateVelocityLift and the accelerations of the view.
+void updateAccelerationLift(const BlockView& view, BlockMotion& motion);
+/// out (n x r) = d(J^T f)/dq N for forces f on all rows (m), fixed in their frames 1: closure.h, Eq. (6); needs
+/// updateTwists.
+void calcForceLift(const BlockView& view, const BlockMotion& motion, ConstVectorRef forces, MatrixRef out);
+/// Drift of the independent closure rows (rank) for the accelerations held by the view.
+void calcBlockDrift(const BlockView& view, const LoopBlock& block, const BlockBasis& basis, VectorRef rows,
+                    VectorRef drift);
+
+}  // namespace bielle
