@@ -3,6 +3,7 @@
 #include <random>
 
 #include "bielle/math/se3.h"
+#include "bielle/math/small_dense.h"
 #include "bielle/model/joint.h"
 
 using namespace bielle;
@@ -110,5 +111,29 @@ TEST_CASE("every joint kind: integrate, difference, their Jacobians and the moti
       calcJointDifference(joint, q1, rm, dm);
       CHECK(((dp - dm) / (2 * h) - Jv.col(k)).norm() < 1e-8);
     }
+  }
+}
+
+TEST_CASE("small systems are solved with rows swapped more than once") {
+  for (int n : {1, 2, 3, 5, 9, 12}) {
+    MatrixXd A = MatrixXd::NullaryExpr(n, n, [](Eigen::Index, Eigen::Index) { return random(1, 1)[0]; });
+    A += 10 * MatrixXd(Eigen::MatrixXd::Identity(n, n).rowwise().reverse());  // the pivot of every column is far off
+    const MatrixXd X = MatrixXd::NullaryExpr(n, 3, [](Eigen::Index, Eigen::Index) { return random(1, 1)[0]; });
+    MatrixXd factors = A, solution = A * X;
+    std::vector<int> pivots(n);
+    REQUIRE(factorizeSmall(factors, pivots));
+    solveFactorized(factors, pivots, solution);
+    CHECK((solution - X).cwiseAbs().maxCoeff() < 1e-12);
+
+    const MatrixXd S = A * A.transpose();
+    const MatrixXd L = S.llt().matrixL();
+    solution = S * X;
+    solveSmallCholesky(L, solution);
+    CHECK((solution - X).cwiseAbs().maxCoeff() < 1e-10);
+
+    const MatrixXd B = MatrixXd::NullaryExpr(n, 7, [](Eigen::Index, Eigen::Index) { return random(1, 1)[0]; });
+    MatrixXd out = MatrixXd::Ones(7, 3);
+    addSmallProductTransposed(B, X, out, 2);
+    CHECK((out - MatrixXd::Ones(7, 3) - 2 * B.transpose() * X).cwiseAbs().maxCoeff() < 1e-12);
   }
 }

@@ -50,6 +50,11 @@ void updateColumns(const Model& model, Workspace& ws) {
         J.bottomRows<3>() = X.R;
         for (int k = 0; k < 3; ++k) J.col(k).head<3>() = X.p.cross(X.R.col(k));
         break;
+      case JointKind::Universal:  // the first axis rests in what carries the joint
+        J.col(0).tail<3>().noalias() = ws.X_WB[joint.parent].R * (joint.X_PJ.R * joint.axis);
+        J.col(1).tail<3>().noalias() = X.R * joint.axis2;
+        for (int k = 0; k < 2; ++k) J.col(k).head<3>() = X.p.cross(J.col(k).tail<3>());
+        break;
       default:
         calcJointSubspace(joint, ws.q.segment(joint.idx_q, joint.nq), S.leftCols(joint.nv));
         for (int k = 0; k < joint.nv; ++k) J.col(k) = X.actMotion(S.col(k));

@@ -10,17 +10,26 @@ Vector6d calcBodyForce(const Workspace& ws, int i, const Vector6d& A) {
   return ws.Y[i] * A + crossForce(ws.V[i], ws.h[i]);
 }
 
-// B of Eq. (6) for body i.
-void calcB(const Workspace& ws, int i, Matrix6d& B) {
-  const Matrix6d Vx = makeCrossMotionMatrix(ws.V[i]);
-  Matrix6d YVx;
-  YVx.noalias() = ws.Y[i] * Vx;
-  // V x* = -(V x)^T, hence V x* Y = -(Y V x)^T
-  B = -YVx - YVx.transpose();
-  const Matrix3d f = skew(ws.h[i].head<3>());
-  B.topRightCorner<3, 3>() -= f;
-  B.bottomLeftCorner<3, 3>() -= f;
-  B.bottomRightCorner<3, 3>() -= skew(ws.h[i].tail<3>());
+// Angular block of B of Eq. (11) for body i.
+void calcB(const Workspace& ws, int i, double mass, Matrix3d& B) {
+  const Matrix6d& Y = ws.Y[i];
+  const Vector3d v = ws.V[i].head<3>(), w = ws.V[i].tail<3>(), mc(Y(5, 1), Y(3, 2), Y(4, 0));
+  const Matrix3d I = Y.bottomRightCorner<3, 3>(), W = skew(w), cv = mc * v.transpose();
+  if (mass == 0) {
+    B.setZero();
+    return;
+  }
+  B.noalias() = W * I - I * W;
+  B -= cv + cv.transpose() + skew(ws.h[i].tail<3>());
+  B.diagonal().array() += 2 * mc.dot(v);
+}
+
+// Bc x of subtree i.
+Vector6d applyB(const Workspace& ws, int i, const Vector6d& x) {
+  Vector6d out;
+  out.head<3>() = -2 * ws.hc[i].head<3>().cross(x.tail<3>());
+  out.tail<3>().noalias() = ws.Bc[i] * x.tail<3>();
+  return out;
 }
 
 // Generalized forces of the accelerations of the bodies, rotors left out.
@@ -102,16 +111,20 @@ void updateInverseDynamicsFactors(const Model& model, Workspace& ws, const std::
     ws.F[i] = calcBodyForce(ws, i, ws.A[i]);
     if (!f_ext.empty()) ws.F[i] -= f_ext[i];
     ws.Yc[i] = ws.Y[i];
-    calcB(ws, i, ws.Bc[i]);
+    calcB(ws, i, model.bodies()[i].inertia.mass, ws.Bc[i]);
   }
   for (int i = model.numBodies() - 1; i > 0; --i) {
     const Joint& joint = model.joints()[i];
     for (int j = joint.idx_v; j < joint.idx_v + joint.nv; ++j) {
       const Vector6d J = ws.J.col(j), dV = ws.dV.col(j);
       ws.YJ.col(j).noalias() = ws.Yc[i] * J;
-      ws.BtJ.col(j).noalias() = ws.Bc[i].transpose() * J;
-      ws.Gv.col(j).noalias() = ws.Yc[i] * (ws.dJ.col(j) + dV) + ws.Bc[i] * J;
-      ws.Gq.col(j).noalias() = ws.Yc[i] * ws.dA.col(j) + ws.Bc[i] * dV;
+      ws.BtJ.col(j).head<3>().setZero();
+      ws.BtJ.col(j).tail<3>().noalias() = ws.Bc[i].transpose() * J.tail<3>();
+      ws.BtJ.col(j).tail<3>() += 2 * ws.hc[i].head<3>().cross(J.head<3>());
+      ws.Gv.col(j).noalias() = ws.Yc[i] * (ws.dJ.col(j) + dV);
+      ws.Gv.col(j) += applyB(ws, i, J);
+      ws.Gq.col(j).noalias() = ws.Yc[i] * ws.dA.col(j);
+      ws.Gq.col(j) += applyB(ws, i, dV);
       ws.Gq.col(j) += crossForce(J, ws.F[i]);
     }
     if (joint.parent > 0) {

@@ -17,7 +17,7 @@ Workspace::Workspace(const Model& model) {
   A.assign(nb, Vector6d::Zero());
   F.assign(nb, Vector6d::Zero());
   Yc.assign(nb, Matrix6d::Zero());
-  Bc.assign(nb, Matrix6d::Zero());
+  Bc.assign(nb, Matrix3d::Zero());
   for (Matrix6Xd* m : {&J, &w_minus, &dJ, &dV, &dA, &YJ, &BtJ, &Gq, &Gv}) m->setZero(6, nv);
   M.setZero(nv, nv);
   b.setZero(nv);

@@ -145,6 +145,25 @@ class Bench {
     return options_.threads > 1 ? std::vector<int>{1, options_.threads} : std::vector<int>{1};
   }
 
+  // The walk that is measured; a short one where it only has to work.
+  BenchmarkWalkOptions getWalk() const {
+    BenchmarkWalkOptions walk;
+    if (whole_) return walk;
+    walk.start_nodes = 4;
+    walk.swing_nodes = 6;
+    walk.cycles = 1;
+    walk.total_nodes = 24;
+    return walk;
+  }
+  SquatOptions getSquat() const {
+    SquatOptions squat;
+    if (whole_) return squat;
+    squat.depth = 0.95;
+    squat.duration = 0.3;
+    squat.settle = 0.03;
+    return squat;
+  }
+
   void measureUnit() {
     const double unit = calcUnit();
     report_.unit = report_.unit > 0 ? std::min(report_.unit, unit) : unit;
@@ -152,7 +171,7 @@ class Bench {
 
   void measureWalk(Formulation formulation) {
     tell("benchmark walk", formulation);
-    Motion motion = makeBenchmarkWalk(model_, {}, formulation);
+    Motion motion = makeBenchmarkWalk(model_, getWalk(), formulation);
     const int n = motion.problem->numStages(), repetitions = whole_ ? 5 : 1;
     NodeTimes times;
     times.formulation = formulation;
@@ -214,15 +233,25 @@ class Bench {
   }
   void measureSolves(Formulation formulation) {
     tell("squat from a cold start", formulation);
-    measureSolve("squat", formulation, [&] { return makeSquat(model_, {}, formulation); });
+    measureSolve("squat", formulation, [&] { return makeSquat(model_, getSquat(), formulation); });
     tell("benchmark walk from a cold start", formulation);
-    measureSolve("benchmark walk", formulation, [&] { return makeBenchmarkWalk(model_, {}, formulation); });
+    measureSolve("benchmark walk", formulation, [&] { return makeBenchmarkWalk(model_, getWalk(), formulation); });
   }
 
+  RecedingOptions getReceding(int threads) const {
+    RecedingOptions options;
+    options.threads = threads;
+    options.walk = getWalk();
+    if (whole_) return options;
+    options.shifts = 5;
+    options.nodes = 12;
+    options.first_iterations = 5;
+    return options;
+  }
   void measureReceding(Formulation formulation) {
     tell("receding horizon", formulation);
     for (int threads : getThreads())
-      report_.receding.push_back(runRecedingHorizon(model_, formulation, threads, whole_ ? 150 : 5));
+      report_.receding.push_back(runRecedingHorizon(model_, formulation, getReceding(threads)));
   }
 
   void measureChains(Formulation formulation) {
@@ -249,7 +278,7 @@ class Bench {
 
   void measureHorizons(Formulation formulation) {
     tell("horizons", formulation);
-    for (int nodes : whole_ ? std::vector<int>{50, 100, 200, 500, 1000} : std::vector<int>{50, 100}) {
+    for (int nodes : whole_ ? std::vector<int>{50, 100, 200, 500, 1000} : std::vector<int>{20, 40}) {
       BenchmarkWalkOptions options;
       options.cycles = (nodes - options.start_nodes) / (2 * (options.swing_nodes + options.switch_nodes));
       options.total_nodes = nodes;

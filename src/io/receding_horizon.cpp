@@ -7,24 +7,22 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/motion/benchmark_walk.h"
 
 namespace bielle {
 namespace {
 
-constexpr int kNodes = 100;
 constexpr double kPositionNoise = 1e-4, kVelocityNoise = 1e-3;  // rad or m, rad/s or m/s
 
-// Stages [first, first + kNodes) of a longer problem from a state of its own, with the terminal costs of that problem.
+// Stages [first, first + nodes) of a longer problem from a state of its own, with the terminal costs of that problem.
 class Window : public ShootingProblem {
  public:
-  explicit Window(RobotProblem& whole) : whole_(whole), x0_(whole.initialState()) {}
+  Window(RobotProblem& whole, int nodes) : whole_(whole), nodes_(nodes), x0_(whole.initialState()) {}
   void move(int first, const VectorXd& x0) {
     first_ = first;
     x0_ = x0;
   }
 
-  int numStages() const override { return kNodes; }
+  int numStages() const override { return nodes_; }
   int stateSize() const override { return whole_.stateSize(); }
   int tangentSize(int node) const override { return whole_.tangentSize(getNode(node)); }
   int controlSize(int stage) const override { return whole_.controlSize(first_ + stage); }
@@ -38,6 +36,9 @@ class Window : public ShootingProblem {
   StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override {
     return whole_.step(first_ + stage, x, u, x_next, cost);
   }
+  StepStatus continueStep(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override {
+    return whole_.continueStep(first_ + stage, x, u, x_next, cost);
+  }
   StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override { return whole_.calcTerminalCost(x, cost); }
   StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
                        StageModel& out) override {
@@ -47,8 +48,9 @@ class Window : public ShootingProblem {
   std::string getFailure(int node) const override { return whole_.getFailure(getNode(node)); }
 
  private:
-  int getNode(int node) const { return node < kNodes ? first_ + node : whole_.numStages(); }
+  int getNode(int node) const { return node < nodes_ ? first_ + node : whole_.numStages(); }
   RobotProblem& whole_;
+  const int nodes_;
   int first_ = 0;
   VectorXd x0_;
 };
@@ -98,22 +100,23 @@ Torso findTorso(const Model& model, Workspace& ws, const VectorXd& x) {
 
 }  // namespace
 
-RecedingHorizon runRecedingHorizon(const Model& model, Formulation formulation, int threads, int shifts) {
-  Motion motion = makeBenchmarkWalk(model, {}, formulation);
+RecedingHorizon runRecedingHorizon(const Model& model, Formulation formulation, const RecedingOptions& receding) {
+  const int nodes = receding.nodes;
+  Motion motion = makeBenchmarkWalk(model, receding.walk, formulation);
   RobotProblem& whole = *motion.problem;
-  Window window(whole);
-  ShootingTrajectory trajectory{{motion.guess.xs.begin(), motion.guess.xs.begin() + kNodes + 1},
-                                {motion.guess.us.begin(), motion.guess.us.begin() + kNodes}};
+  Window window(whole, nodes);
+  ShootingTrajectory trajectory{{motion.guess.xs.begin(), motion.guess.xs.begin() + nodes + 1},
+                                {motion.guess.us.begin(), motion.guess.us.begin() + nodes}};
   FddpOptions options;
-  options.threads = threads;
-  options.max_iterations = 50;
+  options.threads = receding.threads;
+  options.max_iterations = receding.first_iterations;
   Fddp(options).solve(window, trajectory);  // the plan before the first shift, without haste
   options.max_iterations = 1;
   Fddp solver(options);
 
   RecedingHorizon out;
   out.formulation = formulation;
-  out.threads = threads;
+  out.threads = receding.threads;
   out.least_height = 1;
   out.up = true;
   Workspace ws(model);
@@ -121,10 +124,10 @@ RecedingHorizon runRecedingHorizon(const Model& model, Formulation formulation, 
   VectorXd x = whole.initialState(), next = x;
   const Torso start = findTorso(model, ws, x);
   std::vector<double> times;
-  for (int k = 0; k < std::min(shifts, whole.numStages() - kNodes) && out.up; ++k) {
+  for (int k = 0; k < std::min(receding.shifts, whole.numStages() - nodes) && out.up; ++k) {
     window.move(k, x);
     const auto begin = std::chrono::steady_clock::now();
-    if (k > 0) shift(whole, k + kNodes - 1, trajectory);
+    if (k > 0) shift(whole, k + nodes - 1, trajectory);
     const FddpSummary summary = solver.solve(window, trajectory);
     times.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     double cost = 0;

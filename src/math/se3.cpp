@@ -49,7 +49,8 @@ Vector6d log6(const SE3& X) {
   Vector6d out;
   const Vector3d w = log3(X.R);
   out.tail<3>() = w;
-  out.head<3>().noalias() = calcRightJacobianInverse3(-w) * X.p;
+  const Vector3d cross = w.cross(X.p);
+  out.head<3>() = X.p - 0.5 * cross + calcJacobianInverseFactor(w.squaredNorm()) * w.cross(cross);
   return out;
 }
 

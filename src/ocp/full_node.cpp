@@ -101,7 +101,7 @@ class FullNode : public NodeModel {
 
   void linearizeState() override {}
 
-  void addStateCost(const StateCost& state, double scale, StageModel& out) override {
+  void addStateCost(const StateCost& state, const VectorXd& difference, double scale, StageModel& out) override {
     const int nv = model_.nv();
     const double w = scale * state.weight;
     out.lx.tail(nv) += w * state.weights.tail(nv).cwiseProduct(ws_.v - state.v_ref);
@@ -110,8 +110,7 @@ class FullNode : public NodeModel {
       const int i = joint.idx_v, n = joint.nv;
       if (n == 0) continue;
       const JointVector weights = w * state.weights.segment(i, n);
-      JointVector d(n);
-      calcJointDifference(joint, state.q_ref.segment(joint.idx_q, joint.nq), ws_.q.segment(joint.idx_q, joint.nq), d);
+      const JointVector d = difference.segment(i, n);
       JointMatrix J(n, n);
       calcJointDifferenceJacobian(joint, d, J);
       const JointMatrix WJ = weights.asDiagonal() * J;

@@ -10,9 +10,10 @@
 
 namespace bielle {
 
-// Stacked residuals of a node and the weights that the activations give them.
+// Stacked residuals of a node and the weights that the activations give them; first those that depend on q or v.
 struct ResidualStack {
   VectorXd r, gradient, hessian;
+  int motion_rows = 0;
 };
 
 // Partial derivatives of stacked residuals, rows x nv, nv, constraint rows; with room for those of other nodes.
@@ -49,7 +50,8 @@ class NodeModel {
   virtual bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) = 0;
   // To be called after updateState() at the terminal node in place of linearizeStep().
   virtual void linearizeState() = 0;
-  virtual void addStateCost(const StateCost& cost, double scale, StageModel& out) = 0;
+  // `difference` (nv) is that of q to the reference.
+  virtual void addStateCost(const StateCost& cost, const VectorXd& difference, double scale, StageModel& out) = 0;
   // Gauss-Newton terms; at a running stage forces and controls take part.
   virtual void addResiduals(const ResidualStack& stack, bool running, StageModel& out) = 0;
 

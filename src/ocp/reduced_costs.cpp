@@ -1,28 +1,22 @@
 // Costs in the coordinates of reduced_node.h.
+#include "bielle/math/lane_product.h"
 #include "reduced_node.h"
 
 namespace bielle {
 
 // Gradient and Hessian of a state cost with respect to the dofs of one joint.
-void ReducedNode::calcJointCost(const StateCost& state, double w, const Joint& joint, JointVector& gradient,
-                                JointMatrix& hessian) const {
+void ReducedNode::calcJointCost(const StateCost& state, const VectorXd& difference, double w, const Joint& joint,
+                                JointVector& gradient, JointMatrix& hessian) {
   const int n = joint.nv;
-  const JointVector weights = w * state.weights.segment(joint.idx_v, n);
-  JointVector d(n);
-  calcJointDifference(joint, state.q_ref.segment(joint.idx_q, joint.nq), work_->ws.q.segment(joint.idx_q, joint.nq), d);
-  if (!isCurved(joint)) {
-    gradient = weights.cwiseProduct(d);
-    hessian = weights.asDiagonal();
-    return;
-  }
+  const JointVector weights = w * state.weights.segment(joint.idx_v, n), d = difference.segment(joint.idx_v, n);
   JointMatrix J(n, n);
   calcJointDifferenceJacobian(joint, d, J);
   const JointMatrix WJ = weights.asDiagonal() * J;
-  gradient.noalias() = WJ.transpose() * d;
-  hessian.noalias() = J.transpose() * WJ;
+  gradient.noalias() = WJ.transpose().lazyProduct(d);
+  hessian.noalias() = J.transpose().lazyProduct(WJ);
 }
 
-void ReducedNode::addStateCost(const StateCost& state, double scale, StageModel& out) {
+void ReducedNode::addStateCost(const StateCost& state, const VectorXd& difference, double scale, StageModel& out) {
   const int nv = model_.nv(), nr = reduction_.size;
   const double w = scale * state.weight;
   JointVector gradient;
@@ -30,7 +24,7 @@ void ReducedNode::addStateCost(const StateCost& state, double scale, StageModel&
   for (const FreeJoint& free : free_joints_) {
     const Joint& joint = model_.joints()[free.joint];
     const int o = free.offset, n = joint.nv, k = joint.idx_v;
-    calcJointCost(state, w, joint, gradient, hessian);
+    calcJointCost(state, difference, w, joint, gradient, hessian);
     out.lx.segment(o, n) += gradient;
     out.lxx.block(o, o, n, n) += hessian;
     const JointVector weights = w * state.weights.segment(nv + k, n);
@@ -41,10 +35,16 @@ void ReducedNode::addStateCost(const StateCost& state, double scale, StageModel&
     // Changes of q are N dy, of v N dy_v + Z dy: gradients by dof, and Hessians times N and Z.
     const int o = b.loop.offset, r = b.loop.size;
     const MatrixXd& N = b.at.N;
+    for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
+      const double weight = w * state.weights[b.loop.dofs[k]];
+      b.work->gradient_q[k] = weight * difference[b.loop.dofs[k]];
+      b.work->HN.row(k) = weight * N.row(k);
+    }
     for (size_t j = 0; j < b.loop.joints.size(); ++j) {
       const Joint& joint = model_.joints()[b.loop.joints[j]];
+      if (!isCurved(joint)) continue;
       const int at = b.loop.model.joints()[j + 1].idx_v, n = joint.nv;
-      calcJointCost(state, w, joint, gradient, hessian);
+      calcJointCost(state, difference, w, joint, gradient, hessian);
       b.work->gradient_q.segment(at, n) = gradient;
       b.work->HN.middleRows(at, n) = hessian.lazyProduct(N.middleRows(at, n));
     }
@@ -66,32 +66,41 @@ void ReducedNode::addStateCost(const StateCost& state, double scale, StageModel&
   }
 }
 
+// Rt = (dr/d(dy, dy_v, u))^T, one column per residual: Rt diag(hessian) Rt^T is all second derivatives at once.
 void ReducedNode::addResiduals(const ResidualStack& stack, bool running, StageModel& out) {
-  const int nr = reduction_.size, rows = static_cast<int>(stack.r.size()), nu = model_.nu();
-  const ResidualJacobians& jacobians = work_->jacobians;
-  auto Rx = work_->Rx.topRows(rows), Ru = work_->Ru.topRows(rows);
-  auto scaled = work_->scaled.topRows(rows), Ru_scaled = work_->Ru_scaled.topRows(rows);
-  Rx.setZero();
-  addColumns(jacobians.q.topRows(rows), Lift::N, Rx.leftCols(nr));
-  addColumns(jacobians.v.topRows(rows), Lift::Z, Rx.leftCols(nr));
-  addColumns(jacobians.v.topRows(rows), Lift::N, Rx.rightCols(nr));
+  ReducedWork& work = *work_;
+  const int nr = reduction_.size, nu = running ? model_.nu() : 0, columns = 2 * nr + nu;
+  const int rows = static_cast<int>(stack.r.size()), motion_rows = stack.motion_rows;
+  PaddedMap Rt = shapePadded(work.Rt, columns, rows), scaled = shapePadded(work.Rt_scaled, columns, rows),
+            H = shapePadded(work.H, columns, columns);
+  Rt.setZero();
+  const auto q = work.jacobians.q.topRows(motion_rows), v = work.jacobians.v.topRows(motion_rows);
+  addColumns(q, Lift::N, Rt.block(0, 0, nr, motion_rows));
+  addColumns(v, Lift::Z, Rt.block(0, 0, nr, motion_rows));
+  addColumns(v, Lift::N, Rt.block(nr, 0, nr, motion_rows));
   if (running && contact_rows_ > 0) {
-    const auto by_forces = jacobians.lambda.block(0, loop_rows_, rows, contact_rows_);
-    const auto dlambda = work_->dlambda.topRows(contact_rows_);
-    Rx.noalias() += by_forces * dlambda.leftCols(2 * nr);
-    Ru.noalias() = by_forces * dlambda.rightCols(nu);
-  } else {
-    Ru.setZero();
+    PaddedMap by_forces = shapePadded(work.dlambda_t, columns, contact_rows_);
+    copyTransposed(work.dlambda.topRows(contact_rows_), by_forces);
+    const auto lambda = work.jacobians.lambda.block(0, loop_rows_, rows, contact_rows_);
+    for (int j = 0; j < contact_rows_; ++j)
+      for (int i = 0; i < rows; ++i)
+        if (lambda(i, j) != 0) Rt.col(i) += lambda(i, j) * by_forces.col(j);
   }
-  scaled = stack.hessian.asDiagonal() * Rx;
-  out.lx.noalias() += Rx.transpose() * stack.gradient;
-  out.lxx.triangularView<Eigen::Lower>() += Rx.transpose() * scaled;
-  out.lxx.triangularView<Eigen::StrictlyUpper>() = out.lxx.transpose();
+  clearPadding(Rt);
+  for (int i = 0; i < rows; ++i) scaled.col(i) = stack.hessian[i] * Rt.col(i);
+  clearPadding(scaled);
+  work.H.head(H.outerStride() * columns).setZero();
+  addLowerProduct(0, rows, 1, scaled, Rt, H);
+  for (int i = 0; i < rows; ++i) {
+    out.lx += stack.gradient[i] * Rt.col(i).head(2 * nr);
+    if (running) out.lu += stack.gradient[i] * Rt.col(i).tail(nu);
+  }
+  for (int c = 0; c < 2 * nr; ++c) out.lxx.col(c).tail(2 * nr - c) += H.col(c).segment(c, 2 * nr - c);
+  copyLowerToUpper(out.lxx);
   if (!running) return;
-  Ru_scaled = stack.hessian.asDiagonal() * Ru;
-  out.lu.noalias() += Ru.transpose() * stack.gradient;
-  out.luu.noalias() += Ru.transpose() * Ru_scaled;
-  out.lux.noalias() += Ru.transpose() * scaled;
+  out.lux += H.bottomLeftCorner(nu, 2 * nr);
+  out.luu.triangularView<Eigen::Lower>() += H.bottomRightCorner(nu, nu);
+  copyLowerToUpper(out.luu);
 }
 
 }  // namespace bielle

@@ -5,6 +5,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "bielle/math/lane_product.h"
 
 namespace bielle {
 
@@ -58,8 +59,10 @@ ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const R
   dlambda.setZero(sizes.rows, 2 * nr + nu);
   for (MatrixXd* m : {&jacobians.q, &jacobians.v}) m->setZero(sizes.residuals, nv);
   jacobians.lambda.setZero(sizes.residuals, sizes.constraints);
-  for (MatrixXd* m : {&Rx, &scaled}) m->setZero(sizes.residuals, 2 * nr);
-  for (MatrixXd* m : {&Ru, &Ru_scaled}) m->setZero(sizes.residuals, nu);
+  const Eigen::Index padded = roundUpToLane(2 * nr + nu);
+  for (VectorXd* x : {&Rt, &Rt_scaled}) x->setZero(padded * sizes.residuals);
+  H.setZero(padded * (2 * nr + nu));
+  dlambda_t.setZero(padded * sizes.rows);
 }
 
 ReducedWork& ReducedWorkPool::get() {
@@ -246,14 +249,18 @@ void ReducedNode::updateDriftAccelerations() {
 
 void ReducedNode::addColumns(ConstMatrixRef A, Lift lift, MatrixRef out) const {
   if (lift == Lift::N)
-    for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
-      const Joint& joint = model_.joints()[reduction_.free_joints[i]];
-      out.middleCols(reduction_.free_offsets[i], joint.nv) += A.middleCols(joint.idx_v, joint.nv);
+    for (const FreeJoint& free : free_joints_) {
+      const Joint& joint = model_.joints()[free.joint];
+      for (int k = 0; k < joint.nv; ++k) out.row(free.offset + k) += A.col(joint.idx_v + k).transpose();
     }
   for (const Block& b : blocks_) {
     const MatrixXd& X = lift == Lift::N ? b.at.N : b.work->motion.Z;
     for (int c = 0; c < b.loop.size; ++c)
-      for (size_t k = 0; k < b.loop.dofs.size(); ++k) out.col(b.loop.offset + c) += X(k, c) * A.col(b.loop.dofs[k]);
+      for (Eigen::Index i = 0; i < A.rows(); ++i) {
+        double sum = 0;
+        for (size_t k = 0; k < b.loop.dofs.size(); ++k) sum += X(k, c) * A(i, b.loop.dofs[k]);
+        out(b.loop.offset + c, i) += sum;
+      }
   }
 }
 

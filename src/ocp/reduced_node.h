@@ -80,7 +80,7 @@ struct ReducedWork {
   MatrixXd dydd;                        // size x (2 size + nu), derivatives of y' with respect to (dy, dy_v, u)
   MatrixXd dlambda;                     // largest contact rows x the same
   ResidualJacobians jacobians;
-  MatrixXd Rx, Ru, scaled, Ru_scaled;  // residuals, with room for those of any node
+  VectorXd Rt, Rt_scaled, dlambda_t, H;  // of addResiduals(), with room for any node
 };
 
 // One for each thread that asks.
@@ -136,7 +136,7 @@ class ReducedNode : public NodeModel {
   ResidualJacobians& jacobians() override { return work_->jacobians; }
   bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
   void linearizeState() override;
-  void addStateCost(const StateCost& cost, double scale, StageModel& out) override;
+  void addStateCost(const StateCost& cost, const VectorXd& difference, double scale, StageModel& out) override;
   void addResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
 
  private:
@@ -144,7 +144,7 @@ class ReducedNode : public NodeModel {
   bool updateState(ConstVectorRef x, const ReducedNode* previous);
   void updateWholePlacements();
 
-  // out += A X with A for the whole model (k x nv) and X = N (free dofs: the identity) or Z (free dofs: zero).
+  // out += (A X)^T with A for the whole model (k x nv) and X = N (free dofs: the identity) or Z (free dofs: zero).
   enum class Lift { N, Z };
   void addColumns(ConstMatrixRef A, Lift lift, MatrixRef out) const;
   // out = N^T x
@@ -155,8 +155,8 @@ class ReducedNode : public NodeModel {
     failure_ = point.describeFailure(b.loop, b.work->scratch);
     return false;
   }
-  void calcJointCost(const StateCost& state, double w, const Joint& joint, JointVector& gradient,
-                     JointMatrix& hessian) const;
+  static void calcJointCost(const StateCost& state, const VectorXd& difference, double w, const Joint& joint,
+                            JointVector& gradient, JointMatrix& hessian);
   void updateDriftAccelerations();
   void updateContacts();
   bool closeStep(ConstVectorRef x);

@@ -39,6 +39,7 @@ class ForceResidual : public Residual {
   ForceResidual(const ConstraintSet& set, int constraint)
       : row_(set.offsets[constraint]), rows_(getRows(set.closures[constraint].kind)) {}
   bool needsForces() const override { return true; }
+  bool needsMotion() const override { return false; }
 
  protected:
   ConstVectorRef getForce(const NodeView& node) const { return node.lambda.segment(row_, rows_); }

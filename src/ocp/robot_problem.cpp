@@ -29,6 +29,9 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index) {
         "give one weight per row of the residual");
 }
 
+// As allFinite(), but vectorized: a value that is not finite makes the sum one too.
+bool isFinite(const MatrixXd& A) { return (0 * A).sum() == 0; }
+
 }  // namespace
 
 const char* getName(Formulation formulation) { return formulation == Formulation::Full ? "full" : "reduced"; }
@@ -41,7 +44,8 @@ struct RobotProblem::Node {
   double cost = 0;
   std::unique_ptr<NodeModel> dynamics;
   ResidualStack stack;
-  VectorXd difference;
+  std::vector<int> rows;  // of each cost, its first in the stack
+  VectorXd difference;    // of q to the reference of the state cost
 };
 
 RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages,
@@ -61,6 +65,16 @@ RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorX
     Node& node = nodes_[k];
     node.dynamics = reduction_ ? makeReducedNode(model, *reduction_, spec, pool) : makeFullNode(model, spec);
     node.difference.setZero(model.nv());
+    node.rows.resize(spec.costs.size());
+    int row = 0;
+    for (bool motion : {true, false}) {
+      for (size_t c = 0; c < spec.costs.size(); ++c) {
+        if (spec.costs[c].residual->needsMotion() != motion) continue;
+        node.rows[c] = row;
+        row += spec.costs[c].residual->size();
+      }
+      if (motion) node.stack.motion_rows = row;
+    }
     for (VectorXd* v : {&node.stack.r, &node.stack.gradient, &node.stack.hessian}) v->setZero(countResidualRows(spec));
   }
   tangent_size_ = nodes_.front().dynamics->tangentSize();
@@ -142,12 +156,11 @@ double RobotProblem::sumCosts(int index, std::vector<CostValue>* values) {
   if (spec.control.weight != 0 && node.u.size())
     add("control", 0.5 * spec.control.weight * (node.u - spec.control.reference).cwiseAbs2().dot(spec.control.weights));
   const NodeView view{model_, node.dynamics->workspace(), spec.constraints, node.u, node.dynamics->lambda()};
-  int row = 0;
-  for (const Cost& cost : spec.costs) {
-    auto r = node.stack.r.segment(row, cost.residual->size());
+  for (size_t c = 0; c < spec.costs.size(); ++c) {
+    const Cost& cost = spec.costs[c];
+    auto r = node.stack.r.segment(node.rows[c], cost.residual->size());
     cost.residual->calc(view, r);
     add(cost.name, cost.weight * cost.activation.calc(r));
-    row += cost.residual->size();
   }
   node.cost = sum;
   node.has_cost = true;
@@ -174,7 +187,7 @@ StepStatus RobotProblem::linearize(int stage, ConstVectorRef x, ConstVectorRef u
     out.luu.diagonal() += w * control.weights;
   }
   addCosts(stage, h, out);
-  return out.Fx.allFinite() && out.lxx.allFinite() ? StepStatus::Ok : StepStatus::Failed;
+  return isFinite(out.Fx) && isFinite(out.lxx) ? StepStatus::Ok : StepStatus::Failed;
 }
 
 StepStatus RobotProblem::linearizeTerminal(ConstVectorRef x, StageModel& out) {
@@ -186,30 +199,31 @@ StepStatus RobotProblem::linearizeTerminal(ConstVectorRef x, StageModel& out) {
   out.lx.setZero();
   out.lxx.setZero();
   addCosts(numStages(), 1, out);
-  return out.lxx.allFinite() ? StepStatus::Ok : StepStatus::Failed;
+  return isFinite(out.lxx) ? StepStatus::Ok : StepStatus::Failed;
 }
 
 // Gradient and Hessian of the state cost and of the residual costs, the residuals being those of the last sumCosts().
 void RobotProblem::addCosts(int index, double scale, StageModel& out) {
   Node& node = nodes_[index];
   const StageSpec& spec = specs_[index];
-  if (spec.state.weight != 0) node.dynamics->addStateCost(spec.state, scale, out);
+  if (spec.state.weight != 0) node.dynamics->addStateCost(spec.state, node.difference, scale, out);
   if (spec.costs.empty()) return;
   const NodeView view{model_, node.dynamics->workspace(), spec.constraints, node.u, node.dynamics->lambda()};
   ResidualStack& stack = node.stack;
-  int row = 0;
-  for (const Cost& cost : spec.costs) {
-    const int n = cost.residual->size();
+  for (size_t c = 0; c < spec.costs.size(); ++c) {
+    const Cost& cost = spec.costs[c];
+    const int n = cost.residual->size(), row = node.rows[c];
     ResidualRows rows = node.dynamics->jacobians().getRows(row, n, spec.constraints.rows);
-    rows.q.setZero();
-    rows.v.setZero();
+    if (row < stack.motion_rows) {
+      rows.q.setZero();
+      rows.v.setZero();
+    }
     rows.lambda.setZero();
     cost.residual->calcJacobian(view, rows);
     cost.activation.calcDerivatives(stack.r.segment(row, n), stack.gradient.segment(row, n),
                                     stack.hessian.segment(row, n));
     stack.gradient.segment(row, n) *= scale * cost.weight;
     stack.hessian.segment(row, n) *= scale * cost.weight;
-    row += n;
   }
   node.dynamics->addResiduals(stack, index < numStages(), out);
 }

@@ -2,67 +2,13 @@
 
 #include <cmath>
 
-#include "small_product.h"
+#include "bielle/math/lane_product.h"
 
 namespace bielle {
 
 namespace {
 
 using Eigen::Index;
-using PaddedMap = Eigen::Map<MatrixXd, 0, Eigen::OuterStride<>>;
-
-// The beginning of a buffer as a matrix whose rows are padded.
-PaddedMap shape(VectorXd& buffer, Index rows, Index cols) {
-  return PaddedMap(buffer.data(), rows, cols, Eigen::OuterStride<>(roundUpToLane(rows)));
-}
-
-PaddedMatrix pad(PaddedMap A, Index row = 0, Index col = 0) {
-  return {A.data() + row + col * A.outerStride(), A.outerStride()};
-}
-
-// Padding rows take part in products: they must hold numbers.
-void clearPadding(PaddedMap A) {
-  for (Index j = 0; j < A.cols(); ++j) {
-    for (Index i = A.rows(); i < A.outerStride(); ++i) A.data()[i + j * A.outerStride()] = 0;
-  }
-}
-
-// By blocks: a strided copy of whole rows would cost a tenth of the sweep.
-template <class A, class B>
-void copyTransposed(const A& from, B&& to) {
-  constexpr Index kBlock = 8;
-  for (Index c = 0; c < from.cols(); c += kBlock) {
-    for (Index r = 0; r < from.rows(); r += kBlock) {
-      const Index width = std::min(kBlock, from.cols() - c), height = std::min(kBlock, from.rows() - r);
-      if (width == kBlock && height == kBlock) {
-        to.template block<kBlock, kBlock>(c, r) = from.template block<kBlock, kBlock>(r, c).transpose();
-      } else {
-        to.block(c, r, width, height) = from.block(r, c, height, width).transpose();
-      }
-    }
-  }
-}
-
-void copyLowerToUpper(MatrixXd& A) {
-  constexpr Index kBlock = 8;
-  for (Index c = 0; c < A.cols(); c += kBlock) {
-    const Index width = std::min(kBlock, A.cols() - c), below = A.cols() - c - width;
-    copyTransposed(A.block(c + width, c, below, width), A.block(c, c + width, width, below));
-    for (Index j = c; j < c + width; ++j) {
-      for (Index i = j + 1; i < c + width; ++i) A(j, i) = A(i, j);
-    }
-  }
-}
-
-// H(i, j) += sign sum_k A(i, k) B(j, k) for i >= j >= begin, k < depth. Full lanes: entries above the diagonal change.
-void addLowerProduct(Index begin, Index depth, double sign, PaddedMap A, PaddedMap B, PaddedMap H) {
-  for (Index j = begin, end; j < H.cols(); j = end) {
-    end = std::min((j / kLane + 1) * kLane, H.cols());
-    const Index i = j / kLane * kLane;
-    addProduct(H.rows() - i, end - j, depth, sign, pad(A, i), {B.data() + j, B.outerStride(), 1}, pad(H, i, j));
-  }
-}
-
 // Cholesky elimination of the first `num` unknowns: their columns of H become L over Y^T, the rest of H stays.
 bool factorizeColumns(PaddedMap H, Index num) {
   for (Index j = 0; j < num; ++j) {
@@ -137,7 +83,8 @@ void LqSweep::updateQuadratic(const StageModel& model, const Node& next, Node& n
   node.Qu = model.lu;
   node.Qu.noalias() += model.Fu.transpose() * p;
 
-  auto Ft = shape(Ft_, nu + n, n_next), Ft_Vxx = shape(Ft_Vxx_, nu + n, n_next), H = shape(H_, nu + n, nu + n);
+  auto Ft = shapePadded(Ft_, nu + n, n_next), Ft_Vxx = shapePadded(Ft_Vxx_, nu + n, n_next),
+       H = shapePadded(H_, nu + n, nu + n);
   copyTransposed(model.Fu, Ft.topRows(nu));
   copyTransposed(model.Fx, Ft.bottomRows(n));
   clearPadding(Ft);
@@ -156,7 +103,7 @@ void LqSweep::updateQuadratic(const StageModel& model, const Node& next, Node& n
 // Eqs. (5) to (7).
 LqStatus LqSweep::eliminateControls(Node& node) {
   const Index n = node.Vx.size(), nu = node.Qu.size();
-  auto H = shape(H_, nu + n, nu + n);
+  auto H = shapePadded(H_, nu + n, nu + n);
   if (!hasFiniteLower(H, nu) || !node.Qu.allFinite()) return LqStatus::NotFinite;
   if (!factorizeColumns(H, nu)) return LqStatus::Indefinite;
   const auto L = H.topLeftCorner(nu, nu).triangularView<Eigen::Lower>();
@@ -166,14 +113,14 @@ LqStatus LqSweep::eliminateControls(Node& node) {
   L.transpose().solveInPlace(node.k);
   result_.expected_change += 0.5 * node.Qu.dot(node.k);
   updateGains(static_cast<int>(nu), node);
-  node.K = shape(Kt_, n, nu).transpose();
+  node.K = shapePadded(Kt_, n, nu).transpose();
   return LqStatus::Ok;
 }
 
 // Eqs. (5) to (7) with the box.
 LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, Node& node) {
   const Index n = node.Vx.size(), nu = node.Qu.size();
-  auto H = shape(H_, nu + n, nu + n);
+  auto H = shapePadded(H_, nu + n, nu + n);
   const auto Quu = H.topLeftCorner(nu, nu);
   node.k.setZero();
   switch (box_qp_.solve(Quu, node.Qu, box.lower, box.upper, node.k)) {
@@ -200,14 +147,14 @@ LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, Node& node) {
   if (!factorizeColumns(H, num_free)) return LqStatus::Indefinite;
   updateGains(num_free, node);
   node.K.setZero();
-  for (int i = 0; i < num_free; ++i) node.K.row(box_qp_.getFreeIndex(i)) = shape(Kt_, n, nu).col(i).transpose();
+  for (int i = 0; i < num_free; ++i) node.K.row(box_qp_.getFreeIndex(i)) = shapePadded(Kt_, n, nu).col(i).transpose();
   return LqStatus::Ok;
 }
 
 // Vxx of Eq. (6), and K^T of Eq. (5) of the free controls, from L and Y^T in the first columns of H.
 void LqSweep::updateGains(int num_free, Node& node) {
   const Index n = node.Vx.size(), nu = node.Qu.size();
-  auto H = shape(H_, nu + n, nu + n), Kt = shape(Kt_, n, nu);
+  auto H = shapePadded(H_, nu + n, nu + n), Kt = shapePadded(Kt_, n, nu);
   addLowerProduct(nu, num_free, -1, H, H, H);
   node.Vxx = H.bottomRightCorner(n, n);
   copyLowerToUpper(node.Vxx);

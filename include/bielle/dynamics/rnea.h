@@ -20,6 +20,9 @@
 ///     dtau_j/dq_k = J_j . (Yc_j dA_k + Bc_j dV_k)                 J_j moves with k (k before j, or in the same joint)
 ///     (7) dtau_j/dq_k = J_j . (Yc_k dA_k + Bc_k dV_k + J_k x* F_k)    k after j (8) dtau_j/dv_k = J_j . (Yc_m (dJ_k +
 ///     dV_k) + Bc_m J_k)         m the later of j and k                               (9) M_jk = J_j . Yc_m J_k (10)
+/// With Y = (m 1, -m c^; m c^, I) and the momentum (p, l) = Y V about the world origin, hats for cross products, most of B
+/// cancels:
+///     B = (0, -2 p^; 0, B_a),    B_a = w^ I - I w^ - m (c v^T + v c^T) + 2 m (c.v) 1 - l^                         (11)
 /// External forces f_ext are given as fixed in their body's coordinates; what depends otherwise on q is added by the
 /// caller.
 #include "bielle/dynamics/workspace.h"

@@ -45,7 +45,7 @@ struct Workspace {
 
   // Writer: updateInverseDynamicsDerivatives
   std::vector<Vector6d> F;    ///< nb, force through each joint (subtree sums)
-  std::vector<Matrix6d> Bc;   ///< nb, subtree sums of B (see rnea.h)
+  std::vector<Matrix3d> Bc;   ///< nb, subtree sums of the angular blocks of B (see rnea.h)
   Matrix6Xd YJ, BtJ, Gq, Gv;  ///< 6 x nv, per dof factors of the derivatives
   MatrixXd dID_dq, dID_dv;    ///< nv x nv
 };

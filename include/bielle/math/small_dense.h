@@ -1,6 +1,7 @@
 #pragma once
 /// \file Products and triangular solves of matrices of a few rows, where a general routine spends more on its own
 /// administration than on arithmetic. Column-major; inner loops run down columns, so that the compiler vectorizes them.
+#include <type_traits>
 #include <vector>
 
 #include "bielle/math/types.h"
@@ -32,42 +33,62 @@ inline void addSmallProduct(const A_& A, const B_& B, C_&& out, double s = 1) {
   }
 }
 
+/// Entries (r .. r + Rows, c .. c + Cols) of out += s A^T B: sums that do not wait for each other.
+template <int Rows, int Cols, typename A_, typename B_, typename C_>
+inline void addSmallDots(const A_& A, const B_& B, Eigen::Index r, Eigen::Index c, double s, C_& out) {
+  double sums[Cols][Rows] = {};
+  const double *a = A.data() + r * A.outerStride(), *b = B.data() + c * B.outerStride();
+  for (Eigen::Index k = 0; k < A.rows(); ++k)
+    for (int j = 0; j < Cols; ++j)
+      for (int i = 0; i < Rows; ++i) sums[j][i] += a[i * A.outerStride() + k] * b[j * B.outerStride() + k];
+  for (int j = 0; j < Cols; ++j)
+    for (int i = 0; i < Rows; ++i) out.coeffRef(r + i, c + j) += s * sums[j][i];
+}
+
 /// out += s A^T B, with A (k x n), B (k x m), out (n x m); no aliasing.
 template <typename A_, typename B_, typename C_>
 inline void addSmallProductTransposed(const A_& A, const B_& B, C_&& out, double s = 1) {
-  const Eigen::Index n = A.cols(), inner = A.rows(), m = B.cols();
-  for (Eigen::Index c = 0; c < m; ++c) {
-    const double* __restrict b = B.data() + c * B.outerStride();
-    for (Eigen::Index r = 0; r < n; ++r) {
-      const double* __restrict a = A.data() + r * A.outerStride();
-      double sum = 0;
-      for (Eigen::Index k = 0; k < inner; ++k) sum += a[k] * b[k];
-      out.coeffRef(r, c) += s * sum;
-    }
+  const Eigen::Index n = A.cols(), m = B.cols();
+  Eigen::Index c = 0;
+  const auto addColumns = [&](auto cols) {
+    Eigen::Index r = 0;
+    for (; r + 4 <= n; r += 4) addSmallDots<4, cols>(A, B, r, c, s, out);
+    for (; r + 2 <= n; r += 2) addSmallDots<2, cols>(A, B, r, c, s, out);
+    if (r < n) addSmallDots<1, cols>(A, B, r, c, s, out);
+    c += cols;
+  };
+  while (c + 2 <= m) addColumns(std::integral_constant<int, 2>());
+  if (c < m) addColumns(std::integral_constant<int, 1>());
+}
+
+/// Solves L L^T x = b in place for n known to the compiler, or given.
+template <typename Size>
+inline void solveSmallCholeskyColumn(Size n, const double* __restrict l, Eigen::Index stride, double* __restrict x) {
+  for (int k = 0; k < n; ++k) {
+    const double f = x[k] *= 1 / l[k * stride + k];
+    for (int r = k + 1; r < n; ++r) x[r] -= f * l[k * stride + r];
+  }
+  for (int k = n - 1; k >= 0; --k) {
+    double sum = x[k];
+    for (int r = k + 1; r < n; ++r) sum -= l[k * stride + r] * x[r];
+    x[k] = sum * (1 / l[k * stride + k]);
   }
 }
 
 /// Solves L L^T X = B in place, L the lower triangle of `factor` (n x n), X (n x m).
 template <typename L_, typename X_>
 inline void solveSmallCholesky(const L_& factor, X_&& X) {
-  const Eigen::Index n = factor.rows(), m = X.cols(), stride = X.outerStride();
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const double* __restrict l = factor.data() + k * factor.outerStride();
-    const double inverse = 1 / l[k];
-    double* __restrict x = X.data();
-    for (Eigen::Index c = 0; c < m; ++c, x += stride) {
-      const double f = x[k] *= inverse;
-      for (Eigen::Index r = k + 1; r < n; ++r) x[r] -= f * l[r];
-    }
-  }
-  for (Eigen::Index k = n - 1; k >= 0; --k) {
-    const double* __restrict l = factor.data() + k * factor.outerStride();
-    const double inverse = 1 / l[k];
-    double* __restrict x = X.data();
-    for (Eigen::Index c = 0; c < m; ++c, x += stride) {
-      double sum = x[k];
-      for (Eigen::Index r = k + 1; r < n; ++r) sum -= l[r] * x[r];
-      x[k] = sum * inverse;
+  for (Eigen::Index c = 0; c < X.cols(); ++c) {
+    double* x = X.data() + c * X.outerStride();
+    switch (factor.rows()) {  // one loop or two with all their rows
+      case 6:
+        solveSmallCholeskyColumn(std::integral_constant<int, 6>(), factor.data(), factor.outerStride(), x);
+        break;
+      case 12:
+        solveSmallCholeskyColumn(std::integral_constant<int, 12>(), factor.data(), factor.outerStride(), x);
+        break;
+      default:
+        solveSmallCholeskyColumn(static_cast<int>(factor.rows()), factor.data(), factor.outerStride(), x);
     }
   }
 }

@@ -3,7 +3,7 @@
 ///
 /// Right Jacobians (Sola, Deray, Atchuthan, "A micro Lie theory", eqs. 143-144):
 ///     Exp(w + dw) = Exp(w) Exp(Jr(w) dw),    Log(R Exp(dw)) = Log(R) + Jr^{-1}(Log R) dw.
-/// With t = |w|, every function is even in t and is evaluated by its series where t^2 < 1e-6: the truncated terms are
+/// With t = |w|, every function is even in t and is evaluated by its series where t^2 < 1e-2: the truncated terms are
 /// below rounding there.
 #include <Eigen/Geometry>
 
@@ -32,6 +32,8 @@ Vector3d log3(const Matrix3d& R);
 /// Right Jacobian of exp3 at w, 3x3.
 Matrix3d calcRightJacobian3(const Vector3d& w);
 
+/// (1 / t^2) (1 - (t/2) cot(t/2)), from t^2.
+double calcJacobianInverseFactor(double t2);
 /// Inverse of the right Jacobian at w: the Jacobian of log3 at exp3(w), 3x3. Singular at |w| = 2 pi.
 Matrix3d calcRightJacobianInverse3(const Vector3d& w);
 

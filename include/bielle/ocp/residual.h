@@ -32,6 +32,8 @@ class Residual {
   virtual ~Residual() = default;
   virtual int size() const = 0;
   virtual bool needsForces() const { return false; }
+  /// False when it depends neither on q nor on v.
+  virtual bool needsMotion() const { return true; }
   virtual void calc(const NodeView& node, VectorRef r) const = 0;
   /// Writes all entries that may be non-zero at some state.
   virtual void calcJacobian(const NodeView& node, ResidualRows rows) const = 0;

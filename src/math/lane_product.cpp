@@ -1,6 +1,4 @@
-#include "small_product.h"
-
-#include <algorithm>
+#include "bielle/math/lane_product.h"
 
 namespace bielle {
 
@@ -64,6 +62,31 @@ void addLanes(Eigen::Index lanes, Eigen::Index cols, Eigen::Index depth, double 
 void addProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B,
                 PaddedMatrix C) {
   addLanes<kMaxLanes>(roundUpToLane(rows) / kLane, cols, depth, sign, A, B, C);
+}
+
+void clearPadding(PaddedMap A) {
+  for (Eigen::Index j = 0; j < A.cols(); ++j) {
+    for (Eigen::Index i = A.rows(); i < A.outerStride(); ++i) A.data()[i + j * A.outerStride()] = 0;
+  }
+}
+
+void copyLowerToUpper(MatrixXd& A) {
+  constexpr Eigen::Index kBlock = 8;
+  for (Eigen::Index c = 0; c < A.cols(); c += kBlock) {
+    const Eigen::Index width = std::min(kBlock, A.cols() - c), below = A.cols() - c - width;
+    copyTransposed(A.block(c + width, c, below, width), A.block(c, c + width, width, below));
+    for (Eigen::Index j = c; j < c + width; ++j) {
+      for (Eigen::Index i = j + 1; i < c + width; ++i) A(j, i) = A(i, j);
+    }
+  }
+}
+
+void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, PaddedMap A, PaddedMap B, PaddedMap H) {
+  for (Eigen::Index j = begin, end; j < H.cols(); j = end) {
+    end = std::min((j / kLane + 1) * kLane, H.cols());
+    const Eigen::Index i = j / kLane * kLane;
+    addProduct(H.rows() - i, end - j, depth, sign, pad(A, i), {B.data() + j, B.outerStride(), 1}, pad(H, i, j));
+  }
 }
 
 }  // namespace bielle

@@ -1,0 +1,65 @@
+#pragma once
+/// \file Products of matrices of a few ten rows and columns, where a general product spends as much on packing its
+/// operands as on multiplying them.
+#include <algorithm>
+
+#include "bielle/math/types.h"
+
+namespace bielle {
+
+/// Rows that one vector register holds. Rows are worked on in full lanes.
+constexpr Eigen::Index kLane = 8;
+inline Eigen::Index roundUpToLane(Eigen::Index rows) { return (rows + kLane - 1) / kLane * kLane; }
+
+/// Column-major matrix: entry (i, j) at data[i + j * stride]. Its rows can be read and written up to the next multiple
+/// of kLane.
+struct PaddedMatrix {
+  double* data;
+  Eigen::Index stride;
+};
+
+/// Any strided matrix: entry (k, j) at data[k * row_stride + j * col_stride].
+struct StridedMatrix {
+  const double* data;
+  Eigen::Index row_stride, col_stride;
+};
+
+/// C += sign A B, C (rows x cols), A (rows x depth), B (depth x cols). What lies below `rows` in the last lane of C is
+/// overwritten by something.
+void addProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B,
+                PaddedMatrix C);
+
+/// The beginning of a buffer as a matrix whose rows are padded to full lanes.
+using PaddedMap = Eigen::Map<MatrixXd, 0, Eigen::OuterStride<>>;
+inline PaddedMap shapePadded(VectorXd& buffer, Eigen::Index rows, Eigen::Index cols) {
+  return PaddedMap(buffer.data(), rows, cols, Eigen::OuterStride<>(roundUpToLane(rows)));
+}
+inline PaddedMatrix pad(PaddedMap A, Eigen::Index row = 0, Eigen::Index col = 0) {
+  return {A.data() + row + col * A.outerStride(), A.outerStride()};
+}
+/// Padding rows take part in products: they must hold numbers.
+void clearPadding(PaddedMap A);
+
+/// H(i, j) += sign sum_k A(i, k) B(j, k) for i >= j >= begin, k < depth. Full lanes: entries above the diagonal change.
+void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, PaddedMap A, PaddedMap B, PaddedMap H);
+
+/// to = from^T, by blocks: a strided copy of whole rows costs much more.
+template <class A, class B>
+void copyTransposed(const A& from, B&& to) {
+  constexpr Eigen::Index kBlock = 8;
+  for (Eigen::Index c = 0; c < from.cols(); c += kBlock) {
+    for (Eigen::Index r = 0; r < from.rows(); r += kBlock) {
+      const Eigen::Index width = std::min(kBlock, from.cols() - c), height = std::min(kBlock, from.rows() - r);
+      if (width == kBlock && height == kBlock) {
+        to.template block<kBlock, kBlock>(c, r) = from.template block<kBlock, kBlock>(r, c).transpose();
+      } else {
+        to.block(c, r, width, height) = from.block(r, c, height, width).transpose();
+      }
+    }
+  }
+}
+
+/// The upper triangle of a square matrix becomes the mirror of the lower one.
+void copyLowerToUpper(MatrixXd& A);
+
+}  // namespace bielle
