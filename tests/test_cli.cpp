@@ -307,6 +307,16 @@ TEST_CASE("validate hands its arguments to the program beside, or says what is m
   CHECK(result.out == "<bipetto --samples 3 --help>\n");
 }
 
+TEST_CASE("bench measures, and tells what meanwhile") {
+  const CommandResult result = run({"bench", "--quick", "--json"});
+  CHECK(result.status == 0);
+  CHECK_THAT(result.err, Catch::Contains("measuring benchmark walk"));
+  const json report = json::parse(result.out);
+  CHECK(report["robot"] == "bipetto");
+  CHECK(report["unit [us]"].get<double>() > 0);
+  CHECK(report["walk, FDDP iteration per node"].size() == 4);
+}
+
 TEST_CASE("solve writes a converged squat and says so") {
   const OutputDirectory directory;
   const CommandResult result = run(makeShortSquat(directory.str()));

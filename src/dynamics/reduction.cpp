@@ -332,7 +332,7 @@ bool BlockPoint::close(const LoopBlock& block, BlockScratch& scratch, const Bloc
   step_ = d;
   if (zeta_guess.size()) {
     zeta_ = zeta_guess;
-    step_.noalias() -= scratch.JW.transpose() * zeta_;
+    addSmallProductTransposed(scratch.JW, zeta_, step_, -1);
   } else {
     zeta_.setZero();
   }
@@ -359,7 +359,7 @@ bool BlockPoint::close(const LoopBlock& block, BlockScratch& scratch, const Bloc
     // The residual falls by J dq (notation.h), and dq = -W^{-1} J(q_0)^T dzeta.
     solveFactorized(scratch.newton, scratch.pivots, scratch.correction);
     zeta_ -= scratch.correction;
-    step_.noalias() += scratch.JW.transpose() * scratch.correction;
+    addSmallProductTransposed(scratch.JW, scratch.correction, step_);
   }
   closed_ = true;
   return updateBases(block, scratch);

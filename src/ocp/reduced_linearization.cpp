@@ -12,7 +12,7 @@ template <typename Size>
 void assembleRows(Size size, const double* __restrict q_a, const double* __restrict v_a, int offset,
                   ConstMatrixRef dydd, MatrixXd& F) {
   for (Eigen::Index c = 0; c < F.cols(); ++c) {
-    const double* ydd = dydd.data() + c * dydd.outerStride() + offset;
+    const double* __restrict ydd = dydd.data() + c * dydd.outerStride() + offset;
     double* __restrict q = &F(offset, c), * __restrict v = q + F.rows() / 2;
     for (int i = 0; i < size; ++i) q[i] = v[i] = 0;
     for (int k = 0; k < size; ++k) {
@@ -25,8 +25,19 @@ void assembleRows(Size size, const double* __restrict q_a, const double* __restr
   }
 }
 
-template <typename Matrix>
-void assembleUnit(const Matrix& q_a, const Matrix& v_a, int offset, ConstMatrixRef dydd, MatrixXd& F) {
+// The same where v_a is h times the identity, and q_a h^2 times it but for joints whose configuration is no vector.
+void assembleFreeJoint(const FreeJoint& free, double h, bool curved, ConstMatrixRef dydd, MatrixXd& F) {
+  const int o = free.offset, n = static_cast<int>(free.q_a.rows()), half = static_cast<int>(F.rows() / 2);
+  F.middleRows(half + o, n) = h * dydd.middleRows(o, n);
+  if (!curved) {
+    F.middleRows(o, n) = (h * h) * dydd.middleRows(o, n);
+    return;
+  }
+  F.middleRows(o, n).setZero();
+  addSmallProduct(free.q_a, dydd.middleRows(o, n), F.middleRows(o, n));
+}
+
+void assembleBlock(const MatrixXd& q_a, const MatrixXd& v_a, int offset, ConstMatrixRef dydd, MatrixXd& F) {
   const auto assemble = [&](auto size) { assembleRows(size, q_a.data(), v_a.data(), offset, dydd, F); };
   switch (q_a.rows()) {
     case 1:
@@ -35,8 +46,6 @@ void assembleUnit(const Matrix& q_a, const Matrix& v_a, int offset, ConstMatrixR
       return assemble(std::integral_constant<int, 2>());
     case 3:
       return assemble(std::integral_constant<int, 3>());
-    case 6:
-      return assemble(std::integral_constant<int, 6>());
     default:
       return assemble(static_cast<int>(q_a.rows()));
   }
@@ -63,7 +72,8 @@ void ReducedNode::updateForces() {
           work.ws.J.col(dof).dot(work.ws.F[model_.dofs()[dof].joint]) + model_.armature()[dof] * a_[dof] - tau_[dof];
       b.work->d[k] = b.loop.inverse_metric[k] * left;
     }
-    b.work->independent.noalias() = b.at.J * b.work->d;
+    b.work->independent.setZero();
+    addSmallProduct(b.at.J, b.work->d, b.work->independent);
     solveGram(b.at, b.work->independent);
     expandIndependent(b.at, b.work->independent, b.work->rows);
     calcForceLift(getPlacedView(b.loop, work.ws), b.work->motion, b.work->rows, b.work->HN);
@@ -159,7 +169,10 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
   b.next.load(loop, work.scratch);
   const BlockView ahead = getOwnView(loop, work.scratch.ws);
   updateTwists(ahead, next, work.ahead);
-  expandIndependent(next, b.mu, work.rows);
+  work.independent.setZero();  // mu
+  addSmallProduct(next.J, b.next.step(), work.independent, 1 / h);
+  solveGram(next, work.independent);
+  expandIndependent(next, work.independent, work.rows);
   calcForceLift(ahead, work.ahead, work.rows, work.HnNn);
 
   // J_q N, J_d^{-T} W N and J_d^{-T} W N': the identity but for the blocks of curved joints.
@@ -266,7 +279,6 @@ void ReducedNode::linearizeFreeJoint(FreeJoint& free, const StageModel& out) con
     free.q_v.noalias() = h * Jdiff * Jd;
   }
   free.q_a = h * free.q_v;
-  free.v_a = h * JointMatrix::Identity(n, n);
 }
 
 // Fx and Fu out of the derivatives of y' and what each unit makes of them.
@@ -274,12 +286,13 @@ void ReducedNode::assembleStep(StageModel& out) const {
   const int nr = reduction_.size;
   const auto state = work_->dydd.leftCols(2 * nr), control = work_->dydd.rightCols(model_.nu());
   for (const FreeJoint& free : free_joints_) {
-    assembleUnit(free.q_a, free.v_a, free.offset, state, out.Fx);
-    assembleUnit(free.q_a, free.v_a, free.offset, control, out.Fu);
+    const bool curved = isCurved(model_.joints()[free.joint]);
+    assembleFreeJoint(free, spec_.dt, curved, state, out.Fx);
+    assembleFreeJoint(free, spec_.dt, curved, control, out.Fu);
   }
   for (const Block& b : blocks_) {
-    assembleUnit(b.work->q_a, b.work->v_a, b.loop.offset, state, out.Fx);
-    assembleUnit(b.work->q_a, b.work->v_a, b.loop.offset, control, out.Fu);
+    assembleBlock(b.work->q_a, b.work->v_a, b.loop.offset, state, out.Fx);
+    assembleBlock(b.work->q_a, b.work->v_a, b.loop.offset, control, out.Fu);
   }
   for (const FreeJoint& free : free_joints_) {
     const int n = static_cast<int>(free.q_v.rows()), o = free.offset;

@@ -324,12 +324,11 @@ bool ReducedNode::closeStep(ConstVectorRef x) {
     work.zeta = (0.5 * h * h) * work.independent;
     if (!b.next.close(b.loop, work.scratch, b.at, work.d, work.zeta)) return fail(b, b.next);
     const BlockBasis& next = b.next.basis();
-    work.w = b.next.step() / h;
-    b.mu.noalias() = next.J * work.w;
-    work.independent = b.mu;
-    applyPseudoInverse(b.loop, next, -1, work.independent, b.v_next);
-    b.mu = work.independent;
-    b.v_next += work.w;
+    // (I - J'^+ J') w' = N' (W N')^T w'
+    work.target.setZero();
+    addSmallProductTransposed(next.WN, b.next.step(), work.target, 1 / h);
+    b.v_next.setZero();
+    addSmallProduct(next.N, work.target, b.v_next);
     scatterConfiguration(model_, b.loop, next.q, x_next_.head(nq));
     scatterVelocity(b.loop, b.v_next, x_next_.tail(nv));
   }

@@ -101,22 +101,19 @@ class ReducedWorkPool {
 
 // A block of loops at one node: what lasts from call to call.
 struct ReducedBlock {
-  explicit ReducedBlock(const LoopBlock& l) : loop(l), at(l), next(l), chart(at.WN) {
-    v_next.setZero(l.model.nv());
-    mu.setZero(l.rank);
-  }
+  explicit ReducedBlock(const LoopBlock& l) : loop(l), at(l), next(l), chart(at.WN) { v_next.setZero(l.model.nv()); }
   const LoopBlock& loop;
   BlockBasis at;    // at the state
   BlockPoint next;  // at q+
   MatrixXd chart;   // W N at the last linearized state
-  VectorXd v_next, mu;
+  VectorXd v_next;
   BlockWork* work = nullptr;  // within a call
 };
 
-// A joint outside all loops at one node: what dq+ makes of dy and of dv+, dq+ and dv+ of dy'.
+// A joint outside all loops at one node: what dq+ makes of dy, of dv+ and of dy'; dv+ is h dy'.
 struct FreeJoint {
   int joint = 0, offset = 0;
-  JointMatrix q_y, q_v, q_a, v_a;  // nv x nv of the joint
+  JointMatrix q_y, q_v, q_a;  // nv x nv of the joint
 };
 
 class ReducedNode : public NodeModel {

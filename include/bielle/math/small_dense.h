@@ -61,34 +61,53 @@ inline void addSmallProductTransposed(const A_& A, const B_& B, C_&& out, double
   if (c < m) addColumns(std::integral_constant<int, 1>());
 }
 
-/// Solves L L^T x = b in place for n known to the compiler, or given.
-template <typename Size>
-inline void solveSmallCholeskyColumn(Size n, const double* __restrict l, Eigen::Index stride, double* __restrict x) {
-  for (int k = 0; k < n; ++k) {
-    const double f = x[k] *= 1 / l[k * stride + k];
-    for (int r = k + 1; r < n; ++r) x[r] -= f * l[k * stride + r];
+/// Solves L L^T x = b in place for N known to the compiler: without loops, so that columns overlap.
+template <int N>
+inline void solveSmallCholeskyColumn(const double* __restrict l, Eigen::Index stride, double* __restrict out) {
+  double x[N];
+#pragma GCC unroll 12
+  for (int k = 0; k < N; ++k) x[k] = out[k];
+#pragma GCC unroll 12
+  for (int k = 0; k < N; ++k) {
+    x[k] *= 1 / l[k * stride + k];
+#pragma GCC unroll 12
+    for (int r = k + 1; r < N; ++r) x[r] -= x[k] * l[k * stride + r];
   }
-  for (int k = n - 1; k >= 0; --k) {
-    double sum = x[k];
-    for (int r = k + 1; r < n; ++r) sum -= l[k * stride + r] * x[r];
-    x[k] = sum * (1 / l[k * stride + k]);
+#pragma GCC unroll 12
+  for (int k = N - 1; k >= 0; --k) {
+    double sum = 0, other = 0;
+#pragma GCC unroll 12
+    for (int r = N - 1; r > k; --r) ((r - k) % 2 ? sum : other) += l[k * stride + r] * x[r];
+    x[k] = (x[k] - (other + sum)) * (1 / l[k * stride + k]);
   }
+#pragma GCC unroll 12
+  for (int k = 0; k < N; ++k) out[k] = x[k];
 }
 
 /// Solves L L^T X = B in place, L the lower triangle of `factor` (n x n), X (n x m).
 template <typename L_, typename X_>
 inline void solveSmallCholesky(const L_& factor, X_&& X) {
+  const Eigen::Index n = factor.rows(), stride = factor.outerStride();
+  const double* l = factor.data();
   for (Eigen::Index c = 0; c < X.cols(); ++c) {
-    double* x = X.data() + c * X.outerStride();
-    switch (factor.rows()) {  // one loop or two with all their rows
-      case 6:
-        solveSmallCholeskyColumn(std::integral_constant<int, 6>(), factor.data(), factor.outerStride(), x);
-        break;
-      case 12:
-        solveSmallCholeskyColumn(std::integral_constant<int, 12>(), factor.data(), factor.outerStride(), x);
-        break;
-      default:
-        solveSmallCholeskyColumn(static_cast<int>(factor.rows()), factor.data(), factor.outerStride(), x);
+    double* __restrict x = X.data() + c * X.outerStride();
+    // One loop of a Weld6D closure or two: nearly all blocks there are.
+    if (n == 6) {
+      solveSmallCholeskyColumn<6>(l, stride, x);
+      continue;
+    }
+    if (n == 12) {
+      solveSmallCholeskyColumn<12>(l, stride, x);
+      continue;
+    }
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double f = x[k] *= 1 / l[k * stride + k];
+      for (Eigen::Index r = k + 1; r < n; ++r) x[r] -= f * l[k * stride + r];
+    }
+    for (Eigen::Index k = n - 1; k >= 0; --k) {
+      double sum = x[k];
+      for (Eigen::Index r = k + 1; r < n; ++r) sum -= l[k * stride + r] * x[r];
+      x[k] = sum * (1 / l[k * stride + k]);
     }
   }
 }
