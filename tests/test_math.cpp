@@ -115,7 +115,7 @@ TEST_CASE("every joint kind: integrate, difference, their Jacobians and the moti
 }
 
 TEST_CASE("small systems are solved with rows swapped more than once") {
-  for (int n : {1, 2, 3, 5, 9, 12}) {
+  for (int n : {1, 2, 3, 6, 9, 12}) {
     MatrixXd A = MatrixXd::NullaryExpr(n, n, [](Eigen::Index, Eigen::Index) { return random(1, 1)[0]; });
     A += 10 * MatrixXd(Eigen::MatrixXd::Identity(n, n).rowwise().reverse());  // the pivot of every column is far off
     const MatrixXd X = MatrixXd::NullaryExpr(n, 3, [](Eigen::Index, Eigen::Index) { return random(1, 1)[0]; });

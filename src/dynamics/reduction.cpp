@@ -198,7 +198,7 @@ BlockScratch::BlockScratch(const LoopBlock& block) : ws(block.model) {
   rest.setZero(m);
 }
 
-BlockPoint::BlockPoint(const LoopBlock& block) : basis_(block), placements_(block.model.numBodies()) {
+BlockState::BlockState(const LoopBlock& block) : basis_(block), placements_(block.model.numBodies()) {
   zeta_.setZero(block.rank);
   step_.setZero(block.model.nv());
 }
@@ -283,7 +283,7 @@ bool factorize(const LoopBlock& block, BlockScratch& scratch, BlockBasis& basis)
 }  // namespace
 
 // Eq. (1): N = W^{-1/2} Q_2 with the last columns of Q, and L L^T = J W^{-1} J^T.
-bool BlockPoint::updateBases(const LoopBlock& block, BlockScratch& scratch) {
+bool BlockState::updateBases(const LoopBlock& block, BlockScratch& scratch) {
   const int rank = block.rank, size = block.size, n = static_cast<int>(block.metric.size());
   placements_ = scratch.ws.X_WB;
   updateColumns(block.model, scratch.ws);
@@ -310,21 +310,21 @@ bool BlockPoint::updateBases(const LoopBlock& block, BlockScratch& scratch) {
   return true;
 }
 
-void BlockPoint::load(const LoopBlock& block, BlockScratch& scratch) const {
+void BlockState::load(const LoopBlock& block, BlockScratch& scratch) const {
   scratch.ws.q = basis_.q;
   scratch.ws.X_WB = placements_;
   scratch.ws.stage = WorkspaceStage::Placement;
   updateColumns(block.model, scratch.ws);
 }
 
-bool BlockPoint::update(const LoopBlock& block, BlockScratch& scratch, ConstVectorRef q) {
+bool BlockState::update(const LoopBlock& block, BlockScratch& scratch, ConstVectorRef q) {
   closed_ = true;
   basis_.q = q;
   updatePlacements(block.model, scratch.ws, basis_.q);
   return updateBases(block, scratch);
 }
 
-bool BlockPoint::close(const LoopBlock& block, BlockScratch& scratch, const BlockBasis& start, ConstVectorRef d,
+bool BlockState::close(const LoopBlock& block, BlockScratch& scratch, const BlockBasis& start, ConstVectorRef d,
                        const VectorXd& zeta_guess) {
   closed_ = false;
   // Newton on zeta with the matrix J(q) W^{-1} J(q_0)^T of the independent rows, refreshed while it pays.
@@ -365,7 +365,7 @@ bool BlockPoint::close(const LoopBlock& block, BlockScratch& scratch, const Bloc
   return updateBases(block, scratch);
 }
 
-std::string BlockPoint::describeFailure(const LoopBlock& block, const BlockScratch& scratch) const {
+std::string BlockState::describeFailure(const LoopBlock& block, const BlockScratch& scratch) const {
   const ConstraintSet& set = block.closures;
   if (closed_)
     return "closure '" + set.closures.front().name + "': the rank of its loops is no longer " +
@@ -378,6 +378,8 @@ std::string BlockPoint::describeFailure(const LoopBlock& block, const BlockScrat
   }
   return "closure '" + set.closures[worst].name + "' does not close: the step is too large, or out of its reach";
 }
+
+void BlockPoint::selectIndependent(const MatrixXd& all, MatrixXd& out) const { selectRows(all, basis().rows, out); }
 
 void expandIndependent(const BlockBasis& basis, ConstVectorRef independent, VectorRef all) {
   all.setZero();

@@ -170,8 +170,8 @@ bool ReducedNode::updateState(ConstVectorRef x, const ReducedNode* previous) {
   v_ = x.tail(model_.nv());
   for (size_t i = 0; i < blocks_.size(); ++i) {
     Block& b = blocks_[i];
-    BlockPoint& point = b.work->point;
-    const BlockPoint* source = previous ? &previous->blocks_[i].next : &point;
+    BlockState& point = b.work->point;
+    const BlockState* source = previous ? &previous->blocks_[i].next : &point;
     if (!previous) {
       gatherConfiguration(model_, b.loop, q_, b.work->q);
       if (!point.update(b.loop, b.work->scratch, b.work->q)) return fail(b, point);
@@ -210,8 +210,8 @@ void ReducedNode::restore() {
 
 bool ReducedNode::updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) {
   takeWork();
-  const bool follows = previous && previous->x_next() == x;
-  if (!updateState(x, follows ? static_cast<const ReducedNode*>(previous) : nullptr)) return false;
+  const ReducedNode* before = previous && previous->x_next() == x ? static_cast<const ReducedNode*>(previous) : nullptr;
+  if (!updateState(x, before)) return false;
   ReducedWork& work = *work_;
   updateDriftAccelerations();
   updateInverseDynamics(model_, work.ws, work.a_d);
@@ -231,7 +231,7 @@ bool ReducedNode::updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel
   lambda_.tail(contact_rows_) = contacts.lambda;
   a_ = work.a_d;
   addFromReduced(work.ydd, a_);
-  return closeStep(x);
+  return closeStep(x, before);
 }
 
 // a_d = -J^+ gamma of the loops.
@@ -305,7 +305,7 @@ void ReducedNode::updateContacts() {
 }
 
 // robot_problem.h Eq. (3)
-bool ReducedNode::closeStep(ConstVectorRef x) {
+bool ReducedNode::closeStep(ConstVectorRef x, const ReducedNode* previous) {
   const int nq = model_.nq(), nv = model_.nv();
   const double h = spec_.dt;
   VectorXd& w = work_->w;
@@ -321,8 +321,11 @@ bool ReducedNode::closeStep(ConstVectorRef x) {
     gatherVelocity(b.loop, w, work.d);
     work.d *= h;
     // To second order the closures open by h^2/2 gamma along h w: J J^T zeta = h^2/2 gamma, with the zeta of close().
-    work.zeta = (0.5 * h * h) * work.independent;
+    // What that lacked in the step before, it will lack again.
+    work.zeta = b.surplus = (0.5 * h * h) * work.independent;
+    if (previous) work.zeta += previous->blocks_[&b - blocks_.data()].surplus;
     if (!b.next.close(b.loop, work.scratch, b.at, work.d, work.zeta)) return fail(b, b.next);
+    b.surplus = b.next.zeta() - b.surplus;
     const BlockBasis& next = b.next.basis();
     // (I - J'^+ J') w' = N' (W N')^T w'
     work.target.setZero();

@@ -37,7 +37,7 @@ namespace bielle {
 struct BlockWork {
   explicit BlockWork(const LoopBlock& l);
   BlockScratch scratch;
-  BlockPoint start, point;                         // for integrate() and open gaps
+  BlockState start, point;                         // for integrate() and open gaps
   BlockMotion motion, ahead;                       // at the state, in the whole model; at q+, in the block
   VectorXd q, v, a, d, w, gradient_q, gradient_v;  // n (q: nq)
   VectorXd independent, zeta, rows;                // rank, rank, m
@@ -101,12 +101,16 @@ class ReducedWorkPool {
 
 // A block of loops at one node: what lasts from call to call.
 struct ReducedBlock {
-  explicit ReducedBlock(const LoopBlock& l) : loop(l), at(l), next(l), chart(at.WN) { v_next.setZero(l.model.nv()); }
+  explicit ReducedBlock(const LoopBlock& l) : loop(l), at(l), next(l), chart(at.WN) {
+    v_next.setZero(l.model.nv());
+    surplus.setZero(l.rank);
+  }
   const LoopBlock& loop;
   BlockBasis at;    // at the state
-  BlockPoint next;  // at q+
+  BlockState next;  // at q+
   MatrixXd chart;   // W N at the last linearized state
   VectorXd v_next;
+  VectorXd surplus;           // rank, zeta of the closing less its second-order prediction
   BlockWork* work = nullptr;  // within a call
 };
 
@@ -148,7 +152,7 @@ class ReducedNode : public NodeModel {
   void projectVector(const VectorXd& x, VectorXd& out) const;
   // x += N y
   void addFromReduced(const VectorXd& y, VectorXd& x) const;
-  bool fail(const Block& b, const BlockPoint& point) {
+  bool fail(const Block& b, const BlockState& point) {
     failure_ = point.describeFailure(b.loop, b.work->scratch);
     return false;
   }
@@ -156,7 +160,7 @@ class ReducedNode : public NodeModel {
                             JointVector& gradient, JointMatrix& hessian);
   void updateDriftAccelerations();
   void updateContacts();
-  bool closeStep(ConstVectorRef x);
+  bool closeStep(ConstVectorRef x, const ReducedNode* previous);
   bool moveToNodeState(Block& b, StageModel& out);
   void updateForces();
   void calcContactDerivatives();

@@ -114,7 +114,7 @@ VectorXd calcDriftAcceleration(const Linkage& linkage, BlockPoint& point, const 
   }
   point.selectIndependent(gamma, independent);
   point.solveGram(independent);
-  const VectorXd a = -(point.basis().JW.transpose() * independent);
+  const VectorXd a = -(block.inverse_metric.asDiagonal() * (point.basis().J.transpose() * independent));
   return a - T * selectRowsOf(a, linkage.joint_dofs);
 }
 

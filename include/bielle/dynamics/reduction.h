@@ -108,9 +108,9 @@ struct BlockScratch {
 };
 
 /// A closed configuration of a block with what was computed there. No allocation once made.
-class BlockPoint {
+class BlockState {
  public:
-  explicit BlockPoint(const LoopBlock& block);
+  explicit BlockState(const LoopBlock& block);
 
   /// Kinematics, Jacobian and bases (1) at q (block's nq), which stay in the scratch too. False when the rank is not that
   /// of the block.
@@ -136,6 +136,26 @@ class BlockPoint {
   std::vector<SE3> placements_;
   VectorXd zeta_, step_;
   bool closed_ = false;  // the last close() got as far as the bases
+};
+
+/// A BlockState with a scratch of its own: simpler where there are few of them.
+class BlockPoint {
+ public:
+  explicit BlockPoint(const LoopBlock& block) : scratch_(block), state_(block) {}
+  bool update(const LoopBlock& block, ConstVectorRef q) { return state_.update(block, scratch_, q); }
+  bool close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d, const VectorXd& zeta_guess) {
+    return state_.close(block, scratch_, start, d, zeta_guess);
+  }
+  const BlockBasis& basis() const { return state_.basis(); }
+  std::string describeFailure(const LoopBlock& block) const { return state_.describeFailure(block, scratch_); }
+  Workspace& workspace() { return scratch_.ws; }  ///< positions are those of the last update() or close()
+  void solveGram(MatrixRef X) const { bielle::solveGram(basis(), X); }
+  /// Independent rows out of all rows (m x k -> rank x k).
+  void selectIndependent(const MatrixXd& all, MatrixXd& out) const;
+
+ private:
+  BlockScratch scratch_;
+  BlockState state_;
 };
 
 /// Forces on all rows (m) of forces on the independent ones.
