@@ -92,7 +92,7 @@ class LqSweep {
   LqRegularization regularization_;
   LqResult result_;
   BoxQp box_qp_;
-  // Buffers of one node, sized for the largest, their rows padded to full lanes (small_product.h). With F = [Fu Fx]:
+  // Buffers of one node, sized for the largest, their rows padded to full lanes (lane_product.h). With F = [Fu Fx]:
   // F^T, F^T Vxx', the Hessian [Quu . ; Qxu Qxx] whose first columns become those of L over Y^T, and K^T.
   VectorXd p_, Vxx_gap_, Ft_, Ft_Vxx_, H_, Kt_;
 };
