@@ -30,7 +30,8 @@ class Camera {
   // Far enough that all robots are in the picture.
   setView(name) {
     const focus = this.getWishedTarget(), direction = new THREE.Vector3(...(VIEWS[name] || VIEWS.oblique)).normalize();
-    const height = this.scene.size, width = 0.62 * this.scene.size + this.scene.spread * (name === 'side' ? 0.2 : 1);
+    const height = this.scene.size + this.scene.rise,
+          width = 0.62 * this.scene.size + this.scene.spread * (name === 'side' ? 0.2 : 1);
     const distance = Math.max(height, width / this.three.aspect) / 2 / Math.tan(this.three.fov * Math.PI / 360) +
         this.scene.spread / 4;
     this.controls.target.copy(focus);
@@ -43,7 +44,7 @@ class Camera {
     const focus = this.scene.calcFocus(), boxes = this.scene.robots.map(robot => robot.box);
     const middle =
         boxes.reduce((sum, box) => sum + (box.isEmpty() ? 0 : (box.min.z + box.max.z) / 2), 0) / boxes.length;
-    focus.z = middle + this.scene.robots[0].run.calcClimb(this.scene.time);
+    focus.z = middle + this.scene.rise / 2 + this.scene.robots[0].run.calcClimb(this.scene.time);
     return focus;
   }
 

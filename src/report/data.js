@@ -83,6 +83,14 @@ class Run {
     return values[next - 1] + share * (values[next] - values[next - 1]) - values[0];
   }
 
+  // How far the centre of mass goes up from where it was, footholds aside, m.
+  calcRise() {
+    let rise = 0;
+    for (let k = 0; k < this.time.length; ++k)
+      rise = Math.max(rise, this.com.get(k, 2) - this.com.get(0, 2) - this.calcClimb(this.time[k]));
+    return rise;
+  }
+
   getPhases() {
     const phases = Array.isArray(this.summary.phases) ? this.summary.phases : [];
     return phases.map(phase => {

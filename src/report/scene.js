@@ -20,6 +20,7 @@ class Scene {
     this.size = Math.max(...this.robots.map(robot => robot.size));
     this.ground = this.findGround(runs[0].summary.ground);
     this.scales = this.makeScales(runs);
+    this.rise = Math.max(0, ...runs.map(run => run.calcRise()));
     this.seeThrough = false;
     for (const robot of this.robots) this.three.add(robot.root);
     this.addGround(runs);

@@ -67,6 +67,7 @@ Linkage makeLoopLinkage(const Model& model, const LoopBlock& block, std::vector<
   Linkage linkage;
   linkage.block = block;
   linkage.block.metric.setOnes();  // geometry alone: what is light must not move far per step
+  linkage.block.inverse_metric.setOnes();
   linkage.block.inverse_root.setOnes();
   const std::string element = "joint '" + model.joints()[joints.front()].name + "'";
   for (int i : model.serialJoints())
