@@ -173,5 +173,5 @@ TEST_CASE("solve --model serial tells what it leaves out, lift carries the motio
   checkRefused(run({"lift", "/no/such/place", "-o", directory.str("again")}), "cannot be read");
   std::vector<std::string> wrong = squat;
   wrong.insert(wrong.end(), {"--model", "serial", "--serial-armature", "much", "-o", directory.str("again")});
-  checkRefused(run(wrong), "--serial-armature 'much'");
+  checkRefused(run(wrong), "armature 'much' of the serial model");
 }

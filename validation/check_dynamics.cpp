@@ -60,7 +60,8 @@ void addDynamicsRows(CheckContext& context) {
   Worst time, balance, accelerations, velocity, position, differences;
   for (int k = 0; k < context.motion.numStages(); ++k) {
     const StageTrace& stage = context.trace.stages[k];
-    time.add(std::abs(record.time[k + 1] - record.time[k] - context.motion.summary.time_step), k);
+    const double step = context.motion.isImpact(k) ? 0 : context.motion.summary.time_step;
+    time.add(std::abs(record.time[k + 1] - record.time[k] - step), k);
     addLargest(balance, stage.balance, force, k, record.v_names);
     accelerations.add(stage.acceleration_error / acceleration, k);
     addLargest(velocity, stage.velocity_rest, 1, k, record.v_names);

@@ -48,7 +48,8 @@ void addForceRows(CheckContext& context) {
   const Model& model = context.model();
   const double least_load = std::max(kLeastLoad * model.mass() * model.gravity().norm(), 1e-9);
   ContactForces forces;
-  for (int k = 0; k < context.motion.numStages(); ++k)
+  for (int k = 0; k < context.motion.numStages(); ++k) {
+    if (context.motion.isImpact(k)) continue;  // no time, no forces
     for (int c = 0; c < static_cast<int>(model.contacts().size()); ++c) {
       const ContactFrame& contact = model.contacts()[c];
       const Vector6d wrench = context.motion.record.contact_wrenches.block<1, 6>(k, 6 * c).transpose();
@@ -57,6 +58,7 @@ void addForceRows(CheckContext& context) {
       else
         forces.in_air.add(wrench.cwiseAbs().maxCoeff(), k, contact.name);
     }
+  }
   const std::string nothing = "no foot stands";
   context.add(forces.normal, "contact: least normal force", "N", 0, nothing);
   context.add(forces.friction, "contact: tangential over normal", "1", context.motion.summary.ground.friction, nothing);

@@ -1,14 +1,14 @@
 #include "check_input.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "bielle/io/names.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
+#include "bielle/transmission/serial_model.h"
 
 namespace bielle::validation {
 namespace {
@@ -78,6 +78,10 @@ std::vector<ContactTarget> CheckedMotion::getContacts(int phase) const {
   return contacts;
 }
 
+bool CheckedMotion::isImpact(int stage) const {
+  return std::find(summary.impacts.begin(), summary.impacts.end(), stage) != summary.impacts.end();
+}
+
 bool CheckedMotion::stands(int contact, int node) const {
   for (const MotionSummary::Stance& stance : summary.phases[findPhase(node)].stances)
     if (stance.contact == model.contacts()[contact].name) return true;
@@ -97,14 +101,14 @@ void checkConsistency(const CheckedMotion& motion) {
 CheckedMotion readMotion(const std::string& directory) {
   CheckedMotion motion;
   motion.summary = readSummary(directory);
-  const nlohmann::json json = nlohmann::json::parse(std::ifstream(motion.summary.file));
-  if (json.value("model", "closed") != "closed")
-    throw ModelError(motion.summary.file, "entry 'model'", "only motions of the closed model can be checked",
-                     "make it with --model closed");
   motion.record = readRecord((std::filesystem::path(directory) / "trajectory.npz").string());
   std::error_code error;
   const bool file_exists = std::filesystem::exists(motion.summary.robot_file, error);
   motion.model = loadRobot(file_exists ? motion.summary.robot_file : motion.summary.robot).model;
+  if (motion.summary.model == "serial")
+    motion.model = makeSerialModel(motion.model, makeStandingPosture(motion.model),
+                                   parseSerialArmature(motion.summary.serial_armature))
+                       .model;
   checkConsistency(motion);
   return motion;
 }

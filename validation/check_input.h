@@ -19,6 +19,8 @@ struct CheckedMotion {
   int findPhase(int node) const;
   /// The contacts of a phase, in the order of the summary.
   std::vector<ContactTarget> getContacts(int phase) const;
+  /// Whether a stage is a rigid impact: no time passes, velocities jump.
+  bool isImpact(int stage) const;
   /// Whether a contact of the model stands on the ground at a node.
   bool stands(int contact, int node) const;
 };

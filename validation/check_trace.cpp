@@ -119,7 +119,7 @@ class Tracer {
 
   // What is judged along the closures of the next node.
   void traceArrival(int k, StageTrace& stage) const {
-    const double h = motion_.summary.time_step;
+    const double h = motion_.isImpact(k) ? 0 : motion_.summary.time_step;
     stage.position_rest = projectOnTangent(calcStep(k) - h * motion_.record.v.row(k + 1).transpose());
   }
 
@@ -137,7 +137,24 @@ class Tracer {
     return wrenches;
   }
 
+  // Velocities after an impact by Simbody's mass matrix and constraints, J of loops and of the feet that stand
+  // afterwards:  v+ = v - M^{-1} J^T (J M^{-1} J^T)^+ J v.
+  void traceImpact(const SimbodyBridge& simbody, int k, StageTrace& stage) const {
+    const VectorXd v = motion_.record.v.row(k), next = motion_.record.v.row(k + 1);
+    const MatrixXd M = simbody.calcMassMatrix(), J = simbody.calcConstraintJacobian();
+    const Eigen::LLT<MatrixXd> llt(M);
+    Eigen::CompleteOrthogonalDecomposition<MatrixXd> rows;  // of J L^{-T}, in the metric of the inertia
+    rows.setThreshold(kRankThreshold);
+    rows.compute(llt.matrixL().solve(J.transpose()).transpose());
+    const VectorXd lost = llt.matrixU().solve(rows.solve(J * v));
+    stage.balance = VectorXd::Zero(motion_.model.nv());
+    stage.velocity_rest = next - v + lost;
+    const VectorXd change = next - v;
+    stage.contact_work = change.dot(M * (v + change / 2));  // what the impact takes away
+  }
+
   void traceStage(const SimbodyBridge& simbody, int k, StageTrace& stage) const {
+    if (motion_.isImpact(k)) return traceImpact(simbody, k, stage);
     const MotionRecord& record = motion_.record;
     const double h = motion_.summary.time_step;
     const VectorXd v = record.v.row(k), a = record.a.row(k), next = record.v.row(k + 1), d = calcStep(k);

@@ -76,7 +76,8 @@ int run(const LiftArguments& arguments) {
   std::error_code error;
   robot_argument.name = fs::is_regular_file(summary.robot_file, error) ? summary.robot_file : summary.robot;
   const LoadedRobot robot = robot_argument.load();
-  const SerialModel serial = makeSerialModel(robot.model, makeStandingPosture(robot.model));
+  const SerialModel serial =
+      makeSerialModel(robot.model, makeStandingPosture(robot.model), parseSerialArmature(summary.serial_armature));
   const Motion motion = remakeMotion(summary, serial.model);
   const SerialTrajectory trajectory = makeSerialTrajectory(motion, record);
   makeOutputDirectory(arguments.directory);

@@ -101,19 +101,6 @@ void addReport(const std::string& directory) {
   }
 }
 
-SerialModelOptions readArmature(const std::string& text) {
-  SerialModelOptions options;
-  if (text == "reflected") {
-    options.armature_kind = SerialModelOptions::Armature::Reflected;
-    return options;
-  }
-  const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, options.armature);
-  if (error != std::errc() || stop != end)
-    throw ModelError("", "--serial-armature '" + text + "'", "it is neither a number nor 'reflected'", "e.g. 1e-3");
-  return options;
-}
-
 // What the serial model leaves out: nothing goes silently.
 void printSerialModel(const SerialModel& serial) {
   const auto join = [](const std::vector<std::string>& names) {
@@ -146,7 +133,8 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   const LoadedRobot robot = arguments.robot.load();
   std::optional<SerialModel> serial;
   if (arguments.serial) {
-    serial = makeSerialModel(robot.model, makeStandingPosture(robot.model), readArmature(arguments.serial_armature));
+    serial =
+        makeSerialModel(robot.model, makeStandingPosture(robot.model), parseSerialArmature(arguments.serial_armature));
     printSerialModel(*serial);
   }
   Motion motion = request.make(serial ? serial->model : robot.model, arguments.formulation);
@@ -165,7 +153,8 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
     };
   }
   const FddpSummary summary = Fddp(arguments.solver).solve(*motion.problem, motion.guess, observer);
-  const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed"};
+  const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed",
+                    serial ? arguments.serial_armature : ""};
   const MotionResult result = makeResult(run, motion, motion.guess, summary);
   printResult(result, writeResult(arguments.directory, result));
   const bool failed = !arguments.no_check && !checkResult(arguments.directory);

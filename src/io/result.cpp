@@ -87,6 +87,7 @@ Json makeSummary(const MotionResult& result) {
           {"robot", result.run.robot},
           {"robot_file", result.run.robot_file},
           {"model", result.run.model},
+          {"serial_armature", result.run.serial_armature},
           {"formulation", getName(result.formulation)},
           {"command", result.run.command},
           {"requested", listByName(result.requested)},

@@ -34,6 +34,7 @@ MotionSummary read(const Json& json) {
   summary.robot = json.at("robot");
   summary.robot_file = json.at("robot_file");
   summary.model = json.value("model", "closed");
+  summary.serial_armature = json.value("serial_armature", "");
   const std::string formulation = json.at("formulation");
   summary.formulation = formulation == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
   summary.converged = json.at("converged");
@@ -45,7 +46,8 @@ MotionSummary read(const Json& json) {
       phase.stances.push_back({contact.at("name"), readPlacement(contact)});
     summary.phases.push_back(phase);
   }
-  for (const Json& stage : json.at("impacts")) summary.impacts.push_back(stage);
+  if (json.contains("impacts"))
+    for (const Json& stage : json.at("impacts")) summary.impacts.push_back(stage);
   summary.ground = readGround(json.at("ground"));
   return summary;
 }

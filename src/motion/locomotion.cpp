@@ -161,7 +161,7 @@ void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& ste
 
 void addLandingCosts(const Scene& scene, const Footstep& step, StageSpec& stage) {
   const LocomotionOptions& o = scene.options;
-  const double h = stage.dt;
+  const double h = stage.kind == StageKind::Impact ? 1 : stage.dt;
   const BodyFrame foot = getFoot(scene, step.side);
   addCost(stage, "landing", 1 / h,
           makeVector(o.landing_foothold_weight, o.landing_height_weight, o.landing_rotation_weight),
@@ -181,12 +181,24 @@ StageSpec makeStage(const Scene& scene, const GaitNode& node, const std::vector<
   addComCosts(scene, node, stage);
   addForceCosts(scene, node, stage);
   if (phase.swings) addSwingCosts(scene, node, scene.task.plan.steps[phase.steps_done], stage);
-  if (node.lands) addLandingCosts(scene, scene.task.plan.steps[phase.steps_done - 1], stage);
+  if (node.lands && o.rigid_landing == 0) addLandingCosts(scene, scene.task.plan.steps[phase.steps_done - 1], stage);
   if (o.feet_distance_weight != 0)
     stage.costs.push_back({"feet distance", o.feet_distance_weight,
                            Activation::makeBarrier(VectorXd::Ones(1), VectorXd::Constant(1, o.feet_distance),
                                                    VectorXd::Constant(1, 1e12)),
                            makeFrameDistance(getFoot(scene, Side::Left), getFoot(scene, Side::Right))});
+  return stage;
+}
+
+// A foot comes down and stops at once.
+StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector<ContactTarget>& contacts) {
+  StageSpec stage = makeRegularizedStage(scene, node);
+  stage.kind = StageKind::Impact;
+  stage.dt = 0;
+  stage.constraints = makeConstraintSet(scene.model, contacts);
+  stage.state.weight *= scene.options.timing.time_step;
+  stage.control.weight *= scene.options.timing.time_step;  // torques do nothing here: they go to zero
+  addLandingCosts(scene, scene.task.plan.steps[scene.gait.phases[node.phase].steps_done - 1], stage);
   return stage;
 }
 
@@ -227,6 +239,8 @@ std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
       {"swing_leave", &o.swing.leave, "1", "when the swing foot starts to move horizontally, from 0 to 1"},
       {"swing_arrive", &o.swing.arrive, "1", "when it is over its foothold, from 0 to 1"},
       {"friction", &o.friction, "1", "friction coefficient"},
+      {"rigid_landing", &o.rigid_landing, "0 or 1",
+       "1: feet that land stop by a rigid impact; 0: softly, by costs alone"},
       {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
       {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
       {"heading_weight", &o.heading_weight, "1", "head where the feet do, within the state regularization"},
@@ -320,19 +334,27 @@ Motion makeLocomotion(const Model& model, const Stance& stance, const Locomotion
   motion.ground = task.ground;
   motion.ground.friction = options.friction;
   std::vector<StageSpec> stages;
+  size_t node = 0;
   for (const GaitPhase& phase : scene.gait.phases) {
     const std::vector<ContactTarget> contacts = makeTargets(scene, phase);
-    motion.schedule.phases.push_back({nameOf(scene, phase), phase.nodes, contacts});
     const VectorXd u = calcStaticTorques(model, makeConstraintSet(model, contacts), stance.q).u;
-    for (int i = 0; i < phase.nodes; ++i) {
-      stages.push_back(makeStage(scene, scene.gait.nodes[stages.size()], contacts));
+    if (scene.gait.nodes[node].lands && options.rigid_landing != 0) {
+      motion.schedule.phases.push_back({"impact", 1, contacts});
+      stages.push_back(makeImpact(scene, scene.gait.nodes[node], contacts));
+      motion.guess.us.push_back(VectorXd::Zero(model.nu()));
+      motion.guess.xs.push_back(makeGuess(scene, scene.gait.nodes[node]));
+    }
+    motion.schedule.phases.push_back({nameOf(scene, phase), phase.nodes, contacts});
+    for (int i = 0; i < phase.nodes; ++i, ++node) {
+      stages.push_back(makeStage(scene, scene.gait.nodes[node], contacts));
       motion.guess.us.push_back(u);
+      motion.guess.xs.push_back(makeGuess(scene, scene.gait.nodes[node]));
     }
   }
   stages.push_back(makeTerminalStage(scene));
   motion.problem =
       std::make_unique<RobotProblem>(model, stance.q, VectorXd::Zero(model.nv()), std::move(stages), formulation);
-  for (const GaitNode& node : scene.gait.nodes) motion.guess.xs.push_back(makeGuess(scene, node));
+  motion.guess.xs.push_back(makeGuess(scene, scene.gait.nodes.back()));
   return motion;
 }
 

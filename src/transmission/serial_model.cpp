@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <set>
 
@@ -148,6 +149,21 @@ void forCommonJoints(const Model& from, const Model& model, const Copy& copy) {
 }
 
 }  // namespace
+
+SerialModelOptions parseSerialArmature(const std::string& text) {
+  SerialModelOptions options;
+  if (text.empty()) return options;
+  if (text == "reflected") {
+    options.armature_kind = SerialModelOptions::Armature::Reflected;
+    return options;
+  }
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, options.armature);
+  if (error != std::errc() || stop != end)
+    throw ModelError("", "armature '" + text + "' of the serial model", "it is neither a number nor 'reflected'",
+                     "give kg m^2, e.g. 1e-3");
+  return options;
+}
 
 SerialModel makeSerialModel(const Model& closed, ConstVectorRef q, const SerialModelOptions& options) {
   SerialModel out;

@@ -13,6 +13,7 @@ struct RunInfo {
   std::string robot_file;            ///< its .urdf, absolute
   std::vector<std::string> command;  ///< the command line, or empty
   std::string model = "closed";      ///< or "serial": the robot's linkages were frozen (transmission/serial_model.h)
+  std::string serial_armature;       ///< of the serial model, as asked for (parseSerialArmature)
 };
 
 struct MotionResult {
@@ -52,6 +53,7 @@ struct MotionSummary {
   std::string file;  ///< that was read
   std::string motion, robot, robot_file;
   std::string model = "closed";  ///< or "serial"
+  std::string serial_armature;   ///< of the serial model (parseSerialArmature)
   Formulation formulation = Formulation::Full;
   bool converged = false;
   std::vector<std::pair<std::string, double>> requested;

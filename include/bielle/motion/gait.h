@@ -26,8 +26,8 @@ struct GaitTiming {
 
 /// Shape of a swing, over its progress s in [0, 1].
 struct SwingShape {
-  double height = 0.04;          ///< of the apex over the higher of both ends, m
-  double apex = 0.5;             ///< s of the apex
+  double height = 0.04;             ///< of the apex over the higher of both ends, m
+  double apex = 0.5;                ///< s of the apex
   double leave = 0, arrive = 0.95;  ///< the horizontal motion takes place between these
 };
 /// Placement along a swing from a to b.

@@ -5,7 +5,8 @@
 /// - state regularization about the standing posture at rest, the base heading as the feet do; motor torques;
 /// - centre of mass: position and velocity;
 /// - swing foot: placement along its path, and (instead) fly high: its horizontal velocity near the ground;
-/// - landing, at the first node of a double support: placement and velocity of the foot that came down, over h;
+/// - landing, at the first node of a double support or at the impact before it: placement and velocity of the foot that
+///   comes down, times what makes up for the h of a stage;
 /// - forces of stance feet: share of the weight, centre of pressure, friction pyramid;
 /// - feet not nearer than `feet_distance`.
 /// The terminal node has the centre of mass, the posture and rest.
@@ -18,6 +19,10 @@ struct LocomotionOptions {
   GaitTiming timing;
   SwingShape swing;
   double friction = 0.7;  ///< coefficient, 1
+  /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time and bears the landing
+  /// costs, as they stand before the foot stops. 0: soft landing by costs alone; the contact's stabilisation stops the
+  /// foot within a time step.
+  double rigid_landing = 0;
 
   double state_weight = 0.1;             ///< of the state regularization
   double torso_weight = 1e4;             ///< of the torso's roll and pitch within the state regularization

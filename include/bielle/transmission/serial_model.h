@@ -24,6 +24,10 @@ struct SerialModelOptions {
   double armature = 1e-3;  ///< kg m^2
 };
 
+/// Armature out of a text: kg m^2, or "reflected"; empty for the default.
+/// \throws ModelError when it is none
+SerialModelOptions parseSerialArmature(const std::string& text);
+
 struct SerialModel {
   Model model;
   VectorXd q_reference;  ///< nq of the closed model
