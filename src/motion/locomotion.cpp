@@ -305,7 +305,7 @@ Stance makeStance(const Model& model, const LocomotionOptions& options) {
 }
 
 Motion makeLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
-                      const LocomotionOptions& options, Formulation formulation) {
+                      const LocomotionOptions& options, const ProblemOptions& problem) {
   check(options);
   Scene scene{model,
               stance,
@@ -330,8 +330,7 @@ Motion makeLocomotion(const Model& model, const Stance& stance, const Locomotion
     }
   }
   stages.push_back(makeTerminalStage(scene));
-  motion.problem =
-      std::make_unique<RobotProblem>(model, stance.q, VectorXd::Zero(model.nv()), std::move(stages), formulation);
+  motion.problem = makeProblem(model, stance.q, std::move(stages), problem);
   for (const GaitNode& node : scene.gait.nodes) motion.guess.xs.push_back(makeGuess(scene, node));
   return motion;
 }
