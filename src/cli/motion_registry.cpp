@@ -16,7 +16,7 @@ struct Preset {
 
 // The request owns its options; listOptions() is found by their type.
 template <typename Options>
-std::function<MotionRequest()> makeRequests(Motion (*make)(const Model&, const Options&, Formulation),
+std::function<MotionRequest()> makeRequests(Motion (*make)(const Model&, const Options&, const ProblemOptions&),
                                             const std::vector<Preset<Options>>& presets = {}) {
   return [=] {
     const auto options = std::make_shared<Options>();
@@ -24,7 +24,7 @@ std::function<MotionRequest()> makeRequests(Motion (*make)(const Model&, const O
     request.options = listOptions(*options);
     for (const Preset<Options>& preset : presets)
       request.presets.push_back({preset.name, preset.help, [=] { preset.apply(*options); }});
-    request.make = [=](const Model& model, Formulation formulation) { return make(model, *options, formulation); };
+    request.make = [=](const Model& model, const ProblemOptions& problem) { return make(model, *options, problem); };
     return request;
   };
 }

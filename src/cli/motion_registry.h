@@ -19,7 +19,7 @@ struct MotionPreset {
 struct MotionRequest {
   std::vector<OptionEntry> options;
   std::vector<MotionPreset> presets;
-  std::function<Motion(const Model&, Formulation)> make;
+  std::function<Motion(const Model&, const ProblemOptions&)> make;
 };
 
 struct MotionEntry {

@@ -24,10 +24,11 @@ namespace {
 struct SolveArguments {
   RobotArgument robot;
   std::string directory;
-  Formulation formulation = Formulation::Reduced;
+  ProblemOptions problem;
   bool serial = false;
   std::string serial_armature = "1e-3";
-  std::vector<std::string> settings;  // name=value
+  std::vector<std::string> settings;                        // name=value
+  std::vector<std::string> effort_limits, velocity_limits;  // motor=value
   FddpOptions solver;
   std::string warm_start;  // directory of a result, or empty
   bool quiet = false, no_check = false, no_report = false;
@@ -45,15 +46,30 @@ void watchSignals() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
-void applySetting(const std::string& setting, const std::vector<OptionEntry>& options) {
+// name=number
+std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,
+                                            const std::string& example) {
   const size_t equals = setting.find('=');
   double value = 0;
   const char* end = setting.data() + setting.size();
   const char* begin = equals == std::string::npos ? end : setting.data() + equals + 1;
   const auto [stop, error] = std::from_chars(begin, end, value);
   if (error != std::errc() || stop != end)
-    throw ModelError("", "--set '" + setting + "'", "it is not of the form name=number", "e.g. --set com_weight=1e5");
-  setOption(options, setting.substr(0, equals), value);
+    throw ModelError("", flag + " '" + setting + "'", "it is not of the form name=number",
+                     "e.g. " + flag + " " + example);
+  return {setting.substr(0, equals), value};
+}
+
+// A limit given for one motor asks for the limits of all.
+LimitOptions makeLimits(const SolveArguments& arguments) {
+  LimitOptions limits = arguments.problem.limits;
+  for (const std::string& setting : arguments.effort_limits)
+    limits.efforts.insert(parseSetting("--limit", setting, "motor_knee_right=12"));
+  for (const std::string& setting : arguments.velocity_limits)
+    limits.velocities.insert(parseSetting("--velocity-limit", setting, "motor_knee_right=15"));
+  if (!limits.areEnforced() && !(limits.efforts.empty() && limits.velocities.empty()))
+    limits.barrier = LimitBarrier::Quadratic;
+  return limits;
 }
 
 std::string formatOptionList(const MotionEntry& motion) {
@@ -101,6 +117,15 @@ void addReport(const std::string& directory) {
   }
 }
 
+// The limits given by motor are told with what else was asked.
+Motion makeLimited(const MotionRequest& request, const Model& model, const ProblemOptions& problem) {
+  Motion motion = request.make(model, problem);
+  for (const auto& [motor, value] : problem.limits.efforts) motion.requested.emplace_back("limit " + motor, value);
+  for (const auto& [motor, value] : problem.limits.velocities)
+    motion.requested.emplace_back("velocity-limit " + motor, value);
+  return motion;
+}
+
 // What the serial model leaves out: nothing goes silently.
 void printSerialModel(const SerialModel& serial) {
   const auto join = [](const std::vector<std::string>& names) {
@@ -126,7 +151,10 @@ bool checkResult(const std::string& directory) {
 }
 
 int solve(const SolveArguments& arguments, const MotionRequest& request) {
-  for (const std::string& setting : arguments.settings) applySetting(setting, request.options);
+  for (const std::string& setting : arguments.settings) {
+    const auto [name, value] = parseSetting("--set", setting, "com_weight=1e5");
+    setOption(request.options, name, value);
+  }
   for (const OptionEntry& option : request.options)
     if (!std::isfinite(*option.value))
       throw ModelError("", "option '" + option.name + "'", "it is not finite", "give a number");
@@ -137,7 +165,10 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
         makeSerialModel(robot.model, makeStandingPosture(robot.model), parseSerialArmature(arguments.serial_armature));
     printSerialModel(*serial);
   }
-  Motion motion = request.make(serial ? serial->model : robot.model, arguments.formulation);
+  const LimitOptions limits = makeLimits(arguments);
+  Motion motion = makeLimited(request, serial ? serial->model : robot.model, {arguments.problem.formulation, limits});
+  FddpOptions solver = arguments.solver;
+  if (limits.areEnforced()) solver.bounds = ControlBounds::Enforce;
   if (!arguments.warm_start.empty()) setGuess(readResultRecord(arguments.warm_start), motion);
   makeOutputDirectory(arguments.directory);
 
@@ -152,7 +183,7 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
       return FddpAction::Continue;
     };
   }
-  const FddpSummary summary = Fddp(arguments.solver).solve(*motion.problem, motion.guess, observer);
+  const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess, observer);
   const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed",
                     serial ? arguments.serial_armature : ""};
   const MotionResult result = makeResult(run, motion, motion.guess, summary);
@@ -181,6 +212,28 @@ void addPresets(CLI::App& sub, const std::shared_ptr<MotionRequest>& request) {
       ->check(CLI::IsMember(names));
 }
 
+void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
+  const std::map<std::string, LimitBarrier> kinds = {{"quadratic", LimitBarrier::Quadratic},
+                                                     {"log", LimitBarrier::Logarithmic}};
+  LimitOptions& limits = arguments->problem.limits;
+  sub.add_option_function<std::string>(
+         "--limits", [&limits, kinds](const std::string& name) { limits.barrier = kinds.at(name); },
+         "keep to the robot's limits: torques exactly, joint ranges and motor velocities by barriers, which are "
+         "`quadratic` (nothing inside) or `log` (keeps away from them)")
+      ->check(CLI::IsMember(std::vector<std::string>{"quadratic", "log"}));
+  sub.add_option("--limit", arguments->effort_limits,
+                 "motor=largest torque [N m] in place of the robot's; implies --limits quadratic; may be repeated")
+      ->allow_extra_args(false);
+  sub.add_option("--velocity-limit", arguments->velocity_limits, "motor=largest velocity [rad/s], likewise")
+      ->allow_extra_args(false);
+  sub.add_option("--limit-weight", limits.quadratic_weight, "of quadratic barriers, over the limit squared")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  sub.add_option("--log-weight", limits.logarithmic_weight, "of logarithmic barriers")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+}
+
 // Flags are written with hyphens.
 std::string makeFlag(std::string option) {
   std::replace(option.begin(), option.end(), '_', '-');
@@ -205,11 +258,12 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   sub.add_option_function<std::string>(
          "--formulation",
          [arguments](const std::string& name) {
-           arguments->formulation = name == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
+           arguments->problem.formulation =
+               name == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
          },
          "reduced: loops are closed at every node; full: all joints of the spanning tree, closures by accelerations")
       ->check(CLI::IsMember({getName(Formulation::Full), getName(Formulation::Reduced)}))
-      ->default_str(getName(arguments->formulation));
+      ->default_str(getName(arguments->problem.formulation));
   sub.add_option_function<std::string>(
          "--model", [arguments](const std::string& name) { arguments->serial = name == "serial"; },
          "closed: with its linkages; serial: linkages frozen at the standing posture, motors on the serial joints")
@@ -219,6 +273,7 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
                  "of the motors on serial joints [kg m^2], or `reflected`: what the rotors weigh there at the standing "
                  "posture")
       ->capture_default_str();
+  addLimitOptions(sub, arguments);
   sub.add_option("--max-iterations", arguments->solver.max_iterations, "the solver stops there")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();

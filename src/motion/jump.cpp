@@ -237,7 +237,7 @@ std::vector<OptionEntry> listOptions(JumpOptions& o) {
           {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"}};
 }
 
-Motion makeJump(const Model& model, const JumpOptions& options, Formulation formulation) {
+Motion makeJump(const Model& model, const JumpOptions& options, const ProblemOptions& problem) {
   check(model, options);
   const Scene scene = makeScene(model, options);
   Motion motion;
@@ -274,8 +274,7 @@ Motion makeJump(const Model& model, const JumpOptions& options, Formulation form
   }
   stages.push_back(makeTerminalStage(scene));
   motion.guess.xs.push_back(makeGuess(scene, Phase::Settle, 0));
-  motion.problem =
-      std::make_unique<RobotProblem>(model, scene.q0, VectorXd::Zero(model.nv()), std::move(stages), formulation);
+  motion.problem = makeProblem(model, scene.q0, std::move(stages), problem);
   JumpOptions copy = options;
   for (const OptionEntry& entry : listOptions(copy)) motion.requested.emplace_back(entry.name, *entry.value);
   return motion;

@@ -319,7 +319,7 @@ Stance makeStance(const Model& model, const LocomotionOptions& options) {
 }
 
 Motion makeLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
-                      const LocomotionOptions& options, Formulation formulation) {
+                      const LocomotionOptions& options, const ProblemOptions& problem) {
   check(options);
   Scene scene{model,
               stance,
@@ -352,8 +352,7 @@ Motion makeLocomotion(const Model& model, const Stance& stance, const Locomotion
     }
   }
   stages.push_back(makeTerminalStage(scene));
-  motion.problem =
-      std::make_unique<RobotProblem>(model, stance.q, VectorXd::Zero(model.nv()), std::move(stages), formulation);
+  motion.problem = makeProblem(model, stance.q, std::move(stages), problem);
   motion.guess.xs.push_back(makeGuess(scene, scene.gait.nodes.back()));
   return motion;
 }

@@ -76,9 +76,9 @@ double calcSquatHeight(const SquatOptions& o, double t) {
   return 1 - (1 - o.depth) * 0.5 * (1 - std::cos(2 * kPi * s));
 }
 
-Motion makeSquat(const Model& model, const SquatOptions& options, Formulation formulation) {
+Motion makeSquat(const Model& model, const SquatOptions& options, const ProblemOptions& problem) {
   check(model, options);
-  const VectorXd q0 = makeStandingPosture(model), v0 = VectorXd::Zero(model.nv());
+  const VectorXd q0 = makeStandingPosture(model);
   std::vector<int> feet;
   for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
   const ContactGains gains = limitContactGains({options.contact_kp, options.contact_kd}, options.time_step);
@@ -103,7 +103,7 @@ Motion makeSquat(const Model& model, const SquatOptions& options, Formulation fo
   terminal.costs.resize(1);  // the height; forces have no meaning at the terminal node
   terminal.state.weight = options.terminal_weight;
   terminal.state.weights.head(model.nv()).setZero();
-  motion.problem = std::make_unique<RobotProblem>(model, q0, v0, std::move(stages), formulation);
+  motion.problem = makeProblem(model, q0, std::move(stages), problem);
 
   const VectorXd u0 = calcStaticTorques(model, makeConstraintSet(model, contacts), q0).u;
   motion.guess.xs.assign(nodes + 1, motion.problem->initialState());

@@ -94,7 +94,7 @@ Ground makeStairsGround(const StairsOptions& o, const Vector3d& start) {
   return ground;
 }
 
-Motion makeStairs(const Model& model, const StairsOptions& options, Formulation formulation) {
+Motion makeStairs(const Model& model, const StairsOptions& options, const ProblemOptions& problem) {
   StairsOptions o = options;
   const Stance stance = makeStance(model, o.gait);
   const int stairs = check(model, stance, o);
@@ -104,7 +104,7 @@ Motion makeStairs(const Model& model, const StairsOptions& options, Formulation 
   task.plan = planStairs(stance, o, stairs);
   task.ground = makeStairsGround(o, calcMiddle(stance.feet[0], stance.feet[1]).p);
   task.com_velocity = Vector3d(o.speed, 0, 0);
-  Motion motion = makeLocomotion(model, stance, task, o.gait, formulation);
+  Motion motion = makeLocomotion(model, stance, task, o.gait, problem);
   for (const OptionEntry& entry : listOptions(o)) motion.requested.emplace_back(entry.name, *entry.value);
   return motion;
 }

@@ -9,14 +9,14 @@ namespace {
 
 template <typename Options>
 Motion makeSteps(const Model& model, const char* name, const StepCommand& command, const Vector3d& velocity, Side first,
-                 const Options& options, Formulation formulation) {
+                 const Options& options, const ProblemOptions& problem) {
   const int steps = countSteps("steps", options.steps);
   const Stance stance = makeStance(model, options.gait);
   LocomotionTask task;
   task.name = name;
   task.plan = planFootsteps(stance.feet[0], stance.feet[1], command, steps, first);
   task.com_velocity = velocity;
-  Motion motion = makeLocomotion(model, stance, task, options.gait, formulation);
+  Motion motion = makeLocomotion(model, stance, task, options.gait, problem);
   Options copy = options;
   for (const OptionEntry& entry : listOptions(copy)) motion.requested.emplace_back(entry.name, *entry.value);
   return motion;
@@ -57,22 +57,22 @@ void setPaperWeights(SideWalkOptions& o) {
   o.gait.feet_distance_weight = 10;
 }
 
-Motion makeWalk(const Model& model, const WalkOptions& o, Formulation formulation) {
+Motion makeWalk(const Model& model, const WalkOptions& o, const ProblemOptions& problem) {
   return makeSteps(model, "walk", {o.speed * o.gait.timing.stepDuration(), 0, 0}, Vector3d(o.speed, 0, 0), Side::Right,
-                   o, formulation);
+                   o, problem);
 }
 
-Motion makeSideWalk(const Model& model, const SideWalkOptions& o, Formulation formulation) {
+Motion makeSideWalk(const Model& model, const SideWalkOptions& o, const ProblemOptions& problem) {
   return makeSteps(model, "side walk", {0, o.speed * o.gait.timing.stepDuration(), 0}, Vector3d(0, o.speed, 0),
-                   o.speed > 0 ? Side::Left : Side::Right, o, formulation);
+                   o.speed > 0 ? Side::Left : Side::Right, o, problem);
 }
 
-Motion makeTurn(const Model& model, const TurnOptions& o, Formulation formulation) {
+Motion makeTurn(const Model& model, const TurnOptions& o, const ProblemOptions& problem) {
   if (!(o.radius >= 0))
     throw ModelError("", "option 'radius'", "it is negative", "give metres, and a negative angle to turn to the right");
   const double yaw = o.angle / std::max(1, countSteps("steps", o.steps) - 1);
   return makeSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(),
-                   yaw > 0 ? Side::Left : Side::Right, o, formulation);
+                   yaw > 0 ? Side::Left : Side::Right, o, problem);
 }
 
 }  // namespace bielle

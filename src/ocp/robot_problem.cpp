@@ -25,6 +25,8 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index) {
   if (spec.control.weight != 0)
     require(spec.control.reference.size() == model.nu() && spec.control.weights.size() == model.nu(),
             "the control cost has wrong sizes", "reference and weights: nu");
+  require(spec.effort_limits.size() == 0 || spec.effort_limits.size() == model.nu(),
+          "its effort limits have a wrong size", "effort_limits: nu, or empty");
   for (const Cost& cost : spec.costs)
     require(
         cost.residual && cost.activation.weights.size() == cost.residual->size(),
@@ -236,9 +238,10 @@ void RobotProblem::addCosts(int index, double scale, StageModel& out) {
 
 std::string RobotProblem::getFailure(int node) const { return nodes_[node].dynamics->failure(); }
 
-void RobotProblem::getControlBounds(int, VectorRef lower, VectorRef upper) const {
+void RobotProblem::getControlBounds(int stage, VectorRef lower, VectorRef upper) const {
+  const VectorXd& limits = specs_[stage].effort_limits;
   for (int m = 0; m < model_.nu(); ++m) {
-    upper[m] = model_.motors()[m].effort_limit;
+    upper[m] = limits.size() ? limits[m] : model_.motors()[m].effort_limit;
     lower[m] = -upper[m];
   }
 }

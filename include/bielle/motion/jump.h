@@ -72,6 +72,6 @@ JumpHeight calcJumpHeight(const JumpOptions& options, double gravity, double t);
 
 /// Jump with all contacts of the robot at once, from its standing posture.
 /// \throws ModelError when the request is impossible (durations, lengths, no contact)
-Motion makeJump(const Model& model, const JumpOptions& options = {}, Formulation formulation = Formulation::Reduced);
+Motion makeJump(const Model& model, const JumpOptions& options = {}, const ProblemOptions& problem = {});
 
 }  // namespace bielle

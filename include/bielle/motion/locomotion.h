@@ -81,6 +81,6 @@ struct LocomotionTask {
 
 /// \throws ModelError when the request is impossible: footholds out of the legs' reach, soles that collide, durations
 Motion makeLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
-                      const LocomotionOptions& options, Formulation formulation);
+                      const LocomotionOptions& options, const ProblemOptions& problem);
 
 }  // namespace bielle

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "bielle/motion/limits.h"
 #include "bielle/ocp/contact_schedule.h"
 #include "bielle/ocp/ground.h"
 #include "bielle/ocp/robot_problem.h"

@@ -31,7 +31,7 @@ std::vector<OptionEntry> listOptions(SquatOptions& options);
 
 /// Squat on all contacts of the robot, from its standing posture.
 /// \throws ModelError when the request is impossible (depth, durations, no contact)
-Motion makeSquat(const Model& model, const SquatOptions& options = {}, Formulation formulation = Formulation::Reduced);
+Motion makeSquat(const Model& model, const SquatOptions& options = {}, const ProblemOptions& problem = {});
 
 /// Height of the CoM at time t over its initial height: 1 at rest, `depth` at mid-motion.
 double calcSquatHeight(const SquatOptions& options, double t);

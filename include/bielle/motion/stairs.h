@@ -29,7 +29,6 @@ void setPaperWeights(StairsOptions& options);
 Ground makeStairsGround(const StairsOptions& options, const Vector3d& start);
 
 /// \throws ModelError when the request is impossible (see locomotion.h)
-Motion makeStairs(const Model& model, const StairsOptions& options = {},
-                  Formulation formulation = Formulation::Reduced);
+Motion makeStairs(const Model& model, const StairsOptions& options = {}, const ProblemOptions& problem = {});
 
 }  // namespace bielle

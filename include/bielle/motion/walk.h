@@ -34,9 +34,8 @@ void setPaperWeights(WalkOptions& options);
 void setPaperWeights(SideWalkOptions& options);
 
 /// \throws ModelError when the request is impossible (see locomotion.h)
-Motion makeWalk(const Model& model, const WalkOptions& options = {}, Formulation formulation = Formulation::Reduced);
-Motion makeSideWalk(const Model& model, const SideWalkOptions& options = {},
-                    Formulation formulation = Formulation::Reduced);
-Motion makeTurn(const Model& model, const TurnOptions& options = {}, Formulation formulation = Formulation::Reduced);
+Motion makeWalk(const Model& model, const WalkOptions& options = {}, const ProblemOptions& problem = {});
+Motion makeSideWalk(const Model& model, const SideWalkOptions& options = {}, const ProblemOptions& problem = {});
+Motion makeTurn(const Model& model, const TurnOptions& options = {}, const ProblemOptions& problem = {});
 
 }  // namespace bielle

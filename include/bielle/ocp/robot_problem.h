@@ -40,6 +40,7 @@ struct StageSpec {
   StateCost state;
   ControlCost control;
   std::vector<Cost> costs;
+  VectorXd effort_limits;  ///< of |u|, nu, for solvers that enforce bounds; empty: those of the motors
 };
 
 /// Value of one cost at one node, for reports.

@@ -1,0 +1,49 @@
+#pragma once
+/// \file Limits of motors and joints, for every motion.
+///
+/// - Torques |u| <= effort limit, exactly: bounds of the controls, kept by a solver with ControlBounds::Enforce.
+/// - Ranges of joints with one degree of freedom, and velocities of motors, by barriers. With s the scale of a limit (half
+///   the width of the range, 1 when it is open on one side; the velocity limit) and r the coordinate, either
+///       quadratic:    1/2 w (excess of r / s)^2,                                                               (1)
+///   nothing inside and soft outside, or
+///       logarithmic:  -w (ln(distance to a bound / (margin s))), relaxed nearer than margin s (cost.h),        (2)
+///   which keeps away from the bounds, at the price of pulling on everything inside.
+#include <map>
+#include <string>
+#include <vector>
+
+#include "bielle/ocp/robot_problem.h"
+
+namespace bielle {
+
+enum class LimitBarrier { None, Quadratic, Logarithmic };
+
+struct LimitOptions {
+  LimitBarrier barrier = LimitBarrier::None;  ///< None: no limit counts, torques neither
+  double quadratic_weight = 1e3;              ///< w of Eq. (1), 1
+  double logarithmic_weight = 1e-2;           ///< w of Eq. (2), 1
+  double margin = 0.05;                       ///< of Eq. (2), 1
+  std::map<std::string, double> efforts;      ///< by motor, N m or N, in place of the limits of the model
+  std::map<std::string, double> velocities;   ///< by motor, rad/s or m/s, likewise
+
+  bool areEnforced() const { return barrier != LimitBarrier::None; }
+};
+
+/// Sets the effort limits of the stages and adds the barriers to them.
+/// \throws ModelError when there is no such motor, or a limit is not positive
+void addLimits(const Model& model, const LimitOptions& options, std::vector<StageSpec>& stages);
+
+/// What a problem is made with, besides the motion itself.
+struct ProblemOptions {
+  Formulation formulation = Formulation::Reduced;
+  LimitOptions limits;
+
+  ProblemOptions() = default;
+  ProblemOptions(Formulation formulation, const LimitOptions& limits = {}) : formulation(formulation), limits(limits) {}
+};
+
+/// The last step of making a motion: stages with their limits to a problem that starts at rest in q0.
+std::unique_ptr<RobotProblem> makeProblem(const Model& model, const VectorXd& q0, std::vector<StageSpec> stages,
+                                          const ProblemOptions& options);
+
+}  // namespace bielle
