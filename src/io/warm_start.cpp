@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
 #include "bielle/model/error.h"
 
@@ -23,6 +24,18 @@ void requireSame(const std::vector<std::string>& recorded, const std::vector<std
                      "give a result of the same robot");
 }
 
+// Moves the base over the ground so that the feet of a phase are, in the mean, at their places.
+void carryToFeet(const Model& model, Workspace& ws, const ContactPhase& phase, VectorRef x) {
+  if (!model.hasFreeFlyer() || phase.contacts.empty()) return;
+  updatePlacements(model, ws, x.head(model.nq()));
+  Vector3d error = Vector3d::Zero();
+  for (const ContactTarget& target : phase.contacts) {
+    const ContactFrame& foot = model.contacts()[target.contact];
+    error += target.X_WT.p - getPlacement(ws, foot.body, foot.X_BF).p;
+  }
+  x.head<3>() += error / static_cast<double>(phase.contacts.size());
+}
+
 }  // namespace
 
 void setGuess(const MotionRecord& record, Motion& motion) {
@@ -35,9 +48,11 @@ void setGuess(const MotionRecord& record, Motion& motion) {
     throw ModelError("", "warm start", "the recorded motion is empty or has numbers that are not finite",
                      "give the result of a solve that went through");
   const int nodes = motion.problem->numStages() + 1;
+  Workspace ws(model);
   for (int k = 0; k < nodes; ++k) {
     const int row = matchRow(k, nodes, record.q.rows());
     motion.guess.xs[k] << record.q.row(row).transpose(), record.v.row(row).transpose();
+    carryToFeet(model, ws, motion.schedule.getPhase(k), motion.guess.xs[k]);
     if (k + 1 < nodes) motion.guess.us[k] = record.u.row(matchRow(k, nodes - 1, record.u.rows())).transpose();
   }
 }
