@@ -13,7 +13,7 @@ struct RunInfo {
   std::string robot_file;            ///< its .urdf, absolute
   std::vector<std::string> command;  ///< the command line, or empty
   std::string model = "closed";      ///< or "serial": the robot's linkages were frozen (transmission/serial_model.h)
-  std::string serial_armature;       ///< of the serial model, as asked for (parseSerialArmature)
+  std::string serial_armature{};     ///< of the serial model, as asked for (parseSerialArmature)
 };
 
 struct MotionResult {
