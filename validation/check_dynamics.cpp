@@ -83,11 +83,15 @@ void addEnergyRows(CheckContext& context) {
   double total = 0, exchanged = 0, largest = 0;
   for (size_t k = 0; k < context.trace.stages.size(); ++k) {
     const StageTrace& stage = context.trace.stages[k];
-    const double gain = nodes[k + 1].kinetic + nodes[k + 1].potential - nodes[k].kinetic - nodes[k].potential;
-    const double rest = gain - stage.motor_work - stage.contact_work - stage.closure_work;
+    const double h = context.motion.isImpact(static_cast<int>(k)) ? 0 : context.motion.summary.time_step;
+    const double rest =
+        nodes[k + 1].kinetic - nodes[k].kinetic - stage.motor_work - stage.contact_work - stage.closure_work;
+    // Over the mean velocity, as all work: an Euler step falls along its last one, h^2/2 m g a away. That cancels over a
+    // motion from rest to rest.
+    const double gravity_work = h / 2 * (nodes[k].gravity_power + nodes[k + 1].gravity_power);
     const double flow = stage.exchanged + std::abs(nodes[k + 1].potential - nodes[k].potential);
-    interval.add(std::abs(rest), static_cast<int>(k));
-    total += rest;
+    interval.add(std::abs(rest - gravity_work), static_cast<int>(k));
+    total += rest + nodes[k + 1].potential - nodes[k].potential;
     exchanged += flow;
     largest = std::max(largest, flow);
   }

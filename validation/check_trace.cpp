@@ -97,6 +97,7 @@ class Tracer {
     }
     node.kinetic = simbody.calcKineticEnergy();
     node.potential = simbody.calcPotentialEnergy();
+    node.gravity_power = motion_.model.mass() * motion_.model.gravity().dot(simbody.calcComVelocity());
     return node;
   }
 

@@ -318,7 +318,7 @@ TEST_CASE("check: files that are missing, broken or of another robot are refused
   poison("/time_step_s", "soon", "summary.json");
   poison("/ground/friction", -1, "friction");
   poison("/ground", 7, "summary.json");
-  poison("/model", "serial", "model");
+  poison("/model", "serial", "not those of the robot");
   poison("/robot_file", std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar/fourbar.urdf", "not those of the robot");
   directory.write("summary.json", "{");
   refuse("summary.json");

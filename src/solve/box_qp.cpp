@@ -13,6 +13,8 @@ constexpr double kShrink = 0.6;
 constexpr double kMinStep = 1e-20;
 // A free gradient this small beside the terms it is the sum of is rounding.
 constexpr double kTolerance = 4 * std::numeric_limits<double>::epsilon();
+// What is still a solution where an ill-conditioned Hessian lets rounding end the search.
+constexpr double kAcceptable = 1e-9;
 
 }  // namespace
 
@@ -40,7 +42,8 @@ BoxQpStatus BoxQp::solve(ConstMatrixRef H, ConstVectorRef g, ConstVectorRef lowe
     if ((iteration == 0 || !same_set) && !factorize(H)) return BoxQpStatus::Indefinite;
     double free_gradient = 0;
     for (int i = 0; i < num_free_; ++i) free_gradient = std::max(free_gradient, std::abs(r[free_[i]]));
-    if (free_gradient <= kTolerance * (largest_g + n * largest_H * d.cwiseAbs().maxCoeff())) return BoxQpStatus::Ok;
+    const double scale = largest_g + n * largest_H * d.cwiseAbs().maxCoeff();
+    if (free_gradient <= kTolerance * scale) return BoxQpStatus::Ok;
 
     calcNewtonStep(r, s);
     for (double t = 1;; t *= kShrink) {  // Eq. (3), the decrease computed from the move: no cancellation
@@ -49,7 +52,7 @@ BoxQpStatus BoxQp::solve(ConstMatrixRef H, ConstVectorRef g, ConstVectorRef lowe
       H_move.noalias() = H_sym * move;
       const double slope = r.dot(move);
       if (-slope - 0.5 * move.dot(H_move) >= -kArmijo * slope) break;
-      if (t < kMinStep) return BoxQpStatus::NotConverged;
+      if (t < kMinStep) return free_gradient <= kAcceptable * scale ? BoxQpStatus::Ok : BoxQpStatus::NotConverged;
     }
     d = trial;
   }
