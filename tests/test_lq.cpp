@@ -329,6 +329,33 @@ TEST_CASE("a sweep with boxes: wide ones change nothing, tight ones clamp k and 
   CHECK(tight.expected_change == Approx(dense.calcValue(stack(dx, du, dense))).epsilon(1e-10));
 }
 
+TEST_CASE("a sweep with any control clamped: gains and value function of the free ones, as by dense elimination") {
+  const int n = 7, nu = 5;
+  for (int which = 0; which < nu; ++which) {
+    CAPTURE(which);
+    const auto models = makeModels(std::vector<int>(4, n), std::vector<int>(3, nu));
+    std::vector<ControlBox> boxes(3, {VectorXd::Constant(nu, -1e3), VectorXd::Constant(nu, 1e3)});
+    for (ControlBox& box : boxes) box.lower[which] = box.upper[which] = 0.1;
+    LqSweep sweep;
+    REQUIRE(sweep.update(models, {}, boxes).status == LqStatus::Ok);
+    std::vector<int> free;
+    for (int i = 0; i < nu; ++i)
+      if (i != which) free.push_back(i);
+    MatrixXd V = models[3].lxx;
+    for (int k = 2; k >= 0; --k) {
+      const StageModel& m = models[k];
+      const MatrixXd Quu = m.luu + m.Fu.transpose() * V * m.Fu, Qux = m.lux + m.Fu.transpose() * V * m.Fx;
+      const MatrixXd free_Qux = Qux(free, Eigen::all);
+      const MatrixXd K = -MatrixXd(Quu(free, free)).ldlt().solve(free_Qux);
+      V = m.lxx + m.Fx.transpose() * V * m.Fx + free_Qux.transpose() * K;
+      const auto& node = sweep.getNodes()[k];
+      CHECK((node.Vxx - V).norm() < 1e-10 * V.norm());
+      CHECK((MatrixXd(node.K(free, Eigen::all)) - K).norm() < 1e-10 * (1 + K.norm()));
+      CHECK(node.K.row(which).isZero(0));
+    }
+  }
+}
+
 TEST_CASE("time of a sweep in products of its tangent size", "[.][time]") {
   const int n = GENERATE(36, 108);
   const auto models = makeModels(std::vector<int>(251, n), std::vector<int>(250, 12));

@@ -166,7 +166,8 @@ class Tracer {
 
     const MatrixXd M = simbody.calcMassMatrix();
     VectorXd rows = simbody.calcConstraintAcceleration(a);
-    rows.head(loop_rows_).setZero();
+    // Loops that are closed at every node have nothing to stabilise.
+    if (motion_.summary.formulation == Formulation::Reduced) rows.head(loop_rows_).setZero();
     const VectorXd a_simbody = simbody.solveWithArmature(Precision::Double, rows).a;
     stage.acceleration = calcNorm(M, a_simbody);
     stage.acceleration_error = calcNorm(M, a - a_simbody);

@@ -274,7 +274,7 @@ std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
 void setPaperWeights(LocomotionOptions& o) {
   o.timing.start = o.timing.end = 0.2;
   o.timing.single = 0.4;
-  o.timing.both = o.timing.time_step;
+  o.timing.both = o.timing.time_step = 0.015;
   o.state_weight = 1;
   o.torso_weight = 2500;
   o.heading_weight = 0;

@@ -139,9 +139,7 @@ LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, Node& node) {
   // The free rows and columns move to the front, in place: a free index is never smaller than its rank.
   const int num_free = box_qp_.getNumFree();
   for (int j = 0; j < num_free; ++j) {
-    const int free = box_qp_.getFreeIndex(j);
-    if (free == j) continue;
-    H.col(j) = H.col(free);
+    if (const int free = box_qp_.getFreeIndex(j); free != j) H.col(j) = H.col(free);
     for (int i = j; i < num_free; ++i) H(i, j) = H(box_qp_.getFreeIndex(i), j);
   }
   if (!factorizeColumns(H, num_free)) return LqStatus::Indefinite;

@@ -19,7 +19,7 @@ struct GaitTiming {
   double single = 0.36;      ///< single support, s
   double both = 0.045;       ///< double support between steps, s
   double end = 0.45;         ///< double support after the last step, s
-  double time_step = 0.015;  ///< s
+  double time_step = 0.012;  ///< s; feet sink by it times the square of the joint speeds
 
   double stepDuration() const { return single + both; }  ///< s
 };

@@ -46,7 +46,7 @@ struct JumpOptions {
   double friction_weight = 1e-2;            ///< of leaving the friction pyramid, 1/N^2
   double swing_weight = 1e4;                ///< of the feet's path in flight, 1/m^2
   double swing_rotation_weight = 1e2;       ///< of their orientation, 1
-  double touchdown_placement_weight = 1e4;  ///< over h, 1/m^2 and 1
+  double touchdown_placement_weight = 1e5;  ///< over h, 1/m^2 and 1
   double touchdown_velocity_weight = 1e2;   ///< over h, s^2/m^2
   double terminal_weight = 1e3;             ///< of the final velocities and of the final place of the CoM
   double contact_kp = 1e4;                  ///< stabilisation of the contacts, 1/s^2; limited to 1/(4 h^2)
