@@ -23,6 +23,7 @@ void addRobots(CLI::App& app, Action& action);
 void addBench(CLI::App& app, Action& action);
 void addRatio(CLI::App& app, Action& action);
 void addLift(CLI::App& app, Action& action);
+void addStudy(CLI::App& app, Action& action);
 
 // Only the line of the help: its arguments are those of another program.
 void addValidate(CLI::App& app);

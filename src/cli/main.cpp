@@ -46,6 +46,7 @@ int main(int argc, char** argv) {
   addRobots(app, action);
   addRatio(app, action);
   addLift(app, action);
+  addStudy(app, action);
   addBench(app, action);
   addValidate(app);
   app.callback([&action] {
