@@ -24,6 +24,7 @@ void addRobots(CLI::App& app, Action& action);
 void addBench(CLI::App& app, Action& action);
 void addRatio(CLI::App& app, Action& action);
 void addLift(CLI::App& app, Action& action);
+void addStudy(CLI::App& app, Action& action);
 
 // bielle validate and bielle check: only their lines of the help, their arguments are those of other programs.
 void addCompanions(CLI::App& app);

@@ -47,6 +47,7 @@ int main(int argc, char** argv) {
   addRobots(app, action);
   addRatio(app, action);
   addLift(app, action);
+  addStudy(app, action);
   addBench(app, action);
   addCompanions(app);
   app.callback([&action] {

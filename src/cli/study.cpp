@@ -1,0 +1,176 @@
+// bielle study: the paper's comparison, case by case.
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <map>
+#include <sstream>
+#include <thread>
+
+#include "bielle/io/result.h"
+#include "bielle/model/error.h"
+#include "cli/commands.h"
+#include "study/report.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::cli {
+namespace {
+
+using namespace bielle::study;
+
+struct StudyArguments {
+  std::string name, directory = "study", robot = "bipetto";
+  std::vector<double> values;
+  int jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+};
+
+// Results depend on the program and on the files of the robot: FNV-1a over them.
+std::string calcFingerprint(const fs::path& program, const LoadedRobot& robot) {
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(robot.directory))
+    if (entry.path().extension() == ".urdf" || entry.path().extension() == ".yaml") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  files.push_back(program);
+  std::uint64_t hash = 0xcbf29ce484222325;
+  for (const fs::path& path : files) {
+    std::ifstream file(path, std::ios::binary);
+    for (std::istreambuf_iterator<char> c(file), end; c != end; ++c)
+      hash = (hash ^ static_cast<unsigned char>(*c)) * 0x100000001b3;
+  }
+  char text[32];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
+  return text;
+}
+
+std::vector<Study> chooseStudies(const StudyArguments& arguments) {
+  std::vector<Study> chosen;
+  for (const Study& study : getStudies())
+    if (arguments.name == "all" || arguments.name == study.name) chosen.push_back(study);
+  if (arguments.values.empty()) return chosen;
+  if (arguments.name == "all" || chosen[0].motion.empty())
+    throw ModelError("", "--values", "'" + arguments.name + "' is not a study of one parameter",
+                     "give values to squat, speed, walk, stairs or jump");
+  chosen[0].values = arguments.values;
+  return chosen;
+}
+
+// The cases of all studies; those that studies share, once.
+std::vector<Case> collectCases(const std::vector<Study>& studies, const std::string& robot) {
+  std::vector<Case> cases;
+  for (const Study& study : studies)
+    for (const Case& one : makeCases(study, robot))
+      if (std::none_of(cases.begin(), cases.end(), [&](const Case& other) { return other.name == one.name; }))
+        cases.push_back(one);
+  return cases;
+}
+
+StudyResult readStudy(const Study& study, const ComparedRobot& robot, const std::string& directory,
+                      const std::map<std::string, CaseOutcome>& outcomes) {
+  StudyResult result{study, {}, {}};
+  for (const double value : study.values)
+    result.comparisons.push_back(readComparison(study, value, robot, directory,
+                                                outcomes.at(makeClosedCase(study, value, "").name),
+                                                outcomes.at(makeSerialCase(study, value, "").name)));
+  if (study.motion.empty()) result.ratio = readRatio(directory + "/" + makeRatioCase("").name + "/" + kRatio);
+  return result;
+}
+
+std::string describeCommand(const StudyArguments& arguments) {
+  std::string text = "bielle study " + arguments.name + " --robot " + arguments.robot;
+  if (!arguments.values.empty()) text += " --values";
+  for (const double value : arguments.values) {
+    std::ostringstream number;
+    number << value;
+    text += " " + number.str();
+  }
+  return text;
+}
+
+int run(const StudyArguments& arguments) {
+  const std::vector<Study> studies = chooseStudies(arguments);
+  const ComparedRobot robot = loadComparedRobot(arguments.robot);
+  makeOutputDirectory(arguments.directory);
+  const std::string directory = arguments.directory + "/cases";
+  const std::vector<Case> cases = collectCases(studies, arguments.robot);
+
+  RunOptions options;
+  options.program = fs::read_symlink("/proc/self/exe");
+  options.identity = getBuildInfo().bielle + " " + calcFingerprint(options.program, robot.robot);
+  options.jobs = arguments.jobs;
+  options.progress = [](const std::string& line) { std::cout << line << std::endl; };
+  const RunOutcome outcome = runCases(directory, cases, options);
+  if (outcome.interrupted) {
+    std::cerr << "bielle: error: interrupted; the same command goes on from here" << std::endl;
+    return kFailed;
+  }
+
+  std::map<std::string, CaseOutcome> outcomes;
+  bool complete = true;
+  for (size_t i = 0; i < cases.size(); ++i) {
+    outcomes[cases[i].name] = outcome.cases[i];
+    complete &= outcome.cases[i].complete;
+  }
+  std::vector<StudyPage> pages;
+  for (const Study& study : studies) {
+    pages.push_back(writeStudy(arguments.directory, readStudy(study, robot, directory, outcomes), robot));
+    for (const std::string& file : pages.back().files) std::cout << "  " << file << "\n";
+    for (const std::string& note : pages.back().notes) std::cerr << "bielle: warning: " << note << "\n";
+  }
+  if (arguments.name == "all")
+    std::cout << "  " << writeReport(arguments.directory, arguments.robot, describeCommand(arguments), pages) << "\n";
+  if (!complete) std::cerr << "bielle: error: some cases broke down; the same command tries them anew" << std::endl;
+  return complete ? kOk : kFailed;
+}
+
+}  // namespace
+
+void addStudy(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("study", "The paper's comparison of closed and serial models, done again");
+  const auto arguments = std::make_shared<StudyArguments>();
+  std::vector<std::string> names = {"all"};
+  std::string list;
+  for (const Study& study : getStudies()) {
+    names.push_back(study.name);
+    list +=
+        "  " + study.name + std::string(10 - study.name.size(), ' ') + study.title + " (section " + study.section + ")";
+    if (study.values.size() > 1) {
+      std::ostringstream range;
+      range << ": " << study.parameter << " " << study.values.front() << " to " << study.values.back() << ", "
+            << study.values.size() << " values";
+      list += range.str();
+    }
+    list += "\n";
+  }
+  command.add_option("NAME", arguments->name, "one of the studies below, or all")
+      ->required()
+      ->check(CLI::IsMember(names));
+  command.add_option("-o,--output", arguments->directory, "directory for NAME.csv, NAME.md, figures and cases/")
+      ->capture_default_str();
+  command.add_option("--jobs", arguments->jobs, "cases at a time, one process each")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command
+      .add_option("--robot", arguments->robot,
+                  "name, directory or .urdf file of a robot with an approximate serial model")
+      ->capture_default_str();
+  command.add_option("--values", arguments->values, "values of the parameter of one study, instead of its own");
+  command.footer(
+      "Studies:\n" + list +
+      "Every motion is made twice: by the closed model, and by the approximate serial one, lifted to the closed model "
+      "afterwards.\nA case is a process of its own. Cases that have been done are kept: after Ctrl-C, a crash or a "
+      "change of "
+      "--values,\nthe same command does what is missing. A motion that does not converge or cannot be lifted is a "
+      "result.\n"
+      "Exit status: 0 done, 1 interrupted or a case broke down, 2 bad input.\n"
+      "Examples:\n"
+      "  bielle study squat -o study --jobs 2\n"
+      "  bielle study squat --values 0.6 0.62 0.64\n"
+      "  bielle study all");
+  command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
+}
+
+}  // namespace bielle::cli

@@ -1,0 +1,38 @@
+#pragma once
+// What the paper says of its comparison, beside what was found. Every verdict follows from numbers by the rule that its
+// text states; "open" where there are no numbers.
+#include <string>
+#include <vector>
+
+#include "study/measures.h"
+
+namespace bielle::study {
+
+// The reduction ratio along the range of a joint that holds the starting posture (branch 0 of ratio.json).
+struct RatioFinding {
+  std::string joint;
+  std::vector<double> angle, ratio;       // in the order of the sweep; empty: there are no results
+  std::vector<double> joint_dead_points;  // angles where the ratio is infinite, rad
+  double start = kMissing;                // ratio at the starting posture
+};
+RatioFinding readRatio(const std::string& directory);
+
+// Everything that came out of one study.
+struct StudyResult {
+  Study study;
+  std::vector<Comparison> comparisons;
+  RatioFinding ratio;  // of the study of the ratio
+};
+
+enum class Verdict { Agrees, Partly, Differs, Open };
+const char* getName(Verdict verdict);
+
+struct Claim {
+  std::string section, text;  // of the paper
+  Verdict verdict = Verdict::Open;
+  std::string found;
+};
+
+std::vector<Claim> judgeClaims(const StudyResult& result, const Model& model);
+
+}  // namespace bielle::study

@@ -1,0 +1,31 @@
+#pragma once
+// Curves over numbers, as scripts for gnuplot.
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace bielle::study {
+
+enum class CurveStyle { Lines, LinesPoints, Crosses };
+
+struct Curve {
+  std::string title;
+  std::string color;  // "#rrggbb"
+  CurveStyle style = CurveStyle::Lines;
+  bool dashed = false;
+  std::vector<std::pair<double, double>> points;  // those that are not finite interrupt the line
+};
+
+struct Plot {
+  std::string title, x_label, y_label;
+  bool logarithmic = false;  // y
+  std::vector<Curve> curves;
+};
+
+// The colours of the models, the same in all figures.
+constexpr const char *kClosedColor = "#1f77b4", *kLiftedColor = "#d62728", *kSerialColor = "#7f7f7f";
+
+// Draws the plots one below the other. False when there is no gnuplot. \throws ModelError when it cannot be drawn
+bool drawPlots(const std::string& path, const std::vector<Plot>& plots);
+
+}  // namespace bielle::study
