@@ -52,7 +52,7 @@ TEST_CASE("warm start: other lengths are resampled, feet carried to their places
   Motion motion = makeShortWalk(0.4);
   MotionRecord record = makeRecord(motion, motion.guess);
   Motion longer = makeShortWalk(0.6, 0.6);
-  REQUIRE(longer.problem->numStages() == motion.problem->numStages() + 20);
+  REQUIRE(longer.problem->numStages() == motion.problem->numStages() + 25);
   setGuess(record, longer);
   const Model& model = getBipetto();
   Workspace ws(model);
