@@ -84,8 +84,6 @@ TEST_CASE("limits: barriers hold motor velocities back") {
     CAPTURE(static_cast<int>(barrier), peak);
     LimitOptions limits;
     limits.barrier = barrier;
-    limits.quadratic_weight = 1e5;
-    limits.logarithmic_weight = 1;
     limits.velocities = {{motor, 0.7 * peak}, {"motor_knee_left", 0.7 * peak}};
     Motion slow = makeSquat(getBipetto(), options, {Formulation::Reduced, limits});
     CHECK(solve(slow, ControlBounds::Enforce).termination == FddpTermination::Converged);

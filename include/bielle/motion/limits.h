@@ -20,8 +20,8 @@ enum class LimitBarrier { None, Quadratic, Logarithmic };
 
 struct LimitOptions {
   LimitBarrier barrier = LimitBarrier::None;  ///< None: no limit counts, torques neither
-  double quadratic_weight = 1e3;              ///< w of Eq. (1), 1
-  double logarithmic_weight = 1e-2;           ///< w of Eq. (2), 1
+  double quadratic_weight = 1e5;              ///< w of Eq. (1), 1
+  double logarithmic_weight = 1;              ///< w of Eq. (2), 1
   double margin = 0.05;                       ///< of Eq. (2), 1
   std::map<std::string, double> efforts;      ///< by motor, N m or N, in place of the limits of the model
   std::map<std::string, double> velocities;   ///< by motor, rad/s or m/s, likewise
