@@ -7,19 +7,20 @@
 /// acceleration of what its coordinate leaves still (the parent body; for the second axis of a universal joint, the
 /// parent plus the first axis) and w_k the velocity of what carries its axis (the child body; for a universal joint,
 /// w_k = w-_k):
-///     V_i = sum_{k <= i} J_k v_k,    dJ_k/dt = w_k x J_k,    A_i = -g + sum_{k <= i} (J_k a_k + dJ_k v_k) (1)
+///     V_i = sum_{k <= i} J_k v_k,    dJ_k/dt = w_k x J_k,    A_i = -g + sum_{k <= i} (J_k a_k + dJ_k v_k)         (1)
 /// A change of q_k moves everything after it rigidly by J_k. In the coordinates of body i, which hide that motion,
-///     dV_i/dq_k = dV_k,               dV_k = w-_k x J_k (2) dA_i/dq_k = dA_k - V_i x dV_k,  dA_k = a-_k x J_k + w-_k x
-///     dV_k                                                 (3) dV_i/dv_k = J_k,                dA_i/dv_k = dJ_k + dV_k
-///     - V_i x J_k                                             (4)
+///     dV_i/dq_k = dV_k,                dV_k = w-_k x J_k                                                          (2)
+///     dA_i/dq_k = dA_k - V_i x dV_k,   dA_k = a-_k x J_k + w-_k x dV_k                                            (3)
+///     dV_i/dv_k = J_k,                 dA_i/dv_k = dJ_k + dV_k - V_i x J_k                                        (4)
 /// so that the force f_i = Y_i A_i + V_i x* Y_i V_i - f_ext,i varies in those coordinates by
-///     df_i/dq_k = Y_i dA_k + B_i dV_k,   df_i/dv_k = Y_i (dJ_k + dV_k) + B_i J_k (5) B x = -Y (V x x) + x x* (Y V) + V
-///     x* (Y x)                                                                      (6)
+///     df_i/dq_k = Y_i dA_k + B_i dV_k,   df_i/dv_k = Y_i (dJ_k + dV_k) + B_i J_k                                  (5)
+///     B x = -Y (V x x) + x x* (Y V) + V x* (Y x)                                                                  (6)
 /// where columns no longer depend on i: Y and B are summed over subtrees (index c). With F_i the subtree sum of f:
 ///     tau_j = J_j . F_j
-///     dtau_j/dq_k = J_j . (Yc_j dA_k + Bc_j dV_k)                 J_j moves with k (k before j, or in the same joint)
-///     (7) dtau_j/dq_k = J_j . (Yc_k dA_k + Bc_k dV_k + J_k x* F_k)    k after j (8) dtau_j/dv_k = J_j . (Yc_m (dJ_k +
-///     dV_k) + Bc_m J_k)         m the later of j and k                               (9) M_jk = J_j . Yc_m J_k (10)
+///     dtau_j/dq_k = J_j . (Yc_j dA_k + Bc_j dV_k)                  J_j moves with k (k before j, or same joint)   (7)
+///     dtau_j/dq_k = J_j . (Yc_k dA_k + Bc_k dV_k + J_k x* F_k)     k after j                                      (8)
+///     dtau_j/dv_k = J_j . (Yc_m (dJ_k + dV_k) + Bc_m J_k)          m the later of j and k                         (9)
+///     M_jk = J_j . Yc_m J_k                                                                                      (10)
 /// With Y = (m 1, -m c^; m c^, I) and the momentum (p, l) = Y V about the world origin, hats for cross products, most of B
 /// cancels:
 ///     B = (0, -2 p^; 0, B_a),    B_a = w^ I - I w^ - m (c v^T + v c^T) + 2 m (c.v) 1 - l^                         (11)
