@@ -6,3 +6,5 @@ bielle_test(limits SOURCES test_limits.cpp LIBS bielle_motion)
 bielle_test(dead_points SOURCES test_dead_points.cpp LIBS bielle_motion)
 bielle_test(formulations SOURCES test_formulations.cpp LIBS bielle_motion)
 bielle_test(bench SOURCES test_bench.cpp LIBS bielle_io)
+# Whole motions: minutes under sanitizers.
+set_tests_properties(walk stairs jump limits PROPERTIES LABELS system)
