@@ -38,7 +38,7 @@ double printFootholds(const Motion& motion, const ShootingTrajectory& trajectory
       const ContactFrame& foot = model.contacts()[target.contact];
       const Vector3d p = getPlacement(ws, foot.body, foot.X_BF).p;
       const double error = (p - target.X_WT.p).norm();
-      std::printf("%7.3f  %-14s %-10s %9.4f %9.4f %13.3f\n", k * motion.schedule.dt, phase.name.c_str(),
+      std::printf("%7.3f  %-14s %-10s %9.4f %9.4f %13.3f\n", motion.schedule.getTime(k), phase.name.c_str(),
                   foot.name.c_str(), p.x(), p.y(), 1e3 * error);
       worst = std::max(worst, error);
     }

@@ -61,7 +61,7 @@ double calcFallAcceleration(const MotionResult& result) {
   }
   const int step = nodes / 4, middle = start + nodes / 2;
   const auto height = [&](int k) { return result.record.com(k, 2); };
-  const double dt = step * result.schedule.dt;
+  const double dt = result.schedule.getTime(step);
   return (height(middle - step) - 2 * height(middle) + height(middle + step)) / (dt * dt);
 }
 

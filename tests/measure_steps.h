@@ -104,7 +104,7 @@ class StepMeter {
       if (target.contact == c) out_.foothold = std::max(out_.foothold, (getFoot(c).p - target.X_WT.p).norm());
     out_.touchdown = std::max(out_.touchdown, speeds_[c]);
     out_.tilt_at_landing = std::max(out_.tilt_at_landing, std::acos(std::min(1.0, getFoot(c).R(2, 2))));
-    out_.touchdown_times.push_back(k * motion_.schedule.dt);
+    out_.touchdown_times.push_back(motion_.schedule.getTime(k));
     out_.touchdown_coms.push_back(calcCom(model_, ws_));
   }
 

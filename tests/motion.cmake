@@ -1,5 +1,6 @@
 bielle_test(walk SOURCES test_walk.cpp LIBS bielle_motion)
 bielle_test(stairs SOURCES test_stairs.cpp LIBS bielle_motion)
+bielle_test(sequence SOURCES test_sequence.cpp LIBS bielle_motion)
 bielle_test(motion SOURCES test_motion.cpp LIBS bielle_motion)
 bielle_test(jump SOURCES test_jump.cpp LIBS bielle_motion)
 bielle_test(limits SOURCES test_limits.cpp LIBS bielle_motion)
@@ -7,4 +8,4 @@ bielle_test(dead_points SOURCES test_dead_points.cpp LIBS bielle_motion)
 bielle_test(formulations SOURCES test_formulations.cpp LIBS bielle_motion)
 bielle_test(bench SOURCES test_bench.cpp LIBS bielle_io)
 # Whole motions: minutes under sanitizers.
-set_tests_properties(walk stairs jump limits PROPERTIES LABELS system)
+set_tests_properties(walk stairs jump limits sequence PROPERTIES LABELS system)

@@ -302,8 +302,8 @@ TEST_CASE("a summary reads back: phases, stances, ground; what is none is refuse
   CHECK(summary.formulation == result.formulation);
   CHECK_FALSE(summary.converged);
   CHECK(summary.requested == result.requested);
-  CHECK(summary.time_step == result.schedule.dt);
   REQUIRE(summary.phases.size() == 1);
+  CHECK(summary.phases[0].time_step == result.schedule.phases[0].dt);
   CHECK(summary.phases[0].nodes == squat.motion.problem->numStages());
   REQUIRE(summary.phases[0].stances.size() == 2);
   for (int c = 0; c < 2; ++c) {

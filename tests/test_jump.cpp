@@ -86,7 +86,7 @@ void measureBody(const Motion& motion, const ShootingTrajectory& t, Outcome& out
     }
   }
   // The stone through the places at take-off and touchdown.
-  const double T = (land - flight) * motion.schedule.dt;
+  const double T = motion.schedule.getTime(land) - motion.schedule.getTime(flight);
   for (int k = flight; k <= land; ++k) {
     const double s = static_cast<double>(k - flight) / (land - flight);
     const Vector3d stone = (1 - s) * com[flight] + s * com[land] + 0.5 * 9.81 * T * T * s * (1 - s) * Vector3d::UnitZ();

@@ -37,7 +37,6 @@ std::vector<int> listSerialDofs(const Model& closed, const Model& serial) {
 SerialTrajectory makeTrajectory(const Motion& motion) {
   const Model& model = motion.problem->model();
   SerialTrajectory out;
-  out.dt = motion.schedule.dt;
   for (size_t k = 0; k < motion.guess.xs.size(); ++k) {
     const VectorXd& x = motion.guess.xs[k];
     out.q.push_back(x.head(model.nq()));
@@ -47,6 +46,7 @@ SerialTrajectory makeTrajectory(const Motion& motion) {
     REQUIRE(motion.problem->calcDynamics(static_cast<int>(k), x, motion.guess.us[k], a, forces) == StepStatus::Ok);
     out.a.push_back(a);
     out.forces.push_back(forces);
+    out.dt.push_back(motion.problem->spec(static_cast<int>(k)).dt);
     out.constraints.push_back(motion.problem->spec(static_cast<int>(k)).constraints);
   }
   return out;
@@ -55,7 +55,7 @@ SerialTrajectory makeTrajectory(const Motion& motion) {
 // The rocker of the four-bar at a constant speed from where it stands.
 SerialTrajectory makeSwing(const SerialModel& serial, int stages, double dt, double speed) {
   SerialTrajectory out;
-  out.dt = dt;
+  out.dt.assign(stages, dt);
   const double start = serial.q_reference[2];
   for (int k = 0; k <= stages; ++k) {
     out.q.push_back(VectorXd::Constant(1, start + k * dt * speed));

@@ -60,8 +60,7 @@ void addDynamicsRows(CheckContext& context) {
   Worst time, balance, accelerations, velocity, position, differences;
   for (int k = 0; k < context.motion.numStages(); ++k) {
     const StageTrace& stage = context.trace.stages[k];
-    const double step = context.motion.isImpact(k) ? 0 : context.motion.summary.time_step;
-    time.add(std::abs(record.time[k + 1] - record.time[k] - step), k);
+    time.add(std::abs(record.time[k + 1] - record.time[k] - context.motion.getTimeStep(k)), k);
     addLargest(balance, stage.balance, force, k, record.v_names);
     accelerations.add(stage.acceleration_error / acceleration, k);
     addLargest(velocity, stage.velocity_rest, 1, k, record.v_names);
@@ -83,7 +82,7 @@ void addEnergyRows(CheckContext& context) {
   double total = 0, exchanged = 0, largest = 0;
   for (size_t k = 0; k < context.trace.stages.size(); ++k) {
     const StageTrace& stage = context.trace.stages[k];
-    const double h = context.motion.isImpact(static_cast<int>(k)) ? 0 : context.motion.summary.time_step;
+    const double h = context.motion.getTimeStep(static_cast<int>(k));
     const double rest =
         nodes[k + 1].kinetic - nodes[k].kinetic - stage.motor_work - stage.contact_work - stage.closure_work;
     // Over the mean velocity, as all work: an Euler step falls along its last one, h^2/2 m g a away. That cancels over a

@@ -51,6 +51,8 @@ void checkPhases(const CheckedMotion& motion) {
     require(phase.nodes >= 0 && phase.nodes <= motion.numStages() - node, motion, element,
             "its nodes do not fit into the trajectory");
     node += phase.nodes;
+    require(phase.time_step >= 0 && std::isfinite(phase.time_step), motion, element + ", entry 'time_step_s'",
+            "it is negative, or not finite");
     std::set<std::string> names;
     for (const MotionSummary::Stance& stance : phase.stances) {
       require(motion.model.findContact(stance.contact) >= 0, motion, element,
@@ -78,10 +80,6 @@ std::vector<ContactTarget> CheckedMotion::getContacts(int phase) const {
   return contacts;
 }
 
-bool CheckedMotion::isImpact(int stage) const {
-  return std::find(summary.impacts.begin(), summary.impacts.end(), stage) != summary.impacts.end();
-}
-
 bool CheckedMotion::stands(int contact, int node) const {
   for (const MotionSummary::Stance& stance : summary.phases[findPhase(node)].stances)
     if (stance.contact == model.contacts()[contact].name) return true;
@@ -91,8 +89,6 @@ bool CheckedMotion::stands(int contact, int node) const {
 void checkConsistency(const CheckedMotion& motion) {
   checkNames(motion);
   require(motion.numStages() >= 1, motion, "trajectory", "it has no stage");
-  require(motion.summary.time_step > 0 && std::isfinite(motion.summary.time_step), motion, "entry 'time_step_s'",
-          "it is not positive");
   require(isFinite(motion.summary.ground) && motion.summary.ground.friction >= 0, motion, "entry 'ground'",
           "a number is not finite, or the friction negative");
   checkPhases(motion);

@@ -19,8 +19,10 @@ struct CheckedMotion {
   int findPhase(int node) const;
   /// The contacts of a phase, in the order of the summary.
   std::vector<ContactTarget> getContacts(int phase) const;
+  /// Length of a stage, s; of a rigid impact 0.
+  double getTimeStep(int stage) const { return summary.phases[findPhase(stage)].time_step; }
   /// Whether a stage is a rigid impact: no time passes, velocities jump.
-  bool isImpact(int stage) const;
+  bool isImpact(int stage) const { return getTimeStep(stage) == 0; }
   /// Whether a contact of the model stands on the ground at a node.
   bool stands(int contact, int node) const;
 };

@@ -120,7 +120,7 @@ class Tracer {
 
   // What is judged along the closures of the next node.
   void traceArrival(int k, StageTrace& stage) const {
-    const double h = motion_.isImpact(k) ? 0 : motion_.summary.time_step;
+    const double h = motion_.getTimeStep(k);
     stage.position_rest = projectOnTangent(calcStep(k) - h * motion_.record.v.row(k + 1).transpose());
   }
 
@@ -157,7 +157,7 @@ class Tracer {
   void traceStage(const SimbodyBridge& simbody, int k, StageTrace& stage) const {
     if (motion_.isImpact(k)) return traceImpact(simbody, k, stage);
     const MotionRecord& record = motion_.record;
-    const double h = motion_.summary.time_step;
+    const double h = motion_.getTimeStep(k);
     const VectorXd v = record.v.row(k), a = record.a.row(k), next = record.v.row(k + 1), d = calcStep(k);
     const VectorXd motors = calcMotorForces(motion_.model, record.u.row(k).transpose());
     std::vector<Vector6d> wrenches = gatherWrenches(k);

@@ -77,8 +77,7 @@ CheckedMotion makeFreeMotion(const Model& model, double h, Formulation formulati
   motion.summary.motion = "free motion";
   motion.summary.robot = model.name();
   motion.summary.formulation = formulation;
-  motion.summary.time_step = h;
-  motion.summary.phases = {{"free", 0, stages, {}}};
+  motion.summary.phases = {{"free", 0, stages, h, {}}};
   MotionRecord& record = motion.record;
   record.q_names = makePositionNames(model);
   record.v_names = makeVelocityNames(model);
@@ -153,7 +152,7 @@ CheckedMotion makeFourBarMotion(double h, Formulation formulation) {
   std::vector<StageSpec> specs;
   for (int k = 0; k <= stages; ++k) specs.push_back(makeStage());
   Motion motion;
-  motion.schedule = {h, {{"free", stages, {}}}};
+  motion.schedule = {{{"free", stages, h, {}}}};
   motion.problem = std::make_unique<RobotProblem>(model, q0, VectorXd::Zero(model.nv()), std::move(specs), formulation);
   ShootingTrajectory trajectory;
   trajectory.xs = {motion.problem->initialState()};
@@ -252,8 +251,10 @@ TEST_CASE("check: a foot that slides, and one that is said to be in the air") {
 
   CheckedMotion lifted = getSquat().checked;
   const auto stances = lifted.summary.phases[0].stances;
-  lifted.summary.phases = {
-      {"both", 0, 80, stances}, {"one", 80, 40, {stances[0]}}, {"both", 120, lifted.numStages() - 120, stances}};
+  const double h = lifted.getTimeStep(0);
+  lifted.summary.phases = {{"both", 0, 80, h, stances},
+                           {"one", 80, 40, h, {stances[0]}},
+                           {"both", 120, lifted.numStages() - 120, h, stances}};
   const CheckReport report = checkMotion(lifted);
   INFO(print(report));
   for (const char* name : {"swinging feet: clearance", "contact: force in the air", "equations of motion"})
@@ -314,8 +315,8 @@ TEST_CASE("check: files that are missing, broken or of another robot are refused
   poison("/phases", Json::array(), "not as long");
   poison("/phases/0/contacts/0/name", "hand", "no contact 'hand'");
   poison("/phases/0/contacts/0/name", "foot_right", "stands twice");
-  poison("/time_step_s", 0, "time_step_s");
-  poison("/time_step_s", "soon", "summary.json");
+  poison("/phases/0/time_step_s", -1, "time_step_s");
+  poison("/phases/0/time_step_s", "soon", "summary.json");
   poison("/ground/friction", -1, "friction");
   poison("/ground", 7, "summary.json");
   poison("/model", "serial", "not those of the robot");

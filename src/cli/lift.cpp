@@ -21,16 +21,6 @@ struct LiftArguments {
   LiftOptions options;
 };
 
-Motion remakeMotion(const MotionSummary& summary, const Model& serial) {
-  for (const MotionEntry& entry : getMotions()) {
-    if (entry.name != summary.motion) continue;
-    const MotionRequest request = entry.makeRequest();
-    for (const auto& [name, value] : summary.requested) setOption(request.options, name, value);
-    return request.make(serial, summary.formulation);
-  }
-  throw ModelError(summary.file, "motion '" + summary.motion + "'", "there is no such motion", "make it anew");
-}
-
 void printOutcome(const LiftArguments& arguments, const LiftResult& lifted, const MotionResult* result, int stages) {
   const std::vector<LiftNode>& nodes = lifted.nodes;
   LiftNode worst = nodes.front();
@@ -78,7 +68,8 @@ int run(const LiftArguments& arguments) {
   const LoadedRobot robot = robot_argument.load();
   const SerialModel serial =
       makeSerialModel(robot.model, makeStandingPosture(robot.model), parseSerialArmature(summary.serial_armature));
-  const Motion motion = remakeMotion(summary, serial.model);
+  const Motion motion = makeMotion(
+      serial.model, remakeRequest(summary).plan(serial.model, makeStandingPosture(serial.model)), summary.formulation);
   const SerialTrajectory trajectory = makeSerialTrajectory(motion, record);
   makeOutputDirectory(arguments.directory);
 

@@ -1,6 +1,11 @@
 #include "cli/motion_registry.h"
 
+#include <algorithm>
+#include <map>
+
+#include "bielle/model/error.h"
 #include "bielle/motion/jump.h"
+#include "bielle/motion/sequence.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
@@ -16,7 +21,7 @@ struct Preset {
 
 // The request owns its options; listOptions() is found by their type.
 template <typename Options>
-std::function<MotionRequest()> makeRequests(Motion (*make)(const Model&, const Options&, const ProblemOptions&),
+std::function<MotionRequest()> makeRequests(MotionPlan (*plan)(const Model&, const Options&, const VectorXd&),
                                             const std::vector<Preset<Options>>& presets = {}) {
   return [=] {
     const auto options = std::make_shared<Options>();
@@ -24,12 +29,35 @@ std::function<MotionRequest()> makeRequests(Motion (*make)(const Model&, const O
     request.options = listOptions(*options);
     for (const Preset<Options>& preset : presets)
       request.presets.push_back({preset.name, preset.help, [=] { preset.apply(*options); }});
-    request.make = [=](const Model& model, const ProblemOptions& problem) { return make(model, *options, problem); };
+    request.plan = [=](const Model& model, const VectorXd& q0) { return plan(model, *options, q0); };
     return request;
   };
 }
 
 constexpr const char* kPaper = "those published with the paper, on its structure: no footholds, a velocity instead";
+
+const MotionEntry& findMotion(const std::string& file, const std::string& name) {
+  std::string known;
+  for (const MotionEntry& entry : getMotions()) {
+    if (entry.name == name) return entry;
+    known += (known.empty() ? "" : ", ") + entry.name;
+  }
+  throw ModelError(file, "motion '" + name + "'", "there is no such motion", "choose one of: " + known);
+}
+
+// The motions of a sequence from the names of its options: "walk2.speed" is one of a walk.
+std::vector<std::string> listParts(const std::vector<std::pair<std::string, double>>& requested) {
+  std::vector<std::string> labels, motions;
+  for (const auto& [name, value] : requested) {
+    const size_t dot = name.find('.');
+    if (dot == std::string::npos) continue;
+    const std::string label = name.substr(0, dot);
+    if (std::find(labels.begin(), labels.end(), label) != labels.end()) continue;
+    labels.push_back(label);
+    motions.push_back(label.substr(0, label.find_last_not_of("0123456789") + 1));
+  }
+  return motions;
+}
 
 }  // namespace
 
@@ -39,34 +67,60 @@ const std::vector<MotionEntry>& getMotions() {
        "down and up again, feet flat: the height of the centre of mass follows a sine",
        "bielle solve squat --robot bipetto --depth 0.7 -o squat",
        {"depth", "duration"},
-       makeRequests<SquatOptions>(makeSquat)},
+       makeRequests<SquatOptions>(planSquat)},
       {"walk",
        "steps forward or backward on level ground, from standing to standing",
        "bielle solve walk --robot bipetto --speed 0.5 -o walk",
        {"speed", "steps", "single_support", "double_support", "swing_height"},
-       makeRequests<WalkOptions>(makeWalk, {{"paper", kPaper, setPaperWeights}})},
+       makeRequests<WalkOptions>(planWalk, {{"paper", kPaper, setPaperWeights}})},
       {"side-walk",
        "steps to the left or to the right",
        "bielle solve side-walk --robot bipetto --speed -0.2 -o side",
        {"speed", "steps", "single_support", "double_support", "swing_height"},
-       makeRequests<SideWalkOptions>(makeSideWalk, {{"paper", kPaper, setPaperWeights}})},
+       makeRequests<SideWalkOptions>(planSideWalk, {{"paper", kPaper, setPaperWeights}})},
       {"turn",
        "steps on the spot or along an arc, to another heading",
        "bielle solve turn --robot bipetto --angle 1.57 --radius 0.5 -o turn",
        {"angle", "radius", "steps", "single_support", "double_support", "swing_height"},
-       makeRequests<TurnOptions>(makeTurn)},
+       makeRequests<TurnOptions>(planTurn)},
       {"stairs",
        "up or down stairs, one foot per step",
        "bielle solve stairs --robot bipetto --height 0.06 --stairs 4 -o stairs",
        {"height", "depth", "stairs", "speed", "width", "double_support", "swing_height"},
-       makeRequests<StairsOptions>(makeStairs, {{"paper", kPaper, setPaperWeights}})},
+       makeRequests<StairsOptions>(planStairs, {{"paper", kPaper, setPaperWeights}})},
       {"jump",
        "push, fly for a given time, land: the height of the centre of mass at mid-flight follows from the time",
        "bielle solve jump --robot bipetto --flight 0.3 --length 0.2 -o jump",
        {"flight", "length"},
-       makeRequests<JumpOptions>(makeJump)},
+       makeRequests<JumpOptions>(planJump)},
   };
   return motions;
+}
+
+MotionRequest makeSequenceRequest(const std::vector<std::string>& motions) {
+  MotionRequest request;
+  std::map<std::string, int> times;
+  for (const std::string& motion : motions) {
+    const MotionRequest part = findMotion("", motion).makeRequest();
+    const int time = ++times[motion];
+    const std::string name = time == 1 ? motion : motion + std::to_string(time);
+    for (OptionEntry option : part.options) {
+      option.name = name + "." + option.name;
+      request.options.push_back(option);
+    }
+    request.parts.push_back({name, part.plan});
+  }
+  request.plan = [parts = request.parts](const Model& model, const VectorXd& q0) {
+    return planSequence(model, parts, q0);
+  };
+  return request;
+}
+
+MotionRequest remakeRequest(const MotionSummary& summary) {
+  const MotionRequest request = summary.motion == kSequence ? makeSequenceRequest(listParts(summary.requested))
+                                                            : findMotion(summary.file, summary.motion).makeRequest();
+  for (const auto& [name, value] : summary.requested) setOption(request.options, name, value);
+  return request;
 }
 
 }  // namespace bielle::cli

@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "bielle/motion/motion.h"
+#include "bielle/io/result.h"
+#include "bielle/motion/sequence.h"
 
 namespace bielle::cli {
 
@@ -19,7 +20,8 @@ struct MotionPreset {
 struct MotionRequest {
   std::vector<OptionEntry> options;
   std::vector<MotionPreset> presets;
-  std::function<Motion(const Model&, const ProblemOptions&)> make;
+  std::function<MotionPlan(const Model&, const VectorXd& q0)> plan;
+  std::vector<SequencePart> parts;  // of a sequence
 };
 
 struct MotionEntry {
@@ -29,5 +31,14 @@ struct MotionEntry {
 };
 
 const std::vector<MotionEntry>& getMotions();
+
+// Motions by name, one after the other. Options are "NAME.option"; where a motion comes again NAME is "walk2" and so on.
+// \throws ModelError when there is no such motion
+inline constexpr const char* kSequence = "sequence";
+MotionRequest makeSequenceRequest(const std::vector<std::string>& motions);
+
+// The request that a result tells of.
+// \throws ModelError when there is no such motion or option
+MotionRequest remakeRequest(const MotionSummary& summary);
 
 }  // namespace bielle::cli

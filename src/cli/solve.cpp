@@ -119,7 +119,7 @@ void addReport(const std::string& directory) {
 
 // The limits given by motor are told with what else was asked.
 Motion makeLimited(const MotionRequest& request, const Model& model, const ProblemOptions& problem) {
-  Motion motion = request.make(model, problem);
+  Motion motion = makeMotion(model, request.plan(model, makeStandingPosture(model)), problem);
   for (const auto& [motor, value] : problem.limits.efforts) motion.requested.emplace_back("limit " + motor, value);
   for (const auto& [motor, value] : problem.limits.velocities)
     motion.requested.emplace_back("velocity-limit " + motor, value);
@@ -150,6 +150,32 @@ bool checkResult(const std::string& directory) {
   return status != kFailed;
 }
 
+// Prints a line per iteration, unless quiet, and stops at a signal.
+FddpObserver makeObserver(const SolveArguments& arguments) {
+  FddpObserver observer;
+  observer.interrupt = &interrupted;
+  if (arguments.quiet) return observer;
+  observer.callback = [](const FddpIteration& line) {
+    printFddpIteration(std::cout, line);
+    std::cout.flush();
+    return FddpAction::Continue;
+  };
+  return observer;
+}
+
+// Each motion of a sequence by itself.
+ShootingTrajectory solveParts(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
+                              const SolveArguments& arguments, const FddpOptions& solver) {
+  FddpObserver observer;
+  observer.interrupt = &interrupted;
+  const auto report = [&arguments](const std::string& part, const FddpSummary& summary) {
+    if (arguments.quiet) return;
+    std::cout << "by itself, " << part << ": " << getName(summary.termination) << ", " << summary.iterations
+              << " iterations, " << formatNumber(summary.seconds, "%.2f") << " s" << std::endl;
+  };
+  return bielle::solveParts(model, request.parts, makeStandingPosture(model), problem, solver, observer, report);
+}
+
 int solve(const SolveArguments& arguments, const MotionRequest& request) {
   for (const std::string& setting : arguments.settings) {
     const auto [name, value] = parseSetting("--set", setting, "com_weight=1e5");
@@ -166,24 +192,19 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
     printSerialModel(*serial);
   }
   const LimitOptions limits = makeLimits(arguments);
-  Motion motion = makeLimited(request, serial ? serial->model : robot.model, {arguments.problem.formulation, limits});
+  const Model& model = serial ? serial->model : robot.model;
+  const ProblemOptions problem{arguments.problem.formulation, limits};
+  Motion motion = makeLimited(request, model, problem);
   FddpOptions solver = arguments.solver;
   if (limits.areEnforced()) solver.bounds = ControlBounds::Enforce;
   if (!arguments.warm_start.empty()) setGuess(readResultRecord(arguments.warm_start), motion);
   makeOutputDirectory(arguments.directory);
 
   watchSignals();
-  FddpObserver observer;
-  observer.interrupt = &interrupted;
-  if (!arguments.quiet) {
-    printFddpHeader(std::cout);
-    observer.callback = [](const FddpIteration& line) {
-      printFddpIteration(std::cout, line);
-      std::cout.flush();
-      return FddpAction::Continue;
-    };
-  }
-  const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess, observer);
+  if (!request.parts.empty() && arguments.warm_start.empty())
+    motion.guess = solveParts(request, model, problem, arguments, solver);
+  if (!arguments.quiet) printFddpHeader(std::cout);
+  const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess, makeObserver(arguments));
   const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed",
                     serial ? arguments.serial_armature : ""};
   const MotionResult result = makeResult(run, motion, motion.guess, summary);
@@ -240,19 +261,15 @@ std::string makeFlag(std::string option) {
   return "--" + option;
 }
 
-void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
-  CLI::App& sub = *command.add_subcommand(motion.name, motion.help);
-  const auto arguments = std::make_shared<SolveArguments>();
-  const auto request = std::make_shared<MotionRequest>(motion.makeRequest());
+void addOutput(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
   sub.add_option("--robot", arguments->robot.name, "name, directory or .urdf file")->required();
   sub.add_option("-o,--output", arguments->directory,
                  "directory for trajectory.csv, trajectory.npz, summary.json and report.html; made if need be")
       ->required();
-  addPresets(sub, request);
-  for (const OptionEntry& option : request->options)
-    if (std::find(motion.flags.begin(), motion.flags.end(), option.name) != motion.flags.end())
-      sub.add_option(makeFlag(option.name), *option.value, option.help + " [" + option.unit + "]")
-          ->capture_default_str();
+}
+
+// What all motions share.
+void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
   sub.add_option("--set", arguments->settings, "name=value of one of the options below; may be repeated")
       ->allow_extra_args(false);
   sub.add_option_function<std::string>(
@@ -285,12 +302,54 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   sub.add_flag("--quiet", arguments->quiet, "no line per iteration");
   sub.add_flag("--no-report", arguments->no_report, "no report.html");
   sub.add_flag("--no-check", arguments->no_check, "do not run `bielle check` on the result");
-  sub.footer(
-      "Options of --set, with default and unit:\n" + formatOptionList(motion) + "Examples:\n  " + motion.example +
-      "\n  " + motion.example + " --set com_weight=2e5 --max-iterations 50\n" +
-      "Ctrl-C stops the solver; the iterate it has by then is written, and marked as interrupted. Exit status: 0 "
-      "converged\nand checked, 1 not converged or a check failed (results are written all the same), 2 bad input.");
+}
+
+constexpr const char* kOutcome =
+    "Ctrl-C stops the solver; the iterate it has by then is written, and marked as interrupted. Exit status: 0 "
+    "converged\nand checked, 1 not converged or a check failed (results are written all the same), 2 bad input.";
+
+void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
+  CLI::App& sub = *command.add_subcommand(motion.name, motion.help);
+  const auto arguments = std::make_shared<SolveArguments>();
+  const auto request = std::make_shared<MotionRequest>(motion.makeRequest());
+  addOutput(sub, arguments);
+  addPresets(sub, request);
+  for (const OptionEntry& option : request->options)
+    if (std::find(motion.flags.begin(), motion.flags.end(), option.name) != motion.flags.end())
+      sub.add_option(makeFlag(option.name), *option.value, option.help + " [" + option.unit + "]")
+          ->capture_default_str();
+  addSolverOptions(sub, arguments);
+  sub.footer("Options of --set, with default and unit:\n" + formatOptionList(motion) + "Examples:\n  " +
+             motion.example + "\n  " + motion.example + " --set com_weight=2e5 --max-iterations 50\n" + kOutcome);
   sub.callback([&action, arguments, request] { action = [=] { return solve(*arguments, *request); }; });
+}
+
+constexpr const char* kSequenceExample =
+    "bielle solve sequence --robot bipetto --motions squat,walk,stairs,jump --set walk.speed=0.4 -o sequence";
+
+void addSequence(CLI::App& command, Action& action) {
+  CLI::App& sub = *command.add_subcommand(kSequence, "several motions one after the other, as one problem");
+  const auto arguments = std::make_shared<SolveArguments>();
+  const auto motions =
+      std::make_shared<std::vector<std::string>>(std::vector<std::string>{"squat", "walk", "stairs", "jump"});
+  addOutput(sub, arguments);
+  std::vector<std::string> names;
+  for (const MotionEntry& motion : getMotions()) names.push_back(motion.name);
+  sub.add_option("--motions", *motions, "their names, in order, with commas between them; one may come again")
+      ->delimiter(',')
+      ->check(CLI::IsMember(names))
+      ->capture_default_str();
+  addSolverOptions(sub, arguments);
+  sub.footer(
+      std::string("Options of --set are those of the motions (`bielle solve MOTION --help`) after their names, as "
+                  "walk.speed;\nwhere a motion comes again it is walk2, walk3 and so on. Each motion starts where the "
+                  "one before ends.\nEach is solved by itself first, which makes the guess for the whole, unless "
+                  "--warm-start gives one.\nExamples:\n  ") +
+      kSequenceExample +
+      "\n  bielle solve sequence --robot bipetto --motions walk,turn,walk --set walk2.speed=0.3 -o " + "there\n" +
+      kOutcome);
+  sub.callback(
+      [&action, arguments, motions] { action = [=] { return solve(*arguments, makeSequenceRequest(*motions)); }; });
 }
 
 }  // namespace
@@ -305,6 +364,8 @@ void addSolve(CLI::App& app, Action& action) {
     addMotion(command, motion, action);
     examples += "  " + motion.example + "\n";
   }
+  addSequence(command, action);
+  examples += std::string("  ") + kSequenceExample + "\n";
   command.footer(examples + "`bielle solve MOTION --help` lists what can be set.");
 }
 

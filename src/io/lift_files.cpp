@@ -19,12 +19,15 @@ SerialTrajectory makeSerialTrajectory(const Motion& motion, const MotionRecord& 
     throw ModelError(model.name(), "trajectory", "its stages, joints or contacts are not those of this motion",
                      "make it anew with `bielle solve --model serial`");
   SerialTrajectory out;
-  out.dt = problem.spec(0).dt;
   for (int k = 0; k <= stages; ++k) {
     out.q.push_back(record.q.row(k));
     out.v.push_back(record.v.row(k));
     if (k == stages) break;
+    if (problem.spec(k).kind == StageKind::Impact)
+      throw ModelError(model.name(), "stage " + std::to_string(k), "it is a rigid impact, which cannot be lifted",
+                       "solve the serial motion with `--set rigid_landing=0`");
     out.a.push_back(record.a.row(k));
+    out.dt.push_back(problem.spec(k).dt);
     const ConstraintSet& set = problem.spec(k).constraints;
     out.constraints.push_back(set);
     VectorXd forces(set.rows);
@@ -44,7 +47,6 @@ MotionResult makeLiftedResult(const RunInfo& run, const Model& closed, const Mot
   motion.name = serial.name;
   motion.ground = serial.ground;
   motion.requested = serial.requested;
-  motion.schedule.dt = serial.schedule.dt;
   int left = static_cast<int>(lifted.trajectory.us.size());
   for (ContactPhase phase : serial.schedule.phases) {
     phase.nodes = std::min(phase.nodes, left);

@@ -61,7 +61,11 @@ Json makePhases(const MotionResult& result) {
                           {"position", {p.x(), p.y(), p.z()}},
                           {"quaternion", {r.x(), r.y(), r.z(), r.w()}}});
     }
-    phases.push_back({{"name", phase.name}, {"start_node", start}, {"nodes", phase.nodes}, {"contacts", contacts}});
+    phases.push_back({{"name", phase.name},
+                      {"start_node", start},
+                      {"nodes", phase.nodes},
+                      {"time_step_s", phase.dt},
+                      {"contacts", contacts}});
     start += phase.nodes;
   }
   return phases;
@@ -106,9 +110,7 @@ Json makeSummary(const MotionResult& result) {
           {"contact_slip", {{"position_m", result.slip_position}, {"angle_rad", result.slip_angle}}},
           {"com_height", {{"start_m", result.com_start}, {"lowest_m", result.com_lowest}}},
           {"peak_torques", listByName(result.peak_torques)},
-          {"time_step_s", result.schedule.dt},
           {"phases", makePhases(result)},
-          {"impacts", result.impacts},
           {"ground", makeGround(result.ground)},
           {"log_columns", {"iteration", "cost", "gap", "gradient", "step", "regularization", "seconds"}},
           {"log", log}};
@@ -124,8 +126,6 @@ MotionResult makeResult(const RunInfo& run, const Motion& motion, const Shooting
   result.formulation = motion.problem->formulation();
   result.requested = motion.requested;
   result.schedule = motion.schedule;
-  for (int k = 0; k < motion.problem->numStages(); ++k)
-    if (motion.problem->spec(k).kind == StageKind::Impact) result.impacts.push_back(k);
   result.ground = motion.ground;
   result.solver = summary;
   result.record = makeRecord(motion, trajectory);

@@ -39,15 +39,13 @@ MotionSummary read(const Json& json) {
   summary.formulation = formulation == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
   summary.converged = json.at("converged");
   for (const auto& [name, value] : json.at("requested").items()) summary.requested.emplace_back(name, value);
-  summary.time_step = json.at("time_step_s");
   for (const Json& entry : json.at("phases")) {
-    MotionSummary::Phase phase{entry.at("name"), entry.at("start_node"), entry.at("nodes"), {}};
+    MotionSummary::Phase phase{
+        entry.at("name"), entry.at("start_node"), entry.at("nodes"), entry.at("time_step_s"), {}};
     for (const Json& contact : entry.at("contacts"))
       phase.stances.push_back({contact.at("name"), readPlacement(contact)});
     summary.phases.push_back(phase);
   }
-  if (json.contains("impacts"))
-    for (const Json& stage : json.at("impacts")) summary.impacts.push_back(stage);
   summary.ground = readGround(json.at("ground"));
   return summary;
 }

@@ -151,30 +151,29 @@ Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o, Form
   updatePositions(model, ws, scene.q0);
   scene.com0 = calcCom(model, ws);
 
-  Motion motion;
-  motion.name = "benchmark walk";
-  motion.schedule.dt = o.time_step;
-  std::vector<StageSpec> stages;
+  MotionPlan plan;
+  plan.name = "benchmark walk";
+  std::vector<StageSpec>& stages = plan.stages;
   const int last_switch = o.start_nodes + 2 * o.cycles * (o.swing_nodes + o.switch_nodes);
   for (const Phase& phase : phases) {
     const std::vector<ContactTarget> contacts =
         makeContactTargets(model, scene.q0, getStance(scene, phase.kind), o.contact_kp, o.contact_kd);
-    motion.schedule.phases.push_back({getName(phase.kind), phase.nodes, contacts});
+    plan.schedule.phases.push_back({getName(phase.kind), phase.nodes, o.time_step, contacts});
     const VectorXd u = calcStaticTorques(model, makeConstraintSet(model, contacts), scene.q0).u;
     for (int i = 0; i < phase.nodes; ++i) {
       const int node = static_cast<int>(stages.size());
       const double time = o.time_step * (std::clamp(node, o.start_nodes, last_switch) - o.start_nodes);
       stages.push_back(makeStage(scene, phase.kind, contacts, (i + 1.0) / (phase.nodes + 1.0), time));
-      motion.guess.us.push_back(u);
+      plan.guess.us.push_back(u);
     }
   }
   stages.push_back(makeTerminalStage(scene));
-  const size_t num_nodes = stages.size();
-  motion.problem =
-      std::make_unique<RobotProblem>(model, scene.q0, VectorXd::Zero(model.nv()), std::move(stages), formulation);
-  motion.guess.xs.assign(num_nodes, motion.problem->initialState());
-  motion.requested = {{"speed", o.speed}, {"step_height", o.step_height}, {"total_nodes", double(o.total_nodes)}};
-  return motion;
+  VectorXd x0 = VectorXd::Zero(model.nq() + model.nv());
+  x0.head(model.nq()) = scene.q0;
+  plan.guess.xs.assign(stages.size(), x0);
+  plan.q_start = plan.q_end = scene.q0;
+  plan.requested = {{"speed", o.speed}, {"step_height", o.step_height}, {"total_nodes", double(o.total_nodes)}};
+  return makeMotion(model, std::move(plan), formulation);
 }
 
 }  // namespace bielle

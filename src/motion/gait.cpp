@@ -62,6 +62,7 @@ void solvePendulum(double ratio, Eigen::Ref<Eigen::Matrix2Xd> p) {
 }
 
 void fillFeet(const FootstepPlan& plan, const SwingShape& shape, double h, Gait& gait) {
+  const double start = calcHeading(calcMiddle(plan.start[0], plan.start[1]));
   double load = 0.5;
   size_t k = 0;
   for (size_t p = 0; p < gait.phases.size(); ++p) {
@@ -87,7 +88,7 @@ void fillFeet(const FootstepPlan& plan, const SwingShape& shape, double h, Gait&
         node.V_F /= h;
         feet[static_cast<int>(step.side)] = node.X_WF;
       }
-      node.heading = calcHeading(calcMiddle(feet[0], feet[1]));
+      node.heading = std::remainder(calcHeading(calcMiddle(feet[0], feet[1])) - start, 2 * kPi);
     }
     load = after;
   }

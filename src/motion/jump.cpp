@@ -118,10 +118,8 @@ StageSpec makeTerminalStage(const Scene& scene) {
   return stage;
 }
 
-Scene makeScene(const Model& model, const JumpOptions& o) {
-  Scene scene{
-      model, o, calcJumpFigures(o, model.gravity().norm()), makeStandingPosture(model), makeStateWeights(model), {}, {},
-      {},    {}};
+Scene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
+  Scene scene{model, o, calcJumpFigures(o, model.gravity().norm()), q0, makeStateWeights(model), {}, {}, {}, {}};
   if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3).setConstant(o.torso_weight);
   raiseMotorWeights(model, o.motor_weight, scene.state_weights);
   std::vector<int> feet;
@@ -237,14 +235,14 @@ std::vector<OptionEntry> listOptions(JumpOptions& o) {
           {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"}};
 }
 
-Motion makeJump(const Model& model, const JumpOptions& options, const ProblemOptions& problem) {
+MotionPlan planJump(const Model& model, const JumpOptions& options, const VectorXd& q0) {
   check(model, options);
-  const Scene scene = makeScene(model, options);
-  Motion motion;
-  motion.name = "jump";
-  motion.schedule.dt = options.time_step;
-  motion.ground.friction = options.friction;
-  std::vector<StageSpec> stages;
+  const Scene scene = makeScene(model, options, q0);
+  MotionPlan plan;
+  plan.name = "jump";
+  plan.ground.height = scene.before.front().X_WT.p.z();
+  plan.ground.friction = options.friction;
+  std::vector<StageSpec>& stages = plan.stages;
   const double g = model.gravity().norm();
   const GroundCosts ground{options.force_weight, options.pressure_weight, options.friction_weight,
                            options.friction / std::sqrt(2)};  // the pyramid within the cone
@@ -254,7 +252,7 @@ Motion makeJump(const Model& model, const JumpOptions& options, const ProblemOpt
         &contacts = phase == Phase::Flight ? none : (over ? scene.after : scene.before);
     const int nodes = countNodes(options, phase);
     if (nodes == 0) continue;
-    motion.schedule.phases.push_back({getName(phase), nodes, contacts});
+    plan.schedule.phases.push_back({getName(phase), nodes, options.time_step, contacts});
     const VectorXd u = contacts.empty() ? VectorXd::Zero(model.nu()).eval()
                                         : calcStaticTorques(model, makeConstraintSet(model, contacts), scene.q0).u;
     for (int i = 0; i < nodes; ++i) {
@@ -268,16 +266,21 @@ Motion makeJump(const Model& model, const JumpOptions& options, const ProblemOpt
         addHeightCost(scene, "apex", options.apex_weight / options.time_step, com.height, stage);
       if (phase == Phase::Flight && i > 0) addSwingCosts(scene, static_cast<double>(i) / nodes, stage);
       if (phase == Phase::Land && i == 0) addTouchdownCosts(scene, stage);
-      motion.guess.xs.push_back(makeGuess(scene, phase, i * options.time_step));
-      motion.guess.us.push_back(u);
+      plan.guess.xs.push_back(makeGuess(scene, phase, i * options.time_step));
+      plan.guess.us.push_back(u);
     }
   }
   stages.push_back(makeTerminalStage(scene));
-  motion.guess.xs.push_back(makeGuess(scene, Phase::Settle, 0));
-  motion.problem = makeProblem(model, scene.q0, std::move(stages), problem);
+  plan.guess.xs.push_back(makeGuess(scene, Phase::Settle, 0));
+  plan.q_start = q0;
+  plan.q_end = carryPosture(model, q0, {Matrix3d::Identity(), scene.shift});
   JumpOptions copy = options;
-  for (const OptionEntry& entry : listOptions(copy)) motion.requested.emplace_back(entry.name, *entry.value);
-  return motion;
+  plan.requested = listValues(listOptions(copy));
+  return plan;
+}
+
+Motion makeJump(const Model& model, const JumpOptions& options, const ProblemOptions& problem) {
+  return makeMotion(model, planJump(model, options, makeStandingPosture(model)), problem);
 }
 
 }  // namespace bielle

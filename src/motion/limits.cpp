@@ -93,10 +93,4 @@ void addLimits(const Model& model, const LimitOptions& options, std::vector<Stag
   }
 }
 
-std::unique_ptr<RobotProblem> makeProblem(const Model& model, const VectorXd& q0, std::vector<StageSpec> stages,
-                                          const ProblemOptions& options) {
-  addLimits(model, options.limits, stages);
-  return std::make_unique<RobotProblem>(model, q0, VectorXd::Zero(model.nv()), std::move(stages), options.formulation);
-}
-
 }  // namespace bielle

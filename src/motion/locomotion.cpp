@@ -297,12 +297,12 @@ void setPaperWeights(LocomotionOptions& o) {
   o.closure_kp = o.closure_kd = 0;
 }
 
-Stance makeStance(const Model& model, const LocomotionOptions& options) {
+Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0) {
   if (!model.hasFreeFlyer())
     throw ModelError(model.name(), "root joint", "the robot cannot walk, its base is fixed",
                      "load it with a free base");
   Stance stance;
-  stance.q = makeStandingPosture(model);
+  stance.q = q0;
   Workspace ws(model);
   updatePositions(model, ws, stance.q);
   stance.com = calcCom(model, ws);
@@ -318,8 +318,8 @@ Stance makeStance(const Model& model, const LocomotionOptions& options) {
   return stance;
 }
 
-Motion makeLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
-                      const LocomotionOptions& options, const ProblemOptions& problem) {
+MotionPlan planLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
+                          const LocomotionOptions& options) {
   check(options);
   Scene scene{model,
               stance,
@@ -328,33 +328,34 @@ Motion makeLocomotion(const Model& model, const Stance& stance, const Locomotion
               makeGait(task.plan, options.timing, options.swing, stance.com, model.gravity().norm()),
               makeWeights(model, options)};
   check(scene);
-  Motion motion;
-  motion.name = task.name;
-  motion.schedule.dt = options.timing.time_step;
-  motion.ground = task.ground;
-  motion.ground.friction = options.friction;
-  std::vector<StageSpec> stages;
+  MotionPlan plan;
+  plan.name = task.name;
+  plan.ground = task.ground;
+  plan.ground.friction = options.friction;
   size_t node = 0;
   for (const GaitPhase& phase : scene.gait.phases) {
     const std::vector<ContactTarget> contacts = makeTargets(scene, phase);
     const VectorXd u = calcStaticTorques(model, makeConstraintSet(model, contacts), stance.q).u;
     if (scene.gait.nodes[node].lands && options.rigid_landing != 0) {
-      motion.schedule.phases.push_back({"impact", 1, contacts});
-      stages.push_back(makeImpact(scene, scene.gait.nodes[node], contacts));
-      motion.guess.us.push_back(VectorXd::Zero(model.nu()));
-      motion.guess.xs.push_back(makeGuess(scene, scene.gait.nodes[node]));
+      plan.schedule.phases.push_back({"impact", 1, 0, contacts});
+      plan.stages.push_back(makeImpact(scene, scene.gait.nodes[node], contacts));
+      plan.guess.us.push_back(VectorXd::Zero(model.nu()));
+      plan.guess.xs.push_back(makeGuess(scene, scene.gait.nodes[node]));
     }
-    motion.schedule.phases.push_back({nameOf(scene, phase), phase.nodes, contacts});
+    plan.schedule.phases.push_back({nameOf(scene, phase), phase.nodes, options.timing.time_step, contacts});
     for (int i = 0; i < phase.nodes; ++i, ++node) {
-      stages.push_back(makeStage(scene, scene.gait.nodes[node], contacts));
-      motion.guess.us.push_back(u);
-      motion.guess.xs.push_back(makeGuess(scene, scene.gait.nodes[node]));
+      plan.stages.push_back(makeStage(scene, scene.gait.nodes[node], contacts));
+      plan.guess.us.push_back(u);
+      plan.guess.xs.push_back(makeGuess(scene, scene.gait.nodes[node]));
     }
   }
-  stages.push_back(makeTerminalStage(scene));
-  motion.problem = makeProblem(model, stance.q, std::move(stages), problem);
-  motion.guess.xs.push_back(makeGuess(scene, scene.gait.nodes.back()));
-  return motion;
+  plan.stages.push_back(makeTerminalStage(scene));
+  plan.guess.xs.push_back(makeGuess(scene, scene.gait.nodes.back()));
+  const auto end = task.plan.getStance(static_cast<int>(task.plan.steps.size()));
+  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
+  plan.q_start = stance.q;
+  plan.q_end = carryPosture(model, stance.q, calcMiddle(end[0], end[1]) * start.inverse());
+  return plan;
 }
 
 }  // namespace bielle

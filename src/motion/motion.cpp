@@ -21,8 +21,27 @@ void setOption(const std::vector<OptionEntry>& options, const std::string& name,
   throw ModelError("", "option '" + name + "'", "there is no such option", "choose one of: " + known);
 }
 
+std::vector<std::pair<std::string, double>> listValues(const std::vector<OptionEntry>& options) {
+  std::vector<std::pair<std::string, double>> values;
+  for (const OptionEntry& option : options) values.emplace_back(option.name, *option.value);
+  return values;
+}
+
 void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy) {
   if (!ok) throw ModelError("", "option '" + option + "'", problem, remedy);
+}
+
+Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options) {
+  addLimits(model, options.limits, plan.stages);
+  Motion motion;
+  motion.name = std::move(plan.name);
+  motion.schedule = std::move(plan.schedule);
+  motion.ground = std::move(plan.ground);
+  motion.problem = std::make_unique<RobotProblem>(model, plan.q_start, VectorXd::Zero(model.nv()),
+                                                  std::move(plan.stages), options.formulation);
+  motion.guess = std::move(plan.guess);
+  motion.requested = std::move(plan.requested);
+  return motion;
 }
 
 StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constraints, ConstVectorRef q) {
@@ -55,6 +74,15 @@ VectorXd makeStandingPosture(const Model& model) {
   if (result.status != AssemblyStatus::Closed)
     throw ModelError(model.name(), "reference '" + name + "'", result.message, "correct its targets");
   return result.q;
+}
+
+VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X) {
+  VectorXd carried = q;
+  if (!model.hasFreeFlyer()) return carried;
+  carried.head<3>() = X.act(q.head<3>());
+  const Eigen::Quaterniond turn(X.R), base(Eigen::Vector4d(q.segment<4>(3)));
+  carried.segment<4>(3) = (turn * base).coeffs();
+  return carried;
 }
 
 ContactGains limitContactGains(const ContactGains& gains, double h) {

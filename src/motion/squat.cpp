@@ -76,9 +76,8 @@ double calcSquatHeight(const SquatOptions& o, double t) {
   return 1 - (1 - o.depth) * 0.5 * (1 - std::cos(2 * kPi * s));
 }
 
-Motion makeSquat(const Model& model, const SquatOptions& options, const ProblemOptions& problem) {
+MotionPlan planSquat(const Model& model, const SquatOptions& options, const VectorXd& q0) {
   check(model, options);
-  const VectorXd q0 = makeStandingPosture(model);
   std::vector<int> feet;
   for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
   const ContactGains gains = limitContactGains({options.contact_kp, options.contact_kd}, options.time_step);
@@ -86,31 +85,39 @@ Motion makeSquat(const Model& model, const SquatOptions& options, const ProblemO
   Workspace ws(model);
   updatePositions(model, ws, q0);
   const Vector3d com0 = calcCom(model, ws);
+  double level = 0;  // of the soles
+  for (const ContactTarget& contact : contacts) level += contact.X_WT.p.z() / static_cast<double>(contacts.size());
 
-  Motion motion;
-  motion.name = "squat";
-  motion.ground.friction = options.friction;
+  MotionPlan plan;
+  plan.name = "squat";
+  plan.ground.height = level;
+  plan.ground.friction = options.friction;
   const int nodes = static_cast<int>(std::ceil((options.duration + 2 * options.settle) / options.time_step - 1e-9));
-  motion.schedule = {options.time_step, {{"double support", nodes, contacts}}};
-  std::vector<StageSpec> stages;
+  plan.schedule.phases = {{"double support", nodes, options.time_step, contacts}};
   for (int k = 0; k <= nodes; ++k) {
-    const Vector3d com(com0.x(), com0.y(), com0.z() * calcSquatHeight(options, k * options.time_step));
-    stages.push_back(makeStage(model, options, contacts, q0, com));
+    const double height = (com0.z() - level) * calcSquatHeight(options, k * options.time_step);
+    const Vector3d com(com0.x(), com0.y(), level + height);
+    plan.stages.push_back(makeStage(model, options, contacts, q0, com));
   }
-  StageSpec& terminal = stages.back();
+  StageSpec& terminal = plan.stages.back();
   terminal.constraints = {};
   terminal.control.weight = 0;
   terminal.costs.resize(1);  // the height; forces have no meaning at the terminal node
   terminal.state.weight = options.terminal_weight;
   terminal.state.weights.head(model.nv()).setZero();
-  motion.problem = makeProblem(model, q0, std::move(stages), problem);
 
-  const VectorXd u0 = calcStaticTorques(model, makeConstraintSet(model, contacts), q0).u;
-  motion.guess.xs.assign(nodes + 1, motion.problem->initialState());
-  motion.guess.us.assign(nodes, u0);
+  VectorXd x0 = VectorXd::Zero(model.nq() + model.nv());
+  x0.head(model.nq()) = q0;
+  plan.guess.xs.assign(nodes + 1, x0);
+  plan.guess.us.assign(nodes, calcStaticTorques(model, makeConstraintSet(model, contacts), q0).u);
+  plan.q_start = plan.q_end = q0;
   SquatOptions copy = options;
-  for (const OptionEntry& entry : listOptions(copy)) motion.requested.emplace_back(entry.name, *entry.value);
-  return motion;
+  plan.requested = listValues(listOptions(copy));
+  return plan;
+}
+
+Motion makeSquat(const Model& model, const SquatOptions& options, const ProblemOptions& problem) {
+  return makeMotion(model, planSquat(model, options, makeStandingPosture(model)), problem);
 }
 
 }  // namespace bielle

@@ -18,7 +18,7 @@ int check(const Model& model, const Stance& stance, const StairsOptions& o) {
   require(o.stairs >= 1 && o.stairs <= 100 && o.stairs == std::floor(o.stairs), "stairs",
           "it is not a whole number from 1 to 100", "give a number of steps");
   require(o.speed > 0, "speed", "it is not positive", "give m/s, e.g. 0.3");
-  require(o.width > stance.feet[0].p.y() - stance.feet[1].p.y() + 2 * foot.half_width, "width",
+  require(o.width > (stance.feet[0].p - stance.feet[1].p).norm() + 2 * foot.half_width, "width",
           "the feet do not fit on the stairs", "give metres, e.g. 0.8");
   const double single = o.depth / o.speed - o.gait.timing.both;
   require(single >= 0.2 && single <= 3, "speed",
@@ -28,12 +28,13 @@ int check(const Model& model, const Stance& stance, const StairsOptions& o) {
 }
 
 // Foot i on step i; both end on the last one.
-FootstepPlan planStairs(const Stance& stance, const StairsOptions& o, int stairs) {
+FootstepPlan planFootholds(const Stance& stance, const StairsOptions& o, int stairs) {
   FootstepPlan plan{stance.feet, {}};
+  const Vector3d up = calcMiddle(stance.feet[0], stance.feet[1]).R * Vector3d(o.depth, 0, o.height);
   Side side = Side::Right;
   for (int i = 1; i <= stairs + 1; ++i, side = getOther(side)) {
     SE3 X = stance.feet[static_cast<int>(side)];
-    X.p += std::min(i, stairs) * Vector3d(o.depth, 0, o.height);
+    X.p += std::min(i, stairs) * up;
     plan.steps.push_back({side, X});
   }
   return plan;
@@ -77,36 +78,33 @@ void setPaperWeights(StairsOptions& o) {
   o.gait.fly_high_weight = 50;
 }
 
-Ground makeStairsGround(const StairsOptions& o, const Vector3d& start) {
-  constexpr double kLanding = 1;  // length of the level part behind the robot, or at the end, m
+Ground makeStairsGround(const StairsOptions& o, const SE3& X_WP) {
   const int stairs = static_cast<int>(o.stairs);
   Ground ground;
-  ground.height = std::min(0.0, stairs * o.height);
-  const auto add = [&](double from, double to, double z) {
-    ground.steps.push_back({Vector3d((from + to) / 2, start.y(), z), to - from, o.width, 0});
-  };
-  const double edge = start.x() + o.depth / 2;
-  if (o.height < 0) add(start.x() - kLanding, edge, 0);
-  for (int i = 1; i <= stairs; ++i) {
-    const double from = edge + (i - 1) * o.depth;
-    add(from, i < stairs ? from + o.depth : from + kLanding, i * o.height);
-  }
+  ground.height = X_WP.p.z() + std::min(0.0, stairs * o.height);
+  for (int i = o.height < 0 ? 0 : 1; i <= stairs; ++i)
+    ground.steps.push_back({X_WP.act(i * Vector3d(o.depth, 0, o.height)), o.depth, o.width, calcHeading(X_WP)});
   return ground;
 }
 
-Motion makeStairs(const Model& model, const StairsOptions& options, const ProblemOptions& problem) {
+MotionPlan planStairs(const Model& model, const StairsOptions& options, const VectorXd& q0) {
   StairsOptions o = options;
-  const Stance stance = makeStance(model, o.gait);
+  const Stance stance = makeStance(model, o.gait, q0);
+  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   const int stairs = check(model, stance, o);
   o.gait.timing.single = o.depth / o.speed - o.gait.timing.both;
   LocomotionTask task;
   task.name = "stairs";
-  task.plan = planStairs(stance, o, stairs);
-  task.ground = makeStairsGround(o, calcMiddle(stance.feet[0], stance.feet[1]).p);
-  task.com_velocity = Vector3d(o.speed, 0, 0);
-  Motion motion = makeLocomotion(model, stance, task, o.gait, problem);
-  for (const OptionEntry& entry : listOptions(o)) motion.requested.emplace_back(entry.name, *entry.value);
-  return motion;
+  task.plan = planFootholds(stance, o, stairs);
+  task.ground = makeStairsGround(o, start);
+  task.com_velocity = start.R * Vector3d(o.speed, 0, 0);
+  MotionPlan plan = planLocomotion(model, stance, task, o.gait);
+  plan.requested = listValues(listOptions(o));
+  return plan;
+}
+
+Motion makeStairs(const Model& model, const StairsOptions& options, const ProblemOptions& problem) {
+  return makeMotion(model, planStairs(model, options, makeStandingPosture(model)), problem);
 }
 
 }  // namespace bielle

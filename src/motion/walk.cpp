@@ -7,19 +7,22 @@
 namespace bielle {
 namespace {
 
+// \param velocity  in the axes of the feet at the start
 template <typename Options>
-Motion makeSteps(const Model& model, const char* name, const StepCommand& command, const Vector3d& velocity, Side first,
-                 const Options& options, const ProblemOptions& problem) {
+MotionPlan planSteps(const Model& model, const char* name, const StepCommand& command, const Vector3d& velocity,
+                     Side first, const Options& options, const VectorXd& q0) {
   const int steps = countSteps("steps", options.steps);
-  const Stance stance = makeStance(model, options.gait);
+  const Stance stance = makeStance(model, options.gait, q0);
+  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   LocomotionTask task;
   task.name = name;
   task.plan = planFootsteps(stance.feet[0], stance.feet[1], command, steps, first);
-  task.com_velocity = velocity;
-  Motion motion = makeLocomotion(model, stance, task, options.gait, problem);
+  task.ground.height = start.p.z();
+  task.com_velocity = start.R * velocity;
+  MotionPlan plan = planLocomotion(model, stance, task, options.gait);
   Options copy = options;
-  for (const OptionEntry& entry : listOptions(copy)) motion.requested.emplace_back(entry.name, *entry.value);
-  return motion;
+  plan.requested = listValues(listOptions(copy));
+  return plan;
 }
 
 std::vector<OptionEntry> join(std::vector<OptionEntry> entries, LocomotionOptions& gait) {
@@ -57,22 +60,34 @@ void setPaperWeights(SideWalkOptions& o) {
   o.gait.feet_distance_weight = 10;
 }
 
-Motion makeWalk(const Model& model, const WalkOptions& o, const ProblemOptions& problem) {
-  return makeSteps(model, "walk", {o.speed * o.gait.timing.stepDuration(), 0, 0}, Vector3d(o.speed, 0, 0), Side::Right,
-                   o, problem);
+MotionPlan planWalk(const Model& model, const WalkOptions& o, const VectorXd& q0) {
+  return planSteps(model, "walk", {o.speed * o.gait.timing.stepDuration(), 0, 0}, Vector3d(o.speed, 0, 0), Side::Right,
+                   o, q0);
 }
 
-Motion makeSideWalk(const Model& model, const SideWalkOptions& o, const ProblemOptions& problem) {
-  return makeSteps(model, "side walk", {0, o.speed * o.gait.timing.stepDuration(), 0}, Vector3d(0, o.speed, 0),
-                   o.speed > 0 ? Side::Left : Side::Right, o, problem);
+MotionPlan planSideWalk(const Model& model, const SideWalkOptions& o, const VectorXd& q0) {
+  return planSteps(model, "side-walk", {0, o.speed * o.gait.timing.stepDuration(), 0}, Vector3d(0, o.speed, 0),
+                   o.speed > 0 ? Side::Left : Side::Right, o, q0);
 }
 
-Motion makeTurn(const Model& model, const TurnOptions& o, const ProblemOptions& problem) {
+MotionPlan planTurn(const Model& model, const TurnOptions& o, const VectorXd& q0) {
   if (!(o.radius >= 0))
     throw ModelError("", "option 'radius'", "it is negative", "give metres, and a negative angle to turn to the right");
   const double yaw = o.angle / std::max(1, countSteps("steps", o.steps) - 1);
-  return makeSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(),
-                   yaw > 0 ? Side::Left : Side::Right, o, problem);
+  return planSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(),
+                   yaw > 0 ? Side::Left : Side::Right, o, q0);
+}
+
+Motion makeWalk(const Model& model, const WalkOptions& options, const ProblemOptions& problem) {
+  return makeMotion(model, planWalk(model, options, makeStandingPosture(model)), problem);
+}
+
+Motion makeSideWalk(const Model& model, const SideWalkOptions& options, const ProblemOptions& problem) {
+  return makeMotion(model, planSideWalk(model, options, makeStandingPosture(model)), problem);
+}
+
+Motion makeTurn(const Model& model, const TurnOptions& options, const ProblemOptions& problem) {
+  return makeMotion(model, planTurn(model, options, makeStandingPosture(model)), problem);
 }
 
 }  // namespace bielle

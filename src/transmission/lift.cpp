@@ -56,6 +56,7 @@ class Lifter {
     std::vector<VectorXd>&xs = result_.trajectory.xs, &us = result_.trajectory.us;
     us.resize(xs.empty() ? 0 : std::min(us.size(), xs.size() - 1));
     result_.constraints.resize(us.size());
+    result_.dt.resize(us.size());
     return std::move(result_);
   }
 
@@ -222,10 +223,10 @@ const char* getName(LiftStatus status) {
   return "?";
 }
 
-std::vector<StageSpec> makeStages(double dt, const std::vector<ConstraintSet>& constraints) {
+std::vector<StageSpec> makeStages(const std::vector<double>& dt, const std::vector<ConstraintSet>& constraints) {
   std::vector<StageSpec> stages(constraints.size() + 1);
   for (size_t k = 0; k < constraints.size(); ++k) {
-    stages[k].dt = dt;
+    stages[k].dt = dt[k];
     stages[k].constraints = constraints[k];
   }
   return stages;
@@ -235,7 +236,8 @@ LiftResult lift(const Model& closed, const SerialModel& serial, const SerialTraj
                 const LiftOptions& options) {
   const size_t stages = trajectory.a.size();
   bool fits = stages > 0 && trajectory.q.size() == stages + 1 && trajectory.v.size() == stages + 1 &&
-              trajectory.constraints.size() == stages && trajectory.forces.size() == stages;
+              trajectory.constraints.size() == stages && trajectory.dt.size() == stages &&
+              trajectory.forces.size() == stages;
   for (size_t k = 0; fits && k <= stages; ++k)
     fits = trajectory.q[k].size() == serial.model.nq() && trajectory.v[k].size() == serial.model.nv() &&
            trajectory.q[k].allFinite() && trajectory.v[k].allFinite() &&

@@ -22,7 +22,6 @@ struct MotionResult {
   Formulation formulation = Formulation::Full;
   std::vector<std::pair<std::string, double>> requested;  ///< every option by name
   ContactSchedule schedule;
-  std::vector<int> impacts;  ///< stages that are rigid impacts
   Ground ground;
   FddpSummary solver;
   MotionRecord record;
@@ -48,6 +47,7 @@ struct MotionSummary {
   struct Phase {
     std::string name;
     int start_node = 0, nodes = 0;
+    double time_step = 0;  ///< s; 0: a rigid impact
     std::vector<Stance> stances;
   };
   std::string file;  ///< that was read
@@ -57,9 +57,7 @@ struct MotionSummary {
   Formulation formulation = Formulation::Full;
   bool converged = false;
   std::vector<std::pair<std::string, double>> requested;
-  double time_step = 0;  ///< s
   std::vector<Phase> phases;
-  std::vector<int> impacts;  ///< stages that are rigid impacts
   Ground ground;
 };
 

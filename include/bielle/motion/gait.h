@@ -41,7 +41,7 @@ struct GaitPhase {
 
 struct GaitNode {
   Vector3d com = Vector3d::Zero(), com_velocity = Vector3d::Zero();  ///< m, m/s
-  double heading = 0, heading_rate = 0;                              ///< rad, rad/s
+  double heading = 0, heading_rate = 0;                              ///< since the start; rad, rad/s
   double load[2] = {0.5, 0.5};  ///< share of the weight on the left and on the right foot
   int phase = 0;
   double progress = 0;              ///< of the swing, in (0, 1)

@@ -70,8 +70,9 @@ struct JumpHeight {
 };
 JumpHeight calcJumpHeight(const JumpOptions& options, double gravity, double t);
 
-/// Jump with all contacts of the robot at once, from its standing posture.
+/// Jump with all contacts of the robot at once, from the standing posture q0.
 /// \throws ModelError when the request is impossible (durations, lengths, no contact)
+MotionPlan planJump(const Model& model, const JumpOptions& options, const VectorXd& q0);
 Motion makeJump(const Model& model, const JumpOptions& options = {}, const ProblemOptions& problem = {});
 
 }  // namespace bielle

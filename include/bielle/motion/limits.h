@@ -42,8 +42,4 @@ struct ProblemOptions {
   ProblemOptions(Formulation formulation, const LimitOptions& limits = {}) : formulation(formulation), limits(limits) {}
 };
 
-/// The last step of making a motion: stages with their limits to a problem that starts at rest in q0.
-std::unique_ptr<RobotProblem> makeProblem(const Model& model, const VectorXd& q0, std::vector<StageSpec> stages,
-                                          const ProblemOptions& options);
-
 }  // namespace bielle

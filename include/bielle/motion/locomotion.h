@@ -68,8 +68,8 @@ struct Stance {
   std::array<int, 2> contacts{};  ///< indices of the left and right foot
   std::array<SE3, 2> feet;        ///< their placements
 };
-/// \throws ModelError when the robot lacks a foot, or a posture
-Stance makeStance(const Model& model, const LocomotionOptions& options);
+/// The stance in a closed posture q0. \throws ModelError when the robot lacks a foot
+Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0);
 
 /// What is to be done.
 struct LocomotionTask {
@@ -80,7 +80,7 @@ struct LocomotionTask {
 };
 
 /// \throws ModelError when the request is impossible: footholds out of the legs' reach, soles that collide, durations
-Motion makeLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
-                      const LocomotionOptions& options, const ProblemOptions& problem);
+MotionPlan planLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
+                          const LocomotionOptions& options);
 
 }  // namespace bielle

@@ -24,8 +24,22 @@ struct OptionEntry {
 /// \throws ModelError naming the options there are
 void setOption(const std::vector<OptionEntry>& options, const std::string& name, double value);
 
+/// The options' present values.
+std::vector<std::pair<std::string, double>> listValues(const std::vector<OptionEntry>& options);
+
 /// \throws ModelError naming the option, unless ok
 void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy);
+
+/// A motion before it becomes a problem: what a sequence joins. It starts and ends standing.
+struct MotionPlan {
+  std::string name;
+  ContactSchedule schedule;
+  Ground ground;
+  std::vector<StageSpec> stages;                          ///< N running ones and the terminal one
+  ShootingTrajectory guess;                               ///< quasi-static
+  VectorXd q_start, q_end;                                ///< standing postures, nq
+  std::vector<std::pair<std::string, double>> requested;  ///< what was asked, by option name
+};
 
 /// A problem ready to be solved, with what reports need to know about it.
 struct Motion {
@@ -36,6 +50,10 @@ struct Motion {
   ShootingTrajectory guess;                               ///< quasi-static
   std::vector<std::pair<std::string, double>> requested;  ///< what was asked, by option name
 };
+
+/// The last step of making a motion: its stages, with their limits, to a problem that starts at rest.
+/// \throws ModelError when there is no motor that a limit names
+Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options);
 
 /// Motor torques that hold the robot still at q under the closures and contacts, as well as they can: with a = v = 0,
 ///     b(q, 0) = B u + J^T lambda (1)
@@ -49,6 +67,10 @@ StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constra
 /// The robot's starting posture: its reference `half_sitting`, or the only reference it has.
 /// \throws ModelError when there is none, or it cannot be closed
 VectorXd makeStandingPosture(const Model& model);
+
+/// The posture q carried over the ground by X, a displacement and a turn about the vertical. A robot without a free-flyer
+/// stays where it is.
+VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X);
 
 /// Stabilisation of contacts, 1/s^2 and 1/s, limited to 1/(4 h^2) and 1/h with h the time step: one Euler step turns a
 /// contact velocity e into (1 - kd h) e, beyond 1/h it would swing back.

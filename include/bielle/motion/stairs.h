@@ -3,7 +3,7 @@
 ///
 /// Step i is a box whose top is i times the height over (or under) the ground that the robot starts from; its middle is
 /// i times the depth ahead of the starting feet. Foot i lands on the middle of step i, the last foot joins it on the top
-/// one, which is long enough to stand on.
+/// one. Going down, the robot starts from a step of the same depth.
 #include "bielle/motion/locomotion.h"
 
 namespace bielle {
@@ -25,10 +25,11 @@ std::vector<OptionEntry> listOptions(StairsOptions& options);
 /// Weights and durations of the paper's stairs.
 void setPaperWeights(StairsOptions& options);
 
-/// The stairs in front of feet that start with the middle of their soles at x = `start`.
-Ground makeStairsGround(const StairsOptions& options, const Vector3d& start);
+/// The stairs in front of feet whose middle (calcMiddle) is X_WP at the start.
+Ground makeStairsGround(const StairsOptions& options, const SE3& X_WP);
 
-/// \throws ModelError when the request is impossible (see locomotion.h)
+/// From the standing posture q0. \throws ModelError when the request is impossible (see locomotion.h)
+MotionPlan planStairs(const Model& model, const StairsOptions& options, const VectorXd& q0);
 Motion makeStairs(const Model& model, const StairsOptions& options = {}, const ProblemOptions& problem = {});
 
 }  // namespace bielle

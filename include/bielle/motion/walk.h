@@ -33,7 +33,12 @@ std::vector<OptionEntry> listOptions(TurnOptions& options);
 void setPaperWeights(WalkOptions& options);
 void setPaperWeights(SideWalkOptions& options);
 
-/// \throws ModelError when the request is impossible (see locomotion.h)
+/// From the standing posture q0. \throws ModelError when the request is impossible (see locomotion.h)
+MotionPlan planWalk(const Model& model, const WalkOptions& options, const VectorXd& q0);
+MotionPlan planSideWalk(const Model& model, const SideWalkOptions& options, const VectorXd& q0);
+MotionPlan planTurn(const Model& model, const TurnOptions& options, const VectorXd& q0);
+
+/// The same, as problems from the robot's standing posture.
 Motion makeWalk(const Model& model, const WalkOptions& options = {}, const ProblemOptions& problem = {});
 Motion makeSideWalk(const Model& model, const SideWalkOptions& options = {}, const ProblemOptions& problem = {});
 Motion makeTurn(const Model& model, const TurnOptions& options = {}, const ProblemOptions& problem = {});

@@ -1,5 +1,6 @@
 #pragma once
 /// \file Which feet stand where and when, as a small readable list.
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -11,17 +12,26 @@ namespace bielle {
 struct ContactPhase {
   std::string name;                     ///< e.g. "double support"
   int nodes = 0;                        ///< stages it lasts
+  double dt = 0;                        ///< length of a stage, s; 0: a rigid impact
   std::vector<ContactTarget> contacts;  ///< feet on the ground, with their places
 };
 
 struct ContactSchedule {
-  double dt = 0.015;  ///< s
   std::vector<ContactPhase> phases;
 
   int numStages() const {
     int n = 0;
     for (const ContactPhase& phase : phases) n += phase.nodes;
     return n;
+  }
+  /// Time of a node since the start, s.
+  double getTime(int node) const {
+    double time = 0;
+    for (const ContactPhase& phase : phases) {
+      time += std::min(node, phase.nodes) * phase.dt;
+      node -= std::min(node, phase.nodes);
+    }
+    return time;
   }
   /// Phase of a stage; the terminal node belongs to the last one.
   const ContactPhase& getPhase(int stage) const {

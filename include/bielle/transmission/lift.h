@@ -25,9 +25,9 @@ namespace bielle {
 
 /// N stages, N + 1 nodes of the serial model.
 struct SerialTrajectory {
-  double dt = 0.015;                       ///< s
   std::vector<VectorXd> q, v;              ///< N + 1, of the serial model
   std::vector<VectorXd> a;                 ///< N
+  std::vector<double> dt;                  ///< N, s
   std::vector<ConstraintSet> constraints;  ///< N, the contacts of the serial model in force
   std::vector<VectorXd> forces;            ///< N, on the rows of the constraints
 };
@@ -58,15 +58,15 @@ struct LiftNode {
 
 struct LiftResult {
   std::vector<LiftNode> nodes;             ///< up to the one that fails
-  double dt = 0;                           ///< s
   std::vector<ConstraintSet> constraints;  ///< loops and contacts in force at every stage that was lifted
+  std::vector<double> dt;                  ///< of these stages, s
   ShootingTrajectory trajectory;           ///< of the closed model, as far as it was lifted
 
   bool lifted() const { return !nodes.empty() && nodes.back().status == LiftStatus::Lifted; }
 };
 
 /// The stages of a problem with these dynamics and without costs, the terminal node among them.
-std::vector<StageSpec> makeStages(double dt, const std::vector<ConstraintSet>& constraints);
+std::vector<StageSpec> makeStages(const std::vector<double>& dt, const std::vector<ConstraintSet>& constraints);
 
 /// \throws ModelError when the trajectory is not one of the serial model
 LiftResult lift(const Model& closed, const SerialModel& serial, const SerialTrajectory& trajectory,

@@ -1,0 +1,136 @@
+#include "bielle/motion/sequence.h"
+
+#include <cmath>
+
+#include "bielle/math/so3.h"
+#include "bielle/model/error.h"
+#include "bielle/motion/footsteps.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kSameLevel = 1e-6;  // m
+constexpr double kRim = 0.01;        // of a platform around the soles, m
+
+// What carries the soles that stand on a plan's plane once the plane lies lower: their bounding box, along the first one.
+// \pre a sole stands there
+GroundStep makePlatform(const Model& model, const std::vector<ContactTarget>& soles) {
+  const SE3& first = soles.front().X_WT;
+  const double yaw = calcHeading(first);
+  const Matrix3d R = makeAxisRotation(Vector3d::UnitZ(), yaw);
+  Eigen::AlignedBox2d box;
+  for (const ContactTarget& sole : soles) {
+    const ContactFrame& frame = model.contacts()[sole.contact];
+    for (double x : {-frame.half_length, frame.half_length})
+      for (double y : {-frame.half_width, frame.half_width})
+        box.extend((R.transpose() * sole.X_WT.act(Vector3d(x, y, 0))).head<2>().eval());
+  }
+  const Vector3d middle = R * Vector3d(box.center().x(), box.center().y(), 0);
+  return {middle + first.p.z() * Vector3d::UnitZ(), box.sizes().x() + 2 * kRim, box.sizes().y() + 2 * kRim, yaw};
+}
+
+std::vector<ContactTarget> listSolesOnPlane(const MotionPlan& plan) {
+  std::vector<ContactTarget> soles;
+  for (const ContactPhase& phase : plan.schedule.phases)
+    for (const ContactTarget& contact : phase.contacts)
+      if (std::abs(contact.X_WT.p.z() - plan.ground.height) < kSameLevel) soles.push_back(contact);
+  return soles;
+}
+
+Ground joinGrounds(const Model& model, const std::vector<MotionPlan>& plans) {
+  Ground ground = plans.front().ground;
+  ground.steps.clear();
+  for (const MotionPlan& plan : plans) {
+    ground.height = std::min(ground.height, plan.ground.height);
+    if (plan.ground.friction != ground.friction)
+      throw ModelError("", "option '" + plan.name + ".friction'", "the ground has another one for the motions before",
+                       "give the same friction for all motions of the sequence");
+  }
+  for (const MotionPlan& plan : plans) {
+    const std::vector<ContactTarget> soles = listSolesOnPlane(plan);
+    if (plan.ground.height > ground.height + kSameLevel && !soles.empty())
+      ground.steps.push_back(makePlatform(model, soles));
+    ground.steps.insert(ground.steps.end(), plan.ground.steps.begin(), plan.ground.steps.end());
+  }
+  return ground;
+}
+
+// Steps and platforms of one motion may lie where the feet of another one stand.
+void checkSoles(const Model& model, const MotionPlan& plan, const Ground& ground) {
+  for (const ContactPhase& phase : plan.schedule.phases)
+    for (const ContactTarget& sole : phase.contacts) {
+      const ContactFrame& frame = model.contacts()[sole.contact];
+      for (double x : {-frame.half_length, frame.half_length})
+        for (double y : {-frame.half_width, frame.half_width}) {
+          const Vector3d corner = sole.X_WT.act(Vector3d(x, y, 0));
+          if (ground.calcHeight(corner.x(), corner.y()) > corner.z() + kSameLevel)
+            throw ModelError("", "motion '" + plan.name + "' of the sequence",
+                             "its '" + phase.name + "' stands where another motion of the sequence has higher ground",
+                             "lead away from there first, e.g. by a walk");
+        }
+    }
+}
+
+template <typename T>
+void moveAll(std::vector<T>& from, std::vector<T>& to) {
+  to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+}
+
+// The last state of a part is the first one of the next.
+void join(ShootingTrajectory& part, ShootingTrajectory& whole) {
+  if (!whole.xs.empty()) whole.xs.pop_back();
+  moveAll(part.xs, whole.xs);
+  moveAll(part.us, whole.us);
+}
+
+}  // namespace
+
+MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0) {
+  if (parts.empty())
+    throw ModelError("", "sequence", "it has no motion", "name at least one, e.g. squat, walk, stairs or jump");
+  std::vector<MotionPlan> plans;
+  for (const SequencePart& part : parts) {
+    plans.push_back(part.plan(model, plans.empty() ? q0 : plans.back().q_end));
+    plans.back().name = part.name;
+  }
+  MotionPlan sequence;
+  sequence.name = "sequence";
+  sequence.ground = joinGrounds(model, plans);
+  for (const MotionPlan& plan : plans) checkSoles(model, plan, sequence.ground);
+  sequence.q_start = q0;
+  sequence.q_end = plans.back().q_end;
+  for (size_t i = 0; i < plans.size(); ++i) {
+    MotionPlan& plan = plans[i];
+    if (i + 1 < plans.size()) plan.stages.pop_back();
+    moveAll(plan.stages, sequence.stages);
+    join(plan.guess, sequence.guess);
+    for (ContactPhase& phase : plan.schedule.phases) {
+      phase.name = plan.name + ": " + phase.name;
+      sequence.schedule.phases.push_back(std::move(phase));
+    }
+    for (auto& [name, value] : plan.requested) sequence.requested.emplace_back(plan.name + "." + name, value);
+  }
+  return sequence;
+}
+
+ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
+                              const ProblemOptions& problem, const FddpOptions& solver, const FddpObserver& observer,
+                              const PartReport& report) {
+  ShootingTrajectory whole;
+  VectorXd q = q0;
+  for (const SequencePart& part : parts) {
+    MotionPlan plan = part.plan(model, q);
+    q = plan.q_end;
+    Motion motion = makeMotion(model, std::move(plan), problem);
+    const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess, observer);
+    if (report) report(part.name, summary);
+    join(motion.guess, whole);
+  }
+  return whole;
+}
+
+Motion makeSequence(const Model& model, const std::vector<SequencePart>& parts, const ProblemOptions& problem) {
+  return makeMotion(model, planSequence(model, parts, makeStandingPosture(model)), problem);
+}
+
+}  // namespace bielle
