@@ -128,6 +128,21 @@ Outcome solveAndMeasure(Motion& motion, FddpSummary& summary) {
 
 }  // namespace
 
+TEST_CASE("jump: the paper's problem has a solution, which flies as a stone") {
+  JumpOptions options;
+  setPaperWeights(options);
+  Motion motion = makeJump(getBipetto(), options);
+  CHECK(motion.problem->numStages() == 4 * 10 + 26);
+  FddpSummary summary;
+  const Outcome out = solveAndMeasure(motion, summary);
+  CAPTURE(summary.message, summary.iterations);
+  CHECK(summary.termination == FddpTermination::Converged);
+  CHECK(out.stone < 1e-2);
+  CHECK(out.rise == Approx(9.81 * 0.39 * 0.39 / 8).epsilon(0.05));
+  CHECK(out.knee_lowest > 0);
+  CHECK(out.tilt < 0.2);
+}
+
 TEST_CASE("jump: Bipetto flies as long and as far as asked, and lands softly") {
   struct Row {
     Formulation formulation;

@@ -35,6 +35,8 @@ std::function<MotionRequest()> makeRequests(MotionPlan (*plan)(const Model&, con
 }
 
 constexpr const char* kPaper = "those published with the paper, on its structure: no footholds, a velocity instead";
+constexpr const char* kPaperJump =
+    "those published with the paper, on its structure: no paths of the feet, the height at mid-flight alone";
 
 const MotionEntry& findMotion(const std::string& file, const std::string& name) {
   std::string known;
@@ -92,7 +94,7 @@ const std::vector<MotionEntry>& getMotions() {
        "push, fly for a given time, land: the height of the centre of mass at mid-flight follows from the time",
        "bielle solve jump --robot bipetto --flight 0.3 --length 0.2 -o jump",
        {"flight", "length"},
-       makeRequests<JumpOptions>(planJump)},
+       makeRequests<JumpOptions>(planJump, {{"paper", kPaperJump, setPaperWeights}})},
   };
   return motions;
 }

@@ -95,11 +95,14 @@ void addHeightCost(const Scene& scene, const std::string& name, double weight, d
 
 void addTouchdownCosts(const Scene& scene, StageSpec& stage) {
   const JumpOptions& o = scene.options;
+  const Vector6d weights = (Vector6d() << Vector3d::Constant(o.touchdown_foothold_weight).head<2>(),
+                            o.touchdown_height_weight, Vector3d::Constant(o.touchdown_rotation_weight))
+                               .finished();
   for (const ContactTarget& target : scene.after) {
     const ContactFrame& contact = scene.model.contacts()[target.contact];
     const BodyFrame foot{contact.body, contact.X_BF};
-    stage.costs.push_back({"touchdown " + contact.name, o.touchdown_placement_weight / o.time_step,
-                           Activation::makeQuadratic(Vector6d::Ones()), makeFramePlacement(foot, target.X_WT)});
+    stage.costs.push_back({"touchdown " + contact.name, 1 / o.time_step, Activation::makeQuadratic(weights),
+                           makeFramePlacement(foot, target.X_WT)});
     stage.costs.push_back({"touchdown velocity " + contact.name, o.touchdown_velocity_weight / o.time_step,
                            Activation::makeQuadratic(Vector6d::Ones()), makeFrameVelocity(foot)});
   }
@@ -227,12 +230,36 @@ std::vector<OptionEntry> listOptions(JumpOptions& o) {
           {"friction_weight", &o.friction_weight, "1/N^2", "stay inside the friction pyramid"},
           {"swing_weight", &o.swing_weight, "1/m^2", "path of the feet in flight"},
           {"swing_rotation_weight", &o.swing_rotation_weight, "1", "soles stay level in flight"},
-          {"touchdown_placement_weight", &o.touchdown_placement_weight, "1/m^2", "feet land flat, where they should"},
+          {"touchdown_foothold_weight", &o.touchdown_foothold_weight, "1/m^2", "feet land where they should"},
+          {"touchdown_height_weight", &o.touchdown_height_weight, "1/m^2", "feet land on the ground"},
+          {"touchdown_rotation_weight", &o.touchdown_rotation_weight, "1", "feet land flat"},
           {"touchdown_velocity_weight", &o.touchdown_velocity_weight, "s^2/m^2", "feet land without speed"},
           {"terminal_weight", &o.terminal_weight, "1", "end at rest, in place"},
           {"contact_kp", &o.contact_kp, "1/s^2",
            "stabilisation of the contacts, position (limited to 1/(4 h^2), h the time step)"},
           {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"}};
+}
+
+void setPaperWeights(JumpOptions& o) {
+  o.time_step = 0.015;
+  o.stand = o.push = o.land = o.settle = 10 * o.time_step;
+  o.flight = 26 * o.time_step;
+  o.stretch = 0;
+  o.apex_weight = 1e5 * o.time_step;  // a running cost there
+  o.com_weight = 0;
+  o.state_weight = 0.7;
+  o.torso_weight = 2500;
+  o.motor_weight = 0;
+  o.control_weight = 0.05;
+  o.force_weight = 500;
+  o.pressure_weight = 5;
+  o.swing_weight = o.swing_rotation_weight = 0;
+  o.touchdown_foothold_weight = 0;
+  o.touchdown_height_weight = 1e5;
+  o.touchdown_rotation_weight = o.touchdown_velocity_weight = 1e3;
+  o.terminal_weight = 1e3;
+  o.contact_kp = 0;
+  o.contact_kd = 100;
 }
 
 MotionPlan planJump(const Model& model, const JumpOptions& options, const VectorXd& q0) {

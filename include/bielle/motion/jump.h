@@ -35,26 +35,32 @@ struct JumpOptions {
   double friction = 0.7;     ///< coefficient, 1
   double time_step = 0.005;  ///< s
 
-  double apex_weight = 1e4;                 ///< of the CoM's height at mid-flight, over h, 1/m^2
-  double com_weight = 1e3;                  ///< of the CoM's height on the ground, 1/m^2
-  double state_weight = 0.02;               ///< of the state regularization
-  double torso_weight = 2000;               ///< of the torso's rotation within the state regularization
-  double motor_weight = 1;                  ///< of motor velocities within the state regularization
-  double control_weight = 3e-3;             ///< of the motor torques, 1/(N m)^2
-  double force_weight = 30;                 ///< of the contact force reference, over (m g)^2
-  double pressure_weight = 1;               ///< of the centre of pressure, over the half size of the sole squared
-  double friction_weight = 1e-2;            ///< of leaving the friction pyramid, 1/N^2
-  double swing_weight = 1e4;                ///< of the feet's path in flight, 1/m^2
-  double swing_rotation_weight = 1e2;       ///< of their orientation, 1
-  double touchdown_placement_weight = 1e5;  ///< over h, 1/m^2 and 1
-  double touchdown_velocity_weight = 1e2;   ///< over h, s^2/m^2
-  double terminal_weight = 1e3;             ///< of the final velocities and of the final place of the CoM
-  double contact_kp = 1e4;                  ///< stabilisation of the contacts, 1/s^2; limited to 1/(4 h^2)
-  double contact_kd = 200;                  ///< 1/s; limited to 1/h
+  double apex_weight = 1e4;                ///< of the CoM's height at mid-flight, over h, 1/m^2
+  double com_weight = 1e3;                 ///< of the CoM's height on the ground, 1/m^2
+  double state_weight = 0.02;              ///< of the state regularization
+  double torso_weight = 2000;              ///< of the torso's rotation within the state regularization
+  double motor_weight = 1;                 ///< of motor velocities within the state regularization
+  double control_weight = 3e-3;            ///< of the motor torques, 1/(N m)^2
+  double force_weight = 30;                ///< of the contact force reference, over (m g)^2
+  double pressure_weight = 1;              ///< of the centre of pressure, over the half size of the sole squared
+  double friction_weight = 1e-2;           ///< of leaving the friction pyramid, 1/N^2
+  double swing_weight = 1e4;               ///< of the feet's path in flight, 1/m^2
+  double swing_rotation_weight = 1e2;      ///< of their orientation, 1
+  double touchdown_foothold_weight = 1e5;  ///< horizontal place of the feet, over h, 1/m^2
+  double touchdown_height_weight = 1e5;    ///< their height, over h, 1/m^2
+  double touchdown_rotation_weight = 1e5;  ///< their orientation, over h, 1
+  double touchdown_velocity_weight = 1e2;  ///< over h, s^2/m^2
+  double terminal_weight = 1e3;            ///< of the final velocities and of the final place of the CoM
+  double contact_kp = 1e4;                 ///< stabilisation of the contacts, 1/s^2; limited to 1/(4 h^2)
+  double contact_kd = 200;                 ///< 1/s; limited to 1/h
 };
 
 /// Every number of the options by name, pointing into `options`.
 std::vector<OptionEntry> listOptions(JumpOptions& options);
+
+/// Weights and durations of the paper's jump (its example code), on its structure: no paths and footholds of the feet, the
+/// height of the CoM at mid-flight alone. Hips keep the importance of the walk, theirs was that of the other joints.
+void setPaperWeights(JumpOptions& options);
 
 /// What a jump is in numbers, Eq. (1), with the durations that fit the time step.
 struct JumpFigures {
