@@ -8,7 +8,7 @@ bielle_packages=(g++ cmake ninja-build libeigen3-dev liburdfdom-dev liburdfdom-h
   libnlopt-cxx-dev gnuplot-nox libjs-three libjs-dygraphs)
 # What its tests need besides: Catch2, Simbody to compare with, Google Benchmark, Python to read NumPy archives, a browser
 # to look at reports.
-bielle_test_packages=(catch2 libsimbody-dev libbenchmark-dev python3 chromium)
+bielle_test_packages=(catch2 libsimbody-dev libbenchmark-dev python3 chromium pkg-config)
 
 # install_missing PACKAGE...: installs those that dpkg does not know as installed.
 install_missing() {

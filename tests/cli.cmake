@@ -7,7 +7,20 @@ set_tests_properties(cli PROPERTIES LABELS system)
 
 # An installation is found, linked and run by a project of its own. It takes what has been built.
 add_test(NAME install COMMAND ${CMAKE_COMMAND}
-  -DBUILD=${PROJECT_BINARY_DIR} -DSOURCE=${CMAKE_CURRENT_SOURCE_DIR}/consumer -DWORK=${CMAKE_CURRENT_BINARY_DIR}/install
+  -DBUILD=${PROJECT_BINARY_DIR} -DROOT=${PROJECT_SOURCE_DIR} -DSOURCE=${CMAKE_CURRENT_SOURCE_DIR}/consumer
+  -DWORK=${CMAKE_CURRENT_BINARY_DIR}/install
   -DCXX=${CMAKE_CXX_COMPILER} -DGENERATOR=${CMAKE_GENERATOR} -DCONFIG=$<CONFIG>
   -P ${CMAKE_CURRENT_SOURCE_DIR}/consumer/check_install.cmake)
 set_tests_properties(install PROPERTIES LABELS system)
+
+# Manual pages and completion follow the help of the command.
+foreach(name man completion)
+  add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_${name}.py
+    $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
+  set_tests_properties(${name} PROPERTIES LABELS unit SKIP_RETURN_CODE 77)
+endforeach()
+
+# Packages run everywhere: a build that is tuned to its machine is refused, and the preset tunes nothing.
+add_test(NAME package COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_package.py
+  ${CMAKE_COMMAND} ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_BINARY_DIR}/package)
+set_tests_properties(package PROPERTIES LABELS system)

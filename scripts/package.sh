@@ -1,0 +1,11 @@
+#!/bin/bash
+# Makes the Debian packages `bielle` and `libbielle-dev` in build-package. Installs what is missing (Debian 12).
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
+
+install_missing "${bielle_packages[@]}" libsimbody-dev dpkg-dev file
+cd "$bielle_root"
+build build-package --preset package
+cd build-package
+cpack -G DEB
+ls -l "$PWD"/*.deb

@@ -1,0 +1,40 @@
+#!/bin/bash
+# try_package.sh [DIRECTORY]: installs the packages of scripts/package.sh on a bare Debian 12, made by debootstrap in the
+# directory (default: a temporary one, removed at the end), and runs what they bring. As root.
+set -euo pipefail
+packages=$(cd "$(dirname "${BASH_SOURCE[0]}")/../build-package" && pwd)
+mirror=${MIRROR:-http://deb.debian.org/debian}
+
+bare=${1:-}
+if [ -z "$bare" ]; then
+  bare=$(mktemp -d)
+  trap 'umount "$bare/proc" 2>/dev/null || true; rm -rf --one-file-system "$bare"' EXIT
+fi
+[ -e "$bare/bin/bash" ] || debootstrap --variant=minbase bookworm "$bare" "$mirror"
+mountpoint -q "$bare/proc" || mount -t proc proc "$bare/proc"
+cp "$packages"/*.deb "$bare/tmp"
+cp /etc/resolv.conf "$bare/etc"
+
+inside() { chroot "$bare" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive "$@"; }
+inside apt-get update -qq
+inside sh -ec 'apt-get install -qq -y --no-install-recommends /tmp/bielle_*.deb'
+inside sh -ec '
+  cd /tmp
+  bielle --version
+  bielle robots
+  bielle info fourbar
+  bielle solve squat --robot bipetto --depth 0.7 --quiet -o squat
+  bielle check --brief squat
+  bielle validate fourbar
+  test -s squat/report.html
+  test -e /usr/share/bash-completion/completions/bielle'
+# The library, used by a program that knows pkg-config alone.
+inside sh -ec 'apt-get install -qq -y --no-install-recommends /tmp/libbielle-dev_*.deb g++ pkg-config'
+cat > "$bare/tmp/main.cpp" <<'PROGRAM'
+#include <bielle/model/reader.h>
+#include <cstdio>
+int main() { std::printf("%d motors\n", bielle::loadRobot("bipetto").model.nu()); }
+PROGRAM
+inside sh -ec 'cd /tmp; g++ -O1 main.cpp $(pkg-config --cflags --libs bielle) -o main; ./main | grep "12 motors"'
+umount "$bare/proc"
+echo "the packages install and run on a bare machine"
