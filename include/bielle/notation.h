@@ -47,7 +47,8 @@
 /// forward when the sole rests on flat ground.
 ///
 /// ## Errata of the paper ("Optimal Control of Walkers with Parallel Actuation", 2024)
-/// Each sign below was derived anew and is held by finite differences in the tests. Equation numbers are the paper's.
+/// Each was derived anew and is held by differences (tests/test_errata.cpp, docs/signs.md). Equation numbers are the
+/// paper's; eqs. 11 to 15 are right as printed.
 /// - eqs. 2, 4, 6: the force enters eq. 2 as +J^T lambda on the right; the KKT matrix of eq. 4 and ID in eq. 6 write it on
 ///   the left with the same sign, so that their lambda is the opposite one. Here (1) holds everywhere: ID = M a + b - J^T lambda.
 /// - eq. 5: the derivative needs a minus, dy/dz = -K^{-1} [d a_c/dz; d ID/dz], both taken at fixed acceleration and fixed
@@ -55,3 +56,5 @@
 /// - eqs. 7, 8: d/dt Log6(X_12) = -nu_c at a closed configuration. The spring of a stabilised closure is a_c + k_d nu_c - k_p r = 0.
 /// - eq. 9: gamma_1 is A_1 in frame 1 (the second line prints the index of body 2).
 /// - eq. 19: with phi_2 = -X* lambda (eq. 18), d phi_2/dq = -[X* lambda]* (J_2 - X J_1); the printed sign is the opposite.
+///   The Jacobians there are in the frames of the joints, F_j1 and F_j2, not in F_1 and F_2 as the text below it says.
+/// - eq. 21: the velocity to be met is v_s*^{k+1}, at the end of the step; the printed index is k.
