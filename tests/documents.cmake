@@ -1,0 +1,20 @@
+# Pages are run as their readers would: every command, and what it shows.
+set(pages tutorial modelling signs new_robot)
+if(BIELLE_BUILD_EXAMPLES)
+  list(APPEND pages new_motion)
+endif()
+if(BIELLE_BUILD_VALIDATION)
+  add_test(NAME documents_readme COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_documents.py
+    ${PROJECT_BINARY_DIR}/bin ${PROJECT_SOURCE_DIR} README.md)
+  foreach(page ${pages})
+    add_test(NAME documents_${page} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_documents.py
+      ${PROJECT_BINARY_DIR}/bin ${PROJECT_SOURCE_DIR} docs/${page}.md)
+    set_tests_properties(documents_${page} PROPERTIES LABELS system)
+  endforeach()
+  set_tests_properties(documents_readme PROPERTIES LABELS system TIMEOUT 900)
+endif()
+
+# The pages of Doxygen: no warning, and their formulas appear.
+add_test(NAME doxygen COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_doxygen.py
+  ${CMAKE_COMMAND} ${PROJECT_BINARY_DIR})
+set_tests_properties(doxygen PROPERTIES LABELS system SKIP_RETURN_CODE 77)
