@@ -68,23 +68,24 @@ Motion makeSway(const Model& model, const SwayOptions& o) {
   const Vector3d com = calcCom(model, ws);
 
   const int nodes = static_cast<int>(std::lround(o.periods * o.period / o.time_step));
-  std::vector<StageSpec> stages;
+  MotionPlan plan;
   for (int k = 0; k <= nodes; ++k)
-    stages.push_back(makeStage(model, o, feet, q0, com + Vector3d(0, calcSway(o, k * o.time_step), 0)));
-  StageSpec& terminal = stages.back();  // no forces there: at rest in the posture of the start
+    plan.stages.push_back(makeStage(model, o, feet, q0, com + Vector3d(0, calcSway(o, k * o.time_step), 0)));
+  StageSpec& terminal = plan.stages.back();  // no forces there: at rest in the posture of the start
   terminal.constraints = {};
   terminal.control.weight = 0;
   terminal.costs.clear();
   terminal.state.weight = 1e3;
 
-  Motion motion;
-  motion.name = "sway";
-  motion.schedule = {o.time_step, {{"double support", nodes, feet}}};
-  motion.problem = makeProblem(model, q0, std::move(stages), {});
-  motion.guess.xs.assign(nodes + 1, motion.problem->initialState());
-  motion.guess.us.assign(nodes, calcStaticTorques(model, makeConstraintSet(model, feet), q0).u);
-  motion.requested = {{"amplitude", o.amplitude}, {"period", o.period}};
-  return motion;
+  plan.name = "sway";
+  plan.schedule.phases = {{"double support", nodes, o.time_step, feet}};
+  VectorXd x0 = VectorXd::Zero(model.nq() + model.nv());
+  x0.head(model.nq()) = q0;
+  plan.guess.xs.assign(nodes + 1, x0);
+  plan.guess.us.assign(nodes, calcStaticTorques(model, makeConstraintSet(model, feet), q0).u);
+  plan.q_start = plan.q_end = q0;
+  plan.requested = {{"amplitude", o.amplitude}, {"period", o.period}};
+  return makeMotion(model, std::move(plan), {});
 }
 
 // Largest difference of both sides of Eq. (2), m.
