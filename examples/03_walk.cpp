@@ -76,11 +76,7 @@ int main(int argc, char** argv) {
               options.gait.timing.stepDuration());
 
   FddpObserver observer;
-  observer.callback = [](const FddpIteration& line) {
-    printFddpIteration(std::cout, line);
-    return FddpAction::Continue;
-  };
-  printFddpHeader(std::cout);
+  observer.callback = makeFddpPrinter(std::cout);
   ShootingTrajectory trajectory = motion.guess;
   const FddpSummary summary = Fddp().solve(*motion.problem, trajectory, observer);
   const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, trajectory, summary);

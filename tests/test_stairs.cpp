@@ -65,6 +65,9 @@ TEST_CASE("stairs: the ground is where it was asked for") {
   CHECK(up.calcHeight(1.6, 0) == Approx(0.15));
   CHECK(up.calcHeight(1.8, 0) == 0);
   options.height = -0.05;
+  StairsOptions sloping = options;
+  sloping.slope = -0.2;
+  CHECK(makeStairs(getBipetto(), sloping).ground.calcHeight(0.6, 0) == Approx(-3 * 0.2 * options.depth));
   const Ground down = makeStairsGround(options, {Matrix3d::Identity(), Vector3d(1, 0, 0)});
   CHECK(down.calcHeight(1, 0) == Approx(0).margin(1e-12));
   CHECK(down.calcHeight(1.2, 0) == Approx(-0.05));

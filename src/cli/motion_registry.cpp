@@ -88,7 +88,7 @@ const std::vector<MotionEntry>& getMotions() {
       {"stairs",
        "up or down stairs, one foot per step",
        "bielle solve stairs --robot bipetto --height 0.06 --stairs 4 -o stairs",
-       {"height", "depth", "stairs", "speed", "width", "double_support", "swing_height"},
+       {"height", "depth", "slope", "stairs", "speed", "width", "double_support", "swing_height"},
        makeRequests<StairsOptions>(planStairs, {{"paper", kPaper, setPaperWeights}})},
       {"jump",
        "push, fly for a given time, land: the height of the centre of mass at mid-flight follows from the time",

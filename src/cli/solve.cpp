@@ -154,12 +154,7 @@ bool checkResult(const std::string& directory) {
 FddpObserver makeObserver(const SolveArguments& arguments) {
   FddpObserver observer;
   observer.interrupt = &interrupted;
-  if (arguments.quiet) return observer;
-  observer.callback = [](const FddpIteration& line) {
-    printFddpIteration(std::cout, line);
-    std::cout.flush();
-    return FddpAction::Continue;
-  };
+  if (!arguments.quiet) observer.callback = makeFddpPrinter(std::cout);
   return observer;
 }
 
@@ -203,7 +198,6 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   watchSignals();
   if (!request.parts.empty() && arguments.warm_start.empty())
     motion.guess = solveParts(request, model, problem, arguments, solver);
-  if (!arguments.quiet) printFddpHeader(std::cout);
   const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess, makeObserver(arguments));
   const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed",
                     serial ? arguments.serial_armature : ""};
@@ -240,7 +234,7 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
   sub.add_option_function<std::string>(
          "--limits", [&limits, kinds](const std::string& name) { limits.barrier = kinds.at(name); },
          "keep to the robot's limits: torques exactly, joint ranges and motor velocities by barriers, which are "
-         "`quadratic` (nothing inside) or `log` (keeps away from them)")
+         "`quadratic` (nothing inside, but for the last hundredth) or `log` (keeps away from them)")
       ->check(CLI::IsMember(std::vector<std::string>{"quadratic", "log"}));
   sub.add_option("--limit", arguments->effort_limits,
                  "motor=largest torque [N m] in place of the robot's; implies --limits quadratic; may be repeated")
@@ -334,10 +328,14 @@ void addSequence(CLI::App& command, Action& action) {
       std::make_shared<std::vector<std::string>>(std::vector<std::string>{"squat", "walk", "stairs", "jump"});
   addOutput(sub, arguments);
   std::vector<std::string> names;
-  for (const MotionEntry& motion : getMotions()) names.push_back(motion.name);
-  sub.add_option("--motions", *motions, "their names, in order, with commas between them; one may come again")
+  std::string known;
+  for (const MotionEntry& motion : getMotions()) {
+    names.push_back(motion.name);
+    known += (known.empty() ? "" : ", ") + motion.name;
+  }
+  sub.add_option("--motions", *motions, "in order, with commas between them: " + known + "; one may come again")
       ->delimiter(',')
-      ->check(CLI::IsMember(names))
+      ->check(CLI::IsMember(names).description(""))
       ->capture_default_str();
   addSolverOptions(sub, arguments);
   sub.footer(

@@ -68,9 +68,11 @@ void addBarrier(const LimitOptions& options, const std::string& name, const Boun
   for (int i = 0; i < n; ++i) scale[i] = bounds.getScale(i);
   const VectorXd lower = VectorXd::Map(bounds.lower.data(), n), upper = VectorXd::Map(bounds.upper.data(), n);
   if (options.barrier == LimitBarrier::Quadratic)
-    stage.costs.push_back({name, options.quadratic_weight,
-                           Activation::makeBarrier(scale.cwiseAbs2().cwiseInverse(), lower, upper),
-                           std::move(residual)});
+    stage.costs.push_back(
+        {name, options.quadratic_weight,
+         Activation::makeBarrier(scale.cwiseAbs2().cwiseInverse(), lower + options.quadratic_margin * scale,
+                                 upper - options.quadratic_margin * scale),
+         std::move(residual)});
   else
     stage.costs.push_back({name, options.logarithmic_weight,
                            Activation::makeLogBarrier(VectorXd::Ones(n), lower, upper, options.margin * scale),

@@ -56,6 +56,7 @@ std::vector<OptionEntry> listOptions(StairsOptions& o) {
   std::vector<OptionEntry> entries = {
       {"height", &o.height, "m", "of a step; negative: down"},
       {"depth", &o.depth, "m", "of a step"},
+      {"slope", &o.slope, "1", "height over depth; unless 0, it takes the place of the height"},
       {"stairs", &o.stairs, "1", "number of steps of the stairs"},
       {"speed", &o.speed, "m/s", "forward velocity; with the depth it gives the duration of a step"},
       {"width", &o.width, "m", "of the stairs"}};
@@ -89,6 +90,7 @@ Ground makeStairsGround(const StairsOptions& o, const SE3& X_WP) {
 
 MotionPlan planStairs(const Model& model, const StairsOptions& options, const VectorXd& q0) {
   StairsOptions o = options;
+  if (o.slope != 0) o.height = o.slope * o.depth;
   const Stance stance = makeStance(model, o.gait, q0);
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   const int stairs = check(model, stance, o);

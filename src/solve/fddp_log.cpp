@@ -35,4 +35,14 @@ void printFddpIteration(std::ostream& out, const FddpIteration& line) {
   out << text;
 }
 
+std::function<FddpAction(const FddpIteration&)> makeFddpPrinter(std::ostream& out) {
+  return [&out, first = true](const FddpIteration& line) mutable {
+    if (first) printFddpHeader(out);
+    first = false;
+    printFddpIteration(out, line);
+    out.flush();
+    return FddpAction::Continue;
+  };
+}
+
 }  // namespace bielle

@@ -4,8 +4,8 @@
 /// - Torques |u| <= effort limit, exactly: bounds of the controls, kept by a solver with ControlBounds::Enforce.
 /// - Ranges of joints with one degree of freedom, and velocities of motors, by barriers. With s the scale of a limit (half
 ///   the width of the range, 1 when it is open on one side; the velocity limit) and r the coordinate, either
-///       quadratic:    1/2 w (excess of r / s)^2,                                                               (1)
-///   nothing inside and soft outside, or
+///       quadratic:    1/2 w (excess of r / s over bounds drawn in by `quadratic_margin`)^2,                    (1)
+///   nothing inside and soft outside; what the softness yields stays within the margin; or
 ///       logarithmic:  -w (ln(distance to a bound / (margin s))), relaxed nearer than margin s (cost.h),        (2)
 ///   which keeps away from the bounds, at the price of pulling on everything inside.
 #include <map>
@@ -21,6 +21,7 @@ enum class LimitBarrier { None, Quadratic, Logarithmic };
 struct LimitOptions {
   LimitBarrier barrier = LimitBarrier::None;  ///< None: no limit counts, torques neither
   double quadratic_weight = 1e5;              ///< w of Eq. (1), 1
+  double quadratic_margin = 0.01;             ///< of Eq. (1), 1
   double logarithmic_weight = 1;              ///< w of Eq. (2), 1
   double margin = 0.05;                       ///< of Eq. (2), 1
   std::map<std::string, double> efforts;      ///< by motor, N m or N, in place of the limits of the model

@@ -149,8 +149,9 @@ class Fddp {
   std::unique_ptr<Workspace> work_;
 };
 
-/// The log as a table: its header, and one line per iteration.
+/// The log as a table: its header, and one line per iteration; and a callback that prints it as it grows.
 void printFddpHeader(std::ostream& out);
 void printFddpIteration(std::ostream& out, const FddpIteration& line);
+std::function<FddpAction(const FddpIteration&)> makeFddpPrinter(std::ostream& out);
 
 }  // namespace bielle
