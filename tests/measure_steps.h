@@ -134,8 +134,9 @@ class StepMeter {
     if (k > 0) out_.torque_variation += (t_.us[k] - t_.us[k - 1]).cwiseAbs().sum();
   }
 
-  // Between thigh and shin, seen from the left of the torso.
+  // Between thigh and shin, seen from the left of the torso; nothing for a leg without a knee.
   double calcBend(const std::string& leg) const {
+    if (model_.findJoint("knee" + leg) < 0) return 1e9;
     const auto at = [&](const std::string& joint) { return ws_.X_WB[model_.findJoint(joint + leg)].p; };
     const Vector3d left = ws_.X_WB[1].R.col(1), knee = at("knee");
     const Vector3d thigh = (knee - at("hipy")).normalized(), shin = (at("ankley") - knee).normalized();

@@ -20,6 +20,7 @@ void addView(CLI::App& app, Action& action);
 void addExport(CLI::App& app, Action& action);
 void addInfo(CLI::App& app, Action& action);
 void addEval(CLI::App& app, Action& action);
+void addGenerate(CLI::App& app, Action& action);
 void addRobots(CLI::App& app, Action& action);
 void addBench(CLI::App& app, Action& action);
 void addRatio(CLI::App& app, Action& action);
@@ -41,6 +42,10 @@ struct RobotArgument {
   LoadedRobot load() const;
 };
 void addFixedBase(CLI::App& command, RobotArgument& robot);
+
+// name=number. \throws ModelError that shows the example
+std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,
+                                            const std::string& example);
 
 // The whole command line, for the record.
 void setCommandLine(int argc, char** argv);

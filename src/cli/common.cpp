@@ -1,3 +1,4 @@
+#include <charconv>
 #include <iostream>
 #include <sstream>
 
@@ -29,6 +30,19 @@ LoadedRobot RobotArgument::load() const {
 
 void addFixedBase(CLI::App& command, RobotArgument& robot) {
   command.add_flag("--fixed-base", robot.fixed_base, "fix the root link to the ground");
+}
+
+std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,
+                                            const std::string& example) {
+  const size_t equals = setting.find('=');
+  double value = 0;
+  const char* end = setting.data() + setting.size();
+  const char* begin = equals == std::string::npos ? end : setting.data() + equals + 1;
+  const auto [stop, error] = std::from_chars(begin, end, value);
+  if (error != std::errc() || stop != end)
+    throw ModelError("", flag + " '" + setting + "'", "it is not of the form name=number",
+                     "e.g. " + flag + " " + example);
+  return {setting.substr(0, equals), value};
 }
 
 void setCommandLine(int argc, char** argv) { command_line.assign(argv, argv + argc); }

@@ -45,6 +45,7 @@ int main(int argc, char** argv) {
   addInfo(app, action);
   addEval(app, action);
   addRobots(app, action);
+  addGenerate(app, action);
   addRatio(app, action);
   addLift(app, action);
   addStudy(app, action);

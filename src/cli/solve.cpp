@@ -1,7 +1,6 @@
 // bielle solve MOTION: makes the problem, solves it, writes the result.
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <cmath>
 #include <csignal>
 #include <filesystem>
@@ -44,20 +43,6 @@ void watchSignals() {
   action.sa_flags = SA_RESETHAND | SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
-}
-
-// name=number
-std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,
-                                            const std::string& example) {
-  const size_t equals = setting.find('=');
-  double value = 0;
-  const char* end = setting.data() + setting.size();
-  const char* begin = equals == std::string::npos ? end : setting.data() + equals + 1;
-  const auto [stop, error] = std::from_chars(begin, end, value);
-  if (error != std::errc() || stop != end)
-    throw ModelError("", flag + " '" + setting + "'", "it is not of the form name=number",
-                     "e.g. " + flag + " " + example);
-  return {setting.substr(0, equals), value};
 }
 
 // A limit given for one motor asks for the limits of all.

@@ -38,11 +38,13 @@ std::vector<Linkage> listLinkages(const Model& closed, const Reduction& reductio
         coordinates += closed.joints()[i].nv;
       }
     if (joints.empty() || coordinates != block.size)
-      throw ModelError(closed.name(), "closures " + join(closures),
-                       "there is no equivalent serial chain: their linkage has mobility " + std::to_string(block.size) +
-                           ", the serial joints in it (" + join(joints) + ") have " + std::to_string(coordinates) +
-                           " coordinates",
-                       "list serial joints that determine the linkage, or use the closed model");
+      throw ModelError(
+          closed.name(), "closures " + join(closures),
+          "there is no equivalent serial chain: their linkage has mobility " + std::to_string(block.size) +
+              ", the serial joints in it (" + join(joints) + ") have " + std::to_string(coordinates) + " coordinates",
+          joints.empty() ? "use the closed model; if one-axis joints of the linkage do determine it, as a knee or "
+                           "an ankle would, list them as serial_joints"
+                         : "list serial joints that determine the linkage, or use the closed model");
     linkages.push_back(makeLinkage(closed, reduction, joints));
   }
   return linkages;

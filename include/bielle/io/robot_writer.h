@@ -1,0 +1,25 @@
+#pragma once
+/// \file A model written as the files that loadRobot reads (model/reader.h).
+#include <string>
+
+#include "bielle/model/model.h"
+
+namespace bielle {
+
+struct RobotText {
+  std::string urdf, yaml;
+};
+
+/// Masses and inertias have twelve digits; lengths, angles and directions are rounded to 1e-12. Every body, joint, frame, closure, motor,
+/// contact and reference keeps its name; links that were merged into a body are frames. Bodies keep their order where the
+/// model lists them depth first.
+/// \param remark  comment at the head of both files
+/// \throws ModelError naming what the files cannot say: a universal joint whose axes are not axes of its frame, limits of
+///     joints of several coordinates
+RobotText formatRobot(const Model& model, const std::string& remark = "");
+
+/// Writes DIRECTORY/NAME.urdf and .yaml, NAME the last name of the directory.
+/// \throws ModelError also when they cannot be written
+void writeRobot(const Model& model, const std::string& directory, const std::string& remark = "");
+
+}  // namespace bielle

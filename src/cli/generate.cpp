@@ -1,0 +1,70 @@
+// bielle generate: a robot from named numbers.
+#include <filesystem>
+#include <iostream>
+#include <sstream>
+
+#include "bielle/io/robot_writer.h"
+#include "bielle/model/error.h"
+#include "bielle/robots/generators.h"
+#include "cli/commands.h"
+#include "cli/table.h"
+
+namespace bielle::cli {
+namespace {
+
+struct GenerateArguments {
+  std::vector<std::string> settings;  // name=value
+  std::string directory;
+};
+
+std::string formatParameters(const Generator& generator) {
+  std::vector<Row> rows;
+  for (const Parameter& p : generator.makeRequest().parameters)
+    rows.push_back({p.name, formatNumber(*p.value), "[" + p.unit + "]",
+                    formatNumber(p.lower) + " .. " + formatNumber(p.upper), p.help});
+  std::ostringstream text;
+  printTable(text, rows);
+  return text.str();
+}
+
+int generate(const Generator& generator, const GenerateArguments& arguments) {
+  const GeneratorRequest request = generator.makeRequest();
+  std::string changes;
+  for (const std::string& setting : arguments.settings) {
+    const auto [name, value] = parseSetting("--set", setting, request.parameters.front().name + "=0.1");
+    setParameter(request.parameters, name, value);
+    changes += (changes.empty() ? " with " : ", ") + setting;
+  }
+  const Model model = request.make();
+  writeRobot(model, arguments.directory, "Written by `bielle generate " + generator.name + "`" + changes + ".");
+  std::cout << model.name() << ": " << formatNumber(model.mass()) << " kg, nv " << model.nv() << ", " << model.nu()
+            << " motors, " << model.closures().size() << " closures\n  " << arguments.directory << "\n";
+  return kOk;
+}
+
+}  // namespace
+
+void addGenerate(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("generate", "Write a robot made of named lengths, angles and masses");
+  command.callback([&action] {
+    if (!action) throw CLI::RequiredError("A robot");
+  });
+  for (const Generator& generator : getGenerators()) {
+    CLI::App& sub = *command.add_subcommand(generator.name, generator.help);
+    const auto arguments = std::make_shared<GenerateArguments>();
+    sub.add_option("--set", arguments->settings, "NAME=VALUE, may be repeated")->type_name("NAME=VALUE");
+    sub.add_option("-o,--output", arguments->directory,
+                   "directory of the robot; its files get its last name, and every command takes it as a robot")
+        ->required();
+    sub.footer("Parameters of --set, with default, unit and bounds:\n" + formatParameters(generator) +
+               "Example:\n  bielle generate " + generator.name + " -o my_" + generator.name);
+    sub.callback([&action, &generator, arguments] {
+      action = [&generator, arguments] { return generate(generator, *arguments); };
+    });
+  }
+  command.footer(
+      "Examples:\n  bielle generate cleobot --set upper_length=0.25 -o longer\n  bielle info longer\n"
+      "`bielle generate ROBOT --help` lists what can be set.");
+}
+
+}  // namespace bielle::cli

@@ -1,0 +1,343 @@
+#include "bielle/io/robot_writer.h"
+
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "bielle/io/text_file.h"
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+std::string formatNumber(double value, const char* format = "%.12g") {
+  char text[40];
+  std::snprintf(text, sizeof text, format, value);
+  return std::string(text) == "-0" ? "0" : text;
+}
+
+// Of a length, an angle or a direction: nothing under 1e-12.
+std::string formatRounded(double value) { return formatNumber(std::round(value * 1e12) / 1e12, "%.15g"); }
+
+std::string formatVector(const Vector3d& v, const char* separator = " ") {
+  return formatRounded(v.x()) + separator + formatRounded(v.y()) + separator + formatRounded(v.z());
+}
+
+std::string escapeXml(const std::string& text) {
+  std::string out;
+  for (char c : text) {
+    if (c == '&')
+      out += "&amp;";
+    else if (c == '<')
+      out += "&lt;";
+    else if (c == '"')
+      out += "&quot;";
+    else
+      out += c;
+  }
+  return out;
+}
+
+// A name as YAML takes it.
+std::string quote(const std::string& name) {
+  const bool plain =
+      !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) &&
+      name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") == std::string::npos;
+  if (plain) return name;
+  std::string out = "\"";
+  for (char c : name) out += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
+  return out + "\"";
+}
+
+std::string formatList(const std::vector<double>& values) {
+  std::string text;
+  for (double value : values) text += (text.empty() ? "" : ", ") + formatRounded(value);
+  return "[" + text + "]";
+}
+
+// R = Rz(yaw) Ry(pitch) Rx(roll)
+Vector3d calcRollPitchYaw(const Matrix3d& R) {
+  const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
+  if (std::hypot(R(0, 0), R(1, 0)) < 1e-9)  // roll and yaw turn about one axis: no yaw
+    return {std::atan2(-R(1, 2), R(1, 1)), pitch, 0};
+  return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
+}
+
+std::string formatOrigin(const SE3& X) {
+  std::string text = "<origin xyz=\"" + formatVector(X.p) + "\"";
+  if (!X.R.isIdentity(1e-15)) text += " rpy=\"" + formatVector(calcRollPitchYaw(X.R)) + "\"";
+  return text + "/>";
+}
+
+// The letter of a direction that is an axis of its frame, or 0.
+char getAxisLetter(const Vector3d& axis) {
+  for (int i = 0; i < 3; ++i)
+    if (axis.isApprox(Vector3d::Unit(i), 1e-12)) return static_cast<char>('X' + i);
+  return 0;
+}
+
+[[noreturn]] void refuse(const Model& model, const std::string& element, const std::string& problem) {
+  throw ModelError(model.name(), element, problem + ": its files cannot say that", "change the model");
+}
+
+class Writer {
+ public:
+  explicit Writer(const Model& model) : model_(model) {
+    for (const Body& body : model.bodies()) bodies_.insert(body.name);
+    const Joint& first = model.joints()[1];
+    bool ground = false;  // anything else on the ground makes it a link of its own
+    for (const Frame& frame : model.frames()) ground |= frame.body == 0 && frame.name != "world";
+    for (const Visual& visual : model.visuals()) ground |= visual.body == 0;
+    for (int i = 2; i < model.numBodies(); ++i) ground |= model.joints()[i].parent == 0;
+    free_root_ = !ground && model.hasFreeFlyer() && first.name == "root_joint" && first.X_PJ.p.isZero(0) &&
+                 first.X_PJ.R.isIdentity(0);
+  }
+
+  std::string formatUrdf(const std::string& remark) {
+    std::ostringstream links;
+    for (int i = free_root_ ? 1 : 0; i < model_.numBodies(); ++i) {
+      writeLink(i, links);
+      if (i > (free_root_ ? 1 : 0)) writeJoint(i, links);
+      for (const Frame& frame : model_.frames())
+        if (frame.body == i && !bodies_.count(frame.name)) writeFrame(frame.name, i, frame.X_BF, links);
+      writeMadeFrames(i, links);
+    }
+    std::ostringstream out;
+    out << "<?xml version=\"1.0\"?>\n";
+    if (!remark.empty()) out << "<!-- " << remark << " -->\n";
+    out << "<robot name=\"" << escapeXml(model_.name()) << "\">\n";
+    for (const auto& [color, name] : colors_)
+      out << "  <material name=\"" << name << "\"><color rgba=\"" << color << "\"/></material>\n";
+    out << links.str() << "</robot>\n";
+    return out.str();
+  }
+
+  std::string formatYaml(const std::string& remark) {
+    std::ostringstream out;
+    if (!remark.empty()) out << "# " << remark << "\n";
+    if (!free_root_ && !model_.hasFreeFlyer()) out << "base: fixed\n";
+    if (model_.gravity() != Vector3d(0, 0, -9.81)) out << "gravity: [" << formatVector(model_.gravity(), ", ") << "]\n";
+    writeJointTypes(out);
+    writeClosures(out);
+    writeMotors(out);
+    writeContacts(out);
+    writeReferences(out);
+    if (!model_.serialJoints().empty()) {
+      out << "\nserial_joints:\n";
+      for (int i : model_.serialJoints()) out << "  - " << quote(model_.joints()[i].name) << "\n";
+    }
+    return out.str();
+  }
+
+ private:
+  std::string getMaterial(const Eigen::Vector4d& rgba) {
+    std::string color;
+    for (int i = 0; i < 4; ++i) color += (i ? " " : "") + formatRounded(rgba[i]);
+    const auto it = colors_.emplace(color, "color_" + std::to_string(colors_.size() + 1)).first;
+    return it->second;
+  }
+
+  void writeLink(int i, std::ostream& out) {
+    const Body& body = model_.bodies()[i];
+    out << "\n  <link name=\"" << escapeXml(body.name) << "\">\n";
+    if (body.inertia.mass > 0) {
+      const Matrix3d& I = body.inertia.I_com;
+      out << "    <inertial>\n      <origin xyz=\"" << formatVector(body.inertia.com) << "\"/>\n      <mass value=\""
+          << formatNumber(body.inertia.mass) << "\"/>\n      <inertia";
+      const double least = 1e-12 * I.diagonal().maxCoeff();  // products under it are rounding
+      const auto write = [&](const char* name, double value) {
+        out << " " << name << "=\"" << formatNumber(std::abs(value) < least ? 0 : value) << "\"";
+      };
+      write("ixx", I(0, 0)), write("iyy", I(1, 1)), write("izz", I(2, 2));
+      write("ixy", I(0, 1)), write("ixz", I(0, 2)), write("iyz", I(1, 2));
+      out << "/>\n    </inertial>\n";
+    }
+    for (const Visual& visual : model_.visuals())
+      if (visual.body == i) writeVisual(visual, out);
+    out << "  </link>\n";
+  }
+
+  void writeVisual(const Visual& visual, std::ostream& out) {
+    out << "    <visual>\n      " << formatOrigin(visual.X_BV) << "\n      <geometry>";
+    const Vector3d& size = visual.size;
+    switch (visual.shape) {
+      case Visual::Shape::Box:
+        out << "<box size=\"" << formatVector(size) << "\"/>";
+        break;
+      case Visual::Shape::Cylinder:
+        out << "<cylinder radius=\"" << formatRounded(size[0]) << "\" length=\"" << formatRounded(size[1]) << "\"/>";
+        break;
+      case Visual::Shape::Sphere:
+        out << "<sphere radius=\"" << formatRounded(size[0]) << "\"/>";
+        break;
+      case Visual::Shape::Mesh:
+        out << "<mesh filename=\"" << escapeXml(visual.mesh) << "\" scale=\"" << formatVector(size) << "\"/>";
+        break;
+    }
+    out << "</geometry>\n      <material name=\"" << getMaterial(visual.rgba) << "\"/>\n    </visual>\n";
+  }
+
+  void writeJoint(int i, std::ostream& out) {
+    const Joint& joint = model_.joints()[i];
+    const char* type = "continuous";  // universal and spherical joints get their kind by the YAML file
+    if (joint.kind == JointKind::Prismatic) type = "prismatic";
+    if (joint.kind == JointKind::Planar) type = "planar";
+    if (joint.kind == JointKind::FreeFlyer) type = "floating";
+    if (joint.kind == JointKind::Revolute) type = "revolute";
+    out << "  <joint name=\"" << escapeXml(joint.name) << "\" type=\"" << type << "\">\n    "
+        << formatOrigin(joint.X_PJ) << "\n    <parent link=\"" << escapeXml(model_.bodies()[joint.parent].name)
+        << "\"/>\n    <child link=\"" << escapeXml(model_.bodies()[i].name) << "\"/>\n";
+    if (joint.nv == 1 || joint.kind == JointKind::Planar)
+      out << "    <axis xyz=\"" << formatVector(joint.axis) << "\"/>\n";
+    writeLimits(joint, out);
+    out << "  </joint>\n";
+  }
+
+  void writeLimits(const Joint& joint, std::ostream& out) {
+    const auto lower = model_.lowerLimits().segment(joint.idx_v, joint.nv),
+               upper = model_.upperLimits().segment(joint.idx_v, joint.nv),
+               velocity = model_.velocityLimits().segment(joint.idx_v, joint.nv);
+    const bool ranged = lower.allFinite() && upper.allFinite();
+    const bool open = lower.array().isInf().all() && upper.array().isInf().all();
+    const bool slow = velocity.allFinite();
+    if ((!ranged && !open) || (joint.nv != 1 && (ranged || slow)))
+      refuse(model_, "joint '" + joint.name + "'", "it is limited on one side, or has several coordinates with limits");
+    if (!ranged && !slow && (joint.kind == JointKind::Continuous || joint.nv != 1)) return;
+    out << "    <limit";
+    if (ranged) out << " lower=\"" << formatRounded(lower[0]) << "\" upper=\"" << formatRounded(upper[0]) << "\"";
+    out << " effort=\"0\" velocity=\"" << formatNumber(slow ? velocity[0] : 0) << "\"/>\n";
+  }
+
+  void writeFrame(const std::string& name, int body, const SE3& X_BF, std::ostream& out) {
+    out << "  <link name=\"" << escapeXml(name) << "\"/>\n  <joint name=\"" << escapeXml(name)
+        << "_frame\" type=\"fixed\">\n    " << formatOrigin(X_BF) << "\n    <parent link=\""
+        << escapeXml(model_.bodies()[body].name) << "\"/>\n    <child link=\"" << escapeXml(name)
+        << "\"/>\n  </joint>\n";
+  }
+
+  // A frame of the model at this place; a made name where there is none.
+  std::string findFrame(int body, const SE3& X_BF, const std::string& made) const {
+    for (const Frame& frame : model_.frames())
+      if (frame.body == body && frame.X_BF.p == X_BF.p && frame.X_BF.R == X_BF.R) return frame.name;
+    return made;
+  }
+
+  // Frames of closures and contacts that have no name.
+  void writeMadeFrames(int body, std::ostream& out) {
+    const auto write = [&](int owner, const SE3& X, const std::string& made) {
+      if (owner == body && findFrame(owner, X, made) == made && model_.findFrame(made) < 0)
+        writeFrame(made, body, X, out);
+    };
+    for (const Closure& c : model_.closures()) {
+      write(c.body1, c.X_B1, c.name + "_frame1");
+      write(c.body2, c.X_B2, c.name + "_frame2");
+    }
+    for (const ContactFrame& c : model_.contacts()) write(c.body, c.X_BF, c.name + "_sole");
+  }
+
+  void writeJointTypes(std::ostream& out) {
+    std::string names, types;
+    for (int i = 1; i < model_.numBodies(); ++i) {
+      const Joint& joint = model_.joints()[i];
+      if (joint.kind != JointKind::Spherical && joint.kind != JointKind::Universal) continue;
+      names += "  - " + quote(joint.name) + "\n";
+      if (joint.kind == JointKind::Spherical) {
+        types += "  - SPHERICAL\n";
+        continue;
+      }
+      const char a = getAxisLetter(joint.axis), b = getAxisLetter(joint.axis2);
+      if (!a || !b)
+        refuse(model_, "universal joint '" + joint.name + "'", "its axes are not among x, y and z of its frame");
+      types += std::string("  - UJOINT_") + a + b + "\n";
+    }
+    if (!names.empty()) out << "\njoint_name:\n" << names << "joint_type:\n" << types;
+  }
+
+  void writeClosures(std::ostream& out) {
+    if (!model_.closures().empty()) out << "\nclosures:\n";
+    for (const Closure& c : model_.closures()) {
+      out << "  - {name: " << quote(c.name) << ", frames: [" << quote(findFrame(c.body1, c.X_B1, c.name + "_frame1"))
+          << ", " << quote(findFrame(c.body2, c.X_B2, c.name + "_frame2")) << "], type: " << getName(c.kind);
+      if (c.kind == ClosureKind::Hinge5D) out << ", axis: [" << formatVector(c.axis, ", ") << "]";
+      if (c.kp != 0) out << ", kp: " << formatNumber(c.kp);
+      if (c.kd != 0) out << ", kd: " << formatNumber(c.kd);
+      out << "}\n";
+    }
+  }
+
+  void writeMotors(std::ostream& out) {
+    if (!model_.motors().empty()) out << "\nmotors:  # armature in kg m^2 (kg where prismatic), N m and rad/s\n";
+    for (const Motor& motor : model_.motors()) {
+      out << "  " << quote(motor.name) << ": {armature: " << formatNumber(motor.armature);
+      if (std::isfinite(motor.effort_limit)) out << ", effort: " << formatNumber(motor.effort_limit);
+      if (std::isfinite(motor.velocity_limit)) out << ", velocity: " << formatNumber(motor.velocity_limit);
+      out << "}\n";
+    }
+    std::string others;
+    for (int i = 1; i < model_.numBodies(); ++i) {
+      const Joint& joint = model_.joints()[i];
+      const double armature = model_.armature()[joint.idx_v];
+      if (armature != 0 && model_.findMotor(joint.name) < 0)
+        others += "  " + quote(joint.name) + ": " + formatNumber(armature) + "\n";
+    }
+    if (!others.empty()) out << "armature:\n" << others;
+  }
+
+  void writeContacts(std::ostream& out) {
+    if (!model_.contacts().empty()) out << "\ncontacts:\n";
+    for (const ContactFrame& c : model_.contacts()) {
+      out << "  " << quote(c.name) << ": {frame: " << quote(findFrame(c.body, c.X_BF, c.name + "_sole")) << ", type: ";
+      if (c.kind == ContactKind::Point3D)
+        out << "3d";
+      else
+        out << "6d, sole: [" << formatRounded(2 * c.half_length) << ", " << formatRounded(2 * c.half_width) << "]";
+      out << "}\n";
+    }
+  }
+
+  void writeReferences(std::ostream& out) {
+    if (!model_.references().empty()) out << "\nreferences:\n";
+    for (const Reference& reference : model_.references()) {
+      out << "  " << quote(reference.name) << ":\n";
+      if (!reference.joints.empty()) out << "    joints:\n";
+      for (const auto& [name, values] : reference.joints)
+        out << "      " << quote(name) << ": " << (values.size() == 1 ? formatRounded(values[0]) : formatList(values))
+            << "\n";
+      if (!reference.height_frame.empty())
+        out << "    height: {frame: " << quote(reference.height_frame) << ", value: " << formatRounded(reference.height)
+            << "}\n";
+      if (!reference.feet.empty()) out << "    feet:\n";
+      for (const auto& [name, place] : reference.feet)
+        out << "      " << quote(name) << ": [" << formatVector(place, ", ") << "]\n";
+    }
+  }
+
+  const Model& model_;
+  std::set<std::string> bodies_;
+  bool free_root_ = false;  // the root link is carried by the free-flyer that the reader makes
+  std::map<std::string, std::string> colors_;
+};
+
+}  // namespace
+
+RobotText formatRobot(const Model& model, const std::string& remark) {
+  Writer writer(model);
+  return {writer.formatUrdf(remark), writer.formatYaml(remark)};
+}
+
+void writeRobot(const Model& model, const std::string& directory, const std::string& remark) {
+  namespace fs = std::filesystem;
+  const fs::path path = fs::absolute(directory).lexically_normal();
+  const std::string name = (path.has_filename() ? path : path.parent_path()).filename().string();
+  const RobotText text = formatRobot(model, remark);
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error)
+    throw ModelError(directory, "directory", "it cannot be made: " + error.message(), "give another one with -o");
+  writeTextFile((path / (name + ".urdf")).string(), text.urdf);
+  writeTextFile((path / (name + ".yaml")).string(), text.yaml);
+}
+
+}  // namespace bielle

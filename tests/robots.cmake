@@ -1,0 +1,5 @@
+bielle_test(generators SOURCES test_generators.cpp robot_directory.cpp LIBS bielle_io bielle_robots)
+bielle_test(cleobot SOURCES test_cleobot.cpp robot_directory.cpp run_command.cpp LIBS bielle_io)
+target_compile_definitions(test_cleobot PRIVATE BIELLE_COMMAND="$<TARGET_FILE:bielle_command>")
+add_dependencies(test_cleobot bielle_command)
+set_tests_properties(cleobot PROPERTIES LABELS system)

@@ -1,0 +1,287 @@
+// Generated robots: possible bodies, loops that close, mobility as counted by hand, and the files that come along.
+#include <Eigen/Eigenvalues>
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/io/robot_writer.h"
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/robots/cleobot.h"
+#include "bielle/robots/generators.h"
+#include "bielle/robots/solid.h"
+#include "robot_directory.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+const std::string kRobots = std::string(BIELLE_SOURCE_DIR) + "/robots/";
+
+std::string readFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+// The same text, numbers to their rounding: the last digit is the compiler's.
+void checkSameText(const std::string& a, const std::string& b) {
+  const auto next = [](const std::string& text, size_t& at) {
+    const size_t begin = at;
+    at = std::min(text.find_first_of(" \n\",[]", at + 1), text.size());
+    return text.substr(begin, at - begin);
+  };
+  size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    const std::string x = next(a, i), y = next(b, j);
+    if (x == y) continue;
+    char *end_x = nullptr, *end_y = nullptr;
+    const double number_x = std::strtod(x.c_str() + 1, &end_x), number_y = std::strtod(y.c_str() + 1, &end_y);
+    INFO("'" + x + "' against '" + y + "'");
+    REQUIRE((x.size() > 1 && y.size() > 1 && *end_x == 0 && *end_y == 0));
+    REQUIRE(std::abs(number_x - number_y) < 1e-11 * (1 + std::abs(number_x)));
+  }
+  CHECK(i == a.size());
+  CHECK(j == b.size());
+}
+
+// Same bodies, joints, closures, motors and feet; placements and inertias to the rounding of the files.
+void checkSame(const Model& a, const Model& b) {
+  REQUIRE(a.numBodies() == b.numBodies());
+  for (int i = 1; i < a.numBodies(); ++i) {
+    const Joint &ja = a.joints()[i], &jb = b.joints()[i];
+    CAPTURE(ja.name);
+    CHECK(ja.name == jb.name);
+    CHECK(a.bodies()[i].name == b.bodies()[i].name);
+    CHECK(ja.kind == jb.kind);
+    CHECK(ja.parent == jb.parent);
+    CHECK((ja.X_PJ.p - jb.X_PJ.p).norm() < 1e-11);
+    CHECK((ja.X_PJ.R - jb.X_PJ.R).norm() < 1e-11);
+    if (ja.nv <= 2) CHECK((ja.axis - jb.axis).norm() < 1e-11);
+    if (ja.nv == 2) CHECK((ja.axis2 - jb.axis2).norm() < 1e-11);
+    const Matrix6d Ya = a.bodies()[i].inertia.toMatrix(), Yb = b.bodies()[i].inertia.toMatrix();
+    CHECK((Ya - Yb).norm() < 1e-10 * (1 + Ya.norm()));
+  }
+  REQUIRE(a.closures().size() == b.closures().size());
+  for (size_t c = 0; c < a.closures().size(); ++c) {
+    const Closure &ca = a.closures()[c], &cb = b.closures()[c];
+    CHECK(ca.name == cb.name);
+    CHECK(ca.kind == cb.kind);
+    CHECK(ca.body1 == cb.body1);
+    CHECK(ca.body2 == cb.body2);
+    CHECK((ca.X_B1.p - cb.X_B1.p).norm() < 1e-11);
+    CHECK((ca.X_B2.p - cb.X_B2.p).norm() < 1e-11);
+  }
+  REQUIRE(a.nu() == b.nu());
+  for (int m = 0; m < a.nu(); ++m) CHECK(a.motors()[m].name == b.motors()[m].name);
+  CHECK((a.armature() - b.armature()).norm() < 1e-12);
+  CHECK(a.lowerLimits() == b.lowerLimits());
+  CHECK(a.upperLimits() == b.upperLimits());
+  REQUIRE(a.contacts().size() == b.contacts().size());
+  for (size_t c = 0; c < a.contacts().size(); ++c) {
+    CHECK(a.contacts()[c].name == b.contacts()[c].name);
+    CHECK(a.contacts()[c].half_length == Approx(b.contacts()[c].half_length));
+    CHECK((a.contacts()[c].X_BF.p - b.contacts()[c].X_BF.p).norm() < 1e-11);
+  }
+  CHECK(a.serialJoints() == b.serialJoints());
+  REQUIRE(a.visuals().size() == b.visuals().size());
+  REQUIRE(a.references().size() == b.references().size());
+  for (size_t r = 0; r < a.references().size(); ++r) {
+    CHECK(a.references()[r].name == b.references()[r].name);
+    CHECK(a.references()[r].joints.size() == b.references()[r].joints.size());
+  }
+}
+
+// What is known of a generated robot without a computer.
+struct Expected {
+  int rows, rank, mobility;
+  double mass;  // kg
+};
+
+const std::map<std::string, Expected>& getExpected() {
+  // Cleobot, Gruebler per leg. Hip: 7 bodies, 42 - 3 * 5 (motors) - 3 * 4 (universal) - 4 * 3 (balls) = 3. Lower leg: 7
+  // bodies, 42 - 6 * 5 (motors and knees) - 3 * 3 (balls) = 3. The base has 6.
+  static const std::map<std::string, Expected> expected = {
+      {"cleobot", {30, 30, 18, 24.6}},
+  };
+  return expected;
+}
+
+}  // namespace
+
+TEST_CASE("solids: inertias by their own integrals") {
+  // Second moments of a solid from a grid of points.
+  const auto integrate = [](const Solid& solid, const auto& inside, const Vector3d& half) {
+    const int n = 60;
+    Matrix3d I = Matrix3d::Zero();
+    int count = 0;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j)
+        for (int k = 0; k < n; ++k) {
+          const Vector3d p = half.cwiseProduct(2 * Vector3d(i + 0.5, j + 0.5, k + 0.5) / n - Vector3d::Ones());
+          if (!inside(p)) continue;
+          ++count;
+          const Vector3d r = solid.X_LS.R * p;
+          I += r.squaredNorm() * Matrix3d::Identity() - r * r.transpose();
+        }
+    return Matrix3d(I * solid.mass / count);
+  };
+  const Solid box = makeBox({0.1, 0.2, 0.3}, {0.2, 0.3, 0.5}, 2, colors::kSteel);
+  const Solid rod = makeRod({0.1, 0, 0.2}, {0.3, 0.4, -0.1}, 0.08, 3, colors::kRod);
+  const Solid ball = makeSphere({0, 0, 1}, 0.2, 1.5, colors::kSteel);
+  const double length = Vector3d(0.2, 0.4, -0.3).norm();
+  CHECK(rod.mass == Approx(3 * length));
+  CHECK((rod.X_LS.R.col(2) - Vector3d(0.2, 0.4, -0.3) / length).norm() < 1e-12);
+  CHECK((calcInertia(rod).com - Vector3d(0.2, 0.2, 0.05)).norm() < 1e-12);
+  const auto check = [&](const Solid& solid, const auto& inside, const Vector3d& half) {
+    const Matrix3d I = integrate(solid, inside, half), J = calcInertia(solid).I_com;
+    CHECK((I - J).norm() < 5e-3 * J.norm());
+  };
+  check(box, [](const Vector3d&) { return true; }, {0.1, 0.15, 0.25});
+  check(rod, [](const Vector3d& p) { return p.head<2>().norm() < 0.08; }, {0.08, 0.08, length / 2});
+  check(
+      ball, [](const Vector3d& p) { return p.norm() < 0.2; }, Vector3d::Constant(0.2));
+  const Inertia sum = calcInertia(std::vector<Solid>{box, ball});
+  CHECK(sum.mass == Approx(3.5));
+  CHECK(sum.com.z() == Approx((2 * 0.3 + 1.5) / 3.5));
+}
+
+TEST_CASE("generators: every body is possible, the loops close, mobility is what Gruebler counts") {
+  for (const Generator& generator : getGenerators()) {
+    CAPTURE(generator.name);
+    const Model model = generator.makeRequest().make();
+    double mass = 0;
+    for (int i = 1; i < model.numBodies(); ++i) {
+      const Inertia& inertia = model.bodies()[i].inertia;
+      CAPTURE(model.bodies()[i].name);
+      CHECK(inertia.mass > 0);
+      const Vector3d moments = Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia.I_com).eigenvalues();
+      CHECK(moments[0] > 0);
+      CHECK(moments[2] < moments[0] + moments[1]);
+      mass += inertia.mass;
+    }
+    REQUIRE(getExpected().count(generator.name) == 1);
+    const Expected& expected = getExpected().at(generator.name);
+    CHECK(mass == Approx(expected.mass).epsilon(0.005));
+    const AssemblyResult closed = findClosedConfiguration(model);
+    REQUIRE(closed.status == AssemblyStatus::Closed);
+    CHECK(closed.gap < 1e-11);
+    const Mobility mobility = calcMobility(model, closed.q);
+    CHECK(mobility.rows == expected.rows);
+    CHECK(mobility.rank == expected.rank);
+    CHECK(mobility.mobility == expected.mobility);
+    CHECK(model.nu() == mobility.mobility - (model.hasFreeFlyer() ? 6 : 0));
+    for (const Reference& reference : model.references())
+      CHECK(assembleReference(model, reference.name).status == AssemblyStatus::Closed);
+  }
+}
+
+TEST_CASE("generators: what comes along is what they write") {
+  for (const Generator& generator : getGenerators()) {
+    CAPTURE(generator.name);
+    const Model model = generator.makeRequest().make();
+    const RobotText text = formatRobot(model, "Written by `bielle generate " + generator.name + "`.");
+    checkSameText(readFile(kRobots + generator.name + "/" + generator.name + ".urdf"), text.urdf);
+    checkSameText(readFile(kRobots + generator.name + "/" + generator.name + ".yaml"), text.yaml);
+    CHECK(std::filesystem::exists(kRobots + generator.name + "/README.md"));
+    const LoadedRobot loaded = loadRobot(kRobots + generator.name);
+    CHECK(loaded.warnings.empty());
+    checkSame(model, loaded.model);
+  }
+}
+
+TEST_CASE("writer: robots that were read are written and read again") {
+  for (const char* name : {"bipetto", "fourbar", "fivebar"}) {
+    CAPTURE(name);
+    const RobotDirectory directory;
+    const Model model = loadRobot(kRobots + name).model;
+    writeRobot(model, directory.path() + "/copy", "A copy.");
+    const LoadedRobot copy = loadRobot(directory.path() + "/copy");
+    CHECK(copy.warnings.empty());
+    CHECK(copy.model.name() == model.name());
+    checkSame(model, copy.model);
+  }
+}
+
+TEST_CASE("writer: names are escaped, what the files cannot say is refused") {
+  const auto build = [](const Joint& joint, const JointLimits& limits = {}) {
+    ModelBuilder builder("a & \"b\"");
+    builder.addLink("arm <1>", "world", joint, {1, Vector3d::Zero(), Matrix3d::Identity()}, limits);
+    return builder.build();
+  };
+  const RobotDirectory directory;
+  Joint joint = makeRevolute("turn: \"one\" & more", {0, 0, 1}, Vector3d(1, 2, 2) / 3);
+  joint.X_PJ.R = Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitY()).toRotationMatrix();  // roll and yaw turn about one axis
+  const Model model = build(joint);
+  writeRobot(model, directory.path() + "/odd");
+  checkSame(model, loadRobot(directory.path() + "/odd").model);
+
+  const Joint skew = makeUniversal("u", {0, 0, 0}, Vector3d(1, 1, 0).normalized(), Vector3d::UnitZ());
+  CHECK_THROWS_WITH(formatRobot(build(skew)), Catch::Contains("universal joint 'u'"));
+  JointLimits half;
+  half.lower = VectorXd::Constant(1, -1);
+  CHECK_THROWS_WITH(formatRobot(build(joint, half)), Catch::Contains("limited on one side"));
+}
+
+TEST_CASE("generators: names stay when lengths change, bounds and names are checked") {
+  for (const Generator& generator : getGenerators()) {
+    CAPTURE(generator.name);
+    const Model model = generator.makeRequest().make();
+    const GeneratorRequest request = generator.makeRequest();
+    for (const Parameter& p : request.parameters) {
+      CAPTURE(p.name);
+      CHECK(p.lower <= *p.value);
+      CHECK(*p.value <= p.upper);
+      CHECK_FALSE(p.help.empty());
+      *p.value *= 1.01;
+    }
+    const Model other = request.make();
+    REQUIRE(other.numBodies() == model.numBodies());
+    for (int i = 1; i < model.numBodies(); ++i) CHECK(other.joints()[i].name == model.joints()[i].name);
+    for (int m = 0; m < model.nu(); ++m) CHECK(other.motors()[m].name == model.motors()[m].name);
+    CHECK(other.mass() != model.mass());
+    const Parameter& first = request.parameters.front();
+    *first.value = first.upper + 1;
+    CHECK_THROWS_WITH(request.make(), Catch::Contains("parameter '" + first.name + "'"));
+    *first.value = std::numeric_limits<double>::quiet_NaN();
+    CHECK_THROWS_AS(request.make(), ModelError);
+    CHECK_THROWS_WITH(setParameter(request.parameters, "no_such", 1), Catch::Contains(first.name));
+  }
+  CHECK_THROWS_WITH(findGenerator("no_such"), Catch::Contains("cleobot"));
+}
+
+TEST_CASE("Cleobot: its neutral configuration stands closed, the legs are mirror images") {
+  const Model model = makeCleobot();
+  Workspace ws(model);
+  VectorXd q = model.makeNeutral();
+  q[2] = 0.6;
+  updatePositions(model, ws, q);
+  CHECK(calcLargestGap(ws, makeConstraintSet(model)) < 1e-15);
+  for (const ContactFrame& foot : model.contacts()) {
+    const SE3 X = getPlacement(ws, foot.body, foot.X_BF);
+    CHECK((X.p - Vector3d(0, foot.name == "foot_left" ? 0.125 : -0.125, 0)).norm() < 1e-12);
+    CHECK(X.R.isIdentity(1e-12));
+  }
+  for (int i = 1; i < model.numBodies(); ++i) {
+    std::string name = model.bodies()[i].name;
+    const size_t at = name.find("_left");
+    if (at == std::string::npos) continue;
+    const int other = model.frames()[model.findFrame(name.replace(at, 5, "_right"))].body;
+    const Vector3d mirror(1, -1, 1);
+    CHECK((getPlacement(ws, i, {}).p - mirror.cwiseProduct(getPlacement(ws, other, {}).p)).norm() < 1e-12);
+    const Inertia &a = model.bodies()[i].inertia, &b = model.bodies()[other].inertia;
+    CHECK((a.com - mirror.cwiseProduct(b.com)).norm() < 1e-12);
+    CHECK((a.I_com - Matrix3d(mirror.asDiagonal() * b.I_com * mirror.asDiagonal())).norm() < 1e-12);
+  }
+}
+
+TEST_CASE("Cleobot: limbs that do not reach are refused") {
+  CleobotParameters parameters;
+  parameters.shank_length = 0.15;
+  CHECK_THROWS_WITH(makeCleobot(parameters), Catch::Contains("do not meet"));
+}
