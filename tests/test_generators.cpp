@@ -106,8 +106,10 @@ struct Expected {
 const std::map<std::string, Expected>& getExpected() {
   // Cleobot, Gruebler per leg. Hip: 7 bodies, 42 - 3 * 5 (motors) - 3 * 4 (universal) - 4 * 3 (balls) = 3. Lower leg: 7
   // bodies, 42 - 6 * 5 (motors and knees) - 3 * 3 (balls) = 3. The base has 6.
+  // RSU biped, per leg: four serial joints, and the ankle with its chains: 6 bodies, 36 - 4 * 5 - 2 * 4 - 2 * 3 = 2.
   static const std::map<std::string, Expected> expected = {
       {"cleobot", {30, 30, 18, 24.6}},
+      {"rsu_biped", {12, 12, 18, 25.68}},
   };
   return expected;
 }

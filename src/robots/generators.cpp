@@ -2,6 +2,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/robots/cleobot.h"
+#include "bielle/robots/rsu_biped.h"
 
 namespace bielle {
 namespace {
@@ -21,6 +22,8 @@ const std::vector<Generator>& getGenerators() {
   static const std::vector<Generator> generators = {
       {"cleobot", "biped with parallel legs: 3-RRS lower legs, hips turned by three crank-and-rod chains",
        makeRequests<CleobotParameters>(makeCleobot)},
+      {"rsu_biped", "biped with serial hips and knees, ankles driven by two rods with spherical ends (RSU)",
+       makeRequests<RsuBipedParameters>(makeRsuBiped)},
   };
   return generators;
 }

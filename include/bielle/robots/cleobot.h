@@ -48,7 +48,7 @@ struct CleobotParameters {
   double shank_length = 0.285;   ///< l2, m
   double platform_inset = 0.01;  ///< of the balls of the foot from under the motors, towards the middle, m
   double ankle_height = 0.06;    ///< of the balls over the sole, m
-  double sole_length = 0.14, sole_width = 0.09;  ///< m
+  double sole_length = 0.10, sole_width = 0.10;  ///< m
 
   double trunk_mass = 8.6;      ///< without motors, kg
   double hip_motor_mass = 0.8;  ///< each, on the trunk, kg

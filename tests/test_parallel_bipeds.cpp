@@ -1,4 +1,5 @@
-// Cleobot squats, walks and jumps with the costs of Bipetto; no serial chain stands in for its legs.
+// Cleobot and the biped with RSU ankles squat, walk and jump with the costs of Bipetto. No serial chain stands in for
+// the legs of Cleobot.
 #include <Eigen/SVD>
 #include <catch2/catch.hpp>
 #include <filesystem>
@@ -59,44 +60,67 @@ CommandResult run(std::vector<std::string> arguments) {
   return runCommand(arguments);
 }
 
+// bielle solve MOTION, which checks; the motion it wrote.
+MotionRecord solve(const std::string& robot, const std::vector<std::string>& motion, const RobotDirectory& directory) {
+  std::vector<std::string> arguments = {"solve"};
+  arguments.insert(arguments.end(), motion.begin(), motion.end());
+  arguments.insert(arguments.end(), {"--robot", robot, "-o", directory.path() + "/result", "--no-report"});
+  const CommandResult result = run(arguments);
+  CAPTURE(arguments, result.out, result.err);
+  CHECK(result.status == 0);
+  CHECK((result.out.find(": passed") != std::string::npos || result.out.find("not checked") != std::string::npos));
+  return readRecord(directory.path() + "/result/trajectory.npz");
+}
+
+struct Request {
+  std::vector<std::string> motion;
+  double com_lowest, com_highest;  // m
+};
+
+// Heights, torques, closed loops, an upright trunk, and linkages away from their singularities.
+void checkMotions(const std::string& robot, const std::vector<Request>& requests, double torque, double lean,
+                  const Margin& least) {
+  const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/" + robot).model;
+  for (const Request& request : requests) {
+    CAPTURE(request.motion);
+    const RobotDirectory directory;
+    const MotionRecord record = solve(robot, request.motion, directory);
+    CHECK(record.gap.maxCoeff() < 1e-10);
+    CHECK(record.com.col(2).minCoeff() == Approx(request.com_lowest).margin(0.01));
+    CHECK(record.com.col(2).maxCoeff() == Approx(request.com_highest).margin(0.012));
+    CHECK(record.u.cwiseAbs().maxCoeff() < torque);
+    Margin margin;
+    Workspace ws(model);
+    for (int k = 0; k < record.q.rows(); ++k) {
+      widen(model, ws, record.q.row(k), margin);
+      const Eigen::Quaterniond trunk(Eigen::Vector4d(record.q.row(k).segment<4>(3)));
+      CHECK((trunk * Vector3d::UnitZ()).z() > std::cos(lean));
+    }
+    CHECK(margin.closures > least.closures);
+    CHECK(margin.motors > least.motors);
+  }
+}
+
 }  // namespace
 
 TEST_CASE("Cleobot: bielle solve squat, walk and jump converge, pass their check and stay far from singularities") {
-  struct Request {
-    std::vector<std::string> motion;
-    double com_lowest, com_highest;  // m
-  };
-  const double standing = 0.538;
-  const std::vector<Request> requests = {{{"squat"}, 0.7 * standing, standing},
-                                         {{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
-                                         {{"walk"}, 0.97 * standing, 1.02 * standing},
-                                         {{"jump"}, 0.88 * standing, standing + 0.02 + 9.81 * 0.09 / 8}};
-  for (const Request& request : requests) {
-    const RobotDirectory directory;
-    std::vector<std::string> arguments = {"solve"};
-    arguments.insert(arguments.end(), request.motion.begin(), request.motion.end());
-    arguments.insert(arguments.end(), {"--robot", "cleobot", "-o", directory.path() + "/result", "--no-report"});
-    CAPTURE(arguments);
-    const CommandResult result = run(arguments);
-    CAPTURE(result.out, result.err);
-    CHECK(result.status == 0);
-    CHECK((result.out.find(": passed") != std::string::npos || result.out.find("not checked") != std::string::npos));
-    const MotionRecord record = readRecord(directory.path() + "/result/trajectory.npz");
-    CHECK(record.gap.maxCoeff() < 1e-10);
-    CHECK(record.com.col(2).minCoeff() == Approx(request.com_lowest).margin(0.01));
-    CHECK(record.com.col(2).maxCoeff() == Approx(request.com_highest).margin(0.01));
-    CHECK(record.u.cwiseAbs().maxCoeff() < 45);
-    Margin margin;
-    Workspace ws(getCleobot());
-    for (int k = 0; k < record.q.rows(); ++k) {
-      widen(getCleobot(), ws, record.q.row(k), margin);
-      const Eigen::Quaterniond trunk(Eigen::Vector4d(record.q.row(k).segment<4>(3)));
-      CHECK((trunk * Vector3d::UnitZ()).z() > std::cos(0.25));
-    }
-    CAPTURE(margin.closures, margin.motors);
-    CHECK(margin.closures > 0.015);
-    CHECK(margin.motors > 0.2);
-  }
+  const double standing = 0.538, rise = 9.81 * 0.3 * 0.3 / 8;
+  checkMotions("cleobot",
+               {{{"squat"}, 0.7 * standing, standing},
+                {{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
+                {{"walk"}, 0.98 * standing, 1.02 * standing},
+                {{"jump"}, 0.88 * standing, standing + 0.02 + rise}},
+               45, 0.25, {0.015, 0.2});
+}
+
+TEST_CASE("RSU biped: bielle solve squat, walk and jump converge, pass their check and stay far from singularities") {
+  const double standing = 0.393, rise = 9.81 * 0.3 * 0.3 / 8;
+  checkMotions("rsu_biped",
+               {{{"squat"}, 0.7 * standing, standing},
+                {{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
+                {{"walk"}, 0.98 * standing, 1.02 * standing},
+                {{"jump"}, 0.83 * standing, standing + 0.02 + rise}},
+               70, 0.25, {0.015, 0.2});
 }
 
 TEST_CASE("Cleobot: feet of a walk land where they should and do not slide") {

@@ -1,0 +1,50 @@
+#pragma once
+/// \file A biped with serial hips and knees and ankles of two RSU chains (revolute crank, spherical rod ends).
+///
+/// x forward, y left, z up; s = +1 for the left leg, -1 for the right one. All frames are parallel in the neutral
+/// configuration, which is closed: legs straight. Joints of a leg, all angles about x, y, z of these frames: hipz, hipx,
+/// hipy in one point, knee (positive: bent), ankley, anklex in one point.
+///
+/// Ankle: two motors on the shank at the height h over the ankle and at +-w beside it, cranks of length c backward and
+/// up by the angle delta; rods run down from their ends, with a universal joint there, to balls at the heel
+///     (-a cos delta, +-w, a sin delta)                                                                           (1)
+/// of the foot, over the ankle. With c = a, rods and shank form parallelograms: the cranks turn as the foot is pitched,
+/// against each other when it is rolled. Their dead points are a quarter turn from where the arms are square to the shank:
+/// ankley = -delta. Each chain leaves the ankle's two freedoms: per leg, with the two hinges of the ankle, 6 bodies and
+/// 36 - 2 5 - 2 (5 + 4 + 3) = 2.
+#include "bielle/model/model.h"
+#include "bielle/robots/parameter.h"
+
+namespace bielle {
+
+struct RsuBipedParameters {
+  double hip_offset = 0.125;                     ///< of a hip from the middle plane, m
+  double trunk_height = 0.185;                   ///< of the trunk's frame over the hips, m
+  double thigh_length = 0.22;                    ///< m
+  double shank_length = 0.24;                    ///< m
+  double ankle_height = 0.045;                   ///< over the sole, m
+  double hip_height = 0.39;                      ///< of the hips over the soles in the reference `half_sitting`, m
+  double sole_length = 0.10, sole_width = 0.10;  ///< m
+  double sole_offset = 0.017;                    ///< of the middle of the sole before the ankle, m
+
+  double ankle_arm = 0.05;         ///< a, m
+  double ankle_crank = 0.05;       ///< c, m
+  double ankle_half_width = 0.06;  ///< w, m
+  double motor_height = 0.17;      ///< h, m
+  double arm_angle = 0.6;          ///< delta, rad
+
+  double trunk_mass = 6.72;   ///< without motors, kg
+  double motor_mass = 0.8;     ///< each of twelve, kg
+  double hip_link_mass = 1.2;  ///< each of the two links between trunk and thigh, without motors, kg
+  double link_density = 3;     ///< of thigh and shank, kg/m
+  double rod_density = 0.5;    ///< of cranks and rods, kg/m
+  double foot_mass = 0.5;      ///< kg
+  double armature = 1e-3;      ///< of every motor, kg m^2
+};
+
+std::vector<Parameter> listParameters(RsuBipedParameters& parameters);
+
+/// \throws ModelError when a parameter is outside its bounds, or the legs do not reach from hip_height to the ground
+Model makeRsuBiped(const RsuBipedParameters& parameters = {});
+
+}  // namespace bielle
