@@ -204,6 +204,45 @@ TEST_CASE("what is possible but odd is a warning") {
   CHECK_THAT(warn(kToyUrdf, "name_mot: [shoulder]\nmotors: {rod_joint: {}}"), Contains(yaml + "key 'name_mot'"));
 }
 
+TEST_CASE("a file with the key model completes a robot that is elsewhere") {
+  const RobotDirectory others, own;
+  others.write("toy/robot.urdf", kToyUrdf);
+  others.write("toy/robot.yaml", kToyYaml);
+  const LoadedRobot plain = loadRobot(others.path() + "/toy");
+  own.write("mine/mine.yaml",
+            "model: [nowhere, toy]\nmotors: {shoulder: {armature: 0.5, effort: .inf}}\n"
+            "contacts: {tip: {frame: hand, type: 3d}}\n");
+  {
+    const RobotsVariable variable(own.path() + ":" + others.path());
+    for (const std::string& name : {std::string("mine"), own.path() + "/mine", own.path() + "/mine/mine.yaml"}) {
+      const LoadedRobot robot = loadRobot(name);
+      CHECK(robot.file == own.path() + "/mine/mine.yaml");
+      CHECK(robot.directory == own.path() + "/mine");
+      CHECK(robot.model.closures().size() == plain.model.closures().size());
+      CHECK(robot.model.contacts().size() == 1);
+      CHECK(robot.model.motors().at(0).armature == 0.5);
+      CHECK(std::isinf(robot.model.motors().at(0).effort_limit));
+    }
+    const std::vector<std::string> names = listRobots();
+    CHECK(std::find(names.begin(), names.end(), "mine") != names.end());
+    CHECK(findRobotFile("toy") == others.path() + "/toy/robot.urdf");
+  }
+  using Catch::Contains;
+  const RobotsVariable variable(own.path());
+  const std::vector<std::string> names = listRobots();
+  CHECK(std::find(names.begin(), names.end(), "mine") == names.end());
+  CHECK_THROWS_WITH(loadRobot("mine"),
+                    Contains("mine.yaml: key 'model'") && Contains("nowhere, toy") && Contains("BIELLE_ROBOTS"));
+  own.write("near/near.yaml",
+            "model: " + others.path() + "/toy/robot.urdf\ncontacts: {tip: {frame: fist, type: 3d}}\n");
+  CHECK_THROWS_WITH(loadRobot("near"), Contains("near.yaml: contact 'tip'") && Contains("'fist'"));
+  own.write("alone/alone.yaml", "gravity: [0, 0, -1]\n");
+  CHECK_THROWS_WITH(loadRobot(own.path() + "/alone"), Contains("it is missing"));
+  own.write("both/both.urdf", kToyUrdf);
+  own.write("both/both.yaml", "model: toy\n");
+  CHECK_THROWS_WITH(loadRobot("both"), Contains("there is a URDF beside this file"));
+}
+
 TEST_CASE("robots are found by name, directory and file, and a robot that is nowhere is told where it was sought") {
   const RobotDirectory first, second;
   second.write("toy/toy.urdf", kToyUrdf);

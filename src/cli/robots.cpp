@@ -1,5 +1,4 @@
 // bielle robots: the names that can be given, and where they lead.
-#include <filesystem>
 #include <iostream>
 
 #include "cli/commands.h"
@@ -11,14 +10,7 @@ namespace {
 int listKnownRobots() {
   const std::vector<std::string> directories = getRobotDirectories();
   std::vector<Row> rows;
-  for (const std::string& name : listRobots())
-    for (const std::string& directory : directories) {
-      const auto file = std::filesystem::path(directory) / name / (name + ".urdf");
-      std::error_code error;
-      if (!std::filesystem::is_regular_file(file, error)) continue;
-      rows.push_back({name, file.string()});
-      break;
-    }
+  for (const std::string& name : listRobots()) rows.push_back({name, findRobotFile(name)});
   printTable(std::cout, rows, "");
   if (!rows.empty()) return kOk;
   std::cerr << "bielle: no robot was found in:\n";

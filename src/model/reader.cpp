@@ -34,6 +34,59 @@ void retypeJoints(const YamlFile& yaml, UrdfFile& urdf) {
   }
 }
 
+// The files of a robot: a URDF with what is beside it, or what completes them.
+struct RobotFiles {
+  UrdfFile urdf;
+  YamlFile yaml;
+};
+
+RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
+  RobotFiles files{readUrdf(path.string()), {}};
+  std::filesystem::path settings = path;
+  settings.replace_extension(".yaml");
+  if (std::filesystem::exists(settings)) files.yaml = readYaml(settings.string());
+  if (!files.yaml.models.empty())
+    throw ModelError(files.yaml.path, "key 'model'", "there is a URDF beside this file, " + path.string(),
+                     "remove the key, or put the file where there is none");
+  return files;
+}
+
+// What the file of a robot that others published adds goes before what they give.
+void complete(const YamlFile& own, YamlFile& yaml) {
+  const auto replace = [](const auto& from, auto& to) {
+    if (!from.empty()) to = from;
+  };
+  yaml.path = own.path;
+  replace(own.joint_types, yaml.joint_types);
+  replace(own.closures, yaml.closures);
+  replace(own.motors, yaml.motors);
+  replace(own.armature, yaml.armature);
+  replace(own.contacts, yaml.contacts);
+  replace(own.references, yaml.references);
+  replace(own.serial_joints, yaml.serial_joints);
+  if (own.base) yaml.base = own.base;
+  if (own.motor_armature) yaml.motor_armature = own.motor_armature;
+  if (own.gravity) yaml.gravity = own.gravity;
+  yaml.warnings.insert(yaml.warnings.end(), own.warnings.begin(), own.warnings.end());
+}
+
+RobotFiles readRobotFiles(const std::filesystem::path& path) {
+  if (path.extension() != ".yaml") return readUrdfAndYaml(path);
+  const YamlFile own = readYaml(path.string());
+  const std::string urdf = findModel(own);
+  if (urdf.empty()) {
+    std::string models;
+    for (const std::string& model : own.models) models += (models.empty() ? "" : ", ") + model;
+    throw ModelError(own.path, "key 'model'",
+                     models.empty() ? "it is missing, and there is no URDF beside this file"
+                                    : "the robot that this file completes is not there: " + models,
+                     "put its directory into one of those that BIELLE_ROBOTS names, or correct the key");
+  }
+  RobotFiles files = readUrdfAndYaml(urdf);
+  complete(own, files.yaml);
+  return files;
+}
+
 // The root link: carried by a free-flyer, or part of the ground. A root named "world" is the ground itself.
 void addRoot(const UrdfFile& urdf, BaseKind base, ModelBuilder& builder) {
   if (urdf.root == "world") return;
@@ -118,12 +171,8 @@ void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder)
 }  // namespace
 
 LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options) {
-  const std::filesystem::path path = findUrdf(name_or_path);
-  UrdfFile urdf = readUrdf(path.string());
-  YamlFile yaml;
-  std::filesystem::path settings = path;
-  settings.replace_extension(".yaml");
-  if (std::filesystem::exists(settings)) yaml = readYaml(settings.string());
+  const std::filesystem::path path = findRobotFile(name_or_path);
+  auto [urdf, yaml] = readRobotFiles(path);
   retypeJoints(yaml, urdf);
 
   ModelBuilder builder(urdf.name, urdf.path);

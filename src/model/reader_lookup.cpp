@@ -30,8 +30,8 @@ bool isDirectory(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-// robot.urdf, else the one named as the directory, else the only one.
-std::string findUrdfInDirectory(const fs::path& directory) {
+// robot.urdf, else the one named as the directory, else the only one; without any, the YAML named as the directory.
+std::string findInDirectory(const fs::path& directory) {
   const fs::path named = fs::absolute(directory).lexically_normal();
   const std::string stem = (named.has_filename() ? named : named.parent_path()).filename().string();
   for (const std::string& candidate : {std::string("robot"), stem})
@@ -41,10 +41,28 @@ std::string findUrdfInDirectory(const fs::path& directory) {
   for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error))
     if (it->path().extension() == ".urdf" && isFile(it->path())) found.push_back(it->path().string());
   if (found.size() == 1) return found.front();
+  if (found.empty() && isFile(directory / (stem + ".yaml"))) return (directory / (stem + ".yaml")).string();
   std::sort(found.begin(), found.end());
   throw ModelError(directory.string(), "directory",
                    found.empty() ? "it holds no .urdf file" : "it holds several .urdf files: " + join(found),
                    found.empty() ? "put robot.urdf there" : "give one of them by its path");
+}
+
+// In the directories of robots; empty when there is none.
+std::string findByName(const std::string& name) {
+  for (const std::string& directory : getRobotDirectories())
+    for (const std::string& file : {name + ".urdf", std::string("robot.urdf"), name + ".yaml"})
+      if (const fs::path path = fs::path(directory) / name / file; isFile(path)) return path.string();
+  return "";
+}
+
+// Whether this is a file that completes a robot, and the robot is there.
+bool completesModel(const fs::path& path) {
+  try {
+    return isFile(path) && !findModel(readYaml(path.string())).empty();
+  } catch (const ModelError&) {
+    return false;  // said when it is asked for
+  }
 }
 
 }  // namespace
@@ -82,28 +100,36 @@ std::vector<std::string> getRobotDirectories() {
   return directories;
 }
 
+std::string findModel(const YamlFile& yaml) {
+  for (const std::string& model : yaml.models) {
+    const fs::path place = fs::path(yaml.path).parent_path() / model;
+    if (isFile(place) && place.extension() == ".urdf") return place.string();
+    if (isDirectory(place) && fs::path(findInDirectory(place)).extension() == ".urdf") return findInDirectory(place);
+    const std::string file = findByName(model);
+    if (fs::path(file).extension() == ".urdf") return file;
+  }
+  return "";
+}
+
 std::vector<std::string> listRobots() {
   std::set<std::string> names;
   for (const std::string& directory : getRobotDirectories()) {
     std::error_code error;
     for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
       const std::string name = it->path().filename().string();
-      if (isFile(it->path() / (name + ".urdf"))) names.insert(name);
+      if (isFile(it->path() / (name + ".urdf")) || completesModel(it->path() / (name + ".yaml"))) names.insert(name);
     }
   }
   return {names.begin(), names.end()};
 }
 
-std::string findUrdf(const std::string& name_or_path) {
+std::string findRobotFile(const std::string& name_or_path) {
   const fs::path path = name_or_path;
-  const bool is_name =
-      !name_or_path.empty() && name_or_path.find('/') == std::string::npos && path.extension() != ".urdf";
+  const bool is_name = !name_or_path.empty() && name_or_path.find('/') == std::string::npos &&
+                       path.extension() != ".urdf" && path.extension() != ".yaml";
   if (is_name)
-    for (const std::string& directory : getRobotDirectories()) {
-      const fs::path file = fs::path(directory) / path / (name_or_path + ".urdf");
-      if (isFile(file)) return file.string();
-    }
-  if (isDirectory(path)) return findUrdfInDirectory(path);
+    if (const std::string file = findByName(name_or_path); !file.empty()) return file;
+  if (isDirectory(path)) return findInDirectory(path);
   if (isFile(path)) return name_or_path;
   throw ModelError("", "robot '" + name_or_path + "'",
                    is_name ? "there is none of this name in " + join(getRobotDirectories()) + ", nor such a path"

@@ -279,7 +279,7 @@ BaseKind readBase(const Entry& entry) {
 void readRoot(const Entry& root, YamlFile& file) {
   const Fields fields =
       root.getFields({"closed_loop", "type", "closure_name", "closures", "name_mot", "motors", "armature", "joint_name",
-                      "joint_type", "base", "contacts", "references", "serial_joints", "gravity"});
+                      "joint_type", "base", "contacts", "references", "serial_joints", "gravity", "model"});
   readPublishedClosures(fields, root, file);
   readJointTypes(fields, file);
   readMotors(fields, file);
@@ -289,6 +289,8 @@ void readRoot(const Entry& root, YamlFile& file) {
   if (const Entry* entry = find(fields, "serial_joints")) file.serial_joints = entry->getTexts();
   if (const Entry* entry = find(fields, "gravity")) file.gravity = entry->getVector3();
   if (const Entry* entry = find(fields, "base")) file.base = readBase(*entry);
+  if (const Entry* entry = find(fields, "model"))
+    file.models = entry->isList() ? entry->getTexts() : std::vector<std::string>{entry->getText()};
 }
 
 }  // namespace

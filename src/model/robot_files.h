@@ -60,6 +60,7 @@ struct ContactSpec {
 /// A robot's YAML file. Names are not resolved yet.
 struct YamlFile {
   std::string path;
+  std::vector<std::string> models;  ///< of the robot that this file completes, in the order in which they are tried
   std::optional<BaseKind> base;
   std::vector<std::pair<std::string, JointRetyping>> joint_types;  ///< in the order of the file
   std::vector<ClosureSpec> closures;
@@ -79,7 +80,7 @@ YamlFile readYaml(const std::string& path);
 /// File whole. \throws ModelError when it cannot be read
 std::string readText(const std::string& path);
 
-/// Finds the URDF of a robot. \throws ModelError listing where it looked and which robots there are
-std::string findUrdf(const std::string& name_or_path);
+/// The URDF of the robot that a file with the key `model` completes; empty when none of them is there.
+std::string findModel(const YamlFile& yaml);
 
 }  // namespace bielle

@@ -35,6 +35,9 @@
 ///   along x, m
 /// - `references: {name: {joints: {joint: number or list}, height: {frame, value}, feet: {contact: [x, y, z]}}, ...}`
 /// - `serial_joints: [joint, ...]`, `gravity: [x, y, z]` (m/s^2)
+/// - `model: NAME or path from here`, or a list of them: this file, with no URDF beside it, completes a robot published
+///   by others, the first of these that is there; a name is looked for in the directories of robots. Its keys go before
+///   those of the YAML file of that robot.
 #include <optional>
 #include <string>
 #include <vector>
@@ -53,13 +56,17 @@ struct LoadedRobot {
   Model model;
   std::vector<std::string> warnings;  ///< "file: element: what", possible but worth a look
   std::string directory;              ///< where the files were found
-  std::string file;                   ///< the .urdf, absolute
+  std::string file;                   ///< the .urdf, or the .yaml that completes one elsewhere, absolute
 };
 
-/// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf in the directories of getRobotDirectories()), by
-/// directory (its robot.urdf, else the .urdf named as the directory, else its only .urdf) or by .urdf file. \throws
+/// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf, robot.urdf or bipetto.yaml in the directories of
+/// getRobotDirectories()), by directory (its robot.urdf, else the .urdf named as the directory, else its only .urdf, else
+/// the .yaml named as the directory), by .urdf file or by .yaml file with the key `model`. \throws
 /// ModelError naming the file, the element and the remedy; nothing else, whatever the files hold
 LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options = {});
+
+/// The file of a robot by name or path, as loadRobot finds it. \throws ModelError listing where it looked
+std::string findRobotFile(const std::string& name_or_path);
 
 /// Directories searched for robots by name, in this order: those of $BIELLE_ROBOTS (separated by colons),
 /// share/bielle/robots of the installation that the running program belongs to, robots/ of the source tree, the

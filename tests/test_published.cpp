@@ -1,0 +1,117 @@
+// Models that others published, in the format of the robots here. They are no part of the project: where they are not at
+// hand, the tests are skipped and say so. How they agree with Simbody is seen in validation/.
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <map>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/squat.h"
+#include "bielle/motion/stairs.h"
+#include "bielle/motion/walk.h"
+#include "measure_steps.h"
+
+using namespace bielle;
+namespace fs = std::filesystem;
+
+namespace {
+
+const std::string kSource = BIELLE_SOURCE_DIR, kPublished = kSource + "/../shared/robots";
+
+bool isAtHand(const std::string& name) {
+  if (fs::is_directory(kPublished + "/" + name)) return true;
+  WARN("skipped: the published model " + name + " is not at hand");
+  return false;
+}
+
+FddpSummary solve(Motion& motion) {
+  FddpOptions solver;
+  solver.max_iterations = 60;
+  return Fddp(solver).solve(*motion.problem, motion.guess);
+}
+
+void checkSteps(Motion& motion) {
+  const FddpSummary summary = solve(motion);
+  CAPTURE(motion.name, summary.message, summary.iterations);
+  CHECK(summary.termination == FddpTermination::Converged);
+  const StepMeasures m = StepMeter(motion, motion.guess).measure();
+  CHECK(m.slip < 1e-3);
+  CHECK(m.penetration < 1e-3);
+  CHECK(m.lowest > -1e-3);
+  CHECK(m.clearance > 0.01);
+  CHECK(m.foothold < 2e-3);
+  CHECK(m.touchdown < 0.2);
+  CHECK(m.pressure < 1);
+  CHECK(m.friction < 0.7);
+  CHECK(m.load > 5);
+  CHECK(m.tilt < 0.05);
+  CHECK(m.feet > 0.05);
+  CHECK(m.torque < 80);
+  CHECK(m.velocity_jump < 5);
+  CHECK(m.final_speed < 0.02);
+}
+
+}  // namespace
+
+TEST_CASE("published models load and close, with the rank and mobility that they have") {
+  struct Expected {
+    int rows, rank, mobility;  // on a fixed base
+  };
+  // 5bar_linkage: five hinges and the welded pin, 6 joints; a planar loop holds 3. robot_delta: 14 hinges, planar too,
+  // three loops. The bipeds: no rod is held twice.
+  const std::map<std::string, Expected> published = {{"5bar_linkage", {6, 3, 3}},
+                                                     {"robot_delta", {18, 9, 5}},
+                                                     {"digit_like_2legs", {36, 36, 12}},
+                                                     {"battobot_6d", {36, 36, 12}}};
+  for (const auto& [name, expected] : published) {
+    if (!isAtHand(name)) continue;
+    CAPTURE(name);
+    LoadOptions options;
+    options.base = BaseKind::Fixed;
+    const Model model = loadRobot(kPublished + "/" + name, options).model;
+    const AssemblyResult closed = findClosedConfiguration(model);
+    CHECK(closed.status == AssemblyStatus::Closed);
+    CHECK(closed.gap < 1e-10);
+    const Mobility mobility = calcMobility(model, closed.q);
+    CHECK(mobility.rows == expected.rows);
+    CHECK(mobility.rank == expected.rank);
+    CHECK(mobility.mobility == expected.mobility);
+  }
+}
+
+TEST_CASE("Digit squats, walks and climbs stairs with the feet and the posture that come along") {
+  if (!isAtHand("digit_like_2legs")) return;
+  REQUIRE(setenv("BIELLE_ROBOTS", kPublished.c_str(), 1) == 0);
+  const LoadedRobot robot = loadRobot(kSource + "/robots/digit");
+  unsetenv("BIELLE_ROBOTS");
+  const Model& model = robot.model;
+  CHECK(robot.warnings.empty());
+  CHECK(robot.file.substr(robot.file.size() - 10) == "digit.yaml");
+  CHECK(model.nu() == 12);
+  CHECK(model.armature().sum() == Approx(12e-3));
+
+  SquatOptions squat;
+  squat.depth = 0.6;
+  Motion down = makeSquat(model, squat);
+  const FddpSummary summary = solve(down);
+  CHECK(summary.termination == FddpTermination::Converged);
+  Workspace ws(model);
+  double start = 0, lowest = 1e9;
+  for (const VectorXd& x : down.guess.xs) {
+    updatePositions(model, ws, x.head(model.nq()));
+    if (start == 0) start = calcCom(model, ws).z();
+    lowest = std::min(lowest, calcCom(model, ws).z());
+    CHECK(calcLargestGap(ws, makeConstraintSet(model)) < 1e-10);
+    for (const ContactFrame& foot : model.contacts())
+      CHECK(std::abs(getPlacement(ws, foot.body, foot.X_BF).p.z()) < 1e-3);
+  }
+  CHECK(lowest == Approx(0.6 * start).margin(3e-3));
+
+  Motion walk = makeWalk(model);
+  checkSteps(walk);
+  StairsOptions stairs;
+  stairs.stairs = 3;
+  Motion climb = makeStairs(model, stairs);
+  checkSteps(climb);
+}
