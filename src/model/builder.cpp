@@ -8,11 +8,6 @@
 
 namespace bielle {
 
-ModelError::ModelError(const std::string& source, const std::string& element, const std::string& problem,
-                       const std::string& remedy)
-    : std::runtime_error((source.empty() ? "" : source + ": ") + element + ": " + problem +
-                         (remedy.empty() ? "" : "; " + remedy)) {}
-
 ModelBuilder::ModelBuilder(std::string name, std::string source) : source_(std::move(source)) {
   model_.name_ = std::move(name);
   Joint world;

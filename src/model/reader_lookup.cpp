@@ -14,6 +14,8 @@ namespace fs = std::filesystem;
 namespace bielle {
 namespace {
 
+constexpr std::uintmax_t kLargestFile = 256'000'000;
+
 std::string join(const std::vector<std::string>& items) {
   std::string text;
   for (const std::string& item : items) text += (text.empty() ? "" : ", ") + item;
@@ -68,11 +70,15 @@ bool completesModel(const fs::path& path) {
 }  // namespace
 
 std::string readText(const std::string& path) {
+  std::error_code unknown;
+  if (const auto size = fs::file_size(path, unknown); !unknown && size > kLargestFile)
+    throw ModelError(path, "file", "it is larger than a robot may be (256 MB)", "give a URDF or YAML file");
   std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (!file.is_open() || file.bad() || isDirectory(path))
-    throw ModelError(path, "file", "it cannot be read", "check the path and its permissions");
-  return text;
+  if (file.is_open() && !isDirectory(path)) try {
+      return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    } catch (const std::ios_base::failure&) {  // so the iterators tell that reading fails
+    }
+  throw ModelError(path, "file", "it cannot be read", "check the path and its permissions");
 }
 
 std::vector<std::string> getRobotDirectories() {

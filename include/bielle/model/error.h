@@ -5,7 +5,8 @@
 
 namespace bielle {
 
-/// Bad input at the boundary. what() reads "file: element: what is wrong; remedy".
+/// Bad input at the boundary. what() reads "file: element: what is wrong; remedy", on one line, without control characters,
+/// long parts cut.
 class ModelError : public std::runtime_error {
  public:
   /// \param source file (or "" for a model built in code)   \param element e.g. `joint 'knee'`

@@ -1,0 +1,25 @@
+// summary.json of a result, and the state that `bielle eval` is given: numbers, or one clear error.
+#include "bielle/io/result.h"
+#include "bielle/model/error.h"
+#include "bielle/model/fourbar_chain.h"
+#include "cli/eval_state.h"
+#include "scratch.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace bielle;
+  const fuzz::Scratch& scratch = fuzz::getScratch();
+  const std::string text = fuzz::toText(data, size);
+  scratch.write("summary.json", text);
+  try {
+    readSummary(scratch.path());
+  } catch (const ModelError&) {
+  }
+  static const Model model = makeFourBarChain().model;
+  const std::string path = scratch.write("state.json", text);
+  try {
+    const cli::EvalState state = cli::readState(model, path);
+    if (!state.q.allFinite() || !state.v.allFinite() || !state.u.allFinite()) fuzz::fail("a state is not finite");
+  } catch (const ModelError&) {
+  }
+  return 0;
+}

@@ -1,0 +1,46 @@
+#!/bin/bash
+# run.sh [SECONDS [TARGET...]]: runs the fuzz targets of build-fuzz one after the other (default: all, 600 s each) on the
+# shipped files, and tells what came out. Findings are kept in build-fuzz/findings, corpora in build-fuzz/corpus.
+set -euo pipefail
+export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+seconds=${1:-600}
+shift || true
+targets=("$@")
+[ ${#targets[@]} -gt 0 ] || targets=(urdf yaml json csv npz)
+build=$root/build-fuzz
+mkdir -p "$build/findings" "$build/seeds"
+
+# Seeds: the robots of the source tree, a small robot's YAML with every key, and a result that the command makes.
+if [ ! -e "$build/seeds/done" ]; then
+  mkdir -p "$build"/seeds/{urdf,yaml,json,csv,npz}
+  cp "$root"/robots/*/*.urdf "$build/seeds/urdf"
+  cp "$root"/robots/*/*.yaml "$root"/tests/fuzz/toy.yaml "$build/seeds/yaml"
+  "${BIELLE:-$root/build/bin/bielle}" solve squat --robot bipetto --depth 0.95 --set duration=0.4 --set settle=0 \
+    --set time_step=0.1 --max-iterations 1 --quiet --no-check --no-report -o "$build/seeds/result" >/dev/null || true
+  cp "$build/seeds/result/trajectory.csv" "$build/seeds/csv"
+  cp "$build/seeds/result/trajectory.npz" "$build/seeds/npz"
+  cp "$build/seeds/result/summary.json" "$build/seeds/json"
+  echo '{"joints": {"crank1": {"q": 0.5, "v": [0.1]}}, "torques": {"crank1": 3.5}, "contacts": []}' >"$build/seeds/json/state.json"
+  printf 'time,q.a,v.a,a.a,u.m,closure.c.fx,closure.c.fy,closure.c.fz,closure.c.nx,closure.c.ny,closure.c.nz,com.x,com.y,com.z,gap.position,gap.angle\n0,1,2,3,4,1,2,3,4,5,6,1,2,3,0,0\n1,1e300,nan,,,,,,,,,inf,-0,3,0,0\n' >"$build/seeds/csv/small.csv"
+  touch "$build/seeds/done"
+fi
+
+status=0
+for target in "${targets[@]}"; do
+  mkdir -p "$build/corpus/$target"
+  log=$build/fuzz_$target.log
+  dictionary=()
+  case $target in urdf | yaml) dictionary=("-dict=$root/tests/fuzz/robot.dict") ;; esac
+  if nice "$build/tests/fuzz/fuzz_$target" "$build/corpus/$target" "$build/seeds/$target" -max_total_time="$seconds" \
+    -timeout=10 -rss_limit_mb=2048 -malloc_limit_mb=1024 -max_len=65536 -print_final_stats=1 \
+    -artifact_prefix="$build/findings/$target-" "${dictionary[@]}" >"$log" 2>&1; then
+    outcome="nothing found"
+  else
+    outcome="FOUND, see $log"
+    status=1
+  fi
+  runs=$(awk '/stat::number_of_executed_units/ { print $2 }' "$log")
+  echo "$target: ${runs:-?} inputs in ${seconds} s, $(find "$build/corpus/$target" -type f | wc -l) kept: $outcome"
+done
+exit $status

@@ -1,0 +1,52 @@
+#pragma once
+// What must hold of any robot files: a model that can be computed with, or one clear error.
+#include <cmath>
+#include <sstream>
+#include <string>
+
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+
+namespace bielle::testing {
+
+enum class Trial { Valid, Refused, Wrong };
+struct TrialResult {
+  Trial trial = Trial::Valid;
+  std::string message;  ///< the error, or what is wrong
+};
+
+// "place: element: problem; remedy" that names the directory or file, on one line of the command's output.
+inline bool isClear(const std::string& error, const std::string& directory) {
+  return error.rfind(directory, 0) == 0 && error.find(": ", directory.size()) != std::string::npos &&
+         error.find("; ") != std::string::npos;
+}
+
+// Statuses are told, and numbers under a good status are finite.
+inline std::string findWrong(const Model& model) {
+  const VectorXd q = model.makeNeutral(), zero = VectorXd::Zero(model.nv());
+  if (!q.allFinite() || model.mass() < 0 || !std::isfinite(model.mass())) return "the model is not finite";
+  if (model.nv() > 300) return "";
+  Workspace ws(model);
+  ConstrainedWorkspace cws;
+  const DynamicsStatus status = updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), q, zero, zero);
+  if (status != DynamicsStatus::Ok) return "";
+  if (!cws.a.allFinite() || !cws.lambda.allFinite()) return "accelerations or forces are not finite";
+  return "";
+}
+
+inline TrialResult tryRobot(const std::string& directory) {
+  try {
+    const LoadedRobot robot = loadRobot(directory);
+    const std::string wrong = findWrong(robot.model);
+    return {wrong.empty() ? Trial::Valid : Trial::Wrong, wrong};
+  } catch (const ModelError& error) {
+    const bool clear = isClear(error.what(), directory);
+    return {clear ? Trial::Refused : Trial::Wrong, error.what()};
+  } catch (const std::exception& error) {
+    return {Trial::Wrong, std::string("another exception: ") + error.what()};
+  }
+}
+
+}  // namespace bielle::testing

@@ -1,0 +1,201 @@
+// Thousands of robot files with something wrong in them: each is a model that can be computed with, or one clear error.
+// The mutations are those that people and programs make (values out of range, names exchanged, lines lost or doubled,
+// files cut short) and some that nobody makes. tests/fuzz goes on from there, guided by coverage.
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <random>
+#include <regex>
+
+#include "robot_directory.h"
+#include "robot_trial.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+struct RobotFiles {
+  std::string name, urdf, yaml;
+};
+
+std::string readFile(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+// The toy, and the smaller ones of the robots of the source tree.
+std::vector<RobotFiles> collectRobots() {
+  std::vector<RobotFiles> robots = {{"toy", kToyUrdf, kToyYaml}};
+  for (const auto& entry : std::filesystem::directory_iterator(BIELLE_SOURCE_DIR "/robots")) {
+    const std::string name = entry.path().filename().string();
+    const RobotFiles files = {name, readFile(entry.path() / (name + ".urdf")),
+                              readFile(entry.path() / (name + ".yaml"))};
+    if (!files.urdf.empty() && files.urdf.size() < 60000) robots.push_back(files);
+  }
+  std::sort(robots.begin(), robots.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+  return robots;
+}
+
+using Random = std::mt19937;
+int choose(Random& rng, int count) { return std::uniform_int_distribution<int>(0, count - 1)(rng); }
+
+std::vector<std::string> split(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+std::string join(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += line + "\n";
+  return text;
+}
+
+// Places that match a pattern; one of them, replaced.
+std::string replaceOneOf(const std::string& text, const std::regex& pattern, const std::string& by, Random& rng) {
+  std::vector<std::smatch> found{std::sregex_iterator(text.begin(), text.end(), pattern), std::sregex_iterator()};
+  if (found.empty()) return text;
+  const std::smatch& match = found[choose(rng, static_cast<int>(found.size()))];
+  return text.substr(0, match.position()) + by + text.substr(match.position() + match.length());
+}
+
+std::string findOneOf(const std::string& text, const std::regex& pattern, Random& rng) {
+  std::vector<std::smatch> found{std::sregex_iterator(text.begin(), text.end(), pattern), std::sregex_iterator()};
+  return found.empty() ? "" : found[choose(rng, static_cast<int>(found.size()))].str();
+}
+
+std::string changeNumber(const std::string& text, Random& rng) {
+  static const std::regex number(R"([-+]?\d+(\.\d+)?([eE][-+]?\d+)?)");
+  static const char* const values[] = {
+      "0",     "-1",   "1e300", "-1e300", "1e-300", "1e308", "1e999", "nan", ".nan", "inf",
+      "-.inf", "1e10", "-0",    "",       "x",      "1,5",   "0x10",  "1e",  "1 2",  "99999999999999999999",
+      "1e-9",  "3.14", "--1",   "1e150"};
+  return replaceOneOf(text, number, values[choose(rng, std::size(values))], rng);
+}
+
+std::string exchangeName(const std::string& text, Random& rng) {
+  static const std::regex name(R"([A-Za-z_]\w{2,})");
+  const std::string other = choose(rng, 8) ? findOneOf(text, name, rng) : "world";
+  return replaceOneOf(text, name, other, rng);
+}
+
+std::string changeLines(const std::string& text, Random& rng) {
+  std::vector<std::string> lines = split(text);
+  if (lines.empty()) return text;
+  const int count = static_cast<int>(lines.size()), i = choose(rng, count), j = choose(rng, count);
+  switch (choose(rng, 4)) {
+    case 0:
+      lines.erase(lines.begin() + i);
+      break;
+    case 1:
+      lines.insert(lines.begin() + j, std::string(lines[i]));
+      break;
+    case 2:
+      std::swap(lines[i], lines[j]);
+      break;
+    default:
+      lines.erase(lines.begin() + std::min(i, j), lines.begin() + std::max(i, j));
+  }
+  return join(lines);
+}
+
+std::string changeBytes(std::string text, Random& rng) {
+  if (text.empty()) return text;
+  const int at = choose(rng, static_cast<int>(text.size()));
+  switch (choose(rng, 4)) {
+    case 0:
+      return text.substr(0, at);
+    case 1:
+      text[at] = static_cast<char>(choose(rng, 256));
+      return text;
+    case 2:
+      return text.erase(at, 1 + choose(rng, 40));
+    default:
+      return text.insert(at, std::string(1 + choose(rng, 40), static_cast<char>(choose(rng, 256))));
+  }
+}
+
+// Depth and numbers that no robot has.
+std::string blowUp(const std::string& text, Random& rng) {
+  const int n = 1 << choose(rng, 14);
+  std::string more;
+  switch (choose(rng, 6)) {
+    case 0:
+      for (int i = 0; i < n; ++i) more += "<link name=\"n" + std::to_string(i) + "\">";
+      break;
+    case 1:
+      more = std::string(n, '[');
+      break;
+    case 2:
+      more = "closed_loop: " + std::string(n, '[') + std::string(n, ']') + "\n";
+      break;
+    case 3:
+      for (int i = 0; i < n / 64; ++i) {
+        const std::string a = std::to_string(i), b = std::to_string(i + 1);
+        more += "<link name=\"n" + a + "\"/><joint name=\"m" + a + "\" type=\"continuous\"><parent link=\"n" + a +
+                "\"/><child link=\"n" + b + "\"/></joint>";
+      }
+      break;
+    case 4:
+      more = "a: &a [x]\n";
+      for (char c = 'b'; c < 'b' + n % 20; ++c)
+        more += std::string(1, c) + ": &" + c + " [*" + std::string(1, c - 1) + ", *" + std::string(1, c - 1) + "]\n";
+      break;
+    default:
+      more = std::string(n, 'a');
+  }
+  const size_t end = text.rfind("</robot>");
+  const size_t at = choose(rng, 2) && end != std::string::npos ? end : choose(rng, static_cast<int>(text.size()) + 1);
+  return text.substr(0, at) + more + text.substr(at);
+}
+
+std::string mutate(std::string text, Random& rng) {
+  const int times = 1 + choose(rng, 3);
+  for (int i = 0; i < times; ++i) {
+    const int kind = choose(rng, 20);
+    if (kind < 8)
+      text = changeNumber(text, rng);
+    else if (kind < 12)
+      text = exchangeName(text, rng);
+    else if (kind < 16)
+      text = changeLines(text, rng);
+    else if (kind < 19)
+      text = changeBytes(text, rng);
+    else
+      text = blowUp(text, rng);
+  }
+  return text;
+}
+
+}  // namespace
+
+TEST_CASE("Mutated robot files are models or clear errors") {
+  constexpr int kTrials = 12000;
+  const std::vector<RobotFiles> robots = collectRobots();
+  REQUIRE(robots.size() >= 4);
+  const RobotDirectory directory;
+  std::map<Trial, int> count;
+  std::map<std::string, int> said;
+  for (int i = 0; i < kTrials; ++i) {
+    Random rng(i);  // so that one of them can be tried again by itself
+    // Small robots more often: a mutation of a large one is like its neighbour.
+    const RobotFiles& files = robots[choose(rng, 4) ? choose(rng, static_cast<int>(robots.size())) : robots.size() - 1];
+    const bool in_yaml = choose(rng, 2);
+    directory.writeRobot(in_yaml ? files.urdf : mutate(files.urdf, rng),
+                         in_yaml ? mutate(files.yaml, rng) : files.yaml);
+    const TrialResult result = tryRobot(directory.path());
+    ++count[result.trial];
+    if (result.trial == Trial::Refused) ++said[result.message.substr(result.message.rfind("; "))];
+    CAPTURE(i, files.name, in_yaml, result.message);
+    CHECK(result.trial != Trial::Wrong);
+  }
+  std::cout << kTrials << " mutated robots: " << count[Trial::Valid] << " models, " << count[Trial::Refused]
+            << " refused with " << said.size() << " different remedies\n";
+  // The mutations reach the readers: neither all harmless nor all at the surface.
+  CHECK(count[Trial::Valid] > kTrials / 20);
+  CHECK(count[Trial::Refused] > kTrials / 4);
+  CHECK(said.size() > 30);
+}
