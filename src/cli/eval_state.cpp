@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <iostream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "bielle/io/names.h"
+#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 
 namespace bielle::cli {
@@ -183,11 +183,7 @@ EvalState readState(const Model& model, const std::string& path) {
     const std::string text{std::istreambuf_iterator<char>(std::cin), std::istreambuf_iterator<char>()};
     return StateReader(model, "standard input").read(text);
   }
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (!file.is_open() || file.bad())
-    throw ModelError(path, "file", "it cannot be read", "check the path and its permissions");
-  return StateReader(model, path).read(text);
+  return StateReader(model, path).read(readTextFile(path, "check the path and its permissions"));
 }
 
 }  // namespace bielle::cli

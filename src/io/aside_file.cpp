@@ -5,7 +5,9 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
@@ -17,10 +19,22 @@ void failToWrite(const std::string& path, const std::string& why) {
                    "check the directory, its permissions and the space left");
 }
 
-AsideFile::AsideFile(const std::string& path) : path_(path), aside_(path + ".part" + std::to_string(getpid())) {}
+namespace {
+
+// A device or a pipe is written to, not replaced.
+bool isSpecial(const std::string& path) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  return std::filesystem::is_other(status);
+}
+
+}  // namespace
+
+AsideFile::AsideFile(const std::string& path)
+    : path_(path), aside_(isSpecial(path) ? path : path + ".part" + std::to_string(getpid())) {}
 
 AsideFile::~AsideFile() {
-  if (!aside_.empty()) std::remove(aside_.c_str());
+  if (aside_ != path_ && !aside_.empty()) std::remove(aside_.c_str());
 }
 
 void AsideFile::write(const std::string& text) {
@@ -32,8 +46,18 @@ void AsideFile::write(const std::string& text) {
 }
 
 void AsideFile::commit() {
-  if (std::rename(aside_.c_str(), path_.c_str()) != 0) failToWrite(path_, std::strerror(errno));
+  if (aside_ != path_ && std::rename(aside_.c_str(), path_.c_str()) != 0) failToWrite(path_, std::strerror(errno));
   aside_.clear();
+}
+
+std::string readTextFile(const std::string& path, const std::string& remedy) {
+  std::error_code unknown;
+  std::ifstream file(path, std::ios::binary);
+  if (file.is_open() && !std::filesystem::is_directory(path, unknown)) try {
+      return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    } catch (const std::ios_base::failure&) {  // so the iterators tell that reading fails
+    }
+  throw ModelError(path, "file", "it cannot be read", remedy);
 }
 
 void writeTextFile(const std::string& path, const std::string& text) {

@@ -1,10 +1,12 @@
 // The .npy format: magic, version, length of the header, a Python dictionary, then the data. Little-endian, as are the
 // machines Bielle runs on.
+#include <algorithm>
 #include <codecvt>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 #include <locale>
+#include <optional>
 #include <regex>
 
 #include "bielle/model/error.h"
@@ -14,14 +16,19 @@ namespace bielle {
 namespace {
 
 constexpr char kMagic[] = "\x93NUMPY\x01";  // with the terminating zero, the minor version
-constexpr size_t kPrelude = 10, kAlignment = 64;
+constexpr size_t kPrelude = 10, kAlignment = 64, kLongestHeader = 1024;
 
 using Utf8 = std::wstring_convert<std::codecvt_utf8<char32_t>, char32_t>;
 Utf8 makeUtf8() { return Utf8("?", U"?"); }  // what stands for bytes that are not UTF-8
 
-size_t calcCount(const std::vector<size_t>& shape) {
+// Number of elements; nothing when it is over `most`.
+std::optional<size_t> calcCount(const std::vector<size_t>& shape, size_t most) {
+  if (std::find(shape.begin(), shape.end(), size_t{0}) != shape.end()) return 0;
   size_t count = 1;
-  for (size_t n : shape) count *= n;
+  for (size_t n : shape) {
+    if (count > most / n) return std::nullopt;
+    count *= n;
+  }
   return count;
 }
 
@@ -68,6 +75,7 @@ NpyArray parseNpy(const std::string& path, const std::string& element, const std
           "it is no array of the .npy format 1.0");
   const size_t length = static_cast<unsigned char>(bytes[8]) + 256u * static_cast<unsigned char>(bytes[9]);
   require(bytes.size() >= kPrelude + length, "it is cut short");
+  require(length <= kLongestHeader, "its header is too long");  // std::regex recurses
   const std::string header = bytes.substr(kPrelude, length);
   static const std::regex pattern(
       R"(\{\s*'descr':\s*'<(f8|U\d{1,6})',\s*'fortran_order':\s*False,\s*'shape':\s*\(([\d, ]*)\),?\s*\}\s*)");
@@ -82,8 +90,9 @@ NpyArray parseNpy(const std::string& path, const std::string& element, const std
   array.is_text = type[0] == 'U';
   const size_t width = array.is_text ? std::stoul(type.substr(1)) : 1;
   const size_t item = array.is_text ? sizeof(char32_t) * width : sizeof(double);
-  const size_t count = calcCount(array.shape);
-  require(bytes.size() - kPrelude - length == count * item, "its data do not fit its shape");
+  const std::optional<size_t> elements = calcCount(array.shape, bytes.size());
+  require(elements && bytes.size() - kPrelude - length == *elements * item, "its data do not fit its shape");
+  const size_t count = *elements;
   const char* data = bytes.data() + kPrelude + length;
   if (!array.is_text) {
     array.numbers.resize(count);

@@ -10,6 +10,10 @@
 namespace bielle {
 namespace {
 
+// Archives of the same numbers are the same bytes: the first day that the format knows, wherever and whenever.
+constexpr zip_uint16_t kFirstDay = (1 << 5) | 1;
+constexpr size_t kLargest = size_t{1} << 28;  // all arrays together, bytes
+
 [[noreturn]] void fail(const std::string& path, const std::string& element, const std::string& problem) {
   throw ModelError(path, element, problem, "give a trajectory that Bielle wrote");
 }
@@ -25,7 +29,11 @@ struct ArchiveDeleter {
 struct SourceDeleter {
   void operator()(zip_source_t* source) const { zip_source_free(source); }
 };
+struct FileDeleter {
+  void operator()(zip_file_t* file) const { zip_fclose(file); }
+};
 using Archive = std::unique_ptr<zip_t, ArchiveDeleter>;
+using File = std::unique_ptr<zip_file_t, FileDeleter>;
 using Source = std::unique_ptr<zip_source_t, SourceDeleter>;
 
 std::string readSource(zip_source_t* source) {
@@ -35,6 +43,22 @@ std::string readSource(zip_source_t* source) {
   for (zip_int64_t n = 0; (n = zip_source_read(source, buffer, sizeof buffer)) > 0;)
     bytes.append(buffer, static_cast<size_t>(n));
   zip_source_close(source);
+  return bytes;
+}
+
+// What the archive says of an entry's size is not believed: a small file can unpack to more than there is memory.
+std::string readEntry(zip_t* archive, zip_int64_t index, const std::string& path, const std::string& name,
+                      size_t largest) {
+  const File file(zip_fopen_index(archive, index, 0));
+  if (!file) fail(path, name, std::string("it cannot be read: ") + zip_strerror(archive));
+  std::string bytes;
+  char buffer[65536];
+  zip_int64_t count = 0;
+  while ((count = zip_fread(file.get(), buffer, sizeof buffer)) > 0) {
+    bytes.append(buffer, static_cast<size_t>(count));
+    if (bytes.size() > largest) fail(path, name, "it is larger than a trajectory may be (256 MiB)");
+  }
+  if (count < 0) fail(path, name, "it is damaged");
   return bytes;
 }
 
@@ -53,10 +77,13 @@ std::string formatArchive(const NpyArrays& arrays) {
   for (const auto& [name, array] : arrays) {
     const std::string& bytes = files[name + ".npy"] = formatNpy(array);
     zip_source_t* input = zip_source_buffer(archive.get(), bytes.data(), bytes.size(), 0);
-    if (!input || zip_file_add(archive.get(), (name + ".npy").c_str(), input, ZIP_FL_ENC_UTF_8) < 0) {
+    const zip_int64_t index =
+        input ? zip_file_add(archive.get(), (name + ".npy").c_str(), input, ZIP_FL_ENC_UTF_8) : zip_int64_t{-1};
+    if (index < 0) {
       zip_source_free(input);
       failInMemory(zip_strerror(archive.get()));
     }
+    zip_file_set_dostime(archive.get(), static_cast<zip_uint64_t>(index), 0, kFirstDay, 0);
   }
   if (zip_close(archive.get()) != 0) failInMemory(zip_strerror(archive.get()));
   archive.release();
@@ -74,16 +101,12 @@ NpyArrays readArchive(const std::string& path) {
     fail(path, "file", "it cannot be read: " + why);
   }
   NpyArrays arrays;
+  size_t left = kLargest;
   for (zip_int64_t i = 0; i < zip_get_num_entries(archive.get(), 0); ++i) {
-    zip_stat_t stat;
-    zip_stat_init(&stat);
-    zip_file_t* file = zip_fopen_index(archive.get(), i, 0);
-    if (!file || zip_stat_index(archive.get(), i, 0, &stat) != 0) fail(path, "file", zip_strerror(archive.get()));
-    const std::string name = stat.name;
-    std::string bytes(stat.size, '\0');
-    const zip_int64_t count = zip_fread(file, bytes.data(), bytes.size());
-    zip_fclose(file);
-    if (count != static_cast<zip_int64_t>(bytes.size())) fail(path, name, "it is cut short");
+    const char* entry = zip_get_name(archive.get(), i, ZIP_FL_ENC_GUESS);
+    if (!entry) fail(path, "file", zip_strerror(archive.get()));
+    const std::string name = entry, bytes = readEntry(archive.get(), i, path, name, left);
+    left -= bytes.size();
     const size_t stem = name.size() > 4 ? name.size() - 4 : 0;
     if (name.substr(stem) != ".npy") fail(path, name, "it is no .npy file");
     arrays[name.substr(0, stem)] = parseNpy(path, name, bytes);

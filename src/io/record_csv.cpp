@@ -1,17 +1,22 @@
 // Trajectories as comma-separated values.
 #include <charconv>
-#include <fstream>
-#include <iterator>
 
+#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 #include "io/record_tables.h"
 
 namespace bielle {
 namespace {
 
+constexpr const char* kRemedy = "give a trajectory that Bielle wrote";
+
 [[noreturn]] void fail(const std::string& path, const std::string& element, const std::string& problem) {
-  throw ModelError(path, element, problem, "give a trajectory that Bielle wrote");
+  throw ModelError(path, element, problem, kRemedy);
 }
+
+constexpr size_t kMostColumns = 1 << 20;
+
+std::string nameLine(int node) { return "line " + std::to_string(node + 2); }
 
 // A name with a comma, a quote or a line break is quoted, as usual in CSV.
 std::string quote(const std::string& name) {
@@ -33,11 +38,11 @@ std::vector<std::string> makeHeader(const MotionRecord& record) {
   return header;
 }
 
-// The cells of the line that begins at `at`, which moves to the next line.
-std::vector<std::string> readLine(const std::string& text, size_t& at) {
+// The cells of the line that begins at `at`, which moves to the next line. It gives up after `most` cells and one.
+std::vector<std::string> readLine(const std::string& text, size_t& at, size_t most) {
   std::vector<std::string> cells(1);
   bool quoted = false;
-  for (; at < text.size(); ++at) {
+  for (; at < text.size() && cells.size() <= most; ++at) {
     const char c = text[at];
     if (c == '"' && quoted && at + 1 < text.size() && text[at + 1] == '"')
       cells.back() += text[++at];
@@ -88,27 +93,29 @@ std::string formatCsv(const MotionRecord& record) {
 }
 
 MotionRecord readCsv(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (!file.is_open() || file.bad()) fail(path, "file", "it cannot be read");
+  const std::string text = readTextFile(path, kRemedy);
   size_t at = 0;
   MotionRecord record;
-  const std::vector<std::string> header = readLine(text, at);
+  const std::vector<std::string> header = readLine(text, at, kMostColumns);
   for (const std::string& column : header) addName(column, record);
   if (makeHeader(record) != header) fail(path, "header", "its columns are not those of a trajectory");
-  std::vector<std::vector<std::string>> rows;
-  while (at < text.size()) rows.push_back(readLine(text, at));
-  if (rows.empty()) fail(path, "file", "it has no node");
+  // Counted before there is memory for them.
+  const size_t first_row = at;
+  int nodes = 0;
+  for (; at < text.size(); ++nodes)
+    if (readLine(text, at, header.size()).size() != header.size())
+      fail(path, nameLine(nodes), "it has not the " + std::to_string(header.size()) + " cells of the header");
+  if (nodes == 0) fail(path, "file", "it has no node");
 
-  resizeRecord(static_cast<int>(rows.size()) - 1, record);
+  resizeRecord(nodes - 1, record);
   const std::vector<RecordTable> tables = listTables(record);
-  for (size_t k = 0; k < rows.size(); ++k) {
-    const std::string line = "line " + std::to_string(k + 2);
-    if (rows[k].size() != header.size())
-      fail(path, line, std::to_string(rows[k].size()) + " cells for " + std::to_string(header.size()) + " columns");
+  at = first_row;
+  for (int k = 0; k < nodes; ++k) {
+    const std::string line = nameLine(k);
+    const std::vector<std::string> row = readLine(text, at, header.size());
     size_t column = 0;
     const auto read = [&](double& value) {
-      const std::string& cell = rows[k][column];
+      const std::string& cell = row[column];
       const char* end = cell.data() + cell.size();
       const auto [stop, error] = std::from_chars(cell.data(), end, value);
       if (error != std::errc() || stop != end)
@@ -119,9 +126,9 @@ MotionRecord readCsv(const std::string& path) {
     for (const RecordTable& table : tables) {
       RowMatrixXd& data = record.*table.data;
       for (int i = 0; i < data.cols(); ++i) {
-        if (static_cast<int>(k) < data.rows())
+        if (k < data.rows())
           read(data(k, i));
-        else if (!rows[k][column++].empty())
+        else if (!row[column++].empty())
           fail(path, line, "the last node holds values of a stage");
       }
     }

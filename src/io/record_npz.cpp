@@ -48,15 +48,15 @@ MotionRecord readNpz(const std::string& path) {
   const NpyArray time = takeArray(path, "time", false, arrays);
   if (time.shape.size() != 1 || time.numbers.empty())
     throw ModelError(path, "array 'time'", "it is not a list of nodes", "give a trajectory that Bielle wrote");
-  resizeRecord(static_cast<int>(time.numbers.size()) - 1, record);
-  record.time = VectorXd::Map(time.numbers.data(), time.numbers.size());
+  const size_t nodes = time.numbers.size();
+  record.time = VectorXd::Map(time.numbers.data(), nodes);
   for (const RecordTable& table : listTables(record)) {
-    RowMatrixXd& data = record.*table.data;
+    const size_t rows = table.per == RecordTable::Per::Node ? nodes : nodes - 1;
     const NpyArray array = takeArray(path, table.array, false, arrays);
-    if (array.shape != makeShape(table, data.rows()))
+    if (array.shape != makeShape(table, rows))
       throw ModelError(path, "array '" + table.array + "'", "its shape does not fit the names and the nodes",
                        "give a trajectory that Bielle wrote");
-    data = RowMatrixXd::Map(array.numbers.data(), data.rows(), data.cols());
+    record.*table.data = RowMatrixXd::Map(array.numbers.data(), rows, table.columns.size());
   }
   return record;
 }

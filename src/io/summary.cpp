@@ -1,12 +1,20 @@
 #include <filesystem>
-#include <fstream>
+#include <limits>
 
 #include "bielle/io/result.h"
+#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 #include "io/json_text.h"
 
 namespace bielle {
 namespace {
+
+// A number of nodes, or the index of one.
+int readCount(const Json& json) {
+  if (!json.is_number_integer() || json < 0 || json > std::numeric_limits<int>::max())
+    throw std::runtime_error(json.dump(-1, ' ', true, Json::error_handler_t::replace) + " is no number of nodes");
+  return json;
+}
 
 Vector3d readVector(const Json& json) {
   return Vector3d(json.at(0).get<double>(), json.at(1).get<double>(), json.at(2).get<double>());
@@ -41,7 +49,7 @@ MotionSummary read(const Json& json) {
   for (const auto& [name, value] : json.at("requested").items()) summary.requested.emplace_back(name, value);
   for (const Json& entry : json.at("phases")) {
     MotionSummary::Phase phase{
-        entry.at("name"), entry.at("start_node"), entry.at("nodes"), entry.at("time_step_s"), {}};
+        entry.at("name"), readCount(entry.at("start_node")), readCount(entry.at("nodes")), entry.at("time_step_s"), {}};
     for (const Json& contact : entry.at("contacts"))
       phase.stances.push_back({contact.at("name"), readPlacement(contact)});
     summary.phases.push_back(phase);
@@ -54,10 +62,9 @@ MotionSummary read(const Json& json) {
 
 MotionSummary readSummary(const std::string& directory) {
   const std::string path = (std::filesystem::path(directory) / "summary.json").string();
-  std::ifstream file(path);
-  if (!file) throw ModelError(path, "file", "it cannot be read", "give a directory that `bielle solve` wrote");
+  const std::string text = readTextFile(path, "give a directory that `bielle solve` wrote");
   try {
-    MotionSummary summary = read(Json::parse(file));
+    MotionSummary summary = read(Json::parse(text));
     summary.file = path;
     return summary;
   } catch (const std::exception& error) {

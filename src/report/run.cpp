@@ -1,7 +1,6 @@
 #include "report/run.h"
 
 #include <filesystem>
-#include <fstream>
 
 #include "bielle/io/names.h"
 #include "bielle/model/error.h"
@@ -14,16 +13,9 @@ namespace bielle {
 namespace {
 
 Json readJson(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file.is_open())
-    throw ModelError(path.string(), "file", "it cannot be read", "give a directory that `bielle solve` wrote");
-  try {
-    Json json = Json::parse(file);
-    if (json.is_object()) return json;
-  } catch (const Json::exception& error) {
-    throw ModelError(path.string(), "JSON", error.what(), "make it again");
-  }
-  throw ModelError(path.string(), "JSON", "it is no object", "make it again");
+  Json out;
+  readJsonFile(path.string(), "give a directory that `bielle solve` wrote", [&out](const Json& json) { out = json; });
+  return out;
 }
 
 std::string getText(const Json& json, const char* key) {

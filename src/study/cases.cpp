@@ -51,13 +51,18 @@ Json describeRequest(const Case& request, const RunOptions& options) {
 
 // The outcome in case.json, if it is there and answers the same request.
 std::optional<CaseOutcome> readOutcome(const std::string& path, const Json& request) {
+  if (!std::filesystem::is_regular_file(path)) return std::nullopt;
   std::ifstream file(path);
   const Json json = Json::parse(file, nullptr, false);
   if (!json.is_object() || json.value("request", Json()) != request) return std::nullopt;
   CaseOutcome outcome;
   outcome.complete = outcome.kept = true;
-  for (const Json& step : json.at("outcome"))
-    outcome.steps.push_back({step.at("status"), step.at("seconds"), step.at("error")});
+  try {
+    for (const Json& step : json.at("outcome"))
+      outcome.steps.push_back({step.at("status"), step.at("seconds"), step.at("error")});
+  } catch (const Json::exception&) {  // not as it was written: the case is done anew
+    return std::nullopt;
+  }
   return outcome;
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
-#include <fstream>
+#include <filesystem>
 #include <functional>
 
 #include "io/json_text.h"
@@ -271,18 +271,19 @@ const char* getName(Verdict verdict) {
 
 RatioFinding readRatio(const std::string& directory) {
   RatioFinding finding;
-  std::ifstream file(directory + "/ratio.json");
-  const Json json = Json::parse(file, nullptr, false);
-  if (!json.is_object()) return finding;
-  finding.joint = json.at("swept");
-  for (const Json& sample : json.at("samples")) {
-    const double angle = sample.at("joints").at(0);
-    if (sample.at("dead") == "joint") finding.joint_dead_points.push_back(angle);
-    if (sample.at("branch") != 0 || sample.at("dead") != "" || sample.at("R").size() != 1) continue;
-    finding.angle.push_back(angle);
-    finding.ratio.push_back(sample.at("R").at(0));
-    if (sample.at("s") == 0) finding.start = finding.ratio.back();
-  }
+  const std::string file = directory + "/ratio.json";
+  if (!std::filesystem::exists(file)) return finding;
+  readJsonFile(file, "remove its directory, so that the case is done anew", [&finding](const Json& json) {
+    finding.joint = json.at("swept");
+    for (const Json& sample : json.at("samples")) {
+      const double angle = sample.at("joints").at(0);
+      if (sample.at("dead") == "joint") finding.joint_dead_points.push_back(angle);
+      if (sample.at("branch") != 0 || sample.at("dead") != "" || sample.at("R").size() != 1) continue;
+      finding.angle.push_back(angle);
+      finding.ratio.push_back(sample.at("R").at(0));
+      if (sample.at("s") == 0) finding.start = finding.ratio.back();
+    }
+  });
   return finding;
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -17,6 +16,8 @@ namespace fs = std::filesystem;
 namespace bielle::study {
 namespace {
 
+constexpr const char* kRemedy = "remove its directory, so that the case is done anew";
+
 // Nodes of the window.
 std::pair<int, int> findWindow(Window window, const MotionSummary& summary, int nodes) {
   if (window == Window::Whole) return {0, nodes - 1};
@@ -26,7 +27,10 @@ std::pair<int, int> findWindow(Window window, const MotionSummary& summary, int 
   for (const MotionSummary::Phase& phase : summary.phases)
     if (phase.stances.size() < most) steps.emplace_back(phase.start_node, phase.start_node + phase.nodes);
   if (steps.size() < 5) return {0, nodes - 1};
-  return {steps[2].first, steps[steps.size() - 3].second};
+  const std::pair<int, int> found(steps[2].first, steps[steps.size() - 3].second);
+  if (found.first > found.second || found.second >= nodes)
+    throw ModelError(summary.file, "phases", "they are not as long as the trajectory", kRemedy);
+  return found;
 }
 
 Load calcLoad(const MotionRecord& record, const std::vector<std::string>& motors, int first, int last) {
@@ -49,10 +53,10 @@ Load calcLoad(const MotionRecord& record, const std::vector<std::string>& motors
 
 // Numbers of summary.json that readSummary leaves out.
 void readSolver(const std::string& file, Performance& out) {
-  std::ifstream stream(file);
-  const Json json = Json::parse(stream, nullptr, false);
-  out.iterations = json.value("iterations", 0);
-  out.seconds = json.value("seconds", kMissing);
+  readJsonFile(file, kRemedy, [&out](const Json& json) {
+    out.iterations = json.value("iterations", 0);
+    out.seconds = json.value("seconds", kMissing);
+  });
 }
 
 void measure(const Study& study, const std::string& directory, const std::vector<std::string>& knee_motors,
@@ -78,16 +82,17 @@ void measure(const Study& study, const std::string& directory, const std::vector
 
 LiftFacts readLift(const std::string& directory, const Performance& lifted) {
   LiftFacts facts;
-  std::ifstream stream(directory + "/lift.json");
-  const Json json = Json::parse(stream, nullptr, false);
-  if (!json.is_object()) return facts;
-  if (!lifted.success) {
-    facts.message = json.at("message");
-    const std::string status = json.at("status");
-    facts.at_linkage =
-        status == getName(LiftStatus::UnreachablePosture) || status == getName(LiftStatus::SingularLinkage);
-  }
-  for (const Json& node : json.at("nodes")) facts.margin = std::fmin(facts.margin, node.at("margin").get<double>());
+  const std::string file = directory + "/lift.json";
+  if (!fs::exists(file)) return facts;
+  readJsonFile(file, kRemedy, [&](const Json& json) {
+    if (!lifted.success) {
+      facts.message = json.at("message");
+      const std::string status = json.at("status");
+      facts.at_linkage =
+          status == getName(LiftStatus::UnreachablePosture) || status == getName(LiftStatus::SingularLinkage);
+    }
+    for (const Json& node : json.at("nodes")) facts.margin = std::fmin(facts.margin, node.at("margin").get<double>());
+  });
   if (lifted.record) facts.until = lifted.record->time[lifted.record->time.size() - 1];
   return facts;
 }
