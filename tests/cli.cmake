@@ -24,3 +24,7 @@ endforeach()
 add_test(NAME package COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_package.py
   ${CMAKE_COMMAND} ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_BINARY_DIR}/package)
 set_tests_properties(package PROPERTIES LABELS system)
+
+add_test(NAME interruptions COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_interruptions.py
+  $<TARGET_FILE:bielle_command>)
+set_tests_properties(interruptions PROPERTIES LABELS system)

@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "bielle/io/text_file.h"
+#include "bielle/io/standard_output.h"
 #include "bielle/model/error.h"
 #include "check.h"
 
@@ -17,6 +18,7 @@ constexpr int kPasses = 0, kFails = 1, kBadInput = 2;
 }  // namespace
 
 int main(int argc, char** argv) {
+  ignoreClosedPipes();
   CLI::App app{
       "Checks a motion that `bielle solve` wrote, from its files alone: forces and energies by Simbody's dynamics, "
       "steps, "
@@ -40,6 +42,7 @@ int main(int argc, char** argv) {
       std::cout << formatReport(report);
     else
       printReport(std::cout, report, brief ? CheckPrint::Failures : CheckPrint::All);
+    finishStandardOutput();
     return report.passed() ? kPasses : kFails;
   } catch (const ModelError& error) {
     std::cerr << "bielle: error: " << error.what() << std::endl;

@@ -3,6 +3,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "bielle/io/standard_output.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "validate.h"
@@ -30,6 +31,7 @@ nlohmann::json toJson(const ValidationReport& report) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  ignoreClosedPipes();
   CLI::App app{
       "Compares the dynamics of robots with Simbody's on random closed states. Status 0: all agree; 1: a row fails; "
       "2: bad input."};
@@ -77,10 +79,11 @@ int main(int argc, char** argv) {
       else
         printReport(std::cout, report);
     }
+    if (json) std::cout << nlohmann::json{{"passed", passed}, {"robots", reports}}.dump(2) << "\n";
+    finishStandardOutput();
   } catch (const ModelError& error) {
     std::cerr << "bielle-validate: " << error.what() << "\n";
     return kBadInput;
   }
-  if (json) std::cout << nlohmann::json{{"passed", passed}, {"robots", reports}}.dump(2) << "\n";
   return passed ? kAgrees : kDisagrees;
 }

@@ -50,7 +50,9 @@ std::optional<int> runCompanion(const std::string& name, std::vector<std::string
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
     if (errno != EINTR) return {};
-  return WIFEXITED(status) ? WEXITSTATUS(status) : kFailed;
+  if (WIFEXITED(status)) return WEXITSTATUS(status);
+  std::cerr << "bielle: warning: " << name << " was ended by signal " << WTERMSIG(status) << std::endl;
+  return kFailed;
 }
 
 }  // namespace bielle::cli

@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "bielle/io/result.h"
+#include "bielle/io/standard_output.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 
@@ -20,9 +21,7 @@ std::string describeVersion() {
   return "bielle " + build.bielle + " (Eigen " + build.eigen + ", " + build.compiler + ")";
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   using namespace bielle::cli;
   setCommandLine(argc, argv);
   const std::string first = argc > 1 ? argv[1] : "";
@@ -67,4 +66,17 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {
     return fail(error.what(), kFailed);
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  bielle::ignoreClosedPipes();
+  const int status = run(argc, argv);
+  try {
+    bielle::finishStandardOutput();
+  } catch (const bielle::ModelError& error) {
+    if (status == bielle::cli::kOk) return fail(error.what(), bielle::cli::kBadInput);
+  }
+  return status;
 }

@@ -163,6 +163,10 @@ std::vector<std::string> writeResult(const std::string& directory, const MotionR
   csv.write(formatCsv(result.record));
   npz.write(formatNpz(result.record));
   summary.write(formatJson(makeSummary(result)) + "\n");
+  // What was there goes first, and the summary comes last: whoever is killed here leaves no mixture of two results.
+  std::error_code error;
+  for (const char* name : {"summary.json", "check.json", "lift.json", "report.html"})
+    fs::remove(fs::path(directory) / name, error);
   for (AsideFile* file : {&csv, &npz, &summary}) file->commit();
   return paths;
 }
