@@ -28,3 +28,7 @@ set_tests_properties(package PROPERTIES LABELS system)
 add_test(NAME interruptions COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_interruptions.py
   $<TARGET_FILE:bielle_command>)
 set_tests_properties(interruptions PROPERTIES LABELS system)
+
+add_test(NAME determinism COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_determinism.py
+  $<TARGET_FILE:bielle_command>)
+set_tests_properties(determinism PROPERTIES LABELS system)
