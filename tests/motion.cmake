@@ -9,3 +9,5 @@ bielle_test(formulations SOURCES test_formulations.cpp LIBS bielle_motion)
 bielle_test(bench SOURCES test_bench.cpp LIBS bielle_io)
 # Whole motions: minutes under sanitizers.
 set_tests_properties(walk stairs jump limits sequence PROPERTIES LABELS system)
+bielle_test(hostile_numbers SOURCES test_hostile_numbers.cpp mechanisms.cpp LIBS bielle_io)
+set_tests_properties(hostile_numbers PROPERTIES LABELS system)

@@ -5,6 +5,7 @@
 
 #include "bielle/math/so3.h"
 #include "bielle/model/error.h"
+#include "bielle/motion/motion.h"
 
 namespace bielle {
 namespace {
@@ -19,12 +20,13 @@ double ease(double s) {
 
 int countNodes(double duration, double h) { return static_cast<int>(std::lround(duration / h)); }
 
-void check(const GaitTiming& t) {
+void check(const GaitTiming& t, size_t steps) {
   const auto require = [](bool ok, const char* option, const char* problem) {
     if (!ok) throw ModelError("", std::string("option '") + option + "'", problem, "give seconds");
   };
   const double h = t.time_step;
   require(h > 0 && h <= 0.1, "time_step", "it is outside 0 .. 0.1 s");
+  requireStages(t.start + steps * (t.single + t.both) + t.end, h);
   for (const auto& [name, value] : {std::pair("start_support", t.start), std::pair("single_support", t.single),
                                     std::pair("double_support", t.both), std::pair("end_support", t.end)})
     require(std::isfinite(value) && value < 60 && countNodes(value, h) >= 1, name,
@@ -132,7 +134,7 @@ SE3 calcSwing(const SwingShape& shape, const SE3& a, const SE3& b, double s) {
 
 Gait makeGait(const FootstepPlan& plan, const GaitTiming& timing, const SwingShape& shape, const Vector3d& com,
               double gravity) {
-  check(timing);
+  check(timing, plan.steps.size());
   Gait gait;
   gait.phases = makePhases(static_cast<int>(plan.steps.size()), timing);
   int stages = 0;

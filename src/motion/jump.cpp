@@ -167,6 +167,7 @@ void check(const Model& model, const JumpOptions& o) {
       {"stand", o.stand}, {"push", o.push}, {"land", o.land}, {"settle", o.settle}};
   for (const auto& [name, value] : durations)
     requireOption(value >= 0 && std::isfinite(value), name, "it is negative", "give seconds");
+  requireStages(o.stand + o.push + o.flight + o.land + o.settle, o.time_step);
   requireOption(std::abs(o.length) <= 2, "length", "it is not within 2 m", "give metres, negative to jump backwards");
   requireOption(o.stretch >= 0 && std::isfinite(o.stretch), "stretch", "it is negative", "give metres, e.g. 0.02");
   requireOption(o.clearance >= 0 && std::isfinite(o.clearance), "clearance", "it is negative",

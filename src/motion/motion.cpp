@@ -27,6 +27,11 @@ std::vector<std::pair<std::string, double>> listValues(const std::vector<OptionE
   return values;
 }
 
+void requireStages(double seconds, double time_step) {
+  requireOption(seconds <= 1e5 * time_step, "time_step", "it makes more than 100000 stages of the motion",
+                "give longer stages, e.g. 0.01 s, or a shorter motion");
+}
+
 void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy) {
   if (!ok) throw ModelError("", "option '" + option + "'", problem, remedy);
 }

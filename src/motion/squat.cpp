@@ -18,6 +18,7 @@ void check(const Model& model, const SquatOptions& o) {
   requireOption(o.settle >= 0 && std::isfinite(o.settle), "settle", "it is negative", "give seconds, or 0");
   requireOption(o.time_step > 0 && o.time_step <= o.duration / 4, "time_step",
                 "it is not positive, or over a quarter of the motion", "give seconds, e.g. 0.015");
+  requireStages(o.duration + 2 * o.settle, o.time_step);
   requireOption(o.contact_kp >= 0, "contact_kp", "it is negative", "give 0 or more, 1/s^2");
   requireOption(o.contact_kd >= 0, "contact_kd", "it is negative", "give 0 or more, 1/s");
   if (model.contacts().empty())

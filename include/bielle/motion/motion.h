@@ -30,6 +30,9 @@ std::vector<std::pair<std::string, double>> listValues(const std::vector<OptionE
 /// \throws ModelError naming the option, unless ok
 void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy);
 
+/// \throws ModelError when a motion of so many seconds has more stages than there may be memory for (100000)
+void requireStages(double seconds, double time_step);
+
 /// A motion before it becomes a problem: what a sequence joins. It starts and ends standing.
 struct MotionPlan {
   std::string name;
