@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <iostream>
 
-#include "bielle/io/text_file.h"
 #include "bielle/io/standard_output.h"
+#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 #include "check.h"
 

@@ -33,7 +33,7 @@ struct RsuBipedParameters {
   double motor_height = 0.17;      ///< h, m
   double arm_angle = 0.6;          ///< delta, rad
 
-  double trunk_mass = 6.72;   ///< without motors, kg
+  double trunk_mass = 6.72;    ///< without motors, kg
   double motor_mass = 0.8;     ///< each of twelve, kg
   double hip_link_mass = 1.2;  ///< each of the two links between trunk and thigh, without motors, kg
   double link_density = 3;     ///< of thigh and shank, kg/m
