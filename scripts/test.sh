@@ -6,4 +6,4 @@ source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 install_missing "${bielle_packages[@]}" "${bielle_test_packages[@]}"
 cd "$bielle_root"
 build build/test --preset release
-ctest --test-dir build/test --output-on-failure
+ctest --test-dir build/test --parallel "$(nproc)" --output-on-failure
