@@ -13,8 +13,10 @@
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/robots/cleobot.h"
+#include "bielle/robots/delta.h"
 #include "bielle/robots/generators.h"
 #include "bielle/robots/solid.h"
+#include "bielle/robots/spring_leg.h"
 #include "robot_directory.h"
 
 using namespace bielle;
@@ -99,7 +101,7 @@ void checkSame(const Model& a, const Model& b) {
 
 // What is known of a generated robot without a computer.
 struct Expected {
-  int rows, rank, mobility;
+  int rows, rank, mobility, motors;
   double mass;  // kg
 };
 
@@ -107,9 +109,13 @@ const std::map<std::string, Expected>& getExpected() {
   // Cleobot, Gruebler per leg. Hip: 7 bodies, 42 - 3 * 5 (motors) - 3 * 4 (universal) - 4 * 3 (balls) = 3. Lower leg: 7
   // bodies, 42 - 6 * 5 (motors and knees) - 3 * 3 (balls) = 3. The base has 6.
   // RSU biped, per leg: four serial joints, and the ankle with its chains: 6 bodies, 36 - 4 * 5 - 2 * 4 - 2 * 3 = 2.
+  // A planar loop of hinges has three rows that count less the turn about its own hinge: 2. Five-bar leg: rail and four
+  // hinges, 5 - 2. Spring leg: 10 joints, the heel rod's ball 3, the planar loop of the toe 2. Delta: 16 joints, the
+  // platform moves in 3 directions. Chain: 3 joints and one planar loop per four-bar.
   static const std::map<std::string, Expected> expected = {
-      {"cleobot", {30, 30, 18, 24.6}},
-      {"rsu_biped", {12, 12, 18, 25.68}},
+      {"cleobot", {30, 30, 18, 12, 24.6}}, {"rsu_biped", {12, 12, 18, 12, 25.68}},
+      {"fivebar_leg", {5, 2, 3, 2, 1.83}}, {"spring_leg", {8, 5, 5, 5, 7.77}},
+      {"delta", {25, 13, 3, 3, 0.927}},    {"fourbar_chain", {15, 6, 3, 3, 4.8}},
   };
   return expected;
 }
@@ -177,7 +183,7 @@ TEST_CASE("generators: every body is possible, the loops close, mobility is what
     CHECK(mobility.rows == expected.rows);
     CHECK(mobility.rank == expected.rank);
     CHECK(mobility.mobility == expected.mobility);
-    CHECK(model.nu() == mobility.mobility - (model.hasFreeFlyer() ? 6 : 0));
+    CHECK(model.nu() == expected.motors);
     for (const Reference& reference : model.references())
       CHECK(assembleReference(model, reference.name).status == AssemblyStatus::Closed);
   }
@@ -240,7 +246,7 @@ TEST_CASE("generators: names stay when lengths change, bounds and names are chec
       CHECK(p.lower <= *p.value);
       CHECK(*p.value <= p.upper);
       CHECK_FALSE(p.help.empty());
-      *p.value *= 1.01;
+      *p.value *= p.name == "count" ? 1 : 1.01;
     }
     const Model other = request.make();
     REQUIRE(other.numBodies() == model.numBodies());
@@ -286,4 +292,49 @@ TEST_CASE("Cleobot: limbs that do not reach are refused") {
   CleobotParameters parameters;
   parameters.shank_length = 0.15;
   CHECK_THROWS_WITH(makeCleobot(parameters), Catch::Contains("do not meet"));
+}
+
+TEST_CASE("delta: the platform follows the closed form") {
+  const DeltaParameters p;
+  const Model model = makeDelta(p);
+  const auto depth = [&](double angle) {
+    const double reach = p.base_radius + p.upper_length * std::cos(angle) - p.platform_radius;
+    return p.upper_length * std::sin(angle) + std::sqrt(p.forearm_length * p.forearm_length - reach * reach);
+  };
+  const Frame& effector = model.frames()[model.findFrame("effector")];
+  for (double turn : {-0.5, 0.0, 0.4}) {
+    AssemblyProblem problem;
+    problem.q_ref = model.makeNeutral();
+    problem.weights = VectorXd::Constant(model.nv(), 1e-6);
+    for (const Motor& motor : model.motors()) {
+      // The axis is z x d: a positive angle turns the arm down.
+      problem.q_ref[model.joints()[motor.joint].idx_q] = turn;
+      problem.weights[motor.dof] = 1;
+    }
+    const AssemblyResult result = assemble(model, problem);
+    REQUIRE(result.status == AssemblyStatus::Closed);
+    Workspace ws(model);
+    updatePositions(model, ws, result.q);
+    const SE3 X = getPlacement(ws, effector.body, effector.X_BF);
+    CHECK((X.p + Vector3d(0, 0, depth(p.arm_angle + turn))).norm() < 1e-9);
+    CHECK(X.R.isIdentity(1e-9));
+  }
+}
+
+TEST_CASE("spring leg: the heel rod keeps the tarsus nearly parallel to itself while the knee bends") {
+  const Model model = makeSpringLeg();
+  const int tarsus = model.frames()[model.findFrame("tarsus_link")].body;
+  Workspace ws(model);
+  for (double bend : {-0.3, 0.3}) {
+    AssemblyProblem problem;
+    problem.q_ref = model.makeNeutral();
+    problem.weights = VectorXd::Constant(model.nv(), 1e-6);
+    for (const Motor& motor : model.motors()) problem.weights[motor.dof] = 1;
+    problem.q_ref[model.joints()[model.findJoint("knee")].idx_q] = bend;
+    const AssemblyResult result = assemble(model, problem);
+    REQUIRE(result.status == AssemblyStatus::Closed);
+    updatePositions(model, ws, result.q);
+    CHECK(result.q[model.joints()[model.findJoint("knee")].idx_q] == Approx(bend).margin(0.05));
+    CHECK(std::abs(log3(ws.X_WB[tarsus].R).y()) < 0.1 * std::abs(bend));
+  }
 }

@@ -54,6 +54,9 @@ int main(int argc, char** argv) {
                  "seconds of a free motion integrated by both programs, 0 for none")
       ->check(CLI::Range(0.0, 60.0))
       ->capture_default_str();
+  app.add_option("--motion-step", options.motion_step, "of our integrator there [s]; fast mechanisms need less")
+      ->check(CLI::Range(1e-6, 0.1))
+      ->capture_default_str();
   app.add_option("--base", base, "overrides the robot's own base")->check(CLI::IsMember({"free", "fixed"}));
   app.add_flag("--json", json, "print JSON instead of tables");
   try {

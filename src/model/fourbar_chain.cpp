@@ -7,14 +7,26 @@
 namespace bielle {
 namespace {
 
-// A slender rod from the origin along x.
-Inertia makeRod(double length, double density) {
+// A round rod from the origin along x, slender without a radius.
+Inertia makeRod(double length, double density, double radius) {
   Inertia rod;
   rod.mass = density * length;
   rod.com = {length / 2, 0, 0};
-  const double across = rod.mass * length * length / 12;
-  rod.I_com = Vector3d(0, across, across).asDiagonal();
+  const double across = rod.mass * (length * length / 12 + radius * radius / 4);
+  rod.I_com = Vector3d(rod.mass * radius * radius / 2, across, across).asDiagonal();
   return rod;
+}
+
+void addRod(const std::string& link, const std::string& parent, const Joint& joint, double length,
+            const FourBarChainOptions& o, ModelBuilder& builder) {
+  builder.addLink(link, parent, joint, makeRod(length, o.density, o.radius));
+  if (o.radius == 0) return;
+  Visual visual;
+  visual.shape = Visual::Shape::Cylinder;
+  visual.X_BV = {Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), Vector3d::UnitX()).toRotationMatrix(),
+                 {length / 2, 0, 0}};
+  visual.size = {o.radius, length, 0};
+  builder.addVisual(link, visual);
 }
 
 Joint makeHinge(const std::string& name, double x) {
@@ -46,19 +58,25 @@ Vector3d closeFourBar(const FourBarChainOptions& o) {
 
 FourBarChain makeFourBarChain(const FourBarChainOptions& o) {
   const Vector3d q = closeFourBar(o);
-  ModelBuilder builder("chain of four-bars");
+  ModelBuilder builder("fourbar_chain");
+  Reference closed;
+  closed.name = "closed";
   std::string ground = "world";
   for (int i = 1; i <= o.count; ++i) {
     const std::string n = std::to_string(i), rocker = "rocker" + n, crank = "crank" + n, coupler = "coupler" + n;
-    builder.addLink(rocker, ground, makeHinge(rocker, o.ground), makeRod(o.rocker, o.density));
-    builder.addLink(crank, ground, makeHinge(crank, 0), makeRod(o.crank, o.density));
-    builder.addLink(coupler, crank, makeHinge(coupler, o.crank), makeRod(o.coupler, o.density));
+    addRod(rocker, ground, makeHinge(rocker, o.ground), o.rocker, o, builder);
+    addRod(crank, ground, makeHinge(crank, 0), o.crank, o, builder);
+    addRod(coupler, crank, makeHinge(coupler, o.crank), o.coupler, o, builder);
     builder.addFrame("end of " + coupler, coupler, {Matrix3d::Identity(), {o.coupler, 0, 0}});
     builder.addFrame("end of " + rocker, rocker, {Matrix3d::Identity(), {o.rocker, 0, 0}});
     builder.addClosure("loop" + n, ClosureKind::Hinge5D, "end of " + coupler, "end of " + rocker, Vector3d::UnitY());
     builder.addMotor(o.motor == FourBarMotor::Crank ? crank : rocker);
+    closed.joints[rocker] = {q[0]};
+    closed.joints[crank] = {q[1]};
+    closed.joints[coupler] = {q[2]};
     ground = coupler;
   }
+  builder.addReference(closed);
   return {builder.build(), q.replicate(o.count, 1)};
 }
 

@@ -1,8 +1,14 @@
 #include "bielle/robots/generators.h"
 
+#include <cmath>
+
 #include "bielle/model/error.h"
+#include "bielle/model/fourbar_chain.h"
 #include "bielle/robots/cleobot.h"
+#include "bielle/robots/delta.h"
+#include "bielle/robots/fivebar_leg.h"
 #include "bielle/robots/rsu_biped.h"
+#include "bielle/robots/spring_leg.h"
 
 namespace bielle {
 namespace {
@@ -16,6 +22,32 @@ std::function<GeneratorRequest()> makeRequests(Model (*make)(const Parameters&))
   };
 }
 
+// The chain of model/fourbar_chain.h, its rods drawn.
+struct FourBarChainParameters {
+  FourBarChainParameters() { options.radius = 0.01; }
+  FourBarChainOptions options;
+  double count = 3;
+};
+
+std::vector<Parameter> listParameters(FourBarChainParameters& p) {
+  FourBarChainOptions& o = p.options;
+  return {{"count", &p.count, "1", 1, 1000, "four-bars, a whole number"},
+          {"ground", &o.ground, "m", 0.01, 10, "between the pivots of crank and rocker"},
+          {"crank", &o.crank, "m", 0.01, 10, "length of the crank"},
+          {"coupler", &o.coupler, "m", 0.01, 10, "length of the coupler, the ground of the next four-bar"},
+          {"rocker", &o.rocker, "m", 0.01, 10, "length of the rocker"},
+          {"crank_angle", &o.crank_angle, "rad", -3.15, 3.15, "from the ground, in the reference `closed`"},
+          {"density", &o.density, "kg/m", 0.01, 100, "of the rods"},
+          {"radius", &o.radius, "m", 0.001, 0.1, "of the rods"}};
+}
+
+Model makeChain(const FourBarChainParameters& parameters) {
+  FourBarChainParameters p = parameters;
+  checkParameters("fourbar_chain", listParameters(p));
+  p.options.count = static_cast<int>(std::floor(p.count));
+  return makeFourBarChain(p.options).model;
+}
+
 }  // namespace
 
 const std::vector<Generator>& getGenerators() {
@@ -24,6 +56,13 @@ const std::vector<Generator>& getGenerators() {
        makeRequests<CleobotParameters>(makeCleobot)},
       {"rsu_biped", "biped with serial hips and knees, ankles driven by two rods with spherical ends (RSU)",
        makeRequests<RsuBipedParameters>(makeRsuBiped)},
+      {"fivebar_leg", "planar leg on a rail: two coaxial motors, four rods, a point foot",
+       makeRequests<FiveBarLegParameters>(makeFiveBarLeg)},
+      {"spring_leg", "leg like Cassie's with rigid springs: tarsus and toe moved by four-bars",
+       makeRequests<SpringLegParameters>(makeSpringLeg)},
+      {"delta", "Clavel's delta, all of hinges: many more rows than rank", makeRequests<DeltaParameters>(makeDelta)},
+      {"fourbar_chain", "chain of planar four-bars, each on the coupler of the one before",
+       makeRequests<FourBarChainParameters>(makeChain)},
   };
   return generators;
 }

@@ -31,10 +31,11 @@ struct FourBarChainOptions {
   double crank_angle = 1.0471975511965976;  ///< theta2 at the closed configuration, rad
   FourBarMotor motor = FourBarMotor::Crank;
   double density = 2;  ///< mass of the rods per length, kg/m
+  double radius = 0;   ///< of the rods, m; 0: slender, not drawn
 };
 
 struct FourBarChain {
-  Model model;        ///< joints rocker<i>, crank<i>, coupler<i>; closures loop<i>; i from 1
+  Model model;        ///< joints rocker<i>, crank<i>, coupler<i>; closures loop<i>; i from 1; reference `closed`
   VectorXd q_closed;  ///< by Eq. (2), on the branch above
 };
 
