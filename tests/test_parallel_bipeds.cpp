@@ -154,3 +154,39 @@ TEST_CASE("Cleobot: the serial model is refused, and why") {
                              Catch::Contains("use the closed model"));
   CHECK_FALSE(std::filesystem::exists(directory.path() + "/result"));
 }
+
+TEST_CASE("bielle generate writes a robot that every command takes, and refuses what makes none") {
+  const RobotDirectory directory;
+  const std::string place = directory.path() + "/other";
+  const CommandResult made =
+      run({"generate", "cleobot", "--set", "upper_length=0.2", "--set", "hip_arm=0.07", "-o", place});
+  CAPTURE(made.out, made.err);
+  REQUIRE(made.status == 0);
+  const LoadedRobot robot = loadRobot(place);
+  CHECK(robot.file == place + "/other.urdf");
+  const Model& model = robot.model;
+  CHECK(model.joints()[model.findJoint("knee1_left")].X_PJ.p.norm() == Approx(0.2));
+  const Frame& arm = model.frames()[model.findFrame("thigh_end_hip1_left")];
+  CHECK(arm.X_BF.p.x() == Approx(-0.07));
+  CHECK(run({"info", place}).status == 0);
+  CHECK_THAT(run({"generate", "cleobot", "--help"}).out,
+             Catch::Contains("upper_length") && Catch::Contains("[kg m^2]") && Catch::Contains("0.05 .. 1"));
+
+  const auto refuse = [&](const std::string& kind, const std::string& setting, const std::string& text) {
+    const CommandResult result = run({"generate", kind, "--set", setting, "-o", directory.path() + "/none"});
+    CAPTURE(kind, setting);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, Catch::Contains(text));
+    CHECK_FALSE(std::filesystem::exists(directory.path() + "/none"));
+  };
+  refuse("cleobot", "uper_length=0.2", "choose one of: hip_height");
+  refuse("cleobot", "upper_length=-1", "outside 0.05 .. 1");
+  refuse("cleobot", "upper_length=long", "not of the form name=number");
+  refuse("cleobot", "shank_length=0.15", "do not meet");
+  refuse("delta", "forearm_length=0.1", "do not reach the platform");
+  refuse("fivebar_leg", "lower_length=0.05", "do not meet");
+  refuse("rsu_biped", "hip_height=0.8", "do not reach the ground");
+  refuse("spring_leg", "crank_place=0.5", "beyond the toe");
+  refuse("fourbar_chain", "count=2.5", "no whole number");
+  refuse("fourbar_chain", "rocker=2", "do not meet");
+}

@@ -25,6 +25,14 @@ bool isAtHand(const std::string& name) {
   return false;
 }
 
+// A robot here that completes a published one.
+LoadedRobot loadCompleted(const std::string& name) {
+  REQUIRE(setenv("BIELLE_ROBOTS", kPublished.c_str(), 1) == 0);
+  LoadedRobot robot = loadRobot(kSource + "/robots/" + name);
+  unsetenv("BIELLE_ROBOTS");
+  return robot;
+}
+
 FddpSummary solve(Motion& motion) {
   FddpOptions solver;
   solver.max_iterations = 60;
@@ -82,9 +90,7 @@ TEST_CASE("published models load and close, with the rank and mobility that they
 
 TEST_CASE("Digit squats, walks and climbs stairs with the feet and the posture that come along") {
   if (!isAtHand("digit_like_2legs")) return;
-  REQUIRE(setenv("BIELLE_ROBOTS", kPublished.c_str(), 1) == 0);
-  const LoadedRobot robot = loadRobot(kSource + "/robots/digit");
-  unsetenv("BIELLE_ROBOTS");
+  const LoadedRobot robot = loadCompleted("digit");
   const Model& model = robot.model;
   CHECK(robot.warnings.empty());
   CHECK(robot.file.substr(robot.file.size() - 10) == "digit.yaml");
@@ -114,4 +120,22 @@ TEST_CASE("Digit squats, walks and climbs stairs with the feet and the posture t
   stairs.stairs = 3;
   Motion climb = makeStairs(model, stairs);
   checkSteps(climb);
+}
+
+TEST_CASE("the published model of Bipetto, completed, squats as Bipetto does") {
+  if (!isAtHand("battobot_6d")) return;
+  const LoadedRobot published = loadCompleted("battobot");
+  const Model ours = loadRobot(kSource + "/robots/bipetto").model;
+  SquatOptions options;
+  options.depth = 0.8;
+  Motion a = makeSquat(published.model, options), b = makeSquat(ours, options);
+  const FddpSummary of_published = solve(a), of_ours = solve(b);
+  CHECK(of_published.termination == FddpTermination::Converged);
+  CHECK(of_published.cost == Approx(of_ours.cost).epsilon(1e-4));
+  // The bodies are listed in another order: compare by name.
+  for (const std::string joint : {"knee_left", "ankley_right", "motor_ankle1_left"}) {
+    const int i = published.model.joints()[published.model.findJoint(joint)].idx_q,
+              j = ours.joints()[ours.findJoint(joint)].idx_q;
+    for (size_t k = 0; k < a.guess.xs.size(); ++k) CHECK(std::abs(a.guess.xs[k][i] - b.guess.xs[k][j]) < 1e-3);
+  }
 }

@@ -44,7 +44,9 @@ std::vector<Parameter> listParameters(FourBarChainParameters& p) {
 Model makeChain(const FourBarChainParameters& parameters) {
   FourBarChainParameters p = parameters;
   checkParameters("fourbar_chain", listParameters(p));
-  p.options.count = static_cast<int>(std::floor(p.count));
+  if (p.count != std::floor(p.count))
+    throw ModelError("fourbar_chain", "parameter 'count'", "it is no whole number", "give 1, 2, 3, ...");
+  p.options.count = static_cast<int>(p.count);
   return makeFourBarChain(p.options).model;
 }
 
