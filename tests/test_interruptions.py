@@ -179,6 +179,26 @@ def test_signals():
     assert len(outcomes) >= 3
 
 
+def test_deep_json():
+    """Elements nested so deep that whatever recurses over them would end the program."""
+    run(*SQUAT, "--quiet", "--no-report", "-o", "deep", status=0)
+    for name in ("summary.json", "check.json"):
+        with open(f"deep/{name}") as file:
+            text = file.read().rstrip()
+        for depth, status in ((50, 0), (300000, 2)):
+            with open(f"deep/{name}", "w") as file:
+                file.write(text[:-1] + ', "extra": ' + "[" * depth + "]" * depth + "}")
+            run(program, "report", "deep", status=status, error="it is nested too deep" if status else "")
+            if name == "summary.json":
+                run(program, "check", "deep", status=status, error="it is nested too deep" if status else "")
+        with open(f"deep/{name}", "w") as file:
+            file.write(text)
+    for opening, closing in (("[", "]"), ('{"a": ', "}")):
+        with open("state.json", "w") as file:
+            file.write('{"joints": ' + opening * 300000 + "1" + closing * 300000 + "}")
+        run(program, "eval", "fourbar", "--state", "state.json", status=2, error="it is nested too deep")
+
+
 def test_input_that_stops():
     """A state that is cut short on the standard input, and none at all."""
     for text in ("", "{", '{"joints": {"crank_joint": '):

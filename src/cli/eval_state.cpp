@@ -31,6 +31,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr int kDeepest = 20;  // elements of a state are not nested deeper; what reads them recurses
+
 std::string join(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
@@ -63,7 +65,8 @@ class StateReader {
   // A key given twice would silently hide the first one.
   json parse(const std::string& text) const {
     std::vector<std::set<std::string>> keys;
-    const auto check = [&](int, json::parse_event_t event, json& parsed) {
+    const auto check = [&](int depth, json::parse_event_t event, json& parsed) {
+      if (depth > kDeepest) fail("document", "it is nested too deep", "write {\"joints\": {...}, \"torques\": {...}}");
       if (event == json::parse_event_t::object_start) keys.emplace_back();
       if (event == json::parse_event_t::object_end) keys.pop_back();
       if (event == json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second)

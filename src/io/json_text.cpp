@@ -25,13 +25,20 @@ std::string formatJson(const Json& json, int indent) {
   return json.is_object() ? "{" + text + end + "}" : "[" + text + end + "]";
 }
 
+Json parseJson(const std::string& text) {
+  return Json::parse(text, [](int depth, Json::parse_event_t, Json&) {
+    if (depth > kDeepestJson) throw std::runtime_error("it is nested too deep");
+    return true;
+  });
+}
+
 void readJsonFile(const std::string& path, const std::string& remedy, const std::function<void(const Json&)>& read) {
   const std::string text = readTextFile(path, remedy);
   try {
-    const Json json = Json::parse(text);
-    if (!json.is_object()) throw ModelError(path, "JSON", "it is no object", remedy);
+    const Json json = parseJson(text);
+    if (!json.is_object()) throw std::runtime_error("it is no object");
     read(json);
-  } catch (const Json::exception& error) {
+  } catch (const std::exception& error) {
     throw ModelError(path, "JSON", error.what(), remedy);
   }
 }

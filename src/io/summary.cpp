@@ -64,7 +64,7 @@ MotionSummary readSummary(const std::string& directory) {
   const std::string path = (std::filesystem::path(directory) / "summary.json").string();
   const std::string text = readTextFile(path, "give a directory that `bielle solve` wrote");
   try {
-    MotionSummary summary = read(Json::parse(text));
+    MotionSummary summary = read(parseJson(text));
     summary.file = path;
     return summary;
   } catch (const std::exception& error) {

@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "bielle/io/result.h"
+#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 #include "io/aside_file.h"
 #include "io/json_text.h"
@@ -52,15 +53,14 @@ Json describeRequest(const Case& request, const RunOptions& options) {
 // The outcome in case.json, if it is there and answers the same request.
 std::optional<CaseOutcome> readOutcome(const std::string& path, const Json& request) {
   if (!std::filesystem::is_regular_file(path)) return std::nullopt;
-  std::ifstream file(path);
-  const Json json = Json::parse(file, nullptr, false);
-  if (!json.is_object() || json.value("request", Json()) != request) return std::nullopt;
   CaseOutcome outcome;
   outcome.complete = outcome.kept = true;
   try {
+    const Json json = parseJson(readTextFile(path, ""));
+    if (json.at("request") != request) return std::nullopt;
     for (const Json& step : json.at("outcome"))
       outcome.steps.push_back({step.at("status"), step.at("seconds"), step.at("error")});
-  } catch (const Json::exception&) {  // not as it was written: the case is done anew
+  } catch (const std::exception&) {  // not as it was written: the case is done anew
     return std::nullopt;
   }
   return outcome;
