@@ -13,14 +13,14 @@ set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 
 set(CPACK_DEBIAN_COMMAND_PACKAGE_NAME bielle)
-set(CPACK_COMPONENT_COMMAND_DESCRIPTION "Motions for legged robots driven through linkages: the command
- Models trees of bodies closed by loops, generates motions by optimal control and checks them. Robots,
- manual pages and completion included.")
+set(CPACK_COMPONENT_COMMAND_DESCRIPTION
+  "The command: it models legged robots whose joints are driven through linkages, generates motions by
+ optimal control and checks them. Robots, manual pages and completion included.")
 set(CPACK_DEBIAN_COMMAND_PACKAGE_SUGGESTS "gnuplot-nox, chromium, ffmpeg, bash-completion")
 
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libbielle-dev)
-set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Motions for legged robots driven through linkages: the library
- Headers and static libraries, with what find_package(bielle) and pkg-config look for.")
+set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
+  "The library: headers and static libraries, with what find_package(bielle) and pkg-config look for.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4), liburdfdom-dev, liburdfdom-headers-dev, \
 libconsole-bridge-dev, libtinyxml-dev, libyaml-cpp-dev, libzip-dev, libnlopt-dev, libnlopt-cxx-dev")
