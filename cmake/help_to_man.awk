@@ -12,6 +12,7 @@ function end_verbatim() { if (verbatim) print ".fi"; verbatim = 0 }
 BEGIN { state = "description" }
 state == "description" && /^Usage:/ {
   printf ".TH %s 1 \"\" \"bielle %s\" \"Bielle\"\n", toupper(escape(name)), version
+  print ".ad l\n.nh"
   section("name")
   sub(/\.$/, "", summary)
   print escape(name) " \\- " escape(summary)
