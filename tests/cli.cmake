@@ -17,7 +17,7 @@ set_tests_properties(install PROPERTIES LABELS system)
 foreach(name man completion)
   add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_${name}.py
     $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
-  set_tests_properties(${name} PROPERTIES LABELS unit SKIP_RETURN_CODE 77)
+  set_tests_properties(${name} PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 endforeach()
 
 # Packages run everywhere: a build that is tuned to its machine is refused, and the preset tunes nothing.
