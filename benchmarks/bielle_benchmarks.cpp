@@ -91,7 +91,8 @@ struct Walk {
                            VectorXd::NullaryExpr(model.nu(), [&](Eigen::Index) { return uniform(rng); }));
     memory.assign(n, {Workspace(model), {}});
     models.resize(n + 1);
-    next = xs[0];
+    statuses.resize(n + 1);
+    next.assign(problem.getBatchSize(), xs[0]);
   }
   void updateDynamics(int k, const VectorXd& u) {
     updateConstrainedDynamics(model, memory[k].ws, memory[k].cws, problem.spec(k).constraints, xs[k].head(model.nq()),
@@ -101,12 +102,22 @@ struct Walk {
     updateConstrainedDerivatives(model, memory[k].ws, memory[k].cws, problem.spec(k).constraints);
   }
   void linearize(const std::vector<VectorXd>& controls) {
-    for (int k = 0; k < problem.numStages(); ++k) problem.linearize(k, xs[k], controls[k], xs[k + 1], models[k]);
+    problem.linearizeStages(0, problem.numStages(), xs, controls, models, statuses);
     problem.linearizeTerminal(xs.back(), models.back());
   }
   void step(const std::vector<VectorXd>& controls) {
-    double cost = 0;
-    for (int k = 0; k < problem.numStages(); ++k) problem.step(k, xs[k], controls[k], next, cost);
+    const int size = problem.getBatchSize();
+    for (int first = 0; first < problem.numStages(); first += size) {
+      tasks.clear();
+      for (int k = first; k < std::min(problem.numStages(), first + size); ++k) {
+        tasks.emplace_back();
+        tasks.back().stage = k;
+        tasks.back().x = &xs[k];
+        tasks.back().u = &controls[k];
+        tasks.back().x_next = &next[k - first];
+      }
+      problem.stepStages(tasks);
+    }
   }
   const std::vector<VectorXd>& otherControls() { return us[turn = 1 - turn]; }
 
@@ -116,7 +127,9 @@ struct Walk {
   std::vector<VectorXd> xs, us[2];
   std::vector<NodeMemory> memory;
   std::vector<StageModel> models;
-  VectorXd next;
+  std::vector<StepStatus> statuses;
+  std::vector<StepTask> tasks;
+  std::vector<VectorXd> next;
   int turn = 0;
 };
 

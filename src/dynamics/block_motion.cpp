@@ -3,25 +3,29 @@
 namespace bielle {
 namespace {
 
-SE3 getFrame1(const BlockView& view, const Closure& c) { return view.ws.X_WB[c.body1] * c.X_B1; }
+template <typename T>
+SE3Of<T> getFrame1(const BlockViewOf<T>& view, const Closure& c) {
+  return view.ws.X_WB[c.body1] * c.X_B1;
+}
 
 // Difference of a path sum of coordinate c between the bodies of a closure of the block.
-Vector6d calcDifference(const BlockMotion& motion, const Matrix6Xd& sums, const Closure& own, int c) {
+template <typename T>
+Vector6<T> calcDifference(const BlockMotionOf<T>& motion, const Matrix6X<T>& sums, const Closure& own, int c) {
   const int n = static_cast<int>(motion.block.dofs.size());
   const int dof1 = motion.block.body_dof[own.body1], dof2 = motion.block.body_dof[own.body2];
-  Vector6d out = Vector6d::Zero();
+  Vector6<T> out = Vector6<T>::Zero();
   if (dof1 >= 0) out = sums.col(n * c + dof1);
   if (dof2 >= 0) out -= sums.col(n * c + dof2);
   return out;
 }
 
 // Path sums of what `add` adds for dof k of the block, coordinate c.
-template <typename Add>
-void sumPaths(const LoopBlock& block, Matrix6Xd& sums, const Add& add) {
+template <typename T, typename Add>
+void sumPaths(const LoopBlock& block, Matrix6X<T>& sums, const Add& add) {
   const int n = static_cast<int>(block.dofs.size());
   for (int c = 0; c < block.size; ++c)
     for (const DofGroup& group : block.groups) {
-      Vector6d sum = Vector6d::Zero();
+      Vector6<T> sum = Vector6<T>::Zero();
       if (group.parent >= 0) sum = sums.col(n * c + group.parent);
       for (int k = group.begin; k < group.end; ++k) add(k, c, sum);
       for (int k = group.begin; k < group.end; ++k) sums.col(n * c + k) = sum;
@@ -29,109 +33,134 @@ void sumPaths(const LoopBlock& block, Matrix6Xd& sums, const Add& add) {
 }
 
 // out = -J^+ K for all closure rows K (m x r).
-void applyMinusPlus(BlockMotion& motion, const MatrixXd& K, MatrixXd& out) {
-  const BlockBasis& basis = *motion.basis;
+template <typename T>
+void applyMinusPlus(BlockMotionOf<T>& motion, const MatrixX<T>& K, MatrixX<T>& out) {
+  const BlockBasisOf<T>& basis = *motion.basis;
   for (Eigen::Index c = 0; c < K.cols(); ++c)
-    for (size_t i = 0; i < basis.rows.size(); ++i) motion.X(i, c) = K(basis.rows[i], c);
-  applyPseudoInverse(motion.block, basis, -1, motion.X, out);
+    for (size_t i = 0; i < basis.rows.size(); ++i) motion.X(i, c) = getEntry(&K(0, c), basis.rows[i]);
+  applyPseudoInverse<T>(motion.block, basis, -1, motion.X, out);
 }
 
 }  // namespace
 
-BlockMotion::BlockMotion(const LoopBlock& l) : block(l) {
+template <typename T>
+BlockMotionOf<T>::BlockMotionOf(const LoopBlock& l) : block(l) {
   const int n = l.model.nv(), m = l.closures.rows, r = l.size;
-  for (MatrixXd* x : {&Z, &dy, &dv}) x->setZero(n, r);
-  for (Matrix6Xd* x : {&J, &dV, &dA, &dW}) x->setZero(6, n * r);
-  for (MatrixXd* x : {&K_q, &K_v}) x->setZero(m, r);
+  for (MatrixX<T>* x : {&Z, &dy, &dv}) x->setZero(n, r);
+  for (Matrix6X<T>* x : {&J, &dV, &dA, &dW}) x->setZero(6, n * r);
+  for (MatrixX<T>* x : {&K_q, &K_v}) x->setZero(m, r);
   X.setZero(l.rank, r);
 }
 
-void updateTwists(const BlockView& view, const BlockBasis& basis, BlockMotion& motion) {
+template <typename T>
+void updateTwists(const BlockViewOf<T>& view, const BlockBasisOf<T>& basis, BlockMotionOf<T>& motion) {
   motion.basis = &basis;
   sumPaths(motion.block, motion.J,
-           [&](int k, int c, Vector6d& sum) { sum += basis.N(k, c) * view.ws.J.col(view.dofs[k]); });
+           [&](int k, int c, Vector6<T>& sum) { sum += basis.N(k, c) * view.ws.J.col(view.dofs[k]); });
 }
 
-void updateVelocityLift(const BlockView& view, BlockMotion& motion) {
+template <typename T>
+void updateVelocityLift(const BlockViewOf<T>& view, BlockMotionOf<T>& motion) {
   const LoopBlock& block = motion.block;
-  const MatrixXd& N = motion.basis->N;
-  sumPaths(block, motion.dV, [&](int k, int c, Vector6d& sum) { sum += N(k, c) * view.ws.dV.col(view.dofs[k]); });
+  const MatrixX<T>& N = motion.basis->N;
+  sumPaths(block, motion.dV, [&](int k, int c, Vector6<T>& sum) { sum += N(k, c) * view.ws.dV.col(view.dofs[k]); });
   for (size_t i = 0; i < view.closures.size(); ++i) {
     const Closure &placed = view.closures[i], &own = block.closures.closures[i];
-    const SE3 X_W1 = getFrame1(view, placed);
+    const SE3Of<T> X_W1 = getFrame1(view, placed);
     const int row = block.closures.offsets[i], rows = getRows(own.kind);
     for (int c = 0; c < block.size; ++c) {
-      const Vector6d dnu = calcDifference(motion, motion.dV, own, c) +
-                           crossMotion(calcDifference(motion, motion.J, own, c), view.ws.V[placed.body2]);
-      motion.K_q.col(c).segment(row, rows) = selectRows(placed, X_W1.actInvMotion(dnu));
+      const Vector6<T> dnu = calcDifference(motion, motion.dV, own, c) +
+                             crossMotion(calcDifference(motion, motion.J, own, c), view.ws.V[placed.body2]);
+      motion.K_q.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dnu));
     }
   }
   applyMinusPlus(motion, motion.K_q, motion.Z);
-  sumPaths(block, motion.dV, [&](int k, int c, Vector6d& sum) {
+  sumPaths(block, motion.dV, [&](int k, int c, Vector6<T>& sum) {
     sum += N(k, c) * view.ws.dV.col(view.dofs[k]) + motion.Z(k, c) * view.ws.J.col(view.dofs[k]);
   });
 }
 
-void updateAccelerationLift(const BlockView& view, BlockMotion& motion) {
+template <typename T>
+void updateAccelerationLift(const BlockViewOf<T>& view, BlockMotionOf<T>& motion) {
   const LoopBlock& block = motion.block;
-  const Workspace& ws = view.ws;
-  const MatrixXd &N = motion.basis->N, &Z = motion.Z;
-  const auto getTurn = [&](int k) { return ws.dJ.col(view.dofs[k]) + ws.dV.col(view.dofs[k]); };
+  const WorkspaceOf<T>& ws = view.ws;
+  const MatrixX<T>&N = motion.basis->N, &Z = motion.Z;
+  const auto getTurn = [&](int k) -> Vector6<T> { return ws.dJ.col(view.dofs[k]) + ws.dV.col(view.dofs[k]); };
   sumPaths(block, motion.dA,
-           [&](int k, int c, Vector6d& sum) { sum += N(k, c) * ws.dA.col(view.dofs[k]) + Z(k, c) * getTurn(k); });
-  sumPaths(block, motion.dW, [&](int k, int c, Vector6d& sum) { sum += N(k, c) * getTurn(k); });
+           [&](int k, int c, Vector6<T>& sum) { sum += N(k, c) * ws.dA.col(view.dofs[k]) + Z(k, c) * getTurn(k); });
+  sumPaths(block, motion.dW, [&](int k, int c, Vector6<T>& sum) { sum += N(k, c) * getTurn(k); });
   for (size_t i = 0; i < view.closures.size(); ++i) {
     const Closure &placed = view.closures[i], &own = block.closures.closures[i];
-    const SE3 X_W1 = getFrame1(view, placed);
-    const Vector6d &V1 = ws.V[placed.body1], &V2 = ws.V[placed.body2], &A2 = ws.A[placed.body2];
-    const Vector6d V12 = V1 + V2;
+    const SE3Of<T> X_W1 = getFrame1(view, placed);
+    const Vector6<T>&V1 = ws.V[placed.body1], &V2 = ws.V[placed.body2], &A2 = ws.A[placed.body2];
+    const Vector6<T> V12 = V1 + V2;
     const int row = block.closures.offsets[i], rows = getRows(own.kind);
     for (int c = 0; c < block.size; ++c) {
-      const Vector6d J = calcDifference(motion, motion.J, own, c), dV = calcDifference(motion, motion.dV, own, c);
-      const Vector6d dq = calcDifference(motion, motion.dA, own, c) - crossMotion(V12, dV) + crossMotion(J, A2) -
-                          crossMotion(V1, crossMotion(J, V2));
-      const Vector6d dv = calcDifference(motion, motion.dW, own, c) - crossMotion(V12, J);
-      motion.K_q.col(c).segment(row, rows) = selectRows(placed, X_W1.actInvMotion(dq));
-      motion.K_v.col(c).segment(row, rows) = selectRows(placed, X_W1.actInvMotion(dv));
+      const Vector6<T> J = calcDifference(motion, motion.J, own, c), dV = calcDifference(motion, motion.dV, own, c);
+      const Vector6<T> dq = calcDifference(motion, motion.dA, own, c) - crossMotion(V12, dV) + crossMotion(J, A2) -
+                            crossMotion(V1, crossMotion(J, V2));
+      const Vector6<T> dv = calcDifference(motion, motion.dW, own, c) - crossMotion(V12, J);
+      motion.K_q.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dq));
+      motion.K_v.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dv));
     }
   }
   applyMinusPlus(motion, motion.K_q, motion.dy);
   applyMinusPlus(motion, motion.K_v, motion.dv);
-  sumPaths(block, motion.dA, [&](int k, int c, Vector6d& sum) {
+  sumPaths(block, motion.dA, [&](int k, int c, Vector6<T>& sum) {
     sum += N(k, c) * ws.dA.col(view.dofs[k]) + Z(k, c) * getTurn(k) + motion.dy(k, c) * ws.J.col(view.dofs[k]);
   });
-  sumPaths(block, motion.dW, [&](int k, int c, Vector6d& sum) {
+  sumPaths(block, motion.dW, [&](int k, int c, Vector6<T>& sum) {
     sum += N(k, c) * getTurn(k) + motion.dv(k, c) * ws.J.col(view.dofs[k]);
   });
 }
 
-void calcForceLift(const BlockView& view, const BlockMotion& motion, ConstVectorRef forces, MatrixRef out) {
+template <typename T>
+void calcForceLift(const BlockViewOf<T>& view, const BlockMotionOf<T>& motion,
+                   typename ArgumentsOf<T>::ConstVector forces, typename ArgumentsOf<T>::Matrix out) {
   const LoopBlock& block = motion.block;
   const int n = static_cast<int>(block.dofs.size());
   out.setZero();
   for (size_t i = 0; i < view.closures.size(); ++i) {
     const Closure& own = block.closures.closures[i];
-    const Vector6d W =
+    const Vector6<T> W =
         calcClosureWrench(view.ws, view.closures[i], forces.segment(block.closures.offsets[i], getRows(own.kind)));
     const int dof1 = block.body_dof[own.body1];
     for (int c = 0; c < block.size; ++c) {
-      Vector6d twist1 = Vector6d::Zero();
+      Vector6<T> twist1 = Vector6<T>::Zero();
       if (dof1 >= 0) twist1 = motion.J.col(n * c + dof1);
       for (size_t d = 0; d < own.dofs.size(); ++d) {
         const int k = own.dofs[d];
-        const Vector6d moved = crossForce(twist1 - motion.J.col(n * c + k), W);
+        const Vector6<T> moved = crossForce(twist1 - motion.J.col(n * c + k), W);
         out(k, c) += own.signs[d] * view.ws.J.col(view.dofs[k]).dot(moved);
       }
     }
   }
 }
 
-void calcBlockDrift(const BlockView& view, const LoopBlock& block, const BlockBasis& basis, VectorRef rows,
-                    VectorRef drift) {
+template <typename T>
+void calcBlockDrift(const BlockViewOf<T>& view, const LoopBlock& block, const BlockBasisOf<T>& basis,
+                    typename ArgumentsOf<T>::Vector rows, typename ArgumentsOf<T>::Vector drift) {
   for (size_t c = 0; c < view.closures.size(); ++c)
     rows.segment(block.closures.offsets[c], getRows(view.closures[c].kind)) =
         calcClosureAcceleration(view.ws, view.closures[c]);
-  for (size_t i = 0; i < basis.rows.size(); ++i) drift[i] = rows[basis.rows[i]];
+  for (size_t i = 0; i < basis.rows.size(); ++i) drift[i] = getEntry(rows.data(), basis.rows[i]);
 }
+
+template struct BlockMotionOf<double>;
+template void calcBlockDrift(const BlockViewOf<double>&, const LoopBlock&, const BlockBasisOf<double>&,
+                             ArgumentsOf<double>::Vector, ArgumentsOf<double>::Vector);
+template void updateTwists(const BlockViewOf<double>&, const BlockBasisOf<double>&, BlockMotionOf<double>&);
+template void updateVelocityLift(const BlockViewOf<double>&, BlockMotionOf<double>&);
+template void updateAccelerationLift(const BlockViewOf<double>&, BlockMotionOf<double>&);
+template void calcForceLift(const BlockViewOf<double>&, const BlockMotionOf<double>&, ArgumentsOf<double>::ConstVector,
+                            ArgumentsOf<double>::Matrix);
+template struct BlockMotionOf<Lanes>;
+template void calcBlockDrift(const BlockViewOf<Lanes>&, const LoopBlock&, const BlockBasisOf<Lanes>&,
+                             ArgumentsOf<Lanes>::Vector, ArgumentsOf<Lanes>::Vector);
+template void updateTwists(const BlockViewOf<Lanes>&, const BlockBasisOf<Lanes>&, BlockMotionOf<Lanes>&);
+template void updateVelocityLift(const BlockViewOf<Lanes>&, BlockMotionOf<Lanes>&);
+template void updateAccelerationLift(const BlockViewOf<Lanes>&, BlockMotionOf<Lanes>&);
+template void calcForceLift(const BlockViewOf<Lanes>&, const BlockMotionOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector,
+                            ArgumentsOf<Lanes>::Matrix);
 
 }  // namespace bielle

@@ -7,9 +7,13 @@
 namespace bielle {
 namespace {
 
-SE3 getFrame1(const Workspace& ws, const Closure& c) { return ws.X_WB[c.body1] * c.X_B1; }
+template <typename T>
+SE3Of<T> getFrame1(const WorkspaceOf<T>& ws, const Closure& c) {
+  return ws.X_WB[c.body1] * c.X_B1;
+}
 
-SE3 calcRelativePlacement(const Workspace& ws, const Closure& c) {
+template <typename T>
+SE3Of<T> calcRelativePlacement(const WorkspaceOf<T>& ws, const Closure& c) {
   return getFrame1(ws, c).inverseTimes(ws.X_WB[c.body2] * c.X_B2);
 }
 
@@ -17,10 +21,11 @@ SE3 calcRelativePlacement(const Workspace& ws, const Closure& c) {
 Eigen::Matrix<double, 3, 2> getHingeNormals(const Closure& c) { return makePlaneBasis(c.axis).leftCols<2>(); }
 
 // g = theta / sin(theta) of the angle between the hinge axes, and dg/dcos(theta).
+template <typename T>
 struct HingeAngle {
-  double g, dg;
+  T g, dg;
 };
-HingeAngle calcHingeAngle(double sine, double cosine) {
+HingeAngle<double> calcHingeAngle(double sine, double cosine) {
   const double theta = std::atan2(sine, cosine);
   if (theta < 1e-3) return {1 + theta * theta / 6, -1.0 / 3 - 2 * theta * theta / 15};
   const double s = std::max(sine, 1e-12);
@@ -28,28 +33,39 @@ HingeAngle calcHingeAngle(double sine, double cosine) {
   return {theta / s, -(s - theta * cosine) / (s * s * s)};
 }
 
+HingeAngle<Lanes> calcHingeAngle(const Lanes& sine, const Lanes& cosine) {
+  HingeAngle<Lanes> out;
+  for (Eigen::Index l = 0; l < kLane; ++l) {
+    const HingeAngle<double> one = calcHingeAngle(sine[l], cosine[l]);
+    out.g.set(l, one.g);
+    out.dg.set(l, one.dg);
+  }
+  return out;
+}
+
 // Writes rows of full vectors in world coordinates, read in frame 1, to columns of a matrix.
+template <typename T>
 class RowWriter {
  public:
-  RowWriter(const Workspace& ws, const Closure& c) : kind_(c.kind), X_W1_(getFrame1(ws, c)) {
+  RowWriter(const WorkspaceOf<T>& ws, const Closure& c) : kind_(c.kind), X_W1_(getFrame1(ws, c)) {
     if (kind_ == ClosureKind::Hinge5D) normals_ = getHingeNormals(c);
   }
 
   // out = s times the rows of `full`.
-  void write(double s, const Vector6d& full, double* out) const {
-    const Vector6d local = X_W1_.actInvMotion(full);
+  void write(double s, const Vector6<T>& full, T* out) const {
+    const Vector6<T> local = X_W1_.actInvMotion(full);
     for (int i = 0; i < 3; ++i) out[i] = s * local[i];
     if (kind_ == ClosureKind::Ball3D) return;
     if (kind_ == ClosureKind::Weld6D) {
       for (int i = 3; i < 6; ++i) out[i] = s * local[i];
     } else {
-      for (int i = 0; i < 2; ++i) out[3 + i] = s * normals_.col(i).dot(local.tail<3>());
+      for (int i = 0; i < 2; ++i) out[3 + i] = s * normals_.col(i).dot(angular(local));
     }
   }
 
  private:
   ClosureKind kind_;
-  SE3 X_W1_;
+  SE3Of<T> X_W1_;
   Eigen::Matrix<double, 3, 2> normals_;
 };
 
@@ -80,42 +96,59 @@ ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTar
   return set;
 }
 
-RowVectorUpTo6 selectRows(const Closure& c, const Vector6d& full) {
+template <typename T>
+VectorUpTo6<T> selectRows(const Closure& c, const Vector6<T>& full) {
   switch (c.kind) {
     case ClosureKind::Weld6D:
       return full;
     case ClosureKind::Ball3D:
-      return full.head<3>();
+      return linear(full);
     case ClosureKind::Hinge5D:
       break;
   }
-  RowVectorUpTo6 rows(5);
-  rows << full.head<3>(), getHingeNormals(c).transpose() * full.tail<3>();
+  VectorUpTo6<T> rows(5);
+  rows << linear(full), getHingeNormals(c).transpose() * angular(full);
   return rows;
 }
 
-Vector6d expandRows(const Closure& c, ConstVectorRef lambda) {
-  Vector6d full = Vector6d::Zero();
-  full.head<3>() = lambda.head<3>();
-  if (c.kind == ClosureKind::Weld6D) full.tail<3>() = lambda.tail<3>();
-  if (c.kind == ClosureKind::Hinge5D) full.tail<3>() = getHingeNormals(c) * lambda.tail<2>();
+template <typename T>
+Vector6<T> expandRows(const Closure& c, const VectorUpTo6<T>& lambda) {
+  Vector6<T> full = Vector6<T>::Zero();
+  linear(full) = linear(lambda);
+  if (c.kind == ClosureKind::Weld6D) angular(full) = angular(lambda);
+  if (c.kind == ClosureKind::Hinge5D) angular(full) = getHingeNormals(c) * lambda.template tail<2>();
   return full;
 }
 
-RowVectorUpTo6 calcClosureResidual(const Workspace& ws, const Closure& c) {
+Vector6d expandRows(const Closure& c, ConstVectorRef lambda) {
+  return expandRows<double>(c, VectorUpTo6<double>(lambda));
+}
+
+template <typename T>
+VectorUpTo6<T> calcClosureResidual(const WorkspaceOf<T>& ws, const Closure& c) {
   requireStage(ws, WorkspaceStage::Placement, "calcClosureResidual", "updatePlacements or updatePositions");
-  const SE3 X = calcRelativePlacement(ws, c);
+  return calcClosureResidual(c, calcRelativePlacement(ws, c));
+}
+
+template <typename T>
+VectorUpTo6<T> calcClosureResidual(const Closure& c, const SE3Of<T>& X) {
   if (c.kind == ClosureKind::Weld6D) return log6(X);
   if (c.kind == ClosureKind::Ball3D) return X.p;
-  const Vector3d n2 = X.R * c.axis, cross = c.axis.cross(n2);
-  RowVectorUpTo6 rows(5);
-  rows << X.p, getHingeNormals(c).transpose() * (calcHingeAngle(cross.norm(), c.axis.dot(n2)).g * cross);
+  const Vector3<T> axis = c.axis.cast<T>(), n2 = X.R * axis, cross = axis.cross(n2);
+  using std::sqrt;
+  const auto angle = calcHingeAngle(sqrt(cross.squaredNorm()), axis.dot(n2));
+  VectorUpTo6<T> rows(5);
+  const Vector3<T> turn = angle.g * cross;
+  rows << X.p, getHingeNormals(c).transpose() * turn;
   return rows;
 }
 
 RowsBy6 calcClosureResidualRate(const Workspace& ws, const Closure& c) {
   requireStage(ws, WorkspaceStage::Position, "calcClosureResidualRate", "updatePositions");
-  const SE3 X = calcRelativePlacement(ws, c);
+  return calcClosureResidualRate(c, calcRelativePlacement(ws, c));
+}
+
+RowsBy6 calcClosureResidualRate(const Closure& c, const SE3& X) {
   // Frame 2 moves in frame 1 with the twist -nu_c.
   if (c.kind == ClosureKind::Weld6D) return -calcLogJacobian6(X) * X.inverse().toActionMatrix();
   RowsBy6 rate = RowsBy6::Zero(getRows(c.kind), 6);
@@ -123,7 +156,7 @@ RowsBy6 calcClosureResidualRate(const Workspace& ws, const Closure& c) {
   rate.topRightCorner<3, 3>() = skew(X.p);
   if (c.kind == ClosureKind::Hinge5D) {
     const Vector3d n2 = X.R * c.axis, cross = c.axis.cross(n2);
-    const HingeAngle angle = calcHingeAngle(cross.norm(), c.axis.dot(n2));
+    const auto angle = calcHingeAngle(cross.norm(), c.axis.dot(n2));
     const Matrix3d dn2 = skew(n2);  // d n2 = -nu_ang x n2 = [n2 x] nu_ang
     const Matrix3d dr = angle.g * skew(c.axis) * dn2 + angle.dg * cross * (c.axis.transpose() * dn2);
     rate.bottomRightCorner<2, 3>() = getHingeNormals(c).transpose() * dr;
@@ -143,9 +176,10 @@ RowVectorUpTo6 calcClosureVelocity(const Workspace& ws, const Closure& c) {
   return selectRows(c, getFrame1(ws, c).actInvMotion(ws.V[c.body1] - ws.V[c.body2]));
 }
 
-RowVectorUpTo6 calcClosureAcceleration(const Workspace& ws, const Closure& c) {
-  const Vector6d a = ws.A[c.body1] - ws.A[c.body2] + crossMotion(ws.V[c.body1], ws.V[c.body2]);
-  return selectRows(c, getFrame1(ws, c).actInvMotion(a));
+template <typename T>
+VectorUpTo6<T> calcClosureAcceleration(const WorkspaceOf<T>& ws, const Closure& c) {
+  const Vector6<T> a = ws.A[c.body1] - ws.A[c.body2] + crossMotion(ws.V[c.body1], ws.V[c.body2]);
+  return selectRows<T>(c, getFrame1(ws, c).actInvMotion(a));
 }
 
 RowVectorUpTo6 calcClosureStabilization(const Workspace& ws, const Closure& c) {
@@ -155,14 +189,15 @@ RowVectorUpTo6 calcClosureStabilization(const Workspace& ws, const Closure& c) {
   return rows;
 }
 
-void calcClosureJacobian(const Workspace& ws, const Closure& c, MatrixRef J) {
-  const RowWriter rows(ws, c);
+template <typename T>
+void calcClosureJacobian(const WorkspaceOf<T>& ws, const Closure& c, typename ArgumentsOf<T>::Matrix J) {
+  const RowWriter<T> rows(ws, c);
   for (size_t i = 0; i < c.dofs.size(); ++i) rows.write(c.signs[i], ws.J.col(c.dofs[i]), &J(0, c.dofs[i]));
 }
 
 void calcClosureDerivatives(const Workspace& ws, const Closure& c, MatrixRef da_dq, MatrixRef da_dv) {
   requireStage(ws, WorkspaceStage::Acceleration, "calcClosureDerivatives", "updateAccelerations");
-  const RowWriter rows(ws, c);
+  const RowWriter<double> rows(ws, c);
   const Vector6d &V1 = ws.V[c.body1], &V2 = ws.V[c.body2], &A2 = ws.A[c.body2];
   const Vector6d V12 = V1 + V2;
   RowsBy6 rate;
@@ -190,7 +225,7 @@ void calcClosureDerivatives(const Workspace& ws, const Closure& c, MatrixRef da_
 
 void calcClosureVelocityDerivative(const Workspace& ws, const Closure& c, MatrixRef dnu_dq) {
   requireStage(ws, WorkspaceStage::Velocity, "calcClosureVelocityDerivative", "updateVelocities");
-  const RowWriter rows(ws, c);
+  const RowWriter<double> rows(ws, c);
   for (size_t i = 0; i < c.dofs.size(); ++i) {
     const int k = c.dofs[i];
     const Vector6d dnu = ws.dV.col(k) + crossMotion(ws.J.col(k), ws.V[c.body2]);  // Eq. (3)
@@ -198,8 +233,9 @@ void calcClosureVelocityDerivative(const Workspace& ws, const Closure& c, Matrix
   }
 }
 
-Vector6d calcClosureWrench(const Workspace& ws, const Closure& c, ConstVectorRef lambda) {
-  return getFrame1(ws, c).actForce(expandRows(c, lambda));
+template <typename T>
+Vector6<T> calcClosureWrench(const WorkspaceOf<T>& ws, const Closure& c, typename ArgumentsOf<T>::ConstVector lambda) {
+  return getFrame1(ws, c).actForce(expandRows<T>(c, lambda));
 }
 
 void addClosureForceDerivative(const Model& model, const Workspace& ws, const Closure& c, const Vector6d& wrench,
@@ -229,5 +265,20 @@ void addGeneralizedForceDerivative(const Model& model, const Workspace& ws, cons
     }
   }
 }
+
+template VectorUpTo6<double> selectRows(const Closure&, const Vector6d&);
+template VectorUpTo6<Lanes> selectRows(const Closure&, const Vector6<Lanes>&);
+template Vector6d expandRows(const Closure&, const VectorUpTo6<double>&);
+template Vector6<Lanes> expandRows(const Closure&, const VectorUpTo6<Lanes>&);
+template Vector6d calcClosureWrench(const Workspace&, const Closure&, ConstVectorRef);
+template Vector6<Lanes> calcClosureWrench(const WorkspaceOf<Lanes>&, const Closure&, ArgumentsOf<Lanes>::ConstVector);
+
+template VectorUpTo6<double> calcClosureResidual(const Closure&, const SE3&);
+template VectorUpTo6<double> calcClosureResidual(const Workspace&, const Closure&);
+template VectorUpTo6<Lanes> calcClosureResidual(const WorkspaceOf<Lanes>&, const Closure&);
+template VectorUpTo6<double> calcClosureAcceleration(const Workspace&, const Closure&);
+template VectorUpTo6<Lanes> calcClosureAcceleration(const WorkspaceOf<Lanes>&, const Closure&);
+template void calcClosureJacobian(const Workspace&, const Closure&, MatrixRef);
+template void calcClosureJacobian(const WorkspaceOf<Lanes>&, const Closure&, ArgumentsOf<Lanes>::Matrix);
 
 }  // namespace bielle

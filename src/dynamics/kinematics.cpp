@@ -4,26 +4,29 @@ namespace bielle {
 namespace {
 
 // Spatial inertia of a body in world coordinates.
-void calcWorldInertia(const Inertia& inertia, const SE3& X_WB, Matrix6d& Y) {
-  const Vector3d c = X_WB.act(inertia.com);
+template <typename T>
+void calcWorldInertia(const Inertia& inertia, const SE3Of<T>& X_WB, Matrix6<T>& Y) {
+  const Vector3<T> c = X_WB.act(inertia.com.cast<T>());
   const double m = inertia.mass;
-  const Matrix3d C = skew(c);
-  Y.topLeftCorner<3, 3>() = m * Matrix3d::Identity();
-  Y.topRightCorner<3, 3>() = -m * C;
-  Y.bottomLeftCorner<3, 3>() = m * C;
-  Matrix3d T;
-  T.noalias() = X_WB.R * inertia.I_com;
-  Y.bottomRightCorner<3, 3>().noalias() = T * X_WB.R.transpose();
-  Y.bottomRightCorner<3, 3>() += m * (c.squaredNorm() * Matrix3d::Identity() - c * c.transpose());
+  const Matrix3<T> mC = m * skew(c);
+  Y.template topLeftCorner<3, 3>() = m * Matrix3<T>::Identity();
+  Y.template topRightCorner<3, 3>() = -mC;
+  Y.template bottomLeftCorner<3, 3>() = mC;
+  Matrix3<T> rotated;
+  rotated.noalias() = X_WB.R * inertia.I_com;
+  Y.template bottomRightCorner<3, 3>().noalias() = rotated * X_WB.R.transpose();
+  Y.template bottomRightCorner<3, 3>() += m * (c.squaredNorm() * Matrix3<T>::Identity() - c * c.transpose());
 }
 
 }  // namespace
 
-void updatePlacements(const Model& model, Workspace& ws, ConstVectorRef q) {
+template <typename T>
+void updatePlacements(const Model& model, WorkspaceOf<T>& ws, typename ArgumentsOf<T>::ConstVector q) {
   ws.q = q;
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
-    ws.X_WB[i] = ws.X_WB[joint.parent] * (joint.X_PJ * calcJointPlacement(joint, q.segment(joint.idx_q, joint.nq)));
+    const SE3Of<T> X_JB = calcJointPlacement<T>(joint, q.segment(joint.idx_q, joint.nq));
+    ws.X_WB[i] = ws.X_WB[joint.parent] * joint.X_PJ * X_JB;
   }
   ws.stage = WorkspaceStage::Placement;
 }
@@ -33,76 +36,91 @@ void updatePositions(const Model& model, Workspace& ws, ConstVectorRef q) {
   updateColumns(model, ws);
 }
 
-void updateColumns(const Model& model, Workspace& ws) {
+template <typename T>
+void updateColumns(const Model& model, WorkspaceOf<T>& ws) {
   requireStage(ws, WorkspaceStage::Placement, "updateColumns", "updatePlacements");
-  Matrix6d S;
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
-    const SE3& X = ws.X_WB[i];
+    const SE3Of<T>& X = ws.X_WB[i];
     auto J = ws.J.middleCols(joint.idx_v, joint.nv);
+    const auto setAxis = [&](int k, const Vector3<T>& axis) { J.col(k) << X.p.cross(axis), axis; };
     switch (joint.kind) {
       case JointKind::Revolute:
       case JointKind::Continuous:
-        J.col(0).tail<3>().noalias() = X.R * joint.axis;
-        J.col(0).head<3>() = X.p.cross(J.col(0).tail<3>());
+        setAxis(0, X.R * joint.axis);
         break;
       case JointKind::Spherical:
-        J.bottomRows<3>() = X.R;
-        for (int k = 0; k < 3; ++k) J.col(k).head<3>() = X.p.cross(X.R.col(k));
+        for (int k = 0; k < 3; ++k) setAxis(k, X.R.col(k));
         break;
       case JointKind::Universal:  // the first axis rests in what carries the joint
-        J.col(0).tail<3>().noalias() = ws.X_WB[joint.parent].R * (joint.X_PJ.R * joint.axis);
-        J.col(1).tail<3>().noalias() = X.R * joint.axis2;
-        for (int k = 0; k < 2; ++k) J.col(k).head<3>() = X.p.cross(J.col(k).tail<3>());
+        setAxis(0, ws.X_WB[joint.parent].R * (joint.X_PJ.R * joint.axis));
+        setAxis(1, X.R * joint.axis2);
         break;
-      default:
-        calcJointSubspace(joint, ws.q.segment(joint.idx_q, joint.nq), S.leftCols(joint.nv));
-        for (int k = 0; k < joint.nv; ++k) J.col(k) = X.actMotion(S.col(k));
+      default: {  // the subspace does not depend on q
+        Matrix6d S;
+        calcJointSubspace(joint, VectorXd(), S.leftCols(joint.nv));
+        for (int k = 0; k < joint.nv; ++k) J.col(k) = X.actMotion(S.col(k).cast<T>());
+      }
     }
     if (model.bodies()[i].inertia.mass > 0) calcWorldInertia(model.bodies()[i].inertia, X, ws.Y[i]);
   }
   ws.stage = WorkspaceStage::Position;
 }
 
-void updateVelocities(const Model& model, Workspace& ws, ConstVectorRef v) {
+template <typename T>
+void updateVelocities(const Model& model, WorkspaceOf<T>& ws, typename ArgumentsOf<T>::ConstVector v) {
   requireStage(ws, WorkspaceStage::Position, "updateVelocities", "updatePositions");
   ws.v = v;
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
-    ws.V[i] = ws.V[joint.parent];
+    const Vector6<T>& V_parent = ws.V[joint.parent];
     const bool sequential = joint.kind == JointKind::Universal;
+    Vector6<T> V = V_parent;
     if (!sequential)
-      for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) ws.V[i] += ws.J.col(k) * v[k];
+      for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) V += ws.J.col(k) * ws.v[k];
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) {
-      const Vector6d w_minus = sequential ? ws.V[i] : ws.V[joint.parent];
+      const Vector6<T> J = ws.J.col(k), w_minus = sequential ? V : V_parent, dV = crossMotion(w_minus, J);
       ws.w_minus.col(k) = w_minus;
-      ws.dV.col(k) = crossMotion(w_minus, ws.J.col(k));
-      ws.dJ.col(k) = joint.nv == 1 || sequential ? Vector6d(ws.dV.col(k)) : crossMotion(ws.V[i], ws.J.col(k));
-      if (sequential) ws.V[i] += ws.J.col(k) * v[k];
+      ws.dV.col(k) = dV;
+      ws.dJ.col(k) = joint.nv == 1 || sequential ? dV : crossMotion(V, J);
+      if (sequential) V += J * ws.v[k];
     }
-    if (model.bodies()[i].inertia.mass > 0) ws.h[i].noalias() = ws.Y[i] * ws.V[i];
+    ws.V[i] = V;
+    if (model.bodies()[i].inertia.mass > 0) ws.h[i].noalias() = ws.Y[i] * V;
   }
   ws.hc = ws.h;
   for (int i = model.numBodies() - 1; i > 0; --i) ws.hc[model.joints()[i].parent] += ws.hc[i];
   ws.stage = WorkspaceStage::Velocity;
 }
 
-void updateAccelerations(const Model& model, Workspace& ws, ConstVectorRef a) {
+template <typename T>
+void updateAccelerations(const Model& model, WorkspaceOf<T>& ws, typename ArgumentsOf<T>::ConstVector a) {
   requireStage(ws, WorkspaceStage::Velocity, "updateAccelerations", "updateVelocities");
   ws.a = a;
-  ws.A[0] << -model.gravity(), Vector3d::Zero();
+  ws.A[0] << -model.gravity().cast<T>(), Vector3<T>::Zero();
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
-    ws.A[i] = ws.A[joint.parent];
+    const Vector6<T>& A_parent = ws.A[joint.parent];
     const bool sequential = joint.kind == JointKind::Universal;
+    Vector6<T> A = A_parent;
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) {
-      const Vector6d a_minus = sequential ? ws.A[i] : ws.A[joint.parent];
-      ws.dA.col(k) = crossMotion(a_minus, ws.J.col(k)) + crossMotion(ws.w_minus.col(k), ws.dV.col(k));  // Eq. (3)
-      ws.A[i] += ws.J.col(k) * a[k] + ws.dJ.col(k) * ws.v[k];
+      const Vector6<T> J = ws.J.col(k), a_minus = sequential ? A : A_parent;
+      ws.dA.col(k) = crossMotion(a_minus, J) + crossMotion(ws.w_minus.col(k), ws.dV.col(k));  // Eq. (3)
+      A += J * ws.a[k] + ws.dJ.col(k) * ws.v[k];
     }
+    ws.A[i] = A;
   }
   ws.stage = WorkspaceStage::Acceleration;
 }
+
+template void updatePlacements(const Model&, Workspace&, ConstVectorRef);
+template void updatePlacements(const Model&, WorkspaceOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector);
+template void updateColumns(const Model&, Workspace&);
+template void updateColumns(const Model&, WorkspaceOf<Lanes>&);
+template void updateVelocities(const Model&, Workspace&, ConstVectorRef);
+template void updateVelocities(const Model&, WorkspaceOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector);
+template void updateAccelerations(const Model&, Workspace&, ConstVectorRef);
+template void updateAccelerations(const Model&, WorkspaceOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector);
 
 Matrix6Xd calcFrameJacobian(const Model& model, const Workspace& ws, int body, const SE3& X_BF) {
   requireStage(ws, WorkspaceStage::Position, "calcFrameJacobian", "updatePositions");

@@ -4,11 +4,12 @@
 
 namespace bielle {
 
-ReducedTree::ReducedTree(const Model& model, const Reduction& reduction, const std::vector<int>& tips)
+template <typename T>
+ReducedTreeOf<T>::ReducedTreeOf(const Model& model, const Reduction& reduction, const std::vector<int>& tips)
     : model_(model), reduction_(reduction) {
   const auto resize = [](const ReducedUnit& place, Columns& columns) {
     columns.outer = place.outer;
-    for (Matrix6Xd* m : {&columns.J, &columns.dV, &columns.dA, &columns.dW}) m->setZero(6, place.outer.size());
+    for (Matrix6X<T>* m : {&columns.J, &columns.dV, &columns.dA, &columns.dW}) m->setZero(6, place.outer.size());
   };
   size_t groups = 0;
   for (const ReducedUnit& place : reduction.units) {
@@ -21,24 +22,26 @@ ReducedTree::ReducedTree(const Model& model, const Reduction& reduction, const s
       for (int k = 0; k < joint.nv; ++k) unit.dofs.push_back(joint.idx_v + k);
     }
     resize(place, unit.columns);
-    for (Matrix6Xd* m : {&unit.YJ, &unit.BtJ, &unit.Gy, &unit.Gv}) m->setZero(6, place.size);
+    for (Matrix6X<T>* m : {&unit.YJ, &unit.BtJ, &unit.Gy, &unit.Gv}) m->setZero(6, place.size);
     units_.push_back(std::move(unit));
   }
   for (int body : tips) {
     tips_.push_back({makeTip(model, reduction, body), {}});
     resize(tips_.back().place, tips_.back().columns);
   }
-  for (Matrix6Xd* m : {&after_y_, &after_v_}) m->setZero(6, groups);
+  for (Matrix6X<T>* m : {&after_y_, &after_v_}) m->setZero(6, groups);
 }
 
-void ReducedTree::clearAfter(size_t groups) {
+template <typename T>
+void ReducedTreeOf<T>::clearAfter(size_t groups) {
   after_y_.leftCols(groups).setZero();
   after_v_.leftCols(groups).setZero();
 }
 
 // The columns of the parent's outer coordinates, then those of the parent itself along the path.
-void ReducedTree::updateColumns(const Workspace& ws, const std::vector<BlockLift>& lifts, const ReducedUnit& place,
-                                Depth depth, Columns& out) const {
+template <typename T>
+void ReducedTreeOf<T>::updateColumns(const WorkspaceOf<T>& ws, const std::vector<BlockLiftOf<T>>& lifts,
+                                     const ReducedUnit& place, Depth depth, Columns& out) const {
   if (place.parent < 0) return;
   const ReducedUnit& up = reduction_.units[place.parent];
   const Unit& parent = units_[place.parent];
@@ -59,7 +62,7 @@ void ReducedTree::updateColumns(const Workspace& ws, const std::vector<BlockLift
     out.dW.rightCols(n) = ws.dJ.middleCols(k, n) + ws.dV.middleCols(k, n);
     return;
   }
-  const BlockMotion& motion = *lifts[up.block].motion;
+  const BlockMotionOf<T>& motion = *lifts[up.block].motion;
   for (int c = 0; c < up.size; ++c) {
     const Eigen::Index from = n * c + place.path.back(), to = inherited + c;
     out.J.col(to) = motion.J.col(from);
@@ -71,8 +74,9 @@ void ReducedTree::updateColumns(const Workspace& ws, const std::vector<BlockLift
 }
 
 // M of Eq. (3), and (YJ)~.
-void ReducedTree::addMassWithin(const Workspace& ws, const BlockLift* lift, const ReducedUnit& place, Unit& unit,
-                                MatrixRef M) {
+template <typename T>
+void ReducedTreeOf<T>::addMassWithin(const WorkspaceOf<T>& ws, const BlockLiftOf<T>* lift, const ReducedUnit& place,
+                                     Unit& unit, typename ArgumentsOf<T>::Matrix M) {
   const int n = static_cast<int>(unit.dofs.size()), o = place.offset;
   if (!lift) {
     const int first = unit.dofs.front();
@@ -81,20 +85,20 @@ void ReducedTree::addMassWithin(const Workspace& ws, const BlockLift* lift, cons
     M.block(o, o, n, n).diagonal() += model_.armature().segment(first, n);
     return;
   }
-  const BlockMotion& motion = *lift->motion;
-  const MatrixXd& N = motion.basis->N;
+  const BlockMotionOf<T>& motion = *lift->motion;
+  const MatrixX<T>& N = motion.basis->N;
   const std::vector<DofGroup>& groups = motion.block.groups;
   M.block(o, o, place.size, place.size).setZero();
   for (int c = 0; c < place.size; ++c) {
     clearAfter(groups.size());
-    Vector6d total = Vector6d::Zero();
+    Vector6<T> total = Vector6<T>::Zero();
     for (int g = static_cast<int>(groups.size()) - 1; g >= 0; --g) {
       const DofGroup& group = groups[g];
-      Vector6d sum = after_y_.col(g);
+      Vector6<T> sum = after_y_.col(g);
       for (int k = group.begin; k < group.end; ++k) {
         const int dof = unit.dofs[k];
-        const double row = ws.YJ.col(dof).dot(motion.J.col(n * c + k)) + ws.J.col(dof).dot(after_y_.col(g)) +
-                           model_.armature()[dof] * N(k, c);
+        const T row = ws.YJ.col(dof).dot(motion.J.col(n * c + k)) + ws.J.col(dof).dot(after_y_.col(g)) +
+                      model_.armature()[dof] * N(k, c);
         for (int d = 0; d < place.size; ++d) M(o + d, o + c) += N(k, d) * row;
         sum += N(k, c) * ws.YJ.col(dof);
       }
@@ -108,17 +112,19 @@ void ReducedTree::addMassWithin(const Workspace& ws, const BlockLift* lift, cons
   }
 }
 
-void ReducedTree::updateMassMatrix(const Workspace& ws, const std::vector<BlockLift>& lifts, MatrixRef M) {
+template <typename T>
+void ReducedTreeOf<T>::updateMassMatrix(const WorkspaceOf<T>& ws, const std::vector<BlockLiftOf<T>>& lifts,
+                                        typename ArgumentsOf<T>::Matrix M) {
   M.setZero();
   for (size_t u = 0; u < units_.size(); ++u) {
     const ReducedUnit& place = reduction_.units[u];
     Unit& unit = units_[u];
-    const BlockLift* lift = place.block >= 0 ? &lifts[place.block] : nullptr;
+    const BlockLiftOf<T>* lift = place.block >= 0 ? &lifts[place.block] : nullptr;
     updateColumns(ws, lifts, place, Depth::Twists, unit.columns);
     addMassWithin(ws, lift, place, unit, M);
     for (size_t o = 0; o < place.outer.size(); ++o)
       for (int c = 0; c < place.size; ++c) {
-        const double m = unit.columns.J.col(o).dot(unit.YJ.col(c));
+        const T m = unit.columns.J.col(o).dot(unit.YJ.col(c));
         M(place.outer[o], place.offset + c) = m;
         M(place.offset + c, place.outer[o]) = m;
       }
@@ -127,8 +133,9 @@ void ReducedTree::updateMassMatrix(const Workspace& ws, const std::vector<BlockL
 }
 
 // A joint outside all loops: its own entries, and Eq. (1) with N = 1.
-void ReducedTree::addFreeWithin(const Workspace& ws, const ReducedUnit& place, Unit& unit, MatrixRef A_y,
-                                MatrixRef A_v) const {
+template <typename T>
+void ReducedTreeOf<T>::addFreeWithin(const WorkspaceOf<T>& ws, const ReducedUnit& place, Unit& unit,
+                                     typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v) const {
   const int first = unit.dofs.front(), n = static_cast<int>(unit.dofs.size());
   unit.YJ = ws.YJ.middleCols(first, n);
   unit.BtJ = ws.BtJ.middleCols(first, n);
@@ -136,33 +143,35 @@ void ReducedTree::addFreeWithin(const Workspace& ws, const ReducedUnit& place, U
   unit.Gv = ws.Gv.middleCols(first, n);
   for (int k = 0; k < n; ++k)
     for (int j = 0; j < n; ++j) {
-      const DerivativeEntry entry = calcDerivativeEntry(model_, ws, first + j, first + k);
+      const auto entry = calcDerivativeEntry(model_, ws, first + j, first + k);
       A_y(place.offset + j, place.offset + k) = entry.q;
       A_v(place.offset + j, place.offset + k) = entry.v;
     }
 }
 
 // Eqs. (1) and (3)
-void ReducedTree::addBlockWithin(const Workspace& ws, const BlockLift& lift, const ReducedUnit& place, Unit& unit,
-                                 MatrixRef A_y, MatrixRef A_v) {
-  const BlockMotion& motion = *lift.motion;
-  const MatrixXd &N = motion.basis->N, &Z = motion.Z, &dy = motion.dy, &dv = motion.dv;
+template <typename T>
+void ReducedTreeOf<T>::addBlockWithin(const WorkspaceOf<T>& ws, const BlockLiftOf<T>& lift, const ReducedUnit& place,
+                                      Unit& unit, typename ArgumentsOf<T>::Matrix A_y,
+                                      typename ArgumentsOf<T>::Matrix A_v) {
+  const BlockMotionOf<T>& motion = *lift.motion;
+  const MatrixX<T>&N = motion.basis->N, &Z = motion.Z, &dy = motion.dy, &dv = motion.dv;
   const std::vector<DofGroup>& groups = motion.block.groups;
   const int n = static_cast<int>(unit.dofs.size()), o = place.offset;
   for (int c = 0; c < place.size; ++c) {
     clearAfter(groups.size());
-    Vector6d YJ = Vector6d::Zero(), BtJ = YJ, Gy = YJ, Gv = YJ;
+    Vector6<T> YJ = Vector6<T>::Zero(), BtJ = YJ, Gy = YJ, Gv = YJ;
     for (int g = static_cast<int>(groups.size()) - 1; g >= 0; --g) {
       const DofGroup& group = groups[g];
-      const Vector6d after_y = after_y_.col(g), after_v = after_v_.col(g);
-      Vector6d sum_y = after_y, sum_v = after_v;
+      const Vector6<T> after_y = after_y_.col(g), after_v = after_v_.col(g);
+      Vector6<T> sum_y = after_y, sum_v = after_v;
       for (int k = group.begin; k < group.end; ++k) {
         const int dof = unit.dofs[k], at = n * c + k;
         const double armature = model_.armature()[dof];
-        const double row_y = ws.YJ.col(dof).dot(motion.dA.col(at)) + ws.BtJ.col(dof).dot(motion.dV.col(at)) +
-                             ws.J.col(dof).dot(after_y) + armature * dy(k, c) - (*lift.HN)(k, c);
-        const double row_v = ws.YJ.col(dof).dot(motion.dW.col(at)) + ws.BtJ.col(dof).dot(motion.J.col(at)) +
-                             ws.J.col(dof).dot(after_v) + armature * dv(k, c);
+        const T row_y = ws.YJ.col(dof).dot(motion.dA.col(at)) + ws.BtJ.col(dof).dot(motion.dV.col(at)) +
+                        ws.J.col(dof).dot(after_y) + armature * dy(k, c) - (*lift.HN)(k, c);
+        const T row_v = ws.YJ.col(dof).dot(motion.dW.col(at)) + ws.BtJ.col(dof).dot(motion.J.col(at)) +
+                        ws.J.col(dof).dot(after_v) + armature * dv(k, c);
         for (int d = 0; d < place.size; ++d) {
           A_y(o + d, o + c) += N(k, d) * row_y;
           A_v(o + d, o + c) += N(k, d) * row_v;
@@ -187,8 +196,9 @@ void ReducedTree::addBlockWithin(const Workspace& ws, const BlockLift& lift, con
   }
 }
 
-void ReducedTree::updateDerivatives(const Workspace& ws, const std::vector<BlockLift>& lifts, MatrixRef A_y,
-                                    MatrixRef A_v) {
+template <typename T>
+void ReducedTreeOf<T>::updateDerivatives(const WorkspaceOf<T>& ws, const std::vector<BlockLiftOf<T>>& lifts,
+                                         typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v) {
   A_y.setZero();
   A_v.setZero();
   for (size_t u = 0; u < units_.size(); ++u) {
@@ -203,7 +213,7 @@ void ReducedTree::updateDerivatives(const Workspace& ws, const std::vector<Block
     for (size_t o = 0; o < place.outer.size(); ++o) {  // Eq. (2)
       const int beta = place.outer[o];
       const Columns& in = unit.columns;
-      const Vector6d J = in.J.col(o), dV = in.dV.col(o), dA = in.dA.col(o), dW = in.dW.col(o);
+      const Vector6<T> J = in.J.col(o), dV = in.dV.col(o), dA = in.dA.col(o), dW = in.dW.col(o);
       for (int c = 0; c < place.size; ++c) {
         const int alpha = place.offset + c;
         A_y(alpha, beta) = unit.YJ.col(c).dot(dA) + unit.BtJ.col(c).dot(dV);
@@ -215,5 +225,8 @@ void ReducedTree::updateDerivatives(const Workspace& ws, const std::vector<Block
   }
   for (Tip& tip : tips_) updateColumns(ws, lifts, tip.place, Depth::All, tip.columns);
 }
+
+template class ReducedTreeOf<double>;
+template class ReducedTreeOf<Lanes>;
 
 }  // namespace bielle

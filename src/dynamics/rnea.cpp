@@ -6,34 +6,38 @@ namespace bielle {
 namespace {
 
 // Force of body i, without external forces: Y A + V x* Y V.
-Vector6d calcBodyForce(const Workspace& ws, int i, const Vector6d& A) {
+template <typename T>
+Vector6<T> calcBodyForce(const WorkspaceOf<T>& ws, int i, const Vector6<T>& A) {
   return ws.Y[i] * A + crossForce(ws.V[i], ws.h[i]);
 }
 
 // Angular block of B of Eq. (11) for body i.
-void calcB(const Workspace& ws, int i, double mass, Matrix3d& B) {
-  const Matrix6d& Y = ws.Y[i];
-  const Vector3d v = ws.V[i].head<3>(), w = ws.V[i].tail<3>(), mc(Y(5, 1), Y(3, 2), Y(4, 0));
-  const Matrix3d I = Y.bottomRightCorner<3, 3>(), W = skew(w), cv = mc * v.transpose();
+template <typename T>
+void calcB(const WorkspaceOf<T>& ws, int i, double mass, Matrix3<T>& B) {
   if (mass == 0) {
     B.setZero();
     return;
   }
+  const Matrix6<T>& Y = ws.Y[i];
+  const Vector3<T> v = linear(ws.V[i]), w = angular(ws.V[i]), mc(Y(5, 1), Y(3, 2), Y(4, 0));
+  const Matrix3<T> I = Y.template bottomRightCorner<3, 3>(), W = skew(w), cv = mc * v.transpose();
   B.noalias() = W * I - I * W;
-  B -= cv + cv.transpose() + skew(ws.h[i].tail<3>());
+  B -= cv + cv.transpose() + skew(angular(ws.h[i]));
   B.diagonal().array() += 2 * mc.dot(v);
 }
 
 // Bc x of subtree i.
-Vector6d applyB(const Workspace& ws, int i, const Vector6d& x) {
-  Vector6d out;
-  out.head<3>() = -2 * ws.hc[i].head<3>().cross(x.tail<3>());
-  out.tail<3>().noalias() = ws.Bc[i] * x.tail<3>();
+template <typename T>
+Vector6<T> applyB(const WorkspaceOf<T>& ws, int i, const Vector6<T>& x) {
+  Vector6<T> out;
+  linear(out) = -2 * linear(ws.hc[i]).cross(angular(x));
+  angular(out).noalias() = ws.Bc[i] * angular(x);
   return out;
 }
 
 // Generalized forces of the accelerations of the bodies, rotors left out.
-void sumForces(const Model& model, Workspace& ws, VectorXd& out) {
+template <typename T>
+void sumForces(const Model& model, WorkspaceOf<T>& ws, VectorX<T>& out) {
   for (int i = 1; i < model.numBodies(); ++i) ws.F[i] = calcBodyForce(ws, i, ws.A[i]);
   for (int i = model.numBodies() - 1; i > 0; --i) {
     const Joint& joint = model.joints()[i];
@@ -44,7 +48,8 @@ void sumForces(const Model& model, Workspace& ws, VectorXd& out) {
 
 }  // namespace
 
-void updateCompositeInertias(const Model& model, Workspace& ws) {
+template <typename T>
+void updateCompositeInertias(const Model& model, WorkspaceOf<T>& ws) {
   requireStage(ws, WorkspaceStage::Position, "updateCompositeInertias", "updatePositions");
   for (int i = 1; i < model.numBodies(); ++i) ws.Yc[i] = ws.Y[i];
   for (int i = model.numBodies() - 1; i > 0; --i) {
@@ -65,12 +70,13 @@ void updateMassMatrix(const Model& model, Workspace& ws) {
   ws.M.diagonal() += model.armature();
 }
 
-void updateDrift(const Model& model, Workspace& ws) {
+template <typename T>
+void updateDrift(const Model& model, WorkspaceOf<T>& ws) {
   requireStage(ws, WorkspaceStage::Velocity, "updateDrift", "updateVelocities");
-  ws.A[0] << -model.gravity(), Vector3d::Zero();
+  ws.A[0] << -model.gravity().cast<T>(), Vector3<T>::Zero();
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
-    Vector6d A = ws.A[joint.parent];
+    Vector6<T> A = ws.A[joint.parent];
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) A += ws.dJ.col(k) * ws.v[k];
     ws.A[i] = A;
   }
@@ -82,12 +88,13 @@ void updateBias(const Model& model, Workspace& ws) {
   sumForces(model, ws, ws.b);
 }
 
-void updateInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef a) {
+template <typename T>
+void updateInverseDynamics(const Model& model, WorkspaceOf<T>& ws, typename ArgumentsOf<T>::ConstVector a) {
   requireStage(ws, WorkspaceStage::Velocity, "updateInverseDynamics", "updateVelocities");
-  ws.A[0] << -model.gravity(), Vector3d::Zero();
+  ws.A[0] << -model.gravity().cast<T>(), Vector3<T>::Zero();
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
-    Vector6d A = ws.A[joint.parent];
+    Vector6<T> A = ws.A[joint.parent];
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) A += ws.J.col(k) * a[k] + ws.dJ.col(k) * ws.v[k];
     ws.A[i] = A;
   }
@@ -105,7 +112,9 @@ VectorXd calcInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef q
   return tau + model.armature().cwiseProduct(a);
 }
 
-void updateInverseDynamicsFactors(const Model& model, Workspace& ws, const std::vector<Vector6d>& f_ext) {
+template <typename T>
+void updateInverseDynamicsFactors(const Model& model, WorkspaceOf<T>& ws,
+                                  const typename ArgumentsOf<T>::Wrenches& f_ext) {
   requireStage(ws, WorkspaceStage::Acceleration, "updateInverseDynamicsFactors", "updateAccelerations");
   for (int i = 1; i < model.numBodies(); ++i) {
     ws.F[i] = calcBodyForce(ws, i, ws.A[i]);
@@ -116,16 +125,15 @@ void updateInverseDynamicsFactors(const Model& model, Workspace& ws, const std::
   for (int i = model.numBodies() - 1; i > 0; --i) {
     const Joint& joint = model.joints()[i];
     for (int j = joint.idx_v; j < joint.idx_v + joint.nv; ++j) {
-      const Vector6d J = ws.J.col(j), dV = ws.dV.col(j);
+      const Vector6<T> J = ws.J.col(j), dV = ws.dV.col(j), dA = ws.dA.col(j), turn = ws.dJ.col(j) + dV;
       ws.YJ.col(j).noalias() = ws.Yc[i] * J;
-      ws.BtJ.col(j).head<3>().setZero();
-      ws.BtJ.col(j).tail<3>().noalias() = ws.Bc[i].transpose() * J.tail<3>();
-      ws.BtJ.col(j).tail<3>() += 2 * ws.hc[i].head<3>().cross(J.head<3>());
-      ws.Gv.col(j).noalias() = ws.Yc[i] * (ws.dJ.col(j) + dV);
-      ws.Gv.col(j) += applyB(ws, i, J);
-      ws.Gq.col(j).noalias() = ws.Yc[i] * ws.dA.col(j);
-      ws.Gq.col(j) += applyB(ws, i, dV);
-      ws.Gq.col(j) += crossForce(J, ws.F[i]);
+      Vector6<T> BtJ;
+      linear(BtJ).setZero();
+      angular(BtJ).noalias() = ws.Bc[i].transpose() * angular(J);
+      angular(BtJ) += 2 * linear(ws.hc[i]).cross(linear(J));
+      ws.BtJ.col(j) = BtJ;
+      ws.Gv.col(j) = ws.Yc[i] * turn + applyB(ws, i, J);
+      ws.Gq.col(j) = ws.Yc[i] * dA + applyB(ws, i, dV) + crossForce(J, ws.F[i]);
     }
     if (joint.parent > 0) {
       ws.F[joint.parent] += ws.F[i];
@@ -139,7 +147,7 @@ void updateInverseDynamicsDerivatives(const Model& model, Workspace& ws, const s
   requireStage(ws, WorkspaceStage::Acceleration, "updateInverseDynamicsDerivatives", "updateAccelerations");
   updateInverseDynamicsFactors(model, ws, f_ext);
   const auto write = [&](int j, int k) {
-    const DerivativeEntry entry = calcDerivativeEntry(model, ws, j, k);
+    const auto entry = calcDerivativeEntry(model, ws, j, k);
     ws.dID_dq(j, k) = entry.q;
     ws.dID_dv(j, k) = entry.v;
   };
@@ -152,5 +160,14 @@ void updateInverseDynamicsDerivatives(const Model& model, Workspace& ws, const s
       }
     }
 }
+
+template void updateCompositeInertias(const Model&, Workspace&);
+template void updateCompositeInertias(const Model&, WorkspaceOf<Lanes>&);
+template void updateDrift(const Model&, Workspace&);
+template void updateDrift(const Model&, WorkspaceOf<Lanes>&);
+template void updateInverseDynamics(const Model&, Workspace&, ConstVectorRef);
+template void updateInverseDynamics(const Model&, WorkspaceOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector);
+template void updateInverseDynamicsFactors(const Model&, Workspace&, const ArgumentsOf<double>::Wrenches&);
+template void updateInverseDynamicsFactors(const Model&, WorkspaceOf<Lanes>&, const ArgumentsOf<Lanes>::Wrenches&);
 
 }  // namespace bielle

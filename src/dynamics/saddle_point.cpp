@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "bielle/math/lane_product.h"
 #include "bielle/math/small_dense.h"
 
 namespace bielle {
@@ -9,61 +10,66 @@ namespace bielle {
 void SaddlePoint::resize(int n, int m) {
   if (J_.rows() == m && J_.cols() == n) return;
   J_.setZero(m, n);
-  W_.setZero(m, n);
+  M_.setZero(roundUpToLane(n) * n);
+  W_.setZero(roundUpToLane(m) * n);
+  G_llt_.setZero(roundUpToLane(m) * m);
   for (MatrixXd* matrix : {&G_, &Ginv_, &T1_, &T2_}) matrix->setZero(m, m);
   for (VectorXd* v : {&D_, &rhs_, &correction_}) v->setZero(m);
-  // Of something, so that their status is not read before it is set when they are copied.
-  M_llt_.compute(MatrixXd::Identity(n, n));
-  G_llt_.compute(MatrixXd::Identity(m, m));
 }
 
 SaddlePointStatus SaddlePoint::factorize(const MatrixXd& M, const MatrixXd& J, const SaddlePointOptions& options) {
   options_ = options;
-  M_llt_.compute(M);
-  if (M_llt_.info() != Eigen::Success) return SaddlePointStatus::MassMatrixSingular;
-  if (J.rows() == 0) return SaddlePointStatus::Ok;
+  const Eigen::Index n = J_.cols(), m = J_.rows();
+  PaddedMap L = shapePadded(M_, n, n), W = shapePadded(W_, m, n), G_llt = shapePadded(G_llt_, m, m);
+  L = M;
+  clearPadding(L);
+  if (!factorizeColumns(L, n)) return SaddlePointStatus::MassMatrixSingular;
+  if (m == 0) return SaddlePointStatus::Ok;
   J_ = J;
-  W_ = J;
-  solveTransposedFromRight(M_llt_.matrixLLT(), W_);
-  const double largest = std::sqrt(W_.rowwise().squaredNorm().maxCoeff());
-  for (Eigen::Index i = 0; i < W_.rows(); ++i) {
-    const double norm = W_.row(i).norm();
-    D_[i] = norm > 1e-11 * largest ? 1 / norm : 0;  // a row that nothing moves, up to rounding, has no force
-    W_.row(i) *= D_[i];
-  }
-  G_.noalias() = W_ * W_.transpose();
-  G_llt_.compute(G_);
-  const double pivot = G_llt_.info() == Eigen::Success ? G_llt_.matrixLLT().diagonal().array().square().minCoeff() : 0;
+  W = J;
+  clearPadding(W);
+  solveTransposedFromRight(L, W);
+  D_ = W.rowwise().squaredNorm().cwiseSqrt();
+  const double largest = D_.maxCoeff();
+  for (Eigen::Index i = 0; i < m; ++i)  // a row that nothing moves, up to rounding, has no force
+    D_[i] = D_[i] > 1e-11 * largest ? 1 / D_[i] : 0;
+  W.array().colwise() *= D_.array();
+  G_llt.setZero();
+  clearPadding(G_llt);
+  addProduct(m, m, n, 1, pad(W), {W.data(), W.outerStride(), 1}, pad(G_llt));
+  G_ = G_llt;
+  const double pivot = factorizeColumns(G_llt, m) ? G_llt.diagonal().array().square().minCoeff() : 0;
   redundant_ = !(pivot > options.direct_threshold);
   if (redundant_) {
-    T1_ = G_;
-    T1_.diagonal().array() += options.proximal;
-    G_llt_.compute(T1_);
+    G_llt = G_;
+    G_llt.diagonal().array() += options.proximal;
+    factorizeColumns(G_llt, m);
   }
   return SaddlePointStatus::Ok;
 }
 
 void SaddlePoint::solve(const VectorXd& f, const VectorXd& g, VectorXd& a, VectorXd& lambda) {
+  const PaddedMap L = shapePadded(M_, J_.cols(), J_.cols()), G_llt = shapePadded(G_llt_, J_.rows(), J_.rows());
   a = f;
-  M_llt_.solveInPlace(a);  // free accelerations
+  solveSmallCholesky(L, a);  // free accelerations
   if (J_.rows() == 0) return;
   rhs_ = -g;
   rhs_.noalias() -= J_ * a;
   rhs_.array() *= D_.array();
   lambda = rhs_;
-  G_llt_.solveInPlace(lambda);
+  solveSmallCholesky(G_llt, lambda);
   const int iterations = redundant_ ? options_.max_iterations : 2;  // a direct solution is refined once
   for (int i = 1; i < iterations; ++i) {
     correction_ = rhs_;
     correction_.noalias() -= G_ * lambda;
-    G_llt_.solveInPlace(correction_);
+    solveSmallCholesky(G_llt, correction_);
     lambda += correction_;  // Eq. (3)
     if (correction_.norm() <= options_.tolerance * lambda.norm()) break;
   }
   lambda.array() *= D_.array();
   a = f;
   a.noalias() += J_.transpose() * lambda;
-  M_llt_.solveInPlace(a);
+  solveSmallCholesky(L, a);
 }
 
 // Inverse of D G D, or its pseudo-inverse as the limit of Eq. (3): with P = (DGD + mu I)^{-1} and E = mu P, the sum
@@ -71,7 +77,7 @@ void SaddlePoint::solve(const VectorXd& f, const VectorXd& g, VectorXd& a, Vecto
 void SaddlePoint::updateInverse() {
   if (J_.rows() == 0) return;
   Ginv_.setIdentity();
-  G_llt_.solveInPlace(Ginv_);
+  solveSmallCholesky(shapePadded(G_llt_, J_.rows(), J_.rows()), Ginv_);
   if (!redundant_) return;
   constexpr int kDoublings = 3;  // eight proximal steps
   T1_ = options_.proximal * Ginv_;
@@ -92,29 +98,31 @@ void SaddlePoint::updateInverse() {
 }
 
 void SaddlePoint::solveDerivatives(MatrixRef X, MatrixRef dlambda) {
-  if (J_.rows() == 0) {
-    X *= -1;
-    M_llt_.solveInPlace(X);
-    return;
-  }
   // In the coordinates of L: W = D J L^{-T} and L^{-1} dID give J M^{-1} dID = D^{-1} W L^{-1} dID. All is done on
   // transposes, whose columns are long.
-  const Eigen::Index columns = X.cols();
-  if (X_.rows() < columns || X_.cols() != X.rows() || rhs_t_.cols() != J_.rows()) {
-    X_.resize(columns, X.rows());
-    for (MatrixXd* m : {&rhs_t_, &dlambda_t_}) m->resize(columns, J_.rows());
+  const Eigen::Index columns = X.cols(), n = X.rows(), m = J_.rows(), padded = roundUpToLane(columns);
+  if (X_.size() < padded * n || rhs_t_.size() < padded * m) {
+    X_.setZero(padded * n);
+    for (VectorXd* x : {&rhs_t_, &dlambda_t_}) x->setZero(padded * m);
   }
-  auto Xt = X_.topRows(columns), rhs = rhs_t_.topRows(columns), dlambda_t = dlambda_t_.topRows(columns);
-  Xt = X.transpose();
-  solveTransposedFromRight(M_llt_.matrixLLT(), Xt);
-  for (Eigen::Index i = 0; i < D_.size(); ++i) rhs.col(i) = -D_[i] * dlambda.row(i).transpose();
-  rhs.noalias() += Xt * W_.transpose();
-  dlambda_t.noalias() = rhs * Ginv_.transpose();  // symmetric but for rounding, which redundant rows magnify
+  PaddedMap Xt = shapePadded(X_, columns, n), rhs = shapePadded(rhs_t_, columns, m),
+            dlambda_t = shapePadded(dlambda_t_, columns, m), L = shapePadded(M_, n, n), W = shapePadded(W_, m, n);
+  copyTransposed(X, Xt);
+  clearPadding(Xt);
+  solveTransposedFromRight(L, Xt);
+  for (Eigen::Index i = 0; i < m; ++i) rhs.col(i) = -D_[i] * dlambda.row(i).transpose();
+  clearPadding(rhs);
+  addProduct(columns, m, n, 1, pad(Xt), {W.data(), W.outerStride(), 1}, pad(rhs));
+  dlambda_t.setZero();
+  clearPadding(dlambda_t);
+  // Symmetric but for rounding, which redundant rows magnify.
+  addProduct(columns, m, m, 1, pad(rhs), {Ginv_.data(), m, 1}, pad(dlambda_t));
   Xt *= -1;
-  Xt.noalias() += dlambda_t * W_;
-  solveFromRight(M_llt_.matrixLLT(), Xt);
-  X = Xt.transpose();
-  for (Eigen::Index i = 0; i < D_.size(); ++i) dlambda.row(i) = D_[i] * dlambda_t.col(i).transpose();
+  addProduct(columns, n, m, 1, pad(dlambda_t), {W.data(), 1, W.outerStride()}, pad(Xt));
+  solveFromRight(L, Xt);
+  copyTransposed(Xt, X);
+  for (Eigen::Index i = 0; i < m; ++i) dlambda_t.col(i) *= D_[i];
+  copyTransposed(dlambda_t, dlambda);
 }
 
 }  // namespace bielle

@@ -60,35 +60,58 @@ std::unique_ptr<RobotProblem> makeWithoutCosts(const RobotProblem& problem) {
                                         problem.formulation());
 }
 
-// All stages of a problem along a trajectory. Every pass has other controls, so that nothing is found already done.
+// All stages of a problem near a trajectory, several at once where the problem prefers it. Every pass has other controls, so
+// that nothing is found already done.
 class Passes {
  public:
   Passes(RobotProblem& problem, const ShootingTrajectory& trajectory)
-      : problem_(problem), trajectory_(trajectory), models_(trajectory.xs.size()), next_(trajectory.xs.front()) {}
-  void step() {
-    run([](int) {});
+      : problem_(problem),
+        trajectory_(trajectory),
+        size_(problem.getBatchSize()),
+        models_(trajectory.xs.size()),
+        statuses_(trajectory.xs.size()),
+        ends_(std::max(1, problem.numStages() / kPiece), trajectory.xs.front()) {
+    tasks_.reserve(ends_.size());
   }
-  // About the end of each step: gaps are closed, as in most iterations.
+  // In pieces of the horizon, each stage of a piece from where the one before has led.
+  void step() {
+    const int N = problem_.numStages(), pieces = static_cast<int>(ends_.size()), longest = (N + pieces - 1) / pieces;
+    for (VectorXd& u : trajectory_.us) u.array() += 1e-3;
+    for (int i = 0; i < longest; ++i) {
+      tasks_.clear();
+      for (int p = 0; p < pieces; ++p) {
+        const int k = p * N / pieces + i, end = (p + 1) * N / pieces;
+        if (k >= end) continue;
+        tasks_.emplace_back();
+        StepTask& task = tasks_.back();
+        task.stage = k;
+        task.continues = i > 0;
+        task.x = &trajectory_.xs[k];
+        task.u = &trajectory_.us[k];
+        task.x_next = k + 1 < end ? &trajectory_.xs[k + 1] : &ends_[p];
+      }
+      problem_.stepStages(tasks_);
+    }
+  }
+  // About these steps: gaps are closed but for those between the pieces, as in most iterations.
   void linearize() {
-    run([this](int k) { problem_.linearize(k, trajectory_.xs[k], trajectory_.us[k], next_, models_[k]); });
+    step();
+    const int N = problem_.numStages();
+    for (int k = 0; k < N; k += size_)
+      problem_.linearizeStages(k, std::min(N, k + size_), trajectory_.xs, trajectory_.us, models_, statuses_);
     problem_.linearizeTerminal(trajectory_.xs.back(), models_.back());
   }
   const std::vector<StageModel>& models() const { return models_; }
 
  private:
-  template <typename AfterStep>
-  void run(const AfterStep& afterStep) {
-    double cost = 0;
-    for (int k = 0; k < problem_.numStages(); ++k) {
-      trajectory_.us[k].array() += 1e-3;
-      problem_.step(k, trajectory_.xs[k], trajectory_.us[k], next_, cost);
-      afterStep(k);
-    }
-  }
+  static constexpr int kPiece = 15;  // stages: short enough for the controls not to matter
   RobotProblem& problem_;
   ShootingTrajectory trajectory_;
+  const int size_;
   std::vector<StageModel> models_;
-  VectorXd next_;
+  std::vector<StepStatus> statuses_;
+  std::vector<VectorXd> ends_;
+  std::vector<StepTask> tasks_;
 };
 
 // Every crank at about 1 rad/s.

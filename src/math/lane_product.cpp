@@ -1,5 +1,7 @@
 #include "bielle/math/lane_product.h"
 
+#include <cmath>
+
 namespace bielle {
 
 namespace {
@@ -67,6 +69,31 @@ void addProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, double
 void clearPadding(PaddedMap A) {
   for (Eigen::Index j = 0; j < A.cols(); ++j) {
     for (Eigen::Index i = A.rows(); i < A.outerStride(); ++i) A.data()[i + j * A.outerStride()] = 0;
+  }
+}
+
+bool factorizeColumns(PaddedMap H, Eigen::Index num) {
+  for (Eigen::Index j = 0; j < num; ++j) {
+    const Eigen::Index i = j / kLane * kLane;
+    addProduct(H.rows() - i, 1, j, -1, pad(H, i), {H.data() + j, H.outerStride(), 1}, pad(H, i, j));
+    if (!(H(j, j) > 0)) return false;
+    H.col(j).tail(H.rows() - j) /= std::sqrt(H(j, j));
+  }
+  return true;
+}
+
+void solveTransposedFromRight(PaddedMap L, PaddedMap X) {
+  for (Eigen::Index k = 0; k < X.cols(); ++k) {
+    addProduct(X.rows(), 1, k, -1, pad(X), {&L(k, 0), L.outerStride(), 0}, pad(X, 0, k));
+    X.col(k) *= 1 / L(k, k);
+  }
+}
+
+void solveFromRight(PaddedMap L, PaddedMap X) {
+  for (Eigen::Index k = X.cols() - 1; k >= 0; --k) {
+    const Eigen::Index next = std::min(k + 1, X.cols() - 1);  // of the last one nothing is taken away
+    addProduct(X.rows(), 1, X.cols() - 1 - k, -1, pad(X, 0, next), {&L(next, k), 1, 0}, pad(X, 0, k));
+    X.col(k) *= 1 / L(k, k);
   }
 }
 

@@ -45,14 +45,17 @@ SE3 exp6(const Vector6d& twist) {
   return {exp3(w), calcRightJacobian3(-w) * twist.head<3>()};
 }
 
-Vector6d log6(const SE3& X) {
-  Vector6d out;
-  const Vector3d w = log3(X.R);
-  out.tail<3>() = w;
-  const Vector3d cross = w.cross(X.p);
-  out.head<3>() = X.p - 0.5 * cross + calcJacobianInverseFactor(w.squaredNorm()) * w.cross(cross);
+template <typename T>
+Vector6<T> log6(const SE3Of<T>& X) {
+  Vector6<T> out;
+  const Vector3<T> w = log3(X.R);
+  const Vector3<T> cross = w.cross(X.p);
+  linear(out) = X.p - 0.5 * cross + calcJacobianInverseFactor(w.squaredNorm()) * w.cross(cross);
+  angular(out) = w;
   return out;
 }
+template Vector6d log6(const SE3&);
+template Vector6<Lanes> log6(const SE3Of<Lanes>&);
 
 Matrix6d calcRightJacobian6(const Vector6d& twist) {
   const Vector3d rho = twist.head<3>(), phi = twist.tail<3>();

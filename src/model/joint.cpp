@@ -5,6 +5,7 @@
 namespace bielle {
 namespace {
 
+using VectorUpTo7 = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 7, 1>;
 using ConstQuaternionMap = Eigen::Map<const Eigen::Quaterniond>;
 
 // Planar joints live on SE(2), embedded in SE(3) through the basis of their plane.
@@ -114,6 +115,36 @@ SE3 calcJointPlacement(const Joint& joint, ConstVectorRef q) {
   return {};
 }
 
+template <>
+SE3 calcJointPlacement<double>(const Joint& joint, ConstVectorRef q) {
+  return calcJointPlacement(joint, q);
+}
+
+// The kinds that loops are made of; others are computed lane by lane.
+template <>
+SE3Of<Lanes> calcJointPlacement<Lanes>(const Joint& joint, ArgumentsOf<Lanes>::ConstVector q) {
+  switch (joint.kind) {
+    case JointKind::Revolute:
+    case JointKind::Continuous:
+      return {makeAxisRotation(joint.axis, q[0]), Vector3<Lanes>::Zero()};
+    case JointKind::Spherical:
+      return {Eigen::Map<const Eigen::Quaternion<Lanes>>(q.data()).toRotationMatrix(), Vector3<Lanes>::Zero()};
+    case JointKind::Universal:
+      return {makeAxisRotation(joint.axis, q[0]) * makeAxisRotation(joint.axis2, q[1]), Vector3<Lanes>::Zero()};
+    default:
+      break;
+  }
+  SE3Of<Lanes> out;
+  VectorUpTo7 one(joint.nq);
+  for (Eigen::Index l = 0; l < kLane; ++l) {
+    unpackLane(q.data(), l, joint.nq, one.data());
+    const SE3 X = calcJointPlacement(joint, one);
+    for (int k = 0; k < 9; ++k) out.R(k).set(l, X.R(k));
+    for (int k = 0; k < 3; ++k) out.p[k].set(l, X.p[k]);
+  }
+  return out;
+}
+
 void calcJointSubspace(const Joint& joint, ConstVectorRef q, Eigen::Ref<Matrix6Xd> S) {
   S.setZero();
   switch (joint.kind) {
@@ -172,6 +203,31 @@ void integrateJoint(const Joint& joint, ConstVectorRef q, ConstVectorRef dv, Vec
     }
     default:
       q_out = q + dv;
+  }
+}
+
+template <>
+void integrateJoint<double>(const Joint& joint, ConstVectorRef q, ConstVectorRef dv, VectorRef q_out) {
+  integrateJoint(joint, q, dv, q_out);
+}
+
+template <>
+void integrateJoint<Lanes>(const Joint& joint, ArgumentsOf<Lanes>::ConstVector q, ArgumentsOf<Lanes>::ConstVector dv,
+                           ArgumentsOf<Lanes>::Vector q_out) {
+  if (joint.kind == JointKind::Spherical) {
+    using Quaternion = Eigen::Quaternion<Lanes>;
+    const Quaternion product = Eigen::Map<const Quaternion>(q.data()) * exp3AsQuaternion(Vector3<Lanes>(dv.head<3>()));
+    q_out = product.coeffs() * (1 / sqrt(product.coeffs().squaredNorm()));
+  } else if (joint.kind == JointKind::Planar || joint.kind == JointKind::FreeFlyer) {
+    VectorUpTo7 q_one(joint.nq), dv_one(joint.nv), out(joint.nq);
+    for (Eigen::Index l = 0; l < kLane; ++l) {
+      unpackLane(q.data(), l, joint.nq, q_one.data());
+      unpackLane(dv.data(), l, joint.nv, dv_one.data());
+      integrateJoint(joint, q_one, dv_one, out);
+      for (int k = 0; k < joint.nq; ++k) q_out[k].set(l, out[k]);
+    }
+  } else {
+    q_out = q + dv;
   }
 }
 

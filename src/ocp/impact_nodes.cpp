@@ -110,11 +110,7 @@ bool ReducedImpactNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, Sta
   gatherVelocity(loop, x_next_node.tail(model_.nv()), work.d);
   out.gap.segment(o, r).setZero();
   out.gap.segment(nr + o, r).setZero();
-  if (work.q != b.next.basis().q || work.d != b.v_next) {
-    b.next.load(loop, work.scratch);
-    updateTwists(getOwnView(loop, work.scratch.ws), b.next.basis(), work.ahead);
-    if (!moveToNodeState(b, out)) return false;
-  }
+  if ((work.q != b.next.basis().q || work.d != b.v_next) && !moveToNodeState(b, out)) return false;
   // v_v (W N)^T, whose rows pick dv+ of the block's dofs.
   work.HN.noalias() = b.at.WN * work.v_v.transpose();
   for (size_t k = 0; k < loop.dofs.size(); ++k)

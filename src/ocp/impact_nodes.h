@@ -26,6 +26,8 @@ class ReducedImpactNode : public ReducedNode {
   ReducedImpactNode(const Model& model, const Reduction& reduction, const StageSpec& spec,
                     std::shared_ptr<ReducedWorkPool> pool);
   bool updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override;
+  bool startStep(ConstVectorRef, ConstVectorRef, const NodeModel*) override { return false; }
+  void prepareLinearization(NodeModel* const*, int) override {}
   bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
 
  private:

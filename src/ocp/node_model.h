@@ -46,6 +46,13 @@ class NodeModel {
   virtual const Workspace& workspace() const = 0;
   // Where the derivatives of this node's residuals are to be written, before addResiduals().
   virtual ResidualJacobians& jacobians() = 0;
+  // updateStep() of at most kLane nodes of this kind at once, by one thread: startStep() of each, then finishSteps() of one
+  // of them, and showStep() of each for its workspace(). Nodes that do not go with others return false from startStep().
+  virtual bool startStep(ConstVectorRef /*x*/, ConstVectorRef /*u*/, const NodeModel* /*previous*/) { return false; }
+  virtual void finishSteps(NodeModel* const* /*nodes*/, int /*count*/, bool* /*ok*/) {}
+  virtual void showStep(int /*index*/) {}
+  // Before linearizeStep() of at most kLane nodes of this kind, by the same thread: does at once what they have in common.
+  virtual void prepareLinearization(NodeModel* const* /*nodes*/, int /*count*/) {}
   // Fx, Fu and gap about the last updateStep(); the derivatives that addResiduals() needs.
   virtual bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) = 0;
   // To be called after updateState() at the terminal node in place of linearizeStep().

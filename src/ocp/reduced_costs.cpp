@@ -9,6 +9,11 @@ void ReducedNode::calcJointCost(const StateCost& state, const VectorXd& differen
                                 JointVector& gradient, JointMatrix& hessian) {
   const int n = joint.nv;
   const JointVector weights = w * state.weights.segment(joint.idx_v, n), d = difference.segment(joint.idx_v, n);
+  if (!isCurved(joint)) {
+    gradient = weights.cwiseProduct(d);
+    hessian = weights.asDiagonal();
+    return;
+  }
   JointMatrix J(n, n);
   calcJointDifferenceJacobian(joint, d, J);
   const JointMatrix WJ = weights.asDiagonal() * J;
@@ -35,10 +40,18 @@ void ReducedNode::addStateCost(const StateCost& state, const VectorXd& differenc
     // Changes of q are N dy, of v N dy_v + Z dy: gradients by dof, and Hessians times N and Z.
     const int o = b.loop.offset, r = b.loop.size;
     const MatrixXd& N = b.at.N;
+    VectorXd &weights_q = b.work->d, &weights_v = b.work->w;
     for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
-      const double weight = w * state.weights[b.loop.dofs[k]];
-      b.work->gradient_q[k] = weight * difference[b.loop.dofs[k]];
-      b.work->HN.row(k) = weight * N.row(k);
+      const int dof = b.loop.dofs[k];
+      weights_q[k] = w * state.weights[dof];
+      weights_v[k] = w * state.weights[nv + dof];
+      b.work->gradient_q[k] = weights_q[k] * difference[dof];
+      b.work->gradient_v[k] = weights_v[k] * (work_->ws.v[dof] - state.v_ref[dof]);
+    }
+    for (int c = 0; c < r; ++c) {
+      b.work->HN.col(c) = weights_q.cwiseProduct(N.col(c));
+      b.work->wy.col(c) = weights_v.cwiseProduct(b.work->motion.Z.col(c));
+      b.work->wv.col(c) = weights_v.cwiseProduct(N.col(c));
     }
     for (size_t j = 0; j < b.loop.joints.size(); ++j) {
       const Joint& joint = model_.joints()[b.loop.joints[j]];
@@ -47,13 +60,6 @@ void ReducedNode::addStateCost(const StateCost& state, const VectorXd& differenc
       calcJointCost(state, difference, w, joint, gradient, hessian);
       b.work->gradient_q.segment(at, n) = gradient;
       b.work->HN.middleRows(at, n) = hessian.lazyProduct(N.middleRows(at, n));
-    }
-    for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
-      const int dof = b.loop.dofs[k];
-      const double weight = w * state.weights[nv + dof];
-      b.work->gradient_v[k] = weight * (work_->ws.v[dof] - state.v_ref[dof]);
-      b.work->wy.row(k) = weight * b.work->motion.Z.row(k);
-      b.work->wv.row(k) = weight * N.row(k);
     }
     addSmallProductTransposed(N, b.work->gradient_q, out.lx.segment(o, r));
     addSmallProductTransposed(b.work->motion.Z, b.work->gradient_v, out.lx.segment(o, r));

@@ -1,4 +1,6 @@
-// Derivatives of the reduced step: Eqs. (a) to (g) of reduced_node.h.
+// Derivatives of the reduced step: Eqs. (b) and (g) of reduced_node.h, from what reduced_lanes.h has prepared.
+#include <algorithm>
+
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "reduced_node.h"
@@ -25,18 +27,6 @@ void assembleRows(Size size, const double* __restrict q_a, const double* __restr
   }
 }
 
-// The same where v_a is h times the identity, and q_a h^2 times it but for joints whose configuration is no vector.
-void assembleFreeJoint(const FreeJoint& free, double h, bool curved, ConstMatrixRef dydd, MatrixXd& F) {
-  const int o = free.offset, n = static_cast<int>(free.q_a.rows()), half = static_cast<int>(F.rows() / 2);
-  F.middleRows(half + o, n) = h * dydd.middleRows(o, n);
-  if (!curved) {
-    F.middleRows(o, n) = (h * h) * dydd.middleRows(o, n);
-    return;
-  }
-  F.middleRows(o, n).setZero();
-  addSmallProduct(free.q_a, dydd.middleRows(o, n), F.middleRows(o, n));
-}
-
 void assembleBlock(const MatrixXd& q_a, const MatrixXd& v_a, int offset, ConstMatrixRef dydd, MatrixXd& F) {
   const auto assemble = [&](auto size) { assembleRows(size, q_a.data(), v_a.data(), offset, dydd, F); };
   switch (q_a.rows()) {
@@ -53,76 +43,63 @@ void assembleBlock(const MatrixXd& q_a, const MatrixXd& v_a, int offset, ConstMa
 
 }  // namespace
 
-// H N of the loop forces, and the wrenches of the contacts on the bodies. The forces that the loops are left with are
-// those through their joints.
-void ReducedNode::updateForces() {
-  ReducedWork& work = *work_;
-  const ConstraintSet& set = spec_.constraints;
-  for (Vector6d& f : work.f_ext) f.setZero();
-  for (size_t c = num_loops_; c < set.closures.size(); ++c) {
-    const Closure& contact = set.closures[c];
-    work.f_ext[contact.body1] +=
-        calcClosureWrench(work.ws, contact, lambda_.segment(set.offsets[c], getRows(contact.kind)));
-  }
-  updateInverseDynamicsFactors(model_, work.ws, work.f_ext);
-  for (Block& b : blocks_) {
-    for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
-      const int dof = b.loop.dofs[k];
-      const double left =
-          work.ws.J.col(dof).dot(work.ws.F[model_.dofs()[dof].joint]) + model_.armature()[dof] * a_[dof] - tau_[dof];
-      b.work->d[k] = b.loop.inverse_metric[k] * left;
-    }
-    b.work->independent.setZero();
-    addSmallProduct(b.at.J, b.work->d, b.work->independent);
-    solveGram(b.at, b.work->independent);
-    expandIndependent(b.at, b.work->independent, b.work->rows);
-    calcForceLift(getPlacedView(b.loop, work.ws), b.work->motion, b.work->rows, b.work->HN);
-  }
+void ReducedNode::prepareLinearization(NodeModel* const* nodes, int count) {
+  takeWork();
+  work_->lanes.linearize(nodes, count);
 }
 
-// Eq. (c): the right-hand sides of the contact rows.
-void ReducedNode::calcContactDerivatives() {
+int ReducedNode::findContact(int slot) const {
+  const auto found = std::find(contact_slots_.begin(), contact_slots_.end(), slot);
+  return found == contact_slots_.end() ? -1 : num_loops_ + static_cast<int>(found - contact_slots_.begin());
+}
+
+// What residuals look at.
+void ReducedNode::loadKinematics(int lane) {
+  const WorkspaceOf<Lanes>& from = work_->lanes.workspace();
+  Workspace& to = work_->ws;
+  to.q = q_;
+  to.v = v_;
+  to.X_WB = X_WB_;
+  const int nb = model_.numBodies(), nv = model_.nv();
+  unpackLane(from.J.data(), lane, 6 * nv, to.J.data());
+  unpackLane(from.dV.data(), lane, 6 * nv, to.dV.data());
+  unpackLane(from.YJ.data(), lane, 6 * nv, to.YJ.data());
+  unpackLane(from.V.front().data(), lane, 6 * nb, to.V.front().data());
+  unpackLane(from.hc.front().data(), lane, 6 * nb, to.hc.front().data());
+  unpackLane(from.Yc.front().data(), lane, 36 * nb, to.Yc.front().data());
+  to.stage = WorkspaceStage::Velocity;
+}
+
+// The right-hand sides of the contact rows.
+void ReducedNode::loadContactDerivatives(int lane) {
   ReducedWork& work = *work_;
   const int nr = reduction_.size;
   const ConstraintSet& set = spec_.constraints;
   auto dlambda = work.dlambda.topRows(contact_rows_);
   dlambda.setZero();
   for (size_t c = num_loops_; c < set.closures.size(); ++c) {
-    const Closure& contact = set.closures[c];
-    const int row = set.offsets[c] - loop_rows_, n = getRows(contact.kind);
-    const SE3 X_WF = getPlacement(work.ws, contact.body1, contact.X_B1);
-    const Vector6d &V1 = work.ws.V[contact.body1], &A2 = work.ws.A[contact.body2];
-    const ReducedTree::Columns& tip = work.tree.getTip(contact_tips_[c - num_loops_]);
-    RowsBy6 rate;
-    if (contact.kp != 0) rate = calcClosureResidualRate(work.ws, contact);
-    for (size_t o = 0; o < tip.outer.size(); ++o) {
-      const Vector6d J = tip.J.col(o), dV = tip.dV.col(o);
-      const Vector6d dq = tip.dA.col(o) - crossMotion(V1, dV) + crossMotion(J, A2) + contact.kd * dV;
-      const Vector6d dv = tip.dW.col(o) - crossMotion(V1, J) + contact.kd * J;
-      auto da_dy = dlambda.col(tip.outer[o]).segment(row, n);
-      da_dy = selectRows(contact, X_WF.actInvMotion(dq));
-      if (contact.kp != 0) da_dy -= contact.kp * (rate * X_WF.actInvMotion(J));
-      dlambda.col(nr + tip.outer[o]).segment(row, n) = selectRows(contact, X_WF.actInvMotion(dv));
+    const int row = set.offsets[c] - loop_rows_, n = getRows(set.closures[c].kind);
+    const ContactLanes& contact = work.lanes.contacts()[contact_slots_[c - num_loops_]];
+    const std::vector<int>& outer = work.lanes.getOuter(contact);
+    Vector6d dy, dv;
+    for (size_t o = 0; o < outer.size(); ++o) {
+      unpackLane(&contact.dy(0, o), lane, 6, dy.data());
+      unpackLane(&contact.dv(0, o), lane, 6, dv.data());
+      dlambda.col(outer[o]).segment(row, n) = selectRows(set.closures[c], dy);
+      dlambda.col(nr + outer[o]).segment(row, n) = selectRows(set.closures[c], dv);
     }
   }
 }
 
 // Derivatives of y' and lambda_c.
-void ReducedNode::linearizeDynamics() {
+void ReducedNode::linearizeDynamics(int lane) {
   ReducedWork& work = *work_;
   const int nr = reduction_.size;
-  updateAccelerations(model_, work.ws, a_);
-  for (Block& b : blocks_) {
-    const BlockView view = getPlacedView(b.loop, work.ws);
-    updateTwists(view, b.at, b.work->motion);
-    updateVelocityLift(view, b.work->motion);
-    updateAccelerationLift(view, b.work->motion);
-  }
-  updateForces();
-  work.tree.updateDerivatives(work.ws, work.lifts, work.dydd.leftCols(nr), work.dydd.middleCols(nr, nr));
+  unpackLane(work.lanes.A_y().data(), lane, nr * nr, work.dydd.data());
+  unpackLane(work.lanes.A_v().data(), lane, nr * nr, &work.dydd(0, nr));
   work.dydd.rightCols(model_.nu()).setZero();
   addMotorColumns(work.dydd.rightCols(model_.nu()));
-  calcContactDerivatives();
+  loadContactDerivatives(lane);
   SaddlePoint& saddle_point = work.contacts.at(contact_rows_).saddle_point;
   saddle_point.factorize(M_, JcN_);
   saddle_point.updateInverse();
@@ -131,23 +108,24 @@ void ReducedNode::linearizeDynamics() {
 
 // out (size x nu) += -N^T B
 void ReducedNode::addMotorColumns(MatrixRef out) const {
-  for (int m = 0; m < model_.nu(); ++m) {
-    const int dof = model_.motors()[m].dof;
-    for (const FreeJoint& free : free_joints_) {
-      const Joint& joint = model_.joints()[free.joint];
-      if (dof >= joint.idx_v && dof < joint.idx_v + joint.nv) out(free.offset + dof - joint.idx_v, m) -= 1;
+  for (size_t m = 0; m < work_->motors.size(); ++m) {
+    const auto& [block, row] = work_->motors[m];
+    if (block < 0) {
+      out(row, m) -= 1;
+    } else {
+      const LoopBlock& loop = blocks_[block].loop;
+      out.col(m).segment(loop.offset, loop.size) -= blocks_[block].at.N.row(row).transpose();
     }
-    for (const Block& b : blocks_)
-      for (size_t k = 0; k < b.loop.dofs.size(); ++k)
-        if (b.loop.dofs[k] == dof) out.col(m).segment(b.loop.offset, b.loop.size) -= b.at.N.row(k).transpose();
   }
 }
 
 bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
-  restore();
-  linearizeDynamics();
-  for (Block& b : blocks_)
-    if (!linearizeBlock(b, x_next_node, out)) return false;
+  takeWork();
+  const int lane = work_->lanes.findLane(this);
+  loadKinematics(lane);
+  linearizeDynamics(lane);
+  for (size_t i = 0; i < blocks_.size(); ++i)
+    if (!linearizeBlock(blocks_[i], work_->lanes.blocks()[i], lane, x_next_node, out)) return false;
   differenceFree(x_next_node, x_next_, out.gap);
   for (FreeJoint& free : free_joints_) linearizeFreeJoint(free, out);
   assembleStep(out);
@@ -155,50 +133,25 @@ bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
   return true;
 }
 
-// Eqs. (d) to (g) for one block, rows [offset, offset + size) of Fx, Fu and gap.
-bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out) {
+// Eq. (g) for one block, rows [offset, offset + size) of Fx, Fu and gap.
+bool ReducedNode::linearizeBlock(Block& b, const BlockLanes& lanes, int lane, ConstVectorRef x_next_node,
+                                 StageModel& out) {
   const LoopBlock& loop = b.loop;
   BlockWork& work = *b.work;
   const int nr = reduction_.size, o = loop.offset, r = loop.size;
   const double h = spec_.dt;
-  const BlockBasis &base = b.at, &next = b.next.basis();
-
-  work.zeta = b.next.zeta() / h;  // close() moves by h w', so its zeta is h times that of Eq. (3)
-  expandIndependent(base, work.zeta, work.rows);
-  calcForceLift(getPlacedView(loop, work_->ws), work.motion, work.rows, work.HN);
-  b.next.load(loop, work.scratch);
-  const BlockView ahead = getOwnView(loop, work.scratch.ws);
-  updateTwists(ahead, next, work.ahead);
-  work.independent.setZero();  // mu
-  addSmallProduct(next.J, b.next.step(), work.independent, 1 / h);
-  solveGram(next, work.independent);
-  expandIndependent(next, work.independent, work.rows);
-  calcForceLift(ahead, work.ahead, work.rows, work.HnNn);
-
-  // J_q N, J_d^{-T} W N and J_d^{-T} W N': the identity but for the blocks of curved joints.
-  work.JqN = base.N;
-  work.P = base.WN;
-  work.Pn = next.WN;
-  for (const Joint& joint : loop.model.joints()) {
-    if (!isCurved(joint)) continue;
-    const int i = joint.idx_v, n = joint.nv;
-    const JointVector d = b.next.step().segment(i, n);
-    JointMatrix Jq(n, n), Jd(n, n);
-    calcJointIntegrateJacobians(joint, d, Jq, Jd);
-    work.JqN.middleRows(i, n) = Jq.lazyProduct(base.N.middleRows(i, n));
-    calcJointDifferenceJacobian(joint, d, Jd);  // the inverse of J_d
-    work.P.middleRows(i, n) = Jd.transpose().lazyProduct(base.WN.middleRows(i, n));
-    work.Pn.middleRows(i, n) = Jd.transpose().lazyProduct(next.WN.middleRows(i, n));
-  }
-  // Eq. (g)
+  const BlockBasis& next = b.next.basis();
+  const auto load = [lane](const MatrixX<Lanes>& from, MatrixXd& to) {
+    unpackLane(from.data(), lane, from.size(), to.data());
+  };
+  b.work->motion.basis = &b.at;
+  load(lanes.motion.Z, work.motion.Z);  // for costs
   MatrixXd &X = work.X, &Xn = work.Xn, &E = work.E, &En = work.En;
-  for (MatrixXd* m : {&work.mixed, &work.mixed_next, &E, &En, &work.S}) m->setZero();
-  addSmallProductTransposed(work.P, next.N, work.mixed);
-  addSmallProductTransposed(work.Pn, next.N, work.mixed_next);
-  addSmallProductTransposed(work.P, work.JqN, E);
-  addSmallProductTransposed(base.N, work.HN, E, -h);
-  addSmallProductTransposed(work.Pn, work.JqN, En);
-  addSmallProductTransposed(next.N, work.HnNn, work.S);
+  load(lanes.E, E);
+  load(lanes.En, En);
+  load(lanes.S, work.S);
+  load(lanes.mixed, work.mixed);
+  load(lanes.mixed_next, work.mixed_next);
   X.setIdentity();
   if (!factorizeSmall(work.mixed, work.mixed_pivots)) {
     failure_ = "closure '" + loop.closures.closures.front().name + "': the step turns its loops too far";
@@ -226,7 +179,8 @@ bool ReducedNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageMode
 bool ReducedNode::moveToNodeState(Block& b, StageModel& out) {
   const LoopBlock& loop = b.loop;
   const int nr = reduction_.size, r = loop.size, o = loop.offset;
-  // Of the point ahead, whose positions are in the scratch.
+  b.next.load(loop, b.work->scratch);
+  updateTwists(getOwnView(loop, b.work->scratch.ws), b.next.basis(), b.work->ahead);
   updateVelocities(loop.model, b.work->scratch.ws, b.v_next);
   updateVelocityLift(getOwnView(loop, b.work->scratch.ws), b.work->ahead);
   if (!b.work->point.update(loop, b.work->scratch, b.work->q)) return fail(b, b.work->point);
@@ -274,26 +228,38 @@ void ReducedNode::linearizeFreeJoint(FreeJoint& free, const StageModel& out) con
     JointMatrix Jq(n, n), Jd(n, n), Jdiff(n, n);
     const JointVector d = h * x_next_.segment(model_.nq() + joint.idx_v, n), gap = out.gap.segment(free.offset, n);
     calcJointIntegrateJacobians(joint, d, Jq, Jd);
-    calcJointDifferenceJacobian(joint, gap, Jdiff);
-    free.q_y.noalias() = Jdiff * Jq;
-    free.q_v.noalias() = h * Jdiff * Jd;
+    free.q_y = Jq;
+    free.q_v = h * Jd;
+    if (!gap.isZero(0)) {
+      calcJointDifferenceJacobian(joint, gap, Jdiff);
+      free.q_y = Jdiff.lazyProduct(Jq);
+      free.q_v = h * Jdiff.lazyProduct(Jd);
+    }
   }
   free.q_a = h * free.q_v;
 }
 
-// Fx and Fu out of the derivatives of y' and what each unit makes of them.
+// Derivatives of the step by those of y' and what each unit makes of them: h^2 and h times these for a coordinate of its own.
+void ReducedNode::assembleColumns(ConstMatrixRef dydd, MatrixXd& F) const {
+  const int nr = reduction_.size;
+  const double h = spec_.dt;
+  for (Eigen::Index c = 0; c < F.cols(); ++c) {
+    F.col(c).head(nr) = (h * h) * dydd.col(c);
+    F.col(c).tail(nr) = h * dydd.col(c);
+  }
+  for (const FreeJoint& free : free_joints_) {
+    if (!isCurved(model_.joints()[free.joint])) continue;
+    const int o = free.offset, n = static_cast<int>(free.q_a.rows());
+    F.middleRows(o, n).setZero();
+    addSmallProduct(free.q_a, dydd.middleRows(o, n), F.middleRows(o, n));
+  }
+  for (const Block& b : blocks_) assembleBlock(b.work->q_a, b.work->v_a, b.loop.offset, dydd, F);
+}
+
 void ReducedNode::assembleStep(StageModel& out) const {
   const int nr = reduction_.size;
-  const auto state = work_->dydd.leftCols(2 * nr), control = work_->dydd.rightCols(model_.nu());
-  for (const FreeJoint& free : free_joints_) {
-    const bool curved = isCurved(model_.joints()[free.joint]);
-    assembleFreeJoint(free, spec_.dt, curved, state, out.Fx);
-    assembleFreeJoint(free, spec_.dt, curved, control, out.Fu);
-  }
-  for (const Block& b : blocks_) {
-    assembleBlock(b.work->q_a, b.work->v_a, b.loop.offset, state, out.Fx);
-    assembleBlock(b.work->q_a, b.work->v_a, b.loop.offset, control, out.Fu);
-  }
+  assembleColumns(work_->dydd.leftCols(2 * nr), out.Fx);
+  assembleColumns(work_->dydd.rightCols(model_.nu()), out.Fu);
   for (const FreeJoint& free : free_joints_) {
     const int n = static_cast<int>(free.q_v.rows()), o = free.offset;
     out.Fx.block(o, o, n, n) += free.q_y;
@@ -313,7 +279,7 @@ void ReducedNode::linearizeState() {
   restore();
   updateCompositeInertias(model_, work_->ws);
   for (Block& b : blocks_) {
-    const BlockView view = getPlacedView(b.loop, work_->ws);
+    const auto view = getPlacedView(b.loop, work_->ws);
     updateTwists(view, b.at, b.work->motion);
     updateVelocityLift(view, b.work->motion);
   }

@@ -1,4 +1,4 @@
-// State space and step of reduced_node.h.
+// State space of reduced_node.h, and its memory.
 #include <algorithm>
 
 #include "bielle/dynamics/kinematics.h"
@@ -14,32 +14,57 @@ BlockWork::BlockWork(const LoopBlock& l) : scratch(l), start(l), point(l), motio
   for (VectorXd* x : {&v, &a, &d, &w, &gradient_q, &gradient_v}) x->setZero(n);
   for (VectorXd* x : {&independent, &zeta}) x->setZero(rank);
   rows.setZero(l.closures.rows);
-  for (MatrixXd* x : {&HN, &wy, &wv, &HnNn, &JqN, &P, &Pn, &diff_N}) x->setZero(n, r);
+  for (MatrixXd* x : {&HN, &wy, &wv, &diff_N}) x->setZero(n, r);
   for (MatrixXd* x : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a, &S}) x->setZero(r, r);
   for (MatrixXd* x : {&X, &Xn, &E, &En, &mixed, &mixed_next, &Pq, &Pv, &Pz}) x->setZero(r, r);
   target.setZero(r);
   mixed_pivots.resize(r);
 }
 
+namespace {
+
+int find(const std::vector<int>& list, int value) {
+  return static_cast<int>(std::find(list.begin(), list.end(), value) - list.begin());
+}
+
+// The slots of the contacts of a stage: those of their bodies, one after the other.
+std::vector<int> findSlots(const ConstraintSet& set, const std::vector<int>& tips, const std::vector<int>& slots) {
+  std::vector<int> out;
+  for (size_t c = set.num_loops; c < set.closures.size(); ++c) {
+    int slot = find(slots, find(tips, set.closures[c].body1));
+    while (std::find(out.begin(), out.end(), slot) != out.end()) ++slot;
+    out.push_back(slot);
+  }
+  return out;
+}
+
+}  // namespace
+
 ReducedSizes::ReducedSizes(const std::vector<StageSpec>& specs) {
   const auto add = [](int value, std::vector<int>& list) {
-    if (std::find(list.begin(), list.end(), value) == list.end()) list.push_back(value);
+    if (find(list, value) == static_cast<int>(list.size())) list.push_back(value);
   };
+  std::map<int, int> most;  // contacts of each body
   for (const StageSpec& spec : specs) {
     const ConstraintSet& set = spec.constraints;
     int loop_rows = 0;
+    std::map<int, int> count;
     for (int c = 0; c < set.num_loops; ++c) loop_rows += getRows(set.closures[c].kind);
-    for (size_t c = set.num_loops; c < set.closures.size(); ++c) add(set.closures[c].body1, tips);
+    for (size_t c = set.num_loops; c < set.closures.size(); ++c) {
+      const int body = set.closures[c].body1;
+      add(body, tips);
+      most[body] = std::max(most[body], ++count[body]);
+    }
     add(set.rows - loop_rows, contact_rows);
-    rows = std::max(rows, contact_rows.back());
     rows = std::max(rows, set.rows - loop_rows);
     constraints = std::max(constraints, set.rows);
     residuals = std::max(residuals, countResidualRows(spec));
   }
+  for (size_t tip = 0; tip < tips.size(); ++tip) slots.insert(slots.end(), most[tips[tip]], static_cast<int>(tip));
 }
 
 ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const ReducedSizes& sizes)
-    : ws(model), tree(model, reduction, sizes.tips) {
+    : ws(model), tree(model, reduction, sizes.tips), lanes(model, reduction, sizes.tips, sizes.slots) {
   const int nv = model.nv(), nr = reduction.size, nu = model.nu();
   blocks.reserve(reduction.blocks.size());  // lifts point into them
   for (const LoopBlock& block : reduction.blocks) {
@@ -51,8 +76,17 @@ ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const R
     work.saddle_point.resize(nr, rows);
     for (VectorXd* x : {&work.gamma, &work.lambda}) x->setZero(rows);
   }
-  f_ext.assign(model.numBodies(), Vector6d::Zero());
-  for (VectorXd* x : {&a_d, &w, &force}) x->setZero(nv);
+  for (const bielle::Motor& motor : model.motors()) {
+    const auto free = std::find(reduction.free_joints.begin(), reduction.free_joints.end(), motor.joint);
+    if (free != reduction.free_joints.end())
+      motors.push_back({-1, reduction.free_offsets[free - reduction.free_joints.begin()] + motor.dof -
+                                model.joints()[motor.joint].idx_v});
+    for (size_t i = 0; i < reduction.blocks.size(); ++i) {
+      const int row = find(reduction.blocks[i].dofs, motor.dof);
+      if (row < static_cast<int>(reduction.blocks[i].dofs.size())) motors.push_back({static_cast<int>(i), row});
+    }
+  }
+  for (VectorXd* x : {&a_d, &force}) x->setZero(nv);
   for (VectorXd* x : {&f, &ydd}) x->setZero(nr);
   dydd.setZero(nr, 2 * nr + nu);
   dlambda.setZero(sizes.rows, 2 * nr + nu);
@@ -87,10 +121,7 @@ ReducedNode::ReducedNode(const Model& model, const Reduction& reduction, const S
   loop_rows_ = 0;
   for (int c = 0; c < num_loops_; ++c) loop_rows_ += getRows(set.closures[c].kind);
   contact_rows_ = set.rows - loop_rows_;
-  const std::vector<int>& tips = pool_->sizes().tips;
-  for (size_t c = num_loops_; c < set.closures.size(); ++c)
-    contact_tips_.push_back(
-        static_cast<int>(std::find(tips.begin(), tips.end(), set.closures[c].body1) - tips.begin()));
+  contact_slots_ = findSlots(set, pool_->sizes().tips, pool_->sizes().slots);
   X_WB_.resize(model.numBodies());
   q_.setZero(model.nq());
   for (VectorXd* v : {&v_, &tau_, &a_}) v->setZero(nv);
@@ -163,7 +194,7 @@ bool ReducedNode::updateState(ConstVectorRef x) {
   return updateState(x, nullptr);
 }
 
-bool ReducedNode::updateState(ConstVectorRef x, const ReducedNode* previous) {
+bool ReducedNode::updatePoint(ConstVectorRef x, const ReducedNode* previous) {
   const int nq = model_.nq();
   failure_.clear();
   q_ = x.head(nq);
@@ -180,6 +211,11 @@ bool ReducedNode::updateState(ConstVectorRef x, const ReducedNode* previous) {
     for (size_t j = 0; j < b.loop.joints.size(); ++j) X_WB_[b.loop.joints[j]] = source->placements()[j + 1];
   }
   updateWholePlacements();
+  return true;
+}
+
+bool ReducedNode::updateState(ConstVectorRef x, const ReducedNode* previous) {
+  if (!updatePoint(x, previous)) return false;
   restore();
   updateCompositeInertias(model_, work_->ws);
   return true;
@@ -206,136 +242,6 @@ void ReducedNode::restore() {
   ws.stage = WorkspaceStage::Placement;
   updateColumns(model_, ws);
   updateVelocities(model_, ws, v_);
-}
-
-bool ReducedNode::updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) {
-  takeWork();
-  const ReducedNode* before = previous && previous->x_next() == x ? static_cast<const ReducedNode*>(previous) : nullptr;
-  if (!updateState(x, before)) return false;
-  ReducedWork& work = *work_;
-  updateDriftAccelerations();
-  updateInverseDynamics(model_, work.ws, work.a_d);
-  // Eq. (b)
-  calcMotorForces(model_, u, tau_);
-  work.force = tau_ - work.ws.b;
-  projectVector(work.force, work.f);
-  for (Block& b : blocks_) updateTwists(getPlacedView(b.loop, work.ws), b.at, b.work->motion);
-  work.tree.updateMassMatrix(work.ws, work.lifts, M_);
-  updateContacts();
-  ContactWork& contacts = work.contacts.at(contact_rows_);
-  if (contacts.saddle_point.factorize(M_, JcN_) != SaddlePointStatus::Ok) {
-    failure_ = "the mass matrix is singular";
-    return false;
-  }
-  contacts.saddle_point.solve(work.f, contacts.gamma, work.ydd, contacts.lambda);
-  lambda_.tail(contact_rows_) = contacts.lambda;
-  a_ = work.a_d;
-  addFromReduced(work.ydd, a_);
-  return closeStep(x, before);
-}
-
-// a_d = -J^+ gamma of the loops.
-void ReducedNode::updateDriftAccelerations() {
-  ReducedWork& work = *work_;
-  updateDrift(model_, work.ws);
-  work.a_d.setZero();
-  for (Block& b : blocks_) {
-    calcBlockDrift(getPlacedView(b.loop, work.ws), b.loop, b.at, b.work->rows, b.work->zeta);
-    b.work->independent = b.work->zeta;
-    applyPseudoInverse(b.loop, b.at, -1, b.work->independent, b.work->a);
-    scatterVelocity(b.loop, b.work->a, work.a_d);
-  }
-}
-
-void ReducedNode::addColumns(ConstMatrixRef A, Lift lift, MatrixRef out) const {
-  if (lift == Lift::N)
-    for (const FreeJoint& free : free_joints_) {
-      const Joint& joint = model_.joints()[free.joint];
-      for (int k = 0; k < joint.nv; ++k) out.row(free.offset + k) += A.col(joint.idx_v + k).transpose();
-    }
-  for (const Block& b : blocks_) {
-    const MatrixXd& X = lift == Lift::N ? b.at.N : b.work->motion.Z;
-    for (int c = 0; c < b.loop.size; ++c)
-      for (Eigen::Index i = 0; i < A.rows(); ++i) {
-        double sum = 0;
-        for (size_t k = 0; k < b.loop.dofs.size(); ++k) sum += X(k, c) * A(i, b.loop.dofs[k]);
-        out(b.loop.offset + c, i) += sum;
-      }
-  }
-}
-
-void ReducedNode::projectVector(const VectorXd& x, VectorXd& out) const {
-  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
-    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
-    out.segment(reduction_.free_offsets[i], joint.nv) = x.segment(joint.idx_v, joint.nv);
-  }
-  for (const Block& b : blocks_)
-    for (int c = 0; c < b.loop.size; ++c) {
-      double sum = 0;
-      for (size_t k = 0; k < b.loop.dofs.size(); ++k) sum += b.at.N(k, c) * x[b.loop.dofs[k]];
-      out[b.loop.offset + c] = sum;
-    }
-}
-
-void ReducedNode::addFromReduced(const VectorXd& y, VectorXd& x) const {
-  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
-    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
-    x.segment(joint.idx_v, joint.nv) += y.segment(reduction_.free_offsets[i], joint.nv);
-  }
-  for (const Block& b : blocks_)
-    for (size_t k = 0; k < b.loop.dofs.size(); ++k)
-      x[b.loop.dofs[k]] += b.at.N.row(k).dot(y.segment(b.loop.offset, b.loop.size));
-}
-
-// J_c N and gamma_c + J_c a_d; the accelerations of the workspace are those of a_d.
-void ReducedNode::updateContacts() {
-  ReducedWork& work = *work_;
-  const ConstraintSet& set = spec_.constraints;
-  VectorXd& gamma = work.contacts.at(contact_rows_).gamma;
-  JcN_.setZero();
-  for (size_t c = num_loops_; c < set.closures.size(); ++c) {
-    const Closure& contact = set.closures[c];
-    const int row = set.offsets[c] - loop_rows_, n = getRows(contact.kind);
-    gamma.segment(row, n) = calcClosureAcceleration(work.ws, contact) + calcClosureStabilization(work.ws, contact);
-    const SE3 X_WF = getPlacement(work.ws, contact.body1, contact.X_B1);
-    const ReducedTree::Columns& tip = work.tree.getTip(contact_tips_[c - num_loops_]);
-    for (size_t o = 0; o < tip.outer.size(); ++o)
-      JcN_.col(tip.outer[o]).segment(row, n) = selectRows(contact, X_WF.actInvMotion(tip.J.col(o)));
-  }
-}
-
-// robot_problem.h Eq. (3)
-bool ReducedNode::closeStep(ConstVectorRef x, const ReducedNode* previous) {
-  const int nq = model_.nq(), nv = model_.nv();
-  const double h = spec_.dt;
-  VectorXd& w = work_->w;
-  w = x.tail(nv) + h * a_;
-  for (int i : reduction_.free_joints) {
-    const Joint& joint = model_.joints()[i];
-    const JointVector d = h * w.segment(joint.idx_v, joint.nv);
-    integrateJoint(joint, x.segment(joint.idx_q, joint.nq), d, x_next_.segment(joint.idx_q, joint.nq));
-  }
-  x_next_.tail(nv) = w;
-  for (Block& b : blocks_) {
-    BlockWork& work = *b.work;
-    gatherVelocity(b.loop, w, work.d);
-    work.d *= h;
-    // To second order the closures open by h^2/2 gamma along h w: J J^T zeta = h^2/2 gamma, with the zeta of close().
-    // What that lacked in the step before, it will lack again.
-    work.zeta = b.surplus = (0.5 * h * h) * work.independent;
-    if (previous) work.zeta += previous->blocks_[&b - blocks_.data()].surplus;
-    if (!b.next.close(b.loop, work.scratch, b.at, work.d, work.zeta)) return fail(b, b.next);
-    b.surplus = b.next.zeta() - b.surplus;
-    const BlockBasis& next = b.next.basis();
-    // (I - J'^+ J') w' = N' (W N')^T w'
-    work.target.setZero();
-    addSmallProductTransposed(next.WN, b.next.step(), work.target, 1 / h);
-    b.v_next.setZero();
-    addSmallProduct(next.N, work.target, b.v_next);
-    scatterConfiguration(model_, b.loop, next.q, x_next_.head(nq));
-    scatterVelocity(b.loop, b.v_next, x_next_.tail(nv));
-  }
-  return true;
 }
 
 void ReducedNode::differenceAbout(Block& b, const MatrixXd& WN, ConstVectorRef x0, ConstVectorRef x1,

@@ -30,6 +30,7 @@
 
 #include "bielle/dynamics/reduced_tree.h"
 #include "node_model.h"
+#include "reduced_lanes.h"
 
 namespace bielle {
 
@@ -41,8 +42,7 @@ struct BlockWork {
   BlockMotion motion, ahead;                       // at the state, in the whole model; at q+, in the block
   VectorXd q, v, a, d, w, gradient_q, gradient_v;  // n (q: nq)
   VectorXd independent, zeta, rows;                // rank, rank, m
-  MatrixXd HN, wy, wv;                             // n x r, of the loop forces or of zeta; scratch
-  MatrixXd HnNn, JqN, P, Pn, diff_N;               // n x r
+  MatrixXd HN, wy, wv, diff_N;                     // n x r, scratch
   MatrixXd q_y, q_v, q_a, v_y, v_v, v_a, S;        // r x r: dq+ and dv+ by dy, dy_v, dy'; S of Eq. (f)
   MatrixXd X, Xn, E, En, mixed, mixed_next;        // r x r: Eq. (g); matrices to be inverted
   MatrixXd Pq, Pv, Pz;                             // r x r: change of basis at open gaps
@@ -54,6 +54,7 @@ struct BlockWork {
 struct ReducedSizes {
   explicit ReducedSizes(const std::vector<StageSpec>& specs);
   std::vector<int> tips;          // bodies in contact at some stage
+  std::vector<int> slots;         // of all contacts that a stage may have, their tips
   std::vector<int> contact_rows;  // numbers of contact rows that occur
   int rows = 0;                   // largest number of contact rows
   int constraints = 0;            // largest number of constraint rows
@@ -73,13 +74,17 @@ struct ReducedWork {
   std::vector<BlockWork> blocks;
   std::vector<BlockLift> lifts;
   ReducedTree tree;
+  ReducedLanes lanes;
   std::map<int, ContactWork> contacts;  // by rows
-  std::vector<Vector6d> f_ext;          // nb
-  VectorXd a_d, w, force;               // nv
+  VectorXd a_d, force;                  // nv
   VectorXd f, ydd;                      // size
   MatrixXd dydd;                        // size x (2 size + nu), derivatives of y' with respect to (dy, dy_v, u)
   MatrixXd dlambda;                     // largest contact rows x the same
   MatrixXd dlambda_turned;              // its transpose, for impacts
+  struct Motor {
+    int block, row;  // block and row of its N; or -1 and reduced coordinate
+  };
+  std::vector<Motor> motors;
   ResidualJacobians jacobians;
   VectorXd Rt, Rt_scaled, dlambda_t, H;  // of addResiduals(), with room for any node
 };
@@ -122,6 +127,8 @@ struct FreeJoint {
 };
 
 class ReducedNode : public NodeModel {
+  friend class ReducedLanes;  // reads what the last step left
+
  public:
   using Block = ReducedBlock;
 
@@ -136,13 +143,19 @@ class ReducedNode : public NodeModel {
   void restore() override;
   const Workspace& workspace() const override { return work_->ws; }
   ResidualJacobians& jacobians() override { return work_->jacobians; }
+  bool startStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override;
+  void finishSteps(NodeModel* const* nodes, int count, bool* ok) override;
+  void showStep(int index) override;
+  void prepareLinearization(NodeModel* const* nodes, int count) override;
   bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
   void linearizeState() override;
   void addStateCost(const StateCost& cost, const VectorXd& difference, double scale, StageModel& out) override;
   void addResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
 
  protected:
-  // Kinematics at x; the blocks are those that `previous` has closed there, if given.
+  // Bases and placements at x; the blocks are those that `previous` has closed there, if given.
+  bool updatePoint(ConstVectorRef x, const ReducedNode* previous);
+  // And kinematics in the workspace.
   bool updateState(ConstVectorRef x, const ReducedNode* previous);
   void updateWholePlacements();
 
@@ -161,13 +174,19 @@ class ReducedNode : public NodeModel {
                             JointVector& gradient, JointMatrix& hessian);
   void updateDriftAccelerations();
   void updateContacts();
-  bool closeStep(ConstVectorRef x, const ReducedNode* previous);
+  bool solveContacts();
+  void stepFreeJoints();
+  bool closeStep(const ReducedNode* previous);
+  void finishStep(int lane);
   bool moveToNodeState(Block& b, StageModel& out);
-  void updateForces();
-  void calcContactDerivatives();
-  void linearizeDynamics();
-  bool linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out);
+  void loadKinematics(int lane);
+  void loadContactDerivatives(int lane);
+  void linearizeDynamics(int lane);
+  bool linearizeBlock(Block& b, const BlockLanes& lanes, int lane, ConstVectorRef x_next_node, StageModel& out);
+  // The contact of this stage in a slot, as an index of its constraints; -1 if it has none there.
+  int findContact(int slot) const;
   void linearizeFreeJoint(FreeJoint& free, const StageModel& out) const;
+  void assembleColumns(ConstMatrixRef dydd, MatrixXd& F) const;
   void assembleStep(StageModel& out) const;
   void addMotorColumns(MatrixRef out) const;
   void differenceAbout(Block& b, const MatrixXd& WN, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
@@ -183,11 +202,12 @@ class ReducedNode : public NodeModel {
   ReducedWork* work_ = nullptr;
   std::vector<ReducedBlock> blocks_;
   std::vector<FreeJoint> free_joints_;
-  std::vector<int> contact_tips_;  // per contact, index among the tips
+  std::vector<int> contact_slots_;  // per contact
   int num_loops_ = 0, loop_rows_ = 0, contact_rows_ = 0;
   std::vector<SE3> X_WB_;
-  VectorXd q_, v_, tau_, a_;  // of the last update
-  MatrixXd JcN_, M_;          // contact rows x size, size x size
+  VectorXd q_, v_, tau_, a_;             // of the last update
+  const ReducedNode* before_ = nullptr;  // within a step: the node whose next state this is, if known
+  MatrixXd JcN_, M_;                     // contact rows x size, size x size
   VectorXd chart_x_;
 };
 

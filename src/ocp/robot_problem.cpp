@@ -1,5 +1,7 @@
 #include "bielle/ocp/robot_problem.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "bielle/dynamics/reduction.h"
@@ -104,13 +106,21 @@ void RobotProblem::difference(int node, ConstVectorRef x0, ConstVectorRef x1, Ve
 StepStatus RobotProblem::evaluate(int stage, ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) {
   Node& node = nodes_[stage];
   if (node.valid && node.x == x && node.u == u) return StepStatus::Ok;
+  return finishEvaluation(stage, startEvaluation(stage, x, u) && node.dynamics->updateStep(x, u, previous));
+}
+
+bool RobotProblem::startEvaluation(int stage, ConstVectorRef x, ConstVectorRef u) {
+  Node& node = nodes_[stage];
   node.valid = node.has_cost = false;
   node.x = x;
   node.u = u;
-  if (!x.allFinite() || !u.allFinite()) return StepStatus::Failed;
-  if (!node.dynamics->updateStep(x, u, previous) || !node.dynamics->x_next().allFinite()) return StepStatus::Failed;
-  node.valid = true;
-  return StepStatus::Ok;
+  return x.allFinite() && u.allFinite();
+}
+
+StepStatus RobotProblem::finishEvaluation(int stage, bool ok) {
+  Node& node = nodes_[stage];
+  node.valid = ok && node.dynamics->x_next().allFinite();
+  return node.valid ? StepStatus::Ok : StepStatus::Failed;
 }
 
 StepStatus RobotProblem::step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) {
@@ -121,6 +131,39 @@ StepStatus RobotProblem::step(int stage, ConstVectorRef x, ConstVectorRef u, Vec
 StepStatus RobotProblem::continueStep(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) {
   if (evaluate(stage, x, u, nodes_[stage - 1].dynamics.get()) != StepStatus::Ok) return StepStatus::Failed;
   return finishStep(stage, x_next, cost);
+}
+
+// Reduced steps are taken together, unless there is but one. What fails so is tried again alone.
+void RobotProblem::stepStages(std::vector<StepTask>& tasks) {
+  if (tasks.size() == 1 || formulation_ == Formulation::Full) return ShootingProblem::stepStages(tasks);
+  std::array<NodeModel*, kLane> together;
+  std::array<StepTask*, kLane> of;
+  std::array<bool, kLane> ok;
+  for (size_t first = 0; first < tasks.size(); first += kLane) {
+    int count = 0;
+    for (size_t i = first; i < std::min<size_t>(tasks.size(), first + kLane); ++i) {
+      StepTask& task = tasks[i];
+      NodeModel* node = nodes_[task.stage].dynamics.get();
+      const NodeModel* previous = task.continues ? nodes_[task.stage - 1].dynamics.get() : nullptr;
+      if (startEvaluation(task.stage, *task.x, *task.u) && node->startStep(*task.x, *task.u, previous)) {
+        of[count] = &task;
+        together[count++] = node;
+      } else {
+        task.status = task.continues ? continueStep(task.stage, *task.x, *task.u, *task.x_next, task.cost)
+                                     : step(task.stage, *task.x, *task.u, *task.x_next, task.cost);
+      }
+    }
+    if (count > 0) together.front()->finishSteps(together.data(), count, ok.data());
+    for (int i = 0; i < count; ++i) {
+      StepTask& task = *of[i];
+      if (!ok[i]) continue;
+      together[i]->showStep(i);
+      task.status = finishEvaluation(task.stage, true);
+      if (task.status == StepStatus::Ok) task.status = finishStep(task.stage, *task.x_next, task.cost);
+    }
+    for (int i = 0; i < count; ++i)
+      if (!ok[i]) of[i]->status = step(of[i]->stage, *of[i]->x, *of[i]->u, *of[i]->x_next, of[i]->cost);
+  }
 }
 
 StepStatus RobotProblem::finishStep(int stage, VectorRef x_next, double& cost) {
@@ -178,6 +221,30 @@ double RobotProblem::sumCosts(int index, std::vector<CostValue>* values) {
 StepStatus RobotProblem::linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
                                    StageModel& out) {
   if (evaluate(stage, x, u) != StepStatus::Ok) return StepStatus::Failed;
+  NodeModel* node = nodes_[stage].dynamics.get();
+  node->prepareLinearization(&node, 1);
+  return finishLinearization(stage, u, x_next_node, out);
+}
+
+void RobotProblem::linearizeStages(int begin, int end, const std::vector<VectorXd>& xs, const std::vector<VectorXd>& us,
+                                   std::vector<StageModel>& models, std::vector<StepStatus>& statuses) {
+  for (int first = begin; first < end; first += kLane) {
+    const int last = std::min<int>(end, first + kLane);
+    std::array<NodeModel*, kLane> together;
+    int count = 0;
+    for (int k = first; k < last; ++k) {
+      statuses[k] = evaluate(k, xs[k], us[k]);
+      if (statuses[k] == StepStatus::Ok && specs_[k].kind == StageKind::Dynamics)
+        together[count++] = nodes_[k].dynamics.get();
+    }
+    if (count > 0) together.front()->prepareLinearization(together.data(), count);
+    for (int k = first; k < last; ++k)
+      if (statuses[k] == StepStatus::Ok) statuses[k] = finishLinearization(k, us[k], xs[k + 1], models[k]);
+  }
+}
+
+// From prepareLinearization() on.
+StepStatus RobotProblem::finishLinearization(int stage, ConstVectorRef u, ConstVectorRef x_next_node, StageModel& out) {
   if (out.Fx.rows() != tangent_size_ || out.Fu.cols() != model_.nu())
     out.resize(tangent_size_, model_.nu(), tangent_size_);
   if (!nodes_[stage].dynamics->linearizeStep(x_next_node, out)) return StepStatus::Failed;
@@ -218,15 +285,14 @@ void RobotProblem::addCosts(int index, double scale, StageModel& out) {
   if (spec.costs.empty()) return;
   const NodeView view{model_, node.dynamics->workspace(), spec.constraints, node.u, node.dynamics->lambda()};
   ResidualStack& stack = node.stack;
+  ResidualJacobians& jacobians = node.dynamics->jacobians();
+  jacobians.q.topRows(stack.motion_rows).setZero();
+  jacobians.v.topRows(stack.motion_rows).setZero();
+  jacobians.lambda.topLeftCorner(stack.r.size(), spec.constraints.rows).setZero();
   for (size_t c = 0; c < spec.costs.size(); ++c) {
     const Cost& cost = spec.costs[c];
     const int n = cost.residual->size(), row = node.rows[c];
-    ResidualRows rows = node.dynamics->jacobians().getRows(row, n, spec.constraints.rows);
-    if (row < stack.motion_rows) {
-      rows.q.setZero();
-      rows.v.setZero();
-    }
-    rows.lambda.setZero();
+    ResidualRows rows = jacobians.getRows(row, n, spec.constraints.rows);
     cost.residual->calcJacobian(view, rows);
     cost.activation.calcDerivatives(stack.r.segment(row, n), stack.gradient.segment(row, n),
                                     stack.hessian.segment(row, n));

@@ -15,6 +15,18 @@ void StageModel::resize(int ndx, int nu, int ndx_next) {
   luu.setZero(nu, nu);
 }
 
+void ShootingProblem::stepStages(std::vector<StepTask>& tasks) {
+  for (StepTask& task : tasks)
+    task.status = task.continues ? continueStep(task.stage, *task.x, *task.u, *task.x_next, task.cost)
+                                 : step(task.stage, *task.x, *task.u, *task.x_next, task.cost);
+}
+
+void ShootingProblem::linearizeStages(int begin, int end, const std::vector<VectorXd>& xs,
+                                      const std::vector<VectorXd>& us, std::vector<StageModel>& models,
+                                      std::vector<StepStatus>& statuses) {
+  for (int k = begin; k < end; ++k) statuses[k] = linearize(k, xs[k], us[k], xs[k + 1], models[k]);
+}
+
 void ShootingProblem::getControlBounds(int, VectorRef lower, VectorRef upper) const {
   lower.setConstant(-std::numeric_limits<double>::infinity());
   upper.setConstant(std::numeric_limits<double>::infinity());

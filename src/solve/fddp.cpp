@@ -18,7 +18,7 @@ constexpr double kPenaltyMargin = 0.5;  // rho of Eq. (5)
 // Differences of costs below this share of the cost are rounding: they neither accept nor refuse a step.
 constexpr double kCostRounding = 1e-14;
 constexpr double kClosingShare = 0.5;  // of Eq. (4): the most that Eq. (8) may be
-constexpr int kShortestSegment = 20;   // stages
+constexpr int kShortestSegment = 12;   // stages
 
 double calcSecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -29,6 +29,7 @@ double calcSecondsSince(std::chrono::steady_clock::time_point start) {
 struct Fddp::Workspace {
   std::vector<StageModel> models;     // N + 1
   std::vector<std::string> failures;  // N + 1: why a node could not be linearized, empty if it could
+  std::vector<StepStatus> statuses;   // N + 1
   LqSweep sweep;
   std::vector<VectorXd> dx, du;  // the models' full step
   Rollout rollout;
@@ -43,6 +44,7 @@ void Fddp::Workspace::resize(const ShootingProblem& problem, const FddpOptions& 
   const int N = problem.numStages();
   models.resize(N + 1);
   failures.resize(N + 1);
+  statuses.resize(N + 1);
   linearized = std::vector<std::atomic<bool>>(N + 1);
   rollout.resize(problem, options.rollout_segments);
   bounds.resize(options.bounds == ControlBounds::Enforce ? N : 0);
@@ -79,7 +81,8 @@ class Run {
   void start();
   End linearize();
   void linearizeAndSweep();
-  void linearizeNode(int k);
+  void linearizeNodes(int begin, int end);
+  std::string checkModel(int k) const;
   void sweepReadyNodes();
   LqRegularization getRegularization() const;
   End findStep();
@@ -175,14 +178,16 @@ void Run::linearizeAndSweep() {
   work_.sweep.start(work_.models, getRegularization());
   sweep_node_ = N_;
   swept_ = true;
-  std::atomic<int> next{N_};
+  // Batches of stages, always the same ones, and the terminal node.
+  const int size = problem_.getBatchSize(), num_batches = (N_ + size - 1) / size;
+  std::atomic<int> next{num_batches};
   std::atomic_flag sweeping = ATOMIC_FLAG_INIT;
   double linearize_seconds = 0, sweep_seconds = 0;
 #pragma omp parallel num_threads(threads_) reduction(+ : linearize_seconds, sweep_seconds)
   {
-    for (int k; (k = next.fetch_sub(1, std::memory_order_relaxed)) >= 0;) {
+    for (int i; (i = next.fetch_sub(1, std::memory_order_relaxed)) >= 0;) {
       const Clock::time_point start = Clock::now();
-      linearizeNode(k);
+      linearizeNodes(i < num_batches ? i * size : N_, i < num_batches ? std::min(N_, (i + 1) * size) : N_ + 1);
       linearize_seconds += calcSecondsSince(start);
       if (sweeping.test_and_set(std::memory_order_acquire)) continue;
       const Clock::time_point start_sweep = Clock::now();
@@ -211,31 +216,38 @@ LqRegularization Run::getRegularization() const {
   return {regularization_, regularization_ * options_.state_regularization_ratio};
 }
 
-// Runs in parallel: nothing may leave but through its own entries of the workspace.
-void Run::linearizeNode(int k) {
-  StageModel& model = work_.models[k];
-  std::string& failure = work_.failures[k];
-  failure.clear();
+// Stages, or the terminal node. Runs in parallel: nothing may leave but through its own entries of the workspace.
+void Run::linearizeNodes(int begin, int end) {
+  std::string thrown;
   try {
-    const auto& xs = trajectory_.xs;
-    const StepStatus status = k < N_ ? problem_.linearize(k, xs[k], trajectory_.us[k], xs[k + 1], model)
-                                     : problem_.linearizeTerminal(xs[N_], model);
-    const int ndx_next = k < N_ ? problem_.tangentSize(k + 1) : 0;
-    if (status != StepStatus::Ok) {
-      failure = "the problem could not be linearized";
-      const std::string reason = problem_.getFailure(k);
-      if (!reason.empty()) failure += ": " + reason;
-    } else if (!hasSizes(model, problem_.tangentSize(k), k < N_ ? problem_.controlSize(k) : 0, ndx_next)) {
-      failure = "the quadratic model has other sizes than the problem says";
-    } else if (!std::isfinite(model.cost) || !model.gap.allFinite()) {
-      failure = "the cost or the gap is not finite";
+    if (begin < N_) {
+      problem_.linearizeStages(begin, end, trajectory_.xs, trajectory_.us, work_.models, work_.statuses);
+    } else {
+      work_.statuses[N_] = problem_.linearizeTerminal(trajectory_.xs[N_], work_.models[N_]);
     }
   } catch (const std::exception& error) {
-    failure = std::string("the linearization threw: ") + error.what();
+    thrown = std::string("the linearization threw: ") + error.what();
   } catch (...) {
-    failure = "the linearization threw";
+    thrown = "the linearization threw";
   }
-  if (failure.empty()) work_.linearized[k].store(true, std::memory_order_release);
+  for (int k = begin; k < end; ++k) {
+    work_.failures[k] = thrown.empty() ? checkModel(k) : thrown;
+    if (work_.failures[k].empty()) work_.linearized[k].store(true, std::memory_order_release);
+  }
+}
+
+// What is wrong with the model of a node, empty if nothing is.
+std::string Run::checkModel(int k) const {
+  const StageModel& model = work_.models[k];
+  if (work_.statuses[k] != StepStatus::Ok) {
+    const std::string reason = problem_.getFailure(k);
+    return "the problem could not be linearized" + (reason.empty() ? "" : ": " + reason);
+  }
+  const int nu = k < N_ ? problem_.controlSize(k) : 0, ndx_next = k < N_ ? problem_.tangentSize(k + 1) : 0;
+  if (!hasSizes(model, problem_.tangentSize(k), nu, ndx_next))
+    return "the quadratic model has other sizes than the problem says";
+  if (!std::isfinite(model.cost) || !model.gap.allFinite()) return "the cost or the gap is not finite";
+  return {};
 }
 
 // Ends with an acceptable trial, unless the current iterate is where the iterations end.

@@ -9,17 +9,6 @@ namespace bielle {
 namespace {
 
 using Eigen::Index;
-// Cholesky elimination of the first `num` unknowns: their columns of H become L over Y^T, the rest of H stays.
-bool factorizeColumns(PaddedMap H, Index num) {
-  for (Index j = 0; j < num; ++j) {
-    const Index i = j / kLane * kLane;
-    addProduct(H.rows() - i, 1, j, -1, pad(H, i), {H.data() + j, H.outerStride(), 1}, pad(H, i, j));
-    if (!(H(j, j) > 0)) return false;
-    H.col(j).tail(H.rows() - j) /= std::sqrt(H(j, j));
-  }
-  return true;
-}
-
 bool hasFiniteLower(PaddedMap H, Index size) {
   for (Index j = 0; j < size; ++j) {
     if (!H.col(j).segment(j, size - j).allFinite()) return false;

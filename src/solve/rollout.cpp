@@ -18,6 +18,8 @@ void Rollout::resize(const ShootingProblem& problem, int max_segments) {
   }
   segments_.resize(max_segments);
   for (Segment& segment : segments_) segment.end_state.setZero(problem.stateSize());
+  groups_.resize((max_segments + problem.getBatchSize() - 1) / problem.getBatchSize());
+  for (Group& group : groups_) group.tasks.reserve(problem.getBatchSize());
   joint_gap_.setZero(largest);
   joint_slope_.setZero(largest);
   seconds_ = 0;
@@ -25,66 +27,98 @@ void Rollout::resize(const ShootingProblem& problem, int max_segments) {
 
 bool Rollout::update(const RolloutInput& input, const RolloutOptions& options) {
   const int N = input.problem.numStages(), num = options.segments;
-#pragma omp parallel for num_threads(std::min(options.threads, num)) schedule(dynamic)
+  const int size = input.problem.getBatchSize(), num_groups = (num + size - 1) / size;
   for (int s = 0; s < num; ++s) {
+    segments_[s].begin = s * N / num;
+    segments_[s].end = (s + 1) * N / num;
+  }
+#pragma omp parallel for num_threads(std::min(options.threads, num_groups)) schedule(dynamic)
+  for (int g = 0; g < num_groups; ++g) {
     const auto start = std::chrono::steady_clock::now();
-    Segment& segment = segments_[s];
-    segment.begin = s * N / num;
-    segment.end = (s + 1) * N / num;
+    Group& group = groups_[g];
+    group.begin = g * size;
+    group.end = std::min(num, (g + 1) * size);
     try {
-      segment.ok = rollOut(input, options.alpha, segment);
+      group.ok = rollOut(input, options.alpha, group);
     } catch (...) {  // a problem that throws on a wild trial has failed on it, no more
-      segment.ok = false;
+      group.ok = false;
     }
-    segment.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    group.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
   cost_ = 0;
   bool ok = true;
-  for (int s = 0; s < num; ++s) {
-    cost_ += segments_[s].cost;
-    seconds_ += segments_[s].seconds;
-    ok = ok && segments_[s].ok;
+  for (int s = 0; s < num; ++s) cost_ += segments_[s].cost;
+  for (int g = 0; g < num_groups; ++g) {
+    seconds_ += groups_[g].seconds;
+    ok = ok && groups_[g].ok;
   }
   return ok && std::isfinite(cost_) && updateGaps(input, options);
 }
 
 // Eqs. (2), (3) and (7). Runs in parallel: of the node where the next segment starts, nothing is touched.
-bool Rollout::rollOut(const RolloutInput& input, double alpha, Segment& segment) {
-  ShootingProblem& problem = input.problem;
-  const int N = problem.numStages();
-  const auto& [xs, us] = input.nodes;
-  const bool contract = alpha < 1 && !input.feasible;
-  auto& dx = deviations_;
-  double cost = 0;
+bool Rollout::rollOut(const RolloutInput& input, double alpha, Group& group) {
+  int longest = 0;
+  for (int s = group.begin; s < group.end; ++s) {
+    if (!startSegment(input, alpha, segments_[s])) return false;
+    longest = std::max(longest, segments_[s].end - segments_[s].begin);
+  }
+  for (int i = 0; i < longest; ++i) {
+    group.tasks.clear();
+    for (int s = group.begin; s < group.end; ++s) {
+      const int k = segments_[s].begin + i;
+      if (k >= segments_[s].end) continue;
+      group.tasks.emplace_back();
+      prepareTask(input, alpha, k, segments_[s], group.tasks.back());
+    }
+    input.problem.stepStages(group.tasks);
+    auto task = group.tasks.begin();
+    for (int s = group.begin; s < group.end; ++s)
+      if (segments_[s].begin + i < segments_[s].end && !finishTask(input, alpha, *task++, segments_[s])) return false;
+  }
+  return true;
+}
+
+bool Rollout::startSegment(const RolloutInput& input, double alpha, Segment& segment) {
+  const int k = segment.begin;
   segment.cost = 0;
-  dx[segment.begin].setZero();
-  trial_.xs[segment.begin] = xs[segment.begin];
-  if (segment.begin > 0) {
-    dx[segment.begin] = alpha * input.dx[segment.begin];
-    problem.integrate(segment.begin, xs[segment.begin], dx[segment.begin], trial_.xs[segment.begin]);
-    if (!trial_.xs[segment.begin].allFinite()) return false;
+  deviations_[k].setZero();
+  trial_.xs[k] = input.nodes.xs[k];
+  if (k == 0) return true;
+  deviations_[k] = alpha * input.dx[k];
+  input.problem.integrate(k, input.nodes.xs[k], deviations_[k], trial_.xs[k]);
+  return trial_.xs[k].allFinite();
+}
+
+// Stage k of a segment, with the control of Eq. (2).
+void Rollout::prepareTask(const RolloutInput& input, double alpha, int k, Segment& segment, StepTask& task) {
+  const LqSweep::Node& gains = input.sweep.getNodes()[k];
+  VectorXd& u = trial_.us[k];
+  u = input.nodes.us[k] + alpha * gains.k;
+  u.noalias() += gains.K * deviations_[k];
+  if (!input.bounds.empty()) u = u.cwiseMax(input.bounds[k].lower).cwiseMin(input.bounds[k].upper);
+  task.stage = k;
+  task.continues = k > segment.begin && !contracts(input, alpha);
+  task.x = &trial_.xs[k];
+  task.u = &u;
+  task.x_next = isJoint(segment, k + 1) ? &segment.end_state : &trial_.xs[k + 1];
+}
+
+// Eq. (3) behind a step; at the end of the horizon its cost.
+bool Rollout::finishTask(const RolloutInput& input, double alpha, const StepTask& task, Segment& segment) {
+  ShootingProblem& problem = input.problem;
+  const int next = task.stage + 1, N = problem.numStages();
+  if (task.status != StepStatus::Ok) return false;
+  segment.cost += task.cost;
+  if (!std::isfinite(segment.cost) || !task.x_next->allFinite()) return false;
+  if (isJoint(segment, next)) return true;
+  problem.difference(next, input.nodes.xs[next], *task.x_next, deviations_[next]);
+  if (contracts(input, alpha)) {
+    deviations_[next] += (alpha - 1) * input.models[task.stage].gap;
+    problem.integrate(next, input.nodes.xs[next], deviations_[next], *task.x_next);
   }
-  for (int k = segment.begin; k < segment.end; ++k) {
-    const LqSweep::Node& gains = input.sweep.getNodes()[k];
-    VectorXd& u = trial_.us[k];
-    u = us[k] + alpha * gains.k;
-    u.noalias() += gains.K * dx[k];
-    if (!input.bounds.empty()) u = u.cwiseMax(input.bounds[k].lower).cwiseMin(input.bounds[k].upper);
-    const bool at_joint = k + 1 == segment.end && k + 1 < N;
-    VectorXd& next = at_joint ? segment.end_state : trial_.xs[k + 1];
-    const bool continues = k > segment.begin && !contract;
-    const StepStatus status =
-        continues ? problem.continueStep(k, trial_.xs[k], u, next, cost) : problem.step(k, trial_.xs[k], u, next, cost);
-    if (status != StepStatus::Ok) return false;
-    segment.cost += cost;
-    if (!std::isfinite(segment.cost) || !next.allFinite()) return false;
-    if (at_joint) return true;
-    problem.difference(k + 1, xs[k + 1], next, dx[k + 1]);
-    if (!contract) continue;
-    dx[k + 1] += (alpha - 1) * input.models[k].gap;
-    problem.integrate(k + 1, xs[k + 1], dx[k + 1], next);
-  }
-  if (problem.calcTerminalCost(trial_.xs[N], cost) != StepStatus::Ok) return false;
+  if (next < N) return true;
+  double cost = 0;
+  if (problem.calcTerminalCost(*task.x_next, cost) != StepStatus::Ok) return false;
   segment.cost += cost;
   return true;
 }
@@ -97,7 +131,7 @@ bool Rollout::updateGaps(const RolloutInput& input, const RolloutOptions& option
   int s = 0;
   for (int k = 0; k < N; ++k) {
     const VectorXd& gap = input.models[k].gap;
-    const bool at_joint = k + 1 == segments_[s].end && k + 1 < N;
+    const bool at_joint = isJoint(segments_[s], k + 1);
     if (!at_joint) {
       if (rest == 0 || gap.size() == 0) continue;
       gap_sum_ += rest * gap.lpNorm<1>();

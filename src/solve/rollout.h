@@ -44,15 +44,31 @@ class Rollout {
   struct Segment {
     int begin = 0, end = 0;  // its stages
     VectorXd end_state;      // f of its last stage, if another segment follows
-    double cost = 0, seconds = 0;
+    double cost = 0;
+  };
+  // Segments that go together, one stage of each at a time.
+  struct Group {
+    int begin = 0, end = 0;  // its segments
+    std::vector<StepTask> tasks;
+    double seconds = 0;
     bool ok = false;
   };
-  bool rollOut(const RolloutInput& input, double alpha, Segment& segment);
+  bool rollOut(const RolloutInput& input, double alpha, Group& group);
+  bool startSegment(const RolloutInput& input, double alpha, Segment& segment);
+  void prepareTask(const RolloutInput& input, double alpha, int k, Segment& segment, StepTask& task);
+  bool finishTask(const RolloutInput& input, double alpha, const StepTask& task, Segment& segment);
+  // Whether gaps are left to be contracted at every node.
+  static bool contracts(const RolloutInput& input, double alpha) { return alpha < 1 && !input.feasible; }
+  // Whether another segment starts at a node, this one having come there.
+  bool isJoint(const Segment& segment, int node) const {
+    return node == segment.end && node + 1 < static_cast<int>(trial_.xs.size());
+  }
   bool updateGaps(const RolloutInput& input, const RolloutOptions& options);
 
   ShootingTrajectory trial_;
   std::vector<VectorXd> deviations_;  // N + 1: dx of Eq. (3), at a joint the one its segment starts from
   std::vector<Segment> segments_;
+  std::vector<Group> groups_;
   VectorXd joint_gap_, joint_slope_;
   double cost_ = 0, gap_sum_ = 0, gap_max_ = 0, closing_cost_ = 0, seconds_ = 0;
 };

@@ -17,41 +17,52 @@
 namespace bielle {
 
 /// A block seen in the workspace of the whole model or in one of its own.
-struct BlockView {
-  const Workspace& ws;
+template <typename T>
+struct BlockViewOf {
+  const WorkspaceOf<T>& ws;
   const std::vector<Closure>& closures;  ///< with the bodies of the workspace
   const std::vector<int>& dofs;          ///< n, in the workspace
 };
-inline BlockView getPlacedView(const LoopBlock& block, const Workspace& whole) {
+template <typename T>
+BlockViewOf<T> getPlacedView(const LoopBlock& block, const WorkspaceOf<T>& whole) {
   return {whole, block.placed, block.dofs};
 }
-inline BlockView getOwnView(const LoopBlock& block, const Workspace& own) {
+template <typename T>
+BlockViewOf<T> getOwnView(const LoopBlock& block, const WorkspaceOf<T>& own) {
   return {own, block.closures.closures, block.own_dofs};
 }
 
 /// First-order motion of a block; n dofs, r reduced coordinates. Column n c + k of a sum (3) belongs to coordinate c at
 /// dof k, dofs of one group having the sum of all of them.
-struct BlockMotion {
-  explicit BlockMotion(const LoopBlock& block);
+template <typename T>
+struct BlockMotionOf {
+  explicit BlockMotionOf(const LoopBlock& block);
   const LoopBlock& block;
-  const BlockBasis* basis = nullptr;
-  MatrixXd Z, dy, dv;       ///< n x r, Eqs. (1), (2)
-  Matrix6Xd J, dV, dA, dW;  ///< 6 x (n r), Eq. (3)
-  MatrixXd K_q, K_v;        // m x r, derivatives of the closure rows
-  MatrixXd X;               // rank x r
+  const BlockBasisOf<T>* basis = nullptr;
+  MatrixX<T> Z, dy, dv;       ///< n x r, Eqs. (1), (2)
+  Matrix6X<T> J, dV, dA, dW;  ///< 6 x (n r), Eq. (3)
+  MatrixX<T> K_q, K_v;        // m x r, derivatives of the closure rows
+  MatrixX<T> X;               // rank x r
 };
+using BlockMotion = BlockMotionOf<double>;
 
 /// N and J~ at the bases of a point; needs the positions of the view.
-void updateTwists(const BlockView& view, const BlockBasis& basis, BlockMotion& motion);
+template <typename T>
+void updateTwists(const BlockViewOf<T>& view, const BlockBasisOf<T>& basis, BlockMotionOf<T>& motion);
 /// Z and dV~; needs updateTwists and the velocities of the view.
-void updateVelocityLift(const BlockView& view, BlockMotion& motion);
+template <typename T>
+void updateVelocityLift(const BlockViewOf<T>& view, BlockMotionOf<T>& motion);
 /// d_y, d_v, dA~ and dW~; needs updateVelocityLift and the accelerations of the view.
-void updateAccelerationLift(const BlockView& view, BlockMotion& motion);
+template <typename T>
+void updateAccelerationLift(const BlockViewOf<T>& view, BlockMotionOf<T>& motion);
 /// out (n x r) = d(J^T f)/dq N for forces f on all rows (m), fixed in their frames 1: closure.h, Eq. (6); needs
 /// updateTwists.
-void calcForceLift(const BlockView& view, const BlockMotion& motion, ConstVectorRef forces, MatrixRef out);
+template <typename T>
+void calcForceLift(const BlockViewOf<T>& view, const BlockMotionOf<T>& motion,
+                   typename ArgumentsOf<T>::ConstVector forces, typename ArgumentsOf<T>::Matrix out);
 /// Drift of the independent closure rows (rank) for the accelerations held by the view.
-void calcBlockDrift(const BlockView& view, const LoopBlock& block, const BlockBasis& basis, VectorRef rows,
-                    VectorRef drift);
+template <typename T>
+void calcBlockDrift(const BlockViewOf<T>& view, const LoopBlock& block, const BlockBasisOf<T>& basis,
+                    typename ArgumentsOf<T>::Vector rows, typename ArgumentsOf<T>::Vector drift);
 
 }  // namespace bielle

@@ -16,7 +16,9 @@
 namespace bielle {
 
 /// A vector of at most six rows, without allocation.
-using RowVectorUpTo6 = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1>;
+template <typename T>
+using VectorUpTo6 = Eigen::Matrix<T, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1>;
+using RowVectorUpTo6 = VectorUpTo6<double>;
 using RowsBy6 = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::ColMajor, 6, 6>;
 
 /// A foot on the ground (or on a step) at a given place.
@@ -37,15 +39,24 @@ struct ConstraintSet {
 ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTarget>& contacts = {});
 
 /// Rows of a closure out of a full twist-like vector in frame 1, and the wrench in frame 1 of a row force.
-RowVectorUpTo6 selectRows(const Closure& closure, const Vector6d& full);
+template <typename T>
+VectorUpTo6<T> selectRows(const Closure& closure, const Vector6<T>& full);
 Vector6d expandRows(const Closure& closure, ConstVectorRef lambda);
+template <typename T>
+Vector6<T> expandRows(const Closure& closure, const VectorUpTo6<T>& lambda);
 
 /// Closing error: zero if and only if closed (a hinge turned by pi about a normal excepted: its residual is the angle
 /// pi). m and rad.
-RowVectorUpTo6 calcClosureResidual(const Workspace& ws, const Closure& closure);
+template <typename T>
+VectorUpTo6<T> calcClosureResidual(const WorkspaceOf<T>& ws, const Closure& closure);
+/// The same for the placement X_12 of frame 2 in frame 1.
+template <typename T>
+VectorUpTo6<T> calcClosureResidual(const Closure& closure, const SE3Of<T>& X_12);
 /// Matrix R (rows x 6) with d residual/dt = R nu_c for the full velocity nu_c in frame 1. Exact at open configurations
 /// too.
 RowsBy6 calcClosureResidualRate(const Workspace& ws, const Closure& closure);
+/// The same for the placement X_12 of frame 2 in frame 1.
+RowsBy6 calcClosureResidualRate(const Closure& closure, const SE3& X_12);
 /// Jacobian of the residual, R times that of nu_c, written to the columns closure.dofs of H (rows x nv); needs
 /// updatePositions.
 void calcClosureResidualJacobian(const Workspace& ws, const Closure& closure, MatrixRef H);
@@ -54,12 +65,14 @@ void calcClosureResidualJacobian(const Workspace& ws, const Closure& closure, Ma
 RowVectorUpTo6 calcClosureVelocity(const Workspace& ws, const Closure& closure);
 /// Acceleration rows for the accelerations held by the workspace (those of a = 0 after updateBias), without
 /// stabilisation.
-RowVectorUpTo6 calcClosureAcceleration(const Workspace& ws, const Closure& closure);
+template <typename T>
+VectorUpTo6<T> calcClosureAcceleration(const WorkspaceOf<T>& ws, const Closure& closure);
 /// Right-hand offset of the stabilised constraint, kd nu_c - kp r (zero gains: zero).
 RowVectorUpTo6 calcClosureStabilization(const Workspace& ws, const Closure& closure);
 
 /// Jacobian rows, written to the columns closure.dofs of J (rows x nv), Eq. (4); other columns are left alone.
-void calcClosureJacobian(const Workspace& ws, const Closure& closure, MatrixRef J);
+template <typename T>
+void calcClosureJacobian(const WorkspaceOf<T>& ws, const Closure& closure, typename ArgumentsOf<T>::Matrix J);
 /// Derivatives of the stabilised acceleration rows, Eqs. (1) and (2), to the columns closure.dofs; needs
 /// updateAccelerations.
 void calcClosureDerivatives(const Workspace& ws, const Closure& closure, MatrixRef da_dq, MatrixRef da_dv);
@@ -68,7 +81,9 @@ void calcClosureDerivatives(const Workspace& ws, const Closure& closure, MatrixR
 void calcClosureVelocityDerivative(const Workspace& ws, const Closure& closure, MatrixRef dnu_dq);
 
 /// World wrench of a closure force on body 1.
-Vector6d calcClosureWrench(const Workspace& ws, const Closure& closure, ConstVectorRef lambda);
+template <typename T>
+Vector6<T> calcClosureWrench(const WorkspaceOf<T>& ws, const Closure& closure,
+                             typename ArgumentsOf<T>::ConstVector lambda);
 /// Adds to dID_dq what updateInverseDynamicsDerivatives leaves out: the wrench on body 2 moves with frame 1 (the
 /// paper's eq. 19),
 ///     d ID_j/dq_k += s J_j . (J_k x* W)   for j in the support of body 2, k in closure.dofs (5)

@@ -8,16 +8,20 @@ namespace bielle {
 void updatePositions(const Model& model, Workspace& ws, ConstVectorRef q);
 
 /// The placements X_WB at q alone: enough for getPlacement and closure residuals.
-void updatePlacements(const Model& model, Workspace& ws, ConstVectorRef q);
+template <typename T>
+void updatePlacements(const Model& model, WorkspaceOf<T>& ws, typename ArgumentsOf<T>::ConstVector q);
 
 /// Jacobian columns and inertias at the placements of the workspace: what updatePositions adds to updatePlacements.
-void updateColumns(const Model& model, Workspace& ws);
+template <typename T>
+void updateColumns(const Model& model, WorkspaceOf<T>& ws);
 
 /// Body velocities at v (nv); needs updatePositions.
-void updateVelocities(const Model& model, Workspace& ws, ConstVectorRef v);
+template <typename T>
+void updateVelocities(const Model& model, WorkspaceOf<T>& ws, typename ArgumentsOf<T>::ConstVector v);
 
 /// Body accelerations at a (nv), gravity included; needs updateVelocities.
-void updateAccelerations(const Model& model, Workspace& ws, ConstVectorRef a);
+template <typename T>
+void updateAccelerations(const Model& model, WorkspaceOf<T>& ws, typename ArgumentsOf<T>::ConstVector a);
 
 /// Placement in the world of a frame fixed in a body.
 inline SE3 getPlacement(const Workspace& ws, int body, const SE3& X_BF) { return ws.X_WB[body] * X_BF; }

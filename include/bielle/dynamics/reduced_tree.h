@@ -21,26 +21,32 @@
 namespace bielle {
 
 /// What a block contributes: how it moves, and H N (n x size).
-struct BlockLift {
-  const BlockMotion* motion = nullptr;
-  const MatrixXd* HN = nullptr;
+template <typename T>
+struct BlockLiftOf {
+  const BlockMotionOf<T>* motion = nullptr;
+  const MatrixX<T>* HN = nullptr;
 };
 
-class ReducedTree {
+using BlockLift = BlockLiftOf<double>;
+
+template <typename T>
+class ReducedTreeOf {
  public:
   /// \param tips  bodies for which the columns of getTip() are wanted
-  ReducedTree(const Model& model, const Reduction& reduction, const std::vector<int>& tips);
+  ReducedTreeOf(const Model& model, const Reduction& reduction, const std::vector<int>& tips);
 
   /// M (size x size), and J of the tips; needs updateCompositeInertias and the twists of the blocks.
-  void updateMassMatrix(const Workspace& ws, const std::vector<BlockLift>& lifts, MatrixRef M);
+  void updateMassMatrix(const WorkspaceOf<T>& ws, const std::vector<BlockLiftOf<T>>& lifts,
+                        typename ArgumentsOf<T>::Matrix M);
   /// A_y and A_v (size x size), and all columns of the tips; needs updateInverseDynamicsFactors and lifts up to the
   /// accelerations.
-  void updateDerivatives(const Workspace& ws, const std::vector<BlockLift>& lifts, MatrixRef A_y, MatrixRef A_v);
+  void updateDerivatives(const WorkspaceOf<T>& ws, const std::vector<BlockLiftOf<T>>& lifts,
+                         typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v);
 
   /// What moves a body: column o belongs to the reduced coordinate outer[o].
   struct Columns {
     std::vector<int> outer;
-    Matrix6Xd J, dV, dA, dW;  ///< 6 x outer
+    Matrix6X<T> J, dV, dA, dW;  ///< 6 x outer
   };
   const Columns& getTip(int index) const { return tips_[index].columns; }
 
@@ -48,15 +54,17 @@ class ReducedTree {
   struct Unit {
     std::vector<int> dofs;
     Columns columns;
-    Matrix6Xd YJ, BtJ, Gy, Gv;  // 6 x size, Eq. (1)
+    Matrix6X<T> YJ, BtJ, Gy, Gv;  // 6 x size, Eq. (1)
   };
   enum class Depth { Twists, All };
-  void updateColumns(const Workspace& ws, const std::vector<BlockLift>& lifts, const ReducedUnit& place, Depth depth,
-                     Columns& out) const;
-  void addMassWithin(const Workspace& ws, const BlockLift* lift, const ReducedUnit& place, Unit& unit, MatrixRef M);
-  void addFreeWithin(const Workspace& ws, const ReducedUnit& place, Unit& unit, MatrixRef A_y, MatrixRef A_v) const;
-  void addBlockWithin(const Workspace& ws, const BlockLift& lift, const ReducedUnit& place, Unit& unit, MatrixRef A_y,
-                      MatrixRef A_v);
+  void updateColumns(const WorkspaceOf<T>& ws, const std::vector<BlockLiftOf<T>>& lifts, const ReducedUnit& place,
+                     Depth depth, Columns& out) const;
+  void addMassWithin(const WorkspaceOf<T>& ws, const BlockLiftOf<T>* lift, const ReducedUnit& place, Unit& unit,
+                     typename ArgumentsOf<T>::Matrix M);
+  void addFreeWithin(const WorkspaceOf<T>& ws, const ReducedUnit& place, Unit& unit,
+                     typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v) const;
+  void addBlockWithin(const WorkspaceOf<T>& ws, const BlockLiftOf<T>& lift, const ReducedUnit& place, Unit& unit,
+                      typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v);
   // A matrix with a column for each group of the largest block.
   void clearAfter(size_t groups);
 
@@ -68,7 +76,9 @@ class ReducedTree {
   const Reduction& reduction_;
   std::vector<Unit> units_;
   std::vector<Tip> tips_;
-  Matrix6Xd after_y_, after_v_;  // sums (1) over what comes after a group of dofs
+  Matrix6X<T> after_y_, after_v_;  // sums (1) over what comes after a group of dofs
 };
+
+using ReducedTree = ReducedTreeOf<double>;
 
 }  // namespace bielle

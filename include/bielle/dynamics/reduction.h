@@ -31,6 +31,9 @@ struct DofGroup {
   int parent_group = -1;  ///< that group
 };
 
+/// A closure row of which the rows before it leave less than this, relative to the first one, counts as dependent on them.
+constexpr double kRankTolerance = 1e-6;
+
 /// One cluster of loops as a mechanism of its own.
 struct LoopBlock {
   Model model;                        ///< joints and closures of the cluster, massless, over their common root
@@ -76,67 +79,83 @@ Reduction makeReduction(const Model& model, ConstVectorRef q);
 /// Parent, path and outer coordinates of something fixed to a body (no coordinates of its own).
 ReducedUnit makeTip(const Model& model, const Reduction& reduction, int body);
 
-/// Bases (1) at a closed configuration of a block.
-struct BlockBasis {
-  explicit BlockBasis(const LoopBlock& block);
-  VectorXd q;             ///< nq of the block
-  MatrixXd N;             ///< n x size
-  MatrixXd WN;            ///< n x size
-  MatrixXd J;             ///< rank x n, independent rows
-  MatrixXd L;             ///< rank x rank, Cholesky factor of J W^{-1} J^T
-  std::vector<int> rows;  ///< which closure rows J holds
+/// Bases (1) at a closed configuration of a block; T is double, or Lanes for several nodes at once.
+template <typename T>
+struct BlockBasisOf {
+  explicit BlockBasisOf(const LoopBlock& block);
+  VectorX<T> q;                                  ///< nq of the block
+  MatrixX<T> N;                                  ///< n x size
+  MatrixX<T> WN;                                 ///< n x size
+  MatrixX<T> J;                                  ///< rank x n, independent rows
+  MatrixX<T> L;                                  ///< rank x rank, Cholesky factor of J W^{-1} J^T
+  std::vector<typename LogicOf<T>::Index> rows;  ///< which closure rows J holds
 };
+using BlockBasis = BlockBasisOf<double>;
 
 /// (J W^{-1} J^T)^{-1} X in place (rank x k).
-template <typename Matrix>
-void solveGram(const BlockBasis& basis, Matrix&& X) {
+template <typename T, typename Matrix>
+void solveGram(const BlockBasisOf<T>& basis, Matrix&& X) {
   solveSmallCholesky(basis.L, X);
 }
 /// out = s J^+ X = s W^{-1} J^T (J W^{-1} J^T)^{-1} X for X (rank x k), which is overwritten; out n x k.
-void applyPseudoInverse(const LoopBlock& block, const BlockBasis& basis, double s, MatrixRef X, MatrixRef out);
+template <typename T>
+void applyPseudoInverse(const LoopBlock& block, const BlockBasisOf<T>& basis, double s,
+                        typename ArgumentsOf<T>::Matrix X, typename ArgumentsOf<T>::Matrix out);
 
 /// What updates and closings of a block need for a moment: one per thread.
-struct BlockScratch {
-  explicit BlockScratch(const LoopBlock& block);
-  Workspace ws;  ///< of the block's model
-  VectorXd residual, correction;
-  MatrixXd J_all, J, JW;  // all rows; at the iterate of a closing; J W^{-1} where it starts
-  MatrixXd newton;        // factors of the matrix of close()
-  std::vector<int> pivots;
-  MatrixXd reflected, reflectors;  // of J W^{-1/2}, rows padded; Householder vectors
-  VectorXd beta, products, rest;   // their scales; scratch; squared norms of what is left of the rows
+template <typename T>
+struct BlockScratchOf {
+  explicit BlockScratchOf(const LoopBlock& block);
+  using Index = typename LogicOf<T>::Index;
+  WorkspaceOf<T> ws;  ///< of the block's model
+  VectorX<T> residual, correction;
+  MatrixX<T> J_all, J, JW;   // all rows; at the iterate of a closing; J W^{-1} where it starts
+  MatrixX<T> newton, fresh;  // factors of the matrix of close(); of a new one
+  std::vector<Index> pivots, fresh_pivots;
+  MatrixX<T> reflected, reflectors;  // of J W^{-1/2}; Householder vectors
+  VectorX<T> beta, products, rest;   // their scales; scratch; squared norms of what is left of the rows
 };
+using BlockScratch = BlockScratchOf<double>;
 
-/// A closed configuration of a block with what was computed there. No allocation once made.
-class BlockState {
+/// A closed configuration of a block with what was computed there; with Lanes one for each lane. No allocation once made.
+template <typename T>
+class BlockStateOf {
+  friend class BlockStateOf<double>;
+
  public:
-  explicit BlockState(const LoopBlock& block);
+  using Mask = typename LogicOf<T>::Mask;
+  explicit BlockStateOf(const LoopBlock& block);
 
   /// Kinematics, Jacobian and bases (1) at q (block's nq), which stay in the scratch too. False when the rank is not that
   /// of the block.
-  bool update(const LoopBlock& block, BlockScratch& scratch, ConstVectorRef q);
+  Mask update(const LoopBlock& block, BlockScratchOf<T>& scratch, typename ArgumentsOf<T>::ConstVector q);
   /// Closes from `start` as Eq. (2) and updates everything there. False when it does not close or the rank changes.
   /// \param zeta_guess  rank, where zeta is expected, or empty
-  bool close(const LoopBlock& block, BlockScratch& scratch, const BlockBasis& start, ConstVectorRef d,
-             const VectorXd& zeta_guess);
+  Mask close(const LoopBlock& block, BlockScratchOf<T>& scratch, const BlockBasisOf<T>& start,
+             typename ArgumentsOf<T>::ConstVector d, const VectorX<T>& zeta_guess);
+  /// Takes over one lane of another.
+  void assign(const BlockStateOf<Lanes>& lanes, int lane);
   /// Placements and columns of this point back into the scratch.
-  void load(const LoopBlock& block, BlockScratch& scratch) const;
+  void load(const LoopBlock& block, BlockScratchOf<T>& scratch) const;
 
-  const BlockBasis& basis() const { return basis_; }
-  const std::vector<SE3>& placements() const { return placements_; }  ///< of the block's bodies, seen from its root
-  const VectorXd& zeta() const { return zeta_; }                      ///< rank, of the last close()
-  const VectorXd& step() const { return step_; }  ///< n, d - W^{-1} J(q_0)^T zeta of the last close()
+  const BlockBasisOf<T>& basis() const { return basis_; }
+  const std::vector<SE3Of<T>>& placements() const {
+    return placements_;
+  }                                                 ///< of the bodies, seen from the block's root
+  const VectorX<T>& zeta() const { return zeta_; }  ///< rank, of the last close()
+  const VectorX<T>& step() const { return step_; }  ///< n, d - W^{-1} J(q_0)^T zeta of the last close()
   /// Why the last update() or close() returned false, naming a loop; with the scratch as they left it.
   std::string describeFailure(const LoopBlock& block, const BlockScratch& scratch) const;
 
  private:
-  bool updateBases(const LoopBlock& block, BlockScratch& scratch);
+  Mask updateBases(const LoopBlock& block, BlockScratchOf<T>& scratch);
 
-  BlockBasis basis_;
-  std::vector<SE3> placements_;
-  VectorXd zeta_, step_;
+  BlockBasisOf<T> basis_;
+  std::vector<SE3Of<T>> placements_;
+  VectorX<T> zeta_, step_;
   bool closed_ = false;  // the last close() got as far as the bases
 };
+using BlockState = BlockStateOf<double>;
 
 /// A BlockState with a scratch of its own: simpler where there are few of them.
 class BlockPoint {
@@ -159,7 +178,9 @@ class BlockPoint {
 };
 
 /// Forces on all rows (m) of forces on the independent ones.
-void expandIndependent(const BlockBasis& basis, ConstVectorRef independent, VectorRef all);
+template <typename T>
+void expandIndependent(const BlockBasisOf<T>& basis, typename ArgumentsOf<T>::ConstVector independent,
+                       typename ArgumentsOf<T>::Vector all);
 
 /// Segments of a block in vectors of the whole model.
 void gatherConfiguration(const Model& model, const LoopBlock& block, ConstVectorRef q, VectorRef q_block);

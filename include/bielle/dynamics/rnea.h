@@ -34,16 +34,19 @@ namespace bielle {
 void updateMassMatrix(const Model& model, Workspace& ws);
 
 /// Composite inertias and momenta of the dofs (fields Yc, YJ) alone; needs updatePositions.
-void updateCompositeInertias(const Model& model, Workspace& ws);
+template <typename T>
+void updateCompositeInertias(const Model& model, WorkspaceOf<T>& ws);
 
 /// Bias b(q, v), gravity included; needs updateVelocities.
 void updateBias(const Model& model, Workspace& ws);
 
 /// Accelerations (field A) for a = 0 alone; needs updateVelocities.
-void updateDrift(const Model& model, Workspace& ws);
+template <typename T>
+void updateDrift(const Model& model, WorkspaceOf<T>& ws);
 
 /// M a + b(q, v) in the field b, and the accelerations that go with a (nv); needs updateVelocities.
-void updateInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef a);
+template <typename T>
+void updateInverseDynamics(const Model& model, WorkspaceOf<T>& ws, typename ArgumentsOf<T>::ConstVector a);
 
 /// Generalized forces of the motion (q, v, a), all given (updates positions, velocities and accelerations).
 VectorXd calcInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef q, ConstVectorRef v, ConstVectorRef a);
@@ -51,17 +54,21 @@ VectorXd calcInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef q
 /// The per-dof factors of Eqs. (7) to (9) and the subtree sums behind them (fields F, Yc, Bc, YJ, BtJ, Gq, Gv); needs
 /// updateAccelerations.
 /// \param f_ext per body (nb), world wrenches that move with their body, or empty
-void updateInverseDynamicsFactors(const Model& model, Workspace& ws, const std::vector<Vector6d>& f_ext);
+template <typename T>
+void updateInverseDynamicsFactors(const Model& model, WorkspaceOf<T>& ws,
+                                  const typename ArgumentsOf<T>::Wrenches& f_ext);
 
 /// Derivatives of ID(q, v, a) - sum_i J_i^T f_ext,i with respect to q (tangent) and v, at the state and acceleration of
 /// the workspace; needs updateAccelerations. Arguments as above.
 void updateInverseDynamicsDerivatives(const Model& model, Workspace& ws, const std::vector<Vector6d>& f_ext);
 
 /// Entry (j, k) of the derivatives with respect to q and v, for dofs of one path to the root (or one joint), from the factors.
+template <typename T>
 struct DerivativeEntry {
-  double q, v;
+  T q, v;
 };
-inline DerivativeEntry calcDerivativeEntry(const Model& model, const Workspace& ws, int j, int k) {
+template <typename T>
+DerivativeEntry<T> calcDerivativeEntry(const Model& model, const WorkspaceOf<T>& ws, int j, int k) {
   const Dof &dj = model.dofs()[j], &dk = model.dofs()[k];
   const bool moves = dj.joint == dk.joint ? !(dj.first_of_universal && dk.second_of_universal) : k < j;
   if (moves)

@@ -18,8 +18,6 @@
 ///     dlambda = G^+ (J M^{-1} dID - dc),     da = M^{-1} (J^T dlambda - dID).                                        (4)
 ///
 /// With redundant rows dlambda is right up to the null space of J^T.
-#include <Eigen/Cholesky>
-
 #include "bielle/math/types.h"
 
 namespace bielle {
@@ -50,14 +48,15 @@ class SaddlePoint {
 
  private:
   SaddlePointOptions options_;
-  Eigen::LLT<MatrixXd> M_llt_, G_llt_;
-  MatrixXd J_;     ///< m x n
-  MatrixXd W_;     ///< m x n: D J L^{-T}, L the Cholesky factor of M
-  MatrixXd G_;     ///< m x m: D G D
-  MatrixXd Ginv_;  ///< m x m, its (pseudo-)inverse
+  MatrixXd J_;      ///< m x n
+  VectorXd M_;      ///< n x n, padded: L, the Cholesky factor of M
+  VectorXd W_;      ///< m x n, padded: D J L^{-T}
+  MatrixXd G_;      ///< m x m: D G D
+  VectorXd G_llt_;  ///< m x m, padded: its Cholesky factor
+  MatrixXd Ginv_;   ///< m x m, its (pseudo-)inverse
   VectorXd D_, rhs_, correction_;
   MatrixXd T1_, T2_;
-  MatrixXd X_, rhs_t_, dlambda_t_;  ///< transposes within solveDerivatives()
+  VectorXd X_, rhs_t_, dlambda_t_;  ///< transposes within solveDerivatives(), padded
   bool redundant_ = false;
 };
 

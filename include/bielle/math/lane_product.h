@@ -3,12 +3,12 @@
 /// operands as on multiplying them.
 #include <algorithm>
 
+#include "bielle/math/lanes.h"
 #include "bielle/math/types.h"
 
 namespace bielle {
 
-/// Rows that one vector register holds. Rows are worked on in full lanes.
-constexpr Eigen::Index kLane = 8;
+/// Rows are worked on in full lanes.
 inline Eigen::Index roundUpToLane(Eigen::Index rows) { return (rows + kLane - 1) / kLane * kLane; }
 
 /// Column-major matrix: entry (i, j) at data[i + j * stride]. Its rows can be read and written up to the next multiple
@@ -42,6 +42,13 @@ void clearPadding(PaddedMap A);
 
 /// H(i, j) += sign sum_k A(i, k) B(j, k) for i >= j >= begin, k < depth. Full lanes: entries above the diagonal change.
 void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, PaddedMap A, PaddedMap B, PaddedMap H);
+
+/// Cholesky elimination of the first `num` unknowns of a symmetric H, of which the lower triangle is read: their columns
+/// become L over Y^T, the rest of H stays. False when a pivot is not positive.
+bool factorizeColumns(PaddedMap H, Eigen::Index num);
+/// X L^{-T} and X L^{-1} in place, L the lower triangle of a square matrix.
+void solveTransposedFromRight(PaddedMap L, PaddedMap X);
+void solveFromRight(PaddedMap L, PaddedMap X);
 
 /// to = from^T, by blocks: a strided copy of whole rows costs much more.
 template <class A, class B>

@@ -8,68 +8,89 @@
 
 namespace bielle {
 
+/// Linear and angular part of a spatial vector.
+template <typename V>
+auto linear(V&& x) {
+  return x.template head<3>();
+}
+template <typename V>
+auto angular(V&& x) {
+  return x.template tail<3>();
+}
+
 /// Placement of a frame B in a frame A (X_AB).
-struct SE3 {
-  Matrix3d R = Matrix3d::Identity();
-  Vector3d p = Vector3d::Zero();  ///< m
+template <typename T>
+struct SE3Of {
+  Matrix3<T> R;
+  Vector3<T> p;  ///< m
 
-  static SE3 Identity() { return {}; }
-  SE3 operator*(const SE3& o) const { return {R * o.R, p + R * o.p}; }
-  SE3 inverse() const { return {R.transpose(), -(R.transpose() * p)}; }
+  SE3Of() : R(Matrix3<T>::Identity()), p(Vector3<T>::Zero()) {}
+  SE3Of(const Matrix3<T>& rotation, const Vector3<T>& position) : R(rotation), p(position) {}
+  static SE3Of Identity() { return {}; }
+  template <typename U>
+  SE3Of operator*(const SE3Of<U>& o) const {
+    return {R * o.R, p + R * o.p};
+  }
+  SE3Of inverse() const { return {R.transpose(), -(R.transpose() * p)}; }
   /// inverse() * o
-  SE3 inverseTimes(const SE3& o) const { return {R.transpose() * o.R, R.transpose() * (o.p - p)}; }
-  Vector3d act(const Vector3d& point) const { return p + R * point; }
+  SE3Of inverseTimes(const SE3Of& o) const { return {R.transpose() * o.R, R.transpose() * (o.p - p)}; }
+  Vector3<T> act(const Vector3<T>& point) const { return p + R * point; }
 
-  Vector6d actMotion(const Vector6d& m) const {
-    Vector6d out;
-    out.tail<3>().noalias() = R * m.tail<3>();
-    out.head<3>().noalias() = R * m.head<3>();
-    out.head<3>() += p.cross(out.tail<3>());
+  Vector6<T> actMotion(const Vector6<T>& m) const {
+    Vector6<T> out;
+    angular(out).noalias() = R * angular(m);
+    linear(out).noalias() = R * linear(m);
+    linear(out) += p.cross(angular(out));
     return out;
   }
-  Vector6d actInvMotion(const Vector6d& m) const {
-    Vector6d out;
-    out.head<3>().noalias() = R.transpose() * (m.head<3>() - p.cross(m.tail<3>()));
-    out.tail<3>().noalias() = R.transpose() * m.tail<3>();
+  Vector6<T> actInvMotion(const Vector6<T>& m) const {
+    Vector6<T> out;
+    linear(out).noalias() = R.transpose() * (linear(m) - p.cross(angular(m)));
+    angular(out).noalias() = R.transpose() * angular(m);
     return out;
   }
-  Vector6d actForce(const Vector6d& f) const {
-    Vector6d out;
-    out.head<3>().noalias() = R * f.head<3>();
-    out.tail<3>().noalias() = R * f.tail<3>();
-    out.tail<3>() += p.cross(out.head<3>());
+  Vector6<T> actForce(const Vector6<T>& f) const {
+    Vector6<T> out;
+    linear(out).noalias() = R * linear(f);
+    angular(out).noalias() = R * angular(f);
+    angular(out) += p.cross(linear(out));
     return out;
   }
-  Vector6d actInvForce(const Vector6d& f) const {
-    Vector6d out;
-    out.head<3>().noalias() = R.transpose() * f.head<3>();
-    out.tail<3>().noalias() = R.transpose() * (f.tail<3>() - p.cross(f.head<3>()));
+  Vector6<T> actInvForce(const Vector6<T>& f) const {
+    Vector6<T> out;
+    linear(out).noalias() = R.transpose() * linear(f);
+    angular(out).noalias() = R.transpose() * (angular(f) - p.cross(linear(f)));
     return out;
   }
   /// Ad(X), 6x6.
-  Matrix6d toActionMatrix() const {
-    Matrix6d A;
-    A.topLeftCorner<3, 3>() = R;
-    A.bottomRightCorner<3, 3>() = R;
-    A.topRightCorner<3, 3>().noalias() = skew(p) * R;
-    A.bottomLeftCorner<3, 3>().setZero();
+  Matrix6<T> toActionMatrix() const {
+    Matrix6<T> A;
+    A.template topLeftCorner<3, 3>() = R;
+    A.template bottomRightCorner<3, 3>() = R;
+    A.template topRightCorner<3, 3>().noalias() = skew(p) * R;
+    A.template bottomLeftCorner<3, 3>().setZero();
     return A;
   }
 };
+using SE3 = SE3Of<double>;
 
 /// [v x] m
-inline Vector6d crossMotion(const Vector6d& v, const Vector6d& m) {
-  Vector6d out;
-  out.head<3>() = v.tail<3>().cross(m.head<3>()) + v.head<3>().cross(m.tail<3>());
-  out.tail<3>() = v.tail<3>().cross(m.tail<3>());
+template <typename A, typename B>
+Vector6<typename A::Scalar> crossMotion(const Eigen::MatrixBase<A>& v_, const Eigen::MatrixBase<B>& m_) {
+  const Vector6<typename A::Scalar> v = v_, m = m_;
+  Vector6<typename A::Scalar> out;
+  linear(out) = angular(v).cross(linear(m)) + linear(v).cross(angular(m));
+  angular(out) = angular(v).cross(angular(m));
   return out;
 }
 
 /// [v x*] f
-inline Vector6d crossForce(const Vector6d& v, const Vector6d& f) {
-  Vector6d out;
-  out.head<3>() = v.tail<3>().cross(f.head<3>());
-  out.tail<3>() = v.tail<3>().cross(f.tail<3>()) + v.head<3>().cross(f.head<3>());
+template <typename A, typename B>
+Vector6<typename A::Scalar> crossForce(const Eigen::MatrixBase<A>& v_, const Eigen::MatrixBase<B>& f_) {
+  const Vector6<typename A::Scalar> v = v_, f = f_;
+  Vector6<typename A::Scalar> out;
+  linear(out) = angular(v).cross(linear(f));
+  angular(out) = angular(v).cross(angular(f)) + linear(v).cross(linear(f));
   return out;
 }
 
@@ -79,7 +100,8 @@ Matrix6d makeCrossMotionMatrix(const Vector6d& v);
 /// Exponential of a twist (m, rad).
 SE3 exp6(const Vector6d& twist);
 /// Logarithm; angular part in [0, pi].
-Vector6d log6(const SE3& X);
+template <typename T>
+Vector6<T> log6(const SE3Of<T>& X);
 /// Right Jacobian of exp6 (Barfoot and Furgale's Q block, from its closed form), 6x6.
 Matrix6d calcRightJacobian6(const Vector6d& twist);
 /// Jacobian of log6 at X: log6(X exp6(d)) = log6(X) + J d + O(d^2), 6x6.

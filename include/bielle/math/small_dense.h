@@ -4,16 +4,18 @@
 #include <type_traits>
 #include <vector>
 
+#include "bielle/math/lanes.h"
 #include "bielle/math/types.h"
 
 namespace bielle {
 
 /// out += sum over k of s b(k) A.col(k) for `Rows` rows from `row` on, in registers throughout.
 template <int Rows, typename A_, typename B_>
-inline void addSmallColumns(const A_& A, const B_& B, Eigen::Index column, Eigen::Index row, double s, double* out) {
-  using Rows_ = Eigen::Array<double, Rows, 1>;
+inline void addSmallColumns(const A_& A, const B_& B, Eigen::Index column, Eigen::Index row, double s,
+                            typename A_::Scalar* out) {
+  using Rows_ = Eigen::Array<typename A_::Scalar, Rows, 1>;
   Rows_ sum = Rows_::Zero();
-  const double* a = A.data() + row;
+  const auto* a = A.data() + row;
   for (Eigen::Index k = 0; k < A.cols(); ++k, a += A.outerStride())
     sum += B.coeff(k, column) * Eigen::Map<const Rows_>(a);
   Eigen::Map<Rows_>(out + row) += s * sum;
@@ -24,7 +26,7 @@ template <typename A_, typename B_, typename C_>
 inline void addSmallProduct(const A_& A, const B_& B, C_&& out, double s = 1) {
   const Eigen::Index n = A.rows(), m = B.cols();
   for (Eigen::Index c = 0; c < m; ++c) {
-    double* x = out.data() + c * out.outerStride();
+    auto* x = out.data() + c * out.outerStride();
     Eigen::Index row = 0;
     for (; row + 8 <= n; row += 8) addSmallColumns<8>(A, B, c, row, s, x);
     if (row + 4 <= n) addSmallColumns<4>(A, B, c, row, s, x), row += 4;
@@ -36,8 +38,8 @@ inline void addSmallProduct(const A_& A, const B_& B, C_&& out, double s = 1) {
 /// Entries (r .. r + Rows, c .. c + Cols) of out += s A^T B: sums that do not wait for each other.
 template <int Rows, int Cols, typename A_, typename B_, typename C_>
 inline void addSmallDots(const A_& A, const B_& B, Eigen::Index r, Eigen::Index c, double s, C_& out) {
-  double sums[Cols][Rows] = {};
-  const double *a = A.data() + r * A.outerStride(), *b = B.data() + c * B.outerStride();
+  typename A_::Scalar sums[Cols][Rows] = {};
+  const auto *a = A.data() + r * A.outerStride(), *b = B.data() + c * B.outerStride();
   for (Eigen::Index k = 0; k < A.rows(); ++k)
     for (int j = 0; j < Cols; ++j)
       for (int i = 0; i < Rows; ++i) sums[j][i] += a[i * A.outerStride() + k] * b[j * B.outerStride() + k];
@@ -62,9 +64,9 @@ inline void addSmallProductTransposed(const A_& A, const B_& B, C_&& out, double
 }
 
 /// Solves L L^T x = b in place for N known to the compiler: without loops, so that columns overlap.
-template <int N>
-inline void solveSmallCholeskyColumn(const double* __restrict l, Eigen::Index stride, double* __restrict out) {
-  double x[N];
+template <int N, typename T>
+inline void solveSmallCholeskyColumn(const T* __restrict l, Eigen::Index stride, T* __restrict out) {
+  T x[N];
 #pragma GCC unroll 12
   for (int k = 0; k < N; ++k) x[k] = out[k];
 #pragma GCC unroll 12
@@ -75,7 +77,7 @@ inline void solveSmallCholeskyColumn(const double* __restrict l, Eigen::Index st
   }
 #pragma GCC unroll 12
   for (int k = N - 1; k >= 0; --k) {
-    double sum = 0, other = 0;
+    T sum = 0, other = 0;
 #pragma GCC unroll 12
     for (int r = N - 1; r > k; --r) ((r - k) % 2 ? sum : other) += l[k * stride + r] * x[r];
     x[k] = (x[k] - (other + sum)) * (1 / l[k * stride + k]);
@@ -88,9 +90,9 @@ inline void solveSmallCholeskyColumn(const double* __restrict l, Eigen::Index st
 template <typename L_, typename X_>
 inline void solveSmallCholesky(const L_& factor, X_&& X) {
   const Eigen::Index n = factor.rows(), stride = factor.outerStride();
-  const double* l = factor.data();
+  const auto* l = factor.data();
   for (Eigen::Index c = 0; c < X.cols(); ++c) {
-    double* __restrict x = X.data() + c * X.outerStride();
+    auto* __restrict x = X.data() + c * X.outerStride();
     // One loop of a Weld6D closure or two: nearly all blocks there are.
     if (n == 6) {
       solveSmallCholeskyColumn<6>(l, stride, x);
@@ -101,40 +103,24 @@ inline void solveSmallCholesky(const L_& factor, X_&& X) {
       continue;
     }
     for (Eigen::Index k = 0; k < n; ++k) {
-      const double f = x[k] *= 1 / l[k * stride + k];
+      const auto f = x[k] *= 1 / l[k * stride + k];
       for (Eigen::Index r = k + 1; r < n; ++r) x[r] -= f * l[k * stride + r];
     }
     for (Eigen::Index k = n - 1; k >= 0; --k) {
-      double sum = x[k];
-      for (Eigen::Index r = k + 1; r < n; ++r) sum -= l[k * stride + r] * x[r];
-      x[k] = sum * (1 / l[k * stride + k]);
+      const auto f = x[k] *= 1 / l[k * stride + k];
+      for (Eigen::Index r = 0; r < k; ++r) x[r] -= f * l[r * stride + k];
     }
-  }
-}
-
-/// X L^{-T} in place, L the lower triangle of `factor` (n x n), X (m x n).
-template <typename L_>
-inline void solveTransposedFromRight(const L_& factor, MatrixRef X) {
-  for (Eigen::Index k = 0; k < X.cols(); ++k) {
-    addSmallProduct(X.leftCols(k), factor.row(k).head(k).transpose(), X.col(k), -1);
-    X.col(k) *= 1 / factor(k, k);
-  }
-}
-
-/// X L^{-1} in place, L the lower triangle of `factor` (n x n), X (m x n).
-template <typename L_>
-inline void solveFromRight(const L_& factor, MatrixRef X) {
-  for (Eigen::Index k = X.cols() - 1; k >= 0; --k) {
-    const Eigen::Index rest = X.cols() - 1 - k;
-    addSmallProduct(X.rightCols(rest), factor.col(k).tail(rest), X.col(k), -1);
-    X.col(k) *= 1 / factor(k, k);
   }
 }
 
 /// Factors of A (n x n) in place by elimination with partial pivoting; `pivots` (n) holds the row each was swapped with.
-/// False when A is singular.
-bool factorizeSmall(MatrixRef A, std::vector<int>& pivots);
+/// False when A is singular. Matrices of double or of Lanes.
+template <typename Matrix>
+typename LogicOf<typename Matrix::Scalar>::Mask factorizeSmall(
+    Matrix& A, std::vector<typename LogicOf<typename Matrix::Scalar>::Index>& pivots);
 /// Solves A X = B in place with the factors of A, X (n x m).
-void solveFactorized(ConstMatrixRef factors, const std::vector<int>& pivots, MatrixRef X);
+template <typename Matrix>
+void solveFactorized(const Matrix& factors, const std::vector<typename LogicOf<typename Matrix::Scalar>::Index>& pivots,
+                     typename ArgumentsOf<typename Matrix::Scalar>::Matrix X);
 
 }  // namespace bielle

@@ -1,19 +1,40 @@
 #pragma once
 /// \file Eigen types used everywhere.
 #include <Eigen/Core>
+#include <vector>
 
 namespace bielle {
 
+using Eigen::Matrix3;
 using Eigen::Matrix3d;
+using Eigen::MatrixX;
 using Eigen::MatrixXd;
+using Eigen::Vector3;
 using Eigen::Vector3d;
+using Eigen::VectorX;
 using Eigen::VectorXd;
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
-using Matrix6Xd = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+template <typename T>
+using Vector6 = Eigen::Matrix<T, 6, 1>;
+template <typename T>
+using Matrix6 = Eigen::Matrix<T, 6, 6>;
+template <typename T>
+using Matrix6X = Eigen::Matrix<T, 6, Eigen::Dynamic>;
+using Vector6d = Vector6<double>;
+using Matrix6d = Matrix6<double>;
+using Matrix6Xd = Matrix6X<double>;
 using ConstVectorRef = Eigen::Ref<const VectorXd>;
 using VectorRef = Eigen::Ref<VectorXd>;
 using ConstMatrixRef = Eigen::Ref<const MatrixXd>;
 using MatrixRef = Eigen::Ref<MatrixXd>;
+
+// Of functions that work on numbers (T = double) or on the numbers of several nodes at once (T = Lanes): T comes from their
+// workspace, and these take what fits it.
+template <typename T>
+struct ArgumentsOf {
+  using ConstVector = Eigen::Ref<const VectorX<T>>;
+  using Vector = Eigen::Ref<VectorX<T>>;
+  using Matrix = Eigen::Ref<MatrixX<T>>;
+  using Wrenches = std::vector<Vector6<T>>;
+};
 
 }  // namespace bielle

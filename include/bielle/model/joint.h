@@ -32,12 +32,18 @@ struct Joint {
 
 /// Placement of the child in the joint frame; q is the joint's own segment (nq).
 SE3 calcJointPlacement(const Joint& joint, ConstVectorRef q);
+/// Here and below, the template is the same for Lanes, or for either.
+template <typename T>
+SE3Of<T> calcJointPlacement(const Joint& joint, typename ArgumentsOf<T>::ConstVector q);
 
 /// Motion subspace in the child frame, written to the first nv columns of S (6 x nv).
 void calcJointSubspace(const Joint& joint, ConstVectorRef q, Eigen::Ref<Matrix6Xd> S);
 
 /// q_out = q (+) dv (segments of the joint). Quaternions come out normalised.
 void integrateJoint(const Joint& joint, ConstVectorRef q, ConstVectorRef dv, VectorRef q_out);
+template <typename T>
+void integrateJoint(const Joint& joint, typename ArgumentsOf<T>::ConstVector q, typename ArgumentsOf<T>::ConstVector dv,
+                    typename ArgumentsOf<T>::Vector q_out);
 /// dv with q0 (+) dv = q1.
 void calcJointDifference(const Joint& joint, ConstVectorRef q0, ConstVectorRef q1, VectorRef dv);
 /// Jacobians of (q, dv) -> q (+) dv in tangent coordinates: of the result with respect to q and to dv (nv x nv each).

@@ -15,7 +15,8 @@ namespace bielle {
 /// What a residual may look at: one node with its kinematics (and, at a stage, its dynamics) up to date.
 struct NodeView {
   const Model& model;
-  const Workspace& ws;               ///< at least velocities and updateMassMatrix
+  /// Filled are q, v, X_WB, V and hc; for calcJacobian also J, dV, YJ and Yc.
+  const Workspace& ws;
   const ConstraintSet& constraints;  ///< closures and contacts in force
   const VectorXd& u;                 ///< nu, empty at the terminal node
   const VectorXd& lambda;            ///< rows of the constraints, empty at the terminal node

@@ -75,9 +75,13 @@ class RobotProblem : public ShootingProblem {
   void difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override;
   StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override;
   StepStatus continueStep(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override;
+  void stepStages(std::vector<StepTask>& tasks) override;
   StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override;
   StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
                        StageModel& out) override;
+  void linearizeStages(int begin, int end, const std::vector<VectorXd>& xs, const std::vector<VectorXd>& us,
+                       std::vector<StageModel>& models, std::vector<StepStatus>& statuses) override;
+  int getBatchSize() const override { return formulation_ == Formulation::Reduced ? static_cast<int>(kLane) : 1; }
   StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override;
   void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override;
   std::string getFailure(int node) const override;
@@ -92,8 +96,11 @@ class RobotProblem : public ShootingProblem {
 
  private:
   struct Node;
+  bool startEvaluation(int stage, ConstVectorRef x, ConstVectorRef u);
+  StepStatus finishEvaluation(int stage, bool ok);
   StepStatus evaluate(int stage, ConstVectorRef x, ConstVectorRef u, const NodeModel* previous = nullptr);
   StepStatus finishStep(int stage, VectorRef x_next, double& cost);
+  StepStatus finishLinearization(int stage, ConstVectorRef u, ConstVectorRef x_next_node, StageModel& out);
   double sumCosts(int node_index, std::vector<CostValue>* values = nullptr);
   void addCosts(int node_index, double scale, StageModel& out);
 

@@ -32,6 +32,16 @@ struct StageModel {
 /// Result of a step or of a cost evaluation. A numerical failure is a value, never an exception or a NaN handed on.
 enum class StepStatus { Ok, Failed };
 
+/// One step of several.
+struct StepTask {
+  int stage = 0;
+  bool continues = false;  ///< as continueStep()
+  const VectorXd *x = nullptr, *u = nullptr;
+  VectorXd* x_next = nullptr;
+  double cost = 0;                     ///< out
+  StepStatus status = StepStatus::Ok;  ///< out
+};
+
 class ShootingProblem {
  public:
   virtual ~ShootingProblem() = default;
@@ -55,11 +65,20 @@ class ShootingProblem {
   virtual StepStatus continueStep(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) {
     return step(stage, x, u, x_next, cost);
   }
+  /// step(), or continueStep(), of several different stages by one thread, for problems that do them at once for less. What
+  /// comes out must not depend on which stages come together, unless they come alone.
+  virtual void stepStages(std::vector<StepTask>& tasks);
   virtual StepStatus calcTerminalCost(ConstVectorRef x, double& cost) = 0;
 
   /// Quadratic model of stage k about (x, u) with the gap to the node state x_next_node. Same threading rule as step().
   virtual StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
                                StageModel& out) = 0;
+  /// linearize() of the stages [begin, end) about a trajectory (indexed by node, like the models and statuses), for problems
+  /// that do several at once for less. What comes out must not depend on which stages come together.
+  virtual void linearizeStages(int begin, int end, const std::vector<VectorXd>& xs, const std::vector<VectorXd>& us,
+                               std::vector<StageModel>& models, std::vector<StepStatus>& statuses);
+  /// How many stages stepStages() and linearizeStages() are best given.
+  virtual int getBatchSize() const { return 1; }
   virtual StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) = 0;
 
   /// Bounds of the controls of a stage (nu each), infinite where there are none.

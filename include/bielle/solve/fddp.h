@@ -76,9 +76,9 @@ struct FddpOptions {
   double acceptance = 0.1;    ///< share of Eq. (4) by which the merit must really fall, in (0, 1)
 
   ControlBounds bounds = ControlBounds::Ignore;
-  /// Segments of a rollout, Eq. (7), at most: none is shorter than 20 stages. Results depend on it, within the
+  /// Segments of a rollout, Eq. (7), at most: none is shorter than 12 stages. Results depend on it, within the
   /// tolerances, and therefore it is not the number of threads.
-  int rollout_segments = 4;
+  int rollout_segments = 16;
   int threads = 0;  ///< 0: all. The result does not depend on it by a single bit.
 };
 

@@ -1,0 +1,152 @@
+#pragma once
+/// \file Several numbers that take the same path: a scalar type for Eigen.
+///
+/// The mechanisms of neighbouring nodes of a horizon differ in numbers only, and what is done to them are short chains of
+/// dependent operations on vectors of 3 to 14 numbers. With one node per lane every operation of such a chain does the
+/// work of kLane nodes in a full register of the processor. Lanes never mix: what comes out of one does not depend on what
+/// the others hold, by a single bit, so that nodes may be put together in any way.
+#include <Eigen/Core>
+#include <array>
+#include <cmath>
+#include <type_traits>
+
+namespace bielle {
+
+/// Numbers that one vector register holds.
+constexpr Eigen::Index kLane = 8;
+
+/// kLane numbers; the compiler splits them if the processor's registers are shorter.
+struct Lanes {
+  typedef double Vector __attribute__((vector_size(kLane * sizeof(double))));
+  Vector v;
+
+  Lanes() = default;
+  Lanes(double x) : v(x - Vector{}) {}  // the same number in every lane
+  explicit Lanes(const Vector& x) : v(x) {}
+  double operator[](Eigen::Index lane) const { return v[lane]; }
+  void set(Eigen::Index lane, double x) { v[lane] = x; }
+
+  Lanes& operator+=(const Lanes& o) { return v += o.v, *this; }
+  Lanes& operator-=(const Lanes& o) { return v -= o.v, *this; }
+  Lanes& operator*=(const Lanes& o) { return v *= o.v, *this; }
+  Lanes& operator/=(const Lanes& o) { return v /= o.v, *this; }
+
+  friend Lanes sqrt(const Lanes& x) {
+    Lanes out;
+    for (Eigen::Index l = 0; l < kLane; ++l) out.v[l] = std::sqrt(x.v[l]);
+    return out;
+  }
+  friend Lanes abs(const Lanes& x) { return Lanes(x.v < 0 ? -x.v : x.v); }
+};
+
+inline Lanes operator+(const Lanes& a, const Lanes& b) { return Lanes(a.v + b.v); }
+inline Lanes operator-(const Lanes& a, const Lanes& b) { return Lanes(a.v - b.v); }
+inline Lanes operator*(const Lanes& a, const Lanes& b) { return Lanes(a.v * b.v); }
+inline Lanes operator/(const Lanes& a, const Lanes& b) { return Lanes(a.v / b.v); }
+inline Lanes operator-(const Lanes& a) { return Lanes(-a.v); }
+
+/// What a comparison says in each lane; for double it is a bool.
+struct LaneMask {
+  typedef long long Vector __attribute__((vector_size(kLane * sizeof(double))));
+  Vector v;  // -1 or 0
+  bool operator[](Eigen::Index lane) const { return v[lane] != 0; }
+};
+inline LaneMask operator<(const Lanes& a, const Lanes& b) { return {a.v < b.v}; }
+inline LaneMask operator<=(const Lanes& a, const Lanes& b) { return {a.v <= b.v}; }
+inline LaneMask operator>(const Lanes& a, const Lanes& b) { return {a.v > b.v}; }
+inline LaneMask operator&&(const LaneMask& a, const LaneMask& b) { return {a.v & b.v}; }
+inline LaneMask operator||(const LaneMask& a, const LaneMask& b) { return {a.v | b.v}; }
+inline LaneMask operator!(const LaneMask& a) { return {~a.v}; }
+inline bool any(const LaneMask& a) {
+  long long out = 0;
+  for (Eigen::Index l = 0; l < kLane; ++l) out |= a.v[l];
+  return out != 0;
+}
+inline bool any(bool a) { return a; }
+inline Lanes select(const LaneMask& mask, const Lanes& a, const Lanes& b) { return Lanes(mask.v ? a.v : b.v); }
+inline double select(bool mask, double a, double b) { return mask ? a : b; }
+
+/// sin and cos of every lane, to rounding.
+void calcSineCosine(const Lanes& x, Lanes& sine, Lanes& cosine);
+inline void calcSineCosine(double x, double& sine, double& cosine) {
+  sine = std::sin(x);
+  cosine = std::cos(x);
+}
+
+/// A truth and an index for each lane.
+template <typename T>
+struct LogicOf {
+  using Mask = bool;
+  using Index = int;
+};
+template <>
+struct LogicOf<Lanes> {
+  using Mask = LaneMask;
+  using Index = std::array<int, kLane>;
+};
+/// The same index in every lane.
+template <typename T>
+typename LogicOf<T>::Index makeIndex(int i) {
+  typename LogicOf<T>::Index out;
+  if constexpr (std::is_same_v<T, double>)
+    out = i;
+  else
+    out.fill(i);
+  return out;
+}
+inline int select(bool mask, int a, int b) { return mask ? a : b; }
+inline std::array<int, kLane> select(const LaneMask& mask, int a, std::array<int, kLane> b) {
+  for (Eigen::Index l = 0; l < kLane; ++l) b[l] = mask[l] ? a : b[l];
+  return b;
+}
+inline std::array<int, kLane> select(const LaneMask& mask, const std::array<int, kLane>& a, std::array<int, kLane> b) {
+  for (Eigen::Index l = 0; l < kLane; ++l) b[l] = mask[l] ? a[l] : b[l];
+  return b;
+}
+inline double getEntry(const double* x, int i) { return x[i]; }
+inline Lanes getEntry(const Lanes* x, const std::array<int, kLane>& i) {
+  Lanes out;
+  for (Eigen::Index l = 0; l < kLane; ++l) out.v[l] = x[i[l]].v[l];
+  return out;
+}
+inline void setEntry(double* x, int i, double value) { x[i] = value; }
+inline void setEntry(Lanes* x, const std::array<int, kLane>& i, const Lanes& value) {
+  for (Eigen::Index l = 0; l < kLane; ++l) x[i[l]].v[l] = value.v[l];
+}
+
+/// f of every lane on its own, for what branches. double: f(x).
+template <typename F>
+inline auto applyLanes(const Lanes& x, const F& f) {
+  Lanes out;
+  for (Eigen::Index l = 0; l < kLane; ++l) out.v[l] = f(x.v[l]);
+  return out;
+}
+
+/// out[i] gets in[lane][i] in each lane, i < size.
+void packLanes(const std::array<const double*, kLane>& in, Eigen::Index size, Lanes* out);
+/// The way back, for one lane.
+inline void unpackLane(const Lanes* in, Eigen::Index lane, Eigen::Index size, double* out) {
+  const double* from = reinterpret_cast<const double*>(in) + lane;
+  for (Eigen::Index i = 0; i < size; ++i) out[i] = from[i * kLane];
+}
+
+}  // namespace bielle
+
+namespace Eigen {
+template <>
+struct NumTraits<bielle::Lanes> : GenericNumTraits<double> {
+  using Real = bielle::Lanes;
+  using NonInteger = bielle::Lanes;
+  using Nested = bielle::Lanes;
+  using Literal = double;
+  enum { RequireInitialization = 0 };
+};
+template <typename Op>
+struct ScalarBinaryOpTraits<bielle::Lanes, double, Op> {
+  using ReturnType = bielle::Lanes;
+};
+template <typename Op>
+struct ScalarBinaryOpTraits<double, bielle::Lanes, Op> {
+  using ReturnType = bielle::Lanes;
+};
+}  // namespace Eigen

@@ -1,0 +1,333 @@
+// Bases of blocks and closing of their loops: Eqs. (1) and (2) of reduction.h.
+#include <cmath>
+#include <limits>
+
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/reduction.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kClosedTolerance = 1e-13;    // what close() aims at
+constexpr double kAcceptedTolerance = 1e-11;  // what it accepts when rounding stops it
+
+// Rows of a factorization that one operation works on: a register of one node, or a row of the nodes of all lanes.
+template <typename T>
+using RowsOf = Eigen::Array<T, std::is_same_v<T, double> ? kLane : 1, 1>;
+
+}  // namespace
+
+template <typename T>
+BlockBasisOf<T>::BlockBasisOf(const LoopBlock& block) {
+  const int n = block.model.nv();
+  q.setZero(block.model.nq());
+  N.setZero(n, block.size);
+  WN.setZero(n, block.size);
+  J.setZero(block.rank, n);
+  L.setZero(block.rank, block.rank);
+  rows.resize(block.rank);
+}
+
+template <typename T>
+BlockScratchOf<T>::BlockScratchOf(const LoopBlock& block) : ws(block.model) {
+  const int n = block.model.nv(), m = block.closures.rows, rank = block.rank;
+  residual.setZero(m);
+  correction.setZero(rank);
+  J_all.setZero(m, n);
+  J.setZero(rank, n);
+  JW.setZero(rank, n);
+  for (MatrixX<T>* x : {&newton, &fresh}) x->setZero(rank, rank);
+  pivots.resize(rank);
+  fresh_pivots.resize(rank);
+  const Eigen::Index chunk = RowsOf<T>::RowsAtCompileTime, padded = (m + chunk - 1) / chunk * chunk;
+  reflected.setZero(padded, n);
+  reflectors.setZero(n, rank);
+  products.setZero(padded);
+  beta.setZero(rank);
+  rest.setZero(m);
+}
+
+template <typename T>
+BlockStateOf<T>::BlockStateOf(const LoopBlock& block) : basis_(block), placements_(block.model.numBodies()) {
+  zeta_.setZero(block.rank);
+  step_.setZero(block.model.nv());
+}
+
+template <typename T>
+void applyPseudoInverse(const LoopBlock& block, const BlockBasisOf<T>& basis, double s,
+                        typename ArgumentsOf<T>::Matrix X, typename ArgumentsOf<T>::Matrix out) {
+  solveGram(basis, X);
+  out.setZero();
+  addSmallProductTransposed(basis.J, X, out, s);
+  for (Eigen::Index c = 0; c < out.cols(); ++c)
+    for (Eigen::Index k = 0; k < out.rows(); ++k) out(k, c) *= block.inverse_metric[k];
+}
+
+namespace {
+
+template <typename T>
+void updateJacobian(const LoopBlock& block, BlockScratchOf<T>& scratch) {
+  const ConstraintSet& set = block.closures;
+  for (size_t c = 0; c < set.closures.size(); ++c)
+    calcClosureJacobian<T>(scratch.ws, set.closures[c],
+                           scratch.J_all.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
+}
+
+// Returns the largest entry, or none that is a number.
+template <typename T>
+T updateResidual(const LoopBlock& block, BlockScratchOf<T>& scratch) {
+  using std::abs;
+  const ConstraintSet& set = block.closures;
+  T largest = 0, sum = 0;
+  for (size_t c = 0; c < set.closures.size(); ++c) {
+    const int row = set.offsets[c], rows = getRows(set.closures[c].kind);
+    scratch.residual.segment(row, rows) = calcClosureResidual(scratch.ws, set.closures[c]);
+    for (int r = row; r < row + rows; ++r) {
+      const T size = abs(scratch.residual[r]);
+      largest = select(size > largest, size, largest);
+      sum += size;
+    }
+  }
+  return largest + 0 * sum;
+}
+
+// Rows of a matrix that are named.
+template <typename T>
+void selectRows(const MatrixX<T>& all, const std::vector<typename LogicOf<T>::Index>& rows, MatrixX<T>& out) {
+  for (Eigen::Index k = 0; k < all.cols(); ++k)
+    for (size_t i = 0; i < rows.size(); ++i) out(i, k) = getEntry(&all(0, k), rows[i]);
+}
+
+// J W^{-1/2} = [L, 0] Q^T with Q = H_1 H_2 ..., H = I - beta v v^T, the v in the columns of `reflectors`. Rows are taken
+// by what the ones before leave of them, largest first. False when the rank is another than the block's.
+template <typename T>
+typename LogicOf<T>::Mask factorize(const LoopBlock& block, BlockScratchOf<T>& scratch, BlockBasisOf<T>& basis) {
+  using std::abs;
+  using std::sqrt;
+  using Rows = RowsOf<T>;
+  constexpr Eigen::Index kChunk = Rows::RowsAtCompileTime;
+  const T taken = -std::numeric_limits<double>::infinity();
+  MatrixX<T>& E = scratch.reflected;
+  VectorX<T>&rest = scratch.rest, &products = scratch.products;
+  const int m = static_cast<int>(rest.size()), n = static_cast<int>(E.cols()), rank = block.rank;
+  for (int k = 0; k < n; ++k) E.col(k).head(m) = scratch.J_all.col(k) * block.inverse_root[k];
+  rest = E.topRows(m).rowwise().squaredNorm();
+  T first = 0, last = 0;
+  auto regular = T(0) <= T(0);
+  for (int p = 0; p < rank; ++p) {
+    auto row = makeIndex<T>(0);
+    T most = rest[0];
+    for (int r = 1; r < m; ++r) {
+      const auto larger = rest[r] > most;
+      most = select(larger, rest[r], most);
+      row = select(larger, r, row);
+    }
+    basis.rows[p] = row;
+    T* v = &scratch.reflectors(0, p);
+    for (int k = p; k < n; ++k) v[k] = getEntry(&E(0, k), row);
+    // E x for the row x, |x|^2 among it, and with v = x - pivot e_p from it E v.
+    for (Eigen::Index r = 0; r < E.rows(); r += kChunk) {
+      Rows sum = Rows::Zero();
+      for (int k = p; k < n; ++k) sum += v[k] * Eigen::Map<const Rows>(&E(r, k));
+      products.template segment<kChunk>(r).array() = sum;
+    }
+    const T norm = sqrt(getEntry(products.data(), row)), pivot = select(v[p] > T(0), -norm, norm);
+    if (p == 0) first = norm;
+    regular = regular && norm > kRankTolerance * first;
+    if (!any(regular)) return regular;
+    last = norm;
+    const T beta = 1 / (norm * (norm + abs(v[p])));
+    scratch.beta[p] = beta;
+    v[p] -= pivot;
+    for (Eigen::Index r = 0; r < E.rows(); r += kChunk) {
+      const Rows Ev = products.template segment<kChunk>(r).array() - pivot * Eigen::Map<const Rows>(&E(r, p));
+      const Rows scaled = beta * Ev;
+      for (int k = p; k < n; ++k) Eigen::Map<Rows>(&E(r, k)) -= v[k] * scaled;
+    }
+    for (int r = 0; r < m; ++r) rest[r] -= E(r, p) * E(r, p);
+    setEntry(rest.data(), row, taken);
+  }
+  for (int k = 0; k < rank; ++k)
+    for (int p = k; p < rank; ++p) basis.L(p, k) = getEntry(&E(0, k), basis.rows[p]);
+  // What is left must be nothing but rounding.
+  T left = 0;
+  for (int r = 0; r < m; ++r) {
+    const T norm = E.row(r).tail(n - rank).squaredNorm();
+    left = select(rest[r] > taken && norm > left, norm, left);
+  }
+  left = sqrt(left);
+  return regular && (left <= kRankTolerance * last || left <= 1e-3 * kRankTolerance * first);
+}
+
+// Newton's matrix J(q) W^{-1} J(q_0)^T at the present iterate, for the lanes of the mask.
+template <typename T>
+typename LogicOf<T>::Mask updateNewton(const LoopBlock& block, BlockScratchOf<T>& scratch, const BlockBasisOf<T>& start,
+                                       const typename LogicOf<T>::Mask& mask) {
+  updateColumns(block.model, scratch.ws);
+  updateJacobian(block, scratch);
+  selectRows(scratch.J_all, start.rows, scratch.J);
+  scratch.fresh.setZero();
+  addSmallProduct(scratch.J, scratch.JW.transpose(), scratch.fresh);
+  const auto regular = factorizeSmall(scratch.fresh, scratch.fresh_pivots);
+  for (Eigen::Index c = 0; c < scratch.newton.cols(); ++c) {
+    scratch.pivots[c] = select(mask, scratch.fresh_pivots[c], scratch.pivots[c]);
+    for (Eigen::Index r = 0; r < scratch.newton.rows(); ++r)
+      scratch.newton(r, c) = select(mask, scratch.fresh(r, c), scratch.newton(r, c));
+  }
+  return regular;
+}
+
+}  // namespace
+
+// Eq. (1): N = W^{-1/2} Q_2 with the last columns of Q, and L L^T = J W^{-1} J^T.
+template <typename T>
+typename LogicOf<T>::Mask BlockStateOf<T>::updateBases(const LoopBlock& block, BlockScratchOf<T>& scratch) {
+  const int rank = block.rank, size = block.size, n = static_cast<int>(block.metric.size());
+  placements_ = scratch.ws.X_WB;
+  updateColumns(block.model, scratch.ws);
+  updateJacobian(block, scratch);
+  const Mask regular = factorize(block, scratch, basis_);
+  if (!any(regular)) return regular;
+  MatrixX<T>& N = basis_.N;
+  N.setZero();
+  for (int c = 0; c < size; ++c) N(rank + c, c) = 1;
+  for (int p = rank - 1; p >= 0; --p) {
+    const T* v = &scratch.reflectors(0, p);
+    for (int c = 0; c < size; ++c) {
+      T dot = 0;
+      for (int k = p; k < n; ++k) dot += v[k] * N(k, c);
+      dot *= scratch.beta[p];
+      for (int k = p; k < n; ++k) N(k, c) -= dot * v[k];
+    }
+  }
+  for (int c = 0; c < size; ++c)
+    for (int k = 0; k < n; ++k) {
+      N(k, c) *= block.inverse_root[k];
+      basis_.WN(k, c) = block.metric[k] * N(k, c);
+    }
+  selectRows(scratch.J_all, basis_.rows, basis_.J);
+  return regular;
+}
+
+template <typename T>
+void BlockStateOf<T>::load(const LoopBlock& block, BlockScratchOf<T>& scratch) const {
+  scratch.ws.q = basis_.q;
+  scratch.ws.X_WB = placements_;
+  scratch.ws.stage = WorkspaceStage::Placement;
+  updateColumns(block.model, scratch.ws);
+}
+
+template <>
+void BlockStateOf<double>::assign(const BlockStateOf<Lanes>& lanes, int lane) {
+  const auto take = [lane](const auto& from, auto& to) { unpackLane(from.data(), lane, from.size(), to.data()); };
+  take(lanes.basis_.q, basis_.q);
+  take(lanes.basis_.N, basis_.N);
+  take(lanes.basis_.WN, basis_.WN);
+  take(lanes.basis_.J, basis_.J);
+  take(lanes.basis_.L, basis_.L);
+  for (size_t i = 0; i < basis_.rows.size(); ++i) basis_.rows[i] = lanes.basis_.rows[i][lane];
+  for (size_t i = 0; i < placements_.size(); ++i) {
+    take(lanes.placements_[i].R, placements_[i].R);
+    take(lanes.placements_[i].p, placements_[i].p);
+  }
+  take(lanes.zeta_, zeta_);
+  take(lanes.step_, step_);
+  closed_ = true;
+}
+
+template <typename T>
+typename LogicOf<T>::Mask BlockStateOf<T>::update(const LoopBlock& block, BlockScratchOf<T>& scratch,
+                                                  typename ArgumentsOf<T>::ConstVector q) {
+  closed_ = true;
+  basis_.q = q;
+  updatePlacements<T>(block.model, scratch.ws, basis_.q);
+  return updateBases(block, scratch);
+}
+
+// Newton on zeta with the matrix J(q) W^{-1} J(q_0)^T of the independent rows, refreshed while it pays. A lane that is done
+// stays as it is.
+template <typename T>
+typename LogicOf<T>::Mask BlockStateOf<T>::close(const LoopBlock& block, BlockScratchOf<T>& scratch,
+                                                 const BlockBasisOf<T>& start, typename ArgumentsOf<T>::ConstVector d,
+                                                 const VectorX<T>& zeta_guess) {
+  closed_ = false;
+  for (Eigen::Index k = 0; k < start.J.cols(); ++k) scratch.JW.col(k) = start.J.col(k) * block.inverse_metric[k];
+  step_ = d;
+  zeta_.setZero();
+  if (zeta_guess.size()) {
+    zeta_ = zeta_guess;
+    addSmallProductTransposed(scratch.JW, zeta_, step_, -1);
+  }
+  const Mask never = T(0) < T(0);
+  Mask closed = never, failed = never;
+  T previous = 0;
+  constexpr int kMaxIterations = 30;
+  for (int i = 0; i <= kMaxIterations; ++i) {
+    for (const Joint& joint : block.model.joints())
+      if (joint.nv)
+        integrateJoint<T>(joint, start.q.segment(joint.idx_q, joint.nq), step_.segment(joint.idx_v, joint.nv),
+                          basis_.q.segment(joint.idx_q, joint.nq));
+    updatePlacements<T>(block.model, scratch.ws, basis_.q);
+    const T gap = updateResidual(block, scratch);
+    const Mask stalled = i > 0 ? gap > 0.5 * previous : never;
+    failed = failed || !(gap <= std::numeric_limits<double>::max());
+    closed = closed || gap <= kClosedTolerance || (stalled && gap <= kAcceptedTolerance);
+    const Mask active = !(closed || failed);
+    if (!any(active) || i == kMaxIterations) break;
+    const Mask slow = i > 0 ? active && gap > 0.05 * previous : active;
+    if (any(slow)) failed = failed || (slow && !updateNewton(block, scratch, start, slow));
+    previous = gap;
+    for (size_t r = 0; r < start.rows.size(); ++r)
+      scratch.correction[r] = getEntry(scratch.residual.data(), start.rows[r]);
+    // The residual falls by J dq (notation.h), and dq = -W^{-1} J(q_0)^T dzeta.
+    solveFactorized(scratch.newton, scratch.pivots, scratch.correction);
+    for (Eigen::Index r = 0; r < zeta_.size(); ++r)
+      scratch.correction[r] = select(active && !failed, scratch.correction[r], T(0));
+    zeta_ -= scratch.correction;
+    addSmallProductTransposed(scratch.JW, scratch.correction, step_);
+  }
+  if (!any(closed)) return closed;
+  closed_ = true;
+  return closed && updateBases(block, scratch);
+}
+
+template <typename T>
+std::string BlockStateOf<T>::describeFailure(const LoopBlock& block, const BlockScratch& scratch) const {
+  const ConstraintSet& set = block.closures;
+  if (closed_)
+    return "closure '" + set.closures.front().name + "': the rank of its loops is no longer " +
+           std::to_string(block.rank) + ": a configuration where they can move in other ways";
+  size_t worst = 0;
+  double largest = -1;
+  for (size_t c = 0; c < set.closures.size(); ++c) {
+    const double gap = scratch.residual.segment(set.offsets[c], getRows(set.closures[c].kind)).cwiseAbs().maxCoeff();
+    if (gap > largest) largest = gap, worst = c;
+  }
+  return "closure '" + set.closures[worst].name + "' does not close: the step is too large, or out of its reach";
+}
+
+void BlockPoint::selectIndependent(const MatrixXd& all, MatrixXd& out) const {
+  selectRows<double>(all, basis().rows, out);
+}
+
+template <typename T>
+void expandIndependent(const BlockBasisOf<T>& basis, typename ArgumentsOf<T>::ConstVector independent,
+                       typename ArgumentsOf<T>::Vector all) {
+  all.setZero();
+  for (size_t i = 0; i < basis.rows.size(); ++i) setEntry(all.data(), basis.rows[i], independent[i]);
+}
+
+template struct BlockScratchOf<double>;
+template struct BlockScratchOf<Lanes>;
+template class BlockStateOf<double>;
+template class BlockStateOf<Lanes>;
+template struct BlockBasisOf<double>;
+template struct BlockBasisOf<Lanes>;
+template void applyPseudoInverse(const LoopBlock&, const BlockBasis&, double, MatrixRef, MatrixRef);
+template void applyPseudoInverse(const LoopBlock&, const BlockBasisOf<Lanes>&, double, ArgumentsOf<Lanes>::Matrix,
+                                 ArgumentsOf<Lanes>::Matrix);
+template void expandIndependent(const BlockBasis&, ConstVectorRef, VectorRef);
+template void expandIndependent(const BlockBasisOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector,
+                                ArgumentsOf<Lanes>::Vector);
+
+}  // namespace bielle

@@ -1,0 +1,198 @@
+// Several nodes at once: numbers in lanes are those of double, and what comes out of one lane does not depend on the others.
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "bielle/math/se3.h"
+#include "bielle/math/small_dense.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/benchmark_walk.h"
+#include "count_allocations.h"
+
+using namespace bielle;
+
+namespace {
+
+// The benchmark walk, shortened, and a trajectory near its guess whose states are closed.
+struct Walk {
+  explicit Walk(const Model& model) : motion(makeBenchmarkWalk(model, makeOptions(), Formulation::Reduced)) {
+    std::mt19937 rng(1);
+    std::normal_distribution<double> normal;
+    for (int k = 0; k < motion.problem->numStages(); ++k) {
+      VectorXd dx(motion.problem->tangentSize(k));
+      for (double& x : dx) x = 0.01 * normal(rng);
+      motion.problem->integrate(k, motion.guess.xs[k], dx, motion.guess.xs[k]);
+      for (double& u : motion.guess.us[k]) u += normal(rng);
+    }
+    next.assign(motion.guess.xs.size(), motion.guess.xs.front());
+  }
+  static BenchmarkWalkOptions makeOptions() {
+    BenchmarkWalkOptions options;
+    options.start_nodes = 3;
+    options.swing_nodes = 4;
+    options.cycles = 1;
+    options.total_nodes = 16;
+    return options;
+  }
+  // Steps of some stages together; what came out is in `next` and the tasks.
+  std::vector<StepTask> step(const std::vector<int>& stages) {
+    std::vector<StepTask> tasks;
+    for (int k : stages) {
+      StepTask task;
+      task.stage = k;
+      task.x = &motion.guess.xs[k];
+      task.u = &motion.guess.us[k];
+      task.x_next = &next[k + 1];
+      tasks.push_back(task);
+    }
+    motion.problem->stepStages(tasks);
+    return tasks;
+  }
+  Motion motion;
+  std::vector<VectorXd> next;
+};
+
+bool isSame(const StageModel& a, const StageModel& b) {
+  return a.Fx == b.Fx && a.Fu == b.Fu && a.gap == b.gap && a.cost == b.cost && a.lx == b.lx && a.lu == b.lu &&
+         a.lxx == b.lxx && a.lux == b.lux && a.luu == b.luu;
+}
+
+}  // namespace
+
+TEST_CASE("lanes: sine and cosine, rotations, twists and their logarithms are those of double") {
+  std::mt19937 rng(2);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (double range : {1e-3, 0.05, 1.0, 3.0, 1e3, 1e7}) {
+    std::array<Vector6d, kLane> twists;
+    Vector6<Lanes> packed;
+    std::array<const double*, kLane> in;
+    for (size_t l = 0; l < kLane; ++l) {
+      for (double& x : twists[l]) x = uniform(rng);
+      twists[l].tail<3>() *= (l % 2 ? 1e-2 : 1) * range;  // small and large ones side by side
+      in[l] = twists[l].data();
+    }
+    packLanes(in, 6, packed.data());
+    Lanes sine, cosine;
+    calcSineCosine(packed[5], sine, cosine);
+    const Vector3<Lanes> w = angular(packed);
+    const Matrix3<Lanes> R = exp3(w), Jr = calcRightJacobian3(w), JrInv = calcRightJacobianInverse3(w);
+    const Vector6<Lanes> log = log6(SE3Of<Lanes>(R, linear(packed)));
+    for (int l = 0; l < kLane; ++l) {
+      const Vector3d w_l = angular(twists[l]);
+      CHECK(std::abs(sine[l] - std::sin(w_l[2])) < 3e-16);
+      CHECK(std::abs(cosine[l] - std::cos(w_l[2])) < 3e-16);
+      if (range > 3) continue;
+      Matrix3d one;
+      unpackLane(R.data(), l, 9, one.data());
+      CHECK((one - exp3(w_l)).norm() < 1e-15);
+      unpackLane(Jr.data(), l, 9, one.data());
+      CHECK((one - calcRightJacobian3(w_l)).norm() < 1e-15);
+      unpackLane(JrInv.data(), l, 9, one.data());
+      CHECK((one - calcRightJacobianInverse3(w_l)).norm() < 1e-13);
+      Vector6d log_l;
+      unpackLane(log.data(), l, 6, log_l.data());
+      CHECK((log_l - log6(SE3(exp3(w_l), linear(twists[l])))).norm() < 1e-13);
+    }
+  }
+}
+
+TEST_CASE("lanes: each has its own pivots, and a singular one is told from the others") {
+  std::mt19937 rng(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  constexpr int n = 5;
+  std::array<MatrixXd, kLane> A;
+  MatrixX<Lanes> factors(n, n);
+  VectorX<Lanes> x = VectorX<Lanes>::Constant(n, 1.0);
+  std::array<const double*, kLane> in;
+  for (size_t l = 0; l < kLane; ++l) {
+    A[l] = MatrixXd::NullaryExpr(n, n, [&] { return uniform(rng); });
+    if (l == 3) A[l].row(2).setZero();
+    in[l] = A[l].data();
+  }
+  packLanes(in, n * n, factors.data());
+  std::vector<LogicOf<Lanes>::Index> pivots(n);
+  const LaneMask regular = factorizeSmall(factors, pivots);
+  solveFactorized(factors, pivots, x);
+  for (size_t l = 0; l < kLane; ++l) {
+    CHECK(regular[l] == (l != 3));
+    if (l == 3) continue;
+    VectorXd x_l(n);
+    unpackLane(x.data(), l, n, x_l.data());
+    CHECK((A[l] * x_l - VectorXd::Ones(n)).norm() < 1e-11);
+  }
+}
+
+TEST_CASE("steps taken together are those taken alone, whichever come together") {
+  const LoadedRobot robot = loadRobot("bipetto");
+  Walk walk(robot.model), other(robot.model);
+  const int N = walk.motion.problem->numStages();
+  std::vector<int> all(N);
+  for (int k = 0; k < N; ++k) all[k] = k;
+  const std::vector<StepTask> tasks = walk.step(all);
+  for (const std::vector<int>& some : {std::vector<int>{9, 2, 14}, {4, 3}, {0, 1, 5, 6, 7, 8, 10, 11, 12, 13, 15}}) {
+    for (const StepTask& task : other.step(some)) {
+      REQUIRE(task.status == StepStatus::Ok);
+      CHECK(other.next[task.stage + 1] == walk.next[task.stage + 1]);  // by the bit
+      CHECK(task.cost == tasks[task.stage].cost);
+    }
+  }
+  for (int k : all) {
+    Walk alone(robot.model);
+    CHECK(alone.step({k}).front().status == StepStatus::Ok);
+    CHECK((alone.next[k + 1] - walk.next[k + 1]).norm() < 1e-11 * walk.next[k + 1].norm());
+  }
+}
+
+TEST_CASE("a step that fails does so alone, and says why") {
+  const LoadedRobot robot = loadRobot("bipetto");
+  Walk walk(robot.model), other(robot.model);
+  other.motion.guess.us[4].setConstant(1e9);  // beyond the reach of every loop
+  other.motion.guess.us[6][0] = std::numeric_limits<double>::quiet_NaN();
+  walk.step({2, 4, 5, 6});
+  const std::vector<StepTask> tasks = other.step({2, 4, 5, 6});
+  CHECK(tasks[1].status == StepStatus::Failed);
+  CHECK(other.motion.problem->getFailure(4).find("closure") != std::string::npos);
+  CHECK(tasks[3].status == StepStatus::Failed);
+  for (int i : {0, 2}) {
+    CHECK(tasks[i].status == StepStatus::Ok);
+    CHECK(other.next[tasks[i].stage + 1] == walk.next[tasks[i].stage + 1]);
+  }
+}
+
+TEST_CASE("models made together are those made one by one, by the bit") {
+  const LoadedRobot robot = loadRobot("bipetto");
+  Walk walk(robot.model);
+  RobotProblem& problem = *walk.motion.problem;
+  const auto& [xs, us] = walk.motion.guess;
+  const int N = problem.numStages();
+  std::vector<StageModel> models(N + 1), others(N + 1);
+  std::vector<StepStatus> statuses(N + 1, StepStatus::Failed);
+  problem.linearizeStages(0, N, xs, us, models, statuses);
+  for (int k = 0; k < N; ++k) {
+    REQUIRE(statuses[k] == StepStatus::Ok);
+    REQUIRE(problem.linearize(k, xs[k], us[k], xs[k + 1], others[k]) == StepStatus::Ok);
+    CHECK(isSame(models[k], others[k]));
+  }
+  problem.linearizeStages(3, 6, xs, us, others, statuses);
+  for (int k = 3; k < 6; ++k) CHECK(isSame(models[k], others[k]));
+  others[4].lxx(1, 2) += 1e-15 + others[4].lxx(1, 2) * 1e-15;
+  CHECK(!isSame(models[4], others[4]));
+}
+
+TEST_CASE("steps and models made together allocate nothing after the first") {
+  const LoadedRobot robot = loadRobot("bipetto");
+  Walk walk(robot.model);
+  RobotProblem& problem = *walk.motion.problem;
+  const auto& [xs, us] = walk.motion.guess;
+  const int N = problem.numStages();
+  std::vector<StageModel> models(N + 1);
+  std::vector<StepStatus> statuses(N + 1);
+  std::vector<StepTask> tasks = walk.step({1, 4, 8});
+  problem.linearizeStages(0, N, xs, us, models, statuses);
+  for (VectorXd& u : walk.motion.guess.us) u.array() += 0.1;
+  const long before = num_allocations;
+  const VectorXd counted(100);
+  CHECK(num_allocations == before + 1);
+  problem.stepStages(tasks);
+  problem.linearizeStages(0, N, xs, us, models, statuses);
+  CHECK(num_allocations == before + 1);
+}
