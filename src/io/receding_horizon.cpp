@@ -44,6 +44,37 @@ class Window : public ShootingProblem {
                        StageModel& out) override {
     return whole_.linearize(first_ + stage, x, u, x_next_node, out);
   }
+  void stepStages(std::vector<StepTask>& tasks) override {
+    for (StepTask& task : tasks) task.stage += first_;
+    whole_.stepStages(tasks);
+    for (StepTask& task : tasks) task.stage -= first_;
+  }
+  // The whole problem counts nodes from its own first one: what it works on is lent to the places where it looks.
+  void linearizeStages(int begin, int end, const std::vector<VectorXd>& xs, const std::vector<VectorXd>& us,
+                       std::vector<StageModel>& models, std::vector<StepStatus>& statuses) override {
+    static thread_local ShootingTrajectory trajectory;
+    static thread_local std::vector<StageModel> whole_models;
+    static thread_local std::vector<StepStatus> whole_statuses;
+    const size_t size = whole_.numStages() + 1;
+    if (whole_models.size() != size) {
+      trajectory.xs.resize(size);
+      trajectory.us.resize(size);
+      whole_models.resize(size);
+      whole_statuses.resize(size);
+    }
+    for (int k = begin; k < end; ++k) {
+      trajectory.xs[first_ + k] = xs[k];
+      trajectory.us[first_ + k] = us[k];
+      std::swap(whole_models[first_ + k], models[k]);
+    }
+    trajectory.xs[first_ + end] = xs[end];
+    whole_.linearizeStages(first_ + begin, first_ + end, trajectory.xs, trajectory.us, whole_models, whole_statuses);
+    for (int k = begin; k < end; ++k) {
+      std::swap(whole_models[first_ + k], models[k]);
+      statuses[k] = whole_statuses[first_ + k];
+    }
+  }
+  int getBatchSize() const override { return whole_.getBatchSize(); }
   StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override { return whole_.linearizeTerminal(x, out); }
   std::string getFailure(int node) const override { return whole_.getFailure(getNode(node)); }
 
