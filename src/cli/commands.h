@@ -20,6 +20,7 @@ void addView(CLI::App& app, Action& action);
 void addExport(CLI::App& app, Action& action);
 void addInfo(CLI::App& app, Action& action);
 void addEval(CLI::App& app, Action& action);
+void addDesign(CLI::App& app, Action& action);
 void addGenerate(CLI::App& app, Action& action);
 void addRobots(CLI::App& app, Action& action);
 void addBench(CLI::App& app, Action& action);

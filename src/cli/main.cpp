@@ -45,6 +45,7 @@ int run(int argc, char** argv) {
   addEval(app, action);
   addRobots(app, action);
   addGenerate(app, action);
+  addDesign(app, action);
   addRatio(app, action);
   addLift(app, action);
   addStudy(app, action);

@@ -38,15 +38,6 @@ constexpr const char* kPaper = "those published with the paper, on its structure
 constexpr const char* kPaperJump =
     "those published with the paper, on its structure: no paths of the feet, the height at mid-flight alone";
 
-const MotionEntry& findMotion(const std::string& file, const std::string& name) {
-  std::string known;
-  for (const MotionEntry& entry : getMotions()) {
-    if (entry.name == name) return entry;
-    known += (known.empty() ? "" : ", ") + entry.name;
-  }
-  throw ModelError(file, "motion '" + name + "'", "there is no such motion", "choose one of: " + known);
-}
-
 // The motions of a sequence from the names of its options: "walk2.speed" is one of a walk.
 std::vector<std::string> listParts(const std::vector<std::pair<std::string, double>>& requested) {
   std::vector<std::string> labels, motions;
@@ -97,6 +88,15 @@ const std::vector<MotionEntry>& getMotions() {
        makeRequests<JumpOptions>(planJump, {{"paper", kPaperJump, setPaperWeights}})},
   };
   return motions;
+}
+
+const MotionEntry& findMotion(const std::string& file, const std::string& name) {
+  std::string known;
+  for (const MotionEntry& entry : getMotions()) {
+    if (entry.name == name) return entry;
+    known += (known.empty() ? "" : ", ") + entry.name;
+  }
+  throw ModelError(file, "motion '" + name + "'", "there is no such motion", "choose one of: " + known);
 }
 
 MotionRequest makeSequenceRequest(const std::vector<std::string>& motions) {

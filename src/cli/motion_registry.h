@@ -32,6 +32,9 @@ struct MotionEntry {
 
 const std::vector<MotionEntry>& getMotions();
 
+// By name. \throws ModelError naming the file that asks for it, when there is none
+const MotionEntry& findMotion(const std::string& file, const std::string& name);
+
 // Motions by name, one after the other. Options are "NAME.option"; where a motion comes again NAME is "walk2" and so on.
 // \throws ModelError when there is no such motion
 inline constexpr const char* kSequence = "sequence";

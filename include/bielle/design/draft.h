@@ -1,0 +1,48 @@
+#pragma once
+/// \file A model taken apart: places and inertias may change, names and the tree stay.
+#include <string>
+#include <vector>
+
+#include "bielle/model/model.h"
+
+namespace bielle {
+
+class RobotDraft {
+ public:
+  /// The model must outlive the draft.
+  explicit RobotDraft(const Model& model);
+
+  /// A point fixed in a body, in the body's frame (m).
+  struct Place {
+    int body = 0;
+    Vector3d p = Vector3d::Zero();
+  };
+  /// Where a joint stands in the body that carries it, or a frame in its body.
+  /// \throws ModelError when there is neither, or the name is that of a whole body
+  Place getPlace(const std::string& name) const;
+  /// A place by name as seen in `body`: that of getPlace, or the origin where it is the joint that carries `body`.
+  /// \throws ModelError when it is fixed to another body
+  Vector3d getPlaceIn(int body, const std::string& name) const;
+  /// Moves a joint with all that it carries, or a frame with the closures and contacts that were made of it.
+  void setPlace(const std::string& name, const Vector3d& p);
+
+  /// Stretches a link along `direction` (unit) by `factor`, `origin` staying where it is, its mass per length too:
+  ///     D = 1 + (factor - 1) d d^T,   m' = factor m,   c' = origin + D (c - origin),   S' = factor D S D         (1)
+  /// with S = tr(I) / 2 - I the second moments about the centre of mass; what was a possible inertia stays one. Boxes
+  /// and cylinders that are drawn along d grow too.
+  void stretch(const std::string& link, const Vector3d& origin, const Vector3d& direction, double factor);
+
+  Model build() const;
+
+ private:
+  int findMovable(const std::string& name, bool& is_joint) const;
+  int findFrameAt(int body, const SE3& X_BF) const;
+  std::string getLink(int body) const { return body == 0 ? "world" : model_.bodies()[body].name; }
+
+  const Model& model_;
+  std::vector<SE3> joints_, frames_;
+  std::vector<Inertia> inertias_;
+  std::vector<Visual> visuals_;
+};
+
+}  // namespace bielle

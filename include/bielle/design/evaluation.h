@@ -1,0 +1,80 @@
+#pragma once
+/// \file What a design is worth: its motions made, its measures taken, in units of the start design.
+///
+/// With m_i the measures of a design and m_i0 those of the start, a feasible design is worth
+///     f = sum_i w_i m_i / m_i0,                                                                                    (1)
+/// W = sum_i w_i at the start. Infeasible ones are never an error but
+///     f = 2 W + W mean_p min(1, 10 g_p)      some posture p of the start's motions cannot be taken                     (2)
+///     f = 1.5 W + 0.5 W s                    all can, but a motion could not be made                                   (3)
+/// with g_p (m or rad) the largest closing error that is left when loops, base and feet should be where they are in
+/// posture p, and s in (0, 1] the share of the motion that is missing (kept motions), else 1. (2) is continuous in
+/// the design: searches slide back to where the loops close.
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bielle/design/measures.h"
+#include "bielle/design/parametrization.h"
+#include "bielle/motion/motion.h"
+
+namespace bielle {
+
+struct DesignMotion {
+  std::string name;
+  std::function<MotionPlan(const Model&, const VectorXd& q0)> plan;  ///< called by several threads
+};
+
+enum class MotionMode {
+  Reoptimized,  ///< solved for the design, from the solution of the start design
+  Kept          ///< postures and accelerations of the start design; motors recomputed (transmission/lift.h)
+};
+const char* getName(MotionMode mode);
+
+struct ObjectiveTerm {
+  Measure measure = Measure::PeakTorque;
+  std::vector<std::string> motors;  ///< empty: all
+  double weight = 1;                ///< w_i
+};
+
+struct EvaluationOptions {
+  MotionMode mode = MotionMode::Reoptimized;
+  FddpOptions solver = makeSolverOptions();
+  int postures = 6;  ///< of each motion, for (2)
+
+  /// Tolerances of engineering: a cost that changes by less than 1e-8 of itself is done. One thread.
+  static FddpOptions makeSolverOptions();
+};
+
+enum class DesignStatus { Feasible, LoopOpen, MotionFailed };
+const char* getName(DesignStatus status);
+
+struct Evaluation {
+  DesignStatus status = DesignStatus::Feasible;
+  double value = 0;                     ///< f
+  std::vector<double> terms;            ///< m_i, when feasible
+  std::vector<MotionMeasures> motions;  ///< when feasible
+  std::string message;                  ///< why not feasible
+};
+
+/// Makes the motions of the start design when it is made; designs are then evaluated each by itself, so that the result
+/// does not depend on the order, by any number of threads at a time.
+class DesignEvaluator {
+ public:
+  /// \throws ModelError when the start design cannot make the motions, or the objective names unknown motors
+  DesignEvaluator(const Parametrization& robot, std::vector<DesignMotion> motions, std::vector<ObjectiveTerm> objective,
+                  const EvaluationOptions& options = {});
+  ~DesignEvaluator();
+
+  Evaluation evaluate(const VectorXd& x) const;
+  const Evaluation& start() const;  ///< of the start design
+  const Parametrization& robot() const;
+  const std::vector<DesignMotion>& motions() const;
+  const std::vector<ObjectiveTerm>& objective() const;
+
+ private:
+  struct Data;
+  std::unique_ptr<Data> data_;
+};
+
+}  // namespace bielle

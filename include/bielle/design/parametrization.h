@@ -1,0 +1,65 @@
+#pragma once
+/// \file A robot made of named, bounded numbers: the parameters of a generator, or lengths and shifts of a given robot.
+#include <string>
+#include <vector>
+
+#include "bielle/model/model.h"
+
+namespace bielle {
+
+/// The distance of two places of one body (draft.h names them), `to` moving along the line.
+struct LengthChange {
+  std::string from, to;
+  Vector3d across = Vector3d::Zero();  ///< unit vector, in the body: only what is perpendicular to it counts; zero: all
+  std::string stretched;               ///< link whose mass, inertia and drawing grow with the length, or empty
+};
+
+/// A joint or frame moved along a direction of the body that it is fixed to.
+struct ShiftChange {
+  std::string of;
+  Vector3d along = Vector3d::UnitX();  ///< unit vector
+};
+
+/// One number. Of several lengths the first one is the value and the others change by as much (left and right legs,
+/// which need not be equal to the last digit); shifts are all by the value, from where the robot has the place.
+struct DesignVariable {
+  std::string name, unit = "m";
+  double lower = 0, upper = 0;
+  std::string parameter;  ///< of the generator, or
+  std::vector<LengthChange> lengths;
+  std::vector<ShiftChange> shifts;
+};
+
+/// Makes robots out of numbers, fast and without files; names and order of everything are those of the start.
+class Parametrization {
+ public:
+  /// A given robot.
+  /// \param source  named by errors, the file the variables are from
+  /// \throws ModelError for unknown names, places of different bodies, bounds that are crossed or leave the robot out
+  Parametrization(Model model, std::vector<DesignVariable> variables, std::string source = "");
+  /// A generated one, other parameters of the generator being set to what is given.
+  Parametrization(const std::string& generator, std::vector<std::pair<std::string, double>> settings,
+                  std::vector<DesignVariable> variables, std::string source = "");
+
+  const std::vector<DesignVariable>& variables() const { return variables_; }
+  const VectorXd& start() const { return start_; }  ///< the robot as it is
+  const VectorXd& lower() const { return lower_; }
+  const VectorXd& upper() const { return upper_; }
+  const Model& startModel() const { return model_; }
+
+  /// Changes of given robots are made in the order of the variables.
+  /// \throws ModelError when the numbers make no robot
+  Model make(const VectorXd& x) const;
+
+ private:
+  Model generate(const VectorXd* x, VectorXd* start) const;
+  void finish();
+
+  std::string source_, generator_;
+  std::vector<std::pair<std::string, double>> settings_;
+  std::vector<DesignVariable> variables_;
+  Model model_;
+  VectorXd start_, lower_, upper_;
+};
+
+}  // namespace bielle

@@ -1,0 +1,48 @@
+#pragma once
+/// \file The searches of a design problem, logged and resumable, and what comes of them.
+///
+/// Every search writes DIR/search<i>.jsonl: a line that tells what is searched, then one line per evaluation, flushed
+/// before the search goes on. Searches are deterministic; one that was killed at any time is done again with the
+/// evaluations it finds in its log, and goes on where it was. A line that was not finished is dropped.
+#include <array>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bielle/design/spec.h"
+
+namespace bielle {
+
+struct DesignRunOptions {
+  std::string directory;
+  int jobs = 2;                                           ///< searches at a time, one thread each
+  std::function<void(const std::string& line)> progress;  ///< called by one thread at a time
+};
+
+struct LoggedEvaluation {
+  std::string stage;  ///< algorithm
+  VectorXd x;
+  DesignStatus status = DesignStatus::Feasible;
+  double value = 0;
+  double seconds = 0;  ///< processor time when it was done
+};
+
+struct DesignRun {
+  std::vector<std::vector<LoggedEvaluation>> searches;
+  VectorXd best;                ///< the feasible design with the least value; the start when none is better
+  double value = 0;             ///< its value
+  Evaluation evaluation;        ///< of the best design, anew
+  std::array<int, 3> counts{};  ///< evaluations by status
+  int replayed = 0;             ///< evaluations found in the logs
+  double seconds = 0;           ///< processor time of all evaluations, those of earlier runs too
+};
+
+/// \throws ModelError when a log is of another problem, is used by another process, or cannot be written
+DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options);
+
+/// Writes DIR/best (a robot), design.md (before and after) and, where there is gnuplot, design.svg. The same run,
+/// resumed or not, writes the same bytes. Returns the paths. \throws ModelError when a file cannot be written
+std::vector<std::string> writeDesign(const std::string& directory, const DesignEvaluator& evaluator,
+                                     const DesignSpec& spec, const DesignRun& run);
+
+}  // namespace bielle

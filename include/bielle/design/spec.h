@@ -1,0 +1,61 @@
+#pragma once
+/// \file A design problem in a YAML file.
+///
+/// ```yaml
+/// robot: bipetto                 # name, directory or .urdf file (a path: from this file); or
+/// generator: cleobot             # with  set: {thigh_length: 0.2}
+/// variables:
+///   - name: crank                # of a given robot: the distance of two places (joints or frames) of one body
+///     bounds: [0.04, 0.06]       # m
+///     length:                    # one map, or a list: of several the first is the value, the others change by as much
+///       - {from: motor_knee_right, to: transmission_knee_right, across: [0, 0, 1], stretch: knee_crank_right}
+///       - {from: motor_knee_left, to: transmission_knee_left, across: [0, 0, 1], stretch: knee_crank_left}
+///   - name: motor_x              # or a shift of places from where they are
+///     bounds: [-0.01, 0.01]
+///     shift: {of: motor_knee_right, along: [1, 0, 0]}
+///   - {name: foot, parameter: ankle_height, unit: m, bounds: [0.05, 0.08]}    # of a generator
+/// motions:
+///   - {motion: squat, set: {depth: 0.6}}
+/// mode: reoptimized              # or kept
+/// objective:                     # measures: peak_torque, rms_torque, energy, conditioning; all motors by default
+///   - {measure: peak_torque, motors: [motor_knee_left, motor_knee_right], weight: 1}
+/// search:
+///   seed: 1
+///   searches: 2                  # independent ones, one thread each
+///   stages:                      # crs or isres, then bobyqa or sbplx
+///     - {algorithm: crs, evaluations: 200, tolerance: 1e-3}
+/// ```
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bielle/design/evaluation.h"
+#include "bielle/design/search.h"
+
+namespace bielle {
+
+struct DesignSpec {
+  using Settings = std::vector<std::pair<std::string, double>>;
+  struct MotionSpec {
+    std::string motion;
+    Settings settings;
+  };
+  std::string path, text;        ///< the file and what is in it
+  std::string robot, generator;  ///< one of them
+  Settings settings;             ///< of the generator
+  std::vector<DesignVariable> variables;
+  std::vector<MotionSpec> motions;
+  MotionMode mode = MotionMode::Reoptimized;
+  std::vector<ObjectiveTerm> objective;
+  unsigned seed = 1;
+  int searches = 2;
+  std::vector<SearchStage> stages = {{SearchAlgorithm::Crs, 200, 1e-3}, {SearchAlgorithm::Sbplx, 100, 1e-3}};
+};
+
+/// \throws ModelError naming the file, the key with its line, and the remedy
+DesignSpec readDesignSpec(const std::string& path);
+
+/// The robot of a file with its variables. \throws ModelError
+Parametrization makeParametrization(const DesignSpec& spec);
+
+}  // namespace bielle

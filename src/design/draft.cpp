@@ -1,0 +1,118 @@
+#include "bielle/design/draft.h"
+
+#include "bielle/model/builder.h"
+
+namespace bielle {
+
+RobotDraft::RobotDraft(const Model& model) : model_(model), visuals_(model.visuals()) {
+  for (const Joint& joint : model.joints()) joints_.push_back(joint.X_PJ);
+  for (const Frame& frame : model.frames()) frames_.push_back(frame.X_BF);
+  for (const Body& body : model.bodies()) inertias_.push_back(body.inertia);
+}
+
+int RobotDraft::findMovable(const std::string& name, bool& is_joint) const {
+  const int joint = model_.findJoint(name), frame = model_.findFrame(name);
+  is_joint = joint > 0;
+  if (is_joint) return joint;
+  if (frame < 0)
+    throw ModelError(model_.name(), "place '" + name + "'", "there is no such joint or frame",
+                     "`bielle info` lists them");
+  if (getLink(model_.frames()[frame].body) == name)
+    throw ModelError(model_.name(), "place '" + name + "'", "it is a link, the origin of its own coordinates",
+                     "name the joint that carries it");
+  return frame;
+}
+
+RobotDraft::Place RobotDraft::getPlace(const std::string& name) const {
+  bool is_joint = false;
+  const int index = findMovable(name, is_joint);
+  if (is_joint) return {model_.joints()[index].parent, joints_[index].p};
+  return {model_.frames()[index].body, frames_[index].p};
+}
+
+Vector3d RobotDraft::getPlaceIn(int body, const std::string& name) const {
+  if (model_.joints()[body].name == name) return Vector3d::Zero();
+  const Place place = getPlace(name);
+  if (place.body != body)
+    throw ModelError(model_.name(), "place '" + name + "'",
+                     "it is fixed to '" + getLink(place.body) + "', not to '" + getLink(body) + "'",
+                     "name two places of one body");
+  return place.p;
+}
+
+void RobotDraft::setPlace(const std::string& name, const Vector3d& p) {
+  bool is_joint = false;
+  const int index = findMovable(name, is_joint);
+  (is_joint ? joints_ : frames_)[index].p = p;
+}
+
+void RobotDraft::stretch(const std::string& link, const Vector3d& origin, const Vector3d& direction, double factor) {
+  int body = 1;
+  while (body < model_.numBodies() && model_.bodies()[body].name != link) ++body;
+  if (body == model_.numBodies())
+    throw ModelError(model_.name(), "link '" + link + "'", "there is no such body", "`bielle info` lists them");
+  const Matrix3d D = Matrix3d::Identity() + (factor - 1) * direction * direction.transpose();
+  Inertia& inertia = inertias_[body];
+  const Matrix3d S = inertia.I_com.trace() / 2 * Matrix3d::Identity() - inertia.I_com;  // Eq. (1)
+  const Matrix3d stretched = factor * D * S * D;
+  inertia.mass *= factor;
+  inertia.com = origin + D * (inertia.com - origin);
+  inertia.I_com = stretched.trace() * Matrix3d::Identity() - stretched;
+  for (Visual& visual : visuals_) {
+    if (visual.body != body) continue;
+    visual.X_BV.p = origin + D * (visual.X_BV.p - origin);
+    const Vector3d along = (visual.X_BV.R.transpose() * direction).cwiseAbs();
+    if (visual.shape == Visual::Shape::Cylinder && along.z() > 0.99) visual.size[1] *= factor;
+    if (visual.shape != Visual::Shape::Box) continue;
+    for (int i = 0; i < 3; ++i)
+      if (along[i] > 0.99) visual.size[i] *= factor;
+  }
+}
+
+int RobotDraft::findFrameAt(int body, const SE3& X_BF) const {
+  for (size_t i = 0; i < model_.frames().size(); ++i) {
+    const Frame& frame = model_.frames()[i];
+    if (frame.body == body && frame.X_BF.p == X_BF.p && frame.X_BF.R == X_BF.R) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+Model RobotDraft::build() const {
+  const Model& m = model_;
+  ModelBuilder builder(m.name());
+  builder.setGravity(m.gravity());
+  for (int i = 1; i < m.numBodies(); ++i) {
+    Joint joint = m.joints()[i];
+    joint.X_PJ = joints_[i];
+    JointLimits limits;
+    if (joint.nv > 0)
+      limits = {m.lowerLimits().segment(joint.idx_v, joint.nv), m.upperLimits().segment(joint.idx_v, joint.nv),
+                m.velocityLimits().segment(joint.idx_v, joint.nv)};
+    builder.addLink(getLink(i), getLink(joint.parent), joint, inertias_[i], limits);
+  }
+  for (size_t i = 0; i < frames_.size(); ++i) {
+    const Frame& frame = m.frames()[i];
+    if (frame.name != getLink(frame.body)) builder.addFrame(frame.name, getLink(frame.body), {frames_[i]});
+  }
+  // What was made of a frame goes where the frame goes.
+  const auto place = [&](const std::string& name, int body, const SE3& X_BF) {
+    if (const int frame = findFrameAt(body, X_BF); frame >= 0) return m.frames()[frame].name;
+    builder.addFrame(name, getLink(body), X_BF);
+    return name;
+  };
+  for (const Closure& c : m.closures())
+    builder.addClosure(c.name, c.kind, place(c.name + "/frame1", c.body1, c.X_B1),
+                       place(c.name + "/frame2", c.body2, c.X_B2), c.axis, c.kp, c.kd);
+  for (const Motor& motor : m.motors())
+    builder.addMotor(motor.name, motor.armature, motor.effort_limit, motor.velocity_limit);
+  for (const Joint& joint : m.joints())
+    if (joint.nv > 0 && m.findMotor(joint.name) < 0) builder.setArmature(joint.name, m.armature()[joint.idx_v]);
+  for (const ContactFrame& c : m.contacts())
+    builder.addContact(c.name, place(c.name + "/frame", c.body, c.X_BF), c.kind, c.half_length, c.half_width);
+  for (const Reference& reference : m.references()) builder.addReference(reference);
+  for (const Visual& visual : visuals_) builder.addVisual(getLink(visual.body), visual);
+  for (int joint : m.serialJoints()) builder.addSerialJoint(m.joints()[joint].name);
+  return builder.build();
+}
+
+}  // namespace bielle

@@ -1,0 +1,33 @@
+#pragma once
+// The log of one search: what is in it is replayed, the rest is appended.
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "bielle/design/run.h"
+
+namespace bielle {
+
+class EvaluationLog {
+ public:
+  // Opens and holds the file. \throws ModelError when `header` is not its first line, it is held by another process, or it
+  // cannot be written
+  EvaluationLog(const std::string& path, const std::string& header);
+  ~EvaluationLog();
+  EvaluationLog(const EvaluationLog&) = delete;
+  EvaluationLog& operator=(const EvaluationLog&) = delete;
+
+  // The next evaluation of the log, if there is one. \throws ModelError when it is of another design
+  std::optional<LoggedEvaluation> replay(const std::string& stage, const VectorXd& x);
+  void append(const LoggedEvaluation& evaluation);
+
+ private:
+  void read(const std::string& header);
+  void write(const std::string& line);
+
+  std::string path_;
+  int file_ = -1;
+  std::deque<LoggedEvaluation> left_;
+};
+
+}  // namespace bielle

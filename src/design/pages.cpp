@@ -1,0 +1,123 @@
+// What a design run leaves behind: the robot, the table, the figure.
+#include <filesystem>
+#include <sstream>
+
+#include "bielle/design/run.h"
+#include "bielle/io/result.h"
+#include "bielle/io/robot_writer.h"
+#include "io/aside_file.h"
+#include "io/figure.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle {
+namespace {
+
+std::string format(double value, const char* pattern = "%.4g") {
+  char text[40];
+  std::snprintf(text, sizeof text, pattern, value);
+  return text;
+}
+
+std::string formatChange(double before, double after) {
+  return before > 0 ? format(100 * (after / before - 1), "%+.1f %%") : "";
+}
+
+void writeRow(std::ostream& out, const std::string& name, double before, double after) {
+  out << "| " << name << " | " << format(before) << " | " << format(after) << " | " << formatChange(before, after)
+      << " |\n";
+}
+
+std::string describeTerm(const ObjectiveTerm& term) {
+  std::string text = getName(term.measure);
+  for (const std::string& motor : term.motors) text += (&motor == &term.motors.front() ? " of " : ", ") + motor;
+  return text;
+}
+
+void writeVariables(std::ostream& out, const Parametrization& robot, const VectorXd& best) {
+  out << "| variable | unit | bounds | before | after |\n|---|---|---|---|---|\n";
+  for (size_t i = 0; i < robot.variables().size(); ++i) {
+    const DesignVariable& v = robot.variables()[i];
+    const Eigen::Index k = static_cast<Eigen::Index>(i);
+    out << "| " << v.name << " | " << v.unit << " | " << format(v.lower) << " .. " << format(v.upper) << " | "
+        << format(robot.start()[k], "%.5g") << " | " << format(best[k], "%.5g") << " |\n";
+  }
+}
+
+// The motors that turn more than others would make the table long: only what changed by a thousandth is told.
+bool isChanged(double before, double after) { return std::abs(after - before) > 1e-3 * std::abs(before); }
+
+void writeMotion(std::ostream& out, const Model& model, const std::string& name, const MotionMeasures& before,
+                 const MotionMeasures& after) {
+  out << "\n### " << name << "\n\n| measure | before | after | change |\n|---|---|---|---|\n";
+  for (int m = 0; m < model.nu(); ++m) {
+    const MotorMeasures &a = before.motors[m], &b = after.motors[m];
+    if (!isChanged(a.peak_torque, b.peak_torque) && !isChanged(a.peak_speed, b.peak_speed)) continue;
+    const std::string& motor = model.motors()[m].name;
+    writeRow(out, motor + ": peak torque [N m]", a.peak_torque, b.peak_torque);
+    writeRow(out, motor + ": rms torque [N m]", a.rms_torque, b.rms_torque);
+    writeRow(out, motor + ": peak speed [rad/s]", a.peak_speed, b.peak_speed);
+    writeRow(out, motor + ": energy [J]", a.energy, b.energy);
+  }
+  writeRow(out, "conditioning of the linkages", before.conditioning, after.conditioning);
+}
+
+std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRun& run) {
+  const Parametrization& robot = evaluator.robot();
+  std::ostringstream out;
+  out << "# Design of " << robot.startModel().name() << "\n\nMade by `bielle design` from "
+      << fs::path(spec.path).filename().string() << ", motions " << getName(spec.mode)
+      << ". The robot is in `best`; rows of motors that change by less than a thousandth are left out.\n\n";
+  writeVariables(out, robot, run.best);
+  out << "\n| objective | before | after | change |\n|---|---|---|---|\n";
+  for (size_t i = 0; i < evaluator.objective().size() && i < run.evaluation.terms.size(); ++i)
+    writeRow(out, describeTerm(evaluator.objective()[i]), evaluator.start().terms[i], run.evaluation.terms[i]);
+  writeRow(out, "value", evaluator.start().value, run.value);
+  out << "\n"
+      << run.counts[0] + run.counts[1] + run.counts[2] << " designs in " << run.searches.size()
+      << " searches: " << run.counts[0] << " feasible, " << run.counts[1] << " whose loops do not close, "
+      << run.counts[2] << " whose motion fails.\n";
+  for (size_t i = 0; i < run.evaluation.motions.size(); ++i)
+    writeMotion(out, robot.startModel(), evaluator.motions()[i].name, evaluator.start().motions[i],
+                run.evaluation.motions[i]);
+  return out.str();
+}
+
+// Values of feasible designs as points, the least so far as a line, one colour per search.
+std::string makeScript(const DesignEvaluator& evaluator, const DesignRun& run) {
+  std::ostringstream script, plots;
+  script << "set encoding utf8\nset grid\nset xlabel 'evaluation'\nset ylabel 'value'\nset yrange [*:"
+         << 1.5 * evaluator.start().value << "]\n";
+  for (size_t i = 0; i < run.searches.size(); ++i) {
+    double best = evaluator.start().value;
+    script << "$s" << i << " << EOD\n";
+    int count = 0;
+    for (const LoggedEvaluation& e : run.searches[i]) {
+      ++count;
+      if (e.status == DesignStatus::Feasible) best = std::min(best, e.value);
+      script << count << " " << (e.status == DesignStatus::Feasible ? format(e.value, "%.9g") : "NaN") << " "
+             << format(best, "%.9g") << "\n";
+    }
+    script << "EOD\n";
+    const std::string number = std::to_string(i + 1);
+    plots << (i ? ", " : "plot ") << "$s" << i << " using 1:2 with points pt 7 ps 0.3 lc " << number << " notitle, $s"
+          << i << " using 1:3 with lines lw 2 lc " << number << " title 'best of search " << number << "'";
+  }
+  return script.str() + plots.str() + "\n";
+}
+
+}  // namespace
+
+std::vector<std::string> writeDesign(const std::string& directory, const DesignEvaluator& evaluator,
+                                     const DesignSpec& spec, const DesignRun& run) {
+  const std::string best = directory + "/best", page = directory + "/design.md", figure = directory + "/design.svg";
+  writeRobot(evaluator.robot().make(run.best), best, "Written by `bielle design`.");
+  AsideFile file(page);
+  file.write(formatPage(evaluator, spec, run));
+  file.commit();
+  std::vector<std::string> paths = {best, page};
+  if (drawSvg(figure, makeScript(evaluator, run))) paths.push_back(figure);
+  return paths;
+}
+
+}  // namespace bielle

@@ -1,0 +1,131 @@
+#include "bielle/design/run.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <ctime>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "bielle/io/result.h"
+#include "design/evaluation_log.h"
+#include "io/json_text.h"
+
+namespace bielle {
+namespace {
+
+double getThreadSeconds() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+std::string makeHeader(const DesignEvaluator& evaluator, const DesignSpec& spec, int search) {
+  const VectorXd& start = evaluator.robot().start();
+  const Json json = {{"bielle", getBuildInfo().bielle},
+                     {"search", search + 1},
+                     {"spec", spec.text},
+                     {"start", std::vector<double>(start.begin(), start.end())},
+                     {"measures", evaluator.start().terms}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+class DesignRunner {
+ public:
+  DesignRunner(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options)
+      : evaluator_(evaluator), spec_(spec), options_(options) {
+    makeOutputDirectory(options.directory);
+    for (int i = 0; i < spec.searches; ++i)
+      logs_.push_back(std::make_unique<EvaluationLog>(options.directory + "/search" + std::to_string(i + 1) + ".jsonl",
+                                                      makeHeader(evaluator, spec, i)));
+    run_.searches.resize(logs_.size());
+    run_.best = evaluator.robot().start();
+    run_.value = best_shown_ = evaluator.start().value;
+  }
+
+  DesignRun run() {
+    std::vector<std::thread> threads;
+    for (int i = 0; i < std::min(options_.jobs, spec_.searches); ++i) threads.emplace_back([this] { work(); });
+    for (std::thread& thread : threads) thread.join();
+    if (error_) std::rethrow_exception(error_);
+    for (const auto& search : run_.searches)
+      for (const LoggedEvaluation& e : search) {
+        ++run_.counts[static_cast<size_t>(e.status)];
+        run_.seconds += e.seconds;
+        if (e.status == DesignStatus::Feasible && e.value < run_.value) run_.value = e.value, run_.best = e.x;
+      }
+    run_.evaluation = evaluator_.evaluate(run_.best);
+    return std::move(run_);
+  }
+
+ private:
+  void work() {
+    for (size_t i = next_++; i < logs_.size(); i = next_++) {
+      try {
+        search(i);
+      } catch (...) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (!error_) error_ = std::current_exception();
+        next_ = logs_.size();
+        stop_ = true;
+      }
+    }
+  }
+
+  void search(size_t i) {
+    const Parametrization& robot = evaluator_.robot();
+    const auto objective = [&](const VectorXd& x, const SearchStage& stage) { return evaluate(i, x, stage); };
+    minimizeByStages({robot.lower(), robot.upper(), robot.start(), objective}, spec_.stages,
+                     spec_.seed + static_cast<unsigned>(i));
+  }
+
+  double evaluate(size_t i, const VectorXd& x, const SearchStage& stage) {
+    if (stop_) throw std::runtime_error("another search failed");
+    std::optional<LoggedEvaluation> found = logs_[i]->replay(getName(stage.algorithm), x);
+    const bool replayed = found.has_value();
+    if (!replayed) {
+      const double begin = getThreadSeconds();
+      const Evaluation evaluation = evaluator_.evaluate(x);
+      found = {getName(stage.algorithm), x, evaluation.status, evaluation.value, getThreadSeconds() - begin};
+      logs_[i]->append(*found);
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    run_.searches[i].push_back(*found);
+    run_.replayed += replayed;
+    report(i, *found, replayed);
+    return found->value;
+  }
+
+  // A line when a design is the best so far, and now and then.
+  void report(size_t i, const LoggedEvaluation& e, bool replayed) {
+    const bool better = e.status == DesignStatus::Feasible && e.value < best_shown_;
+    if (better) best_shown_ = e.value;
+    const size_t count = run_.searches[i].size();
+    if (!options_.progress || replayed || !(better || count % 20 == 0)) return;
+    char line[160];
+    std::snprintf(line, sizeof line, "search %zu, %s, evaluation %zu: %.4f (%s), best of all %.4f", i + 1,
+                  e.stage.c_str(), count, e.value, getName(e.status), best_shown_);
+    options_.progress(line);
+  }
+
+  const DesignEvaluator& evaluator_;
+  const DesignSpec& spec_;
+  const DesignRunOptions& options_;
+  std::vector<std::unique_ptr<EvaluationLog>> logs_;
+  DesignRun run_;
+  double best_shown_ = 0;
+  std::atomic<size_t> next_{0};
+  std::atomic<bool> stop_{false};
+  std::mutex mutex_;
+  std::exception_ptr error_;
+};
+
+}  // namespace
+
+DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options) {
+  return DesignRunner(evaluator, spec, options).run();
+}
+
+}  // namespace bielle

@@ -1,0 +1,170 @@
+#include "bielle/design/spec.h"
+
+#include <filesystem>
+
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "model/robot_files.h"
+#include "model/yaml_entry.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle {
+namespace {
+
+using Entry = YamlEntry;
+using Fields = YamlFields;
+
+// One of the values by its name.
+template <typename Enum>
+Enum readChoice(const Entry& entry, const std::vector<Enum>& choices) {
+  std::string names;
+  for (const Enum choice : choices) {
+    if (entry.getText() == getName(choice)) return choice;
+    names += std::string(names.empty() ? "" : ", ") + getName(choice);
+  }
+  entry.fail("'" + entry.getText() + "' is unknown", "use one of " + names);
+}
+
+DesignSpec::Settings readSettings(const Entry& entry) {
+  DesignSpec::Settings settings;
+  for (const auto& [name, value] : entry.getMap()) settings.emplace_back(name, value.getNumber());
+  return settings;
+}
+
+Vector3d readDirection(const Entry& entry) {
+  const Vector3d direction = entry.getVector3();
+  if (direction.norm() < 1e-9) entry.fail("it is no direction", "give three numbers that are not all zero");
+  return direction.normalized();
+}
+
+int readCount(const Entry& entry, int most) {
+  const double value = entry.getNumber();
+  if (value != std::floor(value) || value < 1 || value > most)
+    entry.fail("it is not a whole number in 1 .. " + std::to_string(most), "give one");
+  return static_cast<int>(value);
+}
+
+// A list, or its only element.
+std::vector<Entry> getItems(const Entry& entry) { return entry.isList() ? entry.getList() : std::vector<Entry>{entry}; }
+
+LengthChange readLength(const Entry& entry) {
+  const Fields fields = entry.getFields({"from", "to", "across", "stretch"});
+  LengthChange change;
+  change.from = require(fields, "from", entry).getText();
+  change.to = require(fields, "to", entry).getText();
+  if (const Entry* across = find(fields, "across")) change.across = readDirection(*across);
+  if (const Entry* link = find(fields, "stretch")) change.stretched = link->getText();
+  return change;
+}
+
+ShiftChange readShift(const Entry& entry) {
+  const Fields fields = entry.getFields({"of", "along"});
+  return {require(fields, "of", entry).getText(), readDirection(require(fields, "along", entry))};
+}
+
+DesignVariable readVariable(const Entry& entry) {
+  const Fields fields = entry.getFields({"name", "unit", "bounds", "length", "shift", "parameter"});
+  DesignVariable variable;
+  variable.name = require(fields, "name", entry).getText();
+  if (const Entry* unit = find(fields, "unit")) variable.unit = unit->getText();
+  const Entry& bounds = require(fields, "bounds", entry);
+  const std::vector<double> values = bounds.getNumbers(2);
+  variable.lower = values[0], variable.upper = values[1];
+  if (!(variable.lower < variable.upper))
+    bounds.fail("the bounds of variable '" + variable.name + "' are crossed", "give the lower one first");
+  if (const Entry* lengths = find(fields, "length"))
+    for (const Entry& item : getItems(*lengths)) variable.lengths.push_back(readLength(item));
+  if (const Entry* shifts = find(fields, "shift"))
+    for (const Entry& item : getItems(*shifts)) variable.shifts.push_back(readShift(item));
+  if (const Entry* parameter = find(fields, "parameter")) variable.parameter = parameter->getText();
+  const int kinds = !variable.lengths.empty() + !variable.shifts.empty() + !variable.parameter.empty();
+  if (kinds != 1)
+    entry.fail("variable '" + variable.name + "' is not one of a length, a shift and a parameter",
+               "give `length`, `shift` or `parameter`");
+  return variable;
+}
+
+ObjectiveTerm readTerm(const Entry& entry) {
+  const Fields fields = entry.getFields({"measure", "motors", "weight"});
+  ObjectiveTerm term;
+  term.measure = readChoice<Measure>(require(fields, "measure", entry),
+                                     {Measure::PeakTorque, Measure::RmsTorque, Measure::Energy, Measure::Conditioning});
+  if (const Entry* motors = find(fields, "motors")) term.motors = motors->getTexts();
+  if (const Entry* weight = find(fields, "weight")) term.weight = weight->getNumber();
+  if (!(term.weight > 0)) entry.fail("its weight is not positive", "give a positive number, or none");
+  return term;
+}
+
+void readSearch(const Entry& entry, DesignSpec& spec) {
+  const Fields fields = entry.getFields({"seed", "searches", "stages"});
+  if (const Entry* seed = find(fields, "seed")) spec.seed = static_cast<unsigned>(readCount(*seed, 1000000000));
+  if (const Entry* searches = find(fields, "searches")) spec.searches = readCount(*searches, 1000);
+  const Entry* stages = find(fields, "stages");
+  if (!stages) return;
+  spec.stages.clear();
+  for (const Entry& item : stages->getList()) {
+    const Fields stage_fields = item.getFields({"algorithm", "evaluations", "tolerance"});
+    SearchStage stage;
+    stage.algorithm = readChoice<SearchAlgorithm>(
+        require(stage_fields, "algorithm", item),
+        {SearchAlgorithm::Crs, SearchAlgorithm::Isres, SearchAlgorithm::Bobyqa, SearchAlgorithm::Sbplx});
+    stage.evaluations = readCount(require(stage_fields, "evaluations", item), 1000000);
+    if (const Entry* tolerance = find(stage_fields, "tolerance")) stage.tolerance = tolerance->getNumber();
+    if (!(stage.tolerance >= 0 && stage.tolerance < 1))
+      item.fail("its tolerance is outside 0 .. 1", "give a share of the bounds, e.g. 1e-3");
+    spec.stages.push_back(stage);
+  }
+  if (spec.stages.empty()) stages->fail("there are no stages", "give one, or leave the key out");
+}
+
+void readRoot(const Entry& root, DesignSpec& spec) {
+  const Fields fields =
+      root.getFields({"robot", "generator", "set", "variables", "motions", "mode", "objective", "search"});
+  if (const Entry* robot = find(fields, "robot")) spec.robot = robot->getText();
+  if (const Entry* generator = find(fields, "generator")) spec.generator = generator->getText();
+  if (spec.robot.empty() == spec.generator.empty())
+    root.fail("it names neither a robot nor a generator, or both", "give one of `robot` and `generator`");
+  if (const Entry* set = find(fields, "set")) {
+    if (spec.generator.empty()) set->fail("a given robot has no parameters", "remove it, or give a generator");
+    spec.settings = readSettings(*set);
+  }
+  for (const Entry& item : require(fields, "variables", root).getList()) spec.variables.push_back(readVariable(item));
+  for (const Entry& item : require(fields, "motions", root).getList()) {
+    const Fields motion_fields = item.getFields({"motion", "set"});
+    DesignSpec::MotionSpec motion;
+    motion.motion = require(motion_fields, "motion", item).getText();
+    if (const Entry* set = find(motion_fields, "set")) motion.settings = readSettings(*set);
+    spec.motions.push_back(motion);
+  }
+  if (const Entry* mode = find(fields, "mode"))
+    spec.mode = readChoice<MotionMode>(*mode, {MotionMode::Reoptimized, MotionMode::Kept});
+  for (const Entry& item : require(fields, "objective", root).getList()) spec.objective.push_back(readTerm(item));
+  if (const Entry* search = find(fields, "search")) readSearch(*search, spec);
+}
+
+}  // namespace
+
+DesignSpec readDesignSpec(const std::string& path) {
+  DesignSpec spec;
+  spec.path = path;
+  spec.text = readText(path);
+  try {
+    readRoot(Entry(path, "", YAML::Load(spec.text)), spec);
+  } catch (const YAML::Exception& error) {
+    throw ModelError(path, "line " + std::to_string(error.mark.line + 1), "it is not YAML: " + error.msg,
+                     "correct the syntax");
+  }
+  return spec;
+}
+
+Parametrization makeParametrization(const DesignSpec& spec) {
+  if (!spec.generator.empty()) return Parametrization(spec.generator, spec.settings, spec.variables, spec.path);
+  // A path is meant from where the file is; a name stays one.
+  const fs::path beside = fs::path(spec.path).parent_path() / spec.robot;
+  std::error_code error;
+  const bool is_path = spec.robot.find('/') != std::string::npos && fs::exists(beside, error);
+  return Parametrization(loadRobot(is_path ? beside.string() : spec.robot).model, spec.variables, spec.path);
+}
+
+}  // namespace bielle

@@ -1,0 +1,350 @@
+// Design: robots made of numbers, what they are worth, and searches that go on where they were killed.
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "bielle/design/draft.h"
+#include "bielle/design/run.h"
+#include "bielle/io/robot_writer.h"
+#include "bielle/model/error.h"
+#include "bielle/model/fourbar_chain.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/squat.h"
+#include "bielle/robots/generators.h"
+#include "robot_directory.h"
+#include "run_command.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+using Catch::Matchers::Contains;
+namespace fs = std::filesystem;
+
+namespace {
+
+const std::string kRobots = std::string(BIELLE_SOURCE_DIR) + "/robots/";
+const Vector3d kX = Vector3d::UnitX(), kZ = Vector3d::UnitZ();
+
+DesignVariable makeLength(const std::string& name, double lower, double upper, std::vector<LengthChange> lengths) {
+  DesignVariable variable;
+  variable.name = name, variable.lower = lower, variable.upper = upper, variable.lengths = std::move(lengths);
+  return variable;
+}
+
+DesignVariable makeShift(const std::string& name, double lower, double upper, std::vector<ShiftChange> shifts) {
+  DesignVariable variable;
+  variable.name = name, variable.lower = lower, variable.upper = upper, variable.shifts = std::move(shifts);
+  return variable;
+}
+
+Model loadBipetto() { return loadRobot(kRobots + "bipetto").model; }
+
+std::vector<DesignVariable> makeKnee() {
+  return {makeLength("crank", 0.03, 0.08,
+                     {{"motor_knee_right", "transmission_knee_right", kZ, "knee_crank_right"},
+                      {"motor_knee_left", "transmission_knee_left", kZ, "knee_crank_left"}}),
+          makeShift("motor", -0.03, 0.03, {{"motor_knee_right", kX}, {"motor_knee_left", kX}})};
+}
+
+// A squat of no depth, short: the cheapest motion there is.
+DesignMotion makeSmallSquat() {
+  SquatOptions options;
+  options.depth = 0.95, options.duration = 0.6, options.settle = 0.06, options.time_step = 0.03;
+  return {"squat", [options](const Model& model, const VectorXd& q0) { return planSquat(model, options, q0); }};
+}
+
+const std::vector<ObjectiveTerm> kKneePeak = {{Measure::PeakTorque, {"motor_knee_left", "motor_knee_right"}, 1}};
+
+std::string readFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+int countLines(const std::string& path) {
+  const std::string text = readFile(path);
+  return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+}
+
+}  // namespace
+
+TEST_CASE("design: lengths of a four-bar are those of its maker") {
+  FourBarChainOptions options;
+  const Model start = makeFourBarChain(options).model;
+  const std::vector<DesignVariable> variables = {
+      makeLength("crank", 0.1, 0.2, {{"crank1", "coupler1", Vector3d::Zero(), "crank1"}}),
+      makeLength("coupler", 0.3, 0.45, {{"coupler1", "end of coupler1", Vector3d::Zero(), "coupler1"}}),
+      makeLength("rocker", 0.2, 0.4, {{"rocker1", "end of rocker1", Vector3d::Zero(), "rocker1"}}),
+      makeShift("ground", -0.1, 0.1, {{"rocker1", kX}})};
+  const Parametrization robot(start, variables);
+  CHECK(robot.start().isApprox(Eigen::Vector4d(options.crank, options.coupler, options.rocker, 0), 1e-14));
+
+  FourBarChainOptions other = options;
+  other.crank = 0.13, other.coupler = 0.41, other.rocker = 0.27, other.ground = options.ground + 0.03;
+  const Model made = robot.make(Eigen::Vector4d(other.crank, other.coupler, other.rocker, 0.03));
+  const Model expected = makeFourBarChain(other).model;
+  for (int i = 1; i < made.numBodies(); ++i) {
+    CAPTURE(made.joints()[i].name);
+    CHECK(made.joints()[i].name == expected.joints()[i].name);
+    CHECK((made.joints()[i].X_PJ.p - expected.joints()[i].X_PJ.p).norm() < 1e-14);
+    const Matrix6d Y = made.bodies()[i].inertia.toMatrix(), Y_expected = expected.bodies()[i].inertia.toMatrix();
+    CHECK((Y - Y_expected).norm() < 1e-14 * Y_expected.norm());
+  }
+  CHECK((made.closures()[0].X_B1.p - expected.closures()[0].X_B1.p).norm() < 1e-14);
+  CHECK((made.closures()[0].X_B2.p - expected.closures()[0].X_B2.p).norm() < 1e-14);
+}
+
+TEST_CASE("design: the start of a parametrization is the robot, to the last letter") {
+  const Model bipetto = loadBipetto();
+  const Parametrization robot(bipetto, makeKnee());
+  const RobotText made = formatRobot(robot.make(robot.start())), given = formatRobot(bipetto);
+  CHECK(made.urdf == given.urdf);
+  CHECK(made.yaml == given.yaml);
+  CHECK(robot.start()[0] == Approx(std::hypot(0.048296, 0.012941)).epsilon(1e-12));
+}
+
+TEST_CASE("design: both legs change by as much, and nothing else does") {
+  const Model bipetto = loadBipetto();
+  const Parametrization robot(bipetto, makeKnee());
+  VectorXd x = robot.start();
+  x[0] += 0.01, x[1] = 0.004;
+  const Model made = robot.make(x);
+  for (int i = 1; i < made.numBodies(); ++i) {
+    const Joint &a = bipetto.joints()[i], &b = made.joints()[i];
+    CAPTURE(a.name);
+    REQUIRE(a.name == b.name);
+    const double change = (b.X_PJ.p - a.X_PJ.p).norm();
+    const bool crank = a.name.rfind("transmission_knee", 0) == 0, motor = a.name.rfind("motor_knee", 0) == 0;
+    CHECK(change == Approx(crank ? 0.01 : motor ? 0.004 : 0).margin(1e-14));
+    if (crank) CHECK(b.X_PJ.p.z() == a.X_PJ.p.z());  // along its axis nothing moves
+  }
+  const auto mass = [](const Model& model) {
+    for (const Body& body : model.bodies())
+      if (body.name == "knee_crank_left") return body.inertia.mass;
+    return 0.0;
+  };
+  CHECK(mass(made) == Approx(mass(bipetto) * (robot.start()[0] + 0.01) / robot.start()[0]).epsilon(1e-5));
+}
+
+TEST_CASE("design: a stretched body stays a possible one") {
+  const Model bipetto = loadBipetto();
+  RobotDraft draft(bipetto);
+  const Vector3d direction = Vector3d(1, -2, 0.5).normalized();
+  draft.stretch("shin_left", Vector3d(0.1, 0, 0), direction, 0.2);
+  const Model made = draft.build();
+  int body = 1;
+  while (made.bodies()[body].name != "shin_left") ++body;
+  const Vector3d moments = Eigen::SelfAdjointEigenSolver<Matrix3d>(made.bodies()[body].inertia.I_com).eigenvalues();
+  CHECK(moments[0] > 0);
+  CHECK(moments[0] + moments[1] >= moments[2]);
+  CHECK(made.bodies()[body].inertia.mass == Approx(0.2 * bipetto.bodies()[body].inertia.mass));
+  // Across the direction the second moments only lose mass.
+  const Vector3d across = direction.cross(kZ).normalized();
+  const auto second = [&](const Inertia& i) { return i.I_com.trace() / 2 - across.dot(i.I_com * across); };
+  CHECK(second(made.bodies()[body].inertia) == Approx(0.2 * second(bipetto.bodies()[body].inertia)));
+}
+
+TEST_CASE("design: parameters of a generator") {
+  DesignVariable variable;
+  variable.name = "thigh", variable.parameter = "thigh_length", variable.lower = 0.05, variable.upper = 0.5;
+  const Parametrization robot("cleobot", {}, {variable});
+  const GeneratorRequest request = findGenerator("cleobot").makeRequest();
+  const double length = robot.start()[0];
+  setParameter(request.parameters, "thigh_length", length * 1.02);
+  CHECK(formatRobot(robot.make(1.02 * robot.start())).urdf == formatRobot(request.make()).urdf);
+  CHECK(formatRobot(robot.make(robot.start())).urdf != formatRobot(request.make()).urdf);
+}
+
+TEST_CASE("design: measures by hand") {
+  const Model model = makeFourBarChain().model;  // the motor is that of the crank, dof 1
+  ShootingTrajectory trajectory;
+  const VectorXd q = makeFourBarChain().q_closed;
+  for (double speed : {0.5, -2.0, 9.0}) {
+    VectorXd x = VectorXd::Zero(6);
+    x << q, 0, speed, 0;
+    trajectory.xs.push_back(x);
+  }
+  for (double torque : {3.0, -4.0}) trajectory.us.push_back(VectorXd::Constant(1, torque));
+  const MotionMeasures measures = calcMotionMeasures(model, {0.1, 0.3}, trajectory);
+  CHECK(measures.motors[0].peak_torque == 4);
+  CHECK(measures.motors[0].rms_torque == Approx(std::sqrt((0.1 * 9 + 0.3 * 16) / 0.4)));
+  CHECK(measures.motors[0].peak_speed == 2);
+  CHECK(measures.motors[0].energy == Approx(0.1 * 1.5 + 0.3 * 8));
+  // A unit motion of one mobility: the speeds of rocker, crank and coupler by the loop's equations,
+  //     -a s2 w2 - b s3 w3 = -c s4 w4,   a c2 w2 + b c3 w3 = c c4 w4   with w2 = 1.
+  const FourBarChainOptions o;
+  const double t4 = q[0], t2 = q[1], t3 = q[1] + q[2];
+  const double w4 = o.crank * std::sin(t2 - t3) / (o.rocker * std::sin(t4 - t3));
+  const double w3 = o.crank * std::sin(t2 - t4) / (o.coupler * std::sin(t4 - t3));
+  CHECK(measures.conditioning == Approx(std::sqrt(1 + w4 * w4 + (w3 - 1) * (w3 - 1))).epsilon(1e-9));
+}
+
+TEST_CASE("design: a shorter crank is evaluated, an impossible one penalized") {
+  const Parametrization robot(loadBipetto(), makeKnee());
+  const DesignEvaluator evaluator(robot, {makeSmallSquat()}, kKneePeak);
+  CHECK(evaluator.start().value == 1);
+  VectorXd x = robot.start();
+  x[0] -= 0.003;
+  const Evaluation shorter = evaluator.evaluate(x), again = evaluator.evaluate(x);
+  REQUIRE(shorter.status == DesignStatus::Feasible);
+  CHECK(shorter.value == Approx(shorter.terms[0] / evaluator.start().terms[0]));
+  CHECK(shorter.value == again.value);
+  CHECK(std::abs(shorter.value - 1) > 1e-3);
+
+  // The start's motion kept gives nearly the same torques: the motion hardly depends on so small a change.
+  EvaluationOptions kept;
+  kept.mode = MotionMode::Kept;
+  const Evaluation recomputed = DesignEvaluator(robot, {makeSmallSquat()}, kKneePeak, kept).evaluate(x);
+  REQUIRE(recomputed.status == DesignStatus::Feasible);
+  CHECK(recomputed.value == Approx(shorter.value).epsilon(0.05));
+
+  // Out of reach, more and more: worse than anything feasible, and continuous.
+  const Parametrization wide(loadBipetto(), {makeLength("rod", 0.01, 0.3,
+                                                        {{"free_knee_right", "closure_knee_right_A", kZ, ""},
+                                                         {"free_knee_left", "closure_knee_left_A", kZ, ""}})});
+  const DesignEvaluator reach(wide, {makeSmallSquat()}, kKneePeak);
+  double last = 1.5;
+  for (double length : {0.06, 0.05, 0.04, 0.03}) {
+    CAPTURE(length);
+    const Evaluation open = reach.evaluate(VectorXd::Constant(1, length));
+    CHECK(open.status == DesignStatus::LoopOpen);
+    CHECK(open.value > last);
+    last = open.value;
+  }
+  const double near = reach.evaluate(VectorXd::Constant(1, 0.03 + 1e-6)).value;
+  CHECK(std::abs(near - last) < 1e-3);
+}
+
+TEST_CASE("design: searches find a minimum, the same one for the same seed") {
+  SearchProblem problem;
+  problem.lower = Eigen::Vector2d(-1, 0), problem.upper = Eigen::Vector2d(3, 10), problem.start = Eigen::Vector2d(0, 9);
+  std::vector<VectorXd> points;
+  problem.objective = [&](const VectorXd& x, const SearchStage&) {
+    points.push_back(x);
+    return std::pow(x[0] - 1, 2) + std::pow((x[1] - 4) / 3, 2);
+  };
+  for (SearchAlgorithm global : {SearchAlgorithm::Crs, SearchAlgorithm::Isres})
+    for (SearchAlgorithm local : {SearchAlgorithm::Bobyqa, SearchAlgorithm::Sbplx}) {
+      const std::vector<SearchStage> stages = {{global, 100, 1e-4}, {local, 150, 1e-6}};
+      points.clear();
+      const SearchResult result = minimizeByStages(problem, stages, 7);
+      CHECK((result.x - Eigen::Vector2d(1, 4)).norm() < 1e-2);
+      CHECK(result.evaluations == static_cast<int>(points.size()));
+      const std::vector<VectorXd> first = points;
+      points.clear();
+      minimizeByStages(problem, stages, 7);
+      CHECK(points == first);
+      points.clear();
+      minimizeByStages(problem, stages, 8);
+      CHECK(points != first);
+    }
+  problem.objective = [](const VectorXd&, const SearchStage&) -> double { throw ModelError("a", "b", "c", "d"); };
+  CHECK_THROWS_AS(minimizeByStages(problem, {{}}, 1), ModelError);
+}
+
+namespace {
+
+const char* const kSpec = R"(robot: ROBOT
+variables:
+  - name: crank
+    bounds: [0.03, 0.08]
+    length:
+      - {from: motor_knee_right, to: transmission_knee_right, across: [0, 0, 1], stretch: knee_crank_right}
+      - {from: motor_knee_left, to: transmission_knee_left, across: [0, 0, 1], stretch: knee_crank_left}
+  - name: motor
+    bounds: [-0.01, 0.01]
+    shift: [{of: motor_knee_right, along: [1, 0, 0]}, {of: motor_knee_left, along: [1, 0, 0]}]
+motions:
+  - {motion: squat, set: {depth: 0.95, duration: 0.6, settle: 0.06, time_step: 0.03}}
+objective:
+  - {measure: peak_torque, motors: [motor_knee_left, motor_knee_right]}
+search:
+  searches: 2
+  stages:
+    - {algorithm: crs, evaluations: 40}
+    - {algorithm: sbplx, evaluations: 10}
+)";
+
+std::string makeSpec() { return replaceOnce(kSpec, "ROBOT", kRobots + "bipetto"); }
+
+}  // namespace
+
+TEST_CASE("design: a search that is killed goes on and ends the same way") {
+  const RobotDirectory directory;
+  const std::string spec = directory.write("spec.yaml", makeSpec());
+  const std::string whole = directory.path() + "/whole", killed = directory.path() + "/killed";
+  const CommandResult first = runCommand({BIELLE_COMMAND, "design", spec, "-o", whole, "--jobs", "1"});
+  INFO(first.err);
+  REQUIRE(first.status == 0);
+  CHECK_THAT(first.out, Contains("infeasible"));
+
+  {
+    Command command({BIELLE_COMMAND, "design", spec, "-o", killed});
+    REQUIRE(command.waitForOutput("evaluation 20", 120));
+    command.sendSignal(9);
+    CHECK(command.wait().status == 128 + 9);
+  }
+  const std::string log = killed + "/search1.jsonl";
+  CHECK_FALSE(fs::exists(killed + "/design.md"));
+  const int done = countLines(log) - 1;
+  CHECK(done > 0);
+  CHECK(done < 50);
+  std::ofstream(log, std::ios::app) << "{\"stage\": \"cr";  // a line that was not finished
+  const CommandResult second = runCommand({BIELLE_COMMAND, "design", spec, "-o", killed});
+  INFO(second.err);
+  REQUIRE(second.status == 0);
+  CHECK_THAT(second.out, !Contains(", 0 of them from the logs"));
+  for (const char* file : {"/design.md", "/best/best.urdf", "/best/best.yaml"}) {
+    CAPTURE(file);
+    CHECK_FALSE(readFile(whole + file).empty());
+    CHECK(readFile(whole + file) == readFile(killed + file));
+  }
+  CHECK(fs::exists(whole + "/design.svg") == fs::exists(killed + "/design.svg"));
+  CHECK(countLines(log) == countLines(whole + "/search1.jsonl"));
+
+  // The design is a robot, better than the start.
+  const std::string page = readFile(whole + "/design.md"), row = "| value | 1 | ";
+  REQUIRE_THAT(page, Contains(row));
+  CHECK(std::strtod(page.c_str() + page.find(row) + row.size(), nullptr) < 1);
+  CHECK_NOTHROW(loadRobot(whole + "/best"));
+  CHECK(runCommand({BIELLE_COMMAND, "info", whole + "/best"}).status == 0);
+
+  // The log of another problem is refused.
+  directory.write("spec.yaml", replaceOnce(makeSpec(), "evaluations: 40", "evaluations: 41"));
+  const CommandResult other = runCommand({BIELLE_COMMAND, "design", spec, "-o", killed});
+  CHECK(other.status == 2);
+  CHECK_THAT(other.err, Contains("the log is of another design problem"));
+}
+
+TEST_CASE("design: what is wrong is told with its place and remedy") {
+  const RobotDirectory directory;
+  const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
+    const std::string spec = directory.write("spec.yaml", replaceOnce(makeSpec(), from, to));
+    const CommandResult result = runCommand({BIELLE_COMMAND, "design", spec, "-o", directory.path() + "/out"});
+    CAPTURE(to, result.err);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, Contains(problem));
+    CHECK_FALSE(fs::exists(directory.path() + "/out"));
+  };
+  check("[0.03, 0.08]", "[0.08, 0.03]", "crossed");
+  check("[0.03, 0.08]", "[0.06, 0.08]", "outside of its bounds");
+  check("[0.03, 0.08]", "[0.03]", "give 2");
+  check("to: transmission_knee_right", "to: transmission", "there is no such joint or frame");
+  check("from: motor_knee_right", "from: knee_left", "not to 'knee_crank_right'");
+  check("stretch: knee_crank_right", "stretch: crank", "there is no such body");
+  check("- name: motor\n", "- name: crank\n", "given twice");
+  check("motion: squat", "motion: dance", "there is no such motion");
+  check("depth: 0.95", "dept: 0.95", "dept");
+  check("measure: peak_torque", "measure: peak", "use one of peak_torque, rms_torque");
+  check("motors: [motor_knee_left", "motors: [motor_knee", "there is no such motor");
+  check("algorithm: crs", "algorithm: newton", "use one of crs");
+  check("objective:", "objectiv:", "it is unknown");
+  check("depth: 0.95", "depth: 0.05", "start design");
+  CHECK_THROWS_AS(readDesignSpec(directory.path() + "/none.yaml"), ModelError);
+  DesignVariable unknown;
+  unknown.name = "x", unknown.parameter = "no_such", unknown.lower = 0, unknown.upper = 1;
+  CHECK_THROWS_WITH(Parametrization("cleobot", {}, {unknown}), Contains("no_such"));
+}
