@@ -4,8 +4,8 @@
 /// With m_i the measures of a design and m_i0 those of the start, a feasible design is worth
 ///     f = sum_i w_i m_i / m_i0,                                                                                    (1)
 /// W = sum_i w_i at the start. Infeasible ones are never an error but
-///     f = 2 W + W mean_p min(1, 10 g_p)      some posture p of the start's motions cannot be taken                     (2)
-///     f = 1.5 W + 0.5 W s                    all can, but a motion could not be made                                   (3)
+///     f = 2 W + W mean_p min(1, 10 g_p)      some posture p of the start's motions cannot be taken                 (2)
+///     f = 1.5 W + 0.5 W s                    all can, but a motion could not be made                               (3)
 /// with g_p (m or rad) the largest closing error that is left when loops, base and feet should be where they are in
 /// posture p, and s in (0, 1] the share of the motion that is missing (kept motions), else 1. (2) is continuous in
 /// the design: searches slide back to where the loops close.

@@ -17,7 +17,7 @@ const char* getName(SearchAlgorithm algorithm);
 
 struct SearchStage {
   SearchAlgorithm algorithm = SearchAlgorithm::Crs;
-  int evaluations = 100;    ///< at most
+  int evaluations = 100;    ///< at most, but for the few that an algorithm makes in one go
   double tolerance = 1e-3;  ///< done when steps are below, as a share of the width of the bounds
 };
 

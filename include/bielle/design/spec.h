@@ -55,7 +55,7 @@ struct DesignSpec {
 /// \throws ModelError naming the file, the key with its line, and the remedy
 DesignSpec readDesignSpec(const std::string& path);
 
-/// The robot of a file with its variables. \throws ModelError
+/// The robot of a file with its variables. \throws ModelError when there is no such robot or variable
 Parametrization makeParametrization(const DesignSpec& spec);
 
 }  // namespace bielle
