@@ -121,7 +121,8 @@ MotionRequest makeSequenceRequest(const std::vector<std::string>& motions) {
 MotionRequest remakeRequest(const MotionSummary& summary) {
   const MotionRequest request = summary.motion == kSequence ? makeSequenceRequest(listParts(summary.requested))
                                                             : findMotion(summary.file, summary.motion).makeRequest();
-  for (const auto& [name, value] : summary.requested) setOption(request.options, name, value);
+  for (const auto& [name, value] : summary.requested)
+    if (name.rfind(kEffortLimit, 0) != 0 && name.rfind(kVelocityLimit, 0) != 0) setOption(request.options, name, value);
   return request;
 }
 

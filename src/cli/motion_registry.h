@@ -40,7 +40,10 @@ const MotionEntry& findMotion(const std::string& file, const std::string& name);
 inline constexpr const char* kSequence = "sequence";
 MotionRequest makeSequenceRequest(const std::vector<std::string>& motions);
 
-// The request that a result tells of.
+// Limits given by motor stand among what was requested under these names and that of the motor.
+inline constexpr const char *kEffortLimit = "limit ", *kVelocityLimit = "velocity-limit ";
+
+// The request that a result tells of, without limits: they are part of the problem, not of the motion.
 // \throws ModelError when there is no such motion or option
 MotionRequest remakeRequest(const MotionSummary& summary);
 

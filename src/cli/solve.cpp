@@ -105,9 +105,9 @@ void addReport(const std::string& directory) {
 // The limits given by motor are told with what else was asked.
 Motion makeLimited(const MotionRequest& request, const Model& model, const ProblemOptions& problem) {
   Motion motion = makeMotion(model, request.plan(model, makeStandingPosture(model)), problem);
-  for (const auto& [motor, value] : problem.limits.efforts) motion.requested.emplace_back("limit " + motor, value);
+  for (const auto& [motor, value] : problem.limits.efforts) motion.requested.emplace_back(kEffortLimit + motor, value);
   for (const auto& [motor, value] : problem.limits.velocities)
-    motion.requested.emplace_back("velocity-limit " + motor, value);
+    motion.requested.emplace_back(kVelocityLimit + motor, value);
   return motion;
 }
 
