@@ -114,8 +114,8 @@ const std::map<std::string, Expected>& getExpected() {
   // platform moves in 3 directions. Chain: 3 joints and one planar loop per four-bar.
   static const std::map<std::string, Expected> expected = {
       {"cleobot", {30, 30, 18, 12, 24.6}}, {"rsu_biped", {12, 12, 18, 12, 25.68}},
-      {"fivebar_leg", {5, 2, 3, 2, 1.83}}, {"spring_leg", {8, 5, 5, 5, 7.77}},
-      {"delta", {25, 13, 3, 3, 0.927}},    {"fourbar_chain", {15, 6, 3, 3, 4.8}},
+      {"fivebar_leg", {5, 2, 3, 2, 1.83}}, {"spring_leg", {8, 5, 5, 5, 8.297}},
+      {"delta", {25, 13, 3, 3, 3.918}},    {"fourbar_chain", {15, 6, 3, 3, 4.8}},
   };
   return expected;
 }
@@ -318,6 +318,36 @@ TEST_CASE("delta: the platform follows the closed form") {
     const SE3 X = getPlacement(ws, effector.body, effector.X_BF);
     CHECK((X.p + Vector3d(0, 0, depth(p.arm_angle + turn))).norm() < 1e-9);
     CHECK(X.R.isIdentity(1e-9));
+  }
+}
+
+TEST_CASE("delta: the platform is where the worked examples of its source have it") {
+  // R. L. Williams II, 2016, of the IRB 360-1/1600: motor angles, in degrees, for a place of the platform, in metres. The
+  // first arm is along -y there and along x here.
+  struct Example {
+    Vector3d place, angles;
+  };
+  const DeltaParameters p;
+  const Model model = makeDelta(p);
+  const Frame& effector = model.frames()[model.findFrame("effector")];
+  for (const Example& example :
+       {Example{{0, 0, -0.9}, {-20.5, -20.5, -20.5}}, Example{{0.3, 0.5, -1.1}, {47.5, -11.6, 21.4}}}) {
+    AssemblyProblem problem;
+    problem.q_ref = model.makeNeutral();
+    problem.weights = VectorXd::Constant(model.nv(), 1e-6);
+    for (int m = 0; m < 3; ++m) {
+      problem.q_ref[model.joints()[model.motors()[m].joint].idx_q] = example.angles[m] * M_PI / 180 - p.arm_angle;
+      problem.weights[model.motors()[m].dof] = 1;
+    }
+    const AssemblyResult result = assemble(model, problem);
+    REQUIRE(result.status == AssemblyStatus::Closed);
+    Workspace ws(model);
+    updatePositions(model, ws, result.q);
+    const Vector3d& place = example.place;
+    const Vector3d difference =
+        getPlacement(ws, effector.body, effector.X_BF).p - Vector3d(-place.y(), place.x(), place.z());
+    CAPTURE(difference.transpose());
+    CHECK(difference.norm() < 2e-3);  // angles are printed to a tenth of a degree
   }
 }
 

@@ -10,6 +10,7 @@
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
+#include "bielle/robots/spring_leg.h"
 #include "measure_steps.h"
 
 using namespace bielle;
@@ -86,6 +87,73 @@ TEST_CASE("published models load and close, with the rank and mobility that they
     CHECK(mobility.rank == expected.rank);
     CHECK(mobility.mobility == expected.mobility);
   }
+}
+
+TEST_CASE("the spring leg has the lengths, angles and masses of Digit's published leg") {
+  if (!isAtHand("digit_like_2legs")) return;
+  LoadOptions options;
+  options.base = BaseKind::Fixed;
+  const Model digit = loadRobot(kPublished + "/digit_like_2legs", options).model;
+  Workspace ws(digit);
+  updatePositions(digit, ws, digit.makeNeutral());
+  const auto find = [&](const std::string& name) {
+    const int joint = digit.findJoint(name), index = digit.findFrame(name);
+    REQUIRE((joint >= 0 || index >= 0));
+    if (joint >= 0) return ws.X_WB[joint];
+    return getPlacement(ws, digit.frames()[index].body, digit.frames()[index].X_BF);
+  };
+  // The plane of the right leg is square to the axis of hip pitch.
+  const int pitch = digit.findJoint("motor_hip_y");
+  const Vector3d axis = ws.X_WB[pitch].R * digit.joints()[pitch].axis;
+  const auto span = [&](const std::string& from, const std::string& to) { return Vector3d(find(to).p - find(from).p); };
+  const auto flatten = [&](const Vector3d& a) { return Vector3d(a - axis * axis.dot(a)); };
+  const auto turn = [&](const Vector3d& a, const Vector3d& b) {  // from a to b
+    return std::atan2(axis.dot(flatten(b).cross(flatten(a))), flatten(a).dot(flatten(b)));
+  };
+  const SpringLegParameters p;
+  const Vector3d tarsus = span("free_knee", "free_foot1"), heel = span("free_knee", "spherical_free_knee"),
+                 crank_place = span("free_knee", "motor_shin1");
+  const double to_figures = 6e-5;  // four digits
+  CHECK(span("motor_hip_y", "motor_knee").norm() == Approx(p.thigh_length).margin(to_figures));
+  CHECK(flatten(span("motor_knee", "free_knee")).norm() == Approx(p.shin_length).margin(to_figures));
+  CHECK(flatten(tarsus).norm() == Approx(p.tarsus_length).margin(to_figures));
+  CHECK(heel.norm() == Approx(p.heel_length).margin(to_figures));
+  CHECK(turn(-heel, tarsus) == Approx(p.heel_bend).margin(5e-4));
+  CHECK(flatten(span("motor_hip_y", "spherical_free_hip")).norm() < 1e-6);  // the heel rod starts on the pitch axis
+  CHECK(axis.dot(span("motor_hip_y", "spherical_free_hip") - span("motor_knee", "free_knee")) ==
+        Approx(p.rod_offset).margin(to_figures));
+  CHECK(span("spherical_free_hip", "closedloop1_A").norm() + span("spherical_free_knee", "closedloop1_B").norm() ==
+        Approx(p.heel_rod_length).margin(to_figures));
+  CHECK(flatten(crank_place).norm() == Approx(p.crank_place).margin(to_figures));
+  CHECK(turn(crank_place, tarsus) == Approx(p.crank_bend).margin(5e-4));
+  CHECK(flatten(span("motor_shin1", "spherical_free_shin2")).norm() == Approx(p.crank_length).margin(to_figures));
+  CHECK(span("spherical_free_shin2", "closedloop2_A").norm() + span("spherical_free_foot2", "closedloop2_B").norm() ==
+        Approx(p.plantar_length).margin(to_figures));
+  // In the frame of the foot: z up, x forward.
+  const SE3 foot = find("foot");
+  const Vector3d toe = foot.R.transpose() * (find("free_foot1").p - foot.p),
+                 lever = foot.R.transpose() * span("free_foot1", "spherical_free_foot1");
+  CHECK(toe.z() == Approx(p.ankle_height).margin(to_figures));
+  CHECK(-toe.x() == Approx(p.sole_offset).margin(to_figures));
+  CHECK(std::hypot(lever.x(), lever.z()) == Approx(p.lever_length).margin(to_figures));
+  CHECK(std::atan2(lever.x(), -lever.z()) == Approx(p.lever_angle).margin(5e-4));
+  const Vector3d yaw = find("motor_hip_z").p - find("motor_hip_x").p, drop = span("motor_hip_z", "motor_hip_y");
+  CHECK(-yaw.x() == Approx(p.yaw_offset).margin(to_figures));
+  CHECK(-yaw.z() == Approx(p.yaw_drop).margin(to_figures));
+  CHECK(-drop.z() == Approx(p.pitch_drop).margin(to_figures));
+
+  const auto mass = [&](const std::string& joint) { return digit.bodies()[digit.findJoint(joint)].inertia.mass; };
+  CHECK(mass("motor_hip_x") == Approx(p.hip_roll_mass).epsilon(0.002));
+  CHECK(mass("motor_hip_z") == Approx(p.hip_yaw_mass).epsilon(0.002));
+  CHECK(mass("motor_hip_y") == Approx(p.thigh_mass).epsilon(0.002));
+  CHECK(mass("motor_knee") == Approx(p.shin_mass).epsilon(0.002));
+  CHECK(mass("free_knee") == Approx(p.tarsus_mass).epsilon(0.002));
+  CHECK(mass("free_foot1") + mass("free_foot2") == Approx(p.foot_mass).epsilon(0.002));
+  CHECK(mass("spherical_free_hip") + mass("spherical_free_knee") == Approx(p.heel_rod_mass).epsilon(0.002));
+  CHECK(mass("motor_shin1") + mass("motor_shin2") == Approx(p.crank_mass).epsilon(0.01));
+  CHECK(mass("spherical_free_shin1") + mass("spherical_free_shin2") + mass("spherical_free_foot1") +
+            mass("spherical_free_foot2") ==
+        Approx(p.plantar_mass).epsilon(0.01));
 }
 
 TEST_CASE("Digit squats, walks and climbs stairs with the feet and the posture that come along") {

@@ -31,20 +31,20 @@ Arm makeArm(const DeltaParameters& p, int index, double depth) {
 // A bar between the rods of a parallelogram, its middle at a point.
 Solid makeBar(const DeltaParameters& p, const Arm& arm, const Vector3d& middle) {
   const Vector3d side = p.half_width * arm.tangent;
-  return makeRod(middle - side, middle + side, 0.004, p.rod_density, colors::kSteel);
+  return makeRod(middle - side, middle + side, 0.008, p.rod_density, colors::kSteel);
 }
 
 // Motor to lower bar; the parallelogram is closed between its second rod and the lower bar.
 void addArm(const DeltaParameters& p, const Arm& arm, const std::string& name, ModelBuilder& builder) {
   const Vector3d side = p.half_width * arm.tangent, forearm = arm.wrist - arm.elbow, upper = arm.elbow - arm.motor;
   addSolidLink("upper" + name, "world", makeRevolute("motor" + name, arm.motor, arm.tangent),
-               {makeRod(kOrigin, upper, 0.008, 2 * p.rod_density, colors::kMotor)}, builder);
+               {makeRod(kOrigin, upper, 0.02, 2 * p.rod_density, colors::kMotor)}, builder);
   addSolidLink("upper_bar" + name, "upper" + name, makeRevolute("elbow" + name, upper, arm.tangent),
                {makeBar(p, arm, kOrigin)}, builder);
   for (const char* rod : {"b", "a"}) {
     const Vector3d place = *rod == 'a' ? side : Vector3d(-side);
     addSolidLink("rod" + name + rod, "upper_bar" + name, makeRevolute("swing" + name + rod, place, arm.normal),
-                 {makeRod(kOrigin, forearm, 0.004, p.rod_density, colors::kRod)}, builder);
+                 {makeRod(kOrigin, forearm, 0.008, p.rod_density, colors::kRod)}, builder);
     builder.addFrame("rod_end" + name + rod, "rod" + name + rod, {Matrix3d::Identity(), forearm});
   }
   addSolidLink("lower_bar" + name, "rod" + name + "a", makeRevolute("lower" + name, forearm, arm.normal),
@@ -83,12 +83,12 @@ Model makeDelta(const DeltaParameters& parameters) {
   std::vector<Arm> arms;
   for (int i = 0; i < 3; ++i) arms.push_back(makeArm(p, i, depth));
   Solid plate =
-      makeCylinder(-depth * kZ - arms[0].wrist, kZ, p.platform_radius, 0.01, p.platform_mass, colors::kOutput);
+      makeCylinder(-depth * kZ - arms[0].wrist, kZ, p.platform_radius, 0.02, p.platform_mass, colors::kOutput);
   for (int i = 0; i < 3; ++i) {
     const std::string name = std::to_string(i + 1);
     Visual motor;
     motor.shape = Visual::Shape::Cylinder;
-    const Solid solid = makeCylinder(arms[i].motor, arms[i].tangent, 0.02, 0.05, 0, colors::kMotor);
+    const Solid solid = makeCylinder(arms[i].motor, arms[i].tangent, 0.05, 0.1, 0, colors::kMotor);
     motor.X_BV = solid.X_LS;
     motor.size = solid.size;
     motor.rgba = solid.rgba;

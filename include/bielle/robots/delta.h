@@ -10,23 +10,25 @@
 ///     h = l1 sin theta + sqrt(l2^2 - (R + l1 cos theta - r)^2).                                                  (2)
 /// Spatial count (Gruebler) with 16 joints after cutting: 16 - 5 * 5 = -9. The platform has its three translations.
 ///
-/// Lengths of the example in a widely read derivation of the delta's kinematics (triangles of 457.3 and 115 mm, arms of 112
-/// and 232 mm), so that R = 457.3 / (2 sqrt 3) and r = 115 / (2 sqrt 3). Masses and radii are ours.
+/// Lengths of an industrial robot, ABB's IRB 360-1/1600, as R. L. Williams II gives them (The Delta Parallel Robot: Kinematics
+/// Solutions, Ohio University, 2016): sides of base and platform triangles 0.567 and 0.076 m, whose inscribed and
+/// circumscribed circles are R = 0.567 / (2 sqrt 3) and r = 0.076 / sqrt 3; arms of 0.524 and 1.244 m, parallelograms
+/// 0.131 m wide. Neutral posture, masses and radii are ours.
 #include "bielle/model/model.h"
 #include "bielle/robots/parameter.h"
 
 namespace bielle {
 
 struct DeltaParameters {
-  double base_radius = 0.132011;      ///< R, m
-  double platform_radius = 0.033198;  ///< r, m
-  double upper_length = 0.112;        ///< l1, m
-  double forearm_length = 0.232;      ///< l2, m
-  double half_width = 0.03;           ///< of the parallelograms, m
-  double arm_angle = 0.6;             ///< theta in the neutral configuration, below the horizontal, rad
+  double base_radius = 0.163679;      ///< R, m
+  double platform_radius = 0.043879;  ///< r, m
+  double upper_length = 0.524;        ///< l1, m
+  double forearm_length = 1.244;      ///< l2, m
+  double half_width = 0.0655;         ///< of the parallelograms, m
+  double arm_angle = 0.3;             ///< theta in the neutral configuration, below the horizontal, rad
   double rod_density = 0.3;           ///< kg/m
-  double platform_mass = 0.2;         ///< kg
-  double armature = 1e-4;             ///< of a motor, kg m^2
+  double platform_mass = 0.5;         ///< kg
+  double armature = 0.01;             ///< of a motor behind its gear, kg m^2
 };
 
 std::vector<Parameter> listParameters(DeltaParameters& parameters);

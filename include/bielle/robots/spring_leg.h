@@ -2,44 +2,67 @@
 /// \file A leg like Cassie's, its leaf springs taken rigid: tarsus and toe are moved by four-bars.
 ///
 /// Hip roll, yaw and pitch, knee, tarsus and toe; the last four move the sagittal plane. With O the hip pitch axis, K the
-/// knee, T the tarsus joint, P the toe pivot, H the heel on the tarsus, angles from straight down, forward positive:
-///     K = O + l1 (sin a1, -cos a1),   T = K + l2 (sin a2, -cos a2),   P = T + l3 (sin a3, -cos a3),
-///     H = T + h (-sin a1, cos a1),                                                                               (1)
-/// so that O K T H is nearly a parallelogram: the heel rod from O to H keeps the tarsus (nearly) parallel to itself while
-/// the knee bends. It has a universal joint at O and a ball at H: three rows on four joints. The toe's four-bar
-/// (crank on the tarsus, plantar rod, lever of the toe) is closed by a hinge: five rows, rank two, on three joints.
-/// Mobility 5, one per motor: hip_roll, hip_yaw, hip_pitch, knee, motor_toe.
+/// knee, T the tarsus joint, P the toe pivot, H the heel on the tarsus, d(a) = (sin a, -cos a) the direction of the angle a
+/// from straight down, forward positive:
+///     K = O + l1 d(a1),   T = K + l2 d(a2),   P = T + l3 d(a3),   H = T - h d(a3 - e),                            (1)
+/// |OH| = r holds for the heel rod, and gives a3. O K T H is nearly a parallelogram, so that the rod keeps the tarsus
+/// (nearly) parallel to itself while the knee bends; of the two ways to close it, H is behind the line from O to T. The rod has
+/// a universal joint at O, beside the plane by w, and a ball at H: three rows on four joints.
 ///
-/// Lengths in the manner of Cassie's public simulation model, rounded: thigh 0.12, shin 0.50 between its joints with the
-/// springs at rest, tarsus 0.41, heel rod 0.50, plantar rod 0.35, crank 0.055 m. The lever is a little
-/// longer than the crank: an exact parallelogram loses rank where all its rods are aligned. Masses and radii are ours.
+/// The toe's four-bar: a crank of length c about C = T + m d(a3 - f), the plantar rod of length k, the lever of length v
+/// on the foot, at the angle g when the sole is level; the crank points backward. It is closed by a hinge: five rows, rank
+/// two, on three joints. Mobility 5, one per motor: hip_roll, hip_yaw, hip_pitch, knee, motor_toe.
+///
+/// Lengths, angles between them and masses of links are those of the leg of Digit, Cassie's successor, as modelled in
+/// `digit_like_2legs` of example-parallel-robots (LAAS-CNRS and Inria, 2024, BSD 3-Clause), its right leg. Simplified: what
+/// that leg has beside the plane of the pitch axis is moved into it (shin 0.025, tarsus 0.014 m), but for the upper end of the
+/// heel rod; the toe only pitches, its two cranks and rods are one of the mass of both. Toe, posture, radii, armature are ours.
 #include "bielle/model/model.h"
 #include "bielle/robots/parameter.h"
 
 namespace bielle {
 
 struct SpringLegParameters {
-  double thigh_length = 0.12;   ///< l1, m
-  double shin_length = 0.50;    ///< l2, m
-  double tarsus_length = 0.41;  ///< l3, m
-  double heel_length = 0.11;    ///< h, m
-  double crank_length = 0.055;  ///< of the toe's crank, m
-  double lever_length = 0.06;   ///< of its lever, m
-  double crank_place = 0.06;    ///< of the crank along the tarsus, from T, m
-  double toe_length = 0.16;     ///< of the foot, m
-  double thigh_angle = 0.6;     ///< a1 in the neutral configuration, rad
-  double shin_angle = -0.9;     ///< a2, rad
-  double tarsus_angle = 0.9;    ///< a3, rad
-  double motor_mass = 1.2;      ///< each of five, kg
-  double link_density = 2;      ///< of thigh, shin and tarsus, kg/m
-  double rod_density = 0.4;     ///< of heel rod, plantar rod and crank, kg/m
-  double foot_mass = 0.15;      ///< kg
-  double armature = 0.01;       ///< of a motor behind its gear, kg m^2
+  double yaw_offset = 0.0352;  ///< of the yaw axis behind the middle of the roll axis, m
+  double yaw_drop = 0.0527;    ///< of its frame under the roll axis, m
+  double pitch_drop = 0.0549;  ///< of the pitch axis under that frame, m
+
+  double thigh_length = 0.12;       ///< l1, m
+  double shin_length = 0.3993;      ///< l2, m
+  double tarsus_length = 0.3283;    ///< l3, m
+  double heel_length = 0.1198;      ///< h, m
+  double heel_bend = 0.189;         ///< e, rad
+  double heel_rod_length = 0.3999;  ///< r, m
+  double rod_offset = 0.0347;       ///< w, m
+
+  double crank_place = 0.0926;     ///< m, m
+  double crank_bend = 0.168;       ///< f, rad
+  double crank_length = 0.057;     ///< c, m
+  double plantar_length = 0.2399;  ///< k, m
+  double lever_length = 0.0447;    ///< v, m
+  double lever_angle = -0.839;     ///< g, rad
+  double ankle_height = 0.0509;    ///< of P over the sole, m
+  double sole_offset = 0.0235;     ///< of the middle of the sole before P, m
+  double toe_length = 0.16;        ///< of the sole, m
+
+  double thigh_angle = 0.6;   ///< a1 in the neutral configuration, rad
+  double shin_angle = -0.85;  ///< a2, rad
+
+  double hip_roll_mass = 1.29;    ///< kg
+  double hip_yaw_mass = 1.42;     ///< kg
+  double thigh_mass = 3.89;       ///< kg
+  double shin_mass = 0.556;       ///< kg
+  double tarsus_mass = 0.743;     ///< kg
+  double foot_mass = 0.334;       ///< kg
+  double heel_rod_mass = 0.0314;  ///< kg
+  double crank_mass = 0.0091;     ///< kg
+  double plantar_mass = 0.024;    ///< kg
+  double armature = 0.01;         ///< of a motor behind its gear, kg m^2
 };
 
 std::vector<Parameter> listParameters(SpringLegParameters& parameters);
 
-/// \throws ModelError when a parameter is outside its bounds, or the crank beyond the toe
+/// \throws ModelError when a parameter is outside its bounds, a rod does not reach, or the crank is beyond the toe
 Model makeSpringLeg(const SpringLegParameters& parameters = {});
 
 }  // namespace bielle
