@@ -2,22 +2,18 @@
 
 #include <cmath>
 
-#include "bielle/robots/solid.h"
+#include "biped_parts.h"
 
 namespace bielle {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kMotorRadius = 0.038, kMotorLength = 0.042;  // of all motors, m
 const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ();
 
 // One side of the robot.
-struct Side {
+struct Side : BipedSide {
   const CleobotParameters& p;
-  double s;          // +1 left, -1 right
-  std::string name;  // "_left"
 
-  Vector3d mirror(double x, double y, double z) const { return {x, s * y, z}; }
   Vector3d hip() const { return mirror(0, p.hip_offset, -p.trunk_height); }  // in the trunk
 };
 
@@ -53,19 +49,11 @@ Limb makeLimb(const Side& side, int index) {
   return limb;
 }
 
-Solid makeMotor(const Vector3d& place, const Vector3d& axis, double mass) {
-  return makeCylinder(place, axis, kMotorRadius, kMotorLength, mass, colors::kMotor);
-}
-
 // Chain of the hip, Eqs. (3), (4), in the frame of the trunk.
-struct HipChain {
-  Vector3d motor, elbow, end;  // motor, joint of crank and rod, end of the rod
-  Vector3d axis2;              // second axis of the universal joint; the first one is that of the motor, y
-};
-
-HipChain makeHipChain(const Side& side, int index) {
+CrankChain makeHipChain(const Side& side, int index) {
   const CleobotParameters& p = side.p;
-  HipChain chain;
+  CrankChain chain;
+  chain.name = "hip" + std::to_string(index) + side.name;
   if (index == 3) {
     chain.end = side.hip() + side.mirror(0, p.yaw_arm, 0);
     chain.elbow = chain.end + p.yaw_rod * kX;
@@ -78,23 +66,6 @@ HipChain makeHipChain(const Side& side, int index) {
     chain.axis2 = kX;
   }
   return chain;
-}
-
-// Crank and rod, up to the end of the rod.
-void addHipChain(const Side& side, int index, ModelBuilder& builder) {
-  const CleobotParameters& p = side.p;
-  const HipChain chain = makeHipChain(side, index);
-  const std::string name = "hip" + std::to_string(index) + side.name, crank = "crank_" + name, rod = "rod_" + name;
-  const Vector3d to_elbow = chain.elbow - chain.motor, to_end = chain.end - chain.elbow;
-  addSolidLink(crank, "trunk", makeRevolute("motor_" + name, chain.motor, kY),
-               {makeRod(Vector3d::Zero(), to_elbow, 0.010, p.rod_density, colors::kSteel),
-                makeSphere(to_elbow, 0.011, 0.03, colors::kSteel)},
-               builder);
-  addSolidLink(rod, crank, makeUniversal("elbow_" + name, to_elbow, kY, chain.axis2),
-               {makeRod(Vector3d::Zero(), to_end, 0.006, p.rod_density, colors::kRod),
-                makeSphere(to_end, 0.010, 0.02, colors::kSteel)},
-               builder);
-  builder.addFrame("rod_end_" + name, rod, {Matrix3d::Identity(), to_end});
 }
 
 std::vector<Solid> makeThigh(const Side& side) {
@@ -139,14 +110,14 @@ void addFoot(const Side& side, const std::vector<Limb>& limbs, ModelBuilder& bui
   }
   const Joint ball = makeSpherical("ankle1" + side.name, origin - limbs[0].knee);
   addSolidLink("foot_link" + side.name, "shank" + limbs[0].name, ball, solids, builder);
-  builder.addFrame("foot" + side.name, "foot_link" + side.name, {Matrix3d::Identity(), sole});
+  addSole(side, sole, p.sole_length, p.sole_width, builder);
   for (int i = 1; i < 3; ++i)
     builder.addFrame("ankle" + limbs[i].name, "foot_link" + side.name, {Matrix3d::Identity(), limbs[i].ball - origin});
 }
 
 void addLeg(const Side& side, ModelBuilder& builder) {
   const CleobotParameters& p = side.p;
-  for (int i = 1; i <= 3; ++i) addHipChain(side, i, builder);
+  for (int i = 1; i <= 3; ++i) addCrankChain(makeHipChain(side, i), "trunk", p.rod_density, p.armature, builder);
   addSolidLink("thigh" + side.name, "trunk", makeSpherical("hip" + side.name, side.hip()), makeThigh(side), builder);
   std::vector<Limb> limbs;
   for (int i = 1; i <= 3; ++i) limbs.push_back(makeLimb(side, i));
@@ -155,18 +126,14 @@ void addLeg(const Side& side, ModelBuilder& builder) {
   for (int i = 1; i < 3; ++i) addLimb(side, limbs[i], builder);
 
   for (int i = 1; i <= 3; ++i) {
-    const std::string name = "hip" + std::to_string(i) + side.name;
-    builder.addFrame("thigh_end_" + name, "thigh" + side.name,
-                     {Matrix3d::Identity(), makeHipChain(side, i).end - side.hip()});
-    builder.addClosure(name, ClosureKind::Ball3D, "thigh_end_" + name, "rod_end_" + name);
-    builder.addMotor("motor_" + name, p.armature);
+    const CrankChain chain = makeHipChain(side, i);
+    builder.addFrame("thigh_end_" + chain.name, "thigh" + side.name, {Matrix3d::Identity(), chain.end - side.hip()});
+    builder.addClosure(chain.name, ClosureKind::Ball3D, "thigh_end_" + chain.name, "rod_end_" + chain.name);
   }
   for (int i = 1; i < 3; ++i)
     builder.addClosure("ankle" + limbs[i].name, ClosureKind::Ball3D, "ankle" + limbs[i].name,
                        "shank_end" + limbs[i].name);
   for (const Limb& limb : limbs) builder.addMotor("motor_leg" + limb.name, p.armature);
-  builder.addContact("foot" + side.name, "foot" + side.name, ContactKind::Surface6D, p.sole_length / 2,
-                     p.sole_width / 2);
 }
 
 std::vector<Solid> makeTrunk(const std::vector<Side>& sides) {
@@ -223,19 +190,11 @@ std::vector<Parameter> listParameters(CleobotParameters& p) {
 Model makeCleobot(const CleobotParameters& parameters) {
   CleobotParameters p = parameters;
   checkParameters("cleobot", listParameters(p));
-  const std::vector<Side> sides = {{p, 1, "_left"}, {p, -1, "_right"}};
+  const std::vector<Side> sides = {{{1, "_left"}, p}, {{-1, "_right"}, p}};
   ModelBuilder builder("cleobot");
-  Joint root;
-  root.name = "root_joint";
-  root.kind = JointKind::FreeFlyer;
-  addSolidLink("trunk", "world", root, makeTrunk(sides), builder);
+  addTrunk(makeTrunk(sides), builder);
   for (const Side& side : sides) addLeg(side, builder);
-  Reference standing;
-  standing.name = "half_sitting";
-  for (const Side& side : sides) standing.feet["foot" + side.name] = side.mirror(0, p.hip_offset, 0);
-  standing.height_frame = "trunk";
-  standing.height = p.hip_height + p.trunk_height;
-  builder.addReference(standing);
+  builder.addReference(makeStanding(p.hip_offset, p.hip_height + p.trunk_height));
   return builder.build();
 }
 

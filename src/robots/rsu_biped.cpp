@@ -2,23 +2,16 @@
 
 #include <cmath>
 
-#include "bielle/robots/solid.h"
+#include "biped_parts.h"
 
 namespace bielle {
 namespace {
 
-constexpr double kMotorRadius = 0.038, kMotorLength = 0.042;  // of all motors, m
 const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ(), kOrigin = Vector3d::Zero();
 
-struct Leg {
+struct Leg : BipedSide {
   const RsuBipedParameters& p;
-  double s;          // +1 left, -1 right
-  std::string name;  // "_left"
 };
-
-Solid makeMotor(const Vector3d& place, const Vector3d& axis, double mass) {
-  return makeCylinder(place, axis, kMotorRadius, kMotorLength, mass, colors::kMotor);
-}
 
 // Hip of three axes in one point, thigh, shank.
 void addSerialJoints(const Leg& leg, ModelBuilder& builder) {
@@ -41,6 +34,7 @@ void addSerialJoints(const Leg& leg, ModelBuilder& builder) {
                {makeRod(kOrigin, ankle, 0.018, p.link_density, colors::kOutput),
                 makeMotor(motors + side, kY, p.motor_mass), makeMotor(motors - side, kY, p.motor_mass)},
                builder);
+  for (const char* joint : {"hipz", "hipx", "hipy", "knee"}) builder.addMotor(joint + leg.name, p.armature);
 }
 
 void addFoot(const Leg& leg, ModelBuilder& builder) {
@@ -69,20 +63,16 @@ void addFoot(const Leg& leg, ModelBuilder& builder) {
 void addAnkleChain(const Leg& leg, int index, ModelBuilder& builder) {
   const RsuBipedParameters& p = leg.p;
   const Vector3d arm(-std::cos(p.arm_angle), 0, std::sin(p.arm_angle));
-  const Vector3d side = (index == 1 ? leg.s : -leg.s) * p.ankle_half_width * kY;
-  const Vector3d motor = (p.motor_height - p.shank_length) * kZ + side, to_elbow = p.ankle_crank * arm;
-  const Vector3d to_heel = -p.shank_length * kZ + p.ankle_arm * arm + side - motor - to_elbow;
-  const std::string name = std::to_string(index) + leg.name;
-  addSolidLink("ankle_crank" + name, "shank" + leg.name, makeRevolute("motor_ankle" + name, motor, kY),
-               {makeRod(kOrigin, to_elbow, 0.010, p.rod_density, colors::kSteel),
-                makeSphere(to_elbow, 0.011, 0.03, colors::kSteel)},
-               builder);
-  addSolidLink(
-      "ankle_rod" + name, "ankle_crank" + name, makeUniversal("ankle_elbow" + name, to_elbow, kY, kX),
-      {makeRod(kOrigin, to_heel, 0.006, p.rod_density, colors::kRod), makeSphere(to_heel, 0.010, 0.02, colors::kSteel)},
-      builder);
-  builder.addFrame("ankle_rod_end" + name, "ankle_rod" + name, {Matrix3d::Identity(), to_heel});
-  builder.addClosure("ankle" + name, ClosureKind::Ball3D, "heel" + name, "ankle_rod_end" + name);
+  const Vector3d side = (index == 1 ? leg.s : -leg.s) * p.ankle_half_width * kY, ankle = -p.shank_length * kZ;
+  CrankChain chain;
+  chain.name = "ankle" + std::to_string(index) + leg.name;
+  chain.motor = ankle + p.motor_height * kZ + side;
+  chain.elbow = chain.motor + p.ankle_crank * arm;
+  chain.end = ankle + p.ankle_arm * arm + side;
+  chain.axis2 = kX;
+  addCrankChain(chain, "shank" + leg.name, p.rod_density, p.armature, builder);
+  builder.addClosure(chain.name, ClosureKind::Ball3D, "heel" + std::to_string(index) + leg.name,
+                     "rod_end_" + chain.name);
 }
 
 void addLeg(const Leg& leg, ModelBuilder& builder) {
@@ -90,13 +80,9 @@ void addLeg(const Leg& leg, ModelBuilder& builder) {
   addSerialJoints(leg, builder);
   addFoot(leg, builder);
   for (int i : {1, 2}) addAnkleChain(leg, i, builder);
-  for (const char* joint : {"hipz", "hipx", "hipy", "knee", "motor_ankle1", "motor_ankle2"})
-    builder.addMotor(joint + leg.name, p.armature);
   for (const char* joint : {"hipz", "hipx", "hipy", "knee", "ankley", "anklex"})
     builder.addSerialJoint(joint + leg.name);
-  builder.addFrame("foot" + leg.name, "foot_link" + leg.name,
-                   {Matrix3d::Identity(), {p.sole_offset, 0, -p.ankle_height}});
-  builder.addContact("foot" + leg.name, "foot" + leg.name, ContactKind::Surface6D, p.sole_length / 2, p.sole_width / 2);
+  addSole(leg, {p.sole_offset, 0, -p.ankle_height}, p.sole_length, p.sole_width, builder);
 }
 
 std::vector<Solid> makeTrunk(const std::vector<Leg>& legs) {
@@ -120,17 +106,13 @@ Reference makeHalfSitting(const std::vector<Leg>& legs) {
                      "give a height between what thigh and shank can bridge, over ankle_height");
   const double thigh = std::acos((reach * reach + a * a - b * b) / (2 * reach * a));
   const double shank = std::acos((reach * reach + b * b - a * a) / (2 * reach * b));
-  Reference reference;
-  reference.name = "half_sitting";
+  Reference reference = makeStanding(p.hip_offset, p.hip_height + p.trunk_height);
   for (const Leg& leg : legs) {
     reference.joints["hipy" + leg.name] = {-thigh};
     reference.joints["knee" + leg.name] = {thigh + shank};
     reference.joints["ankley" + leg.name] = {-shank};
     for (const char* joint : {"hipz", "hipx", "anklex"}) reference.joints[joint + leg.name] = {0};
-    reference.feet["foot" + leg.name] = Vector3d(0, leg.s * p.hip_offset, 0);
   }
-  reference.height_frame = "trunk";
-  reference.height = p.hip_height + p.trunk_height;
   return reference;
 }
 
@@ -165,12 +147,9 @@ std::vector<Parameter> listParameters(RsuBipedParameters& p) {
 Model makeRsuBiped(const RsuBipedParameters& parameters) {
   RsuBipedParameters p = parameters;
   checkParameters("rsu_biped", listParameters(p));
-  const std::vector<Leg> legs = {{p, 1, "_left"}, {p, -1, "_right"}};
+  const std::vector<Leg> legs = {{{1, "_left"}, p}, {{-1, "_right"}, p}};
   ModelBuilder builder("rsu_biped");
-  Joint root;
-  root.name = "root_joint";
-  root.kind = JointKind::FreeFlyer;
-  addSolidLink("trunk", "world", root, makeTrunk(legs), builder);
+  addTrunk(makeTrunk(legs), builder);
   for (const Leg& leg : legs) addLeg(leg, builder);
   builder.addReference(makeHalfSitting(legs));
   return builder.build();
