@@ -7,6 +7,12 @@
 
 namespace bielle::testing {
 
+/// Every joint that moves, every closure.
+inline constexpr JointKind kJointKinds[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
+                                            JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
+                                            JointKind::FreeFlyer};
+inline constexpr ClosureKind kClosureKinds[] = {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D};
+
 VectorXd randomVector(std::mt19937& rng, int n, double scale = 1);
 SE3 randomPlacement(std::mt19937& rng);
 Inertia randomInertia(std::mt19937& rng);

@@ -15,17 +15,13 @@ using namespace bielle::testing;
 
 namespace {
 
-constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
-                                 JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
-                                 JointKind::FreeFlyer};
-constexpr ClosureKind kClosures[] = {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D};
 constexpr double kStep = 1e-3;
 
 }  // namespace
 
 TEST_CASE("inverse dynamics: M, b and RNEA agree, and its derivatives agree with differences") {
   std::mt19937 rng(1);
-  for (JointKind kind : kJoints) {
+  for (JointKind kind : kJointKinds) {
     CAPTURE(getName(kind));
     const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Weld6D, MechanismBase::FreeFlyer);
     const Model& model = mechanism.model;
@@ -49,7 +45,7 @@ TEST_CASE("inverse dynamics: M, b and RNEA agree, and its derivatives agree with
 
 TEST_CASE("centre of mass: Jacobian and velocity derivative") {
   std::mt19937 rng(2);
-  for (JointKind kind : kJoints) {
+  for (JointKind kind : kJointKinds) {
     CAPTURE(getName(kind));
     const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer);
     const Model& model = mechanism.model;
@@ -77,7 +73,7 @@ TEST_CASE("centre of mass: Jacobian and velocity derivative") {
 
 TEST_CASE("closures: residual rate, velocity and acceleration are time derivatives of one another") {
   std::mt19937 rng(3);
-  for (ClosureKind closure_kind : kClosures) {
+  for (ClosureKind closure_kind : kClosureKinds) {
     for (bool open : {false, true}) {
       CAPTURE(getName(closure_kind), open);
       const Mechanism mechanism =
@@ -119,8 +115,8 @@ TEST_CASE("closures: residual rate, velocity and acceleration are time derivativ
 
 TEST_CASE("constrained dynamics: every joint kind times every closure kind, closed and open, against differences") {
   std::mt19937 rng(4);
-  for (JointKind kind : kJoints)
-    for (ClosureKind closure : kClosures)
+  for (JointKind kind : kJointKinds)
+    for (ClosureKind closure : kClosureKinds)
       for (bool open : {false, true})
         for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
           CAPTURE(getName(kind), getName(closure), open, base == MechanismBase::Fixed);

@@ -12,11 +12,6 @@ using namespace bielle::testing;
 
 namespace {
 
-constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
-                                 JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
-                                 JointKind::FreeFlyer};
-constexpr ClosureKind kClosures[] = {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D};
-
 double calcEnergy(const MatrixXd& M, const VectorXd& v) { return 0.5 * v.dot(M * v); }
 
 }  // namespace
@@ -24,8 +19,8 @@ double calcEnergy(const MatrixXd& M, const VectorXd& v) { return 0.5 * v.dot(M *
 TEST_CASE(
     "impacts: constraints hold afterwards, the energy of the change is lost, derivatives agree with differences") {
   std::mt19937 rng(51);
-  for (JointKind kind : kJoints)
-    for (ClosureKind closure : kClosures)
+  for (JointKind kind : kJointKinds)
+    for (ClosureKind closure : kClosureKinds)
       for (bool open : {false, true})
         for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
           CAPTURE(getName(kind), getName(closure), open, base == MechanismBase::Fixed);

@@ -13,10 +13,6 @@ using namespace bielle::testing;
 
 namespace {
 
-constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
-                                 JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
-                                 JointKind::FreeFlyer};
-
 struct Point {
   VectorXd x, u, x_node;  ///< state, controls, state of the next node
 };
@@ -212,7 +208,7 @@ VectorXd makeNextNode(std::mt19937& rng, RobotProblem& problem, const VectorXd& 
 
 TEST_CASE("shooting problem: random mechanisms of every joint kind, gaps closed, small and large") {
   std::mt19937 rng(21);
-  for (JointKind kind : kJoints) {
+  for (JointKind kind : kJointKinds) {
     const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer, 3, 2);
     const Model& model = mechanism.model;
     RobotProblem problem = makeProblem(rng, model, mechanism.q_closed, {{0, randomPlacement(rng), 5, 4}});

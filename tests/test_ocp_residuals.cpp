@@ -14,9 +14,6 @@ using namespace bielle::testing;
 
 namespace {
 
-constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
-                                 JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
-                                 JointKind::FreeFlyer};
 constexpr double kStep = 5e-4;
 
 // A node at (q, v) with forces lambda.
@@ -104,7 +101,7 @@ VectorXd makeForces(std::mt19937& rng, const ConstraintSet& set) {
 
 TEST_CASE("every residual against differences, on mechanisms of every joint kind") {
   std::mt19937 rng(11);
-  for (JointKind kind : kJoints) {
+  for (JointKind kind : kJointKinds) {
     const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer);
     const Model& model = mechanism.model;
     const ConstraintSet set = makeConstraintSet(model, {{0, {}, 0, 0}, {1, {}, 0, 0}});

@@ -131,7 +131,7 @@ TEST_CASE("reduced step: random mechanisms, every joint kind times every closure
   std::mt19937 rng(11);
   for (JointKind kind : {JointKind::Revolute, JointKind::Prismatic, JointKind::Spherical, JointKind::Universal,
                          JointKind::Planar, JointKind::FreeFlyer})
-    for (ClosureKind closure : {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D})
+    for (ClosureKind closure : kClosureKinds)
       for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
         CAPTURE(getName(kind), getName(closure), base == MechanismBase::Fixed);
         const Mechanism mechanism = makeRandomMechanism(rng, kind, closure, base);
@@ -181,7 +181,7 @@ TEST_CASE("impact stages, in both formulations: random mechanisms and Bipetto, w
   std::mt19937 rng(14);
   std::vector<Mechanism> mechanisms;
   for (JointKind kind : {JointKind::Spherical, JointKind::Universal, JointKind::Planar})
-    for (ClosureKind closure : {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D})
+    for (ClosureKind closure : kClosureKinds)
       mechanisms.push_back(makeRandomMechanism(rng, kind, closure, MechanismBase::FreeFlyer));
   mechanisms.emplace_back();
   mechanisms.back().model = loadRobot("bipetto").model;

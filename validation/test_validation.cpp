@@ -20,11 +20,6 @@ using namespace bielle::validation;
 
 namespace {
 
-constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
-                                 JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
-                                 JointKind::FreeFlyer};
-constexpr ClosureKind kClosures[] = {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D};
-
 std::string print(const ValidationReport& report) {
   std::ostringstream text;
   printReport(text, report);
@@ -37,8 +32,8 @@ TEST_CASE("every joint kind with every closure kind agrees with Simbody") {
   std::mt19937 rng(11);
   ValidationOptions options;
   options.samples = 3;
-  for (JointKind joint : kJoints)
-    for (ClosureKind closure : kClosures)
+  for (JointKind joint : kJointKinds)
+    for (ClosureKind closure : kClosureKinds)
       for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
         const Mechanism mechanism = makeRandomMechanism(rng, joint, closure, base);
         options.start = mechanism.q_closed;
