@@ -39,13 +39,13 @@ int main(int argc, char** argv) {
   const LoadedRobot robot = loadRobot("bipetto");
   Motion motion = makeSequence(robot.model, parts);
   double alone = 0;
-  ShootingTrajectory trajectory =
-      solveParts(robot.model, parts, makeStandingPosture(robot.model), {}, {}, {},
-                 [&](const std::string& part, const FddpSummary& summary) {
-                   std::printf("%-8s %-10s after %2d iterations, cost %9.5f\n", part.c_str(),
-                               getName(summary.termination), summary.iterations, summary.cost);
-                   alone += summary.cost;
-                 });
+  PartsOptions apart;
+  apart.report = [&](const std::string& part, const FddpSummary& summary) {
+    std::printf("%-8s %-10s after %2d iterations, cost %9.5f\n", part.c_str(), getName(summary.termination),
+                summary.iterations, summary.cost);
+    alone += summary.cost;
+  };
+  ShootingTrajectory trajectory = solveParts(robot.model, parts, makeStandingPosture(robot.model), apart);
   FddpObserver observer;
   observer.callback = makeFddpPrinter(std::cout);
   const FddpSummary summary = Fddp().solve(*motion.problem, trajectory, observer);

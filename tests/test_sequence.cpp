@@ -142,11 +142,12 @@ TEST_CASE("sequence: unlike motions are solved as one problem") {
   const Model& model = getBipetto();
   Motion motion = makeSequence(model, parts);
   std::vector<std::string> solved;
-  motion.guess = solveParts(model, parts, makeStandingPosture(model), {}, {}, {},
-                            [&](const std::string& part, const FddpSummary& summary) {
-                              solved.push_back(part);
-                              CHECK(summary.termination == FddpTermination::Converged);
-                            });
+  PartsOptions apart;
+  apart.report = [&](const std::string& part, const FddpSummary& summary) {
+    solved.push_back(part);
+    CHECK(summary.termination == FddpTermination::Converged);
+  };
+  motion.guess = solveParts(model, parts, makeStandingPosture(model), apart);
   CHECK(solved == std::vector<std::string>{"squat", "turn", "walk", "stairs", "jump"});
   FddpOptions options;
   options.max_iterations = 100;

@@ -146,14 +146,16 @@ FddpObserver makeObserver(const SolveArguments& arguments) {
 // Each motion of a sequence by itself.
 ShootingTrajectory solveParts(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
                               const SolveArguments& arguments, const FddpOptions& solver) {
-  FddpObserver observer;
-  observer.interrupt = &interrupted;
-  const auto report = [&arguments](const std::string& part, const FddpSummary& summary) {
+  PartsOptions options;
+  options.problem = problem;
+  options.solver = solver;
+  options.observer.interrupt = &interrupted;
+  options.report = [&arguments](const std::string& part, const FddpSummary& summary) {
     if (arguments.quiet) return;
     std::cout << "by itself, " << part << ": " << getName(summary.termination) << ", " << summary.iterations
               << " iterations, " << formatNumber(summary.seconds, "%.2f") << " s" << std::endl;
   };
-  return bielle::solveParts(model, request.parts, makeStandingPosture(model), problem, solver, observer, report);
+  return bielle::solveParts(model, request.parts, makeStandingPosture(model), options);
 }
 
 int solve(const SolveArguments& arguments, const MotionRequest& request) {

@@ -114,16 +114,15 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
 }
 
 ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
-                              const ProblemOptions& problem, const FddpOptions& solver, const FddpObserver& observer,
-                              const PartReport& report) {
+                              const PartsOptions& options) {
   ShootingTrajectory whole;
   VectorXd q = q0;
   for (const SequencePart& part : parts) {
     MotionPlan plan = part.plan(model, q);
     q = plan.q_end;
-    Motion motion = makeMotion(model, std::move(plan), problem);
-    const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess, observer);
-    if (report) report(part.name, summary);
+    Motion motion = makeMotion(model, std::move(plan), options.problem);
+    const FddpSummary summary = Fddp(options.solver).solve(*motion.problem, motion.guess, options.observer);
+    if (options.report) options.report(part.name, summary);
     join(motion.guess, whole);
   }
   return whole;

@@ -18,14 +18,18 @@ struct SequencePart {
 /// \throws ModelError when there is no part, when one is impossible, or when they differ in friction or do not fit on one ground
 MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0);
 
+struct PartsOptions {
+  ProblemOptions problem;
+  FddpOptions solver;
+  FddpObserver observer;                                                            ///< watches every solve
+  std::function<void(const std::string& part, const FddpSummary& summary)> report;  ///< is told how each one ended
+};
+
 /// A guess for the sequence: each motion solved by itself. From a quasi-static guess a long sequence may stop half-way,
 /// since one step length moves all motions at the pace of the hardest, and leaves the others with open gaps for long.
 /// Parts that do not converge contribute what they came to.
-/// \param observer  watches every solve; `report` is told how each ended
-using PartReport = std::function<void(const std::string& part, const FddpSummary& summary)>;
 ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
-                              const ProblemOptions& problem = {}, const FddpOptions& solver = {},
-                              const FddpObserver& observer = {}, const PartReport& report = {});
+                              const PartsOptions& options = {});
 
 /// From the robot's standing posture.
 Motion makeSequence(const Model& model, const std::vector<SequencePart>& parts, const ProblemOptions& problem = {});
