@@ -1,0 +1,191 @@
+#include "bielle/dynamics/variation.h"
+
+#include "bielle/dynamics/kinematics.h"
+
+namespace bielle {
+namespace {
+
+// How the frames of a closure move in their bodies.
+struct FrameTwists {
+  Vector6d frame1 = Vector6d::Zero(), frame2 = Vector6d::Zero();
+};
+
+FrameTwists getFrameTwists(const Model& model, const ConstraintSet& set, size_t c, const ModelVariation& change) {
+  if (static_cast<int>(c) < set.num_loops) return {change.frames1[c], change.frames2[c]};
+  const int contact = model.findContact(set.closures[c].name);
+  return {contact < 0 ? Vector6d(Vector6d::Zero()) : change.contacts[contact], Vector6d::Zero()};
+}
+
+Vector6d calcDisplacement1(const Model& model, const Workspace& ws, const ConstraintSet& set, size_t c,
+                           const ModelVariation& change, const VariationWorkspace& variation) {
+  const Closure& closure = set.closures[c];
+  return variation.D[closure.body1] +
+         getPlacement(ws, closure.body1, closure.X_B1).actMotion(getFrameTwists(model, set, c, change).frame1);
+}
+
+// Rows of a closure out of a full vector in the world.
+RowVectorUpTo6 readRows(const Workspace& ws, const Closure& closure, const Vector6d& world) {
+  return selectRows<double>(closure, getPlacement(ws, closure.body1, closure.X_B1).actInvMotion(world));
+}
+
+RowVectorUpTo6 calcResidualRows(const Model& model, const Workspace& ws, const ConstraintSet& set, size_t c,
+                                const ModelVariation& change, const VariationWorkspace& variation) {
+  const Closure& closure = set.closures[c];
+  const SE3 X_W1 = getPlacement(ws, closure.body1, closure.X_B1), X_W2 = getPlacement(ws, closure.body2, closure.X_B2);
+  const Vector6d D_1 = calcDisplacement1(model, ws, set, c, change, variation);
+  const Vector6d D_2 = variation.D[closure.body2] + X_W2.actMotion(getFrameTwists(model, set, c, change).frame2);
+  return calcClosureResidualRate(ws, closure) * X_W1.actInvMotion(D_1 - D_2);  // Eq. (7)
+}
+
+RowVectorUpTo6 calcVelocityRows(const Model& model, const Workspace& ws, const ConstraintSet& set, size_t c,
+                                const ModelVariation& change, const VariationWorkspace& variation) {
+  const Closure& closure = set.closures[c];
+  const int b1 = closure.body1, b2 = closure.body2;
+  const Vector6d D_1 = calcDisplacement1(model, ws, set, c, change, variation);
+  return readRows(ws, closure, variation.dV[b1] - variation.dV[b2] - crossMotion(D_1, ws.V[b1] - ws.V[b2]));  // Eq. (7)
+}
+
+// Calls write(c, rows) with the rows of closure c, for all closures.
+template <typename Rows>
+VectorXd stackRows(const ConstraintSet& set, Rows&& calcRows) {
+  VectorXd out(set.rows);
+  for (size_t c = 0; c < set.closures.size(); ++c)
+    out.segment(set.offsets[c], getRows(set.closures[c].kind)) = calcRows(c);
+  return out;
+}
+
+// Joint i of Eqs. (1) to (4).
+void updateJointVariation(const Model& model, const Workspace& ws, int i, const ModelVariation& change,
+                          const MotionVariation& motion, VariationWorkspace& out) {
+  const Joint& joint = model.joints()[i];
+  const int p = joint.parent, begin = joint.idx_v, end = begin + joint.nv;
+  const bool sequential = joint.kind == JointKind::Universal;
+  Vector6d D = out.D[p] + (ws.X_WB[p] * joint.X_PJ).actMotion(change.joints[i]);
+  Vector6d w = ws.V[p], dw = out.dV[p];  // of what carries the axis
+  const auto advance = [&](int k) {
+    w += ws.J.col(k) * ws.v[k];
+    dw += ws.J.col(k) * motion.v[k] + out.dJ.col(k) * ws.v[k];
+  };
+  if (!sequential) {
+    for (int k = begin; k < end; ++k) D += ws.J.col(k) * motion.q[k];
+    for (int k = begin; k < end; ++k) out.dJ.col(k) = crossMotion(D, ws.J.col(k));
+    for (int k = begin; k < end; ++k) advance(k);
+  }
+  Vector6d dA = out.dA[p];
+  for (int k = begin; k < end; ++k) {
+    const Vector6d J = ws.J.col(k);
+    if (sequential) out.dJ.col(k) = crossMotion(D, J);
+    const Vector6d dJ = out.dJ.col(k);
+    dA += J * motion.a[k] + dJ * ws.a[k] + ws.dJ.col(k) * motion.v[k] +
+          (crossMotion(dw, J) + crossMotion(w, dJ)) * ws.v[k];
+    if (!sequential) continue;
+    D += J * motion.q[k];
+    advance(k);
+  }
+  out.D[i] = D, out.dV[i] = dw, out.dA[i] = dA;
+}
+
+// Forces of body i alone, and their change by Eq. (5).
+void updateBodyForces(const Workspace& ws, int i, const Matrix6d& inertia, VariationWorkspace& out) {
+  const Matrix6d& Y = ws.Y[i];
+  const Vector6d &V = ws.V[i], &A = ws.A[i], &D = out.D[i];
+  const auto vary = [&](const Vector6d& x, const Vector6d& dx) {  // of Y x
+    return Vector6d(crossForce(D, Y * x) + Y * (dx - crossMotion(D, x)) +
+                    ws.X_WB[i].actForce(inertia * ws.X_WB[i].actInvMotion(x)));
+  };
+  const Vector6d h = Y * V;
+  out.F[i] = Y * A + crossForce(V, h);
+  out.dF[i] = vary(A, out.dA[i]) + crossForce(out.dV[i], h) + crossForce(V, vary(V, out.dV[i]));
+}
+
+}  // namespace
+
+ModelVariation::ModelVariation(const Model& model)
+    : joints(model.numBodies(), Vector6d::Zero()),
+      frames1(model.closures().size(), Vector6d::Zero()),
+      frames2(frames1),
+      contacts(model.contacts().size(), Vector6d::Zero()),
+      inertias(model.numBodies(), Matrix6d::Zero()),
+      armature(VectorXd::Zero(model.nv())) {}
+
+MotionVariation::MotionVariation(const Model& model) : q(VectorXd::Zero(model.nv())), v(q), a(q) {}
+
+VariationWorkspace::VariationWorkspace(const Model& model)
+    : D(model.numBodies(), Vector6d::Zero()), dV(D), dA(D), dJ(Matrix6Xd::Zero(6, model.nv())), F(D), dF(D) {}
+
+void updateVariation(const Model& model, const Workspace& ws, const ModelVariation& change,
+                     const MotionVariation& motion, VariationWorkspace& variation) {
+  requireStage(ws, WorkspaceStage::Acceleration, "updateVariation", "updateAccelerations");
+  for (int i = 1; i < model.numBodies(); ++i) updateJointVariation(model, ws, i, change, motion, variation);
+}
+
+VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, const ConstraintSet& constraints,
+                                      ConstVectorRef lambda, const ModelVariation& change,
+                                      const MotionVariation& motion, VariationWorkspace& variation) {
+  for (int i = 1; i < model.numBodies(); ++i) updateBodyForces(ws, i, change.inertias[i], variation);
+  for (size_t c = 0; c < constraints.closures.size(); ++c) {
+    const Closure& closure = constraints.closures[c];
+    const Vector6d W =
+        calcClosureWrench<double>(ws, closure, lambda.segment(constraints.offsets[c], getRows(closure.kind)));
+    const Vector6d dW = crossForce(calcDisplacement1(model, ws, constraints, c, change, variation), W);
+    variation.F[closure.body1] -= W, variation.dF[closure.body1] -= dW;
+    variation.F[closure.body2] += W, variation.dF[closure.body2] += dW;
+  }
+  VectorXd out = model.armature().cwiseProduct(motion.a) + change.armature.cwiseProduct(ws.a);
+  for (int i = model.numBodies() - 1; i > 0; --i) {
+    const Joint& joint = model.joints()[i];
+    for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k)
+      out[k] += variation.dJ.col(k).dot(variation.F[i]) + ws.J.col(k).dot(variation.dF[i]);  // Eq. (6)
+    variation.F[joint.parent] += variation.F[i];
+    variation.dF[joint.parent] += variation.dF[i];
+  }
+  return out;
+}
+
+VectorXd calcResidualVariation(const Model& model, const Workspace& ws, const ConstraintSet& constraints,
+                               const ModelVariation& change, const VariationWorkspace& variation) {
+  return stackRows(constraints,
+                   [&](size_t c) { return calcResidualRows(model, ws, constraints, c, change, variation); });
+}
+
+VectorXd calcVelocityVariation(const Model& model, const Workspace& ws, const ConstraintSet& constraints,
+                               const ModelVariation& change, const VariationWorkspace& variation) {
+  return stackRows(constraints,
+                   [&](size_t c) { return calcVelocityRows(model, ws, constraints, c, change, variation); });
+}
+
+VectorXd calcAccelerationVariation(const Model& model, const Workspace& ws, const ConstraintSet& constraints,
+                                   const ModelVariation& change, const VariationWorkspace& variation) {
+  return stackRows(constraints, [&](size_t c) {
+    const Closure& closure = constraints.closures[c];
+    const int b1 = closure.body1, b2 = closure.body2;
+    const Vector6d a = ws.A[b1] - ws.A[b2] + crossMotion(ws.V[b1], ws.V[b2]);
+    const Vector6d D_1 = calcDisplacement1(model, ws, constraints, c, change, variation);
+    RowVectorUpTo6 rows = readRows(ws, closure,
+                                   variation.dA[b1] - variation.dA[b2] + crossMotion(variation.dV[b1], ws.V[b2]) +
+                                       crossMotion(ws.V[b1], variation.dV[b2]) - crossMotion(D_1, a));  // Eq. (8)
+    if (closure.kd != 0) rows += closure.kd * calcVelocityRows(model, ws, constraints, c, change, variation);
+    if (closure.kp != 0) rows -= closure.kp * calcResidualRows(model, ws, constraints, c, change, variation);
+    return rows;
+  });
+}
+
+DynamicsVariation calcConstrainedVariation(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
+                                           const ConstraintSet& constraints, const std::vector<ModelVariation>& changes,
+                                           const std::vector<MotionVariation>& motions) {
+  const Eigen::Index n = static_cast<Eigen::Index>(changes.size());
+  DynamicsVariation out{MatrixXd(model.nv(), n), MatrixXd(constraints.rows, n)};
+  VariationWorkspace variation(model);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    MotionVariation motion(model);
+    if (!motions.empty()) motion.q = motions[i].q, motion.v = motions[i].v;
+    updateVariation(model, ws, changes[i], motion, variation);
+    out.a.col(i) = calcInverseDynamicsVariation(model, ws, constraints, cws.lambda, changes[i], motion, variation);
+    out.lambda.col(i) = calcAccelerationVariation(model, ws, constraints, changes[i], variation);
+  }
+  cws.saddle_point.updateInverse();
+  cws.saddle_point.solveDerivatives(out.a, out.lambda);
+  return out;
+}
+
+}  // namespace bielle

@@ -1,0 +1,62 @@
+#include "moved_model.h"
+
+#include "bielle/model/builder.h"
+
+namespace bielle::testing {
+namespace {
+
+Inertia readInertia(const Matrix6d& Y) {
+  Inertia out;
+  out.mass = Y(0, 0);
+  if (out.mass > 0) out.com = Vector3d(Y(5, 1), Y(3, 2), Y(4, 0)) / out.mass;
+  const Matrix3d C = skew(out.com);
+  out.I_com = Y.bottomRightCorner<3, 3>() + out.mass * C * C;
+  return out;
+}
+
+std::string getLink(const Model& model, int body) { return body == 0 ? "world" : model.bodies()[body].name; }
+
+ModelBuilder makeBuilder(const Model& m, const ModelVariation& direction, double step) {
+  const auto move = [step](const SE3& X, const Vector6d& twist) { return X * exp6(step * twist); };
+  ModelBuilder builder(m.name());
+  builder.setGravity(m.gravity());
+  for (int i = 1; i < m.numBodies(); ++i) {
+    Joint joint = m.joints()[i];
+    joint.X_PJ = move(joint.X_PJ, direction.joints[i]);
+    const Matrix6d Y = m.bodies()[i].inertia.toMatrix() + step * direction.inertias[i];
+    builder.addLink(getLink(m, i), getLink(m, joint.parent), joint, readInertia(Y));
+  }
+  for (size_t c = 0; c < m.closures().size(); ++c) {
+    const Closure& closure = m.closures()[c];
+    const std::string frame1 = closure.name + "/1", frame2 = closure.name + "/2";
+    builder.addFrame(frame1, getLink(m, closure.body1), move(closure.X_B1, direction.frames1[c]));
+    builder.addFrame(frame2, getLink(m, closure.body2), move(closure.X_B2, direction.frames2[c]));
+    builder.addClosure(closure.name, closure.kind, frame1, frame2, closure.axis, closure.kp, closure.kd);
+  }
+  for (const Motor& motor : m.motors())
+    builder.addMotor(motor.name, motor.armature + step * direction.armature[motor.dof]);
+  for (const Joint& joint : m.joints())
+    if (joint.nv == 1 && m.findMotor(joint.name) < 0)
+      builder.setArmature(joint.name, m.armature()[joint.idx_v] + step * direction.armature[joint.idx_v]);
+  for (size_t c = 0; c < m.contacts().size(); ++c) {
+    const ContactFrame& contact = m.contacts()[c];
+    builder.addFrame(contact.name + "/f", getLink(m, contact.body), move(contact.X_BF, direction.contacts[c]));
+    builder.addContact(contact.name, contact.name + "/f", contact.kind, contact.half_length, contact.half_width);
+  }
+  return builder;
+}
+
+}  // namespace
+
+Model moveModel(const Model& model, const ModelVariation& direction, double step) {
+  return makeBuilder(model, direction, step).build();
+}
+
+Model addContactsEverywhere(const Model& model) {
+  ModelBuilder builder = makeBuilder(model, ModelVariation(model), 0);
+  for (int i = 1; i < model.numBodies(); ++i)
+    builder.addContact("sole of " + getLink(model, i), getLink(model, i), ContactKind::Surface6D, 0.1, 0.05);
+  return builder.build();
+}
+
+}  // namespace bielle::testing
