@@ -19,6 +19,7 @@ struct SolvedMotion {
   MotionRecord record;
   std::vector<VectorXd> postures;
   std::optional<SerialTrajectory> serial;  // of its equivalent serial chain, where there is one
+  std::vector<int> kept_dofs;              // of the closed model: those of the chain, in its order
 };
 
 // What a design did with one motion.
@@ -26,6 +27,7 @@ struct Outcome {
   double missing = 1;  // share of the motion
   std::string message;
   MotionMeasures measures;
+  LiftResult lifted;  // of a kept motion
 };
 
 std::vector<double> listSteps(const RobotProblem& problem) {
@@ -74,10 +76,13 @@ MotionRecord restrictRecord(const Model& closed, const Model& serial, const Moti
   return record;
 }
 
-SerialTrajectory makeKeptMotion(const Model& closed, const DesignMotion& motion, const MotionRecord& record) {
+void addKeptMotion(const Model& closed, const DesignMotion& motion, SolvedMotion& solved) {
   const SerialModel serial = makeSerialModel(closed, makeStandingPosture(closed));
   const Motion serial_motion = makeReducedMotion(serial.model, motion);
-  return makeSerialTrajectory(serial_motion, restrictRecord(closed, serial.model, serial_motion, record));
+  solved.serial =
+      makeSerialTrajectory(serial_motion, restrictRecord(closed, serial.model, serial_motion, solved.record));
+  const VectorXd dofs = VectorXd::LinSpaced(closed.nv(), 0, closed.nv() - 1);
+  for (const double dof : restrictVelocity(closed, serial.model, dofs)) solved.kept_dofs.push_back(std::lround(dof));
 }
 
 LiftResult liftMotion(const Model& model, const SerialTrajectory& kept) {
@@ -101,7 +106,8 @@ void setStart(const Model& model, const SolvedMotion& solved, Motion& motion) {
 
 Outcome keepMotion(const Model& model, const SerialTrajectory& kept) {
   Outcome out;
-  const LiftResult lifted = liftMotion(model, kept);
+  out.lifted = liftMotion(model, kept);
+  const LiftResult& lifted = out.lifted;
   out.missing = 1 - static_cast<double>(lifted.dt.size()) / static_cast<double>(kept.dt.size() + 1);
   if (!lifted.lifted()) {
     out.message = lifted.nodes.empty() ? "nothing could be lifted" : lifted.nodes.back().message;
@@ -147,7 +153,9 @@ struct DesignEvaluator::Data {
 
   void readObjective();
   void solveStart();
-  void makeMotions(const Model& model, Evaluation& out) const;
+  void makeMotions(const Model& model, Evaluation& out, std::vector<LiftResult>* lifted = nullptr) const;
+  Evaluation evaluate(const VectorXd& x, std::vector<LiftResult>* lifted = nullptr) const;
+  void checkGradient() const;
   bool checkPostures(const Model& model, Evaluation& out) const;
   void sumUp(Evaluation& out) const;
 };
@@ -204,12 +212,12 @@ void DesignEvaluator::Data::solveStart() {
     const Outcome outcome = solveMotion(model, problem, options.solver);
     if (outcome.missing > 0)
       throw ModelError(model.name(), "start design", outcome.message, "ask for a motion that the robot can make");
-    SolvedMotion solved_motion{makeRecord(problem, problem.guess), {}, {}};
+    SolvedMotion solved_motion{makeRecord(problem, problem.guess), {}, {}, {}};
     const int last = problem.problem->numStages();
     for (int p = 0; p < options.postures; ++p)
       solved_motion.postures.push_back(problem.guess.xs[p * last / std::max(1, options.postures - 1)].head(model.nq()));
     try {
-      solved_motion.serial = makeKeptMotion(model, motion, solved_motion.record);
+      addKeptMotion(model, motion, solved_motion);
     } catch (const ModelError&) {  // no serial chain, or impacts: motions cannot be kept, but solved
       if (options.mode == MotionMode::Kept) throw;
     }
@@ -227,7 +235,7 @@ void DesignEvaluator::Data::solveStart() {
   start.value = weight;
 }
 
-void DesignEvaluator::Data::makeMotions(const Model& model, Evaluation& out) const {
+void DesignEvaluator::Data::makeMotions(const Model& model, Evaluation& out, std::vector<LiftResult>* lifted) const {
   double missing = 0;
   for (size_t i = 0; i < motions.size(); ++i) {
     Outcome outcome;
@@ -246,6 +254,7 @@ void DesignEvaluator::Data::makeMotions(const Model& model, Evaluation& out) con
       return;
     }
     out.motions.push_back(outcome.measures);
+    if (lifted) lifted->push_back(std::move(outcome.lifted));
   }
 }
 
@@ -284,18 +293,56 @@ const Parametrization& DesignEvaluator::robot() const { return data_->robot; }
 const std::vector<DesignMotion>& DesignEvaluator::motions() const { return data_->motions; }
 const std::vector<ObjectiveTerm>& DesignEvaluator::objective() const { return data_->objective; }
 
-Evaluation DesignEvaluator::evaluate(const VectorXd& x) const {
+Evaluation DesignEvaluator::Data::evaluate(const VectorXd& x, std::vector<LiftResult>* lifted) const {
   Evaluation out;
   try {
-    const Model model = data_->robot.make(x);
-    if (!data_->checkPostures(model, out)) return out;
-    data_->makeMotions(model, out);
+    const Model model = robot.make(x);
+    if (!checkPostures(model, out)) return out;
+    makeMotions(model, out, lifted);
   } catch (const ModelError& error) {  // numbers that make no robot, postures that no motion can start from
     out.status = DesignStatus::MotionFailed;
     out.message = error.what();
-    out.value = data_->weight * 2;
+    out.value = weight * 2;
   }
-  if (out.status == DesignStatus::Feasible) data_->sumUp(out);
+  if (out.status == DesignStatus::Feasible) sumUp(out);
+  return out;
+}
+
+void DesignEvaluator::Data::checkGradient() const {
+  const std::string& name = robot.startModel().name();
+  if (options.mode != MotionMode::Kept)
+    throw ModelError(name, "mode: reoptimized", "its motions have no gradient with respect to the design",
+                     "keep them (`mode: kept`), or search by bobyqa or sbplx");
+  for (const ObjectiveTerm& term : objective)
+    if (!hasGradient(term.measure))
+      throw ModelError(name, std::string("objective: ") + getName(term.measure), "it has no gradient",
+                       "choose peak_torque, rms_torque or energy, or search by bobyqa or sbplx");
+}
+
+Evaluation DesignEvaluator::evaluate(const VectorXd& x) const { return data_->evaluate(x); }
+
+SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
+  data_->checkGradient();
+  std::vector<LiftResult> lifted;
+  SlopedEvaluation out{data_->evaluate(x, &lifted), {}};
+  if (out.evaluation.status != DesignStatus::Feasible) return out;
+  const Model model = data_->robot.make(x);
+  const std::vector<ModelVariation> variations = calcDesignVariations(data_->robot, x);
+  std::vector<MotorSlopes> slopes;
+  for (size_t i = 0; i < lifted.size(); ++i) {
+    const SolvedMotion& kept = data_->solved[i];
+    slopes.push_back(calcMotorSlopes(model, kept.kept_dofs, *kept.serial, lifted[i], variations));
+    if (slopes.back().failure.empty()) continue;
+    out.evaluation = {DesignStatus::MotionFailed, 2 * data_->weight, {}, {}, slopes.back().failure};
+    return out;
+  }
+  for (size_t i = 0; i < data_->objective.size(); ++i) {
+    const ObjectiveTerm& term = data_->objective[i];
+    out.terms.push_back(calcMeasurePieces(term.measure, data_->term_motors[i], slopes));
+    const double scale = term.weight / data_->start.terms[i];
+    out.terms[i].values *= scale;
+    out.terms[i].gradients *= scale;
+  }
   return out;
 }
 

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "bielle/design/gradient.h"
 #include "bielle/design/measures.h"
 #include "bielle/design/parametrization.h"
 #include "bielle/motion/motion.h"
@@ -57,6 +58,12 @@ struct Evaluation {
   std::string message;                  ///< why not feasible
 };
 
+/// An evaluation and how its terms change.
+struct SlopedEvaluation {
+  Evaluation evaluation;
+  std::vector<MeasurePieces> terms;  ///< w_i m_i / m_i0 of Eq. (1) in pieces, when feasible
+};
+
 /// Makes the motions of the start design when it is made; designs are then evaluated each by itself, so that the result
 /// does not depend on the order, by any number of threads at a time.
 class DesignEvaluator {
@@ -67,6 +74,9 @@ class DesignEvaluator {
   ~DesignEvaluator();
 
   Evaluation evaluate(const VectorXd& x) const;
+  /// The same with gradients (gradient.h). Where they do not exist, as at a dead point, the design counts as one whose motion fails.
+  /// \throws ModelError when motions are not kept, or a measure has no gradient
+  SlopedEvaluation differentiate(const VectorXd& x) const;
   const Evaluation& start() const;  ///< of the start design
   const Parametrization& robot() const;
   const std::vector<DesignMotion>& motions() const;

@@ -1,0 +1,52 @@
+#pragma once
+/// \file Gradients of what motors pay for a kept motion (MotionMode::Kept), with respect to the variables of a design.
+///
+/// Joints, base and feet move as before, and so do the contact forces as far as the motion leaves them open. With the model's
+/// change along a variable x_i (variation.h), postures, speeds and torques of the motors change at every node by Eqs. (2) and (5)
+/// of kept_motion.h: dv_i(k), du_i(k). A measure is the largest of smooth pieces p_j, each with its gradient:
+///     rms torque of one motor in one motion     p = (sum h u^2 / T)^1/2,  dp = sum h u du / (T p)                   (1)
+///     energy                                    p = sum h |u v|,          dp = sum h sign(u v) (du v + u dv)        (2)
+///     peak torque in a stretch of the motion    p = |u(k)|,               dp = sign(u(k)) du(k)                     (3)
+/// with k the node of the largest |u| in the stretch. Of a peak torque, the piece of every motor, motion and stretch counts:
+/// where one peak is shaved another takes over, and a search that minimizes the largest needs to see both.
+#include <string>
+
+#include "bielle/design/measures.h"
+#include "bielle/design/parametrization.h"
+#include "bielle/dynamics/kept_motion.h"
+#include "bielle/transmission/lift.h"
+
+namespace bielle {
+
+/// Whether calcMeasurePieces knows the measure.
+bool hasGradient(Measure measure);
+
+/// How the model changes with every variable at x. Placements, inertias and armatures are smooth functions of the numbers,
+/// polynomials of at most the third degree for lengths and shifts; they are differenced by the five-point rule over a thousandth
+/// of the bounds, which is exact for polynomials up to the fourth degree.
+/// \throws ModelError when a variable changes what is no placement, inertia or armature (an axis, a gain)
+std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x);
+
+/// Torques and speeds of the motors over the N stages of a kept motion, and their derivatives. A stage without duration
+/// has no torque.
+struct MotorSlopes {
+  std::vector<double> dt;        ///< N, s
+  MatrixXd u, v;                 ///< nu x N
+  std::vector<MatrixXd> du, dv;  ///< per variable, nu x N
+  std::string failure;           ///< why there are none, or empty
+};
+/// \param kept_dofs  of the model, in the order of the velocities of the serial trajectory
+/// \param lifted  all of the trajectory, lifted to the model
+MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dofs, const SerialTrajectory& trajectory,
+                            const LiftResult& lifted, const std::vector<ModelVariation>& variations);
+
+/// A measure, the largest of `values`, and how they change.
+struct MeasurePieces {
+  VectorXd values;     ///< p
+  MatrixXd gradients;  ///< pieces x variables
+};
+/// Eqs. (1) to (3) over the motors named and all motions: always as many pieces for the same motions and motors.
+MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
+                                const std::vector<MotorSlopes>& motions);
+
+}  // namespace bielle
