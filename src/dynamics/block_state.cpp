@@ -10,6 +10,9 @@ namespace {
 
 constexpr double kClosedTolerance = 1e-13;    // what close() aims at
 constexpr double kAcceptedTolerance = 1e-11;  // what it accepts when rounding stops it
+// Relative differences of lengths below this decide nothing. In symmetric postures whole rows are equally long and entries
+// vanish: were rounding to choose between them, one point would have as many bases as ways to compute it.
+constexpr double kTie = 1e-7;
 
 // Rows of a factorization that one operation works on: a register of one node, or a row of the nodes of all lanes.
 template <typename T>
@@ -118,7 +121,7 @@ typename LogicOf<T>::Mask factorize(const LoopBlock& block, BlockScratchOf<T>& s
     auto row = makeIndex<T>(0);
     T most = rest[0];
     for (int r = 1; r < m; ++r) {
-      const auto larger = rest[r] > most;
+      const auto larger = rest[r] > (1 + kTie) * most;
       most = select(larger, rest[r], most);
       row = select(larger, r, row);
     }
@@ -131,12 +134,12 @@ typename LogicOf<T>::Mask factorize(const LoopBlock& block, BlockScratchOf<T>& s
       for (int k = p; k < n; ++k) sum += v[k] * Eigen::Map<const Rows>(&E(r, k));
       products.template segment<kChunk>(r).array() = sum;
     }
-    const T norm = sqrt(getEntry(products.data(), row)), pivot = select(v[p] > T(0), -norm, norm);
+    const T norm = sqrt(getEntry(products.data(), row)), pivot = select(v[p] > kTie * norm, -norm, norm);
     if (p == 0) first = norm;
     regular = regular && norm > kRankTolerance * first;
     if (!any(regular)) return regular;
     last = norm;
-    const T beta = 1 / (norm * (norm + abs(v[p])));
+    const T beta = 1 / (norm * norm - pivot * v[p]);
     scratch.beta[p] = beta;
     v[p] -= pivot;
     for (Eigen::Index r = 0; r < E.rows(); r += kChunk) {
