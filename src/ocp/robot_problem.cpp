@@ -102,11 +102,15 @@ void RobotProblem::difference(int node, ConstVectorRef x0, ConstVectorRef x1, Ve
   nodes_[node].dynamics->difference(x0, x1, dx);
 }
 
+bool RobotProblem::isEvaluated(int stage, ConstVectorRef x, ConstVectorRef u) const {
+  const Node& node = nodes_[stage];
+  return node.valid && node.x == x && node.u == u;
+}
+
 // Dynamics and next state at (x, u), unless they are already there. `previous` is the node whose next state x is, if any.
 StepStatus RobotProblem::evaluate(int stage, ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) {
-  Node& node = nodes_[stage];
-  if (node.valid && node.x == x && node.u == u) return StepStatus::Ok;
-  return finishEvaluation(stage, startEvaluation(stage, x, u) && node.dynamics->updateStep(x, u, previous));
+  if (isEvaluated(stage, x, u)) return StepStatus::Ok;
+  return finishEvaluation(stage, startEvaluation(stage, x, u) && nodes_[stage].dynamics->updateStep(x, u, previous));
 }
 
 bool RobotProblem::startEvaluation(int stage, ConstVectorRef x, ConstVectorRef u) {
@@ -133,37 +137,48 @@ StepStatus RobotProblem::continueStep(int stage, ConstVectorRef x, ConstVectorRe
   return finishStep(stage, x_next, cost);
 }
 
-// Reduced steps are taken together, unless there is but one. What fails so is tried again alone.
+// Reduced steps are taken together, unless there is but one.
 void RobotProblem::stepStages(std::vector<StepTask>& tasks) {
   if (tasks.size() == 1 || formulation_ == Formulation::Full) return ShootingProblem::stepStages(tasks);
+  for (size_t first = 0; first < tasks.size(); first += kLane) {
+    const int count = static_cast<int>(std::min<size_t>(tasks.size() - first, kLane));
+    evaluateTogether(&tasks[first], count,
+                     [this](StepTask& task) { task.status = finishStep(task.stage, *task.x_next, task.cost); });
+  }
+}
+
+// evaluate() of at most kLane stages at once, and `finish` of those that went through, while their workspaces show them. What
+// does not go with others, or fails with them, is tried alone.
+template <typename Finish>
+void RobotProblem::evaluateTogether(StepTask* tasks, int num_tasks, const Finish& finish) {
   std::array<NodeModel*, kLane> together;
   std::array<StepTask*, kLane> of;
   std::array<bool, kLane> ok;
-  for (size_t first = 0; first < tasks.size(); first += kLane) {
-    int count = 0;
-    for (size_t i = first; i < std::min<size_t>(tasks.size(), first + kLane); ++i) {
-      StepTask& task = tasks[i];
-      NodeModel* node = nodes_[task.stage].dynamics.get();
-      const NodeModel* previous = task.continues ? nodes_[task.stage - 1].dynamics.get() : nullptr;
-      if (startEvaluation(task.stage, *task.x, *task.u) && node->startStep(*task.x, *task.u, previous)) {
-        of[count] = &task;
-        together[count++] = node;
-      } else {
-        task.status = task.continues ? continueStep(task.stage, *task.x, *task.u, *task.x_next, task.cost)
-                                     : step(task.stage, *task.x, *task.u, *task.x_next, task.cost);
-      }
+  const auto evaluateAlone = [&](StepTask& task, const NodeModel* previous) {
+    task.status = evaluate(task.stage, *task.x, *task.u, previous);
+    if (task.status == StepStatus::Ok) finish(task);
+  };
+  int count = 0;
+  for (int i = 0; i < num_tasks; ++i) {
+    StepTask& task = tasks[i];
+    NodeModel* node = nodes_[task.stage].dynamics.get();
+    const NodeModel* previous = task.continues ? nodes_[task.stage - 1].dynamics.get() : nullptr;
+    if (startEvaluation(task.stage, *task.x, *task.u) && node->startStep(*task.x, *task.u, previous)) {
+      of[count] = &task;
+      together[count++] = node;
+    } else {
+      evaluateAlone(task, previous);
     }
-    if (count > 0) together.front()->finishSteps(together.data(), count, ok.data());
-    for (int i = 0; i < count; ++i) {
-      StepTask& task = *of[i];
-      if (!ok[i]) continue;
-      together[i]->showStep(i);
-      task.status = finishEvaluation(task.stage, true);
-      if (task.status == StepStatus::Ok) task.status = finishStep(task.stage, *task.x_next, task.cost);
-    }
-    for (int i = 0; i < count; ++i)
-      if (!ok[i]) of[i]->status = step(of[i]->stage, *of[i]->x, *of[i]->u, *of[i]->x_next, of[i]->cost);
   }
+  if (count > 0) together.front()->finishSteps(together.data(), count, ok.data());
+  for (int i = 0; i < count; ++i) {
+    if (!ok[i]) continue;
+    together[i]->showStep(i);
+    of[i]->status = finishEvaluation(of[i]->stage, true);
+    if (of[i]->status == StepStatus::Ok) finish(*of[i]);
+  }
+  for (int i = 0; i < count; ++i)
+    if (!ok[i]) evaluateAlone(*of[i], nullptr);
 }
 
 StepStatus RobotProblem::finishStep(int stage, VectorRef x_next, double& cost) {
@@ -226,10 +241,26 @@ StepStatus RobotProblem::linearize(int stage, ConstVectorRef x, ConstVectorRef u
   return finishLinearization(stage, u, x_next_node, out);
 }
 
+// evaluate() of those of at most kLane stages that need it, together if that pays.
+void RobotProblem::evaluateStages(int begin, int end, const std::vector<VectorXd>& xs,
+                                  const std::vector<VectorXd>& us) {
+  if (formulation_ == Formulation::Full) return;
+  std::array<StepTask, kLane> tasks;
+  int count = 0;
+  for (int k = begin; k < end; ++k) {
+    if (isEvaluated(k, xs[k], us[k])) continue;
+    tasks[count].stage = k;
+    tasks[count].x = &xs[k];
+    tasks[count++].u = &us[k];
+  }
+  if (count > 1) evaluateTogether(tasks.data(), count, [](const StepTask&) {});
+}
+
 void RobotProblem::linearizeStages(int begin, int end, const std::vector<VectorXd>& xs, const std::vector<VectorXd>& us,
                                    std::vector<StageModel>& models, std::vector<StepStatus>& statuses) {
   for (int first = begin; first < end; first += kLane) {
     const int last = std::min<int>(end, first + kLane);
+    evaluateStages(first, last, xs, us);
     std::array<NodeModel*, kLane> together;
     int count = 0;
     for (int k = first; k < last; ++k) {

@@ -96,9 +96,13 @@ class RobotProblem : public ShootingProblem {
 
  private:
   struct Node;
+  bool isEvaluated(int stage, ConstVectorRef x, ConstVectorRef u) const;
   bool startEvaluation(int stage, ConstVectorRef x, ConstVectorRef u);
   StepStatus finishEvaluation(int stage, bool ok);
   StepStatus evaluate(int stage, ConstVectorRef x, ConstVectorRef u, const NodeModel* previous = nullptr);
+  template <typename Finish>
+  void evaluateTogether(StepTask* tasks, int num_tasks, const Finish& finish);
+  void evaluateStages(int begin, int end, const std::vector<VectorXd>& xs, const std::vector<VectorXd>& us);
   StepStatus finishStep(int stage, VectorRef x_next, double& cost);
   StepStatus finishLinearization(int stage, ConstVectorRef u, ConstVectorRef x_next_node, StageModel& out);
   double sumCosts(int node_index, std::vector<CostValue>* values = nullptr);
