@@ -152,6 +152,53 @@ TEST_CASE("a point has one basis, whatever the rounding on the way to it") {
   }
 }
 
+// Stages whose contacts differ in all that they may: none, one, both, twice the same, points, a hinge.
+TEST_CASE("nodes with all sorts of contacts go together") {
+  const Model model = loadRobot("bipetto").model;
+  const Walk walk(model);
+  const auto& [xs, us] = walk.motion.guess;
+  const int left = model.findContact("foot_left"), right = model.findContact("foot_right");
+  REQUIRE((left >= 0 && right >= 0));
+  const std::vector<std::vector<int>> feet = {{left, right},       {},           {right}, {left, left},
+                                              {left, right, left}, {right, left}};
+  const VectorXd q = xs[0].head(model.nq()), v = xs[0].tail(model.nv());
+  const auto makeProblem = [&] {
+    std::vector<StageSpec> stages;
+    for (ClosureKind kind : {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D})
+      for (const std::vector<int>& contacts : feet) {
+        StageSpec stage;
+        stage.dt = 0.01 + 1e-3 * stages.size();
+        stage.constraints = makeConstraintSet(model, makeContactTargets(model, q, contacts, 20, 5));
+        ConstraintSet& set = stage.constraints;
+        if (!contacts.empty()) set.closures[set.num_loops].kind = kind;
+        set.rows = 0;
+        for (size_t c = 0; c < set.closures.size(); ++c) {
+          set.offsets[c] = set.rows;
+          set.rows += getRows(set.closures[c].kind);
+        }
+        stages.push_back(std::move(stage));
+      }
+    stages.emplace_back();
+    return std::make_unique<RobotProblem>(model, q, v, std::move(stages), Formulation::Reduced);
+  };
+  const std::unique_ptr<RobotProblem> problem = makeProblem(), other = makeProblem();
+  const int N = problem->numStages();
+  const std::vector<VectorXd> points(N + 1, xs[2]), controls(N, us[2]);
+  std::vector<StageModel> together(N + 1);
+  std::vector<StepStatus> statuses(N + 1, StepStatus::Failed);
+  problem->linearizeStages(0, N, points, controls, together, statuses);
+  for (int k = 0; k < N; ++k) {
+    CAPTURE(k);
+    REQUIRE(statuses[k] == StepStatus::Ok);
+    StageModel alone;
+    REQUIRE(other->linearize(k, points[k], controls[k], points[k + 1], alone) == StepStatus::Ok);
+    CHECK((together[k].gap - alone.gap).norm() < 1e-10 * alone.gap.norm());
+    CHECK((together[k].Fx - alone.Fx).norm() < 1e-9 * alone.Fx.norm());
+    CHECK((together[k].Fu - alone.Fu).norm() < 1e-9 * alone.Fu.norm());
+    if (k > 0) CHECK((together[k].Fx - together[k - 1].Fx).norm() > 1e-5 * alone.Fx.norm());
+  }
+}
+
 TEST_CASE("steps taken together are those taken alone, whichever come together") {
   const LoadedRobot robot = loadRobot("bipetto");
   Walk walk(robot.model), other(robot.model);

@@ -221,21 +221,27 @@ void BlockStateOf<T>::load(const LoopBlock& block, BlockScratchOf<T>& scratch) c
 }
 
 template <>
-void BlockStateOf<double>::assign(const BlockStateOf<Lanes>& lanes, int lane) {
-  const auto take = [lane](const auto& from, auto& to) { unpackLane(from.data(), lane, from.size(), to.data()); };
-  take(lanes.basis_.q, basis_.q);
-  take(lanes.basis_.N, basis_.N);
-  take(lanes.basis_.WN, basis_.WN);
-  take(lanes.basis_.J, basis_.J);
-  take(lanes.basis_.L, basis_.L);
-  for (size_t i = 0; i < basis_.rows.size(); ++i) basis_.rows[i] = lanes.basis_.rows[i][lane];
-  for (size_t i = 0; i < placements_.size(); ++i) {
-    take(lanes.placements_[i].R, placements_[i].R);
-    take(lanes.placements_[i].p, placements_[i].p);
+void BlockStateOf<Lanes>::store(const std::array<BlockState*, kLane>& to) const {
+  static_assert(sizeof(SE3) == 12 * sizeof(double) && sizeof(SE3Of<Lanes>) == 12 * sizeof(Lanes));
+  const auto give = [&](const Lanes* from, Eigen::Index size, const auto& get) {
+    std::array<double*, kLane> out;
+    for (size_t l = 0; l < kLane; ++l) out[l] = to[l] ? get(*to[l]) : nullptr;
+    unpackLanes(from, size, out);
+  };
+  give(basis_.q.data(), basis_.q.size(), [](BlockState& s) { return s.basis_.q.data(); });
+  give(basis_.N.data(), basis_.N.size(), [](BlockState& s) { return s.basis_.N.data(); });
+  give(basis_.WN.data(), basis_.WN.size(), [](BlockState& s) { return s.basis_.WN.data(); });
+  give(basis_.J.data(), basis_.J.size(), [](BlockState& s) { return s.basis_.J.data(); });
+  give(basis_.L.data(), basis_.L.size(), [](BlockState& s) { return s.basis_.L.data(); });
+  give(placements_.front().R.data(), 12 * placements_.size(),
+       [](BlockState& s) { return s.placements_.front().R.data(); });
+  give(zeta_.data(), zeta_.size(), [](BlockState& s) { return s.zeta_.data(); });
+  give(step_.data(), step_.size(), [](BlockState& s) { return s.step_.data(); });
+  for (size_t l = 0; l < kLane; ++l) {
+    if (!to[l]) continue;
+    for (size_t i = 0; i < basis_.rows.size(); ++i) to[l]->basis_.rows[i] = basis_.rows[i][l];
+    to[l]->closed_ = true;
   }
-  take(lanes.zeta_, zeta_);
-  take(lanes.step_, step_);
-  closed_ = true;
 }
 
 template <typename T>

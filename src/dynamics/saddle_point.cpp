@@ -7,13 +7,21 @@
 
 namespace bielle {
 
+void SaddlePointFactors::resize(int n, int m) {
+  L.setZero(n, n);
+  Wt.setZero(n, m);
+  Ginv.setZero(m, m);
+  D.setZero(m);
+}
+
 void SaddlePoint::resize(int n, int m) {
   if (J_.rows() == m && J_.cols() == n) return;
   J_.setZero(m, n);
   M_.setZero(roundUpToLane(n) * n);
   W_.setZero(roundUpToLane(m) * n);
   G_llt_.setZero(roundUpToLane(m) * m);
-  for (MatrixXd* matrix : {&G_, &Ginv_, &T1_, &T2_}) matrix->setZero(m, m);
+  factors_.resize(n, m);
+  for (MatrixXd* matrix : {&G_, &T1_, &T2_}) matrix->setZero(m, m);
   for (VectorXd* v : {&D_, &rhs_, &correction_}) v->setZero(m);
 }
 
@@ -75,53 +83,59 @@ void SaddlePoint::solve(const VectorXd& f, const VectorXd& g, VectorXd& a, Vecto
 // Inverse of D G D, or its pseudo-inverse as the limit of Eq. (3): with P = (DGD + mu I)^{-1} and E = mu P, the sum
 // P (I + E + E^2 + ...) is doubled at each pass, P_{2k} = P_k + E^k P_k.
 void SaddlePoint::updateInverse() {
-  if (J_.rows() == 0) return;
-  Ginv_.setIdentity();
-  solveSmallCholesky(shapePadded(G_llt_, J_.rows(), J_.rows()), Ginv_);
+  const Eigen::Index n = J_.cols(), m = J_.rows();
+  factors_.L = shapePadded(M_, n, n);
+  if (m == 0) return;
+  copyTransposed(shapePadded(W_, m, n), factors_.Wt);
+  factors_.D = D_;
+  MatrixXd& Ginv = factors_.Ginv;
+  Ginv.setIdentity();
+  solveSmallCholesky(shapePadded(G_llt_, m, m), Ginv);
   if (!redundant_) return;
   constexpr int kDoublings = 3;  // eight proximal steps
-  T1_ = options_.proximal * Ginv_;
+  T1_ = options_.proximal * Ginv;
   for (int i = 0; i < kDoublings; ++i) {
-    T2_ = Ginv_;
-    T2_.noalias() += T1_ * Ginv_;
-    Ginv_.swap(T2_);
+    T2_ = Ginv;
+    T2_.noalias() += T1_ * Ginv;
+    Ginv.swap(T2_);
     T2_.noalias() = T1_ * T1_;
     T1_.swap(T2_);
   }
   // G P G loses what is not in the range of G, rounding of the size of 1/mu above all; one Newton-Schulz step then gains
   // what eigenvalues near mu still lack.
-  T1_.noalias() = G_ * Ginv_;
-  T2_.noalias() = Ginv_ * T1_;
+  T1_.noalias() = G_ * Ginv;
+  T2_.noalias() = Ginv * T1_;
   T1_.noalias() = G_ * T2_;
-  Ginv_ = 2 * T2_;
-  Ginv_.noalias() -= T2_ * T1_;
+  Ginv = 2 * T2_;
+  Ginv.noalias() -= T2_ * T1_;
 }
 
-void SaddlePoint::solveDerivatives(MatrixRef X, MatrixRef dlambda) {
+void SaddlePoint::solveDerivatives(const SaddlePointFactors& factors, MatrixRef X, MatrixRef dlambda) {
   // In the coordinates of L: W = D J L^{-T} and L^{-1} dID give J M^{-1} dID = D^{-1} W L^{-1} dID. All is done on
   // transposes, whose columns are long.
-  const Eigen::Index columns = X.cols(), n = X.rows(), m = J_.rows(), padded = roundUpToLane(columns);
+  const Eigen::Index columns = X.cols(), n = X.rows(), m = factors.D.size(), padded = roundUpToLane(columns);
   if (X_.size() < padded * n || rhs_t_.size() < padded * m) {
     X_.setZero(padded * n);
     for (VectorXd* x : {&rhs_t_, &dlambda_t_}) x->setZero(padded * m);
   }
   PaddedMap Xt = shapePadded(X_, columns, n), rhs = shapePadded(rhs_t_, columns, m),
-            dlambda_t = shapePadded(dlambda_t_, columns, m), L = shapePadded(M_, n, n), W = shapePadded(W_, m, n);
+            dlambda_t = shapePadded(dlambda_t_, columns, m);
+  const MatrixXd &L = factors.L, &Wt = factors.Wt;
   copyTransposed(X, Xt);
   clearPadding(Xt);
   solveTransposedFromRight(L, Xt);
-  for (Eigen::Index i = 0; i < m; ++i) rhs.col(i) = -D_[i] * dlambda.row(i).transpose();
+  for (Eigen::Index i = 0; i < m; ++i) rhs.col(i) = -factors.D[i] * dlambda.row(i).transpose();
   clearPadding(rhs);
-  addProduct(columns, m, n, 1, pad(Xt), {W.data(), W.outerStride(), 1}, pad(rhs));
+  addProduct(columns, m, n, 1, pad(Xt), {Wt.data(), 1, n}, pad(rhs));
   dlambda_t.setZero();
   clearPadding(dlambda_t);
   // Symmetric but for rounding, which redundant rows magnify.
-  addProduct(columns, m, m, 1, pad(rhs), {Ginv_.data(), m, 1}, pad(dlambda_t));
+  addProduct(columns, m, m, 1, pad(rhs), {factors.Ginv.data(), m, 1}, pad(dlambda_t));
   Xt *= -1;
-  addProduct(columns, n, m, 1, pad(dlambda_t), {W.data(), 1, W.outerStride()}, pad(Xt));
+  addProduct(columns, n, m, 1, pad(dlambda_t), {Wt.data(), n, 1}, pad(Xt));
   solveFromRight(L, Xt);
   copyTransposed(Xt, X);
-  for (Eigen::Index i = 0; i < m; ++i) dlambda_t.col(i) *= D_[i];
+  for (Eigen::Index i = 0; i < m; ++i) dlambda_t.col(i) *= factors.D[i];
   copyTransposed(dlambda_t, dlambda);
 }
 

@@ -82,17 +82,17 @@ bool factorizeColumns(PaddedMap H, Eigen::Index num) {
   return true;
 }
 
-void solveTransposedFromRight(PaddedMap L, PaddedMap X) {
+void solveTransposedFromRight(ConstMatrixRef L, PaddedMap X) {
   for (Eigen::Index k = 0; k < X.cols(); ++k) {
-    addProduct(X.rows(), 1, k, -1, pad(X), {&L(k, 0), L.outerStride(), 0}, pad(X, 0, k));
+    addProduct(X.rows(), 1, k, -1, pad(X), {L.data() + k, L.outerStride(), 0}, pad(X, 0, k));
     X.col(k) *= 1 / L(k, k);
   }
 }
 
-void solveFromRight(PaddedMap L, PaddedMap X) {
+void solveFromRight(ConstMatrixRef L, PaddedMap X) {
   for (Eigen::Index k = X.cols() - 1; k >= 0; --k) {
     const Eigen::Index next = std::min(k + 1, X.cols() - 1);  // of the last one nothing is taken away
-    addProduct(X.rows(), 1, X.cols() - 1 - k, -1, pad(X, 0, next), {&L(next, k), 1, 0}, pad(X, 0, k));
+    addProduct(X.rows(), 1, X.cols() - 1 - k, -1, pad(X, 0, next), {L.data() + next + k * L.outerStride(), 1, 0}, pad(X, 0, k));
     X.col(k) *= 1 / L(k, k);
   }
 }

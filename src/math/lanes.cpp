@@ -11,6 +11,7 @@ constexpr double kLargest = 1e5;
 constexpr double kRound = 6755399441055744.0;  // 1.5 * 2^52: added and taken away, it rounds to an integer
 
 using Vector = Lanes::Vector;
+typedef double Anywhere __attribute__((vector_size(kLane * sizeof(double)), aligned(sizeof(double)), may_alias));
 
 // Rows become columns: exchanges entries across the diagonal at distance 1, 2 and 4.
 void transpose(std::array<Vector, kLane>& rows) {
@@ -33,7 +34,6 @@ void transpose(std::array<Vector, kLane>& rows) {
 }  // namespace
 
 void packLanes(const std::array<const double*, kLane>& in, Eigen::Index size, Lanes* out) {
-  typedef double Anywhere __attribute__((vector_size(kLane * sizeof(double)), aligned(sizeof(double)), may_alias));
   Eigen::Index i = 0;
   for (; i + kLane <= size; i += kLane) {
     std::array<Vector, kLane> rows;
@@ -45,6 +45,22 @@ void packLanes(const std::array<const double*, kLane>& in, Eigen::Index size, La
   }
   for (; i < size; ++i)
     for (Eigen::Index l = 0; l < kLane; ++l) out[i].v[l] = in[l][i];
+}
+
+void unpackLanes(const Lanes* in, Eigen::Index size, const std::array<double*, kLane>& out) {
+  Eigen::Index i = 0;
+  for (; i + kLane <= size; i += kLane) {
+    std::array<Vector, kLane> rows;
+#pragma GCC unroll 8
+    for (Eigen::Index l = 0; l < kLane; ++l) rows[l] = in[i + l].v;
+    transpose(rows);
+#pragma GCC unroll 8
+    for (Eigen::Index l = 0; l < kLane; ++l)
+      if (out[l]) *reinterpret_cast<Anywhere*>(out[l] + i) = rows[l];
+  }
+  for (; i < size; ++i)
+    for (Eigen::Index l = 0; l < kLane; ++l)
+      if (out[l]) out[l][i] = in[i].v[l];
 }
 
 // Minimax polynomials of FreeBSD's libm (k_sin.c, k_cos.c), whose errors are below 2^-58.

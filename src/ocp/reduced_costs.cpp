@@ -33,7 +33,7 @@ void ReducedNode::addStateCost(const StateCost& state, const VectorXd& differenc
     out.lx.segment(o, n) += gradient;
     out.lxx.block(o, o, n, n) += hessian;
     const JointVector weights = w * state.weights.segment(nv + k, n);
-    out.lx.segment(nr + o, n) += weights.cwiseProduct(work_->ws.v.segment(k, n) - state.v_ref.segment(k, n));
+    out.lx.segment(nr + o, n) += weights.cwiseProduct(v_.segment(k, n) - state.v_ref.segment(k, n));
     out.lxx.block(nr + o, nr + o, n, n).diagonal() += weights;
   }
   for (Block& b : blocks_) {
@@ -46,7 +46,7 @@ void ReducedNode::addStateCost(const StateCost& state, const VectorXd& differenc
       weights_q[k] = w * state.weights[dof];
       weights_v[k] = w * state.weights[nv + dof];
       b.work->gradient_q[k] = weights_q[k] * difference[dof];
-      b.work->gradient_v[k] = weights_v[k] * (work_->ws.v[dof] - state.v_ref[dof]);
+      b.work->gradient_v[k] = weights_v[k] * (v_[dof] - state.v_ref[dof]);
     }
     for (int c = 0; c < r; ++c) {
       b.work->HN.col(c) = weights_q.cwiseProduct(N.col(c));

@@ -38,11 +38,6 @@ StepJacobians calcStepJacobians(const Joint& joint, const VectorUpTo6<Lanes>& d)
   return out;
 }
 
-// Placements as the numbers they are made of.
-static_assert(sizeof(SE3) == 12 * sizeof(double) && sizeof(SE3Of<Lanes>) == 12 * sizeof(Lanes));
-const double* getNumbers(const SE3& X) { return X.R.data(); }
-Lanes* getNumbers(SE3Of<Lanes>& X) { return X.R.data(); }
-
 }  // namespace
 
 BlockLanes::BlockLanes(const LoopBlock& l)
@@ -56,9 +51,29 @@ BlockLanes::BlockLanes(const LoopBlock& l)
   for (MatrixX<Lanes>* x : {&E, &En, &S, &mixed, &mixed_next}) x->setZero(r, r);
 }
 
+LaneView::LaneView(const Model& model, const std::vector<BlockLanes>& blocks, const std::vector<ContactLanes>& contacts,
+                   int size)
+    : ws(model) {
+  dydd.setZero(size, 2 * size + model.nu());
+  for (const BlockLanes& b : blocks) {
+    const Eigen::Index n = b.at.N.rows(), r = b.at.N.cols();
+    const MatrixXd square = MatrixXd::Zero(r, r);
+    this->blocks.push_back({MatrixXd::Zero(n, r), square, square, square, square, square});
+  }
+  for (const ContactLanes& contact : contacts) {
+    const Matrix6Xd columns = Matrix6Xd::Zero(6, contact.J.cols());
+    this->contacts.push_back({columns, columns});
+  }
+}
+
 ReducedLanes::ReducedLanes(const Model& model, const Reduction& reduction, const std::vector<int>& tips,
                            const std::vector<int>& slots)
-    : model_(model), reduction_(reduction), tips_(tips), ws_(model), tree_(model, reduction, tips) {
+    : model_(model),
+      reduction_(reduction),
+      tips_(tips),
+      ws_(model),
+      tree_(model, reduction, tips),
+      system_(reduction.size, 6 * static_cast<int>(slots.size())) {
   blocks_.reserve(reduction.blocks.size());  // lifts point into them
   for (const LoopBlock& block : reduction.blocks) {
     blocks_.emplace_back(block);
@@ -77,8 +92,8 @@ ReducedLanes::ReducedLanes(const Model& model, const Reduction& reduction, const
   nodes_.reserve(kLane);
   f_ext_.assign(model.numBodies(), Vector6<Lanes>::Zero());
   for (VectorX<Lanes>* x : {&v_, &a_, &tau_}) x->setZero(model.nv());
-  for (MatrixX<Lanes>* x : {&A_y_, &A_v_, &M_}) x->setZero(reduction.size, reduction.size);
-  for (VectorX<Lanes>* x : {&f_, &ydd_}) x->setZero(reduction.size);
+  for (MatrixX<Lanes>* x : {&A_y_, &A_v_}) x->setZero(reduction.size, reduction.size);
+  for (size_t l = 0; l < kLane; ++l) views_.emplace_back(model, blocks_, contacts_, reduction.size);
 }
 
 int ReducedLanes::findLane(const ReducedNode* node) const {
@@ -88,15 +103,13 @@ int ReducedLanes::findLane(const ReducedNode* node) const {
 
 void ReducedLanes::setNodes(NodeModel* const* nodes, int count) {
   nodes_.clear();
-  for (int l = 0; l < count; ++l) nodes_.push_back(static_cast<const ReducedNode*>(nodes[l]));
+  for (int l = 0; l < count; ++l) nodes_.push_back(static_cast<ReducedNode*>(nodes[l]));
   packNodes();
 }
 
 void ReducedLanes::linearize(NodeModel* const* nodes, int count) {
-  using Node = const ReducedNode&;
   setNodes(nodes, count);
-  pack([](Node n) { return n.a_.data(); }, a_.size(), a_.data());
-  for (size_t i = 0; i < blocks_.size(); ++i) packBlock(i);
+  packSteps();
   updateColumns(model_, ws_);
   updateVelocities(model_, ws_, v_);
   updateAccelerations(model_, ws_, a_);
@@ -111,93 +124,10 @@ void ReducedLanes::linearize(NodeModel* const* nodes, int count) {
   for (ContactLanes& contact : contacts_)
     if (contact.used) updateContact(contact);
   for (BlockLanes& b : blocks_) linearizeStep(b);
+  storeDerivatives();
 }
 
-// `get` says where the numbers of a node are; lanes without a node do what the first one does.
-template <typename Get>
-void ReducedLanes::pack(const Get& get, Eigen::Index size, Lanes* out) const {
-  std::array<const double*, kLane> in;
-  for (size_t l = 0; l < kLane; ++l) in[l] = get(*nodes_[l < nodes_.size() ? l : 0]);
-  packLanes(in, size, out);
-}
-
-void ReducedLanes::packNodes() {
-  using Node = const ReducedNode&;
-  pack([](Node n) { return getNumbers(n.X_WB_.front()); }, 12 * model_.numBodies(), getNumbers(ws_.X_WB.front()));
-  ws_.stage = WorkspaceStage::Placement;
-  pack([](Node n) { return n.v_.data(); }, v_.size(), v_.data());
-  pack([](Node n) { return n.tau_.data(); }, tau_.size(), tau_.data());
-  pack([](Node n) { return &n.spec_.dt; }, 1, &h_);
-  for (size_t i = 0; i < blocks_.size(); ++i)
-    packBasis([&](Node n) -> const BlockBasis& { return n.blocks_[i].at; }, blocks_[i].at);
-  for (size_t i = 0; i < contacts_.size(); ++i) packContact(i);
-}
-
-template <typename GetBasis>
-void ReducedLanes::packBasis(const GetBasis& getBasis, BlockBasisOf<Lanes>& to) const {
-  using Node = const ReducedNode&;
-  pack([&](Node n) { return getBasis(n).N.data(); }, to.N.size(), to.N.data());
-  pack([&](Node n) { return getBasis(n).WN.data(); }, to.WN.size(), to.WN.data());
-  pack([&](Node n) { return getBasis(n).J.data(); }, to.J.size(), to.J.data());
-  pack([&](Node n) { return getBasis(n).L.data(); }, to.L.size(), to.L.data());
-  for (size_t k = 0; k < to.rows.size(); ++k)
-    for (size_t l = 0; l < kLane; ++l) to.rows[k][l] = getBasis(*nodes_[l < nodes_.size() ? l : 0]).rows[k];
-}
-
-// What linearize() needs of the points ahead.
-void ReducedLanes::packBlock(size_t i) {
-  using Node = const ReducedNode&;
-  BlockLanes& b = blocks_[i];
-  packBasis([&](Node n) -> const BlockBasis& { return n.blocks_[i].next.basis(); }, b.next);
-  pack([&](Node n) { return n.blocks_[i].next.zeta().data(); }, b.zeta.size(), b.zeta.data());
-  pack([&](Node n) { return n.blocks_[i].next.step().data(); }, b.step.size(), b.step.data());
-  pack([&](Node n) { return getNumbers(n.blocks_[i].next.placements().front()); }, 12 * b.loop.model.numBodies(),
-       getNumbers(b.own.X_WB.front()));
-  b.own.stage = WorkspaceStage::Placement;
-}
-
-// Nodes without this contact have no force there, and whatever its other numbers.
-void ReducedLanes::packContact(size_t slot) {
-  ContactLanes& contact = contacts_[slot];
-  contact.used = false;
-  contact.wrench.setZero();
-  contact.kd = 0;
-  contact.kp_rate.setZero();
-  contact.kp_residual.setZero();
-  for (size_t l = 0; l < nodes_.size(); ++l) {
-    const ReducedNode& node = *nodes_[l];
-    const int index = node.findContact(static_cast<int>(slot));
-    if (index < 0) continue;
-    const Closure& closure = node.spec_.constraints.closures[index];
-    const SE3 X_WF = node.X_WB_[closure.body1] * closure.X_B1;
-    const VectorUpTo6<double> lambda =
-        node.lambda_.segment(node.spec_.constraints.offsets[index], getRows(closure.kind));
-    const Vector6d wrench = X_WF.actForce(expandRows(closure, lambda));
-    for (int k = 0; k < 12; ++k) getNumbers(contact.X_WF)[k].set(l, getNumbers(X_WF)[k]);
-    for (int k = 0; k < 6; ++k) contact.wrench[k].set(l, wrench[k]);
-    contact.kd.set(l, closure.kd);
-    contact.used = true;
-    if (closure.kp == 0) continue;
-    const SE3 X_12 = X_WF.inverseTimes(closure.X_B2);
-    const RowVectorUpTo6 residual = closure.kp * calcClosureResidual(closure, X_12);
-    const RowsBy6 rate = closure.kp * calcClosureResidualRate(closure, X_12);
-    for (int r = 0; r < residual.size(); ++r) contact.kp_residual[r].set(l, residual[r]);
-    for (int c = 0; c < 6; ++c)
-      for (int r = 0; r < rate.rows(); ++r) contact.kp_rate(r, c).set(l, rate(r, c));
-  }
-}
-
-void ReducedLanes::packBlockStep(size_t i) {
-  using Node = const ReducedNode&;
-  BlockLanes& b = blocks_[i];
-  pack([&](Node n) { return n.blocks_[i].at.q.data(); }, b.at.q.size(), b.at.q.data());
-  for (size_t l = 0; l < kLane; ++l) {
-    const ReducedNode* before = nodes_[l < nodes_.size() ? l : 0]->before_;
-    for (Eigen::Index k = 0; k < b.surplus.size(); ++k) b.surplus[k].set(l, before ? before->blocks_[i].surplus[k] : 0);
-  }
-}
-
-void ReducedLanes::startSteps(NodeModel* const* nodes, int count) {
+LaneMask ReducedLanes::startSteps(NodeModel* const* nodes, int count) {
   setNodes(nodes, count);
   for (size_t i = 0; i < blocks_.size(); ++i) packBlockStep(i);
   updateColumns(model_, ws_);
@@ -215,63 +145,55 @@ void ReducedLanes::startSteps(NodeModel* const* nodes, int count) {
   }
   updateInverseDynamics(model_, ws_, a_);
   for (const FreeDofs& free : free_)
-    for (int k = 0; k < free.size; ++k) f_[free.offset + k] = tau_[free.dof + k] - ws_.b[free.dof + k];
+    for (int k = 0; k < free.size; ++k) system_.f[free.offset + k] = tau_[free.dof + k] - ws_.b[free.dof + k];
   for (BlockLanes& b : blocks_) {
     for (size_t k = 0; k < b.loop.dofs.size(); ++k) b.left[k] = tau_[b.loop.dofs[k]] - ws_.b[b.loop.dofs[k]];
-    auto f = f_.segment(b.loop.offset, b.loop.size);
+    auto f = system_.f.segment(b.loop.offset, b.loop.size);
     f.setZero();
     addSmallProductTransposed(b.at.N, b.left, f);
   }
-  tree_.updateMassMatrix(ws_, lifts_, M_);
-  for (ContactLanes& contact : contacts_)
-    if (contact.used) updateContactRows(contact);
+  tree_.updateMassMatrix(ws_, lifts_, system_.M);
+  for (size_t slot = 0; slot < contacts_.size(); ++slot) updateContactRows(slot);
+  LaneMask solved = system_.solve();
+  for (size_t l = 0; l < nodes_.size(); ++l)
+    if (nodes_[l]->hasHinges()) solved.v[l] = 0;
+  storeFactors(solved);
+  return solved;
 }
 
 // J_c N and gamma_c + J_c a_d; the accelerations of the workspace are those of a_d.
-void ReducedLanes::updateContactRows(ContactLanes& contact) {
+void ReducedLanes::updateContactRows(size_t slot) {
+  ContactLanes& contact = contacts_[slot];
+  auto Jt = system_.Jt.middleCols<6>(6 * slot);
+  auto gamma = system_.gamma.segment<6>(6 * slot);
+  Jt.setZero();
+  gamma.setZero();
+  if (!contact.used) return;
   const auto& tip = tree_.getTip(contact.tip);
   const int body = tips_[contact.tip];
   contact.gamma = contact.X_WF.actInvMotion(ws_.A[body] - ws_.A[0] + contact.kd * ws_.V[body]) - contact.kp_residual;
   for (size_t o = 0; o < tip.outer.size(); ++o) contact.J.col(o) = contact.X_WF.actInvMotion(tip.J.col(o));
-}
-
-void ReducedLanes::loadSystem(int lane, MatrixXd& M, MatrixXd& JcN, VectorXd& f, VectorXd& gamma) const {
-  const ReducedNode& node = *nodes_[lane];
-  const ConstraintSet& set = node.spec_.constraints;
-  unpackLane(M_.data(), lane, M_.size(), M.data());
-  unpackLane(f_.data(), lane, f_.size(), f.data());
-  JcN.setZero();
-  for (size_t c = set.num_loops; c < set.closures.size(); ++c) {
-    const ContactLanes& contact = contacts_[node.contact_slots_[c - set.num_loops]];
-    const std::vector<int>& outer = getOuter(contact);
-    const int row = set.offsets[c] - node.loop_rows_, n = getRows(set.closures[c].kind);
-    Vector6d full;
-    unpackLane(contact.gamma.data(), lane, 6, full.data());
-    gamma.segment(row, n) = selectRows(set.closures[c], full);
-    for (size_t o = 0; o < outer.size(); ++o) {
-      unpackLane(&contact.J(0, o), lane, 6, full.data());
-      JcN.col(outer[o]).segment(row, n) = selectRows(set.closures[c], full);
-    }
+  for (int r = 0; r < 6; ++r) {
+    const LaneMask present = system_.absent[6 * slot + r] < Lanes(1);
+    gamma[r] = select(present, contact.gamma[r], 0);
+    for (size_t o = 0; o < tip.outer.size(); ++o) Jt(tip.outer[o], r) = select(present, contact.J(r, o), 0);
   }
-}
-
-void ReducedLanes::storeAccelerations(int lane, const VectorXd& ydd) {
-  for (Eigen::Index k = 0; k < ydd.size(); ++k) ydd_[k].set(lane, ydd[k]);
 }
 
 // robot_problem.h Eq. (3). Lanes without a node are left to themselves.
 LaneMask ReducedLanes::finishSteps() {
-  for (Eigen::Index k = 0; k < ydd_.size(); ++k)
-    for (Eigen::Index l = nodes_.size(); l < kLane; ++l) ydd_[k].set(l, ydd_[k][0]);
+  VectorX<Lanes>& ydd = system_.ydd;
+  for (Eigen::Index k = 0; k < ydd.size(); ++k)
+    for (Eigen::Index l = nodes_.size(); l < kLane; ++l) ydd[k].set(l, ydd[k][0]);
   for (const FreeDofs& free : free_)
-    for (int k = 0; k < free.size; ++k) a_[free.dof + k] += ydd_[free.offset + k];
+    for (int k = 0; k < free.size; ++k) a_[free.dof + k] += ydd[free.offset + k];
   LaneMask closed = Lanes(0) <= Lanes(0);
   for (BlockLanes& b : blocks_) closed = closed && close(b);
   return closed;
 }
 
 LaneMask ReducedLanes::close(BlockLanes& b) {
-  const auto ydd = ydd_.segment(b.loop.offset, b.loop.size);
+  const auto ydd = system_.ydd.segment(b.loop.offset, b.loop.size);
   addSmallProduct(b.at.N, ydd, b.a_d);  // now a
   for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
     const int dof = b.loop.dofs[k];

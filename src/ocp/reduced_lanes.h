@@ -1,8 +1,9 @@
 #pragma once
 // Up to kLane steps and their derivatives at once, one node per lane (lanes.h): what reduced_node.h needs of the mechanism for
-// its Eqs. (b) to (g). Nodes may have different contacts and time steps. What is left to each of them is the system of its
-// contacts and its costs.
+// its Eqs. (b) to (g). Nodes may have different contacts and time steps. What is left to each of them are redundant contacts and
+// its costs.
 #include "bielle/dynamics/reduced_tree.h"
+#include "contact_system.h"
 
 namespace bielle {
 
@@ -39,19 +40,36 @@ struct ContactLanes {
   Vector6<Lanes> gamma;        // all rows of gamma_c + J_c a_d
 };
 
+// What one lane holds, for its node alone.
+struct LaneView {
+  LaneView(const Model& model, const std::vector<BlockLanes>& blocks, const std::vector<ContactLanes>& contacts,
+           int size);
+  struct Block {
+    MatrixXd Z, E, En, S, mixed, mixed_next;  // as in BlockLanes
+  };
+  struct Contact {
+    Matrix6Xd dy, dv;  // as in ContactLanes
+  };
+  Workspace ws;   // V and hc behind a step; what residuals look at, behind linearize()
+  MatrixXd dydd;  // size x (2 size + nu): A_y, A_v, and room
+  std::vector<Block> blocks;
+  std::vector<Contact> contacts;
+};
+
 class ReducedLanes {
  public:
   // \param slots  tips of all contacts that one node may have, a tip with two contacts twice
   ReducedLanes(const Model& model, const Reduction& reduction, const std::vector<int>& tips,
                const std::vector<int>& slots);
 
-  // Steps of at most kLane reduced nodes whose points and motor forces are there: up to the systems of the contacts, Eq. (b);
-  // what these are for each node (f, and gamma at its contact rows); their solution back; and the rest. Tells which steps
-  // went through.
-  void startSteps(NodeModel* const* nodes, int count);
+  // Steps of at most kLane reduced nodes whose points and motor forces are there: Eq. (b), and where it could be solved; what
+  // it is for one of the others (f, and gamma at its contact rows) and its solution back; the rest, and where that went
+  // through; and what the nodes keep of it, but for those that failed.
+  LaneMask startSteps(NodeModel* const* nodes, int count);
   void loadSystem(int lane, MatrixXd& M, MatrixXd& JcN, VectorXd& f, VectorXd& gamma) const;
   void storeAccelerations(int lane, const VectorXd& ydd);
   LaneMask finishSteps();
+  void storeSteps(const bool* ok);
 
   // Derivatives about the last step of each of at most kLane reduced nodes.
   void linearize(NodeModel* const* nodes, int count);
@@ -59,24 +77,26 @@ class ReducedLanes {
   // Lane of a node of the last call, -1 for others.
   int findLane(const ReducedNode* node) const;
 
-  const WorkspaceOf<Lanes>& workspace() const { return ws_; }
-  const std::vector<BlockLanes>& blocks() const { return blocks_; }
-  const std::vector<ContactLanes>& contacts() const { return contacts_; }
-  const std::vector<int>& getOuter(const ContactLanes& contact) const { return tree_.getTip(contact.tip).outer; }
-  const VectorX<Lanes>& accelerations() const { return a_; }
-  const MatrixX<Lanes>& A_y() const { return A_y_; }
-  const MatrixX<Lanes>& A_v() const { return A_v_; }
+  LaneView& getView(int lane) { return views_[lane]; }
+  // Reduced coordinates that move the contact of a slot.
+  const std::vector<int>& getOuter(int slot) const { return tree_.getTip(contacts_[slot].tip).outer; }
 
  private:
   template <typename Get>
   void pack(const Get& get, Eigen::Index size, Lanes* out) const;
+  template <typename Get>
+  void unpack(const Lanes* in, Eigen::Index size, const Get& get) const;
   void setNodes(NodeModel* const* nodes, int count);
   void packNodes();
   template <typename GetBasis>
   void packBasis(const GetBasis& getBasis, BlockBasisOf<Lanes>& to) const;
   void packBlockStep(size_t i);
   void packBlock(size_t i);
-  void updateContactRows(ContactLanes& contact);
+  void packSteps();
+  void updateContactRows(size_t slot);
+  void storeFactors(const LaneMask& solved);
+  void storeForces(size_t lane);
+  void storeDerivatives();
   LaneMask close(BlockLanes& b);
   void packContact(size_t slot);
   void updateForces();
@@ -86,7 +106,7 @@ class ReducedLanes {
   const Model& model_;
   const Reduction& reduction_;
   const std::vector<int>& tips_;
-  std::vector<const ReducedNode*> nodes_;
+  std::vector<ReducedNode*> nodes_;
   WorkspaceOf<Lanes> ws_;
   std::vector<BlockLanes> blocks_;
   std::vector<BlockLiftOf<Lanes>> lifts_;
@@ -100,8 +120,8 @@ class ReducedLanes {
   VectorX<Lanes> v_, a_, tau_;         // nv
   Lanes h_;
   MatrixX<Lanes> A_y_, A_v_;  // size x size, reduced_tree.h Eqs. (2) and (3)
-  MatrixX<Lanes> M_;          // size x size
-  VectorX<Lanes> f_, ydd_;    // size
+  ContactSystem system_;      // six rows for each slot
+  std::vector<LaneView> views_;
 };
 
 }  // namespace bielle

@@ -53,25 +53,21 @@ int ReducedNode::findContact(int slot) const {
   return found == contact_slots_.end() ? -1 : num_loops_ + static_cast<int>(found - contact_slots_.begin());
 }
 
-// What residuals look at.
-void ReducedNode::loadKinematics(int lane) {
-  const WorkspaceOf<Lanes>& from = work_->lanes.workspace();
-  Workspace& to = work_->ws;
-  to.q = q_;
-  to.v = v_;
-  to.X_WB = X_WB_;
-  const int nb = model_.numBodies(), nv = model_.nv();
-  unpackLane(from.J.data(), lane, 6 * nv, to.J.data());
-  unpackLane(from.dV.data(), lane, 6 * nv, to.dV.data());
-  unpackLane(from.YJ.data(), lane, 6 * nv, to.YJ.data());
-  unpackLane(from.V.front().data(), lane, 6 * nb, to.V.front().data());
-  unpackLane(from.hc.front().data(), lane, 6 * nb, to.hc.front().data());
-  unpackLane(from.Yc.front().data(), lane, 36 * nb, to.Yc.front().data());
-  to.stage = WorkspaceStage::Velocity;
+bool ReducedNode::hasHinges() const {
+  const std::vector<Closure>& closures = spec_.constraints.closures;
+  return std::any_of(closures.begin() + num_loops_, closures.end(),
+                     [](const Closure& c) { return c.kind == ClosureKind::Hinge5D; });
+}
+
+// The contact row of a row of a slot, -1 if this stage has none there.
+int ReducedNode::findContactRow(size_t slot, int row) const {
+  const int index = findContact(static_cast<int>(slot));
+  if (index < 0 || row >= getRows(spec_.constraints.closures[index].kind)) return -1;
+  return spec_.constraints.offsets[index] - loop_rows_ + row;
 }
 
 // The right-hand sides of the contact rows.
-void ReducedNode::loadContactDerivatives(int lane) {
+void ReducedNode::loadContactDerivatives(const LaneView& view) {
   ReducedWork& work = *work_;
   const int nr = reduction_.size;
   const ConstraintSet& set = spec_.constraints;
@@ -79,31 +75,24 @@ void ReducedNode::loadContactDerivatives(int lane) {
   dlambda.setZero();
   for (size_t c = num_loops_; c < set.closures.size(); ++c) {
     const int row = set.offsets[c] - loop_rows_, n = getRows(set.closures[c].kind);
-    const ContactLanes& contact = work.lanes.contacts()[contact_slots_[c - num_loops_]];
-    const std::vector<int>& outer = work.lanes.getOuter(contact);
-    Vector6d dy, dv;
+    const int slot = contact_slots_[c - num_loops_];
+    const LaneView::Contact& contact = view.contacts[slot];
+    const std::vector<int>& outer = work.lanes.getOuter(slot);
     for (size_t o = 0; o < outer.size(); ++o) {
-      unpackLane(&contact.dy(0, o), lane, 6, dy.data());
-      unpackLane(&contact.dv(0, o), lane, 6, dv.data());
-      dlambda.col(outer[o]).segment(row, n) = selectRows(set.closures[c], dy);
-      dlambda.col(nr + outer[o]).segment(row, n) = selectRows(set.closures[c], dv);
+      dlambda.col(outer[o]).segment(row, n) = selectRows<double>(set.closures[c], contact.dy.col(o));
+      dlambda.col(nr + outer[o]).segment(row, n) = selectRows<double>(set.closures[c], contact.dv.col(o));
     }
   }
 }
 
 // Derivatives of y' and lambda_c.
-void ReducedNode::linearizeDynamics(int lane) {
+void ReducedNode::linearizeDynamics(LaneView& view) {
   ReducedWork& work = *work_;
-  const int nr = reduction_.size;
-  unpackLane(work.lanes.A_y().data(), lane, nr * nr, work.dydd.data());
-  unpackLane(work.lanes.A_v().data(), lane, nr * nr, &work.dydd(0, nr));
-  work.dydd.rightCols(model_.nu()).setZero();
-  addMotorColumns(work.dydd.rightCols(model_.nu()));
-  loadContactDerivatives(lane);
-  SaddlePoint& saddle_point = work.contacts.at(contact_rows_).saddle_point;
-  saddle_point.factorize(M_, JcN_);
-  saddle_point.updateInverse();
-  saddle_point.solveDerivatives(work.dydd, work.dlambda.topRows(contact_rows_));
+  view.dydd.rightCols(model_.nu()).setZero();
+  addMotorColumns(view.dydd.rightCols(model_.nu()));
+  loadContactDerivatives(view);
+  work.contacts.at(contact_rows_)
+      .saddle_point.solveDerivatives(factors_, view.dydd, work.dlambda.topRows(contact_rows_));
 }
 
 // out (size x nu) += -N^T B
@@ -121,49 +110,41 @@ void ReducedNode::addMotorColumns(MatrixRef out) const {
 
 bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
   takeWork();
-  const int lane = work_->lanes.findLane(this);
-  loadKinematics(lane);
-  linearizeDynamics(lane);
+  LaneView& view = work_->lanes.getView(work_->lanes.findLane(this));
+  showView(view);
+  linearizeDynamics(view);
   for (size_t i = 0; i < blocks_.size(); ++i)
-    if (!linearizeBlock(blocks_[i], work_->lanes.blocks()[i], lane, x_next_node, out)) return false;
+    if (!linearizeBlock(blocks_[i], view.blocks[i], x_next_node, out)) return false;
   differenceFree(x_next_node, x_next_, out.gap);
   for (FreeJoint& free : free_joints_) linearizeFreeJoint(free, out);
-  assembleStep(out);
+  assembleStep(view.dydd, out);
   storeChart();
   return true;
 }
 
 // Eq. (g) for one block, rows [offset, offset + size) of Fx, Fu and gap.
-bool ReducedNode::linearizeBlock(Block& b, const BlockLanes& lanes, int lane, ConstVectorRef x_next_node,
-                                 StageModel& out) {
+bool ReducedNode::linearizeBlock(Block& b, LaneView::Block& view, ConstVectorRef x_next_node, StageModel& out) {
   const LoopBlock& loop = b.loop;
   BlockWork& work = *b.work;
   const int nr = reduction_.size, o = loop.offset, r = loop.size;
   const double h = spec_.dt;
   const BlockBasis& next = b.next.basis();
-  const auto load = [lane](const MatrixX<Lanes>& from, MatrixXd& to) {
-    unpackLane(from.data(), lane, from.size(), to.data());
-  };
-  b.work->motion.basis = &b.at;
-  load(lanes.motion.Z, work.motion.Z);  // for costs
-  MatrixXd &X = work.X, &Xn = work.Xn, &E = work.E, &En = work.En;
-  load(lanes.E, E);
-  load(lanes.En, En);
-  load(lanes.S, work.S);
-  load(lanes.mixed, work.mixed);
-  load(lanes.mixed_next, work.mixed_next);
+  work.motion.basis = &b.at;
+  work.motion.Z = view.Z;  // for costs
+  MatrixXd &X = work.X, &Xn = work.Xn;
+  const MatrixXd &E = view.E, &S = view.S;
   X.setIdentity();
-  if (!factorizeSmall(work.mixed, work.mixed_pivots)) {
+  if (!factorizeSmall(view.mixed, work.mixed_pivots)) {
     failure_ = "closure '" + loop.closures.closures.front().name + "': the step turns its loops too far";
     return false;
   }
-  solveFactorized(work.mixed, work.mixed_pivots, X);
-  Xn = work.mixed_next.lazyProduct(X);
+  solveFactorized(view.mixed, work.mixed_pivots, X);
+  Xn = view.mixed_next.lazyProduct(X);
   work.q_y = X.lazyProduct(E);
   work.q_v = h * X;
   work.q_a = (h * h) * X;
-  work.v_y = (Xn.lazyProduct(E) - En) / h - work.S.lazyProduct(work.q_y);
-  work.v_v = Xn - work.S.lazyProduct(work.q_v);
+  work.v_y = (Xn.lazyProduct(E) - view.En) / h - S.lazyProduct(work.q_y);
+  work.v_v = Xn - S.lazyProduct(work.q_v);
   work.v_a = h * work.v_v;
 
   // About the node state, where a gap is open.
@@ -206,13 +187,13 @@ bool ReducedNode::moveToNodeState(Block& b, StageModel& out) {
   const std::pair<MatrixXd*, MatrixXd*> derivatives[] = {
       {&b.work->q_y, &b.work->v_y}, {&b.work->q_v, &b.work->v_v}, {&b.work->q_a, &b.work->v_a}};
   for (const auto& [dq, dv] : derivatives) {
-    b.work->S.setZero();
-    addSmallProduct(b.work->Pv, *dv, b.work->S);
-    addSmallProduct(b.work->Pz, *dq, b.work->S);
-    dv->swap(b.work->S);
-    b.work->S.setZero();
-    addSmallProduct(b.work->Pq, *dq, b.work->S);
-    dq->swap(b.work->S);
+    b.work->moved.setZero();
+    addSmallProduct(b.work->Pv, *dv, b.work->moved);
+    addSmallProduct(b.work->Pz, *dq, b.work->moved);
+    dv->swap(b.work->moved);
+    b.work->moved.setZero();
+    addSmallProduct(b.work->Pq, *dq, b.work->moved);
+    dq->swap(b.work->moved);
   }
   return true;
 }
@@ -256,10 +237,10 @@ void ReducedNode::assembleColumns(ConstMatrixRef dydd, MatrixXd& F) const {
   for (const Block& b : blocks_) assembleBlock(b.work->q_a, b.work->v_a, b.loop.offset, dydd, F);
 }
 
-void ReducedNode::assembleStep(StageModel& out) const {
+void ReducedNode::assembleStep(const MatrixXd& dydd, StageModel& out) const {
   const int nr = reduction_.size;
-  assembleColumns(work_->dydd.leftCols(2 * nr), out.Fx);
-  assembleColumns(work_->dydd.rightCols(model_.nu()), out.Fu);
+  assembleColumns(dydd.leftCols(2 * nr), out.Fx);
+  assembleColumns(dydd.rightCols(model_.nu()), out.Fu);
   for (const FreeJoint& free : free_joints_) {
     const int n = static_cast<int>(free.q_v.rows()), o = free.offset;
     out.Fx.block(o, o, n, n) += free.q_y;

@@ -15,8 +15,8 @@ BlockWork::BlockWork(const LoopBlock& l) : scratch(l), start(l), point(l), motio
   for (VectorXd* x : {&independent, &zeta}) x->setZero(rank);
   rows.setZero(l.closures.rows);
   for (MatrixXd* x : {&HN, &wy, &wv, &diff_N}) x->setZero(n, r);
-  for (MatrixXd* x : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a, &S}) x->setZero(r, r);
-  for (MatrixXd* x : {&X, &Xn, &E, &En, &mixed, &mixed_next, &Pq, &Pv, &Pz}) x->setZero(r, r);
+  for (MatrixXd* x : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a}) x->setZero(r, r);
+  for (MatrixXd* x : {&X, &Xn, &mixed, &moved, &Pq, &Pv, &Pz}) x->setZero(r, r);
   target.setZero(r);
   mixed_pivots.resize(r);
 }
@@ -74,6 +74,7 @@ ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const R
   for (int rows : sizes.contact_rows) {
     ContactWork& work = contacts[rows];
     work.saddle_point.resize(nr, rows);
+    work.JcN.setZero(rows, nr);
     for (VectorXd* x : {&work.gamma, &work.lambda}) x->setZero(rows);
   }
   for (const bielle::Motor& motor : model.motors()) {
@@ -88,7 +89,7 @@ ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const R
   }
   for (VectorXd* x : {&a_d, &force}) x->setZero(nv);
   for (VectorXd* x : {&f, &ydd}) x->setZero(nr);
-  dydd.setZero(nr, 2 * nr + nu);
+  M.setZero(nr, nr);
   dlambda.setZero(sizes.rows, 2 * nr + nu);
   dlambda_turned.setZero(2 * nr + nu, sizes.rows);
   for (MatrixXd* m : {&jacobians.q, &jacobians.v}) m->setZero(sizes.residuals, nv);
@@ -125,8 +126,7 @@ ReducedNode::ReducedNode(const Model& model, const Reduction& reduction, const S
   X_WB_.resize(model.numBodies());
   q_.setZero(model.nq());
   for (VectorXd* v : {&v_, &tau_, &a_}) v->setZero(nv);
-  JcN_.setZero(contact_rows_, nr);
-  M_.setZero(nr, nr);
+  factors_.resize(nr, contact_rows_);
   chart_x_.setConstant(model.nq() + nv, std::numeric_limits<double>::quiet_NaN());
 }
 
@@ -237,6 +237,7 @@ void ReducedNode::updateWholePlacements() {
 void ReducedNode::restore() {
   takeWork();
   Workspace& ws = work_->ws;
+  shown_ = &ws;
   ws.q = q_;
   ws.X_WB = X_WB_;
   ws.stage = WorkspaceStage::Placement;

@@ -43,8 +43,8 @@ struct BlockWork {
   VectorXd q, v, a, d, w, gradient_q, gradient_v;  // n (q: nq)
   VectorXd independent, zeta, rows;                // rank, rank, m
   MatrixXd HN, wy, wv, diff_N;                     // n x r, scratch
-  MatrixXd q_y, q_v, q_a, v_y, v_v, v_a, S;        // r x r: dq+ and dv+ by dy, dy_v, dy'; S of Eq. (f)
-  MatrixXd X, Xn, E, En, mixed, mixed_next;        // r x r: Eq. (g); matrices to be inverted
+  MatrixXd q_y, q_v, q_a, v_y, v_v, v_a;           // r x r: dq+ and dv+ by dy, dy_v, dy'
+  MatrixXd X, Xn, mixed, moved;                    // r x r: Eq. (g); a matrix to be inverted; scratch
   MatrixXd Pq, Pv, Pz;                             // r x r: change of basis at open gaps
   VectorXd target;                                 // r
   std::vector<int> mixed_pivots;
@@ -64,6 +64,7 @@ struct ReducedSizes {
 // What a node with so many contact rows needs.
 struct ContactWork {
   SaddlePoint saddle_point;
+  MatrixXd JcN;  // rows x size
   VectorXd gamma, lambda;
 };
 
@@ -78,8 +79,8 @@ struct ReducedWork {
   std::map<int, ContactWork> contacts;  // by rows
   VectorXd a_d, force;                  // nv
   VectorXd f, ydd;                      // size
-  MatrixXd dydd;                        // size x (2 size + nu), derivatives of y' with respect to (dy, dy_v, u)
-  MatrixXd dlambda;                     // largest contact rows x the same
+  MatrixXd M;                           // size x size
+  MatrixXd dlambda;                     // largest contact rows x (2 size + nu), by (dy, dy_v, u)
   MatrixXd dlambda_turned;              // its transpose, for impacts
   struct Motor {
     int block, row;  // block and row of its N; or -1 and reduced coordinate
@@ -127,7 +128,7 @@ struct FreeJoint {
 };
 
 class ReducedNode : public NodeModel {
-  friend class ReducedLanes;  // reads what the last step left
+  friend class ReducedLanes;  // reads what the last step left, and leaves what the next one does
 
  public:
   using Block = ReducedBlock;
@@ -141,7 +142,7 @@ class ReducedNode : public NodeModel {
   bool updateState(ConstVectorRef x) override;
   bool updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override;
   void restore() override;
-  const Workspace& workspace() const override { return work_->ws; }
+  const Workspace& workspace() const override { return *shown_; }
   ResidualJacobians& jacobians() override { return work_->jacobians; }
   bool startStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override;
   void finishSteps(NodeModel* const* nodes, int count, bool* ok) override;
@@ -177,17 +178,20 @@ class ReducedNode : public NodeModel {
   bool solveContacts();
   void stepFreeJoints();
   bool closeStep(const ReducedNode* previous);
-  void finishStep(int lane);
+  void finishStep();
   bool moveToNodeState(Block& b, StageModel& out);
-  void loadKinematics(int lane);
-  void loadContactDerivatives(int lane);
-  void linearizeDynamics(int lane);
-  bool linearizeBlock(Block& b, const BlockLanes& lanes, int lane, ConstVectorRef x_next_node, StageModel& out);
+  void showView(LaneView& view);
+  void loadContactDerivatives(const LaneView& view);
+  void linearizeDynamics(LaneView& view);
+  bool linearizeBlock(Block& b, LaneView::Block& view, ConstVectorRef x_next_node, StageModel& out);
   // The contact of this stage in a slot, as an index of its constraints; -1 if it has none there.
   int findContact(int slot) const;
+  int findContactRow(size_t slot, int row) const;
+  // Whether a contact has other rows than the first ones of its six.
+  bool hasHinges() const;
   void linearizeFreeJoint(FreeJoint& free, const StageModel& out) const;
   void assembleColumns(ConstMatrixRef dydd, MatrixXd& F) const;
-  void assembleStep(StageModel& out) const;
+  void assembleStep(const MatrixXd& dydd, StageModel& out) const;
   void addMotorColumns(MatrixRef out) const;
   void differenceAbout(Block& b, const MatrixXd& WN, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
   void differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
@@ -200,6 +204,7 @@ class ReducedNode : public NodeModel {
   const Reduction& reduction_;
   std::shared_ptr<ReducedWorkPool> pool_;
   ReducedWork* work_ = nullptr;
+  const Workspace* shown_ = nullptr;
   std::vector<ReducedBlock> blocks_;
   std::vector<FreeJoint> free_joints_;
   std::vector<int> contact_slots_;  // per contact
@@ -207,7 +212,7 @@ class ReducedNode : public NodeModel {
   std::vector<SE3> X_WB_;
   VectorXd q_, v_, tau_, a_;             // of the last update
   const ReducedNode* before_ = nullptr;  // within a step: the node whose next state this is, if known
-  MatrixXd JcN_, M_;                     // contact rows x size, size x size
+  SaddlePointFactors factors_;           // of Eq. (b)
   VectorXd chart_x_;
 };
 

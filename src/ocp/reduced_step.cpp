@@ -17,7 +17,7 @@ bool ReducedNode::updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel
   work.force = tau_ - work.ws.b;
   projectVector(work.force, work.f);
   for (Block& b : blocks_) updateTwists(getPlacedView(b.loop, work.ws), b.at, b.work->motion);
-  work.tree.updateMassMatrix(work.ws, work.lifts, M_);
+  work.tree.updateMassMatrix(work.ws, work.lifts, work.M);
   updateContacts();
   if (!solveContacts()) return false;
   a_ = work.a_d;
@@ -30,11 +30,13 @@ bool ReducedNode::updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel
 bool ReducedNode::solveContacts() {
   ReducedWork& work = *work_;
   ContactWork& contacts = work.contacts.at(contact_rows_);
-  if (contacts.saddle_point.factorize(M_, JcN_) != SaddlePointStatus::Ok) {
+  if (contacts.saddle_point.factorize(work.M, contacts.JcN) != SaddlePointStatus::Ok) {
     failure_ = "the mass matrix is singular";
     return false;
   }
   contacts.saddle_point.solve(work.f, contacts.gamma, work.ydd, contacts.lambda);
+  contacts.saddle_point.updateInverse();
+  factors_ = contacts.saddle_point.factors();
   lambda_.tail(contact_rows_) = contacts.lambda;
   return true;
 }
@@ -50,32 +52,28 @@ bool ReducedNode::startStep(ConstVectorRef x, ConstVectorRef u, const NodeModel*
 void ReducedNode::finishSteps(NodeModel* const* nodes, int count, bool* ok) {
   takeWork();
   ReducedLanes& lanes = work_->lanes;
-  lanes.startSteps(nodes, count);
+  const LaneMask solved = lanes.startSteps(nodes, count);
   for (int l = 0; l < count; ++l) {
+    ok[l] = true;
+    if (solved[l]) continue;
     ReducedNode& node = *static_cast<ReducedNode*>(nodes[l]);
     node.takeWork();
-    lanes.loadSystem(l, node.M_, node.JcN_, work_->f, work_->contacts.at(node.contact_rows_).gamma);
+    ContactWork& contacts = work_->contacts.at(node.contact_rows_);
+    lanes.loadSystem(l, work_->M, contacts.JcN, work_->f, contacts.gamma);
     ok[l] = node.solveContacts();
     if (!ok[l]) work_->ydd.setZero();
     lanes.storeAccelerations(l, work_->ydd);
   }
   const LaneMask closed = lanes.finishSteps();
-  for (int l = 0; l < count; ++l) {
-    ok[l] = ok[l] && closed[l];
-    if (ok[l]) static_cast<ReducedNode*>(nodes[l])->finishStep(l);
-  }
+  for (int l = 0; l < count; ++l) ok[l] = ok[l] && closed[l];
+  lanes.storeSteps(ok);
+  for (int l = 0; l < count; ++l)
+    if (ok[l]) static_cast<ReducedNode*>(nodes[l])->finishStep();
 }
 
-void ReducedNode::finishStep(int lane) {
-  const ReducedLanes& lanes = work_->lanes;
-  unpackLane(lanes.accelerations().data(), lane, a_.size(), a_.data());
+void ReducedNode::finishStep() {
   stepFreeJoints();
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    Block& b = blocks_[i];
-    const BlockLanes& from = lanes.blocks()[i];
-    b.next.assign(from.closing, lane);
-    unpackLane(from.surplus.data(), lane, b.surplus.size(), b.surplus.data());
-    unpackLane(from.v_next.data(), lane, b.v_next.size(), b.v_next.data());
+  for (Block& b : blocks_) {
     scatterConfiguration(model_, b.loop, b.next.basis().q, x_next_.head(model_.nq()));
     scatterVelocity(b.loop, b.v_next, x_next_.tail(model_.nv()));
   }
@@ -84,14 +82,15 @@ void ReducedNode::finishStep(int lane) {
 // What the values of residuals depend on.
 void ReducedNode::showStep(int index) {
   takeWork();
-  const WorkspaceOf<Lanes>& from = work_->lanes.workspace();
-  Workspace& to = work_->ws;
-  to.q = q_;
-  to.v = v_;
-  to.X_WB = X_WB_;
-  unpackLane(from.V.front().data(), index, 6 * model_.numBodies(), to.V.front().data());
-  unpackLane(from.hc.front().data(), index, 6 * model_.numBodies(), to.hc.front().data());
-  to.stage = WorkspaceStage::Velocity;
+  showView(work_->lanes.getView(index));
+}
+
+void ReducedNode::showView(LaneView& view) {
+  shown_ = &view.ws;
+  view.ws.q = q_;
+  view.ws.v = v_;
+  view.ws.X_WB = X_WB_;
+  view.ws.stage = WorkspaceStage::Velocity;
 }
 
 // a_d = -J^+ gamma of the loops.
@@ -152,7 +151,8 @@ void ReducedNode::updateContacts() {
   ReducedWork& work = *work_;
   const ConstraintSet& set = spec_.constraints;
   VectorXd& gamma = work.contacts.at(contact_rows_).gamma;
-  JcN_.setZero();
+  MatrixXd& JcN = work.contacts.at(contact_rows_).JcN;
+  JcN.setZero();
   for (size_t c = num_loops_; c < set.closures.size(); ++c) {
     const Closure& contact = set.closures[c];
     const int row = set.offsets[c] - loop_rows_, n = getRows(contact.kind);
@@ -160,7 +160,7 @@ void ReducedNode::updateContacts() {
     const SE3 X_WF = getPlacement(work.ws, contact.body1, contact.X_B1);
     const ReducedTree::Columns& tip = work.tree.getTip(pool_->sizes().slots[contact_slots_[c - num_loops_]]);
     for (size_t o = 0; o < tip.outer.size(); ++o)
-      JcN_.col(tip.outer[o]).segment(row, n) = selectRows(contact, X_WF.actInvMotion(tip.J.col(o)));
+      JcN.col(tip.outer[o]).segment(row, n) = selectRows(contact, X_WF.actInvMotion(tip.J.col(o)));
   }
 }
 

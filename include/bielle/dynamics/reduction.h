@@ -120,7 +120,7 @@ using BlockScratch = BlockScratchOf<double>;
 /// A closed configuration of a block with what was computed there; with Lanes one for each lane. No allocation once made.
 template <typename T>
 class BlockStateOf {
-  friend class BlockStateOf<double>;
+  friend class BlockStateOf<Lanes>;
 
  public:
   using Mask = typename LogicOf<T>::Mask;
@@ -133,8 +133,8 @@ class BlockStateOf {
   /// \param zeta_guess  rank, where zeta is expected, or empty
   Mask close(const LoopBlock& block, BlockScratchOf<T>& scratch, const BlockBasisOf<T>& start,
              typename ArgumentsOf<T>::ConstVector d, const VectorX<T>& zeta_guess);
-  /// Takes over one lane of another.
-  void assign(const BlockStateOf<Lanes>& lanes, int lane);
+  /// Lanes only: each lane becomes a state of its own, but for those whose pointer is null.
+  void store(const std::array<BlockStateOf<double>*, kLane>& to) const;
   /// Placements and columns of this point back into the scratch.
   void load(const LoopBlock& block, BlockScratchOf<T>& scratch) const;
 

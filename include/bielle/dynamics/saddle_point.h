@@ -31,6 +31,15 @@ struct SaddlePointOptions {
 
 enum class SaddlePointStatus { Ok, MassMatrixSingular };
 
+/// What Eq. (4) needs of a factorised system.
+struct SaddlePointFactors {
+  MatrixXd L;     ///< n x n, lower triangle: Cholesky factor of M
+  MatrixXd Wt;    ///< n x m, L^{-1} J^T D
+  MatrixXd Ginv;  ///< m x m, (pseudo-)inverse of D G D
+  VectorXd D;     ///< m
+  void resize(int n, int m);
+};
+
 class SaddlePoint {
  public:
   /// Sizes the memory for n coordinates and m rows; no allocation when the sizes stay.
@@ -42,7 +51,11 @@ class SaddlePoint {
   /// Prepares solveDerivatives().
   void updateInverse();
   /// Eq. (4): X (n x k) holds dID and becomes da; dlambda (m x k) holds dc and becomes dlambda.
-  void solveDerivatives(MatrixRef X, MatrixRef dlambda);
+  void solveDerivatives(MatrixRef X, MatrixRef dlambda) { solveDerivatives(factors_, X, dlambda); }
+  /// The same for another system of the same sizes.
+  void solveDerivatives(const SaddlePointFactors& factors, MatrixRef X, MatrixRef dlambda);
+  /// Of the last system; needs updateInverse().
+  const SaddlePointFactors& factors() const { return factors_; }
   /// Whether the rows needed Eq. (3).
   bool isRedundant() const { return redundant_; }
 
@@ -53,7 +66,7 @@ class SaddlePoint {
   VectorXd W_;      ///< m x n, padded: D J L^{-T}
   MatrixXd G_;      ///< m x m: D G D
   VectorXd G_llt_;  ///< m x m, padded: its Cholesky factor
-  MatrixXd Ginv_;   ///< m x m, its (pseudo-)inverse
+  SaddlePointFactors factors_;
   VectorXd D_, rhs_, correction_;
   MatrixXd T1_, T2_;
   VectorXd X_, rhs_t_, dlambda_t_;  ///< transposes within solveDerivatives(), padded

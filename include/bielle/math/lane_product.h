@@ -47,8 +47,8 @@ void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, Padded
 /// become L over Y^T, the rest of H stays. False when a pivot is not positive.
 bool factorizeColumns(PaddedMap H, Eigen::Index num);
 /// X L^{-T} and X L^{-1} in place, L the lower triangle of a square matrix.
-void solveTransposedFromRight(PaddedMap L, PaddedMap X);
-void solveFromRight(PaddedMap L, PaddedMap X);
+void solveTransposedFromRight(ConstMatrixRef L, PaddedMap X);
+void solveFromRight(ConstMatrixRef L, PaddedMap X);
 
 /// to = from^T, by blocks: a strided copy of whole rows costs much more.
 template <class A, class B>

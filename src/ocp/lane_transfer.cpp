@@ -1,0 +1,221 @@
+// What goes into the lanes of reduced_lanes.h and comes out of them: from nodes that each have their numbers side by side to
+// numbers that each have their nodes side by side.
+#include "reduced_node.h"
+
+namespace bielle {
+namespace {
+
+// Placements as the numbers they are made of.
+const double* getNumbers(const SE3& X) { return X.R.data(); }
+Lanes* getNumbers(SE3Of<Lanes>& X) { return X.R.data(); }
+
+}  // namespace
+
+// `get` says where the numbers of a node are; lanes without a node do what the first one does.
+template <typename Get>
+void ReducedLanes::pack(const Get& get, Eigen::Index size, Lanes* out) const {
+  std::array<const double*, kLane> in;
+  for (size_t l = 0; l < kLane; ++l) in[l] = get(*nodes_[l < nodes_.size() ? l : 0]);
+  packLanes(in, size, out);
+}
+
+// `get` says where the numbers of a lane go, null for nowhere.
+template <typename Get>
+void ReducedLanes::unpack(const Lanes* in, Eigen::Index size, const Get& get) const {
+  std::array<double*, kLane> out{};
+  for (size_t l = 0; l < nodes_.size(); ++l) out[l] = get(l);
+  unpackLanes(in, size, out);
+}
+
+void ReducedLanes::packNodes() {
+  using Node = const ReducedNode&;
+  pack([](Node n) { return getNumbers(n.X_WB_.front()); }, 12 * model_.numBodies(), getNumbers(ws_.X_WB.front()));
+  ws_.stage = WorkspaceStage::Placement;
+  pack([](Node n) { return n.v_.data(); }, v_.size(), v_.data());
+  pack([](Node n) { return n.tau_.data(); }, tau_.size(), tau_.data());
+  pack([](Node n) { return &n.spec_.dt; }, 1, &h_);
+  for (size_t i = 0; i < blocks_.size(); ++i)
+    packBasis([&](Node n) -> const BlockBasis& { return n.blocks_[i].at; }, blocks_[i].at);
+  for (size_t i = 0; i < contacts_.size(); ++i) packContact(i);
+}
+
+template <typename GetBasis>
+void ReducedLanes::packBasis(const GetBasis& getBasis, BlockBasisOf<Lanes>& to) const {
+  using Node = const ReducedNode&;
+  pack([&](Node n) { return getBasis(n).N.data(); }, to.N.size(), to.N.data());
+  pack([&](Node n) { return getBasis(n).WN.data(); }, to.WN.size(), to.WN.data());
+  pack([&](Node n) { return getBasis(n).J.data(); }, to.J.size(), to.J.data());
+  pack([&](Node n) { return getBasis(n).L.data(); }, to.L.size(), to.L.data());
+  for (size_t k = 0; k < to.rows.size(); ++k)
+    for (size_t l = 0; l < kLane; ++l) to.rows[k][l] = getBasis(*nodes_[l < nodes_.size() ? l : 0]).rows[k];
+}
+
+// What linearize() needs of the steps.
+void ReducedLanes::packSteps() {
+  pack([](const ReducedNode& n) { return n.a_.data(); }, a_.size(), a_.data());
+  for (size_t i = 0; i < blocks_.size(); ++i) packBlock(i);
+}
+
+void ReducedLanes::packBlock(size_t i) {
+  using Node = const ReducedNode&;
+  BlockLanes& b = blocks_[i];
+  packBasis([&](Node n) -> const BlockBasis& { return n.blocks_[i].next.basis(); }, b.next);
+  pack([&](Node n) { return n.blocks_[i].next.zeta().data(); }, b.zeta.size(), b.zeta.data());
+  pack([&](Node n) { return n.blocks_[i].next.step().data(); }, b.step.size(), b.step.data());
+  pack([&](Node n) { return getNumbers(n.blocks_[i].next.placements().front()); }, 12 * b.loop.model.numBodies(),
+       getNumbers(b.own.X_WB.front()));
+  b.own.stage = WorkspaceStage::Placement;
+}
+
+// Nodes without this contact have no force there, and whatever its other numbers.
+void ReducedLanes::packContact(size_t slot) {
+  ContactLanes& contact = contacts_[slot];
+  contact.used = false;
+  contact.wrench.setZero();
+  contact.kd = 0;
+  contact.kp_rate.setZero();
+  contact.kp_residual.setZero();
+  auto absent = system_.absent.segment<6>(6 * slot);
+  absent.setOnes();
+  for (size_t l = 0; l < nodes_.size(); ++l) {
+    const ReducedNode& node = *nodes_[l];
+    const int index = node.findContact(static_cast<int>(slot));
+    if (index < 0) continue;
+    const Closure& closure = node.spec_.constraints.closures[index];
+    const SE3 X_WF = node.X_WB_[closure.body1] * closure.X_B1;
+    const VectorUpTo6<double> lambda =
+        node.lambda_.segment(node.spec_.constraints.offsets[index], getRows(closure.kind));
+    const Vector6d wrench = X_WF.actForce(expandRows(closure, lambda));
+    for (int k = 0; k < 12; ++k) getNumbers(contact.X_WF)[k].set(l, getNumbers(X_WF)[k]);
+    for (int k = 0; k < 6; ++k) contact.wrench[k].set(l, wrench[k]);
+    contact.kd.set(l, closure.kd);
+    contact.used = true;
+    for (Eigen::Index r = 0; r < lambda.size(); ++r) absent[r].set(l, 0);
+    if (closure.kp == 0) continue;
+    const SE3 X_12 = X_WF.inverseTimes(closure.X_B2);
+    const RowVectorUpTo6 residual = closure.kp * calcClosureResidual(closure, X_12);
+    const RowsBy6 rate = closure.kp * calcClosureResidualRate(closure, X_12);
+    for (int r = 0; r < residual.size(); ++r) contact.kp_residual[r].set(l, residual[r]);
+    for (int c = 0; c < 6; ++c)
+      for (int r = 0; r < rate.rows(); ++r) contact.kp_rate(r, c).set(l, rate(r, c));
+  }
+}
+
+void ReducedLanes::packBlockStep(size_t i) {
+  using Node = const ReducedNode&;
+  BlockLanes& b = blocks_[i];
+  pack([&](Node n) { return n.blocks_[i].at.q.data(); }, b.at.q.size(), b.at.q.data());
+  for (size_t l = 0; l < kLane; ++l) {
+    const ReducedNode* before = nodes_[l < nodes_.size() ? l : 0]->before_;
+    for (Eigen::Index k = 0; k < b.surplus.size(); ++k) b.surplus[k].set(l, before ? before->blocks_[i].surplus[k] : 0);
+  }
+}
+
+// Rows that a node has are the first ones of their slots.
+void ReducedLanes::storeFactors(const LaneMask& solved) {
+  const auto store = [&](const auto& from, const auto& get) {
+    unpack(from.data(), from.size(), [&](size_t l) { return solved[l] ? get(nodes_[l]->factors_).data() : nullptr; });
+  };
+  store(system_.L, [](SaddlePointFactors& factors) -> MatrixXd& { return factors.L; });
+  for (size_t slot = 0; slot < contacts_.size(); ++slot)
+    for (int r = 0; r < 6; ++r) {
+      const int i = static_cast<int>(slot) * 6 + r;
+      const auto column = system_.Wt.col(i);
+      unpack(column.data(), column.size(), [&](size_t l) -> double* {
+        const int row = solved[l] ? nodes_[l]->findContactRow(slot, r) : -1;
+        return row < 0 ? nullptr : &nodes_[l]->factors_.Wt(0, row);
+      });
+    }
+  for (size_t l = 0; l < nodes_.size(); ++l)
+    if (solved[l]) storeForces(l);
+}
+
+// The small part of it, and the forces.
+void ReducedLanes::storeForces(size_t lane) {
+  ReducedNode& node = *nodes_[lane];
+  for (size_t slot = 0; slot < contacts_.size(); ++slot)
+    for (int r = 0; r < 6; ++r) {
+      const int row = node.findContactRow(slot, r);
+      if (row < 0) continue;
+      const Eigen::Index i = 6 * slot + r;
+      node.lambda_[node.loop_rows_ + row] = system_.lambda[i][lane];
+      node.factors_.D[row] = system_.D[i][lane];
+      for (size_t other = 0; other < contacts_.size(); ++other)
+        for (int s = 0; s < 6; ++s) {
+          const int col = node.findContactRow(other, s);
+          if (col >= 0) node.factors_.Ginv(row, col) = system_.Ginv(i, 6 * other + s)[lane];
+        }
+    }
+}
+
+void ReducedLanes::loadSystem(int lane, MatrixXd& M, MatrixXd& JcN, VectorXd& f, VectorXd& gamma) const {
+  const ReducedNode& node = *nodes_[lane];
+  const ConstraintSet& set = node.spec_.constraints;
+  unpackLane(system_.M.data(), lane, M.size(), M.data());
+  unpackLane(system_.f.data(), lane, f.size(), f.data());
+  JcN.setZero();
+  for (size_t c = set.num_loops; c < set.closures.size(); ++c) {
+    const ContactLanes& contact = contacts_[node.contact_slots_[c - set.num_loops]];
+    const std::vector<int>& outer = tree_.getTip(contact.tip).outer;
+    const int row = set.offsets[c] - node.loop_rows_, n = getRows(set.closures[c].kind);
+    Vector6d full;
+    unpackLane(contact.gamma.data(), lane, 6, full.data());
+    gamma.segment(row, n) = selectRows(set.closures[c], full);
+    for (size_t o = 0; o < outer.size(); ++o) {
+      unpackLane(&contact.J(0, o), lane, 6, full.data());
+      JcN.col(outer[o]).segment(row, n) = selectRows(set.closures[c], full);
+    }
+  }
+}
+
+void ReducedLanes::storeAccelerations(int lane, const VectorXd& ydd) {
+  for (Eigen::Index k = 0; k < ydd.size(); ++k) system_.ydd[k].set(lane, ydd[k]);
+}
+
+void ReducedLanes::storeSteps(const bool* ok) {
+  const auto store = [&](const VectorX<Lanes>& from, const auto& get) {
+    unpack(from.data(), from.size(), [&](size_t l) { return ok[l] ? get(*nodes_[l]).data() : nullptr; });
+  };
+  store(a_, [](ReducedNode& node) -> VectorXd& { return node.a_; });
+  for (size_t i = 0; i < blocks_.size(); ++i) {
+    std::array<BlockState*, kLane> next{};
+    for (size_t l = 0; l < nodes_.size(); ++l) next[l] = ok[l] ? &nodes_[l]->blocks_[i].next : nullptr;
+    blocks_[i].closing.store(next);
+    store(blocks_[i].surplus, [i](ReducedNode& node) -> VectorXd& { return node.blocks_[i].surplus; });
+    store(blocks_[i].v_next, [i](ReducedNode& node) -> VectorXd& { return node.blocks_[i].v_next; });
+  }
+  const int nb = model_.numBodies();
+  unpack(ws_.V.front().data(), 6 * nb, [this](size_t l) { return views_[l].ws.V.front().data(); });
+  unpack(ws_.hc.front().data(), 6 * nb, [this](size_t l) { return views_[l].ws.hc.front().data(); });
+}
+
+void ReducedLanes::storeDerivatives() {
+  const auto store = [this](const auto& from, const auto& get) {
+    unpack(from.data(), from.size(), [&](size_t l) { return get(views_[l]); });
+  };
+  store(ws_.J, [](LaneView& view) { return view.ws.J.data(); });
+  store(ws_.dV, [](LaneView& view) { return view.ws.dV.data(); });
+  store(ws_.YJ, [](LaneView& view) { return view.ws.YJ.data(); });
+  store(A_y_, [](LaneView& view) { return view.dydd.data(); });
+  store(A_v_, [](LaneView& view) { return view.dydd.data() + view.dydd.rows() * view.dydd.rows(); });
+  const int nb = model_.numBodies();
+  unpack(ws_.V.front().data(), 6 * nb, [this](size_t l) { return views_[l].ws.V.front().data(); });
+  unpack(ws_.hc.front().data(), 6 * nb, [this](size_t l) { return views_[l].ws.hc.front().data(); });
+  unpack(ws_.Yc.front().data(), 36 * nb, [this](size_t l) { return views_[l].ws.Yc.front().data(); });
+  for (size_t i = 0; i < blocks_.size(); ++i) {
+    const BlockLanes& b = blocks_[i];
+    store(b.motion.Z, [i](LaneView& view) { return view.blocks[i].Z.data(); });
+    store(b.E, [i](LaneView& view) { return view.blocks[i].E.data(); });
+    store(b.En, [i](LaneView& view) { return view.blocks[i].En.data(); });
+    store(b.S, [i](LaneView& view) { return view.blocks[i].S.data(); });
+    store(b.mixed, [i](LaneView& view) { return view.blocks[i].mixed.data(); });
+    store(b.mixed_next, [i](LaneView& view) { return view.blocks[i].mixed_next.data(); });
+  }
+  for (size_t i = 0; i < contacts_.size(); ++i) {
+    if (!contacts_[i].used) continue;
+    store(contacts_[i].dy, [i](LaneView& view) { return view.contacts[i].dy.data(); });
+    store(contacts_[i].dv, [i](LaneView& view) { return view.contacts[i].dv.data(); });
+  }
+}
+
+}  // namespace bielle
