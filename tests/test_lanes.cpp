@@ -170,7 +170,10 @@ TEST_CASE("nodes with all sorts of contacts go together") {
         stage.dt = 0.01 + 1e-3 * stages.size();
         stage.constraints = makeConstraintSet(model, makeContactTargets(model, q, contacts, 20, 5));
         ConstraintSet& set = stage.constraints;
-        if (!contacts.empty()) set.closures[set.num_loops].kind = kind;
+        if (!contacts.empty()) {
+        set.closures[set.num_loops].kind = kind;
+        set.closures[set.num_loops].axis = Vector3d::UnitX();  // of the hinge
+      }
         set.rows = 0;
         for (size_t c = 0; c < set.closures.size(); ++c) {
           set.offsets[c] = set.rows;

@@ -95,9 +95,13 @@ void ReducedLanes::packContact(size_t slot) {
     const SE3 X_12 = X_WF.inverseTimes(closure.X_B2);
     const RowVectorUpTo6 residual = closure.kp * calcClosureResidual(closure, X_12);
     const RowsBy6 rate = closure.kp * calcClosureResidualRate(closure, X_12);
-    for (int r = 0; r < residual.size(); ++r) contact.kp_residual[r].set(l, residual[r]);
-    for (int c = 0; c < 6; ++c)
-      for (int r = 0; r < rate.rows(); ++r) contact.kp_rate(r, c).set(l, rate(r, c));
+    // As a hinge's rows are no rows of the frame, they are brought back to where selectRows() finds them.
+    const Vector6d residual_rows = expandRows(closure, residual);
+    for (int r = 0; r < 6; ++r) contact.kp_residual[r].set(l, residual_rows[r]);
+    for (int c = 0; c < 6; ++c) {
+      const Vector6d rate_rows = expandRows(closure, rate.col(c));
+      for (int r = 0; r < 6; ++r) contact.kp_rate(r, c).set(l, rate_rows[r]);
+    }
   }
 }
 
