@@ -21,6 +21,7 @@ void addExport(CLI::App& app, Action& action);
 void addInfo(CLI::App& app, Action& action);
 void addEval(CLI::App& app, Action& action);
 void addDesign(CLI::App& app, Action& action);
+void addCompare(CLI::App& app, Action& action);
 void addGenerate(CLI::App& app, Action& action);
 void addRobots(CLI::App& app, Action& action);
 void addBench(CLI::App& app, Action& action);

@@ -33,6 +33,7 @@ int run(const DesignArguments& arguments) {
   for (const DesignSpec::MotionSpec& motion : spec.motions) motions.push_back(makeDesignMotion(spec.path, motion));
   EvaluationOptions options;
   options.mode = spec.mode;
+  options.drives = spec.drives;
   const DesignEvaluator evaluator(robot, motions, spec.objective, options);
 
   DesignRunOptions run_options;
@@ -89,8 +90,12 @@ void addDesign(CLI::App& app, Action& action) {
       "  motions:\n"
       "    - {motion: squat, set: {depth: 0.6}}\n"
       "  mode: reoptimized          (or `kept`: postures of the start design, motor torques computed anew)\n"
-      "  objective:                 (peak_torque, rms_torque, energy [J], conditioning; over their start values)\n"
+      "  objective:                 (peak_torque, rms_torque, energy, electrical_energy [J], conditioning, workspace;\n"
+      "                              over their start values; all motors when none are named)\n"
       "    - {measure: peak_torque, motors: [motor_knee_left, motor_knee_right], weight: 1}\n"
+      "    - {measure: workspace, region: {foot: foot_left, x: [-0.2, 0.2], z: [-0.1, 0.1]}}     (share that is "
+      "reached)\n"
+      "  drives: {motor_constant: 2, regeneration: 0}     (for electrical_energy; N m/sqrt(W) at the joints)\n"
       "  search:\n"
       "    seed: 1\n"
       "    searches: 2\n"

@@ -46,6 +46,7 @@ int run(int argc, char** argv) {
   addRobots(app, action);
   addGenerate(app, action);
   addDesign(app, action);
+  addCompare(app, action);
   addRatio(app, action);
   addLift(app, action);
   addStudy(app, action);

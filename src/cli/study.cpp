@@ -1,11 +1,7 @@
 // bielle study: the paper's comparison, case by case.
 #include <algorithm>
-#include <cstdint>
-#include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <map>
 #include <sstream>
 #include <thread>
@@ -27,24 +23,6 @@ struct StudyArguments {
   std::vector<double> values;
   int jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 };
-
-// Results depend on the program and on the files of the robot: FNV-1a over them.
-std::string calcFingerprint(const fs::path& program, const LoadedRobot& robot) {
-  std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(robot.directory))
-    if (entry.path().extension() == ".urdf" || entry.path().extension() == ".yaml") files.push_back(entry.path());
-  std::sort(files.begin(), files.end());
-  files.push_back(program);
-  std::uint64_t hash = 0xcbf29ce484222325;
-  for (const fs::path& path : files) {
-    std::ifstream file(path, std::ios::binary);
-    for (std::istreambuf_iterator<char> c(file), end; c != end; ++c)
-      hash = (hash ^ static_cast<unsigned char>(*c)) * 0x100000001b3;
-  }
-  char text[32];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
-  return text;
-}
 
 std::vector<Study> chooseStudies(const StudyArguments& arguments) {
   std::vector<Study> chosen;
@@ -99,7 +77,7 @@ int run(const StudyArguments& arguments) {
 
   RunOptions options;
   options.program = fs::read_symlink("/proc/self/exe");
-  options.identity = getBuildInfo().bielle + " " + calcFingerprint(options.program, robot.robot);
+  options.identity = makeIdentity(options.program, {robot.robot.directory});
   options.jobs = arguments.jobs;
   options.progress = [](const std::string& line) { std::cout << line << std::endl; };
   const RunOutcome outcome = runCases(directory, cases, options);

@@ -46,11 +46,22 @@ void RobotDraft::setPlace(const std::string& name, const Vector3d& p) {
   (is_joint ? joints_ : frames_)[index].p = p;
 }
 
-void RobotDraft::stretch(const std::string& link, const Vector3d& origin, const Vector3d& direction, double factor) {
+int RobotDraft::findLink(const std::string& name) const {
   int body = 1;
-  while (body < model_.numBodies() && model_.bodies()[body].name != link) ++body;
+  while (body < model_.numBodies() && model_.bodies()[body].name != name) ++body;
   if (body == model_.numBodies())
-    throw ModelError(model_.name(), "link '" + link + "'", "there is no such body", "`bielle info` lists them");
+    throw ModelError(model_.name(), "link '" + name + "'", "there is no such body", "`bielle info` lists them");
+  return body;
+}
+
+void RobotDraft::scaleMass(const std::string& link, double factor) {
+  Inertia& inertia = inertias_[findLink(link)];
+  inertia.mass *= factor;
+  inertia.I_com *= factor;
+}
+
+void RobotDraft::stretch(const std::string& link, const Vector3d& origin, const Vector3d& direction, double factor) {
+  const int body = findLink(link);
   const Matrix3d D = Matrix3d::Identity() + (factor - 1) * direction * direction.transpose();
   Inertia& inertia = inertias_[body];
   const Matrix3d S = inertia.I_com.trace() / 2 * Matrix3d::Identity() - inertia.I_com;  // Eq. (1)

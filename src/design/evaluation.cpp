@@ -42,12 +42,13 @@ Motion makeReducedMotion(const Model& model, const DesignMotion& motion) {
   return makeMotion(model, motion.plan(model, makeStandingPosture(model)), options);
 }
 
-Outcome solveMotion(const Model& model, Motion& motion, const FddpOptions& options) {
+Outcome solveMotion(const Model& model, Motion& motion, const FddpOptions& options,
+                    const std::vector<MotorDrive>& drives) {
   Outcome out;
   const FddpSummary summary = Fddp(options).solve(*motion.problem, motion.guess);
   out.message = motion.name + ": " + getName(summary.termination) + " " + summary.message;
   if (summary.termination != FddpTermination::Converged) return out;
-  out.measures = calcMotionMeasures(model, listSteps(*motion.problem), motion.guess);
+  out.measures = calcMotionMeasures(model, listSteps(*motion.problem), motion.guess, drives);
   out.missing = 0;
   return out;
 }
@@ -104,7 +105,7 @@ void setStart(const Model& model, const SolvedMotion& solved, Motion& motion) {
   setClosedGuess(solved.record, motion);
 }
 
-Outcome keepMotion(const Model& model, const SerialTrajectory& kept) {
+Outcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::vector<MotorDrive>& drives) {
   Outcome out;
   out.lifted = liftMotion(model, kept);
   const LiftResult& lifted = out.lifted;
@@ -113,7 +114,7 @@ Outcome keepMotion(const Model& model, const SerialTrajectory& kept) {
     out.message = lifted.nodes.empty() ? "nothing could be lifted" : lifted.nodes.back().message;
     return out;
   }
-  out.measures = calcMotionMeasures(model, lifted.dt, lifted.trajectory);
+  out.measures = calcMotionMeasures(model, lifted.dt, lifted.trajectory, drives);
   out.missing = 0;
   return out;
 }
@@ -146,7 +147,9 @@ struct DesignEvaluator::Data {
   std::vector<DesignMotion> motions;
   std::vector<ObjectiveTerm> objective;
   EvaluationOptions options;
+  std::vector<MotorDrive> drives;
   std::vector<std::vector<int>> term_motors;
+  std::vector<std::optional<WorkspaceGrid>> term_grids;
   double weight = 0;  // W
   std::vector<SolvedMotion> solved;
   Evaluation start;
@@ -157,7 +160,8 @@ struct DesignEvaluator::Data {
   Evaluation evaluate(const VectorXd& x, std::vector<LiftResult>* lifted = nullptr) const;
   void checkGradient() const;
   bool checkPostures(const Model& model, Evaluation& out) const;
-  void sumUp(Evaluation& out) const;
+  double calcTerm(size_t i, const Model& model, const std::vector<MotionMeasures>& measures) const;
+  void sumUp(const Model& model, Evaluation& out) const;
 };
 
 FddpOptions EvaluationOptions::makeSolverOptions() {
@@ -185,7 +189,11 @@ const char* getName(DesignStatus status) {
 
 void DesignEvaluator::Data::readObjective() {
   const Model& model = robot.startModel();
-  if (motions.empty()) throw ModelError(model.name(), "motions", "there are none", "name at least one");
+  drives = makeDrives(model, options.drives);
+  const bool needs_motions = std::any_of(objective.begin(), objective.end(),
+                                         [](const ObjectiveTerm& term) { return term.measure != Measure::Workspace; });
+  if (motions.empty() && needs_motions)
+    throw ModelError(model.name(), "motions", "there are none", "name at least one");
   if (objective.empty()) throw ModelError(model.name(), "objective", "it is empty", "name a measure");
   for (const ObjectiveTerm& term : objective) {
     std::vector<int> motors;
@@ -201,6 +209,8 @@ void DesignEvaluator::Data::readObjective() {
       throw ModelError(model.name(), std::string("objective: ") + getName(term.measure), "its weight is not positive",
                        "give a positive number");
     term_motors.push_back(motors);
+    term_grids.emplace_back();
+    if (term.measure == Measure::Workspace) term_grids.back() = makeWorkspaceGrid(model, term.region);
     weight += term.weight;
   }
 }
@@ -209,7 +219,7 @@ void DesignEvaluator::Data::solveStart() {
   const Model& model = robot.startModel();
   for (const DesignMotion& motion : motions) {
     Motion problem = makeReducedMotion(model, motion);
-    const Outcome outcome = solveMotion(model, problem, options.solver);
+    const Outcome outcome = solveMotion(model, problem, options.solver, drives);
     if (outcome.missing > 0)
       throw ModelError(model.name(), "start design", outcome.message, "ask for a motion that the robot can make");
     SolvedMotion solved_motion{makeRecord(problem, problem.guess), {}, {}, {}};
@@ -227,7 +237,7 @@ void DesignEvaluator::Data::solveStart() {
   if (start.status != DesignStatus::Feasible)
     throw ModelError(model.name(), "start design", start.message, "ask for a motion that the robot can make");
   for (size_t i = 0; i < objective.size(); ++i) {
-    start.terms.push_back(getMeasure(objective[i].measure, term_motors[i], start.motions));
+    start.terms.push_back(calcTerm(i, model, start.motions));
     if (!(start.terms[i] > 0 && std::isfinite(start.terms[i])))
       throw ModelError(model.name(), std::string("objective: ") + getName(objective[i].measure),
                        "the start design has zero or infinity", "choose another measure or other motors");
@@ -240,11 +250,11 @@ void DesignEvaluator::Data::makeMotions(const Model& model, Evaluation& out, std
   for (size_t i = 0; i < motions.size(); ++i) {
     Outcome outcome;
     if (options.mode == MotionMode::Kept) {
-      outcome = keepMotion(model, *solved[i].serial);
+      outcome = keepMotion(model, *solved[i].serial, drives);
     } else {
       Motion motion = makeReducedMotion(model, motions[i]);
       setStart(model, solved[i], motion);
-      outcome = solveMotion(model, motion, options.solver);
+      outcome = solveMotion(model, motion, options.solver, drives);
     }
     missing += outcome.missing / static_cast<double>(motions.size());
     if (outcome.missing > 0 || !std::isfinite(outcome.measures.conditioning)) {
@@ -273,16 +283,23 @@ bool DesignEvaluator::Data::checkPostures(const Model& model, Evaluation& out) c
   return false;
 }
 
-void DesignEvaluator::Data::sumUp(Evaluation& out) const {
+double DesignEvaluator::Data::calcTerm(size_t i, const Model& model,
+                                       const std::vector<MotionMeasures>& measures) const {
+  if (!term_grids[i]) return getMeasure(objective[i].measure, term_motors[i], measures);
+  const double points = static_cast<double>(term_grids[i]->placements.size());
+  return 1 / std::max(calcCoverage(model, *term_grids[i]).share, 0.5 / points);
+}
+
+void DesignEvaluator::Data::sumUp(const Model& model, Evaluation& out) const {
   for (size_t i = 0; i < objective.size(); ++i) {
-    out.terms.push_back(getMeasure(objective[i].measure, term_motors[i], out.motions));
+    out.terms.push_back(calcTerm(i, model, out.motions));
     out.value += objective[i].weight * out.terms[i] / start.terms[i];  // Eq. (1)
   }
 }
 
 DesignEvaluator::DesignEvaluator(const Parametrization& robot, std::vector<DesignMotion> motions,
                                  std::vector<ObjectiveTerm> objective, const EvaluationOptions& options)
-    : data_(new Data{robot, std::move(motions), std::move(objective), options, {}, 0, {}, {}}) {
+    : data_(new Data{robot, std::move(motions), std::move(objective), options, {}, {}, {}, 0, {}, {}}) {
   data_->readObjective();
   data_->solveStart();
 }
@@ -299,12 +316,12 @@ Evaluation DesignEvaluator::Data::evaluate(const VectorXd& x, std::vector<LiftRe
     const Model model = robot.make(x);
     if (!checkPostures(model, out)) return out;
     makeMotions(model, out, lifted);
+    if (out.status == DesignStatus::Feasible) sumUp(model, out);
   } catch (const ModelError& error) {  // numbers that make no robot, postures that no motion can start from
     out.status = DesignStatus::MotionFailed;
     out.message = error.what();
     out.value = weight * 2;
   }
-  if (out.status == DesignStatus::Feasible) sumUp(out);
   return out;
 }
 

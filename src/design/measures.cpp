@@ -1,76 +1,87 @@
 #include "bielle/design/measures.h"
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include "bielle/dynamics/reduction.h"
+#include "bielle/design/conditioning.h"
+#include "bielle/model/error.h"
 
 namespace bielle {
 namespace {
 
-// Positions of the motors among the dofs of a block.
-std::vector<int> findMotors(const Model& model, const LoopBlock& block) {
-  std::vector<int> positions;
-  for (size_t i = 0; i < block.dofs.size(); ++i)
-    for (const Motor& motor : model.motors())
-      if (motor.dof == block.dofs[i]) positions.push_back(static_cast<int>(i));
-  return positions;
-}
-
-// 1 / sigma_min(Q_M); infinite when the block cannot be evaluated.
-double calcConditioning(const LoopBlock& block, const std::vector<int>& motors, BlockPoint& point,
-                        const VectorXd& q_block) {
-  if (!point.update(block, q_block)) return std::numeric_limits<double>::infinity();
-  const MatrixXd& N = point.basis().N;
-  const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(N).householderQ() * MatrixXd::Identity(N.rows(), N.cols());
-  MatrixXd Q_M(motors.size(), Q.cols());
-  for (size_t i = 0; i < motors.size(); ++i) Q_M.row(static_cast<Eigen::Index>(i)) = Q.row(motors[i]);
-  const double least = Eigen::JacobiSVD<MatrixXd>(Q_M).singularValues().tail<1>()[0];
-  return least > 0 ? 1 / least : std::numeric_limits<double>::infinity();
-}
-
-double calcWorstConditioning(const Model& model, const ShootingTrajectory& trajectory) {
-  double worst = 1;
-  if (model.closures().empty()) return worst;
-  const Reduction reduction = makeReduction(model, trajectory.xs.front().head(model.nq()));
-  for (const LoopBlock& block : reduction.blocks) {
-    const std::vector<int> motors = findMotors(model, block);
-    if (static_cast<int>(motors.size()) < block.size || block.size == 0) continue;  // moved by others too
-    BlockPoint point(block);
-    VectorXd q_block(block.model.nq());
-    for (const VectorXd& x : trajectory.xs) {
-      gatherConfiguration(model, block, x.head(model.nq()), q_block);
-      worst = std::max(worst, calcConditioning(block, motors, point, q_block));
-    }
+MotorMeasures calcMeasures(const MotorTrace& trace, Eigen::Index motor, const MotorDrive& drive) {
+  MotorMeasures out;
+  double squares = 0, duration = 0;
+  for (size_t k = 0; k < trace.dt.size(); ++k) {
+    const Eigen::Index stage = static_cast<Eigen::Index>(k);
+    const double h = trace.dt[k], u = trace.torque(motor, stage), v = trace.speed(motor, stage);
+    const double power = u * v + std::pow(u / drive.motor_constant, 2);  // Eq. (1)
+    out.peak_torque = std::max(out.peak_torque, std::abs(u));
+    out.peak_speed = std::max(out.peak_speed, std::abs(v));
+    out.energy += h * std::abs(u * v);
+    out.electrical_energy += h * (power > 0 ? power : drive.regeneration * power);
+    squares += h * u * u;
+    duration += h;
   }
-  return worst;
+  out.rms_torque = duration > 0 ? std::sqrt(squares / duration) : 0;
+  return out;
 }
 
 }  // namespace
 
-MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>& dt,
-                                  const ShootingTrajectory& trajectory) {
-  MotionMeasures out;
-  double duration = 0;
-  for (double h : dt) duration += h;
-  for (int m = 0; m < model.nu(); ++m) {
-    MotorMeasures motor;
-    double squares = 0;
-    for (size_t k = 0; k < dt.size(); ++k) {
-      const double h = dt[k], u = h > 0 ? trajectory.us[k][m] : 0;  // an impact takes no time and no torque
-      const double v = trajectory.xs[k][model.nq() + model.motors()[m].dof];
-      motor.peak_torque = std::max(motor.peak_torque, std::abs(u));
-      motor.peak_speed = std::max(motor.peak_speed, std::abs(v));
-      motor.energy += h * std::abs(u * v);
-      squares += h * u * u;
-    }
-    motor.rms_torque = duration > 0 ? std::sqrt(squares / duration) : 0;
-    out.motors.push_back(motor);
+std::vector<MotorDrive> makeDrives(const Model& model, const DriveTable& table) {
+  const auto require = [&](bool ok, const std::string& element, const std::string& problem, const std::string& remedy) {
+    if (!ok) throw ModelError(model.name(), "drives: " + element, problem, remedy);
+  };
+  const auto requireConstant = [&](double value, const std::string& element) {
+    require(value > 0 && std::isfinite(value), element, "it is not positive",
+            "give newton metres per square root of watt");
+  };
+  requireConstant(table.common.motor_constant, "motor_constant");
+  require(table.common.regeneration >= 0 && table.common.regeneration <= 1, "regeneration", "it is outside 0 .. 1",
+          "give the share that is given back");
+  std::vector<MotorDrive> drives(model.motors().size(), table.common);
+  for (const auto& [name, constant] : table.motor_constants) {
+    const int motor = model.findMotor(name);
+    require(motor >= 0, "motor '" + name + "'", "there is no such motor", "`bielle info` lists them");
+    requireConstant(constant, "motor '" + name + "'");
+    drives[static_cast<size_t>(motor)].motor_constant = constant;
   }
-  out.conditioning = calcWorstConditioning(model, trajectory);
+  return drives;
+}
+
+MotorTrace makeMotorTrace(const Model& model, const std::vector<double>& dt, const ShootingTrajectory& trajectory) {
+  MotorTrace trace;
+  const Eigen::Index stages = static_cast<Eigen::Index>(dt.size());
+  trace.dt = dt;
+  trace.torque = trace.speed = MatrixXd::Zero(model.nu(), stages);
+  double time = 0;
+  for (Eigen::Index k = 0; k < stages; ++k) {
+    const size_t stage = static_cast<size_t>(k);
+    trace.time.push_back(time);
+    time += dt[stage];
+    if (dt[stage] > 0) trace.torque.col(k) = trajectory.us[stage];
+    for (int m = 0; m < model.nu(); ++m)
+      trace.speed(m, k) = trajectory.xs[stage][model.nq() + model.motors()[static_cast<size_t>(m)].dof];
+  }
+  return trace;
+}
+
+std::vector<MotorMeasures> calcMotorMeasures(const MotorTrace& trace, const std::vector<MotorDrive>& drives) {
+  std::vector<MotorMeasures> out;
+  for (Eigen::Index m = 0; m < trace.torque.rows(); ++m)
+    out.push_back(calcMeasures(trace, m, drives.empty() ? MotorDrive() : drives[static_cast<size_t>(m)]));
+  return out;
+}
+
+MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>& dt,
+                                  const ShootingTrajectory& trajectory, const std::vector<MotorDrive>& drives) {
+  MotionMeasures out;
+  out.trace = makeMotorTrace(model, dt, trajectory);
+  out.motors = calcMotorMeasures(out.trace, drives);
+  LinkageConditioning conditioning(model, trajectory.xs.front().head(model.nq()));
+  for (const VectorXd& x : trajectory.xs)
+    out.conditioning = std::max(out.conditioning, conditioning.calc(x.head(model.nq())));
   return out;
 }
 
@@ -82,6 +93,10 @@ const char* getName(Measure measure) {
       return "rms_torque";
     case Measure::Energy:
       return "energy";
+    case Measure::ElectricalEnergy:
+      return "electrical_energy";
+    case Measure::Workspace:
+      return "workspace";
     case Measure::Conditioning:
       break;
   }
@@ -97,6 +112,7 @@ double getMeasure(Measure measure, const std::vector<int>& motors, const std::ve
       if (measure == Measure::PeakTorque) value = std::max(value, motor.peak_torque);
       if (measure == Measure::RmsTorque) value = std::max(value, motor.rms_torque);
       if (measure == Measure::Energy) value += motor.energy;
+      if (measure == Measure::ElectricalEnergy) value += motor.electrical_energy;
     }
   }
   return value;

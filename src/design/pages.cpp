@@ -5,8 +5,8 @@
 #include "bielle/design/run.h"
 #include "bielle/io/result.h"
 #include "bielle/io/robot_writer.h"
+#include "design/figures.h"
 #include "io/aside_file.h"
-#include "io/figure.h"
 
 namespace fs = std::filesystem;
 
@@ -57,7 +57,8 @@ void writeMotion(std::ostream& out, const Model& model, const std::string& name,
     writeRow(out, motor + ": peak torque [N m]", a.peak_torque, b.peak_torque);
     writeRow(out, motor + ": rms torque [N m]", a.rms_torque, b.rms_torque);
     writeRow(out, motor + ": peak speed [rad/s]", a.peak_speed, b.peak_speed);
-    writeRow(out, motor + ": energy [J]", a.energy, b.energy);
+    writeRow(out, motor + ": mechanical energy [J]", a.energy, b.energy);
+    writeRow(out, motor + ": electrical energy [J]", a.electrical_energy, b.electrical_energy);
   }
   writeRow(out, "conditioning of the linkages", before.conditioning, after.conditioning);
 }
@@ -83,40 +84,20 @@ std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec,
   return out.str();
 }
 
-// Values of feasible designs as points, the least so far as a line, one colour per search.
-std::string makeScript(const DesignEvaluator& evaluator, const DesignRun& run) {
-  std::ostringstream script, plots;
-  script << "set encoding utf8\nset grid\nset xlabel 'evaluation'\nset ylabel 'value'\nset yrange [*:"
-         << 1.5 * evaluator.start().value << "]\n";
-  for (size_t i = 0; i < run.searches.size(); ++i) {
-    double best = evaluator.start().value;
-    script << "$s" << i << " << EOD\n";
-    int count = 0;
-    for (const LoggedEvaluation& e : run.searches[i]) {
-      ++count;
-      if (e.status == DesignStatus::Feasible) best = std::min(best, e.value);
-      script << count << " " << (e.status == DesignStatus::Feasible ? format(e.value, "%.9g") : "NaN") << " "
-             << format(best, "%.9g") << "\n";
-    }
-    script << "EOD\n";
-    const std::string number = std::to_string(i + 1);
-    plots << (i ? ", " : "plot ") << "$s" << i << " using 1:2 with points pt 7 ps 0.3 lc " << number << " notitle, $s"
-          << i << " using 1:3 with lines lw 2 lc " << number << " title 'best of search " << number << "'";
-  }
-  return script.str() + plots.str() + "\n";
-}
-
 }  // namespace
 
 std::vector<std::string> writeDesign(const std::string& directory, const DesignEvaluator& evaluator,
                                      const DesignSpec& spec, const DesignRun& run) {
-  const std::string best = directory + "/best", page = directory + "/design.md", figure = directory + "/design.svg";
+  const std::string best = directory + "/best", page = directory + "/design.md";
   writeRobot(evaluator.robot().make(run.best), best, "Written by `bielle design`.");
   AsideFile file(page);
   file.write(formatPage(evaluator, spec, run));
   file.commit();
   std::vector<std::string> paths = {best, page};
-  if (drawSvg(figure, makeScript(evaluator, run))) paths.push_back(figure);
+  for (const DesignFigure& figure : makeDesignFigures(evaluator, run)) {
+    const std::string path = directory + "/" + figure.name + ".svg";
+    if (drawPlots(path, figure.plots)) paths.push_back(path);
+  }
   return paths;
 }
 

@@ -85,12 +85,62 @@ DesignVariable readVariable(const Entry& entry) {
   return variable;
 }
 
+WorkspaceAxis readAxis(const Entry& entry) {
+  WorkspaceAxis axis;
+  axis.kind = WorkspaceAxis::Kind::Range;
+  if (!entry.isList()) {
+    if (entry.isWord("free"))
+      axis.kind = WorkspaceAxis::Kind::Free;
+    else
+      axis.lower = axis.upper = entry.getNumber();
+    return axis;
+  }
+  const std::vector<Entry> items = entry.getList();
+  if (items.size() != 2 && items.size() != 3) entry.fail("it is no range", "give [from, to] or [from, to, points]");
+  axis.lower = items[0].getNumber(), axis.upper = items[1].getNumber();
+  if (!(axis.lower < axis.upper)) entry.fail("the range is crossed", "give the lower bound first");
+  if (items.size() == 3) axis.points = readCount(items[2], 1000);
+  return axis;
+}
+
+WorkspaceRegion readRegion(const Entry& entry) {
+  const std::vector<std::string> axes = {"x", "y", "z", "roll", "pitch", "yaw"};
+  std::vector<std::string> keys = {"foot", "base", "max_conditioning"};
+  keys.insert(keys.end(), axes.begin(), axes.end());
+  const Fields fields = entry.getFields(keys);
+  WorkspaceRegion region;
+  if (const Entry* foot = find(fields, "foot")) region.foot = foot->getText();
+  if (const Entry* base = find(fields, "base")) region.base = base->getText();
+  if (const Entry* bound = find(fields, "max_conditioning")) {
+    region.max_conditioning = bound->getNumber();
+    if (!(region.max_conditioning >= 1)) bound->fail("no linkage is below 1", "give a number of 1 or more");
+  }
+  for (size_t i = 0; i < axes.size(); ++i)
+    if (const Entry* axis = find(fields, axes[i])) region.axes[i] = readAxis(*axis);
+  return region;
+}
+
+DriveTable readDrives(const Entry& entry) {
+  const Fields fields = entry.getFields({"motor_constant", "motors", "regeneration"});
+  DriveTable drives;
+  if (const Entry* constant = find(fields, "motor_constant")) drives.common.motor_constant = constant->getNumber();
+  if (const Entry* share = find(fields, "regeneration")) drives.common.regeneration = share->getNumber();
+  if (const Entry* motors = find(fields, "motors")) drives.motor_constants = readSettings(*motors);
+  return drives;
+}
+
 ObjectiveTerm readTerm(const Entry& entry) {
-  const Fields fields = entry.getFields({"measure", "motors", "weight"});
+  const Fields fields = entry.getFields({"measure", "motors", "weight", "region"});
   ObjectiveTerm term;
   term.measure = readChoice<Measure>(require(fields, "measure", entry),
-                                     {Measure::PeakTorque, Measure::RmsTorque, Measure::Energy, Measure::Conditioning});
-  if (const Entry* motors = find(fields, "motors")) term.motors = motors->getTexts();
+                                     {Measure::PeakTorque, Measure::RmsTorque, Measure::Energy,
+                                      Measure::ElectricalEnergy, Measure::Conditioning, Measure::Workspace});
+  const Entry *motors = find(fields, "motors"), *region = find(fields, "region");
+  const bool is_workspace = term.measure == Measure::Workspace;
+  if (motors && is_workspace) motors->fail("a workspace has no motors", "remove it");
+  if (region && !is_workspace) region->fail("only a workspace has a region", "remove it");
+  if (region) term.region = readRegion(*region);
+  if (motors) term.motors = motors->getTexts();
   if (const Entry* weight = find(fields, "weight")) term.weight = weight->getNumber();
   if (!(term.weight > 0)) entry.fail("its weight is not positive", "give a positive number, or none");
   return term;
@@ -120,7 +170,7 @@ void readSearch(const Entry& entry, DesignSpec& spec) {
 
 void readRoot(const Entry& root, DesignSpec& spec) {
   const Fields fields =
-      root.getFields({"robot", "generator", "set", "variables", "motions", "mode", "objective", "search"});
+      root.getFields({"robot", "generator", "set", "variables", "motions", "mode", "objective", "drives", "search"});
   if (const Entry* robot = find(fields, "robot")) spec.robot = robot->getText();
   if (const Entry* generator = find(fields, "generator")) spec.generator = generator->getText();
   if (spec.robot.empty() == spec.generator.empty())
@@ -130,13 +180,15 @@ void readRoot(const Entry& root, DesignSpec& spec) {
     spec.settings = readSettings(*set);
   }
   for (const Entry& item : require(fields, "variables", root).getList()) spec.variables.push_back(readVariable(item));
-  for (const Entry& item : require(fields, "motions", root).getList()) {
-    const Fields motion_fields = item.getFields({"motion", "set"});
-    DesignSpec::MotionSpec motion;
-    motion.motion = require(motion_fields, "motion", item).getText();
-    if (const Entry* set = find(motion_fields, "set")) motion.settings = readSettings(*set);
-    spec.motions.push_back(motion);
-  }
+  if (const Entry* motions = find(fields, "motions"))
+    for (const Entry& item : motions->getList()) {
+      const Fields motion_fields = item.getFields({"motion", "set"});
+      DesignSpec::MotionSpec motion;
+      motion.motion = require(motion_fields, "motion", item).getText();
+      if (const Entry* set = find(motion_fields, "set")) motion.settings = readSettings(*set);
+      spec.motions.push_back(motion);
+    }
+  if (const Entry* drives = find(fields, "drives")) spec.drives = readDrives(*drives);
   if (const Entry* mode = find(fields, "mode"))
     spec.mode = readChoice<MotionMode>(*mode, {MotionMode::Reoptimized, MotionMode::Kept});
   for (const Entry& item : require(fields, "objective", root).getList()) spec.objective.push_back(readTerm(item));

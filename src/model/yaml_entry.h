@@ -31,6 +31,8 @@ class YamlEntry {
   bool isMap() const { return node_.IsMap(); }
   bool isList() const { return node_.IsSequence(); }
 
+  bool isWord(const std::string& word) const { return node_.IsScalar() && node_.Scalar() == word; }
+
   std::string getText() const {
     if (!node_.IsScalar() || node_.Scalar().empty()) fail("it is not a name", "give one word");
     return node_.Scalar();

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "bielle/dynamics/kinematics.h"
+#include "io/fastenings.h"
 #include "report/pack.h"
 
 namespace fs = std::filesystem;
@@ -83,18 +84,6 @@ Json describeShape(const char* shape, int body, const SE3& X_BV, const Vector3d&
           {"pose", packPose(X_BV)},
           {"size", packVector(size)},
           {"rgba", packVector(rgba)}};
-}
-
-// Points fastened to each body, in its own frame: joints that it carries, ends of closures, contacts.
-std::vector<std::vector<Vector3d>> listFastenings(const Model& model) {
-  std::vector<std::vector<Vector3d>> points(model.numBodies());
-  for (int i = 1; i < model.numBodies(); ++i) points[model.joints()[i].parent].push_back(model.joints()[i].X_PJ.p);
-  for (const Closure& closure : model.closures()) {
-    points[closure.body1].push_back(closure.X_B1.p);
-    points[closure.body2].push_back(closure.X_B2.p);
-  }
-  for (const ContactFrame& contact : model.contacts()) points[contact.body].push_back(contact.X_BF.p);
-  return points;
 }
 
 double calcExtent(const Model& model) {

@@ -6,9 +6,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <optional>
 
 #include "bielle/io/result.h"
@@ -197,6 +199,25 @@ class CaseRunner {
 };
 
 }  // namespace
+
+// FNV-1a over all of them.
+std::string makeIdentity(const std::string& program, const std::vector<std::string>& robots) {
+  std::vector<fs::path> files;
+  for (const std::string& robot : robots)
+    for (const fs::directory_entry& entry : fs::directory_iterator(robot))
+      if (entry.path().extension() == ".urdf" || entry.path().extension() == ".yaml") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  files.push_back(program);
+  std::uint64_t hash = 0xcbf29ce484222325;
+  for (const fs::path& path : files) {
+    std::ifstream file(path, std::ios::binary);
+    for (std::istreambuf_iterator<char> c(file), end; c != end; ++c)
+      hash = (hash ^ static_cast<unsigned char>(*c)) * 0x100000001b3;
+  }
+  char text[32];
+  std::snprintf(text, sizeof text, " %016llx", static_cast<unsigned long long>(hash));
+  return getBuildInfo().bielle + text;
+}
 
 RunOutcome runCases(const std::string& directory, const std::vector<Case>& cases, const RunOptions& options) {
   const DirectoryLock lock(directory);

@@ -41,6 +41,9 @@ struct RunOutcome {
   bool interrupted = false;  // by the user; the cases under way were dropped
 };
 
+// What results depend on: the program and the files of the robots in these directories.
+std::string makeIdentity(const std::string& program, const std::vector<std::string>& robots);
+
 // Runs the cases in directory/NAME. \throws ModelError when directories or files cannot be made, or another study is at
 // work in the directory
 RunOutcome runCases(const std::string& directory, const std::vector<Case>& cases, const RunOptions& options);

@@ -43,10 +43,10 @@ Plot makeTorquePlot(const StudyResult& result, const char* title, double Load::*
       title,
       result.study.label,
       "torque [N m]",
-      false,
+      PlotScale::Free,
       {makeSweep(result, "closed", kClosedColor, closed), makeSweep(result, "serial, lifted", kLiftedColor, lifted),
        makeSweep(result, "serial, knee joint", kSerialColor, serial, true), markFailures(result, partial)}};
-  plot.logarithmic = isWide(plot.curves);
+  if (isWide(plot.curves)) plot.scale = PlotScale::Logarithmic;
   return plot;
 }
 
@@ -55,7 +55,7 @@ Plot makeHeightPlot(const StudyResult& result) {
   return {"Mean height of the centre of mass",
           result.study.label,
           "height [m]",
-          false,
+          PlotScale::Free,
           {makeSweep(result, "closed", kClosedColor,
                      [](const Comparison& e) { return drawn(e.closed, e.closed.com_mean); }),
            makeSweep(result, "serial, lifted", kLiftedColor, lifted),
@@ -77,14 +77,12 @@ Curve makeTorqueCurve(const Performance& motion, const std::vector<std::string>&
 }
 
 Plot makeTorqueHistory(const Comparison& entry, const std::vector<std::string>& motors, const char* title) {
-  Plot plot{title,
-            "time [s]",
-            "torque [N m]",
-            false,
-            {makeTorqueCurve(entry.closed, motors, "closed", kClosedColor),
-             makeTorqueCurve(entry.lifted, motors, "serial, lifted", kLiftedColor)}};
-  plot.logarithmic = false;
-  return plot;
+  return {title,
+          "time [s]",
+          "torque [N m]",
+          PlotScale::Free,
+          {makeTorqueCurve(entry.closed, motors, "closed", kClosedColor),
+           makeTorqueCurve(entry.lifted, motors, "serial, lifted", kLiftedColor)}};
 }
 
 Curve makeAngleCurve(const Performance& motion, const std::string& joint, const char* title, const char* color) {
@@ -101,7 +99,7 @@ Plot makeKneePlot(const Comparison& entry, const ComparedRobot& robot) {
   return {"Angle of " + knee,
           "time [s]",
           "angle [rad]",
-          false,
+          PlotScale::Free,
           {makeAngleCurve(entry.closed, knee, "closed", kClosedColor),
            makeAngleCurve(entry.lifted, knee, "serial, lifted", kLiftedColor),
            makeAngleCurve(entry.serial, knee, "serial", kSerialColor)}};
@@ -116,10 +114,10 @@ Curve makePath(const RowMatrixXd& path, int x, int y, const VectorXd* time, cons
 
 // Feet seen from the side and the centre of mass over time, of both models.
 std::vector<Plot> makePathPlots(const Comparison& entry, const ComparedRobot& robot) {
-  std::vector<Plot> plots = {{"Feet, from the side", "x [m]", "z [m]", false, {}},
-                             {"Centre of mass, height", "time [s]", "z [m]", false, {}},
-                             {"Centre of mass, forward", "time [s]", "x [m]", false, {}},
-                             {"Centre of mass, sideways", "time [s]", "y [m]", false, {}}};
+  std::vector<Plot> plots = {{"Feet, from the side", "x [m]", "z [m]", PlotScale::Free, {}},
+                             {"Centre of mass, height", "time [s]", "z [m]", PlotScale::Free, {}},
+                             {"Centre of mass, forward", "time [s]", "x [m]", PlotScale::Free, {}},
+                             {"Centre of mass, sideways", "time [s]", "y [m]", PlotScale::Free, {}}};
   const auto add = [&](const Performance& motion, const char* title, const char* color) {
     if (!motion.record) return;
     const std::vector<RowMatrixXd> feet = calcFeet(robot.robot.model, *motion.record);
@@ -152,10 +150,13 @@ void addRatio(const RatioFinding& ratio, std::vector<Figure>& figures) {
   Curve curve{ratio.joint, kClosedColor, CurveStyle::Lines, false, {}};
   for (size_t i = 0; i < ratio.ratio.size(); ++i)
     if (ratio.ratio[i] < 5 * ratio.start) curve.points.emplace_back(ratio.angle[i], ratio.ratio[i]);
-  figures.push_back(
-      {"ratio",
-       "Reduction ratio of the knee, up to five times that of the starting posture",
-       {{"Reduction ratio", "angle of " + ratio.joint + " [rad]", "motor speed / joint speed", false, {curve}}}});
+  figures.push_back({"ratio",
+                     "Reduction ratio of the knee, up to five times that of the starting posture",
+                     {{"Reduction ratio",
+                       "angle of " + ratio.joint + " [rad]",
+                       "motor speed / joint speed",
+                       PlotScale::Free,
+                       {curve}}}});
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "study/claims.h"
-#include "study/plot.h"
+#include "io/plot.h"
 
 namespace bielle::study {
 

@@ -32,10 +32,14 @@ class RobotDraft {
   /// and cylinders that are drawn along d grow too.
   void stretch(const std::string& link, const Vector3d& origin, const Vector3d& direction, double factor);
 
+  /// Mass and inertia of a link times a positive factor; its centre of mass stays.
+  void scaleMass(const std::string& link, double factor);
+
   Model build() const;
 
  private:
   int findMovable(const std::string& name, bool& is_joint) const;
+  int findLink(const std::string& name) const;
   int findFrameAt(int body, const SE3& X_BF) const;
   std::string getLink(int body) const { return body == 0 ? "world" : model_.bodies()[body].name; }
 

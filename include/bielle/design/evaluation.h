@@ -3,7 +3,8 @@
 ///
 /// With m_i the measures of a design and m_i0 those of the start, a feasible design is worth
 ///     f = sum_i w_i m_i / m_i0,                                                                                    (1)
-/// W = sum_i w_i at the start. Infeasible ones are never an error but
+/// W = sum_i w_i at the start. The measure of a workspace is the inverse of the share that is reached, of half a point at
+/// least. Infeasible ones are never an error but
 ///     f = 2 W + W mean_p min(1, 10 g_p)      some posture p of the start's motions cannot be taken                 (2)
 ///     f = 1.5 W + 0.5 W s                    all can, but a motion could not be made                               (3)
 /// with g_p (m or rad) the largest closing error that is left when loops, base and feet should be where they are in
@@ -17,6 +18,7 @@
 #include "bielle/design/gradient.h"
 #include "bielle/design/measures.h"
 #include "bielle/design/parametrization.h"
+#include "bielle/design/workspace.h"
 #include "bielle/motion/motion.h"
 
 namespace bielle {
@@ -36,12 +38,14 @@ struct ObjectiveTerm {
   Measure measure = Measure::PeakTorque;
   std::vector<std::string> motors;  ///< empty: all
   double weight = 1;                ///< w_i
+  WorkspaceRegion region;           ///< of the workspace, which has no motors
 };
 
 struct EvaluationOptions {
   MotionMode mode = MotionMode::Reoptimized;
   FddpOptions solver = makeSolverOptions();
   int postures = 6;  ///< of each motion, for (2)
+  DriveTable drives;
 
   /// Tolerances of engineering: a cost that changes by less than 1e-8 of itself is done. One thread.
   static FddpOptions makeSolverOptions();

@@ -1,6 +1,7 @@
 #pragma once
 /// \file What motors and linkages pay for a motion.
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bielle/model/model.h"
@@ -9,32 +10,60 @@
 
 namespace bielle {
 
+/// What turns electrical into mechanical power at a motor. Of a motor with motor constant K (torque over the square root of
+/// the heat it makes) behind a gear of ratio n, the model's motor has K_m = n K. Of the power at its terminals
+///     P = u v + (u / K_m)^2                                                                                        (1)
+/// it takes max(P, 0) and gives back the share r of what is negative: braking first has to pay for its own heat.
+/// No friction, no iron losses, no standby.
+struct MotorDrive {
+  /// K_m, N m/sqrt(W) (N/sqrt(W) of a linear motor). The default is ours, of the order of geared motors of 0.8 kg that
+  /// hold some 15 N m with 50 W of heat.
+  double motor_constant = 2;
+  double regeneration = 0;  ///< r, 0 .. 1
+};
+
+/// Drives by motor: one constant for all, others by name.
+struct DriveTable {
+  MotorDrive common;
+  std::vector<std::pair<std::string, double>> motor_constants;
+};
+/// \throws ModelError for unknown motors, constants that are not positive, shares outside 0 .. 1
+std::vector<MotorDrive> makeDrives(const Model& model, const DriveTable& table);
+
 /// Of one motor over a motion of N stages.
 struct MotorMeasures {
-  double peak_torque = 0;  ///< max |u|, N m or N
-  double rms_torque = 0;   ///< sqrt(sum h u^2 / sum h)
-  double peak_speed = 0;   ///< max |v|, rad/s or m/s
-  double energy = 0;       ///< sum h |u v|, J: what is braked is not given back
+  double peak_torque = 0;        ///< max |u|, N m or N
+  double rms_torque = 0;         ///< sqrt(sum h u^2 / sum h)
+  double peak_speed = 0;         ///< max |v|, rad/s or m/s
+  double energy = 0;             ///< sum h |u v|, J: what is braked is not given back
+  double electrical_energy = 0;  ///< sum h (max(P, 0) + r min(P, 0)), Eq. (1), J
 };
+
+/// What motors do over time, N stages: speeds are those at the beginning of a stage.
+struct MotorTrace {
+  std::vector<double> time, dt;  ///< of the stages, s
+  MatrixXd torque, speed;        ///< nu x N; an impact (dt = 0) has no torque
+};
+/// \param dt  N, s   \param trajectory  states (q, v) of the model at N + 1 nodes; N controls
+MotorTrace makeMotorTrace(const Model& model, const std::vector<double>& dt, const ShootingTrajectory& trajectory);
+
+/// \param drives  by motor; empty: the default of all
+std::vector<MotorMeasures> calcMotorMeasures(const MotorTrace& trace, const std::vector<MotorDrive>& drives = {});
 
 struct MotionMeasures {
   std::vector<MotorMeasures> motors;  ///< in the order of the model
-  /// The farthest that a unit motion of a linkage is from showing at its motors: with Q an orthonormal basis of the
-  /// closed
-  /// motions of a loop cluster and Q_M its rows of motors, the largest 1 / sigma_min(Q_M) over clusters and nodes, 1 or
-  /// more. Infinite where the motors do not determine the linkage (a dead point of the motors).
-  double conditioning = 1;
+  double conditioning = 1;            ///< the worst over the nodes (conditioning.h)
+  MotorTrace trace;
 };
-
-/// \param dt  N, s   \param trajectory  states (q, v) of the model at N + 1 nodes, closed; N controls
+/// \param trajectory  closed at its nodes
 MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>& dt,
-                                  const ShootingTrajectory& trajectory);
+                                  const ShootingTrajectory& trajectory, const std::vector<MotorDrive>& drives = {});
 
-enum class Measure { PeakTorque, RmsTorque, Energy, Conditioning };
+enum class Measure { PeakTorque, RmsTorque, Energy, ElectricalEnergy, Conditioning, Workspace };
 const char* getName(Measure measure);
 
-/// The largest peak torque, rms torque or conditioning over the motors named and all motions, or the energy of
-/// all of them together.
+/// The largest peak torque, rms torque or conditioning over the motors named and all motions, or an energy of
+/// all of them together. The workspace is no matter of motions (workspace.h).
 double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions);
 
 }  // namespace bielle

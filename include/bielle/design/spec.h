@@ -17,8 +17,15 @@
 /// motions:
 ///   - {motion: squat, set: {depth: 0.6}}
 /// mode: reoptimized              # or kept
-/// objective:                     # measures: peak_torque, rms_torque, energy, conditioning; all motors by default
+/// objective:                     # peak_torque, rms_torque, energy, electrical_energy, conditioning; all motors by default
 ///   - {measure: peak_torque, motors: [motor_knee_left, motor_knee_right], weight: 1}
+///   - measure: workspace         # 1 / share of the places of a foot that can be reached (workspace.h)
+///     region:                    # ranges [from, to] or [from, to, points] (m, rad), numbers (held), or free
+///       {foot: foot_left, base: torso, x: [-0.2, 0.2, 9], z: [-0.1, 0.1], yaw: free, max_conditioning: 10}
+/// drives:                        # for electrical_energy (measures.h)
+///   motor_constant: 2            # N m/sqrt(W) at the joints, all motors but those of `motors`
+///   motors: {motor_knee_left: 3, motor_knee_right: 3}
+///   regeneration: 0              # share of what braking leaves at the terminals
 /// search:
 ///   seed: 1
 ///   searches: 2                  # independent ones, one thread each
@@ -47,6 +54,7 @@ struct DesignSpec {
   std::vector<MotionSpec> motions;
   MotionMode mode = MotionMode::Reoptimized;
   std::vector<ObjectiveTerm> objective;
+  DriveTable drives;
   unsigned seed = 1;
   int searches = 2;
   std::vector<SearchStage> stages = {{SearchAlgorithm::Crs, 200, 1e-3}, {SearchAlgorithm::Sbplx, 100, 1e-3}};

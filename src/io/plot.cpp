@@ -1,14 +1,14 @@
-#include "study/plot.h"
+#include "io/plot.h"
 
 #include <cmath>
 #include <sstream>
 
 #include "io/figure.h"
 
-namespace bielle::study {
+namespace bielle {
 namespace {
 
-constexpr int kWidth = 720, kPlotHeight = 330;
+constexpr int kWidth = 720, kPlotHeight = 330, kEqualHeight = 520;
 
 void writePoints(std::ostream& script, const Curve& curve, const std::string& name) {
   script << "$" << name << " << EOD\n";
@@ -24,6 +24,8 @@ void writePoints(std::ostream& script, const Curve& curve, const std::string& na
 std::string describeStyle(const Curve& curve) {
   const std::string color = " lc rgb '" + curve.color + "'";
   switch (curve.style) {
+    case CurveStyle::Points:
+      return "with points pt 7 ps 0.3" + color;
     case CurveStyle::Crosses:
       return "with points pt 2 ps 1.2 lw 2" + color;
     case CurveStyle::LinesPoints:
@@ -39,7 +41,7 @@ std::vector<const Curve*> findDrawable(const Plot& plot) {
   std::vector<const Curve*> drawable;
   for (const Curve& curve : plot.curves)
     for (const auto& [x, y] : curve.points)
-      if (std::isfinite(x) && std::isfinite(y) && (!plot.logarithmic || y > 0)) {
+      if (std::isfinite(x) && std::isfinite(y) && (plot.scale != PlotScale::Logarithmic || y > 0)) {
         drawable.push_back(&curve);
         break;
       }
@@ -52,12 +54,13 @@ void writePlot(std::ostream& script, const Plot& plot, int index) {
   for (size_t i = 0; i < curves.size(); ++i) writePoints(script, *curves[i], name(i));
   script << "set title " << quoteGnuplot(plot.title) << " noenhanced\nset xlabel " << quoteGnuplot(plot.x_label)
          << " noenhanced\nset ylabel " << quoteGnuplot(plot.y_label) << " noenhanced\n"
-         << (plot.logarithmic ? "set logscale y\n" : "unset logscale y\n");
+         << (plot.scale == PlotScale::Logarithmic ? "set logscale y\n" : "unset logscale y\n") << "set size "
+         << (plot.scale == PlotScale::Equal ? "ratio -1\n" : "noratio\n");
   if (curves.empty())
     script << "set xrange [0:1]\nset yrange [0:1]\nset label 1 'no results' at 0.4, 0.5\nplot NaN notitle\n";
   for (size_t i = 0; i < curves.size(); ++i)
-    script << (i ? ", " : "plot ") << "$" << name(i) << " " << describeStyle(*curves[i]) << " title "
-           << quoteGnuplot(curves[i]->title) << " noenhanced";
+    script << (i ? ", " : "plot ") << "$" << name(i) << " " << describeStyle(*curves[i])
+           << (curves[i]->title.empty() ? " notitle" : " title " + quoteGnuplot(curves[i]->title) + " noenhanced");
   script << "\nset xrange [*:*]\nset yrange [*:*]\nunset label 1\n";
 }
 
@@ -69,7 +72,8 @@ bool drawPlots(const std::string& path, const std::vector<Plot>& plots) {
   script << "set encoding utf8\nset grid\nset key outside right top\nset multiplot layout " << plots.size() << ",1\n";
   for (size_t i = 0; i < plots.size(); ++i) writePlot(script, plots[i], static_cast<int>(i));
   script << "unset multiplot\n";
-  return drawSvg(path, script.str(), kWidth, kPlotHeight * static_cast<int>(plots.size()));
+  const bool equal = !plots.empty() && plots[0].scale == PlotScale::Equal;
+  return drawSvg(path, script.str(), kWidth, (equal ? kEqualHeight : kPlotHeight) * static_cast<int>(plots.size()));
 }
 
-}  // namespace bielle::study
+}  // namespace bielle

@@ -4,21 +4,23 @@
 #include <utility>
 #include <vector>
 
-namespace bielle::study {
+namespace bielle {
 
-enum class CurveStyle { Lines, LinesPoints, Crosses };
+enum class CurveStyle { Lines, LinesPoints, Points, Crosses };
 
 struct Curve {
-  std::string title;
+  std::string title;  // empty: not in the key
   std::string color;  // "#rrggbb"
   CurveStyle style = CurveStyle::Lines;
   bool dashed = false;
   std::vector<std::pair<double, double>> points;  // those that are not finite interrupt the line
 };
 
+enum class PlotScale { Free, Logarithmic /* y */, Equal /* a metre is a metre in x and y */ };
+
 struct Plot {
   std::string title, x_label, y_label;
-  bool logarithmic = false;  // y
+  PlotScale scale = PlotScale::Free;
   std::vector<Curve> curves;
 };
 
@@ -28,4 +30,4 @@ constexpr const char *kClosedColor = "#1f77b4", *kLiftedColor = "#d62728", *kSer
 // Draws the plots one below the other. False when there is no gnuplot. \throws ModelError when it cannot be drawn
 bool drawPlots(const std::string& path, const std::vector<Plot>& plots);
 
-}  // namespace bielle::study
+}  // namespace bielle

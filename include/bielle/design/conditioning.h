@@ -1,0 +1,33 @@
+#pragma once
+/// \file How far the motors of a linkage are from not determining it.
+#include <vector>
+
+#include "bielle/dynamics/reduction.h"
+
+namespace bielle {
+
+/// With Q an orthonormal basis of the closed motions of a loop cluster and Q_M its rows of motors, 1 / sigma_min(Q_M): how
+/// far a unit motion of the linkage may be from showing at its motors. 1 or more; infinite where the motors do not
+/// determine the linkage. Clusters that others move too (fewer motors than mobility) are left out.
+class LinkageConditioning {
+ public:
+  /// \param q  closed configuration at which ranks are taken. \throws ModelError as makeReduction. The model must outlive it.
+  LinkageConditioning(const Model& model, ConstVectorRef q);
+  LinkageConditioning(const LinkageConditioning&) = delete;
+  LinkageConditioning& operator=(const LinkageConditioning&) = delete;
+  /// The worst cluster at a closed configuration; infinite where one has lost rank.
+  double calc(ConstVectorRef q);
+
+ private:
+  struct Cluster {
+    const LoopBlock* block;
+    std::vector<int> motors;  // positions among the dofs of the block
+    BlockPoint point;
+    VectorXd q;
+  };
+  const Model& model_;
+  Reduction reduction_;
+  std::vector<Cluster> clusters_;
+};
+
+}  // namespace bielle

@@ -1,0 +1,122 @@
+// bielle compare: robots that do the same, side by side.
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <thread>
+
+#include "bielle/io/result.h"
+#include "cli/commands.h"
+#include "study/architecture_report.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::cli {
+namespace {
+
+using namespace bielle::study;
+
+struct CompareArguments {
+  std::string spec, directory;
+  int jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+};
+
+// Those of all robots; a motion that is also one of the speeds is done once.
+std::vector<Case> collectCases(const ArchitectureSpec& spec, const std::vector<Contender>& contenders) {
+  std::vector<Case> cases;
+  for (const Contender& contender : contenders)
+    for (const auto* motions : {&spec.motions, &spec.speeds})
+      for (const ArchitectureMotion& motion : *motions) {
+        const Case one = makeArchitectureCase(contender, motion);
+        if (std::none_of(cases.begin(), cases.end(), [&](const Case& other) { return other.name == one.name; }))
+          cases.push_back(one);
+      }
+  return cases;
+}
+
+ArchitectureResults readResults(const ArchitectureSpec& spec, const std::vector<Contender>& contenders,
+                                const std::string& directory, const std::map<std::string, CaseOutcome>& outcomes) {
+  ArchitectureResults results;
+  for (const Contender& contender : contenders) {
+    const auto readAll = [&](const std::vector<ArchitectureMotion>& motions) {
+      std::vector<Feat> feats;
+      for (const ArchitectureMotion& motion : motions) {
+        const std::string name = makeArchitectureCase(contender, motion).name;
+        feats.push_back(readFeat(spec, contender, directory + "/" + name + "/" + kMotion, outcomes.at(name)));
+      }
+      return feats;
+    };
+    results.motions.push_back(readAll(spec.motions));
+    results.speeds.push_back(readAll(spec.speeds));
+  }
+  return results;
+}
+
+int run(const CompareArguments& arguments) {
+  const ArchitectureSpec spec = readArchitectureSpec(arguments.spec);
+  makeOutputDirectory(arguments.directory);
+  const std::vector<Contender> contenders = makeContenders(spec, arguments.directory + "/robots");
+  const std::vector<Case> cases = collectCases(spec, contenders);
+  RunOptions options;
+  options.program = fs::read_symlink("/proc/self/exe");
+  std::vector<std::string> directories;
+  for (const Contender& contender : contenders) directories.push_back(contender.directory);
+  options.identity = makeIdentity(options.program, directories);
+  options.jobs = arguments.jobs;
+  options.progress = [](const std::string& line) { std::cout << line << std::endl; };
+  const std::string directory = arguments.directory + "/cases";
+  const RunOutcome outcome = runCases(directory, cases, options);
+  if (outcome.interrupted) {
+    std::cerr << "bielle: error: interrupted; the same command goes on from here" << std::endl;
+    return kFailed;
+  }
+  std::map<std::string, CaseOutcome> outcomes;
+  bool complete = true;
+  for (size_t i = 0; i < cases.size(); ++i) {
+    outcomes[cases[i].name] = outcome.cases[i];
+    complete &= outcome.cases[i].complete;
+  }
+  std::vector<std::string> notes;
+  for (const std::string& path : writeArchitectures(arguments.directory, spec, contenders,
+                                                    readResults(spec, contenders, directory, outcomes), notes))
+    std::cout << "  " << path << "\n";
+  for (const std::string& note : notes) std::cerr << "bielle: warning: " << note << "\n";
+  if (!complete) std::cerr << "bielle: error: some cases broke down; the same command tries them anew" << std::endl;
+  return complete ? kOk : kFailed;
+}
+
+}  // namespace
+
+void addCompare(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("compare", "Robots that make the same motions, side by side");
+  const auto arguments = std::make_shared<CompareArguments>();
+  command.add_option("SPEC", arguments->spec, "YAML file: robots, their mass, motions, speeds, groups of motors")
+      ->required();
+  command
+      .add_option("-o,--output", arguments->directory,
+                  "directory for compare.md, compare.csv, figures, robots/ and cases/; made if need be")
+      ->required();
+  command.add_option("--jobs", arguments->jobs, "cases at a time, one process each")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command.footer(
+      "SPEC:\n"
+      "  robots:                         (a robot, or a generator with its parameters, by the name it is to have)\n"
+      "    bipetto: {robot: bipetto}\n"
+      "    cleobot: {generator: cleobot, set: {hip_height: 0.48}}\n"
+      "  mass: 25.7                      (kg, of every robot, by its trunk; left out: they stay as they are)\n"
+      "  motions:\n"
+      "    - {motion: squat, set: {depth: 0.6}}\n"
+      "    - {motion: walk, set: {speed: 0.5}}\n"
+      "  speeds: {motion: walk, option: speed, from: 0.3, to: 1.0, step: 0.1}\n"
+      "  groups: {hips: [hip], knees and ankles: [knee, ankle, leg]}     (motors by parts of their names)\n"
+      "  drives: {motor_constant: 2, regeneration: 0}     (N m/sqrt(W) at the joints; share given back)\n"
+      "Peak and rms torques by group, power, mechanical and electrical energy, cost of transport; of the speeds, the\n"
+      "largest whose motion converges and passes `bielle check`. A case is a process of its own; those that have been\n"
+      "done are kept: after Ctrl-C or a crash the same command goes on.\n"
+      "Exit status: 0 done, 1 interrupted or a case broke down, 2 bad input.\n"
+      "Example:\n  bielle compare examples/architectures/architectures.yaml -o architectures");
+  command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
+}
+
+}  // namespace bielle::cli

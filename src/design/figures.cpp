@@ -1,0 +1,132 @@
+#include "design/figures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/motion/motion.h"
+#include "io/fastenings.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kGap = std::numeric_limits<double>::quiet_NaN();  // interrupts a line
+constexpr size_t kMostMotors = 4;                                  // of one plot
+const char* const kColors[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#e377c2", "#17becf"};
+constexpr size_t kNumColors = std::size(kColors);
+
+// Values of feasible designs as points, the least so far as a line, one colour per search. What is far off is left out.
+Plot makeCourse(const DesignEvaluator& evaluator, const DesignRun& run) {
+  const double start = evaluator.start().value;
+  Plot plot{"Value of the designs", "evaluation", "value", PlotScale::Free, {}};
+  for (size_t i = 0; i < run.searches.size(); ++i) {
+    const char* color = kColors[i % kNumColors];
+    Curve values{"", color, CurveStyle::Points, false, {}};
+    Curve best{"best of search " + std::to_string(i + 1), color, CurveStyle::Lines, false, {}};
+    double least = start;
+    for (const LoggedEvaluation& e : run.searches[i]) {
+      const bool feasible = e.status == DesignStatus::Feasible;
+      if (feasible) least = std::min(least, e.value);
+      const double count = static_cast<double>(best.points.size() + 1);
+      values.points.emplace_back(count, feasible && e.value < 1.5 * start ? e.value : kGap);
+      best.points.emplace_back(count, least);
+    }
+    plot.curves.push_back(values);
+    plot.curves.push_back(best);
+  }
+  return plot;
+}
+
+// The motors of the objective that have the largest torques in this motion, in the order of the model.
+std::vector<int> chooseMotors(const DesignEvaluator& evaluator, const MotionMeasures& before,
+                              const MotionMeasures& after) {
+  const Model& model = evaluator.robot().startModel();
+  std::set<int> named;
+  for (const ObjectiveTerm& term : evaluator.objective())
+    for (const std::string& motor : term.motors) named.insert(model.findMotor(motor));
+  if (named.empty())
+    for (int m = 0; m < model.nu(); ++m) named.insert(m);
+  std::vector<int> motors(named.begin(), named.end());
+  const auto peak = [&](int m) { return std::max(before.motors[m].peak_torque, after.motors[m].peak_torque); };
+  std::stable_sort(motors.begin(), motors.end(), [&](int a, int b) { return peak(a) > peak(b); });
+  motors.resize(std::min(motors.size(), kMostMotors));
+  std::sort(motors.begin(), motors.end());
+  return motors;
+}
+
+Curve makeCurve(const MotorTrace& trace, const MatrixXd& values, int motor, const std::string& title, size_t color,
+                bool dashed) {
+  Curve curve{title, kColors[color % kNumColors], CurveStyle::Lines, dashed, {}};
+  for (size_t k = 0; k < trace.time.size(); ++k)
+    if (trace.dt[k] > 0) curve.points.emplace_back(trace.time[k], values(motor, static_cast<Eigen::Index>(k)));
+  return curve;
+}
+
+DesignFigure makeMotionFigure(const DesignEvaluator& evaluator, const std::string& name, const MotionMeasures& before,
+                              const MotionMeasures& after) {
+  Plot torque{"Motor torques", "time [s]", "torque [N m]", PlotScale::Free, {}};
+  Plot speed{"Motor speeds", "time [s]", "speed [rad/s]", PlotScale::Free, {}};
+  const std::vector<int> motors = chooseMotors(evaluator, before, after);
+  for (size_t i = 0; i < motors.size(); ++i) {
+    const std::string& motor = evaluator.robot().startModel().motors()[motors[i]].name;
+    for (const auto& [measures, title, dashed] :
+         {std::tuple{&before, "before: " + motor, true}, std::tuple{&after, "after: " + motor, false}}) {
+      torque.curves.push_back(makeCurve(measures->trace, measures->trace.torque, motors[i], title, i, dashed));
+      speed.curves.push_back(makeCurve(measures->trace, measures->trace.speed, motors[i], title, i, dashed));
+    }
+  }
+  return {name, {torque, speed}};
+}
+
+// Rods between what is fastened to the bodies, seen along an axis of the world.
+Curve makeSkeleton(const Model& model, int horizontal, const std::string& title, const char* color) {
+  Curve curve{title, color, CurveStyle::Lines, false, {}};
+  Workspace ws(model);
+  updatePlacements(model, ws, makeStandingPosture(model));
+  const std::vector<std::vector<Vector3d>> fastenings = listFastenings(model);
+  for (int i = 1; i < model.numBodies(); ++i)
+    for (const Vector3d& point : fastenings[i]) {
+      const Vector3d end = ws.X_WB[i].R * point + ws.X_WB[i].p;
+      curve.points.insert(curve.points.end(),
+                          {{ws.X_WB[i].p[horizontal], ws.X_WB[i].p.z()}, {end[horizontal], end.z()}, {kGap, kGap}});
+    }
+  return curve;
+}
+
+// The extent of a view; a planar mechanism has none from its edge.
+double calcWidth(const Curve& curve) {
+  double least = 0, most = 0;
+  for (const auto& [x, y] : curve.points) least = std::fmin(least, x), most = std::fmax(most, x);
+  return most - least;
+}
+
+DesignFigure makeMechanismFigure(const DesignEvaluator& evaluator, const DesignRun& run) {
+  const Model best = evaluator.robot().make(run.best);
+  DesignFigure figure{"design_mechanism", {}};
+  for (const auto& [title, axis, horizontal] :
+       {std::tuple{"From the side", "x [m]", 0}, {"From the front", "y [m]", 1}}) {
+    const Curve before = makeSkeleton(evaluator.robot().startModel(), horizontal, "before", kSerialColor);
+    const Curve after = makeSkeleton(best, horizontal, "after", kClosedColor);
+    if (std::max(calcWidth(before), calcWidth(after)) > 1e-6)
+      figure.plots.push_back({title, axis, "z [m]", PlotScale::Equal, {before, after}});
+  }
+  return figure;
+}
+
+}  // namespace
+
+std::vector<DesignFigure> makeDesignFigures(const DesignEvaluator& evaluator, const DesignRun& run) {
+  std::vector<DesignFigure> figures = {{"design", {makeCourse(evaluator, run)}}};
+  std::set<std::string> names;
+  for (size_t i = 0; i < run.evaluation.motions.size(); ++i) {
+    std::string name = "design_" + evaluator.motions()[i].name;
+    if (!names.insert(name).second) name += "_" + std::to_string(i + 1);
+    figures.push_back(makeMotionFigure(evaluator, name, evaluator.start().motions[i], run.evaluation.motions[i]));
+  }
+  figures.push_back(makeMechanismFigure(evaluator, run));
+  return figures;
+}
+
+}  // namespace bielle

@@ -1,0 +1,20 @@
+#pragma once
+// The figures of a design run.
+#include <string>
+#include <vector>
+
+#include "bielle/design/run.h"
+#include "io/plot.h"
+
+namespace bielle {
+
+struct DesignFigure {
+  std::string name;  // of the file, without extension
+  std::vector<Plot> plots;
+};
+
+// `design`: values over evaluations. `design_MOTION`: torques and speeds over time, of the start and of the best
+// design. `design_mechanism`: both, from the side and from the front, in their standing posture.
+std::vector<DesignFigure> makeDesignFigures(const DesignEvaluator& evaluator, const DesignRun& run);
+
+}  // namespace bielle

@@ -1,0 +1,72 @@
+#pragma once
+// A comparison of robots that do the same: which ones, what they are made to do, and the cases of it.
+//
+// In a YAML file:
+//   robots:                        # name: a robot (name, or path from this file), or a generator with its parameters
+//     bipetto: {robot: bipetto}
+//     cleobot: {generator: cleobot, set: {hip_height: 0.5}}
+//   mass: 25.7                     # kg, of every robot, by its trunk; left out: they stay as they are
+//   motions:
+//     - {motion: squat, set: {depth: 0.6}}
+//   speeds: {motion: walk, option: speed, from: 0.3, to: 1.0, step: 0.1}     # the largest that is done and passes
+//   groups: {hips: [hip], "knees and ankles": [knee, ankle]}     # motors by parts of their names, the first that fits
+//   drives: {motor_constant: 2, regeneration: 0}                 # of all motors (design/measures.h)
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bielle/design/measures.h"
+#include "bielle/model/reader.h"
+#include "study/cases.h"
+
+namespace bielle::study {
+
+using Settings = std::vector<std::pair<std::string, double>>;
+
+struct Architecture {
+  std::string name;
+  std::string robot, generator;  // one of them
+  Settings settings;             // of the generator
+};
+
+struct ArchitectureMotion {
+  std::string motion;
+  Settings settings;
+  std::string name() const;  // with its settings: "walk-speed-0.5"
+};
+
+struct MotorGroup {
+  std::string name;
+  std::vector<std::string> words;
+};
+
+struct ArchitectureSpec {
+  std::string path, text;
+  std::vector<Architecture> robots;
+  double mass = 0;  // kg; 0: as they are
+  std::vector<ArchitectureMotion> motions;
+  std::vector<ArchitectureMotion> speeds;  // slowest first; may be empty
+  std::vector<double> speed_values;
+  std::vector<MotorGroup> groups;  // the last one has no words: all motors
+  MotorDrive drive;
+};
+
+// \throws ModelError naming the file, the key with its line, and the remedy
+ArchitectureSpec readArchitectureSpec(const std::string& path);
+
+// A robot as it is compared.
+struct Contender {
+  std::string name, directory;  // where its files were written
+  LoadedRobot robot;
+  double trunk_factor = 1;  // mass and inertia of the trunk over what they were
+};
+
+// Makes the robots and writes them to directory/NAME.
+// \throws ModelError when there is no such robot, or its trunk cannot make up for the mass
+std::vector<Contender> makeContenders(const ArchitectureSpec& spec, const std::string& directory);
+
+// Its result is in kMotion.
+constexpr const char* kMotion = "motion";
+Case makeArchitectureCase(const Contender& contender, const ArchitectureMotion& motion);
+
+}  // namespace bielle::study

@@ -1,0 +1,250 @@
+// Measures of designs against closed forms: electrical energy, and the workspace of a five-bar leg.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "bielle/design/evaluation.h"
+#include "bielle/design/spec.h"
+#include "bielle/model/error.h"
+#include "bielle/robots/fivebar_leg.h"
+#include "bielle/robots/generators.h"
+#include "robot_directory.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+using Catch::Matchers::Contains;
+
+namespace {
+
+MotorTrace makeTrace(const std::vector<double>& dt, const std::vector<double>& torque,
+                     const std::vector<double>& speed) {
+  MotorTrace trace;
+  trace.dt = dt;
+  trace.time.resize(dt.size());
+  trace.torque = Eigen::Map<const Eigen::RowVectorXd>(torque.data(), torque.size());
+  trace.speed = Eigen::Map<const Eigen::RowVectorXd>(speed.data(), speed.size());
+  return trace;
+}
+
+using Eigen::Vector2d;
+
+// The five-bar leg on paper, in the plane x, z with the motors at the origin: one side's rods to the foot.
+struct Side {
+  Vector2d knee, lower;  // from the motor to the knee, from there to the foot
+};
+
+Side calcSide(const FiveBarLegParameters& p, const Vector2d& foot, double bend) {
+  const double a = p.upper_length, b = p.lower_length, r = foot.norm();
+  const double along = (a * a + r * r - b * b) / (2 * r);
+  const Vector2d e = foot / r, across(-e.y(), e.x());
+  const Vector2d knee = along * e + bend * std::sqrt(a * a - along * along) * across;
+  return {knee, foot - knee};
+}
+
+// Speeds of the knees per speed of the motors: v (x) l_i = w_i (c_i' . l_i) for both sides gives the velocity v of the foot,
+// with c' the derivative of the knee by the motor's angle; then the lower rods turn by the rest.
+double calcConditioning(const FiveBarLegParameters& p, const Vector2d& foot) {
+  const Side sides[] = {calcSide(p, foot, 1), calcSide(p, foot, -1)};
+  const auto turn = [](const Vector2d& v) { return Vector2d(-v.y(), v.x()); };
+  Eigen::Matrix2d A, K;
+  for (int i = 0; i < 2; ++i) A.row(i) = sides[i].lower.transpose();
+  for (int motor = 0; motor < 2; ++motor) {
+    Vector2d right = Vector2d::Zero();
+    right[motor] = turn(sides[motor].knee).dot(sides[motor].lower);
+    const Vector2d v = A.inverse() * right;
+    for (int i = 0; i < 2; ++i) {
+      const double w = i == motor ? 1 : 0;
+      const Vector2d rest = v - w * turn(sides[i].knee);
+      K(i, motor) = turn(sides[i].lower).dot(rest) / sides[i].lower.squaredNorm() - w;
+    }
+  }
+  const double sigma = Eigen::JacobiSVD<Eigen::Matrix2d>(K).singularValues()[0];
+  return std::sqrt(1 + sigma * sigma);
+}
+
+WorkspaceAxis makeRange(double lower, double upper, int points) {
+  return {WorkspaceAxis::Kind::Range, lower, upper, points};
+}
+
+// A box over the whole annulus and beyond: the foot stands at (0, -depth).
+WorkspaceRegion makeBox(double depth) {
+  WorkspaceRegion region;
+  region.axes[0] = makeRange(-0.35, 0.35, 23);
+  region.axes[2] = makeRange(depth - 0.35, depth + 0.35, 23);
+  return region;
+}
+
+double getDepth(const FiveBarLegParameters& p) {
+  const double side = p.upper_length * std::sin(p.stand_angle);
+  return p.upper_length * std::cos(p.stand_angle) + std::sqrt(p.lower_length * p.lower_length - side * side);
+}
+
+Vector2d getFoot(const WorkspaceGrid& grid, size_t point) {
+  return {grid.placements[point].p.x(), grid.placements[point].p.z()};
+}
+
+}  // namespace
+
+TEST_CASE("measures: electrical energy of stages by hand") {
+  MotorDrive drive;
+  drive.motor_constant = 2, drive.regeneration = 0.5;
+  // Heat (u / 2)^2 = 2.25 W, 4 W, 2.25 W, 2.25 W; at the shaft 1.5 W, 8 W, -12 W, -1.5 W.
+  const MotorTrace trace = makeTrace({0.1, 0.3, 0.2, 0.4}, {3, -4, 3, -3}, {0.5, -2, -4, 0.5});
+  const MotorMeasures measures = calcMotorMeasures(trace, {drive})[0];
+  CHECK(measures.electrical_energy == Approx(0.1 * 3.75 + 0.3 * 12 - 0.5 * 0.2 * 9.75 + 0.4 * 0.75));
+  CHECK(measures.energy == Approx(0.1 * 1.5 + 0.3 * 8 + 0.2 * 12 + 0.4 * 1.5));
+  drive.regeneration = 0;
+  CHECK(calcMotorMeasures(trace, {drive})[0].electrical_energy == Approx(0.1 * 3.75 + 0.3 * 12 + 0.4 * 0.75));
+  CHECK(calcMotorMeasures(trace)[0].electrical_energy == calcMotorMeasures(trace, {MotorDrive()})[0].electrical_energy);
+}
+
+TEST_CASE("measures: electrical energy of a harmonic motion") {
+  // u = U cos wt, v = V cos(wt - phi) over a period T: T (U V cos(phi) / 2 + U^2 / (2 K^2)) with all given back; sums over
+  // equal steps are exact.
+  const double U = 20, V = 3, K = 1.7, T = 0.8;
+  const int n = 100;
+  for (double phi : {0.0, 1.0, 2.5}) {
+    std::vector<double> u, v;
+    for (int k = 0; k < n; ++k) {
+      u.push_back(U * std::cos(2 * M_PI * k / n));
+      v.push_back(V * std::cos(2 * M_PI * k / n - phi));
+    }
+    MotorDrive drive;
+    drive.motor_constant = K, drive.regeneration = 1;
+    const MotorMeasures measures = calcMotorMeasures(makeTrace(std::vector<double>(n, T / n), u, v), {drive})[0];
+    CHECK(measures.electrical_energy == Approx(T * (U * V * std::cos(phi) / 2 + U * U / (2 * K * K))));
+    CHECK(measures.rms_torque == Approx(U / std::sqrt(2)));
+  }
+}
+
+TEST_CASE("measures: drives by name") {
+  const Model leg = makeFiveBarLeg();
+  DriveTable table;
+  table.common.motor_constant = 1.5;
+  table.motor_constants = {{"motor_back", 2.5}};
+  const std::vector<MotorDrive> drives = makeDrives(leg, table);
+  REQUIRE(drives.size() == 2);
+  CHECK(drives[leg.findMotor("motor_front")].motor_constant == 1.5);
+  CHECK(drives[leg.findMotor("motor_back")].motor_constant == 2.5);
+  table.motor_constants = {{"motor", 2.5}};
+  CHECK_THROWS_WITH(makeDrives(leg, table), Contains("no such motor"));
+  table.motor_constants = {{"motor_back", 0}};
+  CHECK_THROWS_WITH(makeDrives(leg, table), Contains("not positive"));
+  table = {};
+  table.common.regeneration = 1.1;
+  CHECK_THROWS_WITH(makeDrives(leg, table), Contains("0 .. 1"));
+}
+
+TEST_CASE("workspace: the annulus of a five-bar leg, point by point") {
+  for (double lower : {0.2, 0.17}) {
+    CAPTURE(lower);
+    FiveBarLegParameters p;
+    p.lower_length = lower;
+    const Model leg = makeFiveBarLeg(p);
+    const WorkspaceGrid grid = makeWorkspaceGrid(leg, makeBox(getDepth(p)));
+    REQUIRE(grid.placements.size() == 23 * 23);
+    const WorkspaceCoverage coverage = calcCoverage(leg, grid);
+    const double inner = p.lower_length - p.upper_length, outer = p.lower_length + p.upper_length;
+    int expected = 0;
+    for (size_t i = 0; i < grid.placements.size(); ++i) {
+      const double r = getFoot(grid, i).norm();
+      const bool inside = r > inner && r < outer;
+      CAPTURE(getFoot(grid, i).transpose(), r);
+      REQUIRE(std::min(std::abs(r - inner), std::abs(r - outer)) > 1e-5);  // no point stands on the rim
+      CHECK(static_cast<bool>(coverage.reached[i]) == inside);
+      expected += inside;
+    }
+    CHECK(coverage.share == Approx(expected / 529.0));
+    // And the grid is fine enough for the area.
+    CHECK(coverage.share == Approx(M_PI * (outer * outer - inner * inner) / (0.7 * 0.7)).epsilon(0.06));
+  }
+}
+
+TEST_CASE("workspace: a bound on the conditioning, by the leg's equations") {
+  const FiveBarLegParameters p;
+  const Model leg = makeFiveBarLeg(p);
+  WorkspaceRegion region = makeBox(getDepth(p));
+  region.max_conditioning = 1.5;
+  const WorkspaceGrid grid = makeWorkspaceGrid(leg, region);
+  const WorkspaceCoverage coverage = calcCoverage(leg, grid);
+  int good = 0, bad = 0;
+  for (size_t i = 0; i < grid.placements.size(); ++i) {
+    const Vector2d foot = getFoot(grid, i);
+    if (foot.norm() <= 0.1 || foot.norm() >= 0.3) continue;
+    CAPTURE(foot.transpose());
+    const double conditioning = calcConditioning(p, foot);
+    if (std::abs(conditioning - 1.5) < 1e-6) continue;
+    CHECK(static_cast<bool>(coverage.reached[i]) == conditioning < 1.5);
+    ++(conditioning < 1.5 ? good : bad);
+  }
+  CHECK(good > 50);
+  CHECK(bad > 20);
+}
+
+TEST_CASE("workspace: joint ranges, axes and what is refused") {
+  const Model leg = makeFiveBarLeg();
+  WorkspaceRegion region;
+  const WorkspaceGrid standard = makeWorkspaceGrid(leg, region);
+  CHECK(standard.placements.size() == 81);
+  CHECK(standard.held.head<3>().all());
+  CHECK_FALSE(standard.held.tail<3>().any());  // of a point foot
+  CHECK(calcCoverage(leg, standard).share > 0.9);
+
+  const auto refuse = [&](const std::string& problem) {
+    CHECK_THROWS_WITH(makeWorkspaceGrid(leg, region), Contains(problem));
+    region = {};
+  };
+  region.foot = "hand";
+  refuse("no such contact");
+  region.base = "hand";
+  refuse("no such link");
+  region.axes[0] = makeRange(1, 0, 3);
+  refuse("crossed");
+  region.axes[0] = region.axes[1] = region.axes[2] = makeRange(0, 1, 100);
+  refuse("100000");
+
+  // A foot that may not be turned: nowhere but where it stands.
+  region.axes[0] = makeRange(-0.03, 0.03, 3);
+  region.axes[4] = makeRange(0, 0, 1);
+  const WorkspaceCoverage level = calcCoverage(leg, makeWorkspaceGrid(leg, region));
+  CHECK(level.reached == std::vector<char>{0, 1, 0});
+}
+
+TEST_CASE("workspace: an objective, in a file") {
+  const RobotDirectory directory;
+  const std::string text = R"(generator: fivebar_leg
+variables:
+  - {name: lower, parameter: lower_length, bounds: [0.15, 0.25]}
+objective:
+  - {measure: workspace, region: {x: [-0.35, 0.35, 23], z: [-0.1368, 0.5632, 23]}}
+)";
+  const DesignSpec spec = readDesignSpec(directory.write("spec.yaml", text));
+  const Parametrization robot = makeParametrization(spec);
+  const DesignEvaluator evaluator(robot, {}, spec.objective);
+  // Points inside the annulus of the design, the box staying where the start design has it.
+  const auto countInside = [&](double lower) {
+    const WorkspaceGrid grid = makeWorkspaceGrid(robot.startModel(), spec.objective[0].region);
+    int count = 0;
+    for (size_t i = 0; i < grid.placements.size(); ++i) {
+      const double r = getFoot(grid, i).norm();
+      count += r > lower - 0.1 && r < lower + 0.1;
+    }
+    return count;
+  };
+  CHECK(evaluator.start().terms[0] == Approx(529.0 / countInside(0.2)));
+  const Evaluation longer = evaluator.evaluate(VectorXd::Constant(1, 0.23));
+  CHECK(longer.terms[0] == Approx(529.0 / countInside(0.23)));
+  CHECK(longer.value == Approx(static_cast<double>(countInside(0.2)) / countInside(0.23)));
+
+  const auto refuse = [&](const std::string& from, const std::string& to, const std::string& problem) {
+    const std::string path = directory.write("wrong.yaml", replaceOnce(text, from, to));
+    CHECK_THROWS_WITH(readDesignSpec(path), Contains(problem));
+  };
+  refuse("x: [-0.35, 0.35, 23]", "x: [0.35, -0.35, 23]", "crossed");
+  refuse("x: [-0.35, 0.35, 23]", "x: [0.35]", "no range");
+  refuse("x: [-0.35, 0.35, 23]", "x: most", "not a number");
+  refuse("region: {", "region: {max_conditioning: 0.5, ", "below 1");
+  refuse("workspace, region", "energy, region", "only a workspace");
+  refuse("region: {", "motors: [motor_front], region: {", "has no motors");
+  CHECK_THROWS_WITH(DesignEvaluator(robot, {}, {{Measure::Energy, {}, 1, {}}}), Contains("motions"));
+}
