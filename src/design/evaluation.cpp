@@ -133,6 +133,7 @@ double calcPostureGap(const Model& start, const Model& model, const VectorXd& po
     problem.frames.push_back(target);
   }
   AssemblyOptions options;
+  options.step = AssemblyStep::Shortest;
   options.tolerance = 1e-9;
   options.max_iterations = 30;
   options.continuation_steps = 4;

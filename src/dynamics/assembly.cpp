@@ -106,6 +106,19 @@ VectorXd calcStep(const MatrixXd& H, const VectorXd& h, const VectorXd& wish, do
   return step;
 }
 
+// The first term of Eq. (1) alone.
+VectorXd calcShortestStep(const MatrixXd& H, const VectorXd& h, double damping, double rank_tolerance) {
+  if (h.size() == 0) return VectorXd::Zero(H.cols());
+  if (damping > 0) {
+    MatrixXd gram = H * H.transpose();
+    gram.diagonal().array() += damping * damping;
+    return -H.transpose() * gram.llt().solve(h);
+  }
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factors;
+  factors.setThreshold(rank_tolerance);
+  return -factors.compute(H).solve(h);
+}
+
 // Newton iterations towards h(q) = offset; true when met.
 bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyOptions& options, const VectorXd& offset,
              HardConditions& conditions, AssemblyResult& result) {
@@ -117,8 +130,11 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
     const double damping = std::min(0.1, error);
     // A wish far from where the conditions allow (a leg asked to stretch) can make the iterates circle: it fades.
     const double wish_gain = std::pow(0.8, std::max(0, i - kFullWishIterations));
-    VectorXd step = calcStep(conditions.H, conditions.h - offset, wish, wish_gain, weights,
-                             error < 1e-3 ? 0.0 : 0.3 * damping, options.rank_tolerance);
+    const double shrink = error < 1e-3 ? 0.0 : 0.3 * damping;
+    VectorXd step =
+        options.step == AssemblyStep::Shortest
+            ? calcShortestStep(conditions.H, conditions.h - offset, shrink, options.rank_tolerance)
+            : calcStep(conditions.H, conditions.h - offset, wish, wish_gain, weights, shrink, options.rank_tolerance);
     const double largest = step.size() ? step.cwiseAbs().maxCoeff() : 0;
     if (!std::isfinite(largest)) return false;
     const bool met = conditions.rows() == 0 || (conditions.h - offset).cwiseAbs().maxCoeff() <= options.tolerance;

@@ -29,7 +29,13 @@ struct AssemblyProblem {
   std::vector<FrameTarget> frames;
 };
 
+enum class AssemblyStep {
+  Wishful,  ///< Eq. (1), by a singular value decomposition
+  Shortest  ///< z = 0: the least change from step to step, by a complete orthogonal decomposition, many times cheaper
+};
+
 struct AssemblyOptions {
+  AssemblyStep step = AssemblyStep::Wishful;
   double tolerance = 1e-12;  ///< on every closure and target, m and rad
   double step_limit = 0.2;   ///< largest change of a coordinate per step, m or rad
   int max_iterations = 200;  ///< per continuation step
