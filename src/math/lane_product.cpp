@@ -48,6 +48,7 @@ void addRows(Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A,
     }
   };
   addColumns(addBlock<L, kColumns>, kColumns);
+  addColumns(addBlock<L, 2>, 2);
   addColumns(addBlock<L, 1>, 1);
 }
 
@@ -57,6 +58,40 @@ void addLanes(Eigen::Index lanes, Eigen::Index cols, Eigen::Index depth, double 
               PaddedMatrix C) {
   for (; lanes >= L; lanes -= L, A.data += L * kLane, C.data += L * kLane) addRows<L>(cols, depth, sign, A, B, C);
   if constexpr (L > 1) addLanes<L - 1>(lanes, cols, depth, sign, A, B, C);
+}
+
+// A lower triangle of at most kColumns rows: what is below its diagonal, and the inverse of its diagonal.
+struct Triangle {
+  double entries[kColumns][kColumns], scales[kColumns];
+};
+
+// X T^{-T} for X of C columns, one `stride` after the other: a few of them stay in registers.
+template <int C>
+void solveColumns(const Triangle& T, Eigen::Index rows, PaddedMatrix X, Eigen::Index stride) {
+  for (Eigen::Index i = 0; i < rows; i += kLane) {
+    Lane x[C];
+#pragma GCC unroll 4
+    for (int j = 0; j < C; ++j) {
+      x[j] = *reinterpret_cast<const Lane*>(X.data + i + j * stride);
+#pragma GCC unroll 4
+      for (int m = 0; m < j; ++m) x[j] -= x[m] * T.entries[j][m];
+      x[j] *= T.scales[j];
+      *reinterpret_cast<Lane*>(X.data + i + j * stride) = x[j];
+    }
+  }
+}
+
+void solveColumns(const Triangle& T, int cols, Eigen::Index rows, PaddedMatrix X, Eigen::Index stride) {
+  switch (cols) {
+    case 1:
+      return solveColumns<1>(T, rows, X, stride);
+    case 2:
+      return solveColumns<2>(T, rows, X, stride);
+    case 3:
+      return solveColumns<3>(T, rows, X, stride);
+    default:
+      return solveColumns<kColumns>(T, rows, X, stride);
+  }
 }
 
 }  // namespace
@@ -73,27 +108,53 @@ void clearPadding(PaddedMap A) {
 }
 
 bool factorizeColumns(PaddedMap H, Eigen::Index num) {
-  for (Eigen::Index j = 0; j < num; ++j) {
-    const Eigen::Index i = j / kLane * kLane;
-    addProduct(H.rows() - i, 1, j, -1, pad(H, i), {H.data() + j, H.outerStride(), 1}, pad(H, i, j));
-    if (!(H(j, j) > 0)) return false;
-    H.col(j).tail(H.rows() - j) /= std::sqrt(H(j, j));
+  for (Eigen::Index k = 0; k < num; k += kColumns) {
+    const Eigen::Index i = k / kLane * kLane, cols = std::min<Eigen::Index>(kColumns, num - k);
+    addProduct(H.rows() - i, cols, k, -1, pad(H, i), {H.data() + k, H.outerStride(), 1}, pad(H, i, k));
+    Triangle L;
+    for (int j = 0; j < cols; ++j) {
+      double pivot = H(k + j, k + j);
+      for (int m = 0; m < j; ++m) {
+        double entry = H(k + j, k + m);
+        for (int n = 0; n < m; ++n) entry -= L.entries[j][n] * L.entries[m][n];
+        L.entries[j][m] = entry * L.scales[m];
+        pivot -= L.entries[j][m] * L.entries[j][m];
+      }
+      if (!(pivot > 0)) return false;
+      L.scales[j] = 1 / std::sqrt(pivot);
+    }
+    solveColumns(L, static_cast<int>(cols), roundUpToLane(H.rows() - i), pad(H, i, k), H.outerStride());
   }
   return true;
 }
 
 void solveTransposedFromRight(ConstMatrixRef L, PaddedMap X) {
-  for (Eigen::Index k = 0; k < X.cols(); ++k) {
-    addProduct(X.rows(), 1, k, -1, pad(X), {L.data() + k, L.outerStride(), 0}, pad(X, 0, k));
-    X.col(k) *= 1 / L(k, k);
+  for (Eigen::Index k = 0; k < X.cols(); k += kColumns) {
+    const Eigen::Index cols = std::min<Eigen::Index>(kColumns, X.cols() - k);
+    addProduct(X.rows(), cols, k, -1, pad(X), {L.data() + k, L.outerStride(), 1}, pad(X, 0, k));
+    Triangle block;
+    for (int j = 0; j < cols; ++j) {
+      for (int m = 0; m < j; ++m) block.entries[j][m] = L(k + j, k + m);
+      block.scales[j] = 1 / L(k + j, k + j);
+    }
+    solveColumns(block, static_cast<int>(cols), roundUpToLane(X.rows()), pad(X, 0, k), X.outerStride());
   }
 }
 
+// The same from the last column on.
 void solveFromRight(ConstMatrixRef L, PaddedMap X) {
-  for (Eigen::Index k = X.cols() - 1; k >= 0; --k) {
-    const Eigen::Index next = std::min(k + 1, X.cols() - 1);  // of the last one nothing is taken away
-    addProduct(X.rows(), 1, X.cols() - 1 - k, -1, pad(X, 0, next), {L.data() + next + k * L.outerStride(), 1, 0}, pad(X, 0, k));
-    X.col(k) *= 1 / L(k, k);
+  for (Eigen::Index end = X.cols(), cols; end > 0; end -= cols) {
+    cols = std::min<Eigen::Index>(kColumns, end);
+    const Eigen::Index k = end - cols, rest = X.cols() - end;
+    if (rest > 0)
+      addProduct(X.rows(), cols, rest, -1, pad(X, 0, end), {L.data() + end + k * L.outerStride(), 1, L.outerStride()},
+                 pad(X, 0, k));
+    Triangle block;
+    for (int j = 0; j < cols; ++j) {
+      for (int m = 0; m < j; ++m) block.entries[j][m] = L(end - 1 - m, end - 1 - j);
+      block.scales[j] = 1 / L(end - 1 - j, end - 1 - j);
+    }
+    solveColumns(block, static_cast<int>(cols), roundUpToLane(X.rows()), pad(X, 0, end - 1), -X.outerStride());
   }
 }
 

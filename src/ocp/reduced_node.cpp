@@ -253,9 +253,11 @@ void ReducedNode::differenceAbout(Block& b, const MatrixXd& WN, ConstVectorRef x
     calcJointDifference(joint, x0.segment(joint.idx_q, joint.nq), x1.segment(joint.idx_q, joint.nq),
                         b.work->d.segment(b.loop.model.joints()[j + 1].idx_v, joint.nv));
   }
-  dx.segment(b.loop.offset, b.loop.size).noalias() = WN.transpose() * b.work->d;
+  dx.segment(b.loop.offset, b.loop.size).setZero();
+  addSmallProductTransposed(WN, b.work->d, dx.segment(b.loop.offset, b.loop.size));
   for (size_t k = 0; k < b.loop.dofs.size(); ++k) b.work->d[k] = x1[nq + b.loop.dofs[k]] - x0[nq + b.loop.dofs[k]];
-  dx.segment(nr + b.loop.offset, b.loop.size).noalias() = WN.transpose() * b.work->d;
+  dx.segment(nr + b.loop.offset, b.loop.size).setZero();
+  addSmallProductTransposed(WN, b.work->d, dx.segment(nr + b.loop.offset, b.loop.size));
 }
 
 void ReducedNode::differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const {

@@ -147,10 +147,8 @@ void LqSweep::updateGains(int num_free, Node& node) {
   copyLowerToUpper(node.Vxx);
   Kt.leftCols(num_free) = -H.bottomLeftCorner(n, num_free);
   clearPadding(Kt);
-  for (Index j = num_free - 1; j >= 0; --j) {
-    addProduct(n, 1, num_free - 1 - j, -1, pad(Kt, 0, j + 1), {&H(j + 1, j), 1, 0}, pad(Kt, 0, j));
-    Kt.col(j) /= H(j, j);
-  }
+  PaddedMap free = shapePadded(Kt_, n, num_free);
+  solveFromRight(H.topLeftCorner(num_free, num_free), free);
 }
 
 double LqSweep::calcStep(const std::vector<StageModel>& models, std::vector<VectorXd>& dx,
