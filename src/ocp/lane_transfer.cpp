@@ -1,5 +1,7 @@
 // What goes into the lanes of reduced_lanes.h and comes out of them: from nodes that each have their numbers side by side to
 // numbers that each have their nodes side by side.
+#include <algorithm>
+
 #include "reduced_node.h"
 
 namespace bielle {
@@ -27,10 +29,43 @@ void ReducedLanes::unpack(const Lanes* in, Eigen::Index size, const Get& get) co
   unpackLanes(in, size, out);
 }
 
+void ReducedLanes::packPlacements() {
+  pack([](const ReducedNode& n) { return getNumbers(n.X_WB_.front()); }, 12 * model_.numBodies(),
+       getNumbers(ws_.X_WB.front()));
+  ws_.stage = WorkspaceStage::Placement;
+}
+
+// Bases of nodes that do not go on from another, and placements of all.
+LaneMask ReducedLanes::updatePoints() {
+  pack([](const ReducedNode& n) { return n.q_.data(); }, ws_.q.size(), ws_.q.data());
+  LaneMask placed = Lanes(0) <= Lanes(0);
+  const auto isNew = [](const ReducedNode* n) { return !n->before_; };
+  if (std::any_of(nodes_.begin(), nodes_.end(), isNew))
+    for (size_t i = 0; i < blocks_.size(); ++i) {
+      BlockLanes& b = blocks_[i];
+      for (size_t j = 0; j < b.loop.joints.size(); ++j) {
+        const Joint &own = b.loop.model.joints()[j + 1], &joint = model_.joints()[b.loop.joints[j]];
+        b.at.q.segment(own.idx_q, own.nq) = ws_.q.segment(joint.idx_q, joint.nq);
+      }
+      placed = placed && b.closing.update(b.loop, b.scratch, b.at.q);
+      std::array<BlockState*, kLane> states{};  // `next` is free until the step is done
+      for (size_t l = 0; l < nodes_.size(); ++l)
+        if (isNew(nodes_[l])) states[l] = &nodes_[l]->blocks_[i].next;
+      b.closing.store(states);
+      for (ReducedNode* n : nodes_)
+        if (isNew(n)) n->takePoint(n->blocks_[i], n->blocks_[i].next);
+    }
+  packPlacements();
+  placeWhole<Lanes>(model_, reduction_, ws_.q, ws_.X_WB);
+  unpack(ws_.X_WB.front().R.data(), 12 * model_.numBodies(),
+         [this](size_t l) { return nodes_[l]->X_WB_.front().R.data(); });
+  for (size_t l = 0; l < nodes_.size(); ++l)
+    if (!isNew(nodes_[l])) placed.v[l] = -1;
+  return placed;
+}
+
 void ReducedLanes::packNodes() {
   using Node = const ReducedNode&;
-  pack([](Node n) { return getNumbers(n.X_WB_.front()); }, 12 * model_.numBodies(), getNumbers(ws_.X_WB.front()));
-  ws_.stage = WorkspaceStage::Placement;
   pack([](Node n) { return n.v_.data(); }, v_.size(), v_.data());
   pack([](Node n) { return n.tau_.data(); }, tau_.size(), tau_.data());
   pack([](Node n) { return &n.spec_.dt; }, 1, &h_);

@@ -104,11 +104,12 @@ int ReducedLanes::findLane(const ReducedNode* node) const {
 void ReducedLanes::setNodes(NodeModel* const* nodes, int count) {
   nodes_.clear();
   for (int l = 0; l < count; ++l) nodes_.push_back(static_cast<ReducedNode*>(nodes[l]));
-  packNodes();
 }
 
 void ReducedLanes::linearize(NodeModel* const* nodes, int count) {
   setNodes(nodes, count);
+  packPlacements();
+  packNodes();
   packSteps();
   updateColumns(model_, ws_);
   updateVelocities(model_, ws_, v_);
@@ -127,8 +128,10 @@ void ReducedLanes::linearize(NodeModel* const* nodes, int count) {
   storeDerivatives();
 }
 
-LaneMask ReducedLanes::startSteps(NodeModel* const* nodes, int count) {
+LaneMask ReducedLanes::startSteps(NodeModel* const* nodes, int count, LaneMask& placed) {
   setNodes(nodes, count);
+  placed = updatePoints();
+  packNodes();
   for (size_t i = 0; i < blocks_.size(); ++i) packBlockStep(i);
   updateColumns(model_, ws_);
   updateVelocities(model_, ws_, v_);

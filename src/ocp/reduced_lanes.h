@@ -62,10 +62,11 @@ class ReducedLanes {
   ReducedLanes(const Model& model, const Reduction& reduction, const std::vector<int>& tips,
                const std::vector<int>& slots);
 
-  // Steps of at most kLane reduced nodes whose points and motor forces are there: Eq. (b), and where it could be solved; what
+  // Steps of at most kLane reduced nodes whose states and motor forces are there, and the bases of those that go on from
+  // another: `placed` where the others could be found; Eq. (b), and where it could be solved; what
   // it is for one of the others (f, and gamma at its contact rows) and its solution back; the rest, and where that went
   // through; and what the nodes keep of it, but for those that failed.
-  LaneMask startSteps(NodeModel* const* nodes, int count);
+  LaneMask startSteps(NodeModel* const* nodes, int count, LaneMask& placed);
   void loadSystem(int lane, MatrixXd& M, MatrixXd& JcN, VectorXd& f, VectorXd& gamma) const;
   void storeAccelerations(int lane, const VectorXd& ydd);
   LaneMask finishSteps();
@@ -87,7 +88,9 @@ class ReducedLanes {
   template <typename Get>
   void unpack(const Lanes* in, Eigen::Index size, const Get& get) const;
   void setNodes(NodeModel* const* nodes, int count);
+  void packPlacements();
   void packNodes();
+  LaneMask updatePoints();
   template <typename GetBasis>
   void packBasis(const GetBasis& getBasis, BlockBasisOf<Lanes>& to) const;
   void packBlockStep(size_t i);

@@ -21,6 +21,23 @@ BlockWork::BlockWork(const LoopBlock& l) : scratch(l), start(l), point(l), motio
   mixed_pivots.resize(r);
 }
 
+template <typename T>
+void placeWhole(const Model& model, const Reduction& reduction, typename ArgumentsOf<T>::ConstVector q,
+                std::vector<SE3Of<T>>& X_WB) {
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const ReducedUnit& unit = reduction.units[reduction.unit_of_body[i]];
+    const Joint& joint = model.joints()[i];
+    if (unit.block >= 0) {
+      X_WB[i] = X_WB[reduction.blocks[unit.block].root] * X_WB[i];
+    } else {
+      const SE3Of<T> X_JB = calcJointPlacement<T>(joint, q.segment(joint.idx_q, joint.nq));
+      X_WB[i] = X_WB[joint.parent] * joint.X_PJ * X_JB;
+    }
+  }
+}
+template void placeWhole(const Model&, const Reduction&, ConstVectorRef, std::vector<SE3>&);
+template void placeWhole(const Model&, const Reduction&, ArgumentsOf<Lanes>::ConstVector, std::vector<SE3Of<Lanes>>&);
+
 namespace {
 
 int find(const std::vector<int>& list, int value) {
@@ -138,6 +155,7 @@ void ReducedNode::takeWork() {
 void ReducedNode::integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) {
   takeWork();
   const int nq = model_.nq(), nr = reduction_.size;
+  const bool linearized = chart_x_ == x;  // here, and so the bases may still be there
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];
     const int at = reduction_.free_offsets[i], n = joint.nv;
@@ -149,12 +167,13 @@ void ReducedNode::integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out
     const LoopBlock& loop = b.loop;
     BlockWork& work = *b.work;
     gatherConfiguration(model_, loop, x.head(nq), work.q);
-    if (!work.start.update(loop, work.scratch, work.q)) {
+    const bool known = linearized && b.at.q == work.q;
+    if (!known && !work.start.update(loop, work.scratch, work.q)) {
       fail(b, work.start);
       x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
       return;
     }
-    const BlockBasis &from = work.start.basis(), &to = work.point.basis();
+    const BlockBasis &from = known ? b.at : work.start.basis(), &to = work.point.basis();
     work.d.noalias() = from.N * dx.segment(loop.offset, loop.size);
     if (!work.point.close(loop, work.scratch, from, work.d, {})) {
       fail(b, work.point);
@@ -195,23 +214,30 @@ bool ReducedNode::updateState(ConstVectorRef x) {
 }
 
 bool ReducedNode::updatePoint(ConstVectorRef x, const ReducedNode* previous) {
-  const int nq = model_.nq();
-  failure_.clear();
-  q_ = x.head(nq);
-  v_ = x.tail(model_.nv());
+  setState(x);
   for (size_t i = 0; i < blocks_.size(); ++i) {
     Block& b = blocks_[i];
     BlockState& point = b.work->point;
-    const BlockState* source = previous ? &previous->blocks_[i].next : &point;
     if (!previous) {
       gatherConfiguration(model_, b.loop, q_, b.work->q);
       if (!point.update(b.loop, b.work->scratch, b.work->q)) return fail(b, point);
     }
-    b.at = source->basis();
-    for (size_t j = 0; j < b.loop.joints.size(); ++j) X_WB_[b.loop.joints[j]] = source->placements()[j + 1];
+    takePoint(b, previous ? previous->blocks_[i].next : point);
   }
-  updateWholePlacements();
+  placeWhole(model_, reduction_, q_, X_WB_);
   return true;
+}
+
+void ReducedNode::setState(ConstVectorRef x) {
+  failure_.clear();
+  q_ = x.head(model_.nq());
+  v_ = x.tail(model_.nv());
+}
+
+// Placements of a block stay as seen from the body that carries it.
+void ReducedNode::takePoint(Block& b, const BlockState& point) {
+  b.at = point.basis();
+  for (size_t j = 0; j < b.loop.joints.size(); ++j) X_WB_[b.loop.joints[j]] = point.placements()[j + 1];
 }
 
 bool ReducedNode::updateState(ConstVectorRef x, const ReducedNode* previous) {
@@ -219,19 +245,6 @@ bool ReducedNode::updateState(ConstVectorRef x, const ReducedNode* previous) {
   restore();
   updateCompositeInertias(model_, work_->ws);
   return true;
-}
-
-// World placements, where those of blocks are still seen from the body that carries the block.
-void ReducedNode::updateWholePlacements() {
-  for (int i = 1; i < model_.numBodies(); ++i) {
-    const ReducedUnit& unit = reduction_.units[reduction_.unit_of_body[i]];
-    const Joint& joint = model_.joints()[i];
-    if (unit.block >= 0) {
-      X_WB_[i] = X_WB_[reduction_.blocks[unit.block].root] * X_WB_[i];
-    } else {
-      X_WB_[i] = X_WB_[joint.parent] * (joint.X_PJ * calcJointPlacement(joint, q_.segment(joint.idx_q, joint.nq)));
-    }
-  }
 }
 
 void ReducedNode::restore() {

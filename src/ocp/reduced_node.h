@@ -50,6 +50,11 @@ struct BlockWork {
   std::vector<int> mixed_pivots;
 };
 
+// World placements of all bodies, where those of blocks are seen from the body that carries the block.
+template <typename T>
+void placeWhole(const Model& model, const Reduction& reduction, typename ArgumentsOf<T>::ConstVector q,
+                std::vector<SE3Of<T>>& X_WB);
+
 // Sizes of the memory that the nodes of a problem share.
 struct ReducedSizes {
   explicit ReducedSizes(const std::vector<StageSpec>& specs);
@@ -158,7 +163,8 @@ class ReducedNode : public NodeModel {
   bool updatePoint(ConstVectorRef x, const ReducedNode* previous);
   // And kinematics in the workspace.
   bool updateState(ConstVectorRef x, const ReducedNode* previous);
-  void updateWholePlacements();
+  void setState(ConstVectorRef x);
+  void takePoint(Block& b, const BlockState& point);
 
   // out += (A X)^T with A for the whole model (k x nv) and X = N (free dofs: the identity) or Z (free dofs: zero).
   enum class Lift { N, Z };

@@ -45,17 +45,21 @@ bool ReducedNode::startStep(ConstVectorRef x, ConstVectorRef u, const NodeModel*
   takeWork();
   before_ = previous && previous->x_next() == x ? static_cast<const ReducedNode*>(previous) : nullptr;
   calcMotorForces(model_, u, tau_);
-  return updatePoint(x, before_);
+  setState(x);
+  if (before_)
+    for (size_t i = 0; i < blocks_.size(); ++i) takePoint(blocks_[i], before_->blocks_[i].next);
+  return true;
 }
 
 // Steps that fail together with others are tried once more alone, which says why.
 void ReducedNode::finishSteps(NodeModel* const* nodes, int count, bool* ok) {
   takeWork();
   ReducedLanes& lanes = work_->lanes;
-  const LaneMask solved = lanes.startSteps(nodes, count);
+  LaneMask placed;
+  const LaneMask solved = lanes.startSteps(nodes, count, placed);
   for (int l = 0; l < count; ++l) {
-    ok[l] = true;
-    if (solved[l]) continue;
+    ok[l] = placed[l];
+    if (solved[l] || !ok[l]) continue;
     ReducedNode& node = *static_cast<ReducedNode*>(nodes[l]);
     node.takeWork();
     ContactWork& contacts = work_->contacts.at(node.contact_rows_);
