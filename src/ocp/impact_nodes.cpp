@@ -81,7 +81,7 @@ bool ReducedImpactNode::linearizeStep(ConstVectorRef x_next_node, StageModel& ou
   for (Block& b : blocks_)
     if (!linearizeBlock(b, x_next_node, out)) return false;
   differenceFree(x_next_node, x_next_, out.gap);
-  for (const FreeJoint& free : free_joints_) linearizeFreeJoint(free, out);
+  for (const FreeJoint& free : work_->free_joints) linearizeFreeJoint(free, out);
   return true;
 }
 

@@ -26,7 +26,7 @@ void ReducedNode::addStateCost(const StateCost& state, const VectorXd& differenc
   const double w = scale * state.weight;
   JointVector gradient;
   JointMatrix hessian;
-  for (const FreeJoint& free : free_joints_) {
+  for (const FreeJoint& free : work_->free_joints) {
     const Joint& joint = model_.joints()[free.joint];
     const int o = free.offset, n = joint.nv, k = joint.idx_v;
     calcJointCost(state, difference, w, joint, gradient, hessian);

@@ -116,7 +116,7 @@ bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
   for (size_t i = 0; i < blocks_.size(); ++i)
     if (!linearizeBlock(blocks_[i], view.blocks[i], x_next_node, out)) return false;
   differenceFree(x_next_node, x_next_, out.gap);
-  for (FreeJoint& free : free_joints_) linearizeFreeJoint(free, out);
+  for (FreeJoint& free : work_->free_joints) linearizeFreeJoint(free, out);
   assembleStep(view.dydd, out);
   storeChart();
   return true;
@@ -228,7 +228,7 @@ void ReducedNode::assembleColumns(ConstMatrixRef dydd, MatrixXd& F) const {
     F.col(c).head(nr) = (h * h) * dydd.col(c);
     F.col(c).tail(nr) = h * dydd.col(c);
   }
-  for (const FreeJoint& free : free_joints_) {
+  for (const FreeJoint& free : work_->free_joints) {
     if (!isCurved(model_.joints()[free.joint])) continue;
     const int o = free.offset, n = static_cast<int>(free.q_a.rows());
     F.middleRows(o, n).setZero();
@@ -241,7 +241,7 @@ void ReducedNode::assembleStep(const MatrixXd& dydd, StageModel& out) const {
   const int nr = reduction_.size;
   assembleColumns(dydd.leftCols(2 * nr), out.Fx);
   assembleColumns(dydd.rightCols(model_.nu()), out.Fu);
-  for (const FreeJoint& free : free_joints_) {
+  for (const FreeJoint& free : work_->free_joints) {
     const int n = static_cast<int>(free.q_v.rows()), o = free.offset;
     out.Fx.block(o, o, n, n) += free.q_y;
     out.Fx.block(o, nr + o, n, n) += free.q_v;

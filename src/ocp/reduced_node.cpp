@@ -88,6 +88,11 @@ ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const R
     blocks.emplace_back(block);
     lifts.push_back({&blocks.back().motion, &blocks.back().HN});
   }
+  for (size_t i = 0; i < reduction.free_joints.size(); ++i) {
+    free_joints.emplace_back();
+    free_joints.back().joint = reduction.free_joints[i];
+    free_joints.back().offset = reduction.free_offsets[i];
+  }
   for (int rows : sizes.contact_rows) {
     ContactWork& work = contacts[rows];
     work.saddle_point.resize(nr, rows);
@@ -128,11 +133,6 @@ ReducedNode::ReducedNode(const Model& model, const Reduction& reduction, const S
                          std::shared_ptr<ReducedWorkPool> pool)
     : NodeModel(model, spec), reduction_(reduction), pool_(std::move(pool)) {
   for (const LoopBlock& block : reduction.blocks) blocks_.emplace_back(block);
-  for (size_t i = 0; i < reduction.free_joints.size(); ++i) {
-    free_joints_.emplace_back();
-    free_joints_.back().joint = reduction.free_joints[i];
-    free_joints_.back().offset = reduction.free_offsets[i];
-  }
   const int nv = model.nv(), nr = reduction.size;
   const ConstraintSet& set = spec.constraints;
   num_loops_ = set.num_loops;

@@ -55,6 +55,12 @@ template <typename T>
 void placeWhole(const Model& model, const Reduction& reduction, typename ArgumentsOf<T>::ConstVector q,
                 std::vector<SE3Of<T>>& X_WB);
 
+// A joint outside all loops: what dq+ makes of dy, of dv+ and of dy'; dv+ is h dy'.
+struct FreeJoint {
+  int joint = 0, offset = 0;
+  JointMatrix q_y, q_v, q_a;  // nv x nv of the joint
+};
+
 // Sizes of the memory that the nodes of a problem share.
 struct ReducedSizes {
   explicit ReducedSizes(const std::vector<StageSpec>& specs);
@@ -79,6 +85,7 @@ struct ReducedWork {
   Workspace ws;
   std::vector<BlockWork> blocks;
   std::vector<BlockLift> lifts;
+  std::vector<FreeJoint> free_joints;
   ReducedTree tree;
   ReducedLanes lanes;
   std::map<int, ContactWork> contacts;  // by rows
@@ -124,12 +131,6 @@ struct ReducedBlock {
   VectorXd v_next;
   VectorXd surplus;           // rank, zeta of the closing less its second-order prediction
   BlockWork* work = nullptr;  // within a call
-};
-
-// A joint outside all loops at one node: what dq+ makes of dy, of dv+ and of dy'; dv+ is h dy'.
-struct FreeJoint {
-  int joint = 0, offset = 0;
-  JointMatrix q_y, q_v, q_a;  // nv x nv of the joint
 };
 
 class ReducedNode : public NodeModel {
@@ -212,7 +213,6 @@ class ReducedNode : public NodeModel {
   ReducedWork* work_ = nullptr;
   const Workspace* shown_ = nullptr;
   std::vector<ReducedBlock> blocks_;
-  std::vector<FreeJoint> free_joints_;
   std::vector<int> contact_slots_;  // per contact
   int num_loops_ = 0, loop_rows_ = 0, contact_rows_ = 0;
   std::vector<SE3> X_WB_;

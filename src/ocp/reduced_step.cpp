@@ -112,7 +112,7 @@ void ReducedNode::updateDriftAccelerations() {
 
 void ReducedNode::addColumns(ConstMatrixRef A, Lift lift, MatrixRef out) const {
   if (lift == Lift::N)
-    for (const FreeJoint& free : free_joints_) {
+    for (const FreeJoint& free : work_->free_joints) {
       const Joint& joint = model_.joints()[free.joint];
       for (int k = 0; k < joint.nv; ++k) out.row(free.offset + k) += A.col(joint.idx_v + k).transpose();
     }
