@@ -256,6 +256,35 @@ void calcJointDifference(const Joint& joint, ConstVectorRef q0, ConstVectorRef q
   }
 }
 
+void calcJointDifference(const Joint& joint, ArgumentsOf<Lanes>::ConstVector q0, ArgumentsOf<Lanes>::ConstVector q1,
+                         ArgumentsOf<Lanes>::Vector dv) {
+  using QuaternionMap = Eigen::Map<const Eigen::Quaternion<Lanes>>;
+  switch (joint.kind) {
+    case JointKind::Spherical: {
+      const Matrix3<Lanes> R0 = QuaternionMap(q0.data()).toRotationMatrix();
+      dv = log3<Lanes>(R0.transpose() * QuaternionMap(q1.data()).toRotationMatrix());
+      break;
+    }
+    case JointKind::FreeFlyer: {
+      const SE3Of<Lanes> X0(QuaternionMap(q0.data() + 3).toRotationMatrix(), q0.head<3>());
+      dv = log6(X0.inverseTimes({QuaternionMap(q1.data() + 3).toRotationMatrix(), q1.head<3>()}));
+      break;
+    }
+    case JointKind::Planar: {
+      Vector3d from, to, one;
+      for (Eigen::Index l = 0; l < kLane; ++l) {
+        unpackLane(q0.data(), l, 3, from.data());
+        unpackLane(q1.data(), l, 3, to.data());
+        calcJointDifference(joint, from, to, one);
+        for (int k = 0; k < 3; ++k) dv[k].set(l, one[k]);
+      }
+      break;
+    }
+    default:
+      dv = q1 - q0;
+  }
+}
+
 void calcJointIntegrateJacobians(const Joint& joint, ConstVectorRef dv, MatrixRef J_q, MatrixRef J_dv) {
   switch (joint.kind) {
     case JointKind::Spherical:

@@ -35,6 +35,16 @@ class NodeModel {
   virtual void integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) = 0;
   virtual void difference(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) = 0;
 
+  // Of several nodes of this kind, by one thread.
+  struct Difference {
+    NodeModel* node;
+    const VectorXd *x0, *x1;
+    VectorXd* dx;
+  };
+  virtual void calcDifferences(const Difference* items, int count) {
+    for (int i = 0; i < count; ++i) items[i].node->difference(*items[i].x0, *items[i].x1, *items[i].dx);
+  }
+
   // Kinematics at x alone (terminal node).
   virtual bool updateState(ConstVectorRef x) = 0;
   // Dynamics at (x, u) and the next state, in x_next(). `previous`, if any, is a node of the same kind that may have x as

@@ -92,6 +92,8 @@ ReducedLanes::ReducedLanes(const Model& model, const Reduction& reduction, const
   nodes_.reserve(kLane);
   f_ext_.assign(model.numBodies(), Vector6<Lanes>::Zero());
   for (VectorX<Lanes>* x : {&v_, &a_, &tau_}) x->setZero(model.nv());
+  for (VectorX<Lanes>* x : {&x0_, &x1_}) x->setZero(model.nq() + model.nv());
+  dx_.setZero(2 * reduction.size);
   for (MatrixX<Lanes>* x : {&A_y_, &A_v_}) x->setZero(reduction.size, reduction.size);
   for (size_t l = 0; l < kLane; ++l) views_.emplace_back(model, blocks_, contacts_, reduction.size);
 }
@@ -162,6 +164,45 @@ LaneMask ReducedLanes::startSteps(NodeModel* const* nodes, int count, LaneMask& 
     if (nodes_[l]->hasHinges()) solved.v[l] = 0;
   storeFactors(solved);
   return solved;
+}
+
+void ReducedLanes::calcDifferences(const NodeModel::Difference* items, int count) {
+  const int nq = model_.nq(), nr = reduction_.size;
+  const auto packItems = [&](const auto& get, Eigen::Index size, Lanes* out) {
+    std::array<const double*, kLane> in;
+    for (int l = 0; l < kLane; ++l) in[l] = get(items[l < count ? l : 0]);
+    packLanes(in, size, out);
+  };
+  packItems([](const auto& item) { return item.x0->data(); }, x0_.size(), x0_.data());
+  packItems([](const auto& item) { return item.x1->data(); }, x1_.size(), x1_.data());
+  const auto subtract = [&](const Joint& joint, auto&& d) {
+    calcJointDifference(joint, x0_.segment(joint.idx_q, joint.nq), x1_.segment(joint.idx_q, joint.nq), d);
+  };
+  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+    const int o = reduction_.free_offsets[i];
+    subtract(joint, dx_.segment(o, joint.nv));
+    dx_.segment(nr + o, joint.nv) = x1_.segment(nq + joint.idx_v, joint.nv) - x0_.segment(nq + joint.idx_v, joint.nv);
+  }
+  for (size_t i = 0; i < blocks_.size(); ++i) {
+    BlockLanes& b = blocks_[i];
+    MatrixX<Lanes>& chart = b.P;
+    packItems([i](const auto& item) { return static_cast<const ReducedNode*>(item.node)->blocks_[i].chart.data(); },
+              chart.size(), chart.data());
+    for (size_t j = 0; j < b.loop.joints.size(); ++j) {
+      const Joint &own = b.loop.model.joints()[j + 1], &joint = model_.joints()[b.loop.joints[j]];
+      subtract(joint, b.left.segment(own.idx_v, own.nv));
+    }
+    auto dy = dx_.segment(b.loop.offset, b.loop.size), dy_v = dx_.segment(nr + b.loop.offset, b.loop.size);
+    dy.setZero();
+    addSmallProductTransposed(chart, b.left, dy);
+    for (size_t k = 0; k < b.loop.dofs.size(); ++k) b.left[k] = x1_[nq + b.loop.dofs[k]] - x0_[nq + b.loop.dofs[k]];
+    dy_v.setZero();
+    addSmallProductTransposed(chart, b.left, dy_v);
+  }
+  std::array<double*, kLane> out{};
+  for (int l = 0; l < count; ++l) out[l] = items[l].dx->data();
+  unpackLanes(dx_.data(), dx_.size(), out);
 }
 
 // J_c N and gamma_c + J_c a_d; the accelerations of the workspace are those of a_d.

@@ -4,10 +4,10 @@
 // its costs.
 #include "bielle/dynamics/reduced_tree.h"
 #include "contact_system.h"
+#include "node_model.h"
 
 namespace bielle {
 
-class NodeModel;
 class ReducedNode;
 
 // One block of loops at the nodes of all lanes.
@@ -72,6 +72,9 @@ class ReducedLanes {
   LaneMask finishSteps();
   void storeSteps(const bool* ok);
 
+  // ReducedNode::calcDifferences() for at most kLane nodes whose charts are those at x0.
+  void calcDifferences(const NodeModel::Difference* items, int count);
+
   // Derivatives about the last step of each of at most kLane reduced nodes.
   void linearize(NodeModel* const* nodes, int count);
 
@@ -121,6 +124,7 @@ class ReducedLanes {
   ReducedTreeOf<Lanes> tree_;
   std::vector<Vector6<Lanes>> f_ext_;  // nb
   VectorX<Lanes> v_, a_, tau_;         // nv
+  VectorX<Lanes> x0_, x1_, dx_;        // nq + nv, nq + nv, 2 size
   Lanes h_;
   MatrixX<Lanes> A_y_, A_v_;  // size x size, reduced_tree.h Eqs. (2) and (3)
   ContactSystem system_;      // six rows for each slot

@@ -208,6 +208,21 @@ void ReducedNode::difference(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx)
   differenceFree(x0, x1, dx);
 }
 
+// In lanes, where the bases of the last linearization serve.
+void ReducedNode::calcDifferences(const Difference* items, int count) {
+  takeWork();
+  std::array<Difference, kLane> together;
+  int num = 0;
+  for (int i = 0; i < count; ++i) {
+    ReducedNode& node = *static_cast<ReducedNode*>(items[i].node);
+    if (node.chart_x_ == *items[i].x0)
+      together[num++] = items[i];
+    else
+      node.difference(*items[i].x0, *items[i].x1, *items[i].dx);
+  }
+  if (num > 0) work_->lanes.calcDifferences(together.data(), num);
+}
+
 bool ReducedNode::updateState(ConstVectorRef x) {
   takeWork();
   return updateState(x, nullptr);

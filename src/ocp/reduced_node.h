@@ -145,6 +145,7 @@ class ReducedNode : public NodeModel {
   int tangentSize() const override { return 2 * reduction_.size; }
   void integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) override;
   void difference(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) override;
+  void calcDifferences(const Difference* items, int count) override;
   bool updateState(ConstVectorRef x) override;
   bool updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override;
   void restore() override;

@@ -144,7 +144,19 @@ void RobotProblem::stepStages(std::vector<StepTask>& tasks) {
     const int count = static_cast<int>(std::min<size_t>(tasks.size() - first, kLane));
     evaluateTogether(&tasks[first], count,
                      [this](StepTask& task) { task.status = finishStep(task.stage, *task.x_next, task.cost); });
+    calcDeviations(&tasks[first], count);
   }
+}
+
+void RobotProblem::calcDeviations(const StepTask* tasks, int num_tasks) {
+  std::array<NodeModel::Difference, kLane> wanted;
+  int count = 0;
+  for (int i = 0; i < num_tasks; ++i) {
+    const StepTask& task = tasks[i];
+    if (task.deviation && task.status == StepStatus::Ok)
+      wanted[count++] = {nodes_[task.stage + 1].dynamics.get(), task.origin, task.x_next, task.deviation};
+  }
+  if (count > 0) wanted.front().node->calcDifferences(wanted.data(), count);
 }
 
 // evaluate() of at most kLane stages at once, and `finish` of those that went through, while their workspaces show them. What

@@ -16,9 +16,12 @@ void StageModel::resize(int ndx, int nu, int ndx_next) {
 }
 
 void ShootingProblem::stepStages(std::vector<StepTask>& tasks) {
-  for (StepTask& task : tasks)
+  for (StepTask& task : tasks) {
     task.status = task.continues ? continueStep(task.stage, *task.x, *task.u, *task.x_next, task.cost)
                                  : step(task.stage, *task.x, *task.u, *task.x_next, task.cost);
+    if (task.deviation && task.status == StepStatus::Ok)
+      difference(task.stage + 1, *task.origin, *task.x_next, *task.deviation);
+  }
 }
 
 void ShootingProblem::linearizeStages(int begin, int end, const std::vector<VectorXd>& xs,

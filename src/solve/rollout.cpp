@@ -100,7 +100,13 @@ void Rollout::prepareTask(const RolloutInput& input, double alpha, int k, Segmen
   task.continues = k > segment.begin && !contracts(input, alpha);
   task.x = &trial_.xs[k];
   task.u = &u;
-  task.x_next = isJoint(segment, k + 1) ? &segment.end_state : &trial_.xs[k + 1];
+  if (isJoint(segment, k + 1)) {
+    task.x_next = &segment.end_state;
+  } else {
+    task.x_next = &trial_.xs[k + 1];
+    task.origin = &input.nodes.xs[k + 1];
+    task.deviation = &deviations_[k + 1];
+  }
 }
 
 // Eq. (3) behind a step; at the end of the horizon its cost.
@@ -111,7 +117,6 @@ bool Rollout::finishTask(const RolloutInput& input, double alpha, const StepTask
   segment.cost += task.cost;
   if (!std::isfinite(segment.cost) || !task.x_next->allFinite()) return false;
   if (isJoint(segment, next)) return true;
-  problem.difference(next, input.nodes.xs[next], *task.x_next, deviations_[next]);
   if (contracts(input, alpha)) {
     deviations_[next] += (alpha - 1) * input.models[task.stage].gap;
     problem.integrate(next, input.nodes.xs[next], deviations_[next], *task.x_next);

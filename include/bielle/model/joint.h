@@ -46,6 +46,8 @@ void integrateJoint(const Joint& joint, typename ArgumentsOf<T>::ConstVector q, 
                     typename ArgumentsOf<T>::Vector q_out);
 /// dv with q0 (+) dv = q1.
 void calcJointDifference(const Joint& joint, ConstVectorRef q0, ConstVectorRef q1, VectorRef dv);
+void calcJointDifference(const Joint& joint, ArgumentsOf<Lanes>::ConstVector q0, ArgumentsOf<Lanes>::ConstVector q1,
+                         ArgumentsOf<Lanes>::Vector dv);
 /// Jacobians of (q, dv) -> q (+) dv in tangent coordinates: of the result with respect to q and to dv (nv x nv each).
 void calcJointIntegrateJacobians(const Joint& joint, ConstVectorRef dv, MatrixRef J_q, MatrixRef J_dv);
 /// Jacobian of dv = q1 (-) q0 with respect to q1, as a function of dv (nv x nv): the inverse of J_dv above.

@@ -102,6 +102,7 @@ class RobotProblem : public ShootingProblem {
   StepStatus evaluate(int stage, ConstVectorRef x, ConstVectorRef u, const NodeModel* previous = nullptr);
   template <typename Finish>
   void evaluateTogether(StepTask* tasks, int num_tasks, const Finish& finish);
+  void calcDeviations(const StepTask* tasks, int num_tasks);
   void evaluateStages(int begin, int end, const std::vector<VectorXd>& xs, const std::vector<VectorXd>& us);
   StepStatus finishStep(int stage, VectorRef x_next, double& cost);
   StepStatus finishLinearization(int stage, ConstVectorRef u, ConstVectorRef x_next_node, StageModel& out);

@@ -38,6 +38,8 @@ struct StepTask {
   bool continues = false;  ///< as continueStep()
   const VectorXd *x = nullptr, *u = nullptr;
   VectorXd* x_next = nullptr;
+  const VectorXd* origin = nullptr;    ///< where `deviation` is wanted: the state it is about
+  VectorXd* deviation = nullptr;       ///< out: x_next as difference() from it, at the next node
   double cost = 0;                     ///< out
   StepStatus status = StepStatus::Ok;  ///< out
 };
