@@ -26,6 +26,7 @@ struct Walk {
       for (double& u : motion.guess.us[k]) u += normal(rng);
     }
     next.assign(motion.guess.xs.size(), motion.guess.xs.front());
+    deviations.assign(next.size(), VectorXd::Zero(motion.problem->tangentSize(0)));
   }
   static BenchmarkWalkOptions makeOptions() {
     BenchmarkWalkOptions options;
@@ -35,7 +36,7 @@ struct Walk {
     options.total_nodes = 16;
     return options;
   }
-  // Steps of some stages together; what came out is in `next` and the tasks.
+  // Steps of some stages together; what came out is in `next`, `deviations` and the tasks.
   std::vector<StepTask> step(const std::vector<int>& stages) {
     std::vector<StepTask> tasks;
     for (int k : stages) {
@@ -44,13 +45,15 @@ struct Walk {
       task.x = &motion.guess.xs[k];
       task.u = &motion.guess.us[k];
       task.x_next = &next[k + 1];
+      task.origin = &motion.guess.xs[k + 1];
+      task.deviation = &deviations[k + 1];
       tasks.push_back(task);
     }
     motion.problem->stepStages(tasks);
     return tasks;
   }
   Motion motion;
-  std::vector<VectorXd> next;
+  std::vector<VectorXd> next, deviations;
 };
 
 bool isSame(const StageModel& a, const StageModel& b) {
@@ -171,9 +174,9 @@ TEST_CASE("nodes with all sorts of contacts go together") {
         stage.constraints = makeConstraintSet(model, makeContactTargets(model, q, contacts, 20, 5));
         ConstraintSet& set = stage.constraints;
         if (!contacts.empty()) {
-        set.closures[set.num_loops].kind = kind;
-        set.closures[set.num_loops].axis = Vector3d::UnitX();  // of the hinge
-      }
+          set.closures[set.num_loops].kind = kind;
+          set.closures[set.num_loops].axis = Vector3d::UnitX();  // of the hinge
+        }
         set.rows = 0;
         for (size_t c = 0; c < set.closures.size(); ++c) {
           set.offsets[c] = set.rows;
@@ -221,6 +224,31 @@ TEST_CASE("steps taken together are those taken alone, whichever come together")
     CHECK(alone.step({k}).front().status == StepStatus::Ok);
     CHECK((alone.next[k + 1] - walk.next[k + 1]).norm() < 1e-11 * walk.next[k + 1].norm());
   }
+}
+
+TEST_CASE("deviations of steps taken together are differences, with and without the bases of a linearization") {
+  const LoadedRobot robot = loadRobot("bipetto");
+  Walk walk(robot.model);
+  RobotProblem& problem = *walk.motion.problem;
+  const auto& [xs, us] = walk.motion.guess;
+  const int N = problem.numStages();
+  const std::vector<int> some = {0, 3, 7, 8, 11, N - 1};
+  const auto check = [&] {
+    for (VectorXd& u : walk.motion.guess.us) u.array() += 0.1;
+    walk.step(some);
+    for (int k : some) {
+      VectorXd expected(problem.tangentSize(k + 1));
+      problem.difference(k + 1, xs[k + 1], walk.next[k + 1], expected);
+      CHECK(expected.norm() > 1e-3);
+      CHECK((walk.deviations[k + 1] - expected).norm() < 1e-11 * expected.norm());
+    }
+  };
+  check();
+  std::vector<StageModel> models(N + 1);
+  std::vector<StepStatus> statuses(N + 1);
+  problem.linearizeStages(0, N, xs, us, models, statuses);
+  problem.linearizeTerminal(xs[N], models[N]);
+  check();
 }
 
 TEST_CASE("a step that fails does so alone, and says why") {

@@ -110,33 +110,38 @@ void SaddlePoint::updateInverse() {
   Ginv.noalias() -= T2_ * T1_;
 }
 
-void SaddlePoint::solveDerivatives(const SaddlePointFactors& factors, MatrixRef X, MatrixRef dlambda) {
+void SaddlePoint::solveDerivatives(MatrixRef X, MatrixRef dlambda) {
+  const Eigen::Index columns = X.cols(), m = J_.rows(), padded = roundUpToLane(columns);
+  if (dlambda_t_.size() < padded * m) dlambda_t_.setZero(padded * m);
+  PaddedMap dlambda_t = shapePadded(dlambda_t_, columns, m);
+  copyTransposed(dlambda, dlambda_t);
+  solveDerivatives(factors_, X, dlambda_t);
+  copyTransposed(dlambda_t, dlambda);
+}
+
+void SaddlePoint::solveDerivatives(const SaddlePointFactors& factors, MatrixRef X, PaddedMap dlambda_t) {
   // In the coordinates of L: W = D J L^{-T} and L^{-1} dID give J M^{-1} dID = D^{-1} W L^{-1} dID. All is done on
   // transposes, whose columns are long.
   const Eigen::Index columns = X.cols(), n = X.rows(), m = factors.D.size(), padded = roundUpToLane(columns);
   if (X_.size() < padded * n || rhs_t_.size() < padded * m) {
     X_.setZero(padded * n);
-    for (VectorXd* x : {&rhs_t_, &dlambda_t_}) x->setZero(padded * m);
+    rhs_t_.setZero(padded * m);
   }
-  PaddedMap Xt = shapePadded(X_, columns, n), rhs = shapePadded(rhs_t_, columns, m),
-            dlambda_t = shapePadded(dlambda_t_, columns, m);
+  PaddedMap Xt = shapePadded(X_, columns, n), rhs = shapePadded(rhs_t_, columns, m);
   const MatrixXd &L = factors.L, &Wt = factors.Wt;
   copyTransposed(X, Xt);
   clearPadding(Xt);
   solveTransposedFromRight(L, Xt);
-  for (Eigen::Index i = 0; i < m; ++i) rhs.col(i) = -factors.D[i] * dlambda.row(i).transpose();
+  for (Eigen::Index i = 0; i < m; ++i) rhs.col(i) = -factors.D[i] * dlambda_t.col(i);
   clearPadding(rhs);
   addProduct(columns, m, n, 1, pad(Xt), {Wt.data(), 1, n}, pad(rhs));
-  dlambda_t.setZero();
-  clearPadding(dlambda_t);
   // Symmetric but for rounding, which redundant rows magnify.
-  addProduct(columns, m, m, 1, pad(rhs), {factors.Ginv.data(), m, 1}, pad(dlambda_t));
+  setProduct(columns, m, m, pad(rhs), {factors.Ginv.data(), m, 1}, pad(dlambda_t));
   Xt *= -1;
   addProduct(columns, n, m, 1, pad(dlambda_t), {Wt.data(), n, 1}, pad(Xt));
   solveFromRight(L, Xt);
   copyTransposed(Xt, X);
   for (Eigen::Index i = 0; i < m; ++i) dlambda_t.col(i) *= factors.D[i];
-  copyTransposed(dlambda_t, dlambda);
 }
 
 }  // namespace bielle

@@ -17,7 +17,9 @@ constexpr int kMaxLanes = 1;
 #endif
 constexpr int kColumns = 4;
 
-template <int L, int C>
+enum class Into { Sum, Nothing };  // what a product meets where it goes
+
+template <Into into, int L, int C>
 void addBlock(Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B, PaddedMatrix out) {
   Lane sums[C][L] = {};
   const double *a = A.data, *b = B.data;
@@ -35,11 +37,14 @@ void addBlock(Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B, 
 #pragma GCC unroll 8
   for (int j = 0; j < C; ++j) {
 #pragma GCC unroll 8
-    for (int i = 0; i < L; ++i) *reinterpret_cast<Lane*>(out.data + j * out.stride + i * kLane) += sign * sums[j][i];
+    for (int i = 0; i < L; ++i) {
+      Lane& entry = *reinterpret_cast<Lane*>(out.data + j * out.stride + i * kLane);
+      entry = into == Into::Sum ? entry + sign * sums[j][i] : sign * sums[j][i];
+    }
   }
 }
 
-template <int L>
+template <Into into, int L>
 void addRows(Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B, PaddedMatrix C) {
   Eigen::Index j = 0;
   const auto addColumns = [&](auto block, Eigen::Index width) {
@@ -47,17 +52,17 @@ void addRows(Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A,
       block(depth, sign, A, {B.data + j * B.col_stride, B.row_stride, B.col_stride}, {C.data + j * C.stride, C.stride});
     }
   };
-  addColumns(addBlock<L, kColumns>, kColumns);
-  addColumns(addBlock<L, 2>, 2);
-  addColumns(addBlock<L, 1>, 1);
+  addColumns(addBlock<into, L, kColumns>, kColumns);
+  addColumns(addBlock<into, L, 2>, 2);
+  addColumns(addBlock<into, L, 1>, 1);
 }
 
 // As many lanes at a time as there are, up to L.
-template <int L>
+template <Into into, int L>
 void addLanes(Eigen::Index lanes, Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B,
               PaddedMatrix C) {
-  for (; lanes >= L; lanes -= L, A.data += L * kLane, C.data += L * kLane) addRows<L>(cols, depth, sign, A, B, C);
-  if constexpr (L > 1) addLanes<L - 1>(lanes, cols, depth, sign, A, B, C);
+  for (; lanes >= L; lanes -= L, A.data += L * kLane, C.data += L * kLane) addRows<into, L>(cols, depth, sign, A, B, C);
+  if constexpr (L > 1) addLanes<into, L - 1>(lanes, cols, depth, sign, A, B, C);
 }
 
 // A lower triangle of at most kColumns rows: what is below its diagonal, and the inverse of its diagonal.
@@ -98,7 +103,12 @@ void solveColumns(const Triangle& T, int cols, Eigen::Index rows, PaddedMatrix X
 
 void addProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B,
                 PaddedMatrix C) {
-  addLanes<kMaxLanes>(roundUpToLane(rows) / kLane, cols, depth, sign, A, B, C);
+  addLanes<Into::Sum, kMaxLanes>(roundUpToLane(rows) / kLane, cols, depth, sign, A, B, C);
+}
+
+void setProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, PaddedMatrix A, StridedMatrix B,
+                PaddedMatrix C) {
+  addLanes<Into::Nothing, kMaxLanes>(roundUpToLane(rows) / kLane, cols, depth, 1, A, B, C);
 }
 
 void clearPadding(PaddedMap A) {

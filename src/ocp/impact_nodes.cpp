@@ -89,14 +89,11 @@ bool ReducedImpactNode::linearizeStep(ConstVectorRef x_next_node, StageModel& ou
 void ReducedImpactNode::updateForceDerivatives() {
   const int nr = reduction_.size;
   const auto by_q = iws_.dimpulse_dq.bottomRows(contact_rows_), by_v = iws_.dimpulse_dv.bottomRows(contact_rows_);
-  auto dlambda = work_->dlambda.topRows(contact_rows_);
+  PaddedMap dlambda = shapeForceDerivatives();
   dlambda.setZero();
-  auto turned = work_->dlambda_turned.leftCols(contact_rows_);
-  turned.setZero();
-  addColumns(by_q, Lift::N, turned.topRows(nr));
-  addColumns(by_v, Lift::Z, turned.topRows(nr));
-  addColumns(by_v, Lift::N, turned.middleRows(nr, nr));
-  dlambda = turned.transpose();
+  addColumns(by_q, Lift::N, dlambda.topRows(nr));
+  addColumns(by_v, Lift::Z, dlambda.topRows(nr));
+  addColumns(by_v, Lift::N, dlambda.middleRows(nr, nr));
 }
 
 // Eq. (a) for one block.

@@ -85,8 +85,7 @@ void ReducedNode::addResiduals(const ResidualStack& stack, bool running, StageMo
   addColumns(v, Lift::Z, Rt.block(0, 0, nr, motion_rows));
   addColumns(v, Lift::N, Rt.block(nr, 0, nr, motion_rows));
   if (running && contact_rows_ > 0) {
-    PaddedMap by_forces = shapePadded(work.dlambda_t, columns, contact_rows_);
-    copyTransposed(work.dlambda.topRows(contact_rows_), by_forces);
+    const PaddedMap by_forces = shapeForceDerivatives();
     const auto lambda = work.jacobians.lambda.block(0, loop_rows_, rows, contact_rows_);
     for (int j = 0; j < contact_rows_; ++j)
       for (int i = 0; i < rows; ++i)

@@ -66,12 +66,16 @@ int ReducedNode::findContactRow(size_t slot, int row) const {
   return spec_.constraints.offsets[index] - loop_rows_ + row;
 }
 
+PaddedMap ReducedNode::shapeForceDerivatives() const {
+  return shapePadded(work_->dlambda, 2 * reduction_.size + model_.nu(), contact_rows_);
+}
+
 // The right-hand sides of the contact rows.
 void ReducedNode::loadContactDerivatives(const LaneView& view) {
   ReducedWork& work = *work_;
   const int nr = reduction_.size;
   const ConstraintSet& set = spec_.constraints;
-  auto dlambda = work.dlambda.topRows(contact_rows_);
+  PaddedMap dlambda = shapeForceDerivatives();
   dlambda.setZero();
   for (size_t c = num_loops_; c < set.closures.size(); ++c) {
     const int row = set.offsets[c] - loop_rows_, n = getRows(set.closures[c].kind);
@@ -79,8 +83,8 @@ void ReducedNode::loadContactDerivatives(const LaneView& view) {
     const LaneView::Contact& contact = view.contacts[slot];
     const std::vector<int>& outer = work.lanes.getOuter(slot);
     for (size_t o = 0; o < outer.size(); ++o) {
-      dlambda.col(outer[o]).segment(row, n) = selectRows<double>(set.closures[c], contact.dy.col(o));
-      dlambda.col(nr + outer[o]).segment(row, n) = selectRows<double>(set.closures[c], contact.dv.col(o));
+      dlambda.row(outer[o]).segment(row, n) = selectRows<double>(set.closures[c], contact.dy.col(o)).transpose();
+      dlambda.row(nr + outer[o]).segment(row, n) = selectRows<double>(set.closures[c], contact.dv.col(o)).transpose();
     }
   }
 }
@@ -91,8 +95,7 @@ void ReducedNode::linearizeDynamics(LaneView& view) {
   view.dydd.rightCols(model_.nu()).setZero();
   addMotorColumns(view.dydd.rightCols(model_.nu()));
   loadContactDerivatives(view);
-  work.contacts.at(contact_rows_)
-      .saddle_point.solveDerivatives(factors_, view.dydd, work.dlambda.topRows(contact_rows_));
+  work.contacts.at(contact_rows_).saddle_point.solveDerivatives(factors_, view.dydd, shapeForceDerivatives());
 }
 
 // out (size x nu) += -N^T B

@@ -112,14 +112,12 @@ ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const R
   for (VectorXd* x : {&a_d, &force}) x->setZero(nv);
   for (VectorXd* x : {&f, &ydd}) x->setZero(nr);
   M.setZero(nr, nr);
-  dlambda.setZero(sizes.rows, 2 * nr + nu);
-  dlambda_turned.setZero(2 * nr + nu, sizes.rows);
   for (MatrixXd* m : {&jacobians.q, &jacobians.v}) m->setZero(sizes.residuals, nv);
   jacobians.lambda.setZero(sizes.residuals, sizes.constraints);
   const Eigen::Index padded = roundUpToLane(2 * nr + nu);
   for (VectorXd* x : {&Rt, &Rt_scaled}) x->setZero(padded * sizes.residuals);
   H.setZero(padded * (2 * nr + nu));
-  dlambda_t.setZero(padded * sizes.rows);
+  dlambda.setZero(padded * sizes.rows);
 }
 
 ReducedWork& ReducedWorkPool::get() {

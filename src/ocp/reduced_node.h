@@ -92,14 +92,13 @@ struct ReducedWork {
   VectorXd a_d, force;                  // nv
   VectorXd f, ydd;                      // size
   MatrixXd M;                           // size x size
-  MatrixXd dlambda;                     // largest contact rows x (2 size + nu), by (dy, dy_v, u)
-  MatrixXd dlambda_turned;              // its transpose, for impacts
   struct Motor {
     int block, row;  // block and row of its N; or -1 and reduced coordinate
   };
   std::vector<Motor> motors;
   ResidualJacobians jacobians;
-  VectorXd Rt, Rt_scaled, dlambda_t, H;  // of addResiduals(), with room for any node
+  VectorXd Rt, Rt_scaled, H;  // of addResiduals(), with room for any node
+  VectorXd dlambda;           // see shapeForceDerivatives(), likewise
 };
 
 // One for each thread that asks.
@@ -189,6 +188,8 @@ class ReducedNode : public NodeModel {
   void finishStep();
   bool moveToNodeState(Block& b, StageModel& out);
   void showView(LaneView& view);
+  // Derivatives of the contact forces by (dy, dy_v, u), one column per row of the contacts.
+  PaddedMap shapeForceDerivatives() const;
   void loadContactDerivatives(const LaneView& view);
   void linearizeDynamics(LaneView& view);
   bool linearizeBlock(Block& b, LaneView::Block& view, ConstVectorRef x_next_node, StageModel& out);

@@ -77,8 +77,7 @@ void LqSweep::updateQuadratic(const StageModel& model, const Node& next, Node& n
   copyTransposed(model.Fu, Ft.topRows(nu));
   copyTransposed(model.Fx, Ft.bottomRows(n));
   clearPadding(Ft);
-  Ft_Vxx_.head(Ft.outerStride() * n_next).setZero();
-  addProduct(nu + n, n_next, n_next, 1, pad(Ft), {next.Vxx.data(), 1, n_next}, pad(Ft_Vxx));
+  setProduct(nu + n, n_next, n_next, pad(Ft), {next.Vxx.data(), 1, n_next}, pad(Ft_Vxx));
   H.topLeftCorner(nu, nu) = model.luu;
   H.topRightCorner(nu, n).setZero();
   copyTransposed(model.lux, H.bottomLeftCorner(n, nu));

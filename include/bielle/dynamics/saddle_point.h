@@ -18,7 +18,7 @@
 ///     dlambda = G^+ (J M^{-1} dID - dc),     da = M^{-1} (J^T dlambda - dID).                                        (4)
 ///
 /// With redundant rows dlambda is right up to the null space of J^T.
-#include "bielle/math/types.h"
+#include "bielle/math/lane_product.h"
 
 namespace bielle {
 
@@ -51,9 +51,9 @@ class SaddlePoint {
   /// Prepares solveDerivatives().
   void updateInverse();
   /// Eq. (4): X (n x k) holds dID and becomes da; dlambda (m x k) holds dc and becomes dlambda.
-  void solveDerivatives(MatrixRef X, MatrixRef dlambda) { solveDerivatives(factors_, X, dlambda); }
-  /// The same for another system of the same sizes.
-  void solveDerivatives(const SaddlePointFactors& factors, MatrixRef X, MatrixRef dlambda);
+  void solveDerivatives(MatrixRef X, MatrixRef dlambda);
+  /// The same for another system of the same sizes, and dlambda^T (k x m).
+  void solveDerivatives(const SaddlePointFactors& factors, MatrixRef X, PaddedMap dlambda_t);
   /// Of the last system; needs updateInverse().
   const SaddlePointFactors& factors() const { return factors_; }
   /// Whether the rows needed Eq. (3).

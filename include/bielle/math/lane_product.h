@@ -29,6 +29,10 @@ struct StridedMatrix {
 void addProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B,
                 PaddedMatrix C);
 
+/// C = A B, likewise: C need not hold numbers.
+void setProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, PaddedMatrix A, StridedMatrix B,
+                PaddedMatrix C);
+
 /// The beginning of a buffer as a matrix whose rows are padded to full lanes.
 using PaddedMap = Eigen::Map<MatrixXd, 0, Eigen::OuterStride<>>;
 inline PaddedMap shapePadded(VectorXd& buffer, Eigen::Index rows, Eigen::Index cols) {
