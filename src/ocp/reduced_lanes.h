@@ -1,7 +1,7 @@
 #pragma once
 // Up to kLane steps and their derivatives at once, one node per lane (lanes.h): what reduced_node.h needs of the mechanism for
-// its Eqs. (b) to (g). Nodes may have different contacts and time steps. What is left to each of them are redundant contacts and
-// its costs.
+// its Eqs. (b) to (g). Nodes may have different contacts and time steps. What is left to each of them is its costs, its
+// quadratic model, and the system of its contacts where some are redundant.
 #include "bielle/dynamics/reduced_tree.h"
 #include "contact_system.h"
 #include "node_model.h"
@@ -63,13 +63,14 @@ class ReducedLanes {
                const std::vector<int>& slots);
 
   // Steps of at most kLane reduced nodes whose states and motor forces are there, and the bases of those that go on from
-  // another: `placed` where the others could be found; Eq. (b), and where it could be solved; what
-  // it is for one of the others (f, and gamma at its contact rows) and its solution back; the rest, and where that went
-  // through; and what the nodes keep of it, but for those that failed.
+  // another node. Finds the bases of the others (`placed`: where that went through) and solves Eq. (b); returns where.
   LaneMask startSteps(NodeModel* const* nodes, int count, LaneMask& placed);
+  // Eq. (b) of a lane where it did not, with gamma at the contact rows of its node; and its solution back.
   void loadSystem(int lane, MatrixXd& M, MatrixXd& JcN, VectorXd& f, VectorXd& gamma) const;
   void storeAccelerations(int lane, const VectorXd& ydd);
+  // The rest of the steps; returns where that went through.
   LaneMask finishSteps();
+  // What the nodes keep, but for those that failed.
   void storeSteps(const bool* ok);
 
   // ReducedNode::calcDifferences() for at most kLane nodes whose charts are those at x0.

@@ -8,7 +8,7 @@
 ///     J N = 0,   N^T W N = I,   J^+ = W^{-1} J^T (J W^{-1} J^T)^{-1}                                                  (1)
 /// N (n x (n - rank)) is an orthonormal basis of the tangent space and (W N)^T reads its coordinates. Its choice is free at
 /// every point: no chart is left, and a dead point of a linkage, where motor or joint coordinates break down, is nothing
-/// special. Only a change of rank is.
+/// special. Only a change of rank is. Rounding has no part in the choice: one point has one basis, however it is reached.
 ///
 /// Moving on the manifold from a point q_0: for a displacement d (n), close along the rows of the start,
 ///     q = q_0 (+) (d - W^{-1} J(q_0)^T zeta)    with zeta such that q is closed                                       (2)
