@@ -21,6 +21,20 @@ std::string describeVersion() {
   return "bielle " + build.bielle + " (Eigen " + build.eigen + ", " + build.compiler + ")";
 }
 
+// What is wrong with the command line; where a command, motion or robot is missing or unknown, those there are.
+std::string describe(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
+  const CLI::App* last = &app;
+  while (!last->get_subcommands().empty()) last = last->get_subcommands().back();
+  std::string known;
+  for (const CLI::App* command : last->get_subcommands([](const CLI::App*) { return true; }))
+    known += (known.empty() ? "" : ", ") + command->get_name();
+  if (known.empty()) return std::string(error.what()) + "; see --help";
+  const std::vector<std::string> unknown = app.remaining(true);
+  const char* const* named = std::find_first_of(argv + 1, argv + argc, unknown.begin(), unknown.end());
+  const bool is_name = named != argv + argc && **named != '-';
+  return (is_name ? "there is no '" + std::string(*named) + "'" : error.what()) + "; choose one of: " + known;
+}
+
 int run(int argc, char** argv) {
   using namespace bielle::cli;
   setCommandLine(argc, argv);
@@ -59,7 +73,7 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    return fail(std::string(error.what()) + "; see --help", kBadInput);
+    return fail(describe(app, error, argc, argv), kBadInput);
   }
   try {
     return action();

@@ -22,7 +22,7 @@ void checkParameters(const std::string& robot, const std::vector<Parameter>& par
   for (const Parameter& p : parameters) {
     if (*p.value >= p.lower && *p.value <= p.upper) continue;
     std::ostringstream problem;
-    problem << *p.value << " " << p.unit << " is outside " << p.lower << " .. " << p.upper;
+    problem << *p.value << (p.unit == "1" ? "" : " " + p.unit) << " is outside " << p.lower << " .. " << p.upper;
     throw ModelError(robot, "parameter '" + p.name + "'", problem.str(), "give a value within its bounds");
   }
 }
