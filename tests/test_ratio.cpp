@@ -243,8 +243,24 @@ TEST_CASE("a sweep ends at joint limits, and where loops lose rank") {
   CHECK_FALSE(folded.full_turn);
   CHECK_THAT(folded.begin + folded.end, Catch::Contains("'loop1'"));
   for (const RatioSample& sample : folded.samples) CHECK(sample.ratio.R(0, 0) == Approx(1).margin(1e-6));
+  for (size_t i = 0; i < folded.samples.size(); ++i)
+    CHECK(folded.samples[i].loses_rank == (i == 0 || i + 1 == folded.samples.size()));
   CHECK(folded.samples.front().motors[0] == Approx(0).margin(1e-3));
   CHECK(folded.samples.back().motors[0] == Approx(kPi).margin(1e-3));
+}
+
+TEST_CASE("virtual work balances where the motor stands still too, and another ratio is seen there") {
+  const Robot robot("spring_leg", {"toe_joint"});
+  const RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);
+  CHECK(sweep.full_turn);
+  int dead = 0;
+  for (const RatioSample& sample : sweep.samples) {
+    if (sample.dead == DeadPointKind::Motor) ++dead;
+    CHECK(calcBalanceError(robot.model, robot.linkage, robot.getWhole(sample), sample.ratio.R) < 1e-10);
+    const MatrixXd other = sample.ratio.R + MatrixXd::Constant(1, 1, 1e-4);
+    CHECK(calcBalanceError(robot.model, robot.linkage, robot.getWhole(sample), other) > 1e-6);
+  }
+  CHECK(dead == 2);
 }
 
 TEST_CASE("joints without a linkage of their own: direct, or refused") {

@@ -38,7 +38,7 @@ VectorXd findStart(const LoadedRobot& robot, const std::string& reference) {
 double calcLargestBalanceError(const Model& model, const RatioReport& report, VectorXd q) {
   double largest = 0;
   for (const RatioSample& sample : report.sweep.samples) {
-    if (sample.dead == DeadPointKind::Joint) continue;
+    if (sample.dead == DeadPointKind::Joint || sample.loses_rank) continue;
     if (!report.linkage.isDirect()) scatterConfiguration(model, report.linkage.block, sample.q, q);
     largest = std::max(largest, calcBalanceError(model, report.linkage, q, sample.ratio.R));
   }

@@ -207,8 +207,13 @@ double calcBalanceError(const Model& model, const Linkage& linkage, ConstVectorR
   for (int i = 0; i < linkage.size(); ++i) {
     VectorXd motor = rest, joints = rest;
     motor[model.motors()[linkage.motors[i]].dof] = 1;
-    for (int j = 0; j < linkage.size(); ++j) joints[model.joints()[linkage.joints[j]].idx_v] -= R(i, j);
-    const double alone = std::max(calcAcceleration(motor).norm(), calcAcceleration(joints).norm());
+    double alone = calcAcceleration(motor).norm();
+    for (int j = 0; j < linkage.size(); ++j) {
+      VectorXd joint = rest;
+      joint[model.joints()[linkage.joints[j]].idx_v] = 1;
+      joints -= R(i, j) * joint;
+      alone = std::max(alone, std::max(1.0, std::abs(R(i, j))) * calcAcceleration(joint).norm());
+    }
     // A motor on its own joint balances itself, with nothing left to compare.
     if (alone > 0) error = std::max(error, calcAcceleration(motor + joints).norm() / alone);
   }

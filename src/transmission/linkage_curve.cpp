@@ -146,6 +146,11 @@ MatrixXd LinkageCurve::calcJacobian(const VectorXd& q) {
   return J;
 }
 
+bool LinkageCurve::hasRank(const VectorXd& q) {
+  const VectorXd sigma = Eigen::JacobiSVD<MatrixXd>(calcJacobian(q)).singularValues();
+  return sigma[linkage_.block.rank - 1] > kLostRank * sigma[0];
+}
+
 // The determinant of J on the independent rows of the start, completed by the tangent space there, changes its sign.
 bool LinkageCurve::findRankLoss(const CurvePoint& from, const CurvePoint& to, double& h) {
   if (!from_.update(linkage_.block, from.q)) return false;
@@ -160,10 +165,7 @@ bool LinkageCurve::findRankLoss(const CurvePoint& from, const CurvePoint& to, do
   if (calcDeterminant(from) * calcDeterminant(to) > 0) return false;
   const double root = findRoot(from, h, kRankPlace, calcDeterminant);
   CurvePoint at;
-  if (advance(from, root, at)) {  // other rows may have kept the rank
-    const VectorXd sigma = Eigen::JacobiSVD<MatrixXd>(calcJacobian(at.q)).singularValues();
-    if (sigma[rows.size() - 1] > kLostRank * sigma[0]) return false;
-  }
+  if (advance(from, root, at) && hasRank(at.q)) return false;  // other rows have kept the rank
   why_ = "closure '" + linkage_.block.closures.closures.front().name +
          "': its loops lose rank, they can go on in several ways";
   h = root;
@@ -182,6 +184,7 @@ RatioSample LinkageCurve::makeSample(const CurvePoint& point, DeadPointKind dead
     sample.joints[i] = point.q[linkage_.joint_positions[i]];
     sample.motors[i] = point.q[linkage_.motor_positions[i]];
   }
+  sample.loses_rank = !hasRank(point.q);
   const bool there = from_.update(linkage_.block, point.q) && calcLinkageRatio(linkage_, from_, sample.ratio);
   if (dead == DeadPointKind::Joint || !there) {
     const double infinite = std::numeric_limits<double>::infinity();

@@ -39,6 +39,7 @@ class LinkageCurve {
   bool finishPoint(const VectorXd& direction, CurvePoint& point);
   MatrixXd getHeldRows() const;
   MatrixXd calcJacobian(const VectorXd& q);
+  bool hasRank(const VectorXd& q);
 
   const Linkage& linkage_;
   int joint_;

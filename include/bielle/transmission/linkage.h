@@ -60,7 +60,7 @@ bool calcLinkageTangent(const Linkage& linkage, const BlockPoint& point, MatrixX
 
 /// How far the constrained dynamics of the whole robot are from Eq. (1): at rest, a unit torque of each motor is balanced by
 /// -R^T of it on the joints, on top of what holds gravity. Returns the largest acceleration that remains over those that
-/// either side alone would give.
+/// either side, or a unit torque of a joint, would give alone (at a dead point of the motor neither side gives any).
 /// \param q  nq of the whole model, closed, with the block at the configuration where R was taken
 double calcBalanceError(const Model& model, const Linkage& linkage, ConstVectorRef q, const MatrixXd& R);
 

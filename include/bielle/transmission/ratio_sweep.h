@@ -29,7 +29,8 @@ struct RatioSample {
   VectorXd motors;     ///< m
   LinkageRatio ratio;  ///< at a dead point of the joint: infinite R and condition, zero dR
   DeadPointKind dead = DeadPointKind::None;
-  VectorXd q;  ///< configuration of the block; empty for a direct linkage
+  bool loses_rank = false;  ///< the loops can go on in several ways there; the ratio is that of the way that was come
+  VectorXd q;               ///< configuration of the block; empty for a direct linkage
 };
 
 struct SweepOptions {
