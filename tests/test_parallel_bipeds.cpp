@@ -123,6 +123,15 @@ TEST_CASE("RSU biped: bielle solve squat, walk and jump converge, pass their che
                70, 0.25, {0.015, 0.2});
 }
 
+TEST_CASE("Cleobot and the RSU biped walk at 0.9 m/s and pass their check") {
+  for (const char* robot : {"cleobot", "rsu_biped"}) {
+    CAPTURE(robot);
+    const RobotDirectory directory;
+    const MotionRecord record = solve(robot, {"walk", "--speed", "0.9"}, directory);
+    CHECK(record.com(record.com.rows() - 1, 0) - record.com(0, 0) > 1.7);
+  }
+}
+
 TEST_CASE("Cleobot: feet of a walk land where they should and do not slide") {
   Motion motion = makeWalk(getCleobot());
   const FddpSummary summary = Fddp(FddpOptions{}).solve(*motion.problem, motion.guess);

@@ -182,8 +182,12 @@ TEST_CASE("Digit squats, walks and climbs stairs with the feet and the posture t
   }
   CHECK(lowest == Approx(0.6 * start).margin(3e-3));
 
-  Motion walk = makeWalk(model);
-  checkSteps(walk);
+  for (double speed : {0.5, 0.8}) {
+    WalkOptions options;
+    options.speed = speed;
+    Motion walk = makeWalk(model, options);
+    checkSteps(walk);
+  }
   StairsOptions stairs;
   stairs.stairs = 3;
   Motion climb = makeStairs(model, stairs);

@@ -148,6 +148,44 @@ TEST_CASE("walk: Bipetto walks as fast as asked, on its feet") {
   }
 }
 
+TEST_CASE("walk: the first double support is as long as the soles need to set off") {
+  const Model& model = getBipetto();
+  const ContactFrame& sole = model.contacts()[0];
+  const VectorXd q0 = makeStandingPosture(model);
+  const auto count = [&](const WalkOptions& options) {
+    return planWalk(model, options, q0).schedule.phases.front().nodes;
+  };
+  WalkOptions options;
+  const double h = options.gait.timing.time_step;
+  CHECK(count(options) == std::lround(options.gait.timing.start / h));
+  options.speed = 0.9;
+  options.gait.start_pressure = 0.3;
+  const int nodes = count(options);
+  CHECK(nodes > std::lround(options.gait.timing.start / h));
+  // A pendulum at rest whose centre of pressure is held back by d: how far it runs ahead of the path in the end (the part
+  // of its error that grows), as a simulation has it.
+  const Stance stance = makeStance(model, options.gait, q0);
+  const double d = options.gait.start_pressure * sole.half_length, g = 9.81, height = stance.com.z();
+  const FootstepPlan plan = planFootsteps(stance.feet[0], stance.feet[1],
+                                          {options.speed * options.gait.timing.stepDuration(), 0, 0}, 6, Side::Right);
+  const auto runAhead = [&](double duration) {
+    GaitTiming timing = options.gait.timing;
+    timing.start = duration;
+    const Gait gait = makeGait(plan, timing, options.gait.swing, stance.com, g);
+    double error = 0, rate = -gait.nodes[0].com_velocity.x();
+    const int steps = 20000;
+    for (int i = 0; i < steps; ++i) {
+      rate += duration / steps * g / height * (error + d);
+      error += duration / steps * rate;
+    }
+    return error + std::sqrt(height / g) * rate;
+  };
+  CHECK(runAhead(nodes * h) > 0);
+  CHECK(runAhead(nodes * h - 0.062) < 0);  // a step of the search and the rounding to nodes less
+  options.gait.start_pressure = 0;
+  CHECK(count(options) == std::lround(options.gait.timing.start / h));
+}
+
 TEST_CASE("walk: the full formulation walks alike") {
   const Solved full = solve(makeWalk(getBipetto(), {}, Formulation::Full));
   checkSteps(full);
@@ -206,6 +244,7 @@ TEST_CASE("walk: what cannot be done is refused by name") {
                                                                  {"time_step", 0, "time_step"},
                                                                  {"friction", 0, "friction"},
                                                                  {"swing_height", -0.1, "swing_height"},
+                                                                 {"start_pressure", -0.1, "start_pressure"},
                                                                  {"com_weight", -1, "com_weight"},
                                                                  {"swing_apex", 1, "swing_apex"}}) {
     CAPTURE(option, value);

@@ -36,6 +36,24 @@ void check(const LocomotionOptions& options) {
   require(swing.arrive <= 1, "swing_arrive", "it is over 1", "give a part of the swing, e.g. 1");
 }
 
+// The first double support lengthened until Eq. (1) holds.
+Gait makeStartingGait(const Model& model, const Stance& stance, const LocomotionTask& task,
+                      const LocomotionOptions& options) {
+  constexpr double kStep = 0.05, kLongest = 2;  // s
+  const double gravity = model.gravity().norm(), height = stance.com.z() - stance.feet[0].p.z();
+  const double tau = std::sqrt(height / gravity);
+  const double half =
+      std::min(model.contacts()[stance.contacts[0]].half_length, model.contacts()[stance.contacts[1]].half_length);
+  const Vector3d forward = calcMiddle(stance.feet[0], stance.feet[1]).R.col(0);
+  GaitTiming timing = options.timing;
+  for (;; timing.start += kStep) {
+    Gait gait = makeGait(task.plan, timing, options.swing, stance.com, gravity);
+    const double v = std::abs(forward.dot(gait.nodes[0].com_velocity)), T = timing.start;
+    if (v * tau <= options.start_pressure * half * (1 - std::exp(-T / tau))) return gait;
+    if (options.start_pressure == 0 || half == 0 || T > kLongest) return gait;
+  }
+}
+
 // What no choice of motor torques can do.
 void check(const Scene& scene) {
   constexpr double kStretch = 1.15, kCrouch = 0.6;  // of the legs, over their length in the standing posture
@@ -138,8 +156,10 @@ void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
     const bool left = scene.model.findContact(set.closures[set.num_loops + i].name) == scene.stance.contacts[0];
     loads[i] = std::max(1.0, weight * node.load[left ? 0 : 1]);
   }
-  // The pyramid within the cone.
-  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, o.friction_weight, o.friction / std::sqrt(2)}, loads,
+  // The pyramid within the cone, and a little more: a penalty is met only nearly.
+  constexpr double kMargin = 0.95;
+  addGroundCosts(scene.model,
+                 {o.force_weight, o.pressure_weight, o.friction_weight, kMargin * o.friction / std::sqrt(2)}, loads,
                  stage);
 }
 
@@ -229,7 +249,9 @@ StageSpec makeTerminalStage(const Scene& scene) {
 
 std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
   return {
-      {"start_support", &o.timing.start, "s", "double support before the first step"},
+      {"start_support", &o.timing.start, "s", "double support before the first step, at least"},
+      {"start_pressure", &o.start_pressure, "1",
+       "it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given"},
       {"single_support", &o.timing.single, "s", "one foot on the ground"},
       {"double_support", &o.timing.both, "s", "both feet on the ground between two steps"},
       {"end_support", &o.timing.end, "s", "double support after the last step"},
@@ -260,7 +282,8 @@ std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
       {"landing_velocity_weight", &o.landing_velocity_weight, "s^2/m^2", "a landing foot is still"},
       {"force_weight", &o.force_weight, "1", "pass the weight evenly from foot to foot, over (m g)^2"},
       {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
-      {"friction_weight", &o.friction_weight, "1/N^2", "stay inside the friction pyramid"},
+      {"friction_weight", &o.friction_weight, "1",
+       "stay inside the friction pyramid, over the load of the foot squared"},
       {"feet_distance", &o.feet_distance, "m", "least distance of the feet"},
       {"feet_distance_weight", &o.feet_distance_weight, "1/m^2", "feet do not come nearer"},
       {"terminal_weight", &o.terminal_weight, "1", "end at rest, in place"},
@@ -273,6 +296,7 @@ std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
 
 void setPaperWeights(LocomotionOptions& o) {
   o.timing.start = o.timing.end = 0.2;
+  o.start_pressure = 0;
   o.timing.single = 0.4;
   o.timing.both = o.timing.time_step = 0.015;
   o.state_weight = 1;
@@ -321,12 +345,8 @@ Stance makeStance(const Model& model, const LocomotionOptions& options, const Ve
 MotionPlan planLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
                           const LocomotionOptions& options) {
   check(options);
-  Scene scene{model,
-              stance,
-              task,
-              options,
-              makeGait(task.plan, options.timing, options.swing, stance.com, model.gravity().norm()),
-              makeWeights(model, options)};
+  Scene scene{
+      model, stance, task, options, makeStartingGait(model, stance, task, options), makeWeights(model, options)};
   check(scene);
   MotionPlan plan;
   plan.name = task.name;

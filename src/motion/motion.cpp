@@ -146,8 +146,9 @@ void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd
     if (costs.force_weight != 0)
       stage.costs.push_back({"force " + contact.name, costs.force_weight / (weight * weight),
                              Activation::makeQuadratic(VectorXd::Ones(rows)), makeContactForce(set, c, reference)});
+    const double load = std::max(reference[2], 0.1 * weight);
     if (costs.friction_weight != 0)
-      stage.costs.push_back({"friction " + contact.name, costs.friction_weight,
+      stage.costs.push_back({"friction " + contact.name, costs.friction_weight / (load * load),
                              Activation::makeBarrier(VectorXd::Ones(4), VectorXd::Zero(4), VectorXd::Constant(4, 1e12)),
                              makeFrictionPyramid(set, c, costs.friction)});
     if (costs.pressure_weight == 0 || rows != 6 || contact.half_length <= 0 || contact.half_width <= 0) continue;

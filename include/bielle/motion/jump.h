@@ -43,7 +43,7 @@ struct JumpOptions {
   double control_weight = 3e-3;            ///< of the motor torques, 1/(N m)^2
   double force_weight = 30;                ///< of the contact force reference, over (m g)^2
   double pressure_weight = 1;              ///< of the centre of pressure, over the half size of the sole squared
-  double friction_weight = 1e-2;           ///< of leaving the friction pyramid, 1/N^2
+  double friction_weight = 100;            ///< of leaving the friction pyramid, over the load of the foot squared, 1
   double swing_weight = 1e4;               ///< of the feet's path in flight, 1/m^2
   double swing_rotation_weight = 1e2;      ///< of their orientation, 1
   double touchdown_foothold_weight = 1e5;  ///< horizontal place of the feet, over h, 1/m^2

@@ -10,6 +10,11 @@
 /// - forces of stance feet: share of the weight, centre of pressure, friction pyramid;
 /// - feet not nearer than `feet_distance`.
 /// The terminal node has the centre of mass, the posture and rest.
+///
+/// The pendulum of gait.h sets off at once, with a velocity v at the first node, while the robot is at rest. With the time
+/// constant tau = sqrt(z / g), a centre of pressure held back by d for a time T brings the robot onto its path when
+///     d (1 - exp(-T / tau)) = v tau,                                                                           (1)
+/// where v falls with T as well. The first double support is as long as d in the soles asks for.
 #include "bielle/motion/gait.h"
 #include "bielle/motion/motion.h"
 
@@ -17,6 +22,7 @@ namespace bielle {
 
 struct LocomotionOptions {
   GaitTiming timing;
+  double start_pressure = 0.4;  ///< largest d of Eq. (1) over the soles' half length; 0: timing.start as it is given
   SwingShape swing;
   double friction = 0.7;  ///< coefficient, 1
   /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time and bears the landing
@@ -43,7 +49,7 @@ struct LocomotionOptions {
   double landing_velocity_weight = 1e3;  ///< its velocity, times h, s^2/m^2
   double force_weight = 10;              ///< of the contact force reference, over (m g)^2
   double pressure_weight = 10;           ///< of the centre of pressure, over the half size of the sole squared
-  double friction_weight = 1e-2;         ///< of leaving the friction pyramid, 1/N^2
+  double friction_weight = 100;          ///< of leaving the friction pyramid, over the load of the foot squared, 1
   double feet_distance = 0.2;            ///< least distance of the feet, m
   double feet_distance_weight = 0;       ///< of coming nearer, 1/m^2
   double terminal_weight = 1e3;          ///< of the final velocities, and of the final place of the CoM

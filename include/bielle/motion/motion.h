@@ -95,10 +95,12 @@ void raiseMotorWeights(const Model& model, double weight, VectorXd& weights);
 
 /// What feet on the ground should do, for all motions.
 struct GroundCosts {
-  double force_weight = 10;       ///< of the force reference, over (m g)^2
-  double pressure_weight = 1;     ///< of the centre of pressure, over the half size of the sole squared
-  double friction_weight = 1e-2;  ///< of leaving the friction pyramid, 1/N^2
-  double friction = 0.7;          ///< coefficient, 1
+  double force_weight = 10;    ///< of the force reference, over (m g)^2
+  double pressure_weight = 1;  ///< of the centre of pressure, over the half size of the sole squared
+  /// Of leaving the friction pyramid, over the square of the foot's load (of m g / 10 at least), 1. By newtons alone, a
+  /// weight that holds a foot that bears little is so stiff for one that bears the robot that the solver creeps.
+  double friction_weight = 100;
+  double friction = 0.7;  ///< coefficient, 1
 };
 /// Adds the costs of every contact in force at the stage. \param loads  vertical force of each, in their order, N
 void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd& loads, StageSpec& stage);
