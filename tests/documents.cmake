@@ -1,5 +1,5 @@
 # Pages are run as their readers would: every command, and what it shows.
-set(pages tutorial modelling signs new_robot motions linkages checks speed)
+set(pages tutorial modelling signs new_robot motions linkages checks speed design)
 if(BIELLE_BUILD_EXAMPLES)
   list(APPEND pages new_motion)
 endif()

@@ -97,6 +97,34 @@ TEST_CASE("assembly: a four-bar against its closed form over the full turn of th
   }
 }
 
+TEST_CASE("assembly: the shortest steps close the same robot, and change nothing without need") {
+  const Model model = loadOwn("bipetto");
+  const VectorXd closed = assembleReference(model, "half_sitting").q;
+  AssemblyProblem problem;
+  problem.q_ref = model.integrate(closed, 0.02 * VectorXd::Random(model.nv()));
+  AssemblyOptions options;
+  options.step = AssemblyStep::Shortest;
+  const AssemblyResult result = assemble(model, problem, options);
+  REQUIRE(result.status == AssemblyStatus::Closed);
+  Workspace ws(model);
+  CHECK(calcGap(model, ws, result.q) < 1e-12);
+  CHECK(result.iterations < 10);
+  // No closed configuration nearby is closer to the start, to first order: the way there is across the closed motions.
+  const ConstraintSet set = makeConstraintSet(model);
+  MatrixXd J(set.rows, model.nv());
+  updatePositions(model, ws, result.q);
+  for (size_t c = 0; c < set.closures.size(); ++c)
+    calcClosureResidualJacobian(ws, set.closures[c], J.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
+  const VectorXd way = model.difference(problem.q_ref, result.q);
+  const VectorXd along = way - J.completeOrthogonalDecomposition().solve(J * way);
+  CHECK(along.norm() < 0.1 * way.norm());
+  // Out of reach it says so.
+  problem.frames.push_back({"trunk", 1, SE3(), {Matrix3d::Identity(), Vector3d(0, 0, 0.5)}});
+  for (const ContactFrame& foot : model.contacts())
+    problem.frames.push_back({foot.name, foot.body, foot.X_BF, {Matrix3d::Identity(), Vector3d(0, 0, -2)}});
+  CHECK(assemble(model, problem, options).status == AssemblyStatus::NotClosed);
+}
+
 TEST_CASE("assembly: a loop too short to close is named, with its gap") {
   // The rods reach 0.2 m, the pins are 0.4 m apart.
   ModelBuilder builder("short");

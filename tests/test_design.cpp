@@ -147,6 +147,17 @@ TEST_CASE("design: a stretched body stays a possible one") {
   CHECK(second(made.bodies()[body].inertia) == Approx(0.2 * second(bipetto.bodies()[body].inertia)));
 }
 
+TEST_CASE("design: a heavier trunk") {
+  const Model bipetto = loadBipetto();
+  RobotDraft draft(bipetto);
+  draft.scaleMass(bipetto.bodies()[1].name, 1.5);
+  const Inertia before = bipetto.bodies()[1].inertia, after = draft.build().bodies()[1].inertia;
+  CHECK(after.mass == Approx(1.5 * before.mass));
+  CHECK((after.I_com - 1.5 * before.I_com).norm() < 1e-14);
+  CHECK(after.com == before.com);
+  CHECK_THROWS_AS(draft.scaleMass("nothing", 2), ModelError);
+}
+
 TEST_CASE("design: parameters of a generator") {
   DesignVariable variable;
   variable.name = "thigh", variable.parameter = "thigh_length", variable.lower = 0.05, variable.upper = 0.5;
