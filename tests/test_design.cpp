@@ -313,7 +313,13 @@ TEST_CASE("design: a search that is killed goes on and ends the same way") {
     CHECK_FALSE(readFile(whole + file).empty());
     CHECK(readFile(whole + file) == readFile(killed + file));
   }
-  CHECK(fs::exists(whole + "/design.svg") == fs::exists(killed + "/design.svg"));
+  const bool is_drawn = fs::exists(whole + "/design.svg");  // where there is gnuplot
+  for (const char* figure : {"/design.svg", "/design_squat.svg", "/design_mechanism.svg"}) {
+    CAPTURE(figure);
+    CHECK(fs::exists(whole + figure) == is_drawn);
+    CHECK(readFile(whole + figure) == readFile(killed + figure));
+    if (is_drawn) CHECK_THAT(readFile(whole + figure), Contains("before") || Contains("best of search 2"));
+  }
   CHECK(countLines(log) == countLines(whole + "/search1.jsonl"));
 
   // The design is a robot, better than the start.

@@ -70,7 +70,7 @@ void addDesign(CLI::App& app, Action& action) {
       ->required();
   command
       .add_option("-o,--output", arguments->directory,
-                  "directory for best/ (a robot), design.md, design.svg and the logs; made if need be")
+                  "directory for best/ (a robot), design.md, figures and the logs; made if need be")
       ->required();
   command.add_option("--jobs", arguments->jobs, "searches at a time, one thread each; results do not depend on it")
       ->check(CLI::Range(1, 1024))

@@ -100,6 +100,17 @@ void printMotion(std::ostream& page, const ArchitectureSpec& spec, size_t motion
   page << "\n";
 }
 
+// The largest speed that is done, and the slower ones that are not.
+std::string describeLargest(const ArchitectureSpec& spec, const std::vector<Feat>& feats) {
+  size_t largest = feats.size();
+  while (largest > 0 && !feats[largest - 1].done) --largest;
+  if (largest == 0) return "none";
+  std::string text = "**" + format(spec.speed_values[largest - 1], 2) + "**", missing;
+  for (size_t i = 0; i + 1 < largest; ++i)
+    if (!feats[i].done) missing += (missing.empty() ? "" : ", ") + format(spec.speed_values[i], 2);
+  return missing.empty() ? text : text + " (not " + missing + ")";
+}
+
 void printSpeeds(std::ostream& page, const ArchitectureSpec& spec, const std::vector<Contender>& contenders,
                  const ArchitectureResults& results) {
   if (spec.speeds.empty()) return;
@@ -119,12 +130,7 @@ void printSpeeds(std::ostream& page, const ArchitectureSpec& spec, const std::ve
     page << "\n";
   }
   page << "| **largest that passes** |";
-  for (const std::vector<Feat>& feats : results.speeds) {
-    std::string largest = "none";
-    for (size_t i = 0; i < feats.size(); ++i)
-      if (feats[i].done) largest = format(spec.speed_values[i], 2);
-    page << " **" << largest << "** |";
-  }
+  for (const std::vector<Feat>& feats : results.speeds) page << " " << describeLargest(spec, feats) << " |";
   page << "\n\n";
 }
 

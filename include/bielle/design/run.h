@@ -40,8 +40,9 @@ struct DesignRun {
 /// \throws ModelError when a log is of another problem, is used by another process, or cannot be written
 DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options);
 
-/// Writes DIR/best (a robot), design.md (before and after) and, where there is gnuplot, design.svg. The same run,
-/// resumed or not, writes the same bytes. Returns the paths. \throws ModelError when a file cannot be written
+/// Writes DIR/best (a robot), design.md (before and after) and, where there is gnuplot, design.svg (values over the
+/// evaluations), design_MOTION.svg (torques and speeds before and after) and design_mechanism.svg (both mechanisms). The
+/// same run, resumed or not, writes the same bytes. Returns the paths. \throws ModelError when a file cannot be written
 std::vector<std::string> writeDesign(const std::string& directory, const DesignEvaluator& evaluator,
                                      const DesignSpec& spec, const DesignRun& run);
 
