@@ -2,6 +2,9 @@ bielle_test(design SOURCES test_design.cpp robot_directory.cpp run_command.cpp L
 target_compile_definitions(test_design PRIVATE BIELLE_COMMAND="$<TARGET_FILE:bielle_command>")
 add_dependencies(test_design bielle_command)
 set_tests_properties(design PROPERTIES LABELS system)
-bielle_test(design_gradient SOURCES test_design_gradient.cpp moved_model.cpp mechanisms.cpp LIBS bielle_design)
+bielle_test(design_gradient SOURCES test_design_gradient.cpp mechanisms.cpp robot_directory.cpp run_command.cpp
+  LIBS bielle_design)
+target_compile_definitions(test_design_gradient PRIVATE BIELLE_COMMAND="$<TARGET_FILE:bielle_command>")
+add_dependencies(test_design_gradient bielle_command)
 set_tests_properties(design_gradient PROPERTIES LABELS system)
 bielle_test(design_measures SOURCES test_design_measures.cpp robot_directory.cpp LIBS bielle_design)

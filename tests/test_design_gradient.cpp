@@ -1,14 +1,23 @@
-// Gradients of designs: the measures of kept motions. Oracle: differences of fourth order over designs, each made and lifted
-// anew; a five-bar leg whose torques are computed without loops' forces.
+// Gradients of designs: the measures of kept motions and the searches that use them. Oracle: differences of fourth order over
+// designs, each made and lifted anew; minima by hand.
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 
 #include "bielle/design/run.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
 #include "check_derivative.h"
+#include "robot_directory.h"
+#include "run_command.h"
 
 using namespace bielle;
 using namespace bielle::testing;
+using Catch::Matchers::Contains;
 
 namespace {
 
@@ -25,6 +34,8 @@ DesignMotion makeShortWalk() {
   options.speed = 0.4, options.steps = 2;
   return {"walk", [options](const Model& model, const VectorXd& q0) { return planWalk(model, options, q0); }};
 }
+
+double square(double x) { return x * x; }
 
 Eigen::Index findActive(const MeasurePieces& term) {
   Eigen::Index active = 0;
@@ -52,24 +63,244 @@ TEST_CASE("design gradient: Bipetto's knee, torques and energy of kept motions")
     CAPTURE(trial, x);
     const SlopedEvaluation here = evaluator.differentiate(x);
     REQUIRE(here.evaluation.status == DesignStatus::Feasible);
-    MatrixXd analytic(4, n);
+    MatrixXd analytic(5, n);
     for (int i = 0; i < 4; ++i) {
       const Eigen::Index active = findActive(here.terms[i]);
       analytic.row(i) = here.terms[i].gradients.row(active);
       const double weight = evaluator.objective()[i].weight / evaluator.start().terms[i];
       CHECK(here.terms[i].values[active] == Approx(weight * here.evaluation.terms[i]).epsilon(1e-9));
     }
+    // A margin that changes: that of a knee.
+    Eigen::Index knee = 0;
+    here.limits.gradients.rowwise().norm().maxCoeff(&knee);
+    analytic.row(4) = here.limits.gradients.row(knee);
     const MatrixXd numeric = differentiate(x, 1e-4, [&](const VectorXd& other) {
       const Evaluation evaluation = evaluator.evaluate(other);
       REQUIRE(evaluation.status == DesignStatus::Feasible);
-      VectorXd terms(4);
+      VectorXd terms(5);
       for (int i = 0; i < 4; ++i)
         terms[i] = evaluator.objective()[i].weight / evaluator.start().terms[i] * evaluation.terms[i];
+      terms[4] = evaluator.differentiate(other).limits.values[knee];
       return terms;
     });
     INFO(analytic << "\n\n" << numeric);
     for (int i = 0; i < 4; ++i)
       checkDerivative(analytic.row(i), numeric.row(i), getName(evaluator.objective()[i].measure));
+    checkDerivative(analytic.row(4), numeric.row(4), "margin");
     x[0] -= 0.006, x[1] += 0.004, x[2] -= 0.005, x[3] += 0.003, x[4] += 0.002;
   }
+}
+
+namespace {
+
+// A leg of which rail and motors move along given curves, its foot on a spring that pushes up: N stages of a trajectory and
+// what a design makes of it.
+struct LegMotion {
+  SerialTrajectory kept;
+  LiftResult lifted;
+};
+
+std::vector<int> findLegDofs(const Model& leg) {
+  std::vector<int> dofs;
+  for (const Joint& joint : leg.joints())
+    if (joint.name == "rail" || leg.findMotor(joint.name) >= 0) dofs.push_back(joint.idx_v);
+  return dofs;
+}
+
+LegMotion makeLegMotion(const Model& leg) {
+  LegMotion out;
+  const std::vector<int> dofs = findLegDofs(leg);
+  const ConstraintSet set = makeConstraintSet(leg, {{0, SE3(), 0, 0}});
+  VectorXd q = leg.makeNeutral();
+  for (int k = 0; k < 30; ++k) {
+    const double t = 0.02 * k;
+    const Eigen::Vector3d target(0.02 * std::sin(9 * t), 0.2 * std::sin(7 * t), -0.3 * std::sin(5 * t + 0.4));
+    Workspace ws(leg);
+    for (int i = 0; i < 30; ++i) {  // closed with the three coordinates where they should be
+      updatePositions(leg, ws, q);
+      VectorXd residual(5), miss(3);
+      residual = calcClosureResidual(ws, set.closures[0]);
+      for (int j = 0; j < 3; ++j) miss[j] = target[j] - q[dofs[j]];
+      const ConstraintSet loops = makeConstraintSet(leg);
+      q = leg.integrate(q, Closing(leg, ws, loops, dofs).solve(residual, miss));
+    }
+    VectorXd x(leg.nq() + leg.nv());
+    x << q, VectorXd::Zero(leg.nv());
+    out.lifted.trajectory.xs.push_back(x);
+    out.lifted.constraints.push_back(set);
+    out.lifted.dt.push_back(k == 10 ? 0 : 0.02);
+    out.kept.v.push_back(Eigen::Vector3d(0.18 * std::cos(9 * t), 1.4 * std::cos(7 * t), -1.5 * std::cos(5 * t + 0.4)));
+    out.kept.a.push_back(Eigen::Vector3d(-1.6 * std::sin(9 * t), -9.8 * std::sin(7 * t), 7.5 * std::sin(5 * t + 0.4)));
+    out.kept.forces.push_back(Vector3d(1.5 * std::sin(t), 0.3, 12));
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("design gradient: the margin is that of the lift") {
+  const Parametrization robot = makeParametrization(readDesignSpec(kKnee));
+  const auto make = [&](double margin) {
+    EvaluationOptions options;
+    options.mode = MotionMode::Kept;
+    options.margin = margin;
+    return DesignEvaluator(robot, {makeSmallSquat()}, {{Measure::RmsTorque, {}, 1}}, options);
+  };
+  const MeasurePieces limits = make(0.1).differentiate(robot.start()).limits;
+  const double least = std::sqrt(square(1.01 * 0.1) - limits.values.maxCoeff());
+  CHECK(least < 0.5);
+  CHECK_NOTHROW(make(least * (1 - 1e-6)));
+  CHECK_THROWS_WITH(make(least * (1 + 1e-6)), Contains("nearer to a dead point"));
+}
+
+TEST_CASE("design gradient: parameters of a five-bar leg") {
+  std::vector<DesignVariable> variables;
+  for (const auto& [name, lower, upper] :
+       {std::tuple{"upper_length", 0.08, 0.14}, {"lower_length", 0.17, 0.25}, {"motor_mass", 0.1, 0.5}}) {
+    DesignVariable variable;
+    variable.name = variable.parameter = name, variable.lower = lower, variable.upper = upper;
+    variables.push_back(variable);
+  }
+  const Parametrization robot("fivebar_leg", {}, variables);
+  const std::vector<Measure> measures = {Measure::PeakTorque, Measure::RmsTorque, Measure::Energy};
+  const auto calcPieces = [&](const VectorXd& x, const std::vector<ModelVariation>& directions) {
+    const Model leg = robot.make(x);
+    const LegMotion motion = makeLegMotion(leg);
+    const MotorSlopes slopes = calcMotorSlopes(leg, findLegDofs(leg), motion.kept, motion.lifted, directions);
+    CHECK(slopes.failure.empty());
+    std::vector<MeasurePieces> out;
+    for (const Measure measure : measures) out.push_back(calcMeasurePieces(measure, {0, 1}, {slopes}));
+    out.push_back(calcMarginPieces(0.1, {slopes}));
+    return out;
+  };
+  const VectorXd x = robot.start() + Eigen::Vector3d(0.01, 0.005, 0.03);
+  const std::vector<MeasurePieces> analytic = calcPieces(x, calcDesignVariations(robot, x));
+  CHECK(analytic[0].values.size() == 24);
+  for (size_t i = 0; i < analytic.size(); ++i) {
+    CAPTURE(i);
+    checkDerivative(analytic[i].gradients,
+                    differentiate(x, 1e-4, [&](const VectorXd& other) { return calcPieces(other, {})[i].values; }));
+  }
+}
+
+TEST_CASE("design gradient: searches with gradients take kinks and limits") {
+  SearchProblem problem;
+  problem.lower = Eigen::Vector2d(-1, 0), problem.upper = Eigen::Vector2d(3, 10), problem.start = Eigen::Vector2d(2, 9);
+  int calls = 0;
+  bool limited = false;
+  problem.sloped = [&](const VectorXd& x, const SearchStage&) {
+    ++calls;
+    SlopedValue out;
+    // max(|x - 1|, |y - 4|) + (x + y - 6)^2 / 8: with s = x - 1 = y - 4 the sum is s + (2 s - 1)^2 / 8, least at s = 0.
+    MeasurePieces kinks{VectorXd(4), MatrixXd(4, 2)};
+    kinks.values << x[0] - 1, 1 - x[0], x[1] - 4, 4 - x[1];
+    kinks.gradients << 1, 0, -1, 0, 0, 1, 0, -1;
+    const double rest = x[0] + x[1] - 6;
+    out.terms = {kinks, {VectorXd::Constant(1, rest * rest / 8), MatrixXd::Constant(1, 2, rest / 4)}};
+    out.value = kinks.values.maxCoeff() + rest * rest / 8;
+    if (limited) out.limits = {VectorXd::Constant(1, x[0] * x[0] - 0.25), Eigen::RowVector2d(2 * x[0], 0)};  // x <= 1/2
+    if (limited && x[0] > 0.501) out.value = 100;  // the search is told a tighter limit
+    return out;
+  };
+  for (const SearchAlgorithm algorithm : {SearchAlgorithm::Slsqp, SearchAlgorithm::Mma}) {
+    CAPTURE(getName(algorithm));
+    calls = 0, limited = false;
+    problem.start = Eigen::Vector2d(2, 9);
+    SearchResult result = minimizeByStages(problem, {{algorithm, 200, 1e-7}}, 1);
+    CHECK((result.x - Eigen::Vector2d(1, 4)).norm() < 1e-4);
+    CHECK(result.value == Approx(0.125).epsilon(1e-4));
+    CHECK(result.evaluations == calls);
+    // With x <= 1/2 the largest is 1/2 for y in 3.5 .. 4.5, and y = 4.5 has the least rest.
+    limited = true;
+    problem.start = Eigen::Vector2d(-0.5, 9);
+    result = minimizeByStages(problem, {{algorithm, 400, 1e-9}}, 1);
+    CHECK((result.x - Eigen::Vector2d(0.5, 4.5)).norm() < 1e-3);
+  }
+  // From where nothing can be differentiated, nothing is searched; what is thrown comes out.
+  problem.sloped = [](const VectorXd&, const SearchStage&) { return SlopedValue{3, {}, {}}; };
+  CHECK(minimizeByStages(problem, {{SearchAlgorithm::Slsqp, 10, 1e-3}}, 1).evaluations == 1);
+  problem.sloped = [](const VectorXd&, const SearchStage&) -> SlopedValue { throw ModelError("a", "b", "c", "d"); };
+  CHECK_THROWS_AS(minimizeByStages(problem, {{SearchAlgorithm::Mma, 10, 1e-3}}, 1), ModelError);
+}
+
+namespace {
+
+std::string readFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+// Bipetto's knee with a short squat, searched by one algorithm.
+std::string makeSpec(const std::string& algorithm) {
+  std::string text = readFile(kKnee);
+  text = replaceOnce(text, "robot: bipetto", "robot: " + std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
+  text = replaceOnce(text, "{depth: 0.6}", "{depth: 0.8, duration: 0.6, settle: 0.1, time_step: 0.02}");
+  text = replaceOnce(text, "  - {motion: walk, set: {speed: 0.5}}\n", "");
+  text = replaceOnce(text, "mode: reoptimized", "mode: kept\nmargin: 0.15");
+  const size_t search = text.find("search:");
+  return text.substr(0, search) + "search:\n  searches: 1\n  stages:\n    - {algorithm: " + algorithm +
+         ", evaluations: 60}\n";
+}
+
+double readValue(const std::string& page) {
+  const std::string row = "| value | 1 | ";
+  return std::strtod(page.c_str() + page.find(row) + row.size(), nullptr);
+}
+
+}  // namespace
+
+TEST_CASE("design gradient: bielle design by gradients, resumed, in fewer evaluations") {
+  const RobotDirectory directory;
+  const auto run = [&](const std::string& algorithm, const std::string& out) {
+    const std::string spec = directory.write("spec.yaml", makeSpec(algorithm));
+    const CommandResult result = runCommand({BIELLE_COMMAND, "design", spec, "-o", out});
+    INFO(result.err);
+    REQUIRE(result.status == 0);
+    return result;
+  };
+  const std::string whole = directory.path() + "/whole", cut = directory.path() + "/cut";
+  run("slsqp", whole);
+  const std::string log = readFile(whole + "/search1.jsonl"), page = readFile(whole + "/design.md");
+  const auto evaluations = std::count(log.begin(), log.end(), '\n') - 1;
+  CHECK_THAT(log, Contains("\"gradients\""));
+  CHECK(evaluations < 30);
+
+  // Cut in the middle of an evaluation: the same points from there on, and the same robot.
+  std::filesystem::create_directory(cut);
+  std::ofstream(cut + "/search1.jsonl", std::ios::binary) << log.substr(0, log.size() / 2);
+  CHECK_THAT(run("slsqp", cut).out, !Contains(", 0 of them from the logs"));
+  CHECK(readFile(cut + "/design.md") == page);
+  CHECK(readFile(cut + "/best/best.urdf") == readFile(whole + "/best/best.urdf"));
+  const std::string resumed = readFile(cut + "/search1.jsonl");
+  CHECK(std::count(resumed.begin(), resumed.end(), '\n') - 1 == evaluations);
+
+  // Without gradients twice the evaluations do not come as far; the other algorithm does.
+  run("sbplx", directory.path() + "/sbplx");
+  run("mma", directory.path() + "/mma");
+  const double slsqp = readValue(page), sbplx = readValue(readFile(directory.path() + "/sbplx/design.md")),
+               mma = readValue(readFile(directory.path() + "/mma/design.md"));
+  CAPTURE(evaluations, slsqp, sbplx, mma);
+  CHECK(slsqp < 0.9);
+  CHECK(slsqp < sbplx + 1e-3);
+  CHECK(mma == Approx(slsqp).epsilon(1e-2));
+}
+
+TEST_CASE("design gradient: stages that need gradients are refused where there are none") {
+  const RobotDirectory directory;
+  const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
+    const std::string spec = directory.write("spec.yaml", replaceOnce(makeSpec("slsqp"), from, to));
+    const CommandResult result = runCommand({BIELLE_COMMAND, "design", spec, "-o", directory.path() + "/out"});
+    CAPTURE(to, result.err);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, Contains(problem) && Contains("line "));
+  };
+  check("mode: kept\nmargin: 0.15", "mode: reoptimized", "give `mode: kept`, or bobyqa or sbplx");
+  check("measure: peak_torque", "measure: conditioning", "which conditioning does not have");
+  check("mode: kept", "mode: reoptimized", "only motions that are kept have a margin");
+  check("margin: 0.15", "margin: 1.5", "outside");
+
+  const Parametrization robot = makeParametrization(readDesignSpec(kKnee));
+  CHECK_THROWS_WITH(
+      DesignEvaluator(robot, {makeSmallSquat()}, {{Measure::Conditioning, {}, 1}}).differentiate(robot.start()),
+      Contains("mode: kept"));
 }

@@ -278,20 +278,22 @@ TEST_CASE("variation: motor torques, forces and closing of a kept motion") {
         KeptMotion other(moved, kept);
         REQUIRE(other.update(makeConstraintSet(moved, contacts), moved.integrate(q, d), v, a, forces) ==
                 KeptMotionStatus::Ok);
-        VectorXd out(3 * nv + nu + rows);
-        out << d, other.v(), other.a(), other.u(), other.lambda();
+        VectorXd out(4 * nv + nu + rows);
+        out << d, other.v(), other.a(), other.tangent() * a, other.u(), other.lambda();
         return out;
       });
       MatrixXd analytic(numeric.rows(), numeric.cols());
       for (Eigen::Index i = 0; i < numeric.cols(); ++i) {
         KeptMotion::Variation variation(model);
         REQUIRE(motion.calcVariation(directions[i], variation) == KeptMotionStatus::Ok);
-        analytic.col(i) << variation.motion.q, variation.motion.v, variation.motion.a, variation.u, variation.lambda;
+        analytic.col(i) << variation.motion.q, variation.motion.v, variation.motion.a,
+            motion.calcTangentVariation(directions[i], variation.motion, a), variation.u, variation.lambda;
       }
       checkDerivative(analytic.topRows(nv), numeric.topRows(nv), "q");
       checkDerivative(analytic.middleRows(nv, nv), numeric.middleRows(nv, nv), "v");
       checkDerivative(analytic.middleRows(2 * nv, nv), numeric.middleRows(2 * nv, nv), "a");
-      checkDerivative(analytic.middleRows(3 * nv, nu), numeric.middleRows(3 * nv, nu), "u");
+      checkDerivative(analytic.middleRows(3 * nv, nv), numeric.middleRows(3 * nv, nv), "T a");
+      checkDerivative(analytic.middleRows(4 * nv, nu), numeric.middleRows(4 * nv, nu), "u");
       checkDerivative(analytic.bottomRows(rows), numeric.bottomRows(rows), "lambda");
     }
 }

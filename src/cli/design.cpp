@@ -34,6 +34,7 @@ int run(const DesignArguments& arguments) {
   EvaluationOptions options;
   options.mode = spec.mode;
   options.drives = spec.drives;
+  options.margin = spec.margin;
   const DesignEvaluator evaluator(robot, motions, spec.objective, options);
 
   DesignRunOptions run_options;
@@ -90,6 +91,7 @@ void addDesign(CLI::App& app, Action& action) {
       "  motions:\n"
       "    - {motion: squat, set: {depth: 0.6}}\n"
       "  mode: reoptimized          (or `kept`: postures of the start design, motor torques computed anew)\n"
+      "  margin: 0.1                (kept motions: the least that a joint moves in a unit motion of its linkage)\n"
       "  objective:                 (peak_torque, rms_torque, energy, electrical_energy [J], conditioning, workspace;\n"
       "                              over their start values; all motors when none are named)\n"
       "    - {measure: peak_torque, motors: [motor_knee_left, motor_knee_right], weight: 1}\n"
@@ -99,7 +101,9 @@ void addDesign(CLI::App& app, Action& action) {
       "  search:\n"
       "    seed: 1\n"
       "    searches: 2\n"
-      "    stages:                  (crs or isres, then bobyqa or sbplx)\n"
+      "    stages:                  (crs or isres, then bobyqa or sbplx; with `mode: kept` and peak_torque, "
+      "rms_torque\n"
+      "                             or energy also slsqp or mma: gradients, far fewer evaluations)\n"
       "      - {algorithm: crs, evaluations: 200}\n"
       "      - {algorithm: sbplx, evaluations: 100, tolerance: 1e-3}\n"
       "Every evaluation is logged: after Ctrl-C or a crash the same command goes on from there and ends the same way.\n"

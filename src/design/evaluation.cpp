@@ -14,6 +14,8 @@
 namespace bielle {
 namespace {
 
+constexpr double kLimitShare = 1.01;  // of the margin: searches that end at a limit end inside of it
+
 // A motion of the start design.
 struct SolvedMotion {
   MotionRecord record;
@@ -105,7 +107,8 @@ void setStart(const Model& model, const SolvedMotion& solved, Motion& motion) {
   setClosedGuess(solved.record, motion);
 }
 
-Outcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::vector<MotorDrive>& drives) {
+Outcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::vector<MotorDrive>& drives,
+                   double margin) {
   Outcome out;
   out.lifted = liftMotion(model, kept);
   const LiftResult& lifted = out.lifted;
@@ -116,6 +119,11 @@ Outcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::
   }
   out.measures = calcMotionMeasures(model, lifted.dt, lifted.trajectory, drives);
   out.missing = 0;
+  const auto near = std::find_if(lifted.nodes.begin(), lifted.nodes.end(),
+                                 [margin](const LiftNode& node) { return node.margin < margin; });
+  if (near == lifted.nodes.end()) return out;
+  out.missing = static_cast<double>(lifted.nodes.end() - near) / static_cast<double>(lifted.nodes.size());
+  out.message = "a linkage comes nearer to a dead point than the margin";
   return out;
 }
 
@@ -251,21 +259,22 @@ void DesignEvaluator::Data::makeMotions(const Model& model, Evaluation& out, std
   for (size_t i = 0; i < motions.size(); ++i) {
     Outcome outcome;
     if (options.mode == MotionMode::Kept) {
-      outcome = keepMotion(model, *solved[i].serial, drives);
+      outcome = keepMotion(model, *solved[i].serial, drives, options.margin);
     } else {
       Motion motion = makeReducedMotion(model, motions[i]);
       setStart(model, solved[i], motion);
       outcome = solveMotion(model, motion, options.solver, drives);
     }
     missing += outcome.missing / static_cast<double>(motions.size());
-    if (outcome.missing > 0 || !std::isfinite(outcome.measures.conditioning)) {
+    const bool failed = outcome.missing > 0 || !std::isfinite(outcome.measures.conditioning);
+    if (lifted) lifted->push_back(std::move(outcome.lifted));
+    if (failed && out.status == DesignStatus::Feasible) {
       out.status = DesignStatus::MotionFailed;
       out.message = outcome.missing > 0 ? outcome.message : "a dead point of the motors";
       out.value = weight * (1.5 + 0.5 * std::max(missing, 1e-3));
-      return;
     }
+    if (failed && !lifted) return;
     out.motions.push_back(outcome.measures);
-    if (lifted) lifted->push_back(std::move(outcome.lifted));
   }
 }
 
@@ -342,12 +351,13 @@ Evaluation DesignEvaluator::evaluate(const VectorXd& x) const { return data_->ev
 SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
   data_->checkGradient();
   std::vector<LiftResult> lifted;
-  SlopedEvaluation out{data_->evaluate(x, &lifted), {}};
-  if (out.evaluation.status != DesignStatus::Feasible) return out;
+  SlopedEvaluation out{data_->evaluate(x, &lifted), {}, {}};
+  if (lifted.size() < data_->motions.size()) return out;
   const Model model = data_->robot.make(x);
   const std::vector<ModelVariation> variations = calcDesignVariations(data_->robot, x);
   std::vector<MotorSlopes> slopes;
   for (size_t i = 0; i < lifted.size(); ++i) {
+    if (!lifted[i].lifted()) return out;
     const SolvedMotion& kept = data_->solved[i];
     slopes.push_back(calcMotorSlopes(model, kept.kept_dofs, *kept.serial, lifted[i], variations));
     if (slopes.back().failure.empty()) continue;
@@ -361,6 +371,7 @@ SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
     out.terms[i].values *= scale;
     out.terms[i].gradients *= scale;
   }
+  out.limits = calcMarginPieces(kLimitShare * data_->options.margin, slopes);
   return out;
 }
 

@@ -22,11 +22,40 @@ DesignStatus readStatus(const std::string& name) {
   return DesignStatus::Feasible;
 }
 
+VectorXd readVector(const Json& json) {
+  const std::vector<double> x = json;
+  return VectorXd::Map(x.data(), static_cast<Eigen::Index>(x.size()));
+}
+
+Json formatVector(const VectorXd& x) { return std::vector<double>(x.begin(), x.end()); }
+
+MeasurePieces readPieces(const Json& json) {
+  const VectorXd values = readVector(json.at("pieces"));
+  const Json& rows = json.at("gradients");
+  MatrixXd gradients(values.size(), values.size() ? static_cast<Eigen::Index>(rows.at(0).size()) : 0);
+  for (Eigen::Index i = 0; i < gradients.rows(); ++i) gradients.row(i) = readVector(rows.at(i)).transpose();
+  return {values, gradients};
+}
+
+Json formatPieces(const MeasurePieces& pieces) {
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < pieces.gradients.rows(); ++i) rows.push_back(formatVector(pieces.gradients.row(i)));
+  return {{"pieces", formatVector(pieces.values)}, {"gradients", rows}};
+}
+
 LoggedEvaluation readLine(const std::string& line) {
   const Json json = Json::parse(line);
-  const std::vector<double> x = json.at("x");
-  return {json.at("stage"), VectorXd::Map(x.data(), static_cast<Eigen::Index>(x.size())), readStatus(json.at("status")),
-          json.at("value"), json.at("seconds")};
+  LoggedEvaluation out{json.at("stage"),
+                       readVector(json.at("x")),
+                       readStatus(json.at("status")),
+                       json.at("value"),
+                       json.at("seconds"),
+                       {},
+                       {}};
+  if (!json.contains("terms")) return out;
+  for (const Json& term : json.at("terms")) out.terms.push_back(readPieces(term));
+  out.limits = readPieces(json.at("limits"));
+  return out;
 }
 
 }  // namespace
@@ -95,11 +124,13 @@ std::optional<LoggedEvaluation> EvaluationLog::replay(const std::string& stage, 
 }
 
 void EvaluationLog::append(const LoggedEvaluation& e) {
-  const Json json = {{"stage", e.stage},
-                     {"x", std::vector<double>(e.x.begin(), e.x.end())},
-                     {"status", getName(e.status)},
-                     {"value", e.value},
-                     {"seconds", e.seconds}};
+  Json json = {{"stage", e.stage},
+               {"x", formatVector(e.x)},
+               {"status", getName(e.status)},
+               {"value", e.value},
+               {"seconds", e.seconds}};
+  if (!e.terms.empty()) json["limits"] = formatPieces(e.limits);
+  for (const MeasurePieces& term : e.terms) json["terms"].push_back(formatPieces(term));
   write(json.dump());
 }
 

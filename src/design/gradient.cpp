@@ -1,5 +1,6 @@
 #include "bielle/design/gradient.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -78,15 +79,42 @@ void addEnergy(const MotorSlopes& motion, int m, Eigen::Index piece, MeasurePiec
   }
 }
 
+// Nodes of a stretch: begin, end.
+std::pair<int, int> getStretch(const MotorSlopes& motion, int stretch) {
+  return {stretch * countNodes(motion) / kStretches, (stretch + 1) * countNodes(motion) / kStretches};
+}
+
 // Eq. (3)
 void addPeak(const MotorSlopes& motion, int m, int stretch, Eigen::Index piece, MeasurePieces& out) {
-  const int begin = stretch * countNodes(motion) / kStretches, end = (stretch + 1) * countNodes(motion) / kStretches;
+  const auto [begin, end] = getStretch(motion, stretch);
   for (int k = begin; k < end; ++k) {
     if (!(std::abs(motion.u(m, k)) > out.values[piece])) continue;
     out.values[piece] = std::abs(motion.u(m, k));
     for (size_t i = 0; i < motion.du.size(); ++i)
       out.gradients(piece, i) = motion.u(m, k) < 0 ? -motion.du[i](m, k) : motion.du[i](m, k);
   }
+}
+
+// Positions among the kept dofs of those of each loop cluster.
+std::vector<std::vector<int>> groupByCluster(const Model& model, const std::vector<int>& kept) {
+  std::vector<std::vector<int>> out;
+  for (const LoopCluster& cluster : model.clusters()) {
+    out.emplace_back();
+    for (size_t i = 0; i < kept.size(); ++i)
+      if (std::binary_search(cluster.dofs.begin(), cluster.dofs.end(), kept[i]))
+        out.back().push_back(static_cast<int>(i));
+  }
+  return out;
+}
+
+// w of Eq. (4), as speeds of all kept dofs.
+VectorXd findFastest(const MatrixXd& T, const std::vector<int>& columns) {
+  MatrixXd T_c(T.rows(), columns.size());
+  for (size_t i = 0; i < columns.size(); ++i) T_c.col(static_cast<Eigen::Index>(i)) = T.col(columns[i]);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(T_c.transpose() * T_c);
+  VectorXd w = VectorXd::Zero(T.cols());
+  for (size_t i = 0; i < columns.size(); ++i) w[columns[i]] = solver.eigenvectors()(i, T_c.cols() - 1);
+  return w;
 }
 
 }  // namespace
@@ -112,31 +140,76 @@ std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, c
   return out;
 }
 
+namespace {
+
+class SlopeRecorder {
+ public:
+  SlopeRecorder(const Model& model, const std::vector<int>& kept, const std::vector<double>& dt,
+                const std::vector<ModelVariation>& variations)
+      : model_(model),
+        variations_(variations),
+        clusters_(groupByCluster(model, kept)),
+        motion_(model, kept),
+        variation_(model) {
+    const Eigen::Index N = static_cast<Eigen::Index>(dt.size()), c = static_cast<Eigen::Index>(clusters_.size());
+    const MatrixXd of_motors = MatrixXd::Zero(model.nu(), N), of_clusters = MatrixXd::Zero(c, N);
+    out_.dt = dt, out_.u = out_.v = of_motors, out_.margin = of_clusters;
+    out_.du.assign(variations.size(), of_motors), out_.dv = out_.du;
+    out_.dmargin.assign(variations.size(), of_clusters);
+  }
+
+  KeptMotionStatus record(int k, const SerialTrajectory& trajectory, const LiftResult& lifted) {
+    const KeptMotionStatus status = motion_.update(lifted.constraints[k], lifted.trajectory.xs[k].head(model_.nq()),
+                                                   trajectory.v[k], trajectory.a[k], trajectory.forces[k]);
+    if (status != KeptMotionStatus::Ok) return status;
+    write(k, motion_.u(), motion_.v(), out_.u, out_.v);
+    std::vector<VectorXd> fastest;
+    for (size_t c = 0; c < clusters_.size(); ++c) {
+      fastest.push_back(findFastest(motion_.tangent(), clusters_[c]));
+      out_.margin(c, k) = 1 / (motion_.tangent() * fastest[c]).squaredNorm();
+    }
+    for (size_t i = 0; i < variations_.size(); ++i) {
+      const KeptMotionStatus varied = motion_.calcVariation(variations_[i], variation_);
+      if (varied != KeptMotionStatus::Ok) return varied;
+      write(k, variation_.u, variation_.motion.v, out_.du[i], out_.dv[i]);
+      for (size_t c = 0; c < clusters_.size(); ++c) {
+        const double slope = (motion_.tangent() * fastest[c])
+                                 .dot(motion_.calcTangentVariation(variations_[i], variation_.motion, fastest[c]));
+        out_.dmargin[i](c, k) = -2 * slope * out_.margin(c, k) * out_.margin(c, k);  // Eq. (4)
+      }
+    }
+    return status;
+  }
+
+  MotorSlopes take() { return std::move(out_); }
+
+ private:
+  void write(int k, const VectorXd& u, const VectorXd& v, MatrixXd& to_u, MatrixXd& to_v) const {
+    if (out_.dt[k] > 0) to_u.col(k) = u;
+    for (int m = 0; m < model_.nu(); ++m) to_v(m, k) = v[model_.motors()[m].dof];
+  }
+
+  const Model& model_;
+  const std::vector<ModelVariation>& variations_;
+  std::vector<std::vector<int>> clusters_;
+  KeptMotion motion_;
+  KeptMotion::Variation variation_;
+  MotorSlopes out_;
+};
+
+}  // namespace
+
 MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dofs, const SerialTrajectory& trajectory,
                             const LiftResult& lifted, const std::vector<ModelVariation>& variations) {
-  const int N = static_cast<int>(lifted.dt.size()), nu = model.nu();
-  MotorSlopes out{lifted.dt, MatrixXd(nu, N), MatrixXd(nu, N), {}, {}, ""};
-  out.du.assign(variations.size(), MatrixXd::Zero(nu, N));
-  out.dv = out.du;
-  KeptMotion motion(model, kept_dofs);
-  KeptMotion::Variation variation(model);
-  for (int k = 0; k < N; ++k) {
-    KeptMotionStatus status = motion.update(lifted.constraints[k], lifted.trajectory.xs[k].head(model.nq()),
-                                            trajectory.v[k], trajectory.a[k], trajectory.forces[k]);
-    for (size_t i = 0; i < variations.size() && status == KeptMotionStatus::Ok; ++i) {
-      status = motion.calcVariation(variations[i], variation);
-      if (status != KeptMotionStatus::Ok) break;
-      if (lifted.dt[k] > 0) out.du[i].col(k) = variation.u;
-      for (int m = 0; m < nu; ++m) out.dv[i](m, k) = variation.motion.v[model.motors()[m].dof];
-    }
-    if (status != KeptMotionStatus::Ok) {
-      out.failure = std::string("no gradient at node ") + std::to_string(k) + ": " + getMessage(status);
-      return out;
-    }
-    out.u.col(k) = lifted.dt[k] > 0 ? motion.u() : VectorXd(VectorXd::Zero(nu));
-    for (int m = 0; m < nu; ++m) out.v(m, k) = motion.v()[model.motors()[m].dof];
+  SlopeRecorder recorder(model, kept_dofs, lifted.dt, variations);
+  for (int k = 0; k < static_cast<int>(lifted.dt.size()); ++k) {
+    const KeptMotionStatus status = recorder.record(k, trajectory, lifted);
+    if (status == KeptMotionStatus::Ok) continue;
+    MotorSlopes out;
+    out.failure = "no gradient at node " + std::to_string(k) + ": " + getMessage(status);
+    return out;
   }
-  return out;
+  return recorder.take();
 }
 
 MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
@@ -152,6 +225,24 @@ MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
       for (int s = 0; s < stretches; ++s, ++piece)
         if (measure == Measure::PeakTorque) addPeak(motion, m, s, piece, out);
     }
+  return out;
+}
+
+MeasurePieces calcMarginPieces(double least, const std::vector<MotorSlopes>& motions) {
+  const Eigen::Index clusters = motions.front().margin.rows();
+  MeasurePieces out = makePieces(motions.size() * clusters * kStretches, motions.front().dmargin.size());
+  Eigen::Index piece = 0;
+  for (const MotorSlopes& motion : motions)
+    for (Eigen::Index c = 0; c < clusters; ++c)
+      for (int s = 0; s < kStretches; ++s, ++piece) {
+        out.values[piece] = least * least - 1;  // no margin is larger than 1
+        const auto [begin, end] = getStretch(motion, s);
+        for (int k = begin; k < end; ++k) {
+          if (!(least * least - motion.margin(c, k) > out.values[piece])) continue;
+          out.values[piece] = least * least - motion.margin(c, k);
+          for (size_t i = 0; i < motion.dmargin.size(); ++i) out.gradients(piece, i) = -motion.dmargin[i](c, k);
+        }
+      }
   return out;
 }
 

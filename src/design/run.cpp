@@ -76,26 +76,38 @@ class DesignRunner {
 
   void search(size_t i) {
     const Parametrization& robot = evaluator_.robot();
-    const auto objective = [&](const VectorXd& x, const SearchStage& stage) { return evaluate(i, x, stage); };
-    minimizeByStages({robot.lower(), robot.upper(), robot.start(), objective}, spec_.stages,
+    const auto objective = [&](const VectorXd& x, const SearchStage& stage) { return evaluate(i, x, stage).value; };
+    const auto sloped = [&](const VectorXd& x, const SearchStage& stage) {
+      const LoggedEvaluation e = evaluate(i, x, stage);
+      return SlopedValue{e.value, e.terms, e.limits};
+    };
+    minimizeByStages({robot.lower(), robot.upper(), robot.start(), objective, sloped}, spec_.stages,
                      spec_.seed + static_cast<unsigned>(i));
   }
 
-  double evaluate(size_t i, const VectorXd& x, const SearchStage& stage) {
+  LoggedEvaluation evaluate(size_t i, const VectorXd& x, const SearchStage& stage) {
     if (stop_) throw std::runtime_error("another search failed");
     std::optional<LoggedEvaluation> found = logs_[i]->replay(getName(stage.algorithm), x);
     const bool replayed = found.has_value();
     if (!replayed) {
       const double begin = getThreadSeconds();
-      const Evaluation evaluation = evaluator_.evaluate(x);
-      found = {getName(stage.algorithm), x, evaluation.status, evaluation.value, getThreadSeconds() - begin};
+      const SlopedEvaluation sloped = needsGradient(stage.algorithm) ? evaluator_.differentiate(x)
+                                                                     : SlopedEvaluation{evaluator_.evaluate(x), {}, {}};
+      const Evaluation& evaluation = sloped.evaluation;
+      found = {getName(stage.algorithm),
+               x,
+               evaluation.status,
+               evaluation.value,
+               getThreadSeconds() - begin,
+               sloped.terms,
+               sloped.limits};
       logs_[i]->append(*found);
     }
     const std::lock_guard<std::mutex> lock(mutex_);
     run_.searches[i].push_back(*found);
     run_.replayed += replayed;
     report(i, *found, replayed);
-    return found->value;
+    return *found;
   }
 
   // A line when a design is the best so far, and now and then.

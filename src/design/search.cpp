@@ -1,31 +1,19 @@
-// The only file of the layer that knows NLopt.
 #include "bielle/design/search.h"
 
 #include <cmath>
-#include <exception>
 #include <limits>
-#include <nlopt.hpp>
+
+#include "design/nlopt_search.h"
 
 namespace bielle {
 namespace {
 
-// Searches see the bounds as 0 and 1.
-struct Search {
-  const SearchProblem& problem;
-  const SearchStage* stage = nullptr;
-  SearchResult best;
-  std::exception_ptr error;
-};
-
 double evaluate(const std::vector<double>& unit, std::vector<double>&, void* data) {
   Search& search = *static_cast<Search*>(data);
-  const SearchProblem& p = search.problem;
-  const VectorXd share = VectorXd::Map(unit.data(), static_cast<Eigen::Index>(unit.size()));
-  const VectorXd x = p.lower + share.cwiseProduct(p.upper - p.lower);
+  const VectorXd x = getPoint(search.problem, unit);
   try {
-    const double value = p.objective(x.cwiseMax(p.lower).cwiseMin(p.upper), *search.stage);
-    ++search.best.evaluations;
-    if (value < search.best.value) search.best.value = value, search.best.x = x.cwiseMax(p.lower).cwiseMin(p.upper);
+    const double value = search.problem.objective(x, *search.stage);
+    search.add(x, value);
     return value;
   } catch (...) {  // kept: NLopt would forget what it was
     search.error = std::current_exception();
@@ -41,24 +29,42 @@ nlopt::algorithm getAlgorithm(SearchAlgorithm algorithm) {
       return nlopt::GN_ISRES;
     case SearchAlgorithm::Bobyqa:
       return nlopt::LN_BOBYQA;
-    case SearchAlgorithm::Sbplx:
-      break;
+    default:
+      return nlopt::LN_SBPLX;
   }
-  return nlopt::LN_SBPLX;
 }
 
 void runStage(Search& search) {
   const SearchProblem& p = search.problem;
-  const unsigned n = static_cast<unsigned>(p.start.size());
-  nlopt::opt optimizer(getAlgorithm(search.stage->algorithm), n);
+  nlopt::opt optimizer(getAlgorithm(search.stage->algorithm), static_cast<unsigned>(p.start.size()));
   optimizer.set_min_objective(evaluate, &search);
   optimizer.set_lower_bounds(0);
   optimizer.set_upper_bounds(1);
+  optimizer.set_initial_step(0.1);
+  std::vector<double> unit = getShares(p, search.best.x);
+  runOptimizer(search, optimizer, unit);
+}
+
+}  // namespace
+
+VectorXd getPoint(const SearchProblem& p, const std::vector<double>& unit) {
+  const VectorXd share = VectorXd::Map(unit.data(), p.start.size());
+  return (p.lower + share.cwiseProduct(p.upper - p.lower)).cwiseMax(p.lower).cwiseMin(p.upper);
+}
+
+std::vector<double> getShares(const SearchProblem& p, const VectorXd& x) {
+  const VectorXd share = (x - p.lower).cwiseQuotient(p.upper - p.lower);
+  return {share.begin(), share.end()};
+}
+
+void Search::add(const VectorXd& x, double value) {
+  ++best.evaluations;
+  if (value < best.value) best.value = value, best.x = x;
+}
+
+void runOptimizer(Search& search, nlopt::opt& optimizer, std::vector<double>& unit) {
   optimizer.set_maxeval(search.stage->evaluations);
   optimizer.set_xtol_abs(search.stage->tolerance);
-  optimizer.set_initial_step(0.1);
-  std::vector<double> unit(n);
-  for (unsigned i = 0; i < n; ++i) unit[i] = (search.best.x[i] - p.lower[i]) / (p.upper[i] - p.lower[i]);
   double value = 0;
   try {
     optimizer.optimize(unit, value);
@@ -69,8 +75,6 @@ void runStage(Search& search) {
   }
 }
 
-}  // namespace
-
 const char* getName(SearchAlgorithm algorithm) {
   switch (algorithm) {
     case SearchAlgorithm::Crs:
@@ -80,9 +84,17 @@ const char* getName(SearchAlgorithm algorithm) {
     case SearchAlgorithm::Bobyqa:
       return "bobyqa";
     case SearchAlgorithm::Sbplx:
+      return "sbplx";
+    case SearchAlgorithm::Slsqp:
+      return "slsqp";
+    case SearchAlgorithm::Mma:
       break;
   }
-  return "sbplx";
+  return "mma";
+}
+
+bool needsGradient(SearchAlgorithm algorithm) {
+  return algorithm == SearchAlgorithm::Slsqp || algorithm == SearchAlgorithm::Mma;
 }
 
 SearchResult minimizeByStages(const SearchProblem& problem, const std::vector<SearchStage>& stages, unsigned seed) {
@@ -90,7 +102,7 @@ SearchResult minimizeByStages(const SearchProblem& problem, const std::vector<Se
   nlopt::srand(seed);  // of this thread alone
   for (const SearchStage& stage : stages) {
     search.stage = &stage;
-    runStage(search);
+    needsGradient(stage.algorithm) ? runSlopedStage(search) : runStage(search);
   }
   return search.best;
 }

@@ -146,6 +146,17 @@ ObjectiveTerm readTerm(const Entry& entry) {
   return term;
 }
 
+// A stage with gradients at `stage`, the mode and the objective having been read.
+void checkGradient(const DesignSpec& spec, const Entry& stage) {
+  if (spec.mode != MotionMode::Kept)
+    stage.fail("it needs gradients, which motions that are made anew for every design do not have",
+               "give `mode: kept`, or bobyqa or sbplx");
+  for (const ObjectiveTerm& term : spec.objective)
+    if (!hasGradient(term.measure))
+      stage.fail(std::string("it needs gradients, which ") + getName(term.measure) + " does not have",
+                 "choose among peak_torque, rms_torque and energy, or give bobyqa or sbplx");
+}
+
 void readSearch(const Entry& entry, DesignSpec& spec) {
   const Fields fields = entry.getFields({"seed", "searches", "stages"});
   if (const Entry* seed = find(fields, "seed")) spec.seed = static_cast<unsigned>(readCount(*seed, 1000000000));
@@ -156,9 +167,11 @@ void readSearch(const Entry& entry, DesignSpec& spec) {
   for (const Entry& item : stages->getList()) {
     const Fields stage_fields = item.getFields({"algorithm", "evaluations", "tolerance"});
     SearchStage stage;
-    stage.algorithm = readChoice<SearchAlgorithm>(
-        require(stage_fields, "algorithm", item),
-        {SearchAlgorithm::Crs, SearchAlgorithm::Isres, SearchAlgorithm::Bobyqa, SearchAlgorithm::Sbplx});
+    stage.algorithm =
+        readChoice<SearchAlgorithm>(require(stage_fields, "algorithm", item),
+                                    {SearchAlgorithm::Crs, SearchAlgorithm::Isres, SearchAlgorithm::Bobyqa,
+                                     SearchAlgorithm::Sbplx, SearchAlgorithm::Slsqp, SearchAlgorithm::Mma});
+    if (needsGradient(stage.algorithm)) checkGradient(spec, item);
     stage.evaluations = readCount(require(stage_fields, "evaluations", item), 1000000);
     if (const Entry* tolerance = find(stage_fields, "tolerance")) stage.tolerance = tolerance->getNumber();
     if (!(stage.tolerance >= 0 && stage.tolerance < 1))
@@ -169,8 +182,8 @@ void readSearch(const Entry& entry, DesignSpec& spec) {
 }
 
 void readRoot(const Entry& root, DesignSpec& spec) {
-  const Fields fields =
-      root.getFields({"robot", "generator", "set", "variables", "motions", "mode", "objective", "drives", "search"});
+  const Fields fields = root.getFields(
+      {"robot", "generator", "set", "variables", "motions", "mode", "margin", "objective", "drives", "search"});
   if (const Entry* robot = find(fields, "robot")) spec.robot = robot->getText();
   if (const Entry* generator = find(fields, "generator")) spec.generator = generator->getText();
   if (spec.robot.empty() == spec.generator.empty())
@@ -191,6 +204,11 @@ void readRoot(const Entry& root, DesignSpec& spec) {
   if (const Entry* drives = find(fields, "drives")) spec.drives = readDrives(*drives);
   if (const Entry* mode = find(fields, "mode"))
     spec.mode = readChoice<MotionMode>(*mode, {MotionMode::Reoptimized, MotionMode::Kept});
+  if (const Entry* margin = find(fields, "margin")) {
+    if (spec.mode != MotionMode::Kept) margin->fail("only motions that are kept have a margin", "give `mode: kept`");
+    spec.margin = margin->getNumber();
+    if (!(spec.margin >= 1e-3 && spec.margin < 1)) margin->fail("it is outside 0.001 .. 1", "give e.g. 0.1");
+  }
   for (const Entry& item : require(fields, "objective", root).getList()) spec.objective.push_back(readTerm(item));
   if (const Entry* search = find(fields, "search")) readSearch(*search, spec);
 }

@@ -134,25 +134,38 @@ KeptMotionStatus KeptMotion::update(const ConstraintSet& constraints, ConstVecto
       solution.segment(nu, nf);
 
   updatePositions(model_, virtual_ws_, q);
-  updateVelocities(model_, virtual_ws_, T_ * solution.tail(nk));
-  updateAccelerations(model_, virtual_ws_, VectorXd::Zero(model_.nv()));
+  m_ = T_ * solution.tail(nk);
   return KeptMotionStatus::Ok;
+}
+
+// n, and in `rows` e, for a velocity v that is closed: Eq. (5).
+VectorXd KeptMotion::calcLift(const ModelVariation& change, const VectorXd& dq, const VectorXd& v, VectorXd& rows) {
+  updateVelocities(model_, virtual_ws_, v);
+  updateAccelerations(model_, virtual_ws_, VectorXd::Zero(model_.nv()));
+  MotionVariation motion(model_);
+  motion.q = dq;
+  VariationWorkspace variation(model_);
+  updateVariation(model_, virtual_ws_, change, motion, variation);
+  rows = calcVelocityVariation(model_, virtual_ws_, constraints_, change, variation);
+  return -closing_->solve(rows.head(loops_.rows), VectorXd::Zero(T_.cols()));
+}
+
+VectorXd KeptMotion::calcTangentVariation(const ModelVariation& change, const MotionVariation& motion,
+                                          ConstVectorRef w) {
+  VectorXd rows;
+  return calcLift(change, motion.q, T_ * w, rows);
 }
 
 KeptMotionStatus KeptMotion::calcVariation(const ModelVariation& change, Variation& out) {
   const Eigen::Index nu = model_.nu(), nf = J_contacts_.rows(), nk = T_.cols(), loops = loops_.rows;
-  const VectorXd still = VectorXd::Zero(nk);
   closing_->calcMotion(model_, ws_, change, out.motion);
   VariationWorkspace variation(model_);
   updateVariation(model_, ws_, change, out.motion, variation);
   const VectorXd force =
       calcInverseDynamicsVariation(model_, ws_, constraints_, lambda_, change, out.motion, variation);
 
-  MotionVariation moved(model_);  // m stays as it is
-  moved.q = out.motion.q;
-  updateVariation(model_, virtual_ws_, change, moved, variation);
-  const VectorXd e = calcVelocityVariation(model_, virtual_ws_, constraints_, change, variation);
-  const VectorXd n = -closing_->solve(e.head(loops), still);
+  VectorXd e;
+  const VectorXd n = calcLift(change, out.motion.q, m_, e);
   VectorXd rhs(nu + nf + nk), solution;
   rhs << -selectMotors(n), -(e.tail(nf) + J_contacts_ * n), T_.transpose() * force;
   if (!solveBalance(rhs, solution)) return KeptMotionStatus::Unbalanced;  // Eq. (5)

@@ -46,6 +46,9 @@ struct EvaluationOptions {
   FddpOptions solver = makeSolverOptions();
   int postures = 6;  ///< of each motion, for (2)
   DriveTable drives;
+  /// Kept motions whose linkages come nearer to a dead point are none (LiftOptions::singular): the least that a joint moves
+  /// in a unit motion of its linkage.
+  double margin = 1e-3;
 
   /// Tolerances of engineering: a cost that changes by less than 1e-8 of itself is done. One thread.
   static FddpOptions makeSolverOptions();
@@ -65,7 +68,10 @@ struct Evaluation {
 /// An evaluation and how its terms change.
 struct SlopedEvaluation {
   Evaluation evaluation;
-  std::vector<MeasurePieces> terms;  ///< w_i m_i / m_i0 of Eq. (1) in pieces, when feasible
+  /// w_i m_i / m_i0 of Eq. (1) in pieces; also of designs whose motions come too near to dead points, none of other infeasible
+  /// ones.
+  std::vector<MeasurePieces> terms;
+  MeasurePieces limits;  ///< a hundredth tighter than EvaluationOptions::margin, <= 0
 };
 
 /// Makes the motions of the start design when it is made; designs are then evaluated each by itself, so that the result

@@ -9,6 +9,12 @@
 ///     peak torque in a stretch of the motion    p = |u(k)|,               dp = sign(u(k)) du(k)                     (3)
 /// with k the node of the largest |u| in the stretch. Of a peak torque, the piece of every motor, motion and stretch counts:
 /// where one peak is shaved another takes over, and a search that minimizes the largest needs to see both.
+///
+/// The torques of a kept motion end where a linkage comes to a dead point of its joints, and torques fall right before it, so
+/// that searches run into this wall. With T_c the tangent of a loop cluster for unit speeds of its joints, w the right
+/// singular vector of its largest singular value and mu = 1 / |T_c w| its margin (linkage.h), a design is kept from it by
+///     mu(k)^2 >= least^2,    d mu^2 = -2 mu^4 (T_c w) . d(T_c w)                                                    (4)
+/// for the smallest mu in every stretch. The square falls linearly towards a dead point, where mu itself has a vertical slope.
 #include <string>
 
 #include "bielle/design/measures.h"
@@ -33,7 +39,9 @@ struct MotorSlopes {
   std::vector<double> dt;        ///< N, s
   MatrixXd u, v;                 ///< nu x N
   std::vector<MatrixXd> du, dv;  ///< per variable, nu x N
-  std::string failure;           ///< why there are none, or empty
+  MatrixXd margin;               ///< loop clusters x N, mu^2 of Eq. (4)
+  std::vector<MatrixXd> dmargin;
+  std::string failure;  ///< why there are none, or empty
 };
 /// \param kept_dofs  of the model, in the order of the velocities of the serial trajectory
 /// \param lifted  all of the trajectory, lifted to the model
@@ -48,5 +56,8 @@ struct MeasurePieces {
 /// Eqs. (1) to (3) over the motors named and all motions: always as many pieces for the same motions and motors.
 MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
                                 const std::vector<MotorSlopes>& motions);
+
+/// Eq. (4) as pieces p <= 0: least^2 - mu^2 of every cluster, motion and stretch.
+MeasurePieces calcMarginPieces(double least, const std::vector<MotorSlopes>& motions);
 
 }  // namespace bielle

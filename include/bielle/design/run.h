@@ -24,7 +24,9 @@ struct LoggedEvaluation {
   VectorXd x;
   DesignStatus status = DesignStatus::Feasible;
   double value = 0;
-  double seconds = 0;  ///< processor time when it was done
+  double seconds = 0;                ///< processor time when it was done
+  std::vector<MeasurePieces> terms;  ///< SlopedEvaluation, in stages that need gradients
+  MeasurePieces limits;
 };
 
 struct DesignRun {

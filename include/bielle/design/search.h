@@ -1,9 +1,13 @@
 #pragma once
-/// \file Minimizing without derivatives inside bounds, by NLopt: a global algorithm, then a local one.
+/// \file Minimizing inside bounds by NLopt: a global algorithm, then a local one, with gradients where they exist.
+///
+/// Local algorithms with gradients minimize a sum of terms, each the largest of smooth pieces p_ij(x). The kinks of the
+/// largest are taken out by one more variable t_i for every term of several pieces,
+///     min_{x, t} sum_i t_i    s.t.  p_ij(x) <= t_i,  g_k(x) <= 0    (a term of one piece is added as it is)         (1)
 #include <functional>
 #include <vector>
 
-#include "bielle/math/types.h"
+#include "bielle/design/gradient.h"
 
 namespace bielle {
 
@@ -11,9 +15,12 @@ enum class SearchAlgorithm {
   Crs,     ///< controlled random search with local mutation; global
   Isres,   ///< improved stochastic ranking evolution strategy; global
   Bobyqa,  ///< quadratic models; local
-  Sbplx    ///< simplex on subspaces; local, takes kinks
+  Sbplx,   ///< simplex on subspaces; local, takes kinks
+  Slsqp,   ///< sequential quadratic programs (Kraft 1994); local, needs gradients
+  Mma      ///< moving asymptotes (Svanberg 2002); local, needs gradients
 };
 const char* getName(SearchAlgorithm algorithm);
+bool needsGradient(SearchAlgorithm algorithm);
 
 struct SearchStage {
   SearchAlgorithm algorithm = SearchAlgorithm::Crs;
@@ -21,9 +28,16 @@ struct SearchStage {
   double tolerance = 1e-3;  ///< done when steps are below, as a share of the width of the bounds
 };
 
+struct SlopedValue {
+  double value = 0;                  ///< finite
+  std::vector<MeasurePieces> terms;  ///< p_ij, always as many, of as many pieces; none where x is infeasible
+  MeasurePieces limits;              ///< g_k, which may be violated a little where there are terms
+};
+
 struct SearchProblem {
   VectorXd lower, upper, start;
-  std::function<double(const VectorXd& x, const SearchStage& stage)> objective;  ///< finite
+  std::function<double(const VectorXd& x, const SearchStage& stage)> objective;         ///< finite
+  std::function<SlopedValue(const VectorXd& x, const SearchStage& stage)> sloped = {};  ///< for stages with gradients
 };
 
 struct SearchResult {
@@ -32,7 +46,8 @@ struct SearchResult {
   int evaluations = 0;
 };
 
-/// Each stage starts from the best point so far, the first one from the start. The same seed gives the same points, in
+/// Each stage starts from the best point so far, the first one from the start. One with gradients is passed over where that point
+/// is infeasible, and steps back from infeasible points as from worse ones. The same seed gives the same points, in
 /// any thread. What the objective throws comes out of here.
 SearchResult minimizeByStages(const SearchProblem& problem, const std::vector<SearchStage>& stages, unsigned seed);
 

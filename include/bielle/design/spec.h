@@ -16,7 +16,8 @@
 ///   - {name: foot, parameter: ankle_height, unit: m, bounds: [0.05, 0.08]}    # of a generator
 /// motions:
 ///   - {motion: squat, set: {depth: 0.6}}
-/// mode: reoptimized              # or kept
+/// mode: reoptimized              # or kept, then with
+/// margin: 0.1                    # from dead points: the least that a joint moves in a unit motion of its linkage
 /// objective:                     # peak_torque, rms_torque, energy, electrical_energy, conditioning; all motors by default
 ///   - {measure: peak_torque, motors: [motor_knee_left, motor_knee_right], weight: 1}
 ///   - measure: workspace         # 1 / share of the places of a foot that can be reached (workspace.h)
@@ -29,7 +30,7 @@
 /// search:
 ///   seed: 1
 ///   searches: 2                  # independent ones, one thread each
-///   stages:                      # crs or isres, then bobyqa or sbplx
+///   stages:                      # crs or isres, then bobyqa or sbplx; slsqp or mma (gradients) for motions that are kept
 ///     - {algorithm: crs, evaluations: 200, tolerance: 1e-3}
 /// ```
 #include <string>
@@ -53,6 +54,7 @@ struct DesignSpec {
   std::vector<DesignVariable> variables;
   std::vector<MotionSpec> motions;
   MotionMode mode = MotionMode::Reoptimized;
+  double margin = EvaluationOptions().margin;
   std::vector<ObjectiveTerm> objective;
   DriveTable drives;
   unsigned seed = 1;

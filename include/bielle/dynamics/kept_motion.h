@@ -84,8 +84,11 @@ class KeptMotion {
     MotionVariation motion;
     VectorXd u, lambda;
   };
+  const MatrixXd& tangent() const { return T_; }  ///< T (nv x kept)
   /// After an update() that was Ok. Unbalanced where the changed mechanism could not make the motion.
   KeptMotionStatus calcVariation(const ModelVariation& change, Variation& out);
+  /// Change (nv) of T w for speeds w of the kept dofs, dq being that of the motion: Eq. (2) at v = T w.
+  VectorXd calcTangentVariation(const ModelVariation& change, const MotionVariation& motion, ConstVectorRef w);
 
  private:
   VectorXd selectMotors(const VectorXd& x) const;
@@ -94,11 +97,13 @@ class KeptMotion {
   const Model& model_;
   std::vector<int> kept_;
   ConstraintSet constraints_, loops_;
-  Workspace ws_, virtual_ws_;  // virtual_ws_: velocity m
+  VectorXd calcLift(const ModelVariation& change, const VectorXd& dq, const VectorXd& v, VectorXd& rows);
+
+  Workspace ws_, virtual_ws_;  // virtual_ws_: at the same configuration with other velocities
   std::optional<Closing> closing_;
   MatrixXd T_, J_contacts_, balance_;
   Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition_;
-  VectorXd v_, u_, lambda_;
+  VectorXd v_, u_, lambda_, m_;
 };
 
 }  // namespace bielle

@@ -1,0 +1,29 @@
+#pragma once
+// What the searches share, with and without gradients; only they know NLopt.
+#include <exception>
+#include <nlopt.hpp>
+
+#include "bielle/design/search.h"
+
+namespace bielle {
+
+struct Search {
+  const SearchProblem& problem;
+  const SearchStage* stage = nullptr;
+  SearchResult best;
+  std::exception_ptr error;
+
+  void add(const VectorXd& x, double value);  // an evaluation
+};
+
+// NLopt sees the bounds as 0 and 1.
+VectorXd getPoint(const SearchProblem& problem, const std::vector<double>& unit);
+std::vector<double> getShares(const SearchProblem& problem, const VectorXd& x);
+
+// By the stage's number of evaluations and tolerance; throws what the objective threw.
+void runOptimizer(Search& search, nlopt::opt& optimizer, std::vector<double>& unit);
+
+// Eq. (1) of search.h.
+void runSlopedStage(Search& search);
+
+}  // namespace bielle
