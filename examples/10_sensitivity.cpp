@@ -1,7 +1,7 @@
 /// \file What a length is worth: the motor torque of a closed chain, differentiated by the lengths of its rods.
 ///
-/// A motor turns the crank (length a, angle theta2) of a four-bar, whose rocker (c, theta4) shall swing in a given way; the
-/// coupler (b, theta3) ties them, the ground is d:
+/// A motor turns the crank (length a, angle theta2) of a four-bar, whose rocker (c, theta4) shall swing in a given way;
+/// the coupler (b, theta3) ties them, the ground is d:
 ///     a cos theta2 + b cos theta3 = d + c cos theta4,    a sin theta2 + b sin theta3 = c sin theta4.           (1)
 /// A longer coupler turns the rocker while the crank stands still. The component of d(1)/db along the coupler says
 ///     d theta4 / db = 1 / (c sin(theta3 - theta4)).                                                           (2)

@@ -1,5 +1,5 @@
-// Gradients of designs: the measures of kept motions and the searches that use them. Oracle: differences of fourth order over
-// designs, each made and lifted anew; minima by hand.
+// Gradients of designs: the measures of kept motions and the searches that use them. Oracle: differences of fourth
+// order over designs, each made and lifted anew; minima by hand.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -93,8 +93,8 @@ TEST_CASE("design gradient: Bipetto's knee, torques and energy of kept motions")
 
 namespace {
 
-// A leg of which rail and motors move along given curves, its foot on a spring that pushes up: N stages of a trajectory and
-// what a design makes of it.
+// A leg of which rail and motors move along given curves, its foot on a spring that pushes up: N stages of a trajectory
+// and what a design makes of it.
 struct LegMotion {
   SerialTrajectory kept;
   LiftResult lifted;

@@ -1,5 +1,5 @@
-// How dynamics, closing and motor torques change with the mechanism. Oracle: central differences (fourth order) over models
-// that are built anew with moved joints, closures, contacts and inertias. Every test also sees a poisoned entry.
+// How dynamics, closing and motor torques change with the mechanism. Oracle: central differences (fourth order) over
+// models that are built anew with moved joints, closures, contacts and inertias. Every test also sees a poisoned entry.
 #include <Eigen/QR>
 
 #include "bielle/dynamics/kept_motion.h"
@@ -19,8 +19,8 @@ constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, Jo
 constexpr ClosureKind kClosures[] = {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D};
 constexpr double kStep = 2e-4;
 
-// Both frames of the loop in all six directions, the first contact, the placements of the joints (each along a direction of
-// its own), an inertia, armature, and everything at once.
+// Both frames of the loop in all six directions, the first contact, the placements of the joints (each along a
+// direction of its own), an inertia, armature, and everything at once.
 std::vector<ModelVariation> listVariations(std::mt19937& rng, const Model& model) {
   std::vector<ModelVariation> out;
   for (int k = 0; k < 6; ++k)

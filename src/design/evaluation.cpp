@@ -123,7 +123,8 @@ Outcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::
                                  [margin](const LiftNode& node) { return node.margin < margin; });
   if (near == lifted.nodes.end()) return out;
   out.missing = static_cast<double>(lifted.nodes.end() - near) / static_cast<double>(lifted.nodes.size());
-  out.message = "a linkage comes nearer to a dead point than the margin";
+  out.message = "a linkage comes nearer to a dead point than the margin: " + std::to_string(near->margin) + " < " +
+                std::to_string(margin);
   return out;
 }
 

@@ -46,8 +46,8 @@ struct EvaluationOptions {
   FddpOptions solver = makeSolverOptions();
   int postures = 6;  ///< of each motion, for (2)
   DriveTable drives;
-  /// Kept motions whose linkages come nearer to a dead point are none (LiftOptions::singular): the least that a joint moves
-  /// in a unit motion of its linkage.
+  /// Kept motions whose linkages come nearer to a dead point are none (LiftOptions::singular): the least that a joint
+  /// moves in a unit motion of its linkage.
   double margin = 1e-3;
 
   /// Tolerances of engineering: a cost that changes by less than 1e-8 of itself is done. One thread.
@@ -68,8 +68,8 @@ struct Evaluation {
 /// An evaluation and how its terms change.
 struct SlopedEvaluation {
   Evaluation evaluation;
-  /// w_i m_i / m_i0 of Eq. (1) in pieces; also of designs whose motions come too near to dead points, none of other infeasible
-  /// ones.
+  /// w_i m_i / m_i0 of Eq. (1) in pieces; also of designs whose motions come too near to dead points, none of other
+  /// infeasible ones.
   std::vector<MeasurePieces> terms;
   MeasurePieces limits;  ///< a hundredth tighter than EvaluationOptions::margin, <= 0
 };
@@ -84,7 +84,8 @@ class DesignEvaluator {
   ~DesignEvaluator();
 
   Evaluation evaluate(const VectorXd& x) const;
-  /// The same with gradients (gradient.h). Where they do not exist, as at a dead point, the design counts as one whose motion fails.
+  /// The same with gradients (gradient.h). Where they do not exist, as at a dead point, the design counts as one whose
+  /// motion fails.
   /// \throws ModelError when motions are not kept, or a measure has no gradient
   SlopedEvaluation differentiate(const VectorXd& x) const;
   const Evaluation& start() const;  ///< of the start design

@@ -1,20 +1,23 @@
 #pragma once
 /// \file Gradients of what motors pay for a kept motion (MotionMode::Kept), with respect to the variables of a design.
 ///
-/// Joints, base and feet move as before, and so do the contact forces as far as the motion leaves them open. With the model's
-/// change along a variable x_i (variation.h), postures, speeds and torques of the motors change at every node by Eqs. (2) and (5)
-/// of kept_motion.h: dv_i(k), du_i(k). A measure is the largest of smooth pieces p_j, each with its gradient:
-///     rms torque of one motor in one motion     p = (sum h u^2 / T)^1/2,  dp = sum h u du / (T p)                   (1)
-///     energy                                    p = sum h |u v|,          dp = sum h sign(u v) (du v + u dv)        (2)
-///     peak torque in a stretch of the motion    p = |u(k)|,               dp = sign(u(k)) du(k)                     (3)
-/// with k the node of the largest |u| in the stretch. Of a peak torque, the piece of every motor, motion and stretch counts:
-/// where one peak is shaved another takes over, and a search that minimizes the largest needs to see both.
+/// Joints, base and feet move as before, and so do the contact forces as far as the motion leaves them open. With the
+/// model's change along a variable x_i (variation.h), postures, speeds and torques of the motors change at every node
+/// by Eqs. (2) and (5) of kept_motion.h: dv_i(k), du_i(k). A measure is the largest of smooth pieces p_j, each with its
+/// gradient:
+///     rms torque of one motor in one motion     p = (sum h u^2 / T)^1/2,  dp = sum h u du / (T p)                  (1)
+///     energy                                    p = sum h |u v|,          dp = sum h sign(u v) (du v + u dv)       (2)
+///     peak torque in a stretch of the motion    p = |u(k)|,               dp = sign(u(k)) du(k)                    (3)
+/// with k the node of the largest |u| in the stretch. Of a peak torque, the piece of every motor, motion and stretch
+/// counts: where one peak is shaved another takes over, and a search that minimizes the largest needs to see both.
 ///
-/// The torques of a kept motion end where a linkage comes to a dead point of its joints, and torques fall right before it, so
-/// that searches run into this wall. With T_c the tangent of a loop cluster for unit speeds of its joints, w the right
-/// singular vector of its largest singular value and mu = 1 / |T_c w| its margin (linkage.h), a design is kept from it by
-///     mu(k)^2 >= least^2,    d mu^2 = -2 mu^4 (T_c w) . d(T_c w)                                                    (4)
-/// for the smallest mu in every stretch. The square falls linearly towards a dead point, where mu itself has a vertical slope.
+/// The torques of a kept motion end where a linkage comes to a dead point of its joints, and torques fall right before
+/// it, so that searches run into this wall. With T_c the tangent of a loop cluster for unit speeds of its joints, w the
+/// right singular vector of its largest singular value and mu = 1 / |T_c w| its margin (linkage.h), a design is kept
+/// from it by
+///     mu(k)^2 >= least^2,    d mu^2 = -2 mu^4 (T_c w) . d(T_c w)                                                   (4)
+/// for the smallest mu in every stretch. The square falls linearly towards a dead point, where mu itself has a vertical
+/// slope.
 #include <string>
 
 #include "bielle/design/measures.h"
@@ -27,9 +30,9 @@ namespace bielle {
 /// Whether calcMeasurePieces knows the measure.
 bool hasGradient(Measure measure);
 
-/// How the model changes with every variable at x. Placements, inertias and armatures are smooth functions of the numbers,
-/// polynomials of at most the third degree for lengths and shifts; they are differenced by the five-point rule over a thousandth
-/// of the bounds, which is exact for polynomials up to the fourth degree.
+/// How the model changes with every variable at x. Placements, inertias and armatures are smooth functions of the
+/// numbers, polynomials of at most the third degree for lengths and shifts; they are differenced by the five-point rule
+/// over a thousandth of the bounds, which is exact for polynomials up to the fourth degree.
 /// \throws ModelError when a variable changes what is no placement, inertia or armature (an axis, a gain)
 std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x);
 

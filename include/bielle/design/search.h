@@ -3,7 +3,7 @@
 ///
 /// Local algorithms with gradients minimize a sum of terms, each the largest of smooth pieces p_ij(x). The kinks of the
 /// largest are taken out by one more variable t_i for every term of several pieces,
-///     min_{x, t} sum_i t_i    s.t.  p_ij(x) <= t_i,  g_k(x) <= 0    (a term of one piece is added as it is)         (1)
+///     min_{x, t} sum_i t_i    s.t.  p_ij(x) <= t_i,  g_k(x) <= 0    (a term of one piece is added as it is)        (1)
 #include <functional>
 #include <vector>
 
@@ -46,9 +46,9 @@ struct SearchResult {
   int evaluations = 0;
 };
 
-/// Each stage starts from the best point so far, the first one from the start. One with gradients is passed over where that point
-/// is infeasible, and steps back from infeasible points as from worse ones. The same seed gives the same points, in
-/// any thread. What the objective throws comes out of here.
+/// Each stage starts from the best point so far, the first one from the start. One with gradients is passed over where
+/// that point is infeasible, and steps back from infeasible points as from worse ones. The same seed gives the same
+/// points, in any thread. What the objective throws comes out of here.
 SearchResult minimizeByStages(const SearchProblem& problem, const std::vector<SearchStage>& stages, unsigned seed);
 
 }  // namespace bielle

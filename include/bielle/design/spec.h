@@ -30,7 +30,7 @@
 /// search:
 ///   seed: 1
 ///   searches: 2                  # independent ones, one thread each
-///   stages:                      # crs or isres, then bobyqa or sbplx; slsqp or mma (gradients) for motions that are kept
+///   stages:                      # crs or isres, then bobyqa or sbplx; slsqp or mma (gradients) in mode kept
 ///     - {algorithm: crs, evaluations: 200, tolerance: 1e-3}
 /// ```
 #include <string>

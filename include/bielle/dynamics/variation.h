@@ -1,25 +1,26 @@
 #pragma once
-/// \file How dynamics change, to first order, when the mechanism itself does: its lengths, where its closures are attached,
-/// its inertias; and its motion with it.
+/// \file How dynamics change, to first order, when the mechanism itself does: its lengths, where its closures are
+/// attached, its inertias; and its motion with it.
 ///
-/// A direction is a change of the model and one of its motion. Forward through the tree, in world coordinates, with D_i the
-/// displacement of body i (a twist), D_0 = 0, p its parent and X_WJ the placement of the joint's frame in the world:
-///     D_i   = D_p + X_WJ xi_i + sum_k J_k dq_k                                                                      (1)
-///     dJ_k  = D x J_k                                                                                               (2)
-///     dV_i  = dV_p + sum_k (J_k dv_k + dJ_k v_k)                                                                    (3)
-///     dA_i  = dA_p + sum_k (J_k da_k + dJ_k a_k + (w_k x J_k) dv_k + (dw_k x J_k + w_k x dJ_k) v_k)                 (4)
-/// where xi_i is the twist by which the joint's frame moves in the body that carries it, k runs over the dofs of joint i,
-/// and D, w_k, dw_k are displacement, velocity and its change of what carries axis k: body i, or for the axes of a universal
-/// joint what stands before them. So the placement of a joint counts as the coordinate of a joint that stands still in front of
-/// it. The forces Y A + V x* Y V follow with
-///     dY = [D x*] Y - Y [D x] + X_WB (dY in the body) X_WB^*                                                        (5)
+/// A direction is a change of the model and one of its motion. Forward through the tree, in world coordinates, with D_i
+/// the displacement of body i (a twist), D_0 = 0, p its parent and X_WJ the placement of the joint's frame in the
+/// world:
+///     D_i   = D_p + X_WJ xi_i + sum_k J_k dq_k                                                                     (1)
+///     dJ_k  = D x J_k                                                                                              (2)
+///     dV_i  = dV_p + sum_k (J_k dv_k + dJ_k v_k)                                                                   (3)
+///     dA_i  = dA_p + sum_k (J_k da_k + dJ_k a_k + (w_k x J_k) dv_k + (dw_k x J_k + w_k x dJ_k) v_k)                (4)
+/// where xi_i is the twist by which the joint's frame moves in the body that carries it, k runs over the dofs of joint
+/// i, and D, w_k, dw_k are displacement, velocity and its change of what carries axis k: body i, or for the axes of a
+/// universal joint what stands before them. So the placement of a joint counts as the coordinate of a joint that stands
+/// still in front of it. The forces Y A + V x* Y V follow with
+///     dY = [D x*] Y - Y [D x] + X_WB (dY in the body) X_WB^*                                                       (5)
 /// and a closure force, fixed in frame 1, turns with it: with D_1 = D_b1 + X_W1 xi_1 (D_2 likewise),
-///     dW = D_1 x* W,    dtau_k = dJ_k . F + J_k . dF                                                                (6)
+///     dW = D_1 x* W,    dtau_k = dJ_k . F + J_k . dF                                                               (6)
 /// F being the sums over subtrees. For the closures themselves, read in frame 1 (notation.h),
-///     d residual = R (D_1 - D_2),    d nu_c = dV_1 - dV_2 - D_1 x (V_1 - V_2)                                       (7)
-///     d a_c = dA_1 - dA_2 + dV_1 x V_2 + V_1 x dV_2 - D_1 x (A_1 - A_2 + V_1 x V_2)                                 (8)
-/// Forward dynamics change by Eq. (4) of saddle_point.h. Where rows are redundant, that holds for changes that leave them so: any
-/// other one would change the rank.
+///     d residual = R (D_1 - D_2),    d nu_c = dV_1 - dV_2 - D_1 x (V_1 - V_2)                                      (7)
+///     d a_c = dA_1 - dA_2 + dV_1 x V_2 + V_1 x dV_2 - D_1 x (A_1 - A_2 + V_1 x V_2)                                (8)
+/// Forward dynamics change by Eq. (4) of saddle_point.h. Where rows are redundant, that holds for changes that leave
+/// them so: any other one would change the rank.
 #include "bielle/dynamics/constrained.h"
 
 namespace bielle {
@@ -60,8 +61,8 @@ VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, c
                                       ConstVectorRef lambda, const ModelVariation& change,
                                       const MotionVariation& motion, VariationWorkspace& variation);
 
-/// Changes (rows) of residuals, velocities and stabilised accelerations of all closures of the set, Eqs. (7) and (8); need
-/// updateVariation. Contacts are found in the model by name.
+/// Changes (rows) of residuals, velocities and stabilised accelerations of all closures of the set, Eqs. (7) and (8);
+/// need updateVariation. Contacts are found in the model by name.
 VectorXd calcResidualVariation(const Model& model, const Workspace& ws, const ConstraintSet& constraints,
                                const ModelVariation& change, const VariationWorkspace& variation);
 VectorXd calcVelocityVariation(const Model& model, const Workspace& ws, const ConstraintSet& constraints,
@@ -75,8 +76,8 @@ struct DynamicsVariation {
   MatrixXd lambda;  ///< rows x directions; with redundant rows right up to the null space of J^T
 };
 
-/// Changes at fixed torques and, where `motions` is empty, at fixed (q, v); else motions[i].q and .v go with changes[i]. To be
-/// called after updateConstrainedDynamics.
+/// Changes at fixed torques and, where `motions` is empty, at fixed (q, v); else motions[i].q and .v go with
+/// changes[i]. To be called after updateConstrainedDynamics.
 DynamicsVariation calcConstrainedVariation(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
                                            const ConstraintSet& constraints, const std::vector<ModelVariation>& changes,
                                            const std::vector<MotionVariation>& motions = {});
