@@ -54,8 +54,9 @@ void writePlot(std::ostream& script, const Plot& plot, int index) {
   for (size_t i = 0; i < curves.size(); ++i) writePoints(script, *curves[i], name(i));
   script << "set title " << quoteGnuplot(plot.title) << " noenhanced\nset xlabel " << quoteGnuplot(plot.x_label)
          << " noenhanced\nset ylabel " << quoteGnuplot(plot.y_label) << " noenhanced\n"
-         << (plot.scale == PlotScale::Logarithmic ? "set logscale y\n" : "unset logscale y\n") << "set size "
-         << (plot.scale == PlotScale::Equal ? "ratio -1\n" : "noratio\n");
+         << (plot.scale == PlotScale::Logarithmic ? "set logscale y\n" : "unset logscale y\n")
+         << (plot.scale == PlotScale::Equal ? "set size ratio -1\nset xtics 0.1\nset ytics 0.1\n"
+                                            : "set size noratio\nset xtics autofreq\nset ytics autofreq\n");
   if (curves.empty())
     script << "set xrange [0:1]\nset yrange [0:1]\nset label 1 'no results' at 0.4, 0.5\nplot NaN notitle\n";
   for (size_t i = 0; i < curves.size(); ++i)
