@@ -2,9 +2,11 @@
 // models that are built anew with moved joints, closures, contacts and inertias. Every test also sees a poisoned entry.
 #include <Eigen/QR>
 
+#include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kept_motion.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "bielle/model/reader.h"
 #include "check_derivative.h"
 #include "moved_model.h"
 
@@ -79,10 +81,11 @@ std::vector<int> chooseKept(const Model& model, const VectorXd& q) {
   return kept;
 }
 
-// q (+) d closed by steps of the held dofs' complement, from a configuration nearby.
-VectorXd closeHeld(const Model& model, const VectorXd& q, const std::vector<int>& held) {
+// d with q (+) d closed and held dofs at zero, from a configuration nearby; with contacts, these stay where they are.
+VectorXd closeHeld(const Model& model, const VectorXd& q, const std::vector<int>& held,
+                   const std::vector<ContactTarget>& contacts = {}) {
   Workspace ws(model);
-  const ConstraintSet loops = makeConstraintSet(model);
+  const ConstraintSet loops = makeConstraintSet(model, contacts);
   updatePositions(model, ws, q);
   const Closing closing(model, ws, loops, held);
   const VectorXd still = VectorXd::Zero(static_cast<Eigen::Index>(held.size()));
@@ -298,6 +301,39 @@ TEST_CASE("variation: motor torques, forces and closing of a kept motion") {
     }
 }
 
+TEST_CASE("variation: Bipetto on one foot with its motors held, when its rods change") {
+  const Model bipetto = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto").model;
+  const VectorXd q = assembleReference(bipetto, bipetto.references().front().name).q;
+  Workspace ws(bipetto);
+  updatePositions(bipetto, ws, q);
+  const int foot = 0;
+  const ContactFrame& frame = bipetto.contacts()[foot];
+  const std::vector<ContactTarget> stance = {{foot, getPlacement(ws, frame.body, frame.X_BF), 0, 0}};
+  std::vector<int> motors;
+  for (const Motor& motor : bipetto.motors()) motors.push_back(motor.dof);
+  updateVelocities(bipetto, ws, VectorXd::Zero(bipetto.nv()));
+  updateAccelerations(bipetto, ws, VectorXd::Zero(bipetto.nv()));
+  const Closing closing(bipetto, ws, makeConstraintSet(bipetto, stance), motors);
+  REQUIRE(closing.isDetermined());
+  std::vector<ModelVariation> directions;
+  for (size_t c = 0; c < bipetto.closures().size(); ++c)
+    for (int k = 0; k < 6; ++k) {
+      directions.emplace_back(bipetto);
+      directions.back().frames1[c] = Vector6d::Unit(k);
+    }
+  MatrixXd analytic(bipetto.nv(), directions.size());
+  for (size_t i = 0; i < directions.size(); ++i) {
+    MotionVariation motion(bipetto);
+    CHECK(closing.calcMotion(bipetto, ws, directions[i], motion) < 1e-9);
+    analytic.col(static_cast<Eigen::Index>(i)) = motion.q;
+  }
+  CHECK(analytic.topRows(6).cwiseAbs().maxCoeff() > 10);  // a longer rod of the stance leg moves the trunk
+  for (int dof : motors) CHECK(analytic.row(dof).cwiseAbs().maxCoeff() < 1e-9);
+  checkDerivative(analytic, differentiateModel(bipetto, directions, kStep, [&](const Model& moved) {
+                    return closeHeld(moved, q, motors, stance);
+                  }));
+}
+
 TEST_CASE("variation: what cannot be is told") {
   const Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 1.1);
   const ConstraintSet set = makeConstraintSet(mechanism.model);
@@ -306,6 +342,12 @@ TEST_CASE("variation: what cannot be is told") {
   CHECK(free.update(set, mechanism.q_closed, none, none, none) == KeptMotionStatus::Undetermined);
   KeptMotion crank(mechanism.model, {0});
   CHECK(crank.update(set, mechanism.q_closed, one, one, none) == KeptMotionStatus::Ok);
+  KeptMotion::Variation variation(mechanism.model);
+  ModelVariation change(mechanism.model);
+  change.frames1[0] = Vector6d::Unit(0);  // in the plane, then out of it
+  CHECK(crank.calcVariation(change, variation) == KeptMotionStatus::Ok);
+  change.frames1[0] = Vector6d::Unit(1);
+  CHECK(crank.calcVariation(change, variation) == KeptMotionStatus::Open);
   // Without its motor the crank cannot be given an acceleration.
   ModelBuilder builder("pendulum");
   Joint joint;

@@ -7,6 +7,7 @@ namespace bielle {
 namespace {
 
 constexpr double kRankTolerance = 1e-7;     // relative, of H
+constexpr double kGapTolerance = 1e-6;      // of Eq. (2), relative to 1 and what moves
 constexpr double kBalanceTolerance = 1e-7;  // of Eqs. (4) and (5), relative to their right-hand sides
 
 MatrixXd calcJacobian(const Model& model, const Workspace& ws, const ConstraintSet& set) {
@@ -74,6 +75,8 @@ const char* getMessage(KeptMotionStatus status) {
       return "the coordinates that are kept do not determine the loops: a dead point";
     case KeptMotionStatus::Unbalanced:
       return "motors and contacts cannot give this motion";
+    case KeptMotionStatus::Open:
+      return "the change opens a loop that has more rows than it needs";
   }
   return "?";
 }
@@ -158,7 +161,9 @@ VectorXd KeptMotion::calcTangentVariation(const ModelVariation& change, const Mo
 
 KeptMotionStatus KeptMotion::calcVariation(const ModelVariation& change, Variation& out) {
   const Eigen::Index nu = model_.nu(), nf = J_contacts_.rows(), nk = T_.cols(), loops = loops_.rows;
-  closing_->calcMotion(model_, ws_, change, out.motion);
+  const double gap = closing_->calcMotion(model_, ws_, change, out.motion);
+  const double moved = calcLargest(out.motion.q) + calcLargest(out.motion.v) + calcLargest(out.motion.a);
+  if (!(gap <= kGapTolerance * (1 + moved))) return KeptMotionStatus::Open;
   VariationWorkspace variation(model_);
   updateVariation(model_, ws_, change, out.motion, variation);
   const VectorXd force =

@@ -59,7 +59,8 @@ class Closing {
 enum class KeptMotionStatus {
   Ok,
   Undetermined,  ///< the kept dofs do not determine the loops: a dead point
-  Unbalanced     ///< motors and contacts cannot give this motion, or motors are not independent
+  Unbalanced,    ///< motors and contacts cannot give this motion, or motors are not independent
+  Open           ///< the change opens loops that have more rows than they need
 };
 const char* getMessage(KeptMotionStatus status);
 
@@ -85,7 +86,7 @@ class KeptMotion {
     VectorXd u, lambda;
   };
   const MatrixXd& tangent() const { return T_; }  ///< T (nv x kept)
-  /// After an update() that was Ok. Unbalanced where the changed mechanism could not make the motion.
+  /// After an update() that was Ok. Open or Unbalanced where the changed mechanism could not make the motion.
   KeptMotionStatus calcVariation(const ModelVariation& change, Variation& out);
   /// Change (nv) of T w for speeds w of the kept dofs, dq being that of the motion: Eq. (2) at v = T w.
   VectorXd calcTangentVariation(const ModelVariation& change, const MotionVariation& motion, ConstVectorRef w);
