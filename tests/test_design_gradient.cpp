@@ -162,14 +162,16 @@ TEST_CASE("design gradient: parameters of a five-bar leg") {
     variables.push_back(variable);
   }
   const Parametrization robot("fivebar_leg", {}, variables);
-  const std::vector<Measure> measures = {Measure::PeakTorque, Measure::RmsTorque, Measure::Energy};
+  const std::vector<Measure> measures = {Measure::PeakTorque, Measure::RmsTorque, Measure::Energy,
+                                         Measure::ElectricalEnergy};
+  const std::vector<MotorDrive> drives = {{0.7, 0.4}, {1.5, 0.4}};
   const auto calcPieces = [&](const VectorXd& x, const std::vector<ModelVariation>& directions) {
     const Model leg = robot.make(x);
     const LegMotion motion = makeLegMotion(leg);
     const MotorSlopes slopes = calcMotorSlopes(leg, findLegDofs(leg), motion.kept, motion.lifted, directions);
     CHECK(slopes.failure.empty());
     std::vector<MeasurePieces> out;
-    for (const Measure measure : measures) out.push_back(calcMeasurePieces(measure, {0, 1}, {slopes}));
+    for (const Measure measure : measures) out.push_back(calcMeasurePieces(measure, {0, 1}, {slopes}, drives));
     out.push_back(calcMarginPieces(0.1, {slopes}));
     return out;
   };

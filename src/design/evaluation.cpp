@@ -344,7 +344,7 @@ void DesignEvaluator::Data::checkGradient() const {
   for (const ObjectiveTerm& term : objective)
     if (!hasGradient(term.measure))
       throw ModelError(name, std::string("objective: ") + getName(term.measure), "it has no gradient",
-                       "choose peak_torque, rms_torque or energy, or search by bobyqa or sbplx");
+                       "choose a torque or an energy, or search by bobyqa or sbplx");
 }
 
 Evaluation DesignEvaluator::evaluate(const VectorXd& x) const { return data_->evaluate(x); }
@@ -367,7 +367,7 @@ SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
   }
   for (size_t i = 0; i < data_->objective.size(); ++i) {
     const ObjectiveTerm& term = data_->objective[i];
-    out.terms.push_back(calcMeasurePieces(term.measure, data_->term_motors[i], slopes));
+    out.terms.push_back(calcMeasurePieces(term.measure, data_->term_motors[i], slopes, data_->drives));
     const double scale = term.weight / data_->start.terms[i];
     out.terms[i].values *= scale;
     out.terms[i].gradients *= scale;

@@ -69,13 +69,24 @@ void addRms(const MotorSlopes& motion, int m, Eigen::Index piece, MeasurePieces&
 }
 
 // Eq. (2)
-void addEnergy(const MotorSlopes& motion, int m, Eigen::Index piece, MeasurePieces& out) {
+void addEnergy(const MotorSlopes& motion, int m, MeasurePieces& out) {
   for (int k = 0; k < countNodes(motion); ++k) {
     const double u = motion.u(m, k), v = motion.v(m, k);
-    out.values[piece] += motion.dt[k] * std::abs(u * v);
+    out.values[0] += motion.dt[k] * std::abs(u * v);
     for (size_t i = 0; i < motion.du.size(); ++i)
-      out.gradients(piece, i) +=
-          motion.dt[k] * (u * v < 0 ? -1 : 1) * (motion.du[i](m, k) * v + u * motion.dv[i](m, k));
+      out.gradients(0, i) += motion.dt[k] * (u * v < 0 ? -1 : 1) * (motion.du[i](m, k) * v + u * motion.dv[i](m, k));
+  }
+}
+
+// Eq. (2) with the power at the terminals.
+void addElectricalEnergy(const MotorSlopes& motion, int m, const MotorDrive& drive, MeasurePieces& out) {
+  const double heat = 1 / (drive.motor_constant * drive.motor_constant);
+  for (int k = 0; k < countNodes(motion); ++k) {
+    const double u = motion.u(m, k), v = motion.v(m, k), P = u * v + heat * u * u;
+    const double weight = motion.dt[k] * (P < 0 ? drive.regeneration : 1);
+    out.values[0] += weight * P;
+    for (size_t i = 0; i < motion.du.size(); ++i)
+      out.gradients(0, i) += weight * ((v + 2 * heat * u) * motion.du[i](m, k) + u * motion.dv[i](m, k));
   }
 }
 
@@ -119,9 +130,7 @@ VectorXd findFastest(const MatrixXd& T, const std::vector<int>& columns) {
 
 }  // namespace
 
-bool hasGradient(Measure measure) {
-  return measure == Measure::PeakTorque || measure == Measure::RmsTorque || measure == Measure::Energy;
-}
+bool hasGradient(Measure measure) { return measure != Measure::Conditioning && measure != Measure::Workspace; }
 
 std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x) {
   const Model here = robot.make(x);
@@ -213,14 +222,17 @@ MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dof
 }
 
 MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
-                                const std::vector<MotorSlopes>& motions) {
+                                const std::vector<MotorSlopes>& motions, const std::vector<MotorDrive>& drives) {
   const size_t variables = motions.front().du.size(), pairs = motors.size() * motions.size();
   const int stretches = measure == Measure::PeakTorque ? kStretches : 1;
-  MeasurePieces out = makePieces(measure == Measure::Energy ? 1 : pairs * stretches, variables);
+  const bool sum = measure == Measure::Energy || measure == Measure::ElectricalEnergy;
+  MeasurePieces out = makePieces(sum ? 1 : pairs * stretches, variables);
   Eigen::Index piece = 0;
   for (const MotorSlopes& motion : motions)
     for (int m : motors) {
-      if (measure == Measure::Energy) addEnergy(motion, m, 0, out);
+      if (measure == Measure::Energy) addEnergy(motion, m, out);
+      if (measure == Measure::ElectricalEnergy)
+        addElectricalEnergy(motion, m, drives.empty() ? MotorDrive() : drives[static_cast<size_t>(m)], out);
       if (measure == Measure::RmsTorque) addRms(motion, m, piece, out);
       for (int s = 0; s < stretches; ++s, ++piece)
         if (measure == Measure::PeakTorque) addPeak(motion, m, s, piece, out);

@@ -7,8 +7,9 @@
 /// gradient:
 ///     rms torque of one motor in one motion     p = (sum h u^2 / T)^1/2,  dp = sum h u du / (T p)                  (1)
 ///     energy                                    p = sum h |u v|,          dp = sum h sign(u v) (du v + u dv)       (2)
+///     electrical energy, Eq. (1) of measures.h  p = sum h r P,            dp = sum h r (du v + u dv + 2 u du / K_m^2)
 ///     peak torque in a stretch of the motion    p = |u(k)|,               dp = sign(u(k)) du(k)                    (3)
-/// with k the node of the largest |u| in the stretch. Of a peak torque, the piece of every motor, motion and stretch
+/// with r = 1 where P is positive, else the share that is given back, and k the node of the largest |u| in the stretch. Of a peak torque, the piece of every motor, motion and stretch
 /// counts: where one peak is shaved another takes over, and a search that minimizes the largest needs to see both.
 ///
 /// The torques of a kept motion end where a linkage comes to a dead point of its joints, and torques fall right before
@@ -57,8 +58,9 @@ struct MeasurePieces {
   MatrixXd gradients;  ///< pieces x variables
 };
 /// Eqs. (1) to (3) over the motors named and all motions: always as many pieces for the same motions and motors.
+/// \param drives  by motor; empty: the default of all
 MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
-                                const std::vector<MotorSlopes>& motions);
+                                const std::vector<MotorSlopes>& motions, const std::vector<MotorDrive>& drives = {});
 
 /// Eq. (4) as pieces p <= 0: least^2 - mu^2 of every cluster, motion and stretch.
 MeasurePieces calcMarginPieces(double least, const std::vector<MotorSlopes>& motions);
