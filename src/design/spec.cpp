@@ -154,7 +154,7 @@ void checkGradient(const DesignSpec& spec, const Entry& stage) {
   for (const ObjectiveTerm& term : spec.objective)
     if (!hasGradient(term.measure))
       stage.fail(std::string("it needs gradients, which ") + getName(term.measure) + " does not have",
-                 "choose among peak_torque, rms_torque and energy, or give bobyqa or sbplx");
+                 "choose a torque or an energy, or give bobyqa or sbplx");
 }
 
 void readSearch(const Entry& entry, DesignSpec& spec) {
