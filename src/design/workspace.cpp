@@ -149,7 +149,7 @@ class Explorer {
     problem.frames.push_back({foot.name, foot.body, foot.X_BF, X_WB_ * grid_.placements[point], grid_.held});
     if (grid_.base > 0) problem.frames.push_back({model_.bodies()[grid_.base].name, grid_.base, SE3(), X_WB_});
     AssemblyOptions options;
-  options.step = AssemblyStep::Shortest;
+    options.step = AssemblyStep::Shortest;
     options.tolerance = 1e-9;
     options.max_iterations = 20;
     options.continuation_steps = 2;

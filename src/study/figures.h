@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "study/claims.h"
 #include "io/plot.h"
+#include "study/claims.h"
 
 namespace bielle::study {
 
