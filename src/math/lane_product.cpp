@@ -179,12 +179,29 @@ void copyLowerToUpper(MatrixXd& A) {
   }
 }
 
-void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, PaddedMap A, PaddedMap B, PaddedMap H) {
+namespace {
+
+// Of columns from `begin` on, lane by lane of columns.
+template <typename Product>
+void visitLower(Eigen::Index begin, const PaddedMap& H, const Product& product) {
   for (Eigen::Index j = begin, end; j < H.cols(); j = end) {
     end = std::min((j / kLane + 1) * kLane, H.cols());
-    const Eigen::Index i = j / kLane * kLane;
-    addProduct(H.rows() - i, end - j, depth, sign, pad(A, i), {B.data() + j, B.outerStride(), 1}, pad(H, i, j));
+    product(j / kLane * kLane, j, end - j);
   }
+}
+
+}  // namespace
+
+void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, PaddedMap A, PaddedMap B, PaddedMap H) {
+  visitLower(begin, H, [&](Eigen::Index i, Eigen::Index j, Eigen::Index cols) {
+    addProduct(H.rows() - i, cols, depth, sign, pad(A, i), {B.data() + j, B.outerStride(), 1}, pad(H, i, j));
+  });
+}
+
+void setLowerProduct(Eigen::Index depth, PaddedMap A, PaddedMap B, PaddedMap H) {
+  visitLower(0, H, [&](Eigen::Index i, Eigen::Index j, Eigen::Index cols) {
+    setProduct(H.rows() - i, cols, depth, pad(A, i), {B.data() + j, B.outerStride(), 1}, pad(H, i, j));
+  });
 }
 
 }  // namespace bielle

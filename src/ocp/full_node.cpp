@@ -109,7 +109,7 @@ void FullNode::addStateCost(const StateCost& state, const VectorXd& difference, 
   }
 }
 
-void FullNode::addResiduals(const ResidualStack& stack, bool running, StageModel& out) {
+void FullNode::setResiduals(const ResidualStack& stack, bool running, StageModel& out) {
   const int nv = model_.nv(), rows = static_cast<int>(stack.r.size());
   if (Rx_.rows() != rows) {
     Rx_.setZero(rows, 2 * nv);
@@ -124,13 +124,13 @@ void FullNode::addResiduals(const ResidualStack& stack, bool running, StageModel
     Ru_.noalias() = jacobians_.lambda * cws_.dlambda_du;
   }
   scaled_ = stack.hessian.asDiagonal() * Rx_;
-  out.lx.noalias() += Rx_.transpose() * stack.gradient;
-  out.lxx.noalias() += Rx_.transpose() * scaled_;
+  out.lx.noalias() = Rx_.transpose() * stack.gradient;
+  out.lxx.noalias() = Rx_.transpose() * scaled_;
   if (!running) return;
-  out.lu.noalias() += Ru_.transpose() * stack.gradient;
-  out.lux.noalias() += Ru_.transpose() * scaled_;
+  out.lu.noalias() = Ru_.transpose() * stack.gradient;
+  out.lux.noalias() = Ru_.transpose() * scaled_;
   Ru_scaled_ = stack.hessian.asDiagonal() * Ru_;
-  out.luu.noalias() += Ru_.transpose() * Ru_scaled_;
+  out.luu.noalias() = Ru_.transpose() * Ru_scaled_;
 }
 
 std::unique_ptr<NodeModel> makeFullNode(const Model& model, const StageSpec& spec) {

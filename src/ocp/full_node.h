@@ -19,7 +19,7 @@ class FullNode : public NodeModel {
   bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
   void linearizeState() override {}
   void addStateCost(const StateCost& cost, const VectorXd& difference, double scale, StageModel& out) override;
-  void addResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
+  void setResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
 
  protected:
   Workspace ws_;

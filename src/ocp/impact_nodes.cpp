@@ -85,7 +85,7 @@ bool ReducedImpactNode::linearizeStep(ConstVectorRef x_next_node, StageModel& ou
   return true;
 }
 
-// The impulses of the contacts, where addResiduals() expects them.
+// The impulses of the contacts, where setResiduals() expects them.
 void ReducedImpactNode::updateForceDerivatives() {
   const int nr = reduction_.size;
   const auto by_q = iws_.dimpulse_dq.bottomRows(contact_rows_), by_v = iws_.dimpulse_dv.bottomRows(contact_rows_);

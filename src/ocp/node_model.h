@@ -54,7 +54,7 @@ class NodeModel {
   virtual void restore() = 0;
   // Kinematics of the last function called, until another node of the same thread is worked on.
   virtual const Workspace& workspace() const = 0;
-  // Where the derivatives of this node's residuals are to be written, before addResiduals().
+  // Where the derivatives of this node's residuals are to be written, before setResiduals().
   virtual ResidualJacobians& jacobians() = 0;
   // updateStep() of at most kLane nodes of this kind at once, by one thread: startStep() of each, then finishSteps() of one
   // of them, and showStep() of each for its workspace(). Nodes that do not go with others return false from startStep().
@@ -63,14 +63,14 @@ class NodeModel {
   virtual void showStep(int /*index*/) {}
   // Before linearizeStep() of at most kLane nodes of this kind, by the same thread: does at once what they have in common.
   virtual void prepareLinearization(NodeModel* const* /*nodes*/, int /*count*/) {}
-  // Fx, Fu and gap about the last updateStep(); the derivatives that addResiduals() needs.
+  // Fx, Fu and gap about the last updateStep(); the derivatives that setResiduals() needs.
   virtual bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) = 0;
   // To be called after updateState() at the terminal node in place of linearizeStep().
   virtual void linearizeState() = 0;
   // `difference` (nv) is that of q to the reference.
   virtual void addStateCost(const StateCost& cost, const VectorXd& difference, double scale, StageModel& out) = 0;
-  // Gauss-Newton terms; at a running stage forces and controls take part.
-  virtual void addResiduals(const ResidualStack& stack, bool running, StageModel& out) = 0;
+  // Gauss-Newton terms, whatever `out` held; at a running stage forces and controls take part.
+  virtual void setResiduals(const ResidualStack& stack, bool running, StageModel& out) = 0;
 
   const VectorXd& lambda() const { return lambda_; }
   const VectorXd& x_next() const { return x_next_; }

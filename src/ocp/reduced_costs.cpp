@@ -73,7 +73,7 @@ void ReducedNode::addStateCost(const StateCost& state, const VectorXd& differenc
 }
 
 // Rt = (dr/d(dy, dy_v, u))^T, one column per residual: Rt diag(hessian) Rt^T is all second derivatives at once.
-void ReducedNode::addResiduals(const ResidualStack& stack, bool running, StageModel& out) {
+void ReducedNode::setResiduals(const ResidualStack& stack, bool running, StageModel& out) {
   ReducedWork& work = *work_;
   const int nr = reduction_.size, nu = running ? model_.nu() : 0, columns = 2 * nr + nu;
   const int rows = static_cast<int>(stack.r.size()), motion_rows = stack.motion_rows;
@@ -94,17 +94,18 @@ void ReducedNode::addResiduals(const ResidualStack& stack, bool running, StageMo
   clearPadding(Rt);
   for (int i = 0; i < rows; ++i) scaled.col(i) = stack.hessian[i] * Rt.col(i);
   clearPadding(scaled);
-  work.H.head(H.outerStride() * columns).setZero();
-  addLowerProduct(0, rows, 1, scaled, Rt, H);
+  setLowerProduct(rows, scaled, Rt, H);
+  out.lx.setZero();
+  out.lu.setZero();
   for (int i = 0; i < rows; ++i) {
     out.lx += stack.gradient[i] * Rt.col(i).head(2 * nr);
     if (running) out.lu += stack.gradient[i] * Rt.col(i).tail(nu);
   }
-  for (int c = 0; c < 2 * nr; ++c) out.lxx.col(c).tail(2 * nr - c) += H.col(c).segment(c, 2 * nr - c);
+  for (int c = 0; c < 2 * nr; ++c) out.lxx.col(c).tail(2 * nr - c) = H.col(c).segment(c, 2 * nr - c);
   copyLowerToUpper(out.lxx);
   if (!running) return;
-  out.lux += H.bottomLeftCorner(nu, 2 * nr);
-  out.luu.triangularView<Eigen::Lower>() += H.bottomRightCorner(nu, nu);
+  out.lux = H.bottomLeftCorner(nu, 2 * nr);
+  out.luu.triangularView<Eigen::Lower>() = H.bottomRightCorner(nu, nu);
   copyLowerToUpper(out.luu);
 }
 

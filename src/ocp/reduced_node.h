@@ -97,7 +97,7 @@ struct ReducedWork {
   };
   std::vector<Motor> motors;
   ResidualJacobians jacobians;
-  VectorXd Rt, Rt_scaled, H;  // of addResiduals(), with room for any node
+  VectorXd Rt, Rt_scaled, H;  // of setResiduals(), with room for any node
   VectorXd dlambda;           // see shapeForceDerivatives(), likewise
 };
 
@@ -157,7 +157,7 @@ class ReducedNode : public NodeModel {
   bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
   void linearizeState() override;
   void addStateCost(const StateCost& cost, const VectorXd& difference, double scale, StageModel& out) override;
-  void addResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
+  void setResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
 
  protected:
   // Bases and placements at x; the blocks are those that `previous` has closed there, if given.

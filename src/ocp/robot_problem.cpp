@@ -293,18 +293,13 @@ StepStatus RobotProblem::finishLinearization(int stage, ConstVectorRef u, ConstV
   if (!nodes_[stage].dynamics->linearizeStep(x_next_node, out)) return StepStatus::Failed;
   const double h = getScale(specs_[stage]);
   out.cost = h * sumCosts(stage);
-  out.lx.setZero();
-  out.lu.setZero();
-  out.lxx.setZero();
-  out.lux.setZero();
-  out.luu.setZero();
+  differentiateCosts(stage, h, out);
   const ControlCost& control = specs_[stage].control;
   if (control.weight != 0) {
     const double w = h * control.weight;
     out.lu += w * control.weights.cwiseProduct(u - control.reference);
     out.luu.diagonal() += w * control.weights;
   }
-  addCosts(stage, h, out);
   return isFinite(out.Fx) && isFinite(out.lxx) ? StepStatus::Ok : StepStatus::Failed;
 }
 
@@ -314,18 +309,26 @@ StepStatus RobotProblem::linearizeTerminal(ConstVectorRef x, StageModel& out) {
   if (out.lx.size() != tangent_size_) out.resize(tangent_size_, 0, 0);
   nodes_.back().dynamics->linearizeState();
   out.cost = cost;
-  out.lx.setZero();
-  out.lxx.setZero();
-  addCosts(numStages(), 1, out);
+  differentiateCosts(numStages(), 1, out);
   return isFinite(out.lxx) ? StepStatus::Ok : StepStatus::Failed;
 }
 
-// Gradient and Hessian of the state cost and of the residual costs, the residuals being those of the last sumCosts().
-void RobotProblem::addCosts(int index, double scale, StageModel& out) {
+// Gradient and Hessian of the residual costs, the residuals being those of the last sumCosts(), and of the state cost.
+void RobotProblem::differentiateCosts(int index, double scale, StageModel& out) {
   Node& node = nodes_[index];
   const StageSpec& spec = specs_[index];
+  differentiateResiduals(index, scale, out);
   if (spec.state.weight != 0) node.dynamics->addStateCost(spec.state, node.difference, scale, out);
-  if (spec.costs.empty()) return;
+}
+
+void RobotProblem::differentiateResiduals(int index, double scale, StageModel& out) {
+  Node& node = nodes_[index];
+  const StageSpec& spec = specs_[index];
+  if (spec.costs.empty()) {
+    for (VectorXd* gradient : {&out.lx, &out.lu}) gradient->setZero();
+    for (MatrixXd* hessian : {&out.lxx, &out.lux, &out.luu}) hessian->setZero();
+    return;
+  }
   const NodeView view{model_, node.dynamics->workspace(), spec.constraints, node.u, node.dynamics->lambda()};
   ResidualStack& stack = node.stack;
   ResidualJacobians& jacobians = node.dynamics->jacobians();
@@ -342,7 +345,7 @@ void RobotProblem::addCosts(int index, double scale, StageModel& out) {
     stack.gradient.segment(row, n) *= scale * cost.weight;
     stack.hessian.segment(row, n) *= scale * cost.weight;
   }
-  node.dynamics->addResiduals(stack, index < numStages(), out);
+  node.dynamics->setResiduals(stack, index < numStages(), out);
 }
 
 std::string RobotProblem::getFailure(int node) const { return nodes_[node].dynamics->failure(); }

@@ -46,6 +46,8 @@ void clearPadding(PaddedMap A);
 
 /// H(i, j) += sign sum_k A(i, k) B(j, k) for i >= j >= begin, k < depth. Full lanes: entries above the diagonal change.
 void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, PaddedMap A, PaddedMap B, PaddedMap H);
+/// H(i, j) = sum_k A(i, k) B(j, k) for i >= j, k < depth, likewise: H need not hold numbers.
+void setLowerProduct(Eigen::Index depth, PaddedMap A, PaddedMap B, PaddedMap H);
 
 /// Cholesky elimination of the first `num` unknowns of a symmetric H, of which the lower triangle is read: their columns
 /// become L over Y^T, the rest of H stays. False when a pivot is not positive.

@@ -107,7 +107,8 @@ class RobotProblem : public ShootingProblem {
   StepStatus finishStep(int stage, VectorRef x_next, double& cost);
   StepStatus finishLinearization(int stage, ConstVectorRef u, ConstVectorRef x_next_node, StageModel& out);
   double sumCosts(int node_index, std::vector<CostValue>* values = nullptr);
-  void addCosts(int node_index, double scale, StageModel& out);
+  void differentiateCosts(int node_index, double scale, StageModel& out);
+  void differentiateResiduals(int node_index, double scale, StageModel& out);
 
   const Model& model_;
   Formulation formulation_;
