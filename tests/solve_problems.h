@@ -83,22 +83,22 @@ class PlantProblem : public ShootingProblem {
                        StageModel& out) override {
     for (int j = 0; j < kX + kU; ++j) {
       const auto next = calcNext<std::complex<double>>(x, u, j);
-      for (int i = 0; i < kX; ++i) (j < kX ? out.Fx(i, j) : out.Fu(i, j - kX)) = next[i].imag() / kComplexStep;
+      for (int i = 0; i < kX; ++i) (j < kX ? out.Fx()(i, j) : out.Fu()(i, j - kX)) = next[i].imag() / kComplexStep;
     }
     step(stage, x, u, out.gap, out.cost);
     out.gap -= x_next_node;
     const State e = x - goal;
     out.lx = dt * weight.cwiseProduct(e);
-    out.lxx.diagonal() = dt * weight;
+    out.lxx().diagonal() = dt * weight;
     out.lu = dt * control_weight * u;
-    out.luu.diagonal().setConstant(dt * control_weight);
+    out.luu().diagonal().setConstant(dt * control_weight);
     return StepStatus::Ok;
   }
   StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override {
     calcTerminalCost(x, out.cost);
     const State e = x - goal;
     out.lx = terminal_weight.cwiseProduct(e);
-    out.lxx.diagonal() = terminal_weight;
+    out.lxx().diagonal() = terminal_weight;
     return StepStatus::Ok;
   }
 
@@ -172,15 +172,15 @@ class DoubleWell : public ShootingProblem {
                        StageModel& out) override {
     step(stage, x, u, out.gap, out.cost);
     out.gap -= x_next_node;
-    out.Fx(0, 0) = 1;
-    out.Fu(0, 0) = dt;
+    out.Fx()(0, 0) = 1;
+    out.Fu()(0, 0) = dt;
     out.lu = dt * control_weight * u;
-    out.luu(0, 0) = dt * control_weight;
+    out.luu()(0, 0) = dt * control_weight;
     return StepStatus::Ok;
   }
   StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override {
     out.lx[0] = 4 * x[0] * (x[0] * x[0] - 1);
-    out.lxx(0, 0) = 12 * x[0] * x[0] - 4;
+    out.lxx()(0, 0) = 12 * x[0] * x[0] - 4;
     return calcTerminalCost(x, out.cost);
   }
 };
@@ -238,10 +238,10 @@ class TurningBody : public ShootingProblem {
     MatrixXd J_q(3, 3), J_dq(3, 3), J_gap(3, 3);
     calcJointIntegrateJacobians(joint_, dt * next.tail(3), J_q, J_dq);
     calcJointDifferenceJacobian(joint_, out.gap.head(3), J_gap);
-    out.Fx << J_gap * J_q, J_gap * J_dq * dt * w_w, Matrix3d::Zero(), w_w;
-    out.Fu << J_gap * J_dq * dt * w_u, w_u;
+    out.Fx() << J_gap * J_q, J_gap * J_dq * dt * w_w, Matrix3d::Zero(), w_w;
+    out.Fu() << J_gap * J_dq * dt * w_u, w_u;
     out.lu = dt * control_weight * u;
-    out.luu = dt * control_weight * Matrix3d::Identity();
+    out.luu() = dt * control_weight * Matrix3d::Identity();
     updateStateCost(x, dt * attitude_weight, dt, out);
     return StepStatus::Ok;
   }
@@ -263,9 +263,9 @@ class TurningBody : public ShootingProblem {
     MatrixXd J(3, 3);
     calcJointDifferenceJacobian(joint_, e, J);
     out.lx << w_attitude * J.transpose() * e, w_rate * x.tail(3);
-    out.lxx.setZero();
-    out.lxx.topLeftCorner(3, 3) = w_attitude * J.transpose() * J;
-    out.lxx.bottomRightCorner(3, 3) = w_rate * Matrix3d::Identity();
+    out.lxx().setZero();
+    out.lxx().topLeftCorner(3, 3) = w_attitude * J.transpose() * J;
+    out.lxx().bottomRightCorner(3, 3) = w_rate * Matrix3d::Identity();
   }
 
   Joint joint_;

@@ -265,11 +265,11 @@ TEST_CASE("sweeps of the full size allocate nothing after the first, stages with
   std::vector<StageModel> models(4);
   for (size_t k = 0; k < models.size(); ++k) {
     models[k].resize(n, k < 2 ? nu : 0, n);
-    models[k].Fx.setIdentity();
-    models[k].Fu.setRandom();
+    models[k].Fx().setIdentity();
+    models[k].Fu().setRandom();
     models[k].lu.setOnes();
-    models[k].lxx.setIdentity();
-    models[k].luu.setIdentity();
+    models[k].lxx().setIdentity();
+    models[k].luu().setIdentity();
   }
   std::vector<ControlBox> boxes(3);
   for (int k = 0; k < 2; ++k) boxes[k] = {VectorXd::Constant(nu, -1e-3), VectorXd::Constant(nu, 1e-3)};

@@ -38,7 +38,7 @@ class SpoiledProblem : public ShootingProblem {
   StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override { return inner_.calcTerminalCost(x, cost); }
   StepStatus linearize(int k, ConstVectorRef x, ConstVectorRef u, ConstVectorRef next, StageModel& out) override {
     const StepStatus status = inner_.linearize(k, x, u, next, out);
-    return k == bad_stage ? spoil(out.Fx(0, 1)) : status;
+    return k == bad_stage ? spoil(out.Fx()(0, 1)) : status;
   }
   StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override { return inner_.linearizeTerminal(x, out); }
 

@@ -32,15 +32,15 @@ std::vector<StageModel> makeModels(const std::vector<int>& ndx, const std::vecto
     const bool terminal = k + 1 == ndx.size();
     const int n = ndx[k], u = terminal ? 0 : nu[k], next = terminal ? 0 : ndx[k + 1];
     m.resize(n, u, next);
-    m.Fx = random(next, n) / std::sqrt(double(n));
-    m.Fu = random(next, u);
+    m.Fx() = random(next, n) / std::sqrt(double(n));
+    m.Fu() = random(next, u);
     m.gap = random(next, 1);
     m.lx = random(n, 1);
     m.lu = random(u, 1);
     const MatrixXd H = makePositive(n + u, 0.1);
-    m.lxx = H.topLeftCorner(n, n);
-    m.luu = H.bottomRightCorner(u, u);
-    m.lux = H.bottomLeftCorner(u, n);
+    m.lxx() = H.topLeftCorner(n, n);
+    m.luu() = H.bottomRightCorner(u, u);
+    m.lux() = H.bottomLeftCorner(u, n);
   }
   return models;
 }
@@ -70,15 +70,15 @@ struct DenseProgram {
       const StageModel& m = models[k];
       const auto n = m.lx.size(), u = m.lu.size(), next = m.gap.size();
       const int x = x_at[k], c = u_at[k];
-      H.block(x, x, n, n) = m.lxx + mu.state * MatrixXd::Identity(n, n);
-      H.block(c, c, u, u) = m.luu + mu.control * MatrixXd::Identity(u, u);
-      H.block(c, x, u, n) = m.lux;
-      H.block(x, c, n, u) = m.lux.transpose();
+      H.block(x, x, n, n) = m.lxx() + mu.state * MatrixXd::Identity(n, n);
+      H.block(c, c, u, u) = m.luu() + mu.control * MatrixXd::Identity(u, u);
+      H.block(c, x, u, n) = m.lux();
+      H.block(x, c, n, u) = m.lux().transpose();
       g.segment(x, n) = m.lx;
       g.segment(c, u) = m.lu;
       if (k + 1 == models.size()) break;
-      A.block(row, x, next, n) = -m.Fx;
-      A.block(row, c, next, u) = -m.Fu;
+      A.block(row, x, next, n) = -m.Fx();
+      A.block(row, c, next, u) = -m.Fu();
       A.block(row, x_at[k + 1], next, next).setIdentity();
       b.segment(row, next) = m.gap;
       row += static_cast<int>(next);
@@ -187,9 +187,10 @@ TEST_CASE("the value function is the optimal cost to go from any deviation") {
 
 TEST_CASE("state costs may be indefinite as long as the program is convex") {
   auto models = makeModels({4, 4, 4, 4}, {4, 4, 4});
-  for (size_t k = 1; k < models.size(); ++k) models[k].lxx.diagonal().array() -= 0.5;  // reached through invertible Fu
-  for (size_t k = 0; k + 1 < models.size(); ++k) models[k].luu.diagonal().array() += 30;
-  const Eigen::LDLT<MatrixXd> ldlt(models[2].lxx);
+  for (size_t k = 1; k < models.size(); ++k)
+    models[k].lxx().diagonal().array() -= 0.5;  // reached through invertible Fu
+  for (size_t k = 0; k + 1 < models.size(); ++k) models[k].luu().diagonal().array() += 30;
+  const Eigen::LDLT<MatrixXd> ldlt(models[2].lxx());
   REQUIRE_FALSE(ldlt.isPositive());
   const DenseProgram dense(models, {});
   const MatrixXd Z = dense.A.fullPivLu().kernel();
@@ -208,21 +209,21 @@ TEST_CASE("one poisoned entry of any block moves the step away from the dense so
     poison(copy[3]);
     return calcStepError(sweep, copy, dense, {});
   };
-  CHECK(poisoned([](StageModel& m) { m.Fx(1, 2) += 1e-4; }) > 1e-7);
-  CHECK(poisoned([](StageModel& m) { m.Fu(1, 2) += 1e-4; }) > 1e-7);
+  CHECK(poisoned([](StageModel& m) { m.Fx()(1, 2) += 1e-4; }) > 1e-7);
+  CHECK(poisoned([](StageModel& m) { m.Fu()(1, 2) += 1e-4; }) > 1e-7);
   CHECK(poisoned([](StageModel& m) { m.gap(1) += 1e-4; }) > 1e-7);
   CHECK(poisoned([](StageModel& m) { m.lx(1) += 1e-4; }) > 1e-7);
   CHECK(poisoned([](StageModel& m) { m.lu(1) += 1e-4; }) > 1e-7);
-  CHECK(poisoned([](StageModel& m) { m.lxx(2, 1) += 1e-4; }) > 1e-7);
-  CHECK(poisoned([](StageModel& m) { m.lux(2, 1) += 1e-4; }) > 1e-7);
-  CHECK(poisoned([](StageModel& m) { m.luu(2, 1) += 1e-4; }) > 1e-7);
+  CHECK(poisoned([](StageModel& m) { m.lxx()(2, 1) += 1e-4; }) > 1e-7);
+  CHECK(poisoned([](StageModel& m) { m.lux()(2, 1) += 1e-4; }) > 1e-7);
+  CHECK(poisoned([](StageModel& m) { m.luu()(2, 1) += 1e-4; }) > 1e-7);
 }
 
 TEST_CASE("an indefinite control block and a value that is not finite are reported with their node") {
   const auto models = makeModels(kTangents, kControls);
   LqSweep sweep;
   auto bad = models;
-  bad[3].luu -= 1e4 * MatrixXd::Identity(5, 5);
+  bad[3].luu() -= 1e4 * MatrixXd::Identity(5, 5);
   LqResult result = sweep.update(bad, {});
   CHECK(result.status == LqStatus::Indefinite);
   CHECK(result.node == 3);
@@ -235,10 +236,10 @@ TEST_CASE("an indefinite control block and a value that is not finite are report
     return sweep.update(copy, {});
   };
   for (const LqResult& r :
-       {poisoned([&](StageModel& m) { m.Fx(1, 2) = nan; }), poisoned([&](StageModel& m) { m.Fu(1, 2) = nan; }),
+       {poisoned([&](StageModel& m) { m.Fx()(1, 2) = nan; }), poisoned([&](StageModel& m) { m.Fu()(1, 2) = nan; }),
         poisoned([&](StageModel& m) { m.gap(1) = nan; }), poisoned([&](StageModel& m) { m.lx(1) = nan; }),
-        poisoned([&](StageModel& m) { m.lu(1) = nan; }), poisoned([&](StageModel& m) { m.lxx(2, 1) = nan; }),
-        poisoned([&](StageModel& m) { m.lux(2, 1) = nan; }), poisoned([&](StageModel& m) { m.luu(2, 1) = nan; })}) {
+        poisoned([&](StageModel& m) { m.lu(1) = nan; }), poisoned([&](StageModel& m) { m.lxx()(2, 1) = nan; }),
+        poisoned([&](StageModel& m) { m.lux()(2, 1) = nan; }), poisoned([&](StageModel& m) { m.luu()(2, 1) = nan; })}) {
     CHECK(r.status == LqStatus::NotFinite);
     CHECK((r.node == 3 || r.node == 2));
   }
@@ -341,13 +342,13 @@ TEST_CASE("a sweep with any control clamped: gains and value function of the fre
     std::vector<int> free;
     for (int i = 0; i < nu; ++i)
       if (i != which) free.push_back(i);
-    MatrixXd V = models[3].lxx;
+    MatrixXd V = models[3].lxx();
     for (int k = 2; k >= 0; --k) {
       const StageModel& m = models[k];
-      const MatrixXd Quu = m.luu + m.Fu.transpose() * V * m.Fu, Qux = m.lux + m.Fu.transpose() * V * m.Fx;
+      const MatrixXd Quu = m.luu() + m.Fu().transpose() * V * m.Fu(), Qux = m.lux() + m.Fu().transpose() * V * m.Fx();
       const MatrixXd free_Qux = Qux(free, Eigen::all);
       const MatrixXd K = -MatrixXd(Quu(free, free)).ldlt().solve(free_Qux);
-      V = m.lxx + m.Fx.transpose() * V * m.Fx + free_Qux.transpose() * K;
+      V = m.lxx() + m.Fx().transpose() * V * m.Fx() + free_Qux.transpose() * K;
       const auto& node = sweep.getNodes()[k];
       CHECK((node.Vxx - V).norm() < 1e-10 * V.norm());
       CHECK((MatrixXd(node.K(free, Eigen::all)) - K).norm() < 1e-10 * (1 + K.norm()));

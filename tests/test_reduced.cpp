@@ -115,13 +115,13 @@ void checkLinearization(const Model& model, const std::vector<ContactTarget>& co
     return step(moved, u);
   };
   const MatrixXd dx = differentiate(VectorXd::Zero(ndx), 1e-4, along);
-  checkDerivative(linear.Fx, dx.topRows(ndx));
+  checkDerivative(linear.Fx(), dx.topRows(ndx));
   checkDerivative(linear.lx.transpose(), dx.bottomRows(1));
   const MatrixXd du = differentiate(u, 1e-2, [&](const VectorXd& control) { return step(x, control); });
   if (kind == StageKind::Impact)
-    CHECK(linear.Fu.isZero(0));
+    CHECK(linear.Fu().isZero(0));
   else
-    checkDerivative(linear.Fu, du.topRows(ndx));
+    checkDerivative(linear.Fu(), du.topRows(ndx));
   checkDerivative(linear.lu.transpose(), du.bottomRows(1));
 }
 

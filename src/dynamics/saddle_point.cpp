@@ -111,26 +111,28 @@ void SaddlePoint::updateInverse() {
 }
 
 void SaddlePoint::solveDerivatives(MatrixRef X, MatrixRef dlambda) {
-  const Eigen::Index columns = X.cols(), m = J_.rows(), padded = roundUpToLane(columns);
-  if (dlambda_t_.size() < padded * m) dlambda_t_.setZero(padded * m);
-  PaddedMap dlambda_t = shapePadded(dlambda_t_, columns, m);
+  const Eigen::Index columns = X.cols(), n = X.rows(), m = J_.rows(), padded = roundUpToLane(columns);
+  if (X_.size() < padded * n || dlambda_t_.size() < padded * m) {
+    X_.setZero(padded * n);
+    dlambda_t_.setZero(padded * m);
+  }
+  PaddedMap Xt = shapePadded(X_, columns, n), dlambda_t = shapePadded(dlambda_t_, columns, m);
+  copyTransposed(X, Xt);
   copyTransposed(dlambda, dlambda_t);
-  solveDerivatives(factors_, X, dlambda_t);
+  clearPadding(Xt);
+  clearPadding(dlambda_t);
+  solveDerivatives(factors_, Xt, dlambda_t);
+  copyTransposed(Xt, X);
   copyTransposed(dlambda_t, dlambda);
 }
 
-void SaddlePoint::solveDerivatives(const SaddlePointFactors& factors, MatrixRef X, PaddedMap dlambda_t) {
+void SaddlePoint::solveDerivatives(const SaddlePointFactors& factors, PaddedMap Xt, PaddedMap dlambda_t) {
   // In the coordinates of L: W = D J L^{-T} and L^{-1} dID give J M^{-1} dID = D^{-1} W L^{-1} dID. All is done on
   // transposes, whose columns are long.
-  const Eigen::Index columns = X.cols(), n = X.rows(), m = factors.D.size(), padded = roundUpToLane(columns);
-  if (X_.size() < padded * n || rhs_t_.size() < padded * m) {
-    X_.setZero(padded * n);
-    rhs_t_.setZero(padded * m);
-  }
-  PaddedMap Xt = shapePadded(X_, columns, n), rhs = shapePadded(rhs_t_, columns, m);
+  const Eigen::Index columns = Xt.rows(), n = Xt.cols(), m = factors.D.size(), padded = roundUpToLane(columns);
+  if (rhs_t_.size() < padded * m) rhs_t_.setZero(padded * m);
+  PaddedMap rhs = shapePadded(rhs_t_, columns, m);
   const MatrixXd &L = factors.L, &Wt = factors.Wt;
-  copyTransposed(X, Xt);
-  clearPadding(Xt);
   solveTransposedFromRight(L, Xt);
   for (Eigen::Index i = 0; i < m; ++i) rhs.col(i) = -factors.D[i] * dlambda_t.col(i);
   clearPadding(rhs);
@@ -140,7 +142,6 @@ void SaddlePoint::solveDerivatives(const SaddlePointFactors& factors, MatrixRef 
   Xt *= -1;
   addProduct(columns, n, m, 1, pad(dlambda_t), {Wt.data(), n, 1}, pad(Xt));
   solveFromRight(L, Xt);
-  copyTransposed(Xt, X);
   for (Eigen::Index i = 0; i < m; ++i) dlambda_t.col(i) *= factors.D[i];
 }
 

@@ -20,7 +20,7 @@ constexpr int kColumns = 4;
 enum class Into { Sum, Nothing };  // what a product meets where it goes
 
 template <Into into, int L, int C>
-void addBlock(Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B, PaddedMatrix out) {
+void addBlock(Eigen::Index depth, double sign, ConstPaddedMatrix A, StridedMatrix B, PaddedMatrix out) {
   Lane sums[C][L] = {};
   const double *a = A.data, *b = B.data;
   for (Eigen::Index k = 0; k < depth; ++k, a += A.stride, b += B.row_stride) {
@@ -45,7 +45,7 @@ void addBlock(Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B, 
 }
 
 template <Into into, int L>
-void addRows(Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B, PaddedMatrix C) {
+void addRows(Eigen::Index cols, Eigen::Index depth, double sign, ConstPaddedMatrix A, StridedMatrix B, PaddedMatrix C) {
   Eigen::Index j = 0;
   const auto addColumns = [&](auto block, Eigen::Index width) {
     for (; j + width <= cols; j += width) {
@@ -59,8 +59,8 @@ void addRows(Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A,
 
 // As many lanes at a time as there are, up to L.
 template <Into into, int L>
-void addLanes(Eigen::Index lanes, Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B,
-              PaddedMatrix C) {
+void addLanes(Eigen::Index lanes, Eigen::Index cols, Eigen::Index depth, double sign, ConstPaddedMatrix A,
+              StridedMatrix B, PaddedMatrix C) {
   for (; lanes >= L; lanes -= L, A.data += L * kLane, C.data += L * kLane) addRows<into, L>(cols, depth, sign, A, B, C);
   if constexpr (L > 1) addLanes<into, L - 1>(lanes, cols, depth, sign, A, B, C);
 }
@@ -101,12 +101,12 @@ void solveColumns(const Triangle& T, int cols, Eigen::Index rows, PaddedMatrix X
 
 }  // namespace
 
-void addProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B,
-                PaddedMatrix C) {
+void addProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, double sign, ConstPaddedMatrix A,
+                StridedMatrix B, PaddedMatrix C) {
   addLanes<Into::Sum, kMaxLanes>(roundUpToLane(rows) / kLane, cols, depth, sign, A, B, C);
 }
 
-void setProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, PaddedMatrix A, StridedMatrix B,
+void setProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, ConstPaddedMatrix A, StridedMatrix B,
                 PaddedMatrix C) {
   addLanes<Into::Nothing, kMaxLanes>(roundUpToLane(rows) / kLane, cols, depth, 1, A, B, C);
 }
@@ -192,15 +192,16 @@ void visitLower(Eigen::Index begin, const PaddedMap& H, const Product& product) 
 
 }  // namespace
 
-void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, PaddedMap A, PaddedMap B, PaddedMap H) {
+void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, ConstPaddedMatrix A, ConstPaddedMatrix B,
+                     PaddedMap H) {
   visitLower(begin, H, [&](Eigen::Index i, Eigen::Index j, Eigen::Index cols) {
-    addProduct(H.rows() - i, cols, depth, sign, pad(A, i), {B.data() + j, B.outerStride(), 1}, pad(H, i, j));
+    addProduct(H.rows() - i, cols, depth, sign, {A.data + i, A.stride}, {B.data + j, B.stride, 1}, pad(H, i, j));
   });
 }
 
-void setLowerProduct(Eigen::Index depth, PaddedMap A, PaddedMap B, PaddedMap H) {
+void setLowerProduct(Eigen::Index depth, ConstPaddedMatrix A, ConstPaddedMatrix B, PaddedMap H) {
   visitLower(0, H, [&](Eigen::Index i, Eigen::Index j, Eigen::Index cols) {
-    setProduct(H.rows() - i, cols, depth, pad(A, i), {B.data() + j, B.outerStride(), 1}, pad(H, i, j));
+    setProduct(H.rows() - i, cols, depth, {A.data + i, A.stride}, {B.data + j, B.stride, 1}, pad(H, i, j));
   });
 }
 

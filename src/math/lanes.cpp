@@ -47,12 +47,12 @@ void packLanes(const std::array<const double*, kLane>& in, Eigen::Index size, La
     for (Eigen::Index l = 0; l < kLane; ++l) out[i].v[l] = in[l][i];
 }
 
-void unpackLanes(const Lanes* in, Eigen::Index size, const std::array<double*, kLane>& out) {
+void unpackLanes(const Lanes* in, Eigen::Index size, const std::array<double*, kLane>& out, Eigen::Index stride) {
   Eigen::Index i = 0;
   for (; i + kLane <= size; i += kLane) {
     std::array<Vector, kLane> rows;
 #pragma GCC unroll 8
-    for (Eigen::Index l = 0; l < kLane; ++l) rows[l] = in[i + l].v;
+    for (Eigen::Index l = 0; l < kLane; ++l) rows[l] = in[(i + l) * stride].v;
     transpose(rows);
 #pragma GCC unroll 8
     for (Eigen::Index l = 0; l < kLane; ++l)
@@ -60,7 +60,7 @@ void unpackLanes(const Lanes* in, Eigen::Index size, const std::array<double*, k
   }
   for (; i < size; ++i)
     for (Eigen::Index l = 0; l < kLane; ++l)
-      if (out[l]) out[l][i] = in[i].v[l];
+      if (out[l]) out[l][i] = in[i * stride].v[l];
 }
 
 // Minimax polynomials of FreeBSD's libm (k_sin.c, k_cos.c), whose errors are below 2^-58.

@@ -64,19 +64,19 @@ bool FullNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
   if (updateConstrainedDerivatives(model_, ws_, cws_, spec_.constraints) != DynamicsStatus::Ok) return false;
   const int nv = model_.nv();
   const double h = spec_.dt;
-  auto Fv = out.Fx.bottomRows(nv);
+  auto Fv = out.Fx().bottomRows(nv);
   Fv.leftCols(nv) = h * cws_.da_dq;
   Fv.rightCols(nv) = h * cws_.da_dv;
   Fv.rightCols(nv).diagonal().array() += 1;
-  out.Fu.bottomRows(nv) = h * cws_.da_du;
+  out.Fu().bottomRows(nv) = h * cws_.da_du;
   difference(x_next_node, x_next_, out.gap);
   for (const Joint& joint : model_.joints()) {
     const int i = joint.idx_v, n = joint.nv;
     if (n == 0) continue;
     if (!isCurved(joint)) {
-      out.Fx.middleRows(i, n) = h * out.Fx.middleRows(nv + i, n);
-      out.Fx.block(i, i, n, n).diagonal().array() += 1;
-      out.Fu.middleRows(i, n) = h * out.Fu.middleRows(nv + i, n);
+      out.Fx().middleRows(i, n) = h * out.Fx().middleRows(nv + i, n);
+      out.Fx().block(i, i, n, n).diagonal().array() += 1;
+      out.Fu().middleRows(i, n) = h * out.Fu().middleRows(nv + i, n);
       continue;
     }
     JointMatrix Jq(n, n), Jd(n, n), Jdiff(n, n);
@@ -84,9 +84,9 @@ bool FullNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
     calcJointIntegrateJacobians(joint, d, Jq, Jd);
     calcJointDifferenceJacobian(joint, gap, Jdiff);
     const JointMatrix dv = h * Jdiff * Jd, dq = Jdiff * Jq;
-    out.Fx.middleRows(i, n).noalias() = dv * out.Fx.middleRows(nv + i, n);
-    out.Fx.block(i, i, n, n) += dq;
-    out.Fu.middleRows(i, n).noalias() = dv * out.Fu.middleRows(nv + i, n);
+    out.Fx().middleRows(i, n).noalias() = dv * out.Fx().middleRows(nv + i, n);
+    out.Fx().block(i, i, n, n) += dq;
+    out.Fu().middleRows(i, n).noalias() = dv * out.Fu().middleRows(nv + i, n);
   }
   return true;
 }
@@ -95,7 +95,7 @@ void FullNode::addStateCost(const StateCost& state, const VectorXd& difference, 
   const int nv = model_.nv();
   const double w = scale * state.weight;
   out.lx.tail(nv) += w * state.weights.tail(nv).cwiseProduct(ws_.v - state.v_ref);
-  out.lxx.diagonal().tail(nv) += w * state.weights.tail(nv);
+  out.lxx().diagonal().tail(nv) += w * state.weights.tail(nv);
   for (const Joint& joint : model_.joints()) {
     const int i = joint.idx_v, n = joint.nv;
     if (n == 0) continue;
@@ -105,7 +105,7 @@ void FullNode::addStateCost(const StateCost& state, const VectorXd& difference, 
     calcJointDifferenceJacobian(joint, d, J);
     const JointMatrix WJ = weights.asDiagonal() * J;
     out.lx.segment(i, n).noalias() += WJ.transpose() * d;
-    out.lxx.block(i, i, n, n).noalias() += J.transpose() * WJ;
+    out.lxx().block(i, i, n, n).noalias() += J.transpose() * WJ;
   }
 }
 
@@ -125,12 +125,12 @@ void FullNode::setResiduals(const ResidualStack& stack, bool running, StageModel
   }
   scaled_ = stack.hessian.asDiagonal() * Rx_;
   out.lx.noalias() = Rx_.transpose() * stack.gradient;
-  out.lxx.noalias() = Rx_.transpose() * scaled_;
+  out.lxx().noalias() = Rx_.transpose() * scaled_;
   if (!running) return;
   out.lu.noalias() = Ru_.transpose() * stack.gradient;
-  out.lux.noalias() = Ru_.transpose() * scaled_;
+  out.lux().noalias() = Ru_.transpose() * scaled_;
   Ru_scaled_ = stack.hessian.asDiagonal() * Ru_;
-  out.luu.noalias() = Ru_.transpose() * Ru_scaled_;
+  out.luu().noalias() = Ru_.transpose() * Ru_scaled_;
 }
 
 std::unique_ptr<NodeModel> makeFullNode(const Model& model, const StageSpec& spec) {

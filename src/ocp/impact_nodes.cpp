@@ -26,15 +26,15 @@ bool FullImpactNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) 
   cws_.dlambda_dq = iws_.dimpulse_dq;
   cws_.dlambda_dv = iws_.dimpulse_dv;
   difference(x_next_node, x_next_, out.gap);
-  out.Fu.setZero();
-  out.Fx.topRows(nv).setZero();
-  out.Fx.bottomLeftCorner(nv, nv) = iws_.dv_dq;
-  out.Fx.bottomRightCorner(nv, nv) = iws_.dv_dv;
+  out.Fu().setZero();
+  out.Fx().topRows(nv).setZero();
+  out.Fx().bottomLeftCorner(nv, nv) = iws_.dv_dq;
+  out.Fx().bottomRightCorner(nv, nv) = iws_.dv_dv;
   for (const Joint& joint : model_.joints()) {
     if (joint.nv == 0) continue;
     JointMatrix Jdiff(joint.nv, joint.nv);
     calcJointDifferenceJacobian(joint, out.gap.segment(joint.idx_v, joint.nv), Jdiff);
-    out.Fx.block(joint.idx_v, joint.idx_v, joint.nv, joint.nv) = Jdiff;
+    out.Fx().block(joint.idx_v, joint.idx_v, joint.nv, joint.nv) = Jdiff;
   }
   return true;
 }
@@ -76,8 +76,8 @@ bool ReducedImpactNode::linearizeStep(ConstVectorRef x_next_node, StageModel& ou
   addColumns(iws_.dv_dq, Lift::N, D_y_);
   addColumns(iws_.dv_dv, Lift::Z, D_y_);
   addColumns(iws_.dv_dv, Lift::N, D_v_);
-  out.Fx.setZero();
-  out.Fu.setZero();
+  out.Fx().setZero();
+  out.Fu().setZero();
   for (Block& b : blocks_)
     if (!linearizeBlock(b, x_next_node, out)) return false;
   differenceFree(x_next_node, x_next_, out.gap);
@@ -87,13 +87,13 @@ bool ReducedImpactNode::linearizeStep(ConstVectorRef x_next_node, StageModel& ou
 
 // The impulses of the contacts, where setResiduals() expects them.
 void ReducedImpactNode::updateForceDerivatives() {
-  const int nr = reduction_.size;
+  const int nr = reduction_.size, nu = model_.nu();
   const auto by_q = iws_.dimpulse_dq.bottomRows(contact_rows_), by_v = iws_.dimpulse_dv.bottomRows(contact_rows_);
   PaddedMap dlambda = shapeForceDerivatives();
   dlambda.setZero();
-  addColumns(by_q, Lift::N, dlambda.topRows(nr));
-  addColumns(by_v, Lift::Z, dlambda.topRows(nr));
-  addColumns(by_v, Lift::N, dlambda.middleRows(nr, nr));
+  addColumns(by_q, Lift::N, dlambda.middleRows(nu, nr));
+  addColumns(by_v, Lift::Z, dlambda.middleRows(nu, nr));
+  addColumns(by_v, Lift::N, dlambda.middleRows(nu + nr, nr));
 }
 
 // Eq. (a) for one block.
@@ -112,11 +112,11 @@ bool ReducedImpactNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, Sta
   work.HN.noalias() = b.at.WN * work.v_v.transpose();
   for (size_t k = 0; k < loop.dofs.size(); ++k)
     for (int c = 0; c < r; ++c) {
-      out.Fx.row(nr + o + c).head(nr) += work.HN(k, c) * D_y_.col(loop.dofs[k]).transpose();
-      out.Fx.row(nr + o + c).tail(nr) += work.HN(k, c) * D_v_.col(loop.dofs[k]).transpose();
+      out.Fx().row(nr + o + c).head(nr) += work.HN(k, c) * D_y_.col(loop.dofs[k]).transpose();
+      out.Fx().row(nr + o + c).tail(nr) += work.HN(k, c) * D_v_.col(loop.dofs[k]).transpose();
     }
-  out.Fx.block(o, o, r, r) = work.q_y;
-  out.Fx.block(nr + o, o, r, r) += work.v_y;
+  out.Fx().block(o, o, r, r) = work.q_y;
+  out.Fx().block(nr + o, o, r, r) += work.v_y;
   return true;
 }
 
@@ -125,9 +125,9 @@ void ReducedImpactNode::linearizeFreeJoint(const FreeJoint& free, StageModel& ou
   const int nr = reduction_.size, o = free.offset, n = joint.nv;
   JointMatrix Jdiff(n, n);
   calcJointDifferenceJacobian(joint, out.gap.segment(o, n), Jdiff);
-  out.Fx.block(o, o, n, n) = Jdiff;
-  out.Fx.block(nr + o, 0, n, nr) = D_y_.middleCols(joint.idx_v, n).transpose();
-  out.Fx.block(nr + o, nr, n, nr) = D_v_.middleCols(joint.idx_v, n).transpose();
+  out.Fx().block(o, o, n, n) = Jdiff;
+  out.Fx().block(nr + o, 0, n, nr) = D_y_.middleCols(joint.idx_v, n).transpose();
+  out.Fx().block(nr + o, nr, n, nr) = D_v_.middleCols(joint.idx_v, n).transpose();
 }
 
 }  // namespace bielle

@@ -23,10 +23,10 @@ void ReducedLanes::pack(const Get& get, Eigen::Index size, Lanes* out) const {
 
 // `get` says where the numbers of a lane go, null for nowhere.
 template <typename Get>
-void ReducedLanes::unpack(const Lanes* in, Eigen::Index size, const Get& get) const {
+void ReducedLanes::unpack(const Lanes* in, Eigen::Index size, const Get& get, Eigen::Index stride) const {
   std::array<double*, kLane> out{};
   for (size_t l = 0; l < nodes_.size(); ++l) out[l] = get(l);
-  unpackLanes(in, size, out);
+  unpackLanes(in, size, out, stride);
 }
 
 void ReducedLanes::packPlacements() {
@@ -235,8 +235,13 @@ void ReducedLanes::storeDerivatives() {
   store(ws_.J, [](LaneView& view) { return view.ws.J.data(); });
   store(ws_.dV, [](LaneView& view) { return view.ws.dV.data(); });
   store(ws_.YJ, [](LaneView& view) { return view.ws.YJ.data(); });
-  store(A_y_, [](LaneView& view) { return view.dydd.data(); });
-  store(A_v_, [](LaneView& view) { return view.dydd.data() + view.dydd.rows() * view.dydd.rows(); });
+  const Eigen::Index nr = reduction_.size, nu = model_.nu(), rows = roundUpToLane(nu + 2 * nr);
+  for (Eigen::Index i = 0; i < nr; ++i) {
+    unpack(
+        &A_y_(i, 0), nr, [&](size_t l) { return &views_[l].dydd[i * rows + nu]; }, nr);
+    unpack(
+        &A_v_(i, 0), nr, [&](size_t l) { return &views_[l].dydd[i * rows + nu + nr]; }, nr);
+  }
   const int nb = model_.numBodies();
   unpack(ws_.V.front().data(), 6 * nb, [this](size_t l) { return views_[l].ws.V.front().data(); });
   unpack(ws_.hc.front().data(), 6 * nb, [this](size_t l) { return views_[l].ws.hc.front().data(); });

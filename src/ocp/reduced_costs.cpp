@@ -31,10 +31,10 @@ void ReducedNode::addStateCost(const StateCost& state, const VectorXd& differenc
     const int o = free.offset, n = joint.nv, k = joint.idx_v;
     calcJointCost(state, difference, w, joint, gradient, hessian);
     out.lx.segment(o, n) += gradient;
-    out.lxx.block(o, o, n, n) += hessian;
+    out.lxx().block(o, o, n, n) += hessian;
     const JointVector weights = w * state.weights.segment(nv + k, n);
     out.lx.segment(nr + o, n) += weights.cwiseProduct(v_.segment(k, n) - state.v_ref.segment(k, n));
-    out.lxx.block(nr + o, nr + o, n, n).diagonal() += weights;
+    out.lxx().block(nr + o, nr + o, n, n).diagonal() += weights;
   }
   for (Block& b : blocks_) {
     // Changes of q are N dy, of v N dy_v + Z dy: gradients by dof, and Hessians times N and Z.
@@ -64,26 +64,24 @@ void ReducedNode::addStateCost(const StateCost& state, const VectorXd& differenc
     addSmallProductTransposed(N, b.work->gradient_q, out.lx.segment(o, r));
     addSmallProductTransposed(b.work->motion.Z, b.work->gradient_v, out.lx.segment(o, r));
     addSmallProductTransposed(N, b.work->gradient_v, out.lx.segment(nr + o, r));
-    addSmallProductTransposed(N, b.work->HN, out.lxx.block(o, o, r, r));
-    addSmallProductTransposed(b.work->motion.Z, b.work->wy, out.lxx.block(o, o, r, r));
-    addSmallProductTransposed(b.work->motion.Z, b.work->wv, out.lxx.block(o, nr + o, r, r));
-    addSmallProductTransposed(b.work->wv, b.work->motion.Z, out.lxx.block(nr + o, o, r, r));
-    addSmallProductTransposed(N, b.work->wv, out.lxx.block(nr + o, nr + o, r, r));
+    addSmallProductTransposed(N, b.work->HN, out.lxx().block(o, o, r, r));
+    addSmallProductTransposed(b.work->motion.Z, b.work->wy, out.lxx().block(o, o, r, r));
+    addSmallProductTransposed(b.work->wv, b.work->motion.Z, out.lxx().block(nr + o, o, r, r));
+    addSmallProductTransposed(N, b.work->wv, out.lxx().block(nr + o, nr + o, r, r));
   }
 }
 
-// Rt = (dr/d(dy, dy_v, u))^T, one column per residual: Rt diag(hessian) Rt^T is all second derivatives at once.
+// Rt = (dr/d(u, dy, dy_v))^T, one column per residual: Rt diag(hessian) Rt^T is all second derivatives at once.
 void ReducedNode::setResiduals(const ResidualStack& stack, bool running, StageModel& out) {
   ReducedWork& work = *work_;
-  const int nr = reduction_.size, nu = running ? model_.nu() : 0, columns = 2 * nr + nu;
+  const int nr = reduction_.size, nu = running ? model_.nu() : 0, columns = nu + 2 * nr;
   const int rows = static_cast<int>(stack.r.size()), motion_rows = stack.motion_rows;
-  PaddedMap Rt = shapePadded(work.Rt, columns, rows), scaled = shapePadded(work.Rt_scaled, columns, rows),
-            H = shapePadded(work.H, columns, columns);
+  PaddedMap Rt = shapePadded(work.Rt, columns, rows), scaled = shapePadded(work.Rt_scaled, columns, rows);
   Rt.setZero();
   const auto q = work.jacobians.q.topRows(motion_rows), v = work.jacobians.v.topRows(motion_rows);
-  addColumns(q, Lift::N, Rt.block(0, 0, nr, motion_rows));
-  addColumns(v, Lift::Z, Rt.block(0, 0, nr, motion_rows));
-  addColumns(v, Lift::N, Rt.block(nr, 0, nr, motion_rows));
+  addColumns(q, Lift::N, Rt.block(nu, 0, nr, motion_rows));
+  addColumns(v, Lift::Z, Rt.block(nu, 0, nr, motion_rows));
+  addColumns(v, Lift::N, Rt.block(nu + nr, 0, nr, motion_rows));
   if (running && contact_rows_ > 0) {
     const PaddedMap by_forces = shapeForceDerivatives();
     const auto lambda = work.jacobians.lambda.block(0, loop_rows_, rows, contact_rows_);
@@ -94,19 +92,13 @@ void ReducedNode::setResiduals(const ResidualStack& stack, bool running, StageMo
   clearPadding(Rt);
   for (int i = 0; i < rows; ++i) scaled.col(i) = stack.hessian[i] * Rt.col(i);
   clearPadding(scaled);
-  setLowerProduct(rows, scaled, Rt, H);
+  setLowerProduct(rows, pad(scaled), pad(Rt), out.H());
   out.lx.setZero();
   out.lu.setZero();
   for (int i = 0; i < rows; ++i) {
-    out.lx += stack.gradient[i] * Rt.col(i).head(2 * nr);
-    if (running) out.lu += stack.gradient[i] * Rt.col(i).tail(nu);
+    out.lx += stack.gradient[i] * Rt.col(i).tail(2 * nr);
+    if (running) out.lu += stack.gradient[i] * Rt.col(i).head(nu);
   }
-  for (int c = 0; c < 2 * nr; ++c) out.lxx.col(c).tail(2 * nr - c) = H.col(c).segment(c, 2 * nr - c);
-  copyLowerToUpper(out.lxx);
-  if (!running) return;
-  out.lux = H.bottomLeftCorner(nu, 2 * nr);
-  out.luu.triangularView<Eigen::Lower>() = H.bottomRightCorner(nu, nu);
-  copyLowerToUpper(out.luu);
 }
 
 }  // namespace bielle

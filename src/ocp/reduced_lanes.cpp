@@ -54,7 +54,7 @@ BlockLanes::BlockLanes(const LoopBlock& l)
 LaneView::LaneView(const Model& model, const std::vector<BlockLanes>& blocks, const std::vector<ContactLanes>& contacts,
                    int size)
     : ws(model) {
-  dydd.setZero(size, 2 * size + model.nu());
+  dydd.setZero(roundUpToLane(model.nu() + 2 * size) * size);
   for (const BlockLanes& b : blocks) {
     const Eigen::Index n = b.at.N.rows(), r = b.at.N.cols();
     const MatrixXd square = MatrixXd::Zero(r, r);

@@ -51,7 +51,7 @@ struct LaneView {
     Matrix6Xd dy, dv;  // as in ContactLanes
   };
   Workspace ws;   // V and hc behind a step; what residuals look at, behind linearize()
-  MatrixXd dydd;  // size x (2 size + nu): A_y, A_v, and room
+  VectorXd dydd;  // (nu + 2 size) x size, padded: room, A_y^T, A_v^T
   std::vector<Block> blocks;
   std::vector<Contact> contacts;
 };
@@ -90,7 +90,7 @@ class ReducedLanes {
   template <typename Get>
   void pack(const Get& get, Eigen::Index size, Lanes* out) const;
   template <typename Get>
-  void unpack(const Lanes* in, Eigen::Index size, const Get& get) const;
+  void unpack(const Lanes* in, Eigen::Index size, const Get& get, Eigen::Index stride = 1) const;
   void setNodes(NodeModel* const* nodes, int count);
   void packPlacements();
   void packNodes();

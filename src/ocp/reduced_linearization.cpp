@@ -6,43 +6,6 @@
 #include "reduced_node.h"
 
 namespace bielle {
-namespace {
-
-// Rows of a unit with `size` coordinates from `offset` on: q_a and v_a (size x size) times the derivatives of y'. Sizes
-// known to the compiler make a few instructions of a column.
-template <typename Size>
-void assembleRows(Size size, const double* __restrict q_a, const double* __restrict v_a, int offset,
-                  ConstMatrixRef dydd, MatrixXd& F) {
-  for (Eigen::Index c = 0; c < F.cols(); ++c) {
-    const double* __restrict ydd = dydd.data() + c * dydd.outerStride() + offset;
-    double* __restrict q = &F(offset, c), * __restrict v = q + F.rows() / 2;
-    for (int i = 0; i < size; ++i) q[i] = v[i] = 0;
-    for (int k = 0; k < size; ++k) {
-      const double y = ydd[k];
-      for (int i = 0; i < size; ++i) {
-        q[i] += q_a[k * size + i] * y;
-        v[i] += v_a[k * size + i] * y;
-      }
-    }
-  }
-}
-
-void assembleBlock(const MatrixXd& q_a, const MatrixXd& v_a, int offset, ConstMatrixRef dydd, MatrixXd& F) {
-  const auto assemble = [&](auto size) { assembleRows(size, q_a.data(), v_a.data(), offset, dydd, F); };
-  switch (q_a.rows()) {
-    case 1:
-      return assemble(std::integral_constant<int, 1>());
-    case 2:
-      return assemble(std::integral_constant<int, 2>());
-    case 3:
-      return assemble(std::integral_constant<int, 3>());
-    default:
-      return assemble(static_cast<int>(q_a.rows()));
-  }
-}
-
-}  // namespace
-
 void ReducedNode::prepareLinearization(NodeModel* const* nodes, int count) {
   takeWork();
   work_->lanes.linearize(nodes, count);
@@ -67,24 +30,31 @@ int ReducedNode::findContactRow(size_t slot, int row) const {
 }
 
 PaddedMap ReducedNode::shapeForceDerivatives() const {
-  return shapePadded(work_->dlambda, 2 * reduction_.size + model_.nu(), contact_rows_);
+  return shapePadded(work_->dlambda, model_.nu() + 2 * reduction_.size, contact_rows_);
+}
+
+// Derivatives of y' by (u, dy, dy_v), one column per coordinate; before linearizeDynamics() the right-hand sides.
+PaddedMap ReducedNode::shapeAccelerationDerivatives(LaneView& view) const {
+  return shapePadded(view.dydd, model_.nu() + 2 * reduction_.size, reduction_.size);
 }
 
 // The right-hand sides of the contact rows.
 void ReducedNode::loadContactDerivatives(const LaneView& view) {
   ReducedWork& work = *work_;
-  const int nr = reduction_.size;
+  const int nr = reduction_.size, nu = model_.nu();
   const ConstraintSet& set = spec_.constraints;
   PaddedMap dlambda = shapeForceDerivatives();
   dlambda.setZero();
+  clearPadding(dlambda);
   for (size_t c = num_loops_; c < set.closures.size(); ++c) {
     const int row = set.offsets[c] - loop_rows_, n = getRows(set.closures[c].kind);
     const int slot = contact_slots_[c - num_loops_];
     const LaneView::Contact& contact = view.contacts[slot];
     const std::vector<int>& outer = work.lanes.getOuter(slot);
     for (size_t o = 0; o < outer.size(); ++o) {
-      dlambda.row(outer[o]).segment(row, n) = selectRows<double>(set.closures[c], contact.dy.col(o)).transpose();
-      dlambda.row(nr + outer[o]).segment(row, n) = selectRows<double>(set.closures[c], contact.dv.col(o)).transpose();
+      dlambda.row(nu + outer[o]).segment(row, n) = selectRows<double>(set.closures[c], contact.dy.col(o)).transpose();
+      dlambda.row(nu + nr + outer[o]).segment(row, n) =
+          selectRows<double>(set.closures[c], contact.dv.col(o)).transpose();
     }
   }
 }
@@ -92,21 +62,22 @@ void ReducedNode::loadContactDerivatives(const LaneView& view) {
 // Derivatives of y' and lambda_c.
 void ReducedNode::linearizeDynamics(LaneView& view) {
   ReducedWork& work = *work_;
-  view.dydd.rightCols(model_.nu()).setZero();
-  addMotorColumns(view.dydd.rightCols(model_.nu()));
+  PaddedMap dydd = shapeAccelerationDerivatives(view);
+  dydd.topRows(model_.nu()).setZero();
+  addMotorRows(dydd);
   loadContactDerivatives(view);
-  work.contacts.at(contact_rows_).saddle_point.solveDerivatives(factors_, view.dydd, shapeForceDerivatives());
+  work.contacts.at(contact_rows_).saddle_point.solveDerivatives(factors_, dydd, shapeForceDerivatives());
 }
 
-// out (size x nu) += -N^T B
-void ReducedNode::addMotorColumns(MatrixRef out) const {
+// The first nu rows of out (x size) += -(N^T B)^T
+void ReducedNode::addMotorRows(PaddedMap out) const {
   for (size_t m = 0; m < work_->motors.size(); ++m) {
     const auto& [block, row] = work_->motors[m];
     if (block < 0) {
-      out(row, m) -= 1;
+      out(m, row) -= 1;
     } else {
       const LoopBlock& loop = blocks_[block].loop;
-      out.col(m).segment(loop.offset, loop.size) -= blocks_[block].at.N.row(row).transpose();
+      out.row(m).segment(loop.offset, loop.size) -= blocks_[block].at.N.row(row);
     }
   }
 }
@@ -120,7 +91,7 @@ bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
     if (!linearizeBlock(blocks_[i], view.blocks[i], x_next_node, out)) return false;
   differenceFree(x_next_node, x_next_, out.gap);
   for (FreeJoint& free : work_->free_joints) linearizeFreeJoint(free, out);
-  assembleStep(view.dydd, out);
+  assembleStep(shapeAccelerationDerivatives(view), out);
   storeChart();
   return true;
 }
@@ -223,39 +194,37 @@ void ReducedNode::linearizeFreeJoint(FreeJoint& free, const StageModel& out) con
   free.q_a = h * free.q_v;
 }
 
-// Derivatives of the step by those of y' and what each unit makes of them: h^2 and h times these for a coordinate of its own.
-void ReducedNode::assembleColumns(ConstMatrixRef dydd, MatrixXd& F) const {
-  const int nr = reduction_.size;
+// Columns of F^T, from those of y' and what each unit makes of them: h^2 and h times these for a coordinate of its own.
+void ReducedNode::assembleStep(PaddedMap dydd, StageModel& out) const {
+  const Eigen::Index nr = reduction_.size, nu = model_.nu(), rows = dydd.rows();
   const double h = spec_.dt;
-  for (Eigen::Index c = 0; c < F.cols(); ++c) {
-    F.col(c).head(nr) = (h * h) * dydd.col(c);
-    F.col(c).tail(nr) = h * dydd.col(c);
-  }
+  PaddedMap Ft = out.Ft();
+  const auto add = [&](const auto& derivative, Eigen::Index row, Eigen::Index col) {
+    Ft.block(nu + row, col, derivative.cols(), derivative.rows()) += derivative.transpose();
+  };
+  const auto multiply = [&](const auto& derivative, Eigen::Index from, Eigen::Index to) {
+    const Eigen::Index n = derivative.rows();
+    setProduct(rows, n, n, pad(dydd, 0, from), {derivative.data(), derivative.outerStride(), 1}, pad(Ft, 0, to));
+  };
   for (const FreeJoint& free : work_->free_joints) {
-    if (!isCurved(model_.joints()[free.joint])) continue;
-    const int o = free.offset, n = static_cast<int>(free.q_a.rows());
-    F.middleRows(o, n).setZero();
-    addSmallProduct(free.q_a, dydd.middleRows(o, n), F.middleRows(o, n));
-  }
-  for (const Block& b : blocks_) assembleBlock(b.work->q_a, b.work->v_a, b.loop.offset, dydd, F);
-}
-
-void ReducedNode::assembleStep(const MatrixXd& dydd, StageModel& out) const {
-  const int nr = reduction_.size;
-  assembleColumns(dydd.leftCols(2 * nr), out.Fx);
-  assembleColumns(dydd.rightCols(model_.nu()), out.Fu);
-  for (const FreeJoint& free : work_->free_joints) {
-    const int n = static_cast<int>(free.q_v.rows()), o = free.offset;
-    out.Fx.block(o, o, n, n) += free.q_y;
-    out.Fx.block(o, nr + o, n, n) += free.q_v;
-    out.Fx.block(nr + o, nr + o, n, n).diagonal().array() += 1;
+    const Eigen::Index o = free.offset, n = free.q_a.rows();
+    if (isCurved(model_.joints()[free.joint]))
+      multiply(free.q_a, o, o);
+    else
+      Ft.middleCols(o, n) = (h * h) * dydd.middleCols(o, n);
+    Ft.middleCols(nr + o, n) = h * dydd.middleCols(o, n);
+    add(free.q_y, o, o);
+    add(free.q_v, nr + o, o);
+    Ft.block(nu + nr + o, nr + o, n, n).diagonal().array() += 1;
   }
   for (const Block& b : blocks_) {
-    const int o = b.loop.offset, r = b.loop.size;
-    out.Fx.block(o, o, r, r) += b.work->q_y;
-    out.Fx.block(o, nr + o, r, r) += b.work->q_v;
-    out.Fx.block(nr + o, o, r, r) += b.work->v_y;
-    out.Fx.block(nr + o, nr + o, r, r) += b.work->v_v;
+    const Eigen::Index o = b.loop.offset;
+    multiply(b.work->q_a, o, o);
+    multiply(b.work->v_a, o, nr + o);
+    add(b.work->q_y, o, o);
+    add(b.work->q_v, nr + o, o);
+    add(b.work->v_y, o, nr + o);
+    add(b.work->v_v, nr + o, nr + o);
   }
 }
 

@@ -116,7 +116,6 @@ ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const R
   jacobians.lambda.setZero(sizes.residuals, sizes.constraints);
   const Eigen::Index padded = roundUpToLane(2 * nr + nu);
   for (VectorXd* x : {&Rt, &Rt_scaled}) x->setZero(padded * sizes.residuals);
-  H.setZero(padded * (2 * nr + nu));
   dlambda.setZero(padded * sizes.rows);
 }
 

@@ -97,8 +97,8 @@ struct ReducedWork {
   };
   std::vector<Motor> motors;
   ResidualJacobians jacobians;
-  VectorXd Rt, Rt_scaled, H;  // of setResiduals(), with room for any node
-  VectorXd dlambda;           // see shapeForceDerivatives(), likewise
+  VectorXd Rt, Rt_scaled;  // of setResiduals(), with room for any node
+  VectorXd dlambda;        // see shapeForceDerivatives(), likewise
 };
 
 // One for each thread that asks.
@@ -188,7 +188,7 @@ class ReducedNode : public NodeModel {
   void finishStep();
   bool moveToNodeState(Block& b, StageModel& out);
   void showView(LaneView& view);
-  // Derivatives of the contact forces by (dy, dy_v, u), one column per row of the contacts.
+  // Derivatives of the contact forces by (u, dy, dy_v), one column per row of the contacts.
   PaddedMap shapeForceDerivatives() const;
   void loadContactDerivatives(const LaneView& view);
   void linearizeDynamics(LaneView& view);
@@ -199,9 +199,9 @@ class ReducedNode : public NodeModel {
   // Whether a contact has other rows than the first ones of its six.
   bool hasHinges() const;
   void linearizeFreeJoint(FreeJoint& free, const StageModel& out) const;
-  void assembleColumns(ConstMatrixRef dydd, MatrixXd& F) const;
-  void assembleStep(const MatrixXd& dydd, StageModel& out) const;
-  void addMotorColumns(MatrixRef out) const;
+  PaddedMap shapeAccelerationDerivatives(LaneView& view) const;
+  void assembleStep(PaddedMap dydd, StageModel& out) const;
+  void addMotorRows(PaddedMap out) const;
   void differenceAbout(Block& b, const MatrixXd& WN, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
   void differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
   bool updateChart(ConstVectorRef x);

@@ -40,7 +40,9 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index) {
 double getScale(const StageSpec& spec) { return spec.kind == StageKind::Impact ? 1 : spec.dt; }
 
 // As allFinite(), but vectorized: a value that is not finite makes the sum one too.
-bool isFinite(const MatrixXd& A) { return (0 * A).sum() == 0; }
+bool isFinite(ConstMatrixRef A) { return (0 * A).sum() == 0; }
+// Of what is no number in a sum of squares, something is in the diagonal.
+bool isFinite(const StageModel& model) { return isFinite(model.Ft()) && model.H().diagonal().allFinite(); }
 
 }  // namespace
 
@@ -288,8 +290,7 @@ void RobotProblem::linearizeStages(int begin, int end, const std::vector<VectorX
 
 // From prepareLinearization() on.
 StepStatus RobotProblem::finishLinearization(int stage, ConstVectorRef u, ConstVectorRef x_next_node, StageModel& out) {
-  if (out.Fx.rows() != tangent_size_ || out.Fu.cols() != model_.nu())
-    out.resize(tangent_size_, model_.nu(), tangent_size_);
+  if (!out.hasSizes(tangent_size_, model_.nu(), tangent_size_)) out.resize(tangent_size_, model_.nu(), tangent_size_);
   if (!nodes_[stage].dynamics->linearizeStep(x_next_node, out)) return StepStatus::Failed;
   const double h = getScale(specs_[stage]);
   out.cost = h * sumCosts(stage);
@@ -298,19 +299,19 @@ StepStatus RobotProblem::finishLinearization(int stage, ConstVectorRef u, ConstV
   if (control.weight != 0) {
     const double w = h * control.weight;
     out.lu += w * control.weights.cwiseProduct(u - control.reference);
-    out.luu.diagonal() += w * control.weights;
+    out.luu().diagonal() += w * control.weights;
   }
-  return isFinite(out.Fx) && isFinite(out.lxx) ? StepStatus::Ok : StepStatus::Failed;
+  return isFinite(out) ? StepStatus::Ok : StepStatus::Failed;
 }
 
 StepStatus RobotProblem::linearizeTerminal(ConstVectorRef x, StageModel& out) {
   double cost = 0;
   if (calcTerminalCost(x, cost) != StepStatus::Ok) return StepStatus::Failed;
-  if (out.lx.size() != tangent_size_) out.resize(tangent_size_, 0, 0);
+  if (!out.hasSizes(tangent_size_, 0, 0)) out.resize(tangent_size_, 0, 0);
   nodes_.back().dynamics->linearizeState();
   out.cost = cost;
   differentiateCosts(numStages(), 1, out);
-  return isFinite(out.lxx) ? StepStatus::Ok : StepStatus::Failed;
+  return isFinite(out) ? StepStatus::Ok : StepStatus::Failed;
 }
 
 // Gradient and Hessian of the residual costs, the residuals being those of the last sumCosts(), and of the state cost.
@@ -326,7 +327,7 @@ void RobotProblem::differentiateResiduals(int index, double scale, StageModel& o
   const StageSpec& spec = specs_[index];
   if (spec.costs.empty()) {
     for (VectorXd* gradient : {&out.lx, &out.lu}) gradient->setZero();
-    for (MatrixXd* hessian : {&out.lxx, &out.lux, &out.luu}) hessian->setZero();
+    out.H().setZero();
     return;
   }
   const NodeView view{model_, node.dynamics->workspace(), spec.constraints, node.u, node.dynamics->lambda()};

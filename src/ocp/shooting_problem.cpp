@@ -5,14 +5,20 @@
 namespace bielle {
 
 void StageModel::resize(int ndx, int nu, int ndx_next) {
-  Fx.setZero(ndx_next, ndx);
-  Fu.setZero(ndx_next, nu);
+  ndx_ = ndx;
+  nu_ = nu;
+  ndx_next_ = ndx_next;
   gap.setZero(ndx_next);
+  cost = 0;
   lx.setZero(ndx);
   lu.setZero(nu);
-  lxx.setZero(ndx, ndx);
-  lux.setZero(nu, ndx);
-  luu.setZero(nu, nu);
+  Ft_.setZero(getRows() * ndx_next);
+  H_.setZero(getRows() * (nu + ndx));
+}
+
+bool StageModel::hasSizes(int ndx, int nu, int ndx_next) const {
+  return ndx_ == ndx && nu_ == nu && ndx_next_ == ndx_next && gap.size() == ndx_next && lx.size() == ndx &&
+         lu.size() == nu;
 }
 
 void ShootingProblem::stepStages(std::vector<StepTask>& tasks) {

@@ -244,7 +244,7 @@ std::string Run::checkModel(int k) const {
     return "the problem could not be linearized" + (reason.empty() ? "" : ": " + reason);
   }
   const int nu = k < N_ ? problem_.controlSize(k) : 0, ndx_next = k < N_ ? problem_.tangentSize(k + 1) : 0;
-  if (!hasSizes(model, problem_.tangentSize(k), nu, ndx_next))
+  if (!model.hasSizes(problem_.tangentSize(k), nu, ndx_next))
     return "the quadratic model has other sizes than the problem says";
   if (!std::isfinite(model.cost) || !model.gap.allFinite()) return "the cost or the gap is not finite";
   return {};

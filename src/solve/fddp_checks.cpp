@@ -47,10 +47,4 @@ void checkSizes(const ShootingProblem& problem, const ShootingTrajectory& trajec
   }
 }
 
-bool hasSizes(const StageModel& m, int ndx, int nu, int ndx_next) {
-  return m.Fx.rows() == ndx_next && m.Fx.cols() == ndx && m.Fu.rows() == ndx_next && m.Fu.cols() == nu &&
-         m.gap.size() == ndx_next && m.lx.size() == ndx && m.lu.size() == nu && m.lxx.rows() == ndx &&
-         m.lxx.cols() == ndx && m.lux.rows() == nu && m.lux.cols() == ndx && m.luu.rows() == nu && m.luu.cols() == nu;
-}
-
 }  // namespace bielle

@@ -8,6 +8,5 @@ namespace bielle {
 void checkOptions(const FddpOptions& options);
 /// Throws std::invalid_argument if the sizes of the trajectory are not those of the problem.
 void checkSizes(const ShootingProblem& problem, const ShootingTrajectory& trajectory);
-bool hasSizes(const StageModel& model, int ndx, int nu, int ndx_next);
 
 }  // namespace bielle

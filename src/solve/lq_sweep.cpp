@@ -1,5 +1,6 @@
 #include "bielle/solve/lq_sweep.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "bielle/math/lane_product.h"
@@ -42,7 +43,7 @@ LqStatus LqSweep::updateNode(int k, const StageModel& model, const ControlBox* b
   Node& node = nodes_[k];
   if (k + 1 == static_cast<int>(nodes_.size())) {
     node.Vx = model.lx;
-    node.Vxx = model.lxx;
+    node.Vxx = model.lxx();
     node.Vxx.diagonal().array() += regularization_.state;
     copyLowerToUpper(node.Vxx);
     return LqStatus::Ok;
@@ -63,29 +64,22 @@ LqStatus LqSweep::updateStage(const StageModel& model, const Node& next, const C
 
 // Eqs. (2) to (4). Vx holds Qx from here to the elimination.
 void LqSweep::updateQuadratic(const StageModel& model, const Node& next, Node& node) {
-  const Index n = model.Fx.cols(), nu = model.Fu.cols(), n_next = model.Fx.rows();
-  auto p = p_.head(n_next), Vxx_gap = Vxx_gap_.head(n_next);
+  const Index n = model.lx.size(), nu = model.lu.size(), n_next = model.gap.size();
+  const ConstPaddedMap Ft = model.Ft();
+  auto p = p_.head(n_next), Vxx_gap = Vxx_gap_.head(n_next), Q = Q_.head(nu + n);
   Vxx_gap.noalias() = next.Vxx * model.gap;
   p = next.Vx + Vxx_gap;
-  node.Vx = model.lx;
-  node.Vx.noalias() += model.Fx.transpose() * p;
-  node.Qu = model.lu;
-  node.Qu.noalias() += model.Fu.transpose() * p;
+  Q << model.lu, model.lx;
+  Q.noalias() += Ft * p;
+  node.Qu = Q.head(nu);
+  node.Vx = Q.tail(n);
 
-  auto Ft = shapePadded(Ft_, nu + n, n_next), Ft_Vxx = shapePadded(Ft_Vxx_, nu + n, n_next),
-       H = shapePadded(H_, nu + n, nu + n);
-  copyTransposed(model.Fu, Ft.topRows(nu));
-  copyTransposed(model.Fx, Ft.bottomRows(n));
-  clearPadding(Ft);
+  auto Ft_Vxx = shapePadded(Ft_Vxx_, nu + n, n_next), H = shapePadded(H_, nu + n, nu + n);
   setProduct(nu + n, n_next, n_next, pad(Ft), {next.Vxx.data(), 1, n_next}, pad(Ft_Vxx));
-  H.topLeftCorner(nu, nu) = model.luu;
-  H.topRightCorner(nu, n).setZero();
-  copyTransposed(model.lux, H.bottomLeftCorner(n, nu));
-  H.bottomRightCorner(n, n) = model.lxx;
-  clearPadding(H);
+  std::copy_n(model.H().data(), H.outerStride() * H.cols(), H.data());
   H.diagonal().head(nu).array() += regularization_.control;
   H.diagonal().tail(n).array() += regularization_.state;
-  addLowerProduct(0, n_next, 1, Ft, Ft_Vxx, H);
+  addLowerProduct(0, n_next, 1, pad(Ft), pad(Ft_Vxx), H);
 }
 
 // Eqs. (5) to (7).
@@ -141,7 +135,7 @@ LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, Node& node) {
 void LqSweep::updateGains(int num_free, Node& node) {
   const Index n = node.Vx.size(), nu = node.Qu.size();
   auto H = shapePadded(H_, nu + n, nu + n), Kt = shapePadded(Kt_, n, nu);
-  addLowerProduct(nu, num_free, -1, H, H, H);
+  addLowerProduct(nu, num_free, -1, pad(H), pad(H), H);
   node.Vxx = H.bottomRightCorner(n, n);
   copyLowerToUpper(node.Vxx);
   Kt.leftCols(num_free) = -H.bottomLeftCorner(n, num_free);
@@ -162,8 +156,8 @@ double LqSweep::calcStep(const std::vector<StageModel>& models, std::vector<Vect
     du[k].noalias() += nodes_[k].K * dx[k];
     slope += models[k].lx.dot(dx[k]) + models[k].lu.dot(du[k]);
     dx[k + 1] = models[k].gap;
-    dx[k + 1].noalias() += models[k].Fx * dx[k];
-    dx[k + 1].noalias() += models[k].Fu * du[k];
+    dx[k + 1].noalias() += models[k].Fx() * dx[k];
+    dx[k + 1].noalias() += models[k].Fu() * du[k];
   }
   return slope + models[N].lx.dot(dx[N]);
 }
@@ -184,7 +178,7 @@ void LqSweep::resize(const std::vector<StageModel>& models) {
   const Index rows = roundUpToLane(max_n + max_nu);
   p_.resize(max_n);
   Vxx_gap_.resize(max_n);
-  Ft_.resize(rows * max_n);
+  Q_.resize(max_n + max_nu);
   Ft_Vxx_.resize(rows * max_n);
   H_.setZero(rows * (max_n + max_nu));
   Kt_.resize(roundUpToLane(max_n) * max_nu);

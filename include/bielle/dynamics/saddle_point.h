@@ -52,8 +52,8 @@ class SaddlePoint {
   void updateInverse();
   /// Eq. (4): X (n x k) holds dID and becomes da; dlambda (m x k) holds dc and becomes dlambda.
   void solveDerivatives(MatrixRef X, MatrixRef dlambda);
-  /// The same for another system of the same sizes, and dlambda^T (k x m).
-  void solveDerivatives(const SaddlePointFactors& factors, MatrixRef X, PaddedMap dlambda_t);
+  /// The same for another system of the same sizes, and for X^T (k x n) and dlambda^T (k x m), padding finite.
+  void solveDerivatives(const SaddlePointFactors& factors, PaddedMap Xt, PaddedMap dlambda_t);
   /// Of the last system; needs updateInverse().
   const SaddlePointFactors& factors() const { return factors_; }
   /// Whether the rows needed Eq. (3).

@@ -18,6 +18,13 @@ struct PaddedMatrix {
   Eigen::Index stride;
 };
 
+struct ConstPaddedMatrix {
+  ConstPaddedMatrix(const double* d, Eigen::Index s) : data(d), stride(s) {}
+  ConstPaddedMatrix(const PaddedMatrix& A) : data(A.data), stride(A.stride) {}
+  const double* data;
+  Eigen::Index stride;
+};
+
 /// Any strided matrix: entry (k, j) at data[k * row_stride + j * col_stride].
 struct StridedMatrix {
   const double* data;
@@ -26,28 +33,36 @@ struct StridedMatrix {
 
 /// C += sign A B, C (rows x cols), A (rows x depth), B (depth x cols). What lies below `rows` in the last lane of C is
 /// overwritten by something.
-void addProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, double sign, PaddedMatrix A, StridedMatrix B,
-                PaddedMatrix C);
+void addProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, double sign, ConstPaddedMatrix A,
+                StridedMatrix B, PaddedMatrix C);
 
 /// C = A B, likewise: C need not hold numbers.
-void setProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, PaddedMatrix A, StridedMatrix B,
+void setProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, ConstPaddedMatrix A, StridedMatrix B,
                 PaddedMatrix C);
 
 /// The beginning of a buffer as a matrix whose rows are padded to full lanes.
 using PaddedMap = Eigen::Map<MatrixXd, 0, Eigen::OuterStride<>>;
+using ConstPaddedMap = Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>>;
+/// A transposed part of such a matrix.
+using RowMatrixMap = Eigen::Map<RowMatrixXd, 0, Eigen::OuterStride<>>;
+using ConstRowMatrixMap = Eigen::Map<const RowMatrixXd, 0, Eigen::OuterStride<>>;
 inline PaddedMap shapePadded(VectorXd& buffer, Eigen::Index rows, Eigen::Index cols) {
   return PaddedMap(buffer.data(), rows, cols, Eigen::OuterStride<>(roundUpToLane(rows)));
 }
 inline PaddedMatrix pad(PaddedMap A, Eigen::Index row = 0, Eigen::Index col = 0) {
   return {A.data() + row + col * A.outerStride(), A.outerStride()};
 }
+inline ConstPaddedMatrix pad(ConstPaddedMap A, Eigen::Index row = 0, Eigen::Index col = 0) {
+  return {A.data() + row + col * A.outerStride(), A.outerStride()};
+}
 /// Padding rows take part in products: they must hold numbers.
 void clearPadding(PaddedMap A);
 
 /// H(i, j) += sign sum_k A(i, k) B(j, k) for i >= j >= begin, k < depth. Full lanes: entries above the diagonal change.
-void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, PaddedMap A, PaddedMap B, PaddedMap H);
+void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, ConstPaddedMatrix A, ConstPaddedMatrix B,
+                     PaddedMap H);
 /// H(i, j) = sum_k A(i, k) B(j, k) for i >= j, k < depth, likewise: H need not hold numbers.
-void setLowerProduct(Eigen::Index depth, PaddedMap A, PaddedMap B, PaddedMap H);
+void setLowerProduct(Eigen::Index depth, ConstPaddedMatrix A, ConstPaddedMatrix B, PaddedMap H);
 
 /// Cholesky elimination of the first `num` unknowns of a symmetric H, of which the lower triangle is read: their columns
 /// become L over Y^T, the rest of H stays. False when a pivot is not positive.

@@ -124,8 +124,8 @@ inline auto applyLanes(const Lanes& x, const F& f) {
 
 /// out[i] gets in[lane][i] in each lane, i < size.
 void packLanes(const std::array<const double*, kLane>& in, Eigen::Index size, Lanes* out);
-/// The way back: out[lane][i] gets in[i] of each lane; lanes whose pointer is null are left out.
-void unpackLanes(const Lanes* in, Eigen::Index size, const std::array<double*, kLane>& out);
+/// The way back: out[lane][i] gets in[i * stride] of each lane; lanes whose pointer is null are left out.
+void unpackLanes(const Lanes* in, Eigen::Index size, const std::array<double*, kLane>& out, Eigen::Index stride = 1);
 /// The same for one lane alone: a cache line per number.
 inline void unpackLane(const Lanes* in, Eigen::Index lane, Eigen::Index size, double* out) {
   const double* from = reinterpret_cast<const double*>(in) + lane;

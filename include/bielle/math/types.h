@@ -19,6 +19,7 @@ template <typename T>
 using Matrix6 = Eigen::Matrix<T, 6, 6>;
 template <typename T>
 using Matrix6X = Eigen::Matrix<T, 6, Eigen::Dynamic>;
+using RowMatrixXd = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Vector6d = Vector6<double>;
 using Matrix6d = Matrix6<double>;
 using Matrix6Xd = Matrix6X<double>;

@@ -8,25 +8,53 @@
 #include <string>
 #include <vector>
 
-#include "bielle/math/types.h"
+#include "bielle/math/lane_product.h"
 
 namespace bielle {
 
 /// Quadratic model of one stage about (x_k, u_k), in tangent coordinates at x_k and at the node state x_{k+1}:
 ///     dx_{k+1} = Fx dx_k + Fu du_k + gap
 ///     l = cost + lx.dx + lu.du + 1/2 (dx.lxx.dx + 2 du.lux.dx + du.luu.du)
-/// The terminal node fills cost, lx and lxx only.
-struct StageModel {
-  MatrixXd Fx;   ///< ndx_{k+1} x ndx_k
-  MatrixXd Fu;   ///< ndx_{k+1} x nu_k
+/// At the terminal node cost, lx and lxx only: its other sizes are zero.
+///
+/// The matrices are views of two that are kept the way the sweep works on them (lane_product.h): F^T = [Fu Fx]^T, and the
+/// lower triangle of the Hessian [luu . ; lux^T lxx].
+class StageModel {
+ public:
   VectorXd gap;  ///< ndx_{k+1}: difference(x_{k+1}, f_k(x_k, u_k))
   double cost = 0;
-  VectorXd lx;   ///< ndx_k
-  VectorXd lu;   ///< nu_k
-  MatrixXd lxx;  ///< ndx_k x ndx_k, symmetric
-  MatrixXd lux;  ///< nu_k x ndx_k
-  MatrixXd luu;  ///< nu_k x nu_k, symmetric
+  VectorXd lx;  ///< ndx_k
+  VectorXd lu;  ///< nu_k
+
+  /// All of it zero.
   void resize(int ndx, int nu, int ndx_next);
+  bool hasSizes(int ndx, int nu, int ndx_next) const;
+
+  RowMatrixMap Fx() { return {Ft_.data() + nu_, ndx_next_, ndx_, getStride()}; }  ///< ndx_{k+1} x ndx_k
+  RowMatrixMap Fu() { return {Ft_.data(), ndx_next_, nu_, getStride()}; }         ///< ndx_{k+1} x nu_k
+  ConstRowMatrixMap Fx() const { return {Ft_.data() + nu_, ndx_next_, ndx_, getStride()}; }
+  ConstRowMatrixMap Fu() const { return {Ft_.data(), ndx_next_, nu_, getStride()}; }
+
+  /// ndx_k x ndx_k, symmetric: only the lower triangle is written and read
+  PaddedMap lxx() { return {H_.data() + nu_ * (1 + getRows()), ndx_, ndx_, getStride()}; }
+  RowMatrixMap lux() { return {H_.data() + nu_, nu_, ndx_, getStride()}; }  ///< nu_k x ndx_k
+  PaddedMap luu() { return {H_.data(), nu_, nu_, getStride()}; }            ///< nu_k x nu_k, likewise
+  ConstPaddedMap lxx() const { return {H_.data() + nu_ * (1 + getRows()), ndx_, ndx_, getStride()}; }
+  ConstRowMatrixMap lux() const { return {H_.data() + nu_, nu_, ndx_, getStride()}; }
+  ConstPaddedMap luu() const { return {H_.data(), nu_, nu_, getStride()}; }
+
+  /// (nu_k + ndx_k) x ndx_{k+1} and (nu_k + ndx_k) square; what is written to the padding must be finite
+  PaddedMap Ft() { return {Ft_.data(), nu_ + ndx_, ndx_next_, getStride()}; }
+  PaddedMap H() { return {H_.data(), nu_ + ndx_, nu_ + ndx_, getStride()}; }
+  ConstPaddedMap Ft() const { return {Ft_.data(), nu_ + ndx_, ndx_next_, getStride()}; }
+  ConstPaddedMap H() const { return {H_.data(), nu_ + ndx_, nu_ + ndx_, getStride()}; }
+
+ private:
+  Eigen::Index getRows() const { return roundUpToLane(nu_ + ndx_); }
+  Eigen::OuterStride<> getStride() const { return Eigen::OuterStride<>(getRows()); }
+
+  Eigen::Index ndx_ = 0, nu_ = 0, ndx_next_ = 0;
+  VectorXd Ft_, H_;
 };
 
 /// Result of a step or of a cost evaluation. A numerical failure is a value, never an exception or a NaN handed on.

@@ -56,11 +56,11 @@ class LqSweep {
  public:
   /// What the sweep knows at node k; at the terminal node Vx and Vxx only.
   struct Node {
-    VectorXd Vx;   ///< ndx_k
-    MatrixXd Vxx;  ///< ndx_k x ndx_k, symmetric, both triangles
-    VectorXd Qu;   ///< nu_k
-    VectorXd k;    ///< nu_k
-    MatrixXd K;    ///< nu_k x ndx_k
+    VectorXd Vx;    ///< ndx_k
+    MatrixXd Vxx;   ///< ndx_k x ndx_k, symmetric, both triangles
+    VectorXd Qu;    ///< nu_k
+    VectorXd k;     ///< nu_k
+    RowMatrixXd K;  ///< nu_k x ndx_k
   };
 
   /// Solves (1) for N + 1 models, the last one terminal. boxes: N of them, or none.
@@ -92,9 +92,9 @@ class LqSweep {
   LqRegularization regularization_;
   LqResult result_;
   BoxQp box_qp_;
-  // Buffers of one node, sized for the largest, their rows padded to full lanes (lane_product.h). With F = [Fu Fx]:
-  // F^T, F^T Vxx', the Hessian [Quu . ; Qxu Qxx] whose first columns become those of L over Y^T, and K^T.
-  VectorXd p_, Vxx_gap_, Ft_, Ft_Vxx_, H_, Kt_;
+  // Buffers of one node, sized for the largest, matrices with rows padded to full lanes (lane_product.h). With F = [Fu Fx]:
+  // [Qu Qx], F^T Vxx', the Hessian [Quu . ; Qxu Qxx] whose first columns become those of L over Y^T, and K^T.
+  VectorXd p_, Vxx_gap_, Q_, Ft_Vxx_, H_, Kt_;
 };
 
 }  // namespace bielle
