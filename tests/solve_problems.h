@@ -89,6 +89,7 @@ class PlantProblem : public ShootingProblem {
     out.gap -= x_next_node;
     const State e = x - goal;
     out.lx = dt * weight.cwiseProduct(e);
+    out.H().setZero();
     out.lxx().diagonal() = dt * weight;
     out.lu = dt * control_weight * u;
     out.luu().diagonal().setConstant(dt * control_weight);
@@ -98,6 +99,7 @@ class PlantProblem : public ShootingProblem {
     calcTerminalCost(x, out.cost);
     const State e = x - goal;
     out.lx = terminal_weight.cwiseProduct(e);
+    out.H().setZero();
     out.lxx().diagonal() = terminal_weight;
     return StepStatus::Ok;
   }
@@ -174,7 +176,9 @@ class DoubleWell : public ShootingProblem {
     out.gap -= x_next_node;
     out.Fx()(0, 0) = 1;
     out.Fu()(0, 0) = dt;
+    out.lx.setZero();
     out.lu = dt * control_weight * u;
+    out.H().setZero();
     out.luu()(0, 0) = dt * control_weight;
     return StepStatus::Ok;
   }
@@ -241,8 +245,8 @@ class TurningBody : public ShootingProblem {
     out.Fx() << J_gap * J_q, J_gap * J_dq * dt * w_w, Matrix3d::Zero(), w_w;
     out.Fu() << J_gap * J_dq * dt * w_u, w_u;
     out.lu = dt * control_weight * u;
-    out.luu() = dt * control_weight * Matrix3d::Identity();
     updateStateCost(x, dt * attitude_weight, dt, out);
+    out.luu() = dt * control_weight * Matrix3d::Identity();
     return StepStatus::Ok;
   }
   StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override {
@@ -263,7 +267,7 @@ class TurningBody : public ShootingProblem {
     MatrixXd J(3, 3);
     calcJointDifferenceJacobian(joint_, e, J);
     out.lx << w_attitude * J.transpose() * e, w_rate * x.tail(3);
-    out.lxx().setZero();
+    out.H().setZero();
     out.lxx().topLeftCorner(3, 3) = w_attitude * J.transpose() * J;
     out.lxx().bottomRightCorner(3, 3) = w_rate * Matrix3d::Identity();
   }

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "fddp_checks.h"
+#include "hessian_pool.h"
 #include "rollout.h"
 
 namespace bielle {
@@ -27,7 +28,7 @@ double calcSecondsSince(std::chrono::steady_clock::time_point start) {
 }  // namespace
 
 struct Fddp::Workspace {
-  std::vector<StageModel> models;     // N + 1
+  std::vector<StageModel> models;     // N + 1, those that wait for their sweep with a Hessian from the pool
   std::vector<std::string> failures;  // N + 1: why a node could not be linearized, empty if it could
   std::vector<StepStatus> statuses;   // N + 1
   LqSweep sweep;
@@ -36,6 +37,7 @@ struct Fddp::Workspace {
   std::vector<ControlBox> bounds;             // of u, N or none
   std::vector<ControlBox> boxes;              // of du, N or none
   std::vector<std::atomic<bool>> linearized;  // N + 1: the model is there for the sweep
+  HessianPool hessians;
 
   void resize(const ShootingProblem& problem, const FddpOptions& options);
 };
@@ -50,7 +52,8 @@ void Fddp::Workspace::resize(const ShootingProblem& problem, const FddpOptions& 
   bounds.resize(options.bounds == ControlBounds::Enforce ? N : 0);
   for (int k = 0; k <= N; ++k) {
     const int nu = k < N ? problem.controlSize(k) : 0;
-    models[k].resize(problem.tangentSize(k), nu, k < N ? problem.tangentSize(k + 1) : 0);
+    const int ndx = problem.tangentSize(k), ndx_next = k < N ? problem.tangentSize(k + 1) : 0;
+    if (!models[k].hasSizes(ndx, nu, ndx_next)) models[k].resize(ndx, nu, ndx_next);
     if (bounds.empty() || k == N) continue;
     bounds[k].lower.resize(nu);
     bounds[k].upper.resize(nu);
@@ -60,6 +63,7 @@ void Fddp::Workspace::resize(const ShootingProblem& problem, const FddpOptions& 
     }
   }
   boxes = bounds;
+  hessians.resize(models);
 }
 
 namespace {
@@ -175,6 +179,7 @@ Run::End Run::linearize() {
 // finished a node sweeps as far as models are there, unless somebody does so already. What is left is swept at the end.
 void Run::linearizeAndSweep() {
   for (std::atomic<bool>& linearized : work_.linearized) linearized.store(false, std::memory_order_relaxed);
+  for (StageModel& model : work_.models) work_.hessians.takeBack(model);  // of a sweep that stopped half way
   work_.sweep.start(work_.models, getRegularization());
   sweep_node_ = N_;
   swept_ = true;
@@ -208,6 +213,7 @@ void Run::sweepReadyNodes() {
          work_.linearized[sweep_node_].load(std::memory_order_acquire)) {
     const ControlBox* box = sweep_node_ < N_ && !work_.boxes.empty() ? &work_.boxes[sweep_node_] : nullptr;
     work_.sweep.updateNode(sweep_node_, work_.models[sweep_node_], box);
+    work_.hessians.takeBack(work_.models[sweep_node_]);
     --sweep_node_;
   }
 }
@@ -219,6 +225,7 @@ LqRegularization Run::getRegularization() const {
 // Stages, or the terminal node. Runs in parallel: nothing may leave but through its own entries of the workspace.
 void Run::linearizeNodes(int begin, int end) {
   std::string thrown;
+  for (int k = begin; k < end; ++k) work_.hessians.lend(work_.models[k]);
   try {
     if (begin < N_) {
       problem_.linearizeStages(begin, end, trajectory_.xs, trajectory_.us, work_.models, work_.statuses);
@@ -261,11 +268,12 @@ Run::End Run::findStep() {
   }
 }
 
-// The sweep, at the least regularization from the current one on for which it goes through.
+// The sweep, at the least regularization from the current one on for which it goes through. A second one needs the models
+// anew: the sweep uses them up.
 Run::End Run::updateBackwardPass() {
   while (true) {
     const Clock::time_point start = Clock::now();
-    if (!swept_) work_.sweep.update(work_.models, getRegularization(), work_.boxes);
+    if (!swept_) linearizeAndSweep();
     swept_ = false;
     const LqResult result = work_.sweep.getResult();
     if (result.status == LqStatus::NotFinite) {

@@ -28,7 +28,9 @@ LqResult LqSweep::update(const std::vector<StageModel>& models, const LqRegulari
   const int N = static_cast<int>(models.size()) - 1;
   for (int k = N; k >= 0; --k) {
     const ControlBox* box = k < N && !boxes.empty() ? &boxes[k] : nullptr;
-    if (updateNode(k, models[k], box) != LqStatus::Ok) break;
+    const ConstPaddedMap H = models[k].H();
+    std::copy_n(H.data(), H.outerStride() * H.cols(), H_.data());
+    if (updateNode(k, models[k], shapePadded(H_, H.rows(), H.cols()), box) != LqStatus::Ok) break;
   }
   return result_;
 }
@@ -39,31 +41,36 @@ void LqSweep::start(const std::vector<StageModel>& models, const LqRegularizatio
   result_ = LqResult();
 }
 
-LqStatus LqSweep::updateNode(int k, const StageModel& model, const ControlBox* box) {
+LqStatus LqSweep::updateNode(int k, StageModel& model, const ControlBox* box) {
+  return updateNode(k, model, model.H(), box);
+}
+
+LqStatus LqSweep::updateNode(int k, const StageModel& model, PaddedMap H, const ControlBox* box) {
   Node& node = nodes_[k];
   if (k + 1 == static_cast<int>(nodes_.size())) {
     node.Vx = model.lx;
-    node.Vxx = model.lxx();
+    node.Vxx = H;
     node.Vxx.diagonal().array() += regularization_.state;
     copyLowerToUpper(node.Vxx);
     return LqStatus::Ok;
   }
-  const LqStatus status = updateStage(model, nodes_[k + 1], box, node);
+  const LqStatus status = updateStage(model, nodes_[k + 1], box, H, node);
   if (status != LqStatus::Ok) result_ = {status, k, 0};
   return status;
 }
 
-LqStatus LqSweep::updateStage(const StageModel& model, const Node& next, const ControlBox* box, Node& node) {
-  updateQuadratic(model, next, node);
+LqStatus LqSweep::updateStage(const StageModel& model, const Node& next, const ControlBox* box, PaddedMap H,
+                              Node& node) {
+  updateQuadratic(model, next, H, node);
   if (!node.Vx.allFinite()) return LqStatus::NotFinite;
   result_.expected_change += next.Vx.dot(model.gap) + 0.5 * model.gap.dot(Vxx_gap_.head(model.gap.size()));
-  const LqStatus status = box ? eliminateBoxedControls(*box, node) : eliminateControls(node);
+  const LqStatus status = box ? eliminateBoxedControls(*box, H, node) : eliminateControls(H, node);
   if (status != LqStatus::Ok) return status;
   return isFinite(node) ? LqStatus::Ok : LqStatus::NotFinite;
 }
 
 // Eqs. (2) to (4). Vx holds Qx from here to the elimination.
-void LqSweep::updateQuadratic(const StageModel& model, const Node& next, Node& node) {
+void LqSweep::updateQuadratic(const StageModel& model, const Node& next, PaddedMap H, Node& node) {
   const Index n = model.lx.size(), nu = model.lu.size(), n_next = model.gap.size();
   const ConstPaddedMap Ft = model.Ft();
   auto p = p_.head(n_next), Vxx_gap = Vxx_gap_.head(n_next), Q = Q_.head(nu + n);
@@ -74,18 +81,16 @@ void LqSweep::updateQuadratic(const StageModel& model, const Node& next, Node& n
   node.Qu = Q.head(nu);
   node.Vx = Q.tail(n);
 
-  auto Ft_Vxx = shapePadded(Ft_Vxx_, nu + n, n_next), H = shapePadded(H_, nu + n, nu + n);
+  auto Ft_Vxx = shapePadded(Ft_Vxx_, nu + n, n_next);
   setProduct(nu + n, n_next, n_next, pad(Ft), {next.Vxx.data(), 1, n_next}, pad(Ft_Vxx));
-  std::copy_n(model.H().data(), H.outerStride() * H.cols(), H.data());
   H.diagonal().head(nu).array() += regularization_.control;
   H.diagonal().tail(n).array() += regularization_.state;
   addLowerProduct(0, n_next, 1, pad(Ft), pad(Ft_Vxx), H);
 }
 
 // Eqs. (5) to (7).
-LqStatus LqSweep::eliminateControls(Node& node) {
+LqStatus LqSweep::eliminateControls(PaddedMap H, Node& node) {
   const Index n = node.Vx.size(), nu = node.Qu.size();
-  auto H = shapePadded(H_, nu + n, nu + n);
   if (!hasFiniteLower(H, nu) || !node.Qu.allFinite()) return LqStatus::NotFinite;
   if (!factorizeColumns(H, nu)) return LqStatus::Indefinite;
   const auto L = H.topLeftCorner(nu, nu).triangularView<Eigen::Lower>();
@@ -94,15 +99,14 @@ LqStatus LqSweep::eliminateControls(Node& node) {
   node.Vx.noalias() += H.bottomLeftCorner(n, nu) * node.k;  // Qux^T k = Y^T (-L^{-1} Qu)
   L.transpose().solveInPlace(node.k);
   result_.expected_change += 0.5 * node.Qu.dot(node.k);
-  updateGains(static_cast<int>(nu), node);
+  updateGains(static_cast<int>(nu), H, node);
   node.K = shapePadded(Kt_, n, nu).transpose();
   return LqStatus::Ok;
 }
 
 // Eqs. (5) to (7) with the box.
-LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, Node& node) {
+LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, PaddedMap H, Node& node) {
   const Index n = node.Vx.size(), nu = node.Qu.size();
-  auto H = shapePadded(H_, nu + n, nu + n);
   const auto Quu = H.topLeftCorner(nu, nu);
   node.k.setZero();
   switch (box_qp_.solve(Quu, node.Qu, box.lower, box.upper, node.k)) {
@@ -125,16 +129,16 @@ LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, Node& node) {
     for (int i = j; i < num_free; ++i) H(i, j) = H(box_qp_.getFreeIndex(i), j);
   }
   if (!factorizeColumns(H, num_free)) return LqStatus::Indefinite;
-  updateGains(num_free, node);
+  updateGains(num_free, H, node);
   node.K.setZero();
   for (int i = 0; i < num_free; ++i) node.K.row(box_qp_.getFreeIndex(i)) = shapePadded(Kt_, n, nu).col(i).transpose();
   return LqStatus::Ok;
 }
 
 // Vxx of Eq. (6), and K^T of Eq. (5) of the free controls, from L and Y^T in the first columns of H.
-void LqSweep::updateGains(int num_free, Node& node) {
+void LqSweep::updateGains(int num_free, PaddedMap H, Node& node) {
   const Index n = node.Vx.size(), nu = node.Qu.size();
-  auto H = shapePadded(H_, nu + n, nu + n), Kt = shapePadded(Kt_, n, nu);
+  auto Kt = shapePadded(Kt_, n, nu);
   addLowerProduct(nu, num_free, -1, pad(H), pad(H), H);
   node.Vxx = H.bottomRightCorner(n, n);
   copyLowerToUpper(node.Vxx);

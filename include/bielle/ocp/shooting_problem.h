@@ -28,6 +28,8 @@ class StageModel {
 
   /// All of it zero.
   void resize(int ndx, int nu, int ndx_next);
+  /// Exchanges the memory of H() for another piece of at least its size, numbers and all; without any, it must not be used.
+  void swapHessian(VectorXd& memory) { H_.swap(memory); }
   bool hasSizes(int ndx, int nu, int ndx_next) const;
 
   RowMatrixMap Fx() { return {Ft_.data() + nu_, ndx_next_, ndx_, getStride()}; }  ///< ndx_{k+1} x ndx_k
@@ -100,7 +102,8 @@ class ShootingProblem {
   virtual void stepStages(std::vector<StepTask>& tasks);
   virtual StepStatus calcTerminalCost(ConstVectorRef x, double& cost) = 0;
 
-  /// Quadratic model of stage k about (x, u) with the gap to the node state x_next_node. Same threading rule as step().
+  /// Quadratic model of stage k about (x, u) with the gap to the node state x_next_node. Same threading rule as step(). `out`
+  /// has its sizes, if it comes from a solver, and holds anything.
   virtual StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
                                StageModel& out) = 0;
   /// linearize() of the stages [begin, end) about a trajectory (indexed by node, like the models and statuses), for problems

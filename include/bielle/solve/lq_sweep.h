@@ -68,9 +68,9 @@ class LqSweep {
                   const std::vector<ControlBox>& boxes = {});
 
   /// The same node by node, for models that come one after the other: start(), then updateNode(k) for k = N .. 0 as
-  /// long as the status is Ok. start() reads only the sizes of the models.
+  /// long as the status is Ok. start() reads only the sizes of the models. The Hessian of the model is used up.
   void start(const std::vector<StageModel>& models, const LqRegularization& regularization);
-  LqStatus updateNode(int k, const StageModel& model, const ControlBox* box = nullptr);
+  LqStatus updateNode(int k, StageModel& model, const ControlBox* box = nullptr);
   /// Result of the nodes updated so far.
   const LqResult& getResult() const { return result_; }
 
@@ -82,18 +82,20 @@ class LqSweep {
 
  private:
   void resize(const std::vector<StageModel>& models);
-  LqStatus updateStage(const StageModel& model, const Node& next, const ControlBox* box, Node& node);
-  void updateQuadratic(const StageModel& model, const Node& next, Node& node);
-  LqStatus eliminateControls(Node& node);
-  LqStatus eliminateBoxedControls(const ControlBox& box, Node& node);
-  void updateGains(int num_free, Node& node);
+  // H: the Hessian of the model, becomes [Quu . ; Qxu Qxx], whose first columns become those of L over Y^T.
+  LqStatus updateNode(int k, const StageModel& model, PaddedMap H, const ControlBox* box);
+  LqStatus updateStage(const StageModel& model, const Node& next, const ControlBox* box, PaddedMap H, Node& node);
+  void updateQuadratic(const StageModel& model, const Node& next, PaddedMap H, Node& node);
+  LqStatus eliminateControls(PaddedMap H, Node& node);
+  LqStatus eliminateBoxedControls(const ControlBox& box, PaddedMap H, Node& node);
+  void updateGains(int num_free, PaddedMap H, Node& node);
 
   std::vector<Node> nodes_;
   LqRegularization regularization_;
   LqResult result_;
   BoxQp box_qp_;
   // Buffers of one node, sized for the largest, matrices with rows padded to full lanes (lane_product.h). With F = [Fu Fx]:
-  // [Qu Qx], F^T Vxx', the Hessian [Quu . ; Qxu Qxx] whose first columns become those of L over Y^T, and K^T.
+  // [Qu Qx], F^T Vxx', the Hessian where the model keeps its own, and K^T.
   VectorXd p_, Vxx_gap_, Q_, Ft_Vxx_, H_, Kt_;
 };
 
