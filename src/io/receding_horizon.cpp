@@ -143,6 +143,7 @@ RecedingHorizon runRecedingHorizon(const Model& model, Formulation formulation, 
   options.max_iterations = receding.first_iterations;
   Fddp(options).solve(window, trajectory);  // the plan before the first shift, without haste
   options.max_iterations = 1;
+  options.last_rollout = LastRollout::Segments;
   Fddp solver(options);
 
   RecedingHorizon out;

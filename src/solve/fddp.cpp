@@ -310,7 +310,7 @@ double Run::calcGradient() const {
 // the gradient vanishes if it goes on as it came. So are those that follow a shortened step: had the gaps at the joints
 // shortened it, the next step is free of them.
 int Run::chooseSegments() const {
-  const bool last = line_.iteration >= options_.max_iterations;
+  const bool last = options_.last_rollout == LastRollout::OnePiece && line_.iteration >= options_.max_iterations;
   const bool converging =
       line_.gradient * line_.gradient <= options_.gradient_tolerance * std::max(line_.gradient, last_gradient_);
   if (last || converging || last_step_ < 1) return 1;

@@ -33,7 +33,7 @@
 /// more. (The penalty nu c alone would not do: gaps and decrease are both of second order, so that it would refuse full
 /// steps however close to the solution.) A trial for which (8) exceeds half of (4) is refused, whatever its merit; a full
 /// step that is refused in segments is tried again in one piece, and so are all shorter ones. Steps that follow a
-/// shortened one are rolled out in one piece, and so are the last ones, which must close the gaps.
+/// shortened one are rolled out in one piece, and so are the last ones, which must close the gaps (but see LastRollout).
 ///
 /// Stationarity is measured by the projected gradient, with [lower, upper] the bounds of du (infinite if ignored):
 ///     gradient = sum_k | clamp(-Qu_k, lower_k, upper_k) |^2. (6)
@@ -53,6 +53,10 @@ struct ShootingTrajectory {
 };
 
 enum class ControlBounds { Ignore, Enforce };
+
+/// What the last iteration that is allowed does about gaps: closes them by a rollout in one piece, or leaves those that
+/// segments open, as other iterations do, for the next solve of a receding horizon.
+enum class LastRollout { OnePiece, Segments };
 
 struct FddpOptions {
   int max_iterations = 200;
@@ -79,6 +83,7 @@ struct FddpOptions {
   /// Segments of a rollout, Eq. (7), at most: none is shorter than 12 stages. Results depend on it, within the
   /// tolerances, and therefore it is not the number of threads.
   int rollout_segments = 16;
+  LastRollout last_rollout = LastRollout::OnePiece;
   int threads = 0;  ///< 0: all. The result does not depend on it by a single bit.
 };
 
