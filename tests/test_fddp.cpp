@@ -208,6 +208,50 @@ TEST_CASE("the gaps that segments open are there, known, and closed by the last 
   CHECK(open.gap == Approx(actual).epsilon(0.3));
 }
 
+TEST_CASE("a short last step closes the gaps by a second rollout in segments, a long one by a rollout in one piece") {
+  struct CountingBody : TurningBody {
+    std::atomic<int> steps{0};
+    StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override {
+      ++steps;
+      return TurningBody::step(stage, x, u, x_next, cost);
+    }
+  } problem;
+  problem.stages = 100;
+  problem.goal << 0.6, 0.4, -0.3, -0.2;
+  problem.goal.normalize();
+  problem.start.tail(3) << 0.3, -0.5, 1;
+  FddpOptions options;
+  options.threads = GENERATE(1, 2);
+  options.gradient_tolerance = 1e-30;  // the end of the iterations is theirs
+  int short_steps = 0, long_steps = 0;
+  for (options.max_iterations = 2; options.max_iterations <= 9; ++options.max_iterations) {
+    CAPTURE(options.max_iterations);
+    const auto solve = [&](LastRollout last, double& gap) {
+      options.last_rollout = last;
+      ShootingTrajectory t = makeGuess(problem);
+      problem.steps = 0;
+      const FddpSummary summary = Fddp(options).solve(problem, t);
+      REQUIRE(summary.log.back().step == 1);
+      const int steps = problem.steps;
+      gap = calcLargestGap(problem, t);
+      CHECK(summary.gap == Approx(gap).epsilon(0.3).margin(1e-13));
+      return steps;
+    };
+    double open = 0, closed = 0;
+    const int steps = solve(LastRollout::Segments, open), more = solve(LastRollout::Closed, closed) - steps;
+    CHECK(closed <= options.gap_tolerance);
+    if (open <= options.gap_tolerance) {
+      CHECK(more == 0);
+      continue;
+    }
+    CHECK((more == 0 || more == problem.stages));
+    ++(more > 0 ? short_steps : long_steps);
+    if (more > 0) CHECK(closed < 1e-3 * open);
+  }
+  CHECK(short_steps > 0);
+  CHECK(long_steps > 0);
+}
+
 TEST_CASE("the seconds of linearization, sweeps and rollouts make up those of the solve on one thread") {
   auto problem = makeCartPole();
   FddpOptions options;

@@ -92,7 +92,8 @@ class Run {
   End findStep();
   End updateBackwardPass();
   bool searchLine();
-  int chooseSegments() const;
+  bool mustClose() const;
+  bool closesTwice(int segments) const;
   bool isAcceptable(double alpha, double nu) const;
   void acceptStep();
   End raiseRegularization(const char* reason);
@@ -306,33 +307,46 @@ double Run::calcGradient() const {
   return gradient;
 }
 
-// The steps that should close the gaps for good are rolled out in one piece: the last one allowed, and those after which
-// the gradient vanishes if it goes on as it came. So are those that follow a shortened step: had the gaps at the joints
-// shortened it, the next step is free of them.
-int Run::chooseSegments() const {
-  const bool last = options_.last_rollout == LastRollout::OnePiece && line_.iteration >= options_.max_iterations;
-  const bool converging =
-      line_.gradient * line_.gradient <= options_.gradient_tolerance * std::max(line_.gradient, last_gradient_);
-  if (last || converging || last_step_ < 1) return 1;
-  return std::max(1, std::min(options_.rollout_segments, N_ / kShortestSegment));
+// Whether the step should close the gaps for good: the last one allowed, and the one after which the gradient vanishes if
+// it goes on as it came.
+bool Run::mustClose() const {
+  const bool last = options_.last_rollout == LastRollout::Closed && line_.iteration >= options_.max_iterations;
+  return last ||
+         line_.gradient * line_.gradient <= options_.gradient_tolerance * std::max(line_.gradient, last_gradient_);
+}
+
+// Whether the gaps that Eq. (9) leaves may be hoped to count as closed.
+bool Run::closesTwice(int segments) const {
+  double step = 0;
+  for (int s = 1; s < segments; ++s) step = std::max(step, work_.dx[s * N_ / segments].lpNorm<Eigen::Infinity>());
+  return std::pow(step, 3) <= options_.gap_tolerance;
 }
 
 bool Run::searchLine() {
   const double penalized = std::max(0.0, slope_ + 0.5 * std::max(0.0, curvature_));
   const double nu = gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0;  // Eq. (5)
   const RolloutInput input{problem_, trajectory_, work_.models, work_.sweep, work_.dx, work_.bounds, isFeasible()};
-  const auto accept = [&](double alpha, int segments) {
-    if (!work_.rollout.update(input, {alpha, segments, threads_}) || !isAcceptable(alpha, nu)) return false;
+  Rollout& rollout = work_.rollout;
+  const auto accept = [&](bool ok, double alpha) {
+    if (!ok || !isAcceptable(alpha, nu)) return false;
     line_.step = alpha;
     return true;
   };
   // Segments start where linear models foresee it: what they cannot reach, one piece may.
-  const int segments = chooseSegments();
-  if (segments > 1 && accept(1, segments)) return true;
+  const RolloutOptions cut{1, std::max(1, std::min(options_.rollout_segments, N_ / kShortestSegment)), threads_};
+  if (cut.segments > 1 && last_step_ == 1) {
+    const auto isClosed = [&] { return rollout.getGapMax() <= options_.gap_tolerance; };
+    if (!mustClose()) {
+      if (accept(rollout.update(input, cut), 1)) return true;
+    } else if (closesTwice(cut.segments)) {
+      const bool ok = rollout.update(input, cut) && (isClosed() || (rollout.close(input, cut) && isClosed()));
+      if (accept(ok, 1)) return true;
+    }
+  }
   double alpha = 1;
   for (int i = 0; i < options_.num_step_lengths; ++i, alpha *= 0.5) {
     if (isInterrupted()) return false;
-    if (accept(alpha, 1)) return true;
+    if (accept(rollout.update(input, {alpha, 1, threads_}), alpha)) return true;
   }
   return false;
 }

@@ -10,28 +10,61 @@ void Rollout::resize(const ShootingProblem& problem, int max_segments) {
   trial_.xs.assign(N + 1, VectorXd::Zero(problem.stateSize()));
   trial_.us.resize(N);
   deviations_.resize(N + 1);
-  int largest = 0;
+  int largest = 0, most_controls = 0;
   for (int k = 0; k <= N; ++k) {
     deviations_[k].setZero(problem.tangentSize(k));
     largest = std::max(largest, problem.tangentSize(k));
-    if (k < N) trial_.us[k].setZero(problem.controlSize(k));
+    if (k == N) continue;
+    trial_.us[k].setZero(problem.controlSize(k));
+    most_controls = std::max(most_controls, problem.controlSize(k));
   }
   segments_.resize(max_segments);
-  for (Segment& segment : segments_) segment.end_state.setZero(problem.stateSize());
+  for (Segment& segment : segments_) {
+    segment.start.setZero(largest);
+    segment.end_state.setZero(problem.stateSize());
+  }
   groups_.resize((max_segments + problem.getBatchSize() - 1) / problem.getBatchSize());
   for (Group& group : groups_) group.tasks.reserve(problem.getBatchSize());
-  joint_gap_.setZero(largest);
-  joint_slope_.setZero(largest);
+  for (VectorXd* x : {&joint_gap_, &joint_slope_, &motion_}) x->setZero(largest);
+  control_.setZero(most_controls);
   seconds_ = 0;
 }
 
 bool Rollout::update(const RolloutInput& input, const RolloutOptions& options) {
   const int N = input.problem.numStages(), num = options.segments;
-  const int size = input.problem.getBatchSize(), num_groups = (num + size - 1) / size;
   for (int s = 0; s < num; ++s) {
     segments_[s].begin = s * N / num;
     segments_[s].end = (s + 1) * N / num;
+    segments_[s].start = options.alpha * input.dx[segments_[s].begin];
   }
+  return rollOut(input, options);
+}
+
+// Eq. (9)
+bool Rollout::close(const RolloutInput& input, const RolloutOptions& options) {
+  motion_.setZero();
+  for (int s = 1; s < options.segments; ++s) {
+    const int joint = segments_[s].begin;
+    for (int k = segments_[s - 1].begin; k < joint; ++k) {
+      const StageModel& model = input.models[k];
+      auto motion = motion_.head(model.lx.size()), next = joint_gap_.head(model.gap.size());
+      auto control = control_.head(model.lu.size());
+      control.noalias() = input.sweep.getNodes()[k].K * motion;
+      next.noalias() = model.Fx() * motion;
+      next.noalias() += model.Fu() * control;
+      motion_.head(next.size()) = next;
+    }
+    VectorXd& start = segments_[s].start;
+    auto gap = joint_gap_.head(start.size());
+    input.problem.difference(joint, input.nodes.xs[joint], segments_[s - 1].end_state, gap);
+    motion_.head(start.size()) += gap - start;
+    start += motion_.head(start.size());
+  }
+  return rollOut(input, options);
+}
+
+bool Rollout::rollOut(const RolloutInput& input, const RolloutOptions& options) {
+  const int num = options.segments, size = input.problem.getBatchSize(), num_groups = (num + size - 1) / size;
 #pragma omp parallel for num_threads(std::min(options.threads, num_groups)) schedule(dynamic)
   for (int g = 0; g < num_groups; ++g) {
     const auto start = std::chrono::steady_clock::now();
@@ -59,7 +92,7 @@ bool Rollout::update(const RolloutInput& input, const RolloutOptions& options) {
 bool Rollout::rollOut(const RolloutInput& input, double alpha, Group& group) {
   int longest = 0;
   for (int s = group.begin; s < group.end; ++s) {
-    if (!startSegment(input, alpha, segments_[s])) return false;
+    if (!startSegment(input, segments_[s])) return false;
     longest = std::max(longest, segments_[s].end - segments_[s].begin);
   }
   for (int i = 0; i < longest; ++i) {
@@ -78,13 +111,13 @@ bool Rollout::rollOut(const RolloutInput& input, double alpha, Group& group) {
   return true;
 }
 
-bool Rollout::startSegment(const RolloutInput& input, double alpha, Segment& segment) {
+bool Rollout::startSegment(const RolloutInput& input, Segment& segment) {
   const int k = segment.begin;
   segment.cost = 0;
   deviations_[k].setZero();
   trial_.xs[k] = input.nodes.xs[k];
   if (k == 0) return true;
-  deviations_[k] = alpha * input.dx[k];
+  deviations_[k] = segment.start;
   input.problem.integrate(k, input.nodes.xs[k], deviations_[k], trial_.xs[k]);
   return trial_.xs[k].allFinite();
 }

@@ -29,6 +29,9 @@ class Rollout {
 
   /// Returns whether a trial of finite numbers came out.
   bool update(const RolloutInput& input, const RolloutOptions& options);
+  /// The same once more, from where the gaps of the last update(), full steps in segments, are closed to first order (fddp.h,
+  /// Eq. 9).
+  bool close(const RolloutInput& input, const RolloutOptions& options);
 
   ShootingTrajectory& getTrial() { return trial_; }
   double getCost() const { return cost_; }
@@ -43,6 +46,7 @@ class Rollout {
  private:
   struct Segment {
     int begin = 0, end = 0;  // its stages
+    VectorXd start;          // deviation at its first node
     VectorXd end_state;      // f of its last stage, if another segment follows
     double cost = 0;
   };
@@ -53,8 +57,9 @@ class Rollout {
     double seconds = 0;
     bool ok = false;
   };
+  bool rollOut(const RolloutInput& input, const RolloutOptions& options);
   bool rollOut(const RolloutInput& input, double alpha, Group& group);
-  bool startSegment(const RolloutInput& input, double alpha, Segment& segment);
+  bool startSegment(const RolloutInput& input, Segment& segment);
   void prepareTask(const RolloutInput& input, double alpha, int k, Segment& segment, StepTask& task);
   bool finishTask(const RolloutInput& input, double alpha, const StepTask& task, Segment& segment);
   // Whether gaps are left to be contracted at every node.
@@ -69,7 +74,7 @@ class Rollout {
   std::vector<VectorXd> deviations_;  // N + 1: dx of Eq. (3), at a joint the one its segment starts from
   std::vector<Segment> segments_;
   std::vector<Group> groups_;
-  VectorXd joint_gap_, joint_slope_;
+  VectorXd joint_gap_, joint_slope_, motion_, control_;
   double cost_ = 0, gap_sum_ = 0, gap_max_ = 0, closing_cost_ = 0, seconds_ = 0;
 };
 

@@ -33,7 +33,12 @@
 /// more. (The penalty nu c alone would not do: gaps and decrease are both of second order, so that it would refuse full
 /// steps however close to the solution.) A trial for which (8) exceeds half of (4) is refused, whatever its merit; a full
 /// step that is refused in segments is tried again in one piece, and so are all shorter ones. Steps that follow a
-/// shortened one are rolled out in one piece, and so are the last ones, which must close the gaps (but see LastRollout).
+/// shortened one are rolled out in one piece.
+///
+/// The last step must close the gaps. If it is short it is rolled out twice, the second time from
+///     dx'_j = e_j + (Fx + Fu K)_{j-1} .. (Fx + Fu K)_i (dx'_i - dx_i),                                             (9)
+/// where e_j is the deviation to which the segment from node i to j led at first: gaps of third order are left. If the step
+/// is not short, or this did not close them, it is rolled out in one piece.
 ///
 /// Stationarity is measured by the projected gradient, with [lower, upper] the bounds of du (infinite if ignored):
 ///     gradient = sum_k | clamp(-Qu_k, lower_k, upper_k) |^2. (6)
@@ -54,9 +59,9 @@ struct ShootingTrajectory {
 
 enum class ControlBounds { Ignore, Enforce };
 
-/// What the last iteration that is allowed does about gaps: closes them by a rollout in one piece, or leaves those that
-/// segments open, as other iterations do, for the next solve of a receding horizon.
-enum class LastRollout { OnePiece, Segments };
+/// The last iteration that is allowed closes the gaps, or leaves those that segments open, as other iterations do, to the
+/// next solve of a receding horizon.
+enum class LastRollout { Closed, Segments };
 
 struct FddpOptions {
   int max_iterations = 200;
@@ -83,7 +88,7 @@ struct FddpOptions {
   /// Segments of a rollout, Eq. (7), at most: none is shorter than 12 stages. Results depend on it, within the
   /// tolerances, and therefore it is not the number of threads.
   int rollout_segments = 16;
-  LastRollout last_rollout = LastRollout::OnePiece;
+  LastRollout last_rollout = LastRollout::Closed;
   int threads = 0;  ///< 0: all. The result does not depend on it by a single bit.
 };
 
