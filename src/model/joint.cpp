@@ -313,10 +313,35 @@ void calcJointDifferenceJacobian(const Joint& joint, ConstVectorRef dv, MatrixRe
       J_q1 = calcRightJacobianInverse3(dv);
       break;
     case JointKind::Planar:
-      projectPlanar(joint, calcLogJacobian6(exp6(embedPlanar(joint, dv))), J_q1);
+      projectPlanar(joint, calcRightJacobianInverse6(embedPlanar(joint, dv)), J_q1);
       break;
     case JointKind::FreeFlyer:
-      J_q1 = calcLogJacobian6(exp6(dv));
+      J_q1 = calcRightJacobianInverse6<double>(dv);
+      break;
+    default:
+      J_q1.setIdentity();
+  }
+}
+
+void calcJointDifferenceJacobian(const Joint& joint, ArgumentsOf<Lanes>::ConstVector dv,
+                                 ArgumentsOf<Lanes>::Matrix J_q1) {
+  switch (joint.kind) {
+    case JointKind::Spherical:
+      J_q1 = calcRightJacobianInverse3<Lanes>(dv);
+      break;
+    case JointKind::Planar: {
+      Vector3d one;
+      Matrix3d J;
+      for (Eigen::Index l = 0; l < kLane; ++l) {
+        unpackLane(dv.data(), l, 3, one.data());
+        calcJointDifferenceJacobian(joint, one, J);
+        for (int c = 0; c < 3; ++c)
+          for (int r = 0; r < 3; ++r) J_q1(r, c).set(l, J(r, c));
+      }
+      break;
+    }
+    case JointKind::FreeFlyer:
+      J_q1 = calcRightJacobianInverse6<Lanes>(dv);
       break;
     default:
       J_q1.setIdentity();

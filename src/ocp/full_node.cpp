@@ -20,6 +20,7 @@ int countResidualRows(const StageSpec& spec) {
 FullNode::FullNode(const Model& model, const StageSpec& spec) : NodeModel(model, spec), ws_(model) {
   tau_.setZero(model.nv());
   displacement_.setZero(model.nv());
+  difference_.setZero(model.nv());
   const int rows = countResidualRows(spec);
   for (MatrixXd* m : {&jacobians_.q, &jacobians_.v}) m->setZero(rows, model.nv());
   jacobians_.lambda.setZero(rows, spec.constraints.rows);
@@ -91,7 +92,17 @@ bool FullNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
   return true;
 }
 
-void FullNode::addStateCost(const StateCost& state, const VectorXd& difference, double scale, StageModel& out) {
+double FullNode::calcStateCost() {
+  const StateCost& state = spec_.state;
+  const int nv = model_.nv();
+  model_.difference(state.q_ref, ws_.q, difference_);
+  return 0.5 * state.weight *
+         (difference_.cwiseAbs2().dot(state.weights.head(nv)) +
+          (ws_.v - state.v_ref).cwiseAbs2().dot(state.weights.tail(nv)));
+}
+
+void FullNode::addStateCost(double scale, StageModel& out) {
+  const StateCost& state = spec_.state;
   const int nv = model_.nv();
   const double w = scale * state.weight;
   out.lx.tail(nv) += w * state.weights.tail(nv).cwiseProduct(ws_.v - state.v_ref);
@@ -100,7 +111,7 @@ void FullNode::addStateCost(const StateCost& state, const VectorXd& difference, 
     const int i = joint.idx_v, n = joint.nv;
     if (n == 0) continue;
     const JointVector weights = w * state.weights.segment(i, n);
-    const JointVector d = difference.segment(i, n);
+    const JointVector d = difference_.segment(i, n);
     JointMatrix J(n, n);
     calcJointDifferenceJacobian(joint, d, J);
     const JointMatrix WJ = weights.asDiagonal() * J;

@@ -18,7 +18,8 @@ class FullNode : public NodeModel {
   ResidualJacobians& jacobians() override { return jacobians_; }
   bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
   void linearizeState() override {}
-  void addStateCost(const StateCost& cost, const VectorXd& difference, double scale, StageModel& out) override;
+  double calcStateCost() override;
+  void addStateCost(double scale, StageModel& out) override;
   void setResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
 
  protected:
@@ -27,8 +28,8 @@ class FullNode : public NodeModel {
 
  private:
   ResidualJacobians jacobians_;
-  VectorXd tau_, displacement_;
-  MatrixXd Rx_, Ru_, scaled_, Ru_scaled_;  // total derivatives of the residuals; the same times the Hessian
+  VectorXd tau_, displacement_, difference_;  // the last one of q to the reference of the state cost
+  MatrixXd Rx_, Ru_, scaled_, Ru_scaled_;     // total derivatives of the residuals; the same times the Hessian
 };
 
 }  // namespace bielle

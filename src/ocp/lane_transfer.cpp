@@ -140,6 +140,52 @@ void ReducedLanes::packContact(size_t slot) {
   }
 }
 
+// References and weights of the state costs, unless they are there from the last call. False when no node has one; nodes that
+// have none get weights of zero.
+bool ReducedLanes::packStateCosts() {
+  std::array<const StateCost*, kLane> costs;
+  for (size_t l = 0; l < kLane; ++l) costs[l] = nodes_[l < nodes_.size() ? l : 0]->state_cost_;
+  const auto some = std::find_if(costs.begin(), costs.end(), [](const StateCost* cost) { return cost; });
+  if (some == costs.end()) return false;
+  if (costs == state_costs_) return true;
+  state_costs_ = costs;
+  const auto packCosts = [&](const auto& get, VectorX<Lanes>& out) {
+    std::array<const double*, kLane> in;
+    for (size_t l = 0; l < kLane; ++l) in[l] = get(costs[l] ? *costs[l] : **some).data();
+    packLanes(in, out.size(), out.data());
+  };
+  packCosts([](const StateCost& cost) -> const VectorXd& { return cost.q_ref; }, state_cost_.q_ref);
+  packCosts([](const StateCost& cost) -> const VectorXd& { return cost.v_ref; }, state_cost_.v_ref);
+  packCosts([](const StateCost& cost) -> const VectorXd& { return cost.weights; }, state_cost_.weights);
+  Lanes weight;
+  for (size_t l = 0; l < kLane; ++l) weight.set(l, costs[l] ? costs[l]->weight : 0);
+  state_cost_.weights *= weight;
+  return true;
+}
+
+void ReducedLanes::updateStateCosts() {
+  if (!packStateCosts()) return;
+  const Lanes value = state_cost_.update(ws_.q, v_);
+  unpack(state_cost_.difference.data(), state_cost_.difference.size(),
+         [this](size_t l) { return nodes_[l]->state_difference_.data(); });
+  for (size_t l = 0; l < nodes_.size(); ++l) {
+    nodes_[l]->state_value_ = value[l];
+    nodes_[l]->has_state_value_ = true;
+  }
+}
+
+void ReducedLanes::linearizeStateCosts() {
+  if (!packStateCosts()) return;
+  for (ReducedNode* node : nodes_)
+    if (node->state_cost_) node->calcStateCost();  // for the difference of steps taken alone
+  pack([](const ReducedNode& n) { return n.state_difference_.data(); }, state_cost_.difference.size(),
+       state_cost_.difference.data());
+  const StateCostModelOf<Lanes>& model = state_cost_.differentiate(v_, lifts_);
+  unpack(model.gradient.data(), model.gradient.size(),
+         [this](size_t l) { return views_[l].state_cost.gradient.data(); });
+  unpack(model.hessian.data(), model.hessian.size(), [this](size_t l) { return views_[l].state_cost.hessian.data(); });
+}
+
 void ReducedLanes::packBlockStep(size_t i) {
   using Node = const ReducedNode&;
   BlockLanes& b = blocks_[i];

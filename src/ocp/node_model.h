@@ -67,8 +67,9 @@ class NodeModel {
   virtual bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) = 0;
   // To be called after updateState() at the terminal node in place of linearizeStep().
   virtual void linearizeState() = 0;
-  // `difference` (nv) is that of q to the reference.
-  virtual void addStateCost(const StateCost& cost, const VectorXd& difference, double scale, StageModel& out) = 0;
+  // The state cost of the stage at the last update; then scale times its derivatives there.
+  virtual double calcStateCost() = 0;
+  virtual void addStateCost(double scale, StageModel& out) = 0;
   // Gauss-Newton terms, whatever `out` held; at a running stage forces and controls take part.
   virtual void setResiduals(const ResidualStack& stack, bool running, StageModel& out) = 0;
 

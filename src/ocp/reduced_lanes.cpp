@@ -11,29 +11,18 @@ namespace {
 
 using JointMatrixLanes = Eigen::Matrix<Lanes, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
 
-// Jacobians of q (+) d with respect to q, and of the difference d with respect to its end: node by node but for the one
-// kind that loops are full of.
-struct StepJacobians {
-  JointMatrixLanes q, difference;
-};
-StepJacobians calcStepJacobians(const Joint& joint, const VectorUpTo6<Lanes>& d) {
-  if (joint.kind == JointKind::Spherical) {
-    const Vector3<Lanes> w = d;
-    return {exp3(w).transpose(), calcRightJacobianInverse3(w)};
-  }
+// Jacobian of q (+) d with respect to q: node by node but for the one kind that loops are full of.
+JointMatrixLanes calcIntegrateJacobian(const Joint& joint, const VectorUpTo6<Lanes>& d) {
+  if (joint.kind == JointKind::Spherical) return exp3<Lanes>(d).transpose();
   const int n = joint.nv;
-  StepJacobians out{JointMatrixLanes(n, n), JointMatrixLanes(n, n)};
-  JointMatrix q(n, n), step(n, n), difference(n, n);
+  JointMatrixLanes out(n, n);
+  JointMatrix q(n, n), step(n, n);
   JointVector one(n);
   for (Eigen::Index l = 0; l < kLane; ++l) {
     unpackLane(d.data(), l, n, one.data());
     calcJointIntegrateJacobians(joint, one, q, step);
-    calcJointDifferenceJacobian(joint, one, difference);
     for (int c = 0; c < n; ++c)
-      for (int r = 0; r < n; ++r) {
-        out.q(r, c).set(l, q(r, c));
-        out.difference(r, c).set(l, difference(r, c));
-      }
+      for (int r = 0; r < n; ++r) out(r, c).set(l, q(r, c));
   }
   return out;
 }
@@ -51,10 +40,10 @@ BlockLanes::BlockLanes(const LoopBlock& l)
   for (MatrixX<Lanes>* x : {&E, &En, &S, &mixed, &mixed_next}) x->setZero(r, r);
 }
 
-LaneView::LaneView(const Model& model, const std::vector<BlockLanes>& blocks, const std::vector<ContactLanes>& contacts,
-                   int size)
-    : ws(model) {
-  dydd.setZero(roundUpToLane(model.nu() + 2 * size) * size);
+LaneView::LaneView(const Model& model, const Reduction& reduction, const std::vector<BlockLanes>& blocks,
+                   const std::vector<ContactLanes>& contacts)
+    : ws(model), state_cost(model, reduction) {
+  dydd.setZero(roundUpToLane(model.nu() + 2 * reduction.size) * reduction.size);
   for (const BlockLanes& b : blocks) {
     const Eigen::Index n = b.at.N.rows(), r = b.at.N.cols();
     const MatrixXd square = MatrixXd::Zero(r, r);
@@ -73,7 +62,8 @@ ReducedLanes::ReducedLanes(const Model& model, const Reduction& reduction, const
       tips_(tips),
       ws_(model),
       tree_(model, reduction, tips),
-      system_(reduction.size, 6 * static_cast<int>(slots.size())) {
+      system_(reduction.size, 6 * static_cast<int>(slots.size())),
+      state_cost_(model, reduction) {
   blocks_.reserve(reduction.blocks.size());  // lifts point into them
   for (const LoopBlock& block : reduction.blocks) {
     blocks_.emplace_back(block);
@@ -95,7 +85,7 @@ ReducedLanes::ReducedLanes(const Model& model, const Reduction& reduction, const
   for (VectorX<Lanes>* x : {&x0_, &x1_}) x->setZero(model.nq() + model.nv());
   dx_.setZero(2 * reduction.size);
   for (MatrixX<Lanes>* x : {&A_y_, &A_v_}) x->setZero(reduction.size, reduction.size);
-  for (size_t l = 0; l < kLane; ++l) views_.emplace_back(model, blocks_, contacts_, reduction.size);
+  for (size_t l = 0; l < kLane; ++l) views_.emplace_back(model, reduction, blocks_, contacts_);
 }
 
 int ReducedLanes::findLane(const ReducedNode* node) const {
@@ -127,6 +117,7 @@ void ReducedLanes::linearize(NodeModel* const* nodes, int count) {
   for (ContactLanes& contact : contacts_)
     if (contact.used) updateContact(contact);
   for (BlockLanes& b : blocks_) linearizeStep(b);
+  linearizeStateCosts();
   storeDerivatives();
 }
 
@@ -134,6 +125,7 @@ LaneMask ReducedLanes::startSteps(NodeModel* const* nodes, int count, LaneMask& 
   setNodes(nodes, count);
   placed = updatePoints();
   packNodes();
+  updateStateCosts();
   for (size_t i = 0; i < blocks_.size(); ++i) packBlockStep(i);
   updateColumns(model_, ws_);
   updateVelocities(model_, ws_, v_);
@@ -317,10 +309,11 @@ void ReducedLanes::linearizeStep(BlockLanes& b) {
   for (const Joint& joint : b.loop.model.joints()) {
     if (!isCurved(joint)) continue;
     const int i = joint.idx_v, n = joint.nv;
-    const StepJacobians jacobians = calcStepJacobians(joint, b.step.segment(i, n));
-    b.JqN.middleRows(i, n) = jacobians.q.lazyProduct(b.at.N.middleRows(i, n));
-    b.P.middleRows(i, n) = jacobians.difference.transpose().lazyProduct(b.at.WN.middleRows(i, n));
-    b.Pn.middleRows(i, n) = jacobians.difference.transpose().lazyProduct(b.next.WN.middleRows(i, n));
+    JointMatrixLanes Jdiff(n, n);
+    calcJointDifferenceJacobian(joint, b.step.segment(i, n), Jdiff);
+    b.JqN.middleRows(i, n) = calcIntegrateJacobian(joint, b.step.segment(i, n)).lazyProduct(b.at.N.middleRows(i, n));
+    b.P.middleRows(i, n) = Jdiff.transpose().lazyProduct(b.at.WN.middleRows(i, n));
+    b.Pn.middleRows(i, n) = Jdiff.transpose().lazyProduct(b.next.WN.middleRows(i, n));
   }
   for (MatrixX<Lanes>* m : {&b.mixed, &b.mixed_next, &b.E, &b.En, &b.S}) m->setZero();
   addSmallProductTransposed(b.P, b.next.N, b.mixed);

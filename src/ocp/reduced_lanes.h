@@ -1,10 +1,11 @@
 #pragma once
 // Up to kLane steps and their derivatives at once, one node per lane (lanes.h): what reduced_node.h needs of the mechanism for
-// its Eqs. (b) to (g). Nodes may have different contacts and time steps. What is left to each of them is its costs, its
+// its Eqs. (b) to (g). Nodes may have different contacts and time steps. What is left to each of them is its residuals, its
 // quadratic model, and the system of its contacts where some are redundant.
 #include "bielle/dynamics/reduced_tree.h"
 #include "contact_system.h"
 #include "node_model.h"
+#include "reduced_state_cost.h"
 
 namespace bielle {
 
@@ -42,8 +43,8 @@ struct ContactLanes {
 
 // What one lane holds, for its node alone.
 struct LaneView {
-  LaneView(const Model& model, const std::vector<BlockLanes>& blocks, const std::vector<ContactLanes>& contacts,
-           int size);
+  LaneView(const Model& model, const Reduction& reduction, const std::vector<BlockLanes>& blocks,
+           const std::vector<ContactLanes>& contacts);
   struct Block {
     MatrixXd Z, E, En, S, mixed, mixed_next;  // as in BlockLanes
   };
@@ -54,6 +55,7 @@ struct LaneView {
   VectorXd dydd;  // (nu + 2 size) x size, padded: room, A_y^T, A_v^T
   std::vector<Block> blocks;
   std::vector<Contact> contacts;
+  StateCostModel state_cost;
 };
 
 class ReducedLanes {
@@ -106,6 +108,9 @@ class ReducedLanes {
   void storeDerivatives();
   LaneMask close(BlockLanes& b);
   void packContact(size_t slot);
+  bool packStateCosts();
+  void updateStateCosts();
+  void linearizeStateCosts();
   void updateForces();
   void updateContact(ContactLanes& contact);
   void linearizeStep(BlockLanes& b);
@@ -129,6 +134,8 @@ class ReducedLanes {
   Lanes h_;
   MatrixX<Lanes> A_y_, A_v_;  // size x size, reduced_tree.h Eqs. (2) and (3)
   ContactSystem system_;      // six rows for each slot
+  ReducedStateCostOf<Lanes> state_cost_;
+  std::array<const StateCost*, kLane> state_costs_{};  // whose references it holds
   std::vector<LaneView> views_;
 };
 

@@ -104,7 +104,7 @@ bool ReducedNode::linearizeBlock(Block& b, LaneView::Block& view, ConstVectorRef
   const double h = spec_.dt;
   const BlockBasis& next = b.next.basis();
   work.motion.basis = &b.at;
-  work.motion.Z = view.Z;  // for costs
+  work.motion.Z = view.Z;  // for residuals
   MatrixXd &X = work.X, &Xn = work.Xn;
   const MatrixXd &E = view.E, &S = view.S;
   X.setIdentity();
@@ -230,6 +230,7 @@ void ReducedNode::assembleStep(PaddedMap dydd, StageModel& out) const {
 
 void ReducedNode::linearizeState() {
   restore();
+  state_model_ = nullptr;
   updateCompositeInertias(model_, work_->ws);
   for (Block& b : blocks_) {
     const auto view = getPlacedView(b.loop, work_->ws);

@@ -11,10 +11,10 @@ namespace bielle {
 BlockWork::BlockWork(const LoopBlock& l) : scratch(l), start(l), point(l), motion(l), ahead(l) {
   const int n = l.model.nv(), r = l.size, rank = l.rank;
   q.setZero(l.model.nq());
-  for (VectorXd* x : {&v, &a, &d, &w, &gradient_q, &gradient_v}) x->setZero(n);
+  for (VectorXd* x : {&v, &a, &d, &w}) x->setZero(n);
   for (VectorXd* x : {&independent, &zeta}) x->setZero(rank);
   rows.setZero(l.closures.rows);
-  for (MatrixXd* x : {&HN, &wy, &wv, &diff_N}) x->setZero(n, r);
+  for (MatrixXd* x : {&HN, &diff_N}) x->setZero(n, r);
   for (MatrixXd* x : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a}) x->setZero(r, r);
   for (MatrixXd* x : {&X, &Xn, &mixed, &moved, &Pq, &Pv, &Pz}) x->setZero(r, r);
   target.setZero(r);
@@ -76,12 +76,25 @@ ReducedSizes::ReducedSizes(const std::vector<StageSpec>& specs) {
     rows = std::max(rows, set.rows - loop_rows);
     constraints = std::max(constraints, set.rows);
     residuals = std::max(residuals, countResidualRows(spec));
+    if (spec.state.weight != 0 && !findStateCost(spec.state)) state_costs.push_back(&spec.state);
   }
   for (size_t tip = 0; tip < tips.size(); ++tip) slots.insert(slots.end(), most[tips[tip]], static_cast<int>(tip));
 }
 
+const StateCost* ReducedSizes::findStateCost(const StateCost& cost) const {
+  if (cost.weight == 0) return nullptr;
+  const auto found = std::find_if(state_costs.begin(), state_costs.end(), [&](const StateCost* other) {
+    return other->weight == cost.weight && other->q_ref == cost.q_ref && other->v_ref == cost.v_ref &&
+           other->weights == cost.weights;
+  });
+  return found == state_costs.end() ? nullptr : *found;
+}
+
 ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const ReducedSizes& sizes)
-    : ws(model), tree(model, reduction, sizes.tips), lanes(model, reduction, sizes.tips, sizes.slots) {
+    : ws(model),
+      tree(model, reduction, sizes.tips),
+      state_cost(model, reduction),
+      lanes(model, reduction, sizes.tips, sizes.slots) {
   const int nv = model.nv(), nr = reduction.size, nu = model.nu();
   blocks.reserve(reduction.blocks.size());  // lifts point into them
   for (const LoopBlock& block : reduction.blocks) {
@@ -139,7 +152,8 @@ ReducedNode::ReducedNode(const Model& model, const Reduction& reduction, const S
   contact_slots_ = findSlots(set, pool_->sizes().tips, pool_->sizes().slots);
   X_WB_.resize(model.numBodies());
   q_.setZero(model.nq());
-  for (VectorXd* v : {&v_, &tau_, &a_}) v->setZero(nv);
+  for (VectorXd* v : {&v_, &tau_, &a_, &state_difference_}) v->setZero(nv);
+  state_cost_ = pool_->sizes().findStateCost(spec.state);
   factors_.resize(nr, contact_rows_);
   chart_x_.setConstant(model.nq() + nv, std::numeric_limits<double>::quiet_NaN());
 }
@@ -242,6 +256,7 @@ bool ReducedNode::updatePoint(ConstVectorRef x, const ReducedNode* previous) {
 
 void ReducedNode::setState(ConstVectorRef x) {
   failure_.clear();
+  has_state_value_ = false;
   q_ = x.head(model_.nq());
   v_ = x.tail(model_.nv());
 }

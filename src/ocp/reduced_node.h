@@ -31,6 +31,7 @@
 #include "bielle/dynamics/reduced_tree.h"
 #include "node_model.h"
 #include "reduced_lanes.h"
+#include "reduced_state_cost.h"
 
 namespace bielle {
 
@@ -38,15 +39,15 @@ namespace bielle {
 struct BlockWork {
   explicit BlockWork(const LoopBlock& l);
   BlockScratch scratch;
-  BlockState start, point;                         // for integrate() and open gaps
-  BlockMotion motion, ahead;                       // at the state, in the whole model; at q+, in the block
-  VectorXd q, v, a, d, w, gradient_q, gradient_v;  // n (q: nq)
-  VectorXd independent, zeta, rows;                // rank, rank, m
-  MatrixXd HN, wy, wv, diff_N;                     // n x r, scratch
-  MatrixXd q_y, q_v, q_a, v_y, v_v, v_a;           // r x r: dq+ and dv+ by dy, dy_v, dy'
-  MatrixXd X, Xn, mixed, moved;                    // r x r: Eq. (g); a matrix to be inverted; scratch
-  MatrixXd Pq, Pv, Pz;                             // r x r: change of basis at open gaps
-  VectorXd target;                                 // r
+  BlockState start, point;                // for integrate() and open gaps
+  BlockMotion motion, ahead;              // at the state, in the whole model; at q+, in the block
+  VectorXd q, v, a, d, w;                 // n (q: nq)
+  VectorXd independent, zeta, rows;       // rank, rank, m
+  MatrixXd HN, diff_N;                    // n x r, scratch
+  MatrixXd q_y, q_v, q_a, v_y, v_v, v_a;  // r x r: dq+ and dv+ by dy, dy_v, dy'
+  MatrixXd X, Xn, mixed, moved;           // r x r: Eq. (g); a matrix to be inverted; scratch
+  MatrixXd Pq, Pv, Pz;                    // r x r: change of basis at open gaps
+  VectorXd target;                        // r
   std::vector<int> mixed_pivots;
 };
 
@@ -64,12 +65,15 @@ struct FreeJoint {
 // Sizes of the memory that the nodes of a problem share.
 struct ReducedSizes {
   explicit ReducedSizes(const std::vector<StageSpec>& specs);
-  std::vector<int> tips;          // bodies in contact at some stage
-  std::vector<int> slots;         // of all contacts that a stage may have, their tips
-  std::vector<int> contact_rows;  // numbers of contact rows that occur
-  int rows = 0;                   // largest number of contact rows
-  int constraints = 0;            // largest number of constraint rows
-  int residuals = 0;              // largest number of residual rows
+  std::vector<int> tips;                      // bodies in contact at some stage
+  std::vector<int> slots;                     // of all contacts that a stage may have, their tips
+  std::vector<int> contact_rows;              // numbers of contact rows that occur
+  int rows = 0;                               // largest number of contact rows
+  int constraints = 0;                        // largest number of constraint rows
+  int residuals = 0;                          // largest number of residual rows
+  std::vector<const StateCost*> state_costs;  // those that differ
+  // The one of them that is the same; null when the stage has none.
+  const StateCost* findStateCost(const StateCost& cost) const;
 };
 
 // What a node with so many contact rows needs.
@@ -87,6 +91,7 @@ struct ReducedWork {
   std::vector<BlockLift> lifts;
   std::vector<FreeJoint> free_joints;
   ReducedTree tree;
+  ReducedStateCostOf<double> state_cost;
   ReducedLanes lanes;
   std::map<int, ContactWork> contacts;  // by rows
   VectorXd a_d, force;                  // nv
@@ -156,7 +161,8 @@ class ReducedNode : public NodeModel {
   void prepareLinearization(NodeModel* const* nodes, int count) override;
   bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
   void linearizeState() override;
-  void addStateCost(const StateCost& cost, const VectorXd& difference, double scale, StageModel& out) override;
+  double calcStateCost() override;
+  void addStateCost(double scale, StageModel& out) override;
   void setResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
 
  protected:
@@ -178,8 +184,7 @@ class ReducedNode : public NodeModel {
     failure_ = point.describeFailure(b.loop, b.work->scratch);
     return false;
   }
-  static void calcJointCost(const StateCost& state, const VectorXd& difference, double w, const Joint& joint,
-                            JointVector& gradient, JointMatrix& hessian);
+  void loadStateCost();
   void updateDriftAccelerations();
   void updateContacts();
   bool solveContacts();
@@ -222,6 +227,11 @@ class ReducedNode : public NodeModel {
   const ReducedNode* before_ = nullptr;  // within a step: the node whose next state this is, if known
   SaddlePointFactors factors_;           // of Eq. (b)
   VectorXd chart_x_;
+  const StateCost* state_cost_;  // of the stage, the same object for equal ones; null: none
+  bool has_state_value_ = false;
+  double state_value_ = 0;                       // of the state cost at the last update
+  VectorXd state_difference_;                    // nv, and of q to its reference
+  const StateCostModel* state_model_ = nullptr;  // derivatives, where lanes have made them
 };
 
 }  // namespace bielle

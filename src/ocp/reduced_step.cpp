@@ -91,6 +91,7 @@ void ReducedNode::showStep(int index) {
 
 void ReducedNode::showView(LaneView& view) {
   shown_ = &view.ws;
+  state_model_ = &view.state_cost;
   view.ws.q = q_;
   view.ws.v = v_;
   view.ws.X_WB = X_WB_;

@@ -57,7 +57,6 @@ struct RobotProblem::Node {
   std::unique_ptr<NodeModel> dynamics;
   ResidualStack stack;
   std::vector<int> rows;  // of each cost, its first in the stack
-  VectorXd difference;    // of q to the reference of the state cost
 };
 
 RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages,
@@ -76,7 +75,6 @@ RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorX
     const StageSpec& spec = specs_[k];
     Node& node = nodes_[k];
     node.dynamics = reduction_ ? makeReducedNode(model, *reduction_, spec, pool) : makeFullNode(model, spec);
-    node.difference.setZero(model.nv());
     node.rows.resize(spec.costs.size());
     int row = 0;
     for (bool motion : {true, false}) {
@@ -226,13 +224,7 @@ double RobotProblem::sumCosts(int index, std::vector<CostValue>* values) {
     sum += value;
     if (values) values->push_back({name, value});
   };
-  const int nq = model_.nq(), nv = model_.nv();
-  if (spec.state.weight != 0) {
-    model_.difference(spec.state.q_ref, node.x.head(nq), node.difference);
-    double value = node.difference.cwiseAbs2().dot(spec.state.weights.head(nv));
-    value += (node.x.tail(nv) - spec.state.v_ref).cwiseAbs2().dot(spec.state.weights.tail(nv));
-    add("state", 0.5 * spec.state.weight * value);
-  }
+  if (spec.state.weight != 0) add("state", node.dynamics->calcStateCost());
   if (spec.control.weight != 0 && node.u.size())
     add("control", 0.5 * spec.control.weight * (node.u - spec.control.reference).cwiseAbs2().dot(spec.control.weights));
   const NodeView view{model_, node.dynamics->workspace(), spec.constraints, node.u, node.dynamics->lambda()};
@@ -319,7 +311,7 @@ void RobotProblem::differentiateCosts(int index, double scale, StageModel& out) 
   Node& node = nodes_[index];
   const StageSpec& spec = specs_[index];
   differentiateResiduals(index, scale, out);
-  if (spec.state.weight != 0) node.dynamics->addStateCost(spec.state, node.difference, scale, out);
+  if (spec.state.weight != 0) node.dynamics->addStateCost(scale, out);
 }
 
 void RobotProblem::differentiateResiduals(int index, double scale, StageModel& out) {

@@ -104,6 +104,9 @@ template <typename T>
 Vector6<T> log6(const SE3Of<T>& X);
 /// Right Jacobian of exp6 (Barfoot and Furgale's Q block, from its closed form), 6x6.
 Matrix6d calcRightJacobian6(const Vector6d& twist);
+/// Its inverse, 6x6. Singular at an angle of 2 pi.
+template <typename T>
+Matrix6<T> calcRightJacobianInverse6(const Vector6<T>& twist);
 /// Jacobian of log6 at X: log6(X exp6(d)) = log6(X) + J d + O(d^2), 6x6.
 Matrix6d calcLogJacobian6(const SE3& X);
 

@@ -52,6 +52,8 @@ void calcJointDifference(const Joint& joint, ArgumentsOf<Lanes>::ConstVector q0,
 void calcJointIntegrateJacobians(const Joint& joint, ConstVectorRef dv, MatrixRef J_q, MatrixRef J_dv);
 /// Jacobian of dv = q1 (-) q0 with respect to q1, as a function of dv (nv x nv): the inverse of J_dv above.
 void calcJointDifferenceJacobian(const Joint& joint, ConstVectorRef dv, MatrixRef J_q1);
+void calcJointDifferenceJacobian(const Joint& joint, ArgumentsOf<Lanes>::ConstVector dv,
+                                 ArgumentsOf<Lanes>::Matrix J_q1);
 /// Neutral configuration of a joint kind, written to q (nq).
 void setNeutral(JointKind kind, VectorRef q);
 

@@ -1,0 +1,168 @@
+#include "reduced_state_cost.h"
+
+namespace bielle {
+namespace {
+
+// Numbers of the Hessian of a unit.
+int countFree(const Joint& joint) { return joint.nv * (joint.nv + 1); }
+int countBlock(const LoopBlock& loop) { return 3 * loop.size * loop.size; }
+
+// out += scale times the lower triangle of H (n x n).
+void addLower(const double* H, int n, double scale, Eigen::Block<PaddedMap> out) {
+  for (int c = 0; c < n; ++c)
+    for (int r = c; r < n; ++r) out(r, c) += scale * H[c * n + r];
+}
+
+}  // namespace
+
+template <typename T>
+StateCostModelOf<T>::StateCostModelOf(const Model& model, const Reduction& reduction) {
+  int numbers = 0;
+  for (int i : reduction.free_joints) numbers += countFree(model.joints()[i]);
+  for (const LoopBlock& loop : reduction.blocks) numbers += countBlock(loop);
+  gradient.setZero(2 * reduction.size);
+  hessian.setZero(numbers);
+}
+
+void addStateCostModel(const Model& model, const Reduction& reduction, const StateCostModel& cost, double scale,
+                       StageModel& out) {
+  const int nr = reduction.size;
+  PaddedMap lxx = out.lxx();
+  out.lx += scale * cost.gradient;
+  const double* hessian = cost.hessian.data();
+  for (size_t i = 0; i < reduction.free_joints.size(); ++i) {
+    const Joint& joint = model.joints()[reduction.free_joints[i]];
+    const int o = reduction.free_offsets[i], n = joint.nv;
+    addLower(hessian, n, scale, lxx.block(o, o, n, n));
+    for (int c = 0; c < n; ++c) lxx(nr + o + c, nr + o + c) += scale * hessian[n * n + c];
+    hessian += countFree(joint);
+  }
+  for (const LoopBlock& loop : reduction.blocks) {
+    const int o = loop.offset, n = loop.size;
+    addLower(hessian, n, scale, lxx.block(o, o, n, n));
+    lxx.block(nr + o, o, n, n) += scale * Eigen::Map<const MatrixXd>(hessian + n * n, n, n);
+    addLower(hessian + 2 * n * n, n, scale, lxx.block(nr + o, nr + o, n, n));
+    hessian += countBlock(loop);
+  }
+}
+
+template <typename T>
+ReducedStateCostOf<T>::ReducedStateCostOf(const Model& model, const Reduction& reduction)
+    : model_(model), reduction_(reduction), derivatives_(model, reduction) {
+  q_ref.setZero(model.nq());
+  weights.setZero(2 * model.nv());
+  for (VectorX<T>* x : {&v_ref, &difference, &gradient_q_, &gradient_v_}) x->setZero(model.nv());
+  for (const LoopBlock& loop : reduction.blocks) {
+    const int n = loop.model.nv(), r = loop.size;
+    const VectorX<T> column = VectorX<T>::Zero(n);
+    const MatrixX<T> columns = MatrixX<T>::Zero(n, r);
+    blocks_.push_back({column, column, columns, columns, columns});
+  }
+}
+
+template <typename T>
+T ReducedStateCostOf<T>::update(const VectorX<T>& q, const VectorX<T>& v) {
+  for (const Joint& joint : model_.joints()) {
+    if (joint.nv == 0) continue;
+    calcJointDifference(joint, q_ref.segment(joint.idx_q, joint.nq), q.segment(joint.idx_q, joint.nq),
+                        difference.segment(joint.idx_v, joint.nv));
+  }
+  T of_q = 0, of_v = 0;
+  const int nv = model_.nv();
+  for (int k = 0; k < nv; ++k) {
+    const T d = difference[k], e = v[k] - v_ref[k];
+    of_q += weights[k] * d * d;
+    of_v += weights[nv + k] * e * e;
+  }
+  return 0.5 * (of_q + of_v);
+}
+
+template <typename T>
+const StateCostModelOf<T>& ReducedStateCostOf<T>::differentiate(const VectorX<T>& v,
+                                                                const std::vector<BlockLiftOf<T>>& lifts) {
+  const int nv = model_.nv();
+  for (int k = 0; k < nv; ++k) {
+    gradient_q_[k] = weights[k] * difference[k];
+    gradient_v_[k] = weights[nv + k] * (v[k] - v_ref[k]);
+  }
+  T* hessian = derivatives_.hessian.data();
+  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+    differentiateFree(joint, reduction_.free_offsets[i], hessian);
+    hessian += countFree(joint);
+  }
+  for (size_t i = 0; i < reduction_.blocks.size(); ++i) {
+    differentiateBlock(reduction_.blocks[i], *lifts[i].motion, blocks_[i], hessian);
+    hessian += countBlock(reduction_.blocks[i]);
+  }
+  return derivatives_;
+}
+
+// J_d^T W_q J_d of a joint whose J_d is not the identity; the gradient of its coordinates becomes J_d^T W_q d.
+template <typename T>
+typename ReducedStateCostOf<T>::JointMatrix ReducedStateCostOf<T>::differentiateJoint(const Joint& joint) {
+  const int k = joint.idx_v, n = joint.nv;
+  JointMatrix J(n, n);
+  calcJointDifferenceJacobian(joint, difference.segment(k, n), J);
+  const JointMatrix WJ = weights.segment(k, n).asDiagonal() * J;
+  Eigen::Matrix<T, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1> gradient =
+      J.transpose().lazyProduct(gradient_q_.segment(k, n));
+  gradient_q_.segment(k, n) = gradient;
+  return J.transpose().lazyProduct(WJ);
+}
+
+template <typename T>
+void ReducedStateCostOf<T>::differentiateFree(const Joint& joint, int offset, T* hessian) {
+  const int k = joint.idx_v, n = joint.nv;
+  Eigen::Map<MatrixX<T>> yy(hessian, n, n);
+  if (isCurved(joint))
+    yy = differentiateJoint(joint);
+  else
+    yy = weights.segment(k, n).asDiagonal();
+  for (int c = 0; c < n; ++c) hessian[n * n + c] = weights[model_.nv() + k + c];
+  derivatives_.gradient.segment(offset, n) = gradient_q_.segment(k, n);
+  derivatives_.gradient.segment(reduction_.size + offset, n) = gradient_v_.segment(k, n);
+}
+
+template <typename T>
+void ReducedStateCostOf<T>::differentiateBlock(const LoopBlock& loop, const BlockMotionOf<T>& motion, Block& block,
+                                               T* hessian) {
+  const int r = loop.size, nv = model_.nv();
+  const MatrixX<T>&N = motion.basis->N, &Z = motion.Z;
+  for (size_t j = 0; j < loop.joints.size(); ++j) {
+    const Joint &joint = model_.joints()[loop.joints[j]], &own = loop.model.joints()[j + 1];
+    const auto rows = N.middleRows(own.idx_v, own.nv);
+    if (isCurved(joint))
+      block.HN.middleRows(own.idx_v, own.nv) = differentiateJoint(joint).lazyProduct(rows);
+    else
+      block.HN.middleRows(own.idx_v, own.nv) = weights.segment(joint.idx_v, joint.nv).asDiagonal() * rows;
+  }
+  for (size_t k = 0; k < loop.dofs.size(); ++k) {
+    const int dof = loop.dofs[k];
+    block.gradient_q[k] = gradient_q_[dof];
+    block.gradient_v[k] = gradient_v_[dof];
+    for (int c = 0; c < r; ++c) {
+      block.WZ(k, c) = weights[nv + dof] * Z(k, c);
+      block.WN(k, c) = weights[nv + dof] * N(k, c);
+    }
+  }
+  auto l_y = derivatives_.gradient.segment(loop.offset, r),
+       l_v = derivatives_.gradient.segment(reduction_.size + loop.offset, r);
+  Eigen::Map<MatrixX<T>> yy(hessian, r, r), vy(hessian + r * r, r, r), vv(hessian + 2 * r * r, r, r);
+  for (auto* x : {&l_y, &l_v}) x->setZero();
+  for (auto* x : {&yy, &vy, &vv}) x->setZero();
+  addSmallProductTransposed(N, block.gradient_q, l_y);
+  addSmallProductTransposed(Z, block.gradient_v, l_y);
+  addSmallProductTransposed(N, block.gradient_v, l_v);
+  addSmallProductTransposed(N, block.HN, yy);
+  addSmallProductTransposed(Z, block.WZ, yy);
+  addSmallProductTransposed(N, block.WZ, vy);
+  addSmallProductTransposed(N, block.WN, vv);
+}
+
+template struct StateCostModelOf<double>;
+template struct StateCostModelOf<Lanes>;
+template class ReducedStateCostOf<double>;
+template class ReducedStateCostOf<Lanes>;
+
+}  // namespace bielle
