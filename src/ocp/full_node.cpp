@@ -120,6 +120,11 @@ void FullNode::addStateCost(double scale, StageModel& out) {
   }
 }
 
+ResidualJacobians& FullNode::startResiduals(const ResidualStack&) {
+  for (MatrixXd* m : {&jacobians_.q, &jacobians_.v, &jacobians_.lambda}) m->setZero();
+  return jacobians_;
+}
+
 void FullNode::setResiduals(const ResidualStack& stack, bool running, StageModel& out) {
   const int nv = model_.nv(), rows = static_cast<int>(stack.r.size());
   if (Rx_.rows() != rows) {

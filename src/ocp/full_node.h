@@ -15,7 +15,7 @@ class FullNode : public NodeModel {
   bool updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override;
   void restore() override {}
   const Workspace& workspace() const override { return ws_; }
-  ResidualJacobians& jacobians() override { return jacobians_; }
+  ResidualJacobians& startResiduals(const ResidualStack& stack) override;
   bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
   void linearizeState() override {}
   double calcStateCost() override;

@@ -14,6 +14,7 @@ namespace bielle {
 struct ResidualStack {
   VectorXd r, gradient, hessian;
   int motion_rows = 0;
+  bool counts(int row) const { return gradient[row] != 0 || hessian[row] != 0; }
 };
 
 // Partial derivatives of stacked residuals, rows x nv, nv, constraint rows; with room for those of other nodes.
@@ -54,8 +55,8 @@ class NodeModel {
   virtual void restore() = 0;
   // Kinematics of the last function called, until another node of the same thread is worked on.
   virtual const Workspace& workspace() const = 0;
-  // Where the derivatives of this node's residuals are to be written, before setResiduals().
-  virtual ResidualJacobians& jacobians() = 0;
+  // Where the derivatives of this node's residuals are to be written, before setResiduals(): zero so far.
+  virtual ResidualJacobians& startResiduals(const ResidualStack& stack) = 0;
   // updateStep() of at most kLane nodes of this kind at once, by one thread: startStep() of each, then finishSteps() of one
   // of them, and showStep() of each for its workspace(). Nodes that do not go with others return false from startStep().
   virtual bool startStep(ConstVectorRef /*x*/, ConstVectorRef /*u*/, const NodeModel* /*previous*/) { return false; }
@@ -70,7 +71,8 @@ class NodeModel {
   // The state cost of the stage at the last update; then scale times its derivatives there.
   virtual double calcStateCost() = 0;
   virtual void addStateCost(double scale, StageModel& out) = 0;
-  // Gauss-Newton terms, whatever `out` held; at a running stage forces and controls take part.
+  // Gauss-Newton terms, whatever `out` held; at a running stage forces and controls take part. Derivatives of rows
+  // that do not count need not be there.
   virtual void setResiduals(const ResidualStack& stack, bool running, StageModel& out) = 0;
 
   const VectorXd& lambda() const { return lambda_; }

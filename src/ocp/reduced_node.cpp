@@ -125,10 +125,12 @@ ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const R
   for (VectorXd* x : {&a_d, &force}) x->setZero(nv);
   for (VectorXd* x : {&f, &ydd}) x->setZero(nr);
   M.setZero(nr, nr);
-  for (MatrixXd* m : {&jacobians.q, &jacobians.v}) m->setZero(sizes.residuals, nv);
-  jacobians.lambda.setZero(sizes.residuals, sizes.constraints);
+  const Eigen::Index rows = roundUpToLane(sizes.residuals);
+  for (MatrixXd* m : {&jacobians.q, &jacobians.v}) m->setZero(rows, nv);
+  jacobians.lambda.setZero(rows, sizes.constraints);
   const Eigen::Index padded = roundUpToLane(2 * nr + nu);
   for (VectorXd* x : {&Rt, &Rt_scaled}) x->setZero(padded * sizes.residuals);
+  gradient.setZero(2 * nr + nu);
   dlambda.setZero(padded * sizes.rows);
 }
 

@@ -102,8 +102,8 @@ struct ReducedWork {
   };
   std::vector<Motor> motors;
   ResidualJacobians jacobians;
-  VectorXd Rt, Rt_scaled;  // of setResiduals(), with room for any node
-  VectorXd dlambda;        // see shapeForceDerivatives(), likewise
+  VectorXd Rt, Rt_scaled, gradient;  // of setResiduals(), with room for any node
+  VectorXd dlambda;                  // see shapeForceDerivatives(), likewise
 };
 
 // One for each thread that asks.
@@ -154,7 +154,7 @@ class ReducedNode : public NodeModel {
   bool updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override;
   void restore() override;
   const Workspace& workspace() const override { return *shown_; }
-  ResidualJacobians& jacobians() override { return work_->jacobians; }
+  ResidualJacobians& startResiduals(const ResidualStack& stack) override;
   bool startStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override;
   void finishSteps(NodeModel* const* nodes, int count, bool* ok) override;
   void showStep(int index) override;
@@ -185,6 +185,8 @@ class ReducedNode : public NodeModel {
     return false;
   }
   void loadStateCost();
+  // Rt of setResiduals(), columns of rows that count.
+  void updateResidualDerivatives(const ResidualStack& stack, bool running, PaddedMap Rt);
   void updateDriftAccelerations();
   void updateContacts();
   bool solveContacts();

@@ -119,12 +119,22 @@ void ReducedNode::addColumns(ConstMatrixRef A, Lift lift, MatrixRef out) const {
     }
   for (const Block& b : blocks_) {
     const MatrixXd& X = lift == Lift::N ? b.at.N : b.work->motion.Z;
-    for (int c = 0; c < b.loop.size; ++c)
-      for (Eigen::Index i = 0; i < A.rows(); ++i) {
-        double sum = 0;
-        for (size_t k = 0; k < b.loop.dofs.size(); ++k) sum += X(k, c) * A(i, b.loop.dofs[k]);
-        out(b.loop.offset + c, i) += sum;
-      }
+    for (int c = 0; c < b.loop.size; ++c) {
+      Eigen::Index i = 0;
+      const auto addRows = [&](auto rows) {
+        using Rows = Eigen::Array<double, rows, 1>;
+        for (; i + rows <= A.rows(); i += rows) {
+          Rows sum = Rows::Zero();
+          for (size_t k = 0; k < b.loop.dofs.size(); ++k)
+            sum += X(k, c) * Eigen::Map<const Rows>(&A.coeffRef(i, b.loop.dofs[k]));
+          out.row(b.loop.offset + c).segment<rows>(i) += sum.matrix().transpose();
+        }
+      };
+      addRows(std::integral_constant<int, 8>());
+      addRows(std::integral_constant<int, 4>());
+      addRows(std::integral_constant<int, 2>());
+      addRows(std::integral_constant<int, 1>());
+    }
   }
 }
 

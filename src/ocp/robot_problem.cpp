@@ -324,19 +324,16 @@ void RobotProblem::differentiateResiduals(int index, double scale, StageModel& o
   }
   const NodeView view{model_, node.dynamics->workspace(), spec.constraints, node.u, node.dynamics->lambda()};
   ResidualStack& stack = node.stack;
-  ResidualJacobians& jacobians = node.dynamics->jacobians();
-  jacobians.q.topRows(stack.motion_rows).setZero();
-  jacobians.v.topRows(stack.motion_rows).setZero();
-  jacobians.lambda.topLeftCorner(stack.r.size(), spec.constraints.rows).setZero();
+  ResidualJacobians& jacobians = node.dynamics->startResiduals(stack);
   for (size_t c = 0; c < spec.costs.size(); ++c) {
     const Cost& cost = spec.costs[c];
     const int n = cost.residual->size(), row = node.rows[c];
-    ResidualRows rows = jacobians.getRows(row, n, spec.constraints.rows);
-    cost.residual->calcJacobian(view, rows);
-    cost.activation.calcDerivatives(stack.r.segment(row, n), stack.gradient.segment(row, n),
-                                    stack.hessian.segment(row, n));
-    stack.gradient.segment(row, n) *= scale * cost.weight;
-    stack.hessian.segment(row, n) *= scale * cost.weight;
+    auto gradient = stack.gradient.segment(row, n), hessian = stack.hessian.segment(row, n);
+    cost.activation.calcDerivatives(stack.r.segment(row, n), gradient, hessian);
+    gradient *= scale * cost.weight;
+    hessian *= scale * cost.weight;
+    if (gradient.isZero(0) && hessian.isZero(0)) continue;  // bounds that are kept, for one
+    cost.residual->calcJacobian(view, jacobians.getRows(row, n, spec.constraints.rows));
   }
   node.dynamics->setResiduals(stack, index < numStages(), out);
 }
