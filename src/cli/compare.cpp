@@ -1,15 +1,11 @@
 // bielle compare: robots that do the same, side by side.
 #include <algorithm>
-#include <filesystem>
-#include <iostream>
-#include <map>
 #include <thread>
 
 #include "bielle/io/result.h"
+#include "cli/case_run.h"
 #include "cli/commands.h"
 #include "study/architecture_report.h"
-
-namespace fs = std::filesystem;
 
 namespace bielle::cli {
 namespace {
@@ -21,21 +17,17 @@ struct CompareArguments {
   int jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 };
 
-// Those of all robots; a motion that is also one of the speeds is done once.
-std::vector<Case> collectCases(const ArchitectureSpec& spec, const std::vector<Contender>& contenders) {
+// A motion that is also one of the speeds makes the same case.
+std::vector<Case> makeCases(const ArchitectureSpec& spec, const std::vector<Contender>& contenders) {
   std::vector<Case> cases;
   for (const Contender& contender : contenders)
     for (const auto* motions : {&spec.motions, &spec.speeds})
-      for (const ArchitectureMotion& motion : *motions) {
-        const Case one = makeArchitectureCase(contender, motion);
-        if (std::none_of(cases.begin(), cases.end(), [&](const Case& other) { return other.name == one.name; }))
-          cases.push_back(one);
-      }
+      for (const ArchitectureMotion& motion : *motions) cases.push_back(makeArchitectureCase(contender, motion));
   return cases;
 }
 
 ArchitectureResults readResults(const ArchitectureSpec& spec, const std::vector<Contender>& contenders,
-                                const std::string& directory, const std::map<std::string, CaseOutcome>& outcomes) {
+                                const std::string& directory, const CaseOutcomes& outcomes) {
   ArchitectureResults results;
   for (const Contender& contender : contenders) {
     const auto readAll = [&](const std::vector<ArchitectureMotion>& motions) {
@@ -56,33 +48,14 @@ int run(const CompareArguments& arguments) {
   const ArchitectureSpec spec = readArchitectureSpec(arguments.spec);
   makeOutputDirectory(arguments.directory);
   const std::vector<Contender> contenders = makeContenders(spec, arguments.directory + "/robots");
-  const std::vector<Case> cases = collectCases(spec, contenders);
-  RunOptions options;
-  options.program = fs::read_symlink("/proc/self/exe");
-  std::vector<std::string> directories;
-  for (const Contender& contender : contenders) directories.push_back(contender.directory);
-  options.identity = makeIdentity(options.program, directories);
-  options.jobs = arguments.jobs;
-  options.progress = [](const std::string& line) { std::cout << line << std::endl; };
-  const std::string directory = arguments.directory + "/cases";
-  const RunOutcome outcome = runCases(directory, cases, options);
-  if (outcome.interrupted) {
-    std::cerr << "bielle: error: interrupted; the same command goes on from here" << std::endl;
-    return kFailed;
-  }
-  std::map<std::string, CaseOutcome> outcomes;
-  bool complete = true;
-  for (size_t i = 0; i < cases.size(); ++i) {
-    outcomes[cases[i].name] = outcome.cases[i];
-    complete &= outcome.cases[i].complete;
-  }
-  std::vector<std::string> notes;
-  for (const std::string& path : writeArchitectures(arguments.directory, spec, contenders,
-                                                    readResults(spec, contenders, directory, outcomes), notes))
-    std::cout << "  " << path << "\n";
-  for (const std::string& note : notes) std::cerr << "bielle: warning: " << note << "\n";
-  if (!complete) std::cerr << "bielle: error: some cases broke down; the same command tries them anew" << std::endl;
-  return complete ? kOk : kFailed;
+  CaseRun cases{arguments.directory + "/cases", makeCases(spec, contenders), {}, arguments.jobs};
+  for (const Contender& contender : contenders) cases.robots.push_back(contender.directory);
+  return runAndWrite(cases, [&](const CaseOutcomes& outcomes) {
+    std::vector<std::string> notes;
+    const ArchitectureResults results = readResults(spec, contenders, cases.directory, outcomes);
+    const std::vector<std::string> paths = writeArchitectures(arguments.directory, spec, contenders, results, notes);
+    printPaths(paths, notes);
+  });
 }
 
 }  // namespace

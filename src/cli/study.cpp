@@ -1,17 +1,14 @@
 // bielle study: the paper's comparison, case by case.
 #include <algorithm>
-#include <filesystem>
 #include <iostream>
-#include <map>
 #include <sstream>
 #include <thread>
 
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
+#include "cli/case_run.h"
 #include "cli/commands.h"
 #include "study/report.h"
-
-namespace fs = std::filesystem;
 
 namespace bielle::cli {
 namespace {
@@ -36,18 +33,8 @@ std::vector<Study> chooseStudies(const StudyArguments& arguments) {
   return chosen;
 }
 
-// The cases of all studies; those that studies share, once.
-std::vector<Case> collectCases(const std::vector<Study>& studies, const std::string& robot) {
-  std::vector<Case> cases;
-  for (const Study& study : studies)
-    for (const Case& one : makeCases(study, robot))
-      if (std::none_of(cases.begin(), cases.end(), [&](const Case& other) { return other.name == one.name; }))
-        cases.push_back(one);
-  return cases;
-}
-
 StudyResult readStudy(const Study& study, const ComparedRobot& robot, const std::string& directory,
-                      const std::map<std::string, CaseOutcome>& outcomes) {
+                      const CaseOutcomes& outcomes) {
   StudyResult result{study, {}, {}};
   for (const double value : study.values)
     result.comparisons.push_back(readComparison(study, value, robot, directory,
@@ -72,36 +59,18 @@ int run(const StudyArguments& arguments) {
   const std::vector<Study> studies = chooseStudies(arguments);
   const ComparedRobot robot = loadComparedRobot(arguments.robot);
   makeOutputDirectory(arguments.directory);
-  const std::string directory = arguments.directory + "/cases";
-  const std::vector<Case> cases = collectCases(studies, arguments.robot);
-
-  RunOptions options;
-  options.program = fs::read_symlink("/proc/self/exe");
-  options.identity = makeIdentity(options.program, {robot.robot.directory});
-  options.jobs = arguments.jobs;
-  options.progress = [](const std::string& line) { std::cout << line << std::endl; };
-  const RunOutcome outcome = runCases(directory, cases, options);
-  if (outcome.interrupted) {
-    std::cerr << "bielle: error: interrupted; the same command goes on from here" << std::endl;
-    return kFailed;
-  }
-
-  std::map<std::string, CaseOutcome> outcomes;
-  bool complete = true;
-  for (size_t i = 0; i < cases.size(); ++i) {
-    outcomes[cases[i].name] = outcome.cases[i];
-    complete &= outcome.cases[i].complete;
-  }
-  std::vector<StudyPage> pages;
-  for (const Study& study : studies) {
-    pages.push_back(writeStudy(arguments.directory, readStudy(study, robot, directory, outcomes), robot));
-    for (const std::string& file : pages.back().files) std::cout << "  " << file << "\n";
-    for (const std::string& note : pages.back().notes) std::cerr << "bielle: warning: " << note << "\n";
-  }
-  if (arguments.name == "all")
-    std::cout << "  " << writeReport(arguments.directory, arguments.robot, describeCommand(arguments), pages) << "\n";
-  if (!complete) std::cerr << "bielle: error: some cases broke down; the same command tries them anew" << std::endl;
-  return complete ? kOk : kFailed;
+  CaseRun cases{arguments.directory + "/cases", {}, {robot.robot.directory}, arguments.jobs};
+  for (const Study& study : studies)
+    for (const Case& one : makeCases(study, arguments.robot)) cases.cases.push_back(one);
+  return runAndWrite(cases, [&](const CaseOutcomes& outcomes) {
+    std::vector<StudyPage> pages;
+    for (const Study& study : studies) {
+      pages.push_back(writeStudy(arguments.directory, readStudy(study, robot, cases.directory, outcomes), robot));
+      printPaths(pages.back().files, pages.back().notes);
+    }
+    if (arguments.name == "all")
+      std::cout << "  " << writeReport(arguments.directory, arguments.robot, describeCommand(arguments), pages) << "\n";
+  });
 }
 
 }  // namespace

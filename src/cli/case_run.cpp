@@ -1,0 +1,44 @@
+#include "cli/case_run.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+
+#include "cli/commands.h"
+
+namespace bielle::cli {
+
+using namespace bielle::study;
+
+int runAndWrite(const CaseRun& run, const std::function<void(const CaseOutcomes&)>& write) {
+  std::vector<Case> cases;
+  for (const Case& one : run.cases)
+    if (std::none_of(cases.begin(), cases.end(), [&](const Case& other) { return other.name == one.name; }))
+      cases.push_back(one);
+  RunOptions options;
+  options.program = std::filesystem::read_symlink("/proc/self/exe");
+  options.identity = makeIdentity(options.program, run.robots);
+  options.jobs = run.jobs;
+  options.progress = [](const std::string& line) { std::cout << line << std::endl; };
+  const RunOutcome outcome = runCases(run.directory, cases, options);
+  if (outcome.interrupted) {
+    std::cerr << "bielle: error: interrupted; the same command goes on from here" << std::endl;
+    return kFailed;
+  }
+  CaseOutcomes outcomes;
+  bool complete = true;
+  for (size_t i = 0; i < cases.size(); ++i) {
+    outcomes[cases[i].name] = outcome.cases[i];
+    complete &= outcome.cases[i].complete;
+  }
+  write(outcomes);
+  if (!complete) std::cerr << "bielle: error: some cases broke down; the same command tries them anew" << std::endl;
+  return complete ? kOk : kFailed;
+}
+
+void printPaths(const std::vector<std::string>& paths, const std::vector<std::string>& notes) {
+  for (const std::string& path : paths) std::cout << "  " << path << "\n";
+  for (const std::string& note : notes) std::cerr << "bielle: warning: " << note << "\n";
+}
+
+}  // namespace bielle::cli
