@@ -22,7 +22,7 @@ std::vector<Case> makeCases(const ArchitectureSpec& spec, const std::vector<Cont
   std::vector<Case> cases;
   for (const Contender& contender : contenders)
     for (const auto* motions : {&spec.motions, &spec.speeds})
-      for (const ArchitectureMotion& motion : *motions) cases.push_back(makeArchitectureCase(contender, motion));
+      for (const MotionSpec& motion : *motions) cases.push_back(makeArchitectureCase(contender, motion));
   return cases;
 }
 
@@ -30,9 +30,9 @@ ArchitectureResults readResults(const ArchitectureSpec& spec, const std::vector<
                                 const std::string& directory, const CaseOutcomes& outcomes) {
   ArchitectureResults results;
   for (const Contender& contender : contenders) {
-    const auto readAll = [&](const std::vector<ArchitectureMotion>& motions) {
+    const auto readAll = [&](const std::vector<MotionSpec>& motions) {
       std::vector<Feat> feats;
-      for (const ArchitectureMotion& motion : motions) {
+      for (const MotionSpec& motion : motions) {
         const std::string name = makeArchitectureCase(contender, motion).name;
         feats.push_back(readFeat(spec, contender, directory + "/" + name + "/" + kMotion, outcomes.at(name)));
       }

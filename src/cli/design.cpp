@@ -16,7 +16,7 @@ struct DesignArguments {
 };
 
 // Every call makes a request of its own: plans are made by several threads.
-DesignMotion makeDesignMotion(const std::string& file, const DesignSpec::MotionSpec& motion) {
+DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion) {
   const auto make = [file, motion] {
     const MotionRequest request = findMotion(file, motion.motion).makeRequest();
     for (const auto& [name, value] : motion.settings) setOption(request.options, name, value);
@@ -30,7 +30,7 @@ int run(const DesignArguments& arguments) {
   const DesignSpec spec = readDesignSpec(arguments.spec);
   const Parametrization robot = makeParametrization(spec);
   std::vector<DesignMotion> motions;
-  for (const DesignSpec::MotionSpec& motion : spec.motions) motions.push_back(makeDesignMotion(spec.path, motion));
+  for (const MotionSpec& motion : spec.motions) motions.push_back(makeDesignMotion(spec.path, motion));
   EvaluationOptions options;
   options.mode = spec.mode;
   options.drives = spec.drives;

@@ -1,13 +1,7 @@
 #include "bielle/design/spec.h"
 
-#include <filesystem>
-
-#include "bielle/model/error.h"
-#include "bielle/model/reader.h"
+#include "design/spec_parts.h"
 #include "model/robot_files.h"
-#include "model/yaml_entry.h"
-
-namespace fs = std::filesystem;
 
 namespace bielle {
 namespace {
@@ -24,12 +18,6 @@ Enum readChoice(const Entry& entry, const std::vector<Enum>& choices) {
     names += std::string(names.empty() ? "" : ", ") + getName(choice);
   }
   entry.fail("'" + entry.getText() + "' is unknown", "use one of " + names);
-}
-
-DesignSpec::Settings readSettings(const Entry& entry) {
-  DesignSpec::Settings settings;
-  for (const auto& [name, value] : entry.getMap()) settings.emplace_back(name, value.getNumber());
-  return settings;
 }
 
 Vector3d readDirection(const Entry& entry) {
@@ -184,23 +172,9 @@ void readSearch(const Entry& entry, DesignSpec& spec) {
 void readRoot(const Entry& root, DesignSpec& spec) {
   const Fields fields = root.getFields(
       {"robot", "generator", "set", "variables", "motions", "mode", "margin", "objective", "drives", "search"});
-  if (const Entry* robot = find(fields, "robot")) spec.robot = robot->getText();
-  if (const Entry* generator = find(fields, "generator")) spec.generator = generator->getText();
-  if (spec.robot.empty() == spec.generator.empty())
-    root.fail("it names neither a robot nor a generator, or both", "give one of `robot` and `generator`");
-  if (const Entry* set = find(fields, "set")) {
-    if (spec.generator.empty()) set->fail("a given robot has no parameters", "remove it, or give a generator");
-    spec.settings = readSettings(*set);
-  }
+  spec.robot = readRobotSpec(fields, root);
   for (const Entry& item : require(fields, "variables", root).getList()) spec.variables.push_back(readVariable(item));
-  if (const Entry* motions = find(fields, "motions"))
-    for (const Entry& item : motions->getList()) {
-      const Fields motion_fields = item.getFields({"motion", "set"});
-      DesignSpec::MotionSpec motion;
-      motion.motion = require(motion_fields, "motion", item).getText();
-      if (const Entry* set = find(motion_fields, "set")) motion.settings = readSettings(*set);
-      spec.motions.push_back(motion);
-    }
+  if (const Entry* motions = find(fields, "motions")) spec.motions = readMotionSpecs(*motions);
   if (const Entry* drives = find(fields, "drives")) spec.drives = readDrives(*drives);
   if (const Entry* mode = find(fields, "mode"))
     spec.mode = readChoice<MotionMode>(*mode, {MotionMode::Reoptimized, MotionMode::Kept});
@@ -219,22 +193,14 @@ DesignSpec readDesignSpec(const std::string& path) {
   DesignSpec spec;
   spec.path = path;
   spec.text = readText(path);
-  try {
-    readRoot(Entry(path, "", YAML::Load(spec.text)), spec);
-  } catch (const YAML::Exception& error) {
-    throw ModelError(path, "line " + std::to_string(error.mark.line + 1), "it is not YAML: " + error.msg,
-                     "correct the syntax");
-  }
+  readDocument(path, spec.text, [&](const Entry& root) { readRoot(root, spec); });
   return spec;
 }
 
 Parametrization makeParametrization(const DesignSpec& spec) {
-  if (!spec.generator.empty()) return Parametrization(spec.generator, spec.settings, spec.variables, spec.path);
-  // A path is meant from where the file is; a name stays one.
-  const fs::path beside = fs::path(spec.path).parent_path() / spec.robot;
-  std::error_code error;
-  const bool is_path = spec.robot.find('/') != std::string::npos && fs::exists(beside, error);
-  return Parametrization(loadRobot(is_path ? beside.string() : spec.robot).model, spec.variables, spec.path);
+  const RobotSpec& robot = spec.robot;
+  if (!robot.generator.empty()) return Parametrization(robot.generator, robot.settings, spec.variables, spec.path);
+  return Parametrization(makeRobot(robot, spec.path), spec.variables, spec.path);
 }
 
 }  // namespace bielle

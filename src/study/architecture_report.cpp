@@ -85,7 +85,7 @@ void printRobots(std::ostream& page, const std::vector<Contender>& contenders) {
 
 void printMotion(std::ostream& page, const ArchitectureSpec& spec, size_t motion,
                  const std::vector<Contender>& contenders, const ArchitectureResults& results) {
-  printHead(page, spec.motions[motion].name(), contenders);
+  printHead(page, makeName(spec.motions[motion]), contenders);
   page << "| outcome |";
   for (const std::vector<Feat>& feats : results.motions)
     page << " " << feats[motion].outcome
@@ -153,7 +153,7 @@ std::string formatCsv(const ArchitectureSpec& spec, const std::vector<Contender>
          {std::pair{&spec.motions, &results.motions[r]}, {&spec.speeds, &results.speeds[r]}})
       for (size_t i = 0; i < motions->size(); ++i) {
         const Feat& feat = (*feats)[i];
-        csv << quoteCsv(contenders[r].name) << "," << (*motions)[i].name() << "," << quoteCsv(feat.outcome) << ","
+        csv << quoteCsv(contenders[r].name) << "," << makeName((*motions)[i]) << "," << quoteCsv(feat.outcome) << ","
             << feat.iterations;
         for (const Row& row : rows) {
           csv << ",";
@@ -233,7 +233,8 @@ std::vector<std::string> writeArchitectures(const std::string& directory, const 
   for (size_t i = 0; i < spec.motions.size(); ++i) {
     page << "## " << spec.motions[i].motion << "\n\n";
     printMotion(page, spec, i, contenders, results);
-    draw(spec.motions[i].name() + ".svg", spec.motions[i].name(), makeMotionPlots(contenders, results, i));
+    const std::string name = makeName(spec.motions[i]);
+    draw(name + ".svg", name, makeMotionPlots(contenders, results, i));
   }
   printSpeeds(page, spec, contenders, results);
   if (!spec.speeds.empty()) draw("speeds.svg", "over speed", makeSpeedPlots(spec, contenders, results));

@@ -2,16 +2,12 @@
 
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 
 #include "bielle/design/draft.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
-#include "bielle/robots/generators.h"
-#include "model/yaml_entry.h"
-
-namespace fs = std::filesystem;
+#include "design/spec_parts.h"
 
 namespace bielle::study {
 namespace {
@@ -25,45 +21,16 @@ std::string formatValue(double value) {
   return text;
 }
 
-Settings readSettings(const Entry& entry) {
-  Settings settings;
-  for (const auto& [name, value] : entry.getMap()) settings.emplace_back(name, value.getNumber());
-  return settings;
-}
-
 std::vector<Architecture> readRobots(const Entry& entry) {
   std::vector<Architecture> robots;
   for (const auto& [name, item] : entry.getMap()) {
     const Fields fields = item.getFields({"robot", "generator", "set"});
-    Architecture one;
-    one.name = name;
     if (name.empty() || name[0] == '.' || name.find('/') != std::string::npos)
       item.fail("'" + name + "' cannot be the name of a directory", "use a plain word");
-    if (const Entry* robot = find(fields, "robot")) one.robot = robot->getText();
-    if (const Entry* generator = find(fields, "generator")) one.generator = generator->getText();
-    if (one.robot.empty() == one.generator.empty())
-      item.fail("it names neither a robot nor a generator, or both", "give one of `robot` and `generator`");
-    if (const Entry* set = find(fields, "set")) {
-      if (one.generator.empty()) set->fail("a given robot has no parameters", "remove it, or give a generator");
-      one.settings = readSettings(*set);
-    }
-    robots.push_back(one);
+    robots.push_back({name, readRobotSpec(fields, item)});
   }
   if (robots.empty()) entry.fail("there are none", "name at least one");
   return robots;
-}
-
-std::vector<ArchitectureMotion> readMotions(const Entry& entry) {
-  std::vector<ArchitectureMotion> motions;
-  for (const Entry& item : entry.getList()) {
-    const Fields fields = item.getFields({"motion", "set"});
-    ArchitectureMotion motion;
-    motion.motion = require(fields, "motion", item).getText();
-    if (const Entry* set = find(fields, "set")) motion.settings = readSettings(*set);
-    motions.push_back(motion);
-  }
-  if (motions.empty()) entry.fail("there are none", "name at least one");
-  return motions;
 }
 
 void readSpeeds(const Entry& entry, ArchitectureSpec& spec) {
@@ -76,7 +43,7 @@ void readSpeeds(const Entry& entry, ArchitectureSpec& spec) {
   for (int i = 0; from + i * step <= to + 1e-9 * step; ++i) {
     // The number that is written, not the sum of steps.
     const double value = std::round((from + i * step) * 1e9) / 1e9;
-    ArchitectureMotion one{motion ? motion->getText() : "walk", {{option ? option->getText() : "speed", value}}};
+    MotionSpec one{motion ? motion->getText() : "walk", {{option ? option->getText() : "speed", value}}};
     if (set)
       for (const auto& setting : readSettings(*set)) one.settings.push_back(setting);
     spec.speeds.push_back(one);
@@ -91,7 +58,9 @@ void readRoot(const Entry& root, ArchitectureSpec& spec) {
     spec.mass = mass->getNumber();
     if (!(spec.mass > 0)) mass->fail("it is not positive", "give kilograms");
   }
-  spec.motions = readMotions(require(fields, "motions", root));
+  const Entry& motions = require(fields, "motions", root);
+  spec.motions = readMotionSpecs(motions);
+  if (spec.motions.empty()) motions.fail("there are none", "name at least one");
   if (const Entry* speeds = find(fields, "speeds")) readSpeeds(*speeds, spec);
   if (const Entry* groups = find(fields, "groups"))
     for (const auto& [name, words] : groups->getMap()) spec.groups.push_back({name, words.getTexts()});
@@ -110,19 +79,6 @@ void readRoot(const Entry& root, ArchitectureSpec& spec) {
   }
 }
 
-Model makeModel(const ArchitectureSpec& spec, const Architecture& architecture) {
-  if (architecture.generator.empty()) {
-    // A path is meant from where the file is; a name stays one.
-    const fs::path beside = fs::path(spec.path).parent_path() / architecture.robot;
-    std::error_code error;
-    const bool is_path = architecture.robot.find('/') != std::string::npos && fs::exists(beside, error);
-    return loadRobot(is_path ? beside.string() : architecture.robot).model;
-  }
-  const GeneratorRequest request = findGenerator(architecture.generator).makeRequest();
-  for (const auto& [name, value] : architecture.settings) setParameter(request.parameters, name, value);
-  return request.make();
-}
-
 // The factor of the trunk's mass that makes the whole weigh so much.
 double calcTrunkFactor(const ArchitectureSpec& spec, const std::string& name, const Model& model) {
   if (spec.mass == 0) return 1;
@@ -139,9 +95,9 @@ double calcTrunkFactor(const ArchitectureSpec& spec, const std::string& name, co
 
 }  // namespace
 
-std::string ArchitectureMotion::name() const {
-  std::string text = motion;
-  for (const auto& [option, value] : settings) text += "-" + option + "-" + formatValue(value);
+std::string makeName(const MotionSpec& motion) {
+  std::string text = motion.motion;
+  for (const auto& [option, value] : motion.settings) text += "-" + option + "-" + formatValue(value);
   return text;
 }
 
@@ -149,19 +105,14 @@ ArchitectureSpec readArchitectureSpec(const std::string& path) {
   ArchitectureSpec spec;
   spec.path = path;
   spec.text = readTextFile(path, "give the path of a comparison");
-  try {
-    readRoot(Entry(path, "", YAML::Load(spec.text)), spec);
-  } catch (const YAML::Exception& error) {
-    throw ModelError(path, "line " + std::to_string(error.mark.line + 1), "it is not YAML: " + error.msg,
-                     "correct the syntax");
-  }
+  readDocument(path, spec.text, [&](const Entry& root) { readRoot(root, spec); });
   return spec;
 }
 
 std::vector<Contender> makeContenders(const ArchitectureSpec& spec, const std::string& directory) {
   std::vector<Contender> contenders;
   for (const Architecture& architecture : spec.robots) {
-    const Model model = makeModel(spec, architecture);
+    const Model model = makeRobot(architecture.robot, spec.path);
     Contender contender;
     contender.name = architecture.name;
     contender.directory = directory + "/" + architecture.name;
@@ -175,7 +126,7 @@ std::vector<Contender> makeContenders(const ArchitectureSpec& spec, const std::s
   return contenders;
 }
 
-Case makeArchitectureCase(const Contender& contender, const ArchitectureMotion& motion) {
+Case makeArchitectureCase(const Contender& contender, const MotionSpec& motion) {
   std::vector<std::string> solve = {"solve",     motion.motion, "--robot", contender.directory,
                                     "--threads", "1",           "--quiet", "--no-report"};
   for (const auto& [option, value] : motion.settings) {
@@ -183,7 +134,7 @@ Case makeArchitectureCase(const Contender& contender, const ArchitectureMotion& 
     solve.push_back(option + "=" + formatValue(value));
   }
   solve.insert(solve.end(), {"-o", std::string("@") + kMotion});
-  return {contender.name + "-" + motion.name(), {solve}};
+  return {contender.name + "-" + makeName(motion), {solve}};
 }
 
 }  // namespace bielle::study

@@ -12,28 +12,21 @@
 //   groups: {hips: [hip], "knees and ankles": [knee, ankle]}     # motors by parts of their names, the first that fits
 //   drives: {motor_constant: 2, regeneration: 0}                 # of all motors (design/measures.h)
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "bielle/design/measures.h"
+#include "bielle/design/spec.h"
 #include "bielle/model/reader.h"
 #include "study/cases.h"
 
 namespace bielle::study {
 
-using Settings = std::vector<std::pair<std::string, double>>;
-
 struct Architecture {
   std::string name;
-  std::string robot, generator;  // one of them
-  Settings settings;             // of the generator
+  RobotSpec robot;
 };
 
-struct ArchitectureMotion {
-  std::string motion;
-  Settings settings;
-  std::string name() const;  // with its settings: "walk-speed-0.5"
-};
+// With its settings: "walk-speed-0.5".
+std::string makeName(const MotionSpec& motion);
 
 struct MotorGroup {
   std::string name;
@@ -44,8 +37,8 @@ struct ArchitectureSpec {
   std::string path, text;
   std::vector<Architecture> robots;
   double mass = 0;  // kg; 0: as they are
-  std::vector<ArchitectureMotion> motions;
-  std::vector<ArchitectureMotion> speeds;  // slowest first; may be empty
+  std::vector<MotionSpec> motions;
+  std::vector<MotionSpec> speeds;  // slowest first; may be empty
   std::vector<double> speed_values;
   std::vector<MotorGroup> groups;  // the last one has no words: all motors
   MotorDrive drive;
@@ -67,6 +60,6 @@ std::vector<Contender> makeContenders(const ArchitectureSpec& spec, const std::s
 
 // Its result is in kMotion.
 constexpr const char* kMotion = "motion";
-Case makeArchitectureCase(const Contender& contender, const ArchitectureMotion& motion);
+Case makeArchitectureCase(const Contender& contender, const MotionSpec& motion);
 
 }  // namespace bielle::study

@@ -42,15 +42,22 @@
 
 namespace bielle {
 
+/// Numbers by name.
+using Settings = std::vector<std::pair<std::string, double>>;
+
+struct RobotSpec {
+  std::string name, generator;  ///< one of them; a name may be a path
+  Settings settings;            ///< of the generator
+};
+
+struct MotionSpec {
+  std::string motion;
+  Settings settings;
+};
+
 struct DesignSpec {
-  using Settings = std::vector<std::pair<std::string, double>>;
-  struct MotionSpec {
-    std::string motion;
-    Settings settings;
-  };
-  std::string path, text;        ///< the file and what is in it
-  std::string robot, generator;  ///< one of them
-  Settings settings;             ///< of the generator
+  std::string path, text;  ///< the file and what is in it
+  RobotSpec robot;
   std::vector<DesignVariable> variables;
   std::vector<MotionSpec> motions;
   MotionMode mode = MotionMode::Reoptimized;

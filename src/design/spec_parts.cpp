@@ -1,0 +1,66 @@
+#include "design/spec_parts.h"
+
+#include <filesystem>
+
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/robots/generators.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle {
+
+void readDocument(const std::string& path, const std::string& text, const std::function<void(const YamlEntry&)>& read) {
+  try {
+    read(YamlEntry(path, "", YAML::Load(text)));
+  } catch (const YAML::Exception& error) {
+    throw ModelError(path, "line " + std::to_string(error.mark.line + 1), "it is not YAML: " + error.msg,
+                     "correct the syntax");
+  }
+}
+
+Settings readSettings(const YamlEntry& entry) {
+  Settings settings;
+  for (const auto& [name, value] : entry.getMap()) settings.emplace_back(name, value.getNumber());
+  return settings;
+}
+
+RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map) {
+  RobotSpec spec;
+  if (const YamlEntry* robot = find(fields, "robot")) spec.name = robot->getText();
+  if (const YamlEntry* generator = find(fields, "generator")) spec.generator = generator->getText();
+  if (spec.name.empty() == spec.generator.empty())
+    map.fail("it names neither a robot nor a generator, or both", "give one of `robot` and `generator`");
+  if (const YamlEntry* set = find(fields, "set")) {
+    if (spec.generator.empty()) set->fail("a given robot has no parameters", "remove it, or give a generator");
+    spec.settings = readSettings(*set);
+  }
+  return spec;
+}
+
+std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry) {
+  std::vector<MotionSpec> motions;
+  for (const YamlEntry& item : entry.getList()) {
+    const YamlFields fields = item.getFields({"motion", "set"});
+    MotionSpec motion;
+    motion.motion = require(fields, "motion", item).getText();
+    if (const YamlEntry* set = find(fields, "set")) motion.settings = readSettings(*set);
+    motions.push_back(motion);
+  }
+  return motions;
+}
+
+Model makeRobot(const RobotSpec& spec, const std::string& file) {
+  if (spec.generator.empty()) {
+    // A path is meant from where the file is; a name stays one.
+    const fs::path beside = fs::path(file).parent_path() / spec.name;
+    std::error_code error;
+    const bool is_path = spec.name.find('/') != std::string::npos && fs::exists(beside, error);
+    return loadRobot(is_path ? beside.string() : spec.name).model;
+  }
+  const GeneratorRequest request = findGenerator(spec.generator).makeRequest();
+  for (const auto& [name, value] : spec.settings) setParameter(request.parameters, name, value);
+  return request.make();
+}
+
+}  // namespace bielle

@@ -1,0 +1,28 @@
+#pragma once
+// What files that name robots and motions have in common.
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bielle/design/spec.h"
+#include "bielle/model/model.h"
+#include "model/yaml_entry.h"
+
+namespace bielle {
+
+// Lets `read` see the document. \throws ModelError where `text`, of the file `path`, is not YAML
+void readDocument(const std::string& path, const std::string& text, const std::function<void(const YamlEntry&)>& read);
+
+Settings readSettings(const YamlEntry& entry);
+
+// The keys `robot` or `generator` and `set` of a map.
+RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map);
+
+// A list of {motion: NAME, set: {...}}.
+std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry);
+
+// \param file  where the robot is named: paths start there
+// \throws ModelError when there is no such robot, generator or parameter
+Model makeRobot(const RobotSpec& spec, const std::string& file);
+
+}  // namespace bielle
