@@ -8,6 +8,7 @@
 
 #include "bielle/io/text_file.h"
 #include "io/plot.h"
+#include "study/report.h"
 
 namespace bielle::study {
 namespace {
@@ -15,15 +16,6 @@ namespace {
 const char* const kColors[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#e377c2", "#17becf"};
 
 const char* getColor(size_t robot) { return kColors[robot % std::size(kColors)]; }
-
-std::string format(double value, int digits) {
-  if (!std::isfinite(value)) return "–";
-  std::ostringstream text;
-  text.setf(std::ios::fixed);
-  text.precision(digits);
-  text << value;
-  return text.str();
-}
 
 struct Row {
   std::string name, key;  // for the page; for the columns of the table
@@ -74,8 +66,8 @@ void printRobots(std::ostream& page, const std::vector<Contender>& contenders) {
     for (const Contender& contender : contenders) page << " " << get(contender) << " |";
     page << "\n";
   };
-  print("mass [kg]", [](const Contender& one) { return format(one.robot.model.mass(), 3); });
-  print("trunk times", [](const Contender& one) { return format(one.trunk_factor, 4); });
+  print("mass [kg]", [](const Contender& one) { return formatCell(one.robot.model.mass(), 3); });
+  print("trunk times", [](const Contender& one) { return formatCell(one.trunk_factor, 4); });
   print("motors", [](const Contender& one) { return std::to_string(one.robot.model.nu()); });
   print("joint velocities, closure rows", [](const Contender& one) {
     return std::to_string(one.robot.model.nv()) + ", " + std::to_string(one.robot.model.numClosureRows());
@@ -94,7 +86,7 @@ void printMotion(std::ostream& page, const ArchitectureSpec& spec, size_t motion
   for (const Row& row : listRows(spec)) {
     page << "| " << row.name << " |";
     for (const std::vector<Feat>& feats : results.motions)
-      page << " " << (feats[motion].exists ? format(row.get(feats[motion]), row.digits) : "–") << " |";
+      page << " " << (feats[motion].exists ? formatCell(row.get(feats[motion]), row.digits) : "–") << " |";
     page << "\n";
   }
   page << "\n";
@@ -105,9 +97,9 @@ std::string describeLargest(const ArchitectureSpec& spec, const std::vector<Feat
   size_t largest = feats.size();
   while (largest > 0 && !feats[largest - 1].done) --largest;
   if (largest == 0) return "none";
-  std::string text = "**" + format(spec.speed_values[largest - 1], 2) + "**", missing;
+  std::string text = "**" + formatCell(spec.speed_values[largest - 1], 2) + "**", missing;
   for (size_t i = 0; i + 1 < largest; ++i)
-    if (!feats[i].done) missing += (missing.empty() ? "" : ", ") + format(spec.speed_values[i], 2);
+    if (!feats[i].done) missing += (missing.empty() ? "" : ", ") + formatCell(spec.speed_values[i], 2);
   return missing.empty() ? text : text + " (not " + missing + ")";
 }
 
@@ -118,12 +110,12 @@ void printSpeeds(std::ostream& page, const ArchitectureSpec& spec, const std::ve
       << "## Speed\n\nPeak torque of all motors [N m], electrical cost of transport, iterations; or what is wrong.\n\n";
   printHead(page, spec.speeds[0].motion + ": " + spec.speeds[0].settings[0].first, contenders);
   for (size_t i = 0; i < spec.speeds.size(); ++i) {
-    page << "| " << format(spec.speed_values[i], 2) << " |";
+    page << "| " << formatCell(spec.speed_values[i], 2) << " |";
     for (const std::vector<Feat>& feats : results.speeds) {
       const Feat& feat = feats[i];
       page << " "
-           << (feat.done ? format(feat.groups.back().peak, 1) + ", " + format(feat.cost_of_transport, 2) + ", " +
-                               std::to_string(feat.iterations)
+           << (feat.done ? formatCell(feat.groups.back().peak, 1) + ", " + formatCell(feat.cost_of_transport, 2) +
+                               ", " + std::to_string(feat.iterations)
                          : feat.outcome)
            << " |";
     }
@@ -132,12 +124,6 @@ void printSpeeds(std::ostream& page, const ArchitectureSpec& spec, const std::ve
   page << "| **largest that passes** |";
   for (const std::vector<Feat>& feats : results.speeds) page << " " << describeLargest(spec, feats) << " |";
   page << "\n\n";
-}
-
-std::string quoteCsv(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + "\"";
 }
 
 std::string formatCsv(const ArchitectureSpec& spec, const std::vector<Contender>& contenders,
@@ -217,8 +203,8 @@ std::vector<std::string> writeArchitectures(const std::string& directory, const 
   std::vector<std::string> paths;
   std::ostringstream page;
   page << "# Robots compared\n\nMade by `bielle compare` from " << std::filesystem::path(spec.path).filename().string()
-       << ". " << kExplanation << format(spec.drive.motor_constant, 2) << " N m/sqrt(W), "
-       << format(100 * spec.drive.regeneration, 0)
+       << ". " << kExplanation << formatCell(spec.drive.motor_constant, 2) << " N m/sqrt(W), "
+       << formatCell(100 * spec.drive.regeneration, 0)
        << " % of what braking leaves given back; cost of transport: over weight and distance.\n\n";
   printRobots(page, contenders);
   const auto draw = [&](const std::string& name, const std::string& caption, const std::vector<Plot>& plots) {

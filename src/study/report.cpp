@@ -5,7 +5,7 @@
 #include <functional>
 #include <sstream>
 
-#include "io/aside_file.h"
+#include "bielle/io/text_file.h"
 #include "study/figures.h"
 
 namespace bielle::study {
@@ -18,37 +18,16 @@ std::string formatExact(double value) {
   return {text, std::to_chars(text, text + sizeof text, value).ptr};
 }
 
-std::string formatCell(double value, int digits) {
-  if (!std::isfinite(value)) return "–";
-  std::ostringstream text;
-  text.setf(std::ios::fixed);
-  text.precision(digits);
-  text << value;
-  return text.str();
-}
-
 // In parentheses what was measured of a motion that ends early.
 std::string formatUntil(const Performance& motion, double value, int digits) {
   const std::string cell = formatCell(value, digits);
   return std::isfinite(value) && !motion.success ? "(" + cell + ")" : cell;
 }
 
-std::string quoteCsv(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + "\"";
-}
-
 std::string escapeMarkdown(const std::string& text) {
   std::string escaped;
   for (const char c : text) escaped += c == '|' ? "\\|" : std::string(1, c);
   return escaped;
-}
-
-void writeText(const std::string& path, const std::string& text) {
-  AsideFile file(path);
-  file.write(text);
-  file.commit();
 }
 
 // One line per value and model.
@@ -154,12 +133,27 @@ void printNumbers(std::ostream& page, const StudyResult& result) {
 
 }  // namespace
 
+std::string formatCell(double value, int digits) {
+  if (!std::isfinite(value)) return "–";
+  std::ostringstream text;
+  text.setf(std::ios::fixed);
+  text.precision(digits);
+  text << value;
+  return text.str();
+}
+
+std::string quoteCsv(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
 StudyPage writeStudy(const std::string& directory, const StudyResult& result, const ComparedRobot& robot) {
   StudyPage page;
   const std::string base = directory + "/" + result.study.name;
   const bool comparison = !result.study.motion.empty();
   page.files.push_back(base + ".csv");
-  writeText(page.files.back(), comparison ? formatCsv(result) : formatRatioCsv(result));
+  writeTextFile(page.files.back(), comparison ? formatCsv(result) : formatRatioCsv(result));
   std::ostringstream text;
   text << "## " << result.study.title << " (" << result.study.section << ")\n\n";
   printClaims(text, judgeClaims(result, robot.robot.model));
@@ -176,7 +170,7 @@ StudyPage writeStudy(const std::string& directory, const StudyResult& result, co
   if (comparison) printNumbers(text, result);
   page.text = text.str();
   page.files.push_back(base + ".md");
-  writeText(page.files.back(), page.text);
+  writeTextFile(page.files.back(), page.text);
   return page;
 }
 
@@ -197,7 +191,7 @@ std::string writeReport(const std::string& directory, const std::string& robot, 
          "not converge, or of what was lifted until the lift failed.\n\n";
   for (const StudyPage& page : pages) text << page.text;
   const std::string path = directory + "/report.md";
-  writeText(path, text.str());
+  writeTextFile(path, text.str());
   return path;
 }
 

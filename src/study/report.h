@@ -7,6 +7,11 @@
 
 namespace bielle::study {
 
+// With so many decimals; a dash where there is no number.
+std::string formatCell(double value, int digits);
+// A text as one field of a table in CSV.
+std::string quoteCsv(const std::string& text);
+
 // What was written about one study.
 struct StudyPage {
   std::string text;                // Markdown, from a heading of the second level
