@@ -247,4 +247,8 @@ objective:
   refuse("workspace, region", "energy, region", "only a workspace");
   refuse("region: {", "motors: [motor_front], region: {", "has no motors");
   CHECK_THROWS_WITH(DesignEvaluator(robot, {}, {{Measure::Energy, {}, 1, {}}}), Contains("motions"));
+  EvaluationOptions kept;
+  kept.mode = MotionMode::Kept;
+  const DesignEvaluator without(robot, {}, spec.objective, kept);
+  CHECK_THROWS_WITH(without.differentiate(robot.start()), Contains("workspace does not have"));
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -168,7 +167,6 @@ struct DesignEvaluator::Data {
   void solveStart();
   void makeMotions(const Model& model, Evaluation& out, std::vector<LiftResult>* lifted = nullptr) const;
   Evaluation evaluate(const VectorXd& x, std::vector<LiftResult>* lifted = nullptr) const;
-  void checkGradient() const;
   bool checkPostures(const Model& model, Evaluation& out) const;
   double calcTerm(size_t i, const Model& model, const std::vector<MotionMeasures>& measures) const;
   void sumUp(const Model& model, Evaluation& out) const;
@@ -195,6 +193,17 @@ const char* getName(DesignStatus status) {
       break;
   }
   return "motion failed";
+}
+
+std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std::vector<ObjectiveTerm>& objective) {
+  if (mode != MotionMode::Kept)
+    return GradientObstacle{"it needs gradients, which motions that are made anew for every design do not have",
+                            "give `mode: kept`, or bobyqa or sbplx"};
+  for (const ObjectiveTerm& term : objective)
+    if (!hasGradient(term.measure))
+      return GradientObstacle{std::string("it needs gradients, which ") + getName(term.measure) + " does not have",
+                              "choose a torque or an energy, or give bobyqa or sbplx"};
+  return {};
 }
 
 void DesignEvaluator::Data::readObjective() {
@@ -336,21 +345,11 @@ Evaluation DesignEvaluator::Data::evaluate(const VectorXd& x, std::vector<LiftRe
   return out;
 }
 
-void DesignEvaluator::Data::checkGradient() const {
-  const std::string& name = robot.startModel().name();
-  if (options.mode != MotionMode::Kept)
-    throw ModelError(name, "mode: reoptimized", "its motions have no gradient with respect to the design",
-                     "keep them (`mode: kept`), or search by bobyqa or sbplx");
-  for (const ObjectiveTerm& term : objective)
-    if (!hasGradient(term.measure))
-      throw ModelError(name, std::string("objective: ") + getName(term.measure), "it has no gradient",
-                       "choose a torque or an energy, or search by bobyqa or sbplx");
-}
-
 Evaluation DesignEvaluator::evaluate(const VectorXd& x) const { return data_->evaluate(x); }
 
 SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
-  data_->checkGradient();
+  if (const auto obstacle = findGradientObstacle(data_->options.mode, data_->objective))
+    throw ModelError(data_->robot.startModel().name(), "search", obstacle->problem, obstacle->remedy);
   std::vector<LiftResult> lifted;
   SlopedEvaluation out{data_->evaluate(x, &lifted), {}, {}};
   if (lifted.size() < data_->motions.size()) return out;

@@ -134,17 +134,7 @@ ObjectiveTerm readTerm(const Entry& entry) {
   return term;
 }
 
-// A stage with gradients at `stage`, the mode and the objective having been read.
-void checkGradient(const DesignSpec& spec, const Entry& stage) {
-  if (spec.mode != MotionMode::Kept)
-    stage.fail("it needs gradients, which motions that are made anew for every design do not have",
-               "give `mode: kept`, or bobyqa or sbplx");
-  for (const ObjectiveTerm& term : spec.objective)
-    if (!hasGradient(term.measure))
-      stage.fail(std::string("it needs gradients, which ") + getName(term.measure) + " does not have",
-                 "choose a torque or an energy, or give bobyqa or sbplx");
-}
-
+// The mode and the objective have been read.
 void readSearch(const Entry& entry, DesignSpec& spec) {
   const Fields fields = entry.getFields({"seed", "searches", "stages"});
   if (const Entry* seed = find(fields, "seed")) spec.seed = static_cast<unsigned>(readCount(*seed, 1000000000));
@@ -159,7 +149,9 @@ void readSearch(const Entry& entry, DesignSpec& spec) {
         readChoice<SearchAlgorithm>(require(stage_fields, "algorithm", item),
                                     {SearchAlgorithm::Crs, SearchAlgorithm::Isres, SearchAlgorithm::Bobyqa,
                                      SearchAlgorithm::Sbplx, SearchAlgorithm::Slsqp, SearchAlgorithm::Mma});
-    if (needsGradient(stage.algorithm)) checkGradient(spec, item);
+    if (needsGradient(stage.algorithm))
+      if (const auto obstacle = findGradientObstacle(spec.mode, spec.objective))
+        item.fail(obstacle->problem, obstacle->remedy);
     stage.evaluations = readCount(require(stage_fields, "evaluations", item), 1000000);
     if (const Entry* tolerance = find(stage_fields, "tolerance")) stage.tolerance = tolerance->getNumber();
     if (!(stage.tolerance >= 0 && stage.tolerance < 1))

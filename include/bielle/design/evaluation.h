@@ -12,6 +12,7 @@
 /// the design: searches slide back to where the loops close.
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,13 @@ struct EvaluationOptions {
   /// Tolerances of engineering: a cost that changes by less than 1e-8 of itself is done. One thread.
   static FddpOptions makeSolverOptions();
 };
+
+/// Why the value of designs has no gradient, and what it would have one of.
+struct GradientObstacle {
+  std::string problem, remedy;
+};
+/// Nothing where motions are kept and every measure has a gradient.
+std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std::vector<ObjectiveTerm>& objective);
 
 enum class DesignStatus { Feasible, LoopOpen, MotionFailed };
 const char* getName(DesignStatus status);
