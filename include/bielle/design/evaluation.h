@@ -39,7 +39,7 @@ struct ObjectiveTerm {
   Measure measure = Measure::PeakTorque;
   std::vector<std::string> motors;  ///< empty: all
   double weight = 1;                ///< w_i
-  WorkspaceRegion region;           ///< of the workspace, which has no motors
+  WorkspaceRegion region = {};      ///< of the workspace, which has no motors
 };
 
 struct EvaluationOptions {
