@@ -35,7 +35,7 @@ T pick(Random& rng, std::initializer_list<T> values) {
 Mechanism makeMechanism(Random& rng, MechanismBase base) {
   const JointKind joint = pick(
       rng, {JointKind::Revolute, JointKind::Prismatic, JointKind::Spherical, JointKind::Universal, JointKind::Planar});
-  const ClosureKind closure = pick(rng, {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D});
+  const ClosureKind closure = kClosureKinds[choose(rng, std::size(kClosureKinds))];
   const double kp = pick(rng, {0.0, 0.0, 100.0, 1e12}), kd = pick(rng, {0.0, 0.0, 20.0, 1e12});
   return makeRandomMechanism(rng, joint, closure, base, kp, kd);
 }

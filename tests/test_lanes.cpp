@@ -27,6 +27,8 @@ struct Walk {
     }
     next.assign(motion.guess.xs.size(), motion.guess.xs.front());
     deviations.assign(next.size(), VectorXd::Zero(motion.problem->tangentSize(0)));
+    models.resize(next.size());
+    statuses.assign(next.size(), StepStatus::Failed);
   }
   static BenchmarkWalkOptions makeOptions() {
     BenchmarkWalkOptions options;
@@ -52,8 +54,14 @@ struct Walk {
     motion.problem->stepStages(tasks);
     return tasks;
   }
+  // Stages `first` to `last` - 1 together; what came out is in `models` and `statuses`.
+  void linearize(int first, int last) {
+    motion.problem->linearizeStages(first, last, motion.guess.xs, motion.guess.us, models, statuses);
+  }
   Motion motion;
   std::vector<VectorXd> next, deviations;
+  std::vector<StageModel> models;
+  std::vector<StepStatus> statuses;
 };
 
 MatrixXd getLower(ConstPaddedMap H) { return H.triangularView<Eigen::Lower>(); }
@@ -246,10 +254,8 @@ TEST_CASE("deviations of steps taken together are differences, with and without 
     }
   };
   check();
-  std::vector<StageModel> models(N + 1);
-  std::vector<StepStatus> statuses(N + 1);
-  problem.linearizeStages(0, N, xs, us, models, statuses);
-  problem.linearizeTerminal(xs[N], models[N]);
+  walk.linearize(0, N);
+  problem.linearizeTerminal(xs[N], walk.models[N]);
   check();
 }
 
@@ -275,35 +281,31 @@ TEST_CASE("models made together are those made one by one, by the bit") {
   RobotProblem& problem = *walk.motion.problem;
   const auto& [xs, us] = walk.motion.guess;
   const int N = problem.numStages();
-  std::vector<StageModel> models(N + 1), others(N + 1);
-  std::vector<StepStatus> statuses(N + 1, StepStatus::Failed);
-  problem.linearizeStages(0, N, xs, us, models, statuses);
+  std::vector<StageModel> others(N + 1);
+  walk.linearize(0, N);
   for (int k = 0; k < N; ++k) {
-    REQUIRE(statuses[k] == StepStatus::Ok);
+    REQUIRE(walk.statuses[k] == StepStatus::Ok);
     REQUIRE(problem.linearize(k, xs[k], us[k], xs[k + 1], others[k]) == StepStatus::Ok);
-    CHECK(isSame(models[k], others[k]));
+    CHECK(isSame(walk.models[k], others[k]));
   }
-  problem.linearizeStages(3, 6, xs, us, others, statuses);
-  for (int k = 3; k < 6; ++k) CHECK(isSame(models[k], others[k]));
+  for (int k = 3; k < 6; ++k) walk.models[k] = {};
+  walk.linearize(3, 6);
+  for (int k = 3; k < 6; ++k) CHECK(isSame(walk.models[k], others[k]));
   others[4].lxx()(2, 1) += 1e-15 + others[4].lxx()(2, 1) * 1e-15;
-  CHECK(!isSame(models[4], others[4]));
+  CHECK(!isSame(walk.models[4], others[4]));
 }
 
 TEST_CASE("steps and models made together allocate nothing after the first") {
   const LoadedRobot robot = loadRobot("bipetto");
   Walk walk(robot.model);
-  RobotProblem& problem = *walk.motion.problem;
-  const auto& [xs, us] = walk.motion.guess;
-  const int N = problem.numStages();
-  std::vector<StageModel> models(N + 1);
-  std::vector<StepStatus> statuses(N + 1);
+  const int N = walk.motion.problem->numStages();
   std::vector<StepTask> tasks = walk.step({1, 4, 8});
-  problem.linearizeStages(0, N, xs, us, models, statuses);
+  walk.linearize(0, N);
   for (VectorXd& u : walk.motion.guess.us) u.array() += 0.1;
   const long before = num_allocations;
   const VectorXd counted(100);
   CHECK(num_allocations == before + 1);
-  problem.stepStages(tasks);
-  problem.linearizeStages(0, N, xs, us, models, statuses);
+  walk.motion.problem->stepStages(tasks);
+  walk.linearize(0, N);
   CHECK(num_allocations == before + 1);
 }

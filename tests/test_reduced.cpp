@@ -129,8 +129,7 @@ void checkLinearization(const Model& model, const std::vector<ContactTarget>& co
 
 TEST_CASE("reduced step: random mechanisms, every joint kind times every closure kind") {
   std::mt19937 rng(11);
-  for (JointKind kind : {JointKind::Revolute, JointKind::Prismatic, JointKind::Spherical, JointKind::Universal,
-                         JointKind::Planar, JointKind::FreeFlyer})
+  for (JointKind kind : kJointKinds)
     for (ClosureKind closure : kClosureKinds)
       for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
         CAPTURE(getName(kind), getName(closure), base == MechanismBase::Fixed);

@@ -15,10 +15,6 @@ using namespace bielle::testing;
 
 namespace {
 
-constexpr JointKind kJoints[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
-                                 JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
-                                 JointKind::FreeFlyer};
-constexpr ClosureKind kClosures[] = {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D};
 constexpr double kStep = 2e-4;
 
 // Both frames of the loop in all six directions, the first contact, the placements of the joints (each along a
@@ -104,7 +100,7 @@ VectorXd closeHeld(const Model& model, const VectorXd& q, const std::vector<int>
 
 TEST_CASE("variation: inverse dynamics and closures along a motion are those of their Jacobians") {
   std::mt19937 rng(21);
-  for (JointKind kind : kJoints) {
+  for (JointKind kind : kJointKinds) {
     CAPTURE(getName(kind));
     const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Hinge5D, MechanismBase::FreeFlyer, 3, 2);
     const Model& model = mechanism.model;
@@ -141,8 +137,8 @@ TEST_CASE("variation: inverse dynamics and closures along a motion are those of 
 
 TEST_CASE("variation: forward dynamics, every joint kind times every closure kind, closed and open") {
   std::mt19937 rng(22);
-  for (JointKind kind : kJoints)
-    for (ClosureKind closure : kClosures)
+  for (JointKind kind : kJointKinds)
+    for (ClosureKind closure : kClosureKinds)
       for (bool open : {false, true})
         for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
           CAPTURE(getName(kind), getName(closure), open, base == MechanismBase::Fixed);
@@ -241,8 +237,8 @@ TEST_CASE("variation: redundant rows, changes that leave them so") {
 
 TEST_CASE("variation: motor torques, forces and closing of a kept motion") {
   std::mt19937 rng(23);
-  for (JointKind kind : kJoints)
-    for (ClosureKind closure : kClosures) {
+  for (JointKind kind : kJointKinds)
+    for (ClosureKind closure : kClosureKinds) {
       CAPTURE(getName(kind), getName(closure));
       const Mechanism mechanism = makeRandomMechanism(rng, kind, closure, MechanismBase::FreeFlyer);
       const Model model = addContactsEverywhere(mechanism.model);
