@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "bielle/io/opensim.h"
+#include "bielle/io/text_file.h"
 #include "cli/commands.h"
-#include "io/aside_file.h"
 
 namespace fs = std::filesystem;
 
@@ -21,9 +21,7 @@ int exportTrajectory(const ExportArguments& arguments) {
   const MotionRecord record = readRecord((place / "trajectory.npz").string());
   const fs::path path =
       arguments.output.empty() ? place / ("trajectory." + arguments.format) : fs::path(arguments.output);
-  AsideFile file(path.string());
-  file.write(arguments.format == "mot" ? formatMot(record) : formatSto(record));
-  file.commit();
+  writeTextFile(path.string(), arguments.format == "mot" ? formatMot(record) : formatSto(record));
   std::cout << path.string() << "\n";
   return kOk;
 }

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <ostream>
 
+#include "bielle/io/text_file.h"
 #include "cli/ratio_figure.h"
 #include "cli/table.h"
 #include "io/aside_file.h"
@@ -193,9 +194,7 @@ std::vector<std::string> writeReport(const std::string& directory, const RatioRe
   if (report.map) {
     std::vector<RatioSample> all;
     for (const std::vector<RatioSample>& row : report.map->rows) all.insert(all.end(), row.begin(), row.end());
-    AsideFile map(place("map.csv"));
-    map.write(formatCsv(report.linkage, all, report.sweep.joint));
-    map.commit();
+    writeTextFile(place("map.csv"), formatCsv(report.linkage, all, report.sweep.joint));
     written.push_back(place("map.csv"));
   }
   json.commit();

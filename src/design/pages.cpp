@@ -5,8 +5,8 @@
 #include "bielle/design/run.h"
 #include "bielle/io/result.h"
 #include "bielle/io/robot_writer.h"
+#include "bielle/io/text_file.h"
 #include "design/figures.h"
-#include "io/aside_file.h"
 
 namespace fs = std::filesystem;
 
@@ -90,9 +90,7 @@ std::vector<std::string> writeDesign(const std::string& directory, const DesignE
                                      const DesignSpec& spec, const DesignRun& run) {
   const std::string best = directory + "/best", page = directory + "/design.md";
   writeRobot(evaluator.robot().make(run.best), best, "Written by `bielle design`.");
-  AsideFile file(page);
-  file.write(formatPage(evaluator, spec, run));
-  file.commit();
+  writeTextFile(page, formatPage(evaluator, spec, run));
   std::vector<std::string> paths = {best, page};
   for (const DesignFigure& figure : makeDesignFigures(evaluator, run)) {
     const std::string path = directory + "/" + figure.name + ".svg";

@@ -5,6 +5,7 @@
 #include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
+#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 #include "io/aside_file.h"
 #include "io/record_tables.h"
@@ -95,11 +96,7 @@ MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajecto
   return record;
 }
 
-void writeCsv(const std::string& path, const MotionRecord& record) {
-  AsideFile file(path);
-  file.write(formatCsv(record));
-  file.commit();
-}
+void writeCsv(const std::string& path, const MotionRecord& record) { writeTextFile(path, formatCsv(record)); }
 
 void writeNpz(const std::string& path, const MotionRecord& record) {
   AsideFile file(path);

@@ -4,8 +4,8 @@
 #include <map>
 
 #include "bielle/io/result.h"
+#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
-#include "io/aside_file.h"
 #include "report/page.h"
 #include "report/run.h"
 
@@ -57,10 +57,7 @@ std::string makeReport(const std::vector<std::string>& directories) {
 }
 
 void writeReport(const std::string& path, const std::vector<std::string>& directories) {
-  const std::string page = makeReport(directories);
-  AsideFile file(path);
-  file.write(page);
-  file.commit();
+  writeTextFile(path, makeReport(directories));
 }
 
 }  // namespace bielle

@@ -8,8 +8,8 @@
 #include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/result.h"
+#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
-#include "io/aside_file.h"
 #include "report/pack.h"
 #include "report/page.h"
 #include "report/run.h"
@@ -192,11 +192,6 @@ std::string makeView(const LoadedRobot& robot) {
                    {"view", {{"parents", parents}, {"groups", grids}}}});
 }
 
-void writeView(const std::string& path, const LoadedRobot& robot) {
-  const std::string page = makeView(robot);
-  AsideFile file(path);
-  file.write(page);
-  file.commit();
-}
+void writeView(const std::string& path, const LoadedRobot& robot) { writeTextFile(path, makeView(robot)); }
 
 }  // namespace bielle

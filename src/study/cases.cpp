@@ -72,9 +72,7 @@ void writeOutcome(const std::string& path, const Json& request, const CaseOutcom
   Json steps = Json::array();
   for (const StepOutcome& step : outcome.steps)
     steps.push_back({{"status", step.status}, {"seconds", step.seconds}, {"error", step.error}});
-  AsideFile file(path);
-  file.write(formatJson({{"request", request}, {"outcome", steps}}) + "\n");
-  file.commit();
+  writeTextFile(path, formatJson({{"request", request}, {"outcome", steps}}) + "\n");
 }
 
 std::string findError(const std::string& log) {
