@@ -13,6 +13,7 @@
 #include <cstdlib>
 #include <iostream>
 
+#include "bielle/io/names.h"
 #include "bielle/io/result.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
@@ -21,18 +22,12 @@ using namespace bielle;
 
 namespace {
 
-int indexOf(const std::vector<std::string>& names, const std::string& name) {
-  for (size_t i = 0; i < names.size(); ++i)
-    if (names[i] == name) return static_cast<int>(i);
-  std::fprintf(stderr, "there is no %s\n", name.c_str());
-  std::exit(1);
-}
-
 // What the knee and its motor do at some nodes: the rods change both the angle and the torque.
 void printMotion(const MotionResult& result, const SquatOptions& options) {
   const MotionRecord& record = result.record;
-  const int knee = indexOf(record.q_names, "knee_right"), crank = indexOf(record.q_names, "motor_knee_right");
-  const int motor = indexOf(record.u_names, "motor_knee_right"), foot = indexOf(record.contact_names, "foot_right");
+  const int knee = findColumn(record.q_names, "knee_right"), crank = findColumn(record.q_names, "motor_knee_right");
+  const int motor = findColumn(record.u_names, "motor_knee_right"),
+            foot = findColumn(record.contact_names, "foot_right");
   const int stages = static_cast<int>(record.time.size()) - 1;
   std::printf("\n%7s %10s %10s %11s %12s %13s %13s\n", "t [s]", "CoM [m]", "Eq. 3 [m]", "knee [rad]", "motor [rad]",
               "motor [N m]", "right sole [N]");

@@ -15,6 +15,7 @@
 #include <cstdlib>
 #include <iostream>
 
+#include "bielle/io/names.h"
 #include "bielle/io/result.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/jump.h"
@@ -23,18 +24,11 @@ using namespace bielle;
 
 namespace {
 
-int indexOf(const std::vector<std::string>& names, const std::string& name) {
-  for (size_t i = 0; i < names.size(); ++i)
-    if (names[i] == name) return static_cast<int>(i);
-  std::fprintf(stderr, "there is no %s\n", name.c_str());
-  std::exit(1);
-}
-
 // A few nodes of every phase.
 void printMotion(const MotionResult& result, const JumpOptions& options) {
   const MotionRecord& record = result.record;
-  const int knee = indexOf(record.q_names, "knee_right"), motor = indexOf(record.u_names, "motor_knee_right");
-  const int foot = indexOf(record.contact_names, "foot_right");
+  const int knee = findColumn(record.q_names, "knee_right"), motor = findColumn(record.u_names, "motor_knee_right");
+  const int foot = findColumn(record.contact_names, "foot_right");
   std::printf("\n%8s %8s %10s %12s %11s %12s %14s\n", "", "t [s]", "CoM [m]", "planned [m]", "knee [rad]",
               "motor [N m]", "right sole [N]");
   int start = 0;

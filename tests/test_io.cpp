@@ -106,6 +106,8 @@ TEST_CASE("coordinate names have the sizes of q and v, and name one-coordinate j
   const Joint& rod = model.joints()[model.findJoint("transmission_knee_right")];
   CHECK(q[rod.idx_q + 3] == "transmission_knee_right.qw");
   CHECK(v[rod.idx_v + 2] == "transmission_knee_right.wz");
+  CHECK(findColumn(v, "transmission_knee_right.wz") == rod.idx_v + 2);
+  CHECK_THROWS_AS(findColumn(v, "transmission_knee_right"), ModelError);
 }
 
 TEST_CASE("a record holds what the dynamics say at each node") {

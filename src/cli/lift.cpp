@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "bielle/io/lift_files.h"
+#include "bielle/io/names.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "cli/motion_registry.h"
@@ -49,7 +50,7 @@ void printOutcome(const LiftArguments& arguments, const LiftResult& lifted, cons
   const MotionRecord& record = result->record;
   std::vector<Row> motors = {{"motor", "peak torque [N m]", "peak speed [rad/s]"}};
   for (size_t m = 0; m < record.u_names.size(); ++m) {
-    const auto at = std::find(record.v_names.begin(), record.v_names.end(), record.u_names[m]) - record.v_names.begin();
+    const int at = findColumn(record.v_names, record.u_names[m]);
     motors.push_back({record.u_names[m], formatNumber(record.u.col(m).cwiseAbs().maxCoeff(), "%.3f"),
                       formatNumber(record.v.col(at).cwiseAbs().maxCoeff(), "%.3f")});
   }

@@ -1,5 +1,9 @@
 #include "bielle/io/names.h"
 
+#include <algorithm>
+
+#include "bielle/model/error.h"
+
 namespace bielle {
 namespace {
 
@@ -58,6 +62,12 @@ std::vector<std::string> makeWrenchNames(const std::vector<std::string>& names) 
   for (const std::string& name : names)
     for (const char* entry : kWrenchEntries) entries.push_back(name + "." + entry);
   return entries;
+}
+
+int findColumn(const std::vector<std::string>& names, const std::string& name) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) throw ModelError("", "column '" + name + "'", "the trajectory does not have it");
+  return static_cast<int>(found - names.begin());
 }
 
 }  // namespace bielle

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <functional>
 
+#include "bielle/io/names.h"
+
 namespace bielle::study {
 namespace {
 

@@ -6,6 +6,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/io/names.h"
 #include "bielle/model/error.h"
 #include "bielle/transmission/lift.h"
 #include "bielle/transmission/linkage.h"
@@ -119,12 +120,6 @@ Performance readPerformance(const Study& study, const CaseOutcome& outcome, size
 }
 
 }  // namespace
-
-int findColumn(const std::vector<std::string>& names, const std::string& name) {
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end()) throw ModelError("", "column '" + name + "'", "the trajectory does not have it");
-  return static_cast<int>(found - names.begin());
-}
 
 ComparedRobot loadComparedRobot(const std::string& name) {
   ComparedRobot compared{loadRobot(name), {}, {}, {}};

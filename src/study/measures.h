@@ -62,9 +62,6 @@ struct Comparison {
 Comparison readComparison(const Study& study, double value, const ComparedRobot& robot, const std::string& cases,
                           const CaseOutcome& closed, const CaseOutcome& serial);
 
-// Column of a name. \throws ModelError when it is not there
-int findColumn(const std::vector<std::string>& names, const std::string& name);
-
 // Paths of the contact frames of the closed robot: N + 1 x 3 each, m.
 std::vector<RowMatrixXd> calcFeet(const Model& model, const MotionRecord& record);
 
