@@ -1,6 +1,7 @@
 #pragma once
 // What a walking robot does, measured on its trajectory by kinematics and by the dynamics of its stages.
 #include <array>
+#include <catch2/catch.hpp>
 #include <cmath>
 #include <optional>
 
@@ -168,5 +169,20 @@ class StepMeter {
   std::array<double, 8> speeds_{};  // of the feet in the air, m/s
   StepMeasures out_;
 };
+
+// What feet have to do in every motion with steps: stand still, clear the ground, land where they should, push without
+// tipping or slipping.
+inline void checkFeet(const StepMeasures& m) {
+  CHECK(m.slip < 1e-3);
+  CHECK(m.penetration < 1e-3);
+  CHECK(m.lowest > -1e-3);
+  CHECK(m.clearance > 0.01);
+  CHECK(m.foothold < 2e-3);
+  CHECK(m.touchdown < 0.2);
+  CHECK(m.feet > 0.05);
+  CHECK(m.pressure < 1);
+  CHECK(m.friction < 0.7);
+  CHECK(m.load > 5);
+}
 
 }  // namespace bielle

@@ -11,6 +11,7 @@
 #include "bielle/io/record.h"
 #include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
+#include "get_error.h"
 #include "robot_directory.h"
 
 namespace fs = std::filesystem;
@@ -20,12 +21,7 @@ using namespace bielle::testing;
 namespace {
 
 std::string getErrorOfReading(const std::string& path) {
-  try {
-    readRecord(path);
-  } catch (const ModelError& error) {
-    return error.what();
-  }
-  return "";
+  return getError([&] { readRecord(path); });
 }
 
 // Arguments: where to write. Each archive is a whole trajectory of one joint but for one array, which is replaced.

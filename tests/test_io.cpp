@@ -16,9 +16,11 @@
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
+#include "get_error.h"
 
 namespace fs = std::filesystem;
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
 
@@ -83,12 +85,7 @@ void checkEqual(const MotionRecord& a, const MotionRecord& b) {
 }
 
 std::string getErrorOfReading(const std::string& path) {
-  try {
-    readRecord(path);
-  } catch (const ModelError& error) {
-    return error.what();
-  }
-  return "";
+  return getError([&] { readRecord(path); });
 }
 
 }  // namespace
@@ -321,18 +318,13 @@ TEST_CASE("a summary reads back: phases, stances, ground; what is none is refuse
   CHECK(summary.ground.calcHeight(0.5, 0.1) == 0.15);
   CHECK(summary.ground.calcHeight(0.5, 0.5) == -0.25);
 
-  const auto getError = [&](const std::string& text) -> std::string {
+  const auto getErrorOf = [&](const std::string& text) {
     writeText(directory / "summary.json", text);
-    try {
-      readSummary(directory / "");
-    } catch (const ModelError& error) {
-      return error.what();
-    }
-    return "";
+    return getError([&] { readSummary(directory / ""); });
   };
-  CHECK_THAT(getError(""), Catch::Contains("summary.json: file: "));
-  CHECK_THAT(getError("{}"), Catch::Contains("'motion'"));
-  CHECK_THAT(getError("[1]"), Catch::Contains("summary.json"));
+  CHECK_THAT(getErrorOf(""), Catch::Contains("summary.json: file: "));
+  CHECK_THAT(getErrorOf("{}"), Catch::Contains("'motion'"));
+  CHECK_THAT(getErrorOf("[1]"), Catch::Contains("summary.json"));
   fs::remove(directory / "summary.json");
   CHECK_THROWS_WITH(readSummary(directory / ""), Catch::Contains("it cannot be read"));
 }

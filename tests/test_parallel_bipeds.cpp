@@ -138,18 +138,10 @@ TEST_CASE("Cleobot: feet of a walk land where they should and do not slide") {
   CAPTURE(summary.message, summary.iterations);
   CHECK(summary.termination == FddpTermination::Converged);
   const StepMeasures m = StepMeter(motion, motion.guess).measure();
-  CHECK(m.slip < 1e-3);
-  CHECK(m.penetration < 1e-3);
-  CHECK(m.lowest > -1e-3);
+  checkFeet(m);
   CHECK(m.clearance > 0.02);
-  CHECK(m.foothold < 2e-3);
-  CHECK(m.touchdown < 0.2);
-  CHECK(m.pressure < 1);
-  CHECK(m.friction < 0.7);
-  CHECK(m.load > 5);
   CHECK(m.tilt < 0.1);
   CHECK(m.velocity_jump < 5);
-  CHECK(m.feet > 0.05);
   CHECK(m.end.x() - m.start.x() > 0.9);
   CHECK(m.final_speed < 0.02);
 }

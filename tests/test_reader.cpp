@@ -6,6 +6,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
+#include "get_error.h"
 #include "robot_directory.h"
 
 using namespace bielle;
@@ -270,15 +271,7 @@ TEST_CASE("robots are found by name, directory and file, and a robot that is now
   CHECK(loadRobot(second.path() + "/lonely").model.name() == "toy");
 
   using Catch::Contains;
-  const auto say = [](const std::string& name) {
-    std::string what;
-    try {
-      loadRobot(name);
-    } catch (const ModelError& error) {
-      what = error.what();
-    }
-    return what;
-  };
+  const auto say = [](const std::string& name) { return getError([&] { loadRobot(name); }); };
   CHECK_THAT(say("unicorn"), Contains("robot 'unicorn'") && Contains(first.path()) && Contains(second.path()) &&
                                  Contains("known names: ") && Contains("bipetto, ") && Contains("toy"));
   CHECK_THAT(say(second.path() + "/none"), Contains("no such file or directory") && Contains("known names"));

@@ -5,6 +5,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
+#include "get_error.h"
 #include "robot_directory.h"
 
 using namespace bielle;
@@ -13,13 +14,8 @@ using namespace bielle::testing;
 namespace {
 
 // What loadRobot says about it; empty when it loads.
-std::string getError(const std::string& name_or_path) {
-  try {
-    loadRobot(name_or_path);
-  } catch (const ModelError& error) {
-    return error.what();
-  }
-  return "";
+std::string getErrorOfLoading(const std::string& name_or_path) {
+  return getError([&] { loadRobot(name_or_path); });
 }
 
 struct Mistake {
@@ -169,7 +165,7 @@ TEST_CASE("a wrong URDF is an error that names file, element and remedy, and urd
   std::streambuf* const terminal = std::cerr.rdbuf(captured.rdbuf());
   std::vector<std::string> errors;
   for (const Mistake& m : kUrdfMistakes)
-    errors.push_back(getError(directory.writeRobot(replaceOnce(kToyUrdf, m.from, m.to), kToyYaml)));
+    errors.push_back(getErrorOfLoading(directory.writeRobot(replaceOnce(kToyUrdf, m.from, m.to), kToyYaml)));
   std::cerr.rdbuf(terminal);
   for (size_t i = 0; i < errors.size(); ++i) checkError(errors[i], directory.path() + "/robot.urdf", kUrdfMistakes[i]);
   CHECK(captured.str().empty());
@@ -178,23 +174,24 @@ TEST_CASE("a wrong URDF is an error that names file, element and remedy, and urd
 TEST_CASE("a wrong YAML is an error that names file, element and remedy") {
   const RobotDirectory directory;
   for (const Mistake& m : kYamlMistakes)
-    checkError(getError(directory.writeRobot(kToyUrdf, replaceOnce(kToyYaml, m.from, m.to))),
+    checkError(getErrorOfLoading(directory.writeRobot(kToyUrdf, replaceOnce(kToyYaml, m.from, m.to))),
                directory.path() + "/robot.yaml", m);
 }
 
 TEST_CASE("files that are no robot at all are errors") {
   const RobotDirectory directory;
-  CHECK(getError(directory.writeRobot("", "")).find("not well-formed XML") != std::string::npos);
-  CHECK(getError(directory.writeRobot("<world/>", "")).find("not <robot>") != std::string::npos);
-  CHECK(getError(directory.writeRobot("<robot name='a'/>", "")).find("no link") != std::string::npos);
-  CHECK(getError(directory.writeRobot("<robot name='a'><link name='b'/></robot>", "base: fixed"))
+  CHECK(getErrorOfLoading(directory.writeRobot("", "")).find("not well-formed XML") != std::string::npos);
+  CHECK(getErrorOfLoading(directory.writeRobot("<world/>", "")).find("not <robot>") != std::string::npos);
+  CHECK(getErrorOfLoading(directory.writeRobot("<robot name='a'/>", "")).find("no link") != std::string::npos);
+  CHECK(getErrorOfLoading(directory.writeRobot("<robot name='a'><link name='b'/></robot>", "base: fixed"))
             .find("no moving joint; declare") != std::string::npos);
-  CHECK(getError(directory.writeRobot(kToyUrdf, "- a list")).find("document (line 1): it is not a map") !=
+  CHECK(getErrorOfLoading(directory.writeRobot(kToyUrdf, "- a list")).find("document (line 1): it is not a map") !=
         std::string::npos);
   std::string deep = "<robot name='a'>";
   for (int i = 0; i < 100000; ++i) deep += "<a>";
-  CHECK(getError(directory.writeRobot(deep, "")).find("nested deeper") != std::string::npos);
-  CHECK(getError(directory.writeRobot(kToyUrdf, std::string(100000, '['))).find("robot.yaml") != std::string::npos);
+  CHECK(getErrorOfLoading(directory.writeRobot(deep, "")).find("nested deeper") != std::string::npos);
+  CHECK(getErrorOfLoading(directory.writeRobot(kToyUrdf, std::string(100000, '['))).find("robot.yaml") !=
+        std::string::npos);
 }
 
 // Whatever the bytes, loadRobot answers with a model or a ModelError.
@@ -204,7 +201,7 @@ TEST_CASE("truncated and corrupted files never do worse than a ModelError") {
   int refused = 0, tried = 0;
   const auto attempt = [&](const std::string& u, const std::string& y) {
     ++tried;
-    refused += !getError(directory.writeRobot(u, y)).empty();
+    refused += !getErrorOfLoading(directory.writeRobot(u, y)).empty();
   };
   for (size_t n = 0; n < urdf.size(); n += 3) attempt(urdf.substr(0, n), yaml);
   for (size_t n = 1; n < yaml.size(); ++n) attempt(urdf, yaml.substr(0, n));

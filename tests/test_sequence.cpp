@@ -11,9 +11,11 @@
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
+#include "get_error.h"
 #include "measure_steps.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
 
@@ -165,23 +167,18 @@ TEST_CASE("sequence: unlike motions are solved as one problem") {
 }
 
 TEST_CASE("sequence: what does not fit together is refused by name") {
-  const auto getError = [](const std::vector<SequencePart>& parts) -> std::string {
-    try {
-      makeSequence(getBipetto(), parts);
-    } catch (const ModelError& error) {
-      return error.what();
-    }
-    return "";
+  const auto getErrorOf = [](const std::vector<SequencePart>& parts) {
+    return getError([&] { makeSequence(getBipetto(), parts); });
   };
-  CHECK_THAT(getError({}), Catch::Contains("no motion"));
+  CHECK_THAT(getErrorOf({}), Catch::Contains("no motion"));
   WalkOptions slippery;
   slippery.gait.friction = 0.4;
-  CHECK_THAT(getError({makePart("walk", planWalk, WalkOptions()), makePart("walk2", planWalk, slippery)}),
+  CHECK_THAT(getErrorOf({makePart("walk", planWalk, WalkOptions()), makePart("walk2", planWalk, slippery)}),
              Catch::Contains("walk2.friction"));
   // Down again at a right angle: its steps lie across those that lead up.
   TurnOptions turn;
   turn.angle = 1.57;
-  CHECK_THAT(getError({makePart("stairs", planStairs, makeStairsOf(0.06)), makePart("turn", planTurn, turn),
-                       makePart("stairs2", planStairs, makeStairsOf(-0.06))}),
+  CHECK_THAT(getErrorOf({makePart("stairs", planStairs, makeStairsOf(0.06)), makePart("turn", planTurn, turn),
+                         makePart("stairs2", planStairs, makeStairsOf(-0.06))}),
              Catch::Contains("higher ground"));
 }
