@@ -7,8 +7,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "backward_pass.h"
 #include "fddp_checks.h"
-#include "hessian_pool.h"
 #include "rollout.h"
 
 namespace bielle {
@@ -28,42 +28,28 @@ double calcSecondsSince(std::chrono::steady_clock::time_point start) {
 }  // namespace
 
 struct Fddp::Workspace {
-  std::vector<StageModel> models;     // N + 1, those that wait for their sweep with a Hessian from the pool
-  std::vector<std::string> failures;  // N + 1: why a node could not be linearized, empty if it could
-  std::vector<StepStatus> statuses;   // N + 1
-  LqSweep sweep;
+  BackwardPass backward;
   std::vector<VectorXd> dx, du;  // the models' full step
   Rollout rollout;
-  std::vector<ControlBox> bounds;             // of u, N or none
-  std::vector<ControlBox> boxes;              // of du, N or none
-  std::vector<std::atomic<bool>> linearized;  // N + 1: the model is there for the sweep
-  HessianPool hessians;
+  std::vector<ControlBox> bounds;  // of u, N or none
+  std::vector<ControlBox> boxes;   // of du, N or none
 
   void resize(const ShootingProblem& problem, const FddpOptions& options);
 };
 
 void Fddp::Workspace::resize(const ShootingProblem& problem, const FddpOptions& options) {
-  const int N = problem.numStages();
-  models.resize(N + 1);
-  failures.resize(N + 1);
-  statuses.resize(N + 1);
-  linearized = std::vector<std::atomic<bool>>(N + 1);
+  backward.resize(problem);
   rollout.resize(problem, options.rollout_segments);
-  bounds.resize(options.bounds == ControlBounds::Enforce ? N : 0);
-  for (int k = 0; k <= N; ++k) {
-    const int nu = k < N ? problem.controlSize(k) : 0;
-    const int ndx = problem.tangentSize(k), ndx_next = k < N ? problem.tangentSize(k + 1) : 0;
-    if (!models[k].hasSizes(ndx, nu, ndx_next)) models[k].resize(ndx, nu, ndx_next);
-    if (bounds.empty() || k == N) continue;
+  bounds.resize(options.bounds == ControlBounds::Enforce ? problem.numStages() : 0);
+  for (size_t k = 0; k < bounds.size(); ++k) {
+    const int stage = static_cast<int>(k), nu = problem.controlSize(stage);
     bounds[k].lower.resize(nu);
     bounds[k].upper.resize(nu);
-    problem.getControlBounds(k, bounds[k].lower, bounds[k].upper);
-    if (!(bounds[k].lower.array() <= bounds[k].upper.array()).all()) {
+    problem.getControlBounds(stage, bounds[k].lower, bounds[k].upper);
+    if (!(bounds[k].lower.array() <= bounds[k].upper.array()).all())
       throw std::invalid_argument("Fddp: a lower control bound of stage " + std::to_string(k) + " exceeds the upper");
-    }
   }
   boxes = bounds;
-  hessians.resize(models);
 }
 
 namespace {
@@ -84,13 +70,10 @@ class Run {
 
   void start();
   End linearize();
-  void linearizeAndSweep();
-  void linearizeNodes(int begin, int end);
-  std::string checkModel(int k) const;
-  void sweepReadyNodes();
-  LqRegularization getRegularization() const;
+  End linearizeAndSweep();
+  void updateGaps();
   End findStep();
-  End updateBackwardPass();
+  End updateStep();
   bool searchLine();
   bool mustClose() const;
   bool closesTwice(int segments) const;
@@ -117,8 +100,7 @@ class Run {
   double slope_ = 0, curvature_ = 0;  // Eq. (1)
   double regularization_ = 0;
   int threads_ = 1;
-  int sweep_node_ = 0;                        // the next one of a sweep that goes along with the linearization
-  bool swept_ = false;                        // that sweep is still to be looked at
+  bool swept_ = false;                        // a sweep is still to be looked at
   double last_gradient_ = 0, last_step_ = 1;  // of the iteration before
   FddpSummary summary_;
 };
@@ -157,112 +139,38 @@ Run::End Run::linearize() {
     work_.boxes[k].lower = work_.bounds[k].lower - trajectory_.us[k];
     work_.boxes[k].upper = work_.bounds[k].upper - trajectory_.us[k];
   }
-  linearizeAndSweep();
+  if (const End end = linearizeAndSweep()) return end;
+  updateGaps();
+  summary_.cost = line_.cost;
+  summary_.gap = line_.gap;
+  return {};
+}
+
+Run::End Run::linearizeAndSweep() {
+  const LqRegularization regularization{regularization_, regularization_ * options_.state_regularization_ratio};
+  const int failed = work_.backward.update({problem_, trajectory_, work_.boxes, regularization, threads_});
+  swept_ = true;
+  if (failed < 0) return {};
+  summary_.message = "node " + std::to_string(failed) + ": " + work_.backward.getFailure(failed);
+  return FddpTermination::Failed;
+}
+
+void Run::updateGaps() {
   gap_sum_ = 0;
-  for (int k = 0; k <= N_; ++k) {
-    if (!work_.failures[k].empty()) {
-      summary_.message = "node " + std::to_string(k) + ": " + work_.failures[k];
-      return FddpTermination::Failed;
-    }
-    const StageModel& model = work_.models[k];
+  for (const StageModel& model : work_.backward.getModels()) {
     line_.cost += model.cost;
-    if (k == N_ || model.gap.size() == 0) continue;
+    if (model.gap.size() == 0) continue;
     line_.gap = std::max(line_.gap, model.gap.lpNorm<Eigen::Infinity>());
     gap_sum_ += model.gap.lpNorm<1>();
   }
-  summary_.cost = line_.cost;
-  summary_.gap = line_.gap;
   if (isFeasible()) gap_sum_ = 0;
-  return {};
-}
-
-// The sweep needs one node after the other, from the last on, and so it goes along with the linearization: whoever has
-// finished a node sweeps as far as models are there, unless somebody does so already. What is left is swept at the end.
-void Run::linearizeAndSweep() {
-  for (std::atomic<bool>& linearized : work_.linearized) linearized.store(false, std::memory_order_relaxed);
-  for (StageModel& model : work_.models) work_.hessians.takeBack(model);  // of a sweep that stopped half way
-  work_.sweep.start(work_.models, getRegularization());
-  sweep_node_ = N_;
-  swept_ = true;
-  // Batches of stages, always the same ones, and the terminal node.
-  const int size = problem_.getBatchSize(), num_batches = (N_ + size - 1) / size;
-  std::atomic<int> next{num_batches};
-  std::atomic_flag sweeping = ATOMIC_FLAG_INIT;
-  double linearize_seconds = 0, sweep_seconds = 0;
-#pragma omp parallel num_threads(threads_) reduction(+ : linearize_seconds, sweep_seconds)
-  {
-    for (int i; (i = next.fetch_sub(1, std::memory_order_relaxed)) >= 0;) {
-      const Clock::time_point start = Clock::now();
-      linearizeNodes(i < num_batches ? i * size : N_, i < num_batches ? std::min(N_, (i + 1) * size) : N_ + 1);
-      linearize_seconds += calcSecondsSince(start);
-      if (sweeping.test_and_set(std::memory_order_acquire)) continue;
-      const Clock::time_point start_sweep = Clock::now();
-      sweepReadyNodes();
-      sweep_seconds += calcSecondsSince(start_sweep);
-      sweeping.clear(std::memory_order_release);
-    }
-  }
-  const Clock::time_point start_rest = Clock::now();
-  sweepReadyNodes();
-  summary_.linearize_seconds += linearize_seconds;
-  summary_.sweep_seconds += sweep_seconds + calcSecondsSince(start_rest);
-}
-
-// Stops for good at a node that could not be linearized or swept.
-void Run::sweepReadyNodes() {
-  while (sweep_node_ >= 0 && work_.sweep.getResult().status == LqStatus::Ok &&
-         work_.linearized[sweep_node_].load(std::memory_order_acquire)) {
-    const ControlBox* box = sweep_node_ < N_ && !work_.boxes.empty() ? &work_.boxes[sweep_node_] : nullptr;
-    work_.sweep.updateNode(sweep_node_, work_.models[sweep_node_], box);
-    work_.hessians.takeBack(work_.models[sweep_node_]);
-    --sweep_node_;
-  }
-}
-
-LqRegularization Run::getRegularization() const {
-  return {regularization_, regularization_ * options_.state_regularization_ratio};
-}
-
-// Stages, or the terminal node. Runs in parallel: nothing may leave but through its own entries of the workspace.
-void Run::linearizeNodes(int begin, int end) {
-  std::string thrown;
-  for (int k = begin; k < end; ++k) work_.hessians.lend(work_.models[k]);
-  try {
-    if (begin < N_) {
-      problem_.linearizeStages(begin, end, trajectory_.xs, trajectory_.us, work_.models, work_.statuses);
-    } else {
-      work_.statuses[N_] = problem_.linearizeTerminal(trajectory_.xs[N_], work_.models[N_]);
-    }
-  } catch (const std::exception& error) {
-    thrown = std::string("the linearization threw: ") + error.what();
-  } catch (...) {
-    thrown = "the linearization threw";
-  }
-  for (int k = begin; k < end; ++k) {
-    work_.failures[k] = thrown.empty() ? checkModel(k) : thrown;
-    if (work_.failures[k].empty()) work_.linearized[k].store(true, std::memory_order_release);
-  }
-}
-
-// What is wrong with the model of a node, empty if nothing is.
-std::string Run::checkModel(int k) const {
-  const StageModel& model = work_.models[k];
-  if (work_.statuses[k] != StepStatus::Ok) {
-    const std::string reason = problem_.getFailure(k);
-    return "the problem could not be linearized" + (reason.empty() ? "" : ": " + reason);
-  }
-  const int nu = k < N_ ? problem_.controlSize(k) : 0, ndx_next = k < N_ ? problem_.tangentSize(k + 1) : 0;
-  if (!model.hasSizes(problem_.tangentSize(k), nu, ndx_next))
-    return "the quadratic model has other sizes than the problem says";
-  if (!std::isfinite(model.cost) || !model.gap.allFinite()) return "the cost or the gap is not finite";
-  return {};
 }
 
 // Ends with an acceptable trial, unless the current iterate is where the iterations end.
 Run::End Run::findStep() {
   while (true) {
     if (isInterrupted()) return FddpTermination::Interrupted;
-    if (const End end = updateBackwardPass()) return end;
+    if (const End end = updateStep()) return end;
     if (line_.gradient <= options_.gradient_tolerance && isFeasible()) return FddpTermination::Converged;
     if (searchLine()) return {};
     if (const End end = raiseRegularization("no step is acceptable")) return end;
@@ -271,19 +179,21 @@ Run::End Run::findStep() {
 
 // The sweep, at the least regularization from the current one on for which it goes through. A second one needs the models
 // anew: the sweep uses them up.
-Run::End Run::updateBackwardPass() {
+Run::End Run::updateStep() {
   while (true) {
-    const Clock::time_point start = Clock::now();
-    if (!swept_) linearizeAndSweep();
+    if (!swept_)
+      if (const End end = linearizeAndSweep()) return end;
     swept_ = false;
-    const LqResult result = work_.sweep.getResult();
+    const Clock::time_point start = Clock::now();
+    const LqSweep& sweep = work_.backward.getSweep();
+    const LqResult result = sweep.getResult();
     if (result.status == LqStatus::NotFinite) {
       summary_.message = "node " + std::to_string(result.node) + ": the quadratic models are not finite";
       return FddpTermination::Failed;
     }
     line_.regularization = regularization_;
     if (result.status == LqStatus::Ok) {
-      slope_ = work_.sweep.calcStep(work_.models, work_.dx, work_.du);
+      slope_ = sweep.calcStep(work_.backward.getModels(), work_.dx, work_.du);
       summary_.sweep_seconds += calcSecondsSince(start);
       curvature_ = 2 * (result.expected_change - slope_);  // Eq. (8) of the sweep
       line_.gradient = calcGradient();
@@ -297,7 +207,7 @@ Run::End Run::updateBackwardPass() {
 double Run::calcGradient() const {
   double gradient = 0;
   for (int k = 0; k < N_; ++k) {
-    const VectorXd& Qu = work_.sweep.getNodes()[k].Qu;
+    const VectorXd& Qu = work_.backward.getSweep().getNodes()[k].Qu;
     if (work_.boxes.empty()) {
       gradient += Qu.squaredNorm();
     } else {
@@ -325,7 +235,8 @@ bool Run::closesTwice(int segments) const {
 bool Run::searchLine() {
   const double penalized = std::max(0.0, slope_ + 0.5 * std::max(0.0, curvature_));
   const double nu = gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0;  // Eq. (5)
-  const RolloutInput input{problem_, trajectory_, work_.models, work_.sweep, work_.dx, work_.bounds, isFeasible()};
+  const RolloutInput input{problem_,     trajectory_, work_.backward.getModels(), work_.backward.getSweep(), work_.dx,
+                           work_.bounds, isFeasible()};
   Rollout& rollout = work_.rollout;
   const auto accept = [&](bool ok, double alpha) {
     if (!ok || !isAcceptable(alpha, nu)) return false;
@@ -407,6 +318,8 @@ Run::End Run::checkProgress() {
 FddpSummary Run::finish(FddpTermination termination) {
   summary_.termination = termination;
   summary_.seconds = calcSecondsSince(start_);
+  summary_.linearize_seconds = work_.backward.getLinearizeSeconds();
+  summary_.sweep_seconds += work_.backward.getSweepSeconds();
   summary_.rollout_seconds = work_.rollout.getSeconds();
   const bool judged = termination == FddpTermination::Converged || termination == FddpTermination::RegularizationMax;
   if (judged && line_.step == 0) {  // the iterate from which no step was taken
@@ -445,6 +358,6 @@ FddpSummary Fddp::solve(ShootingProblem& problem, ShootingTrajectory& trajectory
   return Run(options_, problem, trajectory, observer, *work_).solve();
 }
 
-const LqSweep& Fddp::getSweep() const { return work_->sweep; }
+const LqSweep& Fddp::getSweep() const { return work_->backward.getSweep(); }
 
 }  // namespace bielle

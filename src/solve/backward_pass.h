@@ -1,0 +1,53 @@
+#pragma once
+// The linearization of all nodes and the sweep over them (fddp.h, 1 and 2).
+#include <atomic>
+#include <string>
+
+#include "bielle/solve/fddp.h"
+#include "hessian_pool.h"
+
+namespace bielle {
+
+/// The trajectory to linearize about, the boxes of du (N or none), and what the sweep adds.
+struct BackwardInput {
+  ShootingProblem& problem;
+  const ShootingTrajectory& nodes;
+  const std::vector<ControlBox>& boxes;
+  LqRegularization regularization;
+  int threads;
+};
+
+/// The sweep needs one node after the other, from the last on, and so it goes along with the linearization: whoever has
+/// finished a batch of nodes sweeps as far as models are there, unless somebody does so already.
+class BackwardPass {
+ public:
+  void resize(const ShootingProblem& problem);
+
+  /// Returns the first node that could not be linearized, -1 if all could. The sweep may have stopped all the same.
+  int update(const BackwardInput& input);
+  /// Why a node could not be linearized, empty if it could.
+  const std::string& getFailure(int node) const { return failures_[node]; }
+
+  /// N + 1, but for their second derivatives, which the sweep uses up.
+  const std::vector<StageModel>& getModels() const { return models_; }
+  const LqSweep& getSweep() const { return sweep_; }
+  /// Of all updates since resize(), summed over the threads.
+  double getLinearizeSeconds() const { return linearize_seconds_; }
+  double getSweepSeconds() const { return sweep_seconds_; }
+
+ private:
+  void linearize(const BackwardInput& input, int begin, int end);
+  std::string checkModel(const ShootingProblem& problem, int k) const;
+  void sweepReadyNodes(const BackwardInput& input);
+
+  std::vector<StageModel> models_;             // N + 1, those that wait for the sweep with a Hessian from the pool
+  std::vector<std::string> failures_;          // N + 1
+  std::vector<StepStatus> statuses_;           // N + 1
+  std::vector<std::atomic<bool>> linearized_;  // N + 1: the model is there for the sweep
+  HessianPool hessians_;
+  LqSweep sweep_;
+  int sweep_node_ = -1;  // the next one
+  double linearize_seconds_ = 0, sweep_seconds_ = 0;
+};
+
+}  // namespace bielle
