@@ -50,6 +50,17 @@ std::string describeFailures(const Comparisons& all) {
 }
 double calcPeakRatio(const Comparison& entry) { return entry.lifted.knee.peak / entry.closed.knee.peak; }
 
+// Of the closed model's peak knee torque over the values, "FROM least TO most".
+Claim judgeEffort(const char* section, const char* text, const char* from, const char* to, const Comparisons& all) {
+  double least = INFINITY, most = 0;
+  for (const Comparison& entry : all)
+    if (hasClosed(entry))
+      least = std::min(least, entry.closed.knee.peak), most = std::max(most, entry.closed.knee.peak);
+  if (most == 0) return {section, text, Verdict::Open, "no results"};
+  return {section, text, most < 2 * least ? Verdict::Agrees : Verdict::Differs,
+          print("%s %.1f %s %.1f N m (agrees: within a factor of two)", from, least, to, most)};
+}
+
 Claim judgeConvergence(const char* section, const char* text, const Comparisons& all) {
   const int n = static_cast<int>(all.size()), closed = count(all, hasClosed), serial = count(all, hasSerial);
   const Verdict verdict = closed == n && serial == n ? Verdict::Agrees : Verdict::Differs;
@@ -96,19 +107,8 @@ std::vector<Claim> judgeSquat(const StudyResult& result, const Model&) {
                     : Verdict::Differs,
        print("peak knee torque, lifted over closed, where lifted to the end: %s; until a lift fails: at most %.2f",
              describePeakRatios(all).c_str(), ratio)});
-
-  double least = INFINITY, most = 0;
-  for (const Comparison& entry : all)
-    if (hasClosed(entry))
-      least = std::min(least, entry.closed.knee.peak), most = std::max(most, entry.closed.knee.peak);
-  claims.push_back({"V-A.1", "the closed model anticipates and makes an effective movement",
-                    most == 0          ? Verdict::Open
-                    : most < 2 * least ? Verdict::Agrees
-                                       : Verdict::Differs,
-                    most == 0
-                        ? "no results"
-                        : print("its peak knee torque stays between %.1f and %.1f N m (agrees: within a factor of two)",
-                                least, most)});
+  claims.push_back(judgeEffort("V-A.1", "the closed model anticipates and makes an effective movement",
+                               "its peak knee torque stays between", "and", all));
   return claims;
 }
 
@@ -158,17 +158,8 @@ std::vector<Claim> judgeSpeed(const StudyResult& result, const Model&) {
                     : late > 0                       ? Verdict::Partly
                                                      : Verdict::Differs,
                     "speeds whose lift fails: " + describeFailures(all)});
-  double least = INFINITY, most = 0;
-  for (const Comparison& entry : all)
-    if (hasClosed(entry))
-      least = std::min(least, entry.closed.knee.peak), most = std::max(most, entry.closed.knee.peak);
-  claims.push_back({"V-A.3", "the closed model's motor effort stays reasonable, independently of the speed",
-                    most == 0          ? Verdict::Open
-                    : most < 2 * least ? Verdict::Agrees
-                                       : Verdict::Differs,
-                    most == 0
-                        ? "no results"
-                        : print("peak knee torque %.1f to %.1f N m (agrees: within a factor of two)", least, most)});
+  claims.push_back(judgeEffort("V-A.3", "the closed model's motor effort stays reasonable, independently of the speed",
+                               "peak knee torque", "to", all));
   return claims;
 }
 
