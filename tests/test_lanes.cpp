@@ -259,6 +259,44 @@ TEST_CASE("deviations of steps taken together are differences, with and without 
   check();
 }
 
+TEST_CASE("states moved together are those moved alone, whichever come together") {
+  const LoadedRobot robot = loadRobot("bipetto");
+  Walk walk(robot.model);
+  RobotProblem& problem = *walk.motion.problem;
+  const auto& [xs, us] = walk.motion.guess;
+  const int N = problem.numStages();
+  std::mt19937 rng(5);
+  std::normal_distribution<double> normal;
+  std::vector<VectorXd> dxs(N + 1, VectorXd(problem.tangentSize(0)));
+  for (VectorXd& dx : dxs)
+    for (double& x : dx) x = 0.02 * normal(rng);
+  const auto move = [&](const std::vector<int>& nodes, std::vector<VectorXd>& moved) {
+    std::vector<IntegrateTask> tasks;
+    for (int k : nodes) tasks.push_back({k, &xs[k], &dxs[k], &moved[k]});
+    problem.integrateNodes(tasks);
+  };
+  std::vector<VectorXd> before(N + 1, xs[0]), moved = before, again = before;
+  move({0, 2, 3, 5, 7, 8, 9, 11, 12, 15}, before);  // no bases at hand
+  walk.linearize(0, N);
+  const std::vector<int> some = {0, 2, 3, 5, 7, 8, 9, 11, 12, 15};
+  move(some, moved);
+  move({3, 5}, again);
+  CHECK((again[3] == moved[3] && again[5] == moved[5]));  // by the bit
+  for (int k : some) {
+    VectorXd alone(problem.stateSize()), dx(problem.tangentSize(k));
+    problem.integrate(k, xs[k], dxs[k], alone);
+    CHECK((moved[k] - alone).norm() < 1e-11 * alone.norm());
+    CHECK((moved[k] - before[k]).norm() < 1e-11 * alone.norm());
+    problem.difference(k, xs[k], moved[k], dx);
+    CHECK((dx - dxs[k]).norm() < 1e-10 * dx.norm());
+  }
+  dxs[5] *= 1e4;  // beyond the reach of every loop
+  move(some, again);
+  CHECK(!again[5].allFinite());
+  CHECK(problem.getFailure(5).find("closure") != std::string::npos);
+  CHECK(again[7] == moved[7]);
+}
+
 TEST_CASE("a step that fails does so alone, and says why") {
   const LoadedRobot robot = loadRobot("bipetto");
   Walk walk(robot.model), other(robot.model);
@@ -300,6 +338,9 @@ TEST_CASE("steps and models made together allocate nothing after the first") {
   Walk walk(robot.model);
   const int N = walk.motion.problem->numStages();
   std::vector<StepTask> tasks = walk.step({1, 4, 8});
+  const std::vector<VectorXd>& xs = walk.motion.guess.xs;
+  VectorXd dx = VectorXd::Constant(walk.motion.problem->tangentSize(0), 1e-3), moved = xs[0];
+  const std::vector<IntegrateTask> starts = {{2, &xs[2], &dx, &moved}};
   walk.linearize(0, N);
   for (VectorXd& u : walk.motion.guess.us) u.array() += 0.1;
   const long before = num_allocations;
@@ -307,5 +348,6 @@ TEST_CASE("steps and models made together allocate nothing after the first") {
   CHECK(num_allocations == before + 1);
   walk.motion.problem->stepStages(tasks);
   walk.linearize(0, N);
+  walk.motion.problem->integrateNodes(starts);
   CHECK(num_allocations == before + 1);
 }

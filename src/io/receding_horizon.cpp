@@ -30,6 +30,12 @@ class Window : public ShootingProblem {
   void integrate(int node, ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) const override {
     whole_.integrate(getNode(node), x, dx, x_out);
   }
+  void integrateNodes(const std::vector<IntegrateTask>& tasks) const override {
+    static thread_local std::vector<IntegrateTask> whole_tasks;
+    whole_tasks = tasks;
+    for (IntegrateTask& task : whole_tasks) task.node = getNode(task.node);
+    whole_.integrateNodes(whole_tasks);
+  }
   void difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override {
     whole_.difference(getNode(node), x0, x1, dx);
   }

@@ -1,5 +1,7 @@
 #include "bielle/math/lanes.h"
 
+#include <algorithm>
+
 namespace bielle {
 namespace {
 
@@ -33,9 +35,15 @@ void transpose(std::array<Vector, kLane>& rows) {
 
 }  // namespace
 
+// By kLane numbers of each lane, the last of which repeat some of the ones before.
 void packLanes(const std::array<const double*, kLane>& in, Eigen::Index size, Lanes* out) {
-  Eigen::Index i = 0;
-  for (; i + kLane <= size; i += kLane) {
+  if (size < kLane) {
+    for (Eigen::Index i = 0; i < size; ++i)
+      for (Eigen::Index l = 0; l < kLane; ++l) out[i].v[l] = in[l][i];
+    return;
+  }
+  for (Eigen::Index k = 0; k < size; k += kLane) {
+    const Eigen::Index i = std::min(k, size - kLane);
     std::array<Vector, kLane> rows;
 #pragma GCC unroll 8
     for (Eigen::Index l = 0; l < kLane; ++l) rows[l] = *reinterpret_cast<const Anywhere*>(in[l] + i);
@@ -43,13 +51,16 @@ void packLanes(const std::array<const double*, kLane>& in, Eigen::Index size, La
 #pragma GCC unroll 8
     for (Eigen::Index l = 0; l < kLane; ++l) out[i + l].v = rows[l];
   }
-  for (; i < size; ++i)
-    for (Eigen::Index l = 0; l < kLane; ++l) out[i].v[l] = in[l][i];
 }
 
 void unpackLanes(const Lanes* in, Eigen::Index size, const std::array<double*, kLane>& out, Eigen::Index stride) {
-  Eigen::Index i = 0;
-  for (; i + kLane <= size; i += kLane) {
+  if (size < kLane) {
+    for (Eigen::Index l = 0; l < kLane; ++l)
+      for (Eigen::Index i = 0; i < size && out[l]; ++i) out[l][i] = in[i * stride].v[l];
+    return;
+  }
+  for (Eigen::Index k = 0; k < size; k += kLane) {
+    const Eigen::Index i = std::min(k, size - kLane);
     std::array<Vector, kLane> rows;
 #pragma GCC unroll 8
     for (Eigen::Index l = 0; l < kLane; ++l) rows[l] = in[(i + l) * stride].v;
@@ -58,9 +69,6 @@ void unpackLanes(const Lanes* in, Eigen::Index size, const std::array<double*, k
     for (Eigen::Index l = 0; l < kLane; ++l)
       if (out[l]) *reinterpret_cast<Anywhere*>(out[l] + i) = rows[l];
   }
-  for (; i < size; ++i)
-    for (Eigen::Index l = 0; l < kLane; ++l)
-      if (out[l]) out[l][i] = in[i * stride].v[l];
 }
 
 // Minimax polynomials of FreeBSD's libm (k_sin.c, k_cos.c), whose errors are below 2^-58.

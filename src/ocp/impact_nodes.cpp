@@ -1,5 +1,7 @@
 #include "impact_nodes.h"
 
+#include "bielle/dynamics/kinematics.h"
+
 namespace bielle {
 
 FullImpactNode::FullImpactNode(const Model& model, const StageSpec& spec) : FullNode(model, spec), iws_(model) {
@@ -100,23 +102,44 @@ void ReducedImpactNode::updateForceDerivatives() {
 bool ReducedImpactNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out) {
   const LoopBlock& loop = b.loop;
   BlockWork& work = *b.work;
+  BlockGapOf<double>& gap = work.gap;
   const int nr = reduction_.size, o = loop.offset, r = loop.size;
-  for (MatrixXd* m : {&work.q_y, &work.v_v, &work.v_a}) m->setIdentity();
-  for (MatrixXd* m : {&work.q_v, &work.q_a, &work.v_y}) m->setZero();
-  gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), work.q);
-  gatherVelocity(loop, x_next_node.tail(model_.nv()), work.d);
-  out.gap.segment(o, r).setZero();
-  out.gap.segment(nr + o, r).setZero();
-  if ((work.q != b.next.basis().q || work.d != b.v_next) && !moveToNodeState(b, out)) return false;
-  // v_v (W N)^T, whose rows pick dv+ of the block's dofs.
-  work.HN.noalias() = b.at.WN * work.v_v.transpose();
+  gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), gap.q);
+  gatherVelocity(loop, x_next_node.tail(model_.nv()), gap.v);
+  if (!updateGap(b)) return false;
+  out.gap.segment(o, r) = gap.y;
+  out.gap.segment(nr + o, r) = gap.y_v;
+  // P_v (W N)^T, whose rows pick dv+ of the block's dofs.
+  work.HN.noalias() = b.at.WN * gap.P_v.transpose();
   for (size_t k = 0; k < loop.dofs.size(); ++k)
     for (int c = 0; c < r; ++c) {
       out.Fx().row(nr + o + c).head(nr) += work.HN(k, c) * D_y_.col(loop.dofs[k]).transpose();
       out.Fx().row(nr + o + c).tail(nr) += work.HN(k, c) * D_v_.col(loop.dofs[k]).transpose();
     }
-  out.Fx().block(o, o, r, r) = work.q_y;
-  out.Fx().block(nr + o, o, r, r) += work.v_y;
+  out.Fx().block(o, o, r, r) = gap.P_q;
+  out.Fx().block(nr + o, o, r, r) += gap.P_z;
+  return true;
+}
+
+// From q+ to the node state that it holds.
+bool ReducedImpactNode::updateGap(Block& b) {
+  const LoopBlock& loop = b.loop;
+  BlockWork& work = *b.work;
+  BlockGapOf<double>& gap = work.gap;
+  if (gap.q == b.next.basis().q && gap.v == b.v_next) {
+    for (VectorXd* x : {&gap.y, &gap.y_v}) x->setZero();
+    for (MatrixXd* P : {&gap.P_q, &gap.P_v}) P->setIdentity();
+    gap.P_z.setZero();
+    return true;
+  }
+  b.next.load(loop, work.scratch);
+  const auto view = getOwnView(loop, work.scratch.ws);
+  updateTwists(view, b.next.basis(), work.ahead);
+  updateVelocities(loop.model, work.scratch.ws, b.v_next);
+  updateVelocityLift(view, work.ahead);
+  if (!work.point.update(loop, work.scratch, gap.q)) return fail(b, work.point);
+  gap.WN = work.point.basis().WN;
+  gap.update(loop, b.next.basis(), b.v_next, work.ahead.Z);
   return true;
 }
 

@@ -27,12 +27,13 @@ class ReducedImpactNode : public ReducedNode {
                     std::shared_ptr<ReducedWorkPool> pool);
   bool updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override;
   bool startStep(ConstVectorRef, ConstVectorRef, const NodeModel*) override { return false; }
-  void prepareLinearization(NodeModel* const*, int) override {}
+  void prepareLinearization(const Linearization*, int) override {}
   bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
 
  private:
   void updateForceDerivatives();
   bool linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out);
+  bool updateGap(Block& b);
   void linearizeFreeJoint(const FreeJoint& free, StageModel& out) const;
 
   ImpactWorkspace iws_;

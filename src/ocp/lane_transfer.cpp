@@ -70,15 +70,17 @@ void ReducedLanes::packNodes() {
   pack([](Node n) { return n.tau_.data(); }, tau_.size(), tau_.data());
   pack([](Node n) { return &n.spec_.dt; }, 1, &h_);
   for (size_t i = 0; i < blocks_.size(); ++i)
-    packBasis([&](Node n) -> const BlockBasis& { return n.blocks_[i].at; }, blocks_[i].at);
+    packBasis(
+        blocks_[i].loop, [&](Node n) -> const BlockBasis& { return n.blocks_[i].at; }, blocks_[i].at);
   for (size_t i = 0; i < contacts_.size(); ++i) packContact(i);
 }
 
 template <typename GetBasis>
-void ReducedLanes::packBasis(const GetBasis& getBasis, BlockBasisOf<Lanes>& to) const {
+void ReducedLanes::packBasis(const LoopBlock& block, const GetBasis& getBasis, BlockBasisOf<Lanes>& to) const {
   using Node = const ReducedNode&;
   pack([&](Node n) { return getBasis(n).N.data(); }, to.N.size(), to.N.data());
-  pack([&](Node n) { return getBasis(n).WN.data(); }, to.WN.size(), to.WN.data());
+  for (Eigen::Index c = 0; c < to.N.cols(); ++c)
+    for (Eigen::Index k = 0; k < to.N.rows(); ++k) to.WN(k, c) = block.metric[k] * to.N(k, c);
   pack([&](Node n) { return getBasis(n).J.data(); }, to.J.size(), to.J.data());
   pack([&](Node n) { return getBasis(n).L.data(); }, to.L.size(), to.L.data());
   for (size_t k = 0; k < to.rows.size(); ++k)
@@ -94,7 +96,10 @@ void ReducedLanes::packSteps() {
 void ReducedLanes::packBlock(size_t i) {
   using Node = const ReducedNode&;
   BlockLanes& b = blocks_[i];
-  packBasis([&](Node n) -> const BlockBasis& { return n.blocks_[i].next.basis(); }, b.next);
+  packBasis(
+      b.loop, [&](Node n) -> const BlockBasis& { return n.blocks_[i].next.basis(); }, b.next);
+  pack([&](Node n) { return n.blocks_[i].next.basis().q.data(); }, b.next.q.size(), b.next.q.data());
+  pack([&](Node n) { return n.blocks_[i].v_next.data(); }, b.v_next.size(), b.v_next.data());
   pack([&](Node n) { return n.blocks_[i].next.zeta().data(); }, b.zeta.size(), b.zeta.data());
   pack([&](Node n) { return n.blocks_[i].next.step().data(); }, b.step.size(), b.step.data());
   pack([&](Node n) { return getNumbers(n.blocks_[i].next.placements().front()); }, 12 * b.loop.model.numBodies(),
@@ -186,6 +191,14 @@ void ReducedLanes::linearizeStateCosts() {
   unpack(model.hessian.data(), model.hessian.size(), [this](size_t l) { return views_[l].state_cost.hessian.data(); });
 }
 
+void ReducedLanes::packPoint(size_t i) {
+  using Node = const ReducedNode&;
+  BlockLanes& b = blocks_[i];
+  packBasis(
+      b.loop, [&](Node n) -> const BlockBasis& { return n.blocks_[i].at; }, b.at);
+  pack([&](Node n) { return n.blocks_[i].at.q.data(); }, b.at.q.size(), b.at.q.data());
+}
+
 void ReducedLanes::packBlockStep(size_t i) {
   using Node = const ReducedNode&;
   BlockLanes& b = blocks_[i];
@@ -207,7 +220,7 @@ void ReducedLanes::storeFactors(const LaneMask& solved) {
       const int i = static_cast<int>(slot) * 6 + r;
       const auto column = system_.Wt.col(i);
       unpack(column.data(), column.size(), [&](size_t l) -> double* {
-        const int row = solved[l] ? nodes_[l]->findContactRow(slot, r) : -1;
+        const int row = solved[l] ? nodes_[l]->getContactRow(slot, r) : -1;
         return row < 0 ? nullptr : &nodes_[l]->factors_.Wt(0, row);
       });
     }
@@ -220,14 +233,14 @@ void ReducedLanes::storeForces(size_t lane) {
   ReducedNode& node = *nodes_[lane];
   for (size_t slot = 0; slot < contacts_.size(); ++slot)
     for (int r = 0; r < 6; ++r) {
-      const int row = node.findContactRow(slot, r);
+      const int row = node.getContactRow(slot, r);
       if (row < 0) continue;
       const Eigen::Index i = 6 * slot + r;
       node.lambda_[node.loop_rows_ + row] = system_.lambda[i][lane];
       node.factors_.D[row] = system_.D[i][lane];
       for (size_t other = 0; other < contacts_.size(); ++other)
         for (int s = 0; s < 6; ++s) {
-          const int col = node.findContactRow(other, s);
+          const int col = node.getContactRow(other, s);
           if (col >= 0) node.factors_.Ginv(row, col) = system_.Ginv(i, 6 * other + s)[lane];
         }
     }
@@ -295,11 +308,16 @@ void ReducedLanes::storeDerivatives() {
   for (size_t i = 0; i < blocks_.size(); ++i) {
     const BlockLanes& b = blocks_[i];
     store(b.motion.Z, [i](LaneView& view) { return view.blocks[i].Z.data(); });
-    store(b.E, [i](LaneView& view) { return view.blocks[i].E.data(); });
-    store(b.En, [i](LaneView& view) { return view.blocks[i].En.data(); });
-    store(b.S, [i](LaneView& view) { return view.blocks[i].S.data(); });
-    store(b.mixed, [i](LaneView& view) { return view.blocks[i].mixed.data(); });
-    store(b.mixed_next, [i](LaneView& view) { return view.blocks[i].mixed_next.data(); });
+    store(b.q_y, [i](LaneView& view) { return view.blocks[i].q_y.data(); });
+    store(b.q_v, [i](LaneView& view) { return view.blocks[i].q_v.data(); });
+    store(b.v_y, [i](LaneView& view) { return view.blocks[i].v_y.data(); });
+    store(b.v_v, [i](LaneView& view) { return view.blocks[i].v_v.data(); });
+    store(b.gap.y, [i](LaneView& view) { return view.blocks[i].gap.data(); });
+    store(b.gap.y_v, [i](LaneView& view) { return view.blocks[i].gap_v.data(); });
+    for (size_t l = 0; l < nodes_.size(); ++l) {
+      views_[l].blocks[i].turned = b.turned[l];
+      views_[l].blocks[i].placed = b.placed[l];
+    }
   }
   for (size_t i = 0; i < contacts_.size(); ++i) {
     if (!contacts_[i].used) continue;

@@ -37,6 +37,14 @@ class NodeModel {
   virtual void difference(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) = 0;
 
   // Of several nodes of this kind, by one thread.
+  struct Integration {
+    NodeModel* node;
+    const VectorXd *x, *dx;
+    VectorXd* x_out;
+  };
+  virtual void integrateNodes(const Integration* items, int count) {
+    for (int i = 0; i < count; ++i) items[i].node->integrate(*items[i].x, *items[i].dx, *items[i].x_out);
+  }
   struct Difference {
     NodeModel* node;
     const VectorXd *x0, *x1;
@@ -63,7 +71,12 @@ class NodeModel {
   virtual void finishSteps(NodeModel* const* /*nodes*/, int /*count*/, bool* /*ok*/) {}
   virtual void showStep(int /*index*/) {}
   // Before linearizeStep() of at most kLane nodes of this kind, by the same thread: does at once what they have in common.
-  virtual void prepareLinearization(NodeModel* const* /*nodes*/, int /*count*/) {}
+  struct Linearization {
+    NodeModel* node;
+    const double* x_next_node;
+    const NodeModel* next;  // the node of this kind whose state that is, where it may be looked at; or null
+  };
+  virtual void prepareLinearization(const Linearization* /*items*/, int /*count*/) {}
   // Fx, Fu and gap about the last updateStep(); the derivatives that setResiduals() needs.
   virtual bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) = 0;
   // To be called after updateState() at the terminal node in place of linearizeStep().

@@ -7,37 +7,18 @@
 #include "reduced_node.h"
 
 namespace bielle {
-namespace {
-
-using JointMatrixLanes = Eigen::Matrix<Lanes, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
-
-// Jacobian of q (+) d with respect to q: node by node but for the one kind that loops are full of.
-JointMatrixLanes calcIntegrateJacobian(const Joint& joint, const VectorUpTo6<Lanes>& d) {
-  if (joint.kind == JointKind::Spherical) return exp3<Lanes>(d).transpose();
-  const int n = joint.nv;
-  JointMatrixLanes out(n, n);
-  JointMatrix q(n, n), step(n, n);
-  JointVector one(n);
-  for (Eigen::Index l = 0; l < kLane; ++l) {
-    unpackLane(d.data(), l, n, one.data());
-    calcJointIntegrateJacobians(joint, one, q, step);
-    for (int c = 0; c < n; ++c)
-      for (int r = 0; r < n; ++r) out(r, c).set(l, q(r, c));
-  }
-  return out;
-}
-
-}  // namespace
 
 BlockLanes::BlockLanes(const LoopBlock& l)
-    : loop(l), at(l), next(l), own(l.model), motion(l), ahead(l), scratch(l), closing(l) {
+    : loop(l), at(l), next(l), own(l.model), motion(l), ahead(l), gap(l), scratch(l), closing(l) {
   const int n = l.model.nv(), r = l.size, rank = l.rank;
   target.setZero(r);
   for (VectorX<Lanes>* x : {&left, &step, &a_d, &v_next}) x->setZero(n);
   for (VectorX<Lanes>* x : {&zeta, &independent, &drift, &predicted, &surplus}) x->setZero(rank);
   rows.setZero(l.closures.rows);
   for (MatrixX<Lanes>* x : {&HN, &HnNn, &JqN, &P, &Pn}) x->setZero(n, r);
-  for (MatrixX<Lanes>* x : {&E, &En, &S, &mixed, &mixed_next}) x->setZero(r, r);
+  for (MatrixX<Lanes>* x : {&E, &En, &S, &X, &Xn, &mixed, &mixed_next, &q_y, &q_v, &v_y, &v_v}) x->setZero(r, r);
+  pivots.resize(r);
+  q_near.setZero(l.model.nq());
 }
 
 LaneView::LaneView(const Model& model, const Reduction& reduction, const std::vector<BlockLanes>& blocks,
@@ -47,7 +28,8 @@ LaneView::LaneView(const Model& model, const Reduction& reduction, const std::ve
   for (const BlockLanes& b : blocks) {
     const Eigen::Index n = b.at.N.rows(), r = b.at.N.cols();
     const MatrixXd square = MatrixXd::Zero(r, r);
-    this->blocks.push_back({MatrixXd::Zero(n, r), square, square, square, square, square});
+    const VectorXd gap = VectorXd::Zero(r);
+    this->blocks.push_back({MatrixXd::Zero(n, r), square, square, square, square, gap, gap, true, true});
   }
   for (const ContactLanes& contact : contacts) {
     const Matrix6Xd columns = Matrix6Xd::Zero(6, contact.J.cols());
@@ -93,36 +75,8 @@ int ReducedLanes::findLane(const ReducedNode* node) const {
   return found == nodes_.end() ? -1 : static_cast<int>(found - nodes_.begin());
 }
 
-void ReducedLanes::setNodes(NodeModel* const* nodes, int count) {
-  nodes_.clear();
-  for (int l = 0; l < count; ++l) nodes_.push_back(static_cast<ReducedNode*>(nodes[l]));
-}
-
-void ReducedLanes::linearize(NodeModel* const* nodes, int count) {
-  setNodes(nodes, count);
-  packPlacements();
-  packNodes();
-  packSteps();
-  updateColumns(model_, ws_);
-  updateVelocities(model_, ws_, v_);
-  updateAccelerations(model_, ws_, a_);
-  for (BlockLanes& b : blocks_) {
-    const auto view = getPlacedView(b.loop, ws_);
-    updateTwists(view, b.at, b.motion);
-    updateVelocityLift(view, b.motion);
-    updateAccelerationLift(view, b.motion);
-  }
-  updateForces();
-  tree_.updateDerivatives(ws_, lifts_, A_y_, A_v_);
-  for (ContactLanes& contact : contacts_)
-    if (contact.used) updateContact(contact);
-  for (BlockLanes& b : blocks_) linearizeStep(b);
-  linearizeStateCosts();
-  storeDerivatives();
-}
-
 LaneMask ReducedLanes::startSteps(NodeModel* const* nodes, int count, LaneMask& placed) {
-  setNodes(nodes, count);
+  setNodes(count, [&](int l) { return static_cast<ReducedNode*>(nodes[l]); });
   placed = updatePoints();
   packNodes();
   updateStateCosts();
@@ -156,45 +110,6 @@ LaneMask ReducedLanes::startSteps(NodeModel* const* nodes, int count, LaneMask& 
     if (nodes_[l]->hasHinges()) solved.v[l] = 0;
   storeFactors(solved);
   return solved;
-}
-
-void ReducedLanes::calcDifferences(const NodeModel::Difference* items, int count) {
-  const int nq = model_.nq(), nr = reduction_.size;
-  const auto packItems = [&](const auto& get, Eigen::Index size, Lanes* out) {
-    std::array<const double*, kLane> in;
-    for (int l = 0; l < kLane; ++l) in[l] = get(items[l < count ? l : 0]);
-    packLanes(in, size, out);
-  };
-  packItems([](const auto& item) { return item.x0->data(); }, x0_.size(), x0_.data());
-  packItems([](const auto& item) { return item.x1->data(); }, x1_.size(), x1_.data());
-  const auto subtract = [&](const Joint& joint, auto&& d) {
-    calcJointDifference(joint, x0_.segment(joint.idx_q, joint.nq), x1_.segment(joint.idx_q, joint.nq), d);
-  };
-  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
-    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
-    const int o = reduction_.free_offsets[i];
-    subtract(joint, dx_.segment(o, joint.nv));
-    dx_.segment(nr + o, joint.nv) = x1_.segment(nq + joint.idx_v, joint.nv) - x0_.segment(nq + joint.idx_v, joint.nv);
-  }
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    BlockLanes& b = blocks_[i];
-    MatrixX<Lanes>& chart = b.P;
-    packItems([i](const auto& item) { return static_cast<const ReducedNode*>(item.node)->blocks_[i].chart.data(); },
-              chart.size(), chart.data());
-    for (size_t j = 0; j < b.loop.joints.size(); ++j) {
-      const Joint &own = b.loop.model.joints()[j + 1], &joint = model_.joints()[b.loop.joints[j]];
-      subtract(joint, b.left.segment(own.idx_v, own.nv));
-    }
-    auto dy = dx_.segment(b.loop.offset, b.loop.size), dy_v = dx_.segment(nr + b.loop.offset, b.loop.size);
-    dy.setZero();
-    addSmallProductTransposed(chart, b.left, dy);
-    for (size_t k = 0; k < b.loop.dofs.size(); ++k) b.left[k] = x1_[nq + b.loop.dofs[k]] - x0_[nq + b.loop.dofs[k]];
-    dy_v.setZero();
-    addSmallProductTransposed(chart, b.left, dy_v);
-  }
-  std::array<double*, kLane> out{};
-  for (int l = 0; l < count; ++l) out[l] = items[l].dx->data();
-  unpackLanes(dx_.data(), dx_.size(), out);
 }
 
 // J_c N and gamma_c + J_c a_d; the accelerations of the workspace are those of a_d.
@@ -250,79 +165,6 @@ LaneMask ReducedLanes::close(BlockLanes& b) {
   b.v_next.setZero();
   addSmallProduct(next.N, b.target, b.v_next);
   return closed;
-}
-
-// H N of the loop forces, and the wrenches of the contacts on the bodies. The forces that the loops are left with are
-// those through their joints.
-void ReducedLanes::updateForces() {
-  for (Vector6<Lanes>& f : f_ext_) f.setZero();
-  for (const ContactLanes& contact : contacts_)
-    if (contact.used) f_ext_[tips_[contact.tip]] += contact.wrench;
-  updateInverseDynamicsFactors(model_, ws_, f_ext_);
-  for (BlockLanes& b : blocks_) {
-    for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
-      const int dof = b.loop.dofs[k];
-      const Lanes left =
-          ws_.J.col(dof).dot(ws_.F[model_.dofs()[dof].joint]) + model_.armature()[dof] * a_[dof] - tau_[dof];
-      b.left[k] = b.loop.inverse_metric[k] * left;
-    }
-    b.independent.setZero();
-    addSmallProduct(b.at.J, b.left, b.independent);
-    solveGram(b.at, b.independent);
-    expandIndependent(b.at, b.independent, b.rows);
-    calcForceLift(getPlacedView(b.loop, ws_), b.motion, b.rows, b.HN);
-  }
-}
-
-// Eq. (c)
-void ReducedLanes::updateContact(ContactLanes& contact) {
-  const auto& tip = tree_.getTip(contact.tip);
-  const Vector6<Lanes>&V1 = ws_.V[tips_[contact.tip]], &A2 = ws_.A[0];
-  for (size_t o = 0; o < tip.outer.size(); ++o) {
-    const Vector6<Lanes> J = tip.J.col(o), dV = tip.dV.col(o);
-    const Vector6<Lanes> dq = tip.dA.col(o) - crossMotion(V1, dV) + crossMotion(J, A2) + contact.kd * dV;
-    const Vector6<Lanes> dv = tip.dW.col(o) - crossMotion(V1, J) + contact.kd * J;
-    contact.dy.col(o) = contact.X_WF.actInvMotion(dq) - contact.kp_rate * contact.X_WF.actInvMotion(J);
-    contact.dv.col(o) = contact.X_WF.actInvMotion(dv);
-  }
-}
-
-// The products of Eqs. (d) to (g).
-void ReducedLanes::linearizeStep(BlockLanes& b) {
-  b.independent = b.zeta / h_;  // close() moves by h w', so its zeta is h times that of Eq. (e)
-  expandIndependent(b.at, b.independent, b.rows);
-  calcForceLift(getPlacedView(b.loop, ws_), b.motion, b.rows, b.HN);
-  updateColumns(b.loop.model, b.own);
-  const auto ahead = getOwnView(b.loop, b.own);
-  updateTwists(ahead, b.next, b.ahead);
-  b.independent.setZero();  // mu
-  addSmallProduct(b.next.J, b.step, b.independent);
-  b.independent /= h_;
-  solveGram(b.next, b.independent);
-  expandIndependent(b.next, b.independent, b.rows);
-  calcForceLift(ahead, b.ahead, b.rows, b.HnNn);
-
-  // J_q N, J_d^{-T} W N and J_d^{-T} W N': the identity but for the blocks of curved joints.
-  b.JqN = b.at.N;
-  b.P = b.at.WN;
-  b.Pn = b.next.WN;
-  for (const Joint& joint : b.loop.model.joints()) {
-    if (!isCurved(joint)) continue;
-    const int i = joint.idx_v, n = joint.nv;
-    JointMatrixLanes Jdiff(n, n);
-    calcJointDifferenceJacobian(joint, b.step.segment(i, n), Jdiff);
-    b.JqN.middleRows(i, n) = calcIntegrateJacobian(joint, b.step.segment(i, n)).lazyProduct(b.at.N.middleRows(i, n));
-    b.P.middleRows(i, n) = Jdiff.transpose().lazyProduct(b.at.WN.middleRows(i, n));
-    b.Pn.middleRows(i, n) = Jdiff.transpose().lazyProduct(b.next.WN.middleRows(i, n));
-  }
-  for (MatrixX<Lanes>* m : {&b.mixed, &b.mixed_next, &b.E, &b.En, &b.S}) m->setZero();
-  addSmallProductTransposed(b.P, b.next.N, b.mixed);
-  addSmallProductTransposed(b.Pn, b.next.N, b.mixed_next);
-  addSmallProductTransposed(b.at.N, b.HN, b.E);
-  b.E *= -h_;
-  addSmallProductTransposed(b.P, b.JqN, b.E);
-  addSmallProductTransposed(b.Pn, b.JqN, b.En);
-  addSmallProductTransposed(b.next.N, b.HnNn, b.S);
 }
 
 }  // namespace bielle

@@ -3,8 +3,8 @@
 // its Eqs. (b) to (g). Nodes may have different contacts and time steps. What is left to each of them is its residuals, its
 // quadratic model, and the system of its contacts where some are redundant.
 #include "bielle/dynamics/reduced_tree.h"
+#include "block_gap.h"
 #include "contact_system.h"
-#include "node_model.h"
 #include "reduced_state_cost.h"
 
 namespace bielle {
@@ -20,7 +20,14 @@ struct BlockLanes {
   BlockMotionOf<Lanes> motion, ahead;                  // at the states, in the whole model; at q+, in the block
   VectorX<Lanes> left, step, zeta, independent, rows;  // n, n, rank, rank, m
   MatrixX<Lanes> HN, HnNn, JqN, P, Pn;                 // n x r, as in reduced_node.h
-  MatrixX<Lanes> E, En, S, mixed, mixed_next;          // r x r: those of Eqs. (f) and (g), P^T N', P'^T N'
+  MatrixX<Lanes> E, En, S, X, Xn;                      // r x r: those of Eqs. (f) and (g)
+  MatrixX<Lanes> mixed, mixed_next;                    // r x r: P^T N', P'^T N'
+  std::vector<LogicOf<Lanes>::Index> pivots;
+  MatrixX<Lanes> q_y, q_v, v_y,
+      v_v;                  // r x r: dy+ and dy_v+ of Eq. (g) by dy and dy_v; by dy' they are h times those by dy_v
+  BlockGapOf<Lanes> gap;    // to the node states
+  VectorX<Lanes> q_near;    // nq, where a basis is known that may be that of a node state
+  LaneMask turned, placed;  // where X exists; where the bases of the node states do
   // Of a step
   BlockScratchOf<Lanes> scratch;
   BlockStateOf<Lanes> closing;                                    // at q+
@@ -46,7 +53,9 @@ struct LaneView {
   LaneView(const Model& model, const Reduction& reduction, const std::vector<BlockLanes>& blocks,
            const std::vector<ContactLanes>& contacts);
   struct Block {
-    MatrixXd Z, E, En, S, mixed, mixed_next;  // as in BlockLanes
+    MatrixXd Z, q_y, q_v, v_y, v_v;  // as in BlockLanes
+    VectorXd gap, gap_v;             // r
+    bool turned, placed;
   };
   struct Contact {
     Matrix6Xd dy, dv;  // as in ContactLanes
@@ -57,6 +66,14 @@ struct LaneView {
   std::vector<Contact> contacts;
   StateCostModel state_cost;
 };
+
+// `get` says where the numbers of an item are; lanes without an item do what the first one does.
+template <typename Item, typename Get, typename Out>
+void packItems(const Item* items, int count, const Get& get, Out& out) {
+  std::array<const double*, kLane> in;
+  for (int l = 0; l < kLane; ++l) in[l] = get(items[l < count ? l : 0]);
+  packLanes(in, out.size(), out.data());
+}
 
 class ReducedLanes {
  public:
@@ -78,8 +95,11 @@ class ReducedLanes {
   // ReducedNode::calcDifferences() for at most kLane nodes whose charts are those at x0.
   void calcDifferences(const NodeModel::Difference* items, int count);
 
+  // ReducedNode::integrate() for at most kLane nodes whose bases are those at x; tells where that went through.
+  LaneMask integrate(const NodeModel::Integration* items, int count);
+
   // Derivatives about the last step of each of at most kLane reduced nodes.
-  void linearize(NodeModel* const* nodes, int count);
+  void linearize(const NodeModel::Linearization* items, int count);
 
   // Lane of a node of the last call, -1 for others.
   int findLane(const ReducedNode* node) const;
@@ -93,12 +113,17 @@ class ReducedLanes {
   void pack(const Get& get, Eigen::Index size, Lanes* out) const;
   template <typename Get>
   void unpack(const Lanes* in, Eigen::Index size, const Get& get, Eigen::Index stride = 1) const;
-  void setNodes(NodeModel* const* nodes, int count);
+  template <typename Get>
+  void setNodes(int count, const Get& get) {
+    nodes_.clear();
+    for (int l = 0; l < count; ++l) nodes_.push_back(get(l));
+  }
   void packPlacements();
   void packNodes();
   LaneMask updatePoints();
   template <typename GetBasis>
-  void packBasis(const GetBasis& getBasis, BlockBasisOf<Lanes>& to) const;
+  void packBasis(const LoopBlock& block, const GetBasis& getBasis, BlockBasisOf<Lanes>& to) const;
+  void packPoint(size_t i);
   void packBlockStep(size_t i);
   void packBlock(size_t i);
   void packSteps();
@@ -114,6 +139,8 @@ class ReducedLanes {
   void updateForces();
   void updateContact(ContactLanes& contact);
   void linearizeStep(BlockLanes& b);
+  void updateGap(size_t i, const NodeModel::Linearization* items);
+  void findNodeBasis(size_t i, const NodeModel::Linearization* items, const LaneMask& open);
 
   const Model& model_;
   const Reduction& reduction_;

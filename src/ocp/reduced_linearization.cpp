@@ -6,9 +6,10 @@
 #include "reduced_node.h"
 
 namespace bielle {
-void ReducedNode::prepareLinearization(NodeModel* const* nodes, int count) {
+
+void ReducedNode::prepareLinearization(const Linearization* items, int count) {
   takeWork();
-  work_->lanes.linearize(nodes, count);
+  work_->lanes.linearize(items, count);
 }
 
 int ReducedNode::findContact(int slot) const {
@@ -20,13 +21,6 @@ bool ReducedNode::hasHinges() const {
   const std::vector<Closure>& closures = spec_.constraints.closures;
   return std::any_of(closures.begin() + num_loops_, closures.end(),
                      [](const Closure& c) { return c.kind == ClosureKind::Hinge5D; });
-}
-
-// The contact row of a row of a slot, -1 if this stage has none there.
-int ReducedNode::findContactRow(size_t slot, int row) const {
-  const int index = findContact(static_cast<int>(slot));
-  if (index < 0 || row >= getRows(spec_.constraints.closures[index].kind)) return -1;
-  return spec_.constraints.offsets[index] - loop_rows_ + row;
 }
 
 PaddedMap ReducedNode::shapeForceDerivatives() const {
@@ -88,143 +82,84 @@ bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
   showView(view);
   linearizeDynamics(view);
   for (size_t i = 0; i < blocks_.size(); ++i)
-    if (!linearizeBlock(blocks_[i], view.blocks[i], x_next_node, out)) return false;
+    if (!linearizeBlock(i, view.blocks[i], x_next_node, out)) return false;
   differenceFree(x_next_node, x_next_, out.gap);
-  for (FreeJoint& free : work_->free_joints) linearizeFreeJoint(free, out);
-  assembleStep(shapeAccelerationDerivatives(view), out);
+  for (FreeJoint& free : work_->free_joints)
+    if (free.curved) linearizeFreeJoint(free, out);
+  assembleStep(view, out);
   storeChart();
   return true;
 }
 
-// Eq. (g) for one block, rows [offset, offset + size) of Fx, Fu and gap.
-bool ReducedNode::linearizeBlock(Block& b, LaneView::Block& view, ConstVectorRef x_next_node, StageModel& out) {
-  const LoopBlock& loop = b.loop;
-  BlockWork& work = *b.work;
-  const int nr = reduction_.size, o = loop.offset, r = loop.size;
-  const double h = spec_.dt;
-  const BlockBasis& next = b.next.basis();
-  work.motion.basis = &b.at;
-  work.motion.Z = view.Z;  // for residuals
-  MatrixXd &X = work.X, &Xn = work.Xn;
-  const MatrixXd &E = view.E, &S = view.S;
-  X.setIdentity();
-  if (!factorizeSmall(view.mixed, work.mixed_pivots)) {
-    failure_ = "closure '" + loop.closures.closures.front().name + "': the step turns its loops too far";
+// What costs need of a block, and its gap.
+bool ReducedNode::linearizeBlock(size_t i, LaneView::Block& view, ConstVectorRef x_next_node, StageModel& out) {
+  Block& b = blocks_[i];
+  b.work->motion.basis = &b.at;
+  b.work->motion.Z.swap(view.Z);
+  if (!view.turned) {
+    failure_ = "closure '" + b.loop.closures.closures.front().name + "': the step turns its loops too far";
     return false;
   }
-  solveFactorized(view.mixed, work.mixed_pivots, X);
-  Xn = view.mixed_next.lazyProduct(X);
-  work.q_y = X.lazyProduct(E);
-  work.q_v = h * X;
-  work.q_a = (h * h) * X;
-  work.v_y = (Xn.lazyProduct(E) - view.En) / h - S.lazyProduct(work.q_y);
-  work.v_v = Xn - S.lazyProduct(work.q_v);
-  work.v_a = h * work.v_v;
-
-  // About the node state, where a gap is open.
-  gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), work.q);
-  gatherVelocity(loop, x_next_node.tail(model_.nv()), work.d);
-  if (work.q != next.q || work.d != b.v_next) return moveToNodeState(b, out);
-  out.gap.segment(o, r).setZero();
-  out.gap.segment(nr + o, r).setZero();
+  if (!view.placed) {
+    gatherConfiguration(model_, b.loop, x_next_node.head(model_.nq()), b.work->q);
+    b.work->point.update(b.loop, b.work->scratch, b.work->q);
+    return fail(b, b.work->point);
+  }
+  out.gap.segment(b.loop.offset, b.loop.size) = view.gap;
+  out.gap.segment(reduction_.size + b.loop.offset, b.loop.size) = view.gap_v;
   return true;
 }
 
-// The gap of a block to the node state (b.work->q, b.work->d), and its derivatives read there.
-bool ReducedNode::moveToNodeState(Block& b, StageModel& out) {
-  const LoopBlock& loop = b.loop;
-  const int nr = reduction_.size, r = loop.size, o = loop.offset;
-  b.next.load(loop, b.work->scratch);
-  updateTwists(getOwnView(loop, b.work->scratch.ws), b.next.basis(), b.work->ahead);
-  updateVelocities(loop.model, b.work->scratch.ws, b.v_next);
-  updateVelocityLift(getOwnView(loop, b.work->scratch.ws), b.work->ahead);
-  if (!b.work->point.update(loop, b.work->scratch, b.work->q)) return fail(b, b.work->point);
-  const MatrixXd &WN = b.work->point.basis().WN, &Nn = b.next.basis().N;
-  loop.model.difference(b.work->q, b.next.basis().q, b.work->a);
-  b.work->w = b.v_next - b.work->d;
-  b.work->diff_N = Nn;  // becomes J_diff N'
-  for (const Joint& joint : loop.model.joints()) {
-    if (!isCurved(joint)) continue;
-    const int i = joint.idx_v, n = joint.nv;
-    JointMatrix Jdiff(n, n);
-    calcJointDifferenceJacobian(joint, b.work->a.segment(i, n), Jdiff);
-    b.work->diff_N.middleRows(i, n) = Jdiff.lazyProduct(Nn.middleRows(i, n));
-  }
-  out.gap.segment(o, r).setZero();
-  out.gap.segment(nr + o, r).setZero();
-  addSmallProductTransposed(WN, b.work->a, out.gap.segment(o, r));
-  addSmallProductTransposed(WN, b.work->w, out.gap.segment(nr + o, r));
-  for (MatrixXd* P : {&b.work->Pq, &b.work->Pv, &b.work->Pz}) P->setZero();
-  addSmallProductTransposed(WN, b.work->diff_N, b.work->Pq);
-  addSmallProductTransposed(WN, Nn, b.work->Pv);
-  addSmallProductTransposed(WN, b.work->ahead.Z, b.work->Pz);
-  const std::pair<MatrixXd*, MatrixXd*> derivatives[] = {
-      {&b.work->q_y, &b.work->v_y}, {&b.work->q_v, &b.work->v_v}, {&b.work->q_a, &b.work->v_a}};
-  for (const auto& [dq, dv] : derivatives) {
-    b.work->moved.setZero();
-    addSmallProduct(b.work->Pv, *dv, b.work->moved);
-    addSmallProduct(b.work->Pz, *dq, b.work->moved);
-    dv->swap(b.work->moved);
-    b.work->moved.setZero();
-    addSmallProduct(b.work->Pq, *dq, b.work->moved);
-    dq->swap(b.work->moved);
-  }
-  return true;
-}
-
-// The same for a joint outside all loops, where N and J^T vanish.
+// Eq. (g) for a curved joint outside all loops, where N and J^T vanish.
 void ReducedNode::linearizeFreeJoint(FreeJoint& free, const StageModel& out) const {
   const Joint& joint = model_.joints()[free.joint];
   const int n = joint.nv;
   const double h = spec_.dt;
-  free.q_y.setIdentity(n, n);
-  free.q_v = h * JointMatrix::Identity(n, n);
-  if (isCurved(joint)) {
-    JointMatrix Jq(n, n), Jd(n, n), Jdiff(n, n);
-    const JointVector d = h * x_next_.segment(model_.nq() + joint.idx_v, n), gap = out.gap.segment(free.offset, n);
-    calcJointIntegrateJacobians(joint, d, Jq, Jd);
-    free.q_y = Jq;
-    free.q_v = h * Jd;
-    if (!gap.isZero(0)) {
-      calcJointDifferenceJacobian(joint, gap, Jdiff);
-      free.q_y = Jdiff.lazyProduct(Jq);
-      free.q_v = h * Jdiff.lazyProduct(Jd);
-    }
-  }
-  free.q_a = h * free.q_v;
+  JointMatrix Jq(n, n), Jd(n, n), Jdiff(n, n);
+  const JointVector d = h * x_next_.segment(model_.nq() + joint.idx_v, n), gap = out.gap.segment(free.offset, n);
+  calcJointIntegrateJacobians(joint, d, Jq, Jd);
+  free.q_y = Jq;
+  free.q_v = h * Jd;
+  if (gap.isZero(0)) return;
+  calcJointDifferenceJacobian(joint, gap, Jdiff);
+  free.q_y = Jdiff.lazyProduct(Jq);
+  free.q_v = h * Jdiff.lazyProduct(Jd);
 }
 
-// Columns of F^T, from those of y' and what each unit makes of them: h^2 and h times these for a coordinate of its own.
-void ReducedNode::assembleStep(PaddedMap dydd, StageModel& out) const {
-  const Eigen::Index nr = reduction_.size, nu = model_.nu(), rows = dydd.rows();
+// Columns of F^T, from those of dv = dy_v + h dy' and what each unit makes of dv and dy.
+void ReducedNode::assembleStep(LaneView& view, StageModel& out) const {
+  const Eigen::Index nr = reduction_.size, nu = model_.nu();
   const double h = spec_.dt;
-  PaddedMap Ft = out.Ft();
-  const auto add = [&](const auto& derivative, Eigen::Index row, Eigen::Index col) {
-    Ft.block(nu + row, col, derivative.cols(), derivative.rows()) += derivative.transpose();
-  };
+  PaddedMap Ft = out.Ft(), dv = shapeAccelerationDerivatives(view);
+  dv *= h;
+  dv.bottomRows(nr).diagonal().array() += 1;
   const auto multiply = [&](const auto& derivative, Eigen::Index from, Eigen::Index to) {
     const Eigen::Index n = derivative.rows();
-    setProduct(rows, n, n, pad(dydd, 0, from), {derivative.data(), derivative.outerStride(), 1}, pad(Ft, 0, to));
+    setProduct(dv.rows(), n, n, pad(dv, 0, from), {derivative.data(), derivative.outerStride(), 1}, pad(Ft, 0, to));
+  };
+  const auto add = [&](const auto& derivative, Eigen::Index from, Eigen::Index to) {
+    const Eigen::Index n = derivative.rows();
+    for (Eigen::Index i = 0; i < n; ++i)
+      for (Eigen::Index k = 0; k < n; ++k) Ft(nu + from + k, to + i) += derivative(i, k);
   };
   for (const FreeJoint& free : work_->free_joints) {
-    const Eigen::Index o = free.offset, n = free.q_a.rows();
-    if (isCurved(model_.joints()[free.joint]))
-      multiply(free.q_a, o, o);
-    else
-      Ft.middleCols(o, n) = (h * h) * dydd.middleCols(o, n);
-    Ft.middleCols(nr + o, n) = h * dydd.middleCols(o, n);
-    add(free.q_y, o, o);
-    add(free.q_v, nr + o, o);
-    Ft.block(nu + nr + o, nr + o, n, n).diagonal().array() += 1;
+    const Eigen::Index o = free.offset, n = free.size;
+    Ft.middleCols(nr + o, n) = dv.middleCols(o, n);
+    if (free.curved) {
+      multiply(free.q_v, o, o);
+      add(free.q_y, o, o);
+    } else {
+      Ft.middleCols(o, n) = h * dv.middleCols(o, n);
+      Ft.block(nu + o, o, n, n).diagonal().array() += 1;
+    }
   }
-  for (const Block& b : blocks_) {
-    const Eigen::Index o = b.loop.offset;
-    multiply(b.work->q_a, o, o);
-    multiply(b.work->v_a, o, nr + o);
-    add(b.work->q_y, o, o);
-    add(b.work->q_v, nr + o, o);
-    add(b.work->v_y, o, nr + o);
-    add(b.work->v_v, nr + o, nr + o);
+  for (size_t i = 0; i < blocks_.size(); ++i) {
+    const LaneView::Block& b = view.blocks[i];
+    const Eigen::Index o = blocks_[i].loop.offset;
+    multiply(b.q_v, o, o);
+    multiply(b.v_v, o, nr + o);
+    add(b.q_y, o, o);
+    add(b.v_y, o, nr + o);
   }
 }
 

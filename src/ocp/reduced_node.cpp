@@ -8,15 +8,14 @@
 
 namespace bielle {
 
-BlockWork::BlockWork(const LoopBlock& l) : scratch(l), start(l), point(l), motion(l), ahead(l) {
+BlockWork::BlockWork(const LoopBlock& l) : scratch(l), start(l), point(l), motion(l), ahead(l), gap(l) {
   const int n = l.model.nv(), r = l.size, rank = l.rank;
   q.setZero(l.model.nq());
   for (VectorXd* x : {&v, &a, &d, &w}) x->setZero(n);
   for (VectorXd* x : {&independent, &zeta}) x->setZero(rank);
   rows.setZero(l.closures.rows);
-  for (MatrixXd* x : {&HN, &diff_N}) x->setZero(n, r);
-  for (MatrixXd* x : {&q_y, &q_v, &q_a, &v_y, &v_v, &v_a}) x->setZero(r, r);
-  for (MatrixXd* x : {&X, &Xn, &mixed, &moved, &Pq, &Pv, &Pz}) x->setZero(r, r);
+  HN.setZero(n, r);
+  mixed.setZero(r, r);
   target.setZero(r);
   mixed_pivots.resize(r);
 }
@@ -105,6 +104,8 @@ ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const R
     free_joints.emplace_back();
     free_joints.back().joint = reduction.free_joints[i];
     free_joints.back().offset = reduction.free_offsets[i];
+    free_joints.back().size = model.joints()[reduction.free_joints[i]].nv;
+    free_joints.back().curved = isCurved(model.joints()[reduction.free_joints[i]]);
   }
   for (int rows : sizes.contact_rows) {
     ContactWork& work = contacts[rows];
@@ -152,6 +153,10 @@ ReducedNode::ReducedNode(const Model& model, const Reduction& reduction, const S
   for (int c = 0; c < num_loops_; ++c) loop_rows_ += getRows(set.closures[c].kind);
   contact_rows_ = set.rows - loop_rows_;
   contact_slots_ = findSlots(set, pool_->sizes().tips, pool_->sizes().slots);
+  slot_rows_.assign(6 * pool_->sizes().slots.size(), -1);
+  for (size_t c = num_loops_; c < set.closures.size(); ++c)
+    for (int r = 0; r < getRows(set.closures[c].kind); ++r)
+      slot_rows_[6 * contact_slots_[c - num_loops_] + r] = set.offsets[c] - loop_rows_ + r;
   X_WB_.resize(model.numBodies());
   q_.setZero(model.nq());
   for (VectorXd* v : {&v_, &tau_, &a_, &state_difference_}) v->setZero(nv);
@@ -209,6 +214,34 @@ void ReducedNode::integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out
     scatterConfiguration(model_, loop, to.q, x_out.head(nq));
     scatterVelocity(loop, work.v, x_out.tail(model_.nv()));
   }
+}
+
+// In lanes, where the bases are at hand.
+void ReducedNode::integrateNodes(const Integration* items, int count) {
+  takeWork();
+  std::array<Integration, kLane> together;
+  int num = 0;
+  for (int i = 0; i < count; ++i) {
+    ReducedNode& node = *static_cast<ReducedNode*>(items[i].node);
+    if (node.isKnown(*items[i].x))
+      together[num++] = items[i];
+    else
+      node.integrate(*items[i].x, *items[i].dx, *items[i].x_out);
+  }
+  if (num == 0) return;
+  const LaneMask done = work_->lanes.integrate(together.data(), num);
+  for (int l = 0; l < num; ++l)  // those that fail say why
+    if (!done[l]) together[l].node->integrate(*together[l].x, *together[l].dx, *together[l].x_out);
+}
+
+bool ReducedNode::isKnown(ConstVectorRef x) const {
+  if (chart_x_ != x) return false;
+  for (const Block& b : blocks_)
+    for (size_t j = 0; j < b.loop.joints.size(); ++j) {
+      const Joint &own = b.loop.model.joints()[j + 1], &joint = model_.joints()[b.loop.joints[j]];
+      if (b.at.q.segment(own.idx_q, own.nq) != x.segment(joint.idx_q, joint.nq)) return false;
+    }
+  return true;
 }
 
 void ReducedNode::difference(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) {

@@ -39,15 +39,14 @@ namespace bielle {
 struct BlockWork {
   explicit BlockWork(const LoopBlock& l);
   BlockScratch scratch;
-  BlockState start, point;                // for integrate() and open gaps
-  BlockMotion motion, ahead;              // at the state, in the whole model; at q+, in the block
-  VectorXd q, v, a, d, w;                 // n (q: nq)
-  VectorXd independent, zeta, rows;       // rank, rank, m
-  MatrixXd HN, diff_N;                    // n x r, scratch
-  MatrixXd q_y, q_v, q_a, v_y, v_v, v_a;  // r x r: dq+ and dv+ by dy, dy_v, dy'
-  MatrixXd X, Xn, mixed, moved;           // r x r: Eq. (g); a matrix to be inverted; scratch
-  MatrixXd Pq, Pv, Pz;                    // r x r: change of basis at open gaps
-  VectorXd target;                        // r
+  BlockState start, point;           // for integrate() and open gaps
+  BlockMotion motion, ahead;         // at the state, in the whole model; at q+, in the block
+  BlockGapOf<double> gap;            // of an impact
+  VectorXd q, v, a, d, w;            // n (q: nq)
+  VectorXd independent, zeta, rows;  // rank, rank, m
+  MatrixXd HN;                       // n x r, scratch
+  MatrixXd mixed;                    // r x r
+  VectorXd target;                   // r
   std::vector<int> mixed_pivots;
 };
 
@@ -56,10 +55,11 @@ template <typename T>
 void placeWhole(const Model& model, const Reduction& reduction, typename ArgumentsOf<T>::ConstVector q,
                 std::vector<SE3Of<T>>& X_WB);
 
-// A joint outside all loops: what dq+ makes of dy, of dv+ and of dy'; dv+ is h dy'.
+// A joint outside all loops: what dq+ makes of dy and of dv+, the identity and h but for curved joints.
 struct FreeJoint {
-  int joint = 0, offset = 0;
-  JointMatrix q_y, q_v, q_a;  // nv x nv of the joint
+  int joint = 0, offset = 0, size = 0;
+  bool curved = false;
+  JointMatrix q_y, q_v;  // nv x nv of the joint, where it is curved
 };
 
 // Sizes of the memory that the nodes of a problem share.
@@ -148,6 +148,7 @@ class ReducedNode : public NodeModel {
 
   int tangentSize() const override { return 2 * reduction_.size; }
   void integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) override;
+  void integrateNodes(const Integration* items, int count) override;
   void difference(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) override;
   void calcDifferences(const Difference* items, int count) override;
   bool updateState(ConstVectorRef x) override;
@@ -158,7 +159,7 @@ class ReducedNode : public NodeModel {
   bool startStep(ConstVectorRef x, ConstVectorRef u, const NodeModel* previous) override;
   void finishSteps(NodeModel* const* nodes, int count, bool* ok) override;
   void showStep(int index) override;
-  void prepareLinearization(NodeModel* const* nodes, int count) override;
+  void prepareLinearization(const Linearization* items, int count) override;
   bool linearizeStep(ConstVectorRef x_next_node, StageModel& out) override;
   void linearizeState() override;
   double calcStateCost() override;
@@ -193,22 +194,24 @@ class ReducedNode : public NodeModel {
   void stepFreeJoints();
   bool closeStep(const ReducedNode* previous);
   void finishStep();
-  bool moveToNodeState(Block& b, StageModel& out);
   void showView(LaneView& view);
   // Derivatives of the contact forces by (u, dy, dy_v), one column per row of the contacts.
   PaddedMap shapeForceDerivatives() const;
   void loadContactDerivatives(const LaneView& view);
   void linearizeDynamics(LaneView& view);
-  bool linearizeBlock(Block& b, LaneView::Block& view, ConstVectorRef x_next_node, StageModel& out);
+  bool linearizeBlock(size_t i, LaneView::Block& view, ConstVectorRef x_next_node, StageModel& out);
   // The contact of this stage in a slot, as an index of its constraints; -1 if it has none there.
   int findContact(int slot) const;
-  int findContactRow(size_t slot, int row) const;
+  // The contact row of a row of a slot, -1 if this stage has none there.
+  int getContactRow(size_t slot, int row) const { return slot_rows_[6 * slot + row]; }
   // Whether a contact has other rows than the first ones of its six.
   bool hasHinges() const;
   void linearizeFreeJoint(FreeJoint& free, const StageModel& out) const;
   PaddedMap shapeAccelerationDerivatives(LaneView& view) const;
-  void assembleStep(PaddedMap dydd, StageModel& out) const;
+  void assembleStep(LaneView& view, StageModel& out) const;
   void addMotorRows(PaddedMap out) const;
+  // Whether the bases of this node are those at x.
+  bool isKnown(ConstVectorRef x) const;
   void differenceAbout(Block& b, const MatrixXd& WN, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
   void differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
   bool updateChart(ConstVectorRef x);
@@ -223,6 +226,7 @@ class ReducedNode : public NodeModel {
   const Workspace* shown_ = nullptr;
   std::vector<ReducedBlock> blocks_;
   std::vector<int> contact_slots_;  // per contact
+  std::vector<int> slot_rows_;      // per slot, see getContactRow()
   int num_loops_ = 0, loop_rows_ = 0, contact_rows_ = 0;
   std::vector<SE3> X_WB_;
   VectorXd q_, v_, tau_, a_;             // of the last update

@@ -98,6 +98,19 @@ void RobotProblem::integrate(int node, ConstVectorRef x, ConstVectorRef dx, Vect
   nodes_[node].dynamics->integrate(x, dx, x_out);
 }
 
+// Reduced nodes together, as their steps.
+void RobotProblem::integrateNodes(const std::vector<IntegrateTask>& tasks) const {
+  std::array<NodeModel::Integration, kLane> together;
+  for (size_t first = 0; first < tasks.size(); first += kLane) {
+    const int count = static_cast<int>(std::min<size_t>(tasks.size() - first, kLane));
+    for (int i = 0; i < count; ++i) {
+      const IntegrateTask& task = tasks[first + i];
+      together[i] = {nodes_[task.node].dynamics.get(), task.x, task.dx, task.x_out};
+    }
+    together.front().node->integrateNodes(together.data(), count);
+  }
+}
+
 void RobotProblem::difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const {
   nodes_[node].dynamics->difference(x0, x1, dx);
 }
@@ -243,7 +256,8 @@ StepStatus RobotProblem::linearize(int stage, ConstVectorRef x, ConstVectorRef u
                                    StageModel& out) {
   if (evaluate(stage, x, u) != StepStatus::Ok) return StepStatus::Failed;
   NodeModel* node = nodes_[stage].dynamics.get();
-  node->prepareLinearization(&node, 1);
+  const NodeModel::Linearization alone{node, x_next_node.data(), nullptr};
+  node->prepareLinearization(&alone, 1);
   return finishLinearization(stage, u, x_next_node, out);
 }
 
@@ -267,14 +281,17 @@ void RobotProblem::linearizeStages(int begin, int end, const std::vector<VectorX
   for (int first = begin; first < end; first += kLane) {
     const int last = std::min<int>(end, first + kLane);
     evaluateStages(first, last, xs, us);
-    std::array<NodeModel*, kLane> together;
+    std::array<NodeModel::Linearization, kLane> together;
     int count = 0;
+    for (int k = first; k < last; ++k) statuses[k] = evaluate(k, xs[k], us[k]);
     for (int k = first; k < last; ++k) {
-      statuses[k] = evaluate(k, xs[k], us[k]);
-      if (statuses[k] == StepStatus::Ok && specs_[k].kind == StageKind::Dynamics)
-        together[count++] = nodes_[k].dynamics.get();
+      if (statuses[k] != StepStatus::Ok || specs_[k].kind != StageKind::Dynamics) continue;
+      // The node behind the last one may be another thread's.
+      const bool has_next = k + 1 < last && statuses[k + 1] == StepStatus::Ok;
+      together[count++] = {nodes_[k].dynamics.get(), xs[k + 1].data(),
+                           has_next ? nodes_[k + 1].dynamics.get() : nullptr};
     }
-    if (count > 0) together.front()->prepareLinearization(together.data(), count);
+    if (count > 0) together.front().node->prepareLinearization(together.data(), count);
     for (int k = first; k < last; ++k)
       if (statuses[k] == StepStatus::Ok) statuses[k] = finishLinearization(k, us[k], xs[k + 1], models[k]);
   }

@@ -21,6 +21,10 @@ bool StageModel::hasSizes(int ndx, int nu, int ndx_next) const {
          lu.size() == nu;
 }
 
+void ShootingProblem::integrateNodes(const std::vector<IntegrateTask>& tasks) const {
+  for (const IntegrateTask& task : tasks) integrate(task.node, *task.x, *task.dx, *task.x_out);
+}
+
 void ShootingProblem::stepStages(std::vector<StepTask>& tasks) {
   for (StepTask& task : tasks) {
     task.status = task.continues ? continueStep(task.stage, *task.x, *task.u, *task.x_next, task.cost)

@@ -1,5 +1,6 @@
 #include "rollout.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -24,7 +25,10 @@ void Rollout::resize(const ShootingProblem& problem, int max_segments) {
     segment.end_state.setZero(problem.stateSize());
   }
   groups_.resize((max_segments + problem.getBatchSize() - 1) / problem.getBatchSize());
-  for (Group& group : groups_) group.tasks.reserve(problem.getBatchSize());
+  for (Group& group : groups_) {
+    group.tasks.reserve(problem.getBatchSize());
+    group.starts.reserve(problem.getBatchSize());
+  }
   for (VectorXd* x : {&joint_gap_, &joint_slope_, &motion_}) x->setZero(largest);
   control_.setZero(most_controls);
   seconds_ = 0;
@@ -90,11 +94,9 @@ bool Rollout::rollOut(const RolloutInput& input, const RolloutOptions& options) 
 
 // Eqs. (2), (3) and (7). Runs in parallel: of the node where the next segment starts, nothing is touched.
 bool Rollout::rollOut(const RolloutInput& input, double alpha, Group& group) {
+  if (!startSegments(input, group)) return false;
   int longest = 0;
-  for (int s = group.begin; s < group.end; ++s) {
-    if (!startSegment(input, segments_[s])) return false;
-    longest = std::max(longest, segments_[s].end - segments_[s].begin);
-  }
+  for (int s = group.begin; s < group.end; ++s) longest = std::max(longest, segments_[s].end - segments_[s].begin);
   for (int i = 0; i < longest; ++i) {
     group.tasks.clear();
     for (int s = group.begin; s < group.end; ++s) {
@@ -111,15 +113,22 @@ bool Rollout::rollOut(const RolloutInput& input, double alpha, Group& group) {
   return true;
 }
 
-bool Rollout::startSegment(const RolloutInput& input, Segment& segment) {
-  const int k = segment.begin;
-  segment.cost = 0;
-  deviations_[k].setZero();
-  trial_.xs[k] = input.nodes.xs[k];
-  if (k == 0) return true;
-  deviations_[k] = segment.start;
-  input.problem.integrate(k, input.nodes.xs[k], deviations_[k], trial_.xs[k]);
-  return trial_.xs[k].allFinite();
+bool Rollout::startSegments(const RolloutInput& input, Group& group) {
+  group.starts.clear();
+  for (int s = group.begin; s < group.end; ++s) {
+    const int k = segments_[s].begin;
+    segments_[s].cost = 0;
+    if (k == 0) {
+      deviations_[k].setZero();
+      trial_.xs[k] = input.nodes.xs[k];
+    } else {
+      deviations_[k] = segments_[s].start;
+      group.starts.push_back({k, &input.nodes.xs[k], &deviations_[k], &trial_.xs[k]});
+    }
+  }
+  input.problem.integrateNodes(group.starts);
+  return std::all_of(group.starts.begin(), group.starts.end(),
+                     [](const IntegrateTask& start) { return start.x_out->allFinite(); });
 }
 
 // Stage k of a segment, with the control of Eq. (2).

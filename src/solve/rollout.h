@@ -54,12 +54,13 @@ class Rollout {
   struct Group {
     int begin = 0, end = 0;  // its segments
     std::vector<StepTask> tasks;
+    std::vector<IntegrateTask> starts;
     double seconds = 0;
     bool ok = false;
   };
   bool rollOut(const RolloutInput& input, const RolloutOptions& options);
   bool rollOut(const RolloutInput& input, double alpha, Group& group);
-  bool startSegment(const RolloutInput& input, Segment& segment);
+  bool startSegments(const RolloutInput& input, Group& group);
   void prepareTask(const RolloutInput& input, double alpha, int k, Segment& segment, StepTask& task);
   bool finishTask(const RolloutInput& input, double alpha, const StepTask& task, Segment& segment);
   // Whether gaps are left to be contracted at every node.

@@ -72,6 +72,7 @@ class RobotProblem : public ShootingProblem {
   int controlSize(int) const override { return model_.nu(); }
   const VectorXd& initialState() const override { return x0_; }
   void integrate(int node, ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) const override;
+  void integrateNodes(const std::vector<IntegrateTask>& tasks) const override;
   void difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override;
   StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override;
   StepStatus continueStep(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override;

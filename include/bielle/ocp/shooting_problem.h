@@ -74,6 +74,13 @@ struct StepTask {
   StepStatus status = StepStatus::Ok;  ///< out
 };
 
+/// One integrate() of several.
+struct IntegrateTask {
+  int node = 0;
+  const VectorXd *x = nullptr, *dx = nullptr;
+  VectorXd* x_out = nullptr;  ///< out
+};
+
 class ShootingProblem {
  public:
   virtual ~ShootingProblem() = default;
@@ -86,6 +93,9 @@ class ShootingProblem {
 
   /// x_out = x (+) dx. x_out may alias x.
   virtual void integrate(int node, ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) const = 0;
+  /// integrate() at several different nodes by one thread, for problems that do so at once for less. What comes out must not
+  /// depend on which nodes come together.
+  virtual void integrateNodes(const std::vector<IntegrateTask>& tasks) const;
   /// dx with x0 (+) dx = x1.
   virtual void difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const = 0;
 
@@ -107,7 +117,8 @@ class ShootingProblem {
   virtual StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
                                StageModel& out) = 0;
   /// linearize() of the stages [begin, end) about a trajectory (indexed by node, like the models and statuses), for problems
-  /// that do several at once for less. What comes out must not depend on which stages come together.
+  /// that do several at once for less. What comes out must not depend on which stages come together, unless some of them were
+  /// stepped alone.
   virtual void linearizeStages(int begin, int end, const std::vector<VectorXd>& xs, const std::vector<VectorXd>& us,
                                std::vector<StageModel>& models, std::vector<StepStatus>& statuses);
   /// How many stages stepStages() and linearizeStages() are best given.

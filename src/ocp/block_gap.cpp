@@ -1,0 +1,42 @@
+#include "block_gap.h"
+
+namespace bielle {
+
+template <typename T>
+BlockGapOf<T>::BlockGapOf(const LoopBlock& block) {
+  const int n = block.model.nv(), r = block.size;
+  q.setZero(block.model.nq());
+  for (VectorX<T>* x : {&v, &d_, &w_}) x->setZero(n);
+  for (VectorX<T>* x : {&y, &y_v}) x->setZero(r);
+  for (MatrixX<T>* x : {&WN, &JdN_}) x->setZero(n, r);
+  for (MatrixX<T>* x : {&P_q, &P_v, &P_z}) x->setZero(r, r);
+}
+
+template <typename T>
+void BlockGapOf<T>::update(const LoopBlock& block, const BlockBasisOf<T>& next, const VectorX<T>& v_next,
+                           const MatrixX<T>& Z) {
+  w_ = v_next - v;
+  JdN_ = next.N;
+  for (const Joint& joint : block.model.joints()) {
+    if (joint.nv == 0) continue;
+    const int i = joint.idx_v, n = joint.nv;
+    calcJointDifference(joint, q.segment(joint.idx_q, joint.nq), next.q.segment(joint.idx_q, joint.nq),
+                        d_.segment(i, n));
+    if (!isCurved(joint)) continue;
+    JointMatrixOf<T> J(n, n);
+    calcJointDifferenceJacobian(joint, d_.segment(i, n), J);
+    JdN_.middleRows(i, n) = J.lazyProduct(next.N.middleRows(i, n));
+  }
+  for (VectorX<T>* x : {&y, &y_v}) x->setZero();
+  for (MatrixX<T>* x : {&P_q, &P_v, &P_z}) x->setZero();
+  addSmallProductTransposed(WN, d_, y);
+  addSmallProductTransposed(WN, w_, y_v);
+  addSmallProductTransposed(WN, JdN_, P_q);
+  addSmallProductTransposed(WN, next.N, P_v);
+  addSmallProductTransposed(WN, Z, P_z);
+}
+
+template struct BlockGapOf<double>;
+template struct BlockGapOf<Lanes>;
+
+}  // namespace bielle
