@@ -296,10 +296,11 @@ void ReducedLanes::storeDerivatives() {
   store(ws_.YJ, [](LaneView& view) { return view.ws.YJ.data(); });
   const Eigen::Index nr = reduction_.size, nu = model_.nu(), rows = roundUpToLane(nu + 2 * nr);
   for (Eigen::Index i = 0; i < nr; ++i) {
-    unpack(
-        &A_y_(i, 0), nr, [&](size_t l) { return &views_[l].dydd[i * rows + nu]; }, nr);
-    unpack(
-        &A_v_(i, 0), nr, [&](size_t l) { return &views_[l].dydd[i * rows + nu + nr]; }, nr);
+    const auto getColumn = [&](Eigen::Index row) {
+      return [this, at = i * rows + row](size_t l) { return &views_[l].dydd[at]; };
+    };
+    unpack(&A_y_(i, 0), nr, getColumn(nu), nr);
+    unpack(&A_v_(i, 0), nr, getColumn(nu + nr), nr);
   }
   const int nb = model_.numBodies();
   unpack(ws_.V.front().data(), 6 * nb, [this](size_t l) { return views_[l].ws.V.front().data(); });

@@ -23,8 +23,8 @@ struct BlockLanes {
   MatrixX<Lanes> E, En, S, X, Xn;                      // r x r: those of Eqs. (f) and (g)
   MatrixX<Lanes> mixed, mixed_next;                    // r x r: P^T N', P'^T N'
   std::vector<LogicOf<Lanes>::Index> pivots;
-  MatrixX<Lanes> q_y, q_v, v_y,
-      v_v;                  // r x r: dy+ and dy_v+ of Eq. (g) by dy and dy_v; by dy' they are h times those by dy_v
+  // r x r: dy+ and dy_v+ of Eq. (g) by dy and dy_v; by dy' they are h times those by dy_v
+  MatrixX<Lanes> q_y, q_v, v_y, v_v;
   BlockGapOf<Lanes> gap;    // to the node states
   VectorX<Lanes> q_near;    // nq, where a basis is known that may be that of a node state
   LaneMask turned, placed;  // where X exists; where the bases of the node states do
