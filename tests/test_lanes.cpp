@@ -9,6 +9,7 @@
 #include "bielle/motion/benchmark_walk.h"
 #include "bielle/motion/motion.h"
 #include "count_allocations.h"
+#include "mechanisms.h"
 
 using namespace bielle;
 
@@ -110,6 +111,34 @@ TEST_CASE("lanes: sine and cosine, rotations, twists and their logarithms are th
   }
 }
 
+TEST_CASE("lanes: derivatives of differences are those of double, for every kind of joint") {
+  std::mt19937 rng(4);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (JointKind kind : testing::kJointKinds)
+    for (double range : {1e-4, 0.3, 2.0}) {
+      Joint joint;
+      joint.kind = kind;
+      const int n = joint.nv = getNv(kind);
+      CAPTURE(getName(kind), range);
+      std::array<VectorXd, kLane> d;
+      std::array<const double*, kLane> in;
+      for (size_t l = 0; l < kLane; ++l) {
+        d[l] = VectorXd::NullaryExpr(n, [&] { return (l % 2 ? 1e-2 : 1) * range * uniform(rng); });
+        in[l] = d[l].data();
+      }
+      VectorX<Lanes> packed(n);
+      packLanes(in, n, packed.data());
+      MatrixX<Lanes> J(n, n);
+      calcJointDifferenceJacobian(joint, packed, J);
+      for (int l = 0; l < kLane; ++l) {
+        MatrixXd expected(n, n), one(n, n);
+        calcJointDifferenceJacobian(joint, d[l], expected);
+        unpackLane(J.data(), l, n * n, one.data());
+        CHECK((one - expected).norm() < 1e-12);
+      }
+    }
+}
+
 TEST_CASE("lanes: each has its own pivots, and a singular one is told from the others") {
   std::mt19937 rng(3);
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -208,9 +237,12 @@ TEST_CASE("nodes with all sorts of contacts go together") {
     REQUIRE(statuses[k] == StepStatus::Ok);
     StageModel alone;
     REQUIRE(other->linearize(k, points[k], controls[k], points[k + 1], alone) == StepStatus::Ok);
-    CHECK((together[k].gap - alone.gap).norm() < 1e-10 * alone.gap.norm());
-    CHECK((together[k].Fx() - alone.Fx()).norm() < 1e-9 * alone.Fx().norm());
-    CHECK((together[k].Fu() - alone.Fu()).norm() < 1e-9 * alone.Fu().norm());
+    // Redundant rows magnify rounding by 1e7 (saddle_point.h, Eq. 3).
+    const bool redundant = std::count(feet[k % feet.size()].begin(), feet[k % feet.size()].end(), left) > 1;
+    const double tolerance = redundant ? 1e-8 : 1e-12;
+    CHECK((together[k].gap - alone.gap).norm() < tolerance * alone.gap.norm());
+    CHECK((together[k].Fx() - alone.Fx()).norm() < tolerance * alone.Fx().norm());
+    CHECK((together[k].Fu() - alone.Fu()).norm() < tolerance * alone.Fu().norm());
     if (k > 0) CHECK((together[k].Fx() - together[k - 1].Fx()).norm() > 1e-5 * alone.Fx().norm());
   }
 }
