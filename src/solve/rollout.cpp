@@ -29,7 +29,7 @@ void Rollout::resize(const ShootingProblem& problem, int max_segments) {
     group.tasks.reserve(problem.getBatchSize());
     group.starts.reserve(problem.getBatchSize());
   }
-  for (VectorXd* x : {&joint_gap_, &joint_slope_, &motion_}) x->setZero(largest);
+  for (VectorXd* x : {&joint_gap_, &joint_slope_, &shift_}) x->setZero(largest);
   control_.setZero(most_controls);
   seconds_ = 0;
 }
@@ -44,25 +44,25 @@ bool Rollout::update(const RolloutInput& input, const RolloutOptions& options) {
   return rollOut(input, options);
 }
 
-// Eq. (9)
+// Eq. (9), with the shift of the starts from segment to segment.
 bool Rollout::close(const RolloutInput& input, const RolloutOptions& options) {
-  motion_.setZero();
+  shift_.setZero();
   for (int s = 1; s < options.segments; ++s) {
     const int joint = segments_[s].begin;
     for (int k = segments_[s - 1].begin; k < joint; ++k) {
       const StageModel& model = input.models[k];
-      auto motion = motion_.head(model.lx.size()), next = joint_gap_.head(model.gap.size());
+      auto shift = shift_.head(model.lx.size()), next = joint_gap_.head(model.gap.size());
       auto control = control_.head(model.lu.size());
-      control.noalias() = input.sweep.getNodes()[k].K * motion;
-      next.noalias() = model.Fx() * motion;
+      control.noalias() = input.sweep.getNodes()[k].K * shift;
+      next.noalias() = model.Fx() * shift;
       next.noalias() += model.Fu() * control;
-      motion_.head(next.size()) = next;
+      shift_.head(next.size()) = next;
     }
     VectorXd& start = segments_[s].start;
     auto gap = joint_gap_.head(start.size());
     input.problem.difference(joint, input.nodes.xs[joint], segments_[s - 1].end_state, gap);
-    motion_.head(start.size()) += gap - start;
-    start += motion_.head(start.size());
+    shift_.head(start.size()) += gap - start;
+    start += shift_.head(start.size());
   }
   return rollOut(input, options);
 }

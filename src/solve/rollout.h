@@ -75,7 +75,7 @@ class Rollout {
   std::vector<VectorXd> deviations_;  // N + 1: dx of Eq. (3), at a joint the one its segment starts from
   std::vector<Segment> segments_;
   std::vector<Group> groups_;
-  VectorXd joint_gap_, joint_slope_, motion_, control_;
+  VectorXd joint_gap_, joint_slope_, shift_, control_;
   double cost_ = 0, gap_sum_ = 0, gap_max_ = 0, closing_cost_ = 0, seconds_ = 0;
 };
 
