@@ -1,16 +1,10 @@
 #include "backward_pass.h"
 
-#include <chrono>
 #include <cmath>
 
+#include "stopwatch.h"
+
 namespace bielle {
-
-namespace {
-
-using Clock = std::chrono::steady_clock;
-double calcSecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-}  // namespace
 
 void BackwardPass::resize(const ShootingProblem& problem) {
   const int N = problem.numStages();

@@ -2,7 +2,6 @@
 
 #include <omp.h>
 
-#include <chrono>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
@@ -10,6 +9,7 @@
 #include "backward_pass.h"
 #include "fddp_checks.h"
 #include "rollout.h"
+#include "stopwatch.h"
 
 namespace bielle {
 
@@ -20,10 +20,6 @@ constexpr double kPenaltyMargin = 0.5;  // rho of Eq. (5)
 constexpr double kCostRounding = 1e-14;
 constexpr double kClosingShare = 0.5;  // of Eq. (4): the most that Eq. (8) may be
 constexpr int kShortestSegment = 12;   // stages
-
-double calcSecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 }  // namespace
 
@@ -64,7 +60,6 @@ class Run {
   FddpSummary solve();
 
  private:
-  using Clock = std::chrono::steady_clock;
   /// Why the iterations end, if they do.
   using End = std::optional<FddpTermination>;
 

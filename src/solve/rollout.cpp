@@ -1,8 +1,9 @@
 #include "rollout.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+
+#include "stopwatch.h"
 
 namespace bielle {
 
@@ -71,7 +72,7 @@ bool Rollout::rollOut(const RolloutInput& input, const RolloutOptions& options) 
   const int num = options.segments, size = input.problem.getBatchSize(), num_groups = (num + size - 1) / size;
 #pragma omp parallel for num_threads(std::min(options.threads, num_groups)) schedule(dynamic)
   for (int g = 0; g < num_groups; ++g) {
-    const auto start = std::chrono::steady_clock::now();
+    const Clock::time_point start = Clock::now();
     Group& group = groups_[g];
     group.begin = g * size;
     group.end = std::min(num, (g + 1) * size);
@@ -80,7 +81,7 @@ bool Rollout::rollOut(const RolloutInput& input, const RolloutOptions& options) 
     } catch (...) {  // a problem that throws on a wild trial has failed on it, no more
       group.ok = false;
     }
-    group.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    group.seconds = calcSecondsSince(start);
   }
   cost_ = 0;
   bool ok = true;
