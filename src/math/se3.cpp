@@ -2,53 +2,39 @@
 
 #include <cmath>
 
+#include "small_angle.h"
+
 namespace bielle {
 namespace {
-
-constexpr double kSmallAngleSquared = 1e-2;
 
 // Off-diagonal block Q of the left Jacobian of SE(3) (Barfoot, "State estimation for robotics", eq. 7.86), for the
 // twist (rho, phi):
 //     Q = P/2 + a (FP + PF + FPF) + b (FFP + PFF - 3 FPF) + c (FPFF + FFPF),     F = [phi]x, P = [rho]x
 //     a = (t - sin t)/t^3,  b = (t^2/2 + cos t - 1)/t^4,  c = (b + 3 d)/2,  d = (t - sin t - t^3/6)/t^5,  t = |phi|.
+// Here are a, b and c; t^6 terms are kept so that the cancellation of the closed form never shows.
 template <typename T>
-struct LeftQFactors {
-  T a, b, c;
-};
-
-// t^6 terms kept so that the cancellation of the closed form never shows.
-template <typename T>
-LeftQFactors<T> calcLeftQSeries(const T& t2) {
+std::array<T, 3> calcLeftQSeries(const T& t2) {
   const T b = 1.0 / 24 - t2 / 720 + t2 * t2 / 40320 - t2 * t2 * t2 / 3628800;
   const T d = -1.0 / 120 + t2 / 5040 - t2 * t2 / 362880 + t2 * t2 * t2 / 39916800;  // (t - sin t - t^3/6) / t^5
   return {1.0 / 6 - t2 / 120 + t2 * t2 / 5040 - t2 * t2 * t2 / 362880, b, 0.5 * (b + 3 * d)};
 }
 
-LeftQFactors<double> calcLeftQFactors(double t2) {
+std::array<double, 3> calcLeftQFactors(double t2) {
   if (t2 < kSmallAngleSquared) return calcLeftQSeries(t2);
   const double t = std::sqrt(t2), s = std::sin(t), cs = std::cos(t);
   const double b = (0.5 * t2 + cs - 1) / (t2 * t2);
   return {(t - s) / (t2 * t), b, 0.5 * (b + 3 * (t - s - t2 * t / 6) / (t2 * t2 * t))};
 }
-
-LeftQFactors<Lanes> calcLeftQFactors(const Lanes& t2) {
-  LeftQFactors<Lanes> out = calcLeftQSeries(t2);
-  for (Eigen::Index l = 0; l < kLane; ++l) {
-    if (t2[l] < kSmallAngleSquared) continue;
-    const LeftQFactors<double> f = calcLeftQFactors(t2[l]);
-    out.a.set(l, f.a);
-    out.b.set(l, f.b);
-    out.c.set(l, f.c);
-  }
-  return out;
+std::array<Lanes, 3> calcLeftQFactors(const Lanes& t2) {
+  return replaceLarge(t2, calcLeftQSeries(t2), [](double one) { return calcLeftQFactors(one); });
 }
 
 template <typename T>
 Matrix3<T> calcLeftQ(const Vector3<T>& rho, const Vector3<T>& phi) {
-  const auto f = calcLeftQFactors(phi.squaredNorm());
+  const auto [a, b, c] = calcLeftQFactors(phi.squaredNorm());
   const Matrix3<T> F = skew(phi), P = skew(rho);
   const Matrix3<T> FP = F * P, PF = P * F, FPF = FP * F;
-  return 0.5 * P + f.a * (FP + PF + FPF) + f.b * (F * FP + PF * F - 3 * FPF) + f.c * (FPF * F + F * FPF);
+  return 0.5 * P + a * (FP + PF + FPF) + b * (F * FP + PF * F - 3 * FPF) + c * (FPF * F + F * FPF);
 }
 
 }  // namespace

@@ -2,43 +2,27 @@
 
 #include <cmath>
 
+#include "small_angle.h"
+
 namespace bielle {
 namespace {
 
-constexpr double kSmallAngleSquared = 1e-2;  // series below: their first missing terms are under rounding
-
-// The even functions of the angle t that the exponential and its Jacobian are made of.
+// What the exponential and its Jacobian are made of: sin t / t, (1 - cos t) / t^2 and (t - sin t) / t^3.
 template <typename T>
-struct AngleFunctions {
-  T sinc;        // sin t / t
-  T cosc;        // (1 - cos t) / t^2
-  T sinc_minus;  // (t - sin t) / t^3
-};
-
-template <typename T>
-AngleFunctions<T> calcAngleSeries(const T& t2) {
+std::array<T, 3> calcAngleSeries(const T& t2) {
   return {1 - t2 / 6 * (1 - t2 / 20 * (1 - t2 / 42 * (1 - t2 / 72))),
           0.5 * (1 - t2 / 12 * (1 - t2 / 30 * (1 - t2 / 56 * (1 - t2 / 90)))),
           1.0 / 6 * (1 - t2 / 20 * (1 - t2 / 42 * (1 - t2 / 72 * (1 - t2 / 110))))};
 }
 
-AngleFunctions<double> calcAngleFunctions(double t2) {
+std::array<double, 3> calcAngleFunctions(double t2) {
   if (t2 < kSmallAngleSquared) return calcAngleSeries(t2);
   const double t = std::sqrt(t2);
   const double half = std::sin(0.5 * t);
   return {std::sin(t) / t, 2 * half * half / t2, (t - std::sin(t)) / (t2 * t)};
 }
-
-AngleFunctions<Lanes> calcAngleFunctions(const Lanes& t2) {
-  AngleFunctions<Lanes> out = calcAngleSeries(t2);
-  for (Eigen::Index l = 0; l < kLane; ++l) {
-    if (t2[l] < kSmallAngleSquared) continue;
-    const AngleFunctions<double> f = calcAngleFunctions(t2[l]);
-    out.sinc.set(l, f.sinc);
-    out.cosc.set(l, f.cosc);
-    out.sinc_minus.set(l, f.sinc_minus);
-  }
-  return out;
+std::array<Lanes, 3> calcAngleFunctions(const Lanes& t2) {
+  return replaceLarge(t2, calcAngleSeries(t2), [](double one) { return calcAngleFunctions(one); });
 }
 
 template <typename T>
@@ -46,31 +30,20 @@ T calcInverseSeries(const T& t2) {
   return 1.0 / 12 + t2 * (1.0 / 720 + t2 * (1.0 / 30240 + t2 * (1.0 / 1209600 + t2 / 47900160)));
 }
 
-// sin(t/2) / t and cos(t/2) from t^2.
+// sin(t/2) / t and cos(t/2).
 template <typename T>
-struct HalfAngle {
-  T sine, cosine;
-};
-template <typename T>
-HalfAngle<T> calcHalfAngleSeries(const T& t2) {
+std::array<T, 2> calcHalfAngleSeries(const T& t2) {
   const T u = 0.25 * t2;
   return {0.5 * (1 - u / 6 * (1 - u / 20 * (1 - u / 42 * (1 - u / 72)))),
           1 - u / 2 * (1 - u / 12 * (1 - u / 30 * (1 - u / 56 * (1 - u / 90))))};
 }
-HalfAngle<double> calcHalfAngle(double t2) {
+std::array<double, 2> calcHalfAngle(double t2) {
   if (t2 < kSmallAngleSquared) return calcHalfAngleSeries(t2);
   const double t = std::sqrt(t2);
   return {std::sin(0.5 * t) / t, std::cos(0.5 * t)};
 }
-HalfAngle<Lanes> calcHalfAngle(const Lanes& t2) {
-  HalfAngle<Lanes> out = calcHalfAngleSeries(t2);
-  for (Eigen::Index l = 0; l < kLane; ++l) {
-    if (t2[l] < kSmallAngleSquared) continue;
-    const HalfAngle<double> f = calcHalfAngle(t2[l]);
-    out.sine.set(l, f.sine);
-    out.cosine.set(l, f.cosine);
-  }
-  return out;
+std::array<Lanes, 2> calcHalfAngle(const Lanes& t2) {
+  return replaceLarge(t2, calcHalfAngleSeries(t2), [](double one) { return calcHalfAngle(one); });
 }
 
 // 1 + a [w x] + b [w x]^2
@@ -84,16 +57,16 @@ Matrix3<T> makeFromSkew(const Vector3<T>& w, const T& a, const T& b) {
 
 template <typename T>
 Matrix3<T> exp3(const Vector3<T>& w) {
-  const auto f = calcAngleFunctions(w.squaredNorm());
-  return makeFromSkew<T>(w, f.sinc, f.cosc);
+  const auto [sinc, cosc, sinc_minus] = calcAngleFunctions(w.squaredNorm());
+  return makeFromSkew<T>(w, sinc, cosc);
 }
 Matrix3d exp3(const Vector3d& w) { return exp3<double>(w); }
 template Matrix3<Lanes> exp3(const Vector3<Lanes>&);
 
 template <typename T>
 Matrix3<T> calcRightJacobian3(const Vector3<T>& w) {
-  const auto f = calcAngleFunctions(w.squaredNorm());
-  return makeFromSkew<T>(w, -f.cosc, f.sinc_minus);
+  const auto [sinc, cosc, sinc_minus] = calcAngleFunctions(w.squaredNorm());
+  return makeFromSkew<T>(w, -cosc, sinc_minus);
 }
 Matrix3d calcRightJacobian3(const Vector3d& w) { return calcRightJacobian3<double>(w); }
 template Matrix3<Lanes> calcRightJacobian3(const Vector3<Lanes>&);
@@ -107,8 +80,8 @@ template Matrix3<Lanes> calcRightJacobianInverse3(const Vector3<Lanes>&);
 
 template <typename T>
 Eigen::Quaternion<T> exp3AsQuaternion(const Vector3<T>& w) {
-  const auto half = calcHalfAngle(w.squaredNorm());
-  return {half.cosine, half.sine * w.x(), half.sine * w.y(), half.sine * w.z()};
+  const auto [sine, cosine] = calcHalfAngle(w.squaredNorm());
+  return {cosine, sine * w.x(), sine * w.y(), sine * w.z()};
 }
 Eigen::Quaterniond exp3AsQuaternion(const Vector3d& w) { return exp3AsQuaternion<double>(w); }
 template Eigen::Quaternion<Lanes> exp3AsQuaternion(const Vector3<Lanes>&);
