@@ -168,12 +168,21 @@ TEST_CASE("a rollout in segments leads to the same optimum in about as many iter
   check(body, makeGuess(body));
 }
 
+namespace {
+
+// Long enough for several segments, from a start that turns already.
+void makeLongTurn(TurningBody& body) {
+  body.stages = 100;
+  body.goal << 0.6, 0.4, -0.3, -0.2;
+  body.goal.normalize();
+  body.start.tail(3) << 0.3, -0.5, 1;
+}
+
+}  // namespace
+
 TEST_CASE("the gaps that segments open are there, known, and closed by the last iteration allowed") {
   TurningBody problem;
-  problem.stages = 100;
-  problem.goal << 0.6, 0.4, -0.3, -0.2;
-  problem.goal.normalize();
-  problem.start.tail(3) << 0.3, -0.5, 1;
+  makeLongTurn(problem);
   FddpOptions options;
   options.threads = GENERATE(1, 2);
   ShootingTrajectory t = makeGuess(problem);
@@ -216,10 +225,7 @@ TEST_CASE("a short last step closes the gaps by a second rollout in segments, a 
       return TurningBody::step(stage, x, u, x_next, cost);
     }
   } problem;
-  problem.stages = 100;
-  problem.goal << 0.6, 0.4, -0.3, -0.2;
-  problem.goal.normalize();
-  problem.start.tail(3) << 0.3, -0.5, 1;
+  makeLongTurn(problem);
   FddpOptions options;
   options.threads = GENERATE(1, 2);
   options.gradient_tolerance = 1e-30;  // the end of the iterations is theirs
