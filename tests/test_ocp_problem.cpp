@@ -333,12 +333,12 @@ TEST_CASE("shooting problem: what does not fit is refused, what is not finite fa
   const Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 0.7);
   const Model& model = mechanism.model;
   const VectorXd v = VectorXd::Zero(4);
-  const auto make = [&](const std::function<void(StageSpec&)>& spoil) {
+  const auto make = [&](const std::function<void(StageSpec&)>& spoil, Formulation formulation = Formulation::Full) {
     std::vector<StageSpec> stages;
     stages.push_back(makeTerminal(rng, model, mechanism.q_closed));
     stages.push_back(makeTerminal(rng, model, mechanism.q_closed));
     spoil(stages[0]);
-    return RobotProblem(model, mechanism.q_closed, v, std::move(stages));
+    return RobotProblem(model, mechanism.q_closed, v, std::move(stages), formulation);
   };
   CHECK_NOTHROW(make([](StageSpec&) {}));
   CHECK_THROWS_AS(make([](StageSpec& s) { s.dt = 0; }), ModelError);
@@ -358,4 +358,14 @@ TEST_CASE("shooting problem: what does not fit is refused, what is not finite fa
   CHECK(problem.linearize(0, x, u, next, out) == StepStatus::Failed);
   CHECK(problem.calcTerminalCost(x, cost) == StepStatus::Failed);
   CHECK(problem.linearizeTerminal(x, out) == StepStatus::Failed);
+
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::function<void(StageSpec&)> spoils[] = {
+      [&](StageSpec& s) { s.state.weight = nan; }, [&](StageSpec& s) { s.state.q_ref[0] = nan; },
+      [&](StageSpec& s) { s.state.v_ref[1] = nan; }, [&](StageSpec& s) { s.state.weights[2] = nan; }};
+  for (Formulation formulation : {Formulation::Full, Formulation::Reduced})
+    for (const auto& spoil : spoils) {
+      RobotProblem spoilt = make(spoil, formulation);
+      CHECK(spoilt.step(0, spoilt.initialState(), u, next, cost) == StepStatus::Failed);
+    }
 }

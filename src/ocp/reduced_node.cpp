@@ -1,5 +1,6 @@
 // State space of reduced_node.h, and its memory.
 #include <algorithm>
+#include <cstring>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
@@ -11,7 +12,7 @@ namespace bielle {
 BlockWork::BlockWork(const LoopBlock& l) : scratch(l), start(l), point(l), motion(l), ahead(l), gap(l) {
   const int n = l.model.nv(), r = l.size, rank = l.rank;
   q.setZero(l.model.nq());
-  for (VectorXd* x : {&v, &a, &d, &w}) x->setZero(n);
+  for (VectorXd* x : {&v, &a, &d}) x->setZero(n);
   for (VectorXd* x : {&independent, &zeta}) x->setZero(rank);
   rows.setZero(l.closures.rows);
   HN.setZero(n, r);
@@ -75,18 +76,25 @@ ReducedSizes::ReducedSizes(const std::vector<StageSpec>& specs) {
     rows = std::max(rows, set.rows - loop_rows);
     constraints = std::max(constraints, set.rows);
     residuals = std::max(residuals, countResidualRows(spec));
-    if (spec.state.weight != 0 && !findStateCost(spec.state)) state_costs.push_back(&spec.state);
+    if (spec.state.weight != 0) state_costs.insert(&spec.state);
   }
   for (size_t tip = 0; tip < tips.size(); ++tip) slots.insert(slots.end(), most[tips[tip]], static_cast<int>(tip));
 }
 
+bool StateCostOrder::operator()(const StateCost* a, const StateCost* b) const {
+  const auto compare = [](const double* x, const double* y, Eigen::Index size) {
+    return size == 0 ? 0 : std::memcmp(x, y, size * sizeof(double));
+  };
+  if (const int order = compare(&a->weight, &b->weight, 1)) return order < 0;
+  for (VectorXd StateCost::*member : {&StateCost::q_ref, &StateCost::v_ref, &StateCost::weights}) {
+    const VectorXd &x = a->*member, &y = b->*member;  // all of the same model
+    if (const int order = compare(x.data(), y.data(), x.size())) return order < 0;
+  }
+  return false;
+}
+
 const StateCost* ReducedSizes::findStateCost(const StateCost& cost) const {
-  if (cost.weight == 0) return nullptr;
-  const auto found = std::find_if(state_costs.begin(), state_costs.end(), [&](const StateCost* other) {
-    return other->weight == cost.weight && other->q_ref == cost.q_ref && other->v_ref == cost.v_ref &&
-           other->weights == cost.weights;
-  });
-  return found == state_costs.end() ? nullptr : *found;
+  return cost.weight == 0 ? nullptr : *state_costs.find(&cost);
 }
 
 ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const ReducedSizes& sizes)

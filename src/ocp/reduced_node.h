@@ -26,6 +26,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <thread>
 
 #include "bielle/dynamics/reduced_tree.h"
@@ -42,7 +43,7 @@ struct BlockWork {
   BlockState start, point;           // for integrate() and open gaps
   BlockMotion motion, ahead;         // at the state, in the whole model; at q+, in the block
   BlockGapOf<double> gap;            // of an impact
-  VectorXd q, v, a, d, w;            // n (q: nq)
+  VectorXd q, v, a, d;               // n (q: nq)
   VectorXd independent, zeta, rows;  // rank, rank, m
   MatrixXd HN;                       // n x r, scratch
   MatrixXd mixed;                    // r x r
@@ -62,16 +63,21 @@ struct FreeJoint {
   JointMatrix q_y, q_v;  // nv x nv of the joint, where it is curved
 };
 
+// An order of state costs by the bytes of their numbers, NaN among them.
+struct StateCostOrder {
+  bool operator()(const StateCost* a, const StateCost* b) const;
+};
+
 // Sizes of the memory that the nodes of a problem share.
 struct ReducedSizes {
   explicit ReducedSizes(const std::vector<StageSpec>& specs);
-  std::vector<int> tips;                      // bodies in contact at some stage
-  std::vector<int> slots;                     // of all contacts that a stage may have, their tips
-  std::vector<int> contact_rows;              // numbers of contact rows that occur
-  int rows = 0;                               // largest number of contact rows
-  int constraints = 0;                        // largest number of constraint rows
-  int residuals = 0;                          // largest number of residual rows
-  std::vector<const StateCost*> state_costs;  // those that differ
+  std::vector<int> tips;                                   // bodies in contact at some stage
+  std::vector<int> slots;                                  // of all contacts that a stage may have, their tips
+  std::vector<int> contact_rows;                           // numbers of contact rows that occur
+  int rows = 0;                                            // largest number of contact rows
+  int constraints = 0;                                     // largest number of constraint rows
+  int residuals = 0;                                       // largest number of residual rows
+  std::set<const StateCost*, StateCostOrder> state_costs;  // those that differ
   // The one of them that is the same; null when the stage has none.
   const StateCost* findStateCost(const StateCost& cost) const;
 };
