@@ -163,9 +163,10 @@ std::vector<std::string> writeResult(const std::string& directory, const MotionR
   csv.write(formatCsv(result.record));
   npz.write(formatNpz(result.record));
   summary.write(formatJson(makeSummary(result)) + "\n");
-  // What was there goes first, and the summary comes last: whoever is killed here leaves no mixture of two results.
+  // What was there goes first, the summary after all that was made of it, and the new one comes last: whoever is killed here
+  // leaves no mixture of two results.
   std::error_code error;
-  for (const char* name : {"summary.json", "check.json", "lift.json", "report.html"})
+  for (const char* name : {"report.html", "lift.json", "check.json", "summary.json"})
     fs::remove(fs::path(directory) / name, error);
   for (AsideFile* file : {&csv, &npz, &summary}) file->commit();
   return paths;
