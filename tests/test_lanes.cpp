@@ -171,22 +171,22 @@ TEST_CASE("a point has one basis, whatever the rounding on the way to it") {
   const Model model = loadRobot("bipetto").model;
   const VectorXd q = makeStandingPosture(model);
   const Reduction reduction = makeReduction(model, q);
-  REQUIRE(reduction.blocks.size() == 4);
+  REQUIRE(reduction.clusters.size() == 4);
   std::mt19937 rng(4);
   std::uniform_real_distribution<double> uniform(-1e-13, 1e-13);
-  for (const LoopBlock& block : reduction.blocks) {
-    VectorXd q_block(block.model.nq()), moved(block.model.nq());
-    gatherConfiguration(model, block, q, q_block);
-    BlockPoint point(block), other(block);
-    REQUIRE(point.update(block, q_block));
+  for (const ReducedCluster& cluster : reduction.clusters) {
+    VectorXd q_cluster(cluster.model.nq()), moved(cluster.model.nq());
+    gatherConfiguration(model, cluster, q, q_cluster);
+    ClusterPoint point(cluster), other(cluster);
+    REQUIRE(point.update(cluster, q_cluster));
     for (int i = 0; i < 50; ++i) {
-      for (Eigen::Index k = 0; k < moved.size(); ++k) moved[k] = q_block[k] + uniform(rng);
-      REQUIRE(other.update(block, moved));
+      for (Eigen::Index k = 0; k < moved.size(); ++k) moved[k] = q_cluster[k] + uniform(rng);
+      REQUIRE(other.update(cluster, moved));
       CHECK((other.basis().N - point.basis().N).norm() < 1e-9 * point.basis().N.norm());
       VectorX<Lanes> q_lanes = moved.cast<Lanes>();
-      BlockScratchOf<Lanes> scratch(block);
-      BlockStateOf<Lanes> lanes(block);
-      REQUIRE(!any(!lanes.update(block, scratch, q_lanes)));
+      ClusterScratchOf<Lanes> scratch(cluster);
+      ClusterStateOf<Lanes> lanes(cluster);
+      REQUIRE(!any(!lanes.update(cluster, scratch, q_lanes)));
       MatrixXd N(point.basis().N.rows(), point.basis().N.cols());
       unpackLane(lanes.basis().N.data(), i % kLane, N.size(), N.data());
       CHECK((N - point.basis().N).norm() < 1e-9 * point.basis().N.norm());

@@ -27,7 +27,7 @@ struct Robot {
         linkage(makeLinkage(model, makeReduction(model, q), joints)) {}
   VectorXd getWhole(const RatioSample& sample) const {
     VectorXd whole = q;
-    scatterConfiguration(model, linkage.block, sample.q, whole);
+    scatterConfiguration(model, linkage.cluster, sample.q, whole);
     return whole;
   }
   Model model;
@@ -59,14 +59,14 @@ VectorXd closeAt(const Model& model, const VectorXd& q, const std::string& joint
 }
 
 void checkRatioDerivatives(const Robot& robot, const RatioSample& sample) {
-  const LoopBlock& block = robot.linkage.block;
+  const ReducedCluster& cluster = robot.linkage.cluster;
   const int m = robot.linkage.size();
-  BlockPoint center(block), moved(block);
+  ClusterPoint center(cluster), moved(cluster);
   LinkageRatio ratio, side;
-  REQUIRE(center.update(block, sample.q));
+  REQUIRE(center.update(cluster, sample.q));
   REQUIRE(calcLinkageRatio(robot.linkage, center, ratio));
   const auto move = [&](const VectorXd& dq, VectorXd& joints) {
-    REQUIRE(moved.close(block, center.basis(), dq, VectorXd()));
+    REQUIRE(moved.close(cluster, center.basis(), dq, VectorXd()));
     joints.resize(m);
     for (int j = 0; j < m; ++j) joints[j] = moved.basis().q[robot.linkage.joint_positions[j]];
     REQUIRE(calcLinkageRatio(robot.linkage, moved, side));

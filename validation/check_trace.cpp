@@ -39,8 +39,8 @@ VectorXd calcMetric(const CheckedMotion& motion) {
   // A start that is open is told by other rows; what it should have been is good enough here.
   const AssemblyResult start = closeConfiguration(motion.model, motion.record.q.row(0).transpose());
   if (start.status != AssemblyStatus::Closed) return metric;
-  for (const LoopBlock& block : makeReduction(motion.model, start.q).blocks)
-    for (size_t i = 0; i < block.dofs.size(); ++i) metric[block.dofs[i]] = block.metric[i];
+  for (const ReducedCluster& cluster : makeReduction(motion.model, start.q).clusters)
+    for (size_t i = 0; i < cluster.dofs.size(); ++i) metric[cluster.dofs[i]] = cluster.metric[i];
   return metric;
 }
 

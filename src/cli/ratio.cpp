@@ -39,7 +39,7 @@ double calcLargestBalanceError(const Model& model, const RatioReport& report, Ve
   double largest = 0;
   for (const RatioSample& sample : report.sweep.samples) {
     if (sample.dead == DeadPointKind::Joint || sample.loses_rank) continue;
-    if (!report.linkage.isDirect()) scatterConfiguration(model, report.linkage.block, sample.q, q);
+    if (!report.linkage.isDirect()) scatterConfiguration(model, report.linkage.cluster, sample.q, q);
     largest = std::max(largest, calcBalanceError(model, report.linkage, q, sample.ratio.R));
   }
   return largest;

@@ -8,11 +8,11 @@
 namespace bielle {
 namespace {
 
-std::vector<int> findMotors(const Model& model, const LoopBlock& block) {
+std::vector<int> findMotors(const Model& model, const ReducedCluster& cluster) {
   std::vector<int> positions;
-  for (size_t i = 0; i < block.dofs.size(); ++i)
+  for (size_t i = 0; i < cluster.dofs.size(); ++i)
     for (const Motor& motor : model.motors())
-      if (motor.dof == block.dofs[i]) positions.push_back(static_cast<int>(i));
+      if (motor.dof == cluster.dofs[i]) positions.push_back(static_cast<int>(i));
   return positions;
 }
 
@@ -29,19 +29,19 @@ double calcConditioning(const MatrixXd& N, const std::vector<int>& motors) {
 LinkageConditioning::LinkageConditioning(const Model& model, ConstVectorRef q) : model_(model) {
   if (model.closures().empty()) return;
   reduction_ = makeReduction(model, q);
-  for (const LoopBlock& block : reduction_.blocks) {
-    const std::vector<int> motors = findMotors(model, block);
-    if (block.size > 0 && static_cast<int>(motors.size()) >= block.size)
-      clusters_.push_back({&block, motors, BlockPoint(block), VectorXd(block.model.nq())});
+  for (const ReducedCluster& cluster : reduction_.clusters) {
+    const std::vector<int> motors = findMotors(model, cluster);
+    if (cluster.size > 0 && static_cast<int>(motors.size()) >= cluster.size)
+      entries_.push_back({&cluster, motors, ClusterPoint(cluster), VectorXd(cluster.model.nq())});
   }
 }
 
 double LinkageConditioning::calc(ConstVectorRef q) {
   double worst = 1;
-  for (Cluster& cluster : clusters_) {
-    gatherConfiguration(model_, *cluster.block, q, cluster.q);
-    if (!cluster.point.update(*cluster.block, cluster.q)) return std::numeric_limits<double>::infinity();
-    worst = std::max(worst, calcConditioning(cluster.point.basis().N, cluster.motors));
+  for (Entry& entry : entries_) {
+    gatherConfiguration(model_, *entry.cluster, q, entry.q);
+    if (!entry.point.update(*entry.cluster, entry.q)) return std::numeric_limits<double>::infinity();
+    worst = std::max(worst, calcConditioning(entry.point.basis().N, entry.motors));
   }
   return worst;
 }

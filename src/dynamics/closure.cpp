@@ -17,7 +17,7 @@ SE3Of<T> calcRelativePlacement(const WorkspaceOf<T>& ws, const Closure& c) {
   return getFrame1(ws, c).inverseTimes(ws.X_WB[c.body2] * c.X_B2);
 }
 
-// The two unit vectors normal to the hinge axis, as columns.
+// The two reduced joint vectors normal to the hinge axis, as columns.
 Eigen::Matrix<double, 3, 2> getHingeNormals(const Closure& c) { return makePlaneBasis(c.axis).leftCols<2>(); }
 
 // g = theta / sin(theta) of the angle between the hinge axes, and dg/dcos(theta).

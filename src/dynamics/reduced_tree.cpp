@@ -7,23 +7,23 @@ namespace bielle {
 template <typename T>
 ReducedTreeOf<T>::ReducedTreeOf(const Model& model, const Reduction& reduction, const std::vector<int>& tips)
     : model_(model), reduction_(reduction) {
-  const auto resize = [](const ReducedUnit& place, Columns& columns) {
+  const auto resize = [](const ReducedJoint& place, Columns& columns) {
     columns.outer = place.outer;
     for (Matrix6X<T>* m : {&columns.J, &columns.dV, &columns.dA, &columns.dW}) m->setZero(6, place.outer.size());
   };
   size_t groups = 0;
-  for (const ReducedUnit& place : reduction.units) {
-    Unit unit;
-    if (place.block >= 0) {
-      unit.dofs = reduction.blocks[place.block].dofs;
-      groups = std::max(groups, reduction.blocks[place.block].groups.size());
+  for (const ReducedJoint& place : reduction.joints) {
+    Link link;
+    if (place.cluster >= 0) {
+      link.dofs = reduction.clusters[place.cluster].dofs;
+      groups = std::max(groups, reduction.clusters[place.cluster].groups.size());
     } else {
       const Joint& joint = model.joints()[place.joint];
-      for (int k = 0; k < joint.nv; ++k) unit.dofs.push_back(joint.idx_v + k);
+      for (int k = 0; k < joint.nv; ++k) link.dofs.push_back(joint.idx_v + k);
     }
-    resize(place, unit.columns);
-    for (Matrix6X<T>* m : {&unit.YJ, &unit.BtJ, &unit.Gy, &unit.Gv}) m->setZero(6, place.size);
-    units_.push_back(std::move(unit));
+    resize(place, link.columns);
+    for (Matrix6X<T>* m : {&link.YJ, &link.BtJ, &link.Gy, &link.Gv}) m->setZero(6, place.size);
+    links_.push_back(std::move(link));
   }
   for (int body : tips) {
     tips_.push_back({makeTip(model, reduction, body), {}});
@@ -40,11 +40,11 @@ void ReducedTreeOf<T>::clearAfter(size_t groups) {
 
 // The columns of the parent's outer coordinates, then those of the parent itself along the path.
 template <typename T>
-void ReducedTreeOf<T>::updateColumns(const WorkspaceOf<T>& ws, const std::vector<BlockLiftOf<T>>& lifts,
-                                     const ReducedUnit& place, Depth depth, Columns& out) const {
+void ReducedTreeOf<T>::updateColumns(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts,
+                                     const ReducedJoint& place, Depth depth, Columns& out) const {
   if (place.parent < 0) return;
-  const ReducedUnit& up = reduction_.units[place.parent];
-  const Unit& parent = units_[place.parent];
+  const ReducedJoint& up = reduction_.joints[place.parent];
+  const Link& parent = links_[place.parent];
   const Eigen::Index inherited = up.outer.size(), n = parent.dofs.size();
   const bool all = depth == Depth::All;
   out.J.leftCols(inherited) = parent.columns.J;
@@ -53,7 +53,7 @@ void ReducedTreeOf<T>::updateColumns(const WorkspaceOf<T>& ws, const std::vector
     out.dA.leftCols(inherited) = parent.columns.dA;
     out.dW.leftCols(inherited) = parent.columns.dW;
   }
-  if (up.block < 0) {
+  if (up.cluster < 0) {
     const int k = parent.dofs.front();
     out.J.rightCols(n) = ws.J.middleCols(k, n);
     if (!all) return;
@@ -62,7 +62,7 @@ void ReducedTreeOf<T>::updateColumns(const WorkspaceOf<T>& ws, const std::vector
     out.dW.rightCols(n) = ws.dJ.middleCols(k, n) + ws.dV.middleCols(k, n);
     return;
   }
-  const BlockMotionOf<T>& motion = *lifts[up.block].motion;
+  const ClusterMotionOf<T>& motion = *lifts[up.cluster].motion;
   for (int c = 0; c < up.size; ++c) {
     const Eigen::Index from = n * c + place.path.back(), to = inherited + c;
     out.J.col(to) = motion.J.col(from);
@@ -75,19 +75,19 @@ void ReducedTreeOf<T>::updateColumns(const WorkspaceOf<T>& ws, const std::vector
 
 // M of Eq. (3), and (YJ)~.
 template <typename T>
-void ReducedTreeOf<T>::addMassWithin(const WorkspaceOf<T>& ws, const BlockLiftOf<T>* lift, const ReducedUnit& place,
-                                     Unit& unit, typename ArgumentsOf<T>::Matrix M) {
-  const int n = static_cast<int>(unit.dofs.size()), o = place.offset;
+void ReducedTreeOf<T>::addMassWithin(const WorkspaceOf<T>& ws, const ClusterLiftOf<T>* lift, const ReducedJoint& place,
+                                     Link& link, typename ArgumentsOf<T>::Matrix M) {
+  const int n = static_cast<int>(link.dofs.size()), o = place.offset;
   if (!lift) {
-    const int first = unit.dofs.front();
-    unit.YJ = ws.YJ.middleCols(first, n);
-    M.block(o, o, n, n).noalias() = ws.J.middleCols(first, n).transpose().lazyProduct(unit.YJ);
+    const int first = link.dofs.front();
+    link.YJ = ws.YJ.middleCols(first, n);
+    M.block(o, o, n, n).noalias() = ws.J.middleCols(first, n).transpose().lazyProduct(link.YJ);
     M.block(o, o, n, n).diagonal() += model_.armature().segment(first, n);
     return;
   }
-  const BlockMotionOf<T>& motion = *lift->motion;
+  const ClusterMotionOf<T>& motion = *lift->motion;
   const MatrixX<T>& N = motion.basis->N;
-  const std::vector<DofGroup>& groups = motion.block.groups;
+  const std::vector<DofGroup>& groups = motion.cluster.groups;
   M.block(o, o, place.size, place.size).setZero();
   for (int c = 0; c < place.size; ++c) {
     clearAfter(groups.size());
@@ -96,7 +96,7 @@ void ReducedTreeOf<T>::addMassWithin(const WorkspaceOf<T>& ws, const BlockLiftOf
       const DofGroup& group = groups[g];
       Vector6<T> sum = after_y_.col(g);
       for (int k = group.begin; k < group.end; ++k) {
-        const int dof = unit.dofs[k];
+        const int dof = link.dofs[k];
         const T row = ws.YJ.col(dof).dot(motion.J.col(n * c + k)) + ws.J.col(dof).dot(after_y_.col(g)) +
                       model_.armature()[dof] * N(k, c);
         for (int d = 0; d < place.size; ++d) M(o + d, o + c) += N(k, d) * row;
@@ -108,23 +108,23 @@ void ReducedTreeOf<T>::addMassWithin(const WorkspaceOf<T>& ws, const BlockLiftOf
         total += sum;
       }
     }
-    unit.YJ.col(c) = total;
+    link.YJ.col(c) = total;
   }
 }
 
 template <typename T>
-void ReducedTreeOf<T>::updateMassMatrix(const WorkspaceOf<T>& ws, const std::vector<BlockLiftOf<T>>& lifts,
+void ReducedTreeOf<T>::updateMassMatrix(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts,
                                         typename ArgumentsOf<T>::Matrix M) {
   M.setZero();
-  for (size_t u = 0; u < units_.size(); ++u) {
-    const ReducedUnit& place = reduction_.units[u];
-    Unit& unit = units_[u];
-    const BlockLiftOf<T>* lift = place.block >= 0 ? &lifts[place.block] : nullptr;
-    updateColumns(ws, lifts, place, Depth::Twists, unit.columns);
-    addMassWithin(ws, lift, place, unit, M);
+  for (size_t u = 0; u < links_.size(); ++u) {
+    const ReducedJoint& place = reduction_.joints[u];
+    Link& link = links_[u];
+    const ClusterLiftOf<T>* lift = place.cluster >= 0 ? &lifts[place.cluster] : nullptr;
+    updateColumns(ws, lifts, place, Depth::Twists, link.columns);
+    addMassWithin(ws, lift, place, link, M);
     for (size_t o = 0; o < place.outer.size(); ++o)
       for (int c = 0; c < place.size; ++c) {
-        const T m = unit.columns.J.col(o).dot(unit.YJ.col(c));
+        const T m = link.columns.J.col(o).dot(link.YJ.col(c));
         M(place.outer[o], place.offset + c) = m;
         M(place.offset + c, place.outer[o]) = m;
       }
@@ -134,13 +134,13 @@ void ReducedTreeOf<T>::updateMassMatrix(const WorkspaceOf<T>& ws, const std::vec
 
 // A joint outside all loops: its own entries, and Eq. (1) with N = 1.
 template <typename T>
-void ReducedTreeOf<T>::addFreeWithin(const WorkspaceOf<T>& ws, const ReducedUnit& place, Unit& unit,
+void ReducedTreeOf<T>::addFreeWithin(const WorkspaceOf<T>& ws, const ReducedJoint& place, Link& link,
                                      typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v) const {
-  const int first = unit.dofs.front(), n = static_cast<int>(unit.dofs.size());
-  unit.YJ = ws.YJ.middleCols(first, n);
-  unit.BtJ = ws.BtJ.middleCols(first, n);
-  unit.Gy = ws.Gq.middleCols(first, n);
-  unit.Gv = ws.Gv.middleCols(first, n);
+  const int first = link.dofs.front(), n = static_cast<int>(link.dofs.size());
+  link.YJ = ws.YJ.middleCols(first, n);
+  link.BtJ = ws.BtJ.middleCols(first, n);
+  link.Gy = ws.Gq.middleCols(first, n);
+  link.Gv = ws.Gv.middleCols(first, n);
   for (int k = 0; k < n; ++k)
     for (int j = 0; j < n; ++j) {
       const auto entry = calcDerivativeEntry(model_, ws, first + j, first + k);
@@ -151,13 +151,13 @@ void ReducedTreeOf<T>::addFreeWithin(const WorkspaceOf<T>& ws, const ReducedUnit
 
 // Eqs. (1) and (3)
 template <typename T>
-void ReducedTreeOf<T>::addBlockWithin(const WorkspaceOf<T>& ws, const BlockLiftOf<T>& lift, const ReducedUnit& place,
-                                      Unit& unit, typename ArgumentsOf<T>::Matrix A_y,
-                                      typename ArgumentsOf<T>::Matrix A_v) {
-  const BlockMotionOf<T>& motion = *lift.motion;
+void ReducedTreeOf<T>::addClusterWithin(const WorkspaceOf<T>& ws, const ClusterLiftOf<T>& lift,
+                                        const ReducedJoint& place, Link& link, typename ArgumentsOf<T>::Matrix A_y,
+                                        typename ArgumentsOf<T>::Matrix A_v) {
+  const ClusterMotionOf<T>& motion = *lift.motion;
   const MatrixX<T>&N = motion.basis->N, &Z = motion.Z, &dy = motion.dy, &dv = motion.dv;
-  const std::vector<DofGroup>& groups = motion.block.groups;
-  const int n = static_cast<int>(unit.dofs.size()), o = place.offset;
+  const std::vector<DofGroup>& groups = motion.cluster.groups;
+  const int n = static_cast<int>(link.dofs.size()), o = place.offset;
   for (int c = 0; c < place.size; ++c) {
     clearAfter(groups.size());
     Vector6<T> YJ = Vector6<T>::Zero(), BtJ = YJ, Gy = YJ, Gv = YJ;
@@ -166,7 +166,7 @@ void ReducedTreeOf<T>::addBlockWithin(const WorkspaceOf<T>& ws, const BlockLiftO
       const Vector6<T> after_y = after_y_.col(g), after_v = after_v_.col(g);
       Vector6<T> sum_y = after_y, sum_v = after_v;
       for (int k = group.begin; k < group.end; ++k) {
-        const int dof = unit.dofs[k], at = n * c + k;
+        const int dof = link.dofs[k], at = n * c + k;
         const double armature = model_.armature()[dof];
         const T row_y = ws.YJ.col(dof).dot(motion.dA.col(at)) + ws.BtJ.col(dof).dot(motion.dV.col(at)) +
                         ws.J.col(dof).dot(after_y) + armature * dy(k, c) - (*lift.HN)(k, c);
@@ -189,37 +189,37 @@ void ReducedTreeOf<T>::addBlockWithin(const WorkspaceOf<T>& ws, const BlockLiftO
         Gv += sum_v;
       }
     }
-    unit.YJ.col(c) = YJ;
-    unit.BtJ.col(c) = BtJ;
-    unit.Gy.col(c) = Gy;
-    unit.Gv.col(c) = Gv;
+    link.YJ.col(c) = YJ;
+    link.BtJ.col(c) = BtJ;
+    link.Gy.col(c) = Gy;
+    link.Gv.col(c) = Gv;
   }
 }
 
 template <typename T>
-void ReducedTreeOf<T>::updateDerivatives(const WorkspaceOf<T>& ws, const std::vector<BlockLiftOf<T>>& lifts,
+void ReducedTreeOf<T>::updateDerivatives(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts,
                                          typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v) {
   A_y.setZero();
   A_v.setZero();
-  for (size_t u = 0; u < units_.size(); ++u) {
-    const ReducedUnit& place = reduction_.units[u];
-    Unit& unit = units_[u];
-    updateColumns(ws, lifts, place, Depth::All, unit.columns);
-    if (place.block >= 0) {
-      addBlockWithin(ws, lifts[place.block], place, unit, A_y, A_v);
+  for (size_t u = 0; u < links_.size(); ++u) {
+    const ReducedJoint& place = reduction_.joints[u];
+    Link& link = links_[u];
+    updateColumns(ws, lifts, place, Depth::All, link.columns);
+    if (place.cluster >= 0) {
+      addClusterWithin(ws, lifts[place.cluster], place, link, A_y, A_v);
     } else {
-      addFreeWithin(ws, place, unit, A_y, A_v);
+      addFreeWithin(ws, place, link, A_y, A_v);
     }
     for (size_t o = 0; o < place.outer.size(); ++o) {  // Eq. (2)
       const int beta = place.outer[o];
-      const Columns& in = unit.columns;
+      const Columns& in = link.columns;
       const Vector6<T> J = in.J.col(o), dV = in.dV.col(o), dA = in.dA.col(o), dW = in.dW.col(o);
       for (int c = 0; c < place.size; ++c) {
         const int alpha = place.offset + c;
-        A_y(alpha, beta) = unit.YJ.col(c).dot(dA) + unit.BtJ.col(c).dot(dV);
-        A_v(alpha, beta) = unit.YJ.col(c).dot(dW) + unit.BtJ.col(c).dot(J);
-        A_y(beta, alpha) = J.dot(unit.Gy.col(c));
-        A_v(beta, alpha) = J.dot(unit.Gv.col(c));
+        A_y(alpha, beta) = link.YJ.col(c).dot(dA) + link.BtJ.col(c).dot(dV);
+        A_v(alpha, beta) = link.YJ.col(c).dot(dW) + link.BtJ.col(c).dot(J);
+        A_y(beta, alpha) = J.dot(link.Gy.col(c));
+        A_v(beta, alpha) = J.dot(link.Gv.col(c));
       }
     }
   }

@@ -12,8 +12,8 @@
 namespace bielle {
 namespace {
 
-// The cluster's joints over their common root, which becomes the world of the block.
-Model makeBlockModel(const Model& model, const LoopCluster& cluster, const std::vector<int>& joints) {
+// The cluster's joints over their common root, which becomes the world of the cluster.
+Model makeClusterModel(const Model& model, const LoopCluster& loops, const std::vector<int>& joints) {
   ModelBuilder builder("loops of " + model.name());
   builder.setGravity(Vector3d::Zero());
   std::vector<std::string> links(model.numBodies(), "world");
@@ -22,7 +22,7 @@ Model makeBlockModel(const Model& model, const LoopCluster& cluster, const std::
     links[i] = model.bodies()[i].name;
     builder.addLink(links[i], links[joint.parent], joint, {});
   }
-  for (int c : cluster.closures) {
+  for (int c : loops.closures) {
     const Closure& closure = model.closures()[c];
     builder.addFrame(closure.name + "|1", links[closure.body1], closure.X_B1);
     builder.addFrame(closure.name + "|2", links[closure.body2], closure.X_B2);
@@ -40,49 +40,49 @@ VectorXd makeMetric(const Workspace& ws, const std::vector<int>& dofs) {
   return largest > 0 ? VectorXd((metric / largest).cwiseMax(kFloor)) : VectorXd::Ones(metric.size());
 }
 
-// Parent, path and outer coordinates of a unit carried by body `root`.
-void connectUnit(const Model& model, const Reduction& reduction, int root, ReducedUnit& unit) {
+// Parent, path and outer coordinates of a reduced joint carried by body `root`.
+void connect(const Model& model, const Reduction& reduction, int root, ReducedJoint& reduced) {
   if (root == 0) return;
-  unit.parent = reduction.unit_of_body[root];
-  const ReducedUnit& up = reduction.units[unit.parent];
-  unit.outer = up.outer;
-  for (int k = 0; k < up.size; ++k) unit.outer.push_back(up.offset + k);
+  reduced.parent = reduction.joint_of_body[root];
+  const ReducedJoint& up = reduction.joints[reduced.parent];
+  reduced.outer = up.outer;
+  for (int k = 0; k < up.size; ++k) reduced.outer.push_back(up.offset + k);
   std::vector<int> dofs;
-  if (up.block >= 0) {
-    dofs = reduction.blocks[up.block].dofs;
+  if (up.cluster >= 0) {
+    dofs = reduction.clusters[up.cluster].dofs;
   } else {
     const Joint& joint = model.joints()[up.joint];
     for (int k = 0; k < joint.nv; ++k) dofs.push_back(joint.idx_v + k);
   }
   const std::vector<int>& support = model.supportDofs(root);
   for (size_t k = 0; k < dofs.size(); ++k)
-    if (std::binary_search(support.begin(), support.end(), dofs[k])) unit.path.push_back(static_cast<int>(k));
+    if (std::binary_search(support.begin(), support.end(), dofs[k])) reduced.path.push_back(static_cast<int>(k));
 }
 
-// What the paths through a block are made of.
-void addGroups(LoopBlock& block) {
-  std::vector<int> last_group(block.model.numBodies(), -1);
-  block.body_dof.assign(block.model.numBodies(), -1);
-  for (int i = 1; i < block.model.numBodies(); ++i) {
-    const Joint& joint = block.model.joints()[i];
+// What the paths through a cluster are made of.
+void addGroups(ReducedCluster& cluster) {
+  std::vector<int> last_group(cluster.model.numBodies(), -1);
+  cluster.body_dof.assign(cluster.model.numBodies(), -1);
+  for (int i = 1; i < cluster.model.numBodies(); ++i) {
+    const Joint& joint = cluster.model.joints()[i];
     last_group[i] = last_group[joint.parent];
-    block.body_dof[i] = block.body_dof[joint.parent];
+    cluster.body_dof[i] = cluster.body_dof[joint.parent];
     const int step = joint.kind == JointKind::Universal ? 1 : joint.nv;
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; k += step) {
-      block.groups.push_back({k, k + step, block.body_dof[i], last_group[i]});
-      block.body_dof[i] = k + step - 1;
-      last_group[i] = static_cast<int>(block.groups.size()) - 1;
+      cluster.groups.push_back({k, k + step, cluster.body_dof[i], last_group[i]});
+      cluster.body_dof[i] = k + step - 1;
+      last_group[i] = static_cast<int>(cluster.groups.size()) - 1;
     }
   }
 }
 
-// The closures of a block for someone who looks at the whole model.
-void placeClosures(const Model& model, LoopBlock& block) {
-  block.placed = block.closures.closures;
-  for (size_t c = 0; c < block.placed.size(); ++c) {
-    const Closure& whole = model.closures()[block.cluster_closures[c]];
-    block.placed[c].body1 = whole.body1;
-    block.placed[c].body2 = whole.body2;
+// The closures of a cluster for someone who looks at the whole model.
+void placeClosures(const Model& model, ReducedCluster& cluster) {
+  cluster.placed = cluster.closures.closures;
+  for (size_t c = 0; c < cluster.placed.size(); ++c) {
+    const Closure& whole = model.closures()[cluster.closure_indices[c]];
+    cluster.placed[c].body1 = whole.body1;
+    cluster.placed[c].body2 = whole.body2;
   }
 }
 
@@ -94,99 +94,99 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
   updatePositions(model, whole, q);
   updateMassMatrix(model, whole);
   std::vector<int> owner(model.numBodies(), -1);
-  for (const LoopCluster& cluster : model.clusters()) {
-    LoopBlock block;
-    block.dofs = cluster.dofs;
-    for (int k : cluster.dofs)
-      if (block.joints.empty() || block.joints.back() != model.dofs()[k].joint)
-        block.joints.push_back(model.dofs()[k].joint);
-    for (int i : block.joints) owner[i] = static_cast<int>(out.blocks.size());
-    block.model = makeBlockModel(model, cluster, block.joints);
-    block.closures = makeConstraintSet(block.model);
-    block.cluster_closures = cluster.closures;
-    VectorXd q_block(block.model.nq());
-    gatherConfiguration(model, block, q, q_block);
-    const Mobility mobility = calcMobility(block.model, q_block, kRankTolerance);
-    block.rank = mobility.rank;
-    block.size = mobility.mobility;
-    block.metric = makeMetric(whole, block.dofs);
-    block.inverse_metric = block.metric.cwiseInverse();
-    block.inverse_root = block.metric.cwiseSqrt().cwiseInverse();
-    for (size_t k = 0; k < block.dofs.size(); ++k) block.own_dofs.push_back(static_cast<int>(k));
-    block.root = model.joints()[block.joints.front()].parent;
-    addGroups(block);
-    placeClosures(model, block);
-    Workspace ws(block.model);
-    updatePositions(block.model, ws, q_block);
-    for (const Closure& closure : block.closures.closures)
+  for (const LoopCluster& loops : model.clusters()) {
+    ReducedCluster cluster;
+    cluster.dofs = loops.dofs;
+    for (int k : loops.dofs)
+      if (cluster.joints.empty() || cluster.joints.back() != model.dofs()[k].joint)
+        cluster.joints.push_back(model.dofs()[k].joint);
+    for (int i : cluster.joints) owner[i] = static_cast<int>(out.clusters.size());
+    cluster.model = makeClusterModel(model, loops, cluster.joints);
+    cluster.closures = makeConstraintSet(cluster.model);
+    cluster.closure_indices = loops.closures;
+    VectorXd q_cluster(cluster.model.nq());
+    gatherConfiguration(model, cluster, q, q_cluster);
+    const Mobility mobility = calcMobility(cluster.model, q_cluster, kRankTolerance);
+    cluster.rank = mobility.rank;
+    cluster.size = mobility.mobility;
+    cluster.metric = makeMetric(whole, cluster.dofs);
+    cluster.inverse_metric = cluster.metric.cwiseInverse();
+    cluster.inverse_root = cluster.metric.cwiseSqrt().cwiseInverse();
+    for (size_t k = 0; k < cluster.dofs.size(); ++k) cluster.own_dofs.push_back(static_cast<int>(k));
+    cluster.root = model.joints()[cluster.joints.front()].parent;
+    addGroups(cluster);
+    placeClosures(model, cluster);
+    Workspace ws(cluster.model);
+    updatePositions(cluster.model, ws, q_cluster);
+    for (const Closure& closure : cluster.closures.closures)
       if (!(calcClosureResidual(ws, closure).cwiseAbs().maxCoeff() < 1e-8))
         throw ModelError(model.name(), "closure '" + closure.name + "'", "it is open at the given configuration",
                          "close the configuration first (assemble, closeConfiguration)");
-    out.blocks.push_back(std::move(block));
+    out.clusters.push_back(std::move(cluster));
   }
-  // Units and their reduced coordinates, in the order of the first joint of each.
-  std::vector<int> block_unit(out.blocks.size(), -1);
-  std::vector<int>& unit_of = out.unit_of_body;
-  unit_of.assign(model.numBodies(), -1);
+  // Reduced joints and their reduced coordinates, in the order of the first joint of each.
+  std::vector<int> cluster_joint(out.clusters.size(), -1);
+  std::vector<int>& joint_of = out.joint_of_body;
+  joint_of.assign(model.numBodies(), -1);
   for (int i = 1; i < model.numBodies(); ++i) {
-    if (owner[i] >= 0 && block_unit[owner[i]] >= 0) {
-      unit_of[i] = block_unit[owner[i]];
+    if (owner[i] >= 0 && cluster_joint[owner[i]] >= 0) {
+      joint_of[i] = cluster_joint[owner[i]];
       continue;
     }
-    ReducedUnit unit;
-    unit.offset = out.size;
-    unit_of[i] = static_cast<int>(out.units.size());
+    ReducedJoint reduced;
+    reduced.offset = out.size;
+    joint_of[i] = static_cast<int>(out.joints.size());
     if (owner[i] < 0) {
-      unit.joint = i;
-      unit.size = model.joints()[i].nv;
+      reduced.joint = i;
+      reduced.size = model.joints()[i].nv;
       out.free_joints.push_back(i);
       out.free_offsets.push_back(out.size);
     } else {
-      unit.block = owner[i];
-      block_unit[owner[i]] = unit_of[i];
-      out.blocks[owner[i]].offset = out.size;
-      unit.size = out.blocks[owner[i]].size;
+      reduced.cluster = owner[i];
+      cluster_joint[owner[i]] = joint_of[i];
+      out.clusters[owner[i]].offset = out.size;
+      reduced.size = out.clusters[owner[i]].size;
     }
-    // The first joint of a block hangs on the body that carries the whole block.
-    connectUnit(model, out, model.joints()[i].parent, unit);
-    out.size += unit.size;
-    out.units.push_back(unit);
+    // The first joint of a cluster hangs on the body that carries the whole cluster.
+    connect(model, out, model.joints()[i].parent, reduced);
+    out.size += reduced.size;
+    out.joints.push_back(reduced);
   }
   if (out.size == 0)
     throw ModelError(model.name(), "closures", "they leave the robot no mobility", "see `bielle info` for ranks");
   return out;
 }
 
-ReducedUnit makeTip(const Model& model, const Reduction& reduction, int body) {
-  ReducedUnit tip;
-  connectUnit(model, reduction, body, tip);
+ReducedJoint makeTip(const Model& model, const Reduction& reduction, int body) {
+  ReducedJoint tip;
+  connect(model, reduction, body, tip);
   return tip;
 }
 
-void gatherConfiguration(const Model& model, const LoopBlock& block, ConstVectorRef q, VectorRef q_block) {
+void gatherConfiguration(const Model& model, const ReducedCluster& cluster, ConstVectorRef q, VectorRef q_cluster) {
   int at = 0;
-  for (int i : block.joints) {
+  for (int i : cluster.joints) {
     const Joint& joint = model.joints()[i];
-    q_block.segment(at, joint.nq) = q.segment(joint.idx_q, joint.nq);
+    q_cluster.segment(at, joint.nq) = q.segment(joint.idx_q, joint.nq);
     at += joint.nq;
   }
 }
 
-void scatterConfiguration(const Model& model, const LoopBlock& block, ConstVectorRef q_block, VectorRef q) {
+void scatterConfiguration(const Model& model, const ReducedCluster& cluster, ConstVectorRef q_cluster, VectorRef q) {
   int at = 0;
-  for (int i : block.joints) {
+  for (int i : cluster.joints) {
     const Joint& joint = model.joints()[i];
-    q.segment(joint.idx_q, joint.nq) = q_block.segment(at, joint.nq);
+    q.segment(joint.idx_q, joint.nq) = q_cluster.segment(at, joint.nq);
     at += joint.nq;
   }
 }
 
-void gatherVelocity(const LoopBlock& block, ConstVectorRef v, VectorRef v_block) {
-  for (size_t k = 0; k < block.dofs.size(); ++k) v_block[k] = v[block.dofs[k]];
+void gatherVelocity(const ReducedCluster& cluster, ConstVectorRef v, VectorRef v_cluster) {
+  for (size_t k = 0; k < cluster.dofs.size(); ++k) v_cluster[k] = v[cluster.dofs[k]];
 }
 
-void scatterVelocity(const LoopBlock& block, ConstVectorRef v_block, VectorRef v) {
-  for (size_t k = 0; k < block.dofs.size(); ++k) v[block.dofs[k]] = v_block[k];
+void scatterVelocity(const ReducedCluster& cluster, ConstVectorRef v_cluster, VectorRef v) {
+  for (size_t k = 0; k < cluster.dofs.size(); ++k) v[cluster.dofs[k]] = v_cluster[k];
 }
 
 }  // namespace bielle

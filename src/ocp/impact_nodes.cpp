@@ -58,7 +58,7 @@ bool ReducedImpactNode::updateStep(ConstVectorRef x, ConstVectorRef, const NodeM
   }
   lambda_.tail(contact_rows_) = iws_.impulse.tail(contact_rows_);
   x_next_ << q_, iws_.v_plus;
-  for (Block& b : blocks_) {
+  for (Cluster& b : clusters_) {
     gatherConfiguration(model_, b.loop, q_, b.work->q);
     if (!b.next.update(b.loop, b.work->scratch, b.work->q)) return fail(b, b.next);
     gatherVelocity(b.loop, iws_.v_plus, b.v_next);
@@ -80,8 +80,8 @@ bool ReducedImpactNode::linearizeStep(ConstVectorRef x_next_node, StageModel& ou
   addColumns(iws_.dv_dv, Lift::N, D_v_);
   out.Fx().setZero();
   out.Fu().setZero();
-  for (Block& b : blocks_)
-    if (!linearizeBlock(b, x_next_node, out)) return false;
+  for (Cluster& b : clusters_)
+    if (!linearizeCluster(b, x_next_node, out)) return false;
   differenceFree(x_next_node, x_next_, out.gap);
   for (const FreeJoint& free : work_->free_joints) linearizeFreeJoint(free, out);
   return true;
@@ -98,18 +98,18 @@ void ReducedImpactNode::updateForceDerivatives() {
   addColumns(by_v, Lift::N, dlambda.middleRows(nu + nr, nr));
 }
 
-// Eq. (a) for one block.
-bool ReducedImpactNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out) {
-  const LoopBlock& loop = b.loop;
-  BlockWork& work = *b.work;
-  BlockGapOf<double>& gap = work.gap;
+// Eq. (a) for one cluster.
+bool ReducedImpactNode::linearizeCluster(Cluster& b, ConstVectorRef x_next_node, StageModel& out) {
+  const ReducedCluster& loop = b.loop;
+  ClusterWork& work = *b.work;
+  ClusterGapOf<double>& gap = work.gap;
   const int nr = reduction_.size, o = loop.offset, r = loop.size;
   gatherConfiguration(model_, loop, x_next_node.head(model_.nq()), gap.q);
   gatherVelocity(loop, x_next_node.tail(model_.nv()), gap.v);
   if (!updateGap(b)) return false;
   out.gap.segment(o, r) = gap.y;
   out.gap.segment(nr + o, r) = gap.y_v;
-  // P_v (W N)^T, whose rows pick dv+ of the block's dofs.
+  // P_v (W N)^T, whose rows pick dv+ of the cluster's dofs.
   work.HN.noalias() = b.at.WN * gap.P_v.transpose();
   for (size_t k = 0; k < loop.dofs.size(); ++k)
     for (int c = 0; c < r; ++c) {
@@ -122,10 +122,10 @@ bool ReducedImpactNode::linearizeBlock(Block& b, ConstVectorRef x_next_node, Sta
 }
 
 // From q+ to the node state that it holds.
-bool ReducedImpactNode::updateGap(Block& b) {
-  const LoopBlock& loop = b.loop;
-  BlockWork& work = *b.work;
-  BlockGapOf<double>& gap = work.gap;
+bool ReducedImpactNode::updateGap(Cluster& b) {
+  const ReducedCluster& loop = b.loop;
+  ClusterWork& work = *b.work;
+  ClusterGapOf<double>& gap = work.gap;
   if (gap.q == b.next.basis().q && gap.v == b.v_next) {
     for (VectorXd* x : {&gap.y, &gap.y_v}) x->setZero();
     for (MatrixXd* P : {&gap.P_q, &gap.P_v}) P->setIdentity();

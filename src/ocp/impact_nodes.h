@@ -32,8 +32,8 @@ class ReducedImpactNode : public ReducedNode {
 
  private:
   void updateForceDerivatives();
-  bool linearizeBlock(Block& b, ConstVectorRef x_next_node, StageModel& out);
-  bool updateGap(Block& b);
+  bool linearizeCluster(Cluster& b, ConstVectorRef x_next_node, StageModel& out);
+  bool updateGap(Cluster& b);
   void linearizeFreeJoint(const FreeJoint& free, StageModel& out) const;
 
   ImpactWorkspace iws_;

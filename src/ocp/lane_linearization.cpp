@@ -46,7 +46,7 @@ void ReducedLanes::linearize(const NodeModel::Linearization* items, int count) {
   updateColumns(model_, ws_);
   updateVelocities(model_, ws_, v_);
   updateAccelerations(model_, ws_, a_);
-  for (BlockLanes& b : blocks_) {
+  for (ClusterLanes& b : clusters_) {
     const auto view = getPlacedView(b.loop, ws_);
     updateTwists(view, b.at, b.motion);
     updateVelocityLift(view, b.motion);
@@ -56,8 +56,8 @@ void ReducedLanes::linearize(const NodeModel::Linearization* items, int count) {
   tree_.updateDerivatives(ws_, lifts_, A_y_, A_v_);
   for (ContactLanes& contact : contacts_)
     if (contact.used) updateContact(contact);
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    linearizeStep(blocks_[i]);
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    linearizeStep(clusters_[i]);
     updateGap(i, items);
   }
   linearizeStateCosts();
@@ -71,7 +71,7 @@ void ReducedLanes::updateForces() {
   for (const ContactLanes& contact : contacts_)
     if (contact.used) f_ext_[tips_[contact.tip]] += contact.wrench;
   updateInverseDynamicsFactors(model_, ws_, f_ext_);
-  for (BlockLanes& b : blocks_) {
+  for (ClusterLanes& b : clusters_) {
     for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
       const int dof = b.loop.dofs[k];
       const Lanes left =
@@ -100,7 +100,7 @@ void ReducedLanes::updateContact(ContactLanes& contact) {
 }
 
 // Eqs. (d) to (g).
-void ReducedLanes::linearizeStep(BlockLanes& b) {
+void ReducedLanes::linearizeStep(ClusterLanes& b) {
   b.independent = b.zeta / h_;  // close() moves by h w', so its zeta is h times that of Eq. (e)
   expandIndependent(b.at, b.independent, b.rows);
   calcForceLift(getPlacedView(b.loop, ws_), b.motion, b.rows, b.HN);
@@ -114,7 +114,7 @@ void ReducedLanes::linearizeStep(BlockLanes& b) {
   expandIndependent(b.next, b.independent, b.rows);
   calcForceLift(ahead, b.ahead, b.rows, b.HnNn);
 
-  // J_q N, J_d^{-T} W N and J_d^{-T} W N': the identity but for the blocks of curved joints.
+  // J_q N, J_d^{-T} W N and J_d^{-T} W N': the identity but for the clusters of curved joints.
   b.JqN = b.at.N;
   b.P = b.at.WN;
   b.Pn = b.next.WN;
@@ -153,8 +153,8 @@ void ReducedLanes::linearizeStep(BlockLanes& b) {
 
 // What comes of Eq. (g) read about the node states, where they are open.
 void ReducedLanes::updateGap(size_t i, const NodeModel::Linearization* items) {
-  BlockLanes& b = blocks_[i];
-  BlockGapOf<Lanes>& gap = b.gap;
+  ClusterLanes& b = clusters_[i];
+  ClusterGapOf<Lanes>& gap = b.gap;
   for (size_t j = 0; j < b.loop.joints.size(); ++j) {
     const Joint &own = b.loop.model.joints()[j + 1], &joint = model_.joints()[b.loop.joints[j]];
     gap.q.segment(own.idx_q, own.nq) = x1_.segment(joint.idx_q, joint.nq);
@@ -182,11 +182,11 @@ void ReducedLanes::updateGap(size_t i, const NodeModel::Linearization* items) {
 
 // That of the node itself where it is at hand, or that of q+ where only velocities differ.
 void ReducedLanes::findNodeBasis(size_t i, const NodeModel::Linearization* items, const LaneMask& open) {
-  BlockLanes& b = blocks_[i];
+  ClusterLanes& b = clusters_[i];
   const int count = static_cast<int>(nodes_.size());
-  const auto getNear = [i](const NodeModel::Linearization& item) -> const BlockBasis& {
-    if (item.next) return static_cast<const ReducedNode*>(item.next)->blocks_[i].at;
-    return static_cast<const ReducedNode*>(item.node)->blocks_[i].next.basis();
+  const auto getNear = [i](const NodeModel::Linearization& item) -> const ClusterBasis& {
+    if (item.next) return static_cast<const ReducedNode*>(item.next)->clusters_[i].at;
+    return static_cast<const ReducedNode*>(item.node)->clusters_[i].next.basis();
   };
   packItems(
       items, count, [&](const auto& item) { return getNear(item).q.data(); }, b.q_near);

@@ -18,12 +18,12 @@ void ReducedLanes::calcDifferences(const NodeModel::Difference* items, int count
     subtract(joint, dx_.segment(o, joint.nv));
     dx_.segment(nr + o, joint.nv) = x1_.segment(nq + joint.idx_v, joint.nv) - x0_.segment(nq + joint.idx_v, joint.nv);
   }
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    BlockLanes& b = blocks_[i];
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    ClusterLanes& b = clusters_[i];
     MatrixX<Lanes>& chart = b.P;
     packItems(
         items, count,
-        [i](const auto& item) { return static_cast<const ReducedNode*>(item.node)->blocks_[i].chart.data(); }, chart);
+        [i](const auto& item) { return static_cast<const ReducedNode*>(item.node)->clusters_[i].chart.data(); }, chart);
     for (size_t j = 0; j < b.loop.joints.size(); ++j) {
       const Joint &own = b.loop.model.joints()[j + 1], &joint = model_.joints()[b.loop.joints[j]];
       subtract(joint, b.left.segment(own.idx_v, own.nv));
@@ -55,14 +55,14 @@ LaneMask ReducedLanes::integrate(const NodeModel::Integration* items, int count)
     x1_.segment(k, n) = x0_.segment(k, n) + dx_.segment(nr + o, n);
   }
   LaneMask done = Lanes(0) <= Lanes(0);
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    BlockLanes& b = blocks_[i];
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    ClusterLanes& b = clusters_[i];
     packPoint(i);
     b.step.setZero();
     addSmallProduct(b.at.N, dx_.segment(b.loop.offset, b.loop.size), b.step);
     done = done && b.closing.close(b.loop, b.scratch, b.at, b.step, {});
     // The velocity at the new point whose coordinates about the old one are N^T v + dy_v.
-    const BlockBasisOf<Lanes>& to = b.closing.basis();
+    const ClusterBasisOf<Lanes>& to = b.closing.basis();
     for (size_t k = 0; k < b.loop.dofs.size(); ++k) b.left[k] = x0_[nq + b.loop.dofs[k]];
     b.target = dx_.segment(nr + b.loop.offset, b.loop.size);
     addSmallProductTransposed(b.at.WN, b.left, b.target);

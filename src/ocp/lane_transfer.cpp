@@ -41,19 +41,19 @@ LaneMask ReducedLanes::updatePoints() {
   LaneMask placed = Lanes(0) <= Lanes(0);
   const auto isNew = [](const ReducedNode* n) { return !n->before_; };
   if (std::any_of(nodes_.begin(), nodes_.end(), isNew))
-    for (size_t i = 0; i < blocks_.size(); ++i) {
-      BlockLanes& b = blocks_[i];
+    for (size_t i = 0; i < clusters_.size(); ++i) {
+      ClusterLanes& b = clusters_[i];
       for (size_t j = 0; j < b.loop.joints.size(); ++j) {
         const Joint &own = b.loop.model.joints()[j + 1], &joint = model_.joints()[b.loop.joints[j]];
         b.at.q.segment(own.idx_q, own.nq) = ws_.q.segment(joint.idx_q, joint.nq);
       }
       placed = placed && b.closing.update(b.loop, b.scratch, b.at.q);
-      std::array<BlockState*, kLane> states{};  // `next` is free until the step is done
+      std::array<ClusterState*, kLane> states{};  // `next` is free until the step is done
       for (size_t l = 0; l < nodes_.size(); ++l)
-        if (isNew(nodes_[l])) states[l] = &nodes_[l]->blocks_[i].next;
+        if (isNew(nodes_[l])) states[l] = &nodes_[l]->clusters_[i].next;
       b.closing.store(states);
       for (ReducedNode* n : nodes_)
-        if (isNew(n)) n->takePoint(n->blocks_[i], n->blocks_[i].next);
+        if (isNew(n)) n->takePoint(n->clusters_[i], n->clusters_[i].next);
     }
   packPlacements();
   placeWhole<Lanes>(model_, reduction_, ws_.q, ws_.X_WB);
@@ -69,18 +69,18 @@ void ReducedLanes::packNodes() {
   pack([](Node n) { return n.v_.data(); }, v_.size(), v_.data());
   pack([](Node n) { return n.tau_.data(); }, tau_.size(), tau_.data());
   pack([](Node n) { return &n.spec_.dt; }, 1, &h_);
-  for (size_t i = 0; i < blocks_.size(); ++i)
+  for (size_t i = 0; i < clusters_.size(); ++i)
     packBasis(
-        blocks_[i].loop, [&](Node n) -> const BlockBasis& { return n.blocks_[i].at; }, blocks_[i].at);
+        clusters_[i].loop, [&](Node n) -> const ClusterBasis& { return n.clusters_[i].at; }, clusters_[i].at);
   for (size_t i = 0; i < contacts_.size(); ++i) packContact(i);
 }
 
 template <typename GetBasis>
-void ReducedLanes::packBasis(const LoopBlock& block, const GetBasis& getBasis, BlockBasisOf<Lanes>& to) const {
+void ReducedLanes::packBasis(const ReducedCluster& cluster, const GetBasis& getBasis, ClusterBasisOf<Lanes>& to) const {
   using Node = const ReducedNode&;
   pack([&](Node n) { return getBasis(n).N.data(); }, to.N.size(), to.N.data());
   for (Eigen::Index c = 0; c < to.N.cols(); ++c)
-    for (Eigen::Index k = 0; k < to.N.rows(); ++k) to.WN(k, c) = block.metric[k] * to.N(k, c);
+    for (Eigen::Index k = 0; k < to.N.rows(); ++k) to.WN(k, c) = cluster.metric[k] * to.N(k, c);
   pack([&](Node n) { return getBasis(n).J.data(); }, to.J.size(), to.J.data());
   pack([&](Node n) { return getBasis(n).L.data(); }, to.L.size(), to.L.data());
   for (size_t k = 0; k < to.rows.size(); ++k)
@@ -90,19 +90,19 @@ void ReducedLanes::packBasis(const LoopBlock& block, const GetBasis& getBasis, B
 // What linearize() needs of the steps.
 void ReducedLanes::packSteps() {
   pack([](const ReducedNode& n) { return n.a_.data(); }, a_.size(), a_.data());
-  for (size_t i = 0; i < blocks_.size(); ++i) packBlock(i);
+  for (size_t i = 0; i < clusters_.size(); ++i) packCluster(i);
 }
 
-void ReducedLanes::packBlock(size_t i) {
+void ReducedLanes::packCluster(size_t i) {
   using Node = const ReducedNode&;
-  BlockLanes& b = blocks_[i];
+  ClusterLanes& b = clusters_[i];
   packBasis(
-      b.loop, [&](Node n) -> const BlockBasis& { return n.blocks_[i].next.basis(); }, b.next);
-  pack([&](Node n) { return n.blocks_[i].next.basis().q.data(); }, b.next.q.size(), b.next.q.data());
-  pack([&](Node n) { return n.blocks_[i].v_next.data(); }, b.v_next.size(), b.v_next.data());
-  pack([&](Node n) { return n.blocks_[i].next.zeta().data(); }, b.zeta.size(), b.zeta.data());
-  pack([&](Node n) { return n.blocks_[i].next.step().data(); }, b.step.size(), b.step.data());
-  pack([&](Node n) { return getNumbers(n.blocks_[i].next.placements().front()); }, 12 * b.loop.model.numBodies(),
+      b.loop, [&](Node n) -> const ClusterBasis& { return n.clusters_[i].next.basis(); }, b.next);
+  pack([&](Node n) { return n.clusters_[i].next.basis().q.data(); }, b.next.q.size(), b.next.q.data());
+  pack([&](Node n) { return n.clusters_[i].v_next.data(); }, b.v_next.size(), b.v_next.data());
+  pack([&](Node n) { return n.clusters_[i].next.zeta().data(); }, b.zeta.size(), b.zeta.data());
+  pack([&](Node n) { return n.clusters_[i].next.step().data(); }, b.step.size(), b.step.data());
+  pack([&](Node n) { return getNumbers(n.clusters_[i].next.placements().front()); }, 12 * b.loop.model.numBodies(),
        getNumbers(b.own.X_WB.front()));
   b.own.stage = WorkspaceStage::Placement;
 }
@@ -193,19 +193,20 @@ void ReducedLanes::linearizeStateCosts() {
 
 void ReducedLanes::packPoint(size_t i) {
   using Node = const ReducedNode&;
-  BlockLanes& b = blocks_[i];
+  ClusterLanes& b = clusters_[i];
   packBasis(
-      b.loop, [&](Node n) -> const BlockBasis& { return n.blocks_[i].at; }, b.at);
-  pack([&](Node n) { return n.blocks_[i].at.q.data(); }, b.at.q.size(), b.at.q.data());
+      b.loop, [&](Node n) -> const ClusterBasis& { return n.clusters_[i].at; }, b.at);
+  pack([&](Node n) { return n.clusters_[i].at.q.data(); }, b.at.q.size(), b.at.q.data());
 }
 
-void ReducedLanes::packBlockStep(size_t i) {
+void ReducedLanes::packClusterStep(size_t i) {
   using Node = const ReducedNode&;
-  BlockLanes& b = blocks_[i];
-  pack([&](Node n) { return n.blocks_[i].at.q.data(); }, b.at.q.size(), b.at.q.data());
+  ClusterLanes& b = clusters_[i];
+  pack([&](Node n) { return n.clusters_[i].at.q.data(); }, b.at.q.size(), b.at.q.data());
   for (size_t l = 0; l < kLane; ++l) {
     const ReducedNode* before = nodes_[l < nodes_.size() ? l : 0]->before_;
-    for (Eigen::Index k = 0; k < b.surplus.size(); ++k) b.surplus[k].set(l, before ? before->blocks_[i].surplus[k] : 0);
+    for (Eigen::Index k = 0; k < b.surplus.size(); ++k)
+      b.surplus[k].set(l, before ? before->clusters_[i].surplus[k] : 0);
   }
 }
 
@@ -275,12 +276,12 @@ void ReducedLanes::storeSteps(const bool* ok) {
     unpack(from.data(), from.size(), [&](size_t l) { return ok[l] ? get(*nodes_[l]).data() : nullptr; });
   };
   store(a_, [](ReducedNode& node) -> VectorXd& { return node.a_; });
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    std::array<BlockState*, kLane> next{};
-    for (size_t l = 0; l < nodes_.size(); ++l) next[l] = ok[l] ? &nodes_[l]->blocks_[i].next : nullptr;
-    blocks_[i].closing.store(next);
-    store(blocks_[i].surplus, [i](ReducedNode& node) -> VectorXd& { return node.blocks_[i].surplus; });
-    store(blocks_[i].v_next, [i](ReducedNode& node) -> VectorXd& { return node.blocks_[i].v_next; });
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    std::array<ClusterState*, kLane> next{};
+    for (size_t l = 0; l < nodes_.size(); ++l) next[l] = ok[l] ? &nodes_[l]->clusters_[i].next : nullptr;
+    clusters_[i].closing.store(next);
+    store(clusters_[i].surplus, [i](ReducedNode& node) -> VectorXd& { return node.clusters_[i].surplus; });
+    store(clusters_[i].v_next, [i](ReducedNode& node) -> VectorXd& { return node.clusters_[i].v_next; });
   }
   const int nb = model_.numBodies();
   unpack(ws_.V.front().data(), 6 * nb, [this](size_t l) { return views_[l].ws.V.front().data(); });
@@ -306,18 +307,18 @@ void ReducedLanes::storeDerivatives() {
   unpack(ws_.V.front().data(), 6 * nb, [this](size_t l) { return views_[l].ws.V.front().data(); });
   unpack(ws_.hc.front().data(), 6 * nb, [this](size_t l) { return views_[l].ws.hc.front().data(); });
   unpack(ws_.Yc.front().data(), 36 * nb, [this](size_t l) { return views_[l].ws.Yc.front().data(); });
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    const BlockLanes& b = blocks_[i];
-    store(b.motion.Z, [i](LaneView& view) { return view.blocks[i].Z.data(); });
-    store(b.q_y, [i](LaneView& view) { return view.blocks[i].q_y.data(); });
-    store(b.q_v, [i](LaneView& view) { return view.blocks[i].q_v.data(); });
-    store(b.v_y, [i](LaneView& view) { return view.blocks[i].v_y.data(); });
-    store(b.v_v, [i](LaneView& view) { return view.blocks[i].v_v.data(); });
-    store(b.gap.y, [i](LaneView& view) { return view.blocks[i].gap.data(); });
-    store(b.gap.y_v, [i](LaneView& view) { return view.blocks[i].gap_v.data(); });
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    const ClusterLanes& b = clusters_[i];
+    store(b.motion.Z, [i](LaneView& view) { return view.clusters[i].Z.data(); });
+    store(b.q_y, [i](LaneView& view) { return view.clusters[i].q_y.data(); });
+    store(b.q_v, [i](LaneView& view) { return view.clusters[i].q_v.data(); });
+    store(b.v_y, [i](LaneView& view) { return view.clusters[i].v_y.data(); });
+    store(b.v_v, [i](LaneView& view) { return view.clusters[i].v_v.data(); });
+    store(b.gap.y, [i](LaneView& view) { return view.clusters[i].gap.data(); });
+    store(b.gap.y_v, [i](LaneView& view) { return view.clusters[i].gap_v.data(); });
     for (size_t l = 0; l < nodes_.size(); ++l) {
-      views_[l].blocks[i].turned = b.turned[l];
-      views_[l].blocks[i].placed = b.placed[l];
+      views_[l].clusters[i].turned = b.turned[l];
+      views_[l].clusters[i].placed = b.placed[l];
     }
   }
   for (size_t i = 0; i < contacts_.size(); ++i) {

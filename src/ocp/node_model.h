@@ -110,7 +110,7 @@ std::shared_ptr<ReducedWorkPool> makeReducedWorkPool(const Model& model, const R
 std::unique_ptr<NodeModel> makeReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec,
                                            std::shared_ptr<ReducedWorkPool> pool);
 
-// Joints whose configuration is not a vector: their blocks of the manifold Jacobians differ from the identity.
+// Joints whose configuration is not a vector: their clusters of the manifold Jacobians differ from the identity.
 inline bool isCurved(const Joint& joint) {
   return joint.kind == JointKind::Spherical || joint.kind == JointKind::Planar || joint.kind == JointKind::FreeFlyer;
 }

@@ -8,7 +8,7 @@
 
 namespace bielle {
 
-BlockLanes::BlockLanes(const LoopBlock& l)
+ClusterLanes::ClusterLanes(const ReducedCluster& l)
     : loop(l), at(l), next(l), own(l.model), motion(l), ahead(l), gap(l), scratch(l), closing(l) {
   const int n = l.model.nv(), r = l.size, rank = l.rank;
   target.setZero(r);
@@ -21,15 +21,15 @@ BlockLanes::BlockLanes(const LoopBlock& l)
   q_near.setZero(l.model.nq());
 }
 
-LaneView::LaneView(const Model& model, const Reduction& reduction, const std::vector<BlockLanes>& blocks,
+LaneView::LaneView(const Model& model, const Reduction& reduction, const std::vector<ClusterLanes>& clusters,
                    const std::vector<ContactLanes>& contacts)
     : ws(model), state_cost(model, reduction) {
   dydd.setZero(roundUpToLane(model.nu() + 2 * reduction.size) * reduction.size);
-  for (const BlockLanes& b : blocks) {
+  for (const ClusterLanes& b : clusters) {
     const Eigen::Index n = b.at.N.rows(), r = b.at.N.cols();
     const MatrixXd square = MatrixXd::Zero(r, r);
     const VectorXd gap = VectorXd::Zero(r);
-    this->blocks.push_back({MatrixXd::Zero(n, r), square, square, square, square, gap, gap, true, true});
+    this->clusters.push_back({MatrixXd::Zero(n, r), square, square, square, square, gap, gap, true, true});
   }
   for (const ContactLanes& contact : contacts) {
     const Matrix6Xd columns = Matrix6Xd::Zero(6, contact.J.cols());
@@ -46,10 +46,10 @@ ReducedLanes::ReducedLanes(const Model& model, const Reduction& reduction, const
       tree_(model, reduction, tips),
       system_(reduction.size, 6 * static_cast<int>(slots.size())),
       state_cost_(model, reduction) {
-  blocks_.reserve(reduction.blocks.size());  // lifts point into them
-  for (const LoopBlock& block : reduction.blocks) {
-    blocks_.emplace_back(block);
-    lifts_.push_back({&blocks_.back().motion, &blocks_.back().HN});
+  clusters_.reserve(reduction.clusters.size());  // lifts point into them
+  for (const ReducedCluster& cluster : reduction.clusters) {
+    clusters_.emplace_back(cluster);
+    lifts_.push_back({&clusters_.back().motion, &clusters_.back().HN});
   }
   for (int tip : slots) {
     ContactLanes contact;
@@ -67,7 +67,7 @@ ReducedLanes::ReducedLanes(const Model& model, const Reduction& reduction, const
   for (VectorX<Lanes>* x : {&x0_, &x1_}) x->setZero(model.nq() + model.nv());
   dx_.setZero(2 * reduction.size);
   for (MatrixX<Lanes>* x : {&A_y_, &A_v_}) x->setZero(reduction.size, reduction.size);
-  for (size_t l = 0; l < kLane; ++l) views_.emplace_back(model, reduction, blocks_, contacts_);
+  for (size_t l = 0; l < kLane; ++l) views_.emplace_back(model, reduction, clusters_, contacts_);
 }
 
 int ReducedLanes::findLane(const ReducedNode* node) const {
@@ -80,15 +80,15 @@ LaneMask ReducedLanes::startSteps(NodeModel* const* nodes, int count, LaneMask& 
   placed = updatePoints();
   packNodes();
   updateStateCosts();
-  for (size_t i = 0; i < blocks_.size(); ++i) packBlockStep(i);
+  for (size_t i = 0; i < clusters_.size(); ++i) packClusterStep(i);
   updateColumns(model_, ws_);
   updateVelocities(model_, ws_, v_);
   updateCompositeInertias(model_, ws_);
   updateDrift(model_, ws_);
   a_.setZero();  // here a_d
-  for (BlockLanes& b : blocks_) {
+  for (ClusterLanes& b : clusters_) {
     const auto view = getPlacedView(b.loop, ws_);
-    calcBlockDrift<Lanes>(view, b.loop, b.at, b.rows, b.drift);
+    calcClusterDrift<Lanes>(view, b.loop, b.at, b.rows, b.drift);
     b.independent = b.drift;
     applyPseudoInverse<Lanes>(b.loop, b.at, -1, b.independent, b.a_d);
     for (size_t k = 0; k < b.loop.dofs.size(); ++k) a_[b.loop.dofs[k]] = b.a_d[k];
@@ -97,7 +97,7 @@ LaneMask ReducedLanes::startSteps(NodeModel* const* nodes, int count, LaneMask& 
   updateInverseDynamics(model_, ws_, a_);
   for (const FreeDofs& free : free_)
     for (int k = 0; k < free.size; ++k) system_.f[free.offset + k] = tau_[free.dof + k] - ws_.b[free.dof + k];
-  for (BlockLanes& b : blocks_) {
+  for (ClusterLanes& b : clusters_) {
     for (size_t k = 0; k < b.loop.dofs.size(); ++k) b.left[k] = tau_[b.loop.dofs[k]] - ws_.b[b.loop.dofs[k]];
     auto f = system_.f.segment(b.loop.offset, b.loop.size);
     f.setZero();
@@ -139,11 +139,11 @@ LaneMask ReducedLanes::finishSteps() {
   for (const FreeDofs& free : free_)
     for (int k = 0; k < free.size; ++k) a_[free.dof + k] += ydd[free.offset + k];
   LaneMask closed = Lanes(0) <= Lanes(0);
-  for (BlockLanes& b : blocks_) closed = closed && close(b);
+  for (ClusterLanes& b : clusters_) closed = closed && close(b);
   return closed;
 }
 
-LaneMask ReducedLanes::close(BlockLanes& b) {
+LaneMask ReducedLanes::close(ClusterLanes& b) {
   const auto ydd = system_.ydd.segment(b.loop.offset, b.loop.size);
   addSmallProduct(b.at.N, ydd, b.a_d);  // now a
   for (size_t k = 0; k < b.loop.dofs.size(); ++k) {
@@ -158,7 +158,7 @@ LaneMask ReducedLanes::close(BlockLanes& b) {
   const LaneMask closed = b.closing.close(b.loop, b.scratch, b.at, b.step, b.zeta);
   b.surplus = b.closing.zeta() - b.predicted;
   // (I - J'^+ J') w' = N' (W N')^T w'
-  const BlockBasisOf<Lanes>& next = b.closing.basis();
+  const ClusterBasisOf<Lanes>& next = b.closing.basis();
   b.target.setZero();
   addSmallProductTransposed(next.WN, b.closing.step(), b.target);
   b.target /= h_;

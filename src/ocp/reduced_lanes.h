@@ -3,7 +3,7 @@
 // its Eqs. (b) to (g). Nodes may have different contacts and time steps. What is left to each of them is its residuals, its
 // quadratic model, and the system of its contacts where some are redundant.
 #include "bielle/dynamics/reduced_tree.h"
-#include "block_gap.h"
+#include "cluster_gap.h"
 #include "contact_system.h"
 #include "reduced_state_cost.h"
 
@@ -11,13 +11,13 @@ namespace bielle {
 
 class ReducedNode;
 
-// One block of loops at the nodes of all lanes.
-struct BlockLanes {
-  explicit BlockLanes(const LoopBlock& l);
-  const LoopBlock& loop;
-  BlockBasisOf<Lanes> at, next;                        // at the states, at q+
-  WorkspaceOf<Lanes> own;                              // of the block's model at q+
-  BlockMotionOf<Lanes> motion, ahead;                  // at the states, in the whole model; at q+, in the block
+// One cluster of loops at the nodes of all lanes.
+struct ClusterLanes {
+  explicit ClusterLanes(const ReducedCluster& l);
+  const ReducedCluster& loop;
+  ClusterBasisOf<Lanes> at, next;                      // at the states, at q+
+  WorkspaceOf<Lanes> own;                              // of the cluster's model at q+
+  ClusterMotionOf<Lanes> motion, ahead;                // at the states, in the whole model; at q+, in the cluster
   VectorX<Lanes> left, step, zeta, independent, rows;  // n, n, rank, rank, m
   MatrixX<Lanes> HN, HnNn, JqN, P, Pn;                 // n x r, as in reduced_node.h
   MatrixX<Lanes> E, En, S, X, Xn;                      // r x r: those of Eqs. (f) and (g)
@@ -25,12 +25,12 @@ struct BlockLanes {
   std::vector<LogicOf<Lanes>::Index> pivots;
   // r x r: dy+ and dy_v+ of Eq. (g) by dy and dy_v; by dy' they are h times those by dy_v
   MatrixX<Lanes> q_y, q_v, v_y, v_v;
-  BlockGapOf<Lanes> gap;    // to the node states
+  ClusterGapOf<Lanes> gap;  // to the node states
   VectorX<Lanes> q_near;    // nq, where a basis is known that may be that of a node state
   LaneMask turned, placed;  // where X exists; where the bases of the node states do
   // Of a step
-  BlockScratchOf<Lanes> scratch;
-  BlockStateOf<Lanes> closing;                                    // at q+
+  ClusterScratchOf<Lanes> scratch;
+  ClusterStateOf<Lanes> closing;                                  // at q+
   VectorX<Lanes> drift, a_d, predicted, surplus, target, v_next;  // rank, n, rank, rank, r, n
 };
 
@@ -50,10 +50,10 @@ struct ContactLanes {
 
 // What one lane holds, for its node alone.
 struct LaneView {
-  LaneView(const Model& model, const Reduction& reduction, const std::vector<BlockLanes>& blocks,
+  LaneView(const Model& model, const Reduction& reduction, const std::vector<ClusterLanes>& clusters,
            const std::vector<ContactLanes>& contacts);
-  struct Block {
-    MatrixXd Z, q_y, q_v, v_y, v_v;  // as in BlockLanes
+  struct Cluster {
+    MatrixXd Z, q_y, q_v, v_y, v_v;  // as in ClusterLanes
     VectorXd gap, gap_v;             // r
     bool turned, placed;
   };
@@ -62,7 +62,7 @@ struct LaneView {
   };
   Workspace ws;   // V and hc behind a step; what residuals look at, behind linearize()
   VectorXd dydd;  // (nu + 2 size) x size, padded: room, A_y^T, A_v^T
-  std::vector<Block> blocks;
+  std::vector<Cluster> clusters;
   std::vector<Contact> contacts;
   StateCostModel state_cost;
 };
@@ -122,23 +122,23 @@ class ReducedLanes {
   void packNodes();
   LaneMask updatePoints();
   template <typename GetBasis>
-  void packBasis(const LoopBlock& block, const GetBasis& getBasis, BlockBasisOf<Lanes>& to) const;
+  void packBasis(const ReducedCluster& cluster, const GetBasis& getBasis, ClusterBasisOf<Lanes>& to) const;
   void packPoint(size_t i);
-  void packBlockStep(size_t i);
-  void packBlock(size_t i);
+  void packClusterStep(size_t i);
+  void packCluster(size_t i);
   void packSteps();
   void updateContactRows(size_t slot);
   void storeFactors(const LaneMask& solved);
   void storeForces(size_t lane);
   void storeDerivatives();
-  LaneMask close(BlockLanes& b);
+  LaneMask close(ClusterLanes& b);
   void packContact(size_t slot);
   bool packStateCosts();
   void updateStateCosts();
   void linearizeStateCosts();
   void updateForces();
   void updateContact(ContactLanes& contact);
-  void linearizeStep(BlockLanes& b);
+  void linearizeStep(ClusterLanes& b);
   void updateGap(size_t i, const NodeModel::Linearization* items);
   void findNodeBasis(size_t i, const NodeModel::Linearization* items, const LaneMask& open);
 
@@ -147,8 +147,8 @@ class ReducedLanes {
   const std::vector<int>& tips_;
   std::vector<ReducedNode*> nodes_;
   WorkspaceOf<Lanes> ws_;
-  std::vector<BlockLanes> blocks_;
-  std::vector<BlockLiftOf<Lanes>> lifts_;
+  std::vector<ClusterLanes> clusters_;
+  std::vector<ClusterLiftOf<Lanes>> lifts_;
   std::vector<ContactLanes> contacts_;
   struct FreeDofs {
     int dof, offset, size;  // of a joint outside all loops: velocity coordinates, reduced coordinates

@@ -66,12 +66,12 @@ void ReducedNode::linearizeDynamics(LaneView& view) {
 // The first nu rows of out (x size) += -(N^T B)^T
 void ReducedNode::addMotorRows(PaddedMap out) const {
   for (size_t m = 0; m < work_->motors.size(); ++m) {
-    const auto& [block, row] = work_->motors[m];
-    if (block < 0) {
+    const auto& [cluster, row] = work_->motors[m];
+    if (cluster < 0) {
       out(m, row) -= 1;
     } else {
-      const LoopBlock& loop = blocks_[block].loop;
-      out.row(m).segment(loop.offset, loop.size) -= blocks_[block].at.N.row(row);
+      const ReducedCluster& loop = clusters_[cluster].loop;
+      out.row(m).segment(loop.offset, loop.size) -= clusters_[cluster].at.N.row(row);
     }
   }
 }
@@ -81,8 +81,8 @@ bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
   LaneView& view = work_->lanes.getView(work_->lanes.findLane(this));
   showView(view);
   linearizeDynamics(view);
-  for (size_t i = 0; i < blocks_.size(); ++i)
-    if (!linearizeBlock(i, view.blocks[i], x_next_node, out)) return false;
+  for (size_t i = 0; i < clusters_.size(); ++i)
+    if (!linearizeCluster(i, view.clusters[i], x_next_node, out)) return false;
   differenceFree(x_next_node, x_next_, out.gap);
   for (FreeJoint& free : work_->free_joints)
     if (free.curved) linearizeFreeJoint(free, out);
@@ -91,9 +91,9 @@ bool ReducedNode::linearizeStep(ConstVectorRef x_next_node, StageModel& out) {
   return true;
 }
 
-// What costs need of a block, and its gap.
-bool ReducedNode::linearizeBlock(size_t i, LaneView::Block& view, ConstVectorRef x_next_node, StageModel& out) {
-  Block& b = blocks_[i];
+// What costs need of a cluster, and its gap.
+bool ReducedNode::linearizeCluster(size_t i, LaneView::Cluster& view, ConstVectorRef x_next_node, StageModel& out) {
+  Cluster& b = clusters_[i];
   b.work->motion.basis = &b.at;
   b.work->motion.Z.swap(view.Z);
   if (!view.turned) {
@@ -126,7 +126,7 @@ void ReducedNode::linearizeFreeJoint(FreeJoint& free, const StageModel& out) con
   free.q_v = h * Jdiff.lazyProduct(Jd);
 }
 
-// Columns of F^T, from those of dv = dy_v + h dy' and what each unit makes of dv and dy.
+// Columns of F^T, from those of dv = dy_v + h dy' and what each reduced joint makes of dv and dy.
 void ReducedNode::assembleStep(LaneView& view, StageModel& out) const {
   const Eigen::Index nr = reduction_.size, nu = model_.nu();
   const double h = spec_.dt;
@@ -153,9 +153,9 @@ void ReducedNode::assembleStep(LaneView& view, StageModel& out) const {
       Ft.block(nu + o, o, n, n).diagonal().array() += 1;
     }
   }
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    const LaneView::Block& b = view.blocks[i];
-    const Eigen::Index o = blocks_[i].loop.offset;
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    const LaneView::Cluster& b = view.clusters[i];
+    const Eigen::Index o = clusters_[i].loop.offset;
     multiply(b.q_v, o, o);
     multiply(b.v_v, o, nr + o);
     add(b.q_y, o, o);
@@ -167,7 +167,7 @@ void ReducedNode::linearizeState() {
   restore();
   state_model_ = nullptr;
   updateCompositeInertias(model_, work_->ws);
-  for (Block& b : blocks_) {
+  for (Cluster& b : clusters_) {
     const auto view = getPlacedView(b.loop, work_->ws);
     updateTwists(view, b.at, b.work->motion);
     updateVelocityLift(view, b.work->motion);

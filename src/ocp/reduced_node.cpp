@@ -9,7 +9,7 @@
 
 namespace bielle {
 
-BlockWork::BlockWork(const LoopBlock& l) : scratch(l), start(l), point(l), motion(l), ahead(l), gap(l) {
+ClusterWork::ClusterWork(const ReducedCluster& l) : scratch(l), start(l), point(l), motion(l), ahead(l), gap(l) {
   const int n = l.model.nv(), r = l.size, rank = l.rank;
   q.setZero(l.model.nq());
   for (VectorXd* x : {&v, &a, &d}) x->setZero(n);
@@ -25,10 +25,10 @@ template <typename T>
 void placeWhole(const Model& model, const Reduction& reduction, typename ArgumentsOf<T>::ConstVector q,
                 std::vector<SE3Of<T>>& X_WB) {
   for (int i = 1; i < model.numBodies(); ++i) {
-    const ReducedUnit& unit = reduction.units[reduction.unit_of_body[i]];
+    const ReducedJoint& reduced = reduction.joints[reduction.joint_of_body[i]];
     const Joint& joint = model.joints()[i];
-    if (unit.block >= 0) {
-      X_WB[i] = X_WB[reduction.blocks[unit.block].root] * X_WB[i];
+    if (reduced.cluster >= 0) {
+      X_WB[i] = X_WB[reduction.clusters[reduced.cluster].root] * X_WB[i];
     } else {
       const SE3Of<T> X_JB = calcJointPlacement<T>(joint, q.segment(joint.idx_q, joint.nq));
       X_WB[i] = X_WB[joint.parent] * joint.X_PJ * X_JB;
@@ -103,10 +103,10 @@ ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const R
       state_cost(model, reduction),
       lanes(model, reduction, sizes.tips, sizes.slots) {
   const int nv = model.nv(), nr = reduction.size, nu = model.nu();
-  blocks.reserve(reduction.blocks.size());  // lifts point into them
-  for (const LoopBlock& block : reduction.blocks) {
-    blocks.emplace_back(block);
-    lifts.push_back({&blocks.back().motion, &blocks.back().HN});
+  clusters.reserve(reduction.clusters.size());  // lifts point into them
+  for (const ReducedCluster& cluster : reduction.clusters) {
+    clusters.emplace_back(cluster);
+    lifts.push_back({&clusters.back().motion, &clusters.back().HN});
   }
   for (size_t i = 0; i < reduction.free_joints.size(); ++i) {
     free_joints.emplace_back();
@@ -126,9 +126,9 @@ ReducedWork::ReducedWork(const Model& model, const Reduction& reduction, const R
     if (free != reduction.free_joints.end())
       motors.push_back({-1, reduction.free_offsets[free - reduction.free_joints.begin()] + motor.dof -
                                 model.joints()[motor.joint].idx_v});
-    for (size_t i = 0; i < reduction.blocks.size(); ++i) {
-      const int row = find(reduction.blocks[i].dofs, motor.dof);
-      if (row < static_cast<int>(reduction.blocks[i].dofs.size())) motors.push_back({static_cast<int>(i), row});
+    for (size_t i = 0; i < reduction.clusters.size(); ++i) {
+      const int row = find(reduction.clusters[i].dofs, motor.dof);
+      if (row < static_cast<int>(reduction.clusters[i].dofs.size())) motors.push_back({static_cast<int>(i), row});
     }
   }
   for (VectorXd* x : {&a_d, &force}) x->setZero(nv);
@@ -153,7 +153,7 @@ ReducedWork& ReducedWorkPool::get() {
 ReducedNode::ReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec,
                          std::shared_ptr<ReducedWorkPool> pool)
     : NodeModel(model, spec), reduction_(reduction), pool_(std::move(pool)) {
-  for (const LoopBlock& block : reduction.blocks) blocks_.emplace_back(block);
+  for (const ReducedCluster& cluster : reduction.clusters) clusters_.emplace_back(cluster);
   const int nv = model.nv(), nr = reduction.size;
   const ConstraintSet& set = spec.constraints;
   num_loops_ = set.num_loops;
@@ -175,7 +175,7 @@ ReducedNode::ReducedNode(const Model& model, const Reduction& reduction, const S
 
 void ReducedNode::takeWork() {
   work_ = &pool_->get();
-  for (size_t i = 0; i < blocks_.size(); ++i) blocks_[i].work = &work_->blocks[i];
+  for (size_t i = 0; i < clusters_.size(); ++i) clusters_[i].work = &work_->clusters[i];
 }
 
 void ReducedNode::integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) {
@@ -189,9 +189,9 @@ void ReducedNode::integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out
     integrateJoint(joint, x.segment(joint.idx_q, joint.nq), d, x_out.segment(joint.idx_q, joint.nq));
     x_out.segment(nq + joint.idx_v, n) = x.segment(nq + joint.idx_v, n) + dx.segment(nr + at, n);
   }
-  for (Block& b : blocks_) {
-    const LoopBlock& loop = b.loop;
-    BlockWork& work = *b.work;
+  for (Cluster& b : clusters_) {
+    const ReducedCluster& loop = b.loop;
+    ClusterWork& work = *b.work;
     gatherConfiguration(model_, loop, x.head(nq), work.q);
     const bool known = linearized && b.at.q == work.q;
     if (!known && !work.start.update(loop, work.scratch, work.q)) {
@@ -199,7 +199,7 @@ void ReducedNode::integrate(ConstVectorRef x, ConstVectorRef dx, VectorRef x_out
       x_out.setConstant(std::numeric_limits<double>::quiet_NaN());
       return;
     }
-    const BlockBasis &from = known ? b.at : work.start.basis(), &to = work.point.basis();
+    const ClusterBasis &from = known ? b.at : work.start.basis(), &to = work.point.basis();
     work.d.noalias() = from.N * dx.segment(loop.offset, loop.size);
     if (!work.point.close(loop, work.scratch, from, work.d, {})) {
       fail(b, work.point);
@@ -244,7 +244,7 @@ void ReducedNode::integrateNodes(const Integration* items, int count) {
 
 bool ReducedNode::isKnown(ConstVectorRef x) const {
   if (chart_x_ != x) return false;
-  for (const Block& b : blocks_)
+  for (const Cluster& b : clusters_)
     for (size_t j = 0; j < b.loop.joints.size(); ++j) {
       const Joint &own = b.loop.model.joints()[j + 1], &joint = model_.joints()[b.loop.joints[j]];
       if (b.at.q.segment(own.idx_q, own.nq) != x.segment(joint.idx_q, joint.nq)) return false;
@@ -258,7 +258,7 @@ void ReducedNode::difference(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx)
     dx.setConstant(std::numeric_limits<double>::quiet_NaN());
     return;
   }
-  for (Block& b : blocks_) differenceAbout(b, b.chart, x0, x1, dx);
+  for (Cluster& b : clusters_) differenceAbout(b, b.chart, x0, x1, dx);
   differenceFree(x0, x1, dx);
 }
 
@@ -284,14 +284,14 @@ bool ReducedNode::updateState(ConstVectorRef x) {
 
 bool ReducedNode::updatePoint(ConstVectorRef x, const ReducedNode* previous) {
   setState(x);
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    Block& b = blocks_[i];
-    BlockState& point = b.work->point;
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    Cluster& b = clusters_[i];
+    ClusterState& point = b.work->point;
     if (!previous) {
       gatherConfiguration(model_, b.loop, q_, b.work->q);
       if (!point.update(b.loop, b.work->scratch, b.work->q)) return fail(b, point);
     }
-    takePoint(b, previous ? previous->blocks_[i].next : point);
+    takePoint(b, previous ? previous->clusters_[i].next : point);
   }
   placeWhole(model_, reduction_, q_, X_WB_);
   return true;
@@ -304,8 +304,8 @@ void ReducedNode::setState(ConstVectorRef x) {
   v_ = x.tail(model_.nv());
 }
 
-// Placements of a block stay as seen from the body that carries it.
-void ReducedNode::takePoint(Block& b, const BlockState& point) {
+// Placements of a cluster stay as seen from the body that carries it.
+void ReducedNode::takePoint(Cluster& b, const ClusterState& point) {
   b.at = point.basis();
   for (size_t j = 0; j < b.loop.joints.size(); ++j) X_WB_[b.loop.joints[j]] = point.placements()[j + 1];
 }
@@ -328,7 +328,7 @@ void ReducedNode::restore() {
   updateVelocities(model_, ws, v_);
 }
 
-void ReducedNode::differenceAbout(Block& b, const MatrixXd& WN, ConstVectorRef x0, ConstVectorRef x1,
+void ReducedNode::differenceAbout(Cluster& b, const MatrixXd& WN, ConstVectorRef x0, ConstVectorRef x1,
                                   VectorRef dx) const {
   const int nq = model_.nq(), nr = reduction_.size;
   for (size_t j = 0; j < b.loop.joints.size(); ++j) {
@@ -356,7 +356,7 @@ void ReducedNode::differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef
 // Bases at x for difference(): those of the last linearization, unless x is another point.
 bool ReducedNode::updateChart(ConstVectorRef x) {
   if (chart_x_ == x) return true;
-  for (Block& b : blocks_) {
+  for (Cluster& b : clusters_) {
     gatherConfiguration(model_, b.loop, x.head(model_.nq()), b.work->q);
     if (!b.work->point.update(b.loop, b.work->scratch, b.work->q)) return fail(b, b.work->point);
     b.chart = b.work->point.basis().WN;
@@ -366,7 +366,7 @@ bool ReducedNode::updateChart(ConstVectorRef x) {
 }
 
 void ReducedNode::storeChart() {
-  for (Block& b : blocks_) b.chart = b.at.WN;
+  for (Cluster& b : clusters_) b.chart = b.at.WN;
   chart_x_.head(model_.nq()) = q_;
   chart_x_.tail(model_.nv()) = v_;
 }

@@ -1,8 +1,8 @@
 #pragma once
-// The reduced formulation: robot_problem.h Eq. (3) and its derivatives. Written for one block of loops with bases N, J, J^+
+// The reduced formulation: robot_problem.h Eq. (3) and its derivatives. Written for one cluster of loops with bases N, J, J^+
 // and metric W (reduction.h) at q, and N', J', J'^+ at q+; a free joint is the case N = N' = W = I without rows.
 //
-// A tangent vector (dy, dy_v) at the state means, with Z, d_y and d_v of block_motion.h,
+// A tangent vector (dy, dy_v) at the state means, with Z, d_y and d_v of cluster_motion.h,
 //     dq = N dy,   dv = N dy_v + Z dy,   da = N dy' + d_y dy + d_v dy_v                                               (a)
 // Dynamics: with a = N y' + a_d, a_d = -J^+ gamma, and hats for projections by N^T from both sides,
 //     M^ y' - (J_c N)^T lambda_c = N^T (tau - b - M a_d),    (J_c N) y' = -gamma_c - J_c a_d                          (b)
@@ -36,13 +36,13 @@
 
 namespace bielle {
 
-// What a block needs within a call, n = nv, m rows of the closures, r reduced coordinates.
-struct BlockWork {
-  explicit BlockWork(const LoopBlock& l);
-  BlockScratch scratch;
-  BlockState start, point;           // for integrate() and open gaps
-  BlockMotion motion, ahead;         // at the state, in the whole model; at q+, in the block
-  BlockGapOf<double> gap;            // of an impact
+// What a cluster needs within a call, n = nv, m rows of the closures, r reduced coordinates.
+struct ClusterWork {
+  explicit ClusterWork(const ReducedCluster& l);
+  ClusterScratch scratch;
+  ClusterState start, point;         // for integrate() and open gaps
+  ClusterMotion motion, ahead;       // at the state, in the whole model; at q+, in the cluster
+  ClusterGapOf<double> gap;          // of an impact
   VectorXd q, v, a, d;               // n (q: nq)
   VectorXd independent, zeta, rows;  // rank, rank, m
   MatrixXd HN;                       // n x r, scratch
@@ -51,7 +51,7 @@ struct BlockWork {
   std::vector<int> mixed_pivots;
 };
 
-// World placements of all bodies, where those of blocks are seen from the body that carries the block.
+// World placements of all bodies, where those of clusters are seen from the body that carries the cluster.
 template <typename T>
 void placeWhole(const Model& model, const Reduction& reduction, typename ArgumentsOf<T>::ConstVector q,
                 std::vector<SE3Of<T>>& X_WB);
@@ -93,8 +93,8 @@ struct ContactWork {
 struct ReducedWork {
   ReducedWork(const Model& model, const Reduction& reduction, const ReducedSizes& sizes);
   Workspace ws;
-  std::vector<BlockWork> blocks;
-  std::vector<BlockLift> lifts;
+  std::vector<ClusterWork> clusters;
+  std::vector<ClusterLift> lifts;
   std::vector<FreeJoint> free_joints;
   ReducedTree tree;
   ReducedStateCostOf<double> state_cost;
@@ -104,7 +104,7 @@ struct ReducedWork {
   VectorXd f, ydd;                      // size
   MatrixXd M;                           // size x size
   struct Motor {
-    int block, row;  // block and row of its N; or -1 and reduced coordinate
+    int cluster, row;  // cluster and row of its N; or -1 and reduced coordinate
   };
   std::vector<Motor> motors;
   ResidualJacobians jacobians;
@@ -128,26 +128,26 @@ class ReducedWorkPool {
   std::map<std::thread::id, std::unique_ptr<ReducedWork>> works_;
 };
 
-// A block of loops at one node: what lasts from call to call.
-struct ReducedBlock {
-  explicit ReducedBlock(const LoopBlock& l) : loop(l), at(l), next(l), chart(at.WN) {
+// A cluster of loops at one node: what lasts from call to call.
+struct ClusterNode {
+  explicit ClusterNode(const ReducedCluster& l) : loop(l), at(l), next(l), chart(at.WN) {
     v_next.setZero(l.model.nv());
     surplus.setZero(l.rank);
   }
-  const LoopBlock& loop;
-  BlockBasis at;    // at the state
-  BlockState next;  // at q+
-  MatrixXd chart;   // W N at the last linearized state
+  const ReducedCluster& loop;
+  ClusterBasis at;    // at the state
+  ClusterState next;  // at q+
+  MatrixXd chart;     // W N at the last linearized state
   VectorXd v_next;
-  VectorXd surplus;           // rank, zeta of the closing less its second-order prediction
-  BlockWork* work = nullptr;  // within a call
+  VectorXd surplus;             // rank, zeta of the closing less its second-order prediction
+  ClusterWork* work = nullptr;  // within a call
 };
 
 class ReducedNode : public NodeModel {
   friend class ReducedLanes;  // reads what the last step left, and leaves what the next one does
 
  public:
-  using Block = ReducedBlock;
+  using Cluster = ClusterNode;
 
   ReducedNode(const Model& model, const Reduction& reduction, const StageSpec& spec,
               std::shared_ptr<ReducedWorkPool> pool);
@@ -173,12 +173,12 @@ class ReducedNode : public NodeModel {
   void setResiduals(const ResidualStack& stack, bool running, StageModel& out) override;
 
  protected:
-  // Bases and placements at x; the blocks are those that `previous` has closed there, if given.
+  // Bases and placements at x; the clusters are those that `previous` has closed there, if given.
   bool updatePoint(ConstVectorRef x, const ReducedNode* previous);
   // And kinematics in the workspace.
   bool updateState(ConstVectorRef x, const ReducedNode* previous);
   void setState(ConstVectorRef x);
-  void takePoint(Block& b, const BlockState& point);
+  void takePoint(Cluster& b, const ClusterState& point);
 
   // out += (A X)^T with A for the whole model (k x nv) and X = N (free dofs: the identity) or Z (free dofs: zero).
   enum class Lift { N, Z };
@@ -187,7 +187,7 @@ class ReducedNode : public NodeModel {
   void projectVector(const VectorXd& x, VectorXd& out) const;
   // x += N y
   void addFromReduced(const VectorXd& y, VectorXd& x) const;
-  bool fail(const Block& b, const BlockState& point) {
+  bool fail(const Cluster& b, const ClusterState& point) {
     failure_ = point.describeFailure(b.loop, b.work->scratch);
     return false;
   }
@@ -205,7 +205,7 @@ class ReducedNode : public NodeModel {
   PaddedMap shapeForceDerivatives() const;
   void loadContactDerivatives(const LaneView& view);
   void linearizeDynamics(LaneView& view);
-  bool linearizeBlock(size_t i, LaneView::Block& view, ConstVectorRef x_next_node, StageModel& out);
+  bool linearizeCluster(size_t i, LaneView::Cluster& view, ConstVectorRef x_next_node, StageModel& out);
   // The contact of this stage in a slot, as an index of its constraints; -1 if it has none there.
   int findContact(int slot) const;
   // The contact row of a row of a slot, -1 if this stage has none there.
@@ -218,7 +218,7 @@ class ReducedNode : public NodeModel {
   void addMotorRows(PaddedMap out) const;
   // Whether the bases of this node are those at x.
   bool isKnown(ConstVectorRef x) const;
-  void differenceAbout(Block& b, const MatrixXd& WN, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
+  void differenceAbout(Cluster& b, const MatrixXd& WN, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
   void differenceFree(ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const;
   bool updateChart(ConstVectorRef x);
   void storeChart();
@@ -230,7 +230,7 @@ class ReducedNode : public NodeModel {
   std::shared_ptr<ReducedWorkPool> pool_;
   ReducedWork* work_ = nullptr;
   const Workspace* shown_ = nullptr;
-  std::vector<ReducedBlock> blocks_;
+  std::vector<ClusterNode> clusters_;
   std::vector<int> contact_slots_;  // per contact
   std::vector<int> slot_rows_;      // per slot, see getContactRow()
   int num_loops_ = 0, loop_rows_ = 0, contact_rows_ = 0;

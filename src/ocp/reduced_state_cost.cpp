@@ -3,9 +3,9 @@
 namespace bielle {
 namespace {
 
-// Numbers of the Hessian of a unit.
+// Numbers of the Hessian of a reduced joint.
 int countFree(const Joint& joint) { return joint.nv * (joint.nv + 1); }
-int countBlock(const LoopBlock& loop) { return 3 * loop.size * loop.size; }
+int countCluster(const ReducedCluster& loop) { return 3 * loop.size * loop.size; }
 
 // out += scale times the lower triangle of H (n x n).
 void addLower(const double* H, int n, double scale, Eigen::Block<PaddedMap> out) {
@@ -19,7 +19,7 @@ template <typename T>
 StateCostModelOf<T>::StateCostModelOf(const Model& model, const Reduction& reduction) {
   int numbers = 0;
   for (int i : reduction.free_joints) numbers += countFree(model.joints()[i]);
-  for (const LoopBlock& loop : reduction.blocks) numbers += countBlock(loop);
+  for (const ReducedCluster& loop : reduction.clusters) numbers += countCluster(loop);
   gradient.setZero(2 * reduction.size);
   hessian.setZero(numbers);
 }
@@ -37,12 +37,12 @@ void addStateCostModel(const Model& model, const Reduction& reduction, const Sta
     for (int c = 0; c < n; ++c) lxx(nr + o + c, nr + o + c) += scale * hessian[n * n + c];
     hessian += countFree(joint);
   }
-  for (const LoopBlock& loop : reduction.blocks) {
+  for (const ReducedCluster& loop : reduction.clusters) {
     const int o = loop.offset, n = loop.size;
     addLower(hessian, n, scale, lxx.block(o, o, n, n));
     lxx.block(nr + o, o, n, n) += scale * Eigen::Map<const MatrixXd>(hessian + n * n, n, n);
     addLower(hessian + 2 * n * n, n, scale, lxx.block(nr + o, nr + o, n, n));
-    hessian += countBlock(loop);
+    hessian += countCluster(loop);
   }
 }
 
@@ -52,11 +52,11 @@ ReducedStateCostOf<T>::ReducedStateCostOf(const Model& model, const Reduction& r
   q_ref.setZero(model.nq());
   weights.setZero(2 * model.nv());
   for (VectorX<T>* x : {&v_ref, &difference, &gradient_q_, &gradient_v_}) x->setZero(model.nv());
-  for (const LoopBlock& loop : reduction.blocks) {
+  for (const ReducedCluster& loop : reduction.clusters) {
     const int n = loop.model.nv(), r = loop.size;
     const VectorX<T> column = VectorX<T>::Zero(n);
     const MatrixX<T> columns = MatrixX<T>::Zero(n, r);
-    blocks_.push_back({column, column, columns, columns, columns});
+    clusters_.push_back({column, column, columns, columns, columns});
   }
 }
 
@@ -79,7 +79,7 @@ T ReducedStateCostOf<T>::update(const VectorX<T>& q, const VectorX<T>& v) {
 
 template <typename T>
 const StateCostModelOf<T>& ReducedStateCostOf<T>::differentiate(const VectorX<T>& v,
-                                                                const std::vector<BlockLiftOf<T>>& lifts) {
+                                                                const std::vector<ClusterLiftOf<T>>& lifts) {
   const int nv = model_.nv();
   for (int k = 0; k < nv; ++k) {
     gradient_q_[k] = weights[k] * difference[k];
@@ -91,9 +91,9 @@ const StateCostModelOf<T>& ReducedStateCostOf<T>::differentiate(const VectorX<T>
     differentiateFree(joint, reduction_.free_offsets[i], hessian);
     hessian += countFree(joint);
   }
-  for (size_t i = 0; i < reduction_.blocks.size(); ++i) {
-    differentiateBlock(reduction_.blocks[i], *lifts[i].motion, blocks_[i], hessian);
-    hessian += countBlock(reduction_.blocks[i]);
+  for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
+    differentiateCluster(reduction_.clusters[i], *lifts[i].motion, clusters_[i], hessian);
+    hessian += countCluster(reduction_.clusters[i]);
   }
   return derivatives_;
 }
@@ -125,25 +125,25 @@ void ReducedStateCostOf<T>::differentiateFree(const Joint& joint, int offset, T*
 }
 
 template <typename T>
-void ReducedStateCostOf<T>::differentiateBlock(const LoopBlock& loop, const BlockMotionOf<T>& motion, Block& block,
-                                               T* hessian) {
+void ReducedStateCostOf<T>::differentiateCluster(const ReducedCluster& loop, const ClusterMotionOf<T>& motion,
+                                                 Cluster& cluster, T* hessian) {
   const int r = loop.size, nv = model_.nv();
   const MatrixX<T>&N = motion.basis->N, &Z = motion.Z;
   for (size_t j = 0; j < loop.joints.size(); ++j) {
     const Joint &joint = model_.joints()[loop.joints[j]], &own = loop.model.joints()[j + 1];
     const auto rows = N.middleRows(own.idx_v, own.nv);
     if (isCurved(joint))
-      block.HN.middleRows(own.idx_v, own.nv) = differentiateJoint(joint).lazyProduct(rows);
+      cluster.HN.middleRows(own.idx_v, own.nv) = differentiateJoint(joint).lazyProduct(rows);
     else
-      block.HN.middleRows(own.idx_v, own.nv) = weights.segment(joint.idx_v, joint.nv).asDiagonal() * rows;
+      cluster.HN.middleRows(own.idx_v, own.nv) = weights.segment(joint.idx_v, joint.nv).asDiagonal() * rows;
   }
   for (size_t k = 0; k < loop.dofs.size(); ++k) {
     const int dof = loop.dofs[k];
-    block.gradient_q[k] = gradient_q_[dof];
-    block.gradient_v[k] = gradient_v_[dof];
+    cluster.gradient_q[k] = gradient_q_[dof];
+    cluster.gradient_v[k] = gradient_v_[dof];
     for (int c = 0; c < r; ++c) {
-      block.WZ(k, c) = weights[nv + dof] * Z(k, c);
-      block.WN(k, c) = weights[nv + dof] * N(k, c);
+      cluster.WZ(k, c) = weights[nv + dof] * Z(k, c);
+      cluster.WN(k, c) = weights[nv + dof] * N(k, c);
     }
   }
   auto l_y = derivatives_.gradient.segment(loop.offset, r),
@@ -151,13 +151,13 @@ void ReducedStateCostOf<T>::differentiateBlock(const LoopBlock& loop, const Bloc
   Eigen::Map<MatrixX<T>> yy(hessian, r, r), vy(hessian + r * r, r, r), vv(hessian + 2 * r * r, r, r);
   for (auto* x : {&l_y, &l_v}) x->setZero();
   for (auto* x : {&yy, &vy, &vv}) x->setZero();
-  addSmallProductTransposed(N, block.gradient_q, l_y);
-  addSmallProductTransposed(Z, block.gradient_v, l_y);
-  addSmallProductTransposed(N, block.gradient_v, l_v);
-  addSmallProductTransposed(N, block.HN, yy);
-  addSmallProductTransposed(Z, block.WZ, yy);
-  addSmallProductTransposed(N, block.WZ, vy);
-  addSmallProductTransposed(N, block.WN, vv);
+  addSmallProductTransposed(N, cluster.gradient_q, l_y);
+  addSmallProductTransposed(Z, cluster.gradient_v, l_y);
+  addSmallProductTransposed(N, cluster.gradient_v, l_v);
+  addSmallProductTransposed(N, cluster.HN, yy);
+  addSmallProductTransposed(Z, cluster.WZ, yy);
+  addSmallProductTransposed(N, cluster.WZ, vy);
+  addSmallProductTransposed(N, cluster.WN, vv);
 }
 
 template struct StateCostModelOf<double>;

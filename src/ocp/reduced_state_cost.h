@@ -3,7 +3,7 @@
 //
 // With d = q (-) q_ref, J_d its Jacobian by q, e = v - v_ref, and the weights W_q and W_v (diagonal),
 //     l = 1/2 (d.W_q d + e.W_v e)
-// A unit (reduction.h) with bases N and Z of Eq. (a) (a free joint: N = 1, Z = 0) has, with H = J_d^T W_q J_d by Gauss-Newton,
+// A reduced joint (reduction.h) with bases N and Z of Eq. (a) (a free joint: N = 1, Z = 0) has, with H = J_d^T W_q J_d by Gauss-Newton,
 //     l_y  = N^T J_d^T W_q d + Z^T W_v e,     l_v  = N^T W_v e
 //     l_yy = N^T H N + Z^T W_v Z,             l_vy = N^T W_v Z,         l_vv = N^T W_v N                              (h)
 #include "bielle/dynamics/reduced_tree.h"
@@ -11,7 +11,7 @@
 
 namespace bielle {
 
-// Gradient (2 size), and unit by unit l_yy and the diagonal of l_vv of the free joints, l_yy, l_vy and l_vv of the blocks.
+// Gradient (2 size), and reduced joint by reduced joint l_yy and the diagonal of l_vv of the free joints, l_yy, l_vy and l_vv of the clusters.
 template <typename T>
 struct StateCostModelOf {
   explicit StateCostModelOf(const Model& model, const Reduction& reduction);
@@ -34,22 +34,22 @@ class ReducedStateCostOf {
   // The value at (q, v), and d.
   T update(const VectorX<T>& q, const VectorX<T>& v);
   // Eq. (h) where d is that of the state whose lifts these are, up to the velocities.
-  const StateCostModelOf<T>& differentiate(const VectorX<T>& v, const std::vector<BlockLiftOf<T>>& lifts);
+  const StateCostModelOf<T>& differentiate(const VectorX<T>& v, const std::vector<ClusterLiftOf<T>>& lifts);
 
  private:
   using JointMatrix = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
   JointMatrix differentiateJoint(const Joint& joint);
   void differentiateFree(const Joint& joint, int offset, T* hessian);
-  struct Block {
+  struct Cluster {
     VectorX<T> gradient_q, gradient_v;  // n
     MatrixX<T> HN, WZ, WN;              // n x r: H N, W_v Z, W_v N
   };
-  void differentiateBlock(const LoopBlock& loop, const BlockMotionOf<T>& motion, Block& block, T* hessian);
+  void differentiateCluster(const ReducedCluster& loop, const ClusterMotionOf<T>& motion, Cluster& cluster, T* hessian);
 
   const Model& model_;
   const Reduction& reduction_;
   VectorX<T> gradient_q_, gradient_v_;  // nv, J_d^T W_q d and W_v e
-  std::vector<Block> blocks_;
+  std::vector<Cluster> clusters_;
   StateCostModelOf<T> derivatives_;
 };
 

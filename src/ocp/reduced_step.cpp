@@ -16,7 +16,7 @@ bool ReducedNode::updateStep(ConstVectorRef x, ConstVectorRef u, const NodeModel
   calcMotorForces(model_, u, tau_);
   work.force = tau_ - work.ws.b;
   projectVector(work.force, work.f);
-  for (Block& b : blocks_) updateTwists(getPlacedView(b.loop, work.ws), b.at, b.work->motion);
+  for (Cluster& b : clusters_) updateTwists(getPlacedView(b.loop, work.ws), b.at, b.work->motion);
   work.tree.updateMassMatrix(work.ws, work.lifts, work.M);
   updateContacts();
   if (!solveContacts()) return false;
@@ -47,7 +47,7 @@ bool ReducedNode::startStep(ConstVectorRef x, ConstVectorRef u, const NodeModel*
   calcMotorForces(model_, u, tau_);
   setState(x);
   if (before_)
-    for (size_t i = 0; i < blocks_.size(); ++i) takePoint(blocks_[i], before_->blocks_[i].next);
+    for (size_t i = 0; i < clusters_.size(); ++i) takePoint(clusters_[i], before_->clusters_[i].next);
   return true;
 }
 
@@ -77,7 +77,7 @@ void ReducedNode::finishSteps(NodeModel* const* nodes, int count, bool* ok) {
 
 void ReducedNode::finishStep() {
   stepFreeJoints();
-  for (Block& b : blocks_) {
+  for (Cluster& b : clusters_) {
     scatterConfiguration(model_, b.loop, b.next.basis().q, x_next_.head(model_.nq()));
     scatterVelocity(b.loop, b.v_next, x_next_.tail(model_.nv()));
   }
@@ -103,8 +103,8 @@ void ReducedNode::updateDriftAccelerations() {
   ReducedWork& work = *work_;
   updateDrift(model_, work.ws);
   work.a_d.setZero();
-  for (Block& b : blocks_) {
-    calcBlockDrift(getPlacedView(b.loop, work.ws), b.loop, b.at, b.work->rows, b.work->zeta);
+  for (Cluster& b : clusters_) {
+    calcClusterDrift(getPlacedView(b.loop, work.ws), b.loop, b.at, b.work->rows, b.work->zeta);
     b.work->independent = b.work->zeta;
     applyPseudoInverse(b.loop, b.at, -1, b.work->independent, b.work->a);
     scatterVelocity(b.loop, b.work->a, work.a_d);
@@ -117,7 +117,7 @@ void ReducedNode::addColumns(ConstMatrixRef A, Lift lift, MatrixRef out) const {
       const Joint& joint = model_.joints()[free.joint];
       for (int k = 0; k < joint.nv; ++k) out.row(free.offset + k) += A.col(joint.idx_v + k).transpose();
     }
-  for (const Block& b : blocks_) {
+  for (const Cluster& b : clusters_) {
     const MatrixXd& X = lift == Lift::N ? b.at.N : b.work->motion.Z;
     for (int c = 0; c < b.loop.size; ++c) {
       Eigen::Index i = 0;
@@ -143,7 +143,7 @@ void ReducedNode::projectVector(const VectorXd& x, VectorXd& out) const {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];
     out.segment(reduction_.free_offsets[i], joint.nv) = x.segment(joint.idx_v, joint.nv);
   }
-  for (const Block& b : blocks_)
+  for (const Cluster& b : clusters_)
     for (int c = 0; c < b.loop.size; ++c) {
       double sum = 0;
       for (size_t k = 0; k < b.loop.dofs.size(); ++k) sum += b.at.N(k, c) * x[b.loop.dofs[k]];
@@ -156,7 +156,7 @@ void ReducedNode::addFromReduced(const VectorXd& y, VectorXd& x) const {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];
     x.segment(joint.idx_v, joint.nv) += y.segment(reduction_.free_offsets[i], joint.nv);
   }
-  for (const Block& b : blocks_)
+  for (const Cluster& b : clusters_)
     for (size_t k = 0; k < b.loop.dofs.size(); ++k)
       x[b.loop.dofs[k]] += b.at.N.row(k).dot(y.segment(b.loop.offset, b.loop.size));
 }
@@ -195,17 +195,17 @@ void ReducedNode::stepFreeJoints() {
 bool ReducedNode::closeStep(const ReducedNode* previous) {
   const int nq = model_.nq(), nv = model_.nv();
   const double h = spec_.dt;
-  for (Block& b : blocks_) {
-    BlockWork& work = *b.work;
+  for (Cluster& b : clusters_) {
+    ClusterWork& work = *b.work;
     gatherVelocity(b.loop, x_next_.tail(nv), work.d);
     work.d *= h;
     // To second order the closures open by h^2/2 gamma along h w: J J^T zeta = h^2/2 gamma, with the zeta of close().
     // What that lacked in the step before, it will lack again.
     work.zeta = b.surplus = (0.5 * h * h) * work.independent;
-    if (previous) work.zeta += previous->blocks_[&b - blocks_.data()].surplus;
+    if (previous) work.zeta += previous->clusters_[&b - clusters_.data()].surplus;
     if (!b.next.close(b.loop, work.scratch, b.at, work.d, work.zeta)) return fail(b, b.next);
     b.surplus = b.next.zeta() - b.surplus;
-    const BlockBasis& next = b.next.basis();
+    const ClusterBasis& next = b.next.basis();
     // (I - J'^+ J') w' = N' (W N')^T w'
     work.target.setZero();
     addSmallProductTransposed(next.WN, b.next.step(), work.target, 1 / h);

@@ -43,11 +43,11 @@ bool contains(const std::vector<int>& list, int value) {
   return std::find(list.begin(), list.end(), value) != list.end();
 }
 
-// Places of the joint with index i of the whole model within the block.
+// Places of the joint with index i of the whole model within the cluster.
 void addPlaces(const Linkage& linkage, int i, std::vector<int>& dofs, std::vector<int>& positions) {
-  const std::vector<int>& joints = linkage.block.joints;
+  const std::vector<int>& joints = linkage.cluster.joints;
   const int at = static_cast<int>(std::find(joints.begin(), joints.end(), i) - joints.begin());
-  const Joint& joint = linkage.block.model.joints()[at + 1];  // the first one is the world
+  const Joint& joint = linkage.cluster.model.joints()[at + 1];  // the first one is the world
   dofs.push_back(joint.idx_v);
   positions.push_back(joint.idx_q);
 }
@@ -63,33 +63,33 @@ Linkage makeDirectLinkage(const Model& model, int joint) {
   return linkage;
 }
 
-Linkage makeLoopLinkage(const Model& model, const LoopBlock& block, std::vector<int> joints) {
+Linkage makeLoopLinkage(const Model& model, const ReducedCluster& cluster, std::vector<int> joints) {
   Linkage linkage;
-  linkage.block = block;
-  linkage.block.metric.setOnes();  // geometry alone: what is light must not move far per step
-  linkage.block.inverse_metric.setOnes();
-  linkage.block.inverse_root.setOnes();
+  linkage.cluster = cluster;
+  linkage.cluster.metric.setOnes();  // geometry alone: what is light must not move far per step
+  linkage.cluster.inverse_metric.setOnes();
+  linkage.cluster.inverse_root.setOnes();
   const std::string element = "joint '" + model.joints()[joints.front()].name + "'";
   for (int i : model.serialJoints())
-    if (static_cast<int>(joints.size()) < block.size && contains(block.joints, i) && !contains(joints, i) &&
+    if (static_cast<int>(joints.size()) < cluster.size && contains(cluster.joints, i) && !contains(joints, i) &&
         model.joints()[i].nv == 1)
       joints.push_back(i);
   std::vector<std::string> motor_names;
   for (int m = 0; m < model.nu(); ++m)
-    if (contains(block.joints, model.motors()[m].joint)) {
+    if (contains(cluster.joints, model.motors()[m].joint)) {
       linkage.motors.push_back(m);
       motor_names.push_back(model.motors()[m].name);
     }
-  const std::string mobility = "its linkage has mobility " + std::to_string(block.size);
-  if (static_cast<int>(linkage.motors.size()) != block.size)
+  const std::string mobility = "its linkage has mobility " + std::to_string(cluster.size);
+  if (static_cast<int>(linkage.motors.size()) != cluster.size)
     throw ModelError(model.name(), element,
                      mobility + " and " + std::to_string(linkage.motors.size()) + " motors (" + join(motor_names) + ")",
                      "a ratio needs as many motors as mobility");
-  if (static_cast<int>(joints.size()) != block.size)
+  if (static_cast<int>(joints.size()) != cluster.size)
     throw ModelError(model.name(), element,
                      mobility + ", driven by " + join(motor_names) + "; " + std::to_string(joints.size()) +
                          " joint(s) of it are named or listed as serial joints",
-                     "name " + std::to_string(block.size) + " joints of this linkage");
+                     "name " + std::to_string(cluster.size) + " joints of this linkage");
   linkage.joints = std::move(joints);
   for (int i : linkage.joints) addPlaces(linkage, i, linkage.joint_dofs, linkage.joint_positions);
   for (int m : linkage.motors) addPlaces(linkage, model.motors()[m].joint, linkage.motor_dofs, linkage.motor_positions);
@@ -102,20 +102,20 @@ MatrixXd selectRowsOf(const MatrixXd& N, const std::vector<int>& dofs) {
   return rows;
 }
 
-// a of Eq. (2) at the velocity v = T w of the block (n).
-VectorXd calcDriftAcceleration(const Linkage& linkage, BlockPoint& point, const MatrixXd& T, const VectorXd& v) {
-  const LoopBlock& block = linkage.block;
+// a of Eq. (2) at the velocity v = T w of the cluster (n).
+VectorXd calcDriftAcceleration(const Linkage& linkage, ClusterPoint& point, const MatrixXd& T, const VectorXd& v) {
+  const ReducedCluster& cluster = linkage.cluster;
   Workspace& ws = point.workspace();
-  updateVelocities(block.model, ws, v);
-  updateAccelerations(block.model, ws, VectorXd::Zero(block.model.nv()));
-  MatrixXd gamma(block.closures.rows, 1), independent(block.rank, 1);
-  for (size_t c = 0; c < block.closures.closures.size(); ++c) {
-    const Closure& closure = block.closures.closures[c];
-    gamma.block(block.closures.offsets[c], 0, getRows(closure.kind), 1) = calcClosureAcceleration(ws, closure);
+  updateVelocities(cluster.model, ws, v);
+  updateAccelerations(cluster.model, ws, VectorXd::Zero(cluster.model.nv()));
+  MatrixXd gamma(cluster.closures.rows, 1), independent(cluster.rank, 1);
+  for (size_t c = 0; c < cluster.closures.closures.size(); ++c) {
+    const Closure& closure = cluster.closures.closures[c];
+    gamma.block(cluster.closures.offsets[c], 0, getRows(closure.kind), 1) = calcClosureAcceleration(ws, closure);
   }
   point.selectIndependent(gamma, independent);
   point.solveGram(independent);
-  const VectorXd a = -(block.inverse_metric.asDiagonal() * (point.basis().J.transpose() * independent));
+  const VectorXd a = -(cluster.inverse_metric.asDiagonal() * (point.basis().J.transpose() * independent));
   return a - T * selectRowsOf(a, linkage.joint_dofs);
 }
 
@@ -123,29 +123,29 @@ VectorXd calcDriftAcceleration(const Linkage& linkage, BlockPoint& point, const 
 
 Linkage makeLinkage(const Model& model, const Reduction& reduction, const std::vector<std::string>& names) {
   std::vector<int> joints;
-  int block = -1;
+  int cluster = -1;
   for (const std::string& name : names) {
     const int joint = findScalarJoint(model, name);
     int owner = -1;
-    for (size_t b = 0; b < reduction.blocks.size(); ++b)
-      if (contains(reduction.blocks[b].joints, joint)) owner = static_cast<int>(b);
-    if (!joints.empty() && (owner != block || owner < 0))
+    for (size_t b = 0; b < reduction.clusters.size(); ++b)
+      if (contains(reduction.clusters[b].joints, joint)) owner = static_cast<int>(b);
+    if (!joints.empty() && (owner != cluster || owner < 0))
       throw ModelError(model.name(), "joint '" + name + "'",
                        "it is not in the linkage of '" + model.joints()[joints.front()].name + "'",
                        "ask for joints of one linkage at a time");
     if (contains(joints, joint)) throw ModelError(model.name(), "joint '" + name + "'", "it is named twice", "");
-    block = owner;
+    cluster = owner;
     joints.push_back(joint);
   }
   if (joints.empty()) throw ModelError(model.name(), "joints", "none is named", "name a joint");
-  Linkage linkage = block < 0 ? makeDirectLinkage(model, joints.front())
-                              : makeLoopLinkage(model, reduction.blocks[block], std::move(joints));
+  Linkage linkage = cluster < 0 ? makeDirectLinkage(model, joints.front())
+                                : makeLoopLinkage(model, reduction.clusters[cluster], std::move(joints));
   for (int i : linkage.joints) linkage.joint_names.push_back(model.joints()[i].name);
   for (int m : linkage.motors) linkage.motor_names.push_back(model.motors()[m].name);
   return linkage;
 }
 
-bool calcLinkageTangent(const Linkage& linkage, const BlockPoint& point, MatrixXd& T, double* margin) {
+bool calcLinkageTangent(const Linkage& linkage, const ClusterPoint& point, MatrixXd& T, double* margin) {
   const MatrixXd& N = point.basis().N;
   const Eigen::JacobiSVD<MatrixXd> svd(selectRowsOf(N, linkage.joint_dofs), Eigen::ComputeThinU | Eigen::ComputeThinV);
   const VectorXd& sigma = svd.singularValues();
@@ -155,7 +155,7 @@ bool calcLinkageTangent(const Linkage& linkage, const BlockPoint& point, MatrixX
   return true;
 }
 
-bool calcLinkageRatio(const Linkage& linkage, BlockPoint& point, LinkageRatio& out) {
+bool calcLinkageRatio(const Linkage& linkage, ClusterPoint& point, LinkageRatio& out) {
   const int m = linkage.size();
   out.R = MatrixXd::Identity(m, m);
   out.dR.assign(m, MatrixXd::Zero(m, m));
@@ -181,7 +181,7 @@ bool calcLinkageRatio(const Linkage& linkage, BlockPoint& point, LinkageRatio& o
   return out.R.allFinite();
 }
 
-bool calcLinkageMotion(const Linkage& linkage, BlockPoint& point, ConstVectorRef v_J, ConstVectorRef a_J, VectorXd& v,
+bool calcLinkageMotion(const Linkage& linkage, ClusterPoint& point, ConstVectorRef v_J, ConstVectorRef a_J, VectorXd& v,
                        VectorXd& a) {
   MatrixXd T;
   if (!calcLinkageTangent(linkage, point, T)) return false;

@@ -8,18 +8,18 @@
 namespace bielle {
 
 struct CurvePoint {
-  VectorXd q;        // of the block, closed
-  VectorXd tangent;  // n, of unit length in the metric of the block
+  VectorXd q;        // of the cluster, closed
+  VectorXd tangent;  // n, of unit length in the metric of the cluster
   double s = 0;
   double joint_rate = 0, motor_rate = 0;  // Eq. (2)
 };
 
 class LinkageCurve {
  public:
-  // From the configuration of the block, along increasing angles of the joint.
-  LinkageCurve(const Linkage& linkage, int joint, ConstVectorRef q_block);
+  // From the configuration of the cluster, along increasing angles of the joint.
+  LinkageCurve(const Linkage& linkage, int joint, ConstVectorRef q_cluster);
 
-  // False when the rank is not the block's, or the held joints cannot be held; why() says which.
+  // False when the rank is not the cluster's, or the held joints cannot be held; why() says which.
   bool start(CurvePoint& point);
   // The point at a distance h (of either sign) along the tangent of `from`.
   bool advance(const CurvePoint& from, double h, CurvePoint& to);
@@ -33,7 +33,7 @@ class LinkageCurve {
 
   RatioSample makeSample(const CurvePoint& point, DeadPointKind dead = DeadPointKind::None);
   const std::string& why() const { return why_; }
-  const LoopBlock& block() const { return linkage_.block; }
+  const ReducedCluster& cluster() const { return linkage_.cluster; }
 
  private:
   bool finishPoint(const VectorXd& direction, CurvePoint& point);
@@ -45,7 +45,7 @@ class LinkageCurve {
   int joint_;
   std::vector<int> held_;  // of the linkage's joints
   VectorXd q_start_, held_angles_;
-  BlockPoint from_, point_;
+  ClusterPoint from_, point_;
   std::string why_;
 };
 

@@ -21,22 +21,22 @@ class PostureLift {
   // The closed velocity and acceleration with the serial ones.
   VectorXd liftVelocity(const VectorXd& v_s);
   void liftMotion(const VectorXd& v_s, const VectorXd& a_s, VectorXd& v, VectorXd& a);
-  // nv x nv of the serial model: the tangent of unit serial speeds.
+  // nv x nv of the serial model: the tangent of drive serial speeds.
   MatrixXd calcTangent() const;
   double margin() const { return margin_; }
   const std::string& why() const { return why_; }
 
  private:
-  struct Unit {
+  struct Drive {
     Linkage linkage;
-    BlockPoint here, next;
+    ClusterPoint here, next;
     std::vector<int> serial_positions, serial_dofs;  // of the linkage's joints in the serial model
   };
-  LiftStatus closeUnit(Unit& unit, const VectorXd& target);
+  LiftStatus closeDrive(Drive& drive, const VectorXd& target);
   LiftStatus checkMargin(double singular);
 
   const Model &closed_, &serial_;
-  std::vector<Unit> units_;
+  std::vector<Drive> drives_;
   std::vector<std::pair<int, int>> free_joints_;  // outside loops: in the closed and in the serial model
   VectorXd q_;
   double margin_ = 1;

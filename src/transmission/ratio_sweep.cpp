@@ -24,22 +24,22 @@ VectorXd calcWrappedDifference(const Model& model, const VectorXd& q0, const Vec
   return d;
 }
 
-// The coordinate of a dof of a block that has a limit: its entry in q. Limits are those of joints of one coordinate.
+// The coordinate of a dof of a cluster that has a limit: its entry in q. Limits are those of joints of one coordinate.
 struct Limit {
   int position;
   double lower, upper;
   std::string joint;
 };
 
-std::vector<Limit> listLimits(const Model& model, const LoopBlock& block) {
+std::vector<Limit> listLimits(const Model& model, const ReducedCluster& cluster) {
   std::vector<Limit> limits;
-  for (size_t i = 0; i < block.joints.size(); ++i) {
-    const Joint& joint = model.joints()[block.joints[i]];
+  for (size_t i = 0; i < cluster.joints.size(); ++i) {
+    const Joint& joint = model.joints()[cluster.joints[i]];
     if (joint.nq != joint.nv) continue;
     for (int k = 0; k < joint.nv; ++k) {
       const double lower = model.lowerLimits()[joint.idx_v + k], upper = model.upperLimits()[joint.idx_v + k];
       if (std::isfinite(lower) || std::isfinite(upper))
-        limits.push_back({block.model.joints()[i + 1].idx_q + k, lower, upper, joint.name});
+        limits.push_back({cluster.model.joints()[i + 1].idx_q + k, lower, upper, joint.name});
     }
   }
   return limits;
@@ -49,7 +49,11 @@ std::vector<Limit> listLimits(const Model& model, const LoopBlock& block) {
 class Walk {
  public:
   Walk(const Model& model, const Linkage& linkage, LinkageCurve& curve, const SweepOptions& options)
-      : model_(model), linkage_(linkage), curve_(curve), options_(options), limits_(listLimits(model, linkage.block)) {}
+      : model_(model),
+        linkage_(linkage),
+        curve_(curve),
+        options_(options),
+        limits_(listLimits(model, linkage.cluster)) {}
 
   std::vector<RatioSample> samples;  // without the start
   std::string end;
@@ -130,9 +134,9 @@ class Walk {
   // Whether the step from `at` to `next` passes the start, in the direction of the start.
   bool returns(const CurvePoint& start, const CurvePoint& at, const CurvePoint& next) {
     if (std::abs(at.s) < 2 * options_.step) return false;
-    const Model& block = linkage_.block.model;
-    const VectorXd before = calcWrappedDifference(block, start.q, at.q);
-    const VectorXd after = calcWrappedDifference(block, start.q, next.q);
+    const Model& cluster = linkage_.cluster.model;
+    const VectorXd before = calcWrappedDifference(cluster, start.q, at.q);
+    const VectorXd after = calcWrappedDifference(cluster, start.q, next.q);
     const VectorXd& t = start.tangent;
     if (std::min(before.norm(), after.norm()) > options_.step || t.dot(before) * t.dot(after) > 0 ||
         t.dot(next.tangent) < 0.5)
@@ -203,9 +207,9 @@ std::vector<RatioSample> RatioSweep::getDeadPoints() const {
 RatioSweep sweepRatio(const Model& model, const Linkage& linkage, ConstVectorRef q, int joint,
                       const SweepOptions& options) {
   if (linkage.isDirect()) return sweepDirect(model, linkage);
-  VectorXd q_block(linkage.block.model.nq());
-  gatherConfiguration(model, linkage.block, q, q_block);
-  LinkageCurve curve(linkage, joint, q_block);
+  VectorXd q_cluster(linkage.cluster.model.nq());
+  gatherConfiguration(model, linkage.cluster, q, q_cluster);
+  LinkageCurve curve(linkage, joint, q_cluster);
   CurvePoint start;
   if (!curve.start(start) || std::abs(start.joint_rate) < 1e-9)
     throw ModelError(model.name(), "joint '" + linkage.joint_names[joint] + "'",

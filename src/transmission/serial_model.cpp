@@ -28,19 +28,19 @@ bool contains(const std::vector<int>& list, int value) {
 // The linkages of the robot with their serial joints; each must be determined by them.
 std::vector<Linkage> listLinkages(const Model& closed, const Reduction& reduction) {
   std::vector<Linkage> linkages;
-  for (const LoopBlock& block : reduction.blocks) {
+  for (const ReducedCluster& cluster : reduction.clusters) {
     std::vector<std::string> closures, joints;
-    for (int c : block.cluster_closures) closures.push_back(closed.closures()[c].name);
+    for (int c : cluster.closure_indices) closures.push_back(closed.closures()[c].name);
     int coordinates = 0;
     for (int i : closed.serialJoints())
-      if (contains(block.joints, i)) {
+      if (contains(cluster.joints, i)) {
         joints.push_back(closed.joints()[i].name);
         coordinates += closed.joints()[i].nv;
       }
-    if (joints.empty() || coordinates != block.size)
+    if (joints.empty() || coordinates != cluster.size)
       throw ModelError(
           closed.name(), "closures " + join(closures),
-          "there is no equivalent serial chain: their linkage has mobility " + std::to_string(block.size) +
+          "there is no equivalent serial chain: their linkage has mobility " + std::to_string(cluster.size) +
               ", the serial joints in it (" + join(joints) + ") have " + std::to_string(coordinates) + " coordinates",
           joints.empty() ? "use the closed model; if one-axis joints of the linkage do determine it, as a knee or "
                            "an ankle would, list them as serial_joints"
@@ -173,16 +173,16 @@ SerialModel makeSerialModel(const Model& closed, ConstVectorRef q, const SerialM
   const Reduction reduction = makeReduction(closed, q);
   const std::vector<Linkage> linkages = listLinkages(closed, reduction);
   std::vector<bool> frozen(closed.numBodies(), false);
-  for (const LoopBlock& block : reduction.blocks)
-    for (int i : block.joints) frozen[i] = !contains(closed.serialJoints(), i);
+  for (const ReducedCluster& cluster : reduction.clusters)
+    for (int i : cluster.joints) frozen[i] = !contains(closed.serialJoints(), i);
   for (const Linkage& linkage : linkages) {
-    BlockPoint point(linkage.block);
-    VectorXd q_block(linkage.block.model.nq());
-    gatherConfiguration(closed, linkage.block, q, q_block);
+    ClusterPoint point(linkage.cluster);
+    VectorXd q_cluster(linkage.cluster.model.nq());
+    gatherConfiguration(closed, linkage.cluster, q, q_cluster);
     LinkageRatio ratio;
     MatrixXd T;
     double margin = 0;
-    if (!point.update(linkage.block, q_block) || !calcLinkageTangent(linkage, point, T, &margin) ||
+    if (!point.update(linkage.cluster, q_cluster) || !calcLinkageTangent(linkage, point, T, &margin) ||
         margin < kSmallestMargin || !calcLinkageRatio(linkage, point, ratio))
       throw ModelError(closed.name(), "joints " + join(linkage.joint_names),
                        "their linkage is at a dead point at the reference, they do not determine it",

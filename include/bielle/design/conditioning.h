@@ -19,15 +19,15 @@ class LinkageConditioning {
   double calc(ConstVectorRef q);
 
  private:
-  struct Cluster {
-    const LoopBlock* block;
-    std::vector<int> motors;  // positions among the dofs of the block
-    BlockPoint point;
+  struct Entry {
+    const ReducedCluster* cluster;
+    std::vector<int> motors;  // positions among the dofs of the cluster
+    ClusterPoint point;
     VectorXd q;
   };
   const Model& model_;
   Reduction reduction_;
-  std::vector<Cluster> clusters_;
+  std::vector<Entry> entries_;
 };
 
 }  // namespace bielle

@@ -1,33 +1,33 @@
 #pragma once
 /// \file Mass matrix and derivatives of inverse dynamics in reduced coordinates, without ever forming those of full size.
 ///
-/// The factors of rnea.h are linear in a change of the dofs, so that a unit needs a few columns only. Seen from a unit
-/// further out, a reduced coordinate is its J~, dV~, dA~, dW~ of block_motion.h, Eq. (3), at the dof that carries the path;
-/// seen from a unit further in, with sums over all its dofs j,
+/// The factors of rnea.h are linear in a change of the dofs, so that a reduced joint needs a few columns only. Seen from a reduced joint
+/// further out, a reduced coordinate is its J~, dV~, dA~, dW~ of cluster_motion.h, Eq. (3), at the dof that carries the path;
+/// seen from a reduced joint further in, with sums over all its dofs j,
 ///     (YJ)~ = sum YJ_j N_j,   (BtJ)~ = sum BtJ_j N_j,
 ///     G~_y = sum Gq_j N_j + Gv_j Z_j + YJ_j d_y,j,           G~_v = sum Gv_j N_j + YJ_j d_v,j                         (1)
 /// Then, for a coordinate alpha further out and beta further in on its path, by Eqs. (7) to (10) of rnea.h,
 ///     A_y(alpha, beta) = (YJ)~_alpha . dA~_beta + (BtJ)~_alpha . dV~_beta,    A_y(beta, alpha) = J~_beta . G~_y,alpha
 ///     A_v(alpha, beta) = (YJ)~_alpha . dW~_beta + (BtJ)~_alpha . J~_beta,     A_v(beta, alpha) = J~_beta . G~_v,alpha
 ///     M(alpha, beta) = J~_beta . (YJ)~_alpha                                                                          (2)
-/// Within a unit the same holds dof by dof, J~, .. being the path sums at dof j and G'~, (YJ)'~ the sums (1) over what
+/// Within a reduced joint the same holds dof by dof, J~, .. being the path sums at dof j and G'~, (YJ)'~ the sums (1) over what
 /// comes after it, plus the rotors D and less H = d(J^T lambda)/dq of its loop forces:
 ///     A_y = sum_j N_j (YJ_j . dA~ + BtJ_j . dV~ + J_j . G'~_y + D_j d_y,j - (H N)_j)
 ///     A_v = sum_j N_j (YJ_j . dW~ + BtJ_j . J~ + J_j . G'~_v + D_j d_v,j),   M = sum_j N_j (YJ_j . J~ + J_j . (YJ)'~ + D_j N_j)
 ///                                                                                                                     (3)
-/// The loop forces have no other effect: inner to the block, they cancel in every sum that leaves it.
-#include "bielle/dynamics/block_motion.h"
+/// The loop forces have no other effect: inner to the cluster, they cancel in every sum that leaves it.
+#include "bielle/dynamics/cluster_motion.h"
 
 namespace bielle {
 
-/// What a block contributes: how it moves, and H N (n x size).
+/// What a cluster contributes: how it moves, and H N (n x size).
 template <typename T>
-struct BlockLiftOf {
-  const BlockMotionOf<T>* motion = nullptr;
+struct ClusterLiftOf {
+  const ClusterMotionOf<T>* motion = nullptr;
   const MatrixX<T>* HN = nullptr;
 };
 
-using BlockLift = BlockLiftOf<double>;
+using ClusterLift = ClusterLiftOf<double>;
 
 template <typename T>
 class ReducedTreeOf {
@@ -35,12 +35,12 @@ class ReducedTreeOf {
   /// \param tips  bodies for which the columns of getTip() are wanted
   ReducedTreeOf(const Model& model, const Reduction& reduction, const std::vector<int>& tips);
 
-  /// M (size x size), and J of the tips; needs updateCompositeInertias and the twists of the blocks.
-  void updateMassMatrix(const WorkspaceOf<T>& ws, const std::vector<BlockLiftOf<T>>& lifts,
+  /// M (size x size), and J of the tips; needs updateCompositeInertias and the twists of the clusters.
+  void updateMassMatrix(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts,
                         typename ArgumentsOf<T>::Matrix M);
   /// A_y and A_v (size x size), and all columns of the tips; needs updateInverseDynamicsFactors and lifts up to the
   /// accelerations.
-  void updateDerivatives(const WorkspaceOf<T>& ws, const std::vector<BlockLiftOf<T>>& lifts,
+  void updateDerivatives(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts,
                          typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v);
 
   /// What moves a body: column o belongs to the reduced coordinate outer[o].
@@ -51,30 +51,30 @@ class ReducedTreeOf {
   const Columns& getTip(int index) const { return tips_[index].columns; }
 
  private:
-  struct Unit {
+  struct Link {
     std::vector<int> dofs;
     Columns columns;
     Matrix6X<T> YJ, BtJ, Gy, Gv;  // 6 x size, Eq. (1)
   };
   enum class Depth { Twists, All };
-  void updateColumns(const WorkspaceOf<T>& ws, const std::vector<BlockLiftOf<T>>& lifts, const ReducedUnit& place,
+  void updateColumns(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts, const ReducedJoint& place,
                      Depth depth, Columns& out) const;
-  void addMassWithin(const WorkspaceOf<T>& ws, const BlockLiftOf<T>* lift, const ReducedUnit& place, Unit& unit,
+  void addMassWithin(const WorkspaceOf<T>& ws, const ClusterLiftOf<T>* lift, const ReducedJoint& place, Link& link,
                      typename ArgumentsOf<T>::Matrix M);
-  void addFreeWithin(const WorkspaceOf<T>& ws, const ReducedUnit& place, Unit& unit,
+  void addFreeWithin(const WorkspaceOf<T>& ws, const ReducedJoint& place, Link& link,
                      typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v) const;
-  void addBlockWithin(const WorkspaceOf<T>& ws, const BlockLiftOf<T>& lift, const ReducedUnit& place, Unit& unit,
-                      typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v);
-  // A matrix with a column for each group of the largest block.
+  void addClusterWithin(const WorkspaceOf<T>& ws, const ClusterLiftOf<T>& lift, const ReducedJoint& place, Link& link,
+                        typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v);
+  // A matrix with a column for each group of the largest cluster.
   void clearAfter(size_t groups);
 
   struct Tip {
-    ReducedUnit place;
+    ReducedJoint place;
     Columns columns;
   };
   const Model& model_;
   const Reduction& reduction_;
-  std::vector<Unit> units_;
+  std::vector<Link> links_;
   std::vector<Tip> tips_;
   Matrix6X<T> after_y_, after_v_;  // sums (1) over what comes after a group of dofs
 };

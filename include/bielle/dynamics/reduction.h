@@ -2,9 +2,9 @@
 /// \file Reduced coordinates: the manifold of closed configurations, loop cluster by loop cluster.
 ///
 /// A cluster of loops touches few dofs (Bipetto's knee: 7, with 6 closure rows). Seen from the body that carries it, it
-/// is a small mechanism of its own, here a `LoopBlock` with its own massless Model whose world is that body. At a
+/// is a small mechanism of its own, here a `ReducedCluster` with its own massless Model whose world is that body. At a
 /// closed configuration, let J (rank x n) be independent rows of its closure Jacobian, chosen by pivoting, W the metric
-/// of the block (diagonal, constant), and
+/// of the cluster (diagonal, constant), and
 ///     J N = 0,   N^T W N = I,   J^+ = W^{-1} J^T (J W^{-1} J^T)^{-1}                                                  (1)
 /// N (n x (n - rank)) is an orthonormal basis of the tangent space and (W N)^T reads its coordinates. Its choice is free at
 /// every point: no chart is left, and a dead point of a linkage, where motor or joint coordinates break down, is nothing
@@ -24,7 +24,7 @@
 
 namespace bielle {
 
-/// Dofs [begin, end) of a block that move each other's axes: those of one joint, or one of a universal joint.
+/// Dofs [begin, end) of a cluster that move each other's axes: those of one joint, or one of a universal joint.
 struct DofGroup {
   int begin = 0, end = 0;
   int parent = -1;        ///< last dof of the group before it on the path to the root, -1: none
@@ -35,41 +35,41 @@ struct DofGroup {
 constexpr double kRankTolerance = 1e-6;
 
 /// One cluster of loops as a mechanism of its own.
-struct LoopBlock {
-  Model model;                        ///< joints and closures of the cluster, massless, over their common root
-  ConstraintSet closures;             ///< of `model`, without stabilisation
-  std::vector<int> cluster_closures;  ///< their indices in the whole model
-  std::vector<Closure> placed;        ///< the same closures with the bodies of the whole model, dofs those of `model`
-  int root = 0;                       ///< body of the whole model that carries the block
-  std::vector<int> joints;            ///< joint indices in the whole model, in the order of `model`
-  std::vector<int> dofs;              ///< velocity coordinates in the whole model (n)
-  std::vector<int> own_dofs;          ///< 0, 1, .. n - 1
-  std::vector<DofGroup> groups;       ///< parents first
-  std::vector<int> body_dof;          ///< per body of `model`, the last dof on its path, -1 for the root
-  VectorXd metric;                    ///< n, diagonal of W
-  VectorXd inverse_metric;            ///< n, diagonal of W^{-1}
-  VectorXd inverse_root;              ///< n, diagonal of W^{-1/2}
-  int rank = 0;                       ///< of the closure Jacobian
-  int offset = 0, size = 0;           ///< reduced coordinates [offset, offset + size), size = n - rank
+struct ReducedCluster {
+  Model model;                       ///< joints and closures of the cluster, massless, over their common root
+  ConstraintSet closures;            ///< of `model`, without stabilisation
+  std::vector<int> closure_indices;  ///< their indices in the whole model
+  std::vector<Closure> placed;       ///< the same closures with the bodies of the whole model, dofs those of `model`
+  int root = 0;                      ///< body of the whole model that carries the cluster
+  std::vector<int> joints;           ///< joint indices in the whole model, in the order of `model`
+  std::vector<int> dofs;             ///< velocity coordinates in the whole model (n)
+  std::vector<int> own_dofs;         ///< 0, 1, .. n - 1
+  std::vector<DofGroup> groups;      ///< parents first
+  std::vector<int> body_dof;         ///< per body of `model`, the last dof on its path, -1 for the root
+  VectorXd metric;                   ///< n, diagonal of W
+  VectorXd inverse_metric;           ///< n, diagonal of W^{-1}
+  VectorXd inverse_root;             ///< n, diagonal of W^{-1/2}
+  int rank = 0;                      ///< of the closure Jacobian
+  int offset = 0, size = 0;          ///< reduced coordinates [offset, offset + size), size = n - rank
 };
 
-/// A free joint or a block: what a coordinate of the reduced tree belongs to. Units come parents first.
-struct ReducedUnit {
-  int joint = -1, block = -1;  ///< one of them: joint of the whole model, or index into Reduction::blocks
-  int offset = 0, size = 0;    ///< reduced coordinates
-  int parent = -1;             ///< unit that carries it, -1: the world
-  std::vector<int> path;       ///< dofs of the parent unit that move it: positions among the parent's dofs
-  std::vector<int> outer;      ///< reduced coordinates of all units before it on the way to the root
+/// A free joint or a cluster: what a coordinate of the reduced tree belongs to. Reduced joints come parents first.
+struct ReducedJoint {
+  int joint = -1, cluster = -1;  ///< one of them: joint of the whole model, or index into Reduction::clusters
+  int offset = 0, size = 0;      ///< reduced coordinates
+  int parent = -1;               ///< reduced joint that carries it, -1: the world
+  std::vector<int> path;         ///< dofs of the parent reduced joint that move it: positions among the parent's dofs
+  std::vector<int> outer;        ///< reduced coordinates of all reduced joints before it on the way to the root
 };
 
-/// How the velocity coordinates of a model split into blocks and free dofs.
+/// How the velocity coordinates of a model split into clusters and free dofs.
 struct Reduction {
-  std::vector<LoopBlock> blocks;
+  std::vector<ReducedCluster> clusters;
   std::vector<int> free_joints;   ///< joints outside all loops
   std::vector<int> free_offsets;  ///< first reduced coordinate of each
-  std::vector<ReducedUnit> units;
-  std::vector<int> unit_of_body;  ///< per body of the whole model, -1 for the world
-  int size = 0;                   ///< reduced coordinates: the mobility of the robot
+  std::vector<ReducedJoint> joints;
+  std::vector<int> joint_of_body;  ///< per body of the whole model, -1 for the world
+  int size = 0;                    ///< reduced coordinates: the mobility of the robot
 };
 
 /// \param q closed configuration at which ranks are taken
@@ -77,37 +77,37 @@ struct Reduction {
 Reduction makeReduction(const Model& model, ConstVectorRef q);
 
 /// Parent, path and outer coordinates of something fixed to a body (no coordinates of its own).
-ReducedUnit makeTip(const Model& model, const Reduction& reduction, int body);
+ReducedJoint makeTip(const Model& model, const Reduction& reduction, int body);
 
-/// Bases (1) at a closed configuration of a block; T is double, or Lanes for several nodes at once.
+/// Bases (1) at a closed configuration of a cluster; T is double, or Lanes for several nodes at once.
 template <typename T>
-struct BlockBasisOf {
-  explicit BlockBasisOf(const LoopBlock& block);
-  VectorX<T> q;                                  ///< nq of the block
+struct ClusterBasisOf {
+  explicit ClusterBasisOf(const ReducedCluster& cluster);
+  VectorX<T> q;                                  ///< nq of the cluster
   MatrixX<T> N;                                  ///< n x size
   MatrixX<T> WN;                                 ///< n x size
   MatrixX<T> J;                                  ///< rank x n, independent rows
   MatrixX<T> L;                                  ///< rank x rank, Cholesky factor of J W^{-1} J^T
   std::vector<typename LogicOf<T>::Index> rows;  ///< which closure rows J holds
 };
-using BlockBasis = BlockBasisOf<double>;
+using ClusterBasis = ClusterBasisOf<double>;
 
 /// (J W^{-1} J^T)^{-1} X in place (rank x k).
 template <typename T, typename Matrix>
-void solveGram(const BlockBasisOf<T>& basis, Matrix&& X) {
+void solveGram(const ClusterBasisOf<T>& basis, Matrix&& X) {
   solveSmallCholesky(basis.L, X);
 }
 /// out = s J^+ X = s W^{-1} J^T (J W^{-1} J^T)^{-1} X for X (rank x k), which is overwritten; out n x k.
 template <typename T>
-void applyPseudoInverse(const LoopBlock& block, const BlockBasisOf<T>& basis, double s,
+void applyPseudoInverse(const ReducedCluster& cluster, const ClusterBasisOf<T>& basis, double s,
                         typename ArgumentsOf<T>::Matrix X, typename ArgumentsOf<T>::Matrix out);
 
-/// What updates and closings of a block need for a moment: one per thread.
+/// What updates and closings of a cluster need for a moment: one per thread.
 template <typename T>
-struct BlockScratchOf {
-  explicit BlockScratchOf(const LoopBlock& block);
+struct ClusterScratchOf {
+  explicit ClusterScratchOf(const ReducedCluster& cluster);
   using Index = typename LogicOf<T>::Index;
-  WorkspaceOf<T> ws;  ///< of the block's model
+  WorkspaceOf<T> ws;  ///< of the cluster's model
   VectorX<T> residual, correction;
   MatrixX<T> J_all, J, JW;   // all rows; at the iterate of a closing; J W^{-1} where it starts
   MatrixX<T> newton, fresh;  // factors of the matrix of close(); of a new one
@@ -115,77 +115,77 @@ struct BlockScratchOf {
   MatrixX<T> reflected, reflectors;  // of J W^{-1/2}; Householder vectors
   VectorX<T> beta, products, rest;   // their scales; scratch; squared norms of what is left of the rows
 };
-using BlockScratch = BlockScratchOf<double>;
+using ClusterScratch = ClusterScratchOf<double>;
 
-/// A closed configuration of a block with what was computed there; with Lanes one for each lane. No allocation once made.
+/// A closed configuration of a cluster with what was computed there; with Lanes one for each lane. No allocation once made.
 template <typename T>
-class BlockStateOf {
-  friend class BlockStateOf<Lanes>;
+class ClusterStateOf {
+  friend class ClusterStateOf<Lanes>;
 
  public:
   using Mask = typename LogicOf<T>::Mask;
-  explicit BlockStateOf(const LoopBlock& block);
+  explicit ClusterStateOf(const ReducedCluster& cluster);
 
-  /// Kinematics, Jacobian and bases (1) at q (block's nq), which stay in the scratch too. False when the rank is not that
-  /// of the block.
-  Mask update(const LoopBlock& block, BlockScratchOf<T>& scratch, typename ArgumentsOf<T>::ConstVector q);
+  /// Kinematics, Jacobian and bases (1) at q (cluster's nq), which stay in the scratch too. False when the rank is not that
+  /// of the cluster.
+  Mask update(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch, typename ArgumentsOf<T>::ConstVector q);
   /// Closes from `start` as Eq. (2) and updates everything there. False when it does not close or the rank changes.
   /// \param zeta_guess  rank, where zeta is expected, or empty
-  Mask close(const LoopBlock& block, BlockScratchOf<T>& scratch, const BlockBasisOf<T>& start,
+  Mask close(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch, const ClusterBasisOf<T>& start,
              typename ArgumentsOf<T>::ConstVector d, const VectorX<T>& zeta_guess);
   /// Lanes only: each lane becomes a state of its own, but for those whose pointer is null.
-  void store(const std::array<BlockStateOf<double>*, kLane>& to) const;
+  void store(const std::array<ClusterStateOf<double>*, kLane>& to) const;
   /// Placements and columns of this point back into the scratch.
-  void load(const LoopBlock& block, BlockScratchOf<T>& scratch) const;
+  void load(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) const;
 
-  const BlockBasisOf<T>& basis() const { return basis_; }
+  const ClusterBasisOf<T>& basis() const { return basis_; }
   const std::vector<SE3Of<T>>& placements() const {
     return placements_;
-  }                                                 ///< of the bodies, seen from the block's root
+  }                                                 ///< of the bodies, seen from the cluster's root
   const VectorX<T>& zeta() const { return zeta_; }  ///< rank, of the last close()
   const VectorX<T>& step() const { return step_; }  ///< n, d - W^{-1} J(q_0)^T zeta of the last close()
   /// Why the last update() or close() returned false, naming a loop; with the scratch as they left it.
-  std::string describeFailure(const LoopBlock& block, const BlockScratch& scratch) const;
+  std::string describeFailure(const ReducedCluster& cluster, const ClusterScratch& scratch) const;
 
  private:
-  Mask updateBases(const LoopBlock& block, BlockScratchOf<T>& scratch);
+  Mask updateBases(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch);
 
-  BlockBasisOf<T> basis_;
+  ClusterBasisOf<T> basis_;
   std::vector<SE3Of<T>> placements_;
   VectorX<T> zeta_, step_;
   bool closed_ = false;  // the last close() got as far as the bases
 };
-using BlockState = BlockStateOf<double>;
+using ClusterState = ClusterStateOf<double>;
 
-/// A BlockState with a scratch of its own: simpler where there are few of them.
-class BlockPoint {
+/// A ClusterState with a scratch of its own: simpler where there are few of them.
+class ClusterPoint {
  public:
-  explicit BlockPoint(const LoopBlock& block) : scratch_(block), state_(block) {}
-  bool update(const LoopBlock& block, ConstVectorRef q) { return state_.update(block, scratch_, q); }
-  bool close(const LoopBlock& block, const BlockBasis& start, ConstVectorRef d, const VectorXd& zeta_guess) {
-    return state_.close(block, scratch_, start, d, zeta_guess);
+  explicit ClusterPoint(const ReducedCluster& cluster) : scratch_(cluster), state_(cluster) {}
+  bool update(const ReducedCluster& cluster, ConstVectorRef q) { return state_.update(cluster, scratch_, q); }
+  bool close(const ReducedCluster& cluster, const ClusterBasis& start, ConstVectorRef d, const VectorXd& zeta_guess) {
+    return state_.close(cluster, scratch_, start, d, zeta_guess);
   }
-  const BlockBasis& basis() const { return state_.basis(); }
-  std::string describeFailure(const LoopBlock& block) const { return state_.describeFailure(block, scratch_); }
+  const ClusterBasis& basis() const { return state_.basis(); }
+  std::string describeFailure(const ReducedCluster& cluster) const { return state_.describeFailure(cluster, scratch_); }
   Workspace& workspace() { return scratch_.ws; }  ///< positions are those of the last update() or close()
   void solveGram(MatrixRef X) const { bielle::solveGram(basis(), X); }
   /// Independent rows out of all rows (m x k -> rank x k).
   void selectIndependent(const MatrixXd& all, MatrixXd& out) const;
 
  private:
-  BlockScratch scratch_;
-  BlockState state_;
+  ClusterScratch scratch_;
+  ClusterState state_;
 };
 
 /// Forces on all rows (m) of forces on the independent ones.
 template <typename T>
-void expandIndependent(const BlockBasisOf<T>& basis, typename ArgumentsOf<T>::ConstVector independent,
+void expandIndependent(const ClusterBasisOf<T>& basis, typename ArgumentsOf<T>::ConstVector independent,
                        typename ArgumentsOf<T>::Vector all);
 
-/// Segments of a block in vectors of the whole model.
-void gatherConfiguration(const Model& model, const LoopBlock& block, ConstVectorRef q, VectorRef q_block);
-void scatterConfiguration(const Model& model, const LoopBlock& block, ConstVectorRef q_block, VectorRef q);
-void gatherVelocity(const LoopBlock& block, ConstVectorRef v, VectorRef v_block);
-void scatterVelocity(const LoopBlock& block, ConstVectorRef v_block, VectorRef v);
+/// Segments of a cluster in vectors of the whole model.
+void gatherConfiguration(const Model& model, const ReducedCluster& cluster, ConstVectorRef q, VectorRef q_cluster);
+void scatterConfiguration(const Model& model, const ReducedCluster& cluster, ConstVectorRef q_cluster, VectorRef q);
+void gatherVelocity(const ReducedCluster& cluster, ConstVectorRef v, VectorRef v_cluster);
+void scatterVelocity(const ReducedCluster& cluster, ConstVectorRef v_cluster, VectorRef v);
 
 }  // namespace bielle

@@ -1,11 +1,11 @@
-#include "block_gap.h"
+#include "cluster_gap.h"
 
 namespace bielle {
 
 template <typename T>
-BlockGapOf<T>::BlockGapOf(const LoopBlock& block) {
-  const int n = block.model.nv(), r = block.size;
-  q.setZero(block.model.nq());
+ClusterGapOf<T>::ClusterGapOf(const ReducedCluster& cluster) {
+  const int n = cluster.model.nv(), r = cluster.size;
+  q.setZero(cluster.model.nq());
   for (VectorX<T>* x : {&v, &d_, &w_}) x->setZero(n);
   for (VectorX<T>* x : {&y, &y_v}) x->setZero(r);
   for (MatrixX<T>* x : {&WN, &JdN_}) x->setZero(n, r);
@@ -13,11 +13,11 @@ BlockGapOf<T>::BlockGapOf(const LoopBlock& block) {
 }
 
 template <typename T>
-void BlockGapOf<T>::update(const LoopBlock& block, const BlockBasisOf<T>& next, const VectorX<T>& v_next,
-                           const MatrixX<T>& Z) {
+void ClusterGapOf<T>::update(const ReducedCluster& cluster, const ClusterBasisOf<T>& next, const VectorX<T>& v_next,
+                             const MatrixX<T>& Z) {
   w_ = v_next - v;
   JdN_ = next.N;
-  for (const Joint& joint : block.model.joints()) {
+  for (const Joint& joint : cluster.model.joints()) {
     if (joint.nv == 0) continue;
     const int i = joint.idx_v, n = joint.nv;
     calcJointDifference(joint, q.segment(joint.idx_q, joint.nq), next.q.segment(joint.idx_q, joint.nq),
@@ -36,7 +36,7 @@ void BlockGapOf<T>::update(const LoopBlock& block, const BlockBasisOf<T>& next, 
   addSmallProductTransposed(WN, Z, P_z);
 }
 
-template struct BlockGapOf<double>;
-template struct BlockGapOf<Lanes>;
+template struct ClusterGapOf<double>;
+template struct ClusterGapOf<Lanes>;
 
 }  // namespace bielle

@@ -1,7 +1,7 @@
 #pragma once
 // Where a node state is not the next state q+ of the node before it: what reaches q+ in the coordinates of the basis N' there,
 // read about the node state q_k instead, whose basis is N_k. With d = q+ (-) q_k, w = v+ - v_k, J_d the derivative of d by q+
-// and Z' of block_motion.h at q+,
+// and Z' of cluster_motion.h at q+,
 //     gap = ((W N_k)^T d, (W N_k)^T w),
 //     dy+ <- P_q dy+,   dy_v+ <- P_v dy_v+ + P_z dy+,                                                                 (1)
 //     P_q = (W N_k)^T J_d N',   P_v = (W N_k)^T N',   P_z = (W N_k)^T Z'
@@ -12,10 +12,10 @@ namespace bielle {
 template <typename T>
 using JointMatrixOf = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
 
-// Of a block of loops with n dofs and r reduced coordinates; T is double, or Lanes for several nodes at once.
+// Of a cluster of loops with n dofs and r reduced coordinates; T is double, or Lanes for several nodes at once.
 template <typename T>
-struct BlockGapOf {
-  explicit BlockGapOf(const LoopBlock& block);
+struct ClusterGapOf {
+  explicit ClusterGapOf(const ReducedCluster& cluster);
 
   VectorX<T> q, v;  // to be filled: the node state, nq and n
   MatrixX<T> WN;    // to be filled: of its basis, n x r
@@ -24,7 +24,8 @@ struct BlockGapOf {
   MatrixX<T> P_q, P_v, P_z;  // r x r
 
   // \param next, v_next  q+ and v+   \param Z  Z' (n x r)
-  void update(const LoopBlock& block, const BlockBasisOf<T>& next, const VectorX<T>& v_next, const MatrixX<T>& Z);
+  void update(const ReducedCluster& cluster, const ClusterBasisOf<T>& next, const VectorX<T>& v_next,
+              const MatrixX<T>& Z);
 
  private:
   VectorX<T> d_, w_;  // n

@@ -1,7 +1,7 @@
 #pragma once
-/// \file How a block of loops moves with its reduced coordinates, to first order.
+/// \file How a cluster of loops moves with its reduced coordinates, to first order.
 ///
-/// A change (dy, dy_v) of the reduced state of a block moves its dofs by
+/// A change (dy, dy_v) of the reduced state of a cluster moves its dofs by
 ///     dq = N dy,   dv = N dy_v + Z dy,   Z = -J^+ d(J v)/dq N                                                         (1)
 /// since J v = 0 is kept, and its accelerations, at fixed reduced accelerations, by
 ///     da = d_y dy + d_v dy_v,   d_y = -J^+ (C_q N + C_v Z),   d_v = -J^+ C_v N                                        (2)
@@ -16,53 +16,53 @@
 
 namespace bielle {
 
-/// A block seen in the workspace of the whole model or in one of its own.
+/// A cluster seen in the workspace of the whole model or in one of its own.
 template <typename T>
-struct BlockViewOf {
+struct ClusterViewOf {
   const WorkspaceOf<T>& ws;
   const std::vector<Closure>& closures;  ///< with the bodies of the workspace
   const std::vector<int>& dofs;          ///< n, in the workspace
 };
 template <typename T>
-BlockViewOf<T> getPlacedView(const LoopBlock& block, const WorkspaceOf<T>& whole) {
-  return {whole, block.placed, block.dofs};
+ClusterViewOf<T> getPlacedView(const ReducedCluster& cluster, const WorkspaceOf<T>& whole) {
+  return {whole, cluster.placed, cluster.dofs};
 }
 template <typename T>
-BlockViewOf<T> getOwnView(const LoopBlock& block, const WorkspaceOf<T>& own) {
-  return {own, block.closures.closures, block.own_dofs};
+ClusterViewOf<T> getOwnView(const ReducedCluster& cluster, const WorkspaceOf<T>& own) {
+  return {own, cluster.closures.closures, cluster.own_dofs};
 }
 
-/// First-order motion of a block; n dofs, r reduced coordinates. Column n c + k of a sum (3) belongs to coordinate c at
+/// First-order motion of a cluster; n dofs, r reduced coordinates. Column n c + k of a sum (3) belongs to coordinate c at
 /// dof k, dofs of one group having the sum of all of them.
 template <typename T>
-struct BlockMotionOf {
-  explicit BlockMotionOf(const LoopBlock& block);
-  const LoopBlock& block;
-  const BlockBasisOf<T>* basis = nullptr;
+struct ClusterMotionOf {
+  explicit ClusterMotionOf(const ReducedCluster& cluster);
+  const ReducedCluster& cluster;
+  const ClusterBasisOf<T>* basis = nullptr;
   MatrixX<T> Z, dy, dv;       ///< n x r, Eqs. (1), (2)
   Matrix6X<T> J, dV, dA, dW;  ///< 6 x (n r), Eq. (3)
   MatrixX<T> K_q, K_v;        // m x r, derivatives of the closure rows
   MatrixX<T> X;               // rank x r
 };
-using BlockMotion = BlockMotionOf<double>;
+using ClusterMotion = ClusterMotionOf<double>;
 
 /// N and J~ at the bases of a point; needs the positions of the view.
 template <typename T>
-void updateTwists(const BlockViewOf<T>& view, const BlockBasisOf<T>& basis, BlockMotionOf<T>& motion);
+void updateTwists(const ClusterViewOf<T>& view, const ClusterBasisOf<T>& basis, ClusterMotionOf<T>& motion);
 /// Z and dV~; needs updateTwists and the velocities of the view.
 template <typename T>
-void updateVelocityLift(const BlockViewOf<T>& view, BlockMotionOf<T>& motion);
+void updateVelocityLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& motion);
 /// d_y, d_v, dA~ and dW~; needs updateVelocityLift and the accelerations of the view.
 template <typename T>
-void updateAccelerationLift(const BlockViewOf<T>& view, BlockMotionOf<T>& motion);
+void updateAccelerationLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& motion);
 /// out (n x r) = d(J^T f)/dq N for forces f on all rows (m), fixed in their frames 1: closure.h, Eq. (6); needs
 /// updateTwists.
 template <typename T>
-void calcForceLift(const BlockViewOf<T>& view, const BlockMotionOf<T>& motion,
+void calcForceLift(const ClusterViewOf<T>& view, const ClusterMotionOf<T>& motion,
                    typename ArgumentsOf<T>::ConstVector forces, typename ArgumentsOf<T>::Matrix out);
 /// Drift of the independent closure rows (rank) for the accelerations held by the view.
 template <typename T>
-void calcBlockDrift(const BlockViewOf<T>& view, const LoopBlock& block, const BlockBasisOf<T>& basis,
-                    typename ArgumentsOf<T>::Vector rows, typename ArgumentsOf<T>::Vector drift);
+void calcClusterDrift(const ClusterViewOf<T>& view, const ReducedCluster& cluster, const ClusterBasisOf<T>& basis,
+                      typename ArgumentsOf<T>::Vector rows, typename ArgumentsOf<T>::Vector drift);
 
 }  // namespace bielle

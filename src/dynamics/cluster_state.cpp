@@ -1,4 +1,4 @@
-// Bases of blocks and closing of their loops: Eqs. (1) and (2) of reduction.h.
+// Bases of clusters and closing of their loops: Eqs. (1) and (2) of reduction.h.
 #include <cmath>
 #include <limits>
 
@@ -21,19 +21,19 @@ using RowsOf = Eigen::Array<T, std::is_same_v<T, double> ? kLane : 1, 1>;
 }  // namespace
 
 template <typename T>
-BlockBasisOf<T>::BlockBasisOf(const LoopBlock& block) {
-  const int n = block.model.nv();
-  q.setZero(block.model.nq());
-  N.setZero(n, block.size);
-  WN.setZero(n, block.size);
-  J.setZero(block.rank, n);
-  L.setZero(block.rank, block.rank);
-  rows.resize(block.rank);
+ClusterBasisOf<T>::ClusterBasisOf(const ReducedCluster& cluster) {
+  const int n = cluster.model.nv();
+  q.setZero(cluster.model.nq());
+  N.setZero(n, cluster.size);
+  WN.setZero(n, cluster.size);
+  J.setZero(cluster.rank, n);
+  L.setZero(cluster.rank, cluster.rank);
+  rows.resize(cluster.rank);
 }
 
 template <typename T>
-BlockScratchOf<T>::BlockScratchOf(const LoopBlock& block) : ws(block.model) {
-  const int n = block.model.nv(), m = block.closures.rows, rank = block.rank;
+ClusterScratchOf<T>::ClusterScratchOf(const ReducedCluster& cluster) : ws(cluster.model) {
+  const int n = cluster.model.nv(), m = cluster.closures.rows, rank = cluster.rank;
   residual.setZero(m);
   correction.setZero(rank);
   J_all.setZero(m, n);
@@ -51,26 +51,27 @@ BlockScratchOf<T>::BlockScratchOf(const LoopBlock& block) : ws(block.model) {
 }
 
 template <typename T>
-BlockStateOf<T>::BlockStateOf(const LoopBlock& block) : basis_(block), placements_(block.model.numBodies()) {
-  zeta_.setZero(block.rank);
-  step_.setZero(block.model.nv());
+ClusterStateOf<T>::ClusterStateOf(const ReducedCluster& cluster)
+    : basis_(cluster), placements_(cluster.model.numBodies()) {
+  zeta_.setZero(cluster.rank);
+  step_.setZero(cluster.model.nv());
 }
 
 template <typename T>
-void applyPseudoInverse(const LoopBlock& block, const BlockBasisOf<T>& basis, double s,
+void applyPseudoInverse(const ReducedCluster& cluster, const ClusterBasisOf<T>& basis, double s,
                         typename ArgumentsOf<T>::Matrix X, typename ArgumentsOf<T>::Matrix out) {
   solveGram(basis, X);
   out.setZero();
   addSmallProductTransposed(basis.J, X, out, s);
   for (Eigen::Index c = 0; c < out.cols(); ++c)
-    for (Eigen::Index k = 0; k < out.rows(); ++k) out(k, c) *= block.inverse_metric[k];
+    for (Eigen::Index k = 0; k < out.rows(); ++k) out(k, c) *= cluster.inverse_metric[k];
 }
 
 namespace {
 
 template <typename T>
-void updateJacobian(const LoopBlock& block, BlockScratchOf<T>& scratch) {
-  const ConstraintSet& set = block.closures;
+void updateJacobian(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) {
+  const ConstraintSet& set = cluster.closures;
   for (size_t c = 0; c < set.closures.size(); ++c)
     calcClosureJacobian<T>(scratch.ws, set.closures[c],
                            scratch.J_all.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
@@ -78,9 +79,9 @@ void updateJacobian(const LoopBlock& block, BlockScratchOf<T>& scratch) {
 
 // Returns the largest entry, or none that is a number.
 template <typename T>
-T updateResidual(const LoopBlock& block, BlockScratchOf<T>& scratch) {
+T updateResidual(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) {
   using std::abs;
-  const ConstraintSet& set = block.closures;
+  const ConstraintSet& set = cluster.closures;
   T largest = 0, sum = 0;
   for (size_t c = 0; c < set.closures.size(); ++c) {
     const int row = set.offsets[c], rows = getRows(set.closures[c].kind);
@@ -102,9 +103,10 @@ void selectRows(const MatrixX<T>& all, const std::vector<typename LogicOf<T>::In
 }
 
 // J W^{-1/2} = [L, 0] Q^T with Q = H_1 H_2 ..., H = I - beta v v^T, the v in the columns of `reflectors`. Rows are taken
-// by what the ones before leave of them, largest first. False when the rank is another than the block's.
+// by what the ones before leave of them, largest first. False when the rank is another than the cluster's.
 template <typename T>
-typename LogicOf<T>::Mask factorize(const LoopBlock& block, BlockScratchOf<T>& scratch, BlockBasisOf<T>& basis) {
+typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                    ClusterBasisOf<T>& basis) {
   using std::abs;
   using std::sqrt;
   using Rows = RowsOf<T>;
@@ -112,8 +114,8 @@ typename LogicOf<T>::Mask factorize(const LoopBlock& block, BlockScratchOf<T>& s
   const T taken = -std::numeric_limits<double>::infinity();
   MatrixX<T>& E = scratch.reflected;
   VectorX<T>&rest = scratch.rest, &products = scratch.products;
-  const int m = static_cast<int>(rest.size()), n = static_cast<int>(E.cols()), rank = block.rank;
-  for (int k = 0; k < n; ++k) E.col(k).head(m) = scratch.J_all.col(k) * block.inverse_root[k];
+  const int m = static_cast<int>(rest.size()), n = static_cast<int>(E.cols()), rank = cluster.rank;
+  for (int k = 0; k < n; ++k) E.col(k).head(m) = scratch.J_all.col(k) * cluster.inverse_root[k];
   rest = E.topRows(m).rowwise().squaredNorm();
   T first = 0, last = 0;
   auto regular = T(0) <= T(0);
@@ -164,10 +166,10 @@ typename LogicOf<T>::Mask factorize(const LoopBlock& block, BlockScratchOf<T>& s
 
 // Newton's matrix J(q) W^{-1} J(q_0)^T at the present iterate, for the lanes of the mask.
 template <typename T>
-typename LogicOf<T>::Mask updateNewton(const LoopBlock& block, BlockScratchOf<T>& scratch, const BlockBasisOf<T>& start,
-                                       const typename LogicOf<T>::Mask& mask) {
-  updateColumns(block.model, scratch.ws);
-  updateJacobian(block, scratch);
+typename LogicOf<T>::Mask updateNewton(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                       const ClusterBasisOf<T>& start, const typename LogicOf<T>::Mask& mask) {
+  updateColumns(cluster.model, scratch.ws);
+  updateJacobian(cluster, scratch);
   selectRows(scratch.J_all, start.rows, scratch.J);
   scratch.fresh.setZero();
   addSmallProduct(scratch.J, scratch.JW.transpose(), scratch.fresh);
@@ -184,12 +186,12 @@ typename LogicOf<T>::Mask updateNewton(const LoopBlock& block, BlockScratchOf<T>
 
 // Eq. (1): N = W^{-1/2} Q_2 with the last columns of Q, and L L^T = J W^{-1} J^T.
 template <typename T>
-typename LogicOf<T>::Mask BlockStateOf<T>::updateBases(const LoopBlock& block, BlockScratchOf<T>& scratch) {
-  const int rank = block.rank, size = block.size, n = static_cast<int>(block.metric.size());
+typename LogicOf<T>::Mask ClusterStateOf<T>::updateBases(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) {
+  const int rank = cluster.rank, size = cluster.size, n = static_cast<int>(cluster.metric.size());
   placements_ = scratch.ws.X_WB;
-  updateColumns(block.model, scratch.ws);
-  updateJacobian(block, scratch);
-  const Mask regular = factorize(block, scratch, basis_);
+  updateColumns(cluster.model, scratch.ws);
+  updateJacobian(cluster, scratch);
+  const Mask regular = factorize(cluster, scratch, basis_);
   if (!any(regular)) return regular;
   MatrixX<T>& N = basis_.N;
   N.setZero();
@@ -205,38 +207,38 @@ typename LogicOf<T>::Mask BlockStateOf<T>::updateBases(const LoopBlock& block, B
   }
   for (int c = 0; c < size; ++c)
     for (int k = 0; k < n; ++k) {
-      N(k, c) *= block.inverse_root[k];
-      basis_.WN(k, c) = block.metric[k] * N(k, c);
+      N(k, c) *= cluster.inverse_root[k];
+      basis_.WN(k, c) = cluster.metric[k] * N(k, c);
     }
   selectRows(scratch.J_all, basis_.rows, basis_.J);
   return regular;
 }
 
 template <typename T>
-void BlockStateOf<T>::load(const LoopBlock& block, BlockScratchOf<T>& scratch) const {
+void ClusterStateOf<T>::load(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) const {
   scratch.ws.q = basis_.q;
   scratch.ws.X_WB = placements_;
   scratch.ws.stage = WorkspaceStage::Placement;
-  updateColumns(block.model, scratch.ws);
+  updateColumns(cluster.model, scratch.ws);
 }
 
 template <>
-void BlockStateOf<Lanes>::store(const std::array<BlockState*, kLane>& to) const {
+void ClusterStateOf<Lanes>::store(const std::array<ClusterState*, kLane>& to) const {
   static_assert(sizeof(SE3) == 12 * sizeof(double) && sizeof(SE3Of<Lanes>) == 12 * sizeof(Lanes));
   const auto give = [&](const Lanes* from, Eigen::Index size, const auto& get) {
     std::array<double*, kLane> out;
     for (size_t l = 0; l < kLane; ++l) out[l] = to[l] ? get(*to[l]) : nullptr;
     unpackLanes(from, size, out);
   };
-  give(basis_.q.data(), basis_.q.size(), [](BlockState& s) { return s.basis_.q.data(); });
-  give(basis_.N.data(), basis_.N.size(), [](BlockState& s) { return s.basis_.N.data(); });
-  give(basis_.WN.data(), basis_.WN.size(), [](BlockState& s) { return s.basis_.WN.data(); });
-  give(basis_.J.data(), basis_.J.size(), [](BlockState& s) { return s.basis_.J.data(); });
-  give(basis_.L.data(), basis_.L.size(), [](BlockState& s) { return s.basis_.L.data(); });
+  give(basis_.q.data(), basis_.q.size(), [](ClusterState& s) { return s.basis_.q.data(); });
+  give(basis_.N.data(), basis_.N.size(), [](ClusterState& s) { return s.basis_.N.data(); });
+  give(basis_.WN.data(), basis_.WN.size(), [](ClusterState& s) { return s.basis_.WN.data(); });
+  give(basis_.J.data(), basis_.J.size(), [](ClusterState& s) { return s.basis_.J.data(); });
+  give(basis_.L.data(), basis_.L.size(), [](ClusterState& s) { return s.basis_.L.data(); });
   give(placements_.front().R.data(), 12 * placements_.size(),
-       [](BlockState& s) { return s.placements_.front().R.data(); });
-  give(zeta_.data(), zeta_.size(), [](BlockState& s) { return s.zeta_.data(); });
-  give(step_.data(), step_.size(), [](BlockState& s) { return s.step_.data(); });
+       [](ClusterState& s) { return s.placements_.front().R.data(); });
+  give(zeta_.data(), zeta_.size(), [](ClusterState& s) { return s.zeta_.data(); });
+  give(step_.data(), step_.size(), [](ClusterState& s) { return s.step_.data(); });
   for (size_t l = 0; l < kLane; ++l) {
     if (!to[l]) continue;
     for (size_t i = 0; i < basis_.rows.size(); ++i) to[l]->basis_.rows[i] = basis_.rows[i][l];
@@ -245,22 +247,23 @@ void BlockStateOf<Lanes>::store(const std::array<BlockState*, kLane>& to) const 
 }
 
 template <typename T>
-typename LogicOf<T>::Mask BlockStateOf<T>::update(const LoopBlock& block, BlockScratchOf<T>& scratch,
-                                                  typename ArgumentsOf<T>::ConstVector q) {
+typename LogicOf<T>::Mask ClusterStateOf<T>::update(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                                    typename ArgumentsOf<T>::ConstVector q) {
   closed_ = true;
   basis_.q = q;
-  updatePlacements<T>(block.model, scratch.ws, basis_.q);
-  return updateBases(block, scratch);
+  updatePlacements<T>(cluster.model, scratch.ws, basis_.q);
+  return updateBases(cluster, scratch);
 }
 
 // Newton on zeta with the matrix J(q) W^{-1} J(q_0)^T of the independent rows, refreshed while it pays. A lane that is done
 // stays as it is.
 template <typename T>
-typename LogicOf<T>::Mask BlockStateOf<T>::close(const LoopBlock& block, BlockScratchOf<T>& scratch,
-                                                 const BlockBasisOf<T>& start, typename ArgumentsOf<T>::ConstVector d,
-                                                 const VectorX<T>& zeta_guess) {
+typename LogicOf<T>::Mask ClusterStateOf<T>::close(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                                   const ClusterBasisOf<T>& start,
+                                                   typename ArgumentsOf<T>::ConstVector d,
+                                                   const VectorX<T>& zeta_guess) {
   closed_ = false;
-  for (Eigen::Index k = 0; k < start.J.cols(); ++k) scratch.JW.col(k) = start.J.col(k) * block.inverse_metric[k];
+  for (Eigen::Index k = 0; k < start.J.cols(); ++k) scratch.JW.col(k) = start.J.col(k) * cluster.inverse_metric[k];
   step_ = d;
   zeta_.setZero();
   if (zeta_guess.size()) {
@@ -272,19 +275,19 @@ typename LogicOf<T>::Mask BlockStateOf<T>::close(const LoopBlock& block, BlockSc
   T previous = 0;
   constexpr int kMaxIterations = 30;
   for (int i = 0; i <= kMaxIterations; ++i) {
-    for (const Joint& joint : block.model.joints())
+    for (const Joint& joint : cluster.model.joints())
       if (joint.nv)
         integrateJoint<T>(joint, start.q.segment(joint.idx_q, joint.nq), step_.segment(joint.idx_v, joint.nv),
                           basis_.q.segment(joint.idx_q, joint.nq));
-    updatePlacements<T>(block.model, scratch.ws, basis_.q);
-    const T gap = updateResidual(block, scratch);
+    updatePlacements<T>(cluster.model, scratch.ws, basis_.q);
+    const T gap = updateResidual(cluster, scratch);
     const Mask stalled = i > 0 ? gap > 0.5 * previous : never;
     failed = failed || !(gap <= std::numeric_limits<double>::max());
     closed = closed || gap <= kClosedTolerance || (stalled && gap <= kAcceptedTolerance);
     const Mask active = !(closed || failed);
     if (!any(active) || i == kMaxIterations) break;
     const Mask slow = i > 0 ? active && gap > 0.05 * previous : active;
-    if (any(slow)) failed = failed || (slow && !updateNewton(block, scratch, start, slow));
+    if (any(slow)) failed = failed || (slow && !updateNewton(cluster, scratch, start, slow));
     previous = gap;
     for (size_t r = 0; r < start.rows.size(); ++r)
       scratch.correction[r] = getEntry(scratch.residual.data(), start.rows[r]);
@@ -297,15 +300,15 @@ typename LogicOf<T>::Mask BlockStateOf<T>::close(const LoopBlock& block, BlockSc
   }
   if (!any(closed)) return closed;
   closed_ = true;
-  return closed && updateBases(block, scratch);
+  return closed && updateBases(cluster, scratch);
 }
 
 template <typename T>
-std::string BlockStateOf<T>::describeFailure(const LoopBlock& block, const BlockScratch& scratch) const {
-  const ConstraintSet& set = block.closures;
+std::string ClusterStateOf<T>::describeFailure(const ReducedCluster& cluster, const ClusterScratch& scratch) const {
+  const ConstraintSet& set = cluster.closures;
   if (closed_)
     return "closure '" + set.closures.front().name + "': the rank of its loops is no longer " +
-           std::to_string(block.rank) + ": a configuration where they can move in other ways";
+           std::to_string(cluster.rank) + ": a configuration where they can move in other ways";
   size_t worst = 0;
   double largest = -1;
   for (size_t c = 0; c < set.closures.size(); ++c) {
@@ -315,28 +318,28 @@ std::string BlockStateOf<T>::describeFailure(const LoopBlock& block, const Block
   return "closure '" + set.closures[worst].name + "' does not close: the step is too large, or out of its reach";
 }
 
-void BlockPoint::selectIndependent(const MatrixXd& all, MatrixXd& out) const {
+void ClusterPoint::selectIndependent(const MatrixXd& all, MatrixXd& out) const {
   selectRows<double>(all, basis().rows, out);
 }
 
 template <typename T>
-void expandIndependent(const BlockBasisOf<T>& basis, typename ArgumentsOf<T>::ConstVector independent,
+void expandIndependent(const ClusterBasisOf<T>& basis, typename ArgumentsOf<T>::ConstVector independent,
                        typename ArgumentsOf<T>::Vector all) {
   all.setZero();
   for (size_t i = 0; i < basis.rows.size(); ++i) setEntry(all.data(), basis.rows[i], independent[i]);
 }
 
-template struct BlockScratchOf<double>;
-template struct BlockScratchOf<Lanes>;
-template class BlockStateOf<double>;
-template class BlockStateOf<Lanes>;
-template struct BlockBasisOf<double>;
-template struct BlockBasisOf<Lanes>;
-template void applyPseudoInverse(const LoopBlock&, const BlockBasis&, double, MatrixRef, MatrixRef);
-template void applyPseudoInverse(const LoopBlock&, const BlockBasisOf<Lanes>&, double, ArgumentsOf<Lanes>::Matrix,
-                                 ArgumentsOf<Lanes>::Matrix);
-template void expandIndependent(const BlockBasis&, ConstVectorRef, VectorRef);
-template void expandIndependent(const BlockBasisOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector,
+template struct ClusterScratchOf<double>;
+template struct ClusterScratchOf<Lanes>;
+template class ClusterStateOf<double>;
+template class ClusterStateOf<Lanes>;
+template struct ClusterBasisOf<double>;
+template struct ClusterBasisOf<Lanes>;
+template void applyPseudoInverse(const ReducedCluster&, const ClusterBasis&, double, MatrixRef, MatrixRef);
+template void applyPseudoInverse(const ReducedCluster&, const ClusterBasisOf<Lanes>&, double,
+                                 ArgumentsOf<Lanes>::Matrix, ArgumentsOf<Lanes>::Matrix);
+template void expandIndependent(const ClusterBasis&, ConstVectorRef, VectorRef);
+template void expandIndependent(const ClusterBasisOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector,
                                 ArgumentsOf<Lanes>::Vector);
 
 }  // namespace bielle

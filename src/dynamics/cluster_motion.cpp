@@ -1,0 +1,166 @@
+#include "bielle/dynamics/cluster_motion.h"
+
+namespace bielle {
+namespace {
+
+template <typename T>
+SE3Of<T> getFrame1(const ClusterViewOf<T>& view, const Closure& c) {
+  return view.ws.X_WB[c.body1] * c.X_B1;
+}
+
+// Difference of a path sum of coordinate c between the bodies of a closure of the cluster.
+template <typename T>
+Vector6<T> calcDifference(const ClusterMotionOf<T>& motion, const Matrix6X<T>& sums, const Closure& own, int c) {
+  const int n = static_cast<int>(motion.cluster.dofs.size());
+  const int dof1 = motion.cluster.body_dof[own.body1], dof2 = motion.cluster.body_dof[own.body2];
+  Vector6<T> out = Vector6<T>::Zero();
+  if (dof1 >= 0) out = sums.col(n * c + dof1);
+  if (dof2 >= 0) out -= sums.col(n * c + dof2);
+  return out;
+}
+
+// Path sums of what `add` adds for dof k of the cluster, coordinate c.
+template <typename T, typename Add>
+void sumPaths(const ReducedCluster& cluster, Matrix6X<T>& sums, const Add& add) {
+  const int n = static_cast<int>(cluster.dofs.size());
+  for (int c = 0; c < cluster.size; ++c)
+    for (const DofGroup& group : cluster.groups) {
+      Vector6<T> sum = Vector6<T>::Zero();
+      if (group.parent >= 0) sum = sums.col(n * c + group.parent);
+      for (int k = group.begin; k < group.end; ++k) add(k, c, sum);
+      for (int k = group.begin; k < group.end; ++k) sums.col(n * c + k) = sum;
+    }
+}
+
+// out = -J^+ K for all closure rows K (m x r).
+template <typename T>
+void applyMinusPlus(ClusterMotionOf<T>& motion, const MatrixX<T>& K, MatrixX<T>& out) {
+  const ClusterBasisOf<T>& basis = *motion.basis;
+  for (Eigen::Index c = 0; c < K.cols(); ++c)
+    for (size_t i = 0; i < basis.rows.size(); ++i) motion.X(i, c) = getEntry(&K(0, c), basis.rows[i]);
+  applyPseudoInverse<T>(motion.cluster, basis, -1, motion.X, out);
+}
+
+}  // namespace
+
+template <typename T>
+ClusterMotionOf<T>::ClusterMotionOf(const ReducedCluster& l) : cluster(l) {
+  const int n = l.model.nv(), m = l.closures.rows, r = l.size;
+  for (MatrixX<T>* x : {&Z, &dy, &dv}) x->setZero(n, r);
+  for (Matrix6X<T>* x : {&J, &dV, &dA, &dW}) x->setZero(6, n * r);
+  for (MatrixX<T>* x : {&K_q, &K_v}) x->setZero(m, r);
+  X.setZero(l.rank, r);
+}
+
+template <typename T>
+void updateTwists(const ClusterViewOf<T>& view, const ClusterBasisOf<T>& basis, ClusterMotionOf<T>& motion) {
+  motion.basis = &basis;
+  sumPaths(motion.cluster, motion.J,
+           [&](int k, int c, Vector6<T>& sum) { sum += basis.N(k, c) * view.ws.J.col(view.dofs[k]); });
+}
+
+template <typename T>
+void updateVelocityLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& motion) {
+  const ReducedCluster& cluster = motion.cluster;
+  const MatrixX<T>& N = motion.basis->N;
+  sumPaths(cluster, motion.dV, [&](int k, int c, Vector6<T>& sum) { sum += N(k, c) * view.ws.dV.col(view.dofs[k]); });
+  for (size_t i = 0; i < view.closures.size(); ++i) {
+    const Closure &placed = view.closures[i], &own = cluster.closures.closures[i];
+    const SE3Of<T> X_W1 = getFrame1(view, placed);
+    const int row = cluster.closures.offsets[i], rows = getRows(own.kind);
+    for (int c = 0; c < cluster.size; ++c) {
+      const Vector6<T> dnu = calcDifference(motion, motion.dV, own, c) +
+                             crossMotion(calcDifference(motion, motion.J, own, c), view.ws.V[placed.body2]);
+      motion.K_q.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dnu));
+    }
+  }
+  applyMinusPlus(motion, motion.K_q, motion.Z);
+  sumPaths(cluster, motion.dV, [&](int k, int c, Vector6<T>& sum) {
+    sum += N(k, c) * view.ws.dV.col(view.dofs[k]) + motion.Z(k, c) * view.ws.J.col(view.dofs[k]);
+  });
+}
+
+template <typename T>
+void updateAccelerationLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& motion) {
+  const ReducedCluster& cluster = motion.cluster;
+  const WorkspaceOf<T>& ws = view.ws;
+  const MatrixX<T>&N = motion.basis->N, &Z = motion.Z;
+  const auto getTurn = [&](int k) -> Vector6<T> { return ws.dJ.col(view.dofs[k]) + ws.dV.col(view.dofs[k]); };
+  sumPaths(cluster, motion.dA,
+           [&](int k, int c, Vector6<T>& sum) { sum += N(k, c) * ws.dA.col(view.dofs[k]) + Z(k, c) * getTurn(k); });
+  sumPaths(cluster, motion.dW, [&](int k, int c, Vector6<T>& sum) { sum += N(k, c) * getTurn(k); });
+  for (size_t i = 0; i < view.closures.size(); ++i) {
+    const Closure &placed = view.closures[i], &own = cluster.closures.closures[i];
+    const SE3Of<T> X_W1 = getFrame1(view, placed);
+    const Vector6<T>&V1 = ws.V[placed.body1], &V2 = ws.V[placed.body2], &A2 = ws.A[placed.body2];
+    const Vector6<T> V12 = V1 + V2;
+    const int row = cluster.closures.offsets[i], rows = getRows(own.kind);
+    for (int c = 0; c < cluster.size; ++c) {
+      const Vector6<T> J = calcDifference(motion, motion.J, own, c), dV = calcDifference(motion, motion.dV, own, c);
+      const Vector6<T> dq = calcDifference(motion, motion.dA, own, c) - crossMotion(V12, dV) + crossMotion(J, A2) -
+                            crossMotion(V1, crossMotion(J, V2));
+      const Vector6<T> dv = calcDifference(motion, motion.dW, own, c) - crossMotion(V12, J);
+      motion.K_q.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dq));
+      motion.K_v.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dv));
+    }
+  }
+  applyMinusPlus(motion, motion.K_q, motion.dy);
+  applyMinusPlus(motion, motion.K_v, motion.dv);
+  sumPaths(cluster, motion.dA, [&](int k, int c, Vector6<T>& sum) {
+    sum += N(k, c) * ws.dA.col(view.dofs[k]) + Z(k, c) * getTurn(k) + motion.dy(k, c) * ws.J.col(view.dofs[k]);
+  });
+  sumPaths(cluster, motion.dW, [&](int k, int c, Vector6<T>& sum) {
+    sum += N(k, c) * getTurn(k) + motion.dv(k, c) * ws.J.col(view.dofs[k]);
+  });
+}
+
+template <typename T>
+void calcForceLift(const ClusterViewOf<T>& view, const ClusterMotionOf<T>& motion,
+                   typename ArgumentsOf<T>::ConstVector forces, typename ArgumentsOf<T>::Matrix out) {
+  const ReducedCluster& cluster = motion.cluster;
+  const int n = static_cast<int>(cluster.dofs.size());
+  out.setZero();
+  for (size_t i = 0; i < view.closures.size(); ++i) {
+    const Closure& own = cluster.closures.closures[i];
+    const Vector6<T> W =
+        calcClosureWrench(view.ws, view.closures[i], forces.segment(cluster.closures.offsets[i], getRows(own.kind)));
+    const int dof1 = cluster.body_dof[own.body1];
+    for (int c = 0; c < cluster.size; ++c) {
+      Vector6<T> twist1 = Vector6<T>::Zero();
+      if (dof1 >= 0) twist1 = motion.J.col(n * c + dof1);
+      for (size_t d = 0; d < own.dofs.size(); ++d) {
+        const int k = own.dofs[d];
+        const Vector6<T> moved = crossForce(twist1 - motion.J.col(n * c + k), W);
+        out(k, c) += own.signs[d] * view.ws.J.col(view.dofs[k]).dot(moved);
+      }
+    }
+  }
+}
+
+template <typename T>
+void calcClusterDrift(const ClusterViewOf<T>& view, const ReducedCluster& cluster, const ClusterBasisOf<T>& basis,
+                      typename ArgumentsOf<T>::Vector rows, typename ArgumentsOf<T>::Vector drift) {
+  for (size_t c = 0; c < view.closures.size(); ++c)
+    rows.segment(cluster.closures.offsets[c], getRows(view.closures[c].kind)) =
+        calcClosureAcceleration(view.ws, view.closures[c]);
+  for (size_t i = 0; i < basis.rows.size(); ++i) drift[i] = getEntry(rows.data(), basis.rows[i]);
+}
+
+template struct ClusterMotionOf<double>;
+template void calcClusterDrift(const ClusterViewOf<double>&, const ReducedCluster&, const ClusterBasisOf<double>&,
+                               ArgumentsOf<double>::Vector, ArgumentsOf<double>::Vector);
+template void updateTwists(const ClusterViewOf<double>&, const ClusterBasisOf<double>&, ClusterMotionOf<double>&);
+template void updateVelocityLift(const ClusterViewOf<double>&, ClusterMotionOf<double>&);
+template void updateAccelerationLift(const ClusterViewOf<double>&, ClusterMotionOf<double>&);
+template void calcForceLift(const ClusterViewOf<double>&, const ClusterMotionOf<double>&,
+                            ArgumentsOf<double>::ConstVector, ArgumentsOf<double>::Matrix);
+template struct ClusterMotionOf<Lanes>;
+template void calcClusterDrift(const ClusterViewOf<Lanes>&, const ReducedCluster&, const ClusterBasisOf<Lanes>&,
+                               ArgumentsOf<Lanes>::Vector, ArgumentsOf<Lanes>::Vector);
+template void updateTwists(const ClusterViewOf<Lanes>&, const ClusterBasisOf<Lanes>&, ClusterMotionOf<Lanes>&);
+template void updateVelocityLift(const ClusterViewOf<Lanes>&, ClusterMotionOf<Lanes>&);
+template void updateAccelerationLift(const ClusterViewOf<Lanes>&, ClusterMotionOf<Lanes>&);
+template void calcForceLift(const ClusterViewOf<Lanes>&, const ClusterMotionOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector,
+                            ArgumentsOf<Lanes>::Matrix);
+
+}  // namespace bielle
