@@ -13,9 +13,9 @@
 #include <random>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/model/fourbar_chain.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/benchmark_walk.h"
+#include "bielle/robots/fourbar_chain.h"
 #include "bielle/solve/fddp.h"
 
 namespace {

@@ -16,7 +16,7 @@
 
 #include "bielle/design/search.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/model/fourbar_chain.h"
+#include "bielle/robots/fourbar_chain.h"
 
 using namespace bielle;
 

@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "bielle/io/bench.h"
+#include "bench/bench.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 

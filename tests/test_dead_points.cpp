@@ -7,8 +7,8 @@
 #include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
-#include "bielle/model/fourbar_chain.h"
 #include "bielle/ocp/robot_problem.h"
+#include "bielle/robots/fourbar_chain.h"
 #include "bielle/solve/fddp.h"
 
 using namespace bielle;

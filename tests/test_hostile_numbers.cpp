@@ -10,12 +10,12 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/record.h"
 #include "bielle/model/error.h"
-#include "bielle/model/fourbar_chain.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
+#include "bielle/robots/fourbar_chain.h"
 #include "mechanisms.h"
 
 using namespace bielle;

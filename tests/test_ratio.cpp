@@ -6,8 +6,8 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/model/error.h"
-#include "bielle/model/fourbar_chain.h"
 #include "bielle/model/reader.h"
+#include "bielle/robots/fourbar_chain.h"
 #include "bielle/transmission/ratio_sweep.h"
 #include "check_derivative.h"
 #include "robot_directory.h"

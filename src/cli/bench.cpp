@@ -1,5 +1,5 @@
 // bielle bench: how fast it is on this machine.
-#include "bielle/io/bench.h"
+#include "bench/bench.h"
 
 #include <cmath>
 #include <iostream>

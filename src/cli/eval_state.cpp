@@ -8,8 +8,8 @@
 #include <set>
 
 #include "bielle/io/names.h"
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
+#include "model/text_file.h"
 
 namespace bielle::cli {
 
@@ -186,7 +186,7 @@ EvalState readState(const Model& model, const std::string& path) {
     const std::string text{std::istreambuf_iterator<char>(std::cin), std::istreambuf_iterator<char>()};
     return StateReader(model, "standard input").read(text);
   }
-  return StateReader(model, path).read(readTextFile(path, "check the path and its permissions"));
+  return StateReader(model, path).read(readTextFile(path));
 }
 
 }  // namespace bielle::cli

@@ -1,7 +1,7 @@
 #include "bielle/design/spec.h"
 
 #include "design/spec_parts.h"
-#include "model/robot_files.h"
+#include "model/text_file.h"
 
 namespace bielle {
 namespace {
@@ -184,8 +184,8 @@ void readRoot(const Entry& root, DesignSpec& spec) {
 DesignSpec readDesignSpec(const std::string& path) {
   DesignSpec spec;
   spec.path = path;
-  spec.text = readText(path);
-  readDocument(path, spec.text, [&](const Entry& root) { readRoot(root, spec); });
+  spec.text = readTextFile(path, "give the path of a specification");
+  readYamlDocument(path, spec.text, [&](const Entry& root) { readRoot(root, spec); });
   return spec;
 }
 

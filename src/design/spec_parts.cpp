@@ -10,15 +10,6 @@ namespace fs = std::filesystem;
 
 namespace bielle {
 
-void readDocument(const std::string& path, const std::string& text, const std::function<void(const YamlEntry&)>& read) {
-  try {
-    read(YamlEntry(path, "", YAML::Load(text)));
-  } catch (const YAML::Exception& error) {
-    throw ModelError(path, "line " + std::to_string(error.mark.line + 1), "it is not YAML: " + error.msg,
-                     "correct the syntax");
-  }
-}
-
 Settings readSettings(const YamlEntry& entry) {
   Settings settings;
   for (const auto& [name, value] : entry.getMap()) settings.emplace_back(name, value.getNumber());

@@ -1,6 +1,5 @@
 #pragma once
 // What files that name robots and motions have in common.
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -9,9 +8,6 @@
 #include "model/yaml_entry.h"
 
 namespace bielle {
-
-// Lets `read` see the document. \throws ModelError where `text`, of the file `path`, is not YAML
-void readDocument(const std::string& path, const std::string& text, const std::function<void(const YamlEntry&)>& read);
 
 Settings readSettings(const YamlEntry& entry);
 

@@ -7,7 +7,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
@@ -48,16 +47,6 @@ void AsideFile::write(const std::string& text) {
 void AsideFile::commit() {
   if (aside_ != path_ && std::rename(aside_.c_str(), path_.c_str()) != 0) failToWrite(path_, std::strerror(errno));
   aside_.clear();
-}
-
-std::string readTextFile(const std::string& path, const std::string& remedy) {
-  std::error_code unknown;
-  std::ifstream file(path, std::ios::binary);
-  if (file.is_open() && !std::filesystem::is_directory(path, unknown)) try {
-      return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-    } catch (const std::ios_base::failure&) {  // so the iterators tell that reading fails
-    }
-  throw ModelError(path, "file", "it cannot be read", remedy);
 }
 
 void writeTextFile(const std::string& path, const std::string& text) {

@@ -1,7 +1,7 @@
 #include "io/json_text.h"
 
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
+#include "model/text_file.h"
 
 namespace bielle {
 

@@ -1,9 +1,9 @@
 // Trajectories as comma-separated values.
 #include <charconv>
 
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 #include "io/record_tables.h"
+#include "model/text_file.h"
 
 namespace bielle {
 namespace {

@@ -2,9 +2,9 @@
 #include <limits>
 
 #include "bielle/io/result.h"
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 #include "io/json_text.h"
+#include "model/text_file.h"
 
 namespace bielle {
 namespace {

@@ -2,12 +2,11 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <set>
 
 #include "bielle/model/error.h"
-#include "robot_files.h"
+#include "model/robot_files.h"
+#include "model/text_file.h"
 
 namespace fs = std::filesystem;
 
@@ -69,16 +68,11 @@ bool completesModel(const fs::path& path) {
 
 }  // namespace
 
-std::string readText(const std::string& path) {
+std::string readRobotText(const std::string& path) {
   std::error_code unknown;
   if (const auto size = fs::file_size(path, unknown); !unknown && size > kLargestFile)
     throw ModelError(path, "file", "it is larger than a robot may be (256 MB)", "give a URDF or YAML file");
-  std::ifstream file(path, std::ios::binary);
-  if (file.is_open() && !isDirectory(path)) try {
-      return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-    } catch (const std::ios_base::failure&) {  // so the iterators tell that reading fails
-    }
-  throw ModelError(path, "file", "it cannot be read", "check the path and its permissions");
+  return readTextFile(path);
 }
 
 std::vector<std::string> getRobotDirectories() {

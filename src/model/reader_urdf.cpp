@@ -295,7 +295,7 @@ UrdfJoint makeJoint(const urdf::Joint& joint, JointKind kind, const std::string&
 }  // namespace
 
 UrdfFile readUrdf(const std::string& path) {
-  const std::string xml = readText(path);
+  const std::string xml = readRobotText(path);
   Tree tree = makeTree(xml, path);
   urdf::ModelInterfaceSharedPtr model;
   std::string complaints;

@@ -204,12 +204,7 @@ void readRoot(const Entry& root, YamlFile& file) {
 YamlFile readYaml(const std::string& path) {
   YamlFile file;
   file.path = path;
-  try {
-    readRoot(Entry(path, "", YAML::Load(readText(path))), file);
-  } catch (const YAML::Exception& e) {
-    throw ModelError(path, "line " + std::to_string(e.mark.line + 1), "it is not well-formed YAML: " + e.msg,
-                     "correct the syntax");
-  }
+  readYamlDocument(path, readRobotText(path), [&](const Entry& root) { readRoot(root, file); });
   return file;
 }
 

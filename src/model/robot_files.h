@@ -77,8 +77,8 @@ struct YamlFile {
 /// \throws ModelError for unknown keys, wrong types, lists that do not match
 YamlFile readYaml(const std::string& path);
 
-/// File whole. \throws ModelError when it cannot be read
-std::string readText(const std::string& path);
+/// File whole. \throws ModelError when it cannot be read, or is too large
+std::string readRobotText(const std::string& path);
 
 /// The URDF of the robot that a file with the key `model` completes; empty when none of them is there.
 std::string findModel(const YamlFile& yaml);

@@ -1,116 +1,59 @@
 #pragma once
-// A YAML file, place by place: every refusal names the file, the key and the line.
-#include <yaml-cpp/yaml.h>
-
-#include <algorithm>
-#include <cmath>
+// A YAML file, place by place: every refusal names the file, the key and the line. yaml-cpp stays in yaml_entry.cpp.
+#include <functional>
 #include <map>
-#include <set>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bielle/math/types.h"
-#include "bielle/model/error.h"
+
+namespace YAML {
+class Node;
+}
 
 namespace bielle {
 
 // A place in the file: its value and its name for messages.
 class YamlEntry {
  public:
-  YamlEntry(std::string path, std::string element, YAML::Node node)
-      : path_(std::move(path)), element_(std::move(element)), node_(std::move(node)) {}
+  YamlEntry(std::string path, std::string element, const YAML::Node& node);
 
-  [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const {
-    const int line = node_.IsDefined() ? node_.Mark().line : -1;
-    throw ModelError(
-        path_,
-        (element_.empty() ? "document" : element_) + (line >= 0 ? " (line " + std::to_string(line + 1) + ")" : ""),
-        problem, remedy);
-  }
+  /// \throws ModelError, naming file, element and line
+  [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const;
   const std::string& element() const { return element_; }
-  bool isMap() const { return node_.IsMap(); }
-  bool isList() const { return node_.IsSequence(); }
+  bool isMap() const;
+  bool isList() const;
+  bool isWord(const std::string& word) const;
 
-  bool isWord(const std::string& word) const { return node_.IsScalar() && node_.Scalar() == word; }
-
-  std::string getText() const {
-    if (!node_.IsScalar() || node_.Scalar().empty()) fail("it is not a name", "give one word");
-    return node_.Scalar();
-  }
-  double getNumber(bool may_be_infinite = false) const {
-    double value = 0;
-    if (!node_.IsScalar() || !YAML::convert<double>::decode(node_, value))
-      fail("it is not a number", "give one number");
-    if (std::isnan(value) || (std::isinf(value) && !may_be_infinite)) fail("it is not finite", "give a finite number");
-    return value;
-  }
+  // What is asked for, or fail().
+  std::string getText() const;
+  double getNumber(bool may_be_infinite = false) const;
   /// Elements of a list; `count` < 0: of any length.
-  std::vector<YamlEntry> getList(int count = -1) const {
-    if (!isList()) fail("it is not a list", "write it as [a, b, ...]");
-    if (count >= 0 && static_cast<int>(node_.size()) != count)
-      fail("it has " + std::to_string(node_.size()) + " element(s)", "give " + std::to_string(count));
-    std::vector<YamlEntry> entries;
-    for (const YAML::Node& item : node_)
-      entries.emplace_back(path_, element_ + "[" + std::to_string(entries.size()) + "]", item);
-    return entries;
-  }
-  std::vector<std::string> getTexts(int count = -1) const {
-    std::vector<std::string> out;
-    for (const YamlEntry& entry : getList(count)) out.push_back(entry.getText());
-    return out;
-  }
-  std::vector<double> getNumbers(int count = -1) const {
-    std::vector<double> out;
-    for (const YamlEntry& entry : getList(count)) out.push_back(entry.getNumber());
-    return out;
-  }
-  Vector3d getVector3() const { return Eigen::Map<const Vector3d>(getNumbers(3).data()); }
+  std::vector<YamlEntry> getList(int count = -1) const;
+  std::vector<std::string> getTexts(int count = -1) const;
+  std::vector<double> getNumbers(int count = -1) const;
+  Vector3d getVector3() const;
   /// Pairs of a map in the order of the file; nothing written counts as an empty map.
-  std::vector<std::pair<std::string, YamlEntry>> getMap() const {
-    std::vector<std::pair<std::string, YamlEntry>> pairs;
-    if (node_.IsNull()) return pairs;
-    if (!isMap()) fail("it is not a map", "write it as {name: value, ...}");
-    std::set<std::string> seen;
-    for (const auto& pair : node_) {
-      if (!pair.first.IsScalar()) fail("one of its keys is not a name", "use plain words as keys");
-      const std::string key = pair.first.Scalar();
-      if (!seen.insert(key).second) fail("key '" + key + "' is given twice", "keep one");
-      pairs.emplace_back(
-          key,
-          YamlEntry(path_, element_.empty() ? "key '" + key + "'" : element_ + ": key '" + key + "'", pair.second));
-    }
-    return pairs;
-  }
+  std::vector<std::pair<std::string, YamlEntry>> getMap() const;
   /// The map by key, all keys among the known ones.
-  std::map<std::string, YamlEntry> getFields(const std::vector<std::string>& known) const {
-    std::map<std::string, YamlEntry> fields;
-    for (const auto& [key, entry] : getMap()) {
-      if (std::find(known.begin(), known.end(), key) == known.end()) {
-        std::string names;
-        for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
-        entry.fail("it is unknown", "known keys are " + names);
-      }
-      fields.emplace(key, entry);
-    }
-    return fields;
-  }
+  std::map<std::string, YamlEntry> getFields(const std::vector<std::string>& known) const;
 
  private:
   std::string path_, element_;
-  YAML::Node node_;
+  std::shared_ptr<const YAML::Node> node_;
 };
 
 using YamlFields = std::map<std::string, YamlEntry>;
 
-inline const YamlEntry* find(const YamlFields& fields, const std::string& key) {
-  const auto it = fields.find(key);
-  return it == fields.end() ? nullptr : &it->second;
-}
+/// Null where the key is not written.
+const YamlEntry* find(const YamlFields& fields, const std::string& key);
+/// \throws ModelError naming the owner, where the key is not written
+const YamlEntry& require(const YamlFields& fields, const std::string& key, const YamlEntry& owner);
 
-inline const YamlEntry& require(const YamlFields& fields, const std::string& key, const YamlEntry& owner) {
-  const YamlEntry* entry = find(fields, key);
-  if (!entry) owner.fail("it has no '" + key + "'", "add it");
-  return *entry;
-}
+/// Lets `read` see the document. \throws ModelError where `text`, of the file `path`, is not YAML
+void readYamlDocument(const std::string& path, const std::string& text,
+                      const std::function<void(const YamlEntry&)>& read);
 
 }  // namespace bielle

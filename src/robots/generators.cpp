@@ -3,10 +3,10 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
-#include "bielle/model/fourbar_chain.h"
 #include "bielle/robots/cleobot.h"
 #include "bielle/robots/delta.h"
 #include "bielle/robots/fivebar_leg.h"
+#include "bielle/robots/fourbar_chain.h"
 #include "bielle/robots/rsu_biped.h"
 #include "bielle/robots/spring_leg.h"
 
@@ -22,7 +22,7 @@ std::function<GeneratorRequest()> makeRequests(Model (*make)(const Parameters&))
   };
 }
 
-// The chain of model/fourbar_chain.h, its rods drawn.
+// The chain of robots/fourbar_chain.h, its rods drawn.
 struct FourBarChainParameters {
   FourBarChainParameters() { options.radius = 0.01; }
   FourBarChainOptions options;

@@ -5,9 +5,9 @@
 
 #include "bielle/design/draft.h"
 #include "bielle/io/robot_writer.h"
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 #include "design/spec_parts.h"
+#include "model/text_file.h"
 
 namespace bielle::study {
 namespace {
@@ -105,7 +105,7 @@ ArchitectureSpec readArchitectureSpec(const std::string& path) {
   ArchitectureSpec spec;
   spec.path = path;
   spec.text = readTextFile(path, "give the path of a comparison");
-  readDocument(path, spec.text, [&](const Entry& root) { readRoot(root, spec); });
+  readYamlDocument(path, spec.text, [&](const Entry& root) { readRoot(root, spec); });
   return spec;
 }
 

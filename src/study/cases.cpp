@@ -18,6 +18,7 @@
 #include "bielle/model/error.h"
 #include "io/aside_file.h"
 #include "io/json_text.h"
+#include "model/text_file.h"
 #include "study/child.h"
 
 namespace fs = std::filesystem;

@@ -1,4 +1,4 @@
-#include "io/receding_horizon.h"
+#include "bench/receding_horizon.h"
 
 #include <algorithm>
 #include <chrono>

@@ -1,6 +1,6 @@
 #pragma once
 // The receding horizon of `bielle bench`.
-#include "bielle/io/bench.h"
+#include "bench/bench.h"
 #include "bielle/motion/benchmark_walk.h"
 
 namespace bielle {

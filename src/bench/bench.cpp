@@ -1,16 +1,16 @@
-#include "bielle/io/bench.h"
+#include "bench/bench.h"
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <fstream>
 
+#include "bench/receding_horizon.h"
 #include "bielle/dynamics/assembly.h"
 #include "bielle/io/result.h"
-#include "bielle/model/fourbar_chain.h"
 #include "bielle/motion/benchmark_walk.h"
 #include "bielle/motion/squat.h"
-#include "io/receding_horizon.h"
+#include "bielle/robots/fourbar_chain.h"
 
 namespace bielle {
 namespace {

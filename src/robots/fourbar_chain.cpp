@@ -1,4 +1,4 @@
-#include "bielle/model/fourbar_chain.h"
+#include "bielle/robots/fourbar_chain.h"
 
 #include <cmath>
 

@@ -1,0 +1,149 @@
+"""test_includes.py SOURCE: includes run one way, and what is not ours stays behind the files that are named here."""
+import os
+import re
+import sys
+
+# What a room may include, besides itself and whatever these may include.
+ROOMS = {
+    "math": [],
+    "model": ["math"],
+    "robots": ["model"],
+    "dynamics": ["model"],
+    "ocp": ["dynamics"],
+    "solve": ["ocp"],
+    "motion": ["solve"],
+    "transmission": ["motion"],
+    "io": ["transmission"],
+    "report": ["io"],
+    "design": ["io", "robots"],
+    "study": ["design"],
+    "bench": ["io", "robots"],
+    "cli": ["report", "study", "bench"],
+    "validation": ["io"],
+}
+# A header by how its name begins, and who may include it: files, or folders.
+OTHERS = {
+    "yaml-cpp/": ["src/model/yaml_entry.cpp"],
+    "urdf_": ["src/model/reader_urdf.cpp"],
+    "tinyxml": ["src/model/reader_urdf.cpp"],
+    "zip.h": ["src/io/npz.cpp"],
+    "nlopt": ["src/transmission/slsqp.cpp", "src/design/nlopt_search.h"],
+    "CLI/": ["src/cli/", "validation/"],
+    "nlohmann/": ["src/", "validation/", "tests/"],
+    "Simbody": ["validation/"],
+    "SimTK": ["validation/"],
+    "simbody/": ["validation/"],
+}
+PUBLIC = "include/bielle/"
+OUTSIDE = ("examples/", "tests/consumer/")  # they see what users see
+GENERATED = ("assets.inc",)
+FOLDERS = ("include/", "src/", "validation/", "tests/", "examples/", "benchmarks/")
+
+
+def collect(room):
+    """The rooms that a room may include."""
+    rooms = {room}
+    for below in ROOMS[room]:
+        rooms |= collect(below)
+    return rooms
+
+
+def find_room(path):
+    """The room of a file; None for those that may see all rooms."""
+    for folder in (PUBLIC, "src/"):
+        if path.startswith(folder):
+            rest = path[len(folder):]
+            return rest.split("/")[0] if "/" in rest else None
+    return "validation" if path.startswith("validation/") else None
+
+
+def resolve(path, name, files):
+    """The file of this project that `path` includes by `name`, if it is one."""
+    for folder in ("include/", "src/", os.path.dirname(path) + "/", "validation/", "tests/"):
+        target = os.path.normpath(folder + name)
+        if target in files:
+            return target
+    return None
+
+
+def check_include(path, name, quoted, files):
+    """What is wrong with an include; None when nothing is."""
+    target = resolve(path, name, files)
+    if target is None:
+        if quoted and name not in GENERATED:
+            return "there is no such file"
+        for start, places in OTHERS.items():
+            if name.startswith(start) and not any(path.startswith(place) for place in places):
+                return "only " + ", ".join(places) + " may include it"
+        return None
+    if target.startswith(PUBLIC):
+        pass
+    elif path.startswith(PUBLIC):
+        return "a public header includes one that is not installed"
+    elif path.startswith(OUTSIDE) and target.startswith("src/"):
+        return "users see public headers only"
+    room, other = find_room(path), find_room(target)
+    if room is not None and room not in ROOMS:
+        return f"'{room}' is no room: add it to ROOMS"
+    if room and other and other not in collect(room):
+        return f"{room} may include {', '.join(sorted(collect(room)))}"
+    return None
+
+
+def check_file(path, text, files):
+    problems = []
+    for number, line in enumerate(text.splitlines(), 1):
+        match = re.match(r'\s*#\s*include\s*(["<])([^">]+)[">]', line)
+        problem = match and check_include(path, match[2], match[1] == '"', files)
+        if problem:
+            problems.append(f"{path}:{number}: {line.strip()}: {problem}")
+    if path.startswith("src/") and path.endswith("CMakeLists.txt") and "simbody" in text.lower():
+        problems.append(f"{path}: only validation links Simbody")
+    return problems
+
+
+def check_planted():
+    """Every kind of violation is noticed."""
+    files = {"include/bielle/math/so3.h", "include/bielle/model/model.h", "include/bielle/io/result.h",
+             "src/io/plot.h", "src/model/yaml_entry.h", "validation/check.h"}
+    for path, text, is_wrong in [
+            ("src/model/model.cpp", '#include "bielle/math/so3.h"', False),
+            ("src/math/so3.cpp", '#include "bielle/model/model.h"', True),
+            ("include/bielle/math/so3.h", '#include "bielle/io/result.h"', True),
+            ("src/report/page.cpp", '#include "io/plot.h"', False),
+            ("src/motion/walk.cpp", '#include "io/plot.h"', True),
+            ("src/model/reader.cpp", '#include "yaml_entry.h"', False),
+            ("include/bielle/report/report.h", '#include "io/plot.h"', True),
+            ("examples/01_fourbar.cpp", '#include "bielle/io/result.h"', False),
+            ("examples/01_fourbar.cpp", '#include "io/plot.h"', True),
+            ("src/model/reader.cpp", "#include <yaml-cpp/yaml.h>", True),
+            ("src/model/yaml_entry.cpp", "#include <yaml-cpp/yaml.h>", False),
+            ("src/io/result.cpp", "#include <SimTKsimbody.h>", True),
+            ("tests/test_io.cpp", "#include <SimTKsimbody.h>", True),
+            ("validation/check.cpp", "#include <SimTKsimbody.h>", False),
+            ("src/io/result.cpp", '#include "validation/check.h"', True),
+            ("src/io/result.cpp", '#include "check.h"', True),
+            ("src/hall/result.cpp", '#include "io/plot.h"', True),
+            ("src/io/CMakeLists.txt", "find_package(Simbody)", True)]:
+        assert bool(check_file(path, text, files)) == is_wrong, (path, text)
+
+
+def main(source):
+    check_planted()
+    files = set()
+    for folder in FOLDERS:
+        for place, _, names in os.walk(os.path.join(source, folder)):
+            files |= {os.path.relpath(os.path.join(place, name), source) for name in names}
+    count, problems = 0, []
+    for path in sorted(files):
+        if path.endswith((".h", ".cpp", "CMakeLists.txt")):
+            with open(os.path.join(source, path), encoding="utf-8") as file:
+                problems += check_file(path, file.read(), files)
+            count += 1
+    assert count > 200, f"only {count} files in {source}"
+    print("\n".join(problems) or f"{count} files, all includes in order")
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))
