@@ -53,6 +53,8 @@ struct CheckBounds {
   double feet_distance = 0;       ///< m, between soles seen from above
 
   double pressure = 0;         ///< m, of the centre of pressure beyond the sole
+  double wrench_cone = 0;      ///< m, least margin of the whole wrench of a sole (wrench_cone.h)
+  double point_moment = 1e-9;  ///< N m, on a contact that is a point
   double force_in_air = 1e-9;  ///< N or N m
   double range = 1e-6;         ///< m or rad beyond a limit
   /// Of the energy exchanged in the busiest interval. Euler steps lose or gain in the order of h: a squat 1e-2, a take-off

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "check_rows.h"
+#include "wrench_cone.h"
 
 namespace bielle::validation {
 namespace {
@@ -12,20 +13,27 @@ namespace {
 constexpr double kLeastLoad = 0.01;
 
 struct ContactForces {
-  Worst normal{CheckRow::Kind::AtLeast}, friction, pressure, torsion{CheckRow::Kind::Note}, in_air;
+  Worst normal{CheckRow::Kind::AtLeast}, friction, pressure, torsion{CheckRow::Kind::Note},
+      cone{CheckRow::Kind::AtLeast}, point, in_air;
 };
 
-void addWrench(const ContactFrame& contact, const Vector6d& wrench, double least_load, int node, ContactForces& out) {
+void addWrench(const ContactFrame& contact, const Vector6d& wrench, const CheckContext& context, double least_load,
+               int node, ContactForces& out) {
   const Vector3d f = wrench.head<3>(), n = wrench.tail<3>();
   const double load = std::max(f.z(), least_load);
   out.normal.add(f.z(), node, contact.name);
   out.friction.add(f.head<2>().norm() / load, node, contact.name);
-  if (contact.kind != ContactKind::Surface6D) return;
+  if (contact.kind == ContactKind::Point3D) {
+    out.point.add(n.cwiseAbs().maxCoeff(), node, contact.name);
+    return;
+  }
+  const ConeMargin cone = calcConeMargin(wrench, contact.half_length, contact.half_width,
+                                         context.motion.summary.ground.friction, least_load);
+  out.cone.add(cone.value, node, contact.name + ", " + cone.limit);
   // The centre of pressure is (-n_y, n_x) / f_z; the vertical moment about it is what the sole must hold by twisting.
   const double x = -n.y() / load, y = n.x() / load;
   out.torsion.add(std::abs(n.z() - (x * f.y() - y * f.x())) / load, node, contact.name);
-  if (contact.half_length > 0 && contact.half_width > 0)
-    out.pressure.add(std::max(std::abs(x) - contact.half_length, std::abs(y) - contact.half_width), node, contact.name);
+  out.pressure.add(std::max(std::abs(x) - contact.half_length, std::abs(y) - contact.half_width), node, contact.name);
 }
 
 // Largest |value| / limit of the motors that have a limit, with both in the note.
@@ -54,7 +62,7 @@ void addForceRows(CheckContext& context) {
       const ContactFrame& contact = model.contacts()[c];
       const Vector6d wrench = context.motion.record.contact_wrenches.block<1, 6>(k, 6 * c).transpose();
       if (context.motion.stands(c, k))
-        addWrench(contact, wrench, least_load, k, forces);
+        addWrench(contact, wrench, context, least_load, k, forces);
       else
         forces.in_air.add(wrench.cwiseAbs().maxCoeff(), k, contact.name);
     }
@@ -63,7 +71,9 @@ void addForceRows(CheckContext& context) {
   context.add(forces.normal, "contact: least normal force", "N", 0, nothing);
   context.add(forces.friction, "contact: tangential over normal", "1", context.motion.summary.ground.friction, nothing);
   context.add(forces.pressure, "contact: pressure beyond the sole", "m", context.bounds.pressure, "no sole stands");
+  context.add(forces.cone, "contact: wrench cone of the sole", "m", context.bounds.wrench_cone, "no sole stands");
   context.add(forces.torsion, "contact: twisting over normal", "m", 0, "no sole stands");
+  context.add(forces.point, "contact: moment on a point", "N m", context.bounds.point_moment, "no point stands");
   context.add(forces.in_air, "contact: force in the air", "N, N m", context.bounds.force_in_air, "no foot swings");
 }
 

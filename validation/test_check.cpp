@@ -233,12 +233,19 @@ TEST_CASE("check: each poisoned number makes its rows fail and no other") {
           "loops: gap, angle", "loops: opening velocity"},
          [&](CheckedMotion& m) { m.record.q(node, knee) += 1e-4; });
   expect({"time between nodes"}, [&](CheckedMotion& m) { m.record.time[node] += 1e-6; });
-  expect({"contact: tangential over normal"}, [&](CheckedMotion& m) { m.summary.ground.friction = 1e-4; });
+  expect({"contact: tangential over normal", "contact: wrench cone of the sole"},
+         [&](CheckedMotion& m) { m.summary.ground.friction = 1e-4; });
   expect({"standing feet: off the ground"}, [&](CheckedMotion& m) { m.summary.ground.height = 3e-3; });
-  expect({"contact: least normal force", "contact: pressure beyond the sole", "equations of motion"},
+  expect({"contact: least normal force", "contact: pressure beyond the sole", "contact: wrench cone of the sole",
+          "equations of motion"},
          [&](CheckedMotion& m) { m.record.contact_wrenches(node, foot + 2) = -0.1; });
-  expect({"contact: pressure beyond the sole", "equations of motion"},
+  expect({"contact: pressure beyond the sole", "contact: wrench cone of the sole", "equations of motion"},
          [&](CheckedMotion& m) { m.record.contact_wrenches(node, foot + 4) = 10; });
+  // Of all that a sole bears, the torque about its normal alone: 0.07 m of the load at most, less what pulls sideways.
+  const double load = good.record.contact_wrenches(node, foot + 2);
+  expect({"contact: wrench cone of the sole", "equations of motion"},
+         [&](CheckedMotion& m) { m.record.contact_wrenches(node, foot + 5) = 0.071 * load; });
+  expect({"equations of motion"}, [&](CheckedMotion& m) { m.record.contact_wrenches(node, foot + 5) = 0.06 * load; });
   expect({"numbers not finite"}, [&](CheckedMotion& m) { m.record.v(node, 3) = std::nan(""); });
 }
 
