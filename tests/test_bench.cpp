@@ -1,8 +1,10 @@
 // The report of `bielle bench` is whole. Nothing here depends on how fast anything is.
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <stdexcept>
 
-#include "bench/bench.h"
+#include "bench/receding_horizon.h"
+#include "bench/window.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 
@@ -10,6 +12,15 @@ using namespace bielle;
 
 namespace {
 Model loadOwn(const std::string& name) { return loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/" + name).model; }
+
+BenchmarkWalkOptions makeShortWalk() {
+  BenchmarkWalkOptions walk;
+  walk.start_nodes = 4;
+  walk.swing_nodes = 6;
+  walk.cycles = 1;
+  walk.total_nodes = 24;
+  return walk;
+}
 }  // namespace
 
 TEST_CASE("bench: every work is measured, in both formulations") {
@@ -38,9 +49,10 @@ TEST_CASE("bench: every work is measured, in both formulations") {
   for (const SolveTime& t : report.solves) CHECK((t.seconds > 0 && t.iterations > 0));
   REQUIRE(report.receding.size() == 4);
   for (const RecedingHorizon& t : report.receding) {
-    CHECK(t.shifts == 5);
+    CHECK(t.shifts == 20);  // the walk is begun anew on the way
     CHECK(t.up);
-    CHECK((t.seconds > 0 && t.seconds <= t.worst));
+    CHECK((t.median > 0 && t.median <= t.percentile_99 && t.percentile_99 <= t.worst));
+    CHECK((t.preempted >= 0 && t.preempted <= 1));
   }
   REQUIRE(report.chains.size() == 6);
   REQUIRE(report.horizons.size() == 4);
@@ -49,4 +61,53 @@ TEST_CASE("bench: every work is measured, in both formulations") {
 TEST_CASE("bench: a robot that cannot walk is refused") {
   CHECK_THROWS_AS(runBench(loadOwn("fourbar"), {}), ModelError);
   CHECK_THROWS_WITH(runBench(loadOwn("fourbar"), {}), Catch::Contains("foot_left"));
+}
+
+TEST_CASE("bench: a window has the bounds of the stages that it shows") {
+  const Model model = loadOwn("bipetto");
+  const auto makeLimits = [&](int stage) -> VectorXd {
+    return VectorXd::LinSpaced(model.nu(), 10 + stage, 20 + stage);
+  };
+  std::vector<StageSpec> stages(25);
+  for (size_t k = 0; k < stages.size(); ++k) {
+    stages[k].constraints = makeConstraintSet(model);
+    stages[k].effort_limits = makeLimits(static_cast<int>(k));
+  }
+  const VectorXd x0 = makeBenchmarkWalk(model, makeShortWalk()).problem->initialState();
+  RobotProblem whole(model, x0.head(model.nq()), x0.tail(model.nv()), std::move(stages));
+  Window window(whole, 12);
+  window.move(5, whole.initialState());
+  for (int k = 0; k < window.numStages(); ++k) {
+    REQUIRE(window.controlSize(k) == model.nu());
+    VectorXd lower(model.nu()), upper(model.nu());
+    window.getControlBounds(k, lower, upper);
+    CHECK(lower == -makeLimits(5 + k));
+    CHECK(upper == makeLimits(5 + k));
+  }
+}
+
+TEST_CASE("bench: a window over all of a problem is that problem") {
+  const Model model = loadOwn("bipetto");
+  for (const Formulation formulation : {Formulation::Full, Formulation::Reduced}) {
+    FddpOptions options;
+    options.max_iterations = 3;
+    Motion motion = makeBenchmarkWalk(model, makeShortWalk(), formulation);
+    ShootingTrajectory whole = motion.guess, seen = motion.guess;
+    const FddpSummary expected = Fddp(options).solve(*motion.problem, whole);
+    Window window(*motion.problem, motion.problem->numStages());
+    const FddpSummary summary = Fddp(options).solve(window, seen);
+    CHECK(summary.cost == expected.cost);
+    CHECK((seen.xs == whole.xs && seen.us == whole.us));
+  }
+}
+
+TEST_CASE("bench: a horizon that cannot recede is refused") {
+  const Model model = loadOwn("bipetto");
+  RecedingOptions options;
+  options.walk = makeShortWalk();
+  options.nodes = 24;
+  CHECK_THROWS_AS(runRecedingHorizon(model, Formulation::Reduced, options), std::invalid_argument);
+  options.nodes = 12;
+  options.shifts = 0;
+  CHECK_THROWS_WITH(runRecedingHorizon(model, Formulation::Reduced, options), Catch::Contains("0 shifts of 12 nodes"));
 }

@@ -261,12 +261,16 @@ class Bench {
     measureSolve("benchmark walk", formulation, [&] { return makeBenchmarkWalk(model_, getWalk(), formulation); });
   }
 
-  RecedingOptions getReceding(int threads) const {
+  RecedingOptions getReceding(Formulation formulation, int threads) const {
     RecedingOptions options;
     options.threads = threads;
     options.walk = getWalk();
-    if (whole_) return options;
-    options.shifts = 5;
+    if (whole_) {
+      const bool full = formulation == Formulation::Full;
+      options.shifts = full ? std::max(1, options_.shifts / 30) : options_.shifts;
+      return options;
+    }
+    options.shifts = 20;
     options.nodes = 12;
     options.first_iterations = 5;
     return options;
@@ -274,7 +278,7 @@ class Bench {
   void measureReceding(Formulation formulation) {
     tell("receding horizon", formulation);
     for (int threads : getThreads())
-      report_.receding.push_back(runRecedingHorizon(model_, formulation, getReceding(threads)));
+      report_.receding.push_back(runRecedingHorizon(model_, formulation, getReceding(formulation, threads)));
   }
 
   void measureChains(Formulation formulation) {

@@ -1,10 +1,14 @@
 #include "bench/receding_horizon.h"
 
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <random>
+#include <stdexcept>
 
+#include "bench/window.h"
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 
@@ -12,85 +16,6 @@ namespace bielle {
 namespace {
 
 constexpr double kPositionNoise = 1e-4, kVelocityNoise = 1e-3;  // rad or m, rad/s or m/s
-
-// Stages [first, first + nodes) of a longer problem from a state of its own, with the terminal costs of that problem.
-class Window : public ShootingProblem {
- public:
-  Window(RobotProblem& whole, int nodes) : whole_(whole), nodes_(nodes), x0_(whole.initialState()) {}
-  void move(int first, const VectorXd& x0) {
-    first_ = first;
-    x0_ = x0;
-  }
-
-  int numStages() const override { return nodes_; }
-  int stateSize() const override { return whole_.stateSize(); }
-  int tangentSize(int node) const override { return whole_.tangentSize(getNode(node)); }
-  int controlSize(int stage) const override { return whole_.controlSize(first_ + stage); }
-  const VectorXd& initialState() const override { return x0_; }
-  void integrate(int node, ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) const override {
-    whole_.integrate(getNode(node), x, dx, x_out);
-  }
-  void integrateNodes(const std::vector<IntegrateTask>& tasks) const override {
-    static thread_local std::vector<IntegrateTask> whole_tasks;
-    whole_tasks = tasks;
-    for (IntegrateTask& task : whole_tasks) task.node = getNode(task.node);
-    whole_.integrateNodes(whole_tasks);
-  }
-  void difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override {
-    whole_.difference(getNode(node), x0, x1, dx);
-  }
-  StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override {
-    return whole_.step(first_ + stage, x, u, x_next, cost);
-  }
-  StepStatus continueStep(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override {
-    return whole_.continueStep(first_ + stage, x, u, x_next, cost);
-  }
-  StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override { return whole_.calcTerminalCost(x, cost); }
-  StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
-                       StageModel& out) override {
-    return whole_.linearize(first_ + stage, x, u, x_next_node, out);
-  }
-  void stepStages(std::vector<StepTask>& tasks) override {
-    for (StepTask& task : tasks) task.stage += first_;
-    whole_.stepStages(tasks);
-    for (StepTask& task : tasks) task.stage -= first_;
-  }
-  // The whole problem counts nodes from its own first one: what it works on is lent to the places where it looks.
-  void linearizeStages(int begin, int end, const std::vector<VectorXd>& xs, const std::vector<VectorXd>& us,
-                       std::vector<StageModel>& models, std::vector<StepStatus>& statuses) override {
-    static thread_local ShootingTrajectory trajectory;
-    static thread_local std::vector<StageModel> whole_models;
-    static thread_local std::vector<StepStatus> whole_statuses;
-    const size_t size = whole_.numStages() + 1;
-    if (whole_models.size() != size) {
-      trajectory.xs.resize(size);
-      trajectory.us.resize(size);
-      whole_models.resize(size);
-      whole_statuses.resize(size);
-    }
-    for (int k = begin; k < end; ++k) {
-      trajectory.xs[first_ + k] = xs[k];
-      trajectory.us[first_ + k] = us[k];
-      std::swap(whole_models[first_ + k], models[k]);
-    }
-    trajectory.xs[first_ + end] = xs[end];
-    whole_.linearizeStages(first_ + begin, first_ + end, trajectory.xs, trajectory.us, whole_models, whole_statuses);
-    for (int k = begin; k < end; ++k) {
-      std::swap(whole_models[first_ + k], models[k]);
-      statuses[k] = whole_statuses[first_ + k];
-    }
-  }
-  int getBatchSize() const override { return whole_.getBatchSize(); }
-  StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override { return whole_.linearizeTerminal(x, out); }
-  std::string getFailure(int node) const override { return whole_.getFailure(getNode(node)); }
-
- private:
-  int getNode(int node) const { return node < nodes_ ? first_ + node : whole_.numStages(); }
-  RobotProblem& whole_;
-  const int nodes_;
-  int first_ = 0;
-  VectorXd x0_;
-};
 
 class Disturbance {
  public:
@@ -135,54 +60,115 @@ Torso findTorso(const Model& model, Workspace& ws, const VectorXd& x) {
   return {ws.X_WB[1].p.z(), ws.X_WB[1].R.row(2).transpose()};
 }
 
+// How often the system has taken a processor away from this program.
+long countPreemptions() {
+  rusage usage;
+  getrusage(RUSAGE_SELF, &usage);
+  return usage.ru_nivcsw;
+}
+
+class Receding {
+ public:
+  Receding(const Model& model, Formulation formulation, const RecedingOptions& options)
+      : model_(model),
+        options_(options),
+        motion_(makeBenchmarkWalk(model, options.walk, formulation)),
+        whole_(*motion_.problem),
+        window_(whole_, options.nodes),
+        ws_(model),
+        disturbance_(model) {
+    if (options.shifts < 1 || options.nodes >= whole_.numStages())
+      throw std::invalid_argument("receding horizon: " + std::to_string(options.shifts) + " shifts of " +
+                                  std::to_string(options.nodes) + " nodes in a walk of " +
+                                  std::to_string(whole_.numStages()) + " stages");
+    out_.formulation = formulation;
+    out_.threads = options.threads;
+    out_.least_height = 1;
+    out_.up = true;
+  }
+
+  RecedingHorizon run() {
+    const ShootingTrajectory plan = makePlan();
+    FddpOptions single;
+    single.threads = options_.threads;
+    single.max_iterations = 1;
+    single.last_rollout = LastRollout::Segments;
+    Fddp solver(single);
+    ShootingTrajectory trajectory = plan;
+    solver.solve(window_, trajectory);  // sizes the memory
+    while (out_.up && static_cast<int>(times_.size()) < options_.shifts) walk(plan, solver);
+    summarize();
+    return out_;
+  }
+
+ private:
+  // The plan before the first shift, without haste.
+  ShootingTrajectory makePlan() {
+    const int nodes = options_.nodes;
+    ShootingTrajectory plan{{motion_.guess.xs.begin(), motion_.guess.xs.begin() + nodes + 1},
+                            {motion_.guess.us.begin(), motion_.guess.us.begin() + nodes}};
+    FddpOptions options;
+    options.threads = options_.threads;
+    options.max_iterations = options_.first_iterations;
+    Fddp(options).solve(window_, plan);
+    return plan;
+  }
+
+  // Once from the start of the walk until the horizon has come to its end, or enough shifts are made.
+  void walk(ShootingTrajectory trajectory, Fddp& solver) {
+    VectorXd x = whole_.initialState(), next = x;
+    const Torso start = findTorso(model_, ws_, x);
+    const int last = whole_.numStages() - options_.nodes;
+    for (int k = 0; k < last && out_.up && static_cast<int>(times_.size()) < options_.shifts; ++k) {
+      window_.move(k, x);
+      const bool solved = solve(k, solver, trajectory);
+      double cost = 0;
+      out_.up = solved && whole_.step(k, x, trajectory.us[0], next, cost) == StepStatus::Ok;
+      if (!out_.up) break;
+      x = disturbance_.apply(whole_.spec(k + 1).constraints, next);
+      const Torso torso = findTorso(model_, ws_, x);
+      out_.least_height = std::min(out_.least_height, torso.height / start.height);
+      out_.largest_tilt = std::max(out_.largest_tilt, std::acos(std::min(1.0, torso.up.dot(start.up))));
+      out_.up = out_.least_height > 0.8 && out_.largest_tilt < 0.5;
+    }
+  }
+
+  bool solve(int k, Fddp& solver, ShootingTrajectory& trajectory) {
+    const long preemptions = countPreemptions();
+    const auto begin = std::chrono::steady_clock::now();
+    if (k > 0) shift(whole_, k + options_.nodes - 1, trajectory);
+    const FddpSummary summary = solver.solve(window_, trajectory);
+    times_.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    if (countPreemptions() > preemptions) ++preempted_;
+    return summary.termination != FddpTermination::Failed;
+  }
+
+  void summarize() {
+    const size_t count = times_.size();
+    std::sort(times_.begin(), times_.end());
+    out_.shifts = static_cast<int>(count);
+    out_.median = times_[count / 2];
+    out_.percentile_99 = times_[std::min(count - 1, (99 * count + 99) / 100 - 1)];
+    out_.worst = times_.back();
+    out_.preempted = preempted_ / static_cast<double>(count);
+  }
+
+  const Model& model_;
+  const RecedingOptions& options_;
+  Motion motion_;
+  RobotProblem& whole_;
+  Window window_;
+  Workspace ws_;
+  Disturbance disturbance_;
+  std::vector<double> times_;  // s
+  int preempted_ = 0;
+  RecedingHorizon out_;
+};
+
 }  // namespace
 
-RecedingHorizon runRecedingHorizon(const Model& model, Formulation formulation, const RecedingOptions& receding) {
-  const int nodes = receding.nodes;
-  Motion motion = makeBenchmarkWalk(model, receding.walk, formulation);
-  RobotProblem& whole = *motion.problem;
-  Window window(whole, nodes);
-  ShootingTrajectory trajectory{{motion.guess.xs.begin(), motion.guess.xs.begin() + nodes + 1},
-                                {motion.guess.us.begin(), motion.guess.us.begin() + nodes}};
-  FddpOptions options;
-  options.threads = receding.threads;
-  options.max_iterations = receding.first_iterations;
-  Fddp(options).solve(window, trajectory);  // the plan before the first shift, without haste
-  options.max_iterations = 1;
-  options.last_rollout = LastRollout::Segments;
-  Fddp solver(options);
-
-  RecedingHorizon out;
-  out.formulation = formulation;
-  out.threads = receding.threads;
-  out.least_height = 1;
-  out.up = true;
-  Workspace ws(model);
-  Disturbance disturbance(model);
-  VectorXd x = whole.initialState(), next = x;
-  const Torso start = findTorso(model, ws, x);
-  std::vector<double> times;
-  for (int k = 0; k < std::min(receding.shifts, whole.numStages() - nodes) && out.up; ++k) {
-    window.move(k, x);
-    const auto begin = std::chrono::steady_clock::now();
-    if (k > 0) shift(whole, k + nodes - 1, trajectory);
-    const FddpSummary summary = solver.solve(window, trajectory);
-    times.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-    double cost = 0;
-    out.up = summary.termination != FddpTermination::Failed &&
-             whole.step(k, x, trajectory.us[0], next, cost) == StepStatus::Ok;
-    if (!out.up) break;
-    x = disturbance.apply(whole.spec(k + 1).constraints, next);
-    const Torso torso = findTorso(model, ws, x);
-    out.least_height = std::min(out.least_height, torso.height / start.height);
-    out.largest_tilt = std::max(out.largest_tilt, std::acos(std::min(1.0, torso.up.dot(start.up))));
-    out.up = out.least_height > 0.8 && out.largest_tilt < 0.5;
-  }
-  out.shifts = static_cast<int>(times.size());
-  std::sort(times.begin(), times.end());
-  out.seconds = times[times.size() / 2];
-  out.worst = times.back();
-  return out;
+RecedingHorizon runRecedingHorizon(const Model& model, Formulation formulation, const RecedingOptions& options) {
+  return Receding(model, formulation, options).run();
 }
 
 }  // namespace bielle
