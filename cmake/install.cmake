@@ -1,5 +1,5 @@
-# The installation: headers, one library per layer, robots, the command, and the package `find_package(bielle)` finds.
-# Two components: `command` is what runs, `development` what others build with.
+# The installation: headers, libraries, robots, the command, and the package `find_package(bielle)` finds.
+# Three components: `command` is what runs, `library` the shared library, `development` what others build with.
 include(CMakePackageConfigHelpers)
 
 get_property(layers GLOBAL PROPERTY BIELLE_LAYERS)
@@ -10,9 +10,13 @@ target_link_libraries(bielle_all INTERFACE ${layers})
 
 install(DIRECTORY robots/ DESTINATION ${CMAKE_INSTALL_DATADIR}/bielle/robots COMPONENT command)
 install(FILES LICENSE README.md CHANGELOG.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT command)
-install(TARGETS bielle_command RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
+set(programs bielle_command)
 if(BIELLE_BUILD_VALIDATION)
-  install(TARGETS bielle-validate bielle-check RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
+  list(APPEND programs bielle-validate bielle-check)
+endif()
+install(TARGETS ${programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
+if(BUILD_SHARED_LIBS)
+  set_target_properties(${programs} PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
 endif()
 install(FILES completions/bielle.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME bielle
   COMPONENT command)
@@ -20,8 +24,16 @@ install(FILES completions/_bielle DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-
 include(cmake/man.cmake)
 
 install(DIRECTORY include/bielle DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
-install(TARGETS ${layers} bielle_all EXPORT bielleTargets
+install(TARGETS bielle_headers ${layers} bielle_all EXPORT bielleTargets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
+if(BUILD_SHARED_LIBS)
+  install(TARGETS bielle_library EXPORT bielleTargets
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development)
+  foreach(level IN LISTS BIELLE_LEVELS)
+    install(TARGETS bielle_library_${level}
+      LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/glibc-hwcaps/${level} COMPONENT library NAMELINK_SKIP)
+  endforeach()
+endif()
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/bielle)
 install(EXPORT bielleTargets NAMESPACE bielle:: DESTINATION ${package} COMPONENT development)
 configure_package_config_file(cmake/bielleConfig.cmake.in ${PROJECT_BINARY_DIR}/bielleConfig.cmake

@@ -1,4 +1,5 @@
-# Debian packages by `cpack -G DEB` (scripts/package.sh): `bielle`, the command with its robots, and `libbielle-dev`.
+# Debian packages by `cpack -G DEB` (scripts/package.sh): `bielle`, the command with its robots, `libbielle0.1`, the shared
+# library that it runs on, and `libbielle-dev`.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME bielle)
 set(CPACK_PACKAGE_CONTACT "the Bielle authors <bielle@localhost>")
@@ -6,10 +7,13 @@ set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
 set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
-set(CPACK_COMPONENTS_ALL command development)
+set(CPACK_COMPONENTS_ALL command library development)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/lib)
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+set(CPACK_DEBIAN_ENABLE_COMPONENT_DEPENDS ON)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 
 set(CPACK_DEBIAN_COMMAND_PACKAGE_NAME bielle)
@@ -18,14 +22,21 @@ set(CPACK_COMPONENT_COMMAND_DESCRIPTION
  optimal control and checks them. Robots, manual pages and completion included.")
 set(CPACK_DEBIAN_COMMAND_PACKAGE_SUGGESTS "gnuplot-nox, chromium, ffmpeg, bash-completion")
 
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libbielle${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+set(CPACK_COMPONENT_LIBRARY_DESCRIPTION
+  "The shared library, compiled for several levels of the processor; the dynamic linker loads the best.")
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)
+set(CPACK_COMPONENT_COMMAND_DEPENDS library)
+
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libbielle-dev)
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
-  "The library: headers and static libraries, with what find_package(bielle) and pkg-config look for.")
+  "The library: headers, with what find_package(bielle) and pkg-config look for.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4), liburdfdom-dev, liburdfdom-headers-dev, \
-libconsole-bridge-dev, libtinyxml-dev, libyaml-cpp-dev, libzip-dev, libnlopt-dev, libnlopt-cxx-dev")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4)")
+set(CPACK_COMPONENT_DEVELOPMENT_DEPENDS library)
 
 # A package must run on every machine of its architecture.
 set(CPACK_PROJECT_CONFIG_FILE ${PROJECT_SOURCE_DIR}/cmake/refuse_native.cmake)
 set(CPACK_BIELLE_NATIVE ${BIELLE_NATIVE})
+set(CPACK_BIELLE_SHARED ${BUILD_SHARED_LIBS})
 include(CPack)

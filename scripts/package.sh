@@ -1,5 +1,5 @@
 #!/bin/bash
-# Makes the Debian packages `bielle` and `libbielle-dev` in build-package. Installs what is missing (Debian 12).
+# Makes the Debian packages `bielle`, `libbielle0.1` and `libbielle-dev` in build-package. Installs what is missing (Debian 12).
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 

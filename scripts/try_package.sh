@@ -17,7 +17,7 @@ cp /etc/resolv.conf "$bare/etc"
 
 inside() { chroot "$bare" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive "$@"; }
 inside apt-get update -qq
-inside sh -ec 'apt-get install -qq -y --no-install-recommends /tmp/bielle_*.deb'
+inside sh -ec 'apt-get install -qq -y --no-install-recommends /tmp/bielle_*.deb /tmp/libbielle0.1_*.deb'
 inside sh -ec '
   cd /tmp
   bielle --version
@@ -25,6 +25,7 @@ inside sh -ec '
   bielle info fourbar
   bielle solve squat --robot bipetto --depth 0.7 --quiet -o squat
   bielle check --brief squat
+  bielle bench --quick
   bielle validate fourbar
   test -s squat/report.html
   test -e /usr/share/bash-completion/completions/bielle'

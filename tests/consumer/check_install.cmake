@@ -43,6 +43,7 @@ get_filename_component(pc ${pc} DIRECTORY)
 set(ENV{PKG_CONFIG_PATH} ${pc})
 run(${PKG_CONFIG} --cflags --libs bielle)
 separate_arguments(flags UNIX_COMMAND "${output}")
+set(ENV{LD_LIBRARY_PATH} ${WORK}/prefix/${LIBDIR})  # where the library is a shared one
 run(${CXX} -O1 ${WORK}/readme.cpp -o ${WORK}/readme ${flags})
 run(${PKG_CONFIG} --variable=robotsdir bielle)
 string(STRIP "${output}" robots)

@@ -1,0 +1,90 @@
+# How the layers of src become libraries.
+#
+# BIELLE_NATIVE=ON: one static library per layer, tuned to this machine. The linker holds the one-way includes.
+# BIELLE_NATIVE=OFF: one shared library of all layers. On x86-64 it is compiled once for every machine, and once more for
+# each of BIELLE_LEVELS, the levels of the x86-64 psABI (v3 has AVX2 and FMA, v4 has AVX-512):
+#   lib/libbielle.so.0.1
+#   lib/glibc-hwcaps/x86-64-v3/libbielle.so.0.1
+#   lib/glibc-hwcaps/x86-64-v4/libbielle.so.0.1
+# The dynamic linker of glibc 2.33 or later loads the best of them that the processor can run; an older one loads the
+# first. Programs are compiled for every machine. Three things make the libraries interchangeable:
+# - Alignment, which Eigen chooses by instruction set, is fixed for the library and for its users (bielle_headers).
+# - The library exports namespace bielle alone (layers.map). Eigen's kernels, whose packets differ from level to level,
+#   thus never replace those of the program or of another library.
+# - A function that the program and the library both define, such as a template of namespace bielle, is called by each in
+#   its own copy (-Bsymbolic-functions).
+# Whether Lanes travel in registers or in memory depends on the level: no function that the library exports to programs may
+# take or return them by value.
+if(BIELLE_NATIVE)
+  option(BUILD_SHARED_LIBS "One shared library instead of a static one per layer" OFF)
+else()
+  option(BUILD_SHARED_LIBS "One shared library instead of a static one per layer" ON)
+  if(CMAKE_SYSTEM_NAME STREQUAL Linux AND CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|amd64)$")
+    set(BIELLE_LEVELS x86-64-v3 x86-64-v4 CACHE STRING "Levels of x86-64 that the shared library is also compiled for")
+  endif()
+endif()
+
+# What users of the library must share with it.
+add_library(bielle_headers INTERFACE)
+set_target_properties(bielle_headers PROPERTIES EXPORT_NAME headers)
+target_include_directories(bielle_headers INTERFACE
+  $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+target_link_libraries(bielle_headers INTERFACE Eigen3::Eigen)
+target_compile_features(bielle_headers INTERFACE cxx_std_17)
+# Nodes run in parallel, matrix products do not: Eigen's own threads allocate and would make results depend on their number.
+target_compile_definitions(bielle_headers INTERFACE EIGEN_DONT_PARALLELIZE)
+if(BIELLE_NATIVE)
+  # Eigen's alignment depends on it, and its functions, which the linker takes once, do as well.
+  target_compile_options(bielle_headers INTERFACE -march=native)
+endif()
+if(BUILD_SHARED_LIBS)
+  target_compile_definitions(bielle_headers INTERFACE EIGEN_MAX_ALIGN_BYTES=64 EIGEN_MAX_STATIC_ALIGN_BYTES=64)
+endif()
+
+# bielle_shared_library(TARGET FOLDER): the shared library, without layers so far.
+function(bielle_shared_library target folder)
+  set(map ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/layers.map)
+  add_library(${target} SHARED)
+  set_target_properties(${target} PROPERTIES OUTPUT_NAME bielle EXPORT_NAME library LINKER_LANGUAGE CXX
+    SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
+    LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib/${folder} LINK_DEPENDS ${map})
+  target_link_options(${target} PRIVATE -Wl,-Bsymbolic-functions -Wl,--version-script=${map})
+  target_link_libraries(${target} PUBLIC bielle_headers)
+endfunction()
+
+if(BUILD_SHARED_LIBS)
+  bielle_shared_library(bielle_library .)
+  foreach(level IN LISTS BIELLE_LEVELS)
+    bielle_shared_library(bielle_library_${level} glibc-hwcaps/${level})
+    add_dependencies(bielle_library bielle_library_${level})
+  endforeach()
+endif()
+
+# bielle_layer(NAME SOURCES... INCLUDE DIRECTORIES... PUBLIC LIBRARIES... PRIVATE LIBRARIES...): the target bielle_NAME.
+function(bielle_layer name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;INCLUDE;PUBLIC;PRIVATE" ${ARGN})
+  set_property(GLOBAL APPEND PROPERTY BIELLE_LAYERS bielle_${name})
+  if(BUILD_SHARED_LIBS)
+    add_library(bielle_${name} INTERFACE)
+    target_link_libraries(bielle_${name} INTERFACE bielle_library)
+    list(FILTER ARG_PUBLIC EXCLUDE REGEX "^bielle_")  # all in the same library
+    foreach(level IN ITEMS "" LISTS BIELLE_LEVELS)
+      string(JOIN _ suffix "" ${level})
+      set(objects bielle_${name}_objects${suffix})
+      add_library(${objects} OBJECT ${ARG_SOURCES})
+      target_include_directories(${objects} PRIVATE ${PROJECT_SOURCE_DIR}/src ${ARG_INCLUDE})
+      target_link_libraries(${objects} PRIVATE bielle_headers ${ARG_PUBLIC} ${ARG_PRIVATE} bielle_warnings)
+      if(level)
+        target_compile_options(${objects} PRIVATE -march=${level} -mtune=generic)
+      endif()
+      target_link_libraries(bielle_library${suffix} PRIVATE ${objects})
+    endforeach()
+  else()
+    add_library(bielle_${name} STATIC ${ARG_SOURCES})
+    target_include_directories(bielle_${name} PRIVATE ${PROJECT_SOURCE_DIR}/src ${ARG_INCLUDE})
+    target_link_libraries(bielle_${name}
+      PUBLIC bielle_headers ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:bielle_warnings>)
+  endif()
+  add_library(bielle::${name} ALIAS bielle_${name})
+  set_target_properties(bielle_${name} PROPERTIES EXPORT_NAME ${name})
+endfunction()
