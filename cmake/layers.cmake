@@ -67,7 +67,7 @@ function(bielle_layer name)
   if(BUILD_SHARED_LIBS)
     add_library(bielle_${name} INTERFACE)
     target_link_libraries(bielle_${name} INTERFACE bielle_library)
-    list(FILTER ARG_PUBLIC EXCLUDE REGEX "^bielle_")  # all in the same library
+    list(FILTER ARG_PUBLIC EXCLUDE REGEX "^bielle_")  # the layers below are in the same library
     foreach(level IN ITEMS "" LISTS BIELLE_LEVELS)
       string(JOIN _ suffix "" ${level})
       set(objects bielle_${name}_objects${suffix})

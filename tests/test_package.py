@@ -33,6 +33,8 @@ for command in commands:
     name = words[words.index("-o") + 1]
     levels[name] = [word for word in words if word.startswith("-m")]
     assert "-O3" in words and alignment <= set(words), command
+    with open(words[-1], encoding="utf-8") as file:
+        assert "-fopenmp" in words or "#pragma omp" not in file.read(), command
 for name, flags in levels.items():
     level = re.search(r"_objects_(x86-64-v[34])\.dir/", name)
     assert flags == ([f"-march={level[1]}", "-mtune=generic"] if level else []), (name, flags)
