@@ -14,7 +14,9 @@
 #include <cmath>
 #include <cstdio>
 
+#include "bielle/design/parametrization.h"
 #include "bielle/design/search.h"
+#include "bielle/dynamics/kept_motion.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/robots/fourbar_chain.h"
 

@@ -8,9 +8,10 @@
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/robots/fourbar_chain.h"
-#include "bielle/transmission/ratio_sweep.h"
+#include "bielle/transmission/ratio.h"
 #include "check_derivative.h"
 #include "robot_directory.h"
+#include "transmission/linkage.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -22,14 +23,8 @@ constexpr double kA = 0.15, kB = 0.35, kC = 0.30, kD = 0.40;  // robots/fourbar/
 
 struct Robot {
   explicit Robot(const std::string& name, const std::vector<std::string>& joints)
-      : model(loadRobot(name).model),
-        q(findClosedConfiguration(model).q),
-        linkage(makeLinkage(model, makeReduction(model, q), joints)) {}
-  VectorXd getWhole(const RatioSample& sample) const {
-    VectorXd whole = q;
-    scatterConfiguration(model, linkage.cluster, sample.q, whole);
-    return whole;
-  }
+      : model(loadRobot(name).model), q(findClosedConfiguration(model).q), linkage(makeLinkage(model, q, joints)) {}
+  VectorXd getWhole(const RatioSample& sample) const { return carryLinkage(model, linkage, sample, q); }
   Model model;
   VectorXd q;
   Linkage linkage;
@@ -59,7 +54,7 @@ VectorXd closeAt(const Model& model, const VectorXd& q, const std::string& joint
 }
 
 void checkRatioDerivatives(const Robot& robot, const RatioSample& sample) {
-  const ReducedCluster& cluster = robot.linkage.cluster;
+  const ReducedCluster& cluster = *robot.linkage.cluster;
   const int m = robot.linkage.size();
   ClusterPoint center(cluster), moved(cluster);
   LinkageRatio ratio, side;
@@ -123,7 +118,7 @@ TEST_CASE("four-bar driven by its rocker: the dead points are the motor's") {
   FourBarChainOptions options;
   options.motor = FourBarMotor::Rocker;
   const FourBarChain chain = makeFourBarChain(options);
-  const Linkage linkage = makeLinkage(chain.model, makeReduction(chain.model, chain.q_closed), {"crank1"});
+  const Linkage linkage = makeLinkage(chain.model, chain.q_closed, {"crank1"});
   const RatioSweep sweep = sweepRatio(chain.model, linkage, chain.q_closed);
   CHECK(sweep.full_turn);
   const std::vector<RatioSample> dead = sweep.getDeadPoints();
@@ -238,7 +233,7 @@ TEST_CASE("a sweep ends at joint limits, and where loops lose rank") {
   parallelogram.ground = parallelogram.coupler = 0.4;
   parallelogram.crank = parallelogram.rocker = 0.2;
   const FourBarChain chain = makeFourBarChain(parallelogram);
-  const Linkage linkage = makeLinkage(chain.model, makeReduction(chain.model, chain.q_closed), {"rocker1"});
+  const Linkage linkage = makeLinkage(chain.model, chain.q_closed, {"rocker1"});
   const RatioSweep folded = sweepRatio(chain.model, linkage, chain.q_closed);
   CHECK_FALSE(folded.full_turn);
   CHECK_THAT(folded.begin + folded.end, Catch::Contains("'loop1'"));

@@ -8,7 +8,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/model/reader.h"
-#include "bielle/transmission/ratio_sweep.h"
+#include "bielle/transmission/ratio.h"
 #include "run_command.h"
 
 namespace fs = std::filesystem;
@@ -61,7 +61,7 @@ class OutputDirectory {
 TEST_CASE("ratio prints a table, and the same numbers as JSON, CSV and a figure") {
   const Model model = loadRobot("bipetto").model;
   const VectorXd q = findClosedConfiguration(model).q;
-  const RatioSweep sweep = sweepRatio(model, makeLinkage(model, makeReduction(model, q), {"knee_right"}), q);
+  const RatioSweep sweep = sweepRatio(model, makeLinkage(model, q, {"knee_right"}), q);
   const OutputDirectory directory;
   const CommandResult result = run({"ratio", "bipetto", "--joint", "knee_right", "-o", directory.str(), "--json"});
   INFO(result.err);

@@ -35,12 +35,12 @@ VectorXd findStart(const LoadedRobot& robot, const std::string& reference) {
   return result.q;
 }
 
-double calcLargestBalanceError(const Model& model, const RatioReport& report, VectorXd q) {
+double calcLargestBalanceError(const Model& model, const RatioReport& report, const VectorXd& q) {
   double largest = 0;
   for (const RatioSample& sample : report.sweep.samples) {
     if (sample.dead == DeadPointKind::Joint || sample.loses_rank) continue;
-    if (!report.linkage.isDirect()) scatterConfiguration(model, report.linkage.cluster, sample.q, q);
-    largest = std::max(largest, calcBalanceError(model, report.linkage, q, sample.ratio.R));
+    const VectorXd whole = carryLinkage(model, report.linkage, sample, q);
+    largest = std::max(largest, calcBalanceError(model, report.linkage, whole, sample.ratio.R));
   }
   return largest;
 }
@@ -51,7 +51,7 @@ int run(const RatioArguments& arguments) {
   RatioReport report;
   report.robot = arguments.robot.name;
   const VectorXd q = findStart(robot, arguments.reference);
-  report.linkage = makeLinkage(model, makeReduction(model, q), arguments.joints);
+  report.linkage = makeLinkage(model, q, arguments.joints);
   report.sweep = sweepRatio(model, report.linkage, q, 0, arguments.sweep);
   if (report.linkage.size() == 2) report.map = mapRatio(model, report.linkage, q, arguments.grid, arguments.sweep);
   report.balance_error = calcLargestBalanceError(model, report, q);

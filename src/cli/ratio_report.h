@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "bielle/transmission/ratio_sweep.h"
+#include "bielle/transmission/ratio.h"
 #include "io/json_text.h"
 
 namespace bielle::cli {

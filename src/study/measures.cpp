@@ -9,8 +9,8 @@
 #include "bielle/io/names.h"
 #include "bielle/model/error.h"
 #include "bielle/transmission/lift.h"
-#include "bielle/transmission/linkage.h"
 #include "io/json_text.h"
+#include "transmission/linkage.h"
 
 namespace fs = std::filesystem;
 
@@ -124,10 +124,10 @@ Performance readPerformance(const Study& study, const CaseOutcome& outcome, size
 ComparedRobot loadComparedRobot(const std::string& name) {
   ComparedRobot compared{loadRobot(name), {}, {}, {}};
   const Model& model = compared.robot.model;
-  const Reduction reduction = makeReduction(model, findClosedConfiguration(model).q);
+  const VectorXd q = findClosedConfiguration(model).q;
   const auto findMotors = [&](const std::vector<std::string>& joints, std::vector<std::string>& motors) {
     for (const std::string& joint : joints) {
-      const Linkage linkage = makeLinkage(model, reduction, {joint});
+      const Linkage linkage = makeLinkage(model, q, {joint});
       motors.insert(motors.end(), linkage.motor_names.begin(), linkage.motor_names.end());
     }
   };

@@ -1,4 +1,4 @@
-#include "bielle/transmission/linkage.h"
+#include "transmission/linkage.h"
 
 #include <Eigen/SVD>
 #include <algorithm>
@@ -45,9 +45,9 @@ bool contains(const std::vector<int>& list, int value) {
 
 // Places of the joint with index i of the whole model within the cluster.
 void addPlaces(const Linkage& linkage, int i, std::vector<int>& dofs, std::vector<int>& positions) {
-  const std::vector<int>& joints = linkage.cluster.joints;
+  const std::vector<int>& joints = linkage.cluster->joints;
   const int at = static_cast<int>(std::find(joints.begin(), joints.end(), i) - joints.begin());
-  const Joint& joint = linkage.cluster.model.joints()[at + 1];  // the first one is the world
+  const Joint& joint = linkage.cluster->model.joints()[at + 1];  // the first one is the world
   dofs.push_back(joint.idx_v);
   positions.push_back(joint.idx_q);
 }
@@ -60,15 +60,17 @@ Linkage makeDirectLinkage(const Model& model, int joint) {
                      "nothing drives it: it is in no loop and has no motor", "name a joint that a motor moves");
   linkage.joints = {joint};
   linkage.motors = {motor};
+  linkage.cluster = std::make_shared<ReducedCluster>();
   return linkage;
 }
 
 Linkage makeLoopLinkage(const Model& model, const ReducedCluster& cluster, std::vector<int> joints) {
   Linkage linkage;
-  linkage.cluster = cluster;
-  linkage.cluster.metric.setOnes();  // geometry alone: what is light must not move far per step
-  linkage.cluster.inverse_metric.setOnes();
-  linkage.cluster.inverse_root.setOnes();
+  const auto unweighted = std::make_shared<ReducedCluster>(cluster);
+  unweighted->metric.setOnes();  // geometry alone: what is light must not move far per step
+  unweighted->inverse_metric.setOnes();
+  unweighted->inverse_root.setOnes();
+  linkage.cluster = unweighted;
   const std::string element = "joint '" + model.joints()[joints.front()].name + "'";
   for (int i : model.serialJoints())
     if (static_cast<int>(joints.size()) < cluster.size && contains(cluster.joints, i) && !contains(joints, i) &&
@@ -104,7 +106,7 @@ MatrixXd selectRowsOf(const MatrixXd& N, const std::vector<int>& dofs) {
 
 // a of Eq. (2) at the velocity v = T w of the cluster (n).
 VectorXd calcDriftAcceleration(const Linkage& linkage, ClusterPoint& point, const MatrixXd& T, const VectorXd& v) {
-  const ReducedCluster& cluster = linkage.cluster;
+  const ReducedCluster& cluster = *linkage.cluster;
   Workspace& ws = point.workspace();
   updateVelocities(cluster.model, ws, v);
   updateAccelerations(cluster.model, ws, VectorXd::Zero(cluster.model.nv()));
@@ -144,6 +146,18 @@ Linkage makeLinkage(const Model& model, const Reduction& reduction, const std::v
   for (int m : linkage.motors) linkage.motor_names.push_back(model.motors()[m].name);
   return linkage;
 }
+
+Linkage makeLinkage(const Model& model, ConstVectorRef q, const std::vector<std::string>& joints) {
+  return makeLinkage(model, makeReduction(model, q), joints);
+}
+
+VectorXd carryLinkage(const Model& model, const Linkage& linkage, const RatioSample& sample, ConstVectorRef q) {
+  VectorXd whole = q;
+  if (!linkage.isDirect()) scatterConfiguration(model, *linkage.cluster, sample.q, whole);
+  return whole;
+}
+
+bool Linkage::isDirect() const { return cluster->joints.empty(); }
 
 bool calcLinkageTangent(const Linkage& linkage, const ClusterPoint& point, MatrixXd& T, double* margin) {
   const MatrixXd& N = point.basis().N;

@@ -18,7 +18,7 @@ constexpr double kHeldRank = 1e-6;        // singular values of the rates of hel
 }  // namespace
 
 LinkageCurve::LinkageCurve(const Linkage& linkage, int joint, ConstVectorRef q_cluster)
-    : linkage_(linkage), joint_(joint), q_start_(q_cluster), from_(linkage.cluster), point_(linkage.cluster) {
+    : linkage_(linkage), joint_(joint), q_start_(q_cluster), from_(*linkage.cluster), point_(*linkage.cluster) {
   for (int j = 0; j < linkage.size(); ++j)
     if (j != joint) held_.push_back(j);
   held_angles_.resize(held_.size());
@@ -59,17 +59,17 @@ bool LinkageCurve::finishPoint(const VectorXd& direction, CurvePoint& point) {
 }
 
 bool LinkageCurve::start(CurvePoint& point) {
-  if (!point_.update(linkage_.cluster, q_start_)) {
-    why_ = point_.describeFailure(linkage_.cluster);
+  if (!point_.update(*linkage_.cluster, q_start_)) {
+    why_ = point_.describeFailure(*linkage_.cluster);
     return false;
   }
   point.s = 0;
-  const VectorXd towards = VectorXd::Unit(linkage_.cluster.model.nv(), linkage_.joint_dofs[joint_]);
+  const VectorXd towards = VectorXd::Unit(linkage_.cluster->model.nv(), linkage_.joint_dofs[joint_]);
   return finishPoint(point_.basis().N * (point_.basis().N.transpose() * towards), point);
 }
 
 bool LinkageCurve::advance(const CurvePoint& from, double h, CurvePoint& to) {
-  const ReducedCluster& cluster = linkage_.cluster;
+  const ReducedCluster& cluster = *linkage_.cluster;
   if (!from_.update(cluster, from.q)) {
     why_ = from_.describeFailure(cluster);
     return false;
@@ -137,10 +137,10 @@ double LinkageCurve::findRoot(const CurvePoint& from, double h, double tolerance
 }
 
 MatrixXd LinkageCurve::calcJacobian(const VectorXd& q) {
-  const ConstraintSet& set = linkage_.cluster.closures;
-  MatrixXd J = MatrixXd::Zero(set.rows, linkage_.cluster.model.nv());
-  Workspace ws(linkage_.cluster.model);
-  updatePositions(linkage_.cluster.model, ws, q);
+  const ConstraintSet& set = linkage_.cluster->closures;
+  MatrixXd J = MatrixXd::Zero(set.rows, linkage_.cluster->model.nv());
+  Workspace ws(linkage_.cluster->model);
+  updatePositions(linkage_.cluster->model, ws, q);
   for (size_t c = 0; c < set.closures.size(); ++c)
     calcClosureJacobian(ws, set.closures[c], J.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
   return J;
@@ -148,12 +148,12 @@ MatrixXd LinkageCurve::calcJacobian(const VectorXd& q) {
 
 bool LinkageCurve::hasRank(const VectorXd& q) {
   const VectorXd sigma = Eigen::JacobiSVD<MatrixXd>(calcJacobian(q)).singularValues();
-  return sigma[linkage_.cluster.rank - 1] > kLostRank * sigma[0];
+  return sigma[linkage_.cluster->rank - 1] > kLostRank * sigma[0];
 }
 
 // The determinant of J on the independent rows of the start, completed by the tangent space there, changes its sign.
 bool LinkageCurve::findRankLoss(const CurvePoint& from, const CurvePoint& to, double& h) {
-  if (!from_.update(linkage_.cluster, from.q)) return false;
+  if (!from_.update(*linkage_.cluster, from.q)) return false;
   const std::vector<int> rows = from_.basis().rows;
   MatrixXd completed(rows.size() + linkage_.size(), from_.basis().N.rows());
   completed.bottomRows(linkage_.size()) = from_.basis().N.transpose();
@@ -166,7 +166,7 @@ bool LinkageCurve::findRankLoss(const CurvePoint& from, const CurvePoint& to, do
   const double root = findRoot(from, h, kRankPlace, calcDeterminant);
   CurvePoint at;
   if (advance(from, root, at) && hasRank(at.q)) return false;  // other rows have kept the rank
-  why_ = "closure '" + linkage_.cluster.closures.closures.front().name +
+  why_ = "closure '" + linkage_.cluster->closures.closures.front().name +
          "': its loops lose rank, they can go on in several ways";
   h = root;
   return true;
@@ -185,7 +185,7 @@ RatioSample LinkageCurve::makeSample(const CurvePoint& point, DeadPointKind dead
     sample.motors[i] = point.q[linkage_.motor_positions[i]];
   }
   sample.loses_rank = !hasRank(point.q);
-  const bool there = from_.update(linkage_.cluster, point.q) && calcLinkageRatio(linkage_, from_, sample.ratio);
+  const bool there = from_.update(*linkage_.cluster, point.q) && calcLinkageRatio(linkage_, from_, sample.ratio);
   if (dead == DeadPointKind::Joint || !there) {
     const double infinite = std::numeric_limits<double>::infinity();
     sample.ratio.R.setConstant(m, m, infinite);

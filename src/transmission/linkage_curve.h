@@ -1,9 +1,9 @@
 #pragma once
-// The curve of ratio_sweep.h, step by step.
+// The curve of ratio.h, step by step.
 #include <functional>
 #include <string>
 
-#include "bielle/transmission/ratio_sweep.h"
+#include "transmission/linkage.h"
 
 namespace bielle {
 
@@ -11,7 +11,7 @@ struct CurvePoint {
   VectorXd q;        // of the cluster, closed
   VectorXd tangent;  // n, of unit length in the metric of the cluster
   double s = 0;
-  double joint_rate = 0, motor_rate = 0;  // Eq. (2)
+  double joint_rate = 0, motor_rate = 0;  // Eq. (5)
 };
 
 class LinkageCurve {
@@ -33,7 +33,7 @@ class LinkageCurve {
 
   RatioSample makeSample(const CurvePoint& point, DeadPointKind dead = DeadPointKind::None);
   const std::string& why() const { return why_; }
-  const ReducedCluster& cluster() const { return linkage_.cluster; }
+  const ReducedCluster& cluster() const { return *linkage_.cluster; }
 
  private:
   bool finishPoint(const VectorXd& direction, CurvePoint& point);

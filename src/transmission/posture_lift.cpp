@@ -18,7 +18,7 @@ PostureLift::PostureLift(const Model& closed, const SerialModel& serial)
   const Reduction reduction = makeReduction(closed, q_);
   for (const SerialModel::Replacement& replacement : serial.replacements) {
     const Linkage linkage = makeLinkage(closed, reduction, replacement.joints);
-    Drive drive{linkage, ClusterPoint(linkage.cluster), ClusterPoint(linkage.cluster), {}, {}};
+    Drive drive{linkage, ClusterPoint(*linkage.cluster), ClusterPoint(*linkage.cluster), {}, {}};
     for (const std::string& name : linkage.joint_names) {
       const Joint& joint = serial_.joints()[serial_.findJoint(name)];
       drive.serial_positions.push_back(joint.idx_q);
@@ -35,16 +35,16 @@ LiftStatus PostureLift::setConfiguration(const VectorXd& q_s, double singular) {
     q_.segment(to.idx_q, to.nq) = q_s.segment(from.idx_q, from.nq);
   }
   for (Drive& drive : drives_) {
-    VectorXd target(drive.linkage.size()), q_cluster(drive.linkage.cluster.model.nq());
+    VectorXd target(drive.linkage.size()), q_cluster(drive.linkage.cluster->model.nq());
     for (int j = 0; j < target.size(); ++j) target[j] = q_s[drive.serial_positions[j]];
-    gatherConfiguration(closed_, drive.linkage.cluster, q_, q_cluster);
-    if (!drive.here.update(drive.linkage.cluster, q_cluster)) {
-      why_ = drive.here.describeFailure(drive.linkage.cluster);
+    gatherConfiguration(closed_, *drive.linkage.cluster, q_, q_cluster);
+    if (!drive.here.update(*drive.linkage.cluster, q_cluster)) {
+      why_ = drive.here.describeFailure(*drive.linkage.cluster);
       return LiftStatus::SingularLinkage;
     }
     const LiftStatus status = closeDrive(drive, target);
     if (status != LiftStatus::Lifted) return status;
-    scatterConfiguration(closed_, drive.linkage.cluster, drive.here.basis().q, q_);
+    scatterConfiguration(closed_, *drive.linkage.cluster, drive.here.basis().q, q_);
   }
   return checkMargin(singular);
 }
@@ -52,10 +52,10 @@ LiftStatus PostureLift::setConfiguration(const VectorXd& q_s, double singular) {
 LiftStatus PostureLift::setClosedConfiguration(const VectorXd& q, double singular) {
   q_ = q;
   for (Drive& drive : drives_) {
-    VectorXd q_cluster(drive.linkage.cluster.model.nq());
-    gatherConfiguration(closed_, drive.linkage.cluster, q_, q_cluster);
-    if (drive.here.update(drive.linkage.cluster, q_cluster)) continue;
-    why_ = drive.here.describeFailure(drive.linkage.cluster);
+    VectorXd q_cluster(drive.linkage.cluster->model.nq());
+    gatherConfiguration(closed_, *drive.linkage.cluster, q_, q_cluster);
+    if (drive.here.update(*drive.linkage.cluster, q_cluster)) continue;
+    why_ = drive.here.describeFailure(*drive.linkage.cluster);
     return LiftStatus::SingularLinkage;
   }
   return checkMargin(singular);
@@ -77,7 +77,7 @@ LiftStatus PostureLift::closeDrive(Drive& drive, const VectorXd& target) {
     d *= std::min(1.0, kLongestStep / d.cwiseAbs().maxCoeff());
     bool nearer = false;
     for (int halving = 0; halving < kMaxHalvings && !nearer; ++halving, d /= 2)
-      nearer = drive.next.close(linkage.cluster, drive.here.basis(), d, VectorXd()) &&
+      nearer = drive.next.close(*linkage.cluster, drive.here.basis(), d, VectorXd()) &&
                calcMiss(drive.next).norm() < miss.norm();
     if (!nearer) break;
     std::swap(drive.here, drive.next);
@@ -122,8 +122,8 @@ void PostureLift::liftMotion(const VectorXd& v_s, const VectorXd& a_s, VectorXd&
     VectorXd v_J(m), a_J(m), v_cluster, a_cluster;
     for (int j = 0; j < m; ++j) v_J[j] = v_s[drive.serial_dofs[j]], a_J[j] = a_s[drive.serial_dofs[j]];
     if (!calcLinkageMotion(drive.linkage, drive.here, v_J, a_J, v_cluster, a_cluster)) continue;  // seen by checkMargin
-    scatterVelocity(drive.linkage.cluster, v_cluster, v);
-    scatterVelocity(drive.linkage.cluster, a_cluster, a);
+    scatterVelocity(*drive.linkage.cluster, v_cluster, v);
+    scatterVelocity(*drive.linkage.cluster, a_cluster, a);
   }
 }
 
@@ -137,8 +137,8 @@ MatrixXd PostureLift::calcTangent() const {
   for (const Drive& drive : drives_) {
     if (!calcLinkageTangent(drive.linkage, drive.here, T)) continue;
     for (int j = 0; j < drive.linkage.size(); ++j)
-      for (size_t k = 0; k < drive.linkage.cluster.dofs.size(); ++k)
-        out(drive.linkage.cluster.dofs[k], drive.serial_dofs[j]) = T(k, j);
+      for (size_t k = 0; k < drive.linkage.cluster->dofs.size(); ++k)
+        out(drive.linkage.cluster->dofs[k], drive.serial_dofs[j]) = T(k, j);
   }
   return out;
 }

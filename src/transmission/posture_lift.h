@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "bielle/transmission/lift.h"
-#include "bielle/transmission/linkage.h"
+#include "transmission/linkage.h"
 
 namespace bielle {
 

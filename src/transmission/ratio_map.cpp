@@ -67,7 +67,7 @@ RatioMap mapRatio(const Model& model, const Linkage& linkage, ConstVectorRef q, 
   double low = INFINITY, high = -INFINITY;
   VectorXd whole = q;
   for (const RatioSample& sample : sampleAt(linkage, spine, map.first)) {
-    scatterConfiguration(model, linkage.cluster, sample.q, whole);
+    scatterConfiguration(model, *linkage.cluster, sample.q, whole);
     ribs.push_back(sweepRatio(model, linkage, whole, 1, options));
     append(ribs.back(), map.dead_points);
     const std::vector<RatioSample> rib = getMainBranch(ribs.back());

@@ -1,9 +1,8 @@
-#include "bielle/transmission/ratio_sweep.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "bielle/transmission/ratio.h"
 #include "transmission/linkage_curve.h"
 
 namespace bielle {
@@ -53,7 +52,7 @@ class Walk {
         linkage_(linkage),
         curve_(curve),
         options_(options),
-        limits_(listLimits(model, linkage.cluster)) {}
+        limits_(listLimits(model, *linkage.cluster)) {}
 
   std::vector<RatioSample> samples;  // without the start
   std::string end;
@@ -134,7 +133,7 @@ class Walk {
   // Whether the step from `at` to `next` passes the start, in the direction of the start.
   bool returns(const CurvePoint& start, const CurvePoint& at, const CurvePoint& next) {
     if (std::abs(at.s) < 2 * options_.step) return false;
-    const Model& cluster = linkage_.cluster.model;
+    const Model& cluster = linkage_.cluster->model;
     const VectorXd before = calcWrappedDifference(cluster, start.q, at.q);
     const VectorXd after = calcWrappedDifference(cluster, start.q, next.q);
     const VectorXd& t = start.tangent;
@@ -207,8 +206,8 @@ std::vector<RatioSample> RatioSweep::getDeadPoints() const {
 RatioSweep sweepRatio(const Model& model, const Linkage& linkage, ConstVectorRef q, int joint,
                       const SweepOptions& options) {
   if (linkage.isDirect()) return sweepDirect(model, linkage);
-  VectorXd q_cluster(linkage.cluster.model.nq());
-  gatherConfiguration(model, linkage.cluster, q, q_cluster);
+  VectorXd q_cluster(linkage.cluster->model.nq());
+  gatherConfiguration(model, *linkage.cluster, q, q_cluster);
   LinkageCurve curve(linkage, joint, q_cluster);
   CurvePoint start;
   if (!curve.start(start) || std::abs(start.joint_rate) < 1e-9)

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "bielle/model/builder.h"
-#include "bielle/transmission/linkage.h"
+#include "transmission/linkage.h"
 
 namespace bielle {
 namespace {
@@ -176,13 +176,13 @@ SerialModel makeSerialModel(const Model& closed, ConstVectorRef q, const SerialM
   for (const ReducedCluster& cluster : reduction.clusters)
     for (int i : cluster.joints) frozen[i] = !contains(closed.serialJoints(), i);
   for (const Linkage& linkage : linkages) {
-    ClusterPoint point(linkage.cluster);
-    VectorXd q_cluster(linkage.cluster.model.nq());
-    gatherConfiguration(closed, linkage.cluster, q, q_cluster);
+    ClusterPoint point(*linkage.cluster);
+    VectorXd q_cluster(linkage.cluster->model.nq());
+    gatherConfiguration(closed, *linkage.cluster, q, q_cluster);
     LinkageRatio ratio;
     MatrixXd T;
     double margin = 0;
-    if (!point.update(linkage.cluster, q_cluster) || !calcLinkageTangent(linkage, point, T, &margin) ||
+    if (!point.update(*linkage.cluster, q_cluster) || !calcLinkageTangent(linkage, point, T, &margin) ||
         margin < kSmallestMargin || !calcLinkageRatio(linkage, point, ratio))
       throw ModelError(closed.name(), "joints " + join(linkage.joint_names),
                        "their linkage is at a dead point at the reference, they do not determine it",

@@ -14,7 +14,7 @@
 ///
 /// The torques of a kept motion end where a linkage comes to a dead point of its joints, and torques fall right before
 /// it, so that searches run into this wall. With T_c the tangent of a loop cluster for unit speeds of its joints, w the
-/// right singular vector of its largest singular value and mu = 1 / |T_c w| its margin (linkage.h), a design is kept
+/// right singular vector of its largest singular value and mu = 1 / |T_c w| its margin (ratio.h), a design is kept
 /// from it by
 ///     mu(k)^2 >= least^2,    d mu^2 = -2 mu^4 (T_c w) . d(T_c w)                                                   (4)
 /// for the smallest mu in every stretch. The square falls linearly towards a dead point, where mu itself has a vertical
@@ -23,6 +23,7 @@
 
 #include "bielle/design/measures.h"
 #include "bielle/design/parametrization.h"
+#include "bielle/design/search.h"
 #include "bielle/dynamics/kept_motion.h"
 #include "bielle/transmission/lift.h"
 
@@ -30,12 +31,6 @@ namespace bielle {
 
 /// Whether calcMeasurePieces knows the measure.
 bool hasGradient(Measure measure);
-
-/// How the model changes with every variable at x. Placements, inertias and armatures are smooth functions of the
-/// numbers, polynomials of at most the third degree for lengths and shifts; they are differenced by the five-point rule
-/// over a thousandth of the bounds, which is exact for polynomials up to the fourth degree.
-/// \throws ModelError when a variable changes what is no placement, inertia or armature (an axis, a gain)
-std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x);
 
 /// Torques and speeds of the motors over the N stages of a kept motion, and their derivatives. A stage without duration
 /// has no torque.
@@ -52,11 +47,6 @@ struct MotorSlopes {
 MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dofs, const SerialTrajectory& trajectory,
                             const LiftResult& lifted, const std::vector<ModelVariation>& variations);
 
-/// A measure, the largest of `values`, and how they change.
-struct MeasurePieces {
-  VectorXd values;     ///< p
-  MatrixXd gradients;  ///< pieces x variables
-};
 /// Eqs. (1) to (3) over the motors named and all motions: always as many pieces for the same motions and motors.
 /// \param drives  by motor; empty: the default of all
 MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,

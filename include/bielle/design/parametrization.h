@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "bielle/model/model.h"
+#include "bielle/dynamics/variation.h"
 
 namespace bielle {
 
@@ -61,5 +61,11 @@ class Parametrization {
   Model model_;
   VectorXd start_, lower_, upper_;
 };
+
+/// How the model changes with every variable at x. Placements, inertias and armatures are smooth functions of the
+/// numbers, polynomials of at most the third degree for lengths and shifts; they are differenced by the five-point rule
+/// over a thousandth of the bounds, which is exact for polynomials up to the fourth degree.
+/// \throws ModelError when a variable changes what is no placement, inertia or armature (an axis, a gain)
+std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x);
 
 }  // namespace bielle

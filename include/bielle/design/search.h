@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "bielle/design/gradient.h"
+#include "bielle/math/types.h"
 
 namespace bielle {
 
@@ -26,6 +26,12 @@ struct SearchStage {
   SearchAlgorithm algorithm = SearchAlgorithm::Crs;
   int evaluations = 100;    ///< at most, but for the few that an algorithm makes in one go
   double tolerance = 1e-3;  ///< done when steps are below, as a share of the width of the bounds
+};
+
+/// Smooth pieces, of which the largest counts, and how they change.
+struct MeasurePieces {
+  VectorXd values;     ///< p
+  MatrixXd gradients;  ///< pieces x variables
 };
 
 struct SlopedValue {

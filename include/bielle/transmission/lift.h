@@ -6,7 +6,7 @@
 ///     min_u 1/2 |q_s^{k+1} - q_s*^{k+1}|^2 + 1/2 |v_s^{k+1} - v_s*^{k+1}|^2    s.t.  x_c^{k+1} = f_k(x_c^k, u)        (1)
 /// (LiftMethod::Nlopt; x_c^{k+1} is eliminated by a step of the closed dynamics, reduced formulation). With
 /// LiftMethod::Newton every node is lifted by itself: the loops are closed on the serial joints by Newton steps from the
-/// node before, v_c = T v_s and a_c follow from the linkages (linkage.h), and with lambda the foot forces
+/// node before, v_c = T v_s and a_c follow from the linkages (ratio.h), and with lambda the foot forces
 ///     T^T (M a_c + b) = T^T B u + T^T J_c^T lambda                                                                    (2)
 /// gives u, the loop forces being eliminated by T. Where feet share the load in several ways (double support), (2) leaves
 /// lambda open: it is the one nearest to the serial one. (1) starts from the same u and does not move along directions that

@@ -5,7 +5,7 @@
 /// bodies, with their masses and inertias, join the bodies that carry them. The closures go, the serial joints get motors
 /// of their own names. Base, joints outside loops with their motors, frames, contacts, visuals, gravity and the names of
 /// all these stay, so that results map by name. A linkage is frozen only if its serial joints determine it: as many
-/// coordinates as it has mobility, and not at a dead point of the joint (linkage.h).
+/// coordinates as it has mobility, and not at a dead point of the joint (ratio.h).
 /// With R the ratio of the linkage at the reference, the new motors get what its motors can give there:
 ///     effort <= sum_i |R_ij| effort_i,    velocity <= sum_i |R^{-1}_ji| velocity_i.                                 (1)
 #include <string>

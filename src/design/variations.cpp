@@ -1,0 +1,63 @@
+// How a parametrized robot changes with its numbers.
+#include "bielle/design/parametrization.h"
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kStep = 1e-3;  // of the width of the bounds
+
+// What a direction cannot carry.
+bool isSameButForPlaces(const Model& a, const Model& b) {
+  const auto same = [](const Vector3d& x, const Vector3d& y) { return (x - y).norm() < 1e-12; };
+  bool out = a.numBodies() == b.numBodies() && a.closures().size() == b.closures().size() &&
+             a.contacts().size() == b.contacts().size() && same(a.gravity(), b.gravity());
+  for (int i = 1; out && i < a.numBodies(); ++i) {
+    const Joint &j = a.joints()[i], &k = b.joints()[i];
+    out = j.kind == k.kind && same(j.axis, k.axis) && same(j.axis2, k.axis2);
+  }
+  for (size_t c = 0; out && c < a.closures().size(); ++c) {
+    const Closure &j = a.closures()[c], &k = b.closures()[c];
+    out = j.kind == k.kind && same(j.axis, k.axis) && j.kp == k.kp && j.kd == k.kd;
+  }
+  return out;
+}
+
+// Adds weight times the way from one model to another.
+void addChange(const Model& from, const Model& to, double weight, ModelVariation& out) {
+  const auto addTwist = [weight](const SE3& X, const SE3& Y, Vector6d& twist) {
+    twist += weight * log6(X.inverseTimes(Y));
+  };
+  for (int i = 1; i < from.numBodies(); ++i) {
+    addTwist(from.joints()[i].X_PJ, to.joints()[i].X_PJ, out.joints[i]);
+    out.inertias[i] += weight * (to.bodies()[i].inertia.toMatrix() - from.bodies()[i].inertia.toMatrix());
+  }
+  for (size_t c = 0; c < from.closures().size(); ++c) {
+    addTwist(from.closures()[c].X_B1, to.closures()[c].X_B1, out.frames1[c]);
+    addTwist(from.closures()[c].X_B2, to.closures()[c].X_B2, out.frames2[c]);
+  }
+  for (size_t c = 0; c < from.contacts().size(); ++c)
+    addTwist(from.contacts()[c].X_BF, to.contacts()[c].X_BF, out.contacts[c]);
+  out.armature += weight * (to.armature() - from.armature());
+}
+
+}  // namespace
+
+std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x) {
+  const Model here = robot.make(x);
+  std::vector<ModelVariation> out(x.size(), ModelVariation(here));
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    const double h = kStep * (robot.upper()[i] - robot.lower()[i]);
+    for (const auto& [steps, weight] : {std::pair{-2, 1.0}, {-1, -8.0}, {1, 8.0}, {2, -1.0}}) {
+      const Model there = robot.make(x + steps * h * VectorXd::Unit(x.size(), i));
+      if (!isSameButForPlaces(here, there))
+        throw ModelError(here.name(), "variable '" + robot.variables()[i].name + "'",
+                         "it changes an axis, gain or gravity: motor torques have no gradient along it",
+                         "search without gradients, by bobyqa or sbplx");
+      addChange(here, there, weight / (12 * h), out[i]);
+    }
+  }
+  return out;
+}
+
+}  // namespace bielle
