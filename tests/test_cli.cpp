@@ -363,13 +363,28 @@ TEST_CASE("solve ends by the check of its result, whose failure is its own") {
   setenv("PATH", path.c_str(), 1);
   CHECK(absent.status == 0);
   CHECK_THAT(absent.out, Catch::Contains("not checked: bielle-check is not built"));
-  for (const int status : {0, 1, 2}) {
-    std::ofstream(checker) << "#!/bin/sh\necho \"<$@>\"\nexit " << status << "\n";
+  // What the check does at its end, the status of the command, and its line of error.
+  const std::tuple<const char*, int, const char*> ends[] = {
+      {"exit 0", 0, ""},
+      {"exit 1", 1, ""},
+      {"exit 2", 1, "bielle-check broke off with status 2"},
+      {"exit 77", 1, "bielle-check broke off with status 77"},
+      {"kill -KILL $$", 1, "bielle-check was ended by signal 9"},
+  };
+  for (const auto& [end, status, error] : ends) {
+    std::ofstream(checker) << "#!/bin/sh\necho \"<$@>\"\n" << end << "\n";
     fs::permissions(checker, fs::perms::owner_all);
     const CommandResult result = runCommand(arguments);
-    CHECK(result.status == (status == 1 ? 1 : 0));
+    INFO(end << "\n" << result.err);
+    CHECK(result.status == status);
     CHECK_THAT(result.out, Catch::Contains("<--brief " + directory.str() + "/motion>\n"));
+    CHECK_THAT(result.err, Catch::Contains(error));
+    CHECK(result.err.empty() == (*error == 0));
   }
+  std::ofstream(checker) << "#!/nonexistent/interpreter\n";
+  const CommandResult unable = runCommand(arguments);
+  CHECK(unable.status == 1);
+  CHECK_THAT(unable.err, Catch::Contains("bielle-check cannot be started"));
 }
 
 TEST_CASE("in the full formulation velocities follow accelerations") {

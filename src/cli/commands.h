@@ -33,7 +33,8 @@ void addStudy(CLI::App& app, Action& action);
 void addCompanions(CLI::App& app);
 // Becomes that program; returns only when it cannot. `arguments` ends with a null pointer and begins with a name.
 int becomeCompanion(const std::string& name, char** arguments);
-// Runs it to its end. Its exit status, or nothing when it is not there.
+// Runs it to its end. Its exit status, kFailed with a line of error when a signal ended it or it cannot be started, or
+// nothing when it is not there.
 std::optional<int> runCompanion(const std::string& name, std::vector<std::string> arguments);
 
 // What every command with a robot asks for.

@@ -3,6 +3,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <iostream>
 
@@ -46,13 +48,18 @@ std::optional<int> runCompanion(const std::string& name, std::vector<std::string
   argv.push_back(nullptr);
   std::cout.flush();
   pid_t child = 0;
-  if (posix_spawnp(&child, program.c_str(), nullptr, nullptr, argv.data(), environ) != 0) return {};
+  const auto fail = [&name](const std::string& why) {
+    std::cerr << "bielle: error: " << name << " " << why << std::endl;
+    return kFailed;
+  };
+  const int error = posix_spawnp(&child, program.c_str(), nullptr, nullptr, argv.data(), environ);
+  if (error == ENOENT && program == name) return {};  // beside this program it was there
+  if (error != 0) return fail(std::string("cannot be started: ") + std::strerror(error));
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
-    if (errno != EINTR) return {};
+    if (errno != EINTR) return fail(std::string("was lost: ") + std::strerror(errno));
   if (WIFEXITED(status)) return WEXITSTATUS(status);
-  std::cerr << "bielle: warning: " << name << " was ended by signal " << WTERMSIG(status) << std::endl;
-  return kFailed;
+  return fail("was ended by signal " + std::to_string(WTERMSIG(status)));
 }
 
 }  // namespace bielle::cli

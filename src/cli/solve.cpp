@@ -128,11 +128,15 @@ void printSerialModel(const SerialModel& serial) {
   std::cout << "\n";
 }
 
-// Whether the motion passes bielle-check, or could not be checked.
+// Whether the motion passes bielle-check, or there is none. A check that breaks off says nothing good.
 bool checkResult(const std::string& directory) {
   const std::optional<int> status = runCompanion("bielle-check", {"--brief", directory});
-  if (!status) std::cout << "  not checked: bielle-check is not built (-DBIELLE_BUILD_VALIDATION=ON)\n";
-  return status != kFailed;
+  if (!status)
+    std::cout << "  not checked: bielle-check is not built (-DBIELLE_BUILD_VALIDATION=ON)\n";
+  else if (*status != kOk && *status != kFailed)
+    std::cerr << "bielle: error: " << directory << ": bielle-check broke off with status " << *status
+              << "; see what it said, `bielle check " << directory << "` tries again" << std::endl;
+  return !status || *status == kOk;
 }
 
 // Prints a line per iteration, unless quiet, and stops at a signal.
@@ -287,7 +291,8 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
 
 constexpr const char* kOutcome =
     "Ctrl-C stops the solver; the iterate it has by then is written, and marked as interrupted. Exit status: 0 "
-    "converged\nand checked, 1 not converged or a check failed (results are written all the same), 2 bad input.";
+    "converged\nand checked, 1 not converged, or the check failed or broke off (results are written all the same), 2 "
+    "bad input.";
 
 void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   CLI::App& sub = *command.add_subcommand(motion.name, motion.help);
