@@ -26,32 +26,39 @@ ShootingTrajectory makeLine(const PlantProblem<Plant>& problem) {
   return guess;
 }
 
-inline double calcCost(ShootingProblem& problem, const std::vector<VectorXd>& us) {
-  VectorXd x = problem.initialState(), next = x;
-  double total = 0, cost = 0;
+// One node, evaluated alone.
+inline std::unique_ptr<NodeEvaluation> evaluate(const ShootingProblem& problem, int node, const VectorXd& x,
+                                                const VectorXd* u = nullptr) {
+  auto out = problem.makeEvaluation();
+  EvaluateTask task;
+  task.node = node;
+  task.x = &x;
+  task.u = u;
+  task.out = out.get();
+  problem.evaluate(&task, 1, problem.makeScratch().get());
+  return out;
+}
+
+inline double calcCost(const ShootingProblem& problem, const std::vector<VectorXd>& us) {
+  VectorXd x = problem.initialState();
+  double total = 0;
   for (size_t k = 0; k < us.size(); ++k) {
-    problem.step(static_cast<int>(k), x, us[k], next, cost);
-    total += cost;
-    x = next;
+    const auto node = evaluate(problem, static_cast<int>(k), x, &us[k]);
+    total += node->cost;
+    x = node->x_next;
   }
-  problem.calcTerminalCost(x, cost);
-  return total + cost;
+  return total + evaluate(problem, problem.numStages(), x)->cost;
 }
 
 // Of the node states as they are, whatever the gaps between them.
-inline double calcCostAlong(ShootingProblem& problem, const ShootingTrajectory& t) {
-  VectorXd next = t.xs[0];
-  double total = 0, cost = 0;
-  for (size_t k = 0; k < t.us.size(); ++k) {
-    problem.step(static_cast<int>(k), t.xs[k], t.us[k], next, cost);
-    total += cost;
-  }
-  problem.calcTerminalCost(t.xs.back(), cost);
-  return total + cost;
+inline double calcCostAlong(const ShootingProblem& problem, const ShootingTrajectory& t) {
+  double total = 0;
+  for (size_t k = 0; k < t.us.size(); ++k) total += evaluate(problem, static_cast<int>(k), t.xs[k], &t.us[k])->cost;
+  return total + evaluate(problem, problem.numStages(), t.xs.back())->cost;
 }
 
 // dJ/du of the rollout from the initial state, stage after stage.
-inline VectorXd calcShootingGradient(ShootingProblem& problem, std::vector<VectorXd> us) {
+inline VectorXd calcShootingGradient(const ShootingProblem& problem, std::vector<VectorXd> us) {
   const double h = 1e-5;
   std::vector<double> gradient;
   for (VectorXd& u : us) {
@@ -67,20 +74,21 @@ inline VectorXd calcShootingGradient(ShootingProblem& problem, std::vector<Vecto
   return Eigen::Map<VectorXd>(gradient.data(), static_cast<Eigen::Index>(gradient.size()));
 }
 
-inline double calcLargestGap(ShootingProblem& problem, const ShootingTrajectory& t) {
-  double gap = 0, cost;
-  VectorXd next(problem.stateSize());
-  for (size_t k = 0; k < t.us.size(); ++k) {
-    const int node = static_cast<int>(k);
-    VectorXd dx(problem.tangentSize(node + 1));
-    problem.step(node, t.xs[k], t.us[k], next, cost);
-    problem.difference(node + 1, t.xs[k + 1], next, dx);
+inline double calcLargestGap(const ShootingProblem& problem, const ShootingTrajectory& t) {
+  const int N = problem.numStages();
+  double gap = 0;
+  for (int k = 0; k < N; ++k) {
+    const auto node = evaluate(problem, k, t.xs[k], &t.us[k]);
+    const auto next = evaluate(problem, k + 1, t.xs[k + 1], k + 1 < N ? &t.us[k + 1] : nullptr);
+    VectorXd dx(problem.tangentSize(k + 1));
+    const DifferenceTask task{k + 1, next.get(), &node->x_next, &dx};
+    problem.difference(&task, 1, problem.makeScratch().get());
     gap = std::max(gap, dx.lpNorm<Eigen::Infinity>());
   }
   return gap;
 }
 
-inline void checkOptimal(ShootingProblem& problem, const FddpSummary& summary, const ShootingTrajectory& result) {
+inline void checkOptimal(const ShootingProblem& problem, const FddpSummary& summary, const ShootingTrajectory& result) {
   CAPTURE(summary.message, summary.iterations, summary.cost);
   CHECK(summary.termination == FddpTermination::Converged);
   CHECK(calcLargestGap(problem, result) < 1e-10);

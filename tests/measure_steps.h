@@ -41,7 +41,7 @@ struct StepMeasures {
 class StepMeter {
  public:
   StepMeter(Motion& motion, const ShootingTrajectory& t)
-      : motion_(motion), t_(t), model_(motion.problem->model()), ws_(model_) {}
+      : motion_(motion), t_(t), model_(motion.problem->model()), ws_(model_), evaluator_(*motion.problem) {}
 
   StepMeasures measure() {
     const int stages = motion_.problem->numStages();
@@ -145,15 +145,15 @@ class StepMeter {
   }
 
   void measureForces(int k, const ContactPhase& phase) {
-    VectorXd a, lambda;
-    if (motion_.problem->calcDynamics(k, t_.xs[k], t_.us[k], a, lambda) != StepStatus::Ok) {
+    const RobotEvaluation& at = evaluator_.evaluate(k, t_.xs[k], t_.us[k]);
+    if (at.status != StepStatus::Ok) {
       out_.load = -1e9;
       return;
     }
     const ConstraintSet& set = motion_.problem->spec(k).constraints;
     for (size_t c = 0; c < phase.contacts.size(); ++c) {
       const ContactFrame& contact = model_.contacts()[phase.contacts[c].contact];
-      const Vector6d f = lambda.segment<6>(set.offsets[set.num_loops + c]);
+      const Vector6d f = at.lambda.segment<6>(set.offsets[set.num_loops + c]);
       out_.load = std::min(out_.load, f[2]);
       out_.friction = std::max(out_.friction, f.head<2>().norm() / std::max(f[2], 1e-9));
       out_.pressure = std::max(
@@ -165,6 +165,7 @@ class StepMeter {
   const ShootingTrajectory& t_;
   const Model& model_;
   Workspace ws_;
+  RobotEvaluator evaluator_;
   std::array<std::optional<SE3>, 8> places_;
   std::array<double, 8> speeds_{};  // of the feet in the air, m/s
   StepMeasures out_;

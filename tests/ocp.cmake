@@ -3,5 +3,4 @@ bielle_test(ocp_problem SOURCES test_ocp_problem.cpp mechanisms.cpp LIBS bielle_
 # The test counts allocations: malloc, and operator new(size_t) by its mangled name.
 target_link_options(test_ocp_problem PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 bielle_test(lanes SOURCES test_lanes.cpp LIBS bielle_motion)
-target_link_options(test_lanes PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 bielle_test(reduced SOURCES test_reduced.cpp mechanisms.cpp LIBS bielle_motion)

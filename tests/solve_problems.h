@@ -6,9 +6,54 @@
 #include <vector>
 
 #include "bielle/model/joint.h"
-#include "bielle/ocp/shooting_problem.h"
+#include "bielle/solve/shooting_problem.h"
 
 namespace bielle::test {
+
+/// A problem whose evaluations hold nothing but states, controls and costs, from functions of one node.
+class PlainProblem : public NodewiseProblem {
+ public:
+  using NodewiseProblem::difference;
+  using NodewiseProblem::evaluate;
+  using NodewiseProblem::integrate;
+  using NodewiseProblem::linearize;
+
+  void evaluate(EvaluateTask& task, ProblemScratch*) const override {
+    NodeEvaluation& out = *task.out;
+    out.x = *task.x;
+    out.status = StepStatus::Ok;
+    if (task.node == numStages()) {
+      out.cost = calcTerminalCost(out.x);
+    } else {
+      out.u = *task.u;
+      out.x_next.resize(stateSize());
+      out.cost = calcStep(task.node, out.x, out.u, out.x_next);
+    }
+  }
+  void linearize(LinearizeTask& task, ProblemScratch*) const override {
+    task.status = StepStatus::Ok;
+    task.out->cost = task.at->cost;
+    task.out->hessian().setZero();
+    if (task.node == numStages()) return linearizeTerminal(task.at->x, *task.out);
+    calcDifference(task.next->x, task.at->x_next, task.out->gap);
+    linearizeStage(*task.at, *task.out);
+  }
+  void integrate(const IntegrateTask& task, ProblemScratch*) const override {
+    calcSum(task.at->x, *task.dx, *task.x_out);
+  }
+  void difference(const DifferenceTask& task, ProblemScratch*) const override {
+    calcDifference(task.at->x, *task.x1, *task.dx);
+  }
+
+  virtual void calcSum(const VectorXd& x, const VectorXd& dx, VectorXd& out) const { out = x + dx; }
+  virtual void calcDifference(const VectorXd& x0, const VectorXd& x1, VectorXd& dx) const { dx = x1 - x0; }
+  /// x_next, and the cost.
+  virtual double calcStep(int stage, const VectorXd& x, const VectorXd& u, VectorXd& x_next) const = 0;
+  virtual double calcTerminalCost(const VectorXd& x) const = 0;
+  /// All but cost and gap; second derivatives are zero before.
+  virtual void linearizeStage(const NodeEvaluation& at, StageModel& out) const = 0;
+  virtual void linearizeTerminal(const VectorXd& x, StageModel& out) const = 0;
+};
 
 /// theta from hanging; torque at the hinge.
 struct Pendulum {
@@ -45,7 +90,7 @@ struct Linear {
 /// Plant under Euler steps, with cost 1/2 dt (x - goal).Q.(x - goal) + 1/2 dt r u.u and 1/2 (x - goal).P.(x - goal), Q
 /// and P diagonal. Allocates nothing once built.
 template <class Plant>
-class PlantProblem : public ShootingProblem {
+class PlantProblem : public PlainProblem {
  public:
   static constexpr int kX = Plant::kStates, kU = Plant::kControls;
   using State = Eigen::Matrix<double, kX, 1>;
@@ -60,48 +105,36 @@ class PlantProblem : public ShootingProblem {
   int tangentSize(int) const override { return kX; }
   int controlSize(int) const override { return kU; }
   const VectorXd& initialState() const override { return start; }
-  void integrate(int, ConstVectorRef x, ConstVectorRef dx, VectorRef out) const override { out = x + dx; }
-  void difference(int, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override { dx = x1 - x0; }
   void getControlBounds(int, VectorRef lower, VectorRef upper) const override {
     lower.setConstant(-bound);
     upper.setConstant(bound);
   }
 
-  StepStatus step(int, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override {
+  double calcStep(int, const VectorXd& x, const VectorXd& u, VectorXd& x_next) const override {
     const auto next = calcNext<double>(x, u, -1);
     for (int i = 0; i < kX; ++i) x_next[i] = next[i];
     const State e = x - goal;
-    cost = 0.5 * dt * (e.dot(weight.cwiseProduct(e)) + control_weight * u.squaredNorm());
-    return StepStatus::Ok;
+    return 0.5 * dt * (e.dot(weight.cwiseProduct(e)) + control_weight * u.squaredNorm());
   }
-  StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override {
+  double calcTerminalCost(const VectorXd& x) const override {
     const State e = x - goal;
-    cost = 0.5 * e.dot(terminal_weight.cwiseProduct(e));
-    return StepStatus::Ok;
+    return 0.5 * e.dot(terminal_weight.cwiseProduct(e));
   }
-  StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
-                       StageModel& out) override {
+  void linearizeStage(const NodeEvaluation& at, StageModel& out) const override {
     for (int j = 0; j < kX + kU; ++j) {
-      const auto next = calcNext<std::complex<double>>(x, u, j);
+      const auto next = calcNext<std::complex<double>>(at.x, at.u, j);
       for (int i = 0; i < kX; ++i) (j < kX ? out.Fx()(i, j) : out.Fu()(i, j - kX)) = next[i].imag() / kComplexStep;
     }
-    step(stage, x, u, out.gap, out.cost);
-    out.gap -= x_next_node;
-    const State e = x - goal;
+    const State e = at.x - goal;
     out.lx = dt * weight.cwiseProduct(e);
-    out.H().setZero();
     out.lxx().diagonal() = dt * weight;
-    out.lu = dt * control_weight * u;
+    out.lu = dt * control_weight * at.u;
     out.luu().diagonal().setConstant(dt * control_weight);
-    return StepStatus::Ok;
   }
-  StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override {
-    calcTerminalCost(x, out.cost);
+  void linearizeTerminal(const VectorXd& x, StageModel& out) const override {
     const State e = x - goal;
     out.lx = terminal_weight.cwiseProduct(e);
-    out.H().setZero();
     out.lxx().diagonal() = terminal_weight;
-    return StepStatus::Ok;
   }
 
  private:
@@ -149,7 +182,7 @@ inline PlantProblem<Linear> makeLinear() {
 
 /// A point x pushed out of the crest of a double well, x+ = x + dt u, with the cost 1/2 dt r u^2 and (x^2 - 1)^2 at the
 /// end, whose exact Hessian is negative about the crest.
-class DoubleWell : public ShootingProblem {
+class DoubleWell : public PlainProblem {
  public:
   double dt = 0.1, control_weight = 1e-3;
   VectorXd start = VectorXd::Constant(1, 0.1);
@@ -159,40 +192,28 @@ class DoubleWell : public ShootingProblem {
   int tangentSize(int) const override { return 1; }
   int controlSize(int) const override { return 1; }
   const VectorXd& initialState() const override { return start; }
-  void integrate(int, ConstVectorRef x, ConstVectorRef dx, VectorRef out) const override { out = x + dx; }
-  void difference(int, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override { dx = x1 - x0; }
-  StepStatus step(int, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override {
+  double calcStep(int, const VectorXd& x, const VectorXd& u, VectorXd& x_next) const override {
     x_next = x + dt * u;
-    cost = 0.5 * dt * control_weight * u.squaredNorm();
-    return StepStatus::Ok;
+    return 0.5 * dt * control_weight * u.squaredNorm();
   }
-  StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override {
-    cost = std::pow(x[0] * x[0] - 1, 2);
-    return StepStatus::Ok;
-  }
-  StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
-                       StageModel& out) override {
-    step(stage, x, u, out.gap, out.cost);
-    out.gap -= x_next_node;
+  double calcTerminalCost(const VectorXd& x) const override { return std::pow(x[0] * x[0] - 1, 2); }
+  void linearizeStage(const NodeEvaluation& at, StageModel& out) const override {
     out.Fx()(0, 0) = 1;
     out.Fu()(0, 0) = dt;
     out.lx.setZero();
-    out.lu = dt * control_weight * u;
-    out.H().setZero();
+    out.lu = dt * control_weight * at.u;
     out.luu()(0, 0) = dt * control_weight;
-    return StepStatus::Ok;
   }
-  StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override {
+  void linearizeTerminal(const VectorXd& x, StageModel& out) const override {
     out.lx[0] = 4 * x[0] * (x[0] * x[0] - 1);
     out.lxx()(0, 0) = 12 * x[0] * x[0] - 4;
-    return calcTerminalCost(x, out.cost);
   }
 };
 
 /// A body turned by torques from one attitude to another. x = (quaternion x y z w, angular velocity w in the body):
 ///     w+ = w + dt I^{-1} (u - w x I w),    q+ = q (+) dt w+,
 /// with the cost 1/2 dt (w_r |q (-) q_goal|^2 + |w|^2 + r |u|^2), and 1/2 P (|q (-) q_goal|^2 + |w|^2) at the end.
-class TurningBody : public ShootingProblem {
+class TurningBody : public PlainProblem {
  public:
   int stages = 60;
   double dt = 0.05, attitude_weight = 1, control_weight = 0.1, terminal_weight = 100;
@@ -209,49 +230,40 @@ class TurningBody : public ShootingProblem {
   int tangentSize(int) const override { return 6; }
   int controlSize(int) const override { return 3; }
   const VectorXd& initialState() const override { return start; }
-  void integrate(int, ConstVectorRef x, ConstVectorRef dx, VectorRef out) const override {
-    const Vector3d w = x.tail(3) + dx.tail(3);
+  void calcSum(const VectorXd& x, const VectorXd& dx, VectorXd& out) const override {
     integrateJoint(joint_, x.head(4), dx.head(3), out.head(4));
-    out.tail(3) = w;
+    out.tail(3) = x.tail(3) + dx.tail(3);
   }
-  void difference(int, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override {
+  void calcDifference(const VectorXd& x0, const VectorXd& x1, VectorXd& dx) const override {
     calcJointDifference(joint_, x0.head(4), x1.head(4), dx.head(3));
     dx.tail(3) = x1.tail(3) - x0.tail(3);
   }
-  StepStatus step(int, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override {
+  double calcStep(int, const VectorXd& x, const VectorXd& u, VectorXd& x_next) const override {
     const Vector3d w = x.tail(3), torque = u;
     const Vector3d w_next = w + dt * (torque - w.cross(inertia.cwiseProduct(w))).cwiseQuotient(inertia);
     integrateJoint(joint_, x.head(4), dt * w_next, x_next.head(4));
     x_next.tail(3) = w_next;
-    cost = 0.5 * dt * (calcAttitudeCost(x, nullptr) + w.squaredNorm() + control_weight * u.squaredNorm());
-    return StepStatus::Ok;
+    return 0.5 * dt * (calcAttitudeCost(x, nullptr) + w.squaredNorm() + control_weight * u.squaredNorm());
   }
-  StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override {
-    cost = 0.5 * terminal_weight * (calcAttitudeCost(x, nullptr) / attitude_weight + x.tail(3).squaredNorm());
-    return StepStatus::Ok;
+  double calcTerminalCost(const VectorXd& x) const override {
+    return 0.5 * terminal_weight * (calcAttitudeCost(x, nullptr) / attitude_weight + x.tail(3).squaredNorm());
   }
-  StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
-                       StageModel& out) override {
-    VectorXd next(7);
-    step(stage, x, u, next, out.cost);
-    difference(stage + 1, x_next_node, next, out.gap);
-    const Vector3d w = x.tail(3);
+  void linearizeStage(const NodeEvaluation& at, StageModel& out) const override {
+    const Vector3d w = at.x.tail(3);
     const Matrix3d W = (skew(inertia.cwiseProduct(w)) - skew(w) * Matrix3d(inertia.asDiagonal()));
     const Matrix3d w_w = Matrix3d::Identity() + dt * inertia.cwiseInverse().asDiagonal() * W;
     const Matrix3d w_u = dt * Matrix3d(inertia.cwiseInverse().asDiagonal());
     MatrixXd J_q(3, 3), J_dq(3, 3), J_gap(3, 3);
-    calcJointIntegrateJacobians(joint_, dt * next.tail(3), J_q, J_dq);
+    calcJointIntegrateJacobians(joint_, dt * at.x_next.tail(3), J_q, J_dq);
     calcJointDifferenceJacobian(joint_, out.gap.head(3), J_gap);
     out.Fx() << J_gap * J_q, J_gap * J_dq * dt * w_w, Matrix3d::Zero(), w_w;
     out.Fu() << J_gap * J_dq * dt * w_u, w_u;
-    out.lu = dt * control_weight * u;
-    updateStateCost(x, dt * attitude_weight, dt, out);
+    out.lu = dt * control_weight * at.u;
+    updateStateCost(at.x, dt * attitude_weight, dt, out);
     out.luu() = dt * control_weight * Matrix3d::Identity();
-    return StepStatus::Ok;
   }
-  StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override {
+  void linearizeTerminal(const VectorXd& x, StageModel& out) const override {
     updateStateCost(x, terminal_weight, terminal_weight, out);
-    return calcTerminalCost(x, out.cost);
   }
 
  private:
@@ -267,7 +279,6 @@ class TurningBody : public ShootingProblem {
     MatrixXd J(3, 3);
     calcJointDifferenceJacobian(joint_, e, J);
     out.lx << w_attitude * J.transpose() * e, w_rate * x.tail(3);
-    out.H().setZero();
     out.lxx().topLeftCorner(3, 3) = w_attitude * J.transpose() * J;
     out.lxx().bottomRightCorner(3, 3) = w_rate * Matrix3d::Identity();
   }

@@ -50,8 +50,8 @@ TEST_CASE("a body turns on SO(3), from a guess that jumps about") {
   std::mt19937 rng(1);
   std::normal_distribution<double> normal(0, 0.4);
   for (size_t k = 1; k < t.xs.size(); ++k) {
-    const VectorXd dx = VectorXd::NullaryExpr(6, [&](Eigen::Index) { return normal(rng); });
-    problem.integrate(static_cast<int>(k), t.xs[k], dx, t.xs[k]);
+    const VectorXd dx = VectorXd::NullaryExpr(6, [&](Eigen::Index) { return normal(rng); }), x = t.xs[k];
+    problem.calcSum(x, dx, t.xs[k]);
   }
   REQUIRE(calcLargestGap(problem, t) > 0.5);
   checkOptimal(problem, Fddp(makeTightOptions()).solve(problem, t), t);
@@ -219,10 +219,10 @@ TEST_CASE("the gaps that segments open are there, known, and closed by the last 
 
 TEST_CASE("a short last step closes the gaps by a second rollout in segments, a long one by a rollout in one piece") {
   struct CountingBody : TurningBody {
-    std::atomic<int> steps{0};
-    StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override {
+    mutable std::atomic<int> steps{0};
+    double calcStep(int stage, const VectorXd& x, const VectorXd& u, VectorXd& x_next) const override {
       ++steps;
-      return TurningBody::step(stage, x, u, x_next, cost);
+      return TurningBody::calcStep(stage, x, u, x_next);
     }
   } problem;
   makeLongTurn(problem);

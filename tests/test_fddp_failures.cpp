@@ -10,46 +10,56 @@ using namespace bielle::test;
 namespace {
 
 /// Forwards to a problem and spoils some of its answers.
-class SpoiledProblem : public ShootingProblem {
+class SpoiledProblem : public NodewiseProblem {
  public:
-  enum class Fault { Status, Nan, Throw };
-  explicit SpoiledProblem(ShootingProblem& inner) : inner_(inner) {}
+  enum class Fault { None, Status, Nan, Throw };
+  explicit SpoiledProblem(const PlainProblem& inner) : inner_(inner) {}
 
   Fault fault = Fault::Status;
-  int bad_stage = -1;            ///< linearize() of this stage is spoiled
-  double largest_state = 1e300;  ///< step() is spoiled where a state is larger
-  std::atomic<int> num_spoiled{0};
+  int bad_evaluation = -1;               ///< evaluate() of this stage is spoiled
+  int bad_linearization = -1;            ///< linearize() of this stage is spoiled
+  double largest_state = 1e300;          ///< evaluate() is spoiled where a state is larger
+  const VectorXd* only_state = nullptr;  ///< evaluate() is spoiled at all others
+  mutable std::atomic<int> num_spoiled{0};
 
   int numStages() const override { return inner_.numStages(); }
   int stateSize() const override { return inner_.stateSize(); }
   int tangentSize(int node) const override { return inner_.tangentSize(node); }
   int controlSize(int stage) const override { return inner_.controlSize(stage); }
   const VectorXd& initialState() const override { return inner_.initialState(); }
-  void integrate(int k, ConstVectorRef x, ConstVectorRef dx, VectorRef out) const override {
-    inner_.integrate(k, x, dx, out);
+  void evaluate(EvaluateTask& task, ProblemScratch* scratch) const override {
+    inner_.evaluate(task, scratch);
+    const VectorXd& x = *task.x;
+    if (task.node == bad_evaluation || x.lpNorm<Eigen::Infinity>() > largest_state || (only_state && x != *only_state))
+      spoil(task.out->cost, task.out->status, task.out->failure);
   }
-  void difference(int k, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override {
-    inner_.difference(k, x0, x1, dx);
+  void linearize(LinearizeTask& task, ProblemScratch* scratch) const override {
+    inner_.linearize(task, scratch);
+    if (task.node == bad_linearization) spoil(task.out->Fx()(0, 1), task.status, task.failure);
   }
-  StepStatus step(int k, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override {
-    const StepStatus status = inner_.step(k, x, u, x_next, cost);
-    return x.lpNorm<Eigen::Infinity>() > largest_state ? spoil(cost) : status;
+  void integrate(const IntegrateTask& task, ProblemScratch* scratch) const override { inner_.integrate(task, scratch); }
+  void difference(const DifferenceTask& task, ProblemScratch* scratch) const override {
+    inner_.difference(task, scratch);
   }
-  StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override { return inner_.calcTerminalCost(x, cost); }
-  StepStatus linearize(int k, ConstVectorRef x, ConstVectorRef u, ConstVectorRef next, StageModel& out) override {
-    const StepStatus status = inner_.linearize(k, x, u, next, out);
-    return k == bad_stage ? spoil(out.Fx()(0, 1)) : status;
-  }
-  StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override { return inner_.linearizeTerminal(x, out); }
 
  private:
-  StepStatus spoil(double& value) {
+  void spoil(double& value, StepStatus& status, std::string& failure) const {
     ++num_spoiled;
-    if (fault == Fault::Throw) throw std::runtime_error("the knee is locked");
-    if (fault == Fault::Nan) value = std::numeric_limits<double>::quiet_NaN();
-    return fault == Fault::Status ? StepStatus::Failed : StepStatus::Ok;
+    switch (fault) {
+      case Fault::None:
+        break;
+      case Fault::Status:
+        status = StepStatus::Failed;
+        failure = "the knee is locked";
+        break;
+      case Fault::Nan:
+        value = std::numeric_limits<double>::quiet_NaN();
+        break;
+      case Fault::Throw:
+        throw std::logic_error("a knee that is no joint");
+    }
   }
-  ShootingProblem& inner_;
+  const PlainProblem& inner_;
 };
 
 }  // namespace
@@ -83,27 +93,29 @@ TEST_CASE("an interrupted solve keeps the iterate it had, by the flag as by the 
   CHECK(summary.cost < start);
 }
 
-TEST_CASE("a problem that fails, throws or gives NaN at a node ends the solve with the node's name") {
+TEST_CASE("a problem that fails or gives NaN at a node ends the solve with the node's name") {
   using Fault = SpoiledProblem::Fault;
-  const Fault fault = GENERATE(Fault::Status, Fault::Nan, Fault::Throw);
+  const Fault fault = GENERATE(Fault::Status, Fault::Nan);
+  const bool evaluating = GENERATE(true, false);
   auto inner = makePendulum();
   SpoiledProblem problem(inner);
   problem.fault = fault;
-  problem.bad_stage = 37;
+  (evaluating ? problem.bad_evaluation : problem.bad_linearization) = 37;
   ShootingTrajectory t = makeGuess(problem);
   const ShootingTrajectory guess = t;
   const FddpSummary summary = Fddp().solve(problem, t);
   CHECK(summary.termination == FddpTermination::Failed);
+  CAPTURE(summary.message);
   const bool named =
       summary.message.find("node 37") == 0 || (fault == Fault::Nan && summary.message.find("node 3") == 0);
   CHECK(named);
-  if (fault == Fault::Throw) CHECK(summary.message.find("the knee is locked") != std::string::npos);
+  if (fault == Fault::Status) CHECK(summary.message.find("the knee is locked") != std::string::npos);
   CHECK(t.us == guess.us);
 }
 
-TEST_CASE("trials on which the problem fails, throws or gives NaN are only too long") {
+TEST_CASE("trials on which the problem fails or gives NaN are only too long") {
   using Fault = SpoiledProblem::Fault;
-  const Fault fault = GENERATE(Fault::Status, Fault::Nan, Fault::Throw);
+  const Fault fault = GENERATE(Fault::Status, Fault::Nan);
   auto inner = makeCartPole();
   SpoiledProblem problem(inner);
   problem.fault = fault;
@@ -112,6 +124,34 @@ TEST_CASE("trials on which the problem fails, throws or gives NaN are only too l
   const FddpSummary summary = Fddp(makeTightOptions()).solve(problem, t);
   CHECK(problem.num_spoiled > 0);
   checkOptimal(inner, summary, t);
+}
+
+TEST_CASE("what a problem throws comes out of solve() as it is, from evaluations, rollouts and linearizations") {
+  using Fault = SpoiledProblem::Fault;
+  const int where = GENERATE(0, 1, 2), threads = GENERATE(1, 2);
+  CAPTURE(where, threads);
+  auto inner = makeCartPole();
+  SpoiledProblem problem(inner);
+  problem.fault = Fault::Throw;
+  if (where == 0) problem.bad_evaluation = 37;
+  if (where == 1) problem.largest_state = 14;  // of trials alone
+  if (where == 2) problem.bad_linearization = 37;
+  FddpOptions options = makeTightOptions();
+  options.threads = threads;
+  Fddp fddp(options);
+  ShootingTrajectory t = makeGuess(problem), seen = t;
+  FddpObserver observer;
+  observer.callback = [&](const FddpIteration&) {
+    seen = t;
+    return FddpAction::Continue;
+  };
+  CHECK_THROWS_AS(fddp.solve(problem, t, observer), std::logic_error);
+  CHECK(problem.num_spoiled > 0);
+  CHECK(t.xs == seen.xs);
+  CHECK(t.us == seen.us);
+
+  problem.fault = Fault::None;  // the solver can be used again
+  checkOptimal(inner, fddp.solve(problem, t), t);
 }
 
 TEST_CASE("an indefinite problem is regularized until it can be solved") {
@@ -124,15 +164,18 @@ TEST_CASE("an indefinite problem is regularized until it can be solved") {
   CHECK(summary.log.back().regularization < 1e-3 * summary.log.front().regularization);
 }
 
-TEST_CASE("a problem nothing can improve ends at the largest regularization") {
+TEST_CASE("a problem nothing can improve ends at the largest regularization, with the reason of the first trial") {
+  using Fault = SpoiledProblem::Fault;
   auto inner = makeCartPole();
   SpoiledProblem problem(inner);
-  problem.largest_state = 0;  // no rollout succeeds
+  problem.fault = GENERATE(Fault::Status, Fault::Nan);
+  problem.only_state = &inner.start;  // no rollout succeeds
   ShootingTrajectory t = makeGuess(problem);
   const FddpSummary summary = Fddp().solve(problem, t);
   CHECK(summary.termination == FddpTermination::RegularizationMax);
   CHECK(summary.iterations == 0);
-  CHECK(summary.message == "no step is acceptable even at the largest regularization");
+  CHECK(summary.message == std::string("no step is acceptable even at the largest regularization") +
+                               (problem.fault == Fault::Status ? "; node 1: the knee is locked" : ""));
 }
 
 TEST_CASE("options without sense are refused by name") {

@@ -99,14 +99,15 @@ void measureBody(const Motion& motion, const ShootingTrajectory& t, Outcome& out
 
 void measureForces(const Motion& motion, const ShootingTrajectory& t, Outcome& out) {
   const Model& model = motion.problem->model();
-  VectorXd a, lambda;
+  RobotEvaluator evaluator(*motion.problem);
   for (size_t k = 0; k < t.us.size(); ++k) {
     const ConstraintSet& set = motion.problem->spec(static_cast<int>(k)).constraints;
     if (static_cast<int>(set.closures.size()) == set.num_loops) continue;
-    REQUIRE(motion.problem->calcDynamics(static_cast<int>(k), t.xs[k], t.us[k], a, lambda) == StepStatus::Ok);
+    const RobotEvaluation& at = evaluator.evaluate(static_cast<int>(k), t.xs[k], t.us[k]);
+    REQUIRE(at.status == StepStatus::Ok);
     for (size_t c = set.num_loops; c < set.closures.size(); ++c) {
       const ContactFrame& contact = model.contacts()[model.findContact(set.closures[c].name)];
-      const Vector6d f = lambda.segment<6>(set.offsets[c]);
+      const Vector6d f = at.lambda.segment<6>(set.offsets[c]);
       out.force = std::min(out.force, f[2]);
       out.friction = std::max(out.friction, f.head<2>().norm() / f[2]);
       out.pressure = std::max(

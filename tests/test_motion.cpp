@@ -8,6 +8,7 @@
 #include "bielle/model/reader.h"
 #include "bielle/motion/benchmark_walk.h"
 #include "bielle/motion/squat.h"
+#include "problem_probe.h"
 
 using namespace bielle;
 
@@ -48,14 +49,13 @@ Outcome measure(const Model& model, const SquatOptions& options, const std::vect
 }
 
 // Largest |x_{k+1} - f(x_k, u_k)| by stepping again.
-double calcDefect(RobotProblem& problem, const ShootingTrajectory& t) {
+double calcDefect(const RobotProblem& problem, const ShootingTrajectory& t) {
   double defect = 0, cost = 0;
+  testing::ProblemProbe probe(problem);
   VectorXd next(problem.stateSize());
   for (int k = 0; k < problem.numStages(); ++k) {
-    VectorXd dx(problem.tangentSize(k + 1));
-    REQUIRE(problem.step(k, t.xs[k], t.us[k], next, cost) == StepStatus::Ok);
-    problem.difference(k + 1, t.xs[k + 1], next, dx);
-    defect = std::max(defect, dx.cwiseAbs().maxCoeff());
+    REQUIRE(probe.step(k, t.xs[k], t.us[k], next, cost) == StepStatus::Ok);
+    defect = std::max(defect, probe.difference(t.xs[k + 1], next).cwiseAbs().maxCoeff());
   }
   return defect;
 }

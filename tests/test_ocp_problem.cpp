@@ -7,6 +7,7 @@
 #include "bielle/motion/squat.h"
 #include "check_derivative.h"
 #include "count_allocations.h"
+#include "problem_probe.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -67,31 +68,19 @@ VectorXd join(const VectorXd& q, const VectorXd& v) {
   return x;
 }
 
-VectorXd move(const RobotProblem& problem, int node, const VectorXd& x, const VectorXd& dx) {
-  VectorXd out(x.size());
-  problem.integrate(node, x, dx, out);
-  return out;
-}
-
-VectorXd calcDifference(const RobotProblem& problem, int node, const VectorXd& x0, const VectorXd& x1) {
-  VectorXd dx(problem.tangentSize(node));
-  problem.difference(node, x0, x1, dx);
-  return dx;
-}
-
 struct Step {
   VectorXd gap;
   double cost;
 };
-Step calcStep(RobotProblem& problem, int stage, const Point& point, const VectorXd& dx, const VectorXd& du) {
+Step calcStep(ProblemProbe& problem, int stage, const Point& point, const VectorXd& dx, const VectorXd& du) {
   VectorXd next(problem.stateSize());
   double cost = 0;
-  REQUIRE(problem.step(stage, move(problem, stage, point.x, dx), point.u + du, next, cost) == StepStatus::Ok);
-  return {calcDifference(problem, stage + 1, point.x_node, next), cost};
+  REQUIRE(problem.step(stage, problem.integrate(point.x, dx), point.u + du, next, cost) == StepStatus::Ok);
+  return {problem.difference(point.x_node, next), cost};
 }
 
 // Everything that is weighted and squared, each row times the root of its weight as it is at (x, u).
-VectorXd calcWeightedResiduals(RobotProblem& problem, int node, const VectorXd& x, const VectorXd& u,
+VectorXd calcWeightedResiduals(ProblemProbe& problem, int node, const VectorXd& x, const VectorXd& u,
                                const VectorXd& curvature) {
   const Model& model = problem.model();
   const StageSpec& spec = problem.spec(node);
@@ -117,7 +106,7 @@ VectorXd calcWeightedResiduals(RobotProblem& problem, int node, const VectorXd& 
 }
 
 // Second derivative of every row's activation at the residuals r, with all its weights.
-VectorXd calcCurvature(const RobotProblem& problem, int node, const VectorXd& r) {
+VectorXd calcCurvature(const ProblemProbe& problem, int node, const VectorXd& r) {
   const Model& model = problem.model();
   const StageSpec& spec = problem.spec(node);
   const bool running = node < problem.numStages();
@@ -139,12 +128,12 @@ VectorXd calcCurvature(const RobotProblem& problem, int node, const VectorXd& r)
   return (running ? spec.dt : 1) * out;
 }
 
-void checkGaussNewton(RobotProblem& problem, int node, const Point& point, const StageModel& model, double h) {
+void checkGaussNewton(ProblemProbe& problem, int node, const Point& point, const StageModel& model, double h) {
   const int ndx = problem.tangentSize(node), nu = static_cast<int>(point.u.size());
   const VectorXd curvature = calcCurvature(problem, node, calcWeightedResiduals(problem, node, point.x, point.u, {}));
   MatrixXd J(curvature.size(), ndx + nu);
   J.leftCols(ndx) = differentiate(VectorXd::Zero(ndx), h, [&](const VectorXd& dx) {
-    return calcWeightedResiduals(problem, node, move(problem, node, point.x, dx), point.u, curvature);
+    return calcWeightedResiduals(problem, node, problem.integrate(point.x, dx), point.u, curvature);
   });
   if (nu > 0)
     J.rightCols(nu) = differentiate(
@@ -158,14 +147,14 @@ void checkGaussNewton(RobotProblem& problem, int node, const Point& point, const
 }
 
 // h: step in x; the one in u can be longer, as forces are linear in it.
-void checkStage(RobotProblem& problem, const Point& point, double h) {
+void checkStage(ProblemProbe& problem, const Point& point, double h) {
   StageModel model;
   REQUIRE(problem.linearize(0, point.x, point.u, point.x_node, model) == StepStatus::Ok);
   const VectorXd no_dx = VectorXd::Zero(problem.tangentSize(0)), no_du = VectorXd::Zero(point.u.size());
   Step here;  // not through integrate(), which closes reduced states anew, to rounding
   VectorXd next(problem.stateSize());
   REQUIRE(problem.step(0, point.x, point.u, next, here.cost) == StepStatus::Ok);
-  here.gap = calcDifference(problem, 1, point.x_node, next);
+  here.gap = problem.difference(point.x_node, next);
   CHECK(model.cost == Approx(here.cost).epsilon(1e-13));
   CHECK((model.gap - here.gap).cwiseAbs().maxCoeff() <= 1e-13 * (1 + here.gap.cwiseAbs().maxCoeff()));
   const auto both = [](const Step& step) { return join(step.gap, VectorXd::Constant(1, step.cost)); };
@@ -183,25 +172,25 @@ void checkStage(RobotProblem& problem, const Point& point, double h) {
   checkGaussNewton(problem, 0, point, model, h);
 }
 
-void checkTerminal(RobotProblem& problem, const VectorXd& x, double h) {
+void checkTerminal(ProblemProbe& problem, const VectorXd& x, double h) {
   StageModel model;
   const int node = problem.numStages();
   REQUIRE(problem.linearizeTerminal(x, model) == StepStatus::Ok);
   checkDerivative(model.lx.transpose(),
                   differentiate(VectorXd::Zero(problem.tangentSize(node)), h, [&](const VectorXd& dx) {
                     double cost = 0;
-                    REQUIRE(problem.calcTerminalCost(move(problem, node, x, dx), cost) == StepStatus::Ok);
+                    REQUIRE(problem.calcTerminalCost(problem.integrate(x, dx), cost) == StepStatus::Ok);
                     return VectorXd::Constant(1, cost);
                   }));
   checkGaussNewton(problem, node, {x, {}, {}}, model, h);
 }
 
 // The next node's state: where the step leads, moved away by `gap` in every coordinate.
-VectorXd makeNextNode(std::mt19937& rng, RobotProblem& problem, const VectorXd& x, const VectorXd& u, double gap) {
+VectorXd makeNextNode(std::mt19937& rng, ProblemProbe& problem, const VectorXd& x, const VectorXd& u, double gap) {
   VectorXd next(problem.stateSize());
   double cost = 0;
   REQUIRE(problem.step(0, x, u, next, cost) == StepStatus::Ok);
-  return move(problem, 1, next, randomVector(rng, problem.tangentSize(1), gap));
+  return problem.integrate(next, randomVector(rng, problem.tangentSize(1), gap));
 }
 
 }  // namespace
@@ -211,7 +200,8 @@ TEST_CASE("shooting problem: random mechanisms of every joint kind, gaps closed,
   for (JointKind kind : kJointKinds) {
     const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer, 3, 2);
     const Model& model = mechanism.model;
-    RobotProblem problem = makeProblem(rng, model, mechanism.q_closed, {{0, randomPlacement(rng), 5, 4}});
+    const RobotProblem whole = makeProblem(rng, model, mechanism.q_closed, {{0, randomPlacement(rng), 5, 4}});
+    ProblemProbe problem(whole);
     const VectorXd q = model.integrate(mechanism.q_closed, randomVector(rng, model.nv(), 0.1));
     const VectorXd x = join(q, randomVector(rng, model.nv())), u = randomVector(rng, model.nu(), 5);
     for (double gap : {0.0, 1e-3, 0.6}) {
@@ -235,7 +225,8 @@ TEST_CASE("shooting problem: a redundant planar four-bar") {
   std::vector<StageSpec> stages;
   stages.push_back(std::move(stage));
   stages.push_back(std::move(terminal));
-  RobotProblem problem(model, mechanism.q_closed, VectorXd::Zero(4), std::move(stages));
+  const RobotProblem whole(model, mechanism.q_closed, VectorXd::Zero(4), std::move(stages));
+  ProblemProbe problem(whole);
   Workspace ws(model);
   // Off the closures too: the four angles keep the loop planar, so the redundant rows never contradict one another.
   const VectorXd v = randomVector(rng, 4), u = VectorXd::Constant(1, 0.4);
@@ -252,7 +243,7 @@ TEST_CASE("shooting problem: the squat of Bipetto, half sitting with velocities 
   SquatOptions options;
   options.duration = 0.3;
   const Motion motion = makeSquat(model, options, formulation);
-  RobotProblem& problem = *motion.problem;
+  ProblemProbe problem(*motion.problem);
   const VectorXd q = problem.initialState().head(model.nq());
   Workspace ws(model);
   const VectorXd v = projectVelocity(model, ws, problem.spec(0).constraints, q, randomVector(rng, model.nv(), 0.5));
@@ -272,13 +263,13 @@ TEST_CASE("shooting problem: a linearization does not depend on what was compute
   const Model model = loadRobot("bipetto").model;
   const auto make = [&] { return makeSquat(model, {}, formulation); };
   const Motion used = make(), fresh = make();
-  RobotProblem& problem = *used.problem;
+  ProblemProbe problem(*used.problem), untouched(*fresh.problem);
   const VectorXd x0 = problem.initialState(), u = used.guess.us[0];
-  const VectorXd x = move(problem, 0, x0, randomVector(rng, problem.tangentSize(0), 0.05));
+  const VectorXd x = problem.integrate(x0, randomVector(rng, problem.tangentSize(0), 0.05));
   StageModel once, again, other;
-  REQUIRE(fresh.problem->linearize(0, x, u, x0, once) == StepStatus::Ok);
+  REQUIRE(untouched.linearize(0, x, u, x0, once) == StepStatus::Ok);
   for (int i = 0; i < 3; ++i) {  // elsewhere, with other forces and velocities
-    const VectorXd away = move(problem, 0, x0, randomVector(rng, problem.tangentSize(0), 0.1));
+    const VectorXd away = problem.integrate(x0, randomVector(rng, problem.tangentSize(0), 0.1));
     REQUIRE(problem.linearize(0, away, u + randomVector(rng, model.nu(), 20), x0, other) == StepStatus::Ok);
   }
   for (int i = 0; i < 2; ++i) {  // the second time nothing is new
@@ -299,33 +290,42 @@ TEST_CASE("shooting problem: steps and linearizations allocate nothing after the
   const VectorXd q = makeStandingPosture(model);
   const Formulation formulation = GENERATE(Formulation::Full, Formulation::Reduced);
   CAPTURE(getName(formulation));
-  RobotProblem problem = makeProblem(rng, model, q, makeContactTargets(model, q, {0, 1}, 0, 100), formulation);
+  const RobotProblem problem = makeProblem(rng, model, q, makeContactTargets(model, q, {0, 1}, 0, 100), formulation);
   const VectorXd x = problem.initialState();
   const VectorXd u = randomVector(rng, model.nu(), 1);
-  VectorXd x2 = move(problem, 0, x, randomVector(rng, problem.tangentSize(0), 1e-3)), next = x;
-  VectorXd dx(problem.tangentSize(0));
-  StageModel out, terminal;
-  double cost = 0;
+  const VectorXd small = randomVector(rng, problem.tangentSize(0), 1e-3);
+  const VectorXd x2 = ProblemProbe(problem).integrate(x, small);
+  const auto stage = problem.makeEvaluation(), terminal = problem.makeEvaluation();
+  const auto scratch = problem.makeScratch();
+  StageModel models[2];
+  models[0].resize(problem.tangentSize(0), model.nu(), problem.tangentSize(1));
+  models[1].resize(problem.tangentSize(1), 0, 0);
+  VectorXd moved = x, dx(problem.tangentSize(0));
   const auto runAll = [&](const VectorXd& at) {
-    std::vector<long> counts(6, 0);
+    std::vector<long> counts(4, 0);
     const auto measure = [&](int i, auto&& f) {
       const long before = num_allocations;
       f();
       counts[i] = num_allocations - before;
     };
-    measure(0, [&] { problem.step(0, at, u, next, cost); });
-    measure(1, [&] { problem.linearize(0, at, u, x, out); });
-    measure(2, [&] { problem.calcTerminalCost(at, cost); });
-    measure(3, [&] { problem.linearizeTerminal(at, terminal); });
-    measure(4, [&] { problem.difference(1, x, at, dx); });
-    measure(5, [&] { problem.integrate(1, x, dx, next); });
+    EvaluateTask steps[] = {{0, &at, &u, nullptr, stage.get()}, {1, &x, nullptr, nullptr, terminal.get()}};
+    LinearizeTask linearizations[2];
+    linearizations[0] = {0, stage.get(), terminal.get(), &models[0], StepStatus::Failed, {}};
+    linearizations[1] = {1, terminal.get(), nullptr, &models[1], StepStatus::Failed, {}};
+    const IntegrateTask move{0, stage.get(), &small, &moved};
+    const DifferenceTask difference{0, stage.get(), &x, &dx};
+    measure(0, [&] { problem.evaluate(steps, 2, scratch.get()); });
+    measure(1, [&] { problem.linearize(linearizations, 2, scratch.get()); });
+    measure(2, [&] { problem.integrate(&move, 1, scratch.get()); });
+    measure(3, [&] { problem.difference(&difference, 1, scratch.get()); });
+    for (const LinearizeTask& task : linearizations) CHECK(task.status == StepStatus::Ok);
     return counts;
   };
   const long before = num_allocations;
   const VectorXd counted(100);
   REQUIRE(num_allocations == before + 1);
   runAll(x);
-  CHECK(runAll(x2) == std::vector<long>(6, 0));
+  CHECK(runAll(x2) == std::vector<long>(4, 0));
 }
 
 TEST_CASE("shooting problem: what does not fit is refused, what is not finite fails") {
@@ -347,7 +347,8 @@ TEST_CASE("shooting problem: what does not fit is refused, what is not finite fa
   CHECK_THROWS_AS(make([](StageSpec& s) { s.costs[0].activation.weights.resize(2); }), ModelError);
   CHECK_THROWS_AS(RobotProblem(model, mechanism.q_closed, VectorXd::Zero(3), {}), ModelError);
   CHECK_THROWS_AS(RobotProblem(model, mechanism.q_closed, v, {}), ModelError);
-  RobotProblem problem = make([](StageSpec&) {});
+  const RobotProblem whole = make([](StageSpec&) {});
+  ProblemProbe problem(whole);
   VectorXd x = problem.initialState(), next = x;
   const VectorXd u = VectorXd::Zero(1);
   double cost = 0;
@@ -365,7 +366,8 @@ TEST_CASE("shooting problem: what does not fit is refused, what is not finite fa
       [&](StageSpec& s) { s.state.v_ref[1] = nan; }, [&](StageSpec& s) { s.state.weights[2] = nan; }};
   for (Formulation formulation : {Formulation::Full, Formulation::Reduced})
     for (const auto& spoil : spoils) {
-      RobotProblem spoilt = make(spoil, formulation);
+      const RobotProblem whole_spoilt = make(spoil, formulation);
+      ProblemProbe spoilt(whole_spoilt);
       CHECK(spoilt.step(0, spoilt.initialState(), u, next, cost) == StepStatus::Failed);
     }
 }

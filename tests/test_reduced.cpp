@@ -10,6 +10,7 @@
 #include "bielle/ocp/robot_problem.h"
 #include "check_derivative.h"
 #include "mechanisms.h"
+#include "problem_probe.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -87,31 +88,28 @@ void checkLinearization(const Model& model, const std::vector<ContactTarget>& co
                         const VectorXd& x_node, std::mt19937& rng, StageKind kind = StageKind::Dynamics,
                         Formulation formulation = Formulation::Reduced) {
   const bool reduced = formulation == Formulation::Reduced;
-  RobotProblem problem(model, state.q, state.v, makeStages(model, contacts, state.q, rng, kind), formulation);
+  const RobotProblem whole(model, state.q, state.v, makeStages(model, contacts, state.q, rng, kind), formulation);
+  ProblemProbe problem(whole);
   const VectorXd x = state.x(), u = randomVector(rng, model.nu(), 5);
   const int ndx = problem.tangentSize(0);
   StageModel stage;
   REQUIRE(problem.linearize(0, x, u, x_node, stage) == StepStatus::Ok);
   const StageModel linear = stage;
   const auto step = [&](const VectorXd& at, const VectorXd& control) {
-    VectorXd x_next(x.size()), dx(ndx), out(ndx + 1);
+    VectorXd x_next(x.size()), out(ndx + 1);
     double cost = 0;
     REQUIRE(problem.step(0, at, control, x_next, cost) == StepStatus::Ok);
     if (reduced) CHECK(calcGap(model, x_next) < 1e-10);
     if (reduced) CHECK(calcClosureSpeed(model, x_next) < 1e-9);
-    problem.difference(1, x_node, x_next, dx);
-    out << dx, cost;
+    out << problem.difference(x_node, x_next), cost;
     return out;
   };
   const VectorXd at_x = step(x, u);
   CHECK((at_x.head(ndx) - linear.gap).cwiseAbs().maxCoeff() < 1e-10);
   const auto along = [&](const VectorXd& dx) {
-    VectorXd moved(x.size());
-    problem.integrate(0, x, dx, moved);
+    const VectorXd moved = problem.integrate(x, dx);
     if (reduced) CHECK(calcGap(model, moved) < 1e-10);
-    VectorXd back(ndx);
-    problem.difference(0, x, moved, back);
-    CHECK((back - dx).cwiseAbs().maxCoeff() < 1e-9);
+    CHECK((problem.difference(x, moved) - dx).cwiseAbs().maxCoeff() < 1e-9);
     return step(moved, u);
   };
   const MatrixXd dx = differentiate(VectorXd::Zero(ndx), 1e-4, along);
@@ -138,7 +136,9 @@ TEST_CASE("reduced step: random mechanisms, every joint kind times every closure
         std::vector<ContactTarget> contacts;
         if (base == MechanismBase::FreeFlyer) contacts = {{1, {}, 0, 10}};
         const State state = makeClosedState(model, mechanism.q_closed, 0, 1, rng);
-        RobotProblem problem(model, state.q, state.v, makeStages(model, contacts, state.q, rng), Formulation::Reduced);
+        const RobotProblem whole(model, state.q, state.v, makeStages(model, contacts, state.q, rng),
+                                 Formulation::Reduced);
+        ProblemProbe problem(whole);
         VectorXd x_next(state.x().size());
         double cost = 0;
         REQUIRE(problem.step(0, state.x(), VectorXd::Zero(model.nu()), x_next, cost) == StepStatus::Ok);
@@ -191,8 +191,9 @@ TEST_CASE("impact stages, in both formulations: random mechanisms and Bipetto, w
       CAPTURE(model.name(), getName(formulation));
       const std::vector<ContactTarget> contacts = {{1, {}, 0, 10}};
       const State state = makeClosedState(model, mechanism.q_closed, 0, 1, rng);
-      RobotProblem problem(model, state.q, state.v, makeStages(model, contacts, state.q, rng, StageKind::Impact),
-                           formulation);
+      const RobotProblem whole(model, state.q, state.v, makeStages(model, contacts, state.q, rng, StageKind::Impact),
+                               formulation);
+      ProblemProbe problem(whole);
       VectorXd x_next(state.x().size());
       double cost = 0;
       REQUIRE(problem.step(0, state.x(), VectorXd::Zero(model.nu()), x_next, cost) == StepStatus::Ok);
@@ -215,7 +216,8 @@ TEST_CASE("reduced accelerations are those of the full formulation") {
   const double h = 1e-5;
   std::vector<StageSpec> stages = makeStages(model, contacts, state.q, rng);
   for (StageSpec& stage : stages) stage.dt = h;
-  RobotProblem problem(model, state.q, state.v, std::move(stages), Formulation::Reduced);
+  const RobotProblem whole(model, state.q, state.v, std::move(stages), Formulation::Reduced);
+  ProblemProbe problem(whole);
   const VectorXd u = randomVector(rng, model.nu(), 5);
   VectorXd x_next(state.x().size()), a, lambda;
   double cost = 0;

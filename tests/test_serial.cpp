@@ -37,15 +37,16 @@ std::vector<int> listSerialDofs(const Model& closed, const Model& serial) {
 SerialTrajectory makeTrajectory(const Motion& motion) {
   const Model& model = motion.problem->model();
   SerialTrajectory out;
+  RobotEvaluator evaluator(*motion.problem);
   for (size_t k = 0; k < motion.guess.xs.size(); ++k) {
     const VectorXd& x = motion.guess.xs[k];
     out.q.push_back(x.head(model.nq()));
     out.v.push_back(x.tail(model.nv()));
     if (k + 1 == motion.guess.xs.size()) break;
-    VectorXd a, forces;
-    REQUIRE(motion.problem->calcDynamics(static_cast<int>(k), x, motion.guess.us[k], a, forces) == StepStatus::Ok);
-    out.a.push_back(a);
-    out.forces.push_back(forces);
+    const RobotEvaluation& at = evaluator.evaluate(static_cast<int>(k), x, motion.guess.us[k]);
+    REQUIRE(at.status == StepStatus::Ok);
+    out.a.push_back(at.a);
+    out.forces.push_back(at.lambda);
     out.dt.push_back(motion.problem->spec(static_cast<int>(k)).dt);
     out.constraints.push_back(motion.problem->spec(static_cast<int>(k)).constraints);
   }

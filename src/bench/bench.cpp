@@ -60,58 +60,65 @@ std::unique_ptr<RobotProblem> makeWithoutCosts(const RobotProblem& problem) {
                                         problem.formulation());
 }
 
-// All stages of a problem near a trajectory, several at once where the problem prefers it. Every pass has other controls, so
-// that nothing is found already done.
+// All nodes of a problem near a trajectory, several at once where the problem prefers it.
 class Passes {
  public:
-  Passes(RobotProblem& problem, const ShootingTrajectory& trajectory)
+  Passes(const RobotProblem& problem, const ShootingTrajectory& trajectory)
       : problem_(problem),
         trajectory_(trajectory),
-        size_(problem.getBatchSize()),
-        models_(trajectory.xs.size()),
-        statuses_(trajectory.xs.size()),
-        ends_(std::max(1, problem.numStages() / kPiece), trajectory.xs.front()) {
-    tasks_.reserve(ends_.size());
+        scratch_(problem.makeScratch()),
+        pieces_(std::max(1, problem.numStages() / kPiece)),
+        models_(trajectory.xs.size()) {
+    const int N = problem.numStages();
+    for (int k = 0; k <= N; ++k) {
+      evaluations_.push_back(problem.makeEvaluation());
+      models_[k].resize(problem.tangentSize(k), k < N ? problem.controlSize(k) : 0,
+                        k < N ? problem.tangentSize(k + 1) : 0);
+    }
   }
   // In pieces of the horizon, each stage of a piece from where the one before has led.
   void step() {
-    const int N = problem_.numStages(), pieces = static_cast<int>(ends_.size()), longest = (N + pieces - 1) / pieces;
-    for (VectorXd& u : trajectory_.us) u.array() += 1e-3;
+    const int N = problem_.numStages(), longest = (N + pieces_ - 1) / pieces_;
     for (int i = 0; i < longest; ++i) {
-      tasks_.clear();
-      for (int p = 0; p < pieces; ++p) {
-        const int k = p * N / pieces + i, end = (p + 1) * N / pieces;
+      steps_.clear();
+      for (int p = 0; p < pieces_; ++p) {
+        const int k = p * N / pieces_ + i, end = (p + 1) * N / pieces_;
         if (k >= end) continue;
-        tasks_.emplace_back();
-        StepTask& task = tasks_.back();
-        task.stage = k;
-        task.continues = i > 0;
-        task.x = &trajectory_.xs[k];
-        task.u = &trajectory_.us[k];
-        task.x_next = k + 1 < end ? &trajectory_.xs[k + 1] : &ends_[p];
+        const NodeEvaluation* previous = i > 0 ? evaluations_[k - 1].get() : nullptr;
+        steps_.push_back({k, previous ? &previous->x_next : &trajectory_.xs[k], &trajectory_.us[k], previous,
+                          evaluations_[k].get()});
       }
-      problem_.stepStages(tasks_);
+      problem_.evaluate(steps_.data(), static_cast<int>(steps_.size()), scratch_.get());
     }
   }
   // About these steps: gaps are closed but for those between the pieces, as in most iterations.
   void linearize() {
     step();
     const int N = problem_.numStages();
-    for (int k = 0; k < N; k += size_)
-      problem_.linearizeStages(k, std::min(N, k + size_), trajectory_.xs, trajectory_.us, models_, statuses_);
-    problem_.linearizeTerminal(trajectory_.xs.back(), models_.back());
+    EvaluateTask terminal{N, &evaluations_[N - 1]->x_next, nullptr, evaluations_[N - 1].get(), evaluations_[N].get()};
+    problem_.evaluate(&terminal, 1, scratch_.get());
+    linearizations_.clear();
+    for (int k = 0; k <= N; ++k) {
+      linearizations_.emplace_back();
+      linearizations_.back().node = k;
+      linearizations_.back().at = evaluations_[k].get();
+      linearizations_.back().next = k < N ? evaluations_[k + 1].get() : nullptr;
+      linearizations_.back().out = &models_[k];
+    }
+    problem_.linearize(linearizations_.data(), N + 1, scratch_.get());
   }
   const std::vector<StageModel>& models() const { return models_; }
 
  private:
   static constexpr int kPiece = 15;  // stages: short enough for the controls not to matter
-  RobotProblem& problem_;
-  ShootingTrajectory trajectory_;
-  const int size_;
+  const RobotProblem& problem_;
+  const ShootingTrajectory trajectory_;
+  std::unique_ptr<ProblemScratch> scratch_;
+  const int pieces_;
   std::vector<StageModel> models_;
-  std::vector<StepStatus> statuses_;
-  std::vector<VectorXd> ends_;
-  std::vector<StepTask> tasks_;
+  std::vector<std::unique_ptr<NodeEvaluation>> evaluations_;
+  std::vector<EvaluateTask> steps_;
+  std::vector<LinearizeTask> linearizations_;
 };
 
 // Every crank at about 1 rad/s.

@@ -40,14 +40,14 @@ class Disturbance {
 };
 
 // One stage on: the new last one comes with the torques that hold the robot still there, and steps to the new last state.
-void shift(RobotProblem& whole, int new_stage, ShootingTrajectory& trajectory) {
+void shift(const RobotProblem& whole, RobotEvaluator& evaluator, int new_stage, ShootingTrajectory& trajectory) {
   std::rotate(trajectory.xs.begin(), trajectory.xs.begin() + 1, trajectory.xs.end());
   std::rotate(trajectory.us.begin(), trajectory.us.begin() + 1, trajectory.us.end());
   const VectorXd& last = *(trajectory.xs.end() - 2);
   VectorXd& u = trajectory.us.back();
   u = calcStaticTorques(whole.model(), whole.spec(new_stage).constraints, last.head(whole.model().nq())).u;
-  double cost = 0;
-  if (whole.step(new_stage, last, u, trajectory.xs.back(), cost) != StepStatus::Ok) trajectory.xs.back() = last;
+  const RobotEvaluation& step = evaluator.evaluate(new_stage, last, u);
+  trajectory.xs.back() = step.status == StepStatus::Ok ? step.x_next : last;
 }
 
 // Height of the first body and the direction that was up in it.
@@ -75,6 +75,7 @@ class Receding {
         motion_(makeBenchmarkWalk(model, options.walk, formulation)),
         whole_(*motion_.problem),
         window_(whole_, options.nodes),
+        evaluator_(whole_),
         ws_(model),
         disturbance_(model) {
     if (options.shifts < 1 || options.nodes >= whole_.numStages())
@@ -122,9 +123,10 @@ class Receding {
     for (int k = 0; k < last && out_.up && static_cast<int>(times_.size()) < options_.shifts; ++k) {
       window_.move(k, x);
       const bool solved = solve(k, solver, trajectory);
-      double cost = 0;
-      out_.up = solved && whole_.step(k, x, trajectory.us[0], next, cost) == StepStatus::Ok;
+      const RobotEvaluation& step = evaluator_.evaluate(k, x, trajectory.us[0]);
+      out_.up = solved && step.status == StepStatus::Ok;
       if (!out_.up) break;
+      next = step.x_next;
       x = disturbance_.apply(whole_.spec(k + 1).constraints, next);
       const Torso torso = findTorso(model_, ws_, x);
       out_.least_height = std::min(out_.least_height, torso.height / start.height);
@@ -136,7 +138,7 @@ class Receding {
   bool solve(int k, Fddp& solver, ShootingTrajectory& trajectory) {
     const long preemptions = countPreemptions();
     const auto begin = std::chrono::steady_clock::now();
-    if (k > 0) shift(whole_, k + options_.nodes - 1, trajectory);
+    if (k > 0) shift(whole_, evaluator_, k + options_.nodes - 1, trajectory);
     const FddpSummary summary = solver.solve(window_, trajectory);
     times_.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     if (countPreemptions() > preemptions) ++preempted_;
@@ -158,6 +160,7 @@ class Receding {
   Motion motion_;
   RobotProblem& whole_;
   Window window_;
+  RobotEvaluator evaluator_;
   Workspace ws_;
   Disturbance disturbance_;
   std::vector<double> times_;  // s

@@ -3,7 +3,7 @@
 namespace bielle {
 
 Vector3d calcCom(const Model& model, const Workspace& ws) {
-  requireStage(ws, WorkspaceStage::Position, "calcCom", "updatePositions");
+  requireStage(ws, WorkspaceStage::Placement, "calcCom", "updatePlacements or updatePositions");
   Vector3d sum = Vector3d::Zero();
   for (int i = 1; i < model.numBodies(); ++i) {
     const Inertia& inertia = model.bodies()[i].inertia;
@@ -13,7 +13,7 @@ Vector3d calcCom(const Model& model, const Workspace& ws) {
 }
 
 Vector3d calcComVelocity(const Model& model, const Workspace& ws) {
-  requireStage(ws, WorkspaceStage::Velocity, "calcComVelocity", "updateVelocities");
+  requireBodyVelocities(ws, "calcComVelocity");
   return ws.hc[0].head<3>() / model.mass();
 }
 
@@ -33,7 +33,7 @@ void calcComVelocityDerivative(const Model& model, const Workspace& ws, Eigen::R
 }
 
 Vector6d calcCentroidalMomentum(const Model& model, const Workspace& ws) {
-  requireStage(ws, WorkspaceStage::Velocity, "calcCentroidalMomentum", "updateVelocities");
+  requireBodyVelocities(ws, "calcCentroidalMomentum");
   Vector6d h = ws.hc[0];
   h.tail<3>() -= calcCom(model, ws).cross(h.head<3>());
   return h;

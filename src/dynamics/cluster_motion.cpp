@@ -48,7 +48,7 @@ ClusterMotionOf<T>::ClusterMotionOf(const ReducedCluster& l) : cluster(l) {
   const int n = l.model.nv(), m = l.closures.rows, r = l.size;
   for (MatrixX<T>* x : {&Z, &dy, &dv}) x->setZero(n, r);
   for (Matrix6X<T>* x : {&J, &dV, &dA, &dW}) x->setZero(6, n * r);
-  for (MatrixX<T>* x : {&K_q, &K_v}) x->setZero(m, r);
+  for (MatrixX<T>* x : {&C_q, &C_v}) x->setZero(m, r);
   X.setZero(l.rank, r);
 }
 
@@ -71,10 +71,10 @@ void updateVelocityLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& motion
     for (int c = 0; c < cluster.size; ++c) {
       const Vector6<T> dnu = calcDifference(motion, motion.dV, own, c) +
                              crossMotion(calcDifference(motion, motion.J, own, c), view.ws.V[placed.body2]);
-      motion.K_q.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dnu));
+      motion.C_q.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dnu));
     }
   }
-  applyMinusPlus(motion, motion.K_q, motion.Z);
+  applyMinusPlus(motion, motion.C_q, motion.Z);
   sumPaths(cluster, motion.dV, [&](int k, int c, Vector6<T>& sum) {
     sum += N(k, c) * view.ws.dV.col(view.dofs[k]) + motion.Z(k, c) * view.ws.J.col(view.dofs[k]);
   });
@@ -100,12 +100,12 @@ void updateAccelerationLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& mo
       const Vector6<T> dq = calcDifference(motion, motion.dA, own, c) - crossMotion(V12, dV) + crossMotion(J, A2) -
                             crossMotion(V1, crossMotion(J, V2));
       const Vector6<T> dv = calcDifference(motion, motion.dW, own, c) - crossMotion(V12, J);
-      motion.K_q.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dq));
-      motion.K_v.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dv));
+      motion.C_q.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dq));
+      motion.C_v.col(c).segment(row, rows) = selectRows<T>(placed, X_W1.actInvMotion(dv));
     }
   }
-  applyMinusPlus(motion, motion.K_q, motion.dy);
-  applyMinusPlus(motion, motion.K_v, motion.dv);
+  applyMinusPlus(motion, motion.C_q, motion.dy);
+  applyMinusPlus(motion, motion.C_v, motion.dv);
   sumPaths(cluster, motion.dA, [&](int k, int c, Vector6<T>& sum) {
     sum += N(k, c) * ws.dA.col(view.dofs[k]) + Z(k, c) * getTurn(k) + motion.dy(k, c) * ws.J.col(view.dofs[k]);
   });
@@ -115,7 +115,7 @@ void updateAccelerationLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& mo
 }
 
 template <typename T>
-void calcForceLift(const ClusterViewOf<T>& view, const ClusterMotionOf<T>& motion,
+void calcGeometricStiffness(const ClusterViewOf<T>& view, const ClusterMotionOf<T>& motion,
                    typename ArgumentsOf<T>::ConstVector forces, typename ArgumentsOf<T>::Matrix out) {
   const ReducedCluster& cluster = motion.cluster;
   const int n = static_cast<int>(cluster.dofs.size());
@@ -152,7 +152,7 @@ template void calcClusterDrift(const ClusterViewOf<double>&, const ReducedCluste
 template void updateTwists(const ClusterViewOf<double>&, const ClusterBasisOf<double>&, ClusterMotionOf<double>&);
 template void updateVelocityLift(const ClusterViewOf<double>&, ClusterMotionOf<double>&);
 template void updateAccelerationLift(const ClusterViewOf<double>&, ClusterMotionOf<double>&);
-template void calcForceLift(const ClusterViewOf<double>&, const ClusterMotionOf<double>&,
+template void calcGeometricStiffness(const ClusterViewOf<double>&, const ClusterMotionOf<double>&,
                             ArgumentsOf<double>::ConstVector, ArgumentsOf<double>::Matrix);
 template struct ClusterMotionOf<Lanes>;
 template void calcClusterDrift(const ClusterViewOf<Lanes>&, const ReducedCluster&, const ClusterBasisOf<Lanes>&,
@@ -160,7 +160,7 @@ template void calcClusterDrift(const ClusterViewOf<Lanes>&, const ReducedCluster
 template void updateTwists(const ClusterViewOf<Lanes>&, const ClusterBasisOf<Lanes>&, ClusterMotionOf<Lanes>&);
 template void updateVelocityLift(const ClusterViewOf<Lanes>&, ClusterMotionOf<Lanes>&);
 template void updateAccelerationLift(const ClusterViewOf<Lanes>&, ClusterMotionOf<Lanes>&);
-template void calcForceLift(const ClusterViewOf<Lanes>&, const ClusterMotionOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector,
+template void calcGeometricStiffness(const ClusterViewOf<Lanes>&, const ClusterMotionOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector,
                             ArgumentsOf<Lanes>::Matrix);
 
 }  // namespace bielle

@@ -52,9 +52,9 @@ ClusterScratchOf<T>::ClusterScratchOf(const ReducedCluster& cluster) : ws(cluste
 
 template <typename T>
 ClusterStateOf<T>::ClusterStateOf(const ReducedCluster& cluster)
-    : basis_(cluster), placements_(cluster.model.numBodies()) {
-  zeta_.setZero(cluster.rank);
-  step_.setZero(cluster.model.nv());
+    : basis(cluster), placements(cluster.model.numBodies()) {
+  zeta.setZero(cluster.rank);
+  step.setZero(cluster.model.nv());
 }
 
 template <typename T>
@@ -102,7 +102,7 @@ void selectRows(const MatrixX<T>& all, const std::vector<typename LogicOf<T>::In
     for (size_t i = 0; i < rows.size(); ++i) out(i, k) = getEntry(&all(0, k), rows[i]);
 }
 
-// J W^{-1/2} = [L, 0] Q^T with Q = H_1 H_2 ..., H = I - beta v v^T, the v in the columns of `reflectors`. Rows are taken
+// J W^{-1/2} = [L, 0] Q^T with Q = Q_1 Q_2 ..., Q_p = I - beta v v^T, the v in the columns of `reflectors`. Rows are taken
 // by what the ones before leave of them, largest first. False when the rank is another than the cluster's.
 template <typename T>
 typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
@@ -182,18 +182,18 @@ typename LogicOf<T>::Mask updateNewton(const ReducedCluster& cluster, ClusterScr
   return regular;
 }
 
-}  // namespace
-
 // Eq. (1): N = W^{-1/2} Q_2 with the last columns of Q, and L L^T = J W^{-1} J^T.
 template <typename T>
-typename LogicOf<T>::Mask ClusterStateOf<T>::updateBases(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) {
+typename LogicOf<T>::Mask updateBases(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                      ClusterStateOf<T>& out) {
   const int rank = cluster.rank, size = cluster.size, n = static_cast<int>(cluster.metric.size());
-  placements_ = scratch.ws.X_WB;
+  ClusterBasisOf<T>& basis = out.basis;
+  out.placements = scratch.ws.X_WB;
   updateColumns(cluster.model, scratch.ws);
   updateJacobian(cluster, scratch);
-  const Mask regular = factorize(cluster, scratch, basis_);
+  const auto regular = factorize(cluster, scratch, basis);
   if (!any(regular)) return regular;
-  MatrixX<T>& N = basis_.N;
+  MatrixX<T>& N = basis.N;
   N.setZero();
   for (int c = 0; c < size; ++c) N(rank + c, c) = 1;
   for (int p = rank - 1; p >= 0; --p) {
@@ -208,67 +208,43 @@ typename LogicOf<T>::Mask ClusterStateOf<T>::updateBases(const ReducedCluster& c
   for (int c = 0; c < size; ++c)
     for (int k = 0; k < n; ++k) {
       N(k, c) *= cluster.inverse_root[k];
-      basis_.WN(k, c) = cluster.metric[k] * N(k, c);
+      basis.WN(k, c) = cluster.metric[k] * N(k, c);
     }
-  selectRows(scratch.J_all, basis_.rows, basis_.J);
+  selectRows(scratch.J_all, basis.rows, basis.J);
   return regular;
 }
 
-template <typename T>
-void ClusterStateOf<T>::load(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) const {
-  scratch.ws.q = basis_.q;
-  scratch.ws.X_WB = placements_;
+}  // namespace
+
+void loadClusterState(const ReducedCluster& cluster, const ClusterState& state, ClusterScratch& scratch) {
+  scratch.ws.q = state.basis.q;
+  scratch.ws.X_WB = state.placements;
   scratch.ws.stage = WorkspaceStage::Placement;
   updateColumns(cluster.model, scratch.ws);
 }
 
-template <>
-void ClusterStateOf<Lanes>::store(const std::array<ClusterState*, kLane>& to) const {
-  static_assert(sizeof(SE3) == 12 * sizeof(double) && sizeof(SE3Of<Lanes>) == 12 * sizeof(Lanes));
-  const auto give = [&](const Lanes* from, Eigen::Index size, const auto& get) {
-    std::array<double*, kLane> out;
-    for (size_t l = 0; l < kLane; ++l) out[l] = to[l] ? get(*to[l]) : nullptr;
-    unpackLanes(from, size, out);
-  };
-  give(basis_.q.data(), basis_.q.size(), [](ClusterState& s) { return s.basis_.q.data(); });
-  give(basis_.N.data(), basis_.N.size(), [](ClusterState& s) { return s.basis_.N.data(); });
-  give(basis_.WN.data(), basis_.WN.size(), [](ClusterState& s) { return s.basis_.WN.data(); });
-  give(basis_.J.data(), basis_.J.size(), [](ClusterState& s) { return s.basis_.J.data(); });
-  give(basis_.L.data(), basis_.L.size(), [](ClusterState& s) { return s.basis_.L.data(); });
-  give(placements_.front().R.data(), 12 * placements_.size(),
-       [](ClusterState& s) { return s.placements_.front().R.data(); });
-  give(zeta_.data(), zeta_.size(), [](ClusterState& s) { return s.zeta_.data(); });
-  give(step_.data(), step_.size(), [](ClusterState& s) { return s.step_.data(); });
-  for (size_t l = 0; l < kLane; ++l) {
-    if (!to[l]) continue;
-    for (size_t i = 0; i < basis_.rows.size(); ++i) to[l]->basis_.rows[i] = basis_.rows[i][l];
-    to[l]->closed_ = true;
-  }
-}
-
 template <typename T>
-typename LogicOf<T>::Mask ClusterStateOf<T>::update(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
-                                                    typename ArgumentsOf<T>::ConstVector q) {
-  closed_ = true;
-  basis_.q = q;
-  updatePlacements<T>(cluster.model, scratch.ws, basis_.q);
-  return updateBases(cluster, scratch);
+typename LogicOf<T>::Mask updateClusterState(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                             typename ArgumentsOf<T>::ConstVector q, ClusterStateOf<T>& out) {
+  scratch.closed = T(0) <= T(0);
+  out.basis.q = q;
+  updatePlacements<T>(cluster.model, scratch.ws, out.basis.q);
+  return updateBases(cluster, scratch, out);
 }
 
 // Newton on zeta with the matrix J(q) W^{-1} J(q_0)^T of the independent rows, refreshed while it pays. A lane that is done
 // stays as it is.
 template <typename T>
-typename LogicOf<T>::Mask ClusterStateOf<T>::close(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
-                                                   const ClusterBasisOf<T>& start,
-                                                   typename ArgumentsOf<T>::ConstVector d,
-                                                   const VectorX<T>& zeta_guess) {
-  closed_ = false;
+typename LogicOf<T>::Mask closeCluster(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                       const ClusterBasisOf<T>& start, typename ArgumentsOf<T>::ConstVector d,
+                                       const VectorX<T>& zeta_guess, ClusterStateOf<T>& out) {
+  using Mask = typename LogicOf<T>::Mask;
   for (Eigen::Index k = 0; k < start.J.cols(); ++k) scratch.JW.col(k) = start.J.col(k) * cluster.inverse_metric[k];
-  step_ = d;
-  zeta_.setZero();
+  out.step = d;
+  out.zeta.setZero();
   if (zeta_guess.size()) {
-    zeta_ = zeta_guess;
-    addSmallProductTransposed(scratch.JW, zeta_, step_, -1);
+    out.zeta = zeta_guess;
+    addSmallProductTransposed(scratch.JW, out.zeta, out.step, -1);
   }
   const Mask never = T(0) < T(0);
   Mask closed = never, failed = never;
@@ -277,9 +253,9 @@ typename LogicOf<T>::Mask ClusterStateOf<T>::close(const ReducedCluster& cluster
   for (int i = 0; i <= kMaxIterations; ++i) {
     for (const Joint& joint : cluster.model.joints())
       if (joint.nv)
-        integrateJoint<T>(joint, start.q.segment(joint.idx_q, joint.nq), step_.segment(joint.idx_v, joint.nv),
-                          basis_.q.segment(joint.idx_q, joint.nq));
-    updatePlacements<T>(cluster.model, scratch.ws, basis_.q);
+        integrateJoint<T>(joint, start.q.segment(joint.idx_q, joint.nq), out.step.segment(joint.idx_v, joint.nv),
+                          out.basis.q.segment(joint.idx_q, joint.nq));
+    updatePlacements<T>(cluster.model, scratch.ws, out.basis.q);
     const T gap = updateResidual(cluster, scratch);
     const Mask stalled = i > 0 ? gap > 0.5 * previous : never;
     failed = failed || !(gap <= std::numeric_limits<double>::max());
@@ -293,28 +269,28 @@ typename LogicOf<T>::Mask ClusterStateOf<T>::close(const ReducedCluster& cluster
       scratch.correction[r] = getEntry(scratch.residual.data(), start.rows[r]);
     // The residual falls by J dq (notation.h), and dq = -W^{-1} J(q_0)^T dzeta.
     solveFactorized(scratch.newton, scratch.pivots, scratch.correction);
-    for (Eigen::Index r = 0; r < zeta_.size(); ++r)
+    for (Eigen::Index r = 0; r < out.zeta.size(); ++r)
       scratch.correction[r] = select(active && !failed, scratch.correction[r], T(0));
-    zeta_ -= scratch.correction;
-    addSmallProductTransposed(scratch.JW, scratch.correction, step_);
+    out.zeta -= scratch.correction;
+    addSmallProductTransposed(scratch.JW, scratch.correction, out.step);
   }
-  if (!any(closed)) return closed;
-  closed_ = true;
-  return closed && updateBases(cluster, scratch);
+  scratch.closed = closed;
+  return any(closed) ? closed && updateBases(cluster, scratch, out) : closed;
 }
 
 template <typename T>
-std::string ClusterStateOf<T>::describeFailure(const ReducedCluster& cluster, const ClusterScratch& scratch) const {
+std::string describeFailure(const ReducedCluster& cluster, const ClusterScratchOf<T>& scratch, int lane) {
   const ConstraintSet& set = cluster.closures;
-  if (closed_)
+  if (getLane(scratch.closed, lane))
     return "closure '" + set.closures.front().name + "': the rank of its loops is no longer " +
            std::to_string(cluster.rank) + ": a configuration where they can move in other ways";
   size_t worst = 0;
   double largest = -1;
-  for (size_t c = 0; c < set.closures.size(); ++c) {
-    const double gap = scratch.residual.segment(set.offsets[c], getRows(set.closures[c].kind)).cwiseAbs().maxCoeff();
-    if (gap > largest) largest = gap, worst = c;
-  }
+  for (size_t c = 0; c < set.closures.size(); ++c)
+    for (int r = 0; r < getRows(set.closures[c].kind); ++r) {
+      const double gap = std::abs(getLane(scratch.residual[set.offsets[c] + r], lane));
+      if (gap > largest) largest = gap, worst = c;
+    }
   return "closure '" + set.closures[worst].name + "' does not close: the step is too large, or out of its reach";
 }
 
@@ -331,8 +307,17 @@ void expandIndependent(const ClusterBasisOf<T>& basis, typename ArgumentsOf<T>::
 
 template struct ClusterScratchOf<double>;
 template struct ClusterScratchOf<Lanes>;
-template class ClusterStateOf<double>;
-template class ClusterStateOf<Lanes>;
+template struct ClusterStateOf<double>;
+template struct ClusterStateOf<Lanes>;
+template bool updateClusterState(const ReducedCluster&, ClusterScratch&, ConstVectorRef, ClusterState&);
+template LaneMask updateClusterState(const ReducedCluster&, ClusterScratchOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector,
+                                     ClusterStateOf<Lanes>&);
+template bool closeCluster(const ReducedCluster&, ClusterScratch&, const ClusterBasis&, ConstVectorRef, const VectorXd&,
+                           ClusterState&);
+template LaneMask closeCluster(const ReducedCluster&, ClusterScratchOf<Lanes>&, const ClusterBasisOf<Lanes>&,
+                               ArgumentsOf<Lanes>::ConstVector, const VectorX<Lanes>&, ClusterStateOf<Lanes>&);
+template std::string describeFailure(const ReducedCluster&, const ClusterScratch&, int);
+template std::string describeFailure(const ReducedCluster&, const ClusterScratchOf<Lanes>&, int);
 template struct ClusterBasisOf<double>;
 template struct ClusterBasisOf<Lanes>;
 template void applyPseudoInverse(const ReducedCluster&, const ClusterBasis&, double, MatrixRef, MatrixRef);

@@ -56,8 +56,7 @@ DynamicsStatus updateConstrainedDynamics(const Model& model, Workspace& ws, Cons
   updateMassMatrix(model, ws);
   updateBias(model, ws);
   assembleConstraints(ws, cws, constraints);
-  if (cws.saddle_point.factorize(ws.M, cws.J, options) != SaddlePointStatus::Ok)
-    return DynamicsStatus::MassMatrixSingular;
+  if (!cws.saddle_point.factorize(ws.M, cws.J, options)) return DynamicsStatus::MassMatrixSingular;
   cws.force = tau - ws.b;
   cws.saddle_point.solve(cws.force, cws.gamma, cws.a, cws.lambda);
   cws.violation = cws.gamma;

@@ -33,7 +33,7 @@ DynamicsStatus updateImpact(const Model& model, ImpactWorkspace& iws, const Cons
     const Closure& closure = constraints.closures[c];
     calcClosureJacobian(iws.ws, closure, iws.J.middleRows(constraints.offsets[c], getRows(closure.kind)));
   }
-  if (iws.saddle_point.factorize(iws.ws.M, iws.J) != SaddlePointStatus::Ok) return DynamicsStatus::MassMatrixSingular;
+  if (!iws.saddle_point.factorize(iws.ws.M, iws.J)) return DynamicsStatus::MassMatrixSingular;
   iws.momentum.noalias() = iws.ws.M * v;
   iws.saddle_point.solve(iws.momentum, iws.zero, iws.v_plus, iws.impulse);
   iws.change = iws.v_plus - v;

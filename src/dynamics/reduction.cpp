@@ -163,7 +163,9 @@ ReducedJoint makeTip(const Model& model, const Reduction& reduction, int body) {
   return tip;
 }
 
-void gatherConfiguration(const Model& model, const ReducedCluster& cluster, ConstVectorRef q, VectorRef q_cluster) {
+template <typename T>
+void gatherConfiguration(const Model& model, const ReducedCluster& cluster, typename ArgumentsOf<T>::ConstVector q,
+                         typename ArgumentsOf<T>::Vector q_cluster) {
   int at = 0;
   for (int i : cluster.joints) {
     const Joint& joint = model.joints()[i];
@@ -172,7 +174,9 @@ void gatherConfiguration(const Model& model, const ReducedCluster& cluster, Cons
   }
 }
 
-void scatterConfiguration(const Model& model, const ReducedCluster& cluster, ConstVectorRef q_cluster, VectorRef q) {
+template <typename T>
+void scatterConfiguration(const Model& model, const ReducedCluster& cluster,
+                          typename ArgumentsOf<T>::ConstVector q_cluster, typename ArgumentsOf<T>::Vector q) {
   int at = 0;
   for (int i : cluster.joints) {
     const Joint& joint = model.joints()[i];
@@ -180,6 +184,13 @@ void scatterConfiguration(const Model& model, const ReducedCluster& cluster, Con
     at += joint.nq;
   }
 }
+
+template void gatherConfiguration<double>(const Model&, const ReducedCluster&, ConstVectorRef, VectorRef);
+template void gatherConfiguration<Lanes>(const Model&, const ReducedCluster&, ArgumentsOf<Lanes>::ConstVector,
+                                         ArgumentsOf<Lanes>::Vector);
+template void scatterConfiguration<double>(const Model&, const ReducedCluster&, ConstVectorRef, VectorRef);
+template void scatterConfiguration<Lanes>(const Model&, const ReducedCluster&, ArgumentsOf<Lanes>::ConstVector,
+                                          ArgumentsOf<Lanes>::Vector);
 
 void gatherVelocity(const ReducedCluster& cluster, ConstVectorRef v, VectorRef v_cluster) {
   for (size_t k = 0; k < cluster.dofs.size(); ++k) v_cluster[k] = v[cluster.dofs[k]];

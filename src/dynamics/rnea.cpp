@@ -11,7 +11,7 @@ Vector6<T> calcBodyForce(const WorkspaceOf<T>& ws, int i, const Vector6<T>& A) {
   return ws.Y[i] * A + crossForce(ws.V[i], ws.h[i]);
 }
 
-// Angular cluster of B of Eq. (11) for body i.
+// Angular block of B of Eq. (11) for body i.
 template <typename T>
 void calcB(const WorkspaceOf<T>& ws, int i, double mass, Matrix3<T>& B) {
   if (mass == 0) {

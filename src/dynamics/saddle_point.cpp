@@ -1,11 +1,114 @@
 #include "bielle/dynamics/saddle_point.h"
 
 #include <cmath>
+#include <type_traits>
 
-#include "bielle/math/lane_product.h"
 #include "bielle/math/small_dense.h"
 
 namespace bielle {
+namespace {
+
+constexpr double kUnmoved = 1e-22;  // share of the largest |row|^2 below which nothing moves a row, up to rounding
+
+using LanesMap = Eigen::Map<MatrixX<Lanes>>;
+using ConstLanesMap = Eigen::Map<const MatrixX<Lanes>>;
+
+// What the two scalars do in their own way: rows of double side by side in a register, or a system in each lane.
+
+void clear(PaddedMap A) { clearPadding(A); }
+void clear(LanesMap) {}
+
+// Cholesky factor in the lower triangle, in place. Tells whether all pivots, squares of its diagonal, are above the threshold.
+bool factorizeCholesky(PaddedMap A, double threshold) {
+  return factorizeColumns(A, A.cols()) && (A.cols() == 0 || A.diagonal().array().square().minCoeff() > threshold);
+}
+
+LaneMask factorizeCholesky(LanesMap A, double threshold) {
+  const Eigen::Index n = A.rows();
+  LaneMask regular = Lanes(0) <= Lanes(0);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const auto subtract = [&](auto rows, Eigen::Index i) {
+      Lanes sums[rows];
+      for (int r = 0; r < rows; ++r) sums[r] = A(i + r, j);
+      for (Eigen::Index k = 0; k < j; ++k) {
+        const Lanes factor = A(j, k);
+        const Lanes* a = &A(i, k);
+        for (int r = 0; r < rows; ++r) sums[r] -= a[r] * factor;
+      }
+      for (int r = 0; r < rows; ++r) A(i + r, j) = sums[r];
+    };
+    Eigen::Index i = j;
+    for (; i + 4 <= n; i += 4) subtract(std::integral_constant<int, 4>(), i);
+    for (; i < n; ++i) subtract(std::integral_constant<int, 1>(), i);
+    regular = regular && A(j, j) > Lanes(threshold);
+    const Lanes scale = 1 / sqrt(A(j, j));
+    for (Eigen::Index r = j; r < n; ++r) A(r, j) *= scale;
+  }
+  return regular;
+}
+
+// W = J L^{-T} in place.
+void solveFactor(PaddedMap L, PaddedMap W) { solveTransposedFromRight(L, W); }
+
+void solveFactor(LanesMap L, LanesMap W) {
+  const Eigen::Index m = W.rows(), n = W.cols();
+  const auto solveRows = [&](auto rows, Eigen::Index i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      Lanes sums[rows];
+      for (int r = 0; r < rows; ++r) sums[r] = W(i + r, j);
+      for (Eigen::Index k = 0; k < j; ++k) {
+        const Lanes factor = L(j, k);
+        const Lanes* w = &W(i, k);
+        for (int r = 0; r < rows; ++r) sums[r] -= factor * w[r];
+      }
+      const Lanes scale = 1 / L(j, j);
+      for (int r = 0; r < rows; ++r) W(i + r, j) = sums[r] * scale;
+    }
+  };
+  Eigen::Index i = 0;
+  for (; i + 4 <= m; i += 4) solveRows(std::integral_constant<int, 4>(), i);
+  for (; i < m; ++i) solveRows(std::integral_constant<int, 1>(), i);
+}
+
+// G = W W^T
+void setGram(PaddedMap W, PaddedMap room, MatrixXd& G) {
+  room.setZero();
+  clearPadding(room);
+  addProduct(W.rows(), W.rows(), W.cols(), 1, pad(W), {W.data(), W.outerStride(), 1}, pad(room));
+  G = room;
+}
+
+void setGram(LanesMap W, LanesMap, MatrixX<Lanes>& G) {
+  G.setZero();
+  addSmallProduct(W, W.transpose(), G);
+}
+
+// x = L^{-1} x and x = L^{-T} x
+template <typename Matrix, typename T>
+void solveLower(const Matrix& L, VectorX<T>& x) {
+  for (Eigen::Index j = 0; j < x.size(); ++j) {
+    x[j] /= L(j, j);
+    for (Eigen::Index r = j + 1; r < x.size(); ++r) x[r] -= L(r, j) * x[j];
+  }
+}
+
+template <typename Matrix, typename T>
+void solveLowerTransposed(const Matrix& L, VectorX<T>& x) {
+  for (Eigen::Index j = x.size() - 1; j >= 0; --j) {
+    T sum = x[j];
+    for (Eigen::Index r = j + 1; r < x.size(); ++r) sum -= L(r, j) * x[r];
+    x[j] = sum / L(j, j);
+  }
+}
+
+template <typename Vector>
+auto calcSquaredNorm(const Vector& x) {
+  typename Vector::Scalar sum = 0;
+  for (Eigen::Index i = 0; i < x.size(); ++i) sum += x[i] * x[i];
+  return sum;
+}
+
+}  // namespace
 
 void SaddlePointFactors::resize(int n, int m) {
   L.setZero(n, n);
@@ -14,104 +117,139 @@ void SaddlePointFactors::resize(int n, int m) {
   D.setZero(m);
 }
 
-void SaddlePoint::resize(int n, int m) {
-  if (J_.rows() == m && J_.cols() == n) return;
-  J_.setZero(m, n);
-  M_.setZero(roundUpToLane(n) * n);
-  W_.setZero(roundUpToLane(m) * n);
-  G_llt_.setZero(roundUpToLane(m) * m);
-  factors_.resize(n, m);
-  for (MatrixXd* matrix : {&G_, &T1_, &T2_}) matrix->setZero(m, m);
-  for (VectorXd* v : {&D_, &rhs_, &correction_}) v->setZero(m);
+template <typename T>
+void SaddlePointOf<T>::resize(int n, int m) {
+  if (n_ == n && m_ == m) return;
+  n_ = n;
+  m_ = m;
+  const auto allocate = [](Storage& storage, Eigen::Index rows, Eigen::Index cols) {
+    if constexpr (std::is_same_v<T, double>)
+      storage.setZero(roundUpToLane(rows) * cols);
+    else
+      storage.setZero(rows, cols);
+  };
+  allocate(L_, n, n);
+  allocate(W_, m, n);
+  allocate(G_llt_, m, m);
+  for (MatrixX<T>* x : {&G_, &Ginv_, &P_, &T1_, &T2_}) x->setZero(m, m);
+  for (VectorX<T>* x : {&D_, &rhs_, &y_, &correction_}) x->setZero(m);
 }
 
-SaddlePointStatus SaddlePoint::factorize(const MatrixXd& M, const MatrixXd& J, const SaddlePointOptions& options) {
+template <typename T>
+typename LogicOf<T>::Mask SaddlePointOf<T>::factorize(const MatrixX<T>& M, const MatrixX<T>& J,
+                                                      const SaddlePointOptions& options) {
+  using std::sqrt;
   options_ = options;
-  const Eigen::Index n = J_.cols(), m = J_.rows();
-  PaddedMap L = shapePadded(M_, n, n), W = shapePadded(W_, m, n), G_llt = shapePadded(G_llt_, m, m);
+  auto L = view(L_, n_, n_), W = view(W_, m_, n_), G_llt = view(G_llt_, m_, m_);
+  dependent_ = unmoved_ = T(0) < T(0);
   L = M;
-  clearPadding(L);
-  if (!factorizeColumns(L, n)) return SaddlePointStatus::MassMatrixSingular;
-  if (m == 0) return SaddlePointStatus::Ok;
-  J_ = J;
+  clear(L);
+  const Mask regular = factorizeCholesky(L, 0);
+  if (!any(regular) || m_ == 0) return regular;
   W = J;
-  clearPadding(W);
-  solveTransposedFromRight(L, W);
-  D_ = W.rowwise().squaredNorm().cwiseSqrt();
-  const double largest = D_.maxCoeff();
-  for (Eigen::Index i = 0; i < m; ++i)  // a row that nothing moves, up to rounding, has no force
-    D_[i] = D_[i] > 1e-11 * largest ? 1 / D_[i] : 0;
-  W.array().colwise() *= D_.array();
-  G_llt.setZero();
-  clearPadding(G_llt);
-  addProduct(m, m, n, 1, pad(W), {W.data(), W.outerStride(), 1}, pad(G_llt));
-  G_ = G_llt;
-  const double pivot = factorizeColumns(G_llt, m) ? G_llt.diagonal().array().square().minCoeff() : 0;
-  redundant_ = !(pivot > options.direct_threshold);
-  if (redundant_) {
-    G_llt = G_;
-    G_llt.diagonal().array() += options.proximal;
-    factorizeColumns(G_llt, m);
+  clear(W);
+  solveFactor(L, W);
+  T largest = 0;
+  for (Eigen::Index i = 0; i < m_; ++i) {
+    D_[i] = calcSquaredNorm(W.row(i));
+    largest = select(D_[i] > largest, D_[i], largest);
   }
-  return SaddlePointStatus::Ok;
+  for (Eigen::Index i = 0; i < m_; ++i) {
+    const auto moved = D_[i] > kUnmoved * largest;
+    unmoved_ = unmoved_ || !moved;
+    D_[i] = select(moved, 1 / sqrt(select(moved, D_[i], T(1))), T(0));
+    W.row(i) *= D_[i];
+  }
+  setGram(W, G_llt, G_);
+  for (Eigen::Index i = 0; i < m_; ++i) G_(i, i) = select(D_[i] > T(0), G_(i, i), T(1));
+  G_llt = G_;
+  clear(G_llt);
+  dependent_ = !factorizeCholesky(G_llt, options.direct_threshold);
+  if (!any(dependent_)) return regular;
+  for (Eigen::Index j = 0; j < m_; ++j) T1_.col(j) = G_llt.col(j);
+  G_llt = G_;
+  clear(G_llt);
+  for (Eigen::Index i = 0; i < m_; ++i) G_llt(i, i) += options.proximal;
+  factorizeCholesky(G_llt, 0);
+  for (Eigen::Index j = 0; j < m_; ++j)
+    for (Eigen::Index i = 0; i < m_; ++i) G_llt(i, j) = select(dependent_, G_llt(i, j), T1_(i, j));
+  return regular;
 }
 
-void SaddlePoint::solve(const VectorXd& f, const VectorXd& g, VectorXd& a, VectorXd& lambda) {
-  const PaddedMap L = shapePadded(M_, J_.cols(), J_.cols()), G_llt = shapePadded(G_llt_, J_.rows(), J_.rows());
+template <typename T>
+void SaddlePointOf<T>::solve(const VectorX<T>& f, const VectorX<T>& g, VectorX<T>& a, VectorX<T>& lambda) {
+  const auto L = view(L_, n_, n_), W = view(W_, m_, n_), G_llt = view(G_llt_, m_, m_);
   a = f;
-  solveSmallCholesky(L, a);  // free accelerations
-  if (J_.rows() == 0) return;
-  rhs_ = -g;
-  rhs_.noalias() -= J_ * a;
-  rhs_.array() *= D_.array();
-  lambda = rhs_;
-  solveSmallCholesky(G_llt, lambda);
-  const int iterations = redundant_ ? options_.max_iterations : 2;  // a direct solution is refined once
-  for (int i = 1; i < iterations; ++i) {
+  solveLower(L, a);  // z
+  if (m_ == 0) return solveLowerTransposed(L, a);
+  rhs_ = -D_.cwiseProduct(g);
+  addSmallProduct(W, a, rhs_, -1);
+  y_ = rhs_;
+  solveSmallCholesky(G_llt, y_);
+  // A direct solution is refined once, Eq. (4) goes on until nothing changes.
+  Mask active = T(0) <= T(0);
+  for (int i = 1; i < options_.max_iterations && any(active); ++i) {
     correction_ = rhs_;
-    correction_.noalias() -= G_ * lambda;
+    addSmallProduct(G_, y_, correction_, -1);
     solveSmallCholesky(G_llt, correction_);
-    lambda += correction_;  // Eq. (3)
-    if (correction_.norm() <= options_.tolerance * lambda.norm()) break;
+    for (Eigen::Index r = 0; r < m_; ++r) y_[r] += select(active, correction_[r], T(0));
+    const T tolerance = options_.tolerance * options_.tolerance;
+    active = active && dependent_ && calcSquaredNorm(correction_) > tolerance * calcSquaredNorm(y_);
   }
-  lambda.array() *= D_.array();
-  a = f;
-  a.noalias() += J_.transpose() * lambda;
-  solveSmallCholesky(L, a);
+  addSmallProductTransposed(W, y_, a);
+  solveLowerTransposed(L, a);
+  lambda = D_.cwiseProduct(y_);
 }
 
-// Inverse of D G D, or its pseudo-inverse as the limit of Eq. (3): with P = (DGD + mu I)^{-1} and E = mu P, the sum
-// P (I + E + E^2 + ...) is doubled at each pass, P_{2k} = P_k + E^k P_k.
-void SaddlePoint::updateInverse() {
-  const Eigen::Index n = J_.cols(), m = J_.rows();
-  factors_.L = shapePadded(M_, n, n);
-  if (m == 0) return;
-  copyTransposed(shapePadded(W_, m, n), factors_.Wt);
-  factors_.D = D_;
-  MatrixXd& Ginv = factors_.Ginv;
-  Ginv.setIdentity();
-  solveSmallCholesky(shapePadded(G_llt_, m, m), Ginv);
-  if (!redundant_) return;
+template <typename T>
+void SaddlePointOf<T>::updateInverse() {
+  if (m_ == 0) return;
+  Ginv_.setIdentity();
+  solveSmallCholesky(view(G_llt_, m_, m_), Ginv_);
+  if (any(dependent_)) improveInverse();
+}
+
+// With P = (W W^T + mu I)^{-1} and E = mu P, the sum P (I + E + E^2 + ...) is doubled at each pass, P_{2k} = P_k + E^k P_k.
+template <typename T>
+void SaddlePointOf<T>::improveInverse() {
+  const auto multiply = [](const MatrixX<T>& A, const MatrixX<T>& B, MatrixX<T>& out) {
+    out.setZero();
+    addSmallProduct(A, B, out);
+  };
+  MatrixX<T>& P = P_;
+  P = Ginv_;
   constexpr int kDoublings = 3;  // eight proximal steps
-  T1_ = options_.proximal * Ginv;
+  T1_ = options_.proximal * P;
   for (int i = 0; i < kDoublings; ++i) {
-    T2_ = Ginv;
-    T2_.noalias() += T1_ * Ginv;
-    Ginv.swap(T2_);
-    T2_.noalias() = T1_ * T1_;
+    multiply(T1_, P, T2_);
+    P += T2_;
+    multiply(T1_, T1_, T2_);
     T1_.swap(T2_);
   }
   // G P G loses what is not in the range of G, rounding of the size of 1/mu above all; one Newton-Schulz step then gains
   // what eigenvalues near mu still lack.
-  T1_.noalias() = G_ * Ginv;
-  T2_.noalias() = Ginv * T1_;
-  T1_.noalias() = G_ * T2_;
-  Ginv = 2 * T2_;
-  Ginv.noalias() -= T2_ * T1_;
+  multiply(G_, P, T1_);
+  multiply(P, T1_, T2_);
+  multiply(G_, T2_, T1_);
+  multiply(T2_, T1_, P);
+  for (Eigen::Index j = 0; j < m_; ++j)
+    for (Eigen::Index i = 0; i < m_; ++i) Ginv_(i, j) = select(dependent_, 2 * T2_(i, j) - P(i, j), Ginv_(i, j));
+}
+
+template class SaddlePointOf<double>;
+template class SaddlePointOf<Lanes>;
+
+void SaddlePoint::updateInverse() {
+  SaddlePointOf<double>::updateInverse();
+  factors_.L = L();
+  factors_.Wt.resize(L().rows(), W().rows());
+  copyTransposed(W(), factors_.Wt);
+  factors_.Ginv = Ginv();
+  factors_.D = D();
 }
 
 void SaddlePoint::solveDerivatives(MatrixRef X, MatrixRef dlambda) {
-  const Eigen::Index columns = X.cols(), n = X.rows(), m = J_.rows(), padded = roundUpToLane(columns);
+  const Eigen::Index columns = X.cols(), n = X.rows(), m = dlambda.rows(), padded = roundUpToLane(columns);
   if (X_.size() < padded * n || dlambda_t_.size() < padded * m) {
     X_.setZero(padded * n);
     dlambda_t_.setZero(padded * m);
@@ -121,17 +259,16 @@ void SaddlePoint::solveDerivatives(MatrixRef X, MatrixRef dlambda) {
   copyTransposed(dlambda, dlambda_t);
   clearPadding(Xt);
   clearPadding(dlambda_t);
-  solveDerivatives(factors_, Xt, dlambda_t);
+  bielle::solveDerivatives(factors_, Xt, dlambda_t, room_);
   copyTransposed(Xt, X);
   copyTransposed(dlambda_t, dlambda);
 }
 
-void SaddlePoint::solveDerivatives(const SaddlePointFactors& factors, PaddedMap Xt, PaddedMap dlambda_t) {
-  // In the coordinates of L: W = D J L^{-T} and L^{-1} dID give J M^{-1} dID = D^{-1} W L^{-1} dID. All is done on
-  // transposes, whose columns are long.
+void solveDerivatives(const SaddlePointFactors& factors, PaddedMap Xt, PaddedMap dlambda_t, VectorXd& room) {
+  // J M^{-1} dID = D^{-1} W L^{-1} dID. All is done on transposes, whose columns are long.
   const Eigen::Index columns = Xt.rows(), n = Xt.cols(), m = factors.D.size(), padded = roundUpToLane(columns);
-  if (rhs_t_.size() < padded * m) rhs_t_.setZero(padded * m);
-  PaddedMap rhs = shapePadded(rhs_t_, columns, m);
+  if (room.size() < padded * m) room.setZero(padded * m);
+  PaddedMap rhs = shapePadded(room, columns, m);
   const MatrixXd &L = factors.L, &Wt = factors.Wt;
   solveTransposedFromRight(L, Xt);
   for (Eigen::Index i = 0; i < m; ++i) rhs.col(i) = -factors.D[i] * dlambda_t.col(i);

@@ -31,6 +31,10 @@ void requireStage(const WorkspaceOf<T>& ws, WorkspaceStage stage, const char* fu
   if (ws.stage < stage) throw std::logic_error(std::string(function) + " needs " + call + " to be called first");
 }
 
+void requireBodyVelocities(const Workspace& ws, const char* function) {
+  if (ws.stage != WorkspaceStage::Bodies) requireStage(ws, WorkspaceStage::Velocity, function, "updateVelocities");
+}
+
 template struct WorkspaceOf<double>;
 template struct WorkspaceOf<Lanes>;
 template void requireStage(const Workspace&, WorkspaceStage, const char*, const char*);

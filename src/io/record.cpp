@@ -26,7 +26,8 @@ void recordNode(const Model& model, Workspace& ws, const VectorXd& x, int k, Mot
   }
 }
 
-void recordStage(RobotProblem& problem, const VectorXd& x, const VectorXd& u, int k, MotionRecord& record) {
+void recordStage(const RobotProblem& problem, RobotEvaluator& evaluator, const VectorXd& x, const VectorXd& u, int k,
+                 MotionRecord& record) {
   const Model& model = problem.model();
   record.u.row(k) = u;
   record.closure_wrenches.row(k).setZero();
@@ -35,20 +36,20 @@ void recordStage(RobotProblem& problem, const VectorXd& x, const VectorXd& u, in
     record.a.row(k).setZero();
     return;
   }
-  VectorXd a, lambda;
-  if (problem.calcDynamics(k, x, u, a, lambda) != StepStatus::Ok) {
+  const RobotEvaluation& at = evaluator.evaluate(k, x, u);
+  if (at.status != StepStatus::Ok) {
     for (RowMatrixXd* table : {&record.a, &record.closure_wrenches, &record.contact_wrenches})
       table->row(k).setConstant(std::numeric_limits<double>::quiet_NaN());
     return;
   }
-  record.a.row(k) = a;
+  record.a.row(k) = at.a;
   const ConstraintSet& set = problem.spec(k).constraints;
   for (int c = 0; c < static_cast<int>(set.closures.size()); ++c) {
     const Closure& closure = set.closures[c];
     const bool loop = c < set.num_loops;
     const int index = loop ? c : model.findContact(closure.name);
     (loop ? record.closure_wrenches : record.contact_wrenches).block<1, 6>(k, 6 * index) =
-        expandRows(closure, lambda.segment(set.offsets[c], getRows(closure.kind)));
+        expandRows(closure, at.lambda.segment(set.offsets[c], getRows(closure.kind)));
   }
 }
 
@@ -74,7 +75,8 @@ std::vector<RecordTable> listTables(const MotionRecord& r) {
 }
 
 MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajectory) {
-  RobotProblem& problem = *motion.problem;
+  const RobotProblem& problem = *motion.problem;
+  RobotEvaluator evaluator(problem);
   const Model& model = problem.model();
   const int stages = problem.numStages();
   MotionRecord record;
@@ -90,7 +92,7 @@ MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajecto
     record.time[k] = time;
     recordNode(model, ws, trajectory.xs[k], k, record);
     if (k == stages) break;
-    recordStage(problem, trajectory.xs[k], trajectory.us[k], k, record);
+    recordStage(problem, evaluator, trajectory.xs[k], trajectory.us[k], k, record);
     time += problem.spec(k).dt;
   }
   return record;

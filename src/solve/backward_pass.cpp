@@ -1,7 +1,9 @@
 #include "backward_pass.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "parallel_errors.h"
 #include "stopwatch.h"
 
 namespace bielle {
@@ -9,9 +11,9 @@ namespace bielle {
 void BackwardPass::resize(const ShootingProblem& problem) {
   const int N = problem.numStages();
   models_.resize(N + 1);
+  tasks_.resize(N + 1);
   failures_.resize(N + 1);
-  statuses_.resize(N + 1);
-  linearized_ = std::vector<std::atomic<bool>>(N + 1);
+  if (linearized_.size() != models_.size()) linearized_ = std::vector<std::atomic<bool>>(N + 1);
   for (int k = 0; k <= N; ++k) {
     const int ndx = problem.tangentSize(k), nu = k < N ? problem.controlSize(k) : 0;
     const int ndx_next = k < N ? problem.tangentSize(k + 1) : 0;
@@ -23,20 +25,28 @@ void BackwardPass::resize(const ShootingProblem& problem) {
 
 int BackwardPass::update(const BackwardInput& input) {
   const int N = input.problem.numStages();
-  for (std::atomic<bool>& linearized : linearized_) linearized.store(false, std::memory_order_relaxed);
-  for (StageModel& model : models_) hessians_.takeBack(model);  // of a sweep that stopped half way
+  const EvaluationList& nodes = input.evaluations.getIterate();
+  for (int k = 0; k <= N; ++k) {
+    hessians_.takeBack(models_[k]);  // of a sweep that stopped half way
+    tasks_[k].node = k;
+    tasks_[k].at = nodes[k].get();
+    tasks_[k].next = k < N ? nodes[k + 1].get() : nullptr;
+    tasks_[k].out = &models_[k];
+    linearized_[k].store(false, std::memory_order_relaxed);
+  }
   sweep_.start(models_, input.regularization);
   sweep_node_ = N;
-  // Batches of stages, always the same ones, and the terminal node.
-  const int size = input.problem.getBatchSize(), num_batches = (N + size - 1) / size;
-  std::atomic<int> next{num_batches};
+  // Batches of nodes, always the same ones, from the last on.
+  const int size = input.problem.getBatchSize(), num_batches = N / size + 1;
+  std::atomic<int> next{num_batches - 1};
   std::atomic_flag sweeping = ATOMIC_FLAG_INIT;
+  ParallelErrors errors;
   double linearize_seconds = 0, sweep_seconds = 0;
-#pragma omp parallel num_threads(input.threads) reduction(+ : linearize_seconds, sweep_seconds)
+#pragma omp parallel num_threads(std::min(input.threads, num_batches)) reduction(+ : linearize_seconds, sweep_seconds)
   {
     for (int i; (i = next.fetch_sub(1, std::memory_order_relaxed)) >= 0;) {
       const Clock::time_point start = Clock::now();
-      linearize(input, i < num_batches ? i * size : N, i < num_batches ? std::min(N, (i + 1) * size) : N + 1);
+      errors.run(i, [&] { linearize(input, i * size, std::min(N + 1, (i + 1) * size)); });
       linearize_seconds += calcSecondsSince(start);
       if (sweeping.test_and_set(std::memory_order_acquire)) continue;
       const Clock::time_point start_sweep = Clock::now();
@@ -45,6 +55,7 @@ int BackwardPass::update(const BackwardInput& input) {
       sweeping.clear(std::memory_order_release);
     }
   }
+  errors.rethrow();
   const Clock::time_point start_rest = Clock::now();
   sweepReadyNodes(input);
   linearize_seconds_ += linearize_seconds;
@@ -67,24 +78,16 @@ void BackwardPass::sweepReadyNodes(const BackwardInput& input) {
   }
 }
 
-// Stages, or the terminal node. Runs in parallel: nothing may leave but through their own entries.
+// Runs in parallel: writes only to the entries of its own nodes.
 void BackwardPass::linearize(const BackwardInput& input, int begin, int end) {
-  const ShootingTrajectory& nodes = input.nodes;
-  std::string thrown;
-  for (int k = begin; k < end; ++k) hessians_.lend(models_[k]);
-  try {
-    if (begin < input.problem.numStages()) {
-      input.problem.linearizeStages(begin, end, nodes.xs, nodes.us, models_, statuses_);
-    } else {
-      statuses_[begin] = input.problem.linearizeTerminal(nodes.xs[begin], models_[begin]);
-    }
-  } catch (const std::exception& error) {
-    thrown = std::string("the linearization threw: ") + error.what();
-  } catch (...) {
-    thrown = "the linearization threw";
-  }
   for (int k = begin; k < end; ++k) {
-    failures_[k] = thrown.empty() ? checkModel(input.problem, k) : thrown;
+    hessians_.lend(models_[k]);
+    tasks_[k].status = StepStatus::Failed;
+    tasks_[k].failure.clear();
+  }
+  input.problem.linearize(&tasks_[begin], end - begin, input.evaluations.getScratch());
+  for (int k = begin; k < end; ++k) {
+    failures_[k] = checkModel(input.problem, k);
     if (failures_[k].empty()) linearized_[k].store(true, std::memory_order_release);
   }
 }
@@ -92,8 +95,8 @@ void BackwardPass::linearize(const BackwardInput& input, int begin, int end) {
 // What is wrong with the model of a node, empty if nothing is.
 std::string BackwardPass::checkModel(const ShootingProblem& problem, int k) const {
   const StageModel& model = models_[k];
-  if (statuses_[k] != StepStatus::Ok) {
-    const std::string reason = problem.getFailure(k);
+  if (tasks_[k].status != StepStatus::Ok) {
+    const std::string& reason = tasks_[k].failure;
     return "the problem could not be linearized" + (reason.empty() ? "" : ": " + reason);
   }
   const int N = problem.numStages(), nu = k < N ? problem.controlSize(k) : 0;

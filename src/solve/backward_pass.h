@@ -3,22 +3,23 @@
 #include <atomic>
 #include <string>
 
-#include "bielle/solve/fddp.h"
+#include "bielle/solve/lq_sweep.h"
 #include "hessian_pool.h"
+#include "node_evaluations.h"
 
 namespace bielle {
 
-/// The trajectory to linearize about, the boxes of du (N or none), and what the sweep adds.
+/// The iterate to linearize about, the boxes of du (N or none), and what the sweep adds.
 struct BackwardInput {
-  ShootingProblem& problem;
-  const ShootingTrajectory& nodes;
+  const ShootingProblem& problem;
+  const NodeEvaluations& evaluations;
   const std::vector<ControlBox>& boxes;
   LqRegularization regularization;
   int threads;
 };
 
-/// The sweep needs one node after the other, from the last on, and so it goes along with the linearization: whoever has
-/// finished a batch of nodes sweeps as far as models are there, unless somebody does so already.
+/// The sweep needs one node after the other, from the last on, and so it goes along with the linearization: a thread that has
+/// finished a batch of nodes sweeps as far as there are models, unless another thread is doing so.
 class BackwardPass {
  public:
   void resize(const ShootingProblem& problem);
@@ -28,7 +29,7 @@ class BackwardPass {
   /// Why a node could not be linearized, empty if it could.
   const std::string& getFailure(int node) const { return failures_[node]; }
 
-  /// N + 1, but for their second derivatives, which the sweep uses up.
+  /// N + 1, without their second derivatives, which the sweep uses up.
   const std::vector<StageModel>& getModels() const { return models_; }
   const LqSweep& getSweep() const { return sweep_; }
   /// Of all updates since resize(), summed over the threads.
@@ -41,8 +42,8 @@ class BackwardPass {
   void sweepReadyNodes(const BackwardInput& input);
 
   std::vector<StageModel> models_;             // N + 1, those that wait for the sweep with a Hessian from the pool
+  std::vector<LinearizeTask> tasks_;           // N + 1
   std::vector<std::string> failures_;          // N + 1
-  std::vector<StepStatus> statuses_;           // N + 1
   std::vector<std::atomic<bool>> linearized_;  // N + 1: the model is there for the sweep
   HessianPool hessians_;
   LqSweep sweep_;

@@ -2,12 +2,14 @@
 
 #include <omp.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
 
 #include "backward_pass.h"
 #include "fddp_checks.h"
+#include "node_evaluations.h"
 #include "rollout.h"
 #include "stopwatch.h"
 
@@ -19,23 +21,27 @@ constexpr double kPenaltyMargin = 0.5;  // rho of Eq. (5)
 // Differences of costs below this share of the cost are rounding: they neither accept nor refuse a step.
 constexpr double kCostRounding = 1e-14;
 constexpr double kClosingShare = 0.5;  // of Eq. (4): the most that Eq. (8) may be
-constexpr int kShortestSegment = 12;   // stages
+constexpr int kShortestSegment = 6;    // stages
 
 }  // namespace
 
 struct Fddp::Workspace {
+  NodeEvaluations evaluations;
   BackwardPass backward;
   std::vector<VectorXd> dx, du;  // the models' full step
   Rollout rollout;
   std::vector<ControlBox> bounds;  // of u, N or none
   std::vector<ControlBox> boxes;   // of du, N or none
+  std::vector<char> open;          // N: whether the gap behind a stage counts as open
 
-  void resize(const ShootingProblem& problem, const FddpOptions& options);
+  void resize(const ShootingProblem& problem, const FddpOptions& options, int threads);
 };
 
-void Fddp::Workspace::resize(const ShootingProblem& problem, const FddpOptions& options) {
+void Fddp::Workspace::resize(const ShootingProblem& problem, const FddpOptions& options, int threads) {
+  const int num_trials = std::min(problem.getBatchSize(), options.num_step_lengths);
+  evaluations.resize(problem, num_trials > 1 ? 2 * num_trials : 0, threads);
   backward.resize(problem);
-  rollout.resize(problem, options.rollout_segments);
+  rollout.resize(problem, options.rollout_segments, num_trials);
   bounds.resize(options.bounds == ControlBounds::Enforce ? problem.numStages() : 0);
   for (size_t k = 0; k < bounds.size(); ++k) {
     const int stage = static_cast<int>(k), nu = problem.controlSize(stage);
@@ -46,6 +52,7 @@ void Fddp::Workspace::resize(const ShootingProblem& problem, const FddpOptions& 
       throw std::invalid_argument("Fddp: a lower control bound of stage " + std::to_string(k) + " exceeds the upper");
   }
   boxes = bounds;
+  open.assign(problem.numStages(), false);
 }
 
 namespace {
@@ -53,7 +60,7 @@ namespace {
 /// One call of solve(): the numbers of the current iterate and of the step searched from it.
 class Run {
  public:
-  Run(const FddpOptions& options, ShootingProblem& problem, ShootingTrajectory& trajectory,
+  Run(const FddpOptions& options, const ShootingProblem& problem, ShootingTrajectory& trajectory,
       const FddpObserver& observer, Fddp::Workspace& work)
       : options_(options), problem_(problem), trajectory_(trajectory), observer_(observer), work_(work) {}
 
@@ -65,25 +72,30 @@ class Run {
 
   void start();
   End linearize();
+  End evaluate();
   End linearizeAndSweep();
   void updateGaps();
   End findStep();
   End updateStep();
   bool searchLine();
+  bool tryFullStep(const RolloutInput& input, int segments, double nu);
+  bool searchInSegments(const RolloutInput& input, int segments, double nu);
+  bool accept(Trial& trial, double nu);
   bool mustClose() const;
   bool closesTwice(int segments) const;
-  bool isAcceptable(double alpha, double nu) const;
+  bool isAcceptable(const Trial& trial, double nu) const;
   void acceptStep();
   End raiseRegularization(const char* reason);
   End checkProgress();
   FddpSummary finish(FddpTermination termination);
 
   bool isInterrupted() const { return observer_.interrupt && observer_.interrupt->load(); }
+  int getNumSegments() const { return std::max(1, std::min(options_.rollout_segments, N_ / kShortestSegment)); }
   bool isFeasible() const { return line_.gap <= options_.gap_tolerance; }
   double calcGradient() const;
 
   const FddpOptions& options_;
-  ShootingProblem& problem_;
+  const ShootingProblem& problem_;
   ShootingTrajectory& trajectory_;
   const FddpObserver& observer_;
   Fddp::Workspace& work_;
@@ -91,11 +103,14 @@ class Run {
   int N_ = 0;
   Clock::time_point start_ = Clock::now();
   FddpIteration line_;                // the iteration under way
-  double gap_sum_ = 0;                // c, zero once the gaps are closed
+  double gap_sum_ = 0;                // c, of the gaps that count as open
   double slope_ = 0, curvature_ = 0;  // Eq. (1)
   double regularization_ = 0;
   int threads_ = 1;
-  bool swept_ = false;                        // a sweep is still to be looked at
+  bool swept_ = false;         // a sweep is still to be looked at
+  Trial* accepted_ = nullptr;  // the trial that ends a line search
+  int failed_node_ = -1;       // where the first trial of a line search failed that did, and why
+  std::string failure_;
   double last_gradient_ = 0, last_step_ = 1;  // of the iteration before
   FddpSummary summary_;
 };
@@ -113,12 +128,12 @@ FddpSummary Run::solve() {
 void Run::start() {
   N_ = problem_.numStages();
   checkSizes(problem_, trajectory_);
-  work_.resize(problem_, options_);
+  threads_ = options_.threads > 0 ? options_.threads : omp_get_max_threads();
+  work_.resize(problem_, options_, threads_);
   trajectory_.xs[0] = problem_.initialState();
   for (size_t k = 0; k < work_.bounds.size(); ++k) {
     trajectory_.us[k] = trajectory_.us[k].cwiseMax(work_.bounds[k].lower).cwiseMin(work_.bounds[k].upper);
   }
-  threads_ = options_.threads > 0 ? options_.threads : omp_get_max_threads();
   regularization_ = options_.initial_regularization;
   summary_.log.reserve(std::min(options_.max_iterations + 1, 10000));
 }
@@ -134,6 +149,7 @@ Run::End Run::linearize() {
     work_.boxes[k].lower = work_.bounds[k].lower - trajectory_.us[k];
     work_.boxes[k].upper = work_.bounds[k].upper - trajectory_.us[k];
   }
+  if (const End end = evaluate()) return end;
   if (const End end = linearizeAndSweep()) return end;
   updateGaps();
   summary_.cost = line_.cost;
@@ -141,9 +157,18 @@ Run::End Run::linearize() {
   return {};
 }
 
+Run::End Run::evaluate() {
+  const int failed = work_.evaluations.update(problem_, trajectory_, threads_);
+  if (failed < 0) return {};
+  const std::string& reason = work_.evaluations.getIterate()[failed]->failure;
+  summary_.message = "node " + std::to_string(failed) + ": the problem could not be evaluated";
+  if (!reason.empty()) summary_.message += ": " + reason;
+  return FddpTermination::Failed;
+}
+
 Run::End Run::linearizeAndSweep() {
   const LqRegularization regularization{regularization_, regularization_ * options_.state_regularization_ratio};
-  const int failed = work_.backward.update({problem_, trajectory_, work_.boxes, regularization, threads_});
+  const int failed = work_.backward.update({problem_, work_.evaluations, work_.boxes, regularization, threads_});
   swept_ = true;
   if (failed < 0) return {};
   summary_.message = "node " + std::to_string(failed) + ": " + work_.backward.getFailure(failed);
@@ -151,14 +176,16 @@ Run::End Run::linearizeAndSweep() {
 }
 
 void Run::updateGaps() {
+  const std::vector<StageModel>& models = work_.backward.getModels();
   gap_sum_ = 0;
-  for (const StageModel& model : work_.backward.getModels()) {
-    line_.cost += model.cost;
-    if (model.gap.size() == 0) continue;
-    line_.gap = std::max(line_.gap, model.gap.lpNorm<Eigen::Infinity>());
-    gap_sum_ += model.gap.lpNorm<1>();
+  for (int k = 0; k <= N_; ++k) {
+    line_.cost += models[k].cost;
+    if (models[k].gap.size() == 0) continue;
+    const double largest = models[k].gap.lpNorm<Eigen::Infinity>();
+    line_.gap = std::max(line_.gap, largest);
+    work_.open[k] = largest > options_.gap_tolerance;
+    if (work_.open[k]) gap_sum_ += models[k].gap.lpNorm<1>();
   }
-  if (isFeasible()) gap_sum_ = 0;
 }
 
 // Ends with an acceptable trial, unless the current iterate is where the iterations end.
@@ -173,8 +200,9 @@ Run::End Run::findStep() {
 }
 
 // The sweep, at the least regularization from the current one on for which it goes through. A second one needs the models
-// anew: the sweep uses them up.
+// anew, because a sweep uses up their Hessians; the evaluations are still there.
 Run::End Run::updateStep() {
+  failure_.clear();
   while (true) {
     if (!swept_)
       if (const End end = linearizeAndSweep()) return end;
@@ -230,48 +258,82 @@ bool Run::closesTwice(int segments) const {
 bool Run::searchLine() {
   const double penalized = std::max(0.0, slope_ + 0.5 * std::max(0.0, curvature_));
   const double nu = gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0;  // Eq. (5)
-  const RolloutInput input{problem_,     trajectory_, work_.backward.getModels(), work_.backward.getSweep(), work_.dx,
-                           work_.bounds, isFeasible()};
+  const RolloutInput input{
+      problem_,     trajectory_, work_.evaluations, work_.backward.getModels(), work_.backward.getSweep(), work_.dx,
+      work_.bounds, work_.open,  threads_};
+  const int segments = getNumSegments();
+  if (segments > 1 && options_.last_rollout == LastRollout::Segments && !mustClose())
+    return searchInSegments(input, segments, nu);
+  if (segments > 1 && last_step_ == 1 && tryFullStep(input, segments, nu)) return true;
   Rollout& rollout = work_.rollout;
-  const auto accept = [&](bool ok, double alpha) {
-    if (!ok || !isAcceptable(alpha, nu)) return false;
-    line_.step = alpha;
-    return true;
-  };
-  // Segments start where linear models foresee it: what they cannot reach, one piece may.
-  const RolloutOptions cut{1, std::max(1, std::min(options_.rollout_segments, N_ / kShortestSegment)), threads_};
-  if (cut.segments > 1 && last_step_ == 1) {
-    const auto isClosed = [&] { return rollout.getGapMax() <= options_.gap_tolerance; };
-    if (!mustClose()) {
-      if (accept(rollout.update(input, cut), 1)) return true;
-    } else if (closesTwice(cut.segments)) {
-      const bool ok = rollout.update(input, cut) && (isClosed() || (rollout.close(input, cut) && isClosed()));
-      if (accept(ok, 1)) return true;
-    }
-  }
+  const int num_trials = rollout.getNumTrials();
   double alpha = 1;
-  for (int i = 0; i < options_.num_step_lengths; ++i, alpha *= 0.5) {
+  for (int i = 0; i < options_.num_step_lengths; i += num_trials) {
     if (isInterrupted()) return false;
-    if (accept(rollout.update(input, {alpha, 1, threads_}), alpha)) return true;
+    const int num = std::min(num_trials, options_.num_step_lengths - i);
+    rollout.search(input, alpha, num);
+    for (int j = 0; j < num; ++j, alpha *= 0.5)
+      if (accept(rollout.getTrial(j), nu)) return true;
   }
   return false;
 }
 
-// Whether the merit of the trial has fallen enough, Eqs. (4) and (8).
-bool Run::isAcceptable(double alpha, double nu) const {
-  const Rollout& trial = work_.rollout;
+// A full step in segments. They start where linear models foresee it: what they cannot reach, a rollout in one piece may.
+bool Run::tryFullStep(const RolloutInput& input, int segments, double nu) {
+  Rollout& rollout = work_.rollout;
+  Trial& trial = rollout.getTrial(0);
+  if (!mustClose()) {
+    rollout.cut(input, 1, segments);
+    return accept(trial, nu);
+  }
+  if (!closesTwice(segments)) return false;
+  const auto isClosed = [&] { return trial.gap_max <= options_.gap_tolerance; };
+  rollout.cut(input, 1, segments);
+  if (trial.ok && !isClosed()) rollout.close(input);
+  return isClosed() && accept(trial, nu);
+}
+
+// All step lengths, one after the other: a receding horizon has no time for rollouts in one piece.
+bool Run::searchInSegments(const RolloutInput& input, int segments, double nu) {
+  double alpha = 1;
+  for (int i = 0; i < options_.num_step_lengths; ++i, alpha *= 0.5) {
+    if (isInterrupted()) return false;
+    work_.rollout.cut(input, alpha, segments);
+    if (accept(work_.rollout.getTrial(0), nu)) return true;
+  }
+  return false;
+}
+
+bool Run::accept(Trial& trial, double nu) {
+  if (!trial.ok && failure_.empty() && trial.failed_node >= 0) {
+    failed_node_ = trial.failed_node;
+    failure_ = trial.failure;
+  }
+  accepted_ = trial.ok && isAcceptable(trial, nu) ? &trial : nullptr;
+  return accepted_ != nullptr;
+}
+
+// Whether the merit of a trial has fallen enough, Eqs. (4) and (8).
+bool Run::isAcceptable(const Trial& trial, double nu) const {
+  const double alpha = trial.alpha;
   const double foreseen = -alpha * slope_ - 0.5 * alpha * alpha * curvature_ + nu * alpha * gap_sum_;
-  const double real = line_.cost - trial.getCost() - trial.getClosingCost() + nu * (gap_sum_ - trial.getGapSum());
+  const double real = line_.cost - trial.cost - trial.closing_cost + nu * (gap_sum_ - trial.gap_sum);
   const double rounding = kCostRounding * std::abs(line_.cost);
   const double decrease = std::max(0.0, foreseen);  // boxes make Eq. (4) an approximation
   return real >= options_.acceptance * decrease - rounding &&
-         std::abs(trial.getClosingCost()) <= kClosingShare * decrease + rounding;
+         std::abs(trial.closing_cost) <= kClosingShare * decrease + rounding;
 }
 
 void Run::acceptStep() {
-  std::swap(trajectory_, work_.rollout.getTrial());
-  summary_.cost = work_.rollout.getCost();
-  summary_.gap = work_.rollout.getGapMax();
+  std::swap(trajectory_, accepted_->nodes);
+  if (work_.rollout.hasEvaluations()) {
+    work_.evaluations.swapTrial();
+  } else {
+    work_.evaluations.outdate();
+  }
+  line_.step = accepted_->alpha;
+  summary_.cost = accepted_->cost;
+  summary_.gap = accepted_->gap_max;
   ++summary_.iterations;
 }
 
@@ -280,12 +342,7 @@ Run::End Run::raiseRegularization(const char* reason) {
   regularization_ *= options_.regularization_increase;
   if (regularization_ <= options_.max_regularization) return {};
   summary_.message = std::string(reason) + " even at the largest regularization";
-  for (int k = 0; k <= N_; ++k) {
-    const std::string failure = problem_.getFailure(k);
-    if (failure.empty()) continue;
-    summary_.message += "; node " + std::to_string(k) + ": " + failure;
-    break;
-  }
+  if (!failure_.empty()) summary_.message += "; node " + std::to_string(failed_node_) + ": " + failure_;
   return FddpTermination::RegularizationMax;
 }
 
@@ -313,7 +370,7 @@ Run::End Run::checkProgress() {
 FddpSummary Run::finish(FddpTermination termination) {
   summary_.termination = termination;
   summary_.seconds = calcSecondsSince(start_);
-  summary_.linearize_seconds = work_.backward.getLinearizeSeconds();
+  summary_.linearize_seconds = work_.evaluations.getSeconds() + work_.backward.getLinearizeSeconds();
   summary_.sweep_seconds += work_.backward.getSweepSeconds();
   summary_.rollout_seconds = work_.rollout.getSeconds();
   const bool judged = termination == FddpTermination::Converged || termination == FddpTermination::RegularizationMax;
@@ -349,8 +406,18 @@ Fddp::~Fddp() = default;
 Fddp::Fddp(Fddp&&) noexcept = default;
 Fddp& Fddp::operator=(Fddp&&) noexcept = default;
 
-FddpSummary Fddp::solve(ShootingProblem& problem, ShootingTrajectory& trajectory, const FddpObserver& observer) {
+FddpSummary Fddp::solve(const ShootingProblem& problem, ShootingTrajectory& trajectory, const FddpObserver& observer) {
   return Run(options_, problem, trajectory, observer, *work_).solve();
+}
+
+void Fddp::advance(ShootingTrajectory& trajectory) {
+  const size_t N = trajectory.us.size();
+  if (N < 1 || trajectory.xs.size() != N + 1) throw std::invalid_argument("Fddp: no trajectory to advance");
+  for (size_t k = 0; k < N; ++k) trajectory.xs[k].swap(trajectory.xs[k + 1]);
+  for (size_t k = 0; k + 1 < N; ++k) trajectory.us[k].swap(trajectory.us[k + 1]);
+  trajectory.xs[N] = trajectory.xs[N - 1];
+  if (N > 1) trajectory.us[N - 1] = trajectory.us[N - 2];
+  work_->evaluations.advance();
 }
 
 const LqSweep& Fddp::getSweep() const { return work_->backward.getSweep(); }

@@ -1,10 +1,10 @@
 #pragma once
-// Second derivatives are wanted from the linearization of a node to its sweep, which soon follows: pieces of memory that go
-// from node to node, the one that came back last first, stay in the cache.
+// Second derivatives are needed only from the linearization of a node to its sweep, which follows soon: pieces of memory that
+// are passed from node to node, the most recently returned one first, stay in the cache.
 #include <algorithm>
 #include <mutex>
 
-#include "bielle/ocp/shooting_problem.h"
+#include "bielle/solve/stage_model.h"
 
 namespace bielle {
 
@@ -14,7 +14,7 @@ class HessianPool {
   void resize(std::vector<StageModel>& models) {
     Eigen::Index size = 0;
     for (StageModel& model : models) {
-      size = std::max(size, model.H().outerStride() * model.H().cols());
+      size = std::max(size, model.hessian().outerStride() * model.hessian().cols());
       VectorXd none;
       model.swapHessian(none);
     }
@@ -27,7 +27,7 @@ class HessianPool {
     model.swapHessian(free_.back());
     free_.pop_back();
   }
-  /// From a model that has one; from others nothing.
+  /// Does nothing for a model that has none.
   void takeBack(StageModel& model) {
     VectorXd memory;
     model.swapHessian(memory);

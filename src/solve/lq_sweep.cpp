@@ -10,9 +10,10 @@ namespace bielle {
 namespace {
 
 using Eigen::Index;
-bool hasFiniteLower(PaddedMap H, Index size) {
+
+bool hasFiniteLower(MatrixMap Q, Index size) {
   for (Index j = 0; j < size; ++j) {
-    if (!H.col(j).segment(j, size - j).allFinite()) return false;
+    if (!Q.col(j).segment(j, size - j).allFinite()) return false;
   }
   return true;
 }
@@ -28,9 +29,9 @@ LqResult LqSweep::update(const std::vector<StageModel>& models, const LqRegulari
   const int N = static_cast<int>(models.size()) - 1;
   for (int k = N; k >= 0; --k) {
     const ControlBox* box = k < N && !boxes.empty() ? &boxes[k] : nullptr;
-    const ConstPaddedMap H = models[k].H();
-    std::copy_n(H.data(), H.outerStride() * H.cols(), H_.data());
-    if (updateNode(k, models[k], shapePadded(H_, H.rows(), H.cols()), box) != LqStatus::Ok) break;
+    const ConstMatrixMap hessian = models[k].hessian();
+    std::copy_n(hessian.data(), hessian.outerStride() * hessian.cols(), hessian_.data());
+    if (updateNode(k, models[k], shapePadded(hessian_, hessian.rows(), hessian.cols()), box) != LqStatus::Ok) break;
   }
   return result_;
 }
@@ -42,72 +43,72 @@ void LqSweep::start(const std::vector<StageModel>& models, const LqRegularizatio
 }
 
 LqStatus LqSweep::updateNode(int k, StageModel& model, const ControlBox* box) {
-  return updateNode(k, model, model.H(), box);
+  return updateNode(k, model, model.hessian(), box);
 }
 
-LqStatus LqSweep::updateNode(int k, const StageModel& model, PaddedMap H, const ControlBox* box) {
+LqStatus LqSweep::updateNode(int k, const StageModel& model, MatrixMap Q, const ControlBox* box) {
   Node& node = nodes_[k];
   if (k + 1 == static_cast<int>(nodes_.size())) {
     node.Vx = model.lx;
-    node.Vxx = H;
+    node.Vxx = Q;
     node.Vxx.diagonal().array() += regularization_.state;
     copyLowerToUpper(node.Vxx);
     return LqStatus::Ok;
   }
-  const LqStatus status = updateStage(model, nodes_[k + 1], box, H, node);
+  const LqStatus status = updateStage(model, nodes_[k + 1], box, Q, node);
   if (status != LqStatus::Ok) result_ = {status, k, 0};
   return status;
 }
 
-LqStatus LqSweep::updateStage(const StageModel& model, const Node& next, const ControlBox* box, PaddedMap H,
+LqStatus LqSweep::updateStage(const StageModel& model, const Node& next, const ControlBox* box, MatrixMap Q,
                               Node& node) {
-  updateQuadratic(model, next, H, node);
+  updateQuadratic(model, next, Q, node);
   if (!node.Vx.allFinite()) return LqStatus::NotFinite;
   result_.expected_change += next.Vx.dot(model.gap) + 0.5 * model.gap.dot(Vxx_gap_.head(model.gap.size()));
-  const LqStatus status = box ? eliminateBoxedControls(*box, H, node) : eliminateControls(H, node);
+  const LqStatus status = box ? eliminateBoxedControls(*box, Q, node) : eliminateControls(Q, node);
   if (status != LqStatus::Ok) return status;
   return isFinite(node) ? LqStatus::Ok : LqStatus::NotFinite;
 }
 
 // Eqs. (2) to (4). Vx holds Qx from here to the elimination.
-void LqSweep::updateQuadratic(const StageModel& model, const Node& next, PaddedMap H, Node& node) {
+void LqSweep::updateQuadratic(const StageModel& model, const Node& next, MatrixMap Q, Node& node) {
   const Index n = model.lx.size(), nu = model.lu.size(), n_next = model.gap.size();
-  const ConstPaddedMap Ft = model.Ft();
-  auto p = p_.head(n_next), Vxx_gap = Vxx_gap_.head(n_next), Q = Q_.head(nu + n);
+  const ConstMatrixMap Ft = model.Ft();
+  auto p = p_.head(n_next), Vxx_gap = Vxx_gap_.head(n_next), gradient = gradient_.head(nu + n);
   Vxx_gap.noalias() = next.Vxx * model.gap;
   p = next.Vx + Vxx_gap;
-  Q << model.lu, model.lx;
-  Q.noalias() += Ft * p;
-  node.Qu = Q.head(nu);
-  node.Vx = Q.tail(n);
+  gradient << model.lu, model.lx;
+  gradient.noalias() += Ft * p;
+  node.Qu = gradient.head(nu);
+  node.Vx = gradient.tail(n);
 
   auto Ft_Vxx = shapePadded(Ft_Vxx_, nu + n, n_next);
   setProduct(nu + n, n_next, n_next, pad(Ft), {next.Vxx.data(), 1, n_next}, pad(Ft_Vxx));
-  H.diagonal().head(nu).array() += regularization_.control;
-  H.diagonal().tail(n).array() += regularization_.state;
-  addLowerProduct(0, n_next, 1, pad(Ft), pad(Ft_Vxx), H);
+  Q.diagonal().head(nu).array() += regularization_.control;
+  Q.diagonal().tail(n).array() += regularization_.state;
+  addLowerProduct(0, n_next, 1, pad(Ft), pad(Ft_Vxx), Q);
 }
 
 // Eqs. (5) to (7).
-LqStatus LqSweep::eliminateControls(PaddedMap H, Node& node) {
+LqStatus LqSweep::eliminateControls(MatrixMap Q, Node& node) {
   const Index n = node.Vx.size(), nu = node.Qu.size();
-  if (!hasFiniteLower(H, nu) || !node.Qu.allFinite()) return LqStatus::NotFinite;
-  if (!factorizeColumns(H, nu)) return LqStatus::Indefinite;
-  const auto L = H.topLeftCorner(nu, nu).triangularView<Eigen::Lower>();
+  if (!hasFiniteLower(Q, nu) || !node.Qu.allFinite()) return LqStatus::NotFinite;
+  if (!factorizeColumns(Q, nu)) return LqStatus::Indefinite;
+  const auto L = Q.topLeftCorner(nu, nu).triangularView<Eigen::Lower>();
   node.k = -node.Qu;
   L.solveInPlace(node.k);
-  node.Vx.noalias() += H.bottomLeftCorner(n, nu) * node.k;  // Qux^T k = Y^T (-L^{-1} Qu)
+  node.Vx.noalias() += Q.bottomLeftCorner(n, nu) * node.k;  // Qux^T k = Y^T (-L^{-1} Qu)
   L.transpose().solveInPlace(node.k);
   result_.expected_change += 0.5 * node.Qu.dot(node.k);
-  updateGains(static_cast<int>(nu), H, node);
+  updateGains(static_cast<int>(nu), Q, node);
   node.K = shapePadded(Kt_, n, nu).transpose();
   return LqStatus::Ok;
 }
 
 // Eqs. (5) to (7) with the box.
-LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, PaddedMap H, Node& node) {
+LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, MatrixMap Q, Node& node) {
   const Index n = node.Vx.size(), nu = node.Qu.size();
-  const auto Quu = H.topLeftCorner(nu, nu);
+  const auto Quu = Q.topLeftCorner(nu, nu);
   node.k.setZero();
   switch (box_qp_.solve(Quu, node.Qu, box.lower, box.upper, node.k)) {
     case BoxQpStatus::Ok:
@@ -115,9 +116,9 @@ LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, PaddedMap H, Nod
     case BoxQpStatus::Indefinite:
       return LqStatus::Indefinite;
     case BoxQpStatus::NotConverged:
-      return hasFiniteLower(H, nu) ? LqStatus::Indefinite : LqStatus::NotFinite;
+      return hasFiniteLower(Q, nu) ? LqStatus::Indefinite : LqStatus::NotFinite;
   }
-  node.Vx.noalias() += H.bottomLeftCorner(n, nu) * node.k;
+  node.Vx.noalias() += Q.bottomLeftCorner(n, nu) * node.k;
   auto Quu_k = Kt_.head(nu);
   Quu_k.noalias() = Quu.selfadjointView<Eigen::Lower>() * node.k;
   result_.expected_change += node.Qu.dot(node.k) + 0.5 * node.k.dot(Quu_k);
@@ -125,27 +126,27 @@ LqStatus LqSweep::eliminateBoxedControls(const ControlBox& box, PaddedMap H, Nod
   // The free rows and columns move to the front, in place: a free index is never smaller than its rank.
   const int num_free = box_qp_.getNumFree();
   for (int j = 0; j < num_free; ++j) {
-    if (const int free = box_qp_.getFreeIndex(j); free != j) H.col(j) = H.col(free);
-    for (int i = j; i < num_free; ++i) H(i, j) = H(box_qp_.getFreeIndex(i), j);
+    if (const int free = box_qp_.getFreeIndex(j); free != j) Q.col(j) = Q.col(free);
+    for (int i = j; i < num_free; ++i) Q(i, j) = Q(box_qp_.getFreeIndex(i), j);
   }
-  if (!factorizeColumns(H, num_free)) return LqStatus::Indefinite;
-  updateGains(num_free, H, node);
+  if (!factorizeColumns(Q, num_free)) return LqStatus::Indefinite;
+  updateGains(num_free, Q, node);
   node.K.setZero();
   for (int i = 0; i < num_free; ++i) node.K.row(box_qp_.getFreeIndex(i)) = shapePadded(Kt_, n, nu).col(i).transpose();
   return LqStatus::Ok;
 }
 
-// Vxx of Eq. (6), and K^T of Eq. (5) of the free controls, from L and Y^T in the first columns of H.
-void LqSweep::updateGains(int num_free, PaddedMap H, Node& node) {
+// Vxx of Eq. (6), and K^T of Eq. (5) of the free controls, from L and Y^T in the first columns of Q.
+void LqSweep::updateGains(int num_free, MatrixMap Q, Node& node) {
   const Index n = node.Vx.size(), nu = node.Qu.size();
   auto Kt = shapePadded(Kt_, n, nu);
-  addLowerProduct(nu, num_free, -1, pad(H), pad(H), H);
-  node.Vxx = H.bottomRightCorner(n, n);
+  addLowerProduct(nu, num_free, -1, pad(Q), pad(Q), Q);
+  node.Vxx = Q.bottomRightCorner(n, n);
   copyLowerToUpper(node.Vxx);
-  Kt.leftCols(num_free) = -H.bottomLeftCorner(n, num_free);
+  Kt.leftCols(num_free) = -Q.bottomLeftCorner(n, num_free);
   clearPadding(Kt);
-  PaddedMap free = shapePadded(Kt_, n, num_free);
-  solveFromRight(H.topLeftCorner(num_free, num_free), free);
+  MatrixMap free = shapePadded(Kt_, n, num_free);
+  solveFromRight(Q.topLeftCorner(num_free, num_free), free);
 }
 
 double LqSweep::calcStep(const std::vector<StageModel>& models, std::vector<VectorXd>& dx,
@@ -182,9 +183,9 @@ void LqSweep::resize(const std::vector<StageModel>& models) {
   const Index rows = roundUpToLane(max_n + max_nu);
   p_.resize(max_n);
   Vxx_gap_.resize(max_n);
-  Q_.resize(max_n + max_nu);
+  gradient_.resize(max_n + max_nu);
   Ft_Vxx_.resize(rows * max_n);
-  H_.setZero(rows * (max_n + max_nu));
+  hessian_.setZero(rows * (max_n + max_nu));
   Kt_.resize(roundUpToLane(max_n) * max_nu);
 }
 

@@ -3,54 +3,78 @@
 #include <algorithm>
 #include <cmath>
 
+#include "parallel_errors.h"
 #include "stopwatch.h"
 
 namespace bielle {
 
-void Rollout::resize(const ShootingProblem& problem, int max_segments) {
-  const int N = problem.numStages();
-  trial_.xs.assign(N + 1, VectorXd::Zero(problem.stateSize()));
-  trial_.us.resize(N);
-  deviations_.resize(N + 1);
+namespace {
+
+// Whether a part of the gap behind a stage is to stay open.
+bool contracts(const RolloutInput& input, const Trial& trial, int stage) {
+  return trial.alpha < 1 && input.open[stage];
+}
+
+}  // namespace
+
+void Rollout::resize(const ShootingProblem& problem, int max_segments, int num_trials) {
+  N_ = problem.numStages();
   int largest = 0, most_controls = 0;
-  for (int k = 0; k <= N; ++k) {
-    deviations_[k].setZero(problem.tangentSize(k));
-    largest = std::max(largest, problem.tangentSize(k));
-    if (k == N) continue;
-    trial_.us[k].setZero(problem.controlSize(k));
-    most_controls = std::max(most_controls, problem.controlSize(k));
+  for (int k = 0; k <= N_; ++k) largest = std::max(largest, problem.tangentSize(k));
+  for (int k = 0; k < N_; ++k) most_controls = std::max(most_controls, problem.controlSize(k));
+  trials_.resize(num_trials);
+  for (Trial& trial : trials_) {
+    trial.nodes.xs.resize(N_ + 1);
+    trial.nodes.us.resize(N_);
+    trial.deviations.resize(N_ + 1);
+    for (int k = 0; k <= N_; ++k) {
+      trial.nodes.xs[k].setZero(problem.stateSize());
+      trial.deviations[k].setZero(problem.tangentSize(k));
+      if (k < N_) trial.nodes.us[k].setZero(problem.controlSize(k));
+    }
   }
-  segments_.resize(max_segments);
-  for (Segment& segment : segments_) {
-    segment.start.setZero(largest);
-    segment.end_state.setZero(problem.stateSize());
+  const int num_tracks = std::max(max_segments, num_trials), size = problem.getBatchSize();
+  tracks_.resize(num_tracks);
+  for (Track& track : tracks_) {
+    track.start.setZero(largest);
+    track.arrival.setZero(largest);
   }
-  groups_.resize((max_segments + problem.getBatchSize() - 1) / problem.getBatchSize());
+  groups_.resize((num_tracks + size - 1) / size);
   for (Group& group : groups_) {
-    group.tasks.reserve(problem.getBatchSize());
-    group.starts.reserve(problem.getBatchSize());
+    group.active.reserve(size);
+    group.evaluations.reserve(size);
+    group.differences.reserve(size);
+    group.states.reserve(size);
+    group.moved.reserve(size);
   }
   for (VectorXd* x : {&joint_gap_, &joint_slope_, &shift_}) x->setZero(largest);
   control_.setZero(most_controls);
   seconds_ = 0;
 }
 
-bool Rollout::update(const RolloutInput& input, const RolloutOptions& options) {
-  const int N = input.problem.numStages(), num = options.segments;
-  for (int s = 0; s < num; ++s) {
-    segments_[s].begin = s * N / num;
-    segments_[s].end = (s + 1) * N / num;
-    segments_[s].start = options.alpha * input.dx[segments_[s].begin];
+void Rollout::cut(const RolloutInput& input, double alpha, int segments) {
+  num_segments_ = segments;
+  rolling_ = false;
+  trials_[0].alpha = alpha;
+  for (int s = 0; s < segments; ++s) {
+    Track& track = tracks_[s];
+    track.trial = &trials_[0];
+    track.begin = s * N_ / segments;
+    track.end = (s + 1) * N_ / segments;
+    track.start = alpha * input.dx[track.begin];
+    track.arrival.resize(input.dx[track.end].size());
+    track.rolling = -1;
   }
-  return rollOut(input, options);
+  rollOut(input, segments);
+  updateGaps(input, segments, trials_[0]);
 }
 
-// Eq. (9), with the shift of the starts from segment to segment.
-bool Rollout::close(const RolloutInput& input, const RolloutOptions& options) {
+// Eq. (9): carries each segment's start correction into the next.
+void Rollout::close(const RolloutInput& input) {
   shift_.setZero();
-  for (int s = 1; s < options.segments; ++s) {
-    const int joint = segments_[s].begin;
-    for (int k = segments_[s - 1].begin; k < joint; ++k) {
+  for (int s = 1; s < num_segments_; ++s) {
+    const int joint = tracks_[s].begin;
+    for (int k = tracks_[s - 1].begin; k < joint; ++k) {
       const StageModel& model = input.models[k];
       auto shift = shift_.head(model.lx.size()), next = joint_gap_.head(model.gap.size());
       auto control = control_.head(model.lu.size());
@@ -59,148 +83,218 @@ bool Rollout::close(const RolloutInput& input, const RolloutOptions& options) {
       next.noalias() += model.Fu() * control;
       shift_.head(next.size()) = next;
     }
-    VectorXd& start = segments_[s].start;
-    auto gap = joint_gap_.head(start.size());
-    input.problem.difference(joint, input.nodes.xs[joint], segments_[s - 1].end_state, gap);
-    shift_.head(start.size()) += gap - start;
+    VectorXd& start = tracks_[s].start;
+    shift_.head(start.size()) += tracks_[s - 1].arrival - start;
     start += shift_.head(start.size());
   }
-  return rollOut(input, options);
+  rollOut(input, num_segments_);
+  updateGaps(input, num_segments_, trials_[0]);
 }
 
-bool Rollout::rollOut(const RolloutInput& input, const RolloutOptions& options) {
-  const int num = options.segments, size = input.problem.getBatchSize(), num_groups = (num + size - 1) / size;
-#pragma omp parallel for num_threads(std::min(options.threads, num_groups)) schedule(dynamic)
+void Rollout::search(const RolloutInput& input, double alpha, int num) {
+  rolling_ = trials_.size() > 1;
+  for (int i = 0; i < num; ++i, alpha *= 0.5) {
+    trials_[i].alpha = alpha;
+    Track& track = tracks_[i];
+    track.trial = &trials_[i];
+    track.begin = 0;
+    track.end = N_;
+    track.rolling = rolling_ ? 2 * i : -1;
+  }
+  rollOut(input, num);
+  for (int i = 0; i < num; ++i) updateGaps(input, 1, trials_[i]);
+}
+
+void Rollout::rollOut(const RolloutInput& input, int num_tracks) {
+  const int size = input.problem.getBatchSize(), num_groups = (num_tracks + size - 1) / size;
+  ParallelErrors errors;
+#pragma omp parallel for num_threads(std::min(input.threads, num_groups)) schedule(dynamic)
   for (int g = 0; g < num_groups; ++g) {
     const Clock::time_point start = Clock::now();
-    Group& group = groups_[g];
-    group.begin = g * size;
-    group.end = std::min(num, (g + 1) * size);
-    try {
-      group.ok = rollOut(input, options.alpha, group);
-    } catch (...) {  // a problem that throws on a wild trial has failed on it, no more
-      group.ok = false;
+    groups_[g].begin = g * size;
+    groups_[g].end = std::min(num_tracks, (g + 1) * size);
+    errors.run(g, [&] { rollOut(input, groups_[g]); });
+    groups_[g].seconds = calcSecondsSince(start);
+  }
+  for (int g = 0; g < num_groups; ++g) seconds_ += groups_[g].seconds;
+  errors.rethrow();
+  for (Trial& trial : trials_) {
+    trial.ok = true;
+    trial.cost = 0;
+    trial.failed_node = -1;
+  }
+  for (int t = 0; t < num_tracks; ++t) {
+    Trial& trial = *tracks_[t].trial;
+    trial.cost += tracks_[t].cost;
+    if (trial.ok && tracks_[t].failed_node >= 0) {
+      trial.ok = false;
+      trial.failed_node = tracks_[t].failed_node;
+      trial.failure = tracks_[t].failure;
     }
-    group.seconds = calcSecondsSince(start);
   }
-  cost_ = 0;
-  bool ok = true;
-  for (int s = 0; s < num; ++s) cost_ += segments_[s].cost;
-  for (int g = 0; g < num_groups; ++g) {
-    seconds_ += groups_[g].seconds;
-    ok = ok && groups_[g].ok;
-  }
-  return ok && std::isfinite(cost_) && updateGaps(input, options);
 }
 
-// Eqs. (2), (3) and (7). Runs in parallel: of the node where the next segment starts, nothing is touched.
-bool Rollout::rollOut(const RolloutInput& input, double alpha, Group& group) {
-  if (!startSegments(input, group)) return false;
-  int longest = 0;
-  for (int s = group.begin; s < group.end; ++s) longest = std::max(longest, segments_[s].end - segments_[s].begin);
-  for (int i = 0; i < longest; ++i) {
-    group.tasks.clear();
-    for (int s = group.begin; s < group.end; ++s) {
-      const int k = segments_[s].begin + i;
-      if (k >= segments_[s].end) continue;
-      group.tasks.emplace_back();
-      prepareTask(input, alpha, k, segments_[s], group.tasks.back());
-    }
-    input.problem.stepStages(group.tasks);
-    auto task = group.tasks.begin();
-    for (int s = group.begin; s < group.end; ++s)
-      if (segments_[s].begin + i < segments_[s].end && !finishTask(input, alpha, *task++, segments_[s])) return false;
+// Runs in parallel: nothing is touched at the node where the next segment starts. A track that fails is left behind.
+void Rollout::rollOut(const RolloutInput& input, Group& group) {
+  startTracks(input, group);
+  for (int step = 0; !group.active.empty(); ++step) {
+    evaluateNodes(input, step, group);
+    findDeviations(input, group);
+    contractGaps(input, group);
   }
-  return true;
 }
 
-bool Rollout::startSegments(const RolloutInput& input, Group& group) {
-  group.starts.clear();
-  for (int s = group.begin; s < group.end; ++s) {
-    const int k = segments_[s].begin;
-    segments_[s].cost = 0;
+// Eq. (7).
+void Rollout::startTracks(const RolloutInput& input, Group& group) {
+  group.active.clear();
+  group.states.clear();
+  group.moved.clear();
+  for (int t = group.begin; t < group.end; ++t) {
+    Track& track = tracks_[t];
+    track.cost = 0;
+    track.failed_node = -1;
+    const int k = track.begin;
+    VectorXd& deviation = track.trial->deviations[k];
     if (k == 0) {
-      deviations_[k].setZero();
-      trial_.xs[k] = input.nodes.xs[k];
+      deviation.setZero();
+      track.trial->nodes.xs[k] = input.nodes.xs[k];
     } else {
-      deviations_[k] = segments_[s].start;
-      group.starts.push_back({k, &input.nodes.xs[k], &deviations_[k], &trial_.xs[k]});
+      deviation = track.start;
+      group.states.push_back({k, input.evaluations.getIterate()[k].get(), &deviation, &track.trial->nodes.xs[k]});
+      group.moved.push_back(&track);
     }
+    group.active.push_back(&track);
   }
-  input.problem.integrateNodes(group.starts);
-  return std::all_of(group.starts.begin(), group.starts.end(),
-                     [](const IntegrateTask& start) { return start.x_out->allFinite(); });
+  integrate(input, group);
 }
 
-// Stage k of a segment, with the control of Eq. (2).
-void Rollout::prepareTask(const RolloutInput& input, double alpha, int k, Segment& segment, StepTask& task) {
+// The node so many steps behind the start of each track, and its cost; tracks that end here are no longer active.
+void Rollout::evaluateNodes(const RolloutInput& input, int step, Group& group) {
+  const auto hasEnded = [&](const Track* track) {
+    const int k = track->begin + step;
+    return track->failed_node >= 0 || k > track->end || (k == track->end && k < N_);
+  };
+  group.active.erase(std::remove_if(group.active.begin(), group.active.end(), hasEnded), group.active.end());
+  group.evaluations.clear();
+  for (Track* track : group.active) {
+    Trial& trial = *track->trial;
+    const int k = track->begin + step;
+    if (k < N_) updateControl(input, k, trial);
+    const bool continues = k > track->begin && !contracts(input, trial, k - 1);
+    group.evaluations.push_back({k, &trial.nodes.xs[k], k < N_ ? &trial.nodes.us[k] : nullptr,
+                                 continues ? getEvaluation(input, *track, k - 1) : nullptr,
+                                 getEvaluation(input, *track, k)});
+  }
+  if (group.active.empty()) return;
+  const int count = static_cast<int>(group.active.size());
+  input.problem.evaluate(group.evaluations.data(), count, input.evaluations.getScratch());
+  for (int i = 0; i < count; ++i) {
+    Track& track = *group.active[i];
+    const NodeEvaluation& out = *group.evaluations[i].out;
+    const int k = group.evaluations[i].node;
+    const bool ok = out.status == StepStatus::Ok;
+    if (ok) track.cost += out.cost;
+    if (!ok || !std::isfinite(track.cost) || (k < N_ && !out.x_next.allFinite())) track.fail(k, out.failure);
+  }
+}
+
+// Eq. (2).
+void Rollout::updateControl(const RolloutInput& input, int k, Trial& trial) const {
   const LqSweep::Node& gains = input.sweep.getNodes()[k];
-  VectorXd& u = trial_.us[k];
-  u = input.nodes.us[k] + alpha * gains.k;
-  u.noalias() += gains.K * deviations_[k];
+  VectorXd& u = trial.nodes.us[k];
+  u = input.nodes.us[k] + trial.alpha * gains.k;
+  u.noalias() += gains.K * trial.deviations[k];
   if (!input.bounds.empty()) u = u.cwiseMax(input.bounds[k].lower).cwiseMin(input.bounds[k].upper);
-  task.stage = k;
-  task.continues = k > segment.begin && !contracts(input, alpha);
-  task.x = &trial_.xs[k];
-  task.u = &u;
-  if (isJoint(segment, k + 1)) {
-    task.x_next = &segment.end_state;
-  } else {
-    task.x_next = &trial_.xs[k + 1];
-    task.origin = &input.nodes.xs[k + 1];
-    task.deviation = &deviations_[k + 1];
-  }
 }
 
-// Eq. (3) behind a step; at the end of the horizon its cost.
-bool Rollout::finishTask(const RolloutInput& input, double alpha, const StepTask& task, Segment& segment) {
-  ShootingProblem& problem = input.problem;
-  const int next = task.stage + 1, N = problem.numStages();
-  if (task.status != StepStatus::Ok) return false;
-  segment.cost += task.cost;
-  if (!std::isfinite(segment.cost) || !task.x_next->allFinite()) return false;
-  if (isJoint(segment, next)) return true;
-  if (contracts(input, alpha)) {
-    deviations_[next] += (alpha - 1) * input.models[task.stage].gap;
-    problem.integrate(next, input.nodes.xs[next], deviations_[next], *task.x_next);
+// Where f leads, as a deviation from the iterate: the first term of Eq. (3).
+void Rollout::findDeviations(const RolloutInput& input, Group& group) {
+  group.differences.clear();
+  group.moved.clear();
+  for (size_t i = 0; i < group.active.size(); ++i) {
+    Track& track = *group.active[i];
+    Trial& trial = *track.trial;
+    const int k = group.evaluations[i].node, next = k + 1;
+    const NodeEvaluation& out = *group.evaluations[i].out;
+    if (track.failed_node >= 0 || k == N_) continue;
+    const bool at_joint = next == track.end && next < N_, contracted = contracts(input, trial, k);
+    if (!at_joint && !contracted) trial.nodes.xs[next] = out.x_next;
+    if (next == N_ && !contracted) continue;  // nobody asks for it
+    group.differences.push_back({next, input.evaluations.getIterate()[next].get(), &out.x_next,
+                                 at_joint ? &track.arrival : &trial.deviations[next]});
+    group.moved.push_back(&track);
   }
-  if (next < N) return true;
-  double cost = 0;
-  if (problem.calcTerminalCost(*task.x_next, cost) != StepStatus::Ok) return false;
-  segment.cost += cost;
-  return true;
+  if (group.moved.empty()) return;
+  input.problem.difference(group.differences.data(), static_cast<int>(group.differences.size()),
+                           input.evaluations.getScratch());
+  for (size_t i = 0; i < group.moved.size(); ++i)
+    if (!group.differences[i].dx->allFinite()) group.moved[i]->fail(group.differences[i].node, {});
+}
+
+// The rest of Eq. (3), for steps that leave a part of the gaps open.
+void Rollout::contractGaps(const RolloutInput& input, Group& group) {
+  group.states.clear();
+  group.moved.clear();
+  for (size_t i = 0; i < group.active.size(); ++i) {
+    Track& track = *group.active[i];
+    Trial& trial = *track.trial;
+    const int k = group.evaluations[i].node, next = k + 1;
+    const bool at_joint = next == track.end && next < N_;
+    if (track.failed_node >= 0 || k == N_ || at_joint || !contracts(input, trial, k)) continue;
+    trial.deviations[next] += (trial.alpha - 1) * input.models[k].gap;
+    group.states.push_back(
+        {next, input.evaluations.getIterate()[next].get(), &trial.deviations[next], &trial.nodes.xs[next]});
+    group.moved.push_back(&track);
+  }
+  integrate(input, group);
+}
+
+void Rollout::integrate(const RolloutInput& input, Group& group) {
+  if (group.moved.empty()) return;
+  input.problem.integrate(group.states.data(), static_cast<int>(group.states.size()), input.evaluations.getScratch());
+  for (size_t i = 0; i < group.moved.size(); ++i)
+    if (!group.states[i].x_out->allFinite()) group.moved[i]->fail(group.states[i].node, {});
+}
+
+NodeEvaluation* Rollout::getEvaluation(const RolloutInput& input, const Track& track, int node) const {
+  if (track.rolling < 0) return input.evaluations.getTrial()[node].get();
+  return input.evaluations.getRolling()[track.rolling + node % 2].get();
 }
 
 // What is left of the old gaps, the gaps at the joints, and Eq. (8).
-bool Rollout::updateGaps(const RolloutInput& input, const RolloutOptions& options) {
-  const int N = input.problem.numStages();
-  const double rest = input.feasible ? 0 : 1 - options.alpha;
-  gap_sum_ = gap_max_ = closing_cost_ = 0;
+void Rollout::updateGaps(const RolloutInput& input, int num_tracks, Trial& trial) {
+  trial.gap_sum = trial.gap_max = trial.closing_cost = 0;
+  if (!trial.ok) return;
   int s = 0;
-  for (int k = 0; k < N; ++k) {
+  for (int k = 0; k < N_; ++k) {
     const VectorXd& gap = input.models[k].gap;
-    const bool at_joint = isJoint(segments_[s], k + 1);
-    if (!at_joint) {
-      if (rest == 0 || gap.size() == 0) continue;
-      gap_sum_ += rest * gap.lpNorm<1>();
-      gap_max_ = std::max(gap_max_, rest * gap.lpNorm<Eigen::Infinity>());
-      continue;
+    const double rest = contracts(input, trial, k) ? 1 - trial.alpha : 0;
+    if (s + 1 < num_tracks && k + 1 == tracks_[s].end) {
+      addJointGap(input, rest, tracks_[s], tracks_[s + 1], trial);
+      ++s;
+    } else if (rest > 0) {
+      trial.gap_sum += rest * gap.lpNorm<1>();
+      trial.gap_max = std::max(trial.gap_max, rest * gap.lpNorm<Eigen::Infinity>());
     }
-    auto opened = joint_gap_.head(gap.size());
-    auto slope = joint_slope_.head(gap.size());
-    const LqSweep::Node& value = input.sweep.getNodes()[k + 1];
-    input.problem.difference(k + 1, input.nodes.xs[k + 1], segments_[s++].end_state, opened);
-    opened -= deviations_[k + 1];
-    gap_sum_ += opened.lpNorm<1>();
-    gap_max_ = std::max(gap_max_, opened.size() > 0 ? opened.lpNorm<Eigen::Infinity>() : 0.0);
-    opened -= rest * gap;
-    slope = value.Vx;
-    slope.noalias() += value.Vxx * deviations_[k + 1];
-    closing_cost_ += slope.dot(opened);
-    slope.noalias() = value.Vxx * opened;
-    closing_cost_ += 0.5 * slope.dot(opened);
   }
-  return std::isfinite(gap_sum_) && std::isfinite(closing_cost_);
+  trial.ok = std::isfinite(trial.cost) && std::isfinite(trial.gap_sum) && std::isfinite(trial.closing_cost);
+}
+
+// The gap between two segments, and its part in Eq. (8).
+void Rollout::addJointGap(const RolloutInput& input, double rest, const Track& before, const Track& after,
+                          Trial& trial) {
+  if (after.start.size() == 0) return;
+  const LqSweep::Node& value = input.sweep.getNodes()[after.begin];
+  auto gap = joint_gap_.head(after.start.size()), slope = joint_slope_.head(after.start.size());
+  gap = before.arrival - after.start;
+  trial.gap_sum += gap.lpNorm<1>();
+  trial.gap_max = std::max(trial.gap_max, gap.lpNorm<Eigen::Infinity>());
+  gap -= rest * input.models[before.end - 1].gap;
+  slope = value.Vx;
+  slope.noalias() += value.Vxx * after.start;
+  trial.closing_cost += slope.dot(gap);
+  slope.noalias() = value.Vxx * gap;
+  trial.closing_cost += 0.5 * slope.dot(gap);
 }
 
 }  // namespace bielle

@@ -1,82 +1,103 @@
 #pragma once
-// The nonlinear rollout of one trial step (fddp.h, Eqs. 2, 3, 7 and 8).
-#include "bielle/solve/fddp.h"
+// The nonlinear rollout of trial steps (fddp.h, Eqs. 2, 3, 7 and 8).
+#include "bielle/solve/lq_sweep.h"
+#include "node_evaluations.h"
 
 namespace bielle {
 
-/// What a rollout reads: the linearized trajectory, its models, the sweep over them and the step it foresees.
+/// What a rollout reads: the current iterate, its models, the sweep over them and the step they foresee.
 struct RolloutInput {
-  ShootingProblem& problem;
+  const ShootingProblem& problem;
   const ShootingTrajectory& nodes;
+  const NodeEvaluations& evaluations;  ///< of which it writes those of the trial, or the rolling ones
   const std::vector<StageModel>& models;
   const LqSweep& sweep;
   const std::vector<VectorXd>& dx;        ///< N + 1, of the full step
   const std::vector<ControlBox>& bounds;  ///< of u, N or none
-  bool feasible;                          ///< the gaps count as closed
+  const std::vector<char>& open;          ///< N: whether the gap behind a stage counts as open
+  int threads;
 };
 
-/// Length of the step, segments of the horizon, and the threads they are shared by.
-struct RolloutOptions {
+/// A trajectory that was tried.
+struct Trial {
   double alpha = 1;
-  int segments = 1;
-  int threads = 1;
+  ShootingTrajectory nodes;
+  bool ok = false;  ///< it consists of finite numbers
+  double cost = 0;
+  double gap_sum = 0, gap_max = 0;  ///< c, and its largest entry
+  double closing_cost = 0;          ///< Eq. (8)
+  int failed_node = -1;             ///< where the problem failed, and why
+  std::string failure;
+
+  std::vector<VectorXd> deviations;  ///< N + 1: dx of Eq. (3), at a joint the one its segment starts from
 };
 
-/// A trial trajectory, kept between rollouts.
+/// Trials, kept between rollouts.
 class Rollout {
  public:
-  void resize(const ShootingProblem& problem, int max_segments);
+  /// num_trials: how many step lengths are tried side by side.
+  void resize(const ShootingProblem& problem, int max_segments, int num_trials);
+  int getNumTrials() const { return static_cast<int>(trials_.size()); }
 
-  /// Returns whether a trial of finite numbers came out.
-  bool update(const RolloutInput& input, const RolloutOptions& options);
-  /// The same once more, from where the gaps of the last update(), full steps in segments, are closed to first order (fddp.h,
-  /// Eq. 9).
-  bool close(const RolloutInput& input, const RolloutOptions& options);
+  /// A step of length alpha in several segments: getTrial(0).
+  void cut(const RolloutInput& input, double alpha, int segments);
+  /// A full step once more, from where the gaps of the last cut() are closed to first order (fddp.h, Eq. 9).
+  void close(const RolloutInput& input);
+  /// Steps of length alpha, alpha / 2, alpha / 4, ..., each in one piece: as many trials.
+  void search(const RolloutInput& input, double alpha, int num);
 
-  ShootingTrajectory& getTrial() { return trial_; }
-  double getCost() const { return cost_; }
-  /// c of the trial, and its largest entry.
-  double getGapSum() const { return gap_sum_; }
-  double getGapMax() const { return gap_max_; }
-  /// Eq. (8).
-  double getClosingCost() const { return closing_cost_; }
+  Trial& getTrial(int i) { return trials_[i]; }
+  /// Whether the trial's evaluations are those of the input's NodeEvaluations: trials side by side do not keep theirs.
+  bool hasEvaluations() const { return !rolling_; }
   /// Of all rollouts since resize(), summed over the threads.
   double getSeconds() const { return seconds_; }
 
  private:
-  struct Segment {
-    int begin = 0, end = 0;  // its stages
-    VectorXd start;          // deviation at its first node
-    VectorXd end_state;      // f of its last stage, if another segment follows
+  // Stages of a trial, one after the other.
+  struct Track {
+    Trial* trial = nullptr;
+    int begin = 0, end = 0;
     double cost = 0;
+    int failed_node = -1;
+    std::string failure;
+    VectorXd start;    // deviation at its first node
+    VectorXd arrival;  // deviation of f of its last stage, if another segment starts there
+    int rolling = -1;  // the first of its two rolling evaluations, -1: those of the trial are kept
+    void fail(int node, const std::string& reason) {
+      failed_node = node;
+      failure = reason;
+    }
   };
-  // Segments that go together, one stage of each at a time.
+  // Tracks that go together, one node of each at a time.
   struct Group {
-    int begin = 0, end = 0;  // its segments
-    std::vector<StepTask> tasks;
-    std::vector<IntegrateTask> starts;
+    int begin = 0, end = 0;  // its tracks
+    std::vector<Track*> active;
+    std::vector<EvaluateTask> evaluations;  // of the active ones
+    std::vector<DifferenceTask> differences;
+    std::vector<IntegrateTask> states;
+    std::vector<Track*> moved;  // whose the differences, or the states, are
     double seconds = 0;
-    bool ok = false;
   };
-  bool rollOut(const RolloutInput& input, const RolloutOptions& options);
-  bool rollOut(const RolloutInput& input, double alpha, Group& group);
-  bool startSegments(const RolloutInput& input, Group& group);
-  void prepareTask(const RolloutInput& input, double alpha, int k, Segment& segment, StepTask& task);
-  bool finishTask(const RolloutInput& input, double alpha, const StepTask& task, Segment& segment);
-  // Whether gaps are left to be contracted at every node.
-  static bool contracts(const RolloutInput& input, double alpha) { return alpha < 1 && !input.feasible; }
-  // Whether another segment starts at a node, this one having come there.
-  bool isJoint(const Segment& segment, int node) const {
-    return node == segment.end && node + 1 < static_cast<int>(trial_.xs.size());
-  }
-  bool updateGaps(const RolloutInput& input, const RolloutOptions& options);
+  void rollOut(const RolloutInput& input, int num_tracks);
+  void rollOut(const RolloutInput& input, Group& group);
+  void startTracks(const RolloutInput& input, Group& group);
+  void evaluateNodes(const RolloutInput& input, int step, Group& group);
+  void findDeviations(const RolloutInput& input, Group& group);
+  void contractGaps(const RolloutInput& input, Group& group);
+  void integrate(const RolloutInput& input, Group& group);
+  void updateControl(const RolloutInput& input, int k, Trial& trial) const;
+  void updateGaps(const RolloutInput& input, int num_tracks, Trial& trial);
+  void addJointGap(const RolloutInput& input, double rest, const Track& before, const Track& after, Trial& trial);
+  NodeEvaluation* getEvaluation(const RolloutInput& input, const Track& track, int node) const;
 
-  ShootingTrajectory trial_;
-  std::vector<VectorXd> deviations_;  // N + 1: dx of Eq. (3), at a joint the one its segment starts from
-  std::vector<Segment> segments_;
+  int N_ = 0;
+  std::vector<Trial> trials_;
+  std::vector<Track> tracks_;
   std::vector<Group> groups_;
+  int num_segments_ = 0;  // of the last cut()
+  bool rolling_ = false;
   VectorXd joint_gap_, joint_slope_, shift_, control_;
-  double cost_ = 0, gap_sum_ = 0, gap_max_ = 0, closing_cost_ = 0, seconds_ = 0;
+  double seconds_ = 0;
 };
 
 }  // namespace bielle

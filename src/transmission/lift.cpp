@@ -157,12 +157,14 @@ class Lifter {
     if (!problem_) {  // bound to the first state
       problem_ = std::make_unique<RobotProblem>(closed_, x.head(closed_.nq()), x.tail(closed_.nv()),
                                                 makeStages(result_.dt, result_.constraints), Formulation::Reduced);
+      evaluator_ = std::make_unique<RobotEvaluator>(*problem_);
       next_ = x;
     }
     bool failed = false;
     const auto follow = [&](const VectorXd& torques) {
-      double cost = 0;
-      failed |= problem_->step(k, x, torques, next_, cost) != StepStatus::Ok;
+      const RobotEvaluation& step = evaluator_->evaluate(k, x, torques);
+      failed |= step.status != StepStatus::Ok;
+      if (!failed) next_ = step.x_next;
       return failed ? VectorXd(VectorXd::Zero(2 * serial_.nv())) : calcTrackingError(k + 1, next_);
     };
     const auto differentiate = [&](const VectorXd& torques) {
@@ -190,7 +192,8 @@ class Lifter {
     result_.nodes.back().evaluations = best.evaluations;
     follow(u);
     if (failed)
-      return fail(LiftStatus::SingularLinkage, "the step of the closed dynamics fails: " + problem_->getFailure(k));
+      return fail(LiftStatus::SingularLinkage,
+                  "the step of the closed dynamics fails: " + evaluator_->evaluation().failure);
     return true;
   }
 
@@ -201,6 +204,7 @@ class Lifter {
   Workspace ws_;
   ConstrainedWorkspace cws_;
   std::unique_ptr<RobotProblem> problem_;
+  std::unique_ptr<RobotEvaluator> evaluator_;  // of the problem
   VectorXd next_;
   LiftResult result_;
 };

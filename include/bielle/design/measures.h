@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "bielle/model/model.h"
-#include "bielle/ocp/shooting_problem.h"
 #include "bielle/solve/fddp.h"
+#include "bielle/solve/shooting_problem.h"
 
 namespace bielle {
 

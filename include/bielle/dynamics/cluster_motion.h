@@ -41,7 +41,7 @@ struct ClusterMotionOf {
   const ClusterBasisOf<T>* basis = nullptr;
   MatrixX<T> Z, dy, dv;       ///< n x r, Eqs. (1), (2)
   Matrix6X<T> J, dV, dA, dW;  ///< 6 x (n r), Eq. (3)
-  MatrixX<T> K_q, K_v;        // m x r, derivatives of the closure rows
+  MatrixX<T> C_q, C_v;        // m x r, derivatives of the closure rows
   MatrixX<T> X;               // rank x r
 };
 using ClusterMotion = ClusterMotionOf<double>;
@@ -58,7 +58,7 @@ void updateAccelerationLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& mo
 /// out (n x r) = d(J^T f)/dq N for forces f on all rows (m), fixed in their frames 1: closure.h, Eq. (6); needs
 /// updateTwists.
 template <typename T>
-void calcForceLift(const ClusterViewOf<T>& view, const ClusterMotionOf<T>& motion,
+void calcGeometricStiffness(const ClusterViewOf<T>& view, const ClusterMotionOf<T>& motion,
                    typename ArgumentsOf<T>::ConstVector forces, typename ArgumentsOf<T>::Matrix out);
 /// Drift of the independent closure rows (rank) for the accelerations held by the view.
 template <typename T>

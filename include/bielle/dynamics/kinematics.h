@@ -28,6 +28,7 @@ inline SE3 getPlacement(const Workspace& ws, int body, const SE3& X_BF) { return
 
 /// Twist of a frame in its own coordinates (6).
 inline Vector6d calcFrameVelocity(const Workspace& ws, int body, const SE3& X_BF) {
+  requireBodyVelocities(ws, "calcFrameVelocity");
   return getPlacement(ws, body, X_BF).actInvMotion(ws.V[body]);
 }
 

@@ -11,8 +11,8 @@
 ///     A_v(alpha, beta) = (YJ)~_alpha . dW~_beta + (BtJ)~_alpha . J~_beta,     A_v(beta, alpha) = J~_beta . G~_v,alpha
 ///     M(alpha, beta) = J~_beta . (YJ)~_alpha                                                                          (2)
 /// Within a reduced joint the same holds dof by dof, J~, .. being the path sums at dof j and G'~, (YJ)'~ the sums (1) over what
-/// comes after it, plus the rotors D and less H = d(J^T lambda)/dq of its loop forces:
-///     A_y = sum_j N_j (YJ_j . dA~ + BtJ_j . dV~ + J_j . G'~_y + D_j d_y,j - (H N)_j)
+/// comes after it, plus the rotors D and less the geometric stiffness K = d(J^T lambda)/dq of its loop forces:
+///     A_y = sum_j N_j (YJ_j . dA~ + BtJ_j . dV~ + J_j . G'~_y + D_j d_y,j - (K N)_j)
 ///     A_v = sum_j N_j (YJ_j . dW~ + BtJ_j . J~ + J_j . G'~_v + D_j d_v,j),   M = sum_j N_j (YJ_j . J~ + J_j . (YJ)'~ + D_j N_j)
 ///                                                                                                                     (3)
 /// The loop forces have no other effect: inner to the cluster, they cancel in every sum that leaves it.
@@ -20,11 +20,11 @@
 
 namespace bielle {
 
-/// What a cluster contributes: how it moves, and H N (n x size).
+/// What a cluster contributes: how it moves, and K N (n x size).
 template <typename T>
 struct ClusterLiftOf {
   const ClusterMotionOf<T>* motion = nullptr;
-  const MatrixX<T>* HN = nullptr;
+  const MatrixX<T>* KN = nullptr;
 };
 
 using ClusterLift = ClusterLiftOf<double>;

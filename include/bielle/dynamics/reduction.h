@@ -114,59 +114,51 @@ struct ClusterScratchOf {
   std::vector<Index> pivots, fresh_pivots;
   MatrixX<T> reflected, reflectors;  // of J W^{-1/2}; Householder vectors
   VectorX<T> beta, products, rest;   // their scales; scratch; squared norms of what is left of the rows
+  typename LogicOf<T>::Mask closed;  // whether the last closing got as far as the bases
 };
 using ClusterScratch = ClusterScratchOf<double>;
 
-/// A closed configuration of a cluster with what was computed there; with Lanes one for each lane. No allocation once made.
+/// A closed configuration of a cluster with what was computed there; with Lanes one for each lane.
 template <typename T>
-class ClusterStateOf {
-  friend class ClusterStateOf<Lanes>;
-
- public:
-  using Mask = typename LogicOf<T>::Mask;
+struct ClusterStateOf {
   explicit ClusterStateOf(const ReducedCluster& cluster);
-
-  /// Kinematics, Jacobian and bases (1) at q (cluster's nq), which stay in the scratch too. False when the rank is not that
-  /// of the cluster.
-  Mask update(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch, typename ArgumentsOf<T>::ConstVector q);
-  /// Closes from `start` as Eq. (2) and updates everything there. False when it does not close or the rank changes.
-  /// \param zeta_guess  rank, where zeta is expected, or empty
-  Mask close(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch, const ClusterBasisOf<T>& start,
-             typename ArgumentsOf<T>::ConstVector d, const VectorX<T>& zeta_guess);
-  /// Lanes only: each lane becomes a state of its own, but for those whose pointer is null.
-  void store(const std::array<ClusterStateOf<double>*, kLane>& to) const;
-  /// Placements and columns of this point back into the scratch.
-  void load(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) const;
-
-  const ClusterBasisOf<T>& basis() const { return basis_; }
-  const std::vector<SE3Of<T>>& placements() const {
-    return placements_;
-  }                                                 ///< of the bodies, seen from the cluster's root
-  const VectorX<T>& zeta() const { return zeta_; }  ///< rank, of the last close()
-  const VectorX<T>& step() const { return step_; }  ///< n, d - W^{-1} J(q_0)^T zeta of the last close()
-  /// Why the last update() or close() returned false, naming a loop; with the scratch as they left it.
-  std::string describeFailure(const ReducedCluster& cluster, const ClusterScratch& scratch) const;
-
- private:
-  Mask updateBases(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch);
-
-  ClusterBasisOf<T> basis_;
-  std::vector<SE3Of<T>> placements_;
-  VectorX<T> zeta_, step_;
-  bool closed_ = false;  // the last close() got as far as the bases
+  ClusterBasisOf<T> basis;
+  std::vector<SE3Of<T>> placements;  ///< of the bodies of the cluster's model, seen from its root
+  VectorX<T> zeta;                   ///< rank, of the closing that led here
+  VectorX<T> step;                   ///< n, its d - W^{-1} J(q_0)^T zeta
 };
 using ClusterState = ClusterStateOf<double>;
+
+/// Kinematics, Jacobian and bases (1) at q (cluster's nq), which stay in the scratch too. False when the rank is not that of the
+/// cluster. No allocation.
+template <typename T>
+typename LogicOf<T>::Mask updateClusterState(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                             typename ArgumentsOf<T>::ConstVector q, ClusterStateOf<T>& out);
+/// Closes from `start` as Eq. (2) and updates everything there. False when it does not close or the rank changes. No allocation.
+/// \param zeta_guess  rank, where zeta is expected, or empty
+template <typename T>
+typename LogicOf<T>::Mask closeCluster(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
+                                       const ClusterBasisOf<T>& start, typename ArgumentsOf<T>::ConstVector d,
+                                       const VectorX<T>& zeta_guess, ClusterStateOf<T>& out);
+/// Placements and columns of a state back into the scratch.
+void loadClusterState(const ReducedCluster& cluster, const ClusterState& state, ClusterScratch& scratch);
+/// Why the last of these functions returned false, naming a closure; with the scratch as it left it.
+/// \param lane  of Lanes; 0 for double
+template <typename T>
+std::string describeFailure(const ReducedCluster& cluster, const ClusterScratchOf<T>& scratch, int lane = 0);
 
 /// A ClusterState with a scratch of its own: simpler where there are few of them.
 class ClusterPoint {
  public:
   explicit ClusterPoint(const ReducedCluster& cluster) : scratch_(cluster), state_(cluster) {}
-  bool update(const ReducedCluster& cluster, ConstVectorRef q) { return state_.update(cluster, scratch_, q); }
-  bool close(const ReducedCluster& cluster, const ClusterBasis& start, ConstVectorRef d, const VectorXd& zeta_guess) {
-    return state_.close(cluster, scratch_, start, d, zeta_guess);
+  bool update(const ReducedCluster& cluster, ConstVectorRef q) {
+    return updateClusterState(cluster, scratch_, q, state_);
   }
-  const ClusterBasis& basis() const { return state_.basis(); }
-  std::string describeFailure(const ReducedCluster& cluster) const { return state_.describeFailure(cluster, scratch_); }
+  bool close(const ReducedCluster& cluster, const ClusterBasis& start, ConstVectorRef d, const VectorXd& zeta_guess) {
+    return closeCluster(cluster, scratch_, start, d, zeta_guess, state_);
+  }
+  const ClusterBasis& basis() const { return state_.basis; }
+  std::string describeFailure(const ReducedCluster& cluster) const { return bielle::describeFailure(cluster, scratch_); }
   Workspace& workspace() { return scratch_.ws; }  ///< positions are those of the last update() or close()
   void solveGram(MatrixRef X) const { bielle::solveGram(basis(), X); }
   /// Independent rows out of all rows (m x k -> rank x k).
@@ -183,8 +175,20 @@ void expandIndependent(const ClusterBasisOf<T>& basis, typename ArgumentsOf<T>::
                        typename ArgumentsOf<T>::Vector all);
 
 /// Segments of a cluster in vectors of the whole model.
-void gatherConfiguration(const Model& model, const ReducedCluster& cluster, ConstVectorRef q, VectorRef q_cluster);
-void scatterConfiguration(const Model& model, const ReducedCluster& cluster, ConstVectorRef q_cluster, VectorRef q);
+template <typename T>
+void gatherConfiguration(const Model& model, const ReducedCluster& cluster, typename ArgumentsOf<T>::ConstVector q,
+                         typename ArgumentsOf<T>::Vector q_cluster);
+template <typename T>
+void scatterConfiguration(const Model& model, const ReducedCluster& cluster,
+                          typename ArgumentsOf<T>::ConstVector q_cluster, typename ArgumentsOf<T>::Vector q);
+inline void gatherConfiguration(const Model& model, const ReducedCluster& cluster, ConstVectorRef q,
+                                VectorRef q_cluster) {
+  gatherConfiguration<double>(model, cluster, q, q_cluster);
+}
+inline void scatterConfiguration(const Model& model, const ReducedCluster& cluster, ConstVectorRef q_cluster,
+                                 VectorRef q) {
+  scatterConfiguration<double>(model, cluster, q_cluster, q);
+}
 void gatherVelocity(const ReducedCluster& cluster, ConstVectorRef v, VectorRef v_cluster);
 void scatterVelocity(const ReducedCluster& cluster, ConstVectorRef v_cluster, VectorRef v);
 

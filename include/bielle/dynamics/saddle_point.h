@@ -4,18 +4,22 @@
 ///     M a - J^T lambda = f,     J a = -g                                                                             (1)
 ///     G lambda = -g - J M^{-1} f,     G = J M^{-1} J^T                                                               (2)
 ///
-/// With D = diag(G)^{-1/2} the system (D G D) y = D rhs is factorised directly where it is well conditioned, and solved
-/// by proximal iterations (Carpentier, Budhiraja, Mansard, RSS 2021) otherwise,
+/// With L L^T = M, z = L^{-1} f, D = diag(G)^{-1/2} and W = D J L^{-T} it reads
 ///
-///     y <- y + (D G D + mu I)^{-1} (D rhs - D G D y),                                                                (3)
+///     (W W^T) y = -D g - W z,     lambda = D y,     a = L^{-T} (z + W^T y).                                          (3)
 ///
-/// which converge to the least-squares, minimum-norm y; lambda = D y. Neither a nor J^T lambda depends on the choice of
-/// rows.
+/// W W^T = D G D has a unit diagonal. It is factorised directly where it is well conditioned; otherwise (3) is solved by proximal
+/// iterations (Carpentier, Budhiraja, Mansard, RSS 2021),
+///
+///     y <- y + (W W^T + mu I)^{-1} (rhs - W W^T y),                                                                  (4)
+///
+/// which converge to the least-squares, minimum-norm y. Neither a nor J^T lambda depends on the choice of rows. A row that
+/// nothing moves, a row of zeros among them, has no force.
 ///
 /// Derivatives along any argument: with dID the derivative of M a - J^T lambda - f and dc that of J a + g, both at
 /// fixed a and lambda,
 ///
-///     dlambda = G^+ (J M^{-1} dID - dc),     da = M^{-1} (J^T dlambda - dID).                                        (4)
+///     dlambda = G^+ (J M^{-1} dID - dc),     da = M^{-1} (J^T dlambda - dID).                                        (5)
 ///
 /// With redundant rows dlambda is right up to the null space of J^T.
 #include "bielle/math/lane_product.h"
@@ -23,54 +27,87 @@
 namespace bielle {
 
 struct SaddlePointOptions {
-  double proximal = 1e-7;          ///< mu of Eq. (3), relative to the unit diagonal of D G D
-  int max_iterations = 30;         ///< of Eq. (3)
+  double proximal = 1e-7;          ///< mu of Eq. (4), relative to the unit diagonal of W W^T
+  int max_iterations = 30;         ///< of Eq. (4)
   double tolerance = 1e-13;        ///< stop when a correction is below this, relative to the solution
-  double direct_threshold = 1e-5;  ///< smallest pivot of D G D for which it is factorised directly
+  double direct_threshold = 1e-5;  ///< smallest pivot of W W^T for which it is factorised directly
 };
 
-enum class SaddlePointStatus { Ok, MassMatrixSingular };
-
-/// What Eq. (4) needs of a factorised system.
+/// What Eq. (5) needs of a factorised system.
 struct SaddlePointFactors {
   MatrixXd L;     ///< n x n, lower triangle: Cholesky factor of M
-  MatrixXd Wt;    ///< n x m, L^{-1} J^T D
-  MatrixXd Ginv;  ///< m x m, (pseudo-)inverse of D G D
+  MatrixXd Wt;    ///< n x m, W^T
+  MatrixXd Ginv;  ///< m x m, (pseudo-)inverse of W W^T
   VectorXd D;     ///< m
   void resize(int n, int m);
 };
+/// Eq. (5) for Xt (k x n), which holds dID^T and becomes da^T, and dlambda_t (k x m), which holds dc^T and becomes dlambda^T, both
+/// with their padding finite. `room` is memory that grows to k x m.
+void solveDerivatives(const SaddlePointFactors& factors, PaddedMap Xt, PaddedMap dlambda_t, VectorXd& room);
 
-class SaddlePoint {
+/// T is double, or Lanes for as many systems of one size. In lanes a matrix is kept as it is; numbers of double have their rows
+/// padded to full registers.
+template <typename T>
+class SaddlePointOf {
  public:
+  using Mask = typename LogicOf<T>::Mask;
+
   /// Sizes the memory for n coordinates and m rows; no allocation when the sizes stay.
   void resize(int n, int m);
   /// \param M n x n symmetric positive definite   \param J m x n
-  SaddlePointStatus factorize(const MatrixXd& M, const MatrixXd& J, const SaddlePointOptions& options = {});
+  /// \returns false where M is not positive definite
+  Mask factorize(const MatrixX<T>& M, const MatrixX<T>& J, const SaddlePointOptions& options = {});
   /// Eq. (1) for f (n), g (m).
-  void solve(const VectorXd& f, const VectorXd& g, VectorXd& a, VectorXd& lambda);
-  /// Prepares solveDerivatives().
+  void solve(const VectorX<T>& f, const VectorX<T>& g, VectorX<T>& a, VectorX<T>& lambda);
+  /// Inverse of W W^T, or its pseudo-inverse as the limit of Eq. (4), in Ginv().
   void updateInverse();
-  /// Eq. (4): X (n x k) holds dID and becomes da; dlambda (m x k) holds dc and becomes dlambda.
-  void solveDerivatives(MatrixRef X, MatrixRef dlambda);
-  /// The same for another system of the same sizes, and for X^T (k x n) and dlambda^T (k x m), padding finite.
-  void solveDerivatives(const SaddlePointFactors& factors, PaddedMap Xt, PaddedMap dlambda_t);
-  /// Of the last system; needs updateInverse().
-  const SaddlePointFactors& factors() const { return factors_; }
-  /// Whether the rows needed Eq. (3).
-  bool isRedundant() const { return redundant_; }
+  /// Whether some row has nothing to say of its own: nothing moves it, or it follows from the others.
+  Mask isRedundant() const { return dependent_ || unmoved_; }
+
+  // Of the last system. L(): its lower triangle; Ginv(): needs updateInverse().
+  auto L() const { return view(L_, n_, n_); }
+  auto W() const { return view(W_, m_, n_); }
+  const MatrixX<T>& Ginv() const { return Ginv_; }
+  const VectorX<T>& D() const { return D_; }
 
  private:
+  using Storage = std::conditional_t<std::is_same_v<T, double>, VectorXd, MatrixX<T>>;
+  static auto view(const Storage& storage, Eigen::Index rows, Eigen::Index cols) {
+    if constexpr (std::is_same_v<T, double>)
+      return ConstPaddedMap(storage.data(), rows, cols, Eigen::OuterStride<>(roundUpToLane(rows)));
+    else
+      return Eigen::Map<const MatrixX<T>>(storage.data(), rows, cols);
+  }
+  static auto view(Storage& storage, Eigen::Index rows, Eigen::Index cols) {
+    if constexpr (std::is_same_v<T, double>)
+      return shapePadded(storage, rows, cols);
+    else
+      return Eigen::Map<MatrixX<T>>(storage.data(), rows, cols);
+  }
+  void improveInverse();
+
   SaddlePointOptions options_;
-  MatrixXd J_;      ///< m x n
-  VectorXd M_;      ///< n x n, padded: L, the Cholesky factor of M
-  VectorXd W_;      ///< m x n, padded: D J L^{-T}
-  MatrixXd G_;      ///< m x m: D G D
-  VectorXd G_llt_;  ///< m x m, padded: its Cholesky factor
+  Eigen::Index n_ = 0, m_ = 0;
+  Storage L_, W_;        // n x n, m x n
+  Storage G_llt_;        // m x m: Cholesky factor of W W^T, with mu on its diagonal where rows depend on others
+  MatrixX<T> G_, Ginv_;  // m x m
+  MatrixX<T> P_, T1_, T2_;   // m x m, scratch
+  VectorX<T> D_, rhs_, y_, correction_;
+  Mask dependent_ = T(0) < T(0);  // rows follow from others: Eq. (4)
+  Mask unmoved_ = T(0) < T(0);    // some row is moved by nothing
+};
+
+/// One system, with its derivatives.
+class SaddlePoint : public SaddlePointOf<double> {
+ public:
+  /// Prepares solveDerivatives().
+  void updateInverse();
+  /// Eq. (5): X (n x k) holds dID and becomes da; dlambda (m x k) holds dc and becomes dlambda.
+  void solveDerivatives(MatrixRef X, MatrixRef dlambda);
+
+ private:
   SaddlePointFactors factors_;
-  VectorXd D_, rhs_, correction_;
-  MatrixXd T1_, T2_;
-  VectorXd X_, rhs_t_, dlambda_t_;  ///< transposes within solveDerivatives(), padded
-  bool redundant_ = false;
+  VectorXd X_, dlambda_t_, room_;  // transposes within solveDerivatives(), padded
 };
 
 }  // namespace bielle

@@ -9,7 +9,8 @@ namespace bielle {
 
 /// How far a workspace has been filled for the present (q, v, a). Each update* function sets its stage, and a function
 /// that needs an earlier stage calls requireStage(), which throws std::logic_error naming the missing call.
-enum class WorkspaceStage { Empty, Placement, Position, Velocity, Acceleration };
+/// Bodies: X_WB, V and hc are there, but not the columns that belong to them (J, dJ, dV, ..) and what follows from those.
+enum class WorkspaceStage { Empty, Placement, Bodies, Position, Velocity, Acceleration };
 
 /// T is double, or Lanes for several nodes at once (lanes.h).
 /// All spatial quantities are in world coordinates about the world origin, so that recursions only add.
@@ -58,5 +59,7 @@ using Workspace = WorkspaceOf<double>;
 /// Throws std::logic_error naming `call` unless the workspace has reached the stage.
 template <typename T>
 void requireStage(const WorkspaceOf<T>& ws, WorkspaceStage stage, const char* function, const char* call);
+/// The same for functions that look at the velocities of bodies alone: Bodies, or Velocity and later.
+void requireBodyVelocities(const Workspace& ws, const char* function);
 
 }  // namespace bielle

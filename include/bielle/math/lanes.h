@@ -63,6 +63,10 @@ inline bool any(const LaneMask& a) {
   return out != 0;
 }
 inline bool any(bool a) { return a; }
+inline double getLane(const Lanes& x, Eigen::Index lane) { return x[lane]; }
+inline bool getLane(const LaneMask& x, Eigen::Index lane) { return x[lane]; }
+inline double getLane(double x, Eigen::Index) { return x; }
+inline bool getLane(bool x, Eigen::Index) { return x; }
 inline Lanes select(const LaneMask& mask, const Lanes& a, const Lanes& b) { return Lanes(mask.v ? a.v : b.v); }
 inline double select(bool mask, double a, double b) { return mask ? a : b; }
 

@@ -15,7 +15,8 @@ namespace bielle {
 /// What a residual may look at: one node with its kinematics (and, at a stage, its dynamics) up to date.
 struct NodeView {
   const Model& model;
-  /// Filled are q, v, X_WB, V and hc; for calcJacobian also J, dV, YJ and Yc.
+  /// In calc(): q, v, X_WB, V and hc, at the stage Bodies; in calcJacobian() J, dV, h, YJ and Yc as well, at the stage
+  /// Velocity. Functions of the library that look at more throw.
   const Workspace& ws;
   const ConstraintSet& constraints;  ///< closures and contacts in force
   const VectorXd& u;                 ///< nu, empty at the terminal node

@@ -15,7 +15,7 @@
 ///
 ///     w = v + h a,    q+ = q (+) h w',  w' = w - W^{-1} J^T zeta with q+ closed,    v+ = (I - J^+ J)(q+) w'          (3)
 ///
-/// Its derivatives stand in reduced_node.cpp. As h vanishes both formulations have the same optimum.
+/// Its derivatives stand in src/ocp/reduced/reduced_kernel.h. As h vanishes both formulations have the same optimum.
 /// Running cost of a stage: h times the sum of its costs; the terminal node has no h.
 /// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and so on.
 #include <string>
@@ -23,7 +23,7 @@
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/ocp/cost.h"
-#include "bielle/ocp/shooting_problem.h"
+#include "bielle/solve/node_evaluator.h"
 
 namespace bielle {
 
@@ -53,9 +53,15 @@ struct CostValue {
 enum class Formulation { Full, Reduced };
 const char* getName(Formulation formulation);
 
-class NodeModel;
-struct ResidualStack;
-struct Reduction;
+class Transcription;
+
+/// A node of a robot's problem: beside the next state, what made it.
+struct RobotEvaluation : NodeEvaluation {
+  VectorXd a;          ///< nv, accelerations; at an impact, nothing
+  VectorXd lambda;     ///< rows of the constraints of the stage: forces (at an impact, impulses), each in its frame 1
+  VectorXd residuals;  ///< of all costs, one after the other in an order of the problem's
+  double state_cost = 0;  ///< before scaling by the time step
+};
 
 class RobotProblem : public ShootingProblem {
  public:
@@ -68,56 +74,40 @@ class RobotProblem : public ShootingProblem {
 
   int numStages() const override { return static_cast<int>(specs_.size()) - 1; }
   int stateSize() const override { return model_.nq() + model_.nv(); }
-  int tangentSize(int) const override { return tangent_size_; }
+  int tangentSize(int node) const override;
   int controlSize(int) const override { return model_.nu(); }
   const VectorXd& initialState() const override { return x0_; }
-  void integrate(int node, ConstVectorRef x, ConstVectorRef dx, VectorRef x_out) const override;
-  void integrateNodes(const std::vector<IntegrateTask>& tasks) const override;
-  void difference(int node, ConstVectorRef x0, ConstVectorRef x1, VectorRef dx) const override;
-  StepStatus step(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override;
-  StepStatus continueStep(int stage, ConstVectorRef x, ConstVectorRef u, VectorRef x_next, double& cost) override;
-  void stepStages(std::vector<StepTask>& tasks) override;
-  StepStatus calcTerminalCost(ConstVectorRef x, double& cost) override;
-  StepStatus linearize(int stage, ConstVectorRef x, ConstVectorRef u, ConstVectorRef x_next_node,
-                       StageModel& out) override;
-  void linearizeStages(int begin, int end, const std::vector<VectorXd>& xs, const std::vector<VectorXd>& us,
-                       std::vector<StageModel>& models, std::vector<StepStatus>& statuses) override;
-  int getBatchSize() const override { return formulation_ == Formulation::Reduced ? static_cast<int>(kLane) : 1; }
-  StepStatus linearizeTerminal(ConstVectorRef x, StageModel& out) override;
   void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override;
-  std::string getFailure(int node) const override;
+  /// A RobotEvaluation.
+  std::unique_ptr<NodeEvaluation> makeEvaluation() const override;
+  std::unique_ptr<ProblemScratch> makeScratch() const override;
+  void evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const override;
+  void linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const override;
+  void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const override;
+  void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const override;
+  int getBatchSize() const override;
 
   const Model& model() const { return model_; }
   Formulation formulation() const { return formulation_; }
   const StageSpec& spec(int node) const { return specs_[node]; }
-  /// Accelerations (nv) and constraint forces (rows) of a stage at (x, u).
-  StepStatus calcDynamics(int stage, ConstVectorRef x, ConstVectorRef u, VectorXd& a, VectorXd& lambda);
-  /// Costs by name at a node (u empty at the terminal node).
-  std::vector<CostValue> calcCosts(int node, ConstVectorRef x, ConstVectorRef u);
+  /// Costs by name at an evaluated node.
+  std::vector<CostValue> getCosts(int node, const RobotEvaluation& at) const;
 
  private:
-  struct Node;
-  bool isEvaluated(int stage, ConstVectorRef x, ConstVectorRef u) const;
-  bool startEvaluation(int stage, ConstVectorRef x, ConstVectorRef u);
-  StepStatus finishEvaluation(int stage, bool ok);
-  StepStatus evaluate(int stage, ConstVectorRef x, ConstVectorRef u, const NodeModel* previous = nullptr);
-  template <typename Finish>
-  void evaluateTogether(StepTask* tasks, int num_tasks, const Finish& finish);
-  void calcDeviations(const StepTask* tasks, int num_tasks);
-  void evaluateStages(int begin, int end, const std::vector<VectorXd>& xs, const std::vector<VectorXd>& us);
-  StepStatus finishStep(int stage, VectorRef x_next, double& cost);
-  StepStatus finishLinearization(int stage, ConstVectorRef u, ConstVectorRef x_next_node, StageModel& out);
-  double sumCosts(int node_index, std::vector<CostValue>* values = nullptr);
-  void differentiateCosts(int node_index, double scale, StageModel& out);
-  void differentiateResiduals(int node_index, double scale, StageModel& out);
-
   const Model& model_;
   Formulation formulation_;
   std::vector<StageSpec> specs_;
-  std::unique_ptr<Reduction> reduction_;
-  std::vector<Node> nodes_;
-  int tangent_size_ = 0;
+  std::unique_ptr<Transcription> transcription_;
   VectorXd x0_;
+};
+
+/// NodeEvaluator for the problem of a robot.
+class RobotEvaluator : public NodeEvaluator {
+ public:
+  explicit RobotEvaluator(const RobotProblem& problem) : NodeEvaluator(problem) {}
+  const RobotEvaluation& evaluate(int node, const VectorXd& x, const VectorXd& u = VectorXd()) {
+    return static_cast<const RobotEvaluation&>(NodeEvaluator::evaluate(node, x, u));
+  }
 };
 
 }  // namespace bielle

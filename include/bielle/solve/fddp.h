@@ -5,7 +5,7 @@
 /// bounds after Tassa, Mansard, Todorov, "Control-Limited Differential Dynamic Programming", ICRA 2014.
 ///
 /// One iteration, from node states xs and controls us that need not obey the dynamics:
-/// 1. Linearize every stage about (xs_k, us_k); gap_k = difference(xs_{k+1}, f_k(xs_k, us_k)).
+/// 1. Evaluate and linearize every stage about (xs_k, us_k); gap_k = difference(xs_{k+1}, f_k(xs_k, us_k)).
 /// 2. The LQ sweep (lq_sweep.h, its eqs. 2 to 7) gives k, K, and what the models foresee for a step of length alpha,
 ///        change(alpha) = alpha slope + 1/2 alpha^2 curvature.                                                     (1)
 /// 3. Nonlinear rollout with x'_0 = xs_0 and, for k = 0 .. N-1, all tangent vectors in the coordinates of xs:
@@ -20,7 +20,8 @@
 ///    positive on the whole of (0, 1] for rho = 1/2 and
 ///        nu = max(0, (slope + 1/2 max(0, curvature)) / ((1 - rho) c)). (5)
 ///    alpha is accepted if the merit really falls by `acceptance` times (4), c by alpha c. As long as c falls in every
-///    iteration (it does but for Eq. 7), nu may be chosen anew in each of them: the iterations cannot cycle.
+///    iteration (which it does except after Eq. 7), nu may be chosen anew in each of them: the iterations cannot cycle.
+///    A problem that works on several tasks at once is given several alpha side by side; the largest acceptable one is taken.
 /// 5. If no alpha is accepted, or a Quu is indefinite, the regularization grows and the sweep is repeated.
 ///
 /// A rollout can be cut into segments that run at the same time. The segment that starts at node j starts from where
@@ -31,9 +32,10 @@
 /// part in J is that the value function foresees the trial to cost, once the gap is closed,
 ///     closing = sum_j Vx_j.g_j + (Vxx_j dx_j).g_j + 1/2 g_j.Vxx_j.g_j                                              (8)
 /// more. (The penalty nu c alone would not do: gaps and decrease are both of second order, so that it would refuse full
-/// steps however close to the solution.) A trial for which (8) exceeds half of (4) is refused, whatever its merit; a full
-/// step that is refused in segments is tried again in one piece, and so are all shorter ones. Steps that follow a
-/// shortened one are rolled out in one piece.
+/// steps however close to the solution.) A trial for which (8) exceeds half of (4) is refused, whatever its merit. A full step
+/// that is refused in segments is tried again in one piece, and so are all shorter ones; steps that follow a shortened one are
+/// rolled out in one piece. With LastRollout::Segments, for receding horizons, steps of all lengths are rolled out in segments:
+/// then an iteration takes about the same time whatever its step.
 ///
 /// The last step must close the gaps. If it is short it is rolled out twice, the second time from
 ///     dx'_j = e_j + (Fx + Fu K)_{j-1} .. (Fx + Fu K)_i (dx'_i - dx_i),                                             (9)
@@ -49,18 +51,14 @@
 #include <string>
 
 #include "bielle/solve/lq_sweep.h"
+#include "bielle/solve/shooting_problem.h"
 
 namespace bielle {
 
-/// Node states (N + 1) and controls (N) of a shooting problem.
-struct ShootingTrajectory {
-  std::vector<VectorXd> xs, us;
-};
-
 enum class ControlBounds { Ignore, Enforce };
 
-/// The last iteration that is allowed closes the gaps, or leaves those that segments open, as other iterations do, to the
-/// next solve of a receding horizon.
+/// The last iteration that is allowed closes the gaps; or, in a receding horizon, it leaves them to the next solve, as other
+/// iterations do, and all steps are rolled out in segments.
 enum class LastRollout { Closed, Segments };
 
 struct FddpOptions {
@@ -85,7 +83,7 @@ struct FddpOptions {
   double acceptance = 0.1;    ///< share of Eq. (4) by which the merit must really fall, in (0, 1)
 
   ControlBounds bounds = ControlBounds::Ignore;
-  /// Segments of a rollout, Eq. (7), at most: none is shorter than 12 stages. Results depend on it, within the
+  /// Segments of a rollout, Eq. (7), at most: none is shorter than 6 stages. Results depend on it, within the
   /// tolerances, and therefore it is not the number of threads.
   int rollout_segments = 16;
   LastRollout last_rollout = LastRollout::Closed;
@@ -135,8 +133,9 @@ struct FddpObserver {
   const std::atomic<bool>* interrupt = nullptr;
 };
 
-/// The solver owns its memory: it can be kept for problems of the same sizes, and an iteration after the first
-/// allocates nothing. It calls integrate() and difference() only from the node states of the last linearization.
+/// The solver owns its memory and can be kept from solve to solve: an iteration after the first allocates nothing. Evaluations
+/// are kept for as long as the problem has the same id(). It calls integrate() and difference() only about evaluations of the
+/// current iterate. What a problem throws leaves solve(), with the current iterate in the trajectory.
 class Fddp {
  public:
   struct Workspace;  ///< what a solve writes, kept between solves
@@ -149,7 +148,13 @@ class Fddp {
 
   /// trajectory: initial guess in, xs_0 is replaced by the initial state and controls are projected on enforced bounds;
   /// current iterate during and after. Throws std::invalid_argument if its sizes do not fit the problem.
-  FddpSummary solve(ShootingProblem& problem, ShootingTrajectory& trajectory, const FddpObserver& observer = {});
+  FddpSummary solve(const ShootingProblem& problem, ShootingTrajectory& trajectory, const FddpObserver& observer = {});
+
+  /// Moves a horizon on by one stage: the trajectory that the last solve() returned and, with it, the evaluations of its
+  /// nodes. The next solve(), of a problem with the same id() whose node k is what node k + 1 was, evaluates only nodes 0, N - 1
+  /// and N. Until then no other node of the trajectory may change, or that solve() throws std::invalid_argument. The last
+  /// state and control are repeated.
+  void advance(ShootingTrajectory& trajectory);
 
   /// Gains and value function of the last sweep, about the last linearized trajectory.
   const LqSweep& getSweep() const;

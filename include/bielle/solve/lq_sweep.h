@@ -24,8 +24,8 @@
 /// Without gaps and boxes curvature = -slope.
 #include <vector>
 
-#include "bielle/ocp/shooting_problem.h"
 #include "bielle/solve/box_qp.h"
+#include "bielle/solve/stage_model.h"
 
 namespace bielle {
 
@@ -67,8 +67,9 @@ class LqSweep {
   LqResult update(const std::vector<StageModel>& models, const LqRegularization& regularization,
                   const std::vector<ControlBox>& boxes = {});
 
-  /// The same node by node, for models that come one after the other: start(), then updateNode(k) for k = N .. 0 as
-  /// long as the status is Ok. start() reads only the sizes of the models. The Hessian of the model is used up.
+  /// The same node by node, for models that become available one after the other: start(), then updateNode(k) for
+  /// k = N .. 0 as long as the status is Ok. start() reads only the sizes of the models. updateNode() overwrites the Hessian
+  /// of the model.
   void start(const std::vector<StageModel>& models, const LqRegularization& regularization);
   LqStatus updateNode(int k, StageModel& model, const ControlBox* box = nullptr);
   /// Result of the nodes updated so far.
@@ -82,21 +83,21 @@ class LqSweep {
 
  private:
   void resize(const std::vector<StageModel>& models);
-  // H: the Hessian of the model, becomes [Quu . ; Qxu Qxx], whose first columns become those of L over Y^T.
-  LqStatus updateNode(int k, const StageModel& model, PaddedMap H, const ControlBox* box);
-  LqStatus updateStage(const StageModel& model, const Node& next, const ControlBox* box, PaddedMap H, Node& node);
-  void updateQuadratic(const StageModel& model, const Node& next, PaddedMap H, Node& node);
-  LqStatus eliminateControls(PaddedMap H, Node& node);
-  LqStatus eliminateBoxedControls(const ControlBox& box, PaddedMap H, Node& node);
-  void updateGains(int num_free, PaddedMap H, Node& node);
+  // Q: the Hessian of the model, which becomes [Quu . ; Qxu Qxx], whose first columns become those of L over Y^T.
+  LqStatus updateNode(int k, const StageModel& model, MatrixMap Q, const ControlBox* box);
+  LqStatus updateStage(const StageModel& model, const Node& next, const ControlBox* box, MatrixMap Q, Node& node);
+  void updateQuadratic(const StageModel& model, const Node& next, MatrixMap Q, Node& node);
+  LqStatus eliminateControls(MatrixMap Q, Node& node);
+  LqStatus eliminateBoxedControls(const ControlBox& box, MatrixMap Q, Node& node);
+  void updateGains(int num_free, MatrixMap Q, Node& node);
 
   std::vector<Node> nodes_;
   LqRegularization regularization_;
   LqResult result_;
   BoxQp box_qp_;
-  // Buffers of one node, sized for the largest, matrices with rows padded to full lanes (lane_product.h). With F = [Fu Fx]:
-  // [Qu Qx], F^T Vxx', the Hessian where the model keeps its own, and K^T.
-  VectorXd p_, Vxx_gap_, Q_, Ft_Vxx_, H_, Kt_;
+  // Buffers of one node, sized for the largest, matrices with columns padded like those of a StageModel. With F = [Fu Fx]:
+  // [Qu Qx], F^T Vxx', a copy of the Hessian for models that keep theirs, and K^T.
+  VectorXd p_, Vxx_gap_, gradient_, Ft_Vxx_, hessian_, Kt_;
 };
 
 }  // namespace bielle

@@ -1,4 +1,4 @@
-#include "reduced_state_cost.h"
+#include "state_cost.h"
 
 namespace bielle {
 namespace {
@@ -7,10 +7,10 @@ namespace {
 int countFree(const Joint& joint) { return joint.nv * (joint.nv + 1); }
 int countCluster(const ReducedCluster& loop) { return 3 * loop.size * loop.size; }
 
-// out += scale times the lower triangle of H (n x n).
-void addLower(const double* H, int n, double scale, Eigen::Block<PaddedMap> out) {
+// out += scale times the lower triangle of a matrix (n x n).
+void addLower(const double* numbers, int n, double scale, Eigen::Block<MatrixMap> out) {
   for (int c = 0; c < n; ++c)
-    for (int r = c; r < n; ++r) out(r, c) += scale * H[c * n + r];
+    for (int r = c; r < n; ++r) out(r, c) += scale * numbers[c * n + r];
 }
 
 }  // namespace
@@ -27,7 +27,7 @@ StateCostModelOf<T>::StateCostModelOf(const Model& model, const Reduction& reduc
 void addStateCostModel(const Model& model, const Reduction& reduction, const StateCostModel& cost, double scale,
                        StageModel& out) {
   const int nr = reduction.size;
-  PaddedMap lxx = out.lxx();
+  MatrixMap lxx = out.lxx();
   out.lx += scale * cost.gradient;
   const double* hessian = cost.hessian.data();
   for (size_t i = 0; i < reduction.free_joints.size(); ++i) {
@@ -46,46 +46,43 @@ void addStateCostModel(const Model& model, const Reduction& reduction, const Sta
   }
 }
 
-template <typename T>
-ReducedStateCostOf<T>::ReducedStateCostOf(const Model& model, const Reduction& reduction)
+ReducedStateCost::ReducedStateCost(const Model& model, const Reduction& reduction)
     : model_(model), reduction_(reduction), derivatives_(model, reduction) {
   q_ref.setZero(model.nq());
   weights.setZero(2 * model.nv());
-  for (VectorX<T>* x : {&v_ref, &difference, &gradient_q_, &gradient_v_}) x->setZero(model.nv());
+  for (VectorX<Lanes>* x : {&v_ref, &difference, &gradient_q_, &gradient_v_}) x->setZero(model.nv());
   for (const ReducedCluster& loop : reduction.clusters) {
     const int n = loop.model.nv(), r = loop.size;
-    const VectorX<T> column = VectorX<T>::Zero(n);
-    const MatrixX<T> columns = MatrixX<T>::Zero(n, r);
+    const VectorX<Lanes> column = VectorX<Lanes>::Zero(n);
+    const MatrixX<Lanes> columns = MatrixX<Lanes>::Zero(n, r);
     clusters_.push_back({column, column, columns, columns, columns});
   }
 }
 
-template <typename T>
-T ReducedStateCostOf<T>::update(const VectorX<T>& q, const VectorX<T>& v) {
+Lanes ReducedStateCost::update(const VectorX<Lanes>& q, const VectorX<Lanes>& v) {
   for (const Joint& joint : model_.joints()) {
     if (joint.nv == 0) continue;
     calcJointDifference(joint, q_ref.segment(joint.idx_q, joint.nq), q.segment(joint.idx_q, joint.nq),
                         difference.segment(joint.idx_v, joint.nv));
   }
-  T of_q = 0, of_v = 0;
+  Lanes of_q = 0, of_v = 0;
   const int nv = model_.nv();
   for (int k = 0; k < nv; ++k) {
-    const T d = difference[k], e = v[k] - v_ref[k];
+    const Lanes d = difference[k], e = v[k] - v_ref[k];
     of_q += weights[k] * d * d;
     of_v += weights[nv + k] * e * e;
   }
   return 0.5 * (of_q + of_v);
 }
 
-template <typename T>
-const StateCostModelOf<T>& ReducedStateCostOf<T>::differentiate(const VectorX<T>& v,
-                                                                const std::vector<ClusterLiftOf<T>>& lifts) {
+const StateCostModelOf<Lanes>& ReducedStateCost::differentiate(const VectorX<Lanes>& v,
+                                                               const std::vector<ClusterLiftOf<Lanes>>& lifts) {
   const int nv = model_.nv();
   for (int k = 0; k < nv; ++k) {
     gradient_q_[k] = weights[k] * difference[k];
     gradient_v_[k] = weights[nv + k] * (v[k] - v_ref[k]);
   }
-  T* hessian = derivatives_.hessian.data();
+  Lanes* hessian = derivatives_.hessian.data();
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];
     differentiateFree(joint, reduction_.free_offsets[i], hessian);
@@ -99,22 +96,20 @@ const StateCostModelOf<T>& ReducedStateCostOf<T>::differentiate(const VectorX<T>
 }
 
 // J_d^T W_q J_d of a joint whose J_d is not the identity; the gradient of its coordinates becomes J_d^T W_q d.
-template <typename T>
-typename ReducedStateCostOf<T>::JointMatrix ReducedStateCostOf<T>::differentiateJoint(const Joint& joint) {
+ReducedStateCost::JointMatrix ReducedStateCost::differentiateJoint(const Joint& joint) {
   const int k = joint.idx_v, n = joint.nv;
   JointMatrix J(n, n);
   calcJointDifferenceJacobian(joint, difference.segment(k, n), J);
   const JointMatrix WJ = weights.segment(k, n).asDiagonal() * J;
-  Eigen::Matrix<T, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1> gradient =
+  Eigen::Matrix<Lanes, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1> gradient =
       J.transpose().lazyProduct(gradient_q_.segment(k, n));
   gradient_q_.segment(k, n) = gradient;
   return J.transpose().lazyProduct(WJ);
 }
 
-template <typename T>
-void ReducedStateCostOf<T>::differentiateFree(const Joint& joint, int offset, T* hessian) {
+void ReducedStateCost::differentiateFree(const Joint& joint, int offset, Lanes* hessian) {
   const int k = joint.idx_v, n = joint.nv;
-  Eigen::Map<MatrixX<T>> yy(hessian, n, n);
+  Eigen::Map<MatrixX<Lanes>> yy(hessian, n, n);
   if (isCurved(joint))
     yy = differentiateJoint(joint);
   else
@@ -124,18 +119,17 @@ void ReducedStateCostOf<T>::differentiateFree(const Joint& joint, int offset, T*
   derivatives_.gradient.segment(reduction_.size + offset, n) = gradient_v_.segment(k, n);
 }
 
-template <typename T>
-void ReducedStateCostOf<T>::differentiateCluster(const ReducedCluster& loop, const ClusterMotionOf<T>& motion,
-                                                 Cluster& cluster, T* hessian) {
+void ReducedStateCost::differentiateCluster(const ReducedCluster& loop, const ClusterMotionOf<Lanes>& motion,
+                                            Cluster& cluster, Lanes* hessian) {
   const int r = loop.size, nv = model_.nv();
-  const MatrixX<T>&N = motion.basis->N, &Z = motion.Z;
+  const MatrixX<Lanes>&N = motion.basis->N, &Z = motion.Z;
   for (size_t j = 0; j < loop.joints.size(); ++j) {
     const Joint &joint = model_.joints()[loop.joints[j]], &own = loop.model.joints()[j + 1];
     const auto rows = N.middleRows(own.idx_v, own.nv);
     if (isCurved(joint))
-      cluster.HN.middleRows(own.idx_v, own.nv) = differentiateJoint(joint).lazyProduct(rows);
+      cluster.QN.middleRows(own.idx_v, own.nv) = differentiateJoint(joint).lazyProduct(rows);
     else
-      cluster.HN.middleRows(own.idx_v, own.nv) = weights.segment(joint.idx_v, joint.nv).asDiagonal() * rows;
+      cluster.QN.middleRows(own.idx_v, own.nv) = weights.segment(joint.idx_v, joint.nv).asDiagonal() * rows;
   }
   for (size_t k = 0; k < loop.dofs.size(); ++k) {
     const int dof = loop.dofs[k];
@@ -148,13 +142,13 @@ void ReducedStateCostOf<T>::differentiateCluster(const ReducedCluster& loop, con
   }
   auto l_y = derivatives_.gradient.segment(loop.offset, r),
        l_v = derivatives_.gradient.segment(reduction_.size + loop.offset, r);
-  Eigen::Map<MatrixX<T>> yy(hessian, r, r), vy(hessian + r * r, r, r), vv(hessian + 2 * r * r, r, r);
+  Eigen::Map<MatrixX<Lanes>> yy(hessian, r, r), vy(hessian + r * r, r, r), vv(hessian + 2 * r * r, r, r);
   for (auto* x : {&l_y, &l_v}) x->setZero();
   for (auto* x : {&yy, &vy, &vv}) x->setZero();
   addSmallProductTransposed(N, cluster.gradient_q, l_y);
   addSmallProductTransposed(Z, cluster.gradient_v, l_y);
   addSmallProductTransposed(N, cluster.gradient_v, l_v);
-  addSmallProductTransposed(N, cluster.HN, yy);
+  addSmallProductTransposed(N, cluster.QN, yy);
   addSmallProductTransposed(Z, cluster.WZ, yy);
   addSmallProductTransposed(N, cluster.WZ, vy);
   addSmallProductTransposed(N, cluster.WN, vv);
@@ -162,7 +156,5 @@ void ReducedStateCostOf<T>::differentiateCluster(const ReducedCluster& loop, con
 
 template struct StateCostModelOf<double>;
 template struct StateCostModelOf<Lanes>;
-template class ReducedStateCostOf<double>;
-template class ReducedStateCostOf<Lanes>;
 
 }  // namespace bielle

@@ -5,12 +5,10 @@
 //     gap = ((W N_k)^T d, (W N_k)^T w),
 //     dy+ <- P_q dy+,   dy_v+ <- P_v dy_v+ + P_z dy+,                                                                 (1)
 //     P_q = (W N_k)^T J_d N',   P_v = (W N_k)^T N',   P_z = (W N_k)^T Z'
-#include "node_model.h"
+#include "bielle/dynamics/cluster_motion.h"
+#include "ocp/transcription.h"
 
 namespace bielle {
-
-template <typename T>
-using JointMatrixOf = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
 
 // Of a cluster of loops with n dofs and r reduced coordinates; T is double, or Lanes for several nodes at once.
 template <typename T>

@@ -1,0 +1,294 @@
+// The full formulation: robot_problem.h Eqs. (1) and (2), x = (q, v) of the spanning tree; and its impacts, dq+ = dq,
+// dv+ = D_q dq + D_v dv (dynamics/impact.h).
+#include "bielle/dynamics/impact.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "ocp/transcription.h"
+
+namespace bielle {
+namespace {
+
+struct FullEvaluation : RobotEvaluation {
+  explicit FullEvaluation(const Model& model) : ws(model) {}
+  Workspace ws;
+  ConstrainedWorkspace cws;
+  std::unique_ptr<ImpactWorkspace> impact;  // of an impact alone
+};
+
+struct FullScratch : ProblemScratch {
+  ResidualJacobians jacobians;
+  ResidualWeights weights;
+  VectorXd tau, displacement, difference;  // nv
+  MatrixXd Rx, Ru, scaled;                 // total derivatives of the residuals; those times the second derivatives
+  // All with room for the residuals of any node.
+};
+
+class FullTranscription : public Transcription {
+ public:
+  FullTranscription(const Model& model, const std::vector<StageSpec>& specs) : model_(model), specs_(specs) {
+    for (const StageSpec& spec : specs) costs_.emplace_back(spec, &spec != &specs.back());
+  }
+
+  int tangentSize() const override { return 2 * model_.nv(); }
+  int getBatchSize() const override { return 1; }
+
+  std::unique_ptr<RobotEvaluation> makeEvaluation() const override { return std::make_unique<FullEvaluation>(model_); }
+
+  std::unique_ptr<ProblemScratch> makeScratch() const override {
+    auto out = std::make_unique<FullScratch>();
+    for (VectorXd* v : {&out->tau, &out->displacement, &out->difference}) v->setZero(model_.nv());
+    int rows = 0, constraint_rows = 0;
+    for (size_t k = 0; k < specs_.size(); ++k) {
+      rows = std::max(rows, costs_[k].rows());
+      constraint_rows = std::max(constraint_rows, specs_[k].constraints.rows);
+    }
+    for (MatrixXd* m : {&out->jacobians.q, &out->jacobians.v}) m->setZero(rows, model_.nv());
+    out->jacobians.lambda.setZero(rows, constraint_rows);
+    for (VectorXd* v : {&out->weights.gradient, &out->weights.hessian}) v->setZero(rows);
+    for (MatrixXd* m : {&out->Rx, &out->scaled}) m->setZero(rows, 2 * model_.nv());
+    out->Ru.setZero(rows, model_.nu());
+    return out;
+  }
+
+  void evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const override {
+    for (int i = 0; i < count; ++i) evaluate(tasks[i], static_cast<FullScratch&>(*scratch));
+  }
+  void linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const override {
+    for (int i = 0; i < count; ++i) linearize(tasks[i], static_cast<FullScratch&>(*scratch));
+  }
+  void integrate(const IntegrateTask* tasks, int count, ProblemScratch*) const override {
+    const int nq = model_.nq(), nv = model_.nv();
+    for (const IntegrateTask* task = tasks; task != tasks + count; ++task) {
+      const VectorXd &x = task->at->x, &dx = *task->dx;
+      model_.integrate(x.head(nq), dx.head(nv), task->x_out->head(nq));
+      task->x_out->tail(nv) = x.tail(nv) + dx.tail(nv);
+    }
+  }
+  void difference(const DifferenceTask* tasks, int count, ProblemScratch*) const override {
+    for (int i = 0; i < count; ++i) calcDifference(tasks[i].at->x, *tasks[i].x1, *tasks[i].dx);
+  }
+
+ private:
+  bool isRunning(int node) const { return node + 1 < static_cast<int>(specs_.size()); }
+  bool isImpact(int node) const { return isRunning(node) && specs_[node].kind == StageKind::Impact; }
+
+  void evaluate(EvaluateTask& task, FullScratch& scratch) const;
+  DynamicsStatus updateStep(int node, FullScratch& scratch, FullEvaluation& at) const;
+  DynamicsStatus updateImpactStep(int node, FullEvaluation& at) const;
+  double calcStateCost(const StateCost& state, const FullEvaluation& at, VectorXd& difference) const;
+
+  void linearize(LinearizeTask& task, FullScratch& scratch) const;
+  void setStep(double h, const FullEvaluation& at, VectorXd& displacement, StageModel& out) const;
+  void setImpact(const FullEvaluation& at, StageModel& out) const;
+  void setResiduals(int node, const FullEvaluation& at, FullScratch& scratch, StageModel& out) const;
+  void addStateCost(int node, const FullEvaluation& at, VectorXd& difference, StageModel& out) const;
+
+  void calcDifference(const VectorXd& x0, const VectorXd& x1, VectorXd& dx) const {
+    const int nq = model_.nq(), nv = model_.nv();
+    model_.difference(x0.head(nq), x1.head(nq), dx.head(nv));
+    dx.tail(nv) = x1.tail(nv) - x0.tail(nv);
+  }
+
+  const Model& model_;
+  const std::vector<StageSpec>& specs_;
+  std::vector<NodeCosts> costs_;
+};
+
+void updateState(const Model& model, const VectorXd& x, Workspace& ws) {
+  updatePositions(model, ws, x.head(model.nq()));
+  updateVelocities(model, ws, x.tail(model.nv()));
+  updateMassMatrix(model, ws);
+}
+
+void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const {
+  auto& at = static_cast<FullEvaluation&>(*task.out);
+  const int node = task.node;
+  if (!startEvaluation(model_, task, specs_[node], isRunning(node), costs_[node].rows(), at)) return;
+  if (isRunning(node)) {
+    const DynamicsStatus status = isImpact(node) ? updateImpactStep(node, at) : updateStep(node, scratch, at);
+    if (status != DynamicsStatus::Ok) {
+      at.failure = getMessage(status);
+      return;
+    }
+    if (!at.x_next.allFinite()) return;
+  } else {
+    updateState(model_, at.x, at.ws);
+  }
+  if (specs_[node].state.weight != 0) at.state_cost = calcStateCost(specs_[node].state, at, scratch.difference);
+  costs_[node].calc({model_, at.ws, specs_[node].constraints, at.u, at.lambda}, at);
+  if (std::isfinite(at.cost)) at.status = StepStatus::Ok;
+}
+
+// Eq. (1)
+DynamicsStatus FullTranscription::updateStep(int node, FullScratch& scratch, FullEvaluation& at) const {
+  const int nq = model_.nq(), nv = model_.nv();
+  const double h = specs_[node].dt;
+  calcMotorForces(model_, at.u, scratch.tau);
+  const DynamicsStatus status = updateConstrainedDynamics(model_, at.ws, at.cws, specs_[node].constraints,
+                                                          at.x.head(nq), at.x.tail(nv), scratch.tau);
+  if (status != DynamicsStatus::Ok) return status;
+  at.a = at.cws.a;
+  at.lambda = at.cws.lambda;
+  at.x_next.tail(nv) = at.x.tail(nv) + h * at.a;
+  scratch.displacement = h * at.x_next.tail(nv);
+  model_.integrate(at.x.head(nq), scratch.displacement, at.x_next.head(nq));
+  return status;
+}
+
+DynamicsStatus FullTranscription::updateImpactStep(int node, FullEvaluation& at) const {
+  if (!at.impact) at.impact = std::make_unique<ImpactWorkspace>(model_);
+  updateState(model_, at.x, at.ws);
+  const DynamicsStatus status = updateImpact(model_, *at.impact, specs_[node].constraints, at.ws.q, at.ws.v);
+  if (status != DynamicsStatus::Ok) return status;
+  at.lambda = at.impact->impulse;
+  at.a.setZero();
+  at.x_next << at.ws.q, at.impact->v_plus;
+  return status;
+}
+
+double FullTranscription::calcStateCost(const StateCost& state, const FullEvaluation& at, VectorXd& difference) const {
+  const int nv = model_.nv();
+  model_.difference(state.q_ref, at.ws.q, difference);
+  return 0.5 * state.weight *
+         (difference.cwiseAbs2().dot(state.weights.head(nv)) +
+          (at.ws.v - state.v_ref).cwiseAbs2().dot(state.weights.tail(nv)));
+}
+
+void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) const {
+  auto& at = static_cast<FullEvaluation&>(*task.at);
+  const int node = task.node;
+  StageModel& out = *task.out;
+  task.status = StepStatus::Failed;
+  task.failure.clear();
+  if (isRunning(node)) {
+    const DynamicsStatus status = isImpact(node)
+                                      ? updateImpactDerivatives(model_, *at.impact, specs_[node].constraints)
+                                      : updateConstrainedDerivatives(model_, at.ws, at.cws, specs_[node].constraints);
+    if (status != DynamicsStatus::Ok) {
+      task.failure = getMessage(status);
+      return;
+    }
+    calcDifference(task.next->x, at.x_next, out.gap);
+    if (isImpact(node))
+      setImpact(at, out);
+    else
+      setStep(specs_[node].dt, at, scratch.displacement, out);
+  }
+  out.cost = at.cost;
+  setResiduals(node, at, scratch, out);
+  addStateCost(node, at, scratch.difference, out);
+  if (isRunning(node)) costs_[node].addControlCost(at.u, out);
+  if (isFinite(out)) task.status = StepStatus::Ok;
+}
+
+// Eq. (2), then the Jacobian of the difference to the node state where a gap is open.
+void FullTranscription::setStep(double h, const FullEvaluation& at, VectorXd& displacement, StageModel& out) const {
+  const int nv = model_.nv();
+  RowMatrixMap Fx = out.Fx(), Fu = out.Fu();
+  auto Fv = Fx.bottomRows(nv);
+  Fv.leftCols(nv) = h * at.cws.da_dq;
+  Fv.rightCols(nv) = h * at.cws.da_dv;
+  Fv.rightCols(nv).diagonal().array() += 1;
+  Fu.bottomRows(nv) = h * at.cws.da_du;
+  displacement = h * at.x_next.tail(nv);
+  for (const Joint& joint : model_.joints()) {
+    const int i = joint.idx_v, n = joint.nv;
+    if (n == 0) continue;
+    if (!isCurved(joint)) {
+      Fx.middleRows(i, n) = h * Fx.middleRows(nv + i, n);
+      Fx.block(i, i, n, n).diagonal().array() += 1;
+      Fu.middleRows(i, n) = h * Fu.middleRows(nv + i, n);
+      continue;
+    }
+    JointMatrix Jq(n, n), Jd(n, n), Jdiff(n, n);
+    const JointVector d = displacement.segment(i, n), gap = out.gap.segment(i, n);
+    calcJointIntegrateJacobians(joint, d, Jq, Jd);
+    calcJointDifferenceJacobian(joint, gap, Jdiff);
+    const JointMatrix dv = h * Jdiff * Jd, dq = Jdiff * Jq;
+    Fx.middleRows(i, n).noalias() = dv * Fx.middleRows(nv + i, n);
+    Fx.block(i, i, n, n) += dq;
+    Fu.middleRows(i, n).noalias() = dv * Fu.middleRows(nv + i, n);
+  }
+}
+
+void FullTranscription::setImpact(const FullEvaluation& at, StageModel& out) const {
+  const int nv = model_.nv();
+  RowMatrixMap Fx = out.Fx();
+  out.Fu().setZero();
+  Fx.topRows(nv).setZero();
+  Fx.bottomLeftCorner(nv, nv) = at.impact->dv_dq;
+  Fx.bottomRightCorner(nv, nv) = at.impact->dv_dv;
+  for (const Joint& joint : model_.joints()) {
+    if (joint.nv == 0) continue;
+    JointMatrix Jdiff(joint.nv, joint.nv);
+    calcJointDifferenceJacobian(joint, out.gap.segment(joint.idx_v, joint.nv), Jdiff);
+    Fx.block(joint.idx_v, joint.idx_v, joint.nv, joint.nv) = Jdiff;
+  }
+}
+
+// Gauss-Newton terms, whatever `out` held; at a running stage forces and controls take part.
+void FullTranscription::setResiduals(int node, const FullEvaluation& at, FullScratch& scratch, StageModel& out) const {
+  const int nv = model_.nv(), nu = model_.nu(), rows = costs_[node].rows();
+  out.lx.setZero();
+  out.lu.setZero();
+  out.hessian().setZero();
+  if (rows == 0) return;
+  ResidualJacobians& jacobians = scratch.jacobians;
+  for (MatrixXd* m : {&jacobians.q, &jacobians.v, &jacobians.lambda}) m->topRows(rows).setZero();
+  costs_[node].differentiate({model_, at.ws, specs_[node].constraints, at.u, at.lambda}, at, scratch.weights,
+                             jacobians);
+  const auto gradient = scratch.weights.gradient.head(rows), hessian = scratch.weights.hessian.head(rows);
+  const auto by_forces = jacobians.lambda.topLeftCorner(rows, specs_[node].constraints.rows);
+  auto Rx = scratch.Rx.topRows(rows);
+  auto scaled = scratch.scaled.topRows(rows);
+  Rx.leftCols(nv) = jacobians.q.topRows(rows);
+  Rx.rightCols(nv) = jacobians.v.topRows(rows);
+  if (isRunning(node) && isImpact(node)) {
+    Rx.leftCols(nv).noalias() += by_forces * at.impact->dimpulse_dq;
+    Rx.rightCols(nv).noalias() += by_forces * at.impact->dimpulse_dv;
+  } else if (isRunning(node)) {
+    Rx.leftCols(nv).noalias() += by_forces * at.cws.dlambda_dq;
+    Rx.rightCols(nv).noalias() += by_forces * at.cws.dlambda_dv;
+  }
+  scaled = hessian.asDiagonal() * Rx;
+  out.lx.noalias() = Rx.transpose() * gradient;
+  out.lxx().noalias() = Rx.transpose() * scaled;
+  if (!isRunning(node) || isImpact(node)) return;  // motors have no say in an impact
+  auto Ru = scratch.Ru.topRows(rows);
+  auto scaled_Ru = scaled.leftCols(nu);
+  Ru.noalias() = by_forces * at.cws.dlambda_du;
+  out.lu.noalias() = Ru.transpose() * gradient;
+  out.lux().noalias() = Ru.transpose() * scaled;
+  scaled_Ru = hessian.asDiagonal() * Ru;
+  out.luu().noalias() = Ru.transpose() * scaled_Ru;
+}
+
+void FullTranscription::addStateCost(int node, const FullEvaluation& at, VectorXd& difference, StageModel& out) const {
+  const StateCost& state = specs_[node].state;
+  if (state.weight == 0) return;
+  const int nv = model_.nv();
+  const double w = costs_[node].scale() * state.weight;
+  model_.difference(state.q_ref, at.ws.q, difference);
+  MatrixMap lxx = out.lxx();
+  out.lx.tail(nv) += w * state.weights.tail(nv).cwiseProduct(at.ws.v - state.v_ref);
+  lxx.diagonal().tail(nv) += w * state.weights.tail(nv);
+  for (const Joint& joint : model_.joints()) {
+    const int i = joint.idx_v, n = joint.nv;
+    if (n == 0) continue;
+    const JointVector weights = w * state.weights.segment(i, n);
+    const JointVector d = difference.segment(i, n);
+    JointMatrix J(n, n);
+    calcJointDifferenceJacobian(joint, d, J);
+    const JointMatrix WJ = weights.asDiagonal() * J;
+    out.lx.segment(i, n).noalias() += WJ.transpose() * d;
+    lxx.block(i, i, n, n).noalias() += J.transpose() * WJ;
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Transcription> makeFullTranscription(const Model& model, const std::vector<StageSpec>& specs) {
+  return std::make_unique<FullTranscription>(model, specs);
+}
+
+}  // namespace bielle

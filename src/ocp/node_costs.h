@@ -1,0 +1,48 @@
+#pragma once
+// The costs of one node, their residuals stacked: first those that depend on q or v, then those of forces alone.
+#include "bielle/ocp/robot_problem.h"
+
+namespace bielle {
+
+// Weights that the activations give to stacked residuals.
+struct ResidualWeights {
+  VectorXd gradient, hessian;  // rows
+  bool counts(int row) const { return gradient[row] != 0 || hessian[row] != 0; }
+};
+
+// Partial derivatives of stacked residuals, rows x nv, nv, constraint rows; with room for those of other nodes.
+struct ResidualJacobians {
+  MatrixXd q, v, lambda;
+};
+
+class NodeCosts {
+ public:
+  // The spec must outlive it.
+  NodeCosts(const StageSpec& spec, bool running);
+
+  int rows() const { return rows_; }
+  int motionRows() const { return motion_rows_; }
+  // What the sum of the costs is multiplied by: the time step of a running stage; 1 at an impact and at the terminal node.
+  double scale() const { return scale_; }
+
+  // Residuals, and from them the scaled cost; `at` has its state cost already.
+  void calc(const NodeView& node, RobotEvaluation& at) const;
+  // Scaled weights of the rows and Jacobians of those that count; the entries of the Jacobians are zero before.
+  void differentiate(const NodeView& node, const RobotEvaluation& at, ResidualWeights& weights,
+                     ResidualJacobians& jacobians) const;
+  // Derivatives of the control cost, added.
+  void addControlCost(const VectorXd& u, StageModel& out) const;
+  std::vector<CostValue> getValues(const RobotEvaluation& at) const;
+
+ private:
+  double calcControlCost(const VectorXd& u) const;
+  template <typename Add>
+  void visitValues(const RobotEvaluation& at, const Add& add) const;
+
+  const StageSpec& spec_;
+  std::vector<int> first_rows_;  // of each cost
+  int rows_ = 0, motion_rows_ = 0;
+  double scale_ = 1;
+};
+
+}  // namespace bielle

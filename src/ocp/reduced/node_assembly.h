@@ -1,0 +1,59 @@
+#pragma once
+// The quadratic model of one node from what the kernel has left in its view: F^T, and residuals by the chain rule.
+#include "reduced_kernel.h"
+
+namespace bielle {
+
+class NodeAssembly {
+ public:
+  NodeAssembly(const Model& model, const Reduction& reduction, const ReducedLayout& layout, int most_residuals);
+
+  // Fx, Fu and gap of a step; the derivatives of its contact forces, which setResiduals() needs next. Uses up view.dydd.
+  void setStep(double h, const ContactLayout& contacts, const ReducedEvaluation& at, const ReducedEvaluation& next,
+               LaneView& view, StageModel& out);
+  // Those of the impulses of an impact, by q and by v (rows x nv).
+  void setImpulseDerivatives(ConstMatrixRef by_q, ConstMatrixRef by_v, const ReducedEvaluation& at,
+                             const LaneView& view);
+  // Gauss-Newton terms of the residuals, whatever `out` held.
+  void setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
+                    const ReducedEvaluation& at, const LaneView& view, StageModel& out);
+
+  // Gap and derivatives of a joint outside all clusters: what dq+ makes of dy and of dv+, the identity and h but for curved
+  // joints.
+  struct FreeJoint {
+    const Joint* joint;
+    int offset, size;
+    bool curved;
+    JointMatrix q_y, q_v;  // of a curved one
+  };
+  std::vector<FreeJoint>& freeJoints() { return free_joints_; }
+  void calcFreeGaps(const ReducedEvaluation& at, const ReducedEvaluation& next, VectorXd& gap) const;
+
+  // out += (A X)^T with A for the whole model (k x nv) and X = N (joints outside all clusters: the identity) or Z (zero).
+  void addTimesN(ConstMatrixRef A, const ReducedEvaluation& at, MatrixRef out) const;
+  void addTimesZ(ConstMatrixRef A, const LaneView& view, MatrixRef out) const;
+
+ private:
+  void setContactDerivatives(const ContactLayout& contacts, const LaneView& view);
+  void addMotorRows(const ReducedEvaluation& at, PaddedMap dydd) const;
+  void updateFreeJoint(double h, const ReducedEvaluation& at, const VectorXd& gap, FreeJoint& free) const;
+  void setTransition(double h, const LaneView& view, PaddedMap dv, StageModel& out) const;
+  void updateResidualDerivatives(const NodeCosts& costs, const ContactLayout& contacts, const ReducedEvaluation& at,
+                                 const LaneView& view, PaddedMap Rt);
+
+  const Model& model_;
+  const Reduction& reduction_;
+  const ReducedLayout& layout_;
+  std::vector<FreeJoint> free_joints_;
+  struct Motor {
+    int cluster, row;  // cluster and row of its N; or -1 and reduced coordinate
+  };
+  std::vector<Motor> motors_;
+  ResidualJacobians jacobians_;
+  ResidualWeights weights_;
+  VectorXd Rt_, Rt_scaled_, gradient_;  // with room for any node
+  VectorXd dlambda_;  // (nu + 2 size) x contact rows, padded: derivatives of contact forces by (u, dy, dy_v)
+  VectorXd room_;     // of solveDerivatives()
+};
+
+}  // namespace bielle

@@ -1,0 +1,56 @@
+#pragma once
+// A node of the reduced formulation as a value, and what is known of all nodes of a problem before any is evaluated.
+#include "bielle/dynamics/impact.h"
+#include "bielle/dynamics/reduction.h"
+#include "ocp/transcription.h"
+
+namespace bielle {
+
+// A cluster at one node.
+struct ClusterNode {
+  explicit ClusterNode(const ReducedCluster& cluster) : at(cluster), next(cluster) {
+    v_next.setZero(cluster.model.nv());
+  }
+  ClusterBasis at;    // at the state
+  ClusterState next;  // at q+
+  VectorXd v_next;    // n, v+
+};
+
+// It stores only what is expensive to recompute, so that a long horizon fits into the caches.
+struct ReducedEvaluation : RobotEvaluation {
+  ReducedEvaluation(const Model& model, const Reduction& reduction) : X_WB(model.numBodies()) {
+    clusters.reserve(reduction.clusters.size());
+    for (const ReducedCluster& cluster : reduction.clusters) clusters.emplace_back(cluster);
+  }
+  std::vector<SE3> X_WB;  // nb
+  std::vector<ClusterNode> clusters;
+  SaddlePointFactors factors;               // of reduced_kernel.h, Eq. (b)
+  std::unique_ptr<ImpactWorkspace> impact;  // of an impact alone
+};
+
+// Contacts of one node. A slot is a place for a contact, always on the same body; two contacts of a body take two slots.
+struct ContactLayout {
+  struct Contact {
+    const Closure* closure;
+    int slot;
+    int row, rows;  // among the contact rows
+    Matrix3d
+        turn;  // from the angular part of a twist in the contact frame to its last rows; zero rows where there are none
+  };
+  std::vector<Contact> contacts;
+  int closure_rows = 0;  // of the model's closures, which come before the contacts
+  int rows = 0;          // of all contacts
+};
+
+// All nodes of a problem.
+struct ReducedLayout {
+  ReducedLayout(const Model& model, const Reduction& reduction, const std::vector<StageSpec>& specs);
+  std::vector<int> tips;                 // bodies in contact at some stage
+  std::vector<std::vector<int>> outers;  // per tip, reduced coordinates that move it
+  std::vector<int> slots;                // tip of each slot
+  std::vector<ContactLayout> contacts;   // per node
+  int most_contact_rows = 0, most_constraint_rows = 0;
+  std::vector<int> state_costs;  // per node, -1: none; nodes with equal costs have the same number
+};
+
+}  // namespace bielle

@@ -1,0 +1,208 @@
+#pragma once
+// The reduced step, its differences and its derivatives: robot_problem.h Eq. (3), for as many nodes at once as a register of the
+// processor has lanes. Written for one cluster with bases N, J, J^+ and metric W (reduction.h) at q, and N', J', J'^+ at q+; a
+// joint outside all clusters is the case N = N' = W = 1 without rows.
+//
+// A tangent vector (dy, dy_v) at the state means, with Z, d_y and d_v of cluster_motion.h,
+//     dq = N dy,   dv = N dy_v + Z dy,   da = N dy' + d_y dy + d_v dy_v                                               (a)
+// Dynamics: with a = N y' + a_d, a_d = -J^+ gamma, and hats for projections by N^T from both sides,
+//     M^ y' - (J_c N)^T lambda_c = N^T (tau - b - M a_d),    (J_c N) y' = -gamma_c - J_c a_d                          (b)
+// where c are the contacts. The closure forces, which N^T hides, balance what is left:
+// J^T lambda_l = M a + b - tau - J_c^T lambda_c. Derivatives at fixed lambda_l, lambda_c: those of inverse dynamics
+// (reduced_tree.h), and of the contact rows, with the columns J~, .. of the contact's body in the place of J_k, .. of closure.h
+// Eqs. (1) and (2).                                                                                                   (c)
+// Step: w = v + h a; e is the displacement before closing, A = h J' J_d W^{-1} J^T, and K = d(J^T zeta)/dq,
+// K' = d(J'^T mu)/dq' are geometric stiffnesses, S = N'^T K' N':
+//     e = (J_q - h J_d W^{-1} K) dq + h J_d dw                                                                        (d)
+//     dq+ = e - h J_d W^{-1} J^T A^{-1} J' e,     dw' = dw - W^{-1} K dq - W^{-1} J^T A^{-1} J' e                     (e)
+//     dy+ = (W N')^T dq+,   dy_v+ = (W N')^T dw' - S dy+,   mu = J'^{+T} W w'                                         (f)
+// S is there because the projection of w' turns with q+. Nothing of the size of J needs to be inverted: (W N')^T times the
+// oblique projection of (e) vanishes on J_d W^{-1} J^T, and so it is read by P = J_d^{-T} W N. With P' = J_d^{-T} W N',
+// X = (P^T N')^{-1}, X' = P'^T N' X, E = P^T J_q N - h N^T K N, and (W N)^T Z = (W N)^T d_y = (W N)^T d_v = 0,
+//     dy+   = X E dy + h X dy_v + h^2 X dy'
+//     dy_v+ = (X' E - P'^T J_q N) / h dy + X' dy_v + h X' dy' - S dy+                                                 (g)
+// With a gap, the result is read about the node state's own basis (cluster_gap.h).
+//
+// All of it runs in lanes, one node alone too: what comes out of a lane does not depend on the others, and so results do not
+// depend on which nodes come together. Only what has other sizes at every node (costs, F^T) is done node by node.
+#include "bielle/dynamics/reduced_tree.h"
+#include "cluster_gap.h"
+#include "lane_transfer.h"
+#include "reduced_evaluation.h"
+#include "state_cost.h"
+
+namespace bielle {
+
+// A cluster at the nodes of all lanes; n dofs, m closure rows, r reduced coordinates.
+struct ClusterLanes {
+  explicit ClusterLanes(const ReducedCluster& cluster);
+  const ReducedCluster& cluster;
+  ClusterBasisOf<Lanes> at;            // at the states
+  ClusterMotionOf<Lanes> motion;       // there, in the whole model
+  ClusterScratchOf<Lanes> scratch;     // of updates and closings
+  ClusterStateOf<Lanes> next;          // at q+
+  VectorX<Lanes> v_next;               // n, v+
+  VectorX<Lanes> drift, a, d, target;  // rank; n: a_d, then a; n; r
+  VectorX<Lanes> left, forces, rows;   // n; rank and m: what the closures balance, and the forces that do
+  MatrixX<Lanes> mixed;                // r x r
+  std::vector<LogicOf<Lanes>::Index> pivots;
+  // Of derivatives, names as in the equations
+  WorkspaceOf<Lanes> own;                // of the cluster's model at q+
+  ClusterMotionOf<Lanes> ahead;          // at q+, in the cluster
+  MatrixX<Lanes> KN, KnNn, JqN, P, Pn;   // n x r
+  MatrixX<Lanes> E, En, S, X, Xn, PnNn;  // r x r; PnNn = P'^T N'
+  MatrixX<Lanes> q_y, q_v, v_y, v_v;     // r x r: dy+ and dy_v+ by dy and dy_v; by dy' they are h times those by dy_v
+  ClusterGapOf<Lanes> gap;               // to the node states
+};
+
+// The contacts of one slot.
+struct ContactLanes {
+  int tip = 0;                 // index among the tips
+  bool used = false;           // by some lane
+  Lanes present;               // 1 or 0
+  SE3Of<Lanes> X_WF;           // of the contact's frame
+  Matrix3<Lanes> turn;         // as ContactLayout::Contact::turn
+  Lanes kd;                    // gain
+  Vector6<Lanes> kp_residual;  // kp times the residual, as rows
+  Matrix6<Lanes> kp_rate;      // kp times the rows of its rate by the frame's twist
+  Vector6<Lanes> wrench;       // on the body, world
+  Matrix6X<Lanes> dy, dv;      // 6 x outer coordinates of the tip: rows of Eq. (c)
+
+  // Rows of a twist or acceleration in the world, and the wrench on the body of forces on the rows.
+  template <typename Derived>
+  Vector6<Lanes> selectRows(const Eigen::MatrixBase<Derived>& world) const {
+    const Vector6<Lanes> full = X_WF.actInvMotion(world);
+    Vector6<Lanes> out;
+    linear(out) = present * linear(full);
+    angular(out) = turn * angular(full);
+    return out;
+  }
+  Vector6<Lanes> expandRows(const Vector6<Lanes>& rows_force) const {
+    Vector6<Lanes> full;
+    linear(full) = linear(rows_force);
+    angular(full) = turn.transpose() * angular(rows_force);
+    return X_WF.actForce(full);
+  }
+};
+
+// What the kernel leaves for one node: what its residuals look at, and its derivatives in sizes that all nodes have.
+struct LaneView {
+  LaneView(const Model& model, const Reduction& reduction, const ReducedTreeOf<Lanes>& tree,
+           const ReducedLayout& layout);
+  struct Cluster {
+    MatrixXd Z, q_y, q_v, v_y, v_v;  // as in ClusterLanes
+    VectorXd gap, gap_v;             // r
+  };
+  struct Contact {
+    Matrix6Xd dy, dv;  // as in ContactLanes
+  };
+  Workspace ws;
+  VectorXd dydd;  // (nu + 2 size) x size, padded: room for torques, then A_y^T and A_v^T of reduced_tree.h
+  std::vector<Cluster> clusters;
+  std::vector<Contact> contacts;  // per slot
+  StateCostModel state_cost;
+};
+
+// Memory of one thread. Every function takes at most kLane items, and leaves nothing behind but what it writes to them and to
+// the views, one per item.
+class ReducedKernel {
+ public:
+  ReducedKernel(const Model& model, const Reduction& reduction, const ReducedLayout& layout);
+
+  struct StepItem {
+    int node;
+    const StageSpec* spec;
+    const ReducedEvaluation* previous;  // whose q+ is the state, or null
+    ReducedEvaluation* at;              // with x and u
+  };
+  // Steps: fills `at` but for costs, sets the status of those that went through to Ok, and tells the others why not. Of the views:
+  // what residuals look at.
+  void step(const StepItem* items, int count, std::vector<LaneView>& views);
+  // The same for states alone, at impacts and the terminal node.
+  void place(const StepItem* items, int count, std::vector<LaneView>& views);
+
+  struct LinearizeItem {
+    int node;
+    const StageSpec* spec;
+    const ReducedEvaluation* at;
+    const ReducedEvaluation* next;  // at the node state behind it; not read by linearizeStates()
+    bool ok;                        // out
+    std::string* failure;           // out, where it is not
+  };
+  // Derivatives of steps, all of the views.
+  void linearizeSteps(LinearizeItem* items, int count, std::vector<LaneView>& views);
+  // Of states alone: what residuals look at, Z and the state cost.
+  void linearizeStates(LinearizeItem* items, int count, std::vector<LaneView>& views);
+
+  void integrate(const IntegrateTask* tasks, int count);
+  void difference(const DifferenceTask* tasks, int count);
+
+  const ReducedTreeOf<Lanes>& tree() const { return tree_; }
+
+ private:
+  // reduced_transfer.cpp: numbers between nodes and lanes
+  void loadState(LaneSource<const ReducedEvaluation> nodes);
+  void loadBases(LaneSource<const ReducedEvaluation> nodes);
+  void loadPoints(const StepItem* items, int count);
+  void loadControls(const StepItem* items, int count);
+  void loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices);
+  void loadContact(int lane, const ContactLayout::Contact& contact, const ReducedEvaluation& node, int closure_rows);
+  bool loadStateCosts(const int* indices, const StageSpec* const* specs, int count);
+  void loadStep(LaneSource<const ReducedEvaluation> nodes);
+  void storePoints(const StepItem* items, int count);
+  void storeNext(size_t cluster, const StepItem* items, int count);
+  void storeStep(const StepItem* items, int count);
+  void storeSystem(const StepItem& item, int lane);
+  void storeMotion(int count, std::vector<LaneView>& views) const;
+  void storeColumns(int count, std::vector<LaneView>& views) const;
+  void storeDerivatives(int count, std::vector<LaneView>& views) const;
+
+  // reduced_step.cpp
+  LaneMask placeAll(const StepItem* items, int count);
+  void placeBodies();
+  void updateStateCosts(const StepItem* items, int count);
+  void updateDriftAccelerations();
+  void updateSystem();
+  void updateContactRows(size_t slot);
+  void stepFreeJoints();
+  LaneMask closeStep(ClusterLanes& c);
+  void updateClosureForces();
+  // Rows of a cluster's closures among those of the model.
+  template <typename Visit>
+  void visitClosureRows(const ReducedCluster& cluster, const Visit& visit) const {
+    for (size_t j = 0; j < cluster.closures.closures.size(); ++j)
+      visit(cluster.closures.offsets[j], closure_offsets_[cluster.closure_indices[j]],
+            getRows(cluster.closures.closures[j].kind));
+  }
+
+  // reduced_derivatives.cpp
+  void updateForces();
+  void updateContact(ContactLanes& contact);
+  LaneMask updateClusterDerivatives(ClusterLanes& c);
+  void updateGap(size_t cluster, const LinearizeItem* items, int count);
+  void linearizeStateCosts(const LinearizeItem* items, int count, std::vector<LaneView>& views);
+
+  const Model& model_;
+  const Reduction& reduction_;
+  const ReducedLayout& layout_;
+  WorkspaceOf<Lanes> ws_;
+  std::vector<ClusterLanes> clusters_;
+  std::vector<ClusterLiftOf<Lanes>> lifts_;
+  ReducedTreeOf<Lanes> tree_;
+  std::vector<ContactLanes> contacts_;  // per slot
+  VectorX<Lanes> v_, a_, tau_, x1_;     // nv; nq + nv: the next states
+  Lanes h_;
+  // Eq. (b), six rows for each slot
+  SaddlePointOf<Lanes> system_;
+  MatrixX<Lanes> M_, JcN_;                           // size x size, rows x size
+  VectorX<Lanes> f_, gamma_, ydd_, contact_forces_;  // size, rows
+  VectorX<Lanes> closure_forces_;                    // rows of all closures
+  std::vector<int> closure_offsets_;                 // first row of each closure of the model
+  VectorX<Lanes> u_, dx_;                            // nu; 2 size
+  std::vector<Vector6<Lanes>> f_ext_;                // nb
+  MatrixX<Lanes> A_y_, A_v_;                         // size x size, reduced_tree.h Eqs. (2) and (3)
+  ReducedStateCost state_cost_;
+  std::array<int, kLane> loaded_costs_;  // whose references and weights it holds
+};
+
+}  // namespace bielle

@@ -1,0 +1,155 @@
+// The reduced formulation behind RobotProblem: hands batches of nodes to the kernel, and does node by node what has other sizes at
+// every node.
+#include <algorithm>
+
+#include "node_assembly.h"
+#include "reduced_impact.h"
+
+namespace bielle {
+namespace {
+
+struct ReducedScratch : ProblemScratch {
+  ReducedScratch(const Model& model, const Reduction& reduction, const ReducedLayout& layout, int residuals)
+      : kernel(model, reduction, layout),
+        views(kLane, LaneView(model, reduction, kernel.tree(), layout)),
+        assembly(model, reduction, layout, residuals),
+        impact(model, reduction) {}
+  ReducedKernel kernel;
+  std::vector<LaneView> views;  // one per lane
+  NodeAssembly assembly;
+  ReducedImpact impact;
+};
+
+// At most kLane items.
+template <typename Item>
+struct Batch {
+  std::array<Item, kLane> items;
+  std::array<int, kLane> tasks;  // which task each item is
+  int count = 0;
+  void add(const Item& item, int task) {
+    items[count] = item;
+    tasks[count++] = task;
+  }
+};
+
+class ReducedTranscription : public Transcription {
+ public:
+  ReducedTranscription(const Model& model, const VectorXd& q0, const std::vector<StageSpec>& specs)
+      : model_(model), specs_(specs), reduction_(makeReduction(model, q0)), layout_(model, reduction_, specs) {
+    for (const StageSpec& spec : specs) costs_.emplace_back(spec, &spec != &specs.back());
+  }
+
+  int tangentSize() const override { return 2 * reduction_.size; }
+  int getBatchSize() const override { return static_cast<int>(kLane); }
+  std::unique_ptr<RobotEvaluation> makeEvaluation() const override {
+    return std::make_unique<ReducedEvaluation>(model_, reduction_);
+  }
+  std::unique_ptr<ProblemScratch> makeScratch() const override {
+    int residuals = 0;
+    for (const NodeCosts& costs : costs_) residuals = std::max(residuals, costs.rows());
+    return std::make_unique<ReducedScratch>(model_, reduction_, layout_, residuals);
+  }
+
+  void evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const override;
+  void linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const override;
+  void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const override {
+    static_cast<ReducedScratch*>(scratch)->kernel.integrate(tasks, count);
+  }
+  void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const override {
+    static_cast<ReducedScratch*>(scratch)->kernel.difference(tasks, count);
+  }
+
+ private:
+  bool isRunning(int node) const { return node + 1 < static_cast<int>(specs_.size()); }
+  bool isImpact(int node) const { return isRunning(node) && specs_[node].kind == StageKind::Impact; }
+  bool isStep(int node) const { return isRunning(node) && !isImpact(node); }
+  void finishEvaluation(int node, const LaneView& view, RobotEvaluation& at) const;
+  void finishLinearization(LinearizeTask& task, LaneView& view, ReducedScratch& scratch) const;
+
+  const Model& model_;
+  const std::vector<StageSpec>& specs_;
+  const Reduction reduction_;
+  const ReducedLayout layout_;
+  std::vector<NodeCosts> costs_;
+};
+
+void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScratch* memory) const {
+  auto& scratch = static_cast<ReducedScratch&>(*memory);
+  Batch<ReducedKernel::StepItem> steps, states;
+  for (int i = 0; i < count; ++i) {
+    const int node = tasks[i].node;
+    auto& at = static_cast<ReducedEvaluation&>(*tasks[i].out);
+    if (!startEvaluation(model_, tasks[i], specs_[node], isRunning(node), costs_[node].rows(), at)) continue;
+    const int rows = layout_.contacts[node].rows;
+    if (at.factors.D.size() != rows || at.factors.L.rows() != reduction_.size) at.factors.resize(reduction_.size, rows);
+    const auto* previous = static_cast<const ReducedEvaluation*>(tasks[i].previous);
+    (isStep(node) ? steps : states).add({node, &specs_[node], previous, &at}, i);
+  }
+  if (steps.count > 0) scratch.kernel.step(steps.items.data(), steps.count, scratch.views);
+  for (int l = 0; l < steps.count; ++l) finishEvaluation(steps.items[l].node, scratch.views[l], *steps.items[l].at);
+  if (states.count > 0) scratch.kernel.place(states.items.data(), states.count, scratch.views);
+  for (int l = 0; l < states.count; ++l) {
+    const ReducedKernel::StepItem& item = states.items[l];
+    if (isImpact(item.node) && item.at->status == StepStatus::Ok) scratch.impact.update(item);
+    finishEvaluation(item.node, scratch.views[l], *item.at);
+  }
+}
+
+// Costs, behind a step that went through.
+void ReducedTranscription::finishEvaluation(int node, const LaneView& view, RobotEvaluation& at) const {
+  if (at.status != StepStatus::Ok) return;
+  costs_[node].calc({model_, view.ws, specs_[node].constraints, at.u, at.lambda}, at);
+  if (!at.x_next.allFinite() || !std::isfinite(at.cost)) at.status = StepStatus::Failed;
+}
+
+void ReducedTranscription::linearize(LinearizeTask* tasks, int count, ProblemScratch* memory) const {
+  auto& scratch = static_cast<ReducedScratch&>(*memory);
+  Batch<ReducedKernel::LinearizeItem> steps, states;
+  for (int i = 0; i < count; ++i) {
+    const int node = tasks[i].node;
+    tasks[i].status = StepStatus::Failed;
+    tasks[i].failure.clear();
+    const auto* at = static_cast<const ReducedEvaluation*>(tasks[i].at);
+    const auto* next = static_cast<const ReducedEvaluation*>(tasks[i].next);
+    (isStep(node) ? steps : states).add({node, &specs_[node], at, next, false, &tasks[i].failure}, i);
+  }
+  const auto finish = [&](Batch<ReducedKernel::LinearizeItem>& batch) {
+    for (int l = 0; l < batch.count; ++l)
+      if (batch.items[l].ok) finishLinearization(tasks[batch.tasks[l]], scratch.views[l], scratch);
+  };
+  if (steps.count > 0) scratch.kernel.linearizeSteps(steps.items.data(), steps.count, scratch.views);
+  finish(steps);
+  if (states.count > 0) scratch.kernel.linearizeStates(states.items.data(), states.count, scratch.views);
+  finish(states);
+}
+
+void ReducedTranscription::finishLinearization(LinearizeTask& task, LaneView& view, ReducedScratch& scratch) const {
+  const int node = task.node;
+  auto& at = static_cast<ReducedEvaluation&>(*task.at);
+  const auto* next = static_cast<const ReducedEvaluation*>(task.next);
+  NodeAssembly& assembly = scratch.assembly;
+  StageModel& out = *task.out;
+  if (isStep(node)) {
+    assembly.setStep(specs_[node].dt, layout_.contacts[node], at, *next, view, out);
+  } else if (isImpact(node)) {
+    const DynamicsStatus status = scratch.impact.linearize(specs_[node].constraints, at, *next, view, assembly, out);
+    if (status != DynamicsStatus::Ok) {
+      task.failure = getMessage(status);
+      return;
+    }
+  }
+  out.cost = at.cost;
+  assembly.setResiduals(costs_[node], specs_[node], layout_.contacts[node], at, view, out);
+  if (specs_[node].state.weight != 0) addStateCostModel(model_, reduction_, view.state_cost, costs_[node].scale(), out);
+  if (isRunning(node)) costs_[node].addControlCost(at.u, out);
+  if (isFinite(out)) task.status = StepStatus::Ok;
+}
+
+}  // namespace
+
+std::unique_ptr<Transcription> makeReducedTranscription(const Model& model, const VectorXd& q0,
+                                                        const std::vector<StageSpec>& specs) {
+  return std::make_unique<ReducedTranscription>(model, q0, specs);
+}
+
+}  // namespace bielle

@@ -1,0 +1,295 @@
+// What the kernel reads from nodes and writes to them.
+#include <algorithm>
+
+#include "reduced_kernel.h"
+
+namespace bielle {
+
+// Placements and velocities.
+void ReducedKernel::loadState(LaneSource<const ReducedEvaluation> nodes) {
+  const int nq = model_.nq(), count = nodes.count;
+  gatherLanes(count, nq, ws_.q.data(), [&](int l) { return nodes[l].x.data(); });
+  gatherLanes(count, v_.size(), v_.data(), [&](int l) { return nodes[l].x.data() + nq; });
+  gatherLanes(count, 12 * model_.numBodies(), getNumbers(ws_.X_WB.front()),
+              [&](int l) { return getNumbers(nodes[l].X_WB.front()); });
+  ws_.stage = WorkspaceStage::Placement;
+}
+
+namespace {
+
+// The cluster of each node that `get` names.
+template <typename Get>
+void loadBasis(const ReducedCluster& cluster, int count, const Get& get, ClusterBasisOf<Lanes>& to) {
+  gatherLanes(count, to.q.size(), to.q.data(), [&](int l) { return get(l).q.data(); });
+  gatherLanes(count, to.N.size(), to.N.data(), [&](int l) { return get(l).N.data(); });
+  gatherLanes(count, to.J.size(), to.J.data(), [&](int l) { return get(l).J.data(); });
+  gatherLanes(count, to.L.size(), to.L.data(), [&](int l) { return get(l).L.data(); });
+  for (Eigen::Index c = 0; c < to.N.cols(); ++c)
+    for (Eigen::Index k = 0; k < to.N.rows(); ++k) to.WN(k, c) = cluster.metric[k] * to.N(k, c);
+  for (size_t k = 0; k < to.rows.size(); ++k)
+    for (int l = 0; l < kLane; ++l) to.rows[k][l] = get(l < count ? l : 0).rows[k];
+}
+
+template <typename Get>
+void storeBasis(const ClusterBasisOf<Lanes>& basis, int count, const Get& get) {
+  const auto give = [&](const auto& from, const auto& select) {
+    scatterLanes(from.data(), from.size(), count, [&](int l) -> double* {
+      ClusterBasis* to = get(l);
+      return to ? select(*to).data() : nullptr;
+    });
+  };
+  give(basis.q, [](ClusterBasis& b) -> VectorXd& { return b.q; });
+  give(basis.N, [](ClusterBasis& b) -> MatrixXd& { return b.N; });
+  give(basis.WN, [](ClusterBasis& b) -> MatrixXd& { return b.WN; });
+  give(basis.J, [](ClusterBasis& b) -> MatrixXd& { return b.J; });
+  give(basis.L, [](ClusterBasis& b) -> MatrixXd& { return b.L; });
+  for (int l = 0; l < count; ++l)
+    if (ClusterBasis* to = get(l))
+      for (size_t k = 0; k < basis.rows.size(); ++k) to->rows[k] = basis.rows[k][l];
+}
+
+// The state of a cluster to those that `get` names, null for none.
+template <typename Get>
+void storeState(const ClusterStateOf<Lanes>& state, int count, const Get& get) {
+  storeBasis(state.basis, count, [&](int l) -> ClusterBasis* {
+    ClusterState* to = get(l);
+    return to ? &to->basis : nullptr;
+  });
+  const auto give = [&](const Lanes* from, Eigen::Index size, const auto& select) {
+    scatterLanes(from, size, count, [&](int l) -> double* {
+      ClusterState* to = get(l);
+      return to ? select(*to) : nullptr;
+    });
+  };
+  give(getNumbers(state.placements.front()), 12 * state.placements.size(),
+       [](ClusterState& s) { return getNumbers(s.placements.front()); });
+  give(state.zeta.data(), state.zeta.size(), [](ClusterState& s) { return s.zeta.data(); });
+  give(state.step.data(), state.step.size(), [](ClusterState& s) { return s.step.data(); });
+}
+
+}  // namespace
+
+void ReducedKernel::loadBases(LaneSource<const ReducedEvaluation> nodes) {
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    ClusterLanes& c = clusters_[i];
+    loadBasis(
+        c.cluster, nodes.count, [&](int l) -> const ClusterBasis& { return nodes[l].clusters[i].at; }, c.at);
+  }
+}
+
+// Bases and, as seen from the body that carries the cluster, placements: those of the q+ that a state is, where there is one,
+// or else those that placeAll() has left in the place of q+.
+void ReducedKernel::loadPoints(const StepItem* items, int count) {
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    ClusterLanes& c = clusters_[i];
+    const auto get = [&](int l) -> const ClusterState& {
+      return (items[l].previous ? items[l].previous : items[l].at)->clusters[i].next;
+    };
+    loadBasis(
+        c.cluster, count, [&](int l) -> const ClusterBasis& { return get(l).basis; }, c.at);
+    for (size_t j = 0; j < c.cluster.joints.size(); ++j)
+      gatherLanes(count, 12, getNumbers(ws_.X_WB[c.cluster.joints[j]]),
+                  [&](int l) { return getNumbers(get(l).placements[j + 1]); });
+    for (int l = 0; l < count; ++l) items[l].at->clusters[i].at = get(l).basis;
+  }
+}
+
+// To the nodes whose state is nobody's q+: until their step is done, its place is free.
+void ReducedKernel::storeNext(size_t cluster, const StepItem* items, int count) {
+  storeState(clusters_[cluster].next, count,
+             [&](int l) { return items[l].previous ? nullptr : &items[l].at->clusters[cluster].next; });
+}
+
+void ReducedKernel::storePoints(const StepItem* items, int count) {
+  scatterLanes(getNumbers(ws_.X_WB.front()), 12 * model_.numBodies(), count,
+               [&](int l) { return getNumbers(items[l].at->X_WB.front()); });
+}
+
+// Time steps and motor forces.
+void ReducedKernel::loadControls(const StepItem* items, int count) {
+  gatherLanes(count, 1, &h_, [&](int l) { return &items[l].spec->dt; });
+  gatherLanes(count, u_.size(), u_.data(), [&](int l) { return items[l].at->u.data(); });
+  tau_.setZero();
+  for (int m = 0; m < model_.nu(); ++m) tau_[model_.motors()[m].dof] = u_[m];
+}
+
+// Nodes without a contact in a slot have no force there, and whatever its other numbers.
+void ReducedKernel::loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices) {
+  for (ContactLanes& slot : contacts_) {
+    slot.used = false;
+    slot.present = 0;
+    slot.kd = 0;
+    slot.turn.setZero();
+    slot.kp_residual.setZero();
+    slot.kp_rate.setZero();
+    slot.wrench.setZero();
+  }
+  for (int l = 0; l < nodes.count; ++l) {
+    const ContactLayout& layout = layout_.contacts[indices[l]];
+    for (const ContactLayout::Contact& contact : layout.contacts)
+      loadContact(l, contact, nodes[l], layout.closure_rows);
+  }
+}
+
+void ReducedKernel::loadContact(int lane, const ContactLayout::Contact& contact, const ReducedEvaluation& node,
+                                int closure_rows) {
+  ContactLanes& slot = contacts_[contact.slot];
+  const Closure& closure = *contact.closure;
+  const SE3 X_WF = node.X_WB[closure.body1] * closure.X_B1;
+  const VectorUpTo6<double> lambda = node.lambda.segment(closure_rows + contact.row, contact.rows);
+  const Vector6d wrench = X_WF.actForce(expandRows(closure, lambda));
+  for (int k = 0; k < 12; ++k) getNumbers(slot.X_WF)[k].set(lane, getNumbers(X_WF)[k]);
+  for (int k = 0; k < 6; ++k) slot.wrench[k].set(lane, wrench[k]);
+  for (int k = 0; k < 9; ++k) slot.turn.data()[k].set(lane, contact.turn.data()[k]);
+  slot.kd.set(lane, closure.kd);
+  slot.present.set(lane, 1);
+  slot.used = true;
+  if (closure.kp == 0) return;
+  const SE3 X_12 = X_WF.inverseTimes(closure.X_B2);
+  const RowVectorUpTo6 residual = closure.kp * calcClosureResidual(closure, X_12);
+  const RowsBy6 rate = closure.kp * calcClosureResidualRate(closure, X_12);
+  for (int r = 0; r < contact.rows; ++r) {
+    slot.kp_residual[r].set(lane, residual[r]);
+    for (int c = 0; c < 6; ++c) slot.kp_rate(r, c).set(lane, rate(r, c));
+  }
+}
+
+// References and weights of the state costs, unless they are there from the last call. False when no node has one; nodes
+// without one get weights of zero.
+bool ReducedKernel::loadStateCosts(const int* indices, const StageSpec* const* specs, int count) {
+  std::array<int, kLane> wanted;
+  std::array<const StateCost*, kLane> costs;
+  const StateCost* some = nullptr;
+  for (int l = 0; l < kLane; ++l) {
+    const int i = l < count ? l : 0;
+    wanted[l] = layout_.state_costs[indices[i]];
+    costs[l] = wanted[l] < 0 ? nullptr : &specs[i]->state;
+    if (costs[l]) some = costs[l];
+  }
+  if (!some) return false;
+  if (wanted == loaded_costs_) return true;
+  loaded_costs_ = wanted;
+  const auto load = [&](const auto& get, VectorX<Lanes>& out) {
+    gatherLanes(kLane, out.size(), out.data(), [&](int l) { return get(costs[l] ? *costs[l] : *some).data(); });
+  };
+  load([](const StateCost& cost) -> const VectorXd& { return cost.q_ref; }, state_cost_.q_ref);
+  load([](const StateCost& cost) -> const VectorXd& { return cost.v_ref; }, state_cost_.v_ref);
+  load([](const StateCost& cost) -> const VectorXd& { return cost.weights; }, state_cost_.weights);
+  Lanes weight;
+  for (int l = 0; l < kLane; ++l) weight.set(l, costs[l] ? costs[l]->weight : 0);
+  state_cost_.weights *= weight;
+  return true;
+}
+
+// What a step has found out.
+void ReducedKernel::loadStep(LaneSource<const ReducedEvaluation> nodes) {
+  const int count = nodes.count;
+  gatherLanes(count, a_.size(), a_.data(), [&](int l) { return nodes[l].a.data(); });
+  gatherLanes(count, closure_forces_.size(), closure_forces_.data(), [&](int l) { return nodes[l].lambda.data(); });
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    ClusterLanes& c = clusters_[i];
+    const auto get = [&](int l) -> const ClusterNode& { return nodes[l].clusters[i]; };
+    loadBasis(
+        c.cluster, count, [&](int l) -> const ClusterBasis& { return get(l).next.basis; }, c.next.basis);
+    gatherLanes(count, c.next.zeta.size(), c.next.zeta.data(), [&](int l) { return get(l).next.zeta.data(); });
+    gatherLanes(count, c.next.step.size(), c.next.step.data(), [&](int l) { return get(l).next.step.data(); });
+    gatherLanes(count, c.v_next.size(), c.v_next.data(), [&](int l) { return get(l).v_next.data(); });
+    gatherLanes(count, 12 * c.cluster.model.numBodies(), getNumbers(c.own.X_WB.front()),
+                [&](int l) { return getNumbers(get(l).next.placements.front()); });
+    c.own.stage = WorkspaceStage::Placement;
+  }
+}
+
+void ReducedKernel::storeStep(const StepItem* items, int count) {
+  scatterLanes(a_.data(), a_.size(), count, [&](int l) { return items[l].at->a.data(); });
+  scatterLanes(x1_.data(), x1_.size(), count, [&](int l) { return items[l].at->x_next.data(); });
+  scatterLanes(closure_forces_.data(), closure_forces_.size(), count,
+               [&](int l) { return items[l].at->lambda.data(); });
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    const ClusterLanes& c = clusters_[i];
+    storeState(c.next, count, [&](int l) { return &items[l].at->clusters[i].next; });
+    scatterLanes(c.v_next.data(), c.v_next.size(), count,
+                 [&](int l) { return items[l].at->clusters[i].v_next.data(); });
+  }
+  scatterLanes(system_.L().data(), system_.L().size(), count, [&](int l) { return items[l].at->factors.L.data(); });
+  for (int l = 0; l < count; ++l) storeSystem(items[l], l);
+}
+
+// The rows of the system that a node has, and its contact forces.
+void ReducedKernel::storeSystem(const StepItem& item, int lane) {
+  const ContactLayout& layout = layout_.contacts[item.node];
+  SaddlePointFactors& factors = item.at->factors;
+  const auto W = system_.W();
+  for (const ContactLayout::Contact& contact : layout.contacts)
+    for (int r = 0; r < contact.rows; ++r) {
+      const int row = contact.row + r, from = 6 * contact.slot + r;
+      item.at->lambda[layout.closure_rows + row] = contact_forces_[from][lane];
+      factors.D[row] = system_.D()[from][lane];
+      for (Eigen::Index k = 0; k < W.cols(); ++k) factors.Wt(k, row) = W(from, k)[lane];
+      for (const ContactLayout::Contact& other : layout.contacts)
+        for (int s = 0; s < other.rows; ++s)
+          factors.Ginv(row, other.row + s) = system_.Ginv()(from, 6 * other.slot + s)[lane];
+    }
+}
+
+// Velocities of the bodies, without the columns that make them.
+void ReducedKernel::storeMotion(int count, std::vector<LaneView>& views) const {
+  const int nb = model_.numBodies();
+  const auto store = [&](const Lanes* from, Eigen::Index size, const auto& get) {
+    scatterLanes(from, size, count, [&](int l) { return get(views[l].ws); });
+  };
+  store(ws_.q.data(), ws_.q.size(), [](Workspace& ws) { return ws.q.data(); });
+  store(v_.data(), v_.size(), [](Workspace& ws) { return ws.v.data(); });
+  store(getNumbers(ws_.X_WB.front()), 12 * nb, [](Workspace& ws) { return getNumbers(ws.X_WB.front()); });
+  store(ws_.V.front().data(), 6 * nb, [](Workspace& ws) { return ws.V.front().data(); });
+  store(ws_.hc.front().data(), 6 * nb, [](Workspace& ws) { return ws.hc.front().data(); });
+  for (int l = 0; l < count; ++l) views[l].ws.stage = WorkspaceStage::Bodies;
+}
+
+// All that Jacobians of residuals look at.
+void ReducedKernel::storeColumns(int count, std::vector<LaneView>& views) const {
+  storeMotion(count, views);
+  const auto store = [&](const Lanes* from, Eigen::Index size, const auto& get) {
+    scatterLanes(from, size, count, [&](int l) { return get(views[l]); });
+  };
+  store(ws_.J.data(), ws_.J.size(), [](LaneView& view) { return view.ws.J.data(); });
+  store(ws_.dV.data(), ws_.dV.size(), [](LaneView& view) { return view.ws.dV.data(); });
+  store(ws_.YJ.data(), ws_.YJ.size(), [](LaneView& view) { return view.ws.YJ.data(); });
+  store(ws_.h.front().data(), 6 * model_.numBodies(), [](LaneView& view) { return view.ws.h.front().data(); });
+  store(ws_.Yc.front().data(), 36 * model_.numBodies(), [](LaneView& view) { return view.ws.Yc.front().data(); });
+  for (size_t i = 0; i < clusters_.size(); ++i)
+    store(clusters_[i].motion.Z.data(), clusters_[i].motion.Z.size(),
+          [i](LaneView& view) { return view.clusters[i].Z.data(); });
+  for (int l = 0; l < count; ++l) views[l].ws.stage = WorkspaceStage::Velocity;
+}
+
+void ReducedKernel::storeDerivatives(int count, std::vector<LaneView>& views) const {
+  const auto store = [&](const auto& from, const auto& get) {
+    scatterLanes(from.data(), from.size(), count, [&](int l) { return get(views[l]).data(); });
+  };
+  const Eigen::Index nr = reduction_.size, nu = model_.nu(), rows = roundUpToLane(nu + 2 * nr);
+  for (Eigen::Index i = 0; i < nr; ++i) {
+    const auto storeRow = [&](const MatrixX<Lanes>& A, Eigen::Index row) {
+      scatterLanes(
+          &A(i, 0), nr, count, [&](int l) { return &views[l].dydd[i * rows + row]; }, nr);
+    };
+    storeRow(A_y_, nu);
+    storeRow(A_v_, nu + nr);
+  }
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    const ClusterLanes& c = clusters_[i];
+    store(c.q_y, [i](LaneView& view) -> MatrixXd& { return view.clusters[i].q_y; });
+    store(c.q_v, [i](LaneView& view) -> MatrixXd& { return view.clusters[i].q_v; });
+    store(c.v_y, [i](LaneView& view) -> MatrixXd& { return view.clusters[i].v_y; });
+    store(c.v_v, [i](LaneView& view) -> MatrixXd& { return view.clusters[i].v_v; });
+    store(c.gap.y, [i](LaneView& view) -> VectorXd& { return view.clusters[i].gap; });
+    store(c.gap.y_v, [i](LaneView& view) -> VectorXd& { return view.clusters[i].gap_v; });
+  }
+  for (size_t i = 0; i < contacts_.size(); ++i) {
+    if (!contacts_[i].used) continue;
+    store(contacts_[i].dy, [i](LaneView& view) -> Matrix6Xd& { return view.contacts[i].dy; });
+    store(contacts_[i].dv, [i](LaneView& view) -> Matrix6Xd& { return view.contacts[i].dv; });
+  }
+}
+
+}  // namespace bielle

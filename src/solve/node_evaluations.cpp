@@ -1,0 +1,87 @@
+#include "node_evaluations.h"
+
+#include <omp.h>
+
+#include <stdexcept>
+
+#include "parallel_errors.h"
+#include "stopwatch.h"
+
+namespace bielle {
+
+namespace {
+
+// With room for node k in evaluation k: no iteration should be the first to ask for it.
+void grow(const ShootingProblem& problem, int size, EvaluationList& list) {
+  while (static_cast<int>(list.size()) < size) {
+    const int node = std::min(static_cast<int>(list.size()), problem.numStages() - 1);
+    list.push_back(problem.makeEvaluation());
+    list.back()->x.setZero(problem.stateSize());
+    list.back()->x_next.setZero(problem.stateSize());
+    list.back()->u.setZero(problem.controlSize(node));
+  }
+}
+
+}  // namespace
+
+void NodeEvaluations::resize(const ShootingProblem& problem, int num_rolling, int threads) {
+  if (problem_ != problem.id()) *this = NodeEvaluations();
+  problem_ = problem.id();
+  const int num_nodes = problem.numStages() + 1;
+  grow(problem, num_nodes, iterate_);
+  grow(problem, num_nodes, trial_);
+  grow(problem, num_rolling, rolling_);
+  while (static_cast<int>(scratch_.size()) < threads) scratch_.push_back(problem.makeScratch());
+  tasks_.reserve(num_nodes);
+  if (!advanced_ || static_cast<int>(fresh_.size()) != num_nodes) fresh_.assign(num_nodes, false);
+  advanced_ = false;
+  seconds_ = 0;
+}
+
+int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajectory& nodes, int threads) {
+  const int num_nodes = static_cast<int>(fresh_.size());
+  tasks_.clear();
+  for (int k = 0; k < num_nodes; ++k) {
+    const VectorXd *x = &nodes.xs[k], *u = k + 1 < num_nodes ? &nodes.us[k] : nullptr;
+    if (!fresh_[k]) {
+      tasks_.push_back({k, x, u, nullptr, iterate_[k].get()});
+    } else if (iterate_[k]->x != *x || (u && iterate_[k]->u != *u)) {
+      throw std::invalid_argument("Fddp: node " + std::to_string(k) + " is not what it was when the horizon advanced");
+    }
+  }
+  std::fill(fresh_.begin(), fresh_.end(), true);
+  const int num_tasks = static_cast<int>(tasks_.size()), size = problem.getBatchSize();
+  const int num_batches = (num_tasks + size - 1) / size;
+  ParallelErrors errors;
+  double seconds = 0;
+#pragma omp parallel for num_threads(std::min(threads, num_batches)) schedule(dynamic) reduction(+ : seconds)
+  for (int batch = 0; batch < num_batches; ++batch) {
+    const Clock::time_point start = Clock::now();
+    const int begin = batch * size, count = std::min(size, num_tasks - begin);
+    errors.run(batch, [&] { problem.evaluate(&tasks_[begin], count, getScratch()); });
+    seconds += calcSecondsSince(start);
+  }
+  errors.rethrow();
+  seconds_ += seconds;
+  const auto isOk = [](const std::unique_ptr<NodeEvaluation>& e) { return e->status == StepStatus::Ok; };
+  const auto end = iterate_.begin() + num_nodes, failed = std::find_if_not(iterate_.begin(), end, isOk);
+  return failed == end ? -1 : static_cast<int>(failed - iterate_.begin());
+}
+
+void NodeEvaluations::advance() {
+  const size_t num_nodes = fresh_.size();
+  if (num_nodes == 0) return;  // nothing has been solved
+  std::rotate(iterate_.begin(), iterate_.begin() + 1, iterate_.begin() + num_nodes - 1);
+  std::rotate(fresh_.begin(), fresh_.begin() + 1, fresh_.end() - 1);
+  fresh_[0] = fresh_[num_nodes - 2] = fresh_[num_nodes - 1] = false;
+  advanced_ = true;
+}
+
+void NodeEvaluations::swapTrial() {
+  iterate_.swap(trial_);
+  std::fill(fresh_.begin(), fresh_.end(), true);
+}
+
+ProblemScratch* NodeEvaluations::getScratch() const { return scratch_[omp_get_thread_num()].get(); }
+
+}  // namespace bielle

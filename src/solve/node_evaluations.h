@@ -1,0 +1,48 @@
+#pragma once
+// What a solver keeps of a problem: the evaluations of its nodes, and the memory its functions work in.
+#include <algorithm>
+
+#include "bielle/solve/shooting_problem.h"
+
+namespace bielle {
+
+using EvaluationList = std::vector<std::unique_ptr<NodeEvaluation>>;
+
+class NodeEvaluations {
+ public:
+  /// Makes what is missing: two sets of N + 1 evaluations, `num_rolling` single ones, scratch for each thread. Whatever belongs
+  /// to another problem is dropped. The evaluations of the iterate are outdated, unless advance() moved them.
+  void resize(const ShootingProblem& problem, int num_rolling, int threads);
+
+  /// Evaluates the nodes of the current iterate that are outdated, in batches that threads share. Returns the first node whose
+  /// status is not Ok, -1 if all are.
+  /// \throws std::invalid_argument when a node that is not outdated has another state or control
+  int update(const ShootingProblem& problem, const ShootingTrajectory& nodes, int threads);
+  /// The iterate is another one: all of its evaluations are outdated.
+  void outdate() { std::fill(fresh_.begin(), fresh_.end(), false); }
+  /// Node k becomes what node k + 1 was; nodes 0, N - 1 and N are outdated.
+  void advance();
+
+  /// N + 1 each: of the current iterate, and of a trial that may become it by swapTrial().
+  const EvaluationList& getIterate() const { return iterate_; }
+  const EvaluationList& getTrial() const { return trial_; }
+  void swapTrial();
+  /// For trials whose evaluations are not kept.
+  const EvaluationList& getRolling() const { return rolling_; }
+  /// Of the calling thread.
+  ProblemScratch* getScratch() const;
+
+  /// Of all updates since resize(), summed over the threads.
+  double getSeconds() const { return seconds_; }
+
+ private:
+  std::uint64_t problem_ = 0;  // id
+  EvaluationList iterate_, trial_, rolling_;
+  std::vector<std::unique_ptr<ProblemScratch>> scratch_;  // by thread
+  std::vector<EvaluateTask> tasks_;
+  std::vector<char> fresh_;  // N + 1: the evaluation is that of the iterate's node
+  bool advanced_ = false;    // since the last resize()
+  double seconds_ = 0;
+};
+
+}  // namespace bielle

@@ -1,0 +1,247 @@
+// FDDP on problems that work on several tasks at once: results do not depend on batches or threads, and what was evaluated is
+// kept.
+#include <catch2/catch.hpp>
+
+#include "batched_problem.h"
+#include "count_allocations.h"
+#include "fddp_oracle.h"
+
+using namespace bielle;
+using namespace bielle::test;
+
+namespace {
+
+struct Result {
+  FddpSummary summary;
+  ShootingTrajectory trajectory;
+};
+
+Result solve(const ShootingProblem& problem, const ShootingTrajectory& guess, const FddpOptions& options) {
+  Result out{{}, guess};
+  out.summary = Fddp(options).solve(problem, out.trajectory);
+  return out;
+}
+
+bool isSame(const Result& a, const Result& b) {
+  const auto isSameLine = [](const FddpIteration& l, const FddpIteration& m) {
+    return l.cost == m.cost && l.gap == m.gap && l.gradient == m.gradient && l.step == m.step &&
+           l.regularization == m.regularization;
+  };
+  const auto &log = a.summary.log, &other = b.summary.log;
+  return a.trajectory.xs == b.trajectory.xs && a.trajectory.us == b.trajectory.us && a.summary.cost == b.summary.cost &&
+         a.summary.gap == b.summary.gap && a.summary.message == b.summary.message &&
+         std::equal(log.begin(), log.end(), other.begin(), other.end(), isSameLine);
+}
+
+// Full steps in segments, short steps that leave gaps open, and closing rollouts all occur on the way.
+struct Case {
+  Case() {
+    cart_pole.bound = 12;
+    body.stages = 100;
+    body.goal << 0.6, 0.4, -0.3, -0.2;
+    body.goal.normalize();
+    body.start.tail(3) << 0.3, -0.5, 1;
+  }
+  PlantProblem<CartPole> cart_pole = makeCartPole();
+  TurningBody body;
+  DoubleWell well;
+  template <class F>
+  void visit(const F& f) const {
+    f(cart_pole, makeGuess(cart_pole));
+    f(cart_pole, makeLine(cart_pole));
+    f(body, makeGuess(body));
+    f(well, makeGuess(well));
+  }
+};
+
+}  // namespace
+
+TEST_CASE("neither batches nor threads change one bit of what comes out") {
+  FddpOptions options;
+  options.rollout_segments = GENERATE(1, 5);
+  options.bounds = GENERATE(ControlBounds::Ignore, ControlBounds::Enforce);
+  options.max_iterations = 25;
+  int most_alike = 0;
+  Case().visit([&](const PlainProblem& plain, const ShootingTrajectory& guess) {
+    options.threads = 1;
+    const Result one = solve(plain, guess, options);
+    for (const auto& [size, threads] : {std::pair(1, 2), {3, 1}, {3, 2}, {8, 1}, {8, 3}}) {
+      CAPTURE(size, threads, one.summary.iterations);
+      options.threads = threads;
+      const BatchedProblem problem(plain, size);
+      CHECK(isSame(solve(problem, guess, options), one));
+      most_alike = std::max<int>(most_alike, problem.most_alike);
+    }
+  });
+  CHECK(most_alike == 8);  // step lengths were tried side by side
+}
+
+TEST_CASE("a problem whose results depend on batches is told apart by its bits") {
+  const auto cart_pole = makeCartPole();
+  FddpOptions options;
+  options.max_iterations = 5;
+  std::vector<Result> results;
+  for (const int size : {1, 8}) {
+    BatchedProblem problem(cart_pole, size);
+    problem.spread = true;
+    results.push_back(solve(problem, makeGuess(cart_pole), options));
+  }
+  CHECK_FALSE(isSame(results[0], results[1]));
+}
+
+TEST_CASE("the reason of a failure does not depend on batches") {
+  // A cart that may not go far, on whichever segment.
+  struct ShortTrack : PlantProblem<CartPole> {
+    using PlantProblem<CartPole>::PlantProblem;
+    void evaluate(EvaluateTask& task, ProblemScratch* scratch) const override {
+      PlantProblem<CartPole>::evaluate(task, scratch);
+      if (*task.x == start) return;
+      task.out->status = StepStatus::Failed;
+      task.out->failure = "the cart moved at " + std::to_string(task.node);
+    }
+  } problem;
+  static_cast<PlantProblem<CartPole>&>(problem) = makeCartPole();
+  std::vector<std::string> messages;
+  for (const int size : {1, 3, 8})
+    messages.push_back(solve(BatchedProblem(problem, size), makeGuess(problem), {}).summary.message);
+  CHECK(messages[0].find("the cart moved at 1") != std::string::npos);
+  CHECK(messages[1] == messages[0]);
+  CHECK(messages[2] == messages[0]);
+}
+
+TEST_CASE("a sweep at a larger regularization linearizes anew and evaluates nothing") {
+  const DoubleWell well;
+  const BatchedProblem problem(well, 1);
+  FddpOptions options;
+  options.max_iterations = 1;
+  const Result result = solve(problem, makeGuess(well), options);
+  REQUIRE(result.summary.iterations == 1);
+  REQUIRE(result.summary.log[0].regularization > 1e-4);
+  const int num_nodes = well.numStages() + 1, num_trials = 1 - static_cast<int>(std::log2(result.summary.log[0].step));
+  CHECK(problem.num_linearized >= 5 * num_nodes);
+  CHECK(problem.num_evaluated == num_nodes * (1 + num_trials));
+}
+
+TEST_CASE("a short step integrates only behind the gaps that are open") {
+  auto cart_pole = makeCartPole();
+  const ShootingTrajectory guess = makeGuess(cart_pole);  // hangs still: no gaps
+  cart_pole.start[1] += 0.1;                              // but at the first stage
+  const BatchedProblem problem(cart_pole, 1);
+  FddpOptions options;
+  options.rollout_segments = 1;
+  options.max_iterations = 1;
+  const Result result = solve(problem, guess, options);
+  REQUIRE(result.summary.iterations == 1);
+  REQUIRE(result.summary.log[0].step < 1);
+  CHECK(problem.num_integrated == -std::log2(result.summary.log[0].step));
+  CHECK(calcLargestGap(problem, result.trajectory) == Approx(result.summary.gap).epsilon(1e-6));
+}
+
+TEST_CASE("in a receding horizon steps of all lengths are rolled out in segments, with the gaps they tell") {
+  const auto cart_pole = makeCartPole();
+  const BatchedProblem problem(cart_pole, 8);
+  FddpOptions options;
+  options.last_rollout = LastRollout::Segments;
+  ShootingTrajectory t = makeLine(cart_pole);
+  int num_short = 0;
+  for (int i = 0; i < 8; ++i) {  // one iteration per solve, each from where the last one ended
+    options.max_iterations = 1;
+    const FddpSummary summary = Fddp(options).solve(problem, t);
+    REQUIRE(summary.iterations == 1);
+    num_short += summary.log[0].step < 1;
+    CHECK(calcLargestGap(problem, t) == Approx(summary.gap).epsilon(1e-6).margin(1e-12));
+  }
+  CHECK(num_short > 2);
+  CHECK(problem.most_alike == 1);  // never in one piece, where step lengths go side by side
+
+  options = makeTightOptions();
+  options.last_rollout = LastRollout::Segments;
+  checkOptimal(problem, Fddp(options).solve(problem, t), t);
+}
+
+TEST_CASE("a horizon that advances evaluates only what is new, with the same bytes as one that evaluates all") {
+  auto cart_pole = makeCartPole();  // all stages are alike
+  BatchedProblem problem(cart_pole, GENERATE(1, 8));
+  const int N = cart_pole.stages;
+  FddpOptions options;
+  options.last_rollout = GENERATE(LastRollout::Segments, LastRollout::Closed);
+  options.max_iterations = 1;
+  options.threads = 2;
+  Fddp advancing(options), plain(options);
+  ShootingTrajectory t = makeLine(cart_pole), other = t;
+  const auto count = [&](Fddp& fddp, ShootingTrajectory& trajectory) {
+    const int before = problem.num_evaluated;
+    fddp.solve(problem, trajectory);
+    return problem.num_evaluated - before;
+  };
+  int num_saving = 0;
+  for (int i = 0; i < 12; ++i) {
+    const int num_new = count(advancing, t), num_all = count(plain, other);
+    CHECK(t.xs == other.xs);
+    CHECK(t.us == other.us);
+    CHECK((num_new == num_all || num_new == num_all - (N + 1 - 3)));
+    if (i > 0) num_saving += num_new < num_all;
+    advancing.advance(t);
+    other.xs.erase(other.xs.begin());
+    other.xs.push_back(other.xs.back());
+    other.us.erase(other.us.begin());
+    other.us.push_back(other.us.back());
+    cart_pole.start = other.xs[0] + VectorXd::Constant(4, 1e-3);  // as it was measured
+    ++problem.first;
+  }
+  // After trials side by side there are no evaluations to move.
+  if (options.last_rollout == LastRollout::Segments || problem.getBatchSize() == 1) CHECK(num_saving == 11);
+
+  t.us[N / 2][0] += 1e-9;
+  if (num_saving == 11) CHECK_THROWS_WITH(advancing.solve(problem, t), Catch::Contains("node 50"));
+}
+
+TEST_CASE("evaluations are kept for a problem, and made anew for another one") {
+  const auto cart_pole = makeCartPole();
+  const int size = GENERATE(1, 3);
+  BatchedProblem problem(cart_pole, size);
+  const BatchedProblem copy(cart_pole, size);
+  Fddp fddp;
+  const auto solveOnce = [&](const BatchedProblem& p) {
+    ShootingTrajectory t = makeGuess(p);
+    fddp.solve(p, t);
+    return p.num_made.load();
+  };
+  const int made = solveOnce(problem);
+  CHECK(made == 2 * (cart_pole.stages + 1) + (size > 1 ? 2 * size : 0));
+  CHECK(solveOnce(problem) == made);
+  CHECK(solveOnce(copy) == made);
+  CHECK(solveOnce(problem) == 2 * made);
+}
+
+TEST_CASE("every problem has an id of its own, copies and those that were assigned to included") {
+  DoubleWell a, b;
+  const DoubleWell copy(a);
+  CHECK(a.id() != b.id());
+  CHECK(copy.id() != a.id());
+  const auto before = b.id();
+  b = a;
+  CHECK(b.id() != before);
+  CHECK(b.id() != a.id());
+}
+
+TEST_CASE("an iteration after the first allocates nothing, in batches") {
+  auto cart_pole = makeCartPole();
+  cart_pole.bound = 12;
+  const BatchedProblem problem(cart_pole, GENERATE(3, 8));
+  ShootingTrajectory t = makeLine(cart_pole);
+  FddpOptions options;
+  options.bounds = GENERATE(ControlBounds::Ignore, ControlBounds::Enforce);
+  options.threads = GENERATE(1, 2);
+  std::vector<long> counts;
+  counts.reserve(1000);
+  FddpObserver observer;
+  observer.callback = [&](const FddpIteration&) {
+    counts.push_back(num_allocations);
+    return FddpAction::Continue;
+  };
+  Fddp(options).solve(problem, t, observer);
+  REQUIRE(counts.size() > 10);
+  REQUIRE(problem.most_alike > 1);
+  CHECK(counts.back() == counts.front());
+}
