@@ -46,6 +46,26 @@
 /// of the ground on the foot, in the foot's frame. Contact frames have z along the outward normal of the ground and x
 /// forward when the sole rests on flat ground.
 ///
+/// ## Clusters and reduced coordinates
+/// A *closure* ties bodies of the robot to each other and closes a loop; a *contact* ties a foot to the ground. A *cluster* is what
+/// closures tie together: the joints on a loop, and those of other loops that share some of them. A *reduced joint* is either a
+/// joint outside all clusters or a whole cluster, seen as one joint of several freedoms; reduced joints form a tree.
+///
+/// | symbol        | of a cluster with n dofs, closures of rank m, r = n - m freedoms                         | defined in      |
+/// |---------------|------------------------------------------------------------------------------------------|-----------------|
+/// | J, W          | independent closure rows (m x n); metric (n x n, diagonal)                               | reduction.h     |
+/// | N, J^+        | basis of closed motions (n x r), J N = 0, N^T W N = 1; pseudo-inverse in the metric      | reduction.h     |
+/// | dy, dy_v, y'  | tangent coordinates of position and velocity; reduced accelerations (r)                  | reduced_kernel.h |
+/// | Z, d_y, d_v   | what dy makes of velocities, dy and dy_v of accelerations (n x r)                        | cluster_motion.h |
+/// | J~, dV~, dA~, dW~ | columns J, dV, dA, dJ + dV of rnea.h summed along the path to a dof (6 x r)           | cluster_motion.h |
+/// | K             | geometric stiffness d(J^T f)/dq of constant closure forces f (n x n)                     | cluster_motion.h |
+/// | zeta, mu      | multipliers of closing a step and of projecting its velocity (m)                         | reduced_kernel.h |
+/// | E, P, S, X    | matrices of the derivative of a step                                                     | reduced_kernel.h |
+/// | M^            | mass matrix in reduced coordinates, N^T M N over the tree                                | reduced_tree.h  |
+///
+/// A prime marks what belongs to the end of a step (N', J', q+, v+). Subscript c stands for contacts, l for closures. The solver has
+/// letters of its own: Q and V for its quadratic models, k and K for control and gains (lq_sweep.h).
+///
 /// ## Errata of the paper ("Optimal Control of Walkers with Parallel Actuation", 2024)
 /// Each was derived anew and is held by differences (tests/test_errata.cpp, docs/signs.md). Equation numbers are the
 /// paper's; eqs. 11 to 15 are right as printed.
