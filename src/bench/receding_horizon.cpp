@@ -39,10 +39,8 @@ class Disturbance {
   std::mt19937 rng_{1};
 };
 
-// One stage on: the new last one comes with the torques that hold the robot still there, and steps to the new last state.
-void shift(const RobotProblem& whole, RobotEvaluator& evaluator, int new_stage, ShootingTrajectory& trajectory) {
-  std::rotate(trajectory.xs.begin(), trajectory.xs.begin() + 1, trajectory.xs.end());
-  std::rotate(trajectory.us.begin(), trajectory.us.begin() + 1, trajectory.us.end());
+// The last stage of a horizon that has moved on: torques that hold the robot still, and the state to which they lead.
+void extend(const RobotProblem& whole, RobotEvaluator& evaluator, int new_stage, ShootingTrajectory& trajectory) {
   const VectorXd& last = *(trajectory.xs.end() - 2);
   VectorXd& u = trajectory.us.back();
   u = calcStaticTorques(whole.model(), whole.spec(new_stage).constraints, last.head(whole.model().nq())).u;
@@ -138,7 +136,10 @@ class Receding {
   bool solve(int k, Fddp& solver, ShootingTrajectory& trajectory) {
     const long preemptions = countPreemptions();
     const auto begin = std::chrono::steady_clock::now();
-    if (k > 0) shift(whole_, evaluator_, k + options_.nodes - 1, trajectory);
+    if (k > 0) {
+      solver.advance(trajectory);
+      extend(whole_, evaluator_, k + options_.nodes - 1, trajectory);
+    }
     const FddpSummary summary = solver.solve(window_, trajectory);
     times_.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
     if (countPreemptions() > preemptions) ++preempted_;
