@@ -156,12 +156,12 @@ CheckedMotion makeFourBarMotion(double h, Formulation formulation) {
   motion.problem = std::make_unique<RobotProblem>(model, q0, VectorXd::Zero(model.nv()), std::move(specs), formulation);
   ShootingTrajectory trajectory;
   trajectory.xs = {motion.problem->initialState()};
-  double cost = 0;
+  RobotEvaluator evaluator(*motion.problem);
   for (int k = 0; k < stages; ++k) {
     trajectory.us.push_back(VectorXd::Constant(model.nu(), 0.3));
-    VectorXd next(trajectory.xs[0].size());
-    REQUIRE(motion.problem->step(k, trajectory.xs[k], trajectory.us[k], next, cost) == StepStatus::Ok);
-    trajectory.xs.push_back(next);
+    const RobotEvaluation& step = evaluator.evaluate(k, trajectory.xs[k], trajectory.us[k]);
+    REQUIRE(step.status == StepStatus::Ok);
+    trajectory.xs.push_back(step.x_next);
   }
   CheckedMotion checked = makeFreeMotion(model, h, formulation, stages);
   checked.record = makeRecord(motion, trajectory);
