@@ -1,4 +1,4 @@
-# bielle.pc, from what the layers say of themselves: the flags their users must share, and all they link.
+# bielle.pc, generated from the properties of the layers: the flags that users must share and the libraries to link.
 set(pkgconfig_flags -std=c++17)
 foreach(kind DEFINITIONS OPTIONS)
   get_target_property(flags bielle_headers INTERFACE_COMPILE_${kind})
@@ -13,7 +13,7 @@ endforeach()
 if(BUILD_SHARED_LIBS)
   set(pkgconfig_libraries -lbielle)
 else()
-  # Those above first. What they read robots with is found by its name where the linker looks anyhow.
+  # Upper layers first. The linker finds the libraries of the readers by name on its default path.
   get_property(layers GLOBAL PROPERTY BIELLE_LAYERS)
   list(REVERSE layers)
   list(TRANSFORM layers PREPEND -l OUTPUT_VARIABLE pkgconfig_libraries)
@@ -26,7 +26,7 @@ endif()
 list(JOIN pkgconfig_flags " " pkgconfig_flags)
 list(JOIN pkgconfig_libraries " " pkgconfig_libraries)
 
-# Where the file stands tells the prefix, so that an installation can be moved.
+# The prefix is relative to this file, so that an installation can be moved.
 set(pkgconfig_directory ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 file(RELATIVE_PATH pkgconfig_prefix /prefix/${pkgconfig_directory} /prefix)
 string(REGEX REPLACE "/$" "" pkgconfig_prefix ${pkgconfig_prefix})

@@ -1,5 +1,5 @@
-# Headers as Doxygen takes them. The line that follows \file is its description; lines indented by four or more are
-# equations, to be kept as they stand; < in prose is no markup.
+# Converts headers for Doxygen. The line that follows \file is its description; lines indented by four or more are
+# equations and are kept verbatim; < in prose is escaped.
 function close_block() { if (inside) print indent "/// ~~~"; inside = 0 }
 function escape(text,    parts, count, i, out) {
   count = split(text, parts, "`")

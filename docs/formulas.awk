@@ -1,4 +1,4 @@
-# Formulas of the pages, $`...`$ and blocks of ```math, as Doxygen writes them.
+# Converts the formulas of the pages, $`...`$ and ```math blocks, to the syntax of Doxygen.
 /^```math *$/ { inside = 1; print "\\f["; next }
 inside && /^``` *$/ { inside = 0; print "\\f]"; next }
 {

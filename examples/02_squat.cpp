@@ -22,7 +22,7 @@ using namespace bielle;
 
 namespace {
 
-// What the knee and its motor do at some nodes: the rods change both the angle and the torque.
+// Knee and knee motor at some nodes: the rods change both the angle and the torque.
 void printMotion(const MotionResult& result, const SquatOptions& options) {
   const MotionRecord& record = result.record;
   const int knee = findColumn(record.q_names, "knee_right"), crank = findColumn(record.q_names, "motor_knee_right");

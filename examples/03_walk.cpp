@@ -25,7 +25,7 @@ using namespace bielle;
 
 namespace {
 
-// Where each foot stands, phase by phase, and how far that is from its foothold.
+// Position of each foot in every phase, and its distance from the foothold.
 double printFootholds(const Motion& motion, const ShootingTrajectory& trajectory) {
   const Model& model = motion.problem->model();
   Workspace ws(model);

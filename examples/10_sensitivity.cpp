@@ -1,4 +1,4 @@
-/// \file What a length is worth: the motor torque of a closed chain, differentiated by the lengths of its rods.
+/// \file The derivative of a motor torque of a closed chain with respect to the lengths of its rods.
 ///
 /// A motor turns the crank (length a, angle theta2) of a four-bar, whose rocker (c, theta4) shall swing in a given way;
 /// the coupler (b, theta3) ties them, the ground is d:

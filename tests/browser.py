@@ -1,4 +1,4 @@
-"""A headless Chromium, driven through its DevTools protocol over two pipes, by nothing but Python's library."""
+"""A headless Chromium, driven through its DevTools protocol over two pipes, with the standard library only."""
 import base64
 import json
 import os

@@ -5,7 +5,7 @@ add_dependencies(test_cli bielle_command)
 # The whole path from a program to its motion: not for the builds with sanitizers.
 set_tests_properties(cli PROPERTIES LABELS system)
 
-# An installation is found, linked and run by a project of its own. It takes what has been built.
+# A separate project finds, links and runs an installation of the current build.
 add_test(NAME install COMMAND ${CMAKE_COMMAND}
   -DBUILD=${PROJECT_BINARY_DIR} -DROOT=${PROJECT_SOURCE_DIR} -DSOURCE=${CMAKE_CURRENT_SOURCE_DIR}/consumer
   -DWORK=${CMAKE_CURRENT_BINARY_DIR}/install -DLIBDIR=${CMAKE_INSTALL_LIBDIR}

@@ -1,4 +1,4 @@
-"""What the help of the command says: its subcommands and options, for the tests of what must follow it."""
+"""Parses the help of the command: its subcommands and options, for tests that compare against it."""
 import re
 import subprocess
 

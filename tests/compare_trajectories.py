@@ -1,4 +1,4 @@
-"""Reads trajectory.csv and trajectory.npz by nothing but Python's library; succeeds if they hold the same numbers."""
+"""Reads trajectory.csv and trajectory.npz with the standard library only; succeeds if they hold the same numbers."""
 import ast
 import csv
 import struct

@@ -1,4 +1,4 @@
-# Pages are run as their readers would: every command, and what it shows.
+# Runs every command of the pages as a reader would and compares its output.
 set(pages tutorial modelling signs new_robot motions linkages checks speed design)
 if(BIELLE_BUILD_EXAMPLES)
   list(APPEND pages new_motion)

@@ -1,5 +1,5 @@
 #pragma once
-// What a call is refused with.
+// The error message of a call.
 #include <string>
 
 #include "bielle/model/error.h"

@@ -1,5 +1,5 @@
 #pragma once
-// What a walking robot does, measured on its trajectory by kinematics and by the dynamics of its stages.
+// The behaviour of a walking robot, measured on its trajectory by kinematics and by the dynamics of its stages.
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>

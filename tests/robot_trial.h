@@ -1,5 +1,5 @@
 #pragma once
-// What must hold of any robot files: a model that can be computed with, or one clear error.
+// Any robot files must give either a model that can be computed with or one clear error.
 #include <cmath>
 #include <sstream>
 #include <string>

@@ -118,7 +118,7 @@ TEST_CASE("assembly: the shortest steps close the same robot, and change nothing
   const VectorXd way = model.difference(problem.q_ref, result.q);
   const VectorXd along = way - J.completeOrthogonalDecomposition().solve(J * way);
   CHECK(along.norm() < 0.1 * way.norm());
-  // Out of reach it says so.
+  // Out of reach: the status must say so.
   problem.frames.push_back({"trunk", 1, SE3(), {Matrix3d::Identity(), Vector3d(0, 0, 0.5)}});
   for (const ContactFrame& foot : model.contacts())
     problem.frames.push_back({foot.name, foot.body, foot.X_BF, {Matrix3d::Identity(), Vector3d(0, 0, -2)}});

@@ -213,7 +213,7 @@ TEST_CASE("dead points of the motor: an optimal motion goes through them") {
   CHECK(turns_of_rocker == 1);
   CHECK(trajectory.xs.back()[kCrank] == Approx(options.crank_angle + task.turn).margin(1e-2));
   CHECK(trajectory.xs.back()[3 + kCrank] == Approx(task.final_speed).margin(1e-2));
-  // What the motor gives is what the linkage has gained, but for the discretization.
+  // The work of the motor equals the energy gained by the linkage, up to the discretization.
   const double gained = calcEnergy(chain.model, trajectory.xs.back()) - calcEnergy(chain.model, trajectory.xs.front());
   CAPTURE(work, gained, kinetic);
   CHECK(std::abs(work - gained) < 0.05 * kinetic);

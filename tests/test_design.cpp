@@ -212,7 +212,7 @@ TEST_CASE("design: a shorter crank is evaluated, an impossible one penalized") {
   REQUIRE(recomputed.status == DesignStatus::Feasible);
   CHECK(recomputed.value == Approx(shorter.value).epsilon(0.05));
 
-  // Out of reach, more and more: worse than anything feasible, and continuous.
+  // Designs ever further out of reach: worse than any feasible one, and continuous.
   const Parametrization wide(loadBipetto(), {makeLength("rod", 0.01, 0.3,
                                                         {{"free_knee_right", "closure_knee_right_A", kZ, ""},
                                                          {"free_knee_left", "closure_knee_left_A", kZ, ""}})});

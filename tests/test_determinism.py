@@ -43,7 +43,7 @@ def main():
                 for file, first, second in zip(NAMES, results[name][1], again[1]):
                     assert first == second, f"{name}, {file}: {threads} threads {environment}: other bytes"
             print(f"{name}: {len(results[name][1][0])} bytes of CSV, the same four times")
-        # A change of a millionth is seen.
+        # The comparison notices a change of a millionth.
         changed = solve(["squat", "--depth", "0.7000001"], 1, os.path.join(place, "changed"))
         assert changed[1][0] != results["squat"][1][0] and changed[1][1] != results["squat"][1][1]
 

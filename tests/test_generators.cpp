@@ -99,7 +99,7 @@ void checkSame(const Model& a, const Model& b) {
   }
 }
 
-// What is known of a generated robot without a computer.
+// Properties of a generated robot that are known by hand.
 struct Expected {
   int rows, rank, mobility, motors;
   double mass;  // kg

@@ -157,7 +157,7 @@ TEST_CASE("assembling what cannot be assembled") {
 
 namespace {
 
-// How far out of range a problem is: half of them are such as people ask for.
+// Severity of a problem: half of them are within the range of realistic requests.
 enum class Range { Usual, Any };
 
 StageSpec makeStage(Random& rng, Range range, const Model& model, const VectorXd& q0, double dt) {

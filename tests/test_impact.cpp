@@ -70,7 +70,7 @@ TEST_CASE("a block that lands flat stops; redundant loops meet the same velocity
   REQUIRE(updateImpact(model, iws, set, four_bar.q_closed, v) == DynamicsStatus::Ok);
   CHECK(iws.saddle_point.isRedundant());
   CHECK((iws.J * iws.v_plus).norm() < 1e-10);
-  // What J^T Lambda does not see is kept: N^T M v+ = N^T M v.
+  // Momentum along the null space N of J is conserved: N^T M v+ = N^T M v.
   const Eigen::FullPivLU<MatrixXd> lu(iws.J);
   Eigen::FullPivLU<MatrixXd> rank(lu);
   rank.setThreshold(1e-9);

@@ -1,9 +1,9 @@
-"""test_includes.py SOURCE: includes run one way, and what is not ours stays behind the files that are named here."""
+"""test_includes.py SOURCE: includes run one way, and third-party headers appear only in the files listed here."""
 import os
 import re
 import sys
 
-# What a room may include, besides itself and whatever these may include.
+# Direct dependencies of each room; a room may also include itself and their dependencies.
 ROOMS = {
     "math": [],
     "model": ["math"],
@@ -21,7 +21,7 @@ ROOMS = {
     "cli": ["report", "study", "bench"],
     "validation": ["io"],
 }
-# A header by how its name begins, and who may include it: files, or folders.
+# Prefixes of third-party headers, and the files or folders that may include them.
 OTHERS = {
     "yaml-cpp/": ["src/model/yaml_entry.cpp"],
     "urdf_": ["src/model/reader_urdf.cpp"],

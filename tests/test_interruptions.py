@@ -1,4 +1,4 @@
-"""test_interruptions.py BIELLE: what happens to the command when the world ends around it.
+"""test_interruptions.py BIELLE: the command under signals, full disks and closed pipes.
 
 Full disks, closed pipes, unreadable and unwritable places, SIGINT and SIGKILL at any time: a message, the right status, and
 no file that is not whole under its name.

@@ -1,4 +1,4 @@
-"""test_licences.py BIELLE SOURCE: the licences of what is shipped with it stand where they must."""
+"""test_licences.py BIELLE SOURCE: the licences of all shipped parts are present where required."""
 import os
 import subprocess
 import sys
@@ -10,7 +10,7 @@ with open(os.path.join(source, "LICENSE"), encoding="utf-8") as file:
 assert licence.startswith("BSD 3-Clause License") and "Redistribution and use" in licence
 with open(os.path.join(source, "CITATION.cff"), encoding="utf-8") as file:
     assert "license: BSD-3-Clause" in file.read()
-# Robots that follow published ones carry the licence of those.
+# Robots derived from published ones carry their licence.
 for robot in sorted(os.listdir(os.path.join(source, "robots"))):
     folder = os.path.join(source, "robots", robot)
     if not os.path.isdir(folder):
@@ -29,7 +29,7 @@ with tempfile.TemporaryDirectory() as place:
         text = file.read()
 for part in ("THREE", "Dygraph", "three.js authors", "Dan Vanderkam", "Permission is hereby granted"):
     assert part in text, part
-# No word of a licence that does not go with ours.
+# No incompatible licence is mentioned.
 for folder, _, names in os.walk(os.path.join(source, "src")):
     for name in names:
         with open(os.path.join(folder, name), encoding="utf-8", errors="replace") as file:

@@ -1,4 +1,4 @@
-"""test_man.py BIELLE SOURCE BUILD: a manual page for every command, with every option, that man reads without a complaint."""
+"""test_man.py BIELLE SOURCE BUILD: a manual page for every command, with every option, which man formats without warnings."""
 import os
 import re
 import shutil

@@ -22,7 +22,7 @@ const Model& getCleobot() {
   return robot.model;
 }
 
-// How far a linkage is from its singularities, over all linkages of the robot.
+// Least distance of the robot's linkages from their singularities.
 struct Margin {
   double closures = 1e9;  // smallest singular value of the closure Jacobian: rank; about a lever arm, m
   double motors = 1e9;    // of the motors' rows of an orthonormal basis of the motions that are left: motors hold it

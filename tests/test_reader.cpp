@@ -1,4 +1,4 @@
-// What the files say is what the model has: the published format, our own keys, warnings, and where robots are found.
+// The model matches its files: the published format, our own keys, warnings, and the search for robots.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstdlib>

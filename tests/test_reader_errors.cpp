@@ -13,7 +13,7 @@ using namespace bielle::testing;
 
 namespace {
 
-// What loadRobot says about it; empty when it loads.
+// The error message of loadRobot, empty when it succeeds.
 std::string getErrorOfLoading(const std::string& name_or_path) {
   return getError([&] { loadRobot(name_or_path); });
 }
@@ -194,7 +194,7 @@ TEST_CASE("files that are no robot at all are errors") {
         std::string::npos);
 }
 
-// Whatever the bytes, loadRobot answers with a model or a ModelError.
+// For any bytes, loadRobot returns a model or throws a ModelError.
 TEST_CASE("truncated and corrupted files never do worse than a ModelError") {
   const RobotDirectory directory;
   const std::string urdf = kToyUrdf, yaml = std::string(kToyYaml) + "contacts: {toe: {frame: hand, type: 6d}}\n";

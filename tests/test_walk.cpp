@@ -35,7 +35,7 @@ Vector3d calcSpeed(const StepMeasures& m) {
   return (m.touchdown_coms[last] - m.touchdown_coms[first]) / (m.touchdown_times[last] - m.touchdown_times[first]);
 }
 
-// What every motion on steps has to satisfy.
+// Requirements for every motion with steps.
 void checkSteps(const Solved& solved) {
   const StepMeasures& m = solved.measures;
   CAPTURE(solved.summary.message, solved.summary.iterations);

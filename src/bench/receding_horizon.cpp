@@ -58,7 +58,7 @@ Torso findTorso(const Model& model, Workspace& ws, const VectorXd& x) {
   return {ws.X_WB[1].p.z(), ws.X_WB[1].R.row(2).transpose()};
 }
 
-// How often the system has taken a processor away from this program.
+// Number of involuntary context switches of this program.
 long countPreemptions() {
   rusage usage;
   getrusage(RUSAGE_SELF, &usage);

@@ -37,7 +37,7 @@ int becomeCompanion(const std::string& name, char** arguments);
 // nothing when it is not there.
 std::optional<int> runCompanion(const std::string& name, std::vector<std::string> arguments);
 
-// What every command with a robot asks for.
+// Arguments of every command with a robot.
 struct RobotArgument {
   std::string name;
   bool fixed_base = false;

@@ -21,7 +21,7 @@ std::string describeVersion() {
   return "bielle " + build.bielle + " (Eigen " + build.eigen + ", " + build.compiler + ")";
 }
 
-// What is wrong with the command line; where a command, motion or robot is missing or unknown, those there are.
+// Explains an error of the command line; for a missing or unknown command, motion or robot it lists the known ones.
 std::string describe(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
   const CLI::App* last = &app;
   while (!last->get_subcommands().empty()) last = last->get_subcommands().back();

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 namespace bielle::cli {
 namespace {
 
-// Of the virtual work: what the dynamics leave unbalanced, relative.
+// Relative residual of the virtual work.
 constexpr double kBalanceTolerance = 1e-8;
 
 struct RatioArguments {

@@ -1,5 +1,5 @@
 #pragma once
-// What `bielle ratio` says of a linkage: text, JSON, CSV and a figure.
+// The output of `bielle ratio` for a linkage: text, JSON, CSV and a figure.
 #include <iosfwd>
 #include <optional>
 #include <string>

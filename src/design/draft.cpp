@@ -105,7 +105,7 @@ Model RobotDraft::build() const {
     const Frame& frame = m.frames()[i];
     if (frame.name != getLink(frame.body)) builder.addFrame(frame.name, getLink(frame.body), {frames_[i]});
   }
-  // What was made of a frame goes where the frame goes.
+  // Closures and contacts made from a frame move with it.
   const auto place = [&](const std::string& name, int body, const SE3& X_BF) {
     if (const int frame = findFrameAt(body, X_BF); frame >= 0) return m.frames()[frame].name;
     builder.addFrame(name, getLink(body), X_BF);

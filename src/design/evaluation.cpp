@@ -23,7 +23,7 @@ struct SolvedMotion {
   std::vector<int> kept_dofs;              // of the closed model: those of the chain, in its order
 };
 
-// What a design did with one motion.
+// The outcome of one motion of a design.
 struct Outcome {
   double missing = 1;  // share of the motion
   std::string message;
@@ -92,7 +92,7 @@ LiftResult liftMotion(const Model& model, const SerialTrajectory& kept) {
 }
 
 // Starts from the motion of the start design with the motors recomputed, which is nearly one of this design too.
-// Where that is not to be had: from its postures and torques.
+// Where that fails, start from its postures and torques.
 void setStart(const Model& model, const SolvedMotion& solved, Motion& motion) {
   if (solved.serial) {
     const LiftResult lifted = liftMotion(model, *solved.serial);

@@ -1,5 +1,5 @@
 #pragma once
-// What the searches share, with and without gradients; only they know NLopt.
+// Code shared by the searches with and without gradients, which alone include NLopt.
 #include <exception>
 #include <nlopt.hpp>
 

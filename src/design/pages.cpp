@@ -1,4 +1,4 @@
-// What a design run leaves behind: the robot, the table, the figure.
+// The output of a design run: the robot, the table, the figures.
 #include <filesystem>
 #include <sstream>
 

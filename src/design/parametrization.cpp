@@ -121,7 +121,7 @@ Model Parametrization::make(const VectorXd& x) const {
       draft.setPlace(shift.of, draft.getPlace(shift.of).p + x[k] * shift.along);
     for (const LengthChange& change : variables_[i].lengths) {
       const double length = getLine(original, change).along.norm();
-      // Nothing but the rounding of a square root is lost where nothing changes.
+      // An unchanged value is reproduced up to the rounding of a square root.
       if (x[k] != start_[k] || getLine(draft, change).along.norm() != length)
         setLength(draft, change, length + x[k] - start_[k], length);
     }

@@ -1,5 +1,5 @@
 #pragma once
-// What files that name robots and motions have in common.
+// Parts common to all files that name robots and motions.
 #include <string>
 #include <vector>
 

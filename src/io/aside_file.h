@@ -12,7 +12,7 @@ class AsideFile {
   AsideFile(const AsideFile&) = delete;
   AsideFile& operator=(const AsideFile&) = delete;
 
-  /// Where to write.
+  /// The stream to write to.
   const std::string& aside() const { return aside_; }
   /// \throws ModelError when the text cannot be written
   void write(const std::string& text);

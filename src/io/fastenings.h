@@ -1,5 +1,5 @@
 #pragma once
-// What a robot looks like when nothing is drawn of it: rods between what is fastened to its bodies.
+// A substitute drawing of a robot without visuals: rods between the joints and frames of its bodies.
 #include <vector>
 
 #include "bielle/model/model.h"

@@ -18,7 +18,7 @@ constexpr size_t kLargest = size_t{1} << 28;  // all arrays together, bytes
   throw ModelError(path, element, problem, "give a trajectory that Bielle wrote");
 }
 
-// What libzip says, when it should never say it: all is in memory, and sizes are ours.
+// Errors of libzip that cannot occur: everything is in memory and we set the sizes.
 [[noreturn]] void failInMemory(const char* message) {
   throw std::runtime_error(std::string("a NumPy archive cannot be made: ") + message);
 }
@@ -46,7 +46,7 @@ std::string readSource(zip_source_t* source) {
   return bytes;
 }
 
-// What the archive says of an entry's size is not believed: a small file can unpack to more than there is memory.
+// The size that the archive states for an entry is not trusted: a small file can unpack to more than the memory.
 std::string readEntry(zip_t* archive, zip_int64_t index, const std::string& path, const std::string& name,
                       size_t largest) {
   const File file(zip_fopen_index(archive, index, 0));

@@ -18,7 +18,7 @@ std::string formatNumber(double value, const char* format = "%.12g") {
   return std::string(text) == "-0" ? "0" : text;
 }
 
-// Of a length, an angle or a direction: nothing under 1e-12.
+// Rounds a length, an angle or a direction to 1e-12.
 std::string formatRounded(double value) { return formatNumber(std::round(value * 1e12) / 1e12, "%.15g"); }
 
 std::string formatVector(const Vector3d& v, const char* separator = " ") {

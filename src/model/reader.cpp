@@ -51,7 +51,7 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
   return files;
 }
 
-// What the file of a robot that others published adds goes before what they give.
+// Keys of the file that completes a published robot take precedence over the published ones.
 void complete(const YamlFile& own, YamlFile& yaml) {
   const auto replace = [](const auto& from, auto& to) {
     if (!from.empty()) to = from;
@@ -149,7 +149,7 @@ class FrameResolver {
   const YamlFile& yaml_;
 };
 
-// What refers to the tree by name.
+// Closures, motors and contacts refer to the tree by name.
 void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {
   const FrameResolver frames(urdf, yaml);
   for (const ClosureSpec& c : yaml.closures) {

@@ -1,4 +1,4 @@
-// Where robots are.
+// Finding the files of robots.
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>

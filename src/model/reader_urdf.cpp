@@ -113,7 +113,7 @@ std::set<std::string> collectNames(const TiXmlElement& robot, const std::string&
   return names;
 }
 
-// What urdfdom lets through in one joint.
+// Errors in a joint that urdfdom accepts.
 void checkJoint(const TiXmlElement& joint, const std::string& path, std::vector<std::string>& warnings) {
   const std::string element = "joint '" + getAttribute(&joint, "name") + "'", type = getAttribute(&joint, "type");
   if (!kKinds.count(type)) {

@@ -1,5 +1,5 @@
 #pragma once
-/// \file What the two files of a robot say, before they are put together (private to the reader).
+/// \file The contents of the two files of a robot before they are combined (private to the reader).
 #include <map>
 #include <optional>
 #include <string>

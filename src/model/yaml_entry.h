@@ -27,7 +27,7 @@ class YamlEntry {
   bool isList() const;
   bool isWord(const std::string& word) const;
 
-  // What is asked for, or fail().
+  // Return the requested type, or call fail().
   std::string getText() const;
   double getNumber(bool may_be_infinite = false) const;
   /// Elements of a list; `count` < 0: of any length.

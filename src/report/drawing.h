@@ -1,5 +1,5 @@
 #pragma once
-// What is drawn of a robot: the shapes of its file; for bodies that have none, rods between what is fastened to them.
+// The drawing of a robot: the shapes of its file; for bodies without shapes, rods between their joints and frames.
 #include "bielle/model/reader.h"
 #include "io/json_text.h"
 

@@ -54,7 +54,7 @@ Eigen::RowVector3d calcRollPitchYaw(const Matrix3d& R) {
           std::atan2(R(1, 0), R(0, 0))};
 }
 
-// What follows from the placements of one node after the other.
+// Quantities that follow from the placements, node by node.
 struct NodeTables {
   RowMatrixXd placements;  // bodies x 7
   RowMatrixXd tilt;        // roll, pitch, yaw of the first body since the first node, about the axes of the world

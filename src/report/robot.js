@@ -29,7 +29,7 @@ function makeGeometry(visual, meshes) {
   }
 }
 
-// Of an STL file; null when the file is none, whatever its name says.
+// The triangles of an STL file, or null when the content is not STL.
 function readMesh(text) {
   try {
     const geometry = new THREE.STLLoader().parse(decodeBase64(text).buffer);
@@ -150,7 +150,7 @@ class RobotView {
     this.bodies[visual.body].add(mesh);
   }
 
-  // How the bodies look: the share of the run's colour, and how solid they are.
+  // Appearance of the bodies: the share of the run's colour, and their opacity.
   setLook(tint, opacity) {
     const shade = makeColor(this.run.color);
     for (const entry of this.materials) {

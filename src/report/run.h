@@ -21,7 +21,7 @@ ReportRun readRun(const std::string& directory);
 // The robot: what is drawn of it (drawing.h), joints, motors, closures, contacts.
 Json describeRobot(const LoadedRobot& robot);
 
-// What happens at every node and stage; placements of all bodies and of the feet come from q.
+// Quantities at every node and stage; placements of all bodies and of the feet come from q.
 Json describeMotion(const ReportRun& run);
 
 }  // namespace bielle

@@ -42,7 +42,7 @@ class Scene {
     return {contact: 0.5 * this.size / weight, closure: 0.4 * this.size / closure};
   }
 
-  // Where the motions take place.
+  // The region in which the motions take place.
   calcExtent() {
     const box = new THREE.Box3();
     for (const robot of this.robots) {

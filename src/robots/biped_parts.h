@@ -1,5 +1,5 @@
 #pragma once
-// What the generated bipeds have in common: a free trunk, mirrored legs, cranks that pull at rods, flat soles.
+// Parts common to the generated bipeds: a free trunk, mirrored legs, cranks with rods, flat soles.
 #include <string>
 #include <vector>
 
@@ -15,7 +15,7 @@ struct BipedSide {
   Vector3d mirror(double x, double y, double z) const { return {x, s * y, z}; }
 };
 
-// Of the size that all motors have.
+// A motor; all have the same size.
 Solid makeMotor(const Vector3d& place, const Vector3d& axis, double mass);
 
 // Motor, crank and rod; the rod has a universal joint at the crank. Points in the frame of the base.

@@ -142,7 +142,7 @@ std::vector<Solid> makeTrunk(const std::vector<Side>& sides) {
                                makeBox({0.01, 0, 0.045}, {0.10, 0.34, 0.02}, 0.2 * p.trunk_mass, colors::kSteel),
                                makeSphere({-0.02, 0, 0.30}, 0.055, 0.05 * p.trunk_mass, colors::kShell)};
   for (const Side& side : sides) {
-    // What carries the ball of the hip and the motor of the yaw chain.
+    // Carries the ball of the hip and the motor of the yaw chain.
     const Vector3d yaw_motor = makeHipChain(side, 3).motor, plate(0, side.hip().y(), 0.04);
     for (const Vector3d& end : {side.hip(), yaw_motor})
       solids.push_back(makeCylinder((plate + end) / 2, end - plate, 0.012, (end - plate).norm(), 0.0125 * p.trunk_mass,

@@ -1,5 +1,5 @@
 #pragma once
-// What comes of a comparison of robots: numbers, compare.csv, compare.md and figures.
+// The results of a comparison of robots: numbers, compare.csv, compare.md and figures.
 #include <limits>
 #include <string>
 #include <vector>

@@ -16,7 +16,7 @@ struct Case {
   std::vector<std::vector<std::string>> steps;
 };
 
-// How a run of the command ended: 0 done, 1 not converged or failed (its results are there), 2 refused.
+// Outcome of a run of the command: 0 done, 1 not converged or failed (with results), 2 rejected.
 struct StepOutcome {
   int status = 0;
   double seconds = 0;
@@ -41,7 +41,7 @@ struct RunOutcome {
   bool interrupted = false;  // by the user; the cases under way were dropped
 };
 
-// What results depend on: the program and the files of the robots in these directories.
+// Dependencies of the results: the program and the files of the robots in these directories.
 std::string makeIdentity(const std::string& program, const std::vector<std::string>& robots);
 
 // Runs the cases in directory/NAME. \throws ModelError when directories or files cannot be made, or another study is at

@@ -50,7 +50,7 @@ std::string describeFailures(const Comparisons& all) {
 }
 double calcPeakRatio(const Comparison& entry) { return entry.lifted.knee.peak / entry.closed.knee.peak; }
 
-// Of the closed model's peak knee torque over the values, "FROM least TO most".
+// Range of the closed model's peak knee torque over the values, "FROM least TO most".
 Claim judgeEffort(const char* section, const char* text, const char* from, const char* to, const Comparisons& all) {
   double least = INFINITY, most = 0;
   for (const Comparison& entry : all)

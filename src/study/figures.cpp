@@ -17,10 +17,10 @@ Curve makeSweep(const StudyResult& result, const char* title, const char* color,
   return curve;
 }
 
-// What did not converge or was not lifted to its end interrupts a curve.
+// A case that did not converge or was not lifted entirely interrupts the curve.
 double drawn(const Performance& motion, double value) { return motion.success ? value : kMissing; }
 
-// Where the lift failed, at the height of what came of it.
+// Marks where the lift failed, at the value of its partial result.
 Curve markFailures(const StudyResult& result, const Getter& get) {
   Curve curve{"lift failed: until then", "#000000", CurveStyle::Crosses, false, {}};
   for (const Comparison& entry : result.comparisons)
@@ -134,7 +134,7 @@ std::vector<Plot> makePathPlots(const Comparison& entry, const ComparedRobot& ro
   return plots;
 }
 
-// What one motion is like in time.
+// One motion over time.
 void addHistories(const StudyResult& result, const ComparedRobot& robot, std::vector<Figure>& figures) {
   for (const Comparison& entry : result.comparisons) {
     if (entry.value != result.study.shown && result.comparisons.size() > 1) continue;

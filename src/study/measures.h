@@ -1,5 +1,5 @@
 #pragma once
-// What is read from the results of a study.
+// Quantities read from the results of a study.
 #include <limits>
 #include <optional>
 #include <string>
@@ -27,7 +27,7 @@ struct Load {
   double peak = kMissing, mean = kMissing;
 };
 
-// How far the lift got (lift.json).
+// Extent of the lift (lift.json).
 struct LiftFacts {
   std::string message;       // why it ended early, or empty
   bool at_linkage = false;   // it ended where a linkage is out of reach or at a dead point, not for lack of accuracy

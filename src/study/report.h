@@ -12,7 +12,7 @@ std::string formatCell(double value, int digits);
 // A text as one field of a table in CSV.
 std::string quoteCsv(const std::string& text);
 
-// What was written about one study.
+// The files written for one study.
 struct StudyPage {
   std::string text;                // Markdown, from a heading of the second level
   std::vector<std::string> files;  // paths

@@ -1,5 +1,5 @@
 #pragma once
-/// \file How far the motors of a linkage are from not determining it.
+/// \file Conditioning of a linkage: how well its motors determine it.
 #include <vector>
 
 #include "bielle/dynamics/reduction.h"

@@ -1,5 +1,5 @@
 #pragma once
-/// \file A model taken apart: places and inertias may change, names and the tree stay.
+/// \file A modifiable copy of a model: placements and inertias may change, names and the tree are fixed.
 #include <string>
 #include <vector>
 
@@ -17,7 +17,7 @@ class RobotDraft {
     int body = 0;
     Vector3d p = Vector3d::Zero();
   };
-  /// Where a joint stands in the body that carries it, or a frame in its body.
+  /// Position of a joint in its parent body, or of a frame in its body.
   /// \throws ModelError when there is neither, or the name is that of a whole body
   Place getPlace(const std::string& name) const;
   /// A place by name as seen in `body`: that of getPlace, or the origin where it is the joint that carries `body`.

@@ -1,15 +1,15 @@
 #pragma once
-/// \file What a design is worth: its motions made, its measures taken, in units of the start design.
+/// \file The value of a design: the measures of its motions relative to those of the start design.
 ///
-/// With m_i the measures of a design and m_i0 those of the start, a feasible design is worth
+/// With m_i the measures of a design and m_i0 those of the start, the value of a feasible design is
 ///     f = sum_i w_i m_i / m_i0,                                                                                    (1)
-/// W = sum_i w_i at the start. The measure of a workspace is the inverse of the share that is reached, of half a point at
-/// least. Infeasible ones are never an error but
+/// W = sum_i w_i at the start. The measure of a workspace is the inverse of the share that is reached, at least half a point.
+/// Infeasible designs are not errors; their values are
 ///     f = 2 W + W mean_p min(1, 10 g_p)      some posture p of the start's motions cannot be taken                 (2)
 ///     f = 1.5 W + 0.5 W s                    all can, but a motion could not be made                               (3)
 /// with g_p (m or rad) the largest closing error that is left when loops, base and feet should be where they are in
 /// posture p, and s in (0, 1] the share of the motion that is missing (kept motions), else 1. (2) is continuous in
-/// the design: searches slide back to where the loops close.
+/// the design, so that searches return to designs whose loops close.
 #include <functional>
 #include <memory>
 #include <optional>
@@ -51,11 +51,11 @@ struct EvaluationOptions {
   /// moves in a unit motion of its linkage.
   double margin = 1e-3;
 
-  /// Tolerances of engineering: a cost that changes by less than 1e-8 of itself is done. One thread.
+  /// Engineering tolerances: a solve ends when its cost changes by less than 1e-8 of itself. One thread.
   static FddpOptions makeSolverOptions();
 };
 
-/// Why the value of designs has no gradient, and what it would have one of.
+/// The reason why the value of designs has no gradient, and the remedy.
 struct GradientObstacle {
   std::string problem, remedy;
 };

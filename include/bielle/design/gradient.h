@@ -1,5 +1,5 @@
 #pragma once
-/// \file Gradients of what motors pay for a kept motion (MotionMode::Kept), with respect to the variables of a design.
+/// \file Gradients of motor measures of a kept motion (MotionMode::Kept), with respect to the variables of a design.
 ///
 /// Joints, base and feet move as before, and so do the contact forces as far as the motion leaves them open. With the
 /// model's change along a variable x_i (variation.h), postures, speeds and torques of the motors change at every node
@@ -10,10 +10,10 @@
 ///     electrical energy, Eq. (1) of measures.h  p = sum h r P,            dp = sum h r (du v + u dv + 2 u du / K_m^2)
 ///     peak torque in a stretch of the motion    p = |u(k)|,               dp = sign(u(k)) du(k)                    (3)
 /// with r = 1 where P is positive, else the share that is given back, and k the node of the largest |u| in the stretch. Of a peak torque, the piece of every motor, motion and stretch
-/// counts: where one peak is shaved another takes over, and a search that minimizes the largest needs to see both.
+/// counts: when one peak falls another becomes the largest, and a search that minimizes the largest needs both gradients.
 ///
-/// The torques of a kept motion end where a linkage comes to a dead point of its joints, and torques fall right before
-/// it, so that searches run into this wall. With T_c the tangent of a loop cluster for unit speeds of its joints, w the
+/// A kept motion is infeasible where a linkage reaches a dead point of its joints, and torques fall just before it, which
+/// attracts searches. With T_c the tangent of a loop cluster for unit speeds of its joints, w the
 /// right singular vector of its largest singular value and mu = 1 / |T_c w| its margin (ratio.h), a design is kept
 /// from it by
 ///     mu(k)^2 >= least^2,    d mu^2 = -2 mu^4 (T_c w) . d(T_c w)                                                   (4)

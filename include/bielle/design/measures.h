@@ -1,5 +1,5 @@
 #pragma once
-/// \file What motors and linkages pay for a motion.
+/// \file Measures of the effort of motors and linkages in a motion.
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,10 +10,10 @@
 
 namespace bielle {
 
-/// What turns electrical into mechanical power at a motor. Of a motor with motor constant K (torque over the square root of
+/// Conversion of electrical into mechanical power. For a motor with motor constant K (torque over the square root of
 /// the heat it makes) behind a gear of ratio n, the model's motor has K_m = n K. Of the power at its terminals
 ///     P = u v + (u / K_m)^2                                                                                        (1)
-/// it takes max(P, 0) and gives back the share r of what is negative: braking first has to pay for its own heat.
+/// it consumes max(P, 0) and recovers the share r of the negative part, so that braking first covers its own heat.
 /// No friction, no iron losses, no standby.
 struct MotorDrive {
   /// K_m, N m/sqrt(W) (N/sqrt(W) of a linear motor). The default is ours, of the order of geared motors of 0.8 kg that
@@ -39,7 +39,7 @@ struct MotorMeasures {
   double electrical_energy = 0;  ///< sum h (max(P, 0) + r min(P, 0)), Eq. (1), J
 };
 
-/// What motors do over time, N stages: speeds are those at the beginning of a stage.
+/// Torques and speeds of the motors over N stages; speeds are those at the beginning of a stage.
 struct MotorTrace {
   std::vector<double> time, dt;  ///< of the stages, s
   MatrixXd torque, speed;        ///< nu x N; an impact (dt = 0) has no torque
@@ -63,7 +63,7 @@ enum class Measure { PeakTorque, RmsTorque, Energy, ElectricalEnergy, Conditioni
 const char* getName(Measure measure);
 
 /// The largest peak torque, rms torque or conditioning over the motors named and all motions, or an energy of
-/// all of them together. The workspace is no matter of motions (workspace.h).
+/// all of them together. The workspace does not depend on motions (workspace.h).
 double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions);
 
 }  // namespace bielle

@@ -1,5 +1,5 @@
 #pragma once
-/// \file A robot made of named, bounded numbers: the parameters of a generator, or lengths and shifts of a given robot.
+/// \file A robot as a function of named, bounded numbers: parameters of a generator, or lengths and shifts of a given robot.
 #include <string>
 #include <vector>
 
@@ -30,7 +30,7 @@ struct DesignVariable {
   std::vector<ShiftChange> shifts;
 };
 
-/// Makes robots out of numbers, fast and without files; names and order of everything are those of the start.
+/// Makes robots from numbers, fast and without files; names and orders are those of the start.
 class Parametrization {
  public:
   /// A given robot.
@@ -48,7 +48,7 @@ class Parametrization {
   const Model& startModel() const { return model_; }
 
   /// Changes of given robots are made in the order of the variables.
-  /// \throws ModelError when the numbers make no robot
+  /// \throws ModelError when the numbers do not define a robot
   Model make(const VectorXd& x) const;
 
  private:

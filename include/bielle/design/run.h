@@ -1,9 +1,9 @@
 #pragma once
-/// \file The searches of a design problem, logged and resumable, and what comes of them.
+/// \file The searches of a design problem, logged and resumable, and their results.
 ///
-/// Every search writes DIR/searchN.jsonl, N from 1: a line that tells what is searched, then one line per evaluation,
-/// flushed before the search goes on. Searches are deterministic: one that was killed at any time is done again with
-/// the evaluations that it finds in its log, and goes on where it was. A line that was not finished is dropped.
+/// Every search writes DIR/searchN.jsonl, N from 1: a line that describes the problem, then one line per evaluation, flushed
+/// before the search continues. Searches are deterministic: an interrupted one is repeated with the evaluations in its log
+/// and so resumes where it stopped. An incomplete line is dropped.
 #include <array>
 #include <functional>
 #include <string>

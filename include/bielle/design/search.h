@@ -1,8 +1,8 @@
 #pragma once
-/// \file Minimizing inside bounds by NLopt: a global algorithm, then a local one, with gradients where they exist.
+/// \file Minimization within bounds by NLopt: a global algorithm, then a local one, with gradients where they exist.
 ///
-/// Local algorithms with gradients minimize a sum of terms, each the largest of smooth pieces p_ij(x). The kinks of the
-/// largest are taken out by one more variable t_i for every term of several pieces,
+/// Local algorithms with gradients minimize a sum of terms, each the largest of smooth pieces p_ij(x). An additional variable
+/// t_i for every term of several pieces removes the kinks,
 ///     min_{x, t} sum_i t_i    s.t.  p_ij(x) <= t_i,  g_k(x) <= 0    (a term of one piece is added as it is)        (1)
 #include <functional>
 #include <vector>
@@ -24,7 +24,7 @@ bool needsGradient(SearchAlgorithm algorithm);
 
 struct SearchStage {
   SearchAlgorithm algorithm = SearchAlgorithm::Crs;
-  int evaluations = 100;    ///< at most, but for the few that an algorithm makes in one go
+  int evaluations = 100;    ///< at most, plus the few that an algorithm makes in one batch
   double tolerance = 1e-3;  ///< done when steps are below, as a share of the width of the bounds
 };
 
@@ -54,7 +54,7 @@ struct SearchResult {
 
 /// Each stage starts from the best point so far, the first one from the start. One with gradients is passed over where
 /// that point is infeasible, and steps back from infeasible points as from worse ones. The same seed gives the same
-/// points, in any thread. What the objective throws comes out of here.
+/// points, in any thread. Exceptions of the objective propagate.
 SearchResult minimizeByStages(const SearchProblem& problem, const std::vector<SearchStage>& stages, unsigned seed);
 
 }  // namespace bielle

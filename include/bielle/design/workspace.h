@@ -1,10 +1,10 @@
 #pragma once
-/// \file Which share of the places where a foot should go can it reach?
+/// \file The share of a region of placements that a foot can reach.
 ///
 /// The region is a box of placements of the foot seen from the base, about the placement X_BF0 that the foot of the start
 /// design has in the standing posture, axes those of the base:
 ///     p = p_0 + (x, y, z),    R = Rz(yaw) Ry(pitch) Rx(roll) R_0                                                     (1)
-/// Every axis is a range, held, or free (whatever the mechanism makes of it). Ranges are cut into equal cells; their
+/// Every axis is a range, held, or free (left to the mechanism). Ranges are cut into equal cells; their
 /// middles are the points. A point is reached when all loops close with the base where it is and the foot there, within the
 /// joint ranges of the model and, if asked for, with a conditioning (conditioning.h) under a bound. Points are tried from
 /// their neighbours, beginning at the point next to the standing posture: what would need the loops to be opened does not

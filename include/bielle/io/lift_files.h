@@ -1,17 +1,17 @@
 #pragma once
-/// \file A serial motion read back, and its lift to the closed model as files.
+/// \file Reads a serial motion and writes its lift to the closed model.
 #include "bielle/io/result.h"
 #include "bielle/transmission/lift.h"
 
 namespace bielle {
 
-/// What lift() needs, of a record of a motion of the serial model.
-/// \param motion  made anew as it was asked for: its contacts in force at every stage
+/// The input of lift() from a record of a motion of the serial model.
+/// \param motion  the same request made again, for the active contacts of every stage
 /// \throws ModelError when the record is not one of that motion
 SerialTrajectory makeSerialTrajectory(const Motion& motion, const MotionRecord& record);
 
-/// The lifted motion as far as it got, in the form of a solved one: converged if it was lifted, the mean of the cost of (1) of
-/// lift.h per node as its cost. At least one stage must have been lifted.
+/// The lifted part of the motion in the form of a solved one: converged if it was lifted entirely; its cost is the mean per
+/// node of the cost of (1) of lift.h. At least one stage must have been lifted.
 MotionResult makeLiftedResult(const RunInfo& run, const Model& closed, const Motion& serial, const LiftResult& lifted,
                               double seconds);
 

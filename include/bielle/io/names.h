@@ -26,10 +26,10 @@ constexpr std::array<const char*, 6> kWrenchEntries = {"fx", "fy", "fz", "nx", "
 /// name.fx, ..., name.nz for every name.
 std::vector<std::string> makeWrenchNames(const std::vector<std::string>& names);
 
-/// Where the name stands among them: a column of a record. \throws ModelError when it is not there
+/// Index of the name: a column of a record. \throws ModelError when it is absent
 int findColumn(const std::vector<std::string>& names, const std::string& name);
 
-/// The names of things that have one.
+/// The names of a list of named things.
 template <typename Things>
 std::vector<std::string> getNames(const Things& things) {
   std::vector<std::string> names;

@@ -1,5 +1,5 @@
 #pragma once
-/// \file Motions as files of OpenSim, which other programs read too: a header, then columns separated by tabs.
+/// \file Motions as OpenSim files, which other programs also read: a header, then tab-separated columns.
 #include <string>
 
 #include "bielle/io/record.h"
@@ -9,8 +9,8 @@ namespace bielle {
 /// Coordinates over time (.mot): time and q by their names, rad and m (inDegrees=no).
 std::string formatMot(const MotionRecord& record);
 
-/// Everything over time (.sto): the columns of the CSV (record.h). The last node holds what the last stage did, so that no
-/// cell is empty.
+/// All columns of the CSV (record.h) over time (.sto). The last node repeats the values of the last stage, so that no cell is
+/// empty.
 std::string formatSto(const MotionRecord& record);
 
 }  // namespace bielle

@@ -14,7 +14,7 @@ struct RobotText {
 /// contact and reference keeps its name; links that were merged into a body are frames. Bodies keep their order where the
 /// model lists them depth first.
 /// \param remark  comment at the head of both files
-/// \throws ModelError naming what the files cannot say: a universal joint whose axes are not axes of its frame, limits of
+/// \throws ModelError naming what the files cannot express: a universal joint whose axes are not axes of its frame, limits of
 ///     joints of several coordinates
 RobotText formatRobot(const Model& model, const std::string& remark = "");
 

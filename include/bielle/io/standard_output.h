@@ -1,11 +1,11 @@
 #pragma once
-/// \file What a command prints, when nobody takes it: a full disk, a pipe whose reader has gone.
+/// \file Failures of the standard output: a full disk, a pipe whose reader has ended.
 namespace bielle {
 
-/// From now on a reader that goes away (`| head`) does not end the program, which may have results to write.
+/// Prevents a reader that ends early (`| head`) from terminating the program, which may still have results to write.
 void ignoreClosedPipes();
 
-/// To be called at the end. \throws ModelError when the standard output was not taken whole
+/// Call this at the end. \throws ModelError when the standard output could not be written completely
 void finishStandardOutput();
 
 }  // namespace bielle

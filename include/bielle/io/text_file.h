@@ -1,5 +1,5 @@
 #pragma once
-/// \file Text files: written aside and renamed when they are whole, as all results are.
+/// \file Text files, written to a temporary file and renamed when complete, like all results.
 #include <string>
 
 namespace bielle {

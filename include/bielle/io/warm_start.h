@@ -1,5 +1,5 @@
 #pragma once
-/// \file Starting a solve from the result of another one.
+/// \file Starting a solve from a previous result.
 #include "bielle/io/record.h"
 
 namespace bielle {

@@ -1,6 +1,6 @@
 #pragma once
-/// \file Products of matrices of a few ten rows and columns, where a general product spends as much on packing its
-/// operands as on multiplying them.
+/// \file Products of matrices with a few tens of rows and columns, where a general product spends as much time on packing
+/// its operands as on multiplying them.
 #include <algorithm>
 
 #include "bielle/math/lanes.h"
@@ -8,7 +8,7 @@
 
 namespace bielle {
 
-/// Rows are worked on in full lanes.
+/// Rows are processed in full lanes.
 inline Eigen::Index roundUpToLane(Eigen::Index rows) { return (rows + kLane - 1) / kLane * kLane; }
 
 /// Column-major matrix: entry (i, j) at data[i + j * stride]. Its rows can be read and written up to the next multiple
@@ -31,12 +31,12 @@ struct StridedMatrix {
   Eigen::Index row_stride, col_stride;
 };
 
-/// C += sign A B, C (rows x cols), A (rows x depth), B (depth x cols). What lies below `rows` in the last lane of C is
-/// overwritten by something.
+/// C += sign A B, C (rows x cols), A (rows x depth), B (depth x cols). Entries below `rows` in the last lane of C become
+/// undefined.
 void addProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, double sign, ConstPaddedMatrix A,
                 StridedMatrix B, PaddedMatrix C);
 
-/// C = A B, likewise: C need not hold numbers.
+/// C = A B, likewise; C may be uninitialized.
 void setProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, ConstPaddedMatrix A, StridedMatrix B,
                 PaddedMatrix C);
 
@@ -55,17 +55,17 @@ inline PaddedMatrix pad(PaddedMap A, Eigen::Index row = 0, Eigen::Index col = 0)
 inline ConstPaddedMatrix pad(ConstPaddedMap A, Eigen::Index row = 0, Eigen::Index col = 0) {
   return {A.data() + row + col * A.outerStride(), A.outerStride()};
 }
-/// Padding rows take part in products: they must hold numbers.
+/// Padding rows take part in products, so they must be initialized.
 void clearPadding(PaddedMap A);
 
 /// H(i, j) += sign sum_k A(i, k) B(j, k) for i >= j >= begin, k < depth. Full lanes: entries above the diagonal change.
 void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, ConstPaddedMatrix A, ConstPaddedMatrix B,
                      PaddedMap H);
-/// H(i, j) = sum_k A(i, k) B(j, k) for i >= j, k < depth, likewise: H need not hold numbers.
+/// H(i, j) = sum_k A(i, k) B(j, k) for i >= j, k < depth, likewise; H may be uninitialized.
 void setLowerProduct(Eigen::Index depth, ConstPaddedMatrix A, ConstPaddedMatrix B, PaddedMap H);
 
 /// Cholesky elimination of the first `num` unknowns of a symmetric H, of which the lower triangle is read: their columns
-/// become L over Y^T, the rest of H stays. False when a pivot is not positive.
+/// become L over Y^T, the rest of H is unchanged. False when a pivot is not positive.
 bool factorizeColumns(PaddedMap H, Eigen::Index num);
 /// X L^{-T} and X L^{-1} in place, L the lower triangle of a square matrix.
 void solveTransposedFromRight(ConstMatrixRef L, PaddedMap X);

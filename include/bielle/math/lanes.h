@@ -1,10 +1,10 @@
 #pragma once
-/// \file Several numbers that take the same path: a scalar type for Eigen.
+/// \file A scalar type for Eigen that holds one number per lane of a vector register.
 ///
-/// The mechanisms of neighbouring nodes of a horizon differ in numbers only, and what is done to them are short chains of
-/// dependent operations on vectors of 3 to 14 numbers. With one node per lane every operation of such a chain does the
-/// work of kLane nodes in a full register of the processor. Lanes never mix: what comes out of one does not depend on what
-/// the others hold, by a single bit, so that nodes may be put together in any way.
+/// Neighbouring nodes of a horizon differ in their numbers only, and their dynamics are short chains of dependent operations
+/// on vectors of 3 to 14 numbers. With one node per lane, each operation of such a chain processes kLane nodes in a full
+/// register. Lanes never mix: the result in one does not depend by a single bit on the contents of the others, so that
+/// nodes can be grouped in any way.
 #include <Eigen/Core>
 #include <array>
 #include <cmath>
@@ -45,7 +45,7 @@ inline Lanes operator*(const Lanes& a, const Lanes& b) { return Lanes(a.v * b.v)
 inline Lanes operator/(const Lanes& a, const Lanes& b) { return Lanes(a.v / b.v); }
 inline Lanes operator-(const Lanes& a) { return Lanes(-a.v); }
 
-/// What a comparison says in each lane; for double it is a bool.
+/// The result of a comparison in each lane; for double it is a bool.
 struct LaneMask {
   typedef long long Vector __attribute__((vector_size(kLane * sizeof(double))));
   Vector v;  // -1 or 0
@@ -77,7 +77,7 @@ inline void calcSineCosine(double x, double& sine, double& cosine) {
   cosine = std::cos(x);
 }
 
-/// A truth and an index for each lane.
+/// A bool and an index for each lane.
 template <typename T>
 struct LogicOf {
   using Mask = bool;
@@ -118,7 +118,7 @@ inline void setEntry(Lanes* x, const std::array<int, kLane>& i, const Lanes& val
   for (Eigen::Index l = 0; l < kLane; ++l) x[i[l]].v[l] = value.v[l];
 }
 
-/// f of every lane on its own, for what branches. double: f(x).
+/// f applied to each lane separately, for functions that branch. double: f(x).
 template <typename F>
 inline auto applyLanes(const Lanes& x, const F& f) {
   Lanes out;
@@ -128,7 +128,7 @@ inline auto applyLanes(const Lanes& x, const F& f) {
 
 /// out[i] gets in[lane][i] in each lane, i < size.
 void packLanes(const std::array<const double*, kLane>& in, Eigen::Index size, Lanes* out);
-/// The way back: out[lane][i] gets in[i * stride] of each lane; lanes whose pointer is null are left out.
+/// The inverse: out[lane][i] gets in[i * stride] of each lane; lanes whose pointer is null are left out.
 void unpackLanes(const Lanes* in, Eigen::Index size, const std::array<double*, kLane>& out, Eigen::Index stride = 1);
 /// The same for one lane alone: a cache line per number.
 inline void unpackLane(const Lanes* in, Eigen::Index lane, Eigen::Index size, double* out) {

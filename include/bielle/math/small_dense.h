@@ -1,6 +1,6 @@
 #pragma once
-/// \file Products and triangular solves of matrices of a few rows, where a general routine spends more on its own
-/// administration than on arithmetic. Column-major; inner loops run down columns, so that the compiler vectorizes them.
+/// \file Products and triangular solves of matrices of a few rows, where a general routine spends more time on overhead
+/// than on arithmetic. Column-major; inner loops run down columns, so that the compiler vectorizes them.
 #include <type_traits>
 #include <vector>
 
@@ -35,7 +35,7 @@ inline void addSmallProduct(const A_& A, const B_& B, C_&& out, double s = 1) {
   }
 }
 
-/// Entries (r .. r + Rows, c .. c + Cols) of out += s A^T B: sums that do not wait for each other.
+/// Entries (r .. r + Rows, c .. c + Cols) of out += s A^T B: independent sums.
 template <int Rows, int Cols, typename A_, typename B_, typename C_>
 inline void addSmallDots(const A_& A, const B_& B, Eigen::Index r, Eigen::Index c, double s, C_& out) {
   typename A_::Scalar sums[Cols][Rows] = {};
@@ -63,7 +63,7 @@ inline void addSmallProductTransposed(const A_& A, const B_& B, C_&& out, double
   if (c < m) addColumns(std::integral_constant<int, 1>());
 }
 
-/// Solves L L^T x = b in place for N known to the compiler: without loops, so that columns overlap.
+/// Solves L L^T x = b in place for N known at compile time; unrolled, so that columns overlap.
 template <int N, typename T>
 inline void solveSmallCholeskyColumn(const T* __restrict l, Eigen::Index stride, T* __restrict out) {
   T x[N];
@@ -93,7 +93,7 @@ inline void solveSmallCholesky(const L_& factor, X_&& X) {
   const auto* l = factor.data();
   for (Eigen::Index c = 0; c < X.cols(); ++c) {
     auto* __restrict x = X.data() + c * X.outerStride();
-    // One loop of a Weld6D closure or two: nearly all blocks there are.
+    // One or two Weld6D closures, the most common blocks.
     if (n == 6) {
       solveSmallCholeskyColumn<6>(l, stride, x);
       continue;

@@ -12,14 +12,14 @@ struct JointLimits {
   VectorXd lower, upper, velocity;  ///< per dof of the joint, or empty for none; rad, m, rad/s, m/s
 };
 
-/// Collects bodies, joints, closures, motors and frames, then checks and freezes them.
-/// Bodies are referred to by the name of the link; "world" is the ground. Every add* may be called in any order that
-/// declares a link before it is used; build() throws ModelError naming the element and the remedy.
+/// Collects bodies, joints, closures, motors and frames, then validates them and makes the model.
+/// Bodies are referred to by the name of the link; "world" is the ground. A link must be declared before it is used;
+/// otherwise the order of calls is free. build() throws ModelError naming the element and the remedy.
 class ModelBuilder {
  public:
   explicit ModelBuilder(std::string name, std::string source = "");
 
-  /// File named by the errors of whatever is added from now on.
+  /// File that errors about subsequent additions name.
   void setSource(const std::string& source) { source_ = source; }
 
   /// Adds a link carried by a joint. A Fixed joint merges the link into its parent and leaves a frame of its name.
@@ -45,7 +45,7 @@ class ModelBuilder {
   /// Rotor inertia on every dof of a joint that no motor drives (a motor has its own).
   void setArmature(const std::string& joint, double armature);
 
-  /// Validates and freezes. Things possible but implausible are appended to `warnings` when given.
+  /// Validates and makes the model. Implausible data are reported in `warnings`, if given.
   Model build(std::vector<std::string>* warnings = nullptr) const;
 
  private:

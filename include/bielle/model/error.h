@@ -1,11 +1,11 @@
 #pragma once
-/// \file The one exception thrown for data that cannot be a robot.
+/// \file The exception for invalid input.
 #include <stdexcept>
 #include <string>
 
 namespace bielle {
 
-/// Bad input at the boundary. what() reads "file: element: what is wrong; remedy", on one line, without control characters,
+/// Invalid input at the boundary. what() reads "file: element: what is wrong; remedy", on one line, without control characters,
 /// long parts cut.
 class ModelError : public std::runtime_error {
  public:

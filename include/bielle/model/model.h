@@ -59,7 +59,7 @@ struct Motor {
 
 enum class ContactKind { Point3D, Surface6D };
 
-/// A place of a body that may touch the ground; z is the outward normal of the ground when in contact.
+/// A frame of a body that may touch the ground; z is the outward normal of the ground when in contact.
 struct ContactFrame {
   std::string name;
   int body = 0;
@@ -72,13 +72,13 @@ struct ContactFrame {
 struct Reference {
   std::string name;
   std::map<std::string, std::vector<double>> joints;  ///< joint name -> its q
-  /// Height of a frame over the soles, feet flat on the ground under their own hips; empty frame: joints alone.
+  /// Height of a frame over the soles, with feet flat on the ground under their hips; empty frame: joints alone.
   std::string height_frame;
   double height = 0;                     ///< m
   std::map<std::string, Vector3d> feet;  ///< contact frame -> position of its origin, m (world)
 };
 
-/// What is drawn of a body, from the visuals of the URDF.
+/// A shape drawn for a body, from the visuals of the URDF.
 struct Visual {
   enum class Shape { Box, Cylinder, Sphere, Mesh } shape = Shape::Box;
   int body = 0;

@@ -1,16 +1,15 @@
 #pragma once
 /// \file
-/// Robots from files: a URDF, and beside it a YAML file of the same stem for what a URDF cannot say. (The YAML is
-/// optional.)
+/// Robots from files: a URDF and, optionally, a YAML file with the same stem beside it for data that a URDF cannot express.
 ///
 /// ## The URDF
 /// Links and joints of one tree. Bodies are added depth first, the children of a link in the order in which their
 /// joints stand in the file. A link without <inertial> has no mass. A root named "world" is the ground; any other root
 /// is carried by a free-flyer named "root_joint", or merged into the ground when the base is fixed.
 /// - <limit>: `effort` and `velocity` go to the motor and to the joint (published files often hold placeholders there:
-///   override them by `motors`); 0 means none. `lower` = `upper` = 0, as a missing pair reads, means none. Joints that
-///   the YAML gives another number of coordinates have no limits.
-/// - <mimic> is refused (model the coupling as a closure), <dynamics> is ignored with a warning, meshes need not
+///   override them by `motors`); 0 means none. `lower` = `upper` = 0, like a missing pair, means none. Joints whose number
+///   of coordinates the YAML changes have no limits.
+/// - <mimic> is rejected (model the coupling as a closure), <dynamics> is ignored with a warning, meshes need not
 ///   exist.
 /// - Attributes are finite numbers; inertias are those of a body (no negative mass, triangle inequality), up to 1e-6
 ///   of rounding.
@@ -35,9 +34,9 @@
 ///   along x, m
 /// - `references: {name: {joints: {joint: number or list}, height: {frame, value}, feet: {contact: [x, y, z]}}, ...}`
 /// - `serial_joints: [joint, ...]`, `gravity: [x, y, z]` (m/s^2)
-/// - `model: NAME or path from here`, or a list of them: this file, with no URDF beside it, completes a robot published
-///   by others, the first of these that is there; a name is looked for in the directories of robots. Its keys go before
-///   those of the YAML file of that robot.
+/// - `model: NAME or path relative to this file`, or a list of them: this file, with no URDF beside it, completes the first of
+///   these published robots that exists; names are searched for in the directories of robots. Its keys take precedence over
+///   those of that robot's YAML file.
 #include <optional>
 #include <string>
 #include <vector>
@@ -54,7 +53,7 @@ struct LoadOptions {
 
 struct LoadedRobot {
   Model model;
-  std::vector<std::string> warnings;  ///< "file: element: what", possible but worth a look
+  std::vector<std::string> warnings;  ///< "file: element: problem", valid but suspicious
   std::string directory;              ///< where the files were found
   std::string file;                   ///< the .urdf, or the .yaml that completes one elsewhere, absolute
 };
@@ -62,10 +61,10 @@ struct LoadedRobot {
 /// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf, robot.urdf or bipetto.yaml in the directories of
 /// getRobotDirectories()), by directory (its robot.urdf, else the .urdf named as the directory, else its only .urdf, else
 /// the .yaml named as the directory), by .urdf file or by .yaml file with the key `model`. \throws
-/// ModelError naming the file, the element and the remedy; nothing else, whatever the files hold
+/// ModelError naming the file, the element and the remedy, and no other exception, whatever the files contain
 LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options = {});
 
-/// The file of a robot by name or path, as loadRobot finds it. \throws ModelError listing where it looked
+/// The file of a robot by name or path, as loadRobot finds it. \throws ModelError listing the places searched
 std::string findRobotFile(const std::string& name_or_path);
 
 /// Directories searched for robots by name, in this order: those of $BIELLE_ROBOTS (separated by colons),

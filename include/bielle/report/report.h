@@ -1,10 +1,10 @@
 #pragma once
-/// \file A report: solved motions as one page of HTML that needs nothing but a browser, not even a network.
+/// \file A report: solved motions as one HTML page that needs only a browser, without a network.
 ///
-/// It replays the robot in three dimensions and plots what happens over time, out of the files that a result leaves in
-/// its directory (result.h): trajectory.npz, else trajectory.csv; summary.json; check.json if it is there. Keys of
+/// It replays the robot in three dimensions and plots its quantities over time, from the files in a result's directory
+/// (result.h): trajectory.npz, else trajectory.csv; summary.json; check.json if it is there. Keys of
 /// summary.json beyond those of a bare run are used when present: `robot_file`, `phases`, `ground`. Several
-/// directories are compared on one page. Names found in the files are shown as text, whatever characters they hold.
+/// directories are compared on one page. Names from the files are escaped and shown as text.
 #include <string>
 #include <vector>
 
@@ -14,7 +14,7 @@ namespace bielle {
 /// \throws ModelError naming the file that is missing or does not fit (a robot that has changed since, for example)
 std::string makeReport(const std::vector<std::string>& directories);
 
-/// Writes the page aside and renames it when it is whole. \throws ModelError as above, or when it cannot be written
+/// Writes the page to a temporary file and renames it when complete. \throws ModelError as above, or when it cannot be written
 void writeReport(const std::string& path, const std::vector<std::string>& directories);
 
 }  // namespace bielle

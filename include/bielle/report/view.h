@@ -15,7 +15,7 @@ namespace bielle {
 /// \throws ModelError when no closed configuration is found
 std::string makeView(const LoadedRobot& robot);
 
-/// Writes the page aside and renames it. \throws ModelError as above, or when it cannot be written
+/// Writes the page to a temporary file and renames it. \throws ModelError as above, or when it cannot be written
 void writeView(const std::string& path, const LoadedRobot& robot);
 
 }  // namespace bielle

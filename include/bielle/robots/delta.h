@@ -1,7 +1,7 @@
 #pragma once
 /// \file Clavel's delta: three arms with forearms that are parallelograms hold a platform parallel to its base.
 ///
-/// All joints are hinges, as drawn in the textbook, so that there are many more rows than rank. Arm i at the azimuth
+/// All joints are hinges, as in textbooks, so that there are many more rows than rank. Arm i at the azimuth
 /// psi_i = 2 pi i / 3, radial direction d, tangent t = z x d: a motor about t at R d, the upper arm down to its elbow
 ///     e = R d + l1 (cos theta d - sin theta z),                                                                  (1)
 /// a bar that turns about t there, two rods beside each other that turn about the normal n of the forearm's plane

@@ -1,8 +1,8 @@
 #pragma once
-/// \file Chains of planar four-bar linkages: closed chains of any size, with answers on paper.
+/// \file Chains of planar four-bar linkages: closed chains of any size, with closed-form solutions.
 ///
 /// One four-bar in the plane x-z: a crank of length a turns at the origin of its ground, a rocker of length c swings at
-/// (d, 0), a coupler of length b ties their ends by a hinge. With angles counted from x towards z (about -y), theta2 of
+/// (d, 0), and a coupler of length b joins their ends by a hinge. With angles measured from x towards z (about -y), theta2 of
 /// the crank, theta3 of the coupler and theta4 of the rocker, it closes when
 ///     a cos theta2 + b cos theta3 = d + c cos theta4
 ///     a sin theta2 + b sin theta3 =     c sin theta4.                                                          (1)
@@ -14,8 +14,8 @@
 /// are independent; mobility one.
 ///
 /// The linkage is at a *dead point* of the rocker where crank and coupler are aligned: dtheta4 = 0 there, and the rocker's
-/// angle is no coordinate. With a + b = c + d, or a = c and b = d (a parallelogram), all rods can be aligned: (1) then
-/// loses rank and the linkage can go on in two ways.
+/// angle is not a coordinate. With a + b = c + d, or a = c and b = d (a parallelogram), all rods can be aligned: (1) then
+/// loses rank and the linkage can continue on two branches.
 #include "bielle/model/model.h"
 
 namespace bielle {

@@ -8,10 +8,10 @@
 
 namespace bielle {
 
-/// One request: parameters at their defaults, to be set, and the model that comes of them.
+/// One request: parameters, initially at their defaults, and the function that makes the model.
 struct GeneratorRequest {
   std::vector<Parameter> parameters;
-  std::function<Model()> make;  ///< \throws ModelError when the parameters make no robot
+  std::function<Model()> make;  ///< \throws ModelError when the parameters do not define a robot
 };
 
 struct Generator {
@@ -21,7 +21,7 @@ struct Generator {
 
 const std::vector<Generator>& getGenerators();
 
-/// \throws ModelError naming the generators there are
+/// \throws ModelError listing the generators
 const Generator& findGenerator(const std::string& name);
 
 }  // namespace bielle

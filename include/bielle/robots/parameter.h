@@ -10,12 +10,12 @@ struct Parameter {
   std::string name;
   double* value = nullptr;
   std::string unit;
-  double lower = 0, upper = 0;  ///< what the generator takes, not what a good robot has
+  double lower = 0, upper = 0;  ///< range that the generator accepts, not a recommendation
   std::string help;
 };
 
 /// Sets a parameter by name.
-/// \throws ModelError naming the parameters there are
+/// \throws ModelError listing the parameters
 void setParameter(const std::vector<Parameter>& parameters, const std::string& name, double value);
 
 /// \throws ModelError naming the first parameter that is outside its bounds

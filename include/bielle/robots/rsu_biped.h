@@ -13,8 +13,8 @@
 /// ankley = -delta. Each chain leaves the ankle's two freedoms: per leg, with the two hinges of the ankle, 6 bodies and
 /// 36 - 2 5 - 2 (5 + 4 + 3) = 2.
 ///
-/// The architecture is the textbook's. Distance of the hips, soles, height of the trunk in half_sitting and the whole mass are
-/// those of robots/bipetto; all other dimensions and masses are ours, of no robot that was built.
+/// The architecture is common. Distance of the hips, soles, height of the trunk in half_sitting and total mass are those of
+/// robots/bipetto; all other dimensions and masses are ours, and no such robot was built.
 #include "bielle/model/model.h"
 #include "bielle/robots/parameter.h"
 

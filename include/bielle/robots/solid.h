@@ -1,5 +1,5 @@
 #pragma once
-/// \file Bodies made of simple solids: one list gives the inertia and what is drawn.
+/// \file Bodies made of simple solids: one list defines both inertia and drawing.
 ///
 /// Homogeneous solids of mass m, about their centres, in their own axes:
 ///     box a, b, c:            I = m/12 diag(b^2 + c^2, a^2 + c^2, a^2 + b^2)                                   (1)
@@ -21,7 +21,7 @@ struct Solid {
   Eigen::Vector4d rgba = {0.7, 0.7, 0.7, 1};
 };
 
-/// Colours by what a part is for.
+/// Colours by the function of a part.
 namespace colors {
 inline const Eigen::Vector4d kShell(0.92, 0.92, 0.90, 1), kFrame(0.62, 0.81, 0.93, 1), kOutput(0.23, 0.38, 0.71, 1),
     kMotor(0.97, 0.53, 0, 1), kSteel(0.55, 0.55, 0.58, 1), kRod(0.80, 0.15, 0.15, 1), kSole(0.25, 0.25, 0.27, 1);

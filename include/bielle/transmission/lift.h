@@ -5,15 +5,16 @@
 /// serial part is the same. The paper solves, node after node, with x_c^k known,
 ///     min_u 1/2 |q_s^{k+1} - q_s*^{k+1}|^2 + 1/2 |v_s^{k+1} - v_s*^{k+1}|^2    s.t.  x_c^{k+1} = f_k(x_c^k, u)        (1)
 /// (LiftMethod::Nlopt; x_c^{k+1} is eliminated by a step of the closed dynamics, reduced formulation). With
-/// LiftMethod::Newton every node is lifted by itself: the loops are closed on the serial joints by Newton steps from the
-/// node before, v_c = T v_s and a_c follow from the linkages (ratio.h), and with lambda the foot forces
+/// LiftMethod::Newton every node is lifted separately: the loops are closed on the serial joints by Newton steps from the
+/// previous node, v_c = T v_s and a_c follow from the linkages (ratio.h), and with lambda the foot forces
 ///     T^T (M a_c + b) = T^T B u + T^T J_c^T lambda                                                                    (2)
 /// gives u, the loop forces being eliminated by T. Where feet share the load in several ways (double support), (2) leaves
-/// lambda open: it is the one nearest to the serial one. (1) starts from the same u and does not move along directions that
-/// (1) leaves open. Either way the closed dynamics under u are evaluated anew and compared with what was asked for.
+/// lambda open: it is the one nearest to the serial one. The minimization of (1) starts from the same u and
+/// does not move along directions that (1) leaves open. In both cases the closed dynamics under u are evaluated and compared
+/// with the serial motion.
 ///
-/// A lift fails where the closed robot cannot follow: the posture is out of reach of its linkage, or the linkage is at a dead
-/// point of the joint, where joint speeds ask for infinite motor speeds, or what the closed dynamics do is too far off.
+/// A lift fails where the closed robot cannot follow: the posture is out of reach of a linkage, a linkage is at a dead point of
+/// its joint, where joint speeds require infinite motor speeds, or the closed dynamics deviate too far.
 #include <string>
 #include <vector>
 

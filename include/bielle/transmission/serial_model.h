@@ -6,7 +6,7 @@
 /// of their own names. Base, joints outside loops with their motors, frames, contacts, visuals, gravity and the names of
 /// all these stay, so that results map by name. A linkage is frozen only if its serial joints determine it: as many
 /// coordinates as it has mobility, and not at a dead point of the joint (ratio.h).
-/// With R the ratio of the linkage at the reference, the new motors get what its motors can give there:
+/// With R the ratio of the linkage at the reference, the limits of the new motors are those of its motors there:
 ///     effort <= sum_i |R_ij| effort_i,    velocity <= sum_i |R^{-1}_ji| velocity_i.                                 (1)
 #include <string>
 #include <vector>
@@ -24,14 +24,14 @@ struct SerialModelOptions {
   double armature = 1e-3;  ///< kg m^2
 };
 
-/// Armature out of a text: kg m^2, or "reflected"; empty for the default.
-/// \throws ModelError when it is none
+/// Parses an armature: kg m^2, or "reflected"; empty for the default.
+/// \throws ModelError when the text is neither
 SerialModelOptions parseSerialArmature(const std::string& text);
 
 struct SerialModel {
   Model model;
   VectorXd q_reference;  ///< nq of the closed model
-  /// What was changed, by name.
+  /// Names of what was changed.
   std::vector<std::string> frozen_joints, dropped_closures;
   struct Replacement {
     std::vector<std::string> motors,
