@@ -17,6 +17,7 @@
 # take or return them by value.
 if(BIELLE_NATIVE)
   option(BUILD_SHARED_LIBS "One shared library instead of a static one per layer" OFF)
+  set(BIELLE_LEVELS "")
 else()
   option(BUILD_SHARED_LIBS "One shared library instead of a static one per layer" ON)
   if(CMAKE_SYSTEM_NAME STREQUAL Linux AND CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|amd64)$")
