@@ -13,8 +13,8 @@
 #   thus never replace those of the program or of another library.
 # - A function that the program and the library both define, such as a template of namespace bielle, is called by each in
 #   its own copy (-Bsymbolic-functions).
-# Whether Lanes travel in registers or in memory depends on the level: no function that the library exports to programs may
-# take or return them by value.
+# Whether Lanes travel in registers or in memory depends on the level: no function that programs call may take or return
+# them by value.
 if(BIELLE_NATIVE)
   option(BUILD_SHARED_LIBS "One shared library instead of a static one per layer" OFF)
   set(BIELLE_LEVELS "")
@@ -77,6 +77,11 @@ function(bielle_layer name)
       target_link_libraries(${objects} PRIVATE bielle_headers ${ARG_PUBLIC} ${ARG_PRIVATE} bielle_warnings)
       if(level)
         target_compile_options(${objects} PRIVATE -march=${level} -mtune=generic)
+        if(level STREQUAL x86-64-v3 AND CMAKE_CXX_COMPILER_ID STREQUAL GNU
+            AND CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 12)
+          # Lanes are copied by whole registers. By halves, as the tuning says, loads that follow wait for the stores.
+          target_compile_options(${objects} PRIVATE -mmove-max=256 -mstore-max=256)
+        endif()
       endif()
       target_link_libraries(bielle_library${suffix} PRIVATE ${objects})
     endforeach()

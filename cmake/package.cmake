@@ -35,6 +35,15 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4)")
 set(CPACK_COMPONENT_DEVELOPMENT_DEPENDS library)
 
+# Each package says where Debian looks for it whose work it is.
+if(BUILD_SHARED_LIBS)
+  foreach(component IN LISTS CPACK_COMPONENTS_ALL)
+    string(TOUPPER ${component} upper)
+    install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/${CPACK_DEBIAN_${upper}_PACKAGE_NAME}
+      RENAME copyright COMPONENT ${component})
+  endforeach()
+endif()
+
 # A package must run on every machine of its architecture.
 set(CPACK_PROJECT_CONFIG_FILE ${PROJECT_SOURCE_DIR}/cmake/refuse_native.cmake)
 set(CPACK_BIELLE_NATIVE ${BIELLE_NATIVE})
