@@ -31,11 +31,23 @@ void NodeEvaluations::resize(const ShootingProblem& problem, int num_rolling, in
   grow(problem, num_nodes, iterate_);
   grow(problem, num_nodes, trial_);
   grow(problem, num_rolling, rolling_);
-  while (static_cast<int>(scratch_.size()) < threads) scratch_.push_back(problem.makeScratch());
+  if (static_cast<int>(scratch_.size()) < threads) makeScratch(problem, threads);
   tasks_.reserve(num_nodes);
   if (!advanced_ || static_cast<int>(fresh_.size()) != num_nodes) fresh_.assign(num_nodes, false);
   advanced_ = false;
   seconds_ = 0;
+}
+
+// Each thread makes its own: memory belongs where it is first written to.
+void NodeEvaluations::makeScratch(const ShootingProblem& problem, int threads) {
+  std::vector<std::unique_ptr<ProblemScratch>> made(threads);
+  ParallelErrors errors;
+#pragma omp parallel for num_threads(threads) schedule(static)
+  for (int i = 0; i < threads; ++i) {
+    errors.run(i, [&] { made[i] = problem.makeScratch(); });
+  }
+  errors.rethrow();
+  scratch_ = std::move(made);
 }
 
 int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajectory& nodes, int threads) {

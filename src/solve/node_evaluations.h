@@ -36,6 +36,8 @@ class NodeEvaluations {
   double getSeconds() const { return seconds_; }
 
  private:
+  void makeScratch(const ShootingProblem& problem, int threads);
+
   std::uint64_t problem_ = 0;  // id
   EvaluationList iterate_, trial_, rolling_;
   std::vector<std::unique_ptr<ProblemScratch>> scratch_;  // by thread
