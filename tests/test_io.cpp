@@ -17,6 +17,7 @@
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "get_error.h"
+#include "problem_probe.h"
 
 namespace fs = std::filesystem;
 using namespace bielle;
@@ -52,10 +53,11 @@ struct ShortSquat {
     options.settle = 0;
     options.time_step = 0.03;
     motion = makeSquat(robot.model, options);
+    testing::ProblemProbe probe(*motion.problem);
     for (size_t k = 0; k < motion.guess.xs.size(); ++k) {
       VectorXd& x = motion.guess.xs[k];
       VectorXd dx = VectorXd::LinSpaced(motion.problem->tangentSize(k), -0.01, 0.02) * (0.3 + k);
-      motion.problem->integrate(static_cast<int>(k), VectorXd(x), dx, x);
+      x = probe.integrate(x, dx);
       if (k < motion.guess.us.size()) motion.guess.us[k] += VectorXd::LinSpaced(robot.model.nu(), 0.1, 1.7 / 3);
     }
   }
