@@ -349,6 +349,25 @@ TEST_CASE("solve writes a converged squat and says so") {
   CHECK(directory.readTrajectory().u == record.u);  // whatever the number of threads
 }
 
+TEST_CASE("solve says what was asked and what came out; a goal that is missed is a warning, no failure") {
+  const OutputDirectory directory;
+  const CommandResult met = run(makeShortSquat(directory.str(), {"--quiet"}));
+  INFO(met.out << met.err);
+  CHECK(met.status == 0);
+  CHECK_THAT(met.out, Catch::Contains("depth  asked 0.95, came out 0.9") && !Catch::Contains("missed"));
+  CHECK_THAT(met.err, !Catch::Contains("warning"));
+  CHECK(directory.readSummary()["goals"][0]["met"] == true);
+  const CommandResult missed = run(makeShortSquat(directory.str(), {"--quiet", "--set", "com_weight=1"}));
+  INFO(missed.out << missed.err);
+  CHECK(missed.status == 0);
+  CHECK_THAT(missed.out, Catch::Contains("missed (tolerance 0.01)"));
+  CHECK_THAT(missed.err, Catch::Contains("bielle: warning: depth asked 0.95, came out "));
+  const json goal = directory.readSummary()["goals"][0];
+  CHECK(goal["met"] == false);
+  CHECK(goal["asked"] == 0.95);
+  CHECK(goal["came_out"] > 0.96);
+}
+
 TEST_CASE("solve ends by the check of its result, whose failure is its own") {
   const OutputDirectory directory;
   fs::create_directory(directory.str());

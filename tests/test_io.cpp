@@ -303,6 +303,15 @@ TEST_CASE("a summary reads back: phases, stances, ground; what is none is refuse
   CHECK(summary.formulation == result.formulation);
   CHECK_FALSE(summary.converged);
   CHECK(summary.requested == result.requested);
+  REQUIRE(summary.goals.size() == 1);
+  CHECK(summary.goals[0].goal.name == "depth");
+  CHECK(summary.goals[0].goal.kind == GoalKind::Height);
+  CHECK(summary.goals[0].goal.asked == result.goals[0].goal.asked);
+  CHECK(summary.goals[0].goal.tolerance == result.goals[0].goal.tolerance);
+  CHECK(summary.goals[0].goal.last == squat.motion.problem->numStages());
+  CHECK(summary.goals[0].goal.contacts == result.record.contact_names);
+  CHECK(summary.goals[0].came_out == result.goals[0].came_out);
+  CHECK_FALSE(summary.goals[0].met());  // the guess stands
   REQUIRE(summary.phases.size() == 1);
   CHECK(summary.phases[0].time_step == result.schedule.phases[0].dt);
   CHECK(summary.phases[0].nodes == squat.motion.problem->numStages());

@@ -20,7 +20,7 @@ BIELLE = sys.argv.pop(1)
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 HOSTILE = "<script>window.hacked=1</script><img src=x onerror=window.hacked=2>\"'&amp;</style>"
 
-# What the canvas of the replay shows, as a list of levels of grey on a grid.
+# The canvas of the replay as a list of grey levels on a grid.
 PICTURE = """(() => {
   const small = document.createElement('canvas');
   small.width = small.height = 256;
@@ -30,7 +30,7 @@ PICTURE = """(() => {
   return Array.from(pen.getImageData(0, 0, 256, 256).data).filter((x, i) => i % 4 === 0);
 })()"""
 
-# How many points of its canvas each plot has drawn on.
+# Number of pixels that each plot has drawn.
 INK = """Array.from(document.querySelectorAll('.plot')).map(plot => {
   const canvas = plot.querySelector('canvas');
   const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
@@ -70,6 +70,7 @@ def write_hostile_result(directory):
             out.writerow([k / 10, k / 20, 0.5, "" if k == 10 else 0, 0, 0, -1, 0, 0])
     summary = {"robot": str(directory / "robot.urdf"), "motion": HOSTILE, "termination": HOSTILE,
                "message": "</script>" + HOSTILE, "requested": {HOSTILE: 1}, "command": [HOSTILE],
+               "goals": [None, {"name": HOSTILE, "kind": HOSTILE, "unit": HOSTILE, "asked": 1, "came_out": None}],
                "log_columns": ["iteration", "cost", HOSTILE], "log": [[0, 1, 2], [1, 0.5, 3]],
                "phases": [{"name": HOSTILE, "start_node": 0, "nodes": 10}],
                "ground": {"height": -1.2, "friction": 0.6, "steps": [
@@ -107,6 +108,24 @@ class ReportPage(unittest.TestCase):
     def picture(self, t):
         self.browser.evaluate(f"report.transport.setTime({t})")
         return self.browser.evaluate(PICTURE)
+
+    def test_goals_are_side_by_side(self):
+        self.browser.open(self.squat / "report.html")
+        cells = self.browser.evaluate(
+            "Array.from(document.querySelectorAll('#goals td')).map(cell => cell.textContent)")
+        summary = json.loads((self.squat / "summary.json").read_text())
+        self.assertEqual(cells[:2], ["depth", "0.8"])
+        self.assertAlmostEqual(float(cells[2]), summary["goals"][0]["came_out"], places=3)
+        self.assertEqual(cells[3], "met")
+        summary["goals"][0].update(came_out=0.9, met=False)
+        missed = self.root / "missed"
+        shutil.copytree(self.squat, missed, dirs_exist_ok=True)
+        (missed / "summary.json").write_text(json.dumps(summary))
+        run("report", missed)
+        self.browser.open(missed / "report.html")
+        badges = self.browser.evaluate("Array.from(document.querySelectorAll('.badge.bad')).map(b => b.textContent)")
+        self.assertEqual(badges, ["missed: depth"])
+        self.assertEqual(self.browser.evaluate("document.querySelector('#goals td.fail').textContent"), "MISSED")
 
     def test_replay_moves(self):
         self.browser.open(self.squat / "report.html")

@@ -59,9 +59,11 @@ CheckRow Worst::makeRow(const std::string& name, const std::string& unit, double
 }
 
 bool CheckRow::passed() const {
-  if (kind == Kind::Note || !value) return true;
+  if (kind == Kind::Note || kind == Kind::Goal || !value) return true;
   return kind == Kind::AtMost ? *value <= bound : *value >= bound;  // false for what is not a number
 }
+
+bool CheckRow::isMissedGoal() const { return kind == Kind::Goal && !(value && std::abs(*value - bound) <= tolerance); }
 
 bool CheckReport::passed() const {
   return std::all_of(rows.begin(), rows.end(), [](const CheckRow& row) { return row.passed(); });
@@ -92,35 +94,53 @@ CheckReport checkMotion(const CheckedMotion& motion, const CheckBounds& bounds) 
   addSwingRows(context);
   addForceRows(context);
   addLimitRows(context);
+  addGoalRows(context);
   return report;
 }
 
+namespace {
+
+std::string countRows(std::ptrdiff_t rows, const char* one) {
+  return std::to_string(rows) + " " + one + (rows == 1 ? "" : "s");
+}
+
+void printRow(std::ostream& out, const CheckRow& row) {
+  const bool goal = row.kind == CheckRow::Kind::Goal, judged = row.kind != CheckRow::Kind::Note && row.value;
+  const char* relation = goal ? "== " : row.kind == CheckRow::Kind::AtMost ? "<= " : ">= ";
+  const char* verdict = goal ? (row.isMissedGoal() ? "MISS" : "met") : (row.passed() ? "pass" : "FAIL");
+  out << "  " << std::left << std::setw(34) << row.name << std::right << std::setw(9)
+      << (row.value ? formatNumber(*row.value) : "-") << "  " << std::left << std::setw(12)
+      << (judged ? relation + formatNumber(row.bound) : "") << std::setw(12) << (row.value ? row.unit : "")
+      << std::setw(6) << (judged ? verdict : "") << row.note << "\n";
+}
+
+}  // namespace
+
 void printReport(std::ostream& out, const CheckReport& report, CheckPrint print) {
-  const auto failed =
-      std::count_if(report.rows.begin(), report.rows.end(), [](const auto& row) { return !row.passed(); });
-  out << "check of " << report.motion << ", " << report.robot << ", " << report.nodes << " nodes: "
-      << (failed == 0 ? "passed" : "FAILED by " + std::to_string(failed) + (failed == 1 ? " row" : " rows")) << "\n";
-  for (const CheckRow& row : report.rows) {
-    if (print == CheckPrint::Failures && row.passed()) continue;
-    const bool judged = row.kind != CheckRow::Kind::Note && row.value;
-    const std::string bound = (row.kind == CheckRow::Kind::AtMost ? "<= " : ">= ") + formatNumber(row.bound);
-    out << "  " << std::left << std::setw(34) << row.name << std::right << std::setw(9)
-        << (row.value ? formatNumber(*row.value) : "-") << "  " << std::left << std::setw(12) << (judged ? bound : "")
-        << std::setw(12) << (row.value ? row.unit : "") << std::setw(6)
-        << (judged ? row.passed() ? "pass" : "FAIL" : "") << row.note << "\n";
-  }
+  const auto failed = std::count_if(report.rows.begin(), report.rows.end(), [](const auto& r) { return !r.passed(); });
+  const auto missed =
+      std::count_if(report.rows.begin(), report.rows.end(), [](const auto& r) { return r.isMissedGoal(); });
+  out << "check of " << report.motion << ", " << report.robot << ", " << report.nodes
+      << " nodes: " << (failed == 0 ? "passed" : "FAILED by " + countRows(failed, "row"))
+      << (missed == 0 ? "" : ", " + countRows(missed, "goal") + " missed") << "\n";
+  for (const CheckRow& row : report.rows)
+    if (print == CheckPrint::All || !row.passed() || row.isMissedGoal()) printRow(out, row);
 }
 
 std::string formatReport(const CheckReport& report) {
   using Json = nlohmann::ordered_json;
   Json rows = Json::array();
-  for (const CheckRow& row : report.rows)
+  for (const CheckRow& row : report.rows) {
     rows.push_back({{"name", row.name},
                     {"value", row.value ? Json(*row.value) : Json()},
                     {"bound", row.kind == CheckRow::Kind::Note ? Json() : Json(row.bound)},
                     {"unit", row.unit},
                     {"pass", row.passed()},
                     {"note", row.note}});
+    if (row.kind != CheckRow::Kind::Goal) continue;
+    rows.back()["met"] = !row.isMissedGoal();
+    rows.back()["tolerance"] = row.tolerance;
+  }
   return Json{{"rows", rows}, {"pass", report.passed()}}.dump(2) + "\n";
 }
 

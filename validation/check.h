@@ -57,6 +57,7 @@ struct CheckBounds {
   double point_moment = 1e-9;  ///< N m, on a contact that is a point
   double force_in_air = 1e-9;  ///< N or N m
   double range = 1e-6;         ///< m or rad beyond a limit
+  double goal = 1e-9;          ///< between what the summary tells of a goal and what is measured, in the goal's unit
   /// Of the energy exchanged in the busiest interval. Euler steps lose or gain in the order of h: a squat 1e-2, a take-off
   /// by steps of 5 ms 6e-2.
   double interval_energy = 0.1;
@@ -64,13 +65,17 @@ struct CheckBounds {
 };
 
 struct CheckRow {
-  enum class Kind { AtMost, AtLeast, Note };
+  /// Goal: what came out beside what was asked (`bound`, give or take `tolerance`). Missing it breaks no law of physics,
+  /// so that it is told and the check passes all the same.
+  enum class Kind { AtMost, AtLeast, Note, Goal };
   std::string name;
   Kind kind = Kind::AtMost;
   std::optional<double> value;  ///< none: there was nothing to measure
   double bound = 0;
   std::string unit, note;
-  bool passed() const;
+  double tolerance = 0;  ///< of a goal
+  bool passed() const;   ///< always, for notes and goals
+  bool isMissedGoal() const;
 };
 
 struct CheckReport {
@@ -84,12 +89,12 @@ struct CheckReport {
 /// A trajectory with numbers that are not finite has one row, which says so.
 CheckReport checkMotion(const CheckedMotion& motion, const CheckBounds& bounds = {});
 
-/// The whole table, or its first line and the rows that fail.
+/// The whole table, or its first line, the rows that fail and the goals that are missed.
 enum class CheckPrint { All, Failures };
 void printReport(std::ostream& out, const CheckReport& report, CheckPrint print = CheckPrint::All);
 
 /// {"rows": [{"name", "value", "bound", "unit", "pass", "note"}], "pass"}; a value that was not measured and a bound
-/// that there is not are null.
+/// that there is not are null. Goals have "met" and "tolerance" as well; their bound is what was asked.
 std::string formatReport(const CheckReport& report);
 
 }  // namespace bielle::validation

@@ -54,6 +54,7 @@ void addStanceRows(CheckContext& context);
 void addSwingRows(CheckContext& context);
 void addForceRows(CheckContext& context);
 void addLimitRows(CheckContext& context);
+void addGoalRows(CheckContext& context);
 
 std::string formatNumber(double value);
 

@@ -95,6 +95,7 @@ class Tracer {
       node.gaps.push_back(calcGap(closure, X_12));
       node.gap_rates.push_back(dropFreeAxes(closure, V1 - X_12.actMotion(V2)));
     }
+    node.com = simbody.calcComPosition();
     node.kinetic = simbody.calcKineticEnergy();
     node.potential = simbody.calcPotentialEnergy();
     node.gravity_power = motion_.model.mass() * motion_.model.gravity().dot(simbody.calcComVelocity());

@@ -9,6 +9,7 @@ struct NodeTrace {
   std::vector<Vector6d> foot_twists;  ///< of that frame, in its own coordinates
   std::vector<Vector6d> gaps;  ///< per closure: position and angle vector of frame 2 in frame 1, free axes left out
   std::vector<Vector6d> gap_rates;    ///< the same of its velocity
+  Vector3d com;                       ///< centre of mass, m (world)
   double kinetic = 0, potential = 0;  ///< energies, of bodies and rotors, J
   double gravity_power = 0;           ///< m g . v_com, W
 };

@@ -95,6 +95,10 @@ double SimbodyBridge::calcKineticEnergy() const {
   return s_->system.calcKineticEnergy(s_->state) + 0.5 * s_->model.armature().dot(s_->v.cwiseAbs2());
 }
 
+Vector3d SimbodyBridge::calcComPosition() const {
+  return toEigen(s_->matter.calcSystemMassCenterLocationInGround(s_->state));
+}
+
 Vector3d SimbodyBridge::calcComVelocity() const {
   return toEigen(s_->matter.calcSystemMassCenterVelocityInGround(s_->state));
 }

@@ -53,6 +53,7 @@ class SimbodyBridge {
   SE3 getPlacement(int body) const;    ///< of a body in the world
   Vector6d calcTwist(int body) const;  ///< of a body, in its own frame
   double calcKineticEnergy() const;    ///< J, of the bodies; of the rotors too (diag(armature))
+  Vector3d calcComPosition() const;    ///< of the whole robot, m (world)
   Vector3d calcComVelocity() const;    ///< of the whole robot, m/s (world)
   double calcPotentialEnergy() const;  ///< J, zero for a centre of mass at the origin
   MatrixXd calcMassMatrix() const;     ///< nv x nv, armature included

@@ -47,6 +47,8 @@ MotionResult makeLiftedResult(const RunInfo& run, const Model& closed, const Mot
   motion.name = serial.name;
   motion.ground = serial.ground;
   motion.requested = serial.requested;
+  for (const Goal& goal : serial.goals)  // of a lift that stops early, those that it got to
+    if (goal.last <= static_cast<int>(lifted.trajectory.us.size())) motion.goals.push_back(goal);
   int left = static_cast<int>(lifted.trajectory.us.size());
   for (ContactPhase phase : serial.schedule.phases) {
     phase.nodes = std::min(phase.nodes, left);

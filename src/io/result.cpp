@@ -11,6 +11,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/math/so3.h"
 #include "bielle/model/error.h"
+#include "bielle/motion/footsteps.h"
 #include "io/aside_file.h"
 #include "io/json_text.h"
 #include "io/record_tables.h"
@@ -20,17 +21,15 @@ namespace fs = std::filesystem;
 namespace bielle {
 namespace {
 
-// How far each foot went from where it stood when its contact began.
-void calcSlip(const Motion& motion, const ShootingTrajectory& trajectory, MotionResult& result) {
+// Largest displacement of each foot since its contact began.
+void calcSlip(const Motion& motion, const MotionTrack& track, MotionResult& result) {
   const Model& model = motion.problem->model();
-  Workspace ws(model);
   std::vector<std::optional<SE3>> touch_down(model.contacts().size());
-  for (size_t k = 0; k < trajectory.xs.size(); ++k) {
-    updatePositions(model, ws, trajectory.xs[k].head(model.nq()));
+  for (size_t k = 0; k < track.feet.size(); ++k) {
     std::vector<bool> stands(model.contacts().size(), false);
     for (const ContactTarget& target : motion.schedule.getPhase(static_cast<int>(k)).contacts) {
       const ContactFrame& contact = model.contacts()[target.contact];
-      const SE3 X_WF = getPlacement(ws, contact.body, contact.X_BF);
+      const SE3& X_WF = track.feet[k][target.contact];
       std::optional<SE3>& start = touch_down[target.contact];
       if (!start) start = X_WF;
       const SE3 moved = start->inverseTimes(X_WF);
@@ -81,6 +80,24 @@ Json makeGround(const Ground& ground) {
   return {{"height", ground.height}, {"friction", ground.friction}, {"steps", steps}};
 }
 
+Json makeGoals(const MotionResult& result) {
+  const auto list = [](const Vector3d& p) { return Json{p.x(), p.y(), p.z()}; };
+  Json goals = Json::array();
+  for (const GoalOutcome& outcome : result.goals) {
+    const Goal& goal = outcome.goal;
+    Json json = {{"name", goal.name},    {"kind", getName(goal.kind)},  {"unit", getUnit(goal.kind)},
+                 {"asked", goal.asked},  {"tolerance", goal.tolerance}, {"came_out", outcome.came_out},
+                 {"met", outcome.met()}, {"first_node", goal.first},    {"last_node", goal.last}};
+    if (goal.kind == GoalKind::Speed || goal.kind == GoalKind::Displacement) json["direction"] = list(goal.direction);
+    if (!goal.contacts.empty()) json["contacts"] = goal.contacts;
+    for (const Foothold& foothold : goal.footholds)
+      json["footholds"].push_back(
+          {{"contact", foothold.contact}, {"node", foothold.node}, {"position", list(foothold.position)}});
+    goals.push_back(json);
+  }
+  return goals;
+}
+
 Json makeSummary(const MotionResult& result) {
   const BuildInfo build = getBuildInfo();
   Json log = Json::array();
@@ -94,6 +111,7 @@ Json makeSummary(const MotionResult& result) {
           {"serial_armature", result.run.serial_armature},
           {"formulation", getName(result.formulation)},
           {"command", result.run.command},
+          {"goals", makeGoals(result)},
           {"requested", listByName(result.requested)},
           {"versions", {{"bielle", build.bielle}, {"eigen", build.eigen}, {"compiler", build.compiler}}},
           {"converged", result.converged()},
@@ -118,6 +136,26 @@ Json makeSummary(const MotionResult& result) {
 
 }  // namespace
 
+MotionTrack makeTrack(const Model& model, const MotionRecord& record) {
+  MotionTrack track;
+  track.time.assign(record.time.begin(), record.time.end());
+  track.contacts = record.contact_names;
+  Workspace ws(model);
+  for (Eigen::Index k = 0; k < record.time.size(); ++k) {
+    updatePlacements(model, ws, record.q.row(k).transpose());
+    track.com.push_back(record.com.row(k));
+    track.heading.push_back(calcHeading(ws.X_WB[std::min(1, model.numBodies() - 1)]));
+    track.feet.emplace_back();
+    for (const ContactFrame& contact : model.contacts())
+      track.feet.back().push_back(getPlacement(ws, contact.body, contact.X_BF));
+    if (k == record.contact_wrenches.rows()) break;
+    double load = 0;
+    for (size_t c = 0; c < model.contacts().size(); ++c) load += record.contact_wrenches.block<1, 3>(k, 6 * c).norm();
+    track.load.push_back(load);
+  }
+  return track;
+}
+
 MotionResult makeResult(const RunInfo& run, const Motion& motion, const ShootingTrajectory& trajectory,
                         const FddpSummary& summary) {
   MotionResult result;
@@ -138,7 +176,9 @@ MotionResult makeResult(const RunInfo& run, const Motion& motion, const Shooting
   result.gap_angle = record.gap.col(1).maxCoeff();
   result.com_start = record.com(0, 2);
   result.com_lowest = record.com.col(2).minCoeff();
-  calcSlip(motion, trajectory, result);
+  const MotionTrack track = makeTrack(motion.problem->model(), record);
+  for (const Goal& goal : motion.goals) result.goals.push_back({goal, measureGoal(goal, track)});
+  calcSlip(motion, track, result);
   return result;
 }
 
@@ -163,8 +203,8 @@ std::vector<std::string> writeResult(const std::string& directory, const MotionR
   csv.write(formatCsv(result.record));
   npz.write(formatNpz(result.record));
   summary.write(formatJson(makeSummary(result)) + "\n");
-  // What was there goes first, the summary after all that was made of it, and the new one comes last: whoever is killed here
-  // leaves no mixture of two results.
+  // Files derived from the old summary are removed before it, and the new summary is written last, so that an interruption
+  // never leaves a mixture of two results.
   std::error_code error;
   for (const char* name : {"report.html", "lift.json", "check.json", "summary.json"})
     fs::remove(fs::path(directory) / name, error);

@@ -36,6 +36,26 @@ Ground readGround(const Json& json) {
   return ground;
 }
 
+GoalOutcome readGoal(const Json& json) {
+  GoalOutcome outcome;
+  Goal& goal = outcome.goal;
+  goal.name = json.at("name");
+  goal.kind = parseGoalKind(json.at("kind"));
+  goal.asked = json.at("asked");
+  goal.tolerance = json.at("tolerance");
+  // JSON has no number that is not finite.
+  outcome.came_out =
+      json.at("came_out").is_null() ? std::numeric_limits<double>::quiet_NaN() : json.at("came_out").get<double>();
+  goal.first = readCount(json.at("first_node"));
+  goal.last = readCount(json.at("last_node"));
+  if (json.contains("direction")) goal.direction = readVector(json.at("direction"));
+  if (json.contains("contacts")) goal.contacts = json.at("contacts").get<std::vector<std::string>>();
+  if (json.contains("footholds"))
+    for (const Json& entry : json.at("footholds"))
+      goal.footholds.push_back({entry.at("contact"), readCount(entry.at("node")), readVector(entry.at("position"))});
+  return outcome;
+}
+
 MotionSummary read(const Json& json) {
   MotionSummary summary;
   summary.motion = json.at("motion");
@@ -47,6 +67,8 @@ MotionSummary read(const Json& json) {
   summary.formulation = formulation == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
   summary.converged = json.at("converged");
   for (const auto& [name, value] : json.at("requested").items()) summary.requested.emplace_back(name, value);
+  if (json.contains("goals"))  // older results have none
+    for (const Json& entry : json.at("goals")) summary.goals.push_back(readGoal(entry));
   for (const Json& entry : json.at("phases")) {
     MotionSummary::Phase phase{
         entry.at("name"), readCount(entry.at("start_node")), readCount(entry.at("nodes")), entry.at("time_step_s"), {}};

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// What all stages share.
+// Data common to all stages.
 struct Scene {
   const Model& model;
   const BenchmarkWalkOptions& options;

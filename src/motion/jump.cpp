@@ -9,14 +9,14 @@
 namespace bielle {
 namespace {
 
-// What all stages share.
+// Data common to all stages.
 struct Scene {
   const Model& model;
   const JumpOptions& options;
   JumpFigures figures;
   VectorXd q0;                        // posture at the start
   VectorXd state_weights;             // 2 nv
-  Vector3d com, shift;                // CoM at the start; how far the jump goes
+  Vector3d com, forward, shift;       // CoM at the start; unit vector ahead; how far the jump goes
   std::vector<ContactTarget> before;  // feet where they start and
   std::vector<ContactTarget> after;   // where they land
 };
@@ -122,7 +122,7 @@ StageSpec makeTerminalStage(const Scene& scene) {
 }
 
 Scene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
-  Scene scene{model, o, calcJumpFigures(o, model.gravity().norm()), q0, makeStateWeights(model), {}, {}, {}, {}};
+  Scene scene{model, o, calcJumpFigures(o, model.gravity().norm()), q0, makeStateWeights(model), {}, {}, {}, {}, {}};
   if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3).setConstant(o.torso_weight);
   raiseMotorWeights(model, o.motor_weight, scene.state_weights);
   std::vector<int> feet;
@@ -132,7 +132,8 @@ Scene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
   scene.after = scene.before;
   Vector3d forward = Vector3d::Zero();
   for (const ContactTarget& foot : scene.before) forward += foot.X_WT.R.col(0);
-  scene.shift = o.length * Vector3d(forward.x(), forward.y(), 0).normalized();
+  scene.forward = Vector3d(forward.x(), forward.y(), 0).normalized();
+  scene.shift = o.length * scene.forward;
   for (ContactTarget& foot : scene.after) foot.X_WT.p += scene.shift;
   Workspace ws(model);
   updatePositions(model, ws, scene.q0);
@@ -154,6 +155,17 @@ VectorXd makeGuess(const Scene& scene, Phase phase, double t) {
   const Vector3d velocity = scene.shift / f.flight + (f.take_off - g * t) * Vector3d::UnitZ();
   x.segment<3>(model.nq()) = Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(&scene.q0[3])).conjugate() * velocity;
   return x;
+}
+
+std::vector<Goal> makeGoals(const Scene& scene, int nodes) {
+  const JumpOptions& o = scene.options;
+  const double height = o.stretch + scene.figures.rise;  // Eq. (1)
+  Goal length{GoalKind::Displacement, "length", o.length, calcTolerance(o.length, 0.01), 0, nodes};
+  length.direction = scene.forward;
+  length.contacts = getContactNames(scene.model, scene.before);
+  return {{GoalKind::FlightTime, "flight", o.flight, calcTolerance(o.flight, 0), 0, nodes},
+          {GoalKind::Rise, "height", height, calcTolerance(height, 0.01), 0, nodes},
+          length};
 }
 
 void check(const Model& model, const JumpOptions& o) {
@@ -305,6 +317,7 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
   plan.q_end = carryPosture(model, q0, {Matrix3d::Identity(), scene.shift});
   JumpOptions copy = options;
   plan.requested = listValues(listOptions(copy));
+  plan.goals = makeGoals(scene, plan.schedule.numStages());
   return plan;
 }
 

@@ -12,7 +12,7 @@
 namespace bielle {
 namespace {
 
-// What all stages share.
+// Data common to all stages.
 struct Scene {
   const Model& model;
   const Stance& stance;
@@ -54,7 +54,7 @@ Gait makeStartingGait(const Model& model, const Stance& stance, const Locomotion
   }
 }
 
-// What no choice of motor torques can do.
+// Rejects requests that no motor torques can satisfy.
 void check(const Scene& scene) {
   constexpr double kStretch = 1.15, kCrouch = 0.6;  // of the legs, over their length in the standing posture
   const Model& model = scene.model;
@@ -222,6 +222,31 @@ StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector
   return stage;
 }
 
+// First nodes of the phases in which a foot has come down.
+std::vector<int> listLandings(const ContactSchedule& schedule) {
+  std::vector<int> landings;
+  size_t standing = schedule.phases.front().contacts.size();
+  int node = 0;
+  for (const ContactPhase& phase : schedule.phases) {
+    if (phase.dt > 0 && phase.contacts.size() > standing) landings.push_back(node);
+    if (phase.dt > 0) standing = phase.contacts.size();
+    node += phase.nodes;
+  }
+  return landings;
+}
+
+std::vector<Goal> makeFootholdGoals(const Scene& scene, const ContactSchedule& schedule) {
+  constexpr double kTolerance = 0.01;  // m
+  if (scene.options.landing_foothold_weight == 0) return {};
+  Goal goal{GoalKind::Footholds, "footholds", 0, kTolerance, 0, schedule.numStages()};
+  const std::vector<int> landings = listLandings(schedule);
+  const std::vector<Footstep>& steps = scene.task.plan.steps;
+  for (size_t i = 0; i < std::min(steps.size(), landings.size()); ++i)
+    goal.footholds.push_back({scene.model.contacts()[scene.stance.contacts[static_cast<int>(steps[i].side)]].name,
+                              landings[i], steps[i].X_WF.p});
+  return {goal};
+}
+
 // The standing posture, carried along.
 VectorXd makeGuess(const Scene& scene, const GaitNode& node) {
   const Model& model = scene.model;
@@ -321,6 +346,17 @@ void setPaperWeights(LocomotionOptions& o) {
   o.closure_kp = o.closure_kd = 0;
 }
 
+std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, const Vector3d& direction,
+                                 int steps_per_cycle) {
+  const std::vector<int> landings = listLandings(schedule);
+  const int cycles = (static_cast<int>(landings.size()) - 2) / steps_per_cycle;
+  if (cycles < 1) return {};
+  Goal goal{
+      GoalKind::Speed, "speed", speed, calcTolerance(speed, 0.02), landings[0], landings[cycles * steps_per_cycle]};
+  goal.direction = direction;
+  return {goal};
+}
+
 Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0) {
   if (!model.hasFreeFlyer())
     throw ModelError(model.name(), "root joint", "the robot cannot walk, its base is fixed",
@@ -373,6 +409,7 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   plan.guess.xs.push_back(makeGuess(scene, scene.gait.nodes.back()));
   const auto end = task.plan.getStance(static_cast<int>(task.plan.steps.size()));
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
+  plan.goals = makeFootholdGoals(scene, plan.schedule);
   plan.q_start = stance.q;
   plan.q_end = carryPosture(model, stance.q, calcMiddle(end[0], end[1]) * start.inverse());
   return plan;

@@ -46,6 +46,7 @@ Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& opt
                                                   std::move(plan.stages), options.formulation);
   motion.guess = std::move(plan.guess);
   motion.requested = std::move(plan.requested);
+  motion.goals = std::move(plan.goals);
   return motion;
 }
 
@@ -102,6 +103,12 @@ std::vector<ContactTarget> makeContactTargets(const Model& model, ConstVectorRef
   for (int c : contacts)
     targets.push_back({c, getPlacement(ws, model.contacts()[c].body, model.contacts()[c].X_BF), kp, kd});
   return targets;
+}
+
+std::vector<std::string> getContactNames(const Model& model, const std::vector<ContactTarget>& targets) {
+  std::vector<std::string> names;
+  for (const ContactTarget& target : targets) names.push_back(model.contacts()[target.contact].name);
+  return names;
 }
 
 VectorXd makeStateWeights(const Model& model) {

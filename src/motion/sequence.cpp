@@ -12,7 +12,8 @@ namespace {
 constexpr double kSameLevel = 1e-6;  // m
 constexpr double kRim = 0.01;        // of a platform around the soles, m
 
-// What carries the soles that stand on a plan's plane once the plane lies lower: their bounding box, along the first one.
+// The platform under soles that stood on the plane of a plan when the common plane is lower: their bounding box, aligned with
+// the first sole.
 // \pre a sole stands there
 GroundStep makePlatform(const Model& model, const std::vector<ContactTarget>& soles) {
   const SE3& first = soles.front().X_WT;
@@ -101,6 +102,14 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
   sequence.q_end = plans.back().q_end;
   for (size_t i = 0; i < plans.size(); ++i) {
     MotionPlan& plan = plans[i];
+    const int start = sequence.schedule.numStages();
+    for (Goal& goal : plan.goals) {
+      goal.name = plan.name + "." + goal.name;
+      goal.first += start;
+      goal.last += start;
+      for (Foothold& foothold : goal.footholds) foothold.node += start;
+      sequence.goals.push_back(std::move(goal));
+    }
     if (i + 1 < plans.size()) plan.stages.pop_back();
     moveAll(plan.stages, sequence.stages);
     join(plan.guess, sequence.guess);

@@ -115,6 +115,9 @@ MotionPlan planSquat(const Model& model, const SquatOptions& options, const Vect
   plan.q_start = plan.q_end = q0;
   SquatOptions copy = options;
   plan.requested = listValues(listOptions(copy));
+  Goal depth{GoalKind::Height, "depth", options.depth, calcTolerance(1 - options.depth, 0.01), 0, nodes};
+  depth.contacts = getContactNames(model, contacts);
+  plan.goals = {depth};
   return plan;
 }
 

@@ -40,6 +40,13 @@ FootstepPlan planFootholds(const Stance& stance, const StairsOptions& o, int sta
   return plan;
 }
 
+Goal makeClimbGoal(const Model& model, const Stance& stance, double height, int nodes) {
+  Goal goal{GoalKind::Displacement, "climb", height, calcTolerance(height, 0.01), 0, nodes};
+  goal.direction = Vector3d::UnitZ();
+  for (int contact : stance.contacts) goal.contacts.push_back(model.contacts()[contact].name);
+  return goal;
+}
+
 }  // namespace
 
 LocomotionOptions StairsOptions::makeGaitDefaults() {
@@ -102,6 +109,9 @@ MotionPlan planStairs(const Model& model, const StairsOptions& options, const Ve
   task.com_velocity = start.R * Vector3d(o.speed, 0, 0);
   MotionPlan plan = planLocomotion(model, stance, task, o.gait);
   plan.requested = listValues(listOptions(o));
+  const std::vector<Goal> speed = makeSpeedGoals(plan.schedule, o.speed, start.R.col(0));
+  plan.goals.insert(plan.goals.begin(), speed.begin(), speed.end());
+  plan.goals.insert(plan.goals.begin(), makeClimbGoal(model, stance, stairs * o.height, plan.schedule.numStages()));
   return plan;
 }
 

@@ -7,10 +7,16 @@
 namespace bielle {
 namespace {
 
+// A motion of steps on level ground, and the stance that it starts from.
+struct StepsPlan {
+  MotionPlan motion;
+  SE3 start;  // middle of the feet
+};
+
 // \param velocity  in the axes of the feet at the start
 template <typename Options>
-MotionPlan planSteps(const Model& model, const char* name, const StepCommand& command, const Vector3d& velocity,
-                     Side first, const Options& options, const VectorXd& q0) {
+StepsPlan planSteps(const Model& model, const char* name, const StepCommand& command, const Vector3d& velocity,
+                    Side first, const Options& options, const VectorXd& q0) {
   const int steps = countSteps("steps", options.steps);
   const Stance stance = makeStance(model, options.gait, q0);
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
@@ -22,7 +28,11 @@ MotionPlan planSteps(const Model& model, const char* name, const StepCommand& co
   MotionPlan plan = planLocomotion(model, stance, task, options.gait);
   Options copy = options;
   plan.requested = listValues(listOptions(copy));
-  return plan;
+  return {std::move(plan), start};
+}
+
+void addGoals(std::vector<Goal> goals, MotionPlan& plan) {
+  plan.goals.insert(plan.goals.begin(), goals.begin(), goals.end());
 }
 
 std::vector<OptionEntry> join(std::vector<OptionEntry> entries, LocomotionOptions& gait) {
@@ -61,21 +71,28 @@ void setPaperWeights(SideWalkOptions& o) {
 }
 
 MotionPlan planWalk(const Model& model, const WalkOptions& o, const VectorXd& q0) {
-  return planSteps(model, "walk", {o.speed * o.gait.timing.stepDuration(), 0, 0}, Vector3d(o.speed, 0, 0), Side::Right,
-                   o, q0);
+  StepsPlan plan = planSteps(model, "walk", {o.speed * o.gait.timing.stepDuration(), 0, 0}, Vector3d(o.speed, 0, 0),
+                             Side::Right, o, q0);
+  addGoals(makeSpeedGoals(plan.motion.schedule, o.speed, plan.start.R.col(0)), plan.motion);
+  return std::move(plan.motion);
 }
 
 MotionPlan planSideWalk(const Model& model, const SideWalkOptions& o, const VectorXd& q0) {
-  return planSteps(model, "side-walk", {0, o.speed * o.gait.timing.stepDuration(), 0}, Vector3d(0, o.speed, 0),
-                   o.speed > 0 ? Side::Left : Side::Right, o, q0);
+  StepsPlan plan = planSteps(model, "side-walk", {0, o.speed * o.gait.timing.stepDuration(), 0},
+                             Vector3d(0, o.speed, 0), o.speed > 0 ? Side::Left : Side::Right, o, q0);
+  addGoals(makeSpeedGoals(plan.motion.schedule, o.speed, plan.start.R.col(1), 2), plan.motion);
+  return std::move(plan.motion);
 }
 
 MotionPlan planTurn(const Model& model, const TurnOptions& o, const VectorXd& q0) {
   if (!(o.radius >= 0))
     throw ModelError("", "option 'radius'", "it is negative", "give metres, and a negative angle to turn to the right");
   const double yaw = o.angle / std::max(1, countSteps("steps", o.steps) - 1);
-  return planSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(),
-                   yaw > 0 ? Side::Left : Side::Right, o, q0);
+  StepsPlan plan = planSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(),
+                             yaw > 0 ? Side::Left : Side::Right, o, q0);
+  const int nodes = plan.motion.schedule.numStages();
+  addGoals({{GoalKind::Turn, "angle", o.angle, calcTolerance(o.angle, 0.02), 0, nodes}}, plan.motion);
+  return std::move(plan.motion);
 }
 
 Motion makeWalk(const Model& model, const WalkOptions& options, const ProblemOptions& problem) {

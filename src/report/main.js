@@ -82,11 +82,12 @@ class Report {
   }
 
   fillPanels(json) {
+    fillGoals(document.getElementById('goals'), this.runs);
     fillSummary(document.getElementById('summary'), this.runs);
     fillCheck(document.getElementById('check'), this.runs);
     this.plots = new Plots(document.getElementById('plots'), this.runs, t => this.transport.setTime(t));
     fillIterations(document.getElementById('iterations'), this.runs);
-    fillAsked(document.getElementById('asked'), this.runs);
+    fillOptions(document.getElementById('options'), this.runs);
     document.getElementById('footer').textContent = 'Made by Bielle ' + json.bielle +
         '. Drawn with three.js and dygraphs (both MIT licence). Drag in a plot to zoom, double-click to see all, click to go there; ' +
         'drag the robot to turn it, with the right button to move it. Space plays, arrows step.';

@@ -1,5 +1,5 @@
 'use strict';
-// What was asked and what came out, in words and numbers.
+// Tables of goals, results, checks and options.
 
 function addTable(parent, head, rows) {
   const table = addElement(addElement(parent, 'div', 'scroll'), 'table');
@@ -30,14 +30,39 @@ function makeTitle(runs) {
   return Array.from(new Set(names)).join(' · ');
 }
 
+// Goals of a run: what was asked and what came out.
+function getGoals(run) {
+  const goals = Array.isArray(run.summary.goals) ? run.summary.goals : [];
+  return goals.filter(goal => goal && typeof goal === 'object');
+}
+
 function fillBadges(parent, runs) {
   for (const run of runs) {
     const text = (runs.length > 1 ? run.label + ': ' : '') + (run.summary.termination || 'unknown');
     addElement(parent, 'span', 'badge ' + (run.summary.converged ? 'good' : 'bad'), text);
+    const missed = getGoals(run).filter(goal => !goal.met).map(goal => goal.name);
+    if (missed.length) addElement(parent, 'span', 'badge bad', 'missed: ' + missed.join(', '));
     if (run.check)
       addElement(
           parent, 'span', 'badge ' + (run.check.pass ? 'good' : 'bad'),
           run.check.pass ? 'check passed' : 'check failed');
+  }
+}
+
+// Asked and came out side by side.
+function fillGoals(parent, runs) {
+  for (const run of runs.filter(r => getGoals(r).length)) {
+    parent.hidden = false;
+    if (runs.length > 1) addElement(parent, 'h2', '', run.label);
+    const withUnit = (value, goal) =>
+        typeof value === 'number' ? formatNumber(value) + (goal.unit === '1' ? '' : ' ' + goal.unit) : '–';
+    const rows = getGoals(run).map(
+        goal =>
+            [goal.name,
+             goal.kind === 'footholds' ? 'within ' + withUnit(goal.tolerance, goal) : withUnit(goal.asked, goal),
+             withUnit(goal.came_out, goal),
+             {text: goal.met ? 'met' : 'MISSED', className: goal.met ? 'pass' : 'fail'}]);
+    addTable(parent, ['', 'asked', 'came out', ''], rows);
   }
 }
 
@@ -68,6 +93,12 @@ function fillSummary(parent, runs) {
   addTable(parent, runs.length > 1 ? ['', ...runs.map(run => run.label)] : null, rows);
 }
 
+// Goals are met or missed, bounds hold or fail, notes are not judged.
+function describeVerdict(row) {
+  if (row.met !== undefined) return {text: row.met ? 'met' : 'MISSED', className: row.met ? 'pass' : 'fail'};
+  return {text: row.pass ? 'pass' : 'FAIL', className: row.pass ? 'pass' : 'fail'};
+}
+
 function fillCheck(parent, runs) {
   for (const run of runs.filter(r => r.check)) {
     parent.hidden = false;
@@ -76,8 +107,7 @@ function fillCheck(parent, runs) {
                      .map(
                          row =>
                              [row.name, row.value, row.bound === null || row.bound === undefined ? '–' : row.bound,
-                              row.unit || '', {text: row.pass ? 'pass' : 'FAIL', className: row.pass ? 'pass' : 'fail'},
-                              row.note || '']);
+                              row.unit || '', describeVerdict(row), row.note || '']);
     addTable(parent, ['what', 'value', 'bound', 'unit', '', ''], rows);
   }
 }
@@ -106,7 +136,7 @@ function fillIterations(parent, runs) {
   });
 }
 
-function fillAsked(parent, runs) {
+function fillOptions(parent, runs) {
   const names = Array.from(new Set([].concat(...runs.map(run => Object.keys(run.summary.requested || {})))));
   addTable(
       parent, runs.length > 1 ? ['', ...runs.map(run => run.label)] : null,

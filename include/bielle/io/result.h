@@ -1,5 +1,5 @@
 #pragma once
-/// \file What a solve gave, as three files in a directory.
+/// \file The result of a solve, as three files in a directory.
 #include <string>
 #include <vector>
 
@@ -7,7 +7,7 @@
 
 namespace bielle {
 
-/// How the motion was asked for.
+/// The request that led to a motion.
 struct RunInfo {
   std::string robot;                 ///< name or path, as given
   std::string robot_file;            ///< its .urdf, absolute
@@ -21,6 +21,7 @@ struct MotionResult {
   std::string motion;
   Formulation formulation = Formulation::Full;
   std::vector<std::pair<std::string, double>> requested;  ///< every option by name
+  std::vector<GoalOutcome> goals;                         ///< what was asked and what came out
   ContactSchedule schedule;
   Ground ground;
   FddpSummary solver;
@@ -28,21 +29,24 @@ struct MotionResult {
 
   std::vector<std::pair<std::string, double>> peak_torques;  ///< largest |u| by motor, largest first, N m or N
   double gap_position = 0, gap_angle = 0;                    ///< largest closing error of the motion, m and rad
-  double slip_position = 0, slip_angle = 0;  ///< farthest a foot went from where it touched down, m and rad
+  double slip_position = 0, slip_angle = 0;  ///< largest displacement of a foot from its touchdown, m and rad
   double com_start = 0, com_lowest = 0;      ///< height of the centre of mass, m
 
   bool converged() const { return solver.termination == FddpTermination::Converged; }
   bool interrupted() const { return solver.termination == FddpTermination::Interrupted; }
 };
 
+/// The quantities that goal.h measures, from a record of the model's motion.
+MotionTrack makeTrack(const Model& model, const MotionRecord& record);
+
 MotionResult makeResult(const RunInfo& run, const Motion& motion, const ShootingTrajectory& trajectory,
                         const FddpSummary& summary);
 
-/// What the summary.json of a result tells of the motion.
+/// The motion as the summary.json of a result describes it.
 struct MotionSummary {
   struct Stance {
     std::string contact;
-    SE3 X_WT;  ///< where its frame belongs
+    SE3 X_WT;  ///< desired placement of its frame
   };
   struct Phase {
     std::string name;
@@ -57,6 +61,7 @@ struct MotionSummary {
   Formulation formulation = Formulation::Full;
   bool converged = false;
   std::vector<std::pair<std::string, double>> requested;
+  std::vector<GoalOutcome> goals;
   std::vector<Phase> phases;
   Ground ground;
 };
@@ -64,15 +69,15 @@ struct MotionSummary {
 /// \throws ModelError naming the file, the entry and what is wrong with it
 MotionSummary readSummary(const std::string& directory);
 
-/// Creates the directory, with its parents, and makes sure that files can be written there.
+/// Creates the directory with its parents and verifies that files can be written there.
 /// \throws ModelError naming the directory and why
 void makeOutputDirectory(const std::string& directory);
 
-/// Writes trajectory.csv, trajectory.npz and summary.json. Each is written aside and renamed when all are whole,
+/// Writes trajectory.csv, trajectory.npz and summary.json to temporary files, which are renamed when all are complete,
 /// summary.json last. Returns their paths. \throws ModelError naming the file and why
 std::vector<std::string> writeResult(const std::string& directory, const MotionResult& result);
 
-/// Versions this library was built from and with.
+/// Versions of this library, of Eigen and of the compiler.
 struct BuildInfo {
   std::string bielle, eigen, compiler;
 };

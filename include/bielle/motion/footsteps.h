@@ -1,10 +1,10 @@
 #pragma once
-/// \file Where the feet go: a sequence of footholds, and what can be said of it without dynamics.
+/// \file A sequence of footholds, and the properties that follow from geometry alone.
 ///
 /// A walk is commanded by the displacement of the middle frame P of the two feet per step, in its own axes,
 ///     P_i = P_{i-1} D_i,    D_i = Rz(yaw / 2) (forward, lateral) Rz(yaw / 2)                                    (1)
-/// and the foot of step i lands where it would stand about P_i in the starting posture. A lateral displacement is made
-/// whole by every other step: the foot on that side opens the stance by twice the amount, the other one closes it. The
+/// and the foot of step i lands where it would stand about P_i in the starting posture. Every other step makes the lateral
+/// displacement of two: the foot on that side opens the stance by twice the amount, and the other foot closes it. The
 /// last step brings the feet together.
 #include <array>
 #include <string>
@@ -28,7 +28,7 @@ struct Footstep {
 /// \throws ModelError when it is no whole number from 2 to 200
 int countSteps(const std::string& option, double value);
 
-/// The two feet where they stand, and the steps they take in turn.
+/// The initial placements of the two feet and the steps they take in turn.
 struct FootstepPlan {
   std::array<SE3, 2> start;  ///< left, right
   std::vector<Footstep> steps;

@@ -1,13 +1,13 @@
 #pragma once
-/// \file From footholds and durations to what body and feet should do at every node.
+/// \file From footholds and durations to the desired motion of body and feet at every node.
 ///
 /// - The swing foot follows a path with zero velocity at both ends: horizontally a quintic, vertically up to an apex
-///   over the higher end and down again (flat, its heading turning along).
-/// - The weight passes linearly from foot to foot in double support.
+///   over the higher end and down again; the foot stays flat while its heading turns.
+/// - In double support the weight shifts linearly from foot to foot.
 /// - The centre of mass is that of the linear inverted pendulum whose zero-moment point p goes with the weight: with z the
 ///   height of the CoM over the feet, g gravity and h the time step,
 ///       c_k - z / (g h^2) (c_{k-1} - 2 c_k + c_{k+1}) = p_k,    c_0 and c_N given                                 (1)
-///   a tridiagonal system for its only solution that does not run away (Kajita et al., "Biped walking pattern
+///   a tridiagonal system for its only bounded solution (Kajita et al., "Biped walking pattern
 ///   generation by using preview control", ICRA 2003, where (1) is the table-cart model). At touchdown it is
 ///   as high over the lower foot as at the start, and rises or falls evenly in between.
 #include "bielle/motion/footsteps.h"
@@ -19,7 +19,7 @@ struct GaitTiming {
   double single = 0.36;      ///< single support, s
   double both = 0.045;       ///< double support between steps, s
   double end = 0.45;         ///< double support after the last step, s
-  double time_step = 0.012;  ///< s; feet sink by it times the square of the joint speeds
+  double time_step = 0.012;  ///< s; Euler error sinks the feet in proportion to time_step x joint speed^2
 
   double stepDuration() const { return single + both; }  ///< s
 };
@@ -56,7 +56,7 @@ struct Gait {
 };
 
 /// \param com  centre of mass at the start, m
-/// \throws ModelError on durations that make no sense
+/// \throws ModelError on impossible durations
 Gait makeGait(const FootstepPlan& plan, const GaitTiming& timing, const SwingShape& shape, const Vector3d& com,
               double gravity);
 

@@ -1,8 +1,8 @@
 #pragma once
 /// \file The jump of the paper (its section IV-B): stand, push, fly for a given time, land, settle.
 ///
-/// In flight the centre of mass is a thrown stone. It takes the time T between take-off and touchdown at the same height
-/// z1, so that (the paper deduces the height from the time)
+/// In flight the centre of mass follows a ballistic parabola. The time T between take-off and touchdown at the same height
+/// z1 determines speed and height (as in the paper)
 ///     v0 = g T / 2,    z(T / 2) = z1 + g T^2 / 8,    z1 = z0 + `stretch`,                                      (1)
 /// with z0 the height at the start. While pushing, for D seconds, it follows the polynomial of fifth degree that leaves z0
 /// at rest and arrives at z1 with v0, both without acceleration: down first, then up; while landing, its mirror image.
@@ -16,8 +16,8 @@
 /// - height of the CoM: at mid-flight (over h; the paper asks for no more), and less so on the ground;
 /// - feet on the ground: force by Eq. (2), shared evenly, centre of pressure, friction pyramid;
 /// - feet in flight: placement by Eq. (3);
-/// - touchdown, at the first node of the landing: placement and velocity of the feet, over h. The velocity is asked to
-///   vanish: the legs fold as fast as the body falls.
+/// - touchdown, at the first node of the landing: placement and velocity of the feet, over h. The desired velocity is zero:
+///   the legs fold as fast as the body falls.
 /// The terminal node has the velocities, the posture, and the centre of mass over the feet as at the start.
 #include "bielle/motion/motion.h"
 
@@ -25,7 +25,7 @@ namespace bielle {
 
 struct JumpOptions {
   double flight = 0.3;       ///< time in the air, s; rounded to an even number of time steps
-  double length = 0;         ///< how far ahead the feet land, m
+  double length = 0;         ///< distance ahead at which the feet land, m
   double stand = 0.15;       ///< before the push, s
   double push = 0.3;         ///< D, s
   double land = 0.3;         ///< s

@@ -5,9 +5,9 @@
 /// - Ranges of joints with one degree of freedom, and velocities of motors, by barriers. With s the scale of a limit (half
 ///   the width of the range, 1 when it is open on one side; the velocity limit) and r the coordinate, either
 ///       quadratic:    1/2 w (excess of r / s over bounds drawn in by `quadratic_margin`)^2,                    (1)
-///   nothing inside and soft outside; what the softness yields stays within the margin; or
+///   zero inside and soft outside, where violations stay within the margin; or
 ///       logarithmic:  -w (ln(distance to a bound / (margin s))), relaxed nearer than margin s (cost.h),        (2)
-///   which keeps away from the bounds, at the price of pulling on everything inside.
+///   which keeps away from the bounds but also acts on all values inside them.
 #include <map>
 #include <string>
 #include <vector>
@@ -19,7 +19,7 @@ namespace bielle {
 enum class LimitBarrier { None, Quadratic, Logarithmic };
 
 struct LimitOptions {
-  LimitBarrier barrier = LimitBarrier::None;  ///< None: no limit counts, torques neither
+  LimitBarrier barrier = LimitBarrier::None;  ///< None: all limits, including torque, are ignored
   double quadratic_weight = 1e5;              ///< w of Eq. (1), 1
   double quadratic_margin = 0.01;             ///< of Eq. (1), 1
   double logarithmic_weight = 1;              ///< w of Eq. (2), 1
@@ -31,10 +31,10 @@ struct LimitOptions {
 };
 
 /// Sets the effort limits of the stages and adds the barriers to them.
-/// \throws ModelError when there is no such motor, or a limit is not positive
+/// \throws ModelError when there is no such motor, a limit is not positive, or the range of a joint has no width
 void addLimits(const Model& model, const LimitOptions& options, std::vector<StageSpec>& stages);
 
-/// What a problem is made with, besides the motion itself.
+/// Options of a problem besides those of the motion.
 struct ProblemOptions {
   Formulation formulation = Formulation::Reduced;
   LimitOptions limits;

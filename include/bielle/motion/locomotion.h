@@ -77,7 +77,7 @@ struct Stance {
 /// The stance in a closed posture q0. \throws ModelError when the robot lacks a foot
 Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0);
 
-/// What is to be done.
+/// The steps to take and the ground to take them on.
 struct LocomotionTask {
   std::string name;
   FootstepPlan plan;
@@ -85,6 +85,13 @@ struct LocomotionTask {
   Vector3d com_velocity = Vector3d::Zero();  ///< at steady steps, m/s
 };
 
+/// Mean speed of the centre of mass over the steady steps, from the first landing to the last one but one that lies a
+/// whole number of cycles of `steps_per_cycle` steps later: motions start and end at rest. None when there is no such
+/// landing. \param direction  unit vector, world
+std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, const Vector3d& direction,
+                                 int steps_per_cycle = 1);
+
+/// Its goals are the footholds, unless the costs leave them free.
 /// \throws ModelError when the request is impossible: footholds out of the legs' reach, soles that collide, durations
 MotionPlan planLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
                           const LocomotionOptions& options);

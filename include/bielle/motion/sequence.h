@@ -1,9 +1,9 @@
 #pragma once
 /// \file Motions one after the other, as one optimal control problem.
 ///
-/// Each motion starts from the standing posture that the one before ends in; of the terminal costs only those of the last
-/// one are kept, so that a motion may lean into the next. The ground has the steps of all, its plane is the lowest of
-/// theirs: what happens higher stands on platforms under the soles.
+/// Each motion starts from the standing posture in which the previous one ends. Only the last motion keeps its terminal
+/// costs, so that the others need not come to rest. The ground has the steps of all motions and the lowest of their planes;
+/// soles that stand higher rest on platforms.
 #include <functional>
 
 #include "bielle/motion/motion.h"
@@ -21,13 +21,13 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
 struct PartsOptions {
   ProblemOptions problem;
   FddpOptions solver;
-  FddpObserver observer;                                                            ///< watches every solve
-  std::function<void(const std::string& part, const FddpSummary& summary)> report;  ///< is told how each one ended
+  FddpObserver observer;                                                            ///< of every solve
+  std::function<void(const std::string& part, const FddpSummary& summary)> report;  ///< receives the outcome of each
 };
 
-/// A guess for the sequence: each motion solved by itself. From a quasi-static guess a long sequence may stop half-way,
-/// since one step length moves all motions at the pace of the hardest, and leaves the others with open gaps for long.
-/// Parts that do not converge contribute what they came to.
+/// An initial guess for the sequence: each motion solved separately. From a quasi-static guess a long sequence may fail to
+/// converge, because one step length applies to all motions, so that the hardest one slows the closing of all gaps.
+/// Parts that do not converge contribute their last iterate.
 ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
                               const PartsOptions& options = {});
 

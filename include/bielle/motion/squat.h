@@ -29,7 +29,7 @@ struct SquatOptions {
 /// Every number of the options by name, pointing into `options`.
 std::vector<OptionEntry> listOptions(SquatOptions& options);
 
-/// Squat on all contacts of the robot, from the standing posture q0.
+/// A squat on all contacts of the robot, from the standing posture q0.
 /// \throws ModelError when the request is impossible (depth, durations, no contact)
 MotionPlan planSquat(const Model& model, const SquatOptions& options, const VectorXd& q0);
 Motion makeSquat(const Model& model, const SquatOptions& options = {}, const ProblemOptions& problem = {});

@@ -1,0 +1,239 @@
+// Goals and their outcomes: each kind by hand, then on solved motions and on trajectories that miss.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <stdexcept>
+
+#include "bielle/io/result.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/jump.h"
+#include "bielle/motion/sequence.h"
+#include "bielle/motion/squat.h"
+#include "bielle/motion/stairs.h"
+#include "bielle/motion/walk.h"
+
+using namespace bielle;
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// Two feet, eleven nodes, 0.1 s apart.
+MotionTrack makeTrackOfTwoFeet() {
+  MotionTrack track;
+  track.contacts = {"left", "right"};
+  for (int k = 0; k <= 10; ++k) {
+    track.time.push_back(0.1 * k);
+    track.com.emplace_back(0.03 * k, 0, 0.5);
+    track.heading.push_back(0);
+    track.feet.push_back({SE3(), SE3()});
+    if (k < 10) track.load.push_back(100);
+  }
+  return track;
+}
+
+Goal makeGoal(GoalKind kind, double asked, double tolerance, int first = 0, int last = 10) {
+  return {kind, getName(kind), asked, tolerance, first, last};
+}
+
+const Model& getBipetto() {
+  static const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto").model;
+  return model;
+}
+
+MotionResult solve(Motion motion) {
+  const FddpSummary summary = Fddp().solve(*motion.problem, motion.guess);
+  return makeResult({"bipetto", "", {}}, motion, motion.guess, summary);
+}
+
+const GoalOutcome& find(const MotionResult& result, const std::string& name) {
+  for (const GoalOutcome& outcome : result.goals)
+    if (outcome.goal.name == name) return outcome;
+  throw std::runtime_error("there is no goal '" + name + "'");
+}
+
+}  // namespace
+
+TEST_CASE("goals: the mean speed is that between two nodes, along a direction") {
+  MotionTrack track = makeTrackOfTwoFeet();
+  Goal goal = makeGoal(GoalKind::Speed, 0.3, 0.015, 2, 8);
+  CHECK(measureGoal(goal, track) == Approx(0.3));
+  track.com[0].x() = -5;  // before the steady part
+  track.com[5].x() = 9;   // it is a mean, what happens between does not count
+  CHECK(measureGoal(goal, track) == Approx(0.3));
+  goal.direction = Vector3d(0.6, 0.8, 0);
+  CHECK(measureGoal(goal, track) == Approx(0.18));
+}
+
+TEST_CASE("goals: a height is over the soles, and is the one farthest from the first") {
+  MotionTrack track = makeTrackOfTwoFeet();
+  for (auto& feet : track.feet)
+    for (SE3& foot : feet) foot.p.z() = 0.1;
+  Goal goal = makeGoal(GoalKind::Height, 0.7, 0.01);
+  goal.contacts = track.contacts;
+  CHECK(measureGoal(goal, track) == 1);
+  track.com[5].z() = 0.38;
+  CHECK(measureGoal(goal, track) == Approx(0.7));
+  track.com[6].z() = 0.66;  // 0.16 up outweighs 0.12 down
+  CHECK(measureGoal(goal, track) == Approx(1.4));
+  goal.last = 5;
+  CHECK(measureGoal(goal, track) == Approx(0.7));
+  CHECK(measureGoal(makeGoal(GoalKind::Rise, 0.2, 0.01), track) == Approx(0.16));
+}
+
+TEST_CASE("goals: time in the air counts stages without any force, by their own lengths") {
+  MotionTrack track = makeTrackOfTwoFeet();
+  const Goal goal = makeGoal(GoalKind::FlightTime, 0.3, 0.01);
+  CHECK(measureGoal(goal, track) == 0);
+  for (int k : {3, 4, 5}) track.load[k] = 0;
+  CHECK(measureGoal(goal, track) == Approx(0.3));
+  track.time[6] += 0.05;
+  CHECK(measureGoal(goal, track) == Approx(0.35));
+  track.load[4] = 1e-12;
+  CHECK(measureGoal(goal, track) == Approx(0.25));
+}
+
+TEST_CASE("goals: an angle is counted over full turns") {
+  MotionTrack track = makeTrackOfTwoFeet();
+  for (int k = 0; k <= 10; ++k) track.heading[k] = std::remainder(1.0 + 0.8 * k, 2 * kPi);
+  CHECK(measureGoal(makeGoal(GoalKind::Turn, 8, 0.1), track) == Approx(8));
+}
+
+TEST_CASE("goals: feet are displaced on average, and stand a distance from their footholds") {
+  MotionTrack track = makeTrackOfTwoFeet();
+  track.feet[10][0].p = Vector3d(0.2, 0, 0.1);
+  track.feet[10][1].p = Vector3d(0.3, 0, 0.1);
+  Goal length = makeGoal(GoalKind::Displacement, 0.25, 0.01);
+  length.contacts = track.contacts;
+  CHECK(measureGoal(length, track) == Approx(0.25));
+  length.direction = Vector3d::UnitZ();
+  CHECK(measureGoal(length, track) == Approx(0.1));
+  length.contacts = {"right"};
+  length.direction = Vector3d::UnitX();
+  CHECK(measureGoal(length, track) == Approx(0.3));
+  Goal footholds = makeGoal(GoalKind::Footholds, 0, 0.01);
+  footholds.footholds = {{"left", 10, Vector3d(0.2, 0, 0.1)}, {"right", 10, Vector3d(0.3, 0.03, 0.14)}};
+  CHECK(measureGoal(footholds, track) == Approx(0.05));
+  track.feet[10][0].p.x() = std::nan("");
+  CHECK(std::isnan(measureGoal(footholds, track)));
+}
+
+TEST_CASE("goals: nodes and contacts that the trajectory does not have are refused") {
+  const MotionTrack track = makeTrackOfTwoFeet();
+  CHECK_THROWS_AS(measureGoal(makeGoal(GoalKind::Rise, 0, 0, 0, 11), track), std::out_of_range);
+  CHECK_THROWS_AS(measureGoal(makeGoal(GoalKind::Rise, 0, 0, -1, 3), track), std::out_of_range);
+  CHECK_THROWS_AS(measureGoal(makeGoal(GoalKind::Rise, 0, 0, 4, 3), track), std::out_of_range);
+  Goal goal = makeGoal(GoalKind::Footholds, 0, 0.01);
+  goal.footholds = {{"hand", 3, Vector3d::Zero()}};
+  CHECK_THROWS_WITH(measureGoal(goal, track), Catch::Contains("'hand'"));
+  goal.footholds = {{"left", 11, Vector3d::Zero()}};
+  CHECK_THROWS_AS(measureGoal(goal, track), std::out_of_range);
+  CHECK_THROWS_AS(parseGoalKind("luck"), std::invalid_argument);
+  for (int kind = 0; kind <= static_cast<int>(GoalKind::Footholds); ++kind)
+    CHECK(parseGoalKind(getName(static_cast<GoalKind>(kind))) == static_cast<GoalKind>(kind));
+}
+
+TEST_CASE("goals: a miss is said with its share and tolerance; what is not a number is a miss") {
+  GoalOutcome outcome{makeGoal(GoalKind::Speed, 0.5, 0.025), 0.4213};
+  CHECK_FALSE(outcome.met());
+  CHECK(formatOutcome(outcome) == "asked 0.5 m/s, came out 0.4213 m/s: 84 %, missed (tolerance 0.025 m/s)");
+  outcome.came_out = 0.51;
+  CHECK(outcome.met());
+  CHECK(formatOutcome(outcome) == "asked 0.5 m/s, came out 0.51 m/s: 102 %");
+  outcome.came_out = std::nan("");
+  CHECK_FALSE(outcome.met());
+  CHECK(formatOutcome({makeGoal(GoalKind::Height, 0.7, 0.015), 0.7011}) == "asked 0.7, came out 0.7011");
+  CHECK(formatOutcome({makeGoal(GoalKind::Footholds, 0, 0.01), 0.0123}) ==
+        "asked within 0.01 m, came out 0.0123 m, missed");
+}
+
+TEST_CASE("goals: what motions of Bipetto are asked for comes out") {
+  struct Row {
+    std::string name;
+    double asked;
+  };
+  const auto expect = [](const MotionResult& result, const std::vector<Row>& rows) {
+    CAPTURE(result.motion);
+    CHECK(result.converged());
+    CHECK(result.goals.size() == rows.size());
+    for (const Row& row : rows) {
+      const GoalOutcome& outcome = find(result, row.name);
+      CAPTURE(row.name, formatOutcome(outcome));
+      CHECK(outcome.goal.asked == Approx(row.asked));
+      CHECK(outcome.met());
+    }
+  };
+  SquatOptions up;
+  up.depth = 1.05;
+  expect(solve(makeSquat(getBipetto())), {{"depth", 0.7}});
+  expect(solve(makeSquat(getBipetto(), up)), {{"depth", 1.05}});
+  WalkOptions backward;
+  backward.speed = -0.3;
+  expect(solve(makeWalk(getBipetto())), {{"speed", 0.5}, {"footholds", 0}});
+  expect(solve(makeWalk(getBipetto(), backward)), {{"speed", -0.3}, {"footholds", 0}});
+  expect(solve(makeSideWalk(getBipetto())), {{"speed", 0.2}, {"footholds", 0}});
+  expect(solve(makeTurn(getBipetto())), {{"angle", 1.57}, {"footholds", 0}});
+  expect(solve(makeStairs(getBipetto())), {{"climb", 0.24}, {"speed", 0.3}, {"footholds", 0}});
+  JumpOptions jump;
+  jump.length = 0.2;
+  expect(solve(makeJump(getBipetto(), jump)), {{"flight", 0.3}, {"height", 0.02 + 9.81 * 0.09 / 8}, {"length", 0.2}});
+}
+
+TEST_CASE("goals: a sequence has those of its motions, at their nodes") {
+  SquatOptions squat;
+  WalkOptions walk;
+  walk.gait.rigid_landing = 1;  // its impacts are stages too
+  const auto planBoth = [&](const Model& model, const VectorXd& q0) {
+    return planSequence(model,
+                        {{"squat", [&](const Model& m, const VectorXd& q) { return planSquat(m, squat, q); }},
+                         {"walk", [&](const Model& m, const VectorXd& q) { return planWalk(m, walk, q); }}},
+                        q0);
+  };
+  const VectorXd q0 = makeStandingPosture(getBipetto());
+  const MotionPlan both = planBoth(getBipetto(), q0);
+  const MotionPlan first = planSquat(getBipetto(), squat, q0), second = planWalk(getBipetto(), walk, first.q_end);
+  REQUIRE(both.goals.size() == 3);
+  CHECK(both.goals[0].name == "squat.depth");
+  CHECK(both.goals[1].name == "walk.speed");
+  const int start = first.schedule.numStages();
+  CHECK(both.goals[1].first == second.goals[0].first + start);
+  CHECK(both.goals[1].last == second.goals[0].last + start);
+  REQUIRE(both.goals[2].footholds.size() == 6);
+  for (size_t i = 0; i < 6; ++i) {
+    const Foothold& foothold = both.goals[2].footholds[i];
+    CHECK(foothold.node == second.goals[1].footholds[i].node + start);
+    // There both feet stand, just before only one did.
+    CHECK(both.schedule.getPhase(foothold.node).contacts.size() == 2);
+    CHECK(both.schedule.getPhase(foothold.node).dt > 0);
+    CHECK(both.schedule.getPhase(foothold.node - 1).dt == 0);
+    CHECK(both.schedule.getPhase(foothold.node - 2).contacts.size() == 1);
+  }
+}
+
+TEST_CASE("goals: trajectories that miss are told so") {
+  Motion walk = makeWalk(getBipetto());
+  const FddpSummary summary = Fddp().solve(*walk.problem, walk.guess);
+  const auto measure = [&](const ShootingTrajectory& trajectory) {
+    return makeResult({"bipetto", "", {}}, walk, trajectory, summary);
+  };
+  const MotionResult good = measure(walk.guess);
+  ShootingTrajectory slow = walk.guess;
+  for (VectorXd& x : slow.xs) x[0] *= 0.84;
+  const GoalOutcome speed = find(measure(slow), "speed");
+  CHECK(speed.came_out == Approx(0.84 * find(good, "speed").came_out).epsilon(0.02));
+  CHECK_FALSE(speed.met());
+  CHECK_FALSE(find(measure(slow), "footholds").met());
+  // One foot beside its foothold at one landing, by 2 cm; nothing else changes.
+  ShootingTrajectory beside = walk.guess;
+  beside.xs[find(good, "footholds").goal.footholds[2].node][1] += 0.02;
+  CHECK(find(measure(beside), "footholds").came_out == Approx(0.02).margin(0.002));
+  CHECK_FALSE(find(measure(beside), "footholds").met());
+  CHECK(find(measure(beside), "speed").met());
+
+  // Weights that pull towards something else: the squat converges and is too shallow.
+  SquatOptions lazy;
+  lazy.com_weight = 10;
+  const MotionResult shallow = solve(makeSquat(getBipetto(), lazy));
+  CHECK(shallow.converged());
+  CHECK(find(shallow, "depth").came_out > 0.72);
+  CHECK_FALSE(find(shallow, "depth").met());
+}

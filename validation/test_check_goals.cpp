@@ -1,0 +1,128 @@
+// Goals in the check: measured independently of what the summary tells, told when missed, and compared with the summary.
+#include <catch2/catch.hpp>
+#include <sstream>
+
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/jump.h"
+#include "bielle/motion/squat.h"
+#include "bielle/motion/stairs.h"
+#include "bielle/motion/walk.h"
+#include "check.h"
+#include "robot_directory.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+using namespace bielle::validation;
+
+namespace {
+
+constexpr const char* kClaims = "goals: told, against measured";
+
+const LoadedRobot& getBipetto() {
+  static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
+  return robot;
+}
+
+// After a few iterations, written and read back: what is measured need not be what was asked.
+CheckedMotion solveBriefly(Motion motion) {
+  const RobotDirectory directory;
+  FddpOptions options;
+  options.max_iterations = 4;
+  const FddpSummary summary = Fddp(options).solve(*motion.problem, motion.guess);
+  writeResult(directory.path(), makeResult({"bipetto", getBipetto().file, {}}, motion, motion.guess, summary));
+  return readMotion(directory.path());
+}
+
+CheckedMotion makeShortWalk() {
+  static const CheckedMotion walk = [] {
+    WalkOptions options;
+    options.steps = 4;
+    return solveBriefly(makeWalk(getBipetto().model, options));
+  }();
+  return walk;
+}
+
+const CheckRow& find(const CheckReport& report, const std::string& name) {
+  const CheckRow* row = report.findRow(name);
+  if (row == nullptr) throw std::runtime_error("there is no row '" + name + "'");
+  return *row;
+}
+
+}  // namespace
+
+TEST_CASE("check: every kind of goal comes out of Simbody's kinematics as the summary tells it") {
+  const Model& model = getBipetto().model;
+  JumpOptions jump;
+  jump.length = 0.1;
+  TurnOptions turn;
+  turn.steps = 3;
+  turn.angle = 0.4;
+  StairsOptions stairs;
+  stairs.stairs = 2;
+  std::vector<CheckedMotion> motions = {makeShortWalk()};
+  motions.push_back(solveBriefly(makeSquat(model)));
+  motions.push_back(solveBriefly(makeJump(model, jump)));
+  motions.push_back(solveBriefly(makeTurn(model, turn)));
+  motions.push_back(solveBriefly(makeStairs(model, stairs)));
+  std::set<GoalKind> kinds;
+  for (const CheckedMotion& motion : motions) {
+    const CheckReport report = checkMotion(motion);
+    CAPTURE(motion.summary.motion);
+    REQUIRE(!motion.summary.goals.empty());
+    for (const GoalOutcome& told : motion.summary.goals) {
+      CAPTURE(told.goal.name, told.came_out);
+      const CheckRow& row = find(report, "goal: " + told.goal.name);
+      CHECK(*row.value == Approx(told.came_out).margin(1e-10));
+      CHECK(row.bound == told.goal.asked);
+      CHECK(row.isMissedGoal() == !told.met());
+      kinds.insert(told.goal.kind);
+    }
+    CHECK(find(report, kClaims).passed());
+  }
+  CHECK(kinds.size() == 7);
+}
+
+TEST_CASE("check: a goal that is missed is told, and fails nothing") {
+  CheckedMotion motion = makeShortWalk();
+  for (GoalOutcome& told : motion.summary.goals)
+    if (told.goal.kind == GoalKind::Speed) told.goal.asked *= 1.2;
+  const CheckReport report = checkMotion(motion);
+  const CheckRow& row = find(report, "goal: speed");
+  CHECK(row.isMissedGoal());
+  CHECK(row.passed());
+  for (CheckPrint print : {CheckPrint::All, CheckPrint::Failures}) {
+    std::ostringstream text;
+    printReport(text, report, print);
+    CHECK_THAT(text.str(), Catch::Contains("1 goal missed") && Catch::Contains("MISS  asked; tolerance 0.025 m/s"));
+  }
+  CHECK_THAT(formatReport(report), Catch::Contains("\"met\": false"));
+}
+
+TEST_CASE("check: a summary that tells of a goal what the trajectory does not do fails") {
+  const CheckedMotion good = makeShortWalk();
+  const auto expectFailure = [&good](const std::function<void(CheckedMotion&)>& poison) {
+    CheckedMotion motion = good;
+    poison(motion);
+    CHECK_FALSE(find(checkMotion(motion), kClaims).passed());
+  };
+  expectFailure([](CheckedMotion& m) { m.summary.goals[0].came_out = m.summary.goals[0].goal.asked; });
+  expectFailure([](CheckedMotion& m) { m.summary.goals[0].came_out = std::nan(""); });
+  expectFailure([](CheckedMotion& m) { m.summary.goals[1].came_out += 1e-6; });
+  // The trajectory is slower than it was when the summary was written.
+  expectFailure([](CheckedMotion& m) { m.record.q.col(0) *= 0.84; });
+}
+
+TEST_CASE("check: goals that do not fit their trajectory are refused") {
+  const auto refuse = [](const std::string& what, const std::function<void(Goal&, Goal&)>& poison) {
+    CheckedMotion motion = makeShortWalk();
+    poison(motion.summary.goals.at(0).goal, motion.summary.goals.at(1).goal);
+    CHECK_THROWS_WITH(checkMotion(motion), Catch::Contains(what));
+    CHECK_THROWS_AS(checkMotion(motion), ModelError);
+  };
+  refuse("nodes do not fit", [](Goal& speed, Goal&) { speed.last = 100000; });
+  refuse("no time passes", [](Goal& speed, Goal&) { speed.last = speed.first; });
+  refuse("not finite", [](Goal& speed, Goal&) { speed.asked = std::nan(""); });
+  refuse("nodes do not fit", [](Goal&, Goal& footholds) { footholds.footholds[0].node = 100000; });
+  refuse("no contact 'hand'", [](Goal&, Goal& footholds) { footholds.footholds[0].contact = "hand"; });
+}
