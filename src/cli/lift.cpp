@@ -42,6 +42,7 @@ void printOutcome(const LiftArguments& arguments, const LiftResult& lifted, cons
                            {"acceleration error", formatNumber(worst.acceleration_error, "%.2e") + " rad/s^2 or m/s^2"},
                            {"smallest margin", formatNumber(worst.margin, "%.4f") + " (0: dead point of a joint)"}};
   if (result) {
+    for (const GoalOutcome& outcome : result->goals) rows.push_back({outcome.goal.name, formatOutcome(outcome)});
     rows.push_back({"closure gap", formatNumber(result->gap_position, "%.2e") + " m"});
     rows.push_back({"contact slip", formatNumber(result->slip_position, "%.2e") + " m"});
   }
