@@ -1,12 +1,16 @@
 // Limits of motors: what a motion pays for them, and that it keeps to them.
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <fstream>
+#include <functional>
+#include <regex>
 
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
+#include "robot_directory.h"
 
 using namespace bielle;
 
@@ -121,4 +125,37 @@ TEST_CASE("limits: impossible ones are refused by name") {
                     Catch::Contains("motor_knee_middle") && Catch::Contains("hipx_left"));
   CHECK_THROWS_WITH(make("motor_knee_left", -1), Catch::Contains("not positive"));
   CHECK_THROWS_WITH(make("motor_knee_left", std::nan("")), Catch::Contains("not positive"));
+}
+
+TEST_CASE("limits: a range without width has no scale, and is refused") {
+  std::ifstream file(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto/bipetto.urdf");
+  std::ifstream parameters(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto/bipetto.yaml");
+  const std::string urdf(std::istreambuf_iterator<char>(file), {}),
+      yaml(std::istreambuf_iterator<char>(parameters), {});
+  const std::regex range("lower=\"-0.523599\" upper=\"0.523599\"");
+  REQUIRE(std::regex_search(urdf, range));
+  const testing::RobotDirectory directory;
+  const Model model =
+      loadRobot(directory.writeRobot(std::regex_replace(urdf, range, "lower=\"0.1\" upper=\"0.1\""), yaml)).model;
+  for (LimitBarrier barrier : {LimitBarrier::Quadratic, LimitBarrier::Logarithmic}) {
+    LimitOptions limits;
+    limits.barrier = barrier;
+    CHECK_THROWS_WITH(makeSquat(model, {}, ProblemOptions(Formulation::Reduced, limits)),
+                      Catch::Contains("joint 'hipx_") && Catch::Contains("has no width"));
+  }
+  CHECK_NOTHROW(makeSquat(model));
+}
+
+TEST_CASE("costs: bounds of a barrier that do not have the size of its residual are refused") {
+  const auto expectRefusal = [](const std::function<void(Activation&)>& poison) {
+    MotionPlan plan = planSquat(getBipetto(), {}, makeStandingPosture(getBipetto()));
+    for (Cost& cost : plan.stages[3].costs)
+      if (cost.activation.kind == ActivationKind::Barrier) poison(cost.activation);
+    CHECK_THROWS_WITH(makeMotion(getBipetto(), std::move(plan), {}),
+                      Catch::Contains("stage 3") && Catch::Contains("size of the residual"));
+  };
+  expectRefusal([](Activation& a) { a.lower.conservativeResize(2); });
+  expectRefusal([](Activation& a) { a.upper.resize(0); });
+  expectRefusal([](Activation& a) { a.weights.conservativeResize(5); });
+  expectRefusal([](Activation& a) { a.kind = ActivationKind::LogBarrier; });  // without its relaxation
 }

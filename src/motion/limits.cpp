@@ -44,8 +44,13 @@ Bounds listRanges(const Model& model) {
   Bounds bounds;
   for (int k = 0; k < model.nv(); ++k) {
     const double lower = model.lowerLimits()[k], upper = model.upperLimits()[k];
-    if (model.joints()[model.dofs()[k].joint].nv == 1 && (std::isfinite(lower) || std::isfinite(upper)))
-      bounds.add(k, lower, upper);
+    const Joint& joint = model.joints()[model.dofs()[k].joint];
+    if (joint.nv != 1 || !(std::isfinite(lower) || std::isfinite(upper))) continue;
+    if (lower == upper)
+      throw ModelError(model.name(), "joint '" + joint.name + "'",
+                       "its range has no width, so that no barrier can keep it",
+                       "make the joint fixed, or widen its range");
+    bounds.add(k, lower, upper);
   }
   return bounds;
 }

@@ -63,6 +63,12 @@ Activation Activation::makeLogBarrier(const VectorXd& weights, const VectorXd& l
   return {ActivationKind::LogBarrier, weights, lower, upper, relaxation};
 }
 
+bool Activation::hasSize(Eigen::Index rows) const {
+  const bool barrier = kind != ActivationKind::Quadratic;
+  return weights.size() == rows && (!barrier || (lower.size() == rows && upper.size() == rows)) &&
+         (kind != ActivationKind::LogBarrier || relaxation.size() == rows);
+}
+
 double Activation::calc(ConstVectorRef r) const {
   double sum = 0;
   for (Eigen::Index i = 0; i < r.size(); ++i) sum += weights[i] * calcTerm(*this, i, r[i]).value;

@@ -28,10 +28,9 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index) {
   require(spec.effort_limits.size() == 0 || spec.effort_limits.size() == model.nu(),
           "its effort limits have a wrong size", "effort_limits: nu, or empty");
   for (const Cost& cost : spec.costs)
-    require(
-        cost.residual && cost.activation.weights.size() == cost.residual->size(),
-        "cost '" + cost.name + "' has " + std::to_string(cost.activation.weights.size()) + " weights for another size",
-        "give one weight per row of the residual");
+    require(cost.residual && cost.activation.hasSize(cost.residual->size()),
+            "cost '" + cost.name + "': weights or bounds do not have the size of the residual",
+            "give one weight per row of the residual and, for a barrier, one lower and one upper bound");
 }
 
 }  // namespace

@@ -23,6 +23,8 @@ struct Activation {
   static Activation makeBarrier(const VectorXd& weights, const VectorXd& lower, const VectorXd& upper);
   static Activation makeLogBarrier(const VectorXd& weights, const VectorXd& lower, const VectorXd& upper,
                                    const VectorXd& relaxation);
+  /// Whether weights, bounds and relaxation have the sizes that a residual of `rows` rows asks for.
+  bool hasSize(Eigen::Index rows) const;
   double calc(ConstVectorRef r) const;
   /// Gradient (n) and diagonal of the Hessian (n) with respect to r.
   void calcDerivatives(ConstVectorRef r, VectorRef gradient, VectorRef hessian) const;
