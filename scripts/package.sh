@@ -3,7 +3,7 @@
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
-install_missing "${bielle_packages[@]}" libsimbody-dev dpkg-dev file
+install_missing "${bielle_packages[@]}" "${bielle_check_packages[@]}" dpkg-dev file
 cd "$bielle_root"
 build build-package --preset package
 cd build-package

@@ -1,16 +1,17 @@
-# Functions of the other scripts: packages and builds. To be sourced, after `set -euo pipefail`.
+# Shared functions of the scripts: installing packages and building. Source this file after `set -euo pipefail`.
 export DEBIAN_FRONTEND=noninteractive
 bielle_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
-# What Bielle is built with, on Debian 12 without anything else; gnuplot draws its figures.
+# Build dependencies on a bare Debian 12; gnuplot draws the figures.
 bielle_packages=(g++ cmake ninja-build libeigen3-dev liburdfdom-dev liburdfdom-headers-dev libconsole-bridge-dev
   libtinyxml-dev libyaml-cpp-dev nlohmann-json3-dev libcli11-dev libzip-dev libnlopt-dev
   libnlopt-cxx-dev gnuplot-nox libjs-three libjs-dygraphs)
-# What its tests need besides: Catch2, Simbody to compare with, Google Benchmark, Python to read NumPy archives, a browser
-# to look at reports.
-bielle_test_packages=(catch2 libsimbody-dev libbenchmark-dev python3 chromium pkg-config)
+# Simbody, against which motions and dynamics are checked.
+bielle_check_packages=(libsimbody-dev)
+# Further dependencies of the tests: Catch2, Google Benchmark, Python to read NumPy archives, a browser for the reports.
+bielle_test_packages=(catch2 libbenchmark-dev python3 chromium pkg-config)
 
-# install_missing PACKAGE...: installs those that dpkg does not know as installed.
+# install_missing PACKAGE...: installs the packages that dpkg does not list as installed.
 install_missing() {
   local missing=() package
   for package in "$@"; do
@@ -27,12 +28,14 @@ install_missing() {
   fi
   echo "installing ${missing[*]}"
   if ! apt-cache show "${missing[@]}" >/dev/null 2>&1; then "${sudo[@]}" apt-get update; fi
-  # Package lists may be older than the archive.
+  # The package lists may be out of date.
   "${sudo[@]}" apt-get install -y --no-install-recommends "${missing[@]}" ||
     { "${sudo[@]}" apt-get update && "${sudo[@]}" apt-get install -y --no-install-recommends "${missing[@]}"; }
 }
 
-# build DIRECTORY CMAKE_OPTION...: configures and builds with all cores, as far as memory goes (1.5 GB per compiler).
+# build DIRECTORY CMAKE_OPTION...: configures, then builds `bielle_targets` (default: everything) on as many cores as memory
+# allows, at 1.5 GB per compiler.
+bielle_targets=(all)
 build() {
   local directory=$1 cores memory jobs
   shift
@@ -40,5 +43,5 @@ build() {
   cores=$(nproc)
   memory=$(awk '/^MemAvailable:/ {print int($2 / 1500000)}' /proc/meminfo)
   jobs=$((memory < 1 ? 1 : memory < cores ? memory : cores))
-  cmake --build "$directory" --parallel "$jobs"
+  cmake --build "$directory" --parallel "$jobs" --target "${bielle_targets[@]}"
 }

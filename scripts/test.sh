@@ -1,9 +1,9 @@
 #!/bin/bash
-# Builds everything and runs every test. Installs what is missing (Debian 12).
+# Builds everything and runs every test. Installs missing packages (Debian 12).
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
-install_missing "${bielle_packages[@]}" "${bielle_test_packages[@]}"
+install_missing "${bielle_packages[@]}" "${bielle_check_packages[@]}" "${bielle_test_packages[@]}"
 cd "$bielle_root"
 build build/test --preset release
 ctest --test-dir build/test --parallel "$(nproc)" --output-on-failure
