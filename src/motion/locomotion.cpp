@@ -349,10 +349,11 @@ void setPaperWeights(LocomotionOptions& o) {
 std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, const Vector3d& direction,
                                  int steps_per_cycle) {
   const std::vector<int> landings = listLandings(schedule);
-  const int cycles = (static_cast<int>(landings.size()) - 2) / steps_per_cycle;
+  const int size = static_cast<int>(landings.size());
+  const int first = size - 4 >= steps_per_cycle ? 1 : 0, cycles = (size - 2 - 2 * first) / steps_per_cycle;
   if (cycles < 1) return {};
-  Goal goal{
-      GoalKind::Speed, "speed", speed, calcTolerance(speed, 0.02), landings[0], landings[cycles * steps_per_cycle]};
+  const int last = first + cycles * steps_per_cycle;
+  Goal goal{GoalKind::Speed, "speed", speed, calcTolerance(speed, 0.02), landings[first], landings[last]};
   goal.direction = direction;
   return {goal};
 }

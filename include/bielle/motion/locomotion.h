@@ -85,9 +85,9 @@ struct LocomotionTask {
   Vector3d com_velocity = Vector3d::Zero();  ///< at steady steps, m/s
 };
 
-/// Mean speed of the centre of mass over the steady steps, from the first landing to the last one but one that lies a
-/// whole number of cycles of `steps_per_cycle` steps later: motions start and end at rest. None when there is no such
-/// landing. \param direction  unit vector, world
+/// Mean speed of the centre of mass over the steady steps: from the second landing to the last but two (in short motions from
+/// the first to the last but one), over a whole number of cycles of `steps_per_cycle` steps. Motions start and end at rest.
+/// None when there are too few steps. \param direction  unit vector, world
 std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, const Vector3d& direction,
                                  int steps_per_cycle = 1);
 
