@@ -106,7 +106,7 @@ void measureForces(const Motion& motion, const ShootingTrajectory& t, Outcome& o
     const RobotEvaluation& at = evaluator.evaluate(static_cast<int>(k), t.xs[k], t.us[k]);
     REQUIRE(at.status == StepStatus::Ok);
     for (size_t c = set.num_loops; c < set.closures.size(); ++c) {
-      const ContactFrame& contact = model.contacts()[model.findContact(set.closures[c].name)];
+      const ContactFrame& contact = model.contacts()[set.getContact(static_cast<int>(c))];
       const Vector6d f = at.lambda.segment<6>(set.offsets[c]);
       out.force = std::min(out.force, f[2]);
       out.friction = std::max(out.friction, f.head<2>().norm() / f[2]);

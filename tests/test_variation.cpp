@@ -118,9 +118,9 @@ TEST_CASE("variation: inverse dynamics and closures along a motion are those of 
     updateVariation(model, ws, none, motion, variation);
     checkDerivative(calcInverseDynamicsVariation(model, ws, set, lambda, none, motion, variation),
                     ws.dID_dq * motion.q + ws.dID_dv * motion.v + ws.M * motion.a);
-    const VectorXd residual = calcResidualVariation(model, ws, set, none, variation);
-    const VectorXd velocity = calcVelocityVariation(model, ws, set, none, variation);
-    const VectorXd acceleration = calcAccelerationVariation(model, ws, set, none, variation);
+    const VectorXd residual = calcResidualVariation(ws, set, none, variation);
+    const VectorXd velocity = calcVelocityVariation(ws, set, none, variation);
+    const VectorXd acceleration = calcAccelerationVariation(ws, set, none, variation);
     for (size_t c = 0; c < set.closures.size(); ++c) {
       const int row = set.offsets[c], n = getRows(set.closures[c].kind);
       MatrixXd H = MatrixXd::Zero(n, model.nv()), J = H, nu = H, dq = H, dv = H;

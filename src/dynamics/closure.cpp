@@ -88,6 +88,7 @@ ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTar
     closure.dofs = model.supportDofs(frame.body);
     closure.signs.assign(closure.dofs.size(), 1);
     set.closures.push_back(closure);
+    set.contacts.push_back(target.contact);
   }
   for (const Closure& closure : set.closures) {
     set.offsets.push_back(set.rows);

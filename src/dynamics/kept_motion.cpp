@@ -59,11 +59,11 @@ double Closing::calcMotion(const Model& model, const Workspace& ws, const ModelV
     gap = std::max(gap, calcLargest(left));
   };
   updateVariation(model, ws, change, motion, variation);
-  close(calcResidualVariation(model, ws, closures_, change, variation), motion.q);
+  close(calcResidualVariation(ws, closures_, change, variation), motion.q);
   updateVariation(model, ws, change, motion, variation);
-  close(-calcVelocityVariation(model, ws, closures_, change, variation), motion.v);
+  close(-calcVelocityVariation(ws, closures_, change, variation), motion.v);
   updateVariation(model, ws, change, motion, variation);
-  close(-calcAccelerationVariation(model, ws, closures_, change, variation), motion.a);
+  close(-calcAccelerationVariation(ws, closures_, change, variation), motion.a);
   return gap;
 }
 
@@ -149,7 +149,7 @@ VectorXd KeptMotion::calcLift(const ModelVariation& change, const VectorXd& dq, 
   motion.q = dq;
   VariationWorkspace variation(model_);
   updateVariation(model_, virtual_ws_, change, motion, variation);
-  rows = calcVelocityVariation(model_, virtual_ws_, constraints_, change, variation);
+  rows = calcVelocityVariation(virtual_ws_, constraints_, change, variation);
   return -closing_->solve(rows.head(loops_.rows), VectorXd::Zero(T_.cols()));
 }
 

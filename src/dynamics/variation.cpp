@@ -10,17 +10,16 @@ struct FrameTwists {
   Vector6d frame1 = Vector6d::Zero(), frame2 = Vector6d::Zero();
 };
 
-FrameTwists getFrameTwists(const Model& model, const ConstraintSet& set, size_t c, const ModelVariation& change) {
+FrameTwists getFrameTwists(const ConstraintSet& set, size_t c, const ModelVariation& change) {
   if (static_cast<int>(c) < set.num_loops) return {change.frames1[c], change.frames2[c]};
-  const int contact = model.findContact(set.closures[c].name);
-  return {contact < 0 ? Vector6d(Vector6d::Zero()) : change.contacts[contact], Vector6d::Zero()};
+  return {change.contacts[set.getContact(static_cast<int>(c))], Vector6d::Zero()};
 }
 
-Vector6d calcDisplacement1(const Model& model, const Workspace& ws, const ConstraintSet& set, size_t c,
-                           const ModelVariation& change, const VariationWorkspace& variation) {
+Vector6d calcDisplacement1(const Workspace& ws, const ConstraintSet& set, size_t c, const ModelVariation& change,
+                           const VariationWorkspace& variation) {
   const Closure& closure = set.closures[c];
   return variation.D[closure.body1] +
-         getPlacement(ws, closure.body1, closure.X_B1).actMotion(getFrameTwists(model, set, c, change).frame1);
+         getPlacement(ws, closure.body1, closure.X_B1).actMotion(getFrameTwists(set, c, change).frame1);
 }
 
 // Rows of a closure out of a full vector in the world.
@@ -28,20 +27,20 @@ RowVectorUpTo6 readRows(const Workspace& ws, const Closure& closure, const Vecto
   return selectRows<double>(closure, getPlacement(ws, closure.body1, closure.X_B1).actInvMotion(world));
 }
 
-RowVectorUpTo6 calcResidualRows(const Model& model, const Workspace& ws, const ConstraintSet& set, size_t c,
-                                const ModelVariation& change, const VariationWorkspace& variation) {
+RowVectorUpTo6 calcResidualRows(const Workspace& ws, const ConstraintSet& set, size_t c, const ModelVariation& change,
+                                const VariationWorkspace& variation) {
   const Closure& closure = set.closures[c];
   const SE3 X_W1 = getPlacement(ws, closure.body1, closure.X_B1), X_W2 = getPlacement(ws, closure.body2, closure.X_B2);
-  const Vector6d D_1 = calcDisplacement1(model, ws, set, c, change, variation);
-  const Vector6d D_2 = variation.D[closure.body2] + X_W2.actMotion(getFrameTwists(model, set, c, change).frame2);
+  const Vector6d D_1 = calcDisplacement1(ws, set, c, change, variation);
+  const Vector6d D_2 = variation.D[closure.body2] + X_W2.actMotion(getFrameTwists(set, c, change).frame2);
   return calcClosureResidualRate(ws, closure) * X_W1.actInvMotion(D_1 - D_2);  // Eq. (7)
 }
 
-RowVectorUpTo6 calcVelocityRows(const Model& model, const Workspace& ws, const ConstraintSet& set, size_t c,
-                                const ModelVariation& change, const VariationWorkspace& variation) {
+RowVectorUpTo6 calcVelocityRows(const Workspace& ws, const ConstraintSet& set, size_t c, const ModelVariation& change,
+                                const VariationWorkspace& variation) {
   const Closure& closure = set.closures[c];
   const int b1 = closure.body1, b2 = closure.body2;
-  const Vector6d D_1 = calcDisplacement1(model, ws, set, c, change, variation);
+  const Vector6d D_1 = calcDisplacement1(ws, set, c, change, variation);
   return readRows(ws, closure, variation.dV[b1] - variation.dV[b2] - crossMotion(D_1, ws.V[b1] - ws.V[b2]));  // Eq. (7)
 }
 
@@ -127,7 +126,7 @@ VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, c
     const Closure& closure = constraints.closures[c];
     const Vector6d W =
         calcClosureWrench<double>(ws, closure, lambda.segment(constraints.offsets[c], getRows(closure.kind)));
-    const Vector6d dW = crossForce(calcDisplacement1(model, ws, constraints, c, change, variation), W);
+    const Vector6d dW = crossForce(calcDisplacement1(ws, constraints, c, change, variation), W);
     variation.F[closure.body1] -= W, variation.dF[closure.body1] -= dW;
     variation.F[closure.body2] += W, variation.dF[closure.body2] += dW;
   }
@@ -142,30 +141,28 @@ VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, c
   return out;
 }
 
-VectorXd calcResidualVariation(const Model& model, const Workspace& ws, const ConstraintSet& constraints,
-                               const ModelVariation& change, const VariationWorkspace& variation) {
-  return stackRows(constraints,
-                   [&](size_t c) { return calcResidualRows(model, ws, constraints, c, change, variation); });
+VectorXd calcResidualVariation(const Workspace& ws, const ConstraintSet& constraints, const ModelVariation& change,
+                               const VariationWorkspace& variation) {
+  return stackRows(constraints, [&](size_t c) { return calcResidualRows(ws, constraints, c, change, variation); });
 }
 
-VectorXd calcVelocityVariation(const Model& model, const Workspace& ws, const ConstraintSet& constraints,
-                               const ModelVariation& change, const VariationWorkspace& variation) {
-  return stackRows(constraints,
-                   [&](size_t c) { return calcVelocityRows(model, ws, constraints, c, change, variation); });
+VectorXd calcVelocityVariation(const Workspace& ws, const ConstraintSet& constraints, const ModelVariation& change,
+                               const VariationWorkspace& variation) {
+  return stackRows(constraints, [&](size_t c) { return calcVelocityRows(ws, constraints, c, change, variation); });
 }
 
-VectorXd calcAccelerationVariation(const Model& model, const Workspace& ws, const ConstraintSet& constraints,
-                                   const ModelVariation& change, const VariationWorkspace& variation) {
+VectorXd calcAccelerationVariation(const Workspace& ws, const ConstraintSet& constraints, const ModelVariation& change,
+                                   const VariationWorkspace& variation) {
   return stackRows(constraints, [&](size_t c) {
     const Closure& closure = constraints.closures[c];
     const int b1 = closure.body1, b2 = closure.body2;
     const Vector6d a = ws.A[b1] - ws.A[b2] + crossMotion(ws.V[b1], ws.V[b2]);
-    const Vector6d D_1 = calcDisplacement1(model, ws, constraints, c, change, variation);
+    const Vector6d D_1 = calcDisplacement1(ws, constraints, c, change, variation);
     RowVectorUpTo6 rows = readRows(ws, closure,
                                    variation.dA[b1] - variation.dA[b2] + crossMotion(variation.dV[b1], ws.V[b2]) +
                                        crossMotion(ws.V[b1], variation.dV[b2]) - crossMotion(D_1, a));  // Eq. (8)
-    if (closure.kd != 0) rows += closure.kd * calcVelocityRows(model, ws, constraints, c, change, variation);
-    if (closure.kp != 0) rows -= closure.kp * calcResidualRows(model, ws, constraints, c, change, variation);
+    if (closure.kd != 0) rows += closure.kd * calcVelocityRows(ws, constraints, c, change, variation);
+    if (closure.kp != 0) rows -= closure.kp * calcResidualRows(ws, constraints, c, change, variation);
     return rows;
   });
 }
@@ -181,7 +178,7 @@ DynamicsVariation calcConstrainedVariation(const Model& model, Workspace& ws, Co
     if (!motions.empty()) motion.q = motions[i].q, motion.v = motions[i].v;
     updateVariation(model, ws, changes[i], motion, variation);
     out.a.col(i) = calcInverseDynamicsVariation(model, ws, constraints, cws.lambda, changes[i], motion, variation);
-    out.lambda.col(i) = calcAccelerationVariation(model, ws, constraints, changes[i], variation);
+    out.lambda.col(i) = calcAccelerationVariation(ws, constraints, changes[i], variation);
   }
   cws.saddle_point.updateInverse();
   cws.saddle_point.solveDerivatives(out.a, out.lambda);

@@ -33,7 +33,7 @@ SerialTrajectory makeSerialTrajectory(const Motion& motion, const MotionRecord& 
     VectorXd forces(set.rows);
     for (size_t c = 0; c < set.closures.size(); ++c) {
       const Closure& contact = set.closures[c];
-      const Vector6d wrench = record.contact_wrenches.block<1, 6>(k, 6 * model.findContact(contact.name));
+      const Vector6d wrench = record.contact_wrenches.block<1, 6>(k, 6 * set.contacts[c]);
       forces.segment(set.offsets[c], getRows(contact.kind)) = selectRows(contact, wrench);
     }
     out.forces.push_back(forces);

@@ -28,7 +28,6 @@ void recordNode(const Model& model, Workspace& ws, const VectorXd& x, int k, Mot
 
 void recordStage(const RobotProblem& problem, RobotEvaluator& evaluator, const VectorXd& x, const VectorXd& u, int k,
                  MotionRecord& record) {
-  const Model& model = problem.model();
   record.u.row(k) = u;
   record.closure_wrenches.row(k).setZero();
   record.contact_wrenches.row(k).setZero();
@@ -47,7 +46,7 @@ void recordStage(const RobotProblem& problem, RobotEvaluator& evaluator, const V
   for (int c = 0; c < static_cast<int>(set.closures.size()); ++c) {
     const Closure& closure = set.closures[c];
     const bool loop = c < set.num_loops;
-    const int index = loop ? c : model.findContact(closure.name);
+    const int index = loop ? c : set.getContact(c);
     (loop ? record.closure_wrenches : record.contact_wrenches).block<1, 6>(k, 6 * index) =
         expandRows(closure, at.lambda.segment(set.offsets[c], getRows(closure.kind)));
   }

@@ -32,9 +32,13 @@ struct ContactTarget {
 /// The closures in force: those of the model, then contacts as closures to the world, in the order given.
 struct ConstraintSet {
   std::vector<Closure> closures;
-  std::vector<int> offsets;  ///< first row of each
+  std::vector<int> contacts;  ///< indices into Model::contacts() of the contacts, in their order
+  std::vector<int> offsets;   ///< first row of each closure
   int rows = 0;
   int num_loops = 0;  ///< the first num_loops closures are the model's
+
+  /// Index into Model::contacts() of closure c >= num_loops.
+  int getContact(int c) const { return contacts[c - num_loops]; }
 };
 ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTarget>& contacts = {});
 

@@ -63,12 +63,12 @@ VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, c
 
 /// Changes (rows) of residuals, velocities and stabilised accelerations of all closures of the set, Eqs. (7) and (8);
 /// need updateVariation. Contacts are found in the model by name.
-VectorXd calcResidualVariation(const Model& model, const Workspace& ws, const ConstraintSet& constraints,
-                               const ModelVariation& change, const VariationWorkspace& variation);
-VectorXd calcVelocityVariation(const Model& model, const Workspace& ws, const ConstraintSet& constraints,
-                               const ModelVariation& change, const VariationWorkspace& variation);
-VectorXd calcAccelerationVariation(const Model& model, const Workspace& ws, const ConstraintSet& constraints,
-                                   const ModelVariation& change, const VariationWorkspace& variation);
+VectorXd calcResidualVariation(const Workspace& ws, const ConstraintSet& constraints, const ModelVariation& change,
+                               const VariationWorkspace& variation);
+VectorXd calcVelocityVariation(const Workspace& ws, const ConstraintSet& constraints, const ModelVariation& change,
+                               const VariationWorkspace& variation);
+VectorXd calcAccelerationVariation(const Workspace& ws, const ConstraintSet& constraints, const ModelVariation& change,
+                                   const VariationWorkspace& variation);
 
 /// Accelerations and forces of forward dynamics, one column per direction.
 struct DynamicsVariation {
