@@ -62,6 +62,8 @@ void checkSame(const Model& a, const Model& b) {
     CHECK(a.bodies()[i].name == b.bodies()[i].name);
     CHECK(ja.kind == jb.kind);
     CHECK(ja.parent == jb.parent);
+    CHECK(ja.position_importance == jb.position_importance);
+    CHECK(ja.velocity_importance == jb.velocity_importance);
     CHECK((ja.X_PJ.p - jb.X_PJ.p).norm() < 1e-11);
     CHECK((ja.X_PJ.R - jb.X_PJ.R).norm() < 1e-11);
     if (ja.nv <= 2) CHECK((ja.axis - jb.axis).norm() < 1e-11);

@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "get_error.h"
@@ -117,6 +119,28 @@ TEST_CASE(
     }
 }
 
+TEST_CASE("a universal joint with a cross that has inertia is two joints") {
+  const std::string yaml = "joint_name: [shoulder]\njoint_type: [UJOINT_ZY]\n";
+  const Model plain = load(kToyUrdf, yaml), split = load(kToyUrdf, yaml + "cross_inertia: 0.02\n");
+  REQUIRE(split.nv() == plain.nv());
+  CHECK(split.findJoint("shoulder") == -1);
+  CHECK((getJoint(split, "shoulder_Z").axis - Vector3d::UnitZ()).norm() == 0);
+  CHECK((getJoint(split, "shoulder_Y").axis - Vector3d::UnitY()).norm() == 0);
+  CHECK(split.frames()[split.findFrame("arm")].body == split.findJoint("shoulder_Y"));
+  VectorXd q = plain.makeNeutral();
+  q.tail(3) << 0.3, -0.7, 1.1;
+  const int first = getJoint(plain, "shoulder").idx_v;
+  MatrixXd turn = MatrixXd::Zero(3, plain.nv());  // of the cross, in the axes of the base
+  turn.middleCols<3>(3).setIdentity();
+  turn.col(first) = Vector3d::UnitZ();
+  Workspace of_plain(plain), of_split(split);
+  updatePositions(plain, of_plain, q);
+  updatePositions(split, of_split, q);
+  updateMassMatrix(plain, of_plain);
+  updateMassMatrix(split, of_split);
+  CHECK((of_split.M - of_plain.M - 0.02 * turn.transpose() * turn).norm() < 1e-8);
+}
+
 TEST_CASE("closures: joints stand for their child, pairs for their common name, gains and axes arrive") {
   const Model by_joint = load(kToyUrdf, "closed_loop: [[wrist, rod_joint]]\ntype: ['3D']\nclosure_name: [tip]");
   REQUIRE(by_joint.closures().size() == 1);
@@ -155,6 +179,7 @@ armature: 0.25
 contacts: {toe: {frame: hand, type: 6d, sole: [0.2, 0.1]}, heel: {frame: rod, type: 3D}}
 serial_joints: [rod_joint, shoulder]
 gravity: [0, 0, -1.62]
+importance: {shoulder: [10, 0.5]}
 references:
   up: {joints: {shoulder: 1, root_joint: [0, 0, 1, 0, 0, 0, 1]}, height: {frame: wrist, value: 0.4},
        feet: {toe: [1, 2, 3]}}
@@ -173,6 +198,9 @@ references:
   CHECK(model.contacts()[1].kind == ContactKind::Point3D);
   CHECK(model.serialJoints() == std::vector<int>{model.findJoint("rod_joint"), model.findJoint("shoulder")});
   CHECK((model.gravity() - Vector3d(0, 0, -1.62)).norm() == 0);
+  CHECK(getJoint(model, "shoulder").position_importance == 10);
+  CHECK(getJoint(model, "shoulder").velocity_importance == 0.5);
+  CHECK(getJoint(model, "rod_joint").position_importance == 1);
   REQUIRE(model.references().size() == 1);
   const Reference& up = model.references()[0];
   CHECK(up.joints.at("shoulder") == std::vector<double>{1});

@@ -128,6 +128,7 @@ class Writer {
       out << "\nserial_joints:\n";
       for (int i : model_.serialJoints()) out << "  - " << quote(model_.joints()[i].name) << "\n";
     }
+    writeImportance(out);
     return out.str();
   }
 
@@ -295,6 +296,15 @@ class Writer {
         out << "6d, sole: [" << formatRounded(2 * c.half_length) << ", " << formatRounded(2 * c.half_width) << "]";
       out << "}\n";
     }
+  }
+
+  void writeImportance(std::ostream& out) {
+    std::string lines;
+    for (const Joint& joint : model_.joints())
+      if (joint.position_importance != 1 || joint.velocity_importance != 1)
+        lines += "  " + quote(joint.name) + ": [" + formatNumber(joint.position_importance) + ", " +
+                 formatNumber(joint.velocity_importance) + "]\n";
+    if (!lines.empty()) out << "\nimportance:\n" << lines;
   }
 
   void writeReferences(std::ostream& out) {

@@ -34,6 +34,42 @@ void retypeJoints(const YamlFile& yaml, UrdfFile& urdf) {
   }
 }
 
+// Two revolute joints, with a cross in between, for every universal one.
+void splitUniversalJoints(double cross_inertia, UrdfFile& urdf) {
+  constexpr double kMass = 1e-9;  // kg: nothing without mass has inertia
+  const auto getSuffix = [](const Vector3d& axis) {
+    Eigen::Index largest = 0;
+    axis.cwiseAbs().maxCoeff(&largest);
+    return std::string("_") + "XYZ"[largest];
+  };
+  std::vector<UrdfJoint> joints;
+  for (const UrdfJoint& j : urdf.joints) {
+    joints.push_back(j);
+    if (j.joint.kind != JointKind::Universal) continue;
+    UrdfJoint &first = joints.back(), second = j;
+    first.child = second.parent = j.joint.name + "_cross";
+    first.joint.kind = second.joint.kind = JointKind::Revolute;
+    first.joint.name += getSuffix(j.joint.axis);
+    second.joint.name += getSuffix(j.joint.axis2);
+    second.joint.axis = j.joint.axis2;
+    second.joint.X_PJ = SE3();
+    urdf.links[first.child] = {first.child, {kMass, Vector3d::Zero(), cross_inertia * Matrix3d::Identity()}, {}};
+    joints.push_back(second);
+  }
+  urdf.joints = std::move(joints);
+}
+
+void setImportance(const YamlFile& yaml, UrdfFile& urdf) {
+  for (const auto& [name, values] : yaml.importance) {
+    const auto it = findJoint(urdf.joints, name);
+    if (it == urdf.joints.end() || it->joint.kind == JointKind::Fixed)
+      throw ModelError(yaml.path, "importance of '" + name + "'", "there is no moving joint of this name",
+                       "name a joint of the robot that is not fixed");
+    it->joint.position_importance = values[0];
+    it->joint.velocity_importance = values[1];
+  }
+}
+
 // The files of a robot: a URDF with what is beside it, or what completes them.
 struct RobotFiles {
   UrdfFile urdf;
@@ -64,6 +100,8 @@ void complete(const YamlFile& own, YamlFile& yaml) {
   replace(own.contacts, yaml.contacts);
   replace(own.references, yaml.references);
   replace(own.serial_joints, yaml.serial_joints);
+  replace(own.importance, yaml.importance);
+  if (own.cross_inertia) yaml.cross_inertia = own.cross_inertia;
   if (own.base) yaml.base = own.base;
   if (own.motor_armature) yaml.motor_armature = own.motor_armature;
   if (own.gravity) yaml.gravity = own.gravity;
@@ -174,6 +212,8 @@ LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& option
   const std::filesystem::path path = findRobotFile(name_or_path);
   auto [urdf, yaml] = readRobotFiles(path);
   retypeJoints(yaml, urdf);
+  if (yaml.cross_inertia) splitUniversalJoints(*yaml.cross_inertia, urdf);
+  setImportance(yaml, urdf);
 
   ModelBuilder builder(urdf.name, urdf.path);
   addRoot(urdf, options.base.value_or(yaml.base.value_or(BaseKind::Free)), builder);

@@ -111,6 +111,12 @@ void readJointTypes(const Fields& fields, YamlFile& file) {
   }
 }
 
+double readCrossInertia(const Entry& entry) {
+  const double inertia = entry.getNumber();
+  if (!(inertia > 0)) entry.fail("it is not positive", "give kg m^2, or leave it out for a cross without inertia");
+  return inertia;
+}
+
 void readMotors(const Fields& fields, YamlFile& file) {
   const Entry *names = find(fields, "name_mot"), *motors = find(fields, "motors");
   if (motors) {
@@ -176,6 +182,14 @@ void readReferences(const Entry& map, YamlFile& file) {
   }
 }
 
+void readImportance(const Entry& map, YamlFile& file) {
+  for (const auto& [joint, entry] : map.getMap()) {
+    const std::vector<double> values = entry.getNumbers(2);
+    if (values[0] < 0 || values[1] < 0) entry.fail("a number is negative", "give [position, velocity], 0 or more");
+    file.importance.push_back({joint, {values[0], values[1]}});
+  }
+}
+
 BaseKind readBase(const Entry& entry) {
   const std::string base = entry.getText();
   if (base != "free" && base != "fixed") entry.fail("base '" + base + "' is unknown", "use free or fixed");
@@ -183,16 +197,18 @@ BaseKind readBase(const Entry& entry) {
 }
 
 void readRoot(const Entry& root, YamlFile& file) {
-  const Fields fields =
-      root.getFields({"closed_loop", "type", "closure_name", "closures", "name_mot", "motors", "armature", "joint_name",
-                      "joint_type", "base", "contacts", "references", "serial_joints", "gravity", "model"});
+  const Fields fields = root.getFields({"closed_loop", "type", "closure_name", "closures", "name_mot", "motors",
+                                        "armature", "joint_name", "joint_type", "cross_inertia", "base", "contacts",
+                                        "references", "serial_joints", "importance", "gravity", "model"});
   readPublishedClosures(fields, root, file);
   readJointTypes(fields, file);
+  if (const Entry* entry = find(fields, "cross_inertia")) file.cross_inertia = readCrossInertia(*entry);
   readMotors(fields, file);
   if (const Entry* entry = find(fields, "closures")) readClosures(*entry, file);
   if (const Entry* entry = find(fields, "contacts")) readContacts(*entry, file);
   if (const Entry* entry = find(fields, "references")) readReferences(*entry, file);
   if (const Entry* entry = find(fields, "serial_joints")) file.serial_joints = entry->getTexts();
+  if (const Entry* entry = find(fields, "importance")) readImportance(*entry, file);
   if (const Entry* entry = find(fields, "gravity")) file.gravity = entry->getVector3();
   if (const Entry* entry = find(fields, "base")) file.base = readBase(*entry);
   if (const Entry* entry = find(fields, "model"))

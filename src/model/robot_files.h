@@ -1,5 +1,6 @@
 #pragma once
 /// \file The contents of the two files of a robot before they are combined (private to the reader).
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -63,6 +64,7 @@ struct YamlFile {
   std::vector<std::string> models;  ///< of the robot that this file completes, in the order in which they are tried
   std::optional<BaseKind> base;
   std::vector<std::pair<std::string, JointRetyping>> joint_types;  ///< in the order of the file
+  std::optional<double> cross_inertia;                             ///< of universal joints, kg m^2
   std::vector<ClosureSpec> closures;
   std::vector<MotorSpec> motors;
   std::map<std::string, double> armature;  ///< joint -> kg m^2
@@ -70,6 +72,7 @@ struct YamlFile {
   std::vector<ContactSpec> contacts;
   std::vector<Reference> references;
   std::vector<std::string> serial_joints;
+  std::vector<std::pair<std::string, std::array<double, 2>>> importance;  ///< joint -> of its position, of its velocity
   std::optional<Vector3d> gravity;
   std::vector<std::string> warnings;
 };

@@ -13,15 +13,23 @@ struct Leg : BipedSide {
   const RsuBipedParameters& p;
 };
 
+// Hips weigh in the state regularization as in the paper's walk.
+Joint makeHip(const std::string& name, const Vector3d& place, const Vector3d& axis, double position, double velocity) {
+  Joint joint = makeRevolute(name, place, axis);
+  joint.position_importance = position;
+  joint.velocity_importance = velocity;
+  return joint;
+}
+
 // Hip of three axes in one point, thigh, shank.
 void addSerialJoints(const Leg& leg, ModelBuilder& builder) {
   const RsuBipedParameters& p = leg.p;
   const Vector3d hip(0, leg.s * p.hip_offset, -p.trunk_height), behind(-0.07, 0, 0), beside(0, 0.055 * leg.s, 0);
-  addSolidLink("hip_yaw" + leg.name, "trunk", makeRevolute("hipz" + leg.name, hip, kZ),
+  addSolidLink("hip_yaw" + leg.name, "trunk", makeHip("hipz" + leg.name, hip, kZ, 10, 5),
                {makeBox(behind / 2 + 0.045 * kZ, {0.09, 0.03, 0.02}, p.hip_link_mass, colors::kFrame),
                 makeMotor(behind, kX, p.motor_mass)},
                builder);
-  addSolidLink("hip_roll" + leg.name, "hip_yaw" + leg.name, makeRevolute("hipx" + leg.name, kOrigin, kX),
+  addSolidLink("hip_roll" + leg.name, "hip_yaw" + leg.name, makeHip("hipx" + leg.name, kOrigin, kX, 3, 3),
                {makeBox(behind / 4 + beside / 2, {0.04, 0.06, 0.03}, p.hip_link_mass, colors::kFrame),
                 makeMotor(beside, kY, p.motor_mass)},
                builder);

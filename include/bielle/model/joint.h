@@ -28,6 +28,7 @@ struct Joint {
   Vector3d axis = Vector3d::UnitZ();   ///< unit axis; normal of a planar joint; first axis of a universal joint
   Vector3d axis2 = Vector3d::UnitY();  ///< second axis of a universal joint
   int idx_q = 0, nq = 0, idx_v = 0, nv = 0;
+  double position_importance = 1, velocity_importance = 1;  ///< beside other joints, in the costs of a posture
 };
 
 /// Placement of the child in the joint frame; q is the joint's own segment (nq).

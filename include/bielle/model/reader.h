@@ -33,6 +33,9 @@
 /// - `contacts: {name: {frame, type: 6d | 3d, sole: [length, width]}, ...}`; the sole is centred on its frame, length
 ///   along x, m
 /// - `references: {name: {joints: {joint: number or list}, height: {frame, value}, feet: {contact: [x, y, z]}}, ...}`
+/// - `cross_inertia: kg m^2` makes of every universal joint two revolute ones, named after it and their axes (`_Z`, `_Y`), that
+///   carry a cross of this inertia about any axis between them
+/// - `importance: {joint: [position, velocity], ...}` of joints in the state regularization of motions (default 1, 1)
 /// - `serial_joints: [joint, ...]`, `gravity: [x, y, z]` (m/s^2)
 /// - `model: NAME or path relative to this file`, or a list of them: this file, with no URDF beside it, completes the first of
 ///   these published robots that exists; names are searched for in the directories of robots. Its keys take precedence over
