@@ -1,7 +1,7 @@
 bielle_test(walk SOURCES test_walk.cpp LIBS bielle_motion)
 bielle_test(stairs SOURCES test_stairs.cpp LIBS bielle_motion)
 bielle_test(sequence SOURCES test_sequence.cpp LIBS bielle_motion)
-bielle_test(motion SOURCES test_motion.cpp LIBS bielle_motion)
+bielle_test(motion SOURCES test_motion.cpp robot_directory.cpp LIBS bielle_motion)
 bielle_test(goals SOURCES test_goals.cpp LIBS bielle_io)
 bielle_test(jump SOURCES test_jump.cpp LIBS bielle_motion)
 bielle_test(limits SOURCES test_limits.cpp robot_directory.cpp LIBS bielle_motion)

@@ -1,5 +1,7 @@
 // The motions as their results: what the trajectory does, measured by kinematics, not by what the solver says.
 #include <catch2/catch.hpp>
+#include <fstream>
+#include <iterator>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/centroidal.h"
@@ -7,8 +9,11 @@
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/benchmark_walk.h"
+#include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
+#include "bielle/motion/walk.h"
 #include "problem_probe.h"
+#include "robot_directory.h"
 
 using namespace bielle;
 
@@ -128,12 +133,73 @@ TEST_CASE("squat: impossible options are refused, unknown ones are named") {
                                                                                  {"settle", -0.1},
                                                                                  {"time_step", 0},
                                                                                  {"time_step", 1},
+                                                                                 {"com_weight", -1},
+                                                                                 {"force_weight", nan},
+                                                                                 {"friction", 0},
                                                                                  {"depht", 0.7}}) {
     CAPTURE(option, value);
     CHECK_THROWS_AS(make(option, value), ModelError);
     CHECK_THROWS_WITH(make(option, value), Catch::Contains(option));
   }
   CHECK_THROWS_AS(makeSquat(loadOwn("fourbar"), {}), ModelError);  // no feet
+}
+
+TEST_CASE("weights by joint come with the robot's file, whatever the joints are called") {
+  const Model bipetto = loadOwn("bipetto");
+  const VectorXd weights = makeStateWeights(bipetto);
+  const auto getWeights = [&](const std::string& joint) {
+    const int k = bipetto.joints()[bipetto.findJoint(joint)].idx_v;
+    return std::pair(weights[k], weights[bipetto.nv() + k]);
+  };
+  CHECK(getWeights("hipz_left") == std::pair(100.0, 25.0));
+  CHECK(getWeights("hipx_right") == std::pair(9.0, 9.0));
+  CHECK(getWeights("hipy_right") == std::pair(1.0, 1.0));
+  CHECK(getWeights("motor_knee_left") == std::pair(0.0, 0.0));
+  std::string texts[2];
+  for (int i : {0, 1}) {
+    std::ifstream file(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto/bipetto" + (i == 0 ? ".urdf" : ".yaml"));
+    texts[i].assign(std::istreambuf_iterator<char>(file), {});
+    for (size_t at; (at = texts[i].find("hipz_")) != std::string::npos;) texts[i].replace(at, 5, "yaw_");
+  }
+  CHECK(makeStateWeights(loadRobot(testing::RobotDirectory().writeRobot(texts[0], texts[1])).model) == weights);
+}
+
+TEST_CASE("contact gains and the friction pyramid follow one rule in all motions") {
+  const Model model = loadOwn("bipetto");
+  SquatOptions squat;
+  JumpOptions jump;
+  WalkOptions walk;
+  squat.contact_kp = squat.contact_kd = jump.contact_kp = jump.contact_kd = 1e9;
+  walk.gait.contact_kp = walk.gait.contact_kd = 1e9;
+  const VectorXd q0 = makeStandingPosture(model);
+  for (const MotionPlan& plan : {planSquat(model, squat, q0), planJump(model, jump, q0), planWalk(model, walk, q0)}) {
+    CAPTURE(plan.name);
+    const StageSpec& stage = plan.stages.front();
+    const ConstraintSet& set = stage.constraints;
+    for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
+      CHECK(set.closures[c].kp == Approx(0.5 / (stage.dt * stage.dt)));
+      CHECK(set.closures[c].kd == Approx(1 / stage.dt));
+    }
+    VectorXd lambda = VectorXd::Zero(set.rows), u, r(4);
+    lambda[set.offsets[set.num_loops] + 2] = 1;  // N
+    const Workspace ws(model);
+    int found = 0;
+    for (const Cost& cost : stage.costs) {
+      if (cost.name != "friction " + model.contacts()[set.getContact(set.num_loops)].name) continue;
+      cost.residual->calc({model, ws, set, u, lambda}, r);
+      CHECK(r[0] == Approx(0.95 * 0.7 / std::sqrt(2)));
+      ++found;
+    }
+    CHECK(found == 1);
+  }
+}
+
+TEST_CASE("contacts keep their index in the constraints of a stage") {
+  const Model model = loadOwn("bipetto");
+  const ConstraintSet set = makeConstraintSet(model, {{1, {}, 0, 0}, {0, {}, 0, 0}});
+  CHECK(set.contacts == std::vector<int>{1, 0});
+  for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c)
+    CHECK(model.contacts()[set.getContact(c)].name == set.closures[c].name);
 }
 
 TEST_CASE("benchmark walk: the schedule that speed is measured on") {

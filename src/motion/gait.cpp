@@ -21,17 +21,14 @@ double ease(double s) {
 int countNodes(double duration, double h) { return static_cast<int>(std::lround(duration / h)); }
 
 void check(const GaitTiming& t, size_t steps) {
-  const auto require = [](bool ok, const char* option, const char* problem) {
-    if (!ok) throw ModelError("", std::string("option '") + option + "'", problem, "give seconds");
-  };
   const double h = t.time_step;
-  require(h > 0 && h <= 0.1, "time_step", "it is outside 0 .. 0.1 s");
+  requireOption(h > 0 && h <= 0.1, "time_step", "it is outside 0 .. 0.1 s", "give seconds");
   requireStages(t.start + steps * (t.single + t.both) + t.end, h);
   for (const auto& [name, value] : {std::pair("start_support", t.start), std::pair("single_support", t.single),
                                     std::pair("double_support", t.both), std::pair("end_support", t.end)})
-    require(std::isfinite(value) && value < 60 && countNodes(value, h) >= 1, name,
-            "it is not at least a time step, or over a minute");
-  require(countNodes(t.single, h) >= 4, "single_support", "it is shorter than four time steps");
+    requireOption(value < 60 && countNodes(value, h) >= 1, name, "it is not at least a time step, or over a minute",
+                  "give seconds");
+  requireOption(countNodes(t.single, h) >= 4, "single_support", "it is shorter than four time steps", "give seconds");
 }
 
 std::vector<GaitPhase> makePhases(int steps, const GaitTiming& t) {

@@ -22,18 +22,13 @@ struct Scene {
   VectorXd state_weights;  // 2 nv
 };
 
-void check(const LocomotionOptions& options) {
-  LocomotionOptions copy = options;
-  for (const OptionEntry& option : listOptions(copy))
-    if (!(*option.value >= 0)) throw ModelError("", "option '" + option.name + "'", "it is negative", "give 0 or more");
-  const auto require = [](bool ok, const char* option, const char* problem, const char* remedy) {
-    if (!ok) throw ModelError("", std::string("option '") + option + "'", problem, remedy);
-  };
-  const SwingShape& swing = options.swing;
-  require(options.friction > 0, "friction", "it is not positive", "give a coefficient, e.g. 0.7");
-  require(swing.apex > 0 && swing.apex < 1, "swing_apex", "it is not between 0 and 1", "e.g. 0.5");
-  require(swing.leave < swing.arrive, "swing_leave", "it is not before swing_arrive", "e.g. 0 and 1");
-  require(swing.arrive <= 1, "swing_arrive", "it is over 1", "give a part of the swing, e.g. 1");
+void check(const LocomotionOptions& o) {
+  LocomotionOptions copy = o;
+  requireNotNegative(listOptions(copy));
+  requirePositive(listOptions(copy), {"friction"});
+  requireOption(o.swing.apex > 0 && o.swing.apex < 1, "swing_apex", "it is not between 0 and 1", "e.g. 0.5");
+  requireOption(o.swing.leave < o.swing.arrive, "swing_leave", "it is not before swing_arrive", "e.g. 0 and 1");
+  requireOption(o.swing.arrive <= 1, "swing_arrive", "it is over 1", "give a part of the swing, e.g. 1");
 }
 
 // The first double support lengthened until Eq. (1) holds.
@@ -96,19 +91,15 @@ VectorXd makeWeights(const Model& model, const LocomotionOptions& o) {
   return weights;
 }
 
-// With kd = 1 / h, an Euler step leaves nothing of a velocity, and (1 - kp h^2) e of a displacement e.
-double limitKp(double kp, double h) { return std::min(kp, 0.5 / (h * h)); }
-double limitKd(double kd, double h) { return std::min(kd, 1 / h); }
-
 std::vector<ContactTarget> makeTargets(const Scene& scene, const GaitPhase& phase) {
   const LocomotionOptions& o = scene.options;
-  const double h = o.timing.time_step, kp = limitKp(o.contact_kp, h), kd = limitKd(o.contact_kd, h);
+  const ContactGains gains = limitContactGains({o.contact_kp, o.contact_kd}, o.timing.time_step);
   const auto feet = scene.task.plan.getStance(phase.steps_done);
   std::vector<ContactTarget> targets;
   for (Side side : {Side::Left, Side::Right}) {
     const int i = static_cast<int>(side);
     if (phase.swings && scene.task.plan.steps[phase.steps_done].side == side) continue;
-    targets.push_back({scene.stance.contacts[i], feet[i], kp, kd});
+    targets.push_back({scene.stance.contacts[i], feet[i], gains.kp, gains.kd});
   }
   return targets;
 }
@@ -153,14 +144,10 @@ void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
   const ConstraintSet& set = stage.constraints;
   VectorXd loads(set.closures.size() - set.num_loops);
   for (int i = 0; i < loads.size(); ++i) {
-    const bool left = scene.model.findContact(set.closures[set.num_loops + i].name) == scene.stance.contacts[0];
+    const bool left = set.contacts[i] == scene.stance.contacts[0];
     loads[i] = std::max(1.0, weight * node.load[left ? 0 : 1]);
   }
-  // The pyramid within the cone, and a little more: a penalty is met only nearly.
-  constexpr double kMargin = 0.95;
-  addGroundCosts(scene.model,
-                 {o.force_weight, o.pressure_weight, o.friction_weight, kMargin * o.friction / std::sqrt(2)}, loads,
-                 stage);
+  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, o.friction_weight, o.friction}, loads, stage);
 }
 
 Vector6d makeVector(double x, double z, double rotation) {
@@ -194,10 +181,7 @@ StageSpec makeStage(const Scene& scene, const GaitNode& node, const std::vector<
   const GaitPhase& phase = scene.gait.phases[node.phase];
   StageSpec stage = makeRegularizedStage(scene, node);
   stage.constraints = makeConstraintSet(scene.model, contacts);
-  for (int c = 0; c < stage.constraints.num_loops; ++c) {
-    stage.constraints.closures[c].kp = limitKp(o.closure_kp, stage.dt);
-    stage.constraints.closures[c].kd = limitKd(o.closure_kd, stage.dt);
-  }
+  setClosureGains(limitContactGains({o.closure_kp, o.closure_kd}, stage.dt), stage.constraints);
   addComCosts(scene, node, stage);
   addForceCosts(scene, node, stage);
   if (phase.swings) addSwingCosts(scene, node, scene.task.plan.steps[phase.steps_done], stage);

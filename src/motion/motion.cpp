@@ -1,6 +1,8 @@
 #include "bielle/motion/motion.h"
 
 #include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -34,6 +36,20 @@ void requireStages(double seconds, double time_step) {
 
 void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy) {
   if (!ok) throw ModelError("", "option '" + option + "'", problem, remedy);
+}
+
+void requireNotNegative(const std::vector<OptionEntry>& options, const std::vector<std::string>& any_sign) {
+  for (const OptionEntry& option : options) {
+    requireOption(std::isfinite(*option.value), option.name, "it is not a finite number", "give a number");
+    if (std::find(any_sign.begin(), any_sign.end(), option.name) == any_sign.end())
+      requireOption(*option.value >= 0, option.name, "it is negative", "give 0 or more");
+  }
+}
+
+void requirePositive(const std::vector<OptionEntry>& options, const std::vector<std::string>& names) {
+  for (const OptionEntry& option : options)
+    if (std::find(names.begin(), names.end(), option.name) != names.end())
+      requireOption(*option.value > 0, option.name, "it is not positive", "give a number over 0 [" + option.unit + "]");
 }
 
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options) {
@@ -92,7 +108,14 @@ VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X) {
 }
 
 ContactGains limitContactGains(const ContactGains& gains, double h) {
-  return {std::min(gains.kp, 0.25 / (h * h)), std::min(gains.kd, 1 / h)};
+  return {std::min(gains.kp, 0.5 / (h * h)), std::min(gains.kd, 1 / h)};
+}
+
+void setClosureGains(const ContactGains& gains, ConstraintSet& constraints) {
+  for (int c = 0; c < constraints.num_loops; ++c) {
+    constraints.closures[c].kp = gains.kp;
+    constraints.closures[c].kd = gains.kd;
+  }
 }
 
 std::vector<ContactTarget> makeContactTargets(const Model& model, ConstVectorRef q, const std::vector<int>& contacts,
@@ -111,6 +134,15 @@ std::vector<std::string> getContactNames(const Model& model, const std::vector<C
   return names;
 }
 
+VectorXd selectMainJoints(const Model& model) {
+  VectorXd selected = VectorXd::Zero(model.nv());
+  for (int i : model.serialJoints()) selected.segment(model.joints()[i].idx_v, model.joints()[i].nv).setOnes();
+  if (!model.serialJoints().empty()) return selected;
+  selected.setOnes();
+  if (model.hasFreeFlyer()) selected.head<6>().setZero();
+  return selected;
+}
+
 VectorXd makeStateWeights(const Model& model) {
   const int nv = model.nv();
   VectorXd importance = VectorXd::Zero(2 * nv);
@@ -118,19 +150,11 @@ VectorXd makeStateWeights(const Model& model) {
     importance.segment<6>(0) << 0, 0, 0, 50, 50, 0;
     importance.segment<6>(nv) << 0, 0, 0, 3, 3, 1;
   }
-  std::vector<int> joints = model.serialJoints();
-  if (joints.empty())
-    for (int i = 1; i < model.numBodies(); ++i)
-      if (model.joints()[i].kind != JointKind::FreeFlyer) joints.push_back(i);
-  for (int i : joints) {
-    const Joint& joint = model.joints()[i];
-    // Hips as in the paper's walk: yaw 10, pitch 3, roll 1 for the position, 5, 3, 1 for the velocity; knees and
-    // ankles 1.
-    double position = 1, velocity = 1;
-    if (joint.name.rfind("hipz", 0) == 0) position = 10, velocity = 5;
-    if (joint.name.rfind("hipx", 0) == 0) position = 3, velocity = 3;
-    importance.segment(joint.idx_v, joint.nv).setConstant(position);
-    importance.segment(nv + joint.idx_v, joint.nv).setConstant(velocity);
+  const VectorXd selected = selectMainJoints(model);
+  for (int k = 0; k < nv; ++k) {
+    if (selected[k] == 0) continue;
+    importance[k] = model.joints()[model.dofs()[k].joint].position_importance;
+    importance[nv + k] = model.joints()[model.dofs()[k].joint].velocity_importance;
   }
   return importance.cwiseAbs2();
 }
@@ -144,9 +168,11 @@ void raiseMotorWeights(const Model& model, double weight, VectorXd& weights) {
 
 void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd& loads, StageSpec& stage) {
   const ConstraintSet& set = stage.constraints;
+  // The pyramid inscribed in the cone, and a little more: a penalty is met only nearly.
+  const double pyramid = 0.95 * costs.friction / std::sqrt(2);
   const double weight = model.mass() * model.gravity().norm();
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
-    const ContactFrame& contact = model.contacts()[model.findContact(set.closures[c].name)];
+    const ContactFrame& contact = model.contacts()[set.getContact(c)];
     const int rows = getRows(set.closures[c].kind);
     VectorXd reference = VectorXd::Zero(rows);
     reference[2] = loads[c - set.num_loops];
@@ -157,7 +183,7 @@ void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd
     if (costs.friction_weight != 0)
       stage.costs.push_back({"friction " + contact.name, costs.friction_weight / (load * load),
                              Activation::makeBarrier(VectorXd::Ones(4), VectorXd::Zero(4), VectorXd::Constant(4, 1e12)),
-                             makeFrictionPyramid(set, c, costs.friction)});
+                             makeFrictionPyramid(set, c, pyramid)});
     if (costs.pressure_weight == 0 || rows != 6 || contact.half_length <= 0 || contact.half_width <= 0) continue;
     const Eigen::Vector2d half(contact.half_length, contact.half_width);
     stage.costs.push_back({"pressure " + contact.name, costs.pressure_weight,

@@ -14,13 +14,12 @@ constexpr double kPi = 3.14159265358979323846;
 void check(const Model& model, const SquatOptions& o) {
   requireOption(o.depth >= 0.05 && o.depth <= 2, "depth", "it is outside 0.05 .. 2",
                 "give the lowest height of the centre of mass over its initial height, e.g. 0.7");
-  requireOption(o.duration > 0 && std::isfinite(o.duration), "duration", "it is not positive", "give seconds");
-  requireOption(o.settle >= 0 && std::isfinite(o.settle), "settle", "it is negative", "give seconds, or 0");
-  requireOption(o.time_step > 0 && o.time_step <= o.duration / 4, "time_step",
-                "it is not positive, or over a quarter of the motion", "give seconds, e.g. 0.015");
+  SquatOptions copy = o;
+  requireNotNegative(listOptions(copy));
+  requirePositive(listOptions(copy), {"duration", "time_step", "friction"});
+  requireOption(o.time_step <= o.duration / 4, "time_step", "it is over a quarter of the motion",
+                "give seconds, e.g. 0.015");
   requireStages(o.duration + 2 * o.settle, o.time_step);
-  requireOption(o.contact_kp >= 0, "contact_kp", "it is negative", "give 0 or more, 1/s^2");
-  requireOption(o.contact_kd >= 0, "contact_kd", "it is negative", "give 0 or more, 1/s");
   if (model.contacts().empty())
     throw ModelError(model.name(), "contacts", "a squat needs feet, the robot names no contact frame",
                      "add `contacts` to its YAML file");
@@ -31,10 +30,7 @@ StageSpec makeStage(const Model& model, const SquatOptions& o, const std::vector
   StageSpec stage;
   stage.dt = o.time_step;
   stage.constraints = makeConstraintSet(model, contacts);
-  for (int c = 0; c < stage.constraints.num_loops; ++c) {
-    stage.constraints.closures[c].kp = o.closure_kp;
-    stage.constraints.closures[c].kd = o.closure_kd;
-  }
+  setClosureGains(limitContactGains({o.closure_kp, o.closure_kd}, stage.dt), stage.constraints);
   stage.state = {o.state_weight, q0, VectorXd::Zero(model.nv()), makeStateWeights(model)};
   if (model.hasFreeFlyer()) stage.state.weights.segment<2>(3).setConstant(o.torso_weight);
   raiseMotorWeights(model, o.motor_weight, stage.state.weights);
@@ -66,7 +62,7 @@ std::vector<OptionEntry> listOptions(SquatOptions& o) {
           {"friction", &o.friction, "1", "friction coefficient"},
           {"terminal_weight", &o.terminal_weight, "1", "end at rest"},
           {"contact_kp", &o.contact_kp, "1/s^2",
-           "stabilisation of the contacts, position (limited to 1/(4 h^2), h the time step)"},
+           "stabilisation of the contacts, position (limited to 1/(2 h^2), h the time step)"},
           {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"},
           {"closure_kp", &o.closure_kp, "1/s^2", "stabilisation of the closures, position"},
           {"closure_kd", &o.closure_kd, "1/s", "stabilisation of the closures, velocity"}};

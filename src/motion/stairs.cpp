@@ -7,23 +7,19 @@
 namespace bielle {
 namespace {
 
-void require(bool ok, const std::string& option, const std::string& problem, const std::string& remedy) {
-  if (!ok) throw ModelError("", "option '" + option + "'", problem, remedy);
-}
-
 int check(const Model& model, const Stance& stance, const StairsOptions& o) {
   const ContactFrame& foot = model.contacts()[stance.contacts[0]];
-  require(std::isfinite(o.height), "height", "it is not finite", "give metres, e.g. 0.06, or -0.06 to go down");
-  require(o.depth > 2 * foot.half_length, "depth", "the sole is longer than a step", "give metres, e.g. 0.2");
-  require(o.stairs >= 1 && o.stairs <= 100 && o.stairs == std::floor(o.stairs), "stairs",
-          "it is not a whole number from 1 to 100", "give a number of steps");
-  require(o.speed > 0, "speed", "it is not positive", "give m/s, e.g. 0.3");
-  require(o.width > (stance.feet[0].p - stance.feet[1].p).norm() + 2 * foot.half_width, "width",
-          "the feet do not fit on the stairs", "give metres, e.g. 0.8");
+  requireOption(std::isfinite(o.height), "height", "it is not finite", "give metres, e.g. 0.06, or -0.06 to go down");
+  requireOption(o.depth > 2 * foot.half_length, "depth", "the sole is longer than a step", "give metres, e.g. 0.2");
+  requireOption(o.stairs >= 1 && o.stairs <= 100 && o.stairs == std::floor(o.stairs), "stairs",
+                "it is not a whole number from 1 to 100", "give a number of steps");
+  requireOption(o.speed > 0, "speed", "it is not positive", "give m/s, e.g. 0.3");
+  requireOption(o.width > (stance.feet[0].p - stance.feet[1].p).norm() + 2 * foot.half_width, "width",
+                "the feet do not fit on the stairs", "give metres, e.g. 0.8");
   const double single = o.depth / o.speed - o.gait.timing.both;
-  require(single >= 0.2 && single <= 3, "speed",
-          "a step of this depth would be " + std::to_string(single) + " s on one foot, outside 0.2 .. 3 s",
-          "change speed, depth or double_support");
+  requireOption(single >= 0.2 && single <= 3, "speed",
+                "a step of this depth would be " + std::to_string(single) + " s on one foot, outside 0.2 .. 3 s",
+                "change speed, depth or double_support");
   return static_cast<int>(o.stairs);
 }
 

@@ -51,7 +51,7 @@ struct JumpOptions {
   double touchdown_rotation_weight = 1e5;  ///< their orientation, over h, 1
   double touchdown_velocity_weight = 1e2;  ///< over h, s^2/m^2
   double terminal_weight = 1e3;            ///< of the final velocities and of the final place of the CoM
-  double contact_kp = 1e4;                 ///< stabilisation of the contacts, 1/s^2; limited to 1/(4 h^2)
+  double contact_kp = 1e4;                 ///< stabilisation of the contacts, 1/s^2; limited to 1/(2 h^2)
   double contact_kd = 200;                 ///< 1/s; limited to 1/h
 };
 

@@ -31,6 +31,12 @@ std::vector<std::pair<std::string, double>> listValues(const std::vector<OptionE
 /// \throws ModelError naming the option, unless ok
 void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy);
 
+/// \throws ModelError naming the first option that is not a finite number of 0 or more, but for those in `any_sign`
+void requireNotNegative(const std::vector<OptionEntry>& options, const std::vector<std::string>& any_sign = {});
+
+/// \throws ModelError naming the first of these options that is not positive
+void requirePositive(const std::vector<OptionEntry>& options, const std::vector<std::string>& names);
+
 /// \throws ModelError when a motion of this duration has more than 100000 stages, which may exceed the memory
 void requireStages(double seconds, double time_step);
 
@@ -78,12 +84,15 @@ VectorXd makeStandingPosture(const Model& model);
 /// free-flyer stays in place.
 VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X);
 
-/// Stabilisation of contacts, 1/s^2 and 1/s, limited to 1/(4 h^2) and 1/h with h the time step: one Euler step turns a
-/// contact velocity e into (1 - kd h) e, beyond 1/h it would swing back.
+/// Stabilisation of contacts and closures, 1/s^2 and 1/s, limited to 1/(2 h^2) and 1/h with h the time step: one Euler step
+/// turns a velocity e into (1 - kd h) e and, with kd = 1/h, a displacement d into (1 - kp h^2) d. Beyond 1/h a velocity
+/// would swing back.
 struct ContactGains {
   double kp = 0, kd = 0;
 };
 ContactGains limitContactGains(const ContactGains& gains, double time_step);
+/// Gains of the model's closures in a set of constraints.
+void setClosureGains(const ContactGains& gains, ConstraintSet& constraints);
 
 /// Contacts of the robot held at their places in q.
 std::vector<ContactTarget> makeContactTargets(const Model& model, ConstVectorRef q, const std::vector<int>& contacts,
@@ -96,6 +105,9 @@ std::vector<std::string> getContactNames(const Model& model, const std::vector<C
 /// squared): joints of the equivalent serial chain as listed, linkage joints zero, base position free.
 VectorXd makeStateWeights(const Model& model);
 
+/// Of the joints that count in it: the equivalent serial chain, or all joints but the base; nv, 1 or 0.
+VectorXd selectMainJoints(const Model& model);
+
 /// Raises the weights of motor velocities to at least `weight` (weights: 2 nv); motors of linkages could oscillate otherwise.
 void raiseMotorWeights(const Model& model, double weight, VectorXd& weights);
 
@@ -106,7 +118,7 @@ struct GroundCosts {
   /// Of leaving the friction pyramid, over the square of the foot's load (at least m g / 10), 1. Without this scaling, a
   /// weight that holds a lightly loaded foot is so stiff for a foot that carries the robot that the solver makes tiny steps.
   double friction_weight = 100;
-  double friction = 0.7;  ///< coefficient, 1
+  double friction = 0.7;  ///< coefficient of the ground, 1; the pyramid is a little inside its cone
 };
 /// Adds the costs of every active contact of the stage. \param loads  vertical force of each, in their order, N
 void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd& loads, StageSpec& stage);

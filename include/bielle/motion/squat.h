@@ -20,7 +20,7 @@ struct SquatOptions {
   double friction_weight = 100;  ///< of leaving the friction pyramid, over the load of the foot squared, 1
   double friction = 0.7;         ///< friction coefficient, 1
   double terminal_weight = 1e3;  ///< of the final velocities
-  double contact_kp = 400;       ///< stabilisation of the contacts, 1/s^2; limited to 1/(4 h^2), h the time step
+  double contact_kp = 400;       ///< stabilisation of the contacts, 1/s^2; limited to 1/(2 h^2), h the time step
   double contact_kd = 100;       ///< 1/s; limited to 1/h
   double closure_kp = 0;         ///< stabilisation of the closures, 1/s^2
   double closure_kd = 0;         ///< 1/s
