@@ -63,8 +63,11 @@ std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, 
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
     const int rows = getRows(set.closures[c].kind);
     add("contact force", makeContactForce(set, c, randomVector(rng, rows, 10)));
+    add("contact force in the world", makeContactForce(set, c, randomVector(rng, rows, 10), ForceAxes::World));
     add("friction pyramid", makeFrictionPyramid(set, c, 0.6));
-    if (rows == 6) add("centre of pressure", makeCenterOfPressure(set, c));
+    if (rows != 6) continue;
+    add("centre of pressure", makeCenterOfPressure(set, c));
+    add("centre of pressure in the world", makeCenterOfPressure(set, c, ForceAxes::World));
   }
   add("joint position", makeJointPosition(model, dofs));
   add("joint velocity", makeJointVelocity(dofs));
@@ -177,6 +180,12 @@ TEST_CASE("force residuals: a force at a known point of the sole") {
   const VectorXd q = model.makeNeutral(), v = VectorXd::Zero(model.nv());
   const VectorXd pressure = node.calc(*makeCenterOfPressure(set, constraint), q, v, lambda);
   CHECK((pressure - point.head<2>()).norm() < 1e-14);
+  VectorXd turned = q;  // about the vertical, and the sole with the base
+  turned.segment<4>(3) << 0, 0, std::sin(0.2), std::cos(0.2);
+  const Matrix3d R = makeAxisRotation(Vector3d::UnitZ(), 0.4);
+  const VectorXd level = node.calc(*makeCenterOfPressure(set, constraint, ForceAxes::World), q, v, lambda);
+  const VectorXd in_world = node.calc(*makeCenterOfPressure(set, constraint, ForceAxes::World), turned, v, lambda);
+  CHECK((in_world - R.topLeftCorner<2, 2>() * level).norm() < 1e-14);
   const VectorXd pyramid = node.calc(*makeFrictionPyramid(set, constraint, 0.5), q, v, lambda);
   CHECK((pyramid - Eigen::Vector4d(70, 30, 40, 60)).norm() < 1e-12);
   lambda[row + 2] = 0.5;  // hardly loaded: bounded, and its derivative follows

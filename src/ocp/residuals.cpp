@@ -33,27 +33,65 @@ class ComVelocity : public Residual {
   Vector3d reference_;
 };
 
-// Residuals linear or smooth in the force of one contact.
+// Residuals linear or smooth in the force of one contact, F = blockdiag(R, R) lambda with R = 1 in the axes of the contact
+// and R = R_WF in those of the world.
 class ForceResidual : public Residual {
  public:
-  ForceResidual(const ConstraintSet& set, int constraint)
-      : row_(set.offsets[constraint]), rows_(getRows(set.closures[constraint].kind)) {}
+  ForceResidual(const ConstraintSet& set, int constraint, ForceAxes axes)
+      : row_(set.offsets[constraint]),
+        rows_(getRows(set.closures[constraint].kind)),
+        in_world_(axes == ForceAxes::World),
+        body_(set.closures[constraint].body1),
+        R_BF_(set.closures[constraint].X_B1.R) {}
   bool needsForces() const override { return true; }
-  bool needsMotion() const override { return false; }
+  bool needsMotion() const override { return in_world_; }
 
  protected:
-  ConstVectorRef getForce(const NodeView& node) const { return node.lambda.segment(row_, rows_); }
+  using Force = VectorUpTo6<double>;
+  using Gradient = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;  // dr/dF, n x rows
+
+  Force getForce(const NodeView& node) const {
+    Force f = node.lambda.segment(row_, rows_);
+    if (!in_world_) return f;
+    const Matrix3d R = getAxes(node);
+    for (int i = 0; i < rows_; i += 3) f.segment<3>(i) = (R * f.segment<3>(i)).eval();
+    return f;
+  }
+
+  // dF/dlambda = blockdiag(R, R), and the forces turn with the body: dF/dq_k = J_k x F, axis by axis.
+  void addChain(const NodeView& node, const Force& f, const Gradient& gradient, ResidualRows rows) const {
+    if (!in_world_) {
+      rows.lambda.middleCols(row_, rows_) = gradient;
+      return;
+    }
+    const Matrix3d R = getAxes(node);
+    for (int i = 0; i < rows_; i += 3) rows.lambda.middleCols<3>(row_ + i).noalias() = gradient.middleCols<3>(i) * R;
+    for (int k : node.model.supportDofs(body_)) {
+      const Vector3d w = node.ws.J.col(k).tail<3>();
+      rows.q.col(k).setZero();
+      for (int i = 0; i < rows_; i += 3)
+        rows.q.col(k) += gradient.middleCols<3>(i) * w.cross(Vector3d(f.segment<3>(i)));
+    }
+  }
+
   int row_, rows_;
+
+ private:
+  Matrix3d getAxes(const NodeView& node) const { return node.ws.X_WB[body_].R * R_BF_; }
+
+  bool in_world_;
+  int body_;
+  Matrix3d R_BF_;
 };
 
 class ContactForce : public ForceResidual {
  public:
-  ContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference)
-      : ForceResidual(set, constraint), reference_(reference) {}
+  ContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference, ForceAxes axes)
+      : ForceResidual(set, constraint, axes), reference_(reference) {}
   int size() const override { return rows_; }
   void calc(const NodeView& node, VectorRef r) const override { r = getForce(node) - reference_; }
-  void calcJacobian(const NodeView&, ResidualRows rows) const override {
-    rows.lambda.middleCols(row_, rows_).setIdentity();
+  void calcJacobian(const NodeView& node, ResidualRows rows) const override {
+    addChain(node, getForce(node), Gradient::Identity(rows_, rows_), rows);
   }
 
  private:
@@ -65,19 +103,21 @@ class CenterOfPressure : public ForceResidual {
   using ForceResidual::ForceResidual;
   int size() const override { return 2; }
   void calc(const NodeView& node, VectorRef r) const override {
-    const auto f = getForce(node);
+    const Force f = getForce(node);
     const double fz = limit(f[2]);
     r[0] = -f[4] / fz;
     r[1] = f[3] / fz;
   }
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
-    const auto f = getForce(node);
+    const Force f = getForce(node);
     const double fz = limit(f[2]);
     const bool free = fz == f[2];
-    rows.lambda(0, row_ + 4) = -1 / fz;
-    rows.lambda(1, row_ + 3) = 1 / fz;
-    rows.lambda(0, row_ + 2) = free ? f[4] / (fz * fz) : 0;
-    rows.lambda(1, row_ + 2) = free ? -f[3] / (fz * fz) : 0;
+    Gradient gradient = Gradient::Zero(2, 6);
+    gradient(0, 4) = -1 / fz;
+    gradient(1, 3) = 1 / fz;
+    gradient(0, 2) = free ? f[4] / (fz * fz) : 0;
+    gradient(1, 2) = free ? -f[3] / (fz * fz) : 0;
+    addChain(node, f, gradient, rows);
   }
 
  private:
@@ -87,10 +127,11 @@ class CenterOfPressure : public ForceResidual {
 
 class FrictionPyramid : public ForceResidual {
  public:
-  FrictionPyramid(const ConstraintSet& set, int constraint, double mu) : ForceResidual(set, constraint), mu_(mu) {}
+  FrictionPyramid(const ConstraintSet& set, int constraint, double mu)
+      : ForceResidual(set, constraint, ForceAxes::Contact), mu_(mu) {}
   int size() const override { return 4; }
   void calc(const NodeView& node, VectorRef r) const override {
-    const auto f = getForce(node);
+    const Force f = getForce(node);
     r << mu_ * f[2] - f[0], mu_ * f[2] + f[0], mu_ * f[2] - f[1], mu_ * f[2] + f[1];
   }
   void calcJacobian(const NodeView&, ResidualRows rows) const override {
@@ -153,11 +194,12 @@ std::unique_ptr<Residual> makeComPosition(const Vector3d& reference) {
 std::unique_ptr<Residual> makeComVelocity(const Vector3d& reference) {
   return std::make_unique<ComVelocity>(reference);
 }
-std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference) {
-  return std::make_unique<ContactForce>(set, constraint, reference);
+std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference,
+                                           ForceAxes axes) {
+  return std::make_unique<ContactForce>(set, constraint, reference, axes);
 }
-std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint) {
-  return std::make_unique<CenterOfPressure>(set, constraint);
+std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint, ForceAxes axes) {
+  return std::make_unique<CenterOfPressure>(set, constraint, axes);
 }
 std::unique_ptr<Residual> makeFrictionPyramid(const ConstraintSet& set, int constraint, double mu) {
   return std::make_unique<FrictionPyramid>(set, constraint, mu);

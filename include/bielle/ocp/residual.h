@@ -66,11 +66,14 @@ std::unique_ptr<Residual> makeFrameVelocity(const BodyFrame& frame, const Vector
 std::unique_ptr<Residual> makeFlyHigh(const BodyFrame& frame, double slope, double ground);
 /// Horizontal distance between two frames (1), m.
 std::unique_ptr<Residual> makeFrameDistance(const BodyFrame& a, const BodyFrame& b);
-/// Rows of the force of a contact minus a reference, N and N m, in the contact frame (6 or 3). `constraint` is the
-/// index in the ConstraintSet.
-std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference);
-/// Centre of pressure of a 6D contact in its frame (x, y) (2), m.
-std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint);
+/// The axes that the force of a contact is told in; its moment is about the origin of the contact frame either way.
+enum class ForceAxes { Contact, World };
+/// Rows of the force of a contact minus a reference, N and N m (6 or 3). `constraint` is the index in the ConstraintSet.
+std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference,
+                                           ForceAxes axes = ForceAxes::Contact);
+/// Centre of pressure of a 6D contact about the origin of its frame (x, y) (2), m.
+std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint,
+                                               ForceAxes axes = ForceAxes::Contact);
 /// Friction pyramid of a contact: mu f_z - |f_x| and mu f_z - |f_y| as four rows mu f_z -+ f_{x,y} (4), N; inside when
 /// positive.
 std::unique_ptr<Residual> makeFrictionPyramid(const ConstraintSet& set, int constraint, double mu);
