@@ -222,7 +222,7 @@ TEST_CASE("walk: with the published weights the feet land where they like") {
   CHECK(solved.summary.termination == FddpTermination::Converged);
   const double speed = calcSpeed(solved.measures).x();
   CHECK(speed > 0.25);
-  CHECK(speed < 0.5);  // the velocity is one wish among others
+  CHECK(speed < 0.35);  // the velocity is one wish among others
   CHECK(solved.measures.foothold > 0.02);
   CHECK(solved.measures.slip < 5e-3);
   CHECK(solved.measures.load > 5);

@@ -34,9 +34,9 @@ std::function<MotionRequest()> makeRequests(MotionPlan (*plan)(const Model&, con
   };
 }
 
-constexpr const char* kPaper = "those published with the paper, on its structure: no footholds, a velocity instead";
+constexpr const char* kPaper = "the problem published with the paper: no footholds, a velocity instead";
 constexpr const char* kPaperJump =
-    "those published with the paper, on its structure: no paths of the feet, the height at mid-flight alone";
+    "the problem published with the paper: no paths of the feet, the height at mid-flight alone";
 
 // The motions of a sequence from the names of its options: "walk2.speed" is one of a walk.
 std::vector<std::string> listParts(const std::vector<std::pair<std::string, double>>& requested) {

@@ -101,6 +101,13 @@ void addTouchdownCosts(const Scene& scene, StageSpec& stage) {
   for (const ContactTarget& target : scene.after) {
     const ContactFrame& contact = scene.model.contacts()[target.contact];
     const BodyFrame foot{contact.body, contact.X_BF};
+    if (o.published != 0) {
+      const double h = o.time_step;
+      addFreeLanding(foot, target.X_WT,
+                     {o.touchdown_height_weight / h, o.touchdown_rotation_weight / h, o.touchdown_velocity_weight / h},
+                     stage, " " + contact.name);
+      continue;
+    }
     stage.costs.push_back({"touchdown " + contact.name, 1 / o.time_step, Activation::makeQuadratic(weights),
                            makeFramePlacement(foot, target.X_WT)});
     stage.costs.push_back({"touchdown velocity " + contact.name, o.touchdown_velocity_weight / o.time_step,
@@ -113,6 +120,14 @@ StageSpec makeTerminalStage(const Scene& scene) {
   StageSpec stage = makeStage(scene, {});
   stage.constraints = {};
   stage.control.weight = 0;
+  if (o.published != 0) {
+    const VectorXd selected = selectMainJoints(scene.model);
+    stage.state.weight = o.terminal_weight;
+    stage.state.weights << selected, selected;
+    if (scene.model.hasFreeFlyer())
+      stage.state.weights.head<6>() << 0, 0, 100, 0, 0, 2500;  // height 10, yaw 50, squared
+    return stage;
+  }
   stage.state.weight = 1;
   stage.state.weights.head(scene.model.nv()) *= o.state_weight;
   stage.state.weights.tail(scene.model.nv()).setConstant(o.terminal_weight);
@@ -124,10 +139,15 @@ StageSpec makeTerminalStage(const Scene& scene) {
 Scene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
   Scene scene{model, o, calcJumpFigures(o, model.gravity().norm()), q0, makeStateWeights(model), {}, {}, {}, {}, {}};
   if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3).setConstant(o.torso_weight);
+  if (o.published != 0) {  // hips count as other joints do, the heading does not
+    scene.state_weights.head(model.nv()) = selectMainJoints(model);
+    if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3) << o.torso_weight, o.torso_weight, 0;
+  }
   raiseMotorWeights(model, o.motor_weight, scene.state_weights);
   std::vector<int> feet;
   for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
-  const ContactGains gains = limitContactGains({o.contact_kp, o.contact_kd}, o.time_step);
+  ContactGains gains{o.contact_kp, o.contact_kd};
+  if (o.published == 0) gains = limitContactGains(gains, o.time_step);
   scene.before = makeContactTargets(model, scene.q0, feet, gains.kp, gains.kd);
   scene.after = scene.before;
   Vector3d forward = Vector3d::Zero();
@@ -139,6 +159,16 @@ Scene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
   updatePositions(model, ws, scene.q0);
   scene.com = calcCom(model, ws);
   return scene;
+}
+
+// Of all feet together, Eq. (2); the paper has its average while pushing and landing.
+double calcLoad(const Scene& scene, Phase phase, double com_acceleration) {
+  const double m = scene.model.mass(), g = scene.model.gravity().norm();
+  const JumpFigures& f = scene.figures;
+  if (scene.options.published == 0) return m * (g + com_acceleration);
+  if (phase == Phase::Push) return m * (g + f.take_off / f.push);
+  if (phase == Phase::Land) return m * (g + f.take_off / f.land);
+  return m * g;
 }
 
 // The posture of the start, thrown by Eq. (1).
@@ -221,6 +251,7 @@ std::vector<OptionEntry> listOptions(JumpOptions& o) {
           {"clearance", &o.clearance, "m", "least height of the soles at mid-flight"},
           {"friction", &o.friction, "1", "friction coefficient"},
           {"time_step", &o.time_step, "s", "length of a shooting stage"},
+          {"published", &o.published, "0 or 1", "1: the paper's problem: feet are free in flight; 0: by our costs"},
           {"apex_weight", &o.apex_weight, "1/m^2", "height of the centre of mass at mid-flight"},
           {"com_weight", &o.com_weight, "1/m^2", "height of the centre of mass on the ground"},
           {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
@@ -254,6 +285,8 @@ void setPaperWeights(JumpOptions& o) {
   o.torso_weight = 2500;
   o.motor_weight = 0;
   o.control_weight = 0.05;
+  o.published = 1;
+  o.friction_weight = 0;
   o.force_weight = 500;
   o.pressure_weight = 5;
   o.swing_weight = o.swing_rotation_weight = 0;
@@ -274,7 +307,8 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
   plan.ground.friction = options.friction;
   std::vector<StageSpec>& stages = plan.stages;
   const double g = model.gravity().norm();
-  const GroundCosts ground{options.force_weight, options.pressure_weight, options.friction_weight, options.friction};
+  const GroundCosts ground{options.force_weight, options.pressure_weight, options.friction_weight, options.friction,
+                           options.published != 0 ? ForceAxes::World : ForceAxes::Contact};
   for (Phase phase : {Phase::Stand, Phase::Push, Phase::Flight, Phase::Land, Phase::Settle}) {
     const bool over = phase == Phase::Land || phase == Phase::Settle;
     const std::vector<ContactTarget> none,
@@ -288,7 +322,7 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
       const JumpHeight com = calcJumpHeight(options, g, stages.size() * options.time_step);
       stages.push_back(makeStage(scene, contacts));
       StageSpec& stage = stages.back();
-      const double load = model.mass() * (g + com.acceleration);  // Eq. (2)
+      const double load = calcLoad(scene, phase, com.acceleration);
       addGroundCosts(model, ground, VectorXd::Constant(contacts.size(), load / contacts.size()), stage);
       if (phase != Phase::Flight) addHeightCost(scene, "com height", options.com_weight, com.height, stage);
       if (phase == Phase::Flight && 2 * i == nodes)

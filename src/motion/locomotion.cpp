@@ -91,9 +91,14 @@ VectorXd makeWeights(const Model& model, const LocomotionOptions& o) {
   return weights;
 }
 
+bool isPublished(const Scene& scene) { return scene.options.published != 0; }
+
+ContactGains limitGains(const Scene& scene, const ContactGains& gains) {
+  return isPublished(scene) ? gains : limitContactGains(gains, scene.options.timing.time_step);
+}
+
 std::vector<ContactTarget> makeTargets(const Scene& scene, const GaitPhase& phase) {
-  const LocomotionOptions& o = scene.options;
-  const ContactGains gains = limitContactGains({o.contact_kp, o.contact_kd}, o.timing.time_step);
+  const ContactGains gains = limitGains(scene, {scene.options.contact_kp, scene.options.contact_kd});
   const auto feet = scene.task.plan.getStance(phase.steps_done);
   std::vector<ContactTarget> targets;
   for (Side side : {Side::Left, Side::Right}) {
@@ -134,8 +139,8 @@ void addCost(StageSpec& stage, const std::string& name, double weight, const Vec
 void addComCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
   const LocomotionOptions& o = scene.options;
   addCost(stage, "com", 1, Vector3d(o.com_weight, o.com_weight, o.com_height_weight), makeComPosition(node.com));
-  const Vector3d direction = scene.task.com_velocity.cwiseAbs() / std::max(1e-12, scene.task.com_velocity.norm());
-  addCost(stage, "com velocity", o.com_velocity_weight, direction, makeComVelocity(scene.task.com_velocity));
+  addCost(stage, "com velocity", o.com_velocity_weight, scene.task.direction.cwiseAbs(),
+          makeComVelocity(scene.task.speed * scene.task.direction));
 }
 
 void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
@@ -145,13 +150,22 @@ void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
   VectorXd loads(set.closures.size() - set.num_loops);
   for (int i = 0; i < loads.size(); ++i) {
     const bool left = set.contacts[i] == scene.stance.contacts[0];
-    loads[i] = std::max(1.0, weight * node.load[left ? 0 : 1]);
+    const double share = isPublished(scene) ? 1.0 / loads.size() : node.load[left ? 0 : 1];
+    loads[i] = std::max(1.0, weight * share);
   }
-  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, o.friction_weight, o.friction}, loads, stage);
+  const ForceAxes axes = isPublished(scene) ? ForceAxes::World : ForceAxes::Contact;
+  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, o.friction_weight, o.friction, axes}, loads, stage);
 }
 
 Vector6d makeVector(double x, double z, double rotation) {
   return (Vector6d() << x, x, z, Vector3d::Constant(rotation)).finished();
+}
+
+// A swing costs something where it is near the ground, which rises from stair to stair along with it.
+double calcGround(const Scene& scene, const GaitNode& node, const Footstep& step) {
+  const auto feet = scene.task.plan.getStance(scene.gait.phases[node.phase].steps_done);
+  const double standing = feet[static_cast<int>(getOther(step.side))].p.z();
+  return standing + node.progress * (step.X_WF.p.z() - standing);
 }
 
 void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& step, StageSpec& stage) {
@@ -163,13 +177,22 @@ void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& ste
           makeVector(o.swing_velocity_weight, o.swing_velocity_weight, o.swing_velocity_weight),
           makeFrameVelocity(foot, node.V_F));
   addCost(stage, "fly high", o.fly_high_weight, Eigen::Vector2d::Ones(),
-          makeFlyHigh(foot, o.fly_high_slope, step.X_WF.p.z()));
+          makeFlyHigh(foot, o.fly_high_slope, calcGround(scene, node, step)));
+  if (o.feet_distance_weight != 0)
+    stage.costs.push_back({"feet distance", o.feet_distance_weight,
+                           Activation::makeBarrier(VectorXd::Ones(1), VectorXd::Constant(1, o.feet_distance),
+                                                   VectorXd::Constant(1, 1e12)),
+                           makeFrameDistance(getFoot(scene, Side::Left), getFoot(scene, Side::Right))});
 }
 
 void addLandingCosts(const Scene& scene, const Footstep& step, StageSpec& stage) {
   const LocomotionOptions& o = scene.options;
   const double h = stage.kind == StageKind::Impact ? 1 : stage.dt;
   const BodyFrame foot = getFoot(scene, step.side);
+  if (isPublished(scene))
+    return addFreeLanding(foot, step.X_WF,
+                          {o.landing_height_weight / h, o.landing_rotation_weight / h, o.landing_velocity_weight / h},
+                          stage);
   addCost(stage, "landing", 1 / h,
           makeVector(o.landing_foothold_weight, o.landing_height_weight, o.landing_rotation_weight),
           makeFramePlacement(foot, step.X_WF));
@@ -181,16 +204,11 @@ StageSpec makeStage(const Scene& scene, const GaitNode& node, const std::vector<
   const GaitPhase& phase = scene.gait.phases[node.phase];
   StageSpec stage = makeRegularizedStage(scene, node);
   stage.constraints = makeConstraintSet(scene.model, contacts);
-  setClosureGains(limitContactGains({o.closure_kp, o.closure_kd}, stage.dt), stage.constraints);
+  setClosureGains(limitGains(scene, {o.closure_kp, o.closure_kd}), stage.constraints);
   addComCosts(scene, node, stage);
   addForceCosts(scene, node, stage);
   if (phase.swings) addSwingCosts(scene, node, scene.task.plan.steps[phase.steps_done], stage);
   if (node.lands && o.rigid_landing == 0) addLandingCosts(scene, scene.task.plan.steps[phase.steps_done - 1], stage);
-  if (o.feet_distance_weight != 0)
-    stage.costs.push_back({"feet distance", o.feet_distance_weight,
-                           Activation::makeBarrier(VectorXd::Ones(1), VectorXd::Constant(1, o.feet_distance),
-                                                   VectorXd::Constant(1, 1e12)),
-                           makeFrameDistance(getFoot(scene, Side::Left), getFoot(scene, Side::Right))});
   return stage;
 }
 
@@ -236,6 +254,10 @@ VectorXd makeGuess(const Scene& scene, const GaitNode& node) {
   const Model& model = scene.model;
   VectorXd x = VectorXd::Zero(model.nq() + model.nv());
   x.head(model.nq()) = scene.stance.q;
+  if (isPublished(scene)) {  // on stairs as high as the path, since fly high grows exponentially below the ground
+    x[2] += node.com.z() - scene.stance.com.z();
+    return x;
+  }
   const Matrix3d turn = makeAxisRotation(Vector3d::UnitZ(), node.heading);
   x.head<3>() = node.com + turn * (scene.stance.q.head<3>() - scene.stance.com);
   x.segment<4>(3) = makeHeading(scene, node);
@@ -247,6 +269,11 @@ StageSpec makeTerminalStage(const Scene& scene) {
   const int nv = scene.model.nv();
   StageSpec stage = makeRegularizedStage(scene, node);
   stage.control.weight = 0;
+  if (isPublished(scene)) {
+    stage.state = {scene.options.terminal_weight, scene.stance.q, VectorXd::Zero(nv), VectorXd::Zero(2 * nv)};
+    stage.state.weights.tail(nv) = selectMainJoints(scene.model);
+    return stage;
+  }
   stage.state.weight = 1;
   stage.state.weights.head(nv) *= scene.options.state_weight;
   stage.state.weights.tail(nv).setConstant(scene.options.terminal_weight);
@@ -256,79 +283,7 @@ StageSpec makeTerminalStage(const Scene& scene) {
 
 }  // namespace
 
-std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
-  return {
-      {"start_support", &o.timing.start, "s", "double support before the first step, at least"},
-      {"start_pressure", &o.start_pressure, "1",
-       "it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given"},
-      {"single_support", &o.timing.single, "s", "one foot on the ground"},
-      {"double_support", &o.timing.both, "s", "both feet on the ground between two steps"},
-      {"end_support", &o.timing.end, "s", "double support after the last step"},
-      {"time_step", &o.timing.time_step, "s", "length of a shooting stage"},
-      {"swing_height", &o.swing.height, "m", "apex of the swing foot over the higher end of its path"},
-      {"swing_apex", &o.swing.apex, "1", "when it is reached, from 0 to 1"},
-      {"swing_leave", &o.swing.leave, "1", "when the swing foot starts to move horizontally, from 0 to 1"},
-      {"swing_arrive", &o.swing.arrive, "1", "when it is over its foothold, from 0 to 1"},
-      {"friction", &o.friction, "1", "friction coefficient"},
-      {"rigid_landing", &o.rigid_landing, "0 or 1",
-       "1: feet that land stop by a rigid impact; 0: softly, by costs alone"},
-      {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
-      {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
-      {"heading_weight", &o.heading_weight, "1", "head where the feet do, within the state regularization"},
-      {"motor_weight", &o.motor_weight, "1", "keep motors slow, within the state regularization"},
-      {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
-      {"com_weight", &o.com_weight, "1/m^2", "horizontal position of the centre of mass"},
-      {"com_height_weight", &o.com_height_weight, "1/m^2", "height of the centre of mass"},
-      {"com_velocity_weight", &o.com_velocity_weight, "s^2/m^2", "velocity of the centre of mass, along the way"},
-      {"swing_weight", &o.swing_weight, "1/m^2", "path of the swing foot"},
-      {"swing_velocity_weight", &o.swing_velocity_weight, "s^2/m^2", "velocity of the swing foot along its path"},
-      {"swing_rotation_weight", &o.swing_rotation_weight, "1", "orientation of the swing foot"},
-      {"fly_high_weight", &o.fly_high_weight, "s^2/m^2", "no horizontal velocity of the swing foot near the ground"},
-      {"fly_high_slope", &o.fly_high_slope, "1/m", "how that fades with height"},
-      {"landing_foothold_weight", &o.landing_foothold_weight, "1/m^2", "horizontal place of a landing foot"},
-      {"landing_height_weight", &o.landing_height_weight, "1/m^2", "height of a landing foot"},
-      {"landing_rotation_weight", &o.landing_rotation_weight, "1", "a landing foot is flat"},
-      {"landing_velocity_weight", &o.landing_velocity_weight, "s^2/m^2", "a landing foot is still"},
-      {"force_weight", &o.force_weight, "1", "pass the weight evenly from foot to foot, over (m g)^2"},
-      {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
-      {"friction_weight", &o.friction_weight, "1",
-       "stay inside the friction pyramid, over the load of the foot squared"},
-      {"feet_distance", &o.feet_distance, "m", "least distance of the feet"},
-      {"feet_distance_weight", &o.feet_distance_weight, "1/m^2", "feet do not come nearer"},
-      {"terminal_weight", &o.terminal_weight, "1", "end at rest, in place"},
-      {"contact_kp", &o.contact_kp, "1/s^2",
-       "stabilisation of the contacts, position (limited to 1/(2 h^2), h the time step)"},
-      {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"},
-      {"closure_kp", &o.closure_kp, "1/s^2", "stabilisation of the closures, position (full formulation)"},
-      {"closure_kd", &o.closure_kd, "1/s", "stabilisation of the closures, velocity (full formulation)"}};
-}
-
-void setPaperWeights(LocomotionOptions& o) {
-  o.timing.start = o.timing.end = 0.2;
-  o.start_pressure = 0;
-  o.timing.single = 0.4;
-  o.timing.both = o.timing.time_step = 0.015;
-  o.state_weight = 1;
-  o.torso_weight = 2500;
-  o.heading_weight = 0;
-  o.motor_weight = 0;
-  o.control_weight = 0.02;
-  o.com_weight = 0;
-  o.com_height_weight = 1000;
-  o.com_velocity_weight = 100;
-  o.swing_weight = o.swing_rotation_weight = o.swing_velocity_weight = 0;
-  o.fly_high_weight = 100;
-  o.fly_high_slope = 75;
-  o.landing_foothold_weight = 0;
-  o.landing_height_weight = o.landing_rotation_weight = o.landing_velocity_weight = 1e4;
-  o.force_weight = 10;
-  o.pressure_weight = 10;
-  o.feet_distance_weight = 100;
-  o.terminal_weight = 1e4;
-  o.contact_kp = 0;
-  o.contact_kd = 100;
-  o.closure_kp = o.closure_kd = 0;
-}
+Side getFirstFoot(const LocomotionOptions& options) { return options.published != 0 ? Side::Left : Side::Right; }
 
 std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, const Vector3d& direction,
                                  int steps_per_cycle) {
@@ -368,7 +323,7 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   check(options);
   Scene scene{
       model, stance, task, options, makeStartingGait(model, stance, task, options), makeWeights(model, options)};
-  check(scene);
+  if (!isPublished(scene)) check(scene);
   MotionPlan plan;
   plan.name = task.name;
   plan.ground = task.ground;

@@ -166,6 +166,16 @@ void raiseMotorWeights(const Model& model, double weight, VectorXd& weights) {
   }
 }
 
+void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights& weights, StageSpec& stage,
+                    const std::string& suffix) {
+  stage.costs.push_back({"landing height" + suffix, weights.height, Activation::makeQuadratic(Vector3d::UnitZ()),
+                         makeFrameTranslation(foot, X_WF.p)});
+  stage.costs.push_back({"landing tilt" + suffix, weights.tilt, Activation::makeQuadratic(Vector3d(1, 1, 0)),
+                         makeFrameRotation(foot, X_WF.R)});
+  stage.costs.push_back({"landing velocity" + suffix, weights.velocity, Activation::makeQuadratic(Vector6d::Ones()),
+                         makeFrameVelocity(foot)});
+}
+
 void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd& loads, StageSpec& stage) {
   const ConstraintSet& set = stage.constraints;
   // The pyramid inscribed in the cone, and a little more: a penalty is met only nearly.
@@ -178,7 +188,8 @@ void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd
     reference[2] = loads[c - set.num_loops];
     if (costs.force_weight != 0)
       stage.costs.push_back({"force " + contact.name, costs.force_weight / (weight * weight),
-                             Activation::makeQuadratic(VectorXd::Ones(rows)), makeContactForce(set, c, reference)});
+                             Activation::makeQuadratic(VectorXd::Ones(rows)),
+                             makeContactForce(set, c, reference, costs.axes)});
     const double load = std::max(reference[2], 0.1 * weight);
     if (costs.friction_weight != 0)
       stage.costs.push_back({"friction " + contact.name, costs.friction_weight / (load * load),
@@ -187,7 +198,8 @@ void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd
     if (costs.pressure_weight == 0 || rows != 6 || contact.half_length <= 0 || contact.half_width <= 0) continue;
     const Eigen::Vector2d half(contact.half_length, contact.half_width);
     stage.costs.push_back({"pressure " + contact.name, costs.pressure_weight,
-                           Activation::makeQuadratic(half.cwiseAbs2().cwiseInverse()), makeCenterOfPressure(set, c)});
+                           Activation::makeQuadratic(half.cwiseAbs2().cwiseInverse()),
+                           makeCenterOfPressure(set, c, costs.axes)});
   }
 }
 

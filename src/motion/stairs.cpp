@@ -27,7 +27,7 @@ int check(const Model& model, const Stance& stance, const StairsOptions& o) {
 FootstepPlan planFootholds(const Stance& stance, const StairsOptions& o, int stairs) {
   FootstepPlan plan{stance.feet, {}};
   const Vector3d up = calcMiddle(stance.feet[0], stance.feet[1]).R * Vector3d(o.depth, 0, o.height);
-  Side side = Side::Right;
+  Side side = getFirstFoot(o.gait);
   for (int i = 1; i <= stairs + 1; ++i, side = getOther(side)) {
     SE3 X = stance.feet[static_cast<int>(side)];
     X.p += std::min(i, stairs) * up;
@@ -70,9 +70,15 @@ std::vector<OptionEntry> listOptions(StairsOptions& o) {
 
 void setPaperWeights(StairsOptions& o) {
   setPaperWeights(o.gait);
-  o.gait.timing.start = 0.1;
-  o.gait.timing.both = 0.105;
-  o.gait.timing.end = 0.5;
+  // The ground rises by 0.1 m/s under feet of 0.5 s in the air, cut to 33 time steps, and 7 on the ground: 0.6 s a step.
+  const double h = o.gait.timing.time_step;
+  o.height = 0.1 * 40 * h;
+  o.speed = 0.3;
+  o.depth = o.speed * 40 * h;
+  o.stairs = 7;
+  o.gait.timing.start = 6 * h;       // 0.1 s
+  o.gait.timing.both = 7 * h;        // about 0.1 s
+  o.gait.timing.end = (7 + 33) * h;  // 0.5 s after the last double support
   o.gait.state_weight = 0.05;
   o.gait.control_weight = 0.002;
   o.gait.com_height_weight = 0;
@@ -102,7 +108,8 @@ MotionPlan planStairs(const Model& model, const StairsOptions& options, const Ve
   task.name = "stairs";
   task.plan = planFootholds(stance, o, stairs);
   task.ground = makeStairsGround(o, start);
-  task.com_velocity = start.R * Vector3d(o.speed, 0, 0);
+  task.direction = start.R * Vector3d::UnitX();
+  task.speed = o.speed;
   MotionPlan plan = planLocomotion(model, stance, task, o.gait);
   plan.requested = listValues(listOptions(o));
   const std::vector<Goal> speed = makeSpeedGoals(plan.schedule, o.speed, start.R.col(0));

@@ -13,10 +13,10 @@ struct StepsPlan {
   SE3 start;  // middle of the feet
 };
 
-// \param velocity  in the axes of the feet at the start
+// \param direction  in the axes of the feet at the start
 template <typename Options>
-StepsPlan planSteps(const Model& model, const char* name, const StepCommand& command, const Vector3d& velocity,
-                    Side first, const Options& options, const VectorXd& q0) {
+StepsPlan planSteps(const Model& model, const char* name, const StepCommand& command, const Vector3d& direction,
+                    double speed, Side first, const Options& options, const VectorXd& q0) {
   const int steps = countSteps("steps", options.steps);
   const Stance stance = makeStance(model, options.gait, q0);
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
@@ -24,7 +24,8 @@ StepsPlan planSteps(const Model& model, const char* name, const StepCommand& com
   task.name = name;
   task.plan = planFootsteps(stance.feet[0], stance.feet[1], command, steps, first);
   task.ground.height = start.p.z();
-  task.com_velocity = start.R * velocity;
+  task.direction = start.R * direction;
+  task.speed = speed;
   MotionPlan plan = planLocomotion(model, stance, task, options.gait);
   Options copy = options;
   plan.requested = listValues(listOptions(copy));
@@ -61,25 +62,31 @@ std::vector<OptionEntry> listOptions(TurnOptions& o) {
               o.gait);
 }
 
-void setPaperWeights(WalkOptions& o) { setPaperWeights(o.gait); }
+void setPaperWeights(WalkOptions& o) {
+  setPaperWeights(o.gait);
+  o.steps = 8;
+}
 
 void setPaperWeights(SideWalkOptions& o) {
   setPaperWeights(o.gait);
+  o.speed = -0.4;
+  o.steps = 8;
   o.gait.state_weight = 0.3;
   o.gait.pressure_weight = 1;
   o.gait.feet_distance_weight = 10;
 }
 
 MotionPlan planWalk(const Model& model, const WalkOptions& o, const VectorXd& q0) {
-  StepsPlan plan = planSteps(model, "walk", {o.speed * o.gait.timing.stepDuration(), 0, 0}, Vector3d(o.speed, 0, 0),
-                             Side::Right, o, q0);
+  StepsPlan plan = planSteps(model, "walk", {o.speed * o.gait.timing.stepDuration(), 0, 0}, Vector3d::UnitX(), o.speed,
+                             getFirstFoot(o.gait), o, q0);
   addGoals(makeSpeedGoals(plan.motion.schedule, o.speed, plan.start.R.col(0)), plan.motion);
   return std::move(plan.motion);
 }
 
 MotionPlan planSideWalk(const Model& model, const SideWalkOptions& o, const VectorXd& q0) {
-  StepsPlan plan = planSteps(model, "side-walk", {0, o.speed * o.gait.timing.stepDuration(), 0},
-                             Vector3d(0, o.speed, 0), o.speed > 0 ? Side::Left : Side::Right, o, q0);
+  const Side opening = o.speed > 0 ? Side::Left : Side::Right;
+  StepsPlan plan = planSteps(model, "side-walk", {0, o.speed * o.gait.timing.stepDuration(), 0}, Vector3d::UnitY(),
+                             o.speed, o.gait.published != 0 ? getFirstFoot(o.gait) : opening, o, q0);
   addGoals(makeSpeedGoals(plan.motion.schedule, o.speed, plan.start.R.col(1), 2), plan.motion);
   return std::move(plan.motion);
 }
@@ -88,7 +95,7 @@ MotionPlan planTurn(const Model& model, const TurnOptions& o, const VectorXd& q0
   if (!(o.radius >= 0))
     throw ModelError("", "option 'radius'", "it is negative", "give metres, and a negative angle to turn to the right");
   const double yaw = o.angle / std::max(1, countSteps("steps", o.steps) - 1);
-  StepsPlan plan = planSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(),
+  StepsPlan plan = planSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(), 0,
                              yaw > 0 ? Side::Left : Side::Right, o, q0);
   const int nodes = plan.motion.schedule.numStages();
   addGoals({{GoalKind::Turn, "angle", o.angle, calcTolerance(o.angle, 0.02), 0, nodes}}, plan.motion);

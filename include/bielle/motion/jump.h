@@ -19,6 +19,11 @@
 /// - touchdown, at the first node of the landing: placement and velocity of the feet, over h. The desired velocity is zero:
 ///   the legs fold as fast as the body falls.
 /// The terminal node has the velocities, the posture, and the centre of mass over the feet as at the start.
+///
+/// With `published`, the problem is that of the paper's example code: feet are free in flight and are asked at touchdown for
+/// their height, no tilt and no velocity; the load is the average of Eq. (2) while pushing and landing, the weight before and
+/// after; hips count as other joints do, contacts have the gains given; the terminal node has the height and the heading of
+/// the base, and the joints of the legs (Model::serialJoints) with their velocities.
 #include "bielle/motion/motion.h"
 
 namespace bielle {
@@ -33,6 +38,7 @@ struct JumpOptions {
   double stretch = 0.02;     ///< height of the CoM at take-off and touchdown over that at the start, m
   double clearance = 0.04;   ///< least height of the soles at mid-flight, m
   double friction = 0.7;     ///< coefficient, 1
+  double published = 0;      ///< 1: the paper's problem, below; 0: by our costs
   double time_step = 0.005;  ///< s
 
   double apex_weight = 1e4;                ///< of the CoM's height at mid-flight, over h, 1/m^2
@@ -58,8 +64,7 @@ struct JumpOptions {
 /// Every number of the options by name, pointing into `options`.
 std::vector<OptionEntry> listOptions(JumpOptions& options);
 
-/// Weights and durations of the paper's jump (its example code), on its structure: no paths and footholds of the feet, the
-/// height of the CoM at mid-flight alone. Hips keep the importance of the walk, theirs was that of the other joints.
+/// The paper's problem with the weights and durations of its jump (its example code), as far as its figures tell.
 void setPaperWeights(JumpOptions& options);
 
 /// What a jump is in numbers, Eq. (1), with the durations that fit the time step.

@@ -15,6 +15,15 @@
 /// constant tau = sqrt(z / g), a centre of pressure held back by d for a time T brings the robot onto its path when
 ///     d (1 - exp(-T / tau)) = v tau,                                                                           (1)
 /// where v falls with T as well. The first double support is as long as d in the soles asks for.
+///
+/// With `published`, the problem is that of the paper's example code, of which the walk is known to the last digit:
+/// - no footholds: nothing but the velocity of the CoM leads forward. A landing foot is asked for its height, for no tilt
+///   and no velocity; its place, its heading and the path of a swing have no costs;
+/// - the force reference is the weight on one foot, half of it on each of two, and changes at once; forces and centres of
+///   pressure are in the axes of the world;
+/// - contacts and closures have the gains given, without limits;
+/// - the terminal node has the velocities of the joints of the legs alone (Model::serialJoints);
+/// - the guess is the standing posture at rest, as high as the path of the centre of mass.
 #include "bielle/motion/gait.h"
 #include "bielle/motion/motion.h"
 
@@ -25,6 +34,7 @@ struct LocomotionOptions {
   double start_pressure = 0.4;  ///< largest d of Eq. (1) over the soles' half length; 0: timing.start as it is given
   SwingShape swing;
   double friction = 0.7;  ///< coefficient, 1
+  double published = 0;   ///< 1: the paper's problem, below; 0: on footholds
   /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time and bears the landing
   /// costs, as they stand before the foot stops. 0: soft landing by costs alone; the contact's stabilisation stops the
   /// foot within a time step.
@@ -63,8 +73,7 @@ struct LocomotionOptions {
 
 std::vector<OptionEntry> listOptions(LocomotionOptions& options);
 
-/// Weights and durations of the paper's walk (its example code), on its structure: the CoM's velocity in place of its
-/// position, fly high and impacts in place of foot paths and footholds.
+/// The paper's problem with the weights and durations of its walk (its example code).
 void setPaperWeights(LocomotionOptions& options);
 
 /// The robot as it stands before the first step.
@@ -77,12 +86,16 @@ struct Stance {
 /// The stance in a closed posture q0. \throws ModelError when the robot lacks a foot
 Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0);
 
+/// The foot that steps first where none has to: the left one in the published problem.
+Side getFirstFoot(const LocomotionOptions& options);
+
 /// The steps to take and the ground to take them on.
 struct LocomotionTask {
   std::string name;
   FootstepPlan plan;
   Ground ground;
-  Vector3d com_velocity = Vector3d::Zero();  ///< at steady steps, m/s
+  Vector3d direction = Vector3d::Zero();  ///< of the way, of length 1, or zero where there is none
+  double speed = 0;                       ///< of the CoM along it, at steady steps, m/s
 };
 
 /// Mean speed of the centre of mass over the steady steps: from the second landing to the last but two (in short motions from

@@ -118,8 +118,19 @@ struct GroundCosts {
   /// Of leaving the friction pyramid, over the square of the foot's load (at least m g / 10), 1. Without this scaling, a
   /// weight that holds a lightly loaded foot is so stiff for a foot that carries the robot that the solver makes tiny steps.
   double friction_weight = 100;
-  double friction = 0.7;  ///< coefficient of the ground, 1; the pyramid is a little inside its cone
+  double friction = 0.7;                ///< coefficient of the ground, 1; the pyramid is a little inside its cone
+  ForceAxes axes = ForceAxes::Contact;  ///< of force reference and centre of pressure
 };
+/// What is asked of a foot that may land anywhere, as in the paper: the height of a place, no tilt, no velocity.
+struct LandingWeights {
+  double height = 0;    ///< 1/m^2
+  double tilt = 0;      ///< of the rotation about x and y of the place, 1
+  double velocity = 0;  ///< and angular velocity, s^2/m^2 and s^2
+};
+/// \param suffix  of the names of the costs, where several feet land at once
+void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights& weights, StageSpec& stage,
+                    const std::string& suffix = "");
+
 /// Adds the costs of every active contact of the stage. \param loads  vertical force of each, in their order, N
 void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd& loads, StageSpec& stage);
 
