@@ -145,7 +145,7 @@ MatrixXd differentiate(const VectorXd& x, double h, const std::function<VectorXd
 
 double calcRelativeError(const MatrixXd& a, const MatrixXd& b) {
   if (a.size() == 0) return 0;
-  return (a - b).cwiseAbs().maxCoeff() / std::max(b.cwiseAbs().maxCoeff(), 1e-6);
+  return (a - b).cwiseAbs().maxCoeff<Eigen::PropagateNaN>() / std::max(b.cwiseAbs().maxCoeff(), 1e-6);
 }
 
 }  // namespace bielle::testing
