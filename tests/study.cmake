@@ -8,3 +8,5 @@ bielle_test(compare SOURCES test_compare.cpp robot_directory.cpp run_command.cpp
 target_compile_definitions(test_compare PRIVATE BIELLE_COMMAND="$<TARGET_FILE:bielle_command>")
 add_dependencies(test_compare bielle_command)
 set_tests_properties(compare PROPERTIES LABELS system)
+
+bielle_test(claims SOURCES test_claims.cpp LIBS bielle_study)

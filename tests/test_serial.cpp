@@ -237,6 +237,8 @@ TEST_CASE("a lift fails where the linkage ends, and says so") {
   CHECK(lifted.nodes.size() == beyond + 1);
   CHECK(lifted.nodes.back().status == LiftStatus::UnreachablePosture);
   CHECK_THAT(lifted.nodes.back().message, Catch::Contains("joint 'rocker_joint' is asked for"));
+  CHECK(lifted.nodes.back().joint == "rocker_joint");
+  CHECK(lifted.nodes.front().joint.empty());
   CHECK(lifted.trajectory.xs.size() == beyond);
   CHECK(lifted.trajectory.us.size() + 1 == beyond);
   CHECK(lifted.constraints.size() == lifted.trajectory.us.size());
@@ -253,6 +255,7 @@ TEST_CASE("a lift fails where the linkage ends, and says so") {
   CHECK(singular.nodes.back().status == LiftStatus::SingularLinkage);
   CHECK(singular.nodes.size() == 11);
   CHECK_THAT(singular.nodes.back().message, Catch::Contains("dead point"));
+  CHECK(singular.nodes.back().joint == "rocker_joint");
 
   to_the_end.a.pop_back();
   CHECK_THROWS_AS(lift(fourbar, serial, to_the_end), ModelError);

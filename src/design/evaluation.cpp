@@ -83,8 +83,7 @@ void addKeptMotion(const Model& closed, const DesignMotion& motion, SolvedMotion
   const Motion serial_motion = makeReducedMotion(serial.model, motion);
   solved.serial =
       makeSerialTrajectory(serial_motion, restrictRecord(closed, serial.model, serial_motion, solved.record));
-  const VectorXd dofs = VectorXd::LinSpaced(closed.nv(), 0, closed.nv() - 1);
-  for (const double dof : restrictVelocity(closed, serial.model, dofs)) solved.kept_dofs.push_back(std::lround(dof));
+  solved.kept_dofs = findRestrictedDofs(closed, serial.model);
 }
 
 LiftResult liftMotion(const Model& model, const SerialTrajectory& kept) {

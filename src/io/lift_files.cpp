@@ -90,6 +90,7 @@ std::vector<std::string> writeLift(const std::string& directory, LiftMethod meth
                {"failed_node", lifted.lifted() ? Json(nullptr) : Json(lifted.nodes.size() - 1)},
                {"status", getName(last.status)},
                {"message", last.message},
+               {"joint", last.joint},
                {"nodes", nodes}};
   AsideFile file(path);
   file.write(formatJson(json) + "\n");

@@ -190,8 +190,8 @@ std::vector<Claim> judgeWalk(const StudyResult& result, const Model& model) {
        "peak knee torque, lifted over closed: " + describePeakRatios(result.comparisons)}};
 }
 
-// Excessive: twice the closed model's peak of the given motors in what was lifted, or a linkage that cannot follow whose
-// joint is named so.
+// Excessive: twice the closed model's peak of the given motors in what was lifted, or a linkage that cannot follow, of a
+// joint whose name begins so.
 Claim judgeExcess(const StudyResult& result, const char* text, Load Performance::*load, const std::string& joint) {
   const Comparisons& all = result.comparisons;
   double ratio = 0;
@@ -199,7 +199,7 @@ Claim judgeExcess(const StudyResult& result, const char* text, Load Performance:
     if (hasClosed(entry) && (entry.lifted.*load).peak > 0)
       ratio = std::max(ratio, (entry.lifted.*load).peak / (entry.closed.*load).peak);
   const auto fails = [&](const Comparison& entry) {
-    return failsToLift(entry) && entry.lifted.lift.message.find("'" + joint) != std::string::npos;
+    return failsToLift(entry) && entry.lifted.lift.joint.rfind(joint, 0) == 0;
   };
   const Verdict verdict = std::none_of(all.begin(), all.end(), hasSerial) ? Verdict::Open
                           : ratio > 2 || count(all, fails) > 0            ? Verdict::Agrees

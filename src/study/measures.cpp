@@ -88,6 +88,7 @@ LiftFacts readLift(const std::string& directory, const Performance& lifted) {
   readJsonFile(file, kRemedy, [&](const Json& json) {
     if (!lifted.success) {
       facts.message = json.at("message");
+      facts.joint = json.at("joint");
       const std::string status = json.at("status");
       facts.at_linkage =
           status == getName(LiftStatus::UnreachablePosture) || status == getName(LiftStatus::SingularLinkage);

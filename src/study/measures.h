@@ -31,6 +31,7 @@ struct Load {
 struct LiftFacts {
   std::string message;       // why it ended early, or empty
   bool at_linkage = false;   // it ended where a linkage is out of reach or at a dead point, not for lack of accuracy
+  std::string joint;         // that this linkage drives, or empty
   double until = kMissing;   // time of the last node that was lifted, s
   double margin = kMissing;  // least over nodes and linkages; 0 is a dead point of a joint
 };

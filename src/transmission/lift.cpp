@@ -73,6 +73,10 @@ class Lifter {
     result_.nodes.back().message = why;
     return false;
   }
+  bool failAtLinkage(LiftStatus status, const PostureLift& posture) {
+    result_.nodes.back().joint = posture.joint();
+    return fail(status, posture.why());
+  }
 
   // The closed state of node k: lifted by itself, or where the step before has led.
   bool setState(int k, VectorXd& x) {
@@ -82,7 +86,7 @@ class Lifter {
     const LiftStatus status = stepped ? posture_.setClosedConfiguration(x.head(closed_.nq()), options_.singular)
                                       : posture_.setConfiguration(trajectory_.q[k], options_.singular);
     node.margin = posture_.margin();
-    if (status != LiftStatus::Lifted) return fail(status, posture_.why());
+    if (status != LiftStatus::Lifted) return failAtLinkage(status, posture_);
     if (!stepped) {
       x.resize(closed_.nq() + closed_.nv());
       x << posture_.q(), posture_.liftVelocity(trajectory_.v[k]);
@@ -99,7 +103,7 @@ class Lifter {
   bool failToFollow(int k, const char* what, double error) {
     PostureLift other = posture_;
     const LiftStatus status = other.setConfiguration(trajectory_.q[k], options_.singular);
-    if (status != LiftStatus::Lifted) return fail(status, other.why());
+    if (status != LiftStatus::Lifted) return failAtLinkage(status, other);
     const bool posture = error == result_.nodes.back().position_error;
     return fail(LiftStatus::Inaccurate,
                 describe(what, error, posture ? options_.position_tolerance : options_.velocity_tolerance));

@@ -38,10 +38,9 @@ LiftStatus PostureLift::setConfiguration(const VectorXd& q_s, double singular) {
     VectorXd target(drive.linkage.size()), q_cluster(drive.linkage.cluster->model.nq());
     for (int j = 0; j < target.size(); ++j) target[j] = q_s[drive.serial_positions[j]];
     gatherConfiguration(closed_, *drive.linkage.cluster, q_, q_cluster);
-    if (!drive.here.update(*drive.linkage.cluster, q_cluster)) {
-      why_ = drive.here.describeFailure(*drive.linkage.cluster);
-      return LiftStatus::SingularLinkage;
-    }
+    if (!drive.here.update(*drive.linkage.cluster, q_cluster))
+      return fail(LiftStatus::SingularLinkage, drive.linkage.joint_names.front(),
+                  drive.here.describeFailure(*drive.linkage.cluster));
     const LiftStatus status = closeDrive(drive, target);
     if (status != LiftStatus::Lifted) return status;
     scatterConfiguration(closed_, *drive.linkage.cluster, drive.here.basis().q, q_);
@@ -54,9 +53,9 @@ LiftStatus PostureLift::setClosedConfiguration(const VectorXd& q, double singula
   for (Drive& drive : drives_) {
     VectorXd q_cluster(drive.linkage.cluster->model.nq());
     gatherConfiguration(closed_, *drive.linkage.cluster, q_, q_cluster);
-    if (drive.here.update(*drive.linkage.cluster, q_cluster)) continue;
-    why_ = drive.here.describeFailure(*drive.linkage.cluster);
-    return LiftStatus::SingularLinkage;
+    if (!drive.here.update(*drive.linkage.cluster, q_cluster))
+      return fail(LiftStatus::SingularLinkage, drive.linkage.joint_names.front(),
+                  drive.here.describeFailure(*drive.linkage.cluster));
   }
   return checkMargin(singular);
 }
@@ -89,8 +88,13 @@ LiftStatus PostureLift::closeDrive(Drive& drive, const VectorXd& target) {
   std::ostringstream text;
   text << "joint '" << linkage.joint_names[worst] << "' is asked for " << target[worst] << ", its linkage comes to "
        << target[worst] - miss[worst];
-  why_ = text.str();
-  return LiftStatus::UnreachablePosture;
+  return fail(LiftStatus::UnreachablePosture, linkage.joint_names[worst], text.str());
+}
+
+LiftStatus PostureLift::fail(LiftStatus status, const std::string& joint, const std::string& why) {
+  joint_ = joint;
+  why_ = why;
+  return status;
 }
 
 LiftStatus PostureLift::checkMargin(double singular) {
@@ -101,8 +105,9 @@ LiftStatus PostureLift::checkMargin(double singular) {
     calcLinkageTangent(drive.linkage, drive.here, T, &margin);
     margin_ = std::min(margin_, margin);
     if (margin > singular) continue;
-    why_ = "the linkage of joint '" + drive.linkage.joint_names.front() + "' is at a dead point of the joint";
-    return LiftStatus::SingularLinkage;
+    const std::string& joint = drive.linkage.joint_names.front();
+    return fail(LiftStatus::SingularLinkage, joint,
+                "the linkage of joint '" + joint + "' is at a dead point of the joint");
   }
   return LiftStatus::Lifted;
 }

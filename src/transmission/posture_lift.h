@@ -12,7 +12,8 @@ class PostureLift {
  public:
   PostureLift(const Model& closed, const SerialModel& serial);
 
-  // Closes the loops on the serial joints of q_s, from the configuration of the call before. On failure, why() tells.
+  // Closes the loops on the serial joints of q_s, from the configuration of the call before. On failure, why() and joint()
+  // tell.
   LiftStatus setConfiguration(const VectorXd& q_s, double singular);
   // Takes over a closed configuration.
   LiftStatus setClosedConfiguration(const VectorXd& q, double singular);
@@ -25,6 +26,7 @@ class PostureLift {
   MatrixXd calcTangent() const;
   double margin() const { return margin_; }
   const std::string& why() const { return why_; }
+  const std::string& joint() const { return joint_; }  // LiftNode::joint
 
  private:
   struct Drive {
@@ -34,13 +36,14 @@ class PostureLift {
   };
   LiftStatus closeDrive(Drive& drive, const VectorXd& target);
   LiftStatus checkMargin(double singular);
+  LiftStatus fail(LiftStatus status, const std::string& joint, const std::string& why);
 
   const Model &closed_, &serial_;
   std::vector<Drive> drives_;
   std::vector<std::pair<int, int>> free_joints_;  // outside loops: in the closed and in the serial model
   VectorXd q_;
   double margin_ = 1;
-  std::string why_;
+  std::string why_, joint_;
 };
 
 }  // namespace bielle

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <numeric>
 #include <set>
 
 #include "bielle/model/builder.h"
@@ -223,6 +224,14 @@ VectorXd restrictVelocity(const Model& from, const Model& model, ConstVectorRef 
     out.segment(target.idx_v, target.nv) = v.segment(source.idx_v, source.nv);
   });
   return out;
+}
+
+std::vector<int> findRestrictedDofs(const Model& from, const Model& model) {
+  std::vector<int> dofs(model.nv());
+  forCommonJoints(from, model, [&](const Joint& source, const Joint& target) {
+    std::iota(dofs.begin() + target.idx_v, dofs.begin() + target.idx_v + target.nv, source.idx_v);
+  });
+  return dofs;
 }
 
 }  // namespace bielle

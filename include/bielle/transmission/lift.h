@@ -49,7 +49,9 @@ struct LiftOptions {
 /// Errors are the largest of the serial coordinates.
 struct LiftNode {
   LiftStatus status = LiftStatus::Lifted;
-  std::string message;            ///< why not lifted
+  std::string message;  ///< why not lifted
+  std::string joint;  ///< driven by the linkage where it ended, or empty: of a linkage that is out of reach, its joint
+                      ///< that misses most; of one at a dead point, its first
   double position_error = 0;      ///< rad or m
   double velocity_error = 0;      ///< rad/s or m/s
   double acceleration_error = 0;  ///< of the closed dynamics under u, rad/s^2 or m/s^2

@@ -50,5 +50,7 @@ SerialModel makeSerialModel(const Model& closed, ConstVectorRef q_reference, con
 /// Entries of q (nq) or of v (nv) of the joints that `model` has too, by name: the serial part of a closed state.
 VectorXd restrictConfiguration(const Model& from, const Model& model, ConstVectorRef q);
 VectorXd restrictVelocity(const Model& from, const Model& model, ConstVectorRef v);
+/// Per dof of `model`, the dof of the joint of that name in `from`: restrictVelocity(...)[i] = v[result[i]].
+std::vector<int> findRestrictedDofs(const Model& from, const Model& model);
 
 }  // namespace bielle
