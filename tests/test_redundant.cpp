@@ -249,3 +249,32 @@ TEST_CASE("a published delta robot: redundant loops close, and accelerations obe
   CHECK(cws.residual < 1e-6 * (1 + cws.gamma.cwiseAbs().maxCoeff()));
   CHECK(calcRelativeError(ws.M * cws.a + ws.b - cws.J.transpose() * cws.lambda, tau) < 1e-9);
 }
+
+TEST_CASE("redundant rows that contradict each other are told, those that agree are not") {
+  // The rocker's end is tied to the same place twice; the loop is open by a tenth of a millimetre.
+  const Model model = makeCutAtThePin(ClosureKind::Hinge5D);
+  VectorXd q = ClosedForm(1.1).q().head(3);
+  q[2] += 1e-4 / kRocker;
+  const VectorXd v = VectorXd::Zero(3), torque = VectorXd::Unit(3, 0);
+  const auto solve = [&](double kp, double other_kp) {
+    ConstraintSet set = makeConstraintSet(model, {});
+    Closure twin = set.closures[0];
+    set.closures[0].kp = kp;
+    twin.kp = other_kp;
+    set.closures.push_back(twin);
+    set.offsets.push_back(set.rows);
+    set.rows += getRows(twin.kind);
+    set.num_loops = 2;
+    Workspace ws(model);
+    ConstrainedWorkspace cws;
+    const DynamicsStatus status = updateConstrainedDynamics(model, ws, cws, set, q, v, torque);
+    CHECK(cws.saddle_point.isRedundant());
+    CHECK(cws.a.allFinite());
+    return status;
+  };
+  CHECK(solve(0, 0) == DynamicsStatus::Ok);
+  CHECK(solve(1e8, 1e8) == DynamicsStatus::Ok);
+  CHECK(solve(0, 1e8) == DynamicsStatus::ContradictoryRows);
+  CHECK(solve(1e8, 0) == DynamicsStatus::ContradictoryRows);
+  CHECK_THAT(getMessage(DynamicsStatus::ContradictoryRows), Catch::Contains("contradict"));
+}

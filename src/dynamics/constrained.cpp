@@ -1,6 +1,8 @@
 #include "bielle/dynamics/constrained.h"
 
 #include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
@@ -33,6 +35,16 @@ void assembleConstraints(const Workspace& ws, ConstrainedWorkspace& cws, const C
   }
 }
 
+// Rows that are independent are fulfilled to rounding.
+bool areContradictory(const ConstrainedWorkspace& cws) {
+  if (!cws.saddle_point.isRedundant()) return false;
+  double size = 0;
+  for (Eigen::Index i = 0; i < cws.J.rows(); ++i)
+    size = std::max(size, std::abs(cws.gamma[i]) +
+                              cws.J.row(i).cwiseAbs().cwiseProduct(cws.a.cwiseAbs().transpose()).sum());
+  return cws.residual > kContradiction * size;
+}
+
 }  // namespace
 
 const char* getMessage(DynamicsStatus status) {
@@ -43,6 +55,9 @@ const char* getMessage(DynamicsStatus status) {
       return "the mass matrix is singular: a joint moves no inertia; give its links a mass or the joint an armature";
     case DynamicsStatus::NotFinite:
       return "the accelerations are not finite";
+    case DynamicsStatus::ContradictoryRows:
+      return "redundant rows of closures and contacts contradict each other: close the loops, or let their "
+             "stabilisations agree";
   }
   return "?";
 }
@@ -64,7 +79,7 @@ DynamicsStatus updateConstrainedDynamics(const Model& model, Workspace& ws, Cons
   cws.residual = constraints.rows > 0 ? cws.violation.cwiseAbs().maxCoeff() : 0;
   if (!cws.a.allFinite() || !cws.lambda.allFinite()) return DynamicsStatus::NotFinite;
   updateAccelerations(model, ws, cws.a);
-  return DynamicsStatus::Ok;
+  return areContradictory(cws) ? DynamicsStatus::ContradictoryRows : DynamicsStatus::Ok;
 }
 
 void calcMotorForces(const Model& model, ConstVectorRef u, VectorRef tau) {

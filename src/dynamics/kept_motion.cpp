@@ -1,12 +1,13 @@
 #include "bielle/dynamics/kept_motion.h"
 
+#include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 
 namespace bielle {
 namespace {
 
-constexpr double kRankTolerance = 1e-7;     // relative, of H
+const double kRankTolerance = AssemblyOptions().rank_tolerance;  // relative, of H, which assembly closed
 constexpr double kGapTolerance = 1e-6;      // of Eq. (2), relative to 1 and what moves
 constexpr double kBalanceTolerance = 1e-7;  // of Eqs. (4) and (5), relative to their right-hand sides
 

@@ -40,7 +40,10 @@ struct AssemblyOptions {
   double step_limit = 0.2;   ///< largest change of a coordinate per step, m or rad
   int max_iterations = 200;  ///< per continuation step
   int continuation_steps = 20;
-  double rank_tolerance = 1e-7;  ///< singular values of H below this, relative to the largest, count as zero
+  /// Singular values of H below this, relative to the largest, count as zero. Above the square root of rounding, at which a
+  /// residual of second order in a step can tell a direction; a tenth of kRankTolerance (reduction.h), so that a linkage
+  /// which counts as movable can be moved.
+  double rank_tolerance = 1e-7;
 };
 
 enum class AssemblyStatus { Closed, NotClosed };

@@ -11,7 +11,13 @@
 
 namespace bielle {
 
-enum class DynamicsStatus { Ok, MassMatrixSingular, NotFinite };
+enum class DynamicsStatus {
+  Ok,
+  MassMatrixSingular,
+  NotFinite,
+  /// Redundant rows ask for different accelerations: no a fulfils (1), the one at hand comes nearest.
+  ContradictoryRows
+};
 const char* getMessage(DynamicsStatus status);
 
 /// Memory of one constrained solve; sized for a constraint set at first use, reused without allocation afterwards.
@@ -34,6 +40,10 @@ struct ConstrainedWorkspace {
   std::vector<Vector6d> f_ext;  ///< nb
 };
 
+/// Rows contradict each other when |J a + gamma| exceeds this part of |gamma| + |J| |a|, the largest over all rows. What a
+/// loop of redundant rows may come open by in the full formulation, millimetres in tenths of a metre, leaves less.
+constexpr double kContradiction = 0.05;
+
 /// Accelerations and forces for generalized forces tau (nv) at (q, v). Fills `ws` up to the accelerations.
 DynamicsStatus updateConstrainedDynamics(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
                                          const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v,
@@ -52,7 +62,8 @@ struct Mobility {
   int rows = 0, rank = 0, mobility = 0;
   VectorXd singular_values;
 };
-/// \param tolerance singular values below it times the largest count as zero
+/// \param tolerance singular values below it times the largest count as zero: as kRankTolerance of reduction.h, since both
+///     answer how a mechanism can move. Steps of assembly.h, which must not be stopped by a weak direction, take a smaller one.
 Mobility calcMobility(const Model& model, ConstVectorRef q, double tolerance = 1e-6);
 
 }  // namespace bielle
