@@ -20,7 +20,9 @@ Worst findNotFinite(const CheckedMotion& motion) {
                                                                {"a", &record.a},
                                                                {"u", &record.u},
                                                                {"closure_wrenches", &record.closure_wrenches},
-                                                               {"contact_wrenches", &record.contact_wrenches}};
+                                                               {"contact_wrenches", &record.contact_wrenches},
+                                                               {"com", &record.com},
+                                                               {"gap", &record.gap}};
   Worst worst;
   int count = 0;
   for (const auto& [name, table] : tables)

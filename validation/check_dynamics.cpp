@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "check_rows.h"
+#include "largest.h"
 
 namespace bielle::validation {
 namespace {
@@ -11,7 +12,7 @@ namespace {
 void addLargest(Worst& worst, const VectorXd& x, double scale, int node, const std::vector<std::string>& names) {
   if (x.size() == 0) return;
   Eigen::Index i;
-  const double largest = x.cwiseAbs().maxCoeff(&i);
+  const double largest = calcLargest(x, &i);
   worst.add(largest / scale, node, names[i]);
 }
 
@@ -21,15 +22,15 @@ double calcForceScale(const CheckedMotion& motion) {
   if (weight > 0) return weight;
   double largest = 1e-12;
   for (const RowMatrixXd* table : {&motion.record.u, &motion.record.closure_wrenches, &motion.record.contact_wrenches})
-    if (table->size() > 0) largest = std::max(largest, table->cwiseAbs().maxCoeff());
+    largest = getLarger(largest, calcLargest(*table));
   return largest;
 }
 
 // Accelerations by that of free fall, in the norm sqrt(a' M a), or by the largest of the motion where that is more.
 double calcAccelerationScale(const CheckContext& context) {
   double scale = std::sqrt(context.model().mass()) * context.model().gravity().norm();
-  for (const StageTrace& stage : context.trace.stages) scale = std::max(scale, stage.acceleration);
-  return std::max(scale, 1e-12);
+  for (const StageTrace& stage : context.trace.stages) scale = getLarger(scale, stage.acceleration);
+  return getLarger(scale, 1e-12);
 }
 
 void addClosureRows(CheckContext& context) {
@@ -42,7 +43,7 @@ void addClosureRows(CheckContext& context) {
       const int n = static_cast<int>(k);
       position.add(node.gaps[c].head<3>().norm(), n, model.closures()[c].name);
       angle.add(node.gaps[c].tail<3>().norm(), n, model.closures()[c].name);
-      velocity.add(node.gap_rates[c].cwiseAbs().maxCoeff(), n, model.closures()[c].name);
+      velocity.add(calcLargest(node.gap_rates[c]), n, model.closures()[c].name);
     }
   const double gap = reduced ? context.bounds.closed : context.bounds.drift;
   context.add(position, "loops: gap", "m", gap, "the robot has no loop");
@@ -67,7 +68,11 @@ void addDynamicsRows(CheckContext& context) {
     addLargest(position, stage.position_rest, 1, k, record.v_names);
     differences.add(stage.finite_difference / acceleration, k);
   }
+  Worst com;
+  for (int k = 0; k <= context.motion.numStages(); ++k)
+    com.add((record.com.row(k).transpose() - context.trace.nodes[k].com).norm(), k);
   context.add(time, "time between nodes", "s", bounds.time);
+  context.add(com, "centre of mass, as recorded", "m", bounds.com);
   context.add(balance, "equations of motion", "of weight", bounds.motion_equations);
   context.add(accelerations, "accelerations, against Simbody's", "of largest", bounds.accelerations);
   context.add(velocity, "steps of the velocity", "m/s, rad/s", bounds.velocity_steps);
@@ -76,34 +81,44 @@ void addDynamicsRows(CheckContext& context) {
   addClosureRows(context);
 }
 
+// Both by Eqs. (7) and (8): what is missing in the balance, over what steps of first order may lose or gain.
 void addEnergyRows(CheckContext& context) {
   const std::vector<NodeTrace>& nodes = context.trace.nodes;
+  // A robot that stands still exchanges nothing: rounding of its energy is no failure.
+  const double rounding = 1e-9 * context.model().mass() * context.model().gravity().norm();
+  const auto describe = [](double rest, double scale) {
+    return formatNumber(rest) + " of " + formatNumber(scale) + " J";
+  };
   Worst interval;
-  double total = 0, exchanged = 0, largest = 0;
+  double total = 0, allowed = rounding, exchanged = 0, h_before = 0;
+  // Where terms of first order vanish those of second order remain: a mean interval's scale is added.
+  double mean = rounding;
+  for (const StageTrace& stage : context.trace.stages) mean += stage.energy_scale / context.trace.stages.size();
   for (size_t k = 0; k < context.trace.stages.size(); ++k) {
     const StageTrace& stage = context.trace.stages[k];
     const double h = context.motion.getTimeStep(static_cast<int>(k));
     const double rest =
         nodes[k + 1].kinetic - nodes[k].kinetic - stage.motor_work - stage.contact_work - stage.closure_work;
-    // Over the mean velocity, as all work: an Euler step falls along its last one, h^2/2 m g a away. That cancels over a
-    // motion from rest to rest.
-    const double gravity_work = h / 2 * (nodes[k].gravity_power + nodes[k + 1].gravity_power);
-    const double flow = stage.exchanged + std::abs(nodes[k + 1].potential - nodes[k].potential);
-    interval.add(std::abs(rest - gravity_work), static_cast<int>(k));
-    total += rest + nodes[k + 1].potential - nodes[k].potential;
-    exchanged += flow;
-    largest = std::max(largest, flow);
+    const double missing = rest - h / 2 * (nodes[k].gravity_power + nodes[k + 1].gravity_power);
+    const double scale = stage.energy_scale + mean;
+    interval.add(std::abs(missing) / scale, static_cast<int>(k), describe(std::abs(missing), scale));
+    const double raised = nodes[k + 1].potential - nodes[k].potential;
+    total += rest + raised;
+    // Over the mean velocity an Euler step falls by h^2/2 m g a less than along its last one: h/2 m g times the change of
+    // velocity, which a motion from rest to rest with one step takes back.
+    allowed += stage.energy_scale + std::abs(h - h_before) / 2 * std::abs(nodes[k].gravity_power);
+    h_before = h;
+    exchanged += stage.exchanged + std::abs(raised);
   }
-  // A robot that stands still exchanges nothing: rounding of its energy is no failure.
-  const double rounding = 1e-9 * context.model().mass() * context.model().gravity().norm();
-  context.add(interval, "energy, one interval", "J", context.bounds.interval_energy * largest + rounding);
+  allowed += h_before / 2 * std::abs(nodes.back().gravity_power);
+  context.add(interval, "energy, one interval", "of scale", context.bounds.interval_energy);
   CheckRow row{"energy, whole motion",
                CheckRow::Kind::AtMost,
-               std::abs(total),
-               context.bounds.total_energy * exchanged + rounding,
-               "J",
+               std::abs(total) / allowed,
+               context.bounds.total_energy,
+               "of scale",
                ""};
-  row.note = formatNumber(exchanged) + " J were exchanged";
+  row.note = describe(std::abs(total), allowed) + ", " + formatNumber(exchanged) + " J were exchanged";
   context.rows.push_back(row);
 
   const int last = context.motion.numStages();

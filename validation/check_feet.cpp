@@ -5,6 +5,7 @@
 
 #include "bielle/math/so3.h"
 #include "check_rows.h"
+#include "largest.h"
 
 namespace bielle::validation {
 namespace {
@@ -22,15 +23,22 @@ Corners calcCorners(const ContactFrame& contact, const SE3& X_WF) {
 // Height of the lowest corner over what is under it, m.
 double calcClearance(const Ground& ground, const Corners& corners) {
   double least = corners[0].z() - ground.calcHeight(corners[0].x(), corners[0].y());
-  for (const Vector3d& c : corners) least = std::min(least, c.z() - ground.calcHeight(c.x(), c.y()));
+  for (const Vector3d& c : corners) least = getSmaller(least, c.z() - ground.calcHeight(c.x(), c.y()));
   return least;
+}
+
+// Largest distance of a corner from the ground under it, m: a sole that stands lies flat.
+double calcGap(const Ground& ground, const Corners& corners) {
+  double largest = 0;
+  for (const Vector3d& c : corners) largest = getLarger(largest, std::abs(c.z() - ground.calcHeight(c.x(), c.y())));
+  return largest;
 }
 
 // Largest speed of a corner, m/s; the twist in the contact's frame.
 double calcCornerSpeed(const ContactFrame& contact, const Vector6d& twist) {
   double largest = 0;
   for (const Vector3d& corner : calcCorners(contact, SE3()))
-    largest = std::max(largest, (twist.head<3>() + twist.tail<3>().cross(corner)).norm());
+    largest = getLarger(largest, (twist.head<3>() + twist.tail<3>().cross(corner)).norm());
   return largest;
 }
 
@@ -39,15 +47,15 @@ double calcGapAcrossEdges(const Corners& a, const Corners& b) {
   double widest = -std::numeric_limits<double>::infinity();
   for (int i = 0; i < 4; ++i) {
     const Eigen::Vector2d edge = (a[(i + 1) % 4] - a[i]).head<2>();
-    if (edge.norm() < 1e-9) continue;
+    if (edge.norm() < 1e-9) continue;  // NaN goes on
     const Eigen::Vector2d normal = Eigen::Vector2d(edge.y(), -edge.x()).normalized();
     const auto along = [&normal](const Vector3d& corner) { return normal.dot(corner.head<2>()); };
     double end = along(a[0]), begin_b = along(b[0]), begin = end, end_b = begin_b;
     for (int j = 1; j < 4; ++j) {
-      begin = std::min(begin, along(a[j])), end = std::max(end, along(a[j]));
-      begin_b = std::min(begin_b, along(b[j])), end_b = std::max(end_b, along(b[j]));
+      begin = getSmaller(begin, along(a[j])), end = getLarger(end, along(a[j]));
+      begin_b = getSmaller(begin_b, along(b[j])), end_b = getLarger(end_b, along(b[j]));
     }
-    widest = std::max({widest, begin_b - end, begin - end_b});
+    widest = getLarger(widest, getLarger(begin_b - end, begin - end_b));
   }
   return widest;
 }
@@ -95,8 +103,7 @@ void addStanceRows(CheckContext& context) {
       const SE3 moved = touch_down->inverseTimes(node.feet[c]);
       slip.add(moved.p.norm(), k, contact.name);
       if (contact.kind == ContactKind::Surface6D) angle.add(log3(moved.R).norm(), k, contact.name);
-      height.add(std::abs(calcClearance(context.motion.summary.ground, calcCorners(contact, node.feet[c]))), k,
-                 contact.name);
+      height.add(calcGap(context.motion.summary.ground, calcCorners(contact, node.feet[c])), k, contact.name);
     }
   }
   const std::string nothing = "no foot stands";
@@ -129,11 +136,19 @@ void addSwingRows(CheckContext& context) {
       for (int b = 0; b < a; ++b) {
         if (!hasSole(contacts[a]) || !hasSole(contacts[b]) || contacts[a].body == contacts[b].body) continue;
         const Corners first = getCorners(a, k), second = getCorners(b, k);
-        distance.add(std::max(calcGapAcrossEdges(first, second), calcGapAcrossEdges(second, first)), k,
+        distance.add(getLarger(calcGapAcrossEdges(first, second), calcGapAcrossEdges(second, first)), k,
                      contacts[b].name + " and " + contacts[a].name);
       }
   context.add(clearance, "swinging feet: clearance", "m", bounds.clearance, "no foot swings");
   context.add(below, "swinging feet: least height", "m", -bounds.below_ground, "no foot swings");
+  Worst bodies(CheckRow::Kind::AtLeast);
+  for (int k = 0; k <= context.motion.numStages(); ++k)
+    for (int i = 1; i < model.numBodies(); ++i) {
+      if (model.bodies()[i].inertia.mass == 0) continue;
+      const Vector3d& p = context.trace.nodes[k].mass_centers[i];
+      bodies.add(p.z() - context.motion.summary.ground.calcHeight(p.x(), p.y()), k, model.bodies()[i].name);
+    }
+  if (model.hasFreeFlyer()) context.add(bodies, "bodies: least height", "m", 0, "no body has mass");
   context.add(distance, "distance of the soles", "m", bounds.feet_distance, "there are no two soles");
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "check_rows.h"
+#include "largest.h"
 #include "wrench_cone.h"
 
 namespace bielle::validation {
@@ -20,11 +21,11 @@ struct ContactForces {
 void addWrench(const ContactFrame& contact, const Vector6d& wrench, const CheckContext& context, double least_load,
                int node, ContactForces& out) {
   const Vector3d f = wrench.head<3>(), n = wrench.tail<3>();
-  const double load = std::max(f.z(), least_load);
+  const double load = getLarger(f.z(), least_load);
   out.normal.add(f.z(), node, contact.name);
   out.friction.add(f.head<2>().norm() / load, node, contact.name);
   if (contact.kind == ContactKind::Point3D) {
-    out.point.add(n.cwiseAbs().maxCoeff(), node, contact.name);
+    out.point.add(calcLargest(n), node, contact.name);
     return;
   }
   const ConeMargin cone = calcConeMargin(wrench, contact.half_length, contact.half_width,
@@ -33,7 +34,7 @@ void addWrench(const ContactFrame& contact, const Vector6d& wrench, const CheckC
   // The centre of pressure is (-n_y, n_x) / f_z; the vertical moment about it is what the sole must hold by twisting.
   const double x = -n.y() / load, y = n.x() / load;
   out.torsion.add(std::abs(n.z() - (x * f.y() - y * f.x())) / load, node, contact.name);
-  out.pressure.add(std::max(std::abs(x) - contact.half_length, std::abs(y) - contact.half_width), node, contact.name);
+  out.pressure.add(getLarger(std::abs(x) - contact.half_length, std::abs(y) - contact.half_width), node, contact.name);
 }
 
 // Largest |value| / limit of the motors that have a limit, with both in the note.
@@ -50,6 +51,28 @@ class LimitUse {
   Worst worst_;
 };
 
+// Impulses are judged as forces are: feet that come down hard neither slip nor pull, nor do those that stand already.
+void addImpactRows(CheckContext& context) {
+  constexpr double kLeastChange = 1e-3;  // m/s, of the robot's speed: an impulse that makes less is none
+  const Model& model = context.model();
+  ContactForces impulses;
+  bool any = false;
+  for (int k = 0; k < context.motion.numStages(); ++k) {
+    if (!context.motion.isImpact(k)) continue;
+    any = true;
+    for (int c = 0; c < static_cast<int>(model.contacts().size()); ++c)
+      if (const Vector6d& impulse = context.trace.stages[k].impulses[c];
+          context.motion.stands(c, k) && !(impulse.head<3>().norm() < kLeastChange * model.mass()))
+        addWrench(model.contacts()[c], impulse, context, kLeastChange * model.mass(), k, impulses);
+  }
+  if (!any) return;
+  const std::string nothing = "no impulse changes the robot's speed by 1 mm/s";
+  context.add(impulses.normal, "impact: least normal impulse", "N s", 0, nothing);
+  context.add(impulses.friction, "impact: tangential over normal", "1", context.motion.summary.ground.friction,
+              nothing);
+  context.add(impulses.cone, "impact: wrench cone of the sole", "m", context.bounds.wrench_cone, nothing);
+}
+
 }  // namespace
 
 void addForceRows(CheckContext& context) {
@@ -64,7 +87,7 @@ void addForceRows(CheckContext& context) {
       if (context.motion.stands(c, k))
         addWrench(contact, wrench, context, least_load, k, forces);
       else
-        forces.in_air.add(wrench.cwiseAbs().maxCoeff(), k, contact.name);
+        forces.in_air.add(calcLargest(wrench), k, contact.name);
     }
   }
   const std::string nothing = "no foot stands";
@@ -75,6 +98,7 @@ void addForceRows(CheckContext& context) {
   context.add(forces.torsion, "contact: twisting over normal", "m", 0, "no sole stands");
   context.add(forces.point, "contact: moment on a point", "N m", context.bounds.point_moment, "no point stands");
   context.add(forces.in_air, "contact: force in the air", "N, N m", context.bounds.force_in_air, "no foot swings");
+  addImpactRows(context);
 }
 
 void addLimitRows(CheckContext& context) {
@@ -89,7 +113,7 @@ void addLimitRows(CheckContext& context) {
         const double lower = model.lowerLimits()[joint.idx_v + j], upper = model.upperLimits()[joint.idx_v + j];
         if (!std::isfinite(lower) && !std::isfinite(upper)) continue;
         const double q = record.q(k, joint.idx_q + j);
-        range.add(std::max(lower - q, q - upper), k, record.q_names[joint.idx_q + j]);
+        range.add(getLarger(lower - q, q - upper), k, record.q_names[joint.idx_q + j]);
       }
     }
   LimitUse effort, velocity;
@@ -101,7 +125,16 @@ void addLimitRows(CheckContext& context) {
         effort.add(record.u(k, m), motor.effort_limit, slides ? "N" : "N m", k, motor.name);
       velocity.add(record.v(k, motor.dof), motor.velocity_limit, slides ? "m/s" : "rad/s", k, motor.name);
     }
+  LimitUse speed;  // of joints without a motor
+  for (int k = 0; k <= context.motion.numStages(); ++k)
+    for (int i = 1; i < model.numBodies(); ++i)
+      for (int j = 0; j < model.joints()[i].nv; ++j) {
+        const int dof = model.joints()[i].idx_v + j;
+        if (model.findMotor(model.joints()[i].name) < 0)
+          speed.add(record.v(k, dof), model.velocityLimits()[dof], "", k, record.v_names[dof]);
+      }
   context.add(range, "joints: beyond their range", "rad, m", context.bounds.range, "no limits given");
+  context.add(speed.worst(), "joints: velocity over limit", "1", 1, "no limits given");
   context.add(effort.worst(), "motors: effort over limit", "1", 1, "no limits given");
   context.add(velocity.worst(), "motors: velocity over limit", "1", 1, "no limits given");
 }

@@ -1,5 +1,6 @@
 #pragma once
 // Pieces of checkMotion: where a quantity is worst, and groups of rows.
+#include <cmath>
 #include <limits>
 
 #include "check.h"
@@ -12,8 +13,10 @@ class Worst {
  public:
   explicit Worst(CheckRow::Kind kind = CheckRow::Kind::AtMost) : kind_(kind) {}
 
+  // What is not a number is worst of all: a computation that fails must not pass.
   void add(double value, int node, const std::string& what = "") {
-    if (node_ >= 0 && !(kind_ == CheckRow::Kind::AtLeast ? value < value_ : value > value_)) return;
+    const bool worse = std::isnan(value) || (kind_ == CheckRow::Kind::AtLeast ? value < value_ : value > value_);
+    if (!empty() && (std::isnan(value_) || !worse)) return;
     value_ = value;
     node_ = node;
     what_ = what;

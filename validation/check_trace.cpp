@@ -1,18 +1,18 @@
 #include "check_trace.h"
 
 #include <Eigen/QR>
-#include <map>
 #include <memory>
 
-#include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/reduction.h"
 #include "bielle/math/so3.h"
+#include "check_accelerations.h"
+#include "largest.h"
 #include "simbody_bridge.h"
 
 namespace bielle::validation {
 namespace {
 
-constexpr double kRankThreshold = 1e-8;  // of scaled closure rows: what is below is redundant
+// Of pivots of the scaled rows of loops that are closed to 1e-8 (CheckBounds::closed): what is below is redundant.
+constexpr double kRankThreshold = 1e-8;
 
 // Of frame 2 in frame 1; the angle about the axis of a hinge is free, all angles of a ball are.
 Vector6d calcGap(const Closure& closure, const SE3& X_12) {
@@ -32,19 +32,23 @@ Vector6d dropFreeAxes(const Closure& closure, Vector6d rate) {
   return rate;
 }
 
-// Diagonal of W of check.h, one for joints outside the loops; empty for the full formulation.
+// Diagonal of W, Eq. (3) of check.h, by Simbody's mass matrix; one for joints outside the loops. Empty for the full
+// formulation.
 VectorXd calcMetric(const CheckedMotion& motion) {
-  if (motion.summary.formulation == Formulation::Full || motion.model.closures().empty()) return {};
-  VectorXd metric = VectorXd::Ones(motion.model.nv());
-  // A start that is open is told by other rows; what it should have been is good enough here.
-  const AssemblyResult start = closeConfiguration(motion.model, motion.record.q.row(0).transpose());
-  if (start.status != AssemblyStatus::Closed) return metric;
-  for (const ReducedCluster& cluster : makeReduction(motion.model, start.q).clusters)
-    for (size_t i = 0; i < cluster.dofs.size(); ++i) metric[cluster.dofs[i]] = cluster.metric[i];
+  constexpr double kFloor = 1e-3;
+  const Model& model = motion.model;
+  if (motion.summary.formulation == Formulation::Full || model.closures().empty()) return {};
+  SimbodyBridge simbody(model, model.closures());
+  simbody.setState(motion.record.q.row(0).transpose(), VectorXd::Zero(model.nv()), VectorXd::Zero(model.nv()));
+  const VectorXd inertia = simbody.calcMassMatrix().diagonal();
+  VectorXd metric = VectorXd::Ones(model.nv());
+  for (const LoopCluster& cluster : model.clusters()) {
+    double largest = 0;
+    for (int k : cluster.dofs) largest = getLarger(largest, inertia[k]);
+    for (int k : cluster.dofs) metric[k] = largest > 0 ? getLarger(inertia[k] / largest, kFloor) : 1;
+  }
   return metric;
 }
-
-double calcNorm(const MatrixXd& M, const VectorXd& a) { return std::sqrt(std::max(0.0, a.dot(M * a))); }
 
 class Tracer {
  public:
@@ -61,27 +65,25 @@ class Tracer {
       const VectorXd u = k < stages ? VectorXd(motion_.record.u.row(k)) : VectorXd::Zero(motion_.model.nu());
       SimbodyBridge& simbody = getBridge(motion_.findPhase(k));
       simbody.setState(q, v, calcMotorForces(motion_.model, u));
-      out.nodes.push_back(traceNode(simbody));
+      out.nodes.push_back(traceNode(simbody, v));
       updateTangent(simbody);
-      if (k > 0) traceArrival(k - 1, out.stages[k - 1]);
+      if (k > 0) traceArrival(k - 1, out.nodes[k - 1], out.nodes[k], out.stages[k - 1]);
       if (k < stages) traceStage(simbody, k, out.stages[k]);
     }
     return out;
   }
 
  private:
-  // One per set of contacts.
+  // Of a phase: feet that stand again stand elsewhere.
   SimbodyBridge& getBridge(int phase) {
-    const std::vector<ContactTarget> contacts = motion_.getContacts(phase);
-    std::vector<int> key;
-    for (const ContactTarget& target : contacts) key.push_back(target.contact);
-    std::unique_ptr<SimbodyBridge>& bridge = bridges_[key];
-    if (!bridge)
-      bridge = std::make_unique<SimbodyBridge>(motion_.model, makeConstraintSet(motion_.model, contacts).closures);
-    return *bridge;
+    if (phase != bridge_phase_)
+      bridge_ = std::make_unique<SimbodyBridge>(motion_.model,
+                                                makeConstraintSet(motion_.model, motion_.getContacts(phase)).closures);
+    bridge_phase_ = phase;
+    return *bridge_;
   }
 
-  NodeTrace traceNode(const SimbodyBridge& simbody) const {
+  NodeTrace traceNode(const SimbodyBridge& simbody, const VectorXd& v) const {
     NodeTrace node;
     for (const ContactFrame& contact : motion_.model.contacts()) {
       node.feet.push_back(simbody.getPlacement(contact.body) * contact.X_BF);
@@ -95,10 +97,14 @@ class Tracer {
       node.gaps.push_back(calcGap(closure, X_12));
       node.gap_rates.push_back(dropFreeAxes(closure, V1 - X_12.actMotion(V2)));
     }
-    node.com = simbody.calcComPosition();
+    for (int i = 0; i < motion_.model.numBodies(); ++i)
+      node.mass_centers.push_back(simbody.getPlacement(i).act(motion_.model.bodies()[i].inertia.com));
+    node.com = simbody.calcCom();
     node.kinetic = simbody.calcKineticEnergy();
     node.potential = simbody.calcPotentialEnergy();
     node.gravity_power = motion_.model.mass() * motion_.model.gravity().dot(simbody.calcComVelocity());
+    node.gravity = simbody.calcGravityForces();
+    node.inertial_power = v.dot(simbody.calcBias() + node.gravity);
     return node;
   }
 
@@ -119,10 +125,13 @@ class Tracer {
     return N_ * (N_.transpose() * metric_.cwiseProduct(x));
   }
 
-  // What is judged along the closures of the next node.
-  void traceArrival(int k, StageTrace& stage) const {
+  // What is judged along the closures of the next node, and what needs both nodes.
+  void traceArrival(int k, const NodeTrace& here, const NodeTrace& next, StageTrace& stage) const {
     const double h = motion_.getTimeStep(k);
-    stage.position_rest = projectOnTangent(calcStep(k) - h * motion_.record.v.row(k + 1).transpose());
+    const VectorXd v_next = motion_.record.v.row(k + 1);
+    stage.position_rest = projectOnTangent(calcStep(k) - h * v_next);
+    stage.energy_scale += h * std::abs(next.inertial_power - here.inertial_power) +
+                          h / 2 * std::abs((next.gravity - here.gravity).dot(v_next));
   }
 
   VectorXd calcStep(int k) const {
@@ -139,20 +148,18 @@ class Tracer {
     return wrenches;
   }
 
-  // Velocities after an impact by Simbody's mass matrix and constraints, J of loops and of the feet that stand
-  // afterwards:  v+ = v - M^{-1} J^T (J M^{-1} J^T)^+ J v.
+  // Velocities and impulses of an impact by Simbody's mass matrix and constraints: of loops and of the feet that stand
+  // afterwards.
   void traceImpact(const SimbodyBridge& simbody, int k, StageTrace& stage) const {
-    const VectorXd v = motion_.record.v.row(k), next = motion_.record.v.row(k + 1);
-    const MatrixXd M = simbody.calcMassMatrix(), J = simbody.calcConstraintJacobian();
-    const Eigen::LLT<MatrixXd> llt(M);
-    Eigen::CompleteOrthogonalDecomposition<MatrixXd> rows;  // of J L^{-T}, in the metric of the inertia
-    rows.setThreshold(kRankThreshold);
-    rows.compute(llt.matrixL().solve(J.transpose()).transpose());
-    const VectorXd lost = llt.matrixU().solve(rows.solve(J * v));
+    const VectorXd v = motion_.record.v.row(k), next = motion_.record.v.row(k + 1), change = next - v;
+    const OracleSolution solution = simbody.solveImpact();
     stage.balance = VectorXd::Zero(motion_.model.nv());
-    stage.velocity_rest = next - v + lost;
-    const VectorXd change = next - v;
-    stage.contact_work = change.dot(M * (v + change / 2));  // what the impact takes away
+    stage.velocity_rest = next - solution.a;
+    stage.contact_work = change.dot(simbody.calcMassMatrix() * (v + change / 2));  // what the impact takes away
+    stage.impulses.assign(motion_.model.contacts().size(), Vector6d::Zero());
+    size_t i = motion_.model.closures().size();
+    for (const ContactTarget& target : motion_.getContacts(motion_.findPhase(k)))
+      stage.impulses[target.contact] = solution.wrenches[i++];
   }
 
   void traceStage(const SimbodyBridge& simbody, int k, StageTrace& stage) const {
@@ -166,13 +173,11 @@ class Tracer {
     stage.velocity_rest = projectOnTangent(d / h - v - h * a);
 
     const MatrixXd M = simbody.calcMassMatrix();
-    VectorXd rows = simbody.calcConstraintAcceleration(a);
-    // Loops that are closed at every node have nothing to stabilise.
-    if (motion_.summary.formulation == Formulation::Reduced) rows.head(loop_rows_).setZero();
-    const VectorXd a_simbody = simbody.solveWithArmature(Precision::Double, rows).a;
-    stage.acceleration = calcNorm(M, a_simbody);
-    stage.acceleration_error = calcNorm(M, a - a_simbody);
-    stage.finite_difference = calcNorm(M, (next - v) / h - a_simbody);
+    const AccelerationTrace own =
+        traceAccelerations(simbody, M, v, a, h, motion_.summary.formulation == Formulation::Full);
+    stage.acceleration = own.size;
+    stage.acceleration_error = own.error;
+    stage.finite_difference = calcInertialNorm(M, (next - v) / h - own.a);
 
     const VectorXd moved = h / 2 * (v + next);
     stage.motor_work = motors.dot(moved);
@@ -181,13 +186,16 @@ class Tracer {
     std::fill_n(wrenches.begin(), motion_.model.closures().size(), Vector6d::Zero());
     stage.contact_work = simbody.calcWrenchForces(wrenches).dot(moved);
     stage.closure_work = all_work - stage.contact_work;
+    const VectorXd inertial = simbody.calcBias() + simbody.calcGravityForces();
+    stage.energy_scale = h * h / 2 * std::abs(a.dot(inertial)) + std::abs((M * (next - v - h * a)).dot(v + next)) / 2;
   }
 
   const CheckedMotion& motion_;
   VectorXd metric_;  // nv, diagonal of W, or empty
   MatrixXd N_;       // nv x mobility at the node traced last, N^T W N = 1
   int loop_rows_ = 0;
-  std::map<std::vector<int>, std::unique_ptr<SimbodyBridge>> bridges_;
+  std::unique_ptr<SimbodyBridge> bridge_;
+  int bridge_phase_ = -1;
 };
 
 }  // namespace

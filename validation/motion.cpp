@@ -6,6 +6,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
+#include "largest.h"
 #include "simbody_bridge.h"
 
 namespace bielle::validation {
@@ -29,7 +30,7 @@ class Integrator {
       return false;
     q = model_.integrate(q, h / 6 * (k1.d + 2 * k2.d + 2 * k3.d + k4.d));
     v += h / 6 * (k1.v + 2 * k2.v + 2 * k3.v + k4.v);
-    gap = std::max(gap, retract(model_, ws_, set_, q));
+    gap = getLarger(gap, retract(model_, ws_, set_, q));
     v = projectVelocity(model_, ws_, set_, q, v);
     return true;
   }
@@ -38,7 +39,7 @@ class Integrator {
     updatePositions(model_, ws_, q);
     updateVelocities(model_, ws_, v);
     const double kinetic = calcKineticEnergy(model_, ws_);
-    kinetic_energy = std::max(kinetic_energy, kinetic);
+    kinetic_energy = getLarger(kinetic_energy, kinetic);
     return kinetic + calcPotentialEnergy(model_, ws_);
   }
 
@@ -82,7 +83,7 @@ double retract(const Model& model, Workspace& ws, const ConstraintSet& constrain
       h.segment(row, n) = calcClosureResidual(ws, closure);
       calcClosureResidualJacobian(ws, closure, H.middleRows(row, n));
     }
-    const double gap = h.cwiseAbs().maxCoeff();
+    const double gap = calcLargest(h);
     if (gap < 1e-14 || iteration == 4) return gap;
     Eigen::CompleteOrthogonalDecomposition<MatrixXd> decomposition;
     decomposition.setThreshold(1e-8);
@@ -99,7 +100,7 @@ MotionReport compareMotion(const Model& model, ConstVectorRef q0, ConstVectorRef
   const int steps = static_cast<int>(std::lround(options.duration / options.step));
   for (int i = 0; i < steps; ++i) {
     if (!integrator.step(options.duration / steps, q, v)) return report;
-    report.energy_error = std::max(report.energy_error, std::abs(integrator.calcEnergy(q, v) - energy));
+    report.energy_error = getLarger(report.energy_error, std::abs(integrator.calcEnergy(q, v) - energy));
   }
   SimbodyBridge simbody(model, model.closures());
   simbody.setState(q0, v0, VectorXd::Zero(model.nv()));
@@ -107,8 +108,8 @@ MotionReport compareMotion(const Model& model, ConstVectorRef q0, ConstVectorRef
   simbody.integrate(options.duration, options.simbody_accuracy, q_simbody, v_simbody);
   report.energy_error_simbody = std::abs(simbody.calcKineticEnergy() + simbody.calcPotentialEnergy() - energy);
   report.ok = true;
-  report.distance = model.difference(q_simbody, q).cwiseAbs().maxCoeff();
-  report.travelled = model.difference(q0, q).cwiseAbs().maxCoeff();
+  report.distance = calcLargest(model.difference(q_simbody, q));
+  report.travelled = calcLargest(model.difference(q0, q));
   report.gap = integrator.gap;
   report.kinetic_energy = integrator.kinetic_energy;
   report.q = q;

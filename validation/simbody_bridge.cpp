@@ -21,17 +21,16 @@ VectorXd toEigen(const SimTK::Vector& v) {
   return out;
 }
 
-// M a + J^T m = force, J a = target.
+// M a + J^T m = force, J a = target, for any number of columns.
 struct SaddleTerms {
-  MatrixXd M, J;
-  VectorXd force, target;
+  MatrixXd M, J, force, target;
 };
 
 // With unit diagonal of D M D and rows E J D of unit length (links of a few milligrams beside others of kilograms are
 // usual): a = D z, m = E y. By the null space N of E J D, z = z_J + N w with E J D z_J = E target; N^T then leaves
 //     N^T D M D N w = N^T D (force - M D z_J),    (E J D)^T y = D (force - M D z).
 template <typename Real>
-void solveSaddle(const SaddleTerms& terms, VectorXd& a, VectorXd& multipliers) {
+void solveSaddle(const SaddleTerms& terms, MatrixXd& a, MatrixXd& multipliers) {
   using MatrixXr = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
   using VectorXr = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
   const MatrixXd &M = terms.M, &J = terms.J;
@@ -44,8 +43,8 @@ void solveSaddle(const SaddleTerms& terms, VectorXd& a, VectorXd& multipliers) {
   const auto scale = D_r.asDiagonal();
   const MatrixXr DMD = scale * M.template cast<Real>() * scale;
   const MatrixXr EJD = E.asDiagonal() * J.template cast<Real>() * scale;
-  const VectorXr force = scale * terms.force.template cast<Real>();
-  VectorXr z = VectorXr::Zero(nv), y = VectorXr::Zero(m);
+  const MatrixXr force = scale * terms.force.template cast<Real>();
+  MatrixXr z = MatrixXr::Zero(nv, force.cols()), y = MatrixXr::Zero(m, force.cols());
   MatrixXr N = MatrixXr::Identity(nv, nv);
   Eigen::CompleteOrthogonalDecomposition<MatrixXr> rows, columns;
   for (auto* factor : {&rows, &columns}) factor->setThreshold(kRankThreshold);
@@ -56,8 +55,32 @@ void solveSaddle(const SaddleTerms& terms, VectorXd& a, VectorXd& multipliers) {
   }
   z += N * (N.transpose() * DMD * N).ldlt().solve(N.transpose() * (force - DMD * z));
   if (m > 0) y = columns.solve(force - DMD * z);
-  a = D.cwiseProduct(z.template cast<double>());
-  multipliers = E.cwiseProduct(y).template cast<double>();
+  a = D.asDiagonal() * z.template cast<double>();
+  multipliers = (E.asDiagonal() * y).template cast<double>();
+}
+
+// Residual of notation.h, of which the directions below are taken.
+Vector6d calcClosureGap(const Closure& closure, const SE3& X_12) {
+  if (closure.kind == ClosureKind::Weld6D) return log6(X_12);
+  Vector6d gap = Vector6d::Zero();
+  gap.head<3>() = X_12.p;
+  if (closure.kind == ClosureKind::Ball3D) return gap;
+  const Vector3d axis2 = X_12.R * closure.axis, normal = closure.axis.cross(axis2);
+  if (normal.norm() > 0) gap.tail<3>() = std::atan2(normal.norm(), closure.axis.dot(axis2)) * normal.normalized();
+  return gap;
+}
+
+// Unit twists of frame 1, relative to frame 2, that a closure forbids; notation.h.
+MatrixXd listDirections(const Closure& closure) {
+  const Eigen::Matrix<double, 6, 6> all = Eigen::Matrix<double, 6, 6>::Identity();
+  if (closure.kind == ClosureKind::Weld6D) return all;
+  if (closure.kind == ClosureKind::Ball3D) return all.leftCols(3);
+  const Vector3d normal = closure.axis.unitOrthogonal();
+  MatrixXd directions = MatrixXd::Zero(6, 5);
+  directions.leftCols(3) = all.leftCols(3);
+  directions.col(3).tail<3>() = normal;
+  directions.col(4).tail<3>() = closure.axis.cross(normal);
+  return directions;
 }
 
 }  // namespace
@@ -95,9 +118,7 @@ double SimbodyBridge::calcKineticEnergy() const {
   return s_->system.calcKineticEnergy(s_->state) + 0.5 * s_->model.armature().dot(s_->v.cwiseAbs2());
 }
 
-Vector3d SimbodyBridge::calcComPosition() const {
-  return toEigen(s_->matter.calcSystemMassCenterLocationInGround(s_->state));
-}
+Vector3d SimbodyBridge::calcCom() const { return toEigen(s_->matter.calcSystemMassCenterLocationInGround(s_->state)); }
 
 Vector3d SimbodyBridge::calcComVelocity() const {
   return toEigen(s_->matter.calcSystemMassCenterVelocityInGround(s_->state));
@@ -173,20 +194,61 @@ VectorXd SimbodyBridge::calcConstraintAcceleration(ConstVectorRef a) const {
   return toEigen(rows);
 }
 
-OracleSolution SimbodyBridge::solveWithArmature(Precision precision, const VectorXd& rows) const {
-  SaddleTerms terms{calcMassMatrix(), calcConstraintJacobian(), s_->tau - calcBias(),
-                    -calcConstraintAcceleration(VectorXd::Zero(s_->model.nv()))};
-  if (rows.size() > 0) terms.target += rows;
-  OracleSolution out;
-  VectorXd m;
+OracleSolution SimbodyBridge::solveWithArmature(Precision precision) const {
+  const SaddleTerms terms{calcMassMatrix(), calcConstraintJacobian(), s_->tau - calcBias(),
+                          -calcConstraintAcceleration(VectorXd::Zero(s_->model.nv()))};
+  MatrixXd a, m;
   if (precision == Precision::Double)
-    solveSaddle<double>(terms, out.a, m);
+    solveSaddle<double>(terms, a, m);
   else
-    solveSaddle<long double>(terms, out.a, m);
-  SimTK::Vector multipliers(static_cast<int>(m.size()));
-  for (int i = 0; i < m.size(); ++i) multipliers[i] = m[i];
-  s_->readForces(multipliers, out);
+    solveSaddle<long double>(terms, a, m);
+  return s_->makeSolution(a, m);
+}
+
+ClosureRows SimbodyBridge::calcClosureRows() const {
+  ClosureRows out;
+  const size_t loops = s_->model.closures().size();
+  std::vector<Vector6d> wrenches(s_->closures.size(), Vector6d::Zero());
+  std::vector<VectorXd> rows;
+  std::vector<double> residual;
+  for (size_t c = 0; c < s_->closures.size(); ++c) {
+    const Closure& closure = s_->closures[c];
+    const SE3 X_12 =
+        (getPlacement(closure.body1) * closure.X_B1).inverseTimes(getPlacement(closure.body2) * closure.X_B2);
+    const MatrixXd directions = listDirections(closure);
+    const Vector6d gap = calcClosureGap(closure, X_12);
+    for (Eigen::Index i = 0; i < directions.cols(); ++i) {
+      wrenches[c] = directions.col(i);
+      rows.push_back(calcWrenchForces(wrenches));
+      residual.push_back(directions.col(i).dot(gap));
+    }
+    wrenches[c].setZero();
+    if (c + 1 == loops) out.num_loop_rows = static_cast<int>(rows.size());
+  }
+  out.J.resize(rows.size(), s_->model.nv());
+  for (size_t i = 0; i < rows.size(); ++i) out.J.row(i) = rows[i].transpose();
+  out.residual = Eigen::Map<const VectorXd>(residual.data(), residual.size());
   return out;
+}
+
+MatrixXd SimbodyBridge::calcResponse(const MatrixXd& J, const MatrixXd& targets) const {
+  MatrixXd a, m;
+  solveSaddle<double>({calcMassMatrix(), J, MatrixXd::Zero(J.cols(), targets.cols()), targets}, a, m);
+  return a;
+}
+
+OracleSolution SimbodyBridge::solveImpact() const {
+  const MatrixXd M = calcMassMatrix(), J = calcConstraintJacobian();
+  MatrixXd v, m;
+  solveSaddle<double>({M, J, M * s_->v, VectorXd::Zero(J.rows())}, v, m);
+  return s_->makeSolution(v, m);
+}
+
+VectorXd SimbodyBridge::calcGravityForces() const {
+  SimTK::Vector generalized;
+  s_->matter.multiplyBySystemJacobianTranspose(s_->state, s_->system.getRigidBodyForces(s_->state, Stage::Dynamics),
+                                               generalized);
+  return s_->T.transpose() * s_->gather(generalized);
 }
 
 void SimbodyBridge::integrate(double duration, double accuracy, VectorXd& q, VectorXd& v) {

@@ -39,6 +39,13 @@ struct OracleSolution {
 
 enum class Precision { Double, Extended };
 
+/// Rows of notation.h for the closures of a bridge, one after the other.
+struct ClosureRows {
+  MatrixXd J;             ///< rows x nv: velocities of the closures are J v
+  VectorXd residual;      ///< rows
+  int num_loop_rows = 0;  ///< those of the model's own closures come first
+};
+
 class SimbodyBridge {
  public:
   /// \param closures of the model and contacts, as ConstraintSet::closures orders them
@@ -53,7 +60,7 @@ class SimbodyBridge {
   SE3 getPlacement(int body) const;    ///< of a body in the world
   Vector6d calcTwist(int body) const;  ///< of a body, in its own frame
   double calcKineticEnergy() const;    ///< J, of the bodies; of the rotors too (diag(armature))
-  Vector3d calcComPosition() const;    ///< of the whole robot, m (world)
+  Vector3d calcCom() const;            ///< of the whole robot, m (world)
   Vector3d calcComVelocity() const;    ///< of the whole robot, m/s (world)
   double calcPotentialEnergy() const;  ///< J, zero for a centre of mass at the origin
   MatrixXd calcMassMatrix() const;     ///< nv x nv, armature included
@@ -69,9 +76,16 @@ class SimbodyBridge {
   OracleSolution solveBySimbody();
   /// Simbody's rows J a + dJ/dt v, in the order of calcConstraintJacobian.
   VectorXd calcConstraintAcceleration(ConstVectorRef a) const;
+  /// J by the generalized forces of unit wrenches, residuals by the places of the frames.
+  ClosureRows calcClosureRows() const;
+  /// The part of the accelerations (nv x k) that J a = targets (rows x k) adds: M a + J' m = 0, armature included.
+  MatrixXd calcResponse(const MatrixXd& J, const MatrixXd& targets) const;
+  /// Rigid impact from the velocity set: OracleSolution::a is v+ of M (v+ - v) = J' L, J v+ = 0, wrenches are impulses.
+  OracleSolution solveImpact() const;
+  /// Generalized forces of gravity (nv), as they stand beside motor forces.
+  VectorXd calcGravityForces() const;
   /// The system with armature, above.
-  /// \param rows  what J a + dJ/dt v shall be, empty: zero
-  OracleSolution solveWithArmature(Precision precision = Precision::Extended, const VectorXd& rows = VectorXd()) const;
+  OracleSolution solveWithArmature(Precision precision = Precision::Extended) const;
 
   /// Integrates Simbody's equations from the state set, tau held, by Runge-Kutta-Merson with projection of the
   /// constraints at every step; q and v are overwritten with the final ones. Armature is not seen.

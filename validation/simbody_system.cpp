@@ -208,6 +208,15 @@ double SimbodyBridge::System::calcRounding() const {
   return std::numeric_limits<double>::epsilon() * largest / least;
 }
 
+OracleSolution SimbodyBridge::System::makeSolution(const VectorXd& a, const VectorXd& multipliers) const {
+  OracleSolution out;
+  out.a = a;
+  SimTK::Vector m(static_cast<int>(multipliers.size()));
+  for (int i = 0; i < m.size(); ++i) m[i] = multipliers[i];
+  readForces(m, out);
+  return out;
+}
+
 void SimbodyBridge::System::readForces(const SimTK::Vector& multipliers, OracleSolution& out) const {
   SimTK::Vector generalized;
   matter.multiplyByGTranspose(state, multipliers, generalized);

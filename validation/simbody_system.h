@@ -50,6 +50,8 @@ struct SimbodyBridge::System {
   // Between our order of dofs and Simbody's u.
   void scatter(const VectorXd& ours, SimTK::Vector& u) const;
   VectorXd gather(const SimTK::Vector& u) const;
+  // Accelerations (or velocities) and the constraint forces (or impulses) of the multipliers beside them.
+  OracleSolution makeSolution(const VectorXd& a, const VectorXd& multipliers) const;
   // Constraint forces of Simbody's multipliers.
   void readForces(const SimTK::Vector& multipliers, OracleSolution& out) const;
   // OracleSolution::rounding of Simbody's solver.

@@ -1,174 +1,18 @@
 // Oracles: a pendulum integrated by its own formula, motions poisoned one number at a time, files that lie.
-#include <algorithm>
 #include <catch2/catch.hpp>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
-#include <set>
-#include <sstream>
 
-#include "bielle/dynamics/assembly.h"
-#include "bielle/io/names.h"
-#include "bielle/model/builder.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
-#include "bielle/motion/squat.h"
-#include "check.h"
-#include "robot_directory.h"
 #include "run_command.h"
+#include "test_motions.h"
 
 namespace fs = std::filesystem;
 using namespace bielle;
 using namespace bielle::testing;
 using namespace bielle::validation;
-
-namespace {
-
-using Names = std::set<std::string>;
-
-std::string print(const CheckReport& report) {
-  std::ostringstream text;
-  printReport(text, report);
-  return text.str();
-}
-
-Names getFailures(const CheckReport& report) {
-  Names names;
-  for (const CheckRow& row : report.rows)
-    if (!row.passed()) names.insert(row.name);
-  return names;
-}
-
-double getValue(const CheckReport& report, const std::string& name) {
-  const CheckRow* row = report.findRow(name);
-  REQUIRE(row != nullptr);
-  REQUIRE(row->value);
-  return *row->value;
-}
-
-std::string findBipetto() { return std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto"; }
-
-// As solved, written and read back. Solved once.
-struct SolvedSquat {
-  explicit SolvedSquat(Formulation formulation) {
-    const LoadedRobot robot = loadRobot(findBipetto());
-    Motion motion = makeSquat(robot.model, {}, formulation);
-    summary = Fddp().solve(*motion.problem, motion.guess);
-    writeResult(directory.path(), makeResult({"bipetto", robot.file, {}}, motion, motion.guess, summary));
-    checked = readMotion(directory.path());
-  }
-  RobotDirectory directory;
-  FddpSummary summary;
-  CheckedMotion checked;
-};
-
-const SolvedSquat& getSquat(Formulation formulation = Formulation::Reduced) {
-  static const SolvedSquat reduced(Formulation::Reduced), full(Formulation::Full);
-  return formulation == Formulation::Reduced ? reduced : full;
-}
-
-// A motion without contacts from its states and torques.
-CheckedMotion makeFreeMotion(const Model& model, double h, Formulation formulation, int stages) {
-  CheckedMotion motion;
-  motion.model = model;
-  motion.summary.file = "memory";
-  motion.summary.motion = "free motion";
-  motion.summary.robot = model.name();
-  motion.summary.formulation = formulation;
-  motion.summary.phases = {{"free", 0, stages, h, {}}};
-  MotionRecord& record = motion.record;
-  record.q_names = makePositionNames(model);
-  record.v_names = makeVelocityNames(model);
-  record.u_names = getNames(model.motors());
-  record.closure_names = getNames(model.closures());
-  record.time = VectorXd::LinSpaced(stages + 1, 0, stages * h);
-  record.q.setZero(stages + 1, model.nq());
-  record.v.setZero(stages + 1, model.nv());
-  record.a.setZero(stages, model.nv());
-  record.u.setZero(stages, model.nu());
-  record.closure_wrenches.setZero(stages, 6 * model.closures().size());
-  record.contact_wrenches.setZero(stages, 0);
-  return motion;
-}
-
-// A rod of length l and mass m on a hinge: (m l^2 / 3) q'' = -m g (l / 2) sin q, q from hanging down.
-constexpr double kLength = 0.7, kGravity = 9.81;
-double calcPendulumAcceleration(double q) { return -1.5 * kGravity / kLength * std::sin(q); }
-
-Model makePendulum() {
-  ModelBuilder builder("pendulum");
-  Joint joint;
-  joint.name = "hinge";
-  joint.kind = JointKind::Revolute;
-  joint.axis = Vector3d::UnitY();
-  Inertia inertia;
-  inertia.mass = 1.3;
-  inertia.com = Vector3d(0, 0, -kLength / 2);
-  inertia.I_com = 1.3 * kLength * kLength / 12 * Eigen::Vector3d(1, 1, 1e-3).asDiagonal();
-  builder.addLink("rod", "world", joint, inertia);
-  builder.addMotor("hinge");
-  return builder.build();
-}
-
-// By Euler steps of h, or exactly (classical Runge-Kutta steps of h / 100).
-CheckedMotion makePendulumMotion(double h, bool exact) {
-  const int stages = static_cast<int>(std::lround(1 / h));
-  CheckedMotion motion = makeFreeMotion(makePendulum(), h, Formulation::Full, stages);
-  Eigen::Vector2d x(1.2, 0);
-  const auto rate = [](const Eigen::Vector2d& y) { return Eigen::Vector2d(y[1], calcPendulumAcceleration(y[0])); };
-  for (int k = 0; k <= stages; ++k) {
-    motion.record.q(k, 0) = x[0];
-    motion.record.v(k, 0) = x[1];
-    if (k == stages) break;
-    motion.record.a(k, 0) = calcPendulumAcceleration(x[0]);
-    if (!exact) {
-      x[1] += h * motion.record.a(k, 0);
-      x[0] += h * x[1];
-    }
-    for (int i = 0; exact && i < 100; ++i) {
-      const double s = h / 100;
-      const Eigen::Vector2d k1 = rate(x), k2 = rate(x + s / 2 * k1), k3 = rate(x + s / 2 * k2), k4 = rate(x + s * k3);
-      x += s / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
-    }
-  }
-  return motion;
-}
-
-// The four-bar swinging from rest, by the steps of a formulation.
-CheckedMotion makeFourBarMotion(double h, Formulation formulation) {
-  const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar").model;
-  const VectorXd q0 = findClosedConfiguration(model).q;
-  const int stages = static_cast<int>(std::lround(0.5 / h));
-  const auto makeStage = [&] {
-    StageSpec stage;
-    stage.dt = h;
-    stage.constraints = makeConstraintSet(model);
-    stage.state = {0, q0, VectorXd::Zero(model.nv()), VectorXd::Zero(2 * model.nv())};
-    stage.control = {0, VectorXd::Zero(model.nu()), VectorXd::Zero(model.nu())};
-    return stage;
-  };
-  std::vector<StageSpec> specs;
-  for (int k = 0; k <= stages; ++k) specs.push_back(makeStage());
-  Motion motion;
-  motion.schedule = {{{"free", stages, h, {}}}};
-  motion.problem = std::make_unique<RobotProblem>(model, q0, VectorXd::Zero(model.nv()), std::move(specs), formulation);
-  ShootingTrajectory trajectory;
-  trajectory.xs = {motion.problem->initialState()};
-  RobotEvaluator evaluator(*motion.problem);
-  for (int k = 0; k < stages; ++k) {
-    trajectory.us.push_back(VectorXd::Constant(model.nu(), 0.3));
-    const RobotEvaluation& step = evaluator.evaluate(k, trajectory.xs[k], trajectory.us[k]);
-    REQUIRE(step.status == StepStatus::Ok);
-    trajectory.xs.push_back(step.x_next);
-  }
-  CheckedMotion checked = makeFreeMotion(model, h, formulation, stages);
-  checked.record = makeRecord(motion, trajectory);
-  return checked;
-}
-
-}  // namespace
 
 TEST_CASE("check: the squat of Bipetto passes at its defaults, in both formulations") {
   for (const Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
@@ -222,15 +66,17 @@ TEST_CASE("check: each poisoned number makes its rows fail and no other") {
   const int knee = model.joints()[model.findJoint("motor_knee_left")].idx_q;
   const int foot = 6 * model.findContact("foot_left");
   const Names steps = {"equations of motion", "steps of the velocity", "steps of the configuration"};
-  expect(steps, [&](CheckedMotion& m) { m.record.q(node, hip.idx_q) += 1e-4; });
+  Names moved = steps;
+  moved.insert("centre of mass, as recorded");
+  expect(moved, [&](CheckedMotion& m) { m.record.q(node, hip.idx_q) += 1e-4; });
   expect(steps, [&](CheckedMotion& m) { m.record.v(node, hip.idx_v) += 1e-4; });
   expect({"equations of motion", "steps of the velocity"},
          [&](CheckedMotion& m) { m.record.a(node, hip.idx_v) += 1e-3; });
   expect({"equations of motion"}, [&](CheckedMotion& m) { m.record.u(node, 3) += 1e-3; });
   expect({"equations of motion"}, [&](CheckedMotion& m) { m.record.contact_wrenches(node, foot + 2) += 0.1; });
   expect({"equations of motion"}, [&](CheckedMotion& m) { m.record.closure_wrenches(node, 1) += 0.1; });
-  expect({"equations of motion", "steps of the velocity", "steps of the configuration", "loops: gap",
-          "loops: gap, angle", "loops: opening velocity"},
+  expect({"centre of mass, as recorded", "equations of motion", "steps of the velocity", "steps of the configuration",
+          "loops: gap", "loops: gap, angle", "loops: opening velocity"},
          [&](CheckedMotion& m) { m.record.q(node, knee) += 1e-4; });
   expect({"time between nodes"}, [&](CheckedMotion& m) { m.record.time[node] += 1e-6; });
   expect({"contact: tangential over normal", "contact: wrench cone of the sole"},
@@ -254,7 +100,8 @@ TEST_CASE("check: a foot that slides, and one that is said to be in the air") {
   for (int k = 0; k <= sliding.numStages(); ++k) sliding.record.q(k, 0) += 2e-5 * k;  // 4 mm, at a speed that v lacks
   const CheckReport slid = checkMotion(sliding);
   INFO(print(slid));
-  CHECK(getFailures(slid) == Names{"standing feet: slip", "steps of the velocity", "steps of the configuration"});
+  CHECK(getFailures(slid) == Names{"centre of mass, as recorded", "standing feet: slip", "steps of the velocity",
+                                   "steps of the configuration"});
 
   CheckedMotion lifted = getSquat().checked;
   const auto stances = lifted.summary.phases[0].stances;

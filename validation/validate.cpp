@@ -12,6 +12,7 @@
 #include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "largest.h"
 #include "model_copy.h"
 #include "motion.h"
 #include "simbody_bridge.h"
@@ -163,7 +164,7 @@ class Comparison {
     if (row == report_.rows.end()) row = report_.rows.insert(row, {quantity, 0, tolerance, 0});
     double difference = (ours - theirs).cwiseAbs().maxCoeff() / std::max(theirs.cwiseAbs().maxCoeff(), floor);
     if (!ours.allFinite() || !theirs.allFinite()) difference = std::numeric_limits<double>::infinity();
-    row->difference = std::max(row->difference, difference);
+    row->difference = getLarger(row->difference, difference);
     row->tolerance = std::max(row->tolerance, tolerance);
     ++row->samples;
   }

@@ -1,0 +1,23 @@
+#pragma once
+/// \file The recorded accelerations against Simbody's own, Eqs. (4) and (5) of check.h.
+#include "check_input.h"
+#include "simbody_bridge.h"
+
+namespace bielle::validation {
+
+struct AccelerationTrace {
+  VectorXd a;        ///< nv, Simbody's, with the stabilisation of Eq. (5) that comes nearest to the recorded ones
+  double size = 0;   ///< sqrt(a^T M a)
+  double error = 0;  ///< the same norm of the recorded ones less a
+};
+
+/// sqrt(a^T M a)
+double calcInertialNorm(const MatrixXd& M, const VectorXd& a);
+
+/// \param simbody at the state and with the motor forces of the node; its closures are the loops and then `contacts`
+/// \param M mass matrix there   \param recorded accelerations (nv)
+/// \param stabilised_loops  whether loops have a stabilisation as feet have: the full formulation
+AccelerationTrace traceAccelerations(const SimbodyBridge& simbody, const MatrixXd& M, const VectorXd& v,
+                                     const VectorXd& recorded, double time_step, bool stabilised_loops);
+
+}  // namespace bielle::validation

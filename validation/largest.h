@@ -1,0 +1,21 @@
+#pragma once
+// Maxima and minima that keep a NaN: std::max(x, NaN) is x, and a failed computation would pass for a small one.
+#include <Eigen/Core>
+#include <cmath>
+
+namespace bielle::validation {
+
+inline double getLarger(double a, double b) { return std::isnan(a) || b < a ? a : b; }
+inline double getSmaller(double a, double b) { return std::isnan(a) || a < b ? a : b; }
+
+// Largest |entry|, 0 of none, NaN if one is; its place if it is asked for.
+template <typename Derived>
+double calcLargest(const Eigen::MatrixBase<Derived>& x) {
+  return x.size() == 0 ? 0 : x.cwiseAbs().template maxCoeff<Eigen::PropagateNaN>();
+}
+template <typename Derived>
+double calcLargest(const Eigen::MatrixBase<Derived>& x, Eigen::Index* place) {
+  return x.cwiseAbs().template maxCoeff<Eigen::PropagateNaN>(place);
+}
+
+}  // namespace bielle::validation
