@@ -17,7 +17,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "bielle/io/lift_files.h"
+#include "bielle/io/result.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 

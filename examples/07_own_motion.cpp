@@ -12,7 +12,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/result.h"
 #include "bielle/model/reader.h"

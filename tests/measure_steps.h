@@ -5,9 +5,9 @@
 #include <cmath>
 #include <optional>
 
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
+#include "math/so3.h"
 
 namespace bielle {
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/dynamics/kinematics.h"
+#include "math/so3.h"
 
 namespace bielle::testing {
 

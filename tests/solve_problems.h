@@ -5,8 +5,8 @@
 #include <complex>
 #include <vector>
 
-#include "bielle/model/joint.h"
 #include "bielle/solve/shooting_problem.h"
+#include "model/joint.h"
 
 namespace bielle::test {
 

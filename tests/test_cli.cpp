@@ -10,7 +10,6 @@
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"

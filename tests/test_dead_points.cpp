@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/ocp/robot_problem.h"

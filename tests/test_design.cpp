@@ -8,14 +8,14 @@
 #include <fstream>
 #include <iterator>
 
-#include "bielle/design/draft.h"
-#include "bielle/design/run.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "bielle/robots/generators.h"
+#include "design/draft.h"
+#include "design/run.h"
 #include "robot_directory.h"
 #include "run_command.h"
 

@@ -6,12 +6,12 @@
 #include <fstream>
 #include <iterator>
 
-#include "bielle/design/run.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
 #include "check_derivative.h"
+#include "design/run.h"
 #include "robot_directory.h"
 #include "run_command.h"
 

@@ -3,12 +3,12 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "bielle/design/evaluation.h"
-#include "bielle/design/spec.h"
 #include "bielle/model/error.h"
-#include "bielle/robots/fivebar_leg.h"
 #include "bielle/robots/generators.h"
+#include "design/evaluation.h"
+#include "design/spec.h"
 #include "robot_directory.h"
+#include "robots/fivebar_leg.h"
 
 using namespace bielle;
 using namespace bielle::testing;

@@ -4,6 +4,7 @@
 
 #include "count_allocations.h"
 #include "fddp_oracle.h"
+#include "solve/lq_sweep.h"
 
 using namespace bielle;
 using namespace bielle::test;

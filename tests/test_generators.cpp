@@ -12,12 +12,13 @@
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
-#include "bielle/robots/cleobot.h"
-#include "bielle/robots/delta.h"
 #include "bielle/robots/generators.h"
-#include "bielle/robots/solid.h"
-#include "bielle/robots/spring_leg.h"
+#include "math/so3.h"
 #include "robot_directory.h"
+#include "robots/cleobot.h"
+#include "robots/delta.h"
+#include "robots/solid.h"
+#include "robots/spring_leg.h"
 
 using namespace bielle;
 using namespace bielle::testing;

@@ -9,9 +9,9 @@
 #include <fstream>
 
 #include "bielle/io/record.h"
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 #include "get_error.h"
+#include "io/text_file.h"
 #include "robot_directory.h"
 
 namespace fs = std::filesystem;

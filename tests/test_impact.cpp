@@ -6,6 +6,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "check_derivative.h"
 #include "count_allocations.h"
+#include "dynamics/saddle_point.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -68,7 +69,7 @@ TEST_CASE("a block that lands flat stops; redundant loops meet the same velocity
   REQUIRE(set.rows == 6);
   const VectorXd v = randomVector(rng, model.nv(), 1);
   REQUIRE(updateImpact(model, iws, set, four_bar.q_closed, v) == DynamicsStatus::Ok);
-  CHECK(iws.saddle_point.isRedundant());
+  CHECK(iws.saddle_point->isRedundant());
   CHECK((iws.J * iws.v_plus).norm() < 1e-10);
   // Momentum along the null space N of J is conserved: N^T M v+ = N^T M v.
   const Eigen::FullPivLU<MatrixXd> lu(iws.J);

@@ -8,15 +8,14 @@
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
-#include "bielle/io/opensim.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "get_error.h"
+#include "io/opensim.h"
 #include "problem_probe.h"
 
 namespace fs = std::filesystem;

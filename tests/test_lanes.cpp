@@ -3,13 +3,15 @@
 #include <numeric>
 #include <random>
 
-#include "bielle/dynamics/reduction.h"
 #include "bielle/math/se3.h"
-#include "bielle/math/small_dense.h"
 #include "bielle/model/reader.h"
-#include "bielle/motion/benchmark_walk.h"
 #include "bielle/motion/motion.h"
+#include "dynamics/reduction.h"
+#include "math/small_dense.h"
+#include "math/so3.h"
 #include "mechanisms.h"
+#include "model/joint.h"
+#include "motion/benchmark_walk.h"
 #include "problem_probe.h"
 
 using namespace bielle;

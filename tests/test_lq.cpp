@@ -6,7 +6,7 @@
 #include <chrono>
 #include <random>
 
-#include "bielle/solve/lq_sweep.h"
+#include "solve/lq_sweep.h"
 
 using namespace bielle;
 

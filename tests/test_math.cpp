@@ -3,8 +3,8 @@
 #include <random>
 
 #include "bielle/math/se3.h"
-#include "bielle/math/small_dense.h"
-#include "bielle/model/joint.h"
+#include "math/small_dense.h"
+#include "model/joint.h"
 
 using namespace bielle;
 

@@ -4,6 +4,7 @@
 
 #include "bielle/model/builder.h"
 #include "get_error.h"
+#include "math/so3.h"
 
 using namespace bielle;
 using namespace bielle::testing;

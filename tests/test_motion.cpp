@@ -4,14 +4,13 @@
 #include <iterator>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
-#include "bielle/motion/benchmark_walk.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
+#include "motion/benchmark_walk.h"
 #include "problem_probe.h"
 #include "robot_directory.h"
 

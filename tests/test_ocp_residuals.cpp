@@ -8,6 +8,7 @@
 #include "bielle/model/reader.h"
 #include "bielle/ocp/cost.h"
 #include "check_derivative.h"
+#include "math/so3.h"
 
 using namespace bielle;
 using namespace bielle::testing;

@@ -10,8 +10,8 @@
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
-#include "bielle/robots/spring_leg.h"
 #include "measure_steps.h"
+#include "robots/spring_leg.h"
 
 using namespace bielle;
 namespace fs = std::filesystem;

@@ -4,11 +4,11 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/dynamics/reduction.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/motion.h"
 #include "bielle/ocp/robot_problem.h"
 #include "check_derivative.h"
+#include "dynamics/reduction.h"
 #include "mechanisms.h"
 #include "problem_probe.h"
 

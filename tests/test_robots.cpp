@@ -6,6 +6,7 @@
 #include <map>
 
 #include "bielle/model/reader.h"
+#include "model/joint.h"
 
 using namespace bielle;
 

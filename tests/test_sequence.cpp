@@ -2,7 +2,6 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/math/so3.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/footsteps.h"
@@ -12,6 +11,7 @@
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
 #include "get_error.h"
+#include "math/so3.h"
 #include "measure_steps.h"
 
 using namespace bielle;

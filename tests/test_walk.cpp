@@ -5,6 +5,7 @@
 #include "bielle/model/reader.h"
 #include "bielle/motion/walk.h"
 #include "measure_steps.h"
+#include "motion/gait.h"
 
 using namespace bielle;
 

@@ -3,9 +3,9 @@
 #include <array>
 #include <optional>
 
-#include "bielle/math/so3.h"
 #include "check_rows.h"
 #include "largest.h"
+#include "math/so3.h"
 
 namespace bielle::validation {
 namespace {

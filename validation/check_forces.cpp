@@ -4,6 +4,7 @@
 
 #include "check_rows.h"
 #include "largest.h"
+#include "math/lanes.h"
 #include "wrench_cone.h"
 
 namespace bielle::validation {

@@ -3,10 +3,10 @@
 #include <filesystem>
 #include <iostream>
 
-#include "bielle/io/standard_output.h"
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 #include "check.h"
+#include "io/standard_output.h"
+#include "io/text_file.h"
 
 using namespace bielle;
 using namespace bielle::validation;

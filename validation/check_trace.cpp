@@ -3,9 +3,9 @@
 #include <Eigen/QR>
 #include <memory>
 
-#include "bielle/math/so3.h"
 #include "check_accelerations.h"
 #include "largest.h"
+#include "math/so3.h"
 #include "simbody_bridge.h"
 
 namespace bielle::validation {

@@ -3,9 +3,9 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "bielle/io/standard_output.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
+#include "io/standard_output.h"
 #include "validate.h"
 
 using namespace bielle;

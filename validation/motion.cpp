@@ -4,9 +4,9 @@
 #include <Eigen/QR>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "largest.h"
+#include "model/joint.h"
 #include "simbody_bridge.h"
 
 namespace bielle::validation {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "model/joint.h"
+
 namespace bielle::validation {
 namespace {
 

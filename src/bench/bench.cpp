@@ -8,9 +8,10 @@
 #include "bench/receding_horizon.h"
 #include "bielle/dynamics/assembly.h"
 #include "bielle/io/result.h"
-#include "bielle/motion/benchmark_walk.h"
 #include "bielle/motion/squat.h"
 #include "bielle/robots/fourbar_chain.h"
+#include "motion/benchmark_walk.h"
+#include "solve/lq_sweep.h"
 
 namespace bielle {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 // The receding horizon of `bielle bench`.
 #include "bench/bench.h"
-#include "bielle/motion/benchmark_walk.h"
+#include "motion/benchmark_walk.h"
 
 namespace bielle {
 

@@ -1,7 +1,6 @@
 // bielle eval: the constrained dynamics at one state, and their derivatives.
 #include <iostream>
 
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"

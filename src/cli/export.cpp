@@ -3,9 +3,9 @@
 #include <iostream>
 #include <memory>
 
-#include "bielle/io/opensim.h"
-#include "bielle/io/text_file.h"
 #include "cli/commands.h"
+#include "io/opensim.h"
+#include "io/text_file.h"
 
 namespace fs = std::filesystem;
 

@@ -5,8 +5,8 @@
 #include <iostream>
 #include <optional>
 
-#include "bielle/io/lift_files.h"
 #include "bielle/io/names.h"
+#include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "cli/motion_registry.h"

@@ -4,9 +4,9 @@
 #include <iostream>
 
 #include "bielle/io/result.h"
-#include "bielle/io/standard_output.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
+#include "io/standard_output.h"
 
 namespace {
 

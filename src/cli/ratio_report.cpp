@@ -6,11 +6,11 @@
 #include <filesystem>
 #include <ostream>
 
-#include "bielle/io/text_file.h"
 #include "cli/ratio_figure.h"
 #include "cli/table.h"
 #include "io/aside_file.h"
 #include "io/figure.h"
+#include "io/text_file.h"
 
 namespace fs = std::filesystem;
 

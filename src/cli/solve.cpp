@@ -9,7 +9,6 @@
 #include <sstream>
 
 #include "bielle/io/result.h"
-#include "bielle/io/warm_start.h"
 #include "bielle/model/error.h"
 #include "bielle/report/report.h"
 #include "bielle/transmission/serial_model.h"
@@ -303,7 +302,8 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
 constexpr const char* kOutcome =
     "Ctrl-C stops the solver; the iterate it has by then is written, and marked as interrupted. Exit status: 0 "
     "converged\nand checked, 1 not converged, or the check failed or broke off (results are written all the same), 2 "
-    "bad input.\nA goal that is missed (what came out differs from what was asked) does not change the status; a warning "
+    "bad input.\nA goal that is missed (what came out differs from what was asked) does not change the status; a "
+    "warning "
     "says so at the end.";
 
 void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {

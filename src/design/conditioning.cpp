@@ -1,4 +1,4 @@
-#include "bielle/design/conditioning.h"
+#include "design/conditioning.h"
 
 #include <Eigen/QR>
 #include <Eigen/SVD>

@@ -1,4 +1,4 @@
-#include "bielle/design/draft.h"
+#include "design/draft.h"
 
 #include "bielle/model/builder.h"
 

@@ -1,12 +1,11 @@
-#include "bielle/design/evaluation.h"
+#include "design/evaluation.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/lift_files.h"
-#include "bielle/io/warm_start.h"
+#include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "bielle/transmission/serial_model.h"
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "bielle/design/run.h"
+#include "design/run.h"
 
 namespace bielle {
 

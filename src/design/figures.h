@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "bielle/design/run.h"
+#include "design/run.h"
 #include "io/plot.h"
 
 namespace bielle {

@@ -1,4 +1,4 @@
-#include "bielle/design/gradient.h"
+#include "design/gradient.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

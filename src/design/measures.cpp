@@ -1,10 +1,10 @@
-#include "bielle/design/measures.h"
+#include "design/measures.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "bielle/design/conditioning.h"
 #include "bielle/model/error.h"
+#include "design/conditioning.h"
 
 namespace bielle {
 namespace {

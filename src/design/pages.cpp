@@ -2,11 +2,11 @@
 #include <filesystem>
 #include <sstream>
 
-#include "bielle/design/run.h"
 #include "bielle/io/result.h"
 #include "bielle/io/robot_writer.h"
-#include "bielle/io/text_file.h"
 #include "design/figures.h"
+#include "design/run.h"
+#include "io/text_file.h"
 
 namespace fs = std::filesystem;
 

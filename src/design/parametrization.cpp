@@ -4,9 +4,9 @@
 #include <set>
 #include <sstream>
 
-#include "bielle/design/draft.h"
 #include "bielle/model/error.h"
 #include "bielle/robots/generators.h"
+#include "design/draft.h"
 
 namespace bielle {
 namespace {

@@ -1,4 +1,4 @@
-#include "bielle/design/run.h"
+#include "design/run.h"
 
 #include <algorithm>
 #include <atomic>

@@ -1,4 +1,4 @@
-#include "bielle/design/spec.h"
+#include "design/spec.h"
 
 #include "design/spec_parts.h"
 #include "model/text_file.h"

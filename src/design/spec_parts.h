@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "bielle/design/spec.h"
 #include "bielle/model/model.h"
+#include "design/spec.h"
 #include "model/yaml_entry.h"
 
 namespace bielle {

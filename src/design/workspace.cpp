@@ -1,4 +1,4 @@
-#include "bielle/design/workspace.h"
+#include "design/workspace.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,11 +6,11 @@
 #include <numeric>
 #include <optional>
 
-#include "bielle/design/conditioning.h"
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/motion.h"
+#include "design/conditioning.h"
 
 namespace bielle {
 namespace {

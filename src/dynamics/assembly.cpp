@@ -10,6 +10,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "math/so3.h"
 
 namespace bielle {
 namespace {

@@ -1,4 +1,4 @@
-#include "bielle/dynamics/centroidal.h"
+#include "bielle/dynamics/kinematics.h"
 
 namespace bielle {
 

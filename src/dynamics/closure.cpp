@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "bielle/dynamics/kinematics.h"
+#include "math/lanes.h"
+#include "model/joint.h"
 
 namespace bielle {
 namespace {

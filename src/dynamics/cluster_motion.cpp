@@ -1,4 +1,4 @@
-#include "bielle/dynamics/cluster_motion.h"
+#include "dynamics/cluster_motion.h"
 
 namespace bielle {
 namespace {
@@ -116,7 +116,7 @@ void updateAccelerationLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& mo
 
 template <typename T>
 void calcGeometricStiffness(const ClusterViewOf<T>& view, const ClusterMotionOf<T>& motion,
-                   typename ArgumentsOf<T>::ConstVector forces, typename ArgumentsOf<T>::Matrix out) {
+                            typename ArgumentsOf<T>::ConstVector forces, typename ArgumentsOf<T>::Matrix out) {
   const ReducedCluster& cluster = motion.cluster;
   const int n = static_cast<int>(cluster.dofs.size());
   out.setZero();
@@ -153,14 +153,14 @@ template void updateTwists(const ClusterViewOf<double>&, const ClusterBasisOf<do
 template void updateVelocityLift(const ClusterViewOf<double>&, ClusterMotionOf<double>&);
 template void updateAccelerationLift(const ClusterViewOf<double>&, ClusterMotionOf<double>&);
 template void calcGeometricStiffness(const ClusterViewOf<double>&, const ClusterMotionOf<double>&,
-                            ArgumentsOf<double>::ConstVector, ArgumentsOf<double>::Matrix);
+                                     ArgumentsOf<double>::ConstVector, ArgumentsOf<double>::Matrix);
 template struct ClusterMotionOf<Lanes>;
 template void calcClusterDrift(const ClusterViewOf<Lanes>&, const ReducedCluster&, const ClusterBasisOf<Lanes>&,
                                ArgumentsOf<Lanes>::Vector, ArgumentsOf<Lanes>::Vector);
 template void updateTwists(const ClusterViewOf<Lanes>&, const ClusterBasisOf<Lanes>&, ClusterMotionOf<Lanes>&);
 template void updateVelocityLift(const ClusterViewOf<Lanes>&, ClusterMotionOf<Lanes>&);
 template void updateAccelerationLift(const ClusterViewOf<Lanes>&, ClusterMotionOf<Lanes>&);
-template void calcGeometricStiffness(const ClusterViewOf<Lanes>&, const ClusterMotionOf<Lanes>&, ArgumentsOf<Lanes>::ConstVector,
-                            ArgumentsOf<Lanes>::Matrix);
+template void calcGeometricStiffness(const ClusterViewOf<Lanes>&, const ClusterMotionOf<Lanes>&,
+                                     ArgumentsOf<Lanes>::ConstVector, ArgumentsOf<Lanes>::Matrix);
 
 }  // namespace bielle

@@ -3,7 +3,8 @@
 #include <limits>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/dynamics/reduction.h"
+#include "dynamics/reduction.h"
+#include "model/joint.h"
 
 namespace bielle {
 namespace {

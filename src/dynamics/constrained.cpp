@@ -6,8 +6,20 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "dynamics/saddle_point.h"
 
 namespace bielle {
+
+SaddlePointMemory::SaddlePointMemory() : system_(std::make_unique<SaddlePoint>()) {}
+SaddlePointMemory::~SaddlePointMemory() = default;
+SaddlePointMemory::SaddlePointMemory(const SaddlePointMemory& other)
+    : system_(std::make_unique<SaddlePoint>(*other.system_)) {}
+SaddlePointMemory::SaddlePointMemory(SaddlePointMemory&& other) noexcept = default;
+SaddlePointMemory& SaddlePointMemory::operator=(const SaddlePointMemory& other) {
+  if (this != &other) system_ = std::make_unique<SaddlePoint>(*other.system_);
+  return *this;
+}
+SaddlePointMemory& SaddlePointMemory::operator=(SaddlePointMemory&& other) noexcept = default;
 namespace {
 
 void resize(const Model& model, ConstrainedWorkspace& cws, int rows) {
@@ -21,7 +33,7 @@ void resize(const Model& model, ConstrainedWorkspace& cws, int rows) {
   cws.da_du.setZero(nv, model.nu());
   cws.dlambda_du.setZero(rows, model.nu());
   cws.f_ext.assign(model.numBodies(), Vector6d::Zero());
-  cws.saddle_point.resize(nv, rows);
+  cws.saddle_point->resize(nv, rows);
 }
 
 // Jacobian and gamma of all closures; the accelerations in ws are those of a = 0.
@@ -37,11 +49,11 @@ void assembleConstraints(const Workspace& ws, ConstrainedWorkspace& cws, const C
 
 // Rows that are independent are fulfilled to rounding.
 bool areContradictory(const ConstrainedWorkspace& cws) {
-  if (!cws.saddle_point.isRedundant()) return false;
+  if (!cws.saddle_point->isRedundant()) return false;
   double size = 0;
   for (Eigen::Index i = 0; i < cws.J.rows(); ++i)
-    size = std::max(size, std::abs(cws.gamma[i]) +
-                              cws.J.row(i).cwiseAbs().cwiseProduct(cws.a.cwiseAbs().transpose()).sum());
+    size = std::max(size,
+                    std::abs(cws.gamma[i]) + cws.J.row(i).cwiseAbs().cwiseProduct(cws.a.cwiseAbs().transpose()).sum());
   return cws.residual > kContradiction * size;
 }
 
@@ -64,16 +76,16 @@ const char* getMessage(DynamicsStatus status) {
 
 DynamicsStatus updateConstrainedDynamics(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
                                          const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v,
-                                         ConstVectorRef tau, const SaddlePointOptions& options) {
+                                         ConstVectorRef tau) {
   resize(model, cws, constraints.rows);
   updatePositions(model, ws, q);
   updateVelocities(model, ws, v);
   updateMassMatrix(model, ws);
   updateBias(model, ws);
   assembleConstraints(ws, cws, constraints);
-  if (!cws.saddle_point.factorize(ws.M, cws.J, options)) return DynamicsStatus::MassMatrixSingular;
+  if (!cws.saddle_point->factorize(ws.M, cws.J)) return DynamicsStatus::MassMatrixSingular;
   cws.force = tau - ws.b;
-  cws.saddle_point.solve(cws.force, cws.gamma, cws.a, cws.lambda);
+  cws.saddle_point->solve(cws.force, cws.gamma, cws.a, cws.lambda);
   cws.violation = cws.gamma;
   cws.violation.noalias() += cws.J * cws.a;
   cws.residual = constraints.rows > 0 ? cws.violation.cwiseAbs().maxCoeff() : 0;

@@ -1,5 +1,6 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/rnea.h"
+#include "dynamics/saddle_point.h"
 
 namespace bielle {
 DynamicsStatus updateConstrainedDerivatives(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
@@ -25,10 +26,10 @@ DynamicsStatus updateConstrainedDerivatives(const Model& model, Workspace& ws, C
   }
   cws.da_du.setZero();  // the torques enter ID with a minus
   for (int m = 0; m < model.nu(); ++m) cws.da_du(model.motors()[m].dof, m) = -1;
-  cws.saddle_point.updateInverse();
-  cws.saddle_point.solveDerivatives(cws.da_dq, cws.dlambda_dq);
-  cws.saddle_point.solveDerivatives(cws.da_dv, cws.dlambda_dv);
-  cws.saddle_point.solveDerivatives(cws.da_du, cws.dlambda_du);
+  cws.saddle_point->updateInverse();
+  cws.saddle_point->solveDerivatives(cws.da_dq, cws.dlambda_dq);
+  cws.saddle_point->solveDerivatives(cws.da_dv, cws.dlambda_dv);
+  cws.saddle_point->solveDerivatives(cws.da_du, cws.dlambda_du);
   const bool finite = cws.da_dq.allFinite() && cws.da_dv.allFinite() && cws.dlambda_dq.allFinite();
   return finite ? DynamicsStatus::Ok : DynamicsStatus::NotFinite;
 }

@@ -2,6 +2,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "dynamics/saddle_point.h"
 
 namespace bielle {
 namespace {
@@ -12,7 +13,7 @@ void resize(const Model& model, ImpactWorkspace& iws, int rows) {
   iws.J.setZero(rows, nv);
   iws.impulse.setZero(rows);
   for (MatrixXd* m : {&iws.dimpulse_dq, &iws.dimpulse_dv}) m->setZero(rows, nv);
-  iws.saddle_point.resize(nv, rows);
+  iws.saddle_point->resize(nv, rows);
   iws.zero.setZero(rows);
 }
 
@@ -33,9 +34,9 @@ DynamicsStatus updateImpact(const Model& model, ImpactWorkspace& iws, const Cons
     const Closure& closure = constraints.closures[c];
     calcClosureJacobian(iws.ws, closure, iws.J.middleRows(constraints.offsets[c], getRows(closure.kind)));
   }
-  if (!iws.saddle_point.factorize(iws.ws.M, iws.J)) return DynamicsStatus::MassMatrixSingular;
+  if (!iws.saddle_point->factorize(iws.ws.M, iws.J)) return DynamicsStatus::MassMatrixSingular;
   iws.momentum.noalias() = iws.ws.M * v;
-  iws.saddle_point.solve(iws.momentum, iws.zero, iws.v_plus, iws.impulse);
+  iws.saddle_point->solve(iws.momentum, iws.zero, iws.v_plus, iws.impulse);
   iws.change = iws.v_plus - v;
   return iws.v_plus.allFinite() && iws.impulse.allFinite() ? DynamicsStatus::Ok : DynamicsStatus::NotFinite;
 }
@@ -69,9 +70,9 @@ DynamicsStatus updateImpactDerivatives(const Model& model, ImpactWorkspace& iws,
     addClosureForceDerivative(model, ws, closure, W, iws.dv_dq);
   }
   iws.dv_dv = -ws.M;
-  iws.saddle_point.updateInverse();
-  iws.saddle_point.solveDerivatives(iws.dv_dq, iws.dimpulse_dq);
-  iws.saddle_point.solveDerivatives(iws.dv_dv, iws.dimpulse_dv);
+  iws.saddle_point->updateInverse();
+  iws.saddle_point->solveDerivatives(iws.dv_dq, iws.dimpulse_dq);
+  iws.saddle_point->solveDerivatives(iws.dv_dv, iws.dimpulse_dv);
   return iws.dv_dq.allFinite() && iws.dv_dv.allFinite() ? DynamicsStatus::Ok : DynamicsStatus::NotFinite;
 }
 

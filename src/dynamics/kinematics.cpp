@@ -1,5 +1,8 @@
 #include "bielle/dynamics/kinematics.h"
 
+#include "math/lanes.h"
+#include "model/joint.h"
+
 namespace bielle {
 namespace {
 

@@ -1,4 +1,4 @@
-#include "bielle/dynamics/reduced_tree.h"
+#include "dynamics/reduced_tree.h"
 
 #include "bielle/dynamics/rnea.h"
 

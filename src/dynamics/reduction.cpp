@@ -1,4 +1,4 @@
-#include "bielle/dynamics/reduction.h"
+#include "dynamics/reduction.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,7 @@
 #include "bielle/dynamics/rnea.h"
 
 #include "bielle/dynamics/kinematics.h"
+#include "math/lanes.h"
 
 namespace bielle {
 namespace {

@@ -1,9 +1,9 @@
-#include "bielle/dynamics/saddle_point.h"
+#include "dynamics/saddle_point.h"
 
 #include <cmath>
 #include <type_traits>
 
-#include "bielle/math/small_dense.h"
+#include "math/small_dense.h"
 
 namespace bielle {
 namespace {

@@ -1,6 +1,7 @@
 #include "bielle/dynamics/variation.h"
 
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/saddle_point.h"
 
 namespace bielle {
 namespace {
@@ -180,8 +181,8 @@ DynamicsVariation calcConstrainedVariation(const Model& model, Workspace& ws, Co
     out.a.col(i) = calcInverseDynamicsVariation(model, ws, constraints, cws.lambda, changes[i], motion, variation);
     out.lambda.col(i) = calcAccelerationVariation(ws, constraints, changes[i], variation);
   }
-  cws.saddle_point.updateInverse();
-  cws.saddle_point.solveDerivatives(out.a, out.lambda);
+  cws.saddle_point->updateInverse();
+  cws.saddle_point->solveDerivatives(out.a, out.lambda);
   return out;
 }
 

@@ -2,6 +2,8 @@
 
 #include <stdexcept>
 
+#include "math/lanes.h"
+
 namespace bielle {
 
 template <typename T>

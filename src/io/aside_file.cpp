@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
+#include "io/text_file.h"
 
 namespace bielle {
 

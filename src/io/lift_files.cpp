@@ -1,9 +1,8 @@
-#include "bielle/io/lift_files.h"
-
 #include <algorithm>
 #include <filesystem>
 
 #include "bielle/io/names.h"
+#include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "io/aside_file.h"
 #include "io/json_text.h"

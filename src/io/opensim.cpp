@@ -1,4 +1,4 @@
-#include "bielle/io/opensim.h"
+#include "io/opensim.h"
 
 #include <charconv>
 

@@ -2,13 +2,12 @@
 
 #include <limits>
 
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 #include "io/aside_file.h"
 #include "io/record_tables.h"
+#include "io/text_file.h"
 
 namespace bielle {
 namespace {

@@ -9,12 +9,12 @@
 #include <optional>
 
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/math/so3.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/footsteps.h"
 #include "io/aside_file.h"
 #include "io/json_text.h"
 #include "io/record_tables.h"
+#include "math/so3.h"
 
 namespace fs = std::filesystem;
 

@@ -6,8 +6,8 @@
 #include <set>
 #include <sstream>
 
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
+#include "io/text_file.h"
 
 namespace bielle {
 namespace {

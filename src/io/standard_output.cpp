@@ -1,4 +1,4 @@
-#include "bielle/io/standard_output.h"
+#include "io/standard_output.h"
 
 #include <csignal>
 #include <cstdio>

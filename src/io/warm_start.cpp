@@ -1,10 +1,9 @@
-#include "bielle/io/warm_start.h"
-
 #include <cmath>
 #include <filesystem>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
+#include "bielle/io/result.h"
 #include "bielle/model/error.h"
 
 namespace fs = std::filesystem;

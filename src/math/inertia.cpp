@@ -1,4 +1,4 @@
-#include "bielle/math/inertia.h"
+#include "bielle/math/se3.h"
 
 namespace bielle {
 

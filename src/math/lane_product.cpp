@@ -1,4 +1,4 @@
-#include "bielle/math/lane_product.h"
+#include "math/lane_product.h"
 
 #include <cmath>
 

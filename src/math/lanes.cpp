@@ -1,4 +1,4 @@
-#include "bielle/math/lanes.h"
+#include "math/lanes.h"
 
 #include <algorithm>
 

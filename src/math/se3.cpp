@@ -2,7 +2,8 @@
 
 #include <cmath>
 
-#include "small_angle.h"
+#include "math/small_angle.h"
+#include "math/so3.h"
 
 namespace bielle {
 namespace {

@@ -2,7 +2,7 @@
 // Even functions of an angle t, from t^2: by series for small angles, by their closed form for others.
 #include <array>
 
-#include "bielle/math/lanes.h"
+#include "math/lanes.h"
 
 namespace bielle {
 

@@ -1,4 +1,4 @@
-#include "bielle/math/small_dense.h"
+#include "math/small_dense.h"
 
 #include <cmath>
 #include <utility>

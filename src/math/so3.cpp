@@ -1,8 +1,8 @@
-#include "bielle/math/so3.h"
+#include "math/so3.h"
 
 #include <cmath>
 
-#include "small_angle.h"
+#include "math/small_angle.h"
 
 namespace bielle {
 namespace {

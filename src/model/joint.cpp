@@ -1,6 +1,8 @@
-#include "bielle/model/joint.h"
+#include "model/joint.h"
 
 #include <cmath>
+
+#include "math/so3.h"
 
 namespace bielle {
 namespace {

@@ -1,5 +1,7 @@
 #include "bielle/model/model.h"
 
+#include "model/joint.h"
+
 namespace bielle {
 namespace {
 

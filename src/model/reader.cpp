@@ -6,7 +6,7 @@
 
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
-#include "robot_files.h"
+#include "model/robot_files.h"
 
 namespace bielle {
 namespace {

@@ -12,7 +12,7 @@
 #include <sstream>
 
 #include "bielle/model/error.h"
-#include "robot_files.h"
+#include "model/robot_files.h"
 
 namespace bielle {
 namespace {

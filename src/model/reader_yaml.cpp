@@ -5,8 +5,8 @@
 #include <set>
 
 #include "bielle/model/error.h"
-#include "robot_files.h"
-#include "yaml_entry.h"
+#include "model/robot_files.h"
+#include "model/yaml_entry.h"
 
 namespace bielle {
 namespace {

@@ -1,9 +1,8 @@
-#include "bielle/motion/benchmark_walk.h"
+#include "motion/benchmark_walk.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 

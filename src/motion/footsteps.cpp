@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "bielle/math/so3.h"
 #include "bielle/model/error.h"
+#include "math/so3.h"
 
 namespace bielle {
 namespace {

@@ -1,11 +1,11 @@
-#include "bielle/motion/gait.h"
+#include "motion/gait.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "bielle/math/so3.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/motion.h"
+#include "math/so3.h"
 
 namespace bielle {
 namespace {

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 

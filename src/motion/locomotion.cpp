@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/math/so3.h"
 #include "bielle/model/error.h"
+#include "math/so3.h"
+#include "motion/gait.h"
 
 namespace bielle {
 namespace {

@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include "bielle/math/so3.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/footsteps.h"
+#include "math/so3.h"
 
 namespace bielle {
 namespace {

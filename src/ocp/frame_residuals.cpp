@@ -3,6 +3,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/ocp/residual.h"
+#include "math/so3.h"
 
 namespace bielle {
 namespace {

@@ -1,4 +1,4 @@
-#include "node_costs.h"
+#include "ocp/node_costs.h"
 
 #include <cmath>
 

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "bielle/dynamics/centroidal.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/ocp/residual.h"
 
 namespace bielle {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
-#include "transcription.h"
+#include "ocp/transcription.h"
 
 namespace bielle {
 namespace {

@@ -2,7 +2,7 @@
 // A formulation behind RobotProblem: what a node's state space is and how its dynamics become a step. The functions are those of
 // ShootingProblem; count is at most the batch size.
 #include "bielle/ocp/robot_problem.h"
-#include "node_costs.h"
+#include "ocp/node_costs.h"
 
 namespace bielle {
 

@@ -4,8 +4,8 @@
 #include <map>
 
 #include "bielle/io/result.h"
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
+#include "io/text_file.h"
 #include "report/page.h"
 #include "report/run.h"
 

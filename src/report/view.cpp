@@ -1,15 +1,14 @@
-#include "bielle/report/view.h"
+#include "report/view.h"
 
 #include <algorithm>
 #include <cmath>
 #include <deque>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/centroidal.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/result.h"
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
+#include "io/text_file.h"
 #include "report/pack.h"
 #include "report/page.h"
 #include "report/run.h"

@@ -1,4 +1,4 @@
-#include "biped_parts.h"
+#include "robots/biped_parts.h"
 
 namespace bielle {
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "bielle/robots/solid.h"
+#include "robots/solid.h"
 
 namespace bielle {
 

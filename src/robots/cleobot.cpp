@@ -1,8 +1,8 @@
-#include "bielle/robots/cleobot.h"
+#include "robots/cleobot.h"
 
 #include <cmath>
 
-#include "biped_parts.h"
+#include "robots/biped_parts.h"
 
 namespace bielle {
 namespace {

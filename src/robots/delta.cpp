@@ -1,8 +1,8 @@
-#include "bielle/robots/delta.h"
+#include "robots/delta.h"
 
 #include <cmath>
 
-#include "bielle/robots/solid.h"
+#include "robots/solid.h"
 
 namespace bielle {
 namespace {

@@ -1,8 +1,8 @@
-#include "bielle/robots/fivebar_leg.h"
+#include "robots/fivebar_leg.h"
 
 #include <cmath>
 
-#include "bielle/robots/solid.h"
+#include "robots/solid.h"
 
 namespace bielle {
 namespace {

@@ -3,12 +3,12 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
-#include "bielle/robots/cleobot.h"
-#include "bielle/robots/delta.h"
-#include "bielle/robots/fivebar_leg.h"
 #include "bielle/robots/fourbar_chain.h"
-#include "bielle/robots/rsu_biped.h"
-#include "bielle/robots/spring_leg.h"
+#include "robots/cleobot.h"
+#include "robots/delta.h"
+#include "robots/fivebar_leg.h"
+#include "robots/rsu_biped.h"
+#include "robots/spring_leg.h"
 
 namespace bielle {
 namespace {

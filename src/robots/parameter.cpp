@@ -1,8 +1,7 @@
-#include "bielle/robots/parameter.h"
-
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "bielle/robots/generators.h"
 
 namespace bielle {
 

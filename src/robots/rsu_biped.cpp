@@ -1,8 +1,8 @@
-#include "bielle/robots/rsu_biped.h"
+#include "robots/rsu_biped.h"
 
 #include <cmath>
 
-#include "biped_parts.h"
+#include "robots/biped_parts.h"
 
 namespace bielle {
 namespace {

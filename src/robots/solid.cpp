@@ -1,4 +1,4 @@
-#include "bielle/robots/solid.h"
+#include "robots/solid.h"
 
 namespace bielle {
 namespace {

@@ -1,9 +1,9 @@
-#include "bielle/robots/spring_leg.h"
+#include "robots/spring_leg.h"
 
 #include <cmath>
 #include <optional>
 
-#include "bielle/robots/solid.h"
+#include "robots/solid.h"
 
 namespace bielle {
 namespace {

@@ -1,10 +1,10 @@
-#include "backward_pass.h"
+#include "solve/backward_pass.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "parallel_errors.h"
-#include "stopwatch.h"
+#include "solve/parallel_errors.h"
+#include "solve/stopwatch.h"
 
 namespace bielle {
 

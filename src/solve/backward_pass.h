@@ -3,9 +3,9 @@
 #include <atomic>
 #include <string>
 
-#include "bielle/solve/lq_sweep.h"
-#include "hessian_pool.h"
-#include "node_evaluations.h"
+#include "solve/hessian_pool.h"
+#include "solve/lq_sweep.h"
+#include "solve/node_evaluations.h"
 
 namespace bielle {
 

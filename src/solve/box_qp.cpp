@@ -1,4 +1,4 @@
-#include "bielle/solve/box_qp.h"
+#include "solve/box_qp.h"
 
 #include <Eigen/Cholesky>
 #include <limits>

@@ -7,11 +7,11 @@
 #include <optional>
 #include <stdexcept>
 
-#include "backward_pass.h"
-#include "fddp_checks.h"
-#include "node_evaluations.h"
-#include "rollout.h"
-#include "stopwatch.h"
+#include "solve/backward_pass.h"
+#include "solve/fddp_checks.h"
+#include "solve/node_evaluations.h"
+#include "solve/rollout.h"
+#include "solve/stopwatch.h"
 
 namespace bielle {
 

@@ -1,4 +1,4 @@
-#include "fddp_checks.h"
+#include "solve/fddp_checks.h"
 
 #include <stdexcept>
 

@@ -1,9 +1,9 @@
-#include "bielle/solve/lq_sweep.h"
+#include "solve/lq_sweep.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "bielle/math/lane_product.h"
+#include "math/lane_product.h"
 
 namespace bielle {
 

@@ -1,11 +1,11 @@
-#include "node_evaluations.h"
+#include "solve/node_evaluations.h"
 
 #include <omp.h>
 
 #include <stdexcept>
 
-#include "parallel_errors.h"
-#include "stopwatch.h"
+#include "solve/parallel_errors.h"
+#include "solve/stopwatch.h"
 
 namespace bielle {
 

@@ -1,7 +1,7 @@
 #pragma once
 // The nonlinear rollout of trial steps (fddp.h, Eqs. 2, 3, 7 and 8).
-#include "bielle/solve/lq_sweep.h"
-#include "node_evaluations.h"
+#include "solve/lq_sweep.h"
+#include "solve/node_evaluations.h"
 
 namespace bielle {
 

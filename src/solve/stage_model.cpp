@@ -1,6 +1,6 @@
 #include "bielle/solve/stage_model.h"
 
-#include "bielle/math/lane_product.h"
+#include "math/lane_product.h"
 
 namespace bielle {
 

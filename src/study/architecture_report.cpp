@@ -6,8 +6,8 @@
 #include <functional>
 #include <sstream>
 
-#include "bielle/io/text_file.h"
 #include "io/plot.h"
+#include "io/text_file.h"
 #include "study/report.h"
 
 namespace bielle::study {

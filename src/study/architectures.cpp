@@ -3,9 +3,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include "bielle/design/draft.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/error.h"
+#include "design/draft.h"
 #include "design/spec_parts.h"
 #include "model/text_file.h"
 

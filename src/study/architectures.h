@@ -14,8 +14,8 @@
 #include <string>
 #include <vector>
 
-#include "bielle/design/spec.h"
 #include "bielle/model/reader.h"
+#include "design/spec.h"
 #include "study/cases.h"
 
 namespace bielle::study {

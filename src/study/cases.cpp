@@ -14,10 +14,10 @@
 #include <optional>
 
 #include "bielle/io/result.h"
-#include "bielle/io/text_file.h"
 #include "bielle/model/error.h"
 #include "io/aside_file.h"
 #include "io/json_text.h"
+#include "io/text_file.h"
 #include "model/text_file.h"
 #include "study/child.h"
 

@@ -5,7 +5,7 @@
 #include <functional>
 #include <sstream>
 
-#include "bielle/io/text_file.h"
+#include "io/text_file.h"
 #include "study/figures.h"
 
 namespace bielle::study {

@@ -1,7 +1,7 @@
 #pragma once
 // The linkage of ratio.h at a point of its cluster.
-#include "bielle/dynamics/reduction.h"
 #include "bielle/transmission/ratio.h"
+#include "dynamics/reduction.h"
 
 namespace bielle {
 

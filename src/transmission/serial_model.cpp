@@ -8,6 +8,7 @@
 #include <set>
 
 #include "bielle/model/builder.h"
+#include "model/joint.h"
 #include "transmission/linkage.h"
 
 namespace bielle {

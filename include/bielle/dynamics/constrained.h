@@ -6,10 +6,30 @@
 /// where gamma gathers the drift and the stabilisation of the closures: the system of saddle_point.h, redundant rows
 /// included. Its derivatives take dID = d(M a + b - J^T lambda - tau)/dz and da_c = d(J a + gamma)/dz at fixed a and
 /// lambda.
+#include <memory>
+
 #include "bielle/dynamics/closure.h"
-#include "bielle/dynamics/saddle_point.h"
 
 namespace bielle {
+
+class SaddlePoint;
+
+/// The factorised system of Eq. (1) (src/dynamics/saddle_point.h). A copy is a system of its own.
+class SaddlePointMemory {
+ public:
+  SaddlePointMemory();
+  ~SaddlePointMemory();
+  SaddlePointMemory(const SaddlePointMemory& other);
+  SaddlePointMemory(SaddlePointMemory&& other) noexcept;
+  SaddlePointMemory& operator=(const SaddlePointMemory& other);
+  SaddlePointMemory& operator=(SaddlePointMemory&& other) noexcept;
+  SaddlePoint& operator*() { return *system_; }
+  SaddlePoint* operator->() { return system_.get(); }
+  const SaddlePoint* operator->() const { return system_.get(); }
+
+ private:
+  std::unique_ptr<SaddlePoint> system_;
+};
 
 enum class DynamicsStatus {
   Ok,
@@ -34,7 +54,7 @@ struct ConstrainedWorkspace {
   MatrixXd dlambda_du;              ///< rows x nu
 
   // Intermediate
-  SaddlePoint saddle_point;
+  SaddlePointMemory saddle_point;
   VectorXd force;               ///< nv
   VectorXd violation;           ///< rows, J a + gamma
   std::vector<Vector6d> f_ext;  ///< nb
@@ -47,7 +67,7 @@ constexpr double kContradiction = 0.05;
 /// Accelerations and forces for generalized forces tau (nv) at (q, v). Fills `ws` up to the accelerations.
 DynamicsStatus updateConstrainedDynamics(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
                                          const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v,
-                                         ConstVectorRef tau, const SaddlePointOptions& options = {});
+                                         ConstVectorRef tau);
 
 /// Derivatives at the solution held by the workspaces; to be called after updateConstrainedDynamics.
 DynamicsStatus updateConstrainedDerivatives(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,

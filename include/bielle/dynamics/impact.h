@@ -24,7 +24,7 @@ struct ImpactWorkspace {
 
   // Intermediate
   Workspace ws;
-  SaddlePoint saddle_point;
+  SaddlePointMemory saddle_point;
   VectorXd momentum, change, zero;  ///< nv: M v, v+ - v, 0
   std::vector<Vector6d> f_ext;      ///< nb
 };

@@ -2,7 +2,6 @@
 /// \file The caller-owned memory of all dynamics functions, one per thread or shooting node.
 #include <vector>
 
-#include "bielle/math/lanes.h"
 #include "bielle/model/model.h"
 
 namespace bielle {
@@ -12,7 +11,7 @@ namespace bielle {
 /// Bodies: X_WB, V and hc are there, but not the columns that belong to them (J, dJ, dV, ..) and what follows from those.
 enum class WorkspaceStage { Empty, Placement, Bodies, Position, Velocity, Acceleration };
 
-/// T is double, or Lanes for several nodes at once (lanes.h).
+/// T is double, or Lanes for several nodes at once (inside the library).
 /// All spatial quantities are in world coordinates about the world origin, so that recursions only add.
 /// Shapes: nb = numBodies (world first), nv = velocity coordinates. "Writer" is the function that fills a field.
 template <typename T>

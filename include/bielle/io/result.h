@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "bielle/io/record.h"
+#include "bielle/transmission/lift.h"
 
 namespace bielle {
 
@@ -82,5 +83,34 @@ struct BuildInfo {
   std::string bielle, eigen, compiler;
 };
 BuildInfo getBuildInfo();
+
+// Starting a solve from a previous result.
+
+/// Replaces the guess of a motion by states and torques of a record of the same robot: node by node when the lengths
+/// agree, else each node takes the recorded one at the same share of the duration. The base is carried along so that the feet that stand
+/// are at the places of the new motion.
+/// \throws ModelError when the coordinates or motors are others, or the record has numbers that are not finite
+void setGuess(const MotionRecord& record, Motion& motion);
+
+/// The record in a directory that writeResult() wrote.
+/// \throws ModelError naming the directory or file, and why it cannot be read
+MotionRecord readResultRecord(const std::string& directory);
+
+// Reads a serial motion and writes its lift to the closed model.
+
+/// The input of lift() from a record of a motion of the serial model.
+/// \param motion  the same request made again, for the active contacts of every stage
+/// \throws ModelError when the record is not one of that motion
+SerialTrajectory makeSerialTrajectory(const Motion& motion, const MotionRecord& record);
+
+/// The lifted part of the motion in the form of a solved one: converged if it was lifted entirely; its cost is the mean per
+/// node of the cost of (1) of lift.h. At least one stage must have been lifted.
+MotionResult makeLiftedResult(const RunInfo& run, const Model& closed, const Motion& serial, const LiftResult& lifted,
+                              double seconds);
+
+/// Writes lift.json: outcome, and per node status, errors, margin and evaluations; with a result trajectory.csv,
+/// trajectory.npz and summary.json too. Returns the paths. \throws ModelError naming the file and why
+std::vector<std::string> writeLift(const std::string& directory, LiftMethod method, const LiftResult& lifted,
+                                   const MotionResult* result);
 
 }  // namespace bielle

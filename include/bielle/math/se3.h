@@ -1,12 +1,23 @@
 #pragma once
-/// \file Rigid placements, spatial cross products, and the exponential of SE(3) with its Jacobians.
+/// \file Rigid placements, spatial cross products, the exponential of SE(3) with its Jacobians, and inertias.
 ///
 /// Spatial vectors are linear first, then angular (see notation.h). For X = (R, p):
 ///     Ad(X) = [R, [p]x R; 0, R]     carries twists,    X_AB: frame B to frame A
 ///     Ad(X)^{-T} = [R, 0; [p]x R, R] carries wrenches.
-#include "bielle/math/so3.h"
+#include <Eigen/Geometry>
+
+#include "bielle/math/types.h"
 
 namespace bielle {
+
+/// [w x], 3x3.
+template <typename V>
+Matrix3<typename V::Scalar> skew(const Eigen::MatrixBase<V>& w_) {
+  const Vector3<typename V::Scalar> w = w_;
+  Matrix3<typename V::Scalar> S;
+  S << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
+  return S;
+}
 
 /// Linear and angular part of a spatial vector.
 template <typename V>
@@ -109,5 +120,19 @@ template <typename T>
 Matrix6<T> calcRightJacobianInverse6(const Vector6<T>& twist);
 /// Jacobian of log6 at X: log6(X exp6(d)) = log6(X) + J d + O(d^2), 6x6.
 Matrix6d calcLogJacobian6(const SE3& X);
+
+/// Mass, centre of mass and rotational inertia of a body, in the body's frame.
+struct Inertia {
+  double mass = 0;                    ///< kg
+  Vector3d com = Vector3d::Zero();    ///< centre of mass, m
+  Matrix3d I_com = Matrix3d::Zero();  ///< about the centre of mass, in the axes of the body frame, kg m^2
+
+  /// The same inertia seen from frame A, this one being given in frame B.
+  Inertia transformed(const SE3& X_AB) const { return {mass, X_AB.act(com), X_AB.R * I_com * X_AB.R.transpose()}; }
+  /// Sum of two inertias given in one frame (parallel axis theorem).
+  Inertia operator+(const Inertia& o) const;
+  /// 6x6 spatial inertia about the frame's origin: momentum = matrix * twist.
+  Matrix6d toMatrix() const;
+};
 
 }  // namespace bielle

@@ -1,13 +1,33 @@
 #pragma once
 /// \file The immutable model of a robot: a spanning tree of bodies and joints, closed by closures.
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
 
-#include "bielle/math/inertia.h"
-#include "bielle/model/joint.h"
+#include "bielle/math/se3.h"
 
 namespace bielle {
+
+enum class JointKind { Fixed, Revolute, Continuous, Prismatic, Spherical, Universal, Planar, FreeFlyer };
+
+/// Name as used in messages and files ("revolute", "free-flyer", ...).
+const char* getName(JointKind kind);
+/// Sizes of q and v of a joint kind.
+int getNq(JointKind kind);
+int getNv(JointKind kind);
+
+/// A joint between a parent body and the body of the same index as the joint.
+struct Joint {
+  std::string name;
+  JointKind kind = JointKind::Fixed;
+  int parent = 0;                      ///< body index of the parent
+  SE3 X_PJ;                            ///< placement of the joint frame (child frame at neutral q) in the parent body
+  Vector3d axis = Vector3d::UnitZ();   ///< unit axis; normal of a planar joint; first axis of a universal joint
+  Vector3d axis2 = Vector3d::UnitY();  ///< second axis of a universal joint
+  int idx_q = 0, nq = 0, idx_v = 0, nv = 0;
+  double position_importance = 1, velocity_importance = 1;  ///< beside other joints, in the costs of a posture
+};
 
 /// A rigid body; body i > 0 is carried by joint i, body 0 is the world.
 struct Body {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "bielle/model/model.h"
-#include "bielle/ocp/ground.h"
+#include "bielle/ocp/contact_schedule.h"
 
 namespace bielle {
 

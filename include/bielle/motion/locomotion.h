@@ -24,10 +24,27 @@
 /// - contacts and closures have the gains given, without limits;
 /// - the terminal node has the velocities of the joints of the legs alone (Model::serialJoints);
 /// - the guess is the standing posture at rest, as high as the path of the centre of mass.
-#include "bielle/motion/gait.h"
+#include "bielle/motion/footsteps.h"
 #include "bielle/motion/motion.h"
 
 namespace bielle {
+
+struct GaitTiming {
+  double start = 0.3;        ///< double support before the first step, s
+  double single = 0.36;      ///< single support, s
+  double both = 0.045;       ///< double support between steps, s
+  double end = 0.45;         ///< double support after the last step, s
+  double time_step = 0.012;  ///< s; Euler error sinks the feet in proportion to time_step x joint speed^2
+
+  double stepDuration() const { return single + both; }  ///< s
+};
+
+/// Shape of a swing, over its progress s in [0, 1].
+struct SwingShape {
+  double height = 0.04;             ///< of the apex over the higher of both ends, m
+  double apex = 0.5;                ///< s of the apex
+  double leave = 0, arrive = 0.95;  ///< the horizontal motion takes place between these
+};
 
 struct LocomotionOptions {
   GaitTiming timing;

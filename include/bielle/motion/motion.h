@@ -7,7 +7,6 @@
 #include "bielle/motion/goal.h"
 #include "bielle/motion/limits.h"
 #include "bielle/ocp/contact_schedule.h"
-#include "bielle/ocp/ground.h"
 #include "bielle/ocp/robot_problem.h"
 #include "bielle/solve/fddp.h"
 

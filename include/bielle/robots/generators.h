@@ -1,12 +1,29 @@
 #pragma once
-/// \file The robots that can be generated, by name.
+/// \file The robots that can be generated, by name, and their parameters.
 #include <functional>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "bielle/model/model.h"
-#include "bielle/robots/parameter.h"
 
 namespace bielle {
+
+/// One number of a generator, pointing into its options.
+struct Parameter {
+  std::string name;
+  double* value = nullptr;
+  std::string unit;
+  double lower = 0, upper = 0;  ///< range that the generator accepts, not a recommendation
+  std::string help;
+};
+
+/// Sets a parameter by name.
+/// \throws ModelError listing the parameters
+void setParameter(const std::vector<Parameter>& parameters, const std::string& name, double value);
+
+/// \throws ModelError naming the first parameter that is outside its bounds
+void checkParameters(const std::string& robot, const std::vector<Parameter>& parameters);
 
 /// One request: parameters, initially at their defaults, and the function that makes the model.
 struct GeneratorRequest {

@@ -50,10 +50,11 @@
 #include <memory>
 #include <string>
 
-#include "bielle/solve/lq_sweep.h"
 #include "bielle/solve/shooting_problem.h"
 
 namespace bielle {
+
+class LqSweep;
 
 enum class ControlBounds { Ignore, Enforce };
 

@@ -3,6 +3,8 @@
 #include "bielle/dynamics/impact.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "math/lane_product.h"
+#include "model/joint.h"
 #include "ocp/transcription.h"
 
 namespace bielle {

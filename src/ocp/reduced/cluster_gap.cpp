@@ -1,4 +1,6 @@
-#include "cluster_gap.h"
+#include "ocp/reduced/cluster_gap.h"
+
+#include "model/joint.h"
 
 namespace bielle {
 

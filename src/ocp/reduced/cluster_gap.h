@@ -5,7 +5,7 @@
 //     gap = ((W N_k)^T d, (W N_k)^T w),
 //     dy+ <- P_q dy+,   dy_v+ <- P_v dy_v+ + P_z dy+,                                                                 (1)
 //     P_q = (W N_k)^T J_d N',   P_v = (W N_k)^T N',   P_z = (W N_k)^T Z'
-#include "bielle/dynamics/cluster_motion.h"
+#include "dynamics/cluster_motion.h"
 #include "ocp/transcription.h"
 
 namespace bielle {

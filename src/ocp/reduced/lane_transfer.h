@@ -2,8 +2,8 @@
 // Numbers between nodes, which each have theirs side by side, and lanes (lanes.h), where each number has its nodes side by side.
 #include <array>
 
-#include "bielle/math/lanes.h"
 #include "bielle/math/se3.h"
+#include "math/lanes.h"
 
 namespace bielle {
 

@@ -1,6 +1,8 @@
-#include "node_assembly.h"
+#include "ocp/reduced/node_assembly.h"
 
 #include <algorithm>
+
+#include "model/joint.h"
 
 namespace bielle {
 

@@ -1,6 +1,7 @@
 #pragma once
 // The quadratic model of one node from what the kernel has left in its view: F^T, and residuals by the chain rule.
-#include "reduced_kernel.h"
+#include "math/lane_product.h"
+#include "ocp/reduced/reduced_kernel.h"
 
 namespace bielle {
 

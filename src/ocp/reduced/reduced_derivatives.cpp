@@ -1,7 +1,9 @@
 // Derivatives of steps in lanes: reduced_kernel.h Eqs. (c) to (g).
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "reduced_kernel.h"
+#include "math/so3.h"
+#include "model/joint.h"
+#include "ocp/reduced/reduced_kernel.h"
 
 namespace bielle {
 namespace {

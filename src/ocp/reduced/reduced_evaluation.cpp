@@ -1,4 +1,4 @@
-#include "reduced_evaluation.h"
+#include "ocp/reduced/reduced_evaluation.h"
 
 #include <algorithm>
 #include <map>

@@ -1,7 +1,8 @@
 #pragma once
 // A node of the reduced formulation as a value, and what is known of all nodes of a problem before any is evaluated.
 #include "bielle/dynamics/impact.h"
-#include "bielle/dynamics/reduction.h"
+#include "dynamics/reduction.h"
+#include "dynamics/saddle_point.h"
 #include "ocp/transcription.h"
 
 namespace bielle {

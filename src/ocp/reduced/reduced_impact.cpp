@@ -1,6 +1,7 @@
-#include "reduced_impact.h"
+#include "ocp/reduced/reduced_impact.h"
 
 #include "bielle/dynamics/kinematics.h"
+#include "model/joint.h"
 
 namespace bielle {
 

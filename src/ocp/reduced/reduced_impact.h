@@ -3,7 +3,7 @@
 // dq = N dy, dv = N dy_v + Z dy, dv+ = N dy_v+ + Z+ dy+, where (W N)^T Z+ = 0,
 //     dy+ = dy,   dy_v+ = (W N)^T ((D_q N + D_v Z) dy + D_v N dy_v)                                                   (a)
 // read about the node state's own basis where a gap is open. Impacts are few: they are solved with all dofs, one by one.
-#include "node_assembly.h"
+#include "ocp/reduced/node_assembly.h"
 
 namespace bielle {
 

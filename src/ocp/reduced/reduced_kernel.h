@@ -25,11 +25,11 @@
 //
 // All of it runs in lanes, one node alone too: what comes out of a lane does not depend on the others, and so results do not
 // depend on which nodes come together. Only what has other sizes at every node (costs, F^T) is done node by node.
-#include "bielle/dynamics/reduced_tree.h"
-#include "cluster_gap.h"
-#include "lane_transfer.h"
-#include "reduced_evaluation.h"
-#include "state_cost.h"
+#include "dynamics/reduced_tree.h"
+#include "ocp/reduced/cluster_gap.h"
+#include "ocp/reduced/lane_transfer.h"
+#include "ocp/reduced/reduced_evaluation.h"
+#include "ocp/reduced/state_cost.h"
 
 namespace bielle {
 

@@ -1,5 +1,6 @@
 // Sums and differences of states in lanes.
-#include "reduced_kernel.h"
+#include "model/joint.h"
+#include "ocp/reduced/reduced_kernel.h"
 
 namespace bielle {
 

@@ -3,7 +3,8 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "reduced_kernel.h"
+#include "model/joint.h"
+#include "ocp/reduced/reduced_kernel.h"
 
 namespace bielle {
 

@@ -2,8 +2,8 @@
 // every node.
 #include <algorithm>
 
-#include "node_assembly.h"
-#include "reduced_impact.h"
+#include "ocp/reduced/node_assembly.h"
+#include "ocp/reduced/reduced_impact.h"
 
 namespace bielle {
 namespace {

@@ -1,7 +1,7 @@
 // What the kernel reads from nodes and writes to them.
 #include <algorithm>
 
-#include "reduced_kernel.h"
+#include "ocp/reduced/reduced_kernel.h"
 
 namespace bielle {
 

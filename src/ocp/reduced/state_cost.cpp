@@ -1,4 +1,6 @@
-#include "state_cost.h"
+#include "ocp/reduced/state_cost.h"
+
+#include "model/joint.h"
 
 namespace bielle {
 namespace {

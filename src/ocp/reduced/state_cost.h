@@ -7,7 +7,7 @@
 // Q = J_d^T W_q J_d,
 //     l_y  = N^T J_d^T W_q d + Z^T W_v e,     l_v  = N^T W_v e
 //     l_yy = N^T Q N + Z^T W_v Z,             l_vy = N^T W_v Z,         l_vv = N^T W_v N                              (h)
-#include "bielle/dynamics/reduced_tree.h"
+#include "dynamics/reduced_tree.h"
 #include "ocp/transcription.h"
 
 namespace bielle {

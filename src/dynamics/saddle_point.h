@@ -22,7 +22,7 @@
 ///     dlambda = G^+ (J M^{-1} dID - dc),     da = M^{-1} (J^T dlambda - dID).                                        (5)
 ///
 /// With redundant rows dlambda is right up to the null space of J^T.
-#include "bielle/math/lane_product.h"
+#include "math/lane_product.h"
 
 namespace bielle {
 
@@ -88,10 +88,10 @@ class SaddlePointOf {
 
   SaddlePointOptions options_;
   Eigen::Index n_ = 0, m_ = 0;
-  Storage L_, W_;        // n x n, m x n
-  Storage G_llt_;        // m x m: Cholesky factor of W W^T, with mu on its diagonal where rows depend on others
-  MatrixX<T> G_, Ginv_;  // m x m
-  MatrixX<T> P_, T1_, T2_;   // m x m, scratch
+  Storage L_, W_;           // n x n, m x n
+  Storage G_llt_;           // m x m: Cholesky factor of W W^T, with mu on its diagonal where rows depend on others
+  MatrixX<T> G_, Ginv_;     // m x m
+  MatrixX<T> P_, T1_, T2_;  // m x m, scratch
   VectorX<T> D_, rhs_, y_, correction_;
   Mask dependent_ = T(0) < T(0);  // rows follow from others: Eq. (4)
   Mask unmoved_ = T(0) < T(0);    // some row is moved by nothing

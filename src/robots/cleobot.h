@@ -23,7 +23,7 @@
 /// Arms of the rods about the hip are a (pitch), w (roll) and e (yaw) at the neutral configuration. A chain is at a dead
 /// point where its crank and rod are aligned; the hip is singular where the moments of the three rods are dependent.
 #include "bielle/model/model.h"
-#include "bielle/robots/parameter.h"
+#include "bielle/robots/generators.h"
 
 namespace bielle {
 

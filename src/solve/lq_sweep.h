@@ -24,8 +24,8 @@
 /// Without gaps and boxes curvature = -slope.
 #include <vector>
 
-#include "bielle/solve/box_qp.h"
 #include "bielle/solve/stage_model.h"
+#include "solve/box_qp.h"
 
 namespace bielle {
 

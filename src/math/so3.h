@@ -5,21 +5,10 @@
 ///     Exp(w + dw) = Exp(w) Exp(Jr(w) dw),    Log(R Exp(dw)) = Log(R) + Jr^{-1}(Log R) dw.
 /// With t = |w|, every function is even in t and is evaluated by its series where t^2 < 1e-2: the truncated terms are
 /// below rounding there.
-#include <Eigen/Geometry>
-
-#include "bielle/math/lanes.h"
-#include "bielle/math/types.h"
+#include "bielle/math/se3.h"
+#include "math/lanes.h"
 
 namespace bielle {
-
-/// [w x], 3x3.
-template <typename V>
-Matrix3<typename V::Scalar> skew(const Eigen::MatrixBase<V>& w_) {
-  const Vector3<typename V::Scalar> w = w_;
-  Matrix3<typename V::Scalar> S;
-  S << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
-  return S;
-}
 
 /// Rotation matrix of the rotation vector w (rad). Here and below, the template is for Lanes.
 Matrix3d exp3(const Vector3d& w);

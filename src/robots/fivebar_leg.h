@@ -10,7 +10,7 @@
 /// Lengths of the Minitaur robot: l1 = 0.1 m, l2 = 0.2 m (Kenneally, De, Koditschek, "Design principles for a family of
 /// direct-drive legged robots", IEEE Robotics and Automation Letters 1, 2016). Masses and radii are ours.
 #include "bielle/model/model.h"
-#include "bielle/robots/parameter.h"
+#include "bielle/robots/generators.h"
 
 namespace bielle {
 

@@ -16,7 +16,7 @@
 /// The architecture is common. Distance of the hips, soles, height of the trunk in half_sitting and total mass are those of
 /// robots/bipetto; all other dimensions and masses are ours, and no such robot was built.
 #include "bielle/model/model.h"
-#include "bielle/robots/parameter.h"
+#include "bielle/robots/generators.h"
 
 namespace bielle {
 

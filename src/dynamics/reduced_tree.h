@@ -16,7 +16,7 @@
 ///     A_v = sum_j N_j (YJ_j . dW~ + BtJ_j . J~ + J_j . G'~_v + D_j d_v,j),   M = sum_j N_j (YJ_j . J~ + J_j . (YJ)'~ + D_j N_j)
 ///                                                                                                                     (3)
 /// The loop forces have no other effect: inner to the cluster, they cancel in every sum that leaves it.
-#include "bielle/dynamics/cluster_motion.h"
+#include "dynamics/cluster_motion.h"
 
 namespace bielle {
 

@@ -2,7 +2,7 @@
 /// \file Conditioning of a linkage: how well its motors determine it.
 #include <vector>
 
-#include "bielle/dynamics/reduction.h"
+#include "dynamics/reduction.h"
 
 namespace bielle {
 

@@ -37,8 +37,8 @@
 #include <utility>
 #include <vector>
 
-#include "bielle/design/evaluation.h"
 #include "bielle/design/search.h"
+#include "design/evaluation.h"
 
 namespace bielle {
 

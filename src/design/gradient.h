@@ -21,11 +21,11 @@
 /// slope.
 #include <string>
 
-#include "bielle/design/measures.h"
 #include "bielle/design/parametrization.h"
 #include "bielle/design/search.h"
 #include "bielle/dynamics/kept_motion.h"
 #include "bielle/transmission/lift.h"
+#include "design/measures.h"
 
 namespace bielle {
 

@@ -15,7 +15,7 @@
 /// circumscribed circles are R = 0.567 / (2 sqrt 3) and r = 0.076 / sqrt 3; arms of 0.524 and 1.244 m, parallelograms
 /// 0.131 m wide. Neutral posture, masses and radii are ours.
 #include "bielle/model/model.h"
-#include "bielle/robots/parameter.h"
+#include "bielle/robots/generators.h"
 
 namespace bielle {
 

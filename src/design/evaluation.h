@@ -16,11 +16,11 @@
 #include <string>
 #include <vector>
 
-#include "bielle/design/gradient.h"
-#include "bielle/design/measures.h"
 #include "bielle/design/parametrization.h"
-#include "bielle/design/workspace.h"
 #include "bielle/motion/motion.h"
+#include "design/gradient.h"
+#include "design/measures.h"
+#include "design/workspace.h"
 
 namespace bielle {
 

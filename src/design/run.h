@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "bielle/design/spec.h"
+#include "design/spec.h"
 
 namespace bielle {
 

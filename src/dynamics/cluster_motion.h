@@ -12,7 +12,7 @@
 /// through the frame that it moves: the derivatives of closure.h, Eqs. (1) to (3), along a coordinate are those of its
 /// columns with J_k, dV_k, .. replaced by the difference of (3) between body 1 and body 2. So the work grows with the
 /// number of dofs, and not with its square.
-#include "bielle/dynamics/reduction.h"
+#include "dynamics/reduction.h"
 
 namespace bielle {
 
@@ -59,7 +59,7 @@ void updateAccelerationLift(const ClusterViewOf<T>& view, ClusterMotionOf<T>& mo
 /// updateTwists.
 template <typename T>
 void calcGeometricStiffness(const ClusterViewOf<T>& view, const ClusterMotionOf<T>& motion,
-                   typename ArgumentsOf<T>::ConstVector forces, typename ArgumentsOf<T>::Matrix out);
+                            typename ArgumentsOf<T>::ConstVector forces, typename ArgumentsOf<T>::Matrix out);
 /// Drift of the independent closure rows (rank) for the accelerations held by the view.
 template <typename T>
 void calcClusterDrift(const ClusterViewOf<T>& view, const ReducedCluster& cluster, const ClusterBasisOf<T>& basis,

@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "bielle/dynamics/closure.h"
-#include "bielle/math/small_dense.h"
+#include "math/small_dense.h"
 
 namespace bielle {
 
@@ -158,7 +158,9 @@ class ClusterPoint {
     return closeCluster(cluster, scratch_, start, d, zeta_guess, state_);
   }
   const ClusterBasis& basis() const { return state_.basis; }
-  std::string describeFailure(const ReducedCluster& cluster) const { return bielle::describeFailure(cluster, scratch_); }
+  std::string describeFailure(const ReducedCluster& cluster) const {
+    return bielle::describeFailure(cluster, scratch_);
+  }
   Workspace& workspace() { return scratch_.ws; }  ///< positions are those of the last update() or close()
   void solveGram(MatrixRef X) const { bielle::solveGram(basis(), X); }
   /// Independent rows out of all rows (m x k -> rank x k).

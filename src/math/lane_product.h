@@ -3,8 +3,8 @@
 /// its operands as on multiplying them.
 #include <algorithm>
 
-#include "bielle/math/lanes.h"
 #include "bielle/math/types.h"
+#include "math/lanes.h"
 
 namespace bielle {
 

@@ -10,26 +10,11 @@
 ///   a tridiagonal system for its only bounded solution (Kajita et al., "Biped walking pattern
 ///   generation by using preview control", ICRA 2003, where (1) is the table-cart model). At touchdown it is
 ///   as high over the lower foot as at the start, and rises or falls evenly in between.
-#include "bielle/motion/footsteps.h"
+
+#include "bielle/motion/locomotion.h"
 
 namespace bielle {
 
-struct GaitTiming {
-  double start = 0.3;        ///< double support before the first step, s
-  double single = 0.36;      ///< single support, s
-  double both = 0.045;       ///< double support between steps, s
-  double end = 0.45;         ///< double support after the last step, s
-  double time_step = 0.012;  ///< s; Euler error sinks the feet in proportion to time_step x joint speed^2
-
-  double stepDuration() const { return single + both; }  ///< s
-};
-
-/// Shape of a swing, over its progress s in [0, 1].
-struct SwingShape {
-  double height = 0.04;             ///< of the apex over the higher of both ends, m
-  double apex = 0.5;                ///< s of the apex
-  double leave = 0, arrive = 0.95;  ///< the horizontal motion takes place between these
-};
 /// Placement along a swing from a to b.
 SE3 calcSwing(const SwingShape& shape, const SE3& a, const SE3& b, double s);
 

@@ -18,7 +18,7 @@
 /// that leg has beside the plane of the pitch axis is moved into it (shin 0.025, tarsus 0.014 m), but for the upper end of the
 /// heel rod; the toe only pitches, its two cranks and rods are one of the mass of both. Toe, posture, radii, armature are ours.
 #include "bielle/model/model.h"
-#include "bielle/robots/parameter.h"
+#include "bielle/robots/generators.h"
 
 namespace bielle {
 

@@ -4,8 +4,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "bielle/math/lanes.h"
 #include "bielle/math/types.h"
+#include "math/lanes.h"
 
 namespace bielle {
 
