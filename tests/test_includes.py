@@ -102,6 +102,14 @@ def check_file(path, text, files):
     return problems
 
 
+def check_document(path, text, files):
+    problems = []
+    for name in re.findall(r"`([\w/]+/\w+\.(?:h|cpp))`", text):
+        if not any(folder + name in files for folder in ("", "include/", PUBLIC)):
+            problems.append(f"{path}: `{name}`: there is no such file")
+    return problems
+
+
 def check_planted():
     """Every kind of violation is noticed."""
     files = {"include/bielle/math/so3.h", "include/bielle/model/model.h", "include/bielle/io/result.h",
@@ -126,6 +134,8 @@ def check_planted():
             ("src/hall/result.cpp", '#include "io/plot.h"', True),
             ("src/io/CMakeLists.txt", "find_package(Simbody)", True)]:
         assert bool(check_file(path, text, files)) == is_wrong, (path, text)
+    assert check_document("docs/speed.md", "see `math/so4.h`", files)
+    assert not check_document("docs/speed.md", "see `math/so3.h`, `src/io/plot.h` and `name.h`", files)
 
 
 def main(source):
@@ -140,6 +150,15 @@ def main(source):
             with open(os.path.join(source, path), encoding="utf-8") as file:
                 problems += check_file(path, file.read(), files)
             count += 1
+    for folder in (".", "docs", "examples", "robots", "validation"):
+        for place, folders, names in os.walk(os.path.join(source, folder)):
+            if folder == ".":
+                folders.clear()
+            for name in names:
+                path = os.path.relpath(os.path.join(place, name), source)
+                if name.endswith(".md"):
+                    with open(os.path.join(source, path), encoding="utf-8") as file:
+                        problems += check_document(path, file.read(), files)
     assert count > 200, f"only {count} files in {source}"
     print("\n".join(problems) or f"{count} files, all includes in order")
     return 1 if problems else 0

@@ -1,7 +1,5 @@
 // Loads an installed robot and solves a squat of few nodes.
-#include <bielle/io/result.h>
-#include <bielle/model/reader.h>
-#include <bielle/motion/squat.h>
+#include <bielle/bielle.h>
 
 #include <cstdio>
 #include <cstdlib>
