@@ -131,7 +131,7 @@ void addLimitRows(CheckContext& context) {
     for (int i = 1; i < model.numBodies(); ++i)
       for (int j = 0; j < model.joints()[i].nv; ++j) {
         const int dof = model.joints()[i].idx_v + j;
-        if (model.findMotor(model.joints()[i].name) < 0)
+        if (std::none_of(model.motors().begin(), model.motors().end(), [&](const Motor& m) { return m.dof == dof; }))
           speed.add(record.v(k, dof), model.velocityLimits()[dof], "", k, record.v_names[dof]);
       }
   context.add(range, "joints: beyond their range", "rad, m", context.bounds.range, "no limits given");

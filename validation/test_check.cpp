@@ -47,7 +47,8 @@ TEST_CASE("check: a swinging four-bar passes, its defect shrinks with the step")
     CHECK(fine.passed());
     const std::string name = formulation == Formulation::Reduced ? "finite differences of the velocity" : "loops: gap";
     CHECK(getValue(fine, name) < 0.6 * getValue(coarse, name));
-    CHECK(getValue(fine, "energy, whole motion") < 0.6 * getValue(coarse, "energy, whole motion"));
+    // Told over a bound that halves with the step, as the defect does.
+    CHECK(getValue(fine, "energy, whole motion") == Approx(getValue(coarse, "energy, whole motion")).epsilon(0.05));
   }
 }
 
@@ -134,7 +135,7 @@ TEST_CASE("check: limits of joints and motors, and soles that overlap") {
   CHECK(getFailures(check(std::regex_replace(urdf, motors, "effort=\"14\" velocity=\"30\""), yaml)) ==
         Names{"motors: effort over limit"});
   CHECK(getFailures(check(std::regex_replace(urdf, motors, "effort=\"20\" velocity=\"1\""), yaml)) ==
-        Names{"motors: velocity over limit"});
+        Names{"joints: velocity over limit", "motors: velocity over limit"});
   CHECK(getFailures(check(std::regex_replace(urdf, range, "upper=\"0.0001\""), yaml)) ==
         Names{"joints: beyond their range"});
   CHECK(getFailures(check(urdf, std::regex_replace(yaml, sole, "sole: [0.10, 0.40]"))) ==

@@ -1,5 +1,6 @@
 // Goals in the check: measured independently of what the summary tells, told when missed, and compared with the summary.
 #include <catch2/catch.hpp>
+#include <set>
 #include <sstream>
 
 #include "bielle/model/error.h"

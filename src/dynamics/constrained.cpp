@@ -47,6 +47,9 @@ void assembleConstraints(const Workspace& ws, ConstrainedWorkspace& cws, const C
   }
 }
 
+// Below this, m/s^2 or rad/s^2, an acceleration of the closures is rounding: at rest all of them are.
+constexpr double kRoundingAcceleration = 1e-6;
+
 // Rows that are independent are fulfilled to rounding.
 bool areContradictory(const ConstrainedWorkspace& cws) {
   if (!cws.saddle_point->isRedundant()) return false;
@@ -54,7 +57,7 @@ bool areContradictory(const ConstrainedWorkspace& cws) {
   for (Eigen::Index i = 0; i < cws.J.rows(); ++i)
     size = std::max(size,
                     std::abs(cws.gamma[i]) + cws.J.row(i).cwiseAbs().cwiseProduct(cws.a.cwiseAbs().transpose()).sum());
-  return cws.residual > kContradiction * size;
+  return cws.residual > std::max(kContradiction * size, kRoundingAcceleration);
 }
 
 }  // namespace

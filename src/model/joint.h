@@ -1,12 +1,9 @@
 #pragma once
-/// \file Joint kinds, their configuration manifolds and motion subspaces.
+/// \file Configuration manifolds and motion subspaces of the joints.
 ///
 /// Every joint is seen as a sequence of axes ("dofs"). The motion subspace S (6 x nv, child frame) is constant for all
 /// kinds but the universal joint, whose first axis turns in the child frame when its second angle changes:
 ///     universal:  R = Exp(a1 q1) Exp(a2 q2),   S = [0, 0; Exp(a2 q2)^T a1, a2].
-#include <limits>
-#include <string>
-
 #include "bielle/model/model.h"
 #include "math/lanes.h"
 

@@ -17,7 +17,9 @@ namespace bielle {
 
 const std::string& getAsset(const std::string& name) {
 #define BIELLE_ASSET(id, name, path) {name, {bielle_asset_##id##_begin, bielle_asset_##id##_end}},
-  static const std::map<std::string, std::string> assets = {};
+  static const std::map<std::string, std::string> assets = {
+#include "assets.inc"
+  };
 #undef BIELLE_ASSET
   return assets.at(name);
 }
