@@ -114,7 +114,7 @@ struct ClusterScratchOf {
   std::vector<Index> pivots, fresh_pivots;
   MatrixX<T> reflected, reflectors;  // of J W^{-1/2}; Householder vectors
   VectorX<T> beta, products, rest;   // their scales; scratch; squared norms of what is left of the rows
-  typename LogicOf<T>::Mask closed;  // whether the last closing got as far as the bases
+  typename LogicOf<T>::Mask closed{};  // whether the last closing got as far as the bases
 };
 using ClusterScratch = ClusterScratchOf<double>;
 
