@@ -10,7 +10,6 @@
 ///   a tridiagonal system for its only bounded solution (Kajita et al., "Biped walking pattern
 ///   generation by using preview control", ICRA 2003, where (1) is the table-cart model). At touchdown it is
 ///   as high over the lower foot as at the start, and rises or falls evenly in between.
-
 #include "bielle/motion/locomotion.h"
 
 namespace bielle {
