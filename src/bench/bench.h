@@ -56,15 +56,21 @@ struct SolveTime {
   bool converged = false;
 };
 
+/// Times of some shifts of a receding horizon, s; zero without any.
+struct ShiftTimes {
+  int shifts = 0;
+  double median = 0, percentile_99 = 0, worst = 0;
+};
+
 /// The walk on a horizon of 100 nodes that moves on by one stage before each single FDDP iteration: the plan shifted, its
 /// new last stage holding still. The first plan is made without haste. The next state is the step's, disturbed by noise of
 /// 1e-4 rad and m, 1e-3 rad/s and m/s, on closed loops and with a velocity that keeps loops and stance feet. Where the
 /// horizon has come to the end of the walk, it begins anew with other noise.
 struct RecedingHorizon {
   Formulation formulation = Formulation::Full;
-  int threads = 1, shifts = 0;
-  double median = 0, percentile_99 = 0, worst = 0;  ///< of the time of one shift and iteration, s
-  double preempted = 0;     ///< share of the shifts during which the system gave a processor to someone else, 1
+  int threads = 1;
+  ShiftTimes all;           ///< a shift and its iteration, wall clock
+  ShiftTimes undisturbed;   ///< of those during which the system gave no processor to another program
   double least_height = 0;  ///< of the first body over its initial height, 1
   double largest_tilt = 0;  ///< of the first body from where it was upright, rad
   bool up = false;          ///< all solves went through, height over 0.8, tilt below 0.5 rad

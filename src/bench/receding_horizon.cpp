@@ -68,6 +68,13 @@ long countPreemptions() {
   return usage.ru_nivcsw;
 }
 
+ShiftTimes summarize(std::vector<double> times) {
+  if (times.empty()) return {};
+  std::sort(times.begin(), times.end());
+  const size_t count = times.size();
+  return {static_cast<int>(count), times[count / 2], times[(99 * count + 99) / 100 - 1], times.back()};
+}
+
 class Receding {
  public:
   Receding(const Model& model, Formulation formulation, const RecedingOptions& options)
@@ -100,7 +107,8 @@ class Receding {
     ShootingTrajectory trajectory = plan;
     solver.solve(window_, trajectory);  // sizes the memory
     while (out_.up && static_cast<int>(times_.size()) < options_.shifts) walk(plan, solver);
-    summarize();
+    out_.all = summarize(times_);
+    out_.undisturbed = summarize(undisturbed_);
     return out_;
   }
 
@@ -146,18 +154,8 @@ class Receding {
     }
     const FddpSummary summary = solver.solve(window_, trajectory);
     times_.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-    if (countPreemptions() > preemptions) ++preempted_;
+    if (countPreemptions() == preemptions) undisturbed_.push_back(times_.back());
     return summary.termination != FddpTermination::Failed;
-  }
-
-  void summarize() {
-    const size_t count = times_.size();
-    std::sort(times_.begin(), times_.end());
-    out_.shifts = static_cast<int>(count);
-    out_.median = times_[count / 2];
-    out_.percentile_99 = times_[std::min(count - 1, (99 * count + 99) / 100 - 1)];
-    out_.worst = times_.back();
-    out_.preempted = preempted_ / static_cast<double>(count);
   }
 
   const Model& model_;
@@ -168,8 +166,7 @@ class Receding {
   RobotEvaluator evaluator_;
   Workspace ws_;
   Disturbance disturbance_;
-  std::vector<double> times_;  // s
-  int preempted_ = 0;
+  std::vector<double> times_, undisturbed_;  // s
   RecedingHorizon out_;
 };
 
