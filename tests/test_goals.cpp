@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <stdexcept>
+#include <tuple>
 
 #include "bielle/io/result.h"
 #include "bielle/model/reader.h"
@@ -236,4 +237,26 @@ TEST_CASE("goals: trajectories that miss are told so") {
   CHECK(shallow.converged());
   CHECK(find(shallow, "depth").came_out > 0.72);
   CHECK_FALSE(find(shallow, "depth").met());
+}
+
+TEST_CASE("goals: a squat far out of reach stays finite, and says by how much it missed") {
+  for (const auto& [depth, least, most] : {std::tuple(0.1, 0.15, 0.5), std::tuple(1.9, 1.05, 1.4)}) {
+    CAPTURE(depth);
+    SquatOptions options;
+    options.depth = depth;
+    Motion motion = makeSquat(getBipetto(), options);
+    FddpOptions solver;
+    solver.max_iterations = 60;
+    const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
+    CAPTURE(summary.message, summary.cost);
+    CHECK(std::isfinite(summary.cost));
+    for (const VectorXd& x : motion.guess.xs) REQUIRE(x.allFinite());
+    for (const VectorXd& u : motion.guess.us) REQUIRE(u.allFinite());
+    const MotionResult result = makeResult({"bipetto", "", {}}, motion, motion.guess, summary);
+    const GoalOutcome& outcome = find(result, "depth");
+    CHECK_FALSE(outcome.met());
+    CHECK(outcome.came_out > least);
+    CHECK(outcome.came_out < most);
+    CHECK(formatOutcome(outcome).find("missed") != std::string::npos);
+  }
 }

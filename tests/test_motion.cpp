@@ -96,25 +96,6 @@ TEST_CASE("squat: Bipetto goes down or up as asked, loops closed, feet in place"
   }
 }
 
-TEST_CASE("squat: far out of reach, it says so or misses, and stays finite") {
-  const Model model = loadOwn("bipetto");
-  for (double depth : {0.1, 1.9}) {
-    CAPTURE(depth);
-    SquatOptions options;
-    options.depth = depth;
-    Motion motion = makeSquat(model, options);
-    FddpOptions solver;
-    solver.max_iterations = 60;
-    const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
-    CAPTURE(summary.message, summary.cost);
-    CHECK(std::isfinite(summary.cost));
-    for (const VectorXd& x : motion.guess.xs) REQUIRE(x.allFinite());
-    for (const VectorXd& u : motion.guess.us) REQUIRE(u.allFinite());
-    const Outcome outcome = measure(model, options, motion.guess.xs);
-    CHECK((summary.termination != FddpTermination::Converged || outcome.worst_height > 0.02));
-  }
-}
-
 TEST_CASE("squat: impossible options are refused, unknown ones are named") {
   const Model model = loadOwn("bipetto");
   const auto make = [&](const std::string& option, double value) {

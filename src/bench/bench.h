@@ -2,9 +2,9 @@
 /// \file How fast it is, here: the benchmark walk (benchmark_walk.h) taken apart, whole solves, a receding horizon, and how
 /// times grow with the size of a chain and with the length of the horizon.
 ///
-/// All times are wall clock, s. They are read in a unit that survives machines: one product of two 108 x 108 matrices of
-/// doubles by Eigen, on one thread, measured before and after everything else; the least is taken. Others who use the
-/// processor lengthen all of them: where a work is repeated, its least time is taken, unless the text says otherwise.
+/// All times are wall clock, s. They are given in a machine-independent unit too: one product of two 108 x 108 matrices of
+/// doubles by Eigen, on one thread, measured before and after everything else; the least is taken. Other load on the machine
+/// inflates every time. What is repeated is therefore reported by its least time, unless the text says otherwise.
 #include <functional>
 #include <string>
 #include <vector>
@@ -25,9 +25,9 @@ struct BenchOptions {
   std::function<void(const std::string&)> progress;  ///< called with what comes next, if set
 };
 
-/// The benchmark walk on one thread, s per node, along the third iterate from the standing guess. Each work contains
-/// those above it, but for sweep and rollout. (In an iteration the linearization finds the dynamics already done by the
-/// rollout.)
+/// The benchmark walk on one thread, s per node, along the third iterate from the standing guess. Each time includes those
+/// above it, except for sweep and rollout. (In an iteration the rollout has already computed the dynamics that the
+/// linearization needs.)
 struct NodeTimes {
   Formulation formulation = Formulation::Full;
   int tangent_size = 0;    ///< of a state
