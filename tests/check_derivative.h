@@ -11,7 +11,7 @@ namespace bielle::testing {
 
 constexpr double kDerivativeTolerance = 1e-6;
 
-/// What an error of each entry is judged by: the largest entry of its row or of its column, whichever is less, so that a
+/// Scale of the error of each entry: the largest entry of its row or of its column, whichever is less, so that a
 /// block of small numbers is not hidden by one of large numbers (forces beside accelerations); never less than a
 /// thousandth of the largest of all, where differences leave nothing but rounding, nor than 1e-6.
 inline MatrixXd calcEntryScales(const MatrixXd& numeric) {
@@ -22,8 +22,8 @@ inline MatrixXd calcEntryScales(const MatrixXd& numeric) {
   return rows.replicate(1, size.cols()).cwiseMin(columns.replicate(size.rows(), 1)).cwiseMax(least);
 }
 
-/// Passes when every entry is close, and when a thousandth of its scale added to an entry would be seen: of each row and
-/// of each column one entry is tried, chosen at random (the same ones in every run).
+/// Passes when every entry is close, and when a thousandth of its scale added to an entry would be seen: of each row
+/// and of each column one entry is tried, chosen at random (the same ones in every run).
 inline void checkDerivative(const MatrixXd& analytic, const MatrixXd& numeric, const std::string& name = "") {
   CAPTURE(name);
   REQUIRE(analytic.rows() == numeric.rows());

@@ -1,6 +1,6 @@
 #pragma once
-// What the tests of FDDP share: guesses, and an oracle that knows neither models nor sweeps, the gradient of the cost along
-// its own rollouts by central differences.
+// Shared by the tests of FDDP: guesses, and an oracle that knows neither models nor sweeps, the gradient of the cost
+// along its own rollouts by central differences.
 #include <catch2/catch.hpp>
 
 #include "bielle/solve/fddp.h"
@@ -50,7 +50,7 @@ inline double calcCost(const ShootingProblem& problem, const std::vector<VectorX
   return total + evaluate(problem, problem.numStages(), x)->cost;
 }
 
-// Of the node states as they are, whatever the gaps between them.
+// Cost of the node states as they are, whatever the gaps between them.
 inline double calcCostAlong(const ShootingProblem& problem, const ShootingTrajectory& t) {
   double total = 0;
   for (size_t k = 0; k < t.us.size(); ++k) total += evaluate(problem, static_cast<int>(k), t.xs[k], &t.us[k])->cost;

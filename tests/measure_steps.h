@@ -171,8 +171,8 @@ class StepMeter {
   StepMeasures out_;
 };
 
-// What feet have to do in every motion with steps: stand still, clear the ground, land where they should, push without
-// tipping or slipping.
+// Checks the feet in every motion with steps: they stand still, clear the ground, land where they should, and push
+// without tipping or slipping.
 inline void checkFeet(const StepMeasures& m) {
   CHECK(m.slip < 1e-3);
   CHECK(m.penetration < 1e-3);

@@ -381,7 +381,7 @@ TEST_CASE("solve ends by the check of its result, whose failure is its own") {
   setenv("PATH", path.c_str(), 1);
   CHECK(absent.status == 0);
   CHECK_THAT(absent.out, Catch::Contains("not checked: bielle-check is not built"));
-  // What the check does at its end, the status of the command, and its line of error.
+  // How the check ends, the status of the command, and its error line.
   const std::tuple<const char*, int, const char*> ends[] = {
       {"exit 0", 0, ""},
       {"exit 1", 1, ""},

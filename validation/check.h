@@ -2,10 +2,11 @@
 /// \file A motion checked from its files alone: what `bielle check` reports.
 ///
 /// **Independent** of the program that made the motion are the dynamics: kinematics, mass matrix, bias, accelerations,
-/// impacts, the forces of wrenches, energies and the directions of the loops are Simbody's; the friction of soles, gaps,
-/// feet and limits are computed here. **Shared** with it are the readers of robots and results (a robot that is misread is misread
-/// twice; `tests/test_published.cpp` compares them with another library's), the makers of serial models, the difference of two
-/// configurations and the rotations behind it (notation.h), and the place and friction of the ground, which the summary tells.
+/// impacts, the forces of wrenches, energies and the directions of the loops are Simbody's; the friction of soles,
+/// gaps, feet and limits are computed here. **Shared** with it are the readers of robots and results (a robot that is
+/// misread is misread twice; `tests/test_published.cpp` compares them with another library's), the makers of serial
+/// models, the difference of two configurations and the rotations behind it (notation.h), and the place and friction of
+/// the ground, which the summary tells.
 ///
 /// With q_k, v_k, a_k, u_k, lambda_k of the files and h the time step, a chain leads from the recorded forces to the
 /// recorded states. Nothing in it is approximate, so its bounds are tight:
@@ -17,8 +18,8 @@
 ///     N(q_k)^T W (d_k - h (v_k + h a_k)) = 0,    N(q_{k+1})^T W (d_k - h v_{k+1}) = 0                             (3)
 /// Closed positions and velocities, which have rows of their own, settle the rest.
 ///
-/// (1) asks for no particular wrenches. So Simbody solves for the accelerations too, from q, v and u alone, with its own loops
-/// and standing feet,
+/// (1) asks for no particular wrenches. So Simbody solves for the accelerations too, from q, v and u alone, with its
+/// own loops and standing feet,
 ///     M a + b = B u + J^T m,    J a + dJ/dt v = s,                                                                (4)
 /// where s is a stabilisation that no file tells: of residuals r and velocities nu of the feet and, in the full
 /// formulation, of the loops,
@@ -41,8 +42,8 @@
 
 namespace bielle::validation {
 
-/// What is allowed. Lengths are those that a robot of a metre would not notice; ratios are of what the motion itself
-/// has most of.
+/// Bounds of the check. Lengths are negligible for a robot of one metre; ratios are relative to the largest value in
+/// the motion itself.
 struct CheckBounds {
   double time = 1e-9;  ///< between nodes, s: rounding of their sum
   /// Eq. (1), over the weight of the robot (as N or N m): solves in double precision leave 1e-10.
@@ -52,8 +53,8 @@ struct CheckBounds {
   double accelerations = 1e-3;
   double velocity_steps = 1e-6;  ///< Eqs. (2), (3), m/s or rad/s: gaps that a converged solver may leave
   double position_steps = 1e-8;  ///< Eqs. (2), (3), m or rad
-  /// Eq. (6), over the same, of first order in the step and in the speed of the loops: 1e-3 for a squat, 3e-3 for a walk
-  /// at 0.5 m/s, 3e-2 at 1 m/s.
+  /// Eq. (6), over the same, of first order in the step and in the speed of the loops: 1e-3 for a squat, 3e-3 for a
+  /// walk at 0.5 m/s, 3e-2 at 1 m/s.
   double finite_differences = 0.05;
 
   double closed = 1e-8;           ///< gap of loops in the reduced formulation, m or rad
@@ -80,8 +81,8 @@ struct CheckBounds {
 };
 
 struct CheckRow {
-  /// Goal: what came out beside what was asked (`bound`, give or take `tolerance`). Missing it breaks no law of physics,
-  /// so that it is told and the check passes all the same.
+  /// Goal: what came out beside what was asked (`bound`, give or take `tolerance`). Missing it breaks no law of
+  /// physics, so that it is told and the check passes all the same.
   enum class Kind { AtMost, AtLeast, Note, Goal };
   std::string name;
   Kind kind = Kind::AtMost;

@@ -13,7 +13,7 @@ class Worst {
  public:
   explicit Worst(CheckRow::Kind kind = CheckRow::Kind::AtMost) : kind_(kind) {}
 
-  // What is not a number is worst of all: a computation that fails must not pass.
+  // NaN is worse than any number: a computation that fails must not pass.
   void add(double value, int node, const std::string& what = "") {
     const bool worse = std::isnan(value) || (kind_ == CheckRow::Kind::AtLeast ? value < value_ : value > value_);
     if (!empty() && (std::isnan(value_) || !worse)) return;
@@ -37,7 +37,7 @@ class Worst {
   std::string what_;
 };
 
-// What a group of rows is made from and put into.
+// Input and output of the functions that make a group of rows.
 struct CheckContext {
   const CheckedMotion& motion;
   const MotionTrace& trace;

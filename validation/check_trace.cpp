@@ -11,10 +11,10 @@
 namespace bielle::validation {
 namespace {
 
-// Of pivots of the scaled rows of loops that are closed to 1e-8 (CheckBounds::closed): what is below is redundant.
+// Rows whose pivot, after scaling, is below this are redundant; loops are closed to 1e-8 (CheckBounds::closed).
 constexpr double kRankThreshold = 1e-8;
 
-// Of frame 2 in frame 1; the angle about the axis of a hinge is free, all angles of a ball are.
+// Displacement of frame 2 in frame 1, without free rotations: about the axis of a hinge, about any axis of a ball.
 Vector6d calcGap(const Closure& closure, const SE3& X_12) {
   Vector6d gap = Vector6d::Zero();
   gap.head<3>() = X_12.p;
@@ -74,7 +74,7 @@ class Tracer {
   }
 
  private:
-  // Of a phase: feet that stand again stand elsewhere.
+  // The bridge of a phase: feet that stand again stand elsewhere.
   SimbodyBridge& getBridge(int phase) {
     if (phase != bridge_phase_)
       bridge_ = std::make_unique<SimbodyBridge>(motion_.model,
@@ -125,7 +125,7 @@ class Tracer {
     return N_ * (N_.transpose() * metric_.cwiseProduct(x));
   }
 
-  // What is judged along the closures of the next node, and what needs both nodes.
+  // Quantities judged along the closures of the next node, and those that need both nodes.
   void traceArrival(int k, const NodeTrace& here, const NodeTrace& next, StageTrace& stage) const {
     const double h = motion_.getTimeStep(k);
     const VectorXd v_next = motion_.record.v.row(k + 1);

@@ -88,7 +88,7 @@ TEST_CASE("check: each poisoned number makes its rows fail and no other") {
          [&](CheckedMotion& m) { m.record.contact_wrenches(node, foot + 2) = -0.1; });
   expect({"contact: pressure beyond the sole", "contact: wrench cone of the sole", "equations of motion"},
          [&](CheckedMotion& m) { m.record.contact_wrenches(node, foot + 4) = 10; });
-  // Of all that a sole bears, the torque about its normal alone: 0.07 m of the load at most, less what pulls sideways.
+  // The torque about the normal alone: a sole bears at most 0.07 m times its load, less with a tangential force.
   const double load = good.record.contact_wrenches(node, foot + 2);
   expect({"contact: wrench cone of the sole", "equations of motion"},
          [&](CheckedMotion& m) { m.record.contact_wrenches(node, foot + 5) = 0.071 * load; });

@@ -40,7 +40,8 @@ struct ValidationOptions {
   double force = 10;  ///< largest generalized force, N m or N; less on dofs that it would accelerate beyond 1e5 m/s^2
   double motion_duration = 0;  ///< s, of a free motion from the first state (motion.h); 0 for none
   double motion_step = 1e-3;   ///< s, of our integrator
-  /// Of the distance at the end relative to the way gone, and of the energy error relative to the kinetic energy.
+  /// Tolerance of the distance at the end relative to the path length, and of the energy error relative to the kinetic
+  /// energy.
   double motion_tolerance = 1e-6;
 };
 

@@ -17,7 +17,7 @@ constexpr size_t kMostMotors = 4;                                  // of one plo
 const char* const kColors[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#e377c2", "#17becf"};
 constexpr size_t kNumColors = std::size(kColors);
 
-// Values of feasible designs as points, the least so far as a line, one colour per search. What is far off is left out.
+// Values of feasible designs as points, the least so far as a line, one colour per search. Outliers are left out.
 Plot makeCourse(const DesignEvaluator& evaluator, const DesignRun& run) {
   const double start = evaluator.start().value;
   Plot plot{"Value of the designs", "evaluation", "value", PlotScale::Free, {}};

@@ -9,13 +9,13 @@
 ///     energy                                    p = sum h |u v|,          dp = sum h sign(u v) (du v + u dv)       (2)
 ///     electrical energy, Eq. (1) of measures.h  p = sum h r P,            dp = sum h r (du v + u dv + 2 u du / K_m^2)
 ///     peak torque in a stretch of the motion    p = |u(k)|,               dp = sign(u(k)) du(k)                    (3)
-/// with r = 1 where P is positive, else the share that is given back, and k the node of the largest |u| in the stretch. Of a peak torque, the piece of every motor, motion and stretch
-/// counts: when one peak falls another becomes the largest, and a search that minimizes the largest needs both gradients.
+/// with r = 1 where P is positive, else the share that is recovered, and k the node of the largest |u| in the stretch.
+/// A peak torque has a piece for every motor, motion and stretch: when one peak falls another becomes the largest, and
+/// a search that minimizes the largest needs both gradients.
 ///
-/// A kept motion is infeasible where a linkage reaches a dead point of its joints, and torques fall just before it, which
-/// attracts searches. With T_c the tangent of a loop cluster for unit speeds of its joints, w the
-/// right singular vector of its largest singular value and mu = 1 / |T_c w| its margin (ratio.h), a design is kept
-/// from it by
+/// A kept motion is infeasible where a linkage reaches a dead point of its joints, and torques fall just before it,
+/// which attracts searches. With T_c the tangent of a loop cluster for unit speeds of its joints, w the right singular
+/// vector of its largest singular value and mu = 1 / |T_c w| its margin (ratio.h), a design is kept from it by
 ///     mu(k)^2 >= least^2,    d mu^2 = -2 mu^4 (T_c w) . d(T_c w)                                                   (4)
 /// for the smallest mu in every stretch. The square falls linearly towards a dead point, where mu itself has a vertical
 /// slope.

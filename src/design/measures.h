@@ -11,9 +11,9 @@
 namespace bielle {
 
 /// Conversion of electrical into mechanical power. For a motor with motor constant K (torque over the square root of
-/// the heat it makes) behind a gear of ratio n, the model's motor has K_m = n K. Of the power at its terminals
+/// the heat it makes) behind a gear of ratio n, the model's motor has K_m = n K. The power at its terminals is
 ///     P = u v + (u / K_m)^2                                                                                        (1)
-/// it consumes max(P, 0) and recovers the share r of the negative part, so that braking first covers its own heat.
+/// It consumes max(P, 0) and recovers the share r of the negative part, so that braking first covers its own heat.
 /// No friction, no iron losses, no standby.
 struct MotorDrive {
   /// K_m, N m/sqrt(W) (N/sqrt(W) of a linear motor). The default is ours, of the order of geared motors of 0.8 kg that
@@ -30,7 +30,7 @@ struct DriveTable {
 /// \throws ModelError for unknown motors, constants that are not positive, shares outside 0 .. 1
 std::vector<MotorDrive> makeDrives(const Model& model, const DriveTable& table);
 
-/// Of one motor over a motion of N stages.
+/// Measures of one motor over a motion of N stages.
 struct MotorMeasures {
   double peak_torque = 0;        ///< max |u|, N m or N
   double rms_torque = 0;         ///< sqrt(sum h u^2 / sum h)

@@ -7,7 +7,7 @@ namespace {
 
 constexpr double kStep = 1e-3;  // of the width of the bounds
 
-// What a direction cannot carry.
+// Whether the models agree in everything that a direction cannot change.
 bool isSameButForPlaces(const Model& a, const Model& b) {
   const auto same = [](const Vector3d& x, const Vector3d& y) { return (x - y).norm() < 1e-12; };
   bool out = a.numBodies() == b.numBodies() && a.closures().size() == b.closures().size() &&

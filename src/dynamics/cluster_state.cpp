@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kClosedTolerance = 1e-13;    // what close() aims at
 constexpr double kAcceptedTolerance = 1e-11;  // what it accepts when rounding stops it
-// Relative differences of lengths below this decide nothing. In symmetric postures whole rows are equally long and entries
-// vanish: were rounding to choose between them, one point would have as many bases as ways to compute it.
+// Relative differences of lengths below this are ignored. In symmetric postures whole rows are equally long and
+// entries vanish: if rounding chose between them, the basis would depend on how the point was computed.
 constexpr double kTie = 1e-7;
 
 // Rows of a factorization that one operation works on: a register of one node, or a row of the nodes of all lanes.
@@ -103,8 +103,8 @@ void selectRows(const MatrixX<T>& all, const std::vector<typename LogicOf<T>::In
     for (size_t i = 0; i < rows.size(); ++i) out(i, k) = getEntry(&all(0, k), rows[i]);
 }
 
-// J W^{-1/2} = [L, 0] Q^T with Q = Q_1 Q_2 ..., Q_p = I - beta v v^T, the v in the columns of `reflectors`. Rows are taken
-// by what the ones before leave of them, largest first. False when the rank is another than the cluster's.
+// J W^{-1/2} = [L, 0] Q^T with Q = Q_1 Q_2 ..., Q_p = I - beta v v^T, the v in the columns of `reflectors`. Rows are
+// taken by their remainder after the rows before, largest first. False when the rank differs from the cluster's.
 template <typename T>
 typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
                                     ClusterBasisOf<T>& basis) {
@@ -155,7 +155,7 @@ typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratc
   }
   for (int k = 0; k < rank; ++k)
     for (int p = k; p < rank; ++p) basis.L(p, k) = getEntry(&E(0, k), basis.rows[p]);
-  // What is left must be nothing but rounding.
+  // The remainder must be nothing but rounding.
   T left = 0;
   for (int r = 0; r < m; ++r) {
     const T norm = E.row(r).tail(n - rank).squaredNorm();
@@ -233,8 +233,8 @@ typename LogicOf<T>::Mask updateClusterState(const ReducedCluster& cluster, Clus
   return updateBases(cluster, scratch, out);
 }
 
-// Newton on zeta with the matrix J(q) W^{-1} J(q_0)^T of the independent rows, refreshed while it pays. A lane that is done
-// stays as it is.
+// Newton on zeta with the matrix J(q) W^{-1} J(q_0)^T of the independent rows, refreshed while it pays. A lane that has
+// converged is left unchanged.
 template <typename T>
 typename LogicOf<T>::Mask closeCluster(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
                                        const ClusterBasisOf<T>& start, typename ArgumentsOf<T>::ConstVector d,

@@ -1,26 +1,26 @@
 #pragma once
-/// \file Mass matrix and derivatives of inverse dynamics in reduced coordinates, without ever forming those of full size.
+/// \file Mass matrix and derivatives of inverse dynamics in reduced coordinates, without forming those of full size.
 ///
-/// The factors of rnea.h are linear in a change of the dofs, so that a reduced joint needs a few columns only. Seen from a reduced joint
-/// further out, a reduced coordinate is its J~, dV~, dA~, dW~ of cluster_motion.h, Eq. (3), at the dof that carries the path;
-/// seen from a reduced joint further in, with sums over all its dofs j,
+/// The factors of rnea.h are linear in a change of the dofs, so that a reduced joint needs only a few columns. A
+/// reduced joint further out sees a reduced coordinate as J~, dV~, dA~, dW~ of cluster_motion.h, Eq. (3), at the dof
+/// that carries the path; one further in sees it, with sums over all its dofs j, as
 ///     (YJ)~ = sum YJ_j N_j,   (BtJ)~ = sum BtJ_j N_j,
-///     G~_y = sum Gq_j N_j + Gv_j Z_j + YJ_j d_y,j,           G~_v = sum Gv_j N_j + YJ_j d_v,j                         (1)
-/// Then, for a coordinate alpha further out and beta further in on its path, by Eqs. (7) to (10) of rnea.h,
+///     G~_y = sum Gq_j N_j + Gv_j Z_j + YJ_j d_y,j,           G~_v = sum Gv_j N_j + YJ_j d_v,j                      (1)
+/// Then, for a coordinate alpha and a coordinate beta further in on its path, by Eqs. (7) to (10) of rnea.h,
 ///     A_y(alpha, beta) = (YJ)~_alpha . dA~_beta + (BtJ)~_alpha . dV~_beta,    A_y(beta, alpha) = J~_beta . G~_y,alpha
 ///     A_v(alpha, beta) = (YJ)~_alpha . dW~_beta + (BtJ)~_alpha . J~_beta,     A_v(beta, alpha) = J~_beta . G~_v,alpha
-///     M(alpha, beta) = J~_beta . (YJ)~_alpha                                                                          (2)
-/// Within a reduced joint the same holds dof by dof, J~, .. being the path sums at dof j and G'~, (YJ)'~ the sums (1) over what
-/// comes after it, plus the rotors D and less the geometric stiffness K = d(J^T lambda)/dq of its loop forces:
+///     M(alpha, beta) = J~_beta . (YJ)~_alpha                                                                       (2)
+/// Within a reduced joint the same holds dof by dof, with J~, .. the path sums at dof j and G'~, (YJ)'~ the sums (1)
+/// over the dofs after it, plus the rotors D, less the geometric stiffness K = d(J^T lambda)/dq of its loop forces:
 ///     A_y = sum_j N_j (YJ_j . dA~ + BtJ_j . dV~ + J_j . G'~_y + D_j d_y,j - (K N)_j)
 ///     A_v = sum_j N_j (YJ_j . dW~ + BtJ_j . J~ + J_j . G'~_v + D_j d_v,j),   M = sum_j N_j (YJ_j . J~ + J_j . (YJ)'~ + D_j N_j)
-///                                                                                                                     (3)
-/// The loop forces have no other effect: inner to the cluster, they cancel in every sum that leaves it.
+///                                                                                                                  (3)
+/// The loop forces have no other effect: they are internal to the cluster and cancel in every sum that leaves it.
 #include "dynamics/cluster_motion.h"
 
 namespace bielle {
 
-/// What a cluster contributes: how it moves, and K N (n x size).
+/// Contribution of a cluster: its motion and K N (n x size).
 template <typename T>
 struct ClusterLiftOf {
   const ClusterMotionOf<T>* motion = nullptr;
@@ -32,7 +32,7 @@ using ClusterLift = ClusterLiftOf<double>;
 template <typename T>
 class ReducedTreeOf {
  public:
-  /// \param tips  bodies for which the columns of getTip() are wanted
+  /// \param tips  bodies for which getTip() returns columns
   ReducedTreeOf(const Model& model, const Reduction& reduction, const std::vector<int>& tips);
 
   /// M (size x size), and J of the tips; needs updateCompositeInertias and the twists of the clusters.
@@ -43,7 +43,7 @@ class ReducedTreeOf {
   void updateDerivatives(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts,
                          typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v);
 
-  /// What moves a body: column o belongs to the reduced coordinate outer[o].
+  /// Motion of a body: column o belongs to the reduced coordinate outer[o].
   struct Columns {
     std::vector<int> outer;
     Matrix6X<T> J, dV, dA, dW;  ///< 6 x outer
@@ -76,7 +76,7 @@ class ReducedTreeOf {
   const Reduction& reduction_;
   std::vector<Link> links_;
   std::vector<Tip> tips_;
-  Matrix6X<T> after_y_, after_v_;  // sums (1) over what comes after a group of dofs
+  Matrix6X<T> after_y_, after_v_;  // sums (1) over the dofs after a group
 };
 
 using ReducedTree = ReducedTreeOf<double>;

@@ -31,7 +31,8 @@ Model makeClusterModel(const Model& model, const LoopCluster& loops, const std::
   return builder.build();
 }
 
-// W: the inertia of each dof, with a floor that keeps (1) well conditioned. A mechanism without inertia has no preference.
+// W: the inertia of each dof, with a floor that keeps (1) well conditioned. A mechanism without inertia has no
+// preference.
 VectorXd makeMetric(const Workspace& ws, const std::vector<int>& dofs) {
   constexpr double kFloor = 1e-3;
   VectorXd metric(dofs.size());
@@ -59,7 +60,7 @@ void connect(const Model& model, const Reduction& reduction, int root, ReducedJo
     if (std::binary_search(support.begin(), support.end(), dofs[k])) reduced.path.push_back(static_cast<int>(k));
 }
 
-// What the paths through a cluster are made of.
+// Groups of dofs that make up the paths through a cluster.
 void addGroups(ReducedCluster& cluster) {
   std::vector<int> last_group(cluster.model.numBodies(), -1);
   cluster.body_dof.assign(cluster.model.numBodies(), -1);

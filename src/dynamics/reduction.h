@@ -5,13 +5,14 @@
 /// is a small mechanism of its own, here a `ReducedCluster` with its own massless Model whose world is that body. At a
 /// closed configuration, let J (rank x n) be independent rows of its closure Jacobian, chosen by pivoting, W the metric
 /// of the cluster (diagonal, constant), and
-///     J N = 0,   N^T W N = I,   J^+ = W^{-1} J^T (J W^{-1} J^T)^{-1}                                                  (1)
-/// N (n x (n - rank)) is an orthonormal basis of the tangent space and (W N)^T reads its coordinates. Its choice is free at
-/// every point: no chart is left, and a dead point of a linkage, where motor or joint coordinates break down, is nothing
-/// special. Only a change of rank is. Rounding has no part in the choice: one point has one basis, however it is reached.
+///     J N = 0,   N^T W N = I,   J^+ = W^{-1} J^T (J W^{-1} J^T)^{-1}                                               (1)
+/// N (n x (n - rank)) is an orthonormal basis of the tangent space and (W N)^T reads its coordinates. Its choice is
+/// free at every point: no chart is left, and a dead point of a linkage, where motor or joint coordinates break down,
+/// is nothing special. Only a change of rank is. Rounding has no part in the choice: one point has one basis, however
+/// it is reached.
 ///
 /// Moving on the manifold from a point q_0: for a displacement d (n), close along the rows of the start,
-///     q = q_0 (+) (d - W^{-1} J(q_0)^T zeta)    with zeta such that q is closed                                       (2)
+///     q = q_0 (+) (d - W^{-1} J(q_0)^T zeta)    with zeta such that q is closed                                    (2)
 /// so that (W N)(q_0)^T (q (-) q_0) = (W N)(q_0)^T d: (2) inverts the difference in reduced coordinates exactly.
 ///
 /// W is the inertia that each dof moves at the configuration of the reduction: corrections go where they cost least, to
@@ -31,7 +32,8 @@ struct DofGroup {
   int parent_group = -1;  ///< that group
 };
 
-/// A closure row of which the rows before it leave less than this, relative to the first one, counts as dependent on them.
+/// A closure row of which the rows before it leave less than this, relative to the first one, counts as dependent on
+/// them.
 constexpr double kRankTolerance = 1e-6;
 
 /// One cluster of loops as a mechanism of its own.
@@ -102,7 +104,7 @@ template <typename T>
 void applyPseudoInverse(const ReducedCluster& cluster, const ClusterBasisOf<T>& basis, double s,
                         typename ArgumentsOf<T>::Matrix X, typename ArgumentsOf<T>::Matrix out);
 
-/// What updates and closings of a cluster need for a moment: one per thread.
+/// Scratch memory for updating and closing a cluster, one per thread.
 template <typename T>
 struct ClusterScratchOf {
   explicit ClusterScratchOf(const ReducedCluster& cluster);
@@ -129,12 +131,13 @@ struct ClusterStateOf {
 };
 using ClusterState = ClusterStateOf<double>;
 
-/// Kinematics, Jacobian and bases (1) at q (cluster's nq), which stay in the scratch too. False when the rank is not that of the
-/// cluster. No allocation.
+/// Kinematics, Jacobian and bases (1) at q (cluster's nq), which stay in the scratch too. False when the rank is not
+/// that of the cluster. No allocation.
 template <typename T>
 typename LogicOf<T>::Mask updateClusterState(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
                                              typename ArgumentsOf<T>::ConstVector q, ClusterStateOf<T>& out);
-/// Closes from `start` as Eq. (2) and updates everything there. False when it does not close or the rank changes. No allocation.
+/// Closes from `start` as Eq. (2) and updates everything there. False when it does not close or the rank changes. No
+/// allocation.
 /// \param zeta_guess  rank, where zeta is expected, or empty
 template <typename T>
 typename LogicOf<T>::Mask closeCluster(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,

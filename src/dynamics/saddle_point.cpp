@@ -13,12 +13,13 @@ constexpr double kUnmoved = 1e-22;  // share of the largest |row|^2 below which 
 using LanesMap = Eigen::Map<MatrixX<Lanes>>;
 using ConstLanesMap = Eigen::Map<const MatrixX<Lanes>>;
 
-// What the two scalars do in their own way: rows of double side by side in a register, or a system in each lane.
+// Kernels that differ between the scalars: double keeps rows side by side in a register, Lanes a system in each lane.
 
 void clear(PaddedMap A) { clearPadding(A); }
 void clear(LanesMap) {}
 
-// Cholesky factor in the lower triangle, in place. Tells whether all pivots, squares of its diagonal, are above the threshold.
+// Cholesky factor in the lower triangle, in place. Tells whether all pivots, squares of its diagonal, are above the
+// threshold.
 bool factorizeCholesky(PaddedMap A, double threshold) {
   return factorizeColumns(A, A.cols()) && (A.cols() == 0 || A.diagonal().array().square().minCoeff() > threshold);
 }
@@ -209,7 +210,8 @@ void SaddlePointOf<T>::updateInverse() {
   if (any(dependent_)) improveInverse();
 }
 
-// With P = (W W^T + mu I)^{-1} and E = mu P, the sum P (I + E + E^2 + ...) is doubled at each pass, P_{2k} = P_k + E^k P_k.
+// With P = (W W^T + mu I)^{-1} and E = mu P, each pass doubles the terms of P (I + E + E^2 + ...):
+// P_{2k} = P_k + E^k P_k.
 template <typename T>
 void SaddlePointOf<T>::improveInverse() {
   const auto multiply = [](const MatrixX<T>& A, const MatrixX<T>& B, MatrixX<T>& out) {
@@ -226,8 +228,8 @@ void SaddlePointOf<T>::improveInverse() {
     multiply(T1_, T1_, T2_);
     T1_.swap(T2_);
   }
-  // G P G loses what is not in the range of G, rounding of the size of 1/mu above all; one Newton-Schulz step then gains
-  // what eigenvalues near mu still lack.
+  // G P G loses what is not in the range of G, rounding of the size of 1/mu above all; one Newton-Schulz step then
+  // gains what eigenvalues near mu still lack.
   multiply(G_, P, T1_);
   multiply(P, T1_, T2_);
   multiply(G_, T2_, T1_);

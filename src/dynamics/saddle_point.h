@@ -1,27 +1,27 @@
 #pragma once
 /// \file The symmetric system behind constrained dynamics (the paper's eq. 4), with rows that may be redundant.
 ///
-///     M a - J^T lambda = f,     J a = -g                                                                             (1)
-///     G lambda = -g - J M^{-1} f,     G = J M^{-1} J^T                                                               (2)
+///     M a - J^T lambda = f,     J a = -g                                                                           (1)
+///     G lambda = -g - J M^{-1} f,     G = J M^{-1} J^T                                                             (2)
 ///
 /// With L L^T = M, z = L^{-1} f, D = diag(G)^{-1/2} and W = D J L^{-T} it reads
 ///
-///     (W W^T) y = -D g - W z,     lambda = D y,     a = L^{-T} (z + W^T y).                                          (3)
+///     (W W^T) y = -D g - W z,     lambda = D y,     a = L^{-T} (z + W^T y).                                        (3)
 ///
-/// W W^T = D G D has a unit diagonal. It is factorised directly where it is well conditioned; otherwise (3) is solved by proximal
-/// iterations (Carpentier, Budhiraja, Mansard, RSS 2021),
+/// W W^T = D G D has a unit diagonal. It is factorised directly where it is well conditioned; otherwise (3) is solved
+/// by proximal iterations (Carpentier, Budhiraja, Mansard, RSS 2021),
 ///
-///     y <- y + (W W^T + mu I)^{-1} (rhs - W W^T y),                                                                  (4)
+///     y <- y + (W W^T + mu I)^{-1} (rhs - W W^T y),                                                                (4)
 ///
-/// which converge to the least-squares, minimum-norm y. Neither a nor J^T lambda depends on the choice of rows. A row that
-/// nothing moves, a row of zeros among them, has no force.
+/// which converge to the least-squares, minimum-norm y. Neither a nor J^T lambda depends on the choice of rows. Rows
+/// that no coordinate moves (zero rows) have no force.
 ///
 /// Derivatives along any argument: with dID the derivative of M a - J^T lambda - f and dc that of J a + g, both at
 /// fixed a and lambda,
 ///
-///     dlambda = G^+ (J M^{-1} dID - dc),     da = M^{-1} (J^T dlambda - dID).                                        (5)
+///     dlambda = G^+ (J M^{-1} dID - dc),     da = M^{-1} (J^T dlambda - dID).                                      (5)
 ///
-/// With redundant rows dlambda is right up to the null space of J^T.
+/// With redundant rows dlambda is determined up to the null space of J^T.
 #include "math/lane_product.h"
 
 namespace bielle {
@@ -33,7 +33,7 @@ struct SaddlePointOptions {
   double direct_threshold = 1e-5;  ///< smallest pivot of W W^T for which it is factorised directly
 };
 
-/// What Eq. (5) needs of a factorised system.
+/// The factors of a system that Eq. (5) needs.
 struct SaddlePointFactors {
   MatrixXd L;     ///< n x n, lower triangle: Cholesky factor of M
   MatrixXd Wt;    ///< n x m, W^T
@@ -41,12 +41,12 @@ struct SaddlePointFactors {
   VectorXd D;     ///< m
   void resize(int n, int m);
 };
-/// Eq. (5) for Xt (k x n), which holds dID^T and becomes da^T, and dlambda_t (k x m), which holds dc^T and becomes dlambda^T, both
-/// with their padding finite. `room` is memory that grows to k x m.
+/// Eq. (5) for Xt (k x n), which holds dID^T and becomes da^T, and dlambda_t (k x m), which holds dc^T and becomes
+/// dlambda^T; the padding of both is finite. `room` is memory that grows to k x m.
 void solveDerivatives(const SaddlePointFactors& factors, PaddedMap Xt, PaddedMap dlambda_t, VectorXd& room);
 
-/// T is double, or Lanes for as many systems of one size. In lanes a matrix is kept as it is; numbers of double have their rows
-/// padded to full registers.
+/// T is double, or Lanes for several systems of one size. Matrices of double have their rows padded to full registers;
+/// those of Lanes need no padding.
 template <typename T>
 class SaddlePointOf {
  public:
@@ -61,10 +61,10 @@ class SaddlePointOf {
   void solve(const VectorX<T>& f, const VectorX<T>& g, VectorX<T>& a, VectorX<T>& lambda);
   /// Inverse of W W^T, or its pseudo-inverse as the limit of Eq. (4), in Ginv().
   void updateInverse();
-  /// Whether some row has nothing to say of its own: nothing moves it, or it follows from the others.
+  /// Whether some row is redundant: it is zero or follows from the others.
   Mask isRedundant() const { return dependent_ || unmoved_; }
 
-  // Of the last system. L(): its lower triangle; Ginv(): needs updateInverse().
+  // Factors of the last system. L(): lower triangle; Ginv(): needs updateInverse().
   auto L() const { return view(L_, n_, n_); }
   auto W() const { return view(W_, m_, n_); }
   const MatrixX<T>& Ginv() const { return Ginv_; }
@@ -93,8 +93,8 @@ class SaddlePointOf {
   MatrixX<T> G_, Ginv_;     // m x m
   MatrixX<T> P_, T1_, T2_;  // m x m, scratch
   VectorX<T> D_, rhs_, y_, correction_;
-  Mask dependent_ = T(0) < T(0);  // rows follow from others: Eq. (4)
-  Mask unmoved_ = T(0) < T(0);    // some row is moved by nothing
+  Mask dependent_ = T(0) < T(0);  // some rows follow from others: Eq. (4)
+  Mask unmoved_ = T(0) < T(0);    // some row is zero
 };
 
 /// One system, with its derivatives.

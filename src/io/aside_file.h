@@ -1,5 +1,5 @@
 #pragma once
-// A file written aside and renamed when it is whole. What is no file (/dev/stdout, a pipe) is written to directly.
+// A file written under a temporary name and renamed when complete. Devices and pipes are written directly.
 #include <string>
 
 namespace bielle {

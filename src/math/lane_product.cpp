@@ -181,7 +181,7 @@ void copyLowerToUpper(MatrixXd& A) {
 
 namespace {
 
-// Of columns from `begin` on, lane by lane of columns.
+// Visits the columns from `begin` on, one lane of columns at a time.
 template <typename Product>
 void visitLower(Eigen::Index begin, const PaddedMap& H, const Product& product) {
   for (Eigen::Index j = begin, end; j < H.cols(); j = end) {

@@ -77,7 +77,7 @@ Matrix6d calcRightJacobian6(const Vector6d& twist) {
   return J;
 }
 
-// Of a block triangular matrix.
+// Inverse of a block triangular matrix.
 template <typename T>
 Matrix6<T> calcRightJacobianInverse6(const Vector6<T>& twist) {
   const Vector3<T> rho = linear(twist), phi = angular(twist);

@@ -7,7 +7,7 @@
 namespace bielle {
 namespace {
 
-// What the exponential and its Jacobian are made of: sin t / t, (1 - cos t) / t^2 and (t - sin t) / t^3.
+// Coefficients of the exponential and its Jacobian: sin t / t, (1 - cos t) / t^2 and (t - sin t) / t^3.
 template <typename T>
 std::array<T, 3> calcAngleSeries(const T& t2) {
   return {1 - t2 / 6 * (1 - t2 / 20 * (1 - t2 / 42 * (1 - t2 / 72))),

@@ -160,7 +160,7 @@ Scene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
   return scene;
 }
 
-// Of all feet together, Eq. (2); the paper has its average while pushing and landing.
+// Load on all feet together, Eq. (2); the paper uses its average while pushing and landing.
 double calcLoad(const Scene& scene, Phase phase, double com_acceleration) {
   const double m = scene.model.mass(), g = scene.model.gravity().norm();
   const JumpFigures& f = scene.figures;

@@ -22,7 +22,7 @@ class NodeCosts {
 
   int rows() const { return rows_; }
   int motionRows() const { return motion_rows_; }
-  // What the sum of the costs is multiplied by: the time step of a running stage; 1 at an impact and at the terminal node.
+  // Factor of the sum of the costs: the time step of a running stage; 1 at an impact and at the terminal node.
   double scale() const { return scale_; }
 
   // Residuals, and from them the scaled cost; `at` has its state cost already.

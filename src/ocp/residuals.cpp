@@ -33,8 +33,8 @@ class ComVelocity : public Residual {
   Vector3d reference_;
 };
 
-// Residuals linear or smooth in the force of one contact, F = blockdiag(R, R) lambda with R = 1 in the axes of the contact
-// and R = R_WF in those of the world.
+// Residuals linear or smooth in the force of one contact, F = blockdiag(R, R) lambda with R = 1 in the axes of the
+// contact and R = R_WF in those of the world.
 class ForceResidual : public Residual {
  public:
   ForceResidual(const ConstraintSet& set, int constraint, ForceAxes axes)
@@ -152,7 +152,7 @@ class JointPosition : public Residual {
     if (!dofs_.empty()) return;
     for (int k = 0; k < model.nv(); ++k) {
       const bool limited = std::isfinite(model.lowerLimits()[k]) || std::isfinite(model.upperLimits()[k]);
-      // Of a joint with more dofs, limits bound no coordinate whose rate is a velocity coordinate.
+      // Limits of a joint with several dofs bound no coordinate whose rate is a velocity coordinate.
       if (limited && model.joints()[model.dofs()[k].joint].nv == 1) dofs_.push_back(k);
     }
   }

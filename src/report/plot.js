@@ -25,7 +25,7 @@ function mergeAbscissas(lists) {
   return all.filter((x, i) => i === 0 || x - all[i - 1] > 1e-5);
 }
 
-// Values over the run's own abscissas, spread over those of all runs; null where this run has none. What a stage does is
+// Values over the run's own abscissas, spread over those of all runs; null where this run has none. Values of a stage are
 // held until the next node.
 function spreadValues(xs, values, all) {
   const out = new Array(all.length).fill(null);

@@ -92,7 +92,7 @@ void BackwardPass::linearize(const BackwardInput& input, int begin, int end) {
   }
 }
 
-// What is wrong with the model of a node, empty if nothing is.
+// Describes what is wrong with the model of a node; empty if nothing is.
 std::string BackwardPass::checkModel(const ShootingProblem& problem, int k) const {
   const StageModel& model = models_[k];
   if (tasks_[k].status != StepStatus::Ok) {

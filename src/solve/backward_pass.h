@@ -18,8 +18,8 @@ struct BackwardInput {
   int threads;
 };
 
-/// The sweep needs one node after the other, from the last on, and so it goes along with the linearization: a thread that has
-/// finished a batch of nodes sweeps as far as there are models, unless another thread is doing so.
+/// The sweep needs one node after the other, from the last on, and so it goes along with the linearization: a thread
+/// that has finished a batch of nodes sweeps as far as there are models, unless another thread is doing so.
 class BackwardPass {
  public:
   void resize(const ShootingProblem& problem);
@@ -32,7 +32,7 @@ class BackwardPass {
   /// N + 1, without their second derivatives, which the sweep uses up.
   const std::vector<StageModel>& getModels() const { return models_; }
   const LqSweep& getSweep() const { return sweep_; }
-  /// Of all updates since resize(), summed over the threads.
+  /// Times of all updates since resize(), summed over the threads.
   double getLinearizeSeconds() const { return linearize_seconds_; }
   double getSweepSeconds() const { return sweep_seconds_; }
 

@@ -11,9 +11,9 @@ constexpr int kMaxIterations = 100;
 constexpr double kArmijo = 0.1;
 constexpr double kShrink = 0.6;
 constexpr double kMinStep = 1e-20;
-// A free gradient this small beside the terms it is the sum of is rounding.
+// A free gradient this small, relative to the terms it is the sum of, is rounding.
 constexpr double kTolerance = 4 * std::numeric_limits<double>::epsilon();
-// What is still a solution where an ill-conditioned Hessian lets rounding end the search.
+// Largest relative gradient still accepted where rounding under an ill-conditioned Hessian ends the search.
 constexpr double kAcceptable = 1e-9;
 
 }  // namespace

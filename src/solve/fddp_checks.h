@@ -1,5 +1,5 @@
 #pragma once
-// What a solve demands of its input.
+// Checks of a solve's input.
 #include "bielle/solve/fddp.h"
 
 namespace bielle {

@@ -54,7 +54,7 @@ struct LqResult {
 /// Owns everything a sweep writes. Sized by the first update() and kept: later ones of the same sizes allocate nothing.
 class LqSweep {
  public:
-  /// What the sweep knows at node k; at the terminal node Vx and Vxx only.
+  /// Results of the sweep at node k; at the terminal node Vx and Vxx only.
   struct Node {
     VectorXd Vx;    ///< ndx_k
     MatrixXd Vxx;   ///< ndx_k x ndx_k, symmetric, both triangles
@@ -68,8 +68,8 @@ class LqSweep {
                   const std::vector<ControlBox>& boxes = {});
 
   /// The same node by node, for models that become available one after the other: start(), then updateNode(k) for
-  /// k = N .. 0 as long as the status is Ok. start() reads only the sizes of the models. updateNode() overwrites the Hessian
-  /// of the model.
+  /// k = N .. 0 as long as the status is Ok. start() reads only the sizes of the models. updateNode() overwrites the
+  /// Hessian of the model.
   void start(const std::vector<StageModel>& models, const LqRegularization& regularization);
   LqStatus updateNode(int k, StageModel& model, const ControlBox* box = nullptr);
   /// Result of the nodes updated so far.
@@ -95,8 +95,8 @@ class LqSweep {
   LqRegularization regularization_;
   LqResult result_;
   BoxQp box_qp_;
-  // Buffers of one node, sized for the largest, matrices with columns padded like those of a StageModel. With F = [Fu Fx]:
-  // [Qu Qx], F^T Vxx', a copy of the Hessian for models that keep theirs, and K^T.
+  // Buffers of one node, sized for the largest; columns of matrices are padded like those of a StageModel. With
+  // F = [Fu Fx]: [Qu Qx], F^T Vxx', a copy of the Hessian for models that keep theirs, and K^T.
   VectorXd p_, Vxx_gap_, gradient_, Ft_Vxx_, hessian_, Kt_;
 };
 

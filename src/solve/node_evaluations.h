@@ -1,5 +1,5 @@
 #pragma once
-// What a solver keeps of a problem: the evaluations of its nodes, and the memory its functions work in.
+// The evaluations of a problem's nodes that a solver keeps, and the scratch memory of the problem's functions.
 #include <algorithm>
 
 #include "bielle/solve/shooting_problem.h"
@@ -10,12 +10,12 @@ using EvaluationList = std::vector<std::unique_ptr<NodeEvaluation>>;
 
 class NodeEvaluations {
  public:
-  /// Makes what is missing: two sets of N + 1 evaluations, `num_rolling` single ones, scratch for each thread. Whatever belongs
-  /// to another problem is dropped. The evaluations of the iterate are outdated, unless advance() moved them.
+  /// Makes what is missing: two sets of N + 1 evaluations, `num_rolling` single ones, scratch for each thread. Whatever
+  /// belongs to another problem is dropped. The evaluations of the iterate are outdated, unless advance() moved them.
   void resize(const ShootingProblem& problem, int num_rolling, int threads);
 
-  /// Evaluates the nodes of the current iterate that are outdated, in batches that threads share. Returns the first node whose
-  /// status is not Ok, -1 if all are.
+  /// Evaluates the nodes of the current iterate that are outdated, in batches that threads share. Returns the first
+  /// node whose status is not Ok, -1 if all are.
   /// \throws std::invalid_argument when a node that is not outdated has another state or control
   int update(const ShootingProblem& problem, const ShootingTrajectory& nodes, int threads);
   /// The iterate is another one: all of its evaluations are outdated.
@@ -29,10 +29,10 @@ class NodeEvaluations {
   void swapTrial();
   /// For trials whose evaluations are not kept.
   const EvaluationList& getRolling() const { return rolling_; }
-  /// Of the calling thread.
+  /// Scratch of the calling thread.
   ProblemScratch* getScratch() const;
 
-  /// Of all updates since resize(), summed over the threads.
+  /// Time of all updates since resize(), summed over the threads.
   double getSeconds() const { return seconds_; }
 
  private:

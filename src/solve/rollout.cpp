@@ -261,7 +261,7 @@ NodeEvaluation* Rollout::getEvaluation(const RolloutInput& input, const Track& t
   return input.evaluations.getRolling()[track.rolling + node % 2].get();
 }
 
-// What is left of the old gaps, the gaps at the joints, and Eq. (8).
+// Updates the remainders of the old gaps, the gaps where segments join, and Eq. (8).
 void Rollout::updateGaps(const RolloutInput& input, int num_tracks, Trial& trial) {
   trial.gap_sum = trial.gap_max = trial.closing_cost = 0;
   if (!trial.ok) return;

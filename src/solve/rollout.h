@@ -5,7 +5,7 @@
 
 namespace bielle {
 
-/// What a rollout reads: the current iterate, its models, the sweep over them and the step they foresee.
+/// Data that a rollout reads: the current iterate, its models, the sweep over them and the step they predict.
 struct RolloutInput {
   const ShootingProblem& problem;
   const ShootingTrajectory& nodes;
@@ -49,7 +49,7 @@ class Rollout {
   Trial& getTrial(int i) { return trials_[i]; }
   /// Whether the trial's evaluations are those of the input's NodeEvaluations: trials side by side do not keep theirs.
   bool hasEvaluations() const { return !rolling_; }
-  /// Of all rollouts since resize(), summed over the threads.
+  /// Time of all rollouts since resize(), summed over the threads.
   double getSeconds() const { return seconds_; }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
-// What the paper says of its comparison, beside what was found. Every verdict follows from numbers by the rule that its
-// text states; "open" where there are no numbers.
+// The paper's claims about its comparison, beside our findings. Every verdict follows from numbers by the rule that its
+// text states; it is "open" where there are no numbers.
 #include <string>
 #include <vector>
 

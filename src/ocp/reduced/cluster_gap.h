@@ -1,16 +1,16 @@
 #pragma once
-// Where a node state is not the next state q+ of the node before it: what reaches q+ in the coordinates of the basis N' there,
-// read about the node state q_k instead, whose basis is N_k. With d = q+ (-) q_k, w = v+ - v_k, J_d the derivative of d by q+
-// and Z' of cluster_motion.h at q+,
+// Change of coordinates where a node state q_k, with basis N_k, is not the next state q+ of the node before it: from
+// the coordinates of the basis N' at q+ to those about q_k. With d = q+ (-) q_k, w = v+ - v_k, J_d the derivative of d
+// with respect to q+ and Z' of cluster_motion.h at q+,
 //     gap = ((W N_k)^T d, (W N_k)^T w),
-//     dy+ <- P_q dy+,   dy_v+ <- P_v dy_v+ + P_z dy+,                                                                 (1)
+//     dy+ <- P_q dy+,   dy_v+ <- P_v dy_v+ + P_z dy+,                                                               (1)
 //     P_q = (W N_k)^T J_d N',   P_v = (W N_k)^T N',   P_z = (W N_k)^T Z'
 #include "dynamics/cluster_motion.h"
 #include "ocp/transcription.h"
 
 namespace bielle {
 
-// Of a cluster of loops with n dofs and r reduced coordinates; T is double, or Lanes for several nodes at once.
+// Gap of a loop cluster with n dofs and r reduced coordinates; T is double, or Lanes for several nodes at once.
 template <typename T>
 struct ClusterGapOf {
   explicit ClusterGapOf(const ReducedCluster& cluster);

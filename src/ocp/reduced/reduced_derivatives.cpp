@@ -198,7 +198,7 @@ LaneMask ReducedKernel::updateClusterDerivatives(ClusterLanes& c) {
   return turned;
 }
 
-// What comes of Eq. (g) read about the node states, where they are open.
+// Contribution of reading Eq. (g) about node states that are open.
 void ReducedKernel::updateGap(size_t index, const LinearizeItem* items, int count) {
   ClusterLanes& c = clusters_[index];
   ClusterGapOf<Lanes>& gap = c.gap;

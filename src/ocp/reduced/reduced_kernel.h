@@ -1,30 +1,31 @@
 #pragma once
-// The reduced step, its differences and its derivatives: robot_problem.h Eq. (3), for as many nodes at once as a register of the
-// processor has lanes. Written for one cluster with bases N, J, J^+ and metric W (reduction.h) at q, and N', J', J'^+ at q+; a
-// joint outside all clusters is the case N = N' = W = 1 without rows.
+// The reduced step, its differences and its derivatives: robot_problem.h Eq. (3), for as many nodes at once as a
+// register of the processor has lanes. Written for one cluster with bases N, J, J^+ and metric W (reduction.h) at q,
+// and N', J', J'^+ at q+; a joint outside all clusters is the case N = N' = W = 1 without rows.
 //
 // A tangent vector (dy, dy_v) at the state means, with Z, d_y and d_v of cluster_motion.h,
-//     dq = N dy,   dv = N dy_v + Z dy,   da = N dy' + d_y dy + d_v dy_v                                               (a)
+//     dq = N dy,   dv = N dy_v + Z dy,   da = N dy' + d_y dy + d_v dy_v                                             (a)
 // Dynamics: with a = N y' + a_d, a_d = -J^+ gamma, and hats for projections by N^T from both sides,
-//     M^ y' - (J_c N)^T lambda_c = N^T (tau - b - M a_d),    (J_c N) y' = -gamma_c - J_c a_d                          (b)
-// where c are the contacts. The closure forces, which N^T hides, balance what is left:
-// J^T lambda_l = M a + b - tau - J_c^T lambda_c. Derivatives at fixed lambda_l, lambda_c: those of inverse dynamics
-// (reduced_tree.h), and of the contact rows, with the columns J~, .. of the contact's body in the place of J_k, .. of closure.h
-// Eqs. (1) and (2).                                                                                                   (c)
-// Step: w = v + h a; e is the displacement before closing, A = h J' J_d W^{-1} J^T, and K = d(J^T zeta)/dq,
+//     M^ y' - (J_c N)^T lambda_c = N^T (tau - b - M a_d),    (J_c N) y' = -gamma_c - J_c a_d                        (b)
+// where c are the contacts. The closure forces, which N^T eliminates, balance the remainder:
+// J^T lambda_l = M a + b - tau - J_c^T lambda_c. Derivatives at fixed lambda_l and lambda_c are those of inverse
+// dynamics (reduced_tree.h) and of the contact rows, with the columns J~, .. of the contact's body in place of J_k, ..
+// of closure.h Eqs. (1) and (2).                                                                                    (c)
+// Step: w = v + h a; e is the displacement before closing, A = h J' J_d W^{-1} J^T, and K = d(J^T zeta)/dq and
 // K' = d(J'^T mu)/dq' are geometric stiffnesses, S = N'^T K' N':
-//     e = (J_q - h J_d W^{-1} K) dq + h J_d dw                                                                        (d)
-//     dq+ = e - h J_d W^{-1} J^T A^{-1} J' e,     dw' = dw - W^{-1} K dq - W^{-1} J^T A^{-1} J' e                     (e)
-//     dy+ = (W N')^T dq+,   dy_v+ = (W N')^T dw' - S dy+,   mu = J'^{+T} W w'                                         (f)
-// S is there because the projection of w' turns with q+. Nothing of the size of J needs to be inverted: (W N')^T times the
-// oblique projection of (e) vanishes on J_d W^{-1} J^T, and so it is read by P = J_d^{-T} W N. With P' = J_d^{-T} W N',
-// X = (P^T N')^{-1}, X' = P'^T N' X, E = P^T J_q N - h N^T K N, and (W N)^T Z = (W N)^T d_y = (W N)^T d_v = 0,
+//     e = (J_q - h J_d W^{-1} K) dq + h J_d dw                                                                      (d)
+//     dq+ = e - h J_d W^{-1} J^T A^{-1} J' e,     dw' = dw - W^{-1} K dq - W^{-1} J^T A^{-1} J' e                   (e)
+//     dy+ = (W N')^T dq+,   dy_v+ = (W N')^T dw' - S dy+,   mu = J'^{+T} W w'                                       (f)
+// S appears because the projection of w' turns with q+. Nothing of the size of J needs to be inverted: (W N')^T times
+// the oblique projection of (e) vanishes on J_d W^{-1} J^T, so that P = J_d^{-T} W N reads it. With
+// P' = J_d^{-T} W N', X = (P^T N')^{-1}, X' = P'^T N' X, E = P^T J_q N - h N^T K N, and
+// (W N)^T Z = (W N)^T d_y = (W N)^T d_v = 0,
 //     dy+   = X E dy + h X dy_v + h^2 X dy'
-//     dy_v+ = (X' E - P'^T J_q N) / h dy + X' dy_v + h X' dy' - S dy+                                                 (g)
+//     dy_v+ = (X' E - P'^T J_q N) / h dy + X' dy_v + h X' dy' - S dy+                                               (g)
 // With a gap, the result is read about the node state's own basis (cluster_gap.h).
 //
-// All of it runs in lanes, one node alone too: what comes out of a lane does not depend on the others, and so results do not
-// depend on which nodes come together. Only what has other sizes at every node (costs, F^T) is done node by node.
+// All of it runs in lanes, even for a single node: the result of a lane does not depend on the others, so that results
+// do not depend on batching. Only data whose sizes vary from node to node (costs, F^T) are processed node by node.
 #include "dynamics/reduced_tree.h"
 #include "ocp/reduced/cluster_gap.h"
 #include "ocp/reduced/lane_transfer.h"
@@ -43,10 +44,10 @@ struct ClusterLanes {
   ClusterStateOf<Lanes> next;          // at q+
   VectorX<Lanes> v_next;               // n, v+
   VectorX<Lanes> drift, a, d, target;  // rank; n: a_d, then a; n; r
-  VectorX<Lanes> left, forces, rows;   // n; rank and m: what the closures balance, and the forces that do
+  VectorX<Lanes> left, forces, rows;   // n; rank and m: load on the closures, and their forces
   MatrixX<Lanes> mixed;                // r x r
   std::vector<LogicOf<Lanes>::Index> pivots;
-  // Of derivatives, names as in the equations
+  // Derivatives, named as in the equations
   WorkspaceOf<Lanes> own;                // of the cluster's model at q+
   ClusterMotionOf<Lanes> ahead;          // at q+, in the cluster
   MatrixX<Lanes> KN, KnNn, JqN, P, Pn;   // n x r
@@ -85,7 +86,7 @@ struct ContactLanes {
   }
 };
 
-// What the kernel leaves for one node: what its residuals look at, and its derivatives in sizes that all nodes have.
+// Output of the kernel for one node: the data that residuals read, and derivatives in sizes common to all nodes.
 struct LaneView {
   LaneView(const Model& model, const Reduction& reduction, const ReducedTreeOf<Lanes>& tree,
            const ReducedLayout& layout);
@@ -103,8 +104,8 @@ struct LaneView {
   StateCostModel state_cost;
 };
 
-// Memory of one thread. Every function takes at most kLane items, and leaves nothing behind but what it writes to them and to
-// the views, one per item.
+// Memory of one thread. Every function takes at most kLane items. Its only output is in these items and in the views,
+// one per item.
 class ReducedKernel {
  public:
   ReducedKernel(const Model& model, const Reduction& reduction, const ReducedLayout& layout);
@@ -115,8 +116,8 @@ class ReducedKernel {
     const ReducedEvaluation* previous;  // whose q+ is the state, or null
     ReducedEvaluation* at;              // with x and u
   };
-  // Steps: fills `at` but for costs, sets the status of those that went through to Ok, and tells the others why not. Of the views:
-  // what residuals look at.
+  // Steps: fills `at` except for costs, sets the status of those that succeeded to Ok and the reason why others failed.
+  // In the views it fills the data that residuals read.
   void step(const StepItem* items, int count, std::vector<LaneView>& views);
   // The same for states alone, at impacts and the terminal node.
   void place(const StepItem* items, int count, std::vector<LaneView>& views);
@@ -125,13 +126,13 @@ class ReducedKernel {
     int node;
     const StageSpec* spec;
     const ReducedEvaluation* at;
-    const ReducedEvaluation* next;  // at the node state behind it; not read by linearizeStates()
+    const ReducedEvaluation* next;  // at the next node state; not read by linearizeStates()
     bool ok;                        // out
     std::string* failure;           // out, where it is not
   };
   // Derivatives of steps, all of the views.
   void linearizeSteps(LinearizeItem* items, int count, std::vector<LaneView>& views);
-  // Of states alone: what residuals look at, Z and the state cost.
+  // The same for states alone: the data that residuals read, Z and the state cost.
   void linearizeStates(LinearizeItem* items, int count, std::vector<LaneView>& views);
 
   void integrate(const IntegrateTask* tasks, int count);
@@ -140,7 +141,7 @@ class ReducedKernel {
   const ReducedTreeOf<Lanes>& tree() const { return tree_; }
 
  private:
-  // reduced_transfer.cpp: numbers between nodes and lanes
+  // reduced_transfer.cpp: copies numbers between nodes and lanes
   void loadState(LaneSource<const ReducedEvaluation> nodes);
   void loadBases(LaneSource<const ReducedEvaluation> nodes);
   void loadPoints(const StepItem* items, int count);

@@ -1,4 +1,4 @@
-// What the kernel reads from nodes and writes to them.
+// Copies data between the nodes and the kernel's lanes.
 #include <algorithm>
 
 #include "ocp/reduced/reduced_kernel.h"
@@ -77,8 +77,8 @@ void ReducedKernel::loadBases(LaneSource<const ReducedEvaluation> nodes) {
   }
 }
 
-// Bases and, as seen from the body that carries the cluster, placements: those of the q+ that a state is, where there is one,
-// or else those that placeAll() has left in the place of q+.
+// Bases and, as seen from the body that carries the cluster, placements: those of the q+ that a state is, where there
+// is one, or else those that placeAll() has left in the place of q+.
 void ReducedKernel::loadPoints(const StepItem* items, int count) {
   for (size_t i = 0; i < clusters_.size(); ++i) {
     ClusterLanes& c = clusters_[i];
@@ -154,8 +154,8 @@ void ReducedKernel::loadContact(int lane, const ContactLayout::Contact& contact,
   }
 }
 
-// References and weights of the state costs, unless they are there from the last call. False when no node has one; nodes
-// without one get weights of zero.
+// References and weights of the state costs, unless they are there from the last call. False when no node has one;
+// nodes without one get weights of zero.
 bool ReducedKernel::loadStateCosts(const int* indices, const StageSpec* const* specs, int count) {
   std::array<int, kLane> wanted;
   std::array<const StateCost*, kLane> costs;
@@ -181,7 +181,7 @@ bool ReducedKernel::loadStateCosts(const int* indices, const StageSpec* const* s
   return true;
 }
 
-// What a step has found out.
+// Results of a step that was evaluated before.
 void ReducedKernel::loadStep(LaneSource<const ReducedEvaluation> nodes) {
   const int count = nodes.count;
   gatherLanes(count, a_.size(), a_.data(), [&](int l) { return nodes[l].a.data(); });
