@@ -1,5 +1,5 @@
 #pragma once
-/// \file What a program needs that reads a robot, makes a motion, solves it and writes what came out.
+/// \file Everything a program needs to read a robot, make a motion, solve it and write the result.
 #include "bielle/io/result.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/jump.h"

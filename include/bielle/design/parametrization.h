@@ -1,5 +1,6 @@
 #pragma once
-/// \file A robot as a function of named, bounded numbers: parameters of a generator, or lengths and shifts of a given robot.
+/// \file A robot as a function of named, bounded numbers: parameters of a generator, or lengths and shifts of a given
+/// robot.
 #include <string>
 #include <vector>
 
@@ -7,10 +8,10 @@
 
 namespace bielle {
 
-/// The distance of two places of one body (draft.h names them), `to` moving along the line.
+/// The distance between two places of one body (named as in src/design/draft.h); `to` moves along the line.
 struct LengthChange {
   std::string from, to;
-  Vector3d across = Vector3d::Zero();  ///< unit vector, in the body: only what is perpendicular to it counts; zero: all
+  Vector3d across = Vector3d::Zero();  ///< unit vector in the body: only the part perpendicular to it counts; zero: all
   std::string stretched;               ///< link whose mass, inertia and drawing grow with the length, or empty
 };
 
@@ -20,8 +21,8 @@ struct ShiftChange {
   Vector3d along = Vector3d::UnitX();  ///< unit vector
 };
 
-/// One number. Of several lengths the first one is the value and the others change by as much (left and right legs,
-/// which need not be equal to the last digit); shifts are all by the value, from where the robot has the place.
+/// One number. With several lengths, the first one is the value and the others change by the same amount (left and
+/// right legs, which need not be equal to the last digit); all shifts are by the value, relative to the given robot.
 struct DesignVariable {
   std::string name, unit = "m";
   double lower = 0, upper = 0;
@@ -30,14 +31,14 @@ struct DesignVariable {
   std::vector<ShiftChange> shifts;
 };
 
-/// Makes robots from numbers, fast and without files; names and orders are those of the start.
+/// Makes robots from numbers, fast and without files; names and orders are those of the initial model.
 class Parametrization {
  public:
   /// A given robot.
-  /// \param source  named by errors, the file the variables are from
-  /// \throws ModelError for unknown names, places of different bodies, bounds that are crossed or leave the robot out
+  /// \param source  file that defines the variables, named in errors
+  /// \throws ModelError for unknown names, places on different bodies, bounds that cross or exclude the given robot
   Parametrization(Model model, std::vector<DesignVariable> variables, std::string source = "");
-  /// A generated one, other parameters of the generator being set to what is given.
+  /// A generated robot; `settings` are the values of other parameters of the generator.
   Parametrization(const std::string& generator, std::vector<std::pair<std::string, double>> settings,
                   std::vector<DesignVariable> variables, std::string source = "");
 
@@ -47,7 +48,7 @@ class Parametrization {
   const VectorXd& upper() const { return upper_; }
   const Model& startModel() const { return model_; }
 
-  /// Changes of given robots are made in the order of the variables.
+  /// A given robot is changed in the order of the variables.
   /// \throws ModelError when the numbers do not define a robot
   Model make(const VectorXd& x) const;
 
@@ -62,10 +63,10 @@ class Parametrization {
   VectorXd start_, lower_, upper_;
 };
 
-/// How the model changes with every variable at x. Placements, inertias and armatures are smooth functions of the
-/// numbers, polynomials of at most the third degree for lengths and shifts; they are differenced by the five-point rule
-/// over a thousandth of the bounds, which is exact for polynomials up to the fourth degree.
-/// \throws ModelError when a variable changes what is no placement, inertia or armature (an axis, a gain)
+/// Derivative of the model with respect to every variable at x. Placements, inertias and armatures are smooth functions
+/// of the numbers, polynomials of at most the third degree for lengths and shifts; they are differenced by the
+/// five-point rule over a thousandth of the bounds, which is exact for polynomials up to the fourth degree.
+/// \throws ModelError when a variable changes anything but placements, inertias and armatures (an axis, a gain)
 std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x);
 
 }  // namespace bielle

@@ -1,8 +1,8 @@
 #pragma once
 /// \file Minimization within bounds by NLopt: a global algorithm, then a local one, with gradients where they exist.
 ///
-/// Local algorithms with gradients minimize a sum of terms, each the largest of smooth pieces p_ij(x). An additional variable
-/// t_i for every term of several pieces removes the kinks,
+/// Local algorithms with gradients minimize a sum of terms, each the largest of smooth pieces p_ij(x). An additional
+/// variable t_i for every term of several pieces removes the kinks,
 ///     min_{x, t} sum_i t_i    s.t.  p_ij(x) <= t_i,  g_k(x) <= 0    (a term of one piece is added as it is)        (1)
 #include <functional>
 #include <vector>
@@ -25,10 +25,10 @@ bool needsGradient(SearchAlgorithm algorithm);
 struct SearchStage {
   SearchAlgorithm algorithm = SearchAlgorithm::Crs;
   int evaluations = 100;    ///< at most, plus the few that an algorithm makes in one batch
-  double tolerance = 1e-3;  ///< done when steps are below, as a share of the width of the bounds
+  double tolerance = 1e-3;  ///< done when steps are smaller, relative to the width of the bounds
 };
 
-/// Smooth pieces, of which the largest counts, and how they change.
+/// Smooth pieces, of which the largest counts, and their gradients.
 struct MeasurePieces {
   VectorXd values;     ///< p
   MatrixXd gradients;  ///< pieces x variables
@@ -36,8 +36,8 @@ struct MeasurePieces {
 
 struct SlopedValue {
   double value = 0;                  ///< finite
-  std::vector<MeasurePieces> terms;  ///< p_ij, always as many, of as many pieces; none where x is infeasible
-  MeasurePieces limits;              ///< g_k, which may be violated a little where there are terms
+  std::vector<MeasurePieces> terms;  ///< p_ij, in numbers that do not depend on x; none where x is infeasible
+  MeasurePieces limits;              ///< g_k, which may be slightly violated where there are terms
 };
 
 struct SearchProblem {
@@ -52,7 +52,7 @@ struct SearchResult {
   int evaluations = 0;
 };
 
-/// Each stage starts from the best point so far, the first one from the start. One with gradients is passed over where
+/// Each stage starts from the best point so far, the first one from the start. A stage with gradients is skipped if
 /// that point is infeasible, and steps back from infeasible points as from worse ones. The same seed gives the same
 /// points, in any thread. Exceptions of the objective propagate.
 SearchResult minimizeByStages(const SearchProblem& problem, const std::vector<SearchStage>& stages, unsigned seed);

@@ -1,12 +1,12 @@
 #pragma once
 /// \file Closing a configuration: find q on all closures that also meets given targets.
 ///
-/// Hard conditions h(q) = 0 (closures, frame targets) and a soft wish (stay near preferred joint values) are met by
-/// Newton steps in the tangent space: with H = dh/dq and N a basis of its null space,
+/// Hard conditions h(q) = 0 (closures, frame targets) and a soft preference for given joint values are met by Newton
+/// steps in the tangent space: with H = dh/dq and N a basis of its null space,
 ///     dq = H^+ (-h) + N z,    z = argmin || W (dq - d) ||,    d = q_ref (-) q, (1)
 /// H^+ truncates small singular values and is damped far from the solution; steps are clamped, and halved while |h|
-/// grows. The wish fades after some iterations: far from what the conditions allow, it can make the iterates circle.
-/// When all this stalls, the conditions are approached by continuation: h(q) = (1 - t) h(q_0), t from 0 to 1.
+/// grows. The preference fades after some iterations: if the conditions keep q far from q_ref, it can make the iterates
+/// cycle. If this stalls, the conditions are approached by continuation: h(q) = (1 - t) h(q_0), t from 0 to 1.
 #include <string>
 #include <vector>
 
@@ -25,13 +25,13 @@ struct FrameTarget {
 
 struct AssemblyProblem {
   VectorXd q_ref;    ///< nq, start and preferred configuration
-  VectorXd weights;  ///< nv, of the wish to stay near q_ref; empty: all one
+  VectorXd weights;  ///< nv, of the preference for q_ref; empty: all one
   std::vector<FrameTarget> frames;
 };
 
 enum class AssemblyStep {
   Wishful,  ///< Eq. (1), by a singular value decomposition
-  Shortest  ///< z = 0: the least change from step to step, by a complete orthogonal decomposition, many times cheaper
+  Shortest  ///< z = 0: the least change per step, by a complete orthogonal decomposition, many times cheaper
 };
 
 struct AssemblyOptions {
@@ -40,9 +40,9 @@ struct AssemblyOptions {
   double step_limit = 0.2;   ///< largest change of a coordinate per step, m or rad
   int max_iterations = 200;  ///< per continuation step
   int continuation_steps = 20;
-  /// Singular values of H below this, relative to the largest, count as zero. Above the square root of rounding, at which a
-  /// residual of second order in a step can tell a direction; a tenth of kRankTolerance (reduction.h), so that a linkage
-  /// which counts as movable can be moved.
+  /// Singular values of H below this, relative to the largest, count as zero. It is above the square root of rounding,
+  /// where second-order residuals would be taken for directions, and a tenth of kRankTolerance (reduction.h), so that a
+  /// linkage that counts as movable can be moved.
   double rank_tolerance = 1e-7;
 };
 
@@ -59,14 +59,14 @@ struct AssemblyResult {
 
 AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, const AssemblyOptions& options = {});
 
-/// Nearest closed configuration to q, no other target.
+/// Nearest closed configuration to q, without other targets.
 AssemblyResult closeConfiguration(const Model& model, ConstVectorRef q, const AssemblyOptions& options = {});
 
-/// Some closed configuration of the robot: its references, the configuration nearest to neutral, then starts ever farther
-/// from neutral (the same at every call) are tried in turn. When none closes, the attempt that came nearest.
+/// A closed configuration of the robot: its references, the configuration nearest to neutral, then starts ever farther
+/// from neutral (the same at every call) are tried in turn. If none closes, the attempt with the smallest gap.
 AssemblyResult findClosedConfiguration(const Model& model, const AssemblyOptions& options = {});
 
-/// The assembly problem of a reference of the robot's file: joint wishes, feet flat at their places, height.
+/// The assembly problem of a reference of the robot's file: preferred joint values, feet flat at their places, height.
 AssemblyProblem makeReferenceProblem(const Model& model, const Reference& reference);
 /// Assembled reference by name.
 /// \throws ModelError when there is no such reference
@@ -76,7 +76,7 @@ AssemblyResult assembleReference(const Model& model, const std::string& name, co
 VectorXd projectVelocity(const Model& model, Workspace& ws, const ConstraintSet& constraints, ConstVectorRef q,
                          ConstVectorRef v);
 
-/// Largest residual of the loops of the set at the workspace's q; the name of its closure when asked.
+/// Largest residual of the loops of the set at the workspace's q; the name of its closure goes to `worst`, if given.
 double calcLargestGap(const Workspace& ws, const ConstraintSet& constraints, std::string* worst = nullptr);
 
 }  // namespace bielle

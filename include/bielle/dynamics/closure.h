@@ -4,10 +4,10 @@
 ///
 /// With world spatial vectors, nu_c = V_1 - V_2 and a_c = A_1 - A_2 + V_1 x V_2 (the paper's eqs. 8 and 9), read in
 /// frame 1. For a dof k that moves frame 1 only (s = +1) or frame 2 only (s = -1), in the coordinates of frame 1,
-///     d a_c/dq_k  = s (dA_k - (V_1 + V_2) x dV_k + J_k x A_2 - V_1 x (J_k x V_2))                                   (1)
-///     d a_c/dv_k  = s (dJ_k + dV_k - (V_1 + V_2) x J_k)                                                             (2)
-///     d nu_c/dq_k = s (dV_k + J_k x V_2)                                                                            (3)
-///     d nu_c/dv_k = d a_c/da_k = s J_k                                                                              (4)
+///     d a_c/dq_k  = s (dA_k - (V_1 + V_2) x dV_k + J_k x A_2 - V_1 x (J_k x V_2))                                  (1)
+///     d a_c/dv_k  = s (dJ_k + dV_k - (V_1 + V_2) x J_k)                                                            (2)
+///     d nu_c/dq_k = s (dV_k + J_k x V_2)                                                                           (3)
+///     d nu_c/dv_k = d a_c/da_k = s J_k                                                                             (4)
 /// where dV, dA, dJ are those of rnea.h; a dof that moves both frames changes nothing. (1) gathers the derivatives of
 /// the paper's gamma_1, gamma_2 and gamma_3 (its eqs. 11 to 15): gamma_1 gives dA_k - V_1 x dV_k, gamma_2 gives dA_k -
 /// V_2 x dV_k and, as frame 1 turns, J_k x A_2; the rest is gamma_3.
@@ -42,22 +42,21 @@ struct ConstraintSet {
 };
 ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTarget>& contacts = {});
 
-/// Rows of a closure out of a full twist-like vector in frame 1, and the wrench in frame 1 of a row force.
+/// Selects the rows of a closure from a twist-like vector (6) in frame 1.
 template <typename T>
 VectorUpTo6<T> selectRows(const Closure& closure, const Vector6<T>& full);
+/// Wrench in frame 1 of forces on the rows.
 Vector6d expandRows(const Closure& closure, ConstVectorRef lambda);
 template <typename T>
 Vector6<T> expandRows(const Closure& closure, const VectorUpTo6<T>& lambda);
 
-/// Closing error: zero if and only if closed (a hinge turned by pi about a normal excepted: its residual is the angle
-/// pi). m and rad.
+/// Closing error, m and rad: zero if and only if closed (a hinge turned by pi about a normal has the residual pi).
 template <typename T>
 VectorUpTo6<T> calcClosureResidual(const WorkspaceOf<T>& ws, const Closure& closure);
 /// The same for the placement X_12 of frame 2 in frame 1.
 template <typename T>
 VectorUpTo6<T> calcClosureResidual(const Closure& closure, const SE3Of<T>& X_12);
-/// Matrix R (rows x 6) with d residual/dt = R nu_c for the full velocity nu_c in frame 1. Exact at open configurations
-/// too.
+/// Matrix R (rows x 6) with d residual/dt = R nu_c for the full velocity nu_c in frame 1, exact also when open.
 RowsBy6 calcClosureResidualRate(const Workspace& ws, const Closure& closure);
 /// The same for the placement X_12 of frame 2 in frame 1.
 RowsBy6 calcClosureResidualRate(const Closure& closure, const SE3& X_12);
@@ -81,20 +80,22 @@ void calcClosureJacobian(const WorkspaceOf<T>& ws, const Closure& closure, typen
 /// updateAccelerations.
 void calcClosureDerivatives(const Workspace& ws, const Closure& closure, MatrixRef da_dq, MatrixRef da_dv);
 
-/// Derivative of the velocity rows with respect to q at fixed v, Eq. (3), to the columns closure.dofs; needs updateVelocities.
+/// Derivative of the velocity rows with respect to q at fixed v, Eq. (3), to the columns closure.dofs; needs
+/// updateVelocities.
 void calcClosureVelocityDerivative(const Workspace& ws, const Closure& closure, MatrixRef dnu_dq);
 
 /// World wrench of a closure force on body 1.
 template <typename T>
 Vector6<T> calcClosureWrench(const WorkspaceOf<T>& ws, const Closure& closure,
                              typename ArgumentsOf<T>::ConstVector lambda);
-/// Adds to dID_dq what updateInverseDynamicsDerivatives leaves out: the wrench on body 2 moves with frame 1 (the
+/// Adds to dID_dq the term that updateInverseDynamicsDerivatives omits: the wrench on body 2 moves with frame 1 (the
 /// paper's eq. 19),
 ///     d ID_j/dq_k += s J_j . (J_k x* W)   for j in the support of body 2, k in closure.dofs (5)
 void addClosureForceDerivative(const Model& model, const Workspace& ws, const Closure& closure, const Vector6d& wrench,
                                MatrixRef dID_dq);
-/// Adds to out (nv x nv) the derivative of the generalized force J^T lambda with respect to q, the wrench W being fixed in frame 1:
-///     d (J^T lambda)_j/dq_k = s_j J_j . (J_k x* W) ([k moves frame 1] - [k moves the axis j]),   j, k in closure.dofs   (6)
+/// Adds to out (nv x nv) the derivative of the generalized force J^T lambda with respect to q, the wrench W being fixed
+/// in frame 1:
+///     d (J^T lambda)_j/dq_k = s_j J_j . (J_k x* W) ([k moves frame 1] - [k moves axis j]),   j, k in closure.dofs  (6)
 void addGeneralizedForceDerivative(const Model& model, const Workspace& ws, const Closure& closure,
                                    const Vector6d& wrench, MatrixRef out);
 

@@ -1,7 +1,7 @@
 #pragma once
 /// \file Forward dynamics under closures and contacts, and its derivatives (the paper's eqs. 4 to 6).
 ///
-///     M a - J^T lambda = tau - b,     J a = -gamma                                                                   (1)
+///     M a - J^T lambda = tau - b,     J a = -gamma                                                                 (1)
 ///
 /// where gamma gathers the drift and the stabilisation of the closures: the system of saddle_point.h, redundant rows
 /// included. Its derivatives take dID = d(M a + b - J^T lambda - tau)/dz and da_c = d(J a + gamma)/dz at fixed a and
@@ -14,7 +14,7 @@ namespace bielle {
 
 class SaddlePoint;
 
-/// The factorised system of Eq. (1) (src/dynamics/saddle_point.h). A copy is a system of its own.
+/// The factorised system of Eq. (1) (src/dynamics/saddle_point.h). Copies are deep.
 class SaddlePointMemory {
  public:
   SaddlePointMemory();
@@ -35,12 +35,12 @@ enum class DynamicsStatus {
   Ok,
   MassMatrixSingular,
   NotFinite,
-  /// Redundant rows ask for different accelerations: no a fulfils (1), the one at hand comes nearest.
+  /// Redundant rows require different accelerations: no a satisfies (1), and `a` is the least-squares solution.
   ContradictoryRows
 };
 const char* getMessage(DynamicsStatus status);
 
-/// Memory of one constrained solve; sized for a constraint set at first use, reused without allocation afterwards.
+/// Memory of one constrained solve; sized for a constraint set at first use and then reused without allocation.
 struct ConstrainedWorkspace {
   MatrixXd J;           ///< rows x nv
   VectorXd gamma;       ///< rows
@@ -60,8 +60,9 @@ struct ConstrainedWorkspace {
   std::vector<Vector6d> f_ext;  ///< nb
 };
 
-/// Rows contradict each other when |J a + gamma| exceeds this part of |gamma| + |J| |a|, the largest over all rows. What a
-/// loop of redundant rows may come open by in the full formulation, millimetres in tenths of a metre, leaves less.
+/// Rows contradict each other when |J a + gamma| exceeds this share of |gamma| + |J| |a|, both the largest over all
+/// rows. Loops of redundant rows that drift open in the full formulation, by millimetres in tenths of a metre, stay
+/// below it.
 constexpr double kContradiction = 0.05;
 
 /// Accelerations and forces for generalized forces tau (nv) at (q, v). Fills `ws` up to the accelerations.
@@ -82,8 +83,8 @@ struct Mobility {
   int rows = 0, rank = 0, mobility = 0;
   VectorXd singular_values;
 };
-/// \param tolerance singular values below it times the largest count as zero: as kRankTolerance of reduction.h, since both
-///     answer how a mechanism can move. Steps of assembly.h, which must not be stopped by a weak direction, take a smaller one.
+/// \param tolerance singular values below it times the largest count as zero. It equals kRankTolerance of reduction.h,
+///     since both decide how a mechanism can move; assembly.h, which must still move along weak directions, uses less.
 Mobility calcMobility(const Model& model, ConstVectorRef q, double tolerance = 1e-6);
 
 }  // namespace bielle

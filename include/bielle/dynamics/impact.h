@@ -1,18 +1,18 @@
 #pragma once
-/// \file Rigid impact: a foot that lands takes its place at once, without bouncing.
+/// \file Rigid impact: a foot lands and stops instantly, without bouncing.
 ///
-/// In no time, forces are impulses Lambda and the configuration stays; what was the velocity v becomes v+ with
-///     M (v+ - v) = J^T Lambda,     J v+ = 0                                                                          (1)
+/// Forces are impulses Lambda and the configuration stays; the velocity v becomes v+ with
+///     M (v+ - v) = J^T Lambda,     J v+ = 0                                                                        (1)
 /// J being the rows of all closures and of the contacts in force afterwards: the system of saddle_point.h with f = M v,
 /// g = 0. Its derivatives take, at fixed v+ and Lambda,
-///     dID = d(M (v+ - v) - J^T Lambda)/dq dq - M dv,     dc = d(J v+)/dq dq                                          (2)
-/// the first by inverse dynamics at rest under the accelerations v+ - v, less what gravity puts there. The energy lost
-/// is that of the change, 1/2 (v+ - v)^T M (v+ - v).
+///     dID = d(M (v+ - v) - J^T Lambda)/dq dq - M dv,     dc = d(J v+)/dq dq                                        (2)
+/// the first by inverse dynamics at rest under the accelerations v+ - v, less the terms of gravity. The energy lost is
+/// that of the change, 1/2 (v+ - v)^T M (v+ - v).
 #include "bielle/dynamics/constrained.h"
 
 namespace bielle {
 
-/// Memory of one impact; sized at first use, reused without allocation afterwards.
+/// Memory of one impact; sized at first use and then reused without allocation.
 struct ImpactWorkspace {
   explicit ImpactWorkspace(const Model& model);
 
@@ -29,7 +29,7 @@ struct ImpactWorkspace {
   std::vector<Vector6d> f_ext;      ///< nb
 };
 
-/// Eq. (1) at (q, v) for a constraint set, whose stabilisation plays no part.
+/// Eq. (1) at (q, v) for a constraint set, whose stabilisation is ignored.
 DynamicsStatus updateImpact(const Model& model, ImpactWorkspace& iws, const ConstraintSet& constraints,
                             ConstVectorRef q, ConstVectorRef v);
 

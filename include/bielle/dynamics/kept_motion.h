@@ -1,25 +1,25 @@
 #pragma once
-/// \file Closing to first order, and the inverse problem of a closed mechanism: the torques of a motion that some of
-/// its coordinates give; and how both change with the mechanism (variation.h).
+/// \file First-order closing, and inverse dynamics of a closed mechanism whose motion is given by some of its
+/// coordinates; and the derivatives of both with respect to the mechanism (variation.h).
 ///
-/// **Closing.** Some dofs are held (row selector P), closures with Jacobian J shall stay closed. With H = [J; P] and
+/// **Closing.** Some dofs are held (row selector P), closures with Jacobian J must stay closed. With H = [J; P] and
 /// H^+ its pseudo-inverse,
 ///     v = H^+ (0, v_P),    a = H^+ (-gamma, a_P),    T = H^+ (0, 1)                                                (1)
-/// are velocities, accelerations and tangent of held dofs that move in a given way, and with r_s, nu_s, a_s the changes
-/// of residuals, velocities and accelerations at fixed q, v, a, as Eqs. (7) and (8) of variation.h give them,
+/// are velocities, accelerations and tangent for a given motion of the held dofs. With r_s, nu_s, a_s the changes of
+/// residuals, velocities and accelerations at fixed q, v, a, by Eqs. (7) and (8) of variation.h,
 ///     dq = H^+ (r_s, 0),    dv = -H^+ (nu_s(dq), 0),    da = -H^+ (a_s(dq, dv), 0)                                 (2)
-/// is how everything else moves when the mechanism changes (the residual moves with -J: notation.h). Where the held
-/// dofs leave freedom this is the least motion. A change that no motion can make up for, such as a longer rod when
-/// everything else is held, leaves a gap in (2).
+/// is how everything else moves when the mechanism changes (the residual moves with -J: notation.h). If the held dofs
+/// do not determine the others, this is the least motion. A change that no motion can compensate, such as a longer rod
+/// when everything else is held, leaves a gap in (2).
 ///
-/// **Inverse problem.** The kept dofs determine the loops, their motion is given, and so are forces lambda* of the
-/// contacts. Motors and contacts have to balance
+/// **Inverse problem.** The kept dofs determine the loops; their motion and contact forces lambda* are given. Motors
+/// and contacts must balance
 ///     T^T (M a + b) = T^T B u + T^T J_f^T lambda_f = A u + F lambda_f                                              (3)
 /// with the contact forces nearest to lambda* (in double support they are not determined). With multipliers mu,
 ///     [0 0 A^T; 0 -1 F^T; A F 0] (u, lambda_f, mu) = (0, -lambda*, T^T (M a + b))                                  (4)
-/// m = T mu is a velocity that keeps loops closed and motors still. Eq. (4) says J_l m = 0, B^T m = 0, lambda_f -
-/// lambda* = J_f m, whose derivatives, with e = d(J m) at fixed m (velocity changes, Eq. (7) of variation.h at v = m),
-/// n = -H^+ (e_l, 0) and dID = d(M a + b - J^T lambda) at fixed forces, are the same matrix times
+/// m = T mu is a velocity that keeps loops closed and motors still. Eq. (4) reads J_l m = 0, B^T m = 0,
+/// lambda_f - lambda* = J_f m. With e = d(J m) at fixed m (velocity changes, Eq. (7) of variation.h at v = m),
+/// n = -H^+ (e_l, 0) and dID = d(M a + b - J^T lambda) at fixed forces, its derivative is the same matrix times
 ///     (du, dlambda_f, dmu) = (-B^T n, -(e_f + J_f n), T^T dID).                                                    (5)
 /// Forces of the loops: J_l^T lambda_l = M a + b - B u - J_f^T lambda_f, redundant ones with least norm.
 #include <Eigen/QR>
@@ -32,7 +32,7 @@ namespace bielle {
 /// H of Eq. (1) at a configuration.
 class Closing {
  public:
-  /// \param closures  those that shall stay closed; feet too where they are among them   \param held  dofs
+  /// \param closures  those that must stay closed, feet included if they are among them   \param held  dofs
   /// Needs updatePositions, at a closed configuration.
   Closing(const Model& model, const Workspace& ws, const ConstraintSet& closures, std::vector<int> held);
 
@@ -44,8 +44,8 @@ class Closing {
   /// Whether nothing can move while the held dofs stand still.
   bool isDetermined() const { return decomposition_.rank() == H_.cols(); }
 
-  /// Eq. (2); needs updateAccelerations. Returns the gap: the largest change that is not made up for, of residuals (m,
-  /// rad) per unit of the change.
+  /// Eq. (2); needs updateAccelerations. Returns the gap: the largest change of residuals (m, rad) that remains, per
+  /// unit of the change.
   double calcMotion(const Model& model, const Workspace& ws, const ModelVariation& change,
                     MotionVariation& motion) const;
 
@@ -59,8 +59,8 @@ class Closing {
 enum class KeptMotionStatus {
   Ok,
   Undetermined,  ///< the kept dofs do not determine the loops: a dead point
-  Unbalanced,    ///< motors and contacts cannot give this motion, or motors are not independent
-  Open           ///< the change opens loops that have more rows than they need
+  Unbalanced,    ///< motors and contacts cannot produce this motion, or motors are not independent
+  Open           ///< the change opens loops with redundant rows
 };
 const char* getMessage(KeptMotionStatus status);
 
@@ -79,14 +79,14 @@ class KeptMotion {
   const VectorXd& u() const { return u_; }            ///< nu
   const VectorXd& lambda() const { return lambda_; }  ///< rows of the constraints
 
-  /// What changes with the model while the motion of the kept dofs and lambda* stay.
+  /// Changes with the model at fixed motion of the kept dofs and fixed lambda*.
   struct Variation {
     explicit Variation(const Model& model) : motion(model) {}
     MotionVariation motion;
     VectorXd u, lambda;
   };
   const MatrixXd& tangent() const { return T_; }  ///< T (nv x kept)
-  /// After an update() that was Ok. Open or Unbalanced where the changed mechanism could not make the motion.
+  /// Needs an update() that was Ok. Open or Unbalanced if the changed mechanism could not perform the motion.
   KeptMotionStatus calcVariation(const ModelVariation& change, Variation& out);
   /// Change (nv) of T w for speeds w of the kept dofs, dq being that of the motion: Eq. (2) at v = T w.
   VectorXd calcTangentVariation(const ModelVariation& change, const MotionVariation& motion, ConstVectorRef w);

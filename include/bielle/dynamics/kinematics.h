@@ -11,7 +11,7 @@ void updatePositions(const Model& model, Workspace& ws, ConstVectorRef q);
 template <typename T>
 void updatePlacements(const Model& model, WorkspaceOf<T>& ws, typename ArgumentsOf<T>::ConstVector q);
 
-/// Jacobian columns and inertias at the placements of the workspace: what updatePositions adds to updatePlacements.
+/// Jacobian columns and inertias at the placements of the workspace; with updatePlacements it makes up updatePositions.
 template <typename T>
 void updateColumns(const Model& model, WorkspaceOf<T>& ws);
 

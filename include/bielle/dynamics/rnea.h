@@ -4,9 +4,9 @@
 /// (universal joint).
 ///
 /// Everything is written in world coordinates about the world origin. For a dof k, let w-_k, a-_k be the velocity and
-/// acceleration of what its coordinate leaves still (the parent body; for the second axis of a universal joint, the
-/// parent plus the first axis) and w_k the velocity of what carries its axis (the child body; for a universal joint,
-/// w_k = w-_k):
+/// acceleration of the side that its coordinate does not move (the parent body; for the second axis of a universal
+/// joint, the parent plus the first axis) and w_k the velocity of the side that carries its axis (the child body; for a
+/// universal joint, w_k = w-_k):
 ///     V_i = sum_{k <= i} J_k v_k,    dJ_k/dt = w_k x J_k,    A_i = -g + sum_{k <= i} (J_k a_k + dJ_k v_k)         (1)
 /// A change of q_k moves everything after it rigidly by J_k. In the coordinates of body i, which hide that motion,
 ///     dV_i/dq_k = dV_k,                dV_k = w-_k x J_k                                                          (2)
@@ -21,11 +21,10 @@
 ///     dtau_j/dq_k = J_j . (Yc_k dA_k + Bc_k dV_k + J_k x* F_k)     k after j                                      (8)
 ///     dtau_j/dv_k = J_j . (Yc_m (dJ_k + dV_k) + Bc_m J_k)          m the later of j and k                         (9)
 ///     M_jk = J_j . Yc_m J_k                                                                                      (10)
-/// With Y = (m 1, -m c^; m c^, I) and the momentum (p, l) = Y V about the world origin, hats for cross products, most of B
-/// cancels:
+/// With Y = (m 1, -m c^; m c^, I) and the momentum (p, l) = Y V about the world origin, hats for cross products, most
+/// of B cancels:
 ///     B = (0, -2 p^; 0, B_a),    B_a = w^ I - I w^ - m (c v^T + v c^T) + 2 m (c.v) 1 - l^                         (11)
-/// External forces f_ext are given as fixed in their body's coordinates; what depends otherwise on q is added by the
-/// caller.
+/// External forces f_ext are taken as fixed in their body's coordinates; the caller adds any other dependence on q.
 #include "bielle/dynamics/workspace.h"
 
 namespace bielle {
@@ -44,7 +43,7 @@ void updateBias(const Model& model, Workspace& ws);
 template <typename T>
 void updateDrift(const Model& model, WorkspaceOf<T>& ws);
 
-/// M a + b(q, v) in the field b, and the accelerations that go with a (nv); needs updateVelocities.
+/// M a + b(q, v) in the field b, and the accelerations for a (nv); needs updateVelocities.
 template <typename T>
 void updateInverseDynamics(const Model& model, WorkspaceOf<T>& ws, typename ArgumentsOf<T>::ConstVector a);
 
@@ -62,7 +61,8 @@ void updateInverseDynamicsFactors(const Model& model, WorkspaceOf<T>& ws,
 /// the workspace; needs updateAccelerations. Arguments as above.
 void updateInverseDynamicsDerivatives(const Model& model, Workspace& ws, const std::vector<Vector6d>& f_ext);
 
-/// Entry (j, k) of the derivatives with respect to q and v, for dofs of one path to the root (or one joint), from the factors.
+/// Entry (j, k) of the derivatives with respect to q and v, for dofs of one path to the root (or one joint), from the
+/// factors.
 template <typename T>
 struct DerivativeEntry {
   T q, v;

@@ -1,8 +1,8 @@
 #pragma once
-/// \file How dynamics change, to first order, when the mechanism itself does: its lengths, where its closures are
-/// attached, its inertias; and its motion with it.
+/// \file First-order change of the dynamics with the mechanism (its lengths, attachments of closures, inertias) and
+/// its motion.
 ///
-/// A direction is a change of the model and one of its motion. Forward through the tree, in world coordinates, with D_i
+/// A direction is a change of the model and of its motion. Forward through the tree, in world coordinates, with D_i
 /// the displacement of body i (a twist), D_0 = 0, p its parent and X_WJ the placement of the joint's frame in the
 /// world:
 ///     D_i   = D_p + X_WJ xi_i + sum_k J_k dq_k                                                                     (1)
@@ -10,23 +10,23 @@
 ///     dV_i  = dV_p + sum_k (J_k dv_k + dJ_k v_k)                                                                   (3)
 ///     dA_i  = dA_p + sum_k (J_k da_k + dJ_k a_k + (w_k x J_k) dv_k + (dw_k x J_k + w_k x dJ_k) v_k)                (4)
 /// where xi_i is the twist by which the joint's frame moves in the body that carries it, k runs over the dofs of joint
-/// i, and D, w_k, dw_k are displacement, velocity and its change of what carries axis k: body i, or for the axes of a
-/// universal joint what stands before them. So the placement of a joint counts as the coordinate of a joint that stands
-/// still in front of it. The forces Y A + V x* Y V follow with
+/// i, and D, w_k, dw_k are the displacement, the velocity and its change on the side that carries axis k: body i, or
+/// for a universal joint the side before the axis. So the placement of a joint acts like the coordinate of a joint in
+/// front of it that does not move. The forces Y A + V x* Y V follow with
 ///     dY = [D x*] Y - Y [D x] + X_WB (dY in the body) X_WB^*                                                       (5)
 /// and a closure force, fixed in frame 1, turns with it: with D_1 = D_b1 + X_W1 xi_1 (D_2 likewise),
 ///     dW = D_1 x* W,    dtau_k = dJ_k . F + J_k . dF                                                               (6)
-/// F being the sums over subtrees. For the closures themselves, read in frame 1 (notation.h),
+/// F being the sums over subtrees. For the closures, in frame 1 (notation.h),
 ///     d residual = R (D_1 - D_2),    d nu_c = dV_1 - dV_2 - D_1 x (V_1 - V_2)                                      (7)
 ///     d a_c = dA_1 - dA_2 + dV_1 x V_2 + V_1 x dV_2 - D_1 x (A_1 - A_2 + V_1 x V_2)                                (8)
-/// Forward dynamics change by Eq. (4) of saddle_point.h. Where rows are redundant, that holds for changes that leave
-/// them so: any other one would change the rank.
+/// Forward dynamics change by Eq. (5) of saddle_point.h. With redundant rows, this holds for changes that keep them
+/// redundant: any other change would alter the rank.
 #include "bielle/dynamics/constrained.h"
 
 namespace bielle {
 
-/// A direction in which a model changes, per unit of some length or number. Twists are those of a frame in its own
-/// coordinates: X exp6(t twist). Zero when made.
+/// A direction in which a model changes, per unit of a length or number. Twists are those of a frame in its own
+/// coordinates: X exp6(t twist). Initially zero.
 struct ModelVariation {
   explicit ModelVariation(const Model& model);
 
@@ -38,13 +38,13 @@ struct ModelVariation {
   VectorXd armature;               ///< nv
 };
 
-/// Changes of configuration (tangent), velocity and acceleration, nv each. Zero when made.
+/// Changes of configuration (tangent), velocity and acceleration, nv each. Initially zero.
 struct MotionVariation {
   explicit MotionVariation(const Model& model);
   VectorXd q, v, a;
 };
 
-/// Eqs. (1) to (4) for one direction, and memory of what follows.
+/// Eqs. (1) to (4) for one direction, and memory for Eqs. (5) to (8).
 struct VariationWorkspace {
   explicit VariationWorkspace(const Model& model);
   std::vector<Vector6d> D, dV, dA;  ///< nb, displacements, and changes of V and A in the world
@@ -73,7 +73,7 @@ VectorXd calcAccelerationVariation(const Workspace& ws, const ConstraintSet& con
 /// Accelerations and forces of forward dynamics, one column per direction.
 struct DynamicsVariation {
   MatrixXd a;       ///< nv x directions
-  MatrixXd lambda;  ///< rows x directions; with redundant rows right up to the null space of J^T
+  MatrixXd lambda;  ///< rows x directions; with redundant rows determined up to the null space of J^T
 };
 
 /// Changes at fixed torques and, where `motions` is empty, at fixed (q, v); else motions[i].q and .v go with

@@ -8,7 +8,7 @@ namespace bielle {
 
 /// How far a workspace has been filled for the present (q, v, a). Each update* function sets its stage, and a function
 /// that needs an earlier stage calls requireStage(), which throws std::logic_error naming the missing call.
-/// Bodies: X_WB, V and hc are there, but not the columns that belong to them (J, dJ, dV, ..) and what follows from those.
+/// Bodies: X_WB, V and hc are filled, but not the columns (J, dJ, dV, ..) or anything that follows from them.
 enum class WorkspaceStage { Empty, Placement, Bodies, Position, Velocity, Acceleration };
 
 /// T is double, or Lanes for several nodes at once (inside the library).
@@ -26,8 +26,8 @@ struct WorkspaceOf {
   Matrix6X<T> J;               ///< 6 x nv, twist per unit of each velocity coordinate
   std::vector<Matrix6<T>> Y;   ///< nb, spatial inertias
 
-  // Writer: updateVelocities. Per dof k, w_k is the velocity of what carries its axis and w-_k that of what its
-  // coordinate leaves still; they differ for spherical, planar and free-flyer joints only (see rnea.h).
+  // Writer: updateVelocities. For dof k, w_k is the velocity of the side that carries its axis and w-_k that of the
+  // side that its coordinate does not move (rnea.h); dJ and dV differ for spherical, planar and free-flyer joints only.
   VectorX<T> v;                ///< nv
   std::vector<Vector6<T>> V;   ///< nb, body velocities
   Matrix6X<T> w_minus;         ///< 6 x nv
@@ -58,7 +58,7 @@ using Workspace = WorkspaceOf<double>;
 /// Throws std::logic_error naming `call` unless the workspace has reached the stage.
 template <typename T>
 void requireStage(const WorkspaceOf<T>& ws, WorkspaceStage stage, const char* function, const char* call);
-/// The same for functions that look at the velocities of bodies alone: Bodies, or Velocity and later.
+/// The same for functions that read only the velocities of bodies: Bodies, or Velocity and later.
 void requireBodyVelocities(const Workspace& ws, const char* function);
 
 }  // namespace bielle

@@ -1,7 +1,8 @@
 #pragma once
 /// \file Names of coordinates and wrench entries, the same in every file and report.
 ///
-/// A joint with one coordinate gives its own name; the others append (q | v, in the order of notation.h):
+/// A coordinate of a joint with one coordinate has the joint's name; other joints append (q | v, ordered as in
+/// notation.h):
 /// | joint      | q                      | v                 |
 /// |------------|------------------------|-------------------|
 /// | spherical  | .qx .qy .qz .qw        | .wx .wy .wz       |
@@ -26,7 +27,7 @@ constexpr std::array<const char*, 6> kWrenchEntries = {"fx", "fy", "fz", "nx", "
 /// name.fx, ..., name.nz for every name.
 std::vector<std::string> makeWrenchNames(const std::vector<std::string>& names);
 
-/// Index of the name: a column of a record. \throws ModelError when it is absent
+/// Index of the name, i.e. a column of a record. \throws ModelError when it is absent
 int findColumn(const std::vector<std::string>& names, const std::string& name);
 
 /// The names of a list of named things.

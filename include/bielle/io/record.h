@@ -1,5 +1,5 @@
 #pragma once
-/// \file A solved motion as numbers: what happens at every node, column by named column.
+/// \file A solved motion as numbers: the values at every node, in named columns.
 #include <string>
 #include <vector>
 
@@ -9,8 +9,9 @@ namespace bielle {
 
 using RowMatrixXd = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// N stages, N + 1 nodes; one row per node or, for what a stage does from its node to the next, one row per stage.
-/// An impact is a stage that takes no time: two rows of equal time, between them no acceleration and no forces. SI units, orders and frames of notation.h. Numbers of a stage whose dynamics could not be computed are NaN.
+/// N stages, N + 1 nodes; one row per node or, for quantities of a stage (from its node to the next), one row per
+/// stage. An impact is a stage that takes no time: two rows of equal time, with no acceleration and no forces between
+/// them. SI units, orders and frames of notation.h. Numbers of a stage whose dynamics could not be computed are NaN.
 struct MotionRecord {
   std::vector<std::string> q_names, v_names;  ///< of coordinates, as names.h gives them
   std::vector<std::string> u_names;           ///< of motors
@@ -29,14 +30,14 @@ struct MotionRecord {
 MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajectory);
 
 /// One row per node under one header: time, q.<name>, v.<name>, a.<name>, u.<motor>, closure.<name>.<entry>,
-/// contact.<name>.<entry>, com.x, com.y, com.z, gap.position, gap.angle. The last node is no stage: the cells of a, u
-/// and of the wrenches are empty there. Numbers are the shortest that read back to the same bits.
+/// contact.<name>.<entry>, com.x, com.y, com.z, gap.position, gap.angle. No stage starts at the last node: its cells of
+/// a, u and of the wrenches are empty. Numbers are the shortest that read back to the same bits.
 void writeCsv(const std::string& path, const MotionRecord& record);
 
 /// NumPy archive of the members above by the same names; wrenches are N x closures x 6 and N x contacts x 6.
 void writeNpz(const std::string& path, const MotionRecord& record);
 
-/// Reads what the functions above wrote; the extension (.csv, .npz) tells which.
+/// Reads a file written by the functions above; its extension (.csv, .npz) selects the format.
 /// \throws ModelError naming the file and what is wrong with it, as the writers do when they cannot write
 MotionRecord readRecord(const std::string& path);
 

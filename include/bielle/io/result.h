@@ -14,7 +14,7 @@ struct RunInfo {
   std::string robot_file;            ///< its .urdf, absolute
   std::vector<std::string> command;  ///< the command line, or empty
   std::string model = "closed";      ///< or "serial": the robot's linkages were frozen (transmission/serial_model.h)
-  std::string serial_armature{};     ///< of the serial model, as asked for (parseSerialArmature)
+  std::string serial_armature{};     ///< of the serial model, as requested (parseSerialArmature)
 };
 
 struct MotionResult {
@@ -22,7 +22,7 @@ struct MotionResult {
   std::string motion;
   Formulation formulation = Formulation::Full;
   std::vector<std::pair<std::string, double>> requested;  ///< every option by name
-  std::vector<GoalOutcome> goals;                         ///< what was asked and what came out
+  std::vector<GoalOutcome> goals;                         ///< requested and achieved values
   ContactSchedule schedule;
   Ground ground;
   FddpSummary solver;
@@ -37,7 +37,7 @@ struct MotionResult {
   bool interrupted() const { return solver.termination == FddpTermination::Interrupted; }
 };
 
-/// The quantities that goal.h measures, from a record of the model's motion.
+/// The data that goal.h measures, from a record of the model's motion.
 MotionTrack makeTrack(const Model& model, const MotionRecord& record);
 
 MotionResult makeResult(const RunInfo& run, const Motion& motion, const ShootingTrajectory& trajectory,
@@ -55,7 +55,7 @@ struct MotionSummary {
     double time_step = 0;  ///< s; 0: a rigid impact
     std::vector<Stance> stances;
   };
-  std::string file;  ///< that was read
+  std::string file;  ///< the file that was read
   std::string motion, robot, robot_file;
   std::string model = "closed";  ///< or "serial"
   std::string serial_armature;   ///< of the serial model (parseSerialArmature)
@@ -71,11 +71,11 @@ struct MotionSummary {
 MotionSummary readSummary(const std::string& directory);
 
 /// Creates the directory with its parents and verifies that files can be written there.
-/// \throws ModelError naming the directory and why
+/// \throws ModelError naming the directory and the reason
 void makeOutputDirectory(const std::string& directory);
 
 /// Writes trajectory.csv, trajectory.npz and summary.json to temporary files, which are renamed when all are complete,
-/// summary.json last. Returns their paths. \throws ModelError naming the file and why
+/// summary.json last. Returns their paths. \throws ModelError naming the file and the reason
 std::vector<std::string> writeResult(const std::string& directory, const MotionResult& result);
 
 /// Versions of this library, of Eigen and of the compiler.
@@ -86,30 +86,31 @@ BuildInfo getBuildInfo();
 
 // Starting a solve from a previous result.
 
-/// Replaces the guess of a motion by states and torques of a record of the same robot: node by node when the lengths
-/// agree, else each node takes the recorded one at the same share of the duration. The base is carried along so that the feet that stand
-/// are at the places of the new motion.
-/// \throws ModelError when the coordinates or motors are others, or the record has numbers that are not finite
+/// Replaces the guess of a motion by states and torques of a record of the same robot: node by node if the lengths
+/// agree, otherwise each node takes the recorded one at the same fraction of the duration. The base is moved so that
+/// the stance feet are at the places of the new motion.
+/// \throws ModelError when the coordinates or motors differ, or the record has numbers that are not finite
 void setGuess(const MotionRecord& record, Motion& motion);
 
-/// The record in a directory that writeResult() wrote.
+/// The record in a directory written by writeResult().
 /// \throws ModelError naming the directory or file, and why it cannot be read
 MotionRecord readResultRecord(const std::string& directory);
 
-// Reads a serial motion and writes its lift to the closed model.
+// Lifting: reads a serial motion and writes its lift to the closed model.
 
 /// The input of lift() from a record of a motion of the serial model.
 /// \param motion  the same request made again, for the active contacts of every stage
-/// \throws ModelError when the record is not one of that motion
+/// \throws ModelError when the record does not belong to that motion
 SerialTrajectory makeSerialTrajectory(const Motion& motion, const MotionRecord& record);
 
-/// The lifted part of the motion in the form of a solved one: converged if it was lifted entirely; its cost is the mean per
-/// node of the cost of (1) of lift.h. At least one stage must have been lifted.
+/// The lifted part of the motion in the form of a solved one: converged if it was lifted entirely; its cost is the mean
+/// per node of the cost of (1) of lift.h. At least one stage must have been lifted.
 MotionResult makeLiftedResult(const RunInfo& run, const Model& closed, const Motion& serial, const LiftResult& lifted,
                               double seconds);
 
-/// Writes lift.json: outcome, and per node status, errors, margin and evaluations; with a result trajectory.csv,
-/// trajectory.npz and summary.json too. Returns the paths. \throws ModelError naming the file and why
+/// Writes lift.json: the outcome, and per node status, errors, margin and evaluations; given a result, also
+/// trajectory.csv, trajectory.npz and summary.json. Returns the paths. \throws ModelError naming the file and the
+/// reason
 std::vector<std::string> writeLift(const std::string& directory, LiftMethod method, const LiftResult& lifted,
                                    const MotionResult* result);
 

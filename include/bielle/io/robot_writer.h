@@ -10,16 +10,16 @@ struct RobotText {
   std::string urdf, yaml;
 };
 
-/// Masses and inertias have twelve digits; lengths, angles and directions are rounded to 1e-12. Every body, joint, frame, closure, motor,
-/// contact and reference keeps its name; links that were merged into a body are frames. Bodies keep their order where the
-/// model lists them depth first.
+/// Masses and inertias have twelve digits; lengths, angles and directions are rounded to 1e-12. Every body, joint,
+/// frame, closure, motor, contact and reference keeps its name; links that were merged into a body become frames.
+/// Bodies keep their order if the model lists them depth first.
 /// \param remark  comment at the head of both files
-/// \throws ModelError naming what the files cannot express: a universal joint whose axes are not axes of its frame, limits of
-///     joints of several coordinates
+/// \throws ModelError naming anything that the files cannot express: a universal joint whose axes are not axes of its
+///     frame, limits of joints with several coordinates
 RobotText formatRobot(const Model& model, const std::string& remark = "");
 
-/// Writes DIRECTORY/NAME.urdf and .yaml, NAME the last name of the directory.
-/// \throws ModelError also when they cannot be written
+/// Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY.
+/// \throws ModelError as above, or when they cannot be written
 void writeRobot(const Model& model, const std::string& directory, const std::string& remark = "");
 
 }  // namespace bielle

@@ -28,8 +28,8 @@ using VectorRef = Eigen::Ref<VectorXd>;
 using ConstMatrixRef = Eigen::Ref<const MatrixXd>;
 using MatrixRef = Eigen::Ref<MatrixXd>;
 
-// Argument types of functions that run for one node (T = double) or for several at once (T = Lanes). T is deduced from the
-// workspace.
+// Argument types of functions that run for one node (T = double) or for several at once (T = Lanes). T is deduced from
+// the workspace.
 template <typename T>
 struct ArgumentsOf {
   using ConstVector = Eigen::Ref<const VectorX<T>>;

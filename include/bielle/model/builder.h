@@ -14,19 +14,19 @@ struct JointLimits {
 
 /// Collects bodies, joints, closures, motors and frames, then validates them and makes the model.
 /// Bodies are referred to by the name of the link; "world" is the ground. A link must be declared before it is used;
-/// otherwise the order of calls is free. build() throws ModelError naming the element and the remedy.
+/// otherwise calls may come in any order. build() throws ModelError naming the element and the remedy.
 class ModelBuilder {
  public:
   explicit ModelBuilder(std::string name, std::string source = "");
 
-  /// File that errors about subsequent additions name.
+  /// Sets the file named in errors about subsequent additions.
   void setSource(const std::string& source) { source_ = source; }
 
-  /// Adds a link carried by a joint. A Fixed joint merges the link into its parent and leaves a frame of its name.
+  /// Adds a link carried by a joint. A Fixed joint merges the link into its parent and leaves a frame with its name.
   /// \param joint kind, placement and axes; its parent index and q/v indices are filled here
   void addLink(const std::string& link, const std::string& parent_link, Joint joint, const Inertia& inertia,
                const JointLimits& limits = {});
-  /// Inertia added to a link (several may be given).
+  /// Adds an inertia to a link, which may have several.
   void addInertia(const std::string& link, const Inertia& inertia);
   void addFrame(const std::string& name, const std::string& link, const SE3& X_LF);
   /// Closure between two frames (links are frames too).
@@ -37,12 +37,12 @@ class ModelBuilder {
                 double velocity_limit = std::numeric_limits<double>::infinity());
   void addContact(const std::string& name, const std::string& frame, ContactKind kind, double half_length,
                   double half_width);
-  /// Its joints, contacts and frame are declared before it.
+  /// Its joints, contacts and frame must be declared before it.
   void addReference(Reference reference);
   void addVisual(const std::string& link, Visual visual);
   void addSerialJoint(const std::string& joint);
   void setGravity(const Vector3d& gravity);
-  /// Rotor inertia on every dof of a joint that no motor drives (a motor has its own).
+  /// Sets the rotor inertia on every dof of a joint without a motor (a motor has its own).
   void setArmature(const std::string& joint, double armature);
 
   /// Validates and makes the model. Implausible data are reported in `warnings`, if given.

@@ -5,8 +5,8 @@
 
 namespace bielle {
 
-/// Invalid input at the boundary. what() reads "file: element: what is wrong; remedy", on one line, without control characters,
-/// long parts cut.
+/// Invalid input at the boundary. what() reads "file: element: what is wrong; remedy", on one line, without control
+/// characters and with long parts truncated.
 class ModelError : public std::runtime_error {
  public:
   /// \param source file (or "" for a model built in code)   \param element e.g. `joint 'knee'`

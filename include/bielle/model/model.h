@@ -26,7 +26,7 @@ struct Joint {
   Vector3d axis = Vector3d::UnitZ();   ///< unit axis; normal of a planar joint; first axis of a universal joint
   Vector3d axis2 = Vector3d::UnitY();  ///< second axis of a universal joint
   int idx_q = 0, nq = 0, idx_v = 0, nv = 0;
-  double position_importance = 1, velocity_importance = 1;  ///< beside other joints, in the costs of a posture
+  double position_importance = 1, velocity_importance = 1;  ///< relative to other joints, in the costs of a posture
 };
 
 /// A rigid body; body i > 0 is carried by joint i, body 0 is the world.
@@ -55,8 +55,8 @@ struct Closure {
   SE3 X_B1, X_B2;                     ///< placements of the frames in their bodies
   Vector3d axis = Vector3d::UnitZ();  ///< free axis of a hinge, in frame 1 (and in frame 2)
   double kp = 0, kd = 0;              ///< stabilisation gains, 1/s^2 and 1/s; zero as in the paper
-  /// Dofs that move one frame and not the other, in increasing order, with +1 where they move frame 1, -1 frame 2.
-  /// The relative placement of the frames depends on these alone. Filled by the builder.
+  /// Dofs that move one frame but not the other, in increasing order; sign +1 if they move frame 1, -1 for frame 2.
+  /// The relative placement of the frames depends only on them. Filled by the builder.
   std::vector<int> dofs, signs;
 };
 
@@ -69,7 +69,7 @@ struct LoopCluster {
 
 /// An actuator on one dof.
 struct Motor {
-  std::string name;     ///< name of its joint
+  std::string name;     ///< that of its joint
   int joint = 0;        ///< body/joint index
   int dof = 0;          ///< index into v
   double armature = 0;  ///< rotor inertia seen at the joint, kg m^2 (kg for a prismatic joint)
@@ -112,8 +112,8 @@ struct Visual {
 struct Dof {
   int joint = 0;    ///< joint/body that carries it
   int parent = -1;  ///< dof just before it on the path to the root, -1 at the root
-  /// Dofs j of the same joint for which the axis of this one does not move: only the first axis of a universal joint
-  /// ignores its second one. All the axes of other joints move with the whole joint (child-frame coordinates).
+  /// Whether this is the first or second axis of a universal joint: the first axis does not move with the second one.
+  /// All axes of other joints move with the whole joint (child-frame coordinates).
   bool first_of_universal = false;
   bool second_of_universal = false;
 };
@@ -125,7 +125,7 @@ class Model {
   int nq() const { return nq_; }
   int nv() const { return nv_; }
   int nu() const { return static_cast<int>(motors_.size()); }
-  int numBodies() const { return static_cast<int>(bodies_.size()); }  ///< with the world
+  int numBodies() const { return static_cast<int>(bodies_.size()); }  ///< including the world
   const std::vector<Body>& bodies() const { return bodies_; }
   const std::vector<Joint>& joints() const { return joints_; }  ///< joints()[0] is a placeholder for the world
   const std::vector<Dof>& dofs() const { return dofs_; }
@@ -136,9 +136,9 @@ class Model {
   const std::vector<ContactFrame>& contacts() const { return contacts_; }
   const std::vector<Reference>& references() const { return references_; }
   const std::vector<Visual>& visuals() const { return visuals_; }
-  /// Dofs of the joints of the equivalent serial chain (hips, knee, ankles), as joint indices.
+  /// Indices of the joints of the equivalent serial chain (hips, knee, ankles).
   const std::vector<int>& serialJoints() const { return serial_joints_; }
-  const VectorXd& lowerLimits() const { return lower_; }  ///< per dof, -inf where there is none
+  const VectorXd& lowerLimits() const { return lower_; }  ///< per dof, -inf if there is none
   const VectorXd& upperLimits() const { return upper_; }
   const VectorXd& velocityLimits() const { return velocity_limit_; }
   const VectorXd& armature() const { return armature_; }  ///< per dof, added to the diagonal of M

@@ -1,14 +1,15 @@
 #pragma once
 /// \file
-/// Robots from files: a URDF and, optionally, a YAML file with the same stem beside it for data that a URDF cannot express.
+/// Robots from files: a URDF and, optionally, a YAML file with the same stem beside it for data that URDF cannot
+/// express.
 ///
 /// ## The URDF
-/// Links and joints of one tree. Bodies are added depth first, the children of a link in the order in which their
-/// joints stand in the file. A link without <inertial> has no mass. A root named "world" is the ground; any other root
-/// is carried by a free-flyer named "root_joint", or merged into the ground when the base is fixed.
-/// - <limit>: `effort` and `velocity` go to the motor and to the joint (published files often hold placeholders there:
-///   override them by `motors`); 0 means none. `lower` = `upper` = 0, like a missing pair, means none. Joints whose number
-///   of coordinates the YAML changes have no limits.
+/// Links and joints of one tree. Bodies are added depth first, the children of a link in the order of their joints in
+/// the file. A link without <inertial> has no mass. A root named "world" is the ground; any other root is carried by a
+/// free-flyer named "root_joint", or merged into the ground when the base is fixed.
+/// - <limit>: `effort` and `velocity` apply to the motor and to the joint (published files often have placeholders
+///   there: override them by `motors`); 0 means none. `lower` = `upper` = 0, like a missing pair, means none. Joints
+///   whose number of coordinates is changed by the YAML have no limits.
 /// - <mimic> is rejected (model the coupling as a closure), <dynamics> is ignored with a warning, meshes need not
 ///   exist.
 /// - Attributes are finite numbers; inertias are those of a body (no negative mass, triangle inequality), up to 1e-6
@@ -18,28 +19,29 @@
 /// - `closed_loop: [[A, B], ...]` frames 1 and 2 of each closure: links, or joints, which stand for the frame of their
 ///   child (a link wins); `type: [6d, ...]`, one per pair, 6d | 5d | 3d in any case. `closure_name: [...]` (ours)
 ///   names them; otherwise `knee_A`, `knee_B` make `knee`, and other pairs `A--B`.
-/// - `name_mot: [joint, ...]` the motors, in the order of u.
-/// - `joint_name: [...]`, `joint_type: [...]` other kinds for joints of the URDF, in any case: SPHERICAL, UJOINT_ and
+/// - `name_mot: [joint, ...]` lists the motors, in the order of u.
+/// - `joint_name: [...]`, `joint_type: [...]` replace kinds of joints of the URDF, in any case: SPHERICAL, UJOINT_ and
 ///   two different axes of the joint's own frame in their order (UJOINT_XY), FIXED, REVOLUTE, CONTINUOUS, PRISMATIC,
-///   PLANAR, FLOATING. An absent joint is a warning.
+///   PLANAR, FLOATING. An absent joint gives a warning.
 ///
 /// ## The YAML, our keys (all optional; an unknown key is an error)
 /// - `base: free | fixed`
 /// - `closures: [{name, frames: [A, B], type, axis, kp, kd}, ...]` after those of `closed_loop`; `axis` of a 5d hinge,
 ///   in frame 1 (default z); kp in 1/s^2, kd in 1/s (default 0)
-/// - `motors: {joint: {armature, effort, velocity}, ...}` in place of `name_mot`, its limits (.inf for none) in place
-///   of the URDF's
-/// - `armature: {joint: kg m^2, ...}`, or one number for all motors that `motors` gives none
+/// - `motors: {joint: {armature, effort, velocity}, ...}` instead of `name_mot`; its limits (.inf for none) replace
+///   those of the URDF
+/// - `armature: {joint: kg m^2, ...}`, or one number for all motors without one in `motors`
 /// - `contacts: {name: {frame, type: 6d | 3d, sole: [length, width]}, ...}`; the sole is centred on its frame, length
 ///   along x, m
 /// - `references: {name: {joints: {joint: number or list}, height: {frame, value}, feet: {contact: [x, y, z]}}, ...}`
-/// - `cross_inertia: kg m^2` makes of every universal joint two revolute ones, named after it and their axes (`_Z`, `_Y`), that
-///   carry a cross of this inertia about any axis between them
-/// - `importance: {joint: [position, velocity], ...}` of joints in the state regularization of motions (default 1, 1)
+/// - `cross_inertia: kg m^2` splits every universal joint into two revolute ones, named after it and their axes (`_Z`,
+///   `_Y`), with a cross of this inertia about any axis between them
+/// - `importance: {joint: [position, velocity], ...}` weighs joints in the state regularization of motions (default 1,
+///   1)
 /// - `serial_joints: [joint, ...]`, `gravity: [x, y, z]` (m/s^2)
-/// - `model: NAME or path relative to this file`, or a list of them: this file, with no URDF beside it, completes the first of
-///   these published robots that exists; names are searched for in the directories of robots. Its keys take precedence over
-///   those of that robot's YAML file.
+/// - `model: NAME or path relative to this file`, or a list of them: this file, with no URDF beside it, completes the
+///   first of these published robots that exists; names are looked up in the directories of robots. Its keys take
+///   precedence over those of that robot's YAML file.
 #include <optional>
 #include <string>
 #include <vector>
@@ -58,20 +60,20 @@ struct LoadedRobot {
   Model model;
   std::vector<std::string> warnings;  ///< "file: element: problem", valid but suspicious
   std::string directory;              ///< where the files were found
-  std::string file;                   ///< the .urdf, or the .yaml that completes one elsewhere, absolute
+  std::string file;                   ///< absolute path of the .urdf, or of the .yaml that completes one elsewhere
 };
 
 /// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf, robot.urdf or bipetto.yaml in the directories of
-/// getRobotDirectories()), by directory (its robot.urdf, else the .urdf named as the directory, else its only .urdf, else
-/// the .yaml named as the directory), by .urdf file or by .yaml file with the key `model`. \throws
-/// ModelError naming the file, the element and the remedy, and no other exception, whatever the files contain
+/// getRobotDirectories()), by directory (its robot.urdf, else the .urdf named as the directory, else its only .urdf,
+/// else the .yaml named as the directory), by .urdf file or by .yaml file with the key `model`.
+/// \throws ModelError naming the file, the element and the remedy, and no other exception, whatever the files contain
 LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options = {});
 
 /// The file of a robot by name or path, as loadRobot finds it. \throws ModelError listing the places searched
 std::string findRobotFile(const std::string& name_or_path);
 
 /// Directories searched for robots by name, in this order: those of $BIELLE_ROBOTS (separated by colons),
-/// share/bielle/robots of the installation that the running program belongs to, robots/ of the source tree, the
+/// share/bielle/robots of the installation that the running program belongs to, robots/ of the source tree, and the
 /// configured installation.
 std::vector<std::string> getRobotDirectories();
 

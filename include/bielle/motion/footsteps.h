@@ -1,11 +1,11 @@
 #pragma once
-/// \file A sequence of footholds, and the properties that follow from geometry alone.
+/// \file Sequences of footholds, and their geometric properties.
 ///
-/// A walk is commanded by the displacement of the middle frame P of the two feet per step, in its own axes,
+/// A walk is commanded by the displacement per step of the middle frame P of the two feet, in its own axes,
 ///     P_i = P_{i-1} D_i,    D_i = Rz(yaw / 2) (forward, lateral) Rz(yaw / 2)                                    (1)
-/// and the foot of step i lands where it would stand about P_i in the starting posture. Every other step makes the lateral
-/// displacement of two: the foot on that side opens the stance by twice the amount, and the other foot closes it. The
-/// last step brings the feet together.
+/// and the foot of step i lands in the same place relative to P_i as in the starting posture. Every other step makes
+/// the lateral displacement of two: the foot on that side opens the stance by twice the amount, and the other foot
+/// closes it. The last step brings the feet together.
 #include <array>
 #include <string>
 #include <vector>
@@ -25,7 +25,7 @@ struct Footstep {
 };
 
 /// An option that counts steps.
-/// \throws ModelError when it is no whole number from 2 to 200
+/// \throws ModelError when it is not a whole number from 2 to 200
 int countSteps(const std::string& option, double value);
 
 /// The initial placements of the two feet and the steps they take in turn.
@@ -43,16 +43,17 @@ struct StepCommand {
   double yaw = 0;                   ///< rad, to the left
 };
 
-/// Heading of a placement: of its x seen from above, rad.
+/// Heading of a placement: direction of its x axis seen from above, rad.
 double calcHeading(const SE3& X);
 
 /// Pose of the middle of the two feet: level, heading halfway between theirs.
 SE3 calcMiddle(const SE3& left, const SE3& right);
 
-/// `steps` steps by Eq. (1) on level ground, the first one with the foot `first`; the last one brings the feet together.
+/// `steps` steps by Eq. (1) on level ground, the first one with the foot `first`; the last one brings the feet
+/// together.
 FootstepPlan planFootsteps(const SE3& left, const SE3& right, const StepCommand& command, int steps, Side first);
 
-/// Distance between two soles as rectangles seen from above, m; negative: they overlap (by a lower bound of the depth).
+/// Distance between two soles as rectangles seen from above, m; negative if they overlap (a lower bound of the depth).
 double calcSoleDistance(const ContactFrame& a, const SE3& X_Wa, const ContactFrame& b, const SE3& X_Wb);
 
 }  // namespace bielle

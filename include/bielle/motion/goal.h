@@ -1,9 +1,9 @@
 #pragma once
-/// \file What a motion is asked for, as quantities that can be measured on its trajectory.
+/// \file Goals of a motion, as quantities that can be measured on its trajectory.
 ///
-/// Costs pull a motion towards its goals, but nothing enforces them: a solver that converges may still miss one. What was
-/// asked and what came out are therefore told side by side. With c the centre of mass, p_i the origins of the contact
-/// frames, t the time, and e a unit vector, all from the node `first` to the node `last`:
+/// Costs pull a motion towards its goals, but nothing enforces them: a solver that converges may still miss one.
+/// Requested and achieved values are therefore reported side by side. With c the centre of mass, p_i the origins of the
+/// contact frames, t the time, and e a unit vector, all from the node `first` to the node `last`:
 ///
 ///     Speed         e . (c(last) - c(first)) / (t(last) - t(first))                                              (1)
 ///     Height        (c_z - s) / (c_z(first) - s) where it is farthest from 1,  s the mean of p_iz(first)          (2)
@@ -43,10 +43,10 @@ const char* getUnit(GoalKind kind);  ///< "m/s", "1", "m", "s", "rad"
 /// \throws std::invalid_argument when no kind has this name
 GoalKind parseGoalKind(const std::string& name);
 
-/// The tolerance of most goals: five per cent of what was asked, at least `least`.
+/// The tolerance of most goals: five per cent of the requested value, but not less than `least`.
 double calcTolerance(double asked, double least);
 
-/// What the measurements above need of a trajectory.
+/// Data of a trajectory that the measurements above need.
 struct MotionTrack {
   std::vector<double> time;            ///< N + 1, s
   std::vector<Vector3d> com;           ///< N + 1, m
@@ -65,7 +65,7 @@ struct GoalOutcome {
   bool met() const;  ///< false when came_out is not a number
 };
 
-/// E.g. "asked 0.5 m/s, came out 0.4213 m/s: 84 %"; of a goal that is not met also its tolerance.
+/// E.g. "asked 0.5 m/s, came out 0.4213 m/s: 84 %"; for a missed goal also its tolerance.
 std::string formatOutcome(const GoalOutcome& outcome);
 
 }  // namespace bielle

@@ -1,29 +1,29 @@
 #pragma once
 /// \file The jump of the paper (its section IV-B): stand, push, fly for a given time, land, settle.
 ///
-/// In flight the centre of mass follows a ballistic parabola. The time T between take-off and touchdown at the same height
-/// z1 determines speed and height (as in the paper)
+/// In flight the centre of mass follows a ballistic parabola. The time T between take-off and touchdown at the same
+/// height z1 determines speed and height (as in the paper)
 ///     v0 = g T / 2,    z(T / 2) = z1 + g T^2 / 8,    z1 = z0 + `stretch`,                                      (1)
-/// with z0 the height at the start. While pushing, for D seconds, it follows the polynomial of fifth degree that leaves z0
-/// at rest and arrives at z1 with v0, both without acceleration: down first, then up; while landing, its mirror image.
+/// with z0 the height at the start. While pushing, for D seconds, it follows the polynomial of fifth degree that leaves
+/// z0 at rest and arrives at z1 with v0, both without acceleration: first down, then up; landing is its mirror image.
 /// Feet on the ground carry the load
 ///     f = m (g + z''),    on average m g (1 + v0 / (g D)),                                                     (2)
 /// and in flight they follow
-///     z_f(t) = max(g T^2 / 8, `clearance`) p^2 (2 - p),    p = 4 t/T (1 - t/T),                                        (3)
+///     z_f(t) = max(g T^2 / 8, `clearance`) p^2 (2 - p),    p = 4 t/T (1 - t/T),                                    (3)
 /// at rest at both ends (forward: by a smooth step). The body rises by g T^2 / 8 p: legs stretch by 4/27 of the rise.
 /// Costs of a stage, h the time step:
 /// - state regularization about the posture at the start, at rest; motor torques;
-/// - height of the CoM: at mid-flight (over h; the paper asks for no more), and less so on the ground;
+/// - height of the CoM: at mid-flight (over h, as in the paper) and, with less weight, on the ground;
 /// - feet on the ground: force by Eq. (2), shared evenly, centre of pressure, friction pyramid;
 /// - feet in flight: placement by Eq. (3);
-/// - touchdown, at the first node of the landing: placement and velocity of the feet, over h. The desired velocity is zero:
-///   the legs fold as fast as the body falls.
-/// The terminal node has the velocities, the posture, and the centre of mass over the feet as at the start.
+/// - touchdown, at the first node of the landing: placement and velocity of the feet, over h. The desired velocity is
+///   zero: the legs fold as fast as the body falls.
+/// The terminal node has costs of the velocities, of the posture, and of the centre of mass relative to the feet.
 ///
-/// With `published`, the problem is that of the paper's example code: feet are free in flight and are asked at touchdown for
-/// their height, no tilt and no velocity; the load is the average of Eq. (2) while pushing and landing, the weight before and
-/// after; hips count as other joints do, contacts have the gains given; the terminal node has the height and the heading of
-/// the base, and the joints of the legs (Model::serialJoints) with their velocities.
+/// With `published`, the problem is that of the paper's example code: feet are free in flight; at touchdown their costs
+/// are height, tilt and velocity; the load is the average of Eq. (2) while pushing and landing, the weight before and
+/// after; hips are weighted like other joints; contacts have the gains given, without limits; the terminal costs are
+/// the height and the heading of the base, and the joints of the legs (Model::serialJoints) with their velocities.
 #include "bielle/motion/motion.h"
 
 namespace bielle {
@@ -38,7 +38,7 @@ struct JumpOptions {
   double stretch = 0.02;     ///< height of the CoM at take-off and touchdown over that at the start, m
   double clearance = 0.04;   ///< least height of the soles at mid-flight, m
   double friction = 0.7;     ///< coefficient, 1
-  double published = 0;      ///< 1: the paper's problem, below; 0: by our costs
+  double published = 0;      ///< 1: the paper's problem, see above; 0: our costs
   double time_step = 0.005;  ///< s
 
   double apex_weight = 1e4;                ///< of the CoM's height at mid-flight, over h, 1/m^2
@@ -64,10 +64,10 @@ struct JumpOptions {
 /// Every number of the options by name, pointing into `options`.
 std::vector<OptionEntry> listOptions(JumpOptions& options);
 
-/// The paper's problem with the weights and durations of its jump (its example code), as far as its figures tell.
+/// The paper's problem with the weights and durations of its jump (its example code), as far as its figures show them.
 void setPaperWeights(JumpOptions& options);
 
-/// What a jump is in numbers, Eq. (1), with the durations that fit the time step.
+/// Figures of a jump by Eq. (1), with durations rounded to the time step.
 struct JumpFigures {
   double stand = 0, push = 0, flight = 0, land = 0;  ///< s
   double take_off = 0;                               ///< v0, m/s
@@ -81,7 +81,7 @@ struct JumpHeight {
 };
 JumpHeight calcJumpHeight(const JumpOptions& options, double gravity, double t);
 
-/// Jump with all contacts of the robot at once, from the standing posture q0.
+/// A jump off all contacts of the robot at once, from the standing posture q0.
 /// \throws ModelError when the request is impossible (durations, lengths, no contact)
 MotionPlan planJump(const Model& model, const JumpOptions& options, const VectorXd& q0);
 Motion makeJump(const Model& model, const JumpOptions& options = {}, const ProblemOptions& problem = {});

@@ -1,12 +1,12 @@
 #pragma once
 /// \file Limits of motors and joints, for every motion.
 ///
-/// - Torques |u| <= effort limit, exactly: bounds of the controls, kept by a solver with ControlBounds::Enforce.
-/// - Ranges of joints with one degree of freedom, and velocities of motors, by barriers. With s the scale of a limit (half
-///   the width of the range, 1 when it is open on one side; the velocity limit) and r the coordinate, either
+/// - Torques |u| <= effort limit, exactly: bounds of the controls, enforced by a solver with ControlBounds::Enforce.
+/// - Ranges of joints with one degree of freedom, and velocities of motors, by barriers. With s the scale of a limit
+///   (half the width of the range, 1 when it is open on one side; the velocity limit) and r the coordinate, either
 ///       quadratic:    1/2 w (excess of r / s over bounds drawn in by `quadratic_margin`)^2,                    (1)
-///   zero inside and soft outside, where violations stay within the margin; or
-///       logarithmic:  -w (ln(distance to a bound / (margin s))), relaxed nearer than margin s (cost.h),        (2)
+///   which is zero inside and soft outside, where violations stay within the margin; or
+///       logarithmic:  -w (ln(distance to a bound / (margin s))), relaxed closer than margin s (cost.h),        (2)
 ///   which keeps away from the bounds but also acts on all values inside them.
 #include <map>
 #include <string>
@@ -24,14 +24,14 @@ struct LimitOptions {
   double quadratic_margin = 0.01;             ///< of Eq. (1), 1
   double logarithmic_weight = 1;              ///< w of Eq. (2), 1
   double margin = 0.05;                       ///< of Eq. (2), 1
-  std::map<std::string, double> efforts;      ///< by motor, N m or N, in place of the limits of the model
+  std::map<std::string, double> efforts;      ///< by motor, N m or N, replacing the limits of the model
   std::map<std::string, double> velocities;   ///< by motor, rad/s or m/s, likewise
 
   bool areEnforced() const { return barrier != LimitBarrier::None; }
 };
 
 /// Sets the effort limits of the stages and adds the barriers to them.
-/// \throws ModelError when there is no such motor, a limit is not positive, or the range of a joint has no width
+/// \throws ModelError for an unknown motor, a limit that is not positive, or a joint whose range has no width
 void addLimits(const Model& model, const LimitOptions& options, std::vector<StageSpec>& stages);
 
 /// Options of a problem besides those of the motion.

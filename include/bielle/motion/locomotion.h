@@ -1,28 +1,28 @@
 #pragma once
-/// \file Steps as an optimal control problem: what walk, side walk, turn and stairs share.
+/// \file Steps as an optimal control problem, shared by walk, side walk, turn and stairs.
 ///
-/// Costs of a stage; those of weight zero are left out. References of body and feet are those of gait.h.
+/// Costs of a stage; those with zero weight are omitted. References of body and feet are those of gait.h.
 /// - state regularization about the standing posture at rest, the base heading as the feet do; motor torques;
 /// - centre of mass: position and velocity;
 /// - swing foot: placement along its path, and (instead) fly high: its horizontal velocity near the ground;
-/// - landing, at the first node of a double support or at the impact before it: placement and velocity of the foot that
-///   comes down, times what makes up for the h of a stage;
+/// - landing, at the first node of a double support or at the impact before it: placement and velocity of the landing
+///   foot, over the h of a stage;
 /// - forces of stance feet: share of the weight, centre of pressure, friction pyramid;
-/// - feet not nearer than `feet_distance`.
-/// The terminal node has the centre of mass, the posture and rest.
+/// - distance of the feet, where less than `feet_distance`.
+/// The terminal node has costs of the centre of mass, the posture and the velocities.
 ///
-/// The pendulum of gait.h sets off at once, with a velocity v at the first node, while the robot is at rest. With the time
-/// constant tau = sqrt(z / g), a centre of pressure held back by d for a time T brings the robot onto its path when
+/// The pendulum of gait.h starts with a velocity v, but the robot starts at rest. With the time constant
+/// tau = sqrt(z / g), a centre of pressure held back by d for a time T brings the robot onto the pendulum's path if
 ///     d (1 - exp(-T / tau)) = v tau,                                                                           (1)
-/// where v falls with T as well. The first double support is as long as d in the soles asks for.
+/// where v falls with T as well. The first double support is long enough for d to fit in the soles.
 ///
-/// With `published`, the problem is that of the paper's example code, of which the walk is known to the last digit:
-/// - no footholds: nothing but the velocity of the CoM leads forward. A landing foot is asked for its height, for no tilt
-///   and no velocity; its place, its heading and the path of a swing have no costs;
-/// - the force reference is the weight on one foot, half of it on each of two, and changes at once; forces and centres of
-///   pressure are in the axes of the world;
+/// With `published`, the problem is that of the paper's example code, whose walk is known to the last digit:
+/// - no footholds: only the velocity of the CoM leads forward. The costs of a landing foot are its height, tilt and
+///   velocity; its place, its heading and the path of a swing have no costs;
+/// - the force reference is the weight on one foot, half of it on each of two, and changes at once; forces and centres
+///   of pressure are in the axes of the world;
 /// - contacts and closures have the gains given, without limits;
-/// - the terminal node has the velocities of the joints of the legs alone (Model::serialJoints);
+/// - the only terminal costs are the velocities of the joints of the legs (Model::serialJoints);
 /// - the guess is the standing posture at rest, as high as the path of the centre of mass.
 #include "bielle/motion/footsteps.h"
 #include "bielle/motion/motion.h"
@@ -48,13 +48,13 @@ struct SwingShape {
 
 struct LocomotionOptions {
   GaitTiming timing;
-  double start_pressure = 0.4;  ///< largest d of Eq. (1) over the soles' half length; 0: timing.start as it is given
+  double start_pressure = 0.4;  ///< largest d of Eq. (1) over the soles' half length; 0: timing.start as given
   SwingShape swing;
   double friction = 0.7;  ///< coefficient, 1
-  double published = 0;   ///< 1: the paper's problem, below; 0: on footholds
-  /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time and bears the landing
-  /// costs, as they stand before the foot stops. 0: soft landing by costs alone; the contact's stabilisation stops the
-  /// foot within a time step.
+  double published = 0;   ///< 1: the paper's problem, see above; 0: on footholds
+  /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time and has the landing
+  /// costs, evaluated before the foot stops. 0: soft landing by costs alone; the contact's stabilisation stops the foot
+  /// within a time step.
   double rigid_landing = 0;
 
   double state_weight = 0.1;             ///< of the state regularization
@@ -70,10 +70,10 @@ struct LocomotionOptions {
   double swing_rotation_weight = 1e3;    ///< of its orientation, 1
   double fly_high_weight = 0;            ///< s^2/m^2
   double fly_high_slope = 75;            ///< 1/m
-  double landing_foothold_weight = 1e5;  ///< horizontal place of a landing foot, times h, 1/m^2
-  double landing_height_weight = 1e5;    ///< its height, times h, 1/m^2
-  double landing_rotation_weight = 1e4;  ///< its orientation, times h, 1
-  double landing_velocity_weight = 1e3;  ///< its velocity, times h, s^2/m^2
+  double landing_foothold_weight = 1e5;  ///< horizontal place of a landing foot, over h, 1/m^2
+  double landing_height_weight = 1e5;    ///< its height, over h, 1/m^2
+  double landing_rotation_weight = 1e4;  ///< its orientation, over h, 1
+  double landing_velocity_weight = 1e3;  ///< its velocity, over h, s^2/m^2
   double force_weight = 10;              ///< of the contact force reference, over (m g)^2
   double pressure_weight = 10;           ///< of the centre of pressure, over the half size of the sole squared
   double friction_weight = 100;          ///< of leaving the friction pyramid, over the load of the foot squared, 1
@@ -82,8 +82,8 @@ struct LocomotionOptions {
   double terminal_weight = 1e3;          ///< of the final velocities, and of the final place of the CoM
   double contact_kp = 1e4;  ///< stabilisation of the contacts, 1/s^2; limited to 1/(2 h^2), h the time step
   double contact_kd = 100;  ///< 1/s; limited to 1/h
-  double closure_kp = 1e4;  ///< stabilisation of the closures, limited like that of the contacts; it matters in the
-  double closure_kd = 100;  ///< full formulation alone
+  double closure_kp = 1e4;  ///< stabilisation of the closures, limited like that of the contacts; used only by
+  double closure_kd = 100;  ///< the full formulation
 
   std::string left = "foot_left", right = "foot_right";  ///< contact frames
 };
@@ -103,7 +103,7 @@ struct Stance {
 /// The stance in a closed posture q0. \throws ModelError when the robot lacks a foot
 Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0);
 
-/// The foot that steps first where none has to: the left one in the published problem.
+/// The foot that steps first if the motion does not determine it: the left one in the published problem.
 Side getFirstFoot(const LocomotionOptions& options);
 
 /// The steps to take and the ground to take them on.
@@ -111,13 +111,13 @@ struct LocomotionTask {
   std::string name;
   FootstepPlan plan;
   Ground ground;
-  Vector3d direction = Vector3d::Zero();  ///< of the way, of length 1, or zero where there is none
+  Vector3d direction = Vector3d::Zero();  ///< unit vector of the walking direction, or zero if there is none
   double speed = 0;                       ///< of the CoM along it, at steady steps, m/s
 };
 
-/// Mean speed of the centre of mass over the steady steps: from the second landing to the last but two (in short motions from
-/// the first to the last but one), over a whole number of cycles of `steps_per_cycle` steps. Motions start and end at rest.
-/// None when there are too few steps. \param direction  unit vector, world
+/// Mean speed of the centre of mass over the steady steps: from the second landing to the last but two (in short
+/// motions from the first to the last but one), over a whole number of cycles of `steps_per_cycle` steps. Motions start
+/// and end at rest. Empty if there are too few steps. \param direction  unit vector, world
 std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, const Vector3d& direction,
                                  int steps_per_cycle = 1);
 

@@ -21,16 +21,16 @@ struct OptionEntry {
 };
 
 /// Sets an option by name.
-/// \throws ModelError naming the options there are
+/// \throws ModelError listing the options
 void setOption(const std::vector<OptionEntry>& options, const std::string& name, double value);
 
-/// The options' present values.
+/// The current values of the options.
 std::vector<std::pair<std::string, double>> listValues(const std::vector<OptionEntry>& options);
 
-/// \throws ModelError naming the option, unless ok
+/// \throws ModelError naming the option unless `ok`
 void requireOption(bool ok, const std::string& option, const std::string& problem, const std::string& remedy);
 
-/// \throws ModelError naming the first option that is not a finite number of 0 or more, but for those in `any_sign`
+/// \throws ModelError naming the first option that is not finite, or negative and not in `any_sign`
 void requireNotNegative(const std::vector<OptionEntry>& options, const std::vector<std::string>& any_sign = {});
 
 /// \throws ModelError naming the first of these options that is not positive
@@ -39,7 +39,7 @@ void requirePositive(const std::vector<OptionEntry>& options, const std::vector<
 /// \throws ModelError when a motion of this duration has more than 100000 stages, which may exceed the memory
 void requireStages(double seconds, double time_step);
 
-/// A motion before it becomes a problem, as a sequence joins them. It starts and ends standing.
+/// A motion before it becomes a problem; a sequence joins several. It starts and ends standing.
 struct MotionPlan {
   std::string name;
   ContactSchedule schedule;
@@ -68,7 +68,7 @@ Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& opt
 
 /// Motor torques that hold the robot still at q under the closures and contacts, as far as possible: with a = v = 0,
 ///     b(q, 0) = B u + J^T lambda (1)
-/// solved in the least-squares sense for the smallest (u, lambda / weight of the robot).
+/// solved in the least-squares sense with the smallest (u, lambda / weight of the robot).
 struct StaticTorques {
   VectorXd u;           ///< nu
   double residual = 0;  ///< largest entry of the residual of (1), N m or N
@@ -83,14 +83,14 @@ VectorXd makeStandingPosture(const Model& model);
 /// free-flyer stays in place.
 VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X);
 
-/// Stabilisation of contacts and closures, 1/s^2 and 1/s, limited to 1/(2 h^2) and 1/h with h the time step: one Euler step
-/// turns a velocity e into (1 - kd h) e and, with kd = 1/h, a displacement d into (1 - kp h^2) d. Beyond 1/h a velocity
-/// would swing back.
+/// Stabilisation gains of contacts and closures, 1/s^2 and 1/s, limited to 1/(2 h^2) and 1/h with h the time step: one
+/// Euler step turns a velocity e into (1 - kd h) e and, with kd = 1/h, a displacement d into (1 - kp h^2) d. Beyond 1/h
+/// a velocity would change its sign.
 struct ContactGains {
   double kp = 0, kd = 0;
 };
 ContactGains limitContactGains(const ContactGains& gains, double time_step);
-/// Gains of the model's closures in a set of constraints.
+/// Sets the gains of the model's closures in a set of constraints.
 void setClosureGains(const ContactGains& gains, ConstraintSet& constraints);
 
 /// Contacts of the robot held at their places in q.
@@ -104,29 +104,31 @@ std::vector<std::string> getContactNames(const Model& model, const std::vector<C
 /// squared): joints of the equivalent serial chain as listed, linkage joints zero, base position free.
 VectorXd makeStateWeights(const Model& model);
 
-/// Of the joints that count in it: the equivalent serial chain, or all joints but the base; nv, 1 or 0.
+/// Selects the joints of the state regularization: the equivalent serial chain, or all joints but the base; nv, 1 or 0.
 VectorXd selectMainJoints(const Model& model);
 
-/// Raises the weights of motor velocities to at least `weight` (weights: 2 nv); motors of linkages could oscillate otherwise.
+/// Raises the weights of motor velocities to at least `weight` (weights: 2 nv); otherwise motors of linkages may
+/// oscillate.
 void raiseMotorWeights(const Model& model, double weight, VectorXd& weights);
 
 /// Costs of the feet on the ground, the same for all motions.
 struct GroundCosts {
   double force_weight = 10;    ///< of the force reference, over (m g)^2
   double pressure_weight = 1;  ///< of the centre of pressure, over the half size of the sole squared
-  /// Of leaving the friction pyramid, over the square of the foot's load (at least m g / 10), 1. Without this scaling, a
-  /// weight that holds a lightly loaded foot is so stiff for a foot that carries the robot that the solver makes tiny steps.
+  /// Weight of leaving the friction pyramid, over the square of the foot's load (at least m g / 10), 1. Without this
+  /// scaling, a weight that holds a lightly loaded foot is so stiff for a foot that carries the robot that the solver
+  /// takes tiny steps.
   double friction_weight = 100;
-  double friction = 0.7;                ///< coefficient of the ground, 1; the pyramid is a little inside its cone
+  double friction = 0.7;                ///< coefficient of the ground, 1; the pyramid lies slightly inside its cone
   ForceAxes axes = ForceAxes::Contact;  ///< of force reference and centre of pressure
 };
-/// What is asked of a foot that may land anywhere, as in the paper: the height of a place, no tilt, no velocity.
+/// Weights of a foot that may land anywhere, as in the paper: height of a place, no tilt, no velocity.
 struct LandingWeights {
   double height = 0;    ///< 1/m^2
   double tilt = 0;      ///< of the rotation about x and y of the place, 1
   double velocity = 0;  ///< and angular velocity, s^2/m^2 and s^2
 };
-/// \param suffix  of the names of the costs, where several feet land at once
+/// \param suffix  of the names of the costs, if several feet land at once
 void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights& weights, StageSpec& stage,
                     const std::string& suffix = "");
 

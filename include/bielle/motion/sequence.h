@@ -2,8 +2,8 @@
 /// \file Motions one after the other, as one optimal control problem.
 ///
 /// Each motion starts from the standing posture in which the previous one ends. Only the last motion keeps its terminal
-/// costs, so that the others need not come to rest. The ground has the steps of all motions and the lowest of their planes;
-/// soles that stand higher rest on platforms.
+/// costs, so that the others need not come to rest. The ground has the steps of all motions and the lowest of their
+/// planes; higher soles stand on platforms.
 #include <functional>
 
 #include "bielle/motion/motion.h"
@@ -11,11 +11,12 @@
 namespace bielle {
 
 struct SequencePart {
-  std::string name;  ///< heads its phases and options: "NAME.depth"
+  std::string name;  ///< prefix of its phases and options: "NAME.depth"
   std::function<MotionPlan(const Model&, const VectorXd& q_start)> plan;  ///< e.g. planSquat with its options
 };
 
-/// \throws ModelError when there is no part, when one is impossible, or when they differ in friction or do not fit on one ground
+/// \throws ModelError when there is no part, when one is impossible, or when they differ in friction or do not fit on
+/// one ground
 MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0);
 
 struct PartsOptions {
@@ -25,8 +26,8 @@ struct PartsOptions {
   std::function<void(const std::string& part, const FddpSummary& summary)> report;  ///< receives the outcome of each
 };
 
-/// An initial guess for the sequence: each motion solved separately. From a quasi-static guess a long sequence may fail to
-/// converge, because one step length applies to all motions, so that the hardest one slows the closing of all gaps.
+/// An initial guess for the sequence: each motion solved separately. From a quasi-static guess a long sequence may fail
+/// to converge, because one step length applies to all motions, so that the hardest one slows the closing of all gaps.
 /// Parts that do not converge contribute their last iterate.
 ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
                               const PartsOptions& options = {});

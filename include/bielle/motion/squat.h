@@ -1,6 +1,6 @@
 #pragma once
-/// \file The squat of the paper (its section IV-B): the height of the centre of mass follows a sine down and back, feet
-/// flat.
+/// \file The squat of the paper (its section IV-B): the height of the centre of mass follows a sine down and back, with
+/// flat feet.
 #include "bielle/motion/motion.h"
 
 namespace bielle {

@@ -1,9 +1,9 @@
 #pragma once
-/// \file Climbing and going down stairs, one foot per step.
+/// \file Stairs up and down, one foot per step.
 ///
 /// Step i is a box whose top is i times the height over (or under) the ground that the robot starts from; its middle is
-/// i times the depth ahead of the starting feet. Foot i lands on the middle of step i, the last foot joins it on the top
-/// one. Going down, the robot starts from a step of the same depth.
+/// i times the depth ahead of the starting feet. Foot i lands on the middle of step i, the last foot joins it on the
+/// top one. Going down, the robot starts from a step of the same depth.
 #include "bielle/motion/locomotion.h"
 
 namespace bielle {
@@ -11,7 +11,7 @@ namespace bielle {
 struct StairsOptions {
   double height = 0.06;  ///< of a step; negative: down, m
   double depth = 0.2;    ///< of a step, m
-  double slope = 0;      ///< height over depth, in place of the height unless it is 0, 1
+  double slope = 0;      ///< height over depth, replaces the height unless it is 0, 1
   double stairs = 4;     ///< number of steps of the stairs
   double speed = 0.3;    ///< forward velocity of the CoM, which with the depth gives the duration of a step, m/s
   double width = 0.8;    ///< of the stairs, m
@@ -20,13 +20,13 @@ struct StairsOptions {
   static LocomotionOptions makeGaitDefaults();
 };
 
-/// The duration of single support is not among them: it follows from depth and speed.
+/// They omit the duration of single support, which follows from depth and speed.
 std::vector<OptionEntry> listOptions(StairsOptions& options);
 
 /// Weights and durations of the paper's stairs.
 void setPaperWeights(StairsOptions& options);
 
-/// The stairs in front of feet whose middle (calcMiddle) is X_WP at the start.
+/// The stairs in front of feet whose middle (calcMiddle) is initially X_WP.
 Ground makeStairsGround(const StairsOptions& options, const SE3& X_WP);
 
 /// From the standing posture q0. \throws ModelError when the request is impossible (see locomotion.h)

@@ -1,7 +1,7 @@
 #pragma once
 /// \file Walking on level ground: forward, sideways, on the spot and along an arc.
 ///
-/// All four are footholds by footsteps.h Eq. (1) from the standing posture, and end standing at rest.
+/// All four take footholds from footsteps.h Eq. (1), start from the standing posture, and end standing at rest.
 #include "bielle/motion/locomotion.h"
 
 namespace bielle {

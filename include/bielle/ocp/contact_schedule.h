@@ -1,5 +1,5 @@
 #pragma once
-/// \file Which feet stand where and when, as a small readable list, and the ground: a plane and boxes on it.
+/// \file Contact schedule: which feet stand where and when; and the ground: a plane with boxes on it.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -27,7 +27,7 @@ struct Ground {
   double friction = 0.7;          ///< coefficient, 1
   std::vector<GroundStep> steps;  ///< the highest one counts
 
-  /// Height of what is under a point, m.
+  /// Height of the ground under a point, m.
   double calcHeight(double x, double y) const {
     double z = height;
     for (const GroundStep& step : steps)
@@ -36,10 +36,10 @@ struct Ground {
   }
 };
 
-/// Some time with the same contacts.
+/// A period with constant contacts.
 struct ContactPhase {
   std::string name;                     ///< e.g. "double support"
-  int nodes = 0;                        ///< stages it lasts
+  int nodes = 0;                        ///< number of stages
   double dt = 0;                        ///< length of a stage, s; 0: a rigid impact
   std::vector<ContactTarget> contacts;  ///< feet on the ground, with their places
 };

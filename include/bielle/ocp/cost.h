@@ -1,5 +1,5 @@
 #pragma once
-/// \file Costs: a residual under an activation, and the diagonal costs of state and control.
+/// \file Costs: activations of residuals, and diagonal costs of state and control.
 #include "bielle/ocp/residual.h"
 
 namespace bielle {
@@ -9,7 +9,7 @@ enum class ActivationKind { Quadratic, Barrier, LogBarrier };
 /// Scalar function of a residual r (n).
 ///   Quadratic:  1/2 sum_i w_i r_i^2
 ///   Barrier:    1/2 sum_i w_i (max(0, lower_i - r_i)^2 + max(0, r_i - upper_i)^2)
-///   LogBarrier: sum_i w_i (beta(r_i - lower_i) + beta(upper_i - r_i)), finite bounds only, relaxed at the distance
+///   LogBarrier: sum_i w_i (beta(r_i - lower_i) + beta(upper_i - r_i)), finite bounds only, relaxed within the distance
 ///               delta_i so that it is defined everywhere and twice differentiable (Feller and Ebenbauer, "Relaxed
 ///               logarithmic barrier function based model predictive control of linear systems", 2017):
 ///                   beta(d) = -ln(d / delta)  for d > delta,    1/2 ((d / delta - 2)^2 - 1)  otherwise.
@@ -23,14 +23,14 @@ struct Activation {
   static Activation makeBarrier(const VectorXd& weights, const VectorXd& lower, const VectorXd& upper);
   static Activation makeLogBarrier(const VectorXd& weights, const VectorXd& lower, const VectorXd& upper,
                                    const VectorXd& relaxation);
-  /// Whether weights, bounds and relaxation have the sizes that a residual of `rows` rows asks for.
+  /// Whether weights, bounds and relaxation have the sizes that a residual of `rows` rows needs.
   bool hasSize(Eigen::Index rows) const;
   double calc(ConstVectorRef r) const;
   /// Gradient (n) and diagonal of the Hessian (n) with respect to r.
   void calcDerivatives(ConstVectorRef r, VectorRef gradient, VectorRef hessian) const;
 };
 
-/// weight * activation(residual), by name for reports and for `--set`.
+/// weight * activation(residual); the name is for reports.
 struct Cost {
   std::string name;
   double weight = 1;
@@ -38,8 +38,7 @@ struct Cost {
   std::unique_ptr<Residual> residual;
 };
 
-/// 1/2 weight sum_i w_i d_i^2 with d the tangent difference of the state to a reference, (q (-) q_ref, v - v_ref) (2
-/// nv).
+/// 1/2 weight sum_i w_i d_i^2 with d = (q (-) q_ref, v - v_ref) (2 nv).
 struct StateCost {
   double weight = 0;
   VectorXd q_ref, v_ref;  ///< nq, nv

@@ -1,9 +1,9 @@
 #pragma once
-/// \file Residuals r(q, v, u, lambda) of costs, with analytic derivatives.
+/// \file Residuals r(q, v, lambda) of costs, with analytic derivatives.
 ///
-/// A residual is a small vector with sparse partial derivatives with respect to the tangent of q, to v, to the motor
-/// torques u and to the constraint forces lambda; the stage applies the chain rule through the dynamics. Frame
-/// residuals are written in world axes.
+/// A residual is a small vector with sparse partial derivatives with respect to the tangent of q, to v and to the
+/// constraint forces lambda; the stage applies the chain rule through the dynamics. Frame residuals are in world axes
+/// unless stated otherwise.
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,11 +12,11 @@
 
 namespace bielle {
 
-/// What a residual may look at: one node with its kinematics (and, at a stage, its dynamics) up to date.
+/// Data that a residual may read: one node with its kinematics (and, at a stage, its dynamics) up to date.
 struct NodeView {
   const Model& model;
-  /// In calc(): q, v, X_WB, V and hc, at the stage Bodies; in calcJacobian() J, dV, h, YJ and Yc as well, at the stage
-  /// Velocity. Functions of the library that look at more throw.
+  /// In calc(): q, v, X_WB, V and hc, at the stage Bodies; in calcJacobian() also J, dV, h, YJ and Yc, at the stage
+  /// Velocity. Functions of the library that read more throw.
   const Workspace& ws;
   const ConstraintSet& constraints;  ///< closures and contacts in force
   const VectorXd& u;                 ///< nu, empty at the terminal node
@@ -34,19 +34,19 @@ class Residual {
   virtual ~Residual() = default;
   virtual int size() const = 0;
   virtual bool needsForces() const { return false; }
-  /// False when it depends neither on q nor on v.
+  /// False if it depends neither on q nor on v.
   virtual bool needsMotion() const { return true; }
   virtual void calc(const NodeView& node, VectorRef r) const = 0;
   /// Writes all entries that may be non-zero at some state.
   virtual void calcJacobian(const NodeView& node, ResidualRows rows) const = 0;
 };
 
-/// A frame on a body, as the frame residuals use it.
+/// A frame on a body, for frame residuals.
 struct BodyFrame {
   int body = 0;
   SE3 X_BF;
 };
-/// \throws ModelError when the robot has no such link, frame or contact
+/// The link, frame or contact of this name. \throws ModelError when the robot has none
 BodyFrame getBodyFrame(const Model& model, const std::string& name);
 
 /// Centre of mass minus a reference (3), m.
@@ -66,18 +66,19 @@ std::unique_ptr<Residual> makeFrameVelocity(const BodyFrame& frame, const Vector
 std::unique_ptr<Residual> makeFlyHigh(const BodyFrame& frame, double slope, double ground);
 /// Horizontal distance between two frames (1), m.
 std::unique_ptr<Residual> makeFrameDistance(const BodyFrame& a, const BodyFrame& b);
-/// The axes that the force of a contact is told in; its moment is about the origin of the contact frame either way.
+/// The axes in which the force of a contact is expressed; its moment is always about the origin of the contact frame.
 enum class ForceAxes { Contact, World };
-/// Rows of the force of a contact minus a reference, N and N m (6 or 3). `constraint` is the index in the ConstraintSet.
+/// Rows of the force of a contact minus a reference, N and N m (6 or 3). `constraint` is the index in the
+/// ConstraintSet.
 std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constraint, const VectorXd& reference,
                                            ForceAxes axes = ForceAxes::Contact);
 /// Centre of pressure of a 6D contact about the origin of its frame (x, y) (2), m.
 std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint,
                                                ForceAxes axes = ForceAxes::Contact);
-/// Friction pyramid of a contact: mu f_z - |f_x| and mu f_z - |f_y| as four rows mu f_z -+ f_{x,y} (4), N; inside when
-/// positive.
+/// Friction pyramid of a contact: mu f_z - |f_x| and mu f_z - |f_y| as four rows mu f_z -+ f_{x,y} (4), N; positive
+/// inside.
 std::unique_ptr<Residual> makeFrictionPyramid(const ConstraintSet& set, int constraint, double mu);
-/// Coordinates of joints with one dof (all with finite limits when `dofs` is empty) (n), rad or m.
+/// Coordinates of joints with one dof (all those with finite limits if `dofs` is empty) (n), rad or m.
 std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs);
 /// Velocity coordinates (n), rad/s or m/s.
 std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs);

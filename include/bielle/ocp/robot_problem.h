@@ -3,21 +3,22 @@
 ///
 /// Full formulation (the paper): x = (q, v) of the spanning tree, tangent size 2 nv. One step of length h:
 ///
-///     a = constrained dynamics (q, v, u),    v+ = v + h a,    q+ = q (+) h v+                                        (1)
+///     a = constrained dynamics (q, v, u),    v+ = v + h a,    q+ = q (+) h v+                                      (1)
 ///
 /// with derivatives (J_q, J_d those of (+) at d = h v+)
 ///
-///     dv+ = dv + h da,                       dq+ = J_q dq + h J_d dv+                                                (2)
+///     dv+ = dv + h da,                       dq+ = J_q dq + h J_d dv+                                              (2)
 ///
-/// Reduced formulation (ours): every state is closed and its velocity keeps it so; tangent size 2 (nv - rank), about an
-/// orthonormal basis N(q) per node and loop cluster (reduction.h). With a as in (1), loops eliminated before anything
-/// of full size,
+/// Reduced formulation (ours): every state is closed and its velocity keeps it closed; tangent size 2 (nv - rank), in
+/// an orthonormal basis N(q) per node and loop cluster (reduction.h). With a as in (1), where loops are eliminated
+/// without forming full-size matrices,
 ///
-///     w = v + h a,    q+ = q (+) h w',  w' = w - W^{-1} J^T zeta with q+ closed,    v+ = (I - J^+ J)(q+) w'          (3)
+///     w = v + h a,    q+ = q (+) h w',  w' = w - W^{-1} J^T zeta with q+ closed,    v+ = (I - J^+ J)(q+) w'        (3)
 ///
-/// Its derivatives stand in src/ocp/reduced/reduced_kernel.h. As h vanishes both formulations have the same optimum.
-/// Running cost of a stage: h times the sum of its costs; the terminal node has no h.
-/// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and so on.
+/// Its derivatives are in src/ocp/reduced/reduced_kernel.h. As h vanishes both formulations have the same optimum.
+/// The running cost of a stage is h times the sum of its costs; the terminal cost is the sum itself.
+/// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and likewise for
+/// v and u.
 #include <string>
 #include <vector>
 
@@ -27,12 +28,12 @@
 
 namespace bielle {
 
-/// What a stage does: an Euler step of the dynamics, or a rigid impact (impact.h): (q, v) becomes (q, v+) in no time, the
-/// constraints being those in force afterwards. At an impact lambda is impulses, motors have no say, and the running cost
-/// is the sum of the costs as it stands.
+/// A stage is either an Euler step of the dynamics, or a rigid impact (impact.h): (q, v) becomes (q, v+) in no time,
+/// under the constraints in force afterwards. At an impact lambda holds impulses, motors have no effect, and the
+/// running cost is the sum of the costs, without h.
 enum class StageKind { Dynamics, Impact };
 
-/// One stage of the horizon (or the terminal node, where kind, dt and constraints are not used).
+/// One stage of the horizon (or the terminal node, which uses neither kind, dt nor constraints).
 struct StageSpec {
   StageKind kind = StageKind::Dynamics;
   double dt = 0.015;  ///< s; 0 for an impact
@@ -40,7 +41,7 @@ struct StageSpec {
   StateCost state;
   ControlCost control;
   std::vector<Cost> costs;
-  VectorXd effort_limits;  ///< of |u|, nu, for solvers that enforce bounds; empty: those of the motors
+  VectorXd effort_limits;  ///< bounds of |u|, nu, for solvers that enforce bounds; empty: those of the motors
 };
 
 /// Value of one cost at one node, for reports.
@@ -55,19 +56,20 @@ const char* getName(Formulation formulation);
 
 class Transcription;
 
-/// A node of a robot's problem: beside the next state, what made it.
+/// A node of a robot's problem, with the accelerations and forces behind its next state.
 struct RobotEvaluation : NodeEvaluation {
-  VectorXd a;          ///< nv, accelerations; at an impact, nothing
+  VectorXd a;          ///< nv, accelerations; not used at an impact
   VectorXd lambda;     ///< rows of the constraints of the stage: forces (at an impact, impulses), each in its frame 1
-  VectorXd residuals;  ///< of all costs, one after the other in an order of the problem's
+  VectorXd residuals;  ///< of all costs, concatenated in an order internal to the problem
   double state_cost = 0;  ///< before scaling by the time step
 };
 
 class RobotProblem : public ShootingProblem {
  public:
-  /// \param q0, v0 initial state; closed, with a velocity that keeps it closed, for the reduced formulation
-  /// \param stages N running stages and the terminal one at the end. The model must outlive the problem.
-  /// \throws ModelError on sizes that do not fit, or an open configuration for the reduced formulation
+  /// \param model  must outlive the problem
+  /// \param q0, v0  initial state; for the reduced formulation closed, with a velocity that keeps it closed
+  /// \param stages  N running stages, then the terminal one
+  /// \throws ModelError on sizes that do not match, or an open configuration in the reduced formulation
   RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages,
                Formulation formulation = Formulation::Full);
   ~RobotProblem() override;

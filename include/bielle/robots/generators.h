@@ -1,5 +1,5 @@
 #pragma once
-/// \file The robots that can be generated, by name, and their parameters.
+/// \file Generators of robots by name, and their parameters.
 #include <functional>
 #include <memory>
 #include <string>

@@ -4,43 +4,43 @@
 /// Mastalli et al., "Crocoddyl: An Efficient and Versatile Framework for Multi-Contact Optimal Control", ICRA 2020; the
 /// bounds after Tassa, Mansard, Todorov, "Control-Limited Differential Dynamic Programming", ICRA 2014.
 ///
-/// One iteration, from node states xs and controls us that need not obey the dynamics:
+/// One iteration, from node states xs and controls us that need not satisfy the dynamics:
 /// 1. Evaluate and linearize every stage about (xs_k, us_k); gap_k = difference(xs_{k+1}, f_k(xs_k, us_k)).
-/// 2. The LQ sweep (lq_sweep.h, its eqs. 2 to 7) gives k, K, and what the models foresee for a step of length alpha,
+/// 2. The LQ sweep (lq_sweep.h, its eqs. 2 to 7) gives k, K, and the predicted change of J for a step of length alpha,
 ///        change(alpha) = alpha slope + 1/2 alpha^2 curvature.                                                     (1)
 /// 3. Nonlinear rollout with x'_0 = xs_0 and, for k = 0 .. N-1, all tangent vectors in the coordinates of xs:
 ///        u'_k = us_k + alpha k_k + K_k dx_k               (projected on the bounds when they are enforced)         (2)
 ///        dx_{k+1} = difference(xs_{k+1}, f_k(x'_k, u'_k)) + (alpha - 1) gap_k,   x'_{k+1} = xs_{k+1} (+) dx_{k+1} (3)
 ///    so that the gaps contract to (1 - alpha) gap_k (to first order on a curved manifold); a full step closes them and
 ///    x'_{k+1} = f_k(x'_k, u'_k) exactly. The paper integrates (alpha - 1) gap_k from f_k(x'_k, u'_k) instead: the same
-///    on a vector space, but elsewhere the gap would be used at another point than the one whose coordinates it has.
-/// 4. Line search over alpha on the merit function J + nu c, with J the cost and c = sum_k |gap_k|_1, which should fall
-/// by
+///    on a vector space, but on a manifold it would apply the gap at a point to whose coordinates it does not belong.
+/// 4. Line search over alpha on the merit J + nu c, with J the cost and c = sum_k |gap_k|_1, predicted to fall by
 ///        decrease(alpha) = -change(alpha) + nu alpha c,                                                            (4)
 ///    positive on the whole of (0, 1] for rho = 1/2 and
 ///        nu = max(0, (slope + 1/2 max(0, curvature)) / ((1 - rho) c)). (5)
-///    alpha is accepted if the merit really falls by `acceptance` times (4), c by alpha c. As long as c falls in every
-///    iteration (which it does except after Eq. 7), nu may be chosen anew in each of them: the iterations cannot cycle.
-///    A problem that works on several tasks at once is given several alpha side by side; the largest acceptable one is taken.
+///    alpha is accepted if the merit actually falls by `acceptance` times (4). As long as c falls in every iteration
+///    (which it does, by alpha c, except after Eq. 7), nu may be chosen anew in each: the iterations cannot cycle.
+///    A problem that processes several tasks at once is given several alphas together; the largest acceptable one is
+///    taken.
 /// 5. If no alpha is accepted, or a Quu is indefinite, the regularization grows and the sweep is repeated.
 ///
-/// A rollout can be cut into segments that run at the same time. The segment that starts at node j starts from where
-/// the models see it,
+/// A rollout can be cut into segments that run at the same time. The segment that starts at node j starts from the
+/// state that the models predict,
 ///     dx_j = alpha dx*_j,   x'_j = xs_j (+) dx_j,    dx* the full step of the sweep,                               (7)
 /// and opens a new gap there, g_j = difference(xs_j, f_{j-1}(x'_{j-1}, u'_{j-1})) + (alpha - 1) gap_{j-1} - dx_j, of
-/// second order in the step, which later iterations close like any other. Its part in c of the trial counts, and its
-/// part in J is that the value function foresees the trial to cost, once the gap is closed,
+/// second order in the step, which later iterations close like any other. It counts in c of the trial; and since the
+/// value function predicts the cost of closing it, J of the trial is increased by
 ///     closing = sum_j Vx_j.g_j + (Vxx_j dx_j).g_j + 1/2 g_j.Vxx_j.g_j                                              (8)
-/// more. (The penalty nu c alone would not do: gaps and decrease are both of second order, so that it would refuse full
-/// steps however close to the solution.) A trial for which (8) exceeds half of (4) is refused, whatever its merit. A full step
-/// that is refused in segments is tried again in one piece, and so are all shorter ones; steps that follow a shortened one are
-/// rolled out in one piece. With LastRollout::Segments, for receding horizons, steps of all lengths are rolled out in segments:
-/// then an iteration takes about the same time whatever its step.
+/// (The penalty nu c alone would not suffice: gaps and decrease are both of second order, so that it would reject full
+/// steps however close to the solution.) A trial for which (8) exceeds half of (4) is rejected, whatever its merit. A
+/// full step that is rejected in segments is tried again in one piece, and so are all shorter ones; steps that follow a
+/// shortened one are rolled out in one piece. With LastRollout::Segments, for receding horizons, steps of all lengths
+/// are rolled out in segments: then an iteration takes about the same time whatever its step.
 ///
 /// The last step must close the gaps. If it is short it is rolled out twice, the second time from
 ///     dx'_j = e_j + (Fx + Fu K)_{j-1} .. (Fx + Fu K)_i (dx'_i - dx_i),                                             (9)
-/// where e_j is the deviation to which the segment from node i to j led at first: gaps of third order are left. If the step
-/// is not short, or this did not close them, it is rolled out in one piece.
+/// where e_j is the deviation at the end of the segment from node i to j in the first rollout: gaps of third order
+/// remain. If the step is not short, or this did not close them, it is rolled out in one piece.
 ///
 /// Stationarity is measured by the projected gradient, with [lower, upper] the bounds of du (infinite if ignored):
 ///     gradient = sum_k | clamp(-Qu_k, lower_k, upper_k) |^2. (6)
@@ -58,40 +58,40 @@ class LqSweep;
 
 enum class ControlBounds { Ignore, Enforce };
 
-/// The last iteration that is allowed closes the gaps; or, in a receding horizon, it leaves them to the next solve, as other
-/// iterations do, and all steps are rolled out in segments.
+/// The last allowed iteration either closes the gaps or, in a receding horizon, leaves them to the next solve like
+/// other iterations, and all steps are rolled out in segments.
 enum class LastRollout { Closed, Segments };
 
 struct FddpOptions {
   int max_iterations = 200;
-  /// Converged if Eq. (6) is below, in (units of cost per unit of control)^2, and the gaps are closed.
+  /// Converged if Eq. (6) is below this, in (units of cost per unit of control)^2, and the gaps are closed.
   double gradient_tolerance = 1e-9;
-  /// The gaps are closed if every entry is below, in units of the tangent space.
+  /// The gaps are closed if every entry is below this, in units of the tangent space.
   double gap_tolerance = 1e-10;
-  /// Converged too if a full step at the smallest regularization changes J by less than this times |J|; 0: never.
+  /// Also converged if a full step at the smallest regularization changes J by less than this times |J|; 0: never.
   double cost_tolerance = 1e-13;
 
   double initial_regularization = 1e-9;  ///< mu_u of the first sweep
   double min_regularization = 1e-9;
-  double max_regularization = 1e9;        ///< the solve is given up above
+  double max_regularization = 1e9;        ///< the solve gives up above this
   double regularization_increase = 10;    ///< factor after a failed sweep or line search or a short step
   double regularization_decrease = 10;    ///< divisor after a long step
   double state_regularization_ratio = 1;  ///< mu_x / mu_u
-  double long_step = 0.5;                 ///< alpha is long above
-  double short_step = 0.01;               ///< alpha is short up to here
+  double long_step = 0.5;                 ///< alpha is long above this
+  double short_step = 0.01;               ///< alpha is short up to this
 
   int num_step_lengths = 10;  ///< alpha = 1, 1/2, ..., 2^(1 - num_step_lengths)
-  double acceptance = 0.1;    ///< share of Eq. (4) by which the merit must really fall, in (0, 1)
+  double acceptance = 0.1;    ///< share of Eq. (4) by which the merit must actually fall, in (0, 1)
 
   ControlBounds bounds = ControlBounds::Ignore;
-  /// Segments of a rollout, Eq. (7), at most: none is shorter than 6 stages. Results depend on it, within the
-  /// tolerances, and therefore it is not the number of threads.
+  /// Largest number of segments of a rollout, Eq. (7); none is shorter than 6 stages. Results depend on it, within the
+  /// tolerances: therefore it is not the number of threads.
   int rollout_segments = 16;
   LastRollout last_rollout = LastRollout::Closed;
-  int threads = 0;  ///< 0: all. The result does not depend on it by a single bit.
+  int threads = 0;  ///< 0: all. Results are bitwise independent of it.
 };
 
-/// One line of the log: the iterate that iteration started from and the step it took.
+/// One line of the log: the iterate that the iteration started from and the step it took.
 struct FddpIteration {
   int iteration = 0;
   double cost = 0;            ///< J before the step
@@ -118,15 +118,15 @@ struct FddpSummary {
   double gap = 0;   ///< max_k |gap_k|_inf of the returned trajectory (after a last step alpha < 1: by Eq. 3)
   int iterations = 0;
   double seconds = 0;
-  // Where the time went, s, summed over the threads: with one thread they add up to almost `seconds`.
+  // Time by part, s, summed over the threads: with one thread they add up to almost `seconds`.
   double linearize_seconds = 0, sweep_seconds = 0, rollout_seconds = 0;
   std::vector<FddpIteration> log;
 };
 
 enum class FddpAction { Continue, Stop };
 
-/// How to watch and stop a solve. Stopping leaves the current iterate, the best one so far, in the trajectory; gaps that
-/// are open in it stand in the summary.
+/// Observes and stops a solve. Stopping leaves the current iterate, the best one so far, in the trajectory; the summary
+/// has the gaps that are still open.
 struct FddpObserver {
   /// Called after each iteration; the trajectory passed to solve() is then the new iterate.
   std::function<FddpAction(const FddpIteration&)> callback;
@@ -134,12 +134,13 @@ struct FddpObserver {
   const std::atomic<bool>* interrupt = nullptr;
 };
 
-/// The solver owns its memory and can be kept from solve to solve: an iteration after the first allocates nothing. Evaluations
-/// are kept for as long as the problem has the same id(). It calls integrate() and difference() only about evaluations of the
-/// current iterate. What a problem throws leaves solve(), with the current iterate in the trajectory.
+/// The solver owns its memory and can be kept from solve to solve: an iteration after the first allocates nothing.
+/// Evaluations are kept as long as the problem has the same id(). The solver calls integrate() and difference() only
+/// about evaluations of the current iterate. Exceptions of the problem leave solve(), with the current iterate in the
+/// trajectory.
 class Fddp {
  public:
-  struct Workspace;  ///< what a solve writes, kept between solves
+  struct Workspace;  ///< memory of a solve, kept between solves
 
   /// Throws std::invalid_argument on options that make no sense, naming them.
   explicit Fddp(const FddpOptions& options = {});
@@ -147,17 +148,18 @@ class Fddp {
   Fddp(Fddp&&) noexcept;
   Fddp& operator=(Fddp&&) noexcept;
 
-  /// trajectory: initial guess in, xs_0 is replaced by the initial state and controls are projected on enforced bounds;
-  /// current iterate during and after. Throws std::invalid_argument if its sizes do not fit the problem.
+  /// trajectory: on entry the initial guess, whose xs_0 is replaced by the initial state and whose controls are
+  /// projected on enforced bounds; then the current iterate. Throws std::invalid_argument if its sizes do not match the
+  /// problem.
   FddpSummary solve(const ShootingProblem& problem, ShootingTrajectory& trajectory, const FddpObserver& observer = {});
 
-  /// Moves a horizon on by one stage: the trajectory that the last solve() returned and, with it, the evaluations of its
-  /// nodes. The next solve(), of a problem with the same id() whose node k is what node k + 1 was, evaluates only nodes 0, N - 1
-  /// and N. Until then no other node of the trajectory may change, or that solve() throws std::invalid_argument. The last
-  /// state and control are repeated.
+  /// Shifts a horizon by one stage: the trajectory that the last solve() returned and the evaluations of its nodes. The
+  /// next solve(), of a problem with the same id() whose node k is the previous node k + 1, evaluates only nodes 0,
+  /// N - 1 and N. Until then no other node of the trajectory may change, or that solve() throws std::invalid_argument.
+  /// The last state and control are repeated.
   void advance(ShootingTrajectory& trajectory);
 
-  /// Gains and value function of the last sweep, about the last linearized trajectory.
+  /// Gains and value function of the last sweep, about the trajectory linearized last.
   const LqSweep& getSweep() const;
 
  private:
@@ -165,7 +167,8 @@ class Fddp {
   std::unique_ptr<Workspace> work_;
 };
 
-/// The log as a table: its header, and one line per iteration; and a callback that prints it as it grows.
+/// Print the log as a table: its header, and one line per iteration. makeFddpPrinter() returns a callback that does
+/// both.
 void printFddpHeader(std::ostream& out);
 void printFddpIteration(std::ostream& out, const FddpIteration& line);
 std::function<FddpAction(const FddpIteration&)> makeFddpPrinter(std::ostream& out);

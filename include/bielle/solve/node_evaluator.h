@@ -1,10 +1,10 @@
 #pragma once
-/// \file One node of a shooting problem at a time, for programs that are no solvers.
+/// \file Evaluates one node of a shooting problem at a time, outside a solver.
 #include "bielle/solve/shooting_problem.h"
 
 namespace bielle {
 
-/// Owns an evaluation and the scratch for it. No allocation once it has seen a node of the same sizes.
+/// Owns an evaluation and its scratch. No allocation after the first node of the same sizes.
 class NodeEvaluator {
  public:
   /// The problem must outlive it.
@@ -13,7 +13,7 @@ class NodeEvaluator {
   /// Dynamics and cost of a node at (x, u), kept until the next call; u is not read at the terminal node.
   const NodeEvaluation& evaluate(int node, const VectorXd& x, const VectorXd& u = VectorXd());
   /// Quadratic model about the last evaluation, which must be Ok.
-  /// \param next  evaluation of the node behind it; null at the terminal node
+  /// \param next  evaluation of the next node; null at the terminal node
   StepStatus linearize(const NodeEvaluation* next, StageModel& out);
   /// x (+) dx and x1 (-) x about the state x of the last evaluation.
   VectorXd integrate(const VectorXd& dx);

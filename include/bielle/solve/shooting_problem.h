@@ -3,14 +3,14 @@
 ///
 ///     min  sum_k l_k(x_k, u_k) + l_N(x_N)    s.t.  x_0 given,  x_{k+1} = f_k(x_k, u_k),   k = 0 .. N-1
 ///
-/// A state x is a vector of numbers (quaternions, say) that stands for a point of a manifold; the tangent space at node
-/// k has its own dimension. The solver knows no robot: it asks for evaluations, differences and quadratic models.
+/// A state x is a vector of numbers (e.g. quaternions) that represents a point of a manifold; the tangent space at node
+/// k has its own dimension. The solver knows no robot: it requests evaluations, differences and quadratic models.
 ///
-/// A problem is immutable while it is solved. What it computes about a node is a value, a NodeEvaluation, which the solver
-/// keeps and hands back: derivatives and tangent spaces are those of an evaluation, never of "the last call". Every function
-/// takes several tasks at once, which a problem may work on together; results do not depend, by a single bit, on which tasks
-/// come together, or in which order. Different threads may call at the same time, each with a scratch of its own. Exceptions
-/// are for programming errors: they leave the solver as they are.
+/// A problem is immutable while it is solved. The result of evaluating a node is a value, a NodeEvaluation, which the
+/// solver keeps and hands back: derivatives and tangent spaces are those of an evaluation, never of "the last call".
+/// Every function takes several tasks at once, which a problem may process together; results must not depend, not even
+/// in the last bit, on batching or order. Different threads may call at the same time, each with its own scratch.
+/// Exceptions are for programming errors: the solver passes them on unchanged.
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -20,11 +20,11 @@
 
 namespace bielle {
 
-/// A numerical failure is a value, never an exception or a NaN handed on.
+/// A numerical failure is a status, never an exception or a NaN passed on.
 enum class StepStatus { Ok, Failed };
 
-/// A node evaluated at (x, u). Problems derive their own from it, with whatever derivatives will need. It belongs to the problem
-/// that made it, where it can hold any node, one after the other.
+/// A node evaluated at (x, u). Problems derive their own class from it, with the data that derivatives will need. It
+/// belongs to the problem that made it and can be reused for any of its nodes.
 struct NodeEvaluation {
   virtual ~NodeEvaluation() = default;
   VectorXd x;       ///< stateSize
@@ -39,18 +39,18 @@ struct EvaluateTask {
   int node = 0;                 ///< in [0, N]
   const VectorXd* x = nullptr;  ///< may be out->x
   const VectorXd* u = nullptr;  ///< may be out->u; not read at the terminal node
-  /// The evaluation of the node before, if x is its x_next to the last bit: what was computed there may be taken over, which
-  /// saves time and changes no bit of the result.
+  /// The evaluation of the previous node, if x is its x_next to the last bit: reusing its data saves time and changes
+  /// no bit of the result.
   const NodeEvaluation* previous = nullptr;
-  NodeEvaluation* out = nullptr;  ///< from makeEvaluation() of this problem; holds anything before
+  NodeEvaluation* out = nullptr;  ///< from makeEvaluation() of this problem; its content is overwritten
 };
 
 struct LinearizeTask {
   int node = 0;                  ///< in [0, N]
-  NodeEvaluation* at = nullptr;  ///< whose status is Ok; derivatives may be kept there
+  NodeEvaluation* at = nullptr;  ///< its status is Ok; derivatives may be kept there
   /// The evaluation of node + 1, whose x is the node state to which the gap leads; null at the terminal node.
   const NodeEvaluation* next = nullptr;
-  StageModel* out = nullptr;  ///< of the right sizes, and holding anything
+  StageModel* out = nullptr;  ///< of the right sizes; its content is overwritten
   StepStatus status = StepStatus::Failed;
   std::string failure;  ///< why the status is not Ok, for messages; may be empty
 };
@@ -60,7 +60,7 @@ struct IntegrateTask {
   int node = 0;
   const NodeEvaluation* at = nullptr;
   const VectorXd* dx = nullptr;
-  VectorXd* x_out = nullptr;  ///< not finite where that failed
+  VectorXd* x_out = nullptr;  ///< not finite after a failure
 };
 
 /// dx with x (+) dx = x1.
@@ -80,28 +80,29 @@ class ShootingProblem {
  public:
   virtual ~ShootingProblem() = default;
 
-  /// Tells problems apart: no two have the same, and a copy has its own. Evaluations and scratch belong to one problem.
+  /// Identifies the problem: no two have the same, and a copy has its own. Evaluations and scratch belong to one
+  /// problem.
   std::uint64_t id() const { return id_.value; }
 
   virtual int numStages() const = 0;             ///< N; there are N + 1 nodes
-  virtual int stateSize() const = 0;             ///< numbers in a state, the same at every node
+  virtual int stateSize() const = 0;             ///< size of x, the same at every node
   virtual int tangentSize(int node) const = 0;   ///< node in [0, N]
   virtual int controlSize(int stage) const = 0;  ///< stage in [0, N)
   virtual const VectorXd& initialState() const = 0;
-  /// Bounds of the controls of a stage (nu each), infinite where there are none.
+  /// Bounds of the controls of a stage (nu each), infinite if there are none.
   virtual void getControlBounds(int stage, VectorRef lower, VectorRef upper) const;
 
   virtual std::unique_ptr<NodeEvaluation> makeEvaluation() const;
   virtual std::unique_ptr<ProblemScratch> makeScratch() const { return nullptr; }
 
-  /// f_k and l_k, or l_N. Tasks may name the same node, each with an evaluation of its own to be filled; no task's `previous`
-  /// is another's `out`. Evaluations that held nodes of the same sizes before are filled without an allocation.
+  /// Computes f_k and l_k, or l_N. Several tasks may have the same node, each with its own `out`; no task's `previous`
+  /// is another's `out`. Evaluations that held nodes of the same sizes before are filled without allocation.
   virtual void evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const = 0;
   /// Quadratic models about evaluations.
   virtual void linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const = 0;
   virtual void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const = 0;
   virtual void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const = 0;
-  /// How many tasks the functions are best given.
+  /// Number of tasks per call for best speed.
   virtual int getBatchSize() const { return 1; }
 
  private:
@@ -114,7 +115,7 @@ class ShootingProblem {
   Id id_;
 };
 
-/// A problem that works on one task at a time.
+/// A problem that processes one task at a time.
 class NodewiseProblem : public ShootingProblem {
  public:
   virtual void evaluate(EvaluateTask& task, ProblemScratch* scratch) const = 0;

@@ -4,7 +4,7 @@
 
 namespace bielle {
 
-/// A part of a larger matrix, and the transpose of one.
+/// A block of a larger matrix, and the transpose of one.
 using MatrixMap = Eigen::Map<MatrixXd, 0, Eigen::OuterStride<>>;
 using ConstMatrixMap = Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>>;
 using RowMatrixMap = Eigen::Map<RowMatrixXd, 0, Eigen::OuterStride<>>;
@@ -13,10 +13,10 @@ using ConstRowMatrixMap = Eigen::Map<const RowMatrixXd, 0, Eigen::OuterStride<>>
 /// About (x_k, u_k), in tangent coordinates at x_k and at the node state x_{k+1}:
 ///     dx_{k+1} = Fx dx_k + Fu du_k + gap
 ///     l = cost + lx.dx + lu.du + 1/2 (dx.lxx.dx + 2 du.lux.dx + du.luu.du)
-/// At the terminal node cost, lx and lxx only: its other sizes are zero.
+/// The terminal node has only cost, lx and lxx: its other sizes are zero.
 ///
-/// The matrices are views of two that are kept the way the sweep works on them: F^T = [Fu Fx]^T, and the lower triangle of the
-/// Hessian [luu . ; lux^T lxx], both with columns that begin at multiples of a processor's vector register.
+/// The matrices are views of two that are stored as the sweep needs them: F^T = [Fu Fx]^T, and the lower triangle of
+/// the Hessian [luu . ; lux^T lxx], both with columns aligned to the processor's vector registers.
 class StageModel {
  public:
   VectorXd gap;  ///< ndx_{k+1}: difference(x_{k+1}, f_k(x_k, u_k))
@@ -24,10 +24,10 @@ class StageModel {
   VectorXd lx;  ///< ndx_k
   VectorXd lu;  ///< nu_k
 
-  /// All of it zero.
+  /// Sets the sizes, and all entries to zero.
   void resize(int ndx, int nu, int ndx_next);
-  /// Exchanges the memory of the Hessian for another piece of at least its size, numbers and all; without any, it must not be
-  /// used.
+  /// Exchanges the memory of the Hessian, with its content, for another piece of at least its size; while it has none,
+  /// the Hessian must not be used.
   void swapHessian(VectorXd& memory) { hessian_.swap(memory); }
   bool hasSizes(int ndx, int nu, int ndx_next) const;
 
@@ -54,7 +54,7 @@ class StageModel {
   Eigen::OuterStride<> stride() const { return Eigen::OuterStride<>(stride_); }
 
   Eigen::Index ndx_ = 0, nu_ = 0, ndx_next_ = 0;
-  Eigen::Index stride_ = 0;  // nu + ndx, rounded up to full registers; what stands below is finite
+  Eigen::Index stride_ = 0;  // nu + ndx, rounded up to full registers; the padding is finite
   VectorXd Ft_, hessian_;
 };
 
