@@ -1,6 +1,6 @@
 #pragma once
-/// \file Products of matrices with a few tens of rows and columns, where a general product spends as much time on packing
-/// its operands as on multiplying them.
+/// \file Products of matrices with a few tens of rows and columns, where a general product spends as much time on
+/// packing its operands as on multiplying them.
 #include <algorithm>
 
 #include "bielle/math/types.h"
@@ -31,8 +31,8 @@ struct StridedMatrix {
   Eigen::Index row_stride, col_stride;
 };
 
-/// C += sign A B, C (rows x cols), A (rows x depth), B (depth x cols). Entries below `rows` in the last lane of C become
-/// undefined.
+/// C += sign A B, C (rows x cols), A (rows x depth), B (depth x cols). Entries below `rows` in the last lane of C
+/// become undefined.
 void addProduct(Eigen::Index rows, Eigen::Index cols, Eigen::Index depth, double sign, ConstPaddedMatrix A,
                 StridedMatrix B, PaddedMatrix C);
 
@@ -64,8 +64,8 @@ void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, ConstP
 /// H(i, j) = sum_k A(i, k) B(j, k) for i >= j, k < depth, likewise; H may be uninitialized.
 void setLowerProduct(Eigen::Index depth, ConstPaddedMatrix A, ConstPaddedMatrix B, PaddedMap H);
 
-/// Cholesky elimination of the first `num` unknowns of a symmetric H, of which the lower triangle is read: their columns
-/// become L over Y^T, the rest of H is unchanged. False when a pivot is not positive.
+/// Cholesky elimination of the first `num` unknowns of a symmetric H, of which the lower triangle is read: their
+/// columns become L over Y^T, the rest of H is unchanged. False when a pivot is not positive.
 bool factorizeColumns(PaddedMap H, Eigen::Index num);
 /// X L^{-T} and X L^{-1} in place, L the lower triangle of a square matrix.
 void solveTransposedFromRight(ConstMatrixRef L, PaddedMap X);

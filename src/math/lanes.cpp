@@ -5,8 +5,8 @@
 namespace bielle {
 namespace {
 
-// x = n pi/2 + r with |r| <= pi/4, pi/2 in three parts of which the first two have 33 bits (Cody and Waite); beyond this n
-// their products are no longer exact.
+// x = n pi/2 + r with |r| <= pi/4, pi/2 in three parts of which the first two have 33 bits (Cody and Waite); beyond
+// this n their products are no longer exact.
 constexpr double kHalfPi1 = 1.57079632673412561417e+00, kHalfPi2 = 6.07710050630396597660e-11,
                  kHalfPi3 = 2.02226624879595063154e-21, kTwoOverPi = 6.36619772367581382433e-01;
 constexpr double kLargest = 1e5;

@@ -1,10 +1,10 @@
 #pragma once
 /// \file A scalar type for Eigen that holds one number per lane of a vector register.
 ///
-/// Neighbouring nodes of a horizon differ in their numbers only, and their dynamics are short chains of dependent operations
-/// on vectors of 3 to 14 numbers. With one node per lane, each operation of such a chain processes kLane nodes in a full
-/// register. Lanes never mix: the result in one does not depend by a single bit on the contents of the others, so that
-/// nodes can be grouped in any way.
+/// Neighbouring nodes of a horizon differ in their numbers only, and their dynamics are short chains of dependent
+/// operations on vectors of 3 to 14 numbers. With one node per lane, each operation of such a chain processes kLane
+/// nodes in a full register. Lanes never mix: the result in one does not depend by a single bit on the contents of the
+/// others, so that nodes can be grouped in any way.
 #include <Eigen/Core>
 #include <array>
 #include <cmath>

@@ -21,7 +21,7 @@ double NodeCosts::calcControlCost(const VectorXd& u) const {
   return 0.5 * control.weight * (u - control.reference).cwiseAbs2().dot(control.weights);
 }
 
-// Costs one after the other, unscaled.
+// Visits the costs in turn, unscaled.
 template <typename Add>
 void NodeCosts::visitValues(const RobotEvaluation& at, const Add& add) const {
   static const std::string kState = "state", kControl = "control";
@@ -59,7 +59,7 @@ void NodeCosts::differentiate(const NodeView& node, const RobotEvaluation& at, R
     cost.activation.calcDerivatives(at.residuals.segment(row, n), gradient, hessian);
     gradient *= scale_ * cost.weight;
     hessian *= scale_ * cost.weight;
-    if (gradient.isZero(0) && hessian.isZero(0)) continue;  // bounds that are kept, for one
+    if (gradient.isZero(0) && hessian.isZero(0)) continue;  // for example bounds that are satisfied
     cost.residual->calcJacobian(node, {jacobians.q.middleRows(row, n), jacobians.v.middleRows(row, n),
                                        jacobians.lambda.block(row, 0, n, spec_.constraints.rows)});
   }

@@ -10,7 +10,7 @@ struct ResidualWeights {
   bool counts(int row) const { return gradient[row] != 0 || hessian[row] != 0; }
 };
 
-// Partial derivatives of stacked residuals, rows x nv, nv, constraint rows; with room for those of other nodes.
+// Partial derivatives of stacked residuals, rows x nv, nv, constraint rows; they may be larger than one node needs.
 struct ResidualJacobians {
   MatrixXd q, v, lambda;
 };
@@ -25,12 +25,12 @@ class NodeCosts {
   // Factor of the sum of the costs: the time step of a running stage; 1 at an impact and at the terminal node.
   double scale() const { return scale_; }
 
-  // Residuals, and from them the scaled cost; `at` has its state cost already.
+  // Computes the residuals and the scaled cost; the state cost of `at` must be up to date.
   void calc(const NodeView& node, RobotEvaluation& at) const;
-  // Scaled weights of the rows and Jacobians of those that count; the entries of the Jacobians are zero before.
+  // Computes scaled weights of the rows, and Jacobians of the rows that count, which must be zero before.
   void differentiate(const NodeView& node, const RobotEvaluation& at, ResidualWeights& weights,
                      ResidualJacobians& jacobians) const;
-  // Derivatives of the control cost, added.
+  // Adds the derivatives of the control cost.
   void addControlCost(const VectorXd& u, StageModel& out) const;
   std::vector<CostValue> getValues(const RobotEvaluation& at) const;
 

@@ -121,7 +121,7 @@ class CenterOfPressure : public ForceResidual {
   }
 
  private:
-  // Under 1 N of load there is no centre of pressure to speak of.
+  // Below 1 N of load the centre of pressure is not meaningful.
   static double limit(double fz) { return std::max(fz, 1.0); }
 };
 

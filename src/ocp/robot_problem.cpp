@@ -52,8 +52,8 @@ bool startEvaluation(const Model& model, const EvaluateTask& task, const StageSp
   return at.x.allFinite() && at.u.allFinite();
 }
 
-// As allFinite(), but vectorized: a value that is not finite makes the sum one too. The Hessian is a sum of squares, so any NaN
-// shows on its diagonal.
+// As allFinite(), but vectorized: a value that is not finite makes the sum NaN. The Hessian is a sum of squares, so any
+// NaN shows on its diagonal.
 bool isFinite(const StageModel& model) { return (0 * model.Ft()).sum() == 0 && model.hessian().diagonal().allFinite(); }
 
 RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages,

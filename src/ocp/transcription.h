@@ -1,6 +1,6 @@
 #pragma once
-// A formulation behind RobotProblem: what a node's state space is and how its dynamics become a step. The functions are those of
-// ShootingProblem; count is at most the batch size.
+// A formulation behind RobotProblem: it defines the state space of a node and discretizes its dynamics. The functions
+// are those of ShootingProblem; count is at most the batch size.
 #include "bielle/ocp/robot_problem.h"
 #include "ocp/node_costs.h"
 
@@ -25,11 +25,11 @@ std::unique_ptr<Transcription> makeFullTranscription(const Model& model, const s
 std::unique_ptr<Transcription> makeReducedTranscription(const Model& model, const VectorXd& q0,
                                                         const std::vector<StageSpec>& specs);
 
-// Gives `at` the sizes, the state and the controls of a task, and the status Failed. False when they are not finite.
+// Gives `at` the sizes, the state and the controls of a task, and the status Failed. False if they are not finite.
 bool startEvaluation(const Model& model, const EvaluateTask& task, const StageSpec& spec, bool running, int residuals,
                      RobotEvaluation& at);
 
-// False if anything of a model that matters is not finite.
+// False if an entry of a model that the solver reads is not finite.
 bool isFinite(const StageModel& model);
 
 // Joints whose configuration is not a vector: their blocks of the manifold Jacobians differ from the identity.

@@ -199,8 +199,8 @@ Run::End Run::findStep() {
   }
 }
 
-// The sweep, at the least regularization from the current one on for which it goes through. A second one needs the models
-// anew, because a sweep uses up their Hessians; the evaluations are still there.
+// The sweep, at the least regularization from the current one on for which it goes through. A second one needs the
+// models anew, because a sweep uses up their Hessians; the evaluations are still there.
 Run::End Run::updateStep() {
   failure_.clear();
   while (true) {
@@ -240,8 +240,8 @@ double Run::calcGradient() const {
   return gradient;
 }
 
-// Whether the step should close the gaps for good: the last one allowed, and the one after which the gradient vanishes if
-// it goes on as it came.
+// Whether the step should close the gaps for good: the last one allowed, and the one after which the gradient vanishes
+// if it goes on as it came.
 bool Run::mustClose() const {
   const bool last = options_.last_rollout == LastRollout::Closed && line_.iteration >= options_.max_iterations;
   return last ||
@@ -278,7 +278,8 @@ bool Run::searchLine() {
   return false;
 }
 
-// A full step in segments. They start where linear models foresee it: what they cannot reach, a rollout in one piece may.
+// A full step in segments. They start where linear models foresee it: what they cannot reach, a rollout in one piece
+// may.
 bool Run::tryFullStep(const RolloutInput& input, int segments, double nu) {
   Rollout& rollout = work_.rollout;
   Trial& trial = rollout.getTrial(0);

@@ -1,6 +1,6 @@
 #pragma once
-// Second derivatives are needed only from the linearization of a node to its sweep, which follows soon: pieces of memory that
-// are passed from node to node, the most recently returned one first, stay in the cache.
+// Second derivatives are needed only from the linearization of a node to its sweep, which follows soon: pieces of
+// memory that are passed from node to node, the most recently returned one first, stay in the cache.
 #include <algorithm>
 #include <mutex>
 

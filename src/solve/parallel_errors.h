@@ -5,8 +5,8 @@
 
 namespace bielle {
 
-/// Keeps what the tasks of a parallel region throw, of several the exception of the task with the smallest index, so that the
-/// same one comes out whatever the number of threads.
+/// Keeps what the tasks of a parallel region throw, of several the exception of the task with the smallest index, so
+/// that the same one comes out whatever the number of threads.
 class ParallelErrors {
  public:
   template <class Task>

@@ -1,5 +1,6 @@
 #pragma once
-// Numbers between nodes, which each have theirs side by side, and lanes (lanes.h), where each number has its nodes side by side.
+// Transfers numbers between nodes, each of which stores its numbers contiguously, and lanes (lanes.h), which store the
+// values of all nodes side by side for each number.
 #include <array>
 
 #include "bielle/math/se3.h"
@@ -7,7 +8,7 @@
 
 namespace bielle {
 
-// The nodes of a batch. Lanes without a node do what the first one does.
+// The nodes of a batch. Lanes without a node repeat the first one.
 template <typename Node>
 struct LaneSource {
   Node* const* nodes;
@@ -15,7 +16,7 @@ struct LaneSource {
   Node& operator[](int lane) const { return *nodes[lane < count ? lane : 0]; }
 };
 
-// Each lane of out (size numbers) gets those at get(lane), which is asked for lanes below count; the others get those of lane 0.
+// Each lane below count of out (size numbers) receives the numbers at get(lane); the others receive those of lane 0.
 template <typename Get>
 void gatherLanes(int count, Eigen::Index size, Lanes* out, const Get& get) {
   std::array<const double*, kLane> in;
@@ -23,7 +24,7 @@ void gatherLanes(int count, Eigen::Index size, Lanes* out, const Get& get) {
   packLanes(in, size, out);
 }
 
-// get(lane) says where the numbers of a lane below count go, null for nowhere.
+// get(lane) is the destination of the numbers of a lane below count, or null for none.
 template <typename Get>
 void scatterLanes(const Lanes* in, Eigen::Index size, int count, const Get& get, Eigen::Index stride = 1) {
   std::array<double*, kLane> out{};
@@ -31,7 +32,7 @@ void scatterLanes(const Lanes* in, Eigen::Index size, int count, const Get& get,
   unpackLanes(in, size, out, stride);
 }
 
-// Placements as the numbers they are made of.
+// Placements as arrays of numbers.
 static_assert(sizeof(SE3) == 12 * sizeof(double) && sizeof(SE3Of<Lanes>) == 12 * sizeof(Lanes));
 inline const double* getNumbers(const SE3& X) { return X.R.data(); }
 inline double* getNumbers(SE3& X) { return X.R.data(); }

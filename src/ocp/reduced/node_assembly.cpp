@@ -33,7 +33,7 @@ NodeAssembly::NodeAssembly(const Model& model, const Reduction& reduction, const
   dlambda_.setZero(padded * layout.most_contact_rows);
 }
 
-// The columns of dv = dy_v + h dy' from the dynamics, and what the step makes of dv and dy.
+// The columns of dv = dy_v + h dy' from the dynamics, then the effect of dv and dy on the step.
 void NodeAssembly::setStep(double h, const ContactLayout& contacts, const ReducedEvaluation& at,
                            const ReducedEvaluation& next, LaneView& view, StageModel& out) {
   const int nr = reduction_.size, nu = model_.nu();
@@ -68,7 +68,7 @@ void NodeAssembly::addMotorRows(const ReducedEvaluation& at, PaddedMap dydd) con
   }
 }
 
-// The right-hand sides of the contact rows.
+// Sets the right-hand sides of the contact rows.
 void NodeAssembly::setContactDerivatives(const ContactLayout& contacts, const LaneView& view) {
   const int nr = reduction_.size, nu = model_.nu();
   PaddedMap dlambda = shapePadded(dlambda_, nu + 2 * nr, contacts.rows);
@@ -111,7 +111,7 @@ void NodeAssembly::updateFreeJoint(double h, const ReducedEvaluation& at, const 
   free.q_v = h * Jdiff.lazyProduct(Jd);
 }
 
-// Columns of F^T, from those of dv and what each reduced joint makes of dv and dy.
+// Columns of F^T, from those of dv and the derivatives of each reduced joint with respect to dv and dy.
 void NodeAssembly::setTransition(double h, const LaneView& view, PaddedMap dv, StageModel& out) const {
   const Eigen::Index nr = reduction_.size, nu = model_.nu();
   MatrixMap Ft = out.Ft();
@@ -191,7 +191,7 @@ void NodeAssembly::addTimesZ(ConstMatrixRef A, const LaneView& view, MatrixRef o
     addClusterColumns(reduction_.clusters[i], A, view.clusters[i].Z, out);
 }
 
-// Rt = (dr/d(u, dy, dy_v))^T, one column per residual: Rt diag(hessian) Rt^T is all second derivatives at once.
+// With Rt = (dr/d(u, dy, dy_v))^T, one column per residual, Rt diag(hessian) Rt^T is the whole Hessian.
 void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
                                 const ReducedEvaluation& at, const LaneView& view, StageModel& out) {
   const int nr = reduction_.size, nu = static_cast<int>(at.u.size()), columns = nu + 2 * nr, rows = costs.rows();
@@ -200,7 +200,7 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
     out.hessian().setZero();
     return;
   }
-  // Residuals of other nodes were here before. In full lanes, for which there is room.
+  // Clears the residuals of the last node, in full lanes: the memory is padded.
   for (Eigen::Index i = 0; i < costs.motionRows(); i += kLane) {
     jacobians_.q.middleRows<kLane>(i).setZero();
     jacobians_.v.middleRows<kLane>(i).setZero();
@@ -212,7 +212,7 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
   updateResidualDerivatives(costs, contacts, at, view, Rt);
   auto gradient = gradient_.head(columns);
   gradient.setZero();
-  int counting = 0;  // rows so far that have a weight here
+  int counting = 0;  // rows so far with a non-zero weight
   for (int i = 0; i < rows; ++i) {
     if (!weights_.counts(i)) continue;
     gradient += weights_.gradient[i] * Rt.col(i);

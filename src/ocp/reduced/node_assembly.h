@@ -1,5 +1,5 @@
 #pragma once
-// The quadratic model of one node from what the kernel has left in its view: F^T, and residuals by the chain rule.
+// The quadratic model of one node from its view, which the kernel has filled: F^T, and residuals by the chain rule.
 #include "math/lane_product.h"
 #include "ocp/reduced/reduced_kernel.h"
 
@@ -9,18 +9,18 @@ class NodeAssembly {
  public:
   NodeAssembly(const Model& model, const Reduction& reduction, const ReducedLayout& layout, int most_residuals);
 
-  // Fx, Fu and gap of a step; the derivatives of its contact forces, which setResiduals() needs next. Uses up view.dydd.
+  // Sets Fx, Fu and gap of a step, and the derivatives of its contact forces for setResiduals(). Overwrites view.dydd.
   void setStep(double h, const ContactLayout& contacts, const ReducedEvaluation& at, const ReducedEvaluation& next,
                LaneView& view, StageModel& out);
-  // Those of the impulses of an impact, by q and by v (rows x nv).
+  // Sets the derivatives of the impulses of an impact with respect to q and v (rows x nv).
   void setImpulseDerivatives(ConstMatrixRef by_q, ConstMatrixRef by_v, const ReducedEvaluation& at,
                              const LaneView& view);
-  // Gauss-Newton terms of the residuals, whatever `out` held.
+  // Sets the Gauss-Newton terms of the residuals, overwriting `out`.
   void setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
                     const ReducedEvaluation& at, const LaneView& view, StageModel& out);
 
-  // Gap and derivatives of a joint outside all clusters: what dq+ makes of dy and of dv+, the identity and h but for curved
-  // joints.
+  // Gap and derivatives of a joint outside all clusters: those of q+ with respect to dy and dv+, which are the identity
+  // and h except for curved joints.
   struct FreeJoint {
     const Joint* joint;
     int offset, size;
@@ -30,7 +30,8 @@ class NodeAssembly {
   std::vector<FreeJoint>& freeJoints() { return free_joints_; }
   void calcFreeGaps(const ReducedEvaluation& at, const ReducedEvaluation& next, VectorXd& gap) const;
 
-  // out += (A X)^T with A for the whole model (k x nv) and X = N (joints outside all clusters: the identity) or Z (zero).
+  // out += (A X)^T with A for the whole model (k x nv) and X = N (joints outside all clusters: the identity) or Z
+  // (zero).
   void addTimesN(ConstMatrixRef A, const ReducedEvaluation& at, MatrixRef out) const;
   void addTimesZ(ConstMatrixRef A, const LaneView& view, MatrixRef out) const;
 
@@ -52,7 +53,7 @@ class NodeAssembly {
   std::vector<Motor> motors_;
   ResidualJacobians jacobians_;
   ResidualWeights weights_;
-  VectorXd Rt_, Rt_scaled_, gradient_;  // with room for any node
+  VectorXd Rt_, Rt_scaled_, gradient_;  // large enough for any node
   VectorXd dlambda_;  // (nu + 2 size) x contact rows, padded: derivatives of contact forces by (u, dy, dy_v)
   VectorXd room_;     // of solveDerivatives()
 };

@@ -8,7 +8,7 @@
 namespace bielle {
 namespace {
 
-// Jacobian of q (+) d with respect to q: node by node but for the one kind that closures are full of.
+// Jacobian of q (+) d with respect to q: node by node except for spherical joints, the most frequent kind in closures.
 JointMatrixOf<Lanes> calcIntegrateJacobian(const Joint& joint, const VectorUpTo6<Lanes>& d) {
   if (joint.kind == JointKind::Spherical) return exp3(Vector3<Lanes>(d)).transpose();
   const int n = joint.nv;
@@ -117,7 +117,7 @@ void ReducedKernel::linearizeStateCosts(const LinearizeItem* items, int count, s
                [&](int l) { return views[l].state_cost.hessian.data(); });
 }
 
-// K N of the closure forces, and what the wrenches of the contacts add to inverse dynamics.
+// K N of the closure forces, and the contribution of contact wrenches to inverse dynamics.
 void ReducedKernel::updateForces() {
   for (Vector6<Lanes>& f : f_ext_) f.setZero();
   for (const ContactLanes& contact : contacts_)
@@ -143,7 +143,7 @@ void ReducedKernel::updateContact(ContactLanes& contact) {
   }
 }
 
-// Eqs. (d) to (g). Tells where X exists.
+// Eqs. (d) to (g). Returns the lanes where X exists.
 LaneMask ReducedKernel::updateClusterDerivatives(ClusterLanes& c) {
   const ReducedCluster& cluster = c.cluster;
   const ClusterBasisOf<Lanes>& next = c.next.basis;
@@ -163,7 +163,7 @@ LaneMask ReducedKernel::updateClusterDerivatives(ClusterLanes& c) {
   expandIndependent(next, c.forces, c.rows);
   calcGeometricStiffness(ahead, c.ahead, c.rows, c.KnNn);
 
-  // J_q N, J_d^{-T} W N and J_d^{-T} W N': the identity but for the blocks of curved joints.
+  // J_q N, J_d^{-T} W N and J_d^{-T} W N': J_q and J_d are the identity except for the blocks of curved joints.
   c.JqN = c.at.N;
   c.P = c.at.WN;
   c.Pn = next.WN;

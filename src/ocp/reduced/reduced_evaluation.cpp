@@ -6,7 +6,7 @@
 namespace bielle {
 namespace {
 
-// Index of a value in a list that it joins if it is new.
+// Index of a value in a list, to which it is added if new.
 int findOrAdd(std::vector<int>& list, int value) {
   const auto found = std::find(list.begin(), list.end(), value);
   const int index = static_cast<int>(found - list.begin());

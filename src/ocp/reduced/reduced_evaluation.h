@@ -1,5 +1,5 @@
 #pragma once
-// A node of the reduced formulation as a value, and what is known of all nodes of a problem before any is evaluated.
+// A node of the reduced formulation as a value, and the layout of a problem's nodes, known before evaluation.
 #include "bielle/dynamics/impact.h"
 #include "dynamics/reduction.h"
 #include "dynamics/saddle_point.h"
@@ -26,17 +26,17 @@ struct ReducedEvaluation : RobotEvaluation {
   std::vector<SE3> X_WB;  // nb
   std::vector<ClusterNode> clusters;
   SaddlePointFactors factors;               // of reduced_kernel.h, Eq. (b)
-  std::unique_ptr<ImpactWorkspace> impact;  // of an impact alone
+  std::unique_ptr<ImpactWorkspace> impact;  // only of an impact
 };
 
-// Contacts of one node. A slot is a place for a contact, always on the same body; two contacts of a body take two slots.
+// Contacts of one node. A slot holds one contact, always on the same body; two contacts of a body take two slots.
 struct ContactLayout {
   struct Contact {
     const Closure* closure;
     int slot;
     int row, rows;  // among the contact rows
     Matrix3d
-        turn;  // from the angular part of a twist in the contact frame to its last rows; zero rows where there are none
+        turn;  // from the angular part of a twist in the contact frame to the last rows; zero for rows it lacks
   };
   std::vector<Contact> contacts;
   int closure_rows = 0;  // of the model's closures, which come before the contacts

@@ -69,7 +69,7 @@ void ReducedImpact::linearizeCluster(size_t index, const ReducedEvaluation& at, 
   updateGap(c, at.clusters[index], next.clusters[index].at);
   out.gap.segment(o, r) = gap.y;
   out.gap.segment(nr + o, r) = gap.y_v;
-  // P_v (W N)^T, whose rows pick dv+ of the cluster's dofs.
+  // P_v (W N)^T, which maps dv+ of the cluster's dofs to dy_v+.
   RowMatrixMap Fx = out.Fx();
   c.WNP.noalias() = at.clusters[index].at.WN * gap.P_v.transpose();
   for (size_t k = 0; k < cluster.dofs.size(); ++k)
@@ -81,7 +81,7 @@ void ReducedImpact::linearizeCluster(size_t index, const ReducedEvaluation& at, 
   Fx.block(nr + o, o, r, r) += gap.P_z;
 }
 
-// From q+ to the node state that c.gap holds.
+// Updates c.gap, from q+ to the node state.
 void ReducedImpact::updateGap(Cluster& c, const ClusterNode& node, const ClusterBasis& next) {
   ClusterGapOf<double>& gap = c.gap;
   if (gap.q == node.next.basis.q && gap.v == node.v_next) {

@@ -1,8 +1,9 @@
 #pragma once
 // Rigid impacts (dynamics/impact.h) in the reduced formulation: (q, v) becomes (q, v+). The bases stay, and with
 // dq = N dy, dv = N dy_v + Z dy, dv+ = N dy_v+ + Z+ dy+, where (W N)^T Z+ = 0,
-//     dy+ = dy,   dy_v+ = (W N)^T ((D_q N + D_v Z) dy + D_v N dy_v)                                                   (a)
-// read about the node state's own basis where a gap is open. Impacts are few: they are solved with all dofs, one by one.
+//     dy+ = dy,   dy_v+ = (W N)^T ((D_q N + D_v Z) dy + D_v N dy_v)                                                 (a)
+// with a change to the node state's own basis if a gap is open. Impacts are few: they are solved with all dofs, one by
+// one.
 #include "ocp/reduced/node_assembly.h"
 
 namespace bielle {
@@ -11,7 +12,7 @@ class ReducedImpact {
  public:
   ReducedImpact(const Model& model, const Reduction& reduction);
 
-  // v+ and impulses at a state that the kernel has placed; a failure goes into the status.
+  // Computes v+ and impulses at a state that the kernel has placed; a failure is recorded in the status.
   void update(const ReducedKernel::StepItem& item);
   // Eq. (a), and the derivatives of the impulses.
   DynamicsStatus linearize(const ConstraintSet& constraints, const ReducedEvaluation& at, const ReducedEvaluation& next,

@@ -77,7 +77,7 @@ ReducedKernel::ReducedKernel(const Model& model, const Reduction& reduction, con
   loaded_costs_.fill(-1);
 }
 
-// Bases and placements of the states, and all velocities. Tells where that went through.
+// Bases and placements of the states, and all velocities. Returns the lanes that succeeded.
 LaneMask ReducedKernel::placeAll(const StepItem* items, int count) {
   const int nq = model_.nq();
   gatherLanes(count, nq, ws_.q.data(), [&](int l) { return items[l].at->x.data(); });
@@ -105,7 +105,7 @@ LaneMask ReducedKernel::placeAll(const StepItem* items, int count) {
   return placed;
 }
 
-// From placements seen from the bodies that carry their clusters to those in the world.
+// Converts placements relative to the bodies that carry the clusters to placements in the world.
 void ReducedKernel::placeBodies() {
   for (int i = 1; i < model_.numBodies(); ++i) {
     const ReducedJoint& reduced = reduction_.joints[reduction_.joint_of_body[i]];
@@ -211,7 +211,7 @@ void ReducedKernel::updateContactRows(size_t slot) {
   for (size_t o = 0; o < tip.outer.size(); ++o) JcN.col(tip.outer[o]) = contact.selectRows(tip.J.col(o));
 }
 
-// robot_problem.h Eq. (3), where there are no closures. Lanes without a node repeat the first one, and need no care.
+// robot_problem.h Eq. (3) without closures. Lanes without a node repeat the first one and need no special treatment.
 void ReducedKernel::stepFreeJoints() {
   const int nq = model_.nq();
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
@@ -238,8 +238,8 @@ LaneMask ReducedKernel::closeStep(ClusterLanes& c) {
     a_[dof] = c.a[k];
     c.d[k] = h_ * (v_[dof] + h_ * a_[dof]);
   }
-  // To second order the closures open by h^2/2 gamma along h w: J W^{-1} J^T zeta = h^2/2 gamma. applyPseudoInverse() has left
-  // the solution for gamma in c.forces.
+  // To second order the closures open by h^2/2 gamma along h w: J W^{-1} J^T zeta = h^2/2 gamma. applyPseudoInverse()
+  // has left the solution for gamma in c.forces.
   c.forces *= 0.5 * h_ * h_;
   const LaneMask closed = closeCluster<Lanes>(cluster, c.scratch, c.at, c.d, c.forces, c.next);
   // (I - J'^+ J') w' = N' (W N')^T w'

@@ -1,5 +1,5 @@
-// The reduced formulation behind RobotProblem: hands batches of nodes to the kernel, and does node by node what has other sizes at
-// every node.
+// The reduced formulation behind RobotProblem: it passes batches of nodes to the kernel, and processes node by node the
+// data whose sizes vary from node to node.
 #include <algorithm>
 
 #include "ocp/reduced/node_assembly.h"
@@ -95,7 +95,7 @@ void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScrat
   }
 }
 
-// Costs, behind a step that went through.
+// Computes the costs after a successful step.
 void ReducedTranscription::finishEvaluation(int node, const LaneView& view, RobotEvaluation& at) const {
   if (at.status != StepStatus::Ok) return;
   costs_[node].calc({model_, view.ws, specs_[node].constraints, at.u, at.lambda}, at);

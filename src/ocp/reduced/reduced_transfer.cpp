@@ -77,8 +77,8 @@ void ReducedKernel::loadBases(LaneSource<const ReducedEvaluation> nodes) {
   }
 }
 
-// Bases and, as seen from the body that carries the cluster, placements: those of the q+ that a state is, where there
-// is one, or else those that placeAll() has left in the place of q+.
+// Bases and placements relative to the body that carries the cluster: those of the q+ with which the state is
+// identical, if there is one, or else those that placeAll() has stored in place of q+.
 void ReducedKernel::loadPoints(const StepItem* items, int count) {
   for (size_t i = 0; i < clusters_.size(); ++i) {
     ClusterLanes& c = clusters_[i];
@@ -94,7 +94,7 @@ void ReducedKernel::loadPoints(const StepItem* items, int count) {
   }
 }
 
-// To the nodes whose state is nobody's q+: until their step is done, its place is free.
+// Stores to the nodes whose state is not the q+ of another node: the memory of their own q+ is free until their step.
 void ReducedKernel::storeNext(size_t cluster, const StepItem* items, int count) {
   storeState(clusters_[cluster].next, count,
              [&](int l) { return items[l].previous ? nullptr : &items[l].at->clusters[cluster].next; });
@@ -113,7 +113,7 @@ void ReducedKernel::loadControls(const StepItem* items, int count) {
   for (int m = 0; m < model_.nu(); ++m) tau_[model_.motors()[m].dof] = u_[m];
 }
 
-// Nodes without a contact in a slot have no force there, and whatever its other numbers.
+// Nodes without a contact in a slot have zero force there; its other numbers are arbitrary.
 void ReducedKernel::loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices) {
   for (ContactLanes& slot : contacts_) {
     slot.used = false;
@@ -154,7 +154,7 @@ void ReducedKernel::loadContact(int lane, const ContactLayout::Contact& contact,
   }
 }
 
-// References and weights of the state costs, unless they are there from the last call. False when no node has one;
+// References and weights of the state costs, unless they are still loaded from the last call. False if no node has one;
 // nodes without one get weights of zero.
 bool ReducedKernel::loadStateCosts(const int* indices, const StageSpec* const* specs, int count) {
   std::array<int, kLane> wanted;
@@ -232,7 +232,7 @@ void ReducedKernel::storeSystem(const StepItem& item, int lane) {
     }
 }
 
-// Velocities of the bodies, without the columns that make them.
+// Velocities of the bodies, without their columns.
 void ReducedKernel::storeMotion(int count, std::vector<LaneView>& views) const {
   const int nb = model_.numBodies();
   const auto store = [&](const Lanes* from, Eigen::Index size, const auto& get) {
@@ -246,7 +246,7 @@ void ReducedKernel::storeMotion(int count, std::vector<LaneView>& views) const {
   for (int l = 0; l < count; ++l) views[l].ws.stage = WorkspaceStage::Bodies;
 }
 
-// All that Jacobians of residuals look at.
+// All data that Jacobians of residuals read.
 void ReducedKernel::storeColumns(int count, std::vector<LaneView>& views) const {
   storeMotion(count, views);
   const auto store = [&](const Lanes* from, Eigen::Index size, const auto& get) {

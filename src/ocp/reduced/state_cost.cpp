@@ -5,7 +5,7 @@
 namespace bielle {
 namespace {
 
-// Numbers of the Hessian of a reduced joint.
+// Number of stored Hessian entries of a reduced joint.
 int countFree(const Joint& joint) { return joint.nv * (joint.nv + 1); }
 int countCluster(const ReducedCluster& loop) { return 3 * loop.size * loop.size; }
 

@@ -3,17 +3,17 @@
 //
 // With d = q (-) q_ref, J_d its Jacobian by q, e = v - v_ref, and the weights W_q and W_v (diagonal),
 //     l = 1/2 (d.W_q d + e.W_v e)
-// A reduced joint (reduction.h) with bases N and Z of Eq. (a) (outside all clusters N = 1, Z = 0) has, by Gauss-Newton with
-// Q = J_d^T W_q J_d,
+// By Gauss-Newton, with Q = J_d^T W_q J_d, a reduced joint (reduction.h) with bases N and Z of Eq. (a) (outside all
+// clusters N = 1, Z = 0) contributes
 //     l_y  = N^T J_d^T W_q d + Z^T W_v e,     l_v  = N^T W_v e
-//     l_yy = N^T Q N + Z^T W_v Z,             l_vy = N^T W_v Z,         l_vv = N^T W_v N                              (h)
+//     l_yy = N^T Q N + Z^T W_v Z,             l_vy = N^T W_v Z,         l_vv = N^T W_v N                            (h)
 #include "dynamics/reduced_tree.h"
 #include "ocp/transcription.h"
 
 namespace bielle {
 
-// Gradient (2 size), and the Hessian joint by joint: l_yy and the diagonal of l_vv of each joint outside all clusters, then l_yy,
-// l_vy and l_vv of each cluster.
+// Gradient (2 size), and the Hessian joint by joint: l_yy and the diagonal of l_vv of each joint outside all clusters,
+// then l_yy, l_vy and l_vv of each cluster.
 template <typename T>
 struct StateCostModelOf {
   explicit StateCostModelOf(const Model& model, const Reduction& reduction);
@@ -21,7 +21,7 @@ struct StateCostModelOf {
 };
 using StateCostModel = StateCostModelOf<double>;
 
-// out += scale times it: the lower triangle of lxx.
+// Adds scale times the cost to `out`: the gradient, and the lower triangle of lxx.
 void addStateCostModel(const Model& model, const Reduction& reduction, const StateCostModel& cost, double scale,
                        StageModel& out);
 
@@ -32,9 +32,9 @@ class ReducedStateCost {
   VectorX<Lanes> q_ref, v_ref, weights;  // nq, nv, 2 nv: W_q, W_v
   VectorX<Lanes> difference;             // nv, d
 
-  // The value at (q, v), and d.
+  // Computes the value at (q, v), and d.
   Lanes update(const VectorX<Lanes>& q, const VectorX<Lanes>& v);
-  // Eq. (h) where d is that of the state whose lifts these are, up to the velocities.
+  // Computes Eq. (h) for the last d, given the lifts of the same state up to the velocities.
   const StateCostModelOf<Lanes>& differentiate(const VectorX<Lanes>& v, const std::vector<ClusterLiftOf<Lanes>>& lifts);
 
  private:
