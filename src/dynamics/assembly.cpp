@@ -15,7 +15,7 @@
 namespace bielle {
 namespace {
 
-// Iterations before the soft wish of Eq. (1) starts to fade.
+// Iterations before the preference of Eq. (1) starts to fade.
 constexpr int kFullWishIterations = 30;
 
 // The hard conditions of Eq. (1): residual and Jacobian, with the name of every row's origin.
@@ -129,7 +129,7 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
   for (int i = 0; i < options.max_iterations; ++i, ++result.iterations) {
     const VectorXd wish = model.difference(result.q, problem.q_ref);
     const double damping = std::min(0.1, error);
-    // A wish far from where the conditions allow (a leg asked to stretch) can make the iterates circle: it fades.
+    // A preference far from the feasible set (e.g. an overstretched leg) can make the iterates cycle: it fades.
     const double wish_gain = std::pow(0.8, std::max(0, i - kFullWishIterations));
     const double shrink = error < 1e-3 ? 0.0 : 0.3 * damping;
     VectorXd step =
@@ -141,7 +141,7 @@ bool iterate(const Model& model, const AssemblyProblem& problem, const AssemblyO
     const bool met = conditions.rows() == 0 || (conditions.h - offset).cwiseAbs().maxCoeff() <= options.tolerance;
     if (met && largest < 1e-9) return true;
     if (largest > options.step_limit) step *= options.step_limit / largest;
-    // Halve while the conditions get much worse; a little worse is allowed, as the wish bends the path.
+    // Halve while the conditions get much worse; slightly worse is allowed, as the preference bends the path.
     VectorXd q_new;
     for (int halving = 0; halving < 8; ++halving, step *= 0.5) {
       q_new = model.integrate(result.q, step);
@@ -226,7 +226,7 @@ AssemblyResult findClosedConfiguration(const Model& model, const AssemblyOptions
 AssemblyProblem makeReferenceProblem(const Model& model, const Reference& reference) {
   AssemblyProblem problem;
   problem.q_ref = model.makeNeutral();
-  // Listed joints are wishes; the others follow from the closures, with a weight that only settles ties.
+  // Listed joints are preferences; the others follow from the closures, with a weight that only settles ties.
   problem.weights = VectorXd::Constant(model.nv(), 1e-3);
   for (const auto& [name, values] : reference.joints) {
     const int index = model.findJoint(name);

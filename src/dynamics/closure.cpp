@@ -45,7 +45,7 @@ HingeAngle<Lanes> calcHingeAngle(const Lanes& sine, const Lanes& cosine) {
   return out;
 }
 
-// Writes rows of full vectors in world coordinates, read in frame 1, to columns of a matrix.
+// Transforms full vectors from world coordinates to frame 1 and writes their rows to columns of a matrix.
 template <typename T>
 class RowWriter {
  public:
@@ -243,7 +243,7 @@ Vector6<T> calcClosureWrench(const WorkspaceOf<T>& ws, const Closure& c, typenam
 
 void addClosureForceDerivative(const Model& model, const Workspace& ws, const Closure& c, const Vector6d& wrench,
                                MatrixRef dID_dq) {
-  if (c.body2 == 0) return;  // the world feels nothing
+  if (c.body2 == 0) return;  // no effect on the world
   for (size_t i = 0; i < c.dofs.size(); ++i) {
     const int k = c.dofs[i];
     const Vector6d moved = c.signs[i] * crossForce(ws.J.col(k), wrench);

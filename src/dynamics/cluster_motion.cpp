@@ -19,7 +19,7 @@ Vector6<T> calcDifference(const ClusterMotionOf<T>& motion, const Matrix6X<T>& s
   return out;
 }
 
-// Path sums of what `add` adds for dof k of the cluster, coordinate c.
+// Path sums of the terms that `add` contributes for dof k of the cluster, coordinate c.
 template <typename T, typename Add>
 void sumPaths(const ReducedCluster& cluster, Matrix6X<T>& sums, const Add& add) {
   const int n = static_cast<int>(cluster.dofs.size());

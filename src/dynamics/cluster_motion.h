@@ -1,22 +1,23 @@
 #pragma once
-/// \file How a cluster of loops moves with its reduced coordinates, to first order.
+/// \file First-order motion of a loop cluster with its reduced coordinates.
 ///
 /// A change (dy, dy_v) of the reduced state of a cluster moves its dofs by
-///     dq = N dy,   dv = N dy_v + Z dy,   Z = -J^+ d(J v)/dq N                                                         (1)
-/// since J v = 0 is kept, and its accelerations, at fixed reduced accelerations, by
-///     da = d_y dy + d_v dy_v,   d_y = -J^+ (C_q N + C_v Z),   d_v = -J^+ C_v N                                        (2)
-/// with C_q, C_v the derivatives of the closure accelerations. With the columns of rnea.h summed over the path to a dof,
+///     dq = N dy,   dv = N dy_v + Z dy,   Z = -J^+ d(J v)/dq N                                                      (1)
+/// since J v = 0 is maintained, and its accelerations, at fixed reduced accelerations, by
+///     da = d_y dy + d_v dy_v,   d_y = -J^+ (C_q N + C_v Z),   d_v = -J^+ C_v N                                     (2)
+/// with C_q, C_v the derivatives of the closure accelerations. With the columns of rnea.h summed over the path to a
+/// dof,
 ///     J~ = sum J_k N_k,                          dV~ = sum dV_k N_k + J_k Z_k,
-///     dA~ = sum dA_k N_k + (dJ + dV)_k Z_k + J_k d_y,k,      dW~ = sum (dJ + dV)_k N_k + J_k d_v,k                    (3)
-/// is what the coordinate does to everything after that dof, in the coordinates of what it moves. A dof acts on a closure
-/// through the frame that it moves: the derivatives of closure.h, Eqs. (1) to (3), along a coordinate are those of its
-/// columns with J_k, dV_k, .. replaced by the difference of (3) between body 1 and body 2. So the work grows with the
-/// number of dofs, and not with its square.
+///     dA~ = sum dA_k N_k + (dJ + dV)_k Z_k + J_k d_y,k,      dW~ = sum (dJ + dV)_k N_k + J_k d_v,k                 (3)
+/// is the effect of the coordinate on everything after that dof, in the coordinates of the bodies it moves. A dof acts
+/// on a closure through the frame that it moves: the derivatives of closure.h, Eqs. (1) to (3), along a coordinate are
+/// those of its columns with J_k, dV_k, .. replaced by the difference of (3) between body 1 and body 2. So the effort
+/// is linear in the number of dofs, not quadratic.
 #include "dynamics/reduction.h"
 
 namespace bielle {
 
-/// A cluster seen in the workspace of the whole model or in one of its own.
+/// A cluster in the workspace of the whole model or in its own.
 template <typename T>
 struct ClusterViewOf {
   const WorkspaceOf<T>& ws;
@@ -32,8 +33,8 @@ ClusterViewOf<T> getOwnView(const ReducedCluster& cluster, const WorkspaceOf<T>&
   return {own, cluster.closures.closures, cluster.own_dofs};
 }
 
-/// First-order motion of a cluster; n dofs, r reduced coordinates. Column n c + k of a sum (3) belongs to coordinate c at
-/// dof k, dofs of one group having the sum of all of them.
+/// First-order motion of a cluster; n dofs, r reduced coordinates. Column n c + k of a sum (3) belongs to coordinate c
+/// at dof k; all dofs of a group have the sum over the group.
 template <typename T>
 struct ClusterMotionOf {
   explicit ClusterMotionOf(const ReducedCluster& cluster);

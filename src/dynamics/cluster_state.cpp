@@ -9,13 +9,13 @@
 namespace bielle {
 namespace {
 
-constexpr double kClosedTolerance = 1e-13;    // what close() aims at
-constexpr double kAcceptedTolerance = 1e-11;  // what it accepts when rounding stops it
+constexpr double kClosedTolerance = 1e-13;    // target of closeCluster()
+constexpr double kAcceptedTolerance = 1e-11;  // accepted when rounding stops progress
 // Relative differences of lengths below this are ignored. In symmetric postures whole rows are equally long and
 // entries vanish: if rounding chose between them, the basis would depend on how the point was computed.
 constexpr double kTie = 1e-7;
 
-// Rows of a factorization that one operation works on: a register of one node, or a row of the nodes of all lanes.
+// Rows that one operation of a factorization processes: a register of one node, or one row of all lanes.
 template <typename T>
 using RowsOf = Eigen::Array<T, std::is_same_v<T, double> ? kLane : 1, 1>;
 
@@ -78,7 +78,7 @@ void updateJacobian(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch)
                            scratch.J_all.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
 }
 
-// Returns the largest entry, or none that is a number.
+// Returns the largest entry, or NaN.
 template <typename T>
 T updateResidual(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) {
   using std::abs;
@@ -96,7 +96,7 @@ T updateResidual(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch) {
   return largest + 0 * sum;
 }
 
-// Rows of a matrix that are named.
+// Selects the given rows of a matrix.
 template <typename T>
 void selectRows(const MatrixX<T>& all, const std::vector<typename LogicOf<T>::Index>& rows, MatrixX<T>& out) {
   for (Eigen::Index k = 0; k < all.cols(); ++k)
@@ -131,7 +131,7 @@ typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratc
     basis.rows[p] = row;
     T* v = &scratch.reflectors(0, p);
     for (int k = p; k < n; ++k) v[k] = getEntry(&E(0, k), row);
-    // E x for the row x, |x|^2 among it, and with v = x - pivot e_p from it E v.
+    // Computes E x for the row x, including |x|^2, and from it E v with v = x - pivot e_p.
     for (Eigen::Index r = 0; r < E.rows(); r += kChunk) {
       Rows sum = Rows::Zero();
       for (int k = p; k < n; ++k) sum += v[k] * Eigen::Map<const Rows>(&E(r, k));
@@ -165,7 +165,7 @@ typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratc
   return regular && (left <= kRankTolerance * last || left <= 1e-3 * kRankTolerance * first);
 }
 
-// Newton's matrix J(q) W^{-1} J(q_0)^T at the present iterate, for the lanes of the mask.
+// Newton's matrix J(q) W^{-1} J(q_0)^T at the current iterate, for the lanes of the mask.
 template <typename T>
 typename LogicOf<T>::Mask updateNewton(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
                                        const ClusterBasisOf<T>& start, const typename LogicOf<T>::Mask& mask) {

@@ -47,10 +47,10 @@ void assembleConstraints(const Workspace& ws, ConstrainedWorkspace& cws, const C
   }
 }
 
-// Below this, m/s^2 or rad/s^2, an acceleration of the closures is rounding: at rest all of them are.
+// Accelerations of the closures below this, m/s^2 or rad/s^2, are rounding, as all are at rest.
 constexpr double kRoundingAcceleration = 1e-6;
 
-// Rows that are independent are fulfilled to rounding.
+// Independent rows are satisfied to rounding.
 bool areContradictory(const ConstrainedWorkspace& cws) {
   if (!cws.saddle_point->isRedundant()) return false;
   double size = 0;

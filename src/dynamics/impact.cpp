@@ -55,7 +55,7 @@ DynamicsStatus updateImpactDerivatives(const Model& model, ImpactWorkspace& iws,
     iws.f_ext[closure.body2] -= W;
     calcClosureVelocityDerivative(ws, closure, iws.dimpulse_dq.middleRows(row, n));
   }
-  iws.dv_dv.setZero();  // here first a state at rest
+  iws.dv_dv.setZero();  // first used as a state at rest
   updateVelocities(model, ws, iws.dv_dv.col(0));
   updateAccelerations(model, ws, iws.dv_dv.col(0));
   updateInverseDynamicsDerivatives(model, ws, {});

@@ -7,8 +7,8 @@
 namespace bielle {
 namespace {
 
-const double kRankTolerance = AssemblyOptions().rank_tolerance;  // relative, of H, which assembly closed
-constexpr double kGapTolerance = 1e-6;      // of Eq. (2), relative to 1 and what moves
+const double kRankTolerance = AssemblyOptions().rank_tolerance;  // of H, relative, as in assembly
+constexpr double kGapTolerance = 1e-6;      // of Eq. (2), relative to 1 and the motion
 constexpr double kBalanceTolerance = 1e-7;  // of Eqs. (4) and (5), relative to their right-hand sides
 
 MatrixXd calcJacobian(const Model& model, const Workspace& ws, const ConstraintSet& set) {
@@ -24,7 +24,7 @@ double calcLargest(const VectorXd& x) { return x.size() ? x.cwiseAbs().maxCoeff(
 
 Closing::Closing(const Model& model, const Workspace& ws, const ConstraintSet& closures, std::vector<int> held)
     : closures_(closures), rows_(closures.rows) {
-  for (Closure& closure : closures_.closures) closure.kp = closure.kd = 0;  // what is closed stays closed
+  for (Closure& closure : closures_.closures) closure.kp = closure.kd = 0;  // closed loops need no stabilisation
   H_.setZero(rows_ + static_cast<Eigen::Index>(held.size()), model.nv());
   H_.topRows(rows_) = calcJacobian(model, ws, closures);
   for (size_t i = 0; i < held.size(); ++i) H_(rows_ + static_cast<Eigen::Index>(i), held[i]) = 1;

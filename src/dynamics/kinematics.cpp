@@ -55,7 +55,7 @@ void updateColumns(const Model& model, WorkspaceOf<T>& ws) {
       case JointKind::Spherical:
         for (int k = 0; k < 3; ++k) setAxis(k, X.R.col(k));
         break;
-      case JointKind::Universal:  // the first axis rests in what carries the joint
+      case JointKind::Universal:  // the first axis is fixed in the parent body
         setAxis(0, ws.X_WB[joint.parent].R * (joint.X_PJ.R * joint.axis));
         setAxis(1, X.R * joint.axis2);
         break;

@@ -38,7 +38,7 @@ void ReducedTreeOf<T>::clearAfter(size_t groups) {
   after_v_.leftCols(groups).setZero();
 }
 
-// The columns of the parent's outer coordinates, then those of the parent itself along the path.
+// Columns of the parent's outer coordinates, then of the parent itself along the path.
 template <typename T>
 void ReducedTreeOf<T>::updateColumns(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts,
                                      const ReducedJoint& place, Depth depth, Columns& out) const {

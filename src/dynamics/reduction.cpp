@@ -31,8 +31,7 @@ Model makeClusterModel(const Model& model, const LoopCluster& loops, const std::
   return builder.build();
 }
 
-// W: the inertia of each dof, with a floor that keeps (1) well conditioned. A mechanism without inertia has no
-// preference.
+// W: the inertia of each dof, with a floor that keeps (1) well conditioned. Without inertia all dofs weigh the same.
 VectorXd makeMetric(const Workspace& ws, const std::vector<int>& dofs) {
   constexpr double kFloor = 1e-3;
   VectorXd metric(dofs.size());
@@ -77,7 +76,7 @@ void addGroups(ReducedCluster& cluster) {
   }
 }
 
-// The closures of a cluster for someone who looks at the whole model.
+// The closures of a cluster, with bodies of the whole model.
 void placeClosures(const Model& model, ReducedCluster& cluster) {
   cluster.placed = cluster.closures.closures;
   for (size_t c = 0; c < cluster.placed.size(); ++c) {
@@ -148,7 +147,7 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
       out.clusters[owner[i]].offset = out.size;
       reduced.size = out.clusters[owner[i]].size;
     }
-    // The first joint of a cluster hangs on the body that carries the whole cluster.
+    // The parent of a cluster's first joint carries the whole cluster.
     connect(model, out, model.joints()[i].parent, reduced);
     out.size += reduced.size;
     out.joints.push_back(reduced);

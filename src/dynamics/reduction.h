@@ -1,22 +1,22 @@
 #pragma once
 /// \file Reduced coordinates: the manifold of closed configurations, loop cluster by loop cluster.
 ///
-/// A cluster of loops touches few dofs (Bipetto's knee: 7, with 6 closure rows). Seen from the body that carries it, it
-/// is a small mechanism of its own, here a `ReducedCluster` with its own massless Model whose world is that body. At a
-/// closed configuration, let J (rank x n) be independent rows of its closure Jacobian, chosen by pivoting, W the metric
-/// of the cluster (diagonal, constant), and
+/// A loop cluster involves few dofs (Bipetto's knee: 7, with 6 closure rows). Relative to the body that carries it, it
+/// is a small mechanism, here a `ReducedCluster` with its own massless Model whose world is that body. At a closed
+/// configuration, let J (rank x n) be independent rows of its closure Jacobian, chosen by pivoting, W the metric of the
+/// cluster (diagonal, constant), and
 ///     J N = 0,   N^T W N = I,   J^+ = W^{-1} J^T (J W^{-1} J^T)^{-1}                                               (1)
-/// N (n x (n - rank)) is an orthonormal basis of the tangent space and (W N)^T reads its coordinates. Its choice is
-/// free at every point: no chart is left, and a dead point of a linkage, where motor or joint coordinates break down,
-/// is nothing special. Only a change of rank is. Rounding has no part in the choice: one point has one basis, however
-/// it is reached.
+/// N (n x (n - rank)) is an orthonormal basis of the tangent space and (W N)^T reads its coordinates. It is chosen anew
+/// at every point, without a chart: a dead point of a linkage, where motor or joint coordinates break down, is a
+/// regular point. Only a change of rank is singular. The choice is insensitive to rounding: a point has one basis,
+/// however it is reached.
 ///
-/// Moving on the manifold from a point q_0: for a displacement d (n), close along the rows of the start,
+/// To move on the manifold from a point q_0 by a displacement d (n), close along the rows at q_0:
 ///     q = q_0 (+) (d - W^{-1} J(q_0)^T zeta)    with zeta such that q is closed                                    (2)
 /// so that (W N)(q_0)^T (q (-) q_0) = (W N)(q_0)^T d: (2) inverts the difference in reduced coordinates exactly.
 ///
-/// W is the inertia that each dof moves at the configuration of the reduction: corrections go where they cost least, to
-/// light rods rather than to legs, as constraint impulses do. It also settles what a metre is worth against a radian.
+/// W is the inertia that each dof moves at the configuration of the reduction: corrections move light rods rather than
+/// legs, as constraint impulses do. It also sets the scale between metres and radians.
 #include <string>
 #include <vector>
 
@@ -32,11 +32,11 @@ struct DofGroup {
   int parent_group = -1;  ///< that group
 };
 
-/// A closure row of which the rows before it leave less than this, relative to the first one, counts as dependent on
-/// them.
+/// A closure row whose remainder after the rows before it is below this, relative to the first row, counts as
+/// dependent.
 constexpr double kRankTolerance = 1e-6;
 
-/// One cluster of loops as a mechanism of its own.
+/// One loop cluster as a separate mechanism.
 struct ReducedCluster {
   Model model;                       ///< joints and closures of the cluster, massless, over their common root
   ConstraintSet closures;            ///< of `model`, without stabilisation
@@ -55,13 +55,13 @@ struct ReducedCluster {
   int offset = 0, size = 0;          ///< reduced coordinates [offset, offset + size), size = n - rank
 };
 
-/// A free joint or a cluster: what a coordinate of the reduced tree belongs to. Reduced joints come parents first.
+/// A free joint or a cluster: a node of the reduced tree. Parents come first.
 struct ReducedJoint {
-  int joint = -1, cluster = -1;  ///< one of them: joint of the whole model, or index into Reduction::clusters
+  int joint = -1, cluster = -1;  ///< either a joint of the whole model, or an index into Reduction::clusters
   int offset = 0, size = 0;      ///< reduced coordinates
   int parent = -1;               ///< reduced joint that carries it, -1: the world
   std::vector<int> path;         ///< dofs of the parent reduced joint that move it: positions among the parent's dofs
-  std::vector<int> outer;        ///< reduced coordinates of all reduced joints before it on the way to the root
+  std::vector<int> outer;        ///< reduced coordinates of all reduced joints on its path to the root
 };
 
 /// How the velocity coordinates of a model split into clusters and free dofs.
@@ -74,11 +74,11 @@ struct Reduction {
   int size = 0;                    ///< reduced coordinates: the mobility of the robot
 };
 
-/// \param q closed configuration at which ranks are taken
-/// \throws ModelError when q is not closed (to 1e-8) or a loop leaves no mobility anywhere
+/// \param q closed configuration at which ranks are determined
+/// \throws ModelError when q is not closed (to 1e-8) or the model has no mobility
 Reduction makeReduction(const Model& model, ConstVectorRef q);
 
-/// Parent, path and outer coordinates of something fixed to a body (no coordinates of its own).
+/// Parent, path and outer coordinates of a frame fixed to a body (without coordinates of its own).
 ReducedJoint makeTip(const Model& model, const Reduction& reduction, int body);
 
 /// Bases (1) at a closed configuration of a cluster; T is double, or Lanes for several nodes at once.
@@ -90,7 +90,7 @@ struct ClusterBasisOf {
   MatrixX<T> WN;                                 ///< n x size
   MatrixX<T> J;                                  ///< rank x n, independent rows
   MatrixX<T> L;                                  ///< rank x rank, Cholesky factor of J W^{-1} J^T
-  std::vector<typename LogicOf<T>::Index> rows;  ///< which closure rows J holds
+  std::vector<typename LogicOf<T>::Index> rows;  ///< indices of the closure rows in J
 };
 using ClusterBasis = ClusterBasisOf<double>;
 
@@ -111,46 +111,45 @@ struct ClusterScratchOf {
   using Index = typename LogicOf<T>::Index;
   WorkspaceOf<T> ws;  ///< of the cluster's model
   VectorX<T> residual, correction;
-  MatrixX<T> J_all, J, JW;   // all rows; at the iterate of a closing; J W^{-1} where it starts
-  MatrixX<T> newton, fresh;  // factors of the matrix of close(); of a new one
+  MatrixX<T> J_all, J, JW;   // all rows; independent ones at the iterate; J W^{-1} at the start
+  MatrixX<T> newton, fresh;  // factors of Newton's matrix; of a new one
   std::vector<Index> pivots, fresh_pivots;
   MatrixX<T> reflected, reflectors;  // of J W^{-1/2}; Householder vectors
-  VectorX<T> beta, products, rest;   // their scales; scratch; squared norms of what is left of the rows
-  typename LogicOf<T>::Mask closed{};  // whether the last closing got as far as the bases
+  VectorX<T> beta, products, rest;   // their scales; scratch; squared norms of the remainders of the rows
+  typename LogicOf<T>::Mask closed{};  // whether the last closing reached the bases
 };
 using ClusterScratch = ClusterScratchOf<double>;
 
-/// A closed configuration of a cluster with what was computed there; with Lanes one for each lane.
+/// A closed configuration of a cluster with its derived data; with Lanes one for each lane.
 template <typename T>
 struct ClusterStateOf {
   explicit ClusterStateOf(const ReducedCluster& cluster);
   ClusterBasisOf<T> basis;
-  std::vector<SE3Of<T>> placements;  ///< of the bodies of the cluster's model, seen from its root
-  VectorX<T> zeta;                   ///< rank, of the closing that led here
+  std::vector<SE3Of<T>> placements;  ///< of the bodies of the cluster's model, relative to its root
+  VectorX<T> zeta;                   ///< rank, of the closing that produced it
   VectorX<T> step;                   ///< n, its d - W^{-1} J(q_0)^T zeta
 };
 using ClusterState = ClusterStateOf<double>;
 
-/// Kinematics, Jacobian and bases (1) at q (cluster's nq), which stay in the scratch too. False when the rank is not
+/// Kinematics, Jacobian and bases (1) at q (cluster's nq), which also stay in the scratch. False if the rank is not
 /// that of the cluster. No allocation.
 template <typename T>
 typename LogicOf<T>::Mask updateClusterState(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
                                              typename ArgumentsOf<T>::ConstVector q, ClusterStateOf<T>& out);
-/// Closes from `start` as Eq. (2) and updates everything there. False when it does not close or the rank changes. No
-/// allocation.
-/// \param zeta_guess  rank, where zeta is expected, or empty
+/// Closes from `start` by Eq. (2) and updates the state. False if it does not close or the rank changes. No allocation.
+/// \param zeta_guess  rank, initial guess of zeta, or empty
 template <typename T>
 typename LogicOf<T>::Mask closeCluster(const ReducedCluster& cluster, ClusterScratchOf<T>& scratch,
                                        const ClusterBasisOf<T>& start, typename ArgumentsOf<T>::ConstVector d,
                                        const VectorX<T>& zeta_guess, ClusterStateOf<T>& out);
-/// Placements and columns of a state back into the scratch.
+/// Loads placements and columns of a state into the scratch.
 void loadClusterState(const ReducedCluster& cluster, const ClusterState& state, ClusterScratch& scratch);
-/// Why the last of these functions returned false, naming a closure; with the scratch as it left it.
+/// Why the last of these functions returned false, naming a closure; needs the scratch as that function left it.
 /// \param lane  of Lanes; 0 for double
 template <typename T>
 std::string describeFailure(const ReducedCluster& cluster, const ClusterScratchOf<T>& scratch, int lane = 0);
 
-/// A ClusterState with a scratch of its own: simpler where there are few of them.
+/// A ClusterState with its own scratch: simpler where there are few of them.
 class ClusterPoint {
  public:
   explicit ClusterPoint(const ReducedCluster& cluster) : scratch_(cluster), state_(cluster) {}
@@ -174,12 +173,12 @@ class ClusterPoint {
   ClusterState state_;
 };
 
-/// Forces on all rows (m) of forces on the independent ones.
+/// Expands forces on the independent rows to all rows (m).
 template <typename T>
 void expandIndependent(const ClusterBasisOf<T>& basis, typename ArgumentsOf<T>::ConstVector independent,
                        typename ArgumentsOf<T>::Vector all);
 
-/// Segments of a cluster in vectors of the whole model.
+/// Copy the segments of a cluster from and to vectors of the whole model.
 template <typename T>
 void gatherConfiguration(const Model& model, const ReducedCluster& cluster, typename ArgumentsOf<T>::ConstVector q,
                          typename ArgumentsOf<T>::Vector q_cluster);

@@ -36,7 +36,7 @@ Vector6<T> applyB(const WorkspaceOf<T>& ws, int i, const Vector6<T>& x) {
   return out;
 }
 
-// Generalized forces of the accelerations of the bodies, rotors left out.
+// Generalized forces of the accelerations of the bodies, without rotors.
 template <typename T>
 void sumForces(const Model& model, WorkspaceOf<T>& ws, VectorX<T>& out) {
   for (int i = 1; i < model.numBodies(); ++i) ws.F[i] = calcBodyForce(ws, i, ws.A[i]);

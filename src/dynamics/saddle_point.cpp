@@ -8,7 +8,7 @@
 namespace bielle {
 namespace {
 
-constexpr double kUnmoved = 1e-22;  // share of the largest |row|^2 below which nothing moves a row, up to rounding
+constexpr double kUnmoved = 1e-22;  // share of the largest |row|^2 below which a row is zero up to rounding
 
 using LanesMap = Eigen::Map<MatrixX<Lanes>>;
 using ConstLanesMap = Eigen::Map<const MatrixX<Lanes>>;
@@ -18,7 +18,7 @@ using ConstLanesMap = Eigen::Map<const MatrixX<Lanes>>;
 void clear(PaddedMap A) { clearPadding(A); }
 void clear(LanesMap) {}
 
-// Cholesky factor in the lower triangle, in place. Tells whether all pivots, squares of its diagonal, are above the
+// Cholesky factor in the lower triangle, in place. Returns whether all pivots (squares of its diagonal) exceed the
 // threshold.
 bool factorizeCholesky(PaddedMap A, double threshold) {
   return factorizeColumns(A, A.cols()) && (A.cols() == 0 || A.diagonal().array().square().minCoeff() > threshold);
@@ -187,7 +187,7 @@ void SaddlePointOf<T>::solve(const VectorX<T>& f, const VectorX<T>& g, VectorX<T
   addSmallProduct(W, a, rhs_, -1);
   y_ = rhs_;
   solveSmallCholesky(G_llt, y_);
-  // A direct solution is refined once, Eq. (4) goes on until nothing changes.
+  // A direct solution is refined once; Eq. (4) is iterated until nothing changes.
   Mask active = T(0) <= T(0);
   for (int i = 1; i < options_.max_iterations && any(active); ++i) {
     correction_ = rhs_;
@@ -228,8 +228,8 @@ void SaddlePointOf<T>::improveInverse() {
     multiply(T1_, T1_, T2_);
     T1_.swap(T2_);
   }
-  // G P G loses what is not in the range of G, rounding of the size of 1/mu above all; one Newton-Schulz step then
-  // gains what eigenvalues near mu still lack.
+  // P G P removes components outside the range of G, above all rounding of the size of 1/mu; one Newton-Schulz step
+  // then corrects eigenvalues near mu.
   multiply(G_, P, T1_);
   multiply(P, T1_, T2_);
   multiply(G_, T2_, T1_);
@@ -267,7 +267,7 @@ void SaddlePoint::solveDerivatives(MatrixRef X, MatrixRef dlambda) {
 }
 
 void solveDerivatives(const SaddlePointFactors& factors, PaddedMap Xt, PaddedMap dlambda_t, VectorXd& room) {
-  // J M^{-1} dID = D^{-1} W L^{-1} dID. All is done on transposes, whose columns are long.
+  // J M^{-1} dID = D^{-1} W L^{-1} dID. It operates on transposes, whose columns are long.
   const Eigen::Index columns = Xt.rows(), n = Xt.cols(), m = factors.D.size(), padded = roundUpToLane(columns);
   if (room.size() < padded * m) room.setZero(padded * m);
   PaddedMap rhs = shapePadded(room, columns, m);
@@ -276,7 +276,7 @@ void solveDerivatives(const SaddlePointFactors& factors, PaddedMap Xt, PaddedMap
   for (Eigen::Index i = 0; i < m; ++i) rhs.col(i) = -factors.D[i] * dlambda_t.col(i);
   clearPadding(rhs);
   addProduct(columns, m, n, 1, pad(Xt), {Wt.data(), 1, n}, pad(rhs));
-  // Symmetric but for rounding, which redundant rows magnify.
+  // Ginv is symmetric up to rounding, which redundant rows magnify.
   setProduct(columns, m, m, pad(rhs), {factors.Ginv.data(), m, 1}, pad(dlambda_t));
   Xt *= -1;
   addProduct(columns, n, m, 1, pad(dlambda_t), {Wt.data(), n, 1}, pad(Xt));

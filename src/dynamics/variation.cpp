@@ -23,7 +23,7 @@ Vector6d calcDisplacement1(const Workspace& ws, const ConstraintSet& set, size_t
          getPlacement(ws, closure.body1, closure.X_B1).actMotion(getFrameTwists(set, c, change).frame1);
 }
 
-// Rows of a closure out of a full vector in the world.
+// Rows of a closure, from a full vector in the world.
 RowVectorUpTo6 readRows(const Workspace& ws, const Closure& closure, const Vector6d& world) {
   return selectRows<double>(closure, getPlacement(ws, closure.body1, closure.X_B1).actInvMotion(world));
 }
@@ -61,7 +61,7 @@ void updateJointVariation(const Model& model, const Workspace& ws, int i, const 
   const int p = joint.parent, begin = joint.idx_v, end = begin + joint.nv;
   const bool sequential = joint.kind == JointKind::Universal;
   Vector6d D = out.D[p] + (ws.X_WB[p] * joint.X_PJ).actMotion(change.joints[i]);
-  Vector6d w = ws.V[p], dw = out.dV[p];  // of what carries the axis
+  Vector6d w = ws.V[p], dw = out.dV[p];  // on the side that carries the axis
   const auto advance = [&](int k) {
     w += ws.J.col(k) * ws.v[k];
     dw += ws.J.col(k) * motion.v[k] + out.dJ.col(k) * ws.v[k];
@@ -85,7 +85,7 @@ void updateJointVariation(const Model& model, const Workspace& ws, int i, const 
   out.D[i] = D, out.dV[i] = dw, out.dA[i] = dA;
 }
 
-// Forces of body i alone, and their change by Eq. (5).
+// Force of body i alone, and its change by Eq. (5).
 void updateBodyForces(const Workspace& ws, int i, const Matrix6d& inertia, VariationWorkspace& out) {
   const Matrix6d& Y = ws.Y[i];
   const Vector6d &V = ws.V[i], &A = ws.A[i], &D = out.D[i];

@@ -9,7 +9,7 @@ namespace {
 // A vector of kLane numbers anywhere in memory; the compiler splits it if the processor's registers are shorter.
 typedef double Lane __attribute__((vector_size(kLane * sizeof(double)), aligned(sizeof(double)), may_alias));
 
-// With L lanes and C columns, L C sums, L vectors of A and one number of B are to fit into 32 registers.
+// With L lanes and C columns, L C sums, L vectors of A and one number of B must fit into 32 registers.
 #ifdef __AVX512F__
 constexpr int kMaxLanes = 6;
 #else
@@ -17,7 +17,7 @@ constexpr int kMaxLanes = 1;
 #endif
 constexpr int kColumns = 4;
 
-enum class Into { Sum, Nothing };  // what a product meets where it goes
+enum class Into { Sum, Nothing };  // whether a product is added to its destination or overwrites it
 
 template <Into into, int L, int C>
 void addBlock(Eigen::Index depth, double sign, ConstPaddedMatrix A, StridedMatrix B, PaddedMatrix out) {
@@ -57,7 +57,7 @@ void addRows(Eigen::Index cols, Eigen::Index depth, double sign, ConstPaddedMatr
   addColumns(addBlock<into, L, 1>, 1);
 }
 
-// As many lanes at a time as there are, up to L.
+// Processes the remaining lanes, up to L at a time.
 template <Into into, int L>
 void addLanes(Eigen::Index lanes, Eigen::Index cols, Eigen::Index depth, double sign, ConstPaddedMatrix A,
               StridedMatrix B, PaddedMatrix C) {
@@ -65,12 +65,12 @@ void addLanes(Eigen::Index lanes, Eigen::Index cols, Eigen::Index depth, double 
   if constexpr (L > 1) addLanes<into, L - 1>(lanes, cols, depth, sign, A, B, C);
 }
 
-// A lower triangle of at most kColumns rows: what is below its diagonal, and the inverse of its diagonal.
+// A lower triangle of at most kColumns rows: the entries below its diagonal, and the inverse of its diagonal.
 struct Triangle {
   double entries[kColumns][kColumns], scales[kColumns];
 };
 
-// X T^{-T} for X of C columns, one `stride` after the other: a few of them stay in registers.
+// X T^{-T} for X of C columns at distance `stride`, kept in registers.
 template <int C>
 void solveColumns(const Triangle& T, Eigen::Index rows, PaddedMatrix X, Eigen::Index stride) {
   for (Eigen::Index i = 0; i < rows; i += kLane) {

@@ -65,7 +65,7 @@ void addLowerProduct(Eigen::Index begin, Eigen::Index depth, double sign, ConstP
 void setLowerProduct(Eigen::Index depth, ConstPaddedMatrix A, ConstPaddedMatrix B, PaddedMap H);
 
 /// Cholesky elimination of the first `num` unknowns of a symmetric H, of which the lower triangle is read: their
-/// columns become L over Y^T, the rest of H is unchanged. False when a pivot is not positive.
+/// columns become L over Y^T, the rest of H is unchanged. False if a pivot is not positive.
 bool factorizeColumns(PaddedMap H, Eigen::Index num);
 /// X L^{-T} and X L^{-1} in place, L the lower triangle of a square matrix.
 void solveTransposedFromRight(ConstMatrixRef L, PaddedMap X);
@@ -87,7 +87,7 @@ void copyTransposed(const A& from, B&& to) {
   }
 }
 
-/// The upper triangle of a square matrix becomes the mirror of the lower one.
+/// Copies the lower triangle of a square matrix to the upper one.
 void copyLowerToUpper(MatrixXd& A);
 
 }  // namespace bielle

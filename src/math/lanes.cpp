@@ -6,11 +6,11 @@ namespace bielle {
 namespace {
 
 // x = n pi/2 + r with |r| <= pi/4, pi/2 in three parts of which the first two have 33 bits (Cody and Waite); beyond
-// this n their products are no longer exact.
+// kLargest their products with n are no longer exact.
 constexpr double kHalfPi1 = 1.57079632673412561417e+00, kHalfPi2 = 6.07710050630396597660e-11,
                  kHalfPi3 = 2.02226624879595063154e-21, kTwoOverPi = 6.36619772367581382433e-01;
 constexpr double kLargest = 1e5;
-constexpr double kRound = 6755399441055744.0;  // 1.5 * 2^52: added and taken away, it rounds to an integer
+constexpr double kRound = 6755399441055744.0;  // 1.5 * 2^52: adding and subtracting it rounds to an integer
 
 using Vector = Lanes::Vector;
 typedef double Anywhere __attribute__((vector_size(kLane * sizeof(double)), aligned(sizeof(double)), may_alias));
@@ -35,7 +35,7 @@ void transpose(std::array<Vector, kLane>& rows) {
 
 }  // namespace
 
-// By kLane numbers of each lane, the last of which repeat some of the ones before.
+// Processes kLane numbers of each lane at a time; the last block overlaps the one before.
 void packLanes(const std::array<const double*, kLane>& in, Eigen::Index size, Lanes* out) {
   if (size < kLane) {
     for (Eigen::Index i = 0; i < size; ++i)

@@ -1,9 +1,9 @@
 #pragma once
 /// \file A scalar type for Eigen that holds one number per lane of a vector register.
 ///
-/// Neighbouring nodes of a horizon differ in their numbers only, and their dynamics are short chains of dependent
+/// Neighbouring nodes of a horizon differ only in their numbers, and their dynamics are short chains of dependent
 /// operations on vectors of 3 to 14 numbers. With one node per lane, each operation of such a chain processes kLane
-/// nodes in a full register. Lanes never mix: the result in one does not depend by a single bit on the contents of the
+/// nodes in a full register. Lanes never mix: the result in one lane is bitwise independent of the contents of the
 /// others, so that nodes can be grouped in any way.
 #include <Eigen/Core>
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace bielle {
 
-/// Numbers that one vector register holds.
+/// Count of numbers in one vector register.
 constexpr Eigen::Index kLane = 8;
 
 /// kLane numbers; the compiler splits them if the processor's registers are shorter.
@@ -126,9 +126,9 @@ inline auto applyLanes(const Lanes& x, const F& f) {
   return out;
 }
 
-/// out[i] gets in[lane][i] in each lane, i < size.
+/// Sets each lane of out[i] to in[lane][i], i < size.
 void packLanes(const std::array<const double*, kLane>& in, Eigen::Index size, Lanes* out);
-/// The inverse: out[lane][i] gets in[i * stride] of each lane; lanes whose pointer is null are left out.
+/// The inverse: sets out[lane][i] to that lane of in[i * stride]; lanes whose pointer is null are skipped.
 void unpackLanes(const Lanes* in, Eigen::Index size, const std::array<double*, kLane>& out, Eigen::Index stride = 1);
 /// The same for one lane alone: a cache line per number.
 inline void unpackLane(const Lanes* in, Eigen::Index lane, Eigen::Index size, double* out) {

@@ -12,7 +12,7 @@ namespace {
 // twist (rho, phi):
 //     Q = P/2 + a (FP + PF + FPF) + b (FFP + PFF - 3 FPF) + c (FPFF + FFPF),     F = [phi]x, P = [rho]x
 //     a = (t - sin t)/t^3,  b = (t^2/2 + cos t - 1)/t^4,  c = (b + 3 d)/2,  d = (t - sin t - t^3/6)/t^5,  t = |phi|.
-// Here are a, b and c; t^6 terms are kept so that the cancellation of the closed form never shows.
+// Returns a, b and c; t^6 terms are kept so that the closed form is never used where it cancels.
 template <typename T>
 std::array<T, 3> calcLeftQSeries(const T& t2) {
   const T b = 1.0 / 24 - t2 / 720 + t2 * t2 / 40320 - t2 * t2 * t2 / 3628800;

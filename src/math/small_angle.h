@@ -1,14 +1,14 @@
 #pragma once
-// Even functions of an angle t, from t^2: by series for small angles, by their closed form for others.
+// Even functions of an angle t, from t^2: by series for small angles, in closed form for others.
 #include <array>
 
 #include "math/lanes.h"
 
 namespace bielle {
 
-constexpr double kSmallAngleSquared = 1e-2;  // the first missing terms of the series are under rounding below
+constexpr double kSmallAngleSquared = 1e-2;  // below it the truncated terms of the series are below rounding
 
-// The series of all lanes; those whose angle is not small get what `calc`, of double, says.
+// Replaces the series in lanes whose angle is not small by the values of `calc`, a function of double.
 template <size_t n, typename Calc>
 std::array<Lanes, n> replaceLarge(const Lanes& t2, std::array<Lanes, n> series, const Calc& calc) {
   for (Eigen::Index l = 0; l < kLane; ++l) {

@@ -6,7 +6,7 @@
 namespace bielle {
 namespace {
 
-// Entries p and `other` of a column change places.
+// Swaps entries p and `other` of a column.
 template <typename T, typename Index>
 void swapEntries(T* x, int p, const Index& other) {
   const T value = getEntry(x, other);
@@ -56,7 +56,7 @@ void solveFactorized(const Matrix& factors, const std::vector<typename LogicOf<t
   using T = typename Matrix::Scalar;
   const int n = static_cast<int>(factors.rows());
   const Eigen::Index m = X.cols();
-  for (int p = 0; p < n; ++p)  // all of them first: rows of L were swapped as a whole
+  for (int p = 0; p < n; ++p)  // all swaps first: whole rows of L were swapped
     if (pivots[p] != makeIndex<T>(p))
       for (Eigen::Index c = 0; c < m; ++c) swapEntries(&X(0, c), p, pivots[p]);
   for (int p = 0; p < n; ++p) {

@@ -114,7 +114,7 @@ inline void solveSmallCholesky(const L_& factor, X_&& X) {
 }
 
 /// Factors of A (n x n) in place by elimination with partial pivoting; `pivots` (n) holds the row each was swapped
-/// with. False when A is singular. Matrices of double or of Lanes.
+/// with. False if A is singular. Matrices of double or of Lanes.
 template <typename Matrix>
 typename LogicOf<typename Matrix::Scalar>::Mask factorizeSmall(
     Matrix& A, std::vector<typename LogicOf<typename Matrix::Scalar>::Index>& pivots);

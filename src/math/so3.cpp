@@ -129,7 +129,7 @@ Vector3d log3(const Matrix3d& R) {
   const Vector3d sine = calcSine(R);
   const double s2 = sine.squaredNorm();
   if (s2 < kSmallSineSquared && R.trace() > 0) return calcArcSineSeries(s2) * sine;
-  // Through the quaternion: its vector part is sin(t/2) times the axis, which stays well conditioned near t = pi.
+  // By the quaternion: its vector part is sin(t/2) times the axis, which stays well conditioned near t = pi.
   Eigen::Quaterniond quat(R);
   quat.normalize();
   if (quat.w() < 0) quat.coeffs() *= -1;

@@ -3,8 +3,8 @@
 ///
 /// Right Jacobians (Sola, Deray, Atchuthan, "A micro Lie theory", eqs. 143-144):
 ///     Exp(w + dw) = Exp(w) Exp(Jr(w) dw),    Log(R Exp(dw)) = Log(R) + Jr^{-1}(Log R) dw.
-/// With t = |w|, every function is even in t and is evaluated by its series where t^2 < 1e-2: the truncated terms are
-/// below rounding there.
+/// With t = |w|, every function is even in t and is evaluated by its series for t^2 < 1e-2, where the truncated terms
+/// are below rounding.
 #include "bielle/math/se3.h"
 #include "math/lanes.h"
 

@@ -1,16 +1,16 @@
 #pragma once
-/// \file The benchmark walk: a fixed workload to measure speed with, not a walk to be proud of.
+/// \file The benchmark walk: a fixed workload for measuring speed, not a good walk.
 ///
 /// From the standing posture, 250 stages of 15 ms by default: double support (13), then four times right foot (26),
-/// both (1), left foot (26), both (1); double support to the end. Stages where a foot comes down are the switches.
+/// both (1), left foot (26), both (1); double support to the end. Stages where a foot lands are the switches.
 /// Costs of a stage, h the time step:
-/// - full state regularization about the standing posture at rest (linkage joints included: left free, they make FDDP
-///   creep in short steps), and motor torques;
+/// - full state regularization about the standing posture at rest (including linkage joints, which would otherwise
+///   force FDDP to short steps), and motor torques;
 /// - centre of mass: x follows `speed` from the first step to the last switch, z stays;
-/// - force of every stance foot: the weight over their number, along z;
+/// - force of every stance foot: the weight divided by their number, along z;
 /// - height of the swing foot: a half sine, `step_height` at mid-swing;
 /// - velocity of both feet at the switches, zero, its weight divided by h.
-/// The last node regularizes the state alone.
+/// The last node has only the state regularization.
 #include "bielle/motion/motion.h"
 
 namespace bielle {

@@ -41,7 +41,7 @@ std::vector<GaitPhase> makePhases(int steps, const GaitTiming& t) {
   return phases;
 }
 
-// Weight on the left foot when a phase is over: all of it on the foot that will stand, half at rest.
+// Share of the weight on the left foot at the end of a phase: all on the next stance foot, half at rest.
 double calcLoadAfter(const FootstepPlan& plan, const GaitPhase& phase) {
   const int next = phase.steps_done;
   if (next == static_cast<int>(plan.steps.size())) return 0.5;
@@ -80,7 +80,7 @@ void fillFeet(const FootstepPlan& plan, const SwingShape& shape, double h, Gait&
         const Footstep& step = plan.steps[phase.steps_done];
         node.progress = static_cast<double>(i) / phase.nodes;
         node.X_WF = calcSwing(shape, stance[static_cast<int>(step.side)], step.X_WF, node.progress);
-        // An Euler step ends with the velocity that brought it there.
+        // The velocity at the end of an Euler step is that of the step.
         const SE3 before = calcSwing(shape, stance[static_cast<int>(step.side)], step.X_WF,
                                      std::max(0.0, node.progress - 1.0 / phase.nodes));
         node.V_F << node.X_WF.p - before.p, log3(node.X_WF.R * before.R.transpose());

@@ -4,12 +4,12 @@
 /// - The swing foot follows a path with zero velocity at both ends: horizontally a quintic, vertically up to an apex
 ///   over the higher end and down again; the foot stays flat while its heading turns.
 /// - In double support the weight shifts linearly from foot to foot.
-/// - The centre of mass is that of the linear inverted pendulum whose zero-moment point p goes with the weight: with z the
-///   height of the CoM over the feet, g gravity and h the time step,
+/// - The centre of mass is that of the linear inverted pendulum whose zero-moment point p follows the weight: with z
+///   the height of the CoM over the feet, g gravity and h the time step,
 ///       c_k - z / (g h^2) (c_{k-1} - 2 c_k + c_{k+1}) = p_k,    c_0 and c_N given                                 (1)
-///   a tridiagonal system for its only bounded solution (Kajita et al., "Biped walking pattern
-///   generation by using preview control", ICRA 2003, where (1) is the table-cart model). At touchdown it is
-///   as high over the lower foot as at the start, and rises or falls evenly in between.
+///   a tridiagonal system for its only bounded solution (Kajita et al., "Biped walking pattern generation by using
+///   preview control", ICRA 2003, where (1) is the table-cart model). At touchdown it is as high over the lower foot as
+///   at the start, and rises or falls evenly in between.
 #include "bielle/motion/locomotion.h"
 
 namespace bielle {
@@ -19,7 +19,7 @@ SE3 calcSwing(const SwingShape& shape, const SE3& a, const SE3& b, double s);
 
 struct GaitPhase {
   int nodes = 0;
-  int steps_done = 0;   ///< feet stand where they are after so many steps
+  int steps_done = 0;   ///< number of steps completed
   bool swings = false;  ///< the foot of step `steps_done` is in the air
 };
 
@@ -31,7 +31,7 @@ struct GaitNode {
   double progress = 0;              ///< of the swing, in (0, 1)
   SE3 X_WF;                         ///< placement of the swing foot
   Vector6d V_F = Vector6d::Zero();  ///< its velocity and angular velocity, world axes
-  bool lands = false;               ///< first node of a double support: the foot of the step before has just come down
+  bool lands = false;               ///< first node of a double support: the foot of the last step has just landed
 };
 
 struct Gait {

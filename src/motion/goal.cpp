@@ -78,7 +78,7 @@ double measureFootholds(const Goal& goal, const MotionTrack& track) {
   double farthest = 0;
   for (const Foothold& foothold : goal.footholds) {
     const double distance = (getFoot(track, foothold.contact, foothold.node).p - foothold.position).norm();
-    if (!(distance <= farthest)) farthest = distance;  // a distance that is not a number is kept
+    if (!(distance <= farthest)) farthest = distance;  // NaN is kept
     if (std::isnan(farthest)) break;
   }
   return farthest;
@@ -130,10 +130,10 @@ std::string formatOutcome(const GoalOutcome& outcome) {
     std::snprintf(text, sizeof text, "%.4g", value);
     return std::string(text);
   };
-  const bool exact = goal.kind == GoalKind::Footholds;  // zero is asked of a distance
+  const bool exact = goal.kind == GoalKind::Footholds;  // the requested distance is zero
   std::string text = exact ? "asked within " + format(goal.tolerance) : "asked " + format(goal.asked);
   text += unit + ", came out " + format(outcome.came_out) + unit;
-  // A share of a height over another would mislead.
+  // A percentage of a ratio of heights would be misleading.
   if (!exact && goal.kind != GoalKind::Height && goal.asked != 0 && std::isfinite(outcome.came_out))
     text += ": " + std::to_string(std::lround(100 * outcome.came_out / goal.asked)) + " %";
   if (!outcome.met()) text += exact ? ", missed" : ", missed (tolerance " + format(goal.tolerance) + unit + ")";

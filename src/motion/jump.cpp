@@ -15,9 +15,9 @@ struct Scene {
   JumpFigures figures;
   VectorXd q0;                        // posture at the start
   VectorXd state_weights;             // 2 nv
-  Vector3d com, forward, shift;       // CoM at the start; unit vector ahead; how far the jump goes
-  std::vector<ContactTarget> before;  // feet where they start and
-  std::vector<ContactTarget> after;   // where they land
+  Vector3d com, forward, shift;       // CoM at the start; unit vector ahead; displacement of the jump
+  std::vector<ContactTarget> before;  // feet at the start and
+  std::vector<ContactTarget> after;   // at the landing
 };
 
 enum class Phase { Stand, Push, Flight, Land, Settle };
@@ -138,7 +138,7 @@ StageSpec makeTerminalStage(const Scene& scene) {
 Scene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
   Scene scene{model, o, calcJumpFigures(o, model.gravity().norm()), q0, makeStateWeights(model), {}, {}, {}, {}, {}};
   if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3).setConstant(o.torso_weight);
-  if (o.published != 0) {  // hips count as other joints do, the heading does not
+  if (o.published != 0) {  // hips count like other joints, the heading does not
     scene.state_weights.head(model.nv()) = selectMainJoints(model);
     if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3) << o.torso_weight, o.torso_weight, 0;
   }
@@ -170,7 +170,7 @@ double calcLoad(const Scene& scene, Phase phase, double com_acceleration) {
   return m * g;
 }
 
-// The posture of the start, thrown by Eq. (1).
+// The initial posture, moving by Eq. (1).
 VectorXd makeGuess(const Scene& scene, Phase phase, double t) {
   const Model& model = scene.model;
   VectorXd x(model.nq() + model.nv());
@@ -229,7 +229,7 @@ JumpHeight calcJumpHeight(const JumpOptions& o, double gravity, double t) {
     return JumpHeight{s * s * s * (a + s * (b + s * c)),
                       s * (6 * a + s * (12 * b + s * 20 * c)) / (duration * duration)};
   };
-  t -= f.stand - 1e-6 * o.time_step;  // a node on the border of two phases belongs to the later one
+  t -= f.stand - 1e-6 * o.time_step;  // a node on the boundary of two phases belongs to the later one
   if (t <= 0) return {};
   if (t < f.push) return follow(t / f.push, f.push);
   t -= f.push;

@@ -23,7 +23,7 @@ struct Bounds {
   }
 };
 
-// Values by motor: those of the model, but for the ones given by name.
+// Values by motor: those of the model, except those given by name.
 VectorXd replaceByName(const Model& model, VectorXd values, const std::map<std::string, double>& given,
                        const std::string& what) {
   for (const auto& [name, value] : given) {

@@ -31,7 +31,7 @@ void check(const LocomotionOptions& o) {
   requireOption(o.swing.arrive <= 1, "swing_arrive", "it is over 1", "give a part of the swing, e.g. 1");
 }
 
-// The first double support lengthened until Eq. (1) holds.
+// Lengthens the first double support until Eq. (1) holds.
 Gait makeStartingGait(const Model& model, const Stance& stance, const LocomotionTask& task,
                       const LocomotionOptions& options) {
   constexpr double kStep = 0.05, kLongest = 2;  // s
@@ -113,7 +113,7 @@ std::string nameOf(const Scene& scene, const GaitPhase& phase) {
   return phase.swings ? getName(getOther(scene.task.plan.steps[phase.steps_done].side)) : "double support";
 }
 
-// Quaternion (x y z w) of the base, as at the start but for its heading.
+// Quaternion (x y z w) of the base: the initial one with a new heading.
 Eigen::Vector4d makeHeading(const Scene& scene, const GaitNode& node) {
   const Eigen::Quaterniond start(Eigen::Vector4d(scene.stance.q.segment<4>(3)));
   return (Eigen::Quaterniond(Eigen::AngleAxisd(node.heading, Vector3d::UnitZ())) * start).coeffs();
@@ -161,7 +161,7 @@ Vector6d makeVector(double x, double z, double rotation) {
   return (Vector6d() << x, x, z, Vector3d::Constant(rotation)).finished();
 }
 
-// A swing costs something where it is near the ground, which rises from stair to stair along with it.
+// Height of the ground for the fly-high cost; on stairs it rises along the swing.
 double calcGround(const Scene& scene, const GaitNode& node, const Footstep& step) {
   const auto feet = scene.task.plan.getStance(scene.gait.phases[node.phase].steps_done);
   const double standing = feet[static_cast<int>(getOther(step.side))].p.z();
@@ -212,19 +212,19 @@ StageSpec makeStage(const Scene& scene, const GaitNode& node, const std::vector<
   return stage;
 }
 
-// A foot comes down and stops at once.
+// A foot lands and stops instantly.
 StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector<ContactTarget>& contacts) {
   StageSpec stage = makeRegularizedStage(scene, node);
   stage.kind = StageKind::Impact;
   stage.dt = 0;
   stage.constraints = makeConstraintSet(scene.model, contacts);
   stage.state.weight *= scene.options.timing.time_step;
-  stage.control.weight *= scene.options.timing.time_step;  // torques do nothing here: they go to zero
+  stage.control.weight *= scene.options.timing.time_step;  // torques have no effect here and go to zero
   addLandingCosts(scene, scene.task.plan.steps[scene.gait.phases[node.phase].steps_done - 1], stage);
   return stage;
 }
 
-// First nodes of the phases in which a foot has come down.
+// First nodes of the phases that begin with a landing.
 std::vector<int> listLandings(const ContactSchedule& schedule) {
   std::vector<int> landings;
   size_t standing = schedule.phases.front().contacts.size();
@@ -249,12 +249,12 @@ std::vector<Goal> makeFootholdGoals(const Scene& scene, const ContactSchedule& s
   return {goal};
 }
 
-// The standing posture, carried along.
+// The standing posture, moved along the gait.
 VectorXd makeGuess(const Scene& scene, const GaitNode& node) {
   const Model& model = scene.model;
   VectorXd x = VectorXd::Zero(model.nq() + model.nv());
   x.head(model.nq()) = scene.stance.q;
-  if (isPublished(scene)) {  // on stairs as high as the path, since fly high grows exponentially below the ground
+  if (isPublished(scene)) {  // on stairs at the height of the path, since fly high grows exponentially below the ground
     x[2] += node.com.z() - scene.stance.com.z();
     return x;
   }

@@ -1,4 +1,4 @@
-// The numbers of a locomotion by name, and those that were published.
+// The options of a locomotion by name, and the published values.
 #include "bielle/motion/locomotion.h"
 
 namespace bielle {
@@ -53,7 +53,7 @@ std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
 }
 
 void setPaperWeights(LocomotionOptions& o) {
-  // Durations are cut to whole time steps; the last step has its node of double support, and then the end.
+  // Durations are truncated to whole time steps; the last step has its node of double support, then the end follows.
   const double h = o.timing.time_step = 0.015;
   o.timing.start = 13 * h;   // 0.2 s
   o.timing.single = 26 * h;  // 0.4 s

@@ -178,7 +178,7 @@ void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights
 
 void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd& loads, StageSpec& stage) {
   const ConstraintSet& set = stage.constraints;
-  // The pyramid inscribed in the cone, and a little more: a penalty is met only nearly.
+  // The pyramid inscribed in the cone, shrunk slightly because a penalty is satisfied only approximately.
   const double pyramid = 0.95 * costs.friction / std::sqrt(2);
   const double weight = model.mass() * model.gravity().norm();
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {

@@ -12,9 +12,9 @@ namespace {
 constexpr double kSameLevel = 1e-6;  // m
 constexpr double kRim = 0.01;        // of a platform around the soles, m
 
-// The platform under soles that stood on the plane of a plan when the common plane is lower: their bounding box, aligned with
-// the first sole.
-// \pre a sole stands there
+// The platform under soles that stood on the plane of a plan if the common plane is lower: their bounding box, aligned
+// with the first sole.
+// \pre there is a sole
 GroundStep makePlatform(const Model& model, const std::vector<ContactTarget>& soles) {
   const SE3& first = soles.front().X_WT;
   const double yaw = calcHeading(first);
@@ -56,7 +56,7 @@ Ground joinGrounds(const Model& model, const std::vector<MotionPlan>& plans) {
   return ground;
 }
 
-// Steps and platforms of one motion may lie where the feet of another one stand.
+// Checks that steps and platforms of one motion do not lie under the feet of another.
 void checkSoles(const Model& model, const MotionPlan& plan, const Ground& ground) {
   for (const ContactPhase& phase : plan.schedule.phases)
     for (const ContactTarget& sole : phase.contacts) {

@@ -70,7 +70,7 @@ std::vector<OptionEntry> listOptions(StairsOptions& o) {
 
 void setPaperWeights(StairsOptions& o) {
   setPaperWeights(o.gait);
-  // The ground rises by 0.1 m/s under feet of 0.5 s in the air, cut to 33 time steps, and 7 on the ground: 0.6 s a step.
+  // The ground rises by 0.1 m/s; a foot is 0.5 s in the air, truncated to 33 time steps, and 7 on the ground: 0.6 s.
   const double h = o.gait.timing.time_step;
   o.height = 0.1 * 40 * h;
   o.speed = 0.3;

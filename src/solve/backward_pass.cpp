@@ -27,7 +27,7 @@ int BackwardPass::update(const BackwardInput& input) {
   const int N = input.problem.numStages();
   const EvaluationList& nodes = input.evaluations.getIterate();
   for (int k = 0; k <= N; ++k) {
-    hessians_.takeBack(models_[k]);  // of a sweep that stopped half way
+    hessians_.takeBack(models_[k]);  // if the last sweep stopped halfway
     tasks_[k].node = k;
     tasks_[k].at = nodes[k].get();
     tasks_[k].next = k < N ? nodes[k + 1].get() : nullptr;
@@ -36,7 +36,7 @@ int BackwardPass::update(const BackwardInput& input) {
   }
   sweep_.start(models_, input.regularization);
   sweep_node_ = N;
-  // Batches of nodes, always the same ones, from the last on.
+  // Batches of nodes, independent of the threads, from the last on.
   const int size = input.problem.getBatchSize(), num_batches = N / size + 1;
   std::atomic<int> next{num_batches - 1};
   std::atomic_flag sweeping = ATOMIC_FLAG_INIT;
@@ -65,7 +65,7 @@ int BackwardPass::update(const BackwardInput& input) {
   return -1;
 }
 
-// Stops for good at a node that could not be linearized or swept.
+// Stops at the first node that could not be linearized or swept.
 void BackwardPass::sweepReadyNodes(const BackwardInput& input) {
   const int N = input.problem.numStages();
   while (sweep_node_ >= 0 && sweep_.getResult().status == LqStatus::Ok &&
@@ -78,7 +78,7 @@ void BackwardPass::sweepReadyNodes(const BackwardInput& input) {
   }
 }
 
-// Runs in parallel: writes only to the entries of its own nodes.
+// Runs in parallel: writes only to entries of its own nodes.
 void BackwardPass::linearize(const BackwardInput& input, int begin, int end) {
   for (int k = begin; k < end; ++k) {
     hessians_.lend(models_[k]);

@@ -9,7 +9,7 @@
 
 namespace bielle {
 
-/// The iterate to linearize about, the boxes of du (N or none), and what the sweep adds.
+/// The iterate to linearize about, the boxes of du (N or none), and the regularization of the sweep.
 struct BackwardInput {
   const ShootingProblem& problem;
   const NodeEvaluations& evaluations;
@@ -18,18 +18,18 @@ struct BackwardInput {
   int threads;
 };
 
-/// The sweep needs one node after the other, from the last on, and so it goes along with the linearization: a thread
-/// that has finished a batch of nodes sweeps as far as there are models, unless another thread is doing so.
+/// The sweep visits nodes one by one, from the last on, and runs alongside the linearization: a thread that has
+/// finished a batch of nodes sweeps as far as models are available, unless another thread is doing so.
 class BackwardPass {
  public:
   void resize(const ShootingProblem& problem);
 
-  /// Returns the first node that could not be linearized, -1 if all could. The sweep may have stopped all the same.
+  /// Returns the first node that could not be linearized, or -1; in either case the sweep may have stopped.
   int update(const BackwardInput& input);
   /// Why a node could not be linearized, empty if it could.
   const std::string& getFailure(int node) const { return failures_[node]; }
 
-  /// N + 1, without their second derivatives, which the sweep uses up.
+  /// N + 1, without their second derivatives, which the sweep overwrites.
   const std::vector<StageModel>& getModels() const { return models_; }
   const LqSweep& getSweep() const { return sweep_; }
   /// Times of all updates since resize(), summed over the threads.
@@ -41,10 +41,10 @@ class BackwardPass {
   std::string checkModel(const ShootingProblem& problem, int k) const;
   void sweepReadyNodes(const BackwardInput& input);
 
-  std::vector<StageModel> models_;             // N + 1, those that wait for the sweep with a Hessian from the pool
+  std::vector<StageModel> models_;             // N + 1; those awaiting the sweep have a Hessian from the pool
   std::vector<LinearizeTask> tasks_;           // N + 1
   std::vector<std::string> failures_;          // N + 1
-  std::vector<std::atomic<bool>> linearized_;  // N + 1: the model is there for the sweep
+  std::vector<std::atomic<bool>> linearized_;  // N + 1: the model is ready for the sweep
   HessianPool hessians_;
   LqSweep sweep_;
   int sweep_node_ = -1;  // the next one

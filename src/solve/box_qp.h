@@ -18,15 +18,15 @@ namespace bielle {
 
 enum class BoxQpStatus {
   Ok,
-  Indefinite,   ///< a free block H_ff has no Cholesky factor: add to the diagonal of H
+  Indefinite,   ///< a free block H_ff has no Cholesky factor: increase the diagonal of H
   NotConverged  ///< r_f did not vanish: the data are not finite, or H is singular to rounding
 };
 
-/// Workspace and solution of (1). After the first solve() of the largest size nothing is allocated.
+/// Workspace and solution of (1). No allocation after the first solve() of the largest size.
 class BoxQp {
  public:
-  /// H (n x n; the lower triangle is read), g, lower <= upper (n, infinite where there is no bound).
-  /// d (n): start in (it is clamped first), solution out.
+  /// H (n x n; the lower triangle is read), g, lower <= upper (n, infinite if there is no bound).
+  /// d (n): on entry the start (clamped first), on return the solution.
   BoxQpStatus solve(ConstMatrixRef H, ConstVectorRef g, ConstVectorRef lower, ConstVectorRef upper, VectorRef d);
 
   /// Number of free components, and their indices in increasing order in its first entries.

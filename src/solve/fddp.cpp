@@ -18,9 +18,9 @@ namespace bielle {
 namespace {
 
 constexpr double kPenaltyMargin = 0.5;  // rho of Eq. (5)
-// Differences of costs below this share of the cost are rounding: they neither accept nor refuse a step.
+// Differences of costs below this share of the cost are rounding: they neither accept nor reject a step.
 constexpr double kCostRounding = 1e-14;
-constexpr double kClosingShare = 0.5;  // of Eq. (4): the most that Eq. (8) may be
+constexpr double kClosingShare = 0.5;  // largest share of Eq. (4) that Eq. (8) may reach
 constexpr int kShortestSegment = 6;    // stages
 
 }  // namespace
@@ -32,7 +32,7 @@ struct Fddp::Workspace {
   Rollout rollout;
   std::vector<ControlBox> bounds;  // of u, N or none
   std::vector<ControlBox> boxes;   // of du, N or none
-  std::vector<char> open;          // N: whether the gap behind a stage counts as open
+  std::vector<char> open;          // N: whether the gap after a stage counts as open
 
   void resize(const ShootingProblem& problem, const FddpOptions& options, int threads);
 };
@@ -67,7 +67,7 @@ class Run {
   FddpSummary solve();
 
  private:
-  /// Why the iterations end, if they do.
+  /// Reason for ending the iterations, if they end.
   using End = std::optional<FddpTermination>;
 
   void start();
@@ -102,14 +102,14 @@ class Run {
 
   int N_ = 0;
   Clock::time_point start_ = Clock::now();
-  FddpIteration line_;                // the iteration under way
+  FddpIteration line_;                // the current iteration
   double gap_sum_ = 0;                // c, of the gaps that count as open
   double slope_ = 0, curvature_ = 0;  // Eq. (1)
   double regularization_ = 0;
   int threads_ = 1;
-  bool swept_ = false;         // a sweep is still to be looked at
+  bool swept_ = false;         // a sweep has not been used yet
   Trial* accepted_ = nullptr;  // the trial that ends a line search
-  int failed_node_ = -1;       // where the first trial of a line search failed that did, and why
+  int failed_node_ = -1;       // where the first failed trial of a line search failed, and why
   std::string failure_;
   double last_gradient_ = 0, last_step_ = 1;  // of the iteration before
   FddpSummary summary_;
@@ -188,7 +188,7 @@ void Run::updateGaps() {
   }
 }
 
-// Ends with an acceptable trial, unless the current iterate is where the iterations end.
+// Finds an acceptable trial, unless the iterations end at the current iterate.
 Run::End Run::findStep() {
   while (true) {
     if (isInterrupted()) return FddpTermination::Interrupted;
@@ -199,8 +199,8 @@ Run::End Run::findStep() {
   }
 }
 
-// The sweep, at the least regularization from the current one on for which it goes through. A second one needs the
-// models anew, because a sweep uses up their Hessians; the evaluations are still there.
+// The sweep, at the smallest regularization from the current one on for which it succeeds. A second sweep needs new
+// models, because a sweep overwrites their Hessians; the evaluations are kept.
 Run::End Run::updateStep() {
   failure_.clear();
   while (true) {
@@ -240,15 +240,15 @@ double Run::calcGradient() const {
   return gradient;
 }
 
-// Whether the step should close the gaps for good: the last one allowed, and the one after which the gradient vanishes
-// if it goes on as it came.
+// Whether the step must close the gaps: the last one allowed, and the one after which the gradient vanishes if it keeps
+// falling at the same rate.
 bool Run::mustClose() const {
   const bool last = options_.last_rollout == LastRollout::Closed && line_.iteration >= options_.max_iterations;
   return last ||
          line_.gradient * line_.gradient <= options_.gradient_tolerance * std::max(line_.gradient, last_gradient_);
 }
 
-// Whether the gaps that Eq. (9) leaves may be hoped to count as closed.
+// Whether the gaps that Eq. (9) leaves are likely to count as closed.
 bool Run::closesTwice(int segments) const {
   double step = 0;
   for (int s = 1; s < segments; ++s) step = std::max(step, work_.dx[s * N_ / segments].lpNorm<Eigen::Infinity>());
@@ -278,8 +278,8 @@ bool Run::searchLine() {
   return false;
 }
 
-// A full step in segments. They start where linear models foresee it: what they cannot reach, a rollout in one piece
-// may.
+// A full step in segments, which start where linear models predict them. If it is rejected, a rollout in one piece may
+// still succeed.
 bool Run::tryFullStep(const RolloutInput& input, int segments, double nu) {
   Rollout& rollout = work_.rollout;
   Trial& trial = rollout.getTrial(0);
@@ -294,7 +294,7 @@ bool Run::tryFullStep(const RolloutInput& input, int segments, double nu) {
   return isClosed() && accept(trial, nu);
 }
 
-// All step lengths, one after the other: a receding horizon has no time for rollouts in one piece.
+// All step lengths in turn: a receding horizon has no time for rollouts in one piece.
 bool Run::searchInSegments(const RolloutInput& input, int segments, double nu) {
   double alpha = 1;
   for (int i = 0; i < options_.num_step_lengths; ++i, alpha *= 0.5) {
@@ -347,7 +347,7 @@ Run::End Run::raiseRegularization(const char* reason) {
   return FddpTermination::RegularizationMax;
 }
 
-// After an accepted step: logs it, adapts the regularization to its length, and looks whether to go on.
+// After an accepted step: logs it, adapts the regularization to its length, and decides whether to continue.
 Run::End Run::checkProgress() {
   line_.seconds = calcSecondsSince(start_);
   summary_.log.push_back(line_);

@@ -1,6 +1,6 @@
 #pragma once
-// Second derivatives are needed only from the linearization of a node to its sweep, which follows soon: pieces of
-// memory that are passed from node to node, the most recently returned one first, stay in the cache.
+// Memory for second derivatives, which are needed only from the linearization of a node to its sweep soon after. Pieces
+// passed from node to node, the most recently returned one first, stay in the cache.
 #include <algorithm>
 #include <mutex>
 
@@ -10,7 +10,7 @@ namespace bielle {
 
 class HessianPool {
  public:
-  /// One piece for each of the models, whose own it takes away.
+  /// One piece per model; the models give up their own.
   void resize(std::vector<StageModel>& models) {
     Eigen::Index size = 0;
     for (StageModel& model : models) {
@@ -27,7 +27,7 @@ class HessianPool {
     model.swapHessian(free_.back());
     free_.pop_back();
   }
-  /// Does nothing for a model that has none.
+  /// Does nothing for a model without a piece.
   void takeBack(StageModel& model) {
     VectorXd memory;
     model.swapHessian(memory);

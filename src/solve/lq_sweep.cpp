@@ -70,7 +70,7 @@ LqStatus LqSweep::updateStage(const StageModel& model, const Node& next, const C
   return isFinite(node) ? LqStatus::Ok : LqStatus::NotFinite;
 }
 
-// Eqs. (2) to (4). Vx holds Qx from here to the elimination.
+// Eqs. (2) to (4). Vx holds Qx until the elimination.
 void LqSweep::updateQuadratic(const StageModel& model, const Node& next, MatrixMap Q, Node& node) {
   const Index n = model.lx.size(), nu = model.lu.size(), n_next = model.gap.size();
   const ConstMatrixMap Ft = model.Ft();

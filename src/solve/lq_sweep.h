@@ -4,22 +4,22 @@
 /// With the models of StageModel and regularizations mu_x, mu_u >= 0, find the step (dx, du), dx_0 = 0, that minimizes
 ///     sum_k [ lx.dx + lu.du + 1/2 dx.(lxx + mu_x I).dx + du.lux.dx + 1/2 du.(luu + mu_u I).du ]_k
 ///           + [ lx.dx + 1/2 dx.(lxx + mu_x I).dx ]_N      s.t.  dx_{k+1} = Fx dx_k + Fu du_k + gap_k.            (1)
-/// The cost still to pay from node k is V_k(dx) = v_k + Vx.dx + 1/2 dx.Vxx.dx, from V_N = the terminal term. Backwards,
-/// with V' = V_{k+1} and the value gradient carried over the gap (Mastalli et al., "Crocoddyl", ICRA 2020, eq. 12):
+/// The cost to go from node k is V_k(dx) = v_k + Vx.dx + 1/2 dx.Vxx.dx, with V_N = the terminal term. Backwards, with
+/// V' = V_{k+1} and the value gradient carried over the gap (Mastalli et al., "Crocoddyl", ICRA 2020, eq. 12):
 ///     p   = Vx' + Vxx' gap                                                                                      (2)
 ///     Qx  = lx + Fx^T p                         Qu  = lu + Fu^T p                                               (3)
 ///     Qxx = lxx + mu_x I + Fx^T Vxx' Fx         Qux = lux + Fu^T Vxx' Fx      Quu = luu + mu_u I + Fu^T Vxx' Fu (4)
-/// The control du = k + K dx that minimizes the stage's quadratic, and the value left, with Quu = L L^T:
+/// The control du = k + K dx that minimizes the stage's quadratic, and the resulting value, with Quu = L L^T:
 ///     k = -Quu^{-1} Qu                          K = -Quu^{-1} Qux = -L^{-T} Y,   Y = L^{-1} Qux                 (5)
 ///     Vx = Qx + Qux^T k                         Vxx = Qxx - Y^T Y                                               (6)
 ///     v_k = v_{k+1} + Qu.k + 1/2 k.Quu.k + Vx'.gap + 1/2 gap.Vxx'.gap                                           (7)
 /// so that v_0, the *expected change*, is the optimal value of (1).
 ///
 /// With boxes, lower <= du <= upper at dx = 0, k solves the box QP of Quu and Qu instead, and the rows of K of its
-/// clamped components are zero: (5) for K and (6) then hold with L and Y of the free components alone (see box_qp.h).
+/// clamped components are zero: (5) for K and (6) then hold with L and Y of the free components (see box_qp.h).
 ///
 /// The step of length alpha takes alpha k and alpha gap in place of k and gap: (dx, du) scale with alpha, and the
-/// models foresee the change of cost
+/// models predict the change of cost
 ///     alpha slope + 1/2 alpha^2 curvature,     slope = sum_k lx.dx + lu.du,     slope + 1/2 curvature = v_0.       (8)
 /// Without gaps and boxes curvature = -slope.
 #include <vector>
@@ -34,7 +34,7 @@ struct LqRegularization {
   double state = 0;    ///< mu_x, added to the diagonal of every Vxx
 };
 
-/// Bounds of du at one stage (nu each), infinite where there are none; lower <= 0 <= upper.
+/// Bounds of du at one stage (nu each), infinite if there are none; lower <= 0 <= upper.
 struct ControlBox {
   VectorXd lower, upper;
 };
@@ -47,11 +47,11 @@ enum class LqStatus {
 
 struct LqResult {
   LqStatus status = LqStatus::Ok;
-  int node = -1;               ///< where the sweep stopped, -1 if it went through
+  int node = -1;               ///< where the sweep stopped, -1 if it succeeded
   double expected_change = 0;  ///< v_0, Eq. (7)
 };
 
-/// Owns everything a sweep writes. Sized by the first update() and kept: later ones of the same sizes allocate nothing.
+/// Owns all data that a sweep writes. Sized by the first update(); later ones of the same sizes allocate nothing.
 class LqSweep {
  public:
   /// Results of the sweep at node k; at the terminal node Vx and Vxx only.
@@ -67,7 +67,7 @@ class LqSweep {
   LqResult update(const std::vector<StageModel>& models, const LqRegularization& regularization,
                   const std::vector<ControlBox>& boxes = {});
 
-  /// The same node by node, for models that become available one after the other: start(), then updateNode(k) for
+  /// The same node by node, for models that become available one by one: start(), then updateNode(k) for
   /// k = N .. 0 as long as the status is Ok. start() reads only the sizes of the models. updateNode() overwrites the
   /// Hessian of the model.
   void start(const std::vector<StageModel>& models, const LqRegularization& regularization);
@@ -77,13 +77,13 @@ class LqSweep {
 
   const std::vector<Node>& getNodes() const { return nodes_; }
 
-  /// The solution of (1) of the last update() on the same models: dx_k (N + 1) and du_k (N), resized if need be.
+  /// The solution of (1) of the last update() on the same models: dx_k (N + 1) and du_k (N), resized if necessary.
   /// Returns slope of Eq. (8).
   double calcStep(const std::vector<StageModel>& models, std::vector<VectorXd>& dx, std::vector<VectorXd>& du) const;
 
  private:
   void resize(const std::vector<StageModel>& models);
-  // Q: the Hessian of the model, which becomes [Quu . ; Qxu Qxx], whose first columns become those of L over Y^T.
+  // Q: the Hessian of the model, which becomes [Quu . ; Qxu Qxx]; then its first columns become L over Y^T.
   LqStatus updateNode(int k, const StageModel& model, MatrixMap Q, const ControlBox* box);
   LqStatus updateStage(const StageModel& model, const Node& next, const ControlBox* box, MatrixMap Q, Node& node);
   void updateQuadratic(const StageModel& model, const Node& next, MatrixMap Q, Node& node);

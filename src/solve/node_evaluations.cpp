@@ -11,7 +11,7 @@ namespace bielle {
 
 namespace {
 
-// With room for node k in evaluation k: no iteration should be the first to ask for it.
+// Sizes evaluation k for node k, so that no iteration allocates.
 void grow(const ShootingProblem& problem, int size, EvaluationList& list) {
   while (static_cast<int>(list.size()) < size) {
     const int node = std::min(static_cast<int>(list.size()), problem.numStages() - 1);
@@ -38,7 +38,7 @@ void NodeEvaluations::resize(const ShootingProblem& problem, int num_rolling, in
   seconds_ = 0;
 }
 
-// Each thread makes its own: memory belongs where it is first written to.
+// Each thread makes its own: memory is placed near the thread that first writes to it.
 void NodeEvaluations::makeScratch(const ShootingProblem& problem, int threads) {
   std::vector<std::unique_ptr<ProblemScratch>> made(threads);
   ParallelErrors errors;
@@ -82,7 +82,7 @@ int NodeEvaluations::update(const ShootingProblem& problem, const ShootingTrajec
 
 void NodeEvaluations::advance() {
   const size_t num_nodes = fresh_.size();
-  if (num_nodes == 0) return;  // nothing has been solved
+  if (num_nodes == 0) return;  // no solve so far
   std::rotate(iterate_.begin(), iterate_.begin() + 1, iterate_.begin() + num_nodes - 1);
   std::rotate(fresh_.begin(), fresh_.begin() + 1, fresh_.end() - 1);
   fresh_[0] = fresh_[num_nodes - 2] = fresh_[num_nodes - 1] = false;

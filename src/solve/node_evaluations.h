@@ -10,17 +10,17 @@ using EvaluationList = std::vector<std::unique_ptr<NodeEvaluation>>;
 
 class NodeEvaluations {
  public:
-  /// Makes what is missing: two sets of N + 1 evaluations, `num_rolling` single ones, scratch for each thread. Whatever
-  /// belongs to another problem is dropped. The evaluations of the iterate are outdated, unless advance() moved them.
+  /// Creates any missing memory: two sets of N + 1 evaluations, `num_rolling` single ones, scratch for each thread.
+  /// That of another problem is dropped. The evaluations of the iterate become outdated, unless advance() moved them.
   void resize(const ShootingProblem& problem, int num_rolling, int threads);
 
-  /// Evaluates the nodes of the current iterate that are outdated, in batches that threads share. Returns the first
-  /// node whose status is not Ok, -1 if all are.
+  /// Evaluates the outdated nodes of the current iterate, in batches shared among threads. Returns the first node whose
+  /// status is not Ok, or -1.
   /// \throws std::invalid_argument when a node that is not outdated has another state or control
   int update(const ShootingProblem& problem, const ShootingTrajectory& nodes, int threads);
-  /// The iterate is another one: all of its evaluations are outdated.
+  /// Marks all evaluations of the iterate as outdated.
   void outdate() { std::fill(fresh_.begin(), fresh_.end(), false); }
-  /// Node k becomes what node k + 1 was; nodes 0, N - 1 and N are outdated.
+  /// Node k takes the place of node k + 1; nodes 0, N - 1 and N become outdated.
   void advance();
 
   /// N + 1 each: of the current iterate, and of a trial that may become it by swapTrial().
@@ -42,7 +42,7 @@ class NodeEvaluations {
   EvaluationList iterate_, trial_, rolling_;
   std::vector<std::unique_ptr<ProblemScratch>> scratch_;  // by thread
   std::vector<EvaluateTask> tasks_;
-  std::vector<char> fresh_;  // N + 1: the evaluation is that of the iterate's node
+  std::vector<char> fresh_;  // N + 1: the evaluation is up to date with the iterate
   bool advanced_ = false;    // since the last resize()
   double seconds_ = 0;
 };

@@ -1,12 +1,12 @@
 #pragma once
-// Exceptions cannot leave a parallel region by themselves.
+// Carries exceptions out of a parallel region, which they cannot leave by themselves.
 #include <exception>
 #include <mutex>
 
 namespace bielle {
 
-/// Keeps what the tasks of a parallel region throw, of several the exception of the task with the smallest index, so
-/// that the same one comes out whatever the number of threads.
+/// Keeps an exception thrown by a task of a parallel region: if several throw, that of the task with the smallest
+/// index, so that it does not depend on the number of threads.
 class ParallelErrors {
  public:
   template <class Task>
@@ -20,7 +20,7 @@ class ParallelErrors {
       index_ = index;
     }
   }
-  /// Behind the region.
+  /// To be called after the region.
   void rethrow() const {
     if (error_) std::rethrow_exception(error_);
   }

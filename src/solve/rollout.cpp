@@ -10,7 +10,7 @@ namespace bielle {
 
 namespace {
 
-// Whether a part of the gap behind a stage is to stay open.
+// Whether part of the gap after a stage is to stay open.
 bool contracts(const RolloutInput& input, const Trial& trial, int stage) {
   return trial.alpha < 1 && input.open[stage];
 }
@@ -134,7 +134,7 @@ void Rollout::rollOut(const RolloutInput& input, int num_tracks) {
   }
 }
 
-// Runs in parallel: nothing is touched at the node where the next segment starts. A track that fails is left behind.
+// Runs in parallel: writes nothing at the node where the next segment starts. A track that fails is dropped.
 void Rollout::rollOut(const RolloutInput& input, Group& group) {
   startTracks(input, group);
   for (int step = 0; !group.active.empty(); ++step) {
@@ -168,7 +168,7 @@ void Rollout::startTracks(const RolloutInput& input, Group& group) {
   integrate(input, group);
 }
 
-// The node so many steps behind the start of each track, and its cost; tracks that end here are no longer active.
+// Evaluates the node `step` steps after the start of each track, and its cost; tracks that end here become inactive.
 void Rollout::evaluateNodes(const RolloutInput& input, int step, Group& group) {
   const auto hasEnded = [&](const Track* track) {
     const int k = track->begin + step;
@@ -207,7 +207,7 @@ void Rollout::updateControl(const RolloutInput& input, int k, Trial& trial) cons
   if (!input.bounds.empty()) u = u.cwiseMax(input.bounds[k].lower).cwiseMin(input.bounds[k].upper);
 }
 
-// Where f leads, as a deviation from the iterate: the first term of Eq. (3).
+// Next states f as deviations from the iterate: the first term of Eq. (3).
 void Rollout::findDeviations(const RolloutInput& input, Group& group) {
   group.differences.clear();
   group.moved.clear();
@@ -219,7 +219,7 @@ void Rollout::findDeviations(const RolloutInput& input, Group& group) {
     if (track.failed_node >= 0 || k == N_) continue;
     const bool at_joint = next == track.end && next < N_, contracted = contracts(input, trial, k);
     if (!at_joint && !contracted) trial.nodes.xs[next] = out.x_next;
-    if (next == N_ && !contracted) continue;  // nobody asks for it
+    if (next == N_ && !contracted) continue;  // not needed
     group.differences.push_back({next, input.evaluations.getIterate()[next].get(), &out.x_next,
                                  at_joint ? &track.arrival : &trial.deviations[next]});
     group.moved.push_back(&track);
@@ -231,7 +231,7 @@ void Rollout::findDeviations(const RolloutInput& input, Group& group) {
     if (!group.differences[i].dx->allFinite()) group.moved[i]->fail(group.differences[i].node, {});
 }
 
-// The rest of Eq. (3), for steps that leave a part of the gaps open.
+// The rest of Eq. (3), for steps that leave part of the gaps open.
 void Rollout::contractGaps(const RolloutInput& input, Group& group) {
   group.states.clear();
   group.moved.clear();
@@ -280,7 +280,7 @@ void Rollout::updateGaps(const RolloutInput& input, int num_tracks, Trial& trial
   trial.ok = std::isfinite(trial.cost) && std::isfinite(trial.gap_sum) && std::isfinite(trial.closing_cost);
 }
 
-// The gap between two segments, and its part in Eq. (8).
+// The gap between two segments, and its contribution to Eq. (8).
 void Rollout::addJointGap(const RolloutInput& input, double rest, const Track& before, const Track& after,
                           Trial& trial) {
   if (after.start.size() == 0) return;

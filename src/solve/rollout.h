@@ -9,41 +9,41 @@ namespace bielle {
 struct RolloutInput {
   const ShootingProblem& problem;
   const ShootingTrajectory& nodes;
-  const NodeEvaluations& evaluations;  ///< of which it writes those of the trial, or the rolling ones
+  const NodeEvaluations& evaluations;  ///< it writes those of the trial, or the rolling ones
   const std::vector<StageModel>& models;
   const LqSweep& sweep;
   const std::vector<VectorXd>& dx;        ///< N + 1, of the full step
   const std::vector<ControlBox>& bounds;  ///< of u, N or none
-  const std::vector<char>& open;          ///< N: whether the gap behind a stage counts as open
+  const std::vector<char>& open;          ///< N: whether the gap after a stage counts as open
   int threads;
 };
 
-/// A trajectory that was tried.
+/// A trial trajectory.
 struct Trial {
   double alpha = 1;
   ShootingTrajectory nodes;
-  bool ok = false;  ///< it consists of finite numbers
+  bool ok = false;  ///< all numbers are finite
   double cost = 0;
   double gap_sum = 0, gap_max = 0;  ///< c, and its largest entry
   double closing_cost = 0;          ///< Eq. (8)
   int failed_node = -1;             ///< where the problem failed, and why
   std::string failure;
 
-  std::vector<VectorXd> deviations;  ///< N + 1: dx of Eq. (3), at a joint the one its segment starts from
+  std::vector<VectorXd> deviations;  ///< N + 1: dx of Eq. (3); where a segment starts, its initial one
 };
 
 /// Trials, kept between rollouts.
 class Rollout {
  public:
-  /// num_trials: how many step lengths are tried side by side.
+  /// num_trials: number of step lengths tried side by side.
   void resize(const ShootingProblem& problem, int max_segments, int num_trials);
   int getNumTrials() const { return static_cast<int>(trials_.size()); }
 
-  /// A step of length alpha in several segments: getTrial(0).
+  /// Rolls out a step of length alpha in several segments: getTrial(0).
   void cut(const RolloutInput& input, double alpha, int segments);
-  /// A full step once more, from where the gaps of the last cut() are closed to first order (fddp.h, Eq. 9).
+  /// Repeats a full step from starts that close the gaps of the last cut() to first order (fddp.h, Eq. 9).
   void close(const RolloutInput& input);
-  /// Steps of length alpha, alpha / 2, alpha / 4, ..., each in one piece: as many trials.
+  /// Rolls out steps of length alpha, alpha / 2, alpha / 4, ..., each in one piece, one per trial.
   void search(const RolloutInput& input, double alpha, int num);
 
   Trial& getTrial(int i) { return trials_[i]; }
@@ -53,7 +53,7 @@ class Rollout {
   double getSeconds() const { return seconds_; }
 
  private:
-  // Stages of a trial, one after the other.
+  // Consecutive stages of a trial.
   struct Track {
     Trial* trial = nullptr;
     int begin = 0, end = 0;
@@ -62,20 +62,20 @@ class Rollout {
     std::string failure;
     VectorXd start;    // deviation at its first node
     VectorXd arrival;  // deviation of f of its last stage, if another segment starts there
-    int rolling = -1;  // the first of its two rolling evaluations, -1: those of the trial are kept
+    int rolling = -1;  // the first of its two rolling evaluations; -1: it uses those of the trial
     void fail(int node, const std::string& reason) {
       failed_node = node;
       failure = reason;
     }
   };
-  // Tracks that go together, one node of each at a time.
+  // Tracks processed together, one node of each at a time.
   struct Group {
     int begin = 0, end = 0;  // its tracks
     std::vector<Track*> active;
     std::vector<EvaluateTask> evaluations;  // of the active ones
     std::vector<DifferenceTask> differences;
     std::vector<IntegrateTask> states;
-    std::vector<Track*> moved;  // whose the differences, or the states, are
+    std::vector<Track*> moved;  // tracks of the differences or of the states
     double seconds = 0;
   };
   void rollOut(const RolloutInput& input, int num_tracks);
