@@ -1,40 +1,43 @@
 #pragma once
-/// \file A motion checked from its files alone: what `bielle check` reports.
+/// \file Checks a motion from its files alone; the report of `bielle check`.
 ///
 /// **Independent** of the program that made the motion are the dynamics: kinematics, mass matrix, bias, accelerations,
 /// impacts, the forces of wrenches, energies and the directions of the loops are Simbody's; the friction of soles,
 /// gaps, feet and limits are computed here. **Shared** with it are the readers of robots and results (a robot that is
-/// misread is misread twice; `tests/test_published.cpp` compares them with another library's), the makers of serial
-/// models, the difference of two configurations and the rotations behind it (notation.h), and the place and friction of
-/// the ground, which the summary tells.
+/// misread is misread twice; `tests/test_published.cpp` compares them with another library's), the construction of
+/// serial models, the difference of two configurations with its rotations (notation.h), and the place and friction of
+/// the ground, which are taken from the summary.
 ///
 /// With q_k, v_k, a_k, u_k, lambda_k of the files and h the time step, a chain leads from the recorded forces to the
 /// recorded states. Nothing in it is approximate, so its bounds are tight:
 ///     M(q_k) a_k + b(q_k, v_k) = B u_k + J^T lambda_k                                                             (1)
 ///     d_k = h (v_k + h a_k),    d_k = h v_{k+1},    d_k = q_{k+1} (-) q_k                                         (2)
-/// The wrenches are recorded: (1) holds or not whatever stabilised the contacts. In the reduced formulation (2) holds
-/// outside the loops; their joints are bent onto the closures along W^{-1} J_l^T, with W the inertia of each joint
-/// at the start over the largest of its cluster of loops, a thousandth at least. With J_l N = 0 and N^T W N = 1,
+/// The wrenches are recorded, so that (1) does not depend on the stabilisation of contacts. In the reduced formulation
+/// (2) holds outside the loops; their joints are corrected onto the closures along W^{-1} J_l^T, with W the inertia of
+/// each joint at the start over the largest of its loop cluster, at least a thousandth. With J_l N = 0 and N^T W N = 1,
 ///     N(q_k)^T W (d_k - h (v_k + h a_k)) = 0,    N(q_{k+1})^T W (d_k - h v_{k+1}) = 0                             (3)
-/// Closed positions and velocities, which have rows of their own, settle the rest.
+/// The closure of positions and velocities, which has separate rows, determines the rest.
 ///
-/// (1) asks for no particular wrenches. So Simbody solves for the accelerations too, from q, v and u alone, with its
-/// own loops and standing feet,
+/// (1) does not determine the wrenches. Therefore Simbody also solves for the accelerations, from q, v and u alone,
+/// with its own loops and standing feet,
 ///     M a + b = B u + J^T m,    J a + dJ/dt v = s,                                                                (4)
-/// where s is a stabilisation that no file tells: of residuals r and velocities nu of the feet and, in the full
+/// where s is a stabilisation that is not recorded: of residuals r and velocities nu of the feet and, in the full
 /// formulation, of the loops,
-///     s = -kd nu + kp r,    0 <= h kd <= 1,    0 <= h^2 kp <= 1:                                                  (5)
-/// at most what is open and what moves is gone after a step. At every node the two gains of feet and of loops are those
-/// that bring a nearest to the recorded accelerations. And the velocities alone are differentiated, in the norm of M:
+///     s = -kd nu + kp r,    0 <= h kd <= 1,    0 <= h^2 kp <= 1,                                                  (5)
+/// so that a step removes at most the whole residual and velocity. At every node the two gains of feet and of loops are
+/// those that bring a nearest to the recorded accelerations. In addition, velocities are differentiated, in the norm of
+/// M:
 ///     e_k = (v_{k+1} - v_k) / h - a_k (Simbody's)                                                                 (6)
 /// The full formulation has e = 0; the reduced one turns its velocities with the loops at the end of a step, e = O(h).
 ///
-/// Energy: with T kinetic and v_m = (v_k + v_{k+1}) / 2, forces at the start of a step,
+/// Energy: with T the kinetic energy, v_m = (v_k + v_{k+1}) / 2, and forces taken at the start of a step,
 ///     T_{k+1} - T_k = h v_m (B u + J^T lambda) + h/2 (g_k v_k + g_{k+1} v_{k+1}) + rest                           (7)
-/// would have no rest if M, the inertial part c of b = c - g and the forces g of gravity did not change along the
-/// step, nor velocities turn. With T_{k+1} - T(q_k, v_{k+1}) = h v c + O(h^2), since 2 v c = v dM/dt v, to first order
-///     |rest| <= h |(v c)_{k+1} - (v c)_k| + h^2/2 |a c| + h/2 |(g_{k+1} - g_k) v_{k+1}| + |(v_{k+1} - v_k - h a) M v_m|.   (8)
-/// The mean right side of the motion is added for a single interval, where terms of second order may be all there is.
+/// would have no rest if M, the inertial part c of b = c - g and the forces g of gravity did not change during the
+/// step, and velocities did not turn. With T_{k+1} - T(q_k, v_{k+1}) = h v c + O(h^2), since 2 v c = v dM/dt v, to
+/// first order
+///     |rest| <= h |(v c)_{k+1} - (v c)_k| + h^2/2 |a c| + h/2 |(g_{k+1} - g_k) v_{k+1}|
+///               + |(v_{k+1} - v_k - h a) M v_m|.                                                                  (8)
+/// For a single interval the mean right side of the motion is added, since terms of second order may dominate there.
 #include <iosfwd>
 #include <optional>
 
@@ -59,34 +62,34 @@ struct CheckBounds {
 
   double closed = 1e-8;           ///< gap of loops in the reduced formulation, m or rad
   double closed_velocity = 1e-7;  ///< m/s or rad/s
-  double drift = 2e-3;            ///< gap of loops that are held by accelerations alone, m or rad
+  double drift = 2e-3;            ///< gap of loops held only by accelerations, m or rad
   double drift_velocity = 2e-2;   ///< m/s or rad/s
 
   double slip = 2e-3;             ///< m, of a standing foot from where it touched down
   double slip_angle = 1e-2;       ///< rad
   double sole_height = 1e-3;      ///< m, of any corner of a standing sole over (or in) the ground
-  double landing_velocity = 0.1;  ///< m/s, of a corner of a sole as it comes down
-  double clearance = 5e-3;        ///< m, of a swinging sole in the middle half of its way
+  double landing_velocity = 0.1;  ///< m/s, of a corner of a landing sole
+  double clearance = 5e-3;        ///< m, of a swinging sole in the middle half of its path
   double below_ground = 1e-3;     ///< m, of a foot in the air, at any time
   double feet_distance = 0;       ///< m, between soles seen from above
 
   double pressure = 0;         ///< m, of the centre of pressure beyond the sole
   double wrench_cone = 0;      ///< m, least margin of the whole wrench of a sole (wrench_cone.h)
-  double point_moment = 1e-9;  ///< N m, on a contact that is a point
+  double point_moment = 1e-9;  ///< N m, on a point contact
   double force_in_air = 1e-9;  ///< N or N m
   double range = 1e-6;         ///< m or rad beyond a limit
-  double goal = 1e-9;          ///< between what the summary tells of a goal and what is measured, in the goal's unit
+  double goal = 1e-9;          ///< between the summary's value of a goal and the measured one, in the goal's unit
   double interval_energy = 2;  ///< left side of (8) over its right side, which terms of second order may exceed
-  double total_energy = 1;     ///< the same of the sums over the motion
+  double total_energy = 1;     ///< the same for the sums over the motion
 };
 
 struct CheckRow {
-  /// Goal: what came out beside what was asked (`bound`, give or take `tolerance`). Missing it breaks no law of
-  /// physics, so that it is told and the check passes all the same.
+  /// Goal: the achieved value beside the requested one (`bound`, within `tolerance`). Missing it breaks no law of
+  /// physics: it is reported, and the check still passes.
   enum class Kind { AtMost, AtLeast, Note, Goal };
   std::string name;
   Kind kind = Kind::AtMost;
-  std::optional<double> value;  ///< none: there was nothing to measure
+  std::optional<double> value;  ///< empty: there was nothing to measure
   double bound = 0;
   std::string unit, note;
   double tolerance = 0;  ///< of a goal
@@ -102,15 +105,15 @@ struct CheckReport {
   const CheckRow* findRow(const std::string& name) const;
 };
 
-/// A trajectory with numbers that are not finite has one row, which says so.
+/// A trajectory with numbers that are not finite gives a single row, which says so.
 CheckReport checkMotion(const CheckedMotion& motion, const CheckBounds& bounds = {});
 
-/// The whole table, or its first line, the rows that fail and the goals that are missed.
+/// Prints the whole table, or its first line, the failed rows and the missed goals.
 enum class CheckPrint { All, Failures };
 void printReport(std::ostream& out, const CheckReport& report, CheckPrint print = CheckPrint::All);
 
-/// {"rows": [{"name", "value", "bound", "unit", "pass", "note"}], "pass"}; a value that was not measured and a bound
-/// that there is not are null. Goals have "met" and "tolerance" as well; their bound is what was asked.
+/// {"rows": [{"name", "value", "bound", "unit", "pass", "note"}], "pass"}; a missing value or bound is null. Goals also
+/// have "met" and "tolerance"; their bound is the requested value.
 std::string formatReport(const CheckReport& report);
 
 }  // namespace bielle::validation

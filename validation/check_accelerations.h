@@ -6,17 +6,17 @@
 namespace bielle::validation {
 
 struct AccelerationTrace {
-  VectorXd a;        ///< nv, Simbody's, with the stabilisation of Eq. (5) that comes nearest to the recorded ones
+  VectorXd a;        ///< nv, Simbody's, with the stabilisation of Eq. (5) that brings it nearest to the recorded a
   double size = 0;   ///< sqrt(a^T M a)
-  double error = 0;  ///< the same norm of the recorded ones less a
+  double error = 0;  ///< the same norm of the recorded accelerations less a
 };
 
 /// sqrt(a^T M a)
 double calcInertialNorm(const MatrixXd& M, const VectorXd& a);
 
 /// \param simbody at the state and with the motor forces of the node; its closures are the loops and then `contacts`
-/// \param M mass matrix there   \param recorded accelerations (nv)
-/// \param stabilised_loops  whether loops have a stabilisation as feet have: the full formulation
+/// \param M  mass matrix at that state   \param recorded  accelerations (nv)
+/// \param stabilised_loops  whether loops are stabilised like feet: in the full formulation
 AccelerationTrace traceAccelerations(const SimbodyBridge& simbody, const MatrixXd& M, const VectorXd& v,
                                      const VectorXd& recorded, double time_step, bool stabilised_loops);
 

@@ -104,8 +104,8 @@ void addEnergyRows(CheckContext& context) {
     interval.add(std::abs(missing) / scale, static_cast<int>(k), describe(std::abs(missing), scale));
     const double raised = nodes[k + 1].potential - nodes[k].potential;
     total += rest + raised;
-    // Over the mean velocity an Euler step falls by h^2/2 m g a less than along its last one: h/2 m g times the change of
-    // velocity, which a motion from rest to rest with one step takes back.
+    // Over the mean velocity an Euler step falls by h^2/2 m g a less than along its last one: h/2 m g times the change
+    // of velocity, which a motion from rest to rest with one step takes back.
     allowed += stage.energy_scale + std::abs(h - h_before) / 2 * std::abs(nodes[k].gravity_power);
     h_before = h;
     exchanged += stage.exchanged + std::abs(raised);

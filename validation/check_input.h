@@ -1,5 +1,5 @@
 #pragma once
-/// \file A motion as its files tell it.
+/// \file A motion read from its files.
 #include <string>
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace bielle::validation {
 
-/// A trajectory, its summary and its robot, which fit each other.
+/// A trajectory, its summary and its robot, consistent with each other.
 struct CheckedMotion {
   Model model;
   MotionSummary summary;
@@ -19,7 +19,7 @@ struct CheckedMotion {
   int findPhase(int node) const;
   /// The contacts of a phase, in the order of the summary.
   std::vector<ContactTarget> getContacts(int phase) const;
-  /// Length of a stage, s; of a rigid impact 0.
+  /// Length of a stage, s; 0 for a rigid impact.
   double getTimeStep(int stage) const { return summary.phases[findPhase(stage)].time_step; }
   /// Whether a stage is a rigid impact: no time passes, velocities jump.
   bool isImpact(int stage) const { return getTimeStep(stage) == 0; }
@@ -27,7 +27,7 @@ struct CheckedMotion {
   bool stands(int contact, int node) const;
 };
 
-/// Reads DIR/summary.json, DIR/trajectory.npz and the robot, from its file or, when that is gone, by its name.
+/// Reads DIR/summary.json, DIR/trajectory.npz and the robot, from its file or, if that no longer exists, by its name.
 /// \throws ModelError naming the file, the entry and what is wrong with it
 CheckedMotion readMotion(const std::string& directory);
 

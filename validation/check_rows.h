@@ -1,5 +1,5 @@
 #pragma once
-// Pieces of checkMotion: where a quantity is worst, and groups of rows.
+// Parts of checkMotion: the worst value of a quantity, and groups of rows.
 #include <cmath>
 #include <limits>
 
@@ -8,7 +8,7 @@
 
 namespace bielle::validation {
 
-// The worst of many values and where it was: the largest for a bound from above, the least for one from below.
+// The worst of many values and its node: the largest for an upper bound, the least for a lower one.
 class Worst {
  public:
   explicit Worst(CheckRow::Kind kind = CheckRow::Kind::AtMost) : kind_(kind) {}
@@ -26,7 +26,7 @@ class Worst {
 
   // "node 96, 1.440 s, knee_left"
   std::string describePlace(const CheckedMotion& motion) const;
-  // `nothing`: the note of a row without value, when nothing was added.
+  // `nothing`: the note of a row without value, if nothing was added.
   CheckRow makeRow(const std::string& name, const std::string& unit, double bound, const CheckedMotion& motion,
                    const std::string& nothing = "") const;
 

@@ -1,5 +1,5 @@
 #pragma once
-/// \file What Simbody says at every node of a motion: the measurements behind the rows of check.h.
+/// \file Simbody's values at every node of a motion: the measurements behind the rows of check.h.
 #include "check_input.h"
 
 namespace bielle::validation {
@@ -7,20 +7,20 @@ namespace bielle::validation {
 struct NodeTrace {
   std::vector<SE3> feet;              ///< per contact of the model, placement of its frame in the world
   std::vector<Vector6d> foot_twists;  ///< of that frame, in its own coordinates
-  std::vector<Vector6d> gaps;  ///< per closure: position and angle vector of frame 2 in frame 1, free axes left out
-  std::vector<Vector6d> gap_rates;     ///< the same of its velocity
+  std::vector<Vector6d> gaps;  ///< per closure: position and angle vector of frame 2 in frame 1, without free axes
+  std::vector<Vector6d> gap_rates;     ///< the same for its velocity
   std::vector<Vector3d> mass_centers;  ///< per body, in the world, m
   Vector3d com;                        ///< of the robot, m
   double kinetic = 0, potential = 0;   ///< energies, of bodies and rotors, J
   double gravity_power = 0;            ///< m g . v_com, W
   VectorXd gravity;                    ///< nv, generalized forces of gravity
-  double inertial_power = 0;           ///< v . c, c the bias without gravity: half of what dM/dt makes of v, W
+  double inertial_power = 0;           ///< v . c, c the bias without gravity: half of v . dM/dt v, W
 };
 
 /// A stage, from its node to the next.
 struct StageTrace {
-  VectorXd balance;               ///< nv, M a + b - B u - J^T lambda of what is recorded, Eq. (1) of check.h
-  VectorXd velocity_rest;         ///< nv, the first of Eqs. (2) over h: what is left along the closures, m/s or rad/s
+  VectorXd balance;               ///< nv, M a + b - B u - J^T lambda of the recorded values, Eq. (1) of check.h
+  VectorXd velocity_rest;         ///< nv, the first of Eqs. (2) over h: remainder along the closures, m/s or rad/s
   VectorXd position_rest;         ///< nv, the second of Eqs. (2), m or rad
   double acceleration = 0;        ///< sqrt(a^T M a), a Simbody's own, Eq. (4)
   double acceleration_error = 0;  ///< the same norm of the recorded a less Simbody's
@@ -29,7 +29,7 @@ struct StageTrace {
   double exchanged = 0;           ///< sum of the sizes of the work of each motor, J
   double contact_work = 0;        ///< of feet that slip, J
   double closure_work = 0;        ///< of loops that open, J
-  double energy_scale = 0;        ///< what a step of first order may lose or gain, the right side of Eq. (8), J
+  double energy_scale = 0;        ///< possible loss or gain of a first-order step, the right side of Eq. (8), J
   std::vector<Vector6d>
       impulses;  ///< of a rigid impact: per contact of the model, of the ground on the foot, N s and N m s
 };

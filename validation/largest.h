@@ -8,7 +8,7 @@ namespace bielle::validation {
 inline double getLarger(double a, double b) { return std::isnan(a) || b < a ? a : b; }
 inline double getSmaller(double a, double b) { return std::isnan(a) || a < b ? a : b; }
 
-// Largest |entry|, 0 of none, NaN if one is; its place if it is asked for.
+// Largest |entry|, 0 if there is none, NaN if any entry is NaN; optionally its position.
 template <typename Derived>
 double calcLargest(const Eigen::MatrixBase<Derived>& x) {
   return x.size() == 0 ? 0 : x.cwiseAbs().template maxCoeff<Eigen::PropagateNaN>();

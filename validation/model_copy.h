@@ -1,5 +1,5 @@
 #pragma once
-/// \file A model built anew from another one, with changes: without its rotors for Simbody, or wrong on purpose.
+/// \file A copy of a model with changes: without its rotors for Simbody, or deliberately wrong.
 #include <functional>
 
 #include "bielle/model/model.h"
@@ -12,10 +12,10 @@ struct ModelChanges {
   std::function<void(int index, Closure&)> closure;  ///< changes a closure
 };
 
-/// Bodies, joints, closures, motors and contacts; references, visuals and limits stay behind.
+/// Copies bodies, joints, closures, motors and contacts, but not references, visuals and limits.
 Model copyModel(const Model& model, const ModelChanges& changes = {});
 
-/// The model as Simbody's own solver can take it: no armature, and bodies whose inertia alone could leave a joint
+/// The model in a form that Simbody's own solver accepts: no armature, and bodies whose inertia could leave a joint
 /// without any (a principal moment below `least`, kg m^2) ballasted by 10 g with moments of 1e-4 kg m^2.
 Model makeModelWithoutArmature(const Model& model, double least = 1e-9);
 

@@ -9,8 +9,8 @@
 
 namespace bielle::validation {
 
-/// Newton's steps from q back on all closures of the set, contacts (at their targets) included.
-/// \return largest residual left, m or rad
+/// Newton steps from q back onto all closures of the set, including contacts (at their targets).
+/// \return largest remaining residual, m or rad
 double retract(const Model& model, Workspace& ws, const ConstraintSet& constraints, VectorXd& q);
 
 struct MotionOptions {
@@ -20,12 +20,12 @@ struct MotionOptions {
 };
 
 struct MotionReport {
-  bool ok = false;                  ///< false when a solve failed on the way
+  bool ok = false;                  ///< false if a solve failed
   double distance = 0;              ///< largest of |q_ours (-) q_simbody| at the end, m or rad
   double energy_error = 0;          ///< largest |E(t) - E(0)| of ours over the motion, J
   double energy_error_simbody = 0;  ///< |E(end) - E(0)| of Simbody's, J
   double kinetic_energy = 0;        ///< largest over our motion, J
-  double travelled = 0;             ///< largest of |q(end) (-) q(0)|, to judge the distance by
+  double travelled = 0;             ///< largest of |q(end) (-) q(0)|, the scale of the distance
   double gap = 0;                   ///< largest residual of a closure on our motion, m or rad
   VectorXd q, v;                    ///< our final state
 };

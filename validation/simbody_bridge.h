@@ -2,7 +2,7 @@
 /// \file A Model as a Simbody multibody system: the independent oracle of Bielle's dynamics.
 ///
 /// The tree becomes Simbody's own mobilizers, the closures its own constraints; kinematics, forces and accelerations
-/// are Simbody's. Of Bielle only the model's data and the conventions of notation.h are used.
+/// are Simbody's. Only the model's data and the conventions of notation.h are Bielle's.
 ///
 /// | joint                | mobilizer | u of Simbody from our v                                                     |
 /// |----------------------|-----------|-----------------------------------------------------------------------------|
@@ -14,14 +14,14 @@
 /// | free-flyer           | Free      | u = (R w, R v_lin)                                                          |
 ///
 /// 6D closure: Weld. 3D: Ball. 5D: Ball and two ConstantAngle constraints, the axis in body 2 normal to two directions
-/// of body 1. With u = T(q) v, in the order of our dofs, Simbody's quantities are handed out in our coordinates:
+/// of body 1. With u = T(q) v, in the order of our dofs, Simbody's quantities are returned in our coordinates:
 ///     M = T' M_s T,    b = T' (b_s + M_s dT/dt v),    J = G T,    tau_s = T^{-T} tau,    a = T^{-1} (udot - dT/dt v)
-/// Simbody writes M udot + G' m = f: its constraint forces have the opposite sign, turned here.
+/// Simbody writes M udot + G' m = f: its constraint forces have the opposite sign, which is reversed here.
 ///
 /// Simbody has no rotor inertia. solveBySimbody() therefore ignores the armature; solveWithArmature() solves
 ///     [M + diag(armature), J'; J, 0] [a; m] = [tau - b; -(dJ/dt v)]
-/// by the null space of the scaled rows, dense and rank revealing; all terms are Simbody's. Extended precision is for
-/// those who take differences of the result.
+/// by the null space of the scaled rows, dense and rank revealing; all terms are Simbody's. Extended precision allows
+/// finite differences of the result.
 #include <memory>
 
 #include "bielle/model/model.h"
@@ -32,14 +32,14 @@ struct OracleSolution {
   VectorXd a;                      ///< nv
   VectorXd constraint_force;       ///< nv, J^T lambda
   std::vector<Vector6d> wrenches;  ///< per closure, on body 1, in frame 1
-  /// Relative error that rounding may leave in the solution: 2^-52 times the condition number of G M^-1 G' (its rank
-  /// counted down to 1e-11), which Simbody's solver forms; zero for solveWithArmature.
+  /// Relative error of the solution due to rounding: 2^-52 times the condition number of G M^-1 G' (with rank tolerance
+  /// 1e-11), which Simbody's solver forms; zero for solveWithArmature.
   double rounding = 0;
 };
 
 enum class Precision { Double, Extended };
 
-/// Rows of notation.h for the closures of a bridge, one after the other.
+/// Rows of notation.h for the closures of a bridge, stacked.
 struct ClosureRows {
   MatrixXd J;             ///< rows x nv: velocities of the closures are J v
   VectorXd residual;      ///< rows
@@ -67,11 +67,11 @@ class SimbodyBridge {
   VectorXd calcBias() const;           ///< nv
   /// Generalized forces of accelerations a (nv), constraints ignored, armature included.
   VectorXd calcInverseDynamics(ConstVectorRef a) const;
-  /// Generalized forces J^T lambda (nv) of wrenches on body 1 in frame 1, body 2 taking the opposite ones, per closure.
+  /// Generalized forces J^T lambda (nv) of wrenches per closure on body 1 in frame 1, and their opposites on body 2.
   VectorXd calcWrenchForces(const std::vector<Vector6d>& wrenches) const;
-  /// Simbody's constraint rows x nv, those of a closure one after the other (notation.h has other signs and rows).
+  /// Simbody's constraint rows x nv, stacked by closure (signs and rows differ from those of notation.h).
   MatrixXd calcConstraintJacobian() const;
-  /// Simbody's realize(Acceleration); the armature is not seen.
+  /// Simbody's realize(Acceleration), which ignores the armature.
   /// \throws std::exception of Simbody, for a mass matrix that is singular without armature
   OracleSolution solveBySimbody();
   /// Simbody's rows J a + dJ/dt v, in the order of calcConstraintJacobian.
@@ -82,14 +82,14 @@ class SimbodyBridge {
   MatrixXd calcResponse(const MatrixXd& J, const MatrixXd& targets) const;
   /// Rigid impact from the velocity set: OracleSolution::a is v+ of M (v+ - v) = J' L, J v+ = 0, wrenches are impulses.
   OracleSolution solveImpact() const;
-  /// Generalized forces of gravity (nv), as they stand beside motor forces.
+  /// Generalized forces of gravity (nv), with the sign of motor forces.
   VectorXd calcGravityForces() const;
-  /// The system with armature, above.
+  /// Solves the system with armature, see above.
   OracleSolution solveWithArmature(Precision precision = Precision::Extended) const;
 
   /// Integrates Simbody's equations from the state set, tau held, by Runge-Kutta-Merson with projection of the
-  /// constraints at every step; q and v are overwritten with the final ones. Armature is not seen.
-  /// \param accuracy relative local error asked of the integrator, also the constraint tolerance
+  /// constraints at every step; q and v are overwritten with the final ones. Ignores the armature.
+  /// \param accuracy relative local error of the integrator, also the constraint tolerance
   void integrate(double duration, double accuracy, VectorXd& q, VectorXd& v);
 
  private:

@@ -12,7 +12,7 @@ inline SimTK::Rotation toSimTKRotation(const Matrix3d& R) {
   SimTK::Mat33 m;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) m(i, j) = R(i, j);
-  return SimTK::Rotation(m, true);  // taken as it is, already orthogonal
+  return SimTK::Rotation(m, true);  // already orthogonal, not normalized
 }
 inline Matrix3d toEigen(const SimTK::Mat33& m) {
   Matrix3d R;
@@ -50,7 +50,7 @@ struct SimbodyBridge::System {
   // Between our order of dofs and Simbody's u.
   void scatter(const VectorXd& ours, SimTK::Vector& u) const;
   VectorXd gather(const SimTK::Vector& u) const;
-  // Accelerations (or velocities) and the constraint forces (or impulses) of the multipliers beside them.
+  // Accelerations (or velocities), with the constraint forces (or impulses) of their multipliers.
   OracleSolution makeSolution(const VectorXd& a, const VectorXd& multipliers) const;
   // Constraint forces of Simbody's multipliers.
   void readForces(const SimTK::Vector& multipliers, OracleSolution& out) const;

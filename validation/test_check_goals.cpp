@@ -1,4 +1,5 @@
-// Goals in the check: measured independently of what the summary tells, told when missed, and compared with the summary.
+// Goals in the check: measured independently of what the summary tells, told when missed, and compared with the
+// summary.
 #include <catch2/catch.hpp>
 #include <set>
 #include <sstream>

@@ -1,5 +1,5 @@
 #pragma once
-// Motions to be checked: a squat as it is solved, a pendulum by its own formula, a swinging four-bar.
+// Motions to be checked: a solved squat, a pendulum from its equation of motion, a swinging four-bar.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
@@ -42,7 +42,7 @@ inline double getValue(const CheckReport& report, const std::string& name) {
 
 inline std::string findBipetto() { return std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto"; }
 
-// As solved, written and read back. Solved once.
+// A squat solved once, written and read back.
 struct SolvedSquat {
   explicit SolvedSquat(Formulation formulation) {
     const LoadedRobot robot = loadRobot(findBipetto());
@@ -61,7 +61,7 @@ inline const SolvedSquat& getSquat(Formulation formulation = Formulation::Reduce
   return formulation == Formulation::Reduced ? reduced : full;
 }
 
-// A motion without contacts from its states and torques.
+// A motion without contacts, from its states and torques.
 inline CheckedMotion makeFreeMotion(const Model& model, double h, Formulation formulation, int stages) {
   CheckedMotion motion;
   motion.model = model;
@@ -106,7 +106,7 @@ inline Model makePendulum() {
   return builder.build();
 }
 
-// By Euler steps of h, or exactly (classical Runge-Kutta steps of h / 100).
+// A pendulum's motion by Euler steps of h, or exactly (classical Runge-Kutta steps of h / 100).
 inline CheckedMotion makePendulumMotion(double h, bool exact) {
   const int stages = static_cast<int>(std::lround(1 / h));
   CheckedMotion motion = makeFreeMotion(makePendulum(), h, Formulation::Full, stages);
@@ -131,7 +131,7 @@ inline CheckedMotion makePendulumMotion(double h, bool exact) {
   return motion;
 }
 
-// The four-bar swinging from rest, by the steps of a formulation. `change` makes the loop another one.
+// The four-bar swinging from rest, by the steps of a formulation. `change` modifies the loop.
 inline CheckedMotion makeFourBarMotion(double h, Formulation formulation,
                                        const std::function<void(Closure&)>& change = nullptr) {
   const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar").model;

@@ -84,7 +84,7 @@ struct Mobility {
   VectorXd singular_values;
 };
 /// \param tolerance singular values below it times the largest count as zero. It equals kRankTolerance of reduction.h,
-///     since both decide how a mechanism can move; assembly.h, which must still move along weak directions, uses less.
+///   since both decide how a mechanism can move; assembly.h, which must still move along weak directions, uses less.
 Mobility calcMobility(const Model& model, ConstVectorRef q, double tolerance = 1e-6);
 
 }  // namespace bielle

@@ -15,7 +15,7 @@ struct RobotText {
 /// Bodies keep their order if the model lists them depth first.
 /// \param remark  comment at the head of both files
 /// \throws ModelError naming anything that the files cannot express: a universal joint whose axes are not axes of its
-///     frame, limits of joints with several coordinates
+///   frame, limits of joints with several coordinates
 RobotText formatRobot(const Model& model, const std::string& remark = "");
 
 /// Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY.
