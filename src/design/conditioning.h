@@ -6,16 +6,17 @@
 
 namespace bielle {
 
-/// With Q an orthonormal basis of the closed motions of a loop cluster and Q_M its rows of motors, 1 / sigma_min(Q_M): how
-/// far a unit motion of the linkage may be from showing at its motors. 1 or more; infinite where the motors do not
-/// determine the linkage. Clusters that others move too (fewer motors than mobility) are left out.
+/// With Q an orthonormal basis of the closed motions of a loop cluster and Q_M its rows of motors, 1 / sigma_min(Q_M):
+/// the largest motion of the linkage per unit motion of its motors. 1 or more; infinite if the motors do not determine
+/// the linkage. Clusters with fewer motors than mobility are omitted.
 class LinkageConditioning {
  public:
-  /// \param q  closed configuration at which ranks are taken. \throws ModelError as makeReduction. The model must outlive it.
+  /// The model must outlive it.
+  /// \param q  closed configuration at which ranks are determined. \throws ModelError as makeReduction
   LinkageConditioning(const Model& model, ConstVectorRef q);
   LinkageConditioning(const LinkageConditioning&) = delete;
   LinkageConditioning& operator=(const LinkageConditioning&) = delete;
-  /// The worst cluster at a closed configuration; infinite where one has lost rank.
+  /// The worst cluster at a closed configuration; infinite if one has lost rank.
   double calc(ConstVectorRef q);
 
  private:

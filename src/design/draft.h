@@ -20,19 +20,19 @@ class RobotDraft {
   /// Position of a joint in its parent body, or of a frame in its body.
   /// \throws ModelError when there is neither, or the name is that of a whole body
   Place getPlace(const std::string& name) const;
-  /// A place by name as seen in `body`: that of getPlace, or the origin where it is the joint that carries `body`.
+  /// A place by name in the frame of `body`: that of getPlace, or the origin for the joint that carries `body`.
   /// \throws ModelError when it is fixed to another body
   Vector3d getPlaceIn(int body, const std::string& name) const;
-  /// Moves a joint with all that it carries, or a frame with the closures and contacts that were made of it.
+  /// Moves a joint with everything that it carries, or a frame with the closures and contacts attached to it.
   void setPlace(const std::string& name, const Vector3d& p);
 
-  /// Stretches a link along `direction` (unit) by `factor`, `origin` staying where it is, its mass per length too:
+  /// Stretches a link along `direction` (unit) by `factor`, with `origin` and the mass per length unchanged:
   ///     D = 1 + (factor - 1) d d^T,   m' = factor m,   c' = origin + D (c - origin),   S' = factor D S D         (1)
-  /// with S = tr(I) / 2 - I the second moments about the centre of mass; what was a possible inertia stays one. Boxes
-  /// and cylinders that are drawn along d grow too.
+  /// with S = tr(I) / 2 - I the second moments about the centre of mass; a physical inertia remains physical. Boxes and
+  /// cylinders drawn along d are stretched as well.
   void stretch(const std::string& link, const Vector3d& origin, const Vector3d& direction, double factor);
 
-  /// Mass and inertia of a link times a positive factor; its centre of mass stays.
+  /// Scales mass and inertia of a link by a positive factor; its centre of mass stays.
   void scaleMass(const std::string& link, double factor);
 
   Model build() const;

@@ -12,7 +12,7 @@
 namespace bielle {
 namespace {
 
-constexpr double kLimitShare = 1.01;  // of the margin: searches that end at a limit end inside of it
+constexpr double kLimitShare = 1.01;  // of the margin: searches that end at a limit end inside it
 
 // A motion of the start design.
 struct SolvedMotion {
@@ -53,7 +53,7 @@ Outcome solveMotion(const Model& model, Motion& motion, const FddpOptions& optio
   return out;
 }
 
-// Starts from the solution of the start design: its postures with the loops closed anew, its torques.
+// Starts from the solution of the start design: its postures with the loops closed again, its torques.
 void setClosedGuess(const MotionRecord& record, Motion& motion) {
   setGuess(record, motion);
   const Model& model = motion.problem->model();
@@ -63,7 +63,7 @@ void setClosedGuess(const MotionRecord& record, Motion& motion) {
   }
 }
 
-// The columns of the serial model out of a motion of the closed one.
+// Extracts the coordinates of the serial model from a motion of the closed one.
 MotionRecord restrictRecord(const Model& closed, const Model& serial, const Motion& motion, MotionRecord record) {
   const MotionRecord names = makeRecord(motion, motion.guess);
   RowMatrixXd q(record.q.rows(), serial.nq()), v(record.v.rows(), serial.nv()), a(record.a.rows(), serial.nv());
@@ -89,8 +89,8 @@ LiftResult liftMotion(const Model& model, const SerialTrajectory& kept) {
   return lift(model, makeSerialModel(model, makeStandingPosture(model)), kept);
 }
 
-// Starts from the motion of the start design with the motors recomputed, which is nearly one of this design too.
-// Where that fails, start from its postures and torques.
+// Starts from the motion of the start design with the motors recomputed, which is nearly a motion of this design.
+// If that fails, starts from its postures and torques.
 void setStart(const Model& model, const SolvedMotion& solved, Motion& motion) {
   if (solved.serial) {
     const LiftResult lifted = liftMotion(model, *solved.serial);
@@ -125,7 +125,7 @@ Outcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::
   return out;
 }
 
-// Loops closed with base and feet where they are in a posture of another design of the robot.
+// Closes the loops with base and feet placed as in a posture of another design of the robot.
 double calcPostureGap(const Model& start, const Model& model, const VectorXd& posture) {
   Workspace ws(start);
   updatePlacements(start, ws, posture);
@@ -245,7 +245,7 @@ void DesignEvaluator::Data::solveStart() {
       solved_motion.postures.push_back(problem.guess.xs[p * last / std::max(1, options.postures - 1)].head(model.nq()));
     try {
       addKeptMotion(model, motion, solved_motion);
-    } catch (const ModelError&) {  // no serial chain, or impacts: motions cannot be kept, but solved
+    } catch (const ModelError&) {  // no serial chain, or impacts: motions can be solved but not kept
       if (options.mode == MotionMode::Kept) throw;
     }
     solved.push_back(std::move(solved_motion));
@@ -335,7 +335,7 @@ Evaluation DesignEvaluator::Data::evaluate(const VectorXd& x, std::vector<LiftRe
     if (!checkPostures(model, out)) return out;
     makeMotions(model, out, lifted);
     if (out.status == DesignStatus::Feasible) sumUp(model, out);
-  } catch (const ModelError& error) {  // numbers that make no robot, postures that no motion can start from
+  } catch (const ModelError& error) {  // numbers that define no robot, postures from which no motion can start
     out.status = DesignStatus::MotionFailed;
     out.message = error.what();
     out.value = weight * 2;

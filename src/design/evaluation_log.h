@@ -1,5 +1,5 @@
 #pragma once
-// The log of one search: what is in it is replayed, the rest is appended.
+// The log of one search: evaluations in it are replayed, new ones are appended.
 #include <deque>
 #include <optional>
 #include <string>
@@ -10,14 +10,14 @@ namespace bielle {
 
 class EvaluationLog {
  public:
-  // Opens and holds the file. \throws ModelError when `header` is not its first line, it is held by another process, or it
-  // cannot be written
+  // Opens and locks the file. \throws ModelError when `header` is not its first line, another process has locked it, or
+  // it cannot be written
   EvaluationLog(const std::string& path, const std::string& header);
   ~EvaluationLog();
   EvaluationLog(const EvaluationLog&) = delete;
   EvaluationLog& operator=(const EvaluationLog&) = delete;
 
-  // The next evaluation of the log, if there is one. \throws ModelError when it is of another design
+  // The next evaluation of the log, if there is one. \throws ModelError when it belongs to another design
   std::optional<LoggedEvaluation> replay(const std::string& stage, const VectorXd& x);
   void append(const LoggedEvaluation& evaluation);
 

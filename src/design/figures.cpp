@@ -80,7 +80,7 @@ DesignFigure makeMotionFigure(const DesignEvaluator& evaluator, const std::strin
   return {name, {torque, speed}};
 }
 
-// Rods between what is fastened to the bodies, seen along an axis of the world.
+// Rods between the points fastened to the bodies, seen along an axis of the world.
 Curve makeSkeleton(const Model& model, int horizontal, const std::string& title, const char* color) {
   Curve curve{title, color, CurveStyle::Lines, false, {}};
   Workspace ws(model);
@@ -95,7 +95,7 @@ Curve makeSkeleton(const Model& model, int horizontal, const std::string& title,
   return curve;
 }
 
-// The extent of a view; a planar mechanism has none from its edge.
+// The extent of a view; that of a planar mechanism seen edge-on is zero.
 double calcWidth(const Curve& curve) {
   double least = 0, most = 0;
   for (const auto& [x, y] : curve.points) least = std::fmin(least, x), most = std::fmax(most, x);

@@ -1,10 +1,10 @@
 #pragma once
 /// \file Gradients of motor measures of a kept motion (MotionMode::Kept), with respect to the variables of a design.
 ///
-/// Joints, base and feet move as before, and so do the contact forces as far as the motion leaves them open. With the
-/// model's change along a variable x_i (variation.h), postures, speeds and torques of the motors change at every node
-/// by Eqs. (2) and (5) of kept_motion.h: dv_i(k), du_i(k). A measure is the largest of smooth pieces p_j, each with its
-/// gradient:
+/// Joints, base and feet keep their motion, as do the contact forces as far as the motion does not determine them. With
+/// the model's change along a variable x_i (variation.h), postures, speeds and torques of the motors change at every
+/// node by Eqs. (2) and (5) of kept_motion.h: dv_i(k), du_i(k). A measure is the largest of smooth pieces p_j, each
+/// with its gradient:
 ///     rms torque of one motor in one motion     p = (sum h u^2 / T)^1/2,  dp = sum h u du / (T p)                  (1)
 ///     energy                                    p = sum h |u v|,          dp = sum h sign(u v) (du v + u dv)       (2)
 ///     electrical energy, Eq. (1) of measures.h  p = sum h r P,            dp = sum h r (du v + u dv + 2 u du / K_m^2)
@@ -15,7 +15,7 @@
 ///
 /// A kept motion is infeasible where a linkage reaches a dead point of its joints, and torques fall just before it,
 /// which attracts searches. With T_c the tangent of a loop cluster for unit speeds of its joints, w the right singular
-/// vector of its largest singular value and mu = 1 / |T_c w| its margin (ratio.h), a design is kept from it by
+/// vector of its largest singular value and mu = 1 / |T_c w| its margin (ratio.h), designs are kept away from it by
 ///     mu(k)^2 >= least^2,    d mu^2 = -2 mu^4 (T_c w) . d(T_c w)                                                   (4)
 /// for the smallest mu in every stretch. The square falls linearly towards a dead point, where mu itself has a vertical
 /// slope.
@@ -40,14 +40,14 @@ struct MotorSlopes {
   std::vector<MatrixXd> du, dv;  ///< per variable, nu x N
   MatrixXd margin;               ///< loop clusters x N, mu^2 of Eq. (4)
   std::vector<MatrixXd> dmargin;
-  std::string failure;  ///< why there are none, or empty
+  std::string failure;  ///< reason if there are none, or empty
 };
 /// \param kept_dofs  of the model, in the order of the velocities of the serial trajectory
-/// \param lifted  all of the trajectory, lifted to the model
+/// \param lifted  the whole trajectory, lifted to the model
 MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dofs, const SerialTrajectory& trajectory,
                             const LiftResult& lifted, const std::vector<ModelVariation>& variations);
 
-/// Eqs. (1) to (3) over the motors named and all motions: always as many pieces for the same motions and motors.
+/// Eqs. (1) to (3) over the named motors and all motions: the number of pieces depends only on these.
 /// \param drives  by motor; empty: the default of all
 MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
                                 const std::vector<MotorSlopes>& motions, const std::vector<MotorDrive>& drives = {});

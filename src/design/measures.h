@@ -35,7 +35,7 @@ struct MotorMeasures {
   double peak_torque = 0;        ///< max |u|, N m or N
   double rms_torque = 0;         ///< sqrt(sum h u^2 / sum h)
   double peak_speed = 0;         ///< max |v|, rad/s or m/s
-  double energy = 0;             ///< sum h |u v|, J: what is braked is not given back
+  double energy = 0;             ///< sum h |u v|, J: braking energy is not recovered
   double electrical_energy = 0;  ///< sum h (max(P, 0) + r min(P, 0)), Eq. (1), J
 };
 
@@ -62,8 +62,8 @@ MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>&
 enum class Measure { PeakTorque, RmsTorque, Energy, ElectricalEnergy, Conditioning, Workspace };
 const char* getName(Measure measure);
 
-/// The largest peak torque, rms torque or conditioning over the motors named and all motions, or an energy of
-/// all of them together. The workspace does not depend on motions (workspace.h).
+/// The largest peak torque, rms torque or conditioning over the named motors and all motions, or the sum of an energy
+/// over them. The workspace does not depend on motions (workspace.h).
 double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions);
 
 }  // namespace bielle

@@ -16,11 +16,11 @@ struct Search {
   void add(const VectorXd& x, double value);  // an evaluation
 };
 
-// NLopt sees the bounds as 0 and 1.
+// NLopt's variables are scaled so that the bounds are 0 and 1.
 VectorXd getPoint(const SearchProblem& problem, const std::vector<double>& unit);
 std::vector<double> getShares(const SearchProblem& problem, const VectorXd& x);
 
-// By the stage's number of evaluations and tolerance; throws what the objective threw.
+// Uses the stage's number of evaluations and tolerance; rethrows exceptions of the objective.
 void runOptimizer(Search& search, nlopt::opt& optimizer, std::vector<double>& unit);
 
 // Eq. (1) of search.h.

@@ -44,7 +44,7 @@ void writeVariables(std::ostream& out, const Parametrization& robot, const Vecto
   }
 }
 
-// The motors that turn more than others would make the table long: only what changed by a thousandth is told.
+// Keeps the table short: only changes of at least a thousandth are listed.
 bool isChanged(double before, double after) { return std::abs(after - before) > 1e-3 * std::abs(before); }
 
 void writeMotion(std::ostream& out, const Model& model, const std::string& name, const MotionMeasures& before,

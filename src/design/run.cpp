@@ -110,7 +110,7 @@ class DesignRunner {
     return *found;
   }
 
-  // A line when a design is the best so far, and now and then.
+  // A line for every new best design, and from time to time.
   void report(size_t i, const LoggedEvaluation& e, bool replayed) {
     const bool better = e.status == DesignStatus::Feasible && e.value < best_shown_;
     if (better) best_shown_ = e.value;

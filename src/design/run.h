@@ -1,9 +1,9 @@
 #pragma once
 /// \file The searches of a design problem, logged and resumable, and their results.
 ///
-/// Every search writes DIR/searchN.jsonl, N from 1: a line that describes the problem, then one line per evaluation, flushed
-/// before the search continues. Searches are deterministic: an interrupted one is repeated with the evaluations in its log
-/// and so resumes where it stopped. An incomplete line is dropped.
+/// Every search writes DIR/searchN.jsonl, N from 1: a line that describes the problem, then one line per evaluation,
+/// flushed before the search continues. Searches are deterministic: an interrupted one is repeated with the evaluations
+/// in its log and so resumes where it stopped. An incomplete line is dropped.
 #include <array>
 #include <functional>
 #include <string>
@@ -24,27 +24,28 @@ struct LoggedEvaluation {
   VectorXd x;
   DesignStatus status = DesignStatus::Feasible;
   double value = 0;
-  double seconds = 0;                ///< processor time when it was done
+  double seconds = 0;                ///< processor time at its end
   std::vector<MeasurePieces> terms;  ///< SlopedEvaluation, in stages that need gradients
   MeasurePieces limits;
 };
 
 struct DesignRun {
   std::vector<std::vector<LoggedEvaluation>> searches;
-  VectorXd best;                ///< the feasible design with the least value; the start when none is better
+  VectorXd best;                ///< the feasible design with the least value; the start if none is better
   double value = 0;             ///< its value
-  Evaluation evaluation;        ///< of the best design, anew
+  Evaluation evaluation;        ///< of the best design, repeated
   std::array<int, 3> counts{};  ///< evaluations by status
   int replayed = 0;             ///< evaluations found in the logs
-  double seconds = 0;           ///< processor time of all evaluations, those of earlier runs too
+  double seconds = 0;           ///< processor time of all evaluations, including those of earlier runs
 };
 
-/// \throws ModelError when a log is of another problem, is used by another process, or cannot be written
+/// \throws ModelError when a log belongs to another problem, is used by another process, or cannot be written
 DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options);
 
-/// Writes DIR/best (a robot), design.md (before and after) and, where there is gnuplot, design.svg (values over the
-/// evaluations), design_MOTION.svg (torques and speeds before and after) and design_mechanism.svg (both mechanisms). The
-/// same run, resumed or not, writes the same bytes. Returns the paths. \throws ModelError when a file cannot be written
+/// Writes DIR/best (a robot), design.md (before and after) and, if gnuplot is installed, design.svg (values over the
+/// evaluations), design_MOTION.svg (torques and speeds before and after) and design_mechanism.svg (both mechanisms).
+/// The same run, resumed or not, writes the same bytes. Returns the paths. \throws ModelError when a file cannot be
+/// written
 std::vector<std::string> writeDesign(const std::string& directory, const DesignEvaluator& evaluator,
                                      const DesignSpec& spec, const DesignRun& run);
 

@@ -15,7 +15,7 @@ double evaluate(const std::vector<double>& unit, std::vector<double>&, void* dat
     const double value = search.problem.objective(x, *search.stage);
     search.add(x, value);
     return value;
-  } catch (...) {  // kept: NLopt would forget what it was
+  } catch (...) {  // kept, because NLopt would lose it
     search.error = std::current_exception();
     throw nlopt::forced_stop();
   }
@@ -71,7 +71,7 @@ void runOptimizer(Search& search, nlopt::opt& optimizer, std::vector<double>& un
   } catch (const nlopt::forced_stop&) {
     if (search.error) std::rethrow_exception(search.error);
   } catch (const std::runtime_error&) {
-    // Rounding stops a local search near its minimum; the best point stands.
+    // Rounding stops a local search near its minimum; the best point is valid.
   }
 }
 
@@ -99,7 +99,7 @@ bool needsGradient(SearchAlgorithm algorithm) {
 
 SearchResult minimizeByStages(const SearchProblem& problem, const std::vector<SearchStage>& stages, unsigned seed) {
   Search search{problem, nullptr, {problem.start, std::numeric_limits<double>::infinity(), 0}, nullptr};
-  nlopt::srand(seed);  // of this thread alone
+  nlopt::srand(seed);  // only for this thread
   for (const SearchStage& stage : stages) {
     search.stage = &stage;
     needsGradient(stage.algorithm) ? runSlopedStage(search) : runStage(search);

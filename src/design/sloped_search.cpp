@@ -56,20 +56,20 @@ class EpigraphProblem {
     here_.limits.gradients *= width.asDiagonal();
   }
 
-  // Objective and constraints are asked for the same x, one after the other, and for other t.
+  // Objective and constraints are requested for the same x in succession, with different t.
   void moveTo(const std::vector<double>& z) {
     std::vector<double> shares(z.begin(), z.begin() + n_);
     if (shares == shares_) return;
     shares_ = std::move(shares);
     try {
       update(getPoint(search_.problem, shares_));
-    } catch (...) {  // kept: NLopt would forget what it was
+    } catch (...) {  // kept, because NLopt would lose it
       search_.error = std::current_exception();
       throw nlopt::forced_stop();
     }
   }
 
-  // Pieces of a term; where x is infeasible all have its value, which is worse than that of any feasible one.
+  // Pieces of a term; if x is infeasible all have its value, which is worse than that of any feasible one.
   double getPiece(size_t term, Eigen::Index piece) const {
     return here_.terms.empty() ? here_.value : here_.terms[term].values[piece];
   }

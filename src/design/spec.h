@@ -7,26 +7,27 @@
 /// variables:
 ///   - name: crank                # of a given robot: the distance of two places (joints or frames) of one body
 ///     bounds: [0.04, 0.06]       # m
-///     length:                    # one map, or a list: of several the first is the value, the others change by as much
+///     length:                    # one map, or a list: the first is the value, the others change by the same amount
 ///       - {from: motor_knee_right, to: transmission_knee_right, across: [0, 0, 1], stretch: knee_crank_right}
 ///       - {from: motor_knee_left, to: transmission_knee_left, across: [0, 0, 1], stretch: knee_crank_left}
-///   - name: motor_x              # or a shift of places from where they are
+///   - name: motor_x              # or a shift of places from their positions
 ///     bounds: [-0.01, 0.01]
 ///     shift: {of: motor_knee_right, along: [1, 0, 0]}
 ///   - {name: foot, parameter: ankle_height, unit: m, bounds: [0.05, 0.08]}    # of a generator
 /// motions:
 ///   - {motion: squat, set: {depth: 0.6}}
 /// mode: reoptimized              # or kept, then with
-/// margin: 0.1                    # from dead points: the least that a joint moves in a unit motion of its linkage
-/// objective:                     # peak_torque, rms_torque, energy, electrical_energy, conditioning; all motors by default
+/// margin: 0.1                    # from dead points: least motion of a joint in a unit motion of its linkage
+/// objective:                     # peak_torque, rms_torque, energy, electrical_energy, conditioning; all motors by
+/// default
 ///   - {measure: peak_torque, motors: [motor_knee_left, motor_knee_right], weight: 1}
 ///   - measure: workspace         # 1 / share of the places of a foot that can be reached (workspace.h)
 ///     region:                    # ranges [from, to] or [from, to, points] (m, rad), numbers (held), or free
 ///       {foot: foot_left, base: torso, x: [-0.2, 0.2, 9], z: [-0.1, 0.1], yaw: free, max_conditioning: 10}
 /// drives:                        # for electrical_energy (measures.h)
-///   motor_constant: 2            # N m/sqrt(W) at the joints, all motors but those of `motors`
+///   motor_constant: 2            # N m/sqrt(W) at the joints, all motors except those of `motors`
 ///   motors: {motor_knee_left: 3, motor_knee_right: 3}
-///   regeneration: 0              # share of what braking leaves at the terminals
+///   regeneration: 0              # recovered share of negative electrical power
 /// search:
 ///   seed: 1
 ///   searches: 2                  # independent ones, one thread each
@@ -46,7 +47,7 @@ namespace bielle {
 using Settings = std::vector<std::pair<std::string, double>>;
 
 struct RobotSpec {
-  std::string name, generator;  ///< one of them; a name may be a path
+  std::string name, generator;  ///< either of them; a name may be a path
   Settings settings;            ///< of the generator
 };
 
@@ -56,7 +57,7 @@ struct MotionSpec {
 };
 
 struct DesignSpec {
-  std::string path, text;  ///< the file and what is in it
+  std::string path, text;  ///< the file and its content
   RobotSpec robot;
   std::vector<DesignVariable> variables;
   std::vector<MotionSpec> motions;

@@ -43,7 +43,7 @@ std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry) {
 
 Model makeRobot(const RobotSpec& spec, const std::string& file) {
   if (spec.generator.empty()) {
-    // A path is meant from where the file is; a name stays one.
+    // A path is relative to the file; a name stays unchanged.
     const fs::path beside = fs::path(file).parent_path() / spec.name;
     std::error_code error;
     const bool is_path = spec.name.find('/') != std::string::npos && fs::exists(beside, error);

@@ -17,7 +17,7 @@ RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map);
 // A list of {motion: NAME, set: {...}}.
 std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry);
 
-// \param file  where the robot is named: paths start there
+// \param file  the file that names the robot: paths are relative to it
 // \throws ModelError when there is no such robot, generator or parameter
 Model makeRobot(const RobotSpec& spec, const std::string& file);
 

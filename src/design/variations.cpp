@@ -1,4 +1,4 @@
-// How a parametrized robot changes with its numbers.
+// Derivatives of a parametrized robot with respect to its numbers.
 #include "bielle/design/parametrization.h"
 #include "bielle/model/error.h"
 
@@ -23,7 +23,7 @@ bool isSameButForPlaces(const Model& a, const Model& b) {
   return out;
 }
 
-// Adds weight times the way from one model to another.
+// Adds weight times the difference between two models.
 void addChange(const Model& from, const Model& to, double weight, ModelVariation& out) {
   const auto addTwist = [weight](const SE3& X, const SE3& Y, Vector6d& twist) {
     twist += weight * log6(X.inverseTimes(Y));

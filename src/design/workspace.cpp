@@ -129,7 +129,7 @@ class Explorer {
   }
 
  private:
-  // From the standing posture, by the part of the placement that is held.
+  // Starts from the standing posture, with the held part of the placement.
   std::vector<int> orderByNearness() const {
     std::vector<double> distances;
     for (const SE3& placement : grid_.placements)

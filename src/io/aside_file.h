@@ -16,7 +16,7 @@ class AsideFile {
   const std::string& aside() const { return aside_; }
   /// \throws ModelError when the text cannot be written
   void write(const std::string& text);
-  /// Puts the file in its place, over the one that may be there. \throws ModelError when it cannot
+  /// Renames the file to its final name, replacing any existing file. \throws ModelError when it cannot
   void commit();
 
  private:

@@ -6,7 +6,7 @@
 
 namespace bielle {
 
-// Points fastened to each body, in its own frame: joints that it carries, ends of closures, contacts.
+// Points fixed to each body, in its own frame: joints that it carries, ends of closures, contacts.
 std::vector<std::vector<Vector3d>> listFastenings(const Model& model);
 
 }  // namespace bielle

@@ -18,7 +18,7 @@ std::string quoteGnuplot(const std::string& text) {
 }
 
 bool drawSvg(const std::string& path, const std::string& script, int width, int height) {
-  AsideFile figure(path), source(path + ".gnuplot");  // the script is never committed, and goes
+  AsideFile figure(path), source(path + ".gnuplot");  // the script is never committed and thus removed
   source.write("set terminal svg size " + std::to_string(width) + "," + std::to_string(height) +
                " font 'Helvetica,13' background 'white'\nset output " + quoteGnuplot(figure.aside()) + "\n" + script +
                "\nset output\n");

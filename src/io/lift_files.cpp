@@ -46,7 +46,7 @@ MotionResult makeLiftedResult(const RunInfo& run, const Model& closed, const Mot
   motion.name = serial.name;
   motion.ground = serial.ground;
   motion.requested = serial.requested;
-  for (const Goal& goal : serial.goals)  // of a lift that stops early, those that it got to
+  for (const Goal& goal : serial.goals)  // if a lift stops early, those that it reached
     if (goal.last <= static_cast<int>(lifted.trajectory.us.size())) motion.goals.push_back(goal);
   int left = static_cast<int>(lifted.trajectory.us.size());
   for (ContactPhase phase : serial.schedule.phases) {

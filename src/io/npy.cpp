@@ -19,9 +19,9 @@ constexpr char kMagic[] = "\x93NUMPY\x01";  // with the terminating zero, the mi
 constexpr size_t kPrelude = 10, kAlignment = 64, kLongestHeader = 1024;
 
 using Utf8 = std::wstring_convert<std::codecvt_utf8<char32_t>, char32_t>;
-Utf8 makeUtf8() { return Utf8("?", U"?"); }  // what stands for bytes that are not UTF-8
+Utf8 makeUtf8() { return Utf8("?", U"?"); }  // replacement of bytes that are not UTF-8
 
-// Number of elements; nothing when it is over `most`.
+// Number of elements; empty if it exceeds `most`.
 std::optional<size_t> calcCount(const std::vector<size_t>& shape, size_t most) {
   if (std::find(shape.begin(), shape.end(), size_t{0}) != shape.end()) return 0;
   size_t count = 1;

@@ -1,4 +1,4 @@
-// The only file that knows libzip.
+// The only file that uses libzip.
 #include "io/npz.h"
 
 #include <zip.h>
@@ -10,7 +10,7 @@
 namespace bielle {
 namespace {
 
-// Archives of the same numbers are the same bytes: the first day that the format knows, wherever and whenever.
+// The first date of the format, so that archives of the same numbers are identical at any place and time.
 constexpr zip_uint16_t kFirstDay = (1 << 5) | 1;
 constexpr size_t kLargest = size_t{1} << 28;  // all arrays together, bytes
 

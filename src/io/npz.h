@@ -14,12 +14,12 @@ struct NpyArray {
 };
 using NpyArrays = std::map<std::string, NpyArray>;
 
-// The whole archive, as the file holds it.
+// The whole archive, as bytes.
 std::string formatArchive(const NpyArrays& arrays);
 // \throws ModelError naming the file and what is wrong with it
 NpyArrays readArchive(const std::string& path);
 
-// One array, as the archive holds it. `element` names it in errors.
+// One array, as bytes. `element` names it in errors.
 std::string formatNpy(const NpyArray& array);
 NpyArray parseNpy(const std::string& path, const std::string& element, const std::string& bytes);
 

@@ -7,7 +7,7 @@
 namespace bielle {
 namespace {
 
-// Names in one word: OpenSim knows no quotes.
+// Names in one word: OpenSim does not support quotes.
 std::string makeLabel(std::string name) {
   for (char& c : name)
     if (c == '\t' || c == '\n' || c == '\r' || c == ' ') c = '_';

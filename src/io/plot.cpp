@@ -36,7 +36,7 @@ std::string describeStyle(const Curve& curve) {
   return std::string("with lines lw 2") + (curve.dashed ? " dashtype 2" : "") + color;
 }
 
-// Only curves with a point that can be drawn: gnuplot stops at a plot of nothing.
+// Only curves with a finite point: gnuplot stops at an empty plot.
 std::vector<const Curve*> findDrawable(const Plot& plot) {
   std::vector<const Curve*> drawable;
   for (const Curve& curve : plot.curves)

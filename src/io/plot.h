@@ -9,11 +9,11 @@ namespace bielle {
 enum class CurveStyle { Lines, LinesPoints, Points, Crosses };
 
 struct Curve {
-  std::string title;  // empty: not in the key
+  std::string title;  // empty: not in the legend
   std::string color;  // "#rrggbb"
   CurveStyle style = CurveStyle::Lines;
   bool dashed = false;
-  std::vector<std::pair<double, double>> points;  // those that are not finite interrupt the line
+  std::vector<std::pair<double, double>> points;  // points that are not finite interrupt the line
 };
 
 enum class PlotScale { Free, Logarithmic /* y */, Equal /* a metre is a metre in x and y */ };
@@ -27,7 +27,7 @@ struct Plot {
 // The colours of the models, the same in all figures.
 constexpr const char *kClosedColor = "#1f77b4", *kLiftedColor = "#d62728", *kSerialColor = "#7f7f7f";
 
-// Draws the plots one below the other. False when there is no gnuplot. \throws ModelError when it cannot be drawn
+// Draws the plots one below the other. False if gnuplot is not installed. \throws ModelError when it cannot be drawn
 bool drawPlots(const std::string& path, const std::vector<Plot>& plots);
 
 }  // namespace bielle

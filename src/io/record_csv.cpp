@@ -38,7 +38,7 @@ std::vector<std::string> makeHeader(const MotionRecord& record) {
   return header;
 }
 
-// The cells of the line that begins at `at`, which moves to the next line. It gives up after `most` cells and one.
+// The cells of the line that begins at `at`, which advances to the next line; at most `most` + 1 cells are read.
 std::vector<std::string> readLine(const std::string& text, size_t& at, size_t most) {
   std::vector<std::string> cells(1);
   bool quoted = false;
@@ -99,7 +99,7 @@ MotionRecord readCsv(const std::string& path) {
   const std::vector<std::string> header = readLine(text, at, kMostColumns);
   for (const std::string& column : header) addName(column, record);
   if (makeHeader(record) != header) fail(path, "header", "its columns are not those of a trajectory");
-  // Counted before there is memory for them.
+  // Counted before memory is allocated for them.
   const size_t first_row = at;
   int nodes = 0;
   for (; at < text.size(); ++nodes)

@@ -1,5 +1,5 @@
 #pragma once
-// The tables of a record, in the order of the files: what the CSV and the NumPy formats have in common.
+// The tables of a record, in the order of the files, shared by the CSV and NumPy formats.
 #include "bielle/io/record.h"
 
 namespace bielle {
@@ -11,11 +11,11 @@ struct RecordTable {
   Per per;
   std::vector<std::string> columns;
   RowMatrixXd MotionRecord::*data;
-  int entries;  // columns that belong together and make the last axis of a three-dimensional array, 0: none
+  int entries;  // number of columns that form the last axis of a three-dimensional array, 0: none
 };
 std::vector<RecordTable> listTables(const MotionRecord& record);
 
-// Gives every table its size; the names must be there.
+// Sets the size of every table; the names must be set.
 void resizeRecord(int stages, MotionRecord& record);
 
 std::string formatCsv(const MotionRecord& record);

@@ -203,8 +203,8 @@ std::vector<std::string> writeResult(const std::string& directory, const MotionR
   csv.write(formatCsv(result.record));
   npz.write(formatNpz(result.record));
   summary.write(formatJson(makeSummary(result)) + "\n");
-  // Files derived from the old summary are removed before it, and the new summary is written last, so that an interruption
-  // never leaves a mixture of two results.
+  // Files derived from the old summary are removed before it, and the new summary is written last, so that an
+  // interruption never leaves a mixture of two results.
   std::error_code error;
   for (const char* name : {"report.html", "lift.json", "check.json", "summary.json"})
     fs::remove(fs::path(directory) / name, error);

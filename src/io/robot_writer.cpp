@@ -40,7 +40,7 @@ std::string escapeXml(const std::string& text) {
   return out;
 }
 
-// A name as YAML takes it.
+// A name in YAML syntax.
 std::string quote(const std::string& name) {
   const bool plain =
       !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) &&
@@ -87,7 +87,7 @@ class Writer {
   explicit Writer(const Model& model) : model_(model) {
     for (const Body& body : model.bodies()) bodies_.insert(body.name);
     const Joint& first = model.joints()[1];
-    bool ground = false;  // anything else on the ground makes it a link of its own
+    bool ground = false;  // any other element on the ground requires a separate link
     for (const Frame& frame : model.frames()) ground |= frame.body == 0 && frame.name != "world";
     for (const Visual& visual : model.visuals()) ground |= visual.body == 0;
     for (int i = 2; i < model.numBodies(); ++i) ground |= model.joints()[i].parent == 0;
@@ -147,7 +147,7 @@ class Writer {
       const Matrix3d& I = body.inertia.I_com;
       out << "    <inertial>\n      <origin xyz=\"" << formatVector(body.inertia.com) << "\"/>\n      <mass value=\""
           << formatNumber(body.inertia.mass) << "\"/>\n      <inertia";
-      const double least = 1e-12 * I.diagonal().maxCoeff();  // products under it are rounding
+      const double least = 1e-12 * I.diagonal().maxCoeff();  // products below it are rounding
       const auto write = [&](const char* name, double value) {
         out << " " << name << "=\"" << formatNumber(std::abs(value) < least ? 0 : value) << "\"";
       };
@@ -218,7 +218,7 @@ class Writer {
         << "\"/>\n  </joint>\n";
   }
 
-  // A frame of the model at this place; a made name where there is none.
+  // A frame of the model at this place; if there is none, a generated name.
   std::string findFrame(int body, const SE3& X_BF, const std::string& made) const {
     for (const Frame& frame : model_.frames())
       if (frame.body == body && frame.X_BF.p == X_BF.p && frame.X_BF.R == X_BF.R) return frame.name;

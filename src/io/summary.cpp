@@ -43,7 +43,7 @@ GoalOutcome readGoal(const Json& json) {
   goal.kind = parseGoalKind(json.at("kind"));
   goal.asked = json.at("asked");
   goal.tolerance = json.at("tolerance");
-  // JSON has no number that is not finite.
+  // JSON has no infinity or NaN.
   outcome.came_out =
       json.at("came_out").is_null() ? std::numeric_limits<double>::quiet_NaN() : json.at("came_out").get<double>();
   goal.first = readCount(json.at("first_node"));

@@ -4,7 +4,7 @@
 
 namespace bielle {
 
-/// \throws ModelError naming the file and why it cannot be written
+/// \throws ModelError naming the file and the reason it cannot be written
 void writeTextFile(const std::string& path, const std::string& text);
 
 }  // namespace bielle

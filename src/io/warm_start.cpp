@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 namespace bielle {
 namespace {
 
-// Row of `rows` at the place of row i of `count`.
+// Row of `rows` at the same fraction as row i of `count`.
 int matchRow(int i, int count, Eigen::Index rows) {
   if (count <= 1) return 0;
   return static_cast<int>(std::lround(static_cast<double>(i) * static_cast<double>(rows - 1) / (count - 1)));
@@ -23,7 +23,7 @@ void requireSame(const std::vector<std::string>& recorded, const std::vector<std
                      "give a result of the same robot");
 }
 
-// Moves the base over the ground so that the feet of a phase are, in the mean, at their places.
+// Moves the base over the ground so that the feet of a phase are, on average, at their places.
 void carryToFeet(const Model& model, Workspace& ws, const ContactPhase& phase, VectorRef x) {
   if (!model.hasFreeFlyer() || phase.contacts.empty()) return;
   updatePlacements(model, ws, x.head(model.nq()));

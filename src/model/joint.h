@@ -1,8 +1,8 @@
 #pragma once
 /// \file Configuration manifolds and motion subspaces of the joints.
 ///
-/// Every joint is seen as a sequence of axes ("dofs"). The motion subspace S (6 x nv, child frame) is constant for all
-/// kinds but the universal joint, whose first axis turns in the child frame when its second angle changes:
+/// Every joint is treated as a sequence of axes ("dofs"). The motion subspace S (6 x nv, child frame) is constant for
+/// all kinds except the universal joint, whose first axis turns in the child frame when its second angle changes:
 ///     universal:  R = Exp(a1 q1) Exp(a2 q2),   S = [0, 0; Exp(a2 q2)^T a1, a2].
 #include "bielle/model/model.h"
 #include "math/lanes.h"
@@ -18,7 +18,7 @@ SE3Of<T> calcJointPlacement(const Joint& joint, typename ArgumentsOf<T>::ConstVe
 /// Motion subspace in the child frame, written to the first nv columns of S (6 x nv).
 void calcJointSubspace(const Joint& joint, ConstVectorRef q, Eigen::Ref<Matrix6Xd> S);
 
-/// q_out = q (+) dv (segments of the joint). Quaternions come out normalised.
+/// q_out = q (+) dv (segments of the joint). Quaternions are normalised.
 void integrateJoint(const Joint& joint, ConstVectorRef q, ConstVectorRef dv, VectorRef q_out);
 template <typename T>
 void integrateJoint(const Joint& joint, typename ArgumentsOf<T>::ConstVector q, typename ArgumentsOf<T>::ConstVector dv,
