@@ -1,5 +1,5 @@
 #pragma once
-// The files a page is made of, carried by the library itself: ours and those of three.js and dygraphs.
+// The files that make up a page, embedded in the library: ours and those of three.js and dygraphs.
 #include <string>
 
 namespace bielle {

@@ -19,8 +19,8 @@ namespace {
 
 constexpr std::uintmax_t kLargestMesh = 3'000'000, kAllMeshes = 12'000'000;  // bytes
 
-// Where the file of a mesh may be. `package://name/rest` stands for name/rest in any directory over the robot's or in
-// $ROS_PACKAGE_PATH, or for rest beside the robot.
+// Possible locations of a mesh file. `package://name/rest` stands for name/rest in any directory above the robot's or
+// in $ROS_PACKAGE_PATH, or for rest beside the robot.
 std::vector<fs::path> listMeshPlaces(const std::string& mesh, const fs::path& directory) {
   const std::string package = "package://", file = "file://";
   if (mesh.rfind(file, 0) == 0) return {mesh.substr(file.size())};
@@ -45,7 +45,7 @@ class MeshStore {
  public:
   explicit MeshStore(fs::path directory) : directory_(std::move(directory)) {}
 
-  // Index among the meshes of the page, -1 when it is left out.
+  // Index among the meshes of the page, -1 if it is omitted.
   int find(const std::string& mesh) {
     const auto [it, is_new] = known_.emplace(mesh, -1);
     if (is_new) it->second = load(mesh);
@@ -106,7 +106,7 @@ void addRods(int body, const std::vector<Vector3d>& points, double radius, Json&
   }
 }
 
-// Bodies 1, 2, ... that nothing is drawn of yet.
+// Bodies 1, 2, ... without a drawing.
 void addSkeleton(const Model& model, const std::vector<bool>& is_drawn, Json& visuals) {
   const std::vector<std::vector<Vector3d>> fastenings = listFastenings(model);
   const double extent = calcExtent(model), radius = extent > 0 ? 0.012 * extent : 0.01;

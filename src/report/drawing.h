@@ -6,7 +6,7 @@
 namespace bielle {
 
 // {"visuals": [{body, shape, pose, size, rgba, mesh}], "meshes": [base64 of an STL file]}. `mesh` counts in "meshes".
-// Meshes that are not on the disk, not STL or too large (3 MB each, 12 MB all) are left out.
+// Meshes that are missing, not STL or too large (3 MB each, 12 MB in total) are omitted.
 Json describeDrawing(const LoadedRobot& robot);
 
 }  // namespace bielle

@@ -43,7 +43,7 @@ Json describeContacts(const Model& model) {
   return contacts;
 }
 
-// Whether the ground holds a contact during a stage.
+// Whether a contact is on the ground during a stage.
 bool isLoaded(const MotionRecord& record, int stage, int contact) {
   return !record.contact_wrenches.row(stage).segment<6>(6 * contact).isZero(0);
 }
@@ -60,7 +60,7 @@ struct NodeTables {
   RowMatrixXd tilt;        // roll, pitch, yaw of the first body since the first node, about the axes of the world
   RowMatrixXd feet;        // position (3) of every contact
   RowMatrixXd gaps;        // of every closure: norms of position and angle
-  Json footprints = Json::array();  // placement of a contact where the ground began to hold it
+  Json footprints = Json::array();  // placement of each contact at touchdown
 };
 
 NodeTables makeNodeTables(const Model& model, const MotionRecord& record) {
@@ -92,7 +92,7 @@ NodeTables makeNodeTables(const Model& model, const MotionRecord& record) {
   return tables;
 }
 
-// Centres of pressure in the frames of the contacts, x and y; none without a force or with a point contact.
+// Centres of pressure in the frames of the contacts, x and y; none for zero force or a point contact.
 RowMatrixXd makePressureCentres(const Model& model, const MotionRecord& record) {
   const int contacts = static_cast<int>(model.contacts().size());
   RowMatrixXd centres = RowMatrixXd::Constant(record.u.rows(), 2 * contacts, kNone);

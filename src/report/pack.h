@@ -20,7 +20,7 @@ Json packPose(const SE3& X);
 
 Json packVector(const VectorXd& vector);
 
-// A number, or null when it is not finite (a limit that is none).
+// A number, or null if it is not finite (a missing limit).
 Json packNumber(double value);
 
 }  // namespace bielle

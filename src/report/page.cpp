@@ -7,7 +7,7 @@
 namespace bielle {
 namespace {
 
-// Text of JSON that may stand inside <script>: no element can begin or end in it.
+// JSON text that is safe inside <script>: no element can begin or end in it.
 std::string formatInline(const Json& json) {
   const std::string text = json.dump(-1, ' ', true, Json::error_handler_t::replace);
   std::string out;
@@ -21,13 +21,13 @@ std::string formatInline(const Json& json) {
   return out;
 }
 
-// A script that stands inside <script>.
+// A script that is safe inside <script>.
 std::string guardScript(std::string script) {
   for (size_t at = 0; (at = script.find("</script", at)) != std::string::npos; at += 2) script.insert(at + 1, "\\");
   return script;
 }
 
-// `name` between <!--{ and }--> in the page stands for a text.
+// Replaces `name` between <!--{ and }--> in the page by a text.
 std::string fillPage(const std::string& page, const std::map<std::string, std::string>& texts) {
   static const std::string kOpen = "<!--{", kClose = "}-->";
   std::string out;

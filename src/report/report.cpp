@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 namespace bielle {
 namespace {
 
-// Enough of the ends of the paths to tell them apart.
+// The shortest ends of the paths that distinguish them.
 std::vector<std::string> makeLabels(const std::vector<std::string>& directories) {
   std::vector<fs::path> paths, labels;
   for (const std::string& directory : directories) {

@@ -1,5 +1,5 @@
 #pragma once
-// One solved motion as its directory holds it, and as the page wants it.
+// One solved motion as read from its directory, and as the page needs it.
 #include <string>
 
 #include "bielle/io/record.h"
@@ -18,7 +18,7 @@ struct ReportRun {
 // \throws ModelError naming the file and what is wrong
 ReportRun readRun(const std::string& directory);
 
-// The robot: what is drawn of it (drawing.h), joints, motors, closures, contacts.
+// The robot: its drawing (drawing.h), joints, motors, closures, contacts.
 Json describeRobot(const LoadedRobot& robot);
 
 // Quantities at every node and stage; placements of all bodies and of the feet come from q.

@@ -17,9 +17,9 @@ namespace bielle {
 namespace {
 
 constexpr int kCounts[] = {0, 41, 13, 7};  // values of each motor, by the number of motors of the group
-constexpr double kReach = 1.5;             // to both sides of the start where there is no limit, rad or m
+constexpr double kReach = 1.5;             // on both sides of the start if there is no limit, rad or m
 
-// Motors whose values go together, and the bodies that they move in their parents.
+// Motors that form one grid, and the bodies that they move relative to their parents.
 struct Group {
   std::vector<int> motors, bodies;
 };
@@ -123,7 +123,7 @@ class GroupGrid {
     }
   }
 
-  // The closed configuration near `from` with the motors at the values of the node; empty when there is none.
+  // The closed configuration near `from` with the motors at the values of the node; empty if there is none.
   VectorXd solve(int node, const VectorXd& from) const {
     AssemblyProblem problem;
     problem.q_ref = from;

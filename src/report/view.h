@@ -1,10 +1,10 @@
 #pragma once
 /// \file A robot as a page with a slider for each motor; its loops close as the sliders move.
 ///
-/// The closed configurations are computed beforehand, on a grid over the motors of each loop cluster (a motor outside all
-/// loops is a grid by itself), and interpolated by the page. From the start posture (the robot's first reference, else any
-/// closed one) each node of the grid is reached from a neighbour that closes, so that the linkage keeps its branch. Where
-/// it does not close, the page says so and keeps the last closed one. Motors of clusters with more than three have no
+/// The closed configurations are precomputed on a grid over the motors of each loop cluster (a motor outside all loops
+/// has its own grid) and interpolated by the page. From the start posture (the robot's first reference, else any closed
+/// one) each node of the grid is reached from a closed neighbour, so that the linkage keeps its branch. Where it does
+/// not close, the page says so and keeps the last closed configuration. Motors of clusters with more than three have no
 /// slider.
 #include <string>
 

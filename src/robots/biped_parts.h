@@ -34,7 +34,7 @@ void addTrunk(const std::vector<Solid>& solids, ModelBuilder& builder);
 // Frame and contact "foot_left", "foot_right" under the link of that foot.
 void addSole(const BipedSide& side, const Vector3d& middle, double length, double width, ModelBuilder& builder);
 
-// Reference `half_sitting` but for its joints: soles under the hips, the trunk's frame at a height.
+// Reference `half_sitting` except for its joints: soles under the hips, the trunk's frame at a height.
 Reference makeStanding(double hip_offset, double trunk_height);
 
 }  // namespace bielle

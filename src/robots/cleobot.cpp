@@ -23,7 +23,7 @@ struct Limb {
   Vector3d base, ball;                                   // b, s
   Vector3d knee;                                         // at the neutral configuration
   Vector3d direction;                                    // d
-  Vector3d axis() const { return direction.cross(kZ); }  // a turn by a positive angle moves what hangs below towards d
+  Vector3d axis() const { return direction.cross(kZ); }  // a positive rotation moves the links below towards d
 };
 
 Limb makeLimb(const Side& side, int index) {

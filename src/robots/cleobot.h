@@ -1,27 +1,30 @@
 #pragma once
-/// \file Cleobot, a biped whose legs are parallel mechanisms throughout: the paper's second robot, in dimensions of ours.
+/// \file Cleobot, a biped whose legs are parallel mechanisms throughout: the paper's second robot, with our dimensions.
 ///
 /// All frames are parallel to the world in the neutral configuration, which is closed: the robot stands on flat feet.
 /// x forward, y left, z up; s = +1 for the left leg, -1 for the right one, its mirror image.
 ///
 /// Lower leg, 3-RRS: three limbs i, each a motor at b_i under the thigh, an upper rod of length l1, a knee with an axis
-/// parallel to that of the motor, a shank of length l2 and a ball at s_i of the foot. A limb moves in the vertical plane
-/// (at the neutral configuration) through b_i of heading psi_i; its knee is bent towards d_i = (cos psi_i, sin psi_i, 0):
+/// parallel to that of the motor, a shank of length l2 and a ball at s_i of the foot. A limb moves in the vertical
+/// plane (at the neutral configuration) through b_i of heading psi_i; its knee is bent towards d_i = (cos psi_i, sin
+/// psi_i, 0):
 ///     limb 1, rear:           b_1 = (-r, 0, 0),                              psi_1 = pi                          (1)
 ///     limb 2, 3, front:       b   = (r cos beta, +-s r sin beta, 0),         psi   = +-s alpha    (outer, inner)
 ///     s_i = b_i - inset d_i - (0, 0, height of the lower leg)                                                   (2)
-/// Foot and thigh have three relative freedoms: leg length, pitch and roll. The balls keep to the three planes, which
-/// holds x, y and yaw of the foot while the three normals, as lines through the s_i, meet in no common point: alpha > 0.
-/// With the motors locked, the rest is held by the forces along the shanks; it is lost where a limb is stretched
-/// (knee straight), where a shank lies in the plane of the balls, or where the foot turns so far that the lines meet.
+/// Foot and thigh have three relative freedoms: leg length, pitch and roll. The balls stay in the three planes, which
+/// constrains x, y and yaw of the foot unless the three normals, as lines through the s_i, meet in a common point:
+/// hence alpha > 0. With the motors locked, the forces along the shanks constrain the rest, except where a limb is
+/// stretched (knee straight), where a shank lies in the plane of the balls, or where the foot turns so far that the
+/// lines meet.
 ///
-/// Hip: a ball between trunk and thigh, turned by three chains of a motor on the trunk, a crank of length c, a rod with a
-/// universal joint at the crank and a ball at the thigh. With the centre of the hip as origin:
+/// Hip: a ball between trunk and thigh, turned by three chains of a motor on the trunk, a crank of length c, a rod with
+/// a universal joint at the crank and a ball at the thigh. With the centre of the hip as origin:
 ///     chain 1, 2: ends on the thigh (-a, +-s w, 0) (outer, inner), vertical rods of length l up to the cranks,
-///                 which point backward: together they pitch the leg, against each other they roll it;             (3)
+///                 which point backward: moving together they pitch the leg, in opposition they roll it;           (3)
 ///     chain 3:    end on the thigh (0, s e, 0), rod of length k forward, crank down from the motor: yaw.          (4)
-/// Arms of the rods about the hip are a (pitch), w (roll) and e (yaw) at the neutral configuration. A chain is at a dead
-/// point where its crank and rod are aligned; the hip is singular where the moments of the three rods are dependent.
+/// Arms of the rods about the hip are a (pitch), w (roll) and e (yaw) at the neutral configuration. A chain is at a
+/// dead point where its crank and rod are aligned; the hip is singular where the moments of the three rods are
+/// dependent.
 #include "bielle/model/model.h"
 #include "bielle/robots/generators.h"
 

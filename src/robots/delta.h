@@ -10,7 +10,7 @@
 ///     h = l1 sin theta + sqrt(l2^2 - (R + l1 cos theta - r)^2).                                                  (2)
 /// Spatial count (Gruebler) with 16 joints after cutting: 16 - 5 * 5 = -9. The platform has its three translations.
 ///
-/// Lengths of an industrial robot, ABB's IRB 360-1/1600, as R. L. Williams II gives them (The Delta Parallel Robot: Kinematics
+/// Lengths of an industrial robot, ABB's IRB 360-1/1600, from R. L. Williams II (The Delta Parallel Robot: Kinematics
 /// Solutions, Ohio University, 2016): sides of base and platform triangles 0.567 and 0.076 m, whose inscribed and
 /// circumscribed circles are R = 0.567 / (2 sqrt 3) and r = 0.076 / sqrt 3; arms of 0.524 and 1.244 m, parallelograms
 /// 0.131 m wide. Neutral posture, masses and radii are ours.

@@ -1,8 +1,8 @@
 #pragma once
 /// \file A five-bar leg with coaxial motors on a vertical rail, in the plane x-z: a direct-drive leg.
 ///
-/// Two motors at one axis turn the upper rods (length l1), one to the front, one to the back; the lower rods (l2) meet in the
-/// foot, a pin. With phi the angle of both upper rods from straight down, the foot is right under the motors at
+/// Two motors on one axis turn the upper rods (length l1), one to the front, one to the back; the lower rods (l2) meet
+/// in the foot, a pin. With phi the angle of both upper rods from straight down, the foot is right under the motors at
 ///     l1 cos phi + sqrt(l2^2 - l1^2 sin^2 phi).                                                                  (1)
 /// The pin is a hinge closure: five rows, of which a planar loop needs two. Rail and four hinges less two: mobility 3.
 /// The neutral configuration stands on the ground by (1), all frames parallel.

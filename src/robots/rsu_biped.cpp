@@ -13,7 +13,7 @@ struct Leg : BipedSide {
   const RsuBipedParameters& p;
 };
 
-// Hips weigh in the state regularization as in the paper's walk.
+// Hips are weighted in the state regularization as in the paper's walk.
 Joint makeHip(const std::string& name, const Vector3d& place, const Vector3d& axis, double position, double velocity) {
   Joint joint = makeRevolute(name, place, axis);
   joint.position_importance = position;

@@ -13,7 +13,7 @@ const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::Un
 // d(a) of Eq. (1).
 Vector3d makeDirection(double angle) { return {std::sin(angle), 0, -std::cos(angle)}; }
 
-// Where rods from a and b meet, in the plane: behind the way down from a to b.
+// Intersection of rods from a and b in the plane, behind the line down from a to b.
 std::optional<Vector3d> findMeeting(const Vector3d& a, double rod_a, const Vector3d& b, double rod_b) {
   const double span = (b - a).norm(), along = (span * span + rod_a * rod_a - rod_b * rod_b) / (2 * span);
   const double square = rod_a * rod_a - along * along;
@@ -22,7 +22,7 @@ std::optional<Vector3d> findMeeting(const Vector3d& a, double rod_a, const Vecto
   return a + along * way + std::sqrt(square) * kY.cross(way);
 }
 
-// Points of the neutral configuration as seen from the frame that they are given in there, all frames parallel.
+// Points of the neutral configuration relative to their frames, all frames parallel.
 struct Shape {
   Vector3d knee, shin, tarsus, heel;         // O to K, K to T, T to P, T to H
   Vector3d rod_start, rod;                   // on the thigh, and from there to H
@@ -151,7 +151,7 @@ Model makeSpringLeg(const SpringLegParameters& parameters) {
   addSolidLink("tarsus_link", "shin", makeRevolute("tarsus", shape.shin, kY), tarsus, builder);
   builder.addFrame("heel", "tarsus_link", {Matrix3d::Identity(), shape.heel});
   addToe(p, shape, builder);
-  // The rod must not spin: its universal joint turns about y and about what is more square to it.
+  // The rod must not spin: its universal joint turns about y and about the axis that is more perpendicular to the rod.
   const Vector3d second = std::abs(shape.rod.x()) > std::abs(shape.rod.z()) ? kZ : kX;
   addSolidLink("heel_rod", "thigh", makeUniversal("heel_rod_joint", shape.rod_start, kY, second),
                {makeRod(kOrigin, shape.rod, 0.006, p.heel_rod_mass / p.heel_rod_length, colors::kRod)}, builder);

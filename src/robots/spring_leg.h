@@ -1,22 +1,23 @@
 #pragma once
-/// \file A leg like Cassie's, its leaf springs taken rigid: tarsus and toe are moved by four-bars.
+/// \file A leg like Cassie's with rigid leaf springs: tarsus and toe are moved by four-bars.
 ///
-/// Hip roll, yaw and pitch, knee, tarsus and toe; the last four move the sagittal plane. With O the hip pitch axis, K the
-/// knee, T the tarsus joint, P the toe pivot, H the heel on the tarsus, d(a) = (sin a, -cos a) the direction of the angle a
-/// from straight down, forward positive:
+/// Hip roll, yaw and pitch, knee, tarsus and toe; the last four move in the sagittal plane. With O the hip pitch axis,
+/// K the knee, T the tarsus joint, P the toe pivot, H the heel on the tarsus, d(a) = (sin a, -cos a) the direction of
+/// the angle a from straight down, forward positive:
 ///     K = O + l1 d(a1),   T = K + l2 d(a2),   P = T + l3 d(a3),   H = T - h d(a3 - e),                            (1)
-/// |OH| = r holds for the heel rod, and gives a3. O K T H is nearly a parallelogram, so that the rod keeps the tarsus
-/// (nearly) parallel to itself while the knee bends; of the two ways to close it, H is behind the line from O to T. The rod has
-/// a universal joint at O, beside the plane by w, and a ball at H: three rows on four joints.
+/// The heel rod keeps |OH| = r, which determines a3. O K T H is nearly a parallelogram, so that the rod keeps the
+/// tarsus (nearly) parallel to itself while the knee bends; of the two branches, H is behind the line from O to T. The
+/// rod has a universal joint at O, at the distance w from the plane, and a ball at H: three rows on four joints.
 ///
-/// The toe's four-bar: a crank of length c about C = T + m d(a3 - f), the plantar rod of length k, the lever of length v
-/// on the foot, at the angle g when the sole is level; the crank points backward. It is closed by a hinge: five rows, rank
-/// two, on three joints. Mobility 5, one per motor: hip_roll, hip_yaw, hip_pitch, knee, motor_toe.
+/// The toe's four-bar: a crank of length c about C = T + m d(a3 - f), the plantar rod of length k, the lever of length
+/// v on the foot, at the angle g when the sole is level; the crank points backward. It is closed by a hinge: five rows,
+/// rank two, on three joints. Mobility 5, one per motor: hip_roll, hip_yaw, hip_pitch, knee, motor_toe.
 ///
 /// Lengths, angles between them and masses of links are those of the leg of Digit, Cassie's successor, as modelled in
-/// `digit_like_2legs` of example-parallel-robots (LAAS-CNRS and Inria, 2024, BSD 3-Clause), its right leg. Simplified: what
-/// that leg has beside the plane of the pitch axis is moved into it (shin 0.025, tarsus 0.014 m), but for the upper end of the
-/// heel rod; the toe only pitches, its two cranks and rods are one of the mass of both. Toe, posture, radii, armature are ours.
+/// `digit_like_2legs` of example-parallel-robots (LAAS-CNRS and Inria, 2024, BSD 3-Clause), its right leg. Simplified:
+/// parts beside the sagittal plane are moved into it (shin 0.025, tarsus 0.014 m), except for the upper end of the heel
+/// rod; the toe only pitches, and its two cranks and rods are merged into one with the mass of both. Toe, posture,
+/// radii and armature are ours.
 #include "bielle/model/model.h"
 #include "bielle/robots/generators.h"
 

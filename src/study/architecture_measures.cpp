@@ -1,4 +1,4 @@
-// Numbers of a comparison of robots, out of the files of its cases.
+// Numbers of a comparison of robots, from the files of its cases.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -31,7 +31,7 @@ MotorTrace readTrace(const MotionRecord& record) {
   return trace;
 }
 
-// Motors go to the first group with a word of their names; all are in the last one.
+// Motors belong to the first group with a word of their names; all are in the last one.
 std::vector<std::vector<int>> groupMotors(const std::vector<MotorGroup>& groups,
                                           const std::vector<std::string>& motors) {
   std::vector<std::vector<int>> members(groups.size());
@@ -84,7 +84,7 @@ void measure(const ArchitectureSpec& spec, const Contender& contender, const Mot
                               : out.electrical_energy / (model.mass() * model.gravity().norm() * out.distance);
 }
 
-// The first row of the check that fails, or nothing.
+// The first row of the check that fails, or an empty text.
 std::string findFailure(const std::string& file) {
   std::string failure;
   readJsonFile(file, kRemedy, [&failure](const Json& json) {

@@ -17,9 +17,9 @@ struct GroupLoad {
 
 // One motion of one robot.
 struct Feat {
-  std::string outcome;  // passed, not checked, or what is wrong
-  bool done = false;    // converged and passed (or not checked, where there is no check)
-  bool exists = false;  // there is a motion, done or not: the numbers below
+  std::string outcome;  // passed, not checked, or the problem
+  bool done = false;    // converged and passed (or not checked, if there is no check)
+  bool exists = false;  // there is a motion, done or not, with the numbers below
   int iterations = 0;
   MotorTrace trace;
   std::vector<std::pair<double, double>> com_height;      // over time, s and m
@@ -30,7 +30,7 @@ struct Feat {
   double com_start = 0, com_lowest = 0, com_highest = 0;  // m
   double distance = 0;                                    // of the centre of mass, over the ground, m
   double duration = 0;                                    // s
-  double cost_of_transport = 0;  // electrical energy over weight and distance; NaN where it does not go 0.2 m
+  double cost_of_transport = 0;  // electrical energy over weight and distance; NaN for less than 0.2 m
 };
 
 Feat readFeat(const ArchitectureSpec& spec, const Contender& contender, const std::string& directory,
@@ -41,7 +41,7 @@ struct ArchitectureResults {
   std::vector<std::vector<Feat>> motions, speeds;
 };
 
-// Writes the page, the table and the figures. Returns their paths; `notes` tells what could not be drawn.
+// Writes the page, the table and the figures. Returns their paths; `notes` lists figures that could not be drawn.
 // \throws ModelError when a file cannot be written
 std::vector<std::string> writeArchitectures(const std::string& directory, const ArchitectureSpec& spec,
                                             const std::vector<Contender>& contenders,

@@ -41,7 +41,7 @@ void readSpeeds(const Entry& entry, ArchitectureSpec& spec) {
     entry.fail("its steps do not lead from one to the other", "give from <= to, step > 0 and less than 1000 steps");
   const Entry *motion = find(fields, "motion"), *option = find(fields, "option"), *set = find(fields, "set");
   for (int i = 0; from + i * step <= to + 1e-9 * step; ++i) {
-    // The number that is written, not the sum of steps.
+    // The decimal number, not the sum of steps.
     const double value = std::round((from + i * step) * 1e9) / 1e9;
     MotionSpec one{motion ? motion->getText() : "walk", {{option ? option->getText() : "speed", value}}};
     if (set)
@@ -79,7 +79,7 @@ void readRoot(const Entry& root, ArchitectureSpec& spec) {
   }
 }
 
-// The factor of the trunk's mass that makes the whole weigh so much.
+// The factor of the trunk's mass that gives the required total mass.
 double calcTrunkFactor(const ArchitectureSpec& spec, const std::string& name, const Model& model) {
   if (spec.mass == 0) return 1;
   if (!model.hasFreeFlyer())

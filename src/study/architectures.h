@@ -1,14 +1,14 @@
 #pragma once
-// A comparison of robots that do the same: which ones, what they are made to do, and the cases of it.
+// A comparison of robots on the same motions: the robots, the motions, and the resulting cases.
 //
 // In a YAML file:
 //   robots:                        # name: a robot (name, or path from this file), or a generator with its parameters
 //     bipetto: {robot: bipetto}
 //     cleobot: {generator: cleobot, set: {hip_height: 0.5}}
-//   mass: 25.7                     # kg, of every robot, by its trunk; left out: they stay as they are
+//   mass: 25.7                     # kg, of every robot, set by its trunk; omitted: unchanged
 //   motions:
 //     - {motion: squat, set: {depth: 0.6}}
-//   speeds: {motion: walk, option: speed, from: 0.3, to: 1.0, step: 0.1}     # the largest that is done and passes
+//   speeds: {motion: walk, option: speed, from: 0.3, to: 1.0, step: 0.1}     # the largest that converges and passes
 //   groups: {hips: [hip], "knees and ankles": [knee, ankle]}     # motors by parts of their names, the first that fits
 //   drives: {motor_constant: 2, regeneration: 0}                 # of all motors (design/measures.h)
 #include <string>
@@ -36,7 +36,7 @@ struct MotorGroup {
 struct ArchitectureSpec {
   std::string path, text;
   std::vector<Architecture> robots;
-  double mass = 0;  // kg; 0: as they are
+  double mass = 0;  // kg; 0: unchanged
   std::vector<MotionSpec> motions;
   std::vector<MotionSpec> speeds;  // slowest first; may be empty
   std::vector<double> speed_values;
@@ -47,7 +47,7 @@ struct ArchitectureSpec {
 // \throws ModelError naming the file, the key with its line, and the remedy
 ArchitectureSpec readArchitectureSpec(const std::string& path);
 
-// A robot as it is compared.
+// A robot in a comparison.
 struct Contender {
   std::string name, directory;  // where its files were written
   LoadedRobot robot;
@@ -55,7 +55,7 @@ struct Contender {
 };
 
 // Makes the robots and writes them to directory/NAME.
-// \throws ModelError when there is no such robot, or its trunk cannot make up for the mass
+// \throws ModelError when there is no such robot, or its trunk cannot compensate for the mass
 std::vector<Contender> makeContenders(const ArchitectureSpec& spec, const std::string& directory);
 
 // Its result is in kMotion.

@@ -28,7 +28,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Holds the directory for this process; gone with it.
+// Locks the directory for the lifetime of this process.
 class DirectoryLock {
  public:
   explicit DirectoryLock(const std::string& directory) {
@@ -53,7 +53,7 @@ Json describeRequest(const Case& request, const RunOptions& options) {
   return {{"identity", options.identity}, {"steps", request.steps}};
 }
 
-// The outcome in case.json, if it is there and answers the same request.
+// The outcome in case.json, if it exists and belongs to the same request.
 std::optional<CaseOutcome> readOutcome(const std::string& path, const Json& request) {
   if (!std::filesystem::is_regular_file(path)) return std::nullopt;
   CaseOutcome outcome;
@@ -63,7 +63,7 @@ std::optional<CaseOutcome> readOutcome(const std::string& path, const Json& requ
     if (json.at("request") != request) return std::nullopt;
     for (const Json& step : json.at("outcome"))
       outcome.steps.push_back({step.at("status"), step.at("seconds"), step.at("error")});
-  } catch (const std::exception&) {  // not as it was written: the case is done anew
+  } catch (const std::exception&) {  // corrupted: the case is repeated
     return std::nullopt;
   }
   return outcome;
@@ -146,7 +146,7 @@ class CaseRunner {
       finish(index);
       return;
     }
-    // case.json goes first: should we be stopped in between, nothing may take what remains for a finished case.
+    // case.json is removed first: if we are stopped in between, the remains must not pass for a finished case.
     std::error_code ignored;
     fs::remove(getPath(index, "case.json"), ignored);
     fs::remove_all(getPath(index), ignored);

@@ -17,7 +17,7 @@ namespace {
 [[noreturn]] void becomeProgram(char** argv, const char* log, pid_t parent) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != parent) _exit(127);  // it went before we could ask
+  if (getppid() != parent) _exit(127);  // it ended before the call
   sigset_t none;
   sigemptyset(&none);
   sigprocmask(SIG_SETMASK, &none, nullptr);
@@ -44,7 +44,7 @@ pid_t startChild(const std::vector<std::string>& arguments, const std::string& l
 }
 
 SignalWatch::SignalWatch() {
-  signal(SIGCHLD, SIG_DFL);  // ignored, children would leave no status
+  signal(SIGCHLD, SIG_DFL);  // if ignored, children would leave no status
   sigemptyset(&watched_);
   for (const int number : {SIGINT, SIGTERM, SIGCHLD}) sigaddset(&watched_, number);
   sigprocmask(SIG_BLOCK, &watched_, &before_);

@@ -1,5 +1,5 @@
 #pragma once
-// Child processes: started, waited for together with the signals of the user, and never left behind.
+// Child processes: started, awaited together with the user's signals, and never left running.
 #include <signal.h>
 #include <sys/types.h>
 
@@ -8,8 +8,8 @@
 
 namespace bielle::study {
 
-// Starts a program (arguments[0] is its path) with both outputs in the file `log` and nothing to read. It is in a group
-// of its own, so that Ctrl-C does not reach it, and dies with its parent, however that ends.
+// Starts a program (arguments[0] is its path) with both outputs in the file `log` and no input. It is in a separate
+// process group, so that Ctrl-C does not reach it, and dies with its parent, however that ends.
 // \throws ModelError when there can be no new process
 pid_t startChild(const std::vector<std::string>& arguments, const std::string& log);
 
@@ -18,8 +18,7 @@ struct ChildEnd {
   int status = 0;  // of the exit, or 128 + the signal that ended it
 };
 
-// While it lives, SIGINT, SIGTERM and SIGCHLD are not delivered but waited for. Children get the signals back that were
-// there before.
+// During its lifetime, SIGINT, SIGTERM and SIGCHLD are blocked and awaited. Children get the previous signal mask.
 class SignalWatch {
  public:
   SignalWatch();

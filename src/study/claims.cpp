@@ -38,7 +38,7 @@ int count(const Comparisons& comparisons, const std::function<bool(const Compari
 bool hasClosed(const Comparison& entry) { return entry.closed.success; }
 bool hasSerial(const Comparison& entry) { return entry.serial.success; }
 bool hasBoth(const Comparison& entry) { return entry.closed.success && entry.lifted.success; }
-// There was a serial motion, and a linkage could not follow it.
+// Whether there was a serial motion that a linkage could not follow.
 bool failsToLift(const Comparison& entry) {
   return entry.serial.success && !entry.lifted.success && entry.lifted.lift.at_linkage;
 }
@@ -94,7 +94,7 @@ std::vector<Claim> judgeSquat(const StudyResult& result, const Model&) {
                     "the serial motion reaches a singular configuration where the motors cannot give the torques",
                     failed ? Verdict::Agrees : Verdict::Differs, "targets whose lift fails: " + describeFailures(all)});
 
-  double ratio = 0;  // of what was lifted, whole or not
+  double ratio = 0;  // of the lifted part
   for (const Comparison& entry : all)
     if (hasClosed(entry) && entry.lifted.knee.peak > 0) ratio = std::max(ratio, calcPeakRatio(entry));
   claims.push_back(
@@ -190,8 +190,8 @@ std::vector<Claim> judgeWalk(const StudyResult& result, const Model& model) {
        "peak knee torque, lifted over closed: " + describePeakRatios(result.comparisons)}};
 }
 
-// Excessive: twice the closed model's peak of the given motors in what was lifted, or a linkage that cannot follow, of a
-// joint whose name begins so.
+// Excessive: twice the closed model's peak of the given motors in the lifted part, or a linkage that cannot follow, of
+// a joint whose name has the given prefix.
 Claim judgeExcess(const StudyResult& result, const char* text, Load Performance::*load, const std::string& joint) {
   const Comparisons& all = result.comparisons;
   double ratio = 0;

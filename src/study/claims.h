@@ -8,7 +8,7 @@
 
 namespace bielle::study {
 
-// The reduction ratio along the range of a joint that holds the starting posture (branch 0 of ratio.json).
+// The reduction ratio along the range of a joint that contains the starting posture (branch 0 of ratio.json).
 struct RatioFinding {
   std::string joint;
   std::vector<double> angle, ratio;       // in the order of the sweep; empty: there are no results
@@ -17,7 +17,7 @@ struct RatioFinding {
 };
 RatioFinding readRatio(const std::string& directory);
 
-// Everything that came out of one study.
+// The results of one study.
 struct StudyResult {
   Study study;
   std::vector<Comparison> comparisons;

@@ -52,7 +52,7 @@ Load calcLoad(const MotionRecord& record, const std::vector<std::string>& motors
   return load;
 }
 
-// Numbers of summary.json that readSummary leaves out.
+// Numbers of summary.json that readSummary omits.
 void readSolver(const std::string& file, Performance& out) {
   readJsonFile(file, kRemedy, [&out](const Json& json) {
     out.iterations = json.value("iterations", 0);
@@ -99,7 +99,7 @@ LiftFacts readLift(const std::string& directory, const Performance& lifted) {
   return facts;
 }
 
-// Fills in what a run of the command left; `step` is its place in the case.
+// Reads the results of a run of the command; `step` is its position in the case.
 Performance readPerformance(const Study& study, const CaseOutcome& outcome, size_t step, const std::string& directory,
                             const std::vector<std::string>& knee_motors, const std::vector<std::string>& ankle_motors,
                             const ComparedRobot& robot) {

@@ -13,7 +13,7 @@ namespace bielle::study {
 
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
-// The robot, and what drives the compared joints.
+// The robot, and the motors of the compared joints.
 struct ComparedRobot {
   LoadedRobot robot;
   ComparedJoints joints;
@@ -29,10 +29,10 @@ struct Load {
 
 // Extent of the lift (lift.json).
 struct LiftFacts {
-  std::string message;       // why it ended early, or empty
-  bool at_linkage = false;   // it ended where a linkage is out of reach or at a dead point, not for lack of accuracy
-  std::string joint;         // that this linkage drives, or empty
-  double until = kMissing;   // time of the last node that was lifted, s
+  std::string message;       // reason for an early end, or empty
+  bool at_linkage = false;   // it ended with a linkage out of reach or at a dead point, not for lack of accuracy
+  std::string joint;         // the joint driven by this linkage, or empty
+  double until = kMissing;   // time of the last lifted node, s
   double margin = kMissing;  // least over nodes and linkages; 0 is a dead point of a joint
 };
 

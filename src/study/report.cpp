@@ -11,14 +11,14 @@
 namespace bielle::study {
 namespace {
 
-// The shortest text that reads back to the same number; nothing where there is none.
+// The shortest text that reads back to the same number; empty for NaN.
 std::string formatExact(double value) {
   if (!std::isfinite(value)) return "";
   char text[32];
   return {text, std::to_chars(text, text + sizeof text, value).ptr};
 }
 
-// In parentheses what was measured of a motion that ends early.
+// Measures of a motion that ends early are in parentheses.
 std::string formatUntil(const Performance& motion, double value, int digits) {
   const std::string cell = formatCell(value, digits);
   return std::isfinite(value) && !motion.success ? "(" + cell + ")" : cell;
@@ -73,7 +73,7 @@ void printClaims(std::ostream& page, const std::vector<Claim>& claims) {
   page << "\n";
 }
 
-// Rows are values; columns: what to print of each.
+// Rows are values; columns define what is printed of each.
 void printNumbers(std::ostream& page, const StudyResult& result) {
   struct Column {
     std::string header;

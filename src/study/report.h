@@ -7,16 +7,16 @@
 
 namespace bielle::study {
 
-// With so many decimals; a dash where there is no number.
+// With the given number of decimals; a dash for NaN.
 std::string formatCell(double value, int digits);
-// A text as one field of a table in CSV.
+// A text as a field of a CSV table.
 std::string quoteCsv(const std::string& text);
 
 // The files written for one study.
 struct StudyPage {
   std::string text;                // Markdown, from a heading of the second level
   std::vector<std::string> files;  // paths
-  std::vector<std::string> notes;  // what could not be drawn
+  std::vector<std::string> notes;  // figures that could not be drawn
 };
 
 // Writes the table, the figures and the page. \throws ModelError when a file cannot be written

@@ -35,7 +35,8 @@ std::vector<std::string> makeSolve(const Study& study, double value, const std::
 }  // namespace
 
 const std::vector<Study>& getStudies() {
-  // Eight steps, as in the paper: four are steady. Its weights, and ours, which ask for footholds instead of a velocity.
+  // Eight steps, as in the paper: four are steady. Its weights, and ours, which ask for footholds instead of a
+  // velocity.
   const std::vector<std::string> paper = {"--weights", "paper", "--steps", "8"}, ours = {"--steps", "8"};
   const std::vector<double> heights = makeRange(50, 120, 5, 100), speeds = makeRange(0, 12, 1, 10);
   const std::vector<double> stairs = makeRange(2, 10, 2, 100), flights = makeRange(20, 40, 5, 100);

@@ -1,10 +1,10 @@
 #pragma once
-// The studies as data: which motions they vary, over which values, and what the paper says of them.
+// The studies as data: the motions and values that they vary, and the paper's statements about them.
 //
-// A comparison study makes every motion twice. The closed model gets a motion of its own; the approximate serial model
-// gets one with the same costs, and that is lifted to the closed model (the paper's Appendix A): motor torques that make
-// the closed model follow: node by node from inverse dynamics (lifted), and by the paper's own problem, one step of the
-// dynamics after the other (stepped).
+// A comparison study makes every motion twice, with the same costs: for the closed model and for the approximate serial
+// model. The serial motion is lifted to the closed model (the paper's Appendix A), i.e. motor torques are found that
+// make the closed model follow it: node by node from inverse dynamics (lifted), and by the paper's own problem, one
+// step of the dynamics after the other (stepped).
 #include <string>
 #include <vector>
 
@@ -12,10 +12,10 @@
 
 namespace bielle::study {
 
-// The part of a motion that torques are taken from.
+// The part of a motion from which torques are taken.
 enum class Window {
   Whole,
-  Steady  // steps without the first two and the last two; the whole motion when there are fewer than five
+  Steady  // steps without the first two and the last two; the whole motion if there are fewer than five
 };
 
 struct Study {
@@ -33,13 +33,13 @@ struct Study {
 
 const std::vector<Study>& getStudies();
 
-// The joints whose motors are looked at.
+// The joints whose motors are compared.
 struct ComparedJoints {
   std::vector<std::string> knees = {"knee_right", "knee_left"};       // angles are those of the first
   std::vector<std::string> ankles = {"ankley_right", "ankley_left"};  // one of each linkage
 };
 
-// Names within a case: its results are in the directories of these names.
+// Names within a case, of the directories of its results.
 constexpr const char *kClosed = "closed", *kSerial = "serial", *kLifted = "lifted", *kStepped = "stepped",
                      *kRatio = "ratio";
 

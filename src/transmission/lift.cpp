@@ -52,7 +52,7 @@ class Lifter {
       if (!findTorques(k, x, u)) break;
       result_.trajectory.us.push_back(u);
     }
-    // The last node that holds is the terminal one of what was lifted.
+    // The last valid node is the terminal one of the lifted part.
     std::vector<VectorXd>&xs = result_.trajectory.xs, &us = result_.trajectory.us;
     us.resize(xs.empty() ? 0 : std::min(us.size(), xs.size() - 1));
     result_.constraints.resize(us.size());
@@ -78,7 +78,7 @@ class Lifter {
     return fail(status, posture.why());
   }
 
-  // The closed state of node k: lifted by itself, or where the step before has led.
+  // The closed state of node k: lifted separately, or reached by the previous step.
   bool setState(int k, VectorXd& x) {
     LiftNode& node = result_.nodes.back();
     const bool stepped = options_.method == LiftMethod::Nlopt && k > 0;
@@ -99,7 +99,7 @@ class Lifter {
     return true;
   }
 
-  // The state is too far from the serial one: out of reach, or only inaccurate.
+  // The state is too far from the serial one: out of reach, or merely inaccurate.
   bool failToFollow(int k, const char* what, double error) {
     PostureLift other = posture_;
     const LiftStatus status = other.setConfiguration(trajectory_.q[k], options_.singular);
@@ -131,7 +131,7 @@ class Lifter {
     return true;
   }
 
-  // Eq. (2) at the present posture: the foot forces nearest to the serial ones that let motors do the rest.
+  // Eq. (2) at the current posture: the foot forces nearest to the serial ones for which motors can provide the rest.
   VectorXd calcInverseTorques(int k, const VectorXd& x) {
     const ConstraintSet& set = result_.constraints[k];
     VectorXd v, a;
@@ -156,7 +156,7 @@ class Lifter {
     return svd.solve(rest);
   }
 
-  // Eq. (1) from u, in the coordinates z of u + P z that make it round; leaves the state it leads to in next_.
+  // Eq. (1) from u, in the preconditioned coordinates z of u + P z; stores the resulting state in next_.
   bool followBySlsqp(int k, const VectorXd& x, VectorXd& u) {
     if (!problem_) {  // bound to the first state
       problem_ = std::make_unique<RobotProblem>(closed_, x.head(closed_.nq()), x.tail(closed_.nv()),

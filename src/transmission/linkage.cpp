@@ -43,7 +43,7 @@ bool contains(const std::vector<int>& list, int value) {
   return std::find(list.begin(), list.end(), value) != list.end();
 }
 
-// Places of the joint with index i of the whole model within the cluster.
+// Position within the cluster of the joint with index i in the whole model.
 void addPlaces(const Linkage& linkage, int i, std::vector<int>& dofs, std::vector<int>& positions) {
   const std::vector<int>& joints = linkage.cluster->joints;
   const int at = static_cast<int>(std::find(joints.begin(), joints.end(), i) - joints.begin());
@@ -67,7 +67,7 @@ Linkage makeDirectLinkage(const Model& model, int joint) {
 Linkage makeLoopLinkage(const Model& model, const ReducedCluster& cluster, std::vector<int> joints) {
   Linkage linkage;
   const auto unweighted = std::make_shared<ReducedCluster>(cluster);
-  unweighted->metric.setOnes();  // geometry alone: what is light must not move far per step
+  unweighted->metric.setOnes();  // purely geometric: light bodies must not move far per step
   unweighted->inverse_metric.setOnes();
   unweighted->inverse_root.setOnes();
   linkage.cluster = unweighted;
@@ -228,7 +228,7 @@ double calcBalanceError(const Model& model, const Linkage& linkage, ConstVectorR
       joints -= R(i, j) * joint;
       alone = std::max(alone, std::max(1.0, std::abs(R(i, j))) * calcAcceleration(joint).norm());
     }
-    // A motor on its own joint balances itself, with nothing left to compare.
+    // A motor on its own joint balances itself: nothing to compare.
     if (alone > 0) error = std::max(error, calcAcceleration(motor + joints).norm() / alone);
   }
   return error;

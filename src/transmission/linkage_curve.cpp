@@ -10,7 +10,7 @@ namespace bielle {
 namespace {
 
 constexpr double kHeldTolerance = 1e-13;  // rad
-constexpr double kLongest = 1.2;          // of what a step moves, over its length
+constexpr double kLongest = 1.2;          // largest displacement of a step over its length
 constexpr double kRankPlace = 1e-9;       // of a loss of rank, along the curve
 constexpr double kLostRank = 1e-4;        // singular values of the closures, relative
 constexpr double kHeldRank = 1e-6;        // singular values of the rates of held joints, relative
@@ -74,7 +74,8 @@ bool LinkageCurve::advance(const CurvePoint& from, double h, CurvePoint& to) {
     why_ = from_.describeFailure(cluster);
     return false;
   }
-  // d = h t + N H z, with z such that the held angles stay; the slope of the angles with respect to z is near the identity.
+  // d = h t + N H z, with z such that the held angles stay; the slope of the angles with respect to z is near the
+  // identity.
   const ClusterBasis& basis = from_.basis();
   VectorXd d = h * from.tangent;
   MatrixXd NH;
@@ -115,7 +116,7 @@ double LinkageCurve::findRoot(const CurvePoint& from, double h, double tolerance
   double low = 0, high = h, f_low = f(from);
   if (!advance(from, h, point)) return h;
   double f_high = f(point);
-  // Regula falsi, the value of an end that stays being halved (Illinois).
+  // Regula falsi; the value at an end that stays is halved (Illinois).
   for (int i = 0, side = 0; i < 200 && std::abs(high - low) > tolerance; ++i) {
     const double middle = (low * f_high - high * f_low) / (f_high - f_low);
     if (!advance(from, middle, point)) return middle;
@@ -165,7 +166,7 @@ bool LinkageCurve::findRankLoss(const CurvePoint& from, const CurvePoint& to, do
   if (calcDeterminant(from) * calcDeterminant(to) > 0) return false;
   const double root = findRoot(from, h, kRankPlace, calcDeterminant);
   CurvePoint at;
-  if (advance(from, root, at) && hasRank(at.q)) return false;  // other rows have kept the rank
+  if (advance(from, root, at) && hasRank(at.q)) return false;  // other rows keep the rank
   why_ = "closure '" + linkage_.cluster->closures.closures.front().name +
          "': its loops lose rank, they can go on in several ways";
   h = root;

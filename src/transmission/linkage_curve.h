@@ -16,10 +16,10 @@ struct CurvePoint {
 
 class LinkageCurve {
  public:
-  // From the configuration of the cluster, along increasing angles of the joint.
+  // Starts from the configuration of the cluster, along increasing angles of the joint.
   LinkageCurve(const Linkage& linkage, int joint, ConstVectorRef q_cluster);
 
-  // False when the rank is not the cluster's, or the held joints cannot be held; why() says which.
+  // False if the rank is not the cluster's, or the held joints cannot be held; why() states which.
   bool start(CurvePoint& point);
   // The point at a distance h (of either sign) along the tangent of `from`.
   bool advance(const CurvePoint& from, double h, CurvePoint& to);
@@ -27,8 +27,8 @@ class LinkageCurve {
   double findRoot(const CurvePoint& from, double h, double tolerance,
                   const std::function<double(const CurvePoint&)>& f);
 
-  // Whether the loops lose rank within the step h from `from`, which advance() may have jumped over: the curve has another
-  // one crossing it there. Then `h` becomes the step up to that point.
+  // Whether the loops lose rank within the step h from `from`, which advance() may have skipped: another curve crosses
+  // there. Then `h` becomes the step up to that point.
   bool findRankLoss(const CurvePoint& from, const CurvePoint& to, double& h);
 
   RatioSample makeSample(const CurvePoint& point, DeadPointKind dead = DeadPointKind::None);

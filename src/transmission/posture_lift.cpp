@@ -60,7 +60,7 @@ LiftStatus PostureLift::setClosedConfiguration(const VectorXd& q, double singula
   return checkMargin(singular);
 }
 
-// Newton steps along the closed configurations towards the target, as long as they come nearer.
+// Newton steps along the closed configurations towards the target, as long as the distance decreases.
 LiftStatus PostureLift::closeDrive(Drive& drive, const VectorXd& target) {
   const Linkage& linkage = drive.linkage;
   const auto calcMiss = [&](const ClusterPoint& point) {
@@ -126,7 +126,7 @@ void PostureLift::liftMotion(const VectorXd& v_s, const VectorXd& a_s, VectorXd&
     const int m = drive.linkage.size();
     VectorXd v_J(m), a_J(m), v_cluster, a_cluster;
     for (int j = 0; j < m; ++j) v_J[j] = v_s[drive.serial_dofs[j]], a_J[j] = a_s[drive.serial_dofs[j]];
-    if (!calcLinkageMotion(drive.linkage, drive.here, v_J, a_J, v_cluster, a_cluster)) continue;  // seen by checkMargin
+    if (!calcLinkageMotion(drive.linkage, drive.here, v_J, a_J, v_cluster, a_cluster)) continue;  // see checkMargin
     scatterVelocity(*drive.linkage.cluster, v_cluster, v);
     scatterVelocity(*drive.linkage.cluster, a_cluster, a);
   }

@@ -12,17 +12,17 @@ class PostureLift {
  public:
   PostureLift(const Model& closed, const SerialModel& serial);
 
-  // Closes the loops on the serial joints of q_s, from the configuration of the call before. On failure, why() and joint()
-  // tell.
+  // Closes the loops on the serial joints of q_s, from the configuration of the previous call. On failure, see why()
+  // and joint().
   LiftStatus setConfiguration(const VectorXd& q_s, double singular);
-  // Takes over a closed configuration.
+  // Sets a closed configuration.
   LiftStatus setClosedConfiguration(const VectorXd& q, double singular);
 
   const VectorXd& q() const { return q_; }
-  // The closed velocity and acceleration with the serial ones.
+  // The closed velocity and acceleration for the serial ones.
   VectorXd liftVelocity(const VectorXd& v_s);
   void liftMotion(const VectorXd& v_s, const VectorXd& a_s, VectorXd& v, VectorXd& a);
-  // nv x nv of the serial model: the tangent of drive serial speeds.
+  // nv x nv of the serial model: closed velocities per unit of the serial ones.
   MatrixXd calcTangent() const;
   double margin() const { return margin_; }
   const std::string& why() const { return why_; }

@@ -17,7 +17,7 @@ std::vector<RatioSample> getMainBranch(const RatioSweep& sweep) {
   return {first, last + 1};
 }
 
-// Samples around the start at given angles of the swept joint, as far as it gets there.
+// Samples around the start at given angles of the swept joint, as far as it reaches them.
 std::vector<RatioSample> sampleAt(const Linkage& linkage, const RatioSweep& sweep, const std::vector<double>& angles) {
   std::vector<RatioSample> out;
   const std::vector<RatioSample> branch = getMainBranch(sweep);
@@ -28,7 +28,7 @@ std::vector<RatioSample> sampleAt(const Linkage& linkage, const RatioSweep& swee
       LinkageCurve curve(linkage, sweep.joint, branch[i].q);
       CurvePoint from, at;
       if (!curve.start(from)) break;
-      // Angles are counted on from the start of the sweep; the curve begins anew.
+      // Angles are relative to the start of the sweep; the curve is restarted.
       const double wanted = from.q[linkage.joint_positions[sweep.joint]] - f(branch[i]);
       const double h = curve.findRoot(from, branch[i + 1].s - branch[i].s, 1e-12, [&](const CurvePoint& point) {
         return point.q[linkage.joint_positions[sweep.joint]] - wanted;

@@ -92,7 +92,7 @@ class Walk {
     samples.back().branch = branch;
   }
 
-  // Cuts the step h at the first limit that is passed; returns what is left of it.
+  // Truncates the step h at the first limit that it passes; returns the remaining step.
   double stopAtLimit(const CurvePoint& at, double h, CurvePoint& next) {
     double best = h;
     for (const Limit& limit : limits_)
@@ -151,14 +151,15 @@ class Walk {
   std::vector<Limit> limits_;
 };
 
-// A full turn has no ends: what follows its last dead point of the joint goes before the start, on the branch of the start.
+// A full turn has no ends: samples after its last dead point of the joint move before the start, onto the start's
+// branch.
 void closeTurn(const RatioSample& start, double length, RatioSweep& sweep) {
   std::vector<RatioSample>& samples = sweep.samples;
   size_t last = samples.size();
   while (last-- > 0 && samples[last].dead != DeadPointKind::Joint) {
   }
   if (last >= samples.size() || samples[last].branch < 1) return;  // one branch only
-  // Turns that the angles have made at the end of the curve.
+  // Full turns of the angles at the end of the curve.
   const RatioSample& end = samples.back();
   const auto countTurns = [](const VectorXd& from, const VectorXd& to) {
     return VectorXd(((to - from) / (2 * kPi)).array().round() * 2 * kPi);

@@ -69,7 +69,7 @@ void addBodies(const Model& closed, ConstVectorRef q, const std::vector<bool>& f
   }
 }
 
-// Everything that hangs on bodies. Placements are those of the closed bodies, which are links or fixed frames now.
+// Everything attached to bodies. Placements are relative to the closed bodies, which are now links or fixed frames.
 void addAttachments(const Model& closed, ModelBuilder& builder) {
   std::set<std::string> links;
   for (const Body& body : closed.bodies()) links.insert(body.name);
@@ -88,7 +88,7 @@ void addAttachments(const Model& closed, ModelBuilder& builder) {
   builder.setGravity(closed.gravity());
 }
 
-// One motor on a serial joint in place of those of its linkage, Eq. (1).
+// One motor on a serial joint replaces those of its linkage, Eq. (1).
 void addSerialMotor(const Model& closed, const Linkage& linkage, const MatrixXd& R, int j,
                     const SerialModelOptions& options, ModelBuilder& builder) {
   const Eigen::FullPivLU<MatrixXd> lu(R);
@@ -108,7 +108,7 @@ void addSerialMotor(const Model& closed, const Linkage& linkage, const MatrixXd&
   builder.addMotor(linkage.joint_names[j], armature, effort, velocity);
 }
 
-// Motors in the order of the closed model, those of a linkage where its first motor stood.
+// Motors in the order of the closed model, those of a linkage at the position of its first motor.
 void addMotors(const Model& closed, const std::vector<Linkage>& linkages, const SerialModelOptions& options,
                SerialModel& out, ModelBuilder& builder) {
   std::vector<bool> done(linkages.size(), false);

@@ -35,7 +35,7 @@ SlsqpResult minimizeBySlsqp(const VectorXd& start, const SlsqpObjective& objecti
   try {
     optimizer.optimize(x, value);
   } catch (const std::runtime_error&) {
-    // Rounding stops the line search near the minimum; the best point stands.
+    // Rounding stops the line search near the minimum; the best point is valid.
   }
   return search.best;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Smooth minimization by NLopt's SLSQP (Kraft, 1994). NLopt stands behind slsqp.cpp alone.
+// Smooth minimization by NLopt's SLSQP (Kraft, 1994). Only slsqp.cpp includes NLopt.
 #include <functional>
 #include <string>
 
@@ -18,9 +18,9 @@ struct SlsqpResult {
   int evaluations = 0;
 };
 
-// The objective writes its gradient when it is asked for (not null).
+// The objective writes its gradient if it is requested (not null).
 using SlsqpObjective = std::function<double(const VectorXd& x, VectorXd* gradient)>;
-// The best point met, whatever ends the search.
+// The best point found, however the search ends.
 SlsqpResult minimizeBySlsqp(const VectorXd& start, const SlsqpObjective& objective, const SlsqpOptions& options = {});
 
 }  // namespace bielle
