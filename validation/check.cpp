@@ -12,7 +12,7 @@
 namespace bielle::validation {
 namespace {
 
-// The first number that is not finite, or nothing when all are.
+// The first number that is not finite, or an empty text.
 Worst findNotFinite(const CheckedMotion& motion) {
   const MotionRecord& record = motion.record;
   const std::pair<const char*, const RowMatrixXd*> tables[] = {{"q", &record.q},
@@ -62,7 +62,7 @@ CheckRow Worst::makeRow(const std::string& name, const std::string& unit, double
 
 bool CheckRow::passed() const {
   if (kind == Kind::Note || kind == Kind::Goal || !value) return true;
-  return kind == Kind::AtMost ? *value <= bound : *value >= bound;  // false for what is not a number
+  return kind == Kind::AtMost ? *value <= bound : *value >= bound;  // false for NaN
 }
 
 bool CheckRow::isMissedGoal() const { return kind == Kind::Goal && !(value && std::abs(*value - bound) <= tolerance); }

@@ -8,7 +8,7 @@
 namespace bielle::validation {
 namespace {
 
-// The x in [0, 1]^k, k small, for which A x comes nearest to b: every number at a bound or free, all ways tried.
+// The x in [0, 1]^k, k small, that brings A x nearest to b, by trying all combinations of free and bounded entries.
 VectorXd fitWithinBounds(const MatrixXd& A, const VectorXd& b) {
   constexpr double kRounding = 1e-9;
   const int k = static_cast<int>(A.cols());
@@ -38,7 +38,7 @@ VectorXd fitWithinBounds(const MatrixXd& A, const VectorXd& b) {
 
 double calcInertialNorm(const MatrixXd& M, const VectorXd& a) {
   const double square = a.dot(M * a);
-  return square < 0 ? 0 : std::sqrt(square);  // rounding; NaN stays
+  return square < 0 ? 0 : std::sqrt(square);  // rounding; NaN is kept
 }
 
 AccelerationTrace traceAccelerations(const SimbodyBridge& simbody, const MatrixXd& M, const VectorXd& v,

@@ -16,7 +16,7 @@ void addLargest(Worst& worst, const VectorXd& x, double scale, int node, const s
   worst.add(largest / scale, node, names[i]);
 }
 
-// Forces are judged by the weight of the robot or, where there is none, by the largest force of the motion.
+// Forces are relative to the weight of the robot or, if it has none, to the largest force of the motion.
 double calcForceScale(const CheckedMotion& motion) {
   const double weight = motion.model.mass() * motion.model.gravity().norm();
   if (weight > 0) return weight;
@@ -26,7 +26,8 @@ double calcForceScale(const CheckedMotion& motion) {
   return largest;
 }
 
-// Accelerations by that of free fall, in the norm sqrt(a' M a), or by the largest of the motion where that is more.
+// Accelerations are relative to that of free fall, in the norm sqrt(a' M a), or to the largest of the motion if
+// greater.
 double calcAccelerationScale(const CheckContext& context) {
   double scale = std::sqrt(context.model().mass()) * context.model().gravity().norm();
   for (const StageTrace& stage : context.trace.stages) scale = getLarger(scale, stage.acceleration);
@@ -81,17 +82,17 @@ void addDynamicsRows(CheckContext& context) {
   addClosureRows(context);
 }
 
-// Both by Eqs. (7) and (8): what is missing in the balance, over what steps of first order may lose or gain.
+// Both by Eqs. (7) and (8): the energy missing in the balance, over the possible loss or gain of first-order steps.
 void addEnergyRows(CheckContext& context) {
   const std::vector<NodeTrace>& nodes = context.trace.nodes;
-  // A robot that stands still exchanges nothing: rounding of its energy is no failure.
+  // A robot that stands still exchanges no energy: rounding must not fail.
   const double rounding = 1e-9 * context.model().mass() * context.model().gravity().norm();
   const auto describe = [](double rest, double scale) {
     return formatNumber(rest) + " of " + formatNumber(scale) + " J";
   };
   Worst interval;
   double total = 0, allowed = rounding, exchanged = 0, h_before = 0;
-  // Where terms of first order vanish those of second order remain: a mean interval's scale is added.
+  // Terms of second order remain where those of first order vanish: a mean interval's scale is added.
   double mean = rounding;
   for (const StageTrace& stage : context.trace.stages) mean += stage.energy_scale / context.trace.stages.size();
   for (size_t k = 0; k < context.trace.stages.size(); ++k) {
@@ -104,8 +105,8 @@ void addEnergyRows(CheckContext& context) {
     interval.add(std::abs(missing) / scale, static_cast<int>(k), describe(std::abs(missing), scale));
     const double raised = nodes[k + 1].potential - nodes[k].potential;
     total += rest + raised;
-    // Over the mean velocity an Euler step falls by h^2/2 m g a less than along its last one: h/2 m g times the change
-    // of velocity, which a motion from rest to rest with one step takes back.
+    // With the mean velocity an Euler step falls by h^2/2 m g a less than with its final one: h/2 m g times the change
+    // of velocity, which cancels in a motion from rest to rest with one step size.
     allowed += stage.energy_scale + std::abs(h - h_before) / 2 * std::abs(nodes[k].gravity_power);
     h_before = h;
     exchanged += stage.exchanged + std::abs(raised);

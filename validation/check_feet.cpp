@@ -1,4 +1,4 @@
-// Rows of the feet: where they stand, how they swing and land.
+// Rows of the feet: standing, swinging and landing.
 #include <algorithm>
 #include <array>
 #include <optional>
@@ -12,7 +12,7 @@ namespace {
 
 using Corners = std::array<Vector3d, 4>;
 
-// In the world, one after the other around the sole; four times the origin for a contact without a sole.
+// Corners in the world, in order around the sole; four times the origin for a contact without a sole.
 Corners calcCorners(const ContactFrame& contact, const SE3& X_WF) {
   const double l = contact.half_length, w = contact.half_width;
   Corners corners = {Vector3d(l, w, 0), Vector3d(-l, w, 0), Vector3d(-l, -w, 0), Vector3d(l, -w, 0)};
@@ -20,14 +20,14 @@ Corners calcCorners(const ContactFrame& contact, const SE3& X_WF) {
   return corners;
 }
 
-// Height of the lowest corner over what is under it, m.
+// Height of the lowest corner over the ground under it, m.
 double calcClearance(const Ground& ground, const Corners& corners) {
   double least = corners[0].z() - ground.calcHeight(corners[0].x(), corners[0].y());
   for (const Vector3d& c : corners) least = getSmaller(least, c.z() - ground.calcHeight(c.x(), c.y()));
   return least;
 }
 
-// Largest distance of a corner from the ground under it, m: a sole that stands lies flat.
+// Largest distance of a corner from the ground under it, m: a standing sole lies flat.
 double calcGap(const Ground& ground, const Corners& corners) {
   double largest = 0;
   for (const Vector3d& c : corners) largest = getLarger(largest, std::abs(c.z() - ground.calcHeight(c.x(), c.y())));
@@ -42,12 +42,12 @@ double calcCornerSpeed(const ContactFrame& contact, const Vector6d& twist) {
   return largest;
 }
 
-// Seen from above, the widest gap between two soles across an edge of one of them; negative where they overlap.
+// Seen from above, the widest gap between two soles across an edge of one of them; negative if they overlap.
 double calcGapAcrossEdges(const Corners& a, const Corners& b) {
   double widest = -std::numeric_limits<double>::infinity();
   for (int i = 0; i < 4; ++i) {
     const Eigen::Vector2d edge = (a[(i + 1) % 4] - a[i]).head<2>();
-    if (edge.norm() < 1e-9) continue;  // NaN goes on
+    if (edge.norm() < 1e-9) continue;  // NaN passes
     const Eigen::Vector2d normal = Eigen::Vector2d(edge.y(), -edge.x()).normalized();
     const auto along = [&normal](const Vector3d& corner) { return normal.dot(corner.head<2>()); };
     double end = along(a[0]), begin_b = along(b[0]), begin = end, end_b = begin_b;

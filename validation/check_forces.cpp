@@ -10,8 +10,7 @@
 namespace bielle::validation {
 namespace {
 
-// A foot that carries less than this part of the weight is judged as if it carried so much: ratios of nearly nothing by
-// nearly nothing say nothing.
+// A load below this share of the weight is replaced by it: ratios of two tiny numbers are meaningless.
 constexpr double kLeastLoad = 0.01;
 
 struct ContactForces {
@@ -32,7 +31,8 @@ void addWrench(const ContactFrame& contact, const Vector6d& wrench, const CheckC
   const ConeMargin cone = calcConeMargin(wrench, contact.half_length, contact.half_width,
                                          context.motion.summary.ground.friction, least_load);
   out.cone.add(cone.value, node, contact.name + ", " + cone.limit);
-  // The centre of pressure is (-n_y, n_x) / f_z; the vertical moment about it is what the sole must hold by twisting.
+  // The centre of pressure is (-n_y, n_x) / f_z; the sole must resist the vertical moment about it by twisting
+  // friction.
   const double x = -n.y() / load, y = n.x() / load;
   out.torsion.add(std::abs(n.z() - (x * f.y() - y * f.x())) / load, node, contact.name);
   out.pressure.add(getLarger(std::abs(x) - contact.half_length, std::abs(y) - contact.half_width), node, contact.name);
@@ -52,9 +52,9 @@ class LimitUse {
   Worst worst_;
 };
 
-// Impulses are judged as forces are: feet that come down hard neither slip nor pull, nor do those that stand already.
+// Impulses are checked like forces: neither landing feet nor standing ones slip or pull.
 void addImpactRows(CheckContext& context) {
-  constexpr double kLeastChange = 1e-3;  // m/s, of the robot's speed: an impulse that makes less is none
+  constexpr double kLeastChange = 1e-3;  // m/s, of the robot's speed: smaller impulses are ignored
   const Model& model = context.model();
   ContactForces impulses;
   bool any = false;

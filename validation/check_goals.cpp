@@ -1,4 +1,4 @@
-// Rows of the goals: what was asked and what came out, measured here by Simbody's kinematics and the recorded forces.
+// Rows of the goals: requested and achieved values, measured here by Simbody's kinematics and the recorded forces.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

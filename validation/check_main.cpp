@@ -1,4 +1,4 @@
-// bielle-check: a motion by its files and Simbody.
+// bielle-check: checks a motion from its files with Simbody.
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
@@ -46,7 +46,7 @@ int main(int argc, char** argv) {
     return report.passed() ? kPasses : kFails;
   } catch (const ModelError& error) {
     std::cerr << "bielle: error: " << error.what() << std::endl;
-  } catch (const std::exception& error) {  // of Simbody, for a robot it cannot take
+  } catch (const std::exception& error) {  // of Simbody, for a robot it does not support
     std::cerr << "bielle: error: " << directory << ": Simbody: " << error.what() << std::endl;
   }
   return kBadInput;

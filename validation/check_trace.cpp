@@ -108,7 +108,7 @@ class Tracer {
     return node;
   }
 
-  // Directions along the closures at a node: of x, what no correction W^{-1} J^T y can have made.
+  // Projection along the closures at a node: the part of x that no correction W^{-1} J^T y can produce.
   void updateTangent(const SimbodyBridge& simbody) {
     if (!metric_.size()) return;
     const VectorXd inverse_root = metric_.cwiseSqrt().cwiseInverse();
@@ -148,14 +148,14 @@ class Tracer {
     return wrenches;
   }
 
-  // Velocities and impulses of an impact by Simbody's mass matrix and constraints: of loops and of the feet that stand
-  // afterwards.
+  // Velocities and impulses of an impact by Simbody's mass matrix and constraints, those of loops and of the feet that
+  // stand afterwards.
   void traceImpact(const SimbodyBridge& simbody, int k, StageTrace& stage) const {
     const VectorXd v = motion_.record.v.row(k), next = motion_.record.v.row(k + 1), change = next - v;
     const OracleSolution solution = simbody.solveImpact();
     stage.balance = VectorXd::Zero(motion_.model.nv());
     stage.velocity_rest = next - solution.a;
-    stage.contact_work = change.dot(simbody.calcMassMatrix() * (v + change / 2));  // what the impact takes away
+    stage.contact_work = change.dot(simbody.calcMassMatrix() * (v + change / 2));  // energy lost in the impact
     stage.impulses.assign(motion_.model.contacts().size(), Vector6d::Zero());
     size_t i = motion_.model.closures().size();
     for (const ContactTarget& target : motion_.getContacts(motion_.findPhase(k)))

@@ -12,7 +12,7 @@ namespace {
 
 using SimTK::Stage;
 
-// Rows, and pivots of scaled rows, below this part of the largest one are rounding of redundant rows.
+// Rows, and pivots of scaled rows, below this share of the largest one are rounding of redundant rows.
 constexpr double kRankThreshold = 1e-10;
 
 VectorXd toEigen(const SimTK::Vector& v) {
@@ -59,7 +59,7 @@ void solveSaddle(const SaddleTerms& terms, MatrixXd& a, MatrixXd& multipliers) {
   multipliers = (E.asDiagonal() * y).template cast<double>();
 }
 
-// Residual of notation.h, of which the directions below are taken.
+// Residual of notation.h, whose directions are used below.
 Vector6d calcClosureGap(const Closure& closure, const SE3& X_12) {
   if (closure.kind == ClosureKind::Weld6D) return log6(X_12);
   Vector6d gap = Vector6d::Zero();

@@ -35,7 +35,7 @@ Transform makeUniversalFrame(const Joint& joint) {
   return toSimTKRotation(R);
 }
 
-// (e1, e2, normal): the axes along which a planar joint counts x and y.
+// (e1, e2, normal): the axes along which a planar joint measures x and y.
 Transform makePlanarFrame(const Joint& joint) { return toSimTKRotation(makePlaneBasis(joint.axis)); }
 
 Matrix3d toRotation(ConstVectorRef xyzw) {
@@ -223,7 +223,7 @@ void SimbodyBridge::System::readForces(const SimTK::Vector& multipliers, OracleS
   SimTK::Vector generalized;
   matter.multiplyByGTranspose(state, multipliers, generalized);
   out.constraint_force = -(T.transpose() * gather(generalized));
-  int row = 0;  // holonomic constraints alone: multipliers follow one another
+  int row = 0;  // only holonomic constraints: multipliers are consecutive
   for (size_t c = 0; c < closures.size(); ++c) {
     const SE3 X_B1 = closures[c].X_B1;
     const int body1 = closures[c].body1;

@@ -19,9 +19,8 @@
 namespace bielle::validation {
 namespace {
 
-// Part of the response without constraints that counts as the least size, see Comparison::add. With redundant rows the
-// derivatives carry rounding amplified by the proximal term, 1e-16 / 1e-7 of that response: a derivative of zero shows
-// it.
+// Share of the response without constraints that is the least scale, see Comparison::add. With redundant rows the
+// derivatives have rounding amplified by the proximal term, 1e-16 / 1e-7 of that response, visible where they vanish.
 constexpr double kFloor = 1e-2;
 
 struct Sample {
@@ -51,7 +50,7 @@ MatrixXd calcNullSpace(const MatrixXd& A) {
   return svd.matrixV().rightCols(A.cols() - (sigma.array() > 1e-7 * sigma[0]).count());
 }
 
-// Accelerations are compared as M_ii^(1/2) a_i: the rounding of the forces of a linkage spins its lightest link fast.
+// Accelerations are compared as M_ii^(1/2) a_i, because rounding of forces has a large effect on the lightest link.
 VectorXd getInertiaWeights(const Workspace& ws) { return ws.M.diagonal().cwiseSqrt(); }
 
 bool isRedundant(const MatrixXd& J) { return calcNullSpace(J.transpose()).cols() > 0; }
@@ -92,7 +91,7 @@ class SampleSource {
     const ConstraintSet set = makeConstraintSet(model_, sample.contacts);
     sample.v = projectVelocity(model_, ws, set, sample.q, random(model_.nv(), options_.velocity));
     updateMassMatrix(model_, ws);
-    // A link of milligrams under a force for kilograms would accelerate until nothing but rounding is left to compare.
+    // A link of milligrams under a force for kilograms would accelerate so much that only rounding is compared.
     constexpr double kLargestAcceleration = 1e5;
     const VectorXd force = (kLargestAcceleration * ws.M.diagonal()).cwiseMin(options_.force);
     sample.tau = random(model_.nv(), 1).cwiseProduct(force);
@@ -154,8 +153,7 @@ class Comparison {
 
  private:
   // The largest difference and tolerance of the samples are kept.
-  // `floor` is the least size by which a difference is divided: what constraints cancel to zero is zero up to rounding
-  // of that size.
+  // `floor` is the least scale of a difference: values that constraints cancel to zero have rounding of that size.
   void add(const std::string& quantity, const MatrixXd& ours, const MatrixXd& theirs, double floor, double tolerance) {
     if (theirs.size() == 0) return;
     auto row = std::find_if(report_.rows.begin(), report_.rows.end(),
@@ -235,7 +233,7 @@ class Comparison {
     ConstrainedWorkspace cws;
     if (updateConstrainedDynamics(model_, ws, cws, set, sample.q, sample.v, sample.tau) != DynamicsStatus::Ok ||
         updateConstrainedDerivatives(model_, ws, cws, set) != DynamicsStatus::Ok)
-      return;  // the row of the accelerations tells
+      return;  // reported by the row of the accelerations
     // Accelerations, then wrenches.
     const auto solve = [&](const VectorXd& q, const VectorXd& v, const VectorXd& tau) {
       simbody.setState(q, v, tau);
@@ -323,7 +321,7 @@ ValidationReport validateAgainst(const Model& model, const Model& oracle, const 
       comparison.compare(sample, i < options.derivative_samples);
       if (i == 0 && options.motion_duration > 0) comparison.compareFreeMotion(sample);
     }
-  } catch (const std::exception& error) {  // Simbody throws on what it cannot solve
+  } catch (const std::exception& error) {  // Simbody throws if it cannot solve
     report.failure = error.what();
   }
   return report;

@@ -8,7 +8,7 @@ namespace bielle::validation {
 ConeMargin calcConeMargin(const Vector6d& wrench, double X, double Y, double mu, double least_load) {
   if (!wrench.allFinite()) return {std::numeric_limits<double>::quiet_NaN(), "not finite"};
   const double load = std::max(wrench[2], least_load);
-  const Vector6d w = wrench / load;  // its third number is one from here on, or stands for one
+  const Vector6d w = wrench / load;  // its third number now is one, or is treated as one
   const double least = -mu * (X + Y) + std::abs(Y * w[0] - mu * w[3]) + std::abs(X * w[1] - mu * w[4]);
   const double most = mu * (X + Y) - std::abs(Y * w[0] + mu * w[3]) - std::abs(X * w[1] + mu * w[4]);
   ConeMargin margin{std::min(most - w[5], w[5] - least), "torque"};

@@ -5,7 +5,7 @@ namespace {
 
 constexpr size_t kLongest = 1000;  // of one part; files may hold names of any length
 
-// Names come from files: what could move a terminal's cursor, or end the text, is written as \xNN.
+// Names come from files: characters that could move a terminal's cursor or end the text are written as \xNN.
 std::string makePrintable(const std::string& text) {
   static const char kDigits[] = "0123456789abcdef";
   std::string out;

@@ -122,7 +122,7 @@ SE3 calcJointPlacement<double>(const Joint& joint, ConstVectorRef q) {
   return calcJointPlacement(joint, q);
 }
 
-// The kinds that loops are made of; others are computed lane by lane.
+// Kinds common in loops; others are computed lane by lane.
 template <>
 SE3Of<Lanes> calcJointPlacement<Lanes>(const Joint& joint, ArgumentsOf<Lanes>::ConstVector q) {
   switch (joint.kind) {

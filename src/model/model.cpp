@@ -40,7 +40,7 @@ int getRows(ClosureKind kind) {
 
 int Model::findJoint(const std::string& name) const {
   const int index = findByName(joints_, name);
-  return index == 0 ? -1 : index;  // the world is no joint
+  return index == 0 ? -1 : index;  // the world is not a joint
 }
 int Model::findFrame(const std::string& name) const { return findByName(frames_, name); }
 int Model::findMotor(const std::string& name) const { return findByName(motors_, name); }

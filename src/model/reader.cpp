@@ -1,4 +1,4 @@
-// Puts the two files of a robot together.
+// Combines the two files of a robot.
 #include "bielle/model/reader.h"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ auto findJoint(Joints& joints, const std::string& name) {
   return std::find_if(joints.begin(), joints.end(), [&name](const UrdfJoint& j) { return j.joint.name == name; });
 }
 
-// The kinds that the YAML file gives to joints of the URDF.
+// Joint kinds that the YAML file assigns to joints of the URDF.
 void retypeJoints(const YamlFile& yaml, UrdfFile& urdf) {
   for (const auto& [name, type] : yaml.joint_types) {
     const auto it = findJoint(urdf.joints, name);
@@ -70,7 +70,7 @@ void setImportance(const YamlFile& yaml, UrdfFile& urdf) {
   }
 }
 
-// The files of a robot: a URDF with what is beside it, or what completes them.
+// The files of a robot: a URDF with its YAML file, and possibly a file that completes them.
 struct RobotFiles {
   UrdfFile urdf;
   YamlFile yaml;

@@ -62,7 +62,7 @@ bool completesModel(const fs::path& path) {
   try {
     return isFile(path) && !findModel(readYaml(path.string())).empty();
   } catch (const ModelError&) {
-    return false;  // said when it is asked for
+    return false;  // reported when the robot is requested
   }
 }
 
@@ -88,7 +88,7 @@ std::vector<std::string> getRobotDirectories() {
       add(list.substr(begin, end - begin));
     }
   }
-  // Beside the running program first: an installed program must not see the source tree it came from.
+  // First beside the running program: an installed program must not use the source tree it was built from.
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);
   if (!error) {

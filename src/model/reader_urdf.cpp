@@ -1,5 +1,5 @@
-// The only file that knows urdfdom. TinyXML, which urdfdom reads with, is asked first for what urdfdom forgets or lets
-// through: the order of the joints, links with two parents, detached cycles, mimic joints, the place of a bad number.
+// The only file that uses urdfdom. TinyXML, on which urdfdom is based, first provides what urdfdom discards or accepts:
+// the order of the joints, links with two parents, detached cycles, mimic joints, the place of a bad number.
 #include <console_bridge/console.h>
 #include <tinyxml.h>
 #include <urdf_parser/urdf_parser.h>
@@ -17,7 +17,7 @@
 namespace bielle {
 namespace {
 
-constexpr int kMaxDepth = 200;  // of nested elements; TinyXML recurses without a bound of its own
+constexpr int kMaxDepth = 200;  // of nested elements; TinyXML recurses without a limit
 
 struct NumberRule {
   const char *tag, *attribute;
@@ -99,7 +99,7 @@ std::string getAttribute(const TiXmlElement* element, const char* attribute) {
   return text ? text : "";
 }
 
-// Names of the links or of the joints; their numbers are checked in passing.
+// Names of the links or of the joints; also checks their numbers.
 std::set<std::string> collectNames(const TiXmlElement& robot, const std::string& tag, const std::string& path) {
   std::set<std::string> names;
   for (const TiXmlElement* e = robot.FirstChildElement(tag); e; e = e->NextSiblingElement(tag)) {
@@ -186,7 +186,7 @@ Tree makeTree(const std::string& xml, const std::string& path) {
   const std::vector<Edge> edges = collectEdges(robot, links, path, tree.warnings);
 
   std::set<std::string> unreached = links;
-  std::map<std::string, std::vector<const Edge*>> below;  // link -> the joints that hang under it
+  std::map<std::string, std::vector<const Edge*>> below;  // link -> its child joints
   for (const Edge& edge : edges) {
     unreached.erase(edge.child);
     below[edge.parent].push_back(&edge);
@@ -304,7 +304,7 @@ UrdfFile readUrdf(const std::string& path) {
     model = urdf::parseURDF(xml);
     complaints = capture.text();
   }
-  // urdfdom goes on after some of its errors (a link whose inertial it could not read has none), we do not.
+  // urdfdom continues after some errors (a link whose inertial it could not read has none); we do not.
   if (!model || !complaints.empty())
     throw ModelError(path, "robot '" + tree.robot + "'", "urdfdom cannot read it: " + complaints,
                      "correct the element");

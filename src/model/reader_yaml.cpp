@@ -1,4 +1,4 @@
-// The YAML file of a robot. Every key of every map is known or refused.
+// The YAML file of a robot. Unknown keys of any map are rejected.
 #include <algorithm>
 #include <cctype>
 #include <cmath>

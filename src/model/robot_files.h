@@ -31,10 +31,10 @@ struct UrdfFile {
   std::vector<std::string> warnings;
 };
 
-/// \throws ModelError for anything that is not one tree of named links with finite numbers
+/// \throws ModelError for anything but one tree of named links with finite numbers
 UrdfFile readUrdf(const std::string& path);
 
-/// Kind that replaces the one of the URDF; the axes are the new ones of a universal joint, in the joint's frame.
+/// Joint kind that replaces that of the URDF, with the axes of a universal joint in the joint's frame.
 struct JointRetyping {
   JointKind kind = JointKind::Fixed;
   Vector3d axis = Vector3d::UnitZ(), axis2 = Vector3d::UnitY();
@@ -80,10 +80,10 @@ struct YamlFile {
 /// \throws ModelError for unknown keys, wrong types, lists that do not match
 YamlFile readYaml(const std::string& path);
 
-/// File whole. \throws ModelError when it cannot be read, or is too large
+/// The whole content of a file. \throws ModelError when it cannot be read, or is too large
 std::string readRobotText(const std::string& path);
 
-/// The URDF of the robot that a file with the key `model` completes; empty when none of them is there.
+/// The URDF of the robot that a file with the key `model` completes; empty if none of them exists.
 std::string findModel(const YamlFile& yaml);
 
 }  // namespace bielle

@@ -13,7 +13,7 @@ std::string readTextFile(const std::string& path, const std::string& remedy) {
   std::ifstream file(path, std::ios::binary);
   if (file.is_open() && !std::filesystem::is_directory(path, unknown)) try {
       return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-    } catch (const std::ios_base::failure&) {  // so the iterators tell that reading fails
+    } catch (const std::ios_base::failure&) {  // thrown by the iterators when reading fails
     }
   throw ModelError(path, "file", "it cannot be read", remedy);
 }

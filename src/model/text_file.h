@@ -1,5 +1,5 @@
 #pragma once
-// Text files, read whole.
+// Reading of whole text files.
 #include <string>
 
 namespace bielle {

@@ -1,5 +1,5 @@
 #pragma once
-// A YAML file, place by place: every refusal names the file, the key and the line. yaml-cpp stays in yaml_entry.cpp.
+// Access to a YAML file: every error names the file, the key and the line. Only yaml_entry.cpp includes yaml-cpp.
 #include <functional>
 #include <map>
 #include <memory>
@@ -15,7 +15,7 @@ class Node;
 
 namespace bielle {
 
-// A place in the file: its value and its name for messages.
+// An entry of the file: its value, and its name for messages.
 class YamlEntry {
  public:
   YamlEntry(std::string path, std::string element, const YAML::Node& node);
@@ -35,7 +35,7 @@ class YamlEntry {
   std::vector<std::string> getTexts(int count = -1) const;
   std::vector<double> getNumbers(int count = -1) const;
   Vector3d getVector3() const;
-  /// Pairs of a map in the order of the file; nothing written counts as an empty map.
+  /// Pairs of a map in the order of the file; a missing value counts as an empty map.
   std::vector<std::pair<std::string, YamlEntry>> getMap() const;
   /// The map by key, all keys among the known ones.
   std::map<std::string, YamlEntry> getFields(const std::vector<std::string>& known) const;
@@ -47,12 +47,12 @@ class YamlEntry {
 
 using YamlFields = std::map<std::string, YamlEntry>;
 
-/// Null where the key is not written.
+/// Null if the key is missing.
 const YamlEntry* find(const YamlFields& fields, const std::string& key);
-/// \throws ModelError naming the owner, where the key is not written
+/// \throws ModelError naming the owner, if the key is missing
 const YamlEntry& require(const YamlFields& fields, const std::string& key, const YamlEntry& owner);
 
-/// Lets `read` see the document. \throws ModelError where `text`, of the file `path`, is not YAML
+/// Passes the document to `read`. \throws ModelError if `text`, of the file `path`, is not YAML
 void readYamlDocument(const std::string& path, const std::string& text,
                       const std::function<void(const YamlEntry&)>& read);
 
