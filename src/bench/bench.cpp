@@ -37,7 +37,7 @@ double calcUnit() {
   const double seconds = calcLeastSeconds(200, [&] {
     for (int i = 0; i < kProducts; ++i) c.noalias() += a * b;
   });
-  return c.allFinite() ? seconds / kProducts : 0;  // c is used: the products cannot be left out
+  return c.allFinite() ? seconds / kProducts : 0;  // c is used, so that the products are not optimized away
 }
 
 std::string readProcessor() {
@@ -48,7 +48,7 @@ std::string readProcessor() {
   return "unknown";
 }
 
-// The same stages with nothing but their dynamics.
+// The same stages without costs.
 std::unique_ptr<RobotProblem> makeWithoutCosts(const RobotProblem& problem) {
   const Model& model = problem.model();
   std::vector<StageSpec> stages(problem.numStages() + 1);
@@ -61,7 +61,7 @@ std::unique_ptr<RobotProblem> makeWithoutCosts(const RobotProblem& problem) {
                                         problem.formulation());
 }
 
-// All nodes of a problem near a trajectory, several at once where the problem prefers it.
+// All nodes of a problem near a trajectory, in batches if the problem prefers them.
 class Passes {
  public:
   Passes(const RobotProblem& problem, const ShootingTrajectory& trajectory)
@@ -77,7 +77,7 @@ class Passes {
                         k < N ? problem.tangentSize(k + 1) : 0);
     }
   }
-  // In pieces of the horizon, each stage of a piece from where the one before has led.
+  // In pieces of the horizon; each stage of a piece starts from the result of the previous one.
   void step() {
     const int N = problem_.numStages(), longest = (N + pieces_ - 1) / pieces_;
     for (int i = 0; i < longest; ++i) {
@@ -92,7 +92,7 @@ class Passes {
       problem_.evaluate(steps_.data(), static_cast<int>(steps_.size()), scratch_.get());
     }
   }
-  // About these steps: gaps are closed but for those between the pieces, as in most iterations.
+  // About these steps: gaps are closed except for those between the pieces, as in most iterations.
   void linearize() {
     step();
     const int N = problem_.numStages();
@@ -111,7 +111,7 @@ class Passes {
   const std::vector<StageModel>& models() const { return models_; }
 
  private:
-  static constexpr int kPiece = 15;  // stages: short enough for the controls not to matter
+  static constexpr int kPiece = 15;  // stages: short enough for the controls to have little effect
   const RobotProblem& problem_;
   const ShootingTrajectory trajectory_;
   std::unique_ptr<ProblemScratch> scratch_;
@@ -144,7 +144,7 @@ Fddp makeSolver(int iterations, int threads) {
   return Fddp(options);
 }
 
-// Iterations from the guess, at most that many. The trajectory is left where asked.
+// At most `iterations` iterations from the guess. The trajectory is stored in `result`, if given.
 FddpSummary iterate(Motion& motion, int iterations, int threads, ShootingTrajectory* result = nullptr) {
   ShootingTrajectory trajectory = motion.guess;
   const FddpSummary summary = makeSolver(iterations, threads).solve(*motion.problem, trajectory);
@@ -180,7 +180,7 @@ class Bench {
     return options_.threads > 1 ? std::vector<int>{1, options_.threads} : std::vector<int>{1};
   }
 
-  // The walk that is measured; a short one where it only has to work.
+  // The measured walk; a short one for tests.
   BenchmarkWalkOptions getWalk() const {
     BenchmarkWalkOptions walk;
     if (whole_) return walk;
@@ -233,7 +233,7 @@ class Bench {
     const int n = motion.problem->numStages();
     FddpSummary best;
     Fddp solver = makeSolver(whole_ ? 10 : 2, threads);
-    // The first solve starts the threads and makes the memory, which costs as much as some iterations.
+    // The first solve starts the threads and allocates memory, which takes as long as several iterations.
     for (int i = 0; i < (whole_ ? 4 : 2); ++i) {
       ShootingTrajectory trajectory = motion.guess;
       const FddpSummary summary = solver.solve(*motion.problem, trajectory);

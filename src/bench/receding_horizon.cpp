@@ -15,8 +15,8 @@
 namespace bielle {
 namespace {
 
-// Every plan brakes at the end of its horizon, which moves on by a stage at every shift. Undamped, half of the full steps
-// overshoot there; so damped, next to none, and the plans cost 1 % more.
+// Every plan brakes at the end of its horizon, which moves by one stage at every shift. Without damping, half of the
+// full steps overshoot there; with this damping almost none do, and the plans cost 1 % more.
 constexpr double kRegularization = 5e-3;
 constexpr double kPositionNoise = 1e-4, kVelocityNoise = 1e-3;  // rad or m, rad/s or m/s
 
@@ -42,7 +42,7 @@ class Disturbance {
   std::mt19937 rng_{1};
 };
 
-// The last stage of a horizon that has moved on: torques that hold the robot still, and the state to which they lead.
+// The new last stage of a shifted horizon: torques that hold the robot still, and the resulting state.
 void extend(const RobotProblem& whole, RobotEvaluator& evaluator, int new_stage, ShootingTrajectory& trajectory) {
   const VectorXd& last = *(trajectory.xs.end() - 2);
   VectorXd& u = trajectory.us.back();
@@ -51,7 +51,7 @@ void extend(const RobotProblem& whole, RobotEvaluator& evaluator, int new_stage,
   trajectory.xs.back() = step.status == StepStatus::Ok ? step.x_next : last;
 }
 
-// Height of the first body and the direction that was up in it.
+// Height of the first body and its direction that was initially up.
 struct Torso {
   double height;
   Vector3d up;
@@ -113,7 +113,7 @@ class Receding {
   }
 
  private:
-  // The plan before the first shift, without haste.
+  // The plan before the first shift, without a time limit.
   ShootingTrajectory makePlan() {
     const int nodes = options_.nodes;
     ShootingTrajectory plan{{motion_.guess.xs.begin(), motion_.guess.xs.begin() + nodes + 1},
@@ -125,7 +125,7 @@ class Receding {
     return plan;
   }
 
-  // Once from the start of the walk until the horizon has come to its end, or enough shifts are made.
+  // One pass from the start of the walk until the horizon reaches its end, or enough shifts are made.
   void walk(ShootingTrajectory trajectory, Fddp& solver) {
     VectorXd x = whole_.initialState(), next = x;
     const Torso start = findTorso(model_, ws_, x);

@@ -4,11 +4,12 @@
 
 namespace bielle {
 
-// Stages [first, first + nodes) of a longer problem, from a state of its own, with the terminal costs of that problem.
+// Stages [first, first + nodes) of a longer problem, from its own initial state, with the terminal costs of that
+// problem.
 class Window : public ShootingProblem {
  public:
   Window(const ShootingProblem& whole, int nodes) : whole_(whole), nodes_(nodes), x0_(whole.initialState()) {}
-  // first + nodes is at most the stages of the whole.
+  // first + nodes must not exceed the stages of the whole problem.
   void move(int first, const VectorXd& x0) {
     first_ = first;
     x0_ = x0;
@@ -56,7 +57,7 @@ class Window : public ShootingProblem {
   };
   static Scratch& getScratch(ProblemScratch* scratch) { return static_cast<Scratch&>(*scratch); }
   int getNode(int node) const { return node < nodes_ ? first_ + node : whole_.numStages(); }
-  // Does `work` while tasks bear the numbers of their nodes in the whole.
+  // Calls `work` with tasks numbered by their nodes in the whole problem.
   template <typename Task, typename Work>
   void renumber(Task* tasks, int count, const Work& work) const {
     for (int i = 0; i < count; ++i) tasks[i].node = getNode(tasks[i].node);

@@ -1,4 +1,4 @@
-// bielle bench: how fast it is on this machine.
+// bielle bench: speed on this machine.
 #include "bench/bench.h"
 
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace bielle::cli {
 namespace {
 
-double round3(double value) {  // three significant digits: more are not in a measurement
+double round3(double value) {  // three significant digits, the precision of a measurement
   if (value == 0 || !std::isfinite(value)) return value;
   const double scale = std::pow(10, 2 - std::floor(std::log10(std::abs(value))));
   return std::round(value * scale) / scale;

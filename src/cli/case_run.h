@@ -1,5 +1,5 @@
 #pragma once
-// The commands that are made of cases (study/cases.h).
+// Shared by the commands that run cases (study/cases.h).
 #include <functional>
 #include <map>
 #include <string>
@@ -13,17 +13,17 @@ using CaseOutcomes = std::map<std::string, study::CaseOutcome>;  // by the name 
 
 struct CaseRun {
   std::string directory;            // of the directories of the cases
-  std::vector<study::Case> cases;   // those of one name are one, and done once
-  std::vector<std::string> robots;  // directories of the robots that they are of
+  std::vector<study::Case> cases;   // those of the same name are run once
+  std::vector<std::string> robots;  // directories of their robots
   int jobs = 1;
 };
 
-// Runs the cases with a line for each, then `write`, which makes of them what the user asked for. Returns the exit status:
-// kFailed when the user interrupts, and nothing is written, or when cases broke down.
+// Runs the cases with a line for each, then `write`, which makes the requested output from them. Returns the exit
+// status: kFailed when the user interrupts, in which case nothing is written, or when cases crashed.
 // \throws ModelError as runCases does
 int runAndWrite(const CaseRun& run, const std::function<void(const CaseOutcomes&)>& write);
 
-// To the standard output and error: the files that were written, and what else there is to know.
+// Prints the written files to the standard output, and notes to the standard error.
 void printPaths(const std::vector<std::string>& paths, const std::vector<std::string>& notes);
 
 }  // namespace bielle::cli

@@ -1,5 +1,5 @@
 #pragma once
-// The subcommands of `bielle`, one per file. Each adds itself to the parser and, if it was called, leaves its action.
+// The subcommands of `bielle`, one per file. Each adds itself to the parser and, if it is called, sets the action.
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <optional>
@@ -29,12 +29,13 @@ void addRatio(CLI::App& app, Action& action);
 void addLift(CLI::App& app, Action& action);
 void addStudy(CLI::App& app, Action& action);
 
-// bielle validate and bielle check: only their lines of the help, their arguments are those of other programs.
+// bielle validate and bielle check: only their help lines; their arguments are those of other programs.
 void addCompanions(CLI::App& app);
-// Becomes that program; returns only when it cannot. `arguments` ends with a null pointer and begins with a name.
+// Replaces this process by that program; returns only on failure. `arguments` begins with a name and ends with a null
+// pointer.
 int becomeCompanion(const std::string& name, char** arguments);
-// Runs it to its end. Its exit status, kFailed with a line of error when a signal ended it or it cannot be started, or
-// nothing when it is not there.
+// Runs it to its end. Returns its exit status; kFailed with an error line if a signal ended it or it cannot be started;
+// empty if it does not exist.
 std::optional<int> runCompanion(const std::string& name, std::vector<std::string> arguments);
 
 // Arguments of every command with a robot.
@@ -50,7 +51,7 @@ void addFixedBase(CLI::App& command, RobotArgument& robot);
 std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,
                                             const std::string& example);
 
-// The whole command line, for the record.
+// Sets the command line that results record.
 void setCommandLine(int argc, char** argv);
 const std::vector<std::string>& getCommandLine();
 

@@ -1,4 +1,4 @@
-// The programs beside `bielle` that alone know Simbody: bielle-validate and bielle-check.
+// The programs that use Simbody, installed beside `bielle`: bielle-validate and bielle-check.
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -15,7 +15,7 @@ extern char** environ;
 namespace bielle::cli {
 namespace {
 
-// Beside this program, else by its name alone, for which the PATH is searched.
+// The path beside this program, or else the bare name, which is searched on the PATH.
 std::string findCompanion(const std::string& program) {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
@@ -53,7 +53,7 @@ std::optional<int> runCompanion(const std::string& name, std::vector<std::string
     return kFailed;
   };
   const int error = posix_spawnp(&child, program.c_str(), nullptr, nullptr, argv.data(), environ);
-  if (error == ENOENT && program == name) return {};  // beside this program it was there
+  if (error == ENOENT && program == name) return {};  // beside this program it exists
   if (error != 0) return fail(std::string("cannot be started: ") + std::strerror(error));
   int status = 0;
   while (waitpid(child, &status, 0) < 0)

@@ -1,4 +1,4 @@
-// bielle compare: robots that do the same, side by side.
+// bielle compare: robots on the same motions, side by side.
 #include <algorithm>
 #include <thread>
 

@@ -15,7 +15,7 @@ struct DesignArguments {
   int jobs = 2;
 };
 
-// Every call makes a request of its own: plans are made by several threads.
+// Every call makes its own request, because several threads make plans.
 DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion) {
   const auto make = [file, motion] {
     const MotionRequest request = findMotion(file, motion.motion).makeRequest();

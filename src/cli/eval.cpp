@@ -39,7 +39,7 @@ Json listRows(const MatrixXd& matrix) {
   return rows;
 }
 
-// Six rows per constraint, whatever its kind, of rows of forces.
+// Expands rows of forces to six rows per constraint of any kind.
 MatrixXd expandForces(const ConstraintSet& constraints, const MatrixXd& rows) {
   MatrixXd wrenches(6 * constraints.closures.size(), rows.cols());
   for (size_t c = 0; c < constraints.closures.size(); ++c) {

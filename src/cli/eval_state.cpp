@@ -31,7 +31,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kDeepest = 20;  // elements of a state are not nested deeper; what reads them recurses
+constexpr int kDeepest = 20;  // elements of a state are not nested deeper; reading them recurses
 
 std::string join(const std::vector<std::string>& names) {
   std::string text;
@@ -104,7 +104,7 @@ class StateReader {
     return numbers;
   }
 
-  // q of a joint from what may be given instead of its own coordinates.
+  // q of a joint, also from alternative coordinates.
   VectorXd convertPosition(const Joint& joint, const VectorXd& given, const std::string& element) const {
     const bool cos_sin = (joint.kind == JointKind::Continuous && given.size() == 2) ||
                          (joint.kind == JointKind::Planar && given.size() == 4);

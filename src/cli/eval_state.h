@@ -15,7 +15,7 @@ struct EvalState {
 // Reads a file, or the standard input for "-". \throws ModelError naming the file and the element
 EvalState readState(const Model& model, const std::string& path);
 
-// The part of eval's help that says how a state is written.
+// The part of eval's help that describes the format of a state.
 extern const char* const kStateHelp;
 
 }  // namespace bielle::cli

@@ -42,7 +42,7 @@ std::string findBrowser() {
                    "install it (Debian: chromium), or open the page with any browser");
 }
 
-// Characters that would mean something in an address, by their codes.
+// Escapes characters with a meaning in a URL.
 std::string escapeUrl(const std::string& text) {
   std::string out;
   for (unsigned char c : text) {
@@ -86,7 +86,7 @@ std::string decodeBase64(const std::string& text) {
   return bytes;
 }
 
-// The images that the page leaves in its document (film.js), as bytes of their formats.
+// The images that the page stores in its document (film.js), as bytes of their formats.
 std::vector<std::string> takePictures(const std::string& page, const FilmOptions& options, bool separate) {
   const ScratchDirectory scratch;
   const double seconds = 60 + 4.0 * static_cast<double>(options.times.size());

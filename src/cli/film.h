@@ -1,5 +1,5 @@
 #pragma once
-// Pictures and films of a report's page, taken by a browser without a window.
+// Pictures and films of a report's page, made by a headless browser.
 #include <string>
 #include <vector>
 
@@ -8,7 +8,7 @@ namespace bielle::cli {
 struct FilmOptions {
   std::vector<double> times;      // s
   int width = 480, height = 480;  // of one picture
-  int columns = 0;                // of a strip; 0: as it fits
+  int columns = 0;                // of a strip; 0: automatic
   std::string view = "oblique";
   bool side_by_side = true;  // several robots; otherwise in one place
   bool see_through = false;
@@ -18,7 +18,8 @@ struct FilmOptions {
 // One PNG with a picture per time. \throws ModelError when there is no browser, or it fails
 void writeStrip(const std::string& page, const FilmOptions& options, const std::string& path);
 
-// H.264, `rate` pictures per second of real time. \throws ModelError when there is no browser or no ffmpeg, or one fails
+// H.264, `rate` pictures per second of real time. \throws ModelError when there is no browser or no ffmpeg, or one
+// fails
 void writeFilm(const std::string& page, const FilmOptions& options, double rate, const std::string& path);
 
 }  // namespace bielle::cli

@@ -1,4 +1,4 @@
-// bielle info: what a robot is made of, and whether it closes.
+// bielle info: the elements of a robot, and whether its loops close.
 #include <cmath>
 #include <iostream>
 
@@ -19,7 +19,7 @@ struct Posture {
   std::string message;
 };
 
-// The neutral configuration as it is, and every reference as far as it can be closed.
+// The unchanged neutral configuration, and every reference, closed as far as possible.
 std::vector<Posture> makePostures(const Model& model) {
   std::vector<Posture> postures = {{"neutral", model.makeNeutral(), true, ""}};
   for (const Reference& reference : model.references()) {

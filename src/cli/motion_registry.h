@@ -16,7 +16,7 @@ struct MotionPreset {
   std::function<void()> apply;
 };
 
-// One request: the numbers that can be set, and what makes the motion of them.
+// One request: the options, and the functions that make the motion from them.
 struct MotionRequest {
   std::vector<OptionEntry> options;
   std::vector<MotionPreset> presets;
@@ -26,24 +26,24 @@ struct MotionRequest {
 
 struct MotionEntry {
   std::string name, help, example;
-  std::vector<std::string> flags;              // options that have a flag of their own, besides --set
+  std::vector<std::string> flags;              // options with their own flag, besides --set
   std::function<MotionRequest()> makeRequest;  // with every option at its default
 };
 
 const std::vector<MotionEntry>& getMotions();
 
-// By name. \throws ModelError naming the file that asks for it, when there is none
+// Finds a motion by name. \throws ModelError naming the file that requests it, when there is none
 const MotionEntry& findMotion(const std::string& file, const std::string& name);
 
-// Motions by name, one after the other. Options are "NAME.option"; where a motion comes again NAME is "walk2" and so on.
+// Consecutive motions by name. Options are "NAME.option"; if a motion is repeated NAME is "walk2" and so on.
 // \throws ModelError when there is no such motion
 inline constexpr const char* kSequence = "sequence";
 MotionRequest makeSequenceRequest(const std::vector<std::string>& motions);
 
-// Limits given by motor stand among what was requested under these names and that of the motor.
+// Prefixes of limits given by motor among the requested values, followed by the name of the motor.
 inline constexpr const char *kEffortLimit = "limit ", *kVelocityLimit = "velocity-limit ";
 
-// The request that a result tells of, without limits: they are part of the problem, not of the motion.
+// The request recorded in a result, without limits, which are part of the problem and not of the motion.
 // \throws ModelError when there is no such motion or option
 MotionRequest remakeRequest(const MotionSummary& summary);
 

@@ -1,4 +1,4 @@
-// bielle ratio: how fast the motors of a linkage turn for its joints, and where that breaks down.
+// bielle ratio: reduction ratios of a linkage, and its dead points.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>

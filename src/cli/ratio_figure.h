@@ -6,7 +6,7 @@
 
 namespace bielle::cli {
 
-// Script for drawSvg: R over the joint angle, or the condition number over both joint angles where there is a map.
+// Script for drawSvg: R over the joint angle, or the condition number over both joint angles if there is a map.
 std::string makeRatioScript(const RatioReport& report);
 
 }  // namespace bielle::cli

@@ -34,7 +34,7 @@ std::vector<double> listEntries(const MatrixXd& R) {
   return entries;
 }
 
-Json listNumbers(const std::vector<double>& numbers) {  // JSON knows no infinity
+Json listNumbers(const std::vector<double>& numbers) {  // JSON has no infinity
   Json list = Json::array();
   for (const double x : numbers) list.push_back(std::isfinite(x) ? Json(x) : Json(nullptr));
   return list;
@@ -58,7 +58,7 @@ Json describeSamples(const std::vector<RatioSample>& samples, int swept) {
   return list;
 }
 
-// The shortest text that reads back to the same number; nothing for infinity.
+// The shortest text that reads back to the same number; empty for infinity.
 std::string formatExact(double value) {
   if (!std::isfinite(value)) return "";
   char text[32];

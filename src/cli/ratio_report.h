@@ -21,7 +21,7 @@ struct RatioReport {
 Json describeReport(const RatioReport& report);
 void printReport(std::ostream& out, const RatioReport& report);
 
-// ratio.csv, ratio.json, ratio.svg and, with a map, map.csv. Returns the paths, or notes on what could not be drawn.
+// Writes ratio.csv, ratio.json, ratio.svg and, with a map, map.csv. Returns the paths, or notes on missing figures.
 std::vector<std::string> writeReport(const std::string& directory, const RatioReport& report);
 
 }  // namespace bielle::cli

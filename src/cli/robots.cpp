@@ -1,4 +1,4 @@
-// bielle robots: the names that can be given, and where they lead.
+// bielle robots: the known names and their files.
 #include <iostream>
 
 #include "cli/commands.h"

@@ -35,7 +35,7 @@ struct SolveArguments {
 std::atomic<bool> interrupted{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
 
-// The first signal asks the solver to stop, the second one has its usual effect.
+// The first signal makes the solver stop, the second one has its usual effect.
 void watchSignals() {
   struct sigaction action = {};
   action.sa_handler = [](int) { interrupted = true; };
@@ -44,7 +44,7 @@ void watchSignals() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
-// A limit given for one motor asks for the limits of all.
+// A limit for one motor enables the limits of all.
 LimitOptions makeLimits(const SolveArguments& arguments) {
   LimitOptions limits = arguments.problem.limits;
   for (const std::string& setting : arguments.effort_limits)
@@ -93,7 +93,7 @@ void printResult(const MotionResult& result, const std::vector<std::string>& pat
   for (const std::string& path : paths) std::cout << "  " << path << "\n";
 }
 
-// The page beside the other files. Without it the result is still whole.
+// Writes the page beside the other files. A failure leaves the result complete.
 void addReport(const std::string& directory) {
   const std::string path = (std::filesystem::path(directory) / "report.html").string();
   try {
@@ -104,7 +104,7 @@ void addReport(const std::string& directory) {
   }
 }
 
-// Last of all, where nobody overlooks it: the solver converges, and the check passes, whether goals are met or not.
+// Printed last, to be noticed: the solver may converge and the check pass although goals are missed.
 void warnOfMissedGoals(const MotionResult& result) {
   std::cout.flush();
   for (const GoalOutcome& outcome : result.goals)
@@ -137,7 +137,7 @@ void printSerialModel(const SerialModel& serial) {
   std::cout << "\n";
 }
 
-// Whether the motion passes bielle-check, or there is none. A check that breaks off says nothing good.
+// Whether the motion passes bielle-check, or that program is not installed. A check that breaks off counts as failed.
 bool checkResult(const std::string& directory) {
   const std::optional<int> status = runCompanion("bielle-check", {"--brief", directory});
   if (!status)
@@ -156,7 +156,7 @@ FddpObserver makeObserver(const SolveArguments& arguments) {
   return observer;
 }
 
-// Each motion of a sequence by itself.
+// Solves each motion of a sequence separately.
 ShootingTrajectory solveParts(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
                               const SolveArguments& arguments, const FddpOptions& solver) {
   PartsOptions options;
@@ -209,7 +209,7 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   return result.converged() && !failed ? kOk : kFailed;
 }
 
-// Added before the single options, so that those given as well have the last word.
+// Added before the individual options, so that these take precedence.
 void addPresets(CLI::App& sub, const std::shared_ptr<MotionRequest>& request) {
   if (request->presets.empty()) return;
   std::vector<std::string> names;

@@ -19,7 +19,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Starts the program in a process group of its own, its output into `descriptor`. 0: it could not be started.
+// Starts the program in its own process group, with its output in `descriptor`. 0: it could not be started.
 pid_t start(const std::vector<std::string>& arguments, int descriptor) {
   std::vector<std::string> copy = arguments;
   std::vector<char*> argv;
@@ -40,7 +40,7 @@ pid_t start(const std::vector<std::string>& arguments, int descriptor) {
   return pid;
 }
 
-// Reads until the end of the output; false when the time is over before.
+// Reads until the end of the output; false if the deadline passes first.
 bool readAll(int descriptor, Clock::time_point deadline, std::string& out) {
   char buffer[65536];
   while (true) {

@@ -9,10 +9,10 @@ namespace bielle::cli {
 bool isOnPath(const std::string& program);
 
 struct SubprocessResult {
-  int status = -1;  // of the exit; -1: it could not be started, was ended by a signal, or had no more time
-  std::string out;  // what it wrote on its standard output
+  int status = -1;  // exit status; -1: it could not be started, was ended by a signal, or timed out
+  std::string out;  // its standard output
 };
-// The program is looked for on the PATH. Its standard error goes nowhere; after `seconds` it is killed.
+// Searches for the program on the PATH. Its standard error is discarded; after `seconds` it is killed.
 SubprocessResult runSubprocess(const std::vector<std::string>& arguments, double seconds);
 
 }  // namespace bielle::cli

@@ -10,13 +10,13 @@ namespace bielle::cli {
 
 using Row = std::vector<std::string>;
 
-// Columns padded to their widest cell, two spaces apart, every line behind `margin`.
+// Columns padded to their widest cell, two spaces apart, every line indented by `margin`.
 void printTable(std::ostream& out, const std::vector<Row>& rows, const std::string& margin = "  ");
 
 // A list of objects: one line each under a header, the given keys as columns.
 void printTable(std::ostream& out, const Json& objects, const std::vector<std::string>& keys);
 
-// "%.6g" and the like.
+// Formats a number, e.g. by "%.6g".
 std::string formatNumber(double value, const char* format = "%.6g");
 
 }  // namespace bielle::cli
