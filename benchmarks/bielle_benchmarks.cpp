@@ -1,8 +1,8 @@
-// Single functions of the dynamics at one state of Bipetto, again and again with warm memory, in CPU time of the thread: for
-// whoever changes one of them. What a user waits for (nodes, iterations, whole solves) is measured by `bielle bench`.
+// Single functions of the dynamics at one state of Bipetto, repeated with warm caches, in CPU time of the thread, for
+// developers of these functions. `bielle bench` measures what users experience (nodes, iterations, whole solves).
 //
-// Times come in seconds and, as the counter `units`, over the time of one 108 x 108 product of doubles by Eigen (unit).
-// Machines and neighbours come and go, ratios stay.
+// Times are in seconds and, as the counter `units`, relative to one 108 x 108 product of doubles by Eigen (unit), a
+// ratio that depends little on the machine and its load.
 #include <benchmark/benchmark.h>
 
 #include <ctime>
@@ -20,7 +20,7 @@ namespace {
 
 using namespace bielle;
 
-// Seconds of this thread alone: others who share the processor are not charged to it.
+// Seconds of this thread alone, excluding other load on the processor.
 double getThreadTime() {
   timespec t;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
@@ -35,7 +35,7 @@ void multiply() {
   benchmark::ClobberMemory();
 }
 
-// The least of some, s.
+// The least of several times, s.
 double calcUnit() {
   double least = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 200; ++i) {

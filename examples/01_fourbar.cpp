@@ -10,9 +10,9 @@
 /// One motor turns the crank with the torque u. The model is a tree of four joints q, closed by one weld in the middle
 /// of the coupler, which exerts the wrench lambda:
 ///     M(q) a + b(q, v) = B u + J(q)^T lambda,    d/dt (J(q) v) = 0.                                           (3)
-/// This is six rows for a plane loop that needs three: lambda is not unique, a and J^T lambda are.
-/// We solve (3), check that it does the work it should, and compare da/du with its differences (the program fails if
-/// one check does):
+/// These are six rows for a planar loop that needs three: lambda is not unique, but a and J^T lambda are.
+/// We solve (3), check its energy balance (4), and compare da/du with finite differences (the program fails if a check
+/// does):
 ///     d(kinetic + potential energy)/dt = u v_crank: closures do no work.                                      (4)
 #include <cmath>
 #include <cstdio>
@@ -35,7 +35,7 @@ double calcCouplerAngle(double theta2) {  // Eq. (2)
   return std::atan2(h * wy / l + s * wx / l, h * wx / l - s * wy / l);
 }
 
-// The configuration with the crank at theta2: the crank is pulled there, the loop is met exactly.
+// The configuration with the crank at theta2: the crank is drawn there, and the loop is closed exactly.
 VectorXd close(const Model& model, VectorXd q, double theta2) {
   AssemblyProblem problem;
   problem.q_ref = q;
@@ -86,7 +86,7 @@ int main() {
                   expected * 180 / M_PI);
   }
 
-  // One state in motion: the velocity nearest to a turning crank that the loop allows.
+  // One state in motion: the velocity nearest to a turning crank that keeps the loop closed.
   const double u = 0.8;  // N m
   Dynamics at(model);
   const VectorXd v = projectVelocity(model, at.ws, at.constraints, q, VectorXd::Unit(model.nv(), 0) * 6);

@@ -4,9 +4,9 @@
 ///     M(q) a + b(q, v) = B u + J(q)^T lambda,    d/dt (J(q) v) = 0                                            (1)
 /// for 6 closures of 6 rows and 2 feet of 6 rows. With steps of length h that end on the closures again, find
 ///     min over u   sum_k h l_k(x_k, u_k, lambda_k) + l_N(x_N),                                                (2)
-/// where l asks the centre of mass to follow
+/// where l makes the centre of mass follow
 ///     c_z(t) = c_z(0) (1 - (1 - depth) (1 - cos 2 pi t / T) / 2),                                             (3)
-/// the feet to share the weight, the robot to stay upright, and motors to work little. FDDP solves (2).
+/// the feet share the weight and the robot stay upright, with small motor torques. FDDP solves (2).
 ///
 /// Usage: 02_squat [DIRECTORY [DURATION]]   writes trajectory.csv, trajectory.npz and summary.json
 #include <cstdio>

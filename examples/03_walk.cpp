@@ -1,14 +1,16 @@
 /// \file Bipetto walks: footholds first, then everything else.
 ///
-/// A command of v m/s, with steps of duration T, moves the middle of the feet by v T per step, which gives the foothold of
-/// every step. Carried by one foot at p, a mass that stays at height z over it moves like a pendulum upside down,
-///     c'' = g / z (c - p),                                                                                     (1)
-/// unstable: of all its motions, only one stays near a given sequence of p. gait.h finds it by a tridiagonal system. The
-/// robot is no such pendulum, its legs swing and have masses; so (1) is a wish, and the dynamics with 6 closed loops decide:
+/// A speed of v m/s, with steps of duration T, moves the middle of the feet by v T per step, which determines the
+/// foothold of every step. Carried by one foot at p, a mass at a constant height z over it moves like an inverted
+/// pendulum,
+///     c'' = g / z (c - p).                                                                                     (1)
+/// It is unstable: only one of its motions stays near a given sequence of p. gait.h finds it by a tridiagonal system.
+/// The robot is not such a pendulum, because its legs swing and have masses; so (1) is a reference, and the dynamics
+/// with 6 closed loops are a constraint:
 ///     min over u   sum_k h l_k(x_k, u_k, lambda_k) + l_N(x_N)    s.t.   x_{k+1} = f_k(x_k, u_k),               (2)
-/// where f_k has the foot on the ground that the schedule of stage k says, and l_k asks the centre of mass to follow (1),
-/// the swing foot to follow its path, stance feet to carry their share in the middle of their soles, and the torso to
-/// stay upright. We solve (2), and compare speed, footholds and the path of the centre of mass with what was asked.
+/// where the feet on the ground in f_k are those of the schedule at stage k, and l_k makes the centre of mass follow
+/// (1), the swing foot follow its path, stance feet carry their share in the middle of their soles, and the torso stay
+/// upright. We solve (2), and compare speed, footholds and the path of the centre of mass with the requested ones.
 ///
 /// Usage: 03_walk [DIRECTORY [SPEED [STEPS]]]   writes trajectory.csv, trajectory.npz and summary.json
 #include <cmath>

@@ -1,13 +1,13 @@
-/// \file Bipetto climbs stairs, and what its motors pay for it.
+/// \file Bipetto climbs stairs; the power of its motors.
 ///
-/// Step i of the stairs is a box with its top at i H. Foot i goes from step i - 2 to step i, over the edge of the one
-/// between: a path with its apex over the higher end, on which the sole, a rectangle, must stay over the ground G,
+/// Step i of the stairs is a box with its top at i H. Foot i moves from step i - 2 to step i, over the edge of the one
+/// between: a path with its apex over the higher end, on which the sole, a rectangle, must stay above the ground G,
 ///     min over its corners c of  z_c - G(x_c, y_c)  >= 0   while it swings.                                    (1)
 /// Lifting the mass m by H in a time T takes at least the mean power
-///     P = m g H / T,                                                                                           (2)
-/// what the motors really give is the sum of u_i v_i over motors, and what a motor that cannot recover energy pays, the
-/// sum of max(0, u_i v_i). For steps of some heights we solve the problem of 03_walk.cpp with footholds on the boxes,
-/// check (1) corner by corner, and compare both powers with (2).
+///     P = m g H / T.                                                                                           (2)
+/// The power that the motors deliver is the sum of u_i v_i over motors; without recovery of energy they consume the sum
+/// of max(0, u_i v_i). For several step heights we solve the problem of 03_walk.cpp with footholds on the boxes, check
+/// (1) corner by corner, and compare both powers with (2).
 ///
 /// Usage: 04_stairs [DIRECTORY [STEPS [HEIGHT...]]]   writes the result of each height to DIRECTORY/HEIGHT
 #include <algorithm>
@@ -25,7 +25,7 @@ using namespace bielle;
 
 namespace {
 
-// Eq. (1): the least height of a corner of a foot in the air over what is under it, m.
+// Eq. (1): the least height of a corner of a foot in the air over the ground under it, m.
 double calcClearance(const Motion& motion, const MotionRecord& record) {
   const Model& model = motion.problem->model();
   Workspace ws(model);

@@ -1,14 +1,14 @@
-/// \file A jump of Bipetto: how high, for how long, and what it costs the knees.
+/// \file A jump of Bipetto: its height, its duration, and the load on the knees.
 ///
-/// Off the ground, whatever the motors do, the centre of mass c of a robot of mass m is a thrown stone:
+/// Off the ground, whatever the motors do, the centre of mass c of a robot of mass m follows a ballistic path:
 ///     c'' = -g e_z,    c_z(t) = c_z(0) + v0 t - g t^2 / 2.                                                      (1)
-/// It comes back to the height it left after T = 2 v0 / g. To ask for a time T in the air is to ask for
+/// It returns to its initial height after T = 2 v0 / g. Requesting a time T in the air means requesting
 ///     v0 = g T / 2    and for a rise of    v0^2 / (2 g) = g T^2 / 8.                                          (2)
-/// The push has to give m v0 within the time D that the feet still have on the ground, and so has to press with
+/// The push must provide m v0 within the time D that the feet remain on the ground, and so must press with
 ///     f / (m g) = 1 + v0 / (g D)                                                                              (3)
-/// on average, while legs can be neither longer than stretched nor shorter than folded. The optimal control problem is
-/// that of 02_squat.cpp with contacts that go and come: none of the feet holds from take-off to touchdown. No impact is
-/// foreseen: at touchdown the feet are asked to be at rest, that is, the legs to fold at the speed of the fall.
+/// on average, within the range of the legs from folded to stretched. The optimal control problem is that of
+/// 02_squat.cpp with changing contacts: there are none from take-off to touchdown. There is no impact: costs bring the
+/// feet to rest at touchdown, so that the legs fold at the speed of the fall.
 ///
 /// Usage: 05_jump [DIRECTORY [FLIGHT [LENGTH [TIME_STEP]]]]   seconds, metres, seconds; writes trajectory and summary
 #include <cstdio>
@@ -43,7 +43,7 @@ void printMotion(const MotionResult& result, const JumpOptions& options) {
   }
 }
 
-// Eq. (1) through three places of the flight: the second difference of the height over a quarter of it.
+// Eq. (1) at three nodes of the flight: the second difference of the height over a quarter of it.
 double calcFallAcceleration(const MotionResult& result) {
   int start = 0, nodes = 0;
   for (const ContactPhase& phase : result.schedule.phases) {

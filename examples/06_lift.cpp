@@ -1,14 +1,14 @@
-/// \file The serial model and the way back: a squat planned without its linkages, and what they make of it.
+/// \file The serial model and lifting: a squat planned without linkages, then transferred to them.
 ///
-/// Bipetto's knee is turned by a motor through a four-bar. Planning often leaves that out: the linkage is frozen at a
-/// posture q_r, and a motor is imagined on the knee itself. With q_s the joints that remain (base, hips, knees, ankles),
+/// Bipetto's knee is turned by a motor through a four-bar. Planning often omits it: the linkage is frozen at a posture
+/// q_r, and a motor is assumed on the knee itself. With q_s the joints that remain (base, hips, knees, ankles),
 ///     M_s(q_s) a_s + b_s = B_s u_s + J_s^T lambda                                                              (1)
 /// where M_s(q_s) is, at q_r, the inertia of the closed robot with its linkage joints locked.
-/// Lifting goes back: the closed configuration with the same q_s, and with T the closed velocity per serial velocity
+/// Lifting finds the closed configuration with the same q_s, and with T the closed velocity per serial velocity
 ///     v = T v_s,    a = T a_s + dT/dt v_s,    T^T (M a + b - J^T lambda) = T^T B u.                            (2)
 /// (2) gives the motor torques u if the linkages can follow. For one motor and one joint it reads u R = tau with the
-/// ratio R = v_motor / v_joint: where R grows beyond all bounds, at a dead point of the knee, the motor must turn
-/// infinitely fast and no torque of its own reaches the knee. The serial model does not see that.
+/// ratio R = v_motor / v_joint: where R tends to infinity, at a dead point of the knee, the motor must turn infinitely
+/// fast and its torque does not reach the knee. The serial model ignores this.
 ///
 /// We plan squats of several depths on (1), lift them by (2), and verify u with the constrained dynamics of the closed
 /// robot. The shallow ones are lifted, the deep ones fold the knee beyond its dead point:
@@ -36,7 +36,7 @@ double findPeak(const MotionResult& result, const std::string& motor) {
   return 0;
 }
 
-// Plans a squat on the serial model and lifts it. False when something does not hold that must.
+// Plans a squat on the serial model and lifts it. False if a check fails.
 bool planAndLift(const Model& closed, const SerialModel& serial, double depth) {
   SquatOptions options;
   options.depth = depth;

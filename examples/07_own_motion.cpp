@@ -1,12 +1,12 @@
-/// \file A motion of one's own: Bipetto sways from foot to foot.
+/// \file A custom motion: Bipetto sways from foot to foot.
 ///
 /// The centre of mass follows a given path,
 ///     c_y(t) = A sin(2 pi t / T) s(t),    c_x, c_z as at rest,                                                (1)
-/// with s going smoothly from 0 to 1 over the first period, and from 1 to 0 over the last one. On flat ground, with the
-/// height kept, the centre of pressure of both feet together follows from it whatever the legs do,
+/// with s going smoothly from 0 to 1 over the first period, and from 1 to 0 over the last one. On flat ground, at
+/// constant height, it determines the centre of pressure of both feet together, whatever the legs do,
 ///     p_y = c_y - (c_z / g) d^2 c_y / dt^2,                                                                   (2)
-/// but for the change of the angular momentum about the centre of mass. The program compares both, and fails if they
-/// are too far apart.
+/// except for the change of the angular momentum about the centre of mass. The program compares both sides, and fails
+/// if they differ too much.
 ///
 /// Usage: 07_own_motion [DIRECTORY]   writes trajectory.csv, trajectory.npz and summary.json
 #include <cmath>
@@ -50,7 +50,7 @@ StageSpec makeStage(const Model& model, const SwayOptions& o, const std::vector<
   raiseMotorWeights(model, 1, stage.state.weights);
   stage.control = {1e-3, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
   stage.costs.push_back({"com", o.com_weight, Activation::makeQuadratic(Vector3d::Ones()), makeComPosition(com)});
-  // The feet shall not share the load evenly: no reference of the forces, only what the ground can take.
+  // The feet do not share the load evenly: no force reference, only the limits of pressure and friction.
   GroundCosts ground;
   ground.force_weight = 0;
   const double weight = model.mass() * model.gravity().norm();

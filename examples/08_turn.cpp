@@ -2,10 +2,10 @@
 ///
 /// Feet are commanded by the displacement D of their middle frame P per step, in its own axes (footsteps.h, Eq. 1),
 ///     P_i = P_{i-1} D,    D = Rz(yaw / 2) (forward, lateral) Rz(yaw / 2),                                      (1)
-/// so that n equal steps turn by n yaw, on the spot, or along an arc whose chord per step is 2 r sin(yaw / 2). A lateral
-/// step is made of two: one foot opens the stance, the other one closes it. Either way the feet must not touch each
-/// other, and Bipetto's hips turn by little: what we print at each landing is how far apart the soles are, and how far
-/// the base has come round.
+/// so that n equal steps turn by n yaw, on the spot, or along an arc whose chord per step is 2 r sin(yaw / 2). A
+/// lateral motion takes two steps: one foot opens the stance, the other one closes it. In both cases the feet must not
+/// touch each other, and the range of Bipetto's hips is small: at each landing we print the distance of the soles and
+/// the rotation of the base.
 ///
 /// Usage: 08_turn [DIRECTORY [side SPEED | turn ANGLE [RADIUS]]]   writes trajectory.csv, trajectory.npz, summary.json
 #include <cmath>

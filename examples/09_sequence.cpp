@@ -1,12 +1,12 @@
 /// \file Bipetto walks to some stairs, climbs them and jumps on top: three motions as one problem.
 ///
-/// Motion i plans its stages from a standing posture q_i and ends, by its own wish, in another one, q_{i+1}. Alone it would
+/// Motion i plans its stages from a standing posture q_i and is intended to end in another one, q_{i+1}. Alone it would
 /// solve
 ///     min over u^i   sum_k l^i_k(x_k, u_k) + l^i_N(x_N)    s.t.   x_{k+1} = f_k(x_k, u_k),   x_0 = (q_i, 0).     (1)
 /// In sequence the states in between are free and the terminal costs l^i_N are dropped, all but the last:
 ///     min over u     sum_i sum_k l^i_k(x_k, u_k) + l^last_N(x_N),   x_0 = (q_0, 0).                              (2)
-/// Less is asked, so its optimum is lower than what the solutions of (1) cost together with their terminal costs; how
-/// much it gains is what coming to rest in between would have cost. We print both.
+/// This is less demanding, so that its optimum is below the total cost of the solutions of (1) with their terminal
+/// costs; the difference is the cost of coming to rest in between. We print both.
 ///
 /// Usage: 09_sequence [DIRECTORY [STAIRS]]   writes trajectory.csv, trajectory.npz and summary.json
 #include <cstdio>

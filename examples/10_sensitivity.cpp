@@ -1,16 +1,16 @@
 /// \file The derivative of a motor torque of a closed chain with respect to the lengths of its rods.
 ///
-/// A motor turns the crank (length a, angle theta2) of a four-bar, whose rocker (c, theta4) shall swing in a given way;
-/// the coupler (b, theta3) ties them, the ground is d:
+/// A motor turns the crank (length a, angle theta2) of a four-bar, whose rocker (c, theta4) swings in a given way; the
+/// coupler (b, theta3) connects them, the ground is d:
 ///     a cos theta2 + b cos theta3 = d + c cos theta4,    a sin theta2 + b sin theta3 = c sin theta4.           (1)
-/// A longer coupler turns the rocker while the crank stands still. The component of d(1)/db along the coupler says
+/// A longer coupler turns the rocker while the crank stands still. The component of d(1)/db along the coupler gives
 ///     d theta4 / db = 1 / (c sin(theta3 - theta4)).                                                           (2)
 /// With the rocker's motion kept, the crank's follows, and its torque u from the inverse problem
 ///     M(q) qdd + b(q, v) = B u + J(q)^T lambda.                                                                (3)
-/// We want the lengths a and b for which the torque is least in the mean,
+/// We look for the lengths a and b that minimize the root mean square torque,
 ///     min_{a, b} f(a, b) = (1/N sum_k u_k^2)^1/2,    df = sum_k u_k du_k / (N f),                              (4)
-/// where du_k comes from derivatives of (1) and (3) by the places where the rods are tied, and by their inertias, which
-/// grow with them. We check (2), compare df with differences, and search with it and without.
+/// where du_k comes from derivatives of (1) and (3) with respect to the attachments of the rods and to their inertias,
+/// which grow with them. We check (2), compare df with differences, and search with and without gradients.
 #include <cmath>
 #include <cstdio>
 
@@ -41,7 +41,7 @@ DesignVariable makeLength(const std::string& name, const std::string& from, cons
   return variable;
 }
 
-// Moves q to where the loop is closed with the rocker at an angle, by Newton steps. False when it cannot be.
+// Closes the loop with the rocker at an angle, by Newton steps from q. False if that is impossible.
 bool close(const Model& model, double rocker, VectorXd& q) {
   const ConstraintSet loop = makeConstraintSet(model);
   Workspace ws(model);
@@ -54,7 +54,7 @@ bool close(const Model& model, double rocker, VectorXd& q) {
   return false;
 }
 
-// f and df of Eq. (4); f alone without variations.
+// f and df of Eq. (4); only f without variations.
 SlopedValue calcEffort(const Model& model, VectorXd q, const std::vector<ModelVariation>& variations) {
   KeptMotion motion(model, kRocker);
   KeptMotion::Variation variation(model);
@@ -109,7 +109,7 @@ int main() {
   std::printf("f = %.4f N m; df/da = %.4f, df/db = %.4f N m/m\n", here.value, df[0], df[1]);
   ok &= check("df against central differences, relative", (df - difference).norm() / difference.norm(), 1e-6);
 
-  // Eq. (4) by sequential quadratic programs, and by a simplex method that sees f alone.
+  // Eq. (4) by sequential quadratic programs, and by a simplex method that uses only f.
   SearchProblem problem{robot.lower(), robot.upper(), x, {}, {}};
   problem.objective = [&](const VectorXd& at, const SearchStage&) { return calcEffort(robot.make(at), q, {}).value; };
   problem.sloped = [&](const VectorXd& at, const SearchStage&) {

@@ -7,14 +7,14 @@
 
 namespace bielle::test {
 
-/// Forwards to a problem, task by task, and throws std::logic_error when it is used otherwise than it may be.
+/// Forwards to a problem, task by task, and throws std::logic_error if it is used against the contract.
 class BatchedProblem : public ShootingProblem {
  public:
   BatchedProblem(const PlainProblem& inner, int batch_size) : inner_(inner), batch_size_(batch_size) {}
 
   /// Number of the first stage in a longer horizon: evaluations know their node by its number there.
   int first = 0;
-  /// Poison: a step ends further off the more steps come together.
+  /// Poison: the error of a step grows with the number of steps per call.
   bool spread = false;
   mutable std::atomic<int> num_evaluated{0}, num_linearized{0}, num_integrated{0};  ///< nodes
   mutable std::atomic<int> num_made{0};                                             ///< evaluations

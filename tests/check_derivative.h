@@ -1,5 +1,5 @@
 #pragma once
-// An analytic derivative against differences, for Catch2 tests.
+// Compares an analytic derivative with finite differences, for Catch2 tests.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <random>
@@ -22,8 +22,8 @@ inline MatrixXd calcEntryScales(const MatrixXd& numeric) {
   return rows.replicate(1, size.cols()).cwiseMin(columns.replicate(size.rows(), 1)).cwiseMax(least);
 }
 
-/// Passes when every entry is close, and when a thousandth of its scale added to an entry would be seen: of each row
-/// and of each column one entry is tried, chosen at random (the same ones in every run).
+/// Passes if every entry is close, and if a thousandth of its scale added to an entry would be noticed: one entry of
+/// each row and of each column is tried, chosen at random (the same ones in every run).
 inline void checkDerivative(const MatrixXd& analytic, const MatrixXd& numeric, const std::string& name = "") {
   CAPTURE(name);
   REQUIRE(analytic.rows() == numeric.rows());

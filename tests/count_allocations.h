@@ -1,5 +1,5 @@
 #pragma once
-// Counts allocations: the linker leads malloc (Eigen) and operator new (the standard library) through these counters.
+// Counts allocations: the linker redirects malloc (Eigen) and operator new (the standard library) to these counters.
 // Include in one source of an executable linked with -Wl,--wrap=malloc -Wl,--wrap=_Znwm.
 #include <atomic>
 #include <cstddef>

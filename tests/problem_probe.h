@@ -1,5 +1,5 @@
 #pragma once
-// One node of a problem at a time, by numbers in and numbers out: what tests compare with differences.
+// One node of a problem at a time, with plain numbers in and out, for comparison with finite differences.
 #include "bielle/ocp/robot_problem.h"
 
 namespace bielle::testing {

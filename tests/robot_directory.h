@@ -1,5 +1,5 @@
 #pragma once
-// A small robot as text, to be mutated, and a directory of its own to read it from.
+// A small robot as text, to be mutated, and a temporary directory to read it from.
 #include <filesystem>
 #include <string>
 

@@ -1,5 +1,5 @@
 #pragma once
-// Any robot files must give either a model that can be computed with or one clear error.
+// Any robot files must give either a usable model or one clear error.
 #include <cmath>
 #include <sstream>
 #include <string>
@@ -14,7 +14,7 @@ namespace bielle::testing {
 enum class Trial { Valid, Refused, Wrong };
 struct TrialResult {
   Trial trial = Trial::Valid;
-  std::string message;  ///< the error, or what is wrong
+  std::string message;  ///< the error, or the problem
 };
 
 // "place: element: problem; remedy" that names the directory or file, on one line of the command's output.
@@ -23,7 +23,7 @@ inline bool isClear(const std::string& error, const std::string& directory) {
          error.find("; ") != std::string::npos;
 }
 
-// Statuses are told, and numbers under a good status are finite.
+// Failures have a status, and numbers under a good status are finite.
 inline std::string findWrong(const Model& model) {
   const VectorXd q = model.makeNeutral(), zero = VectorXd::Zero(model.nv());
   if (!q.allFinite() || model.mass() < 0 || !std::isfinite(model.mass())) return "the model is not finite";

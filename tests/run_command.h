@@ -1,5 +1,5 @@
 #pragma once
-// Runs a program and catches what it says.
+// Runs a program and captures its output.
 #include <sys/types.h>
 
 #include <string>

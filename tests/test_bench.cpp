@@ -1,4 +1,4 @@
-// The report of `bielle bench` is whole. Nothing here depends on how fast anything is.
+// The report of `bielle bench` is complete. Nothing here depends on speed.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-// Verdicts of a study, from results written down by hand.
+// Verdicts of a study, from handwritten results.
 #include <catch2/catch.hpp>
 
 #include "study/claims.h"

@@ -1,4 +1,4 @@
-// The command, run as a user runs it. Oracles: the library's own functions on the same states.
+// The command, run like a user does. Oracles: the library's own functions on the same states.
 #include <signal.h>
 
 #include <catch2/catch.hpp>

@@ -1,4 +1,4 @@
-// Design: robots made of numbers, what they are worth, and searches that go on where they were killed.
+// Design: robots made from numbers, their values, and searches that resume after being killed.
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -1,5 +1,5 @@
-// Gradients of designs: the measures of kept motions and the searches that use them. Oracle: differences of fourth
-// order over designs, each made and lifted anew; minima by hand.
+// Gradients of designs: the measures of kept motions and the searches that use them. Oracles: fourth-order differences
+// over designs, each made and lifted separately; minima by hand.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>

@@ -41,8 +41,8 @@ Side calcSide(const FiveBarLegParameters& p, const Vector2d& foot, double bend) 
   return {knee, foot - knee};
 }
 
-// Speeds of the knees per speed of the motors: v (x) l_i = w_i (c_i' . l_i) for both sides gives the velocity v of the foot,
-// with c' the derivative of the knee by the motor's angle; then the lower rods turn by the rest.
+// Speeds of the knees per speed of the motors: v (x) l_i = w_i (c_i' . l_i) for both sides gives the velocity v of the
+// foot, with c' the derivative of the knee by the motor's angle; then the lower rods turn by the rest.
 double calcConditioning(const FiveBarLegParameters& p, const Vector2d& foot) {
   const Side sides[] = {calcSide(p, foot, 1), calcSide(p, foot, -1)};
   const auto turn = [](const Vector2d& v) { return Vector2d(-v.y(), v.x()); };
@@ -99,8 +99,8 @@ TEST_CASE("measures: electrical energy of stages by hand") {
 }
 
 TEST_CASE("measures: electrical energy of a harmonic motion") {
-  // u = U cos wt, v = V cos(wt - phi) over a period T: T (U V cos(phi) / 2 + U^2 / (2 K^2)) with all given back; sums over
-  // equal steps are exact.
+  // u = U cos wt, v = V cos(wt - phi) over a period T: T (U V cos(phi) / 2 + U^2 / (2 K^2)) with all given back; sums
+  // over equal steps are exact.
   const double U = 20, V = 3, K = 1.7, T = 0.8;
   const int n = 100;
   for (double phi : {0.0, 1.0, 2.5}) {

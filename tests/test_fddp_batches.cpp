@@ -1,4 +1,4 @@
-// FDDP on problems that work on several tasks at once: results do not depend on batches or threads, and what was evaluated is
+// FDDP on problems that process several tasks at once: results do not depend on batches or threads, and evaluations are
 // kept.
 #include <catch2/catch.hpp>
 

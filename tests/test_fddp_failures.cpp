@@ -1,4 +1,4 @@
-// FDDP that is interrupted, given problems that fail, or asked for nonsense.
+// FDDP when interrupted, with failing problems, and with invalid options.
 #include <catch2/catch.hpp>
 #include <sstream>
 

@@ -325,8 +325,8 @@ TEST_CASE("delta: the platform follows the closed form") {
 }
 
 TEST_CASE("delta: the platform is where the worked examples of its source have it") {
-  // R. L. Williams II, 2016, of the IRB 360-1/1600: motor angles, in degrees, for a place of the platform, in metres. The
-  // first arm is along -y there and along x here.
+  // R. L. Williams II, 2016, of the IRB 360-1/1600: motor angles, in degrees, for a place of the platform, in metres.
+  // The first arm is along -y there and along x here.
   struct Example {
     Vector3d place, angles;
   };

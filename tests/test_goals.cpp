@@ -1,4 +1,4 @@
-// Goals and their outcomes: each kind by hand, then on solved motions and on trajectories that miss.
+// Goals and their outcomes: each kind by hand, then on solved motions and on trajectories that miss them.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <stdexcept>

@@ -1,6 +1,6 @@
-// Trajectories that are made to hurt: sizes that overflow or lie, archives that unpack to more than there is memory,
-// headers that a recursive parser would not survive. Each is refused with one error that names the file. The archives are
-// made by Python's zipfile. Also: what is not a file is written to and not replaced.
+// Malicious trajectories: sizes that overflow or lie, archives that unpack to more than the memory, headers that crash
+// a recursive parser. Each is rejected with one error that names the file. The archives are made by Python's zipfile.
+// Also: devices and pipes are written to and not replaced.
 #include <sys/stat.h>
 
 #include <catch2/catch.hpp>

@@ -1,6 +1,6 @@
-// Random mechanisms under random numbers, most of which nobody should ask for: singular starts, loops that cannot close,
-// motors and links without mass, speeds and gains beyond all range, time steps from 0 to 10^6 s, one node or ten thousand.
-// Whatever happens, there is a status, and no NaN under a good one; what is refused is refused by a ModelError.
+// Random mechanisms with random, mostly unreasonable numbers: singular starts, loops that cannot close, motors and
+// links without mass, extreme speeds and gains, time steps from 0 to 10^6 s, one node or ten thousand. Every outcome
+// has a status, without NaN under a good one; rejections are ModelErrors.
 #include <catch2/catch.hpp>
 #include <iostream>
 #include <map>

@@ -1,4 +1,4 @@
-// Jumps as their results, measured by kinematics and by the law of the thrown stone, not by what the solver says.
+// Jumps, measured on their trajectories by kinematics and the ballistic parabola, independently of the solver.
 #include <catch2/catch.hpp>
 #include <cmath>
 

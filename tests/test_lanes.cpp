@@ -1,4 +1,5 @@
-// Several nodes at once: numbers in lanes are those of double, and what comes out of one lane does not depend on the others.
+// Several nodes at once: numbers in lanes equal those of double, and the result of a lane does not depend on the
+// others.
 #include <catch2/catch.hpp>
 #include <numeric>
 #include <random>
@@ -191,8 +192,8 @@ TEST_CASE("lanes: each has its own pivots, and a singular one is told from the o
   }
 }
 
-// In a symmetric posture closure rows are equally long and entries of them vanish: what one rounding puts first another puts
-// second. Coordinates of one point in two bases would mean different motions.
+// In a symmetric posture closure rows are equally long and some entries vanish, so that rounding could change their
+// order. Coordinates of one point in two bases would mean different motions.
 TEST_CASE("a point has one basis, whatever the rounding on the way to it") {
   const Model model = loadRobot("bipetto").model;
   const VectorXd q = makeStandingPosture(model);

@@ -1,4 +1,4 @@
-// Limits of motors: what a motion pays for them, and that it keeps to them.
+// Limits of motors: motions satisfy them, at a higher cost.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <fstream>

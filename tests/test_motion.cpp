@@ -1,4 +1,4 @@
-// The motions as their results: what the trajectory does, measured by kinematics, not by what the solver says.
+// Motions, measured on their trajectories by kinematics, independently of the solver.
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <iterator>

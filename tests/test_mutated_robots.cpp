@@ -1,6 +1,6 @@
-// Thousands of robot files with something wrong in them: each is a model that can be computed with, or one clear error.
-// The mutations are those that people and programs make (values out of range, names exchanged, lines lost or doubled,
-// files cut short) and some that nobody makes. tests/fuzz goes on from there, guided by coverage.
+// Thousands of robot files with errors: each gives a usable model, or one clear error. The mutations are those that
+// people and programs make (values out of range, names exchanged, lines lost or doubled, files truncated) and some that
+// nobody makes. tests/fuzz continues from there, guided by coverage.
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <iostream>

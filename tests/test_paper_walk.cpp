@@ -1,5 +1,5 @@
-// The walk of the paper, problem for problem: what the paper's own solver made of its published walk on the published model.
-// Neither is part of the project: where they are not at hand, the tests are skipped and say so.
+// The published walk of the paper on the published model, compared with the solution of the paper's own solver. Neither
+// is part of the project: if they are not available, the tests are skipped and say so.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
@@ -192,9 +192,10 @@ TEST_CASE("the paper's walk: every cost term at the guess and at the solution") 
   CHECK(solution.relative < 1e-6);
 }
 
-// The reference is where the paper's solver found no gradient any more. Ours, whose derivatives are compared with differences
-// (test_ocp_problem.cpp), finds one there and goes on to a lower cost, along trajectories that are closed: the reference is a
-// fixed point of the paper's derivatives and no minimum of its costs. 63.64770 was found from its guess and from its solution.
+// At the reference the paper's solver found a vanishing gradient. Ours, whose derivatives are compared with differences
+// (test_ocp_problem.cpp), finds a gradient there and reaches a lower cost, along closed trajectories: the reference is
+// a fixed point of the paper's derivatives, but not a minimum of its costs. 63.64770 was reached from its guess and
+// from its solution.
 TEST_CASE("the paper's walk: solved from its first guess, it ends below the paper's cost, at its speed") {
   const std::optional<PaperWalk> reference = readReference();
   if (!reference) return;

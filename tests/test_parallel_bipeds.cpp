@@ -1,5 +1,5 @@
-// Cleobot and the biped with RSU ankles squat, walk and jump with the costs of Bipetto. No serial chain stands in for
-// the legs of Cleobot.
+// Cleobot and the biped with RSU ankles squat, walk and jump with the costs of Bipetto. The legs of Cleobot have no
+// equivalent serial chain.
 #include <Eigen/SVD>
 #include <catch2/catch.hpp>
 #include <filesystem>
@@ -60,8 +60,8 @@ CommandResult run(std::vector<std::string> arguments) {
   return runCommand(arguments);
 }
 
-// bielle solve MOTION, which checks; the motion it wrote. Empty `beyond`: it passes; else the wrench cone of a sole is the
-// one row that fails, with a margin that begins so.
+// Runs bielle solve MOTION with its check; returns the written motion. With an empty `beyond` it must pass; otherwise
+// the wrench cone of a sole is the only row that fails, with a margin that begins with this text.
 MotionRecord solve(const std::string& robot, const std::vector<std::string>& motion, const RobotDirectory& directory,
                    const std::string& beyond = "") {
   std::vector<std::string> arguments = {"solve"};

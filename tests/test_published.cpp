@@ -1,5 +1,5 @@
-// Models that others published, in the format of the robots here. They are no part of the project: where they are not at
-// hand, the tests are skipped and say so. How they agree with Simbody is seen in validation/.
+// Models published by others, in the format of our robots. They are not part of the project: if they are not available,
+// the tests are skipped and say so. validation/ compares them with Simbody.
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <map>

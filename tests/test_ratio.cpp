@@ -1,5 +1,5 @@
-// Reduction ratios. Oracles: the four-bar on paper, virtual work in the constrained dynamics, differences, and dead points
-// found without any Jacobian.
+// Reduction ratios. Oracles: the closed-form four-bar, virtual work in the constrained dynamics, differences, and dead
+// points found without any Jacobian.
 #include <cmath>
 #include <fstream>
 #include <sstream>

@@ -1,4 +1,4 @@
-// The page of a report, read as text: what stands in it. (test_report_page.py looks at it in a browser.)
+// The content of a report's page, read as text. (test_report_page.py opens it in a browser.)
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <filesystem>

@@ -1,5 +1,4 @@
-// The robots that come along, against closed forms and against the published files (skipped where those are not at
-// hand).
+// The robots of the project, against closed forms and against the published files (skipped if those are not available).
 #include <Eigen/QR>
 #include <catch2/catch.hpp>
 #include <filesystem>

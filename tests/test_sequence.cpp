@@ -1,4 +1,4 @@
-// Sequences: each motion starts where the one before ends, on one ground, and the whole is solved as one problem.
+// Sequences: each motion starts where the previous one ends, on one ground, and the whole is solved as one problem.
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/kinematics.h"

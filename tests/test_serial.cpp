@@ -1,5 +1,5 @@
-// The Approximate Serial model and the lift back. Oracles: inertia of the closed model with its linkages locked, and the
-// closed model's constrained dynamics under the lifted torques.
+// The Approximate Serial model and the lift back. Oracles: inertia of the closed model with its linkages locked, and
+// the closed model's constrained dynamics under the lifted torques.
 #include <catch2/catch.hpp>
 #include <cmath>
 

@@ -1,5 +1,6 @@
-// How dynamics, closing and motor torques change with the mechanism. Oracle: central differences (fourth order) over
-// models that are built anew with moved joints, closures, contacts and inertias. Every test also sees a poisoned entry.
+// Derivatives of dynamics, closing and motor torques with respect to the mechanism. Oracle: central differences (fourth
+// order) over models rebuilt with moved joints, closures, contacts and inertias. Every test also notices a poisoned
+// entry.
 #include <Eigen/QR>
 
 #include "bielle/dynamics/assembly.h"

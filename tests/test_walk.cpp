@@ -1,4 +1,4 @@
-// Walking motions as their results: where the feet go and what carries them, measured by kinematics and dynamics.
+// Walking motions, measured on their trajectories by kinematics and dynamics.
 #include <catch2/catch.hpp>
 
 #include "bielle/model/error.h"
@@ -163,8 +163,8 @@ TEST_CASE("walk: the first double support is as long as the soles need to set of
   options.gait.start_pressure = 0.3;
   const int nodes = count(options);
   CHECK(nodes > std::lround(options.gait.timing.start / h));
-  // A pendulum at rest whose centre of pressure is held back by d: how far it runs ahead of the path in the end (the part
-  // of its error that grows), as a simulation has it.
+  // Simulates a pendulum at rest whose centre of pressure is held back by d: the distance by which it ends ahead of the
+  // path (the growing part of its error).
   const Stance stance = makeStance(model, options.gait, q0);
   const double d = options.gait.start_pressure * sole.half_length, g = 9.81, height = stance.com.z();
   const FootstepPlan plan = planFootsteps(stance.feet[0], stance.feet[1],
@@ -223,7 +223,7 @@ TEST_CASE("walk: with the published weights the feet land where they like") {
   CHECK(solved.summary.termination == FddpTermination::Converged);
   const double speed = calcSpeed(solved.measures).x();
   CHECK(speed > 0.25);
-  CHECK(speed < 0.35);  // the velocity is one wish among others
+  CHECK(speed < 0.35);  // the velocity is one cost among others
   CHECK(solved.measures.foothold > 0.02);
   CHECK(solved.measures.slip < 5e-3);
   CHECK(solved.measures.load > 5);

@@ -1,4 +1,5 @@
-// Oracles: a pendulum integrated by its own formula, motions poisoned one number at a time, files that lie.
+// Oracles: a pendulum integrated from its equation of motion, motions poisoned one number at a time, inconsistent
+// files.
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
@@ -47,7 +48,7 @@ TEST_CASE("check: a swinging four-bar passes, its defect shrinks with the step")
     CHECK(fine.passed());
     const std::string name = formulation == Formulation::Reduced ? "finite differences of the velocity" : "loops: gap";
     CHECK(getValue(fine, name) < 0.6 * getValue(coarse, name));
-    // Told over a bound that halves with the step, as the defect does.
+    // Relative to a bound that halves with the step, as the defect does.
     CHECK(getValue(fine, "energy, whole motion") == Approx(getValue(coarse, "energy, whole motion")).epsilon(0.05));
   }
 }

@@ -1,5 +1,4 @@
-// Goals in the check: measured independently of what the summary tells, told when missed, and compared with the
-// summary.
+// Goals in the check: measured independently of the summary, reported when missed, and compared with the summary.
 #include <catch2/catch.hpp>
 #include <set>
 #include <sstream>
@@ -26,7 +25,7 @@ const LoadedRobot& getBipetto() {
   return robot;
 }
 
-// After a few iterations, written and read back: what is measured need not be what was asked.
+// A motion after a few iterations, written and read back: measured values need not equal the requested ones.
 CheckedMotion solveBriefly(Motion motion) {
   const RobotDirectory directory;
   FddpOptions options;

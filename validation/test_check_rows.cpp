@@ -1,4 +1,4 @@
-// Every row can fail: motions altered so that one of them does, and numbers that are none.
+// Every row can fail: motions altered so that one of them does, and NaN.
 #include "check_rows.h"
 #include "simbody_bridge.h"
 #include "test_motions.h"
@@ -11,7 +11,7 @@ namespace {
 
 bool fails(const CheckReport& report, const std::string& row) { return getFailures(report).count(row) == 1; }
 
-// The squat, said to stand on one foot in its middle.
+// The squat, falsely recorded as standing on one foot in its middle.
 CheckedMotion makeLifted() {
   CheckedMotion lifted = getSquat().checked;
   const auto stances = lifted.summary.phases[0].stances;
@@ -58,7 +58,7 @@ TEST_CASE("check: a number that is none fails in every column, and one that over
   motion.record.time[17] = std::nan("");
   CHECK(fails(checkMotion(motion), "numbers not finite"));
 
-  // Squares of 1e200 are infinite: what NaN arises on the way reaches the table, or Simbody throws.
+  // Squares of 1e200 are infinite: a resulting NaN reaches the table, or Simbody throws.
   const auto passes = [](const CheckedMotion& altered) {
     try {
       return checkMotion(altered).passed();
@@ -98,7 +98,7 @@ TEST_CASE("check: the worst of many keeps what is not a number") {
 }
 
 TEST_CASE("check: accelerations that no stabilisation explains fail by themselves") {
-  // The loop is pulled to a place 20 um beside its own, softly: gaps stay small, equations and steps hold.
+  // The loop is pulled softly to a place 20 um beside its own: gaps stay small, equations and steps hold.
   const auto pull = [](double offset) {
     return [offset](Closure& closure) {
       closure.X_B2.p.x() += offset;
