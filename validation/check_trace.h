@@ -7,8 +7,8 @@ namespace bielle::validation {
 struct NodeTrace {
   std::vector<SE3> feet;              ///< per contact of the model, placement of its frame in the world
   std::vector<Vector6d> foot_twists;  ///< of that frame, in its own coordinates
-  std::vector<Vector6d> gaps;  ///< per closure: position and angle vector of frame 2 in frame 1, without free axes
-  std::vector<Vector6d> gap_rates;     ///< the same for its velocity
+  std::vector<Vector6d> gaps;       ///< per closure: position and angle vector of frame 2 in frame 1, without free axes
+  std::vector<Vector6d> gap_rates;  ///< the same for its velocity
   std::vector<Vector3d> mass_centers;  ///< per body, in the world, m
   Vector3d com;                        ///< of the robot, m
   double kinetic = 0, potential = 0;   ///< energies, of bodies and rotors, J

@@ -8,7 +8,7 @@ namespace bielle {
 namespace {
 
 const double kRankTolerance = AssemblyOptions().rank_tolerance;  // of H, relative, as in assembly
-constexpr double kGapTolerance = 1e-6;      // of Eq. (2), relative to 1 and the motion
+constexpr double kGapTolerance = 1e-6;                           // of Eq. (2), relative to 1 and the motion
 constexpr double kBalanceTolerance = 1e-7;  // of Eqs. (4) and (5), relative to their right-hand sides
 
 MatrixXd calcJacobian(const Model& model, const Workspace& ws, const ConstraintSet& set) {

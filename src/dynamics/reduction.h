@@ -114,8 +114,8 @@ struct ClusterScratchOf {
   MatrixX<T> J_all, J, JW;   // all rows; independent ones at the iterate; J W^{-1} at the start
   MatrixX<T> newton, fresh;  // factors of Newton's matrix; of a new one
   std::vector<Index> pivots, fresh_pivots;
-  MatrixX<T> reflected, reflectors;  // of J W^{-1/2}; Householder vectors
-  VectorX<T> beta, products, rest;   // their scales; scratch; squared norms of the remainders of the rows
+  MatrixX<T> reflected, reflectors;    // of J W^{-1/2}; Householder vectors
+  VectorX<T> beta, products, rest;     // their scales; scratch; squared norms of the remainders of the rows
   typename LogicOf<T>::Mask closed{};  // whether the last closing reached the bases
 };
 using ClusterScratch = ClusterScratchOf<double>;

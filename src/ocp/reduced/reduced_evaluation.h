@@ -35,8 +35,7 @@ struct ContactLayout {
     const Closure* closure;
     int slot;
     int row, rows;  // among the contact rows
-    Matrix3d
-        turn;  // from the angular part of a twist in the contact frame to the last rows; zero for rows it lacks
+    Matrix3d turn;  // from the angular part of a twist in the contact frame to the last rows; zero for rows it lacks
   };
   std::vector<Contact> contacts;
   int closure_rows = 0;  // of the model's closures, which come before the contacts
