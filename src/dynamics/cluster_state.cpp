@@ -4,6 +4,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "dynamics/reduction.h"
+#include "math/small_dense.h"
 #include "model/joint.h"
 
 namespace bielle {
@@ -15,9 +16,10 @@ constexpr double kAcceptedTolerance = 1e-11;  // accepted when rounding stops pr
 // entries vanish: if rounding chose between them, the basis would depend on how the point was computed.
 constexpr double kTie = 1e-7;
 
-// Rows that one operation of a factorization processes: a register of one node, or one row of all lanes.
+// Rows that one step of a factorization processes: a register of one node, or enough registers of lanes to hide the
+// latency of a sum.
 template <typename T>
-using RowsOf = Eigen::Array<T, std::is_same_v<T, double> ? kLane : 1, 1>;
+using RowsOf = Eigen::Array<T, std::is_same_v<T, double> ? kLane : 6, 1>;
 
 }  // namespace
 
@@ -134,7 +136,7 @@ typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratc
     // Computes E x for the row x, including |x|^2, and from it E v with v = x - pivot e_p.
     for (Eigen::Index r = 0; r < E.rows(); r += kChunk) {
       Rows sum = Rows::Zero();
-      for (int k = p; k < n; ++k) sum += v[k] * Eigen::Map<const Rows>(&E(r, k));
+      for (int k = p; k < n; ++k) addScaled<kChunk>(v[k], &E(r, k), sum.data());
       products.template segment<kChunk>(r).array() = sum;
     }
     const T norm = sqrt(getEntry(products.data(), row)), pivot = select(v[p] > kTie * norm, -norm, norm);
@@ -147,8 +149,8 @@ typename LogicOf<T>::Mask factorize(const ReducedCluster& cluster, ClusterScratc
     v[p] -= pivot;
     for (Eigen::Index r = 0; r < E.rows(); r += kChunk) {
       const Rows Ev = products.template segment<kChunk>(r).array() - pivot * Eigen::Map<const Rows>(&E(r, p));
-      const Rows scaled = beta * Ev;
-      for (int k = p; k < n; ++k) Eigen::Map<Rows>(&E(r, k)) -= v[k] * scaled;
+      const Rows scaled = -beta * Ev;
+      for (int k = p; k < n; ++k) addScaled<kChunk>(v[k], scaled.data(), &E(r, k));
     }
     for (int r = 0; r < m; ++r) rest[r] -= E(r, p) * E(r, p);
     setEntry(rest.data(), row, taken);

@@ -58,9 +58,9 @@ inline LaneMask operator&&(const LaneMask& a, const LaneMask& b) { return {a.v &
 inline LaneMask operator||(const LaneMask& a, const LaneMask& b) { return {a.v | b.v}; }
 inline LaneMask operator!(const LaneMask& a) { return {~a.v}; }
 inline bool any(const LaneMask& a) {
-  long long out = 0;
-  for (Eigen::Index l = 0; l < kLane; ++l) out |= a.v[l];
-  return out != 0;
+  const LaneMask::Vector halves = a.v | __builtin_shuffle(a.v, LaneMask::Vector{4, 5, 6, 7, 0, 1, 2, 3});
+  const LaneMask::Vector quarters = halves | __builtin_shuffle(halves, LaneMask::Vector{2, 3, 0, 1, 6, 7, 4, 5});
+  return (quarters[0] | quarters[1]) != 0;
 }
 inline bool any(bool a) { return a; }
 inline double getLane(const Lanes& x, Eigen::Index lane) { return x[lane]; }
@@ -77,6 +77,14 @@ inline void calcSineCosine(double x, double& sine, double& cosine) {
   cosine = std::cos(x);
 }
 
+/// An index for each lane.
+struct LaneIndex {
+  LaneMask::Vector v;
+  int operator[](Eigen::Index lane) const { return static_cast<int>(v[lane]); }
+  void set(Eigen::Index lane, int i) { v[lane] = i; }
+};
+inline bool operator!=(const LaneIndex& a, const LaneIndex& b) { return any(LaneMask{a.v != b.v}); }
+
 /// A bool and an index for each lane.
 template <typename T>
 struct LogicOf {
@@ -86,35 +94,36 @@ struct LogicOf {
 template <>
 struct LogicOf<Lanes> {
   using Mask = LaneMask;
-  using Index = std::array<int, kLane>;
+  using Index = LaneIndex;
 };
 /// The same index in every lane.
 template <typename T>
 typename LogicOf<T>::Index makeIndex(int i) {
-  typename LogicOf<T>::Index out;
   if constexpr (std::is_same_v<T, double>)
-    out = i;
+    return i;
   else
-    out.fill(i);
-  return out;
+    return {i - LaneMask::Vector{}};
 }
 inline int select(bool mask, int a, int b) { return mask ? a : b; }
-inline std::array<int, kLane> select(const LaneMask& mask, int a, std::array<int, kLane> b) {
-  for (Eigen::Index l = 0; l < kLane; ++l) b[l] = mask[l] ? a : b[l];
-  return b;
-}
-inline std::array<int, kLane> select(const LaneMask& mask, const std::array<int, kLane>& a, std::array<int, kLane> b) {
-  for (Eigen::Index l = 0; l < kLane; ++l) b[l] = mask[l] ? a[l] : b[l];
-  return b;
+inline LaneIndex select(const LaneMask& mask, const LaneIndex& a, const LaneIndex& b) { return {mask.v ? a.v : b.v}; }
+inline LaneIndex select(const LaneMask& mask, int a, const LaneIndex& b) {
+  return select(mask, makeIndex<Lanes>(a), b);
 }
 inline double getEntry(const double* x, int i) { return x[i]; }
-inline Lanes getEntry(const Lanes* x, const std::array<int, kLane>& i) {
+// Whether all lanes name the same entry. Neighbouring nodes mostly do, and then whole registers are moved.
+inline bool isUniform(const LaneIndex& i) { return !(i != makeIndex<Lanes>(i[0])); }
+inline Lanes getEntry(const Lanes* x, const LaneIndex& i) {
+  if (isUniform(i)) return x[i[0]];
   Lanes out;
   for (Eigen::Index l = 0; l < kLane; ++l) out.v[l] = x[i[l]].v[l];
   return out;
 }
 inline void setEntry(double* x, int i, double value) { x[i] = value; }
-inline void setEntry(Lanes* x, const std::array<int, kLane>& i, const Lanes& value) {
+inline void setEntry(Lanes* x, const LaneIndex& i, const Lanes& value) {
+  if (isUniform(i)) {
+    x[i[0]] = value;
+    return;
+  }
   for (Eigen::Index l = 0; l < kLane; ++l) x[i[l]].v[l] = value.v[l];
 }
 

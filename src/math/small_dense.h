@@ -9,6 +9,17 @@
 
 namespace bielle {
 
+/// sum += s x, `Rows` numbers each. For lanes it avoids an Eigen expression, which would store the factor at every step.
+template <int Rows, typename T>
+inline void addScaled(const T& s, const T* x, T* sum) {
+  if constexpr (std::is_same_v<T, double>) {
+    using Rows_ = Eigen::Array<T, Rows, 1>;
+    Eigen::Map<Rows_>(sum) += s * Eigen::Map<const Rows_>(x);
+  } else {
+    for (int i = 0; i < Rows; ++i) sum[i] += s * x[i];
+  }
+}
+
 /// out += sum over k of s b(k) A.col(k) for `Rows` rows from `row` on, in registers throughout.
 template <int Rows, typename A_, typename B_>
 inline void addSmallColumns(const A_& A, const B_& B, Eigen::Index column, Eigen::Index row, double s,
@@ -17,7 +28,7 @@ inline void addSmallColumns(const A_& A, const B_& B, Eigen::Index column, Eigen
   Rows_ sum = Rows_::Zero();
   const auto* a = A.data() + row;
   for (Eigen::Index k = 0; k < A.cols(); ++k, a += A.outerStride())
-    sum += B.coeff(k, column) * Eigen::Map<const Rows_>(a);
+    addScaled<Rows, typename A_::Scalar>(B.coeff(k, column), a, sum.data());
   Eigen::Map<Rows_>(out + row) += s * sum;
 }
 

@@ -57,7 +57,7 @@ void ReducedKernel::linearizeSteps(LinearizeItem* items, int count, std::vector<
   loadBases(batch.source());
   gatherLanes(count, 1, &h_, [&](int l) { return &items[l].spec->dt; });
   gatherLanes(count, x1_.size(), x1_.data(), [&](int l) { return items[l].next->x.data(); });
-  loadContacts(batch.source(), batch.indices.data());
+  loadContacts(batch.source(), batch.indices.data(), ContactUse::Derivatives);
   loadStep(batch.source());
   updateColumns(model_, ws_);
   updateVelocities(model_, ws_, v_);

@@ -64,9 +64,9 @@ struct ContactLanes {
   SE3Of<Lanes> X_WF;           // of the contact's frame
   Matrix3<Lanes> turn;         // as ContactLayout::Contact::turn
   Lanes kd;                    // gain
-  Vector6<Lanes> kp_residual;  // kp times the residual, as rows
-  Matrix6<Lanes> kp_rate;      // kp times the rows of its rate by the frame's twist
-  Vector6<Lanes> wrench;       // on the body, world
+  Vector6<Lanes> kp_residual;  // kp times the residual, as rows; of steps alone
+  Matrix6<Lanes> kp_rate;      // kp times the rows of its rate by the frame's twist; of derivatives alone
+  Vector6<Lanes> wrench;       // on the body, world; of derivatives alone
   Matrix6X<Lanes> dy, dv;      // 6 x outer coordinates of the tip: rows of Eq. (c)
 
   // Rows of a twist or acceleration in the world, and the wrench on the body of forces on the rows.
@@ -146,8 +146,10 @@ class ReducedKernel {
   void loadBases(LaneSource<const ReducedEvaluation> nodes);
   void loadPoints(const StepItem* items, int count);
   void loadControls(const StepItem* items, int count);
-  void loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices);
-  void loadContact(int lane, const ContactLayout::Contact& contact, const ReducedEvaluation& node, int closure_rows);
+  enum class ContactUse { Step, Derivatives };
+  void loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices, ContactUse use);
+  void loadContact(int lane, const ContactLayout::Contact& contact, const ReducedEvaluation& node, int closure_rows,
+                   ContactUse use);
   bool loadStateCosts(const int* indices, const StageSpec* const* specs, int count);
   void loadStep(LaneSource<const ReducedEvaluation> nodes);
   void storePoints(const StepItem* items, int count);

@@ -140,7 +140,7 @@ void ReducedKernel::step(const StepItem* items, int count, std::vector<LaneView>
   std::array<const ReducedEvaluation*, kLane> nodes;
   std::array<int, kLane> indices;
   for (int l = 0; l < count; ++l) nodes[l] = items[l].at, indices[l] = items[l].node;
-  loadContacts({nodes.data(), count}, indices.data());
+  loadContacts({nodes.data(), count}, indices.data(), ContactUse::Step);
   updateDriftAccelerations();
   updateSystem();
   const LaneMask regular = system_.factorize(M_, JcN_);

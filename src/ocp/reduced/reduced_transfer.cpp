@@ -27,7 +27,7 @@ void loadBasis(const ReducedCluster& cluster, int count, const Get& get, Cluster
   for (Eigen::Index c = 0; c < to.N.cols(); ++c)
     for (Eigen::Index k = 0; k < to.N.rows(); ++k) to.WN(k, c) = cluster.metric[k] * to.N(k, c);
   for (size_t k = 0; k < to.rows.size(); ++k)
-    for (int l = 0; l < kLane; ++l) to.rows[k][l] = get(l < count ? l : 0).rows[k];
+    for (int l = 0; l < kLane; ++l) to.rows[k].set(l, get(l < count ? l : 0).rows[k]);
 }
 
 template <typename Get>
@@ -113,45 +113,52 @@ void ReducedKernel::loadControls(const StepItem* items, int count) {
   for (int m = 0; m < model_.nu(); ++m) tau_[model_.motors()[m].dof] = u_[m];
 }
 
-// Nodes without a contact in a slot have zero force there; its other numbers are arbitrary.
-void ReducedKernel::loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices) {
+// Nodes without a contact in a slot have zero force there; its other numbers are arbitrary. Lanes without a node
+// repeat the first one: without its contacts they would fall, and take longer to close than all others.
+void ReducedKernel::loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices, ContactUse use) {
   for (ContactLanes& slot : contacts_) {
     slot.used = false;
     slot.present = 0;
     slot.kd = 0;
     slot.turn.setZero();
-    slot.kp_residual.setZero();
-    slot.kp_rate.setZero();
-    slot.wrench.setZero();
+    if (use == ContactUse::Step) {
+      slot.kp_residual.setZero();
+    } else {
+      slot.kp_rate.setZero();
+      slot.wrench.setZero();
+    }
   }
-  for (int l = 0; l < nodes.count; ++l) {
-    const ContactLayout& layout = layout_.contacts[indices[l]];
+  for (int l = 0; l < kLane; ++l) {
+    const ContactLayout& layout = layout_.contacts[indices[l < nodes.count ? l : 0]];
     for (const ContactLayout::Contact& contact : layout.contacts)
-      loadContact(l, contact, nodes[l], layout.closure_rows);
+      loadContact(l, contact, nodes[l], layout.closure_rows, use);
   }
 }
 
 void ReducedKernel::loadContact(int lane, const ContactLayout::Contact& contact, const ReducedEvaluation& node,
-                                int closure_rows) {
+                                int closure_rows, ContactUse use) {
   ContactLanes& slot = contacts_[contact.slot];
   const Closure& closure = *contact.closure;
   const SE3 X_WF = node.X_WB[closure.body1] * closure.X_B1;
-  const VectorUpTo6<double> lambda = node.lambda.segment(closure_rows + contact.row, contact.rows);
-  const Vector6d wrench = X_WF.actForce(expandRows(closure, lambda));
   for (int k = 0; k < 12; ++k) getNumbers(slot.X_WF)[k].set(lane, getNumbers(X_WF)[k]);
-  for (int k = 0; k < 6; ++k) slot.wrench[k].set(lane, wrench[k]);
   for (int k = 0; k < 9; ++k) slot.turn.data()[k].set(lane, contact.turn.data()[k]);
   slot.kd.set(lane, closure.kd);
   slot.present.set(lane, 1);
   slot.used = true;
-  if (closure.kp == 0) return;
   const SE3 X_12 = X_WF.inverseTimes(closure.X_B2);
-  const RowVectorUpTo6 residual = closure.kp * calcClosureResidual(closure, X_12);
-  const RowsBy6 rate = closure.kp * calcClosureResidualRate(closure, X_12);
-  for (int r = 0; r < contact.rows; ++r) {
-    slot.kp_residual[r].set(lane, residual[r]);
-    for (int c = 0; c < 6; ++c) slot.kp_rate(r, c).set(lane, rate(r, c));
+  if (use == ContactUse::Step) {
+    if (closure.kp == 0) return;
+    const RowVectorUpTo6 residual = closure.kp * calcClosureResidual(closure, X_12);
+    for (int r = 0; r < contact.rows; ++r) slot.kp_residual[r].set(lane, residual[r]);
+    return;
   }
+  const VectorUpTo6<double> lambda = node.lambda.segment(closure_rows + contact.row, contact.rows);
+  const Vector6d wrench = X_WF.actForce(expandRows(closure, lambda));
+  for (int k = 0; k < 6; ++k) slot.wrench[k].set(lane, wrench[k]);
+  if (closure.kp == 0) return;
+  const RowsBy6 rate = closure.kp * calcClosureResidualRate(closure, X_12);
+  for (int r = 0; r < contact.rows; ++r)
+    for (int c = 0; c < 6; ++c) slot.kp_rate(r, c).set(lane, rate(r, c));
 }
 
 // References and weights of the state costs, unless they are still loaded from the last call. False if no node has one;
