@@ -4,3 +4,4 @@ bielle_test(ocp_problem SOURCES test_ocp_problem.cpp mechanisms.cpp LIBS bielle_
 target_link_options(test_ocp_problem PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 bielle_test(lanes SOURCES test_lanes.cpp LIBS bielle_motion)
 bielle_test(reduced SOURCES test_reduced.cpp mechanisms.cpp LIBS bielle_motion)
+bielle_test(path_constraints SOURCES test_path_constraints.cpp mechanisms.cpp LIBS bielle_motion)

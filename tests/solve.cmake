@@ -5,3 +5,5 @@ bielle_test(fddp_failures SOURCES test_fddp_failures.cpp LIBS bielle_solve biell
 target_link_options(test_fddp PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 bielle_test(fddp_batches SOURCES test_fddp_batches.cpp LIBS bielle_solve bielle_model)
 target_link_options(test_fddp_batches PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
+bielle_test(constraints SOURCES test_constraints.cpp LIBS bielle_solve bielle_model)
+target_link_options(test_constraints PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)

@@ -310,8 +310,8 @@ TEST_CASE("shooting problem: steps and linearizations allocate nothing after the
     };
     EvaluateTask steps[] = {{0, &at, &u, nullptr, stage.get()}, {1, &x, nullptr, nullptr, terminal.get()}};
     LinearizeTask linearizations[2];
-    linearizations[0] = {0, stage.get(), terminal.get(), &models[0], StepStatus::Failed, {}};
-    linearizations[1] = {1, terminal.get(), nullptr, &models[1], StepStatus::Failed, {}};
+    linearizations[0] = {0, stage.get(), terminal.get(), nullptr, &models[0], StepStatus::Failed, {}};
+    linearizations[1] = {1, terminal.get(), nullptr, nullptr, &models[1], StepStatus::Failed, {}};
     const IntegrateTask move{0, stage.get(), &small, &moved};
     const DifferenceTask difference{0, stage.get(), &x, &dx};
     measure(0, [&] { problem.evaluate(steps, 2, scratch.get()); });

@@ -4,6 +4,10 @@
 #include <catch2/catch.hpp>
 #include <random>
 
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/motion.h"
+#include "bielle/ocp/residual.h"
 #include "wrench_cone.h"
 
 using namespace bielle;
@@ -142,6 +146,39 @@ TEST_CASE("wrench cone: sums of corner forces are inside, those in round cones t
       CHECK(calcMargin(sole, cones) > -1e-14);
       CHECK(calcMargin(sole, 300 * cones) == Approx(calcMargin(sole, cones)).margin(1e-14));
     }
+}
+
+// The check and the solver have the cone from sources of their own.
+TEST_CASE("wrench cone: the rows that the solver keeps positive are the same cone") {
+  Random random;
+  const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto").model;
+  const VectorXd q = makeStandingPosture(model), u = VectorXd::Zero(model.nu());
+  const ConstraintSet set = makeConstraintSet(model, makeContactTargets(model, q, {1}, 0, 0));
+  const int contact = set.num_loops;
+  const Workspace ws(model);
+  VectorXd lambda = VectorXd::Zero(set.rows);
+  int inside = 0, outside = 0;
+  for (const Sole& sole : kSoles) {
+    const auto cone = makeWrenchCone(set, contact, sole.X, sole.Y, sole.mu);
+    REQUIRE(cone->size() == 17);
+    VectorXd rows(17);
+    for (int i = 0; i < 4000; ++i) {
+      const Vector6d wrench = random.drawWrench(sole);
+      lambda.segment<6>(set.offsets[contact]) = wrench;
+      cone->calc({model, ws, set, u, lambda}, rows);
+      if (wrench[2] < 1e-3) {
+        CHECK(rows[0] == Approx(wrench[2]));
+        continue;
+      }
+      rows /= wrench[2];
+      rows.segment<4>(1) *= sole.X + sole.Y;
+      const double margin = calcMargin(sole, wrench);
+      CHECK(rows.tail<16>().minCoeff() == Approx(margin).margin(1e-12));
+      ++(margin > 0 ? inside : outside);
+    }
+  }
+  CHECK(inside > 600);
+  CHECK(outside > 600);
 }
 
 TEST_CASE("wrench cone: what is nearest, light feet, soles without size, numbers that are none") {

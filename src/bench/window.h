@@ -23,6 +23,13 @@ class Window : public ShootingProblem {
   void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override {
     whole_.getControlBounds(first_ + stage, lower, upper);
   }
+  int constraintSize(int node) const override { return whole_.constraintSize(getNode(node)); }
+  void getConstraintBounds(int node, VectorRef lower, VectorRef upper) const override {
+    whole_.getConstraintBounds(getNode(node), lower, upper);
+  }
+  std::string getConstraintName(int node, int row) const override {
+    return whole_.getConstraintName(getNode(node), row);
+  }
   std::unique_ptr<NodeEvaluation> makeEvaluation() const override { return whole_.makeEvaluation(); }
   std::unique_ptr<ProblemScratch> makeScratch() const override {
     auto out = std::make_unique<Scratch>();

@@ -63,6 +63,10 @@ Activation Activation::makeLogBarrier(const VectorXd& weights, const VectorXd& l
   return {ActivationKind::LogBarrier, weights, lower, upper, relaxation};
 }
 
+bool PathConstraint::hasSize(Eigen::Index rows) const {
+  return lower.size() == rows && upper.size() == rows && scale.size() == rows;
+}
+
 bool Activation::hasSize(Eigen::Index rows) const {
   const bool barrier = kind != ActivationKind::Quadratic;
   return weights.size() == rows && (!barrier || (lower.size() == rows && upper.size() == rows)) &&

@@ -4,16 +4,22 @@
 
 namespace bielle {
 
-NodeCosts::NodeCosts(const StageSpec& spec, bool running) : spec_(spec), first_rows_(spec.costs.size()) {
+NodeCosts::NodeCosts(const StageSpec& spec, bool running)
+    : spec_(spec), first_rows_(spec.costs.size()), first_constraint_rows_(spec.path_constraints.size()) {
   if (running && spec.kind == StageKind::Dynamics) scale_ = spec.dt;
-  for (bool motion : {true, false}) {
-    for (size_t c = 0; c < spec.costs.size(); ++c) {
-      if (spec.costs[c].residual->needsMotion() != motion) continue;
-      first_rows_[c] = rows_;
-      rows_ += spec.costs[c].residual->size();
+  const auto place = [this](const auto& elements, bool motion, std::vector<int>& first_rows) {
+    for (size_t i = 0; i < elements.size(); ++i) {
+      if (elements[i].residual->needsMotion() != motion) continue;
+      first_rows[i] = rows_;
+      rows_ += elements[i].residual->size();
     }
+  };
+  for (bool motion : {true, false}) {
+    place(spec.costs, motion, first_rows_);
+    place(spec.path_constraints, motion, first_constraint_rows_);
     if (motion) motion_rows_ = rows_;
   }
+  for (const PathConstraint& constraint : spec.path_constraints) constraint_rows_ += constraint.residual->size();
 }
 
 double NodeCosts::calcControlCost(const VectorXd& u) const {
@@ -39,6 +45,15 @@ void NodeCosts::calc(const NodeView& node, RobotEvaluation& at) const {
     const Residual& residual = *spec_.costs[c].residual;
     residual.calc(node, at.residuals.segment(first_rows_[c], residual.size()));
   }
+  int row = 0;
+  for (size_t c = 0; c < spec_.path_constraints.size(); ++c) {
+    const PathConstraint& constraint = spec_.path_constraints[c];
+    const int n = constraint.residual->size();
+    auto r = at.residuals.segment(first_constraint_rows_[c], n);
+    constraint.residual->calc(node, r);
+    at.constraints.segment(row, n) = r.cwiseQuotient(constraint.scale);
+    row += n;
+  }
   double sum = 0;
   visitValues(at, [&](const std::string&, double value) { sum += value; });
   at.cost = scale_ * sum;
@@ -50,8 +65,17 @@ std::vector<CostValue> NodeCosts::getValues(const RobotEvaluation& at) const {
   return values;
 }
 
-void NodeCosts::differentiate(const NodeView& node, const RobotEvaluation& at, ResidualWeights& weights,
-                              ResidualJacobians& jacobians) const {
+void NodeCosts::addJacobian(const NodeView& node, const Residual& residual, int row, const ResidualWeights& weights,
+                            ResidualJacobians& jacobians) const {
+  const int n = residual.size();
+  if (weights.gradient.segment(row, n).isZero(0) && weights.hessian.segment(row, n).isZero(0))
+    return;  // bounds that are kept
+  residual.calcJacobian(node, {jacobians.q.middleRows(row, n), jacobians.v.middleRows(row, n),
+                               jacobians.lambda.block(row, 0, n, spec_.constraints.rows)});
+}
+
+void NodeCosts::differentiate(const NodeView& node, const RobotEvaluation& at, const ConstraintWeights* constraints,
+                              ResidualWeights& weights, ResidualJacobians& jacobians) const {
   for (size_t c = 0; c < spec_.costs.size(); ++c) {
     const Cost& cost = spec_.costs[c];
     const int n = cost.residual->size(), row = first_rows_[c];
@@ -59,9 +83,21 @@ void NodeCosts::differentiate(const NodeView& node, const RobotEvaluation& at, R
     cost.activation.calcDerivatives(at.residuals.segment(row, n), gradient, hessian);
     gradient *= scale_ * cost.weight;
     hessian *= scale_ * cost.weight;
-    if (gradient.isZero(0) && hessian.isZero(0)) continue;  // for example bounds that are satisfied
-    cost.residual->calcJacobian(node, {jacobians.q.middleRows(row, n), jacobians.v.middleRows(row, n),
-                                       jacobians.lambda.block(row, 0, n, spec_.constraints.rows)});
+    addJacobian(node, *cost.residual, row, weights, jacobians);
+  }
+  int constraint_row = 0;
+  for (size_t c = 0; c < spec_.path_constraints.size(); ++c) {
+    const PathConstraint& constraint = spec_.path_constraints[c];
+    const int n = constraint.residual->size(), row = first_constraint_rows_[c];
+    auto gradient = weights.gradient.segment(row, n), hessian = weights.hessian.segment(row, n);
+    gradient.setZero();
+    hessian.setZero();
+    if (constraints) {
+      gradient = constraints->gradient.segment(constraint_row, n).cwiseQuotient(constraint.scale);
+      hessian = constraints->hessian.segment(constraint_row, n).cwiseQuotient(constraint.scale.cwiseAbs2());
+    }
+    addJacobian(node, *constraint.residual, row, weights, jacobians);
+    constraint_row += n;
   }
 }
 

@@ -146,6 +146,34 @@ class FrictionPyramid : public ForceResidual {
   double mu_;
 };
 
+// Linear in the force: r = A F.
+class WrenchCone : public ForceResidual {
+ public:
+  WrenchCone(const ConstraintSet& set, int constraint, double X, double Y, double mu)
+      : ForceResidual(set, constraint, ForceAxes::Contact), A_(MatrixXd::Zero(rows_ == 6 ? 17 : 5, rows_)) {
+    A_.col(2).setConstant(mu);
+    A_(0, 2) = 1;
+    for (int side = 0; side < 2; ++side) {
+      const double s = side == 0 ? -1 : 1;
+      A_(1 + side, 0) = A_(3 + side, 1) = s;
+      if (rows_ < 6) continue;
+      A_.row(5 + side) << 0, 0, Y, s, 0, 0;
+      A_.row(7 + side) << 0, 0, X, 0, s, 0;
+      for (int other = 0; other < 2; ++other) {
+        const double t = other == 0 ? -1 : 1;
+        A_.row(9 + 2 * side + other) << s * Y, t * X, mu * (X + Y), -s * mu, -t * mu, 1;
+        A_.row(13 + 2 * side + other) << s * Y, t * X, mu * (X + Y), s * mu, t * mu, -1;
+      }
+    }
+  }
+  int size() const override { return static_cast<int>(A_.rows()); }
+  void calc(const NodeView& node, VectorRef r) const override { r.noalias() = A_ * getForce(node); }
+  void calcJacobian(const NodeView&, ResidualRows rows) const override { rows.lambda.middleCols(row_, rows_) = A_; }
+
+ private:
+  MatrixXd A_;
+};
+
 class JointPosition : public Residual {
  public:
   JointPosition(const Model& model, std::vector<int> dofs) : dofs_(std::move(dofs)) {
@@ -203,6 +231,10 @@ std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int con
 }
 std::unique_ptr<Residual> makeFrictionPyramid(const ConstraintSet& set, int constraint, double mu) {
   return std::make_unique<FrictionPyramid>(set, constraint, mu);
+}
+std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constraint, double half_length,
+                                         double half_width, double mu) {
+  return std::make_unique<WrenchCone>(set, constraint, half_length, half_width, mu);
 }
 std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs) {
   return std::make_unique<JointPosition>(model, dofs);

@@ -9,7 +9,7 @@
 namespace bielle {
 namespace {
 
-void checkSpec(const Model& model, const StageSpec& spec, size_t index) {
+void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool terminal) {
   const std::string element = "stage " + std::to_string(index);
   const auto require = [&](bool ok, const std::string& what, const std::string& remedy) {
     if (!ok) throw ModelError(model.name(), element, what, remedy);
@@ -27,25 +27,42 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index) {
             "the control cost has wrong sizes", "reference and weights: nu");
   require(spec.effort_limits.size() == 0 || spec.effort_limits.size() == model.nu(),
           "its effort limits have a wrong size", "effort_limits: nu, or empty");
-  for (const Cost& cost : spec.costs)
+  const auto requireForces = [&](const Residual& residual, const std::string& name) {
+    require(!terminal || !residual.needsForces(), name + " is about forces, of which the terminal node has none",
+            "leave it out there");
+  };
+  for (const Cost& cost : spec.costs) {
     require(cost.residual && cost.activation.hasSize(cost.residual->size()),
             "cost '" + cost.name + "': weights or bounds do not have the size of the residual",
             "give one weight per row of the residual and, for a barrier, one lower and one upper bound");
+    requireForces(*cost.residual, "cost '" + cost.name + "'");
+  }
+  for (const PathConstraint& constraint : spec.path_constraints) {
+    const std::string name = "path constraint '" + constraint.name + "'";
+    require(constraint.residual && constraint.hasSize(constraint.residual->size()),
+            name + ": bounds or scale do not have the size of the residual", "give one of each per row");
+    require((constraint.scale.array() > 0).all(), name + ": a scale is not positive",
+            "give what counts as a violation of 1");
+    require((constraint.lower.array() <= constraint.upper.array()).all(), name + ": a lower bound exceeds the upper",
+            "exchange them");
+    requireForces(*constraint.residual, name);
+  }
 }
 
 }  // namespace
 
 const char* getName(Formulation formulation) { return formulation == Formulation::Full ? "full" : "reduced"; }
 
-bool startEvaluation(const Model& model, const EvaluateTask& task, const StageSpec& spec, bool running, int residuals,
-                     RobotEvaluation& at) {
+bool startEvaluation(const Model& model, const EvaluateTask& task, const StageSpec& spec, bool running,
+                     const NodeCosts& costs, RobotEvaluation& at) {
   at.x = *task.x;
   at.u.resize(running ? model.nu() : 0);
   if (running) at.u = *task.u;
   at.x_next.resize(running ? at.x.size() : 0);
   at.a.resize(running ? model.nv() : 0);
   at.lambda.resize(running ? spec.constraints.rows : 0);
-  at.residuals.resize(residuals);
+  at.residuals.resize(costs.rows());
+  at.constraints.resize(costs.constraintRows());
   at.state_cost = 0;
   at.status = StepStatus::Failed;
   at.failure.clear();
@@ -63,7 +80,7 @@ RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorX
     throw ModelError(model.name(), "shooting problem", "it has no stage", "give at least the terminal one");
   if (q0.size() != model.nq() || v0.size() != model.nv())
     throw ModelError(model.name(), "shooting problem", "the initial state has a wrong size", "q0: nq, v0: nv");
-  for (size_t k = 0; k < specs_.size(); ++k) checkSpec(model, specs_[k], k);
+  for (size_t k = 0; k < specs_.size(); ++k) checkSpec(model, specs_[k], k, k + 1 == specs_.size());
   transcription_ = formulation == Formulation::Full ? makeFullTranscription(model, specs_)
                                                     : makeReducedTranscription(model, q0, specs_);
   x0_.resize(stateSize());
@@ -113,6 +130,31 @@ void RobotProblem::getControlBounds(int stage, VectorRef lower, VectorRef upper)
     upper[m] = limits.size() ? limits[m] : model_.motors()[m].effort_limit;
     lower[m] = -upper[m];
   }
+}
+
+int RobotProblem::constraintSize(int node) const {
+  int size = 0;
+  for (const PathConstraint& constraint : specs_[node].path_constraints) size += constraint.residual->size();
+  return size;
+}
+
+void RobotProblem::getConstraintBounds(int node, VectorRef lower, VectorRef upper) const {
+  int row = 0;
+  for (const PathConstraint& constraint : specs_[node].path_constraints) {
+    const int n = constraint.residual->size();
+    lower.segment(row, n) = constraint.lower.cwiseQuotient(constraint.scale);
+    upper.segment(row, n) = constraint.upper.cwiseQuotient(constraint.scale);
+    row += n;
+  }
+}
+
+std::string RobotProblem::getConstraintName(int node, int row) const {
+  for (const PathConstraint& constraint : specs_[node].path_constraints) {
+    const int n = constraint.residual->size();
+    if (row < n) return constraint.name + (n > 1 ? ", row " + std::to_string(row) : "");
+    row -= n;
+  }
+  return ShootingProblem::getConstraintName(node, row);
 }
 
 std::vector<CostValue> RobotProblem::getCosts(int node, const RobotEvaluation& at) const {

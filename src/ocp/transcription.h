@@ -26,8 +26,8 @@ std::unique_ptr<Transcription> makeReducedTranscription(const Model& model, cons
                                                         const std::vector<StageSpec>& specs);
 
 // Gives `at` the sizes, the state and the controls of a task, and the status Failed. False if they are not finite.
-bool startEvaluation(const Model& model, const EvaluateTask& task, const StageSpec& spec, bool running, int residuals,
-                     RobotEvaluation& at);
+bool startEvaluation(const Model& model, const EvaluateTask& task, const StageSpec& spec, bool running,
+                     const NodeCosts& costs, RobotEvaluation& at);
 
 // False if an entry of a model that the solver reads is not finite.
 bool isFinite(const StageModel& model);

@@ -31,6 +31,7 @@ int BackwardPass::update(const BackwardInput& input) {
     tasks_[k].node = k;
     tasks_[k].at = nodes[k].get();
     tasks_[k].next = k < N ? nodes[k + 1].get() : nullptr;
+    tasks_[k].weights = input.lagrangian.getWeights(k);
     tasks_[k].out = &models_[k];
     linearized_[k].store(false, std::memory_order_relaxed);
   }

@@ -3,9 +3,9 @@
 #include <atomic>
 #include <string>
 
+#include "solve/augmented_lagrangian.h"
 #include "solve/hessian_pool.h"
 #include "solve/lq_sweep.h"
-#include "solve/node_evaluations.h"
 
 namespace bielle {
 
@@ -13,6 +13,7 @@ namespace bielle {
 struct BackwardInput {
   const ShootingProblem& problem;
   const NodeEvaluations& evaluations;
+  const AugmentedLagrangian& lagrangian;
   const std::vector<ControlBox>& boxes;
   LqRegularization regularization;
   int threads;

@@ -20,13 +20,15 @@ namespace {
 constexpr double kPenaltyMargin = 0.5;  // rho of Eq. (5)
 // Differences of costs below this share of the cost are rounding: they neither accept nor reject a step.
 constexpr double kCostRounding = 1e-14;
-constexpr double kClosingShare = 0.5;  // largest share of Eq. (4) that Eq. (8) may reach
+constexpr double kClosingShare = 0.5;  // of Eq. (4): the most that Eq. (8) may be
+constexpr double kGoodStep = 0.1;      // alpha after which a foreseen decrease is believed
 constexpr int kShortestSegment = 6;    // stages
 
 }  // namespace
 
 struct Fddp::Workspace {
   NodeEvaluations evaluations;
+  AugmentedLagrangian lagrangian;
   BackwardPass backward;
   std::vector<VectorXd> dx, du;  // the models' full step
   Rollout rollout;
@@ -40,6 +42,7 @@ struct Fddp::Workspace {
 void Fddp::Workspace::resize(const ShootingProblem& problem, const FddpOptions& options, int threads) {
   const int num_trials = std::min(problem.getBatchSize(), options.num_step_lengths);
   evaluations.resize(problem, num_trials > 1 ? 2 * num_trials : 0, threads);
+  lagrangian.resize(problem, options.constraints);
   backward.resize(problem);
   rollout.resize(problem, options.rollout_segments, num_trials);
   bounds.resize(options.bounds == ControlBounds::Enforce ? problem.numStages() : 0);
@@ -77,10 +80,12 @@ class Run {
   void updateGaps();
   End findStep();
   End updateStep();
+  End updateMultipliers();
   bool searchLine();
   bool tryFullStep(const RolloutInput& input, int segments, double nu);
   bool searchInSegments(const RolloutInput& input, int segments, double nu);
   bool accept(Trial& trial, double nu);
+  bool mustUpdateMultipliers() const;
   bool mustClose() const;
   bool closesTwice(int segments) const;
   bool isAcceptable(const Trial& trial, double nu) const;
@@ -91,7 +96,10 @@ class Run {
 
   bool isInterrupted() const { return observer_.interrupt && observer_.interrupt->load(); }
   int getNumSegments() const { return std::max(1, std::min(options_.rollout_segments, N_ / kShortestSegment)); }
-  bool isFeasible() const { return line_.gap <= options_.gap_tolerance; }
+  bool isClosed() const { return line_.gap <= options_.gap_tolerance; }
+  bool isStationary() const { return isClosed() && (stalled_ || line_.gradient <= options_.gradient_tolerance); }
+  double calcForeseen() const { return -slope_ - 0.5 * curvature_; }  // decrease by a full step
+  double calcMerit() const { return line_.cost + work_.lagrangian.getValue(); }
   double calcGradient() const;
 
   const FddpOptions& options_;
@@ -102,15 +110,19 @@ class Run {
 
   int N_ = 0;
   Clock::time_point start_ = Clock::now();
-  FddpIteration line_;                // the current iteration
-  double gap_sum_ = 0;                // c, of the gaps that count as open
-  double slope_ = 0, curvature_ = 0;  // Eq. (1)
-  double regularization_ = 0;
+  FddpIteration line_;                                    // the iteration under way
+  double gap_sum_ = 0;                                    // c, of the gaps that count as open
+  double slope_ = 0, curvature_ = 0;                      // Eq. (1)
+  double regularization_ = 0, first_regularization_ = 0;  // the latter of the first sweep of an iteration
   int threads_ = 1;
-  bool swept_ = false;         // a sweep has not been used yet
+  bool swept_ = false;         // a sweep is still to be looked at
+  bool raised_ = false;        // multipliers are new in this iteration
+  bool closing_ = false;       // the next step is the last
+  bool stalled_ = false;       // the last step left the merit as it was, to rounding
   Trial* accepted_ = nullptr;  // the trial that ends a line search
   int failed_node_ = -1;       // where the first failed trial of a line search failed, and why
   std::string failure_;
+  double accepted_merit_ = 0;
   double last_gradient_ = 0, last_step_ = 1;  // of the iteration before
   FddpSummary summary_;
 };
@@ -144,14 +156,18 @@ Run::End Run::linearize() {
     last_step_ = line_.step;
   }
   line_ = FddpIteration();
+  raised_ = false;
+  first_regularization_ = regularization_;
   line_.iteration = summary_.iterations + 1;
   for (size_t k = 0; k < work_.boxes.size(); ++k) {
     work_.boxes[k].lower = work_.bounds[k].lower - trajectory_.us[k];
     work_.boxes[k].upper = work_.bounds[k].upper - trajectory_.us[k];
   }
   if (const End end = evaluate()) return end;
+  work_.lagrangian.update(work_.evaluations.getIterate());
   if (const End end = linearizeAndSweep()) return end;
   updateGaps();
+  line_.violation = work_.lagrangian.getViolation();
   summary_.cost = line_.cost;
   summary_.gap = line_.gap;
   return {};
@@ -168,7 +184,8 @@ Run::End Run::evaluate() {
 
 Run::End Run::linearizeAndSweep() {
   const LqRegularization regularization{regularization_, regularization_ * options_.state_regularization_ratio};
-  const int failed = work_.backward.update({problem_, work_.evaluations, work_.boxes, regularization, threads_});
+  const int failed =
+      work_.backward.update({problem_, work_.evaluations, work_.lagrangian, work_.boxes, regularization, threads_});
   swept_ = true;
   if (failed < 0) return {};
   summary_.message = "node " + std::to_string(failed) + ": " + work_.backward.getFailure(failed);
@@ -193,10 +210,39 @@ Run::End Run::findStep() {
   while (true) {
     if (isInterrupted()) return FddpTermination::Interrupted;
     if (const End end = updateStep()) return end;
-    if (line_.gradient <= options_.gradient_tolerance && isFeasible()) return FddpTermination::Converged;
+    if (isStationary() && work_.lagrangian.isSatisfied()) return FddpTermination::Converged;
+    if (mustUpdateMultipliers()) {
+      if (const End end = updateMultipliers()) return end;
+      continue;
+    }
     if (searchLine()) return {};
     if (const End end = raiseRegularization("no step is acceptable")) return end;
   }
+}
+
+// New multipliers are due once the cost can hardly fall under the old ones.
+bool Run::mustUpdateMultipliers() const {
+  const AugmentedLagrangian& lagrangian = work_.lagrangian;
+  if (lagrangian.isEmpty()) return false;
+  if (isStationary()) return true;
+  const bool first_sweep = regularization_ == first_regularization_;
+  return !raised_ && first_sweep && last_step_ >= kGoodStep &&
+         calcForeseen() <= lagrangian.getShare() * lagrangian.getGain();
+}
+
+// Eq. (12). The next sweep makes new models about the same evaluations.
+Run::End Run::updateMultipliers() {
+  if (!work_.lagrangian.raise(work_.evaluations.getIterate(), line_.cost)) {
+    if (!isClosed() && !closing_) {  // one more step, which closes the gaps
+      closing_ = raised_ = true;
+      return {};
+    }
+    summary_.message = "the constraints cannot all be kept: " + work_.lagrangian.describeWorst(problem_);
+    return FddpTermination::Infeasible;
+  }
+  stalled_ = swept_ = false;
+  raised_ = true;
+  return {};
 }
 
 // The sweep, at the smallest regularization from the current one on for which it succeeds. A second sweep needs new
@@ -244,7 +290,7 @@ double Run::calcGradient() const {
 // falling at the same rate.
 bool Run::mustClose() const {
   const bool last = options_.last_rollout == LastRollout::Closed && line_.iteration >= options_.max_iterations;
-  return last ||
+  return last || closing_ ||
          line_.gradient * line_.gradient <= options_.gradient_tolerance * std::max(line_.gradient, last_gradient_);
 }
 
@@ -258,9 +304,16 @@ bool Run::closesTwice(int segments) const {
 bool Run::searchLine() {
   const double penalized = std::max(0.0, slope_ + 0.5 * std::max(0.0, curvature_));
   const double nu = gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0;  // Eq. (5)
-  const RolloutInput input{
-      problem_,     trajectory_, work_.evaluations, work_.backward.getModels(), work_.backward.getSweep(), work_.dx,
-      work_.bounds, work_.open,  threads_};
+  const RolloutInput input{problem_,
+                           trajectory_,
+                           work_.evaluations,
+                           work_.backward.getModels(),
+                           work_.backward.getSweep(),
+                           work_.lagrangian,
+                           work_.dx,
+                           work_.bounds,
+                           work_.open,
+                           threads_};
   const int segments = getNumSegments();
   if (segments > 1 && options_.last_rollout == LastRollout::Segments && !mustClose())
     return searchInSegments(input, segments, nu);
@@ -318,8 +371,8 @@ bool Run::accept(Trial& trial, double nu) {
 bool Run::isAcceptable(const Trial& trial, double nu) const {
   const double alpha = trial.alpha;
   const double foreseen = -alpha * slope_ - 0.5 * alpha * alpha * curvature_ + nu * alpha * gap_sum_;
-  const double real = line_.cost - trial.cost - trial.closing_cost + nu * (gap_sum_ - trial.gap_sum);
-  const double rounding = kCostRounding * std::abs(line_.cost);
+  const double real = calcMerit() - trial.merit - trial.closing_cost + nu * (gap_sum_ - trial.gap_sum);
+  const double rounding = kCostRounding * (std::abs(line_.cost) + std::abs(work_.lagrangian.getValue()));
   const double decrease = std::max(0.0, foreseen);  // boxes make Eq. (4) an approximation
   return real >= options_.acceptance * decrease - rounding &&
          std::abs(trial.closing_cost) <= kClosingShare * decrease + rounding;
@@ -333,6 +386,7 @@ void Run::acceptStep() {
     work_.evaluations.outdate();
   }
   line_.step = accepted_->alpha;
+  accepted_merit_ = accepted_->merit;
   summary_.cost = accepted_->cost;
   summary_.gap = accepted_->gap_max;
   ++summary_.iterations;
@@ -354,8 +408,10 @@ Run::End Run::checkProgress() {
   if (observer_.callback && observer_.callback(line_) == FddpAction::Stop) return FddpTermination::Interrupted;
 
   const bool newton = line_.step == 1 && line_.regularization <= options_.min_regularization;
-  const bool closed = isFeasible() && summary_.gap <= options_.gap_tolerance;
-  if (newton && closed && std::abs(line_.cost - summary_.cost) < options_.cost_tolerance * std::abs(line_.cost)) {
+  const bool closed = isClosed() && summary_.gap <= options_.gap_tolerance;
+  stalled_ =
+      newton && closed && std::abs(calcMerit() - accepted_merit_) < options_.cost_tolerance * std::abs(line_.cost);
+  if (stalled_ && work_.lagrangian.isEmpty()) {
     summary_.message = "the cost no longer decreases";
     return FddpTermination::Converged;
   }
@@ -370,11 +426,20 @@ Run::End Run::checkProgress() {
 
 FddpSummary Run::finish(FddpTermination termination) {
   summary_.termination = termination;
+  if (!work_.lagrangian.isEmpty()) {
+    if (termination == FddpTermination::Converged) work_.lagrangian.settle();
+    summary_.violation = work_.lagrangian.getViolation();
+    summary_.complementarity = work_.lagrangian.getComplementarity();
+    summary_.multiplier = work_.lagrangian.getLargestMultiplier();
+    summary_.penalty = work_.lagrangian.getPenalty();
+    summary_.multiplier_updates = work_.lagrangian.getNumRaises();
+  }
   summary_.seconds = calcSecondsSince(start_);
   summary_.linearize_seconds = work_.evaluations.getSeconds() + work_.backward.getLinearizeSeconds();
   summary_.sweep_seconds += work_.backward.getSweepSeconds();
   summary_.rollout_seconds = work_.rollout.getSeconds();
-  const bool judged = termination == FddpTermination::Converged || termination == FddpTermination::RegularizationMax;
+  const bool judged = termination == FddpTermination::Converged || termination == FddpTermination::RegularizationMax ||
+                      termination == FddpTermination::Infeasible;
   if (judged && line_.step == 0) {  // the iterate from which no step was taken
     line_.seconds = summary_.seconds;
     summary_.log.push_back(line_);
@@ -383,7 +448,8 @@ FddpSummary Run::finish(FddpTermination termination) {
   if (!summary_.message.empty()) return std::move(summary_);
   switch (termination) {
     case FddpTermination::Converged:
-      summary_.message = "the gradient vanishes and the gaps are closed";
+      summary_.message = work_.lagrangian.isEmpty() ? "the gradient vanishes and the gaps are closed"
+                                                    : "the gradient vanishes, gaps are closed and constraints kept";
       break;
     case FddpTermination::MaxIterations:
       summary_.message = "the largest number of iterations is reached";
@@ -392,6 +458,7 @@ FddpSummary Run::finish(FddpTermination termination) {
       summary_.message = "stopped from outside";
       break;
     case FddpTermination::RegularizationMax:
+    case FddpTermination::Infeasible:
     case FddpTermination::Failed:
       break;
   }
@@ -411,6 +478,9 @@ FddpSummary Fddp::solve(const ShootingProblem& problem, ShootingTrajectory& traj
   return Run(options_, problem, trajectory, observer, *work_).solve();
 }
 
+Multipliers Fddp::getMultipliers() const { return work_->lagrangian.getMultipliers(); }
+void Fddp::setMultipliers(const Multipliers& multipliers) { work_->lagrangian.setMultipliers(multipliers); }
+
 void Fddp::advance(ShootingTrajectory& trajectory) {
   const size_t N = trajectory.us.size();
   if (N < 1 || trajectory.xs.size() != N + 1) throw std::invalid_argument("Fddp: no trajectory to advance");
@@ -419,6 +489,7 @@ void Fddp::advance(ShootingTrajectory& trajectory) {
   trajectory.xs[N] = trajectory.xs[N - 1];
   if (N > 1) trajectory.us[N - 1] = trajectory.us[N - 2];
   work_->evaluations.advance();
+  work_->lagrangian.advance();
 }
 
 const LqSweep& Fddp::getSweep() const { return work_->backward.getSweep(); }

@@ -13,6 +13,8 @@ const char* getName(FddpTermination termination) {
       return "maximum of iterations";
     case FddpTermination::RegularizationMax:
       return "maximum of regularization";
+    case FddpTermination::Infeasible:
+      return "infeasible";
     case FddpTermination::Interrupted:
       return "interrupted";
     case FddpTermination::Failed:

@@ -120,12 +120,13 @@ void Rollout::rollOut(const RolloutInput& input, int num_tracks) {
   errors.rethrow();
   for (Trial& trial : trials_) {
     trial.ok = true;
-    trial.cost = 0;
+    trial.cost = trial.merit = 0;
     trial.failed_node = -1;
   }
   for (int t = 0; t < num_tracks; ++t) {
     Trial& trial = *tracks_[t].trial;
     trial.cost += tracks_[t].cost;
+    trial.merit += tracks_[t].merit;
     if (trial.ok && tracks_[t].failed_node >= 0) {
       trial.ok = false;
       trial.failed_node = tracks_[t].failed_node;
@@ -151,7 +152,7 @@ void Rollout::startTracks(const RolloutInput& input, Group& group) {
   group.moved.clear();
   for (int t = group.begin; t < group.end; ++t) {
     Track& track = tracks_[t];
-    track.cost = 0;
+    track.cost = track.merit = 0;
     track.failed_node = -1;
     const int k = track.begin;
     VectorXd& deviation = track.trial->deviations[k];
@@ -194,7 +195,8 @@ void Rollout::evaluateNodes(const RolloutInput& input, int step, Group& group) {
     const int k = group.evaluations[i].node;
     const bool ok = out.status == StepStatus::Ok;
     if (ok) track.cost += out.cost;
-    if (!ok || !std::isfinite(track.cost) || (k < N_ && !out.x_next.allFinite())) track.fail(k, out.failure);
+    if (ok) track.merit += out.cost + input.lagrangian.calc(k, out.constraints);
+    if (!ok || !std::isfinite(track.merit) || (k < N_ && !out.x_next.allFinite())) track.fail(k, out.failure);
   }
 }
 
@@ -277,7 +279,7 @@ void Rollout::updateGaps(const RolloutInput& input, int num_tracks, Trial& trial
       trial.gap_max = std::max(trial.gap_max, rest * gap.lpNorm<Eigen::Infinity>());
     }
   }
-  trial.ok = std::isfinite(trial.cost) && std::isfinite(trial.gap_sum) && std::isfinite(trial.closing_cost);
+  trial.ok = std::isfinite(trial.merit) && std::isfinite(trial.gap_sum) && std::isfinite(trial.closing_cost);
 }
 
 // The gap between two segments, and its contribution to Eq. (8).

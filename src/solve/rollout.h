@@ -1,7 +1,7 @@
 #pragma once
 // The nonlinear rollout of trial steps (fddp.h, Eqs. 2, 3, 7 and 8).
+#include "solve/augmented_lagrangian.h"
 #include "solve/lq_sweep.h"
-#include "solve/node_evaluations.h"
 
 namespace bielle {
 
@@ -12,6 +12,7 @@ struct RolloutInput {
   const NodeEvaluations& evaluations;  ///< it writes those of the trial, or the rolling ones
   const std::vector<StageModel>& models;
   const LqSweep& sweep;
+  const AugmentedLagrangian& lagrangian;
   const std::vector<VectorXd>& dx;        ///< N + 1, of the full step
   const std::vector<ControlBox>& bounds;  ///< of u, N or none
   const std::vector<char>& open;          ///< N: whether the gap after a stage counts as open
@@ -22,8 +23,9 @@ struct RolloutInput {
 struct Trial {
   double alpha = 1;
   ShootingTrajectory nodes;
-  bool ok = false;  ///< all numbers are finite
-  double cost = 0;
+  bool ok = false;                  ///< it consists of finite numbers
+  double cost = 0;                  ///< J
+  double merit = 0;                 ///< J with what constraints add, Eq. (10)
   double gap_sum = 0, gap_max = 0;  ///< c, and its largest entry
   double closing_cost = 0;          ///< Eq. (8)
   int failed_node = -1;             ///< where the problem failed, and why
@@ -57,7 +59,7 @@ class Rollout {
   struct Track {
     Trial* trial = nullptr;
     int begin = 0, end = 0;
-    double cost = 0;
+    double cost = 0, merit = 0;
     int failed_node = -1;
     std::string failure;
     VectorXd start;    // deviation at its first node

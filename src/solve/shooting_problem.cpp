@@ -25,6 +25,13 @@ void ShootingProblem::getControlBounds(int, VectorRef lower, VectorRef upper) co
   upper.setConstant(std::numeric_limits<double>::infinity());
 }
 
+void ShootingProblem::getConstraintBounds(int, VectorRef lower, VectorRef upper) const {
+  lower.setConstant(-std::numeric_limits<double>::infinity());
+  upper.setConstant(std::numeric_limits<double>::infinity());
+}
+
+std::string ShootingProblem::getConstraintName(int, int row) const { return "constraint " + std::to_string(row); }
+
 std::unique_ptr<NodeEvaluation> ShootingProblem::makeEvaluation() const { return std::make_unique<NodeEvaluation>(); }
 
 void NodewiseProblem::evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const {

@@ -1,5 +1,5 @@
 #pragma once
-/// \file Costs: activations of residuals, and diagonal costs of state and control.
+/// \file Costs: activations of residuals, and diagonal costs of state and control. Path constraints: residuals within bounds.
 #include "bielle/ocp/residual.h"
 
 namespace bielle {
@@ -36,6 +36,17 @@ struct Cost {
   double weight = 1;
   Activation activation;
   std::unique_ptr<Residual> residual;
+};
+
+/// lower <= r <= upper, row by row; equal bounds make an equation, infinite ones leave a side open. The solver sees r and its
+/// bounds over `scale`: the violation that counts as 1.
+struct PathConstraint {
+  std::string name;
+  std::unique_ptr<Residual> residual;
+  VectorXd lower, upper;  ///< n
+  VectorXd scale;         ///< n, positive, in the unit of r
+
+  bool hasSize(Eigen::Index rows) const;
 };
 
 /// 1/2 weight sum_i w_i d_i^2 with d = (q (-) q_ref, v - v_ref) (2 nv).

@@ -41,6 +41,7 @@ struct StageSpec {
   StateCost state;
   ControlCost control;
   std::vector<Cost> costs;
+  std::vector<PathConstraint> path_constraints;
   VectorXd effort_limits;  ///< bounds of |u|, nu, for solvers that enforce bounds; empty: those of the motors
 };
 
@@ -60,7 +61,7 @@ class Transcription;
 struct RobotEvaluation : NodeEvaluation {
   VectorXd a;          ///< nv, accelerations; not used at an impact
   VectorXd lambda;     ///< rows of the constraints of the stage: forces (at an impact, impulses), each in its frame 1
-  VectorXd residuals;  ///< of all costs, concatenated in an order internal to the problem
+  VectorXd residuals;  ///< of all costs and path constraints, concatenated in an order internal to the problem
   double state_cost = 0;  ///< before scaling by the time step
 };
 
@@ -80,6 +81,10 @@ class RobotProblem : public ShootingProblem {
   int controlSize(int) const override { return model_.nu(); }
   const VectorXd& initialState() const override { return x0_; }
   void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override;
+  int constraintSize(int node) const override;
+  void getConstraintBounds(int node, VectorRef lower, VectorRef upper) const override;
+  /// The name of the path constraint, with the row where it has several.
+  std::string getConstraintName(int node, int row) const override;
   /// A RobotEvaluation.
   std::unique_ptr<NodeEvaluation> makeEvaluation() const override;
   std::unique_ptr<ProblemScratch> makeScratch() const override;

@@ -44,6 +44,19 @@
 ///
 /// Stationarity is measured by the projected gradient, with [lower, upper] the bounds of du (infinite if ignored):
 ///     gradient = sum_k | clamp(-Qu_k, lower_k, upper_k) |^2. (6)
+///
+/// Constraints lower <= c_k <= upper are enforced by an augmented Lagrangian (Hestenes, Powell, Rockafellar; around a DDP as in
+/// Howell, Jackson, Manchester, "ALTRO", IROS 2019): with multipliers y_k and a penalty rho, J is everywhere replaced by
+///     J + sum_k (rho/2 |d_k|^2 - |y_k|^2 / (2 rho)),   d_k = z_k - clamp(z_k, lower, upper),   z_k = c_k + y_k / rho,  (10)
+/// whose derivatives by c_k are, without those of the clamp's kinks,
+///     gradient rho d_k,   Hessian rho in rows with d_k != 0 and in equations, 0 in others.                            (11)
+/// Whenever the foreseen decrease has become a small part of the cost, or the gradient has vanished,
+///     y_k <- rho d_k,                                                                                                (12)
+/// and rho grows if the largest violation is more than a quarter of what it was the last time. Converged means that the
+/// gradient has vanished and no row is violated by more than the tolerance; y_k is then the multiplier of c_k in
+///     L = J + sum_k y_k . c_k,  positive at upper bounds, negative at lower ones,  and  y_i (bound_i - c_i) vanishes.   (13)
+/// If the violation no longer falls although rho is at its largest, the problem is called infeasible: the trajectory is then a
+/// point where, to first order, the constraints cannot be violated less.
 #include <atomic>
 #include <functional>
 #include <iosfwd>
@@ -61,6 +74,20 @@ enum class ControlBounds { Ignore, Enforce };
 /// The last allowed iteration either closes the gaps or, in a receding horizon, leaves them to the next solve like
 /// other iterations, and all steps are rolled out in segments.
 enum class LastRollout { Closed, Segments };
+
+/// How constraints are enforced; without effect on problems that have none.
+struct ConstraintOptions {
+  double tolerance = 1e-8;       ///< largest violation of a converged solve, in the units of c
+  double initial_penalty = 0.1;  ///< rho, in the unit of the cost over that of c squared
+  double penalty_increase = 10;  ///< factor when the violation falls too slowly
+  double max_penalty = 1e8;
+};
+
+/// y of Eq. (10), node by node, and rho.
+struct Multipliers {
+  std::vector<VectorXd> values;  ///< N + 1, constraintSize each
+  double penalty = 0;
+};
 
 struct FddpOptions {
   int max_iterations = 200;
@@ -84,6 +111,7 @@ struct FddpOptions {
   double acceptance = 0.1;    ///< share of Eq. (4) by which the merit must actually fall, in (0, 1)
 
   ControlBounds bounds = ControlBounds::Ignore;
+  ConstraintOptions constraints;
   /// Largest number of segments of a rollout, Eq. (7); none is shorter than 6 stages. Results depend on it, within the
   /// tolerances: therefore it is not the number of threads.
   int rollout_segments = 16;
@@ -94,7 +122,8 @@ struct FddpOptions {
 /// One line of the log: the iterate that the iteration started from and the step it took.
 struct FddpIteration {
   int iteration = 0;
-  double cost = 0;            ///< J before the step
+  double cost = 0;            ///< J before the step, without what Eq. (10) adds
+  double violation = 0;       ///< largest of the constraints before the step
   double gap = 0;             ///< max_k |gap_k|_inf before the step
   double gradient = 0;        ///< Eq. (6)
   double step = 0;            ///< alpha; 0: none was taken, the iterate is the result
@@ -106,6 +135,7 @@ enum class FddpTermination {
   Converged,
   MaxIterations,
   RegularizationMax,  ///< no acceptable step even at the largest regularization
+  Infeasible,         ///< the constraints cannot be violated less, to first order; the message names the worst
   Interrupted,        ///< by the flag or the callback
   Failed              ///< the problem failed, or returned values that are not finite, at the current iterate
 };
@@ -117,6 +147,12 @@ struct FddpSummary {
   double cost = 0;  ///< J of the returned trajectory
   double gap = 0;   ///< max_k |gap_k|_inf of the returned trajectory (after a last step alpha < 1: by Eq. 3)
   int iterations = 0;
+  // Of constraints, at the returned trajectory if it ended as Converged, RegularizationMax or Infeasible, else before the last step.
+  double violation = 0;        ///< the largest, in the units of c
+  double complementarity = 0;  ///< largest |y_i (bound_i - c_i)|, Eq. (13)
+  double multiplier = 0;       ///< largest |y_i|
+  double penalty = 0;          ///< rho; 0 if there are no constraints
+  int multiplier_updates = 0;  ///< Eq. (12)
   double seconds = 0;
   // Time by part, s, summed over the threads: with one thread they add up to almost `seconds`.
   double linearize_seconds = 0, sweep_seconds = 0, rollout_seconds = 0;
@@ -158,6 +194,11 @@ class Fddp {
   /// N - 1 and N. Until then no other node of the trajectory may change, or that solve() throws std::invalid_argument.
   /// The last state and control are repeated.
   void advance(ShootingTrajectory& trajectory);
+
+  /// Those that the last solve() ended with; and those that the next one is to start from, instead of zero. advance() moves
+  /// them on. \throws std::invalid_argument when the penalty is not positive
+  Multipliers getMultipliers() const;
+  void setMultipliers(const Multipliers& multipliers);
 
   /// Gains and value function of the last sweep, about the trajectory linearized last.
   const LqSweep& getSweep() const;

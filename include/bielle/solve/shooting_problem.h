@@ -1,7 +1,8 @@
 #pragma once
 /// \file The optimal control problem as a solver sees it (the paper's eq. 1), on manifolds.
 ///
-///     min  sum_k l_k(x_k, u_k) + l_N(x_N)    s.t.  x_0 given,  x_{k+1} = f_k(x_k, u_k),   k = 0 .. N-1
+///     min  sum_k l_k(x_k, u_k) + l_N(x_N)    s.t.  x_0 given,  x_{k+1} = f_k(x_k, u_k),   k = 0 .. N-1,
+///                                                  lower_k <= c_k(x_k, u_k) <= upper_k,   k = 0 .. N
 ///
 /// A state x is a vector of numbers (e.g. quaternions) that represents a point of a manifold; the tangent space at node
 /// k has its own dimension. The solver knows no robot: it requests evaluations, differences and quadratic models.
@@ -27,10 +28,11 @@ enum class StepStatus { Ok, Failed };
 /// belongs to the problem that made it and can be reused for any of its nodes.
 struct NodeEvaluation {
   virtual ~NodeEvaluation() = default;
-  VectorXd x;       ///< stateSize
-  VectorXd u;       ///< controlSize; not used at the terminal node
-  VectorXd x_next;  ///< f_k(x, u), stateSize; not used at the terminal node
-  double cost = 0;  ///< l_k(x, u), or l_N(x)
+  VectorXd x;            ///< stateSize
+  VectorXd u;            ///< controlSize; not used at the terminal node
+  VectorXd x_next;       ///< f_k(x, u), stateSize; not used at the terminal node
+  double cost = 0;       ///< l_k(x, u), or l_N(x)
+  VectorXd constraints;  ///< c_k(x, u), or c_N(x), constraintSize
   StepStatus status = StepStatus::Failed;
   std::string failure;  ///< why the status is not Ok, for messages; may be empty
 };
@@ -45,11 +47,20 @@ struct EvaluateTask {
   NodeEvaluation* out = nullptr;  ///< from makeEvaluation() of this problem; its content is overwritten
 };
 
+/// What a solver adds to the cost of a node for the sake of its constraints: to second order about the evaluated c,
+///     gradient . dc + 1/2 dc . diag(hessian) . dc.
+struct ConstraintWeights {
+  VectorXd gradient, hessian;  ///< constraintSize; both are zero in rows that do not matter at present
+};
+
 struct LinearizeTask {
   int node = 0;                  ///< in [0, N]
   NodeEvaluation* at = nullptr;  ///< its status is Ok; derivatives may be kept there
   /// The evaluation of node + 1, whose x is the node state to which the gap leads; null at the terminal node.
   const NodeEvaluation* next = nullptr;
+  /// To be added to the derivatives of the cost, by the chain rule, the Hessian without second derivatives of c; its cost stays
+  /// l_k. Null: nothing.
+  const ConstraintWeights* weights = nullptr;
   StageModel* out = nullptr;  ///< of the right sizes; its content is overwritten
   StepStatus status = StepStatus::Failed;
   std::string failure;  ///< why the status is not Ok, for messages; may be empty
@@ -91,6 +102,14 @@ class ShootingProblem {
   virtual const VectorXd& initialState() const = 0;
   /// Bounds of the controls of a stage (nu each), infinite if there are none.
   virtual void getControlBounds(int stage, VectorRef lower, VectorRef upper) const;
+
+  /// Rows of c_k, node in [0, N].
+  virtual int constraintSize(int) const { return 0; }
+  /// Bounds of c_k; equal ones make an equation, infinite ones leave a side open. They and c_k should be scaled such that a
+  /// violation of 1 is a large one.
+  virtual void getConstraintBounds(int node, VectorRef lower, VectorRef upper) const;
+  /// Name of a row of c_k for messages, e.g. "wrench cone of foot_left".
+  virtual std::string getConstraintName(int node, int row) const;
 
   virtual std::unique_ptr<NodeEvaluation> makeEvaluation() const;
   virtual std::unique_ptr<ProblemScratch> makeScratch() const { return nullptr; }

@@ -82,7 +82,8 @@ class FullTranscription : public Transcription {
   void linearize(LinearizeTask& task, FullScratch& scratch) const;
   void setStep(double h, const FullEvaluation& at, VectorXd& displacement, StageModel& out) const;
   void setImpact(const FullEvaluation& at, StageModel& out) const;
-  void setResiduals(int node, const FullEvaluation& at, FullScratch& scratch, StageModel& out) const;
+  void setResiduals(int node, const FullEvaluation& at, const ConstraintWeights* constraints, FullScratch& scratch,
+                    StageModel& out) const;
   void addStateCost(int node, const FullEvaluation& at, VectorXd& difference, StageModel& out) const;
 
   void calcDifference(const VectorXd& x0, const VectorXd& x1, VectorXd& dx) const {
@@ -105,7 +106,7 @@ void updateState(const Model& model, const VectorXd& x, Workspace& ws) {
 void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const {
   auto& at = static_cast<FullEvaluation&>(*task.out);
   const int node = task.node;
-  if (!startEvaluation(model_, task, specs_[node], isRunning(node), costs_[node].rows(), at)) return;
+  if (!startEvaluation(model_, task, specs_[node], isRunning(node), costs_[node], at)) return;
   if (isRunning(node)) {
     const DynamicsStatus status = isImpact(node) ? updateImpactStep(node, at) : updateStep(node, scratch, at);
     if (status != DynamicsStatus::Ok) {
@@ -177,7 +178,7 @@ void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) con
       setStep(specs_[node].dt, at, scratch.displacement, out);
   }
   out.cost = at.cost;
-  setResiduals(node, at, scratch, out);
+  setResiduals(node, at, task.weights, scratch, out);
   addStateCost(node, at, scratch.difference, out);
   if (isRunning(node)) costs_[node].addControlCost(at.u, out);
   if (isFinite(out)) task.status = StepStatus::Ok;
@@ -229,7 +230,8 @@ void FullTranscription::setImpact(const FullEvaluation& at, StageModel& out) con
 }
 
 // Gauss-Newton terms, whatever `out` held; at a running stage forces and controls take part.
-void FullTranscription::setResiduals(int node, const FullEvaluation& at, FullScratch& scratch, StageModel& out) const {
+void FullTranscription::setResiduals(int node, const FullEvaluation& at, const ConstraintWeights* constraints,
+                                     FullScratch& scratch, StageModel& out) const {
   const int nv = model_.nv(), nu = model_.nu(), rows = costs_[node].rows();
   out.lx.setZero();
   out.lu.setZero();
@@ -237,8 +239,8 @@ void FullTranscription::setResiduals(int node, const FullEvaluation& at, FullScr
   if (rows == 0) return;
   ResidualJacobians& jacobians = scratch.jacobians;
   for (MatrixXd* m : {&jacobians.q, &jacobians.v, &jacobians.lambda}) m->topRows(rows).setZero();
-  costs_[node].differentiate({model_, at.ws, specs_[node].constraints, at.u, at.lambda}, at, scratch.weights,
-                             jacobians);
+  costs_[node].differentiate({model_, at.ws, specs_[node].constraints, at.u, at.lambda}, at, constraints,
+                             scratch.weights, jacobians);
   const auto gradient = scratch.weights.gradient.head(rows), hessian = scratch.weights.hessian.head(rows);
   const auto by_forces = jacobians.lambda.topLeftCorner(rows, specs_[node].constraints.rows);
   auto Rx = scratch.Rx.topRows(rows);

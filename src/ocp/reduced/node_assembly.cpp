@@ -193,7 +193,8 @@ void NodeAssembly::addTimesZ(ConstMatrixRef A, const LaneView& view, MatrixRef o
 
 // With Rt = (dr/d(u, dy, dy_v))^T, one column per residual, Rt diag(hessian) Rt^T is the whole Hessian.
 void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
-                                const ReducedEvaluation& at, const LaneView& view, StageModel& out) {
+                                const ConstraintWeights* constraints, const ReducedEvaluation& at, const LaneView& view,
+                                StageModel& out) {
   const int nr = reduction_.size, nu = static_cast<int>(at.u.size()), columns = nu + 2 * nr, rows = costs.rows();
   if (rows == 0) {
     for (VectorXd* gradient : {&out.lx, &out.lu}) gradient->setZero();
@@ -207,7 +208,7 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
   }
   for (Eigen::Index i = 0; i < rows; i += kLane)
     jacobians_.lambda.middleRows<kLane>(i).middleCols(contacts.closure_rows, contacts.rows).setZero();
-  costs.differentiate({model_, view.ws, spec.constraints, at.u, at.lambda}, at, weights_, jacobians_);
+  costs.differentiate({model_, view.ws, spec.constraints, at.u, at.lambda}, at, constraints, weights_, jacobians_);
   PaddedMap Rt = shapePadded(Rt_, columns, rows), scaled = shapePadded(Rt_scaled_, columns, rows);
   updateResidualDerivatives(costs, contacts, at, view, Rt);
   auto gradient = gradient_.head(columns);

@@ -17,7 +17,8 @@ class NodeAssembly {
                              const LaneView& view);
   // Sets the Gauss-Newton terms of the residuals, overwriting `out`.
   void setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
-                    const ReducedEvaluation& at, const LaneView& view, StageModel& out);
+                    const ConstraintWeights* constraints, const ReducedEvaluation& at, const LaneView& view,
+                    StageModel& out);
 
   // Gap and derivatives of a joint outside all clusters: those of q+ with respect to dy and dv+, which are the identity
   // and h except for curved joints.

@@ -79,7 +79,7 @@ void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScrat
   for (int i = 0; i < count; ++i) {
     const int node = tasks[i].node;
     auto& at = static_cast<ReducedEvaluation&>(*tasks[i].out);
-    if (!startEvaluation(model_, tasks[i], specs_[node], isRunning(node), costs_[node].rows(), at)) continue;
+    if (!startEvaluation(model_, tasks[i], specs_[node], isRunning(node), costs_[node], at)) continue;
     const int rows = layout_.contacts[node].rows;
     if (at.factors.D.size() != rows || at.factors.L.rows() != reduction_.size) at.factors.resize(reduction_.size, rows);
     const auto* previous = static_cast<const ReducedEvaluation*>(tasks[i].previous);
@@ -139,7 +139,7 @@ void ReducedTranscription::finishLinearization(LinearizeTask& task, LaneView& vi
     }
   }
   out.cost = at.cost;
-  assembly.setResiduals(costs_[node], specs_[node], layout_.contacts[node], at, view, out);
+  assembly.setResiduals(costs_[node], specs_[node], layout_.contacts[node], task.weights, at, view, out);
   if (specs_[node].state.weight != 0) addStateCostModel(model_, reduction_, view.state_cost, costs_[node].scale(), out);
   if (isRunning(node)) costs_[node].addControlCost(at.u, out);
   if (isFinite(out)) task.status = StepStatus::Ok;

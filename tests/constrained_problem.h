@@ -1,0 +1,97 @@
+#pragma once
+// Constraints for the small problems of solve_problems.h, with derivatives by complex steps.
+#include <functional>
+#include <string>
+
+#include "solve_problems.h"
+
+namespace bielle::test {
+
+using Complex = std::complex<double>;
+
+/// One row: lower <= value(x, u) <= upper at the nodes first to last. At the terminal node u is null.
+struct Row {
+  std::string name;
+  int first = 0, last = 0;
+  double lower = 0, upper = 0;
+  std::function<Complex(const Complex* x, const Complex* u)> value;
+};
+
+template <class Base>
+class Constrained : public Base {
+ public:
+  using Base::difference, Base::evaluate, Base::integrate, Base::linearize;
+  explicit Constrained(const Base& base) : Base(base) {}
+
+  std::vector<Row> rows;
+
+  int constraintSize(int node) const override {
+    int size = 0;
+    for (const Row& row : rows) size += isAt(row, node);
+    return size;
+  }
+  void getConstraintBounds(int node, VectorRef lower, VectorRef upper) const override {
+    visit(node, [&](const Row& row, int i) {
+      lower[i] = row.lower;
+      upper[i] = row.upper;
+    });
+  }
+  std::string getConstraintName(int node, int index) const override {
+    std::string name;
+    visit(node, [&](const Row& row, int i) {
+      if (i == index) name = row.name;
+    });
+    return name;
+  }
+  void evaluate(EvaluateTask& task, ProblemScratch* scratch) const override {
+    Base::evaluate(task, scratch);
+    NodeEvaluation& out = *task.out;
+    out.constraints.resize(constraintSize(task.node));
+    visit(task.node, [&](const Row& row, int i) { out.constraints[i] = calc(row, task.node, out, -1).real(); });
+  }
+  void linearize(LinearizeTask& task, ProblemScratch* scratch) const override {
+    Base::linearize(task, scratch);
+    if (!task.weights) return;
+    const int nx = Base::kX, nu = task.node < this->numStages() ? Base::kU : 0;
+    StageModel& out = *task.out;
+    visit(task.node, [&](const Row& row, int i) {
+      Eigen::Matrix<double, Base::kX, 1> by_x;
+      Eigen::Matrix<double, Base::kU, 1> by_u;
+      for (int j = 0; j < nx; ++j) by_x[j] = calc(row, task.node, *task.at, j).imag() / kStep;
+      for (int j = 0; j < nu; ++j) by_u[j] = calc(row, task.node, *task.at, nx + j).imag() / kStep;
+      const double g = task.weights->gradient[i], h = task.weights->hessian[i];
+      for (int j = 0; j < nx; ++j) {
+        out.lx[j] += g * by_x[j];
+        for (int k = 0; k < nx; ++k) out.lxx()(j, k) += h * by_x[j] * by_x[k];
+      }
+      for (int j = 0; j < nu; ++j) {
+        out.lu[j] += g * by_u[j];
+        for (int k = 0; k < nx; ++k) out.lux()(j, k) += h * by_u[j] * by_x[k];
+        for (int k = 0; k < nu; ++k) out.luu()(j, k) += h * by_u[j] * by_u[k];
+      }
+    });
+  }
+
+ private:
+  static constexpr double kStep = 1e-30;
+
+  bool isAt(const Row& row, int node) const { return node >= row.first && node <= row.last; }
+  template <class Visit>
+  void visit(int node, const Visit& work) const {
+    int i = 0;
+    for (const Row& row : rows)
+      if (isAt(row, node)) work(row, i++);
+  }
+  // Entry `seed` of (x, u) carries the complex step.
+  Complex calc(const Row& row, int node, const NodeEvaluation& at, int seed) const {
+    std::array<Complex, Base::kX> x;
+    std::array<Complex, Base::kU> u;
+    for (int i = 0; i < Base::kX; ++i) x[i] = at.x[i];
+    const bool running = node < this->numStages();
+    for (int i = 0; running && i < Base::kU; ++i) u[i] = at.u[i];
+    if (seed >= 0) (seed < Base::kX ? x[seed] : u[seed - Base::kX]) += Complex(0, kStep);
+    return row.value(x.data(), running ? u.data() : nullptr);
+  }
+};
+
+}  // namespace bielle::test

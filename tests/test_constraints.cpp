@@ -1,0 +1,334 @@
+// Constraints of a shooting problem: the conditions of an optimum by an oracle that knows neither models nor sweeps, dense ones
+// on a quadratic program, multipliers that are kept, and constraints that contradict each other.
+#include <Eigen/LU>
+#include <catch2/catch.hpp>
+
+#include "constrained_problem.h"
+#include "count_allocations.h"
+#include "fddp_oracle.h"
+
+using namespace bielle;
+using namespace bielle::test;
+
+namespace {
+
+constexpr double kFree = std::numeric_limits<double>::infinity();
+
+Complex getTip(const Complex* x, const Complex*) { return x[0] + 0.5 * std::sin(x[1]); }
+
+// A cart that catches its pole: the tip must not go far, there is a limit to the force that falls with the speed, and the
+// end is exactly at rest.
+constexpr double kFarthest = 0.74, kPush = 6;
+Constrained<PlantProblem<CartPole>> makeBoundedCartPole() {
+  Constrained<PlantProblem<CartPole>> p(makeCartPole());
+  const int N = p.stages;
+  p.start << 0.3, 0.3, 0, 0;
+  p.terminal_weight.setConstant(1);
+  p.rows.push_back({"tip", 1, N, -kFree, kFarthest, getTip});
+  p.rows.push_back({"push", 0, N - 1, -kPush, kFree, [](const Complex* x, const Complex* u) { return u[0] - x[2]; }});
+  for (int i = 0; i < 4; ++i)
+    p.rows.push_back({"end " + std::to_string(i), N, N, 0, 0, [i](const Complex* x, const Complex*) { return x[i]; }});
+  return p;
+}
+
+// Values of all constraints along the rollout of us, node after node.
+std::vector<VectorXd> calcConstraints(const ShootingProblem& problem, const std::vector<VectorXd>& us) {
+  std::vector<VectorXd> out;
+  VectorXd x = problem.initialState();
+  for (size_t k = 0; k <= us.size(); ++k) {
+    const auto node = evaluate(problem, static_cast<int>(k), x, k < us.size() ? &us[k] : nullptr);
+    out.push_back(node->constraints);
+    if (k < us.size()) x = node->x_next;
+  }
+  return out;
+}
+
+// Eq. (13) of fddp.h along the rollout.
+double calcLagrangian(const ShootingProblem& problem, const std::vector<VectorXd>& us,
+                      const std::vector<VectorXd>& multipliers) {
+  double sum = calcCost(problem, us);
+  const std::vector<VectorXd> c = calcConstraints(problem, us);
+  for (size_t k = 0; k < c.size(); ++k) sum += multipliers[k].dot(c[k]);
+  return sum;
+}
+
+VectorXd calcGradient(const ShootingProblem& problem, std::vector<VectorXd> us,
+                      const std::vector<VectorXd>& multipliers) {
+  const double h = 1e-5;
+  std::vector<double> gradient;
+  for (VectorXd& u : us) {
+    for (Eigen::Index i = 0; i < u.size(); ++i) {
+      const double saved = u[i];
+      u[i] = saved + h;
+      const double above = calcLagrangian(problem, us, multipliers);
+      u[i] = saved - h;
+      gradient.push_back((above - calcLagrangian(problem, us, multipliers)) / (2 * h));
+      u[i] = saved;
+    }
+  }
+  return Eigen::Map<VectorXd>(gradient.data(), static_cast<Eigen::Index>(gradient.size()));
+}
+
+// Half the squares of all violations along the rollout.
+double calcViolations(const ShootingProblem& problem, const std::vector<VectorXd>& us) {
+  double sum = 0;
+  const std::vector<VectorXd> c = calcConstraints(problem, us);
+  for (size_t k = 0; k < c.size(); ++k) {
+    VectorXd lower(c[k].size()), upper(c[k].size());
+    problem.getConstraintBounds(static_cast<int>(k), lower, upper);
+    sum += 0.5 * (c[k] - c[k].cwiseMax(lower).cwiseMin(upper)).squaredNorm();
+  }
+  return sum;
+}
+
+struct Conditions {
+  double gradient = 0, violation = 0, complementarity = 0, wrong_sign = 0;
+  int active = 0;
+};
+
+// Values at the node states: along a rollout the pole would fall farther and farther from them.
+Conditions calcConditions(const ShootingProblem& problem, const ShootingTrajectory& t,
+                          const std::vector<VectorXd>& multipliers) {
+  Conditions out;
+  out.gradient = calcGradient(problem, t.us, multipliers).lpNorm<Eigen::Infinity>();
+  for (size_t k = 0; k < t.xs.size(); ++k) {
+    const auto node = evaluate(problem, static_cast<int>(k), t.xs[k], k < t.us.size() ? &t.us[k] : nullptr);
+    const VectorXd &c = node->constraints, &y = multipliers[k];
+    VectorXd lower(c.size()), upper(c.size());
+    problem.getConstraintBounds(static_cast<int>(k), lower, upper);
+    for (Eigen::Index i = 0; i < c.size(); ++i) {
+      out.violation = std::max({out.violation, lower[i] - c[i], c[i] - upper[i]});
+      out.active += y[i] != 0;
+      if (y[i] > 0) out.complementarity = std::max(out.complementarity, std::abs(y[i] * (upper[i] - c[i])));
+      if (y[i] < 0) out.complementarity = std::max(out.complementarity, std::abs(y[i] * (lower[i] - c[i])));
+      if ((y[i] > 0 && upper[i] == kFree) || (y[i] < 0 && lower[i] == -kFree))
+        out.wrong_sign = std::max(out.wrong_sign, std::abs(y[i]));
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("constraints: a cart catches its pole within bounds, and the conditions of an optimum hold") {
+  auto problem = makeBoundedCartPole();
+  ShootingTrajectory t = makeGuess(problem);
+  FddpOptions options;
+  options.gradient_tolerance = 1e-14;
+  Fddp solver(options);
+  const FddpSummary summary = solver.solve(problem, t);
+  CAPTURE(summary.message, summary.iterations, summary.violation, summary.penalty, summary.multiplier_updates);
+  REQUIRE(summary.termination == FddpTermination::Converged);
+  CHECK(summary.violation <= 1e-8);
+  CHECK(summary.complementarity < 1e-5);
+  CHECK(summary.multiplier > 0.1);
+  CHECK(calcLargestGap(problem, t) < 1e-10);
+  std::vector<VectorXd> multipliers = solver.getMultipliers().values;
+  const Conditions conditions = calcConditions(problem, t, multipliers);
+  CHECK(conditions.gradient < 1e-4);
+  CHECK(conditions.violation <= 1e-8);
+  CHECK(conditions.complementarity < 1e-5);
+  CHECK(conditions.wrong_sign == 0);
+  CHECK(conditions.active > 6);  // tip and push too, not only the four at the end
+
+  // With those at the end alone the tip goes farther and the push is harder; and a wrong multiplier is noticed.
+  auto free = problem;
+  free.rows.erase(free.rows.begin(), free.rows.begin() + 2);
+  ShootingTrajectory wide = makeGuess(free);
+  REQUIRE(Fddp().solve(free, wide).termination == FddpTermination::Converged);
+  double tip = 0, push = 0;
+  for (const VectorXd& x : wide.xs) tip = std::max(tip, x[0] + 0.5 * std::sin(x[1]));
+  for (size_t k = 0; k < wide.us.size(); ++k) push = std::min(push, wide.us[k][0] - wide.xs[k][2]);
+  CHECK(tip > kFarthest + 0.01);
+  CHECK(push < -kPush - 0.3);
+  Eigen::Index largest = 0;
+  multipliers.back().cwiseAbs().maxCoeff(&largest);
+  multipliers.back()[largest] *= 1.01;
+  CHECK(calcConditions(problem, t, multipliers).gradient > 3e-4);
+}
+
+TEST_CASE("constraints: a quadratic program has the solution of its dense conditions") {
+  Constrained<PlantProblem<Linear>> problem(makeLinear());
+  const int N = problem.stages, n = 2 * N;
+  problem.rows.push_back({"speed", 1, N, -0.4, kFree, [](const Complex* x, const Complex*) { return x[1] + x[2]; }});
+  problem.rows.push_back({"end", N, N, 0.25, 0.25, [](const Complex* x, const Complex*) { return x[0]; }});
+  problem.rows.push_back({"mix", 3, 9, -kFree, 0.8, [](const Complex* x, const Complex* u) { return u[1] - x[2]; }});
+  ShootingTrajectory t = makeGuess(problem);
+  Fddp solver(makeTightOptions());
+  const FddpSummary summary = solver.solve(problem, t);
+  CAPTURE(summary.message, summary.iterations);
+  REQUIRE(summary.termination == FddpTermination::Converged);
+
+  // Cost and constraints as functions of all controls, by differences that are exact but for rounding; the rows that bind
+  // are those that have a multiplier.
+  const auto unpack = [&](const VectorXd& all) {
+    std::vector<VectorXd> us;
+    for (int k = 0; k < N; ++k) us.push_back(all.segment(2 * k, 2));
+    return us;
+  };
+  const std::vector<VectorXd> multipliers = solver.getMultipliers().values;
+  std::vector<std::pair<int, int>> binding;
+  VectorXd y_solver(0);
+  for (int k = 0; k <= N; ++k)
+    for (int i = 0; i < multipliers[k].size(); ++i)
+      if (multipliers[k][i] != 0) {
+        binding.push_back({k, i});
+        y_solver.conservativeResize(y_solver.size() + 1);
+        y_solver[y_solver.size() - 1] = multipliers[k][i];
+      }
+  const int m = static_cast<int>(binding.size());
+  REQUIRE(m > 5);
+  const auto calcBinding = [&](const VectorXd& all) {
+    const std::vector<VectorXd> c = calcConstraints(problem, unpack(all));
+    VectorXd out(m);
+    for (int i = 0; i < m; ++i) {
+      const auto [k, row] = binding[i];
+      VectorXd lower(c[k].size()), upper(c[k].size());
+      problem.getConstraintBounds(k, lower, upper);
+      out[i] = c[k][row] - (y_solver[i] > 0 ? upper[row] : lower[row]);
+    }
+    return out;
+  };
+  const VectorXd zero = VectorXd::Zero(n);
+  const double c0 = calcCost(problem, unpack(zero));
+  VectorXd singles(n), gradient(n);
+  for (int i = 0; i < n; ++i) singles[i] = calcCost(problem, unpack(VectorXd::Unit(n, i)));
+  MatrixXd kkt = MatrixXd::Zero(n + m, n + m);
+  const VectorXd d0 = calcBinding(zero);
+  for (int i = 0; i < n; ++i) {
+    const double twice = calcCost(problem, unpack(2 * VectorXd::Unit(n, i)));
+    kkt(i, i) = twice - 2 * singles[i] + c0;
+    gradient[i] = singles[i] - c0 - 0.5 * kkt(i, i);
+    for (int j = 0; j < i; ++j) {
+      const double both = calcCost(problem, unpack(VectorXd::Unit(n, i) + VectorXd::Unit(n, j)));
+      kkt(i, j) = kkt(j, i) = both - singles[i] - singles[j] + c0;
+    }
+    kkt.block(n, i, m, 1) = calcBinding(VectorXd::Unit(n, i)) - d0;
+    kkt.block(i, n, 1, m) = kkt.block(n, i, m, 1).transpose();
+  }
+  VectorXd right(n + m), u_solver(n);
+  right << -gradient, -d0;
+  const VectorXd dense = kkt.fullPivLu().solve(right);
+  for (int k = 0; k < N; ++k) u_solver.segment(2 * k, 2) = t.us[k];
+  CHECK((dense.head(n) - u_solver).lpNorm<Eigen::Infinity>() < 1e-5);
+  CHECK((dense.tail(m) - y_solver).lpNorm<Eigen::Infinity>() < 1e-5 * (1 + y_solver.lpNorm<Eigen::Infinity>()));
+  const Conditions conditions = calcConditions(problem, t, multipliers);
+  CHECK(conditions.violation <= 1e-8);
+  CHECK(conditions.wrong_sign == 0);
+  kkt(0, 0) *= 1.01;
+  const VectorXd poisoned = kkt.fullPivLu().solve(right);
+  CHECK((poisoned.head(n) - u_solver).lpNorm<Eigen::Infinity>() > 1e-4);
+}
+
+TEST_CASE("constraints: with bounds on the control they hold together") {
+  auto problem = makeBoundedCartPole();
+  problem.rows.erase(problem.rows.begin() + 1);  // the push
+  ShootingTrajectory unbounded = makeGuess(problem);
+  Fddp().solve(problem, unbounded);
+  double most = 0;
+  for (const VectorXd& u : unbounded.us) most = std::max(most, std::abs(u[0]));
+  problem.bound = 0.8 * most;
+  FddpOptions options;
+  options.bounds = ControlBounds::Enforce;
+  ShootingTrajectory t = makeGuess(problem);
+  const FddpSummary summary = Fddp(options).solve(problem, t);
+  CAPTURE(summary.message, summary.iterations, summary.violation, most);
+  REQUIRE(summary.termination == FddpTermination::Converged);
+  double largest = 0;
+  for (const VectorXd& u : t.us) largest = std::max(largest, std::abs(u[0]));
+  CHECK(largest == problem.bound);
+  for (const VectorXd& x : t.xs) CHECK(x[0] + 0.5 * std::sin(x[1]) <= kFarthest + 1e-8);
+  CHECK(t.xs.back().lpNorm<Eigen::Infinity>() <= 1e-8);
+}
+
+TEST_CASE("constraints that never bind change no bit of a solve") {
+  const auto free = makeCartPole();
+  Constrained<PlantProblem<CartPole>> loose(free);
+  loose.rows.push_back({"track", 0, 100, -500, 500, [](const Complex* x, const Complex*) { return x[0]; }});
+  ShootingTrajectory a = makeLine(free), b = a;
+  const FddpSummary of_free = Fddp().solve(free, a), of_loose = Fddp().solve(loose, b);
+  CHECK(of_free.iterations == of_loose.iterations);
+  CHECK(a.xs == b.xs);
+  CHECK(a.us == b.us);
+  CHECK(of_loose.multiplier == 0);
+}
+
+TEST_CASE("constraints that contradict each other are named, with what is left of them") {
+  auto problem = makeBoundedCartPole();
+  problem.rows.erase(problem.rows.begin() + 1);  // the push
+  problem.rows.push_back({"wall", 60, 60, kFarthest + 0.1, kFree, getTip});
+  ShootingTrajectory t = makeGuess(problem);
+  const FddpSummary summary = Fddp().solve(problem, t);
+  CAPTURE(summary.message, summary.iterations);
+  CHECK(summary.termination == FddpTermination::Infeasible);
+  CHECK((summary.message.find("tip at node 60") != std::string::npos ||
+         summary.message.find("wall at node 60") != std::string::npos));
+  // One of the two is violated by half of what lies between them at least. The sum of squares cannot be less, to first order.
+  CHECK(summary.violation > 0.05 - 1e-6);
+  CHECK(summary.violation < 0.1);
+  const auto calcSlope = [&](std::vector<VectorXd> us) {
+    VectorXd gradient(us.size());
+    for (size_t k = 0; k < us.size(); ++k) {
+      const double h = 1e-5, saved = us[k][0];
+      us[k][0] = saved + h;
+      const double above = calcViolations(problem, us);
+      us[k][0] = saved - h;
+      gradient[static_cast<Eigen::Index>(k)] = (above - calcViolations(problem, us)) / (2 * h);
+      us[k][0] = saved;
+    }
+    return gradient.norm();
+  };
+  CHECK(calcSlope(t.us) < 1e-4);
+  CHECK(calcSlope(makeGuess(problem).us) > 1e-2);
+}
+
+TEST_CASE("multipliers are worth keeping") {
+  auto problem = makeBoundedCartPole();
+  ShootingTrajectory t = makeGuess(problem);
+  Fddp solver;
+  const FddpSummary cold = solver.solve(problem, t);
+  REQUIRE(cold.termination == FddpTermination::Converged);
+  const Multipliers multipliers = solver.getMultipliers();
+  problem.start[0] = 0.001;
+  ShootingTrajectory warm = t, half = t;
+  Fddp kept, forgotten;
+  kept.setMultipliers(multipliers);
+  const FddpSummary with = kept.solve(problem, warm), without = forgotten.solve(problem, half);
+  CAPTURE(cold.iterations, with.iterations, without.iterations);
+  CHECK(with.termination == FddpTermination::Converged);
+  CHECK(with.iterations < without.iterations);
+  // A solver that is used again starts anew.
+  ShootingTrajectory again = makeGuess(problem), first = again;
+  const FddpSummary second = kept.solve(problem, again), fresh = Fddp().solve(problem, first);
+  CHECK(second.iterations == fresh.iterations);
+  CHECK(again.us == first.us);
+}
+
+TEST_CASE("an iteration with constraints allocates nothing after the first, and threads change no bit") {
+  auto problem = makeBoundedCartPole();
+  std::vector<ShootingTrajectory> results;
+  for (int threads : {1, 2, 7}) {
+    ShootingTrajectory t = makeGuess(problem);
+    FddpOptions options;
+    options.threads = threads;
+    std::vector<long> counts;
+    counts.reserve(1000);
+    FddpObserver observer;
+    observer.callback = [&](const FddpIteration&) {
+      counts.push_back(num_allocations);
+      return FddpAction::Continue;
+    };
+    Fddp(options).solve(problem, t, observer);
+    REQUIRE(counts.size() > 5);
+    CHECK(counts.back() == counts.front());
+    results.push_back(t);
+  }
+  for (const ShootingTrajectory& t : results) CHECK((t.xs == results[0].xs && t.us == results[0].us));
+}
+
+TEST_CASE("bounds of constraints that exclude each other are refused") {
+  auto problem = makeBoundedCartPole();
+  problem.rows[0].lower = kFarthest + 1;
+  ShootingTrajectory t = makeGuess(problem);
+  CHECK_THROWS_WITH(Fddp().solve(problem, t), Catch::Contains("node 1"));
+}

@@ -1,0 +1,191 @@
+// Path constraints of a robot's problem: their rows by central differences in tangent space, in both formulations, at steps,
+// impacts and the end; what their weights add to a quadratic model; and what does not fit.
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/motion.h"
+#include "check_derivative.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+constexpr double kFree = std::numeric_limits<double>::infinity();
+
+PathConstraint makeConstraint(const std::string& name, std::unique_ptr<Residual> residual, double scale = 1) {
+  const int n = residual->size();
+  return {name, std::move(residual), VectorXd::Constant(n, -1), VectorXd::Constant(n, kFree),
+          VectorXd::LinSpaced(n, scale, 1.5 * scale)};
+}
+
+// A step or an impact with both feet on the ground, and a terminal node, with rows that look at q, v and the forces.
+RobotProblem makeProblem(const Model& model, const VectorXd& q, StageKind kind, Formulation formulation) {
+  std::vector<StageSpec> stages(2);
+  StageSpec& stage = stages[0];
+  stage.kind = kind;
+  stage.dt = kind == StageKind::Impact ? 0 : 0.012;
+  stage.constraints = makeConstraintSet(model, makeContactTargets(model, q, {0, 1}, 0, 50));
+  stage.costs.push_back({"com", 3, Activation::makeQuadratic(Vector3d::Ones()), makeComPosition(Vector3d::Ones())});
+  for (int c = stage.constraints.num_loops; c < static_cast<int>(stage.constraints.closures.size()); ++c)
+    stage.path_constraints.push_back(
+        makeConstraint("cone " + std::to_string(c), makeWrenchCone(stage.constraints, c, 0.05, 0.03, 0.5), 20));
+  stage.path_constraints.push_back(makeConstraint("joints", makeJointPosition(model, {7, 9, 10}), 0.3));
+  stage.path_constraints.push_back(makeConstraint("speeds", makeJointVelocity({6, 9}), 4));
+  stages[1].dt = 0.012;
+  stages[1].path_constraints.push_back(makeConstraint("end", makeComPosition(Vector3d::Zero()), 0.1));
+  stages[1].path_constraints.push_back(makeConstraint("rest", makeComVelocity(Vector3d::Zero()), 0.2));
+  return RobotProblem(model, q, VectorXd::Zero(model.nv()), std::move(stages), formulation);
+}
+
+class Node {
+ public:
+  Node(const RobotProblem& problem, int node, const VectorXd& x, const VectorXd& u)
+      : problem_(problem), node_(node), x_(x), u_(u), at_(problem), next_(problem) {
+    at_.evaluate(node, x, u);
+    REQUIRE(at_.evaluation().status == StepStatus::Ok);
+    if (node == 0) next_.evaluate(1, at_.evaluation().x_next);
+    tangent_ = at_.integrate(VectorXd::Zero(problem.tangentSize(node)));
+  }
+  int size() const { return problem_.constraintSize(node_); }
+  int nu() const { return node_ == 0 ? problem_.controlSize(0) : 0; }
+  VectorXd calc(const VectorXd& dx, const VectorXd& du) {
+    RobotEvaluator moved(problem_);
+    const VectorXd x = at_.integrate(dx), u = u_ + du;
+    const RobotEvaluation& out = moved.evaluate(node_, x, u);
+    REQUIRE(out.status == StepStatus::Ok);
+    return out.constraints;
+  }
+  MatrixXd differentiate() {
+    const double h = 1e-5;
+    const int ndx = problem_.tangentSize(node_);
+    MatrixXd out(size(), ndx + nu());
+    for (int j = 0; j < out.cols(); ++j) {
+      VectorXd dx = VectorXd::Zero(ndx), du = VectorXd::Zero(u_.size());
+      (j < ndx ? dx[j] : du[j - ndx]) = h;
+      out.col(j) = (calc(dx, du) - calc(-dx, -du)) / (2 * h);
+    }
+    return out;
+  }
+  StageModel linearize(const ConstraintWeights* weights) {
+    auto at = problem_.makeEvaluation();
+    const auto scratch = problem_.makeScratch();
+    EvaluateTask step{node_, &x_, &u_, nullptr, at.get()};
+    problem_.evaluate(&step, 1, scratch.get());
+    StageModel out;
+    out.resize(problem_.tangentSize(node_), nu(), node_ == 0 ? problem_.tangentSize(1) : 0);
+    LinearizeTask task{node_, at.get(), node_ == 0 ? &next_.evaluation() : nullptr, weights, &out, StepStatus::Failed,
+                       {}};
+    problem_.linearize(&task, 1, scratch.get());
+    REQUIRE(task.status == StepStatus::Ok);
+    return out;
+  }
+
+ private:
+  const RobotProblem& problem_;
+  int node_;
+  VectorXd x_, u_, tangent_;
+  RobotEvaluator at_, next_;
+};
+
+// Jacobian of the rows, from what a weight of 1 on each adds to the gradient.
+MatrixXd collectRows(Node& node) {
+  const StageModel without = node.linearize(nullptr);
+  MatrixXd out(node.size(), without.lx.size() + without.lu.size());
+  for (int i = 0; i < node.size(); ++i) {
+    ConstraintWeights weights{VectorXd::Unit(node.size(), i), VectorXd::Zero(node.size())};
+    const StageModel with = node.linearize(&weights);
+    out.row(i) << (with.lx - without.lx).transpose(), (with.lu - without.lu).transpose();
+    CHECK(with.cost == without.cost);
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("path constraints: rows and their derivatives, at a step, an impact and the end") {
+  const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto").model;
+  const VectorXd q = makeStandingPosture(model);
+  std::mt19937 rng(5);
+  const Formulation formulation = GENERATE(Formulation::Full, Formulation::Reduced);
+  const StageKind kind = GENERATE(StageKind::Dynamics, StageKind::Impact);
+  const RobotProblem problem = makeProblem(model, q, kind, formulation);
+  RobotEvaluator standing(problem);
+  standing.evaluate(1, problem.initialState());
+  const VectorXd x = standing.integrate(randomVector(rng, problem.tangentSize(1), 0.05));
+  const VectorXd u = randomVector(rng, model.nu(), 3);
+  for (int k : {0, 1}) {
+    CAPTURE(getName(formulation), static_cast<int>(kind), k);
+    Node node(problem, k, x, u);
+    REQUIRE(node.size() == (k == 0 ? 2 * 17 + 3 + 2 : 6));
+    const MatrixXd rows = collectRows(node);
+    checkDerivative(rows, node.differentiate(), "rows");
+    // Second derivatives: rows^T diag(h) rows.
+    const StageModel without = node.linearize(nullptr);
+    const VectorXd h = randomVector(rng, node.size()).cwiseAbs();
+    ConstraintWeights weights{VectorXd::Zero(node.size()), h};
+    const StageModel with = node.linearize(&weights);
+    const int ndx = problem.tangentSize(k), nu = node.nu();
+    const MatrixXd product = rows.transpose() * h.asDiagonal() * rows;
+    const auto checkBlock = [&](const MatrixXd& added, const MatrixXd& expected) {
+      CHECK((added - expected).cwiseAbs().maxCoeff() <= 1e-9 * (1 + product.cwiseAbs().maxCoeff()));
+    };
+    const MatrixXd lxx = with.lxx() - without.lxx(), luu = with.luu() - without.luu();
+    checkBlock(lxx.triangularView<Eigen::Lower>(), product.topLeftCorner(ndx, ndx).triangularView<Eigen::Lower>());
+    if (nu == 0) continue;
+    checkBlock(with.lux() - without.lux(), product.bottomLeftCorner(nu, ndx));
+    checkBlock(luu.triangularView<Eigen::Lower>(), product.bottomRightCorner(nu, nu).triangularView<Eigen::Lower>());
+    if (kind == StageKind::Dynamics) CHECK(product.bottomLeftCorner(nu, ndx).norm() > 1e-6);
+  }
+}
+
+TEST_CASE("path constraints: scaled bounds and names") {
+  const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto").model;
+  const VectorXd q = makeStandingPosture(model);
+  const RobotProblem problem = makeProblem(model, q, StageKind::Dynamics, Formulation::Reduced);
+  VectorXd lower(problem.constraintSize(0)), upper(lower.size());
+  problem.getConstraintBounds(0, lower, upper);
+  CHECK(lower[0] == Approx(-1.0 / 20));
+  CHECK(upper[0] == kFree);
+  CHECK(lower[34] == Approx(-1 / 0.3));
+  CHECK(problem.getConstraintName(0, 35) == "joints, row 1");
+  CHECK(problem.getConstraintName(1, 4) == "rest, row 1");
+}
+
+TEST_CASE("path constraints that do not fit are refused by name") {
+  const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto").model;
+  const VectorXd q = makeStandingPosture(model);
+  const auto make = [&](const std::function<void(std::vector<StageSpec>&)>& change) {
+    std::vector<StageSpec> stages(2);
+    stages[0].constraints = makeConstraintSet(model, makeContactTargets(model, q, {0, 1}, 0, 50));
+    stages[0].path_constraints.push_back(makeConstraint("joint", makeJointPosition(model, {7})));
+    change(stages);
+    RobotProblem(model, q, VectorXd::Zero(model.nv()), std::move(stages), Formulation::Reduced);
+  };
+  CHECK_NOTHROW(make([](std::vector<StageSpec>&) {}));
+  const auto refuses = [&](const std::string& text, const std::function<void(PathConstraint&)>& change) {
+    CHECK_THROWS_WITH(make([&](std::vector<StageSpec>& s) { change(s[0].path_constraints[0]); }),
+                      Catch::Contains("path constraint 'joint'") && Catch::Contains(text));
+  };
+  refuses("size", [](PathConstraint& c) { c.scale.resize(0); });
+  refuses("size", [](PathConstraint& c) { c.upper.setConstant(2, 1.0); });
+  refuses("scale", [](PathConstraint& c) { c.scale[0] = 0; });
+  refuses("exceeds", [](PathConstraint& c) {
+    c.lower[0] = kFree;
+    c.upper[0] = 1;
+  });
+  refuses("residual", [](PathConstraint& c) { c.residual.reset(); });
+  // Forces at the terminal node, of a constraint and of a cost.
+  CHECK_THROWS_WITH(make([](std::vector<StageSpec>& s) {
+                      const int c = s[0].constraints.num_loops;
+                      s[1].path_constraints.push_back(
+                          makeConstraint("late cone", makeWrenchCone(s[0].constraints, c, 0.05, 0.03, 0.5)));
+                    }),
+                    Catch::Contains("late cone"));
+  CHECK_THROWS_WITH(make([](std::vector<StageSpec>& s) {
+                      const int c = s[0].constraints.num_loops;
+                      s[1].costs.push_back({"late force", 1, Activation::makeQuadratic(Vector6d::Ones()),
+                                            makeContactForce(s[0].constraints, c, Vector6d::Zero())});
+                    }),
+                    Catch::Contains("late force"));
+}
