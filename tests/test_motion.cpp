@@ -144,7 +144,7 @@ TEST_CASE("weights by joint come with the robot's file, whatever the joints are 
   CHECK(makeStateWeights(loadRobot(testing::RobotDirectory().writeRobot(texts[0], texts[1])).model) == weights);
 }
 
-TEST_CASE("contact gains and the friction pyramid follow one rule in all motions") {
+TEST_CASE("contact gains and wrench cones follow one rule in all motions") {
   const Model model = loadOwn("bipetto");
   SquatOptions squat;
   JumpOptions jump;
@@ -160,14 +160,21 @@ TEST_CASE("contact gains and the friction pyramid follow one rule in all motions
       CHECK(set.closures[c].kp == Approx(0.5 / (stage.dt * stage.dt)));
       CHECK(set.closures[c].kd == Approx(1 / stage.dt));
     }
-    VectorXd lambda = VectorXd::Zero(set.rows), u, r(4);
+    VectorXd lambda = VectorXd::Zero(set.rows), u, r(17);
     lambda[set.offsets[set.num_loops] + 2] = 1;  // N
     const Workspace ws(model);
+    const ContactFrame& foot = model.contacts()[set.getContact(set.num_loops)];
+    const double mu = 0.99 * 0.7 / std::sqrt(2);
     int found = 0;
-    for (const Cost& cost : stage.costs) {
-      if (cost.name != "friction " + model.contacts()[set.getContact(set.num_loops)].name) continue;
-      cost.residual->calc({model, ws, set, u, lambda}, r);
-      CHECK(r[0] == Approx(0.95 * 0.7 / std::sqrt(2)));
+    for (const PathConstraint& constraint : stage.path_constraints) {
+      if (constraint.name != "wrench cone of " + foot.name) continue;
+      constraint.residual->calc({model, ws, set, u, lambda}, r);
+      CHECK(r[0] == 1);
+      CHECK(r[1] == Approx(mu));
+      CHECK(r[5] == Approx(0.99 * foot.half_width));
+      CHECK(r[7] == Approx(0.99 * foot.half_length));
+      CHECK(r[16] == Approx(0.99 * mu * (foot.half_length + foot.half_width)));
+      CHECK(constraint.lower.isZero(0));
       ++found;
     }
     CHECK(found == 1);

@@ -66,6 +66,12 @@ std::string formatOptionList(const MotionEntry& motion) {
   return text.str();
 }
 
+std::string formatConstraints(const FddpSummary& solver) {
+  if (solver.penalty == 0) return "none";
+  return "violated by " + formatNumber(solver.violation, "%.1e") + " at most, largest multiplier " +
+         formatNumber(solver.multiplier, "%.3g") + ", " + std::to_string(solver.multiplier_updates) + " updates";
+}
+
 void printResult(const MotionResult& result, const std::vector<std::string>& paths) {
   const FddpSummary& solver = result.solver;
   std::string torques;
@@ -87,6 +93,7 @@ void printResult(const MotionResult& result, const std::vector<std::string>& pat
                               {"time", formatNumber(solver.seconds, "%.2f") + " s"},
                               {"centre of mass", formatNumber(result.com_start, "%.4f") + " m high, lowest at " +
                                                      formatNumber(result.com_lowest, "%.4f") + " m"},
+                              {"constraints", formatConstraints(solver)},
                               {"closure gap", pair(result.gap_position, result.gap_angle)},
                               {"contact slip", pair(result.slip_position, result.slip_angle)},
                               {"peak torques [N m]", torques}});

@@ -98,11 +98,20 @@ Json makeGoals(const MotionResult& result) {
   return goals;
 }
 
+Json makeConstraints(const FddpSummary& solver) {
+  return {{"largest_violation", solver.violation},
+          {"complementarity", solver.complementarity},
+          {"largest_multiplier", solver.multiplier},
+          {"penalty", solver.penalty},
+          {"multiplier_updates", solver.multiplier_updates}};
+}
+
 Json makeSummary(const MotionResult& result) {
   const BuildInfo build = getBuildInfo();
   Json log = Json::array();
   for (const FddpIteration& line : result.solver.log)
-    log.push_back({line.iteration, line.cost, line.gap, line.gradient, line.step, line.regularization, line.seconds});
+    log.push_back({line.iteration, line.cost, line.gap, line.violation, line.gradient, line.step, line.regularization,
+                   line.seconds});
   const VectorXd& time = result.record.time;
   return {{"motion", result.motion},
           {"robot", result.run.robot},
@@ -122,6 +131,7 @@ Json makeSummary(const MotionResult& result) {
           {"iterations", result.solver.iterations},
           {"seconds", result.solver.seconds},
           {"solver_gap", result.solver.gap},
+          {"constraints", makeConstraints(result.solver)},
           {"nodes", time.size()},
           {"duration_s", time[time.size() - 1]},
           {"closure_gap", {{"position_m", result.gap_position}, {"angle_rad", result.gap_angle}}},
@@ -130,7 +140,7 @@ Json makeSummary(const MotionResult& result) {
           {"peak_torques", listByName(result.peak_torques)},
           {"phases", makePhases(result)},
           {"ground", makeGround(result.ground)},
-          {"log_columns", {"iteration", "cost", "gap", "gradient", "step", "regularization", "seconds"}},
+          {"log_columns", {"iteration", "cost", "gap", "violation", "gradient", "step", "regularization", "seconds"}},
           {"log", log}};
 }
 

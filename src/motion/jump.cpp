@@ -259,8 +259,6 @@ std::vector<OptionEntry> listOptions(JumpOptions& o) {
           {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
           {"force_weight", &o.force_weight, "1", "share the load evenly between feet and in time, over (m g)^2"},
           {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
-          {"friction_weight", &o.friction_weight, "1",
-           "stay inside the friction pyramid, over the load of the foot squared"},
           {"swing_weight", &o.swing_weight, "1/m^2", "path of the feet in flight"},
           {"swing_rotation_weight", &o.swing_rotation_weight, "1", "soles stay level in flight"},
           {"touchdown_foothold_weight", &o.touchdown_foothold_weight, "1/m^2", "feet land where they should"},
@@ -285,7 +283,6 @@ void setPaperWeights(JumpOptions& o) {
   o.motor_weight = 0;
   o.control_weight = 0.05;
   o.published = 1;
-  o.friction_weight = 0;
   o.force_weight = 500;
   o.pressure_weight = 5;
   o.swing_weight = o.swing_rotation_weight = 0;
@@ -306,7 +303,7 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
   plan.ground.friction = options.friction;
   std::vector<StageSpec>& stages = plan.stages;
   const double g = model.gravity().norm();
-  const GroundCosts ground{options.force_weight, options.pressure_weight, options.friction_weight, options.friction,
+  const GroundCosts ground{options.force_weight, options.pressure_weight,
                            options.published != 0 ? ForceAxes::World : ForceAxes::Contact};
   for (Phase phase : {Phase::Stand, Phase::Push, Phase::Flight, Phase::Land, Phase::Settle}) {
     const bool over = phase == Phase::Land || phase == Phase::Settle;
@@ -323,6 +320,7 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
       StageSpec& stage = stages.back();
       const double load = calcLoad(scene, phase, com.acceleration);
       addGroundCosts(model, ground, VectorXd::Constant(contacts.size(), load / contacts.size()), stage);
+      if (options.published == 0) addWrenchCones(model, options.friction, stage);
       if (phase != Phase::Flight) addHeightCost(scene, "com height", options.com_weight, com.height, stage);
       if (phase == Phase::Flight && 2 * i == nodes)
         addHeightCost(scene, "apex", options.apex_weight / options.time_step, com.height, stage);

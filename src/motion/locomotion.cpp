@@ -154,7 +154,8 @@ void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
     loads[i] = std::max(1.0, weight * share);
   }
   const ForceAxes axes = isPublished(scene) ? ForceAxes::World : ForceAxes::Contact;
-  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, o.friction_weight, o.friction, axes}, loads, stage);
+  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, axes}, loads, stage);
+  if (!isPublished(scene)) addWrenchCones(scene.model, o.friction, stage);
 }
 
 Vector6d makeVector(double x, double z, double rotation) {
@@ -220,6 +221,7 @@ StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector
   stage.constraints = makeConstraintSet(scene.model, contacts);
   stage.state.weight *= scene.options.timing.time_step;
   stage.control.weight *= scene.options.timing.time_step;  // torques have no effect here and go to zero
+  if (!isPublished(scene)) addWrenchCones(scene.model, scene.options.friction, stage);
   addLandingCosts(scene, scene.task.plan.steps[scene.gait.phases[node.phase].steps_done - 1], stage);
   return stage;
 }

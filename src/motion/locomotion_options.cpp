@@ -40,8 +40,6 @@ std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
       {"landing_velocity_weight", &o.landing_velocity_weight, "s^2/m^2", "a landing foot is still"},
       {"force_weight", &o.force_weight, "1", "pass the weight evenly from foot to foot, over (m g)^2"},
       {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
-      {"friction_weight", &o.friction_weight, "1",
-       "stay inside the friction pyramid, over the load of the foot squared"},
       {"feet_distance", &o.feet_distance, "m", "least distance of the feet"},
       {"feet_distance_weight", &o.feet_distance_weight, "1/m^2", "feet do not come nearer"},
       {"terminal_weight", &o.terminal_weight, "1", "end at rest, in place"},
@@ -76,7 +74,6 @@ void setPaperWeights(LocomotionOptions& o) {
   o.landing_height_weight = o.landing_rotation_weight = o.landing_velocity_weight = 1e4;
   o.force_weight = 10;
   o.pressure_weight = 10;
-  o.friction_weight = 0;
   o.feet_distance_weight = 100;
   o.terminal_weight = 1e4;
   o.contact_kp = 0;

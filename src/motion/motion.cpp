@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -176,10 +177,30 @@ void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights
                          makeFrameVelocity(foot)});
 }
 
+void addWrenchCones(const Model& model, double friction, StageSpec& stage) {
+  constexpr double kReserve = 0.01;
+  const ConstraintSet& set = stage.constraints;
+  const double unit = model.mass() * (stage.kind == StageKind::Impact ? 1 : model.gravity().norm());
+  const double mu = (1 - kReserve) * friction / std::sqrt(2);
+  for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
+    const ContactFrame& contact = model.contacts()[set.getContact(c)];
+    const double X = (1 - kReserve) * contact.half_length, Y = (1 - kReserve) * contact.half_width;
+    std::unique_ptr<Residual> cone = makeWrenchCone(set, c, X, Y, mu);
+    const int rows = cone->size();
+    VectorXd scale = VectorXd::Constant(rows, unit);
+    if (rows > 5) {
+      const double least = 0.01;  // m, of soles without size
+      scale.segment<2>(5) *= std::max(least, Y);
+      scale.segment<2>(7) *= std::max(least, X);
+      scale.tail<8>() *= std::max(least, X + Y);
+    }
+    stage.path_constraints.push_back({"wrench cone of " + contact.name, std::move(cone), VectorXd::Zero(rows),
+                                      VectorXd::Constant(rows, std::numeric_limits<double>::infinity()), scale});
+  }
+}
+
 void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd& loads, StageSpec& stage) {
   const ConstraintSet& set = stage.constraints;
-  // The pyramid inscribed in the cone, shrunk slightly because a penalty is satisfied only approximately.
-  const double pyramid = 0.95 * costs.friction / std::sqrt(2);
   const double weight = model.mass() * model.gravity().norm();
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
     const ContactFrame& contact = model.contacts()[set.getContact(c)];
@@ -190,11 +211,6 @@ void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd
       stage.costs.push_back({"force " + contact.name, costs.force_weight / (weight * weight),
                              Activation::makeQuadratic(VectorXd::Ones(rows)),
                              makeContactForce(set, c, reference, costs.axes)});
-    const double load = std::max(reference[2], 0.1 * weight);
-    if (costs.friction_weight != 0)
-      stage.costs.push_back({"friction " + contact.name, costs.friction_weight / (load * load),
-                             Activation::makeBarrier(VectorXd::Ones(4), VectorXd::Zero(4), VectorXd::Constant(4, 1e12)),
-                             makeFrictionPyramid(set, c, pyramid)});
     if (costs.pressure_weight == 0 || rows != 6 || contact.half_length <= 0 || contact.half_width <= 0) continue;
     const Eigen::Vector2d half(contact.half_length, contact.half_width);
     stage.costs.push_back({"pressure " + contact.name, costs.pressure_weight,

@@ -37,8 +37,9 @@ StageSpec makeStage(const Model& model, const SquatOptions& o, const std::vector
   stage.costs.push_back(
       {"com height", o.com_weight, Activation::makeQuadratic(Vector3d::UnitZ()), makeComPosition(com)});
   const double weight = model.mass() * model.gravity().norm();
-  addGroundCosts(model, {o.force_weight, o.pressure_weight, o.friction_weight, o.friction},
+  addGroundCosts(model, {o.force_weight, o.pressure_weight},
                  VectorXd::Constant(contacts.size(), weight / contacts.size()), stage);
+  addWrenchCones(model, o.friction, stage);
   return stage;
 }
 
@@ -56,8 +57,6 @@ std::vector<OptionEntry> listOptions(SquatOptions& o) {
           {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
           {"force_weight", &o.force_weight, "1", "share the weight evenly between the feet, over (m g)^2"},
           {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
-          {"friction_weight", &o.friction_weight, "1",
-           "stay inside the friction pyramid, over the load of the foot squared"},
           {"friction", &o.friction, "1", "friction coefficient"},
           {"terminal_weight", &o.terminal_weight, "1", "end at rest"},
           {"contact_kp", &o.contact_kp, "1/s^2",
@@ -99,6 +98,7 @@ MotionPlan planSquat(const Model& model, const SquatOptions& options, const Vect
   StageSpec& terminal = plan.stages.back();
   terminal.constraints = {};
   terminal.control.weight = 0;
+  terminal.path_constraints.clear();
   terminal.costs.resize(1);  // the height; forces have no meaning at the terminal node
   terminal.state.weight = options.terminal_weight;
   terminal.state.weights.head(model.nv()).setZero();

@@ -112,7 +112,7 @@ function fillCheck(parent, runs) {
   }
 }
 
-// Cost, gap and gradient over the iterations, and the whole log.
+// Cost, gap, violation and gradient over the iterations, and the whole log.
 function fillIterations(parent, runs) {
   const logs = runs.map(run => (Array.isArray(run.summary.log) ? run.summary.log : []));
   if (logs.every(log => log.length === 0)) return;
@@ -121,7 +121,7 @@ function fillIterations(parent, runs) {
     const at = columns[r].indexOf(name);
     return at < 0 ? null : logs[r].map(line => line[at]);
   };
-  const series = ['cost', 'gap', 'gradient'].map(
+  const series = ['cost', 'gap', 'violation', 'gradient'].map(
       (name, i) => ({name, color: PALETTE[i], lines: runs.map((run, r) => column(r, name))}));
   new Plot(
       parent,

@@ -25,15 +25,15 @@ const char* getName(FddpTermination termination) {
 
 void printFddpHeader(std::ostream& out) {
   char text[128];
-  std::snprintf(text, sizeof text, "%5s %15s %10s %10s %10s %10s %9s\n", "iter", "cost", "gap", "gradient", "step",
-                "regul.", "time [s]");
+  std::snprintf(text, sizeof text, "%5s %15s %10s %10s %10s %10s %10s %9s\n", "iter", "cost", "gap", "violation",
+                "gradient", "step", "regul.", "time [s]");
   out << text;
 }
 
 void printFddpIteration(std::ostream& out, const FddpIteration& line) {
   char text[128];
-  std::snprintf(text, sizeof text, "%5d %15.8e %10.3e %10.3e %10.3e %10.3e %9.3f\n", line.iteration, line.cost,
-                line.gap, line.gradient, line.step, line.regularization, line.seconds);
+  std::snprintf(text, sizeof text, "%5d %15.8e %10.3e %10.3e %10.3e %10.3e %10.3e %9.3f\n", line.iteration, line.cost,
+                line.gap, line.violation, line.gradient, line.step, line.regularization, line.seconds);
   out << text;
 }
 

@@ -14,7 +14,8 @@
 /// Costs of a stage, h the time step:
 /// - state regularization about the posture at the start, at rest; motor torques;
 /// - height of the CoM: at mid-flight (over h, as in the paper) and, with less weight, on the ground;
-/// - feet on the ground: force by Eq. (2), shared evenly, centre of pressure, friction pyramid;
+/// - feet on the ground: force by Eq. (2), shared evenly, centre of pressure; inside the wrench cones of the soles, by
+///   constraints;
 /// - feet in flight: placement by Eq. (3);
 /// - touchdown, at the first node of the landing: placement and velocity of the feet, over h. The desired velocity is
 ///   zero: the legs fold as fast as the body falls.
@@ -49,7 +50,6 @@ struct JumpOptions {
   double control_weight = 3e-3;            ///< of the motor torques, 1/(N m)^2
   double force_weight = 30;                ///< of the contact force reference, over (m g)^2
   double pressure_weight = 1;              ///< of the centre of pressure, over the half size of the sole squared
-  double friction_weight = 100;            ///< of leaving the friction pyramid, over the load of the foot squared, 1
   double swing_weight = 1e4;               ///< of the feet's path in flight, 1/m^2
   double swing_rotation_weight = 1e2;      ///< of their orientation, 1
   double touchdown_foothold_weight = 1e5;  ///< horizontal place of the feet, over h, 1/m^2

@@ -7,7 +7,7 @@
 /// - swing foot: placement along its path, and (instead) fly high: its horizontal velocity near the ground;
 /// - landing, at the first node of a double support or at the impact before it: placement and velocity of the landing
 ///   foot, over the h of a stage;
-/// - forces of stance feet: share of the weight, centre of pressure, friction pyramid;
+/// - forces of stance feet: share of the weight, centre of pressure; inside the wrench cones of the soles, by constraints;
 /// - distance of the feet, where less than `feet_distance`.
 /// The terminal node has costs of the centre of mass, the posture and the velocities.
 ///
@@ -76,7 +76,6 @@ struct LocomotionOptions {
   double landing_velocity_weight = 1e3;  ///< its velocity, over h, s^2/m^2
   double force_weight = 10;              ///< of the contact force reference, over (m g)^2
   double pressure_weight = 10;           ///< of the centre of pressure, over the half size of the sole squared
-  double friction_weight = 100;          ///< of leaving the friction pyramid, over the load of the foot squared, 1
   double feet_distance = 0.2;            ///< least distance of the feet, m
   double feet_distance_weight = 0;       ///< of coming nearer, 1/m^2
   double terminal_weight = 1e3;          ///< of the final velocities, and of the final place of the CoM

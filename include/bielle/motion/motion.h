@@ -113,13 +113,8 @@ void raiseMotorWeights(const Model& model, double weight, VectorXd& weights);
 
 /// Costs of the feet on the ground, the same for all motions.
 struct GroundCosts {
-  double force_weight = 10;    ///< of the force reference, over (m g)^2
-  double pressure_weight = 1;  ///< of the centre of pressure, over the half size of the sole squared
-  /// Weight of leaving the friction pyramid, over the square of the foot's load (at least m g / 10), 1. Without this
-  /// scaling, a weight that holds a lightly loaded foot is so stiff for a foot that carries the robot that the solver
-  /// takes tiny steps.
-  double friction_weight = 100;
-  double friction = 0.7;                ///< coefficient of the ground, 1; the pyramid lies slightly inside its cone
+  double force_weight = 10;             ///< of the force reference, over (m g)^2
+  double pressure_weight = 1;           ///< of the centre of pressure, over the half size of the sole squared
   ForceAxes axes = ForceAxes::Contact;  ///< of force reference and centre of pressure
 };
 /// Weights of a foot that may land anywhere, as in the paper: height of a place, no tilt, no velocity.
@@ -131,6 +126,12 @@ struct LandingWeights {
 /// \param suffix  of the names of the costs, if several feet land at once
 void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights& weights, StageSpec& stage,
                     const std::string& suffix = "");
+
+/// Adds a path constraint for every active contact: the wrench cone of its sole (residual.h) with nothing pulled, drawn in by
+/// one per cent, in friction and in size, lest rounding of a result leave the cone. Its pyramids of friction/sqrt(2) are inscribed
+/// in round cones. The unit of a violation is the weight of the robot; at an impact, its mass times 1 m/s.
+/// \param friction  coefficient of the ground, positive
+void addWrenchCones(const Model& model, double friction, StageSpec& stage);
 
 /// Adds the costs of every active contact of the stage. \param loads  vertical force of each, in their order, N
 void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd& loads, StageSpec& stage);

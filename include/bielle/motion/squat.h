@@ -17,7 +17,6 @@ struct SquatOptions {
   double control_weight = 1e-3;  ///< of the motor torques, 1/(N m)^2
   double force_weight = 10;      ///< of the contact force reference (half the weight per foot), over (m g)^2
   double pressure_weight = 1;    ///< of the centre of pressure, over the half size of the sole squared
-  double friction_weight = 100;  ///< of leaving the friction pyramid, over the load of the foot squared, 1
   double friction = 0.7;         ///< friction coefficient, 1
   double terminal_weight = 1e3;  ///< of the final velocities
   double contact_kp = 400;       ///< stabilisation of the contacts, 1/s^2; limited to 1/(2 h^2), h the time step
