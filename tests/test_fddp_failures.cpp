@@ -200,11 +200,12 @@ TEST_CASE("guesses of wrong sizes are refused with the sizes") {
 TEST_CASE("the log prints a header and one line of the same columns per iteration") {
   std::ostringstream out;
   printFddpHeader(out);
-  printFddpIteration(out, {7, 1.5, 2e-3, 3e-4, 0.5, 1e-9, 0.25});
+  printFddpIteration(out, {7, 1.5, 4e-5, 2e-3, 3e-4, 0.5, 1e-9, 0.25});
   std::istringstream in(out.str());
   std::string header, line;
   std::getline(in, header);
   std::getline(in, line);
   CHECK(header.size() == line.size());
-  CHECK(line.find("1.50000000e+00  2.000e-03  3.000e-04  5.000e-01  1.000e-09     0.250") != std::string::npos);
+  CHECK(line.find("1.50000000e+00  2.000e-03  4.000e-05  3.000e-04  5.000e-01  1.000e-09     0.250") !=
+        std::string::npos);
 }

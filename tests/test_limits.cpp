@@ -149,8 +149,9 @@ TEST_CASE("limits: a range without width has no scale, and is refused") {
 TEST_CASE("costs: bounds of a barrier that do not have the size of its residual are refused") {
   const auto expectRefusal = [](const std::function<void(Activation&)>& poison) {
     MotionPlan plan = planSquat(getBipetto(), {}, makeStandingPosture(getBipetto()));
-    for (Cost& cost : plan.stages[3].costs)
-      if (cost.activation.kind == ActivationKind::Barrier) poison(cost.activation);
+    Activation barrier = Activation::makeBarrier(Vector3d::Ones(), Vector3d::Zero(), Vector3d::Ones());
+    poison(barrier);
+    plan.stages[3].costs.push_back({"box", 1, barrier, makeComPosition(Vector3d::Zero())});
     CHECK_THROWS_WITH(makeMotion(getBipetto(), std::move(plan), {}),
                       Catch::Contains("stage 3") && Catch::Contains("size of the residual"));
   };

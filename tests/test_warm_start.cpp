@@ -28,15 +28,22 @@ Motion makeShortWalk(double speed, double end = 0.3) {
 
 TEST_CASE("warm start: a result is its own solution, and near that of a walk a little faster") {
   Motion motion = makeShortWalk(0.4);
-  const FddpSummary cold = Fddp().solve(*motion.problem, motion.guess);
+  Fddp first;
+  const FddpSummary cold = first.solve(*motion.problem, motion.guess);
   REQUIRE(cold.termination == FddpTermination::Converged);
   const MotionRecord record = makeRecord(motion, motion.guess);
 
+  // The trajectory itself, and what a file keeps of it, both with the multipliers of its constraints.
   Motion same = makeShortWalk(0.4);
+  same.guess = motion.guess;
+  Fddp second;
+  second.setMultipliers(first.getMultipliers());
+  CHECK(second.solve(*same.problem, same.guess).iterations <= 1);
   setGuess(record, same);
-  const FddpSummary again = Fddp().solve(*same.problem, same.guess);
+  second.setMultipliers(first.getMultipliers());
+  const FddpSummary again = second.solve(*same.problem, same.guess);
   CHECK(again.termination == FddpTermination::Converged);
-  CHECK(again.iterations <= 2);
+  CHECK(3 * again.iterations <= cold.iterations);
   CHECK(again.cost == Approx(cold.cost).epsilon(1e-8));
 
   Motion faster = makeShortWalk(0.48), warm = makeShortWalk(0.48);

@@ -68,8 +68,10 @@ std::string formatOptionList(const MotionEntry& motion) {
 
 std::string formatConstraints(const FddpSummary& solver) {
   if (solver.penalty == 0) return "none";
-  return "violated by " + formatNumber(solver.violation, "%.1e") + " at most, largest multiplier " +
-         formatNumber(solver.multiplier, "%.3g") + ", " + std::to_string(solver.multiplier_updates) + " updates";
+  const std::string violation = formatNumber(solver.violation, "%.1e");
+  return (solver.violation > 0 ? "violated by " + violation + " at most" : std::string("kept")) +
+         ", largest multiplier " + formatNumber(solver.multiplier, "%.3g") + " after " +
+         std::to_string(solver.multiplier_updates) + " updates";
 }
 
 void printResult(const MotionResult& result, const std::vector<std::string>& paths) {

@@ -221,7 +221,6 @@ StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector
   stage.constraints = makeConstraintSet(scene.model, contacts);
   stage.state.weight *= scene.options.timing.time_step;
   stage.control.weight *= scene.options.timing.time_step;  // torques have no effect here and go to zero
-  if (!isPublished(scene)) addWrenchCones(scene.model, scene.options.friction, stage);
   addLandingCosts(scene, scene.task.plan.steps[scene.gait.phases[node.phase].steps_done - 1], stage);
   return stage;
 }

@@ -180,7 +180,7 @@ void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights
 void addWrenchCones(const Model& model, double friction, StageSpec& stage) {
   constexpr double kReserve = 0.01;
   const ConstraintSet& set = stage.constraints;
-  const double unit = model.mass() * (stage.kind == StageKind::Impact ? 1 : model.gravity().norm());
+  const double unit = model.mass() * model.gravity().norm();
   const double mu = (1 - kReserve) * friction / std::sqrt(2);
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
     const ContactFrame& contact = model.contacts()[set.getContact(c)];

@@ -448,8 +448,7 @@ FddpSummary Run::finish(FddpTermination termination) {
   if (!summary_.message.empty()) return std::move(summary_);
   switch (termination) {
     case FddpTermination::Converged:
-      summary_.message = work_.lagrangian.isEmpty() ? "the gradient vanishes and the gaps are closed"
-                                                    : "the gradient vanishes, gaps are closed and constraints kept";
+      summary_.message = "the gradient vanishes and the gaps are closed";
       break;
     case FddpTermination::MaxIterations:
       summary_.message = "the largest number of iterations is reached";

@@ -129,7 +129,7 @@ void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights
 
 /// Adds a path constraint for every active contact: the wrench cone of its sole (residual.h) with nothing pulled, drawn in by
 /// one per cent, in friction and in size, lest rounding of a result leave the cone. Its pyramids of friction/sqrt(2) are inscribed
-/// in round cones. The unit of a violation is the weight of the robot; at an impact, its mass times 1 m/s.
+/// in round cones. A violation of 1 is the weight of the robot.
 /// \param friction  coefficient of the ground, positive
 void addWrenchCones(const Model& model, double friction, StageSpec& stage);
 
