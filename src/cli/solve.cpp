@@ -68,6 +68,7 @@ std::string formatOptionList(const MotionEntry& motion) {
 
 std::string formatConstraints(const FddpSummary& solver) {
   if (solver.penalty == 0) return "none";
+  if (solver.violation == 0 && solver.multiplier == 0) return "kept, none binds";
   const std::string violation = formatNumber(solver.violation, "%.1e");
   return (solver.violation > 0 ? "violated by " + violation + " at most" : std::string("kept")) +
          ", largest multiplier " + formatNumber(solver.multiplier, "%.3g") + " after " +
