@@ -178,7 +178,7 @@ void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights
 }
 
 void addWrenchCones(const Model& model, double friction, StageSpec& stage) {
-  constexpr double kReserve = 0.01;
+  constexpr double kReserve = 0.01, kLeastLoad = 1e-3;
   const ConstraintSet& set = stage.constraints;
   const double unit = model.mass() * model.gravity().norm();
   const double mu = (1 - kReserve) * friction / std::sqrt(2);
@@ -194,7 +194,8 @@ void addWrenchCones(const Model& model, double friction, StageSpec& stage) {
       scale.segment<2>(7) *= std::max(least, X);
       scale.tail<8>() *= std::max(least, X + Y);
     }
-    stage.path_constraints.push_back({"wrench cone of " + contact.name, std::move(cone), VectorXd::Zero(rows),
+    stage.path_constraints.push_back({"wrench cone of " + contact.name, std::move(cone),
+                                      kLeastLoad * unit * VectorXd::Unit(rows, 0),
                                       VectorXd::Constant(rows, std::numeric_limits<double>::infinity()), scale});
   }
 }

@@ -127,9 +127,9 @@ struct LandingWeights {
 void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights& weights, StageSpec& stage,
                     const std::string& suffix = "");
 
-/// Adds a path constraint for every active contact: the wrench cone of its sole (residual.h) with nothing pulled, drawn in by
-/// one per cent, in friction and in size, lest rounding of a result leave the cone. Its pyramids of friction/sqrt(2) are inscribed
-/// in round cones. A violation of 1 is the weight of the robot.
+/// Adds a path constraint for every active contact: the wrench cone of its sole (residual.h), drawn in by one per cent, in
+/// friction and in size, and by a thousandth of the robot's weight in the normal force, lest rounding of a result leave the
+/// cone. Its pyramids of friction/sqrt(2) are inscribed in round cones. A violation of 1 is the weight of the robot.
 /// \param friction  coefficient of the ground, positive
 void addWrenchCones(const Model& model, double friction, StageSpec& stage);
 
