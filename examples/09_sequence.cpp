@@ -45,13 +45,10 @@ int main(int argc, char** argv) {
                 summary.iterations, summary.cost);
     alone += summary.cost;
   };
-  PartsSolution solution = solveParts(robot.model, parts, makeStandingPosture(robot.model), apart);
-  ShootingTrajectory& trajectory = solution.trajectory;
+  ShootingTrajectory trajectory = solveParts(robot.model, parts, makeStandingPosture(robot.model), apart);
   FddpObserver observer;
   observer.callback = makeFddpPrinter(std::cout);
-  Fddp solver;
-  solver.setMultipliers(solution.multipliers);
-  const FddpSummary summary = solver.solve(*motion.problem, trajectory, observer);
+  const FddpSummary summary = Fddp().solve(*motion.problem, trajectory, observer);
   const MotionResult result = makeResult({"bipetto", robot.file, {}}, motion, trajectory, summary);
 
   std::printf("\n%s after %d iterations and %.2f s: cost %.5f, one by one %.5f\n", getName(summary.termination),

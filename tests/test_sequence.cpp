@@ -149,17 +149,11 @@ TEST_CASE("sequence: unlike motions are solved as one problem") {
     solved.push_back(part);
     CHECK(summary.termination == FddpTermination::Converged);
   };
-  const PartsSolution solution = solveParts(model, parts, makeStandingPosture(model), apart);
-  motion.guess = solution.trajectory;
+  motion.guess = solveParts(model, parts, makeStandingPosture(model), apart);
   CHECK(solved == std::vector<std::string>{"squat", "turn", "walk", "stairs", "jump"});
   FddpOptions options;
   options.max_iterations = 100;
-  REQUIRE(solution.multipliers.values.size() == motion.guess.xs.size());
-  for (size_t k = 0; k < motion.guess.xs.size(); ++k)
-    REQUIRE(solution.multipliers.values[k].size() == motion.problem->constraintSize(static_cast<int>(k)));
-  Fddp solver(options);
-  solver.setMultipliers(solution.multipliers);
-  const FddpSummary summary = solver.solve(*motion.problem, motion.guess);
+  const FddpSummary summary = Fddp(options).solve(*motion.problem, motion.guess);
   CAPTURE(summary.message, summary.iterations);
   CHECK(summary.termination == FddpTermination::Converged);
   const StepMeasures m = StepMeter(motion, motion.guess).measure();

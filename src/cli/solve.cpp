@@ -167,8 +167,8 @@ FddpObserver makeObserver(const SolveArguments& arguments) {
 }
 
 // Solves each motion of a sequence separately.
-PartsSolution solveParts(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
-                         const SolveArguments& arguments, const FddpOptions& solver) {
+ShootingTrajectory solveParts(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
+                              const SolveArguments& arguments, const FddpOptions& solver) {
   PartsOptions options;
   options.problem = problem;
   options.solver = solver;
@@ -206,13 +206,9 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   makeOutputDirectory(arguments.directory);
 
   watchSignals();
-  Fddp fddp(solver);
-  if (!request.parts.empty() && arguments.warm_start.empty()) {
-    PartsSolution parts = solveParts(request, model, problem, arguments, solver);
-    motion.guess = std::move(parts.trajectory);
-    if (parts.multipliers.penalty > 0) fddp.setMultipliers(parts.multipliers);
-  }
-  const FddpSummary summary = fddp.solve(*motion.problem, motion.guess, makeObserver(arguments));
+  if (!request.parts.empty() && arguments.warm_start.empty())
+    motion.guess = solveParts(request, model, problem, arguments, solver);
+  const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess, makeObserver(arguments));
   const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed",
                     serial ? arguments.serial_armature : ""};
   const MotionResult result = makeResult(run, motion, motion.guess, summary);

@@ -84,12 +84,6 @@ void join(ShootingTrajectory& part, ShootingTrajectory& whole) {
   moveAll(part.us, whole.us);
 }
 
-void join(const Multipliers& part, Multipliers& whole) {
-  if (!whole.values.empty()) whole.values.pop_back();
-  whole.values.insert(whole.values.end(), part.values.begin(), part.values.end());
-  whole.penalty = std::max(whole.penalty, part.penalty);
-}
-
 }  // namespace
 
 MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0) {
@@ -128,19 +122,17 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
   return sequence;
 }
 
-PartsSolution solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
-                         const PartsOptions& options) {
-  PartsSolution whole;
+ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
+                              const PartsOptions& options) {
+  ShootingTrajectory whole;
   VectorXd q = q0;
   for (const SequencePart& part : parts) {
     MotionPlan plan = part.plan(model, q);
     q = plan.q_end;
     Motion motion = makeMotion(model, std::move(plan), options.problem);
-    Fddp solver(options.solver);
-    const FddpSummary summary = solver.solve(*motion.problem, motion.guess, options.observer);
+    const FddpSummary summary = Fddp(options.solver).solve(*motion.problem, motion.guess, options.observer);
     if (options.report) options.report(part.name, summary);
-    join(motion.guess, whole.trajectory);
-    join(solver.getMultipliers(), whole.multipliers);
+    join(motion.guess, whole);
   }
   return whole;
 }

@@ -26,16 +26,11 @@ struct PartsOptions {
   std::function<void(const std::string& part, const FddpSummary& summary)> report;  ///< receives the outcome of each
 };
 
-struct PartsSolution {
-  ShootingTrajectory trajectory;
-  Multipliers multipliers;  ///< of the constraints, with the largest penalty of the parts; empty if they have none
-};
-
 /// An initial guess for the sequence: each motion solved separately. From a quasi-static guess a long sequence may fail
 /// to converge, because one step length applies to all motions, so that the hardest one slows the closing of all gaps.
 /// Parts that do not converge contribute their last iterate.
-PartsSolution solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
-                         const PartsOptions& options = {});
+ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
+                              const PartsOptions& options = {});
 
 /// From the robot's standing posture.
 Motion makeSequence(const Model& model, const std::vector<SequencePart>& parts, const ProblemOptions& problem = {});
