@@ -57,21 +57,27 @@ inline double calcCostAlong(const ShootingProblem& problem, const ShootingTrajec
   return total + evaluate(problem, problem.numStages(), t.xs.back())->cost;
 }
 
-// dJ/du of the rollout from the initial state, stage after stage.
-inline VectorXd calcShootingGradient(const ShootingProblem& problem, std::vector<VectorXd> us) {
+// df/du by central differences, f a function of the controls, stage after stage.
+template <class Function>
+VectorXd calcControlGradient(std::vector<VectorXd> us, const Function& f) {
   const double h = 1e-5;
   std::vector<double> gradient;
   for (VectorXd& u : us) {
     for (Eigen::Index i = 0; i < u.size(); ++i) {
       const double saved = u[i];
       u[i] = saved + h;
-      const double above = calcCost(problem, us);
+      const double above = f(us);
       u[i] = saved - h;
-      gradient.push_back((above - calcCost(problem, us)) / (2 * h));
+      gradient.push_back((above - f(us)) / (2 * h));
       u[i] = saved;
     }
   }
   return Eigen::Map<VectorXd>(gradient.data(), static_cast<Eigen::Index>(gradient.size()));
+}
+
+// dJ/du of the rollout from the initial state.
+inline VectorXd calcShootingGradient(const ShootingProblem& problem, const std::vector<VectorXd>& us) {
+  return calcControlGradient(us, [&](const std::vector<VectorXd>& all) { return calcCost(problem, all); });
 }
 
 inline double calcLargestGap(const ShootingProblem& problem, const ShootingTrajectory& t) {

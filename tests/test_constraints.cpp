@@ -4,7 +4,7 @@
 #include <catch2/catch.hpp>
 
 #include "constrained_problem.h"
-#include "count_allocations.h"
+#include "count_solver_allocations.h"
 #include "fddp_oracle.h"
 
 using namespace bielle;
@@ -52,23 +52,6 @@ double calcLagrangian(const ShootingProblem& problem, const std::vector<VectorXd
   return sum;
 }
 
-VectorXd calcGradient(const ShootingProblem& problem, std::vector<VectorXd> us,
-                      const std::vector<VectorXd>& multipliers) {
-  const double h = 1e-5;
-  std::vector<double> gradient;
-  for (VectorXd& u : us) {
-    for (Eigen::Index i = 0; i < u.size(); ++i) {
-      const double saved = u[i];
-      u[i] = saved + h;
-      const double above = calcLagrangian(problem, us, multipliers);
-      u[i] = saved - h;
-      gradient.push_back((above - calcLagrangian(problem, us, multipliers)) / (2 * h));
-      u[i] = saved;
-    }
-  }
-  return Eigen::Map<VectorXd>(gradient.data(), static_cast<Eigen::Index>(gradient.size()));
-}
-
 // Half the squares of all violations along the rollout.
 double calcViolations(const ShootingProblem& problem, const std::vector<VectorXd>& us) {
   double sum = 0;
@@ -90,7 +73,8 @@ struct Conditions {
 Conditions calcConditions(const ShootingProblem& problem, const ShootingTrajectory& t,
                           const std::vector<VectorXd>& multipliers) {
   Conditions out;
-  out.gradient = calcGradient(problem, t.us, multipliers).lpNorm<Eigen::Infinity>();
+  const auto lagrangian = [&](const std::vector<VectorXd>& us) { return calcLagrangian(problem, us, multipliers); };
+  out.gradient = calcControlGradient(t.us, lagrangian).lpNorm<Eigen::Infinity>();
   for (size_t k = 0; k < t.xs.size(); ++k) {
     const auto node = evaluate(problem, static_cast<int>(k), t.xs[k], k < t.us.size() ? &t.us[k] : nullptr);
     const VectorXd &c = node->constraints, &y = multipliers[k];
@@ -266,20 +250,9 @@ TEST_CASE("constraints that contradict each other are named, with what is left o
   // One of the two is violated by half of what lies between them at least. The sum of squares cannot be less, to first order.
   CHECK(summary.violation > 0.05 - 1e-6);
   CHECK(summary.violation < 0.1);
-  const auto calcSlope = [&](std::vector<VectorXd> us) {
-    VectorXd gradient(us.size());
-    for (size_t k = 0; k < us.size(); ++k) {
-      const double h = 1e-5, saved = us[k][0];
-      us[k][0] = saved + h;
-      const double above = calcViolations(problem, us);
-      us[k][0] = saved - h;
-      gradient[static_cast<Eigen::Index>(k)] = (above - calcViolations(problem, us)) / (2 * h);
-      us[k][0] = saved;
-    }
-    return gradient.norm();
-  };
-  CHECK(calcSlope(t.us) < 1e-4);
-  CHECK(calcSlope(makeGuess(problem).us) > 1e-2);
+  const auto violations = [&](const std::vector<VectorXd>& us) { return calcViolations(problem, us); };
+  CHECK(calcControlGradient(t.us, violations).norm() < 1e-4);
+  CHECK(calcControlGradient(makeGuess(problem).us, violations).norm() > 1e-2);
 }
 
 TEST_CASE("multipliers are worth keeping") {
@@ -289,7 +262,7 @@ TEST_CASE("multipliers are worth keeping") {
   const FddpSummary cold = solver.solve(problem, t);
   REQUIRE(cold.termination == FddpTermination::Converged);
   const Multipliers multipliers = solver.getMultipliers();
-  problem.start[0] = 0.001;
+  problem.start[0] += 0.001;
   ShootingTrajectory warm = t, half = t;
   Fddp kept, forgotten;
   kept.setMultipliers(multipliers);
@@ -304,6 +277,26 @@ TEST_CASE("multipliers are worth keeping") {
   CHECK(again.us == first.us);
 }
 
+TEST_CASE("a horizon that advances takes its multipliers along") {
+  auto problem = makeBoundedCartPole();
+  ShootingTrajectory t = makeGuess(problem);
+  Fddp solver;
+  solver.solve(problem, t);
+  const std::vector<VectorXd> before = solver.getMultipliers().values;
+  solver.advance(t);
+  const Multipliers after = solver.getMultipliers();
+  const size_t N = t.us.size();
+  REQUIRE(after.values.size() == N + 1);
+  double largest = 0;
+  for (size_t k = 0; k + 1 < N; ++k) {
+    CHECK(after.values[k] == before[k + 1]);
+    largest = std::max(largest, after.values[k].lpNorm<Eigen::Infinity>());
+  }
+  CHECK(largest > 0);
+  CHECK(after.values[N - 1] == before[N - 1]);
+  CHECK(after.values[N] == before[N]);
+}
+
 TEST_CASE("an iteration with constraints allocates nothing after the first, and threads change no bit") {
   auto problem = makeBoundedCartPole();
   std::vector<ShootingTrajectory> results;
@@ -311,14 +304,7 @@ TEST_CASE("an iteration with constraints allocates nothing after the first, and 
     ShootingTrajectory t = makeGuess(problem);
     FddpOptions options;
     options.threads = threads;
-    std::vector<long> counts;
-    counts.reserve(1000);
-    FddpObserver observer;
-    observer.callback = [&](const FddpIteration&) {
-      counts.push_back(num_allocations);
-      return FddpAction::Continue;
-    };
-    Fddp(options).solve(problem, t, observer);
+    const std::vector<long> counts = countAllocations(options, problem, t);
     REQUIRE(counts.size() > 5);
     CHECK(counts.back() == counts.front());
     results.push_back(t);

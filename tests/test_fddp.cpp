@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 #include <random>
 
-#include "count_allocations.h"
+#include "count_solver_allocations.h"
 #include "fddp_oracle.h"
 #include "solve/lq_sweep.h"
 
@@ -298,14 +298,7 @@ TEST_CASE("an iteration after the first allocates nothing") {
   FddpOptions options;
   options.bounds = bounds;
   options.threads = threads;
-  std::vector<long> counts;
-  counts.reserve(1000);
-  FddpObserver observer;
-  observer.callback = [&](const FddpIteration&) {
-    counts.push_back(num_allocations);
-    return FddpAction::Continue;
-  };
-  Fddp(options).solve(problem, t, observer);
+  const std::vector<long> counts = countAllocations(options, problem, t);
   REQUIRE(counts.size() > 10);
   CHECK(counts.back() == counts.front());
 }

@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "batched_problem.h"
-#include "count_allocations.h"
+#include "count_solver_allocations.h"
 #include "fddp_oracle.h"
 
 using namespace bielle;
@@ -233,14 +233,7 @@ TEST_CASE("an iteration after the first allocates nothing, in batches") {
   FddpOptions options;
   options.bounds = GENERATE(ControlBounds::Ignore, ControlBounds::Enforce);
   options.threads = GENERATE(1, 2);
-  std::vector<long> counts;
-  counts.reserve(1000);
-  FddpObserver observer;
-  observer.callback = [&](const FddpIteration&) {
-    counts.push_back(num_allocations);
-    return FddpAction::Continue;
-  };
-  Fddp(options).solve(problem, t, observer);
+  const std::vector<long> counts = countAllocations(options, problem, t);
   REQUIRE(counts.size() > 10);
   REQUIRE(problem.most_alike > 1);
   CHECK(counts.back() == counts.front());

@@ -40,9 +40,12 @@ StageSpec makeStage(std::mt19937& rng, const Model& model, const VectorXd& q,
     const int rows = getRows(stage.constraints.closures[c].kind);
     stage.costs.push_back(
         {"force", 1e-2, quadratic(rows), makeContactForce(stage.constraints, c, randomVector(rng, rows, 5))});
-    stage.costs.push_back({"friction", 1e-2,
-                           Activation::makeBarrier(VectorXd::Ones(4), VectorXd::Zero(4), VectorXd::Constant(4, 1e12)),
-                           makeFrictionPyramid(stage.constraints, c, 0.5)});
+    if (c < stage.constraints.num_loops) continue;
+    std::unique_ptr<Residual> cone = makeWrenchCone(stage.constraints, c, 0.1, 0.04, 0.5);
+    const int n = cone->size();
+    stage.costs.push_back({"cone", 1e-2,
+                           Activation::makeBarrier(VectorXd::Ones(n), VectorXd::Zero(n), VectorXd::Constant(n, 1e12)),
+                           std::move(cone)});
   }
   return stage;
 }

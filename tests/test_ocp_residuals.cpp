@@ -65,7 +65,7 @@ std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, 
     const int rows = getRows(set.closures[c].kind);
     add("contact force", makeContactForce(set, c, randomVector(rng, rows, 10)));
     add("contact force in the world", makeContactForce(set, c, randomVector(rng, rows, 10), ForceAxes::World));
-    add("friction pyramid", makeFrictionPyramid(set, c, 0.6));
+    add("wrench cone", makeWrenchCone(set, c, 0.1, 0.04, 0.6));
     if (rows != 6) continue;
     add("centre of pressure", makeCenterOfPressure(set, c));
     add("centre of pressure in the world", makeCenterOfPressure(set, c, ForceAxes::World));
@@ -187,8 +187,8 @@ TEST_CASE("force residuals: a force at a known point of the sole") {
   const VectorXd level = node.calc(*makeCenterOfPressure(set, constraint, ForceAxes::World), q, v, lambda);
   const VectorXd in_world = node.calc(*makeCenterOfPressure(set, constraint, ForceAxes::World), turned, v, lambda);
   CHECK((in_world - R.topLeftCorner<2, 2>() * level).norm() < 1e-14);
-  const VectorXd pyramid = node.calc(*makeFrictionPyramid(set, constraint, 0.5), q, v, lambda);
-  CHECK((pyramid - Eigen::Vector4d(70, 30, 40, 60)).norm() < 1e-12);
+  const VectorXd cone = node.calc(*makeWrenchCone(set, constraint, 0.1, 0.04, 0.5), q, v, lambda);
+  CHECK((cone.segment<4>(1) - Eigen::Vector4d(70, 30, 40, 60)).norm() < 1e-12);
   lambda[row + 2] = 0.5;  // hardly loaded: bounded, and its derivative follows
   CHECK(node.calc(*makeCenterOfPressure(set, constraint), q, v, lambda).allFinite());
   checkResidual(model, set, *makeCenterOfPressure(set, constraint), q, v, lambda);

@@ -153,7 +153,7 @@ void addBench(CLI::App& app, Action& action) {
       "A unit is one product of two 108 x 108 matrices by Eigen, on one thread, in the same run. Times are the\n"
       "least of some repetitions, but for whole solves (one run) and the receding horizon: median, 99th percentile\n"
       "and worst of its shifts, and of the undisturbed ones, during which the system gave no processor to another\n"
-      "program. What is measured now is told on the standard error. Takes some minutes.\n"
+      "program. Progress is reported on the standard error. Takes some minutes.\n"
       "Examples:\n"
       "  bielle bench\n"
       "  bielle bench --threads 4 --json > bench.json");

@@ -125,27 +125,6 @@ class CenterOfPressure : public ForceResidual {
   static double limit(double fz) { return std::max(fz, 1.0); }
 };
 
-class FrictionPyramid : public ForceResidual {
- public:
-  FrictionPyramid(const ConstraintSet& set, int constraint, double mu)
-      : ForceResidual(set, constraint, ForceAxes::Contact), mu_(mu) {}
-  int size() const override { return 4; }
-  void calc(const NodeView& node, VectorRef r) const override {
-    const Force f = getForce(node);
-    r << mu_ * f[2] - f[0], mu_ * f[2] + f[0], mu_ * f[2] - f[1], mu_ * f[2] + f[1];
-  }
-  void calcJacobian(const NodeView&, ResidualRows rows) const override {
-    rows.lambda.col(row_ + 2).setConstant(mu_);
-    rows.lambda(0, row_) = -1;
-    rows.lambda(1, row_) = 1;
-    rows.lambda(2, row_ + 1) = -1;
-    rows.lambda(3, row_ + 1) = 1;
-  }
-
- private:
-  double mu_;
-};
-
 // Linear in the force: r = A F.
 class WrenchCone : public ForceResidual {
  public:
@@ -228,9 +207,6 @@ std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constra
 }
 std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint, ForceAxes axes) {
   return std::make_unique<CenterOfPressure>(set, constraint, axes);
-}
-std::unique_ptr<Residual> makeFrictionPyramid(const ConstraintSet& set, int constraint, double mu) {
-  return std::make_unique<FrictionPyramid>(set, constraint, mu);
 }
 std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constraint, double half_length,
                                          double half_width, double mu) {

@@ -11,8 +11,10 @@ namespace bielle {
 
 namespace {
 
-constexpr double kFall = 0.25;  // by which a violation must fall, or the penalty grows
-// Of the squared violations over the cost, when violations alone are to be minimized.
+constexpr double kFall = 0.25;  // ratio to which a violation must decrease, or the penalty is raised
+// Foreseen decrease over the gain of new multipliers at which they are due; and while violations alone are minimized.
+constexpr double kShare = 0.1, kRestorationShare = 1e-6;
+// Penalty times squared violations over the cost, while violations alone are minimized.
 constexpr double kRestorationWeight = 1e6;
 
 double clamp(double value, double lower, double upper) { return std::min(std::max(value, lower), upper); }
@@ -40,8 +42,8 @@ void AugmentedLagrangian::resize(const ShootingProblem& problem, const Constrain
   }
   if (!kept_) penalty_ = options.initial_penalty;
   last_violation_ = std::numeric_limits<double>::infinity();
-  value_ = gain_ = violation_ = complementarity_ = 0;
-  num_raises_ = 0;
+  at_ = {};
+  num_updates_ = 0;
   kept_ = restoring_ = false;
 }
 
@@ -50,63 +52,70 @@ double AugmentedLagrangian::Node::calcDistance(double c, Eigen::Index row, doubl
   return z - clamp(z, lower[row], upper[row]);
 }
 
+double AugmentedLagrangian::calcContribution(double d, double multiplier) const {
+  return 0.5 * penalty_ * d * d - 0.5 * multiplier * multiplier / penalty_;
+}
+
 double AugmentedLagrangian::calc(int node, const VectorXd& c) const {
   const Node& own = nodes_[node];
   double sum = 0;
-  for (Eigen::Index i = 0; i < own.lower.size(); ++i) {
-    const double d = own.calcDistance(c[i], i, penalty_), y = own.multipliers[i];
-    sum += 0.5 * penalty_ * d * d - 0.5 * y * y / penalty_;
-  }
+  for (Eigen::Index i = 0; i < own.lower.size(); ++i)
+    sum += calcContribution(own.calcDistance(c[i], i, penalty_), own.multipliers[i]);
   return sum;
 }
 
-void AugmentedLagrangian::update(const EvaluationList& iterate) {
-  value_ = gain_ = violation_ = complementarity_ = squares_ = 0;
-  worst_node_ = worst_row_ = 0;
+void AugmentedLagrangian::evaluate(const EvaluationList& iterate) {
+  at_ = {};
   for (size_t k = 0; k < nodes_.size(); ++k) {
     Node& node = nodes_[k];
     const VectorXd& c = iterate[k]->constraints;
     for (Eigen::Index i = 0; i < node.lower.size(); ++i) {
-      const double d = node.calcDistance(c[i], i, penalty_);
-      node.weights.gradient[i] = penalty_ * d;
+      const double d = node.calcDistance(c[i], i, penalty_), y = penalty_ * d, change = y - node.multipliers[i];
+      node.weights.gradient[i] = y;
       node.weights.hessian[i] = d != 0 || node.lower[i] == node.upper[i] ? penalty_ : 0;
-      gain_ += std::pow(penalty_ * d - node.multipliers[i], 2) / (2 * penalty_);
-      const double y = node.multipliers[i], bound = y > 0 ? node.upper[i] : node.lower[i];
-      if (y != 0) complementarity_ = std::max(complementarity_, std::abs(y * (bound - c[i])));
+      at_.value += calcContribution(d, node.multipliers[i]);
+      at_.gain += change * change / (2 * penalty_);
+      if (y != 0)
+        at_.complementarity =
+            std::max(at_.complementarity, std::abs(y * ((y > 0 ? node.upper : node.lower)[i] - c[i])));
       const double violation = std::abs(c[i] - clamp(c[i], node.lower[i], node.upper[i]));
-      squares_ += violation * violation;
-      if (violation <= violation_) continue;
-      violation_ = violation;
-      worst_node_ = static_cast<int>(k);
-      worst_row_ = static_cast<int>(i);
+      at_.squares += violation * violation;
+      if (violation <= at_.violation) continue;
+      at_.violation = violation;
+      at_.worst_node = static_cast<int>(k);
+      at_.worst_row = static_cast<int>(i);
     }
-    if (node.lower.size() > 0) value_ += calc(static_cast<int>(k), c);
   }
 }
 
-bool AugmentedLagrangian::raise(const EvaluationList& iterate, double cost) {
-  const bool falls = violation_ <= std::max(kFall * last_violation_, options_.tolerance);
+bool AugmentedLagrangian::isDue(double foreseen) const {
+  return foreseen <= (restoring_ ? kRestorationShare : kShare) * at_.gain;
+}
+
+bool AugmentedLagrangian::updateMultipliers(const EvaluationList& iterate, double cost) {
+  const bool falls = at_.violation <= std::max(kFall * last_violation_, options_.tolerance);
   if (restoring_ && !falls) return false;
-  last_violation_ = violation_;
-  ++num_raises_;
+  last_violation_ = at_.violation;
+  ++num_updates_;
   if (!falls && penalty_ >= options_.max_penalty) {
     startRestoration(cost);
   } else {
     restoring_ = false;
-    settle();
+    adoptMultipliers();
     if (!falls) penalty_ = std::min(options_.max_penalty, options_.penalty_increase * penalty_);
   }
-  update(iterate);
+  evaluate(iterate);
   return true;
 }
 
 void AugmentedLagrangian::startRestoration(double cost) {
   restoring_ = true;
-  penalty_ = std::clamp(kRestorationWeight * std::abs(cost) / squares_, options_.initial_penalty, options_.max_penalty);
+  penalty_ =
+      std::clamp(kRestorationWeight * std::abs(cost) / at_.squares, options_.initial_penalty, options_.max_penalty);
   for (Node& node : nodes_) node.multipliers.setZero();
 }
 
-void AugmentedLagrangian::settle() {
+void AugmentedLagrangian::adoptMultipliers() {
   for (Node& node : nodes_) node.multipliers = node.weights.gradient;
 }
 
@@ -142,8 +151,8 @@ void AugmentedLagrangian::advance() {
 
 std::string AugmentedLagrangian::describeWorst(const ShootingProblem& problem) const {
   std::ostringstream out;
-  out << problem.getConstraintName(worst_node_, worst_row_) << " at node " << worst_node_ << " is violated by "
-      << std::setprecision(3) << violation_;
+  out << problem.getConstraintName(at_.worst_node, at_.worst_row) << " at node " << at_.worst_node << " is violated by "
+      << std::setprecision(3) << at_.violation;
   return out.str();
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// The constraints of a shooting problem, by an augmented Lagrangian (fddp.h, Eqs. 10 to 12).
+// The constraints of a shooting problem, by an augmented Lagrangian (fddp.h, Eqs. 10 to 13).
 #include "bielle/solve/fddp.h"
 #include "solve/node_evaluations.h"
 
@@ -7,51 +7,44 @@ namespace bielle {
 
 class AugmentedLagrangian {
  public:
-  /// Bounds of the problem, the first penalty, and multipliers of zero; both are kept if they were given, or moved by advance().
-  /// \throws std::invalid_argument where a lower bound exceeds the upper one
+  /// Reads the bounds of the problem. Starts with the initial penalty and zero multipliers, unless setMultipliers() or
+  /// advance() has provided others since the last call.
+  /// \throws std::invalid_argument if a lower bound exceeds the upper one
   void resize(const ShootingProblem& problem, const ConstraintOptions& options);
   bool isEmpty() const { return rows_ == 0; }
 
-  /// The addend of Eq. (10) for one node.
+  /// Contribution of one node to Eq. (10).
   double calc(int node, const VectorXd& c) const;
-  /// Eq. (11) about the current iterate, and how far it is from feasible.
-  void update(const EvaluationList& iterate);
+  /// Computes the weights of Eq. (11) and the measures below at the current iterate.
+  void evaluate(const EvaluationList& iterate);
   /// Null if the node has no constraints.
   const ConstraintWeights* getWeights(int node) const { return rows_ > 0 ? nodes_[node].getWeights() : nullptr; }
 
-  /// Of the iterate of the last update(): the sum of Eq. (10), the largest violation, and Eq. (13).
-  double getValue() const { return value_; }
-  double getViolation() const { return violation_; }
-  double getComplementarity() const { return complementarity_; }
-  bool isSatisfied() const { return violation_ <= options_.tolerance; }
+  double getValue() const { return at_.value; }                      ///< sum of the contributions to Eq. (10)
+  double getViolation() const { return at_.violation; }              ///< the largest
+  double getComplementarity() const { return at_.complementarity; }  ///< Eq. (13), of the multipliers after Eq. (12)
+  bool isSatisfied() const { return at_.violation <= options_.tolerance; }
+  /// Whether multipliers should be updated, given the decrease that a full step promises under the present ones.
+  bool isDue(double foreseen) const;
 
-  /// The share of getGain() that the foreseen decrease must have fallen to before raise() is due.
-  double getShare() const { return restoring_ ? kRestorationShare : kShare; }
-  /// Eq. (12), a larger penalty if the violation has fallen too little since the last time, then update(). When the penalty is
-  /// at its largest, violations alone are minimized: without multipliers, under a penalty beside which `cost` hardly counts.
-  /// False if even that is done and has not helped: the constraints are infeasible.
-  bool raise(const EvaluationList& iterate, double cost);
-  int getNumRaises() const { return num_raises_; }
-  /// By how much Eq. (12) would lift the sum of Eq. (10): |y+ - y|^2 / (2 rho).
-  double getGain() const { return gain_; }
-  /// Eq. (12) once more at the end: with these multipliers the gradient vanishes.
-  void settle();
+  /// Updates the multipliers, Eq. (12), raises the penalty if the violation has decreased too little since the last update,
+  /// and evaluates again. Once the penalty has reached its maximum, the violations alone are minimized: without multipliers,
+  /// under a penalty that dominates `cost`. Returns false if that has been done and has not reduced them: infeasible.
+  bool updateMultipliers(const EvaluationList& iterate, double cost);
+  int getNumUpdates() const { return num_updates_; }
+  /// Eq. (12) alone: at a stationary point, the multipliers of the constraints.
+  void adoptMultipliers();
 
   double getPenalty() const { return penalty_; }
   double getLargestMultiplier() const;
   Multipliers getMultipliers() const;
-  /// To start from at the next resize().
   void setMultipliers(const Multipliers& multipliers);
-  /// Node k becomes what node k + 1 was.
+  /// Shifts the horizon by one stage: node k takes the multipliers of node k + 1.
   void advance();
-  /// The row that is violated most, e.g. "wrench cone of foot_left at node 12 is violated by 0.05".
+  /// The row with the largest violation, e.g. "wrench cone of foot_left at node 12 is violated by 0.05".
   std::string describeWorst(const ShootingProblem& problem) const;
 
  private:
-  static constexpr double kShare = 0.1, kRestorationShare = 1e-6;
-
-  void startRestoration(double cost);
-
   struct Node {
     VectorXd lower, upper, multipliers;
     ConstraintWeights weights;
@@ -59,18 +52,24 @@ class AugmentedLagrangian {
     // d of Eq. (10)
     double calcDistance(double c, Eigen::Index row, double penalty) const;
   };
+  struct Measures {
+    double value = 0, violation = 0, complementarity = 0;
+    double gain = 0;     // increase of `value` by Eq. (12), to first order: |y+ - y|^2 / (2 rho)
+    double squares = 0;  // sum of the squared violations
+    int worst_node = 0, worst_row = 0;
+  };
+  double calcContribution(double d, double multiplier) const;
+  void startRestoration(double cost);
 
   ConstraintOptions options_;
   std::vector<Node> nodes_;
   Eigen::Index rows_ = 0;   // of all nodes
-  bool restoring_ = false;  // minimizes violations alone
-  bool kept_ = false;       // multipliers and penalty are those to start from
+  bool restoring_ = false;  // minimizes the violations alone
+  bool kept_ = false;       // the next resize() keeps multipliers and penalty
   double penalty_ = 1;
-  double squares_ = 0;  // of the violations, summed
-  double value_ = 0, gain_ = 0, violation_ = 0, complementarity_ = 0;
-  int worst_node_ = 0, worst_row_ = 0;
-  double last_violation_ = 0;  // at the last raise()
-  int num_raises_ = 0;
+  Measures at_;
+  double last_violation_ = 0;  // at the last update of the multipliers
+  int num_updates_ = 0;
 };
 
 }  // namespace bielle

@@ -75,9 +75,6 @@ std::unique_ptr<Residual> makeContactForce(const ConstraintSet& set, int constra
 /// Centre of pressure of a 6D contact about the origin of its frame (x, y) (2), m.
 std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int constraint,
                                                ForceAxes axes = ForceAxes::Contact);
-/// Friction pyramid of a contact: mu f_z - |f_x| and mu f_z - |f_y| as four rows mu f_z -+ f_{x,y} (4), N; positive
-/// inside.
-std::unique_ptr<Residual> makeFrictionPyramid(const ConstraintSet& set, int constraint, double mu);
 /// Wrench cone of a rectangular sole, in the axes of the contact frame, whose origin is in the middle of the sole: inside when
 /// all rows are positive (17), N and N m. With f the force, n the moment, X and Y half the length and width, and four corners
 /// that each bear a pyramid of friction mu (Caron, Pham, Nakamura, "Stability of surface contacts for humanoid robots", ICRA
@@ -85,7 +82,7 @@ std::unique_ptr<Residual> makeFrictionPyramid(const ConstraintSet& set, int cons
 ///     f_z,   mu f_z -+ f_x,   mu f_z -+ f_y,   Y f_z -+ n_x,   X f_z -+ n_y,                                        (1)
 ///     mu (X + Y) f_z + n_z + s (Y f_x - mu n_x) + t (X f_y - mu n_y)   and
 ///     mu (X + Y) f_z - n_z + s (Y f_x + mu n_x) + t (X f_y + mu n_y)   for s, t = -1, 1.                            (2)
-/// A 3D contact has the first five rows.
+/// A 3D contact has the first five rows: it pushes, within the friction pyramid.
 std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constraint, double half_length,
                                          double half_width, double mu);
 /// Coordinates of joints with one dof (all those with finite limits if `dofs` is empty) (n), rad or m.

@@ -1,0 +1,261 @@
+#include "solve/fddp_run.h"
+
+#include <omp.h>
+
+#include <cmath>
+
+#include "solve/fddp_checks.h"
+
+namespace bielle {
+
+namespace {
+
+constexpr double kGoodStep = 0.1;  // alpha after which a foreseen decrease is believed
+
+}  // namespace
+
+FddpSummary FddpRun::solve() {
+  start();
+  while (true) {
+    if (const End end = linearize()) return finish(*end);
+    if (const End end = findStep()) return finish(*end);
+    acceptStep();
+    if (const End end = checkProgress()) return finish(*end);
+  }
+}
+
+void FddpRun::start() {
+  N_ = problem_.numStages();
+  checkSizes(problem_, trajectory_);
+  threads_ = options_.threads > 0 ? options_.threads : omp_get_max_threads();
+  work_.resize(problem_, options_, threads_);
+  trajectory_.xs[0] = problem_.initialState();
+  for (size_t k = 0; k < work_.bounds.size(); ++k) {
+    trajectory_.us[k] = trajectory_.us[k].cwiseMax(work_.bounds[k].lower).cwiseMin(work_.bounds[k].upper);
+  }
+  regularization_ = options_.initial_regularization;
+  summary_.log.reserve(std::min(options_.max_iterations + 1, 10000));
+}
+
+FddpRun::End FddpRun::linearize() {
+  if (summary_.iterations > 0) {
+    last_gradient_ = line_.gradient;
+    last_step_ = line_.step;
+  }
+  line_ = FddpIteration();
+  updated_ = false;
+  first_regularization_ = regularization_;
+  line_.iteration = summary_.iterations + 1;
+  for (size_t k = 0; k < work_.boxes.size(); ++k) {
+    work_.boxes[k].lower = work_.bounds[k].lower - trajectory_.us[k];
+    work_.boxes[k].upper = work_.bounds[k].upper - trajectory_.us[k];
+  }
+  if (const End end = evaluate()) return end;
+  work_.lagrangian.evaluate(work_.evaluations.getIterate());
+  if (const End end = linearizeAndSweep()) return end;
+  updateGaps();
+  line_.violation = work_.lagrangian.getViolation();
+  summary_.cost = line_.cost;
+  summary_.gap = line_.gap;
+  return {};
+}
+
+FddpRun::End FddpRun::evaluate() {
+  const int failed = work_.evaluations.update(problem_, trajectory_, threads_);
+  if (failed < 0) return {};
+  const std::string& reason = work_.evaluations.getIterate()[failed]->failure;
+  summary_.message = "node " + std::to_string(failed) + ": the problem could not be evaluated";
+  if (!reason.empty()) summary_.message += ": " + reason;
+  return FddpTermination::Failed;
+}
+
+FddpRun::End FddpRun::linearizeAndSweep() {
+  const LqRegularization regularization{regularization_, regularization_ * options_.state_regularization_ratio};
+  const int failed =
+      work_.backward.update({problem_, work_.evaluations, work_.lagrangian, work_.boxes, regularization, threads_});
+  swept_ = true;
+  if (failed < 0) return {};
+  summary_.message = "node " + std::to_string(failed) + ": " + work_.backward.getFailure(failed);
+  return FddpTermination::Failed;
+}
+
+void FddpRun::updateGaps() {
+  const std::vector<StageModel>& models = work_.backward.getModels();
+  gap_sum_ = 0;
+  for (int k = 0; k <= N_; ++k) {
+    line_.cost += models[k].cost;
+    if (models[k].gap.size() == 0) continue;
+    const double largest = models[k].gap.lpNorm<Eigen::Infinity>();
+    line_.gap = std::max(line_.gap, largest);
+    work_.open[k] = largest > options_.gap_tolerance;
+    if (work_.open[k]) gap_sum_ += models[k].gap.lpNorm<1>();
+  }
+}
+
+// Finds an acceptable trial, unless the iterations end at the current iterate.
+FddpRun::End FddpRun::findStep() {
+  while (true) {
+    if (isInterrupted()) return FddpTermination::Interrupted;
+    if (const End end = updateStep()) return end;
+    if (isStationary() && work_.lagrangian.isSatisfied()) return FddpTermination::Converged;
+    if (mustUpdateMultipliers()) {
+      if (const End end = updateMultipliers()) return end;
+      continue;
+    }
+    if (searchLine()) return {};
+    if (const End end = raiseRegularization("no step is acceptable")) return end;
+  }
+}
+
+// New multipliers are due once the cost can hardly fall under the old ones.
+bool FddpRun::mustUpdateMultipliers() const {
+  const AugmentedLagrangian& lagrangian = work_.lagrangian;
+  if (lagrangian.isEmpty()) return false;
+  if (isStationary()) return true;
+  const bool first_sweep = regularization_ == first_regularization_;  // a damped one promises little
+  return !updated_ && first_sweep && last_step_ >= kGoodStep && lagrangian.isDue(calcForeseen());
+}
+
+// Eq. (12). The next sweep makes new models about the same evaluations.
+FddpRun::End FddpRun::updateMultipliers() {
+  if (!work_.lagrangian.updateMultipliers(work_.evaluations.getIterate(), line_.cost)) {
+    if (!isClosed() && !closing_) {  // one more step, which closes the gaps
+      closing_ = updated_ = true;
+      return {};
+    }
+    summary_.message = "the constraints cannot all be kept: " + work_.lagrangian.describeWorst(problem_);
+    return FddpTermination::Infeasible;
+  }
+  closing_ = stalled_ = swept_ = false;
+  updated_ = true;
+  return {};
+}
+
+// The sweep, at the smallest regularization from the current one on for which it succeeds. A second sweep needs new
+// models, because a sweep overwrites their Hessians; the evaluations are kept.
+FddpRun::End FddpRun::updateStep() {
+  failure_.clear();
+  while (true) {
+    if (!swept_)
+      if (const End end = linearizeAndSweep()) return end;
+    swept_ = false;
+    const Clock::time_point start = Clock::now();
+    const LqSweep& sweep = work_.backward.getSweep();
+    const LqResult result = sweep.getResult();
+    if (result.status == LqStatus::NotFinite) {
+      summary_.message = "node " + std::to_string(result.node) + ": the quadratic models are not finite";
+      return FddpTermination::Failed;
+    }
+    line_.regularization = regularization_;
+    if (result.status == LqStatus::Ok) {
+      slope_ = sweep.calcStep(work_.backward.getModels(), work_.dx, work_.du);
+      summary_.sweep_seconds += calcSecondsSince(start);
+      curvature_ = 2 * (result.expected_change - slope_);  // Eq. (8) of the sweep
+      line_.gradient = calcGradient();
+      return {};
+    }
+    if (const End end = raiseRegularization("a control Hessian Quu is indefinite")) return end;
+  }
+}
+
+// Eq. (6)
+double FddpRun::calcGradient() const {
+  double gradient = 0;
+  for (int k = 0; k < N_; ++k) {
+    const VectorXd& Qu = work_.backward.getSweep().getNodes()[k].Qu;
+    if (work_.boxes.empty()) {
+      gradient += Qu.squaredNorm();
+    } else {
+      gradient += (-Qu).cwiseMax(work_.boxes[k].lower).cwiseMin(work_.boxes[k].upper).squaredNorm();
+    }
+  }
+  return gradient;
+}
+
+void FddpRun::acceptStep() {
+  std::swap(trajectory_, accepted_->nodes);
+  if (work_.rollout.hasEvaluations()) {
+    work_.evaluations.swapTrial();
+  } else {
+    work_.evaluations.outdate();
+  }
+  line_.step = accepted_->alpha;
+  accepted_merit_ = accepted_->merit;
+  summary_.cost = accepted_->cost;
+  summary_.gap = accepted_->gap_max;
+  ++summary_.iterations;
+}
+
+FddpRun::End FddpRun::raiseRegularization(const char* reason) {
+  if (isInterrupted()) return FddpTermination::Interrupted;
+  regularization_ *= options_.regularization_increase;
+  if (regularization_ <= options_.max_regularization) return {};
+  summary_.message = std::string(reason) + " even at the largest regularization";
+  if (!failure_.empty()) summary_.message += "; node " + std::to_string(failed_node_) + ": " + failure_;
+  return FddpTermination::RegularizationMax;
+}
+
+// After an accepted step: logs it, adapts the regularization to its length, and decides whether to continue.
+FddpRun::End FddpRun::checkProgress() {
+  line_.seconds = calcSecondsSince(start_);
+  summary_.log.push_back(line_);
+  if (observer_.callback && observer_.callback(line_) == FddpAction::Stop) return FddpTermination::Interrupted;
+
+  const bool newton = line_.step == 1 && line_.regularization <= options_.min_regularization;
+  const bool closed = isClosed() && summary_.gap <= options_.gap_tolerance;
+  stalled_ =
+      newton && closed && std::abs(calcMerit() - accepted_merit_) < options_.cost_tolerance * std::abs(line_.cost);
+  if (stalled_ && work_.lagrangian.isEmpty()) {
+    summary_.message = "the cost no longer decreases";
+    return FddpTermination::Converged;
+  }
+  if (summary_.iterations >= options_.max_iterations) return FddpTermination::MaxIterations;
+  if (line_.step > options_.long_step) {
+    regularization_ = std::max(options_.min_regularization, regularization_ / options_.regularization_decrease);
+  } else if (line_.step <= options_.short_step) {
+    regularization_ = std::min(options_.max_regularization, regularization_ * options_.regularization_increase);
+  }
+  return {};
+}
+
+FddpSummary FddpRun::finish(FddpTermination termination) {
+  summary_.termination = termination;
+  if (!work_.lagrangian.isEmpty()) {
+    if (termination == FddpTermination::Converged) work_.lagrangian.adoptMultipliers();
+    summary_.violation = work_.lagrangian.getViolation();
+    summary_.complementarity = work_.lagrangian.getComplementarity();
+    summary_.multiplier = work_.lagrangian.getLargestMultiplier();
+    summary_.penalty = work_.lagrangian.getPenalty();
+    summary_.multiplier_updates = work_.lagrangian.getNumUpdates();
+  }
+  summary_.seconds = calcSecondsSince(start_);
+  summary_.linearize_seconds = work_.evaluations.getSeconds() + work_.backward.getLinearizeSeconds();
+  summary_.sweep_seconds += work_.backward.getSweepSeconds();
+  summary_.rollout_seconds = work_.rollout.getSeconds();
+  const bool judged = termination == FddpTermination::Converged || termination == FddpTermination::RegularizationMax ||
+                      termination == FddpTermination::Infeasible;
+  if (judged && line_.step == 0) {  // the iterate from which no step was taken
+    line_.seconds = summary_.seconds;
+    summary_.log.push_back(line_);
+    if (observer_.callback) observer_.callback(line_);
+  }
+  if (!summary_.message.empty()) return std::move(summary_);
+  switch (termination) {
+    case FddpTermination::Converged:
+      summary_.message = "the gradient vanishes and the gaps are closed";
+      break;
+    case FddpTermination::MaxIterations:
+      summary_.message = "the largest number of iterations is reached";
+      break;
+    case FddpTermination::Interrupted:
+      summary_.message = "stopped from outside";
+      break;
+    case FddpTermination::RegularizationMax:
+    case FddpTermination::Infeasible:
+    case FddpTermination::Failed:
+      break;
+  }
+  return std::move(summary_);
+}
+
+}  // namespace bielle
