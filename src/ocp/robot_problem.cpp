@@ -51,6 +51,8 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool ter
 
 }  // namespace
 
+const char* getName(StepRule rule) { return rule == StepRule::Euler ? "euler" : "midpoint"; }
+
 const char* getName(Formulation formulation) { return formulation == Formulation::Full ? "full" : "reduced"; }
 
 bool startEvaluation(const Model& model, const EvaluateTask& task, const StageSpec& spec, bool running,

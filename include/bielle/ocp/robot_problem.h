@@ -1,21 +1,28 @@
 #pragma once
-/// \file The shooting problem of a robot: constrained dynamics under Euler steps, and costs.
+/// \file The shooting problem of a robot: constrained dynamics in steps, and costs.
 ///
-/// Full formulation (the paper): x = (q, v) of the spanning tree, tangent size 2 nv. One step of length h:
+/// A step of length h is made of kicks and drifts (StepRule). A kick changes the velocity by an acceleration, a drift
+/// moves the robot with its velocity. With a(q, v) the constrained dynamics under the torques u,
 ///
-///     a = constrained dynamics (q, v, u),    v+ = v + h a,    q+ = q (+) h v+                                      (1)
+///     Euler:     v <- v + h a(q, v),  drift h                                                                      (1)
+///     midpoint:  drift h/2,  v <- v + h a(q, v + h/2 a(q, v)),  drift h/2                                          (2)
 ///
-/// with derivatives (J_q, J_d those of (+) at d = h v+)
+/// The midpoint step is of second order: both accelerations are taken half way, the first only to foresee the velocity
+/// there. They have one mass matrix.
 ///
-///     dv+ = dv + h da,                       dq+ = J_q dq + h J_d dv+                                              (2)
+/// Full formulation (the paper): x = (q, v) of the spanning tree, tangent size 2 nv. A drift, with its derivatives (J_q,
+/// J_d those of (+) at d = h v):
+///
+///     q+ = q (+) h v,    v+ = v,                 dq+ = J_q dq + h J_d dv,    dv+ = dv                              (3)
 ///
 /// Reduced formulation (ours): every state is closed and its velocity keeps it closed; tangent size 2 (nv - rank), in
-/// an orthonormal basis N(q) per node and loop cluster (reduction.h). With a as in (1), where loops are eliminated
-/// without forming full-size matrices,
+/// an orthonormal basis N(q) per node and loop cluster (reduction.h). Loops are eliminated from a without forming
+/// full-size matrices. A drift follows the closures, and turns the velocity into them:
 ///
-///     w = v + h a,    q+ = q (+) h w',  w' = w - W^{-1} J^T zeta with q+ closed,    v+ = (I - J^+ J)(q+) w'        (3)
+///     q+ = q (+) h w',    w' = v - W^{-1} J^T zeta  with q+ closed,    v+ = (I - J^+ J)(q+) w'                     (4)
 ///
-/// Its derivatives are in src/ocp/reduced/reduced_kernel.h. As h vanishes both formulations have the same optimum.
+/// The chord w' lies between the tangents of both ends, so that (4) follows a geodesic to second order. The derivatives
+/// are in src/ocp/reduced/reduced_kernel.h. As h vanishes both formulations have the same optimum.
 /// The running cost of a stage is h times the sum of its costs; the terminal cost is the sum itself.
 /// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and likewise for
 /// v and u.
@@ -28,14 +35,19 @@
 
 namespace bielle {
 
-/// A stage is either an Euler step of the dynamics, or a rigid impact (impact.h): (q, v) becomes (q, v+) in no time,
+/// A stage is either a step of the dynamics, or a rigid impact (impact.h): (q, v) becomes (q, v+) in no time,
 /// under the constraints in force afterwards. At an impact lambda holds impulses, motors have no effect, and the
 /// running cost is the sum of the costs, without h.
 enum class StageKind { Dynamics, Impact };
 
+/// Eq. (1), the paper's, of first order; or Eq. (2), of second order.
+enum class StepRule { Euler, Midpoint };
+const char* getName(StepRule rule);
+
 /// One stage of the horizon (or the terminal node, which uses neither kind, dt nor constraints).
 struct StageSpec {
   StageKind kind = StageKind::Dynamics;
+  StepRule step = StepRule::Euler;
   double dt = 0.015;  ///< s; 0 for an impact
   ConstraintSet constraints;
   StateCost state;
@@ -57,9 +69,12 @@ const char* getName(Formulation formulation);
 
 class Transcription;
 
-/// A node of a robot's problem, with the accelerations and forces behind its next state.
+/// A node of a robot's problem, with the accelerations and forces behind its next state. Those of a midpoint step belong
+/// to (q_mid, v_mid), the point after half the drift with the velocity foreseen there.
 struct RobotEvaluation : NodeEvaluation {
   VectorXd a;          ///< nv, accelerations; not used at an impact
+  VectorXd q_mid;      ///< nq, of midpoint steps alone
+  VectorXd v_mid;      ///< nv, likewise
   VectorXd lambda;     ///< rows of the constraints of the stage: forces (at an impact, impulses), each in its frame 1
   VectorXd residuals;  ///< of all costs and path constraints, concatenated in an order internal to the problem
   double state_cost = 0;  ///< before scaling by the time step

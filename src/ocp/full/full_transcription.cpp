@@ -1,4 +1,4 @@
-// The full formulation: robot_problem.h Eqs. (1) and (2), x = (q, v) of the spanning tree; and its impacts, dq+ = dq,
+// The full formulation: robot_problem.h Eqs. (1) and (3), x = (q, v) of the spanning tree; and its impacts, dq+ = dq,
 // dv+ = D_q dq + D_v dv (dynamics/impact.h).
 #include "bielle/dynamics/impact.h"
 #include "bielle/dynamics/kinematics.h"
@@ -184,7 +184,7 @@ void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) con
   if (isFinite(out)) task.status = StepStatus::Ok;
 }
 
-// Eq. (2), then the Jacobian of the difference to the node state where a gap is open.
+// Eqs. (1) and (3), then the Jacobian of the difference to the node state where a gap is open.
 void FullTranscription::setStep(double h, const FullEvaluation& at, VectorXd& displacement, StageModel& out) const {
   const int nv = model_.nv();
   RowMatrixMap Fx = out.Fx(), Fu = out.Fu();

@@ -1,5 +1,5 @@
 #pragma once
-// The reduced step, its differences and its derivatives: robot_problem.h Eq. (3), for as many nodes at once as a
+// The reduced step, its differences and its derivatives: robot_problem.h Eqs. (1) and (4), for as many nodes at once as a
 // register of the processor has lanes. Written for one cluster with bases N, J, J^+ and metric W (reduction.h) at q,
 // and N', J', J'^+ at q+; a joint outside all clusters is the case N = N' = W = 1 without rows.
 //

@@ -1,4 +1,4 @@
-// Steps in lanes: robot_problem.h Eq. (3), reduced_kernel.h Eq. (b).
+// Steps in lanes: robot_problem.h Eqs. (1) and (4), reduced_kernel.h Eq. (b).
 #include <algorithm>
 
 #include "bielle/dynamics/kinematics.h"
@@ -211,7 +211,7 @@ void ReducedKernel::updateContactRows(size_t slot) {
   for (size_t o = 0; o < tip.outer.size(); ++o) JcN.col(tip.outer[o]) = contact.selectRows(tip.J.col(o));
 }
 
-// robot_problem.h Eq. (3) without closures. Lanes without a node repeat the first one and need no special treatment.
+// robot_problem.h Eq. (1) without closures. Lanes without a node repeat the first one and need no special treatment.
 void ReducedKernel::stepFreeJoints() {
   const int nq = model_.nq();
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
