@@ -20,7 +20,7 @@ constexpr double kStep = 5e-4;
 // A node at (q, v) with forces lambda.
 struct TestNode {
   explicit TestNode(const Model& model, const ConstraintSet& set)
-      : model(model), set(set), ws(model), lambda(VectorXd::Zero(set.rows)) {}
+      : model(model), set(set), ws(model), u(VectorXd::Zero(model.nu())), lambda(VectorXd::Zero(set.rows)) {}
   VectorXd calc(const Residual& residual, const VectorXd& q, const VectorXd& v, const VectorXd& forces) {
     move(q, v, forces);
     VectorXd r(residual.size());
@@ -72,23 +72,34 @@ std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, 
   }
   add("joint position", makeJointPosition(model, dofs));
   add("joint velocity", makeJointVelocity(dofs));
+  if (model.nu() > 1) add("motor power", makeMotorPower(model, {model.nu() - 1, 0}));
   return out;
 }
 
 void checkResidual(const Model& model, const ConstraintSet& set, const Residual& residual, const VectorXd& q,
                    const VectorXd& v, const VectorXd& lambda) {
   const int n = residual.size(), nv = model.nv();
-  MatrixXd dq = MatrixXd::Zero(n, nv), dv = dq, dlambda = MatrixXd::Zero(n, set.rows);
+  MatrixXd dq = MatrixXd::Zero(n, nv), dv = dq, dlambda = MatrixXd::Zero(n, set.rows),
+           du = MatrixXd::Zero(n, model.nu());
   TestNode node(model, set);
   // The Jacobian is written over that of another state: what it does not write must be zero everywhere.
   std::mt19937 rng(99);
   node.move(model.integrate(q, randomVector(rng, nv, 0.5)), v + randomVector(rng, nv), 2 * lambda);
-  residual.calcJacobian(node.view(), {dq, dv, dlambda});
+  node.u = randomVector(rng, model.nu());
+  residual.calcJacobian(node.view(), {dq, dv, dlambda, du});
   node.move(q, v, lambda);
-  residual.calcJacobian(node.view(), {dq, dv, dlambda});
+  const VectorXd u = randomVector(rng, model.nu());
+  node.u = u;
+  residual.calcJacobian(node.view(), {dq, dv, dlambda, du});
   checkDerivative(
       dq, differentiateTangent(model, q, kStep, [&](const VectorXd& x) { return node.calc(residual, x, v, lambda); }));
   checkDerivative(dv, differentiate(v, kStep, [&](const VectorXd& x) { return node.calc(residual, q, x, lambda); }));
+  CHECK(residual.needsControls() == !du.isZero(0));
+  if (model.nu() > 0)
+    checkDerivative(du, differentiate(u, kStep, [&](const VectorXd& x) {
+                      node.u = x;
+                      return node.calc(residual, q, v, lambda);
+                    }));
   if (set.rows == 0) return;
   checkDerivative(dlambda,
                   differentiate(lambda, 1e-2, [&](const VectorXd& x) { return node.calc(residual, q, v, x); }));

@@ -32,6 +32,7 @@ RobotProblem makeProblem(const Model& model, const VectorXd& q, StageKind kind, 
         makeConstraint("cone " + std::to_string(c), makeWrenchCone(stage.constraints, c, 0.05, 0.03, 0.5), 20));
   stage.path_constraints.push_back(makeConstraint("joints", makeJointPosition(model, {7, 9, 10}), 0.3));
   stage.path_constraints.push_back(makeConstraint("speeds", makeJointVelocity({6, 9}), 4));
+  stage.path_constraints.push_back(makeConstraint("powers", makeMotorPower(model, {5, 2}), 2));
   stages[1].dt = 0.012;
   stages[1].path_constraints.push_back(makeConstraint("end", makeComPosition(Vector3d::Zero()), 0.1));
   stages[1].path_constraints.push_back(makeConstraint("rest", makeComVelocity(Vector3d::Zero()), 0.2));
@@ -117,7 +118,7 @@ TEST_CASE("path constraints: rows and their derivatives, at a step, an impact an
   for (int k : {0, 1}) {
     CAPTURE(getName(formulation), static_cast<int>(kind), k);
     Node node(problem, k, x, u);
-    REQUIRE(node.size() == (k == 0 ? 2 * 17 + 3 + 2 : 6));
+    REQUIRE(node.size() == (k == 0 ? 2 * 17 + 3 + 2 + 2 : 6));
     const MatrixXd rows = collectRows(node);
     checkDerivative(rows, node.differentiate(), "rows");
     // Second derivatives: rows^T diag(h) rows.
@@ -188,4 +189,8 @@ TEST_CASE("path constraints that do not fit are refused by name") {
                                             makeContactForce(s[0].constraints, c, Vector6d::Zero())});
                     }),
                     Catch::Contains("late force"));
+  CHECK_THROWS_WITH(make([&](std::vector<StageSpec>& s) {
+                      s[1].path_constraints.push_back(makeConstraint("late power", makeMotorPower(model, {0})));
+                    }),
+                    Catch::Contains("late power"));
 }

@@ -12,6 +12,7 @@ NodeCosts::NodeCosts(const StageSpec& spec, bool running)
       if (elements[i].residual->needsMotion() != motion) continue;
       first_rows[i] = rows_;
       rows_ += elements[i].residual->size();
+      needs_controls_ |= elements[i].residual->needsControls();
     }
   };
   for (bool motion : {true, false}) {
@@ -70,8 +71,9 @@ void NodeCosts::addJacobian(const NodeView& node, const Residual& residual, int 
   const int n = residual.size();
   if (weights.gradient.segment(row, n).isZero(0) && weights.hessian.segment(row, n).isZero(0))
     return;  // bounds that are kept
-  residual.calcJacobian(node, {jacobians.q.middleRows(row, n), jacobians.v.middleRows(row, n),
-                               jacobians.lambda.block(row, 0, n, spec_.constraints.rows)});
+  residual.calcJacobian(
+      node, {jacobians.q.middleRows(row, n), jacobians.v.middleRows(row, n),
+             jacobians.lambda.block(row, 0, n, spec_.constraints.rows), jacobians.u.block(row, 0, n, node.u.size())});
 }
 
 void NodeCosts::differentiate(const NodeView& node, const RobotEvaluation& at, const ConstraintWeights* constraints,

@@ -11,9 +11,9 @@ struct ResidualWeights {
   bool counts(int row) const { return gradient[row] != 0 || hessian[row] != 0; }
 };
 
-// Partial derivatives of stacked residuals, rows x nv, nv, constraint rows; they may be larger than one node needs.
+// Partial derivatives of stacked residuals, rows x nv, nv, constraint rows, nu; they may be larger than one node needs.
 struct ResidualJacobians {
-  MatrixXd q, v, lambda;
+  MatrixXd q, v, lambda, u;
 };
 
 class NodeCosts {
@@ -24,6 +24,8 @@ class NodeCosts {
   int rows() const { return rows_; }
   int motionRows() const { return motion_rows_; }
   int constraintRows() const { return constraint_rows_; }
+  // Whether a residual depends on the controls.
+  bool needsControls() const { return needs_controls_; }
   // Factor of the sum of the costs: the time step of a running stage; 1 at an impact and at the terminal node.
   double scale() const { return scale_; }
 
@@ -47,6 +49,7 @@ class NodeCosts {
   const StageSpec& spec_;
   std::vector<int> first_rows_, first_constraint_rows_;  // of each cost, of each path constraint
   int rows_ = 0, motion_rows_ = 0, constraint_rows_ = 0;
+  bool needs_controls_ = false;
   double scale_ = 1;
 };
 

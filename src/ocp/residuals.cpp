@@ -193,6 +193,27 @@ class JointVelocity : public Residual {
   std::vector<int> dofs_;
 };
 
+class MotorPower : public Residual {
+ public:
+  MotorPower(const Model& model, std::vector<int> motors) : motors_(std::move(motors)) {
+    for (int m : motors_) dofs_.push_back(model.motors().at(m).dof);
+  }
+  int size() const override { return static_cast<int>(motors_.size()); }
+  bool needsControls() const override { return true; }
+  void calc(const NodeView& node, VectorRef r) const override {
+    for (size_t i = 0; i < motors_.size(); ++i) r[i] = node.u[motors_[i]] * node.ws.v[dofs_[i]];
+  }
+  void calcJacobian(const NodeView& node, ResidualRows rows) const override {
+    for (size_t i = 0; i < motors_.size(); ++i) {
+      rows.v(i, dofs_[i]) = node.u[motors_[i]];
+      rows.u(i, motors_[i]) = node.ws.v[dofs_[i]];
+    }
+  }
+
+ private:
+  std::vector<int> motors_, dofs_;
+};
+
 }  // namespace
 
 std::unique_ptr<Residual> makeComPosition(const Vector3d& reference) {
@@ -217,6 +238,9 @@ std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vecto
 }
 std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs) {
   return std::make_unique<JointVelocity>(dofs);
+}
+std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors) {
+  return std::make_unique<MotorPower>(model, motors);
 }
 
 }  // namespace bielle

@@ -28,8 +28,8 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool ter
   require(spec.effort_limits.size() == 0 || spec.effort_limits.size() == model.nu(),
           "its effort limits have a wrong size", "effort_limits: nu, or empty");
   const auto requireForces = [&](const Residual& residual, const std::string& name) {
-    require(!terminal || !residual.needsForces(), name + " is about forces, of which the terminal node has none",
-            "leave it out there");
+    require(!terminal || !(residual.needsForces() || residual.needsControls()),
+            name + " is about forces or controls, of which the terminal node has none", "leave it out there");
   };
   for (const Cost& cost : spec.costs) {
     require(cost.residual && cost.activation.hasSize(cost.residual->size()),

@@ -1,8 +1,8 @@
 #pragma once
-/// \file Residuals r(q, v, lambda) of costs, with analytic derivatives.
+/// \file Residuals r(q, v, lambda, u) of costs and path constraints, with analytic derivatives.
 ///
-/// A residual is a small vector with sparse partial derivatives with respect to the tangent of q, to v and to the
-/// constraint forces lambda; the stage applies the chain rule through the dynamics. Frame residuals are in world axes
+/// A residual is a small vector with sparse partial derivatives with respect to the tangent of q, to v, to the
+/// constraint forces lambda and to the motor torques u; the stage applies the chain rule through the dynamics. Frame residuals are in world axes
 /// unless stated otherwise.
 #include <memory>
 #include <string>
@@ -27,6 +27,7 @@ struct NodeView {
 struct ResidualRows {
   MatrixRef q, v;    ///< n x nv
   MatrixRef lambda;  ///< n x rows
+  MatrixRef u;       ///< n x nu
 };
 
 class Residual {
@@ -34,6 +35,8 @@ class Residual {
   virtual ~Residual() = default;
   virtual int size() const = 0;
   virtual bool needsForces() const { return false; }
+  /// Whether it depends on u.
+  virtual bool needsControls() const { return false; }
   /// False if it depends neither on q nor on v.
   virtual bool needsMotion() const { return true; }
   virtual void calc(const NodeView& node, VectorRef r) const = 0;
@@ -89,5 +92,7 @@ std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constrain
 std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs);
 /// Velocity coordinates (n), rad/s or m/s.
 std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs);
+/// Mechanical power u_m v_m of motors, given by their indices in the model (n), W.
+std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors);
 
 }  // namespace bielle

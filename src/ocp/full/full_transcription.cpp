@@ -46,6 +46,7 @@ class FullTranscription : public Transcription {
     }
     for (MatrixXd* m : {&out->jacobians.q, &out->jacobians.v}) m->setZero(rows, model_.nv());
     out->jacobians.lambda.setZero(rows, constraint_rows);
+    out->jacobians.u.setZero(rows, model_.nu());
     for (VectorXd* v : {&out->weights.gradient, &out->weights.hessian}) v->setZero(rows);
     for (MatrixXd* m : {&out->Rx, &out->scaled}) m->setZero(rows, 2 * model_.nv());
     out->Ru.setZero(rows, model_.nu());
@@ -238,7 +239,7 @@ void FullTranscription::setResiduals(int node, const FullEvaluation& at, const C
   out.hessian().setZero();
   if (rows == 0) return;
   ResidualJacobians& jacobians = scratch.jacobians;
-  for (MatrixXd* m : {&jacobians.q, &jacobians.v, &jacobians.lambda}) m->topRows(rows).setZero();
+  for (MatrixXd* m : {&jacobians.q, &jacobians.v, &jacobians.lambda, &jacobians.u}) m->topRows(rows).setZero();
   costs_[node].differentiate({model_, at.ws, specs_[node].constraints, at.u, at.lambda}, at, constraints,
                              scratch.weights, jacobians);
   const auto gradient = scratch.weights.gradient.head(rows), hessian = scratch.weights.hessian.head(rows);
@@ -257,10 +258,11 @@ void FullTranscription::setResiduals(int node, const FullEvaluation& at, const C
   scaled = hessian.asDiagonal() * Rx;
   out.lx.noalias() = Rx.transpose() * gradient;
   out.lxx().noalias() = Rx.transpose() * scaled;
-  if (!isRunning(node) || isImpact(node)) return;  // motors have no say in an impact
+  if (!isRunning(node) || (isImpact(node) && !costs_[node].needsControls())) return;
   auto Ru = scratch.Ru.topRows(rows);
   auto scaled_Ru = scaled.leftCols(nu);
-  Ru.noalias() = by_forces * at.cws.dlambda_du;
+  Ru = jacobians.u.topRows(rows);
+  if (!isImpact(node)) Ru.noalias() += by_forces * at.cws.dlambda_du;  // motors have no say in an impact
   out.lu.noalias() = Ru.transpose() * gradient;
   out.lux().noalias() = Ru.transpose() * scaled;
   scaled_Ru = hessian.asDiagonal() * Ru;

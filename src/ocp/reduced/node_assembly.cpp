@@ -27,6 +27,7 @@ NodeAssembly::NodeAssembly(const Model& model, const Reduction& reduction, const
   const Eigen::Index rows = roundUpToLane(most_residuals), padded = roundUpToLane(2 * nr + nu);
   for (MatrixXd* m : {&jacobians_.q, &jacobians_.v}) m->setZero(rows, nv);
   jacobians_.lambda.setZero(rows, layout.most_constraint_rows);
+  jacobians_.u.setZero(rows, nu);
   for (VectorXd* v : {&weights_.gradient, &weights_.hessian}) v->setZero(most_residuals);
   for (VectorXd* x : {&Rt_, &Rt_scaled_}) x->setZero(padded * most_residuals);
   gradient_.setZero(2 * nr + nu);
@@ -206,8 +207,10 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
     jacobians_.q.middleRows<kLane>(i).setZero();
     jacobians_.v.middleRows<kLane>(i).setZero();
   }
-  for (Eigen::Index i = 0; i < rows; i += kLane)
+  for (Eigen::Index i = 0; i < rows; i += kLane) {
     jacobians_.lambda.middleRows<kLane>(i).middleCols(contacts.closure_rows, contacts.rows).setZero();
+    if (costs.needsControls()) jacobians_.u.middleRows<kLane>(i).setZero();
+  }
   costs.differentiate({model_, view.ws, spec.constraints, at.u, at.lambda}, at, constraints, weights_, jacobians_);
   PaddedMap Rt = shapePadded(Rt_, columns, rows), scaled = shapePadded(Rt_scaled_, columns, rows);
   updateResidualDerivatives(costs, contacts, at, view, Rt);
@@ -235,6 +238,7 @@ void NodeAssembly::updateResidualDerivatives(const NodeCosts& costs, const Conta
   addTimesN(q, at, Rt.block(nu, 0, nr, motion_rows));
   addTimesZ(v, view, Rt.block(nu, 0, nr, motion_rows));
   addTimesN(v, at, Rt.block(nu + nr, 0, nr, motion_rows));
+  if (costs.needsControls()) Rt.topRows(nu) = jacobians_.u.topLeftCorner(costs.rows(), nu).transpose();
   if (nu == 0 || contacts.rows == 0) return;
   const PaddedMap by_forces = shapePadded(dlambda_, nu + 2 * nr, contacts.rows);
   for (int i = 0; i < costs.rows(); ++i) {
