@@ -32,17 +32,33 @@ NodeAssembly::NodeAssembly(const Model& model, const Reduction& reduction, const
   for (VectorXd* x : {&Rt_, &Rt_scaled_}) x->setZero(padded * most_residuals);
   gradient_.setZero(2 * nr + nu);
   dlambda_.setZero(padded * layout.most_contact_rows);
+  by_velocity_.setZero(nr * std::max(nr, layout.most_contact_rows));
+  int largest = 6;
+  for (const ReducedCluster& cluster : reduction.clusters) largest = std::max(largest, cluster.size);
+  column_.setZero(2 * largest);
 }
 
-// The columns of dv = dy_v + h dy' from the dynamics, then the effect of dv and dy on the step.
-void NodeAssembly::setStep(double h, const ContactLayout& contacts, const ReducedEvaluation& at,
+namespace {
+
+bool isMidpoint(const StageSpec& spec) { return spec.step == StepRule::Midpoint; }
+
+}  // namespace
+
+// The columns of dw = dy_v + h dy' from the dynamics, then the effect of dw and dy on the step; of a midpoint step about
+// the point half way, from which the first drift leads back to the state.
+void NodeAssembly::setStep(const StageSpec& spec, const ContactLayout& contacts, const ReducedEvaluation& at,
                            const ReducedEvaluation& next, LaneView& view, StageModel& out) {
   const int nr = reduction_.size, nu = model_.nu();
-  PaddedMap dydd = shapePadded(view.dydd, nu + 2 * nr, nr);
+  const double h = spec.dt, drift = isMidpoint(spec) ? 0.5 * h : h;
+  PaddedMap dydd = shapePadded(view.acceleration.dydd, nu + 2 * nr, nr);
+  PaddedMap dlambda = shapePadded(dlambda_, nu + 2 * nr, contacts.rows);
   dydd.topRows(nu).setZero();
   addMotorRows(at, dydd);
-  setContactDerivatives(contacts, view);
-  solveDerivatives(at.factors, dydd, shapePadded(dlambda_, nu + 2 * nr, contacts.rows), room_);
+  if (isMidpoint(spec))
+    addForeseenVelocity(h, contacts, at, view);
+  else
+    setContactDerivatives(contacts, view.acceleration);
+  solveDerivatives(at.factors, dydd, dlambda, room_);
   for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
     const ReducedCluster& cluster = reduction_.clusters[i];
     out.gap.segment(cluster.offset, cluster.size) = view.clusters[i].gap;
@@ -50,10 +66,73 @@ void NodeAssembly::setStep(double h, const ContactLayout& contacts, const Reduce
   }
   calcFreeGaps(at, next, out.gap);
   for (FreeJoint& free : free_joints_)
-    if (free.curved) updateFreeJoint(h, at, out.gap, free);
+    if (free.curved) updateFreeJoint(drift, at, out.gap, free);
   dydd *= h;
   dydd.bottomRows(nr).diagonal().array() += 1;
-  setTransition(h, view, dydd, out);
+  setTransition(drift, view, dydd, out);
+  if (!isMidpoint(spec)) return;
+  addFirstDrift(drift, at, view, out.Ft());
+  addFirstDrift(drift, at, view, dlambda);
+}
+
+// Right-hand sides of the acceleration half way: its velocity is that of reduced_kernel.h Eq. (h).
+void NodeAssembly::addForeseenVelocity(double h, const ContactLayout& contacts, const ReducedEvaluation& at,
+                                       LaneView& view) {
+  const Eigen::Index nr = reduction_.size, nu = model_.nu(), columns = nu + 2 * nr;
+  PaddedMap foreseen = shapePadded(view.foreseen.dydd, columns, nr),
+            dydd = shapePadded(view.acceleration.dydd, columns, nr);
+  PaddedMap dlambda = shapePadded(dlambda_, columns, contacts.rows);
+  foreseen.topRows(nu).setZero();
+  addMotorRows(at, foreseen);
+  setContactDerivatives(contacts, view.foreseen);
+  solveDerivatives(at.factors, foreseen, dlambda, room_);
+  for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
+    const Eigen::Index o = reduction_.clusters[i].offset, r = reduction_.clusters[i].size;
+    foreseen.block(nu + o, o, r, r) += view.clusters[i].T.transpose();
+  }
+  foreseen *= 0.5 * h;
+  clearPadding(foreseen);
+  setContactDerivatives(contacts, view.acceleration);
+  // By the velocity: the last rows, whose own values the products must not change before they are read.
+  const auto add = [&](PaddedMap out) {
+    Eigen::Map<MatrixXd> by_velocity(by_velocity_.data(), nr, out.cols());
+    by_velocity = out.bottomRows(nr);
+    addProduct(columns, out.cols(), nr, 1, pad(foreseen), {by_velocity.data(), 1, nr}, pad(out));
+  };
+  add(dydd);
+  if (contacts.rows > 0) add(dlambda);
+}
+
+// Rows by (dy, dy_v) half way become rows by those of the state: reduced_kernel.h Eq. (g) with k = 0, transposed.
+void NodeAssembly::addFirstDrift(double h, const ReducedEvaluation& at, const LaneView& view, PaddedMap rows) {
+  const int nr = reduction_.size, nu = model_.nu(), nq = model_.nq();
+  const auto turn = [&](int offset, const auto& q_y, const auto& q_v, const auto& v_y, const auto& v_v) {
+    const Eigen::Index r = q_y.rows();
+    for (Eigen::Index c = 0; c < rows.cols(); ++c) {
+      auto by_q = rows.col(c).segment(nu + offset, r), by_v = rows.col(c).segment(nu + nr + offset, r);
+      auto before_q = column_.head(r), before_v = column_.segment(r, r);
+      before_q = by_q;
+      before_v = by_v;
+      by_q = q_y.transpose().lazyProduct(before_q) + v_y.transpose().lazyProduct(before_v);
+      by_v = q_v.transpose().lazyProduct(before_q) + v_v.transpose().lazyProduct(before_v);
+    }
+  };
+  for (const FreeJoint& free : free_joints_) {
+    const Eigen::Index n = free.size, o = free.offset;
+    if (free.curved) {
+      const JointVector d = h * at.x.segment(nq + free.joint->idx_v, n);
+      JointMatrix Jq(n, n), Jd(n, n);
+      calcJointIntegrateJacobians(*free.joint, d, Jq, Jd);
+      turn(free.offset, Jq, JointMatrix(h * Jd), JointMatrix(JointMatrix::Zero(n, n)),
+           JointMatrix(JointMatrix::Identity(n, n)));
+    } else {
+      rows.middleRows(nu + nr + o, n) += h * rows.middleRows(nu + o, n);
+    }
+  }
+  for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
+    const LaneView::Drift& drift = view.clusters[i].first;
+    turn(reduction_.clusters[i].offset, drift.q_y, drift.q_v, drift.v_y, drift.v_v);
+  }
 }
 
 // The first nu rows of dydd (x size) -= (N^T B)^T
@@ -64,19 +143,20 @@ void NodeAssembly::addMotorRows(const ReducedEvaluation& at, PaddedMap dydd) con
       dydd(m, row) -= 1;
     } else {
       const ReducedCluster& cluster = reduction_.clusters[index];
-      dydd.row(m).segment(cluster.offset, cluster.size) -= at.clusters[index].at.N.row(row);
+      const ClusterBasis& basis = at.q_mid.size() > 0 ? at.mid->clusters[index].basis : at.clusters[index].at;
+      dydd.row(m).segment(cluster.offset, cluster.size) -= basis.N.row(row);
     }
   }
 }
 
 // Sets the right-hand sides of the contact rows.
-void NodeAssembly::setContactDerivatives(const ContactLayout& contacts, const LaneView& view) {
+void NodeAssembly::setContactDerivatives(const ContactLayout& contacts, const LaneView::Acceleration& acceleration) {
   const int nr = reduction_.size, nu = model_.nu();
   PaddedMap dlambda = shapePadded(dlambda_, nu + 2 * nr, contacts.rows);
   dlambda.setZero();
   clearPadding(dlambda);
   for (const ContactLayout::Contact& contact : contacts.contacts) {
-    const LaneView::Contact& columns = view.contacts[contact.slot];
+    const LaneView::Contact& columns = acceleration.contacts[contact.slot];
     const std::vector<int>& outer = layout_.outers[layout_.slots[contact.slot]];
     for (size_t o = 0; o < outer.size(); ++o) {
       dlambda.row(nu + outer[o]).segment(contact.row, contact.rows) = columns.dy.col(o).head(contact.rows).transpose();
@@ -137,7 +217,7 @@ void NodeAssembly::setTransition(double h, const LaneView& view, PaddedMap dv, S
     }
   }
   for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
-    const LaneView::Cluster& c = view.clusters[i];
+    const LaneView::Drift& c = view.clusters[i].drift;
     const Eigen::Index o = reduction_.clusters[i].offset;
     multiply(c.q_v, o, o);
     multiply(c.v_v, o, nr + o);

@@ -9,9 +9,10 @@ class NodeAssembly {
  public:
   NodeAssembly(const Model& model, const Reduction& reduction, const ReducedLayout& layout, int most_residuals);
 
-  // Sets Fx, Fu and gap of a step, and the derivatives of its contact forces for setResiduals(). Overwrites view.dydd.
-  void setStep(double h, const ContactLayout& contacts, const ReducedEvaluation& at, const ReducedEvaluation& next,
-               LaneView& view, StageModel& out);
+  // Sets Fx, Fu and gap of a step, and the derivatives of its contact forces for setResiduals(). Overwrites the
+  // accelerations of the view.
+  void setStep(const StageSpec& spec, const ContactLayout& contacts, const ReducedEvaluation& at,
+               const ReducedEvaluation& next, LaneView& view, StageModel& out);
   // Sets the derivatives of the impulses of an impact with respect to q and v (rows x nv).
   void setImpulseDerivatives(ConstMatrixRef by_q, ConstMatrixRef by_v, const ReducedEvaluation& at,
                              const LaneView& view);
@@ -37,8 +38,10 @@ class NodeAssembly {
   void addTimesZ(ConstMatrixRef A, const LaneView& view, MatrixRef out) const;
 
  private:
-  void setContactDerivatives(const ContactLayout& contacts, const LaneView& view);
+  void setContactDerivatives(const ContactLayout& contacts, const LaneView::Acceleration& acceleration);
   void addMotorRows(const ReducedEvaluation& at, PaddedMap dydd) const;
+  void addForeseenVelocity(double h, const ContactLayout& contacts, const ReducedEvaluation& at, LaneView& view);
+  void addFirstDrift(double h, const ReducedEvaluation& at, const LaneView& view, PaddedMap rows);
   void updateFreeJoint(double h, const ReducedEvaluation& at, const VectorXd& gap, FreeJoint& free) const;
   void setTransition(double h, const LaneView& view, PaddedMap dv, StageModel& out) const;
   void updateResidualDerivatives(const NodeCosts& costs, const ContactLayout& contacts, const ReducedEvaluation& at,
@@ -55,8 +58,10 @@ class NodeAssembly {
   ResidualJacobians jacobians_;
   ResidualWeights weights_;
   VectorXd Rt_, Rt_scaled_, gradient_;  // large enough for any node
-  VectorXd dlambda_;  // (nu + 2 size) x contact rows, padded: derivatives of contact forces by (u, dy, dy_v)
-  VectorXd room_;     // of solveDerivatives()
+  VectorXd dlambda_;      // (nu + 2 size) x contact rows, padded: derivatives of contact forces by (u, dy, dy_v)
+  VectorXd room_;         // of solveDerivatives()
+  VectorXd by_velocity_;  // of addForeseenVelocity(): rows by dy_v
+  VectorXd column_;       // of addFirstDrift(): 2 r of the largest reduced joint
 };
 
 }  // namespace bielle

@@ -36,10 +36,11 @@ void assignWhere(const LaneMask& mask, const Eigen::DenseBase<Derived>& from, Ma
     for (Eigen::Index r = 0; r < to.rows(); ++r) to(r, c) = select(mask, from(r, c), to(r, c));
 }
 
+}  // namespace
+
 // Nodes and indices of a batch.
-struct Batch {
-  template <typename Item>
-  Batch(const Item* items, int n) : count(n) {
+struct ReducedKernel::Batch {
+  Batch(const LinearizeItem* items, int n) : count(n) {
     for (int l = 0; l < n; ++l) nodes[l] = items[l].at, indices[l] = items[l].node, specs[l] = items[l].spec;
   }
   LaneSource<const ReducedEvaluation> source() const { return {nodes.data(), count}; }
@@ -49,17 +50,50 @@ struct Batch {
   std::array<const StageSpec*, kLane> specs;
 };
 
-}  // namespace
-
 void ReducedKernel::linearizeSteps(LinearizeItem* items, int count, std::vector<LaneView>& views) {
   const Batch batch(items, count);
-  loadState(batch.source());
-  loadBases(batch.source());
-  gatherLanes(count, 1, &h_, [&](int l) { return &items[l].spec->dt; });
+  for (int l = 0; l < kLane; ++l) loadLengths(*items[l < count ? l : 0].spec, l);
+  if (getPoint(*items->spec) == Point::Midpoint) {
+    linearizeStates(items, count, views);
+    linearizeMidpoints(batch, items, views);
+  } else {
+    loadState(batch.source(), Point::State);
+    loadBases(batch.source());
+    updateColumns(model_, ws_);
+    linearizeAccelerations(batch, Point::State);
+    linearizeStateCosts(items, count, views);
+    storeColumns(count, views);
+    for (int l = 0; l < count; ++l) items[l].ok = true;
+  }
+  storeAcceleration(count, views, &LaneView::acceleration);
+  loadLastDrift(batch.source());
+  updateDrifts(items, count);
   gatherLanes(count, x1_.size(), x1_.data(), [&](int l) { return items[l].next->x.data(); });
-  loadContacts(batch.source(), batch.indices.data(), ContactUse::Derivatives);
-  loadStep(batch.source());
+  for (size_t i = 0; i < clusters_.size(); ++i) updateGap(i, items, count);
+  storeDrift(count, views, &LaneView::Cluster::drift);
+  storeGaps(count, views);
+}
+
+// The first drift, from the states that are in place, and the two accelerations half way.
+void ReducedKernel::linearizeMidpoints(const Batch& batch, LinearizeItem* items, std::vector<LaneView>& views) {
+  const int count = batch.count;
+  loadFirstDrift(batch.source());
+  updateDrifts(items, count);
+  storeDrift(count, views, &LaneView::Cluster::first);
+  loadState(batch.source(), Point::Foreseen);
+  loadMidpointBases(batch.source());
   updateColumns(model_, ws_);
+  linearizeAccelerations(batch, Point::Foreseen);
+  storeAcceleration(count, views, &LaneView::foreseen);
+  storeTurns(count, views);
+  gatherLanes(count, v_.size(), v_.data(), [&](int l) { return batch.nodes[l]->v_mid.data(); });
+  linearizeAccelerations(batch, Point::Midpoint);
+}
+
+// A_y and A_v at the bases and columns in place and the velocities v_, and Eq. (c).
+void ReducedKernel::linearizeAccelerations(const Batch& batch, Point point) {
+  loadContacts(batch.source(), batch.indices.data(), point, ContactUse::Derivatives);
+  loadAccelerations(batch.source(), point);
   updateVelocities(model_, ws_, v_);
   updateAccelerations(model_, ws_, a_);
   for (ClusterLanes& c : clusters_) {
@@ -72,9 +106,11 @@ void ReducedKernel::linearizeSteps(LinearizeItem* items, int count, std::vector<
   tree_.updateDerivatives(ws_, lifts_, A_y_, A_v_);
   for (ContactLanes& contact : contacts_)
     if (contact.used) updateContact(contact);
-  for (int l = 0; l < count; ++l) items[l].ok = true;
-  for (size_t i = 0; i < clusters_.size(); ++i) {
-    ClusterLanes& c = clusters_[i];
+}
+
+// Eq. (g) for all clusters.
+void ReducedKernel::updateDrifts(LinearizeItem* items, int count) {
+  for (ClusterLanes& c : clusters_) {
     const LaneMask turned = updateClusterDerivatives(c);
     for (int l = 0; l < count; ++l) {
       if (turned[l] || !items[l].ok) continue;
@@ -82,16 +118,28 @@ void ReducedKernel::linearizeSteps(LinearizeItem* items, int count, std::vector<
       *items[l].failure =
           "closure '" + c.cluster.closures.closures.front().name + "': the step turns its loops too far";
     }
-    updateGap(i, items, count);
   }
-  linearizeStateCosts(items, count, views);
-  storeColumns(count, views);
-  storeDerivatives(count, views);
+}
+
+// T of Eq. (h), by the accelerations a of the last linearization: J a = J a_d.
+void ReducedKernel::storeTurns(int count, std::vector<LaneView>& views) {
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    ClusterLanes& c = clusters_[i];
+    for (size_t k = 0; k < c.cluster.dofs.size(); ++k) c.left[k] = -a_[c.cluster.dofs[k]];
+    c.forces.setZero();
+    addSmallProduct(c.at.J, c.left, c.forces);
+    solveGram(c.at, c.forces);
+    expandIndependent(c.at, c.forces, c.rows);
+    calcGeometricStiffness(getPlacedView(c.cluster, ws_), c.motion, c.rows, c.JqN);
+    c.mixed.setZero();
+    addSmallProductTransposed(c.at.N, c.JqN, c.mixed);
+    scatterLanes(c.mixed.data(), c.mixed.size(), count, [&](int l) { return views[l].clusters[i].T.data(); });
+  }
 }
 
 void ReducedKernel::linearizeStates(LinearizeItem* items, int count, std::vector<LaneView>& views) {
   const Batch batch(items, count);
-  loadState(batch.source());
+  loadState(batch.source(), Point::State);
   loadBases(batch.source());
   updateColumns(model_, ws_);
   updateVelocities(model_, ws_, v_);
@@ -147,18 +195,18 @@ void ReducedKernel::updateContact(ContactLanes& contact) {
 LaneMask ReducedKernel::updateClusterDerivatives(ClusterLanes& c) {
   const ReducedCluster& cluster = c.cluster;
   const ClusterBasisOf<Lanes>& next = c.next.basis;
-  c.forces = c.next.zeta / h_;  // closeCluster() moves by h w', so its zeta is h times that of Eq. (e)
+  c.forces = c.next.zeta / drift_;  // closeCluster() moves by h w', so its zeta is h times that of Eq. (e)
   expandIndependent(c.at, c.forces, c.rows);
   calcGeometricStiffness(getPlacedView(cluster, ws_), c.motion, c.rows, c.JqN);  // K N of zeta
   for (MatrixX<Lanes>* m : {&c.PnNn, &c.mixed, &c.E, &c.En, &c.S}) m->setZero();
   addSmallProductTransposed(c.at.N, c.JqN, c.E);
-  c.E *= -h_;
+  c.E *= -drift_;
   updateColumns(cluster.model, c.own);
   const auto ahead = getOwnView(cluster, c.own);
   updateTwists(ahead, next, c.ahead);
   c.forces.setZero();  // mu
   addSmallProduct(next.J, c.next.step, c.forces);
-  c.forces /= h_;
+  c.forces /= drift_;
   solveGram(next, c.forces);
   expandIndependent(next, c.forces, c.rows);
   calcGeometricStiffness(ahead, c.ahead, c.rows, c.KnNn);
@@ -189,9 +237,9 @@ LaneMask ReducedKernel::updateClusterDerivatives(ClusterLanes& c) {
   for (MatrixX<Lanes>* m : {&c.Xn, &c.q_y, &c.v_y}) m->setZero();
   addSmallProduct(c.PnNn, c.X, c.Xn);
   addSmallProduct(c.X, c.E, c.q_y);
-  c.q_v = h_ * c.X;
+  c.q_v = drift_ * c.X;
   addSmallProduct(c.Xn, c.E, c.v_y);
-  c.v_y = (c.v_y - c.En) / h_;
+  c.v_y = (c.v_y - c.En) / drift_;
   addSmallProduct(c.S, c.q_y, c.v_y, -1);
   c.v_v = c.Xn;
   addSmallProduct(c.S, c.q_v, c.v_v, -1);

@@ -30,6 +30,11 @@ bool isSame(const StateCost& a, const StateCost& b) {
 
 }  // namespace
 
+ReducedMidpoint::ReducedMidpoint(const Model& model, const Reduction& reduction) : X_WB(model.numBodies()) {
+  for (const ReducedCluster& cluster : reduction.clusters) clusters.emplace_back(cluster);
+  for (VectorXd* x : {&v, &a}) x->setZero(model.nv());
+}
+
 ReducedLayout::ReducedLayout(const Model& model, const Reduction& reduction, const std::vector<StageSpec>& specs) {
   std::vector<int> most;  // contacts of each tip at one node
   for (const StageSpec& spec : specs) {

@@ -17,6 +17,15 @@ struct ClusterNode {
   VectorXd v_next;    // n, v+
 };
 
+// Half way along a midpoint step: robot_problem.h Eq. (2).
+struct ReducedMidpoint {
+  ReducedMidpoint(const Model& model, const Reduction& reduction);
+  std::vector<SE3> X_WB;               // nb
+  std::vector<ClusterState> clusters;  // closed by the first drift
+  VectorXd v;                          // nv, after it
+  VectorXd a, lambda;                  // nv, constraint rows; with that velocity: they foresee the velocity half way
+};
+
 // It stores only what is expensive to recompute, so that a long horizon fits into the caches.
 struct ReducedEvaluation : RobotEvaluation {
   ReducedEvaluation(const Model& model, const Reduction& reduction) : X_WB(model.numBodies()) {
@@ -27,6 +36,7 @@ struct ReducedEvaluation : RobotEvaluation {
   std::vector<ClusterNode> clusters;
   SaddlePointFactors factors;               // of reduced_kernel.h, Eq. (b)
   std::unique_ptr<ImpactWorkspace> impact;  // only of an impact
+  std::unique_ptr<ReducedMidpoint> mid;     // only of a midpoint step
 };
 
 // Contacts of one node. A slot holds one contact, always on the same body; two contacts of a body take two slots.

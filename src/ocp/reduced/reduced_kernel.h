@@ -1,6 +1,6 @@
 #pragma once
-// The reduced step, its differences and its derivatives: robot_problem.h Eqs. (1) and (4), for as many nodes at once as a
-// register of the processor has lanes. Written for one cluster with bases N, J, J^+ and metric W (reduction.h) at q,
+// The reduced step, its differences and its derivatives: robot_problem.h Eqs. (1), (2) and (4), for as many nodes at once
+// as a register of the processor has lanes. Written for one cluster with bases N, J, J^+ and metric W (reduction.h) at q,
 // and N', J', J'^+ at q+; a joint outside all clusters is the case N = N' = W = 1 without rows.
 //
 // A tangent vector (dy, dy_v) at the state means, with Z, d_y and d_v of cluster_motion.h,
@@ -11,8 +11,8 @@
 // J^T lambda_l = M a + b - tau - J_c^T lambda_c. Derivatives at fixed lambda_l and lambda_c are those of inverse
 // dynamics (reduced_tree.h) and of the contact rows, with the columns J~, .. of the contact's body in place of J_k, ..
 // of closure.h Eqs. (1) and (2).                                                                                    (c)
-// Step: w = v + h a; e is the displacement before closing, A = h J' J_d W^{-1} J^T, and K = d(J^T zeta)/dq and
-// K' = d(J'^T mu)/dq' are geometric stiffnesses, S = N'^T K' N':
+// Kick by k and drift by h: w = v + k a; e is the displacement before closing, A = h J' J_d W^{-1} J^T, and
+// K = d(J^T zeta)/dq and K' = d(J'^T mu)/dq' are geometric stiffnesses, S = N'^T K' N':
 //     e = (J_q - h J_d W^{-1} K) dq + h J_d dw                                                                      (d)
 //     dq+ = e - h J_d W^{-1} J^T A^{-1} J' e,     dw' = dw - W^{-1} K dq - W^{-1} J^T A^{-1} J' e                   (e)
 //     dy+ = (W N')^T dq+,   dy_v+ = (W N')^T dw' - S dy+,   mu = J'^{+T} W w'                                       (f)
@@ -20,8 +20,11 @@
 // the oblique projection of (e) vanishes on J_d W^{-1} J^T, so that P = J_d^{-T} W N reads it. With
 // P' = J_d^{-T} W N', X = (P^T N')^{-1}, X' = P'^T N' X, E = P^T J_q N - h N^T K N, and
 // (W N)^T Z = (W N)^T d_y = (W N)^T d_v = 0,
-//     dy+   = X E dy + h X dy_v + h^2 X dy'
-//     dy_v+ = (X' E - P'^T J_q N) / h dy + X' dy_v + h X' dy' - S dy+                                               (g)
+//     dy+   = X E dy + h X (dy_v + k dy')
+//     dy_v+ = (X' E - P'^T J_q N) / h dy + X' (dy_v + k dy') - S dy+                                                (g)
+// An Euler step has k = h. A midpoint step is (g) twice, with h/2 for h: at the state with k = 0, then half way with k = h,
+// where a belongs to the foreseen velocity v^ = v + h/2 N y'_0, y'_0 being that of v itself. N turns with q,
+//     dy^_v = dy_v + h/2 (dy'_0 + T dy),    T = N^T d(J^T f)/dq N,    f = -J^{+T} W a_d                             (h)
 // With a gap, the result is read about the node state's own basis (cluster_gap.h).
 //
 // All of it runs in lanes, even for a single node: the result of a lane does not depend on the others, so that results
@@ -52,7 +55,7 @@ struct ClusterLanes {
   ClusterMotionOf<Lanes> ahead;          // at q+, in the cluster
   MatrixX<Lanes> KN, KnNn, JqN, P, Pn;   // n x r
   MatrixX<Lanes> E, En, S, X, Xn, PnNn;  // r x r; PnNn = P'^T N'
-  MatrixX<Lanes> q_y, q_v, v_y, v_v;     // r x r: dy+ and dy_v+ by dy and dy_v; by dy' they are h times those by dy_v
+  MatrixX<Lanes> q_y, q_v, v_y, v_v;     // r x r: dy+ and dy_v+ by dy and dy_v; by dy' they are k times those by dy_v
   ClusterGapOf<Lanes> gap;               // to the node states
 };
 
@@ -90,17 +93,27 @@ struct ContactLanes {
 struct LaneView {
   LaneView(const Model& model, const Reduction& reduction, const ReducedTreeOf<Lanes>& tree,
            const ReducedLayout& layout);
+  struct Drift {
+    MatrixXd q_y, q_v, v_y, v_v;  // as in ClusterLanes
+  };
   struct Cluster {
-    MatrixXd Z, q_y, q_v, v_y, v_v;  // as in ClusterLanes
-    VectorXd gap, gap_v;             // r
+    MatrixXd Z;           // as in ClusterLanes
+    Drift drift;          // of a step; of a midpoint step the second
+    Drift first;          // of a midpoint step, Eq. (g) with k = 0
+    MatrixXd T;           // r x r, Eq. (h)
+    VectorXd gap, gap_v;  // r
   };
   struct Contact {
     Matrix6Xd dy, dv;  // as in ContactLanes
   };
+  struct Acceleration {
+    VectorXd dydd;  // (nu + 2 size) x size, padded: room for torques, then A_y^T and A_v^T of reduced_tree.h
+    std::vector<Contact> contacts;  // per slot
+  };
   Workspace ws;
-  VectorXd dydd;  // (nu + 2 size) x size, padded: room for torques, then A_y^T and A_v^T of reduced_tree.h
+  Acceleration acceleration;
+  Acceleration foreseen;  // that with which a midpoint step foresees its velocity
   std::vector<Cluster> clusters;
-  std::vector<Contact> contacts;  // per slot
   StateCostModel state_cost;
 };
 
@@ -116,8 +129,8 @@ class ReducedKernel {
     const ReducedEvaluation* previous;  // whose q+ is the state, or null
     ReducedEvaluation* at;              // with x and u
   };
-  // Steps: fills `at` except for costs, sets the status of those that succeeded to Ok and the reason why others failed.
-  // In the views it fills the data that residuals read.
+  // Steps of one rule: fills `at` except for costs, sets the status of those that succeeded to Ok and the reason why others
+  // failed. In the views it fills the data that residuals read.
   void step(const StepItem* items, int count, std::vector<LaneView>& views);
   // The same for states alone, at impacts and the terminal node.
   void place(const StepItem* items, int count, std::vector<LaneView>& views);
@@ -130,7 +143,7 @@ class ReducedKernel {
     bool ok;                        // out
     std::string* failure;           // out, where it is not
   };
-  // Derivatives of steps, all of the views.
+  // Derivatives of steps of one rule, all of the views.
   void linearizeSteps(LinearizeItem* items, int count, std::vector<LaneView>& views);
   // The same for states alone: the data that residuals read, Z and the state cost.
   void linearizeStates(LinearizeItem* items, int count, std::vector<LaneView>& views);
@@ -142,33 +155,52 @@ class ReducedKernel {
 
  private:
   // reduced_transfer.cpp: copies numbers between nodes and lanes
-  void loadState(LaneSource<const ReducedEvaluation> nodes);
+  // What accelerations belong to.
+  enum class Point { State, Foreseen, Midpoint };
+  static Point getPoint(const StageSpec& spec) {
+    return spec.step == StepRule::Midpoint ? Point::Midpoint : Point::State;
+  }
+  void loadState(LaneSource<const ReducedEvaluation> nodes, Point point);
   void loadBases(LaneSource<const ReducedEvaluation> nodes);
+  void loadMidpointBases(LaneSource<const ReducedEvaluation> nodes);
   void loadPoints(const StepItem* items, int count);
   void loadControls(const StepItem* items, int count);
+  void loadLengths(const StageSpec& spec, int lane);
   enum class ContactUse { Step, Derivatives };
-  void loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices, ContactUse use);
+  void loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices, Point point, ContactUse use);
   void loadContact(int lane, const ContactLayout::Contact& contact, const ReducedEvaluation& node, int closure_rows,
-                   ContactUse use);
+                   Point point, ContactUse use);
   bool loadStateCosts(const int* indices, const StageSpec* const* specs, int count);
-  void loadStep(LaneSource<const ReducedEvaluation> nodes);
+  void loadAccelerations(LaneSource<const ReducedEvaluation> nodes, Point point);
+  template <typename Get>
+  void loadDrift(LaneSource<const ReducedEvaluation> nodes, const Get& get_state);
+  void loadFirstDrift(LaneSource<const ReducedEvaluation> nodes);
+  void loadLastDrift(LaneSource<const ReducedEvaluation> nodes);
   void storePoints(const StepItem* items, int count);
   void storeNext(size_t cluster, const StepItem* items, int count);
+  void storeMidpoint(const StepItem* items, int count);
+  void storeForeseen(const StepItem* items, int count);
   void storeStep(const StepItem* items, int count);
   void storeSystem(const StepItem& item, int lane);
+  void storeContactForces(const ContactLayout& layout, int lane, VectorXd& lambda) const;
   void storeMotion(int count, std::vector<LaneView>& views) const;
   void storeColumns(int count, std::vector<LaneView>& views) const;
-  void storeDerivatives(int count, std::vector<LaneView>& views) const;
+  void storeAcceleration(int count, std::vector<LaneView>& views, LaneView::Acceleration LaneView::*to) const;
+  void storeDrift(int count, std::vector<LaneView>& views, LaneView::Drift LaneView::Cluster::*to) const;
+  void storeGaps(int count, std::vector<LaneView>& views) const;
 
   // reduced_step.cpp
   LaneMask placeAll(const StepItem* items, int count);
   void placeBodies();
   void updateStateCosts(const StepItem* items, int count);
-  void updateDriftAccelerations();
+  LaneMask driftToMidpoint(const StepItem* items, int count);
   void updateSystem();
-  void updateContactRows(size_t slot);
-  void stepFreeJoints();
-  LaneMask closeStep(ClusterLanes& c);
+  void updateLoads();
+  void combineAccelerations();
+  void foreseeVelocity();
+  void driftFreeJoints();
+  LaneMask driftCluster(ClusterLanes& c);
+  void updateNextVelocity(ClusterLanes& c);
   void updateClosureForces();
   // Rows of a cluster's closures among those of the model.
   template <typename Visit>
@@ -179,9 +211,14 @@ class ReducedKernel {
   }
 
   // reduced_derivatives.cpp
+  struct Batch;
+  void linearizeAccelerations(const Batch& batch, Point point);
+  void linearizeMidpoints(const Batch& batch, LinearizeItem* items, std::vector<LaneView>& views);
   void updateForces();
   void updateContact(ContactLanes& contact);
+  void updateDrifts(LinearizeItem* items, int count);
   LaneMask updateClusterDerivatives(ClusterLanes& c);
+  void storeTurns(int count, std::vector<LaneView>& views);
   void updateGap(size_t cluster, const LinearizeItem* items, int count);
   void linearizeStateCosts(const LinearizeItem* items, int count, std::vector<LaneView>& views);
 
@@ -194,7 +231,8 @@ class ReducedKernel {
   ReducedTreeOf<Lanes> tree_;
   std::vector<ContactLanes> contacts_;  // per slot
   VectorX<Lanes> v_, a_, tau_, x1_;     // nv; nq + nv: the next states
-  Lanes h_;
+  VectorX<Lanes> v_mid_;                // nv, the velocity foreseen half way
+  Lanes kick_, drift_;                  // k and h of Eq. (g), s
   // Eq. (b), six rows for each slot
   SaddlePointOf<Lanes> system_;
   MatrixX<Lanes> M_, JcN_;                           // size x size, rows x size

@@ -1,4 +1,4 @@
-// Steps in lanes: robot_problem.h Eqs. (1) and (4), reduced_kernel.h Eq. (b).
+// Steps in lanes: robot_problem.h Eqs. (1), (2) and (4), reduced_kernel.h Eq. (b).
 #include <algorithm>
 
 #include "bielle/dynamics/kinematics.h"
@@ -23,16 +23,19 @@ ClusterLanes::ClusterLanes(const ReducedCluster& l)
 LaneView::LaneView(const Model& model, const Reduction& reduction, const ReducedTreeOf<Lanes>& tree,
                    const ReducedLayout& layout)
     : ws(model), state_cost(model, reduction) {
-  dydd.setZero(roundUpToLane(model.nu() + 2 * reduction.size) * reduction.size);
   for (const ReducedCluster& cluster : reduction.clusters) {
     const int r = cluster.size;
     const MatrixXd square = MatrixXd::Zero(r, r);
+    const Drift drift{square, square, square, square};
     clusters.push_back(
-        {MatrixXd::Zero(cluster.model.nv(), r), square, square, square, square, VectorXd::Zero(r), VectorXd::Zero(r)});
+        {MatrixXd::Zero(cluster.model.nv(), r), drift, drift, square, VectorXd::Zero(r), VectorXd::Zero(r)});
   }
-  for (int tip : layout.slots) {
-    const Matrix6Xd columns = Matrix6Xd::Zero(6, tree.getTip(tip).outer.size());
-    contacts.push_back({columns, columns});
+  for (Acceleration* out : {&acceleration, &foreseen}) {
+    out->dydd.setZero(roundUpToLane(model.nu() + 2 * reduction.size) * reduction.size);
+    for (int tip : layout.slots) {
+      const Matrix6Xd columns = Matrix6Xd::Zero(6, tree.getTip(tip).outer.size());
+      out->contacts.push_back({columns, columns});
+    }
   }
 }
 
@@ -58,7 +61,7 @@ ReducedKernel::ReducedKernel(const Model& model, const Reduction& reduction, con
     for (Matrix6X<Lanes>* x : {&contact.dy, &contact.dv}) x->setZero(6, tree_.getTip(tip).outer.size());
     contacts_.push_back(contact);
   }
-  for (VectorX<Lanes>* x : {&v_, &a_, &tau_}) x->setZero(nv);
+  for (VectorX<Lanes>* x : {&v_, &a_, &tau_, &v_mid_}) x->setZero(nv);
   x1_.setZero(model.nq() + nv);
   system_.resize(nr, rows);
   for (MatrixX<Lanes>* x : {&M_, &A_y_, &A_v_}) x->setZero(nr, nr);
@@ -135,53 +138,104 @@ void ReducedKernel::place(const StepItem* items, int count, std::vector<LaneView
 }
 
 void ReducedKernel::step(const StepItem* items, int count, std::vector<LaneView>& views) {
+  const Point point = getPoint(*items->spec);
   const LaneMask placed = placeAll(items, count);
+  storeMotion(count, views);
   loadControls(items, count);
+  const LaneMask reached = point == Point::Midpoint ? driftToMidpoint(items, count) : makeMask(true);
   std::array<const ReducedEvaluation*, kLane> nodes;
   std::array<int, kLane> indices;
   for (int l = 0; l < count; ++l) nodes[l] = items[l].at, indices[l] = items[l].node;
-  loadContacts({nodes.data(), count}, indices.data(), ContactUse::Step);
-  updateDriftAccelerations();
+  loadContacts({nodes.data(), count}, indices.data(), point, ContactUse::Step);
   updateSystem();
+  updateLoads();
   const LaneMask regular = system_.factorize(M_, JcN_);
   system_.solve(f_, gamma_, ydd_, contact_forces_);
+  combineAccelerations();
+  if (point == Point::Midpoint) {
+    updateClosureForces();
+    storeForeseen(items, count);
+    foreseeVelocity();
+    updateLoads();
+    system_.solve(f_, gamma_, ydd_, contact_forces_);
+    combineAccelerations();
+  }
   system_.updateInverse();
-  stepFreeJoints();
+  driftFreeJoints();
   LaneMask closed = makeMask(true);
   for (ClusterLanes& c : clusters_) {
-    const LaneMask this_one = closeStep(c);
+    const LaneMask this_one = driftCluster(c);
     for (int l = 0; l < count; ++l)
-      if (!this_one[l] && closed[l] && regular[l] && placed[l])
+      if (!this_one[l] && closed[l] && reached[l] && regular[l] && placed[l])
         items[l].at->failure = describeFailure(c.cluster, c.scratch, l);
     closed = closed && this_one;
   }
   updateClosureForces();
   storeStep(items, count);
-  storeMotion(count, views);
   for (int l = 0; l < count; ++l) {
-    if (placed[l] && !regular[l]) items[l].at->failure = "the mass matrix is singular";
-    items[l].at->status = placed[l] && regular[l] && closed[l] ? StepStatus::Ok : StepStatus::Failed;
+    const bool moved = placed[l] && reached[l];
+    if (moved && !regular[l]) items[l].at->failure = "the mass matrix is singular";
+    items[l].at->status = moved && regular[l] && closed[l] ? StepStatus::Ok : StepStatus::Failed;
   }
 }
 
-// a_d = -J^+ gamma of the closures.
-void ReducedKernel::updateDriftAccelerations() {
+// The first drift of a midpoint step: from here on the point of the kernel is the one half way.
+LaneMask ReducedKernel::driftToMidpoint(const StepItem* items, int count) {
+  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+    const VectorUpTo6<Lanes> d = drift_ * v_.segment(joint.idx_v, joint.nv);
+    integrateJoint<Lanes>(joint, ws_.q.segment(joint.idx_q, joint.nq), d, x1_.segment(joint.idx_q, joint.nq));
+  }
+  LaneMask reached = makeMask(true);
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    ClusterLanes& c = clusters_[i];
+    for (size_t k = 0; k < c.cluster.dofs.size(); ++k) c.d[k] = drift_ * v_[c.cluster.dofs[k]];
+    const LaneMask closed = closeCluster<Lanes>(c.cluster, c.scratch, c.at, c.d, VectorX<Lanes>(), c.next);
+    for (int l = 0; l < count; ++l)
+      if (!closed[l] && reached[l] && items[l].at->failure.empty())
+        items[l].at->failure = describeFailure(c.cluster, c.scratch, l);
+    reached = reached && closed;
+    updateNextVelocity(c);
+    for (size_t k = 0; k < c.cluster.dofs.size(); ++k) v_[c.cluster.dofs[k]] = c.v_next[k];
+    scatterConfiguration<Lanes>(model_, c.cluster, c.next.basis.q, x1_);
+    c.at = c.next.basis;
+    for (size_t j = 0; j < c.cluster.joints.size(); ++j) ws_.X_WB[c.cluster.joints[j]] = c.next.placements[j + 1];
+  }
+  ws_.q = x1_.head(model_.nq());
+  placeBodies();
+  storeMidpoint(items, count);
+  ws_.stage = WorkspaceStage::Placement;
+  updateColumns(model_, ws_);
+  updateVelocities(model_, ws_, v_);
+  return reached;
+}
+
+// The matrices of Eq. (b); rows that a node lacks are zero.
+void ReducedKernel::updateSystem() {
   updateCompositeInertias(model_, ws_);
+  for (ClusterLanes& c : clusters_) updateTwists(getPlacedView(c.cluster, ws_), c.at, c.motion);
+  tree_.updateMassMatrix(ws_, lifts_, M_);
+  for (size_t slot = 0; slot < contacts_.size(); ++slot) {
+    auto JcN = JcN_.middleRows<6>(6 * slot);
+    JcN.setZero();
+    if (!contacts_[slot].used) continue;
+    const auto& tip = tree_.getTip(contacts_[slot].tip);
+    for (size_t o = 0; o < tip.outer.size(); ++o) JcN.col(tip.outer[o]) = contacts_[slot].selectRows(tip.J.col(o));
+  }
+}
+
+// Its right-hand sides at the velocities of the workspace: N^T (tau - b - M a_d), and gamma_c + J_c a_d; and
+// a_d = -J^+ gamma of the closures.
+void ReducedKernel::updateLoads() {
   updateDrift(model_, ws_);
   a_.setZero();
   for (ClusterLanes& c : clusters_) {
-    const auto view = getPlacedView(c.cluster, ws_);
-    calcClusterDrift<Lanes>(view, c.cluster, c.at, c.rows, c.drift);
+    calcClusterDrift<Lanes>(getPlacedView(c.cluster, ws_), c.cluster, c.at, c.rows, c.drift);
     c.forces = c.drift;
     applyPseudoInverse<Lanes>(c.cluster, c.at, -1, c.forces, c.a);
     for (size_t k = 0; k < c.cluster.dofs.size(); ++k) a_[c.cluster.dofs[k]] = c.a[k];
-    updateTwists(view, c.at, c.motion);
   }
   updateInverseDynamics(model_, ws_, a_);
-}
-
-// Eq. (b)
-void ReducedKernel::updateSystem() {
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];
     for (int k = 0; k < joint.nv; ++k)
@@ -193,65 +247,85 @@ void ReducedKernel::updateSystem() {
     f.setZero();
     addSmallProductTransposed(c.at.N, c.left, f);
   }
-  tree_.updateMassMatrix(ws_, lifts_, M_);
-  for (size_t slot = 0; slot < contacts_.size(); ++slot) updateContactRows(slot);
+  for (size_t slot = 0; slot < contacts_.size(); ++slot) {
+    const ContactLanes& contact = contacts_[slot];
+    auto gamma = gamma_.segment<6>(6 * slot);
+    gamma.setZero();
+    if (!contact.used) continue;
+    const int body = layout_.tips[contact.tip];
+    gamma = contact.selectRows(ws_.A[body] - ws_.A[0] + contact.kd * ws_.V[body]) - contact.kp_residual;
+  }
 }
 
-// J_c N and gamma_c + J_c a_d; the accelerations of the workspace are those of a_d. Rows that a node lacks are zero.
-void ReducedKernel::updateContactRows(size_t slot) {
-  ContactLanes& contact = contacts_[slot];
-  auto JcN = JcN_.middleRows<6>(6 * slot);
-  auto gamma = gamma_.segment<6>(6 * slot);
-  JcN.setZero();
-  gamma.setZero();
-  if (!contact.used) return;
-  const auto& tip = tree_.getTip(contact.tip);
-  const int body = layout_.tips[contact.tip];
-  gamma = contact.selectRows(ws_.A[body] - ws_.A[0] + contact.kd * ws_.V[body]) - contact.kp_residual;
-  for (size_t o = 0; o < tip.outer.size(); ++o) JcN.col(tip.outer[o]) = contact.selectRows(tip.J.col(o));
-}
-
-// robot_problem.h Eq. (1) without closures. Lanes without a node repeat the first one and need no special treatment.
-void ReducedKernel::stepFreeJoints() {
-  const int nq = model_.nq();
+// a = N y' + a_d
+void ReducedKernel::combineAccelerations() {
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];
-    const int o = reduction_.free_offsets[i], n = joint.nv;
-    VectorUpTo6<Lanes> d(n);
-    for (int k = 0; k < n; ++k) {
+    for (int k = 0; k < joint.nv; ++k) a_[joint.idx_v + k] += ydd_[reduction_.free_offsets[i] + k];
+  }
+  for (ClusterLanes& c : clusters_) {
+    addSmallProduct(c.at.N, ydd_.segment(c.cluster.offset, c.cluster.size), c.a);
+    for (size_t k = 0; k < c.cluster.dofs.size(); ++k) a_[c.cluster.dofs[k]] = c.a[k];
+  }
+}
+
+// v^ = v + k/2 N y', into the workspace too
+void ReducedKernel::foreseeVelocity() {
+  v_mid_ = v_;
+  const Lanes half = 0.5 * kick_;
+  for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
+    const Joint& joint = model_.joints()[reduction_.free_joints[i]];
+    for (int k = 0; k < joint.nv; ++k) v_mid_[joint.idx_v + k] += half * ydd_[reduction_.free_offsets[i] + k];
+  }
+  for (ClusterLanes& c : clusters_) {
+    c.d.setZero();
+    addSmallProduct(c.at.N, ydd_.segment(c.cluster.offset, c.cluster.size), c.d);
+    for (size_t k = 0; k < c.cluster.dofs.size(); ++k) v_mid_[c.cluster.dofs[k]] += half * c.d[k];
+  }
+  updateVelocities(model_, ws_, v_mid_);
+}
+
+// The kick and the drift after it, outside the clusters. Lanes without a node repeat the first one and need no special
+// treatment.
+void ReducedKernel::driftFreeJoints() {
+  const int nq = model_.nq();
+  for (int i : reduction_.free_joints) {
+    const Joint& joint = model_.joints()[i];
+    VectorUpTo6<Lanes> d(joint.nv);
+    for (int k = 0; k < joint.nv; ++k) {
       const int dof = joint.idx_v + k;
-      a_[dof] += ydd_[o + k];
-      x1_[nq + dof] = v_[dof] + h_ * a_[dof];
-      d[k] = h_ * x1_[nq + dof];
+      x1_[nq + dof] = v_[dof] + kick_ * a_[dof];
+      d[k] = drift_ * x1_[nq + dof];
     }
     integrateJoint<Lanes>(joint, ws_.q.segment(joint.idx_q, joint.nq), d, x1_.segment(joint.idx_q, joint.nq));
   }
 }
 
 // The same for a cluster.
-LaneMask ReducedKernel::closeStep(ClusterLanes& c) {
+LaneMask ReducedKernel::driftCluster(ClusterLanes& c) {
   const ReducedCluster& cluster = c.cluster;
-  const auto ydd = ydd_.segment(cluster.offset, cluster.size);
-  addSmallProduct(c.at.N, ydd, c.a);
   for (size_t k = 0; k < cluster.dofs.size(); ++k) {
     const int dof = cluster.dofs[k];
-    a_[dof] = c.a[k];
-    c.d[k] = h_ * (v_[dof] + h_ * a_[dof]);
+    c.d[k] = drift_ * (v_[dof] + kick_ * a_[dof]);
   }
-  // To second order the closures open by h^2/2 gamma along h w: J W^{-1} J^T zeta = h^2/2 gamma. applyPseudoInverse()
-  // has left the solution for gamma in c.forces.
-  c.forces *= 0.5 * h_ * h_;
+  // To second order the closures open by h (k - h/2) gamma along h w: J W^{-1} J^T zeta = h (k - h/2) gamma.
+  // applyPseudoInverse() has left the solution for gamma in c.forces.
+  c.forces *= drift_ * (kick_ - 0.5 * drift_);
   const LaneMask closed = closeCluster<Lanes>(cluster, c.scratch, c.at, c.d, c.forces, c.next);
-  // (I - J'^+ J') w' = N' (W N')^T w'
+  updateNextVelocity(c);
+  for (size_t k = 0; k < cluster.dofs.size(); ++k) x1_[model_.nq() + cluster.dofs[k]] = c.v_next[k];
+  scatterConfiguration<Lanes>(model_, cluster, c.next.basis.q, x1_);
+  return closed;
+}
+
+// (I - J'^+ J') w' = N' (W N')^T w'
+void ReducedKernel::updateNextVelocity(ClusterLanes& c) {
   const ClusterBasisOf<Lanes>& next = c.next.basis;
   c.target.setZero();
   addSmallProductTransposed(next.WN, c.next.step, c.target);
-  c.target /= h_;
+  c.target /= drift_;
   c.v_next.setZero();
   addSmallProduct(next.N, c.target, c.v_next);
-  for (size_t k = 0; k < cluster.dofs.size(); ++k) x1_[model_.nq() + cluster.dofs[k]] = c.v_next[k];
-  scatterConfiguration<Lanes>(model_, cluster, next.q, x1_);
-  return closed;
 }
 
 // J^T lambda_l = M a + b - tau - J_c^T lambda_c, solved on the independent rows; the others have no force.

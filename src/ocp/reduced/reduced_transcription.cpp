@@ -63,6 +63,7 @@ class ReducedTranscription : public Transcription {
   bool isRunning(int node) const { return node + 1 < static_cast<int>(specs_.size()); }
   bool isImpact(int node) const { return isRunning(node) && specs_[node].kind == StageKind::Impact; }
   bool isStep(int node) const { return isRunning(node) && !isImpact(node); }
+  bool isMidpoint(int node) const { return isStep(node) && specs_[node].step == StepRule::Midpoint; }
   void finishEvaluation(int node, const LaneView& view, RobotEvaluation& at) const;
   void finishLinearization(LinearizeTask& task, LaneView& view, ReducedScratch& scratch) const;
 
@@ -75,7 +76,8 @@ class ReducedTranscription : public Transcription {
 
 void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScratch* memory) const {
   auto& scratch = static_cast<ReducedScratch&>(*memory);
-  Batch<ReducedKernel::StepItem> steps, states;
+  std::array<Batch<ReducedKernel::StepItem>, 2> steps;  // by rule
+  Batch<ReducedKernel::StepItem> states;
   for (int i = 0; i < count; ++i) {
     const int node = tasks[i].node;
     auto& at = static_cast<ReducedEvaluation&>(*tasks[i].out);
@@ -83,10 +85,16 @@ void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScrat
     const int rows = layout_.contacts[node].rows;
     if (at.factors.D.size() != rows || at.factors.L.rows() != reduction_.size) at.factors.resize(reduction_.size, rows);
     const auto* previous = static_cast<const ReducedEvaluation*>(tasks[i].previous);
-    (isStep(node) ? steps : states).add({node, &specs_[node], previous, &at}, i);
+    if (isMidpoint(node)) {
+      if (!at.mid) at.mid = std::make_unique<ReducedMidpoint>(model_, reduction_);
+      at.mid->lambda.resize(at.lambda.size());
+    }
+    (isStep(node) ? steps[isMidpoint(node)] : states).add({node, &specs_[node], previous, &at}, i);
   }
-  if (steps.count > 0) scratch.kernel.step(steps.items.data(), steps.count, scratch.views);
-  for (int l = 0; l < steps.count; ++l) finishEvaluation(steps.items[l].node, scratch.views[l], *steps.items[l].at);
+  for (Batch<ReducedKernel::StepItem>& batch : steps) {
+    if (batch.count > 0) scratch.kernel.step(batch.items.data(), batch.count, scratch.views);
+    for (int l = 0; l < batch.count; ++l) finishEvaluation(batch.items[l].node, scratch.views[l], *batch.items[l].at);
+  }
   if (states.count > 0) scratch.kernel.place(states.items.data(), states.count, scratch.views);
   for (int l = 0; l < states.count; ++l) {
     const ReducedKernel::StepItem& item = states.items[l];
@@ -104,21 +112,24 @@ void ReducedTranscription::finishEvaluation(int node, const LaneView& view, Robo
 
 void ReducedTranscription::linearize(LinearizeTask* tasks, int count, ProblemScratch* memory) const {
   auto& scratch = static_cast<ReducedScratch&>(*memory);
-  Batch<ReducedKernel::LinearizeItem> steps, states;
+  std::array<Batch<ReducedKernel::LinearizeItem>, 2> steps;  // by rule
+  Batch<ReducedKernel::LinearizeItem> states;
   for (int i = 0; i < count; ++i) {
     const int node = tasks[i].node;
     tasks[i].status = StepStatus::Failed;
     tasks[i].failure.clear();
     const auto* at = static_cast<const ReducedEvaluation*>(tasks[i].at);
     const auto* next = static_cast<const ReducedEvaluation*>(tasks[i].next);
-    (isStep(node) ? steps : states).add({node, &specs_[node], at, next, false, &tasks[i].failure}, i);
+    (isStep(node) ? steps[isMidpoint(node)] : states).add({node, &specs_[node], at, next, false, &tasks[i].failure}, i);
   }
   const auto finish = [&](Batch<ReducedKernel::LinearizeItem>& batch) {
     for (int l = 0; l < batch.count; ++l)
       if (batch.items[l].ok) finishLinearization(tasks[batch.tasks[l]], scratch.views[l], scratch);
   };
-  if (steps.count > 0) scratch.kernel.linearizeSteps(steps.items.data(), steps.count, scratch.views);
-  finish(steps);
+  for (Batch<ReducedKernel::LinearizeItem>& batch : steps) {
+    if (batch.count > 0) scratch.kernel.linearizeSteps(batch.items.data(), batch.count, scratch.views);
+    finish(batch);
+  }
   if (states.count > 0) scratch.kernel.linearizeStates(states.items.data(), states.count, scratch.views);
   finish(states);
 }
@@ -130,7 +141,7 @@ void ReducedTranscription::finishLinearization(LinearizeTask& task, LaneView& vi
   NodeAssembly& assembly = scratch.assembly;
   StageModel& out = *task.out;
   if (isStep(node)) {
-    assembly.setStep(specs_[node].dt, layout_.contacts[node], at, *next, view, out);
+    assembly.setStep(specs_[node], layout_.contacts[node], at, *next, view, out);
   } else if (isImpact(node)) {
     const DynamicsStatus status = scratch.impact.linearize(specs_[node].constraints, at, *next, view, assembly, out);
     if (status != DynamicsStatus::Ok) {

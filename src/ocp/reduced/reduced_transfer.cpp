@@ -5,13 +5,17 @@
 
 namespace bielle {
 
-// Placements and velocities.
-void ReducedKernel::loadState(LaneSource<const ReducedEvaluation> nodes) {
+// Placements and velocities of a point.
+void ReducedKernel::loadState(LaneSource<const ReducedEvaluation> nodes, Point point) {
   const int nq = model_.nq(), count = nodes.count;
-  gatherLanes(count, nq, ws_.q.data(), [&](int l) { return nodes[l].x.data(); });
-  gatherLanes(count, v_.size(), v_.data(), [&](int l) { return nodes[l].x.data() + nq; });
+  const bool at_state = point == Point::State;
+  gatherLanes(count, nq, ws_.q.data(), [&](int l) { return (at_state ? nodes[l].x : nodes[l].q_mid).data(); });
+  gatherLanes(count, v_.size(), v_.data(), [&](int l) {
+    if (at_state) return nodes[l].x.data() + nq;
+    return (point == Point::Foreseen ? nodes[l].mid->v : nodes[l].v_mid).data();
+  });
   gatherLanes(count, 12 * model_.numBodies(), getNumbers(ws_.X_WB.front()),
-              [&](int l) { return getNumbers(nodes[l].X_WB.front()); });
+              [&](int l) { return getNumbers((at_state ? nodes[l].X_WB : nodes[l].mid->X_WB).front()); });
   ws_.stage = WorkspaceStage::Placement;
 }
 
@@ -77,6 +81,14 @@ void ReducedKernel::loadBases(LaneSource<const ReducedEvaluation> nodes) {
   }
 }
 
+void ReducedKernel::loadMidpointBases(LaneSource<const ReducedEvaluation> nodes) {
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    ClusterLanes& c = clusters_[i];
+    loadBasis(
+        c.cluster, nodes.count, [&](int l) -> const ClusterBasis& { return nodes[l].mid->clusters[i].basis; }, c.at);
+  }
+}
+
 // Bases and placements relative to the body that carries the cluster: those of the q+ with which the state is
 // identical, if there is one, or else those that placeAll() has stored in place of q+.
 void ReducedKernel::loadPoints(const StepItem* items, int count) {
@@ -105,9 +117,15 @@ void ReducedKernel::storePoints(const StepItem* items, int count) {
                [&](int l) { return getNumbers(items[l].at->X_WB.front()); });
 }
 
+// k and h of Eq. (g); of a midpoint step those of the second drift.
+void ReducedKernel::loadLengths(const StageSpec& spec, int lane) {
+  kick_.set(lane, spec.dt);
+  drift_.set(lane, spec.step == StepRule::Midpoint ? 0.5 * spec.dt : spec.dt);
+}
+
 // Time steps and motor forces.
 void ReducedKernel::loadControls(const StepItem* items, int count) {
-  gatherLanes(count, 1, &h_, [&](int l) { return &items[l].spec->dt; });
+  for (int l = 0; l < kLane; ++l) loadLengths(*items[l < count ? l : 0].spec, l);
   gatherLanes(count, u_.size(), u_.data(), [&](int l) { return items[l].at->u.data(); });
   tau_.setZero();
   for (int m = 0; m < model_.nu(); ++m) tau_[model_.motors()[m].dof] = u_[m];
@@ -115,7 +133,8 @@ void ReducedKernel::loadControls(const StepItem* items, int count) {
 
 // Nodes without a contact in a slot have zero force there; its other numbers are arbitrary. Lanes without a node
 // repeat the first one: without its contacts they would fall, and take longer to close than all others.
-void ReducedKernel::loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices, ContactUse use) {
+void ReducedKernel::loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices, Point point,
+                                 ContactUse use) {
   for (ContactLanes& slot : contacts_) {
     slot.used = false;
     slot.present = 0;
@@ -131,15 +150,15 @@ void ReducedKernel::loadContacts(LaneSource<const ReducedEvaluation> nodes, cons
   for (int l = 0; l < kLane; ++l) {
     const ContactLayout& layout = layout_.contacts[indices[l < nodes.count ? l : 0]];
     for (const ContactLayout::Contact& contact : layout.contacts)
-      loadContact(l, contact, nodes[l], layout.closure_rows, use);
+      loadContact(l, contact, nodes[l], layout.closure_rows, point, use);
   }
 }
 
 void ReducedKernel::loadContact(int lane, const ContactLayout::Contact& contact, const ReducedEvaluation& node,
-                                int closure_rows, ContactUse use) {
+                                int closure_rows, Point point, ContactUse use) {
   ContactLanes& slot = contacts_[contact.slot];
   const Closure& closure = *contact.closure;
-  const SE3 X_WF = node.X_WB[closure.body1] * closure.X_B1;
+  const SE3 X_WF = (point == Point::State ? node.X_WB : node.mid->X_WB)[closure.body1] * closure.X_B1;
   for (int k = 0; k < 12; ++k) getNumbers(slot.X_WF)[k].set(lane, getNumbers(X_WF)[k]);
   for (int k = 0; k < 9; ++k) slot.turn.data()[k].set(lane, contact.turn.data()[k]);
   slot.kd.set(lane, closure.kd);
@@ -152,7 +171,8 @@ void ReducedKernel::loadContact(int lane, const ContactLayout::Contact& contact,
     for (int r = 0; r < contact.rows; ++r) slot.kp_residual[r].set(lane, residual[r]);
     return;
   }
-  const VectorUpTo6<double> lambda = node.lambda.segment(closure_rows + contact.row, contact.rows);
+  const VectorXd& forces = point == Point::Foreseen ? node.mid->lambda : node.lambda;
+  const VectorUpTo6<double> lambda = forces.segment(closure_rows + contact.row, contact.rows);
   const Vector6d wrench = X_WF.actForce(expandRows(closure, lambda));
   for (int k = 0; k < 6; ++k) slot.wrench[k].set(lane, wrench[k]);
   if (closure.kp == 0) return;
@@ -188,23 +208,58 @@ bool ReducedKernel::loadStateCosts(const int* indices, const StageSpec* const* s
   return true;
 }
 
-// Results of a step that was evaluated before.
-void ReducedKernel::loadStep(LaneSource<const ReducedEvaluation> nodes) {
-  const int count = nodes.count;
-  gatherLanes(count, a_.size(), a_.data(), [&](int l) { return nodes[l].a.data(); });
-  gatherLanes(count, closure_forces_.size(), closure_forces_.data(), [&](int l) { return nodes[l].lambda.data(); });
+// Accelerations and closure forces of a step that was evaluated before.
+void ReducedKernel::loadAccelerations(LaneSource<const ReducedEvaluation> nodes, Point point) {
+  const bool foreseen = point == Point::Foreseen;
+  gatherLanes(nodes.count, a_.size(), a_.data(),
+              [&](int l) { return (foreseen ? nodes[l].mid->a : nodes[l].a).data(); });
+  gatherLanes(nodes.count, closure_forces_.size(), closure_forces_.data(),
+              [&](int l) { return (foreseen ? nodes[l].mid->lambda : nodes[l].lambda).data(); });
+}
+
+// Where a drift has led; get(node, cluster) is the state.
+template <typename Get>
+void ReducedKernel::loadDrift(LaneSource<const ReducedEvaluation> nodes, const Get& get_state) {
   for (size_t i = 0; i < clusters_.size(); ++i) {
     ClusterLanes& c = clusters_[i];
-    const auto get = [&](int l) -> const ClusterNode& { return nodes[l].clusters[i]; };
+    const auto get = [&](int l) -> const ClusterState& { return get_state(nodes[l], i); };
     loadBasis(
-        c.cluster, count, [&](int l) -> const ClusterBasis& { return get(l).next.basis; }, c.next.basis);
-    gatherLanes(count, c.next.zeta.size(), c.next.zeta.data(), [&](int l) { return get(l).next.zeta.data(); });
-    gatherLanes(count, c.next.step.size(), c.next.step.data(), [&](int l) { return get(l).next.step.data(); });
-    gatherLanes(count, c.v_next.size(), c.v_next.data(), [&](int l) { return get(l).v_next.data(); });
-    gatherLanes(count, 12 * c.cluster.model.numBodies(), getNumbers(c.own.X_WB.front()),
-                [&](int l) { return getNumbers(get(l).next.placements.front()); });
+        c.cluster, nodes.count, [&](int l) -> const ClusterBasis& { return get(l).basis; }, c.next.basis);
+    gatherLanes(nodes.count, c.next.zeta.size(), c.next.zeta.data(), [&](int l) { return get(l).zeta.data(); });
+    gatherLanes(nodes.count, c.next.step.size(), c.next.step.data(), [&](int l) { return get(l).step.data(); });
+    gatherLanes(nodes.count, 12 * c.cluster.model.numBodies(), getNumbers(c.own.X_WB.front()),
+                [&](int l) { return getNumbers(get(l).placements.front()); });
     c.own.stage = WorkspaceStage::Placement;
   }
+}
+
+void ReducedKernel::loadFirstDrift(LaneSource<const ReducedEvaluation> nodes) {
+  loadDrift(nodes,
+            [](const ReducedEvaluation& node, size_t i) -> const ClusterState& { return node.mid->clusters[i]; });
+}
+
+void ReducedKernel::loadLastDrift(LaneSource<const ReducedEvaluation> nodes) {
+  loadDrift(nodes,
+            [](const ReducedEvaluation& node, size_t i) -> const ClusterState& { return node.clusters[i].next; });
+  for (size_t i = 0; i < clusters_.size(); ++i)
+    gatherLanes(nodes.count, clusters_[i].v_next.size(), clusters_[i].v_next.data(),
+                [&](int l) { return nodes[l].clusters[i].v_next.data(); });
+}
+
+void ReducedKernel::storeMidpoint(const StepItem* items, int count) {
+  scatterLanes(getNumbers(ws_.X_WB.front()), 12 * model_.numBodies(), count,
+               [&](int l) { return getNumbers(items[l].at->mid->X_WB.front()); });
+  scatterLanes(ws_.q.data(), ws_.q.size(), count, [&](int l) { return items[l].at->q_mid.data(); });
+  scatterLanes(v_.data(), v_.size(), count, [&](int l) { return items[l].at->mid->v.data(); });
+  for (size_t i = 0; i < clusters_.size(); ++i)
+    storeState(clusters_[i].next, count, [&](int l) { return &items[l].at->mid->clusters[i]; });
+}
+
+void ReducedKernel::storeForeseen(const StepItem* items, int count) {
+  scatterLanes(a_.data(), a_.size(), count, [&](int l) { return items[l].at->mid->a.data(); });
+  scatterLanes(closure_forces_.data(), closure_forces_.size(), count,
+               [&](int l) { return items[l].at->mid->lambda.data(); });
+  for (int l = 0; l < count; ++l) storeContactForces(layout_.contacts[items[l].node], l, items[l].at->mid->lambda);
 }
 
 void ReducedKernel::storeStep(const StepItem* items, int count) {
@@ -218,11 +273,22 @@ void ReducedKernel::storeStep(const StepItem* items, int count) {
     scatterLanes(c.v_next.data(), c.v_next.size(), count,
                  [&](int l) { return items[l].at->clusters[i].v_next.data(); });
   }
+  if (getPoint(*items->spec) == Point::Midpoint)
+    scatterLanes(v_mid_.data(), v_mid_.size(), count, [&](int l) { return items[l].at->v_mid.data(); });
   scatterLanes(system_.L().data(), system_.L().size(), count, [&](int l) { return items[l].at->factors.L.data(); });
-  for (int l = 0; l < count; ++l) storeSystem(items[l], l);
+  for (int l = 0; l < count; ++l) {
+    storeContactForces(layout_.contacts[items[l].node], l, items[l].at->lambda);
+    storeSystem(items[l], l);
+  }
 }
 
-// The rows of the system that a node has, and its contact forces.
+void ReducedKernel::storeContactForces(const ContactLayout& layout, int lane, VectorXd& lambda) const {
+  for (const ContactLayout::Contact& contact : layout.contacts)
+    for (int r = 0; r < contact.rows; ++r)
+      lambda[layout.closure_rows + contact.row + r] = contact_forces_[6 * contact.slot + r][lane];
+}
+
+// The rows of the system that a node has.
 void ReducedKernel::storeSystem(const StepItem& item, int lane) {
   const ContactLayout& layout = layout_.contacts[item.node];
   SaddlePointFactors& factors = item.at->factors;
@@ -230,7 +296,6 @@ void ReducedKernel::storeSystem(const StepItem& item, int lane) {
   for (const ContactLayout::Contact& contact : layout.contacts)
     for (int r = 0; r < contact.rows; ++r) {
       const int row = contact.row + r, from = 6 * contact.slot + r;
-      item.at->lambda[layout.closure_rows + row] = contact_forces_[from][lane];
       factors.D[row] = system_.D()[from][lane];
       for (Eigen::Index k = 0; k < W.cols(); ++k) factors.Wt(k, row) = W(from, k)[lane];
       for (const ContactLayout::Contact& other : layout.contacts)
@@ -270,32 +335,45 @@ void ReducedKernel::storeColumns(int count, std::vector<LaneView>& views) const 
   for (int l = 0; l < count; ++l) views[l].ws.stage = WorkspaceStage::Velocity;
 }
 
-void ReducedKernel::storeDerivatives(int count, std::vector<LaneView>& views) const {
-  const auto store = [&](const auto& from, const auto& get) {
-    scatterLanes(from.data(), from.size(), count, [&](int l) { return get(views[l]).data(); });
-  };
+void ReducedKernel::storeAcceleration(int count, std::vector<LaneView>& views,
+                                      LaneView::Acceleration LaneView::*to) const {
   const Eigen::Index nr = reduction_.size, nu = model_.nu(), rows = roundUpToLane(nu + 2 * nr);
   for (Eigen::Index i = 0; i < nr; ++i) {
     const auto storeRow = [&](const MatrixX<Lanes>& A, Eigen::Index row) {
       scatterLanes(
-          &A(i, 0), nr, count, [&](int l) { return &views[l].dydd[i * rows + row]; }, nr);
+          &A(i, 0), nr, count, [&](int l) { return &(views[l].*to).dydd[i * rows + row]; }, nr);
     };
     storeRow(A_y_, nu);
     storeRow(A_v_, nu + nr);
   }
-  for (size_t i = 0; i < clusters_.size(); ++i) {
-    const ClusterLanes& c = clusters_[i];
-    store(c.q_y, [i](LaneView& view) -> MatrixXd& { return view.clusters[i].q_y; });
-    store(c.q_v, [i](LaneView& view) -> MatrixXd& { return view.clusters[i].q_v; });
-    store(c.v_y, [i](LaneView& view) -> MatrixXd& { return view.clusters[i].v_y; });
-    store(c.v_v, [i](LaneView& view) -> MatrixXd& { return view.clusters[i].v_v; });
-    store(c.gap.y, [i](LaneView& view) -> VectorXd& { return view.clusters[i].gap; });
-    store(c.gap.y_v, [i](LaneView& view) -> VectorXd& { return view.clusters[i].gap_v; });
-  }
+  const auto store = [&](const Matrix6X<Lanes>& from, const auto& get) {
+    scatterLanes(from.data(), from.size(), count, [&](int l) { return get(views[l].*to).data(); });
+  };
   for (size_t i = 0; i < contacts_.size(); ++i) {
     if (!contacts_[i].used) continue;
-    store(contacts_[i].dy, [i](LaneView& view) -> Matrix6Xd& { return view.contacts[i].dy; });
-    store(contacts_[i].dv, [i](LaneView& view) -> Matrix6Xd& { return view.contacts[i].dv; });
+    store(contacts_[i].dy, [i](LaneView::Acceleration& out) -> Matrix6Xd& { return out.contacts[i].dy; });
+    store(contacts_[i].dv, [i](LaneView::Acceleration& out) -> Matrix6Xd& { return out.contacts[i].dv; });
+  }
+}
+
+void ReducedKernel::storeDrift(int count, std::vector<LaneView>& views, LaneView::Drift LaneView::Cluster::*to) const {
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    const ClusterLanes& c = clusters_[i];
+    const auto store = [&](const MatrixX<Lanes>& from, MatrixXd LaneView::Drift::*member) {
+      scatterLanes(from.data(), from.size(), count, [&](int l) { return (views[l].clusters[i].*to.*member).data(); });
+    };
+    store(c.q_y, &LaneView::Drift::q_y);
+    store(c.q_v, &LaneView::Drift::q_v);
+    store(c.v_y, &LaneView::Drift::v_y);
+    store(c.v_v, &LaneView::Drift::v_v);
+  }
+}
+
+void ReducedKernel::storeGaps(int count, std::vector<LaneView>& views) const {
+  for (size_t i = 0; i < clusters_.size(); ++i) {
+    const ClusterGapOf<Lanes>& gap = clusters_[i].gap;
+    scatterLanes(gap.y.data(), gap.y.size(), count, [&](int l) { return views[l].clusters[i].gap.data(); });
+    scatterLanes(gap.y_v.data(), gap.y_v.size(), count, [&](int l) { return views[l].clusters[i].gap_v.data(); });
   }
 }
 
