@@ -10,7 +10,7 @@ COMMANDS = {
     "squat": ["squat", "--depth", "0.7"],
     "squat full": ["squat", "--depth", "0.8", "--formulation", "full"],
     "walk": ["walk", "--speed", "0.4", "--steps", "3"],
-    "limited": ["squat", "--depth", "0.8", "--limits", "log", "--limit", "motor_knee_left=22"],
+    "limited": ["squat", "--depth", "0.8", "--limit", "motor_knee_left=22", "--velocity-limit", "motor_knee_left=3"],
     "serial": ["squat", "--depth", "0.8", "--model", "serial"],
     "jump": ["jump", "--flight", "0.2", "--set", "time_step=0.01"],
     "stairs stopped": ["stairs", "--height", "0.04", "--stairs", "1", "--max-iterations", "3"],

@@ -1,4 +1,4 @@
-// Limits of motors: motions satisfy them, at a higher cost.
+// Limits of motors and joints: motions satisfy them, at a higher cost.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <fstream>
@@ -21,9 +21,9 @@ const Model& getBipetto() {
   return model;
 }
 
-FddpSummary solve(Motion& motion, ControlBounds bounds) {
+FddpSummary solve(Motion& motion) {
   FddpOptions options;
-  options.bounds = bounds;
+  if (motion.bounded) options.bounds = ControlBounds::Enforce;
   return Fddp(options).solve(*motion.problem, motion.guess);
 }
 
@@ -41,17 +41,38 @@ double calcPeakVelocity(const Motion& motion, const std::string& motor) {
   return peak;
 }
 
+double calcPeakPower(const Motion& motion, const std::string& motor) {
+  const int m = getBipetto().findMotor(motor), i = getBipetto().nq() + getBipetto().motors()[m].dof;
+  double peak = 0;
+  for (size_t k = 0; k < motion.guess.us.size(); ++k)
+    peak = std::max(peak, std::abs(motion.guess.us[k][m] * motion.guess.xs[k][i]));
+  return peak;
+}
+
+// A copy of Bipetto with other ranges of the hips.
+std::string replaceRange(const testing::RobotDirectory& directory, const std::string& text) {
+  const auto read = [](const std::string& name) {
+    std::ifstream file(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto/" + name);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  const std::string urdf = read("bipetto.urdf");
+  const std::regex range("lower=\"-0.523599\" upper=\"0.523599\"");
+  REQUIRE(std::regex_search(urdf, range));
+  return directory.writeRobot(std::regex_replace(urdf, range, text), read("bipetto.yaml"));
+}
+
 template <typename Make>
 void checkKneesAtFourFifths(const Make& make) {
   const char* const knees[] = {"motor_knee_left", "motor_knee_right"};
   Motion free = make(ProblemOptions());
-  const FddpSummary without = solve(free, ControlBounds::Ignore);
+  const FddpSummary without = solve(free);
   REQUIRE(without.termination == FddpTermination::Converged);
   LimitOptions limits;
-  limits.barrier = LimitBarrier::Quadratic;
   for (const char* knee : knees) limits.efforts[knee] = 0.8 * calcPeakTorque(free, knee);
   Motion bounded = make(ProblemOptions(Formulation::Reduced, limits));
-  const FddpSummary with = solve(bounded, ControlBounds::Enforce);
+  CHECK(bounded.bounded);
+  CHECK(!free.bounded);
+  const FddpSummary with = solve(bounded);
   CAPTURE(with.message, with.iterations);
   CHECK(with.termination == FddpTermination::Converged);
   CHECK(with.cost > without.cost);
@@ -77,46 +98,96 @@ TEST_CASE("limits: a jump with four fifths of the torque that its knees would li
   checkKneesAtFourFifths([&](const ProblemOptions& problem) { return makeJump(getBipetto(), options, problem); });
 }
 
-TEST_CASE("limits: barriers hold motor velocities back") {
+TEST_CASE("limits: motors keep to their velocity, and use it") {
   SquatOptions options;
   options.duration = 1.2;
   const std::string motor = "motor_knee_right";
   Motion free = makeSquat(getBipetto(), options);
-  REQUIRE(solve(free, ControlBounds::Ignore).termination == FddpTermination::Converged);
-  const double peak = calcPeakVelocity(free, motor);
-  for (LimitBarrier barrier : {LimitBarrier::Quadratic, LimitBarrier::Logarithmic}) {
-    CAPTURE(static_cast<int>(barrier), peak);
+  const FddpSummary without = solve(free);
+  REQUIRE(without.termination == FddpTermination::Converged);
+  const double limit = 0.7 * calcPeakVelocity(free, motor);
+  for (Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
+    CAPTURE(getName(formulation), limit);
     LimitOptions limits;
-    limits.barrier = barrier;
-    limits.velocities = {{motor, 0.7 * peak}, {"motor_knee_left", 0.7 * peak}};
-    Motion slow = makeSquat(getBipetto(), options, {Formulation::Reduced, limits});
-    CHECK(solve(slow, ControlBounds::Enforce).termination == FddpTermination::Converged);
-    const double reached = calcPeakVelocity(slow, motor);
-    CHECK(reached < 0.8 * peak);
-    CHECK(reached > 0.3 * peak);
+    limits.velocities = {{motor, limit}, {"motor_knee_left", limit}};
+    Motion slow = makeSquat(getBipetto(), options, {formulation, limits});
+    const FddpSummary with = solve(slow);
+    CHECK(with.termination == FddpTermination::Converged);
+    CHECK(with.cost > without.cost);
+    CHECK(calcPeakVelocity(slow, motor) <= (1 + 1e-8) * limit);
+    CHECK(calcPeakVelocity(slow, motor) > (1 - 1e-6) * limit);
   }
 }
 
-TEST_CASE("limits: joint ranges of the model get a barrier at every node, and no limits change nothing") {
+TEST_CASE("limits: motors keep to their power, and use it") {
+  JumpOptions options;
+  options.time_step = 0.01;
+  const std::vector<std::string> knees = {"motor_knee_left", "motor_knee_right"};
+  Motion free = makeJump(getBipetto(), options);
+  const FddpSummary without = solve(free);
+  REQUIRE(without.termination == FddpTermination::Converged);
+  const double limit = 0.8 * calcPeakPower(free, knees[0]);
   LimitOptions limits;
-  limits.barrier = LimitBarrier::Logarithmic;
-  const Motion with = makeSquat(getBipetto(), {}, {Formulation::Reduced, limits});
-  const Motion without = makeSquat(getBipetto());
-  for (int k : {0, with.problem->numStages()}) {
-    const std::vector<Cost>&costs = with.problem->spec(k).costs, &fewer = without.problem->spec(k).costs;
-    REQUIRE(costs.size() == fewer.size() + 1);
-    CHECK(costs.back().name == "joint ranges");
-    CHECK(costs.back().residual->size() == 2);  // hipx_left and hipx_right
+  for (const std::string& knee : knees) limits.powers[knee] = limit;
+  Motion weak = makeJump(getBipetto(), options, {Formulation::Reduced, limits});
+  const FddpSummary with = solve(weak);
+  CAPTURE(with.message, with.iterations);
+  CHECK(with.termination == FddpTermination::Converged);
+  CHECK(with.cost > without.cost);
+  for (const std::string& knee : knees) {
+    CAPTURE(knee, limit);
+    CHECK(calcPeakPower(weak, knee) <= (1 + 1e-8) * limit);
+    CHECK(calcPeakPower(weak, knee) > (1 - 1e-6) * limit);
+  }
+}
+
+TEST_CASE("limits: joint ranges hold at every node but the first, and none without limits") {
+  const Motion with = makeSquat(getBipetto());
+  LimitOptions none;
+  none.enforced = false;
+  const Motion without = makeSquat(getBipetto(), {}, {Formulation::Reduced, none});
+  const auto countRanges = [](const Motion& motion, int node) {
+    int count = 0;
+    for (const PathConstraint& constraint : motion.problem->spec(node).path_constraints)
+      count += constraint.name == "range of hipx_left" || constraint.name == "range of hipx_right";
+    return count;
+  };
+  for (int k : {0, 1, with.problem->numStages()}) {
+    CHECK(countRanges(with, k) == (k == 0 ? 0 : 2));
+    CHECK(countRanges(without, k) == 0);
   }
   VectorXd lower(getBipetto().nu()), upper(getBipetto().nu());
   with.problem->getControlBounds(0, lower, upper);
   CHECK(upper.minCoeff() == std::numeric_limits<double>::infinity());
 }
 
+TEST_CASE("limits: a joint stays within its range, and uses it") {
+  WalkOptions options;
+  options.steps = 3;
+  Motion wide = makeWalk(getBipetto(), options);
+  REQUIRE(solve(wide).termination == FddpTermination::Converged);
+  const int q = getBipetto().joints()[getBipetto().findJoint("hipx_left")].idx_q;
+  const auto calcLargest = [q](const Motion& motion) {
+    double largest = -1;
+    for (const VectorXd& x : motion.guess.xs) largest = std::max(largest, x[q]);
+    return largest;
+  };
+  const double limit = 0.8 * calcLargest(wide);
+  REQUIRE(limit > 0.05);
+  const testing::RobotDirectory directory;
+  const Model model =
+      loadRobot(replaceRange(directory, "lower=\"-0.523599\" upper=\"" + std::to_string(limit) + "\"")).model;
+  Motion narrow = makeWalk(model, options);
+  const FddpSummary summary = solve(narrow);
+  CAPTURE(summary.message, summary.iterations, limit);
+  CHECK(summary.termination == FddpTermination::Converged);
+  CHECK(calcLargest(narrow) <= limit + 1e-6);
+  CHECK(calcLargest(narrow) > limit - 1e-5);
+}
+
 TEST_CASE("limits: impossible ones are refused by name") {
   const auto make = [](const std::string& motor, double effort) {
     LimitOptions limits;
-    limits.barrier = LimitBarrier::Quadratic;
     limits.efforts[motor] = effort;
     return makeSquat(getBipetto(), {}, {Formulation::Reduced, limits});
   };
@@ -127,23 +198,17 @@ TEST_CASE("limits: impossible ones are refused by name") {
   CHECK_THROWS_WITH(make("motor_knee_left", std::nan("")), Catch::Contains("not positive"));
 }
 
-TEST_CASE("limits: a range without width has no scale, and is refused") {
-  std::ifstream file(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto/bipetto.urdf");
-  std::ifstream parameters(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto/bipetto.yaml");
-  const std::string urdf(std::istreambuf_iterator<char>(file), {}),
-      yaml(std::istreambuf_iterator<char>(parameters), {});
-  const std::regex range("lower=\"-0.523599\" upper=\"0.523599\"");
-  REQUIRE(std::regex_search(urdf, range));
-  const testing::RobotDirectory directory;
-  const Model model =
-      loadRobot(directory.writeRobot(std::regex_replace(urdf, range, "lower=\"0.1\" upper=\"0.1\""), yaml)).model;
-  for (LimitBarrier barrier : {LimitBarrier::Quadratic, LimitBarrier::Logarithmic}) {
-    LimitOptions limits;
-    limits.barrier = barrier;
-    CHECK_THROWS_WITH(makeSquat(model, {}, ProblemOptions(Formulation::Reduced, limits)),
-                      Catch::Contains("joint 'hipx_") && Catch::Contains("has no width"));
+TEST_CASE("limits: a range without width, or without the starting posture, is refused") {
+  for (const auto& [range, problem] :
+       {std::pair("lower=\"0.1\" upper=\"0.1\"", "has no width"),
+        std::pair("lower=\"0.1\" upper=\"0.2\"", "does not hold the starting posture")}) {
+    const testing::RobotDirectory directory;
+    const Model model = loadRobot(replaceRange(directory, range)).model;
+    CHECK_THROWS_WITH(makeSquat(model), Catch::Contains("joint 'hipx_") && Catch::Contains(problem));
+    LimitOptions none;
+    none.enforced = false;
+    CHECK_NOTHROW(makeSquat(model, {}, {Formulation::Reduced, none}));
   }
-  CHECK_NOTHROW(makeSquat(model));
 }
 
 TEST_CASE("costs: bounds of a barrier that do not have the size of its residual are refused") {
@@ -158,5 +223,4 @@ TEST_CASE("costs: bounds of a barrier that do not have the size of its residual 
   expectRefusal([](Activation& a) { a.lower.conservativeResize(2); });
   expectRefusal([](Activation& a) { a.upper.resize(0); });
   expectRefusal([](Activation& a) { a.weights.conservativeResize(5); });
-  expectRefusal([](Activation& a) { a.kind = ActivationKind::LogBarrier; });  // without its relaxation
 }

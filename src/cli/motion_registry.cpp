@@ -121,8 +121,13 @@ MotionRequest makeSequenceRequest(const std::vector<std::string>& motions) {
 MotionRequest remakeRequest(const MotionSummary& summary) {
   const MotionRequest request = summary.motion == kSequence ? makeSequenceRequest(listParts(summary.requested))
                                                             : findMotion(summary.file, summary.motion).makeRequest();
+  const auto isLimit = [](const std::string& name) {
+    for (const char* prefix : {kEffortLimit, kVelocityLimit, kPowerLimit})
+      if (name.rfind(prefix, 0) == 0) return true;
+    return false;
+  };
   for (const auto& [name, value] : summary.requested)
-    if (name.rfind(kEffortLimit, 0) != 0 && name.rfind(kVelocityLimit, 0) != 0) setOption(request.options, name, value);
+    if (!isLimit(name)) setOption(request.options, name, value);
   return request;
 }
 

@@ -25,8 +25,8 @@ struct SolveArguments {
   ProblemOptions problem;
   bool serial = false;
   std::string serial_armature = "1e-3";
-  std::vector<std::string> settings;                        // name=value
-  std::vector<std::string> effort_limits, velocity_limits;  // motor=value
+  std::vector<std::string> settings;                                      // name=value
+  std::vector<std::string> effort_limits, velocity_limits, power_limits;  // motor=value
   FddpOptions solver;
   std::string warm_start;  // directory of a result, or empty
   bool quiet = false, no_check = false, no_report = false;
@@ -44,15 +44,16 @@ void watchSignals() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
-// A limit for one motor enables the limits of all.
 LimitOptions makeLimits(const SolveArguments& arguments) {
   LimitOptions limits = arguments.problem.limits;
   for (const std::string& setting : arguments.effort_limits)
     limits.efforts.insert(parseSetting("--limit", setting, "motor_knee_right=12"));
   for (const std::string& setting : arguments.velocity_limits)
     limits.velocities.insert(parseSetting("--velocity-limit", setting, "motor_knee_right=15"));
-  if (!limits.areEnforced() && !(limits.efforts.empty() && limits.velocities.empty()))
-    limits.barrier = LimitBarrier::Quadratic;
+  for (const std::string& setting : arguments.power_limits)
+    limits.powers.insert(parseSetting("--power-limit", setting, "motor_knee_right=40"));
+  requireOption(limits.enforced || !limits.areGiven(), "no-limits", "it contradicts a limit given for a motor",
+                "leave out one of them");
   return limits;
 }
 
@@ -124,9 +125,10 @@ void warnOfMissedGoals(const MotionResult& result) {
 // The limits given by motor are listed with the other options.
 Motion makeLimited(const MotionRequest& request, const Model& model, const ProblemOptions& problem) {
   Motion motion = makeMotion(model, request.plan(model, makeStandingPosture(model)), problem);
-  for (const auto& [motor, value] : problem.limits.efforts) motion.requested.emplace_back(kEffortLimit + motor, value);
-  for (const auto& [motor, value] : problem.limits.velocities)
-    motion.requested.emplace_back(kVelocityLimit + motor, value);
+  const LimitOptions& limits = problem.limits;
+  for (const auto& [motor, value] : limits.efforts) motion.requested.emplace_back(kEffortLimit + motor, value);
+  for (const auto& [motor, value] : limits.velocities) motion.requested.emplace_back(kVelocityLimit + motor, value);
+  for (const auto& [motor, value] : limits.powers) motion.requested.emplace_back(kPowerLimit + motor, value);
   return motion;
 }
 
@@ -196,12 +198,11 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
         makeSerialModel(robot.model, makeStandingPosture(robot.model), parseSerialArmature(arguments.serial_armature));
     printSerialModel(*serial);
   }
-  const LimitOptions limits = makeLimits(arguments);
   const Model& model = serial ? serial->model : robot.model;
-  const ProblemOptions problem{arguments.problem.formulation, limits};
+  const ProblemOptions problem{arguments.problem.formulation, makeLimits(arguments)};
   Motion motion = makeLimited(request, model, problem);
   FddpOptions solver = arguments.solver;
-  if (limits.areEnforced()) solver.bounds = ControlBounds::Enforce;
+  if (motion.bounded) solver.bounds = ControlBounds::Enforce;
   if (!arguments.warm_start.empty()) setGuess(readResultRecord(arguments.warm_start), motion);
   makeOutputDirectory(arguments.directory);
 
@@ -239,25 +240,17 @@ void addPresets(CLI::App& sub, const std::shared_ptr<MotionRequest>& request) {
 }
 
 void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
-  const std::map<std::string, LimitBarrier> kinds = {{"quadratic", LimitBarrier::Quadratic},
-                                                     {"log", LimitBarrier::Logarithmic}};
   LimitOptions& limits = arguments->problem.limits;
-  sub.add_option_function<std::string>(
-         "--limits", [&limits, kinds](const std::string& name) { limits.barrier = kinds.at(name); },
-         "keep to the robot's limits: torques exactly, joint ranges and motor velocities by barriers, which are "
-         "`quadratic` (nothing inside, but for the last hundredth) or `log` (keeps away from them)")
-      ->check(CLI::IsMember(std::vector<std::string>{"quadratic", "log"}));
+  sub.add_flag("--no-limits{false}", limits.enforced,
+               "ignore the robot's limits of torques, joint ranges and velocities, which motions keep otherwise");
   sub.add_option("--limit", arguments->effort_limits,
-                 "motor=largest torque [N m] in place of the robot's; implies --limits quadratic; may be repeated")
+                 "motor=largest torque [N m] in place of the robot's; may be repeated")
       ->allow_extra_args(false);
   sub.add_option("--velocity-limit", arguments->velocity_limits, "motor=largest velocity [rad/s], likewise")
       ->allow_extra_args(false);
-  sub.add_option("--limit-weight", limits.quadratic_weight, "of quadratic barriers, over the limit squared")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  sub.add_option("--log-weight", limits.logarithmic_weight, "of logarithmic barriers")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  sub.add_option("--power-limit", arguments->power_limits,
+                 "motor=largest mechanical power [W], driving or braking; may be repeated")
+      ->allow_extra_args(false);
 }
 
 // Flags are written with hyphens.

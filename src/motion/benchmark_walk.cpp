@@ -171,6 +171,7 @@ Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o, Form
   x0.head(model.nq()) = scene.q0;
   plan.guess.xs.assign(stages.size(), x0);
   plan.q_start = plan.q_end = scene.q0;
+  plan.limited = false;
   plan.requested = {{"speed", o.speed}, {"step_height", o.step_height}, {"total_nodes", double(o.total_nodes)}};
   return makeMotion(model, std::move(plan), formulation);
 }

@@ -301,6 +301,7 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
   plan.name = "jump";
   plan.ground.height = scene.before.front().X_WT.p.z();
   plan.ground.friction = options.friction;
+  plan.limited = options.published == 0;
   std::vector<StageSpec>& stages = plan.stages;
   const double g = model.gravity().norm();
   const GroundCosts ground{options.force_weight, options.pressure_weight,

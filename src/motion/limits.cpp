@@ -7,23 +7,16 @@
 namespace bielle {
 namespace {
 
-// Limits of coordinates, with the scale s of each.
-struct Bounds {
-  std::vector<int> dofs;
-  std::vector<double> lower, upper;
+// A limit of a coordinate or of a motor's power.
+struct Bound {
+  std::string name;
+  int index = 0;  // dof or motor
+  double lower = 0, upper = 0;
 
-  void add(int dof, double low, double high) {
-    dofs.push_back(dof);
-    lower.push_back(low);
-    upper.push_back(high);
-  }
-  double getScale(size_t i) const {
-    const double width = upper[i] - lower[i];
-    return std::isfinite(width) ? 0.5 * width : 1;
-  }
+  double getScale() const { return std::isfinite(upper - lower) ? 0.5 * (upper - lower) : 1; }
 };
 
-// Values by motor: those of the model, except those given by name.
+// Values by motor: those given, except where they are replaced by name.
 VectorXd replaceByName(const Model& model, VectorXd values, const std::map<std::string, double>& given,
                        const std::string& what) {
   for (const auto& [name, value] : given) {
@@ -40,64 +33,76 @@ VectorXd replaceByName(const Model& model, VectorXd values, const std::map<std::
   return values;
 }
 
-Bounds listRanges(const Model& model) {
-  Bounds bounds;
+VectorXd getEfforts(const Model& model, const LimitOptions& options) {
+  VectorXd efforts(model.nu());
+  for (int m = 0; m < model.nu(); ++m) efforts[m] = model.motors()[m].effort_limit;
+  return replaceByName(model, efforts, options.efforts, "effort");
+}
+
+std::vector<Bound> listRanges(const Model& model, const VectorXd& q0) {
+  std::vector<Bound> bounds;
   for (int k = 0; k < model.nv(); ++k) {
     const double lower = model.lowerLimits()[k], upper = model.upperLimits()[k];
     const Joint& joint = model.joints()[model.dofs()[k].joint];
     if (joint.nv != 1 || !(std::isfinite(lower) || std::isfinite(upper))) continue;
+    const std::string element = "joint '" + joint.name + "'";
     if (lower == upper)
-      throw ModelError(model.name(), "joint '" + joint.name + "'",
-                       "its range has no width, so that no barrier can keep it",
+      throw ModelError(model.name(), element, "its range has no width, so that no constraint can keep it",
                        "make the joint fixed, or widen its range");
-    bounds.add(k, lower, upper);
+    const double q = q0[joint.idx_q];
+    if (q < lower || q > upper)
+      throw ModelError(model.name(), element,
+                       "its range does not hold the starting posture, where it is at " + std::to_string(q),
+                       "widen its range, or start elsewhere");
+    bounds.push_back({"range of " + joint.name, k, lower, upper});
   }
   return bounds;
 }
 
-Bounds listVelocities(const Model& model, const LimitOptions& options) {
-  VectorXd limits(model.nu());
-  for (int m = 0; m < model.nu(); ++m) limits[m] = model.velocityLimits()[model.motors()[m].dof];
-  limits = replaceByName(model, limits, options.velocities, "velocity");
-  Bounds bounds;
-  for (int m = 0; m < model.nu(); ++m)
-    if (std::isfinite(limits[m])) bounds.add(model.motors()[m].dof, -limits[m], limits[m]);
+std::vector<Bound> listVelocities(const Model& model, const LimitOptions& options) {
+  VectorXd limits = model.velocityLimits(), of_motors(model.nu());
+  for (int m = 0; m < model.nu(); ++m) of_motors[m] = limits[model.motors()[m].dof];
+  of_motors = replaceByName(model, of_motors, options.velocities, "velocity");
+  for (int m = 0; m < model.nu(); ++m) limits[model.motors()[m].dof] = of_motors[m];
+  std::vector<Bound> bounds;
+  for (int k = 0; k < model.nv(); ++k)
+    if (std::isfinite(limits[k]))
+      bounds.push_back({"velocity of " + model.joints()[model.dofs()[k].joint].name, k, -limits[k], limits[k]});
   return bounds;
 }
 
-// Eq. (1) or (2)
-void addBarrier(const LimitOptions& options, const std::string& name, const Bounds& bounds,
-                std::unique_ptr<Residual> residual, StageSpec& stage) {
-  const int n = static_cast<int>(bounds.dofs.size());
-  VectorXd scale(n);
-  for (int i = 0; i < n; ++i) scale[i] = bounds.getScale(i);
-  const VectorXd lower = VectorXd::Map(bounds.lower.data(), n), upper = VectorXd::Map(bounds.upper.data(), n);
-  if (options.barrier == LimitBarrier::Quadratic)
-    stage.costs.push_back(
-        {name, options.quadratic_weight,
-         Activation::makeBarrier(scale.cwiseAbs2().cwiseInverse(), lower + options.quadratic_margin * scale,
-                                 upper - options.quadratic_margin * scale),
-         std::move(residual)});
-  else
-    stage.costs.push_back({name, options.logarithmic_weight,
-                           Activation::makeLogBarrier(VectorXd::Ones(n), lower, upper, options.margin * scale),
-                           std::move(residual)});
+std::vector<Bound> listPowers(const Model& model, const LimitOptions& options) {
+  const double none = std::numeric_limits<double>::infinity();
+  const VectorXd limits = replaceByName(model, VectorXd::Constant(model.nu(), none), options.powers, "power");
+  std::vector<Bound> bounds;
+  for (int m = 0; m < model.nu(); ++m)
+    if (std::isfinite(limits[m])) bounds.push_back({"power of " + model.motors()[m].name, m, -limits[m], limits[m]});
+  return bounds;
+}
+
+void addConstraint(const Bound& bound, std::unique_ptr<Residual> residual, StageSpec& stage) {
+  const auto make = [](double value) { return VectorXd::Constant(1, value); };
+  stage.path_constraints.push_back(
+      {bound.name, std::move(residual), make(bound.lower), make(bound.upper), make(bound.getScale())});
 }
 
 }  // namespace
 
-void addLimits(const Model& model, const LimitOptions& options, std::vector<StageSpec>& stages) {
-  if (!options.areEnforced()) return;
-  VectorXd efforts(model.nu());
-  for (int m = 0; m < model.nu(); ++m) efforts[m] = model.motors()[m].effort_limit;
-  efforts = replaceByName(model, efforts, options.efforts, "effort");
-  const Bounds ranges = listRanges(model), velocities = listVelocities(model, options);
-  for (StageSpec& stage : stages) {
+bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& q0, std::vector<StageSpec>& stages) {
+  if (!options.enforced) return false;
+  const VectorXd efforts = getEfforts(model, options);
+  const std::vector<Bound> ranges = listRanges(model, q0), velocities = listVelocities(model, options),
+                           powers = listPowers(model, options);
+  for (size_t k = 0; k < stages.size(); ++k) {
+    StageSpec& stage = stages[k];
     stage.effort_limits = efforts;
-    if (!ranges.dofs.empty()) addBarrier(options, "joint ranges", ranges, makeJointPosition(model, ranges.dofs), stage);
-    if (!velocities.dofs.empty())
-      addBarrier(options, "motor velocities", velocities, makeJointVelocity(velocities.dofs), stage);
+    if (k == 0) continue;
+    for (const Bound& bound : ranges) addConstraint(bound, makeJointPosition(model, {bound.index}), stage);
+    for (const Bound& bound : velocities) addConstraint(bound, makeJointVelocity({bound.index}), stage);
+    if (k + 1 == stages.size() || stage.kind == StageKind::Impact) continue;
+    for (const Bound& bound : powers) addConstraint(bound, makeMotorPower(model, {bound.index}), stage);
   }
+  return efforts.array().isFinite().any();
 }
 
 }  // namespace bielle

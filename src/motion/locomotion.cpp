@@ -329,6 +329,7 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   plan.name = task.name;
   plan.ground = task.ground;
   plan.ground.friction = options.friction;
+  plan.limited = options.published == 0;
   size_t node = 0;
   for (const GaitPhase& phase : scene.gait.phases) {
     const std::vector<ContactTarget> contacts = makeTargets(scene, phase);

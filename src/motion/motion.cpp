@@ -54,8 +54,9 @@ void requirePositive(const std::vector<OptionEntry>& options, const std::vector<
 }
 
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options) {
-  addLimits(model, options.limits, plan.stages);
   Motion motion;
+  requireOption(plan.limited || !options.limits.areGiven(), "limit", "the paper's problem has none", "leave it out");
+  if (plan.limited) motion.bounded = addLimits(model, options.limits, plan.q_start, plan.stages);
   motion.name = std::move(plan.name);
   motion.schedule = std::move(plan.schedule);
   motion.ground = std::move(plan.ground);

@@ -100,6 +100,7 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
   for (const MotionPlan& plan : plans) checkSoles(model, plan, sequence.ground);
   sequence.q_start = q0;
   sequence.q_end = plans.back().q_end;
+  for (const MotionPlan& plan : plans) sequence.limited &= plan.limited;
   for (size_t i = 0; i < plans.size(); ++i) {
     MotionPlan& plan = plans[i];
     const int start = sequence.schedule.numStages();

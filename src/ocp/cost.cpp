@@ -1,66 +1,22 @@
 #include "bielle/ocp/cost.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace bielle {
 namespace {
 
-// Value and derivatives of a function of one number.
-struct Jet {
-  double value = 0, slope = 0, curvature = 0;
-};
-
-Jet calcSquare(double d) { return {0.5 * d * d, d, 1}; }
-
-// Half the squared distance outside [lower, upper].
-Jet calcExcess(double r, double lower, double upper) {
-  if (r < lower) return calcSquare(r - lower);
-  if (r > upper) return calcSquare(r - upper);
-  return {};
-}
-
-// The relaxed logarithm beta at the distance d.
-Jet calcLogarithm(double d, double delta) {
-  if (d > delta) return {-std::log(d / delta), -1 / d, 1 / (d * d)};
-  const double e = d / delta - 2;
-  return {0.5 * (e * e - 1), e / delta, 1 / (delta * delta)};
-}
-
-Jet calcLogBarrier(double r, double lower, double upper, double delta) {
-  Jet sum;
-  if (std::isfinite(lower)) sum = calcLogarithm(r - lower, delta);
-  if (!std::isfinite(upper)) return sum;
-  const Jet above = calcLogarithm(upper - r, delta);
-  return {sum.value + above.value, sum.slope - above.slope, sum.curvature + above.curvature};
-}
-
-// The term of row i, without its weight.
-Jet calcTerm(const Activation& activation, Eigen::Index i, double r) {
-  switch (activation.kind) {
-    case ActivationKind::Quadratic:
-      return calcSquare(r);
-    case ActivationKind::Barrier:
-      return calcExcess(r, activation.lower[i], activation.upper[i]);
-    case ActivationKind::LogBarrier:
-      return calcLogBarrier(r, activation.lower[i], activation.upper[i], activation.relaxation[i]);
-  }
-  return {};
+// The distance that counts in row i: of the residual, or of what is outside the bounds.
+double calcDistance(const Activation& activation, Eigen::Index i, double r) {
+  if (activation.kind == ActivationKind::Quadratic) return r;
+  return std::min(0.0, r - activation.lower[i]) + std::max(0.0, r - activation.upper[i]);
 }
 
 }  // namespace
 
-Activation Activation::makeQuadratic(const VectorXd& weights) {
-  return {ActivationKind::Quadratic, weights, {}, {}, {}};
-}
+Activation Activation::makeQuadratic(const VectorXd& weights) { return {ActivationKind::Quadratic, weights, {}, {}}; }
 
 Activation Activation::makeBarrier(const VectorXd& weights, const VectorXd& lower, const VectorXd& upper) {
-  return {ActivationKind::Barrier, weights, lower, upper, {}};
-}
-
-Activation Activation::makeLogBarrier(const VectorXd& weights, const VectorXd& lower, const VectorXd& upper,
-                                      const VectorXd& relaxation) {
-  return {ActivationKind::LogBarrier, weights, lower, upper, relaxation};
+  return {ActivationKind::Barrier, weights, lower, upper};
 }
 
 bool PathConstraint::hasSize(Eigen::Index rows) const {
@@ -68,22 +24,24 @@ bool PathConstraint::hasSize(Eigen::Index rows) const {
 }
 
 bool Activation::hasSize(Eigen::Index rows) const {
-  const bool barrier = kind != ActivationKind::Quadratic;
-  return weights.size() == rows && (!barrier || (lower.size() == rows && upper.size() == rows)) &&
-         (kind != ActivationKind::LogBarrier || relaxation.size() == rows);
+  return weights.size() == rows &&
+         (kind == ActivationKind::Quadratic || (lower.size() == rows && upper.size() == rows));
 }
 
 double Activation::calc(ConstVectorRef r) const {
   double sum = 0;
-  for (Eigen::Index i = 0; i < r.size(); ++i) sum += weights[i] * calcTerm(*this, i, r[i]).value;
+  for (Eigen::Index i = 0; i < r.size(); ++i) {
+    const double d = calcDistance(*this, i, r[i]);
+    sum += 0.5 * weights[i] * d * d;
+  }
   return sum;
 }
 
 void Activation::calcDerivatives(ConstVectorRef r, VectorRef gradient, VectorRef hessian) const {
   for (Eigen::Index i = 0; i < r.size(); ++i) {
-    const Jet term = calcTerm(*this, i, r[i]);
-    gradient[i] = weights[i] * term.slope;
-    hessian[i] = weights[i] * term.curvature;
+    const double d = calcDistance(*this, i, r[i]);
+    gradient[i] = weights[i] * d;
+    hessian[i] = kind == ActivationKind::Quadratic || d != 0 ? weights[i] : 0;
   }
 }
 

@@ -23,8 +23,8 @@
 ///
 /// With `published`, the problem is that of the paper's example code: feet are free in flight; at touchdown their costs
 /// are height, tilt and velocity; the load is the average of Eq. (2) while pushing and landing, the weight before and
-/// after; hips are weighted like other joints; contacts have the gains given, without limits; the terminal costs are
-/// the height and the heading of the base, and the joints of the legs (Model::serialJoints) with their velocities.
+/// after; hips are weighted like other joints; contacts have the gains given, without limits; limits of motors and joints do not
+/// apply; the terminal costs are the height and the heading of the base, and the joints of the legs (Model::serialJoints) with their velocities.
 #include "bielle/motion/motion.h"
 
 namespace bielle {

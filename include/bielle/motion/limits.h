@@ -1,13 +1,10 @@
 #pragma once
 /// \file Limits of motors and joints, for every motion.
 ///
-/// - Torques |u| <= effort limit, exactly: bounds of the controls, enforced by a solver with ControlBounds::Enforce.
-/// - Ranges of joints with one degree of freedom, and velocities of motors, by barriers. With s the scale of a limit
-///   (half the width of the range, 1 when it is open on one side; the velocity limit) and r the coordinate, either
-///       quadratic:    1/2 w (excess of r / s over bounds drawn in by `quadratic_margin`)^2,                    (1)
-///   which is zero inside and soft outside, where violations stay within the margin; or
-///       logarithmic:  -w (ln(distance to a bound / (margin s))), relaxed closer than margin s (cost.h),        (2)
-///   which keeps away from the bounds but also acts on all values inside them.
+/// - Torques |u| <= effort limit: bounds of the controls, enforced by a solver with ControlBounds::Enforce.
+/// - Ranges of joints with one degree of freedom, velocities, and powers |u v| of motors: path constraints at every node but the
+///   first, whose state is given. A violation of 1 is half the width of a range (1 rad or 1 m where one side is open), or the
+///   limit of a velocity or power.
 #include <map>
 #include <string>
 #include <vector>
@@ -16,23 +13,19 @@
 
 namespace bielle {
 
-enum class LimitBarrier { None, Quadratic, Logarithmic };
-
 struct LimitOptions {
-  LimitBarrier barrier = LimitBarrier::None;  ///< None: all limits, including torque, are ignored
-  double quadratic_weight = 1e5;              ///< w of Eq. (1), 1
-  double quadratic_margin = 0.01;             ///< of Eq. (1), 1
-  double logarithmic_weight = 1;              ///< w of Eq. (2), 1
-  double margin = 0.05;                       ///< of Eq. (2), 1
-  std::map<std::string, double> efforts;      ///< by motor, N m or N, replacing the limits of the model
-  std::map<std::string, double> velocities;   ///< by motor, rad/s or m/s, likewise
+  bool enforced = true;                      ///< false: all limits, including torque, are ignored
+  std::map<std::string, double> efforts;     ///< by motor, N m or N, replacing the limits of the model
+  std::map<std::string, double> velocities;  ///< by motor, rad/s or m/s, likewise
+  std::map<std::string, double> powers;      ///< by motor, W; driving or braking
 
-  bool areEnforced() const { return barrier != LimitBarrier::None; }
+  bool areGiven() const { return !(efforts.empty() && velocities.empty() && powers.empty()); }
 };
 
-/// Sets the effort limits of the stages and adds the barriers to them.
-/// \throws ModelError for an unknown motor, a limit that is not positive, or a joint whose range has no width
-void addLimits(const Model& model, const LimitOptions& options, std::vector<StageSpec>& stages);
+/// Sets the effort limits of the stages and adds the path constraints to them. Returns whether a torque is limited.
+/// \param q0  configuration of the first node (nq)
+/// \throws ModelError for an unknown motor, a limit that is not positive, a joint whose range has no width or does not hold q0
+bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& q0, std::vector<StageSpec>& stages);
 
 /// Options of a problem besides those of the motion.
 struct ProblemOptions {

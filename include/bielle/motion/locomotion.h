@@ -21,7 +21,7 @@
 ///   velocity; its place, its heading and the path of a swing have no costs;
 /// - the force reference is the weight on one foot, half of it on each of two, and changes at once; forces and centres
 ///   of pressure are in the axes of the world;
-/// - contacts and closures have the gains given, without limits;
+/// - contacts and closures have the gains given, without limits; limits of motors and joints do not apply;
 /// - the only terminal costs are the velocities of the joints of the legs (Model::serialJoints);
 /// - the guess is the standing posture at rest, as high as the path of the centre of mass.
 #include "bielle/motion/footsteps.h"

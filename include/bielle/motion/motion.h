@@ -44,9 +44,10 @@ struct MotionPlan {
   std::string name;
   ContactSchedule schedule;
   Ground ground;
-  std::vector<StageSpec> stages;                          ///< N running stages and the terminal stage
-  ShootingTrajectory guess;                               ///< quasi-static
-  VectorXd q_start, q_end;                                ///< standing postures, nq
+  std::vector<StageSpec> stages;  ///< N running stages and the terminal stage
+  ShootingTrajectory guess;       ///< quasi-static
+  VectorXd q_start, q_end;        ///< standing postures, nq
+  bool limited = true;            ///< whether limits of the robot apply: not in the paper's problems
   std::vector<std::pair<std::string, double>> requested;  ///< every option by name
   std::vector<Goal> goals;                                ///< what is to come out, to be measured on the trajectory
 };
@@ -60,10 +61,11 @@ struct Motion {
   ShootingTrajectory guess;                               ///< quasi-static
   std::vector<std::pair<std::string, double>> requested;  ///< every option by name
   std::vector<Goal> goals;                                ///< what is to come out, to be measured on the trajectory
+  bool bounded = false;  ///< a torque is limited: to be solved with ControlBounds::Enforce
 };
 
 /// Turns a plan into a problem that starts at rest, adding the limits to its stages.
-/// \throws ModelError when a limit names no motor of the robot
+/// \throws ModelError as addLimits() does, or when limits are given for a problem of the paper, which has none
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options);
 
 /// Motor torques that hold the robot still at q under the closures and contacts, as far as possible: with a = v = 0,

@@ -4,26 +4,19 @@
 
 namespace bielle {
 
-enum class ActivationKind { Quadratic, Barrier, LogBarrier };
+enum class ActivationKind { Quadratic, Barrier };
 
 /// Scalar function of a residual r (n).
 ///   Quadratic:  1/2 sum_i w_i r_i^2
 ///   Barrier:    1/2 sum_i w_i (max(0, lower_i - r_i)^2 + max(0, r_i - upper_i)^2)
-///   LogBarrier: sum_i w_i (beta(r_i - lower_i) + beta(upper_i - r_i)), finite bounds only, relaxed within the distance
-///               delta_i so that it is defined everywhere and twice differentiable (Feller and Ebenbauer, "Relaxed
-///               logarithmic barrier function based model predictive control of linear systems", 2017):
-///                   beta(d) = -ln(d / delta)  for d > delta,    1/2 ((d / delta - 2)^2 - 1)  otherwise.
 struct Activation {
   ActivationKind kind = ActivationKind::Quadratic;
   VectorXd weights;       ///< n
   VectorXd lower, upper;  ///< n, barriers only
-  VectorXd relaxation;    ///< delta, n, positive, logarithmic barrier only
 
   static Activation makeQuadratic(const VectorXd& weights);
   static Activation makeBarrier(const VectorXd& weights, const VectorXd& lower, const VectorXd& upper);
-  static Activation makeLogBarrier(const VectorXd& weights, const VectorXd& lower, const VectorXd& upper,
-                                   const VectorXd& relaxation);
-  /// Whether weights, bounds and relaxation have the sizes that a residual of `rows` rows needs.
+  /// Whether weights and bounds have the sizes that a residual of `rows` rows needs.
   bool hasSize(Eigen::Index rows) const;
   double calc(ConstVectorRef r) const;
   /// Gradient (n) and diagonal of the Hessian (n) with respect to r.
