@@ -61,6 +61,13 @@ std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, 
   add("frame velocity", makeFrameVelocity(a, randomVector(rng, 6)));
   add("fly high", makeFlyHigh(a, 5, 0.1));
   add("frame distance", makeFrameDistance(a, b));
+  Ground ground;  // with a step whose ramp reaches under all of the robot
+  ground.height = -0.2;
+  ground.steps = {{Vector3d(0.1, -0.2, 0.3), 0.2, 0.3, 0.5}};
+  add("sole clearance", makeSoleClearance(a, 0.1, 0.05, ground, 3));
+  add("point clearance", makeSoleClearance(b, 0, 0, ground, 3));
+  const auto random = [&rng] { return Vector3d(randomVector(rng, 3, 0.2)); };
+  add("capsule distance", makeCapsuleDistance({a.body, random(), random(), 0.05}, {b.body, random(), random(), 0.02}));
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
     const int rows = getRows(set.closures[c].kind);
     add("contact force", makeContactForce(set, c, randomVector(rng, rows, 10)));
@@ -203,6 +210,69 @@ TEST_CASE("force residuals: a force at a known point of the sole") {
   lambda[row + 2] = 0.5;  // hardly loaded: bounded, and its derivative follows
   CHECK(node.calc(*makeCenterOfPressure(set, constraint), q, v, lambda).allFinite());
   checkResidual(model, set, *makeCenterOfPressure(set, constraint), q, v, lambda);
+}
+
+TEST_CASE("sole clearance: over steps, beside them and between") {
+  const Model model = loadRobot("bipetto").model;
+  const ConstraintSet set = makeConstraintSet(model);
+  const BodyFrame base{1, {}};
+  TestNode node(model, set);
+  Ground ground;
+  ground.steps = {{Vector3d(1, 0, 0.2), 0.4, 0.6, 0.3}, {Vector3d(1.4, 0.1, 0.3), 0.4, 0.6, 0.3}};
+  const double ramp = 0.05;
+  const auto residual = makeSoleClearance(base, 0.1, 0.05, ground, ramp);
+  std::mt19937 rng(15);
+  int equal = 0, less = 0;
+  for (int i = 0; i < 500; ++i) {
+    VectorXd q = model.makeNeutral();
+    q.head<3>() = Vector3d(1.2, 0, 0.5) + Vector3d(randomVector(rng, 3, 0.5));
+    const VectorXd r = node.calc(*residual, q, VectorXd::Zero(model.nv()), {});
+    int row = 0;
+    for (double x : {0.1, -0.1})
+      for (double y : {0.05, -0.05}) {
+        const Vector3d corner = q.head<3>() + Vector3d(x, y, 0);
+        const double height = corner.z() - ground.calcHeight(corner.x(), corner.y());
+        CHECK(r[row] <= height + 1e-12);
+        CHECK(r[row] >= height - 0.3);
+        (r[row] < height - 1e-9 ? less : equal) += 1;
+        ++row;
+      }
+  }
+  CHECK(equal > 1000);
+  CHECK(less > 50);
+}
+
+TEST_CASE("capsule distance: of segments that cross, pass, end and are points") {
+  const Model model = loadRobot("bipetto").model;
+  const ConstraintSet set = makeConstraintSet(model);
+  TestNode node(model, set);
+  const int body = 1;
+  const auto calc = [&](const Vector3d& a0, const Vector3d& a1, const Vector3d& b0, const Vector3d& b1) {
+    const auto residual = makeCapsuleDistance({body, a0, a1, 0.1}, {body, b0, b1, 0.3});
+    return node.calc(*residual, model.makeNeutral(), VectorXd::Zero(model.nv()), {})[0] + 0.4;
+  };
+  const Vector3d x = Vector3d::UnitX(), y = Vector3d::UnitY(), z = Vector3d::UnitZ();
+  CHECK(calc(-x, x, -y + 2 * z, y + 2 * z) == Approx(2));
+  CHECK(calc(-x, x, -y, y) == Approx(0).margin(1e-12));
+  CHECK(calc(Vector3d::Zero(), x, 3 * y, x + 3 * y) == Approx(3));
+  CHECK(calc(Vector3d::Zero(), x, 2 * x + y, 3 * x + y) == Approx(std::sqrt(2)));
+  CHECK(calc(Vector3d::Zero(), x, 4 * x, 5 * x) == Approx(3));
+  CHECK(calc(x, x, -y, y) == Approx(1));
+  CHECK(calc(-y, y, 3 * x, 3 * x) == Approx(3));
+  CHECK(calc(x, x, z, z) == Approx(std::sqrt(2)));
+  // Against a search over both segments.
+  std::mt19937 rng(16);
+  for (int i = 0; i < 20; ++i) {
+    const Vector3d a0 = randomVector(rng, 3), a1 = randomVector(rng, 3), b0 = randomVector(rng, 3),
+                   b1 = randomVector(rng, 3);
+    double least = 1e9;
+    const int steps = 300;
+    for (int s = 0; s <= steps; ++s)
+      for (int t = 0; t <= steps; ++t)
+        least = std::min(least, (a0 + s * (a1 - a0) / steps - b0 - t * (b1 - b0) / steps).norm());
+    CHECK(calc(a0, a1, b0, b1) <= least + 1e-12);
+    CHECK(calc(a0, a1, b0, b1) > least - 0.02);
+  }
 }
 
 TEST_CASE("joint positions without a list are those of the joints with one dof and finite limits") {

@@ -20,6 +20,12 @@ struct GroundStep {
     const double dx = x - top.x(), dy = y - top.y(), c = std::cos(yaw), s = std::sin(yaw);
     return std::abs(c * dx + s * dy) <= length / 2 && std::abs(c * dy - s * dx) <= width / 2;
   }
+  /// Horizontal distance of a point from the top, m.
+  double calcDistance(double x, double y) const {
+    const double dx = x - top.x(), dy = y - top.y(), c = std::cos(yaw), s = std::sin(yaw);
+    return std::hypot(std::max(0.0, std::abs(c * dx + s * dy) - length / 2),
+                      std::max(0.0, std::abs(c * dy - s * dx) - width / 2));
+  }
 };
 
 struct Ground {
