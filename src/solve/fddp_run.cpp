@@ -192,6 +192,7 @@ FddpRun::End FddpRun::raiseRegularization(const char* reason) {
   if (regularization_ <= options_.max_regularization) return {};
   summary_.message = std::string(reason) + " even at the largest regularization";
   if (!failure_.empty()) summary_.message += "; node " + std::to_string(failed_node_) + ": " + failure_;
+  if (!work_.lagrangian.isSatisfied()) summary_.message += "; " + work_.lagrangian.describeWorst(problem_);
   return FddpTermination::RegularizationMax;
 }
 
