@@ -216,15 +216,23 @@ TEST_CASE("the paper's walk: solved from its first guess, it ends below the pape
 TEST_CASE("the paper's walk: a wrong weight is noticed") {
   const std::optional<PaperWalk> reference = readReference();
   if (!reference) return;
-  for (const char* name : {"state_weight", "torso_weight", "control_weight", "com_height_weight", "com_velocity_weight",
-                           "fly_high_weight", "fly_high_slope", "landing_height_weight", "landing_rotation_weight",
-                           "landing_velocity_weight", "force_weight", "pressure_weight", "feet_distance_weight",
-                           "feet_distance", "terminal_weight", "speed", "contact_kd", "contact_kp", "closure_kd"}) {
+  const auto expectNotice = [&](const std::string& name, const std::function<void(WalkOptions&)>& change) {
     CAPTURE(name);
     WalkOptions options = makeOptions();
-    for (OptionEntry& entry : listOptions(options))
-      if (entry.name == name) *entry.value = *entry.value == 0 ? 1 : 1.001 * *entry.value;
+    change(options);
     Motion walk = makeWalk(*reference, options);
     CHECK(compareTerms(walk, reference->solution, reference->terms_of_solution).relative > 1e-6);
-  }
+  };
+  for (const char* name : {"state_weight", "torso_weight", "control_weight", "com_height_weight", "com_velocity_weight",
+                           "force_weight", "pressure_weight", "speed", "contact_kd", "contact_kp", "closure_kd"})
+    expectNotice(name, [name](WalkOptions& options) {
+      for (OptionEntry& entry : listOptions(options))
+        if (entry.name == name) *entry.value = *entry.value == 0 ? 1 : 1.001 * *entry.value;
+    });
+  for (double PaperWeights::*weight :
+       {&PaperWeights::fly_high, &PaperWeights::fly_high_slope, &PaperWeights::feet_distance,
+        &PaperWeights::feet_distance_weight, &PaperWeights::terminal})
+    expectNotice("of the paper alone", [weight](WalkOptions& options) { options.gait.paper.*weight *= 1.001; });
+  for (double LandingWeights::*weight : {&LandingWeights::height, &LandingWeights::tilt, &LandingWeights::velocity})
+    expectNotice("landing", [weight](WalkOptions& options) { options.gait.paper.landing.*weight *= 1.001; });
 }

@@ -4,6 +4,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "motion/foot_constraints.h"
 
 namespace bielle {
 namespace {
@@ -15,6 +16,7 @@ struct Scene {
   JumpFigures figures;
   VectorXd q0;                        // posture at the start
   VectorXd state_weights;             // 2 nv
+  ContactGains gains;                 // of contacts and closures
   Vector3d com, forward, shift;       // CoM at the start; unit vector ahead; displacement of the jump
   std::vector<ContactTarget> before;  // feet at the start and
   std::vector<ContactTarget> after;   // at the landing
@@ -64,6 +66,7 @@ StageSpec makeStage(const Scene& scene, const std::vector<ContactTarget>& contac
   StageSpec stage;
   stage.dt = o.time_step;
   stage.constraints = makeConstraintSet(model, contacts);
+  if (o.published == 0) setClosureGains(scene.gains, stage.constraints);
   stage.state = {o.state_weight, scene.q0, VectorXd::Zero(model.nv()), scene.state_weights};
   stage.control = {o.control_weight, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
   return stage;
@@ -92,25 +95,25 @@ void addHeightCost(const Scene& scene, const std::string& name, double weight, d
                          makeComPosition(scene.com + height * Vector3d::UnitZ())});
 }
 
-void addTouchdownCosts(const Scene& scene, StageSpec& stage) {
-  const JumpOptions& o = scene.options;
-  const Vector6d weights = (Vector6d() << Vector3d::Constant(o.touchdown_foothold_weight).head<2>(),
-                            o.touchdown_height_weight, Vector3d::Constant(o.touchdown_rotation_weight))
-                               .finished();
+// Node i of n in flight. The first one is where the feet stood.
+void addFlightConstraints(const Scene& scene, int i, int n, StageSpec& stage) {
+  if (i == 0 || scene.options.published != 0) return;
+  Ground ground;
+  ground.height = scene.before.front().X_WT.p.z();
+  for (const ContactTarget& start : scene.before)
+    addClearance(scene.model.contacts()[start.contact], ground, 0, isMidSwing(i, n) ? kMidSwingClearance : 0, stage);
+}
+
+void addTouchdown(const Scene& scene, StageSpec& stage) {
+  const LandingWeights& weights = scene.options.paper.touchdown;
+  const double h = stage.dt;
   for (const ContactTarget& target : scene.after) {
     const ContactFrame& contact = scene.model.contacts()[target.contact];
-    const BodyFrame foot{contact.body, contact.X_BF};
-    if (o.published != 0) {
-      const double h = o.time_step;
-      addFreeLanding(foot, target.X_WT,
-                     {o.touchdown_height_weight / h, o.touchdown_rotation_weight / h, o.touchdown_velocity_weight / h},
-                     stage, " " + contact.name);
-      continue;
-    }
-    stage.costs.push_back({"touchdown " + contact.name, 1 / o.time_step, Activation::makeQuadratic(weights),
-                           makeFramePlacement(foot, target.X_WT)});
-    stage.costs.push_back({"touchdown velocity " + contact.name, o.touchdown_velocity_weight / o.time_step,
-                           Activation::makeQuadratic(Vector6d::Ones()), makeFrameVelocity(foot)});
+    if (scene.options.published == 0)
+      addLanding(contact, target.X_WT, stage);
+    else
+      addFreeLanding({contact.body, contact.X_BF}, target.X_WT,
+                     {weights.height / h, weights.tilt / h, weights.velocity / h}, stage, " " + contact.name);
   }
 }
 
@@ -121,22 +124,21 @@ StageSpec makeTerminalStage(const Scene& scene) {
   stage.control.weight = 0;
   if (o.published != 0) {
     const VectorXd selected = selectMainJoints(scene.model);
-    stage.state.weight = o.terminal_weight;
+    stage.state.weight = o.paper.terminal;
     stage.state.weights << selected, selected;
     if (scene.model.hasFreeFlyer())
       stage.state.weights.head<6>() << 0, 0, 100, 0, 0, 2500;  // height 10, yaw 50, squared
     return stage;
   }
-  stage.state.weight = 1;
-  stage.state.weights.head(scene.model.nv()) *= o.state_weight;
-  stage.state.weights.tail(scene.model.nv()).setConstant(o.terminal_weight);
   stage.costs.push_back({"com", o.terminal_weight, Activation::makeQuadratic(Vector3d::Ones()),
                          makeComPosition(scene.com + scene.shift)});
+  addRest(scene.model, stage);
   return stage;
 }
 
 Scene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
-  Scene scene{model, o, calcJumpFigures(o, model.gravity().norm()), q0, makeStateWeights(model), {}, {}, {}, {}, {}};
+  Scene scene{model, o, calcJumpFigures(o, model.gravity().norm()), q0, makeStateWeights(model), {}, {}, {}, {},
+              {},    {}};
   if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3).setConstant(o.torso_weight);
   if (o.published != 0) {  // hips count like other joints, the heading does not
     scene.state_weights.head(model.nv()) = selectMainJoints(model);
@@ -145,7 +147,8 @@ Scene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
   raiseMotorWeights(model, o.motor_weight, scene.state_weights);
   std::vector<int> feet;
   for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
-  ContactGains gains{o.contact_kp, o.contact_kd};
+  ContactGains& gains = scene.gains;
+  gains = {o.contact_kp, o.contact_kd};
   if (o.published == 0) gains = limitContactGains(gains, o.time_step);
   scene.before = makeContactTargets(model, scene.q0, feet, gains.kp, gains.kd);
   scene.after = scene.before;
@@ -261,14 +264,10 @@ std::vector<OptionEntry> listOptions(JumpOptions& o) {
           {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
           {"swing_weight", &o.swing_weight, "1/m^2", "path of the feet in flight"},
           {"swing_rotation_weight", &o.swing_rotation_weight, "1", "soles stay level in flight"},
-          {"touchdown_foothold_weight", &o.touchdown_foothold_weight, "1/m^2", "feet land where they should"},
-          {"touchdown_height_weight", &o.touchdown_height_weight, "1/m^2", "feet land on the ground"},
-          {"touchdown_rotation_weight", &o.touchdown_rotation_weight, "1", "feet land flat"},
-          {"touchdown_velocity_weight", &o.touchdown_velocity_weight, "s^2/m^2", "feet land without speed"},
-          {"terminal_weight", &o.terminal_weight, "1", "end at rest, in place"},
+          {"terminal_weight", &o.terminal_weight, "1/m^2", "place of the centre of mass at the end"},
           {"contact_kp", &o.contact_kp, "1/s^2",
-           "stabilisation of the contacts, position (limited to 1/(2 h^2), h the time step)"},
-          {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"}};
+           "stabilisation of contacts and closures, position (limited to 1/(2 h^2), h the time step)"},
+          {"contact_kd", &o.contact_kd, "1/s", "stabilisation of contacts and closures, velocity (limited to 1/h)"}};
 }
 
 void setPaperWeights(JumpOptions& o) {
@@ -286,10 +285,6 @@ void setPaperWeights(JumpOptions& o) {
   o.force_weight = 500;
   o.pressure_weight = 5;
   o.swing_weight = o.swing_rotation_weight = 0;
-  o.touchdown_foothold_weight = 0;
-  o.touchdown_height_weight = 1e5;
-  o.touchdown_rotation_weight = o.touchdown_velocity_weight = 1e3;
-  o.terminal_weight = 1e3;
   o.contact_kp = 0;
   o.contact_kd = 100;
 }
@@ -326,7 +321,8 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
       if (phase == Phase::Flight && 2 * i == nodes)
         addHeightCost(scene, "apex", options.apex_weight / options.time_step, com.height, stage);
       if (phase == Phase::Flight && i > 0) addSwingCosts(scene, static_cast<double>(i) / nodes, stage);
-      if (phase == Phase::Land && i == 0) addTouchdownCosts(scene, stage);
+      if (phase == Phase::Flight) addFlightConstraints(scene, i, nodes, stage);
+      if (phase == Phase::Land && i == 0) addTouchdown(scene, stage);
       plan.guess.xs.push_back(makeGuess(scene, phase, i * options.time_step));
       plan.guess.us.push_back(u);
     }

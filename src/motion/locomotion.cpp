@@ -7,6 +7,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "math/so3.h"
+#include "motion/foot_constraints.h"
 #include "motion/gait.h"
 
 namespace bielle {
@@ -20,6 +21,7 @@ struct Scene {
   const LocomotionOptions& options;
   Gait gait;
   VectorXd state_weights;  // 2 nv
+  double ramp = 0;         // around the steps of the ground, m
 };
 
 void check(const LocomotionOptions& o) {
@@ -79,8 +81,12 @@ void check(const Scene& scene) {
   }
 }
 
+const ContactFrame& getContact(const Scene& scene, Side side) {
+  return scene.model.contacts()[scene.stance.contacts[static_cast<int>(side)]];
+}
+
 BodyFrame getFoot(const Scene& scene, Side side) {
-  const ContactFrame& contact = scene.model.contacts()[scene.stance.contacts[static_cast<int>(side)]];
+  const ContactFrame& contact = getContact(scene, side);
   return {contact.body, contact.X_BF};
 }
 
@@ -177,27 +183,33 @@ void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& ste
   addCost(stage, "swing velocity", 1,
           makeVector(o.swing_velocity_weight, o.swing_velocity_weight, o.swing_velocity_weight),
           makeFrameVelocity(foot, node.V_F));
-  addCost(stage, "fly high", o.fly_high_weight, Eigen::Vector2d::Ones(),
-          makeFlyHigh(foot, o.fly_high_slope, calcGround(scene, node, step)));
-  if (o.feet_distance_weight != 0)
-    stage.costs.push_back({"feet distance", o.feet_distance_weight,
-                           Activation::makeBarrier(VectorXd::Ones(1), VectorXd::Constant(1, o.feet_distance),
+  if (!isPublished(scene)) return;
+  addCost(stage, "fly high", o.paper.fly_high, Eigen::Vector2d::Ones(),
+          makeFlyHigh(foot, o.paper.fly_high_slope, calcGround(scene, node, step)));
+  if (o.paper.feet_distance_weight != 0)
+    stage.costs.push_back({"feet distance", o.paper.feet_distance_weight,
+                           Activation::makeBarrier(VectorXd::Ones(1), VectorXd::Constant(1, o.paper.feet_distance),
                                                    VectorXd::Constant(1, 1e12)),
                            makeFrameDistance(getFoot(scene, Side::Left), getFoot(scene, Side::Right))});
 }
 
-void addLandingCosts(const Scene& scene, const Footstep& step, StageSpec& stage) {
-  const LocomotionOptions& o = scene.options;
+// Node i of n of the swing of a foot. The first one is where the foot stood.
+void addSwingConstraints(const Scene& scene, const GaitNode& node, int i, int n, StageSpec& stage) {
+  if (i == 0 || isPublished(scene)) return;
+  const GaitPhase& phase = scene.gait.phases[node.phase];
+  const Side side = scene.task.plan.steps[phase.steps_done].side, other = getOther(side);
+  addClearance(getContact(scene, side), scene.task.ground, scene.ramp, isMidSwing(i, n) ? kMidSwingClearance : 0,
+               stage);
+  addDistance(getContact(scene, side), node.X_WF, getContact(scene, other),
+              scene.task.plan.getStance(phase.steps_done)[static_cast<int>(other)], scene.options.feet_distance, stage);
+}
+
+void addLanding(const Scene& scene, const Footstep& step, StageSpec& stage) {
+  if (!isPublished(scene)) return addLanding(getContact(scene, step.side), step.X_WF, stage);
+  const LandingWeights& weights = scene.options.paper.landing;
   const double h = stage.kind == StageKind::Impact ? 1 : stage.dt;
-  const BodyFrame foot = getFoot(scene, step.side);
-  if (isPublished(scene))
-    return addFreeLanding(foot, step.X_WF,
-                          {o.landing_height_weight / h, o.landing_rotation_weight / h, o.landing_velocity_weight / h},
-                          stage);
-  addCost(stage, "landing", 1 / h,
-          makeVector(o.landing_foothold_weight, o.landing_height_weight, o.landing_rotation_weight),
-          makeFramePlacement(foot, step.X_WF));
-  addCost(stage, "landing velocity", o.landing_velocity_weight / h, Vector6d::Ones(), makeFrameVelocity(foot));
+  addFreeLanding(getFoot(scene, step.side), step.X_WF, {weights.height / h, weights.tilt / h, weights.velocity / h},
+                 stage);
 }
 
 StageSpec makeStage(const Scene& scene, const GaitNode& node, const std::vector<ContactTarget>& contacts) {
@@ -209,7 +221,7 @@ StageSpec makeStage(const Scene& scene, const GaitNode& node, const std::vector<
   addComCosts(scene, node, stage);
   addForceCosts(scene, node, stage);
   if (phase.swings) addSwingCosts(scene, node, scene.task.plan.steps[phase.steps_done], stage);
-  if (node.lands && o.rigid_landing == 0) addLandingCosts(scene, scene.task.plan.steps[phase.steps_done - 1], stage);
+  if (node.lands && o.rigid_landing == 0) addLanding(scene, scene.task.plan.steps[phase.steps_done - 1], stage);
   return stage;
 }
 
@@ -221,7 +233,7 @@ StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector
   stage.constraints = makeConstraintSet(scene.model, contacts);
   stage.state.weight *= scene.options.timing.time_step;
   stage.control.weight *= scene.options.timing.time_step;  // torques have no effect here and go to zero
-  addLandingCosts(scene, scene.task.plan.steps[scene.gait.phases[node.phase].steps_done - 1], stage);
+  addLanding(scene, scene.task.plan.steps[scene.gait.phases[node.phase].steps_done - 1], stage);
   return stage;
 }
 
@@ -240,7 +252,7 @@ std::vector<int> listLandings(const ContactSchedule& schedule) {
 
 std::vector<Goal> makeFootholdGoals(const Scene& scene, const ContactSchedule& schedule) {
   constexpr double kTolerance = 0.01;  // m
-  if (scene.options.landing_foothold_weight == 0) return {};
+  if (isPublished(scene)) return {};
   Goal goal{GoalKind::Footholds, "footholds", 0, kTolerance, 0, schedule.numStages()};
   const std::vector<int> landings = listLandings(schedule);
   const std::vector<Footstep>& steps = scene.task.plan.steps;
@@ -271,14 +283,12 @@ StageSpec makeTerminalStage(const Scene& scene) {
   StageSpec stage = makeRegularizedStage(scene, node);
   stage.control.weight = 0;
   if (isPublished(scene)) {
-    stage.state = {scene.options.terminal_weight, scene.stance.q, VectorXd::Zero(nv), VectorXd::Zero(2 * nv)};
+    stage.state = {scene.options.paper.terminal, scene.stance.q, VectorXd::Zero(nv), VectorXd::Zero(2 * nv)};
     stage.state.weights.tail(nv) = selectMainJoints(scene.model);
     return stage;
   }
-  stage.state.weight = 1;
-  stage.state.weights.head(nv) *= scene.options.state_weight;
-  stage.state.weights.tail(nv).setConstant(scene.options.terminal_weight);
   addCost(stage, "com", scene.options.terminal_weight, Vector3d::Ones(), makeComPosition(node.com));
+  addRest(scene.model, stage);
   return stage;
 }
 
@@ -325,6 +335,10 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   Scene scene{
       model, stance, task, options, makeStartingGait(model, stance, task, options), makeWeights(model, options)};
   if (!isPublished(scene)) check(scene);
+  std::vector<ContactTarget> soles;
+  for (const GaitPhase& phase : scene.gait.phases)
+    for (const ContactTarget& sole : makeTargets(scene, phase)) soles.push_back(sole);
+  scene.ramp = chooseRamp(model, task.ground, soles);
   MotionPlan plan;
   plan.name = task.name;
   plan.ground = task.ground;
@@ -343,6 +357,7 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
     plan.schedule.phases.push_back({nameOf(scene, phase), phase.nodes, options.timing.time_step, contacts});
     for (int i = 0; i < phase.nodes; ++i, ++node) {
       plan.stages.push_back(makeStage(scene, scene.gait.nodes[node], contacts));
+      if (phase.swings) addSwingConstraints(scene, scene.gait.nodes[node], i, phase.nodes, plan.stages.back());
       plan.guess.us.push_back(u);
       plan.guess.xs.push_back(makeGuess(scene, scene.gait.nodes[node]));
     }

@@ -4,50 +4,42 @@
 namespace bielle {
 
 std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
-  return {
-      {"start_support", &o.timing.start, "s", "double support before the first step, at least"},
-      {"start_pressure", &o.start_pressure, "1",
-       "it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given"},
-      {"single_support", &o.timing.single, "s", "one foot on the ground"},
-      {"double_support", &o.timing.both, "s", "both feet on the ground between two steps"},
-      {"end_support", &o.timing.end, "s", "double support after the last step"},
-      {"time_step", &o.timing.time_step, "s", "length of a shooting stage"},
-      {"swing_height", &o.swing.height, "m", "apex of the swing foot over the higher end of its path"},
-      {"swing_apex", &o.swing.apex, "1", "when it is reached, from 0 to 1"},
-      {"swing_leave", &o.swing.leave, "1", "when the swing foot starts to move horizontally, from 0 to 1"},
-      {"swing_arrive", &o.swing.arrive, "1", "when it is over its foothold, from 0 to 1"},
-      {"friction", &o.friction, "1", "friction coefficient"},
-      {"published", &o.published, "0 or 1",
-       "1: the paper's problem: feet land where they like; 0: on footholds, by our costs"},
-      {"rigid_landing", &o.rigid_landing, "0 or 1",
-       "1: feet that land stop by a rigid impact; 0: softly, by costs alone"},
-      {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
-      {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
-      {"heading_weight", &o.heading_weight, "1", "head where the feet do, within the state regularization"},
-      {"motor_weight", &o.motor_weight, "1", "keep motors slow, within the state regularization"},
-      {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
-      {"com_weight", &o.com_weight, "1/m^2", "horizontal position of the centre of mass"},
-      {"com_height_weight", &o.com_height_weight, "1/m^2", "height of the centre of mass"},
-      {"com_velocity_weight", &o.com_velocity_weight, "s^2/m^2", "velocity of the centre of mass, along the way"},
-      {"swing_weight", &o.swing_weight, "1/m^2", "path of the swing foot"},
-      {"swing_velocity_weight", &o.swing_velocity_weight, "s^2/m^2", "velocity of the swing foot along its path"},
-      {"swing_rotation_weight", &o.swing_rotation_weight, "1", "orientation of the swing foot"},
-      {"fly_high_weight", &o.fly_high_weight, "s^2/m^2", "no horizontal velocity of the swing foot near the ground"},
-      {"fly_high_slope", &o.fly_high_slope, "1/m", "how that fades with height"},
-      {"landing_foothold_weight", &o.landing_foothold_weight, "1/m^2", "horizontal place of a landing foot"},
-      {"landing_height_weight", &o.landing_height_weight, "1/m^2", "height of a landing foot"},
-      {"landing_rotation_weight", &o.landing_rotation_weight, "1", "a landing foot is flat"},
-      {"landing_velocity_weight", &o.landing_velocity_weight, "s^2/m^2", "a landing foot is still"},
-      {"force_weight", &o.force_weight, "1", "pass the weight evenly from foot to foot, over (m g)^2"},
-      {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
-      {"feet_distance", &o.feet_distance, "m", "least distance of the feet"},
-      {"feet_distance_weight", &o.feet_distance_weight, "1/m^2", "feet do not come nearer"},
-      {"terminal_weight", &o.terminal_weight, "1", "end at rest, in place"},
-      {"contact_kp", &o.contact_kp, "1/s^2",
-       "stabilisation of the contacts, position (limited to 1/(2 h^2), h the time step)"},
-      {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"},
-      {"closure_kp", &o.closure_kp, "1/s^2", "stabilisation of the closures, position (full formulation)"},
-      {"closure_kd", &o.closure_kd, "1/s", "stabilisation of the closures, velocity (full formulation)"}};
+  return {{"start_support", &o.timing.start, "s", "double support before the first step, at least"},
+          {"start_pressure", &o.start_pressure, "1",
+           "it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given"},
+          {"single_support", &o.timing.single, "s", "one foot on the ground"},
+          {"double_support", &o.timing.both, "s", "both feet on the ground between two steps"},
+          {"end_support", &o.timing.end, "s", "double support after the last step"},
+          {"time_step", &o.timing.time_step, "s", "length of a shooting stage"},
+          {"swing_height", &o.swing.height, "m", "apex of the swing foot over the higher end of its path"},
+          {"swing_apex", &o.swing.apex, "1", "when it is reached, from 0 to 1"},
+          {"swing_leave", &o.swing.leave, "1", "when the swing foot starts to move horizontally, from 0 to 1"},
+          {"swing_arrive", &o.swing.arrive, "1", "when it is over its foothold, from 0 to 1"},
+          {"friction", &o.friction, "1", "friction coefficient"},
+          {"published", &o.published, "0 or 1",
+           "1: the paper's problem: feet land where they like; 0: on footholds, by our costs"},
+          {"rigid_landing", &o.rigid_landing, "0 or 1",
+           "1: a rigid impact at every landing, as a stage of its own; 0: none"},
+          {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
+          {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
+          {"heading_weight", &o.heading_weight, "1", "head where the feet do, within the state regularization"},
+          {"motor_weight", &o.motor_weight, "1", "keep motors slow, within the state regularization"},
+          {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
+          {"com_weight", &o.com_weight, "1/m^2", "horizontal position of the centre of mass"},
+          {"com_height_weight", &o.com_height_weight, "1/m^2", "height of the centre of mass"},
+          {"com_velocity_weight", &o.com_velocity_weight, "s^2/m^2", "velocity of the centre of mass, along the way"},
+          {"swing_weight", &o.swing_weight, "1/m^2", "path of the swing foot"},
+          {"swing_velocity_weight", &o.swing_velocity_weight, "s^2/m^2", "velocity of the swing foot along its path"},
+          {"swing_rotation_weight", &o.swing_rotation_weight, "1", "orientation of the swing foot"},
+          {"force_weight", &o.force_weight, "1", "pass the weight evenly from foot to foot, over (m g)^2"},
+          {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
+          {"feet_distance", &o.feet_distance, "m", "least distance of the soles, or what the footholds leave if less"},
+          {"terminal_weight", &o.terminal_weight, "1/m^2", "place of the centre of mass at the end"},
+          {"contact_kp", &o.contact_kp, "1/s^2",
+           "stabilisation of the contacts, position (limited to 1/(2 h^2), h the time step)"},
+          {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"},
+          {"closure_kp", &o.closure_kp, "1/s^2", "stabilisation of the closures, position (full formulation)"},
+          {"closure_kd", &o.closure_kd, "1/s", "stabilisation of the closures, velocity (full formulation)"}};
 }
 
 void setPaperWeights(LocomotionOptions& o) {
@@ -68,14 +60,8 @@ void setPaperWeights(LocomotionOptions& o) {
   o.com_height_weight = 1000;
   o.com_velocity_weight = 100;
   o.swing_weight = o.swing_rotation_weight = o.swing_velocity_weight = 0;
-  o.fly_high_weight = 100;
-  o.fly_high_slope = 75;
-  o.landing_foothold_weight = 0;
-  o.landing_height_weight = o.landing_rotation_weight = o.landing_velocity_weight = 1e4;
   o.force_weight = 10;
   o.pressure_weight = 10;
-  o.feet_distance_weight = 100;
-  o.terminal_weight = 1e4;
   o.contact_kp = 0;
   o.contact_kd = 100;
   o.closure_kp = o.closure_kd = 0;

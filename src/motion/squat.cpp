@@ -4,6 +4,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "motion/foot_constraints.h"
 
 namespace bielle {
 namespace {
@@ -58,7 +59,6 @@ std::vector<OptionEntry> listOptions(SquatOptions& o) {
           {"force_weight", &o.force_weight, "1", "share the weight evenly between the feet, over (m g)^2"},
           {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
           {"friction", &o.friction, "1", "friction coefficient"},
-          {"terminal_weight", &o.terminal_weight, "1", "end at rest"},
           {"contact_kp", &o.contact_kp, "1/s^2",
            "stabilisation of the contacts, position (limited to 1/(2 h^2), h the time step)"},
           {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"},
@@ -100,8 +100,7 @@ MotionPlan planSquat(const Model& model, const SquatOptions& options, const Vect
   terminal.control.weight = 0;
   terminal.path_constraints.clear();
   terminal.costs.resize(1);  // the height; forces have no meaning at the terminal node
-  terminal.state.weight = options.terminal_weight;
-  terminal.state.weights.head(model.nv()).setZero();
+  addRest(model, terminal);
 
   VectorXd x0 = VectorXd::Zero(model.nq() + model.nv());
   x0.head(model.nq()) = q0;

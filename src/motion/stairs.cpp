@@ -84,8 +84,8 @@ void setPaperWeights(StairsOptions& o) {
   o.gait.com_height_weight = 0;
   o.gait.com_velocity_weight = 1e3;
   o.gait.pressure_weight = 1;
-  o.gait.feet_distance_weight = 0;
-  o.gait.fly_high_weight = 50;
+  o.gait.paper.feet_distance_weight = 0;
+  o.gait.paper.fly_high = 50;
 }
 
 Ground makeStairsGround(const StairsOptions& o, const SE3& X_WP) {

@@ -73,7 +73,7 @@ void setPaperWeights(SideWalkOptions& o) {
   o.steps = 8;
   o.gait.state_weight = 0.3;
   o.gait.pressure_weight = 1;
-  o.gait.feet_distance_weight = 10;
+  o.gait.paper.feet_distance_weight = 10;
 }
 
 MotionPlan planWalk(const Model& model, const WalkOptions& o, const VectorXd& q0) {

@@ -14,20 +14,29 @@
 /// Costs of a stage, h the time step:
 /// - state regularization about the posture at the start, at rest; motor torques;
 /// - height of the CoM: at mid-flight (over h, as in the paper) and, with less weight, on the ground;
-/// - feet on the ground: force by Eq. (2), shared evenly, centre of pressure; inside the wrench cones of the soles, by
-///   constraints;
+/// - feet on the ground: force by Eq. (2), shared evenly, centre of pressure;
 /// - feet in flight: placement by Eq. (3);
-/// - touchdown, at the first node of the landing: placement and velocity of the feet, over h. The desired velocity is
-///   zero: the legs fold as fast as the body falls.
-/// The terminal node has costs of the velocities, of the posture, and of the centre of mass relative to the feet.
+/// - at the end: posture, and the centre of mass over the feet as at the start.
+/// What must hold are path constraints:
+/// - wrench cones of the soles on the ground;
+/// - feet in flight: no corner below the ground, and 6 mm over it in the middle half of the flight;
+/// - touchdown, at the first node of the landing: the feet are at their places, flat and at rest: the legs fold as fast as the
+///   body falls;
+/// - at the end the centre of mass is at rest and the torso does not turn.
 ///
-/// With `published`, the problem is that of the paper's example code: feet are free in flight; at touchdown their costs
+/// With `published`, the problem is that of the paper's example code: there are no constraints; feet are free in flight; at touchdown their costs
 /// are height, tilt and velocity; the load is the average of Eq. (2) while pushing and landing, the weight before and
 /// after; hips are weighted like other joints; contacts have the gains given, without limits; limits of motors and joints do not
 /// apply; the terminal costs are the height and the heading of the base, and the joints of the legs (Model::serialJoints) with their velocities.
 #include "bielle/motion/motion.h"
 
 namespace bielle {
+
+/// Of the published problem alone, which has no constraints.
+struct PaperJumpWeights {
+  LandingWeights touchdown{1e5, 1e3, 1e3};  ///< over h
+  double terminal = 1e3;                    ///< of the final velocities
+};
 
 struct JumpOptions {
   double flight = 0.3;       ///< time in the air, s; rounded to an even number of time steps
@@ -42,23 +51,20 @@ struct JumpOptions {
   double published = 0;      ///< 1: the paper's problem, see above; 0: our costs
   double time_step = 0.005;  ///< s
 
-  double apex_weight = 1e4;                ///< of the CoM's height at mid-flight, over h, 1/m^2
-  double com_weight = 1e3;                 ///< of the CoM's height on the ground, 1/m^2
-  double state_weight = 0.02;              ///< of the state regularization
-  double torso_weight = 2000;              ///< of the torso's rotation within the state regularization
-  double motor_weight = 1;                 ///< of motor velocities within the state regularization
-  double control_weight = 3e-3;            ///< of the motor torques, 1/(N m)^2
-  double force_weight = 30;                ///< of the contact force reference, over (m g)^2
-  double pressure_weight = 1;              ///< of the centre of pressure, over the half size of the sole squared
-  double swing_weight = 1e4;               ///< of the feet's path in flight, 1/m^2
-  double swing_rotation_weight = 1e2;      ///< of their orientation, 1
-  double touchdown_foothold_weight = 1e5;  ///< horizontal place of the feet, over h, 1/m^2
-  double touchdown_height_weight = 1e5;    ///< their height, over h, 1/m^2
-  double touchdown_rotation_weight = 1e5;  ///< their orientation, over h, 1
-  double touchdown_velocity_weight = 1e2;  ///< over h, s^2/m^2
-  double terminal_weight = 1e3;            ///< of the final velocities and of the final place of the CoM
-  double contact_kp = 1e4;                 ///< stabilisation of the contacts, 1/s^2; limited to 1/(2 h^2)
-  double contact_kd = 200;                 ///< 1/s; limited to 1/h
+  double apex_weight = 1e4;            ///< of the CoM's height at mid-flight, over h, 1/m^2
+  double com_weight = 1e3;             ///< of the CoM's height on the ground, 1/m^2
+  double state_weight = 0.02;          ///< of the state regularization
+  double torso_weight = 2000;          ///< of the torso's rotation within the state regularization
+  double motor_weight = 1;             ///< of motor velocities within the state regularization
+  double control_weight = 3e-3;        ///< of the motor torques, 1/(N m)^2
+  double force_weight = 30;            ///< of the contact force reference, over (m g)^2
+  double pressure_weight = 1;          ///< of the centre of pressure, over the half size of the sole squared
+  double swing_weight = 1e4;           ///< of the feet's path in flight, 1/m^2
+  double swing_rotation_weight = 1e2;  ///< of their orientation, 1
+  double terminal_weight = 1e3;        ///< of the place of the CoM at the end, 1/m^2
+  PaperJumpWeights paper;
+  double contact_kp = 1e4;  ///< stabilisation of contacts and closures, 1/s^2; limited to 1/(2 h^2)
+  double contact_kd = 200;  ///< 1/s; limited to 1/h
 };
 
 /// Every number of the options by name, pointing into `options`.

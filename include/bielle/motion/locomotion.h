@@ -1,15 +1,17 @@
 #pragma once
 /// \file Steps as an optimal control problem, shared by walk, side walk, turn and stairs.
 ///
-/// Costs of a stage; those with zero weight are omitted. References of body and feet are those of gait.h.
+/// Wishes are costs of a stage; those with zero weight are omitted. References of body and feet are those of gait.h.
 /// - state regularization about the standing posture at rest, the base heading as the feet do; motor torques;
 /// - centre of mass: position and velocity;
-/// - swing foot: placement along its path, and (instead) fly high: its horizontal velocity near the ground;
-/// - landing, at the first node of a double support or at the impact before it: placement and velocity of the landing
-///   foot, over the h of a stage;
-/// - forces of stance feet: share of the weight, centre of pressure; inside the wrench cones of the soles, by constraints;
-/// - distance of the feet, where less than `feet_distance`.
-/// The terminal node has costs of the centre of mass, the posture and the velocities.
+/// - swing foot: placement along its path, and its velocity;
+/// - forces of stance feet: share of the weight, centre of pressure.
+/// What must hold are path constraints:
+/// - wrench cones of the soles on the ground;
+/// - landing, at the first node of a double support or at the impact before it: the foot is on its foothold, flat and at rest, so
+///   that the impulses of an impact vanish;
+/// - swing foot: no corner below the ground, and 6 mm over it in the middle half of the swing; distance from the other foot;
+/// - at the end the centre of mass is at rest and the torso does not turn.
 ///
 /// The pendulum of gait.h starts with a velocity v, but the robot starts at rest. With the time constant
 /// tau = sqrt(z / g), a centre of pressure held back by d for a time T brings the robot onto the pendulum's path if
@@ -17,8 +19,10 @@
 /// where v falls with T as well. The first double support is long enough for d to fit in the soles.
 ///
 /// With `published`, the problem is that of the paper's example code, whose walk is known to the last digit:
+/// - no constraints;
 /// - no footholds: only the velocity of the CoM leads forward. The costs of a landing foot are its height, tilt and
-///   velocity; its place, its heading and the path of a swing have no costs;
+///   velocity; its place, its heading and the path of a swing have no costs, but its horizontal velocity near the ground does
+///   ("fly high"), and so do feet that come near each other;
 /// - the force reference is the weight on one foot, half of it on each of two, and changes at once; forces and centres
 ///   of pressure are in the axes of the world;
 /// - contacts and closures have the gains given, without limits; limits of motors and joints do not apply;
@@ -46,39 +50,42 @@ struct SwingShape {
   double leave = 0, arrive = 0.95;  ///< the horizontal motion takes place between these
 };
 
+/// Of the published problem alone, which has no constraints.
+struct PaperWeights {
+  double fly_high = 100;                  ///< s^2/m^2
+  double fly_high_slope = 75;             ///< 1/m
+  LandingWeights landing{1e4, 1e4, 1e4};  ///< over h
+  double feet_distance = 0.2;             ///< least distance of the feet, m
+  double feet_distance_weight = 100;      ///< of coming nearer, 1/m^2
+  double terminal = 1e4;                  ///< of the final velocities
+};
+
 struct LocomotionOptions {
   GaitTiming timing;
   double start_pressure = 0.4;  ///< largest d of Eq. (1) over the soles' half length; 0: timing.start as given
   SwingShape swing;
   double friction = 0.7;  ///< coefficient, 1
   double published = 0;   ///< 1: the paper's problem, see above; 0: on footholds
-  /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time and has the landing
-  /// costs, evaluated before the foot stops. 0: soft landing by costs alone; the contact's stabilisation stops the foot
-  /// within a time step.
+  /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time. 0: the contact's stabilisation
+  /// stops what velocity a foot may have left.
   double rigid_landing = 0;
 
-  double state_weight = 0.1;             ///< of the state regularization
-  double torso_weight = 1e4;             ///< of the torso's roll and pitch within the state regularization
-  double heading_weight = 1e3;           ///< of its heading within the state regularization
-  double motor_weight = 1;               ///< of motor velocities within the state regularization
-  double control_weight = 1e-3;          ///< of the motor torques, 1/(N m)^2
-  double com_weight = 100;               ///< of the horizontal position of the CoM, 1/m^2
-  double com_height_weight = 3e3;        ///< of its height, 1/m^2
-  double com_velocity_weight = 0;        ///< of its horizontal velocity, s^2/m^2
-  double swing_weight = 1e4;             ///< of the path of the swing foot, 1/m^2
-  double swing_velocity_weight = 200;    ///< of its velocity, s^2/m^2 (and s^2)
-  double swing_rotation_weight = 1e3;    ///< of its orientation, 1
-  double fly_high_weight = 0;            ///< s^2/m^2
-  double fly_high_slope = 75;            ///< 1/m
-  double landing_foothold_weight = 1e5;  ///< horizontal place of a landing foot, over h, 1/m^2
-  double landing_height_weight = 1e5;    ///< its height, over h, 1/m^2
-  double landing_rotation_weight = 1e4;  ///< its orientation, over h, 1
-  double landing_velocity_weight = 1e3;  ///< its velocity, over h, s^2/m^2
-  double force_weight = 10;              ///< of the contact force reference, over (m g)^2
-  double pressure_weight = 10;           ///< of the centre of pressure, over the half size of the sole squared
-  double feet_distance = 0.2;            ///< least distance of the feet, m
-  double feet_distance_weight = 0;       ///< of coming nearer, 1/m^2
-  double terminal_weight = 1e3;          ///< of the final velocities, and of the final place of the CoM
+  double state_weight = 0.1;           ///< of the state regularization
+  double torso_weight = 1e4;           ///< of the torso's roll and pitch within the state regularization
+  double heading_weight = 1e3;         ///< of its heading within the state regularization
+  double motor_weight = 1;             ///< of motor velocities within the state regularization
+  double control_weight = 1e-3;        ///< of the motor torques, 1/(N m)^2
+  double com_weight = 100;             ///< of the horizontal position of the CoM, 1/m^2
+  double com_height_weight = 3e3;      ///< of its height, 1/m^2
+  double com_velocity_weight = 0;      ///< of its horizontal velocity, s^2/m^2
+  double swing_weight = 1e4;           ///< of the path of the swing foot, 1/m^2
+  double swing_velocity_weight = 200;  ///< of its velocity, s^2/m^2 (and s^2)
+  double swing_rotation_weight = 1e3;  ///< of its orientation, 1
+  double force_weight = 10;            ///< of the contact force reference, over (m g)^2
+  double pressure_weight = 10;         ///< of the centre of pressure, over the half size of the sole squared
+  double feet_distance = 0.01;         ///< least distance of the soles, or what the footholds leave if less, m
+  double terminal_weight = 1e3;        ///< of the place of the CoM at the end, 1/m^2
+  PaperWeights paper;
   double contact_kp = 1e4;  ///< stabilisation of the contacts, 1/s^2; limited to 1/(2 h^2), h the time step
   double contact_kd = 100;  ///< 1/s; limited to 1/h
   double closure_kp = 1e4;  ///< stabilisation of the closures, limited like that of the contacts; used only by

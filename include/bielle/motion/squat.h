@@ -1,6 +1,6 @@
 #pragma once
 /// \file The squat of the paper (its section IV-B): the height of the centre of mass follows a sine down and back, with
-/// flat feet.
+/// flat feet. Soles stay inside their wrench cones, and the robot ends at rest, by constraints.
 #include "bielle/motion/motion.h"
 
 namespace bielle {
@@ -18,7 +18,6 @@ struct SquatOptions {
   double force_weight = 10;      ///< of the contact force reference (half the weight per foot), over (m g)^2
   double pressure_weight = 1;    ///< of the centre of pressure, over the half size of the sole squared
   double friction = 0.7;         ///< friction coefficient, 1
-  double terminal_weight = 1e3;  ///< of the final velocities
   double contact_kp = 400;       ///< stabilisation of the contacts, 1/s^2; limited to 1/(2 h^2), h the time step
   double contact_kd = 100;       ///< 1/s; limited to 1/h
   double closure_kp = 0;         ///< stabilisation of the closures, 1/s^2

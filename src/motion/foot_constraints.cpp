@@ -1,0 +1,88 @@
+#include "motion/foot_constraints.h"
+
+#include <cmath>
+
+namespace bielle {
+namespace {
+
+constexpr double kFree = std::numeric_limits<double>::infinity();
+// Violations that count as 1.
+constexpr double kPosition = 0.01, kAngle = 0.1, kVelocity = 0.1;  // m, rad, m/s and rad/s
+
+// Makes the first rows zero and leaves the others free.
+PathConstraint makeEquation(const std::string& name, std::unique_ptr<Residual> residual, int rows,
+                            const VectorXd& scale) {
+  VectorXd bound = VectorXd::Constant(scale.size(), kFree);
+  bound.head(rows).setZero();
+  return {name, std::move(residual), -bound, bound, scale};
+}
+
+Capsule makeSoleCapsule(const ContactFrame& contact) {
+  const bool along_x = contact.half_length >= contact.half_width;
+  const Vector3d half = along_x ? Vector3d(contact.half_length, 0, 0) : Vector3d(0, contact.half_width, 0);
+  return {contact.body, contact.X_BF.act(-half), contact.X_BF.act(half),
+          std::min(contact.half_length, contact.half_width)};
+}
+
+}  // namespace
+
+void addLanding(const ContactFrame& contact, const SE3& X_WF, StageSpec& stage) {
+  const BodyFrame foot{contact.body, contact.X_BF};
+  const bool point = contact.kind != ContactKind::Surface6D;
+  const Vector3d position = Vector3d::Constant(kPosition), angle = Vector3d::Constant(kAngle);
+  if (point)
+    stage.path_constraints.push_back(
+        makeEquation("landing of " + contact.name, makeFrameTranslation(foot, X_WF.p), 3, position));
+  else
+    stage.path_constraints.push_back(makeEquation("landing of " + contact.name, makeFramePlacement(foot, X_WF), 6,
+                                                  (Vector6d() << position, angle).finished()));
+  stage.path_constraints.push_back(makeEquation("landing velocity of " + contact.name, makeFrameVelocity(foot),
+                                                point ? 3 : 6, Vector6d::Constant(kVelocity)));
+}
+
+void addClearance(const ContactFrame& contact, const Ground& ground, double ramp, double least, StageSpec& stage) {
+  auto residual =
+      makeSoleClearance({contact.body, contact.X_BF}, contact.half_length, contact.half_width, ground, ramp);
+  const int n = residual->size();
+  stage.path_constraints.push_back({"clearance of " + contact.name, std::move(residual), VectorXd::Constant(n, least),
+                                    VectorXd::Constant(n, kFree), VectorXd::Constant(n, kPosition)});
+}
+
+double chooseRamp(const Model& model, const Ground& ground, const std::vector<ContactTarget>& soles) {
+  constexpr double kWidest = 0.02, kLeast = 1e-3;  // m
+  double room = kWidest;
+  for (const ContactTarget& sole : soles) {
+    const ContactFrame& contact = model.contacts()[sole.contact];
+    for (double x : {-contact.half_length, contact.half_length})
+      for (double y : {-contact.half_width, contact.half_width}) {
+        const Vector3d corner = sole.X_WT.act(Vector3d(x, y, 0));
+        for (const GroundStep& step : ground.steps)
+          if (step.top.z() > corner.z() + kLeast) room = std::min(room, step.calcDistance(corner.x(), corner.y()));
+      }
+  }
+  return std::max(kLeast, room);
+}
+
+void addDistance(const ContactFrame& swinging, const SE3& X_path, const ContactFrame& standing, const SE3& X_standing,
+                 double least, StageSpec& stage) {
+  constexpr double kTracking = 0.01;  // m
+  for (const ContactFrame* contact : {&swinging, &standing})
+    if (contact->half_length == 0 || contact->half_width == 0) return;
+  const Capsule a = makeSoleCapsule(swinging), b = makeSoleCapsule(standing);
+  const double of_path =
+      calcCapsuleDistance(a, X_path * swinging.X_BF.inverse(), b, X_standing * standing.X_BF.inverse());
+  stage.path_constraints.push_back({"distance of " + swinging.name + " and " + standing.name, makeCapsuleDistance(a, b),
+                                    VectorXd::Constant(1, std::min(least, of_path - kTracking)),
+                                    VectorXd::Constant(1, kFree), VectorXd::Constant(1, kPosition)});
+}
+
+void addRest(const Model& model, StageSpec& terminal) {
+  std::vector<PathConstraint>& constraints = terminal.path_constraints;
+  constraints.push_back(makeEquation("rest of the centre of mass at the end", makeComVelocity(Vector3d::Zero()), 3,
+                                     Vector3d::Constant(kVelocity)));
+  if (model.hasFreeFlyer())
+    constraints.push_back(
+        makeEquation("rest of the torso at the end", makeJointVelocity({3, 4, 5}), 3, Vector3d::Constant(kVelocity)));
+}
+
+}  // namespace bielle

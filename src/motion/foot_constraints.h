@@ -1,0 +1,27 @@
+#pragma once
+// Path constraints of feet, and of the end of a motion.
+#include "bielle/motion/motion.h"
+
+namespace bielle {
+
+// The sole lies at a place, at rest; of a contact at a point only the point does.
+void addLanding(const ContactFrame& contact, const SE3& X_WF, StageSpec& stage);
+
+// All corners of the sole are at least `least` m over the ground, whose steps have ramps (makeSoleClearance).
+void addClearance(const ContactFrame& contact, const Ground& ground, double ramp, double least, StageSpec& stage);
+// Whether check and motion ask for full clearance at node i of n in the air: in the middle half.
+inline bool isMidSwing(int i, int n) { return 4 * i >= n && 4 * i <= 3 * n; }
+inline constexpr double kMidSwingClearance = 6e-3;  // m
+// Width of the ramps around steps that leave the soles on the ground free, at most 2 cm, m.
+double chooseRamp(const Model& model, const Ground& ground, const std::vector<ContactTarget>& soles);
+
+// A foot in the air stays at least `least` m from a standing one, or from where its path leads, less a centimetre if that is
+// nearer. Soles count as capsules: their middle lines, as thick as they are wide.
+void addDistance(const ContactFrame& swinging, const SE3& X_path, const ContactFrame& standing, const SE3& X_standing,
+                 double least, StageSpec& stage);
+
+// The motion ends with the centre of mass at rest and without rotation of the torso. With the feet on the ground, all other
+// velocities follow from these; constraints on them too would contradict what contacts are off by.
+void addRest(const Model& model, StageSpec& terminal);
+
+}  // namespace bielle
