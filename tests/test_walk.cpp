@@ -229,6 +229,26 @@ TEST_CASE("walk: with the published weights the feet land where they like") {
   CHECK(solved.measures.load > 5);
 }
 
+TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with its node") {
+  WalkOptions options;
+  options.steps = 2;
+  MotionPlan plan = planWalk(getBipetto(), options, makeStandingPosture(getBipetto()));
+  int landing = -1;
+  for (size_t k = 0; k < plan.stages.size() && landing < 0; ++k)
+    for (PathConstraint& constraint : plan.stages[k].path_constraints)
+      if (constraint.name.rfind("landing of ", 0) == 0) {
+        constraint.residual = makeFramePlacement(getBodyFrame(getBipetto(), constraint.name.substr(11)),
+                                                 SE3{Matrix3d::Identity(), Vector3d(0, 0, 1)});
+        landing = static_cast<int>(k);
+      }
+  REQUIRE(landing > 0);
+  const Solved far = solve(makeMotion(getBipetto(), std::move(plan), {}));
+  CAPTURE(far.summary.message, far.summary.iterations);
+  CHECK(far.summary.termination == FddpTermination::Infeasible);
+  CHECK_THAT(far.summary.message,
+             Catch::Contains("landing of foot_") && Catch::Contains("at node " + std::to_string(landing)));
+}
+
 TEST_CASE("walk: what cannot be done is refused by name") {
   const auto make = [](const std::string& option, double value) {
     WalkOptions options;

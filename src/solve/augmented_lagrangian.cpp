@@ -108,6 +108,14 @@ bool AugmentedLagrangian::updateMultipliers(const EvaluationList& iterate, doubl
   return true;
 }
 
+bool AugmentedLagrangian::restore(const EvaluationList& iterate, double cost) {
+  if (restoring_) return false;
+  last_violation_ = at_.violation;
+  startRestoration(cost);
+  evaluate(iterate);
+  return true;
+}
+
 void AugmentedLagrangian::startRestoration(double cost) {
   restoring_ = true;
   penalty_ =

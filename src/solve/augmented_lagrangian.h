@@ -31,6 +31,8 @@ class AugmentedLagrangian {
   /// and evaluates again. Once the penalty has reached its maximum, the violations alone are minimized: without multipliers,
   /// under a penalty that dominates `cost`. Returns false if that has been done and has not reduced them: infeasible.
   bool updateMultipliers(const EvaluationList& iterate, double cost);
+  /// Minimizes the violations alone from now on, as updateMultipliers() does in the end. False if that was so already.
+  bool restore(const EvaluationList& iterate, double cost);
   int getNumUpdates() const { return num_updates_; }
   /// Eq. (12) alone: at a stationary point, the multipliers of the constraints.
   void adoptMultipliers();

@@ -190,10 +190,17 @@ FddpRun::End FddpRun::raiseRegularization(const char* reason) {
   if (isInterrupted()) return FddpTermination::Interrupted;
   regularization_ *= options_.regularization_increase;
   if (regularization_ <= options_.max_regularization) return {};
+  AugmentedLagrangian& lagrangian = work_.lagrangian;
+  if (!lagrangian.isSatisfied() && lagrangian.restore(work_.evaluations.getIterate(), line_.cost)) {
+    regularization_ = options_.initial_regularization;
+    stalled_ = swept_ = false;
+    return {};
+  }
   summary_.message = std::string(reason) + " even at the largest regularization";
   if (!failure_.empty()) summary_.message += "; node " + std::to_string(failed_node_) + ": " + failure_;
-  if (!work_.lagrangian.isSatisfied()) summary_.message += "; " + work_.lagrangian.describeWorst(problem_);
-  return FddpTermination::RegularizationMax;
+  if (lagrangian.isSatisfied()) return FddpTermination::RegularizationMax;
+  summary_.message += "; " + lagrangian.describeWorst(problem_);
+  return FddpTermination::Infeasible;
 }
 
 // After an accepted step: logs it, adapts the regularization to its length, and decides whether to continue.
