@@ -4,23 +4,26 @@
 
 namespace bielle {
 
-NodeCosts::NodeCosts(const StageSpec& spec, bool running)
-    : spec_(spec), first_rows_(spec.costs.size()), first_constraint_rows_(spec.path_constraints.size()) {
+NodeCosts::NodeCosts(const StageSpec& spec, bool running) : spec_(spec), first_rows_(spec.costs.size()) {
   if (running && spec.kind == StageKind::Dynamics) scale_ = spec.dt;
-  const auto place = [this](const auto& elements, bool motion, std::vector<int>& first_rows) {
-    for (size_t i = 0; i < elements.size(); ++i) {
-      if (elements[i].residual->needsMotion() != motion) continue;
-      first_rows[i] = rows_;
-      rows_ += elements[i].residual->size();
-      needs_controls_ |= elements[i].residual->needsControls();
-    }
+  const auto add = [this](const Residual& residual, const Cost* cost, const PathConstraint* constraint, int row) {
+    blocks_.push_back({&residual, cost, constraint, rows_, row});
+    rows_ += residual.size();
+    needs_controls_ |= residual.needsControls();
   };
   for (bool motion : {true, false}) {
-    place(spec.costs, motion, first_rows_);
-    place(spec.path_constraints, motion, first_constraint_rows_);
-    if (motion) motion_rows_ = rows_;
+    for (size_t c = 0; c < spec.costs.size(); ++c) {
+      if (spec.costs[c].residual->needsMotion() != motion) continue;
+      first_rows_[c] = rows_;
+      add(*spec.costs[c].residual, &spec.costs[c], nullptr, 0);
+    }
+    int row = 0;
+    for (const PathConstraint& constraint : spec.path_constraints) {
+      if (constraint.residual->needsMotion() == motion) add(*constraint.residual, nullptr, &constraint, row);
+      row += constraint.residual->size();
+    }
+    constraint_rows_ = row;
   }
-  for (const PathConstraint& constraint : spec.path_constraints) constraint_rows_ += constraint.residual->size();
 }
 
 double NodeCosts::calcControlCost(const VectorXd& u) const {
@@ -42,18 +45,11 @@ void NodeCosts::visitValues(const RobotEvaluation& at, const Add& add) const {
 }
 
 void NodeCosts::calc(const NodeView& node, RobotEvaluation& at) const {
-  for (size_t c = 0; c < spec_.costs.size(); ++c) {
-    const Residual& residual = *spec_.costs[c].residual;
-    residual.calc(node, at.residuals.segment(first_rows_[c], residual.size()));
-  }
-  int row = 0;
-  for (size_t c = 0; c < spec_.path_constraints.size(); ++c) {
-    const PathConstraint& constraint = spec_.path_constraints[c];
-    const int n = constraint.residual->size();
-    auto r = at.residuals.segment(first_constraint_rows_[c], n);
-    constraint.residual->calc(node, r);
-    at.constraints.segment(row, n) = r.cwiseQuotient(constraint.scale);
-    row += n;
+  for (const Block& block : blocks_) {
+    const int n = block.residual->size();
+    auto r = at.residuals.segment(block.row, n);
+    block.residual->calc(node, r);
+    if (block.constraint) at.constraints.segment(block.constraint_row, n) = r.cwiseQuotient(block.constraint->scale);
   }
   double sum = 0;
   visitValues(at, [&](const std::string&, double value) { sum += value; });
@@ -66,41 +62,34 @@ std::vector<CostValue> NodeCosts::getValues(const RobotEvaluation& at) const {
   return values;
 }
 
-void NodeCosts::addJacobian(const NodeView& node, const Residual& residual, int row, const ResidualWeights& weights,
-                            ResidualJacobians& jacobians) const {
-  const int n = residual.size();
-  if (weights.gradient.segment(row, n).isZero(0) && weights.hessian.segment(row, n).isZero(0))
-    return;  // bounds that are kept
-  residual.calcJacobian(
-      node, {jacobians.q.middleRows(row, n), jacobians.v.middleRows(row, n),
-             jacobians.lambda.block(row, 0, n, spec_.constraints.rows), jacobians.u.block(row, 0, n, node.u.size())});
+void NodeCosts::selectRows(const RobotEvaluation& at, const ConstraintWeights* constraints, CountedRows& rows) const {
+  rows.blocks.clear();
+  rows.rows = rows.motion_rows = 0;
+  for (const Block& block : blocks_) {
+    const int n = block.residual->size();
+    auto gradient = rows.gradient.segment(rows.rows, n), hessian = rows.hessian.segment(rows.rows, n);
+    if (block.cost) {
+      block.cost->activation.calcDerivatives(at.residuals.segment(block.row, n), gradient, hessian);
+      gradient *= scale_ * block.cost->weight;
+      hessian *= scale_ * block.cost->weight;
+    } else {
+      if (!constraints) continue;
+      const VectorXd& scale = block.constraint->scale;
+      gradient = constraints->gradient.segment(block.constraint_row, n).cwiseQuotient(scale);
+      hessian = constraints->hessian.segment(block.constraint_row, n).cwiseQuotient(scale.cwiseAbs2());
+    }
+    if (gradient.isZero(0) && hessian.isZero(0)) continue;
+    rows.blocks.push_back({block.residual, rows.rows, n});
+    rows.rows += n;
+    if (block.residual->needsMotion()) rows.motion_rows = rows.rows;
+  }
 }
 
-void NodeCosts::differentiate(const NodeView& node, const RobotEvaluation& at, const ConstraintWeights* constraints,
-                              ResidualWeights& weights, ResidualJacobians& jacobians) const {
-  for (size_t c = 0; c < spec_.costs.size(); ++c) {
-    const Cost& cost = spec_.costs[c];
-    const int n = cost.residual->size(), row = first_rows_[c];
-    auto gradient = weights.gradient.segment(row, n), hessian = weights.hessian.segment(row, n);
-    cost.activation.calcDerivatives(at.residuals.segment(row, n), gradient, hessian);
-    gradient *= scale_ * cost.weight;
-    hessian *= scale_ * cost.weight;
-    addJacobian(node, *cost.residual, row, weights, jacobians);
-  }
-  int constraint_row = 0;
-  for (size_t c = 0; c < spec_.path_constraints.size(); ++c) {
-    const PathConstraint& constraint = spec_.path_constraints[c];
-    const int n = constraint.residual->size(), row = first_constraint_rows_[c];
-    auto gradient = weights.gradient.segment(row, n), hessian = weights.hessian.segment(row, n);
-    gradient.setZero();
-    hessian.setZero();
-    if (constraints) {
-      gradient = constraints->gradient.segment(constraint_row, n).cwiseQuotient(constraint.scale);
-      hessian = constraints->hessian.segment(constraint_row, n).cwiseQuotient(constraint.scale.cwiseAbs2());
-    }
-    addJacobian(node, *constraint.residual, row, weights, jacobians);
-    constraint_row += n;
-  }
+void NodeCosts::differentiate(const NodeView& node, const CountedRows& rows, ResidualJacobians& jacobians) const {
+  for (const auto& [residual, row, n] : rows.blocks)
+    residual->calcJacobian(
+        node, {jacobians.q.middleRows(row, n), jacobians.v.middleRows(row, n),
+               jacobians.lambda.block(row, 0, n, spec_.constraints.rows), jacobians.u.block(row, 0, n, node.u.size())});
 }
 
 void NodeCosts::addControlCost(const VectorXd& u, StageModel& out) const {

@@ -5,9 +5,21 @@
 
 namespace bielle {
 
-// Weights that the activations give to stacked residuals.
-struct ResidualWeights {
-  VectorXd gradient, hessian;  // rows
+// Rows of a node that count: those of a residual whose weights do not all vanish, one after the other, first those that depend on
+// q or v. Bounds that are kept leave no rows.
+struct CountedRows {
+  struct Block {
+    const Residual* residual;
+    int row, size;
+  };
+  std::vector<Block> blocks;
+  VectorXd gradient, hessian;  // weights
+  int rows = 0, motion_rows = 0;
+
+  void reserve(int num_blocks, int num_rows) {
+    blocks.reserve(num_blocks);
+    for (VectorXd* v : {&gradient, &hessian}) v->setZero(num_rows);
+  }
   bool counts(int row) const { return gradient[row] != 0 || hessian[row] != 0; }
 };
 
@@ -22,7 +34,7 @@ class NodeCosts {
   NodeCosts(const StageSpec& spec, bool running);
 
   int rows() const { return rows_; }
-  int motionRows() const { return motion_rows_; }
+  int numBlocks() const { return static_cast<int>(blocks_.size()); }
   int constraintRows() const { return constraint_rows_; }
   // Whether a residual depends on the controls.
   bool needsControls() const { return needs_controls_; }
@@ -31,24 +43,31 @@ class NodeCosts {
 
   // Computes the residuals, the scaled cost and the scaled constraints; the state cost of `at` must be up to date.
   void calc(const NodeView& node, RobotEvaluation& at) const;
-  // Computes scaled weights of the rows, and Jacobians of the rows that count, which must be zero before. `constraints` may be
-  // null.
-  void differentiate(const NodeView& node, const RobotEvaluation& at, const ConstraintWeights* constraints,
-                     ResidualWeights& weights, ResidualJacobians& jacobians) const;
+  // Computes scaled weights, and with them which rows count. `constraints` may be null.
+  void selectRows(const RobotEvaluation& at, const ConstraintWeights* constraints, CountedRows& rows) const;
+  // Computes the Jacobians of the counted rows, which must be zero before.
+  void differentiate(const NodeView& node, const CountedRows& rows, ResidualJacobians& jacobians) const;
   // Adds the derivatives of the control cost.
   void addControlCost(const VectorXd& u, StageModel& out) const;
   std::vector<CostValue> getValues(const RobotEvaluation& at) const;
 
  private:
   double calcControlCost(const VectorXd& u) const;
-  void addJacobian(const NodeView& node, const Residual& residual, int row, const ResidualWeights& weights,
-                   ResidualJacobians& jacobians) const;
   template <typename Add>
   void visitValues(const RobotEvaluation& at, const Add& add) const;
 
   const StageSpec& spec_;
-  std::vector<int> first_rows_, first_constraint_rows_;  // of each cost, of each path constraint
-  int rows_ = 0, motion_rows_ = 0, constraint_rows_ = 0;
+  // Of one cost or one path constraint, in the order of the stacked residuals.
+  struct Block {
+    const Residual* residual;
+    const Cost* cost;                  // or null
+    const PathConstraint* constraint;  // or null
+    int row;
+    int constraint_row;  // among the constraints
+  };
+  std::vector<Block> blocks_;
+  std::vector<int> first_rows_;  // of each cost
+  int rows_ = 0, constraint_rows_ = 0;
   bool needs_controls_ = false;
   double scale_ = 1;
 };

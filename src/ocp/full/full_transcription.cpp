@@ -19,7 +19,7 @@ struct FullEvaluation : RobotEvaluation {
 
 struct FullScratch : ProblemScratch {
   ResidualJacobians jacobians;
-  ResidualWeights weights;
+  CountedRows counted;
   VectorXd tau, displacement, difference;  // nv
   MatrixXd Rx, Ru, scaled;                 // total derivatives of the residuals; those times the second derivatives
   // All with room for the residuals of any node.
@@ -39,15 +39,16 @@ class FullTranscription : public Transcription {
   std::unique_ptr<ProblemScratch> makeScratch() const override {
     auto out = std::make_unique<FullScratch>();
     for (VectorXd* v : {&out->tau, &out->displacement, &out->difference}) v->setZero(model_.nv());
-    int rows = 0, constraint_rows = 0;
+    int rows = 0, blocks = 0, constraint_rows = 0;
     for (size_t k = 0; k < specs_.size(); ++k) {
       rows = std::max(rows, costs_[k].rows());
+      blocks = std::max(blocks, costs_[k].numBlocks());
       constraint_rows = std::max(constraint_rows, specs_[k].constraints.rows);
     }
     for (MatrixXd* m : {&out->jacobians.q, &out->jacobians.v}) m->setZero(rows, model_.nv());
     out->jacobians.lambda.setZero(rows, constraint_rows);
     out->jacobians.u.setZero(rows, model_.nu());
-    for (VectorXd* v : {&out->weights.gradient, &out->weights.hessian}) v->setZero(rows);
+    out->counted.reserve(blocks, rows);
     for (MatrixXd* m : {&out->Rx, &out->scaled}) m->setZero(rows, 2 * model_.nv());
     out->Ru.setZero(rows, model_.nu());
     return out;
@@ -233,16 +234,17 @@ void FullTranscription::setImpact(const FullEvaluation& at, StageModel& out) con
 // Gauss-Newton terms, whatever `out` held; at a running stage forces and controls take part.
 void FullTranscription::setResiduals(int node, const FullEvaluation& at, const ConstraintWeights* constraints,
                                      FullScratch& scratch, StageModel& out) const {
-  const int nv = model_.nv(), nu = model_.nu(), rows = costs_[node].rows();
+  const int nv = model_.nv(), nu = model_.nu();
+  costs_[node].selectRows(at, constraints, scratch.counted);
+  const int rows = scratch.counted.rows;
   out.lx.setZero();
   out.lu.setZero();
   out.hessian().setZero();
   if (rows == 0) return;
   ResidualJacobians& jacobians = scratch.jacobians;
   for (MatrixXd* m : {&jacobians.q, &jacobians.v, &jacobians.lambda, &jacobians.u}) m->topRows(rows).setZero();
-  costs_[node].differentiate({model_, at.ws, specs_[node].constraints, at.u, at.lambda}, at, constraints,
-                             scratch.weights, jacobians);
-  const auto gradient = scratch.weights.gradient.head(rows), hessian = scratch.weights.hessian.head(rows);
+  costs_[node].differentiate({model_, at.ws, specs_[node].constraints, at.u, at.lambda}, scratch.counted, jacobians);
+  const auto gradient = scratch.counted.gradient.head(rows), hessian = scratch.counted.hessian.head(rows);
   const auto by_forces = jacobians.lambda.topLeftCorner(rows, specs_[node].constraints.rows);
   auto Rx = scratch.Rx.topRows(rows);
   auto scaled = scratch.scaled.topRows(rows);

@@ -7,7 +7,7 @@
 namespace bielle {
 
 NodeAssembly::NodeAssembly(const Model& model, const Reduction& reduction, const ReducedLayout& layout,
-                           int most_residuals)
+                           const std::vector<NodeCosts>& costs)
     : model_(model), reduction_(reduction), layout_(layout) {
   const int nv = model.nv(), nr = reduction.size, nu = model.nu();
   for (size_t i = 0; i < reduction.free_joints.size(); ++i) {
@@ -24,12 +24,17 @@ NodeAssembly::NodeAssembly(const Model& model, const Reduction& reduction, const
       if (dof != dofs.end()) motors_.push_back({static_cast<int>(i), static_cast<int>(dof - dofs.begin())});
     }
   }
-  const Eigen::Index rows = roundUpToLane(most_residuals), padded = roundUpToLane(2 * nr + nu);
+  int most_rows = 0, most_blocks = 0;
+  for (const NodeCosts& of_node : costs) {
+    most_rows = std::max(most_rows, of_node.rows());
+    most_blocks = std::max(most_blocks, of_node.numBlocks());
+  }
+  const Eigen::Index rows = roundUpToLane(most_rows), padded = roundUpToLane(2 * nr + nu);
   for (MatrixXd* m : {&jacobians_.q, &jacobians_.v}) m->setZero(rows, nv);
   jacobians_.lambda.setZero(rows, layout.most_constraint_rows);
   jacobians_.u.setZero(rows, nu);
-  for (VectorXd* v : {&weights_.gradient, &weights_.hessian}) v->setZero(most_residuals);
-  for (VectorXd* x : {&Rt_, &Rt_scaled_}) x->setZero(padded * most_residuals);
+  counted_.reserve(most_blocks, most_rows);
+  for (VectorXd* x : {&Rt_, &Rt_scaled_}) x->setZero(padded * most_rows);
   gradient_.setZero(2 * nr + nu);
   dlambda_.setZero(padded * layout.most_contact_rows);
   by_velocity_.setZero(nr * std::max(nr, layout.most_contact_rows));
@@ -276,14 +281,16 @@ void NodeAssembly::addTimesZ(ConstMatrixRef A, const LaneView& view, MatrixRef o
 void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
                                 const ConstraintWeights* constraints, const ReducedEvaluation& at, const LaneView& view,
                                 StageModel& out) {
-  const int nr = reduction_.size, nu = static_cast<int>(at.u.size()), columns = nu + 2 * nr, rows = costs.rows();
+  const int nr = reduction_.size, nu = static_cast<int>(at.u.size()), columns = nu + 2 * nr;
+  costs.selectRows(at, constraints, counted_);
+  const int rows = counted_.rows;
   if (rows == 0) {
     for (VectorXd* gradient : {&out.lx, &out.lu}) gradient->setZero();
     out.hessian().setZero();
     return;
   }
   // Clears the residuals of the last node, in full lanes: the memory is padded.
-  for (Eigen::Index i = 0; i < costs.motionRows(); i += kLane) {
+  for (Eigen::Index i = 0; i < counted_.motion_rows; i += kLane) {
     jacobians_.q.middleRows<kLane>(i).setZero();
     jacobians_.v.middleRows<kLane>(i).setZero();
   }
@@ -291,17 +298,17 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
     jacobians_.lambda.middleRows<kLane>(i).middleCols(contacts.closure_rows, contacts.rows).setZero();
     if (costs.needsControls()) jacobians_.u.middleRows<kLane>(i).setZero();
   }
-  costs.differentiate({model_, view.ws, spec.constraints, at.u, at.lambda}, at, constraints, weights_, jacobians_);
+  costs.differentiate({model_, view.ws, spec.constraints, at.u, at.lambda}, counted_, jacobians_);
   PaddedMap Rt = shapePadded(Rt_, columns, rows), scaled = shapePadded(Rt_scaled_, columns, rows);
-  updateResidualDerivatives(costs, contacts, at, view, Rt);
+  updateResidualDerivatives(costs.needsControls(), contacts, at, view, Rt);
   auto gradient = gradient_.head(columns);
   gradient.setZero();
   int counting = 0;  // rows so far with a non-zero weight
   for (int i = 0; i < rows; ++i) {
-    if (!weights_.counts(i)) continue;
-    gradient += weights_.gradient[i] * Rt.col(i);
+    if (!counted_.counts(i)) continue;
+    gradient += counted_.gradient[i] * Rt.col(i);
     if (counting < i) Rt.col(counting) = Rt.col(i);
-    scaled.col(counting++) = weights_.hessian[i] * Rt.col(i);
+    scaled.col(counting++) = counted_.hessian[i] * Rt.col(i);
   }
   clearPadding(shapePadded(Rt_, columns, counting));
   clearPadding(shapePadded(Rt_scaled_, columns, counting));
@@ -310,19 +317,19 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
   out.lx = gradient.tail(2 * nr);
 }
 
-void NodeAssembly::updateResidualDerivatives(const NodeCosts& costs, const ContactLayout& contacts,
-                                             const ReducedEvaluation& at, const LaneView& view, PaddedMap Rt) {
-  const int nr = reduction_.size, nu = static_cast<int>(at.u.size()), motion_rows = costs.motionRows();
+void NodeAssembly::updateResidualDerivatives(bool controls, const ContactLayout& contacts, const ReducedEvaluation& at,
+                                             const LaneView& view, PaddedMap Rt) {
+  const int nr = reduction_.size, nu = static_cast<int>(at.u.size()), motion_rows = counted_.motion_rows;
   Rt.setZero();
   const auto q = jacobians_.q.topRows(motion_rows), v = jacobians_.v.topRows(motion_rows);
   addTimesN(q, at, Rt.block(nu, 0, nr, motion_rows));
   addTimesZ(v, view, Rt.block(nu, 0, nr, motion_rows));
   addTimesN(v, at, Rt.block(nu + nr, 0, nr, motion_rows));
-  if (costs.needsControls()) Rt.topRows(nu) = jacobians_.u.topLeftCorner(costs.rows(), nu).transpose();
+  if (controls) Rt.topRows(nu) = jacobians_.u.topLeftCorner(counted_.rows, nu).transpose();
   if (nu == 0 || contacts.rows == 0) return;
   const PaddedMap by_forces = shapePadded(dlambda_, nu + 2 * nr, contacts.rows);
-  for (int i = 0; i < costs.rows(); ++i) {
-    if (!weights_.counts(i)) continue;
+  for (int i = 0; i < counted_.rows; ++i) {
+    if (!counted_.counts(i)) continue;
     for (int j = 0; j < contacts.rows; ++j) {
       const double factor = jacobians_.lambda(i, contacts.closure_rows + j);
       if (factor != 0) Rt.col(i) += factor * by_forces.col(j);

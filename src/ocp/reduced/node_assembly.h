@@ -7,7 +7,9 @@ namespace bielle {
 
 class NodeAssembly {
  public:
-  NodeAssembly(const Model& model, const Reduction& reduction, const ReducedLayout& layout, int most_residuals);
+  // \param costs  of all nodes
+  NodeAssembly(const Model& model, const Reduction& reduction, const ReducedLayout& layout,
+               const std::vector<NodeCosts>& costs);
 
   // Sets Fx, Fu and gap of a step, and the derivatives of its contact forces for setResiduals(). Overwrites the
   // accelerations of the view.
@@ -44,7 +46,7 @@ class NodeAssembly {
   void addFirstDrift(double h, const ReducedEvaluation& at, const LaneView& view, PaddedMap rows);
   void updateFreeJoint(double h, const ReducedEvaluation& at, const VectorXd& gap, FreeJoint& free) const;
   void setTransition(double h, const LaneView& view, PaddedMap dv, StageModel& out) const;
-  void updateResidualDerivatives(const NodeCosts& costs, const ContactLayout& contacts, const ReducedEvaluation& at,
+  void updateResidualDerivatives(bool controls, const ContactLayout& contacts, const ReducedEvaluation& at,
                                  const LaneView& view, PaddedMap Rt);
 
   const Model& model_;
@@ -56,7 +58,7 @@ class NodeAssembly {
   };
   std::vector<Motor> motors_;
   ResidualJacobians jacobians_;
-  ResidualWeights weights_;
+  CountedRows counted_;
   VectorXd Rt_, Rt_scaled_, gradient_;  // large enough for any node
   VectorXd dlambda_;      // (nu + 2 size) x contact rows, padded: derivatives of contact forces by (u, dy, dy_v)
   VectorXd room_;         // of solveDerivatives()

@@ -9,10 +9,11 @@ namespace bielle {
 namespace {
 
 struct ReducedScratch : ProblemScratch {
-  ReducedScratch(const Model& model, const Reduction& reduction, const ReducedLayout& layout, int residuals)
+  ReducedScratch(const Model& model, const Reduction& reduction, const ReducedLayout& layout,
+                 const std::vector<NodeCosts>& costs)
       : kernel(model, reduction, layout),
         views(kLane, LaneView(model, reduction, kernel.tree(), layout)),
-        assembly(model, reduction, layout, residuals),
+        assembly(model, reduction, layout, costs),
         impact(model, reduction) {}
   ReducedKernel kernel;
   std::vector<LaneView> views;  // one per lane
@@ -45,9 +46,7 @@ class ReducedTranscription : public Transcription {
     return std::make_unique<ReducedEvaluation>(model_, reduction_);
   }
   std::unique_ptr<ProblemScratch> makeScratch() const override {
-    int residuals = 0;
-    for (const NodeCosts& costs : costs_) residuals = std::max(residuals, costs.rows());
-    return std::make_unique<ReducedScratch>(model_, reduction_, layout_, residuals);
+    return std::make_unique<ReducedScratch>(model_, reduction_, layout_, costs_);
   }
 
   void evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const override;
