@@ -241,8 +241,9 @@ void addPresets(CLI::App& sub, const std::shared_ptr<MotionRequest>& request) {
 
 void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
   LimitOptions& limits = arguments->problem.limits;
-  sub.add_flag("--no-limits{false}", limits.enforced,
-               "ignore the robot's limits of torques, joint ranges and velocities, which motions keep otherwise");
+  sub.add_flag_callback(
+      "--no-limits", [&limits] { limits.enforced = false; },
+      "ignore the robot's limits of torques, joint ranges and velocities, which motions keep otherwise");
   sub.add_option("--limit", arguments->effort_limits,
                  "motor=largest torque [N m] in place of the robot's; may be repeated")
       ->allow_extra_args(false);
