@@ -35,7 +35,6 @@ Squat solve(const Model& model, double x_max) {
       stage.path_constraints.push_back(
           {std::string("knee of ") + shin, makeFrameTranslation(getBodyFrame(model, shin), Vector3d::Zero()),
            Vector3d::Constant(-kFree), Vector3d(x_max, kFree, kFree), Vector3d::Constant(scale)});
-  const size_t rows = 6;  // of both knees, behind those that the motion has
   Motion motion = makeMotion(model, std::move(plan), {});
   FddpOptions options;
   options.gradient_tolerance = 1e-12;
@@ -46,11 +45,13 @@ Squat solve(const Model& model, double x_max) {
   RobotEvaluator evaluator(*motion.problem);
   for (size_t k = 0; k < motion.guess.xs.size(); ++k) {
     const VectorXd u = k < motion.guess.us.size() ? motion.guess.us[k] : VectorXd();
-    const VectorXd c = evaluator.evaluate(static_cast<int>(k), motion.guess.xs[k], u).constraints.tail(rows);
-    const VectorXd y = multipliers[k].tail(rows);
-    for (int knee = 0; knee < 2; ++knee) {
-      out.farthest = std::max(out.farthest, scale * c[3 * knee]);
-      out.price += y[3 * knee] / scale;
+    const int node = static_cast<int>(k);
+    const VectorXd& c = evaluator.evaluate(node, motion.guess.xs[k], u).constraints;
+    for (int row = 0; row < c.size(); ++row) {
+      const std::string name = motion.problem->getConstraintName(node, row);
+      if (name != "knee of shin_left, row 0" && name != "knee of shin_right, row 0") continue;  // x of a knee
+      out.farthest = std::max(out.farthest, scale * c[row]);
+      out.price += multipliers[k][row] / scale;
     }
   }
   return out;
