@@ -96,6 +96,21 @@ TEST_CASE("squat: Bipetto goes down or up as asked, loops closed, feet in place"
   }
 }
 
+TEST_CASE("a leg on a rail squats and jumps, and comes to rest") {
+  const Model model = loadOwn("fivebar_leg");
+  SquatOptions squat;
+  squat.depth = 0.8;
+  std::vector<Motion> motions;
+  motions.push_back(makeSquat(model, squat));
+  motions.push_back(makeJump(model));
+  for (Motion& motion : motions) {
+    const FddpSummary summary = Fddp().solve(*motion.problem, motion.guess);
+    CAPTURE(motion.name, summary.message, summary.iterations);
+    CHECK(summary.termination == FddpTermination::Converged);
+    CHECK(motion.guess.xs.back().tail(model.nv()).lpNorm<Eigen::Infinity>() < 1e-5);
+  }
+}
+
 TEST_CASE("squat: impossible options are refused, unknown ones are named") {
   const Model model = loadOwn("bipetto");
   const auto make = [&](const std::string& option, double value) {

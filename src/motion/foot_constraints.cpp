@@ -78,9 +78,11 @@ void addDistance(const ContactFrame& swinging, const SE3& X_path, const ContactF
 
 void addRest(const Model& model, StageSpec& terminal) {
   std::vector<PathConstraint>& constraints = terminal.path_constraints;
-  constraints.push_back(makeEquation("rest of the centre of mass at the end", makeComVelocity(Vector3d::Zero()), 3,
-                                     Vector3d::Constant(kVelocity)));
-  if (model.hasFreeFlyer())
+  const bool flies = model.hasFreeFlyer();
+  const Vector3d bound(flies ? 0 : kFree, flies ? 0 : kFree, 0);
+  constraints.push_back({"rest of the centre of mass at the end", makeComVelocity(Vector3d::Zero()), -bound, bound,
+                         Vector3d::Constant(kVelocity)});
+  if (flies)
     constraints.push_back(
         makeEquation("rest of the torso at the end", makeJointVelocity({3, 4, 5}), 3, Vector3d::Constant(kVelocity)));
 }

@@ -21,7 +21,8 @@ void addDistance(const ContactFrame& swinging, const SE3& X_path, const ContactF
                  double least, StageSpec& stage);
 
 // The motion ends with the centre of mass at rest and without rotation of the torso. With the feet on the ground, all other
-// velocities follow from these; constraints on them too would contradict what contacts are off by.
+// velocities follow from these; constraints on them too would contradict what contacts are off by. Of a robot on a rail
+// that leaves the vertical velocity alone.
 void addRest(const Model& model, StageSpec& terminal);
 
 }  // namespace bielle
