@@ -15,14 +15,14 @@ inline constexpr double kMidSwingClearance = 6e-3;  // m
 // Width of the ramps around steps that leave the soles on the ground free, at most 2 cm, m.
 double chooseRamp(const Model& model, const Ground& ground, const std::vector<ContactTarget>& soles);
 
-// A foot in the air stays at least `least` m from a standing one, or from where its path leads, less a centimetre if that is
-// nearer. Soles count as capsules: their middle lines, as thick as they are wide.
+// A foot in the air stays at least `least` m from a standing one, or from where its path leads, less a centimetre if
+// that is nearer. Soles count as capsules: their middle lines, as thick as they are wide.
 void addDistance(const ContactFrame& swinging, const SE3& X_path, const ContactFrame& standing, const SE3& X_standing,
                  double least, StageSpec& stage);
 
-// The motion ends with the centre of mass at rest and without rotation of the torso. With the feet on the ground, all other
-// velocities follow from these; constraints on them too would contradict what contacts are off by. Of a robot on a rail
-// that leaves the vertical velocity alone.
+// The motion ends with the centre of mass at rest and without rotation of the torso. With the feet on the ground, all
+// other velocities follow from these; constraints on them too would contradict what contacts are off by. Of a robot on
+// a rail that leaves the vertical velocity alone.
 void addRest(const Model& model, StageSpec& terminal);
 
 }  // namespace bielle

@@ -78,7 +78,8 @@ class SoleClearance : public Residual {
   std::vector<Vector3d> corners_;
 };
 
-// Closest points p1 + s d1 and p2 + t d2 of two segments, s and t in [0, 1] (Ericson, "Real-Time Collision Detection", 5.1.9).
+// Closest points p1 + s d1 and p2 + t d2 of two segments, s and t in [0, 1] (Ericson, "Real-Time Collision Detection",
+// 5.1.9).
 std::pair<double, double> calcClosest(const Vector3d& p1, const Vector3d& d1, const Vector3d& p2, const Vector3d& d2) {
   const auto clamp = [](double x) { return std::clamp(x, 0.0, 1.0); };
   const Vector3d r = p1 - p2;
@@ -107,7 +108,8 @@ class CapsuleDistance : public Residual {
   void calc(const NodeView& node, VectorRef r) const override {
     r[0] = calcCapsuleDistance(a_, node.ws.X_WB[a_.body], b_, node.ws.X_WB[b_.body]);
   }
-  // The closest points may count as fixed to their bodies: moving them along their segments changes nothing, to first order.
+  // The closest points may count as fixed to their bodies: moving them along their segments changes nothing, to first
+  // order.
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
     const auto [pa, pb] = calcClosestPoints(a_, node.ws.X_WB[a_.body], b_, node.ws.X_WB[b_.body]);
     const Vector3d normal = (pa - pb) / std::max((pa - pb).norm(), 1e-9);

@@ -5,8 +5,8 @@
 
 namespace bielle {
 
-// Rows of a node that count: those of a residual whose weights do not all vanish, one after the other, first those that depend on
-// q or v. Bounds that are kept leave no rows.
+// Rows of a node that count: those of a residual whose weights do not all vanish, one after the other, first those that
+// depend on q or v. Bounds that are kept leave no rows.
 struct CountedRows {
   struct Block {
     const Residual* residual;

@@ -20,14 +20,15 @@
 /// What must hold are path constraints:
 /// - wrench cones of the soles on the ground;
 /// - feet in flight: no corner below the ground, and 6 mm over it in the middle half of the flight;
-/// - touchdown, at the first node of the landing: the feet are at their places, flat and at rest: the legs fold as fast as the
-///   body falls;
+/// - touchdown, at the first node of the landing: the feet are at their places, flat and at rest: the legs fold as fast
+///   as the body falls;
 /// - at the end the centre of mass is at rest and the torso does not turn.
 ///
-/// With `published`, the problem is that of the paper's example code: there are no constraints; feet are free in flight; at touchdown their costs
-/// are height, tilt and velocity; the load is the average of Eq. (2) while pushing and landing, the weight before and
-/// after; hips are weighted like other joints; contacts have the gains given, without limits; limits of motors and joints do not
-/// apply; the terminal costs are the height and the heading of the base, and the joints of the legs (Model::serialJoints) with their velocities.
+/// With `published`, the problem is that of the paper's example code: there are no constraints; feet are free in
+/// flight; at touchdown their costs are height, tilt and velocity; the load is the average of Eq. (2) while pushing and
+/// landing, the weight before and after; hips are weighted like other joints; contacts have the gains given, without
+/// limits; limits of motors and joints do not apply; the terminal costs are the height and the heading of the base, and
+/// the joints of the legs (Model::serialJoints) with their velocities.
 #include "bielle/motion/motion.h"
 
 namespace bielle {

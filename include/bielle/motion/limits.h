@@ -2,9 +2,9 @@
 /// \file Limits of motors and joints, for every motion.
 ///
 /// - Torques |u| <= effort limit: bounds of the controls, enforced by a solver with ControlBounds::Enforce.
-/// - Ranges of joints with one degree of freedom, velocities, and powers |u v| of motors: path constraints at every node but the
-///   first, whose state is given. A violation of 1 is half the width of a range (1 rad or 1 m where one side is open), or the
-///   limit of a velocity or power.
+/// - Ranges of joints with one degree of freedom, velocities, and powers |u v| of motors: path constraints at every
+///   node but the first, whose state is given. A violation of 1 is half the width of a range (1 rad or 1 m where one
+///   side is open), or the limit of a velocity or power.
 #include <map>
 #include <string>
 #include <vector>
@@ -24,7 +24,8 @@ struct LimitOptions {
 
 /// Sets the effort limits of the stages and adds the path constraints to them. Returns whether a torque is limited.
 /// \param q0  configuration of the first node (nq)
-/// \throws ModelError for an unknown motor, a limit that is not positive, a joint whose range has no width or does not hold q0
+/// \throws ModelError for an unknown motor, a limit that is not positive, a joint whose range has no width or does not
+/// hold q0
 bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& q0, std::vector<StageSpec>& stages);
 
 /// Options of a problem besides those of the motion.

@@ -8,9 +8,10 @@
 /// - forces of stance feet: share of the weight, centre of pressure.
 /// What must hold are path constraints:
 /// - wrench cones of the soles on the ground;
-/// - landing, at the first node of a double support or at the impact before it: the foot is on its foothold, flat and at rest, so
-///   that the impulses of an impact vanish;
-/// - swing foot: no corner below the ground, and 6 mm over it in the middle half of the swing; distance from the other foot;
+/// - landing, at the first node of a double support or at the impact before it: the foot is on its foothold, flat and
+///   at rest, so that the impulses of an impact vanish;
+/// - swing foot: no corner below the ground, and 6 mm over it in the middle half of the swing; distance from the other
+///   foot;
 /// - at the end the centre of mass is at rest and the torso does not turn.
 ///
 /// The pendulum of gait.h starts with a velocity v, but the robot starts at rest. With the time constant
@@ -21,8 +22,8 @@
 /// With `published`, the problem is that of the paper's example code, whose walk is known to the last digit:
 /// - no constraints;
 /// - no footholds: only the velocity of the CoM leads forward. The costs of a landing foot are its height, tilt and
-///   velocity; its place, its heading and the path of a swing have no costs, but its horizontal velocity near the ground does
-///   ("fly high"), and so do feet that come near each other;
+///   velocity; its place, its heading and the path of a swing have no costs, but its horizontal velocity near the
+///   ground does ("fly high"), and so do feet that come near each other;
 /// - the force reference is the weight on one foot, half of it on each of two, and changes at once; forces and centres
 ///   of pressure are in the axes of the world;
 /// - contacts and closures have the gains given, without limits; limits of motors and joints do not apply;
@@ -66,8 +67,8 @@ struct LocomotionOptions {
   SwingShape swing;
   double friction = 0.7;  ///< coefficient, 1
   double published = 0;   ///< 1: the paper's problem, see above; 0: on footholds
-  /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time. 0: the contact's stabilisation
-  /// stops what velocity a foot may have left.
+  /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time. 0: the contact's
+  /// stabilisation stops what velocity a foot may have left.
   double rigid_landing = 0;
 
   double state_weight = 0.1;           ///< of the state regularization

@@ -2,8 +2,8 @@
 /// \file Residuals r(q, v, lambda, u) of costs and path constraints, with analytic derivatives.
 ///
 /// A residual is a small vector with sparse partial derivatives with respect to the tangent of q, to v, to the
-/// constraint forces lambda and to the motor torques u; the stage applies the chain rule through the dynamics. Frame residuals are in world axes
-/// unless stated otherwise.
+/// constraint forces lambda and to the motor torques u; the stage applies the chain rule through the dynamics. Frame
+/// residuals are in world axes unless stated otherwise.
 #include <memory>
 #include <string>
 #include <vector>
@@ -70,8 +70,9 @@ std::unique_ptr<Residual> makeFrameVelocity(const BodyFrame& frame, const Vector
 std::unique_ptr<Residual> makeFlyHigh(const BodyFrame& frame, double slope, double ground);
 /// Horizontal distance between two frames (1), m.
 std::unique_ptr<Residual> makeFrameDistance(const BodyFrame& a, const BodyFrame& b);
-/// Heights of the corners of a sole over the ground (4), of its origin if it has no size (1), m. Around a step the ground is
-/// taken to rise to its top over `ramp` m, so that the residual is continuous, and nowhere more than the true height.
+/// Heights of the corners of a sole over the ground (4), of its origin if it has no size (1), m. Around a step the
+/// ground is taken to rise to its top over `ramp` m, so that the residual is continuous, and nowhere more than the true
+/// height.
 std::unique_ptr<Residual> makeSoleClearance(const BodyFrame& sole, double half_length, double half_width,
                                             const Ground& ground, double ramp);
 /// All points within `radius` of a segment that is fixed to a body.

@@ -135,8 +135,8 @@ enum class FddpTermination {
   Converged,
   MaxIterations,
   RegularizationMax,  ///< no acceptable step even at the largest regularization
-  /// The constraints cannot be violated less, to first order, or no step towards less can be evaluated; the message names
-  /// the worst.
+  /// The constraints cannot be violated less, to first order, or no step towards less can be evaluated; the message
+  /// names the worst.
   Infeasible,
   Interrupted,  ///< by the flag or the callback
   Failed        ///< the problem failed, or returned values that are not finite, at the current iterate

@@ -1,7 +1,7 @@
 #pragma once
-// The reduced step, its differences and its derivatives: robot_problem.h Eqs. (1), (2) and (4), for as many nodes at once
-// as a register of the processor has lanes. Written for one cluster with bases N, J, J^+ and metric W (reduction.h) at q,
-// and N', J', J'^+ at q+; a joint outside all clusters is the case N = N' = W = 1 without rows.
+// The reduced step, its differences and its derivatives: robot_problem.h Eqs. (1), (2) and (4), for as many nodes at
+// once as a register of the processor has lanes. Written for one cluster with bases N, J, J^+ and metric W
+// (reduction.h) at q, and N', J', J'^+ at q+; a joint outside all clusters is the case N = N' = W = 1 without rows.
 //
 // A tangent vector (dy, dy_v) at the state means, with Z, d_y and d_v of cluster_motion.h,
 //     dq = N dy,   dv = N dy_v + Z dy,   da = N dy' + d_y dy + d_v dy_v                                             (a)
@@ -22,8 +22,8 @@
 // (W N)^T Z = (W N)^T d_y = (W N)^T d_v = 0,
 //     dy+   = X E dy + h X (dy_v + k dy')
 //     dy_v+ = (X' E - P'^T J_q N) / h dy + X' (dy_v + k dy') - S dy+                                                (g)
-// An Euler step has k = h. A midpoint step is (g) twice, with h/2 for h: at the state with k = 0, then half way with k = h,
-// where a belongs to the foreseen velocity v^ = v + h/2 N y'_0, y'_0 being that of v itself. N turns with q,
+// An Euler step has k = h. A midpoint step is (g) twice, with h/2 for h: at the state with k = 0, then half way with k
+// = h, where a belongs to the foreseen velocity v^ = v + h/2 N y'_0, y'_0 being that of v itself. N turns with q,
 //     dy^_v = dy_v + h/2 (dy'_0 + T dy),    T = N^T d(J^T f)/dq N,    f = -J^{+T} W a_d                             (h)
 // With a gap, the result is read about the node state's own basis (cluster_gap.h).
 //
@@ -129,8 +129,8 @@ class ReducedKernel {
     const ReducedEvaluation* previous;  // whose q+ is the state, or null
     ReducedEvaluation* at;              // with x and u
   };
-  // Steps of one rule: fills `at` except for costs, sets the status of those that succeeded to Ok and the reason why others
-  // failed. In the views it fills the data that residuals read.
+  // Steps of one rule: fills `at` except for costs, sets the status of those that succeeded to Ok and the reason why
+  // others failed. In the views it fills the data that residuals read.
   void step(const StepItem* items, int count, std::vector<LaneView>& views);
   // The same for states alone, at impacts and the terminal node.
   void place(const StepItem* items, int count, std::vector<LaneView>& views);
