@@ -414,6 +414,15 @@ TEST_CASE("in the full formulation velocities follow accelerations") {
     CHECK((record.v.row(k + 1) - record.v.row(k) - 0.02 * record.a.row(k)).norm() < 1e-8);
 }
 
+TEST_CASE("the rule of the steps is what was asked for") {
+  const OutputDirectory directory;
+  CHECK(run(makeShortSquat(directory.str(), {"--formulation", "full", "--step", "midpoint"})).status != 2);
+  CHECK(directory.readSummary()["step"] == "midpoint");
+  CHECK(run(makeShortSquat(directory.str(), {"--step", "euler"})).status == 0);
+  CHECK(directory.readSummary()["step"] == "euler");
+  checkRefused(run(makeShortSquat(directory.str(), {"--step", "best"})), "best");
+}
+
 TEST_CASE("a squat that does not converge is written, marked, and status 1") {
   const OutputDirectory directory;
   const CommandResult result = run(makeShortSquat(directory.str(), {"--max-iterations", "1"}));

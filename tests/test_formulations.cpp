@@ -1,6 +1,7 @@
 // The full and the reduced formulation have the same optimum as the time step vanishes: they differ by a discretization
 // of first order. docs/formulations.md holds the whole table, which `test_formulations "[.table]"` prints.
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <cstdio>
 
 #include "bielle/dynamics/assembly.h"
@@ -86,6 +87,53 @@ TEST_CASE("formulations: their squats become one as the time step shrinks") {
   for (const Comparison& c : {coarse, fine}) {
     CHECK(c.full.gap > 1e-6);
     CHECK(c.reduced.gap < 1e-10);
+  }
+}
+
+namespace {
+
+// The state after a tenth of a second from rest, under a torque that never changes.
+VectorXd simulate(const Model& model, const VectorXd& q0, Formulation formulation, StepRule step, int stages) {
+  std::vector<StageSpec> specs(stages + 1);
+  for (StageSpec& spec : specs) {
+    spec.step = step;
+    spec.dt = 0.1 / stages;
+    spec.constraints = makeConstraintSet(model);
+  }
+  const RobotProblem problem(model, q0, VectorXd::Zero(model.nv()), std::move(specs), formulation);
+  RobotEvaluator evaluator(problem);
+  VectorXd x = problem.initialState();
+  for (int k = 0; k < stages; ++k) {
+    const RobotEvaluation& at = evaluator.evaluate(k, x, VectorXd::Constant(model.nu(), 0.3));
+    REQUIRE(at.status == StepStatus::Ok);
+    x = at.x_next;
+  }
+  return x;
+}
+
+double calcDistance(const Model& model, const VectorXd& x, const VectorXd& y) {
+  const int nq = model.nq();
+  return std::max(model.difference(x.head(nq), y.head(nq)).cwiseAbs().maxCoeff(),
+                  (x - y).tail(model.nv()).cwiseAbs().maxCoeff());
+}
+
+}  // namespace
+
+TEST_CASE("steps: Euler's are of first order, midpoint's of second") {
+  const std::vector<std::pair<Formulation, StepRule>> discretizations = {{Formulation::Full, StepRule::Euler},
+                                                                         {Formulation::Full, StepRule::Midpoint},
+                                                                         {Formulation::Reduced, StepRule::Euler}};
+  for (const char* name : {"fourbar", "fivebar", "fourbar_chain", "delta", "bipetto"}) {
+    const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/" + name).model;
+    const VectorXd q0 = findClosedConfiguration(model).q;
+    const VectorXd limit = simulate(model, q0, Formulation::Full, StepRule::Midpoint, 3200);
+    for (const auto& [formulation, step] : discretizations) {
+      const double coarse = calcDistance(model, simulate(model, q0, formulation, step, 100), limit);
+      const double fine = calcDistance(model, simulate(model, q0, formulation, step, 200), limit);
+      CAPTURE(name, getName(formulation), getName(step), coarse, fine);
+      const double order = std::log2(coarse / fine);
+      CHECK(order == Approx(step == StepRule::Euler ? 1 : 2).margin(0.15));
+    }
   }
 }
 

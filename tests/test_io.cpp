@@ -300,6 +300,7 @@ TEST_CASE("a summary reads back: phases, stances, ground; what is none is refuse
   CHECK(summary.motion == "squat");
   CHECK(summary.robot_file == "/r.urdf");
   CHECK(summary.formulation == result.formulation);
+  CHECK(summary.step == result.step);
   CHECK_FALSE(summary.converged);
   CHECK(summary.requested == result.requested);
   REQUIRE(summary.goals.size() == 1);

@@ -14,6 +14,18 @@ using namespace bielle::testing;
 
 namespace {
 
+// How a problem is discretized.
+struct Discretization {
+  Formulation formulation = Formulation::Full;
+  StepRule step = StepRule::Euler;
+};
+const std::vector<Discretization> kDiscretizations = {{Formulation::Full, StepRule::Euler},
+                                                      {Formulation::Reduced, StepRule::Euler},
+                                                      {Formulation::Full, StepRule::Midpoint}};
+std::ostream& operator<<(std::ostream& out, const Discretization& d) {
+  return out << getName(d.formulation) << ", " << getName(d.step);
+}
+
 struct Point {
   VectorXd x, u, x_node;  ///< state, controls, state of the next node
 };
@@ -25,8 +37,9 @@ StateCost makeRandomStateCost(std::mt19937& rng, const Model& model, const Vecto
 
 // A stage with a cost of every sort that looks at q, v, u and the forces; the barrier is crossed by some rows only.
 StageSpec makeStage(std::mt19937& rng, const Model& model, const VectorXd& q,
-                    const std::vector<ContactTarget>& contacts) {
+                    const std::vector<ContactTarget>& contacts, StepRule step = StepRule::Euler) {
   StageSpec stage;
+  stage.step = step;
   stage.dt = 0.02;
   stage.constraints = makeConstraintSet(model, contacts);
   stage.state = makeRandomStateCost(rng, model, q);
@@ -58,11 +71,11 @@ StageSpec makeTerminal(std::mt19937& rng, const Model& model, const VectorXd& q)
 }
 
 RobotProblem makeProblem(std::mt19937& rng, const Model& model, const VectorXd& q,
-                         const std::vector<ContactTarget>& contacts, Formulation formulation = Formulation::Full) {
+                         const std::vector<ContactTarget>& contacts, const Discretization& how) {
   std::vector<StageSpec> stages;
-  stages.push_back(makeStage(rng, model, q, contacts));
+  stages.push_back(makeStage(rng, model, q, contacts, how.step));
   stages.push_back(makeTerminal(rng, model, q));
-  return RobotProblem(model, q, VectorXd::Zero(model.nv()), std::move(stages), formulation);
+  return RobotProblem(model, q, VectorXd::Zero(model.nv()), std::move(stages), how.formulation);
 }
 
 VectorXd join(const VectorXd& q, const VectorXd& v) {
@@ -199,16 +212,18 @@ VectorXd makeNextNode(std::mt19937& rng, ProblemProbe& problem, const VectorXd& 
 }  // namespace
 
 TEST_CASE("shooting problem: random mechanisms of every joint kind, gaps closed, small and large") {
+  const StepRule step = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(21);
   for (JointKind kind : kJointKinds) {
     const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer, 3, 2);
     const Model& model = mechanism.model;
-    const RobotProblem whole = makeProblem(rng, model, mechanism.q_closed, {{0, randomPlacement(rng), 5, 4}});
+    const RobotProblem whole =
+        makeProblem(rng, model, mechanism.q_closed, {{0, randomPlacement(rng), 5, 4}}, {Formulation::Full, step});
     ProblemProbe problem(whole);
     const VectorXd q = model.integrate(mechanism.q_closed, randomVector(rng, model.nv(), 0.1));
     const VectorXd x = join(q, randomVector(rng, model.nv())), u = randomVector(rng, model.nu(), 5);
     for (double gap : {0.0, 1e-3, 0.6}) {
-      CAPTURE(getName(kind), gap);
+      CAPTURE(getName(step), getName(kind), gap);
       checkStage(problem, {x, u, makeNextNode(rng, problem, x, u, gap)}, 2e-4);
     }
     CAPTURE(getName(kind));
@@ -217,10 +232,13 @@ TEST_CASE("shooting problem: random mechanisms of every joint kind, gaps closed,
 }
 
 TEST_CASE("shooting problem: a redundant planar four-bar") {
+  const StepRule step = GENERATE(StepRule::Euler, StepRule::Midpoint);
+  CAPTURE(getName(step));
   std::mt19937 rng(22);
   const Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 0.7);
   const Model& model = mechanism.model;
   StageSpec stage;
+  stage.step = step;
   stage.constraints = makeConstraintSet(model);
   stage.state = makeRandomStateCost(rng, model, mechanism.q_closed);
   stage.control = {0.3, VectorXd::Zero(1), VectorXd::Ones(1)};
@@ -238,14 +256,68 @@ TEST_CASE("shooting problem: a redundant planar four-bar") {
   checkTerminal(problem, x, 5e-4);
 }
 
+TEST_CASE("shooting problem: a midpoint step is what the dynamics at its points make of it") {
+  std::mt19937 rng(27);
+  for (JointKind kind : kJointKinds) {
+    CAPTURE(getName(kind));
+    const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer, 3, 2);
+    const Model& model = mechanism.model;
+    const RobotProblem problem = makeProblem(rng, model, mechanism.q_closed, {{0, randomPlacement(rng), 5, 4}},
+                                             {Formulation::Full, StepRule::Midpoint});
+    const VectorXd &q = mechanism.q_closed, v = randomVector(rng, model.nv()), u = randomVector(rng, model.nu(), 5);
+    RobotEvaluator evaluator(problem);
+    const RobotEvaluation& at = evaluator.evaluate(0, join(q, v), u);
+    REQUIRE(at.status == StepStatus::Ok);
+    const StageSpec& spec = problem.spec(0);
+    const double h = spec.dt;
+    Workspace ws(model);
+    ConstrainedWorkspace cws;
+    const VectorXd tau = calcMotorForces(model, u), q_mid = model.integrate(q, h / 2 * v);
+    REQUIRE(updateConstrainedDynamics(model, ws, cws, spec.constraints, q_mid, v, tau) == DynamicsStatus::Ok);
+    const VectorXd v_mid = v + h / 2 * cws.a;
+    REQUIRE(updateConstrainedDynamics(model, ws, cws, spec.constraints, q_mid, v_mid, tau) == DynamicsStatus::Ok);
+    const VectorXd v_next = v + h * cws.a;
+    CHECK(calcRelativeError(at.q_mid, q_mid) < 1e-13);
+    CHECK(calcRelativeError(at.v_mid, v_mid) < 1e-13);
+    CHECK(calcRelativeError(at.a, cws.a) < 1e-13);
+    CHECK(calcRelativeError(at.lambda, cws.lambda) < 1e-13);
+    CHECK(calcRelativeError(at.x_next, join(model.integrate(q_mid, h / 2 * v_next), v_next)) < 1e-13);
+    // The terminal node has no step.
+    const RobotEvaluation& terminal = evaluator.evaluate(1, join(q, v));
+    CHECK(terminal.q_mid.size() + terminal.v_mid.size() == 0);
+  }
+}
+
+TEST_CASE("shooting problem: forces alone, at the midpoint of a step") {
+  std::mt19937 rng(28);
+  for (JointKind kind : kJointKinds) {
+    CAPTURE(getName(kind));
+    const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer, 3, 2);
+    const Model& model = mechanism.model;
+    std::vector<StageSpec> stages;
+    stages.push_back(makeStage(rng, model, mechanism.q_closed, {{0, randomPlacement(rng), 5, 4}}, StepRule::Midpoint));
+    stages.push_back(makeTerminal(rng, model, mechanism.q_closed));
+    StageSpec& stage = stages[0];
+    stage.state.weight = stage.control.weight = 0;
+    stage.costs.erase(
+        std::remove_if(stage.costs.begin(), stage.costs.end(), [](const Cost& cost) { return cost.name != "force"; }),
+        stage.costs.end());
+    const RobotProblem whole(model, mechanism.q_closed, VectorXd::Zero(model.nv()), std::move(stages));
+    ProblemProbe problem(whole);
+    const VectorXd q = model.integrate(mechanism.q_closed, randomVector(rng, model.nv(), 0.1));
+    const VectorXd x = join(q, randomVector(rng, model.nv())), u = randomVector(rng, model.nu(), 5);
+    checkStage(problem, {x, u, makeNextNode(rng, problem, x, u, 0)}, 2e-4);
+  }
+}
+
 TEST_CASE("shooting problem: the squat of Bipetto, half sitting with velocities on the closures") {
-  const auto formulation = GENERATE(Formulation::Full, Formulation::Reduced);
-  CAPTURE(getName(formulation));
+  const Discretization how = GENERATE(from_range(kDiscretizations));
+  CAPTURE(how);
   std::mt19937 rng(23);
   const Model model = loadRobot("bipetto").model;
   SquatOptions options;
   options.duration = 0.3;
-  const Motion motion = makeSquat(model, options, formulation);
+  const Motion motion = makeSquat(model, options, {how.formulation, how.step});
   ProblemProbe problem(*motion.problem);
   const VectorXd q = problem.initialState().head(model.nq());
   Workspace ws(model);
@@ -260,11 +332,11 @@ TEST_CASE("shooting problem: the squat of Bipetto, half sitting with velocities 
 }
 
 TEST_CASE("shooting problem: a linearization does not depend on what was computed before") {
-  const auto formulation = GENERATE(Formulation::Full, Formulation::Reduced);
-  CAPTURE(getName(formulation));
+  const Discretization how = GENERATE(from_range(kDiscretizations));
+  CAPTURE(how);
   std::mt19937 rng(26);
   const Model model = loadRobot("bipetto").model;
-  const auto make = [&] { return makeSquat(model, {}, formulation); };
+  const auto make = [&] { return makeSquat(model, {}, {how.formulation, how.step}); };
   const Motion used = make(), fresh = make();
   ProblemProbe problem(*used.problem), untouched(*fresh.problem);
   const VectorXd x0 = problem.initialState(), u = used.guess.us[0];
@@ -291,9 +363,9 @@ TEST_CASE("shooting problem: steps and linearizations allocate nothing after the
   std::mt19937 rng(24);
   const Model model = loadRobot("bipetto").model;
   const VectorXd q = makeStandingPosture(model);
-  const Formulation formulation = GENERATE(Formulation::Full, Formulation::Reduced);
-  CAPTURE(getName(formulation));
-  const RobotProblem problem = makeProblem(rng, model, q, makeContactTargets(model, q, {0, 1}, 0, 100), formulation);
+  const Discretization how = GENERATE(from_range(kDiscretizations));
+  CAPTURE(how);
+  const RobotProblem problem = makeProblem(rng, model, q, makeContactTargets(model, q, {0, 1}, 0, 100), how);
   const VectorXd x = problem.initialState();
   const VectorXd u = randomVector(rng, model.nu(), 1);
   const VectorXd small = randomVector(rng, problem.tangentSize(0), 1e-3);

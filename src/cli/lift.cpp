@@ -63,6 +63,10 @@ int run(const LiftArguments& arguments) {
   if (summary.model != "serial")
     throw ModelError(summary.file, "model '" + summary.model + "'", "it is not a motion of the serial model",
                      "make one with `bielle solve " + summary.motion + " --model serial`");
+  if (summary.step != StepRule::Euler)
+    throw ModelError(summary.file, std::string("step '") + getName(summary.step) + "'",
+                     "only motions of Euler steps, whose accelerations belong to their nodes, are lifted",
+                     "make one with `bielle solve " + summary.motion + " --model serial --step euler`");
   const MotionRecord record = readRecord((fs::path(arguments.serial_directory) / "trajectory.npz").string());
   RobotArgument robot_argument;
   std::error_code error;
@@ -70,8 +74,9 @@ int run(const LiftArguments& arguments) {
   const LoadedRobot robot = robot_argument.load();
   const SerialModel serial =
       makeSerialModel(robot.model, makeStandingPosture(robot.model), parseSerialArmature(summary.serial_armature));
-  const Motion motion = makeMotion(
-      serial.model, remakeRequest(summary).plan(serial.model, makeStandingPosture(serial.model)), summary.formulation);
+  const Motion motion =
+      makeMotion(serial.model, remakeRequest(summary).plan(serial.model, makeStandingPosture(serial.model)),
+                 {summary.formulation, StepRule::Euler});
   const SerialTrajectory trajectory = makeSerialTrajectory(motion, record);
   makeOutputDirectory(arguments.directory);
 

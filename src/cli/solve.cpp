@@ -23,6 +23,7 @@ struct SolveArguments {
   RobotArgument robot;
   std::string directory;
   ProblemOptions problem;
+  std::optional<StepRule> step;  // if not given: Euler for the serial model, whose motions may be lifted
   bool serial = false;
   std::string serial_armature = "1e-3";
   std::vector<std::string> settings;                                      // name=value
@@ -199,7 +200,9 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
     printSerialModel(*serial);
   }
   const Model& model = serial ? serial->model : robot.model;
-  const ProblemOptions problem{arguments.problem.formulation, makeLimits(arguments)};
+  ProblemOptions problem = arguments.problem;
+  problem.limits = makeLimits(arguments);
+  problem.step = arguments.step.value_or(serial ? StepRule::Euler : problem.step);
   Motion motion = makeLimited(request, model, problem);
   FddpOptions solver = arguments.solver;
   if (motion.bounded) solver.bounds = ControlBounds::Enforce;
@@ -280,6 +283,15 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
          "reduced: loops are closed at every node; full: all joints of the spanning tree, closures by accelerations")
       ->check(CLI::IsMember({getName(Formulation::Full), getName(Formulation::Reduced)}))
       ->default_str(getName(arguments->problem.formulation));
+  sub.add_option_function<std::string>(
+         "--step",
+         [arguments](const std::string& name) {
+           arguments->step = name == getName(StepRule::Euler) ? StepRule::Euler : StepRule::Midpoint;
+         },
+         "euler: steps of first order, as in the paper, and for --model serial if none is given; midpoint: of second "
+         "order")
+      ->check(CLI::IsMember({getName(StepRule::Euler), getName(StepRule::Midpoint)}))
+      ->default_str(getName(arguments->problem.step));
   sub.add_option_function<std::string>(
          "--model", [arguments](const std::string& name) { arguments->serial = name == "serial"; },
          "closed: with its linkages; serial: linkages frozen at the standing posture, motors on the serial joints")

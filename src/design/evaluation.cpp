@@ -37,9 +37,8 @@ std::vector<double> listSteps(const RobotProblem& problem) {
 }
 
 Motion makeReducedMotion(const Model& model, const DesignMotion& motion) {
-  ProblemOptions options;
-  options.formulation = Formulation::Reduced;
-  return makeMotion(model, motion.plan(model, makeStandingPosture(model)), options);
+  // Motions that are kept are lifted, which Euler steps alone can be; the others are comparable with them.
+  return makeMotion(model, motion.plan(model, makeStandingPosture(model)), {Formulation::Reduced, StepRule::Euler});
 }
 
 Outcome solveMotion(const Model& model, Motion& motion, const FddpOptions& options,

@@ -119,6 +119,7 @@ Json makeSummary(const MotionResult& result) {
           {"model", result.run.model},
           {"serial_armature", result.run.serial_armature},
           {"formulation", getName(result.formulation)},
+          {"step", getName(result.step)},
           {"command", result.run.command},
           {"goals", makeGoals(result)},
           {"requested", listByName(result.requested)},
@@ -172,6 +173,7 @@ MotionResult makeResult(const RunInfo& run, const Motion& motion, const Shooting
   result.run = run;
   result.motion = motion.name;
   result.formulation = motion.problem->formulation();
+  result.step = motion.problem->spec(0).step;
   result.requested = motion.requested;
   result.schedule = motion.schedule;
   result.ground = motion.ground;

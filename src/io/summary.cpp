@@ -65,6 +65,8 @@ MotionSummary read(const Json& json) {
   summary.serial_armature = json.value("serial_armature", "");
   const std::string formulation = json.at("formulation");
   summary.formulation = formulation == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
+  const std::string step = json.value("step", getName(StepRule::Euler));  // older results have none
+  summary.step = step == getName(StepRule::Midpoint) ? StepRule::Midpoint : StepRule::Euler;
   summary.converged = json.at("converged");
   for (const auto& [name, value] : json.at("requested").items()) summary.requested.emplace_back(name, value);
   if (json.contains("goals"))  // older results have none

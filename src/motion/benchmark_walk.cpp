@@ -173,7 +173,7 @@ Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o, Form
   plan.q_start = plan.q_end = scene.q0;
   plan.limited = false;
   plan.requested = {{"speed", o.speed}, {"step_height", o.step_height}, {"total_nodes", double(o.total_nodes)}};
-  return makeMotion(model, std::move(plan), formulation);
+  return makeMotion(model, std::move(plan), {formulation, StepRule::Euler});
 }
 
 }  // namespace bielle

@@ -54,6 +54,7 @@ void requirePositive(const std::vector<OptionEntry>& options, const std::vector<
 }
 
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options) {
+  for (StageSpec& stage : plan.stages) stage.step = options.step;
   Motion motion;
   requireOption(plan.limited || !options.limits.areGiven(), "limit", "the paper's problem has none", "leave it out");
   if (plan.limited) motion.bounded = addLimits(model, options.limits, plan.q_start, plan.stages);

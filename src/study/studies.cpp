@@ -23,10 +23,10 @@ std::string makeName(const Study& study, double value, const char* model) {
 }
 
 std::vector<std::string> makeSolve(const Study& study, double value, const std::string& robot, const char* output) {
-  std::vector<std::string> arguments = {"solve",      study.motion, "--robot",
-                                        robot,        "--set",      study.parameter + "=" + formatValue(value, "%.12g"),
-                                        "--threads",  "1",          "--quiet",
-                                        "--no-check", "--no-report"};
+  std::vector<std::string> arguments = {
+      "solve",      study.motion, "--robot", robot,   "--set",   study.parameter + "=" + formatValue(value, "%.12g"),
+      "--threads",  "1",          "--step",  "euler", "--quiet", "--no-check",
+      "--no-report"};
   arguments.insert(arguments.end(), study.settings.begin(), study.settings.end());
   arguments.insert(arguments.end(), {"-o", std::string("@") + output});
   return arguments;

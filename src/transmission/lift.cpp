@@ -234,6 +234,7 @@ const char* getName(LiftStatus status) {
 std::vector<StageSpec> makeStages(const std::vector<double>& dt, const std::vector<ConstraintSet>& constraints) {
   std::vector<StageSpec> stages(constraints.size() + 1);
   for (size_t k = 0; k < constraints.size(); ++k) {
+    stages[k].step = StepRule::Euler;  // lift.h: accelerations belong to the nodes
     stages[k].dt = dt[k];
     stages[k].constraints = constraints[k];
   }

@@ -21,6 +21,7 @@ struct MotionResult {
   RunInfo run;
   std::string motion;
   Formulation formulation = Formulation::Full;
+  StepRule step = StepRule::Euler;
   std::vector<std::pair<std::string, double>> requested;  ///< every option by name
   std::vector<GoalOutcome> goals;                         ///< requested and achieved values
   ContactSchedule schedule;
@@ -60,6 +61,7 @@ struct MotionSummary {
   std::string model = "closed";  ///< or "serial"
   std::string serial_armature;   ///< of the serial model (parseSerialArmature)
   Formulation formulation = Formulation::Full;
+  StepRule step = StepRule::Euler;
   bool converged = false;
   std::vector<std::pair<std::string, double>> requested;
   std::vector<GoalOutcome> goals;

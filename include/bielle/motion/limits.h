@@ -28,13 +28,4 @@ struct LimitOptions {
 /// hold q0
 bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& q0, std::vector<StageSpec>& stages);
 
-/// Options of a problem besides those of the motion.
-struct ProblemOptions {
-  Formulation formulation = Formulation::Reduced;
-  LimitOptions limits;
-
-  ProblemOptions() = default;
-  ProblemOptions(Formulation formulation, const LimitOptions& limits = {}) : formulation(formulation), limits(limits) {}
-};
-
 }  // namespace bielle

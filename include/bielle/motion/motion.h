@@ -64,7 +64,18 @@ struct Motion {
   bool bounded = false;  ///< a torque is limited: to be solved with ControlBounds::Enforce
 };
 
-/// Turns a plan into a problem that starts at rest, adding the limits to its stages.
+/// Options of a problem besides those of the motion.
+struct ProblemOptions {
+  Formulation formulation = Formulation::Reduced;
+  StepRule step = StepRule::Euler;
+  LimitOptions limits;
+
+  ProblemOptions() = default;
+  ProblemOptions(Formulation formulation, const LimitOptions& limits = {}) : formulation(formulation), limits(limits) {}
+  ProblemOptions(Formulation formulation, StepRule step) : formulation(formulation), step(step) {}
+};
+
+/// Turns a plan into a problem that starts at rest, adding the limits and the step rule to its stages.
 /// \throws ModelError as addLimits() does, or when limits are given for a problem of the paper, which has none
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options);
 

@@ -1,27 +1,19 @@
-// The full formulation: robot_problem.h Eqs. (1) and (3), x = (q, v) of the spanning tree; and its impacts, dq+ = dq,
-// dv+ = D_q dq + D_v dv (dynamics/impact.h).
-#include "bielle/dynamics/impact.h"
-#include "bielle/dynamics/kinematics.h"
-#include "bielle/dynamics/rnea.h"
+// The full formulation, x = (q, v) of the spanning tree: steps (full_step.h), impacts, dq+ = dq, dv+ = D_q dq + D_v dv
+// (dynamics/impact.h), and costs.
 #include "math/lane_product.h"
 #include "model/joint.h"
-#include "ocp/transcription.h"
+#include "ocp/full/full_step.h"
 
 namespace bielle {
 namespace {
 
-struct FullEvaluation : RobotEvaluation {
-  explicit FullEvaluation(const Model& model) : ws(model) {}
-  Workspace ws;
-  ConstrainedWorkspace cws;
-  std::unique_ptr<ImpactWorkspace> impact;  // of an impact alone
-};
-
 struct FullScratch : ProblemScratch {
+  FullScratch(const Model& model, int most_constraint_rows) : step(model, most_constraint_rows) {}
+  FullStepScratch step;
   ResidualJacobians jacobians;
   CountedRows counted;
-  VectorXd tau, displacement, difference;  // nv
-  MatrixXd Rx, Ru, scaled;                 // total derivatives of the residuals; those times the second derivatives
+  VectorXd difference;      // nv
+  MatrixXd Rx, Ru, scaled;  // total derivatives of the residuals; those times the second derivatives
   // All with room for the residuals of any node.
 };
 
@@ -37,14 +29,14 @@ class FullTranscription : public Transcription {
   std::unique_ptr<RobotEvaluation> makeEvaluation() const override { return std::make_unique<FullEvaluation>(model_); }
 
   std::unique_ptr<ProblemScratch> makeScratch() const override {
-    auto out = std::make_unique<FullScratch>();
-    for (VectorXd* v : {&out->tau, &out->displacement, &out->difference}) v->setZero(model_.nv());
     int rows = 0, blocks = 0, constraint_rows = 0;
     for (size_t k = 0; k < specs_.size(); ++k) {
       rows = std::max(rows, costs_[k].rows());
       blocks = std::max(blocks, costs_[k].numBlocks());
       constraint_rows = std::max(constraint_rows, specs_[k].constraints.rows);
     }
+    auto out = std::make_unique<FullScratch>(model_, constraint_rows);
+    out->difference.setZero(model_.nv());
     for (MatrixXd* m : {&out->jacobians.q, &out->jacobians.v}) m->setZero(rows, model_.nv());
     out->jacobians.lambda.setZero(rows, constraint_rows);
     out->jacobians.u.setZero(rows, model_.nu());
@@ -77,12 +69,10 @@ class FullTranscription : public Transcription {
   bool isImpact(int node) const { return isRunning(node) && specs_[node].kind == StageKind::Impact; }
 
   void evaluate(EvaluateTask& task, FullScratch& scratch) const;
-  DynamicsStatus updateStep(int node, FullScratch& scratch, FullEvaluation& at) const;
   DynamicsStatus updateImpactStep(int node, FullEvaluation& at) const;
   double calcStateCost(const StateCost& state, const FullEvaluation& at, VectorXd& difference) const;
 
   void linearize(LinearizeTask& task, FullScratch& scratch) const;
-  void setStep(double h, const FullEvaluation& at, VectorXd& displacement, StageModel& out) const;
   void setImpact(const FullEvaluation& at, StageModel& out) const;
   void setResiduals(int node, const FullEvaluation& at, const ConstraintWeights* constraints, FullScratch& scratch,
                     StageModel& out) const;
@@ -99,50 +89,29 @@ class FullTranscription : public Transcription {
   std::vector<NodeCosts> costs_;
 };
 
-void updateState(const Model& model, const VectorXd& x, Workspace& ws) {
-  updatePositions(model, ws, x.head(model.nq()));
-  updateVelocities(model, ws, x.tail(model.nv()));
-  updateMassMatrix(model, ws);
-}
-
 void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const {
   auto& at = static_cast<FullEvaluation&>(*task.out);
   const int node = task.node;
   if (!startEvaluation(model_, task, specs_[node], isRunning(node), costs_[node], at)) return;
   if (isRunning(node)) {
-    const DynamicsStatus status = isImpact(node) ? updateImpactStep(node, at) : updateStep(node, scratch, at);
+    const DynamicsStatus status =
+        isImpact(node) ? updateImpactStep(node, at) : updateFullStep(model_, specs_[node], scratch.step, at);
     if (status != DynamicsStatus::Ok) {
       at.failure = getMessage(status);
       return;
     }
     if (!at.x_next.allFinite()) return;
   } else {
-    updateState(model_, at.x, at.ws);
+    updateNode(model_, at.x, at.ws);
   }
   if (specs_[node].state.weight != 0) at.state_cost = calcStateCost(specs_[node].state, at, scratch.difference);
   costs_[node].calc({model_, at.ws, specs_[node].constraints, at.u, at.lambda}, at);
   if (std::isfinite(at.cost)) at.status = StepStatus::Ok;
 }
 
-// Eq. (1)
-DynamicsStatus FullTranscription::updateStep(int node, FullScratch& scratch, FullEvaluation& at) const {
-  const int nq = model_.nq(), nv = model_.nv();
-  const double h = specs_[node].dt;
-  calcMotorForces(model_, at.u, scratch.tau);
-  const DynamicsStatus status = updateConstrainedDynamics(model_, at.ws, at.cws, specs_[node].constraints,
-                                                          at.x.head(nq), at.x.tail(nv), scratch.tau);
-  if (status != DynamicsStatus::Ok) return status;
-  at.a = at.cws.a;
-  at.lambda = at.cws.lambda;
-  at.x_next.tail(nv) = at.x.tail(nv) + h * at.a;
-  scratch.displacement = h * at.x_next.tail(nv);
-  model_.integrate(at.x.head(nq), scratch.displacement, at.x_next.head(nq));
-  return status;
-}
-
 DynamicsStatus FullTranscription::updateImpactStep(int node, FullEvaluation& at) const {
   if (!at.impact) at.impact = std::make_unique<ImpactWorkspace>(model_);
-  updateState(model_, at.x, at.ws);
+  updateNode(model_, at.x, at.ws);
   const DynamicsStatus status = updateImpact(model_, *at.impact, specs_[node].constraints, at.ws.q, at.ws.v);
   if (status != DynamicsStatus::Ok) return status;
   at.lambda = at.impact->impulse;
@@ -166,9 +135,8 @@ void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) con
   task.status = StepStatus::Failed;
   task.failure.clear();
   if (isRunning(node)) {
-    const DynamicsStatus status = isImpact(node)
-                                      ? updateImpactDerivatives(model_, *at.impact, specs_[node].constraints)
-                                      : updateConstrainedDerivatives(model_, at.ws, at.cws, specs_[node].constraints);
+    const DynamicsStatus status = isImpact(node) ? updateImpactDerivatives(model_, *at.impact, specs_[node].constraints)
+                                                 : updateFullStepDerivatives(model_, specs_[node], scratch.step, at);
     if (status != DynamicsStatus::Ok) {
       task.failure = getMessage(status);
       return;
@@ -177,43 +145,13 @@ void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) con
     if (isImpact(node))
       setImpact(at, out);
     else
-      setStep(specs_[node].dt, at, scratch.displacement, out);
+      setFullStep(model_, specs_[node], at, scratch.step, out);
   }
   out.cost = at.cost;
   setResiduals(node, at, task.weights, scratch, out);
   addStateCost(node, at, scratch.difference, out);
   if (isRunning(node)) costs_[node].addControlCost(at.u, out);
   if (isFinite(out)) task.status = StepStatus::Ok;
-}
-
-// Eqs. (1) and (3), then the Jacobian of the difference to the node state where a gap is open.
-void FullTranscription::setStep(double h, const FullEvaluation& at, VectorXd& displacement, StageModel& out) const {
-  const int nv = model_.nv();
-  RowMatrixMap Fx = out.Fx(), Fu = out.Fu();
-  auto Fv = Fx.bottomRows(nv);
-  Fv.leftCols(nv) = h * at.cws.da_dq;
-  Fv.rightCols(nv) = h * at.cws.da_dv;
-  Fv.rightCols(nv).diagonal().array() += 1;
-  Fu.bottomRows(nv) = h * at.cws.da_du;
-  displacement = h * at.x_next.tail(nv);
-  for (const Joint& joint : model_.joints()) {
-    const int i = joint.idx_v, n = joint.nv;
-    if (n == 0) continue;
-    if (!isCurved(joint)) {
-      Fx.middleRows(i, n) = h * Fx.middleRows(nv + i, n);
-      Fx.block(i, i, n, n).diagonal().array() += 1;
-      Fu.middleRows(i, n) = h * Fu.middleRows(nv + i, n);
-      continue;
-    }
-    JointMatrix Jq(n, n), Jd(n, n), Jdiff(n, n);
-    const JointVector d = displacement.segment(i, n), gap = out.gap.segment(i, n);
-    calcJointIntegrateJacobians(joint, d, Jq, Jd);
-    calcJointDifferenceJacobian(joint, gap, Jdiff);
-    const JointMatrix dv = h * Jdiff * Jd, dq = Jdiff * Jq;
-    Fx.middleRows(i, n).noalias() = dv * Fx.middleRows(nv + i, n);
-    Fx.block(i, i, n, n) += dq;
-    Fu.middleRows(i, n).noalias() = dv * Fu.middleRows(nv + i, n);
-  }
 }
 
 void FullTranscription::setImpact(const FullEvaluation& at, StageModel& out) const {

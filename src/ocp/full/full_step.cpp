@@ -1,0 +1,173 @@
+#include "ocp/full/full_step.h"
+
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "model/joint.h"
+
+namespace bielle {
+
+FullStepScratch::FullStepScratch(const Model& model, int most_constraint_rows)
+    : tau(VectorXd::Zero(model.nv())),
+      displacement(VectorXd::Zero(model.nv())),
+      by_velocity(MatrixXd::Zero(std::max(model.nv(), most_constraint_rows), model.nv())) {}
+
+void updateNode(const Model& model, const VectorXd& x, Workspace& ws) {
+  updatePositions(model, ws, x.head(model.nq()));
+  updateVelocities(model, ws, x.tail(model.nv()));
+  updateMassMatrix(model, ws);
+}
+
+namespace {
+
+bool isMidpoint(const StageSpec& spec) { return spec.step == StepRule::Midpoint; }
+
+// Length of the last drift.
+double getLastDrift(const StageSpec& spec) { return isMidpoint(spec) ? spec.dt / 2 : spec.dt; }
+
+// a and lambda of the step, after the drifts that come before.
+DynamicsStatus updateEulerAcceleration(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
+                                       FullEvaluation& at) {
+  return updateConstrainedDynamics(model, at.ws, at.cws, spec.constraints, at.x.head(model.nq()), at.x.tail(model.nv()),
+                                   scratch.tau);
+}
+
+DynamicsStatus updateMidpointAcceleration(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
+                                          FullEvaluation& at) {
+  if (!at.midpoint) at.midpoint = std::make_unique<FullEvaluation::Midpoint>(model);
+  FullEvaluation::Midpoint& mid = *at.midpoint;
+  const auto q = at.x.head(model.nq());
+  const auto v = at.x.tail(model.nv());
+  updateNode(model, at.x, at.ws);
+  scratch.displacement = spec.dt / 2 * v;
+  model.integrate(q, scratch.displacement, at.q_mid);
+  const DynamicsStatus status =
+      updateConstrainedDynamics(model, mid.foresight_ws, mid.foresight, spec.constraints, at.q_mid, v, scratch.tau);
+  if (status != DynamicsStatus::Ok) return status;
+  at.v_mid = v + spec.dt / 2 * mid.foresight.a;
+  return updateConstrainedDynamics(model, mid.ws, at.cws, spec.constraints, at.q_mid, at.v_mid, scratch.tau);
+}
+
+}  // namespace
+
+DynamicsStatus updateFullStep(const Model& model, const StageSpec& spec, FullStepScratch& scratch, FullEvaluation& at) {
+  const int nq = model.nq(), nv = model.nv();
+  calcMotorForces(model, at.u, scratch.tau);
+  const DynamicsStatus status = isMidpoint(spec) ? updateMidpointAcceleration(model, spec, scratch, at)
+                                                 : updateEulerAcceleration(model, spec, scratch, at);
+  if (status != DynamicsStatus::Ok) return status;
+  at.a = at.cws.a;
+  at.lambda = at.cws.lambda;
+  at.x_next.tail(nv) = at.x.tail(nv) + spec.dt * at.a;
+  scratch.displacement = getLastDrift(spec) * at.x_next.tail(nv);
+  if (isMidpoint(spec))
+    model.integrate(at.q_mid, scratch.displacement, at.x_next.head(nq));
+  else
+    model.integrate(at.x.head(nq), scratch.displacement, at.x_next.head(nq));
+  return status;
+}
+
+namespace {
+
+// The derivatives of a or lambda in Eq. (2), by (q_m, v_m, u), become those by (q_m, v, u).
+void chainForesight(double h, const ConstrainedWorkspace& foresight, MatrixXd& by_velocity, MatrixXd& dq, MatrixXd& dv,
+                    MatrixXd& du) {
+  auto factor = by_velocity.topRows(dv.rows());
+  factor = h / 2 * dv;
+  dq.noalias() += factor * foresight.da_dq;
+  dv.noalias() += factor * foresight.da_dv;
+  du.noalias() += factor * foresight.da_du;
+}
+
+// Those by (q_m, v) become those by (q, v). The displacement is that of the first drift, h/2 v.
+void chainDrift(const Model& model, double h, const VectorXd& displacement, MatrixXd& dq, MatrixXd& dv) {
+  for (const Joint& joint : model.joints()) {
+    const int i = joint.idx_v, n = joint.nv;
+    if (n == 0) continue;
+    if (!isCurved(joint)) {
+      dv.middleCols(i, n) += h / 2 * dq.middleCols(i, n);
+      continue;
+    }
+    JointMatrix Jq(n, n), Jd(n, n);
+    const JointVector d = displacement.segment(i, n);
+    calcJointIntegrateJacobians(joint, d, Jq, Jd);
+    Jd *= h / 2;
+    for (Eigen::Index row = 0; row < dq.rows(); ++row) {
+      const Eigen::Matrix<double, 1, Eigen::Dynamic, Eigen::RowMajor, 1, 6> r = dq.row(row).segment(i, n);
+      dv.row(row).segment(i, n).noalias() += r * Jd;
+      dq.row(row).segment(i, n).noalias() = r * Jq;
+    }
+  }
+}
+
+}  // namespace
+
+DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
+                                         FullEvaluation& at) {
+  ConstrainedWorkspace& cws = at.cws;
+  if (!isMidpoint(spec)) return updateConstrainedDerivatives(model, at.ws, cws, spec.constraints);
+  FullEvaluation::Midpoint& mid = *at.midpoint;
+  DynamicsStatus status = updateConstrainedDerivatives(model, mid.foresight_ws, mid.foresight, spec.constraints);
+  if (status == DynamicsStatus::Ok) status = updateConstrainedDerivatives(model, mid.ws, cws, spec.constraints);
+  if (status != DynamicsStatus::Ok) return status;
+  const double h = spec.dt;
+  chainForesight(h, mid.foresight, scratch.by_velocity, cws.da_dq, cws.da_dv, cws.da_du);
+  chainForesight(h, mid.foresight, scratch.by_velocity, cws.dlambda_dq, cws.dlambda_dv, cws.dlambda_du);
+  scratch.displacement = h / 2 * at.x.tail(model.nv());
+  chainDrift(model, h, scratch.displacement, cws.da_dq, cws.da_dv);
+  chainDrift(model, h, scratch.displacement, cws.dlambda_dq, cws.dlambda_dv);
+  return status;
+}
+
+namespace {
+
+// Adds to the rows of a joint of q what its own q and v contribute without the acceleration, through the drifts.
+void addDrifts(const StageSpec& spec, const FullEvaluation& at, const Joint& joint, const JointMatrix& by_start,
+               RowMatrixMap Fx) {
+  const int i = joint.idx_v, n = joint.nv, nv = static_cast<int>(at.a.size());
+  if (!isMidpoint(spec)) {
+    Fx.block(i, i, n, n) += by_start;
+    return;
+  }
+  const double h = spec.dt;
+  JointMatrix Jq(n, n), Jd(n, n);
+  const JointVector d = h / 2 * at.x.tail(nv).segment(i, n);
+  calcJointIntegrateJacobians(joint, d, Jq, Jd);
+  Fx.block(i, i, n, n).noalias() += by_start * Jq;
+  Fx.block(i, nv + i, n, n).noalias() += h / 2 * by_start * Jd;
+}
+
+}  // namespace
+
+void setFullStep(const Model& model, const StageSpec& spec, const FullEvaluation& at, FullStepScratch& scratch,
+                 StageModel& out) {
+  const int nv = model.nv();
+  const double h = spec.dt, last = getLastDrift(spec);
+  RowMatrixMap Fx = out.Fx(), Fu = out.Fu();
+  auto Fv = Fx.bottomRows(nv);
+  Fv.leftCols(nv) = h * at.cws.da_dq;
+  Fv.rightCols(nv) = h * at.cws.da_dv;
+  Fv.rightCols(nv).diagonal().array() += 1;
+  Fu.bottomRows(nv) = h * at.cws.da_du;
+  scratch.displacement = last * at.x_next.tail(nv);
+  for (const Joint& joint : model.joints()) {
+    const int i = joint.idx_v, n = joint.nv;
+    if (n == 0) continue;
+    if (!isCurved(joint)) {
+      Fx.middleRows(i, n) = last * Fx.middleRows(nv + i, n);
+      Fx.block(i, i, n, n).diagonal().array() += 1;
+      if (isMidpoint(spec)) Fx.block(i, nv + i, n, n).diagonal().array() += h / 2;
+      Fu.middleRows(i, n) = last * Fu.middleRows(nv + i, n);
+      continue;
+    }
+    JointMatrix Jq(n, n), Jd(n, n), Jdiff(n, n);
+    const JointVector d = scratch.displacement.segment(i, n), gap = out.gap.segment(i, n);
+    calcJointIntegrateJacobians(joint, d, Jq, Jd);
+    calcJointDifferenceJacobian(joint, gap, Jdiff);
+    const JointMatrix dv = last * Jdiff * Jd, dq = Jdiff * Jq;
+    Fx.middleRows(i, n).noalias() = dv * Fx.middleRows(nv + i, n);
+    addDrifts(spec, at, joint, dq, Fx);
+    Fu.middleRows(i, n).noalias() = dv * Fu.middleRows(nv + i, n);
+  }
+}
+
+}  // namespace bielle

@@ -1,0 +1,50 @@
+#pragma once
+// A step of the full formulation, robot_problem.h Eqs. (1) to (3), with its derivatives. Of a midpoint step, with q_m and
+// v_m the point half way, a_0 the acceleration at (q_m, v) and a that at (q_m, v_m),
+//
+//     dq_m = J_q dq + h/2 J_d dv,    dv_m = dv + h/2 da_0,                                                        (1)
+//     da_0 = A0_q dq_m + A0_v dv + A0_u du,    da = A_q dq_m + A_v dv_m + A_u du,                                 (2)
+//
+// so that da = (A_q + h/2 A_v A0_q) dq_m + (A_v + h/2 A_v A0_v) dv + (A_u + h/2 A_v A0_u) du, and lambda likewise.
+#include "bielle/dynamics/impact.h"
+#include "ocp/transcription.h"
+
+namespace bielle {
+
+struct FullEvaluation : RobotEvaluation {
+  explicit FullEvaluation(const Model& model) : ws(model) {}
+
+  Workspace ws;  // at the node's state
+  /// The acceleration and the forces of the step; once linearized, their derivatives by the node's state and u.
+  ConstrainedWorkspace cws;
+
+  struct Midpoint {
+    explicit Midpoint(const Model& model) : ws(model), foresight_ws(model) {}
+    Workspace ws, foresight_ws;      // at (q_m, v_m), at (q_m, v)
+    ConstrainedWorkspace foresight;  // a_0
+  };
+  std::unique_ptr<Midpoint> midpoint;       // of a midpoint step alone
+  std::unique_ptr<ImpactWorkspace> impact;  // of an impact alone
+};
+
+struct FullStepScratch {
+  explicit FullStepScratch(const Model& model, int most_constraint_rows);
+  VectorXd tau, displacement;  // nv
+  MatrixXd by_velocity;        // the larger of nv and the constraint rows x nv, A_v of Eq. (2)
+};
+
+/// Positions, velocities and mass matrix at a state, for residuals.
+void updateNode(const Model& model, const VectorXd& x, Workspace& ws);
+
+/// The step of at.x under at.u: fills a, lambda, x_next and, of a midpoint step, q_mid and v_mid.
+DynamicsStatus updateFullStep(const Model& model, const StageSpec& spec, FullStepScratch& scratch, FullEvaluation& at);
+
+/// The derivatives of `at.cws`, after updateFullStep.
+DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
+                                         FullEvaluation& at);
+
+/// Fx and Fu of the step, with the Jacobian of the difference to the node's state where out.gap is open.
+void setFullStep(const Model& model, const StageSpec& spec, const FullEvaluation& at, FullStepScratch& scratch,
+                 StageModel& out);
+
+}  // namespace bielle
