@@ -122,7 +122,8 @@ double calcDistance(const Model& model, const VectorXd& x, const VectorXd& y) {
 TEST_CASE("steps: Euler's are of first order, midpoint's of second") {
   const std::vector<std::pair<Formulation, StepRule>> discretizations = {{Formulation::Full, StepRule::Euler},
                                                                          {Formulation::Full, StepRule::Midpoint},
-                                                                         {Formulation::Reduced, StepRule::Euler}};
+                                                                         {Formulation::Reduced, StepRule::Euler},
+                                                                         {Formulation::Reduced, StepRule::Midpoint}};
   for (const char* name : {"fourbar", "fivebar", "fourbar_chain", "delta", "bipetto"}) {
     const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/" + name).model;
     const VectorXd q0 = findClosedConfiguration(model).q;

@@ -21,7 +21,8 @@ struct Discretization {
 };
 const std::vector<Discretization> kDiscretizations = {{Formulation::Full, StepRule::Euler},
                                                       {Formulation::Reduced, StepRule::Euler},
-                                                      {Formulation::Full, StepRule::Midpoint}};
+                                                      {Formulation::Full, StepRule::Midpoint},
+                                                      {Formulation::Reduced, StepRule::Midpoint}};
 std::ostream& operator<<(std::ostream& out, const Discretization& d) {
   return out << getName(d.formulation) << ", " << getName(d.step);
 }

@@ -62,9 +62,6 @@ bool startEvaluation(const Model& model, const EvaluateTask& task, const StageSp
   if (running) at.u = *task.u;
   at.x_next.resize(running ? at.x.size() : 0);
   at.a.resize(running ? model.nv() : 0);
-  const bool midpoint = running && spec.kind == StageKind::Dynamics && spec.step == StepRule::Midpoint;
-  at.q_mid.resize(midpoint ? model.nq() : 0);
-  at.v_mid.resize(midpoint ? model.nv() : 0);
   at.lambda.resize(running ? spec.constraints.rows : 0);
   const bool midpoint = running && spec.kind == StageKind::Dynamics && spec.step == StepRule::Midpoint;
   at.q_mid.resize(midpoint ? model.nq() : 0);
