@@ -46,12 +46,12 @@ void writeText(const std::string& path, const std::string& text) { std::ofstream
 
 // A short squat and its guess, moved so that nothing is zero by chance.
 struct ShortSquat {
-  ShortSquat() : robot(loadRobot("bipetto")) {
+  explicit ShortSquat(StepRule step = StepRule::Euler) : robot(loadRobot("bipetto")) {
     SquatOptions options;
     options.duration = 0.12;
     options.settle = 0;
     options.time_step = 0.03;
-    motion = makeSquat(robot.model, options);
+    motion = makeSquat(robot.model, options, {Formulation::Reduced, step});
     testing::ProblemProbe probe(*motion.problem);
     for (size_t k = 0; k < motion.guess.xs.size(); ++k) {
       VectorXd& x = motion.guess.xs[k];
@@ -81,6 +81,9 @@ void checkEqual(const MotionRecord& a, const MotionRecord& b) {
   CHECK(areEqual(a.u, b.u));
   CHECK(areEqual(a.closure_wrenches, b.closure_wrenches));
   CHECK(areEqual(a.contact_wrenches, b.contact_wrenches));
+  CHECK(a.has_midpoints == b.has_midpoints);
+  CHECK(areEqual(a.q_mid, b.q_mid));
+  CHECK(areEqual(a.v_mid, b.v_mid));
   CHECK(areEqual(a.com, b.com));
   CHECK(areEqual(a.gap, b.gap));
 }
@@ -159,6 +162,35 @@ TEST_CASE("trajectories come back from CSV and NumPy files to the last bit") {
   MotionRecord other = record;
   other.u(1, 1) = std::nextafter(other.u(1, 1), 1e9);
   CHECK_FALSE(areEqual(other.u, record.u));  // the comparison sees the last bit
+}
+
+TEST_CASE("midpoint steps are recorded with the points to which their accelerations belong") {
+  const TemporaryDirectory directory;
+  ShortSquat squat(StepRule::Midpoint);
+  const MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
+  REQUIRE(record.has_midpoints);
+  RobotEvaluator evaluator(*squat.motion.problem);
+  for (int k = 0; k < squat.motion.problem->numStages(); ++k) {
+    const RobotEvaluation& at = evaluator.evaluate(k, squat.motion.guess.xs[k], squat.motion.guess.us[k]);
+    CHECK(record.q_mid.row(k).transpose() == at.q_mid);
+    CHECK(record.v_mid.row(k).transpose() == at.v_mid);
+    CHECK((record.q_mid.row(k) - record.q.row(k)).norm() > 1e-6);
+  }
+  writeCsv(directory / "t.csv", record);
+  writeNpz(directory / "t.npz", record);
+  checkEqual(readRecord(directory / "t.csv"), record);
+  checkEqual(readRecord(directory / "t.npz"), record);
+
+  const MotionResult result = makeResult({"bipetto", "/r.urdf", {}}, squat.motion, squat.motion.guess, {});
+  writeResult(directory / "", result);
+  CHECK(readSummary(directory / "").step == StepRule::Midpoint);
+  // Summaries of Euler steps may leave the rule out.
+  std::string text = readText(directory / "summary.json");
+  const std::string entry = "\"step\": \"midpoint\",";
+  REQUIRE(text.find(entry) != std::string::npos);
+  text.replace(text.find(entry), entry.size(), "");
+  writeText(directory / "summary.json", text);
+  CHECK(readSummary(directory / "").step == StepRule::Euler);
 }
 
 TEST_CASE("a robot without closures, motors or feet gives files that can be read back") {

@@ -21,6 +21,8 @@ Worst findNotFinite(const CheckedMotion& motion) {
                                                                {"u", &record.u},
                                                                {"closure_wrenches", &record.closure_wrenches},
                                                                {"contact_wrenches", &record.contact_wrenches},
+                                                               {"q_mid", &record.q_mid},
+                                                               {"v_mid", &record.v_mid},
                                                                {"com", &record.com},
                                                                {"gap", &record.gap}};
   Worst worst;

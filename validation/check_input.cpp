@@ -87,6 +87,8 @@ bool CheckedMotion::stands(int contact, int node) const {
 }
 
 void checkConsistency(const CheckedMotion& motion) {
+  require(motion.summary.step == StepRule::Euler, motion, "entry 'step'",
+          "the rows of the check are about Euler steps, and this motion has others");
   checkNames(motion);
   require(motion.numStages() >= 1, motion, "trajectory", "it has no stage");
   require(isFinite(motion.summary.ground) && motion.summary.ground.friction >= 0, motion, "entry 'ground'",

@@ -32,15 +32,24 @@ void recordStage(const RobotProblem& problem, RobotEvaluator& evaluator, const V
   record.contact_wrenches.row(k).setZero();
   if (problem.spec(k).kind == StageKind::Impact) {  // no time, so no forces
     record.a.row(k).setZero();
+    if (record.has_midpoints) {
+      record.q_mid.row(k) = record.q.row(k);
+      record.v_mid.row(k) = record.v.row(k);
+    }
     return;
   }
   const RobotEvaluation& at = evaluator.evaluate(k, x, u);
   if (at.status != StepStatus::Ok) {
-    for (RowMatrixXd* table : {&record.a, &record.closure_wrenches, &record.contact_wrenches})
-      table->row(k).setConstant(std::numeric_limits<double>::quiet_NaN());
+    for (RowMatrixXd* table :
+         {&record.a, &record.closure_wrenches, &record.contact_wrenches, &record.q_mid, &record.v_mid})
+      if (table->cols() > 0) table->row(k).setConstant(std::numeric_limits<double>::quiet_NaN());
     return;
   }
   record.a.row(k) = at.a;
+  if (record.has_midpoints) {
+    record.q_mid.row(k) = at.q_mid;
+    record.v_mid.row(k) = at.v_mid;
+  }
   const ConstraintSet& set = problem.spec(k).constraints;
   for (int c = 0; c < static_cast<int>(set.closures.size()); ++c) {
     const Closure& closure = set.closures[c];
@@ -62,14 +71,19 @@ void resizeRecord(int stages, MotionRecord& record) {
 std::vector<RecordTable> listTables(const MotionRecord& r) {
   using Per = RecordTable::Per;
   using R = MotionRecord;
-  return {{"q", "q", Per::Node, r.q_names, &R::q, 0},
-          {"v", "v", Per::Node, r.v_names, &R::v, 0},
-          {"a", "a", Per::Stage, r.v_names, &R::a, 0},
-          {"u", "u", Per::Stage, r.u_names, &R::u, 0},
-          {"closure_wrenches", "closure", Per::Stage, makeWrenchNames(r.closure_names), &R::closure_wrenches, 6},
-          {"contact_wrenches", "contact", Per::Stage, makeWrenchNames(r.contact_names), &R::contact_wrenches, 6},
-          {"com", "com", Per::Node, {"x", "y", "z"}, &R::com, 0},
-          {"gap", "gap", Per::Node, {"position", "angle"}, &R::gap, 0}};
+  std::vector<RecordTable> tables = {
+      {"q", "q", Per::Node, r.q_names, &R::q, 0},
+      {"v", "v", Per::Node, r.v_names, &R::v, 0},
+      {"a", "a", Per::Stage, r.v_names, &R::a, 0},
+      {"u", "u", Per::Stage, r.u_names, &R::u, 0},
+      {"closure_wrenches", "closure", Per::Stage, makeWrenchNames(r.closure_names), &R::closure_wrenches, 6},
+      {"contact_wrenches", "contact", Per::Stage, makeWrenchNames(r.contact_names), &R::contact_wrenches, 6},
+      {"com", "com", Per::Node, {"x", "y", "z"}, &R::com, 0},
+      {"gap", "gap", Per::Node, {"position", "angle"}, &R::gap, 0}};
+  if (!r.has_midpoints) return tables;
+  tables.push_back({"q_mid", "q_mid", Per::Stage, r.q_names, &R::q_mid, 0});
+  tables.push_back({"v_mid", "v_mid", Per::Stage, r.v_names, &R::v_mid, 0});
+  return tables;
 }
 
 MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajectory) {
@@ -83,6 +97,7 @@ MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajecto
   record.u_names = getNames(model.motors());
   record.closure_names = getNames(model.closures());
   record.contact_names = getNames(model.contacts());
+  record.has_midpoints = problem.spec(0).step == StepRule::Midpoint;
   resizeRecord(stages, record);
   Workspace ws(model);
   double time = 0;

@@ -66,6 +66,7 @@ void addName(const std::string& column, MotionRecord& record) {
   const std::string prefix = column.substr(0, dot), name = column.substr(dot + 1);
   if (prefix == "q") record.q_names.push_back(name);
   if (prefix == "v") record.v_names.push_back(name);
+  if (prefix == "q_mid") record.has_midpoints = true;
   if (prefix == "u") record.u_names.push_back(name);
   const bool first_entry = name.size() > 3 && name.compare(name.size() - 3, 3, ".fx") == 0;
   if (prefix == "closure" && first_entry) record.closure_names.push_back(name.substr(0, name.size() - 3));

@@ -45,6 +45,7 @@ MotionRecord readNpz(const std::string& path) {
   NpyArrays arrays = readArchive(path);
   MotionRecord record;
   for (const auto& [name, member] : kNames) record.*member = takeArray(path, name, true, arrays).texts;
+  record.has_midpoints = arrays.count("q_mid") > 0;
   const NpyArray time = takeArray(path, "time", false, arrays);
   if (time.shape.size() != 1 || time.numbers.empty())
     throw ModelError(path, "array 'time'", "it is not a list of nodes", "give a trajectory that Bielle wrote");

@@ -19,10 +19,12 @@ struct MotionRecord {
 
   VectorXd time;                 ///< N + 1, s
   RowMatrixXd q, v;              ///< N + 1 x nq, N + 1 x nv
-  RowMatrixXd a;                 ///< N x nv
+  RowMatrixXd a;                 ///< N x nv; of midpoint steps at (q_mid, v_mid), like u and the wrenches
   RowMatrixXd u;                 ///< N x nu, N m or N
   RowMatrixXd closure_wrenches;  ///< N x 6 per closure, on body 1, in frame 1
   RowMatrixXd contact_wrenches;  ///< N x 6 per contact, of the ground on the foot, in its frame; zero in the air
+  bool has_midpoints = false;    ///< midpoint steps (robot_problem.h Eq. (2)); else the next two are empty
+  RowMatrixXd q_mid, v_mid;      ///< N x nq, N x nv; of an impact, which takes no time, q and v of its node
   RowMatrixXd com;               ///< N + 1 x 3, m
   RowMatrixXd gap;               ///< N + 1 x 2, largest closing error: norms of position (m) and of angle (rad)
 };
@@ -30,8 +32,9 @@ struct MotionRecord {
 MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajectory);
 
 /// One row per node under one header: time, q.<name>, v.<name>, a.<name>, u.<motor>, closure.<name>.<entry>,
-/// contact.<name>.<entry>, com.x, com.y, com.z, gap.position, gap.angle. No stage starts at the last node: its cells of
-/// a, u and of the wrenches are empty. Numbers are the shortest that read back to the same bits.
+/// contact.<name>.<entry>, com.x, com.y, com.z, gap.position, gap.angle and, of midpoint steps, q_mid.<name> and
+/// v_mid.<name>. No stage starts at the last node: its cells of
+/// a, u, q_mid, v_mid and of the wrenches are empty. Numbers are the shortest that read back to the same bits.
 void writeCsv(const std::string& path, const MotionRecord& record);
 
 /// NumPy archive of the members above by the same names; wrenches are N x closures x 6 and N x contacts x 6.
