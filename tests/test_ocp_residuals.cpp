@@ -61,9 +61,9 @@ std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, 
   add("frame velocity", makeFrameVelocity(a, randomVector(rng, 6)));
   add("fly high", makeFlyHigh(a, 5, 0.1));
   add("frame distance", makeFrameDistance(a, b));
-  Ground ground;  // with a step whose ramp reaches under all of the robot
+  Ground ground;  // with an inclined step whose ramp reaches under all of the robot
   ground.height = -0.2;
-  ground.steps = {{Vector3d(0.1, -0.2, 0.3), 0.2, 0.3, 0.5}};
+  ground.steps = {{Vector3d(0.1, -0.2, 0.3), 0.2, 0.3, 0.5, 0.2, -0.3}};
   add("sole clearance", makeSoleClearance(a, 0.1, 0.05, ground, 3));
   add("point clearance", makeSoleClearance(b, 0, 0, ground, 3));
   const auto random = [&rng] { return Vector3d(randomVector(rng, 3, 0.2)); };

@@ -20,17 +20,32 @@ Corners calcCorners(const ContactFrame& contact, const SE3& X_WF) {
   return corners;
 }
 
-// Height of the lowest corner over the ground under it, m.
+// Calls visit(height over the ground under it, m) for points all over a sole: its middle may be over a gap or an edge that
+// its corners do not see.
+template <typename Visit>
+void visitSole(const Ground& ground, const Corners& corners, const Visit& visit) {
+  constexpr double kEvery = 5e-3;  // m
+  const auto countPoints = [](double length) { return length < 1 ? 1 + static_cast<int>(length / kEvery) : 200; };
+  const Vector3d along = corners[1] - corners[0], across = corners[3] - corners[0];
+  const int n = countPoints(along.norm()), m = countPoints(across.norm());
+  for (int i = 0; i <= n; ++i)
+    for (int j = 0; j <= m; ++j) {
+      const Vector3d p = corners[0] + i * along / n + j * across / m;
+      visit(p.z() - ground.calcHeight(p.x(), p.y()));
+    }
+}
+
+// Least height of a point of the sole over the ground under it, m.
 double calcClearance(const Ground& ground, const Corners& corners) {
   double least = corners[0].z() - ground.calcHeight(corners[0].x(), corners[0].y());
-  for (const Vector3d& c : corners) least = getSmaller(least, c.z() - ground.calcHeight(c.x(), c.y()));
+  visitSole(ground, corners, [&least](double height) { least = getSmaller(least, height); });
   return least;
 }
 
-// Largest distance of a corner from the ground under it, m: a standing sole lies flat.
+// Largest distance of a point of the sole from the ground under it, m: a standing sole lies flat, and on the ground.
 double calcGap(const Ground& ground, const Corners& corners) {
   double largest = 0;
-  for (const Vector3d& c : corners) largest = getLarger(largest, std::abs(c.z() - ground.calcHeight(c.x(), c.y())));
+  visitSole(ground, corners, [&largest](double height) { largest = getLarger(largest, std::abs(height)); });
   return largest;
 }
 

@@ -22,7 +22,7 @@ void require(bool ok, const CheckedMotion& motion, const std::string& element, c
 bool isFinite(const Ground& ground) {
   bool finite = std::isfinite(ground.height) && std::isfinite(ground.friction);
   for (const GroundStep& step : ground.steps)
-    finite = finite && step.top.allFinite() && std::isfinite(step.length + step.width + step.yaw);
+    finite = finite && step.top.allFinite() && std::isfinite(step.length + step.width + step.yaw + step.pitch + step.roll);
   return finite;
 }
 

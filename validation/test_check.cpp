@@ -84,6 +84,12 @@ TEST_CASE("check: each poisoned number makes its rows fail and no other") {
   expect({"contact: tangential over normal", "contact: wrench cone of the sole"},
          [&](CheckedMotion& m) { m.summary.ground.friction = 1e-4; });
   expect({"standing feet: off the ground"}, [&](CheckedMotion& m) { m.summary.ground.height = 3e-3; });
+  // A gap of 2 cm under the middle of a sole, out of the way of its corners.
+  expect({"standing feet: off the ground"}, [&](CheckedMotion& m) {
+    const Vector3d p = m.summary.phases[0].stances[0].X_WT.p;
+    m.summary.ground.height = p.z() - 0.2;
+    for (double side : {-1, 1}) m.summary.ground.steps.push_back({p + Vector3d(side * 1.01, 0, 0), 2, 4, 0});
+  });
   expect({"contact: least normal force", "contact: pressure beyond the sole", "contact: wrench cone of the sole",
           "equations of motion"},
          [&](CheckedMotion& m) { m.record.contact_wrenches(node, foot + 2) = -0.1; });

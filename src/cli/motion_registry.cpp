@@ -4,7 +4,9 @@
 #include <map>
 
 #include "bielle/model/error.h"
+#include "bielle/motion/footholds.h"
 #include "bielle/motion/jump.h"
+#include "bielle/motion/obstacles.h"
 #include "bielle/motion/sequence.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
@@ -32,6 +34,19 @@ std::function<MotionRequest()> makeRequests(MotionPlan (*plan)(const Model&, con
     request.plan = [=](const Model& model, const VectorXd& q0) { return plan(model, *options, q0); };
     return request;
   };
+}
+
+MotionRequest makeFootholdsRequest() {
+  const auto options = std::make_shared<FootholdsOptions>();
+  MotionRequest request;
+  request.options = listOptions(*options);
+  request.files.push_back(
+      {"footholds",
+       "YAML file, a list `footholds` of {foot: left or right, x, y, z [m], yaw, pitch, roll [rad]}, "
+       "relative to the middle of the feet at the start",
+       [=](const std::string& path) { options->footholds = readFootholds(path); }});
+  request.plan = [=](const Model& model, const VectorXd& q0) { return planFootholds(model, *options, q0); };
+  return request;
 }
 
 constexpr const char* kPaper = "the problem published with the paper: no footholds, a velocity instead";
@@ -81,6 +96,21 @@ const std::vector<MotionEntry>& getMotions() {
        "bielle solve stairs --robot bipetto --height 0.06 --stairs 4 -o stairs",
        {"height", "depth", "slope", "stairs", "speed", "width", "double_support", "swing_height"},
        makeRequests<StairsOptions>(planStairs, {{"paper", kPaper, setPaperWeights}})},
+      {"footholds",
+       "steps on uneven footholds from a file",
+       "bielle solve footholds --robot bipetto --footholds stones.yaml -o stones",
+       {"rim", "single_support", "double_support", "swing_height"},
+       makeFootholdsRequest},
+      {"box",
+       "a step onto a box, and down again if asked",
+       "bielle solve box --robot bipetto --height 0.1 --down 1 -o box",
+       {"height", "length", "width", "distance", "down", "single_support", "swing_height"},
+       makeRequests<BoxOptions>(planBox)},
+      {"gap",
+       "a step over a gap in the ground",
+       "bielle solve gap --robot bipetto --width 0.2 -o gap",
+       {"width", "distance", "depth", "single_support", "swing_height"},
+       makeRequests<GapOptions>(planGap)},
       {"jump",
        "push, fly for a given time, land: the height of the centre of mass at mid-flight follows from the time",
        "bielle solve jump --robot bipetto --flight 0.3 --length 0.2 -o jump",

@@ -16,10 +16,17 @@ struct MotionPreset {
   std::function<void()> apply;
 };
 
+// Data of a motion that come from a file (`--NAME FILE`).
+struct MotionFile {
+  std::string name, help;
+  std::function<void(const std::string& path)> read;  // throws ModelError
+};
+
 // One request: the options, and the functions that make the motion from them.
 struct MotionRequest {
   std::vector<OptionEntry> options;
   std::vector<MotionPreset> presets;
+  std::vector<MotionFile> files;
   std::function<MotionPlan(const Model&, const VectorXd& q0)> plan;
   std::vector<SequencePart> parts;  // of a sequence
 };

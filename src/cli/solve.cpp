@@ -242,6 +242,11 @@ void addPresets(CLI::App& sub, const std::shared_ptr<MotionRequest>& request) {
       ->check(CLI::IsMember(names));
 }
 
+void addFiles(CLI::App& sub, const MotionRequest& request) {
+  for (const MotionFile& file : request.files)
+    sub.add_option_function<std::string>("--" + file.name, file.read, file.help)->required();
+}
+
 void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
   LimitOptions& limits = arguments->problem.limits;
   sub.add_flag_callback(
@@ -327,6 +332,7 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   const auto arguments = std::make_shared<SolveArguments>();
   const auto request = std::make_shared<MotionRequest>(motion.makeRequest());
   addOutput(sub, arguments);
+  addFiles(sub, *request);
   addPresets(sub, request);
   for (const OptionEntry& option : request->options)
     if (std::find(motion.flags.begin(), motion.flags.end(), option.name) != motion.flags.end())
@@ -350,6 +356,7 @@ void addSequence(CLI::App& command, Action& action) {
   std::vector<std::string> names;
   std::string known;
   for (const MotionEntry& motion : getMotions()) {
+    if (!motion.makeRequest().files.empty()) continue;
     names.push_back(motion.name);
     known += (known.empty() ? "" : ", ") + motion.name;
   }

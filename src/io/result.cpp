@@ -76,7 +76,9 @@ Json makeGround(const Ground& ground) {
     steps.push_back({{"top", {step.top.x(), step.top.y(), step.top.z()}},
                      {"length", step.length},
                      {"width", step.width},
-                     {"yaw", step.yaw}});
+                     {"yaw", step.yaw},
+                     {"pitch", step.pitch},
+                     {"roll", step.roll}});
   return {{"height", ground.height}, {"friction", ground.friction}, {"steps", steps}};
 }
 

@@ -32,7 +32,8 @@ Ground readGround(const Json& json) {
   ground.height = json.at("height");
   ground.friction = json.at("friction");
   for (const Json& step : json.at("steps"))
-    ground.steps.push_back({readVector(step.at("top")), step.at("length"), step.at("width"), step.at("yaw")});
+    ground.steps.push_back({readVector(step.at("top")), step.at("length"), step.at("width"), step.at("yaw"),
+                            step.value("pitch", 0.0), step.value("roll", 0.0)});
   return ground;
 }
 

@@ -124,8 +124,7 @@ SE3 calcSwing(const SwingShape& shape, const SE3& a, const SE3& b, double s) {
   X.p = a.p + t * (b.p - a.p);
   X.p.z() = s < shape.apex ? a.p.z() + (top - a.p.z()) * ease(s / shape.apex)
                            : b.p.z() + (top - b.p.z()) * ease((1 - s) / (1 - shape.apex));
-  const double turn = std::remainder(calcHeading(b) - calcHeading(a), 2 * kPi);
-  X.R = makeAxisRotation(Vector3d::UnitZ(), calcHeading(a) + t * turn);
+  X.R = a.R * exp3(t * log3(a.R.transpose() * b.R));
   return X;
 }
 

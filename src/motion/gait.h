@@ -2,7 +2,7 @@
 /// \file From footholds and durations to the desired motion of body and feet at every node.
 ///
 /// - The swing foot follows a path with zero velocity at both ends: horizontally a quintic, vertically up to an apex
-///   over the higher end and down again; the foot stays flat while its heading turns.
+///   over the higher end and down again; it turns about one axis, the vertical between level footholds.
 /// - In double support the weight shifts linearly from foot to foot.
 /// - The centre of mass is that of the linear inverted pendulum whose zero-moment point p follows the weight: with z
 ///   the height of the CoM over the feet, g gravity and h the time step,

@@ -18,7 +18,8 @@ struct Ramp {
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();
 };
 
-Ramp calcRamp(const GroundStep& step, double rise, double width, const Eigen::Vector2d& point) {
+// \param floor  height of the plane
+Ramp calcRamp(const GroundStep& step, double floor, double width, const Eigen::Vector2d& point) {
   const double c = std::cos(step.yaw), s = std::sin(step.yaw);
   Eigen::Matrix2d R;
   R << c, -s, s, c;
@@ -26,11 +27,13 @@ Ramp calcRamp(const GroundStep& step, double rise, double width, const Eigen::Ve
                         beyond = (local.cwiseAbs() - half).cwiseMax(0.0);
   const double distance = beyond.norm();
   if (distance >= width) return {};
-  const double t = 1 - distance / width;
-  Ramp ramp{rise * t * t * (3 - 2 * t)};
+  const double t = 1 - distance / width, share = t * t * (3 - 2 * t);
+  const double rise = step.calcHeight(point.x(), point.y()) - floor;
+  const Eigen::Vector2d top_slope(-std::tan(step.pitch), std::tan(step.roll) / std::cos(step.pitch));
+  Ramp ramp{rise * share, share * (R * top_slope)};
   if (distance == 0) return ramp;
   const Eigen::Vector2d outward = beyond.cwiseProduct(local.cwiseSign()) / distance;
-  ramp.slope = -rise * 6 * t * (1 - t) / width * (R * outward);
+  ramp.slope -= rise * 6 * t * (1 - t) / width * (R * outward);
   return ramp;
 }
 
@@ -66,7 +69,7 @@ class SoleClearance : public Residual {
   Ramp calcGround(const Eigen::Vector2d& point) const {
     Ramp highest;
     for (const GroundStep& step : ground_.steps) {
-      const Ramp ramp = calcRamp(step, step.top.z() - ground_.height, ramp_, point);
+      const Ramp ramp = calcRamp(step, ground_.height, ramp_, point);
       if (ramp.height > highest.height) highest = ramp;
     }
     return highest;

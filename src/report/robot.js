@@ -29,6 +29,12 @@ function makeGeometry(visual, meshes) {
   }
 }
 
+// Height of the top of a step over its centre, at a place in its own axes.
+function calcSlope(step, x, y) {
+  const pitch = step.pitch || 0, roll = step.roll || 0;
+  return -Math.tan(pitch) * x + Math.tan(roll) / Math.cos(pitch) * y;
+}
+
 // The triangles of an STL file, or null when the content is not STL.
 function readMesh(text) {
   try {
@@ -171,7 +177,10 @@ class RobotView {
     const ground = this.run.summary.ground;
     for (const step of (ground && ground.steps) || []) {
       const [x, y, top] = step.top, height = Math.max(1e-3, top - ground.height);
-      const geometry = new THREE.BoxBufferGeometry(step.length, step.width, height);
+      const geometry = new THREE.BoxBufferGeometry(step.length, step.width, height), p = geometry.attributes.position;
+      for (let i = 0; i < p.count; ++i)
+        if (p.getZ(i) > 0) p.setZ(i, p.getZ(i) + calcSlope(step, p.getX(i), p.getY(i)));
+      geometry.computeVertexNormals();
       const box =
           new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({color: makeColor('#cfd6df'), roughness: 0.9}));
       box.add(new THREE.LineSegments(
@@ -189,7 +198,7 @@ class RobotView {
     for (const step of (ground && ground.steps) || []) {
       const dx = at.x - step.top[0], dy = at.y - step.top[1], c = Math.cos(step.yaw || 0), s = Math.sin(step.yaw || 0);
       if (Math.abs(c * dx + s * dy) <= step.length / 2 && Math.abs(c * dy - s * dx) <= step.width / 2)
-        floor = Math.max(floor, step.top[2]);
+        floor = Math.max(floor, step.top[2] + calcSlope(step, c * dx + s * dy, c * dy - s * dx));
     }
     return floor;
   }

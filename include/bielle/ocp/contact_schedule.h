@@ -10,11 +10,12 @@
 
 namespace bielle {
 
-/// A box with a level top, e.g. a stair.
+/// A box, e.g. a stair. Its top may be inclined: its axes are those of Rz(yaw) Ry(pitch) Rx(roll).
 struct GroundStep {
   Vector3d top = Vector3d::Zero();  ///< centre of its top, m (world)
-  double length = 0, width = 0;     ///< of the top, along its own x and y, m
+  double length = 0, width = 0;     ///< of the box seen from above, along its own x and y, m
   double yaw = 0;                   ///< of its x about the vertical, rad
+  double pitch = 0, roll = 0;       ///< rad; positive pitch: its x goes down
 
   bool covers(double x, double y) const {
     const double dx = x - top.x(), dy = y - top.y(), c = std::cos(yaw), s = std::sin(yaw);
@@ -25,6 +26,11 @@ struct GroundStep {
     const double dx = x - top.x(), dy = y - top.y(), c = std::cos(yaw), s = std::sin(yaw);
     return std::hypot(std::max(0.0, std::abs(c * dx + s * dy) - length / 2),
                       std::max(0.0, std::abs(c * dy - s * dx) - width / 2));
+  }
+  /// Height of the plane of its top, m.
+  double calcHeight(double x, double y) const {
+    const double dx = x - top.x(), dy = y - top.y(), c = std::cos(yaw), s = std::sin(yaw);
+    return top.z() - std::tan(pitch) * (c * dx + s * dy) + std::tan(roll) / std::cos(pitch) * (c * dy - s * dx);
   }
 };
 
@@ -37,7 +43,7 @@ struct Ground {
   double calcHeight(double x, double y) const {
     double z = height;
     for (const GroundStep& step : steps)
-      if (step.covers(x, y)) z = std::max(z, step.top.z());
+      if (step.covers(x, y)) z = std::max(z, step.calcHeight(x, y));
     return z;
   }
 };

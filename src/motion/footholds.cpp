@@ -1,0 +1,147 @@
+#include "bielle/motion/footholds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "bielle/model/error.h"
+#include "bielle/motion/stairs.h"
+#include "math/so3.h"
+#include "model/text_file.h"
+#include "model/yaml_entry.h"
+#include "motion/course.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kSamePlace = 1e-3;  // m, rad
+constexpr size_t kMostSteps = 200;
+constexpr double kSunken = 0.05;  // of the plane under the lowest stone, m
+
+Footstep readFoothold(const YamlEntry& entry) {
+  const YamlFields fields = entry.getFields({"foot", "x", "y", "z", "yaw", "pitch", "roll"});
+  const YamlEntry& foot = require(fields, "foot", entry);
+  if (!foot.isWord("left") && !foot.isWord("right")) foot.fail("it is no foot", "give left or right");
+  const auto get = [&](const std::string& key) {
+    const YamlEntry* number = find(fields, key);
+    return number ? number->getNumber() : 0;
+  };
+  for (const char* key : {"x", "y"}) require(fields, key, entry);
+  constexpr double kSteepest = 0.7;  // rad
+  for (const char* key : {"pitch", "roll"})
+    if (std::abs(get(key)) > kSteepest)
+      find(fields, key)->fail("the foothold is steeper than " + std::to_string(kSteepest) + " rad", "give radians");
+  Footstep step;
+  step.side = foot.isWord("left") ? Side::Left : Side::Right;
+  step.X_WF.p << get("x"), get("y"), get("z");
+  step.X_WF.R = makeAxisRotation(Vector3d::UnitZ(), get("yaw")) * makeAxisRotation(Vector3d::UnitY(), get("pitch")) *
+                makeAxisRotation(Vector3d::UnitX(), get("roll"));
+  return step;
+}
+
+// The footholds in the world, and the step that brings the feet together.
+std::vector<Footstep> makeSteps(const Stance& stance, const std::vector<Footstep>& footholds) {
+  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
+  std::vector<Footstep> steps;
+  for (const Footstep& foothold : footholds) {
+    if (!steps.empty() && steps.back().side == foothold.side)
+      throw ModelError("", "foothold " + std::to_string(steps.size() + 1),
+                       std::string("the ") + getName(foothold.side) + " steps twice in a row",
+                       "let the feet step in turn");
+    steps.push_back({foothold.side, start * foothold.X_WF});
+  }
+  const Footstep& last = steps.back();
+  const SE3& foot = stance.feet[static_cast<int>(last.side)];
+  const SE3 moved = last.X_WF * foot.inverse();
+  if (std::abs(moved.R(2, 2) - 1) > kSamePlace * kSamePlace)
+    throw ModelError("", "foothold " + std::to_string(steps.size()),
+                     "it is inclined, but the motion ends there, standing on both feet",
+                     "let the last foothold be level: no pitch, no roll");
+  const Side other = getOther(last.side);
+  const SE3 beside = moved * stance.feet[static_cast<int>(other)];
+  const SE3 there = FootstepPlan{stance.feet, steps}.getStance(static_cast<int>(steps.size()))[static_cast<int>(other)];
+  const SE3 gap = there.inverseTimes(beside);
+  if (gap.p.norm() > kSamePlace || log3(gap.R).norm() > kSamePlace) steps.push_back({other, beside});
+  return steps;
+}
+
+// Stones under all footholds. If all of them rise over the level of the start it is that of the plane; otherwise the plane
+// lies under the lowest stone, and the robot starts from a platform.
+Ground makeGround(const Model& model, const Stance& stance, const std::vector<Footstep>& steps, double rim) {
+  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
+  Ground ground;
+  double lowest = start.p.z();
+  for (const Footstep& step : steps) {
+    const ContactFrame& sole = model.contacts()[stance.contacts[static_cast<int>(step.side)]];
+    const GroundStep stone = makeStone(sole, step.X_WF, rim);
+    ground.steps.push_back(stone);
+    for (double x : {-0.5, 0.5})
+      for (double y : {-0.5, 0.5}) {
+        const Vector3d corner =
+            makeAxisRotation(Vector3d::UnitZ(), stone.yaw) * Vector3d(x * stone.length, y * stone.width, 0);
+        lowest = std::min(lowest, stone.calcHeight(stone.top.x() + corner.x(), stone.top.y() + corner.y()));
+      }
+  }
+  ground.height = start.p.z();
+  if (lowest >= start.p.z() - kSamePlace) return ground;
+  ground.height = lowest - kSunken;
+  double width = 0, length = 0;
+  for (int i = 0; i < 2; ++i) {
+    const ContactFrame& sole = model.contacts()[stance.contacts[i]];
+    const Vector3d place = start.inverseTimes(stance.feet[i]).p;
+    width = std::max(width, 2 * (std::abs(place.y()) + sole.half_width + rim));
+    length = std::max(length, 2 * (std::abs(place.x()) + sole.half_length + rim));
+  }
+  ground.steps.push_back({start.p, length, width, calcHeading(start)});
+  return ground;
+}
+
+}  // namespace
+
+LocomotionOptions FootholdsOptions::makeGaitDefaults() {
+  LocomotionOptions gait = StairsOptions::makeGaitDefaults();
+  gait.timing.single = 0.5;
+  gait.swing.height = 0.04;
+  gait.swing.leave = 0.15;
+  gait.swing.arrive = 0.85;
+  return gait;
+}
+
+std::vector<OptionEntry> listOptions(FootholdsOptions& o) {
+  std::vector<OptionEntry> entries = {{"rim", &o.rim, "m", "of the stones around the soles"}};
+  for (OptionEntry& entry : listOptions(o.gait)) entries.push_back(std::move(entry));
+  return entries;
+}
+
+std::vector<Footstep> readFootholds(const std::string& path) {
+  std::vector<Footstep> footholds;
+  readYamlDocument(path, readTextFile(path, "give a YAML file with a list of footholds"),
+                   [&](const YamlEntry& document) {
+                     const YamlFields fields = document.getFields({"footholds"});
+                     const YamlEntry& list = require(fields, "footholds", document);
+                     for (const YamlEntry& entry : list.getList()) footholds.push_back(readFoothold(entry));
+                     if (footholds.empty() || footholds.size() > kMostSteps)
+                       list.fail("it has no foothold, or more than 200",
+                                 "give one entry per step, e.g. {foot: right, x: 0.2, y: -0.1}");
+                   });
+  return footholds;
+}
+
+MotionPlan planFootholds(const Model& model, const FootholdsOptions& o, const VectorXd& q0) {
+  if (o.footholds.empty())
+    throw ModelError("", "footholds", "none are given", "name a file of footholds (`--footholds FILE.yaml`)");
+  requireOption(o.rim >= 0 && o.rim <= 1, "rim", "it is outside 0 .. 1 m", "give metres, e.g. 0.02");
+  const Stance stance = makeStance(model, o.gait, q0);
+  Course course{"footholds", makeSteps(stance, o.footholds), {}};
+  course.ground = makeGround(model, stance, course.steps, o.rim);
+  MotionPlan plan = planCourse(model, stance, course, o.gait);
+  FootholdsOptions copy = o;
+  plan.requested = listValues(listOptions(copy));
+  return plan;
+}
+
+Motion makeFootholds(const Model& model, const FootholdsOptions& options, const ProblemOptions& problem) {
+  return makeMotion(model, planFootholds(model, options, makeStandingPosture(model)), problem);
+}
+
+}  // namespace bielle
