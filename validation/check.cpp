@@ -79,7 +79,15 @@ const CheckRow* CheckReport::findRow(const std::string& name) const {
   return nullptr;
 }
 
-CheckReport checkMotion(const CheckedMotion& motion, const CheckBounds& bounds) {
+CheckBounds makeBounds(StepRule rule) {
+  CheckBounds bounds;
+  if (rule == StepRule::Euler) return bounds;
+  for (double* bound : {&bounds.finite_differences, &bounds.interval_energy, &bounds.total_energy}) *bound /= 10;
+  return bounds;
+}
+
+CheckReport checkMotion(const CheckedMotion& motion) {
+  const CheckBounds bounds = makeBounds(motion.summary.step);
   checkConsistency(motion);
   CheckReport report{motion.summary.motion, motion.summary.robot, static_cast<int>(motion.record.time.size()), {}};
   const Worst not_finite = findNotFinite(motion);

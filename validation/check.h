@@ -38,6 +38,17 @@
 ///     |rest| <= h |(v c)_{k+1} - (v c)_k| + h^2/2 |a c| + h/2 |(g_{k+1} - g_k) v_{k+1}|
 ///               + |(v_{k+1} - v_k - h a) M v_m|.                                                                  (8)
 /// For a single interval the mean right side of the motion is added, since terms of second order may dominate there.
+///
+/// A midpoint step (robot_problem.h Eq. (2)) records the point (q_m, v_m) of its accelerations and forces, where (1) and
+/// (4) hold. With e = q_m (-) q_k, f = q_{k+1} (-) q_m, and P = N N^T W at the point named (the identity in the full
+/// formulation),
+///     P(q_k) (e - h/2 v_k) = 0,    P(q_m) (2 f / h - w) = 0,    P(q_{k+1}) (f - h/2 v_{k+1}) = 0,
+///     w = v- + h P(q_m) a,    v- = P(q_m) 2 e / h  (full: v_k)                                                    (9)
+/// The acceleration that foresees v_m is not recorded, but follows: along the closures at q_m it is 2/h (v_m - v-), which is
+/// compared with Simbody's at (q_m, v-) in the row of (4). e_k of (6) is taken with a at (q_m, v_m), and
+///     T_{k+1} - T_k + U_{k+1} - U_k = h/2 (v- + w) (B u + J^T lambda) + rest,                                     (10)
+/// U the potential energy. Both remainders are of higher order than those of an Euler step; bounds are tenths of the
+/// latter (makeBounds).
 #include <iosfwd>
 #include <optional>
 
@@ -83,6 +94,10 @@ struct CheckBounds {
   double total_energy = 1;     ///< the same for the sums over the motion
 };
 
+/// The bounds of a motion by Euler steps, or of one by midpoint steps: a tenth for what is due to the steps alone, finite
+/// differences of velocities and energy.
+CheckBounds makeBounds(StepRule rule);
+
 struct CheckRow {
   /// Goal: the achieved value beside the requested one (`bound`, within `tolerance`). Missing it breaks no law of
   /// physics: it is reported, and the check still passes.
@@ -106,7 +121,7 @@ struct CheckReport {
 };
 
 /// A trajectory with numbers that are not finite gives a single row, which says so.
-CheckReport checkMotion(const CheckedMotion& motion, const CheckBounds& bounds = {});
+CheckReport checkMotion(const CheckedMotion& motion);
 
 /// Prints the whole table, or its first line, the failed rows and the missed goals.
 enum class CheckPrint { All, Failures };

@@ -40,11 +40,14 @@ void addClosureRows(CheckContext& context) {
   Worst position, angle, velocity;
   for (size_t k = 0; k < context.trace.nodes.size(); ++k)
     for (size_t c = 0; c < model.closures().size(); ++c) {
-      const NodeTrace& node = context.trace.nodes[k];
       const int n = static_cast<int>(k);
-      position.add(node.gaps[c].head<3>().norm(), n, model.closures()[c].name);
-      angle.add(node.gaps[c].tail<3>().norm(), n, model.closures()[c].name);
-      velocity.add(calcLargest(node.gap_rates[c]), n, model.closures()[c].name);
+      const auto add = [&](const ClosureTrace& closures) {
+        position.add(closures.gaps[c].head<3>().norm(), n, model.closures()[c].name);
+        angle.add(closures.gaps[c].tail<3>().norm(), n, model.closures()[c].name);
+        velocity.add(calcLargest(closures.gap_rates[c]), n, model.closures()[c].name);
+      };
+      add(context.trace.nodes[k].closures);
+      if (k < context.trace.stages.size() && context.trace.stages[k].midpoint) add(*context.trace.stages[k].midpoint);
     }
   const double gap = reduced ? context.bounds.closed : context.bounds.drift;
   context.add(position, "loops: gap", "m", gap, "the robot has no loop");
@@ -67,6 +70,7 @@ void addDynamicsRows(CheckContext& context) {
     accelerations.add(stage.acceleration_error / acceleration, k);
     addLargest(velocity, stage.velocity_rest, 1, k, record.v_names);
     addLargest(position, stage.position_rest, 1, k, record.v_names);
+    addLargest(position, stage.midpoint_rest, 1, k, record.v_names);
     differences.add(stage.finite_difference / acceleration, k);
   }
   Worst com;
@@ -100,7 +104,7 @@ void addEnergyRows(CheckContext& context) {
     const double h = context.motion.getTimeStep(static_cast<int>(k));
     const double rest =
         nodes[k + 1].kinetic - nodes[k].kinetic - stage.motor_work - stage.contact_work - stage.closure_work;
-    const double missing = rest - h / 2 * (nodes[k].gravity_power + nodes[k + 1].gravity_power);
+    const double missing = rest - stage.gravity_work;
     const double scale = stage.energy_scale + mean;
     interval.add(std::abs(missing) / scale, static_cast<int>(k), describe(std::abs(missing), scale));
     const double raised = nodes[k + 1].potential - nodes[k].potential;

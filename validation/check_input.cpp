@@ -22,7 +22,8 @@ void require(bool ok, const CheckedMotion& motion, const std::string& element, c
 bool isFinite(const Ground& ground) {
   bool finite = std::isfinite(ground.height) && std::isfinite(ground.friction);
   for (const GroundStep& step : ground.steps)
-    finite = finite && step.top.allFinite() && std::isfinite(step.length + step.width + step.yaw + step.pitch + step.roll);
+    finite =
+        finite && step.top.allFinite() && std::isfinite(step.length + step.width + step.yaw + step.pitch + step.roll);
   return finite;
 }
 
@@ -87,8 +88,8 @@ bool CheckedMotion::stands(int contact, int node) const {
 }
 
 void checkConsistency(const CheckedMotion& motion) {
-  require(motion.summary.step == StepRule::Euler, motion, "entry 'step'",
-          "the rows of the check are about Euler steps, and this motion has others");
+  require(motion.record.has_midpoints == (motion.summary.step == StepRule::Midpoint), motion, "entry 'step'",
+          "the trajectory has midpoints and the summary names Euler steps, or the reverse");
   checkNames(motion);
   require(motion.numStages() >= 1, motion, "trajectory", "it has no stage");
   require(isFinite(motion.summary.ground) && motion.summary.ground.friction >= 0, motion, "entry 'ground'",

@@ -68,7 +68,10 @@ class Tracer {
       out.nodes.push_back(traceNode(simbody, v));
       updateTangent(simbody);
       if (k > 0) traceArrival(k - 1, out.nodes[k - 1], out.nodes[k], out.stages[k - 1]);
-      if (k < stages) traceStage(simbody, k, out.stages[k]);
+      if (k < stages && hasMidpoint(k))
+        traceMidpoint(simbody, k, out.stages[k]);
+      else if (k < stages)
+        traceStage(simbody, k, out.stages[k]);
     }
     return out;
   }
@@ -89,14 +92,7 @@ class Tracer {
       node.feet.push_back(simbody.getPlacement(contact.body) * contact.X_BF);
       node.foot_twists.push_back(contact.X_BF.actInvMotion(simbody.calcTwist(contact.body)));
     }
-    for (const Closure& closure : motion_.model.closures()) {
-      const SE3 X_12 = (simbody.getPlacement(closure.body1) * closure.X_B1)
-                           .inverseTimes(simbody.getPlacement(closure.body2) * closure.X_B2);
-      const Vector6d V1 = closure.X_B1.actInvMotion(simbody.calcTwist(closure.body1));
-      const Vector6d V2 = closure.X_B2.actInvMotion(simbody.calcTwist(closure.body2));
-      node.gaps.push_back(calcGap(closure, X_12));
-      node.gap_rates.push_back(dropFreeAxes(closure, V1 - X_12.actMotion(V2)));
-    }
+    node.closures = traceClosures(simbody);
     for (int i = 0; i < motion_.model.numBodies(); ++i)
       node.mass_centers.push_back(simbody.getPlacement(i).act(motion_.model.bodies()[i].inertia.com));
     node.com = simbody.calcCom();
@@ -106,6 +102,19 @@ class Tracer {
     node.gravity = simbody.calcGravityForces();
     node.inertial_power = v.dot(simbody.calcBias() + node.gravity);
     return node;
+  }
+
+  ClosureTrace traceClosures(const SimbodyBridge& simbody) const {
+    ClosureTrace out;
+    for (const Closure& closure : motion_.model.closures()) {
+      const SE3 X_12 = (simbody.getPlacement(closure.body1) * closure.X_B1)
+                           .inverseTimes(simbody.getPlacement(closure.body2) * closure.X_B2);
+      const Vector6d V1 = closure.X_B1.actInvMotion(simbody.calcTwist(closure.body1));
+      const Vector6d V2 = closure.X_B2.actInvMotion(simbody.calcTwist(closure.body2));
+      out.gaps.push_back(calcGap(closure, X_12));
+      out.gap_rates.push_back(dropFreeAxes(closure, V1 - X_12.actMotion(V2)));
+    }
+    return out;
   }
 
   // Projection along the closures at a node: the part of x that no correction W^{-1} J^T y can produce.
@@ -129,7 +138,14 @@ class Tracer {
   void traceArrival(int k, const NodeTrace& here, const NodeTrace& next, StageTrace& stage) const {
     const double h = motion_.getTimeStep(k);
     const VectorXd v_next = motion_.record.v.row(k + 1);
-    stage.position_rest = projectOnTangent(calcStep(k) - h * v_next);
+    if (hasMidpoint(k)) {
+      const VectorXd q_mid = motion_.record.q_mid.row(k), q_next = motion_.record.q.row(k + 1);
+      stage.position_rest = projectOnTangent(motion_.model.difference(q_mid, q_next) - h / 2 * v_next);
+      stage.gravity_work = here.potential - next.potential;
+    } else {
+      stage.position_rest = projectOnTangent(calcStep(k) - h * v_next);
+      stage.gravity_work = h / 2 * (here.gravity_power + next.gravity_power);
+    }
     stage.energy_scale += h * std::abs(next.inertial_power - here.inertial_power) +
                           h / 2 * std::abs((next.gravity - here.gravity).dot(v_next));
   }
@@ -147,6 +163,8 @@ class Tracer {
       wrenches.push_back(record.contact_wrenches.block<1, 6>(k, 6 * target.contact).transpose());
     return wrenches;
   }
+
+  bool hasMidpoint(int k) const { return motion_.record.has_midpoints && !motion_.isImpact(k); }
 
   // Velocities and impulses of an impact by Simbody's mass matrix and constraints, those of loops and of the feet that
   // stand afterwards.
@@ -179,15 +197,53 @@ class Tracer {
     stage.acceleration_error = own.error;
     stage.finite_difference = calcInertialNorm(M, (next - v) / h - own.a);
 
-    const VectorXd moved = h / 2 * (v + next);
+    traceWork(simbody, motors, wrenches, h / 2 * (v + next), stage);
+    const VectorXd inertial = simbody.calcBias() + simbody.calcGravityForces();
+    stage.energy_scale = h * h / 2 * std::abs(a.dot(inertial)) + std::abs((M * (next - v - h * a)).dot(v + next)) / 2;
+  }
+
+  // Eqs. (9) and (10); what is judged at the next node is left to traceArrival(). The bridge is at the node.
+  void traceMidpoint(SimbodyBridge& simbody, int k, StageTrace& stage) {
+    const MotionRecord& record = motion_.record;
+    const double h = motion_.getTimeStep(k);
+    const VectorXd q = record.q.row(k), v = record.v.row(k), a = record.a.row(k), next = record.v.row(k + 1);
+    const VectorXd q_mid = record.q_mid.row(k), v_mid = record.v_mid.row(k), q_next = record.q.row(k + 1);
+    const VectorXd motors = calcMotorForces(motion_.model, record.u.row(k).transpose());
+    const VectorXd first = motion_.model.difference(q, q_mid), second = motion_.model.difference(q_mid, q_next);
+    stage.midpoint_rest = projectOnTangent(first - h / 2 * v);
+    const VectorXd inertial = simbody.calcBias() + simbody.calcGravityForces();
+    stage.energy_scale = h * h / 2 * std::abs(a.dot(inertial));
+
+    simbody.setState(q_mid, v_mid, motors);
+    stage.midpoint = traceClosures(simbody);
+    updateTangent(simbody);
+    std::vector<Vector6d> wrenches = gatherWrenches(k);
+    stage.balance = simbody.calcInverseDynamics(a) - motors - simbody.calcWrenchForces(wrenches);
+    const bool full = motion_.summary.formulation == Formulation::Full;
+    const VectorXd before = full ? v : projectOnTangent(2 / h * first), after = before + h * projectOnTangent(a);
+    stage.velocity_rest = projectOnTangent(2 / h * second - after);
+    const MatrixXd M = simbody.calcMassMatrix();
+    const AccelerationTrace own = traceAccelerations(simbody, M, v_mid, a, h, full);
+    stage.acceleration = own.size;
+    stage.finite_difference = calcInertialNorm(M, (next - v) / h - own.a);
+    traceWork(simbody, motors, wrenches, h / 2 * (before + after), stage);
+
+    simbody.setState(q_mid, before, motors);
+    const VectorXd held = simbody.solveWithArmature(Precision::Double).a;
+    const VectorXd foreseen = 2 / h * (v_mid - before) + held - projectOnTangent(held);
+    stage.acceleration_error = getLarger(own.error, traceAccelerations(simbody, M, before, foreseen, h, full).error);
+    stage.energy_scale += std::abs((M * (next - v - h * a)).dot(v + next)) / 2;
+  }
+
+  // Works along a displacement.
+  void traceWork(const SimbodyBridge& simbody, const VectorXd& motors, std::vector<Vector6d>& wrenches,
+                 const VectorXd& moved, StageTrace& stage) const {
     stage.motor_work = motors.dot(moved);
     stage.exchanged = motors.cwiseProduct(moved).cwiseAbs().sum();
     const double all_work = simbody.calcWrenchForces(wrenches).dot(moved);
     std::fill_n(wrenches.begin(), motion_.model.closures().size(), Vector6d::Zero());
     stage.contact_work = simbody.calcWrenchForces(wrenches).dot(moved);
     stage.closure_work = all_work - stage.contact_work;
-    const VectorXd inertial = simbody.calcBias() + simbody.calcGravityForces();
-    stage.energy_scale = h * h / 2 * std::abs(a.dot(inertial)) + std::abs((M * (next - v - h * a)).dot(v + next)) / 2;
   }
 
   const CheckedMotion& motion_;

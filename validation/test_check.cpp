@@ -27,6 +27,60 @@ TEST_CASE("check: the squat of Bipetto passes at its defaults, in both formulati
   }
 }
 
+TEST_CASE("check: the same squat by midpoint steps, and each number of its midpoints poisoned") {
+  for (const Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
+    const SolvedSquat squat(formulation, StepRule::Midpoint);
+    CHECK(squat.summary.termination == FddpTermination::Converged);
+    const CheckReport report = checkMotion(squat.checked), euler = checkMotion(getSquat(formulation).checked);
+    INFO(print(report) << print(euler));
+    CHECK(getFailures(report) == Names());
+    for (const char* name : {"finite differences of the velocity", "energy, one interval", "energy, whole motion"})
+      CHECK(report.findRow(name)->bound == Approx(euler.findRow(name)->bound / 10));
+  }
+  const CheckedMotion good = getMidpointSquat().checked;
+  const int node = 60;  // on the way down
+  const auto getNewFailures = [&](const std::function<void(CheckedMotion&)>& poison) {
+    CheckedMotion motion = good;
+    poison(motion);
+    return getFailures(checkMotion(motion));
+  };
+  const int hip = good.model.joints()[good.model.findJoint("hipy_left")].idx_v;
+  const int hip_q = good.model.joints()[good.model.findJoint("hipy_left")].idx_q;
+  const int knee_q = good.model.joints()[good.model.findJoint("motor_knee_left")].idx_q;
+  const Names moved = {"equations of motion", "accelerations, against Simbody's", "steps of the velocity",
+                       "steps of the configuration", "energy, one interval"};
+  CHECK(getNewFailures([&](CheckedMotion& m) { m.record.q_mid(node, hip_q) += 1e-4; }) == moved);
+  CHECK(getNewFailures([&](CheckedMotion& m) { m.record.q_mid(node, knee_q) += 1e-4; }).count("loops: gap") == 1);
+  CHECK(getNewFailures([&](CheckedMotion& m) {
+          m.record.v_mid(node, hip) += 1e-2;
+        }).count("accelerations, against Simbody's") == 1);
+  CHECK(getNewFailures([&](CheckedMotion& m) { m.record.a(node, hip) += 1e-3; }) ==
+        Names{"equations of motion", "steps of the velocity"});
+  CHECK(getNewFailures([&](CheckedMotion& m) {
+          m.record.q(node, hip_q) += 1e-4;
+        }).count("steps of the configuration") == 1);
+  CHECK(getNewFailures([&](CheckedMotion& m) { m.record.v_mid(node, 3) = std::nan(""); }) ==
+        Names{"numbers not finite"});
+  CheckedMotion renamed = good;
+  renamed.summary.step = StepRule::Euler;
+  CHECK_THROWS_WITH(checkMotion(renamed), Catch::Contains("'step'") && Catch::Contains("midpoints"));
+}
+
+TEST_CASE("check: a swinging four-bar by midpoint steps, of second order") {
+  for (const Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
+    const CheckReport coarse = checkMotion(makeFourBarMotion(4e-3, formulation, nullptr, StepRule::Midpoint));
+    const CheckReport fine = checkMotion(makeFourBarMotion(2e-3, formulation, nullptr, StepRule::Midpoint));
+    const CheckReport euler = checkMotion(makeFourBarMotion(2e-3, formulation));
+    INFO(print(coarse) << print(fine) << print(euler));
+    const char* name = "finite differences of the velocity";  // of the full formulation they vanish
+    if (formulation == Formulation::Reduced)
+      CHECK(getValue(fine, name) == Approx(getValue(coarse, name) / 4).epsilon(0.1));
+    // Over a scale of first order.
+    CHECK(getValue(fine, "energy, whole motion") < 0.6 * getValue(coarse, "energy, whole motion"));
+    CHECK(getValue(fine, "energy, whole motion") < 0.1 * getValue(euler, "energy, whole motion"));
+  }
+}
+
 TEST_CASE("check: a pendulum by Euler steps passes; the exact one keeps all but them, at first order") {
   const CheckReport steps = checkMotion(makePendulumMotion(1e-3, false));
   INFO(print(steps));

@@ -44,9 +44,11 @@ inline std::string findBipetto() { return std::string(BIELLE_SOURCE_DIR) + "/rob
 
 // A squat solved once, written and read back.
 struct SolvedSquat {
-  explicit SolvedSquat(Formulation formulation) {
+  explicit SolvedSquat(Formulation formulation, StepRule step = StepRule::Euler) {
     const LoadedRobot robot = loadRobot(findBipetto());
-    Motion motion = makeSquat(robot.model, {}, formulation);
+    ProblemOptions options(formulation);
+    options.step = step;
+    Motion motion = makeSquat(robot.model, {}, options);
     summary = Fddp().solve(*motion.problem, motion.guess);
     writeResult(directory.path(), makeResult({"bipetto", robot.file, {}}, motion, motion.guess, summary));
     checked = readMotion(directory.path());
@@ -59,6 +61,11 @@ struct SolvedSquat {
 inline const SolvedSquat& getSquat(Formulation formulation = Formulation::Reduced) {
   static const SolvedSquat reduced(Formulation::Reduced), full(Formulation::Full);
   return formulation == Formulation::Reduced ? reduced : full;
+}
+
+inline const SolvedSquat& getMidpointSquat() {
+  static const SolvedSquat squat(Formulation::Reduced, StepRule::Midpoint);
+  return squat;
 }
 
 // A motion without contacts, from its states and torques.
@@ -131,14 +138,16 @@ inline CheckedMotion makePendulumMotion(double h, bool exact) {
   return motion;
 }
 
-// The four-bar swinging from rest, by the steps of a formulation. `change` modifies the loop.
+// The four-bar swinging from rest, by the steps of a formulation and a rule. `change` modifies the loop.
 inline CheckedMotion makeFourBarMotion(double h, Formulation formulation,
-                                       const std::function<void(Closure&)>& change = nullptr) {
+                                       const std::function<void(Closure&)>& change = nullptr,
+                                       StepRule rule = StepRule::Euler) {
   const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/fourbar").model;
   const VectorXd q0 = findClosedConfiguration(model).q;
   const int stages = static_cast<int>(std::lround(0.5 / h));
   const auto makeStage = [&] {
     StageSpec stage;
+    stage.step = rule;
     stage.dt = h;
     stage.constraints = makeConstraintSet(model);
     if (change) change(stage.constraints.closures[0]);
@@ -161,6 +170,7 @@ inline CheckedMotion makeFourBarMotion(double h, Formulation formulation,
     trajectory.xs.push_back(step.x_next);
   }
   CheckedMotion checked = makeFreeMotion(model, h, formulation, stages);
+  checked.summary.step = rule;
   checked.record = makeRecord(motion, trajectory);
   return checked;
 }
