@@ -252,6 +252,11 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
   sub.add_flag_callback(
       "--no-limits", [&limits] { limits.enforced = false; },
       "ignore the robot's limits of torques, joint ranges and velocities, which motions keep otherwise");
+  // Lets scripts run that name a kind of barrier: limits are kept by constraints. No group: --help leaves it out.
+  sub.add_option_function<std::string>("--limits",
+                                       [&limits](const std::string& kind) { limits.enforced = kind != "none"; })
+      ->check(CLI::IsMember({"none", "quadratic", "log"}))
+      ->group("");
   sub.add_option("--limit", arguments->effort_limits,
                  "motor=largest torque [N m] in place of the robot's; may be repeated")
       ->allow_extra_args(false);
