@@ -41,9 +41,9 @@ DynamicsStatus updateMidpointAcceleration(const Model& model, const StageSpec& s
   scratch.displacement = spec.dt / 2 * v;
   model.integrate(q, scratch.displacement, at.q_mid);
   const DynamicsStatus status =
-      updateConstrainedDynamics(model, mid.foresight_ws, mid.foresight, spec.constraints, at.q_mid, v, scratch.tau);
+      updateConstrainedDynamics(model, mid.foreseen_ws, mid.foreseen, spec.constraints, at.q_mid, v, scratch.tau);
   if (status != DynamicsStatus::Ok) return status;
-  at.v_mid = v + spec.dt / 2 * mid.foresight.a;
+  at.v_mid = v + spec.dt / 2 * mid.foreseen.a;
   return updateConstrainedDynamics(model, mid.ws, at.cws, spec.constraints, at.q_mid, at.v_mid, scratch.tau);
 }
 
@@ -69,13 +69,13 @@ DynamicsStatus updateFullStep(const Model& model, const StageSpec& spec, FullSte
 namespace {
 
 // The derivatives of a or lambda in Eq. (2), by (q_m, v_m, u), become those by (q_m, v, u).
-void chainForesight(double h, const ConstrainedWorkspace& foresight, MatrixXd& by_velocity, MatrixXd& dq, MatrixXd& dv,
+void chainForeseen(double h, const ConstrainedWorkspace& foreseen, MatrixXd& by_velocity, MatrixXd& dq, MatrixXd& dv,
                     MatrixXd& du) {
   auto factor = by_velocity.topRows(dv.rows());
   factor = h / 2 * dv;
-  dq.noalias() += factor * foresight.da_dq;
-  dv.noalias() += factor * foresight.da_dv;
-  du.noalias() += factor * foresight.da_du;
+  dq.noalias() += factor * foreseen.da_dq;
+  dv.noalias() += factor * foreseen.da_dv;
+  du.noalias() += factor * foreseen.da_du;
 }
 
 // Those by (q_m, v) become those by (q, v). The displacement is that of the first drift, h/2 v.
@@ -106,12 +106,12 @@ DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& sp
   ConstrainedWorkspace& cws = at.cws;
   if (!isMidpoint(spec)) return updateConstrainedDerivatives(model, at.ws, cws, spec.constraints);
   FullEvaluation::Midpoint& mid = *at.midpoint;
-  DynamicsStatus status = updateConstrainedDerivatives(model, mid.foresight_ws, mid.foresight, spec.constraints);
+  DynamicsStatus status = updateConstrainedDerivatives(model, mid.foreseen_ws, mid.foreseen, spec.constraints);
   if (status == DynamicsStatus::Ok) status = updateConstrainedDerivatives(model, mid.ws, cws, spec.constraints);
   if (status != DynamicsStatus::Ok) return status;
   const double h = spec.dt;
-  chainForesight(h, mid.foresight, scratch.by_velocity, cws.da_dq, cws.da_dv, cws.da_du);
-  chainForesight(h, mid.foresight, scratch.by_velocity, cws.dlambda_dq, cws.dlambda_dv, cws.dlambda_du);
+  chainForeseen(h, mid.foreseen, scratch.by_velocity, cws.da_dq, cws.da_dv, cws.da_du);
+  chainForeseen(h, mid.foreseen, scratch.by_velocity, cws.dlambda_dq, cws.dlambda_dv, cws.dlambda_du);
   scratch.displacement = h / 2 * at.x.tail(model.nv());
   chainDrift(model, h, scratch.displacement, cws.da_dq, cws.da_dv);
   chainDrift(model, h, scratch.displacement, cws.dlambda_dq, cws.dlambda_dv);

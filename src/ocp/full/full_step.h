@@ -19,9 +19,9 @@ struct FullEvaluation : RobotEvaluation {
   ConstrainedWorkspace cws;
 
   struct Midpoint {
-    explicit Midpoint(const Model& model) : ws(model), foresight_ws(model) {}
-    Workspace ws, foresight_ws;      // at (q_m, v_m), at (q_m, v)
-    ConstrainedWorkspace foresight;  // a_0
+    explicit Midpoint(const Model& model) : ws(model), foreseen_ws(model) {}
+    Workspace ws, foreseen_ws;      // at (q_m, v_m), at (q_m, v)
+    ConstrainedWorkspace foreseen;  // a_0
   };
   std::unique_ptr<Midpoint> midpoint;       // of a midpoint step alone
   std::unique_ptr<ImpactWorkspace> impact;  // of an impact alone

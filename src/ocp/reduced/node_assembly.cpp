@@ -148,7 +148,7 @@ void NodeAssembly::addMotorRows(const ReducedEvaluation& at, PaddedMap dydd) con
       dydd(m, row) -= 1;
     } else {
       const ReducedCluster& cluster = reduction_.clusters[index];
-      const ClusterBasis& basis = at.q_mid.size() > 0 ? at.mid->clusters[index].basis : at.clusters[index].at;
+      const ClusterBasis& basis = at.q_mid.size() > 0 ? at.midpoint->clusters[index].basis : at.clusters[index].at;
       dydd.row(m).segment(cluster.offset, cluster.size) -= basis.N.row(row);
     }
   }

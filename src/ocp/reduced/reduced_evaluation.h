@@ -34,9 +34,9 @@ struct ReducedEvaluation : RobotEvaluation {
   }
   std::vector<SE3> X_WB;  // nb
   std::vector<ClusterNode> clusters;
-  SaddlePointFactors factors;               // of reduced_kernel.h, Eq. (b)
-  std::unique_ptr<ImpactWorkspace> impact;  // only of an impact
-  std::unique_ptr<ReducedMidpoint> mid;     // only of a midpoint step
+  SaddlePointFactors factors;                 // of reduced_kernel.h, Eq. (b)
+  std::unique_ptr<ImpactWorkspace> impact;    // only of an impact
+  std::unique_ptr<ReducedMidpoint> midpoint;  // only of a midpoint step
 };
 
 // Contacts of one node. A slot holds one contact, always on the same body; two contacts of a body take two slots.

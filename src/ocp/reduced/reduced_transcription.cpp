@@ -85,8 +85,8 @@ void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScrat
     if (at.factors.D.size() != rows || at.factors.L.rows() != reduction_.size) at.factors.resize(reduction_.size, rows);
     const auto* previous = static_cast<const ReducedEvaluation*>(tasks[i].previous);
     if (isMidpoint(node)) {
-      if (!at.mid) at.mid = std::make_unique<ReducedMidpoint>(model_, reduction_);
-      at.mid->lambda.resize(at.lambda.size());
+      if (!at.midpoint) at.midpoint = std::make_unique<ReducedMidpoint>(model_, reduction_);
+      at.midpoint->lambda.resize(at.lambda.size());
     }
     (isStep(node) ? steps[isMidpoint(node)] : states).add({node, &specs_[node], previous, &at}, i);
   }

@@ -12,10 +12,10 @@ void ReducedKernel::loadState(LaneSource<const ReducedEvaluation> nodes, Point p
   gatherLanes(count, nq, ws_.q.data(), [&](int l) { return (at_state ? nodes[l].x : nodes[l].q_mid).data(); });
   gatherLanes(count, v_.size(), v_.data(), [&](int l) {
     if (at_state) return nodes[l].x.data() + nq;
-    return (point == Point::Foreseen ? nodes[l].mid->v : nodes[l].v_mid).data();
+    return (point == Point::Foreseen ? nodes[l].midpoint->v : nodes[l].v_mid).data();
   });
   gatherLanes(count, 12 * model_.numBodies(), getNumbers(ws_.X_WB.front()),
-              [&](int l) { return getNumbers((at_state ? nodes[l].X_WB : nodes[l].mid->X_WB).front()); });
+              [&](int l) { return getNumbers((at_state ? nodes[l].X_WB : nodes[l].midpoint->X_WB).front()); });
   ws_.stage = WorkspaceStage::Placement;
 }
 
@@ -85,7 +85,8 @@ void ReducedKernel::loadMidpointBases(LaneSource<const ReducedEvaluation> nodes)
   for (size_t i = 0; i < clusters_.size(); ++i) {
     ClusterLanes& c = clusters_[i];
     loadBasis(
-        c.cluster, nodes.count, [&](int l) -> const ClusterBasis& { return nodes[l].mid->clusters[i].basis; }, c.at);
+        c.cluster, nodes.count, [&](int l) -> const ClusterBasis& { return nodes[l].midpoint->clusters[i].basis; },
+        c.at);
   }
 }
 
@@ -158,7 +159,7 @@ void ReducedKernel::loadContact(int lane, const ContactLayout::Contact& contact,
                                 int closure_rows, Point point, ContactUse use) {
   ContactLanes& slot = contacts_[contact.slot];
   const Closure& closure = *contact.closure;
-  const SE3 X_WF = (point == Point::State ? node.X_WB : node.mid->X_WB)[closure.body1] * closure.X_B1;
+  const SE3 X_WF = (point == Point::State ? node.X_WB : node.midpoint->X_WB)[closure.body1] * closure.X_B1;
   for (int k = 0; k < 12; ++k) getNumbers(slot.X_WF)[k].set(lane, getNumbers(X_WF)[k]);
   for (int k = 0; k < 9; ++k) slot.turn.data()[k].set(lane, contact.turn.data()[k]);
   slot.kd.set(lane, closure.kd);
@@ -171,7 +172,7 @@ void ReducedKernel::loadContact(int lane, const ContactLayout::Contact& contact,
     for (int r = 0; r < contact.rows; ++r) slot.kp_residual[r].set(lane, residual[r]);
     return;
   }
-  const VectorXd& forces = point == Point::Foreseen ? node.mid->lambda : node.lambda;
+  const VectorXd& forces = point == Point::Foreseen ? node.midpoint->lambda : node.lambda;
   const VectorUpTo6<double> lambda = forces.segment(closure_rows + contact.row, contact.rows);
   const Vector6d wrench = X_WF.actForce(expandRows(closure, lambda));
   for (int k = 0; k < 6; ++k) slot.wrench[k].set(lane, wrench[k]);
@@ -212,9 +213,9 @@ bool ReducedKernel::loadStateCosts(const int* indices, const StageSpec* const* s
 void ReducedKernel::loadAccelerations(LaneSource<const ReducedEvaluation> nodes, Point point) {
   const bool foreseen = point == Point::Foreseen;
   gatherLanes(nodes.count, a_.size(), a_.data(),
-              [&](int l) { return (foreseen ? nodes[l].mid->a : nodes[l].a).data(); });
+              [&](int l) { return (foreseen ? nodes[l].midpoint->a : nodes[l].a).data(); });
   gatherLanes(nodes.count, closure_forces_.size(), closure_forces_.data(),
-              [&](int l) { return (foreseen ? nodes[l].mid->lambda : nodes[l].lambda).data(); });
+              [&](int l) { return (foreseen ? nodes[l].midpoint->lambda : nodes[l].lambda).data(); });
 }
 
 // Where a drift has led; get(node, cluster) is the state.
@@ -235,7 +236,7 @@ void ReducedKernel::loadDrift(LaneSource<const ReducedEvaluation> nodes, const G
 
 void ReducedKernel::loadFirstDrift(LaneSource<const ReducedEvaluation> nodes) {
   loadDrift(nodes,
-            [](const ReducedEvaluation& node, size_t i) -> const ClusterState& { return node.mid->clusters[i]; });
+            [](const ReducedEvaluation& node, size_t i) -> const ClusterState& { return node.midpoint->clusters[i]; });
 }
 
 void ReducedKernel::loadLastDrift(LaneSource<const ReducedEvaluation> nodes) {
@@ -248,18 +249,18 @@ void ReducedKernel::loadLastDrift(LaneSource<const ReducedEvaluation> nodes) {
 
 void ReducedKernel::storeMidpoint(const StepItem* items, int count) {
   scatterLanes(getNumbers(ws_.X_WB.front()), 12 * model_.numBodies(), count,
-               [&](int l) { return getNumbers(items[l].at->mid->X_WB.front()); });
+               [&](int l) { return getNumbers(items[l].at->midpoint->X_WB.front()); });
   scatterLanes(ws_.q.data(), ws_.q.size(), count, [&](int l) { return items[l].at->q_mid.data(); });
-  scatterLanes(v_.data(), v_.size(), count, [&](int l) { return items[l].at->mid->v.data(); });
+  scatterLanes(v_.data(), v_.size(), count, [&](int l) { return items[l].at->midpoint->v.data(); });
   for (size_t i = 0; i < clusters_.size(); ++i)
-    storeState(clusters_[i].next, count, [&](int l) { return &items[l].at->mid->clusters[i]; });
+    storeState(clusters_[i].next, count, [&](int l) { return &items[l].at->midpoint->clusters[i]; });
 }
 
 void ReducedKernel::storeForeseen(const StepItem* items, int count) {
-  scatterLanes(a_.data(), a_.size(), count, [&](int l) { return items[l].at->mid->a.data(); });
+  scatterLanes(a_.data(), a_.size(), count, [&](int l) { return items[l].at->midpoint->a.data(); });
   scatterLanes(closure_forces_.data(), closure_forces_.size(), count,
-               [&](int l) { return items[l].at->mid->lambda.data(); });
-  for (int l = 0; l < count; ++l) storeContactForces(layout_.contacts[items[l].node], l, items[l].at->mid->lambda);
+               [&](int l) { return items[l].at->midpoint->lambda.data(); });
+  for (int l = 0; l < count; ++l) storeContactForces(layout_.contacts[items[l].node], l, items[l].at->midpoint->lambda);
 }
 
 void ReducedKernel::storeStep(const StepItem* items, int count) {
