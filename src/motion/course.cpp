@@ -81,15 +81,4 @@ Goal makeCourseGoal(const Model& model, const Stance& stance, const std::string&
   return goal;
 }
 
-int findLanding(const ContactSchedule& schedule, int step) {
-  int node = 0;
-  size_t standing = schedule.phases.front().contacts.size();
-  for (const ContactPhase& phase : schedule.phases) {
-    if (phase.dt > 0 && phase.contacts.size() > standing && step-- == 0) return node;
-    if (phase.dt > 0) standing = phase.contacts.size();
-    node += phase.nodes;
-  }
-  return node;
-}
-
 }  // namespace bielle

@@ -22,7 +22,4 @@ MotionPlan planCourse(const Model& model, const Stance& stance, const Course& co
 Goal makeCourseGoal(const Model& model, const Stance& stance, const std::string& name, double asked,
                     const Vector3d& direction, int last);
 
-// First node of the double support in which the foot of step `step` has landed.
-int findLanding(const ContactSchedule& schedule, int step);
-
 }  // namespace bielle

@@ -165,4 +165,16 @@ Gait makeGait(const FootstepPlan& plan, const GaitTiming& timing, const SwingSha
   return gait;
 }
 
+std::vector<int> listLandings(const ContactSchedule& schedule) {
+  std::vector<int> landings;
+  size_t standing = schedule.phases.front().contacts.size();
+  int node = 0;
+  for (const ContactPhase& phase : schedule.phases) {
+    if (phase.dt > 0 && phase.contacts.size() > standing) landings.push_back(node);
+    if (phase.dt > 0) standing = phase.contacts.size();
+    node += phase.nodes;
+  }
+  return landings;
+}
+
 }  // namespace bielle

@@ -44,4 +44,7 @@ struct Gait {
 Gait makeGait(const FootstepPlan& plan, const GaitTiming& timing, const SwingShape& shape, const Vector3d& com,
               double gravity);
 
+// First nodes of the phases that begin with a landing, step by step.
+std::vector<int> listLandings(const ContactSchedule& schedule);
+
 }  // namespace bielle

@@ -237,19 +237,6 @@ StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector
   return stage;
 }
 
-// First nodes of the phases that begin with a landing.
-std::vector<int> listLandings(const ContactSchedule& schedule) {
-  std::vector<int> landings;
-  size_t standing = schedule.phases.front().contacts.size();
-  int node = 0;
-  for (const ContactPhase& phase : schedule.phases) {
-    if (phase.dt > 0 && phase.contacts.size() > standing) landings.push_back(node);
-    if (phase.dt > 0) standing = phase.contacts.size();
-    node += phase.nodes;
-  }
-  return landings;
-}
-
 std::vector<Goal> makeFootholdGoals(const Scene& scene, const ContactSchedule& schedule) {
   constexpr double kTolerance = 0.01;  // m
   if (isPublished(scene)) return {};

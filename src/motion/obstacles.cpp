@@ -5,6 +5,7 @@
 #include "bielle/model/error.h"
 #include "bielle/motion/stairs.h"
 #include "motion/course.h"
+#include "motion/gait.h"
 
 namespace bielle {
 namespace {
@@ -93,7 +94,7 @@ MotionPlan planBox(const Model& model, const BoxOptions& o, const VectorXd& q0) 
   MotionPlan plan = planCourse(model, stance, course, o.gait);
   plan.requested = listRequested(o);
   const Goal height =
-      makeCourseGoal(model, stance, "height", o.height, Vector3d::UnitZ(), findLanding(plan.schedule, 1));
+      makeCourseGoal(model, stance, "height", o.height, Vector3d::UnitZ(), listLandings(plan.schedule)[1]);
   plan.goals.insert(plan.goals.begin(), height);
   return plan;
 }

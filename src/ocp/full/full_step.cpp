@@ -70,7 +70,7 @@ namespace {
 
 // The derivatives of a or lambda in Eq. (2), by (q_m, v_m, u), become those by (q_m, v, u).
 void chainForeseen(double h, const ConstrainedWorkspace& foreseen, MatrixXd& by_velocity, MatrixXd& dq, MatrixXd& dv,
-                    MatrixXd& du) {
+                   MatrixXd& du) {
   auto factor = by_velocity.topRows(dv.rows());
   factor = h / 2 * dv;
   dq.noalias() += factor * foreseen.da_dq;
