@@ -1,6 +1,6 @@
 bielle_test(walk SOURCES test_walk.cpp LIBS bielle_motion)
 bielle_test(stairs SOURCES test_stairs.cpp LIBS bielle_motion)
-bielle_test(obstacles SOURCES test_obstacles.cpp LIBS bielle_motion)
+bielle_test(obstacles SOURCES test_obstacles.cpp robot_directory.cpp LIBS bielle_motion)
 bielle_test(sequence SOURCES test_sequence.cpp LIBS bielle_motion)
 bielle_test(motion SOURCES test_motion.cpp robot_directory.cpp LIBS bielle_motion)
 bielle_test(goals SOURCES test_goals.cpp LIBS bielle_io)

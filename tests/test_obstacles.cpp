@@ -1,14 +1,15 @@
 // Uneven footholds, a box and a gap: feet on the ground they were given, and nowhere else.
 #include <catch2/catch.hpp>
-#include <fstream>
 
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/footholds.h"
 #include "bielle/motion/obstacles.h"
 #include "measure_steps.h"
+#include "robot_directory.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
 
@@ -40,9 +41,8 @@ void checkGround(const Motion& motion) {
 }
 
 std::vector<Footstep> read(const std::string& text) {
-  const std::string path = "footholds_under_test.yaml";
-  std::ofstream(path) << text;
-  return readFootholds(path);
+  const RobotDirectory directory;
+  return readFootholds(directory.write("footholds_under_test.yaml", text));
 }
 
 constexpr const char* kStones = R"(footholds:
