@@ -33,12 +33,13 @@ struct TestNode {
     updateMassMatrix(model, ws);
     lambda = forces;
   }
-  NodeView view() const { return {model, ws, set, u, lambda}; }
+  NodeView view() const { return {model, ws, set, u, lambda, time_scale}; }
 
   const Model& model;
   const ConstraintSet& set;
   Workspace ws;
   VectorXd u, lambda;
+  double time_scale = 1.3;
 };
 
 struct NamedResidual {
@@ -88,19 +89,25 @@ void checkResidual(const Model& model, const ConstraintSet& set, const Residual&
   const int n = residual.size(), nv = model.nv();
   MatrixXd dq = MatrixXd::Zero(n, nv), dv = dq, dlambda = MatrixXd::Zero(n, set.rows),
            du = MatrixXd::Zero(n, model.nu());
+  VectorXd ds = VectorXd::Zero(n);
   TestNode node(model, set);
   // The Jacobian is written over that of another state: what it does not write must be zero everywhere.
   std::mt19937 rng(99);
   node.move(model.integrate(q, randomVector(rng, nv, 0.5)), v + randomVector(rng, nv), 2 * lambda);
   node.u = randomVector(rng, model.nu());
-  residual.calcJacobian(node.view(), {dq, dv, dlambda, du});
+  residual.calcJacobian(node.view(), {dq, dv, dlambda, du, ds});
   node.move(q, v, lambda);
   const VectorXd u = randomVector(rng, model.nu());
   node.u = u;
-  residual.calcJacobian(node.view(), {dq, dv, dlambda, du});
+  residual.calcJacobian(node.view(), {dq, dv, dlambda, du, ds});
   checkDerivative(
       dq, differentiateTangent(model, q, kStep, [&](const VectorXd& x) { return node.calc(residual, x, v, lambda); }));
   checkDerivative(dv, differentiate(v, kStep, [&](const VectorXd& x) { return node.calc(residual, q, x, lambda); }));
+  checkDerivative(ds, differentiate(VectorXd::Constant(1, node.time_scale), kStep, [&](const VectorXd& s) {
+                    TestNode other = node;
+                    other.time_scale = s[0];
+                    return other.calc(residual, q, v, lambda);
+                  }));
   CHECK(residual.needsControls() == !du.isZero(0));
   if (model.nu() > 0)
     checkDerivative(du, differentiate(u, kStep, [&](const VectorXd& x) {

@@ -79,7 +79,7 @@ class FrameVelocity : public Residual {
     const Vector6d& V = node.ws.V[frame_.body];
     r.head<3>() = calcPointVelocity(V, getPlacement(node, frame_).p);
     r.tail<3>() = V.tail<3>();
-    r -= reference_;
+    r -= reference_ / node.time_scale;
   }
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
     const Vector3d p = getPlacement(node, frame_).p, w = node.ws.V[frame_.body].tail<3>();
@@ -90,6 +90,7 @@ class FrameVelocity : public Residual {
       rows.v.col(k).head<3>() = calcPointVelocity(J, p);
       rows.v.col(k).tail<3>() = J.tail<3>();
     }
+    rows.s = reference_ / (node.time_scale * node.time_scale);
   }
 
  private:

@@ -5,7 +5,7 @@
 namespace bielle {
 
 NodeCosts::NodeCosts(const StageSpec& spec, bool running) : spec_(spec), first_rows_(spec.costs.size()) {
-  if (running && spec.kind == StageKind::Dynamics) scale_ = spec.dt;
+  step_ = running && spec.kind == StageKind::Dynamics;
   const auto add = [this](const Residual& residual, const Cost* cost, const PathConstraint* constraint, int row) {
     blocks_.push_back({&residual, cost, constraint, rows_, row});
     rows_ += residual.size();
@@ -28,13 +28,14 @@ NodeCosts::NodeCosts(const StageSpec& spec, bool running) : spec_(spec), first_r
 
 double NodeCosts::calcControlCost(const VectorXd& u) const {
   const ControlCost& control = spec_.control;
-  return 0.5 * control.weight * (u - control.reference).cwiseAbs2().dot(control.weights);
+  return 0.5 * control.weight * (u.head(control.reference.size()) - control.reference).cwiseAbs2().dot(control.weights);
 }
 
 // Visits the costs in turn, unscaled.
 template <typename Add>
 void NodeCosts::visitValues(const RobotEvaluation& at, const Add& add) const {
-  static const std::string kState = "state", kControl = "control";
+  static const std::string kTime = "time", kState = "state", kControl = "control";
+  if (step_ && spec_.time_weight != 0) add(kTime, spec_.time_weight);
   if (spec_.state.weight != 0) add(kState, at.state_cost);
   if (spec_.control.weight != 0 && at.u.size() > 0) add(kControl, calcControlCost(at.u));
   for (size_t c = 0; c < spec_.costs.size(); ++c) {
@@ -53,7 +54,7 @@ void NodeCosts::calc(const NodeView& node, RobotEvaluation& at) const {
   }
   double sum = 0;
   visitValues(at, [&](const std::string&, double value) { sum += value; });
-  at.cost = scale_ * sum;
+  at.cost = getScale(at) * sum;
 }
 
 std::vector<CostValue> NodeCosts::getValues(const RobotEvaluation& at) const {
@@ -63,6 +64,7 @@ std::vector<CostValue> NodeCosts::getValues(const RobotEvaluation& at) const {
 }
 
 void NodeCosts::selectRows(const RobotEvaluation& at, const ConstraintWeights* constraints, CountedRows& rows) const {
+  const double scale = getScale(at);
   rows.blocks.clear();
   rows.rows = rows.motion_rows = 0;
   for (const Block& block : blocks_) {
@@ -70,34 +72,35 @@ void NodeCosts::selectRows(const RobotEvaluation& at, const ConstraintWeights* c
     auto gradient = rows.gradient.segment(rows.rows, n), hessian = rows.hessian.segment(rows.rows, n);
     if (block.cost) {
       block.cost->activation.calcDerivatives(at.residuals.segment(block.row, n), gradient, hessian);
-      gradient *= scale_ * block.cost->weight;
-      hessian *= scale_ * block.cost->weight;
+      gradient *= scale * block.cost->weight;
+      hessian *= scale * block.cost->weight;
     } else {
       if (!constraints) continue;
-      const VectorXd& scale = block.constraint->scale;
-      gradient = constraints->gradient.segment(block.constraint_row, n).cwiseQuotient(scale);
-      hessian = constraints->hessian.segment(block.constraint_row, n).cwiseQuotient(scale.cwiseAbs2());
+      const VectorXd& unit = block.constraint->scale;
+      gradient = constraints->gradient.segment(block.constraint_row, n).cwiseQuotient(unit);
+      hessian = constraints->hessian.segment(block.constraint_row, n).cwiseQuotient(unit.cwiseAbs2());
     }
     if (gradient.isZero(0) && hessian.isZero(0)) continue;
-    rows.blocks.push_back({block.residual, rows.rows, n});
+    rows.blocks.push_back({block.residual, rows.rows, n, block.constraint != nullptr});
     rows.rows += n;
     if (block.residual->needsMotion()) rows.motion_rows = rows.rows;
   }
 }
 
 void NodeCosts::differentiate(const NodeView& node, const CountedRows& rows, ResidualJacobians& jacobians) const {
-  for (const auto& [residual, row, n] : rows.blocks)
-    residual->calcJacobian(
-        node, {jacobians.q.middleRows(row, n), jacobians.v.middleRows(row, n),
-               jacobians.lambda.block(row, 0, n, spec_.constraints.rows), jacobians.u.block(row, 0, n, node.u.size())});
+  for (const auto& [residual, row, n, of_constraint] : rows.blocks)
+    residual->calcJacobian(node, {jacobians.q.middleRows(row, n), jacobians.v.middleRows(row, n),
+                                  jacobians.lambda.block(row, 0, n, spec_.constraints.rows),
+                                  jacobians.u.middleRows(row, n), jacobians.s.segment(row, n)});
 }
 
-void NodeCosts::addControlCost(const VectorXd& u, StageModel& out) const {
+void NodeCosts::addControlCost(const RobotEvaluation& at, StageModel& out) const {
   const ControlCost& control = spec_.control;
   if (control.weight == 0) return;
-  const double w = scale_ * control.weight;
-  out.lu += w * control.weights.cwiseProduct(u - control.reference);
-  out.luu().diagonal() += w * control.weights;
+  const double w = getScale(at) * control.weight;
+  const Eigen::Index nu = control.reference.size();
+  out.lu.head(nu) += w * control.weights.cwiseProduct(at.u.head(nu) - control.reference);
+  out.luu().diagonal().head(nu) += w * control.weights;
 }
 
 }  // namespace bielle

@@ -11,6 +11,7 @@ struct CountedRows {
   struct Block {
     const Residual* residual;
     int row, size;
+    bool of_constraint;
   };
   std::vector<Block> blocks;
   VectorXd gradient, hessian;  // weights
@@ -23,9 +24,11 @@ struct CountedRows {
   bool counts(int row) const { return gradient[row] != 0 || hessian[row] != 0; }
 };
 
-// Partial derivatives of stacked residuals, rows x nv, nv, constraint rows, nu; they may be larger than one node needs.
+// Partial derivatives of stacked residuals, rows x nv, nv, constraint rows, nu, 1; they may be larger than one node
+// needs.
 struct ResidualJacobians {
   MatrixXd q, v, lambda, u;
+  VectorXd s;
 };
 
 class NodeCosts {
@@ -38,8 +41,8 @@ class NodeCosts {
   int constraintRows() const { return constraint_rows_; }
   // Whether a residual depends on the controls.
   bool needsControls() const { return needs_controls_; }
-  // Factor of the sum of the costs: the time step of a running stage; 1 at an impact and at the terminal node.
-  double scale() const { return scale_; }
+  // Factor of the sum of the costs: the length of a step; 1 at an impact and at the terminal node.
+  double getScale(const RobotEvaluation& at) const { return step_ ? at.dt : 1; }
 
   // Computes the residuals, the scaled cost and the scaled constraints; the state cost of `at` must be up to date.
   void calc(const NodeView& node, RobotEvaluation& at) const;
@@ -48,11 +51,11 @@ class NodeCosts {
   // Computes the Jacobians of the counted rows, which must be zero before.
   void differentiate(const NodeView& node, const CountedRows& rows, ResidualJacobians& jacobians) const;
   // Adds the derivatives of the control cost.
-  void addControlCost(const VectorXd& u, StageModel& out) const;
+  void addControlCost(const RobotEvaluation& at, StageModel& out) const;
   std::vector<CostValue> getValues(const RobotEvaluation& at) const;
 
  private:
-  double calcControlCost(const VectorXd& u) const;
+  double calcControlCost(const VectorXd& u) const;  // of u with or without a time scale
   template <typename Add>
   void visitValues(const RobotEvaluation& at, const Add& add) const;
 
@@ -69,7 +72,7 @@ class NodeCosts {
   std::vector<int> first_rows_;  // of each cost
   int rows_ = 0, constraint_rows_ = 0;
   bool needs_controls_ = false;
-  double scale_ = 1;
+  bool step_ = false;
 };
 
 }  // namespace bielle

@@ -23,10 +23,13 @@ class ComVelocity : public Residual {
  public:
   explicit ComVelocity(const Vector3d& reference) : reference_(reference) {}
   int size() const override { return 3; }
-  void calc(const NodeView& node, VectorRef r) const override { r = calcComVelocity(node.model, node.ws) - reference_; }
+  void calc(const NodeView& node, VectorRef r) const override {
+    r = calcComVelocity(node.model, node.ws) - reference_ / node.time_scale;
+  }
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
     calcComVelocityDerivative(node.model, node.ws, rows.q);
     rows.v = node.ws.YJ.topRows<3>() / node.model.mass();
+    rows.s = reference_ / (node.time_scale * node.time_scale);
   }
 
  private:

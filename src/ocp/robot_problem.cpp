@@ -18,6 +18,14 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool ter
     require(spec.dt == 0, "an impact that takes time", "give it a time step of 0");
   else
     require(spec.dt > 0 && std::isfinite(spec.dt), "its time step is not positive", "give seconds, e.g. 0.015");
+  const FreeTiming& timing = spec.timing;
+  if (timing.phase >= 0) {
+    require(spec.kind == StageKind::Dynamics && !terminal, "a free duration of what takes no time",
+            "give steps alone a phase of free duration");
+    require(timing.lower > 0 && timing.lower <= timing.upper && std::isfinite(timing.upper),
+            "the bounds of its time scale are not positive, or exchanged", "e.g. 0.6 and 1.6");
+  }
+  require(spec.time_weight >= 0, "its cost of a second is negative", "give 0 or more");
   if (spec.state.weight != 0)
     require(spec.state.q_ref.size() == model.nq() && spec.state.v_ref.size() == model.nv() &&
                 spec.state.weights.size() == 2 * model.nv(),
@@ -49,18 +57,57 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool ter
   }
 }
 
+std::vector<TimeScalePlace> placeTimeScales(const Model& model, const std::vector<StageSpec>& specs) {
+  std::vector<TimeScalePlace> places(specs.size());
+  std::vector<int> ended;
+  for (size_t k = 0; k + 1 < specs.size(); ++k) {
+    const FreeTiming &timing = specs[k].timing, &next = specs[k + 1].timing;
+    if (timing.phase < 0) continue;
+    if (!places[k].in_state) places[k].in_controls = true;
+    const std::string element = "stage " + std::to_string(k);
+    if (std::find(ended.begin(), ended.end(), timing.phase) != ended.end())
+      throw ModelError(model.name(), element, "its phase of free duration has ended before",
+                       "give it a number of its own");
+    if (next.phase != timing.phase) {
+      ended.push_back(timing.phase);
+      continue;
+    }
+    if (next.lower != timing.lower || next.upper != timing.upper)
+      throw ModelError(model.name(), element, "the next step of its phase has other bounds of the time scale",
+                       "give all steps of the phase the same");
+    places[k].in_next = places[k + 1].in_state = true;
+  }
+  return places;
+}
+
 }  // namespace
 
 const char* getName(StepRule rule) { return rule == StepRule::Euler ? "euler" : "midpoint"; }
 
 const char* getName(Formulation formulation) { return formulation == Formulation::Full ? "full" : "reduced"; }
 
-bool startEvaluation(const Model& model, const EvaluateTask& task, const StageSpec& spec, bool running,
-                     const NodeCosts& costs, RobotEvaluation& at) {
+namespace {
+
+int countControls(const Model& model, const TimeScalePlace& place) { return model.nu() + (place.in_controls ? 1 : 0); }
+
+double getTimeScale(const TimeScalePlace& place, const VectorXd& x, const VectorXd& u) {
+  return place.in_controls ? u[u.size() - 1] : place.in_state ? x[x.size() - 1] : 1;
+}
+
+}  // namespace
+
+bool startEvaluation(const Model& model, const EvaluateTask& task, const NodeList& nodes, const NodeCosts& costs,
+                     RobotEvaluation& at) {
+  const StageSpec& spec = nodes.specs[task.node];
+  const TimeScalePlace& place = nodes.places[task.node];
+  const bool running = task.node + 1 < static_cast<int>(nodes.specs.size());
   at.x = *task.x;
-  at.u.resize(running ? model.nu() : 0);
+  at.u.resize(running ? countControls(model, place) : 0);
   if (running) at.u = *task.u;
+  at.time_scale = getTimeScale(place, at.x, at.u);
+  at.dt = running && spec.kind == StageKind::Dynamics ? at.time_scale * spec.dt : 0;
   at.x_next.resize(running ? at.x.size() : 0);
+  if (running && at.x.size() > model.nq() + model.nv()) at.x_next[at.x.size() - 1] = place.in_next ? at.time_scale : 1;
   at.a.resize(running ? model.nv() : 0);
   at.lambda.resize(running ? spec.constraints.rows : 0);
   const bool midpoint = running && spec.kind == StageKind::Dynamics && spec.step == StepRule::Midpoint;
@@ -71,7 +118,31 @@ bool startEvaluation(const Model& model, const EvaluateTask& task, const StageSp
   at.state_cost = 0;
   at.status = StepStatus::Failed;
   at.failure.clear();
-  return at.x.allFinite() && at.u.allFinite();
+  if (place.isFree() && !(at.time_scale > 0)) at.failure = "the time scale is not positive";
+  return at.x.allFinite() && at.u.allFinite() && at.failure.empty();
+}
+
+void setNextTimeScale(const TimeScalePlace& place, const RobotEvaluation& at, const VectorXd& x_next_node,
+                      StageModel& out) {
+  if (!place.in_next) return;
+  MatrixMap Ft = out.Ft();
+  Ft.col(0).setZero();
+  Ft(at.u.size() - (place.in_controls ? 1 : 0), 0) = 1;
+  out.gap[0] = at.time_scale - x_next_node[x_next_node.size() - 1];
+}
+
+void addTimeScaleCost(int leading, const RobotEvaluation& at, ConstVectorRef of_constraints, StageModel& out) {
+  const double s = at.time_scale;
+  const Eigen::Index row = leading - 1, nu = out.lu.size(), size = nu + out.lx.size();
+  const auto getGradient = [&](Eigen::Index i) -> double& { return i < nu ? out.lu[i] : out.lx[i - nu]; };
+  MatrixMap H = out.hessian();
+  const double implicit = getGradient(row) - of_constraints[row];
+  for (Eigen::Index i = 0; i < size; ++i) {
+    if (i == row) continue;
+    H(std::max(i, row), std::min(i, row)) += (getGradient(i) - of_constraints[i]) / (2 * s);
+  }
+  H(row, row) += implicit / s + at.cost / (2 * s * s);
+  getGradient(row) += at.cost / s;
 }
 
 // As allFinite(), but vectorized: a value that is not finite makes the sum NaN. The Hessian is a sum of squares, so any
@@ -86,15 +157,25 @@ RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorX
   if (q0.size() != model.nq() || v0.size() != model.nv())
     throw ModelError(model.name(), "shooting problem", "the initial state has a wrong size", "q0: nq, v0: nv");
   for (size_t k = 0; k < specs_.size(); ++k) checkSpec(model, specs_[k], k, k + 1 == specs_.size());
-  transcription_ = formulation == Formulation::Full ? makeFullTranscription(model, specs_)
-                                                    : makeReducedTranscription(model, q0, specs_);
-  x0_.resize(stateSize());
-  x0_ << q0, v0;
+  places_ = placeTimeScales(model, specs_);
+  const NodeList nodes{specs_, places_};
+  transcription_ = formulation == Formulation::Full ? makeFullTranscription(model, nodes)
+                                                    : makeReducedTranscription(model, q0, nodes);
+  const bool free = std::any_of(places_.begin(), places_.end(), [](const TimeScalePlace& p) { return p.isFree(); });
+  x0_.setOnes(model.nq() + model.nv() + (free ? 1 : 0));
+  x0_.head(model.nq()) = q0;
+  x0_.segment(model.nq(), model.nv()) = v0;
 }
 
 RobotProblem::~RobotProblem() = default;
 
-int RobotProblem::tangentSize(int) const { return transcription_->tangentSize(); }
+int RobotProblem::tangentSize(int node) const {
+  return transcription_->tangentSize() + (places_[node].in_state ? 1 : 0);
+}
+int RobotProblem::controlSize(int stage) const { return countControls(model_, places_[stage]); }
+double RobotProblem::getTimeScale(int stage, const VectorXd& x, const VectorXd& u) const {
+  return bielle::getTimeScale(places_[stage], x, u);
+}
 int RobotProblem::getBatchSize() const { return transcription_->getBatchSize(); }
 std::unique_ptr<NodeEvaluation> RobotProblem::makeEvaluation() const { return transcription_->makeEvaluation(); }
 std::unique_ptr<ProblemScratch> RobotProblem::makeScratch() const { return transcription_->makeScratch(); }
@@ -122,11 +203,19 @@ void RobotProblem::linearize(LinearizeTask* tasks, int count, ProblemScratch* sc
 void RobotProblem::integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const {
   visitBatches(tasks, count, getBatchSize(),
                [&](const IntegrateTask* batch, int size) { transcription_->integrate(batch, size, scratch); });
+  if (!hasFreeTimings()) return;
+  const Eigen::Index last = stateSize() - 1;
+  for (const IntegrateTask* task = tasks; task != tasks + count; ++task)
+    (*task->x_out)[last] = task->at->x[last] + (places_[task->node].in_state ? (*task->dx)[0] : 0);
 }
 
 void RobotProblem::difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const {
   visitBatches(tasks, count, getBatchSize(),
                [&](const DifferenceTask* batch, int size) { transcription_->difference(batch, size, scratch); });
+  if (!hasFreeTimings()) return;
+  const Eigen::Index last = stateSize() - 1;
+  for (const DifferenceTask* task = tasks; task != tasks + count; ++task)
+    if (places_[task->node].in_state) (*task->dx)[0] = (*task->x1)[last] - task->at->x[last];
 }
 
 void RobotProblem::getControlBounds(int stage, VectorRef lower, VectorRef upper) const {
@@ -135,6 +224,9 @@ void RobotProblem::getControlBounds(int stage, VectorRef lower, VectorRef upper)
     upper[m] = limits.size() ? limits[m] : model_.motors()[m].effort_limit;
     lower[m] = -upper[m];
   }
+  if (!places_[stage].in_controls) return;
+  lower[model_.nu()] = specs_[stage].timing.lower;
+  upper[model_.nu()] = specs_[stage].timing.upper;
 }
 
 int RobotProblem::constraintSize(int node) const {

@@ -1,6 +1,7 @@
 #pragma once
 // A formulation behind RobotProblem: it defines the state space of a node and discretizes its dynamics. The functions
-// are those of ShootingProblem; count is at most the batch size.
+// are those of ShootingProblem, except that differences and sums leave out the time scale; count is at most the batch
+// size.
 #include "bielle/ocp/robot_problem.h"
 #include "ocp/node_costs.h"
 
@@ -9,7 +10,7 @@ namespace bielle {
 class Transcription {
  public:
   virtual ~Transcription() = default;
-  virtual int tangentSize() const = 0;
+  virtual int tangentSize() const = 0;  // without a time scale
   virtual int getBatchSize() const = 0;
   virtual std::unique_ptr<RobotEvaluation> makeEvaluation() const = 0;
   virtual std::unique_ptr<ProblemScratch> makeScratch() const = 0;
@@ -19,15 +20,32 @@ class Transcription {
   virtual void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const = 0;
 };
 
-// The specs and costs are those of the nodes; both, like the model, outlive the transcription.
-std::unique_ptr<Transcription> makeFullTranscription(const Model& model, const std::vector<StageSpec>& specs);
+// The nodes of a problem. They outlive the transcription, like the model.
+struct NodeList {
+  const std::vector<StageSpec>& specs;
+  const std::vector<TimeScalePlace>& places;
+};
+std::unique_ptr<Transcription> makeFullTranscription(const Model& model, const NodeList& nodes);
 // \throws ModelError when q0 is open
-std::unique_ptr<Transcription> makeReducedTranscription(const Model& model, const VectorXd& q0,
-                                                        const std::vector<StageSpec>& specs);
+std::unique_ptr<Transcription> makeReducedTranscription(const Model& model, const VectorXd& q0, const NodeList& nodes);
 
-// Gives `at` the sizes, the state and the controls of a task, and the status Failed. False if they are not finite.
-bool startEvaluation(const Model& model, const EvaluateTask& task, const StageSpec& spec, bool running,
-                     const NodeCosts& costs, RobotEvaluation& at);
+// Gives `at` the sizes, the state, the controls and the length of a task, and the status Failed. False if they are not
+// finite, or the time scale is not positive.
+bool startEvaluation(const Model& model, const EvaluateTask& task, const NodeList& nodes, const NodeCosts& costs,
+                     RobotEvaluation& at);
+
+// The number of rows of F^T before those of (dq, dv): torques and, last, a free time scale.
+inline int countLeading(const Model& model, const TimeScalePlace& place) {
+  return model.nu() + (place.isFree() ? 1 : 0);
+}
+
+// The time scale of the next state, and its difference to that of the node's state.
+void setNextTimeScale(const TimeScalePlace& place, const RobotEvaluation& at, const VectorXd& x_next_node,
+                      StageModel& out);
+
+// Adds the derivatives of the running cost by its factor s, robot_problem.h Eq. (6), to those at fixed s.
+// \param of_constraints  by (u, s, dq, dv), the part of the gradient that s does not multiply: that of constraints
+void addTimeScaleCost(int leading, const RobotEvaluation& at, ConstVectorRef of_constraints, StageModel& out);
 
 // False if an entry of a model that the solver reads is not finite.
 bool isFinite(const StageModel& model);

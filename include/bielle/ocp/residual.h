@@ -3,7 +3,8 @@
 ///
 /// A residual is a small vector with sparse partial derivatives with respect to the tangent of q, to v, to the
 /// constraint forces lambda and to the motor torques u; the stage applies the chain rule through the dynamics. Frame
-/// residuals are in world axes unless stated otherwise.
+/// residuals are in world axes unless stated otherwise. References of velocities are those at the time scale 1 of
+/// robot_problem.h Eq. (5); at s they are divided by s: the same path in another time.
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,6 +23,7 @@ struct NodeView {
   const ConstraintSet& constraints;  ///< closures and contacts in force
   const VectorXd& u;                 ///< nu, empty at the terminal node
   const VectorXd& lambda;            ///< rows of the constraints, empty at the terminal node
+  double time_scale = 1;
 };
 
 /// Row block of the stacked residual Jacobians of a node. Entries never written stay zero.
@@ -29,6 +31,7 @@ struct ResidualRows {
   MatrixRef q, v;    ///< n x nv
   MatrixRef lambda;  ///< n x rows
   MatrixRef u;       ///< n x nu
+  VectorRef s;       ///< n, by the time scale
 };
 
 class Residual {

@@ -24,6 +24,18 @@
 /// The chord w' lies between the tangents of both ends, so that (4) follows a geodesic to second order. The derivatives
 /// are in src/ocp/reduced/reduced_kernel.h. As h vanishes both formulations have the same optimum.
 /// The running cost of a stage is h times the sum of its costs; the terminal cost is the sum itself.
+///
+/// The duration of a phase, i.e. of consecutive steps, may be a variable: its time scale s, bounded, with
+///
+///     h_k = s dt_k    for all steps k of the phase                                                                 (5)
+///
+/// The first step of the phase has s among its controls, after the torques. The others have it in their state, where it
+/// does not change: after (q, v) in x, but before them in the tangent space, so that (u, s, dq, dv) is the order of the
+/// variables of a stage in both cases. Derivatives by s are exact. The running cost l = s dt sum_i 1/2 w_i r_i^2 counts
+/// as a sum of squares of sqrt(s) r_i, so that, with g its gradient at a fixed factor s, its Hessian receives
+///     l_ss += l / (2 s^2) + g_s / s,    l_sz += g_z / (2 s)                                                        (6)
+/// where g_s is due to residuals that depend on s: references of velocities, and forces of midpoint steps.
+///
 /// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and likewise for
 /// v and u.
 #include <string>
@@ -44,11 +56,19 @@ enum class StageKind { Dynamics, Impact };
 enum class StepRule { Euler, Midpoint };
 const char* getName(StepRule rule);
 
+/// Membership of a step in a phase whose time scale is a variable, Eq. (5).
+struct FreeTiming {
+  int phase = -1;               ///< the same for all steps of the phase, which follow one another; -1: dt is fixed
+  double lower = 1, upper = 1;  ///< bounds of s, likewise
+};
+
 /// One stage of the horizon (or the terminal node, which uses neither kind, dt nor constraints).
 struct StageSpec {
   StageKind kind = StageKind::Dynamics;
   StepRule step = StepRule::Euler;
-  double dt = 0.015;  ///< s; 0 for an impact
+  double dt = 0.015;  ///< s, at time scale 1; 0 for an impact
+  FreeTiming timing;
+  double time_weight = 0;  ///< cost of a second, not negative
   ConstraintSet constraints;
   StateCost state;
   ControlCost control;
@@ -69,12 +89,21 @@ const char* getName(Formulation formulation);
 
 class Transcription;
 
+/// Where the time scale of a node is, Eq. (5).
+struct TimeScalePlace {
+  bool in_controls = false, in_state = false;  ///< neither: the length of the step is fixed
+  bool in_next = false;                        ///< part of the next state
+  bool isFree() const { return in_controls || in_state; }
+};
+
 /// A node of a robot's problem, with the accelerations and forces behind its next state. Those of a midpoint step belong
 /// to (q_mid, v_mid), the point after half the drift with the velocity foreseen there.
 struct RobotEvaluation : NodeEvaluation {
-  VectorXd a;          ///< nv, accelerations; not used at an impact
-  VectorXd q_mid;      ///< nq, of midpoint steps alone
-  VectorXd v_mid;      ///< nv, likewise
+  double time_scale = 1;  ///< s of Eq. (5)
+  double dt = 0;          ///< length of the step, s; 0 at an impact and at the terminal node
+  VectorXd a;             ///< nv, accelerations; not used at an impact
+  VectorXd q_mid;         ///< nq, of midpoint steps alone
+  VectorXd v_mid;         ///< nv, likewise
   VectorXd lambda;     ///< rows of the constraints of the stage: forces (at an impact, impulses), each in its frame 1
   VectorXd residuals;  ///< of all costs and path constraints, concatenated in an order internal to the problem
   double state_cost = 0;  ///< before scaling by the time step
@@ -91,10 +120,13 @@ class RobotProblem : public ShootingProblem {
   ~RobotProblem() override;
 
   int numStages() const override { return static_cast<int>(specs_.size()) - 1; }
-  int stateSize() const override { return model_.nq() + model_.nv(); }
+  /// nq + nv, and 1 if some time scale is free; that number is 1 in states without a time scale.
+  int stateSize() const override { return static_cast<int>(x0_.size()); }
   int tangentSize(int node) const override;
-  int controlSize(int) const override { return model_.nu(); }
+  /// nu, and 1 at the first step of a phase whose time scale is free.
+  int controlSize(int stage) const override;
   const VectorXd& initialState() const override { return x0_; }
+  /// Those of the torques and of the time scale.
   void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override;
   int constraintSize(int node) const override;
   void getConstraintBounds(int node, VectorRef lower, VectorRef upper) const override;
@@ -112,6 +144,9 @@ class RobotProblem : public ShootingProblem {
   const Model& model() const { return model_; }
   Formulation formulation() const { return formulation_; }
   const StageSpec& spec(int node) const { return specs_[node]; }
+  bool hasFreeTimings() const { return stateSize() > model_.nq() + model_.nv(); }
+  /// Time scale of a stage, 1 where it is fixed.
+  double getTimeScale(int stage, const VectorXd& x, const VectorXd& u) const;
   /// Costs by name at an evaluated node.
   std::vector<CostValue> getCosts(int node, const RobotEvaluation& at) const;
 
@@ -119,6 +154,7 @@ class RobotProblem : public ShootingProblem {
   const Model& model_;
   Formulation formulation_;
   std::vector<StageSpec> specs_;
+  std::vector<TimeScalePlace> places_;  // per node
   std::unique_ptr<Transcription> transcription_;
   VectorXd x0_;
 };

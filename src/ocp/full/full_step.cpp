@@ -9,11 +9,12 @@ namespace bielle {
 FullStepScratch::FullStepScratch(const Model& model, int most_constraint_rows)
     : tau(VectorXd::Zero(model.nv())),
       displacement(VectorXd::Zero(model.nv())),
+      by_scale(VectorXd::Zero(2 * model.nv())),
       by_velocity(MatrixXd::Zero(std::max(model.nv(), most_constraint_rows), model.nv())) {}
 
 void updateNode(const Model& model, const VectorXd& x, Workspace& ws) {
   updatePositions(model, ws, x.head(model.nq()));
-  updateVelocities(model, ws, x.tail(model.nv()));
+  updateVelocities(model, ws, x.segment(model.nq(), model.nv()));
   updateMassMatrix(model, ws);
 }
 
@@ -22,13 +23,15 @@ namespace {
 bool isMidpoint(const StageSpec& spec) { return spec.step == StepRule::Midpoint; }
 
 // Length of the last drift.
-double getLastDrift(const StageSpec& spec) { return isMidpoint(spec) ? spec.dt / 2 : spec.dt; }
+double getLastDrift(const StageSpec& spec, double h) { return isMidpoint(spec) ? h / 2 : h; }
+
+auto getVelocity(const Model& model, const VectorXd& x) { return x.segment(model.nq(), model.nv()); }
 
 // a and lambda of the step, after the drifts that come before.
 DynamicsStatus updateEulerAcceleration(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
                                        FullEvaluation& at) {
-  return updateConstrainedDynamics(model, at.ws, at.cws, spec.constraints, at.x.head(model.nq()), at.x.tail(model.nv()),
-                                   scratch.tau);
+  return updateConstrainedDynamics(model, at.ws, at.cws, spec.constraints, at.x.head(model.nq()),
+                                   getVelocity(model, at.x), scratch.tau);
 }
 
 DynamicsStatus updateMidpointAcceleration(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
@@ -36,29 +39,30 @@ DynamicsStatus updateMidpointAcceleration(const Model& model, const StageSpec& s
   if (!at.midpoint) at.midpoint = std::make_unique<FullEvaluation::Midpoint>(model);
   FullEvaluation::Midpoint& mid = *at.midpoint;
   const auto q = at.x.head(model.nq());
-  const auto v = at.x.tail(model.nv());
+  const auto v = getVelocity(model, at.x);
   updateNode(model, at.x, at.ws);
-  scratch.displacement = spec.dt / 2 * v;
+  scratch.displacement = at.dt / 2 * v;
   model.integrate(q, scratch.displacement, at.q_mid);
   const DynamicsStatus status =
       updateConstrainedDynamics(model, mid.foreseen_ws, mid.foreseen, spec.constraints, at.q_mid, v, scratch.tau);
   if (status != DynamicsStatus::Ok) return status;
-  at.v_mid = v + spec.dt / 2 * mid.foreseen.a;
+  at.v_mid = v + at.dt / 2 * mid.foreseen.a;
   return updateConstrainedDynamics(model, mid.ws, at.cws, spec.constraints, at.q_mid, at.v_mid, scratch.tau);
 }
 
 }  // namespace
 
 DynamicsStatus updateFullStep(const Model& model, const StageSpec& spec, FullStepScratch& scratch, FullEvaluation& at) {
-  const int nq = model.nq(), nv = model.nv();
+  const int nq = model.nq();
   calcMotorForces(model, at.u, scratch.tau);
   const DynamicsStatus status = isMidpoint(spec) ? updateMidpointAcceleration(model, spec, scratch, at)
                                                  : updateEulerAcceleration(model, spec, scratch, at);
   if (status != DynamicsStatus::Ok) return status;
   at.a = at.cws.a;
   at.lambda = at.cws.lambda;
-  at.x_next.tail(nv) = at.x.tail(nv) + spec.dt * at.a;
-  scratch.displacement = getLastDrift(spec) * at.x_next.tail(nv);
+  auto v_next = at.x_next.segment(nq, model.nv());
+  v_next = getVelocity(model, at.x) + at.dt * at.a;
+  scratch.displacement = getLastDrift(spec, at.dt) * v_next;
   if (isMidpoint(spec))
     model.integrate(at.q_mid, scratch.displacement, at.x_next.head(nq));
   else
@@ -76,6 +80,27 @@ void chainForeseen(double h, const ConstrainedWorkspace& foreseen, MatrixXd& by_
   dq.noalias() += factor * foreseen.da_dq;
   dv.noalias() += factor * foreseen.da_dv;
   du.noalias() += factor * foreseen.da_du;
+}
+
+// Eq. (3) for a or lambda, after chainForeseen() for the same.
+void setByScale(double s, const FullEvaluation::Midpoint& mid, const MatrixXd& by_velocity, const MatrixXd& dq,
+                VectorXd& out) {
+  out.noalias() = by_velocity.topRows(dq.rows()) * mid.foreseen.a;
+  out /= s;
+  out.noalias() += dq * mid.q_s;
+}
+
+// q_m,s of Eq. (4).
+void setMidpointByScale(const Model& model, double h, const FullEvaluation& at, VectorXd& out) {
+  out = h / (2 * at.time_scale) * getVelocity(model, at.x);
+  for (const Joint& joint : model.joints()) {
+    if (!isCurved(joint)) continue;
+    const int i = joint.idx_v, n = joint.nv;
+    JointMatrix Jq(n, n), Jd(n, n);
+    const JointVector d = at.time_scale * out.segment(i, n), d_s = out.segment(i, n);
+    calcJointIntegrateJacobians(joint, d, Jq, Jd);
+    out.segment(i, n).noalias() = Jd * d_s;
+  }
 }
 
 // Those by (q_m, v) become those by (q, v). The displacement is that of the first drift, h/2 v.
@@ -101,7 +126,7 @@ void chainDrift(const Model& model, double h, const VectorXd& displacement, Matr
 
 }  // namespace
 
-DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
+DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& spec, bool free, FullStepScratch& scratch,
                                          FullEvaluation& at) {
   ConstrainedWorkspace& cws = at.cws;
   if (!isMidpoint(spec)) return updateConstrainedDerivatives(model, at.ws, cws, spec.constraints);
@@ -109,10 +134,13 @@ DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& sp
   DynamicsStatus status = updateConstrainedDerivatives(model, mid.foreseen_ws, mid.foreseen, spec.constraints);
   if (status == DynamicsStatus::Ok) status = updateConstrainedDerivatives(model, mid.ws, cws, spec.constraints);
   if (status != DynamicsStatus::Ok) return status;
-  const double h = spec.dt;
+  const double h = at.dt;
+  if (free) setMidpointByScale(model, h, at, mid.q_s);
   chainForeseen(h, mid.foreseen, scratch.by_velocity, cws.da_dq, cws.da_dv, cws.da_du);
+  if (free) setByScale(at.time_scale, mid, scratch.by_velocity, cws.da_dq, mid.a_s);
   chainForeseen(h, mid.foreseen, scratch.by_velocity, cws.dlambda_dq, cws.dlambda_dv, cws.dlambda_du);
-  scratch.displacement = h / 2 * at.x.tail(model.nv());
+  if (free) setByScale(at.time_scale, mid, scratch.by_velocity, cws.dlambda_dq, mid.lambda_s);
+  scratch.displacement = h / 2 * getVelocity(model, at.x);
   chainDrift(model, h, scratch.displacement, cws.da_dq, cws.da_dv);
   chainDrift(model, h, scratch.displacement, cws.dlambda_dq, cws.dlambda_dv);
   return status;
@@ -121,16 +149,17 @@ DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& sp
 namespace {
 
 // Adds to the rows of a joint of q what its own q and v contribute without the acceleration, through the drifts.
-void addDrifts(const StageSpec& spec, const FullEvaluation& at, const Joint& joint, const JointMatrix& by_start,
-               RowMatrixMap Fx) {
-  const int i = joint.idx_v, n = joint.nv, nv = static_cast<int>(at.a.size());
+template <class Block>
+void addDrifts(const Model& model, const StageSpec& spec, const FullEvaluation& at, const Joint& joint,
+               const JointMatrix& by_start, Block&& Fx) {
+  const int i = joint.idx_v, n = joint.nv, nv = model.nv();
   if (!isMidpoint(spec)) {
     Fx.block(i, i, n, n) += by_start;
     return;
   }
-  const double h = spec.dt;
+  const double h = at.dt;
   JointMatrix Jq(n, n), Jd(n, n);
-  const JointVector d = h / 2 * at.x.tail(nv).segment(i, n);
+  const JointVector d = h / 2 * getVelocity(model, at.x).segment(i, n);
   calcJointIntegrateJacobians(joint, d, Jq, Jd);
   Fx.block(i, i, n, n).noalias() += by_start * Jq;
   Fx.block(i, nv + i, n, n).noalias() += h / 2 * by_start * Jd;
@@ -138,17 +167,35 @@ void addDrifts(const StageSpec& spec, const FullEvaluation& at, const Joint& joi
 
 }  // namespace
 
-void setFullStep(const Model& model, const StageSpec& spec, const FullEvaluation& at, FullStepScratch& scratch,
-                 StageModel& out) {
+namespace {
+
+// Eqs. (3) and (4) before the Jacobians of the last drift: v+_s, and the derivative of the displacement.
+void setByScale(const Model& model, const StageSpec& spec, const FullEvaluation& at, VectorXd& by_scale) {
   const int nv = model.nv();
-  const double h = spec.dt, last = getLastDrift(spec);
-  RowMatrixMap Fx = out.Fx(), Fu = out.Fu();
+  const double s = at.time_scale, h = at.dt, last = getLastDrift(spec, h);
+  auto of_q = by_scale.head(nv), of_v = by_scale.tail(nv);
+  of_v = h / s * at.a;
+  if (isMidpoint(spec)) of_v += h * at.midpoint->a_s;
+  of_q = last / s * getVelocity(model, at.x_next) + last * of_v;
+}
+
+}  // namespace
+
+void setFullStep(const Model& model, const StageSpec& spec, bool free, const FullEvaluation& at, ConstVectorRef gap,
+                 FullStepScratch& scratch, StageModel& out) {
+  const int nv = model.nv(), nu = model.nu();
+  const double h = at.dt, last = getLastDrift(spec, h);
+  RowMatrixMap all = out.Fx();
+  auto Fx = all.bottomRightCorner(2 * nv, 2 * nv);
+  auto Fu = out.Fu().bottomLeftCorner(2 * nv, nu);
+  VectorXd& by_scale = scratch.by_scale;
+  if (free) setByScale(model, spec, at, by_scale);
   auto Fv = Fx.bottomRows(nv);
   Fv.leftCols(nv) = h * at.cws.da_dq;
   Fv.rightCols(nv) = h * at.cws.da_dv;
   Fv.rightCols(nv).diagonal().array() += 1;
   Fu.bottomRows(nv) = h * at.cws.da_du;
-  scratch.displacement = last * at.x_next.tail(nv);
+  scratch.displacement = last * getVelocity(model, at.x_next);
   for (const Joint& joint : model.joints()) {
     const int i = joint.idx_v, n = joint.nv;
     if (n == 0) continue;
@@ -157,17 +204,23 @@ void setFullStep(const Model& model, const StageSpec& spec, const FullEvaluation
       Fx.block(i, i, n, n).diagonal().array() += 1;
       if (isMidpoint(spec)) Fx.block(i, nv + i, n, n).diagonal().array() += h / 2;
       Fu.middleRows(i, n) = last * Fu.middleRows(nv + i, n);
+      if (free && isMidpoint(spec)) by_scale.segment(i, n) += at.midpoint->q_s.segment(i, n);
       continue;
     }
     JointMatrix Jq(n, n), Jd(n, n), Jdiff(n, n);
-    const JointVector d = scratch.displacement.segment(i, n), gap = out.gap.segment(i, n);
+    const JointVector d = scratch.displacement.segment(i, n), open = gap.segment(i, n);
     calcJointIntegrateJacobians(joint, d, Jq, Jd);
-    calcJointDifferenceJacobian(joint, gap, Jdiff);
+    calcJointDifferenceJacobian(joint, open, Jdiff);
     const JointMatrix dv = last * Jdiff * Jd, dq = Jdiff * Jq;
     Fx.middleRows(i, n).noalias() = dv * Fx.middleRows(nv + i, n);
-    addDrifts(spec, at, joint, dq, Fx);
+    addDrifts(model, spec, at, joint, dq, Fx);
     Fu.middleRows(i, n).noalias() = dv * Fu.middleRows(nv + i, n);
+    if (!free) continue;
+    const JointVector d_s = by_scale.segment(i, n);
+    by_scale.segment(i, n).noalias() = Jdiff * Jd * d_s;
+    if (isMidpoint(spec)) by_scale.segment(i, n).noalias() += dq * at.midpoint->q_s.segment(i, n);
   }
+  if (free) out.Ft().row(nu).tail(2 * nv) = by_scale.transpose();
 }
 
 }  // namespace bielle

@@ -5,7 +5,11 @@
 //     dq_m = J_q dq + h/2 J_d dv,    dv_m = dv + h/2 da_0,                                                        (1)
 //     da_0 = A0_q dq_m + A0_v dv + A0_u du,    da = A_q dq_m + A_v dv_m + A_u du,                                 (2)
 //
-// so that da = (A_q + h/2 A_v A0_q) dq_m + (A_v + h/2 A_v A0_v) dv + (A_u + h/2 A_v A0_u) du, and lambda likewise.
+// so that da = (A_q + h/2 A_v A0_q) dq_m + (A_v + h/2 A_v A0_v) dv + (A_u + h/2 A_v A0_u) du, and lambda likewise. By
+// the time scale s, with h = s dt, v+ = v + h a and p the length of the last drift (h, or h/2 of a midpoint step),
+//
+//     a_s = (A_q + h/2 A_v A0_q) q_m,s + h/(2 s) A_v a_0 for a midpoint step, or else 0,    v+_s = h/s a + h a_s    (3)
+//     q+_s = J_q q_m,s + J_d (p/s v+ + p v+_s),    q_m,s = J_d h/(2 s) v for a midpoint step, or else 0             (4)
 #include "bielle/dynamics/impact.h"
 #include "ocp/transcription.h"
 
@@ -22,6 +26,7 @@ struct FullEvaluation : RobotEvaluation {
     explicit Midpoint(const Model& model) : ws(model), foreseen_ws(model) {}
     Workspace ws, foreseen_ws;      // at (q_m, v_m), at (q_m, v)
     ConstrainedWorkspace foreseen;  // a_0
+    VectorXd q_s, a_s, lambda_s;    // nv, nv, constraint rows, of Eqs. (3) and (4); where the time scale is free
   };
   std::unique_ptr<Midpoint> midpoint;       // of a midpoint step alone
   std::unique_ptr<ImpactWorkspace> impact;  // of an impact alone
@@ -30,6 +35,7 @@ struct FullEvaluation : RobotEvaluation {
 struct FullStepScratch {
   explicit FullStepScratch(const Model& model, int most_constraint_rows);
   VectorXd tau, displacement;  // nv
+  VectorXd by_scale;           // 2 nv, (q+_s, v+_s) of Eqs. (3) and (4)
   MatrixXd by_velocity;        // the larger of nv and the constraint rows x nv, A_v of Eq. (2)
 };
 
@@ -39,12 +45,13 @@ void updateNode(const Model& model, const VectorXd& x, Workspace& ws);
 /// The step of at.x under at.u: fills a, lambda, x_next and, of a midpoint step, q_mid and v_mid.
 DynamicsStatus updateFullStep(const Model& model, const StageSpec& spec, FullStepScratch& scratch, FullEvaluation& at);
 
-/// The derivatives of `at.cws`, after updateFullStep.
-DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& spec, FullStepScratch& scratch,
+/// The derivatives of `at.cws`, after updateFullStep; with `free`, those of a midpoint step by s too.
+DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& spec, bool free, FullStepScratch& scratch,
                                          FullEvaluation& at);
 
-/// Fx and Fu of the step, with the Jacobian of the difference to the node's state where out.gap is open.
-void setFullStep(const Model& model, const StageSpec& spec, const FullEvaluation& at, FullStepScratch& scratch,
-                 StageModel& out);
+/// The robot's part of F of the step and, with `free`, its column of s, with the Jacobian of the difference to the
+/// node's state where the gap is open. \param gap  2 nv, the robot's part of out.gap
+void setFullStep(const Model& model, const StageSpec& spec, bool free, const FullEvaluation& at, ConstVectorRef gap,
+                 FullStepScratch& scratch, StageModel& out);
 
 }  // namespace bielle

@@ -14,13 +14,15 @@ struct FullScratch : ProblemScratch {
   CountedRows counted;
   VectorXd difference;      // nv
   MatrixXd Rx, Ru, scaled;  // total derivatives of the residuals; those times the second derivatives
+  VectorXd Rs;              // those by the time scale
+  VectorXd of_constraints;  // gradient of the constraints' weights
   // All with room for the residuals of any node.
 };
 
 class FullTranscription : public Transcription {
  public:
-  FullTranscription(const Model& model, const std::vector<StageSpec>& specs) : model_(model), specs_(specs) {
-    for (const StageSpec& spec : specs) costs_.emplace_back(spec, &spec != &specs.back());
+  FullTranscription(const Model& model, const NodeList& nodes) : model_(model), nodes_(nodes), specs_(nodes.specs) {
+    for (const StageSpec& spec : specs_) costs_.emplace_back(spec, &spec != &specs_.back());
   }
 
   int tangentSize() const override { return 2 * model_.nv(); }
@@ -40,9 +42,12 @@ class FullTranscription : public Transcription {
     for (MatrixXd* m : {&out->jacobians.q, &out->jacobians.v}) m->setZero(rows, model_.nv());
     out->jacobians.lambda.setZero(rows, constraint_rows);
     out->jacobians.u.setZero(rows, model_.nu());
+    out->jacobians.s.setZero(rows);
     out->counted.reserve(blocks, rows);
     for (MatrixXd* m : {&out->Rx, &out->scaled}) m->setZero(rows, 2 * model_.nv());
     out->Ru.setZero(rows, model_.nu());
+    out->Rs.setZero(rows);
+    out->of_constraints.setZero(model_.nu() + 1 + 2 * model_.nv());
     return out;
   }
 
@@ -55,13 +60,14 @@ class FullTranscription : public Transcription {
   void integrate(const IntegrateTask* tasks, int count, ProblemScratch*) const override {
     const int nq = model_.nq(), nv = model_.nv();
     for (const IntegrateTask* task = tasks; task != tasks + count; ++task) {
-      const VectorXd &x = task->at->x, &dx = *task->dx;
+      const VectorXd& x = task->at->x;
+      const auto dx = task->dx->tail(2 * nv);
       model_.integrate(x.head(nq), dx.head(nv), task->x_out->head(nq));
-      task->x_out->tail(nv) = x.tail(nv) + dx.tail(nv);
+      task->x_out->segment(nq, nv) = x.segment(nq, nv) + dx.tail(nv);
     }
   }
   void difference(const DifferenceTask* tasks, int count, ProblemScratch*) const override {
-    for (int i = 0; i < count; ++i) calcDifference(tasks[i].at->x, *tasks[i].x1, *tasks[i].dx);
+    for (int i = 0; i < count; ++i) calcDifference(tasks[i].at->x, *tasks[i].x1, tasks[i].dx->tail(2 * model_.nv()));
   }
 
  private:
@@ -76,15 +82,18 @@ class FullTranscription : public Transcription {
   void setImpact(const FullEvaluation& at, StageModel& out) const;
   void setResiduals(int node, const FullEvaluation& at, const ConstraintWeights* constraints, FullScratch& scratch,
                     StageModel& out) const;
+  void setControlResiduals(int node, const FullEvaluation& at, FullScratch& scratch, StageModel& out) const;
+  void setScaleResiduals(int node, const FullEvaluation& at, FullScratch& scratch, StageModel& out) const;
   void addStateCost(int node, const FullEvaluation& at, VectorXd& difference, StageModel& out) const;
 
-  void calcDifference(const VectorXd& x0, const VectorXd& x1, VectorXd& dx) const {
+  void calcDifference(const VectorXd& x0, const VectorXd& x1, VectorRef dx) const {
     const int nq = model_.nq(), nv = model_.nv();
     model_.difference(x0.head(nq), x1.head(nq), dx.head(nv));
-    dx.tail(nv) = x1.tail(nv) - x0.tail(nv);
+    dx.tail(nv) = x1.segment(nq, nv) - x0.segment(nq, nv);
   }
 
   const Model& model_;
+  const NodeList nodes_;
   const std::vector<StageSpec>& specs_;
   std::vector<NodeCosts> costs_;
 };
@@ -92,7 +101,7 @@ class FullTranscription : public Transcription {
 void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const {
   auto& at = static_cast<FullEvaluation&>(*task.out);
   const int node = task.node;
-  if (!startEvaluation(model_, task, specs_[node], isRunning(node), costs_[node], at)) return;
+  if (!startEvaluation(model_, task, nodes_, costs_[node], at)) return;
   if (isRunning(node)) {
     const DynamicsStatus status =
         isImpact(node) ? updateImpactStep(node, at) : updateFullStep(model_, specs_[node], scratch.step, at);
@@ -105,7 +114,7 @@ void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const
     updateNode(model_, at.x, at.ws);
   }
   if (specs_[node].state.weight != 0) at.state_cost = calcStateCost(specs_[node].state, at, scratch.difference);
-  costs_[node].calc({model_, at.ws, specs_[node].constraints, at.u, at.lambda}, at);
+  costs_[node].calc({model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale}, at);
   if (std::isfinite(at.cost)) at.status = StepStatus::Ok;
 }
 
@@ -116,7 +125,8 @@ DynamicsStatus FullTranscription::updateImpactStep(int node, FullEvaluation& at)
   if (status != DynamicsStatus::Ok) return status;
   at.lambda = at.impact->impulse;
   at.a.setZero();
-  at.x_next << at.ws.q, at.impact->v_plus;
+  at.x_next.head(model_.nq()) = at.ws.q;
+  at.x_next.segment(model_.nq(), model_.nv()) = at.impact->v_plus;
   return status;
 }
 
@@ -131,26 +141,31 @@ double FullTranscription::calcStateCost(const StateCost& state, const FullEvalua
 void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) const {
   auto& at = static_cast<FullEvaluation&>(*task.at);
   const int node = task.node;
+  const TimeScalePlace& place = nodes_.places[node];
   StageModel& out = *task.out;
   task.status = StepStatus::Failed;
   task.failure.clear();
   if (isRunning(node)) {
-    const DynamicsStatus status = isImpact(node) ? updateImpactDerivatives(model_, *at.impact, specs_[node].constraints)
-                                                 : updateFullStepDerivatives(model_, specs_[node], scratch.step, at);
+    const DynamicsStatus status =
+        isImpact(node) ? updateImpactDerivatives(model_, *at.impact, specs_[node].constraints)
+                       : updateFullStepDerivatives(model_, specs_[node], place.isFree(), scratch.step, at);
     if (status != DynamicsStatus::Ok) {
       task.failure = getMessage(status);
       return;
     }
-    calcDifference(task.next->x, at.x_next, out.gap);
+    auto gap = out.gap.tail(2 * model_.nv());
+    calcDifference(task.next->x, at.x_next, gap);
     if (isImpact(node))
       setImpact(at, out);
     else
-      setFullStep(model_, specs_[node], at, scratch.step, out);
+      setFullStep(model_, specs_[node], place.isFree(), at, gap, scratch.step, out);
+    setNextTimeScale(place, at, task.next->x, out);
   }
   out.cost = at.cost;
   setResiduals(node, at, task.weights, scratch, out);
   addStateCost(node, at, scratch.difference, out);
-  if (isRunning(node)) costs_[node].addControlCost(at.u, out);
+  if (isRunning(node)) costs_[node].addControlCost(at, out);
+  if (place.isFree()) addTimeScaleCost(countLeading(model_, place), at, scratch.of_constraints, out);
   if (isFinite(out)) task.status = StepStatus::Ok;
 }
 
@@ -172,16 +187,19 @@ void FullTranscription::setImpact(const FullEvaluation& at, StageModel& out) con
 // Gauss-Newton terms, whatever `out` held; at a running stage forces and controls take part.
 void FullTranscription::setResiduals(int node, const FullEvaluation& at, const ConstraintWeights* constraints,
                                      FullScratch& scratch, StageModel& out) const {
-  const int nv = model_.nv(), nu = model_.nu();
+  const int nv = model_.nv();
   costs_[node].selectRows(at, constraints, scratch.counted);
   const int rows = scratch.counted.rows;
   out.lx.setZero();
   out.lu.setZero();
   out.hessian().setZero();
+  scratch.of_constraints.setZero();
   if (rows == 0) return;
   ResidualJacobians& jacobians = scratch.jacobians;
   for (MatrixXd* m : {&jacobians.q, &jacobians.v, &jacobians.lambda, &jacobians.u}) m->topRows(rows).setZero();
-  costs_[node].differentiate({model_, at.ws, specs_[node].constraints, at.u, at.lambda}, scratch.counted, jacobians);
+  jacobians.s.head(rows).setZero();
+  costs_[node].differentiate({model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale}, scratch.counted,
+                             jacobians);
   const auto gradient = scratch.counted.gradient.head(rows), hessian = scratch.counted.hessian.head(rows);
   const auto by_forces = jacobians.lambda.topLeftCorner(rows, specs_[node].constraints.rows);
   auto Rx = scratch.Rx.topRows(rows);
@@ -196,27 +214,68 @@ void FullTranscription::setResiduals(int node, const FullEvaluation& at, const C
     Rx.rightCols(nv).noalias() += by_forces * at.cws.dlambda_dv;
   }
   scaled = hessian.asDiagonal() * Rx;
-  out.lx.noalias() = Rx.transpose() * gradient;
-  out.lxx().noalias() = Rx.transpose() * scaled;
+  out.lx.tail(2 * nv).noalias() = Rx.transpose() * gradient;
+  out.lxx().bottomRightCorner(2 * nv, 2 * nv).noalias() = Rx.transpose() * scaled;
   if (!isRunning(node) || (isImpact(node) && !costs_[node].needsControls())) return;
+  setControlResiduals(node, at, scratch, out);
+  if (nodes_.places[node].isFree()) setScaleResiduals(node, at, scratch, out);
+}
+
+// The part of the controls, after that of the state.
+void FullTranscription::setControlResiduals(int node, const FullEvaluation& at, FullScratch& scratch,
+                                            StageModel& out) const {
+  const int nv = model_.nv(), nu = model_.nu(), rows = scratch.counted.rows;
+  const auto gradient = scratch.counted.gradient.head(rows), hessian = scratch.counted.hessian.head(rows);
   auto Ru = scratch.Ru.topRows(rows);
+  auto scaled = scratch.scaled.topRows(rows);
   auto scaled_Ru = scaled.leftCols(nu);
-  Ru = jacobians.u.topRows(rows);
-  if (!isImpact(node)) Ru.noalias() += by_forces * at.cws.dlambda_du;  // motors have no say in an impact
-  out.lu.noalias() = Ru.transpose() * gradient;
-  out.lux().noalias() = Ru.transpose() * scaled;
+  Ru = scratch.jacobians.u.topRows(rows);
+  if (!isImpact(node))  // motors have no say in an impact
+    Ru.noalias() += scratch.jacobians.lambda.topLeftCorner(rows, specs_[node].constraints.rows) * at.cws.dlambda_du;
+  out.lu.head(nu).noalias() = Ru.transpose() * gradient;
+  out.lux().topRightCorner(nu, 2 * nv).noalias() = Ru.transpose() * scaled;
   scaled_Ru = hessian.asDiagonal() * Ru;
-  out.luu().noalias() = Ru.transpose() * scaled_Ru;
+  out.luu().topLeftCorner(nu, nu).noalias() = Ru.transpose() * scaled_Ru;
+}
+
+// The part of the time scale at a fixed factor of the cost: g_s of robot_problem.h Eq. (6).
+void FullTranscription::setScaleResiduals(int node, const FullEvaluation& at, FullScratch& scratch,
+                                          StageModel& out) const {
+  const int nv = model_.nv(), nu = model_.nu(), rows = scratch.counted.rows;
+  const auto hessian = scratch.counted.hessian.head(rows);
+  auto Rs = scratch.Rs.head(rows);
+  Rs = scratch.jacobians.s.head(rows);
+  const auto by_forces = scratch.jacobians.lambda.topLeftCorner(rows, specs_[node].constraints.rows);
+  if (specs_[node].step == StepRule::Midpoint) Rs.noalias() += by_forces * at.midpoint->lambda_s;
+  const auto Rx = scratch.Rx.topRows(rows);
+  const auto Ru = scratch.Ru.topRows(rows);
+  for (const CountedRows::Block& block : scratch.counted.blocks) {
+    if (!block.of_constraint) continue;
+    const auto g = scratch.counted.gradient.segment(block.row, block.size);
+    VectorXd& of_constraints = scratch.of_constraints;
+    of_constraints.head(nu).noalias() += Ru.middleRows(block.row, block.size).transpose() * g;
+    of_constraints[nu] += Rs.segment(block.row, block.size).dot(g);
+    of_constraints.tail(2 * nv).noalias() += Rx.middleRows(block.row, block.size).transpose() * g;
+  }
+  double& gradient = nodes_.places[node].in_controls ? out.lu[nu] : out.lx[0];
+  gradient = Rs.dot(scratch.counted.gradient.head(rows));
+  MatrixMap H = out.hessian();
+  H(nu, nu) = Rs.cwiseAbs2().dot(hessian);
+  Rs.array() *= hessian.array();
+  H.row(nu).head(nu).noalias() = Rs.transpose() * Ru;
+  H.col(nu).tail(2 * nv).noalias() = Rx.transpose() * Rs;
 }
 
 void FullTranscription::addStateCost(int node, const FullEvaluation& at, VectorXd& difference, StageModel& out) const {
   const StateCost& state = specs_[node].state;
   if (state.weight == 0) return;
   const int nv = model_.nv();
-  const double w = costs_[node].scale() * state.weight;
+  const double w = costs_[node].getScale(at) * state.weight;
   model_.difference(state.q_ref, at.ws.q, difference);
-  MatrixMap lxx = out.lxx();
-  out.lx.tail(nv) += w * state.weights.tail(nv).cwiseProduct(at.ws.v - state.v_ref);
+  auto lx = out.lx.tail(2 * nv);
+  MatrixMap all = out.lxx();
+  auto lxx = all.bottomRightCorner(2 * nv, 2 * nv);
+  lx.tail(nv) += w * state.weights.tail(nv).cwiseProduct(at.ws.v - state.v_ref);
   lxx.diagonal().tail(nv) += w * state.weights.tail(nv);
   for (const Joint& joint : model_.joints()) {
     const int i = joint.idx_v, n = joint.nv;
@@ -226,15 +285,15 @@ void FullTranscription::addStateCost(int node, const FullEvaluation& at, VectorX
     JointMatrix J(n, n);
     calcJointDifferenceJacobian(joint, d, J);
     const JointMatrix WJ = weights.asDiagonal() * J;
-    out.lx.segment(i, n).noalias() += WJ.transpose() * d;
+    lx.segment(i, n).noalias() += WJ.transpose() * d;
     lxx.block(i, i, n, n).noalias() += J.transpose() * WJ;
   }
 }
 
 }  // namespace
 
-std::unique_ptr<Transcription> makeFullTranscription(const Model& model, const std::vector<StageSpec>& specs) {
-  return std::make_unique<FullTranscription>(model, specs);
+std::unique_ptr<Transcription> makeFullTranscription(const Model& model, const NodeList& nodes) {
+  return std::make_unique<FullTranscription>(model, nodes);
 }
 
 }  // namespace bielle

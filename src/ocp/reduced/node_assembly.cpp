@@ -29,13 +29,16 @@ NodeAssembly::NodeAssembly(const Model& model, const Reduction& reduction, const
     most_rows = std::max(most_rows, of_node.rows());
     most_blocks = std::max(most_blocks, of_node.numBlocks());
   }
-  const Eigen::Index rows = roundUpToLane(most_rows), padded = roundUpToLane(2 * nr + nu);
+  const Eigen::Index rows = roundUpToLane(most_rows), padded = roundUpToLane(2 * nr + nu + 1);
   for (MatrixXd* m : {&jacobians_.q, &jacobians_.v}) m->setZero(rows, nv);
   jacobians_.lambda.setZero(rows, layout.most_constraint_rows);
   jacobians_.u.setZero(rows, nu);
+  jacobians_.s.setZero(rows);
   counted_.reserve(most_blocks, most_rows);
   for (VectorXd* x : {&Rt_, &Rt_scaled_}) x->setZero(padded * most_rows);
-  gradient_.setZero(2 * nr + nu);
+  for (VectorXd* x : {&gradient_, &constraint_gradient_}) x->setZero(2 * nr + nu + 1);
+  for (VectorXd* x : {&y_, &y_mid_}) x->setZero(nr);
+  velocity_.setZero(nv);
   dlambda_.setZero(padded * layout.most_contact_rows);
   by_velocity_.setZero(nr * std::max(nr, layout.most_contact_rows));
   int largest = 6;
@@ -53,51 +56,58 @@ bool isMidpoint(const StageSpec& spec) { return spec.step == StepRule::Midpoint;
 // the point half way, from which the first drift leads back to the state.
 void NodeAssembly::setStep(const StageSpec& spec, const ContactLayout& contacts, const ReducedEvaluation& at,
                            const ReducedEvaluation& next, LaneView& view, StageModel& out) {
-  const int nr = reduction_.size, nu = model_.nu();
-  const double h = spec.dt, drift = isMidpoint(spec) ? 0.5 * h : h;
-  PaddedMap dydd = shapePadded(view.acceleration.dydd, nu + 2 * nr, nr);
-  PaddedMap dlambda = shapePadded(dlambda_, nu + 2 * nr, contacts.rows);
-  dydd.topRows(nu).setZero();
+  const int nr = reduction_.size, leading = at.leading;
+  const double h = at.dt, drift = isMidpoint(spec) ? 0.5 * h : h;
+  PaddedMap dydd = shapePadded(view.acceleration.dydd, leading + 2 * nr, nr);
+  PaddedMap dlambda = shapePadded(dlambda_, leading + 2 * nr, contacts.rows);
+  dydd.topRows(leading).setZero();
   addMotorRows(at, dydd);
   if (isMidpoint(spec))
     addForeseenVelocity(h, contacts, at, view);
   else
-    setContactDerivatives(contacts, view.acceleration);
+    setContactDerivatives(leading, contacts, view.acceleration);
   solveDerivatives(at.factors, dydd, dlambda, room_);
+  auto gap = out.gap.tail(2 * nr);
   for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
     const ReducedCluster& cluster = reduction_.clusters[i];
-    out.gap.segment(cluster.offset, cluster.size) = view.clusters[i].gap;
-    out.gap.segment(nr + cluster.offset, cluster.size) = view.clusters[i].gap_v;
+    gap.segment(cluster.offset, cluster.size) = view.clusters[i].gap;
+    gap.segment(nr + cluster.offset, cluster.size) = view.clusters[i].gap_v;
   }
-  calcFreeGaps(at, next, out.gap);
+  calcFreeGaps(at, next, gap);
   for (FreeJoint& free : free_joints_)
-    if (free.curved) updateFreeJoint(drift, at, out.gap, free);
+    if (free.curved) updateFreeJoint(drift, at, gap, free);
   dydd *= h;
   dydd.bottomRows(nr).diagonal().array() += 1;
-  setTransition(drift, view, dydd, out);
+  if (isFree(at)) addKickScale(spec, at, dydd);
+  MatrixMap all = out.Ft();
+  const Eigen::Index first = all.cols() - 2 * nr;  // after a time scale
+  MatrixMap Ft(&all(0, first), all.rows(), 2 * nr, Eigen::OuterStride<>(all.outerStride()));
+  setTransition(leading, drift, view, dydd, Ft);
+  if (isFree(at)) subtractVelocity(at, next, Ft);
   if (!isMidpoint(spec)) return;
-  addFirstDrift(drift, at, view, out.Ft());
+  addFirstDrift(drift, at, view, Ft);
   addFirstDrift(drift, at, view, dlambda);
 }
 
 // Right-hand sides of the acceleration half way: its velocity is that of reduced_kernel.h Eq. (h).
 void NodeAssembly::addForeseenVelocity(double h, const ContactLayout& contacts, const ReducedEvaluation& at,
                                        LaneView& view) {
-  const Eigen::Index nr = reduction_.size, nu = model_.nu(), columns = nu + 2 * nr;
+  const Eigen::Index nr = reduction_.size, leading = at.leading, columns = leading + 2 * nr;
   PaddedMap foreseen = shapePadded(view.foreseen.dydd, columns, nr),
             dydd = shapePadded(view.acceleration.dydd, columns, nr);
   PaddedMap dlambda = shapePadded(dlambda_, columns, contacts.rows);
-  foreseen.topRows(nu).setZero();
+  foreseen.topRows(leading).setZero();
   addMotorRows(at, foreseen);
-  setContactDerivatives(contacts, view.foreseen);
+  setContactDerivatives(at.leading, contacts, view.foreseen);
   solveDerivatives(at.factors, foreseen, dlambda, room_);
   for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
     const Eigen::Index o = reduction_.clusters[i].offset, r = reduction_.clusters[i].size;
-    foreseen.block(nu + o, o, r, r) += view.clusters[i].T.transpose();
+    foreseen.block(leading + o, o, r, r) += view.clusters[i].T.transpose();
   }
   foreseen *= 0.5 * h;
+  if (isFree(at)) addForeseenScale(at, foreseen);
   clearPadding(foreseen);
-  setContactDerivatives(contacts, view.acceleration);
+  setContactDerivatives(at.leading, contacts, view.acceleration);
   // By the velocity: the last rows, whose own values the products must not change before they are read.
   const auto add = [&](PaddedMap out) {
     Eigen::Map<MatrixXd> by_velocity(by_velocity_.data(), nr, out.cols());
@@ -110,11 +120,12 @@ void NodeAssembly::addForeseenVelocity(double h, const ContactLayout& contacts, 
 
 // Rows by (dy, dy_v) half way become rows by those of the state: reduced_kernel.h Eq. (g) with k = 0, transposed.
 void NodeAssembly::addFirstDrift(double h, const ReducedEvaluation& at, const LaneView& view, PaddedMap rows) {
-  const int nr = reduction_.size, nu = model_.nu(), nq = model_.nq();
+  if (isFree(at)) addFirstDriftScale(h, at, view, rows);
+  const int nr = reduction_.size, leading = at.leading, nq = model_.nq();
   const auto turn = [&](int offset, const auto& q_y, const auto& q_v, const auto& v_y, const auto& v_v) {
     const Eigen::Index r = q_y.rows();
     for (Eigen::Index c = 0; c < rows.cols(); ++c) {
-      auto by_q = rows.col(c).segment(nu + offset, r), by_v = rows.col(c).segment(nu + nr + offset, r);
+      auto by_q = rows.col(c).segment(leading + offset, r), by_v = rows.col(c).segment(leading + nr + offset, r);
       auto before_q = column_.head(r), before_v = column_.segment(r, r);
       before_q = by_q;
       before_v = by_v;
@@ -131,7 +142,7 @@ void NodeAssembly::addFirstDrift(double h, const ReducedEvaluation& at, const La
       turn(free.offset, Jq, JointMatrix(h * Jd), JointMatrix(JointMatrix::Zero(n, n)),
            JointMatrix(JointMatrix::Identity(n, n)));
     } else {
-      rows.middleRows(nu + nr + o, n) += h * rows.middleRows(nu + o, n);
+      rows.middleRows(leading + nr + o, n) += h * rows.middleRows(leading + o, n);
     }
   }
   for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
@@ -155,23 +166,25 @@ void NodeAssembly::addMotorRows(const ReducedEvaluation& at, PaddedMap dydd) con
 }
 
 // Sets the right-hand sides of the contact rows.
-void NodeAssembly::setContactDerivatives(const ContactLayout& contacts, const LaneView::Acceleration& acceleration) {
-  const int nr = reduction_.size, nu = model_.nu();
-  PaddedMap dlambda = shapePadded(dlambda_, nu + 2 * nr, contacts.rows);
+void NodeAssembly::setContactDerivatives(int leading, const ContactLayout& contacts,
+                                         const LaneView::Acceleration& acceleration) {
+  const int nr = reduction_.size;
+  PaddedMap dlambda = shapePadded(dlambda_, leading + 2 * nr, contacts.rows);
   dlambda.setZero();
   clearPadding(dlambda);
   for (const ContactLayout::Contact& contact : contacts.contacts) {
     const LaneView::Contact& columns = acceleration.contacts[contact.slot];
     const std::vector<int>& outer = layout_.outers[layout_.slots[contact.slot]];
     for (size_t o = 0; o < outer.size(); ++o) {
-      dlambda.row(nu + outer[o]).segment(contact.row, contact.rows) = columns.dy.col(o).head(contact.rows).transpose();
-      dlambda.row(nu + nr + outer[o]).segment(contact.row, contact.rows) =
+      dlambda.row(leading + outer[o]).segment(contact.row, contact.rows) =
+          columns.dy.col(o).head(contact.rows).transpose();
+      dlambda.row(leading + nr + outer[o]).segment(contact.row, contact.rows) =
           columns.dv.col(o).head(contact.rows).transpose();
     }
   }
 }
 
-void NodeAssembly::calcFreeGaps(const ReducedEvaluation& at, const ReducedEvaluation& next, VectorXd& gap) const {
+void NodeAssembly::calcFreeGaps(const ReducedEvaluation& at, const ReducedEvaluation& next, VectorRef gap) const {
   const int nq = model_.nq(), nr = reduction_.size;
   for (const FreeJoint& free : free_joints_) {
     const Joint& joint = *free.joint;
@@ -183,7 +196,7 @@ void NodeAssembly::calcFreeGaps(const ReducedEvaluation& at, const ReducedEvalua
 }
 
 // reduced_kernel.h Eq. (g) for a curved joint outside all clusters, where N = 1 and J^T vanishes.
-void NodeAssembly::updateFreeJoint(double h, const ReducedEvaluation& at, const VectorXd& gap, FreeJoint& free) const {
+void NodeAssembly::updateFreeJoint(double h, const ReducedEvaluation& at, ConstVectorRef gap, FreeJoint& free) const {
   const Joint& joint = *free.joint;
   const int n = free.size;
   JointMatrix Jq(n, n), Jd(n, n), Jdiff(n, n);
@@ -198,9 +211,8 @@ void NodeAssembly::updateFreeJoint(double h, const ReducedEvaluation& at, const 
 }
 
 // Columns of F^T, from those of dv and the derivatives of each reduced joint with respect to dv and dy.
-void NodeAssembly::setTransition(double h, const LaneView& view, PaddedMap dv, StageModel& out) const {
-  const Eigen::Index nr = reduction_.size, nu = model_.nu();
-  MatrixMap Ft = out.Ft();
+void NodeAssembly::setTransition(int leading, double h, const LaneView& view, PaddedMap dv, MatrixMap Ft) const {
+  const Eigen::Index nr = reduction_.size;
   const auto multiply = [&](const auto& derivative, Eigen::Index from, Eigen::Index to) {
     const Eigen::Index n = derivative.rows();
     setProduct(dv.rows(), n, n, pad(dv, 0, from), {derivative.data(), derivative.outerStride(), 1}, pad(Ft, 0, to));
@@ -208,7 +220,7 @@ void NodeAssembly::setTransition(double h, const LaneView& view, PaddedMap dv, S
   const auto add = [&](const auto& derivative, Eigen::Index from, Eigen::Index to) {
     const Eigen::Index n = derivative.rows();
     for (Eigen::Index i = 0; i < n; ++i)
-      for (Eigen::Index k = 0; k < n; ++k) Ft(nu + from + k, to + i) += derivative(i, k);
+      for (Eigen::Index k = 0; k < n; ++k) Ft(leading + from + k, to + i) += derivative(i, k);
   };
   for (const FreeJoint& free : free_joints_) {
     const Eigen::Index o = free.offset, n = free.size;
@@ -218,7 +230,7 @@ void NodeAssembly::setTransition(double h, const LaneView& view, PaddedMap dv, S
       add(free.q_y, o, o);
     } else {
       Ft.middleCols(o, n) = h * dv.middleCols(o, n);
-      Ft.block(nu + o, o, n, n).diagonal().array() += 1;
+      Ft.block(leading + o, o, n, n).diagonal().array() += 1;
     }
   }
   for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
@@ -281,7 +293,8 @@ void NodeAssembly::addTimesZ(ConstMatrixRef A, const LaneView& view, MatrixRef o
 void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
                                 const ConstraintWeights* constraints, const ReducedEvaluation& at, const LaneView& view,
                                 StageModel& out) {
-  const int nr = reduction_.size, nu = static_cast<int>(at.u.size()), columns = nu + 2 * nr;
+  const int nr = reduction_.size, leading = at.leading, columns = leading + 2 * nr;
+  constraint_gradient_.setZero();
   costs.selectRows(at, constraints, counted_);
   const int rows = counted_.rows;
   if (rows == 0) {
@@ -298,9 +311,14 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
     jacobians_.lambda.middleRows<kLane>(i).middleCols(contacts.closure_rows, contacts.rows).setZero();
     if (costs.needsControls()) jacobians_.u.middleRows<kLane>(i).setZero();
   }
-  costs.differentiate({model_, view.ws, spec.constraints, at.u, at.lambda}, counted_, jacobians_);
+  jacobians_.s.head(rows).setZero();
+  costs.differentiate({model_, view.ws, spec.constraints, at.u, at.lambda, at.time_scale}, counted_, jacobians_);
   PaddedMap Rt = shapePadded(Rt_, columns, rows), scaled = shapePadded(Rt_scaled_, columns, rows);
   updateResidualDerivatives(costs.needsControls(), contacts, at, view, Rt);
+  if (isFree(at))
+    for (const CountedRows::Block& block : counted_.blocks)
+      for (int i = block.row; block.of_constraint && i < block.row + block.size; ++i)
+        constraint_gradient_.head(columns) += counted_.gradient[i] * Rt.col(i);
   auto gradient = gradient_.head(columns);
   gradient.setZero();
   int counting = 0;  // rows so far with a non-zero weight
@@ -313,21 +331,22 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
   clearPadding(shapePadded(Rt_, columns, counting));
   clearPadding(shapePadded(Rt_scaled_, columns, counting));
   setLowerProduct(counting, pad(scaled), pad(Rt), out.hessian());
-  out.lu = gradient.head(nu);
-  out.lx = gradient.tail(2 * nr);
+  out.lu = gradient.head(out.lu.size());
+  out.lx = gradient.tail(out.lx.size());
 }
 
 void NodeAssembly::updateResidualDerivatives(bool controls, const ContactLayout& contacts, const ReducedEvaluation& at,
                                              const LaneView& view, PaddedMap Rt) {
-  const int nr = reduction_.size, nu = static_cast<int>(at.u.size()), motion_rows = counted_.motion_rows;
+  const int nr = reduction_.size, nu = model_.nu(), leading = at.leading, motion_rows = counted_.motion_rows;
   Rt.setZero();
   const auto q = jacobians_.q.topRows(motion_rows), v = jacobians_.v.topRows(motion_rows);
-  addTimesN(q, at, Rt.block(nu, 0, nr, motion_rows));
-  addTimesZ(v, view, Rt.block(nu, 0, nr, motion_rows));
-  addTimesN(v, at, Rt.block(nu + nr, 0, nr, motion_rows));
+  addTimesN(q, at, Rt.block(leading, 0, nr, motion_rows));
+  addTimesZ(v, view, Rt.block(leading, 0, nr, motion_rows));
+  addTimesN(v, at, Rt.block(leading + nr, 0, nr, motion_rows));
   if (controls) Rt.topRows(nu) = jacobians_.u.topLeftCorner(counted_.rows, nu).transpose();
-  if (nu == 0 || contacts.rows == 0) return;
-  const PaddedMap by_forces = shapePadded(dlambda_, nu + 2 * nr, contacts.rows);
+  if (isFree(at)) Rt.row(leading - 1) = jacobians_.s.head(counted_.rows).transpose();
+  if (leading == 0 || contacts.rows == 0) return;
+  const PaddedMap by_forces = shapePadded(dlambda_, leading + 2 * nr, contacts.rows);
   for (int i = 0; i < counted_.rows; ++i) {
     if (!counted_.counts(i)) continue;
     for (int j = 0; j < contacts.rows; ++j) {

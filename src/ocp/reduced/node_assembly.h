@@ -22,6 +22,9 @@ class NodeAssembly {
   void setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
                     const ConstraintWeights* constraints, const ReducedEvaluation& at, const LaneView& view,
                     StageModel& out);
+  // The part of the gradient of the last setResiduals() that is due to constraints, by (u, s, dy, dy_v); zero where s is
+  // not free.
+  const VectorXd& getConstraintGradient() const { return constraint_gradient_; }
 
   // Gap and derivatives of a joint outside all clusters: those of q+ with respect to dy and dv+, which are the identity
   // and h except for curved joints.
@@ -32,7 +35,8 @@ class NodeAssembly {
     JointMatrix q_y, q_v;  // of a curved one
   };
   std::vector<FreeJoint>& freeJoints() { return free_joints_; }
-  void calcFreeGaps(const ReducedEvaluation& at, const ReducedEvaluation& next, VectorXd& gap) const;
+  // \param gap  2 size, the robot's part
+  void calcFreeGaps(const ReducedEvaluation& at, const ReducedEvaluation& next, VectorRef gap) const;
 
   // out += (A X)^T with A for the whole model (k x nv) and X = N (joints outside all clusters: the identity) or Z
   // (zero).
@@ -40,14 +44,23 @@ class NodeAssembly {
   void addTimesZ(ConstMatrixRef A, const LaneView& view, MatrixRef out) const;
 
  private:
-  void setContactDerivatives(const ContactLayout& contacts, const LaneView::Acceleration& acceleration);
+  void setContactDerivatives(int leading, const ContactLayout& contacts, const LaneView::Acceleration& acceleration);
   void addMotorRows(const ReducedEvaluation& at, PaddedMap dydd) const;
   void addForeseenVelocity(double h, const ContactLayout& contacts, const ReducedEvaluation& at, LaneView& view);
   void addFirstDrift(double h, const ReducedEvaluation& at, const LaneView& view, PaddedMap rows);
-  void updateFreeJoint(double h, const ReducedEvaluation& at, const VectorXd& gap, FreeJoint& free) const;
-  void setTransition(double h, const LaneView& view, PaddedMap dv, StageModel& out) const;
+  void updateFreeJoint(double h, const ReducedEvaluation& at, ConstVectorRef gap, FreeJoint& free) const;
+  void setTransition(int leading, double h, const LaneView& view, PaddedMap dv, MatrixMap Ft) const;
   void updateResidualDerivatives(bool controls, const ContactLayout& contacts, const ReducedEvaluation& at,
                                  const LaneView& view, PaddedMap Rt);
+
+  // node_scale.cpp: derivatives by a free time scale, reduced_kernel.h Eq. (i)
+  bool isFree(const ReducedEvaluation& at) const { return at.leading > model_.nu(); }
+  void addForeseenScale(const ReducedEvaluation& at, PaddedMap foreseen);
+  void addKickScale(const StageSpec& spec, const ReducedEvaluation& at, PaddedMap dv);
+  void subtractVelocity(const ReducedEvaluation& at, const ReducedEvaluation& next, MatrixMap Ft);
+  void addFirstDriftScale(double h, const ReducedEvaluation& at, const LaneView& view, PaddedMap rows);
+  template <typename GetWN>
+  void project(const VectorXd& v, const GetWN& get_WN, VectorRef out) const;
 
   const Model& model_;
   const Reduction& reduction_;
@@ -64,6 +77,9 @@ class NodeAssembly {
   VectorXd room_;         // of solveDerivatives()
   VectorXd by_velocity_;  // of addForeseenVelocity(): rows by dy_v
   VectorXd column_;       // of addFirstDrift(): 2 r of the largest reduced joint
+  VectorXd y_, y_mid_;    // of node_scale.cpp: size
+  VectorXd velocity_;     // likewise: nv
+  VectorXd constraint_gradient_;  // nu + 1 + 2 size
 };
 
 }  // namespace bielle

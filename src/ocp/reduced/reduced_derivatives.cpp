@@ -52,7 +52,10 @@ struct ReducedKernel::Batch {
 
 void ReducedKernel::linearizeSteps(LinearizeItem* items, int count, std::vector<LaneView>& views) {
   const Batch batch(items, count);
-  for (int l = 0; l < kLane; ++l) loadLengths(*items[l < count ? l : 0].spec, l);
+  for (int l = 0; l < kLane; ++l) {
+    const LinearizeItem& item = items[l < count ? l : 0];
+    loadLengths(*item.spec, item.at->dt, l);
+  }
   if (getPoint(*items->spec) == Point::Midpoint) {
     linearizeStates(items, count, views);
     linearizeMidpoints(batch, items, views);
@@ -65,7 +68,7 @@ void ReducedKernel::linearizeSteps(LinearizeItem* items, int count, std::vector<
     storeColumns(count, views);
     for (int l = 0; l < count; ++l) items[l].ok = true;
   }
-  storeAcceleration(count, views, &LaneView::acceleration);
+  storeAcceleration(batch.source(), views, &LaneView::acceleration);
   loadLastDrift(batch.source());
   updateDrifts(items, count);
   gatherLanes(count, x1_.size(), x1_.data(), [&](int l) { return items[l].next->x.data(); });
@@ -84,7 +87,7 @@ void ReducedKernel::linearizeMidpoints(const Batch& batch, LinearizeItem* items,
   loadMidpointBases(batch.source());
   updateColumns(model_, ws_);
   linearizeAccelerations(batch, Point::Foreseen);
-  storeAcceleration(count, views, &LaneView::foreseen);
+  storeAcceleration(batch.source(), views, &LaneView::foreseen);
   storeTurns(count, views);
   gatherLanes(count, v_.size(), v_.data(), [&](int l) { return batch.nodes[l]->v_mid.data(); });
   linearizeAccelerations(batch, Point::Midpoint);

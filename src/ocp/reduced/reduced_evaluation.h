@@ -32,6 +32,7 @@ struct ReducedEvaluation : RobotEvaluation {
     clusters.reserve(reduction.clusters.size());
     for (const ReducedCluster& cluster : reduction.clusters) clusters.emplace_back(cluster);
   }
+  int leading = 0;        // of a step: rows of F^T before those of (dy, dy_v), countLeading()
   std::vector<SE3> X_WB;  // nb
   std::vector<ClusterNode> clusters;
   SaddlePointFactors factors;                 // of reduced_kernel.h, Eq. (b)

@@ -19,7 +19,8 @@ void ReducedImpact::update(const ReducedKernel::StepItem& item) {
   ReducedEvaluation& at = *item.at;
   const int nq = model_.nq(), nv = model_.nv();
   if (!at.impact) at.impact = std::make_unique<ImpactWorkspace>(model_);
-  const DynamicsStatus status = updateImpact(model_, *at.impact, item.spec->constraints, at.x.head(nq), at.x.tail(nv));
+  const DynamicsStatus status =
+      updateImpact(model_, *at.impact, item.spec->constraints, at.x.head(nq), at.x.segment(nq, nv));
   if (status != DynamicsStatus::Ok) {
     at.failure = getMessage(status);
     at.status = StepStatus::Failed;
@@ -27,7 +28,8 @@ void ReducedImpact::update(const ReducedKernel::StepItem& item) {
   }
   at.lambda = at.impact->impulse;
   at.a.setZero();
-  at.x_next << at.x.head(nq), at.impact->v_plus;
+  at.x_next.head(nq) = at.x.head(nq);
+  at.x_next.segment(nq, nv) = at.impact->v_plus;
   for (size_t i = 0; i < at.clusters.size(); ++i) {
     if (item.previous) at.clusters[i].next = item.previous->clusters[i].next;
     gatherVelocity(reduction_.clusters[i], at.impact->v_plus, at.clusters[i].v_next);
@@ -65,7 +67,7 @@ void ReducedImpact::linearizeCluster(size_t index, const ReducedEvaluation& at, 
   ClusterGapOf<double>& gap = c.gap;
   const int nr = reduction_.size, o = cluster.offset, r = cluster.size;
   gatherConfiguration(model_, cluster, next.x.head(model_.nq()), gap.q);
-  gatherVelocity(cluster, next.x.tail(model_.nv()), gap.v);
+  gatherVelocity(cluster, next.x.segment(model_.nq(), model_.nv()), gap.v);
   updateGap(c, at.clusters[index], next.clusters[index].at);
   out.gap.segment(o, r) = gap.y;
   out.gap.segment(nr + o, r) = gap.y_v;

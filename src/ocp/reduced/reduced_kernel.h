@@ -25,6 +25,10 @@
 // An Euler step has k = h. A midpoint step is (g) twice, with h/2 for h: at the state with k = 0, then half way with k
 // = h, where a belongs to the foreseen velocity v^ = v + h/2 N y'_0, y'_0 being that of v itself. N turns with q,
 //     dy^_v = dy_v + h/2 (dy'_0 + T dy),    T = N^T d(J^T f)/dq N,    f = -J^{+T} W a_d                             (h)
+// Where the time scale s of robot_problem.h Eq. (5) is free, h and k are in proportion to it. A longer drift acts like a
+// kick along w, and (g) depends on dw only through (W N)^T dw. With y_v = (W N)^T v,
+//     dy+_s = h X eta,   dy_v+_s = (X' - h S X) eta - (W N')^T v+ / s,   eta = (y_v + 2 k y') / s                  (i)
+// for each drift, k being 0 in the first one of a midpoint step; half way, h y'_0 / (2 s) is added to (h).
 // With a gap, the result is read about the node state's own basis (cluster_gap.h).
 //
 // All of it runs in lanes, even for a single node: the result of a lane does not depend on the others, so that results
@@ -107,7 +111,8 @@ struct LaneView {
     Matrix6Xd dy, dv;  // as in ContactLanes
   };
   struct Acceleration {
-    VectorXd dydd;  // (nu + 2 size) x size, padded: room for torques, then A_y^T and A_v^T of reduced_tree.h
+    // (leading rows + 2 size) x size, padded: room for torques and time scale, then A_y^T and A_v^T of reduced_tree.h
+    VectorXd dydd;
     std::vector<Contact> contacts;  // per slot
   };
   Workspace ws;
@@ -165,7 +170,7 @@ class ReducedKernel {
   void loadMidpointBases(LaneSource<const ReducedEvaluation> nodes);
   void loadPoints(const StepItem* items, int count);
   void loadControls(const StepItem* items, int count);
-  void loadLengths(const StageSpec& spec, int lane);
+  void loadLengths(const StageSpec& spec, double h, int lane);
   enum class ContactUse { Step, Derivatives };
   void loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices, Point point, ContactUse use);
   void loadContact(int lane, const ContactLayout::Contact& contact, const ReducedEvaluation& node, int closure_rows,
@@ -185,7 +190,8 @@ class ReducedKernel {
   void storeContactForces(const ContactLayout& layout, int lane, VectorXd& lambda) const;
   void storeMotion(int count, std::vector<LaneView>& views) const;
   void storeColumns(int count, std::vector<LaneView>& views) const;
-  void storeAcceleration(int count, std::vector<LaneView>& views, LaneView::Acceleration LaneView::*to) const;
+  void storeAcceleration(LaneSource<const ReducedEvaluation> nodes, std::vector<LaneView>& views,
+                         LaneView::Acceleration LaneView::*to) const;
   void storeDrift(int count, std::vector<LaneView>& views, LaneView::Drift LaneView::Cluster::*to) const;
   void storeGaps(int count, std::vector<LaneView>& views) const;
 

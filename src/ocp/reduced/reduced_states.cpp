@@ -12,6 +12,7 @@ void ReducedKernel::difference(const DifferenceTask* tasks, int count) {
   gatherLanes(count, nq, ws_.q.data(), [&](int l) { return getNode(l).x.data(); });
   gatherLanes(count, v_.size(), v_.data(), [&](int l) { return getNode(l).x.data() + nq; });
   gatherLanes(count, x1_.size(), x1_.data(), [&](int l) { return tasks[l].x1->data(); });
+  const auto getOfRobot = [&](VectorXd& dx) { return dx.data() + dx.size() - dx_.size(); };
   const auto subtract = [&](const Joint& joint, auto&& d) {
     calcJointDifference(joint, ws_.q.segment(joint.idx_q, joint.nq), x1_.segment(joint.idx_q, joint.nq), d);
   };
@@ -36,7 +37,7 @@ void ReducedKernel::difference(const DifferenceTask* tasks, int count) {
     dy_v.setZero();
     addSmallProductTransposed(WN, c.left, dy_v);
   }
-  scatterLanes(dx_.data(), dx_.size(), count, [&](int l) { return tasks[l].dx->data(); });
+  scatterLanes(dx_.data(), dx_.size(), count, [&](int l) { return getOfRobot(*tasks[l].dx); });
 }
 
 void ReducedKernel::integrate(const IntegrateTask* tasks, int count) {
@@ -44,11 +45,12 @@ void ReducedKernel::integrate(const IntegrateTask* tasks, int count) {
   const auto getNode = [&](int l) -> const ReducedEvaluation& {
     return *static_cast<const ReducedEvaluation*>(tasks[l].at);
   };
+  const auto getOfRobot = [&](const VectorXd& dx) { return dx.data() + dx.size() - dx_.size(); };
   std::array<const ReducedEvaluation*, kLane> nodes;
   for (int l = 0; l < count; ++l) nodes[l] = &getNode(l);
   gatherLanes(count, nq, ws_.q.data(), [&](int l) { return getNode(l).x.data(); });
   gatherLanes(count, v_.size(), v_.data(), [&](int l) { return getNode(l).x.data() + nq; });
-  gatherLanes(count, dx_.size(), dx_.data(), [&](int l) { return tasks[l].dx->data(); });
+  gatherLanes(count, dx_.size(), dx_.data(), [&](int l) { return getOfRobot(*tasks[l].dx); });
   loadBases({nodes.data(), count});
   for (size_t i = 0; i < reduction_.free_joints.size(); ++i) {
     const Joint& joint = model_.joints()[reduction_.free_joints[i]];

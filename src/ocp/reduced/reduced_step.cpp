@@ -31,7 +31,7 @@ LaneView::LaneView(const Model& model, const Reduction& reduction, const Reduced
         {MatrixXd::Zero(cluster.model.nv(), r), drift, drift, square, VectorXd::Zero(r), VectorXd::Zero(r)});
   }
   for (Acceleration* out : {&acceleration, &foreseen}) {
-    out->dydd.setZero(roundUpToLane(model.nu() + 2 * reduction.size) * reduction.size);
+    out->dydd.setZero(roundUpToLane(model.nu() + 1 + 2 * reduction.size) * reduction.size);
     for (int tip : layout.slots) {
       const Matrix6Xd columns = Matrix6Xd::Zero(6, tree.getTip(tip).outer.size());
       out->contacts.push_back({columns, columns});

@@ -35,9 +35,13 @@ struct Batch {
 
 class ReducedTranscription : public Transcription {
  public:
-  ReducedTranscription(const Model& model, const VectorXd& q0, const std::vector<StageSpec>& specs)
-      : model_(model), specs_(specs), reduction_(makeReduction(model, q0)), layout_(model, reduction_, specs) {
-    for (const StageSpec& spec : specs) costs_.emplace_back(spec, &spec != &specs.back());
+  ReducedTranscription(const Model& model, const VectorXd& q0, const NodeList& nodes)
+      : model_(model),
+        nodes_(nodes),
+        specs_(nodes.specs),
+        reduction_(makeReduction(model, q0)),
+        layout_(model, reduction_, specs_) {
+    for (const StageSpec& spec : specs_) costs_.emplace_back(spec, &spec != &specs_.back());
   }
 
   int tangentSize() const override { return 2 * reduction_.size; }
@@ -67,6 +71,7 @@ class ReducedTranscription : public Transcription {
   void finishLinearization(LinearizeTask& task, LaneView& view, ReducedScratch& scratch) const;
 
   const Model& model_;
+  const NodeList nodes_;
   const std::vector<StageSpec>& specs_;
   const Reduction reduction_;
   const ReducedLayout layout_;
@@ -80,7 +85,8 @@ void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScrat
   for (int i = 0; i < count; ++i) {
     const int node = tasks[i].node;
     auto& at = static_cast<ReducedEvaluation&>(*tasks[i].out);
-    if (!startEvaluation(model_, tasks[i], specs_[node], isRunning(node), costs_[node], at)) continue;
+    if (!startEvaluation(model_, tasks[i], nodes_, costs_[node], at)) continue;
+    at.leading = isRunning(node) ? countLeading(model_, nodes_.places[node]) : 0;
     const int rows = layout_.contacts[node].rows;
     if (at.factors.D.size() != rows || at.factors.L.rows() != reduction_.size) at.factors.resize(reduction_.size, rows);
     const auto* previous = static_cast<const ReducedEvaluation*>(tasks[i].previous);
@@ -105,7 +111,7 @@ void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScrat
 // Computes the costs after a successful step.
 void ReducedTranscription::finishEvaluation(int node, const LaneView& view, RobotEvaluation& at) const {
   if (at.status != StepStatus::Ok) return;
-  costs_[node].calc({model_, view.ws, specs_[node].constraints, at.u, at.lambda}, at);
+  costs_[node].calc({model_, view.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale}, at);
   if (!at.x_next.allFinite() || !std::isfinite(at.cost)) at.status = StepStatus::Failed;
 }
 
@@ -135,12 +141,14 @@ void ReducedTranscription::linearize(LinearizeTask* tasks, int count, ProblemScr
 
 void ReducedTranscription::finishLinearization(LinearizeTask& task, LaneView& view, ReducedScratch& scratch) const {
   const int node = task.node;
+  const TimeScalePlace& place = nodes_.places[node];
   auto& at = static_cast<ReducedEvaluation&>(*task.at);
   const auto* next = static_cast<const ReducedEvaluation*>(task.next);
   NodeAssembly& assembly = scratch.assembly;
   StageModel& out = *task.out;
   if (isStep(node)) {
     assembly.setStep(specs_[node], layout_.contacts[node], at, *next, view, out);
+    setNextTimeScale(place, at, next->x, out);
   } else if (isImpact(node)) {
     const DynamicsStatus status = scratch.impact.linearize(specs_[node].constraints, at, *next, view, assembly, out);
     if (status != DynamicsStatus::Ok) {
@@ -150,16 +158,17 @@ void ReducedTranscription::finishLinearization(LinearizeTask& task, LaneView& vi
   }
   out.cost = at.cost;
   assembly.setResiduals(costs_[node], specs_[node], layout_.contacts[node], task.weights, at, view, out);
-  if (specs_[node].state.weight != 0) addStateCostModel(model_, reduction_, view.state_cost, costs_[node].scale(), out);
-  if (isRunning(node)) costs_[node].addControlCost(at.u, out);
+  if (specs_[node].state.weight != 0)
+    addStateCostModel(model_, reduction_, view.state_cost, costs_[node].getScale(at), out);
+  if (isRunning(node)) costs_[node].addControlCost(at, out);
+  if (place.isFree()) addTimeScaleCost(at.leading, at, assembly.getConstraintGradient(), out);
   if (isFinite(out)) task.status = StepStatus::Ok;
 }
 
 }  // namespace
 
-std::unique_ptr<Transcription> makeReducedTranscription(const Model& model, const VectorXd& q0,
-                                                        const std::vector<StageSpec>& specs) {
-  return std::make_unique<ReducedTranscription>(model, q0, specs);
+std::unique_ptr<Transcription> makeReducedTranscription(const Model& model, const VectorXd& q0, const NodeList& nodes) {
+  return std::make_unique<ReducedTranscription>(model, q0, nodes);
 }
 
 }  // namespace bielle

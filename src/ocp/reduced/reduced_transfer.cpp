@@ -119,14 +119,17 @@ void ReducedKernel::storePoints(const StepItem* items, int count) {
 }
 
 // k and h of Eq. (g); of a midpoint step those of the second drift.
-void ReducedKernel::loadLengths(const StageSpec& spec, int lane) {
-  kick_.set(lane, spec.dt);
-  drift_.set(lane, spec.step == StepRule::Midpoint ? 0.5 * spec.dt : spec.dt);
+void ReducedKernel::loadLengths(const StageSpec& spec, double h, int lane) {
+  kick_.set(lane, h);
+  drift_.set(lane, spec.step == StepRule::Midpoint ? 0.5 * h : h);
 }
 
 // Time steps and motor forces.
 void ReducedKernel::loadControls(const StepItem* items, int count) {
-  for (int l = 0; l < kLane; ++l) loadLengths(*items[l < count ? l : 0].spec, l);
+  for (int l = 0; l < kLane; ++l) {
+    const StepItem& item = items[l < count ? l : 0];
+    loadLengths(*item.spec, item.at->dt, l);
+  }
   gatherLanes(count, u_.size(), u_.data(), [&](int l) { return items[l].at->u.data(); });
   tau_.setZero();
   for (int m = 0; m < model_.nu(); ++m) tau_[model_.motors()[m].dof] = u_[m];
@@ -336,16 +339,20 @@ void ReducedKernel::storeColumns(int count, std::vector<LaneView>& views) const 
   for (int l = 0; l < count; ++l) views[l].ws.stage = WorkspaceStage::Velocity;
 }
 
-void ReducedKernel::storeAcceleration(int count, std::vector<LaneView>& views,
+void ReducedKernel::storeAcceleration(LaneSource<const ReducedEvaluation> nodes, std::vector<LaneView>& views,
                                       LaneView::Acceleration LaneView::*to) const {
-  const Eigen::Index nr = reduction_.size, nu = model_.nu(), rows = roundUpToLane(nu + 2 * nr);
+  const Eigen::Index nr = reduction_.size;
+  const int count = nodes.count;
   for (Eigen::Index i = 0; i < nr; ++i) {
     const auto storeRow = [&](const MatrixX<Lanes>& A, Eigen::Index row) {
-      scatterLanes(
-          &A(i, 0), nr, count, [&](int l) { return &(views[l].*to).dydd[i * rows + row]; }, nr);
+      const auto get = [&](int l) {
+        const Eigen::Index leading = nodes[l].leading;
+        return &(views[l].*to).dydd[i * roundUpToLane(leading + 2 * nr) + leading + row];
+      };
+      scatterLanes(&A(i, 0), nr, count, get, nr);
     };
-    storeRow(A_y_, nu);
-    storeRow(A_v_, nu + nr);
+    storeRow(A_y_, 0);
+    storeRow(A_v_, nr);
   }
   const auto store = [&](const Matrix6X<Lanes>& from, const auto& get) {
     scatterLanes(from.data(), from.size(), count, [&](int l) { return get(views[l].*to).data(); });

@@ -29,8 +29,10 @@ StateCostModelOf<T>::StateCostModelOf(const Model& model, const Reduction& reduc
 void addStateCostModel(const Model& model, const Reduction& reduction, const StateCostModel& cost, double scale,
                        StageModel& out) {
   const int nr = reduction.size;
-  MatrixMap lxx = out.lxx();
-  out.lx += scale * cost.gradient;
+  MatrixMap all = out.lxx();
+  const Eigen::Index first = all.rows() - 2 * nr;  // after a time scale
+  MatrixMap lxx(&all(first, first), 2 * nr, 2 * nr, Eigen::OuterStride<>(all.outerStride()));
+  out.lx.tail(2 * nr) += scale * cost.gradient;
   const double* hessian = cost.hessian.data();
   for (size_t i = 0; i < reduction.free_joints.size(); ++i) {
     const Joint& joint = model.joints()[reduction.free_joints[i]];
