@@ -13,6 +13,7 @@
 #include "bielle/report/report.h"
 #include "bielle/transmission/serial_model.h"
 #include "cli/commands.h"
+#include "cli/free_timings.h"
 #include "cli/motion_registry.h"
 #include "cli/table.h"
 
@@ -102,6 +103,7 @@ void printResult(const MotionResult& result, const std::vector<std::string>& pat
                               {"closure gap", pair(result.gap_position, result.gap_angle)},
                               {"contact slip", pair(result.slip_position, result.slip_angle)},
                               {"peak torques [N m]", torques}});
+  printTimings(result.timings);
   for (const std::string& path : paths) std::cout << "  " << path << "\n";
 }
 
@@ -210,8 +212,10 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   makeOutputDirectory(arguments.directory);
 
   watchSignals();
-  if (!request.parts.empty() && arguments.warm_start.empty())
+  if (!request.parts.empty() && arguments.warm_start.empty()) {
     motion.guess = solveParts(request, model, problem, arguments, solver);
+    fitTimings(*motion.problem, motion.guess);
+  }
   const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess, makeObserver(arguments));
   const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed",
                     serial ? arguments.serial_armature : ""};
@@ -312,6 +316,7 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
                  "posture")
       ->capture_default_str();
   addLimitOptions(sub, arguments);
+  addTimingOptions(sub, arguments->problem.timings);
   sub.add_option("--max-iterations", arguments->solver.max_iterations, "the solver stops there")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();

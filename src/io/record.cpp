@@ -14,7 +14,7 @@ namespace {
 
 void recordNode(const Model& model, Workspace& ws, const VectorXd& x, int k, MotionRecord& record) {
   record.q.row(k) = x.head(model.nq());
-  record.v.row(k) = x.tail(model.nv());
+  record.v.row(k) = x.segment(model.nq(), model.nv());
   updatePositions(model, ws, x.head(model.nq()));
   record.com.row(k) = calcCom(model, ws);
   record.gap.row(k).setZero();
@@ -27,7 +27,7 @@ void recordNode(const Model& model, Workspace& ws, const VectorXd& x, int k, Mot
 
 void recordStage(const RobotProblem& problem, RobotEvaluator& evaluator, const VectorXd& x, const VectorXd& u, int k,
                  MotionRecord& record) {
-  record.u.row(k) = u;
+  record.u.row(k) = u.head(record.u.cols());
   record.closure_wrenches.row(k).setZero();
   record.contact_wrenches.row(k).setZero();
   if (problem.spec(k).kind == StageKind::Impact) {  // no time, so no forces
@@ -106,7 +106,7 @@ MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajecto
     recordNode(model, ws, trajectory.xs[k], k, record);
     if (k == stages) break;
     recordStage(problem, evaluator, trajectory.xs[k], trajectory.us[k], k, record);
-    time += problem.spec(k).dt;
+    time += problem.getTimeScale(k, trajectory.xs[k], trajectory.us[k]) * problem.spec(k).dt;
   }
   return record;
 }

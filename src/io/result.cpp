@@ -70,6 +70,18 @@ Json makePhases(const MotionResult& result) {
   return phases;
 }
 
+Json makeTimings(const MotionResult& result) {
+  Json timings = Json::array();
+  for (const PhaseTiming& timing : result.timings)
+    timings.push_back({{"phase", timing.phase},
+                       {"start_node", timing.start_node},
+                       {"nominal_s", timing.nominal},
+                       {"chosen_s", timing.chosen},
+                       {"lower_s", timing.lower},
+                       {"upper_s", timing.upper}});
+  return timings;
+}
+
 Json makeGround(const Ground& ground) {
   Json steps = Json::array();
   for (const GroundStep& step : ground.steps)
@@ -142,6 +154,7 @@ Json makeSummary(const MotionResult& result) {
           {"com_height", {{"start_m", result.com_start}, {"lowest_m", result.com_lowest}}},
           {"peak_torques", listByName(result.peak_torques)},
           {"phases", makePhases(result)},
+          {"free_timings", makeTimings(result)},
           {"ground", makeGround(result.ground)},
           {"log_columns", {"iteration", "cost", "gap", "violation", "gradient", "step", "regularization", "seconds"}},
           {"log", log}};
@@ -178,6 +191,12 @@ MotionResult makeResult(const RunInfo& run, const Motion& motion, const Shooting
   result.step = motion.problem->spec(0).step;
   result.requested = motion.requested;
   result.schedule = motion.schedule;
+  result.timings = listTimings(*motion.problem, motion.schedule, trajectory);
+  int node = 0;
+  for (ContactPhase& phase : result.schedule.phases) {
+    if (phase.nodes > 0) phase.dt *= motion.problem->getTimeScale(node, trajectory.xs[node], trajectory.us[node]);
+    node += phase.nodes;
+  }
   result.ground = motion.ground;
   result.solver = summary;
   result.record = makeRecord(motion, trajectory);

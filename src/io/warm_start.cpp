@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -35,6 +36,23 @@ void carryToFeet(const Model& model, Workspace& ws, const ContactPhase& phase, V
   x.head<3>() += error / static_cast<double>(phase.contacts.size());
 }
 
+// Time scales of phases of free duration, from a record of as many nodes.
+void setTimeScales(const MotionRecord& record, Motion& motion) {
+  const RobotProblem& problem = *motion.problem;
+  double scale = 1;
+  for (int k = 0; k < problem.numStages(); ++k) {
+    const StageSpec& spec = problem.spec(k);
+    if (spec.timing.phase < 0) continue;
+    VectorXd &x = motion.guess.xs[k], &u = motion.guess.us[k];
+    if (u.size() > problem.model().nu()) {
+      scale = std::clamp((record.time[k + 1] - record.time[k]) / spec.dt, spec.timing.lower, spec.timing.upper);
+      u[u.size() - 1] = scale;
+    } else {
+      x[x.size() - 1] = scale;
+    }
+  }
+}
+
 }  // namespace
 
 void setGuess(const MotionRecord& record, Motion& motion) {
@@ -50,10 +68,14 @@ void setGuess(const MotionRecord& record, Motion& motion) {
   Workspace ws(model);
   for (int k = 0; k < nodes; ++k) {
     const int row = matchRow(k, nodes, record.q.rows());
-    motion.guess.xs[k] << record.q.row(row).transpose(), record.v.row(row).transpose();
-    carryToFeet(model, ws, motion.schedule.getPhase(k), motion.guess.xs[k]);
-    if (k + 1 < nodes) motion.guess.us[k] = record.u.row(matchRow(k, nodes - 1, record.u.rows())).transpose();
+    VectorXd& x = motion.guess.xs[k];
+    x.head(model.nq()) = record.q.row(row).transpose();
+    x.segment(model.nq(), model.nv()) = record.v.row(row).transpose();
+    carryToFeet(model, ws, motion.schedule.getPhase(k), x);
+    if (k + 1 < nodes)
+      motion.guess.us[k].head(model.nu()) = record.u.row(matchRow(k, nodes - 1, record.u.rows())).transpose();
   }
+  if (record.time.size() == nodes) setTimeScales(record, motion);
 }
 
 MotionRecord readResultRecord(const std::string& directory) {

@@ -53,17 +53,30 @@ void requirePositive(const std::vector<OptionEntry>& options, const std::vector<
       requireOption(*option.value > 0, option.name, "it is not positive", "give a number over 0 [" + option.unit + "]");
 }
 
+namespace {
+
+// Where bounds of durations are enforced, those of the motors are not to be.
+void leaveTorquesFree(const Model& model, std::vector<StageSpec>& stages) {
+  for (StageSpec& stage : stages) stage.effort_limits.setConstant(model.nu(), std::numeric_limits<double>::infinity());
+}
+
+}  // namespace
+
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options) {
   for (StageSpec& stage : plan.stages) stage.step = options.step;
   Motion motion;
   requireOption(plan.limited || !options.limits.areGiven(), "limit", "the paper's problem has none", "leave it out");
   if (plan.limited) motion.bounded = addLimits(model, options.limits, plan.q_start, plan.stages);
+  freeTimings(options.timings, plan.schedule, plan.stages);
+  if (!motion.bounded) leaveTorquesFree(model, plan.stages);
+  motion.bounded |= options.timings.areGiven();
   motion.name = std::move(plan.name);
   motion.schedule = std::move(plan.schedule);
   motion.ground = std::move(plan.ground);
   motion.problem = std::make_unique<RobotProblem>(model, plan.q_start, VectorXd::Zero(model.nv()),
                                                   std::move(plan.stages), options.formulation);
   motion.guess = std::move(plan.guess);
+  fitTimings(*motion.problem, motion.guess);
   motion.requested = std::move(plan.requested);
   motion.goals = std::move(plan.goals);
   return motion;

@@ -130,7 +130,9 @@ ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart
   for (const SequencePart& part : parts) {
     MotionPlan plan = part.plan(model, q);
     q = plan.q_end;
-    Motion motion = makeMotion(model, std::move(plan), options.problem);
+    ProblemOptions problem = options.problem;
+    problem.timings = selectTimings(problem.timings, plan.schedule);
+    Motion motion = makeMotion(model, std::move(plan), problem);
     const FddpSummary summary = Fddp(options.solver).solve(*motion.problem, motion.guess, options.observer);
     if (options.report) options.report(part.name, summary);
     join(motion.guess, whole);

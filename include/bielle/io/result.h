@@ -24,7 +24,8 @@ struct MotionResult {
   StepRule step = StepRule::Euler;
   std::vector<std::pair<std::string, double>> requested;  ///< every option by name
   std::vector<GoalOutcome> goals;                         ///< requested and achieved values
-  ContactSchedule schedule;
+  ContactSchedule schedule;                               ///< with the time steps that came out
+  std::vector<PhaseTiming> timings;                       ///< of the phases of free duration
   Ground ground;
   FddpSummary solver;
   MotionRecord record;
@@ -89,7 +90,8 @@ BuildInfo getBuildInfo();
 // Starting a solve from a previous result.
 
 /// Replaces the guess of a motion by states and torques of a record of the same robot: node by node if the lengths
-/// agree, otherwise each node takes the recorded one at the same fraction of the duration. The base is moved so that
+/// agree, with the durations of phases where they are free; otherwise each node takes the recorded one at the same
+/// fraction of the duration. The base is moved so that
 /// the stance feet are at the places of the new motion.
 /// \throws ModelError when the coordinates or motors differ, or the record has numbers that are not finite
 void setGuess(const MotionRecord& record, Motion& motion);

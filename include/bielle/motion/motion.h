@@ -6,6 +6,7 @@
 
 #include "bielle/motion/goal.h"
 #include "bielle/motion/limits.h"
+#include "bielle/motion/timings.h"
 #include "bielle/ocp/contact_schedule.h"
 #include "bielle/ocp/robot_problem.h"
 #include "bielle/solve/fddp.h"
@@ -61,7 +62,7 @@ struct Motion {
   ShootingTrajectory guess;                               ///< quasi-static
   std::vector<std::pair<std::string, double>> requested;  ///< every option by name
   std::vector<Goal> goals;                                ///< what is to come out, to be measured on the trajectory
-  bool bounded = false;  ///< a torque is limited: to be solved with ControlBounds::Enforce
+  bool bounded = false;  ///< a torque or a duration is limited: to be solved with ControlBounds::Enforce
 };
 
 /// Options of a problem besides those of the motion.
@@ -69,14 +70,16 @@ struct ProblemOptions {
   Formulation formulation = Formulation::Reduced;
   StepRule step = StepRule::Euler;
   LimitOptions limits;
+  TimingOptions timings;
 
   ProblemOptions() = default;
   ProblemOptions(Formulation formulation, const LimitOptions& limits = {}) : formulation(formulation), limits(limits) {}
   ProblemOptions(Formulation formulation, StepRule step) : formulation(formulation), step(step) {}
 };
 
-/// Turns a plan into a problem that starts at rest, adding the limits and the step rule to its stages.
-/// \throws ModelError as addLimits() does, or when limits are given for a problem of the paper, which has none
+/// Turns a plan into a problem that starts at rest, adding limits, free durations and the step rule to its stages.
+/// \throws ModelError as addLimits() and freeTimings() do, or when limits are given for a problem of the paper, which
+/// has none
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options);
 
 /// Motor torques that hold the robot still at q under the closures and contacts, as far as possible: with a = v = 0,

@@ -1,0 +1,55 @@
+#include "cli/free_timings.h"
+
+#include <iostream>
+
+#include "bielle/motion/motion.h"
+#include "cli/commands.h"
+#include "cli/table.h"
+
+namespace bielle::cli {
+namespace {
+
+// PHASE=LOWER:UPPER
+std::pair<std::string, TimingBounds> parseBounds(const std::string& text) {
+  const size_t colon = text.rfind(':');
+  const char* example = "left foot=0.8:1.2";
+  requireOption(colon != std::string::npos, "free-timings", "'" + text + "' has no two bounds",
+                std::string("give PHASE=LOWER:UPPER, e.g. '") + example + "'");
+  const auto [name, lower] = parseSetting("--free-timings", text.substr(0, colon), example);
+  const double upper = parseSetting("--free-timings", name + "=" + text.substr(colon + 1), example).second;
+  return {name, {lower, upper}};
+}
+
+}  // namespace
+
+void addTimingOptions(CLI::App& sub, TimingOptions& timings) {
+  sub.add_option_function<std::vector<std::string>>(
+         "--free-timings",
+         [&timings](const std::vector<std::string>& phases) {
+           for (const std::string& phase : phases)
+             if (!phase.empty()) timings.phases.push_back(parseBounds(phase));
+           if (!timings.areGiven()) timings.phases.push_back({kAllPhases, {}});
+         },
+         "let the solver choose how long phases last; footholds and paths stay. PHASE=LOWER:UPPER bounds one of them "
+         "[of "
+         "the nominal duration], `all` those with contacts; alone: all=0.6:1.6")
+      ->type_name("PHASE=LOWER:UPPER ...")
+      ->expected(0, -1);
+  sub.add_option("--time-weight", timings.time_weight,
+                 "cost of a second of the phases whose duration is free: the more, the faster the rhythm [1/s]")
+      ->capture_default_str();
+}
+
+void printTimings(const std::vector<PhaseTiming>& timings) {
+  if (timings.empty()) return;
+  std::cout << "durations chosen:\n";
+  std::vector<Row> rows;
+  const auto format = [](double seconds) { return formatNumber(seconds, "%.3f"); };
+  for (const PhaseTiming& timing : timings)
+    rows.push_back(
+        {timing.phase, format(timing.chosen) + " s",
+         "for " + format(timing.nominal) + ", within " + format(timing.lower) + " .. " + format(timing.upper)});
+  printTable(std::cout, rows);
+}
+
+}  // namespace bielle::cli

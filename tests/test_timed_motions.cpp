@@ -1,0 +1,170 @@
+// Motions that choose their durations. Oracle: the same problem solved again with one duration fixed on either side.
+#include <catch2/catch.hpp>
+#include <filesystem>
+
+#include "bielle/io/result.h"
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/jump.h"
+#include "bielle/motion/walk.h"
+
+using namespace bielle;
+namespace fs = std::filesystem;
+
+namespace {
+
+const TimingOptions kAll{{{kAllPhases, {}}}, 0};
+
+struct Solution {
+  Motion motion;
+  FddpSummary summary;
+  std::vector<PhaseTiming> timings;
+};
+
+Solution solve(Motion motion, int threads = 0) {
+  FddpOptions options;
+  options.bounds = ControlBounds::Enforce;
+  options.threads = threads;
+  Solution out{std::move(motion), {}, {}};
+  out.summary = Fddp(options).solve(*out.motion.problem, out.motion.guess);
+  REQUIRE(out.summary.termination == FddpTermination::Converged);
+  out.timings = listTimings(*out.motion.problem, out.motion.schedule, out.motion.guess);
+  return out;
+}
+
+WalkOptions makeOptions() {
+  WalkOptions options;
+  options.steps = 2;
+  options.gait.timing.time_step = 0.018;
+  return options;
+}
+
+// A walk with all durations free or, given a solution, one of them at a multiple of what was chosen, from that solution.
+Motion makeTimedWalk(const Model& model, const Solution* solution = nullptr, size_t fixed = 0, double factor = 1) {
+  MotionPlan plan = planWalk(model, makeOptions(), makeStandingPosture(model));
+  const ContactSchedule schedule = plan.schedule;
+  freeTimings(kAll, schedule, plan.stages);
+  double scale = 1;
+  int begin = 0, end = 0;
+  if (solution) {
+    const PhaseTiming& timing = solution->timings[fixed];
+    scale = factor * timing.chosen / timing.nominal;
+    begin = timing.start_node;
+    end = begin + schedule.phases[fixed].nodes;
+    for (int k = begin; k < end; ++k) plan.stages[k].timing.lower = plan.stages[k].timing.upper = scale;
+  }
+  Motion motion = makeMotion(model, std::move(plan), {Formulation::Reduced, StepRule::Midpoint});
+  if (!solution) return motion;
+  motion.guess = solution->motion.guess;
+  motion.guess.us[begin].tail(1)[0] = scale;
+  for (int k = begin + 1; k < end; ++k) motion.guess.xs[k].tail(1)[0] = scale;
+  return motion;
+}
+
+}  // namespace
+
+TEST_CASE("a walk chooses the best duration of each phase") {
+  const Model model = loadRobot("bipetto").model;
+  const Solution best = solve(makeTimedWalk(model));
+  REQUIRE(best.timings.size() == 5);
+  int inside = 0;
+  for (size_t i = 0; i < best.timings.size(); ++i) {
+    const PhaseTiming& timing = best.timings[i];
+    CAPTURE(timing.phase, timing.nominal, timing.chosen, timing.lower, timing.upper);
+    CHECK(timing.nominal == Approx(best.motion.schedule.phases[i].nodes * best.motion.schedule.phases[i].dt));
+    CHECK(timing.lower == Approx(0.6 * timing.nominal));
+    CHECK(timing.upper == Approx(1.6 * timing.nominal));
+    REQUIRE(timing.chosen >= timing.lower);
+    REQUIRE(timing.chosen <= timing.upper);
+    constexpr double kStep = 0.02;
+    const double cost = best.summary.cost, less = solve(makeTimedWalk(model, &best, i, 1 - kStep)).summary.cost,
+                 more = solve(makeTimedWalk(model, &best, i, 1 + kStep)).summary.cost;
+    const bool at_lower = timing.chosen<1.001 * timing.lower, at_upper = timing.chosen> 0.999 * timing.upper;
+    CHECK((less > cost) == !at_lower);
+    CHECK((more > cost) == !at_upper);
+    if (at_lower || at_upper) continue;
+    ++inside;
+    const double slope = (more - less) / (2 * kStep), curvature = (more - 2 * cost + less) / (kStep * kStep);
+    CHECK(std::abs(slope / curvature) < 2e-3);
+  }
+  CHECK(inside >= 2);
+}
+
+TEST_CASE("a result has the durations that came out, and a warm start goes on from them") {
+  const Model model = loadRobot("bipetto").model;
+  const Solution walk = solve(makeTimedWalk(model));
+  const MotionResult result = makeResult({"bipetto", "", {}}, walk.motion, walk.motion.guess, walk.summary);
+  REQUIRE(result.timings.size() == 5);
+  int node = 0;
+  for (size_t i = 0; i < result.timings.size(); ++i) {
+    const PhaseTiming& timing = result.timings[i];
+    CHECK(timing.start_node == node);
+    const int nodes = walk.motion.schedule.phases[i].nodes;
+    CHECK(result.record.time[node + nodes] - result.record.time[node] == Approx(timing.chosen).epsilon(1e-12));
+    CHECK(result.schedule.phases[i].dt * nodes == Approx(timing.chosen).epsilon(1e-12));
+    node += nodes;
+  }
+  CHECK(std::abs(result.timings[1].chosen - result.timings[1].nominal) > 1e-3);
+  CHECK(result.record.q.cols() == model.nq());
+  CHECK(result.record.v.cols() == model.nv());
+  CHECK(result.record.u.cols() == model.nu());
+
+  const fs::path directory = fs::temp_directory_path() / "bielle_test_timed_motions";
+  writeResult(directory.string(), result);
+  const MotionSummary summary = readSummary(directory.string());
+  CHECK(summary.phases[1].time_step == result.schedule.phases[1].dt);
+  Motion again = makeTimedWalk(model);
+  setGuess(readResultRecord(directory.string()), again);
+  fs::remove_all(directory);
+  for (size_t i = 0; i < result.timings.size(); ++i) {
+    const std::vector<PhaseTiming> guessed = listTimings(*again.problem, again.schedule, again.guess);
+    CHECK(guessed[i].chosen == Approx(result.timings[i].chosen));
+  }
+  CHECK(solve(std::move(again)).summary.cost == Approx(walk.summary.cost).epsilon(1e-7));
+}
+
+TEST_CASE("the same motion for every number of threads") {
+  const Model model = loadRobot("bipetto").model;
+  const Solution one = solve(makeTimedWalk(model), 1), three = solve(makeTimedWalk(model), 3);
+  CHECK(one.motion.guess.xs == three.motion.guess.xs);
+  CHECK(one.motion.guess.us == three.motion.guess.us);
+}
+
+TEST_CASE("which phases are free") {
+  const Model model = loadRobot("bipetto").model;
+  const auto list = [&](const TimingOptions& timings) {
+    ProblemOptions options;
+    options.timings = timings;
+    const Motion motion = makeJump(model, {}, options);
+    std::vector<std::string> names;
+    for (const PhaseTiming& timing : listTimings(*motion.problem, motion.schedule, motion.guess)) {
+      names.push_back(timing.phase);
+      CHECK(timing.chosen == Approx(timing.nominal));
+    }
+    return names;
+  };
+  using Names = std::vector<std::string>;
+  CHECK(list({}).empty());
+  CHECK(list(kAll) == Names{"stand", "push", "land", "settle"});
+  CHECK(list({{{"push", {0.8, 1.2}}}, 0}) == Names{"push"});
+  CHECK(list({{{kAllPhases, {}}, {"flight", {0.9, 1.1}}}, 0}) == Names{"stand", "push", "flight", "land", "settle"});
+  CHECK_THROWS_AS(list({{{"swing", {}}}, 0}), ModelError);
+  CHECK_THROWS_AS(list({{{"push", {1.2, 0.8}}}, 0}), ModelError);
+  CHECK_THROWS_AS(list({{{"push", {0, 0.8}}}, 0}), ModelError);
+  CHECK_THROWS_AS(list({{{"push", {}}}, -1}), ModelError);
+  CHECK_THROWS_AS(list({{}, 1}), ModelError);
+
+  // The gains suit the longest step.
+  ProblemOptions options;
+  options.timings = {{{"push", {0.5, 2}}}, 0};
+  const Motion motion = makeJump(model, {}, options);
+  for (int k = 0; k < motion.problem->numStages(); ++k) {
+    const StageSpec& spec = motion.problem->spec(k);
+    const double longest = spec.dt * (spec.timing.phase >= 0 ? 2 : 1);
+    for (const Closure& closure : spec.constraints.closures) {
+      const ContactGains limited = limitContactGains({closure.kp, closure.kd}, longest);
+      CHECK(closure.kp == limited.kp);
+      CHECK(closure.kd == limited.kd);
+    }
+  }
+}
