@@ -113,6 +113,9 @@ TEST_CASE("a result has the durations that came out, and a warm start goes on fr
   writeResult(directory.string(), result);
   const MotionSummary summary = readSummary(directory.string());
   CHECK(summary.phases[1].time_step == result.schedule.phases[1].dt);
+  REQUIRE(summary.timings.size() == result.timings.size());
+  CHECK(summary.timings[1].phase == result.timings[1].phase);
+  CHECK(summary.timings[1].chosen == result.timings[1].chosen);
   Motion again = makeTimedWalk(model);
   setGuess(readResultRecord(directory.string()), again);
   fs::remove_all(directory);
@@ -121,6 +124,23 @@ TEST_CASE("a result has the durations that came out, and a warm start goes on fr
     CHECK(guessed[i].chosen == Approx(result.timings[i].chosen));
   }
   CHECK(solve(std::move(again)).summary.cost == Approx(walk.summary.cost).epsilon(1e-7));
+}
+
+TEST_CASE("a plan with the durations that came out makes the same steps") {
+  const Model model = loadRobot("bipetto").model;
+  const Solution walk = solve(makeTimedWalk(model));
+  MotionPlan plan = planWalk(model, makeOptions(), makeStandingPosture(model));
+  fixTimings(walk.timings, plan.schedule, plan.stages);
+  const Motion fixed = makeMotion(model, std::move(plan), {Formulation::Reduced, StepRule::Midpoint});
+  CHECK(!fixed.problem->hasFreeTimings());
+  RobotEvaluator evaluator(*fixed.problem);
+  const int size = model.nq() + model.nv();
+  for (int k = 0; k < fixed.problem->numStages(); ++k) {
+    const ShootingTrajectory& t = walk.motion.guess;
+    const RobotEvaluation& at = evaluator.evaluate(k, t.xs[k].head(size), t.us[k].head(model.nu()));
+    REQUIRE(at.status == StepStatus::Ok);
+    CHECK((at.x_next - t.xs[k + 1].head(size)).cwiseAbs().maxCoeff() < 1e-8);
+  }
 }
 
 TEST_CASE("the same motion for every number of threads") {

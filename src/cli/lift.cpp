@@ -58,17 +58,6 @@ void printOutcome(const LiftArguments& arguments, const LiftResult& lifted, cons
   printTable(std::cout, motors);
 }
 
-// Gives a plan the durations that its solve chose.
-void setTimeSteps(const MotionSummary& summary, MotionPlan& plan) {
-  if (summary.phases.size() != plan.schedule.phases.size()) return;
-  size_t node = 0;
-  for (size_t i = 0; i < summary.phases.size(); ++i) {
-    ContactPhase& phase = plan.schedule.phases[i];
-    phase.dt = summary.phases[i].time_step;
-    for (const size_t end = node + phase.nodes; node < end; ++node) plan.stages[node].dt = phase.dt;
-  }
-}
-
 int run(const LiftArguments& arguments) {
   const MotionSummary summary = readSummary(arguments.serial_directory);
   if (summary.model != "serial")
@@ -86,7 +75,7 @@ int run(const LiftArguments& arguments) {
   const SerialModel serial =
       makeSerialModel(robot.model, makeStandingPosture(robot.model), parseSerialArmature(summary.serial_armature));
   MotionPlan plan = remakeRequest(summary).plan(serial.model, makeStandingPosture(serial.model));
-  setTimeSteps(summary, plan);
+  fixTimings(summary.timings, plan.schedule, plan.stages);
   const Motion motion = makeMotion(serial.model, std::move(plan), {summary.formulation, StepRule::Euler});
   const SerialTrajectory trajectory = makeSerialTrajectory(motion, record);
   makeOutputDirectory(arguments.directory);

@@ -79,6 +79,10 @@ MotionSummary read(const Json& json) {
       phase.stances.push_back({contact.at("name"), readPlacement(contact)});
     summary.phases.push_back(phase);
   }
+  if (json.contains("free_timings"))  // older results have none
+    for (const Json& entry : json.at("free_timings"))
+      summary.timings.push_back({entry.at("phase"), readCount(entry.at("start_node")), entry.at("nominal_s"),
+                                 entry.at("chosen_s"), entry.at("lower_s"), entry.at("upper_s")});
   summary.ground = readGround(json.at("ground"));
   return summary;
 }

@@ -98,6 +98,21 @@ std::vector<PhaseTiming> listTimings(const RobotProblem& problem, const ContactS
   return timings;
 }
 
+void fixTimings(const std::vector<PhaseTiming>& timings, ContactSchedule& schedule, std::vector<StageSpec>& stages) {
+  int node = 0;
+  for (ContactPhase& phase : schedule.phases) {
+    for (const PhaseTiming& timing : timings) {
+      if (timing.start_node != node || phase.dt == 0 || phase.nodes == 0) continue;
+      phase.dt = timing.chosen / phase.nodes;
+      for (int k = node; k < node + phase.nodes; ++k) {
+        stages[k].dt = phase.dt;
+        limitGains(timing.upper / phase.nodes, stages[k].constraints);
+      }
+    }
+    node += phase.nodes;
+  }
+}
+
 void fitTimings(const RobotProblem& problem, ShootingTrajectory& trajectory) {
   const auto resize = [](int size, VectorXd& x) {
     const Eigen::Index before = x.size();

@@ -67,6 +67,7 @@ struct MotionSummary {
   std::vector<std::pair<std::string, double>> requested;
   std::vector<GoalOutcome> goals;
   std::vector<Phase> phases;
+  std::vector<PhaseTiming> timings;  ///< of the phases of free duration
   Ground ground;
 };
 
