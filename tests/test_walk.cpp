@@ -58,6 +58,12 @@ void checkSteps(const Solved& solved) {
   CHECK(m.final_speed < 2e-3);
 }
 
+LocomotionTask makeTask(const FootstepPlan& plan) {
+  LocomotionTask task;
+  task.plan = plan;
+  return task;
+}
+
 const SE3 kLeft{Matrix3d::Identity(), Vector3d(0, 0.1, 0)}, kRight{Matrix3d::Identity(), Vector3d(0, -0.1, 0)};
 
 }  // namespace
@@ -115,7 +121,7 @@ TEST_CASE("gait: swings start and end at rest, the pendulum's zero-moment point 
   const GaitTiming timing;
   const Vector3d com(0.01, 0, 0.5);
   const double g = 9.81, h = timing.time_step;
-  const Gait gait = makeGait(plan, timing, shape, com, g);
+  const Gait gait = makeGait(makeTask(plan), timing, shape, 0, com, g);
   CHECK((gait.nodes.front().com - com).norm() < 1e-12);
   CHECK((gait.nodes.back().com - com - Vector3d(0.8, 0, 0)).norm() < 1e-12);
   for (size_t k = 1; k + 1 < gait.nodes.size(); ++k) {
@@ -123,7 +129,7 @@ TEST_CASE("gait: swings start and end at rest, the pendulum's zero-moment point 
     CHECK(node.load[0] + node.load[1] == Approx(1));
     CHECK(node.com.z() == Approx(0.5));
     const GaitPhase& phase = gait.phases[node.phase];
-    if (!phase.swings) continue;
+    if (phase.isDoubleSupport()) continue;
     const int stance = static_cast<int>(getOther(plan.steps[phase.steps_done].side));
     const Vector3d zmp = node.com - 0.5 / (g * h * h) * (gait.nodes[k - 1].com - 2 * node.com + gait.nodes[k + 1].com);
     CHECK((zmp - plan.getStance(phase.steps_done)[stance].p).head<2>().norm() < 1e-9);
@@ -172,7 +178,7 @@ TEST_CASE("walk: the first double support is as long as the soles need to set of
   const auto runAhead = [&](double duration) {
     GaitTiming timing = options.gait.timing;
     timing.start = duration;
-    const Gait gait = makeGait(plan, timing, options.gait.swing, stance.com, g);
+    const Gait gait = makeGait(makeTask(plan), timing, options.gait.swing, 0, stance.com, g);
     double error = 0, rate = -gait.nodes[0].com_velocity.x();
     const int steps = 20000;
     for (int i = 0; i < steps; ++i) {

@@ -3,6 +3,7 @@
 #include "bielle/io/result.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/jump.h"
+#include "bielle/motion/run.h"
 #include "bielle/motion/sequence.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"

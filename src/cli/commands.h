@@ -6,6 +6,7 @@
 #include <string>
 
 #include "bielle/model/reader.h"
+#include "bielle/motion/motion.h"
 
 namespace bielle::cli {
 
@@ -46,6 +47,9 @@ struct RobotArgument {
   LoadedRobot load() const;
 };
 void addFixedBase(CLI::App& command, RobotArgument& robot);
+
+// An option of a motion: a number, or a choice by name.
+void addOption(CLI::App& command, const OptionEntry& option);
 
 // name=number. \throws ModelError that shows the example
 std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,

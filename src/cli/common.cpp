@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <charconv>
 #include <iostream>
 #include <sstream>
@@ -10,6 +11,12 @@ namespace bielle::cli {
 namespace {
 
 std::vector<std::string> command_line;
+
+// Flags are written with hyphens.
+std::string makeFlag(std::string option) {
+  std::replace(option.begin(), option.end(), '_', '-');
+  return "--" + option;
+}
 
 }  // namespace
 
@@ -30,6 +37,23 @@ LoadedRobot RobotArgument::load() const {
 
 void addFixedBase(CLI::App& command, RobotArgument& robot) {
   command.add_flag("--fixed-base", robot.fixed_base, "fix the root link to the ground");
+}
+
+void addOption(CLI::App& command, const OptionEntry& option) {
+  if (option.names.empty()) {
+    command.add_option(makeFlag(option.name), *option.value, option.help + " [" + option.unit + "]")
+        ->capture_default_str();
+    return;
+  }
+  command
+      .add_option_function<std::string>(
+          makeFlag(option.name),
+          [option](const std::string& name) {
+            *option.value = std::find(option.names.begin(), option.names.end(), name) - option.names.begin();
+          },
+          option.help)
+      ->check(CLI::IsMember(option.names))
+      ->default_str(option.names.at(static_cast<size_t>(*option.value)));
 }
 
 std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,

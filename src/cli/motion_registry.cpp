@@ -7,6 +7,7 @@
 #include "bielle/motion/footholds.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/obstacles.h"
+#include "bielle/motion/run.h"
 #include "bielle/motion/sequence.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
@@ -116,6 +117,16 @@ const std::vector<MotionEntry>& getMotions() {
        "bielle solve jump --robot bipetto --flight 0.3 --length 0.2 -o jump",
        {"flight", "length"},
        makeRequests<JumpOptions>(planJump, {{"paper", kPaperJump, setPaperWeights}})},
+      {"run",
+       "steps with flights between them, from standing to standing",
+       "bielle solve run --robot bipetto --speed 1 -o run",
+       {"speed", "steps", "flight", "stance", "swing_height"},
+       makeRequests<RunOptions>(planRun)},
+      {"hop",
+       "one foot is lifted, the other one takes off and lands again",
+       "bielle solve hop --robot bipetto --foot left --flight 0.15 -o hop",
+       {"foot", "hops", "flight", "length", "stance", "swing_height"},
+       makeRequests<HopOptions>(planHop)},
   };
   return motions;
 }

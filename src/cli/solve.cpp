@@ -271,12 +271,6 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
       ->allow_extra_args(false);
 }
 
-// Flags are written with hyphens.
-std::string makeFlag(std::string option) {
-  std::replace(option.begin(), option.end(), '_', '-');
-  return "--" + option;
-}
-
 void addOutput(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
   sub.add_option("--robot", arguments->robot.name, "name, directory or .urdf file")->required();
   sub.add_option("-o,--output", arguments->directory,
@@ -345,9 +339,7 @@ void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   addFiles(sub, *request);
   addPresets(sub, request);
   for (const OptionEntry& option : request->options)
-    if (std::find(motion.flags.begin(), motion.flags.end(), option.name) != motion.flags.end())
-      sub.add_option(makeFlag(option.name), *option.value, option.help + " [" + option.unit + "]")
-          ->capture_default_str();
+    if (std::find(motion.flags.begin(), motion.flags.end(), option.name) != motion.flags.end()) addOption(sub, option);
   addSolverOptions(sub, arguments);
   sub.footer("Options of --set, with default and unit:\n" + formatOptionList(motion) + "Examples:\n  " +
              motion.example + "\n  " + motion.example + " --set com_weight=2e5 --max-iterations 50\n" + kOutcome);

@@ -6,6 +6,7 @@
 #include "bielle/model/error.h"
 #include "bielle/motion/motion.h"
 #include "math/so3.h"
+#include "motion/quintic.h"
 
 namespace bielle {
 namespace {
@@ -23,77 +24,148 @@ int countNodes(double duration, double h) { return static_cast<int>(std::lround(
 void check(const GaitTiming& t, size_t steps) {
   const double h = t.time_step;
   requireOption(h > 0 && h <= 0.1, "time_step", "it is outside 0 .. 0.1 s", "give seconds");
-  requireStages(t.start + steps * (t.single + t.both) + t.end, h);
+  requireStages(t.start + steps * t.stepDuration() + t.end, h);
   for (const auto& [name, value] : {std::pair("start_support", t.start), std::pair("single_support", t.single),
                                     std::pair("double_support", t.both), std::pair("end_support", t.end)})
     requireOption(value < 60 && countNodes(value, h) >= 1, name, "it is not at least a time step, or over a minute",
                   "give seconds");
+  requireOption(t.flight == 0 || (countNodes(t.flight, h) >= 2 && t.flight <= 1), "flight",
+                "it is outside two time steps .. 1 s", "give seconds, e.g. 0.1");
   requireOption(countNodes(t.single, h) >= 4, "single_support", "it is shorter than four time steps", "give seconds");
 }
 
-std::vector<GaitPhase> makePhases(int steps, const GaitTiming& t) {
+// The next step of a foot, from step i on.
+int findStep(const FootstepPlan& plan, Side side, int i) {
+  const int size = static_cast<int>(plan.steps.size());
+  while (i < size && plan.steps[i].side != side) ++i;
+  return i < size ? i : -1;
+}
+
+std::vector<GaitPhase> makePhases(const LocomotionTask& task, const GaitTiming& t) {
+  const FootstepPlan& plan = task.plan;
+  const int steps = static_cast<int>(plan.steps.size());
   const double h = t.time_step;
-  std::vector<GaitPhase> phases{{countNodes(t.start, h), 0, false}};
+  std::vector<GaitPhase> phases{{countNodes(t.start, h), 0, {-1, -1}}};
+  Side support = task.support;
   for (int i = 0; i < steps; ++i) {
-    phases.push_back({countNodes(t.single, h), i, true});
-    phases.push_back({countNodes(i + 1 < steps ? t.both : t.end, h), i + 1, false});
+    const bool last = i + 1 == steps;
+    if (t.flight == 0) support = getOther(plan.steps[i].side);
+    std::array<int, 2> in_air{findStep(plan, Side::Left, i), findStep(plan, Side::Right, i)};
+    const std::array<int, 2> in_flight = in_air;
+    in_air[static_cast<int>(support)] = -1;
+    phases.push_back({countNodes(t.single, h), i, in_air});
+    if (t.flight > 0 && !last)
+      phases.push_back({countNodes(t.flight, h), i, in_flight});
+    else
+      phases.push_back({countNodes(last ? t.end : t.both, h), i + 1, {-1, -1}});
+    support = plan.steps[i].side;
   }
   return phases;
 }
 
-// Share of the weight on the left foot at the end of a phase: all on the next stance foot, half at rest.
-double calcLoadAfter(const FootstepPlan& plan, const GaitPhase& phase) {
-  const int next = phase.steps_done;
-  if (next == static_cast<int>(plan.steps.size())) return 0.5;
-  return plan.steps[next].side == Side::Left ? 0 : 1;
+std::vector<SwingSpan> listSwings(const std::vector<GaitPhase>& phases, size_t steps) {
+  std::vector<SwingSpan> swings(steps, {-1, -1});
+  int node = 0;
+  for (const GaitPhase& phase : phases) {
+    for (int step : phase.steps) {
+      if (step < 0) continue;
+      if (swings[step].begin < 0) swings[step].begin = node;
+      swings[step].end = node + phase.nodes;
+    }
+    node += phase.nodes;
+  }
+  return swings;
 }
 
-// Solves Eq. (1) for each column of p (N + 1 rows), whose first and last rows are c_0 and c_N (Thomas' algorithm).
-void solvePendulum(double ratio, Eigen::Ref<Eigen::Matrix2Xd> p) {
+// Share of the left foot in the load: all on a single foot, half at rest.
+double calcShare(const GaitPhase& phase) {
+  if (phase.isDoubleSupport()) return 0.5;
+  return phase.stands(Side::Left) ? 1 : 0;
+}
+
+// Solves Eq. (1) for each row of p (N + 1 columns), whose first and last columns are c_0 and c_N (Thomas' algorithm).
+// \param ratio  z_k / (g h^2)
+void solvePendulum(const VectorXd& ratio, const VectorXd& load, Eigen::Ref<Eigen::Matrix2Xd> p) {
   const int last = static_cast<int>(p.cols()) - 1;
   VectorXd upper = VectorXd::Zero(last + 1);
   for (int k = 1; k < last; ++k) {
-    const double pivot = 1 + 2 * ratio - ratio * upper[k - 1];
-    upper[k] = ratio / pivot;
-    p.col(k) = ((p.col(k) + ratio * p.col(k - 1)) / pivot).eval();
+    const double pivot = load[k] + 2 * ratio[k] - ratio[k] * upper[k - 1];
+    upper[k] = ratio[k] / pivot;
+    p.col(k) = ((load[k] * p.col(k) + ratio[k] * p.col(k - 1)) / pivot).eval();
   }
   for (int k = last - 1; k > 0; --k) p.col(k) += upper[k] * p.col(k + 1);
 }
 
+// A foot in the air k nodes after it left the ground, of n.
+SwingNode makeSwingNode(const SwingShape& shape, const SE3& from, const SE3& to, int k, int n, double h) {
+  SwingNode node;
+  node.progress = static_cast<double>(k) / n;
+  node.X_WF = calcSwing(shape, from, to, node.progress);
+  // The velocity at the end of an Euler step is that of the step.
+  const SE3 before = calcSwing(shape, from, to, std::max(0.0, node.progress - 1.0 / n));
+  node.V_F << node.X_WF.p - before.p, log3(node.X_WF.R * before.R.transpose());
+  node.V_F /= h;
+  return node;
+}
+
 void fillFeet(const FootstepPlan& plan, const SwingShape& shape, double h, Gait& gait) {
   const double start = calcHeading(calcMiddle(plan.start[0], plan.start[1]));
-  double load = 0.5;
-  size_t k = 0;
-  for (size_t p = 0; p < gait.phases.size(); ++p) {
+  const int size = static_cast<int>(gait.phases.size());
+  int k = 0;
+  for (int p = 0; p < size; ++p) {
     const GaitPhase& phase = gait.phases[p];
-    const auto stance = plan.getStance(phase.steps_done);
-    const double after = phase.swings ? load : calcLoadAfter(plan, phase);
+    const double before = calcShare(gait.phases[phase.isDoubleSupport() ? std::max(0, p - 1) : p]),
+                 after = calcShare(gait.phases[phase.isDoubleSupport() ? std::min(p + 1, size - 1) : p]);
     for (int i = 0; i < phase.nodes; ++i, ++k) {
       GaitNode& node = gait.nodes[k];
-      node.phase = static_cast<int>(p);
+      node.phase = p;
       const double share = (i + 1.0) / (phase.nodes + 1.0);
-      node.load[0] = load + share * (after - load);
+      node.load[0] = before + share * (after - before);
       node.load[1] = 1 - node.load[0];
-      node.lands = i == 0 && !phase.swings && p > 0;
-      std::array<SE3, 2> feet = stance;
-      if (phase.swings) {
-        const Footstep& step = plan.steps[phase.steps_done];
-        node.progress = static_cast<double>(i) / phase.nodes;
-        node.X_WF = calcSwing(shape, stance[static_cast<int>(step.side)], step.X_WF, node.progress);
-        // The velocity at the end of an Euler step is that of the step.
-        const SE3 before = calcSwing(shape, stance[static_cast<int>(step.side)], step.X_WF,
-                                     std::max(0.0, node.progress - 1.0 / phase.nodes));
-        node.V_F << node.X_WF.p - before.p, log3(node.X_WF.R * before.R.transpose());
-        node.V_F /= h;
-        feet[static_cast<int>(step.side)] = node.X_WF;
+      if (i == 0 && p > 0 && phase.steps_done > gait.phases[p - 1].steps_done) node.landed = phase.steps_done - 1;
+      std::array<SE3, 2> feet = plan.getStance(phase.steps_done);
+      for (int foot = 0; foot < 2; ++foot) {
+        if (phase.steps[foot] < 0) continue;
+        const SwingSpan& span = gait.swings[phase.steps[foot]];
+        node.swings[foot] = makeSwingNode(shape, feet[foot], plan.steps[phase.steps[foot]].X_WF, k - span.begin,
+                                          span.end - span.begin, h);
+        feet[foot] = node.swings[foot].X_WF;
       }
       node.heading = std::remainder(calcHeading(calcMiddle(feet[0], feet[1])) - start, 2 * kPi);
     }
-    load = after;
   }
   GaitNode& last = gait.nodes.back();
   last = gait.nodes[k - 1];
-  last.lands = false;
+  last.landed = -1;
+}
+
+// Height over that of the pendulum at every node, and the load during the step from it over the weight: Eqs. (2), (3).
+struct Bounce {
+  VectorXd rise, load;
+};
+Bounce calcBounce(const Gait& gait, double h, double stretch, double gravity) {
+  const int size = static_cast<int>(gait.nodes.size());
+  Bounce bounce{VectorXd::Zero(size), VectorXd::Ones(size)};
+  int k = 0;
+  for (size_t p = 0; p < gait.phases.size(); k += gait.phases[p].nodes, ++p) {
+    const GaitPhase& phase = gait.phases[p];
+    if (phase.isDoubleSupport()) continue;
+    const auto getSpeed = [&](const GaitPhase& flight) { return gravity * flight.nodes * h / 2; };
+    PolynomialEnd begin, end;
+    if (phase.flies()) {
+      begin = {stretch, getSpeed(phase), -gravity};
+      end = {stretch, -getSpeed(phase), -gravity};
+    } else {
+      if (gait.phases[p - 1].flies()) begin = {stretch, -getSpeed(gait.phases[p - 1]), -gravity};
+      if (gait.phases[p + 1].flies()) end = {stretch, getSpeed(gait.phases[p + 1]), -gravity};
+    }
+    const Quintic height(begin, end, phase.nodes * h);
+    for (int i = 0; i < phase.nodes; ++i) {
+      bounce.rise[k + i] = height.calc(i * h);
+      bounce.load[k + i] = phase.flies() ? 0 : 1 + height.calcAcceleration((i + 0.5) * h) / gravity;
+    }
+  }
+  return bounce;
 }
 
 // Height of the lower foot at touchdown, linear in time during swings, smoothed over +- window nodes.
@@ -107,7 +179,9 @@ VectorXd calcHeights(const FootstepPlan& plan, const Gait& gait, int window) {
   for (int k = 0; k < size; ++k) {
     const GaitPhase& phase = gait.phases[gait.nodes[k].phase];
     raw[k] = getLower(phase.steps_done);
-    if (phase.swings) raw[k] += gait.nodes[k].progress * (getLower(phase.steps_done + 1) - raw[k]);
+    for (int foot = 0; foot < 2; ++foot)
+      if (phase.steps[foot] == phase.steps_done)
+        raw[k] += gait.nodes[k].swings[foot].progress * (getLower(phase.steps_done + 1) - raw[k]);
   }
   for (int k = 0; k < size; ++k)
     for (int i = -window; i <= window; ++i)
@@ -128,15 +202,19 @@ SE3 calcSwing(const SwingShape& shape, const SE3& a, const SE3& b, double s) {
   return X;
 }
 
-Gait makeGait(const FootstepPlan& plan, const GaitTiming& timing, const SwingShape& shape, const Vector3d& com,
-              double gravity) {
+Gait makeGait(const LocomotionTask& task, const GaitTiming& timing, const SwingShape& shape, double stretch,
+              const Vector3d& com, double gravity) {
+  const FootstepPlan& plan = task.plan;
   check(timing, plan.steps.size());
   Gait gait;
-  gait.phases = makePhases(static_cast<int>(plan.steps.size()), timing);
+  gait.phases = makePhases(task, timing);
+  gait.swings = listSwings(gait.phases, plan.steps.size());
   int stages = 0;
   for (const GaitPhase& phase : gait.phases) stages += phase.nodes;
   gait.nodes.resize(stages + 1);
-  fillFeet(plan, shape, timing.time_step, gait);
+  const double h = timing.time_step;
+  fillFeet(plan, shape, h, gait);
+  const Bounce bounce = calcBounce(gait, h, stretch, gravity);
 
   const auto end = plan.getStance(static_cast<int>(plan.steps.size()));
   const SE3 P0 = calcMiddle(plan.start[0], plan.start[1]), PN = calcMiddle(end[0], end[1]);
@@ -144,20 +222,21 @@ Gait makeGait(const FootstepPlan& plan, const GaitTiming& timing, const SwingSha
   // The zero-moment point starts and ends under the resting centre of mass.
   Eigen::Matrix2Xd p(2, stages + 1);
   for (int k = 0; k <= stages; ++k) {
-    const GaitNode& node = gait.nodes[k];
+    GaitNode& node = gait.nodes[k];
     const auto stance = plan.getStance(gait.phases[node.phase].steps_done);
     const double share = 1 - 2 * std::abs(node.load[0] - 0.5);  // 1 at rest, 0 on one foot
     p.col(k) = (node.load[0] * stance[0].p + node.load[1] * stance[1].p).head<2>();
     if (node.phase == 0) p.col(k) += share * (com - P0.p).head<2>();
     if (node.phase + 1 == static_cast<int>(gait.phases.size())) p.col(k) += share * (rest - PN.p).head<2>();
+    for (double& load : node.load) load *= bounce.load[k];
   }
   p.col(0) = com.head<2>();
   p.col(stages) = rest.head<2>();
-  const double h = timing.time_step, height = com.z() - P0.p.z();
-  solvePendulum(height / (gravity * h * h), p);
+  const double height = com.z() - P0.p.z();
+  solvePendulum((bounce.rise.array() + height) / (gravity * h * h), bounce.load, p);
 
   const VectorXd z = calcHeights(plan, gait, countNodes(timing.stepDuration() / 4, h));
-  for (int k = 0; k <= stages; ++k) gait.nodes[k].com << p.col(k), height + z[k];
+  for (int k = 0; k <= stages; ++k) gait.nodes[k].com << p.col(k), height + z[k] + bounce.rise[k];
   for (int k = 0; k < stages; ++k) {
     gait.nodes[k].com_velocity = (gait.nodes[k + 1].com - gait.nodes[k].com) / h;
     gait.nodes[k].heading_rate = std::remainder(gait.nodes[k + 1].heading - gait.nodes[k].heading, 2 * kPi) / h;

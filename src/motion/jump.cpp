@@ -5,6 +5,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "motion/foot_constraints.h"
+#include "motion/quintic.h"
 
 namespace bielle {
 namespace {
@@ -225,20 +226,17 @@ JumpFigures calcJumpFigures(const JumpOptions& o, double gravity) {
 
 JumpHeight calcJumpHeight(const JumpOptions& o, double gravity, double t) {
   const JumpFigures f = calcJumpFigures(o, gravity);
-  // From (0, 0, 0) at s = 0 to (height, velocity, 0) at s = 1.
-  const auto follow = [&](double s, double duration) {
-    const double z = o.stretch, v = f.take_off * duration;
-    const double a = 10 * z - 4 * v, b = -15 * z + 7 * v, c = 6 * z - 3 * v;
-    return JumpHeight{s * s * s * (a + s * (b + s * c)),
-                      s * (6 * a + s * (12 * b + s * 20 * c)) / (duration * duration)};
+  const auto follow = [](const PolynomialEnd& begin, const PolynomialEnd& end, double t, double duration) {
+    const Quintic height(begin, end, duration);
+    return JumpHeight{height.calc(t), height.calcAcceleration(t)};
   };
   t -= f.stand - 1e-6 * o.time_step;  // a node on the boundary of two phases belongs to the later one
   if (t <= 0) return {};
-  if (t < f.push) return follow(t / f.push, f.push);
+  if (t < f.push) return follow({}, {o.stretch, f.take_off, 0}, t, f.push);
   t -= f.push;
   if (t < f.flight) return {o.stretch + f.take_off * t - 0.5 * gravity * t * t, -gravity};
   t -= f.flight;
-  if (t < f.land) return follow(1 - t / f.land, f.land);
+  if (t < f.land) return follow({o.stretch, -f.take_off, 0}, {}, t, f.land);
   return {};
 }
 

@@ -27,6 +27,7 @@ struct Scene {
 void check(const LocomotionOptions& o) {
   LocomotionOptions copy = o;
   requireNotNegative(listOptions(copy));
+  requireOption(std::abs(o.stretch) <= 0.5, "stretch", "it is not within 0.5 m", "give metres, e.g. 0");
   requirePositive(listOptions(copy), {"friction"});
   requireOption(o.swing.apex > 0 && o.swing.apex < 1, "swing_apex", "it is not between 0 and 1", "e.g. 0.5");
   requireOption(o.swing.leave < o.swing.arrive, "swing_leave", "it is not before swing_arrive", "e.g. 0 and 1");
@@ -44,11 +45,20 @@ Gait makeStartingGait(const Model& model, const Stance& stance, const Locomotion
   const Vector3d forward = calcMiddle(stance.feet[0], stance.feet[1]).R.col(0);
   GaitTiming timing = options.timing;
   for (;; timing.start += kStep) {
-    Gait gait = makeGait(task.plan, timing, options.swing, stance.com, gravity);
+    Gait gait = makeGait(task, timing, options.swing, options.stretch, stance.com, gravity);
     const double v = std::abs(forward.dot(gait.nodes[0].com_velocity)), T = timing.start;
     if (v * tau <= options.start_pressure * half * (1 - std::exp(-T / tau))) return gait;
     if (options.start_pressure == 0 || half == 0 || T > kLongest) return gait;
   }
+}
+
+// Placements of both feet at a node.
+std::array<SE3, 2> getFeet(const Scene& scene, const GaitNode& node) {
+  const GaitPhase& phase = scene.gait.phases[node.phase];
+  std::array<SE3, 2> feet = scene.task.plan.getStance(phase.steps_done);
+  for (int i = 0; i < 2; ++i)
+    if (phase.steps[i] >= 0) feet[i] = node.swings[i].X_WF;
+  return feet;
 }
 
 // Rejects requests that no motor torques can satisfy.
@@ -61,21 +71,21 @@ void check(const Scene& scene) {
     throw ModelError(model.name(), "step " + std::to_string(step) + " of the " + scene.task.name, problem, remedy);
   };
   for (const GaitNode& node : scene.gait.nodes) {
-    const GaitPhase& phase = scene.gait.phases[node.phase];
-    std::array<SE3, 2> feet = scene.task.plan.getStance(phase.steps_done);
-    if (phase.swings) feet[static_cast<int>(scene.task.plan.steps[phase.steps_done].side)] = node.X_WF;
+    const std::array<SE3, 2> feet = getFeet(scene, node);
     if (calcSoleDistance(left, feet[0], right, feet[1]) <= 0)
-      refuse(phase.steps_done + 1, "the feet would collide: the stance is too narrow for the soles on this path",
+      refuse(scene.gait.phases[node.phase].steps_done + 1,
+             "the feet would collide: the stance is too narrow for the soles on this path",
              "turn or step less at a time, with more steps");
   }
-  // Legs as struts from the middle of the hips' plane, half way between the feet at touchdown.
+  // Legs as struts from the middle of the hips' plane, half way between two consecutive footholds at touchdown.
   const double strut = (scene.stance.com - scene.stance.feet[0].p).norm(),
                height = scene.stance.com.z() - scene.stance.feet[0].p.z();
-  for (int i = 1; i <= static_cast<int>(scene.task.plan.steps.size()); ++i) {
-    const auto feet = scene.task.plan.getStance(i);
-    const Vector3d apart = feet[0].p - feet[1].p;
+  for (const GaitPhase& phase : scene.gait.phases) {
+    if (phase.isDoubleSupport() || phase.flies()) continue;
+    const int side = phase.stands(Side::Left) ? 0 : 1, i = phase.steps_done;
+    const Vector3d apart = scene.task.plan.steps[i].X_WF.p - scene.task.plan.getStance(i)[side].p;
     if (std::hypot(apart.head<2>().norm() / 2, kCrouch * height + std::abs(apart.z()) / 2) > kStretch * strut)
-      refuse(i,
+      refuse(i + 1,
              "its foothold is out of the legs' reach: the feet would be " + std::to_string(apart.norm()) + " m apart",
              "ask for a lower speed, or for shorter, lower or more steps");
   }
@@ -109,14 +119,16 @@ std::vector<ContactTarget> makeTargets(const Scene& scene, const GaitPhase& phas
   std::vector<ContactTarget> targets;
   for (Side side : {Side::Left, Side::Right}) {
     const int i = static_cast<int>(side);
-    if (phase.swings && scene.task.plan.steps[phase.steps_done].side == side) continue;
+    if (!phase.stands(side)) continue;
     targets.push_back({scene.stance.contacts[i], feet[i], gains.kp, gains.kd});
   }
   return targets;
 }
 
-std::string nameOf(const Scene& scene, const GaitPhase& phase) {
-  return phase.swings ? getName(getOther(scene.task.plan.steps[phase.steps_done].side)) : "double support";
+std::string nameOf(const GaitPhase& phase) {
+  if (phase.flies()) return "flight";
+  if (phase.isDoubleSupport()) return "double support";
+  return getName(phase.stands(Side::Left) ? Side::Left : Side::Right);
 }
 
 // Quaternion (x y z w) of the base: the initial one with a new heading.
@@ -172,17 +184,18 @@ Vector6d makeVector(double x, double z, double rotation) {
 double calcGround(const Scene& scene, const GaitNode& node, const Footstep& step) {
   const auto feet = scene.task.plan.getStance(scene.gait.phases[node.phase].steps_done);
   const double standing = feet[static_cast<int>(getOther(step.side))].p.z();
-  return standing + node.progress * (step.X_WF.p.z() - standing);
+  return standing + node.swings[static_cast<int>(step.side)].progress * (step.X_WF.p.z() - standing);
 }
 
 void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& step, StageSpec& stage) {
   const LocomotionOptions& o = scene.options;
   const BodyFrame foot = getFoot(scene, step.side);
+  const SwingNode& swing = node.swings[static_cast<int>(step.side)];
   addCost(stage, "swing", 1, makeVector(o.swing_weight, o.swing_weight, o.swing_rotation_weight),
-          makeFramePlacement(foot, node.X_WF));
+          makeFramePlacement(foot, swing.X_WF));
   addCost(stage, "swing velocity", 1,
           makeVector(o.swing_velocity_weight, o.swing_velocity_weight, o.swing_velocity_weight),
-          makeFrameVelocity(foot, node.V_F));
+          makeFrameVelocity(foot, swing.V_F));
   if (!isPublished(scene)) return;
   addCost(stage, "fly high", o.paper.fly_high, Eigen::Vector2d::Ones(),
           makeFlyHigh(foot, o.paper.fly_high_slope, calcGround(scene, node, step)));
@@ -193,15 +206,22 @@ void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& ste
                            makeFrameDistance(getFoot(scene, Side::Left), getFoot(scene, Side::Right))});
 }
 
-// Node i of n of the swing of a foot. The first one is where the foot stood.
-void addSwingConstraints(const Scene& scene, const GaitNode& node, int i, int n, StageSpec& stage) {
-  if (i == 0 || isPublished(scene)) return;
-  const GaitPhase& phase = scene.gait.phases[node.phase];
-  const Side side = scene.task.plan.steps[phase.steps_done].side, other = getOther(side);
-  addClearance(getContact(scene, side), scene.task.ground, scene.ramp, isMidSwing(i, n) ? kMidSwingClearance : 0,
-               stage);
-  addDistance(getContact(scene, side), node.X_WF, getContact(scene, other),
-              scene.task.plan.getStance(phase.steps_done)[static_cast<int>(other)], scene.options.feet_distance, stage);
+// A foot at the first node in the air is where it stood.
+void addSwingConstraints(const Scene& scene, const GaitNode& node, int k, StageSpec& stage) {
+  if (isPublished(scene)) return;
+  const std::array<SE3, 2> feet = getFeet(scene, node);
+  bool apart = false;
+  for (Side side : {Side::Left, Side::Right}) {
+    const int foot = static_cast<int>(side), step = scene.gait.phases[node.phase].steps[foot];
+    if (step < 0 || k == scene.gait.swings[step].begin) continue;
+    const SwingSpan& span = scene.gait.swings[step];
+    addClearance(getContact(scene, side), scene.task.ground, scene.ramp,
+                 isMidSwing(k - span.begin, span.end - span.begin) ? kMidSwingClearance : 0, stage);
+    if (!apart)
+      addDistance(getContact(scene, side), feet[foot], getContact(scene, getOther(side)), feet[1 - foot],
+                  scene.options.feet_distance, stage);
+    apart = true;
+  }
 }
 
 void addLanding(const Scene& scene, const Footstep& step, StageSpec& stage) {
@@ -220,8 +240,9 @@ StageSpec makeStage(const Scene& scene, const GaitNode& node, const std::vector<
   setClosureGains(limitGains(scene, {o.closure_kp, o.closure_kd}), stage.constraints);
   addComCosts(scene, node, stage);
   addForceCosts(scene, node, stage);
-  if (phase.swings) addSwingCosts(scene, node, scene.task.plan.steps[phase.steps_done], stage);
-  if (node.lands && o.rigid_landing == 0) addLanding(scene, scene.task.plan.steps[phase.steps_done - 1], stage);
+  for (int step : phase.steps)
+    if (step >= 0) addSwingCosts(scene, node, scene.task.plan.steps[step], stage);
+  if (node.landed >= 0 && o.rigid_landing == 0) addLanding(scene, scene.task.plan.steps[node.landed], stage);
   return stage;
 }
 
@@ -233,7 +254,7 @@ StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector
   stage.constraints = makeConstraintSet(scene.model, contacts);
   stage.state.weight *= scene.options.timing.time_step;
   stage.control.weight *= scene.options.timing.time_step;  // torques have no effect here and go to zero
-  addLanding(scene, scene.task.plan.steps[scene.gait.phases[node.phase].steps_done - 1], stage);
+  addLanding(scene, scene.task.plan.steps[node.landed], stage);
   return stage;
 }
 
@@ -334,17 +355,18 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   size_t node = 0;
   for (const GaitPhase& phase : scene.gait.phases) {
     const std::vector<ContactTarget> contacts = makeTargets(scene, phase);
-    const VectorXd u = calcStaticTorques(model, makeConstraintSet(model, contacts), stance.q).u;
-    if (scene.gait.nodes[node].lands && options.rigid_landing != 0) {
+    const VectorXd u = phase.flies() ? VectorXd::Zero(model.nu()).eval()
+                                     : calcStaticTorques(model, makeConstraintSet(model, contacts), stance.q).u;
+    if (scene.gait.nodes[node].landed >= 0 && options.rigid_landing != 0) {
       plan.schedule.phases.push_back({"impact", 1, 0, contacts});
       plan.stages.push_back(makeImpact(scene, scene.gait.nodes[node], contacts));
       plan.guess.us.push_back(VectorXd::Zero(model.nu()));
       plan.guess.xs.push_back(makeGuess(scene, scene.gait.nodes[node]));
     }
-    plan.schedule.phases.push_back({nameOf(scene, phase), phase.nodes, options.timing.time_step, contacts});
+    plan.schedule.phases.push_back({nameOf(phase), phase.nodes, options.timing.time_step, contacts});
     for (int i = 0; i < phase.nodes; ++i, ++node) {
       plan.stages.push_back(makeStage(scene, scene.gait.nodes[node], contacts));
-      if (phase.swings) addSwingConstraints(scene, scene.gait.nodes[node], i, phase.nodes, plan.stages.back());
+      addSwingConstraints(scene, scene.gait.nodes[node], static_cast<int>(node), plan.stages.back());
       plan.guess.us.push_back(u);
       plan.guess.xs.push_back(makeGuess(scene, scene.gait.nodes[node]));
     }

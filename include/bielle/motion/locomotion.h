@@ -1,5 +1,5 @@
 #pragma once
-/// \file Steps as an optimal control problem, shared by walk, side walk, turn and stairs.
+/// \file Steps as an optimal control problem, shared by walk, side walk, turn, stairs, run and hop.
 ///
 /// Wishes are costs of a stage; those with zero weight are omitted. References of body and feet are those of gait.h.
 /// - state regularization about the standing posture at rest, the base heading as the feet do; motor torques;
@@ -13,6 +13,11 @@
 /// - swing foot: no corner below the ground, and 6 mm over it in the middle half of the swing; distance from the other
 ///   foot;
 /// - at the end the centre of mass is at rest and the torso does not turn.
+///
+/// With `timing.flight` the robot is in the air between single supports: a foot that has landed stands alone until it
+/// takes off or until the foot of the last step lands beside it. If feet alternate that is a run, if one foot takes
+/// all steps but the last a hop on that foot. Feet in flight have the costs and constraints of swing feet, and forces
+/// follow the load of gait.h Eq. (3).
 ///
 /// The pendulum of gait.h starts with a velocity v, but the robot starts at rest. With the time constant
 /// tau = sqrt(z / g), a centre of pressure held back by d for a time T brings the robot onto the pendulum's path if
@@ -38,10 +43,11 @@ struct GaitTiming {
   double start = 0.3;        ///< double support before the first step, s
   double single = 0.36;      ///< single support, s
   double both = 0.045;       ///< double support between steps, s
+  double flight = 0;         ///< between single supports, in place of double support, s; 0: a walk
   double end = 0.45;         ///< double support after the last step, s
   double time_step = 0.012;  ///< s; Euler error sinks the feet in proportion to time_step x joint speed^2
 
-  double stepDuration() const { return single + both; }  ///< s
+  double stepDuration() const { return single + (flight > 0 ? flight : both); }  ///< s
 };
 
 /// Shape of a swing, over its progress s in [0, 1].
@@ -64,6 +70,7 @@ struct PaperWeights {
 struct LocomotionOptions {
   GaitTiming timing;
   double start_pressure = 0.4;  ///< largest d of Eq. (1) over the soles' half length; 0: timing.start as given
+  double stretch = 0;           ///< height of the CoM at take-off and touchdown over that at the start, m
   SwingShape swing;
   double friction = 0.7;  ///< coefficient, 1
   double published = 0;   ///< 1: the paper's problem, see above; 0: on footholds
@@ -116,8 +123,9 @@ Side getFirstFoot(const LocomotionOptions& options);
 /// The steps to take and the ground to take them on.
 struct LocomotionTask {
   std::string name;
-  FootstepPlan plan;
+  FootstepPlan plan;  ///< steps in the order of their landings
   Ground ground;
+  Side support = Side::Left;              ///< foot that stands before the first flight, if there are flights
   Vector3d direction = Vector3d::Zero();  ///< unit vector of the walking direction, or zero if there is none
   double speed = 0;                       ///< of the CoM along it, at steady steps, m/s
 };

@@ -19,6 +19,7 @@ struct OptionEntry {
   double* value = nullptr;
   std::string unit;
   std::string help;
+  std::vector<std::string> names{};  ///< of the values 0, 1 and so on, if it is a choice
 };
 
 /// Sets an option by name.

@@ -1,0 +1,145 @@
+#include "bielle/motion/run.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bielle/model/error.h"
+#include "motion/gait.h"
+
+namespace bielle {
+namespace {
+
+// Supports and flights have options of their own.
+std::vector<OptionEntry> join(std::vector<OptionEntry> entries, LocomotionOptions& gait) {
+  for (OptionEntry& entry : listOptions(gait))
+    if (entry.name != "single_support" && entry.name != "double_support" && entry.name != "published")
+      entries.push_back(std::move(entry));
+  entries.push_back(
+      {"stretch", &gait.stretch, "m", "height of the centre of mass at take-off and touchdown over that at the start"});
+  return entries;
+}
+
+// Every foot lands by `displacements` ahead of where it stood at the start, along x of the feet.
+std::vector<Footstep> moveAhead(const Stance& stance, const std::vector<std::pair<Side, double>>& displacements) {
+  const Vector3d forward = calcMiddle(stance.feet[0], stance.feet[1]).R.col(0);
+  std::vector<Footstep> steps;
+  for (const auto& [side, displacement] : displacements) {
+    SE3 X = stance.feet[static_cast<int>(side)];
+    X.p += displacement * forward;
+    steps.push_back({side, X});
+  }
+  return steps;
+}
+
+// Steps with flights along x of the feet at the start.
+template <typename Options>
+MotionPlan planFlights(const Model& model, const Stance& stance, LocomotionTask task, Options options) {
+  LocomotionOptions gait = options.gait;
+  gait.timing.flight = options.flight;
+  gait.timing.single = options.stance;
+  requireOption(options.flight > 0, "flight", "it is not positive", "give seconds, e.g. 0.1");
+  requireOption(options.stance >= 4 * gait.timing.time_step, "stance", "it is shorter than four time steps",
+                "give seconds, e.g. 0.25");
+  const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
+  task.ground.height = start.p.z();
+  task.direction = start.R.col(0);
+  MotionPlan plan = planLocomotion(model, stance, task, gait);
+  plan.requested = listValues(listOptions(options));
+  return plan;
+}
+
+// All flights together.
+Goal makeFlightGoal(const ContactSchedule& schedule, int flights, double flight, double time_step) {
+  return {GoalKind::FlightTime, "time in the air", flights * flight, flights * calcTolerance(flight, time_step / 2), 0,
+          schedule.numStages()};
+}
+
+}  // namespace
+
+LocomotionOptions RunOptions::makeGaitDefaults() {
+  LocomotionOptions gait;
+  gait.timing.time_step = 0.005;
+  gait.swing.arrive = 1;
+  gait.force_weight = 100;
+  return gait;
+}
+
+LocomotionOptions HopOptions::makeGaitDefaults() {
+  LocomotionOptions gait = RunOptions::makeGaitDefaults();
+  gait.timing.start = 0.6;
+  gait.swing.height = 0.02;
+  return gait;
+}
+
+std::vector<OptionEntry> listOptions(RunOptions& o) {
+  return join({{"speed", &o.speed, "m/s", "of the steady steps; negative: backward"},
+               {"steps", &o.steps, "1", "number of steps, the last one brings the feet together"},
+               {"flight", &o.flight, "s", "both feet in the air between two steps"},
+               {"stance", &o.stance, "s", "one foot on the ground"}},
+              o.gait);
+}
+
+std::vector<OptionEntry> listOptions(HopOptions& o) {
+  return join(
+      {{"foot", &o.foot, "0 or 1", "to hop on; 0: left, 1: right", {"left", "right"}},
+       {"hops", &o.hops, "1", "number of flights"},
+       {"flight", &o.flight, "s", "time in the air of each"},
+       {"length", &o.length, "m", "of each hop, forward; negative: backward"},
+       {"stance", &o.stance, "s", "on one foot before the first flight, between flights and after the last one"}},
+      o.gait);
+}
+
+MotionPlan planRun(const Model& model, const RunOptions& o, const VectorXd& q0) {
+  const int steps = countSteps("steps", o.steps);
+  const Stance stance = makeStance(model, o.gait, q0);
+  const double length = o.speed * (o.stance + o.flight);
+  std::vector<std::pair<Side, double>> landings;
+  for (int i = 1; i <= steps; ++i)
+    landings.emplace_back(i % 2 != 0 ? Side::Right : Side::Left,
+                          i + 1 < steps ? (i - 0.5) * length : (steps - 2) * length);
+  LocomotionTask task;
+  task.name = "run";
+  task.plan = {stance.feet, moveAhead(stance, landings)};
+  task.support = Side::Left;
+  task.speed = o.speed;
+  MotionPlan plan = planFlights(model, stance, task, o);
+  std::vector<Goal> goals = makeSpeedGoals(plan.schedule, o.speed, calcMiddle(stance.feet[0], stance.feet[1]).R.col(0));
+  goals.push_back(makeFlightGoal(plan.schedule, steps - 1, o.flight, o.gait.timing.time_step));
+  plan.goals.insert(plan.goals.begin(), goals.begin(), goals.end());
+  return plan;
+}
+
+MotionPlan planHop(const Model& model, const HopOptions& o, const VectorXd& q0) {
+  requireOption(o.foot == 0 || o.foot == 1, "foot", "it is neither 0 nor 1",
+                "give 0 for the left, 1 for the right foot");
+  requireOption(o.hops >= 1 && o.hops <= 100 && o.hops == std::floor(o.hops), "hops",
+                "it is not a whole number from 1 to 100", "give one, e.g. 1");
+  const Stance stance = makeStance(model, o.gait, q0);
+  const Side side = o.foot == 0 ? Side::Left : Side::Right;
+  const int hops = static_cast<int>(o.hops);
+  std::vector<std::pair<Side, double>> landings;
+  for (int i = 1; i <= hops; ++i) landings.emplace_back(side, i * o.length);
+  landings.emplace_back(getOther(side), hops * o.length);
+  LocomotionTask task;
+  task.name = "hop";
+  task.plan = {stance.feet, moveAhead(stance, landings)};
+  task.support = side;
+  MotionPlan plan = planFlights(model, stance, task, o);
+  Goal length{GoalKind::Displacement,   "length", hops * o.length, calcTolerance(hops * o.length, 0.01), 0,
+              plan.schedule.numStages()};
+  length.direction = calcMiddle(stance.feet[0], stance.feet[1]).R.col(0);
+  for (int contact : stance.contacts) length.contacts.push_back(model.contacts()[contact].name);
+  const Goal flight = makeFlightGoal(plan.schedule, hops, o.flight, o.gait.timing.time_step);
+  plan.goals.insert(plan.goals.begin(), {flight, length});
+  return plan;
+}
+
+Motion makeRun(const Model& model, const RunOptions& options, const ProblemOptions& problem) {
+  return makeMotion(model, planRun(model, options, makeStandingPosture(model)), problem);
+}
+
+Motion makeHop(const Model& model, const HopOptions& options, const ProblemOptions& problem) {
+  return makeMotion(model, planHop(model, options, makeStandingPosture(model)), problem);
+}
+
+}  // namespace bielle
