@@ -433,6 +433,33 @@ TEST_CASE("scripts that name a kind of barrier get the limits that motions keep 
   checkRefused(run(makeShortSquat(directory.str(), {"--limits", "soft"})), "soft");
 }
 
+TEST_CASE("durations are free within the bounds given, or as planned") {
+  const OutputDirectory directory;
+  const auto solve = [&](std::vector<std::string> options) {
+    const CommandResult result = run(makeShortSquat(directory.str(), options));
+    CHECK(result.status == 0);
+    return directory.readSummary();
+  };
+  CHECK(solve({}).at("free_timings").empty());
+  const double planned = solve({}).at("duration_s");
+  for (const std::vector<std::string>& options :
+       {std::vector<std::string>{"--free-timings"},
+        std::vector<std::string>{"--free-timings", "double support=0.5:0.8"}}) {
+    const bool all = options.size() == 1;
+    const json summary = solve(options), &timing = summary.at("free_timings").at(0);
+    CHECK(timing.at("nominal_s").get<double>() == Approx(planned));
+    CHECK(timing.at("lower_s").get<double>() == Approx((all ? 0.6 : 0.5) * planned));
+    CHECK(timing.at("upper_s").get<double>() == Approx((all ? 1.6 : 0.8) * planned));
+    CHECK(timing.at("chosen_s").get<double>() == Approx(summary.at("duration_s").get<double>()));
+    CHECK(std::abs(timing.at("chosen_s").get<double>() - planned) > 1e-3);
+  }
+  for (const char* wrong :
+       {"double support", "double support=1", "double support=a:b", "double support=2:1", "swing=1:2"})
+    checkRefused(run(makeShortSquat(directory.str(), {"--free-timings", wrong})), "free");
+  checkRefused(run(makeShortSquat(directory.str(), {"--time-weight", "1"})), "time-weight");
+  checkRefused(run(makeShortSquat(directory.str(), {"--free-timings", "--time-weight", "-1"})), "time-weight");
+}
+
 TEST_CASE("a squat that does not converge is written, marked, and status 1") {
   const OutputDirectory directory;
   const CommandResult result = run(makeShortSquat(directory.str(), {"--max-iterations", "1"}));

@@ -22,22 +22,30 @@ std::pair<std::string, TimingBounds> parseBounds(const std::string& text) {
 
 }  // namespace
 
-void addTimingOptions(CLI::App& sub, TimingOptions& timings) {
+void addTimingOptions(CLI::App& sub, TimingArguments& arguments) {
   sub.add_option_function<std::vector<std::string>>(
          "--free-timings",
-         [&timings](const std::vector<std::string>& phases) {
+         [&arguments](const std::vector<std::string>& phases) {
+           arguments.given = true;
            for (const std::string& phase : phases)
-             if (!phase.empty()) timings.phases.push_back(parseBounds(phase));
-           if (!timings.areGiven()) timings.phases.push_back({kAllPhases, {}});
+             if (!phase.empty()) arguments.phases.push_back(phase);
          },
          "let the solver choose how long phases last; footholds and paths stay. PHASE=LOWER:UPPER bounds one of them "
          "[of "
          "the nominal duration], `all` those with contacts; alone: all=0.6:1.6")
-      ->type_name("PHASE=LOWER:UPPER ...")
+      ->type_name("PHASE=LOWER:UPPER")
       ->expected(0, -1);
-  sub.add_option("--time-weight", timings.time_weight,
+  sub.add_option("--time-weight", arguments.time_weight,
                  "cost of a second of the phases whose duration is free: the more, the faster the rhythm [1/s]")
       ->capture_default_str();
+}
+
+TimingOptions makeTimings(const TimingArguments& arguments) {
+  TimingOptions timings;
+  timings.time_weight = arguments.time_weight;
+  for (const std::string& phase : arguments.phases) timings.phases.push_back(parseBounds(phase));
+  if (arguments.given && arguments.phases.empty()) timings.phases.push_back({kAllPhases, {}});
+  return timings;
 }
 
 void printTimings(const std::vector<PhaseTiming>& timings) {

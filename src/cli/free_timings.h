@@ -6,8 +6,17 @@
 
 namespace bielle::cli {
 
-// --free-timings and --time-weight. \param timings  must outlive the parser
-void addTimingOptions(CLI::App& sub, TimingOptions& timings);
+struct TimingArguments {
+  bool given = false;
+  std::vector<std::string> phases;  // PHASE=LOWER:UPPER; none: all phases
+  double time_weight = 0;
+};
+
+// --free-timings and --time-weight. \param arguments  must outlive the parser
+void addTimingOptions(CLI::App& sub, TimingArguments& arguments);
+
+// \throws ModelError when the text of a phase makes no sense
+TimingOptions makeTimings(const TimingArguments& arguments);
 
 // A table of the durations that came out, unless there are none.
 void printTimings(const std::vector<PhaseTiming>& timings);

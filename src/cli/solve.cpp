@@ -29,6 +29,7 @@ struct SolveArguments {
   std::string serial_armature = "1e-3";
   std::vector<std::string> settings;                                      // name=value
   std::vector<std::string> effort_limits, velocity_limits, power_limits;  // motor=value
+  TimingArguments timings;
   FddpOptions solver;
   std::string warm_start;  // directory of a result, or empty
   bool quiet = false, no_check = false, no_report = false;
@@ -204,6 +205,7 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   const Model& model = serial ? serial->model : robot.model;
   ProblemOptions problem = arguments.problem;
   problem.limits = makeLimits(arguments);
+  problem.timings = makeTimings(arguments.timings);
   problem.step = arguments.step.value_or(serial ? StepRule::Euler : problem.step);
   Motion motion = makeLimited(request, model, problem);
   FddpOptions solver = arguments.solver;
@@ -310,7 +312,7 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
                  "posture")
       ->capture_default_str();
   addLimitOptions(sub, arguments);
-  addTimingOptions(sub, arguments->problem.timings);
+  addTimingOptions(sub, arguments->timings);
   sub.add_option("--max-iterations", arguments->solver.max_iterations, "the solver stops there")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
