@@ -145,6 +145,9 @@ TEST_CASE("run, hop: which foot stands when") {
   const MotionPlan plan = planRun(getBipetto(), run, makeStandingPosture(getBipetto()));
   CHECK(describe(plan.schedule) == "LR L - R - L - R LR");
   CHECK(calcAirTime(plan.schedule) == Approx(3 * run.flight));
+  CHECK(plan.goals.front().kind == GoalKind::FlightTime);  // too short for its speed
+  run.steps = 8;
+  CHECK(planRun(getBipetto(), run, makeStandingPosture(getBipetto())).goals.front().kind == GoalKind::Speed);
   HopOptions hop;
   hop.foot = 1;
   hop.hops = 2;

@@ -9,6 +9,8 @@
 namespace bielle {
 namespace {
 
+constexpr int kSteadySteps = 8;  // shorter runs do not reach their speed: the steps at both ends are half as long
+
 // Supports and flights have options of their own.
 std::vector<OptionEntry> join(std::vector<OptionEntry> entries, LocomotionOptions& gait) {
   for (OptionEntry& entry : listOptions(gait))
@@ -103,7 +105,9 @@ MotionPlan planRun(const Model& model, const RunOptions& o, const VectorXd& q0) 
   task.support = Side::Left;
   task.speed = o.speed;
   MotionPlan plan = planFlights(model, stance, task, o);
-  std::vector<Goal> goals = makeSpeedGoals(plan.schedule, o.speed, calcMiddle(stance.feet[0], stance.feet[1]).R.col(0));
+  std::vector<Goal> goals;
+  if (steps >= kSteadySteps)
+    goals = makeSpeedGoals(plan.schedule, o.speed, calcMiddle(stance.feet[0], stance.feet[1]).R.col(0));
   goals.push_back(makeFlightGoal(plan.schedule, steps - 1, o.flight, o.gait.timing.time_step));
   plan.goals.insert(plan.goals.begin(), goals.begin(), goals.end());
   return plan;
