@@ -49,7 +49,8 @@ struct NamedResidual {
 
 // One of every kind. Two contacts are in force; `dofs` have one coordinate each.
 std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, const ConstraintSet& set,
-                                         const BodyFrame& a, const BodyFrame& b, const std::vector<int>& dofs) {
+                                         const BodyFrame& a, const BodyFrame& b, const std::vector<int>& dofs,
+                                         const VectorXd& q_closed) {
   std::vector<NamedResidual> out;
   const auto add = [&out](const std::string& name, std::unique_ptr<Residual> residual) {
     out.push_back({name, std::move(residual)});
@@ -78,6 +79,8 @@ std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, 
     add("centre of pressure", makeCenterOfPressure(set, c));
     add("centre of pressure in the world", makeCenterOfPressure(set, c, ForceAxes::World));
   }
+  for (const Transmission& linkage : listTransmissions(model, q_closed))
+    add("transmission of " + linkage.joints, makeTransmission(linkage));
   add("joint position", makeJointPosition(model, dofs));
   add("joint velocity", makeJointVelocity(dofs));
   if (model.nu() > 1) add("motor power", makeMotorPower(model, {model.nu() - 1, 0}));
@@ -140,7 +143,7 @@ TEST_CASE("every residual against differences, on mechanisms of every joint kind
     const BodyFrame b{model.frames()[model.findFrame("b1k")].body, randomPlacement(rng)};
     const VectorXd q = model.integrate(mechanism.q_closed, randomVector(rng, model.nv(), 0.1));
     const VectorXd v = randomVector(rng, model.nv(), 1), lambda = makeForces(rng, set);
-    for (const NamedResidual& entry : makeResiduals(rng, model, set, a, b, dofs)) {
+    for (const NamedResidual& entry : makeResiduals(rng, model, set, a, b, dofs, mechanism.q_closed)) {
       CAPTURE(getName(kind), entry.name);
       checkResidual(model, set, *entry.residual, q, v, lambda);
     }
@@ -154,9 +157,30 @@ TEST_CASE("every residual against differences, on Bipetto in motion") {
   const VectorXd q = assembleReference(model, "half_sitting").q;
   const VectorXd v = randomVector(rng, model.nv(), 1), lambda = makeForces(rng, set);
   const BodyFrame left = getBodyFrame(model, "foot_left"), right = getBodyFrame(model, "foot_right");
-  for (const NamedResidual& entry : makeResiduals(rng, model, set, left, right, {})) {
+  for (const NamedResidual& entry : makeResiduals(rng, model, set, left, right, {}, q)) {
     CAPTURE(entry.name);
     if (entry.residual->size() > 0) checkResidual(model, set, *entry.residual, q, v, lambda);
+  }
+}
+
+TEST_CASE("transmissions against differences, on every linkage of the robots, at and off closed configurations") {
+  std::mt19937 rng(14);
+  for (const char* name : {"cleobot", "rsu_biped", "digit"}) {
+    const Model model = loadRobot(name).model;
+    const ConstraintSet set = makeConstraintSet(model);
+    const VectorXd q0 = assembleReference(model, model.references().front().name).q;
+    const VectorXd q = closeConfiguration(model, model.integrate(q0, randomVector(rng, model.nv(), 0.05))).q;
+    const VectorXd v = randomVector(rng, model.nv()), lambda = VectorXd::Zero(set.rows);
+    const std::vector<Transmission> linkages = listTransmissions(model, q0);
+    CHECK(linkages.size() >= 2);
+    for (const Transmission& linkage : linkages) {
+      CAPTURE(name, linkage.joints);
+      const auto residual = makeTransmission(linkage);
+      TestNode node(model, set);
+      CHECK(std::abs(node.calc(*residual, q0, v, lambda)[0] - 1) < 1e-10);
+      checkResidual(model, set, *residual, q, v, lambda);
+      checkResidual(model, set, *residual, model.integrate(q, randomVector(rng, model.nv(), 1e-3)), v, lambda);
+    }
   }
 }
 

@@ -1,12 +1,15 @@
 // Reduction ratios. Oracles: the closed-form four-bar, virtual work in the constrained dynamics, differences, and dead
 // points found without any Jacobian.
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
+#include "bielle/ocp/residual.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "bielle/transmission/ratio.h"
 #include "check_derivative.h"
@@ -84,6 +87,39 @@ void checkRatioDerivatives(const Robot& robot, const RatioSample& sample) {
 }
 
 }  // namespace
+
+TEST_CASE("the transmission of an optimal control problem is the inverse of the ratio, and vanishes at a dead point") {
+  for (const char* joint : {"knee_right", "ankle_pitch_right"}) {
+    const Robot robot(std::string(joint) == "knee_right" ? "bipetto" : "rsu_biped", {joint});
+    const std::vector<Transmission> all = listTransmissions(robot.model, robot.q);
+    const auto own = std::find_if(all.begin(), all.end(), [&](const Transmission& linkage) {
+      return linkage.joints.find(joint) != std::string::npos;
+    });
+    REQUIRE(own != all.end());
+    const auto residual = makeTransmission(*own);
+    const ConstraintSet set = makeConstraintSet(robot.model);
+    Workspace ws(robot.model);
+    const VectorXd none;
+    int dead = 0;
+    double reference = 0;
+    const RatioSweep sweep = sweepRatio(robot.model, robot.linkage, robot.q);
+    for (const RatioSample& sample : sweep.samples)
+      if (sample.s == 0) reference = sample.ratio.R.determinant();
+    for (const RatioSample& sample : sweep.samples) {
+      if (sample.loses_rank) continue;
+      updatePositions(robot.model, ws, robot.getWhole(sample));
+      VectorXd r(1);
+      residual->calc({robot.model, ws, set, none, none}, r);
+      if (sample.dead == DeadPointKind::Joint) {
+        ++dead;
+        CHECK(std::abs(r[0]) < 1e-8);
+      } else if (sample.dead == DeadPointKind::None) {
+        CHECK(std::abs(r[0] * sample.ratio.R.determinant() / reference - 1) < 1e-8);
+      }
+    }
+    if (std::string(joint) == "knee_right") CHECK(dead > 0);
+  }
+}
 
 TEST_CASE("four-bar: the ratio on paper, over both branches of a full turn") {
   const Robot robot("fourbar", {"rocker_joint"});

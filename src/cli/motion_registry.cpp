@@ -163,7 +163,7 @@ MotionRequest remakeRequest(const MotionSummary& summary) {
   const MotionRequest request = summary.motion == kSequence ? makeSequenceRequest(listParts(summary.requested))
                                                             : findMotion(summary.file, summary.motion).makeRequest();
   const auto isLimit = [](const std::string& name) {
-    for (const char* prefix : {kEffortLimit, kVelocityLimit, kPowerLimit})
+    for (const char* prefix : {kEffortLimit, kVelocityLimit, kPowerLimit, kDeadPointMargin})
       if (name.rfind(prefix, 0) == 0) return true;
     return false;
   };

@@ -50,6 +50,7 @@ MotionRequest makeSequenceRequest(const std::vector<std::string>& motions);
 // Prefixes of limits given by motor among the requested values, followed by the name of the motor.
 inline constexpr const char *kEffortLimit = "limit ", *kVelocityLimit = "velocity-limit ",
                             *kPowerLimit = "power-limit ";
+inline constexpr const char* kDeadPointMargin = "dead-point-margin";
 
 // The request recorded in a result, without limits, which are part of the problem and not of the motion.
 // \throws ModelError when there is no such motion or option

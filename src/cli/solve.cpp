@@ -133,6 +133,8 @@ Motion makeLimited(const MotionRequest& request, const Model& model, const Probl
   for (const auto& [motor, value] : limits.efforts) motion.requested.emplace_back(kEffortLimit + motor, value);
   for (const auto& [motor, value] : limits.velocities) motion.requested.emplace_back(kVelocityLimit + motor, value);
   for (const auto& [motor, value] : limits.powers) motion.requested.emplace_back(kPowerLimit + motor, value);
+  if (limits.dead_point_margin != LimitOptions().dead_point_margin)
+    motion.requested.emplace_back(kDeadPointMargin, limits.dead_point_margin);
   return motion;
 }
 
@@ -258,6 +260,11 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
   sub.add_flag_callback(
       "--no-limits", [&limits] { limits.enforced = false; },
       "ignore the robot's limits of torques, joint ranges and velocities, which motions keep otherwise");
+  sub.add_option(
+         "--dead-point-margin", limits.dead_point_margin,
+         "smallest share that the speeds of a linkage's joints per speeds of its motors may have of those at the "
+         "start, and largest inverse share; 0: none")
+      ->capture_default_str();
   // Lets scripts run that name a kind of barrier: limits are kept by constraints. No group: --help leaves it out.
   sub.add_option_function<std::string>("--limits",
                                        [&limits](const std::string& kind) { limits.enforced = kind != "none"; })

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "bielle/motion/motion.h"
 
 namespace bielle {
 namespace {
@@ -12,8 +13,7 @@ struct Bound {
   std::string name;
   int index = 0;  // dof or motor
   double lower = 0, upper = 0;
-
-  double getScale() const { return std::isfinite(upper - lower) ? 0.5 * (upper - lower) : 1; }
+  double scale = std::isfinite(upper - lower) ? 0.5 * (upper - lower) : 1;
 };
 
 // Values by motor: those given, except where they are replaced by name.
@@ -83,22 +83,28 @@ std::vector<Bound> listPowers(const Model& model, const LimitOptions& options) {
 void addConstraint(const Bound& bound, std::unique_ptr<Residual> residual, StageSpec& stage) {
   const auto make = [](double value) { return VectorXd::Constant(1, value); };
   stage.path_constraints.push_back(
-      {bound.name, std::move(residual), make(bound.lower), make(bound.upper), make(bound.getScale())});
+      {bound.name, std::move(residual), make(bound.lower), make(bound.upper), make(bound.scale)});
 }
 
 }  // namespace
 
 bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& q0, std::vector<StageSpec>& stages) {
   if (!options.enforced) return false;
+  const double margin = options.dead_point_margin;
+  requireOption(margin >= 0 && margin < 1, "dead_point_margin", "it is outside 0 .. 1", "give a share, e.g. 0.15");
   const VectorXd efforts = getEfforts(model, options);
   const std::vector<Bound> ranges = listRanges(model, q0), velocities = listVelocities(model, options),
                            powers = listPowers(model, options);
+  const std::vector<Transmission> transmissions =
+      margin > 0 ? listTransmissions(model, q0) : std::vector<Transmission>();
   for (size_t k = 0; k < stages.size(); ++k) {
     StageSpec& stage = stages[k];
     stage.effort_limits = efforts;
     if (k == 0) continue;
     for (const Bound& bound : ranges) addConstraint(bound, makeJointPosition(model, {bound.index}), stage);
     for (const Bound& bound : velocities) addConstraint(bound, makeJointVelocity({bound.index}), stage);
+    for (const Transmission& t : transmissions)
+      addConstraint({"dead points of " + t.joints, 0, margin, 1 / margin, 1}, makeTransmission(t), stage);
     if (k + 1 == stages.size() || stage.kind == StageKind::Impact) continue;
     for (const Bound& bound : powers) addConstraint(bound, makeMotorPower(model, {bound.index}), stage);
   }

@@ -12,6 +12,9 @@ namespace bielle {
 namespace {
 
 constexpr double kFall = 0.25;  // ratio to which a violation must decrease, or the penalty is raised
+// Below this violation the penalty is raised at every update: there steps are full, and multipliers converge superlinearly.
+// Farther away a large penalty would only shorten the steps.
+constexpr double kNear = 0.03, kNearPenalty = 1e5;  // the latter over the initial penalty, at most
 // Foreseen decrease over the gain of new multipliers at which they are due; and while violations alone are minimized.
 constexpr double kShare = 0.1, kRestorationShare = 1e-6;
 // Penalty times squared violations over the cost, while violations alone are minimized.
@@ -40,7 +43,8 @@ void AugmentedLagrangian::resize(const ShootingProblem& problem, const Constrain
                                   " exceeds the upper");
     rows_ += rows;
   }
-  if (!kept_) penalty_ = options.initial_penalty;
+  if (!kept_) far_penalty_ = options.initial_penalty;
+  penalty_ = far_penalty_;
   last_violation_ = std::numeric_limits<double>::infinity();
   at_ = {};
   num_updates_ = 0;
@@ -102,7 +106,11 @@ bool AugmentedLagrangian::updateMultipliers(const EvaluationList& iterate, doubl
   } else {
     restoring_ = false;
     adoptMultipliers();
-    if (!falls) penalty_ = std::min(options_.max_penalty, options_.penalty_increase * penalty_);
+    const double raised = std::min(options_.max_penalty, options_.penalty_increase * penalty_);
+    if (!falls)
+      penalty_ = far_penalty_ = raised;
+    else if (at_.violation < kNear)
+      penalty_ = std::max(penalty_, std::min(raised, kNearPenalty * options_.initial_penalty));
   }
   evaluate(iterate);
   return true;
@@ -137,7 +145,7 @@ double AugmentedLagrangian::getLargestMultiplier() const {
 Multipliers AugmentedLagrangian::getMultipliers() const {
   Multipliers out;
   for (const Node& node : nodes_) out.values.push_back(node.multipliers);
-  out.penalty = penalty_;
+  out.penalty = far_penalty_;
   return out;
 }
 
@@ -145,7 +153,7 @@ void AugmentedLagrangian::setMultipliers(const Multipliers& multipliers) {
   if (!(multipliers.penalty > 0)) throw std::invalid_argument("Fddp: the penalty of multipliers must be positive");
   nodes_.resize(multipliers.values.size());
   for (size_t k = 0; k < nodes_.size(); ++k) nodes_[k].multipliers = multipliers.values[k];
-  penalty_ = multipliers.penalty;
+  far_penalty_ = multipliers.penalty;
   kept_ = true;
 }
 

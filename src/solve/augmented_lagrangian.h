@@ -69,6 +69,7 @@ class AugmentedLagrangian {
   bool restoring_ = false;  // minimizes the violations alone
   bool kept_ = false;       // the next resize() keeps multipliers and penalty
   double penalty_ = 1;
+  double far_penalty_ = 1;  // without what was added close to the solution; where the next solve starts
   Measures at_;
   double last_violation_ = 0;  // at the last update of the multipliers
   int num_updates_ = 0;

@@ -111,6 +111,19 @@ std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constrain
 std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs);
 /// Velocity coordinates (n), rad/s or m/s.
 std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs);
+/// A loop cluster with as many motors and serial joints as it has mobility (up to 6), and the transmission between them: with
+/// v_J = Q v_M the speeds of the joints by those of the motors, det Q / det Q_0, Q_0 being that of a reference. It is 1 there,
+/// and 0 at a dead point of the joints, which motors cannot move; at a dead point of the motors, which cannot hold the
+/// joints, it is infinite.
+struct Transmission {
+  std::string joints;                                 ///< names of the serial joints
+  std::shared_ptr<const class TransmissionMap> data;  ///< shared by all residuals of it
+};
+/// The transmissions of all such clusters. \param q_reference  nq, closed
+/// \throws ModelError when the reference is open or a dead point
+std::vector<Transmission> listTransmissions(const Model& model, ConstVectorRef q_reference);
+/// det Q / det Q_0 (1).
+std::unique_ptr<Residual> makeTransmission(const Transmission& transmission);
 /// Mechanical power u_m v_m of motors, given by their indices in the model (n), W.
 std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors);
 

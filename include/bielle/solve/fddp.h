@@ -52,7 +52,8 @@
 ///     gradient rho d_k,   Hessian rho in rows with d_k != 0 and in equations, 0 in others.                            (11)
 /// Whenever the foreseen decrease has become a small part of the cost, or the gradient has vanished,
 ///     y_k <- rho d_k,                                                                                                (12)
-/// and rho grows if the largest violation is more than a quarter of what it was the last time. Converged means that the
+/// and rho grows if the largest violation is more than a quarter of what it was the last time, and, for this solve alone,
+/// whenever it is below 0.03, where steps are full and (12) then converges superlinearly. Converged means that the
 /// gradient has vanished and no row is violated by more than the tolerance; y_k is then the multiplier of c_k in
 ///     L = J + sum_k y_k . c_k,  positive at upper bounds, negative at lower ones,  and  y_i (bound_i - c_i) vanishes.   (13)
 /// If the violation no longer falls although rho is at its largest, the problem is called infeasible: the trajectory is then a
@@ -79,7 +80,7 @@ enum class LastRollout { Closed, Segments };
 struct ConstraintOptions {
   double tolerance = 1e-8;       ///< largest violation of a converged solve, in the units of c
   double initial_penalty = 0.1;  ///< rho, in the unit of the cost over that of c squared
-  double penalty_increase = 10;  ///< factor when the violation falls too slowly
+  double penalty_increase = 10;  ///< factor when the violation falls too slowly, or is small
   double max_penalty = 1e8;
 };
 
