@@ -89,7 +89,7 @@ void checkRatioDerivatives(const Robot& robot, const RatioSample& sample) {
 }  // namespace
 
 TEST_CASE("the transmission of an optimal control problem is the inverse of the ratio, and vanishes at a dead point") {
-  for (const char* joint : {"knee_right", "ankle_pitch_right"}) {
+  for (const char* joint : {"knee_right", "ankley_right"}) {
     const Robot robot(std::string(joint) == "knee_right" ? "bipetto" : "rsu_biped", {joint});
     const std::vector<Transmission> all = listTransmissions(robot.model, robot.q);
     const auto own = std::find_if(all.begin(), all.end(), [&](const Transmission& linkage) {
