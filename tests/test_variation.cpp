@@ -130,6 +130,7 @@ TEST_CASE("variation: inverse dynamics and closures along a motion are those of 
       calcClosureJacobian(ws, set.closures[c], J);
       calcClosureVelocityDerivative(ws, set.closures[c], nu);
       calcClosureDerivatives(ws, set.closures[c], dq, dv);
+      addStabilizationDerivatives(ws, set.closures[c], dq, dv);
       checkDerivative(residual.segment(row, n), H * motion.q);
       checkDerivative(velocity.segment(row, n), nu * motion.q + J * motion.v);
       checkDerivative(acceleration.segment(row, n), dq * motion.q + dv * motion.v + J * motion.a);

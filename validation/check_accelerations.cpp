@@ -41,13 +41,17 @@ double calcInertialNorm(const MatrixXd& M, const VectorXd& a) {
   return square < 0 ? 0 : std::sqrt(square);  // rounding; NaN is kept
 }
 
-AccelerationTrace traceAccelerations(const SimbodyBridge& simbody, const MatrixXd& M, const VectorXd& v,
+ClosureErrors calcClosureErrors(const SimbodyBridge& simbody, const VectorXd& v) {
+  const ClosureRows rows = simbody.calcClosureRows();
+  return {rows.residual, rows.J * v};
+}
+
+AccelerationTrace traceAccelerations(const SimbodyBridge& simbody, const MatrixXd& M, const ClosureErrors& errors,
                                      const VectorXd& recorded, double h, bool stabilised_loops) {
   AccelerationTrace out;
   out.a = simbody.solveWithArmature(Precision::Double).a;
   const ClosureRows rows = simbody.calcClosureRows();
   if (rows.J.rows() > 0) {
-    const VectorXd velocity = rows.J * v;
     const int loops = rows.num_loop_rows, feet = static_cast<int>(rows.J.rows()) - loops;
     std::vector<std::pair<int, int>> groups;  // first row, count
     if (stabilised_loops && loops > 0) groups.emplace_back(0, loops);
@@ -55,8 +59,8 @@ AccelerationTrace traceAccelerations(const SimbodyBridge& simbody, const MatrixX
     MatrixXd targets = MatrixXd::Zero(rows.J.rows(), 2 * groups.size());
     for (size_t g = 0; g < groups.size(); ++g) {
       const auto [first, count] = groups[g];
-      targets.col(2 * g).segment(first, count) = -velocity.segment(first, count) / h;
-      targets.col(2 * g + 1).segment(first, count) = rows.residual.segment(first, count) / (h * h);
+      targets.col(2 * g).segment(first, count) = -errors.velocity.segment(first, count) / h;
+      targets.col(2 * g + 1).segment(first, count) = errors.residual.segment(first, count) / (h * h);
     }
     const MatrixXd response = simbody.calcResponse(rows.J, targets);
     const Eigen::LLT<MatrixXd> llt(M);

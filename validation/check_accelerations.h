@@ -14,10 +14,18 @@ struct AccelerationTrace {
 /// sqrt(a^T M a)
 double calcInertialNorm(const MatrixXd& M, const VectorXd& a);
 
-/// \param simbody at the state and with the motor forces of the node; its closures are the loops and then `contacts`
-/// \param M  mass matrix at that state   \param recorded  accelerations (nv)
+/// What stabilisations act on: residuals and velocities of loops and feet at a node, in rows of notation.h.
+struct ClosureErrors {
+  VectorXd residual, velocity;
+};
+/// \param simbody at the state of the node   \param v  its velocities (nv)
+ClosureErrors calcClosureErrors(const SimbodyBridge& simbody, const VectorXd& v);
+
+/// \param simbody at the point of the accelerations and with the motor forces; its closures are the loops and then
+/// `contacts`
+/// \param M  mass matrix at that point   \param errors  at the node   \param recorded  accelerations (nv)
 /// \param stabilised_loops  whether loops are stabilised like feet: in the full formulation
-AccelerationTrace traceAccelerations(const SimbodyBridge& simbody, const MatrixXd& M, const VectorXd& v,
+AccelerationTrace traceAccelerations(const SimbodyBridge& simbody, const MatrixXd& M, const ClosureErrors& errors,
                                      const VectorXd& recorded, double time_step, bool stabilised_loops);
 
 }  // namespace bielle::validation

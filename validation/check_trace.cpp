@@ -191,8 +191,8 @@ class Tracer {
     stage.velocity_rest = projectOnTangent(d / h - v - h * a);
 
     const MatrixXd M = simbody.calcMassMatrix();
-    const AccelerationTrace own =
-        traceAccelerations(simbody, M, v, a, h, motion_.summary.formulation == Formulation::Full);
+    const AccelerationTrace own = traceAccelerations(simbody, M, calcClosureErrors(simbody, v), a, h,
+                                                     motion_.summary.formulation == Formulation::Full);
     stage.acceleration = own.size;
     stage.acceleration_error = own.error;
     stage.finite_difference = calcInertialNorm(M, (next - v) / h - own.a);
@@ -213,6 +213,7 @@ class Tracer {
     stage.midpoint_rest = projectOnTangent(first - h / 2 * v);
     const VectorXd inertial = simbody.calcBias() + simbody.calcGravityForces();
     stage.energy_scale = h * h / 2 * std::abs(a.dot(inertial));
+    const ClosureErrors errors = calcClosureErrors(simbody, v);
 
     simbody.setState(q_mid, v_mid, motors);
     stage.midpoint = traceClosures(simbody);
@@ -223,15 +224,14 @@ class Tracer {
     const VectorXd before = full ? v : projectOnTangent(2 / h * first), after = before + h * projectOnTangent(a);
     stage.velocity_rest = projectOnTangent(2 / h * second - after);
     const MatrixXd M = simbody.calcMassMatrix();
-    const AccelerationTrace own = traceAccelerations(simbody, M, v_mid, a, h, full);
+    const AccelerationTrace own = traceAccelerations(simbody, M, errors, a, h, full);
     stage.acceleration = own.size;
     stage.finite_difference = calcInertialNorm(M, (next - v) / h - own.a);
     traceWork(simbody, motors, wrenches, h / 2 * (before + after), stage);
 
     simbody.setState(q_mid, before, motors);
-    const VectorXd held = simbody.solveWithArmature(Precision::Double).a;
-    const VectorXd foreseen = 2 / h * (v_mid - before) + held - projectOnTangent(held);
-    stage.acceleration_error = getLarger(own.error, traceAccelerations(simbody, M, before, foreseen, h, full).error);
+    const VectorXd foreseen = projectOnTangent(simbody.solveWithArmature(Precision::Double).a);
+    stage.acceleration_error = getLarger(own.error, calcInertialNorm(M, 2 / h * (v_mid - before) - foreseen));
     stage.energy_scale += std::abs((M * (next - v - h * a)).dot(v + next)) / 2;
   }
 

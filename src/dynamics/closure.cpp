@@ -203,26 +203,34 @@ void calcClosureDerivatives(const Workspace& ws, const Closure& c, MatrixRef da_
   const RowWriter<double> rows(ws, c);
   const Vector6d &V1 = ws.V[c.body1], &V2 = ws.V[c.body2], &A2 = ws.A[c.body2];
   const Vector6d V12 = V1 + V2;
-  RowsBy6 rate;
-  SE3 X_W1;
-  if (c.kp != 0) {
-    rate = calcClosureResidualRate(ws, c);
-    X_W1 = getFrame1(ws, c);
-  }
   for (size_t i = 0; i < c.dofs.size(); ++i) {
     const int k = c.dofs[i];
     const double s = c.signs[i];
     const Vector6d J = ws.J.col(k), dV = ws.dV.col(k);
     const Vector6d J_V2 = crossMotion(J, V2);
-    Vector6d dq = ws.dA.col(k) - crossMotion(V12, dV) + crossMotion(J, A2) - crossMotion(V1, J_V2);  // Eq. (1)
-    Vector6d dv = ws.dJ.col(k) + dV - crossMotion(V12, J);                                           // Eq. (2)
-    if (c.kd != 0) {
-      dq += c.kd * (dV + J_V2);  // Eq. (3)
-      dv += c.kd * J;            // Eq. (4)
-    }
+    const Vector6d dq = ws.dA.col(k) - crossMotion(V12, dV) + crossMotion(J, A2) - crossMotion(V1, J_V2);  // Eq. (1)
+    const Vector6d dv = ws.dJ.col(k) + dV - crossMotion(V12, J);                                           // Eq. (2)
     rows.write(s, dq, &da_dq(0, k));
     rows.write(s, dv, &da_dv(0, k));
-    if (c.kp != 0) da_dq.col(k) -= (c.kp * s) * (rate * X_W1.actInvMotion(J));
+  }
+}
+
+void addStabilizationDerivatives(const Workspace& ws, const Closure& c, MatrixRef ds_dq, MatrixRef ds_dv) {
+  requireStage(ws, WorkspaceStage::Velocity, "addStabilizationDerivatives", "updateVelocities");
+  if (c.kd == 0 && c.kp == 0) return;
+  const RowWriter<double> rows(ws, c);
+  const SE3 X_W1 = getFrame1(ws, c);
+  RowsBy6 rate = RowsBy6::Zero(getRows(c.kind), 6);
+  if (c.kp != 0) rate = calcClosureResidualRate(ws, c);
+  RowVectorUpTo6 row(getRows(c.kind));
+  for (size_t i = 0; i < c.dofs.size(); ++i) {
+    const int k = c.dofs[i];
+    const double s = c.signs[i];
+    const Vector6d J = ws.J.col(k);
+    rows.write(s * c.kd, ws.dV.col(k) + crossMotion(J, ws.V[c.body2]), row.data());  // Eq. (3)
+    ds_dq.col(k) += row - (c.kp * s) * (rate * X_W1.actInvMotion(J));
+    rows.write(s * c.kd, J, row.data());  // Eq. (4)
+    ds_dv.col(k) += row;
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "dynamics/constrained_parts.h"
 #include "dynamics/saddle_point.h"
 
 namespace bielle {
@@ -26,7 +27,7 @@ void resize(const Model& model, ConstrainedWorkspace& cws, int rows) {
   const int nv = model.nv();
   if (cws.J.rows() == rows && cws.J.cols() == nv) return;
   cws.J.setZero(rows, nv);
-  for (VectorXd* v : {&cws.gamma, &cws.lambda, &cws.violation}) v->setZero(rows);
+  for (VectorXd* v : {&cws.gamma, &cws.lambda, &cws.violation, &cws.stabilization}) v->setZero(rows);
   for (VectorXd* v : {&cws.a, &cws.force}) v->setZero(nv);
   for (MatrixXd* m : {&cws.da_dq, &cws.da_dv}) m->setZero(nv, nv);
   for (MatrixXd* m : {&cws.dlambda_dq, &cws.dlambda_dv}) m->setZero(rows, nv);
@@ -34,17 +35,6 @@ void resize(const Model& model, ConstrainedWorkspace& cws, int rows) {
   cws.dlambda_du.setZero(rows, model.nu());
   cws.f_ext.assign(model.numBodies(), Vector6d::Zero());
   cws.saddle_point->resize(nv, rows);
-}
-
-// Jacobian and gamma of all closures; the accelerations in ws are those of a = 0.
-void assembleConstraints(const Workspace& ws, ConstrainedWorkspace& cws, const ConstraintSet& constraints) {
-  cws.J.setZero();
-  for (size_t c = 0; c < constraints.closures.size(); ++c) {
-    const Closure& closure = constraints.closures[c];
-    const int row = constraints.offsets[c], n = getRows(closure.kind);
-    calcClosureJacobian(ws, closure, cws.J.middleRows(row, n));
-    cws.gamma.segment(row, n) = calcClosureAcceleration(ws, closure) + calcClosureStabilization(ws, closure);
-  }
 }
 
 // Accelerations of the closures below this, m/s^2 or rad/s^2, are rounding, as all are at rest.
@@ -77,16 +67,28 @@ const char* getMessage(DynamicsStatus status) {
   return "?";
 }
 
-DynamicsStatus updateConstrainedDynamics(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
-                                         const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v,
-                                         ConstVectorRef tau) {
+bool updateConstrainedSystem(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
+                             const ConstraintSet& constraints, ConstVectorRef q) {
   resize(model, cws, constraints.rows);
   updatePositions(model, ws, q);
-  updateVelocities(model, ws, v);
   updateMassMatrix(model, ws);
-  updateBias(model, ws);
-  assembleConstraints(ws, cws, constraints);
-  if (!cws.saddle_point->factorize(ws.M, cws.J)) return DynamicsStatus::MassMatrixSingular;
+  cws.J.setZero();
+  for (size_t c = 0; c < constraints.closures.size(); ++c) {
+    const Closure& closure = constraints.closures[c];
+    calcClosureJacobian(ws, closure, cws.J.middleRows(constraints.offsets[c], getRows(closure.kind)));
+  }
+  return cws.saddle_point->factorize(ws.M, cws.J);
+}
+
+DynamicsStatus solveConstrainedSystem(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
+                                      const ConstraintSet& constraints, ConstVectorRef tau,
+                                      const VectorXd* stabilization) {
+  updateBias(model, ws);  // leaves the accelerations of a = 0
+  for (size_t c = 0; c < constraints.closures.size(); ++c) {
+    const Closure& closure = constraints.closures[c];
+    cws.gamma.segment(constraints.offsets[c], getRows(closure.kind)) = calcClosureAcceleration(ws, closure);
+  }
+  if (stabilization) cws.gamma += *stabilization;
   cws.force = tau - ws.b;
   cws.saddle_point->solve(cws.force, cws.gamma, cws.a, cws.lambda);
   cws.violation = cws.gamma;
@@ -95,6 +97,22 @@ DynamicsStatus updateConstrainedDynamics(const Model& model, Workspace& ws, Cons
   if (!cws.a.allFinite() || !cws.lambda.allFinite()) return DynamicsStatus::NotFinite;
   updateAccelerations(model, ws, cws.a);
   return areContradictory(cws) ? DynamicsStatus::ContradictoryRows : DynamicsStatus::Ok;
+}
+
+DynamicsStatus updateConstrainedDynamics(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
+                                         const ConstraintSet& constraints, ConstVectorRef q, ConstVectorRef v,
+                                         ConstVectorRef tau) {
+  if (!updateConstrainedSystem(model, ws, cws, constraints, q)) return DynamicsStatus::MassMatrixSingular;
+  updateVelocities(model, ws, v);
+  calcStabilization(ws, constraints, cws.stabilization);
+  return solveConstrainedSystem(model, ws, cws, constraints, tau, &cws.stabilization);
+}
+
+void calcStabilization(const Workspace& ws, const ConstraintSet& constraints, VectorRef out) {
+  for (size_t c = 0; c < constraints.closures.size(); ++c) {
+    const Closure& closure = constraints.closures[c];
+    out.segment(constraints.offsets[c], getRows(closure.kind)) = calcClosureStabilization(ws, closure);
+  }
 }
 
 void calcMotorForces(const Model& model, ConstVectorRef u, VectorRef tau) {

@@ -1,10 +1,19 @@
-#include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/rnea.h"
+#include "dynamics/constrained_parts.h"
 #include "dynamics/saddle_point.h"
 
 namespace bielle {
+
 DynamicsStatus updateConstrainedDerivatives(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
                                             const ConstraintSet& constraints) {
+  updateConstrainedSources(model, ws, cws, constraints);
+  addStabilizationSources(ws, constraints, cws);
+  cws.saddle_point->updateInverse();
+  return solveConstrainedSources(cws);
+}
+
+void updateConstrainedSources(const Model& model, Workspace& ws, ConstrainedWorkspace& cws,
+                              const ConstraintSet& constraints) {
   for (Vector6d& f : cws.f_ext) f.setZero();
   for (size_t c = 0; c < constraints.closures.size(); ++c) {
     const Closure& closure = constraints.closures[c];
@@ -26,7 +35,17 @@ DynamicsStatus updateConstrainedDerivatives(const Model& model, Workspace& ws, C
   }
   cws.da_du.setZero();  // the torques enter ID with a minus
   for (int m = 0; m < model.nu(); ++m) cws.da_du(model.motors()[m].dof, m) = -1;
-  cws.saddle_point->updateInverse();
+}
+
+void addStabilizationSources(const Workspace& ws, const ConstraintSet& constraints, ConstrainedWorkspace& cws) {
+  for (size_t c = 0; c < constraints.closures.size(); ++c) {
+    const Closure& closure = constraints.closures[c];
+    const int row = constraints.offsets[c], n = getRows(closure.kind);
+    addStabilizationDerivatives(ws, closure, cws.dlambda_dq.middleRows(row, n), cws.dlambda_dv.middleRows(row, n));
+  }
+}
+
+DynamicsStatus solveConstrainedSources(ConstrainedWorkspace& cws) {
   cws.saddle_point->solveDerivatives(cws.da_dq, cws.dlambda_dq);
   cws.saddle_point->solveDerivatives(cws.da_dv, cws.dlambda_dv);
   cws.saddle_point->solveDerivatives(cws.da_du, cws.dlambda_du);

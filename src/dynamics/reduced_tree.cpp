@@ -46,18 +46,18 @@ void ReducedTreeOf<T>::updateColumns(const WorkspaceOf<T>& ws, const std::vector
   const ReducedJoint& up = reduction_.joints[place.parent];
   const Link& parent = links_[place.parent];
   const Eigen::Index inherited = up.outer.size(), n = parent.dofs.size();
-  const bool all = depth == Depth::All;
+  const bool velocities = depth != Depth::Twists, all = depth == Depth::All;
   out.J.leftCols(inherited) = parent.columns.J;
+  if (velocities) out.dV.leftCols(inherited) = parent.columns.dV;
   if (all) {
-    out.dV.leftCols(inherited) = parent.columns.dV;
     out.dA.leftCols(inherited) = parent.columns.dA;
     out.dW.leftCols(inherited) = parent.columns.dW;
   }
   if (up.cluster < 0) {
     const int k = parent.dofs.front();
     out.J.rightCols(n) = ws.J.middleCols(k, n);
+    if (velocities) out.dV.rightCols(n) = ws.dV.middleCols(k, n);
     if (!all) return;
-    out.dV.rightCols(n) = ws.dV.middleCols(k, n);
     out.dA.rightCols(n) = ws.dA.middleCols(k, n);
     out.dW.rightCols(n) = ws.dJ.middleCols(k, n) + ws.dV.middleCols(k, n);
     return;
@@ -66,8 +66,8 @@ void ReducedTreeOf<T>::updateColumns(const WorkspaceOf<T>& ws, const std::vector
   for (int c = 0; c < up.size; ++c) {
     const Eigen::Index from = n * c + place.path.back(), to = inherited + c;
     out.J.col(to) = motion.J.col(from);
+    if (velocities) out.dV.col(to) = motion.dV.col(from);
     if (!all) continue;
-    out.dV.col(to) = motion.dV.col(from);
     out.dA.col(to) = motion.dA.col(from);
     out.dW.col(to) = motion.dW.col(from);
   }
@@ -130,6 +130,13 @@ void ReducedTreeOf<T>::updateMassMatrix(const WorkspaceOf<T>& ws, const std::vec
       }
   }
   for (Tip& tip : tips_) updateColumns(ws, lifts, tip.place, Depth::Twists, tip.columns);
+}
+
+template <typename T>
+void ReducedTreeOf<T>::updateTipVelocities(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts) {
+  for (size_t u = 0; u < links_.size(); ++u)
+    updateColumns(ws, lifts, reduction_.joints[u], Depth::Velocities, links_[u].columns);
+  for (Tip& tip : tips_) updateColumns(ws, lifts, tip.place, Depth::Velocities, tip.columns);
 }
 
 // A joint outside all loops: its own entries, and Eq. (1) with N = 1.

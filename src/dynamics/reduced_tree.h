@@ -38,6 +38,8 @@ class ReducedTreeOf {
   /// M (size x size), and J of the tips; needs updateCompositeInertias and the twists of the clusters.
   void updateMassMatrix(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts,
                         typename ArgumentsOf<T>::Matrix M);
+  /// J and dV of the tips; needs the velocities of the workspace and the lifts up to them.
+  void updateTipVelocities(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts);
   /// A_y and A_v (size x size), and all columns of the tips; needs updateInverseDynamicsFactors and lifts up to the
   /// accelerations.
   void updateDerivatives(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts,
@@ -56,7 +58,7 @@ class ReducedTreeOf {
     Columns columns;
     Matrix6X<T> YJ, BtJ, Gy, Gv;  // 6 x size, Eq. (1)
   };
-  enum class Depth { Twists, All };
+  enum class Depth { Twists, Velocities, All };
   void updateColumns(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts, const ReducedJoint& place,
                      Depth depth, Columns& out) const;
   void addMassWithin(const WorkspaceOf<T>& ws, const ClusterLiftOf<T>* lift, const ReducedJoint& place, Link& link,

@@ -76,9 +76,11 @@ RowVectorUpTo6 calcClosureStabilization(const Workspace& ws, const Closure& clos
 /// Jacobian rows, written to the columns closure.dofs of J (rows x nv), Eq. (4); other columns are left alone.
 template <typename T>
 void calcClosureJacobian(const WorkspaceOf<T>& ws, const Closure& closure, typename ArgumentsOf<T>::Matrix J);
-/// Derivatives of the stabilised acceleration rows, Eqs. (1) and (2), to the columns closure.dofs; needs
+/// Derivatives of the acceleration rows without stabilisation, Eqs. (1) and (2), to the columns closure.dofs; needs
 /// updateAccelerations.
 void calcClosureDerivatives(const Workspace& ws, const Closure& closure, MatrixRef da_dq, MatrixRef da_dv);
+/// Adds those of calcClosureStabilization, likewise; needs updateVelocities.
+void addStabilizationDerivatives(const Workspace& ws, const Closure& closure, MatrixRef ds_dq, MatrixRef ds_dv);
 
 /// Derivative of the velocity rows with respect to q at fixed v, Eq. (3), to the columns closure.dofs; needs
 /// updateVelocities.

@@ -57,6 +57,7 @@ struct ConstrainedWorkspace {
   SaddlePointMemory saddle_point;
   VectorXd force;               ///< nv
   VectorXd violation;           ///< rows, J a + gamma
+  VectorXd stabilization;       ///< rows
   std::vector<Vector6d> f_ext;  ///< nb
 };
 

@@ -8,7 +8,9 @@
 ///     midpoint:  drift h/2,  v <- v + h a(q, v + h/2 a(q, v)),  drift h/2                                          (2)
 ///
 /// The midpoint step is of second order: both accelerations are taken half way, the first only to foresee the velocity
-/// there. They have one mass matrix.
+/// there. They have one mass matrix. The stabilisation of contacts and closures (closure.h) is that of the node's state
+/// in both rules: half way along the straight line of the first drift even a foot that stands is off its place, and
+/// moves. The acceleration that foresees has none.
 ///
 /// Full formulation (the paper): x = (q, v) of the spanning tree, tangent size 2 nv. A drift, with its derivatives (J_q,
 /// J_d those of (+) at d = h v):
@@ -52,7 +54,7 @@ namespace bielle {
 /// running cost is the sum of the costs, without h.
 enum class StageKind { Dynamics, Impact };
 
-/// Eq. (1), the paper's, of first order; or Eq. (2), of second order.
+/// Eq. (1), the paper's, of first order; or Eq. (2), of second order, the default of all motions.
 enum class StepRule { Euler, Midpoint };
 const char* getName(StepRule rule);
 

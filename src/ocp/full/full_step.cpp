@@ -2,6 +2,8 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "dynamics/constrained_parts.h"
+#include "dynamics/saddle_point.h"
 #include "model/joint.h"
 
 namespace bielle {
@@ -43,11 +45,18 @@ DynamicsStatus updateMidpointAcceleration(const Model& model, const StageSpec& s
   updateNode(model, at.x, at.ws);
   scratch.displacement = at.dt / 2 * v;
   model.integrate(q, scratch.displacement, at.q_mid);
-  const DynamicsStatus status =
-      updateConstrainedDynamics(model, mid.foreseen_ws, mid.foreseen, spec.constraints, at.q_mid, v, scratch.tau);
+  if (!updateConstrainedSystem(model, mid.ws, at.cws, spec.constraints, at.q_mid))
+    return DynamicsStatus::MassMatrixSingular;
+  updateVelocities(model, mid.ws, v);
+  const DynamicsStatus status = solveConstrainedSystem(model, mid.ws, at.cws, spec.constraints, scratch.tau, nullptr);
   if (status != DynamicsStatus::Ok) return status;
-  at.v_mid = v + at.dt / 2 * mid.foreseen.a;
-  return updateConstrainedDynamics(model, mid.ws, at.cws, spec.constraints, at.q_mid, at.v_mid, scratch.tau);
+  mid.a_0 = at.cws.a;
+  mid.lambda_0 = at.cws.lambda;
+  at.v_mid = v + at.dt / 2 * mid.a_0;
+  mid.stabilization.resize(spec.constraints.rows);
+  calcStabilization(at.ws, spec.constraints, mid.stabilization);
+  updateVelocities(model, mid.ws, at.v_mid);
+  return solveConstrainedSystem(model, mid.ws, at.cws, spec.constraints, scratch.tau, &mid.stabilization);
 }
 
 }  // namespace
@@ -72,25 +81,25 @@ DynamicsStatus updateFullStep(const Model& model, const StageSpec& spec, FullSte
 
 namespace {
 
-// The derivatives of a or lambda in Eq. (2), by (q_m, v_m, u), become those by (q_m, v, u).
-void chainForeseen(double h, const ConstrainedWorkspace& foreseen, MatrixXd& by_velocity, MatrixXd& dq, MatrixXd& dv,
+// Eq. (3): sources by (q_m, v_m, u) become those by (q_m, v, u).
+void chainForeseen(double h, const FullEvaluation::Midpoint& mid, MatrixXd& by_velocity, MatrixXd& dq, MatrixXd& dv,
                    MatrixXd& du) {
   auto factor = by_velocity.topRows(dv.rows());
   factor = h / 2 * dv;
-  dq.noalias() += factor * foreseen.da_dq;
-  dv.noalias() += factor * foreseen.da_dv;
-  du.noalias() += factor * foreseen.da_du;
+  dq.noalias() += factor * mid.A0_q;
+  dv.noalias() += factor * mid.A0_v;
+  du.noalias() += factor * mid.A0_u;
 }
 
-// Eq. (3) for a or lambda, after chainForeseen() for the same.
-void setByScale(double s, const FullEvaluation::Midpoint& mid, const MatrixXd& by_velocity, const MatrixXd& dq,
-                VectorXd& out) {
-  out.noalias() = by_velocity.topRows(dq.rows()) * mid.foreseen.a;
+// r_s of Eq. (4) for dID or dc, after chainForeseen() for the same.
+void setSourcesByScale(double s, const FullEvaluation::Midpoint& mid, const MatrixXd& by_velocity, const MatrixXd& dq,
+                       VectorXd& out) {
+  out.noalias() = by_velocity.topRows(dq.rows()) * mid.a_0;
   out /= s;
   out.noalias() += dq * mid.q_s;
 }
 
-// q_m,s of Eq. (4).
+// q_m,s of Eq. (5).
 void setMidpointByScale(const Model& model, double h, const FullEvaluation& at, VectorXd& out) {
   out = h / (2 * at.time_scale) * getVelocity(model, at.x);
   for (const Joint& joint : model.joints()) {
@@ -131,19 +140,35 @@ DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& sp
   ConstrainedWorkspace& cws = at.cws;
   if (!isMidpoint(spec)) return updateConstrainedDerivatives(model, at.ws, cws, spec.constraints);
   FullEvaluation::Midpoint& mid = *at.midpoint;
-  DynamicsStatus status = updateConstrainedDerivatives(model, mid.foreseen_ws, mid.foreseen, spec.constraints);
-  if (status == DynamicsStatus::Ok) status = updateConstrainedDerivatives(model, mid.ws, cws, spec.constraints);
+  const auto v = getVelocity(model, at.x);
+  cws.saddle_point->updateInverse();
+  cws.lambda = mid.lambda_0;
+  updateVelocities(model, mid.ws, v);
+  updateAccelerations(model, mid.ws, mid.a_0);
+  updateConstrainedSources(model, mid.ws, cws, spec.constraints);
+  cws.lambda = at.lambda;
+  const DynamicsStatus status = solveConstrainedSources(cws);
   if (status != DynamicsStatus::Ok) return status;
+  mid.A0_q = cws.da_dq;
+  mid.A0_v = cws.da_dv;
+  mid.A0_u = cws.da_du;
+  updateVelocities(model, mid.ws, at.v_mid);
+  updateAccelerations(model, mid.ws, at.a);
+  updateConstrainedSources(model, mid.ws, cws, spec.constraints);
   const double h = at.dt;
   if (free) setMidpointByScale(model, h, at, mid.q_s);
-  chainForeseen(h, mid.foreseen, scratch.by_velocity, cws.da_dq, cws.da_dv, cws.da_du);
-  if (free) setByScale(at.time_scale, mid, scratch.by_velocity, cws.da_dq, mid.a_s);
-  chainForeseen(h, mid.foreseen, scratch.by_velocity, cws.dlambda_dq, cws.dlambda_dv, cws.dlambda_du);
-  if (free) setByScale(at.time_scale, mid, scratch.by_velocity, cws.dlambda_dq, mid.lambda_s);
-  scratch.displacement = h / 2 * getVelocity(model, at.x);
+  chainForeseen(h, mid, scratch.by_velocity, cws.da_dq, cws.da_dv, cws.da_du);
+  if (free) setSourcesByScale(at.time_scale, mid, scratch.by_velocity, cws.da_dq, mid.a_s);
+  chainForeseen(h, mid, scratch.by_velocity, cws.dlambda_dq, cws.dlambda_dv, cws.dlambda_du);
+  if (free) {
+    setSourcesByScale(at.time_scale, mid, scratch.by_velocity, cws.dlambda_dq, mid.lambda_s);
+    cws.saddle_point->solveDerivatives(mid.a_s, mid.lambda_s);
+  }
+  scratch.displacement = h / 2 * v;
   chainDrift(model, h, scratch.displacement, cws.da_dq, cws.da_dv);
   chainDrift(model, h, scratch.displacement, cws.dlambda_dq, cws.dlambda_dv);
-  return status;
+  addStabilizationSources(at.ws, spec.constraints, cws);
+  return solveConstrainedSources(cws);
 }
 
 namespace {
@@ -169,7 +194,7 @@ void addDrifts(const Model& model, const StageSpec& spec, const FullEvaluation& 
 
 namespace {
 
-// Eqs. (3) and (4) before the Jacobians of the last drift: v+_s, and the derivative of the displacement.
+// Eqs. (4) and (5) before the Jacobians of the last drift: v+_s, and the derivative of the displacement.
 void setByScale(const Model& model, const StageSpec& spec, const FullEvaluation& at, VectorXd& by_scale) {
   const int nv = model.nv();
   const double s = at.time_scale, h = at.dt, last = getLastDrift(spec, h);

@@ -3,13 +3,16 @@
 // v_m the point half way, a_0 the acceleration at (q_m, v) and a that at (q_m, v_m),
 //
 //     dq_m = J_q dq + h/2 J_d dv,    dv_m = dv + h/2 da_0,                                                        (1)
-//     da_0 = A0_q dq_m + A0_v dv + A0_u du,    da = A_q dq_m + A_v dv_m + A_u du,                                 (2)
+//     da_0 = A0_q dq_m + A0_v dv + A0_u du.                                                                       (2)
 //
-// so that da = (A_q + h/2 A_v A0_q) dq_m + (A_v + h/2 A_v A0_v) dv + (A_u + h/2 A_v A0_u) du, and lambda likewise. By
-// the time scale s, with h = s dt, v+ = v + h a and p the length of the last drift (h, or h/2 of a midpoint step),
+// With r the sources dID and dc of constrained.h for a, by (q_m, v_m, u), and c the stabilisation of the state,
 //
-//     a_s = (A_q + h/2 A_v A0_q) q_m,s + h/(2 s) A_v a_0 for a midpoint step, or else 0,    v+_s = h/s a + h a_s    (3)
-//     q+_s = J_q q_m,s + J_d (p/s v+ + p v+_s),    q_m,s = J_d h/(2 s) v for a midpoint step, or else 0             (4)
+//     dr = (r_q + h/2 r_v A0_q) dq_m + (r_v + h/2 r_v A0_v) dv + (r_u + h/2 r_v A0_u) du,    dc += c_q dq + c_v dv  (3)
+//
+// By the time scale s, with h = s dt, v+ = v + h a and p the length of the last drift (h, or h/2 of a midpoint step),
+//
+//     r_s = (r_q + h/2 r_v A0_q) q_m,s + h/(2 s) r_v a_0 for a midpoint step, or else 0,    v+_s = h/s a + h a_s    (4)
+//     q+_s = J_q q_m,s + J_d (p/s v+ + p v+_s),    q_m,s = J_d h/(2 s) v for a midpoint step, or else 0             (5)
 #include "bielle/dynamics/impact.h"
 #include "ocp/transcription.h"
 
@@ -23,10 +26,12 @@ struct FullEvaluation : RobotEvaluation {
   ConstrainedWorkspace cws;
 
   struct Midpoint {
-    explicit Midpoint(const Model& model) : ws(model), foreseen_ws(model) {}
-    Workspace ws, foreseen_ws;      // at (q_m, v_m), at (q_m, v)
-    ConstrainedWorkspace foreseen;  // a_0
-    VectorXd q_s, a_s, lambda_s;    // nv, nv, constraint rows, of Eqs. (3) and (4); where the time scale is free
+    explicit Midpoint(const Model& model) : ws(model) {}
+    Workspace ws;                 // at q_m; velocities and accelerations are those of the last solution
+    VectorXd a_0, lambda_0;       // nv, constraint rows: of (q_m, v)
+    VectorXd stabilization;       // constraint rows, at the state
+    MatrixXd A0_q, A0_v, A0_u;    // nv x nv, nv x nv, nv x nu
+    VectorXd q_s, a_s, lambda_s;  // nv, nv, constraint rows, of Eqs. (4) and (5); where the time scale is free
   };
   std::unique_ptr<Midpoint> midpoint;       // of a midpoint step alone
   std::unique_ptr<ImpactWorkspace> impact;  // of an impact alone
@@ -35,8 +40,8 @@ struct FullEvaluation : RobotEvaluation {
 struct FullStepScratch {
   explicit FullStepScratch(const Model& model, int most_constraint_rows);
   VectorXd tau, displacement;  // nv
-  VectorXd by_scale;           // 2 nv, (q+_s, v+_s) of Eqs. (3) and (4)
-  MatrixXd by_velocity;        // the larger of nv and the constraint rows x nv, A_v of Eq. (2)
+  VectorXd by_scale;           // 2 nv, (q+_s, v+_s) of Eqs. (4) and (5)
+  MatrixXd by_velocity;        // the larger of nv and the constraint rows x nv, h/2 r_v of Eq. (3)
 };
 
 /// Positions, velocities and mass matrix at a state, for residuals.

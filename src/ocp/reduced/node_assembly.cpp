@@ -12,7 +12,7 @@ NodeAssembly::NodeAssembly(const Model& model, const Reduction& reduction, const
   const int nv = model.nv(), nr = reduction.size, nu = model.nu();
   for (size_t i = 0; i < reduction.free_joints.size(); ++i) {
     const Joint& joint = model.joints()[reduction.free_joints[i]];
-    free_joints_.push_back({&joint, reduction.free_offsets[i], joint.nv, isCurved(joint), {}, {}});
+    free_joints_.push_back({&joint, reduction.free_offsets[i], joint.nv, isCurved(joint), {}, {}, {}, {}});
   }
   for (const bielle::Motor& motor : model.motors()) {
     for (const FreeJoint& free : free_joints_)
@@ -37,7 +37,7 @@ NodeAssembly::NodeAssembly(const Model& model, const Reduction& reduction, const
   counted_.reserve(most_blocks, most_rows);
   for (VectorXd* x : {&Rt_, &Rt_scaled_}) x->setZero(padded * most_rows);
   for (VectorXd* x : {&gradient_, &constraint_gradient_}) x->setZero(2 * nr + nu + 1);
-  for (VectorXd* x : {&y_, &y_mid_}) x->setZero(nr);
+  for (VectorXd* x : {&y_, &y_s_, &y_v_s_}) x->setZero(nr);
   velocity_.setZero(nv);
   dlambda_.setZero(padded * layout.most_contact_rows);
   by_velocity_.setZero(nr * std::max(nr, layout.most_contact_rows));
@@ -52,8 +52,8 @@ bool isMidpoint(const StageSpec& spec) { return spec.step == StepRule::Midpoint;
 
 }  // namespace
 
-// The columns of dw = dy_v + h dy' from the dynamics, then the effect of dw and dy on the step; of a midpoint step about
-// the point half way, from which the first drift leads back to the state.
+// The columns of dw = dy_v + h dy' from the dynamics, then the effect of dw and dy on the step. Of a midpoint step both
+// are those of the point half way, to which the first drift leads from the state.
 void NodeAssembly::setStep(const StageSpec& spec, const ContactLayout& contacts, const ReducedEvaluation& at,
                            const ReducedEvaluation& next, LaneView& view, StageModel& out) {
   const int nr = reduction_.size, leading = at.leading;
@@ -62,10 +62,17 @@ void NodeAssembly::setStep(const StageSpec& spec, const ContactLayout& contacts,
   PaddedMap dlambda = shapePadded(dlambda_, leading + 2 * nr, contacts.rows);
   dydd.topRows(leading).setZero();
   addMotorRows(at, dydd);
-  if (isMidpoint(spec))
+  dlambda.setZero();
+  if (isMidpoint(spec)) {
     addForeseenVelocity(h, contacts, at, view);
-  else
-    setContactDerivatives(leading, contacts, view.acceleration);
+    updateFirstDrift(drift, at);
+    if (isFree(at)) updateFirstDriftScale(drift, at, view);
+    for (PaddedMap rows : {dydd, dlambda}) addFirstDrift(drift, at, view, rows);
+    addContactDerivatives(at.leading, contacts, view.stabilizations, dlambda);
+  } else {
+    addContactDerivatives(at.leading, contacts, view.acceleration.contacts, dlambda);
+  }
+  clearPadding(dlambda);
   solveDerivatives(at.factors, dydd, dlambda, room_);
   auto gap = out.gap.tail(2 * nr);
   for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
@@ -77,16 +84,13 @@ void NodeAssembly::setStep(const StageSpec& spec, const ContactLayout& contacts,
   for (FreeJoint& free : free_joints_)
     if (free.curved) updateFreeJoint(drift, at, gap, free);
   dydd *= h;
-  dydd.bottomRows(nr).diagonal().array() += 1;
+  addVelocity(isMidpoint(spec), at, view, dydd);
   if (isFree(at)) addKickScale(spec, at, dydd);
   MatrixMap all = out.Ft();
   const Eigen::Index first = all.cols() - 2 * nr;  // after a time scale
   MatrixMap Ft(&all(0, first), all.rows(), 2 * nr, Eigen::OuterStride<>(all.outerStride()));
-  setTransition(leading, drift, view, dydd, Ft);
+  setTransition(drift, isMidpoint(spec), at, view, dydd, Ft);
   if (isFree(at)) subtractVelocity(at, next, Ft);
-  if (!isMidpoint(spec)) return;
-  addFirstDrift(drift, at, view, Ft);
-  addFirstDrift(drift, at, view, dlambda);
 }
 
 // Right-hand sides of the acceleration half way: its velocity is that of reduced_kernel.h Eq. (h).
@@ -98,7 +102,8 @@ void NodeAssembly::addForeseenVelocity(double h, const ContactLayout& contacts, 
   PaddedMap dlambda = shapePadded(dlambda_, columns, contacts.rows);
   foreseen.topRows(leading).setZero();
   addMotorRows(at, foreseen);
-  setContactDerivatives(at.leading, contacts, view.foreseen);
+  addContactDerivatives(at.leading, contacts, view.foreseen.contacts, dlambda);
+  clearPadding(dlambda);
   solveDerivatives(at.factors, foreseen, dlambda, room_);
   for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
     const Eigen::Index o = reduction_.clusters[i].offset, r = reduction_.clusters[i].size;
@@ -107,7 +112,9 @@ void NodeAssembly::addForeseenVelocity(double h, const ContactLayout& contacts, 
   foreseen *= 0.5 * h;
   if (isFree(at)) addForeseenScale(at, foreseen);
   clearPadding(foreseen);
-  setContactDerivatives(at.leading, contacts, view.acceleration);
+  dlambda.setZero();
+  addContactDerivatives(at.leading, contacts, view.acceleration.contacts, dlambda);
+  clearPadding(dlambda);
   // By the velocity: the last rows, whose own values the products must not change before they are read.
   const auto add = [&](PaddedMap out) {
     Eigen::Map<MatrixXd> by_velocity(by_velocity_.data(), nr, out.cols());
@@ -118,10 +125,25 @@ void NodeAssembly::addForeseenVelocity(double h, const ContactLayout& contacts, 
   if (contacts.rows > 0) add(dlambda);
 }
 
+// The first drift of joints outside all clusters.
+void NodeAssembly::updateFirstDrift(double h, const ReducedEvaluation& at) {
+  for (FreeJoint& free : free_joints_) {
+    if (!free.curved) continue;
+    const int n = free.size;
+    const JointVector d = h * at.x.segment(model_.nq() + free.joint->idx_v, n);
+    free.first_q_y.resize(n, n);
+    free.first_q_v.resize(n, n);
+    calcJointIntegrateJacobians(*free.joint, d, free.first_q_y, free.first_q_v);
+    free.first_q_v *= h;
+  }
+}
+
 // Rows by (dy, dy_v) half way become rows by those of the state: reduced_kernel.h Eq. (g) with k = 0, transposed.
 void NodeAssembly::addFirstDrift(double h, const ReducedEvaluation& at, const LaneView& view, PaddedMap rows) {
-  if (isFree(at)) addFirstDriftScale(h, at, view, rows);
-  const int nr = reduction_.size, leading = at.leading, nq = model_.nq();
+  const int nr = reduction_.size, leading = at.leading;
+  if (isFree(at))
+    for (int k = 0; k < nr; ++k)
+      rows.row(leading - 1) += y_s_[k] * rows.row(leading + k) + y_v_s_[k] * rows.row(leading + nr + k);
   const auto turn = [&](int offset, const auto& q_y, const auto& q_v, const auto& v_y, const auto& v_v) {
     const Eigen::Index r = q_y.rows();
     for (Eigen::Index c = 0; c < rows.cols(); ++c) {
@@ -136,10 +158,7 @@ void NodeAssembly::addFirstDrift(double h, const ReducedEvaluation& at, const La
   for (const FreeJoint& free : free_joints_) {
     const Eigen::Index n = free.size, o = free.offset;
     if (free.curved) {
-      const JointVector d = h * at.x.segment(nq + free.joint->idx_v, n);
-      JointMatrix Jq(n, n), Jd(n, n);
-      calcJointIntegrateJacobians(*free.joint, d, Jq, Jd);
-      turn(free.offset, Jq, JointMatrix(h * Jd), JointMatrix(JointMatrix::Zero(n, n)),
+      turn(free.offset, free.first_q_y, free.first_q_v, JointMatrix(JointMatrix::Zero(n, n)),
            JointMatrix(JointMatrix::Identity(n, n)));
     } else {
       rows.middleRows(leading + nr + o, n) += h * rows.middleRows(leading + o, n);
@@ -148,6 +167,24 @@ void NodeAssembly::addFirstDrift(double h, const ReducedEvaluation& at, const La
   for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
     const LaneView::Drift& drift = view.clusters[i].first;
     turn(reduction_.clusters[i].offset, drift.q_y, drift.q_v, drift.v_y, drift.v_v);
+  }
+}
+
+// dw += dy_v, of a midpoint step after its first drift.
+void NodeAssembly::addVelocity(bool midpoint, const ReducedEvaluation& at, const LaneView& view, PaddedMap dw) const {
+  const int nr = reduction_.size, leading = at.leading;
+  if (!midpoint) {
+    dw.bottomRows(nr).diagonal().array() += 1;
+    return;
+  }
+  if (isFree(at)) dw.row(leading - 1) += y_v_s_.transpose();
+  for (const FreeJoint& free : free_joints_)
+    dw.block(leading + nr + free.offset, free.offset, free.size, free.size).diagonal().array() += 1;
+  for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
+    const LaneView::Drift& first = view.clusters[i].first;
+    const Eigen::Index o = reduction_.clusters[i].offset, r = reduction_.clusters[i].size;
+    dw.block(leading + o, o, r, r) += first.v_y.transpose();
+    dw.block(leading + nr + o, o, r, r) += first.v_v.transpose();
   }
 }
 
@@ -165,21 +202,19 @@ void NodeAssembly::addMotorRows(const ReducedEvaluation& at, PaddedMap dydd) con
   }
 }
 
-// Sets the right-hand sides of the contact rows.
-void NodeAssembly::setContactDerivatives(int leading, const ContactLayout& contacts,
-                                         const LaneView::Acceleration& acceleration) {
+// Adds right-hand sides of the contact rows; `derivatives` are those of the slots.
+void NodeAssembly::addContactDerivatives(int leading, const ContactLayout& contacts,
+                                         const std::vector<LaneView::Contact>& derivatives, PaddedMap dlambda) const {
   const int nr = reduction_.size;
-  PaddedMap dlambda = shapePadded(dlambda_, leading + 2 * nr, contacts.rows);
-  dlambda.setZero();
-  clearPadding(dlambda);
   for (const ContactLayout::Contact& contact : contacts.contacts) {
-    const LaneView::Contact& columns = acceleration.contacts[contact.slot];
+    const LaneView::Contact& columns = derivatives[contact.slot];
     const std::vector<int>& outer = layout_.outers[layout_.slots[contact.slot]];
     for (size_t o = 0; o < outer.size(); ++o) {
-      dlambda.row(leading + outer[o]).segment(contact.row, contact.rows) =
-          columns.dy.col(o).head(contact.rows).transpose();
-      dlambda.row(leading + nr + outer[o]).segment(contact.row, contact.rows) =
-          columns.dv.col(o).head(contact.rows).transpose();
+      const auto add = [&](int row, const Matrix6Xd& from) {
+        dlambda.row(row).segment(contact.row, contact.rows) += from.col(o).head(contact.rows).transpose();
+      };
+      add(leading + outer[o], columns.dy);
+      add(leading + nr + outer[o], columns.dv);
     }
   }
 }
@@ -210,36 +245,47 @@ void NodeAssembly::updateFreeJoint(double h, const ReducedEvaluation& at, ConstV
   free.q_v = h * Jdiff.lazyProduct(Jd);
 }
 
-// Columns of F^T, from those of dv and the derivatives of each reduced joint with respect to dv and dy.
-void NodeAssembly::setTransition(int leading, double h, const LaneView& view, PaddedMap dv, MatrixMap Ft) const {
-  const Eigen::Index nr = reduction_.size;
+// Columns of F^T, from those of dv and the derivatives of each reduced joint with respect to dv and dy. Those by dy of
+// a midpoint step belong to the point half way, dy = q_y1 dy + q_v1 dy_v of the state.
+void NodeAssembly::setTransition(double h, bool midpoint, const ReducedEvaluation& at, const LaneView& view,
+                                 PaddedMap dv, MatrixMap Ft) const {
+  const Eigen::Index nr = reduction_.size, leading = at.leading;
+  const bool free_midpoint = midpoint && isFree(at);
   const auto multiply = [&](const auto& derivative, Eigen::Index from, Eigen::Index to) {
     const Eigen::Index n = derivative.rows();
     setProduct(dv.rows(), n, n, pad(dv, 0, from), {derivative.data(), derivative.outerStride(), 1}, pad(Ft, 0, to));
   };
-  const auto add = [&](const auto& derivative, Eigen::Index from, Eigen::Index to) {
+  const auto add = [&](const auto& derivative, const auto& q_y1, const auto& q_v1, Eigen::Index from, Eigen::Index to) {
     const Eigen::Index n = derivative.rows();
-    for (Eigen::Index i = 0; i < n; ++i)
-      for (Eigen::Index k = 0; k < n; ++k) Ft(leading + from + k, to + i) += derivative(i, k);
+    if (midpoint) {
+      Ft.block(leading + from, to, n, n) += q_y1.transpose().lazyProduct(derivative.transpose());
+      Ft.block(leading + nr + from, to, n, n) += q_v1.transpose().lazyProduct(derivative.transpose());
+      if (free_midpoint)
+        Ft.row(leading - 1).segment(to, n) += derivative.lazyProduct(y_s_.segment(from, n)).transpose();
+    } else {
+      Ft.block(leading + from, to, n, n) += derivative.transpose();
+    }
   };
   for (const FreeJoint& free : free_joints_) {
     const Eigen::Index o = free.offset, n = free.size;
     Ft.middleCols(nr + o, n) = dv.middleCols(o, n);
     if (free.curved) {
       multiply(free.q_v, o, o);
-      add(free.q_y, o, o);
+      add(free.q_y, free.first_q_y, free.first_q_v, o, o);
     } else {
       Ft.middleCols(o, n) = h * dv.middleCols(o, n);
       Ft.block(leading + o, o, n, n).diagonal().array() += 1;
+      if (midpoint) Ft.block(leading + nr + o, o, n, n).diagonal().array() += h;
+      if (free_midpoint) Ft.row(leading - 1).segment(o, n) += y_s_.segment(o, n).transpose();
     }
   }
   for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
-    const LaneView::Drift& c = view.clusters[i].drift;
+    const LaneView::Drift &c = view.clusters[i].drift, &first = view.clusters[i].first;
     const Eigen::Index o = reduction_.clusters[i].offset;
     multiply(c.q_v, o, o);
     multiply(c.v_v, o, nr + o);
-    add(c.q_y, o, o);
-    add(c.v_y, o, nr + o);
+    add(c.q_y, first.q_y, first.q_v, o, o);
+    add(c.v_y, first.q_y, first.q_v, o, nr + o);
   }
 }
 

@@ -32,7 +32,8 @@ class NodeAssembly {
     const Joint* joint;
     int offset, size;
     bool curved;
-    JointMatrix q_y, q_v;  // of a curved one
+    JointMatrix q_y, q_v;              // of a curved one
+    JointMatrix first_q_y, first_q_v;  // the same for the first drift of a midpoint step
   };
   std::vector<FreeJoint>& freeJoints() { return free_joints_; }
   // \param gap  2 size, the robot's part
@@ -44,12 +45,16 @@ class NodeAssembly {
   void addTimesZ(ConstMatrixRef A, const LaneView& view, MatrixRef out) const;
 
  private:
-  void setContactDerivatives(int leading, const ContactLayout& contacts, const LaneView::Acceleration& acceleration);
+  void addContactDerivatives(int leading, const ContactLayout& contacts,
+                             const std::vector<LaneView::Contact>& derivatives, PaddedMap dlambda) const;
   void addMotorRows(const ReducedEvaluation& at, PaddedMap dydd) const;
   void addForeseenVelocity(double h, const ContactLayout& contacts, const ReducedEvaluation& at, LaneView& view);
+  void updateFirstDrift(double h, const ReducedEvaluation& at);
   void addFirstDrift(double h, const ReducedEvaluation& at, const LaneView& view, PaddedMap rows);
+  void addVelocity(bool midpoint, const ReducedEvaluation& at, const LaneView& view, PaddedMap dw) const;
   void updateFreeJoint(double h, const ReducedEvaluation& at, ConstVectorRef gap, FreeJoint& free) const;
-  void setTransition(int leading, double h, const LaneView& view, PaddedMap dv, MatrixMap Ft) const;
+  void setTransition(double h, bool midpoint, const ReducedEvaluation& at, const LaneView& view, PaddedMap dv,
+                     MatrixMap Ft) const;
   void updateResidualDerivatives(bool controls, const ContactLayout& contacts, const ReducedEvaluation& at,
                                  const LaneView& view, PaddedMap Rt);
 
@@ -58,7 +63,7 @@ class NodeAssembly {
   void addForeseenScale(const ReducedEvaluation& at, PaddedMap foreseen);
   void addKickScale(const StageSpec& spec, const ReducedEvaluation& at, PaddedMap dv);
   void subtractVelocity(const ReducedEvaluation& at, const ReducedEvaluation& next, MatrixMap Ft);
-  void addFirstDriftScale(double h, const ReducedEvaluation& at, const LaneView& view, PaddedMap rows);
+  void updateFirstDriftScale(double h, const ReducedEvaluation& at, const LaneView& view);
   template <typename GetWN>
   void project(const VectorXd& v, const GetWN& get_WN, VectorRef out) const;
 
@@ -77,7 +82,8 @@ class NodeAssembly {
   VectorXd room_;         // of solveDerivatives()
   VectorXd by_velocity_;  // of addForeseenVelocity(): rows by dy_v
   VectorXd column_;       // of addFirstDrift(): 2 r of the largest reduced joint
-  VectorXd y_, y_mid_;    // of node_scale.cpp: size
+  VectorXd y_;            // of node_scale.cpp: size
+  VectorXd y_s_, y_v_s_;  // likewise: how the point half way moves with s
   VectorXd velocity_;     // likewise: nv
   VectorXd constraint_gradient_;  // nu + 1 + 2 size
 };

@@ -52,36 +52,29 @@ void NodeAssembly::subtractVelocity(const ReducedEvaluation& at, const ReducedEv
   Ft.row(at.leading - 1).tail(reduction_.size) -= y_.transpose() / at.time_scale;
 }
 
-// Rows by (dy, dy_v) half way, before they become those by the state. \param h  length of the drift
-void NodeAssembly::addFirstDriftScale(double h, const ReducedEvaluation& at, const LaneView& view, PaddedMap rows) {
-  const int nr = reduction_.size, leading = at.leading, nq = model_.nq();
-  velocity_ = at.x.segment(nq, model_.nv());
+// How the first drift moves the point half way with s. \param h  length of the drift
+void NodeAssembly::updateFirstDriftScale(double h, const ReducedEvaluation& at, const LaneView& view) {
+  velocity_ = at.x.segment(model_.nq(), model_.nv());
   project(
       velocity_, [&](size_t i) -> const MatrixXd& { return at.clusters[i].at.WN; }, y_);
   project(
-      at.midpoint->v, [&](size_t i) -> const MatrixXd& { return at.midpoint->clusters[i].basis.WN; }, y_mid_);
-  for (VectorXd* y : {&y_, &y_mid_}) *y /= at.time_scale;  // eta and what its velocity loses
-  auto row = rows.row(leading - 1);
+      at.midpoint->v, [&](size_t i) -> const MatrixXd& { return at.midpoint->clusters[i].basis.WN; }, y_v_s_);
+  y_ /= at.time_scale;                          // eta
+  y_v_s_ /= -at.time_scale;                     // what its velocity loses
   for (const FreeJoint& free : free_joints_) {  // whose velocity the drift does not change
     const Eigen::Index n = free.size, o = free.offset;
-    JointVector moved = h * y_.segment(o, n);
-    if (free.curved) {
-      JointMatrix Jq(n, n), Jd(n, n);
-      const JointVector eta = moved, d = h * velocity_.segment(free.joint->idx_v, n);
-      calcJointIntegrateJacobians(*free.joint, d, Jq, Jd);
-      moved.noalias() = Jd * eta;
-    }
-    for (Eigen::Index k = 0; k < n; ++k) row += moved[k] * rows.row(leading + o + k);
+    const JointVector eta = y_.segment(o, n);
+    if (free.curved)
+      y_s_.segment(o, n) = free.first_q_v.lazyProduct(eta);
+    else
+      y_s_.segment(o, n) = h * eta;
+    y_v_s_.segment(o, n).setZero();
   }
   for (size_t i = 0; i < reduction_.clusters.size(); ++i) {
     const LaneView::Drift& drift = view.clusters[i].first;
     const Eigen::Index o = reduction_.clusters[i].offset, r = reduction_.clusters[i].size;
-    auto q = column_.head(r), v = column_.segment(r, r);
-    q.noalias() = drift.q_v * y_.segment(o, r);
-    v.noalias() = drift.v_v * y_.segment(o, r);
-    v -= y_mid_.segment(o, r);
-    for (Eigen::Index k = 0; k < r; ++k)
-      row += q[k] * rows.row(leading + o + k) + v[k] * rows.row(leading + nr + o + k);
+    y_s_.segment(o, r).noalias() = drift.q_v * y_.segment(o, r);
+    y_v_s_.segment(o, r).noalias() += drift.v_v * y_.segment(o, r);
   }
 }
 

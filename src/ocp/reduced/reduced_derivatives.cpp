@@ -58,12 +58,15 @@ void ReducedKernel::linearizeSteps(LinearizeItem* items, int count, std::vector<
   }
   if (getPoint(*items->spec) == Point::Midpoint) {
     linearizeStates(items, count, views);
+    linearizeStabilizations(batch, views);
     linearizeMidpoints(batch, items, views);
   } else {
     loadState(batch.source(), Point::State);
     loadBases(batch.source());
     updateColumns(model_, ws_);
     linearizeAccelerations(batch, Point::State);
+    for (ContactLanes& contact : contacts_)
+      if (contact.used) addStabilization(contact);
     linearizeStateCosts(items, count, views);
     storeColumns(count, views);
     for (int l = 0; l < count; ++l) items[l].ok = true;
@@ -75,6 +78,19 @@ void ReducedKernel::linearizeSteps(LinearizeItem* items, int count, std::vector<
   for (size_t i = 0; i < clusters_.size(); ++i) updateGap(i, items, count);
   storeDrift(count, views, &LaneView::Cluster::drift);
   storeGaps(count, views);
+}
+
+// Those of the states, which are in place.
+void ReducedKernel::linearizeStabilizations(const Batch& batch, std::vector<LaneView>& views) {
+  loadContacts(batch.source(), batch.indices.data(), Point::State, ContactUse::Stabilization);
+  tree_.updateTipVelocities(ws_, lifts_);
+  for (ContactLanes& contact : contacts_) {
+    if (!contact.used) continue;
+    contact.dy.setZero();
+    contact.dv.setZero();
+    addStabilization(contact);
+  }
+  storeStabilizations(batch.count, views);
 }
 
 // The first drift, from the states that are in place, and the two accelerations half way.
@@ -101,7 +117,7 @@ void ReducedKernel::linearizeAccelerations(const Batch& batch, Point point) {
   updateAccelerations(model_, ws_, a_);
   for (ClusterLanes& c : clusters_) {
     const auto view = getPlacedView(c.cluster, ws_);
-    updateTwists(view, c.at, c.motion);
+    if (point != Point::Midpoint) updateTwists(view, c.at, c.motion);  // those of the foreseen acceleration
     updateVelocityLift(view, c.motion);
     updateAccelerationLift(view, c.motion);
   }
@@ -187,10 +203,18 @@ void ReducedKernel::updateContact(ContactLanes& contact) {
   const Vector6<Lanes>&V1 = ws_.V[layout_.tips[contact.tip]], &A2 = ws_.A[0];
   for (size_t o = 0; o < tip.outer.size(); ++o) {
     const Vector6<Lanes> J = tip.J.col(o), dV = tip.dV.col(o);
-    const Vector6<Lanes> dq = tip.dA.col(o) - crossMotion(V1, dV) + crossMotion(J, A2) + contact.kd * dV;
-    const Vector6<Lanes> dv = tip.dW.col(o) - crossMotion(V1, J) + contact.kd * J;
-    contact.dy.col(o) = contact.selectRows(dq) - contact.kp_rate * contact.X_WF.actInvMotion(J);
-    contact.dv.col(o) = contact.selectRows(dv);
+    contact.dy.col(o) = contact.selectRows(Vector6<Lanes>(tip.dA.col(o) - crossMotion(V1, dV) + crossMotion(J, A2)));
+    contact.dv.col(o) = contact.selectRows(Vector6<Lanes>(tip.dW.col(o) - crossMotion(V1, J)));
+  }
+}
+
+// The derivatives of kd nu - kp r; needs the columns J and dV of the tip.
+void ReducedKernel::addStabilization(ContactLanes& contact) {
+  const auto& tip = tree_.getTip(contact.tip);
+  for (size_t o = 0; o < tip.outer.size(); ++o) {
+    const Vector6<Lanes> J = tip.J.col(o), kd_dV = contact.kd * tip.dV.col(o), kd_J = contact.kd * J;
+    contact.dy.col(o) += contact.selectRows(kd_dV) - contact.kp_rate * contact.X_WF.actInvMotion(J);
+    contact.dv.col(o) += contact.selectRows(kd_J);
   }
 }
 

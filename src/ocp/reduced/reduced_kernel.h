@@ -10,7 +10,7 @@
 // where c are the contacts. The closure forces, which N^T eliminates, balance the remainder:
 // J^T lambda_l = M a + b - tau - J_c^T lambda_c. Derivatives at fixed lambda_l and lambda_c are those of inverse
 // dynamics (reduced_tree.h) and of the contact rows, with the columns J~, .. of the contact's body in place of J_k, ..
-// of closure.h Eqs. (1) and (2).                                                                                    (c)
+// of closure.h Eqs. (1) to (3).                                                                                     (c)
 // Kick by k and drift by h: w = v + k a; e is the displacement before closing, A = h J' J_d W^{-1} J^T, and
 // K = d(J^T zeta)/dq and K' = d(J'^T mu)/dq' are geometric stiffnesses, S = N'^T K' N':
 //     e = (J_q - h J_d W^{-1} K) dq + h J_d dw                                                                      (d)
@@ -29,6 +29,7 @@
 // kick along w, and (g) depends on dw only through (W N)^T dw. With y_v = (W N)^T v,
 //     dy+_s = h X eta,   dy_v+_s = (X' - h S X) eta - (W N')^T v+ / s,   eta = (y_v + 2 k y') / s                  (i)
 // for each drift, k being 0 in the first one of a midpoint step; half way, h y'_0 / (2 s) is added to (h).
+// The stabilisation of its contacts is that of the state, and y'_0 has none: robot_problem.h Eq. (2).
 // With a gap, the result is read about the node state's own basis (cluster_gap.h).
 //
 // All of it runs in lanes, even for a single node: the result of a lane does not depend on the others, so that results
@@ -65,16 +66,16 @@ struct ClusterLanes {
 
 // The contacts of one slot.
 struct ContactLanes {
-  int tip = 0;                 // index among the tips
-  bool used = false;           // by some lane
-  Lanes present;               // 1 or 0
-  SE3Of<Lanes> X_WF;           // of the contact's frame
-  Matrix3<Lanes> turn;         // as ContactLayout::Contact::turn
-  Lanes kd;                    // gain
-  Vector6<Lanes> kp_residual;  // kp times the residual, as rows; of steps alone
-  Matrix6<Lanes> kp_rate;      // kp times the rows of its rate by the frame's twist; of derivatives alone
-  Vector6<Lanes> wrench;       // on the body, world; of derivatives alone
-  Matrix6X<Lanes> dy, dv;      // 6 x outer coordinates of the tip: rows of Eq. (c)
+  int tip = 0;                   // index among the tips
+  bool used = false;             // by some lane
+  Lanes present;                 // 1 or 0
+  SE3Of<Lanes> X_WF;             // of the contact's frame
+  Matrix3<Lanes> turn;           // as ContactLayout::Contact::turn
+  Lanes kd;                      // gain
+  Vector6<Lanes> stabilization;  // kd nu - kp r at the state, as rows; of steps alone
+  Matrix6<Lanes> kp_rate;        // kp times the rows of the rate of r by the frame's twist; of derivatives alone
+  Vector6<Lanes> wrench;         // on the body, world; of derivatives alone
+  Matrix6X<Lanes> dy, dv;        // 6 x outer coordinates of the tip: rows of Eq. (c)
 
   // Rows of a twist or acceleration in the world, and the wrench on the body of forces on the rows.
   template <typename Derived>
@@ -117,7 +118,8 @@ struct LaneView {
   };
   Workspace ws;
   Acceleration acceleration;
-  Acceleration foreseen;  // that with which a midpoint step foresees its velocity
+  Acceleration foreseen;                // that with which a midpoint step foresees its velocity
+  std::vector<Contact> stabilizations;  // of a midpoint step, per slot: their derivatives at the state
   std::vector<Cluster> clusters;
   StateCostModel state_cost;
 };
@@ -171,7 +173,7 @@ class ReducedKernel {
   void loadPoints(const StepItem* items, int count);
   void loadControls(const StepItem* items, int count);
   void loadLengths(const StageSpec& spec, double h, int lane);
-  enum class ContactUse { Step, Derivatives };
+  enum class ContactUse { Step, Stabilization, Derivatives };
   void loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices, Point point, ContactUse use);
   void loadContact(int lane, const ContactLayout::Contact& contact, const ReducedEvaluation& node, int closure_rows,
                    Point point, ContactUse use);
@@ -192,6 +194,9 @@ class ReducedKernel {
   void storeColumns(int count, std::vector<LaneView>& views) const;
   void storeAcceleration(LaneSource<const ReducedEvaluation> nodes, std::vector<LaneView>& views,
                          LaneView::Acceleration LaneView::*to) const;
+  template <typename Get>
+  void storeContacts(int count, const Get& get) const;
+  void storeStabilizations(int count, std::vector<LaneView>& views) const;
   void storeDrift(int count, std::vector<LaneView>& views, LaneView::Drift LaneView::Cluster::*to) const;
   void storeGaps(int count, std::vector<LaneView>& views) const;
 
@@ -201,7 +206,8 @@ class ReducedKernel {
   void updateStateCosts(const StepItem* items, int count);
   LaneMask driftToMidpoint(const StepItem* items, int count);
   void updateSystem();
-  void updateLoads();
+  void updateStabilizations();
+  void updateLoads(Point point);
   void combineAccelerations();
   void foreseeVelocity();
   void driftFreeJoints();
@@ -222,6 +228,8 @@ class ReducedKernel {
   void linearizeMidpoints(const Batch& batch, LinearizeItem* items, std::vector<LaneView>& views);
   void updateForces();
   void updateContact(ContactLanes& contact);
+  void addStabilization(ContactLanes& contact);
+  void linearizeStabilizations(const Batch& batch, std::vector<LaneView>& views);
   void updateDrifts(LinearizeItem* items, int count);
   LaneMask updateClusterDerivatives(ClusterLanes& c);
   void storeTurns(int count, std::vector<LaneView>& views);

@@ -32,10 +32,11 @@ LaneView::LaneView(const Model& model, const Reduction& reduction, const Reduced
   }
   for (Acceleration* out : {&acceleration, &foreseen}) {
     out->dydd.setZero(roundUpToLane(model.nu() + 1 + 2 * reduction.size) * reduction.size);
-    for (int tip : layout.slots) {
-      const Matrix6Xd columns = Matrix6Xd::Zero(6, tree.getTip(tip).outer.size());
-      out->contacts.push_back({columns, columns});
-    }
+  }
+  for (int tip : layout.slots) {
+    const Matrix6Xd columns = Matrix6Xd::Zero(6, tree.getTip(tip).outer.size());
+    for (std::vector<Contact>* contacts : {&acceleration.contacts, &foreseen.contacts, &stabilizations})
+      contacts->push_back({columns, columns});
   }
 }
 
@@ -142,13 +143,18 @@ void ReducedKernel::step(const StepItem* items, int count, std::vector<LaneView>
   const LaneMask placed = placeAll(items, count);
   storeMotion(count, views);
   loadControls(items, count);
-  const LaneMask reached = point == Point::Midpoint ? driftToMidpoint(items, count) : makeMask(true);
   std::array<const ReducedEvaluation*, kLane> nodes;
   std::array<int, kLane> indices;
   for (int l = 0; l < count; ++l) nodes[l] = items[l].at, indices[l] = items[l].node;
-  loadContacts({nodes.data(), count}, indices.data(), point, ContactUse::Step);
+  loadContacts({nodes.data(), count}, indices.data(), Point::State, ContactUse::Step);
+  updateStabilizations();
+  LaneMask reached = makeMask(true);
+  if (point == Point::Midpoint) {
+    reached = driftToMidpoint(items, count);
+    loadContacts({nodes.data(), count}, indices.data(), point, ContactUse::Step);
+  }
   updateSystem();
-  updateLoads();
+  updateLoads(point == Point::Midpoint ? Point::Foreseen : point);
   const LaneMask regular = system_.factorize(M_, JcN_);
   system_.solve(f_, gamma_, ydd_, contact_forces_);
   combineAccelerations();
@@ -156,7 +162,7 @@ void ReducedKernel::step(const StepItem* items, int count, std::vector<LaneView>
     updateClosureForces();
     storeForeseen(items, count);
     foreseeVelocity();
-    updateLoads();
+    updateLoads(point);
     system_.solve(f_, gamma_, ydd_, contact_forces_);
     combineAccelerations();
   }
@@ -224,9 +230,16 @@ void ReducedKernel::updateSystem() {
   }
 }
 
+// From residuals to kd nu - kp r.
+void ReducedKernel::updateStabilizations() {
+  for (ContactLanes& contact : contacts_)
+    if (contact.used)
+      contact.stabilization += contact.selectRows(Vector6<Lanes>(contact.kd * ws_.V[layout_.tips[contact.tip]]));
+}
+
 // Its right-hand sides at the velocities of the workspace: N^T (tau - b - M a_d), and gamma_c + J_c a_d; and
 // a_d = -J^+ gamma of the closures.
-void ReducedKernel::updateLoads() {
+void ReducedKernel::updateLoads(Point point) {
   updateDrift(model_, ws_);
   a_.setZero();
   for (ClusterLanes& c : clusters_) {
@@ -253,7 +266,8 @@ void ReducedKernel::updateLoads() {
     gamma.setZero();
     if (!contact.used) continue;
     const int body = layout_.tips[contact.tip];
-    gamma = contact.selectRows(ws_.A[body] - ws_.A[0] + contact.kd * ws_.V[body]) - contact.kp_residual;
+    gamma = contact.selectRows(ws_.A[body] - ws_.A[0]);
+    if (point != Point::Foreseen) gamma += contact.stabilization;
   }
 }
 

@@ -136,20 +136,19 @@ void ReducedKernel::loadControls(const StepItem* items, int count) {
 }
 
 // Nodes without a contact in a slot have zero force there; its other numbers are arbitrary. Lanes without a node
-// repeat the first one: without its contacts they would fall, and take longer to close than all others.
+// repeat the first one: without its contacts they would fall, and take longer to close than all others. Gains act at
+// the state.
 void ReducedKernel::loadContacts(LaneSource<const ReducedEvaluation> nodes, const int* indices, Point point,
                                  ContactUse use) {
   for (ContactLanes& slot : contacts_) {
     slot.used = false;
     slot.present = 0;
-    slot.kd = 0;
     slot.turn.setZero();
-    if (use == ContactUse::Step) {
-      slot.kp_residual.setZero();
-    } else {
-      slot.kp_rate.setZero();
-      slot.wrench.setZero();
-    }
+    if (use == ContactUse::Derivatives) slot.wrench.setZero();
+    if (point != Point::State) continue;
+    slot.kd = 0;
+    slot.stabilization.setZero();
+    slot.kp_rate.setZero();
   }
   for (int l = 0; l < kLane; ++l) {
     const ContactLayout& layout = layout_.contacts[indices[l < nodes.count ? l : 0]];
@@ -165,24 +164,26 @@ void ReducedKernel::loadContact(int lane, const ContactLayout::Contact& contact,
   const SE3 X_WF = (point == Point::State ? node.X_WB : node.midpoint->X_WB)[closure.body1] * closure.X_B1;
   for (int k = 0; k < 12; ++k) getNumbers(slot.X_WF)[k].set(lane, getNumbers(X_WF)[k]);
   for (int k = 0; k < 9; ++k) slot.turn.data()[k].set(lane, contact.turn.data()[k]);
-  slot.kd.set(lane, closure.kd);
   slot.present.set(lane, 1);
   slot.used = true;
+  if (use == ContactUse::Derivatives) {
+    const VectorXd& forces = point == Point::Foreseen ? node.midpoint->lambda : node.lambda;
+    const VectorUpTo6<double> lambda = forces.segment(closure_rows + contact.row, contact.rows);
+    const Vector6d wrench = X_WF.actForce(expandRows(closure, lambda));
+    for (int k = 0; k < 6; ++k) slot.wrench[k].set(lane, wrench[k]);
+  }
+  if (point != Point::State) return;
+  slot.kd.set(lane, closure.kd);
+  if (closure.kp == 0) return;
   const SE3 X_12 = X_WF.inverseTimes(closure.X_B2);
   if (use == ContactUse::Step) {
-    if (closure.kp == 0) return;
     const RowVectorUpTo6 residual = closure.kp * calcClosureResidual(closure, X_12);
-    for (int r = 0; r < contact.rows; ++r) slot.kp_residual[r].set(lane, residual[r]);
-    return;
+    for (int r = 0; r < contact.rows; ++r) slot.stabilization[r].set(lane, -residual[r]);
+  } else {
+    const RowsBy6 rate = closure.kp * calcClosureResidualRate(closure, X_12);
+    for (int r = 0; r < contact.rows; ++r)
+      for (int c = 0; c < 6; ++c) slot.kp_rate(r, c).set(lane, rate(r, c));
   }
-  const VectorXd& forces = point == Point::Foreseen ? node.midpoint->lambda : node.lambda;
-  const VectorUpTo6<double> lambda = forces.segment(closure_rows + contact.row, contact.rows);
-  const Vector6d wrench = X_WF.actForce(expandRows(closure, lambda));
-  for (int k = 0; k < 6; ++k) slot.wrench[k].set(lane, wrench[k]);
-  if (closure.kp == 0) return;
-  const RowsBy6 rate = closure.kp * calcClosureResidualRate(closure, X_12);
-  for (int r = 0; r < contact.rows; ++r)
-    for (int c = 0; c < 6; ++c) slot.kp_rate(r, c).set(lane, rate(r, c));
 }
 
 // References and weights of the state costs, unless they are still loaded from the last call. False if no node has one;
@@ -354,14 +355,24 @@ void ReducedKernel::storeAcceleration(LaneSource<const ReducedEvaluation> nodes,
     storeRow(A_y_, 0);
     storeRow(A_v_, nr);
   }
-  const auto store = [&](const Matrix6X<Lanes>& from, const auto& get) {
-    scatterLanes(from.data(), from.size(), count, [&](int l) { return get(views[l].*to).data(); });
+  storeContacts(count, [&](int l) -> std::vector<LaneView::Contact>& { return (views[l].*to).contacts; });
+}
+
+// Derivatives of contact rows, to those that `get` names.
+template <typename Get>
+void ReducedKernel::storeContacts(int count, const Get& get) const {
+  const auto store = [&](size_t i, const Matrix6X<Lanes>& from, Matrix6Xd LaneView::Contact::*to) {
+    scatterLanes(from.data(), from.size(), count, [&](int l) { return (get(l)[i].*to).data(); });
   };
   for (size_t i = 0; i < contacts_.size(); ++i) {
     if (!contacts_[i].used) continue;
-    store(contacts_[i].dy, [i](LaneView::Acceleration& out) -> Matrix6Xd& { return out.contacts[i].dy; });
-    store(contacts_[i].dv, [i](LaneView::Acceleration& out) -> Matrix6Xd& { return out.contacts[i].dv; });
+    store(i, contacts_[i].dy, &LaneView::Contact::dy);
+    store(i, contacts_[i].dv, &LaneView::Contact::dv);
   }
+}
+
+void ReducedKernel::storeStabilizations(int count, std::vector<LaneView>& views) const {
+  storeContacts(count, [&](int l) -> std::vector<LaneView::Contact>& { return views[l].stabilizations; });
 }
 
 void ReducedKernel::storeDrift(int count, std::vector<LaneView>& views, LaneView::Drift LaneView::Cluster::*to) const {
