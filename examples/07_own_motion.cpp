@@ -60,8 +60,7 @@ StageSpec makeStage(const Model& model, const SwayOptions& o, const std::vector<
 
 Motion makeSway(const Model& model, const SwayOptions& o) {
   const VectorXd q0 = makeStandingPosture(model);
-  const ContactGains gains = limitContactGains({400, 100}, o.time_step);
-  const std::vector<ContactTarget> feet = makeContactTargets(model, q0, {0, 1}, gains.kp, gains.kd);
+  const std::vector<ContactTarget> feet = makeContactTargets(model, q0, {0, 1}, 1e4, 200);
   Workspace ws(model);
   updatePositions(model, ws, q0);
   const Vector3d com = calcCom(model, ws);

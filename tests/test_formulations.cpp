@@ -23,8 +23,9 @@ Solution solveSquat(const Model& model, double depth, double dt, Formulation for
   SquatOptions options;
   options.depth = depth;
   options.time_step = dt;
+  options.contact_kp = 400;
   options.contact_kd = 40;  // critical damping; the default is for steps of 15 ms and below
-  Motion motion = makeSquat(model, options, formulation);
+  Motion motion = makeSquat(model, options, {formulation, StepRule::Euler});
   Solution out;
   out.summary = Fddp().solve(*motion.problem, motion.guess);
   out.trajectory = std::move(motion.guess);

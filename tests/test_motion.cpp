@@ -167,12 +167,16 @@ TEST_CASE("contact gains and wrench cones follow one rule in all motions") {
   squat.contact_kp = squat.contact_kd = jump.contact_kp = jump.contact_kd = 1e9;
   walk.gait.contact_kp = walk.gait.contact_kd = 1e9;
   const VectorXd q0 = makeStandingPosture(model);
-  for (const MotionPlan& plan : {planSquat(model, squat, q0), planJump(model, jump, q0), planWalk(model, walk, q0)}) {
-    CAPTURE(plan.name);
-    const StageSpec& stage = plan.stages.front();
+  const auto rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
+  MotionPlan plans[] = {planSquat(model, squat, q0), planJump(model, jump, q0), planWalk(model, walk, q0)};
+  for (MotionPlan& plan : plans) {
+    CAPTURE(plan.name, getName(rule));
+    plan.stages.resize(1);
+    limitGains(rule, plan.stages[0].dt, plan.stages[0].constraints);
+    const StageSpec& stage = plan.stages[0];
     const ConstraintSet& set = stage.constraints;
     for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
-      CHECK(set.closures[c].kp == Approx(0.5 / (stage.dt * stage.dt)));
+      CHECK(set.closures[c].kp == Approx((rule == StepRule::Euler ? 0.5 : 1.0 / 3) / (stage.dt * stage.dt)));
       CHECK(set.closures[c].kd == Approx(1 / stage.dt));
     }
     VectorXd lambda = VectorXd::Zero(set.rows), u, r(17);
@@ -195,6 +199,42 @@ TEST_CASE("contact gains and wrench cones follow one rule in all motions") {
     }
     CHECK(found == 1);
   }
+}
+
+TEST_CASE("a foot beside its place returns as the limits of the gains have it") {
+  const Model model = loadOwn("bipetto");
+  const auto rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
+  const auto formulation = GENERATE(Formulation::Full, Formulation::Reduced);
+  CAPTURE(getName(rule), getName(formulation));
+  constexpr double kOff = 1e-6;  // m
+  const VectorXd q0 = makeStandingPosture(model);
+  std::vector<ContactTarget> contacts = makeContactTargets(model, q0, {0, 1}, 1e9, 1e9);
+  for (ContactTarget& contact : contacts) contact.X_WT.p.x() += kOff;
+  std::vector<StageSpec> stages(2);
+  stages[0].step = rule;
+  stages[0].constraints = makeConstraintSet(model, contacts);
+  limitGains(rule, stages[0].dt, stages[0].constraints);
+  const double h = stages[0].dt, D = 1, K = rule == StepRule::Euler ? 0.5 : 1.0 / 3;
+  const RobotProblem problem(model, q0, VectorXd::Zero(model.nv()), std::move(stages), formulation);
+  RobotEvaluator evaluator(problem);
+  Workspace ws(model);
+  const VectorXd u = calcStaticTorques(model, problem.spec(0).constraints, q0).u;
+  VectorXd x = problem.initialState();
+  double d = -kOff, e = 0;  // along x, m and m/s: Eqs. (1) and (2) of motion.h
+  for (int k = 0; k < 12; ++k) {
+    const RobotEvaluation& at = evaluator.evaluate(0, x, u);
+    REQUIRE(at.status == StepStatus::Ok);
+    x = at.x_next;
+    const double before = e;
+    e = (1 - D) * e - K * d / h;
+    d += rule == StepRule::Euler ? h * e : h / 2 * (before + e);
+    updatePositions(model, ws, x.head(model.nq()));
+    for (const ContactTarget& contact : contacts) {
+      const ContactFrame& frame = model.contacts()[contact.contact];
+      CHECK(getPlacement(ws, frame.body, frame.X_BF).p.x() - contact.X_WT.p.x() == Approx(d).margin(1e-3 * kOff));
+    }
+  }
+  CHECK(std::abs(d) < 1e-3 * kOff);
 }
 
 TEST_CASE("contacts keep their index in the constraints of a stage") {

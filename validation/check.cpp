@@ -82,7 +82,9 @@ const CheckRow* CheckReport::findRow(const std::string& name) const {
 CheckBounds makeBounds(StepRule rule) {
   CheckBounds bounds;
   if (rule == StepRule::Euler) return bounds;
-  for (double* bound : {&bounds.finite_differences, &bounds.interval_energy, &bounds.total_energy}) *bound /= 10;
+  for (double* bound : {&bounds.finite_differences, &bounds.interval_energy, &bounds.total_energy, &bounds.slip,
+                        &bounds.slip_angle, &bounds.sole_height, &bounds.below_ground})
+    *bound /= 10;
   return bounds;
 }
 

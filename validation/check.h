@@ -21,12 +21,12 @@
 /// (1) does not determine the wrenches. Therefore Simbody also solves for the accelerations, from q, v and u alone,
 /// with its own loops and standing feet,
 ///     M a + b = B u + J^T m,    J a + dJ/dt v = s,                                                                (4)
-/// where s is a stabilisation that is not recorded: of residuals r and velocities nu of the feet and, in the full
-/// formulation, of the loops,
+/// where s is a stabilisation that is not recorded: of residuals r and velocities nu that the feet and, in the full
+/// formulation, the loops have at the node,
 ///     s = -kd nu + kp r,    0 <= h kd <= 1,    0 <= h^2 kp <= 1,                                                  (5)
-/// so that a step removes at most the whole residual and velocity. At every node the two gains of feet and of loops are
-/// those that bring a nearest to the recorded accelerations. In addition, velocities are differentiated, in the norm of
-/// M:
+/// so that a step removes at most the whole residual and velocity: it adds -h kd nu + h kp r to nu, and at most h times
+/// that to r. At every node the two gains of feet and of loops are those that bring a nearest to the recorded
+/// accelerations. In addition, velocities are differentiated, in the norm of M:
 ///     e_k = (v_{k+1} - v_k) / h - a_k (Simbody's)                                                                 (6)
 /// The full formulation has e = 0; the reduced one turns its velocities with the loops at the end of a step, e = O(h).
 ///
@@ -44,8 +44,9 @@
 /// formulation),
 ///     P(q_k) (e - h/2 v_k) = 0,    P(q_m) (2 f / h - w) = 0,    P(q_{k+1}) (f - h/2 v_{k+1}) = 0,
 ///     w = v- + h P(q_m) a,    v- = P(q_m) 2 e / h  (full: v_k)                                                    (9)
-/// The acceleration that foresees v_m is not recorded, but follows: along the closures at q_m it is 2/h (v_m - v-), which is
-/// compared with Simbody's at (q_m, v-) in the row of (4). e_k of (6) is taken with a at (q_m, v_m), and
+/// s is still that of the node. The acceleration that foresees v_m is not recorded, but follows: along the closures at
+/// q_m it is 2/h (v_m - v-), which is compared with Simbody's at (q_m, v-), without stabilisation, in the row of (4).
+/// e_k of (6) is taken with a at (q_m, v_m), and
 ///     T_{k+1} - T_k + U_{k+1} - U_k = h/2 (v- + w) (B u + J^T lambda) + rest,                                     (10)
 /// U the potential energy. Both remainders are of higher order than those of an Euler step; bounds are tenths of the
 /// latter (makeBounds).
@@ -95,7 +96,7 @@ struct CheckBounds {
 };
 
 /// The bounds of a motion by Euler steps, or of one by midpoint steps: a tenth for what is due to the steps alone, finite
-/// differences of velocities and energy.
+/// differences of velocities, energy, and the places of standing feet and of feet over the ground.
 CheckBounds makeBounds(StepRule rule);
 
 struct CheckRow {

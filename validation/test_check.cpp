@@ -34,7 +34,8 @@ TEST_CASE("check: the same squat by midpoint steps, and each number of its midpo
     const CheckReport report = checkMotion(squat.checked), euler = checkMotion(getSquat(formulation).checked);
     INFO(print(report) << print(euler));
     CHECK(getFailures(report) == Names());
-    for (const char* name : {"finite differences of the velocity", "energy, one interval", "energy, whole motion"})
+    for (const char* name : {"finite differences of the velocity", "energy, one interval", "energy, whole motion",
+                             "standing feet: slip", "standing feet: slip, angle", "standing feet: off the ground"})
       CHECK(report.findRow(name)->bound == Approx(euler.findRow(name)->bound / 10));
   }
   const CheckedMotion good = getMidpointSquat().checked;

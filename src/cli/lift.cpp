@@ -75,7 +75,7 @@ int run(const LiftArguments& arguments) {
   const SerialModel serial =
       makeSerialModel(robot.model, makeStandingPosture(robot.model), parseSerialArmature(summary.serial_armature));
   MotionPlan plan = remakeRequest(summary).plan(serial.model, makeStandingPosture(serial.model));
-  fixTimings(summary.timings, plan.schedule, plan.stages);
+  fixTimings(summary.timings, StepRule::Euler, plan.schedule, plan.stages);
   const Motion motion = makeMotion(serial.model, std::move(plan), {summary.formulation, StepRule::Euler});
   const SerialTrajectory trajectory = makeSerialTrajectory(motion, record);
   makeOutputDirectory(arguments.directory);

@@ -208,7 +208,8 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   ProblemOptions problem = arguments.problem;
   problem.limits = makeLimits(arguments);
   problem.timings = makeTimings(arguments.timings);
-  problem.step = arguments.step.value_or(serial ? StepRule::Euler : problem.step);
+  problem.step = arguments.step;
+  if (serial && !problem.step) problem.step = StepRule::Euler;
   Motion motion = makeLimited(request, model, problem);
   FddpOptions solver = arguments.solver;
   if (motion.bounded) solver.bounds = ControlBounds::Enforce;
@@ -305,10 +306,11 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
          [arguments](const std::string& name) {
            arguments->step = name == getName(StepRule::Euler) ? StepRule::Euler : StepRule::Midpoint;
          },
-         "euler: steps of first order, as in the paper, and for --model serial if none is given; midpoint: of second "
-         "order")
+         "midpoint: steps of second order; euler: of first order, as in the paper. If none is given, published "
+         "problems and "
+         "--model serial take euler")
       ->check(CLI::IsMember({getName(StepRule::Euler), getName(StepRule::Midpoint)}))
-      ->default_str(getName(arguments->problem.step));
+      ->default_str(getName(StepRule::Midpoint));
   sub.add_option_function<std::string>(
          "--model", [arguments](const std::string& name) { arguments->serial = name == "serial"; },
          "closed: with its linkages; serial: linkages frozen at the standing posture, motors on the serial joints")

@@ -150,7 +150,6 @@ Scene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
   for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
   ContactGains& gains = scene.gains;
   gains = {o.contact_kp, o.contact_kd};
-  if (o.published == 0) gains = limitContactGains(gains, o.time_step);
   scene.before = makeContactTargets(model, scene.q0, feet, gains.kp, gains.kd);
   scene.after = scene.before;
   Vector3d forward = Vector3d::Zero();
@@ -264,7 +263,8 @@ std::vector<OptionEntry> listOptions(JumpOptions& o) {
           {"swing_rotation_weight", &o.swing_rotation_weight, "1", "soles stay level in flight"},
           {"terminal_weight", &o.terminal_weight, "1/m^2", "place of the centre of mass at the end"},
           {"contact_kp", &o.contact_kp, "1/s^2",
-           "stabilisation of contacts and closures, position (limited to 1/(2 h^2), h the time step)"},
+           "stabilisation of contacts and closures, position (limited to 1/(3 h^2), h the time step; Euler steps: "
+           "1/(2 h^2))"},
           {"contact_kd", &o.contact_kd, "1/s", "stabilisation of contacts and closures, velocity (limited to 1/h)"}};
 }
 

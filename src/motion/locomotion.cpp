@@ -109,18 +109,13 @@ VectorXd makeWeights(const Model& model, const LocomotionOptions& o) {
 
 bool isPublished(const Scene& scene) { return scene.options.published != 0; }
 
-ContactGains limitGains(const Scene& scene, const ContactGains& gains) {
-  return isPublished(scene) ? gains : limitContactGains(gains, scene.options.timing.time_step);
-}
-
 std::vector<ContactTarget> makeTargets(const Scene& scene, const GaitPhase& phase) {
-  const ContactGains gains = limitGains(scene, {scene.options.contact_kp, scene.options.contact_kd});
   const auto feet = scene.task.plan.getStance(phase.steps_done);
   std::vector<ContactTarget> targets;
   for (Side side : {Side::Left, Side::Right}) {
     const int i = static_cast<int>(side);
     if (!phase.stands(side)) continue;
-    targets.push_back({scene.stance.contacts[i], feet[i], gains.kp, gains.kd});
+    targets.push_back({scene.stance.contacts[i], feet[i], scene.options.contact_kp, scene.options.contact_kd});
   }
   return targets;
 }
@@ -237,7 +232,7 @@ StageSpec makeStage(const Scene& scene, const GaitNode& node, const std::vector<
   const GaitPhase& phase = scene.gait.phases[node.phase];
   StageSpec stage = makeRegularizedStage(scene, node);
   stage.constraints = makeConstraintSet(scene.model, contacts);
-  setClosureGains(limitGains(scene, {o.closure_kp, o.closure_kd}), stage.constraints);
+  setClosureGains({o.closure_kp, o.closure_kd}, stage.constraints);
   addComCosts(scene, node, stage);
   addForceCosts(scene, node, stage);
   for (int step : phase.steps)

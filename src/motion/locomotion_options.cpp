@@ -36,7 +36,7 @@ std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
           {"feet_distance", &o.feet_distance, "m", "least distance of the soles, or what the footholds leave if less"},
           {"terminal_weight", &o.terminal_weight, "1/m^2", "place of the centre of mass at the end"},
           {"contact_kp", &o.contact_kp, "1/s^2",
-           "stabilisation of the contacts, position (limited to 1/(2 h^2), h the time step)"},
+           "stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2))"},
           {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"},
           {"closure_kp", &o.closure_kp, "1/s^2", "stabilisation of the closures, position (full formulation)"},
           {"closure_kd", &o.closure_kd, "1/s", "stabilisation of the closures, velocity (full formulation)"}};

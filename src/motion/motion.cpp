@@ -63,11 +63,15 @@ void leaveTorquesFree(const Model& model, std::vector<StageSpec>& stages) {
 }  // namespace
 
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options) {
-  for (StageSpec& stage : plan.stages) stage.step = options.step;
+  const StepRule step = options.step.value_or(plan.limited ? StepRule::Midpoint : StepRule::Euler);
+  for (StageSpec& stage : plan.stages) stage.step = step;
   Motion motion;
   requireOption(plan.limited || !options.limits.areGiven(), "limit", "the paper's problem has none", "leave it out");
   if (plan.limited) motion.bounded = addLimits(model, options.limits, plan.q_start, plan.stages);
   freeTimings(options.timings, plan.schedule, plan.stages);
+  for (StageSpec& stage : plan.stages)  // at an impact h vanishes, and gains have no effect
+    if (stage.dt > 0 && (plan.limited || stage.timing.phase >= 0))
+      limitGains(step, stage.dt * std::max(1.0, stage.timing.upper), stage.constraints);
   if (!motion.bounded) leaveTorquesFree(model, plan.stages);
   motion.bounded |= options.timings.areGiven();
   motion.name = std::move(plan.name);
@@ -123,8 +127,12 @@ VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X) {
   return carried;
 }
 
-ContactGains limitContactGains(const ContactGains& gains, double h) {
-  return {std::min(gains.kp, 0.5 / (h * h)), std::min(gains.kd, 1 / h)};
+void limitGains(StepRule rule, double h, ConstraintSet& constraints) {
+  const double most = rule == StepRule::Euler ? 1.0 / 2 : 1.0 / 3;
+  for (Closure& closure : constraints.closures) {
+    closure.kp = std::min(closure.kp, most / (h * h));
+    closure.kd = std::min(closure.kd, 1 / h);
+  }
 }
 
 void setClosureGains(const ContactGains& gains, ConstraintSet& constraints) {

@@ -112,6 +112,9 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
       sequence.goals.push_back(std::move(goal));
     }
     if (i + 1 < plans.size()) plan.stages.pop_back();
+    if (plan.limited && !sequence.limited)  // beside the paper's problems, whose gains are as they are
+      for (StageSpec& stage : plan.stages)
+        if (stage.dt > 0) limitGains(StepRule::Euler, stage.dt, stage.constraints);
     moveAll(plan.stages, sequence.stages);
     join(plan.guess, sequence.guess);
     for (ContactPhase& phase : plan.schedule.phases) {

@@ -30,7 +30,7 @@ StageSpec makeStage(const Model& model, const SquatOptions& o, const std::vector
   StageSpec stage;
   stage.dt = o.time_step;
   stage.constraints = makeConstraintSet(model, contacts);
-  setClosureGains(limitContactGains({o.closure_kp, o.closure_kd}, stage.dt), stage.constraints);
+  setClosureGains({o.closure_kp, o.closure_kd}, stage.constraints);
   stage.state = {o.state_weight, q0, VectorXd::Zero(model.nv()), makeStateWeights(model)};
   if (model.hasFreeFlyer()) stage.state.weights.segment<2>(3).setConstant(o.torso_weight);
   raiseMotorWeights(model, o.motor_weight, stage.state.weights);
@@ -60,7 +60,7 @@ std::vector<OptionEntry> listOptions(SquatOptions& o) {
           {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
           {"friction", &o.friction, "1", "friction coefficient"},
           {"contact_kp", &o.contact_kp, "1/s^2",
-           "stabilisation of the contacts, position (limited to 1/(2 h^2), h the time step)"},
+           "stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2))"},
           {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"},
           {"closure_kp", &o.closure_kp, "1/s^2", "stabilisation of the closures, position"},
           {"closure_kd", &o.closure_kd, "1/s", "stabilisation of the closures, velocity"}};
@@ -76,8 +76,8 @@ MotionPlan planSquat(const Model& model, const SquatOptions& options, const Vect
   check(model, options);
   std::vector<int> feet;
   for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
-  const ContactGains gains = limitContactGains({options.contact_kp, options.contact_kd}, options.time_step);
-  const std::vector<ContactTarget> contacts = makeContactTargets(model, q0, feet, gains.kp, gains.kd);
+  const std::vector<ContactTarget> contacts =
+      makeContactTargets(model, q0, feet, options.contact_kp, options.contact_kd);
   Workspace ws(model);
   updatePositions(model, ws, q0);
   const Vector3d com0 = calcCom(model, ws);

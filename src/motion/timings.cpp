@@ -44,15 +44,6 @@ const TimingBounds* findBounds(const TimingOptions& options, const ContactPhase&
   return named ? named : general;
 }
 
-// The gains that a step of the longest duration allows.
-void limitGains(double longest, ConstraintSet& constraints) {
-  for (Closure& closure : constraints.closures) {
-    const ContactGains gains = limitContactGains({closure.kp, closure.kd}, longest);
-    closure.kp = gains.kp;
-    closure.kd = gains.kd;
-  }
-}
-
 }  // namespace
 
 void freeTimings(const TimingOptions& options, const ContactSchedule& schedule, std::vector<StageSpec>& stages) {
@@ -68,7 +59,6 @@ void freeTimings(const TimingOptions& options, const ContactSchedule& schedule, 
     for (int k = node; bounds && k < node + phase.nodes; ++k) {
       stages[k].timing = {static_cast<int>(i), bounds->lower, bounds->upper};
       stages[k].time_weight = options.time_weight;
-      limitGains(bounds->upper * phase.dt, stages[k].constraints);
     }
     node += phase.nodes;
   }
@@ -98,7 +88,8 @@ std::vector<PhaseTiming> listTimings(const RobotProblem& problem, const ContactS
   return timings;
 }
 
-void fixTimings(const std::vector<PhaseTiming>& timings, ContactSchedule& schedule, std::vector<StageSpec>& stages) {
+void fixTimings(const std::vector<PhaseTiming>& timings, StepRule rule, ContactSchedule& schedule,
+                std::vector<StageSpec>& stages) {
   int node = 0;
   for (ContactPhase& phase : schedule.phases) {
     for (const PhaseTiming& timing : timings) {
@@ -106,7 +97,7 @@ void fixTimings(const std::vector<PhaseTiming>& timings, ContactSchedule& schedu
       phase.dt = timing.chosen / phase.nodes;
       for (int k = node; k < node + phase.nodes; ++k) {
         stages[k].dt = phase.dt;
-        limitGains(timing.upper / phase.nodes, stages[k].constraints);
+        limitGains(rule, timing.upper / phase.nodes, stages[k].constraints);
       }
     }
     node += phase.nodes;

@@ -64,8 +64,8 @@ struct JumpOptions {
   double swing_rotation_weight = 1e2;  ///< of their orientation, 1
   double terminal_weight = 1e3;        ///< of the place of the CoM at the end, 1/m^2
   PaperJumpWeights paper;
-  double contact_kp = 1e4;  ///< stabilisation of contacts and closures, 1/s^2; limited to 1/(2 h^2)
-  double contact_kd = 200;  ///< 1/s; limited to 1/h
+  double contact_kp = 1e4;  ///< stabilisation of contacts and closures, 1/s^2; limited (limitGains)
+  double contact_kd = 200;  ///< 1/s; likewise
 };
 
 /// Every number of the options by name, pointing into `options`.

@@ -94,8 +94,8 @@ struct LocomotionOptions {
   double feet_distance = 0.01;         ///< least distance of the soles, or what the footholds leave if less, m
   double terminal_weight = 1e3;        ///< of the place of the CoM at the end, 1/m^2
   PaperWeights paper;
-  double contact_kp = 1e4;  ///< stabilisation of the contacts, 1/s^2; limited to 1/(2 h^2), h the time step
-  double contact_kd = 100;  ///< 1/s; limited to 1/h
+  double contact_kp = 2e3;  ///< stabilisation of the contacts, 1/s^2; limited (limitGains)
+  double contact_kd = 100;  ///< 1/s; likewise
   double closure_kp = 1e4;  ///< stabilisation of the closures, limited like that of the contacts; used only by
   double closure_kd = 100;  ///< the full formulation
 

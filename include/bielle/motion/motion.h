@@ -1,6 +1,7 @@
 #pragma once
 /// \file A motion: from a few intuitive numbers to a shooting problem with its initial guess.
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -69,7 +70,7 @@ struct Motion {
 /// Options of a problem besides those of the motion.
 struct ProblemOptions {
   Formulation formulation = Formulation::Reduced;
-  StepRule step = StepRule::Euler;
+  std::optional<StepRule> step;  ///< if not given: midpoint, or Euler for the paper's problems
   LimitOptions limits;
   TimingOptions timings;
 
@@ -79,6 +80,7 @@ struct ProblemOptions {
 };
 
 /// Turns a plan into a problem that starts at rest, adding limits, free durations and the step rule to its stages.
+/// Gains are limited to what a step can bear (limitGains), except in the paper's problems of fixed durations.
 /// \throws ModelError as addLimits() and freeTimings() do, or when limits are given for a problem of the paper, which
 /// has none
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options);
@@ -100,13 +102,17 @@ VectorXd makeStandingPosture(const Model& model);
 /// free-flyer stays in place.
 VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X);
 
-/// Stabilisation gains of contacts and closures, 1/s^2 and 1/s, limited to 1/(2 h^2) and 1/h with h the time step: one
-/// Euler step turns a velocity e into (1 - kd h) e and, with kd = 1/h, a displacement d into (1 - kp h^2) d. Beyond 1/h
-/// a velocity would change its sign.
+/// Stabilisation gains of contacts and closures, 1/s^2 and 1/s.
 struct ContactGains {
   double kp = 0, kd = 0;
 };
-ContactGains limitContactGains(const ContactGains& gains, double time_step);
+/// Limits gains to what a step of length h can bear. With D = h kd and K = h^2 kp, a displacement d of a foot and its
+/// velocity e become, in one step,
+///     Euler:     h e+ = (1 - D) h e - K d,    d+ = d + h e+                                                        (1)
+///     midpoint:  h e+ = (1 - D) h e - K d,    d+ = d + h/2 (e + e+)                                                (2)
+/// The limits are D <= 1, beyond which a velocity would change its sign, and K <= 1/2 or, of midpoint steps, 1/3. There
+/// the eigenvalues of a step are 0 and 1/2, or 1/3 and 1/2.
+void limitGains(StepRule rule, double h, ConstraintSet& constraints);
 /// Sets the gains of the model's closures in a set of constraints.
 void setClosureGains(const ContactGains& gains, ConstraintSet& constraints);
 

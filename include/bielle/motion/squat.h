@@ -18,8 +18,8 @@ struct SquatOptions {
   double force_weight = 10;      ///< of the contact force reference (half the weight per foot), over (m g)^2
   double pressure_weight = 1;    ///< of the centre of pressure, over the half size of the sole squared
   double friction = 0.7;         ///< friction coefficient, 1
-  double contact_kp = 400;       ///< stabilisation of the contacts, 1/s^2; limited to 1/(2 h^2), h the time step
-  double contact_kd = 100;       ///< 1/s; limited to 1/h
+  double contact_kp = 1e4;       ///< stabilisation of the contacts, 1/s^2; limited (limitGains)
+  double contact_kd = 200;       ///< 1/s; likewise
   double closure_kp = 0;         ///< stabilisation of the closures, 1/s^2
   double closure_kd = 0;         ///< 1/s
 };

@@ -52,7 +52,8 @@ std::vector<PhaseTiming> listTimings(const RobotProblem& problem, const ContactS
                                      const ShootingTrajectory& trajectory);
 
 /// Gives a plan the durations that were chosen for it, fixed, with the gains of the solve that chose them.
-void fixTimings(const std::vector<PhaseTiming>& timings, ContactSchedule& schedule, std::vector<StageSpec>& stages);
+void fixTimings(const std::vector<PhaseTiming>& timings, StepRule rule, ContactSchedule& schedule,
+                std::vector<StageSpec>& stages);
 
 /// Gives a trajectory of the robot the sizes of a problem, with the time scale 1 where it has none.
 void fitTimings(const RobotProblem& problem, ShootingTrajectory& trajectory);
