@@ -182,6 +182,7 @@ TEST_CASE("jump: its height follows from its time, its load from its height") {
   const double g = 9.81;
   JumpOptions options;
   options.flight = 0.314;
+  options.time_step = 0.005;
   const JumpFigures figures = calcJumpFigures(options, g);
   CHECK(figures.flight == Approx(0.31));  // an even number of steps of 5 ms
   CHECK(figures.take_off == Approx(g * 0.31 / 2));

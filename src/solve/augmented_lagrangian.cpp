@@ -14,7 +14,7 @@ namespace {
 constexpr double kFall = 0.25;  // ratio to which a violation must decrease, or the penalty is raised
 // Below this violation the penalty is raised at every update: there steps are full, and multipliers converge superlinearly.
 // Farther away a large penalty would only shorten the steps.
-constexpr double kNear = 0.03, kNearPenalty = 1e5;  // the latter over the initial penalty, at most
+constexpr double kNear = 0.03, kNearPenalty = 1e3;  // the latter over the initial penalty, at most
 // Foreseen decrease over the gain of new multipliers at which they are due; and while violations alone are minimized.
 constexpr double kShare = 0.1, kRestorationShare = 1e-6;
 // Penalty times squared violations over the cost, while violations alone are minimized.

@@ -50,7 +50,7 @@ struct JumpOptions {
   double clearance = 0.04;   ///< least height of the soles at mid-flight, m
   double friction = 0.7;     ///< coefficient, 1
   double published = 0;      ///< 1: the paper's problem, see above; 0: our costs
-  double time_step = 0.005;  ///< s
+  double time_step = 0.002;  ///< s
 
   double apex_weight = 1e4;            ///< of the CoM's height at mid-flight, over h, 1/m^2
   double com_weight = 1e3;             ///< of the CoM's height on the ground, 1/m^2
