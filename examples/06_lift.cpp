@@ -40,7 +40,8 @@ double findPeak(const MotionResult& result, const std::string& motor) {
 bool planAndLift(const Model& closed, const SerialModel& serial, double depth) {
   SquatOptions options;
   options.depth = depth;
-  Motion motion = makeSquat(serial.model, options);
+  // Lifting takes accelerations at the nodes, where Euler steps have them.
+  Motion motion = makeSquat(serial.model, options, {Formulation::Reduced, StepRule::Euler});
   const FddpSummary summary = Fddp().solve(*motion.problem, motion.guess);
   const MotionRecord record = makeRecord(motion, motion.guess);
   double knee = 0;

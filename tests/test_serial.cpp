@@ -172,7 +172,7 @@ TEST_CASE("a squat of the serial model converges and is lifted: the closed dynam
   options.duration = 0.8;
   options.settle = 0.1;
   options.time_step = 0.02;
-  Motion motion = makeSquat(model, options);
+  Motion motion = makeSquat(model, options, {Formulation::Reduced, StepRule::Euler});
   const FddpSummary summary = Fddp().solve(*motion.problem, motion.guess);
   REQUIRE(summary.termination == FddpTermination::Converged);
   const SerialTrajectory trajectory = makeTrajectory(motion);
