@@ -60,7 +60,7 @@ struct JumpOptions {
   double control_weight = 3e-3;        ///< of the motor torques, 1/(N m)^2
   double force_weight = 30;            ///< of the contact force reference, over (m g)^2
   double pressure_weight = 1;          ///< of the centre of pressure, over the half size of the sole squared
-  double swing_weight = 1e4;           ///< of the feet's path in flight, 1/m^2
+  double swing_weight = 1e5;           ///< of the feet's path in flight, 1/m^2
   double swing_rotation_weight = 1e2;  ///< of their orientation, 1
   double terminal_weight = 1e3;        ///< of the place of the CoM at the end, 1/m^2
   PaperJumpWeights paper;
