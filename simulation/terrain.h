@@ -1,0 +1,74 @@
+#pragma once
+/// \file The ground of a world: quick heights and normals, and grounds that no motion was planned for.
+#include <vector>
+
+#include "bielle/ocp/contact_schedule.h"
+
+namespace bielle::simulation {
+
+/// Height and normal of a Ground. Its boxes are found by a grid of square cells, so that the time of a lookup does not
+/// depend on their number.
+class Terrain {
+ public:
+  explicit Terrain(const Ground& ground = {});
+
+  struct Surface {
+    double height = 0;                    ///< m
+    Vector3d normal = Vector3d::UnitZ();  ///< unit, upwards
+  };
+  /// The surface under (x, y); its height is Ground::calcHeight.
+  Surface find(double x, double y) const;
+
+  struct Touch {
+    double depth = 0;                     ///< m, negative above the ground
+    Vector3d normal = Vector3d::UnitZ();  ///< unit, out of the ground
+  };
+  /// How deep a point is in the ground, along the normal of the surface through which the way out is shortest: the top of a
+  /// box, or one of its sides unless there is ground beyond it.
+  Touch touch(const Vector3d& point) const;
+  const Ground& getGround() const { return ground_; }
+
+ private:
+  // A box seen from above, with the plane of its top: z = height + slope . (x, y).
+  struct Top {
+    double cos = 1, sin = 0, x = 0, y = 0, half_length = 0, half_width = 0;
+    Eigen::Vector2d slope = Eigen::Vector2d::Zero();
+    double height = 0;
+    Vector3d normal = Vector3d::UnitZ();
+    bool covers(double px, double py) const;
+    double calcHeight(double px, double py) const { return height + slope.x() * px + slope.y() * py; }
+  };
+  void fillGrid();
+  // The highest top under a point, above the plane; null if there is none.
+  const Top* findTop(double x, double y) const;
+
+  Ground ground_;
+  std::vector<Top> tops_;
+  Eigen::Vector2d corner_ = Eigen::Vector2d::Zero();  // of the grid
+  double cell_ = 1;                                   // edge of a cell, m
+  int columns_ = 0, rows_ = 0;
+  std::vector<int> starts_, entries_;  // tops that may cover a cell: entries_[starts_[cell] .. starts_[cell + 1])
+};
+
+/// A ramp from x = `start` on, `length` long and `width` wide about y = 0, that rises by `slope` (height over length; negative:
+/// it goes down). \throws ModelError on numbers that make no sense, as makeTiles() does
+struct RampOptions {
+  double slope = 0.05;  ///< 1
+  double start = 0.3;   ///< m
+  double length = 20;   ///< along the horizontal, m
+  double width = 4;     ///< m
+};
+Ground makeRamp(const RampOptions& options);
+
+/// Square tiles whose heights are random, evenly distributed between 0 and `height`. They begin `start` ahead of the origin.
+struct TileOptions {
+  double height = 0.01;  ///< of the highest, m
+  double size = 0.25;    ///< edge of a tile, m
+  double start = 0.2;    ///< m
+  double length = 10;    ///< of the field, m
+  double width = 4;      ///< of the field, about y = 0, m
+  unsigned seed = 1;     ///< the same seed makes the same field on every machine
+};
+Ground makeTiles(const TileOptions& options);
+
+}  // namespace bielle::simulation

@@ -1,0 +1,92 @@
+// The ground of a world: lookups agree with Ground, normals with its slopes, sides of boxes push outwards.
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "bielle/model/error.h"
+#include "simulation/terrain.h"
+
+namespace bielle::simulation {
+namespace {
+
+Ground makeMixedGround() {
+  Ground ground = makeTiles({0.02, 0.3, -1, 3, 2, 7});
+  ground.height = -0.1;
+  ground.steps.push_back({{0.4, 0.1, 0.15}, 0.5, 0.3, 0.7, 0.1, -0.2});
+  ground.steps.push_back({{-3, 2, 0.3}, 2, 1, -1.2, 0, 0});
+  return ground;
+}
+
+}  // namespace
+
+TEST_CASE("terrain: lookups by cells find the heights of all boxes") {
+  const Ground ground = makeMixedGround();
+  const Terrain terrain(ground);
+  std::mt19937 generator(3);
+  std::uniform_real_distribution<double> anywhere(-6, 6);
+  int boxes = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const double x = anywhere(generator), y = anywhere(generator);
+    const double height = ground.calcHeight(x, y);
+    REQUIRE(terrain.find(x, y).height == Approx(height).margin(1e-12));
+    boxes += height > ground.height;
+  }
+  CHECK(boxes > 500);
+}
+
+TEST_CASE("terrain: normals are those of the tops") {
+  const Terrain terrain(makeMixedGround());
+  const double x = 0.42, y = 0.12, h = 1e-5;
+  const auto height = [&](double dx, double dy) { return terrain.find(x + dx, y + dy).height; };
+  const Vector3d expected = Vector3d(height(-h, 0) - height(h, 0), height(0, -h) - height(0, h), 2 * h).normalized();
+  CHECK((terrain.find(x, y).normal - expected).norm() < 1e-9);
+  CHECK(expected.z() < 0.99);
+}
+
+TEST_CASE("terrain: a point leaves a box by the shortest way, but not into the ground") {
+  Ground ground;
+  ground.steps.push_back({{0.5, 0, 0.1}, 1, 1, 0, 0, 0});
+  ground.steps.push_back({{1.5, 0, 0.1}, 1, 1, 0, 0, 0});
+  const Terrain terrain(ground);
+  const Terrain::Touch above = terrain.touch({0.5, 0, 0.103}), top = terrain.touch({0.5, 0, 0.09});
+  CHECK(above.depth == Approx(-0.003));
+  CHECK(top.depth == Approx(0.01));
+  CHECK(top.normal.z() == 1);
+  const Terrain::Touch side = terrain.touch({0.004, 0.1, 0.05});
+  CHECK(side.depth == Approx(0.004));
+  CHECK((side.normal + Vector3d::UnitX()).norm() < 1e-12);
+  CHECK(terrain.touch({0.999, 0.1, 0.05}).normal.z() == 1);  // the next box is beyond this side
+  CHECK(terrain.touch({-0.2, 0, -0.01}).depth == Approx(0.01));
+}
+
+TEST_CASE("terrain: ramps start level, up and down") {
+  for (double slope : {0.1, -0.1}) {
+    const Terrain terrain(makeRamp({slope, 0.3, 5, 4}));
+    CHECK(terrain.find(0, 0).height == Approx(0).margin(1e-12));
+    CHECK(terrain.find(0.29, 0).height == Approx(0).margin(1e-12));
+    CHECK(terrain.find(2.3, 0.5).height == Approx(2 * slope));
+    CHECK(terrain.find(2.3, 0.5).normal.x() == Approx(-slope / std::hypot(1, slope)));
+  }
+}
+
+TEST_CASE("terrain: tiles are of the heights asked, and the same for the same seed") {
+  const TileOptions options{0.03, 0.25, 0.2, 10, 4, 5};
+  const Ground ground = makeTiles(options), again = makeTiles(options);
+  double lowest = 1, highest = 0;
+  for (size_t i = 0; i < ground.steps.size(); ++i) {
+    REQUIRE(ground.steps[i].top == again.steps[i].top);
+    lowest = std::min(lowest, ground.steps[i].top.z());
+    highest = std::max(highest, ground.steps[i].top.z());
+  }
+  CHECK(lowest >= 0);
+  CHECK(lowest < 0.002);
+  CHECK(highest <= 0.03);
+  CHECK(highest > 0.028);
+  CHECK(ground.calcHeight(0.19, 0) == 0);
+  TileOptions other = options;
+  other.seed = 6;
+  CHECK(makeTiles(other).steps[0].top != ground.steps[0].top);
+  other.size = 0;
+  CHECK_THROWS_AS(makeTiles(other), ModelError);
+}
+
+}  // namespace bielle::simulation
