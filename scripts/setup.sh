@@ -6,8 +6,8 @@ bielle_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 bielle_packages=(g++ cmake ninja-build libeigen3-dev liburdfdom-dev liburdfdom-headers-dev libconsole-bridge-dev
   libtinyxml-dev libyaml-cpp-dev nlohmann-json3-dev libcli11-dev libzip-dev libnlopt-dev
   libnlopt-cxx-dev gnuplot-nox libjs-three libjs-dygraphs)
-# Simbody, against which motions and dynamics are checked.
-bielle_check_packages=(libsimbody-dev)
+# Simbody and MuJoCo, against which motions and dynamics are checked.
+bielle_check_packages=(libsimbody-dev libmujoco-dev)
 # Further dependencies of the tests: Catch2, Google Benchmark, Python to read NumPy archives, a browser for the reports.
 bielle_test_packages=(catch2 libbenchmark-dev python3 chromium pkg-config)
 

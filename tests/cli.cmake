@@ -38,3 +38,8 @@ set_tests_properties(determinism PROPERTIES LABELS system)
 add_test(NAME licences COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_licences.py
   $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
 set_tests_properties(licences PROPERTIES LABELS system)
+
+# Robots for MuJoCo: the text alone, which needs no MuJoCo.
+add_test(NAME mjcf COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_mjcf.py
+  $<TARGET_FILE:bielle_command> ${PROJECT_SOURCE_DIR})
+set_tests_properties(mjcf PROPERTIES LABELS system)

@@ -3,3 +3,6 @@ target_compile_definitions(test_io PRIVATE BIELLE_PYTHON="${Python3_EXECUTABLE}"
 bielle_test(warm_start SOURCES test_warm_start.cpp LIBS bielle_io)
 bielle_test(hostile_files SOURCES test_hostile_files.cpp robot_directory.cpp LIBS bielle_io)
 target_compile_definitions(test_hostile_files PRIVATE BIELLE_PYTHON="${Python3_EXECUTABLE}")
+if(TARGET bielle_mujoco)
+  bielle_test(mujoco SOURCES test_mujoco.cpp mechanisms.cpp LIBS bielle_mujoco)
+endif()

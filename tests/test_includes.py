@@ -20,10 +20,11 @@ ROOMS = {
     "bench": ["io", "robots"],
     "cli": ["report", "study", "bench"],
     "control": ["motion"],
-    "simulation": ["control", "io", "robots"],
-    "validation": ["io"],
+    "engines": ["io"],
+    "simulation": ["control", "engines", "robots"],
+    "validation": ["engines"],
 }
-TOP = ("simulation", "validation")  # rooms outside src
+TOP = ("engines", "simulation", "validation")  # rooms outside src
 # Prefixes of third-party headers, and the files or folders that may include them.
 OTHERS = {
     "yaml-cpp/": ["src/model/yaml_entry.cpp"],
@@ -36,11 +37,12 @@ OTHERS = {
     "Simbody": ["validation/"],
     "SimTK": ["validation/"],
     "simbody/": ["validation/"],
+    "mujoco/": ["engines/", "simulation/", "validation/"],
 }
 PUBLIC = "include/bielle/"
 OUTSIDE = ("examples/", "tests/consumer/")  # they see what users see
 GENERATED = ("assets.inc",)
-FOLDERS = ("include/", "src/", "simulation/", "validation/", "tests/", "examples/", "benchmarks/")
+FOLDERS = ("include/", "src/", "engines/", "simulation/", "validation/", "tests/", "examples/", "benchmarks/")
 
 
 def collect(room):

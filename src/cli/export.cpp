@@ -1,9 +1,11 @@
-// bielle export DIR: a trajectory in the format of another program.
+// bielle export: a trajectory or a robot in the format of another program.
 #include <filesystem>
 #include <iostream>
 #include <memory>
 
+#include "bielle/dynamics/assembly.h"
 #include "cli/commands.h"
+#include "io/mjcf.h"
 #include "io/opensim.h"
 #include "io/text_file.h"
 
@@ -13,11 +15,22 @@ namespace bielle::cli {
 namespace {
 
 struct ExportArguments {
-  std::string directory, format = "sto", output;
+  RobotArgument robot;  // or the directory of a result
+  std::string format = "sto", output;
 };
 
+int exportRobot(const ExportArguments& arguments) {
+  const LoadedRobot robot = arguments.robot.load();
+  const MjcfText text = formatMjcf(robot.model, findClosedConfiguration(robot.model).q);
+  for (const std::string& warning : text.warnings) std::cerr << "bielle: warning: " << warning << "\n";
+  const std::string path = arguments.output.empty() ? fs::path(robot.file).stem().string() + ".xml" : arguments.output;
+  writeTextFile(path, text.xml);
+  std::cout << path << "\n";
+  return kOk;
+}
+
 int exportTrajectory(const ExportArguments& arguments) {
-  const fs::path place = arguments.directory;
+  const fs::path place = arguments.robot.name;
   const MotionRecord record = readRecord((place / "trajectory.npz").string());
   const fs::path path =
       arguments.output.empty() ? place / ("trajectory." + arguments.format) : fs::path(arguments.output);
@@ -29,24 +42,30 @@ int exportTrajectory(const ExportArguments& arguments) {
 }  // namespace
 
 void addExport(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("export", "Write a trajectory in the format of another program");
+  CLI::App& command = *app.add_subcommand("export", "Write a trajectory or a robot in the format of another program");
   const auto arguments = std::make_shared<ExportArguments>();
-  command.add_option("directory", arguments->directory, "of `bielle solve`")->required();
+  command.add_option("source", arguments->robot.name, "directory of `bielle solve`; mjcf: a robot")->required();
   command
       .add_option("--format", arguments->format,
-                  "mot: coordinates over time (OpenSim); sto: everything over time (OpenSim)")
-      ->check(CLI::IsMember({"mot", "sto"}))
+                  "mot: coordinates over time (OpenSim); sto: everything over time (OpenSim); mjcf: the robot (MuJoCo)")
+      ->check(CLI::IsMember({"mot", "sto", "mjcf"}))
       ->capture_default_str();
-  command.add_option("-o,--output", arguments->output, "the file; default: trajectory.FORMAT in the directory");
+  addFixedBase(command, arguments->robot);
+  command.add_option("-o,--output", arguments->output,
+                     "the file; default: trajectory.FORMAT in the directory; mjcf: ROBOT.xml here");
   command.footer(
       "SI units, radians. Without export: trajectory.csv has one named column per quantity and a column 'time', as\n"
       "PlotJuggler and spreadsheets read it; trajectory.npz holds arrays q and v with Pinocchio's frames and orders "
       "within\n"
       "a joint, and q_names and v_names to sort the joints by.\n"
+      "mjcf: loops are closed by MuJoCo's soft constraints, so stiff that they need its steps of 0.1 ms.\n"
       "Examples:\n"
       "  bielle export squat --format mot\n"
-      "  bielle export squat --format sto -o squat.sto");
-  command.callback([&action, arguments] { action = [=] { return exportTrajectory(*arguments); }; });
+      "  bielle export squat --format sto -o squat.sto\n"
+      "  bielle export bipetto --format mjcf -o bipetto.xml");
+  command.callback([&action, arguments] {
+    action = [=] { return arguments->format == "mjcf" ? exportRobot(*arguments) : exportTrajectory(*arguments); };
+  });
 }
 
 }  // namespace bielle::cli

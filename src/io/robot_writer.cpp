@@ -8,6 +8,7 @@
 
 #include "bielle/model/error.h"
 #include "io/text_file.h"
+#include "io/xml_text.h"
 
 namespace bielle {
 namespace {
@@ -23,21 +24,6 @@ std::string formatRounded(double value) { return formatNumber(std::round(value *
 
 std::string formatVector(const Vector3d& v, const char* separator = " ") {
   return formatRounded(v.x()) + separator + formatRounded(v.y()) + separator + formatRounded(v.z());
-}
-
-std::string escapeXml(const std::string& text) {
-  std::string out;
-  for (char c : text) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '"')
-      out += "&quot;";
-    else
-      out += c;
-  }
-  return out;
 }
 
 // A name in YAML syntax.

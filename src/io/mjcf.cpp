@@ -1,0 +1,331 @@
+#include "io/mjcf.h"
+
+#include <Eigen/Eigenvalues>
+#include <charconv>
+#include <cmath>
+#include <set>
+#include <sstream>
+
+#include "bielle/dynamics/assembly.h"
+#include "io/mjcf_coordinates.h"
+#include "io/xml_text.h"
+#include "math/so3.h"
+#include "model/joint.h"
+
+namespace bielle {
+namespace {
+
+// MuJoCo refuses masses and moments of inertia of moving bodies up to 1e-15.
+constexpr double kLeastInertia = 1e-14;
+
+std::string formatNumber(double value) {
+  char digits[32];
+  return {digits, std::to_chars(digits, digits + sizeof digits, value + 0.0).ptr};  // + 0.0: no negative zero
+}
+
+template <typename Vector>
+std::string formatVector(const Vector& v) {
+  std::string text;
+  for (Eigen::Index i = 0; i < v.size(); ++i) text += (i ? " " : "") + formatNumber(v[i]);
+  return text;
+}
+
+std::string formatQuaternion(const Matrix3d& R) {
+  const Eigen::Quaterniond q(R);
+  return formatVector(Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()));
+}
+
+std::string attribute(const std::string& name, const std::string& value) {
+  return " " + name + "=\"" + escapeXml(value) + "\"";
+}
+
+std::string formatPlacement(const SE3& X) {
+  return attribute("pos", formatVector(X.p)) + attribute("quat", formatQuaternion(X.R));
+}
+
+class Writer {
+ public:
+  Writer(const Model& model, ConstVectorRef q_ref, const MjcfOptions& options)
+      : model_(model), q_ref_(q_ref), options_(options), children_(model.numBodies()) {
+    for (int i = 1; i < model.numBodies(); ++i) children_[model.joints()[i].parent].push_back(i);
+  }
+
+  MjcfText write() {
+    out_ << "<mujoco" << attribute("model", model_.name()) << ">\n";
+    writeSettings();
+    if (!options_.ground_asset.empty()) out_ << "  <asset>\n" << options_.ground_asset << "  </asset>\n";
+    out_ << "  <worldbody>\n";
+    if (!options_.ground.empty())
+      out_ << options_.ground;
+    else if (!model_.contacts().empty())
+      out_ << "    <geom name=\"ground\" class=\"ground\" type=\"plane\" size=\"0 0 1\"/>\n";
+    writeShapes(0, "    ");
+    for (int child : children_[0]) writeBody(child, "    ");
+    out_ << "  </worldbody>\n";
+    writeClosures();
+    writeMotors();
+    writeKeyframes();
+    out_ << "</mujoco>\n";
+    listOmissions();
+    return {out_.str(), warnings_};
+  }
+
+ private:
+  std::string formatStiffness(const std::string& suffix, double time) const {
+    return attribute("solref" + suffix, formatNumber(time) + " 1") +
+           attribute("solimp" + suffix,
+                     formatNumber(options_.impedance) + " " + formatNumber(options_.impedance) + " 0.001 0.5 2");
+  }
+
+  void writeSettings() {
+    out_ << "  <compiler angle=\"radian\" coordinate=\"local\" inertiafromgeom=\"false\"/>\n  <option"
+         << attribute("timestep", formatNumber(options_.time_step))
+         << attribute("gravity", formatVector(model_.gravity()))
+         << " cone=\"elliptic\" solver=\"Newton\" tolerance=\"1e-10\"/>\n  <default>\n    <joint"
+         << formatStiffness("limit", options_.contact_time) << "/>\n    <equality"
+         << formatStiffness("", options_.closure_time)
+         << "/>\n    <default class=\"drawn\">\n      <geom contype=\"0\" conaffinity=\"0\" group=\"1\"/>\n"
+         << "    </default>\n    <default class=\"ground\">\n"
+         << "      <geom contype=\"0\" conaffinity=\"1\" rgba=\"0.8 0.8 0.8 1\"/>\n    </default>\n"
+         << "    <default class=\"sole\">\n      <geom type=\"sphere\" contype=\"1\" conaffinity=\"0\" condim=\"3\" "
+         << "priority=\"1\"" << attribute("size", formatNumber(options_.sole_radius))
+         << attribute("friction", formatNumber(options_.friction) + " 0 0")
+         << formatStiffness("", options_.contact_time) << "/>\n    </default>\n  </default>\n";
+  }
+
+  void writeBody(int i, const std::string& indent) {
+    const Joint& joint = model_.joints()[i];
+    order_.push_back(i);
+    const SE3 X_PB = joint.X_PJ * calcJointPlacement(joint, q_ref_.segment(joint.idx_q, joint.nq));
+    out_ << indent << "<body" << attribute("name", model_.bodies()[i].name) << formatPlacement(X_PB) << ">\n";
+    const std::string inner = indent + "  ";
+    writeInertia(i, inner);
+    writeJoint(joint, inner);
+    writeShapes(i, inner);
+    for (int child : children_[i]) writeBody(child, inner);
+    out_ << indent << "</body>\n";
+  }
+
+  void writeInertia(int i, const std::string& indent) {
+    const Inertia& inertia = model_.bodies()[i].inertia;
+    const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(inertia.I_com);
+    Matrix3d R = principal.eigenvectors();
+    if (R.determinant() < 0) R.col(0) = -R.col(0);
+    Vector3d moments = principal.eigenvalues().cwiseMax(kLeastInertia);
+    // MuJoCo allows no rounding in the triangle inequality.
+    moments[0] = std::max(moments[0], moments[2] - moments[1]);
+    while (moments[0] + moments[1] < moments[2]) moments[0] = std::nextafter(moments[0], 1e300);
+    if (inertia.mass < kLeastInertia || moments[0] > principal.eigenvalues()[0] + 1e-9 * moments[2])
+      warn("body '" + model_.bodies()[i].name + "'",
+           "its inertia is not that of a body with mass; the smallest that MuJoCo accepts is written");
+    out_ << indent << "<inertial" << formatPlacement({R, inertia.com})
+         << attribute("mass", formatNumber(std::max(inertia.mass, kLeastInertia)))
+         << attribute("diaginertia", formatVector(moments)) << "/>\n";
+  }
+
+  // One hinge or slide; `k` counts the coordinates of the joint, `axis` is in the frame of the body at q_ref.
+  void writeAxis(const Joint& joint, int k, const char* type, const std::string& suffix, const Vector3d& axis,
+                 const std::string& indent) {
+    const int dof = joint.idx_v + k;
+    double lower = model_.lowerLimits()[dof], upper = model_.upperLimits()[dof];
+    out_ << indent << "<joint" << attribute("name", joint.name + suffix) << attribute("type", type)
+         << attribute("axis", formatVector(axis)) << attribute("ref", formatNumber(q_ref_[joint.idx_q + k]))
+         << attribute("armature", formatNumber(model_.armature()[dof]));
+    if (std::isfinite(lower) || std::isfinite(upper)) {
+      constexpr double kFar = 1e10;  // for limits on one side; and a range must not be empty
+      lower = std::max(lower, -kFar), upper = std::max(std::min(upper, kFar), lower + 1e-9);
+      out_ << " limited=\"true\"" << attribute("range", formatNumber(lower) + " " + formatNumber(upper));
+    }
+    out_ << "/>\n";
+  }
+
+  void writeBall(const Joint& joint, int k, const std::string& indent) {
+    out_ << indent << "<joint type=\"ball\"" << attribute("name", joint.name)
+         << attribute("armature", formatNumber(model_.armature()[joint.idx_v + k])) << "/>\n";
+    reportLimits(joint, k);
+  }
+
+  void writeJoint(const Joint& joint, const std::string& indent) {
+    const auto q = q_ref_.segment(joint.idx_q, joint.nq);
+    switch (joint.kind) {
+      case JointKind::Fixed:
+        break;
+      case JointKind::Revolute:
+      case JointKind::Continuous:
+        writeAxis(joint, 0, "hinge", "", joint.axis, indent);
+        break;
+      case JointKind::Prismatic:
+        writeAxis(joint, 0, "slide", "", joint.axis, indent);
+        break;
+      case JointKind::Spherical:
+        writeBall(joint, 0, indent);
+        break;
+      case JointKind::Universal:
+        writeAxis(joint, 0, "hinge", ".angle1", makeAxisRotation(joint.axis2, -q[1]) * joint.axis, indent);
+        writeAxis(joint, 1, "hinge", ".angle2", joint.axis2, indent);
+        break;
+      case JointKind::Planar: {
+        const Matrix3d axes = makeAxisRotation(joint.axis, -q[2]) * makePlaneBasis(joint.axis);
+        writeAxis(joint, 0, "slide", ".x", axes.col(0), indent);
+        writeAxis(joint, 1, "slide", ".y", axes.col(1), indent);
+        writeAxis(joint, 2, "hinge", ".angle", joint.axis, indent);
+        break;
+      }
+      case JointKind::FreeFlyer:
+        writeFreeFlyer(joint, indent);
+        break;
+    }
+  }
+
+  void writeFreeFlyer(const Joint& joint, const std::string& indent) {
+    if (isMjcfFree(joint)) {
+      out_ << indent << "<joint type=\"free\"" << attribute("name", joint.name)
+           << attribute("armature", formatNumber(model_.armature()[joint.idx_v])) << "/>\n";
+      reportLimits(joint, 0);
+      return;
+    }
+    const Matrix3d axes = calcJointPlacement(joint, q_ref_.segment(joint.idx_q, joint.nq)).R.transpose();
+    for (int k = 0; k < 3; ++k)
+      writeAxis(joint, k, "slide", std::string(".") + static_cast<char>('x' + k), axes.col(k), indent);
+    writeBall(joint, 3, indent);
+  }
+
+  void writeShapes(int body, const std::string& indent) {
+    for (const Visual& visual : model_.visuals()) {
+      if (visual.body != body) continue;
+      if (visual.shape == Visual::Shape::Mesh) {
+        meshes_.insert(visual.mesh);
+        continue;
+      }
+      const Vector3d& size = visual.size;
+      const bool is_box = visual.shape == Visual::Shape::Box, is_sphere = visual.shape == Visual::Shape::Sphere;
+      out_ << indent << "<geom class=\"drawn\""
+           << attribute("type", is_box      ? "box"
+                                : is_sphere ? "sphere"
+                                            : "cylinder")
+           << attribute("size", is_box ? formatVector(size / 2) : formatVector(Vector3d(size[0], size[1] / 2, 0)))
+           << formatPlacement(visual.X_BV) << attribute("rgba", formatVector(visual.rgba)) << "/>\n";
+    }
+    for (const ContactFrame& contact : model_.contacts())
+      if (contact.body == body) writeSole(contact, indent);
+  }
+
+  void writeSole(const ContactFrame& contact, const std::string& indent) {
+    const bool is_point = contact.kind == ContactKind::Point3D;
+    for (int corner = 0; corner < (is_point ? 1 : 4); ++corner) {
+      const Vector3d centre((corner < 2 ? 1 : -1) * contact.half_length,
+                            (corner % 2 == 0 ? 1 : -1) * contact.half_width, options_.sole_radius);
+      out_ << indent << "<geom class=\"sole\"" << attribute("name", contact.name + "." + std::to_string(corner + 1))
+           << attribute("pos", formatVector(contact.X_BF.act(centre))) << "/>\n";
+    }
+    out_ << indent << "<site" << attribute("name", contact.name) << formatPlacement(contact.X_BF)
+         << " size=\"0.001\"/>\n";
+  }
+
+  void writeClosures() {
+    if (model_.closures().empty()) return;
+    out_ << "  <equality>\n";
+    for (const Closure& closure : model_.closures()) {
+      const std::string bodies = attribute("body1", model_.bodies()[closure.body1].name) +
+                                 attribute("body2", model_.bodies()[closure.body2].name);
+      const auto connect = [&](const std::string& suffix, const Vector3d& point) {
+        out_ << "    <connect" << attribute("name", closure.name + suffix) << bodies
+             << attribute("anchor", formatVector(closure.X_B1.act(point))) << "/>\n";
+      };
+      if (closure.kind == ClosureKind::Ball3D) {
+        connect("", Vector3d::Zero());
+      } else if (closure.kind == ClosureKind::Hinge5D) {
+        connect(".1", options_.hinge_lever * closure.axis);
+        connect(".2", -options_.hinge_lever * closure.axis);
+      } else {
+        out_ << "    <weld" << attribute("name", closure.name) << bodies
+             << attribute("anchor", formatVector(closure.X_B2.p)) << "/>\n";
+      }
+      if (closure.kp != 0 || closure.kd != 0)
+        warn("closure '" + closure.name + "'", "its gains kp and kd are replaced by a time constant");
+    }
+    out_ << "  </equality>\n";
+  }
+
+  void writeMotors() {
+    if (model_.motors().empty()) return;
+    out_ << "  <actuator>\n";
+    for (const Motor& motor : model_.motors()) {
+      out_ << "    <motor" << attribute("name", motor.name) << attribute("joint", motor.name) << " gear=\"1\"";
+      if (std::isfinite(motor.effort_limit))
+        out_ << " ctrllimited=\"true\""
+             << attribute("ctrlrange", formatNumber(-motor.effort_limit) + " " + formatNumber(motor.effort_limit));
+      out_ << "/>\n";
+    }
+    out_ << "  </actuator>\n";
+  }
+
+  void writeKeyframes() {
+    if (model_.references().empty()) return;
+    out_ << "  <keyframe>\n";
+    for (const Reference& reference : model_.references()) {
+      const AssemblyResult result = assembleReference(model_, reference.name);
+      if (result.status == AssemblyStatus::Closed)
+        out_ << "    <key" << attribute("name", reference.name) << attribute("qpos", formatKeyframe(result.q))
+             << "/>\n";
+      else
+        warn("reference '" + reference.name + "'", "it does not close and is left out: " + result.message);
+    }
+    out_ << "  </keyframe>\n";
+  }
+
+  std::string formatKeyframe(const VectorXd& q) const {
+    std::string text;
+    for (int i : order_) {
+      const Joint& joint = model_.joints()[i];
+      VectorXd qpos(joint.nq);
+      calcMjcfPosition(joint, q_ref_.segment(joint.idx_q, joint.nq), q.segment(joint.idx_q, joint.nq), qpos);
+      text += (text.empty() ? "" : " ") + formatVector(qpos);
+    }
+    return text;
+  }
+
+  void warn(const std::string& element, const std::string& problem) {
+    warnings_.push_back(model_.name() + ": " + element + ": " + problem);
+  }
+
+  void reportLimits(const Joint& joint, int first) {
+    for (int k = joint.idx_v + first; k < joint.idx_v + joint.nv; ++k)
+      if (std::isfinite(model_.lowerLimits()[k]) || std::isfinite(model_.upperLimits()[k])) {
+        warn("joint '" + joint.name + "'", "the limits of its coordinates are left out");
+        return;
+      }
+  }
+
+  void listOmissions() {
+    std::string speeds, meshes;
+    for (const Joint& joint : model_.joints()) {
+      const auto limits = model_.velocityLimits().segment(joint.idx_v, joint.nv);
+      if ((limits.array() < std::numeric_limits<double>::infinity()).any())
+        speeds += (speeds.empty() ? "'" : ", '") + joint.name + "'";
+      if ((joint.kind == JointKind::Planar || joint.kind == JointKind::FreeFlyer) &&
+          model_.armature()[joint.idx_v] != 0)
+        warn("joint '" + joint.name + "'", "its armature acts on accelerations in the frame of its parent");
+    }
+    if (!speeds.empty()) warn("joints " + speeds, "their limits of speed are left out");
+    for (const std::string& mesh : meshes_) meshes += (meshes.empty() ? "'" : ", '") + mesh + "'";
+    if (!meshes.empty()) warn("meshes " + meshes, "they are left out");
+  }
+
+  const Model& model_;
+  const VectorXd q_ref_;
+  const MjcfOptions& options_;
+  std::vector<std::vector<int>> children_;
+  std::vector<int> order_;  // bodies as written
+  std::ostringstream out_;
+  std::set<std::string> meshes_;
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace
+
+MjcfText formatMjcf(const Model& model, ConstVectorRef q_ref, const MjcfOptions& options) {
+  return Writer(model, q_ref, options).write();
+}
+
+}  // namespace bielle

@@ -1,0 +1,39 @@
+#pragma once
+/// \file A robot as a file of MuJoCo (MJCF), for version 2.2.2 and later.
+///
+/// Bodies are written depth first, children in the order of the model, and keep their names and frames. They stand at
+/// the closed configuration q_ref, MuJoCo's qpos0, because MuJoCo closes a loop where its bodies stand in the file.
+/// Coordinates follow the bodies; mjcf_coordinates.h maps those of a joint.
+///
+/// Motors are actuators of their names, in the order of u, in N m or N. A weld is a `weld`, a ball a `connect`, a hinge
+/// two `connect`s NAME.1 and NAME.2 on its axis. Soles are four spheres at their corners (a point contact is one), named
+/// after the contact and numbered from 1, that touch only the plane z = 0; references are keyframes.
+#include <string>
+#include <vector>
+
+#include "bielle/model/model.h"
+
+namespace bielle {
+
+struct MjcfOptions {
+  double time_step = 1e-4;     ///< s
+  double closure_time = 3e-4;  ///< time constant of closures, s; MuJoCo needs at least two steps
+  double contact_time = 1e-3;  ///< time constant of contacts and joint stops, s
+  double impedance = 0.9999;   ///< share of a constraint's acceleration that is met, below 1
+  double friction = 0.7;       ///< Coulomb coefficient between soles and ground
+  double sole_radius = 5e-3;   ///< of the spheres of soles, m
+  double hinge_lever = 0.02;   ///< distance of the two points of a hinge from its frame, m
+  std::string ground_asset;    ///< elements of <asset> that the ground needs
+  std::string ground;          ///< elements of <worldbody> that soles touch; empty: the plane z = 0
+};
+
+struct MjcfText {
+  std::string xml;
+  /// Each names something that MJCF cannot express or that was changed.
+  std::vector<std::string> warnings;
+};
+
+/// \param q_ref  closed configuration (nq), as of findClosedConfiguration
+MjcfText formatMjcf(const Model& model, ConstVectorRef q_ref, const MjcfOptions& options = {});
+
+}  // namespace bielle

@@ -1,0 +1,42 @@
+#pragma once
+/// \file Coordinates of a joint in MuJoCo, as mjcf.h writes it.
+///
+/// q_ref is the joint's part of the configuration at which bodies stand in the file (MuJoCo's qpos0). R is the rotation
+/// of the joint at q, R2 that by the angle of a planar joint; MuJoCo's quaternions are w x y z. A joint becomes one or
+/// several elements of one body, in this order:
+///
+/// | joint                   | elements                                | qpos                       | qvel                |
+/// |-------------------------|-----------------------------------------|----------------------------|---------------------|
+/// | revolute, continuous    | hinge NAME                              | q                          | v                   |
+/// | prismatic               | slide NAME                              | q                          | v                   |
+/// | spherical               | ball NAME                               | q_ref^-1 q                 | v                   |
+/// | universal               | hinges NAME.angle1, NAME.angle2         | q                          | v                   |
+/// | planar                  | slides NAME.x, NAME.y, hinge NAME.angle | q                          | R2 (v_x, v_y), rate |
+/// | free-flyer of a root    | free NAME                               | position, quaternion       | R v_lin, w          |
+/// | free-flyer of any other | slides NAME.x, .y, .z, ball NAME        | position, q_ref^-1 q       | R v_lin, w          |
+///
+/// A root is a body on the world with the identity as placement of its joint: MuJoCo has no other free joints.
+#include <string>
+
+#include "bielle/model/model.h"
+
+namespace bielle {
+
+bool isMjcfFree(const Joint& joint);
+/// Name of the first element.
+std::string getMjcfName(const Joint& joint);
+
+// Sizes of all arguments below: nq or nv of the joint.
+
+void calcMjcfPosition(const Joint& joint, ConstVectorRef q_ref, ConstVectorRef q, VectorRef qpos);
+/// Its inverse; quaternions are normalised.
+void calcPositionFromMjcf(const Joint& joint, ConstVectorRef q_ref, ConstVectorRef qpos, VectorRef q);
+
+/// qvel = T(q) v, T orthogonal.
+void calcMjcfVelocity(const Joint& joint, ConstVectorRef q, ConstVectorRef v, VectorRef qvel);
+/// v = T(q)^T qvel; generalized forces are mapped in the same way.
+void calcVelocityFromMjcf(const Joint& joint, ConstVectorRef q, ConstVectorRef qvel, VectorRef v);
+/// dT/dt v: MuJoCo's acceleration is T a + dT/dt v.
+void calcMjcfVelocityRate(const Joint& joint, ConstVectorRef q, ConstVectorRef v, VectorRef rate);
+
+}  // namespace bielle
