@@ -30,7 +30,7 @@ void addRatio(CLI::App& app, Action& action);
 void addLift(CLI::App& app, Action& action);
 void addStudy(CLI::App& app, Action& action);
 
-// bielle validate and bielle check: only their help lines; their arguments are those of other programs.
+// bielle validate, bielle check and bielle simulate: only their help lines; their arguments are those of other programs.
 void addCompanions(CLI::App& app);
 // Replaces this process by that program; returns only on failure. `arguments` begins with a name and ends with a null
 // pointer.

@@ -1,4 +1,4 @@
-// The programs that use Simbody, installed beside `bielle`: bielle-validate and bielle-check.
+// The programs that use physics engines, installed beside `bielle`: bielle-validate, bielle-check, bielle-simulate.
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -28,6 +28,7 @@ std::string findCompanion(const std::string& program) {
 void addCompanions(CLI::App& app) {
   app.add_subcommand("validate", "Compare the dynamics with Simbody's (see bielle validate --help)");
   app.add_subcommand("check", "Check a motion by its files and Simbody (see bielle check --help)");
+  app.add_subcommand("simulate", "Carry a motion out in physics with contact (see bielle simulate --help)");
 }
 
 int becomeCompanion(const std::string& name, char** arguments) {
@@ -35,8 +36,9 @@ int becomeCompanion(const std::string& name, char** arguments) {
   arguments[0] = program.data();
   execvp(program.c_str(), arguments);
   std::cerr << "bielle: error: " << name
-            << " is neither beside this program nor on the PATH; build Bielle with -DBIELLE_BUILD_VALIDATION=ON (it "
-               "needs Simbody)"
+            << " is neither beside this program nor on the PATH; build Bielle with "
+            << (name == "bielle-simulate" ? "-DBIELLE_BUILD_SIMULATION=ON" : "-DBIELLE_BUILD_VALIDATION=ON")
+            << " (it needs Simbody)"
             << std::endl;
   return kBadInput;
 }

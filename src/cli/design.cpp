@@ -3,7 +3,7 @@
 
 #include "bielle/model/error.h"
 #include "cli/commands.h"
-#include "cli/motion_registry.h"
+#include "io/motion_registry.h"
 #include "cli/table.h"
 #include "design/run.h"
 

@@ -9,7 +9,7 @@
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
-#include "cli/motion_registry.h"
+#include "io/motion_registry.h"
 #include "cli/table.h"
 
 namespace fs = std::filesystem;

@@ -14,7 +14,7 @@
 #include "bielle/transmission/serial_model.h"
 #include "cli/commands.h"
 #include "cli/free_timings.h"
-#include "cli/motion_registry.h"
+#include "io/motion_registry.h"
 #include "cli/table.h"
 
 namespace bielle::cli {

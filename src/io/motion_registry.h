@@ -8,7 +8,7 @@
 #include "bielle/io/result.h"
 #include "bielle/motion/sequence.h"
 
-namespace bielle::cli {
+namespace bielle {
 
 // Values of many options under one name (`--weights NAME`).
 struct MotionPreset {
@@ -56,4 +56,4 @@ inline constexpr const char* kDeadPointMargin = "dead-point-margin";
 // \throws ModelError when there is no such motion or option
 MotionRequest remakeRequest(const MotionSummary& summary);
 
-}  // namespace bielle::cli
+}  // namespace bielle

@@ -1,4 +1,4 @@
-#include "cli/motion_registry.h"
+#include "io/motion_registry.h"
 
 #include <algorithm>
 #include <map>
@@ -13,7 +13,7 @@
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
 
-namespace bielle::cli {
+namespace bielle {
 namespace {
 
 template <typename Options>
@@ -172,4 +172,4 @@ MotionRequest remakeRequest(const MotionSummary& summary) {
   return request;
 }
 
-}  // namespace bielle::cli
+}  // namespace bielle

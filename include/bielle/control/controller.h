@@ -1,0 +1,21 @@
+#pragma once
+/// \file The interface of feedback laws: from what is measured to torques.
+#include "bielle/model/model.h"
+
+namespace bielle {
+
+/// What is known of a robot at an instant of control.
+struct Measurement {
+  double time = 0;  ///< since the start of the controller, s
+  VectorXd q, v;    ///< nq, nv: coordinates of the model, from an estimator or a simulated world
+};
+
+/// Called at every instant of control, in the order of time.
+class Controller {
+ public:
+  virtual ~Controller() = default;
+  /// Torques of the motors in their order (nu, N m or N), not cut at their limits. It neither allocates nor throws.
+  virtual void update(const Measurement& measurement, VectorRef u) = 0;
+};
+
+}  // namespace bielle

@@ -1,0 +1,58 @@
+#pragma once
+/// \file The policy of a solved motion: its torques, and the gains of the solver's last sweep about it.
+///
+///     u = u*(t) + K(t) [q (-) q*(t); v - v*(t)]                                                                     (1)
+///
+/// Stage k lasts from t_k to t_k + h_k. There q* goes from q_k to q_{k+1} along q_k (+) s (q_{k+1} (-) q_k), v* straight
+/// from v_k to v_{k+1}, 0 <= s <= 1. The torque u_k belongs to the middle of its stage and K_k to its start; both are
+/// interpolated linearly within a phase of constant contacts and held across its borders. The solver's gains refer to the
+/// tangent space of the problem at x_k; those of (1) are
+///
+///     K_k = K_k^solver d(x (-) x_k)/d(dq, dv)                                                                       (2)
+///
+/// (nu x 2 nv): in the reduced formulation a state that is not closed is thus projected on the closed ones. After its end the
+/// policy holds the last node, at rest.
+#include <vector>
+
+#include "bielle/control/controller.h"
+#include "bielle/motion/motion.h"
+#include "bielle/solve/fddp.h"
+
+namespace bielle {
+
+class Policy : public Controller {
+ public:
+  /// One stage; an impact, which takes no time, is none.
+  struct Stage {
+    double start = 0, duration = 0;  ///< t_k, h_k, s
+    int phase = 0;                   ///< stages of different phases are not interpolated
+    VectorXd q, v;                   ///< nq, nv: the node at its start
+    VectorXd q_change, v_next;       ///< nv: q_{k+1} (-) q_k; v_{k+1}
+    VectorXd u;                      ///< nu
+    RowMatrixXd K;                   ///< nu x 2 nv; empty without feedback
+  };
+
+  /// \param model  must outlive it   \param stages  at least one, in the order of time
+  Policy(const Model& model, std::vector<Stage> stages);
+
+  void update(const Measurement& measurement, VectorRef u) override;
+  /// q* and v* of Eq. (1).
+  void getReference(double time, VectorRef q, VectorRef v) const;
+  double getDuration() const { return stages_.back().start + stages_.back().duration; }  ///< s
+  const std::vector<Stage>& getStages() const { return stages_; }
+
+ private:
+  size_t findStage(double time) const;
+
+  const Model& model_;
+  std::vector<Stage> stages_;
+  mutable VectorXd step_;  // nv
+  VectorXd q_, error_;     // nq, 2 nv
+};
+
+/// The torques and states of a trajectory of a motion without free durations.
+Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory);
+/// The same with gains. \param solver  whose last solve returned the trajectory
+Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory, const Fddp& solver);
+
+}  // namespace bielle

@@ -1,0 +1,199 @@
+#include "simulation/execution.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/io/names.h"
+#include "io/record_tables.h"
+#include "simulation/terrain.h"
+
+namespace bielle::simulation {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+Vector3d calcPush(const std::vector<Push>& pushes, double time) {
+  Vector3d force = Vector3d::Zero();
+  for (const Push& push : pushes) {
+    if (time < push.time || time >= push.time + push.duration) continue;
+    const double angle = push.direction * kDegree;
+    force += push.impulse / push.duration * Vector3d(std::cos(angle), std::sin(angle), 0);
+  }
+  return force;
+}
+
+// Writes the rows of a record as the motion happens.
+class Recorder {
+ public:
+  Recorder(const Model& model, int stages) : model_(model), ws_(model) {
+    record_.q_names = makePositionNames(model);
+    record_.v_names = makeVelocityNames(model);
+    record_.u_names = getNames(model.motors());
+    record_.closure_names = getNames(model.closures());
+    record_.contact_names = getNames(model.contacts());
+    resizeRecord(stages, record_);
+  }
+
+  // The state of the next node; forces and torques that acted on the way to it are added by addStage().
+  void addNode(const World& world) {
+    const VectorXd &q = world.getConfiguration(), &v = world.getVelocity();
+    record_.time[node_] = world.getTime();
+    record_.q.row(node_) = q;
+    record_.v.row(node_) = v;
+    updatePositions(model_, ws_, q);
+    record_.com.row(node_) = calcCom(model_, ws_);
+    record_.gap.row(node_).setZero();
+    for (const Closure& closure : model_.closures()) {
+      const RowVectorUpTo6 r = calcClosureResidual(ws_, closure);
+      record_.gap(node_, 0) = std::max(record_.gap(node_, 0), r.head(3).norm());
+      record_.gap(node_, 1) = std::max(record_.gap(node_, 1), r.tail(r.size() - 3).norm());
+    }
+    if (node_ > 0)
+      record_.a.row(node_ - 1) =
+          (record_.v.row(node_) - record_.v.row(node_ - 1)) / (record_.time[node_] - record_.time[node_ - 1]);
+    ++node_;
+  }
+  void addStage(const World& world) {
+    const int stage = node_ - 1;
+    record_.u.row(stage) = world.getTorques();
+    record_.closure_wrenches.row(stage).setConstant(std::numeric_limits<double>::quiet_NaN());
+    for (size_t c = 0; c < world.getFeet().size(); ++c)
+      record_.contact_wrenches.block<1, 6>(stage, 6 * c) = world.getFeet()[c].wrench;
+  }
+  Vector3d getCom() const { return record_.com.row(node_ - 1); }
+  // What was recorded, without the rows that were not reached.
+  MotionRecord finish() {
+    const int stages = node_ - 1;
+    record_.time.conservativeResize(node_);
+    for (const RecordTable& table : listTables(record_))
+      (record_.*table.data).conservativeResize(stages + (table.per == RecordTable::Per::Node ? 1 : 0), Eigen::NoChange);
+    return std::move(record_);
+  }
+
+ private:
+  const Model& model_;
+  Workspace ws_;
+  MotionRecord record_;
+  int node_ = 0;
+};
+
+// Compares the trunk with the plan.
+class FallDetector {
+ public:
+  FallDetector(const Model& model, const Policy& plan, const ExecutionOptions& options)
+      : model_(model),
+        plan_(plan),
+        criterion_(options.fall),
+        ground_(options.ground),
+        planned_ground_(options.planned_ground),
+        q_(model.makeNeutral()),
+        v_(VectorXd::Zero(model.nv())) {}
+
+  // Why the robot counts as fallen, or nothing.
+  std::string find(double time, const VectorXd& q) {
+    if (!model_.hasFreeFlyer()) return {};
+    plan_.getReference(time, q_, v_);
+    const Vector3d p = q.head<3>(), planned = q_.head<3>();
+    deviation_ = (p - planned).norm();
+    const auto getUp = [](const VectorXd& at) {
+      return Vector3d(Eigen::Quaterniond(at[6], at[3], at[4], at[5]).toRotationMatrix().row(2));
+    };
+    const double tilt = std::acos(std::clamp(getUp(q).dot(getUp(q_)), -1.0, 1.0));
+    const double height = (p.z() - ground_.find(p.x(), p.y()).height) /
+                          (planned.z() - planned_ground_.find(planned.x(), planned.y()).height);
+    std::ostringstream text;
+    text.precision(3);
+    if (tilt > criterion_.tilt)
+      text << "the trunk leans " << tilt / kDegree << " degrees from its planned attitude at " << time << " s";
+    else if (height < criterion_.height)
+      text << "the trunk is at " << height << " of its planned height at " << time << " s";
+    return text.str();
+  }
+  double getDeviation() const { return deviation_; }  // of the last find(), m
+
+ private:
+  const Model& model_;
+  const Policy& plan_;
+  const FallCriterion criterion_;
+  const Terrain ground_, planned_ground_;
+  VectorXd q_, v_;
+  double deviation_ = 0;
+};
+
+double calcBalance(const Books& start, const Books& end) {
+  const double change = end.getEnergy() - start.getEnergy();
+  const double losses = end.contact_loss + end.stop_loss + end.other_loss;
+  const double exchanged = std::abs(change) + std::abs(end.motor_work) + std::abs(end.push_work) + std::abs(losses);
+  return exchanged > 0 ? (change - end.motor_work - end.push_work + losses) / exchanged : 0;
+}
+
+}  // namespace
+
+const char* getName(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::Stood:
+      return "stood";
+    case Outcome::Fell:
+      return "fell";
+    case Outcome::BrokeOff:
+      return "broke off";
+  }
+  return "?";
+}
+
+Execution execute(const Model& model, const Policy& plan, Controller& controller, World& world,
+                  const ExecutionOptions& o) {
+  const double duration = o.duration > 0 ? o.duration : plan.getDuration() + o.hold;
+  const int ticks = std::max(1, static_cast<int>(std::lround(duration / o.control_period)));
+  const int ticks_per_row = std::max(1, static_cast<int>(std::lround(o.record_period / o.control_period)));
+  Recorder recorder(model, (ticks + ticks_per_row - 1) / ticks_per_row);
+  FallDetector detector(model, plan, o);
+
+  Execution out;
+  Measurement measurement{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
+  VectorXd u = VectorXd::Zero(model.nu());
+  plan.getReference(0, measurement.q, measurement.v);
+  world.reset(measurement.q, measurement.v);
+  out.start = world.getBooks();
+  recorder.addNode(world);
+  const Vector3d com_start = recorder.getCom();
+  int cut = 0, tick = 0;
+  double seconds = 0;
+  bool advances = true;
+  std::string fall;
+  for (; tick < ticks && advances && fall.empty(); ++tick) {
+    measurement.time = world.getTime();
+    measurement.q = world.getConfiguration();
+    measurement.v = world.getVelocity();
+    controller.update(measurement, u);
+    world.setTorques(u);
+    for (int m = 0; m < model.nu(); ++m) cut += u[m] != world.getTorques()[m];
+    world.setPush(calcPush(o.pushes, measurement.time));
+    if (tick % ticks_per_row == 0) recorder.addStage(world);
+    const auto start = std::chrono::steady_clock::now();
+    advances = world.advance(o.control_period);
+    seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    for (const FootReport& foot : world.getFeet()) out.largest_slip = std::max(out.largest_slip, foot.slip);
+    out.largest_gap = std::max(out.largest_gap, world.getGap());
+    if (!advances) break;
+    fall = detector.find(world.getTime(), world.getConfiguration());
+    out.largest_deviation = std::max(out.largest_deviation, detector.getDeviation());
+    if ((tick + 1) % ticks_per_row == 0 || tick + 1 == ticks || !fall.empty()) recorder.addNode(world);
+  }
+  out.outcome = !advances ? Outcome::BrokeOff : !fall.empty() ? Outcome::Fell : Outcome::Stood;
+  out.message = advances ? fall : world.getMessage();
+  out.duration = world.getTime();
+  out.distance = (recorder.getCom() - com_start).head<2>().norm();
+  out.end = world.getBooks();
+  out.energy_balance = calcBalance(out.start, out.end);
+  out.saturated_share = static_cast<double>(cut) / (std::max(1, tick) * std::max(1, model.nu()));
+  out.real_time_factor = seconds > 0 ? out.duration / seconds : 0;
+  out.record = recorder.finish();
+  return out;
+}
+
+}  // namespace bielle::simulation

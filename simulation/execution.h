@@ -1,0 +1,63 @@
+#pragma once
+/// \file Carrying a plan out: a controller and a world, instant by instant, and what came of it.
+#include <string>
+#include <vector>
+
+#include "bielle/control/policy.h"
+#include "bielle/io/record.h"
+#include "simulation/world.h"
+
+namespace bielle::simulation {
+
+/// A constant force on the trunk for a while.
+struct Push {
+  double time = 0;        ///< when it begins, s
+  double impulse = 0;     ///< N s
+  double direction = 0;   ///< about the vertical, from the x axis of the world; 90: to the left, degrees
+  double duration = 0.1;  ///< s
+};
+
+/// When a robot counts as fallen: its trunk (the body of the first joint)
+/// - leans by more than `tilt` from its planned attitude, whatever its heading, or
+/// - is less than `height` times as high over the ground as planned at that time.
+struct FallCriterion {
+  double tilt = 0.8;    ///< rad
+  double height = 0.6;  ///< 1
+};
+
+struct ExecutionOptions {
+  double duration = 0;           ///< s; 0: that of the plan and `hold`
+  double hold = 1;               ///< s
+  double control_period = 1e-3;  ///< s
+  double record_period = 5e-3;   ///< s
+  std::vector<Push> pushes;
+  FallCriterion fall;
+  Ground ground, planned_ground;  ///< of the world; that the plan was made for
+};
+
+enum class Outcome { Stood, Fell, BrokeOff };
+const char* getName(Outcome outcome);
+
+struct Execution {
+  Outcome outcome = Outcome::BrokeOff;
+  std::string message;           ///< what made it count as fallen, or why the world broke off
+  double duration = 0;           ///< until the end, the fall or the break, s
+  double distance = 0;           ///< of the centre of mass over the ground, from the start to the end, m
+  double largest_gap = 0;        ///< of closures, m
+  double largest_slip = 0;       ///< of a sole since its touchdown, m
+  double largest_deviation = 0;  ///< of the trunk from its planned place, m
+  /// Books' Eq. (1), left less right side, over the energies that were exchanged: the sum of the sizes of its terms.
+  double energy_balance = 0;
+  double saturated_share = 0;   ///< of motors and time: torques that were cut at their limits
+  double real_time_factor = 0;  ///< simulated time over the time that the world took
+  Books start, end;
+  MotionRecord record;  ///< of what happened; forces of closures are not known (NaN), accelerations are means
+
+  double getMeanSpeed() const { return duration > 0 ? distance / duration : 0; }  ///< m/s
+};
+
+/// From the state in which the policy starts.
+Execution execute(const Model& model, const Policy& plan, Controller& controller, World& world,
+                  const ExecutionOptions& options = {});
+
+}  // namespace bielle::simulation

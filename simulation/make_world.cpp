@@ -1,0 +1,38 @@
+#include "simulation/make_world.h"
+
+#include "bielle/model/error.h"
+#include "simulation/bielle_world.h"
+
+namespace bielle::simulation {
+namespace {
+
+struct Entry {
+  const char* name;
+  std::unique_ptr<World> (*make)(const Model& model, const WorldOptions& options);
+};
+
+const Entry kWorlds[] = {
+    {"bielle",
+     [](const Model& model, const WorldOptions& options) {
+       return makeBielleWorld(model, {options, {}});
+     }},
+};
+
+}  // namespace
+
+std::vector<std::string> listWorlds() {
+  std::vector<std::string> names;
+  for (const Entry& entry : kWorlds) names.push_back(entry.name);
+  return names;
+}
+
+std::unique_ptr<World> makeWorld(const std::string& name, const Model& model, const WorldOptions& options) {
+  std::string known;
+  for (const Entry& entry : kWorlds) {
+    if (entry.name == name) return entry.make(model, options);
+    known += (known.empty() ? "" : ", ") + std::string(entry.name);
+  }
+  throw ModelError("", "world '" + name + "'", "there is no such world", "choose one of: " + known);
+}
+
+}  // namespace bielle::simulation

@@ -1,0 +1,265 @@
+// bielle-simulate: carries a solved motion out in a world.
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <filesystem>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "bielle/model/error.h"
+#include "io/standard_output.h"
+#include "io/text_file.h"
+#include "model/text_file.h"
+#include "simulation/execution.h"
+#include "simulation/make_world.h"
+#include "simulation/plan.h"
+#include "simulation/terrain.h"
+
+using namespace bielle;
+using namespace bielle::simulation;
+
+namespace {
+
+constexpr int kStood = 0, kFell = 1, kBadInput = 2;
+
+struct Arguments {
+  std::string directory, output, world = "bielle", control = "gains", terrain = "planned";
+  std::vector<std::string> pushes;
+  double friction = 0;  // 0: that of the plan
+  double time_step = 0;
+  unsigned seed = 1;
+  ExecutionOptions execution;
+};
+
+std::pair<std::string, double> parseNumber(const std::string& flag, const std::string& text, const char* example) {
+  const size_t equals = text.find('=');
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const char* begin = equals == std::string::npos ? end : text.data() + equals + 1;
+  const auto [stop, error] = std::from_chars(begin, end, value);
+  if (error != std::errc() || stop != end || !std::isfinite(value))
+    throw ModelError("", flag + " '" + text + "'", "it is not of the form name=number", std::string("e.g. ") + example);
+  return {text.substr(0, equals), value};
+}
+
+// "t=3,impulse=6,direction=90,duration=0.1"
+Push parsePush(const std::string& text) {
+  constexpr const char* kExample = "--push t=3,impulse=6,direction=90,duration=0.1";
+  Push push;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, ',');) {
+    const auto [name, value] = parseNumber("--push", part, kExample);
+    if (name == "t")
+      push.time = value;
+    else if (name == "impulse")
+      push.impulse = value;
+    else if (name == "direction")
+      push.direction = value;
+    else if (name == "duration")
+      push.duration = value;
+    else
+      throw ModelError("", "--push '" + part + "'", "there is no '" + name + "'", std::string("e.g. ") + kExample);
+  }
+  if (!(push.duration > 0 && push.time >= 0))
+    throw ModelError("", "--push '" + text + "'", "its time or its duration is not positive",
+                     std::string("e.g. ") + kExample);
+  return push;
+}
+
+// "planned", "flat", "ramp=0.05" or "tiles=0.01"
+Ground makeGround(const Arguments& arguments, const Ground& planned) {
+  Ground ground;
+  if (arguments.terrain == "planned") {
+    ground = planned;
+  } else if (arguments.terrain != "flat") {
+    const auto [name, value] = parseNumber("--terrain", arguments.terrain, "--terrain tiles=0.01");
+    if (name == "ramp") {
+      RampOptions ramp;
+      ramp.slope = value;
+      ground = makeRamp(ramp);
+    } else if (name == "tiles") {
+      TileOptions tiles;
+      tiles.height = value;
+      tiles.seed = arguments.seed;
+      ground = makeTiles(tiles);
+    } else {
+      throw ModelError("", "terrain '" + name + "'", "there is no such terrain",
+                       "choose one of: planned, flat, ramp=SLOPE, tiles=HEIGHT");
+    }
+  }
+  ground.friction = arguments.friction > 0 ? arguments.friction : planned.friction;
+  return ground;
+}
+
+// A motion that happened, in the form of a solved one.
+MotionResult makeResult(const Arguments& arguments, const Plan& plan, const Ground& ground, const Execution& execution,
+                        const std::vector<std::string>& command) {
+  MotionResult result;
+  result.run = {plan.summary.robot, plan.robot.file, command};
+  result.motion = plan.summary.motion;
+  result.formulation = plan.summary.formulation;
+  result.requested = plan.summary.requested;
+  const int stages = static_cast<int>(execution.record.u.rows());
+  result.schedule.phases.push_back({"simulated", stages, arguments.execution.record_period, {}});
+  result.ground = ground;
+  result.solver.termination =
+      execution.outcome == Outcome::Stood ? FddpTermination::Converged : FddpTermination::Failed;
+  result.solver.message = std::string("carried out: it ") + getName(execution.outcome);
+  result.record = execution.record;
+  const MotionRecord& record = result.record;
+  for (size_t m = 0; m < record.u_names.size(); ++m)
+    result.peak_torques.emplace_back(record.u_names[m], record.u.rows() ? record.u.col(m).cwiseAbs().maxCoeff() : 0);
+  std::stable_sort(result.peak_torques.begin(), result.peak_torques.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
+  result.gap_position = execution.largest_gap;
+  result.gap_angle = record.gap.col(1).maxCoeff();
+  result.slip_position = execution.largest_slip;
+  result.com_start = record.com(0, 2);
+  result.com_lowest = record.com.col(2).minCoeff();
+  return result;
+}
+
+nlohmann::ordered_json listBooks(const Execution& e) {
+  return {{"energy_start_J", e.start.getEnergy()}, {"energy_end_J", e.end.getEnergy()},
+          {"motor_work_J", e.end.motor_work},      {"push_work_J", e.end.push_work},
+          {"contact_loss_J", e.end.contact_loss},  {"stop_loss_J", e.end.stop_loss},
+          {"other_loss_J", e.end.other_loss}};
+}
+
+// Adds what happened to the summary of the result.
+void extendSummary(const std::string& path, const Arguments& arguments, const Plan& plan, const Execution& e) {
+  auto summary = nlohmann::ordered_json::parse(readTextFile(path));
+  summary["world"] = arguments.world;
+  summary["control"] = arguments.control;
+  summary["terrain"] = arguments.terrain;
+  summary["gain_iterations"] = plan.iterations;
+  summary["outcome"] = getName(e.outcome);
+  summary["outcome_message"] = e.message;
+  summary["fell"] = e.outcome == Outcome::Fell;
+  summary["fall_time"] = e.outcome == Outcome::Fell ? nlohmann::ordered_json(e.duration) : nullptr;
+  summary["duration"] = e.duration;
+  summary["distance"] = e.distance;
+  summary["mean_speed"] = e.getMeanSpeed();
+  summary["largest_deviation"] = e.largest_deviation;
+  summary["largest_gap"] = e.largest_gap;
+  summary["largest_slip"] = e.largest_slip;
+  summary["energy_balance"] = e.energy_balance;
+  summary["books"] = listBooks(e);
+  summary["saturated_share"] = e.saturated_share;
+  summary["real_time_factor"] = e.real_time_factor;
+  writeTextFile(path, summary.dump(2) + "\n");
+}
+
+void print(const Arguments& arguments, const Plan& plan, const Execution& e) {
+  std::cout << plan.summary.motion << " of " << plan.summary.robot << " in world " << arguments.world << ", control "
+            << arguments.control << ": it " << getName(e.outcome);
+  if (!e.message.empty()) std::cout << " (" << e.message << ")";
+  char text[600];
+  std::snprintf(text, sizeof text,
+                "\n  duration            %.3f s\n  distance            %.3f m, %.3f m/s\n"
+                "  trunk off its plan  %.4f m at most\n  closures            open by %.1e m at most\n"
+                "  soles               slip by %.1e m at most\n  energy balance      %.1e of what was exchanged\n"
+                "  torques             %.2f %% cut at their limits\n  speed               %.2g times real time\n",
+                e.duration, e.distance, e.getMeanSpeed(), e.largest_deviation, e.largest_gap, e.largest_slip,
+                e.energy_balance, 100 * e.saturated_share, e.real_time_factor);
+  std::cout << text;
+}
+
+int simulate(Arguments arguments, const std::vector<std::string>& command) {
+  for (const std::string& push : arguments.pushes) arguments.execution.pushes.push_back(parsePush(push));
+  const auto plan =
+      readPlan(arguments.directory, arguments.control == "gains" ? PlanControl::Gains : PlanControl::Open);
+  const Model& model = plan->robot.model;
+  const Ground ground = makeGround(arguments, plan->ground);
+  arguments.execution.ground = ground;
+  arguments.execution.planned_ground = plan->ground;
+  const auto world = makeWorld(arguments.world, model, {ground, arguments.time_step});
+  makeOutputDirectory(arguments.output);
+  const Execution execution = execute(model, *plan->policy, *plan->policy, *world, arguments.execution);
+  print(arguments, *plan, execution);
+  const MotionResult result = makeResult(arguments, *plan, ground, execution, command);
+  const std::vector<std::string> paths = writeResult(arguments.output, result);
+  extendSummary((std::filesystem::path(arguments.output) / "summary.json").string(), arguments, *plan, execution);
+  for (const std::string& path : paths) std::cout << "  " << path << "\n";
+  return execution.outcome == Outcome::Stood ? kStood : kFell;
+}
+
+void addOptions(CLI::App& app, Arguments& a) {
+  const auto positive = CLI::PositiveNumber;
+  app.add_option("DIR", a.directory, "result of `bielle solve`: a motion of the closed robot")->required();
+  app.add_option("-o,--output", a.output,
+                 "directory for trajectory.csv, trajectory.npz and summary.json of the motion that happened")
+      ->required();
+  app.add_option("--world", a.world, "bielle: its own dynamics and contact law, fixed steps")
+      ->check(CLI::IsMember(listWorlds()))
+      ->capture_default_str();
+  app.add_option(
+         "--control", a.control,
+         "open: the torques of the plan; gains: and the gains of the solver's last sweep times the deviation from "
+         "the plan, for which the motion is solved again")
+      ->check(CLI::IsMember({"open", "gains"}))
+      ->capture_default_str();
+  app.add_option("--terrain", a.terrain,
+                 "planned: the ground of the plan; flat; ramp=SLOPE: height over length [1], from x = 0.3 m on; "
+                 "tiles=HEIGHT: of 0.25 m, heights at random up to that [m], from x = 0.2 m on")
+      ->capture_default_str();
+  app.add_option("--friction", a.friction, "coefficient of the ground [1]; 0: that of the plan")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--seed", a.seed, "of the heights of tiles")->capture_default_str();
+  app.add_option("--push", a.pushes,
+                 "t=3,impulse=6,direction=90,duration=0.1: a constant force on the trunk from t [s] on, of an impulse "
+                 "[N s], in a direction [degrees, 0: along x, 90: along y] and for a duration [s]; may be repeated")
+      ->allow_extra_args(false);
+  app.add_option("--duration", a.execution.duration, "of the simulation [s]; 0: that of the plan and --hold")
+      ->check(CLI::Range(0.0, 1e4))
+      ->capture_default_str();
+  app.add_option("--hold", a.execution.hold, "how long the last policy is held after the plan [s]")
+      ->check(CLI::Range(0.0, 1e4))
+      ->capture_default_str();
+  app.add_option("--time-step", a.time_step, "of worlds with fixed steps [s]; 0: the world's own")
+      ->check(CLI::Range(0.0, 0.1))
+      ->capture_default_str();
+  app.add_option("--control-period", a.execution.control_period, "between updates of the torques [s]")
+      ->check(positive)
+      ->capture_default_str();
+  app.add_option("--record-period", a.execution.record_period, "between rows of the trajectory [s]")
+      ->check(positive)
+      ->capture_default_str();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ignoreClosedPipes();
+  CLI::App app{
+      "Carries a motion that `bielle solve` wrote out in physics with contact: a controller reads the state of the "
+      "robot "
+      "and commands its motors, feet stand or slip as the ground lets them."};
+  app.name("bielle simulate");
+  Arguments arguments;
+  addOptions(app, arguments);
+  app.footer(
+      "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude, or is less than 0.6 times "
+      "as\n"
+      "high over the ground as planned. Exit status: 0 it stood to the end, 1 it fell or the world broke off (files "
+      "are\n"
+      "written all the same), 2 bad input.\n"
+      "Examples:\n"
+      "  bielle solve walk --robot bipetto --speed 0.4 -o walk\n"
+      "  bielle simulate walk -o carried-out\n"
+      "  bielle simulate walk -o pushed --push t=1.5,impulse=2,direction=90 --friction 0.5");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kStood : kBadInput;
+  }
+  try {
+    const int status = simulate(arguments, {argv, argv + argc});
+    finishStandardOutput();
+    return status;
+  } catch (const std::exception& error) {
+    std::cerr << "bielle: error: " << error.what() << std::endl;
+  }
+  return kBadInput;
+}

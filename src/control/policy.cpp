@@ -1,0 +1,127 @@
+#include "bielle/control/policy.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "bielle/solve/node_evaluator.h"
+#include "solve/lq_sweep.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kPerturbation = 0.01;  // of Eq. (2); differences are linear in it but for rounding
+
+double getMiddle(const Policy::Stage& stage) { return stage.start + 0.5 * stage.duration; }
+
+// Eq. (2)
+RowMatrixXd calcGains(const Model& model, NodeEvaluator& evaluator, const RowMatrixXd& K) {
+  const int nq = model.nq(), nv = model.nv();
+  const VectorXd x = evaluator.evaluation().x;
+  MatrixXd map(K.cols(), 2 * nv);
+  VectorXd moved = x, step = VectorXd::Zero(nv);
+  for (int i = 0; i < nv; ++i) {
+    step.setZero();
+    step[i] = kPerturbation;
+    moved = x;
+    model.integrate(x.head(nq), step, moved.head(nq));
+    map.col(i) = evaluator.difference(moved) / kPerturbation;
+    moved = x;
+    moved[nq + i] += kPerturbation;
+    map.col(nv + i) = evaluator.difference(moved) / kPerturbation;
+  }
+  return K * map;
+}
+
+std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajectory& trajectory,
+                                      const LqSweep* sweep) {
+  const RobotProblem& problem = *motion.problem;
+  if (problem.hasFreeTimings()) throw std::invalid_argument("makePolicy: durations of the motion are free");
+  const Model& model = problem.model();
+  NodeEvaluator evaluator(problem);
+  std::vector<Policy::Stage> stages;
+  double time = 0;
+  int node = 0, phase_index = 0;
+  for (const ContactPhase& phase : motion.schedule.phases) {
+    for (int i = 0; i < phase.nodes; ++i, ++node) {
+      const StageSpec& spec = problem.spec(node);
+      if (spec.kind == StageKind::Impact) continue;
+      const VectorXd &x = trajectory.xs[node], &next = trajectory.xs[node + 1];
+      Policy::Stage stage;
+      stage.start = time;
+      stage.duration = spec.dt;
+      stage.phase = phase_index;
+      stage.q = x.head(model.nq());
+      stage.v = x.segment(model.nq(), model.nv());
+      stage.q_change = model.difference(stage.q, next.head(model.nq()));
+      stage.v_next = next.segment(model.nq(), model.nv());
+      stage.u = trajectory.us[node].head(model.nu());
+      if (sweep) {
+        evaluator.evaluate(node, x, trajectory.us[node]);
+        stage.K = calcGains(model, evaluator, sweep->getNodes()[node].K);
+      }
+      stages.push_back(std::move(stage));
+      time += spec.dt;
+    }
+    ++phase_index;
+  }
+  return stages;
+}
+
+}  // namespace
+
+Policy::Policy(const Model& model, std::vector<Stage> stages) : model_(model), stages_(std::move(stages)) {
+  if (stages_.empty()) throw std::invalid_argument("Policy: there are no stages");
+  step_.setZero(model.nv());
+  q_ = model.makeNeutral();
+  error_.setZero(2 * model.nv());
+}
+
+size_t Policy::findStage(double time) const {
+  const auto after = std::upper_bound(stages_.begin(), stages_.end(), time,
+                                      [](double t, const Stage& stage) { return t < stage.start; });
+  return after == stages_.begin() ? 0 : static_cast<size_t>(after - stages_.begin()) - 1;
+}
+
+void Policy::getReference(double time, VectorRef q, VectorRef v) const {
+  const Stage& stage = stages_[findStage(time)];
+  const double s = std::clamp((time - stage.start) / stage.duration, 0.0, 1.0);
+  step_ = s * stage.q_change;
+  model_.integrate(stage.q, step_, q);
+  if (time > getDuration()) {
+    v.setZero();
+    return;
+  }
+  v = (1 - s) * stage.v + s * stage.v_next;
+}
+
+void Policy::update(const Measurement& measurement, VectorRef u) {
+  const double time = measurement.time;
+  const size_t k = findStage(time);
+  const Stage& stage = stages_[k];
+  const bool early = time < getMiddle(stage);
+  const size_t other = early ? (k > 0 ? k - 1 : k) : std::min(k + 1, stages_.size() - 1);
+  u = stage.u;
+  if (other != k && stages_[other].phase == stage.phase) {
+    const double weight = (time - getMiddle(stage)) / (getMiddle(stages_[other]) - getMiddle(stage));
+    u += weight * (stages_[other].u - stage.u);
+  }
+  if (stage.K.size() == 0) return;
+  auto dq = error_.head(model_.nv()), dv = error_.tail(model_.nv());
+  getReference(time, q_, dv);
+  dv = measurement.v - dv;
+  model_.difference(q_, measurement.q, dq);
+  const bool blends = k + 1 < stages_.size() && stages_[k + 1].phase == stage.phase;
+  const double s = blends ? std::clamp((time - stage.start) / stage.duration, 0.0, 1.0) : 0;
+  u.noalias() += (1 - s) * (stage.K * error_);
+  if (blends) u.noalias() += s * (stages_[k + 1].K * error_);
+}
+
+Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory) {
+  return {motion.problem->model(), makeStages(motion, trajectory, nullptr)};
+}
+
+Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory, const Fddp& solver) {
+  return {motion.problem->model(), makeStages(motion, trajectory, &solver.getSweep())};
+}
+
+}  // namespace bielle
