@@ -63,7 +63,9 @@ bool ClosedTree::drift(double h) {
       failure_ = describeFailure(c.cluster, c.scratch);
       return false;
     }
-    w_.segment(c.cluster.offset, c.cluster.size).noalias() = c.next.basis.WN.transpose() * c.next.step / h;
+    auto w = w_.segment(c.cluster.offset, c.cluster.size);
+    w.noalias() = c.next.basis.WN.transpose() * c.next.step;
+    w /= h;
     std::swap(c.state, c.next);
     scatterConfiguration(model_, c.cluster, c.state.basis.q, q_next_);
   }

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <limits>
-#include <sstream>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
@@ -95,8 +95,10 @@ class FallDetector {
 
   // Why the robot counts as fallen, or nothing.
   std::string find(double time, const VectorXd& q) {
-    if (!model_.hasFreeFlyer()) return {};
     plan_.getReference(time, q_, v_);
+    if (const Joint* joint = findStrayJoint(q))
+      return "joint " + joint->name + " is far from its planned angle at " + formatTime(time);
+    if (!model_.hasFreeFlyer()) return {};
     const Vector3d p = q.head<3>(), planned = q_.head<3>();
     deviation_ = (p - planned).norm();
     const auto getUp = [](const VectorXd& at) {
@@ -105,17 +107,26 @@ class FallDetector {
     const double tilt = std::acos(std::clamp(getUp(q).dot(getUp(q_)), -1.0, 1.0));
     const double height = (p.z() - ground_.find(p.x(), p.y()).height) /
                           (planned.z() - planned_ground_.find(planned.x(), planned.y()).height);
-    std::ostringstream text;
-    text.precision(3);
-    if (tilt > criterion_.tilt)
-      text << "the trunk leans " << tilt / kDegree << " degrees from its planned attitude at " << time << " s";
-    else if (height < criterion_.height)
-      text << "the trunk is at " << height << " of its planned height at " << time << " s";
-    return text.str();
+    if (tilt > criterion_.tilt) return "the trunk leans far from its planned attitude at " + formatTime(time);
+    if (height < criterion_.height) return "the trunk is far below its planned height at " + formatTime(time);
+    return {};
   }
   double getDeviation() const { return deviation_; }  // of the last find(), m
 
  private:
+  const Joint* findStrayJoint(const VectorXd& q) const {
+    for (const Joint& joint : model_.joints()) {
+      const bool turns = joint.kind == JointKind::Revolute || joint.kind == JointKind::Continuous;
+      if (turns && std::abs(q[joint.idx_q] - q_[joint.idx_q]) > criterion_.joint) return &joint;
+    }
+    return nullptr;
+  }
+  static std::string formatTime(double time) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3f s", time);
+    return text;
+  }
+
   const Model& model_;
   const Policy& plan_;
   const FallCriterion criterion_;
@@ -173,13 +184,13 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
     world.setTorques(u);
     for (int m = 0; m < model.nu(); ++m) cut += u[m] != world.getTorques()[m];
     world.setPush(calcPush(o.pushes, measurement.time));
-    if (tick % ticks_per_row == 0) recorder.addStage(world);
     const auto start = std::chrono::steady_clock::now();
     advances = world.advance(o.control_period);
     seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     for (const FootReport& foot : world.getFeet()) out.largest_slip = std::max(out.largest_slip, foot.slip);
     out.largest_gap = std::max(out.largest_gap, world.getGap());
     if (!advances) break;
+    if (tick % ticks_per_row == 0) recorder.addStage(world);
     fall = detector.find(world.getTime(), world.getConfiguration());
     out.largest_deviation = std::max(out.largest_deviation, detector.getDeviation());
     if ((tick + 1) % ticks_per_row == 0 || tick + 1 == ticks || !fall.empty()) recorder.addNode(world);

@@ -19,10 +19,12 @@ struct Push {
 
 /// When a robot counts as fallen: its trunk (the body of the first joint)
 /// - leans by more than `tilt` from its planned attitude, whatever its heading, or
-/// - is less than `height` times as high over the ground as planned at that time.
+/// - is less than `height` times as high over the ground as planned at that time,
+/// or a revolute joint is more than `joint` away from its planned angle: a leg that whirls about carries nothing.
 struct FallCriterion {
   double tilt = 0.8;    ///< rad
   double height = 0.6;  ///< 1
+  double joint = 1.5;   ///< rad
 };
 
 struct ExecutionOptions {

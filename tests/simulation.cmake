@@ -1,3 +1,6 @@
 if(BIELLE_BUILD_SIMULATION)
   bielle_test(terrain SOURCES test_terrain.cpp LIBS bielle_simulation)
+  bielle_test(contact_law SOURCES test_contact_law.cpp LIBS bielle_simulation)
+  bielle_test(bielle_world SOURCES test_bielle_world.cpp world_trials.cpp LIBS bielle_simulation)
+  target_link_options(test_bielle_world PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 endif()

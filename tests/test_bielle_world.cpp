@@ -1,0 +1,148 @@
+// The world of Bielle's own dynamics: the trials of all worlds, forward dynamics of the full system as an oracle, the order
+// of its steps, and no allocation.
+#include <catch2/catch.hpp>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/motion/motion.h"
+#include "count_allocations.h"
+#include "simulation/bielle_world.h"
+#include "simulation/make_world.h"
+#include "world_trials.h"
+
+namespace bielle::simulation {
+namespace {
+
+const Model& getBipetto() {
+  static const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
+  return robot.model;
+}
+
+std::unique_ptr<World> makeTestWorld(double time_step = 0) {
+  BielleWorldOptions options;
+  options.world.time_step = time_step;
+  return makeBielleWorld(getBipetto(), options);
+}
+
+const testing::TrialTolerances kTolerances{1e-3, 1e-6, 1e-10};
+
+// A robot in the air that moves in all coordinates.
+struct Flight {
+  VectorXd q, v, u;
+};
+Flight makeFlight() {
+  const Model& model = getBipetto();
+  Workspace ws(model);
+  Flight flight{makeStandingPosture(model), VectorXd(model.nv()), VectorXd(model.nu())};
+  flight.q[2] += 3;
+  for (int i = 0; i < model.nv(); ++i) flight.v[i] = 0.5 * std::sin(1.0 + 2.3 * i);
+  flight.v = projectVelocity(model, ws, makeConstraintSet(model), flight.q, flight.v);
+  for (int i = 0; i < model.nu(); ++i) flight.u[i] = 0.3 * std::cos(1.7 * i);
+  return flight;
+}
+
+}  // namespace
+
+TEST_CASE("bielle world: a robot stands without creeping") {
+  testing::checkStanding(*makeTestWorld(), getBipetto(), kTolerances);
+}
+
+TEST_CASE("bielle world: a robot is dropped, and the books balance") {
+  testing::checkDropped(*makeTestWorld(), getBipetto(), kTolerances);
+}
+
+TEST_CASE("bielle world: a robot is pushed, and the work of the push is booked") {
+  testing::checkPushed(*makeTestWorld(), getBipetto(), kTolerances);
+}
+
+TEST_CASE("bielle world: accelerations in the air are those of the full system") {
+  const Model& model = getBipetto();
+  const Flight flight = makeFlight();
+  Workspace ws(model);
+  ConstrainedWorkspace cws;
+  REQUIRE(updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), flight.q, flight.v,
+                                    calcMotorForces(model, flight.u)) == DynamicsStatus::Ok);
+  const auto world = makeTestWorld();
+  world->reset(flight.q, flight.v);
+  world->setTorques(flight.u);
+  constexpr double h = 1e-5;
+  REQUIRE(world->advance(h));
+  const VectorXd a = (world->getVelocity() - flight.v) / h;
+  CHECK((a - cws.a).norm() < 1e-3 * cws.a.norm());
+  // The torque of one motor, a thousandth different, must be noticed as often.
+  VectorXd other = flight.u;
+  other[3] *= 1.05;
+  world->reset(flight.q, flight.v);
+  world->setTorques(other);
+  REQUIRE(world->advance(h));
+  CHECK(((world->getVelocity() - flight.v) / h - cws.a).norm() > 1e-3 * cws.a.norm());
+}
+
+TEST_CASE("bielle world: steps are of second order, in the air and on the ground") {
+  const Model& model = getBipetto();
+  const Flight flight = makeFlight();
+  const testing::PostureHold posture(model);
+  for (bool flies : {true, false}) {
+    std::vector<VectorXd> ends;
+    for (double h : {1e-3, 5e-4, 2.5e-4}) {
+      const auto world = makeTestWorld(h);
+      if (flies) {
+        world->reset(flight.q, flight.v);
+        world->setTorques(flight.u);
+        REQUIRE(world->advance(0.1));
+      } else {
+        VectorXd q = posture.getPosture();
+        q[2] -= 1e-3;  // all soles stay on the ground
+        world->reset(q, VectorXd::Zero(model.nv()));
+        world->setTorques(posture.calcTorques(*world));
+        REQUIRE(world->advance(0.05));
+      }
+      ends.push_back(world->getConfiguration());
+    }
+    const double coarse = model.difference(ends[0], ends[1]).norm(), fine = model.difference(ends[1], ends[2]).norm();
+    CAPTURE(flies, coarse, fine);
+    CHECK(coarse > 3 * fine);
+    CHECK(coarse < 1e-3);
+  }
+}
+
+TEST_CASE("bielle world: torques are cut at the limits of the motors") {
+  const auto world = makeTestWorld();
+  const Model& model = getBipetto();
+  const testing::PostureHold posture(model);
+  world->reset(posture.getPosture(), VectorXd::Zero(model.nv()));
+  const VectorXd u = VectorXd::Constant(model.nu(), -1e9);
+  world->setTorques(u);
+  for (int m = 0; m < model.nu(); ++m) {
+    const double limit = model.motors()[m].effort_limit;
+    CHECK(world->getTorques()[m] == std::max(-limit, -1e9));
+  }
+}
+
+TEST_CASE("bielle world: it advances without allocation") {
+  const Model& model = getBipetto();
+  const testing::PostureHold posture(model);
+  const auto world = makeTestWorld();
+  VectorXd q = posture.getPosture();
+  q[2] += 0.001;
+  world->reset(q, VectorXd::Zero(model.nv()));
+  const VectorXd u = posture.calcTorques(*world);
+  const Vector3d push(5, 0, 0);
+  const long before = num_allocations;
+  bool advanced = true;
+  for (int i = 0; i < 50; ++i) {
+    world->setTorques(u);
+    world->setPush(push);
+    advanced = advanced && world->advance(1e-3);
+  }
+  const long allocations = num_allocations - before;
+  CHECK(advanced);
+  CHECK(allocations == 0);
+}
+
+TEST_CASE("worlds: an unknown one is refused by name") {
+  CHECK_THROWS_WITH(makeWorld("moon", getBipetto()), Catch::Contains("world 'moon'") && Catch::Contains("bielle"));
+}
+
+}  // namespace bielle::simulation

@@ -1,0 +1,113 @@
+// The contact law: normal force, friction that sticks, energy, derivatives.
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "simulation/contact_law.h"
+
+namespace bielle::simulation {
+namespace {
+
+ContactPoint makePoint() {
+  ContactPoint point;
+  point.stiffness = 8e4;
+  point.damping = 10;
+  point.shear_stiffness = 6e4;
+  point.shear_damping = 300;
+  point.touches = true;
+  return point;
+}
+
+}  // namespace
+
+TEST_CASE("contact law: the ground never pulls, and does nothing above it") {
+  const Terrain terrain;
+  ContactPoint point = makePoint();
+  CHECK(calcContactForce(terrain, point, {0, 0, 1e-6}, {1, 0, -1}).force.isZero(0));
+  const ContactForce still = calcContactForce(terrain, point, {0, 0, -1e-3}, Vector3d::Zero());
+  CHECK(still.force.z() == Approx(80));
+  CHECK(still.elastic == Approx(0.5 * 8e4 * 1e-6));
+  CHECK(calcContactForce(terrain, point, {0, 0, -1e-3}, {0, 0, 0.05}).force.z() == Approx(40));
+  CHECK(calcContactForce(terrain, point, {0, 0, -1e-3}, {0, 0, 1}).force.isZero(0));
+}
+
+TEST_CASE("contact law: friction holds below the cone without creeping, and drags the anchor beyond") {
+  const Terrain terrain;  // friction 0.7
+  ContactPoint point = makePoint();
+  const double depth = 1e-3, normal = 80;
+  const Vector3d held(5e-4, 0, -depth);  // 30 N of 56
+  for (int i = 0; i < 1000; ++i) {
+    const ContactForce force = calcContactForce(terrain, point, held, Vector3d::Zero());
+    updateAnchor(terrain, held, force, point);
+    REQUIRE(force.force.x() == Approx(-30).epsilon(1e-12));
+  }
+  const Vector3d dragged(3e-3, 4e-3, -depth);
+  const ContactForce force = calcContactForce(terrain, point, dragged, Vector3d::Zero());
+  CHECK(force.force.head<2>().norm() == Approx(0.7 * normal));
+  updateAnchor(terrain, dragged, force, point);
+  CHECK((calcContactForce(terrain, point, dragged, Vector3d::Zero()).force - force.force).norm() < 1e-10);
+  CHECK(point.anchor.head<2>().norm() > 3e-3);
+}
+
+TEST_CASE("contact law: every closed path takes energy, none gives any") {
+  const Terrain terrain;
+  std::mt19937 generator(5);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int trial = 0; trial < 20; ++trial) {
+    ContactPoint point = makePoint();
+    point.anchor = {1e-4 * unit(generator), 0, 0};
+    const double a = unit(generator), b = unit(generator), c = unit(generator);
+    const auto at = [&](double t) {
+      return Vector3d(1e-3 * a * std::sin(t), 1e-3 * b * std::sin(2 * t), -1e-3 * (1 + c * std::sin(t + 1)));
+    };
+    constexpr int kSteps = 20000;
+    constexpr double h = 2 * 3.141592653589793 / kSteps;
+    double taken = 0;
+    const double start = calcContactForce(terrain, point, at(0), Vector3d::Zero()).elastic;
+    for (int i = 0; i < kSteps; ++i) {
+      const Vector3d x = at((i + 0.5) * h), moved = at((i + 1) * h) - at(i * h);
+      const ContactForce force = calcContactForce(terrain, point, x, moved / h * 20);  // fast enough for the dampers
+      updateAnchor(terrain, x, force, point);
+      taken -= force.force.dot(moved);
+      const double stored = calcContactForce(terrain, point, at((i + 1) * h), Vector3d::Zero()).elastic - start;
+      REQUIRE(taken - stored > -1e-6);
+    }
+    CHECK(taken > 1e-4);
+  }
+}
+
+TEST_CASE("contact law: its damping is the derivative by the velocity") {
+  const Terrain terrain;
+  const ContactPoint point = makePoint();
+  const Vector3d x(2e-4, -1e-4, -1e-3);
+  for (double speed : {0.01, 3.0}) {  // inside the cone; sliding
+    const Vector3d velocity(speed, 0.5 * speed, 0.001);
+    const ContactForce force = calcContactForce(terrain, point, x, velocity, true);
+    Matrix3d numeric;
+    const double h = 1e-6;
+    for (int i = 0; i < 3; ++i) {
+      const Vector3d step = h * Vector3d::Unit(i);
+      numeric.col(i) = -(calcContactForce(terrain, point, x, velocity + step).force -
+                         calcContactForce(terrain, point, x, velocity - step).force) /
+                       (2 * h);
+    }
+    // Sliding friction also changes with the normal force: no part of the symmetric damping.
+    if (speed > 1) numeric.topRightCorner<2, 1>().setZero();
+    CHECK((force.damping - numeric).norm() < 1e-5 * numeric.norm());
+    Matrix3d poisoned = force.damping;
+    poisoned(2, 2) *= 1.001;
+    CHECK((poisoned - numeric).norm() > 1e-5 * numeric.norm());
+  }
+}
+
+TEST_CASE("contact law: stops push back from both sides") {
+  const JointStop stop{0, 0, -1, 2, 1e4, 0.5};
+  CHECK(calcStopForce(stop, 1.999, 5).force == 0);
+  CHECK(calcStopForce(stop, 2.01, 0).force == Approx(-100));
+  CHECK(calcStopForce(stop, 2.01, 1).force == Approx(-150));
+  CHECK(calcStopForce(stop, -1.01, 0).force == Approx(100));
+  CHECK(calcStopForce(stop, -1.01, -1).force == Approx(150));
+  CHECK(calcStopForce(stop, -1.01, 10).force == 0);
+  CHECK(calcStopForce(stop, -1.01, 0).elastic == Approx(0.5));
+}
+
+}  // namespace bielle::simulation

@@ -1,0 +1,123 @@
+#include "world_trials.h"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/motion/motion.h"
+
+namespace bielle::simulation::testing {
+namespace {
+
+constexpr double kStiffness = 100, kDamping = 2;  // N m/rad, N m s/rad
+
+Vector3d calcTrunkCom(const World& world, const Model& model) {
+  Workspace ws(model);
+  updatePlacements<double>(model, ws, world.getConfiguration());
+  return ws.X_WB[1].act(model.bodies()[1].inertia.com);
+}
+
+double calcLoad(const World& world) {
+  double load = 0;
+  for (const FootReport& foot : world.getFeet()) load += foot.wrench[2];
+  return load;
+}
+
+}  // namespace
+
+PostureHold::PostureHold(const Model& model) : model_(model), q_(makeStandingPosture(model)) {
+  std::vector<int> feet;
+  for (size_t c = 0; c < model.contacts().size(); ++c) feet.push_back(static_cast<int>(c));
+  u_ = calcStaticTorques(model, makeConstraintSet(model, makeContactTargets(model, q_, feet, 0, 0)), q_).u;
+}
+
+VectorXd PostureHold::calcTorques(const World& world) const {
+  VectorXd u = u_;
+  for (int m = 0; m < model_.nu(); ++m) {
+    const Motor& motor = model_.motors()[m];
+    const int at = model_.joints()[motor.joint].idx_q;
+    u[m] += kStiffness * (q_[at] - world.getConfiguration()[at]) - kDamping * world.getVelocity()[motor.dof];
+  }
+  return u;
+}
+
+bool hold(World& world, const PostureHold& posture, double duration, const std::function<Vector3d(double)>& push) {
+  const int ticks = static_cast<int>(std::lround(duration / 1e-3));
+  for (int i = 0; i < ticks; ++i) {
+    world.setTorques(posture.calcTorques(world));
+    if (push) world.setPush(push(world.getTime()));
+    if (!world.advance(1e-3)) return false;
+  }
+  return true;
+}
+
+double calcImbalance(const Books& start, const Books& end) {
+  const double change = end.getEnergy() - start.getEnergy();
+  const double losses = end.contact_loss + end.stop_loss + end.other_loss;
+  const double largest = std::max({std::abs(change), std::abs(end.motor_work), std::abs(end.push_work), losses, 1e-12});
+  return std::abs(change - end.motor_work - end.push_work + losses) / largest;
+}
+
+void checkStanding(World& world, const Model& model, const TrialTolerances& tolerances) {
+  const PostureHold posture(model);
+  world.reset(posture.getPosture(), VectorXd::Zero(model.nv()));
+  const auto lean = [](double) { return Vector3d(0, 13, 0); };  // friction has to hold it
+  REQUIRE(hold(world, posture, 1.5, lean));
+  std::vector<double> slips;
+  for (const FootReport& foot : world.getFeet()) slips.push_back(foot.slip);
+  REQUIRE(hold(world, posture, 0.5, lean));
+  const double weight = model.mass() * model.gravity().norm();
+  CHECK(calcLoad(world) == Approx(weight).epsilon(1e-3));
+  for (size_t c = 0; c < slips.size(); ++c) {
+    CHECK(world.getFeet()[c].touches);
+    CHECK(world.getFeet()[c].wrench.head<2>().norm() > 4);
+    CHECK(std::abs(world.getFeet()[c].slip - slips[c]) < tolerances.creep);
+  }
+  CHECK((world.getConfiguration().head<3>() - posture.getPosture().head<3>()).norm() < 0.01);
+  CHECK(world.getGap() < tolerances.gap);
+  CHECK(world.getTime() == Approx(2.0));
+}
+
+void checkDropped(World& world, const Model& model, const TrialTolerances& tolerances) {
+  const PostureHold posture(model);
+  VectorXd q = posture.getPosture();
+  constexpr double kHeight = 0.05;
+  q[2] += kHeight;
+  world.reset(q, VectorXd::Zero(model.nv()));
+  const Books start = world.getBooks();
+  REQUIRE(hold(world, posture, 0.03));
+  CHECK(calcLoad(world) == 0);
+  REQUIRE(hold(world, posture, 0.97));
+  const Books end = world.getBooks();
+  CHECK(calcImbalance(start, end) < tolerances.balance);
+  CHECK(end.contact_loss > 0);
+  CHECK(end.stop_loss >= -1e-9);
+  CHECK(calcLoad(world) == Approx(model.mass() * model.gravity().norm()).epsilon(0.1));
+  // Books that omit half of what the ground took must not balance.
+  Books poisoned = end;
+  poisoned.contact_loss /= 2;
+  CHECK(calcImbalance(start, poisoned) > 2 * tolerances.balance);
+}
+
+void checkPushed(World& world, const Model& model, const TrialTolerances& tolerances) {
+  const PostureHold posture(model);
+  world.reset(posture.getPosture(), VectorXd::Zero(model.nv()));
+  REQUIRE(hold(world, posture, 0.5));
+  const Books start = world.getBooks();
+  const Vector3d force(30, 20, 0);
+  const Vector3d before = calcTrunkCom(world, model);
+  REQUIRE(hold(world, posture, 0.1, [&](double) { return force; }));
+  const Vector3d after = calcTrunkCom(world, model);
+  Books end = world.getBooks();
+  const double work = force.dot(after - before);
+  CHECK(work > 0.01);
+  CHECK(end.push_work == Approx(work).epsilon(0.01));
+  end.motor_work -= start.motor_work;
+  end.contact_loss -= start.contact_loss;
+  end.stop_loss -= start.stop_loss;
+  end.other_loss -= start.other_loss;
+  CHECK(calcImbalance(start, end) < tolerances.balance);
+}
+
+}  // namespace bielle::simulation::testing

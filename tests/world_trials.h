@@ -1,0 +1,40 @@
+#pragma once
+// Trials that every world must pass: a robot stands, is dropped, is pushed; and what must be noticed.
+#include <functional>
+#include <memory>
+
+#include "bielle/model/reader.h"
+#include "simulation/world.h"
+
+namespace bielle::simulation::testing {
+
+// Keeps a posture by springs and dampers on the motors about the torques that hold it.
+class PostureHold {
+ public:
+  explicit PostureHold(const Model& model);
+  const VectorXd& getPosture() const { return q_; }
+  VectorXd calcTorques(const World& world) const;
+
+ private:
+  const Model& model_;
+  VectorXd q_, u_;
+};
+
+// Advances by control steps of 1 ms. \returns false if the world broke off
+bool hold(World& world, const PostureHold& posture, double duration,
+          const std::function<Vector3d(double time)>& push = {});
+
+// Left less right side of Books' Eq. (1) over the largest of its terms.
+double calcImbalance(const Books& start, const Books& end);
+
+struct TrialTolerances {
+  double balance = 0.01;  // of calcImbalance()
+  double creep = 1e-6;    // of a robot that stands, m in half a second
+  double gap = 1e-8;      // m
+};
+// Each takes a world of Bipetto on flat ground at height 0 and friction 0.7.
+void checkStanding(World& world, const Model& model, const TrialTolerances& tolerances);
+void checkDropped(World& world, const Model& model, const TrialTolerances& tolerances);
+void checkPushed(World& world, const Model& model, const TrialTolerances& tolerances);
+
+}  // namespace bielle::simulation::testing
