@@ -1,6 +1,7 @@
 #include "engines/mujoco_model.h"
 
 #include <cstring>
+#include <stdexcept>
 
 #include "bielle/model/error.h"
 #include "io/mjcf_coordinates.h"
@@ -10,7 +11,15 @@ namespace {
 
 using MjModel = std::unique_ptr<mjModel, void (*)(mjModel*)>;
 
+// By default MuJoCo ends the program on an error and writes warnings to a file of its own in the current directory. It
+// counts warnings in mjData as well.
+void redirectMessages() {
+  mju_user_error = [](const char* message) { throw std::runtime_error(message); };
+  mju_user_warning = [](const char*) {};
+}
+
 MjModel load(const Model& model, const std::string& xml) {
+  redirectMessages();
   constexpr const char* kName = "robot.xml";
   const auto files = std::make_unique<mjVFS>();
   mj_defaultVFS(files.get());

@@ -9,6 +9,7 @@
 
 namespace bielle {
 
+/// Errors of MuJoCo, whose default is to end the program, are thrown as std::runtime_error once there is a MujocoModel.
 class MujocoModel {
  public:
   /// \param q_ref  closed configuration (nq) at which the loops are tied

@@ -2,6 +2,9 @@
 
 #include "bielle/model/error.h"
 #include "simulation/bielle_world.h"
+#ifdef BIELLE_WITH_MUJOCO
+#include "simulation/mujoco_world.h"
+#endif
 
 namespace bielle::simulation {
 namespace {
@@ -16,6 +19,12 @@ const Entry kWorlds[] = {
      [](const Model& model, const WorldOptions& options) {
        return makeBielleWorld(model, {options, {}});
      }},
+#ifdef BIELLE_WITH_MUJOCO
+    {"mujoco",
+     [](const Model& model, const WorldOptions& options) {
+       return makeMujocoWorld(model, {options, {}});
+     }},
+#endif
 };
 
 }  // namespace

@@ -58,7 +58,7 @@ void addExport(CLI::App& app, Action& action) {
       "PlotJuggler and spreadsheets read it; trajectory.npz holds arrays q and v with Pinocchio's frames and orders "
       "within\n"
       "a joint, and q_names and v_names to sort the joints by.\n"
-      "mjcf: loops are closed by MuJoCo's soft constraints, so stiff that they need its steps of 0.1 ms.\n"
+      "mjcf: loops are closed by MuJoCo's soft constraints, so stiff that they need its steps of 0.25 ms.\n"
       "Examples:\n"
       "  bielle export squat --format mot\n"
       "  bielle export squat --format sto -o squat.sto\n"

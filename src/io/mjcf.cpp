@@ -81,7 +81,7 @@ class Writer {
     out_ << "  <compiler angle=\"radian\" coordinate=\"local\" inertiafromgeom=\"false\"/>\n  <option"
          << attribute("timestep", formatNumber(options_.time_step))
          << attribute("gravity", formatVector(model_.gravity()))
-         << " cone=\"elliptic\" solver=\"Newton\" tolerance=\"1e-10\"/>\n  <default>\n    <joint"
+         << " cone=\"elliptic\" solver=\"Newton\" jacobian=\"sparse\" tolerance=\"1e-10\"/>\n  <default>\n    <joint"
          << formatStiffness("limit", options_.contact_time) << "/>\n    <equality"
          << formatStiffness("", options_.closure_time)
          << "/>\n    <default class=\"drawn\">\n      <geom contype=\"0\" conaffinity=\"0\" group=\"1\"/>\n"

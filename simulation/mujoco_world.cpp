@@ -1,0 +1,242 @@
+#include "simulation/mujoco_world.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/closure.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
+#include "engines/mujoco_model.h"
+#include "simulation/sole_track.h"
+
+namespace bielle::simulation {
+namespace {
+
+// Boxes reach this far below their tops, m.
+constexpr double kBoxDepth = 1;
+
+std::string formatGround(const Ground& ground) {
+  std::ostringstream out;
+  out.precision(17);
+  out << "    <geom name=\"ground\" class=\"ground\" type=\"plane\" size=\"0 0 1\" pos=\"0 0 " << ground.height
+      << "\"/>\n";
+  for (const GroundStep& step : ground.steps) {
+    const Eigen::Quaterniond q = Eigen::AngleAxisd(step.yaw, Vector3d::UnitZ()) *
+                                 Eigen::AngleAxisd(step.pitch, Vector3d::UnitY()) *
+                                 Eigen::AngleAxisd(step.roll, Vector3d::UnitX());
+    // Lengths are given as seen from above.
+    const Vector3d half(step.length / 2 / std::cos(step.pitch), step.width / 2 / std::cos(step.roll), kBoxDepth / 2);
+    const Vector3d centre = step.top - q * Vector3d(0, 0, kBoxDepth / 2);
+    out << "    <geom class=\"ground\" type=\"box\" size=\"" << half.transpose() << "\" pos=\"" << centre.transpose()
+        << "\" quat=\"" << q.w() << " " << q.x() << " " << q.y() << " " << q.z() << "\"/>\n";
+  }
+  return out.str();
+}
+
+MjcfOptions makeRobotOptions(const MujocoWorldOptions& options) {
+  MjcfOptions robot = options.robot;
+  if (options.world.time_step > 0) robot.time_step = options.world.time_step;
+  robot.friction = options.world.ground.friction;
+  robot.ground = formatGround(options.world.ground);
+  return robot;
+}
+
+VectorXd findPosture(const Model& model) {
+  const AssemblyResult closed = findClosedConfiguration(model);
+  if (closed.status != AssemblyStatus::Closed)
+    throw ModelError(model.name(), closed.worst, "its loop cannot be closed: " + closed.message,
+                     "give a reference posture near a closed one");
+  return closed.q;
+}
+
+class MujocoWorld : public World {
+ public:
+  MujocoWorld(const Model& model, const MujocoWorldOptions& options)
+      : model_(model),
+        options_(makeRobotOptions(options)),
+        mujoco_(model, findPosture(model), options_),
+        data_(mujoco_.makeData()),
+        contact_of_geom_(mujoco_.get()->ngeom, -1),
+        ws_(model),
+        soles_(model) {
+    const mjModel& mj = *mujoco_.get();
+    for (size_t c = 0; c < model.contacts().size(); ++c)
+      for (int corner = 1; corner <= 4; ++corner) {
+        const std::string name = model.contacts()[c].name + "." + std::to_string(corner);
+        const int geom = mj_name2id(&mj, mjOBJ_GEOM, name.c_str());
+        if (geom >= 0) contact_of_geom_[geom] = static_cast<int>(c);
+      }
+    q_.setZero(model.nq());
+    u_.setZero(model.nu());
+    for (VectorXd* x : {&v_, &v_before_, &v_mean_, &push_force_}) x->setZero(model.nv());
+    q_before_.setZero(mj.nq);
+    row_velocity_.setZero(mj.njmax);
+  }
+
+  void reset(ConstVectorRef q, ConstVectorRef v) override;
+  void setTorques(ConstVectorRef u) override;
+  void setPush(const Vector3d& force) override;
+  bool advance(double duration) override;
+  const std::string& getMessage() const override { return message_; }
+  double getTime() const override { return time_; }
+  const VectorXd& getConfiguration() const override { return q_; }
+  const VectorXd& getVelocity() const override { return v_; }
+  const VectorXd& getTorques() const override { return u_; }
+  const std::vector<FootReport>& getFeet() const override { return soles_.getReports(); }
+  Books getBooks() const override;
+  double getGap() const override;
+
+ private:
+  bool step();
+  void book(double h);
+  void addSoleForces(double share);
+
+  const Model& model_;
+  const MjcfOptions options_;
+  MujocoModel mujoco_;
+  std::unique_ptr<mjData, void (*)(mjData*)> data_;
+  std::vector<int> contact_of_geom_;  // of the model, -1 if the geom is not one of a sole
+  mutable Workspace ws_;
+  SoleTrack soles_;
+  VectorXd q_, v_, u_;
+  VectorXd q_before_, v_before_, v_mean_, push_force_, row_velocity_;  // MuJoCo's
+  double time_ = 0;
+  double motor_work_ = 0, push_work_ = 0, contact_work_ = 0, stop_work_ = 0, closure_work_ = 0;  // on the robot, J
+  std::string message_;
+};
+
+void MujocoWorld::reset(ConstVectorRef q, ConstVectorRef v) {
+  mj_resetData(mujoco_.get(), data_.get());
+  mujoco_.setState(q, v, *data_);
+  q_ = q;
+  v_ = v;
+  u_.setZero();
+  time_ = motor_work_ = push_work_ = contact_work_ = stop_work_ = closure_work_ = 0;
+  soles_.reset();
+  message_.clear();
+}
+
+void MujocoWorld::setTorques(ConstVectorRef u) {
+  for (int m = 0; m < model_.nu(); ++m) {
+    const double limit = model_.motors()[m].effort_limit;
+    u_[m] = data_->ctrl[m] = std::clamp(u[m], -limit, limit);
+  }
+}
+
+void MujocoWorld::setPush(const Vector3d& force) {
+  Eigen::Map<Vector3d>(data_->xfrc_applied + 6 * mujoco_.getBody(1)) = force;
+}
+
+bool MujocoWorld::advance(double duration) {
+  if (!message_.empty()) return false;
+  if (!(duration > 0)) return true;
+  const int steps = std::max(1, static_cast<int>(std::ceil(duration / options_.time_step - 1e-9)));
+  const double h = duration / steps;
+  mujoco_.get()->opt.timestep = h;
+  soles_.clearForces();
+  for (int i = 0; i < steps && message_.empty(); ++i) {
+    if (!step()) break;
+    book(h);
+    addSoleForces(1.0 / steps);
+    time_ += h;
+  }
+  mujoco_.getState(*data_, q_, v_);
+  updatePositions(model_, ws_, q_);
+  updateVelocities(model_, ws_, v_);
+  soles_.update([this](int body) { return ws_.X_WB[body]; });
+  return message_.empty();
+}
+
+bool MujocoWorld::step() {
+  const mjModel& mj = *mujoco_.get();
+  q_before_ = Eigen::Map<const VectorXd>(data_->qpos, mj.nq);
+  v_before_ = Eigen::Map<const VectorXd>(data_->qvel, mj.nv);
+  try {
+    mj_step(&mj, data_.get());
+  } catch (const std::exception& error) {
+    message_ = std::string("MuJoCo: ") + error.what();
+  }
+  const auto warned = [this](int warning) { return data_->warning[warning].number > 0; };
+  if (warned(mjWARN_CONTACTFULL) || warned(mjWARN_CNSTRFULL)) message_ = "MuJoCo's memory does not hold all contacts";
+  if (warned(mjWARN_BADQPOS) || warned(mjWARN_BADQVEL) || warned(mjWARN_BADQACC))
+    message_ = "MuJoCo's accelerations are no longer finite";
+  if (warned(mjWARN_BADCTRL)) message_ = "the torques are not finite";
+  if (message_.empty()) return true;
+  // From bad numbers MuJoCo goes back to its start.
+  Eigen::Map<VectorXd>(data_->qpos, mj.nq) = q_before_;
+  Eigen::Map<VectorXd>(data_->qvel, mj.nv) = v_before_;
+  return false;
+}
+
+// Eq. (1)
+void MujocoWorld::book(double h) {
+  const mjModel& mj = *mujoco_.get();
+  v_mean_ = 0.5 * (v_before_ + Eigen::Map<const VectorXd>(data_->qvel, mj.nv));
+  motor_work_ += h * v_mean_.dot(Eigen::Map<const VectorXd>(data_->qfrc_actuator, mj.nv));
+  const int trunk = mujoco_.getBody(1);
+  const Eigen::Map<const Vector3d> push(data_->xfrc_applied + 6 * trunk);
+  if (!push.isZero(0)) {
+    push_force_.setZero();
+    mj_applyFT(&mj, data_.get(), push.data(), nullptr, data_->xipos + 3 * trunk, trunk, push_force_.data());
+    push_work_ += h * v_mean_.dot(push_force_);
+  }
+  mj_mulJacVec(&mj, data_.get(), row_velocity_.data(), v_mean_.data());
+  for (int i = 0; i < data_->nefc; ++i) {
+    const double work = h * data_->efc_force[i] * row_velocity_[i];
+    if (data_->efc_type[i] == mjCNSTR_EQUALITY)
+      closure_work_ += work;
+    else if (data_->efc_type[i] == mjCNSTR_LIMIT_JOINT)
+      stop_work_ += work;
+    else
+      contact_work_ += work;
+  }
+}
+
+void MujocoWorld::addSoleForces(double share) {
+  for (int i = 0; i < data_->ncon; ++i) {
+    const mjContact& contact = data_->contact[i];
+    const int second = contact_of_geom_[contact.geom2], first = contact_of_geom_[contact.geom1];
+    mjtNum wrench[6];  // on geom 2, in the axes of the contact
+    mj_contactForce(mujoco_.get(), data_.get(), i, wrench);
+    if (wrench[0] == 0) continue;
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R_CW(contact.frame);
+    Vector3d force = share * (R_CW.transpose() * Vector3d(wrench[0], wrench[1], wrench[2]));
+    if (second < 0) force = -force;
+    ContactPoint point;
+    point.contact = second >= 0 ? second : first;
+    soles_.addForce(point, Eigen::Map<const Vector3d>(contact.pos), force);
+  }
+}
+
+Books MujocoWorld::getBooks() const {
+  updatePositions(model_, ws_, q_);
+  updateVelocities(model_, ws_, v_);
+  Books books;
+  books.kinetic = calcKineticEnergy(model_, ws_);
+  books.potential = calcPotentialEnergy(model_, ws_);
+  books.motor_work = motor_work_;
+  books.push_work = push_work_;
+  books.contact_loss = -contact_work_;
+  books.stop_loss = -stop_work_;
+  books.other_loss = -closure_work_;
+  return books;
+}
+
+double MujocoWorld::getGap() const {
+  updatePositions(model_, ws_, q_);
+  double gap = 0;
+  for (const Closure& closure : model_.closures())
+    gap = std::max(gap, calcClosureResidual(ws_, closure).head<3>().norm());
+  return gap;
+}
+
+}  // namespace
+
+std::unique_ptr<World> makeMujocoWorld(const Model& model, const MujocoWorldOptions& options) {
+  return std::make_unique<MujocoWorld>(model, options);
+}
+
+}  // namespace bielle::simulation

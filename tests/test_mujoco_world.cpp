@@ -1,0 +1,177 @@
+// The world of MuJoCo: the trials of all worlds, and what is particular to it.
+#include <catch2/catch.hpp>
+#include <filesystem>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/builder.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/motion.h"
+#include "engines/mujoco_model.h"
+#include "simulation/mujoco_world.h"
+#include "world_trials.h"
+
+namespace bielle::simulation {
+namespace {
+
+using namespace testing;
+
+// Measured: 1.4e-3 (half a step of free fall is missing from the work of gravity), 6e-8 and 9e-8 m.
+constexpr TrialTolerances kTolerances{0.005, 1e-6, 1e-6};
+
+std::unique_ptr<World> makeFineWorld(const Model& model, double time_step) {
+  MujocoWorldOptions options;
+  options.world.time_step = time_step;
+  return makeMujocoWorld(model, options);
+}
+
+}  // namespace
+
+TEST_CASE("mujoco world: a robot stands") {
+  const Model model = loadRobot("bipetto").model;
+  checkStanding(*makeMujocoWorld(model), model, kTolerances);
+}
+
+TEST_CASE("mujoco world: a robot is dropped, and the books balance") {
+  const Model model = loadRobot("bipetto").model;
+  checkDropped(*makeMujocoWorld(model), model, kTolerances);
+}
+
+TEST_CASE("mujoco world: a robot is pushed, and the work of the push is booked") {
+  const Model model = loadRobot("bipetto").model;
+  checkPushed(*makeMujocoWorld(model), model, kTolerances);
+}
+
+TEST_CASE("mujoco world: a robot stands on a box that is turned and inclined") {
+  const Model model = loadRobot("bipetto").model;
+  const PostureHold posture(model);
+  MujocoWorldOptions options;
+  options.world.ground.height = -0.2;
+  options.world.ground.steps.push_back({{0.02, 0, 0.15}, 1, 1, 0.4, 0.02, -0.01});
+  VectorXd q = posture.getPosture();
+  q[2] += 0.17;
+  const auto world = makeMujocoWorld(model, options);
+  world->reset(q, VectorXd::Zero(model.nv()));
+  REQUIRE(hold(*world, posture, 1));
+  double load = 0;
+  Workspace ws(model);
+  updatePositions(model, ws, world->getConfiguration());
+  for (size_t c = 0; c < model.contacts().size(); ++c) {
+    const ContactFrame& contact = model.contacts()[c];
+    const SE3 X_WF = getPlacement(ws, contact.body, contact.X_BF);
+    CHECK(X_WF.p.z() == Approx(options.world.ground.calcHeight(X_WF.p.x(), X_WF.p.y())).margin(2e-3));
+    load += (X_WF.R * world->getFeet()[c].wrench.head<3>()).z();
+  }
+  CHECK(load == Approx(model.mass() * model.gravity().norm()).epsilon(0.02));
+}
+
+TEST_CASE("mujoco world: a four-bar that falls conserves its energy the better, the shorter the steps") {
+  const Model model = loadRobot("fourbar").model;
+  const VectorXd q = findClosedConfiguration(model).q;
+  const auto calcErrors = [&](double time_step) {
+    MujocoWorldOptions options;
+    options.world.time_step = time_step;
+    options.robot.closure_time = 2 * time_step;
+    const auto world = makeMujocoWorld(model, options);
+    world->reset(q, VectorXd::Zero(model.nv()));
+    const Books start = world->getBooks();
+    double energy = 0, kinetic = 0, gap = 0;
+    for (int i = 0; i < 100; ++i) {
+      REQUIRE(world->advance(0.01));
+      const Books books = world->getBooks();
+      energy = std::max(energy, std::abs(books.getEnergy() - start.getEnergy()));
+      kinetic = std::max(kinetic, books.kinetic);
+      gap = std::max(gap, world->getGap());
+    }
+    return Eigen::Array3d(energy / kinetic, kinetic, gap);
+  };
+  const Eigen::Array3d coarse = calcErrors(2e-4), fine = calcErrors(5e-5);
+  CAPTURE(coarse.transpose(), fine.transpose());
+  CHECK(fine[0] < 5e-4);
+  CHECK(fine[0] < 0.35 * coarse[0]);  // first order: a quarter
+  CHECK(fine[1] == Approx(coarse[1]).epsilon(0.01));
+  CHECK(fine[2] < 2e-6);
+}
+
+TEST_CASE("mujoco world: a push in the air gives the robot its impulse and its work") {
+  const Model model = loadRobot("bipetto").model;
+  VectorXd q = makeStandingPosture(model);
+  q[2] += 5;
+  const auto world = makeFineWorld(model, 2e-5);
+  world->reset(q, VectorXd::Zero(model.nv()));
+  const Books start = world->getBooks();
+  const Vector3d push(100, -60, 30);
+  world->setPush(push);
+  REQUIRE(world->advance(0.2));
+  world->setPush(Vector3d::Zero());
+  REQUIRE(world->advance(0.1));
+  Workspace ws(model);
+  updatePositions(model, ws, world->getConfiguration());
+  updateVelocities(model, ws, world->getVelocity());
+  const Vector3d expected = push * 0.2 + model.mass() * model.gravity() * 0.3;
+  CHECK((model.mass() * calcComVelocity(model, ws) - expected).norm() < 0.01 * expected.norm());
+  const Books books = world->getBooks();
+  CHECK(books.push_work > 1);
+  CHECK(books.contact_loss == 0);
+  CHECK(calcImbalance(start, books) < 0.01);
+  for (const FootReport& foot : world->getFeet()) {
+    CHECK(!foot.touches);
+    CHECK(foot.wrench.isZero(0));
+  }
+}
+
+TEST_CASE("mujoco world: reset takes a state as it is, and the same torques make the same motion") {
+  const Model model = loadRobot("cleobot").model;
+  const VectorXd q = makeStandingPosture(model);
+  const auto world = makeMujocoWorld(model);
+  VectorXd ends[2];
+  for (VectorXd& end : ends) {
+    world->reset(q, VectorXd::Zero(model.nv()));
+    CHECK(world->getTime() == 0);
+    CHECK(world->getConfiguration() == q);
+    CHECK(world->getBooks().motor_work == 0);
+    REQUIRE(hold(*world, PostureHold(model), 0.2));
+    end = world->getConfiguration();
+  }
+  CHECK(ends[0] == ends[1]);
+}
+
+TEST_CASE("mujoco world: torques are cut at the limits of the motors") {
+  Joint joint;
+  joint.name = "swing";
+  joint.kind = JointKind::Revolute;
+  joint.axis = Vector3d::UnitZ();  // gravity does nothing
+  Inertia inertia;
+  inertia.mass = 1;
+  inertia.I_com = 0.5 * Matrix3d::Identity();
+  ModelBuilder builder("pendulum");
+  builder.addLink("bob", "world", joint, inertia);
+  builder.addMotor("swing", 0, 2);
+  const Model model = builder.build();
+  const auto world = makeMujocoWorld(model);
+  world->reset(VectorXd::Zero(1), VectorXd::Zero(1));
+  world->setTorques(VectorXd::Constant(1, -10));
+  CHECK(world->getTorques()[0] == -2);
+  REQUIRE(world->advance(0.1));
+  CHECK(world->getVelocity()[0] == Approx(-2 * 0.1 / 0.5).epsilon(1e-9));
+  CHECK(world->getBooks().motor_work == Approx(world->getBooks().kinetic).epsilon(1e-9));
+}
+
+TEST_CASE("mujoco world: a world that breaks off says so, keeps its last state and leaves no file behind") {
+  const Model model = loadRobot("fourbar").model;
+  const VectorXd q = findClosedConfiguration(model).q;
+  const auto world = makeMujocoWorld(model);
+  world->reset(q, VectorXd::Zero(model.nv()));
+  world->setTorques(VectorXd::Constant(model.nu(), std::numeric_limits<double>::quiet_NaN()));
+  CHECK(!world->advance(0.01));
+  CHECK(world->getMessage().find("torques") != std::string::npos);
+  CHECK(world->getConfiguration() == q);
+  CHECK(!world->advance(0.01));
+  world->reset(q, VectorXd::Zero(model.nv()));
+  CHECK(world->getMessage().empty());
+  CHECK(world->advance(0.01));
+  CHECK_THROWS_AS(mju_error("an error of the engine"), std::runtime_error);
+  CHECK(!std::filesystem::exists("MUJOCO_LOG.TXT"));
+}
+
+}  // namespace bielle::simulation
