@@ -59,6 +59,14 @@ void MujocoModel::setState(ConstVectorRef q, ConstVectorRef v, mjData& data) con
   }
 }
 
+void MujocoModel::setForces(ConstVectorRef q, ConstVectorRef tau, mjData& data) const {
+  for (int i = 1; i < model_.numBodies(); ++i) {
+    const Joint& joint = model_.joints()[i];
+    calcMjcfVelocity(joint, q.segment(joint.idx_q, joint.nq), tau.segment(joint.idx_v, joint.nv),
+                     Eigen::Map<VectorXd>(data.qfrc_applied + idx_v_[i], joint.nv));
+  }
+}
+
 void MujocoModel::getState(const mjData& data, VectorRef q, VectorRef v) const {
   for (int i = 1; i < model_.numBodies(); ++i) {
     const Joint& joint = model_.joints()[i];

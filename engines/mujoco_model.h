@@ -24,6 +24,8 @@ class MujocoModel {
   int getBody(int body) const { return bodies_[body]; }
   /// Sets qpos and qvel.
   void setState(ConstVectorRef q, ConstVectorRef v, mjData& data) const;
+  /// Sets qfrc_applied to generalized forces tau (nv) at q.
+  void setForces(ConstVectorRef q, ConstVectorRef tau, mjData& data) const;
   /// q (nq) and v (nv) of qpos and qvel.
   void getState(const mjData& data, VectorRef q, VectorRef v) const;
 

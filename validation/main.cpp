@@ -1,4 +1,4 @@
-// bielle-validate: robots against Simbody.
+// bielle-validate: robots against Simbody and MuJoCo.
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -7,6 +7,9 @@
 #include "bielle/model/reader.h"
 #include "io/standard_output.h"
 #include "validate.h"
+#ifdef BIELLE_WITH_MUJOCO
+#include "validate_mujoco.h"
+#endif
 
 using namespace bielle;
 using namespace bielle::validation;
@@ -23,9 +26,20 @@ nlohmann::json toJson(const ValidationReport& report) {
                     {"tolerance", row.tolerance},
                     {"samples", row.samples},
                     {"passed", row.passed()}});
-  return {{"robot", report.robot},     {"passed", report.passed()},
-          {"states", report.states},   {"redundant_states", report.redundant_states},
-          {"failure", report.failure}, {"rows", rows}};
+  return {{"robot", report.robot},
+          {"engine", report.engine},
+          {"passed", report.passed()},
+          {"states", report.states},
+          {"redundant_states", report.redundant_states},
+          {"failure", report.failure},
+          {"rows", rows}};
+}
+
+ValidationReport validate(const std::string& engine, const Model& model, const ValidationOptions& options) {
+#ifdef BIELLE_WITH_MUJOCO
+  if (engine == "mujoco") return validateByMujoco(model, options);
+#endif
+  return validateRobot(model, options);
 }
 
 }  // namespace
@@ -33,11 +47,12 @@ nlohmann::json toJson(const ValidationReport& report) {
 int main(int argc, char** argv) {
   ignoreClosedPipes();
   CLI::App app{
-      "Compares the dynamics of robots with Simbody's on random closed states. Status 0: all agree; 1: a row fails; "
+      "Compares the dynamics of robots with Simbody's or MuJoCo's on random closed states. Status 0: all agree; 1: a "
+      "row fails; "
       "2: bad input."};
   std::vector<std::string> robots;
   ValidationOptions options;
-  std::string base;
+  std::string base, engine = "simbody";
   bool json = false;
   app.add_option("ROBOT", robots, "names, directories or .urdf files; by default all robots known by name");
   app.add_option("--samples", options.samples, "random states per robot")
@@ -58,6 +73,14 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1e-6, 0.1))
       ->capture_default_str();
   app.add_option("--base", base, "overrides the robot's own base")->check(CLI::IsMember({"free", "fixed"}));
+  std::vector<std::string> engines = {"simbody"};
+#ifdef BIELLE_WITH_MUJOCO
+  engines.push_back("mujoco");
+#endif
+  app.add_option("--engine", engine,
+                 "simbody: every quantity; mujoco: mass matrix, bias and accelerations, whose closures are soft there")
+      ->check(CLI::IsMember(engines))
+      ->capture_default_str();
   app.add_flag("--json", json, "print JSON instead of tables");
   try {
     app.parse(argc, argv);
@@ -75,7 +98,7 @@ int main(int argc, char** argv) {
   nlohmann::json reports = nlohmann::json::array();
   try {
     for (const std::string& robot : robots) {
-      const ValidationReport report = validateRobot(loadRobot(robot, load).model, options);
+      const ValidationReport report = validate(engine, loadRobot(robot, load).model, options);
       passed = passed && report.passed();
       if (json)
         reports.push_back(toJson(report));

@@ -6,14 +6,13 @@
 #include <functional>
 #include <iomanip>
 #include <limits>
-#include <random>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "largest.h"
 #include "model_copy.h"
 #include "motion.h"
+#include "samples.h"
 #include "simbody_bridge.h"
 
 namespace bielle::validation {
@@ -22,11 +21,6 @@ namespace {
 // Share of the response without constraints that is the least scale, see Comparison::add. With redundant rows the
 // derivatives have rounding amplified by the proximal term, 1e-16 / 1e-7 of that response, visible where they vanish.
 constexpr double kFloor = 1e-2;
-
-struct Sample {
-  VectorXd q, v, tau, a;
-  std::vector<ContactTarget> contacts;
-};
 
 // Wrenches of a range of closures, 6 x n.
 MatrixXd stack(const std::vector<Vector6d>& wrenches, size_t begin, size_t end) {
@@ -59,57 +53,6 @@ bool isRedundant(const MatrixXd& J) { return calcNullSpace(J.transpose()).cols()
 VectorXd differentiate(double h, const std::function<VectorXd(double)>& f) {
   return (45 * (f(h) - f(-h)) - 9 * (f(2 * h) - f(-2 * h)) + (f(3 * h) - f(-3 * h))) / (60 * h);
 }
-
-class SampleSource {
- public:
-  SampleSource(const Model& model, const ValidationOptions& options)
-      : model_(model), options_(options), rng_(options.seed) {
-    const AssemblyResult start =
-        options.start.size() > 0 ? closeConfiguration(model, options.start) : findClosedConfiguration(model);
-    if (start.status != AssemblyStatus::Closed) failure = "no closed configuration was found: " + start.message;
-    q_ref_ = start.q;
-  }
-
-  std::string failure;
-
-  Sample draw() {
-    Sample sample;
-    sample.q = q_ref_;
-    double scale = options_.perturbation;
-    for (int attempt = 0; attempt < 8; ++attempt, scale /= 2) {
-      const AssemblyResult result = closeConfiguration(model_, model_.integrate(q_ref_, random(model_.nv(), scale)));
-      if (result.status != AssemblyStatus::Closed) continue;
-      sample.q = result.q;
-      break;
-    }
-    Workspace ws(model_);
-    updatePositions(model_, ws, sample.q);
-    for (int c = 0; c < static_cast<int>(model_.contacts().size()); ++c) {
-      const ContactFrame& contact = model_.contacts()[c];
-      if (random(1, 1)[0] > 0) sample.contacts.push_back({c, getPlacement(ws, contact.body, contact.X_BF), 0, 0});
-    }
-    const ConstraintSet set = makeConstraintSet(model_, sample.contacts);
-    sample.v = projectVelocity(model_, ws, set, sample.q, random(model_.nv(), options_.velocity));
-    updateMassMatrix(model_, ws);
-    // A link of milligrams under a force for kilograms would accelerate so much that only rounding is compared.
-    constexpr double kLargestAcceleration = 1e5;
-    const VectorXd force = (kLargestAcceleration * ws.M.diagonal()).cwiseMin(options_.force);
-    sample.tau = random(model_.nv(), 1).cwiseProduct(force);
-    sample.a = random(model_.nv(), options_.force);
-    return sample;
-  }
-
- private:
-  VectorXd random(int n, double scale) {
-    std::uniform_real_distribution<double> uniform(-scale, scale);
-    return VectorXd::NullaryExpr(n, [&](Eigen::Index) { return uniform(rng_); });
-  }
-
-  const Model& model_;
-  const ValidationOptions& options_;
-  std::mt19937 rng_;
-  VectorXd q_ref_;
-};
 
 class Comparison {
  public:
@@ -152,18 +95,8 @@ class Comparison {
   }
 
  private:
-  // The largest difference and tolerance of the samples are kept.
-  // `floor` is the least scale of a difference: values that constraints cancel to zero have rounding of that size.
   void add(const std::string& quantity, const MatrixXd& ours, const MatrixXd& theirs, double floor, double tolerance) {
-    if (theirs.size() == 0) return;
-    auto row = std::find_if(report_.rows.begin(), report_.rows.end(),
-                            [&](const ValidationRow& r) { return r.quantity == quantity; });
-    if (row == report_.rows.end()) row = report_.rows.insert(row, {quantity, 0, tolerance, 0});
-    double difference = (ours - theirs).cwiseAbs().maxCoeff() / std::max(theirs.cwiseAbs().maxCoeff(), floor);
-    if (!ours.allFinite() || !theirs.allFinite()) difference = std::numeric_limits<double>::infinity();
-    row->difference = getLarger(row->difference, difference);
-    row->tolerance = std::max(row->tolerance, tolerance);
-    ++row->samples;
+    addDifference(report_, quantity, ours, theirs, floor, tolerance);
   }
   void add(const std::string& quantity, const MatrixXd& ours, const MatrixXd& theirs, double floor = 1e-6) {
     add(quantity, ours, theirs, floor, options_.tolerance);
@@ -334,12 +267,15 @@ ValidationReport validateRobot(const Model& model, const ValidationOptions& opti
 void printReport(std::ostream& out, const ValidationReport& report) {
   out << report.robot << ": " << report.states << " states";
   if (report.redundant_states > 0) out << ", " << report.redundant_states << " with redundant constraint rows";
-  out << (report.passed() ? ", agrees with Simbody\n" : ", DISAGREES with Simbody\n");
+  out << (report.passed() ? ", agrees with " : ", DISAGREES with ") << report.engine << "\n";
   if (!report.failure.empty()) out << "  " << report.failure << "\n";
   for (const ValidationRow& row : report.rows) {
     out << "  " << std::left << std::setw(44) << row.quantity << std::right << std::scientific << std::setprecision(1)
-        << std::setw(9) << row.difference << "  (" << row.tolerance << ")" << std::setw(6) << row.samples << "  "
-        << (row.passed() ? "pass" : "FAIL") << "\n";
+        << std::setw(9) << row.difference;
+    if (std::isfinite(row.tolerance)) out << "  (" << row.tolerance << ")";
+    out << std::setw(std::isfinite(row.tolerance) ? 6 : 17) << row.samples;
+    if (std::isfinite(row.tolerance)) out << "  " << (row.passed() ? "pass" : "FAIL");
+    out << "\n";
   }
   out << std::defaultfloat;
 }

@@ -48,15 +48,16 @@ struct ValidationOptions {
 struct ValidationRow {
   std::string quantity;
   double difference = 0;  ///< largest relative difference; infinity if a number is not finite
-  double tolerance = 0;
-  int samples = 0;  ///< number compared
+  double tolerance = 0;   ///< infinite for rows that only inform
+  int samples = 0;        ///< number compared
   bool passed() const { return difference <= tolerance; }
 };
 
 struct ValidationReport {
   std::string robot;
-  int states = 0;            ///< samples drawn
-  int redundant_states = 0;  ///< of these, the number with redundant constraint rows
+  std::string engine = "Simbody";  ///< that it was compared with
+  int states = 0;                  ///< samples drawn
+  int redundant_states = 0;        ///< of these, the number with redundant constraint rows
   std::vector<ValidationRow> rows;
   std::string failure;  ///< reason if nothing could be compared, or empty
   bool passed() const;

@@ -32,9 +32,9 @@ void calcMjcfPosition(const Joint& joint, ConstVectorRef q_ref, ConstVectorRef q
 /// Its inverse; quaternions are normalised.
 void calcPositionFromMjcf(const Joint& joint, ConstVectorRef q_ref, ConstVectorRef qpos, VectorRef q);
 
-/// qvel = T(q) v, T orthogonal.
+/// qvel = T(q) v, T orthogonal; generalized forces are mapped in the same way.
 void calcMjcfVelocity(const Joint& joint, ConstVectorRef q, ConstVectorRef v, VectorRef qvel);
-/// v = T(q)^T qvel; generalized forces are mapped in the same way.
+/// v = T(q)^T qvel.
 void calcVelocityFromMjcf(const Joint& joint, ConstVectorRef q, ConstVectorRef qvel, VectorRef v);
 /// dT/dt v: MuJoCo's acceleration is T a + dT/dt v.
 void calcMjcfVelocityRate(const Joint& joint, ConstVectorRef q, ConstVectorRef v, VectorRef rate);

@@ -1,0 +1,74 @@
+// MuJoCo against random mechanisms of every joint and closure kind; wrong models must be seen.
+#include <catch2/catch.hpp>
+#include <sstream>
+
+#include "mechanisms.h"
+#include "model_copy.h"
+#include "validate_mujoco.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+using namespace bielle::validation;
+
+namespace {
+
+constexpr const char* kComplete = "accelerations, rigid closures, dJ/dt v added";
+
+std::string print(const ValidationReport& report) {
+  std::ostringstream text;
+  printReport(text, report);
+  return text.str();
+}
+
+}  // namespace
+
+TEST_CASE("every joint kind with every closure kind agrees with MuJoCo") {
+  std::mt19937 rng(21);
+  ValidationOptions options;
+  options.samples = 3;
+  options.tolerance = 1e-10;
+  double without_rate = 0;
+  for (JointKind joint : kJointKinds)
+    for (ClosureKind closure : kClosureKinds)
+      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
+        const Mechanism mechanism = makeRandomMechanism(rng, joint, closure, base);
+        options.start = mechanism.q_closed;
+        const ValidationReport report = validateByMujoco(mechanism.model, options);
+        CAPTURE(getName(joint), getName(closure), base == MechanismBase::FreeFlyer);
+        INFO(print(report));
+        CHECK(report.passed());
+        REQUIRE(report.findRow(kComplete));
+        without_rate = std::max(without_rate, report.findRow("accelerations, rigid closures")->difference);
+      }
+  CHECK(without_rate > 1e-3);  // dJ/dt v is not negligible
+}
+
+TEST_CASE("MuJoCo sees a wrong inertia, a moved closure and a wrong armature") {
+  std::mt19937 rng(22);
+  const Mechanism mechanism =
+      makeRandomMechanism(rng, JointKind::Spherical, ClosureKind::Hinge5D, MechanismBase::FreeFlyer);
+  ValidationOptions options;
+  options.samples = 2;
+  options.start = mechanism.q_closed;
+  const auto expectFailure = [&](const ModelChanges& changes, const std::vector<std::string>& quantities) {
+    const ValidationReport report =
+        validateAgainstMujoco(mechanism.model, copyModel(mechanism.model, changes), options);
+    INFO(print(report));
+    for (const std::string& quantity : quantities) {
+      CAPTURE(quantity);
+      CHECK(!report.findRow(quantity)->passed());
+    }
+  };
+  CHECK(validateAgainstMujoco(mechanism.model, copyModel(mechanism.model), options).passed());
+  ModelChanges changes;
+  changes.inertia = [](int body, Inertia& inertia) {
+    if (body == 5) inertia.mass *= 1 + 1e-5;
+  };
+  expectFailure(changes, {"mass matrix", "bias", kComplete});
+  changes = {};
+  changes.closure = [](int, Closure& closure) { closure.X_B1.p += Vector3d(1e-4, 0, 0); };
+  expectFailure(changes, {kComplete, "accelerations, rigid closures, at rest"});
+  changes = {};
+  changes.armature_scale = 1.001;
+  expectFailure(changes, {"mass matrix", kComplete});
+}
