@@ -1,46 +1,27 @@
 #include "simulation/mujoco_world.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "engines/mujoco_model.h"
+#include "simulation/mujoco_ground.h"
 #include "simulation/sole_track.h"
 
 namespace bielle::simulation {
 namespace {
 
-// Boxes reach this far below their tops, m.
-constexpr double kBoxDepth = 1;
+// Soles that move by less than 10 m/s stay within reach of the boxes shown, s.
+constexpr double kBoxPeriod = MujocoGround::kReach / 10;
 
-std::string formatGround(const Ground& ground) {
-  std::ostringstream out;
-  out.precision(17);
-  out << "    <geom name=\"ground\" class=\"ground\" type=\"plane\" size=\"0 0 1\" pos=\"0 0 " << ground.height
-      << "\"/>\n";
-  for (const GroundStep& step : ground.steps) {
-    const Eigen::Quaterniond q = Eigen::AngleAxisd(step.yaw, Vector3d::UnitZ()) *
-                                 Eigen::AngleAxisd(step.pitch, Vector3d::UnitY()) *
-                                 Eigen::AngleAxisd(step.roll, Vector3d::UnitX());
-    // Lengths are given as seen from above.
-    const Vector3d half(step.length / 2 / std::cos(step.pitch), step.width / 2 / std::cos(step.roll), kBoxDepth / 2);
-    const Vector3d centre = step.top - q * Vector3d(0, 0, kBoxDepth / 2);
-    out << "    <geom class=\"ground\" type=\"box\" size=\"" << half.transpose() << "\" pos=\"" << centre.transpose()
-        << "\" quat=\"" << q.w() << " " << q.x() << " " << q.y() << " " << q.z() << "\"/>\n";
-  }
-  return out.str();
-}
-
-MjcfOptions makeRobotOptions(const MujocoWorldOptions& options) {
+MjcfOptions makeRobotOptions(const MujocoWorldOptions& options, const MujocoGround& ground) {
   MjcfOptions robot = options.robot;
   if (options.world.time_step > 0) robot.time_step = options.world.time_step;
   robot.friction = options.world.ground.friction;
-  robot.ground = formatGround(options.world.ground);
+  robot.ground = ground.format();
   return robot;
 }
 
@@ -56,13 +37,15 @@ class MujocoWorld : public World {
  public:
   MujocoWorld(const Model& model, const MujocoWorldOptions& options)
       : model_(model),
-        options_(makeRobotOptions(options)),
+        ground_(model, options.world.ground),
+        options_(makeRobotOptions(options, ground_)),
         mujoco_(model, findPosture(model), options_),
         data_(mujoco_.makeData()),
         contact_of_geom_(mujoco_.get()->ngeom, -1),
         ws_(model),
         soles_(model) {
     const mjModel& mj = *mujoco_.get();
+    ground_.bind(mj);
     for (size_t c = 0; c < model.contacts().size(); ++c)
       for (int corner = 1; corner <= 4; ++corner) {
         const std::string name = model.contacts()[c].name + "." + std::to_string(corner);
@@ -95,6 +78,7 @@ class MujocoWorld : public World {
   void addSoleForces(double share);
 
   const Model& model_;
+  MujocoGround ground_;
   const MjcfOptions options_;
   MujocoModel mujoco_;
   std::unique_ptr<mjData, void (*)(mjData*)> data_;
@@ -111,6 +95,7 @@ class MujocoWorld : public World {
 void MujocoWorld::reset(ConstVectorRef q, ConstVectorRef v) {
   mj_resetData(mujoco_.get(), data_.get());
   mujoco_.setState(q, v, *data_);
+  mj_kinematics(mujoco_.get(), data_.get());
   q_ = q;
   v_ = v;
   u_.setZero();
@@ -137,8 +122,11 @@ bool MujocoWorld::advance(double duration) {
   const double h = duration / steps;
   mujoco_.get()->opt.timestep = h;
   soles_.clearForces();
+  const int box_steps = std::max(1, static_cast<int>(kBoxPeriod / h));
   for (int i = 0; i < steps && message_.empty(); ++i) {
-    if (!step()) break;
+    if (i % box_steps == 0 && !ground_.update(*mujoco_.get(), *data_))
+      message_ = "there are too many boxes under the soles";
+    if (!message_.empty() || !step()) break;
     book(h);
     addSoleForces(1.0 / steps);
     time_ += h;

@@ -7,8 +7,10 @@
 #include "bielle/model/builder.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/motion.h"
+#include "count_allocations.h"
 #include "engines/mujoco_model.h"
 #include "simulation/mujoco_world.h"
+#include "simulation/terrain.h"
 #include "world_trials.h"
 
 namespace bielle::simulation {
@@ -42,11 +44,12 @@ TEST_CASE("mujoco world: a robot is pushed, and the work of the push is booked")
   checkPushed(*makeMujocoWorld(model), model, kTolerances);
 }
 
-TEST_CASE("mujoco world: a robot stands on a box that is turned and inclined") {
+TEST_CASE("mujoco world: a robot stands on a box that is turned and inclined, one of hundreds") {
   const Model model = loadRobot("bipetto").model;
   const PostureHold posture(model);
   MujocoWorldOptions options;
   options.world.ground.height = -0.2;
+  for (int i = 0; i < 300; ++i) options.world.ground.steps.push_back({{2 + 0.1 * i, 0, 1}, 0.1, 0.1, 0, 0, 0});
   options.world.ground.steps.push_back({{0.02, 0, 0.15}, 1, 1, 0.4, 0.02, -0.01});
   VectorXd q = posture.getPosture();
   q[2] += 0.17;
@@ -63,6 +66,39 @@ TEST_CASE("mujoco world: a robot stands on a box that is turned and inclined") {
     load += (X_WF.R * world->getFeet()[c].wrench.head<3>()).z();
   }
   CHECK(load == Approx(model.mass() * model.gravity().norm()).epsilon(0.02));
+}
+
+TEST_CASE("mujoco world: a ground of more boxes under the soles than it can have is refused") {
+  const Model model = loadRobot("bipetto").model;
+  MujocoWorldOptions options;
+  options.world.ground = makeTiles({0.001, 0.01, -0.5, 1, 1, 1});
+  const auto world = makeMujocoWorld(model, options);
+  world->reset(makeStandingPosture(model), VectorXd::Zero(model.nv()));
+  CHECK(!world->advance(1e-3));
+  CHECK(world->getMessage().find("boxes") != std::string::npos);
+}
+
+TEST_CASE("mujoco world: it advances without allocation") {
+  const Model model = loadRobot("bipetto").model;
+  const PostureHold posture(model);
+  MujocoWorldOptions options;
+  options.world.ground = makeTiles({0.001, 0.25, -1, 2, 2, 1});
+  const auto world = makeMujocoWorld(model, options);
+  VectorXd q = posture.getPosture();
+  q[2] += 0.002;
+  world->reset(q, VectorXd::Zero(model.nv()));
+  const VectorXd u = posture.calcTorques(*world);
+  const long before = num_allocations;
+  bool advanced = true;
+  for (int i = 0; i < 50; ++i) {
+    world->setTorques(u);
+    world->setPush(Vector3d(5, 0, 0));
+    advanced = advanced && world->advance(1e-3);
+  }
+  const long allocations = num_allocations - before;
+  CHECK(advanced);
+  CHECK(world->getFeet()[0].touches);
+  CHECK(allocations == 0);
 }
 
 TEST_CASE("mujoco world: a four-bar that falls conserves its energy the better, the shorter the steps") {
