@@ -141,8 +141,8 @@ bool BielleWorld::advance(double duration) {
   for (int i = 0; i < steps; ++i) {
     if (!tree_.drift(i == 0 ? h / 2 : h)) return fail(tree_.getFailure());
     if (!kick(h)) return fail("the velocities are no longer finite");
-    time_ += h;
   }
+  time_ += duration;
   if (!tree_.drift(h / 2)) return fail(tree_.getFailure());
   soles_.update([this](int body) { return tree_.getPlacement(body); });
   return true;

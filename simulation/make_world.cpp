@@ -5,6 +5,7 @@
 #ifdef BIELLE_WITH_MUJOCO
 #include "simulation/mujoco_world.h"
 #endif
+#include "simulation/simbody_world.h"
 
 namespace bielle::simulation {
 namespace {
@@ -25,6 +26,12 @@ const Entry kWorlds[] = {
        return makeMujocoWorld(model, {options, {}});
      }},
 #endif
+    {"simbody",
+     [](const Model& model, const WorldOptions& options) {
+       SimbodyWorldOptions simbody;
+       simbody.world = options;
+       return makeSimbodyWorld(model, simbody);
+     }},
 };
 
 }  // namespace

@@ -242,11 +242,11 @@ int main(int argc, char** argv) {
   Arguments arguments;
   addOptions(app, arguments);
   app.footer(
-      "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude, or is less than 0.6 times "
-      "as\n"
-      "high over the ground as planned. Exit status: 0 it stood to the end, 1 it fell or the world broke off (files "
-      "are\n"
-      "written all the same), 2 bad input.\n"
+      "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude or is less than 0.6 times as "
+      "high\n"
+      "over the ground as planned, or a joint is more than 1.5 rad away from its planned angle. Exit status: 0 it "
+      "stood to\n"
+      "the end, 1 it fell or the world broke off (files are written all the same), 2 bad input.\n"
       "Examples:\n"
       "  bielle solve walk --robot bipetto --speed 0.4 -o walk\n"
       "  bielle simulate walk -o carried-out\n"

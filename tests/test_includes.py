@@ -34,9 +34,9 @@ OTHERS = {
     "nlopt": ["src/transmission/slsqp.cpp", "src/design/nlopt_search.h"],
     "CLI/": ["src/cli/", "simulation/", "validation/"],
     "nlohmann/": ["src/", "simulation/", "validation/", "tests/"],
-    "Simbody": ["validation/"],
-    "SimTK": ["validation/"],
-    "simbody/": ["validation/"],
+    "Simbody": ["engines/", "simulation/", "validation/"],
+    "SimTK": ["engines/", "simulation/", "validation/"],
+    "simbody/": ["engines/", "simulation/", "validation/"],
     "mujoco/": ["engines/", "simulation/", "validation/"],
 }
 PUBLIC = "include/bielle/"

@@ -15,7 +15,7 @@ using SimTK::Stage;
 // Rows, and pivots of scaled rows, below this share of the largest one are rounding of redundant rows.
 constexpr double kRankThreshold = 1e-10;
 
-VectorXd toEigen(const SimTK::Vector& v) {
+VectorXd toVector(const SimTK::Vector& v) {
   VectorXd out(v.size());
   for (int i = 0; i < v.size(); ++i) out[i] = v[i];
   return out;
@@ -191,7 +191,7 @@ VectorXd SimbodyBridge::calcConstraintAcceleration(ConstVectorRef a) const {
   SimTK::Vector udot(s_->model.nv()), rows;
   s_->scatter(s_->T * a + s_->Tdot_v, udot);
   s_->matter.calcConstraintAccelerationErrors(s_->state, udot, rows);
-  return toEigen(rows);
+  return toVector(rows);
 }
 
 OracleSolution SimbodyBridge::solveWithArmature(Precision precision) const {
@@ -262,7 +262,7 @@ void SimbodyBridge::integrate(double duration, double accuracy, VectorXd& q, Vec
   stepper.stepTo(duration);
   s_->state = integrator.getState();
   s_->system.realize(s_->state, Stage::Dynamics);
-  s_->readState(q, v);
+  s_->readState(s_->state, q, v);
 }
 
 }  // namespace bielle::validation

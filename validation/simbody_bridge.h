@@ -1,20 +1,10 @@
 #pragma once
 /// \file A Model as a Simbody multibody system: the independent oracle of Bielle's dynamics.
 ///
-/// The tree becomes Simbody's own mobilizers, the closures its own constraints; kinematics, forces and accelerations
-/// are Simbody's. Only the model's data and the conventions of notation.h are Bielle's.
+/// engines/simbody_tree.h says how joints and closures become mobilizers and constraints; kinematics, forces and
+/// accelerations are Simbody's.
 ///
-/// | joint                | mobilizer | u of Simbody from our v                                                     |
-/// |----------------------|-----------|-----------------------------------------------------------------------------|
-/// | revolute, continuous | Pin       | u = v                                                                       |
-/// | prismatic            | Slider    | u = v                                                                       |
-/// | spherical            | Ball      | u = R w, angular velocity in the parent's frame F; R = R_FM                 |
-/// | universal            | Universal | u = v; axes not perpendicular: two Pins about a massless body, u = v        |
-/// | planar               | Planar    | u = (rate, R2 (v_x, v_y)), R2 the rotation by the joint's angle             |
-/// | free-flyer           | Free      | u = (R w, R v_lin)                                                          |
-///
-/// 6D closure: Weld. 3D: Ball. 5D: Ball and two ConstantAngle constraints, the axis in body 2 normal to two directions
-/// of body 1. With u = T(q) v, in the order of our dofs, Simbody's quantities are returned in our coordinates:
+/// With u = T(q) v, in the order of our dofs, Simbody's quantities are returned in our coordinates:
 ///     M = T' M_s T,    b = T' (b_s + M_s dT/dt v),    J = G T,    tau_s = T^{-T} tau,    a = T^{-1} (udot - dT/dt v)
 /// Simbody writes M udot + G' m = f: its constraint forces have the opposite sign, which is reversed here.
 ///

@@ -9,6 +9,8 @@
 namespace bielle {
 namespace {
 
+// A clock that sums up its steps may be this much early; without it, stages would begin one instant of control late.
+constexpr double kClockTolerance = 1e-9;  // s
 constexpr double kPerturbation = 0.01;  // of Eq. (2); differences are linear in it but for rounding
 
 double getMiddle(const Policy::Stage& stage) { return stage.start + 0.5 * stage.duration; }
@@ -77,7 +79,7 @@ Policy::Policy(const Model& model, std::vector<Stage> stages) : model_(model), s
 }
 
 size_t Policy::findStage(double time) const {
-  const auto after = std::upper_bound(stages_.begin(), stages_.end(), time,
+  const auto after = std::upper_bound(stages_.begin(), stages_.end(), time + kClockTolerance,
                                       [](double t, const Stage& stage) { return t < stage.start; });
   return after == stages_.begin() ? 0 : static_cast<size_t>(after - stages_.begin()) - 1;
 }

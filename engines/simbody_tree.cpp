@@ -1,0 +1,200 @@
+#include "engines/simbody_tree.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "model/joint.h"
+
+namespace bielle {
+namespace {
+
+using SimTK::MobilizedBody;
+using SimTK::Transform;
+using SimTK::UnitVec3;
+using SimTK::Vec3;
+
+SimTK::Body::Rigid makeBody(const Inertia& inertia) {
+  const Matrix3d& I = inertia.I_com;
+  const SimTK::Inertia central(Vec3(I(0, 0), I(1, 1), I(2, 2)), Vec3(I(0, 1), I(0, 2), I(1, 2)));
+  const Vec3 com = toSimTK(inertia.com);
+  return SimTK::Body::Rigid(SimTK::MassProperties(inertia.mass, com, central.shiftFromMassCenter(-com, inertia.mass)));
+}
+
+// Rotation whose column `axis` is the given direction.
+Transform alignAxis(const Vector3d& direction, SimTK::CoordinateAxis axis) {
+  return SimTK::Rotation(UnitVec3(toSimTK(direction)), axis);
+}
+
+bool arePerpendicular(const Joint& joint) { return std::abs(joint.axis.dot(joint.axis2)) < 1e-14; }
+
+Transform makeUniversalFrame(const Joint& joint) {
+  Matrix3d R;
+  R << joint.axis, joint.axis2, joint.axis.cross(joint.axis2);
+  return toSimTKRotation(R);
+}
+
+// (e1, e2, normal): the axes along which a planar joint measures x and y.
+Transform makePlanarFrame(const Joint& joint) { return toSimTKRotation(makePlaneBasis(joint.axis)); }
+
+Matrix3d toRotation(ConstVectorRef xyzw) {
+  return Eigen::Quaterniond(xyzw[3], xyzw[0], xyzw[1], xyzw[2]).normalized().toRotationMatrix();
+}
+
+Eigen::Matrix2d rotation2(double angle) { return Eigen::Rotation2Dd(angle).toRotationMatrix(); }
+
+}  // namespace
+
+SimbodyTree::SimbodyTree(const Model& m, const std::vector<Closure>& c)
+    : model(m), closures(c), matter(system), forces(system), torques(forces, matter) {
+  SimTK::Force::UniformGravity(forces, matter, toSimTK(model.gravity()));
+  matter.setShowDefaultGeometry(false);
+  bodies.push_back(matter.Ground());
+  first_pins.resize(model.numBodies());
+  for (int i = 1; i < model.numBodies(); ++i) addBody(i);
+  for (const Closure& closure : closures) addClosure(closure);
+  T.setIdentity(model.nv(), model.nv());
+  Tdot_v.setZero(model.nv());
+}
+
+void SimbodyTree::finish() {
+  state = system.realizeTopology();
+  system.realizeModel(state);
+  u_index.resize(model.nv());
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    const int u0 = bodies[i].getFirstUIndex(state);
+    for (int k = 0; k < joint.nv; ++k) {
+      int u = u0 + k;
+      if (joint.kind == JointKind::FreeFlyer) u = u0 + (k + 3) % 6;  // Simbody: angular first
+      if (joint.kind == JointKind::Planar) u = u0 + (k + 1) % 3;     // Simbody: angle first
+      if (!first_pins[i].isEmptyHandle()) u = k == 0 ? int(first_pins[i].getFirstUIndex(state)) : u0;
+      u_index[joint.idx_v + k] = u;
+    }
+  }
+}
+
+void SimbodyTree::addBody(int i) {
+  const Joint& joint = model.joints()[i];
+  const SimTK::Body::Rigid body = makeBody(model.bodies()[i].inertia);
+  MobilizedBody& parent = bodies[joint.parent];
+  const auto at = [&joint](const Transform& X_JF) { return toSimTK(joint.X_PJ) * X_JF; };
+  switch (joint.kind) {
+    case JointKind::Fixed:
+      break;
+    case JointKind::Revolute:
+    case JointKind::Continuous: {
+      const Transform X = alignAxis(joint.axis, SimTK::ZAxis);
+      bodies.push_back(MobilizedBody::Pin(parent, at(X), body, X));
+      return;
+    }
+    case JointKind::Prismatic: {
+      const Transform X = alignAxis(joint.axis, SimTK::XAxis);
+      bodies.push_back(MobilizedBody::Slider(parent, at(X), body, X));
+      return;
+    }
+    case JointKind::Spherical:
+      bodies.push_back(MobilizedBody::Ball(parent, at({}), body, {}));
+      return;
+    case JointKind::Universal: {
+      if (arePerpendicular(joint)) {
+        const Transform X = makeUniversalFrame(joint);
+        bodies.push_back(MobilizedBody::Universal(parent, at(X), body, X));
+        return;
+      }
+      const Transform X1 = alignAxis(joint.axis, SimTK::ZAxis), X2 = alignAxis(joint.axis2, SimTK::ZAxis);
+      first_pins[i] = MobilizedBody::Pin(parent, at(X1), SimTK::Body::Massless(), X1);
+      bodies.push_back(MobilizedBody::Pin(first_pins[i], X2, body, X2));
+      return;
+    }
+    case JointKind::Planar: {
+      const Transform X = makePlanarFrame(joint);
+      bodies.push_back(MobilizedBody::Planar(parent, at(X), body, X));
+      return;
+    }
+    case JointKind::FreeFlyer:
+      bodies.push_back(MobilizedBody::Free(parent, at({}), body, {}));
+      return;
+  }
+  throw std::logic_error("a fixed joint carries no body of a model");
+}
+
+void SimbodyTree::addClosure(const Closure& closure) {
+  MobilizedBody &body1 = bodies[closure.body1], &body2 = bodies[closure.body2];
+  constraints.emplace_back();
+  if (closure.kind == ClosureKind::Weld6D) {
+    constraints.back() = {SimTK::Constraint::Weld(body1, toSimTK(closure.X_B1), body2, toSimTK(closure.X_B2))};
+    return;
+  }
+  constraints.back() = {SimTK::Constraint::Ball(body1, toSimTK(closure.X_B1.p), body2, toSimTK(closure.X_B2.p))};
+  if (closure.kind == ClosureKind::Ball3D) return;
+  const Vector3d normal1 = closure.axis.unitOrthogonal(), normal2 = closure.axis.cross(normal1);
+  const UnitVec3 axis2(toSimTK(closure.X_B2.R * closure.axis));
+  for (const Vector3d& normal : {normal1, normal2})
+    constraints.back().push_back(SimTK::Constraint::ConstantAngle(body1, UnitVec3(toSimTK(closure.X_B1.R * normal)),
+                                                                  body2, axis2, SimTK::Pi / 2));
+}
+
+void SimbodyTree::setCoordinates(ConstVectorRef q) {
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    const VectorXd x = q.segment(joint.idx_q, joint.nq);
+    if (!first_pins[i].isEmptyHandle()) {
+      first_pins[i].setOneQ(state, 0, x[0]);
+      bodies[i].setOneQ(state, 0, x[1]);
+      continue;
+    }
+    VectorXd s = x;  // in Simbody's order
+    if (joint.kind == JointKind::Spherical) s << x[3], x.head<3>();
+    if (joint.kind == JointKind::FreeFlyer) s << x[6], x.segment<3>(3), x.head<3>();
+    if (joint.kind == JointKind::Planar) s << x[2], x.head<2>();
+    for (int k = 0; k < joint.nq; ++k) bodies[i].setOneQ(state, k, s[k]);
+  }
+}
+
+void SimbodyTree::updateVelocityMap(ConstVectorRef q, ConstVectorRef velocity) {
+  v = velocity;
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    const int k = joint.idx_v;
+    if (joint.kind == JointKind::Spherical) T.block<3, 3>(k, k) = toRotation(q.segment<4>(joint.idx_q));
+    if (joint.kind == JointKind::FreeFlyer) {
+      const Matrix3d R = toRotation(q.segment<4>(joint.idx_q + 3));
+      T.block<3, 3>(k, k) = T.block<3, 3>(k + 3, k + 3) = R;
+      Tdot_v.segment<3>(k) = R * Vector3d(v.segment<3>(k + 3)).cross(Vector3d(v.segment<3>(k)));
+    }
+    if (joint.kind == JointKind::Planar) {
+      const Eigen::Matrix2d R = rotation2(q[joint.idx_q + 2]);
+      T.block<2, 2>(k, k) = R;
+      Tdot_v.segment<2>(k) = R * Eigen::Vector2d(-v[k + 1], v[k]) * v[k + 2];
+    }
+  }
+}
+
+void SimbodyTree::readState(const SimTK::State& from, VectorXd& q, VectorXd& velocity) {
+  q.resize(model.nq());
+  for (int i = 1; i < model.numBodies(); ++i) {
+    const Joint& joint = model.joints()[i];
+    VectorXd s(joint.nq);
+    const bool chain = !first_pins[i].isEmptyHandle();
+    for (int k = 0; k < joint.nq; ++k)
+      s[k] = !chain ? bodies[i].getOneQ(from, k) : (k == 0 ? first_pins[i] : bodies[i]).getOneQ(from, 0);
+    VectorXd x = s;
+    if (joint.kind == JointKind::Spherical) x << s.tail<3>(), s[0];
+    if (joint.kind == JointKind::FreeFlyer) x << s.tail<3>(), s.segment<3>(1), s[0];
+    if (joint.kind == JointKind::Planar) x << s.tail<2>(), s[0];
+    q.segment(joint.idx_q, joint.nq) = x;
+  }
+  updateVelocityMap(q, VectorXd::Zero(model.nv()));
+  velocity = T.inverse() * gather(from.getU());
+  updateVelocityMap(q, velocity);
+}
+
+void SimbodyTree::scatter(const VectorXd& ours, SimTK::Vector& u) const {
+  for (int k = 0; k < model.nv(); ++k) u[u_index[k]] = ours[k];
+}
+
+VectorXd SimbodyTree::gather(const SimTK::Vector& u) const {
+  return VectorXd::NullaryExpr(model.nv(), [&](Eigen::Index k) { return u[u_index[k]]; });
+}
+
+}  // namespace bielle

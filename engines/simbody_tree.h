@@ -1,0 +1,82 @@
+#pragma once
+/// \file A Model as a Simbody multibody system, and the maps between its coordinates and ours.
+///
+/// The tree becomes Simbody's own mobilizers, the closures its own constraints. Only the model's data and the conventions of
+/// notation.h are Bielle's. Simbody has no rotor inertia: the armature is left out.
+///
+/// | joint                | mobilizer | u of Simbody from our v                                                     |
+/// |----------------------|-----------|-----------------------------------------------------------------------------|
+/// | revolute, continuous | Pin       | u = v                                                                       |
+/// | prismatic            | Slider    | u = v                                                                       |
+/// | spherical            | Ball      | u = R w, angular velocity in the parent's frame F; R = R_FM                 |
+/// | universal            | Universal | u = v; axes not perpendicular: two Pins about a massless body, u = v        |
+/// | planar               | Planar    | u = (rate, R2 (v_x, v_y)), R2 the rotation by the joint's angle             |
+/// | free-flyer           | Free      | u = (R w, R v_lin)                                                          |
+///
+/// 6D closure: Weld. 3D: Ball. 5D: Ball and two ConstantAngle constraints, the axis in body 2 normal to two directions
+/// of body 1. All together u = T(q) v, in the order of our dofs.
+#include <Simbody.h>
+
+#include "bielle/model/model.h"
+
+namespace bielle {
+
+// Copies between the types of Eigen and Simbody.
+inline SimTK::Vec3 toSimTK(const Vector3d& v) { return {v[0], v[1], v[2]}; }
+inline Vector3d toEigen(const SimTK::Vec3& v) { return {v[0], v[1], v[2]}; }
+inline SimTK::Rotation toSimTKRotation(const Matrix3d& R) {
+  SimTK::Mat33 m;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) m(i, j) = R(i, j);
+  return SimTK::Rotation(m, true);  // already orthogonal, not normalized
+}
+inline Matrix3d toEigen(const SimTK::Mat33& m) {
+  Matrix3d R;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) R(i, j) = m(i, j);
+  return R;
+}
+inline SimTK::Transform toSimTK(const SE3& X) { return {toSimTKRotation(X.R), toSimTK(X.p)}; }
+
+struct SimbodyTree {
+  /// Bodies, constraints and gravity. Other forces, bodies and constraints may be added until finish().
+  /// \param closures  of the model, and any others such as contacts
+  SimbodyTree(const Model& model, const std::vector<Closure>& closures);
+  SimbodyTree(const SimbodyTree&) = delete;
+  SimbodyTree& operator=(const SimbodyTree&) = delete;
+  /// Makes the state.
+  void finish();
+
+  const Model model;
+  const std::vector<Closure> closures;
+  SimTK::MultibodySystem system;
+  SimTK::SimbodyMatterSubsystem matter;
+  SimTK::GeneralForceSubsystem forces;
+  SimTK::Force::DiscreteForces torques;
+  std::vector<SimTK::MobilizedBody> bodies;      ///< per body of the model, ground first
+  std::vector<SimTK::MobilizedBody> first_pins;  ///< of universal joints made of two Pins, else empty handles
+  std::vector<std::vector<SimTK::Constraint>> constraints;  ///< per closure
+  std::vector<int> u_index;                                 ///< per dof, index into Simbody's u
+  SimTK::State state;
+
+  // At the state set last: u = T v.
+  VectorXd v;       ///< nv
+  MatrixXd T;       ///< nv x nv
+  VectorXd Tdot_v;  ///< nv, (dT/dt) v
+
+  /// Sets the coordinates of the state.
+  void setCoordinates(ConstVectorRef q);
+  /// Sets v, T and Tdot_v.
+  void updateVelocityMap(ConstVectorRef q, ConstVectorRef v);
+  /// q and v of a state of the system, in our coordinates; also those of T.
+  void readState(const SimTK::State& from, VectorXd& q, VectorXd& v);
+  /// Between our order of dofs and Simbody's u; scatter() leaves those of other bodies alone.
+  void scatter(const VectorXd& ours, SimTK::Vector& u) const;
+  VectorXd gather(const SimTK::Vector& u) const;
+
+ private:
+  void addBody(int i);
+  void addClosure(const Closure& closure);
+};
+
+}  // namespace bielle

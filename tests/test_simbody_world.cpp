@@ -1,0 +1,79 @@
+// The world of Simbody: the trials of all worlds, and a walk that both worlds carry out alike.
+#include <catch2/catch.hpp>
+
+#include "bielle/control/policy.h"
+#include "bielle/motion/walk.h"
+#include "simulation/bielle_world.h"
+#include "simulation/simbody_world.h"
+#include "world_trials.h"
+
+namespace bielle::simulation {
+namespace {
+
+const Model& getBipetto() {
+  static const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
+  return robot.model;
+}
+
+const testing::TrialTolerances kTolerances{0.01, 1e-6, 1e-6};
+
+Policy makeWalkPolicy(const Model& model) {
+  WalkOptions options;
+  options.speed = 0.4;
+  options.steps = 2;
+  Motion motion = makeWalk(model, options);
+  FddpOptions solver_options;
+  if (motion.bounded) solver_options.bounds = ControlBounds::Enforce;
+  Fddp solver(solver_options);
+  REQUIRE(solver.solve(*motion.problem, motion.guess).termination == FddpTermination::Converged);
+  return makePolicy(motion, motion.guess, solver);
+}
+
+// The configuration after following the policy.
+VectorXd follow(World& world, Policy& policy, const Model& model, double duration) {
+  Measurement at{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
+  policy.getReference(0, at.q, at.v);
+  world.reset(at.q, at.v);
+  VectorXd u(model.nu());
+  for (int i = 0; i < static_cast<int>(std::lround(duration / 1e-3)); ++i) {
+    at = {world.getTime(), world.getConfiguration(), world.getVelocity()};
+    policy.update(at, u);
+    world.setTorques(u);
+    REQUIRE(world.advance(1e-3));
+  }
+  return world.getConfiguration();
+}
+
+}  // namespace
+
+TEST_CASE("simbody world: a robot stands without creeping") {
+  testing::checkStanding(*makeSimbodyWorld(getBipetto()), getBipetto(), kTolerances);
+}
+
+TEST_CASE("simbody world: a robot is dropped, and the books balance") {
+  testing::checkDropped(*makeSimbodyWorld(getBipetto()), getBipetto(), kTolerances);
+}
+
+TEST_CASE("simbody world: a robot is pushed, and the work of the push is booked") {
+  testing::checkPushed(*makeSimbodyWorld(getBipetto()), getBipetto(), kTolerances);
+}
+
+TEST_CASE("simbody world: a walk goes as in Bielle's world, the more so the finer the steps") {
+  const Model& model = getBipetto();
+  Policy policy = makeWalkPolicy(model);
+  constexpr double kDuration = 0.5;  // a foot has left the ground by then
+  const auto run = [&](double time_step) {
+    BielleWorldOptions options;
+    options.world.time_step = time_step;
+    return follow(*makeBielleWorld(model, options), policy, model, kDuration);
+  };
+  const VectorXd reference = follow(*makeSimbodyWorld(model), policy, model, kDuration);
+  const auto compare = [&](const VectorXd& q) { return model.difference(reference, q).cwiseAbs().maxCoeff(); };
+  const double coarse = compare(run(1e-3)), fine = compare(run(2.5e-4));
+  CHECK(fine < 5e-5);
+  CHECK(fine < 0.5 * coarse);
+  // The state an instant of control earlier is another one.
+  CHECK(compare(follow(*makeBielleWorld(model), policy, model, kDuration - 1e-3)) > 10 * fine);
+}
+
+}  // namespace bielle::simulation
