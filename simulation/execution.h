@@ -51,7 +51,7 @@ struct Execution {
   /// Books' Eq. (1), left less right side, over the energies that were exchanged: the sum of the sizes of its terms.
   double energy_balance = 0;
   double saturated_share = 0;   ///< of motors and time: torques that were cut at their limits
-  double real_time_factor = 0;  ///< simulated time over the time that the world took
+  double real_time_factor = 0;  ///< simulated time over the processor time of the world
   Books start, end;
   MotionRecord record;  ///< of what happened; forces of closures are not known (NaN), accelerations are means
 

@@ -190,9 +190,11 @@ void addOptions(CLI::App& app, Arguments& a) {
   app.add_option("-o,--output", a.output,
                  "directory for trajectory.csv, trajectory.npz and summary.json of the motion that happened")
       ->required();
-  app.add_option("--world", a.world,
-                 "bielle: its own dynamics and contact law, fixed steps; mujoco: MuJoCo, closures and contacts soft "
-                 "constraints (where Bielle was built with it)")
+  app.add_option(
+         "--world", a.world,
+         "bielle: its own dynamics and contact law, fixed steps; simbody: Simbody's dynamics, the same contact law, "
+         "steps of controlled error, 40 times slower; mujoco: MuJoCo, closures and contacts soft constraints "
+         "(where Bielle was built with it)")
       ->check(CLI::IsMember(listWorlds()))
       ->capture_default_str();
   app.add_option(

@@ -1,0 +1,109 @@
+// The policy of a solved motion: its torques, and gains that are those of the solver.
+#include <catch2/catch.hpp>
+
+#include "bielle/control/policy.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/squat.h"
+#include "bielle/solve/node_evaluator.h"
+#include "count_allocations.h"
+#include "solve/lq_sweep.h"
+
+namespace bielle {
+namespace {
+
+struct SolvedSquat {
+  SolvedSquat() : robot(loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto")) {
+    SquatOptions options;
+    options.depth = 0.85;
+    motion = makeSquat(robot.model, options);
+    FddpOptions solver_options;
+    if (motion.bounded) solver_options.bounds = ControlBounds::Enforce;
+    solver = std::make_unique<Fddp>(solver_options);
+    REQUIRE(solver->solve(*motion.problem, motion.guess).termination == FddpTermination::Converged);
+  }
+  LoadedRobot robot;
+  Motion motion;
+  std::unique_ptr<Fddp> solver;
+};
+
+SolvedSquat& getSquat() {
+  static SolvedSquat squat;
+  return squat;
+}
+
+Measurement measure(const Model& model, double time, const VectorXd& x) {
+  return {time, x.head(model.nq()), x.segment(model.nq(), model.nv())};
+}
+
+}  // namespace
+
+TEST_CASE("policy: on the plan it gives the torques of the plan, each in the middle of its stage") {
+  SolvedSquat& squat = getSquat();
+  const Model& model = squat.robot.model;
+  Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver);
+  const auto& stages = policy.getStages();
+  REQUIRE(static_cast<int>(stages.size()) == squat.motion.problem->numStages());
+  CHECK(policy.getDuration() == Approx(squat.motion.schedule.getTime(squat.motion.problem->numStages())));
+  VectorXd u(model.nu());
+  for (size_t k : {size_t(0), stages.size() / 3, stages.size() - 1}) {
+    Measurement at{stages[k].start + 0.5 * stages[k].duration, model.makeNeutral(), VectorXd::Zero(model.nv())};
+    policy.getReference(at.time, at.q, at.v);
+    policy.update(at, u);
+    CHECK((u - squat.motion.guess.us[k].head(model.nu())).norm() < 1e-9 * (1 + u.norm()));
+  }
+}
+
+TEST_CASE("policy: its gains are those of the solver's last sweep") {
+  SolvedSquat& squat = getSquat();
+  const Model& model = squat.robot.model;
+  Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver);
+  NodeEvaluator evaluator(*squat.motion.problem);
+  for (int k : {1, 40, 120}) {
+    const VectorXd& x = squat.motion.guess.xs[k];
+    evaluator.evaluate(k, x, squat.motion.guess.us[k]);
+    const RowMatrixXd& K = squat.solver->getSweep().getNodes()[k].K;
+    VectorXd dx(K.cols());
+    for (int i = 0; i < dx.size(); ++i) dx[i] = 1e-3 * std::sin(1 + 2.1 * i);
+    const VectorXd moved = evaluator.integrate(dx);
+    const double time = policy.getStages()[k].start;
+    VectorXd there(model.nu()), here(model.nu());
+    policy.update(measure(model, time, moved), there);
+    policy.update(measure(model, time, x), here);
+    const VectorXd expected = K * dx, found = there - here;
+    CHECK((found - expected).norm() < 1e-6 * expected.norm());
+    dx[3] *= 1.001;
+    CHECK((found - K * dx).norm() > 1e-6 * expected.norm());
+  }
+}
+
+TEST_CASE("policy: without gains the state does not matter; after the end the last node is held at rest") {
+  SolvedSquat& squat = getSquat();
+  const Model& model = squat.robot.model;
+  Policy open = makePolicy(squat.motion, squat.motion.guess);
+  VectorXd u(model.nu()), other(model.nu());
+  open.update(measure(model, 0.4, squat.motion.guess.xs[0]), u);
+  open.update(measure(model, 0.4, squat.motion.guess.xs[90]), other);
+  CHECK(u == other);
+  VectorXd q = model.makeNeutral(), v(model.nv());
+  open.getReference(100, q, v);
+  CHECK(v.isZero(0));
+  CHECK(model.difference(squat.motion.guess.xs.back().head(model.nq()), q).norm() < 1e-12);
+}
+
+TEST_CASE("policy: an update does not allocate") {
+  SolvedSquat& squat = getSquat();
+  const Model& model = squat.robot.model;
+  Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver);
+  const Measurement at = measure(model, 0, squat.motion.guess.xs[0]);
+  Measurement now = at;
+  VectorXd u(model.nu());
+  const long before = num_allocations;
+  for (int i = 0; i < 300; ++i) {
+    now.time = 0.01 * i;
+    policy.update(now, u);
+  }
+  const long allocations = num_allocations - before;
+  CHECK(allocations == 0);
+}
+
+}  // namespace bielle

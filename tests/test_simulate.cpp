@@ -1,0 +1,127 @@
+// The command `bielle simulate`: what it writes, its exit statuses, and that it repeats itself to the byte.
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "bielle/io/record.h"
+#include "run_command.h"
+
+namespace bielle {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::CommandResult;
+using testing::runCommand;
+
+std::string read(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+nlohmann::json readSummary(const fs::path& directory) {
+  return nlohmann::json::parse(read(directory / "summary.json"));
+}
+
+// A walk of two steps, solved once.
+const std::string& getWalk() {
+  static const std::string walk = [] {
+    const std::string directory = (fs::temp_directory_path() / "bielle_simulate_walk").string();
+    const CommandResult solved =
+        runCommand({BIELLE_COMMAND, "solve", "walk", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--speed", "0.4",
+                    "--steps", "2", "-o", directory, "--quiet", "--no-report", "--no-check"});
+    REQUIRE(solved.status == 0);
+    return directory;
+  }();
+  return walk;
+}
+
+CommandResult simulate(const std::string& output, std::vector<std::string> options) {
+  std::vector<std::string> arguments = {BIELLE_COMMAND, "simulate", getWalk(), "-o", output};
+  arguments.insert(arguments.end(), options.begin(), options.end());
+  return runCommand(arguments);
+}
+
+struct Scratch {
+  Scratch() : path(fs::temp_directory_path() / "bielle_simulate_test") { fs::create_directories(path); }
+  ~Scratch() { fs::remove_all(path); }
+  fs::path path;
+};
+
+}  // namespace
+
+TEST_CASE("simulate: with gains a walk stands, and its numbers are written") {
+  const Scratch scratch;
+  const std::string output = (scratch.path / "walk").string();
+  const CommandResult result = simulate(output, {});
+  CAPTURE(result.out, result.err);
+  REQUIRE(result.status == 0);
+  const nlohmann::json summary = readSummary(output);
+  CHECK(summary["fell"] == false);
+  CHECK(summary["fall_time"].is_null());
+  CHECK(summary["distance"].get<double>() > 0.1);
+  CHECK(summary["mean_speed"].get<double>() ==
+        Approx(summary["distance"].get<double>() / summary["duration"].get<double>()));
+  CHECK(std::abs(summary["energy_balance"].get<double>()) < 0.01);
+  CHECK(summary["largest_gap"].get<double>() < 1e-9);
+  CHECK(summary["largest_slip"].get<double>() < 0.005);
+  CHECK(summary["saturated_share"].get<double>() == 0);
+  CHECK(summary["real_time_factor"].get<double>() > 0);
+  const MotionRecord record = readRecord(output + "/trajectory.npz");
+  CHECK(record.time[record.time.size() - 1] == Approx(summary["duration"].get<double>()));
+  CHECK(record.q.allFinite());
+}
+
+TEST_CASE("simulate: without gains the walk falls, with status 1") {
+  const Scratch scratch;
+  const std::string output = (scratch.path / "open").string();
+  const CommandResult result = simulate(output, {"--control", "open"});
+  CHECK(result.status == 1);
+  const nlohmann::json summary = readSummary(output);
+  CHECK(summary["fell"] == true);
+  CHECK(summary["fall_time"] == summary["duration"]);
+  CHECK(summary["duration"].get<double>() < 2);
+  CHECK(result.out.find("fell") != std::string::npos);
+}
+
+TEST_CASE("simulate: the same command writes the same bytes; ground, pushes and seeds matter") {
+  const Scratch scratch;
+  const auto record = [&](const std::string& name, std::vector<std::string> options) {
+    const std::string output = (scratch.path / name).string();
+    options.insert(options.end(), {"--duration", "0.9"});
+    const CommandResult result = simulate(output, options);
+    REQUIRE(result.status < 2);
+    return read(output + "/trajectory.csv");
+  };
+  const std::string first = record("first", {});
+  CHECK(record("again", {}) == first);
+  CHECK(record("pushed", {"--push", "t=0.2,impulse=1,direction=90"}) != first);
+  CHECK(record("icy", {"--friction", "0.1"}) != first);
+  const std::string tiles = record("tiles", {"--terrain", "tiles=0.005", "--seed", "1"});
+  CHECK(tiles != first);
+  CHECK(record("other", {"--terrain", "tiles=0.005", "--seed", "2"}) != tiles);
+}
+
+TEST_CASE("simulate: bad input is refused in one line, with status 2") {
+  const Scratch scratch;
+  const std::string output = (scratch.path / "bad").string();
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {{{"--push", "t=1,force=3"}, "force"},
+                                                                               {{"--push", "t=-1,impulse=3"}, "--push"},
+                                                                               {{"--terrain", "hills=3"}, "hills"},
+                                                                               {{"--terrain", "moon"}, "moon"},
+                                                                               {{"--world", "moon"}, "moon"}};
+  for (const auto& [options, named] : cases) {
+    const CommandResult result = simulate(output, options);
+    CAPTURE(named, result.err);
+    CHECK(result.status == 2);
+    CHECK(result.err.find(named) != std::string::npos);
+  }
+  const CommandResult none = runCommand({BIELLE_COMMAND, "simulate", "/nowhere", "-o", output});
+  CHECK(none.status == 2);
+  CHECK(none.err.find("/nowhere") != std::string::npos);
+}
+
+}  // namespace bielle
