@@ -22,8 +22,8 @@ struct MujocoWorldOptions {
 /// Books: within a step MuJoCo's forces are constant and the velocity changes by M^-1 h f, so that a force f does the work
 ///     h f . (v + v+) / 2                                                                                            (1)
 /// of which the sum is the change of the kinetic energy at a fixed configuration. By (1) contacts, stops and closures are
-/// booked apart; the energy that their springs hold is among the losses (`elastic` is zero). Eq. (1) of world.h then
-/// differs by the error of the steps, which is of first order in their length.
+/// booked apart. The energy that their springs hold is among the losses, which it can make negative; `elastic` is zero. Eq. (1)
+/// of world.h then differs by the error of the steps, which is of first order in their length.
 ///
 /// Wrenches of soles are means over the last advance(). Steps are those of the options, or a little shorter.
 /// \param model  must outlive the world

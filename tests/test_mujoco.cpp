@@ -95,6 +95,27 @@ TEST_CASE("MuJoCo has the mass matrix, the bias and the closures of every joint 
       }
 }
 
+TEST_CASE("MuJoCo starts at the closed configuration, and the references are its keyframes") {
+  for (const char* name : {"bipetto", "cleobot", "rsu_biped"}) {
+    const Model model = loadRobot(name).model;
+    const VectorXd q_ref = findClosedConfiguration(model).q;
+    const MujocoModel mujoco(model, q_ref);
+    const mjModel& mj = *mujoco.get();
+    const auto data = mujoco.makeData();
+    VectorXd q(model.nq()), v(model.nv());
+    mujoco.getState(*data, q, v);
+    CHECK(model.difference(q_ref, q).norm() < 1e-14);
+    REQUIRE(mj.nkey == static_cast<int>(model.references().size()));
+    for (const Reference& reference : model.references()) {
+      CAPTURE(name, reference.name);
+      mj_resetDataKeyframe(&mj, data.get(), mj_name2id(&mj, mjOBJ_KEY, reference.name.c_str()));
+      mujoco.getState(*data, q, v);
+      CHECK(model.difference(assembleReference(model, reference.name).q, q).norm() < 1e-14);
+      CHECK(calcGap(model, mujoco, *data, q) < 1e-10);
+    }
+  }
+}
+
 TEST_CASE("a state comes back from MuJoCo as it was set, at the neutral configuration as well") {
   unsigned seed = 100;
   std::mt19937 rng(5);

@@ -16,8 +16,8 @@
 namespace bielle {
 
 struct MjcfOptions {
-  double time_step = 2.5e-4;     ///< s
-  double closure_time = 5e-4;  ///< time constant of closures, s; MuJoCo needs at least two steps
+  double time_step = 2.5e-4;   ///< s
+  double closure_time = 5e-4;  ///< time constant of closures, s; MuJoCo takes at least two steps
   double contact_time = 1e-3;  ///< time constant of contacts and joint stops, s
   double impedance = 0.9999;   ///< share of a constraint's acceleration that is met, below 1
   double friction = 0.7;       ///< Coulomb coefficient between soles and ground
