@@ -133,7 +133,6 @@ bool MujocoWorld::advance(double duration) {
   }
   mujoco_.getState(*data_, q_, v_);
   updatePositions(model_, ws_, q_);
-  updateVelocities(model_, ws_, v_);
   soles_.update([this](int body) { return ws_.X_WB[body]; });
   return message_.empty();
 }

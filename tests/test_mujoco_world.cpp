@@ -9,6 +9,7 @@
 #include "bielle/motion/motion.h"
 #include "count_allocations.h"
 #include "engines/mujoco_model.h"
+#include "simulation/bielle_world.h"
 #include "simulation/mujoco_world.h"
 #include "simulation/terrain.h"
 #include "world_trials.h"
@@ -21,9 +22,18 @@ using namespace testing;
 // Measured: 1.4e-3 (half a step of free fall is missing from the work of gravity), 6e-8 and 9e-8 m.
 constexpr TrialTolerances kTolerances{0.005, 1e-6, 1e-6};
 
+Inertia makeBob() {
+  Inertia inertia;
+  inertia.mass = 1;
+  inertia.I_com = 0.5 * Matrix3d::Identity();
+  return inertia;
+}
+
+// As stiff as its steps allow.
 std::unique_ptr<World> makeFineWorld(const Model& model, double time_step) {
   MujocoWorldOptions options;
   options.world.time_step = time_step;
+  options.robot.closure_time = 2 * time_step;
   return makeMujocoWorld(model, options);
 }
 
@@ -105,10 +115,7 @@ TEST_CASE("mujoco world: a four-bar that falls conserves its energy the better, 
   const Model model = loadRobot("fourbar").model;
   const VectorXd q = findClosedConfiguration(model).q;
   const auto calcErrors = [&](double time_step) {
-    MujocoWorldOptions options;
-    options.world.time_step = time_step;
-    options.robot.closure_time = 2 * time_step;
-    const auto world = makeMujocoWorld(model, options);
+    const auto world = makeFineWorld(model, time_step);
     world->reset(q, VectorXd::Zero(model.nv()));
     const Books start = world->getBooks();
     double energy = 0, kinetic = 0, gap = 0;
@@ -127,6 +134,56 @@ TEST_CASE("mujoco world: a four-bar that falls conserves its energy the better, 
   CHECK(fine[0] < 0.35 * coarse[0]);  // first order: a quarter
   CHECK(fine[1] == Approx(coarse[1]).epsilon(0.01));
   CHECK(fine[2] < 2e-6);
+}
+
+TEST_CASE("mujoco world: linkages without contact move as in the world of Bielle, the closer the shorter the steps") {
+  for (const char* name : {"delta", "fivebar", "fourbar_chain"}) {
+    const Model model = loadRobot(name).model;
+    const VectorXd q = findClosedConfiguration(model).q, u = VectorXd::Constant(model.nu(), 0.05);
+    const auto run = [&](World& world) {
+      world.reset(q, VectorXd::Zero(model.nv()));
+      world.setTorques(u);
+      REQUIRE(world.advance(0.2));
+      CHECK(world.getGap() < 1e-6);
+      return VectorXd(world.getConfiguration());
+    };
+    BielleWorldOptions options;
+    options.world.time_step = 2e-5;
+    const VectorXd expected = run(*makeBielleWorld(model, options));
+    const auto calcError = [&](double time_step) {
+      return model.difference(expected, run(*makeFineWorld(model, time_step))).cwiseAbs().maxCoeff();
+    };
+    const double moved = model.difference(q, expected).cwiseAbs().maxCoeff();
+    const double coarse = calcError(1e-4), fine = calcError(2.5e-5);
+    CAPTURE(name, moved, coarse, fine);
+    CHECK(moved > 0.1);
+    CHECK(coarse < 2e-3 * moved);
+    CHECK(fine < 0.4 * coarse);  // first order: a quarter
+  }
+}
+
+TEST_CASE("mujoco world: a stop of a joint takes the energy that runs into it") {
+  Joint joint;
+  joint.name = "swing";
+  joint.kind = JointKind::Revolute;
+  joint.axis = Vector3d::UnitZ();
+  JointLimits limits;
+  limits.lower.setConstant(1, -1);
+  limits.upper.setConstant(1, 0.2);
+  ModelBuilder builder("pendulum");
+  builder.addLink("bob", "world", joint, makeBob(), limits);
+  const Model model = builder.build();
+  const auto world = makeMujocoWorld(model);
+  world->reset(VectorXd::Zero(1), VectorXd::Constant(1, 2));
+  const Books start = world->getBooks();
+  REQUIRE(world->advance(0.09));
+  CHECK(world->getConfiguration()[0] == Approx(0.18));
+  CHECK(world->getBooks().stop_loss == 0);
+  REQUIRE(world->advance(0.2));
+  const Books end = world->getBooks();
+  CHECK(world->getConfiguration()[0] < 0.2 + 1e-3);
+  CHECK(end.kinetic < 0.01 * start.kinetic);
+  CHECK(end.stop_loss == Approx(start.kinetic - end.kinetic).epsilon(1e-6));
 }
 
 TEST_CASE("mujoco world: a push in the air gives the robot its impulse and its work") {
@@ -177,11 +234,8 @@ TEST_CASE("mujoco world: torques are cut at the limits of the motors") {
   joint.name = "swing";
   joint.kind = JointKind::Revolute;
   joint.axis = Vector3d::UnitZ();  // gravity does nothing
-  Inertia inertia;
-  inertia.mass = 1;
-  inertia.I_com = 0.5 * Matrix3d::Identity();
   ModelBuilder builder("pendulum");
-  builder.addLink("bob", "world", joint, inertia);
+  builder.addLink("bob", "world", joint, makeBob());
   builder.addMotor("swing", 0, 2);
   const Model model = builder.build();
   const auto world = makeMujocoWorld(model);

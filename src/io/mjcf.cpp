@@ -78,7 +78,7 @@ class Writer {
   }
 
   void writeSettings() {
-    out_ << "  <compiler angle=\"radian\" coordinate=\"local\" inertiafromgeom=\"false\"/>\n  <option"
+    out_ << "  <compiler angle=\"radian\" inertiafromgeom=\"false\"/>\n  <option"
          << attribute("timestep", formatNumber(options_.time_step))
          << attribute("gravity", formatVector(model_.gravity()))
          << " cone=\"elliptic\" solver=\"Newton\" jacobian=\"sparse\" tolerance=\"1e-10\"/>\n  <default>\n    <joint"

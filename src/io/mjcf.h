@@ -1,5 +1,5 @@
 #pragma once
-/// \file A robot as a file of MuJoCo (MJCF), for version 2.2.2 and later.
+/// \file A robot as a file of MuJoCo (MJCF), as version 2.2.2 reads it.
 ///
 /// Bodies are written depth first, children in the order of the model, and keep their names and frames. They stand at
 /// the closed configuration q_ref, MuJoCo's qpos0, because MuJoCo closes a loop where its bodies stand in the file.
