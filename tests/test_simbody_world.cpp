@@ -69,9 +69,9 @@ TEST_CASE("simbody world: a walk goes as in Bielle's world, the more so the fine
   };
   const VectorXd reference = follow(*makeSimbodyWorld(model), policy, model, kDuration);
   const auto compare = [&](const VectorXd& q) { return model.difference(reference, q).cwiseAbs().maxCoeff(); };
-  const double coarse = compare(run(1e-3)), fine = compare(run(2.5e-4));
-  CHECK(fine < 5e-5);
-  CHECK(fine < 0.5 * coarse);
+  const double coarse = compare(run(5e-4)), fine = compare(run(1.25e-4));
+  CHECK(fine < 2e-5);
+  CHECK(fine < 0.2 * coarse);
   // The state an instant of control earlier is another one.
   CHECK(compare(follow(*makeBielleWorld(model), policy, model, kDuration - 1e-3)) > 10 * fine);
 }
