@@ -35,7 +35,8 @@ nlohmann::json toJson(const ValidationReport& report) {
           {"rows", rows}};
 }
 
-ValidationReport validate(const std::string& engine, const Model& model, const ValidationOptions& options) {
+ValidationReport validate([[maybe_unused]] const std::string& engine, const Model& model,
+                          const ValidationOptions& options) {
 #ifdef BIELLE_WITH_MUJOCO
   if (engine == "mujoco") return validateByMujoco(model, options);
 #endif
