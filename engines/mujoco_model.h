@@ -29,7 +29,7 @@ class MujocoModel {
   /// q (nq) and v (nv) of qpos and qvel.
   void getState(const mjData& data, VectorRef q, VectorRef v) const;
 
-  /// MuJoCo's mass matrix (nv x nv) and bias (nv) in the coordinates of notation.h, at data in which mj_forward was run.
+  /// MuJoCo's mass matrix (nv x nv) and bias (nv) in the coordinates of notation.h, after mj_forward.
   /// With qvel = T v:  M = T' M_m T,  b = T' (b_m + (M_m - A) dT/dt v). A is the armature, which the model adds to the
   /// acceleration of v itself.
   MatrixXd calcMassMatrix(const mjData& data) const;

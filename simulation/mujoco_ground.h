@@ -1,8 +1,8 @@
 #pragma once
 /// \file A Ground in MuJoCo: its plane, and as many boxes as can be under the soles at once.
 ///
-/// The time of MuJoCo's steps grows with the number of shapes in its model, touched or not. The model therefore has a few
-/// boxes only, which are moved to those of the ground that are near the soles.
+/// MuJoCo's steps take longer with every shape of its model, touched or not. The model therefore has a few boxes only,
+/// which are moved to those of the ground that are near the soles.
 #include <mujoco/mujoco.h>
 
 #include <string>

@@ -1,4 +1,4 @@
-"""test_mjcf.py BIELLE SOURCE: what `bielle export --format mjcf` writes is XML with the robot's names, and says what it omits."""
+"""test_mjcf.py BIELLE SOURCE: `bielle export --format mjcf` writes XML with a robot's names, and names omissions."""
 import json
 import math
 import os
@@ -41,7 +41,8 @@ def check_robot(bielle, robot, path):
 
 
 def main(bielle, source):
-    robots = ["bipetto", "cleobot", "rsu_biped", "fivebar_leg", "spring_leg", "delta", "fourbar_chain", "fourbar", "fivebar"]
+    robots = ["bipetto", "cleobot", "rsu_biped", "fivebar_leg", "spring_leg", "delta", "fourbar_chain", "fourbar",
+              "fivebar"]
     with tempfile.TemporaryDirectory() as place:
         for robot in robots:
             check_robot(bielle, os.path.join(source, "robots", robot), os.path.join(place, robot + ".xml"))

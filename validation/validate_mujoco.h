@@ -1,7 +1,7 @@
 #pragma once
 /// \file Bielle's dynamics against MuJoCo's, on the states of validate.h, without contacts.
 ///
-/// Mass matrix and bias agree to rounding. Accelerations: at a closed state whose velocity keeps it closed, MuJoCo solves
+/// Mass matrix and bias agree to rounding. At a closed state whose velocity keeps it closed, its accelerations obey
 ///
 ///     M a + b = tau + J^T f,   J a + R f = 0                                                                       (1)
 ///
@@ -18,7 +18,7 @@ namespace bielle::validation {
 /// \throws ModelError when MuJoCo refuses the robot
 ValidationReport validateByMujoco(const Model& model, const ValidationOptions& options = {});
 
-/// The same with MuJoCo's robot made from another model with the same joints and closures: shows that a wrong model fails.
+/// The same with MuJoCo's robot made from another model with the same joints and closures: a wrong model must fail.
 ValidationReport validateAgainstMujoco(const Model& model, const Model& oracle, const ValidationOptions& options = {});
 
 }  // namespace bielle::validation

@@ -53,7 +53,6 @@ class Writer {
   MjcfText write() {
     out_ << "<mujoco" << attribute("model", model_.name()) << ">\n";
     writeSettings();
-    if (!options_.ground_asset.empty()) out_ << "  <asset>\n" << options_.ground_asset << "  </asset>\n";
     out_ << "  <worldbody>\n";
     if (!options_.ground.empty())
       out_ << options_.ground;

@@ -6,8 +6,8 @@
 /// Coordinates follow the bodies; mjcf_coordinates.h maps those of a joint.
 ///
 /// Motors are actuators of their names, in the order of u, in N m or N. A weld is a `weld`, a ball a `connect`, a hinge
-/// two `connect`s NAME.1 and NAME.2 on its axis. Soles are four spheres at their corners (a point contact is one), named
-/// after the contact and numbered from 1, that touch only the plane z = 0; references are keyframes.
+/// two `connect`s NAME.1 and NAME.2 on its axis. A sole is four spheres at its corners, a point contact one sphere,
+/// named after the contact and numbered from 1; they touch only the ground. References are keyframes.
 #include <string>
 #include <vector>
 
@@ -23,8 +23,7 @@ struct MjcfOptions {
   double friction = 0.7;       ///< Coulomb coefficient between soles and ground
   double sole_radius = 5e-3;   ///< of the spheres of soles, m
   double hinge_lever = 0.02;   ///< distance of the two points of a hinge from its frame, m
-  std::string ground_asset;    ///< elements of <asset> that the ground needs
-  std::string ground;          ///< elements of <worldbody> that soles touch; empty: the plane z = 0
+  std::string ground;          ///< elements of `worldbody` that soles touch; empty: the plane z = 0
 };
 
 struct MjcfText {

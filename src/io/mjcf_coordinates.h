@@ -5,15 +5,15 @@
 /// of the joint at q, R2 that by the angle of a planar joint; MuJoCo's quaternions are w x y z. A joint becomes one or
 /// several elements of one body, in this order:
 ///
-/// | joint                   | elements                                | qpos                       | qvel                |
-/// |-------------------------|-----------------------------------------|----------------------------|---------------------|
-/// | revolute, continuous    | hinge NAME                              | q                          | v                   |
-/// | prismatic               | slide NAME                              | q                          | v                   |
-/// | spherical               | ball NAME                               | q_ref^-1 q                 | v                   |
-/// | universal               | hinges NAME.angle1, NAME.angle2         | q                          | v                   |
-/// | planar                  | slides NAME.x, NAME.y, hinge NAME.angle | q                          | R2 (v_x, v_y), rate |
-/// | free-flyer of a root    | free NAME                               | position, quaternion       | R v_lin, w          |
-/// | free-flyer of any other | slides NAME.x, .y, .z, ball NAME        | position, q_ref^-1 q       | R v_lin, w          |
+/// | joint                   | elements                                | qpos                 | qvel                |
+/// |-------------------------|-----------------------------------------|----------------------|---------------------|
+/// | revolute, continuous    | hinge NAME                              | q                    | v                   |
+/// | prismatic               | slide NAME                              | q                    | v                   |
+/// | spherical               | ball NAME                               | q_ref^-1 q           | v                   |
+/// | universal               | hinges NAME.angle1, NAME.angle2         | q                    | v                   |
+/// | planar                  | slides NAME.x, NAME.y, hinge NAME.angle | q                    | R2 (v_x, v_y), rate |
+/// | free-flyer of a root    | free NAME                               | position, quaternion | R v_lin, w          |
+/// | free-flyer of any other | slides NAME.x, .y, .z, ball NAME        | position, q_ref^-1 q | R v_lin, w          |
 ///
 /// A root is a body on the world with the identity as placement of its joint: MuJoCo has no other free joints.
 #include <string>
