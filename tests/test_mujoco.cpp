@@ -116,6 +116,23 @@ TEST_CASE("MuJoCo starts at the closed configuration, and the references are its
   }
 }
 
+TEST_CASE("a robot that nobody drives falls with its loops closed") {
+  for (const char* name : {"bipetto", "cleobot", "rsu_biped", "spring_leg", "delta", "fourbar_chain"}) {
+    const Model model = loadRobot(name).model;
+    const MujocoModel mujoco(model, findClosedConfiguration(model).q);
+    const auto data = mujoco.makeData();
+    double gap = 0;
+    while (data->time < 0.5) {
+      mj_step(mujoco.get(), data.get());
+      for (int i = 0; i < data->ne; ++i) gap = std::max(gap, std::abs(data->efc_pos[i]));
+    }
+    CAPTURE(name, gap);
+    CHECK(data->warning[mjWARN_BADQACC].number == 0);
+    CHECK(gap < 2e-4);
+    CHECK(Eigen::Map<const VectorXd>(data->qvel, model.nv()).norm() > 0.1);
+  }
+}
+
 TEST_CASE("a state comes back from MuJoCo as it was set, at the neutral configuration as well") {
   unsigned seed = 100;
   std::mt19937 rng(5);
