@@ -218,7 +218,7 @@ void addOptions(CLI::App& app, Arguments& a) {
   app.add_option("--duration", a.execution.duration, "of the simulation [s]; 0: that of the plan and --hold")
       ->check(CLI::Range(0.0, 1e4))
       ->capture_default_str();
-  app.add_option("--hold", a.execution.hold, "how long the last policy is held after the plan [s]")
+  app.add_option("--hold", a.execution.hold, "how long the robot stands in its last posture after the plan [s]")
       ->check(CLI::Range(0.0, 1e4))
       ->capture_default_str();
   app.add_option("--time-step", a.time_step, "of worlds with fixed steps [s]; 0: the world's own")

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/control/policy.h"
+#include "bielle/dynamics/constrained.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "bielle/solve/node_evaluator.h"
@@ -76,7 +77,7 @@ TEST_CASE("policy: its gains are those of the solver's last sweep") {
   }
 }
 
-TEST_CASE("policy: without gains the state does not matter; after the end the last node is held at rest") {
+TEST_CASE("policy: without gains the state does not matter; the plan ends at rest") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;
   Policy open = makePolicy(squat.motion, squat.motion.guess);
@@ -88,6 +89,31 @@ TEST_CASE("policy: without gains the state does not matter; after the end the la
   open.getReference(100, q, v);
   CHECK(v.isZero(0));
   CHECK(model.difference(squat.motion.guess.xs.back().head(model.nq()), q).norm() < 1e-12);
+}
+
+TEST_CASE("policy: after its end the torques hold the last posture, and gains call the robot back") {
+  SolvedSquat& squat = getSquat();
+  const Model& model = squat.robot.model;
+  Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver);
+  Measurement at{policy.getDuration() + 0.5, model.makeNeutral(), VectorXd::Zero(model.nv())};
+  policy.getReference(at.time, at.q, at.v);
+  VectorXd u(model.nu()), other(model.nu());
+  policy.update(at, u);
+  Workspace ws(model);
+  ConstrainedWorkspace cws;
+  ConstraintSet set = makeConstraintSet(model, squat.motion.schedule.phases.back().contacts);
+  for (Closure& closure : set.closures) closure.kp = closure.kd = 0;  // the feet may stand where they are
+  const auto calcAcceleration = [&](const VectorXd& torques) {
+    updateConstrainedDynamics(model, ws, cws, set, at.q, at.v, calcMotorForces(model, torques));
+    return cws.a.norm();
+  };
+  CHECK(calcAcceleration(u) < 1e-6);
+  other = u;
+  other[3] *= 1.001;
+  CHECK(calcAcceleration(other) > 1e-3);
+  at.v[0] += 0.01;  // forwards
+  policy.update(at, other);
+  CHECK((other - u).norm() > 0.01);
 }
 
 TEST_CASE("policy: an update does not allocate") {

@@ -11,7 +11,7 @@ namespace {
 
 // A clock that sums up its steps may be this much early; without it, stages would begin one instant of control late.
 constexpr double kClockTolerance = 1e-9;  // s
-constexpr double kPerturbation = 0.01;  // of Eq. (2); differences are linear in it but for rounding
+constexpr double kPerturbation = 0.01;    // of Eq. (2); differences are linear in it but for rounding
 
 double getMiddle(const Policy::Stage& stage) { return stage.start + 0.5 * stage.duration; }
 
@@ -69,10 +69,21 @@ std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajec
   return stages;
 }
 
+// Torques that hold the last posture on the contacts of the last phase.
+VectorXd calcHoldTorques(const Motion& motion, const ShootingTrajectory& trajectory) {
+  const Model& model = motion.problem->model();
+  return calcStaticTorques(model, makeConstraintSet(model, motion.schedule.phases.back().contacts),
+                           trajectory.xs.back().head(model.nq()))
+      .u;
+}
+
 }  // namespace
 
-Policy::Policy(const Model& model, std::vector<Stage> stages) : model_(model), stages_(std::move(stages)) {
+Policy::Policy(const Model& model, std::vector<Stage> stages, const VectorXd& u_hold)
+    : model_(model), stages_(std::move(stages)), u_hold_(u_hold) {
   if (stages_.empty()) throw std::invalid_argument("Policy: there are no stages");
+  last_phase_ = stages_.size() - 1;
+  while (last_phase_ > 0 && stages_[last_phase_ - 1].phase == stages_.back().phase) --last_phase_;
   step_.setZero(model.nv());
   q_ = model.makeNeutral();
   error_.setZero(2 * model.nv());
@@ -98,6 +109,11 @@ void Policy::getReference(double time, VectorRef q, VectorRef v) const {
 
 void Policy::update(const Measurement& measurement, VectorRef u) {
   const double time = measurement.time;
+  if (time + kClockTolerance >= getDuration()) {
+    u = u_hold_;
+    addFeedback(last_phase_, 1, measurement, u);
+    return;
+  }
   const size_t k = findStage(time);
   const Stage& stage = stages_[k];
   const bool early = time < getMiddle(stage);
@@ -107,23 +123,30 @@ void Policy::update(const Measurement& measurement, VectorRef u) {
     const double weight = (time - getMiddle(stage)) / (getMiddle(stages_[other]) - getMiddle(stage));
     u += weight * (stages_[other].u - stage.u);
   }
-  if (stage.K.size() == 0) return;
-  auto dq = error_.head(model_.nv()), dv = error_.tail(model_.nv());
-  getReference(time, q_, dv);
-  dv = measurement.v - dv;
-  model_.difference(q_, measurement.q, dq);
   const bool blends = k + 1 < stages_.size() && stages_[k + 1].phase == stage.phase;
   const double s = blends ? std::clamp((time - stage.start) / stage.duration, 0.0, 1.0) : 0;
-  u.noalias() += (1 - s) * (stage.K * error_);
-  if (blends) u.noalias() += s * (stages_[k + 1].K * error_);
+  addFeedback(k, 1 - s, measurement, u);
+  if (blends) addFeedback(k + 1, s, measurement, u);
+}
+
+// The gains of a stage times the deviation from the plan.
+void Policy::addFeedback(size_t stage, double weight, const Measurement& measurement, VectorRef u) {
+  const RowMatrixXd& K = stages_[stage].K;
+  if (K.size() == 0) return;
+  auto dq = error_.head(model_.nv()), dv = error_.tail(model_.nv());
+  getReference(measurement.time, q_, dv);
+  dv = measurement.v - dv;
+  model_.difference(q_, measurement.q, dq);
+  u.noalias() += weight * (K * error_);
 }
 
 Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory) {
-  return {motion.problem->model(), makeStages(motion, trajectory, nullptr)};
+  return {motion.problem->model(), makeStages(motion, trajectory, nullptr), calcHoldTorques(motion, trajectory)};
 }
 
 Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory, const Fddp& solver) {
-  return {motion.problem->model(), makeStages(motion, trajectory, &solver.getSweep())};
+  return {motion.problem->model(), makeStages(motion, trajectory, &solver.getSweep()),
+          calcHoldTorques(motion, trajectory)};
 }
 
 }  // namespace bielle

@@ -11,7 +11,8 @@
 ///     K_k = K_k^solver d(x (-) x_k)/d(dq, dv)                                                                       (2)
 ///
 /// (nu x 2 nv): in the reduced formulation a state that is not closed is thus projected on the closed ones. After its end the
-/// policy holds the last node, at rest.
+/// policy holds the last posture with the torques u_hold that carry it at rest, and with the gains of the first stage of the
+/// last phase: those of its last stages look ahead too little to care for where the robot is.
 #include <vector>
 
 #include "bielle/control/controller.h"
@@ -33,7 +34,8 @@ class Policy : public Controller {
   };
 
   /// \param model  must outlive it   \param stages  at least one, in the order of time
-  Policy(const Model& model, std::vector<Stage> stages);
+  /// \param u_hold  nu
+  Policy(const Model& model, std::vector<Stage> stages, const VectorXd& u_hold);
 
   void update(const Measurement& measurement, VectorRef u) override;
   /// q* and v* of Eq. (1).
@@ -43,9 +45,12 @@ class Policy : public Controller {
 
  private:
   size_t findStage(double time) const;
+  void addFeedback(size_t stage, double weight, const Measurement& measurement, VectorRef u);
 
   const Model& model_;
   std::vector<Stage> stages_;
+  VectorXd u_hold_;        // nu
+  size_t last_phase_ = 0;  // its first stage
   mutable VectorXd step_;  // nv
   VectorXd q_, error_;     // nq, 2 nv
 };
