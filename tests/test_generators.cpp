@@ -83,7 +83,11 @@ void checkSame(const Model& a, const Model& b) {
     CHECK((ca.X_B2.p - cb.X_B2.p).norm() < 1e-11);
   }
   REQUIRE(a.nu() == b.nu());
-  for (int m = 0; m < a.nu(); ++m) CHECK(a.motors()[m].name == b.motors()[m].name);
+  for (int m = 0; m < a.nu(); ++m) {
+    CHECK(a.motors()[m].name == b.motors()[m].name);
+    CHECK(a.motors()[m].effort_limit == b.motors()[m].effort_limit);
+    CHECK(a.motors()[m].torque_loss == b.motors()[m].torque_loss);
+  }
   CHECK((a.armature() - b.armature()).norm() < 1e-12);
   CHECK(a.lowerLimits() == b.lowerLimits());
   CHECK(a.upperLimits() == b.upperLimits());
@@ -231,6 +235,16 @@ TEST_CASE("writer: names are escaped, what the files cannot say is refused") {
   const Model model = build(joint);
   writeRobot(model, directory.path() + "/odd");
   checkSame(model, loadRobot(directory.path() + "/odd").model);
+
+  ModelBuilder motors("motors");
+  for (const char* name : {"known", "unknown"})
+    motors.addLink(name, "world", makeRevolute(name, {0, 0, 0}, Vector3d::UnitZ()),
+                   {1, Vector3d::Zero(), Matrix3d::Identity()});
+  motors.addMotor("known", 0.1, 20, 3, 0.0625);
+  motors.addMotor("unknown", 0.1);
+  const Model driven = motors.build();
+  writeRobot(driven, directory.path() + "/motors");
+  checkSame(driven, loadRobot(directory.path() + "/motors").model);
 
   const Joint skew = makeUniversal("u", {0, 0, 0}, Vector3d(1, 1, 0).normalized(), Vector3d::UnitZ());
   CHECK_THROWS_WITH(formatRobot(build(skew)), Catch::Contains("universal joint 'u'"));

@@ -122,7 +122,7 @@ TEST_CASE("motors and limits by dof, with the tighter of two velocity limits") {
   limits.velocity = VectorXd::Constant(1, 5);
   builder.addLink("a", "world", makeJoint("ja", JointKind::Revolute), makeBall(1), limits);
   builder.addLink("b", "a", makeJoint("jb", JointKind::Universal), makeBall(1));
-  builder.addMotor("ja", 0.1, 20, 3);
+  builder.addMotor("ja", 0.1, 20, 3, 0.5);
   builder.setArmature("jb", 0.2);
   const Model model = builder.build();
   CHECK(model.lowerLimits()[0] == -1);
@@ -130,6 +130,7 @@ TEST_CASE("motors and limits by dof, with the tighter of two velocity limits") {
   CHECK(model.velocityLimits()[0] == 3);
   CHECK((model.armature() - Vector3d(0.1, 0.2, 0.2)).norm() == 0);
   CHECK(model.motors()[0].effort_limit == 20);
+  CHECK(model.motors()[0].getTorqueLoss() == 0.5);
 }
 
 TEST_CASE("axes are made unit vectors") {
@@ -182,6 +183,7 @@ TEST_CASE("what cannot be a robot is refused by name") {
   CHECK_THAT(getErrorOf([](B& b) { b.addMotor("jc", NAN); }), named("motor 'jc'") && Contains("armature"));
   CHECK_THAT(getErrorOf([](B& b) { b.addMotor("jc", 0, NAN); }), named("motor 'jc'") && Contains("effort"));
   CHECK_THAT(getErrorOf([](B& b) { b.addMotor("jc", 0, 1, 0); }), named("motor 'jc'") && Contains("velocity"));
+  CHECK_THAT(getErrorOf([](B& b) { b.addMotor("jc", 0, 1, 1, -1); }), named("motor 'jc'") && Contains("torque_loss"));
   CHECK_THAT(getErrorOf([](B& b) {
                b.addMotor("jc");
                b.setArmature("jc", 1);

@@ -174,7 +174,7 @@ TEST_CASE("closures: joints stand for their child, pairs for their common name, 
 }
 
 TEST_CASE("motors, armature, contacts, references, serial joints and gravity arrive") {
-  const Model model = load(kToyUrdf, R"(motors: {shoulder: {effort: .inf, velocity: 9}, rod_joint: }
+  const Model model = load(kToyUrdf, R"(motors: {shoulder: {effort: .inf, velocity: 9, torque_loss: 0.4}, rod_joint: }
 armature: 0.25
 contacts: {toe: {frame: hand, type: 6d, sole: [0.2, 0.1]}, heel: {frame: rod, type: 3D}}
 serial_joints: [rod_joint, shoulder]
@@ -188,6 +188,9 @@ references:
   const int shoulder = getJoint(model, "shoulder").idx_v, rod = getJoint(model, "rod_joint").idx_v;
   CHECK(model.motors()[0].effort_limit == kInf);
   CHECK(model.motors()[0].velocity_limit == 9);
+  CHECK(model.motors()[0].torque_loss == 0.4);
+  CHECK_FALSE(model.motors()[1].torque_loss);
+  CHECK(model.motors()[1].getTorqueLoss() == kDefaultTorqueLoss);
   CHECK(model.velocityLimits()[shoulder] == 9);
   CHECK(model.motors()[1].dof == rod);
   CHECK(model.armature().sum() == 0.5);

@@ -28,7 +28,8 @@ Model copyModel(const Model& model, const ModelChanges& changes) {
     builder.addContact(contact.name, contact.name + "/frame", contact.kind, contact.half_length, contact.half_width);
   }
   for (const Motor& motor : model.motors())
-    builder.addMotor(motor.name, changes.armature_scale * motor.armature, motor.effort_limit, motor.velocity_limit);
+    builder.addMotor(motor.name, changes.armature_scale * motor.armature, motor.effort_limit, motor.velocity_limit,
+                     motor.torque_loss);
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
     if (joint.nv > 0 && model.findMotor(joint.name) < 0)

@@ -110,7 +110,8 @@ Json describe(const LoadedRobot& robot) {
     json["motors"].push_back({{"name", motor.name},
                               {"armature", motor.armature},
                               {"effort_limit", orNull(motor.effort_limit)},
-                              {"velocity_limit", orNull(motor.velocity_limit)}});
+                              {"velocity_limit", orNull(motor.velocity_limit)},
+                              {"torque_loss", motor.torque_loss ? Json(*motor.torque_loss) : Json()}});
   for (const ContactFrame& contact : model.contacts())
     json["contacts"].push_back({{"name", contact.name},
                                 {"kind", contact.kind == ContactKind::Surface6D ? "6d" : "3d"},

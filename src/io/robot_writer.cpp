@@ -260,6 +260,7 @@ class Writer {
       out << "  " << quote(motor.name) << ": {armature: " << formatNumber(motor.armature);
       if (std::isfinite(motor.effort_limit)) out << ", effort: " << formatNumber(motor.effort_limit);
       if (std::isfinite(motor.velocity_limit)) out << ", velocity: " << formatNumber(motor.velocity_limit);
+      if (motor.torque_loss) out << ", torque_loss: " << formatNumber(*motor.torque_loss);
       out << "}\n";
     }
     std::string others;

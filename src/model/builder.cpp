@@ -120,7 +120,8 @@ void ModelBuilder::addClosure(const std::string& name, ClosureKind kind, const s
   model_.closures_.push_back(closure);
 }
 
-void ModelBuilder::addMotor(const std::string& joint, double armature, double effort_limit, double velocity_limit) {
+void ModelBuilder::addMotor(const std::string& joint, double armature, double effort_limit, double velocity_limit,
+                            std::optional<double> torque_loss) {
   const std::string element = "motor '" + joint + "'";
   const int index = model_.findJoint(joint);
   if (index < 0) fail(element, "there is no moving joint of this name", "name a joint of the robot that is not fixed");
@@ -133,7 +134,9 @@ void ModelBuilder::addMotor(const std::string& joint, double armature, double ef
     fail(element, "its armature is not a finite number of 0 or more", "give a rotor inertia");
   if (!(effort_limit > 0)) fail(element, "its effort limit is not positive", "give a positive limit or none");
   if (!(velocity_limit > 0)) fail(element, "its velocity limit is not positive", "give a positive limit or none");
-  model_.motors_.push_back({joint, index, j.idx_v, armature, effort_limit, velocity_limit});
+  if (torque_loss && !(*torque_loss >= 0 && std::isfinite(*torque_loss)))
+    fail(element, "its torque_loss is not a finite number of 0 or more", "give W/(N m)^2, or leave it out");
+  model_.motors_.push_back({joint, index, j.idx_v, armature, effort_limit, velocity_limit, torque_loss});
 }
 
 void ModelBuilder::addContact(const std::string& name, const std::string& frame, ContactKind kind, double half_length,

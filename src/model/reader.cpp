@@ -164,7 +164,7 @@ void addMotors(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder
     armature.erase(motor.joint);
     builder.addMotor(motor.joint, motor.armature.value_or(from_map),
                      motor.effort.value_or(found ? joint->effort.value_or(inf) : inf),
-                     motor.velocity.value_or(found ? joint->velocity.value_or(inf) : inf));
+                     motor.velocity.value_or(found ? joint->velocity.value_or(inf) : inf), motor.torque_loss);
   }
   for (const auto& [joint, value] : armature) builder.setArmature(joint, value);
 }

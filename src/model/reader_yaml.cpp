@@ -122,16 +122,17 @@ void readMotors(const Fields& fields, YamlFile& file) {
   if (motors) {
     if (names) file.warnings.push_back(file.path + ": key 'name_mot': it is ignored, 'motors' lists the motors");
     for (const auto& [joint, entry] : motors->getMap()) {
-      const Fields f = entry.getFields({"armature", "effort", "velocity"});
+      const Fields f = entry.getFields({"armature", "effort", "velocity", "torque_loss"});
       MotorSpec motor;
       motor.joint = joint;
       if (const Entry* e = find(f, "armature")) motor.armature = e->getNumber();
       if (const Entry* e = find(f, "effort")) motor.effort = e->getNumber(true);
       if (const Entry* e = find(f, "velocity")) motor.velocity = e->getNumber(true);
+      if (const Entry* e = find(f, "torque_loss")) motor.torque_loss = e->getNumber();
       file.motors.push_back(motor);
     }
   } else if (names) {
-    for (const std::string& joint : names->getTexts()) file.motors.push_back({joint, {}, {}, {}});
+    for (const std::string& joint : names->getTexts()) file.motors.push_back({joint, {}, {}, {}, {}});
   }
   if (const Entry* armature = find(fields, "armature")) {
     if (!armature->isMap()) {

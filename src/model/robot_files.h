@@ -49,7 +49,7 @@ struct ClosureSpec {
 
 struct MotorSpec {
   std::string joint;
-  std::optional<double> armature, effort, velocity;
+  std::optional<double> armature, effort, velocity, torque_loss;
 };
 
 struct ContactSpec {

@@ -34,7 +34,8 @@ class ModelBuilder {
                   const Vector3d& axis = Vector3d::UnitZ(), double kp = 0, double kd = 0);
   void addMotor(const std::string& joint, double armature = 0,
                 double effort_limit = std::numeric_limits<double>::infinity(),
-                double velocity_limit = std::numeric_limits<double>::infinity());
+                double velocity_limit = std::numeric_limits<double>::infinity(),
+                std::optional<double> torque_loss = {});
   void addContact(const std::string& name, const std::string& frame, ContactKind kind, double half_length,
                   double half_width);
   /// Its joints, contacts and frame must be declared before it.

@@ -28,8 +28,8 @@
 /// - `base: free | fixed`
 /// - `closures: [{name, frames: [A, B], type, axis, kp, kd}, ...]` after those of `closed_loop`; `axis` of a 5d hinge,
 ///   in frame 1 (default z); kp in 1/s^2, kd in 1/s (default 0)
-/// - `motors: {joint: {armature, effort, velocity}, ...}` instead of `name_mot`; its limits (.inf for none) replace
-///   those of the URDF
+/// - `motors: {joint: {armature, effort, velocity, torque_loss}, ...}` instead of `name_mot`; its limits (.inf for none)
+///   replace those of the URDF; `torque_loss` in W/(N m)^2 (model.h)
 /// - `armature: {joint: kg m^2, ...}`, or one number for all motors without one in `motors`
 /// - `contacts: {name: {frame, type: 6d | 3d, sole: [length, width]}, ...}`; the sole is centred on its frame, length
 ///   along x, m
