@@ -1,0 +1,73 @@
+#pragma once
+/// \file The least peak of the controls: a shooting problem whose controls stay within a common share of their limits.
+///
+/// From a shooting problem (the inner one) with controls u, and limits L_i > 0, infinite for controls that do not count,
+///
+///     min  sum_k l_k(x_k, u_k) + l_N(x_N) + weight s^2    s.t.  |u_i| <= s L_i  at every stage,    s <= most        (1)
+///
+/// beside what the inner problem asks for. The share s is a control of the first stage and a state of all other nodes,
+/// and the other controls are replaced by
+///
+///     u_i = s L_i w_i,   -1 <= w_i <= 1    (u_i = w_i, within its own bounds, where L_i is infinite).               (2)
+///
+/// Bounds of w do not change with s, so that a solver with ControlBounds::Enforce keeps them exactly. The model of (2) is
+/// that of first order: its second derivative, by s and w_i, belongs to the derivative of the Lagrangian by u_i, which at a
+/// solution vanishes, unless w_i is at a bound and does not move. The cost is quadratic in s because the model of s takes its
+/// curvature from there.
+#include <cmath>
+#include <memory>
+
+#include "bielle/solve/shooting_problem.h"
+
+namespace bielle {
+
+class PeakProblem : public ShootingProblem {
+ public:
+  /// \param inner  must outlive it
+  /// \param limits  L, of the first controls of every stage; controls after them do not count
+  /// \param weight  positive   \param most  largest s, may be infinite
+  /// \throws std::invalid_argument when limits are not positive, none is finite, or weight or `most` is not positive
+  PeakProblem(const ShootingProblem& inner, const VectorXd& limits, double weight, double most);
+
+  int numStages() const override { return inner_.numStages(); }
+  int stateSize() const override { return inner_.stateSize() + 1; }
+  int tangentSize(int node) const override { return inner_.tangentSize(node) + (node > 0 ? 1 : 0); }
+  int controlSize(int stage) const override { return inner_.controlSize(stage) + (stage > 0 ? 0 : 1); }
+  const VectorXd& initialState() const override { return x0_; }
+  void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override;
+  int constraintSize(int node) const override { return inner_.constraintSize(node); }
+  void getConstraintBounds(int node, VectorRef lower, VectorRef upper) const override {
+    inner_.getConstraintBounds(node, lower, upper);
+  }
+  std::string getConstraintName(int node, int row) const override { return inner_.getConstraintName(node, row); }
+  std::unique_ptr<NodeEvaluation> makeEvaluation() const override;
+  std::unique_ptr<ProblemScratch> makeScratch() const override;
+  void evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const override;
+  void linearize(LinearizeTask* tasks, int count, ProblemScratch* scratch) const override;
+  void integrate(const IntegrateTask* tasks, int count, ProblemScratch* scratch) const override;
+  void difference(const DifferenceTask* tasks, int count, ProblemScratch* scratch) const override;
+  int getBatchSize() const override { return inner_.getBatchSize(); }
+
+  /// The largest |u_i| / L_i of a trajectory of the inner problem.
+  double calcPeak(const ShootingTrajectory& inner) const;
+  /// The same trajectory here, with s its peak, and back.
+  ShootingTrajectory wrap(const ShootingTrajectory& inner) const;
+  ShootingTrajectory unwrap(const ShootingTrajectory& trajectory) const;
+
+ private:
+  double getShare(int node, const VectorXd& x, const VectorXd& u) const {
+    return node > 0 ? x[x.size() - 1] : u[u.size() - 1];
+  }
+  bool counts(Eigen::Index control) const { return control < limits_.size() && std::isfinite(limits_[control]); }
+  double getFactor(Eigen::Index control, double share) const { return counts(control) ? share * limits_[control] : 1; }
+  void setModel(int node, const NodeEvaluation& at, const NodeEvaluation* next, StageModel& inner,
+                StageModel& out) const;
+  void setHessian(int node, const NodeEvaluation& at, const StageModel& inner, StageModel& out) const;
+
+  const ShootingProblem& inner_;
+  VectorXd limits_;
+  double weight_, most_;
+  VectorXd x0_;
+};
+
+}  // namespace bielle
