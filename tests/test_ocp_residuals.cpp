@@ -20,7 +20,7 @@ constexpr double kStep = 5e-4;
 // A node at (q, v) with forces lambda.
 struct TestNode {
   explicit TestNode(const Model& model, const ConstraintSet& set)
-      : model(model), set(set), ws(model), u(VectorXd::Zero(model.nu())), lambda(VectorXd::Zero(set.rows)) {}
+      : model(model), set(set), ws(model), u(VectorXd::Zero(model.nu())), lambda(VectorXd::Zero(set.rows)), speeds(u) {}
   VectorXd calc(const Residual& residual, const VectorXd& q, const VectorXd& v, const VectorXd& forces) {
     move(q, v, forces);
     VectorXd r(residual.size());
@@ -33,12 +33,12 @@ struct TestNode {
     updateMassMatrix(model, ws);
     lambda = forces;
   }
-  NodeView view() const { return {model, ws, set, u, lambda, time_scale}; }
+  NodeView view() const { return {model, ws, set, u, lambda, time_scale, &speeds}; }
 
   const Model& model;
   const ConstraintSet& set;
   Workspace ws;
-  VectorXd u, lambda;
+  VectorXd u, lambda, speeds;
   double time_scale = 1.3;
 };
 
@@ -83,6 +83,7 @@ std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, 
     add("transmission of " + linkage.joints, makeTransmission(linkage));
   add("joint position", makeJointPosition(model, dofs));
   add("joint velocity", makeJointVelocity(dofs));
+  if (model.nu() > 0) add("electrical power", makeElectricalPower(randomVector(rng, model.nu()).cwiseAbs()));
   if (model.nu() > 1) add("motor power", makeMotorPower(model, {model.nu() - 1, 0}));
   return out;
 }
@@ -91,18 +92,20 @@ void checkResidual(const Model& model, const ConstraintSet& set, const Residual&
                    const VectorXd& v, const VectorXd& lambda) {
   const int n = residual.size(), nv = model.nv();
   MatrixXd dq = MatrixXd::Zero(n, nv), dv = dq, dlambda = MatrixXd::Zero(n, set.rows),
-           du = MatrixXd::Zero(n, model.nu());
+           du = MatrixXd::Zero(n, model.nu()), dspeeds = du;
   VectorXd ds = VectorXd::Zero(n);
   TestNode node(model, set);
   // The Jacobian is written over that of another state: what it does not write must be zero everywhere.
   std::mt19937 rng(99);
   node.move(model.integrate(q, randomVector(rng, nv, 0.5)), v + randomVector(rng, nv), 2 * lambda);
   node.u = randomVector(rng, model.nu());
-  residual.calcJacobian(node.view(), {dq, dv, dlambda, du, ds});
+  node.speeds = randomVector(rng, model.nu());
+  residual.calcJacobian(node.view(), {dq, dv, dlambda, du, dspeeds, ds});
   node.move(q, v, lambda);
   const VectorXd u = randomVector(rng, model.nu());
   node.u = u;
-  residual.calcJacobian(node.view(), {dq, dv, dlambda, du, ds});
+  node.speeds = randomVector(rng, model.nu());
+  residual.calcJacobian(node.view(), {dq, dv, dlambda, du, dspeeds, ds});
   checkDerivative(
       dq, differentiateTangent(model, q, kStep, [&](const VectorXd& x) { return node.calc(residual, x, v, lambda); }));
   checkDerivative(dv, differentiate(v, kStep, [&](const VectorXd& x) { return node.calc(residual, q, x, lambda); }));
@@ -112,6 +115,13 @@ void checkResidual(const Model& model, const ConstraintSet& set, const Residual&
                     return other.calc(residual, q, v, lambda);
                   }));
   CHECK(residual.needsControls() == !du.isZero(0));
+  CHECK(residual.needsSpeeds() == !dspeeds.isZero(0));
+  if (model.nu() > 0)
+    checkDerivative(dspeeds, differentiate(node.speeds, kStep, [&](const VectorXd& x) {
+                      TestNode other = node;
+                      other.speeds = x;
+                      return other.calc(residual, q, v, lambda);
+                    }));
   if (model.nu() > 0)
     checkDerivative(du, differentiate(u, kStep, [&](const VectorXd& x) {
                       node.u = x;

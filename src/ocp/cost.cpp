@@ -1,6 +1,7 @@
 #include "bielle/ocp/cost.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace bielle {
 namespace {
@@ -19,17 +20,34 @@ Activation Activation::makeBarrier(const VectorXd& weights, const VectorXd& lowe
   return {ActivationKind::Barrier, weights, lower, upper};
 }
 
+Activation Activation::makeEnergy(const VectorXd& weights, const VectorXd& losses, double share, double smoothing) {
+  Activation out;
+  out.kind = ActivationKind::Energy;
+  out.weights = weights;
+  out.losses = losses;
+  out.share = share;
+  out.smoothing = smoothing;
+  return out;
+}
+
 bool PathConstraint::hasSize(Eigen::Index rows) const {
   return lower.size() == rows && upper.size() == rows && scale.size() == rows;
 }
 
 bool Activation::hasSize(Eigen::Index rows) const {
+  if (kind == ActivationKind::Energy)
+    return weights.size() == losses.size() && rows == 2 * losses.size() && smoothing > 0;
   return weights.size() == rows &&
          (kind == ActivationKind::Quadratic || (lower.size() == rows && upper.size() == rows));
 }
 
 double Activation::calc(ConstVectorRef r) const {
   double sum = 0;
+  if (kind == ActivationKind::Energy) {
+    for (Eigen::Index i = 0; i < losses.size(); ++i)
+      sum += weights[i] * (share * r[i] + (1 - share) * (r[i] + std::hypot(r[i], smoothing)) / 2);
+    return sum;
+  }
   for (Eigen::Index i = 0; i < r.size(); ++i) {
     const double d = calcDistance(*this, i, r[i]);
     sum += 0.5 * weights[i] * d * d;
@@ -38,6 +56,17 @@ double Activation::calc(ConstVectorRef r) const {
 }
 
 void Activation::calcDerivatives(ConstVectorRef r, VectorRef gradient, VectorRef hessian) const {
+  if (kind == ActivationKind::Energy) {
+    const Eigen::Index n = losses.size();
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double root = std::hypot(r[i], smoothing), slope = share + (1 - share) * (1 + r[i] / root) / 2;
+      gradient[i] = weights[i] * slope;
+      hessian[i] = weights[i] * (1 - share) * smoothing * smoothing / (2 * root * root * root);
+      gradient[n + i] = 0;
+      hessian[n + i] = weights[i] * slope * 2 * losses[i];
+    }
+    return;
+  }
   for (Eigen::Index i = 0; i < r.size(); ++i) {
     const double d = calcDistance(*this, i, r[i]);
     gradient[i] = weights[i] * d;

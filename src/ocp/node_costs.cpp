@@ -10,6 +10,7 @@ NodeCosts::NodeCosts(const StageSpec& spec, bool running) : spec_(spec), first_r
     blocks_.push_back({&residual, cost, constraint, rows_, row});
     rows_ += residual.size();
     needs_controls_ |= residual.needsControls();
+    needs_speeds_ |= residual.needsSpeeds();
   };
   for (bool motion : {true, false}) {
     for (size_t c = 0; c < spec.costs.size(); ++c) {
@@ -81,17 +82,18 @@ void NodeCosts::selectRows(const RobotEvaluation& at, const ConstraintWeights* c
       hessian = constraints->hessian.segment(block.constraint_row, n).cwiseQuotient(unit.cwiseAbs2());
     }
     if (gradient.isZero(0) && hessian.isZero(0)) continue;
-    rows.blocks.push_back({block.residual, rows.rows, n, block.constraint != nullptr});
+    rows.blocks.push_back({block.residual, rows.rows, n, block.cost && block.cost->activation.isSquare()});
     rows.rows += n;
     if (block.residual->needsMotion()) rows.motion_rows = rows.rows;
   }
 }
 
 void NodeCosts::differentiate(const NodeView& node, const CountedRows& rows, ResidualJacobians& jacobians) const {
-  for (const auto& [residual, row, n, of_constraint] : rows.blocks)
-    residual->calcJacobian(node, {jacobians.q.middleRows(row, n), jacobians.v.middleRows(row, n),
-                                  jacobians.lambda.block(row, 0, n, spec_.constraints.rows),
-                                  jacobians.u.middleRows(row, n), jacobians.s.segment(row, n)});
+  for (const auto& [residual, row, n, square] : rows.blocks)
+    residual->calcJacobian(node,
+                           {jacobians.q.middleRows(row, n), jacobians.v.middleRows(row, n),
+                            jacobians.lambda.block(row, 0, n, spec_.constraints.rows), jacobians.u.middleRows(row, n),
+                            jacobians.speeds.middleRows(row, n), jacobians.s.segment(row, n)});
 }
 
 void NodeCosts::addControlCost(const RobotEvaluation& at, StageModel& out) const {

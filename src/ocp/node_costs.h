@@ -11,7 +11,7 @@ struct CountedRows {
   struct Block {
     const Residual* residual;
     int row, size;
-    bool of_constraint;
+    bool square;  // of a cost that is a sum of squares
   };
   std::vector<Block> blocks;
   VectorXd gradient, hessian;  // weights
@@ -24,10 +24,10 @@ struct CountedRows {
   bool counts(int row) const { return gradient[row] != 0 || hessian[row] != 0; }
 };
 
-// Partial derivatives of stacked residuals, rows x nv, nv, constraint rows, nu, 1; they may be larger than one node
+// Partial derivatives of stacked residuals, rows x nv, nv, constraint rows, nu, nu, 1; they may be larger than one node
 // needs.
 struct ResidualJacobians {
-  MatrixXd q, v, lambda, u;
+  MatrixXd q, v, lambda, u, speeds;
   VectorXd s;
 };
 
@@ -41,6 +41,8 @@ class NodeCosts {
   int constraintRows() const { return constraint_rows_; }
   // Whether a residual depends on the controls.
   bool needsControls() const { return needs_controls_; }
+  // Whether a residual depends on the speeds of the motors.
+  bool needsSpeeds() const { return needs_speeds_; }
   // Factor of the sum of the costs: the length of a step; 1 at an impact and at the terminal node.
   double getScale(const RobotEvaluation& at) const { return step_ ? at.dt : 1; }
 
@@ -71,7 +73,7 @@ class NodeCosts {
   std::vector<Block> blocks_;
   std::vector<int> first_rows_;  // of each cost
   int rows_ = 0, constraint_rows_ = 0;
-  bool needs_controls_ = false;
+  bool needs_controls_ = false, needs_speeds_ = false;
   bool step_ = false;
 };
 

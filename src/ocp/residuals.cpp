@@ -217,6 +217,31 @@ class MotorPower : public Residual {
   std::vector<int> motors_, dofs_;
 };
 
+class ElectricalPower : public Residual {
+ public:
+  explicit ElectricalPower(const VectorXd& losses) : losses_(losses) {}
+  int size() const override { return static_cast<int>(2 * losses_.size()); }
+  bool needsControls() const override { return true; }
+  bool needsSpeeds() const override { return true; }
+  void calc(const NodeView& node, VectorRef r) const override {
+    for (Eigen::Index m = 0; m < losses_.size(); ++m) {
+      const double u = node.u[m];
+      r[m] = u * (*node.speeds)[m] + losses_[m] * u * u;
+      r[losses_.size() + m] = u;
+    }
+  }
+  void calcJacobian(const NodeView& node, ResidualRows rows) const override {
+    for (Eigen::Index m = 0; m < losses_.size(); ++m) {
+      rows.speeds(m, m) = node.u[m];
+      rows.u(m, m) = (*node.speeds)[m] + 2 * losses_[m] * node.u[m];
+      rows.u(losses_.size() + m, m) = 1;
+    }
+  }
+
+ private:
+  VectorXd losses_;
+};
+
 }  // namespace
 
 std::unique_ptr<Residual> makeComPosition(const Vector3d& reference) {
@@ -244,6 +269,9 @@ std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs) {
 }
 std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors) {
   return std::make_unique<MotorPower>(model, motors);
+}
+std::unique_ptr<Residual> makeElectricalPower(const VectorXd& losses) {
+  return std::make_unique<ElectricalPower>(losses);
 }
 
 }  // namespace bielle

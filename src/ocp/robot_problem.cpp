@@ -38,6 +38,8 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool ter
   const auto requireForces = [&](const Residual& residual, const std::string& name) {
     require(!terminal || !(residual.needsForces() || residual.needsControls()),
             name + " is about forces or controls, of which the terminal node has none", "leave it out there");
+    require(spec.kind == StageKind::Dynamics || !residual.needsSpeeds(),
+            name + " is about speeds under torques, of which an impact has none", "leave it out there");
   };
   for (const Cost& cost : spec.costs) {
     require(cost.residual && cost.activation.hasSize(cost.residual->size()),
@@ -122,6 +124,14 @@ bool startEvaluation(const Model& model, const EvaluateTask& task, const NodeLis
   return at.x.allFinite() && at.u.allFinite() && at.failure.empty();
 }
 
+void updateSpeeds(const Model& model, RobotEvaluation& at) {
+  at.speeds.resize(model.nu());
+  for (int m = 0; m < model.nu(); ++m) {
+    const int dof = model.motors()[m].dof;
+    at.speeds[m] = at.v_mid.size() > 0 ? at.v_mid[dof] : at.x[model.nq() + dof];
+  }
+}
+
 void setNextTimeScale(const TimeScalePlace& place, const RobotEvaluation& at, const VectorXd& x_next_node,
                       StageModel& out) {
   if (!place.in_next) return;
@@ -131,17 +141,17 @@ void setNextTimeScale(const TimeScalePlace& place, const RobotEvaluation& at, co
   out.gap[0] = at.time_scale - x_next_node[x_next_node.size() - 1];
 }
 
-void addTimeScaleCost(int leading, const RobotEvaluation& at, ConstVectorRef of_constraints, StageModel& out) {
+void addTimeScaleCost(int leading, const RobotEvaluation& at, ConstVectorRef no_squares, StageModel& out) {
   const double s = at.time_scale;
   const Eigen::Index row = leading - 1, nu = out.lu.size(), size = nu + out.lx.size();
   const auto getGradient = [&](Eigen::Index i) -> double& { return i < nu ? out.lu[i] : out.lx[i - nu]; };
   MatrixMap H = out.hessian();
-  const double implicit = getGradient(row) - of_constraints[row];
+  const double implicit = getGradient(row) - no_squares[row];
   for (Eigen::Index i = 0; i < size; ++i) {
     if (i == row) continue;
-    H(std::max(i, row), std::min(i, row)) += (getGradient(i) - of_constraints[i]) / (2 * s);
+    H(std::max(i, row), std::min(i, row)) += (getGradient(i) - no_squares[i]) / (2 * s);
   }
-  H(row, row) += implicit / s + at.cost / (2 * s * s);
+  H(row, row) += implicit / s + std::max(0.0, at.cost) / (2 * s * s);
   getGradient(row) += at.cost / s;
 }
 

@@ -39,13 +39,17 @@ inline int countLeading(const Model& model, const TimeScalePlace& place) {
   return model.nu() + (place.isFree() ? 1 : 0);
 }
 
+// The speeds of the motors of a step, whose state and, if it is a midpoint step, v_mid are up to date.
+void updateSpeeds(const Model& model, RobotEvaluation& at);
+
 // The time scale of the next state, and its difference to that of the node's state.
 void setNextTimeScale(const TimeScalePlace& place, const RobotEvaluation& at, const VectorXd& x_next_node,
                       StageModel& out);
 
 // Adds the derivatives of the running cost by its factor s, robot_problem.h Eq. (6), to those at fixed s.
-// \param of_constraints  by (u, s, dq, dv), the part of the gradient that s does not multiply: that of constraints
-void addTimeScaleCost(int leading, const RobotEvaluation& at, ConstVectorRef of_constraints, StageModel& out);
+// \param no_squares  by (u, s, dq, dv), the part of the gradient that is not due to squares: that of constraints, which s
+// does not multiply, and of energies
+void addTimeScaleCost(int leading, const RobotEvaluation& at, ConstVectorRef no_squares, StageModel& out);
 
 // False if an entry of a model that the solver reads is not finite.
 bool isFinite(const StageModel& model);

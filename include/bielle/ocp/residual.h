@@ -24,6 +24,9 @@ struct NodeView {
   const VectorXd& u;                 ///< nu, empty at the terminal node
   const VectorXd& lambda;            ///< rows of the constraints, empty at the terminal node
   double time_scale = 1;
+  /// nu, speeds of the motors at the instant to which the torques belong (robot_problem.h); null where no residual of the
+  /// node needs them.
+  const VectorXd* speeds = nullptr;
 };
 
 /// Row block of the stacked residual Jacobians of a node. Entries never written stay zero.
@@ -31,6 +34,7 @@ struct ResidualRows {
   MatrixRef q, v;    ///< n x nv
   MatrixRef lambda;  ///< n x rows
   MatrixRef u;       ///< n x nu
+  MatrixRef speeds;  ///< n x nu
   VectorRef s;       ///< n, by the time scale
 };
 
@@ -41,6 +45,8 @@ class Residual {
   virtual bool needsForces() const { return false; }
   /// Whether it depends on u.
   virtual bool needsControls() const { return false; }
+  /// Whether it depends on the speeds of the motors; such a residual is for steps alone.
+  virtual bool needsSpeeds() const { return false; }
   /// False if it depends neither on q nor on v.
   virtual bool needsMotion() const { return true; }
   virtual void calc(const NodeView& node, VectorRef r) const = 0;
@@ -126,5 +132,8 @@ std::vector<Transmission> listTransmissions(const Model& model, ConstVectorRef q
 std::unique_ptr<Residual> makeTransmission(const Transmission& transmission);
 /// Mechanical power u_m v_m of motors, given by their indices in the model (n), W.
 std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors);
+/// Electrical powers P_m = u_m w_m + loss_m u_m^2 of all motors, w their speeds when the torques act, then their torques
+/// (2 nu), W and N m: what Activation::makeEnergy reads. \param losses  nu, W/(N m)^2
+std::unique_ptr<Residual> makeElectricalPower(const VectorXd& losses);
 
 }  // namespace bielle

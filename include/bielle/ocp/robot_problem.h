@@ -36,7 +36,10 @@
 /// variables of a stage in both cases. Derivatives by s are exact. The running cost l = s dt sum_i 1/2 w_i r_i^2 counts
 /// as a sum of squares of sqrt(s) r_i, so that, with g its gradient at a fixed factor s, its Hessian receives
 ///     l_ss += l / (2 s^2) + g_s / s,    l_sz += g_z / (2 s)                                                        (6)
-/// where g_s is due to residuals that depend on s: references of velocities, and forces of midpoint steps.
+/// where g_s is due to residuals that depend on s: references of velocities, and forces of midpoint steps. Costs that are no
+/// squares count in l and its gradient, but not in g.
+///
+/// The speeds of the motors belong to the velocity that a is taken at: v, or v + h/2 a of a midpoint step.
 ///
 /// Gauss-Newton: a residual r contributes J^T diag(hessian) J with J = dr/dq + dr/dlambda dlambda/dq, and likewise for
 /// v and u.
@@ -106,6 +109,7 @@ struct RobotEvaluation : NodeEvaluation {
   VectorXd a;             ///< nv, accelerations; not used at an impact
   VectorXd q_mid;         ///< nq, of midpoint steps alone
   VectorXd v_mid;         ///< nv, likewise
+  VectorXd speeds;        ///< nu, of the motors, at v_mid or v; where a residual needs them
   VectorXd lambda;     ///< rows of the constraints of the stage: forces (at an impact, impulses), each in its frame 1
   VectorXd residuals;  ///< of all costs and path constraints, concatenated in an order internal to the problem
   double state_cost = 0;  ///< before scaling by the time step

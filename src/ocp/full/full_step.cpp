@@ -171,6 +171,25 @@ DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& sp
   return solveConstrainedSources(cws);
 }
 
+void updateSpeedDerivatives(const Model& model, bool free, FullStepScratch& scratch, FullEvaluation& at) {
+  FullEvaluation::Midpoint& mid = *at.midpoint;
+  const double h = at.dt;
+  mid.speeds_q.resize(model.nu(), model.nv());
+  mid.speeds_v.resize(model.nu(), model.nv());
+  mid.speeds_u.resize(model.nu(), model.nu());
+  mid.speeds_s.setZero(model.nu());
+  for (int m = 0; m < model.nu(); ++m) {
+    const int dof = model.motors()[m].dof;
+    mid.speeds_q.row(m) = h / 2 * mid.A0_q.row(dof);
+    mid.speeds_v.row(m) = h / 2 * mid.A0_v.row(dof);
+    mid.speeds_v(m, dof) += 1;
+    mid.speeds_u.row(m) = h / 2 * mid.A0_u.row(dof);
+    if (free) mid.speeds_s[m] = h / (2 * at.time_scale) * mid.a_0[dof] + mid.speeds_q.row(m).dot(mid.q_s);
+  }
+  scratch.displacement = h / 2 * getVelocity(model, at.x);
+  chainDrift(model, h, scratch.displacement, mid.speeds_q, mid.speeds_v);
+}
+
 namespace {
 
 // Adds to the rows of a joint of q what its own q and v contribute without the acceleration, through the drifts.

@@ -32,6 +32,8 @@ struct FullEvaluation : RobotEvaluation {
     VectorXd stabilization;       // constraint rows, at the state
     MatrixXd A0_q, A0_v, A0_u;    // nv x nv, nv x nv, nv x nu
     VectorXd q_s, a_s, lambda_s;  // nv, nv, constraint rows, of Eqs. (4) and (5); where the time scale is free
+    MatrixXd speeds_q, speeds_v, speeds_u;  // nu x nv, nu x nv, nu x nu: motor rows of dv_m, Eq. (1), by (q, v, u)
+    VectorXd speeds_s;                      // nu, by s
   };
   std::unique_ptr<Midpoint> midpoint;       // of a midpoint step alone
   std::unique_ptr<ImpactWorkspace> impact;  // of an impact alone
@@ -53,6 +55,9 @@ DynamicsStatus updateFullStep(const Model& model, const StageSpec& spec, FullSte
 /// The derivatives of `at.cws`, after updateFullStep; with `free`, those of a midpoint step by s too.
 DynamicsStatus updateFullStepDerivatives(const Model& model, const StageSpec& spec, bool free, FullStepScratch& scratch,
                                          FullEvaluation& at);
+
+/// The derivatives of the speeds of the motors of a midpoint step, after updateFullStepDerivatives.
+void updateSpeedDerivatives(const Model& model, bool free, FullStepScratch& scratch, FullEvaluation& at);
 
 /// The robot's part of F of the step and, with `free`, its column of s, with the Jacobian of the difference to the
 /// node's state where the gap is open. \param gap  2 nv, the robot's part of out.gap

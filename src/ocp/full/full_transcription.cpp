@@ -15,7 +15,7 @@ struct FullScratch : ProblemScratch {
   VectorXd difference;      // nv
   MatrixXd Rx, Ru, scaled;  // total derivatives of the residuals; those times the second derivatives
   VectorXd Rs;              // those by the time scale
-  VectorXd of_constraints;  // gradient of the constraints' weights
+  VectorXd no_squares;      // gradient of what is no sum of squares
   // All with room for the residuals of any node.
 };
 
@@ -41,13 +41,13 @@ class FullTranscription : public Transcription {
     out->difference.setZero(model_.nv());
     for (MatrixXd* m : {&out->jacobians.q, &out->jacobians.v}) m->setZero(rows, model_.nv());
     out->jacobians.lambda.setZero(rows, constraint_rows);
-    out->jacobians.u.setZero(rows, model_.nu());
+    for (MatrixXd* m : {&out->jacobians.u, &out->jacobians.speeds}) m->setZero(rows, model_.nu());
     out->jacobians.s.setZero(rows);
     out->counted.reserve(blocks, rows);
     for (MatrixXd* m : {&out->Rx, &out->scaled}) m->setZero(rows, 2 * model_.nv());
     out->Ru.setZero(rows, model_.nu());
     out->Rs.setZero(rows);
-    out->of_constraints.setZero(model_.nu() + 1 + 2 * model_.nv());
+    out->no_squares.setZero(model_.nu() + 1 + 2 * model_.nv());
     return out;
   }
 
@@ -82,6 +82,7 @@ class FullTranscription : public Transcription {
   void setImpact(const FullEvaluation& at, StageModel& out) const;
   void setResiduals(int node, const FullEvaluation& at, const ConstraintWeights* constraints, FullScratch& scratch,
                     StageModel& out) const;
+  void addSpeedResiduals(int node, const FullEvaluation& at, FullScratch& scratch) const;
   void setControlResiduals(int node, const FullEvaluation& at, FullScratch& scratch, StageModel& out) const;
   void setScaleResiduals(int node, const FullEvaluation& at, FullScratch& scratch, StageModel& out) const;
   void addStateCost(int node, const FullEvaluation& at, VectorXd& difference, StageModel& out) const;
@@ -114,7 +115,8 @@ void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const
     updateNode(model_, at.x, at.ws);
   }
   if (specs_[node].state.weight != 0) at.state_cost = calcStateCost(specs_[node].state, at, scratch.difference);
-  costs_[node].calc({model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale}, at);
+  if (costs_[node].needsSpeeds()) updateSpeeds(model_, at);
+  costs_[node].calc({model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds}, at);
   if (std::isfinite(at.cost)) at.status = StepStatus::Ok;
 }
 
@@ -153,6 +155,8 @@ void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) con
       task.failure = getMessage(status);
       return;
     }
+    if (costs_[node].needsSpeeds() && specs_[node].step == StepRule::Midpoint)
+      updateSpeedDerivatives(model_, place.isFree(), scratch.step, at);
     auto gap = out.gap.tail(2 * model_.nv());
     calcDifference(task.next->x, at.x_next, gap);
     if (isImpact(node))
@@ -165,7 +169,7 @@ void FullTranscription::linearize(LinearizeTask& task, FullScratch& scratch) con
   setResiduals(node, at, task.weights, scratch, out);
   addStateCost(node, at, scratch.difference, out);
   if (isRunning(node)) costs_[node].addControlCost(at, out);
-  if (place.isFree()) addTimeScaleCost(countLeading(model_, place), at, scratch.of_constraints, out);
+  if (place.isFree()) addTimeScaleCost(countLeading(model_, place), at, scratch.no_squares, out);
   if (isFinite(out)) task.status = StepStatus::Ok;
 }
 
@@ -193,13 +197,15 @@ void FullTranscription::setResiduals(int node, const FullEvaluation& at, const C
   out.lx.setZero();
   out.lu.setZero();
   out.hessian().setZero();
-  scratch.of_constraints.setZero();
+  scratch.no_squares.setZero();
   if (rows == 0) return;
   ResidualJacobians& jacobians = scratch.jacobians;
-  for (MatrixXd* m : {&jacobians.q, &jacobians.v, &jacobians.lambda, &jacobians.u}) m->topRows(rows).setZero();
+  for (MatrixXd* m : {&jacobians.q, &jacobians.v, &jacobians.lambda, &jacobians.u, &jacobians.speeds})
+    m->topRows(rows).setZero();
   jacobians.s.head(rows).setZero();
-  costs_[node].differentiate({model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale}, scratch.counted,
-                             jacobians);
+  costs_[node].differentiate({model_, at.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds},
+                             scratch.counted, jacobians);
+  if (costs_[node].needsSpeeds()) addSpeedResiduals(node, at, scratch);
   const auto gradient = scratch.counted.gradient.head(rows), hessian = scratch.counted.hessian.head(rows);
   const auto by_forces = jacobians.lambda.topLeftCorner(rows, specs_[node].constraints.rows);
   auto Rx = scratch.Rx.topRows(rows);
@@ -219,6 +225,22 @@ void FullTranscription::setResiduals(int node, const FullEvaluation& at, const C
   if (!isRunning(node) || (isImpact(node) && !costs_[node].needsControls())) return;
   setControlResiduals(node, at, scratch, out);
   if (nodes_.places[node].isFree()) setScaleResiduals(node, at, scratch, out);
+}
+
+// Derivatives by speeds of motors become those by q, v, u and s.
+void FullTranscription::addSpeedResiduals(int node, const FullEvaluation& at, FullScratch& scratch) const {
+  ResidualJacobians& jacobians = scratch.jacobians;
+  const auto by_speeds = jacobians.speeds.topRows(scratch.counted.rows);
+  if (specs_[node].step == StepRule::Euler) {
+    for (int m = 0; m < model_.nu(); ++m)
+      jacobians.v.col(model_.motors()[m].dof).head(by_speeds.rows()) += by_speeds.col(m);
+    return;
+  }
+  const FullEvaluation::Midpoint& mid = *at.midpoint;
+  jacobians.q.topRows(by_speeds.rows()).noalias() += by_speeds * mid.speeds_q;
+  jacobians.v.topRows(by_speeds.rows()).noalias() += by_speeds * mid.speeds_v;
+  jacobians.u.topRows(by_speeds.rows()).noalias() += by_speeds * mid.speeds_u;
+  jacobians.s.head(by_speeds.rows()).noalias() += by_speeds * mid.speeds_s;
 }
 
 // The part of the controls, after that of the state.
@@ -250,12 +272,12 @@ void FullTranscription::setScaleResiduals(int node, const FullEvaluation& at, Fu
   const auto Rx = scratch.Rx.topRows(rows);
   const auto Ru = scratch.Ru.topRows(rows);
   for (const CountedRows::Block& block : scratch.counted.blocks) {
-    if (!block.of_constraint) continue;
+    if (block.square) continue;
     const auto g = scratch.counted.gradient.segment(block.row, block.size);
-    VectorXd& of_constraints = scratch.of_constraints;
-    of_constraints.head(nu).noalias() += Ru.middleRows(block.row, block.size).transpose() * g;
-    of_constraints[nu] += Rs.segment(block.row, block.size).dot(g);
-    of_constraints.tail(2 * nv).noalias() += Rx.middleRows(block.row, block.size).transpose() * g;
+    VectorXd& no_squares = scratch.no_squares;
+    no_squares.head(nu).noalias() += Ru.middleRows(block.row, block.size).transpose() * g;
+    no_squares[nu] += Rs.segment(block.row, block.size).dot(g);
+    no_squares.tail(2 * nv).noalias() += Rx.middleRows(block.row, block.size).transpose() * g;
   }
   double& gradient = nodes_.places[node].in_controls ? out.lu[nu] : out.lx[0];
   gradient = Rs.dot(scratch.counted.gradient.head(rows));

@@ -32,14 +32,15 @@ NodeAssembly::NodeAssembly(const Model& model, const Reduction& reduction, const
   const Eigen::Index rows = roundUpToLane(most_rows), padded = roundUpToLane(2 * nr + nu + 1);
   for (MatrixXd* m : {&jacobians_.q, &jacobians_.v}) m->setZero(rows, nv);
   jacobians_.lambda.setZero(rows, layout.most_constraint_rows);
-  jacobians_.u.setZero(rows, nu);
+  for (MatrixXd* m : {&jacobians_.u, &jacobians_.speeds}) m->setZero(rows, nu);
   jacobians_.s.setZero(rows);
   counted_.reserve(most_blocks, most_rows);
   for (VectorXd* x : {&Rt_, &Rt_scaled_}) x->setZero(padded * most_rows);
-  for (VectorXd* x : {&gradient_, &constraint_gradient_}) x->setZero(2 * nr + nu + 1);
+  for (VectorXd* x : {&gradient_, &no_squares_}) x->setZero(2 * nr + nu + 1);
   for (VectorXd* x : {&y_, &y_s_, &y_v_s_}) x->setZero(nr);
   velocity_.setZero(nv);
   dlambda_.setZero(padded * layout.most_contact_rows);
+  dspeeds_.setZero(padded * nu);
   by_velocity_.setZero(nr * std::max(nr, layout.most_contact_rows));
   int largest = 6;
   for (const ReducedCluster& cluster : reduction.clusters) largest = std::max(largest, cluster.size);
@@ -136,6 +137,31 @@ void NodeAssembly::updateFirstDrift(double h, const ReducedEvaluation& at) {
     calcJointIntegrateJacobians(*free.joint, d, free.first_q_y, free.first_q_v);
     free.first_q_v *= h;
   }
+}
+
+// Of v^ = N (y_v + h/2 y'_0): what is foreseen, the velocity itself, and the turn of N; then the first drift.
+void NodeAssembly::setSpeeds(const ReducedEvaluation& at, const LaneView& view) {
+  const int nr = reduction_.size, leading = at.leading, columns = leading + 2 * nr;
+  PaddedMap dspeeds = shapePadded(dspeeds_, columns, model_.nu());
+  const ConstMatrixMap foreseen(view.foreseen.dydd.data(), columns, nr, Eigen::OuterStride<>(roundUpToLane(columns)));
+  dspeeds.setZero();
+  for (size_t m = 0; m < motors_.size(); ++m) {
+    const auto& [index, row] = motors_[m];
+    auto column = dspeeds.col(static_cast<Eigen::Index>(m));
+    if (index < 0) {
+      column = foreseen.col(row);
+      column[leading + nr + row] += 1;
+      continue;
+    }
+    const ReducedCluster& cluster = reduction_.clusters[index];
+    const auto N = at.midpoint->clusters[index].basis.N.row(row);
+    for (int c = 0; c < cluster.size; ++c) {
+      column += N[c] * foreseen.col(cluster.offset + c);
+      column[leading + cluster.offset + c] += view.clusters[index].Z_mid(row, c);
+      column[leading + nr + cluster.offset + c] += N[c];
+    }
+  }
+  addFirstDrift(at.dt / 2, at, view, dspeeds);
 }
 
 // Rows by (dy, dy_v) half way become rows by those of the state: reduced_kernel.h Eq. (g) with k = 0, transposed.
@@ -340,7 +366,7 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
                                 const ConstraintWeights* constraints, const ReducedEvaluation& at, const LaneView& view,
                                 StageModel& out) {
   const int nr = reduction_.size, leading = at.leading, columns = leading + 2 * nr;
-  constraint_gradient_.setZero();
+  no_squares_.setZero();
   costs.selectRows(at, constraints, counted_);
   const int rows = counted_.rows;
   if (rows == 0) {
@@ -356,15 +382,17 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
   for (Eigen::Index i = 0; i < rows; i += kLane) {
     jacobians_.lambda.middleRows<kLane>(i).middleCols(contacts.closure_rows, contacts.rows).setZero();
     if (costs.needsControls()) jacobians_.u.middleRows<kLane>(i).setZero();
+    if (costs.needsSpeeds()) jacobians_.speeds.middleRows<kLane>(i).setZero();
   }
   jacobians_.s.head(rows).setZero();
-  costs.differentiate({model_, view.ws, spec.constraints, at.u, at.lambda, at.time_scale}, counted_, jacobians_);
+  costs.differentiate({model_, view.ws, spec.constraints, at.u, at.lambda, at.time_scale, &at.speeds}, counted_,
+                      jacobians_);
   PaddedMap Rt = shapePadded(Rt_, columns, rows), scaled = shapePadded(Rt_scaled_, columns, rows);
-  updateResidualDerivatives(costs.needsControls(), contacts, at, view, Rt);
+  updateResidualDerivatives(costs, contacts, at, view, Rt);
   if (isFree(at))
     for (const CountedRows::Block& block : counted_.blocks)
-      for (int i = block.row; block.of_constraint && i < block.row + block.size; ++i)
-        constraint_gradient_.head(columns) += counted_.gradient[i] * Rt.col(i);
+      for (int i = block.row; !block.square && i < block.row + block.size; ++i)
+        no_squares_.head(columns) += counted_.gradient[i] * Rt.col(i);
   auto gradient = gradient_.head(columns);
   gradient.setZero();
   int counting = 0;  // rows so far with a non-zero weight
@@ -381,16 +409,26 @@ void NodeAssembly::setResiduals(const NodeCosts& costs, const StageSpec& spec, c
   out.lx = gradient.tail(out.lx.size());
 }
 
-void NodeAssembly::updateResidualDerivatives(bool controls, const ContactLayout& contacts, const ReducedEvaluation& at,
-                                             const LaneView& view, PaddedMap Rt) {
+void NodeAssembly::updateResidualDerivatives(const NodeCosts& costs, const ContactLayout& contacts,
+                                             const ReducedEvaluation& at, const LaneView& view, PaddedMap Rt) {
   const int nr = reduction_.size, nu = model_.nu(), leading = at.leading, motion_rows = counted_.motion_rows;
   Rt.setZero();
+  const bool of_state = at.v_mid.size() == 0;  // speeds, too
+  if (costs.needsSpeeds() && of_state)
+    for (int m = 0; m < nu; ++m)
+      jacobians_.v.col(model_.motors()[m].dof).head(motion_rows) += jacobians_.speeds.col(m).head(motion_rows);
   const auto q = jacobians_.q.topRows(motion_rows), v = jacobians_.v.topRows(motion_rows);
   addTimesN(q, at, Rt.block(leading, 0, nr, motion_rows));
   addTimesZ(v, view, Rt.block(leading, 0, nr, motion_rows));
   addTimesN(v, at, Rt.block(leading + nr, 0, nr, motion_rows));
-  if (controls) Rt.topRows(nu) = jacobians_.u.topLeftCorner(counted_.rows, nu).transpose();
+  if (costs.needsControls()) Rt.topRows(nu) = jacobians_.u.topLeftCorner(counted_.rows, nu).transpose();
   if (isFree(at)) Rt.row(leading - 1) = jacobians_.s.head(counted_.rows).transpose();
+  if (costs.needsSpeeds() && !of_state) {
+    const PaddedMap by_speeds = shapePadded(dspeeds_, leading + 2 * nr, nu);
+    for (int i = 0; i < motion_rows; ++i)
+      for (int m = 0; m < nu; ++m)
+        if (jacobians_.speeds(i, m) != 0) Rt.col(i) += jacobians_.speeds(i, m) * by_speeds.col(m);
+  }
   if (leading == 0 || contacts.rows == 0) return;
   const PaddedMap by_forces = shapePadded(dlambda_, leading + 2 * nr, contacts.rows);
   for (int i = 0; i < counted_.rows; ++i) {

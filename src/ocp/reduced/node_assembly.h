@@ -15,6 +15,8 @@ class NodeAssembly {
   // accelerations of the view.
   void setStep(const StageSpec& spec, const ContactLayout& contacts, const ReducedEvaluation& at,
                const ReducedEvaluation& next, LaneView& view, StageModel& out);
+  // Sets the derivatives of the speeds of the motors of a midpoint step, after setStep() for the same node.
+  void setSpeeds(const ReducedEvaluation& at, const LaneView& view);
   // Sets the derivatives of the impulses of an impact with respect to q and v (rows x nv).
   void setImpulseDerivatives(ConstMatrixRef by_q, ConstMatrixRef by_v, const ReducedEvaluation& at,
                              const LaneView& view);
@@ -22,9 +24,9 @@ class NodeAssembly {
   void setResiduals(const NodeCosts& costs, const StageSpec& spec, const ContactLayout& contacts,
                     const ConstraintWeights* constraints, const ReducedEvaluation& at, const LaneView& view,
                     StageModel& out);
-  // The part of the gradient of the last setResiduals() that is due to constraints, by (u, s, dy, dy_v); zero where s is
-  // not free.
-  const VectorXd& getConstraintGradient() const { return constraint_gradient_; }
+  // The part of the gradient of the last setResiduals() that is not due to squares, by (u, s, dy, dy_v); zero where s is not
+  // free.
+  const VectorXd& getGradientOfNoSquares() const { return no_squares_; }
 
   // Gap and derivatives of a joint outside all clusters: those of q+ with respect to dy and dv+, which are the identity
   // and h except for curved joints.
@@ -55,7 +57,7 @@ class NodeAssembly {
   void updateFreeJoint(double h, const ReducedEvaluation& at, ConstVectorRef gap, FreeJoint& free) const;
   void setTransition(double h, bool midpoint, const ReducedEvaluation& at, const LaneView& view, PaddedMap dv,
                      MatrixMap Ft) const;
-  void updateResidualDerivatives(bool controls, const ContactLayout& contacts, const ReducedEvaluation& at,
+  void updateResidualDerivatives(const NodeCosts& costs, const ContactLayout& contacts, const ReducedEvaluation& at,
                                  const LaneView& view, PaddedMap Rt);
 
   // node_scale.cpp: derivatives by a free time scale, reduced_kernel.h Eq. (i)
@@ -79,13 +81,14 @@ class NodeAssembly {
   CountedRows counted_;
   VectorXd Rt_, Rt_scaled_, gradient_;  // large enough for any node
   VectorXd dlambda_;      // (nu + 2 size) x contact rows, padded: derivatives of contact forces by (u, dy, dy_v)
+  VectorXd dspeeds_;      // (nu + 1 + 2 size) x nu, padded: those of the speeds of the motors
   VectorXd room_;         // of solveDerivatives()
   VectorXd by_velocity_;  // of addForeseenVelocity(): rows by dy_v
   VectorXd column_;       // of addFirstDrift(): 2 r of the largest reduced joint
   VectorXd y_;            // of node_scale.cpp: size
   VectorXd y_s_, y_v_s_;  // likewise: how the point half way moves with s
   VectorXd velocity_;     // likewise: nv
-  VectorXd constraint_gradient_;  // nu + 1 + 2 size
+  VectorXd no_squares_;   // nu + 1 + 2 size
 };
 
 }  // namespace bielle

@@ -107,6 +107,7 @@ void ReducedKernel::linearizeMidpoints(const Batch& batch, LinearizeItem* items,
   storeTurns(count, views);
   gatherLanes(count, v_.size(), v_.data(), [&](int l) { return batch.nodes[l]->v_mid.data(); });
   linearizeAccelerations(batch, Point::Midpoint);
+  storeMidpointTurns(count, views);
 }
 
 // A_y and A_v at the bases and columns in place and the velocities v_, and Eq. (c).

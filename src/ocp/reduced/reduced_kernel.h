@@ -103,6 +103,7 @@ struct LaneView {
   };
   struct Cluster {
     MatrixXd Z;           // as in ClusterLanes
+    MatrixXd Z_mid;       // of a midpoint step: half way, at the velocity foreseen there
     Drift drift;          // of a step; of a midpoint step the second
     Drift first;          // of a midpoint step, Eq. (g) with k = 0
     MatrixXd T;           // r x r, Eq. (h)
@@ -196,6 +197,7 @@ class ReducedKernel {
                          LaneView::Acceleration LaneView::*to) const;
   template <typename Get>
   void storeContacts(int count, const Get& get) const;
+  void storeMidpointTurns(int count, std::vector<LaneView>& views) const;
   void storeStabilizations(int count, std::vector<LaneView>& views) const;
   void storeDrift(int count, std::vector<LaneView>& views, LaneView::Drift LaneView::Cluster::*to) const;
   void storeGaps(int count, std::vector<LaneView>& views) const;

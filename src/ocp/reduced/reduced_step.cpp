@@ -27,8 +27,8 @@ LaneView::LaneView(const Model& model, const Reduction& reduction, const Reduced
     const int r = cluster.size;
     const MatrixXd square = MatrixXd::Zero(r, r);
     const Drift drift{square, square, square, square};
-    clusters.push_back(
-        {MatrixXd::Zero(cluster.model.nv(), r), drift, drift, square, VectorXd::Zero(r), VectorXd::Zero(r)});
+    const MatrixXd turns = MatrixXd::Zero(cluster.model.nv(), r);
+    clusters.push_back({turns, turns, drift, drift, square, VectorXd::Zero(r), VectorXd::Zero(r)});
   }
   for (Acceleration* out : {&acceleration, &foreseen}) {
     out->dydd.setZero(roundUpToLane(model.nu() + 1 + 2 * reduction.size) * reduction.size);

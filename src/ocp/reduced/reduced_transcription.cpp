@@ -111,7 +111,8 @@ void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScrat
 // Computes the costs after a successful step.
 void ReducedTranscription::finishEvaluation(int node, const LaneView& view, RobotEvaluation& at) const {
   if (at.status != StepStatus::Ok) return;
-  costs_[node].calc({model_, view.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale}, at);
+  if (costs_[node].needsSpeeds()) updateSpeeds(model_, at);
+  costs_[node].calc({model_, view.ws, specs_[node].constraints, at.u, at.lambda, at.time_scale, &at.speeds}, at);
   if (!at.x_next.allFinite() || !std::isfinite(at.cost)) at.status = StepStatus::Failed;
 }
 
@@ -148,6 +149,7 @@ void ReducedTranscription::finishLinearization(LinearizeTask& task, LaneView& vi
   StageModel& out = *task.out;
   if (isStep(node)) {
     assembly.setStep(specs_[node], layout_.contacts[node], at, *next, view, out);
+    if (costs_[node].needsSpeeds() && isMidpoint(node)) assembly.setSpeeds(at, view);
     setNextTimeScale(place, at, next->x, out);
   } else if (isImpact(node)) {
     const DynamicsStatus status = scratch.impact.linearize(specs_[node].constraints, at, *next, view, assembly, out);
@@ -161,7 +163,7 @@ void ReducedTranscription::finishLinearization(LinearizeTask& task, LaneView& vi
   if (specs_[node].state.weight != 0)
     addStateCostModel(model_, reduction_, view.state_cost, costs_[node].getScale(at), out);
   if (isRunning(node)) costs_[node].addControlCost(at, out);
-  if (place.isFree()) addTimeScaleCost(at.leading, at, assembly.getConstraintGradient(), out);
+  if (place.isFree()) addTimeScaleCost(at.leading, at, assembly.getGradientOfNoSquares(), out);
   if (isFinite(out)) task.status = StepStatus::Ok;
 }
 

@@ -340,6 +340,12 @@ void ReducedKernel::storeColumns(int count, std::vector<LaneView>& views) const 
   for (int l = 0; l < count; ++l) views[l].ws.stage = WorkspaceStage::Velocity;
 }
 
+void ReducedKernel::storeMidpointTurns(int count, std::vector<LaneView>& views) const {
+  for (size_t i = 0; i < clusters_.size(); ++i)
+    scatterLanes(clusters_[i].motion.Z.data(), clusters_[i].motion.Z.size(), count,
+                 [&](int l) { return views[l].clusters[i].Z_mid.data(); });
+}
+
 void ReducedKernel::storeAcceleration(LaneSource<const ReducedEvaluation> nodes, std::vector<LaneView>& views,
                                       LaneView::Acceleration LaneView::*to) const {
   const Eigen::Index nr = reduction_.size;
