@@ -16,3 +16,5 @@ bielle_test(hostile_numbers SOURCES test_hostile_numbers.cpp mechanisms.cpp LIBS
 set_tests_properties(hostile_numbers PROPERTIES LABELS system)
 bielle_test(paper_walk SOURCES test_paper_walk.cpp LIBS bielle_motion nlohmann_json::nlohmann_json)
 set_tests_properties(paper_walk PROPERTIES LABELS system)
+bielle_test(objectives SOURCES test_objectives.cpp LIBS bielle_io)
+set_tests_properties(objectives PROPERTIES LABELS system)

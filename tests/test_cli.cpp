@@ -367,6 +367,45 @@ TEST_CASE("solve says what was asked and what came out; a goal that is missed is
   CHECK(goal["came_out"] > 0.96);
 }
 
+TEST_CASE("solve minimizes energy or peak torque, from the motion of least effort or another result") {
+  const OutputDirectory directory;
+  const std::string effort = directory.str() + "/effort", other = directory.str() + "/other";
+  const auto getEnergy = [](const json& summary) { return summary["electrical_energy"]["total_J"].get<double>(); };
+  const auto readSummary = [](const std::string& path) { return json::parse(std::ifstream(path + "/summary.json")); };
+  CHECK(run(makeShortSquat(effort, {"--quiet"})).status == 0);
+  const json first = readSummary(effort);
+  CHECK(first["objective"]["kind"] == "effort");
+  CHECK(first["electrical_energy"]["cost_of_transport"].is_null());
+  CHECK(first["electrical_energy"]["motors_of_assumed_loss"] == 12);
+  for (const std::string objective : {"energy", "peak-torque"}) {
+    const CommandResult result = run(makeShortSquat(other, {"--objective", objective}));
+    INFO(result.out << result.err);
+    CHECK(result.status == 0);
+    CHECK_THAT(result.out, Catch::Contains("first, the motion of least effort") &&
+                               Catch::Contains("electrical energy") &&
+                               Catch::Contains("losses of 12 motors assumed: 0.25"));
+    const json summary = readSummary(other);
+    CHECK(summary["objective"]["kind"] == objective);
+    const auto getPeak = [](const json& of) {
+      double peak = 0;
+      for (const auto& [motor, value] : of["peak_torques"].items()) peak = std::max(peak, value.get<double>());
+      return peak;
+    };
+    if (objective == "energy") CHECK(getEnergy(summary) < 0.95 * getEnergy(first));
+    if (objective == "peak-torque") CHECK(getPeak(summary) < 0.95 * getPeak(first));
+    // From the files of the same effort: the same problem, but for a scale that is taken where the base of a warm start is,
+    // by the slip of the feet (3e-6 m) from that of the effort.
+    const CommandResult warm =
+        run(makeShortSquat(other, {"--quiet", "--objective", objective, "--warm-start", effort}));
+    CHECK(warm.status == 0);
+    CHECK_THAT(warm.out, !Catch::Contains("least effort"));
+    CHECK(readSummary(other)["cost"].get<double>() == Approx(summary["cost"].get<double>()).epsilon(1e-4));
+  }
+  checkRefused(run(makeShortSquat(other, {"--objective", "time"})), "effort,energy,peak-torque");
+  checkRefused(run(makeShortSquat(other, {"--objective", "energy", "--regularization", "-1"})), "regularization");
+  checkRefused(run(makeShortSquat(other, {"--regeneration", "2"})), "regeneration");
+}
+
 TEST_CASE("solve ends by the check of its result, whose failure is its own") {
   const OutputDirectory directory;
   fs::create_directory(directory.str());

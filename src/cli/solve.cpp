@@ -7,6 +7,7 @@
 #include <iostream>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
@@ -14,8 +15,9 @@
 #include "bielle/transmission/serial_model.h"
 #include "cli/commands.h"
 #include "cli/free_timings.h"
-#include "io/motion_registry.h"
+#include "cli/objective.h"
 #include "cli/table.h"
+#include "io/motion_registry.h"
 
 namespace bielle::cli {
 namespace {
@@ -103,7 +105,8 @@ void printResult(const MotionResult& result, const std::vector<std::string>& pat
                               {"constraints", formatConstraints(solver)},
                               {"closure gap", pair(result.gap_position, result.gap_angle)},
                               {"contact slip", pair(result.slip_position, result.slip_angle)},
-                              {"peak torques [N m]", torques}});
+                              {"peak torques [N m]", torques},
+                              {"electrical energy", formatEnergy(result.energy)}});
   printTimings(result.timings);
   for (const std::string& path : paths) std::cout << "  " << path << "\n";
 }
@@ -189,6 +192,24 @@ ShootingTrajectory solveParts(const MotionRequest& request, const Model& model, 
   return bielle::solveParts(model, request.parts, makeStandingPosture(model), options);
 }
 
+// A motion of another objective: it starts from that of least effort, or from a given result, and is scaled by it.
+Motion makeFromEffort(const MotionRequest& request, const Model& model, const ProblemOptions& problem, Motion effort,
+                      const SolveArguments& arguments) {
+  if (arguments.warm_start.empty()) {
+    if (!arguments.quiet) std::cout << "first, the motion of least effort:" << std::endl;
+    const FddpSummary summary = solveMotion(effort, arguments.solver, makeObserver(arguments));
+    if (!arguments.quiet)
+      std::cout << "least effort: " << getName(summary.termination) << ", " << summary.iterations << " iterations, "
+                << formatNumber(summary.seconds, "%.2f") << " s\nfrom there, " << getName(problem.objective.objective)
+                << ":" << std::endl;
+  }
+  ProblemOptions scaled = problem;
+  scaled.objective = scaleObjective(effort, problem.objective, problem.limits);
+  Motion motion = makeLimited(request, model, scaled);
+  motion.guess = std::move(effort.guess);
+  return motion;
+}
+
 int solve(const SolveArguments& arguments, const MotionRequest& request) {
   for (const std::string& setting : arguments.settings) {
     const auto [name, value] = parseSetting("--set", setting, "com_weight=1e5");
@@ -210,6 +231,8 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   problem.timings = makeTimings(arguments.timings);
   problem.step = arguments.step;
   if (serial && !problem.step) problem.step = StepRule::Euler;
+  const ObjectiveOptions objective = std::exchange(problem.objective, {});
+  problem.objective.regeneration = objective.regeneration;  // of reported energies
   Motion motion = makeLimited(request, model, problem);
   FddpOptions solver = arguments.solver;
   if (motion.bounded) solver.bounds = ControlBounds::Enforce;
@@ -221,7 +244,11 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
     motion.guess = solveParts(request, model, problem, arguments, solver);
     fitTimings(*motion.problem, motion.guess);
   }
-  const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess, makeObserver(arguments));
+  if (objective.objective != Objective::Effort) {
+    problem.objective = objective;
+    motion = makeFromEffort(request, model, problem, std::move(motion), arguments);
+  }
+  const FddpSummary summary = solveMotion(motion, arguments.solver, makeObserver(arguments));
   const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed",
                     serial ? arguments.serial_armature : ""};
   const MotionResult result = makeResult(run, motion, motion.guess, summary);
@@ -322,6 +349,7 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
       ->capture_default_str();
   addLimitOptions(sub, arguments);
   addTimingOptions(sub, arguments->timings);
+  addObjectiveOptions(sub, arguments->problem.objective);
   sub.add_option("--max-iterations", arguments->solver.max_iterations, "the solver stops there")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();

@@ -48,6 +48,19 @@ Json listByName(const std::vector<std::pair<std::string, double>>& values) {
   return json;
 }
 
+Json makeEnergy(const MotionResult& result) {
+  Json motors = Json::object();
+  for (size_t m = 0; m < result.record.u_names.size(); ++m)
+    motors[result.record.u_names[m]] = result.energy.by_motor[static_cast<Eigen::Index>(m)];
+  return {{"total_J", result.energy.total},
+          {"motors_J", motors},
+          {"regeneration", result.energy.regeneration},
+          {"motors_of_assumed_loss", result.energy.num_assumed},
+          {"assumed_loss_W_per_Nm2", kDefaultTorqueLoss},
+          {"distance_m", result.energy.distance},
+          {"cost_of_transport", result.energy.cost_of_transport}};
+}
+
 Json makePhases(const MotionResult& result) {
   Json phases = Json::array();
   int start = 0;
@@ -153,6 +166,11 @@ Json makeSummary(const MotionResult& result) {
           {"contact_slip", {{"position_m", result.slip_position}, {"angle_rad", result.slip_angle}}},
           {"com_height", {{"start_m", result.com_start}, {"lowest_m", result.com_lowest}}},
           {"peak_torques", listByName(result.peak_torques)},
+          {"objective",
+           {{"kind", getName(result.objective.objective)},
+            {"regularization", result.objective.getRegularization()},
+            {"scale", result.objective.scale}}},
+          {"electrical_energy", makeEnergy(result)},
           {"phases", makePhases(result)},
           {"free_timings", makeTimings(result)},
           {"ground", makeGround(result.ground)},
@@ -205,6 +223,8 @@ MotionResult makeResult(const RunInfo& run, const Motion& motion, const Shooting
     result.peak_torques.emplace_back(record.u_names[m], record.u.rows() ? record.u.col(m).cwiseAbs().maxCoeff() : 0);
   std::stable_sort(result.peak_torques.begin(), result.peak_torques.end(),
                    [](const auto& a, const auto& b) { return a.second > b.second; });
+  result.objective = motion.objective;
+  result.energy = calcElectricalEnergy(motion.problem->model(), record, motion.objective.regeneration);
   result.gap_position = record.gap.col(0).maxCoeff();
   result.gap_angle = record.gap.col(1).maxCoeff();
   result.com_start = record.com(0, 2);

@@ -91,9 +91,10 @@ void addSwingCosts(const Scene& scene, double s, StageSpec& stage) {
   }
 }
 
-void addHeightCost(const Scene& scene, const std::string& name, double weight, double height, StageSpec& stage) {
+void addHeightCost(const Scene& scene, const std::string& name, double weight, double height, bool defines,
+                   StageSpec& stage) {
   stage.costs.push_back({name, weight, Activation::makeQuadratic(Vector3d::UnitZ()),
-                         makeComPosition(scene.com + height * Vector3d::UnitZ())});
+                         makeComPosition(scene.com + height * Vector3d::UnitZ()), defines});
 }
 
 // Node i of n in flight. The first one is where the feet stood.
@@ -132,7 +133,7 @@ StageSpec makeTerminalStage(const Scene& scene) {
     return stage;
   }
   stage.costs.push_back({"com", o.terminal_weight, Activation::makeQuadratic(Vector3d::Ones()),
-                         makeComPosition(scene.com + scene.shift)});
+                         makeComPosition(scene.com + scene.shift), true});
   addRest(scene.model, stage);
   return stage;
 }
@@ -315,9 +316,9 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
       const double load = calcLoad(scene, phase, com.acceleration);
       addGroundCosts(model, ground, VectorXd::Constant(contacts.size(), load / contacts.size()), stage);
       if (options.published == 0) addWrenchCones(model, options.friction, stage);
-      if (phase != Phase::Flight) addHeightCost(scene, "com height", options.com_weight, com.height, stage);
+      if (phase != Phase::Flight) addHeightCost(scene, "com height", options.com_weight, com.height, false, stage);
       if (phase == Phase::Flight && 2 * i == nodes)
-        addHeightCost(scene, "apex", options.apex_weight / options.time_step, com.height, stage);
+        addHeightCost(scene, "apex", options.apex_weight / options.time_step, com.height, true, stage);
       if (phase == Phase::Flight && i > 0) addSwingCosts(scene, static_cast<double>(i) / nodes, stage);
       if (phase == Phase::Flight) addFlightConstraints(scene, i, nodes, stage);
       if (phase == Phase::Land && i == 0) addTouchdown(scene, stage);

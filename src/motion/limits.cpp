@@ -33,11 +33,15 @@ VectorXd replaceByName(const Model& model, VectorXd values, const std::map<std::
   return values;
 }
 
-VectorXd getEfforts(const Model& model, const LimitOptions& options) {
+}  // namespace
+
+VectorXd getEffortLimits(const Model& model, const LimitOptions& options) {
   VectorXd efforts(model.nu());
   for (int m = 0; m < model.nu(); ++m) efforts[m] = model.motors()[m].effort_limit;
   return replaceByName(model, efforts, options.efforts, "effort");
 }
+
+namespace {
 
 std::vector<Bound> listRanges(const Model& model, const VectorXd& q0) {
   std::vector<Bound> bounds;
@@ -92,7 +96,7 @@ bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& 
   if (!options.enforced) return false;
   const double margin = options.dead_point_margin;
   requireOption(margin >= 0 && margin < 1, "dead_point_margin", "it is outside 0 .. 1", "give a share, e.g. 0.15");
-  const VectorXd efforts = getEfforts(model, options);
+  const VectorXd efforts = getEffortLimits(model, options);
   const std::vector<Bound> ranges = listRanges(model, q0), velocities = listVelocities(model, options),
                            powers = listPowers(model, options);
   const std::vector<Transmission> transmissions =

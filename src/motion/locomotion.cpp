@@ -144,9 +144,9 @@ StageSpec makeRegularizedStage(const Scene& scene, const GaitNode& node) {
 }
 
 void addCost(StageSpec& stage, const std::string& name, double weight, const VectorXd& weights,
-             std::unique_ptr<Residual> residual) {
+             std::unique_ptr<Residual> residual, bool defines = false) {
   if (weight != 0 && !weights.isZero(0))
-    stage.costs.push_back({name, weight, Activation::makeQuadratic(weights), std::move(residual)});
+    stage.costs.push_back({name, weight, Activation::makeQuadratic(weights), std::move(residual), defines});
 }
 
 void addComCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
@@ -190,7 +190,7 @@ void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& ste
           makeFramePlacement(foot, swing.X_WF));
   addCost(stage, "swing velocity", 1,
           makeVector(o.swing_velocity_weight, o.swing_velocity_weight, o.swing_velocity_weight),
-          makeFrameVelocity(foot, swing.V_F));
+          makeFrameVelocity(foot, swing.V_F), true);
   if (!isPublished(scene)) return;
   addCost(stage, "fly high", o.paper.fly_high, Eigen::Vector2d::Ones(),
           makeFlyHigh(foot, o.paper.fly_high_slope, calcGround(scene, node, step)));
@@ -290,7 +290,7 @@ StageSpec makeTerminalStage(const Scene& scene) {
     stage.state.weights.tail(nv) = selectMainJoints(scene.model);
     return stage;
   }
-  addCost(stage, "com", scene.options.terminal_weight, Vector3d::Ones(), makeComPosition(node.com));
+  addCost(stage, "com", scene.options.terminal_weight, Vector3d::Ones(), makeComPosition(node.com), true);
   addRest(scene.model, stage);
   return stage;
 }

@@ -72,6 +72,10 @@ Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& opt
   for (StageSpec& stage : plan.stages)  // at an impact h vanishes, and gains have no effect
     if (stage.dt > 0 && (plan.limited || stage.timing.phase >= 0))
       limitGains(step, stage.dt * std::max(1.0, stage.timing.upper), stage.constraints);
+  setObjective(model, options.objective, plan.stages);
+  motion.objective = options.objective;
+  motion.within_limits = motion.bounded;
+  if (options.objective.objective == Objective::PeakTorque) motion.peak_limits = getPeakLimits(model, options.limits);
   if (!motion.bounded) leaveTorquesFree(model, plan.stages);
   motion.bounded |= options.timings.areGiven();
   motion.name = std::move(plan.name);

@@ -36,7 +36,7 @@ StageSpec makeStage(const Model& model, const SquatOptions& o, const std::vector
   raiseMotorWeights(model, o.motor_weight, stage.state.weights);
   stage.control = {o.control_weight, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
   stage.costs.push_back(
-      {"com height", o.com_weight, Activation::makeQuadratic(Vector3d::UnitZ()), makeComPosition(com)});
+      {"com height", o.com_weight, Activation::makeQuadratic(Vector3d::UnitZ()), makeComPosition(com), true});
   const double weight = model.mass() * model.gravity().norm();
   addGroundCosts(model, {o.force_weight, o.pressure_weight},
                  VectorXd::Constant(contacts.size(), weight / contacts.size()), stage);

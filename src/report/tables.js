@@ -70,7 +70,7 @@ function fillSummary(parent, runs) {
   const units = (value, unit) => (typeof value === 'number' ? formatNumber(value) + ' ' + unit : undefined);
   const get = [
     ['outcome', run => run.summary.termination + (run.summary.message ? ': ' + run.summary.message : '')],
-    ['cost', run => run.summary.cost], ['iterations', run => run.summary.iterations],
+    ['minimized', run => dig(run.summary, 'objective', 'kind')], ['cost', run => run.summary.cost], ['iterations', run => run.summary.iterations],
     ['solver time', run => units(run.summary.seconds, 's')], ['model', run => run.summary.model],
     ['formulation', run => run.summary.formulation],
     ['duration', run => units(run.summary.duration_s, 's') + ', ' + run.summary.nodes + ' nodes'],
@@ -79,6 +79,8 @@ function fillSummary(parent, runs) {
     ['centre of mass, lowest', run => units(dig(run.summary, 'com_height', 'lowest_m'), 'm high')],
     ['largest closure gap', run => units(dig(run.summary, 'closure_gap', 'position_m'), 'm')],
     ['largest slip of a foot', run => units(dig(run.summary, 'contact_slip', 'position_m'), 'm')],
+    ['electrical energy', run => units(dig(run.summary, 'electrical_energy', 'total_J'), 'J')],
+    ['cost of transport', run => dig(run.summary, 'electrical_energy', 'cost_of_transport')],
     ['friction coefficient', run => dig(run.summary, 'ground', 'friction')],
     [
       'peak torques',

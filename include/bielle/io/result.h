@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "bielle/io/electrical_energy.h"
 #include "bielle/io/record.h"
 #include "bielle/transmission/lift.h"
 
@@ -31,7 +32,9 @@ struct MotionResult {
   MotionRecord record;
 
   std::vector<std::pair<std::string, double>> peak_torques;  ///< largest |u| by motor, largest first, N m or N
-  double gap_position = 0, gap_angle = 0;                    ///< largest closing error of the motion, m and rad
+  ObjectiveOptions objective;
+  ElectricalEnergy energy;
+  double gap_position = 0, gap_angle = 0;    ///< largest closing error of the motion, m and rad
   double slip_position = 0, slip_angle = 0;  ///< largest displacement of a foot from its touchdown, m and rad
   double com_start = 0, com_lowest = 0;      ///< height of the centre of mass, m
 

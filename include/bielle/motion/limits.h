@@ -25,6 +25,9 @@ struct LimitOptions {
   bool areGiven() const { return !(efforts.empty() && velocities.empty() && powers.empty()); }
 };
 
+/// Effort limits by motor (nu), those of the model or given in their place. \throws ModelError as addLimits() does
+VectorXd getEffortLimits(const Model& model, const LimitOptions& options);
+
 /// Sets the effort limits of the stages and adds the path constraints to them. Returns whether a torque is limited.
 /// \param q0  configuration of the first node (nq)
 /// \throws ModelError for an unknown motor, a limit that is not positive, a margin outside 0 .. 1, a joint whose range has no

@@ -7,6 +7,7 @@
 
 #include "bielle/motion/goal.h"
 #include "bielle/motion/limits.h"
+#include "bielle/motion/objective.h"
 #include "bielle/motion/timings.h"
 #include "bielle/ocp/contact_schedule.h"
 #include "bielle/ocp/robot_problem.h"
@@ -65,7 +66,19 @@ struct Motion {
   std::vector<std::pair<std::string, double>> requested;  ///< every option by name
   std::vector<Goal> goals;                                ///< what is to come out, to be measured on the trajectory
   bool bounded = false;  ///< a torque or a duration is limited: to be solved with ControlBounds::Enforce
+  ObjectiveOptions objective{};
+  VectorXd peak_limits{};      ///< of the peak torque, nu (getPeakLimits); empty for other objectives
+  bool within_limits = false;  ///< whether torques are limited, at s = 1 of the peak torque
 };
+
+/// The scale of an objective by Eq. (2) of objective.h. \param effort  the motion of least effort, solved, with its solution as
+/// its guess; \param limits  those of the motion
+ObjectiveOptions scaleObjective(const Motion& effort, const ObjectiveOptions& options, const LimitOptions& limits = {});
+
+/// Solves a motion from its guess, and leaves the solution there: by Fddp, with bounds enforced where there are any. For the
+/// least peak torque it solves the PeakProblem of motion.problem. The guess should then be the motion of least effort: from a
+/// quasi-static guess, motors that share a load have nothing to gain by it.
+FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer = {});
 
 /// Options of a problem besides those of the motion.
 struct ProblemOptions {
@@ -73,16 +86,17 @@ struct ProblemOptions {
   std::optional<StepRule> step;  ///< if not given: midpoint, or Euler for the paper's problems
   LimitOptions limits;
   TimingOptions timings;
+  ObjectiveOptions objective;
 
   ProblemOptions() = default;
   ProblemOptions(Formulation formulation, const LimitOptions& limits = {}) : formulation(formulation), limits(limits) {}
   ProblemOptions(Formulation formulation, StepRule step) : formulation(formulation), step(step) {}
 };
 
-/// Turns a plan into a problem that starts at rest, adding limits, free durations and the step rule to its stages.
+/// Turns a plan into a problem that starts at rest, adding limits, free durations, objective and step rule to its stages.
 /// Gains are limited to what a step can bear (limitGains), except in the paper's problems of fixed durations.
-/// \throws ModelError as addLimits() and freeTimings() do, or when limits are given for a problem of the paper, which
-/// has none
+/// \throws ModelError as addLimits(), freeTimings() and setObjective() do, or when limits are given for a problem of the
+/// paper, which has none
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options);
 
 /// Motor torques that hold the robot still at q under the closures and contacts, as far as possible: with a = v = 0,

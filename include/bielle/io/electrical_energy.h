@@ -1,0 +1,22 @@
+#pragma once
+/// \file The electrical energy of a motion, from its record.
+#include "bielle/io/record.h"
+
+namespace bielle {
+
+/// Eq. (1) of motion/objective.h, without smoothing, as a sum over the steps.
+struct ElectricalEnergy {
+  VectorXd by_motor;             ///< nu, J
+  double total = 0;              ///< J
+  double regeneration = 0;       ///< share of what flows back that was taken off
+  int num_assumed = 0;           ///< motors whose loss is not known: kDefaultTorqueLoss is assumed
+  double distance = 0;           ///< of the centre of mass on the ground, from start to end, m
+  double cost_of_transport = 0;  ///< total over weight and distance; NaN for less than kLeastDistance
+
+  static constexpr double kLeastDistance = 0.2;  ///< m
+};
+
+/// \param regeneration  within 0 .. 1
+ElectricalEnergy calcElectricalEnergy(const Model& model, const MotionRecord& record, double regeneration);
+
+}  // namespace bielle

@@ -1,0 +1,218 @@
+// The electrical energy of motors as a cost. Oracles: central differences in the tangent space; speeds and powers from the
+// evaluation's own velocities; the smoothed cost against the exact one.
+#include <catch2/catch.hpp>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/motion/objective.h"
+#include "bielle/ocp/robot_problem.h"
+#include "check_derivative.h"
+#include "mechanisms.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+struct Discretization {
+  Formulation formulation;
+  StepRule step;
+  bool free;  // whether durations are variables
+};
+std::vector<Discretization> listDiscretizations() {
+  std::vector<Discretization> out;
+  for (Formulation formulation : {Formulation::Full, Formulation::Reduced})
+    for (StepRule step : {StepRule::Euler, StepRule::Midpoint})
+      for (bool free : {false, true}) out.push_back({formulation, step, free});
+  return out;
+}
+std::ostream& operator<<(std::ostream& out, const Discretization& d) {
+  return out << getName(d.formulation) << ", " << getName(d.step) << (d.free ? ", free" : "");
+}
+
+constexpr double kWeight = 0.7, kStep = 0.02;
+
+VectorXd makeLosses(const Model& model) { return VectorXd::LinSpaced(model.nu(), 0.2, 0.5); }
+
+// Three steps with this cost alone, and powers bounded as well.
+RobotProblem makeProblem(const Model& model, const VectorXd& q0, const VectorXd& v0,
+                         const std::vector<ContactTarget>& contacts, const Discretization& how) {
+  std::vector<StageSpec> stages(4);
+  const VectorXd losses = makeLosses(model), ones = VectorXd::Ones(model.nu()), bounds = VectorXd::Ones(2 * model.nu());
+  for (int k = 0; k < 3; ++k) {
+    StageSpec& stage = stages[k];
+    stage.step = how.step;
+    stage.dt = kStep;
+    if (how.free) stage.timing = {0, 0.5, 2};
+    stage.constraints = makeConstraintSet(model, contacts);
+    stage.costs.push_back(
+        {"energy", kWeight, Activation::makeEnergy(ones, losses, 0.3, 4), makeElectricalPower(losses)});
+    stage.path_constraints.push_back({"power", makeElectricalPower(losses), -bounds, bounds, 3 * bounds});
+  }
+  return RobotProblem(model, q0, v0, std::move(stages), how.formulation);
+}
+
+// Powers and torques from the velocities of an evaluation.
+VectorXd calcPowers(const Model& model, const RobotEvaluation& at) {
+  VectorXd out(2 * model.nu());
+  const VectorXd v = at.v_mid.size() > 0 ? at.v_mid : VectorXd(at.x.segment(model.nq(), model.nv()));
+  for (int m = 0; m < model.nu(); ++m) {
+    out[m] = at.u[m] * (v[model.motors()[m].dof] + makeLosses(model)[m] * at.u[m]);
+    out[model.nu() + m] = at.u[m];
+  }
+  return out;
+}
+
+void checkStage(const RobotProblem& problem, int k, const VectorXd& x, const VectorXd& u, std::mt19937& rng) {
+  RobotEvaluator evaluator(problem), moved(problem), node(problem);
+  const Model& model = problem.model();
+  const int ndx = problem.tangentSize(k), nu = problem.controlSize(k), rows = problem.constraintSize(k);
+  const VectorXd x_next = evaluator.evaluate(k, x, u).x_next;
+  REQUIRE(evaluator.evaluation().status == StepStatus::Ok);
+  node.evaluate(k + 1, x_next, VectorXd::Ones(problem.controlSize(k + 1)));
+  REQUIRE(node.evaluation().status == StepStatus::Ok);
+  ConstraintWeights weights{randomVector(rng, rows), randomVector(rng, rows).cwiseAbs()};
+  const auto at = problem.makeEvaluation();
+  const auto scratch = problem.makeScratch();
+  EvaluateTask evaluate{k, &x, &u, nullptr, at.get()};
+  problem.evaluate(&evaluate, 1, scratch.get());
+  StageModel stage;
+  stage.resize(ndx, nu, problem.tangentSize(k + 1));
+  LinearizeTask task{k, at.get(), &node.evaluation(), &weights, &stage, StepStatus::Failed, {}};
+  problem.linearize(&task, 1, scratch.get());
+  REQUIRE(task.status == StepStatus::Ok);
+  // Cost, weighted constraints and powers as functions of (du, dx).
+  const auto step = [&](const VectorXd& d) {
+    const VectorXd x1 = d.tail(ndx).isZero(0) ? x : evaluator.integrate(d.tail(ndx));
+    const RobotEvaluation& to = moved.evaluate(k, x1, u + d.head(nu));
+    REQUIRE(to.status == StepStatus::Ok);
+    VectorXd out(1 + 2 * model.nu());
+    out << to.cost + weights.gradient.dot(to.constraints), calcPowers(model, to);
+    return out;
+  };
+  const MatrixXd J = differentiate(VectorXd::Zero(nu + ndx), 1e-4, step);
+  VectorXd gradient(nu + ndx);
+  gradient << stage.lu, stage.lx;
+  checkDerivative(gradient.transpose(), J.row(0), "gradient");
+  if (problem.hasFreeTimings()) return;
+  const Activation& energy = problem.spec(k).costs[0].activation;
+  const VectorXd r = calcPowers(model, static_cast<const RobotEvaluation&>(*at));
+  VectorXd slope(r.size()), curvature(r.size());
+  energy.calcDerivatives(r, slope, curvature);
+  const VectorXd diagonal = kStep * kWeight * curvature + weights.hessian / 9;
+  const auto by = J.bottomRows(r.size());
+  checkDerivative(MatrixXd(stage.hessian().selfadjointView<Eigen::Lower>()),
+                  by.transpose() * diagonal.asDiagonal() * by, "Hessian");
+}
+
+}  // namespace
+
+TEST_CASE("energy: derivatives by states, torques and durations, every joint kind times every closure kind") {
+  const Discretization how = GENERATE(from_range(listDiscretizations()));
+  std::mt19937 rng(17);
+  for (JointKind kind : kJointKinds)
+    for (ClosureKind closure : kClosureKinds)
+      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
+        CAPTURE(how, getName(kind), getName(closure), base == MechanismBase::Fixed);
+        const Mechanism mechanism = makeRandomMechanism(rng, kind, closure, base, 3, 2);
+        const Model& model = mechanism.model;
+        REQUIRE(model.nu() > 0);
+        std::vector<ContactTarget> contacts;
+        if (base == MechanismBase::FreeFlyer) contacts = {{1, randomPlacement(rng), 5, 4}};
+        Workspace ws(model);
+        const VectorXd& q = mechanism.q_closed;
+        const VectorXd v = projectVelocity(model, ws, makeConstraintSet(model), q, randomVector(rng, model.nv()));
+        const RobotProblem problem = makeProblem(model, q, v, contacts, how);
+        for (int k : {0, 1}) {
+          CAPTURE(k);
+          VectorXd x = problem.initialState(), u = randomVector(rng, problem.controlSize(k), 5);
+          if (how.free && k == 0) u[model.nu()] = 0.8;
+          if (how.free && k == 1) x[x.size() - 1] = 1.3;
+          checkStage(problem, k, x, u, rng);
+        }
+      }
+}
+
+TEST_CASE("energy: the smoothed cost exceeds the exact one by no more than it says") {
+  const double smoothing = 0.1;
+  for (double share : {0.0, 0.4, 1.0}) {
+    const Activation energy = Activation::makeEnergy(VectorXd::Ones(1), VectorXd::Constant(1, 0.25), share, smoothing);
+    double largest = 0;
+    for (double power = -3; power <= 3; power += 1e-3) {
+      const Eigen::Vector2d r(power, 7);
+      const double excess = energy.calc(r) - (power > 0 ? power : share * power);
+      CHECK(excess >= -1e-15);
+      largest = std::max(largest, excess);
+      if (std::abs(power) > 0.5) CHECK(excess <= (1 - share) * smoothing * smoothing / (4 * std::abs(power)) + 1e-15);
+    }
+    CHECK(largest <= (1 - share) * smoothing / 2 + 1e-15);
+    CHECK(largest >= (1 - share) * smoothing / 2 - 1e-3);
+  }
+}
+
+TEST_CASE("energy: a midpoint step takes the work of its torque, an Euler step one of first order") {
+  // One joint under a constant torque from rest: the work of the torque is its kinetic energy.
+  const Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 0.7);
+  const Model& model = mechanism.model;
+  const auto calcWork = [&](StepRule rule, int steps) {
+    std::vector<StageSpec> stages(steps + 1);
+    for (StageSpec& stage : stages) {
+      stage.step = rule;
+      stage.dt = 0.1 / steps;
+      stage.constraints = makeConstraintSet(model);
+      if (&stage == &stages.back()) continue;
+      stage.costs.push_back({"energy", 1, Activation::makeEnergy(VectorXd::Ones(1), VectorXd::Zero(1), 1, 1),
+                             makeElectricalPower(VectorXd::Zero(1))});
+    }
+    const RobotProblem problem(model, mechanism.q_closed, VectorXd::Zero(model.nv()), std::move(stages),
+                               Formulation::Reduced);
+    RobotEvaluator evaluator(problem);
+    VectorXd x = problem.initialState();
+    double work = 0;
+    for (int k = 0; k < steps; ++k) {
+      const RobotEvaluation& at = evaluator.evaluate(k, x, VectorXd::Constant(1, 1.5));
+      work += at.cost;
+      x = VectorXd(at.x_next);
+    }
+    // The torque is constant, so that its exact work is that torque times the angle.
+    return std::abs(work - 1.5 * (x[0] - mechanism.q_closed[0]));
+  };
+  for (int steps : {10, 20}) {
+    CAPTURE(steps);
+    const double midpoint = calcWork(StepRule::Midpoint, steps), euler = calcWork(StepRule::Euler, steps);
+    CHECK(midpoint < 0.02 * euler);
+    CHECK(calcWork(StepRule::Midpoint, 2 * steps) < 0.3 * midpoint);
+    CHECK(calcWork(StepRule::Euler, 2 * steps) > 0.4 * euler);
+  }
+}
+
+TEST_CASE("energy: what makes no sense is refused") {
+  const Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 0.7);
+  const Model& model = mechanism.model;
+  const auto make = [&](const std::function<void(std::vector<StageSpec>&)>& spoil) {
+    std::vector<StageSpec> stages(2);
+    stages[0].constraints = makeConstraintSet(model);
+    spoil(stages);
+    RobotProblem(model, mechanism.q_closed, VectorXd::Zero(model.nv()), std::move(stages));
+  };
+  const auto add = [](StageSpec& stage, int losses) {
+    stage.costs.push_back({"energy", 1, Activation::makeEnergy(VectorXd::Ones(1), VectorXd::Ones(losses), 0, 1),
+                           makeElectricalPower(VectorXd::Ones(1))});
+  };
+  CHECK_NOTHROW(make([&](auto& stages) { add(stages[0], 1); }));
+  using Catch::Contains;
+  CHECK_THROWS_WITH(make([&](auto& stages) { add(stages[0], 2); }), Contains("do not have the size"));
+  CHECK_THROWS_WITH(make([&](auto& stages) { add(stages[1], 1); }), Contains("terminal"));
+  CHECK_THROWS_WITH(make([&](auto& stages) {
+                      add(stages[0], 1);
+                      stages[0].kind = StageKind::Impact;
+                      stages[0].dt = 0;
+                    }),
+                    Contains("impact"));
+  std::vector<StageSpec> stages(2);
+  ObjectiveOptions options;
+  options.regeneration = 1.1;
+  CHECK_THROWS_WITH(setObjective(model, options, stages), Contains("regeneration"));
+  options.regeneration = 0;
+  options.regularization = 0;
+  CHECK_THROWS_WITH(setObjective(model, options, stages), Contains("regularization"));
+}
