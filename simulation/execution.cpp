@@ -142,11 +142,17 @@ double getProcessorTime() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-double calcBalance(const Books& start, const Books& end) {
-  const double change = end.getEnergy() - start.getEnergy();
-  const double losses = end.contact_loss + end.stop_loss + end.other_loss;
-  const double exchanged = std::abs(change) + std::abs(end.motor_work) + std::abs(end.push_work) + std::abs(losses);
-  return exchanged > 0 ? (change - end.motor_work - end.push_work + losses) / exchanged : 0;
+// Left less right side of Books' Eq. (1), J.
+double calcImbalance(const Books& start, const Books& end) {
+  return end.getEnergy() - start.getEnergy() - end.motor_work - end.push_work + end.contact_loss + end.stop_loss +
+         end.other_loss;
+}
+
+// Energy that motors, pushes and losses have moved between two instants, J.
+double calcExchange(const Books& before, const Books& now) {
+  return std::abs(now.motor_work - before.motor_work) + std::abs(now.push_work - before.push_work) +
+         std::abs(now.contact_loss - before.contact_loss) + std::abs(now.stop_loss - before.stop_loss) +
+         std::abs(now.other_loss - before.other_loss);
 }
 
 }  // namespace
@@ -176,11 +182,11 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   VectorXd u = VectorXd::Zero(model.nu());
   plan.getReference(0, measurement.q, measurement.v);
   world.reset(measurement.q, measurement.v);
-  out.start = world.getBooks();
+  out.start = out.end = world.getBooks();
   recorder.addNode(world);
   const Vector3d com_start = recorder.getCom();
   int cut = 0, tick = 0;
-  double seconds = 0;
+  double seconds = 0, exchanged = 0;
   bool advances = true;
   std::string fall;
   for (; tick < ticks && advances && fall.empty(); ++tick) {
@@ -200,14 +206,18 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
     if (tick % ticks_per_row == 0) recorder.addStage(world);
     fall = detector.find(world.getTime(), world.getConfiguration());
     out.largest_deviation = std::max(out.largest_deviation, detector.getDeviation());
-    if ((tick + 1) % ticks_per_row == 0 || tick + 1 == ticks || !fall.empty()) recorder.addNode(world);
+    if ((tick + 1) % ticks_per_row != 0 && tick + 1 != ticks && fall.empty()) continue;
+    recorder.addNode(world);
+    const Books books = world.getBooks();
+    exchanged += calcExchange(out.end, books);
+    out.end = books;
   }
   out.outcome = !advances ? Outcome::BrokeOff : !fall.empty() ? Outcome::Fell : Outcome::Stood;
   out.message = advances ? fall : world.getMessage();
   out.duration = world.getTime();
   out.distance = (recorder.getCom() - com_start).head<2>().norm();
-  out.end = world.getBooks();
-  out.energy_balance = calcBalance(out.start, out.end);
+  out.imbalance = calcImbalance(out.start, out.end);
+  out.energy_balance = exchanged > 0 ? out.imbalance / exchanged : 0;
   out.saturated_share = static_cast<double>(cut) / (std::max(1, tick) * std::max(1, model.nu()));
   out.real_time_factor = seconds > 0 ? out.duration / seconds : 0;
   out.record = recorder.finish();

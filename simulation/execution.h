@@ -48,8 +48,9 @@ struct Execution {
   double largest_gap = 0;        ///< of closures, m
   double largest_slip = 0;       ///< of a sole since its touchdown, m
   double largest_deviation = 0;  ///< of the trunk from its planned place, m
-  /// Books' Eq. (1), left less right side, over the energies that were exchanged: the sum of the sizes of its terms.
-  double energy_balance = 0;
+  double imbalance = 0;          ///< Books' Eq. (1), left less right side, J
+  double energy_balance =
+      0;  ///< the same over the energy that motors, pushes and losses moved, row by row of the record
   double saturated_share = 0;   ///< of motors and time: torques that were cut at their limits
   double real_time_factor = 0;  ///< simulated time over the processor time of the world
   Books start, end;

@@ -123,7 +123,7 @@ nlohmann::ordered_json listBooks(const Execution& e) {
   return {{"energy_start_J", e.start.getEnergy()}, {"energy_end_J", e.end.getEnergy()},
           {"motor_work_J", e.end.motor_work},      {"push_work_J", e.end.push_work},
           {"contact_loss_J", e.end.contact_loss},  {"stop_loss_J", e.end.stop_loss},
-          {"other_loss_J", e.end.other_loss}};
+          {"other_loss_J", e.end.other_loss},      {"imbalance_J", e.imbalance}};
 }
 
 // Adds what happened to the summary of the result.
@@ -158,10 +158,10 @@ void print(const Arguments& arguments, const Plan& plan, const Execution& e) {
   std::snprintf(text, sizeof text,
                 "\n  duration            %.3f s\n  distance            %.3f m, %.3f m/s\n"
                 "  trunk off its plan  %.4f m at most\n  closures            open by %.1e m at most\n"
-                "  soles               slip by %.1e m at most\n  energy balance      %.1e of what was exchanged\n"
+                "  soles               slip by %.1e m at most\n  energy balance      %.1e J, %.1e of what was exchanged\n"
                 "  torques             %.2f %% cut at their limits\n  speed               %.2g times real time\n",
                 e.duration, e.distance, e.getMeanSpeed(), e.largest_deviation, e.largest_gap, e.largest_slip,
-                e.energy_balance, 100 * e.saturated_share, e.real_time_factor);
+                e.imbalance, e.energy_balance, 100 * e.saturated_share, e.real_time_factor);
   std::cout << text;
 }
 
