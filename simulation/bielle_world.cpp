@@ -302,7 +302,7 @@ Books BielleWorld::getBooks() const {
   books.motor_work = motor_work_;
   books.push_work = push_work_;
   books.contact_loss = -contact_work_ - (books.elastic - stops - (elastic_start_ - stops_start_));
-  books.stop_loss = -stop_work_ - (stops - stops_start_);
+  books.stop_loss = stops_start_ - stops - stop_work_;
   return books;
 }
 

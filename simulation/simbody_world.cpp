@@ -319,7 +319,7 @@ Books SimbodyWorld::getBooks() const {
   books.motor_work = work_.motor;
   books.push_work = work_.push;
   books.contact_loss = -work_.contact - (books.elastic - stops - (elastic_start_ - stops_start_));
-  books.stop_loss = -work_.stop - (stops - stops_start_);
+  books.stop_loss = stops_start_ - stops - work_.stop;
   return books;
 }
 

@@ -56,6 +56,10 @@ TEST_CASE("bielle world: a robot is pushed, and the work of the push is booked")
   testing::checkPushed(*makeTestWorld(), getBipetto(), kTolerances);
 }
 
+TEST_CASE("bielle world: a stop holds a joint, and takes energy") {
+  testing::checkStopped(*makeTestWorld(), getBipetto(), kTolerances);
+}
+
 TEST_CASE("bielle world: accelerations in the air are those of the full system") {
   const Model& model = getBipetto();
   const Flight flight = makeFlight();

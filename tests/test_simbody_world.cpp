@@ -58,6 +58,10 @@ TEST_CASE("simbody world: a robot is pushed, and the work of the push is booked"
   testing::checkPushed(*makeSimbodyWorld(getBipetto()), getBipetto(), kTolerances);
 }
 
+TEST_CASE("simbody world: a stop holds a joint, and takes energy") {
+  testing::checkStopped(*makeSimbodyWorld(getBipetto()), getBipetto(), kTolerances);
+}
+
 TEST_CASE("simbody world: a walk goes as in Bielle's world, the more so the finer the steps") {
   const Model& model = getBipetto();
   Policy policy = makeWalkPolicy(model);

@@ -120,4 +120,33 @@ void checkPushed(World& world, const Model& model, const TrialTolerances& tolera
   CHECK(calcImbalance(start, end) < tolerances.balance);
 }
 
+void checkStopped(World& world, const Model& model, const TrialTolerances& tolerances) {
+  const PostureHold posture(model);
+  VectorXd q = posture.getPosture();
+  q[2] += 5;
+  world.reset(q, VectorXd::Zero(model.nv()));
+  const Books start = world.getBooks();
+  const Motor& motor = model.motors()[model.findMotor("hipx_right")];
+  const int at = model.joints()[motor.joint].idx_q;
+  const double upper = model.upperLimits()[motor.dof];
+  REQUIRE(upper < 1);
+  double farthest = -upper;
+  for (int i = 0; i < 300; ++i) {
+    VectorXd u = posture.calcTorques(world);
+    u[model.findMotor("hipx_right")] = 10;
+    world.setTorques(u);
+    REQUIRE(world.advance(1e-3));
+    farthest = std::max(farthest, world.getConfiguration()[at]);
+  }
+  CHECK(farthest > upper);
+  CHECK(farthest < upper + 0.05);
+  const Books end = world.getBooks();
+  CHECK(end.stop_loss > 0.01);
+  CHECK(end.contact_loss == Approx(0).margin(1e-9));
+  CHECK(calcImbalance(start, end) < tolerances.balance);
+  Books poisoned = end;
+  poisoned.stop_loss *= 0.5;
+  CHECK(calcImbalance(start, poisoned) > calcImbalance(start, end));
+}
+
 }  // namespace bielle::simulation::testing

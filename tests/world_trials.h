@@ -36,5 +36,7 @@ struct TrialTolerances {
 void checkStanding(World& world, const Model& model, const TrialTolerances& tolerances);
 void checkDropped(World& world, const Model& model, const TrialTolerances& tolerances);
 void checkPushed(World& world, const Model& model, const TrialTolerances& tolerances);
+// In the air, a motor drives a hip into its stop.
+void checkStopped(World& world, const Model& model, const TrialTolerances& tolerances);
 
 }  // namespace bielle::simulation::testing
