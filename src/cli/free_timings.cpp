@@ -30,9 +30,8 @@ void addTimingOptions(CLI::App& sub, TimingArguments& arguments) {
            for (const std::string& phase : phases)
              if (!phase.empty()) arguments.phases.push_back(phase);
          },
-         "let the solver choose how long phases last; footholds and paths stay. PHASE=LOWER:UPPER bounds one of them "
-         "[of "
-         "the nominal duration], `all` those with contacts; alone: all=0.6:1.6")
+         "let the solver choose how long phases last; footholds and paths stay. PHASE=LOWER:UPPER bounds one of "
+         "them [of the nominal duration], `all` those with contacts; alone: all=0.6:1.6")
       ->type_name("PHASE=LOWER:UPPER")
       ->expected(0, -1);
   sub.add_option("--time-weight", arguments.time_weight,

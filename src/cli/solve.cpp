@@ -194,10 +194,10 @@ ShootingTrajectory solveParts(const MotionRequest& request, const Model& model, 
 
 // A motion of another objective: it starts from that of least effort, or from a given result, and is scaled by it.
 Motion makeFromEffort(const MotionRequest& request, const Model& model, const ProblemOptions& problem, Motion effort,
-                      const SolveArguments& arguments) {
+                      const SolveArguments& arguments, const FddpOptions& solver) {
   if (arguments.warm_start.empty()) {
     if (!arguments.quiet) std::cout << "first, the motion of least effort:" << std::endl;
-    const FddpSummary summary = solveMotion(effort, arguments.solver, makeObserver(arguments));
+    const FddpSummary summary = solveMotion(effort, solver, makeObserver(arguments));
     if (!arguments.quiet)
       std::cout << "least effort: " << getName(summary.termination) << ", " << summary.iterations << " iterations, "
                 << formatNumber(summary.seconds, "%.2f") << " s\nfrom there, " << getName(problem.objective.objective)
@@ -235,8 +235,10 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   problem.objective.regeneration = objective.regeneration;  // of reported energies
   Motion motion = makeLimited(request, model, problem);
   FddpOptions solver = arguments.solver;
-  if (motion.bounded) solver.bounds = ControlBounds::Enforce;
-  if (!arguments.warm_start.empty()) setGuess(readResultRecord(arguments.warm_start), motion);
+  if (!arguments.warm_start.empty())
+    setGuess(readResultRecord(arguments.warm_start), motion);
+  else if (request.parts.empty())
+    solver.initial_regularization = kGuessRegularization;
   makeOutputDirectory(arguments.directory);
 
   watchSignals();
@@ -246,9 +248,10 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   }
   if (objective.objective != Objective::Effort) {
     problem.objective = objective;
-    motion = makeFromEffort(request, model, problem, std::move(motion), arguments);
+    motion = makeFromEffort(request, model, problem, std::move(motion), arguments, solver);
+    solver = arguments.solver;
   }
-  const FddpSummary summary = solveMotion(motion, arguments.solver, makeObserver(arguments));
+  const FddpSummary summary = solveMotion(motion, solver, makeObserver(arguments));
   const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed",
                     serial ? arguments.serial_armature : ""};
   const MotionResult result = makeResult(run, motion, motion.guess, summary);
@@ -290,8 +293,8 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
       "ignore the robot's limits of torques, joint ranges and velocities, which motions keep otherwise");
   sub.add_option(
          "--dead-point-margin", limits.dead_point_margin,
-         "smallest share that the speeds of a linkage's joints per speeds of its motors may have of those at the "
-         "start, and largest inverse share; 0: none")
+         "least transmission of a linkage, the speeds of its joints per speeds of its motors, as a share of that at "
+         "the start; its inverse is the largest; 0: none")
       ->capture_default_str();
   // Lets scripts run that name a kind of barrier: limits are kept by constraints. No group: --help leaves it out.
   sub.add_option_function<std::string>("--limits",
@@ -334,8 +337,7 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
            arguments->step = name == getName(StepRule::Euler) ? StepRule::Euler : StepRule::Midpoint;
          },
          "midpoint: steps of second order; euler: of first order, as in the paper. If none is given, published "
-         "problems and "
-         "--model serial take euler")
+         "problems and --model serial take euler")
       ->check(CLI::IsMember({getName(StepRule::Euler), getName(StepRule::Midpoint)}))
       ->default_str(getName(StepRule::Midpoint));
   sub.add_option_function<std::string>(

@@ -128,6 +128,8 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
 
 ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
                               const PartsOptions& options) {
+  FddpOptions solver = options.solver;
+  solver.initial_regularization = kGuessRegularization;
   ShootingTrajectory whole;
   VectorXd q = q0;
   for (const SequencePart& part : parts) {
@@ -136,7 +138,7 @@ ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart
     ProblemOptions problem = options.problem;
     problem.timings = selectTimings(problem.timings, plan.schedule);
     Motion motion = makeMotion(model, std::move(plan), problem);
-    const FddpSummary summary = Fddp(options.solver).solve(*motion.problem, motion.guess, options.observer);
+    const FddpSummary summary = solveMotion(motion, solver, options.observer);
     if (options.report) options.report(part.name, summary);
     join(motion.guess, whole);
   }

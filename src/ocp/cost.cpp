@@ -14,10 +14,17 @@ double calcDistance(const Activation& activation, Eigen::Index i, double r) {
 
 }  // namespace
 
-Activation Activation::makeQuadratic(const VectorXd& weights) { return {ActivationKind::Quadratic, weights, {}, {}}; }
+Activation Activation::makeQuadratic(const VectorXd& weights) {
+  Activation out;
+  out.weights = weights;
+  return out;
+}
 
 Activation Activation::makeBarrier(const VectorXd& weights, const VectorXd& lower, const VectorXd& upper) {
-  return {ActivationKind::Barrier, weights, lower, upper};
+  Activation out = makeQuadratic(weights);
+  out.kind = ActivationKind::Barrier;
+  out.lower = lower, out.upper = upper;
+  return out;
 }
 
 Activation Activation::makeEnergy(const VectorXd& weights, const VectorXd& losses, double share, double smoothing) {

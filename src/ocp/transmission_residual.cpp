@@ -51,7 +51,8 @@ class TransmissionMap {
       for (int j = 0; j < m; ++j) s.z(joints_[i], j) += s.inverse(j, i);
     for (int j = 0; j < m; ++j) s.z(motors_[j], j) -= 1;
     const ClusterBasis& basis = s.point.basis();
-    s.y.noalias() = basis.J * (cluster_.inverse_metric.asDiagonal() * s.z);
+    s.z.array().colwise() *= cluster_.inverse_metric.array();
+    s.y.noalias() = basis.J * s.z;
     s.point.solveGram(s.y);
     Workspace& ws = s.point.workspace();
     for (int j = 0; j < m; ++j) {

@@ -12,8 +12,8 @@ namespace bielle {
 namespace {
 
 constexpr double kFall = 0.25;  // ratio to which a violation must decrease, or the penalty is raised
-// Below this violation the penalty is raised at every update: there steps are full, and multipliers converge superlinearly.
-// Farther away a large penalty would only shorten the steps.
+// Below this violation the penalty is raised at every update, and multipliers converge the faster. Farther away a large
+// penalty would only shorten the steps.
 constexpr double kNear = 0.03, kNearPenalty = 1e3;  // the latter over the initial penalty, at most
 // Foreseen decrease over the gain of new multipliers at which they are due; and while violations alone are minimized.
 constexpr double kShare = 0.1, kRestorationShare = 1e-6;
@@ -106,11 +106,13 @@ bool AugmentedLagrangian::updateMultipliers(const EvaluationList& iterate, doubl
   } else {
     restoring_ = false;
     adoptMultipliers();
-    const double raised = std::min(options_.max_penalty, options_.penalty_increase * penalty_);
-    if (!falls)
-      penalty_ = far_penalty_ = raised;
-    else if (at_.violation < kNear)
-      penalty_ = std::max(penalty_, std::min(raised, kNearPenalty * options_.initial_penalty));
+    if (!falls) {
+      far_penalty_ = std::min(options_.max_penalty, options_.penalty_increase * far_penalty_);
+      penalty_ = std::min(options_.max_penalty, options_.penalty_increase * penalty_);
+    } else if (at_.violation < kNear) {
+      const double most = std::min(options_.max_penalty, kNearPenalty * options_.initial_penalty);
+      penalty_ = std::max(penalty_, std::min(most, options_.penalty_increase * penalty_));
+    }
   }
   evaluate(iterate);
   return true;

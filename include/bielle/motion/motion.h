@@ -80,6 +80,10 @@ ObjectiveOptions scaleObjective(const Motion& effort, const ObjectiveOptions& op
 /// quasi-static guess, motors that share a load have nothing to gain by it.
 FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer = {});
 
+/// FddpOptions::initial_regularization for solves from Motion::guess. That guess stands still: undamped, the first steps
+/// throw the swing legs so far that dozens of short ones follow. A solution to start from needs none.
+constexpr double kGuessRegularization = 1e-4;
+
 /// Options of a problem besides those of the motion.
 struct ProblemOptions {
   Formulation formulation = Formulation::Reduced;

@@ -53,7 +53,7 @@
 /// Whenever the foreseen decrease has become a small part of the cost, or the gradient has vanished,
 ///     y_k <- rho d_k,                                                                                                (12)
 /// and rho grows if the largest violation is more than a quarter of what it was the last time, and, for this solve alone,
-/// whenever it is below 0.03, where steps are full and (12) then converges superlinearly. Converged means that the
+/// whenever it is below 0.03, up to 1000 times the initial one, so that (12) converges faster. Converged means that the
 /// gradient has vanished and no row is violated by more than the tolerance; y_k is then the multiplier of c_k in
 ///     L = J + sum_k y_k . c_k,  positive at upper bounds, negative at lower ones,  and  y_i (bound_i - c_i) vanishes.   (13)
 /// If the violation no longer falls although rho is at its largest, the problem is called infeasible: the trajectory is then a
@@ -99,7 +99,7 @@ struct FddpOptions {
   /// Also converged if a full step at the smallest regularization changes J by less than this times |J|; 0: never.
   double cost_tolerance = 1e-13;
 
-  double initial_regularization = 1e-9;  ///< mu_u of the first sweep
+  double initial_regularization = 1e-9;  ///< mu_u of the first sweep; from a guess far from the optimum start higher
   double min_regularization = 1e-9;
   double max_regularization = 1e9;        ///< the solve gives up above this
   double regularization_increase = 10;    ///< factor after a failed sweep or line search or a short step
