@@ -7,25 +7,13 @@
 #include "bielle/motion/squat.h"
 #include "check_derivative.h"
 #include "count_allocations.h"
+#include "discretizations.h"
 #include "problem_probe.h"
 
 using namespace bielle;
 using namespace bielle::testing;
 
 namespace {
-
-// How a problem is discretized.
-struct Discretization {
-  Formulation formulation = Formulation::Full;
-  StepRule step = StepRule::Euler;
-};
-const std::vector<Discretization> kDiscretizations = {{Formulation::Full, StepRule::Euler},
-                                                      {Formulation::Reduced, StepRule::Euler},
-                                                      {Formulation::Full, StepRule::Midpoint},
-                                                      {Formulation::Reduced, StepRule::Midpoint}};
-std::ostream& operator<<(std::ostream& out, const Discretization& d) {
-  return out << getName(d.formulation) << ", " << getName(d.step);
-}
 
 struct Point {
   VectorXd x, u, x_node;  ///< state, controls, state of the next node
@@ -61,6 +49,8 @@ StageSpec makeStage(std::mt19937& rng, const Model& model, const VectorXd& q,
                            Activation::makeBarrier(VectorXd::Ones(n), VectorXd::Zero(n), VectorXd::Constant(n, 1e12)),
                            std::move(cone)});
   }
+  for (const Transmission& linkage : listTransmissions(model, q))
+    stage.costs.push_back({"transmission", 1, quadratic(1), makeTransmission(linkage)});
   return stage;
 }
 

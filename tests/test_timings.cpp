@@ -11,24 +11,13 @@
 #include "bielle/solve/fddp.h"
 #include "check_derivative.h"
 #include "count_allocations.h"
+#include "discretizations.h"
 #include "mechanisms.h"
 
 using namespace bielle;
 using namespace bielle::testing;
 
 namespace {
-
-struct Discretization {
-  Formulation formulation;
-  StepRule step;
-};
-const std::vector<Discretization> kDiscretizations = {{Formulation::Full, StepRule::Euler},
-                                                      {Formulation::Reduced, StepRule::Euler},
-                                                      {Formulation::Full, StepRule::Midpoint},
-                                                      {Formulation::Reduced, StepRule::Midpoint}};
-std::ostream& operator<<(std::ostream& out, const Discretization& d) {
-  return out << getName(d.formulation) << ", " << getName(d.step);
-}
 
 StageSpec makeStage(const Model& model, const VectorXd& q_ref, const std::vector<ContactTarget>& contacts, bool running,
                     StepRule rule, std::mt19937& rng) {

@@ -1,0 +1,228 @@
+// `bielle solve`, run like a user does: its files, its messages, its exit status.
+#include <signal.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "bielle/io/record.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/squat.h"
+#include "cli_command.h"
+
+namespace fs = std::filesystem;
+using namespace bielle;
+using namespace bielle::testing;
+using nlohmann::json;
+
+TEST_CASE("solve writes a converged squat and says so") {
+  const OutputDirectory directory;
+  const CommandResult result = run(makeShortSquat(directory.str()));
+  INFO(result.out << result.err);
+  CHECK(result.status == 0);
+  CHECK_THAT(result.out, Catch::Contains("iter") && Catch::Contains("converged") && Catch::Contains("peak torques"));
+  const json summary = directory.readSummary();
+  const MotionRecord record = directory.readTrajectory();
+  CHECK(summary["converged"] == true);
+  CHECK(summary["interrupted"] == false);
+  CHECK(summary["formulation"] == "reduced");
+  CHECK(summary["requested"]["duration"] == 0.6);
+  CHECK(summary["requested"]["depth"] == 0.95);
+  CHECK(summary["command"].size() == kShortSquat.size() + 2);
+  CHECK(record.time.size() == 31);
+  CHECK(summary["closure_gap"]["position_m"] == record.gap.col(0).maxCoeff());
+  CHECK(record.gap.maxCoeff() < 1e-9);
+  const auto& motors = record.u_names;
+  const auto knee = std::find(motors.begin(), motors.end(), "motor_knee_left") - motors.begin();
+  CHECK(summary["peak_torques"]["motor_knee_left"] == record.u.col(knee).cwiseAbs().maxCoeff());
+  // The feet carry the weight of a robot that ends where it began.
+  CHECK(record.com.col(2).minCoeff() < 0.97 * record.com(0, 2));
+  const Model model = loadRobot("bipetto").model;
+  const double mean = (record.contact_wrenches.col(2) + record.contact_wrenches.col(8)).mean();
+  CHECK(mean == Approx(model.mass() * 9.81).epsilon(0.02));
+
+  const CommandResult quiet = run(makeShortSquat(directory.str(), {"--quiet", "--threads", "1"}));
+  CHECK(quiet.status == 0);
+  CHECK_THAT(quiet.out, !Catch::Contains("iter ") && Catch::Contains("converged"));
+  CHECK(directory.readTrajectory().u == record.u);  // whatever the number of threads
+}
+
+TEST_CASE("solve says what was asked and what came out; a goal that is missed is a warning, no failure") {
+  const OutputDirectory directory;
+  const CommandResult met = run(makeShortSquat(directory.str(), {"--quiet"}));
+  INFO(met.out << met.err);
+  CHECK(met.status == 0);
+  CHECK_THAT(met.out, Catch::Contains("depth  asked 0.95, came out 0.9") && !Catch::Contains("missed"));
+  CHECK_THAT(met.err, !Catch::Contains("warning"));
+  CHECK(directory.readSummary()["goals"][0]["met"] == true);
+  const CommandResult missed = run(makeShortSquat(directory.str(), {"--quiet", "--set", "com_weight=1"}));
+  INFO(missed.out << missed.err);
+  CHECK(missed.status == 0);
+  CHECK_THAT(missed.out, Catch::Contains("missed (tolerance 0.01)"));
+  CHECK_THAT(missed.err, Catch::Contains("bielle: warning: depth asked 0.95, came out "));
+  const json goal = directory.readSummary()["goals"][0];
+  CHECK(goal["met"] == false);
+  CHECK(goal["asked"] == 0.95);
+  CHECK(goal["came_out"] > 0.96);
+}
+
+TEST_CASE("solve minimizes energy or peak torque, from the motion of least effort or another result") {
+  const OutputDirectory directory;
+  const std::string effort = directory.str() + "/effort", other = directory.str() + "/other";
+  const auto getEnergy = [](const json& summary) { return summary["electrical_energy"]["total_J"].get<double>(); };
+  const auto readSummary = [](const std::string& path) { return json::parse(std::ifstream(path + "/summary.json")); };
+  CHECK(run(makeShortSquat(effort, {"--quiet"})).status == 0);
+  const json first = readSummary(effort);
+  CHECK(first["objective"]["kind"] == "effort");
+  CHECK(first["electrical_energy"]["cost_of_transport"].is_null());
+  CHECK(first["electrical_energy"]["motors_of_assumed_loss"] == 12);
+  for (const std::string objective : {"energy", "peak-torque"}) {
+    const CommandResult result = run(makeShortSquat(other, {"--objective", objective}));
+    INFO(result.out << result.err);
+    CHECK(result.status == 0);
+    CHECK_THAT(result.out, Catch::Contains("first, the motion of least effort") &&
+                               Catch::Contains("electrical energy") &&
+                               Catch::Contains("losses of 12 motors assumed: 0.25"));
+    const json summary = readSummary(other);
+    CHECK(summary["objective"]["kind"] == objective);
+    const auto getPeak = [](const json& of) {
+      double peak = 0;
+      for (const auto& [motor, value] : of["peak_torques"].items()) peak = std::max(peak, value.get<double>());
+      return peak;
+    };
+    if (objective == "energy") CHECK(getEnergy(summary) < 0.95 * getEnergy(first));
+    if (objective == "peak-torque") CHECK(getPeak(summary) < 0.95 * getPeak(first));
+    // From the files of the same effort: the same problem, but for a scale that is taken where the base of a warm start is,
+    // by the slip of the feet (3e-6 m) from that of the effort.
+    const CommandResult warm =
+        run(makeShortSquat(other, {"--quiet", "--objective", objective, "--warm-start", effort}));
+    CHECK(warm.status == 0);
+    CHECK_THAT(warm.out, !Catch::Contains("least effort"));
+    CHECK(readSummary(other)["cost"].get<double>() == Approx(summary["cost"].get<double>()).epsilon(1e-4));
+  }
+  checkRefused(run(makeShortSquat(other, {"--objective", "time"})), "effort,energy,peak-torque");
+  checkRefused(run(makeShortSquat(other, {"--objective", "energy", "--regularization", "-1"})), "regularization");
+  checkRefused(run(makeShortSquat(other, {"--regeneration", "2"})), "regeneration");
+}
+
+TEST_CASE("solve ends by the check of its result, whose failure is its own") {
+  const OutputDirectory directory;
+  fs::create_directory(directory.str());
+  const std::string copy = directory.str() + "/bielle", checker = directory.str() + "/bielle-check";
+  fs::copy_file(BIELLE_COMMAND, copy);
+  std::vector<std::string> arguments = makeShortSquat(directory.str() + "/motion");
+  arguments.erase(std::find(arguments.begin(), arguments.end(), "--no-check"));
+  arguments.insert(arguments.begin(), copy);
+  const std::string path = std::getenv("PATH");
+  setenv("PATH", "/nonexistent", 1);
+  const CommandResult absent = runCommand(arguments);
+  setenv("PATH", path.c_str(), 1);
+  CHECK(absent.status == 0);
+  CHECK_THAT(absent.out, Catch::Contains("not checked: bielle-check is not built"));
+  // How the check ends, the status of the command, and its error line.
+  const std::tuple<const char*, int, const char*> ends[] = {
+      {"exit 0", 0, ""},
+      {"exit 1", 1, ""},
+      {"exit 2", 1, "bielle-check broke off with status 2"},
+      {"exit 77", 1, "bielle-check broke off with status 77"},
+      {"kill -KILL $$", 1, "bielle-check was ended by signal 9"},
+  };
+  for (const auto& [end, status, error] : ends) {
+    std::ofstream(checker) << "#!/bin/sh\necho \"<$@>\"\n" << end << "\n";
+    fs::permissions(checker, fs::perms::owner_all);
+    const CommandResult result = runCommand(arguments);
+    INFO(end << "\n" << result.err);
+    CHECK(result.status == status);
+    CHECK_THAT(result.out, Catch::Contains("<--brief " + directory.str() + "/motion>\n"));
+    CHECK_THAT(result.err, Catch::Contains(error));
+    CHECK(result.err.empty() == (*error == 0));
+  }
+  std::ofstream(checker) << "#!/nonexistent/interpreter\n";
+  const CommandResult unable = runCommand(arguments);
+  CHECK(unable.status == 1);
+  CHECK_THAT(unable.err, Catch::Contains("bielle-check cannot be started"));
+}
+
+TEST_CASE("in the full formulation velocities follow accelerations") {
+  const OutputDirectory directory;
+  CHECK(run(makeShortSquat(directory.str(), {"--formulation", "full"})).status == 0);
+  CHECK(directory.readSummary()["formulation"] == "full");
+  const MotionRecord record = directory.readTrajectory();
+  for (int k = 0; k + 1 < record.time.size(); ++k)
+    CHECK((record.v.row(k + 1) - record.v.row(k) - 0.02 * record.a.row(k)).norm() < 1e-8);
+}
+
+TEST_CASE("the rule of the steps is what was asked for") {
+  const OutputDirectory directory;
+  CHECK(run(makeShortSquat(directory.str(), {"--formulation", "full", "--step", "midpoint"})).status == 0);
+  CHECK(directory.readSummary()["step"] == "midpoint");
+  CHECK(run(makeShortSquat(directory.str(), {"--step", "euler"})).status == 0);
+  CHECK(directory.readSummary()["step"] == "euler");
+  checkRefused(run(makeShortSquat(directory.str(), {"--step", "best"})), "best");
+}
+
+TEST_CASE("scripts that name a kind of barrier get the limits that motions keep anyway") {
+  const OutputDirectory directory;
+  for (const char* kind : {"quadratic", "log"})
+    CHECK(run(makeShortSquat(directory.str(), {"--limits", kind, "--limit", "motor_knee_right=80"})).status == 0);
+  // Without limits there is none for one motor either.
+  checkRefused(run(makeShortSquat(directory.str(), {"--limits", "none", "--limit", "motor_knee_right=80"})), "limit");
+  checkRefused(run(makeShortSquat(directory.str(), {"--no-limits", "--limit", "motor_knee_right=80"})), "limit");
+  checkRefused(run(makeShortSquat(directory.str(), {"--limits", "soft"})), "soft");
+}
+
+TEST_CASE("durations are free within the bounds given, or as planned") {
+  const OutputDirectory directory;
+  const auto solve = [&](std::vector<std::string> options) {
+    const CommandResult result = run(makeShortSquat(directory.str(), options));
+    CHECK(result.status == 0);
+    return directory.readSummary();
+  };
+  CHECK(solve({}).at("free_timings").empty());
+  const double planned = solve({}).at("duration_s");
+  for (const std::vector<std::string>& options :
+       {std::vector<std::string>{"--free-timings"},
+        std::vector<std::string>{"--free-timings", "double support=0.5:0.8"}}) {
+    const bool all = options.size() == 1;
+    const json summary = solve(options), &timing = summary.at("free_timings").at(0);
+    CHECK(timing.at("nominal_s").get<double>() == Approx(planned));
+    CHECK(timing.at("lower_s").get<double>() == Approx((all ? 0.6 : 0.5) * planned));
+    CHECK(timing.at("upper_s").get<double>() == Approx((all ? 1.6 : 0.8) * planned));
+    CHECK(timing.at("chosen_s").get<double>() == Approx(summary.at("duration_s").get<double>()));
+    CHECK(std::abs(timing.at("chosen_s").get<double>() - planned) > 1e-3);
+  }
+  for (const char* wrong :
+       {"double support", "double support=1", "double support=a:b", "double support=2:1", "swing=1:2"})
+    checkRefused(run(makeShortSquat(directory.str(), {"--free-timings", wrong})), "free");
+  checkRefused(run(makeShortSquat(directory.str(), {"--time-weight", "1"})), "time-weight");
+  checkRefused(run(makeShortSquat(directory.str(), {"--free-timings", "--time-weight", "-1"})), "time-weight");
+}
+
+TEST_CASE("a squat that does not converge is written, marked, and status 1") {
+  const OutputDirectory directory;
+  const CommandResult result = run(makeShortSquat(directory.str(), {"--max-iterations", "1"}));
+  CHECK(result.status == 1);
+  const json summary = directory.readSummary();
+  CHECK(summary["converged"] == false);
+  CHECK(summary["interrupted"] == false);
+  CHECK(summary["termination"] == "maximum of iterations");
+  CHECK(directory.readTrajectory().time.size() == 31);
+}
+
+TEST_CASE("an interrupted squat leaves whole files that say so") {
+  const OutputDirectory directory;
+  // Long enough that the signal comes first.
+  Command command({BIELLE_COMMAND, "solve", "squat", "--robot", "bipetto", "--set", "duration=30", "--no-check", "-o",
+                   directory.str()});
+  REQUIRE(command.waitForOutput("\n    1 ", 60));
+  command.sendSignal(SIGINT);
+  const CommandResult result = command.wait();
+  CHECK(result.status == 1);
+  CHECK_THAT(result.out, Catch::Contains("interrupted"));
+  const json summary = directory.readSummary();
+  CHECK(summary["interrupted"] == true);
+  CHECK(summary["converged"] == false);
+  CHECK(directory.readTrajectory().time.size() == 2041);
+}
