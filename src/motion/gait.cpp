@@ -101,7 +101,7 @@ SwingNode makeSwingNode(const SwingShape& shape, const SE3& from, const SE3& to,
   SwingNode node;
   node.progress = static_cast<double>(k) / n;
   node.X_WF = calcSwing(shape, from, to, node.progress);
-  // The velocity at the end of an Euler step is that of the step.
+  // Of the step that ends here: that of an Euler step; a midpoint step's is half a step older.
   const SE3 before = calcSwing(shape, from, to, std::max(0.0, node.progress - 1.0 / n));
   node.V_F << node.X_WF.p - before.p, log3(node.X_WF.R * before.R.transpose());
   node.V_F /= h;

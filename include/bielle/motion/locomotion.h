@@ -45,7 +45,7 @@ struct GaitTiming {
   double both = 0.045;       ///< double support between steps, s
   double flight = 0;         ///< between single supports, in place of double support, s; 0: a walk
   double end = 0.45;         ///< double support after the last step, s
-  double time_step = 0.012;  ///< s; Euler error sinks the feet in proportion to time_step x joint speed^2
+  double time_step = 0.012;  ///< s; fast feet need shorter ones: what steps of order p leave grows with its power p
 
   double stepDuration() const { return single + (flight > 0 ? flight : both); }  ///< s
 };

@@ -82,7 +82,7 @@ FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpOb
 
 /// FddpOptions::initial_regularization for solves from Motion::guess. That guess stands still: undamped, the first steps
 /// throw the swing legs so far that dozens of short ones follow. A solution to start from needs none.
-constexpr double kGuessRegularization = 1e-4;
+constexpr double kGuessRegularization = 1e-5;
 
 /// Options of a problem besides those of the motion.
 struct ProblemOptions {
