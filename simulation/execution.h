@@ -49,8 +49,8 @@ struct Execution {
   double largest_slip = 0;       ///< of a sole since its touchdown, m
   double largest_deviation = 0;  ///< of the trunk from its planned place, m
   double imbalance = 0;          ///< Books' Eq. (1), left less right side, J
-  double energy_balance =
-      0;  ///< the same over the energy that motors, pushes and losses moved, row by row of the record
+  /// The imbalance over the energy that motors, pushes and losses moved, row by row of the record.
+  double energy_balance = 0;
   double saturated_share = 0;   ///< of motors and time: torques that were cut at their limits
   double real_time_factor = 0;  ///< simulated time over the processor time of the world
   Books start, end;

@@ -111,6 +111,7 @@ MotionResult makeResult(const Arguments& arguments, const Plan& plan, const Grou
     result.peak_torques.emplace_back(record.u_names[m], record.u.rows() ? record.u.col(m).cwiseAbs().maxCoeff() : 0);
   std::stable_sort(result.peak_torques.begin(), result.peak_torques.end(),
                    [](const auto& a, const auto& b) { return a.second > b.second; });
+  result.energy = calcElectricalEnergy(plan.robot.model, record, 0);
   result.gap_position = execution.largest_gap;
   result.gap_angle = record.gap.col(1).maxCoeff();
   result.slip_position = execution.largest_slip;
