@@ -14,6 +14,7 @@
 namespace bielle::simulation {
 namespace {
 
+constexpr double kClockTolerance = 1e-9;  // changes of torques this close to an instant of control belong to it, s
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
 Vector3d calcPush(const std::vector<Push>& pushes, double time) {
@@ -142,6 +143,19 @@ double getProcessorTime() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
+// Advances by a control period, through all changes of the torques that fall into it.
+bool advance(World& world, TorqueDelay& delay, double time, double period) {
+  double elapsed = 0;
+  for (;;) {
+    world.setTorques(delay.getTorques(time + elapsed));
+    const double next = delay.getNextChange() - time;
+    const bool ends = next >= period - kClockTolerance;
+    if (!world.advance((ends ? period : next) - elapsed)) return false;
+    if (ends) return true;
+    elapsed = next;
+  }
+}
+
 // Left less right side of Books' Eq. (1), J.
 double calcImbalance(const Books& start, const Books& end) {
   return end.getEnergy() - start.getEnergy() - end.motor_work - end.push_work + end.contact_loss + end.stop_loss +
@@ -178,7 +192,8 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   FallDetector detector(model, plan, o);
 
   Execution out;
-  Measurement measurement{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
+  Measurement measurement{0, model.makeNeutral(), VectorXd::Zero(model.nv()), o.delay.delay};
+  TorqueDelay delay(model.nu(), o.control_period, o.delay);
   VectorXd u = VectorXd::Zero(model.nu());
   plan.getReference(0, measurement.q, measurement.v);
   world.reset(measurement.q, measurement.v);
@@ -194,12 +209,12 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
     measurement.q = world.getConfiguration();
     measurement.v = world.getVelocity();
     controller.update(measurement, u);
-    world.setTorques(u);
-    for (int m = 0; m < model.nu(); ++m) cut += u[m] != world.getTorques()[m];
+    delay.send(measurement.time, u);
     world.setPush(calcPush(o.pushes, measurement.time));
     const double start = getProcessorTime();
-    advances = world.advance(o.control_period);
+    advances = advance(world, delay, measurement.time, o.control_period);
     seconds += getProcessorTime() - start;
+    for (int m = 0; m < model.nu(); ++m) cut += delay.getActing()[m] != world.getTorques()[m];
     for (const FootReport& foot : world.getFeet()) out.largest_slip = std::max(out.largest_slip, foot.slip);
     out.largest_gap = std::max(out.largest_gap, world.getGap());
     if (!advances) break;

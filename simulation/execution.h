@@ -5,6 +5,7 @@
 
 #include "bielle/control/policy.h"
 #include "bielle/io/record.h"
+#include "simulation/torque_delay.h"
 #include "simulation/world.h"
 
 namespace bielle::simulation {
@@ -32,6 +33,7 @@ struct ExecutionOptions {
   double hold = 1;               ///< s
   double control_period = 1e-3;  ///< s
   double record_period = 5e-3;   ///< s
+  DelayOptions delay;
   std::vector<Push> pushes;
   FallCriterion fall;
   Ground ground, planned_ground;  ///< of the world; that the plan was made for

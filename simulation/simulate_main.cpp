@@ -27,6 +27,7 @@ struct Arguments {
   std::vector<std::string> pushes;
   double friction = 0;  // 0: that of the plan
   double time_step = 0;
+  double delay = 0, jitter = 0;  // ms
   unsigned seed = 1;
   ExecutionOptions execution;
 };
@@ -133,6 +134,8 @@ void extendSummary(const std::string& path, const Arguments& arguments, const Pl
   summary["world"] = arguments.world;
   summary["control"] = arguments.control;
   summary["terrain"] = arguments.terrain;
+  summary["delay"] = {{"mean_ms", arguments.delay}, {"jitter_ms", arguments.jitter}};
+  summary["seed"] = arguments.seed;
   summary["gain_iterations"] = plan.iterations;
   summary["outcome"] = getName(e.outcome);
   summary["outcome_message"] = e.message;
@@ -156,13 +159,14 @@ void print(const Arguments& arguments, const Plan& plan, const Execution& e) {
             << arguments.control << ": it " << getName(e.outcome);
   if (!e.message.empty()) std::cout << " (" << e.message << ")";
   char text[600];
-  std::snprintf(text, sizeof text,
-                "\n  duration            %.3f s\n  distance            %.3f m, %.3f m/s\n"
-                "  trunk off its plan  %.4f m at most\n  closures            open by %.1e m at most\n"
-                "  soles               slip by %.1e m at most\n  energy balance      %.1e J, %.1e of what was exchanged\n"
-                "  torques             %.2f %% cut at their limits\n  speed               %.2g times real time\n",
-                e.duration, e.distance, e.getMeanSpeed(), e.largest_deviation, e.largest_gap, e.largest_slip,
-                e.imbalance, e.energy_balance, 100 * e.saturated_share, e.real_time_factor);
+  std::snprintf(
+      text, sizeof text,
+      "\n  duration            %.3f s\n  distance            %.3f m, %.3f m/s\n"
+      "  trunk off its plan  %.4f m at most\n  closures            open by %.1e m at most\n"
+      "  soles               slip by %.1e m at most\n  energy balance      %.1e J, %.1e of what was exchanged\n"
+      "  torques             %.2f %% cut at their limits\n  speed               %.2g times real time\n",
+      e.duration, e.distance, e.getMeanSpeed(), e.largest_deviation, e.largest_gap, e.largest_slip, e.imbalance,
+      e.energy_balance, 100 * e.saturated_share, e.real_time_factor);
   std::cout << text;
 }
 
@@ -170,6 +174,9 @@ int simulate(Arguments arguments, const std::vector<std::string>& command) {
   for (const std::string& push : arguments.pushes) arguments.execution.pushes.push_back(parsePush(push));
   const auto plan =
       readPlan(arguments.directory, arguments.control == "gains" ? PlanControl::Gains : PlanControl::Open);
+  if (arguments.jitter > arguments.delay)
+    throw ModelError("", "--jitter", "it is longer than the delay", "give at most --delay");
+  arguments.execution.delay = {1e-3 * arguments.delay, 1e-3 * arguments.jitter, arguments.seed};
   const Model& model = plan->robot.model;
   const Ground ground = makeGround(arguments, plan->ground);
   arguments.execution.ground = ground;
@@ -211,7 +218,7 @@ void addOptions(CLI::App& app, Arguments& a) {
   app.add_option("--friction", a.friction, "coefficient of the ground [1]; 0: that of the plan")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_option("--seed", a.seed, "of the heights of tiles")->capture_default_str();
+  app.add_option("--seed", a.seed, "of the heights of tiles and of the jitter")->capture_default_str();
   app.add_option("--push", a.pushes,
                  "t=3,impulse=6,direction=90,duration=0.1: a constant force on the trunk from t [s] on, of an impulse "
                  "[N s], in a direction [degrees, 0: along x, 90: along y] and for a duration [s]; may be repeated")
@@ -227,6 +234,13 @@ void addOptions(CLI::App& app, Arguments& a) {
       ->capture_default_str();
   app.add_option("--control-period", a.execution.control_period, "between updates of the torques [s]")
       ->check(positive)
+      ->capture_default_str();
+  app.add_option("--delay", a.delay, "from a measurement until the torques computed from it act [ms]")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  app.add_option("--jitter", a.jitter,
+                 "each delay differs from --delay by at most this, at random [ms]; not above --delay")
+      ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
   app.add_option("--record-period", a.execution.record_period, "between rows of the trajectory [s]")
       ->check(positive)

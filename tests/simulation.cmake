@@ -1,6 +1,7 @@
 if(BIELLE_BUILD_SIMULATION)
   bielle_test(terrain SOURCES test_terrain.cpp LIBS bielle_simulation)
   bielle_test(contact_law SOURCES test_contact_law.cpp LIBS bielle_simulation)
+  bielle_test(torque_delay SOURCES test_torque_delay.cpp LIBS bielle_simulation)
   bielle_test(bielle_world SOURCES test_bielle_world.cpp world_trials.cpp LIBS bielle_simulation)
   target_link_options(test_bielle_world PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
   bielle_test(simbody_world SOURCES test_simbody_world.cpp world_trials.cpp LIBS bielle_simulation)

@@ -54,6 +54,25 @@ TEST_CASE("policy: on the plan it gives the torques of the plan, each in the mid
   }
 }
 
+TEST_CASE("policy: torques that act later are those of the time when they act") {
+  SolvedSquat& squat = getSquat();
+  const Model& model = squat.robot.model;
+  Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver);
+  constexpr double kTime = 0.8, kDelay = 0.0137;
+  Measurement at{kTime + kDelay, model.makeNeutral(), VectorXd::Zero(model.nv())};
+  VectorXd expected(model.nu()), u(model.nu());
+  policy.getReference(at.time, at.q, at.v);
+  policy.update(at, expected);
+  at.time = kTime;
+  at.delay = kDelay;
+  policy.getReference(at.time, at.q, at.v);
+  policy.update(at, u);  // on the plan when it was measured: no feedback
+  CHECK((u - expected).norm() < 1e-9 * expected.norm());
+  at.delay = 0;
+  policy.update(at, u);
+  CHECK((u - expected).norm() > 1e-3 * expected.norm());
+}
+
 TEST_CASE("policy: its gains are those of the solver's last sweep") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;

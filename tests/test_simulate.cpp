@@ -100,6 +100,10 @@ TEST_CASE("simulate: the same command writes the same bytes; ground, pushes and 
   CHECK(record("again", {}) == first);
   CHECK(record("pushed", {"--push", "t=0.2,impulse=1,direction=90"}) != first);
   CHECK(record("icy", {"--friction", "0.1"}) != first);
+  const std::string delayed = record("delayed", {"--delay", "2", "--jitter", "0.7"});
+  CHECK(delayed != first);
+  CHECK(record("delayed again", {"--delay", "2", "--jitter", "0.7"}) == delayed);
+  CHECK(record("delayed otherwise", {"--delay", "2", "--jitter", "0.7", "--seed", "2"}) != delayed);
   const std::string tiles = record("tiles", {"--terrain", "tiles=0.005", "--seed", "1"});
   CHECK(tiles != first);
   CHECK(record("other", {"--terrain", "tiles=0.005", "--seed", "2"}) != tiles);
@@ -108,11 +112,13 @@ TEST_CASE("simulate: the same command writes the same bytes; ground, pushes and 
 TEST_CASE("simulate: bad input is refused in one line, with status 2") {
   const Scratch scratch;
   const std::string output = (scratch.path / "bad").string();
-  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {{{"--push", "t=1,force=3"}, "force"},
-                                                                               {{"--push", "t=-1,impulse=3"}, "--push"},
-                                                                               {{"--terrain", "hills=3"}, "hills"},
-                                                                               {{"--terrain", "moon"}, "moon"},
-                                                                               {{"--world", "moon"}, "moon"}};
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"--push", "t=1,force=3"}, "force"},
+      {{"--push", "t=-1,impulse=3"}, "--push"},
+      {{"--terrain", "hills=3"}, "hills"},
+      {{"--terrain", "moon"}, "moon"},
+      {{"--delay", "1", "--jitter", "2"}, "--jitter"},
+      {{"--world", "moon"}, "moon"}};
   for (const auto& [options, named] : cases) {
     const CommandResult result = simulate(output, options);
     CAPTURE(named, result.err);

@@ -108,7 +108,7 @@ void Policy::getReference(double time, VectorRef q, VectorRef v) const {
 }
 
 void Policy::update(const Measurement& measurement, VectorRef u) {
-  const double time = measurement.time;
+  const double time = measurement.getActionTime();
   if (time + kClockTolerance >= getDuration()) {
     u = u_hold_;
     addFeedback(last_phase_, 1, measurement, u);

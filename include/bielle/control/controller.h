@@ -6,8 +6,11 @@ namespace bielle {
 
 /// What is known of a robot at an instant of control.
 struct Measurement {
-  double time = 0;  ///< since the start of the controller, s
-  VectorXd q, v;    ///< nq, nv: coordinates of the model, from an estimator or a simulated world
+  double time = 0;   ///< since the start of the controller, s
+  VectorXd q, v;     ///< nq, nv: coordinates of the model, from an estimator or a simulated world
+  double delay = 0;  ///< from `time` until the torques computed from this act, s
+
+  double getActionTime() const { return time + delay; }  ///< when they act, s
 };
 
 /// Called at every instant of control, in the order of time.
