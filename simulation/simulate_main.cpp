@@ -7,12 +7,14 @@
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "bielle/report/report.h"
 #include "io/standard_output.h"
 #include "io/text_file.h"
 #include "model/text_file.h"
 #include "simulation/execution.h"
 #include "simulation/make_world.h"
 #include "simulation/plan.h"
+#include "simulation/planned_record.h"
 #include "simulation/terrain.h"
 
 using namespace bielle;
@@ -29,6 +31,7 @@ struct Arguments {
   double time_step = 0;
   double delay = 0, jitter = 0;  // ms
   unsigned seed = 1;
+  bool no_report = false;
   ExecutionOptions execution;
 };
 
@@ -128,6 +131,16 @@ nlohmann::ordered_json listBooks(const Execution& e) {
           {"other_loss_J", e.end.other_loss},      {"imbalance_J", e.imbalance}};
 }
 
+nlohmann::ordered_json listPushes(const std::vector<Push>& pushes) {
+  auto list = nlohmann::ordered_json::array();
+  for (const Push& push : pushes)
+    list.push_back({{"time_s", push.time},
+                    {"impulse_Ns", push.impulse},
+                    {"direction_deg", push.direction},
+                    {"duration_s", push.duration}});
+  return list;
+}
+
 // Adds what happened to the summary of the result.
 void extendSummary(const std::string& path, const Arguments& arguments, const Plan& plan, const Execution& e) {
   auto summary = nlohmann::ordered_json::parse(readTextFile(path));
@@ -136,6 +149,7 @@ void extendSummary(const std::string& path, const Arguments& arguments, const Pl
   summary["terrain"] = arguments.terrain;
   summary["delay"] = {{"mean_ms", arguments.delay}, {"jitter_ms", arguments.jitter}};
   summary["seed"] = arguments.seed;
+  summary["pushes"] = listPushes(arguments.execution.pushes);
   summary["gain_iterations"] = plan.iterations;
   summary["outcome"] = getName(e.outcome);
   summary["outcome_message"] = e.message;
@@ -186,8 +200,15 @@ int simulate(Arguments arguments, const std::vector<std::string>& command) {
   const Execution execution = execute(model, *plan->policy, *plan->policy, *world, arguments.execution);
   print(arguments, *plan, execution);
   const MotionResult result = makeResult(arguments, *plan, ground, execution, command);
-  const std::vector<std::string> paths = writeResult(arguments.output, result);
-  extendSummary((std::filesystem::path(arguments.output) / "summary.json").string(), arguments, *plan, execution);
+  std::vector<std::string> paths = writeResult(arguments.output, result);
+  const std::filesystem::path output = arguments.output;
+  extendSummary((output / "summary.json").string(), arguments, *plan, execution);
+  paths.push_back((output / "plan.npz").string());
+  writeNpz(paths.back(), makePlannedRecord(model, *plan->policy, execution.record));
+  if (!arguments.no_report) {
+    paths.push_back((output / "report.html").string());
+    writeReport(paths.back(), {arguments.output});
+  }
   for (const std::string& path : paths) std::cout << "  " << path << "\n";
   return execution.outcome == Outcome::Stood ? kStood : kFell;
 }
@@ -196,7 +217,9 @@ void addOptions(CLI::App& app, Arguments& a) {
   const auto positive = CLI::PositiveNumber;
   app.add_option("DIR", a.directory, "result of `bielle solve`: a motion of the closed robot")->required();
   app.add_option("-o,--output", a.output,
-                 "directory for trajectory.csv, trajectory.npz and summary.json of the motion that happened")
+                 "directory for trajectory.csv, trajectory.npz and summary.json of the motion that happened, plan.npz "
+                 "(the plan "
+                 "at the same times) and report.html")
       ->required();
   app.add_option(
          "--world", a.world,
@@ -245,6 +268,7 @@ void addOptions(CLI::App& app, Arguments& a) {
   app.add_option("--record-period", a.execution.record_period, "between rows of the trajectory [s]")
       ->check(positive)
       ->capture_default_str();
+  app.add_flag("--no-report", a.no_report, "writes no report.html");
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ ROOMS = {
     "cli": ["report", "study", "bench"],
     "control": ["motion"],
     "engines": ["io"],
-    "simulation": ["control", "engines", "robots"],
+    "simulation": ["control", "engines", "report", "robots"],
     "validation": ["engines"],
 }
 TOP = ("engines", "simulation", "validation")  # rooms outside src

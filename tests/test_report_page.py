@@ -193,6 +193,38 @@ class ReportPage(unittest.TestCase):
         self.browser.evaluate("report.scene.setSideBySide(false)")
         self.assertGreater(differ(apart, self.browser.evaluate(PICTURE)), 600)
 
+    def test_a_motion_carried_out_is_shown_with_its_plan(self):
+        """Its plan is another squat here, so that ghost and plots differ from what happened."""
+        other, happened = self.root / "other", self.root / "happened"
+        run("solve", "squat", "--robot", "bipetto", "--no-check", "--set", "duration=0.6", "--set", "settle=0", "--set",
+            "time_step=0.02", "--depth", "0.7", "--quiet", "--no-report", "-o", other)
+        shutil.copytree(self.squat, happened, dirs_exist_ok=True)
+        shutil.copy(other / "trajectory.npz", happened / "plan.npz")
+        summary = json.loads((self.squat / "summary.json").read_text())
+        summary.update(outcome="fell", fall_time=0.5, converged=False, world="bielle", control="gains", pushes=[
+            {"time_s": 0.2, "impulse_Ns": 2, "direction_deg": 90, "duration_s": 0.1}])
+        (happened / "summary.json").write_text(json.dumps(summary))
+        run("report", happened)
+        self.browser.open(happened / "report.html")
+        badges = self.browser.evaluate("Array.from(document.querySelectorAll('.badge')).map(b => b.textContent)")
+        self.assertEqual(badges[:2], ["fell at 0.500 s", "world bielle, control gains"])
+        for layer, time in (("plan", 0.3), ("push", 0.25)):
+            shown = self.picture(time)
+            self.browser.evaluate(f"report.scene.setLayer('{layer}', false)")
+            self.assertGreater(differ(shown, self.browser.evaluate(PICTURE)), 50, layer)
+            self.browser.evaluate(f"report.scene.setLayer('{layer}', true)")
+        pushes = [self.browser.evaluate(f"report.runs[0].calcPush({t})") for t in (0.19, 0.25, 0.31)]
+        self.assertEqual([pushes[0], pushes[2]], [[0, 0], [0, 0]])
+        self.assertAlmostEqual(pushes[1][1], 20)
+        torques = "report.plots.plots.find(p => p.definition.title === 'Motor torques')"
+        self.assertEqual(self.browser.evaluate(torques + ".lines.filter(line => line.isPlan).length"), 12)
+        with open(other / "trajectory.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        plan = self.browser.evaluate(torques + ".definition.series.map(s => [s.name, Array.from(s.plans[0])])")
+        for name, values in plan:
+            for row, value in zip(rows, values):
+                self.assertAlmostEqual(float(row["u." + name]), value, delta=1e-5)
+
     def test_hostile_names_are_text(self):
         run("report", self.root / "hostile")
         self.browser.open(self.root / "hostile/report.html")

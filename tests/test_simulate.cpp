@@ -75,6 +75,29 @@ TEST_CASE("simulate: with gains a walk stands, and its numbers are written") {
   CHECK(record.q.allFinite());
 }
 
+TEST_CASE("simulate: the plan lies beside what happened, and the page shows both") {
+  const Scratch scratch;
+  const std::string output = (scratch.path / "shown").string();
+  REQUIRE(simulate(output, {"--push", "t=0.2,impulse=1,direction=90", "--duration", "0.5"}).status == 0);
+  const MotionRecord record = readRecord(output + "/trajectory.npz"), plan = readRecord(output + "/plan.npz");
+  REQUIRE(plan.time == record.time);
+  CHECK(plan.q.row(0) == record.q.row(0));
+  CHECK(plan.q.row(20).isApprox(record.q.row(20), 1e-3));
+  CHECK_FALSE(plan.q.row(80).isApprox(record.q.row(80), 1e-3));  // it was pushed
+  // At a node of the solved motion the plan is that node.
+  const MotionRecord solved = readRecord(getWalk() + "/trajectory.npz");
+  REQUIRE(solved.time[5] == Approx(plan.time[12]).margin(1e-12));  // 0.06 s: steps of 12 and of 5 ms
+  CHECK(plan.q.row(12).isApprox(solved.q.row(5), 1e-6));
+  CHECK(plan.u.allFinite());
+  const nlohmann::json pushes = readSummary(output)["pushes"];
+  REQUIRE(pushes.size() == 1);
+  CHECK(pushes[0]["direction_deg"] == 90);
+  CHECK(read(output + "/report.html").find("\"plan\":{") != std::string::npos);
+  const std::string bare = (scratch.path / "bare").string();
+  REQUIRE(simulate(bare, {"--no-report", "--duration", "0.1"}).status == 0);
+  CHECK_FALSE(fs::exists(bare + "/report.html"));
+}
+
 TEST_CASE("simulate: without gains the walk falls, with status 1") {
   const Scratch scratch;
   const std::string output = (scratch.path / "open").string();

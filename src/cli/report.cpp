@@ -74,7 +74,7 @@ int report(const ReportArguments& arguments) {
 }
 
 void addFilmOptions(CLI::App& command, ReportArguments& arguments) {
-  const std::string layers = " (locks, contactForces, closureForces, com, traces, footprints; with commas)";
+  const std::string layers = " (locks, contactForces, closureForces, com, traces, footprints, plan, push; with commas)";
   command.add_option("--png", arguments.png, "also draws still pictures, side by side in this file; needs chromium");
   command.add_option("--times", arguments.film.times, "of the pictures [s], with commas; default: six over the motion")
       ->delimiter(',')

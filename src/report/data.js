@@ -31,9 +31,9 @@ function decodeBase64(text) {
 // Told apart by colour in the replay and by the pattern of their lines in the plots.
 const RUN_COLORS = ['#1f5fbf', '#e8590c', '#2b8a3e', '#9c36b5', '#0b7285', '#a61e4d'];
 const RUN_BORDERS = ['solid', 'dashed', 'dotted', 'double', 'dashed', 'dotted'];
-const RUN_PATTERNS = [null, [7, 4], [2, 3], [9, 3, 2, 3], [12, 4], [1, 2]];
+const RUN_PATTERNS = [null, [7, 4], [2, 3], [9, 3, 2, 3], [12, 4], [1, 2]], PLAN_PATTERN = [3, 2];
 
-// One solved motion.
+// One motion, solved or carried out; then with its plan, a run at the same times.
 class Run {
   constructor(json, index) {
     this.index = index;
@@ -47,6 +47,24 @@ class Run {
       this[name] = value.data === undefined ? value : new Table(value);
     this.time = this.time.data;
     this.end = this.time[this.time.length - 1];
+    this.plan = json.plan ? new Run(Object.assign({}, json, {motion: json.plan, plan: null}), index) : null;
+  }
+
+  // What pushes the trunk at a time: a horizontal force, N.
+  calcPush(t) {
+    const force = [0, 0];
+    for (const push of this.summary.pushes || []) {
+      if (t < push.time_s || t >= push.time_s + push.duration_s) continue;
+      const angle = push.direction_deg * Math.PI / 180, size = push.impulse_Ns / push.duration_s;
+      force[0] += size * Math.cos(angle);
+      force[1] += size * Math.sin(angle);
+    }
+    return force;
+  }
+
+  // Of the pushes one by one, N.
+  getLargestPush() {
+    return Math.max(0, ...(this.summary.pushes || []).map(push => Math.abs(push.impulse_Ns) / push.duration_s));
   }
 
   // The last node that is not after t, among those a stage starts from.

@@ -122,7 +122,8 @@ class Report {
       });
     const newtons = scale => formatNumber(0.1 / scale, 2) + ' N';
     document.getElementById('scales').textContent = 'Arrows of 10 cm: contact ' + newtons(this.scene.scales.contact) +
-        (this.runs.some(run => run.robot.closures.length) ? ', closure ' + newtons(this.scene.scales.closure) : '') +
+        (this.scene.robots.some(robot => robot.largestClosureForce > 0) ? ', closure ' + newtons(this.scene.scales.closure) : '') +
+        (this.runs.some(run => run.getLargestPush() > 0) ? ', push ' + newtons(this.scene.scales.push) : '') +
         '. Locks: green below 1 µm, red from 1 cm. Grid ' + 100 * this.scene.cell + ' cm.';
     new ResizeObserver(() => this.resize()).observe(document.getElementById('stage'));
     this.resize();

@@ -132,6 +132,7 @@ Json describeRobot(const LoadedRobot& robot) {
                {"motors", motors},
                {"closures", closures},
                {"contacts", describeContacts(model)}});
+  if (model.numBodies() > 1) json["trunk_com"] = packVector(model.bodies()[1].inertia.com);
   return json;
 }
 
@@ -151,6 +152,15 @@ Json describeMotion(const ReportRun& run) {
           {"contact_wrenches", packTable(record.contact_wrenches)},
           {"pressure", packTable(makePressureCentres(run.robot.model, record))},
           {"com", packTable(record.com)}};
+}
+
+Json describePlan(const ReportRun& run) {
+  if (!run.plan) return {};
+  const NodeTables tables = makeNodeTables(run.robot.model, *run.plan);
+  return {{"time", packTable(run.plan->time)}, {"placements", packTable(tables.placements)},
+          {"tilt", packTable(tables.tilt)},    {"feet", packTable(tables.feet)},
+          {"q", packTable(run.plan->q)},       {"v", packTable(run.plan->v)},
+          {"u", packTable(run.plan->u)},       {"com", packTable(run.plan->com)}};
 }
 
 }  // namespace bielle

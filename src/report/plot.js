@@ -38,7 +38,8 @@ function spreadValues(xs, values, all) {
 }
 
 class Plot {
-  // definition: {title, unit, series: [{name, color, hidden, lines: [values of a run, or null], limits: [low, high]}],
+  // definition: {title, unit, series: [{name, color, hidden, lines: [values of a run, or null], plans: [the same of its plan],
+  // limits: [low, high]}],
   // xs: [abscissas of each run], stairs, log, xName}. `owner`: {runs, onPick(x), onZoom(plot, window), bands}.
   constructor(parent, definition, owner) {
     this.definition = definition;
@@ -53,6 +54,7 @@ class Plot {
     this.lines = [];  // of the graph, in its order: {series, run}
     definition.series.forEach((series, s) => series.lines.forEach((values, run) => {
       if (values) this.lines.push({series: s, run, values});
+      if (series.plans && series.plans[run]) this.lines.push({series: s, run, values: series.plans[run], isPlan: true});
     }));
     this.visible = definition.series.map(series => !series.hidden);
     this.makeGraph();
@@ -88,8 +90,9 @@ class Plot {
   makeGraph() {
     const {definition, owner} = this, labels = this.lines.map((line, i) => 'line' + i), series = {};
     this.lines.forEach((line, i) => {
-      const pattern = owner.runs[line.run].pattern;
-      series[labels[i]] = {color: definition.series[line.series].color, strokePattern: pattern};
+      const color = definition.series[line.series].color;
+      series[labels[i]] = line.isPlan ? {color, strokePattern: PLAN_PATTERN, strokeWidth: 1} :
+                                        {color, strokePattern: owner.runs[line.run].pattern};
     });
     this.graph = new Dygraph(this.area, this.makeRows(), {
       labels: ['x', ...labels],

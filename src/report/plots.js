@@ -1,15 +1,17 @@
 'use strict';
 // Which plots there are, and that they move together.
 
-// Series by name over all runs: `list(run)` gives [{name, values, hidden, limits}].
-function collectSeries(runs, list) {
+// Series by name over all runs: `list(run)` gives [{name, values, hidden, limits}], of a plan as well if it is `planned`.
+function collectSeries(runs, list, planned) {
   const series = new Map();
   runs.forEach((run, r) => {
-    for (const item of list(run)) {
-      if (!series.has(item.name))
-        series.set(item.name, {name: item.name, hidden: item.hidden, limits: item.limits, lines: runs.map(() => null)});
-      series.get(item.name).lines[r] = item.values;
+    for (const {name, values, hidden, limits} of list(run)) {
+      if (!series.has(name))
+        series.set(name, {name, hidden, limits, lines: runs.map(() => null), plans: runs.map(() => null)});
+      series.get(name).lines[r] = values;
     }
+    if (planned && run.plan)
+      for (const {name, values} of list(run.plan)) series.get(name).plans[r] = values;
   });
   const all = Array.from(series.values()), colors = pickColors(all.map(item => item.name));
   all.forEach((item, i) => {
@@ -52,24 +54,27 @@ function listContactSeries(run, rows) {
   return [].concat(...run.robot.contacts.map((contact, c) => rows(contact, c)));
 }
 
-// [{title, unit, list, stairs, log}]
+// [{title, unit, list, stairs, log, planned}]
 function listPlots(runs) {
   const range = joint => [joint.lower, joint.upper], speed = joint => [negate(joint.velocity), joint.velocity];
   const hasSerial = runs.some(run => run.robot.joints.some(joint => joint.serial));
   return [
     {
       title: 'Centre of mass',
+      planned: true,
       unit: 'm',
       list: run => AXES.map((axis, i) => ({name: axis, values: run.com.getColumn(i)}))
     },
     {
       title: 'Trunk tilt since the start',
+      planned: true,
       unit: 'rad',
       list: run =>
           (run.robot.free ? ['roll', 'pitch', 'yaw'] : []).map((name, i) => ({name, values: run.tilt.getColumn(i)}))
     },
     {
       title: 'Feet',
+      planned: true,
       unit: 'm',
       list: run => listContactSeries(
           run,
@@ -102,6 +107,7 @@ function listPlots(runs) {
     },
     {
       title: 'Motor torques',
+      planned: true,
       unit: 'N m',
       stairs: true,
       list: run =>
@@ -113,6 +119,7 @@ function listPlots(runs) {
     },
     {
       title: 'Motor velocities',
+      planned: true,
       unit: 'rad/s',
       list: run => run.robot.motors.map(
           motor => ({
@@ -122,13 +129,15 @@ function listPlots(runs) {
           }))
     },
     {title: 'Motor power', unit: 'W', stairs: true, list: listPower},
-    {title: 'Motor angles', unit: 'rad', list: run => listJoints(run, run.q, joint => isMotor(run, joint), range)}, {
+    {title: 'Motor angles', unit: 'rad', planned: true, list: run => listJoints(run, run.q, joint => isMotor(run, joint), range)}, {
       title: 'Joint angles',
+      planned: true,
       unit: 'rad',
       list: run => listJoints(run, run.q, joint => (hasSerial ? joint.serial : !isMotor(run, joint)), range)
     },
     {
       title: 'Joint velocities',
+      planned: true,
       unit: 'rad/s',
       list: run => listJoints(run, run.v, joint => (hasSerial ? joint.serial : !isMotor(run, joint)), speed)
     },
@@ -183,7 +192,7 @@ class Plots {
         {runs, onPick, onZoom: (plot, window) => this.zoom(plot, window), getBands: () => runs[0].getPhases()};
     this.plots = [];
     for (const definition of listPlots(runs)) {
-      const series = collectSeries(runs, definition.list);
+      const series = collectSeries(runs, definition.list, definition.planned);
       if (series.length === 0) continue;
       const xs = runs.map(run => run.time);
       this.plots.push(new Plot(parent, Object.assign({}, definition, {series, xs}), owner));

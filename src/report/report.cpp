@@ -51,7 +51,8 @@ std::string makeReport(const std::vector<std::string>& directories) {
                     {"summary", run.summary},
                     {"check", run.check},
                     {"robot", describeRobot(run.robot)},
-                    {"motion", describeMotion(run)}});
+                    {"motion", describeMotion(run)},
+                    {"plan", describePlan(run)}});
   }
   return makePage({{"bielle", getBuildInfo().bielle}, {"runs", runs}});
 }

@@ -116,26 +116,18 @@ function makeLine(points, color, options) {
 
 const FOOT_COLORS = ['#c2255c', '#1971c2', '#5f3dc4', '#2f9e44'];
 
-class RobotView {
-  constructor(run) {
+// The bodies of a robot and nothing else.
+class BodyView {
+  // `offset`: of several robots in one place those with larger ones are drawn behind, so that they do not flicker.
+  constructor(run, offset) {
     this.run = run;
+    this.offset = offset;
     this.root = new THREE.Group();
     this.materials = [];
     this.bodies = [];
     for (let i = 0; i < run.placements.cols / 7; ++i) this.bodies.push(this.add(this.root, new THREE.Group()));
     for (const visual of run.robot.visuals) this.addVisual(visual);
     this.setPlacements(0);
-    this.root.updateMatrixWorld(true);
-    this.box = new THREE.Box3().setFromObject(this.root);
-    this.size = this.box.isEmpty() ? 1 : this.box.getSize(new THREE.Vector3()).length();
-    this.layers = {};
-    for (const name of ['locks', 'contactForces', 'closureForces', 'com', 'traces', 'footprints'])
-      this.layers[name] = [];
-    this.addSteps();
-    this.addClosures();
-    this.addContacts();
-    this.addCom();
-    this.addTraces();
   }
 
   add(parent, object, layer) {
@@ -163,14 +155,44 @@ class RobotView {
       entry.material.color.copy(entry.color).lerp(shade, tint);
       entry.material.opacity = entry.opacity * opacity;
       entry.material.transparent = entry.material.opacity < 1;
-      entry.material.polygonOffset = this.run.index > 0;  // two robots in one place do not flicker
-      entry.material.polygonOffsetFactor = entry.material.polygonOffsetUnits = 2 * this.run.index;
+      entry.material.polygonOffset = this.offset > 0;
+      entry.material.polygonOffsetFactor = entry.material.polygonOffsetUnits = this.offset;
       entry.material.depthWrite = !entry.material.transparent;
       entry.material.needsUpdate = true;
     }
     this.root.traverse(object => {
       if (object.isMesh && object.parent && this.bodies.includes(object.parent)) object.castShadow = opacity > 0.5;
     });
+  }
+
+  setPlacements(t) {
+    const {k, next, share} = this.run.locate(t), table = this.run.placements;
+    const goal = new THREE.Quaternion();
+    this.bodies.forEach((body, i) => {
+      const a = k * table.cols + 7 * i, b = next * table.cols + 7 * i, d = table.data;
+      body.position.set(...[0, 1, 2].map(j => d[a + j] + share * (d[b + j] - d[a + j])));
+      body.quaternion.set(d[a + 3], d[a + 4], d[a + 5], d[a + 6])
+          .slerp(goal.set(d[b + 3], d[b + 4], d[b + 5], d[b + 6]), share);
+    });
+  }
+}
+
+// With what is known of its motion, and its plan as a ghost.
+class RobotView extends BodyView {
+  constructor(run) {
+    super(run, 2 * run.index);
+    this.layers = {};
+    for (const [name] of LAYERS) this.layers[name] = [];
+    this.root.updateMatrixWorld(true);
+    this.box = new THREE.Box3().setFromObject(this.root);
+    this.size = this.box.isEmpty() ? 1 : this.box.getSize(new THREE.Vector3()).length();
+    this.addSteps();
+    this.addClosures();
+    this.addContacts();
+    this.addCom();
+    this.addTraces();
+    this.addPush();
+    this.addGhost();
   }
 
   addSteps() {
@@ -281,6 +303,30 @@ class RobotView {
     });
   }
 
+  // An arrow at the trunk while something pushes it.
+  addPush() {
+    this.push = new Arrow('#e03131', 0.008 * this.size);
+    if (this.run.getLargestPush() > 0) this.add(this.add(this.root, new THREE.Group(), 'push'), this.push.object);
+  }
+
+  setPush(t, scale) {
+    if (!this.push.object.parent) return;
+    const trunk = this.bodies[1], [x, y] = this.run.calcPush(t);
+    const at = new THREE.Vector3(...this.run.robot.trunk_com).applyQuaternion(trunk.quaternion).add(trunk.position);
+    this.push.set(new THREE.Vector3(x, y, 0).multiplyScalar(scale), at.x, at.y, at.z);
+  }
+
+  addGhost() {
+    if (!this.run.plan) return;
+    this.ghost = new BodyView(this.run.plan, this.offset + 1);
+    this.add(this.root, this.ghost.root, 'plan');
+  }
+
+  setLook(tint, opacity) {
+    super.setLook(tint, opacity);
+    if (this.ghost) this.ghost.setLook(0.85, 0.35 * opacity);
+  }
+
   * listForces(wrenches) {
     for (let k = 0; k < wrenches.rows; ++k)
       for (let c = 0; c < wrenches.cols; c += 6) {
@@ -293,20 +339,11 @@ class RobotView {
     for (const object of this.layers[name]) object.visible = visible;
   }
 
-  setPlacements(t) {
-    const {k, next, share} = this.run.locate(t), table = this.run.placements;
-    const goal = new THREE.Quaternion();
-    this.bodies.forEach((body, i) => {
-      const a = k * table.cols + 7 * i, b = next * table.cols + 7 * i, d = table.data;
-      body.position.set(...[0, 1, 2].map(j => d[a + j] + share * (d[b + j] - d[a + j])));
-      body.quaternion.set(d[a + 3], d[a + 4], d[a + 5], d[a + 6])
-          .slerp(goal.set(d[b + 3], d[b + 4], d[b + 5], d[b + 6]), share);
-    });
-  }
-
-  // `scales`: metres per newton of contact and closure forces. `ground`: its height.
+  // `scales`: metres per newton of forces. `ground`: its height.
   setTime(t, scales, ground) {
     this.setPlacements(t);
+    if (this.ghost) this.ghost.setPlacements(t);
+    this.setPush(t, scales.push);
     const run = this.run, {k, next, share} = run.locate(t);
     const read = (table, row, col) =>
         new THREE.Vector3(table.get(row, col), table.get(row, col + 1), table.get(row, col + 2));

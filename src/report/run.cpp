@@ -32,6 +32,18 @@ LoadedRobot loadRobotOf(const Json& summary, const fs::path& path) {
   return loadRobot(name);
 }
 
+// \throws ModelError when the record is not one of this robot
+MotionRecord readRecordOf(const LoadedRobot& robot, const fs::path& path) {
+  MotionRecord record = readRecord(path.string());
+  const Model& model = robot.model;
+  if (record.q_names != makePositionNames(model) || record.v_names != makeVelocityNames(model) ||
+      record.u_names != getNames(model.motors()) || record.closure_names != getNames(model.closures()) ||
+      record.contact_names != getNames(model.contacts()))
+    throw ModelError(path.string(), "columns", "they are not those of the robot in " + robot.directory,
+                     "solve again, or bring back the robot as it was");
+  return record;
+}
+
 }  // namespace
 
 ReportRun readRun(const std::string& directory) {
@@ -41,19 +53,12 @@ ReportRun readRun(const std::string& directory) {
   run.summary = readJson(place / "summary.json");
   std::error_code error;
   if (fs::exists(place / "check.json", error)) run.check = readJson(place / "check.json");
-  const fs::path archive = place / "trajectory.npz", table = place / "trajectory.csv";
-  const fs::path trajectory = fs::exists(archive, error) ? archive : table;
-  run.record = readRecord(trajectory.string());
   run.robot = loadRobotOf(run.summary, place / "summary.json");
   if (getText(run.summary, "model") == "serial")
     run.robot.model = makeSerialModel(run.robot.model, makeStandingPosture(run.robot.model)).model;
-  const Model& model = run.robot.model;
-  const MotionRecord& record = run.record;
-  if (record.q_names != makePositionNames(model) || record.v_names != makeVelocityNames(model) ||
-      record.u_names != getNames(model.motors()) || record.closure_names != getNames(model.closures()) ||
-      record.contact_names != getNames(model.contacts()))
-    throw ModelError(trajectory.string(), "columns", "they are not those of the robot in " + run.robot.directory,
-                     "solve again, or bring back the robot as it was");
+  const fs::path archive = place / "trajectory.npz", plan = place / "plan.npz";
+  run.record = readRecordOf(run.robot, fs::exists(archive, error) ? archive : place / "trajectory.csv");
+  if (run.summary.contains("outcome") && fs::exists(plan, error)) run.plan = readRecordOf(run.robot, plan);
   return run;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 // One solved motion as read from its directory, and as the page needs it.
+#include <optional>
 #include <string>
 
 #include "bielle/io/record.h"
@@ -12,6 +13,7 @@ struct ReportRun {
   std::string directory;
   Json summary, check;  // check: null when there is none
   MotionRecord record;
+  std::optional<MotionRecord> plan;  // of a motion that was carried out, at the same times
   LoadedRobot robot;
 };
 
@@ -23,5 +25,9 @@ Json describeRobot(const LoadedRobot& robot);
 
 // Quantities at every node and stage; placements of all bodies and of the feet come from q.
 Json describeMotion(const ReportRun& run);
+
+// The plan of a motion that was carried out: what of describeMotion() does not depend on forces of contacts and
+// closures. Null when there is none.
+Json describePlan(const ReportRun& run);
 
 }  // namespace bielle

@@ -3,7 +3,8 @@
 
 const LAYERS = [
   ['locks', 'closures', true], ['contactForces', 'contact forces', true], ['closureForces', 'closure forces', false],
-  ['com', 'centre of mass', true], ['traces', 'traces', true], ['footprints', 'footprints', true]
+  ['com', 'centre of mass', true], ['traces', 'traces', true], ['footprints', 'footprints', true],
+  ['plan', 'plan', true], ['push', 'pushes', true]
 ];
 
 class Scene {
@@ -35,11 +36,12 @@ class Scene {
     return Math.min(0, ...this.robots.map(robot => (robot.box.isEmpty() ? 0 : robot.box.min.z)));
   }
 
-  // The weight is drawn half as long as the robot is large, the largest closure force two fifths.
+  // The weight is drawn half as long as the robot is large, the largest closure force and push two fifths.
   makeScales(runs) {
     const weight = Math.max(...runs.map(run => run.robot.mass * (run.robot.gravity || 9.81)), 1e-9);
     const closure = Math.max(...this.robots.map(robot => robot.largestClosureForce), 1e-9);
-    return {contact: 0.5 * this.size / weight, closure: 0.4 * this.size / closure};
+    const push = Math.max(...runs.map(run => run.getLargestPush()), 1e-9);
+    return {contact: 0.5 * this.size / weight, closure: 0.4 * this.size / closure, push: 0.4 * this.size / push};
   }
 
   // The region in which the motions take place.

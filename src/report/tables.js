@@ -36,10 +36,19 @@ function getGoals(run) {
   return goals.filter(goal => goal && typeof goal === 'object');
 }
 
+// Of a motion that was carried out: whether the robot stood. Of a solved one: how the solver ended.
+function describeOutcome(run) {
+  const {outcome, fall_time, termination} = run.summary;
+  if (outcome === undefined) return termination || 'unknown';
+  return typeof fall_time === 'number' ? outcome + ' at ' + fall_time.toFixed(3) + ' s' : outcome;
+}
+
 function fillBadges(parent, runs) {
   for (const run of runs) {
-    const text = (runs.length > 1 ? run.label + ': ' : '') + (run.summary.termination || 'unknown');
+    const text = (runs.length > 1 ? run.label + ': ' : '') + describeOutcome(run);
     addElement(parent, 'span', 'badge ' + (run.summary.converged ? 'good' : 'bad'), text);
+    if (run.summary.outcome !== undefined)
+      addElement(parent, 'span', 'badge', 'world ' + run.summary.world + ', control ' + run.summary.control);
     const missed = getGoals(run).filter(goal => !goal.met).map(goal => goal.name);
     if (missed.length) addElement(parent, 'span', 'badge bad', 'missed: ' + missed.join(', '));
     if (run.check)
@@ -68,10 +77,24 @@ function fillGoals(parent, runs) {
 
 function fillSummary(parent, runs) {
   const units = (value, unit) => (typeof value === 'number' ? formatNumber(value) + ' ' + unit : undefined);
+  const solved = read => run => (run.summary.outcome === undefined ? read(run) : undefined);
   const get = [
-    ['outcome', run => run.summary.termination + (run.summary.message ? ': ' + run.summary.message : '')],
-    ['minimized', run => dig(run.summary, 'objective', 'kind')], ['cost', run => run.summary.cost], ['iterations', run => run.summary.iterations],
-    ['solver time', run => units(run.summary.seconds, 's')], ['model', run => run.summary.model],
+    [
+      'outcome',
+      run => [describeOutcome(run), run.summary.outcome_message || solved(r => r.summary.message)(run)]
+                 .filter(text => text)
+                 .join(': ')
+    ],
+    ['world', run => run.summary.world],
+    ['control', run => run.summary.control],
+    ['ground', run => run.summary.terrain],
+    ['trunk off its plan', run => units(run.summary.largest_deviation, 'm at most')],
+    ['energy balance', run => units(dig(run.summary, 'books', 'imbalance_J'), 'J')],
+    ['minimized', solved(run => dig(run.summary, 'objective', 'kind'))],
+    ['cost', solved(run => run.summary.cost)],
+    ['iterations', solved(run => run.summary.iterations)],
+    ['solver time', solved(run => units(run.summary.seconds, 's'))],
+    ['model', run => run.summary.model],
     ['formulation', run => run.summary.formulation],
     ['duration', run => units(run.summary.duration_s, 's') + ', ' + run.summary.nodes + ' nodes'],
     ['mass', run => units(run.robot.mass, 'kg')],

@@ -1,0 +1,12 @@
+#pragma once
+/// \file The plan at the nodes of a motion that happened, to be compared with it row by row.
+#include "bielle/control/policy.h"
+#include "bielle/io/record.h"
+
+namespace bielle::simulation {
+
+/// The plan at the times of `happened`: q, v, the centre of mass and the torques without feedback; after the end of the
+/// plan, the posture it holds. Accelerations, wrenches and gaps, which a policy does not know, are NaN.
+MotionRecord makePlannedRecord(const Model& model, const Policy& plan, const MotionRecord& happened);
+
+}  // namespace bielle::simulation
