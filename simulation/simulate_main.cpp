@@ -31,7 +31,7 @@ struct Arguments {
   double time_step = 0;
   double delay = 0, jitter = 0;  // ms
   unsigned seed = 1;
-  bool no_report = false;
+  bool no_report = false, summary_only = false, dry_run = false;
   ExecutionOptions execution;
 };
 
@@ -184,13 +184,41 @@ void print(const Arguments& arguments, const Plan& plan, const Execution& e) {
   std::cout << text;
 }
 
-int simulate(Arguments arguments, const std::vector<std::string>& command) {
+// The files of a motion that happened; returns their paths.
+std::vector<std::string> write(const Arguments& arguments, const Plan& plan, const Execution& execution,
+                               const MotionResult& result) {
+  const std::filesystem::path output = arguments.output;
+  const std::string summary = (output / "summary.json").string();
+  if (arguments.summary_only) {
+    writeSummary(arguments.output, result);
+    extendSummary(summary, arguments, plan, execution);
+    return {summary};
+  }
+  std::vector<std::string> paths = writeResult(arguments.output, result);
+  extendSummary(summary, arguments, plan, execution);
+  paths.push_back((output / "plan.npz").string());
+  writeNpz(paths.back(), makePlannedRecord(plan.robot.model, *plan.policy, execution.record));
+  if (!arguments.no_report) {
+    paths.push_back((output / "report.html").string());
+    writeReport(paths.back(), {arguments.output});
+  }
+  return paths;
+}
+
+// What can be checked of the options without the motion.
+void parseOptions(Arguments& arguments) {
   for (const std::string& push : arguments.pushes) arguments.execution.pushes.push_back(parsePush(push));
-  const auto plan =
-      readPlan(arguments.directory, arguments.control == "gains" ? PlanControl::Gains : PlanControl::Open);
   if (arguments.jitter > arguments.delay)
     throw ModelError("", "--jitter", "it is longer than the delay", "give at most --delay");
   arguments.execution.delay = {1e-3 * arguments.delay, 1e-3 * arguments.jitter, arguments.seed};
+  makeGround(arguments, {});
+}
+
+int simulate(Arguments arguments, const std::vector<std::string>& command) {
+  parseOptions(arguments);
+  if (arguments.dry_run) return kStood;
+  const auto plan =
+      readPlan(arguments.directory, arguments.control == "gains" ? PlanControl::Gains : PlanControl::Open);
   const Model& model = plan->robot.model;
   const Ground ground = makeGround(arguments, plan->ground);
   arguments.execution.ground = ground;
@@ -200,16 +228,7 @@ int simulate(Arguments arguments, const std::vector<std::string>& command) {
   const Execution execution = execute(model, *plan->policy, *plan->policy, *world, arguments.execution);
   print(arguments, *plan, execution);
   const MotionResult result = makeResult(arguments, *plan, ground, execution, command);
-  std::vector<std::string> paths = writeResult(arguments.output, result);
-  const std::filesystem::path output = arguments.output;
-  extendSummary((output / "summary.json").string(), arguments, *plan, execution);
-  paths.push_back((output / "plan.npz").string());
-  writeNpz(paths.back(), makePlannedRecord(model, *plan->policy, execution.record));
-  if (!arguments.no_report) {
-    paths.push_back((output / "report.html").string());
-    writeReport(paths.back(), {arguments.output});
-  }
-  for (const std::string& path : paths) std::cout << "  " << path << "\n";
+  for (const std::string& path : write(arguments, *plan, execution, result)) std::cout << "  " << path << "\n";
   return execution.outcome == Outcome::Stood ? kStood : kFell;
 }
 
@@ -217,9 +236,8 @@ void addOptions(CLI::App& app, Arguments& a) {
   const auto positive = CLI::PositiveNumber;
   app.add_option("DIR", a.directory, "result of `bielle solve`: a motion of the closed robot")->required();
   app.add_option("-o,--output", a.output,
-                 "directory for trajectory.csv, trajectory.npz and summary.json of the motion that happened, plan.npz "
-                 "(the plan "
-                 "at the same times) and report.html")
+                 "directory for trajectory.csv, trajectory.npz and summary.json of the motion that happened, plan.npz (the "
+                 "plan at the same times) and report.html")
       ->required();
   app.add_option(
          "--world", a.world,
@@ -269,6 +287,8 @@ void addOptions(CLI::App& app, Arguments& a) {
       ->check(positive)
       ->capture_default_str();
   app.add_flag("--no-report", a.no_report, "writes no report.html");
+  app.add_flag("--summary-only", a.summary_only, "writes summary.json alone");
+  app.add_flag("--dry-run", a.dry_run, "checks the options; reads no motion, carries nothing out, writes nothing");
 }
 
 }  // namespace

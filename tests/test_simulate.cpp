@@ -98,6 +98,28 @@ TEST_CASE("simulate: the plan lies beside what happened, and the page shows both
   CHECK_FALSE(fs::exists(bare + "/report.html"));
 }
 
+TEST_CASE("simulate: the summary alone is that of the whole result; a dry run only checks") {
+  const Scratch scratch;
+  const std::string whole = (scratch.path / "whole").string(), alone = (scratch.path / "alone").string();
+  REQUIRE(simulate(whole, {"--duration", "0.3", "--no-report"}).status == 0);
+  REQUIRE(simulate(alone, {"--duration", "0.3", "--summary-only"}).status == 0);
+  CHECK(std::distance(fs::directory_iterator(alone), fs::directory_iterator()) == 1);
+  nlohmann::json summaries[] = {readSummary(whole), readSummary(alone)};
+  for (nlohmann::json& summary : summaries)
+    for (const char* of_the_run : {"command", "real_time_factor"}) summary.erase(of_the_run);
+  CHECK(summaries[0] == summaries[1]);
+  const std::string none = (scratch.path / "none").string();
+  const auto check = [&](std::vector<std::string> options) {
+    options.insert(options.begin(), {BIELLE_COMMAND, "simulate", "/nowhere", "-o", none, "--dry-run"});
+    return runCommand(options).status;
+  };
+  CHECK(check({"--friction", "0.5", "--push", "t=1,impulse=2"}) == 0);
+  CHECK(check({"--push", "t=1,force=2"}) == 2);
+  CHECK(check({"--terrain", "hills=3"}) == 2);
+  CHECK(check({"--frictoin", "0.5"}) == 2);
+  CHECK_FALSE(fs::exists(none));
+}
+
 TEST_CASE("simulate: without gains the walk falls, with status 1") {
   const Scratch scratch;
   const std::string output = (scratch.path / "open").string();

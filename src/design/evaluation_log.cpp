@@ -1,16 +1,6 @@
 #include "design/evaluation_log.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <iterator>
-
 #include "bielle/model/error.h"
-#include "io/aside_file.h"
 #include "io/json_text.h"
 
 namespace bielle {
@@ -60,56 +50,17 @@ LoggedEvaluation readLine(const std::string& line) {
 
 }  // namespace
 
-EvaluationLog::EvaluationLog(const std::string& path, const std::string& header) : path_(path) {
-  file_ = open(path.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  if (file_ < 0) failToWrite(path, std::strerror(errno));
-  try {
-    if (flock(file_, LOCK_EX | LOCK_NB) != 0)
-      throw ModelError(path, "log", "another process is at work there", "wait for it, or give another directory");
-    read(header);
-  } catch (...) {
-    close(file_);
-    throw;
-  }
-}
-
-EvaluationLog::~EvaluationLog() { close(file_); }
-
-void EvaluationLog::read(const std::string& header) {
-  std::ifstream stream(path_, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  const size_t whole = text.rfind('\n') == std::string::npos ? 0 : text.rfind('\n') + 1;
-  if (whole < text.size() && ftruncate(file_, static_cast<off_t>(whole)) != 0) failToWrite(path_, std::strerror(errno));
-  text.resize(whole);
-  if (text.empty()) {
-    write(header);
-    return;
-  }
-  size_t begin = 0;
-  for (int line = 1; begin < text.size(); ++line) {
-    const size_t end = text.find('\n', begin);
-    const std::string content = text.substr(begin, end - begin);
-    begin = end + 1;
-    if (line == 1 && content != header)
-      throw ModelError(path_, "line 1", "the log is of another design problem, robot or version",
-                       "give another directory, or remove this one");
-    if (line == 1) continue;
+EvaluationLog::EvaluationLog(const std::string& path, const std::string& header)
+    : log_(path, header, "the log is of another design problem, robot or version") {
+  int line = 1;
+  for (const std::string& text : log_.getLines()) {
+    ++line;
     try {
-      left_.push_back(readLine(content));
+      left_.push_back(readLine(text));
     } catch (const Json::exception&) {
-      throw ModelError(path_, "line " + std::to_string(line), "it is not as it was written",
+      throw ModelError(path, "line " + std::to_string(line), "it is not as it was written",
                        "remove the file: the search is done anew");
     }
-  }
-}
-
-void EvaluationLog::write(const std::string& line) {
-  const std::string text = line + "\n";
-  size_t done = 0;
-  while (done < text.size()) {
-    const ssize_t count = ::write(file_, text.data() + done, text.size() - done);
-    if (count < 0 && errno != EINTR) failToWrite(path_, std::strerror(errno));
-    if (count > 0) done += static_cast<size_t>(count);
   }
 }
 
@@ -118,7 +69,7 @@ std::optional<LoggedEvaluation> EvaluationLog::replay(const std::string& stage, 
   const LoggedEvaluation evaluation = left_.front();
   left_.pop_front();
   if (evaluation.stage != stage || evaluation.x != x)
-    throw ModelError(path_, "log", "its evaluations are not those of this search",
+    throw ModelError(log_.getPath(), "log", "its evaluations are not those of this search",
                      "remove the file: the search is done anew");
   return evaluation;
 }
@@ -131,7 +82,7 @@ void EvaluationLog::append(const LoggedEvaluation& e) {
                {"seconds", e.seconds}};
   if (!e.terms.empty()) json["limits"] = formatPieces(e.limits);
   for (const MeasurePieces& term : e.terms) json["terms"].push_back(formatPieces(term));
-  write(json.dump());
+  log_.append(json.dump());
 }
 
 }  // namespace bielle

@@ -259,10 +259,17 @@ std::vector<std::string> writeResult(const std::string& directory, const MotionR
   // Files derived from the old summary are removed before it, and the new summary is written last, so that an
   // interruption never leaves a mixture of two results.
   std::error_code error;
-  for (const char* name : {"report.html", "lift.json", "check.json", "summary.json"})
+  for (const char* name : {"report.html", "lift.json", "check.json", "plan.npz", "summary.json"})
     fs::remove(fs::path(directory) / name, error);
   for (AsideFile* file : {&csv, &npz, &summary}) file->commit();
   return paths;
+}
+
+void writeSummary(const std::string& directory, const MotionResult& result) {
+  makeOutputDirectory(directory);
+  AsideFile summary((fs::path(directory) / "summary.json").string());
+  summary.write(formatJson(makeSummary(result)) + "\n");
+  summary.commit();
 }
 
 BuildInfo getBuildInfo() {

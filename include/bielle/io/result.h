@@ -84,6 +84,8 @@ void makeOutputDirectory(const std::string& directory);
 /// Writes trajectory.csv, trajectory.npz and summary.json to temporary files, which are renamed when all are complete,
 /// summary.json last. Returns their paths. \throws ModelError naming the file and the reason
 std::vector<std::string> writeResult(const std::string& directory, const MotionResult& result);
+/// Writes summary.json alone.
+void writeSummary(const std::string& directory, const MotionResult& result);
 
 /// Versions of this library, of Eigen and of the compiler.
 struct BuildInfo {
