@@ -13,17 +13,13 @@
 extern char** environ;
 
 namespace bielle::cli {
-namespace {
 
-// The path beside this program, or else the bare name, which is searched on the PATH.
 std::string findCompanion(const std::string& program) {
   std::error_code error;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
   const std::filesystem::path beside = self.parent_path() / program;
   return !error && access(beside.c_str(), X_OK) == 0 ? beside.string() : program;
 }
-
-}  // namespace
 
 void addCompanions(CLI::App& app) {
   app.add_subcommand("validate", "Compare the dynamics with Simbody's (see bielle validate --help)");
@@ -35,11 +31,9 @@ int becomeCompanion(const std::string& name, char** arguments) {
   std::string program = findCompanion(name);
   arguments[0] = program.data();
   execvp(program.c_str(), arguments);
-  std::cerr << "bielle: error: " << name
-            << " is neither beside this program nor on the PATH; build Bielle with "
+  std::cerr << "bielle: error: " << name << " is neither beside this program nor on the PATH; build Bielle with "
             << (name == "bielle-simulate" ? "-DBIELLE_BUILD_SIMULATION=ON" : "-DBIELLE_BUILD_VALIDATION=ON")
-            << " (it needs Simbody)"
-            << std::endl;
+            << " (it needs Simbody)" << std::endl;
   return kBadInput;
 }
 

@@ -64,6 +64,7 @@ int run(int argc, char** argv) {
   addRatio(app, action);
   addLift(app, action);
   addStudy(app, action);
+  addCampaign(app, action);
   addBench(app, action);
   addCompanions(app);
   app.callback([&action] {

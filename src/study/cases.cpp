@@ -76,15 +76,6 @@ void writeOutcome(const std::string& path, const Json& request, const CaseOutcom
   writeTextFile(path, formatJson({{"request", request}, {"outcome", steps}}) + "\n");
 }
 
-std::string findError(const std::string& log) {
-  const std::string prefix = "bielle: error: ";
-  std::ifstream file(log);
-  std::string line, error;
-  while (std::getline(file, line))
-    if (line.rfind(prefix, 0) == 0) error = line.substr(prefix.size());
-  return error;
-}
-
 std::string describeOutcome(const CaseOutcome& outcome) {
   if (outcome.kept) return "kept";
   const StepOutcome& last = outcome.steps.back();
@@ -199,7 +190,15 @@ class CaseRunner {
 
 }  // namespace
 
-// FNV-1a over all of them.
+std::string findError(const std::string& log) {
+  const std::string prefix = "bielle: error: ";
+  std::ifstream file(log);
+  std::string line, error;
+  while (std::getline(file, line))
+    if (line.rfind(prefix, 0) == 0) error = line.substr(prefix.size());
+  return error;
+}
+
 std::string makeIdentity(const std::string& program, const std::vector<std::string>& robots) {
   std::vector<fs::path> files;
   for (const std::string& robot : robots)
@@ -207,6 +206,11 @@ std::string makeIdentity(const std::string& program, const std::vector<std::stri
       if (entry.path().extension() == ".urdf" || entry.path().extension() == ".yaml") files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   files.push_back(program);
+  return makeIdentity(files);
+}
+
+// FNV-1a over all of them.
+std::string makeIdentity(const std::vector<fs::path>& files) {
   std::uint64_t hash = 0xcbf29ce484222325;
   for (const fs::path& path : files) {
     std::ifstream file(path, std::ios::binary);

@@ -5,6 +5,7 @@
 // The directory of a case holds the results, the output of each run (step1.log, ...), and case.json: the request and
 // its outcome. case.json is written last, so that a case without one was interrupted; it is repeated from the
 // beginning.
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -44,6 +45,11 @@ struct RunOutcome {
 
 // Dependencies of the results: the program and the files of the robots in these directories.
 std::string makeIdentity(const std::string& program, const std::vector<std::string>& robots);
+// The same of any files, the program among them.
+std::string makeIdentity(const std::vector<std::filesystem::path>& files);
+
+// The last error message in the output of a run of the command, without its prefix; empty if there is none.
+std::string findError(const std::string& log);
 
 // Runs the cases in directory/NAME. \throws ModelError when directories or files cannot be made, or another study uses
 // the directory

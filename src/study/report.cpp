@@ -11,13 +11,6 @@
 namespace bielle::study {
 namespace {
 
-// The shortest text that reads back to the same number; empty for NaN.
-std::string formatExact(double value) {
-  if (!std::isfinite(value)) return "";
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, value).ptr};
-}
-
 // Measures of a motion that ends early are in parentheses.
 std::string formatUntil(const Performance& motion, double value, int digits) {
   const std::string cell = formatCell(value, digits);
@@ -132,6 +125,12 @@ void printNumbers(std::ostream& page, const StudyResult& result) {
 }
 
 }  // namespace
+
+std::string formatExact(double value) {
+  if (!std::isfinite(value)) return "";
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
+}
 
 std::string formatCell(double value, int digits) {
   if (!std::isfinite(value)) return "–";

@@ -1,0 +1,78 @@
+// bielle campaign: motions carried out again and again, under many conditions.
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <thread>
+
+#include "bielle/model/error.h"
+#include "cli/case_run.h"
+#include "cli/commands.h"
+#include "study/campaign_report.h"
+
+namespace bielle::cli {
+namespace {
+
+using namespace bielle::study;
+
+struct CampaignArguments {
+  std::string spec, directory;
+  int jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+};
+
+int run(const CampaignArguments& arguments) {
+  const CampaignSpec spec = readCampaignSpec(arguments.spec);
+  CampaignOptions options;
+  options.bielle = std::filesystem::read_symlink("/proc/self/exe");
+  options.simulate = findCompanion("bielle-simulate");
+  if (options.simulate.find('/') == std::string::npos)
+    throw ModelError("", options.simulate, "it is not beside this program",
+                     "build Bielle with -DBIELLE_BUILD_SIMULATION=ON (it needs Simbody)");
+  options.jobs = arguments.jobs;
+  options.progress = [](const std::string& line) { std::cerr << line << std::endl; };
+  const CampaignResults results = runCampaign(spec, arguments.directory, options);
+  if (results.interrupted) {
+    std::cerr << "bielle: error: interrupted; the same command goes on from here" << std::endl;
+    return kFailed;
+  }
+  std::vector<std::string> notes;
+  printPaths(writeCampaign(arguments.directory, results, notes), notes);
+  if (!results.complete) std::cerr << "bielle: error: some runs broke down; the same command tries them anew\n";
+  return results.complete ? kOk : kFailed;
+}
+
+}  // namespace
+
+void addCampaign(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("campaign", "Carry motions out many times: pushes, grounds, worlds, seeds");
+  const auto arguments = std::make_shared<CampaignArguments>();
+  command.add_option("SPEC", arguments->spec, "YAML file: motions, options of `bielle simulate`, pushes")->required();
+  command
+      .add_option("-o,--output", arguments->directory,
+                  "directory for runs.csv, campaign.md, summary.json, map.svg and the log runs.jsonl; made if need be")
+      ->required();
+  command.add_option("--jobs", arguments->jobs, "runs at a time, one process each; results do not depend on it")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command.footer(
+      "SPEC: every combination of the values is one run of `bielle simulate`.\n"
+      "  motions:\n"
+      "    - walk                     (directory of a solved motion, from this file)\n"
+      "    - {name: quick, solve: walk, robot: bipetto, set: {speed: 0.6}}     (solved first, once)\n"
+      "  options:                     (any of `bielle simulate`; true: an option without a value)\n"
+      "    world: [bielle, mujoco]\n"
+      "    friction: [0.5, 0.7]\n"
+      "  push:\n"
+      "    time: [1.5, 1.7]           (s; or `phase: [3.5]`: half of phase 3 of the plan, counted from 0)\n"
+      "    direction: [0, 90, 180, 270]\n"
+      "    duration: 0.1\n"
+      "    impulse: [1, 2, 3]         (N s; or `largest_impulse: {up_to: 8, step: 0.25}`: by bisection)\n"
+      "Runs that are in the log are not done again: after Ctrl-C, a crash or with more values in SPEC, the same "
+      "command\n"
+      "does what is missing. A robot that falls is a result.\n"
+      "Exit status: 0 done, 1 interrupted or a run broke down, 2 bad input.\n"
+      "Example:\n"
+      "  bielle campaign pushes.yaml -o pushes");
+  command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
+}
+
+}  // namespace bielle::cli

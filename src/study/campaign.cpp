@@ -1,0 +1,294 @@
+#include "study/campaign.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <deque>
+#include <filesystem>
+#include <map>
+#include <optional>
+
+#include "bielle/io/result.h"
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "io/line_log.h"
+#include "model/text_file.h"
+#include "study/campaign_command.h"
+#include "study/cases.h"
+#include "study/child.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::study {
+namespace {
+
+constexpr size_t kMostCells = 1'000'000;
+constexpr const char* kMotion = "motion";
+// Of the summary of a run; times of the processor, which differ from run to run, are not among them.
+constexpr const char* kFields[] = {"outcome",        "outcome_message",   "duration",     "distance",
+                                   "mean_speed",     "largest_deviation", "largest_slip", "largest_gap",
+                                   "energy_balance", "saturated_share"};
+
+std::string join(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+std::vector<CampaignCell> listCells(const CampaignSpec& spec) {
+  size_t count = 1;
+  for (const CampaignAxis& axis : spec.axes) {
+    count *= axis.values.size();
+    if (count > kMostCells)
+      throw ModelError(spec.path, "campaign", "it has more than a million combinations", "give fewer values");
+  }
+  std::vector<CampaignCell> cells(count, CampaignCell(spec.axes.size()));
+  for (size_t i = 0; i < count; ++i) {
+    size_t rest = i;
+    for (size_t axis = spec.axes.size(); axis-- > 0; rest /= spec.axes[axis].values.size())
+      cells[i][axis] = rest % spec.axes[axis].values.size();
+  }
+  return cells;
+}
+
+// What results depend on besides the options: the program, the motions and their robots.
+std::string makeHeader(const std::string& simulate, const std::vector<std::string>& directories) {
+  std::vector<fs::path> files = {simulate};
+  for (const std::string& directory : directories) {
+    for (const char* name : {"summary.json", "trajectory.csv", "trajectory.npz"})
+      if (fs::exists(fs::path(directory) / name)) files.push_back(fs::path(directory) / name);
+    const fs::path robot = readSummary(directory).robot_file;
+    std::vector<fs::path> parts;
+    if (fs::is_regular_file(robot))
+      for (const fs::directory_entry& entry : fs::directory_iterator(robot.parent_path()))
+        if (entry.path().extension() == ".urdf" || entry.path().extension() == ".yaml") parts.push_back(entry.path());
+    std::sort(parts.begin(), parts.end());
+    files.insert(files.end(), parts.begin(), parts.end());
+  }
+  return Json{{"campaign", makeIdentity(files)}}.dump();
+}
+
+class CampaignRunner {
+ public:
+  CampaignRunner(const CampaignSpec& spec, const std::string& directory, const std::vector<std::string>& motions,
+                 const CampaignOptions& options)
+      : spec_(spec),
+        directory_(directory),
+        motions_(motions),
+        options_(options),
+        commands_(spec, motions),
+        cells_(listCells(spec)),
+        log_(directory + "/runs.jsonl", makeHeader(options.simulate, motions),
+             "the log is of other motions, robots or another version") {
+    for (const std::string& line : log_.getLines()) {
+      try {
+        const Json json = parseJson(line);
+        results_[json.at("run")] = json.at("result");
+      } catch (const std::exception&) {
+        throw ModelError(log_.getPath(), "log", "one of its lines is not as it was written",
+                         "remove the file: the runs are done anew");
+      }
+    }
+  }
+  ~CampaignRunner() {
+    for (const Running& entry : running_) killChild(entry.pid);
+    std::error_code ignored;
+    fs::remove_all(directory_ + "/work", ignored);
+  }
+  CampaignRunner(const CampaignRunner&) = delete;
+  CampaignRunner& operator=(const CampaignRunner&) = delete;
+
+  CampaignResults run() {
+    CampaignResults out;
+    std::deque<size_t> waiting;
+    for (size_t i = 0; i < cells_.size(); ++i) {
+      waiting.push_back(i);
+      done_ += follow(i).done.size();
+    }
+    SignalWatch watch;
+    while (true) {
+      while (!waiting.empty() && static_cast<int>(running_.size()) < options_.jobs) {
+        const size_t cell = waiting.front();
+        waiting.pop_front();
+        begin(cell);
+      }
+      if (running_.empty()) break;
+      if (watch.wait()) {
+        out.interrupted = true;
+        return out;
+      }
+      for (const ChildEnd& end : SignalWatch::collect())
+        if (const auto cell = finish(end)) waiting.push_front(*cell);
+    }
+    out.complete = complete_;
+    collect(out);
+    return out;
+  }
+
+ private:
+  struct Running {
+    pid_t pid = 0;
+    size_t cell = 0;
+    int slot = 0;  // of its directory
+    std::string key;
+  };
+
+  std::string makeImpulse(int multiple) const { return spec_.search ? formatImpulse(*spec_.search, multiple) : ""; }
+  std::string makeKey(size_t cell, int multiple) const {
+    return spec_.motions[cells_[cell][0]].name + " " + join(commands_.make(cells_[cell], makeImpulse(multiple)));
+  }
+  // -1: it has not been done; else whether the robot stood.
+  int findOutcome(size_t cell, int multiple) const {
+    const auto found = results_.find(makeKey(cell, multiple));
+    return found == results_.end() ? -1 : found->second.at("outcome") == kStood;
+  }
+  // Runs of a cell by the multiple of the step of the search, or 1 without a search.
+  struct Progress {
+    std::vector<int> done;  // ascending
+    int next = 0;           // 0: no more is needed
+  };
+  Progress follow(size_t cell) const {
+    Progress progress;
+    int low = 0, high = spec_.search ? spec_.search->count + 1 : 2;
+    while (high - low > 1) {
+      // The largest first: whether it is survived decides if there is anything to search.
+      const int next = progress.done.empty() ? high - 1 : (low + high) / 2, outcome = findOutcome(cell, next);
+      if (outcome < 0) {
+        progress.next = next;
+        break;
+      }
+      progress.done.push_back(next);
+      (outcome == 1 ? low : high) = next;
+    }
+    std::sort(progress.done.begin(), progress.done.end());
+    return progress;
+  }
+  std::string getWork(int slot) const { return directory_ + "/work/" + std::to_string(slot); }
+
+  void begin(size_t cell) {
+    const int multiple = follow(cell).next;
+    if (multiple == 0) return;
+    int slot = 0;
+    while (std::any_of(running_.begin(), running_.end(), [slot](const Running& entry) { return entry.slot == slot; }))
+      ++slot;
+    std::error_code ignored;
+    fs::remove_all(getWork(slot), ignored);
+    makeOutputDirectory(getWork(slot));
+    std::vector<std::string> command = {options_.simulate, motions_[cells_[cell][0]], "-o", getWork(slot),
+                                        "--summary-only"};
+    const std::vector<std::string> arguments = commands_.make(cells_[cell], makeImpulse(multiple));
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    running_.push_back({startChild(command, getWork(slot) + "/log"), cell, slot, makeKey(cell, multiple)});
+  }
+
+  Json readRun(const Running& entry, int status) const {
+    if (status >= 2) return {{"outcome", kRefused}, {"outcome_message", findError(getWork(entry.slot) + "/log")}};
+    Json result = Json::object();
+    readJsonFile(getWork(entry.slot) + "/summary.json", "run the campaign again", [&result](const Json& summary) {
+      for (const char* field : kFields) result[field] = summary.at(field);
+    });
+    return result;
+  }
+
+  // The cell of a child that has ended, if more may have to be done for it.
+  std::optional<size_t> finish(const ChildEnd& end) {
+    const auto found =
+        std::find_if(running_.begin(), running_.end(), [&](const Running& entry) { return entry.pid == end.pid; });
+    if (found == running_.end()) return std::nullopt;
+    const Running entry = *found;
+    running_.erase(found);
+    if (end.status >= 127) {
+      complete_ = false;
+      report(entry.key + ": ended by " + (end.status == 127 ? "a failure to start" : "a signal"));
+      return std::nullopt;
+    }
+    const Json result = readRun(entry, end.status);
+    if (result.at("outcome") != kRefused) log_.append(Json{{"run", entry.key}, {"result", result}}.dump());
+    results_[entry.key] = result;
+    report(entry.key + ": " + result.at("outcome").get<std::string>());
+    return entry.cell;
+  }
+
+  void report(const std::string& text) {
+    ++done_;
+    if (options_.progress)
+      options_.progress("[" + std::to_string(done_) + (spec_.search ? "" : "/" + std::to_string(cells_.size())) + "] " +
+                        text);
+  }
+
+  void collect(CampaignResults& out) const {
+    for (const CampaignAxis& axis : spec_.axes) out.columns.push_back(axis.name);
+    out.searched = spec_.search.has_value();
+    if (spec_.search) out.columns.push_back("push impulse");
+    for (size_t cell = 0; cell < cells_.size(); ++cell)
+      for (const int multiple : follow(cell).done) {
+        CampaignRun run;
+        for (size_t i = 0; i < spec_.axes.size(); ++i) run.values.push_back(spec_.axes[i].values[cells_[cell][i]]);
+        if (spec_.search) run.values.push_back(makeImpulse(multiple));
+        run.command = join(commands_.make(cells_[cell], makeImpulse(multiple)));
+        run.result = results_.at(makeKey(cell, multiple));
+        out.runs.push_back(std::move(run));
+      }
+  }
+
+  const CampaignSpec& spec_;
+  const std::string directory_;
+  const std::vector<std::string> motions_;
+  const CampaignOptions& options_;
+  const CampaignCommands commands_;
+  const std::vector<CampaignCell> cells_;
+  LineLog log_;
+  std::map<std::string, Json> results_;  // by motion and arguments
+  std::vector<Running> running_;
+  size_t done_ = 0;
+  bool complete_ = true;
+};
+
+// The directories of all motions; those that have to be solved are, unless they were before. Empty: interrupted.
+std::vector<std::string> solveMotions(const CampaignSpec& spec, const std::string& directory,
+                                      const CampaignOptions& options) {
+  std::vector<Case> cases;
+  std::vector<std::string> robots;
+  for (const CampaignMotion& motion : spec.motions) {
+    if (!motion.directory.empty()) continue;
+    Case one{motion.name, {motion.solve}};
+    one.steps[0].insert(one.steps[0].end(), {"-o", std::string("@") + kMotion, "--quiet", "--no-report", "--no-check"});
+    cases.push_back(one);
+    robots.push_back(loadRobot(motion.robot).directory);
+  }
+  RunOutcome outcome;
+  if (!cases.empty())
+    outcome = runCases(directory + "/motions", cases,
+                       {options.bielle, makeIdentity(options.bielle, robots), options.jobs, options.progress});
+  if (outcome.interrupted) return {};
+  std::vector<std::string> directories;
+  size_t next = 0;
+  for (const CampaignMotion& motion : spec.motions) {
+    directories.push_back(motion.directory.empty() ? directory + "/motions/" + motion.name + "/" + kMotion
+                                                   : motion.directory);
+    if (!motion.directory.empty()) continue;
+    const CaseOutcome& solved = outcome.cases[next++];
+    if (!solved.complete || solved.steps.empty() || solved.steps.back().status != 0)
+      throw ModelError(spec.path, "motion '" + motion.name + "'", "it was not solved",
+                       "see step1.log in " + directory + "/motions/" + motion.name);
+  }
+  return directories;
+}
+
+}  // namespace
+
+CampaignResults runCampaign(const CampaignSpec& spec, const std::string& directory, const CampaignOptions& options) {
+  makeOutputDirectory(directory);
+  const std::string check = directory + "/check.log";
+  checkCommands(spec, options.simulate, check);
+  fs::remove(check);
+  const std::vector<std::string> motions = solveMotions(spec, directory, options);
+  if (motions.empty()) {
+    CampaignResults out;
+    out.interrupted = true;
+    return out;
+  }
+  setenv("OMP_NUM_THREADS", "1", 1);  // processes share the cores, not threads
+  return CampaignRunner(spec, directory, motions, options).run();
+}
+
+}  // namespace bielle::study

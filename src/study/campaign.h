@@ -1,0 +1,46 @@
+#pragma once
+/// \file The runs of a campaign: each a process `bielle-simulate`, each written to a log when it ends.
+///
+/// The log DIR/runs.jsonl has one line per finished run, in the order in which they ended. Runs in the log are not done
+/// again, and what is not asked for any more does no harm: axes may be extended between two calls. All else follows from
+/// outcomes in the order of the axes, and thus does not depend on the number of processes.
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "io/json_text.h"
+#include "study/campaign_spec.h"
+
+namespace bielle::study {
+
+struct CampaignOptions {
+  std::string bielle, simulate;  ///< paths of the programs
+  int jobs = 1;                  ///< processes at a time
+  std::function<void(const std::string&)> progress;
+};
+
+constexpr const char *kStood = "stood", *kRefused = "refused";
+
+/// One finished run. Under `outcome` of its result: stood, fell, broke off, or, not in the log, refused.
+struct CampaignRun {
+  std::vector<std::string> values;  ///< of the columns
+  std::string command;              ///< arguments of `bielle simulate` after the motion
+  Json result;
+
+  bool stood() const { return result.at("outcome") == kStood; }
+};
+
+/// The axes are the columns; of a search for the largest impulse there is one more, "push impulse", behind them.
+struct CampaignResults {
+  std::vector<std::string> columns;
+  std::vector<CampaignRun> runs;  ///< in the order of the axes, the last column varying first
+  bool searched = false;          ///< for the largest impulses
+  bool interrupted = false;       ///< by the user
+  bool complete = true;           ///< false if processes were ended by signals
+};
+
+/// Checks options by dry runs, solves the motions that are to be solved (in DIR/motions), and does what the log lacks.
+/// \throws ModelError when an option is refused, a motion cannot be solved, or the directory is of another campaign
+CampaignResults runCampaign(const CampaignSpec& spec, const std::string& directory, const CampaignOptions& options);
+
+}  // namespace bielle::study

@@ -1,0 +1,220 @@
+// bielle campaign, run as a user runs it. Oracles: `bielle simulate`, run by itself.
+#include <signal.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "robot_directory.h"
+#include "run_command.h"
+#include "study/campaign_report.h"
+
+namespace fs = std::filesystem;
+using namespace bielle;
+using namespace bielle::testing;
+using Catch::Matchers::Contains;
+using nlohmann::json;
+
+namespace {
+
+std::string readText(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+int countLines(const fs::path& path) {
+  const std::string text = readText(path);
+  return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+}
+
+const char* const kMotion =
+    "{name: walk, solve: walk, robot: " BIELLE_SOURCE_DIR "/robots/bipetto, set: {speed: 0.4, steps: 2}}";
+
+// Twelve short runs.
+std::string makeGrid() {
+  return std::string("motions: [") + kMotion +
+         "]\noptions:\n  friction: [0.7, 0.1]\n  duration: 0.9\n"
+         "push: {phase: 1.5, direction: [0, 90, 180], impulse: [1, 60]}\n";
+}
+
+CommandResult runCampaign(const std::string& spec, const std::string& out, const std::string& jobs = "2") {
+  return runCommand({BIELLE_COMMAND, "campaign", spec, "-o", out, "--jobs", jobs});
+}
+
+// The text of everything that a campaign writes but the log, whose order is that of arrival.
+std::string readResults(const fs::path& out) {
+  std::string text;
+  for (const char* name : {"runs.csv", "campaign.md", "summary.json", "map.svg"}) text += readText(out / name);
+  return text;
+}
+
+int countProgress(const CommandResult& result) {
+  int count = 0;
+  std::istringstream stream(result.err);
+  for (std::string line; std::getline(stream, line);)
+    count += line.rfind("[", 0) == 0 && line.find("--push") < line.size();
+  return count;
+}
+
+study::CampaignRun makeRun(const std::string& direction, const std::string& impulse, bool stood) {
+  study::CampaignRun run;
+  run.values = {"walk", direction, impulse};
+  run.result = {{"outcome", stood ? "stood" : "fell"}};
+  return run;
+}
+
+}  // namespace
+
+TEST_CASE("campaign: a grid of runs, the same bytes with one process or several, and what a run by itself gives") {
+  const RobotDirectory directory;
+  const std::string spec = directory.write("spec.yaml", makeGrid()), out = directory.path() + "/out";
+  const CommandResult result = runCampaign(spec, out);
+  CAPTURE(result.err);
+  REQUIRE(result.status == 0);
+  CHECK(countProgress(result) == 12);
+  CHECK(countLines(out + "/runs.jsonl") == 13);
+  const json summary = json::parse(readText(out + "/summary.json"));
+  CHECK(summary["runs"] == 12);
+  CHECK(summary["outcomes"]["stood"].get<int>() + summary["outcomes"]["fell"].get<int>() == 12);
+  CHECK(summary["axes"]["friction"]["0.7"]["stood"] > 0);
+  CHECK(summary["axes"]["friction"]["0.7"]["runs"] == 6);
+  CHECK(summary["axes"]["push impulse"]["60"]["stood"] == 0);
+  CHECK_THAT(readText(out + "/campaign.md"), Contains("| friction | stood | of |"));
+
+  // A run by itself: phase 1 of the plan, the first step, lasts from 0.3 to 0.66 s.
+  const std::string alone = directory.path() + "/alone";
+  const CommandResult simulated =
+      runCommand({BIELLE_COMMAND, "simulate", out + "/motions/walk/motion", "-o", alone, "--summary-only", "--friction",
+                  "0.7", "--duration", "0.9", "--push", "t=0.48,direction=90,impulse=1"});
+  REQUIRE(simulated.status < 2);
+  const json one = json::parse(readText(alone + "/summary.json"));
+  std::istringstream log(readText(out + "/runs.jsonl"));
+  int found = 0;
+  for (std::string line; std::getline(log, line);) {
+    const json entry = json::parse(line);
+    if (entry.value("run", "") != "walk --friction 0.7 --duration 0.9 --push t=0.48,direction=90,impulse=1") continue;
+    ++found;
+    for (const auto& [name, value] : entry["result"].items()) CHECK(value == one[name]);
+  }
+  CHECK(found == 1);
+
+  const std::string single = directory.path() + "/single";
+  fs::create_directories(single);
+  fs::copy(out + "/motions", single + "/motions", fs::copy_options::recursive);
+  REQUIRE(runCampaign(spec, single, "1").status == 0);
+  CHECK(readResults(single) == readResults(out));
+  CHECK(countProgress(runCampaign(spec, out)) == 0);  // nothing is left to do
+}
+
+TEST_CASE("campaign: after an interruption only what is missing is done") {
+  const RobotDirectory directory;
+  const std::string spec = directory.write("spec.yaml", makeGrid()), out = directory.path() + "/out";
+  const std::string log = out + "/runs.jsonl";
+  {
+    Command command({BIELLE_COMMAND, "campaign", spec, "-o", out, "--jobs", "2"});
+    while (countLines(log) < 4) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    command.sendSignal(SIGINT);
+    const CommandResult result = command.wait();
+    CHECK(result.status == 1);
+    CHECK_THAT(result.err, Contains("interrupted"));
+    CHECK_FALSE(fs::exists(out + "/runs.csv"));
+    CHECK_FALSE(fs::exists(out + "/work"));
+  }
+  const int done = countLines(log) - 1;
+  REQUIRE(done >= 3);
+  REQUIRE(done < 12);
+  std::ofstream(log, std::ios::app) << "{\"run\": \"walk --fri";  // cut off by a crash
+  const CommandResult rest = runCampaign(spec, out);
+  REQUIRE(rest.status == 0);
+  CHECK(countProgress(rest) == 12 - done);
+  CHECK(countLines(log) == 13);
+  std::ofstream(out + "/motions/walk/motion/summary.json", std::ios::app) << "\n";
+  CHECK_THAT(runCampaign(spec, out).err, Contains("of other motions"));
+}
+
+TEST_CASE("campaign: the largest impulse that is survived, by bisection") {
+  const RobotDirectory directory;
+  const std::string spec = directory.write(
+      "spec.yaml",
+      std::string("motions: [") + kMotion +
+          "]\noptions: {duration: 1.2}\npush: {time: 0.4, direction: 90, largest_impulse: {up_to: 32, step: 1}}\n");
+  const std::string out = directory.path() + "/out";
+  const CommandResult result = runCampaign(spec, out);
+  CAPTURE(result.err);
+  REQUIRE(result.status == 0);
+  CHECK(countProgress(result) <= 6);
+  const json found = json::parse(readText(out + "/summary.json"))["largest_impulses"][0];
+  CHECK(found["bounded"] == true);
+  const int survived = found["survived_Ns"];
+  REQUIRE(survived >= 1);
+  REQUIRE(survived < 32);
+  for (const int impulse : {survived, survived + 1})
+    CHECK(runCommand({BIELLE_COMMAND, "simulate", out + "/motions/walk/motion", "-o", directory.path() + "/one",
+                      "--summary-only", "--duration", "1.2", "--push",
+                      "t=0.4,direction=90,impulse=" + std::to_string(impulse)})
+              .status == (impulse > survived));
+}
+
+TEST_CASE("campaign: a specification that is wrong is refused with file, line, key and remedy, before anything runs") {
+  const RobotDirectory directory;
+  const std::string out = directory.path() + "/out", head = std::string("motions: [") + kMotion + "]\n";
+  const std::vector<std::pair<std::string, std::vector<std::string>>> cases = {
+      {"motions: [nowhere]\n", {"motions", "(line 1)", "not a directory of a solved motion"}},
+      {head + "frictions: [1]\n", {"key 'frictions' (line 2)", "known keys are"}},
+      {head + "options:\n  world: bielle\n  frictoin: [0.5]\n", {"key 'frictoin' (line 4)", "--help"}},
+      {head + "options:\n  friction: [0.5, -1]\n", {"key 'friction' (line 3)", "friction"}},
+      {head + "options: {world: [bielle, moon]}\n", {"key 'world' (line 2)", "moon"}},
+      {head + "options: {friction: [0.5, 0.5]}\n", {"friction", "given twice"}},
+      {head + "options: {push: t=1}\n", {"key 'push' (line 2)", "beside `options`"}},
+      {head + "push: {time: 1, phase: 1, impulse: 1}\n", {"key 'push' (line 2)", "give one of them"}},
+      {head + "push: {time: soon, impulse: 1}\n", {"key 'time' (line 2)", "not a number"}},
+      {head + "push: {time: -1, impulse: 1}\n", {"(line 2)", "not positive"}},
+      {head + "push: {time: 1, largest_impulse: {up_to: 1, step: 2}}\n", {"(line 2)", "up_to"}},
+      {"motions: [{name: w, solve: wakl, robot: bipetto}]\n", {"wakl"}},
+      {"motions: [{name: w, solve: walk, robot: bipetto, set: {sped: 1}}]\n", {"sped"}}};
+  for (const auto& [text, words] : cases) {
+    const CommandResult result = runCampaign(directory.write("spec.yaml", text), out);
+    CAPTURE(text, result.err);
+    CHECK(result.status == 2);
+    for (const std::string& word : words) CHECK_THAT(result.err, Contains(word));
+    CHECK_FALSE(fs::exists(out + "/runs.jsonl"));
+    CHECK_FALSE(fs::exists(out + "/motions"));
+  }
+  const std::string late = directory.write("spec.yaml", head + "push: {phase: 99, impulse: 1}\n");
+  CHECK_THAT(runCampaign(late, out).err, Contains("key 'phase' (line 2)") && Contains("no phase 99"));
+}
+
+TEST_CASE("campaign: the example's specification is read") {
+  const study::CampaignSpec spec = study::readCampaignSpec(BIELLE_SOURCE_DIR "/examples/campaign/pushes.yaml");
+  REQUIRE(spec.search);
+  CHECK(spec.search->count == 32);
+  size_t combinations = 1;
+  for (const study::CampaignAxis& axis : spec.axes) combinations *= axis.values.size();
+  CHECK(combinations == 32);
+}
+
+TEST_CASE("campaign: an impulse counts as survived if all smaller ones were") {
+  study::CampaignResults results;
+  results.columns = {"motion", "push direction", "push impulse"};
+  for (const auto& [direction, impulse, stood] :
+       std::vector<std::tuple<const char*, const char*, bool>>{{"0", "10", true},
+                                                               {"0", "2", true},
+                                                               {"90", "1", true},
+                                                               {"90", "2", false},
+                                                               {"90", "3", true},
+                                                               {"180", "1", false}})
+    results.runs.push_back(makeRun(direction, impulse, stood));
+  const std::vector<study::SurvivedImpulse> found = findSurvivedImpulses(results);
+  REQUIRE(found.size() == 3);
+  CHECK(found[0].impulse == 10);
+  CHECK_FALSE(found[0].bounded);
+  CHECK(found[1].impulse == 1);
+  CHECK(found[1].bounded);
+  CHECK(found[2].impulse == 0);
+  CHECK(found[2].bounded);
+}
