@@ -82,8 +82,8 @@ const CheckRow* CheckReport::findRow(const std::string& name) const {
 CheckBounds makeBounds(StepRule rule) {
   CheckBounds bounds;
   if (rule == StepRule::Euler) return bounds;
-  for (double* bound : {&bounds.finite_differences, &bounds.interval_energy, &bounds.total_energy, &bounds.slip,
-                        &bounds.slip_angle, &bounds.sole_height, &bounds.below_ground})
+  for (double* bound :
+       {&bounds.finite_differences, &bounds.slip, &bounds.slip_angle, &bounds.sole_height, &bounds.below_ground})
     *bound /= 10;
   return bounds;
 }

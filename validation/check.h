@@ -48,8 +48,15 @@
 /// q_m it is 2/h (v_m - v-), which is compared with Simbody's at (q_m, v-), without stabilisation, in the row of (4).
 /// e_k of (6) is taken with a at (q_m, v_m), and
 ///     T_{k+1} - T_k + U_{k+1} - U_k = h/2 (v- + w) (B u + J^T lambda) + rest,                                     (10)
-/// U the potential energy. Both remainders are of higher order than those of an Euler step; bounds are tenths of the
-/// latter (makeBounds).
+/// U the potential energy. The rest is of third order. For a drift changes T + U at the rate
+///     p(q, v) = v f(q, v),    f = b + M a_n,    a_n = -W^{-1} J^T (J W^{-1} J^T)^+ dJ/dt v                        (11)
+/// with J the rows of the loops that it follows (none in the full formulation), while the kick takes h v' f(q_m, v_m),
+/// v' = (v- + w) / 2. Trapezoids for both drifts, with the errors of the midpoint rule for them, leave
+///     |rest| <= h/4 |p(q_k, v_k) - p(q_m, v-) - p(q_m, w) + p(q_{k+1}, v_{k+1})|
+///               + h/2 |p(q_m, v-) + p(q_m, w) - 2 p(q_m, v')| + h |v' (f(q_m, v_m) - f(q_m, v'))|                 (12)
+/// up to terms of fourth order: what changes of the power within the drifts, its curvature over the kick, and the
+/// foreseen velocity leave. A motion whose forces and velocities are right keeps to it whatever its steps; whether they
+/// are short enough is judged by finite differences and by feet.
 #include <iosfwd>
 #include <optional>
 
@@ -91,12 +98,12 @@ struct CheckBounds {
   double force_in_air = 1e-9;  ///< N or N m
   double range = 1e-6;         ///< m or rad beyond a limit
   double goal = 1e-9;          ///< between the summary's value of a goal and the measured one, in the goal's unit
-  double interval_energy = 2;  ///< left side of (8) over its right side, which terms of second order may exceed
+  double interval_energy = 2;  ///< left side of (8) or (12) over its right side, which terms of higher order may exceed
   double total_energy = 1;     ///< the same for the sums over the motion
 };
 
 /// The bounds of a motion by Euler steps, or of one by midpoint steps: a tenth for what is due to the steps alone, finite
-/// differences of velocities, energy, and the places of standing feet and of feet over the ground.
+/// differences of velocities, and the places of standing feet and of feet over the ground.
 CheckBounds makeBounds(StepRule rule);
 
 struct CheckRow {

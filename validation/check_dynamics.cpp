@@ -86,7 +86,7 @@ void addDynamicsRows(CheckContext& context) {
   addClosureRows(context);
 }
 
-// Both by Eqs. (7) and (8): the energy missing in the balance, over the possible loss or gain of first-order steps.
+// The energy missing in the balance, Eq. (7) or (10), over what steps may lose or gain, Eq. (8) or (12).
 void addEnergyRows(CheckContext& context) {
   const std::vector<NodeTrace>& nodes = context.trace.nodes;
   // A robot that stands still exchanges no energy: rounding must not fail.
@@ -94,9 +94,10 @@ void addEnergyRows(CheckContext& context) {
   const auto describe = [](double rest, double scale) {
     return formatNumber(rest) + " of " + formatNumber(scale) + " J";
   };
+  const bool midpoint = context.motion.record.has_midpoints;
   Worst interval;
   double total = 0, allowed = rounding, exchanged = 0, h_before = 0;
-  // Terms of second order remain where those of first order vanish: a mean interval's scale is added.
+  // Terms of higher order remain where those of the scale vanish: a mean interval's scale is added.
   double mean = rounding;
   for (const StageTrace& stage : context.trace.stages) mean += stage.energy_scale / context.trace.stages.size();
   for (size_t k = 0; k < context.trace.stages.size(); ++k) {
@@ -111,11 +112,12 @@ void addEnergyRows(CheckContext& context) {
     total += rest + raised;
     // With the mean velocity an Euler step falls by h^2/2 m g a less than with its final one: h/2 m g times the change
     // of velocity, which cancels in a motion from rest to rest with one step size.
-    allowed += stage.energy_scale + std::abs(h - h_before) / 2 * std::abs(nodes[k].gravity_power);
+    allowed += stage.energy_scale;
+    if (!midpoint) allowed += std::abs(h - h_before) / 2 * std::abs(nodes[k].gravity_power);
     h_before = h;
     exchanged += stage.exchanged + std::abs(raised);
   }
-  allowed += h_before / 2 * std::abs(nodes.back().gravity_power);
+  if (!midpoint) allowed += h_before / 2 * std::abs(nodes.back().gravity_power);
   context.add(interval, "energy, one interval", "of scale", context.bounds.interval_energy);
   CheckRow row{"energy, whole motion",
                CheckRow::Kind::AtMost,

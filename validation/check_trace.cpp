@@ -1,6 +1,7 @@
 #include "check_trace.h"
 
 #include <Eigen/QR>
+#include <array>
 #include <memory>
 
 #include "check_accelerations.h"
@@ -67,6 +68,7 @@ class Tracer {
       simbody.setState(q, v, calcMotorForces(motion_.model, u));
       out.nodes.push_back(traceNode(simbody, v));
       updateTangent(simbody);
+      out.nodes.back().drift_power = v.dot(calcDriftForces(simbody));
       if (k > 0) traceArrival(k - 1, out.nodes[k - 1], out.nodes[k], out.stages[k - 1]);
       if (k < stages && hasMidpoint(k))
         traceMidpoint(simbody, k, out.stages[k]);
@@ -122,12 +124,25 @@ class Tracer {
     if (!metric_.size()) return;
     const VectorXd inverse_root = metric_.cwiseSqrt().cwiseInverse();
     const MatrixXd J = simbody.calcConstraintJacobian().topRows(loop_rows_) * inverse_root.asDiagonal();
-    Eigen::ColPivHouseholderQR<MatrixXd> factors;
-    factors.setThreshold(kRankThreshold);
-    factors.compute(J.transpose());
+    factors_.setThreshold(kRankThreshold);
+    factors_.compute(J.transpose());
     const int n = motion_.model.nv();
-    const MatrixXd Q = factors.householderQ();
-    N_ = inverse_root.asDiagonal() * Q.rightCols(n - factors.rank());
+    const MatrixXd Q = factors_.householderQ();
+    N_ = inverse_root.asDiagonal() * Q.rightCols(n - factors_.rank());
+    normal_ = inverse_root.asDiagonal() * Q.leftCols(factors_.rank());
+  }
+
+  // f of Eq. (11), at the state that the bridge has. a_n is the smallest acceleration, in the metric W, that keeps the
+  // loops closed.
+  VectorXd calcDriftForces(const SimbodyBridge& simbody) const {
+    const VectorXd bias = simbody.calcBias();
+    if (!metric_.size()) return bias;
+    const VectorXd left = simbody.calcConstraintAcceleration(VectorXd::Zero(bias.size())).head(loop_rows_);
+    const auto rank = factors_.rank();
+    const auto R = factors_.matrixR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>();
+    const VectorXd ordered = factors_.colsPermutation().transpose() * left;
+    const VectorXd turn = -normal_ * R.transpose().solve(ordered.head(rank));
+    return bias + simbody.calcMassMatrix() * turn;
   }
   VectorXd projectOnTangent(const VectorXd& x) const {
     if (!metric_.size()) return x;
@@ -142,12 +157,13 @@ class Tracer {
       const VectorXd q_mid = motion_.record.q_mid.row(k), q_next = motion_.record.q.row(k + 1);
       stage.position_rest = projectOnTangent(motion_.model.difference(q_mid, q_next) - h / 2 * v_next);
       stage.gravity_work = here.potential - next.potential;
+      stage.energy_scale += h / 4 * std::abs(here.drift_power - stage.midpoint_power + next.drift_power);
     } else {
       stage.position_rest = projectOnTangent(calcStep(k) - h * v_next);
       stage.gravity_work = h / 2 * (here.gravity_power + next.gravity_power);
+      stage.energy_scale += h * std::abs(next.inertial_power - here.inertial_power) +
+                            h / 2 * std::abs((next.gravity - here.gravity).dot(v_next));
     }
-    stage.energy_scale += h * std::abs(next.inertial_power - here.inertial_power) +
-                          h / 2 * std::abs((next.gravity - here.gravity).dot(v_next));
   }
 
   VectorXd calcStep(int k) const {
@@ -211,8 +227,6 @@ class Tracer {
     const VectorXd motors = calcMotorForces(motion_.model, record.u.row(k).transpose());
     const VectorXd first = motion_.model.difference(q, q_mid), second = motion_.model.difference(q_mid, q_next);
     stage.midpoint_rest = projectOnTangent(first - h / 2 * v);
-    const VectorXd inertial = simbody.calcBias() + simbody.calcGravityForces();
-    stage.energy_scale = h * h / 2 * std::abs(a.dot(inertial));
     const ClosureErrors errors = calcClosureErrors(simbody, v);
 
     simbody.setState(q_mid, v_mid, motors);
@@ -232,7 +246,20 @@ class Tracer {
     simbody.setState(q_mid, before, motors);
     const VectorXd foreseen = projectOnTangent(simbody.solveWithArmature(Precision::Double).a);
     stage.acceleration_error = getLarger(own.error, calcInertialNorm(M, 2 / h * (v_mid - before) - foreseen));
-    stage.energy_scale += std::abs((M * (next - v - h * a)).dot(v + next)) / 2;
+    traceMidpointEnergy(simbody, h, q_mid, {before, after, v_mid}, motors, stage);
+  }
+
+  // Eq. (12), but for the powers at the nodes. `v` are v-, w and v_m.
+  void traceMidpointEnergy(SimbodyBridge& simbody, double h, const VectorXd& q_mid, const std::array<VectorXd, 3>& v,
+                           const VectorXd& motors, StageTrace& stage) const {
+    const auto calcForces = [&](const VectorXd& velocity) {
+      simbody.setState(q_mid, velocity, motors);
+      return calcDriftForces(simbody);
+    };
+    const VectorXd mean = (v[0] + v[1]) / 2, f = calcForces(mean);
+    stage.midpoint_power = v[0].dot(calcForces(v[0])) + v[1].dot(calcForces(v[1]));
+    stage.energy_scale =
+        h / 2 * std::abs(stage.midpoint_power - 2 * mean.dot(f)) + h * std::abs(mean.dot(calcForces(v[2]) - f));
   }
 
   // Works along a displacement.
@@ -248,7 +275,10 @@ class Tracer {
 
   const CheckedMotion& motion_;
   VectorXd metric_;  // nv, diagonal of W, or empty
-  MatrixXd N_;       // nv x mobility at the node traced last, N^T W N = 1
+  // At the state that updateTangent() saw last, n = nv: with J of the loops, J^T in the metric W is factorized as
+  // W^{-1/2} J^T = Q R, and N (n x mobility, N^T W N = 1) and `normal` are W^{-1/2} Q.
+  Eigen::ColPivHouseholderQR<MatrixXd> factors_;
+  MatrixXd N_, normal_;
   int loop_rows_ = 0;
   std::unique_ptr<SimbodyBridge> bridge_;
   int bridge_phase_ = -1;

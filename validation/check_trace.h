@@ -22,6 +22,7 @@ struct NodeTrace {
   double gravity_power = 0;            ///< m g . v_com, W
   VectorXd gravity;                    ///< nv, generalized forces of gravity
   double inertial_power = 0;           ///< v . c, c the bias without gravity: half of v . dM/dt v, W
+  double drift_power = 0;              ///< p of Eq. (11), W
 };
 
 /// A stage, from its node to the next.
@@ -39,7 +40,8 @@ struct StageTrace {
   double contact_work = 0;               ///< of feet that slip, J
   double closure_work = 0;               ///< of loops that open, J
   double gravity_work = 0;               ///< over the interval, as Eq. (7) or (10) takes it, J
-  double energy_scale = 0;               ///< possible loss or gain of a first-order step, the right side of Eq. (8), J
+  double midpoint_power = 0;             ///< p(q_m, v-) + p(q_m, w) of Eq. (11), W
+  double energy_scale = 0;               ///< what the step may lose or gain, the right side of Eq. (8) or (12), J
   std::vector<Vector6d>
       impulses;  ///< of a rigid impact: per contact of the model, of the ground on the foot, N s and N m s
 };
