@@ -125,6 +125,39 @@ TEST_CASE("enforced bounds that are infinite change nothing but rounding") {
   for (size_t k = 0; k < free.us.size(); ++k) CHECK((free.us[k] - boxed.us[k]).norm() < 1e-6);
 }
 
+namespace {
+
+// A swing-up whose cost is known only up to an error, as long sums and badly conditioned dynamics leave it.
+struct RoundedPendulum : PlantProblem<Pendulum> {
+  explicit RoundedPendulum(const PlantProblem<Pendulum>& problem) : PlantProblem(problem) {}
+  double error = 0;  // over a constant that the cost contains
+  double calcTerminalCost(const VectorXd& x) const override {
+    return PlantProblem::calcTerminalCost(x) + 10 * (1 + error * std::sin(1e13 * x[0]));
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a decrease that rounding hides ends a solve as converged, and a larger error of the cost does not") {
+  RoundedPendulum problem(makePendulum());
+  FddpOptions options = makeTightOptions();
+  options.gradient_tolerance = 1e-30;
+  options.cost_tolerance = 0;
+  for (double error : {3e-13, 1e-8}) {
+    CAPTURE(error);
+    problem.error = error;
+    ShootingTrajectory t = makeGuess(problem);
+    const FddpSummary summary = Fddp(options).solve(problem, t);
+    const bool hidden = error < 1e-12;
+    CHECK((summary.termination == FddpTermination::Converged) == hidden);
+    if (!hidden) continue;
+    CHECK(summary.message == "the cost no longer decreases");
+    CHECK(summary.iterations < 60);
+    problem.error = 0;
+    checkOptimal(problem, summary, t);
+  }
+}
+
 TEST_CASE("the number of threads does not change one bit of the result") {
   auto problem = makeCartPole();
   ShootingTrajectory one = GENERATE(0, 1) ? makeLine(problem) : makeGuess(problem), two = one;
@@ -216,6 +249,27 @@ TEST_CASE("the gaps that segments open are there, known, and closed by the last 
   const double actual = calcLargestGap(problem, stopped);
   REQUIRE(actual > 1e-6);
   CHECK(open.gap == Approx(actual).epsilon(0.3));
+}
+
+// Beyond the goals that the cart can reach, the models of its last steps foresee half of the curvature: full steps go too
+// far by as much.
+TEST_CASE("steps in segments that open ever wider gaps are given up for steps in one piece") {
+  PlantProblem<CartPole> problem;
+  problem.stages = 58;
+  problem.control_weight = 0.0841713;
+  problem.weight.setConstant(0.0393561);
+  problem.terminal_weight.setConstant(48.4722);
+  problem.start[1] = 0.247705;
+  problem.goal << -0.90931, 5.14581, -1.49833, -1.39276;
+  FddpOptions options;
+  ShootingTrajectory t = makeGuess(problem), whole = t;
+  const FddpSummary summary = Fddp(options).solve(problem, t);
+  options.rollout_segments = 1;
+  const FddpSummary in_one_piece = Fddp(options).solve(problem, whole);
+  CAPTURE(summary.iterations, in_one_piece.iterations);
+  CHECK(summary.termination == FddpTermination::Converged);
+  CHECK(summary.cost == Approx(in_one_piece.cost).epsilon(1e-9));
+  CHECK(summary.iterations < 3 * in_one_piece.iterations);
 }
 
 TEST_CASE("a short last step closes the gaps by a second rollout in segments, a long one by a rollout in one piece") {

@@ -11,6 +11,7 @@ namespace bielle {
 namespace {
 
 constexpr double kGoodStep = 0.1;  // alpha after which a foreseen decrease is believed
+constexpr const char* kStalled = "the cost no longer decreases";
 
 }  // namespace
 
@@ -97,12 +98,19 @@ FddpRun::End FddpRun::findStep() {
   while (true) {
     if (isInterrupted()) return FddpTermination::Interrupted;
     if (const End end = updateStep()) return end;
-    if (isStationary() && work_.lagrangian.isSatisfied()) return FddpTermination::Converged;
+    if (isStationary() && work_.lagrangian.isSatisfied()) {
+      if (line_.gradient > options_.gradient_tolerance) summary_.message = kStalled;
+      return FddpTermination::Converged;
+    }
     if (mustUpdateMultipliers()) {
       if (const End end = updateMultipliers()) return end;
       continue;
     }
-    if (searchLine()) return {};
+    if (searchLine() && (accepted_->alpha == 1 || !isRounding())) return {};
+    if (isRounding()) {
+      stalled_ = swept_ = true;
+      continue;
+    }
     if (const End end = raiseRegularization("no step is acceptable")) return end;
   }
 }
@@ -128,6 +136,7 @@ FddpRun::End FddpRun::updateMultipliers() {
   }
   closing_ = stalled_ = swept_ = false;
   updated_ = true;
+  closed_merit_.reset();
   return {};
 }
 
@@ -181,6 +190,8 @@ void FddpRun::acceptStep() {
   }
   line_.step = accepted_->alpha;
   accepted_merit_ = accepted_->merit;
+  closed_merit_.reset();
+  if (accepted_->alpha == 1) closed_merit_ = accepted_->merit + accepted_->closing_cost;
   summary_.cost = accepted_->cost;
   summary_.gap = accepted_->gap_max;
   ++summary_.iterations;
@@ -194,6 +205,7 @@ FddpRun::End FddpRun::raiseRegularization(const char* reason) {
   if (!lagrangian.isSatisfied() && lagrangian.restore(work_.evaluations.getIterate(), line_.cost)) {
     regularization_ = options_.initial_regularization;
     stalled_ = swept_ = false;
+    closed_merit_.reset();
     return {};
   }
   summary_.message = std::string(reason) + " even at the largest regularization";
@@ -214,7 +226,7 @@ FddpRun::End FddpRun::checkProgress() {
   stalled_ =
       newton && closed && std::abs(calcMerit() - accepted_merit_) < options_.cost_tolerance * std::abs(line_.cost);
   if (stalled_ && work_.lagrangian.isEmpty()) {
-    summary_.message = "the cost no longer decreases";
+    summary_.message = kStalled;
     return FddpTermination::Converged;
   }
   if (summary_.iterations >= options_.max_iterations) return FddpTermination::MaxIterations;

@@ -52,6 +52,9 @@ class FddpRun {
   bool mustUpdateMultipliers() const;
   bool mustClose() const;
   bool closesTwice(int segments) const;
+  bool isOvershooting(const Trial& trial) const;
+  bool isRounding() const;
+  double calcRounding() const;
   bool isAcceptable(const Trial& trial, double nu) const;
   void acceptStep();
   End raiseRegularization(const char* reason);
@@ -82,11 +85,12 @@ class FddpRun {
   bool swept_ = false;         // a sweep is still to be looked at
   bool updated_ = false;       // multipliers are new in this iteration
   bool closing_ = false;       // the next step must close the gaps, since the constraints are infeasible
-  bool stalled_ = false;       // the last step left the merit as it was, to rounding
+  bool stalled_ = false;       // the merit cannot be seen to decrease, because of rounding
   Trial* accepted_ = nullptr;  // the trial that ends a line search
   int failed_node_ = -1;       // where the first failed trial of a line search failed, and why
   std::string failure_;
   double accepted_merit_ = 0;
+  std::optional<double> closed_merit_;        // after a full step under the same multipliers, with Eq. (8)
   double last_gradient_ = 0, last_step_ = 1;  // of the iteration before
   FddpSummary summary_;
 };

@@ -28,6 +28,16 @@ bool FddpRun::closesTwice(int segments) const {
   return std::pow(step, 3) <= options_.gap_tolerance;
 }
 
+// Whether a full step can decrease the merit only by less than the rounding errors of all nodes may hide.
+bool FddpRun::isRounding() const {
+  return regularization_ <= options_.min_regularization && isClosed() && calcForeseen() <= N_ * calcRounding();
+}
+
+// Largest difference of merits that is taken for rounding.
+double FddpRun::calcRounding() const {
+  return kCostRounding * (std::abs(line_.cost) + std::abs(work_.lagrangian.getValue()));
+}
+
 bool FddpRun::searchLine() {
   const double penalized = std::max(0.0, slope_ + 0.5 * std::max(0.0, curvature_));
   const double nu = gap_sum_ > 0 ? penalized / ((1 - kPenaltyMargin) * gap_sum_) : 0;  // Eq. (5)
@@ -65,13 +75,23 @@ bool FddpRun::tryFullStep(const RolloutInput& input, int segments, double nu) {
   Trial& trial = rollout.getTrial(0);
   if (!mustClose()) {
     rollout.cut(input, 1, segments);
-    return accept(trial, nu);
+    return !isOvershooting(trial) && accept(trial, nu);
   }
   if (!closesTwice(segments)) return false;
   const auto isClosed = [&] { return trial.gap_max <= options_.gap_tolerance; };
   rollout.cut(input, 1, segments);
   if (trial.ok && !isClosed()) rollout.close(input);
   return isClosed() && accept(trial, nu);
+}
+
+// Whether a full step in segments, after another one, makes too little of what is foreseen. The merit of Eq. (4) counts the
+// gaps of both steps differently: before, by what closing them takes of the foreseen decrease, after, by Eq. (8). Here both
+// are closed by Eq. (8); otherwise steps that go too far by all of their length would pass, and the iterations could cycle.
+bool FddpRun::isOvershooting(const Trial& trial) const {
+  if (!trial.ok || !closed_merit_) return false;
+  const double foreseen = calcForeseen() - (calcMerit() - *closed_merit_);
+  const double real = *closed_merit_ - trial.merit - trial.closing_cost;
+  return real < options_.acceptance * foreseen - calcRounding();
 }
 
 // All step lengths in turn: a receding horizon has no time for rollouts in one piece.
@@ -99,7 +119,7 @@ bool FddpRun::isAcceptable(const Trial& trial, double nu) const {
   const double alpha = trial.alpha;
   const double foreseen = -alpha * slope_ - 0.5 * alpha * alpha * curvature_ + nu * alpha * gap_sum_;
   const double real = calcMerit() - trial.merit - trial.closing_cost + nu * (gap_sum_ - trial.gap_sum);
-  const double rounding = kCostRounding * (std::abs(line_.cost) + std::abs(work_.lagrangian.getValue()));
+  const double rounding = calcRounding();
   const double decrease = std::max(0.0, foreseen);  // boxes make Eq. (4) an approximation
   return real >= options_.acceptance * decrease - rounding &&
          std::abs(trial.closing_cost) <= kClosingShare * decrease + rounding;

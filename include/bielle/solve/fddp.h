@@ -32,10 +32,12 @@
 /// value function predicts the cost of closing it, J of the trial is increased by
 ///     closing = sum_j Vx_j.g_j + (Vxx_j dx_j).g_j + 1/2 g_j.Vxx_j.g_j                                              (8)
 /// (The penalty nu c alone would not suffice: gaps and decrease are both of second order, so that it would reject full
-/// steps however close to the solution.) A trial for which (8) exceeds half of (4) is rejected, whatever its merit. A
-/// full step that is rejected in segments is tried again in one piece, and so are all shorter ones; steps that follow a
-/// shortened one are rolled out in one piece. With LastRollout::Segments, for receding horizons, steps of all lengths
-/// are rolled out in segments: then an iteration takes about the same time whatever its step.
+/// steps however close to the solution.) A trial for which (8) exceeds half of (4) is rejected, whatever its merit; after
+/// another full step, so is one whose J + closing has not fallen from that of the last by `acceptance` times what the
+/// models foresee between the two: between gaps of second order, (4) alone would let steps pass that go too far by all of
+/// their length. A full step that is rejected in segments is tried again in one piece, and so are all shorter ones; steps
+/// that follow a shortened one are rolled out in one piece. With LastRollout::Segments, for receding horizons, steps of all
+/// lengths are rolled out in segments: then an iteration takes about the same time whatever its step.
 ///
 /// The last step must close the gaps. If it is short it is rolled out twice, the second time from
 ///     dx'_j = e_j + (Fx + Fu K)_{j-1} .. (Fx + Fu K)_i (dx'_i - dx_i),                                             (9)
@@ -96,7 +98,8 @@ struct FddpOptions {
   double gradient_tolerance = 1e-9;
   /// The gaps are closed if every entry is below this, in units of the tangent space.
   double gap_tolerance = 1e-10;
-  /// Also converged if a full step at the smallest regularization changes J by less than this times |J|; 0: never.
+  /// Also converged if a full step at the smallest regularization changes J by less than this times |J|; 0: never. In any
+  /// case if no such step decreases J, and (1) foresees less than the rounding of all nodes may hide, N 1e-14 |J|.
   double cost_tolerance = 1e-13;
 
   double initial_regularization = 1e-9;  ///< mu_u of the first sweep; from a guess far from the optimum start higher
