@@ -192,11 +192,13 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   FallDetector detector(model, plan, o);
 
   Execution out;
-  Measurement measurement{0, model.makeNeutral(), VectorXd::Zero(model.nv()), o.delay.delay};
+  Perception perception(model, o.perception);
   TorqueDelay delay(model.nu(), o.control_period, o.delay);
   VectorXd u = VectorXd::Zero(model.nu());
+  Measurement measurement{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
   plan.getReference(0, measurement.q, measurement.v);
   world.reset(measurement.q, measurement.v);
+  perception.reset(world, measurement.q, measurement.v);
   out.start = out.end = world.getBooks();
   recorder.addNode(world);
   const Vector3d com_start = recorder.getCom();
@@ -205,9 +207,8 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   bool advances = true;
   std::string fall;
   for (; tick < ticks && advances && fall.empty(); ++tick) {
-    measurement.time = world.getTime();
-    measurement.q = world.getConfiguration();
-    measurement.v = world.getVelocity();
+    measurement = perception.update(world);
+    measurement.delay = o.delay.delay;
     controller.update(measurement, u);
     delay.send(measurement.time, u);
     world.setPush(calcPush(o.pushes, measurement.time));
@@ -235,6 +236,7 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   out.energy_balance = exchanged > 0 ? out.imbalance / exchanged : 0;
   out.saturated_share = static_cast<double>(cut) / (std::max(1, tick) * std::max(1, model.nu()));
   out.real_time_factor = seconds > 0 ? out.duration / seconds : 0;
+  out.estimation = perception.getErrors();
   out.record = recorder.finish();
   return out;
 }

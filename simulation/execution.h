@@ -5,6 +5,7 @@
 
 #include "bielle/control/policy.h"
 #include "bielle/io/record.h"
+#include "simulation/perception.h"
 #include "simulation/torque_delay.h"
 #include "simulation/world.h"
 
@@ -33,6 +34,7 @@ struct ExecutionOptions {
   double hold = 1;               ///< s
   double control_period = 1e-3;  ///< s
   double record_period = 5e-3;   ///< s
+  PerceptionOptions perception;  ///< what the controller is told
   DelayOptions delay;
   std::vector<Push> pushes;
   FallCriterion fall;
@@ -55,6 +57,7 @@ struct Execution {
   double energy_balance = 0;
   double saturated_share = 0;   ///< of motors and time: torques that were cut at their limits
   double real_time_factor = 0;  ///< simulated time over the processor time of the world
+  EstimationErrors estimation;
   Books start, end;
   MotionRecord record;  ///< of what happened; forces of closures are not known (NaN), accelerations are means
 

@@ -48,6 +48,7 @@ std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control
   options.limits = readLimits(summary);
   Motion motion = makeMotion(model, std::move(request), options);
   plan->ground = motion.ground;
+  plan->schedule = motion.schedule;
   setGuess(readResultRecord(directory), motion);
   if (control == PlanControl::Open) {
     plan->policy = std::make_unique<Policy>(makePolicy(motion, motion.guess));

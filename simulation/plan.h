@@ -18,6 +18,7 @@ struct Plan {
   LoadedRobot robot;
   MotionSummary summary;
   Ground ground;  ///< that the motion was planned for
+  ContactSchedule schedule;
   std::unique_ptr<Policy> policy;
   int iterations = 0;  ///< that the solver took for the gains; 0: the motion in the files was its solution
 };

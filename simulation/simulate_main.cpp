@@ -22,6 +22,7 @@ using namespace bielle::simulation;
 
 namespace {
 
+constexpr double kRealLookAhead = 36;  // ms
 constexpr int kStood = 0, kFell = 1, kBadInput = 2;
 
 struct Arguments {
@@ -29,7 +30,10 @@ struct Arguments {
   std::vector<std::string> pushes;
   double friction = 0;  // 0: that of the plan
   double time_step = 0;
-  double delay = 0, jitter = 0;  // ms
+  std::string sensors = "ideal";
+  double noise = 1;
+  std::optional<double> look_ahead;  // ms
+  double delay = 0, jitter = 0;      // ms
   unsigned seed = 1;
   bool no_report = false, summary_only = false, dry_run = false;
   ExecutionOptions execution;
@@ -131,6 +135,18 @@ nlohmann::ordered_json listBooks(const Execution& e) {
           {"other_loss_J", e.end.other_loss},      {"imbalance_J", e.imbalance}};
 }
 
+// The drift of a robot that went nowhere is no share of its way.
+nlohmann::ordered_json listEstimation(const EstimationErrors& e) {
+  constexpr double kShortestWay = 0.1;  // m
+  const nlohmann::ordered_json share = e.way > kShortestWay ? nlohmann::ordered_json(e.drift / e.way) : nullptr;
+  return {{"position_error", {{"rms", e.position_rms}, {"max", e.position_max}}},
+          {"velocity_error", {{"rms", e.velocity_rms}, {"max", e.velocity_max}}},
+          {"tilt_error", {{"rms", e.tilt_rms}, {"max", e.tilt_max}}},
+          {"drift", e.drift},
+          {"drift_share", share},
+          {"contact_errors", e.contact_errors}};
+}
+
 nlohmann::ordered_json listPushes(const std::vector<Push>& pushes) {
   auto list = nlohmann::ordered_json::array();
   for (const Push& push : pushes)
@@ -147,6 +163,11 @@ void extendSummary(const std::string& path, const Arguments& arguments, const Pl
   summary["world"] = arguments.world;
   summary["control"] = arguments.control;
   summary["terrain"] = arguments.terrain;
+  summary["sensors"] = arguments.sensors;
+  if (arguments.sensors == "real") {
+    summary["noise"] = arguments.noise;
+    summary["estimator"] = listEstimation(e.estimation);
+  }
   summary["delay"] = {{"mean_ms", arguments.delay}, {"jitter_ms", arguments.jitter}};
   summary["seed"] = arguments.seed;
   summary["pushes"] = listPushes(arguments.execution.pushes);
@@ -181,6 +202,13 @@ void print(const Arguments& arguments, const Plan& plan, const Execution& e) {
       "  torques             %.2f %% cut at their limits\n  speed               %.2g times real time\n",
       e.duration, e.distance, e.getMeanSpeed(), e.largest_deviation, e.largest_gap, e.largest_slip, e.imbalance,
       e.energy_balance, 100 * e.saturated_share, e.real_time_factor);
+  std::cout << text;
+  if (arguments.sensors != "real") return;
+  const EstimationErrors& s = e.estimation;
+  std::snprintf(text, sizeof text,
+                "  estimated trunk     off by %.4f m and %.4f m/s rms, tilt by %.4f rad\n"
+                "  drift               %.4f m of %.3f m\n  contacts            wrong for %.2f %% of the time\n",
+                s.position_rms, s.velocity_rms, s.tilt_rms, s.drift, s.way, 100 * s.contact_errors);
   std::cout << text;
 }
 
@@ -220,6 +248,12 @@ int simulate(Arguments arguments, const std::vector<std::string>& command) {
   const auto plan =
       readPlan(arguments.directory, arguments.control == "gains" ? PlanControl::Gains : PlanControl::Open);
   const Model& model = plan->robot.model;
+  const double look_ahead = arguments.look_ahead.value_or(arguments.sensors == "real" ? kRealLookAhead : 0);
+  plan->policy->setLookAhead(1e-3 * look_ahead);
+  if (arguments.sensors == "real") {
+    arguments.execution.perception.sensors = SensorOptions{makeRealParts(), arguments.noise, arguments.seed, {}};
+    arguments.execution.perception.planned = plan->schedule;
+  }
   const Ground ground = makeGround(arguments, plan->ground);
   arguments.execution.ground = ground;
   arguments.execution.planned_ground = plan->ground;
@@ -259,7 +293,7 @@ void addOptions(CLI::App& app, Arguments& a) {
   app.add_option("--friction", a.friction, "coefficient of the ground [1]; 0: that of the plan")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_option("--seed", a.seed, "of the heights of tiles and of the jitter")->capture_default_str();
+  app.add_option("--seed", a.seed, "of the heights of tiles, of the jitter and of the noise")->capture_default_str();
   app.add_option("--push", a.pushes,
                  "t=3,impulse=6,direction=90,duration=0.1: a constant force on the trunk from t [s] on, of an impulse "
                  "[N s], in a direction [degrees, 0: along x, 90: along y] and for a duration [s]; may be repeated")
@@ -276,6 +310,20 @@ void addOptions(CLI::App& app, Arguments& a) {
   app.add_option("--control-period", a.execution.control_period, "between updates of the torques [s]")
       ->check(positive)
       ->capture_default_str();
+  app.add_option(
+         "--sensors", a.sensors,
+         "ideal: the controller is told the true state; real: what an estimator makes of encoders of the motors and an "
+         "inertial measurement unit in the trunk")
+      ->check(CLI::IsMember({"ideal", "real"}))
+      ->capture_default_str();
+  app.add_option("--noise", a.noise, "of real sensors, over that of their data sheets [1]; 0: exact")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  app.add_option(
+         "--look-ahead", a.look_ahead,
+         "how far before the end of a phase of contacts its last gains are taken [ms]: those after them ask for "
+         "more than an estimated state can give (default: 36 with real sensors, else 0)")
+      ->check(CLI::Range(0.0, 1000.0));
   app.add_option("--delay", a.delay, "from a measurement until the torques computed from it act [ms]")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();

@@ -96,6 +96,29 @@ TEST_CASE("policy: its gains are those of the solver's last sweep") {
   }
 }
 
+TEST_CASE("policy: gains that look ahead are those of an earlier stage of their phase") {
+  SolvedSquat& squat = getSquat();
+  const Model& model = squat.robot.model;
+  Policy policy = makePolicy(squat.motion, squat.motion.guess, *squat.solver), far = policy;
+  const auto& stages = policy.getStages();
+  constexpr int kStages = 5;
+  const size_t last = stages.size() - 1;  // a squat has one phase
+  far.setLookAhead(kStages * stages[last].duration);
+  const auto calcFeedback = [&](Policy& by, size_t k) {
+    Measurement at{stages[k].start, stages[k].q, stages[k].v};
+    VectorXd on(model.nu()), off(model.nu());
+    by.update(at, on);
+    at.v[0] += 0.01;
+    by.update(at, off);
+    return VectorXd(off - on);
+  };
+  const VectorXd early = calcFeedback(policy, 20);
+  CHECK(calcFeedback(far, 20) == early);
+  const VectorXd expected = 0.01 * stages[last + 1 - kStages].K.col(model.nv());
+  CHECK((calcFeedback(far, last - 1) - expected).norm() < 1e-6 * expected.norm());
+  CHECK((calcFeedback(policy, last - 1) - expected).norm() > 1e-3 * expected.norm());
+}
+
 TEST_CASE("policy: without gains the state does not matter; the plan ends at rest") {
   SolvedSquat& squat = getSquat();
   const Model& model = squat.robot.model;

@@ -132,6 +132,29 @@ TEST_CASE("simulate: without gains the walk falls, with status 1") {
   CHECK(result.out.find("fell") != std::string::npos);
 }
 
+TEST_CASE("simulate: with real sensors a walk stands on flat and on uneven ground, and the estimate hardly drifts") {
+  const Scratch scratch;
+  const std::string output = (scratch.path / "real").string();
+  for (const std::string terrain : {"flat", "tiles=0.003"})
+    for (const std::string seed : {"1", "2"}) {
+      CAPTURE(terrain, seed);
+      const CommandResult result = simulate(output, {"--sensors", "real", "--terrain", terrain, "--seed", seed});
+      CAPTURE(result.out, result.err);
+      CHECK(result.status == 0);
+      CHECK(result.out.find("estimated trunk") != std::string::npos);
+      const nlohmann::json summary = readSummary(output);
+      CHECK(summary["sensors"] == "real");
+      CHECK(summary["noise"] == 1);
+      const nlohmann::json& estimator = summary["estimator"];
+      CHECK(estimator["drift_share"].get<double>() < 0.01);
+      CHECK(estimator["velocity_error"]["rms"].get<double>() < 0.03);
+      CHECK(estimator["velocity_error"]["rms"].get<double>() > 1e-4);
+      CHECK(estimator["position_error"]["max"].get<double>() < 0.01);
+      CHECK(estimator["tilt_error"]["max"].get<double>() < 0.01);
+      CHECK(estimator["contact_errors"].get<double>() < 0.05);
+    }
+}
+
 TEST_CASE("simulate: the same command writes the same bytes; ground, pushes and seeds matter") {
   const Scratch scratch;
   const auto record = [&](const std::string& name, std::vector<std::string> options) {
@@ -149,6 +172,11 @@ TEST_CASE("simulate: the same command writes the same bytes; ground, pushes and 
   CHECK(delayed != first);
   CHECK(record("delayed again", {"--delay", "2", "--jitter", "0.7"}) == delayed);
   CHECK(record("delayed otherwise", {"--delay", "2", "--jitter", "0.7", "--seed", "2"}) != delayed);
+  const std::string felt = record("felt", {"--sensors", "real"});
+  CHECK(felt != first);
+  CHECK(record("felt again", {"--sensors", "real"}) == felt);
+  CHECK(record("felt otherwise", {"--sensors", "real", "--seed", "2"}) != felt);
+  CHECK(record("felt exactly", {"--sensors", "real", "--noise", "0"}) != felt);
   const std::string tiles = record("tiles", {"--terrain", "tiles=0.005", "--seed", "1"});
   CHECK(tiles != first);
   CHECK(record("other", {"--terrain", "tiles=0.005", "--seed", "2"}) != tiles);

@@ -84,9 +84,23 @@ Policy::Policy(const Model& model, std::vector<Stage> stages, const VectorXd& u_
   if (stages_.empty()) throw std::invalid_argument("Policy: there are no stages");
   last_phase_ = stages_.size() - 1;
   while (last_phase_ > 0 && stages_[last_phase_ - 1].phase == stages_.back().phase) --last_phase_;
+  setLookAhead(0);
   step_.setZero(model.nv());
   q_ = model.makeNeutral();
   error_.setZero(2 * model.nv());
+}
+
+void Policy::setLookAhead(double duration) {
+  gains_.resize(stages_.size());
+  for (size_t begin = 0, end = 0; begin < stages_.size(); begin = end) {
+    while (end < stages_.size() && stages_[end].phase == stages_[begin].phase) ++end;
+    const double last = stages_[end - 1].start + stages_[end - 1].duration - duration + kClockTolerance;
+    size_t taken = begin;
+    for (size_t k = begin; k < end; ++k) {
+      if (stages_[k].start <= last) taken = k;
+      gains_[k] = taken;
+    }
+  }
 }
 
 size_t Policy::findStage(double time) const {
@@ -131,7 +145,7 @@ void Policy::update(const Measurement& measurement, VectorRef u) {
 
 // The gains of a stage times the deviation from the plan.
 void Policy::addFeedback(size_t stage, double weight, const Measurement& measurement, VectorRef u) {
-  const RowMatrixXd& K = stages_[stage].K;
+  const RowMatrixXd& K = stages_[gains_[stage]].K;
   if (K.size() == 0) return;
   auto dq = error_.head(model_.nv()), dv = error_.tail(model_.nv());
   getReference(measurement.time, q_, dv);

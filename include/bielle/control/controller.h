@@ -6,8 +6,10 @@ namespace bielle {
 
 /// What is known of a robot at an instant of control.
 struct Measurement {
-  double time = 0;   ///< since the start of the controller, s
-  VectorXd q, v;     ///< nq, nv: coordinates of the model, from an estimator or a simulated world
+  double time = 0;  ///< since the start of the controller, s
+  VectorXd q, v;    ///< nq, nv: coordinates of the model, from an estimator or a simulated world
+  /// Per contact of the model, whether it is believed to stand; empty: not known.
+  std::vector<char> contacts{};
   double delay = 0;  ///< from `time` until the torques computed from this act, s
 
   double getActionTime() const { return time + delay; }  ///< when they act, s

@@ -38,6 +38,11 @@ class Policy : public Controller {
   /// \param u_hold  nu
   Policy(const Model& model, std::vector<Stage> stages, const VectorXd& u_hold);
 
+  /// K of stages that begin less than `duration` (s) before the end of their phase is that of the last stage before them in
+  /// the phase. Where a foot must land exactly, the gains of the last stages would remove any deviation within the time that
+  /// is left, and grow without bound: no estimated state bears them. 0, the default: no stage is replaced.
+  void setLookAhead(double duration);
+
   void update(const Measurement& measurement, VectorRef u) override;
   /// q* and v* of Eq. (1).
   void getReference(double time, VectorRef q, VectorRef v) const;
@@ -50,10 +55,11 @@ class Policy : public Controller {
 
   const Model& model_;
   std::vector<Stage> stages_;
-  VectorXd u_hold_;        // nu
-  size_t last_phase_ = 0;  // its first stage
-  mutable VectorXd step_;  // nv
-  VectorXd q_, error_;     // nq, 2 nv
+  std::vector<size_t> gains_;  // per stage, that whose K is taken
+  VectorXd u_hold_;            // nu
+  size_t last_phase_ = 0;      // its first stage
+  mutable VectorXd step_;      // nv
+  VectorXd q_, error_;         // nq, 2 nv
 };
 
 /// The torques and states of a trajectory of a motion without free durations.

@@ -1,0 +1,222 @@
+#include "bielle/control/estimator.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "bielle/dynamics/kinematics.h"
+#include "control/contact_filter.h"
+#include "control/foot_model.h"
+#include "control/passive_joints.h"
+
+namespace bielle {
+namespace {
+
+std::vector<int> listSizes(const Model& model) {
+  std::vector<int> sizes;
+  for (const ContactFrame& contact : model.contacts()) sizes.push_back(contact.kind == ContactKind::Point3D ? 3 : 6);
+  return sizes;
+}
+
+ContactFilterNoise makeNoise(const EstimatorOptions& o) {
+  return {o.gyro_noise, o.accelerometer_noise, o.gyro_walk,     o.accelerometer_walk,
+          o.foot_slide, o.foot_turn,           o.foot_position, o.foot_attitude};
+}
+
+bool contains(const std::vector<int>& list, size_t value) {
+  return std::find(list.begin(), list.end(), static_cast<int>(value)) != list.end();
+}
+
+}  // namespace
+
+struct Estimator::Parts {
+  Parts(const Model& model, ConstVectorRef q, const EstimatorOptions& options);
+
+  void reset(double time, ConstVectorRef q, ConstVectorRef v, const std::vector<int>& contacts);
+  EstimatorStatus update(const SensorReadings& readings, const std::vector<int>& planned);
+  void observe(ConstVectorRef positions, double h);
+  void updateAcceleration(ConstVectorRef u, double h);
+  void readTrunk();
+  void updateFeet(const std::vector<int>& planned);
+  SE3 getSeenFoot(size_t contact) const;
+
+  const Model& model;
+  const EstimatorOptions options;
+  const bool floats;  // on a free-flyer
+  const double weight;
+  PassiveJoints joints;
+  FootModel feet;
+  ContactFilter filter;
+  Measurement measurement;
+  std::vector<double> unrest;
+  VectorXd positions, speeds;  // nu, of the observers of Eq. (1)
+  VectorXd calm_speeds;        // nu, with which standing feet are at rest
+  VectorXd torques[3];         // nu, after each of the filters
+  VectorXd v_seen, v_last, a;  // nv
+  Vector3d gyro = Vector3d::Zero();
+  EstimatorStatus status = EstimatorStatus::Ok;
+};
+
+Estimator::Parts::Parts(const Model& m, ConstVectorRef q, const EstimatorOptions& o)
+    : model(m),
+      options(o),
+      floats(m.hasFreeFlyer()),
+      weight(m.mass() * m.gravity().norm()),
+      joints(m, q),
+      feet(m),
+      filter(listSizes(m), makeNoise(o), m.gravity()),
+      measurement{0, q, VectorXd::Zero(m.nv()), std::vector<char>(m.contacts().size(), 0)},
+      unrest(m.contacts().size(), 1.0) {
+  for (VectorXd* x : {&positions, &speeds, &calm_speeds, &torques[0], &torques[1], &torques[2]}) x->setZero(m.nu());
+  for (VectorXd* x : {&v_seen, &v_last, &a}) x->setZero(m.nv());
+  reset(0, q, VectorXd::Zero(m.nv()), {});
+}
+
+void Estimator::Parts::reset(double time, ConstVectorRef q, ConstVectorRef v, const std::vector<int>& standing) {
+  measurement.time = time;
+  measurement.q = q;
+  measurement.v = v;
+  joints.reset(q);
+  for (int m = 0; m < model.nu(); ++m) {
+    positions[m] = q[model.joints()[model.motors()[m].joint].idx_q];
+    speeds[m] = v[model.motors()[m].dof];
+  }
+  v_seen = v;
+  a.setZero();
+  feet.update(joints, q, v, a, VectorXd::Zero(model.nu()));
+  if (!floats) return;
+  const Workspace& ws = feet.getWorkspace();
+  const SE3 X_WI = ws.X_WB[1] * options.imu;
+  const Vector6d twist = options.imu.actInvMotion(v.head<6>());
+  ContactFilterState state = filter.getState();
+  state.R = X_WI.R;
+  state.p = X_WI.p;
+  state.v = X_WI.R * twist.head<3>();
+  state.gyro_offset.setZero();
+  state.accelerometer_offset.setZero();
+  gyro = twist.tail<3>();
+  Eigen::Matrix<double, 15, 1> deviations = Eigen::Matrix<double, 15, 1>::Zero();
+  deviations.segment<2>(kTurn).setConstant(options.tilt);
+  deviations.segment<3>(kGyro).setConstant(options.gyro_offset);
+  deviations.segment<3>(kAccelerometer).setConstant(options.accelerometer_offset);
+  filter.reset(state, deviations);
+  for (size_t c = 0; c < measurement.contacts.size(); ++c) {
+    measurement.contacts[c] = contains(standing, c);
+    filter.putDown(c, getSeenFoot(c));
+  }
+}
+
+// Eq. (1) in steps of h, with both poles at exp(-s h).
+void Estimator::Parts::observe(ConstVectorRef readings, double h) {
+  const double decay = std::exp(-options.bandwidth * h);
+  for (int m = 0; m < model.nu(); ++m) {
+    const double error = readings[m] - (positions[m] + h * speeds[m]);
+    positions[m] += h * speeds[m] + (1 - decay * decay) * error;
+    speeds[m] += (1 - decay) * (1 - decay) / h * error;
+  }
+}
+
+// Of speeds as they were seen: those that keep believed feet at rest would confirm the belief. The torques pass the filters of
+// the accelerations that they belong to: two poles of the observers, one of the smoothing.
+void Estimator::Parts::updateAcceleration(ConstVectorRef u, double h) {
+  const double decay = std::exp(-options.bandwidth * h), share = -std::expm1(-h / options.smoothing);
+  torques[0] += (1 - decay) * (u - torques[0]);
+  torques[1] += (1 - decay) * (torques[0] - torques[1]);
+  torques[2] += share * (torques[1] - torques[2]);
+  v_last = v_seen;
+  if (floats) v_seen.head<6>() = measurement.v.head<6>();
+  joints.expand(speeds, v_seen);
+  if (h > 0) a += share * ((v_seen - v_last) / h - a);
+}
+
+SE3 Estimator::Parts::getSeenFoot(size_t c) const {
+  const Workspace& ws = feet.getWorkspace();
+  const ContactFrame& contact = model.contacts()[c];
+  return (ws.X_WB[1] * options.imu).inverseTimes(ws.X_WB[contact.body] * contact.X_BF);
+}
+
+// The trunk from the filter.
+void Estimator::Parts::readTrunk() {
+  const ContactFilterState& state = filter.getState();
+  const SE3 X_IB = options.imu.inverse(), X_WB = SE3(state.R, state.p) * X_IB;
+  const Eigen::Quaterniond rotation(X_WB.R);
+  measurement.q.head<3>() = X_WB.p;
+  measurement.q.segment<4>(3) = rotation.coeffs();
+  Vector6d twist;
+  twist << state.R.transpose() * state.v, gyro - state.gyro_offset;
+  measurement.v.head<6>() = options.imu.actMotion(twist);
+}
+
+void Estimator::Parts::updateFeet(const std::vector<int>& planned) {
+  std::vector<char>& contacts = measurement.contacts;
+  for (size_t c = 0; c < contacts.size(); ++c) {
+    const double force = feet.getWrench(c)[2] / weight;
+    const double threshold = contains(planned, c) ? options.planned_contact : options.surprising_contact;
+    const bool stood = contacts[c];
+    contacts[c] = force > (stood ? 0.5 * threshold : threshold);
+    // A foot that hardly carries anything may still roll onto its sole.
+    unrest[c] = 1 + 9 * std::clamp(1 - force / (2 * options.surprising_contact), 0.0, 1.0);
+    if (!contacts[c]) continue;
+    const SE3 seen = getSeenFoot(c);
+    if (!stood || filter.correct(c, seen) > options.slip) filter.putDown(c, seen);
+  }
+}
+
+EstimatorStatus Estimator::Parts::update(const SensorReadings& readings, const std::vector<int>& planned) {
+  const double h = readings.time - measurement.time;
+  if (!readings.motor_positions.allFinite() || !readings.motor_torques.allFinite() ||
+      !readings.angular_velocity.allFinite() || !readings.specific_force.allFinite() || !std::isfinite(h))
+    return status = EstimatorStatus::NotFinite;
+  measurement.time = readings.time;
+  if (h > 0) observe(readings.motor_positions, h);
+  const ClosingStatus closing = joints.update(readings.motor_positions, measurement.q);
+  if (floats && h > 0) {
+    filter.predict(readings.angular_velocity, readings.specific_force, h, unrest);
+    gyro = readings.angular_velocity;
+    readTrunk();
+  }
+  updateAcceleration(readings.motor_torques, h);
+  feet.update(joints, measurement.q, v_seen, a, torques[2]);
+  if (floats && h > 0) {
+    updateFeet(planned);
+    readTrunk();
+  }
+  calm_speeds = speeds;
+  feet.calmFeet(measurement.contacts, measurement.v.head(floats ? 6 : 0), calm_speeds);
+  joints.expand(calm_speeds, measurement.v);
+  status = closing == ClosingStatus::Closed          ? EstimatorStatus::Ok
+           : closing == ClosingStatus::NearDeadPoint ? EstimatorStatus::NearDeadPoint
+                                                     : EstimatorStatus::NotClosed;
+  return status;
+}
+
+Estimator::Estimator(const Model& model, ConstVectorRef q, const EstimatorOptions& options)
+    : parts_(std::make_unique<Parts>(model, q, options)) {}
+Estimator::~Estimator() = default;
+Estimator::Estimator(Estimator&&) noexcept = default;
+
+void Estimator::reset(double time, ConstVectorRef q, ConstVectorRef v, const std::vector<int>& contacts) {
+  parts_->reset(time, q, v, contacts);
+}
+EstimatorStatus Estimator::update(const SensorReadings& readings, const std::vector<int>& planned) {
+  return parts_->update(readings, planned);
+}
+const Measurement& Estimator::getMeasurement() const { return parts_->measurement; }
+const std::vector<char>& Estimator::getContacts() const { return parts_->measurement.contacts; }
+const Vector6d& Estimator::getWrench(size_t contact) const { return parts_->feet.getWrench(contact); }
+double Estimator::getMargin() const { return parts_->joints.getMargin(); }
+
+std::string Estimator::getMessage() const {
+  switch (parts_->status) {
+    case EstimatorStatus::Ok:
+      return {};
+    case EstimatorStatus::NearDeadPoint:
+      return "the linkage of closure '" + parts_->joints.getWeakest() + "' is near a dead point of its motors";
+    case EstimatorStatus::NotClosed:
+      return "the loops do not close at the positions of the motors";
+    case EstimatorStatus::NotFinite:
+      return "readings are not finite";
+  }
+  return {};
+}
+
+}  // namespace bielle

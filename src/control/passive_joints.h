@@ -1,0 +1,82 @@
+#pragma once
+/// \file What the joints of a closed robot do when its motors are known.
+///
+/// A cluster of as many motors as freedoms follows its motors: with the basis N of its closed motions (reduction.h, here in
+/// the metric W = 1) and the rows N_m of the motors,
+///     v = T v_m,   T = N N_m^-1                                                                                     (1)
+/// and its configuration by Newton steps, d = T (q_m - q) closed again by reduction.h, Eq. (2). The smallest singular value
+/// of N_m, the least that the motors move in a unit motion of the cluster, is zero at a dead point, where the linkage
+/// moves though its motors stand. Near one, N_m^-1 is replaced by the damped V diag(s / (s^2 + e^2 - s_min^2)) U^T.
+#include <Eigen/SVD>
+#include <string>
+#include <vector>
+
+#include "dynamics/reduction.h"
+
+namespace bielle {
+
+enum class ClosingStatus {
+  Closed,
+  NearDeadPoint,  ///< closed, but some linkage hardly follows its motors
+  NotClosed       ///< no closed configuration was found near the last one, which is kept
+};
+
+/// No function allocates but the constructor.
+class PassiveJoints {
+ public:
+  /// Below this a linkage is near a dead point.
+  static constexpr double kDeadPointMargin = 0.02;
+
+  /// \param model  must outlive it   \param q  closed configuration at which ranks are determined
+  /// \throws ModelError when motors do not determine a joint other than the free-flyer of the trunk
+  PassiveJoints(const Model& model, ConstVectorRef q);
+
+  /// Starts from a closed configuration.
+  bool reset(ConstVectorRef q);
+  /// \param positions  of the motors (nu)   \param q  nq: all but the free-flyer is written
+  ClosingStatus update(ConstVectorRef positions, VectorRef q);
+
+  /// v of Eq. (1) at the last configuration. \param v  nv: all but the free-flyer is written
+  void expand(ConstVectorRef velocities, VectorRef v) const;
+  /// T of Eq. (1) at the last configuration, row by row: calls visit(motor, entry) for the entries of a dof.
+  template <typename Visit>
+  void visitRow(int dof, const Visit& visit) const {
+    const Place& place = places_[dof];
+    if (place.cluster < 0) {
+      if (place.index >= 0) visit(place.index, 1.0);
+      return;
+    }
+    const Follower& follower = followers_[place.cluster];
+    for (size_t m = 0; m < follower.motors.size(); ++m) visit(follower.motors[m], follower.T(place.index, m));
+  }
+  /// Smallest singular value of N_m of all clusters, 1 if there are none; and the name of a closure of the weakest.
+  double getMargin() const { return margin_; }
+  std::string getWeakest() const { return weakest_ ? *weakest_ : ""; }
+
+ private:
+  struct Follower {
+    explicit Follower(const ReducedCluster& cluster);
+    ReducedCluster cluster;
+    std::vector<int> motors, dofs, positions;  // of the motors: in the model; in the cluster's v and q
+    ClusterScratch scratch;
+    ClusterState state, next;
+    Eigen::JacobiSVD<MatrixXd> svd;  // of N_m
+    MatrixXd N_m, scaled, inverse;   // size x size
+    MatrixXd T;                      // n x size
+    VectorXd gap, step, d;           // size; n; n
+  };
+  struct Place {
+    int cluster = -1, index = -1;  // row of T of a cluster; without one, a motor, or nothing for a free-flyer
+  };
+  static double updateTangent(Follower& follower);
+  bool follow(Follower& follower, ConstVectorRef positions);
+
+  const Model& model_;
+  std::vector<Follower> followers_;
+  std::vector<Place> places_;  // per dof
+  VectorXd no_guess_;
+  double margin_ = 1;
+  const std::string* weakest_ = nullptr;
+};
+
+}  // namespace bielle
