@@ -1,5 +1,6 @@
 #include "engines/simbody_tree.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -44,14 +45,23 @@ Eigen::Matrix2d rotation2(double angle) { return Eigen::Rotation2Dd(angle).toRot
 
 }  // namespace
 
-SimbodyTree::SimbodyTree(const Model& m, const std::vector<Closure>& c)
-    : model(m), closures(c), matter(system), forces(system), torques(forces, matter) {
+SimbodyTree::SimbodyTree(const Model& m, const std::vector<Closure>& c, LoopCut cut)
+    : model(m), closures(c), matter(system), forces(system), torques(forces, matter), cut_joints(c.size(), -1) {
   SimTK::Force::UniformGravity(forces, matter, toSimTK(model.gravity()));
   matter.setShowDefaultGeometry(false);
-  bodies.push_back(matter.Ground());
+  if (cut == LoopCut::FewestRows)
+    for (size_t i = 0; i < closures.size(); ++i) cut_joints[i] = findCutJoint(closures[i]);
+  bodies.resize(model.numBodies());
+  bodies[0] = matter.Ground();
   first_pins.resize(model.numBodies());
-  for (int i = 1; i < model.numBodies(); ++i) addBody(i);
-  for (const Closure& closure : closures) addClosure(closure);
+  for (int i = 1; i < model.numBodies(); ++i)
+    if (!isCut(i)) addBody(i);
+  for (size_t i = 0; i < closures.size(); ++i) {
+    if (cut_joints[i] < 0)
+      addClosure(closures[i]);
+    else
+      addCutLoop(closures[i], cut_joints[i]);
+  }
   T.setIdentity(model.nv(), model.nv());
   Tdot_v.setZero(model.nv());
 }
@@ -62,8 +72,12 @@ void SimbodyTree::finish() {
   u_index.resize(model.nv());
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
-    const int u0 = bodies[i].getFirstUIndex(state);
+    const int u0 = isCut(i) ? -1 : int(bodies[i].getFirstUIndex(state));
     for (int k = 0; k < joint.nv; ++k) {
+      if (isCut(i)) {
+        u_index[joint.idx_v + k] = -1;
+        continue;
+      }
       int u = u0 + k;
       if (joint.kind == JointKind::FreeFlyer) u = u0 + (k + 3) % 6;  // Simbody: angular first
       if (joint.kind == JointKind::Planar) u = u0 + (k + 1) % 3;     // Simbody: angle first
@@ -71,6 +85,27 @@ void SimbodyTree::finish() {
       u_index[joint.idx_v + k] = u;
     }
   }
+}
+
+bool SimbodyTree::isCut(int joint) const {
+  return std::find(cut_joints.begin(), cut_joints.end(), joint) != cut_joints.end();
+}
+
+// The joint of a leaf that only this weld holds, -1 if there is none. The other body must not depend on another cut.
+int SimbodyTree::findCutJoint(const Closure& closure) const {
+  if (closure.kind != ClosureKind::Weld6D) return -1;
+  for (const auto& [leaf, other] : {std::pair{closure.body1, closure.body2}, {closure.body2, closure.body1}}) {
+    const int body = leaf;
+    const auto uses = [body](const Closure& c) { return c.body1 == body || c.body2 == body; };
+    const auto hangs = [body](const Joint& joint) { return joint.parent == body; };
+    const auto drives = [body](const Motor& motor) { return motor.joint == body; };
+    const auto none = [](const auto& list, const auto& test) { return std::none_of(list.begin(), list.end(), test); };
+    if (body > 0 && model.joints()[body].kind == JointKind::Spherical && !isCut(other) &&
+        std::count_if(closures.begin(), closures.end(), uses) == 1 && none(model.joints(), hangs) &&
+        none(model.motors(), drives))
+      return body;
+  }
+  return -1;
 }
 
 void SimbodyTree::addBody(int i) {
@@ -84,35 +119,35 @@ void SimbodyTree::addBody(int i) {
     case JointKind::Revolute:
     case JointKind::Continuous: {
       const Transform X = alignAxis(joint.axis, SimTK::ZAxis);
-      bodies.push_back(MobilizedBody::Pin(parent, at(X), body, X));
+      bodies[i] = MobilizedBody::Pin(parent, at(X), body, X);
       return;
     }
     case JointKind::Prismatic: {
       const Transform X = alignAxis(joint.axis, SimTK::XAxis);
-      bodies.push_back(MobilizedBody::Slider(parent, at(X), body, X));
+      bodies[i] = MobilizedBody::Slider(parent, at(X), body, X);
       return;
     }
     case JointKind::Spherical:
-      bodies.push_back(MobilizedBody::Ball(parent, at({}), body, {}));
+      bodies[i] = MobilizedBody::Ball(parent, at({}), body, {});
       return;
     case JointKind::Universal: {
       if (arePerpendicular(joint)) {
         const Transform X = makeUniversalFrame(joint);
-        bodies.push_back(MobilizedBody::Universal(parent, at(X), body, X));
+        bodies[i] = MobilizedBody::Universal(parent, at(X), body, X);
         return;
       }
       const Transform X1 = alignAxis(joint.axis, SimTK::ZAxis), X2 = alignAxis(joint.axis2, SimTK::ZAxis);
       first_pins[i] = MobilizedBody::Pin(parent, at(X1), SimTK::Body::Massless(), X1);
-      bodies.push_back(MobilizedBody::Pin(first_pins[i], X2, body, X2));
+      bodies[i] = MobilizedBody::Pin(first_pins[i], X2, body, X2);
       return;
     }
     case JointKind::Planar: {
       const Transform X = makePlanarFrame(joint);
-      bodies.push_back(MobilizedBody::Planar(parent, at(X), body, X));
+      bodies[i] = MobilizedBody::Planar(parent, at(X), body, X);
       return;
     }
     case JointKind::FreeFlyer:
-      bodies.push_back(MobilizedBody::Free(parent, at({}), body, {}));
+      bodies[i] = MobilizedBody::Free(parent, at({}), body, {});
       return;
   }
   throw std::logic_error("a fixed joint carries no body of a model");
@@ -134,8 +169,25 @@ void SimbodyTree::addClosure(const Closure& closure) {
                                                                   body2, axis2, SimTK::Pi / 2));
 }
 
+void SimbodyTree::addCutLoop(const Closure& closure, int joint) {
+  const bool first = closure.body1 == joint;
+  const SE3 &X_leaf = first ? closure.X_B1 : closure.X_B2, &X_other = first ? closure.X_B2 : closure.X_B1;
+  bodies[joint] = MobilizedBody::Weld(bodies[first ? closure.body2 : closure.body1], toSimTK(X_other),
+                                      makeBody(model.bodies()[joint].inertia), toSimTK(X_leaf));
+  const Joint& cut = model.joints()[joint];
+  constraints.push_back({SimTK::Constraint::Ball(bodies[cut.parent], toSimTK(cut.X_PJ.p), bodies[joint], Vec3(0))});
+}
+
+// R_FM of a joint by the placements of its bodies.
+SimTK::Rotation SimbodyTree::calcJointRotation(const SimTK::State& from, int joint) const {
+  const Joint& cut = model.joints()[joint];
+  return ~(bodies[cut.parent].getBodyRotation(from) * toSimTKRotation(cut.X_PJ.R)) *
+         bodies[joint].getBodyRotation(from);
+}
+
 void SimbodyTree::setCoordinates(ConstVectorRef q) {
   for (int i = 1; i < model.numBodies(); ++i) {
+    if (isCut(i)) continue;
     const Joint& joint = model.joints()[i];
     const VectorXd x = q.segment(joint.idx_q, joint.nq);
     if (!first_pins[i].isEmptyHandle()) {
@@ -174,6 +226,11 @@ void SimbodyTree::readState(const SimTK::State& from, VectorXd& q, VectorXd& vel
   q.resize(model.nq());
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
+    if (isCut(i)) {
+      const SimTK::Quaternion wxyz = calcJointRotation(from, i).convertRotationToQuaternion();
+      q.segment<4>(joint.idx_q) << wxyz[1], wxyz[2], wxyz[3], wxyz[0];
+      continue;
+    }
     VectorXd s(joint.nq);
     const bool chain = !first_pins[i].isEmptyHandle();
     for (int k = 0; k < joint.nq; ++k)
@@ -186,15 +243,22 @@ void SimbodyTree::readState(const SimTK::State& from, VectorXd& q, VectorXd& vel
   }
   updateVelocityMap(q, VectorXd::Zero(model.nv()));
   velocity = T.inverse() * gather(from.getU());
+  for (const int joint : cut_joints) {
+    if (joint < 0) continue;
+    const Vec3 w_W =
+        bodies[joint].getBodyAngularVelocity(from) - bodies[model.joints()[joint].parent].getBodyAngularVelocity(from);
+    velocity.segment<3>(model.joints()[joint].idx_v) = toEigen(Vec3(~bodies[joint].getBodyRotation(from) * w_W));
+  }
   updateVelocityMap(q, velocity);
 }
 
 void SimbodyTree::scatter(const VectorXd& ours, SimTK::Vector& u) const {
-  for (int k = 0; k < model.nv(); ++k) u[u_index[k]] = ours[k];
+  for (int k = 0; k < model.nv(); ++k)
+    if (u_index[k] >= 0) u[u_index[k]] = ours[k];
 }
 
 VectorXd SimbodyTree::gather(const SimTK::Vector& u) const {
-  return VectorXd::NullaryExpr(model.nv(), [&](Eigen::Index k) { return u[u_index[k]]; });
+  return VectorXd::NullaryExpr(model.nv(), [&](Eigen::Index k) { return u_index[k] < 0 ? 0 : u[u_index[k]]; });
 }
 
 }  // namespace bielle

@@ -15,6 +15,11 @@
 ///
 /// 6D closure: Weld. 3D: Ball. 5D: Ball and two ConstantAngle constraints, the axis in body 2 normal to two directions
 /// of body 1. All together u = T(q) v, in the order of our dofs.
+///
+/// The time of a step goes with the number of constraints. A weld that has a leaf on a spherical joint at one side closes the
+/// same loop as a ball in place of that joint, with three rows and three dofs less: with LoopCut::FewestRows the leaf is
+/// welded to the other body of the closure, for good, and its joint becomes the Ball. Its coordinates are then read from
+/// the placements of its bodies, and what is scattered to them is dropped.
 #include <Simbody.h>
 
 #include "bielle/model/model.h"
@@ -38,10 +43,12 @@ inline Matrix3d toEigen(const SimTK::Mat33& m) {
 }
 inline SimTK::Transform toSimTK(const SE3& X) { return {toSimTKRotation(X.R), toSimTK(X.p)}; }
 
+enum class LoopCut { AsModelled, FewestRows };
+
 struct SimbodyTree {
   /// Bodies, constraints and gravity. Other forces, bodies and constraints may be added until finish().
   /// \param closures  of the model, and any others such as contacts
-  SimbodyTree(const Model& model, const std::vector<Closure>& closures);
+  SimbodyTree(const Model& model, const std::vector<Closure>& closures, LoopCut cut = LoopCut::AsModelled);
   SimbodyTree(const SimbodyTree&) = delete;
   SimbodyTree& operator=(const SimbodyTree&) = delete;
   /// Makes the state.
@@ -56,7 +63,8 @@ struct SimbodyTree {
   std::vector<SimTK::MobilizedBody> bodies;      ///< per body of the model, ground first
   std::vector<SimTK::MobilizedBody> first_pins;  ///< of universal joints made of two Pins, else empty handles
   std::vector<std::vector<SimTK::Constraint>> constraints;  ///< per closure
-  std::vector<int> u_index;                                 ///< per dof, index into Simbody's u
+  std::vector<int> cut_joints;                              ///< per closure, the joint that became a Ball, or -1
+  std::vector<int> u_index;  ///< per dof, index into Simbody's u; -1: of a joint that became a Ball
   SimTK::State state;
 
   // At the state set last: u = T v.
@@ -68,15 +76,20 @@ struct SimbodyTree {
   void setCoordinates(ConstVectorRef q);
   /// Sets v, T and Tdot_v.
   void updateVelocityMap(ConstVectorRef q, ConstVectorRef v);
-  /// q and v of a state of the system, in our coordinates; also those of T.
+  /// q and v of a state of the system, in our coordinates; also those of T. It must have been realized to
+  /// Stage::Velocity if joints became Balls.
   void readState(const SimTK::State& from, VectorXd& q, VectorXd& v);
   /// Between our order of dofs and Simbody's u; scatter() leaves those of other bodies alone.
   void scatter(const VectorXd& ours, SimTK::Vector& u) const;
   VectorXd gather(const SimTK::Vector& u) const;
 
  private:
+  bool isCut(int joint) const;
+  int findCutJoint(const Closure& closure) const;
   void addBody(int i);
   void addClosure(const Closure& closure);
+  void addCutLoop(const Closure& closure, int joint);
+  SimTK::Rotation calcJointRotation(const SimTK::State& from, int joint) const;
 };
 
 }  // namespace bielle

@@ -157,7 +157,8 @@ class SimbodyWorld : public World {
 
   const Model& model_;
   SimbodyTree tree_;
-  WorldForces* forces_;  // owned by the tree's system
+  WorldForces* forces_;                                // owned by the tree's system
+  std::vector<std::pair<MobilizedBody, int>> rotors_;  // with the dof of their motor
   SimTK::RungeKutta3Integrator integrator_;
   SoleTrack soles_;
   VectorXd q_, v_;
@@ -170,7 +171,7 @@ class SimbodyWorld : public World {
 
 SimbodyWorld::SimbodyWorld(const Model& model, const SimbodyWorldOptions& options)
     : model_(model),
-      tree_(model, model.closures()),
+      tree_(model, model.closures(), options.as_modelled ? LoopCut::AsModelled : LoopCut::FewestRows),
       forces_(new WorldForces(tree_, options)),
       integrator_(tree_.system),
       soles_(model) {
@@ -198,6 +199,7 @@ void SimbodyWorld::addRotors() {
       rotor = MobilizedBody::Slider(tree_.matter.updGround(), SimTK::Body::Rigid(mass));
     else
       rotor = MobilizedBody::Pin(tree_.matter.updGround(), SimTK::Body::Rigid(mass));
+    rotors_.emplace_back(rotor, motor.dof);
     const int dof = motor.dof - joint.idx_v;
     const bool is_chain = !tree_.first_pins[motor.joint].isEmptyHandle();
     coupling->add(is_chain && dof == 0 ? tree_.first_pins[motor.joint] : tree_.bodies[motor.joint], is_chain ? 0 : dof,
@@ -220,6 +222,7 @@ void SimbodyWorld::reset(ConstVectorRef q, ConstVectorRef v) {
   SimTK::Vector& u = state.updU();
   u = 0;
   tree_.scatter(tree_.T * v, u);
+  for (const auto& [rotor, dof] : rotors_) u[int(rotor.getFirstUIndex(state))] = u[tree_.u_index[dof]];
   tree_.system.realize(state, Stage::Velocity);
   for (ContactPoint& point : forces_->points) {
     point.touches = false;
@@ -227,7 +230,7 @@ void SimbodyWorld::reset(ConstVectorRef q, ConstVectorRef v) {
   }
   elastic_start_ = forces_->calcElasticEnergy(state, stops_start_);
   try {
-    tree_.system.project(state, 1e-9);  // the rotors take the speeds of their motors
+    tree_.system.project(state, 1e-9);
     integrator_.initialize(state);
   } catch (const std::exception& error) {
     message_ = error.what();
@@ -326,11 +329,16 @@ Books SimbodyWorld::getBooks() const {
 double SimbodyWorld::getGap() const {
   const SimTK::State& state = integrator_.getState();
   double gap = 0;
-  for (const Closure& closure : model_.closures()) {
-    const auto locate = [&](int body, const SE3& X) {
-      return tree_.bodies[body].findStationLocationInGround(state, toSimTK(X.p));
-    };
-    gap = std::max(gap, (locate(closure.body1, closure.X_B1) - locate(closure.body2, closure.X_B2)).norm());
+  const auto locate = [&](int body, const Vector3d& point) {
+    return tree_.bodies[body].findStationLocationInGround(state, toSimTK(point));
+  };
+  for (size_t i = 0; i < model_.closures().size(); ++i) {
+    const Closure& closure = model_.closures()[i];
+    const int joint = tree_.cut_joints[i];
+    const SimTK::Vec3 opening =
+        joint < 0 ? locate(closure.body1, closure.X_B1.p) - locate(closure.body2, closure.X_B2.p)
+                  : locate(model_.joints()[joint].parent, model_.joints()[joint].X_PJ.p) - locate(joint, {0, 0, 0});
+    gap = std::max(gap, opening.norm());
   }
   return gap;
 }

@@ -276,7 +276,7 @@ void addOptions(CLI::App& app, Arguments& a) {
   app.add_option(
          "--world", a.world,
          "bielle: its own dynamics and contact law, fixed steps; simbody: Simbody's dynamics, the same contact law, "
-         "steps of controlled error, 40 times slower; mujoco: MuJoCo, closures and contacts soft constraints "
+         "steps of controlled error, 30 times slower; mujoco: MuJoCo, closures and contacts soft constraints "
          "(where Bielle was built with it)")
       ->check(CLI::IsMember(listWorlds()))
       ->capture_default_str();
