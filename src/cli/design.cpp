@@ -3,9 +3,9 @@
 
 #include "bielle/model/error.h"
 #include "cli/commands.h"
-#include "io/motion_registry.h"
 #include "cli/table.h"
 #include "design/run.h"
+#include "io/motion_registry.h"
 
 namespace bielle::cli {
 namespace {

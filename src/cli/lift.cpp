@@ -9,8 +9,8 @@
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
-#include "io/motion_registry.h"
 #include "cli/table.h"
+#include "io/motion_registry.h"
 
 namespace fs = std::filesystem;
 

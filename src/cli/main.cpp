@@ -39,7 +39,8 @@ int run(int argc, char** argv) {
   using namespace bielle::cli;
   setCommandLine(argc, argv);
   const std::string first = argc > 1 ? argv[1] : "";
-  if (first == "validate" || first == "check" || first == "simulate") return becomeCompanion("bielle-" + first, argv + 1);
+  if (first == "validate" || first == "check" || first == "simulate")
+    return becomeCompanion("bielle-" + first, argv + 1);
 
   CLI::App app{"Legged robots driven through linkages: their dynamics, and motions by optimal control."};
   app.name("bielle");

@@ -14,9 +14,7 @@ const char* getName(Objective objective) {
   return objective == Objective::Energy ? "energy" : "peak-torque";
 }
 
-double getDefaultRegularization(Objective objective) {
-  return objective == Objective::Effort ? 1 : 0.2;
-}
+double getDefaultRegularization(Objective objective) { return objective == Objective::Effort ? 1 : 0.2; }
 
 double ObjectiveOptions::getRegularization() const {
   return regularization.value_or(getDefaultRegularization(objective));
