@@ -123,9 +123,10 @@ void Policy::getReference(double time, VectorRef q, VectorRef v) const {
 
 void Policy::update(const Measurement& measurement, VectorRef u) {
   const double time = measurement.getActionTime();
+  if (hasGains()) updateError(measurement);
   if (time + kClockTolerance >= getDuration()) {
     u = u_hold_;
-    addFeedback(last_phase_, 1, measurement, u);
+    addFeedback(last_phase_, 1, u);
     return;
   }
   const size_t k = findStage(time);
@@ -139,19 +140,20 @@ void Policy::update(const Measurement& measurement, VectorRef u) {
   }
   const bool blends = k + 1 < stages_.size() && stages_[k + 1].phase == stage.phase;
   const double s = blends ? std::clamp((time - stage.start) / stage.duration, 0.0, 1.0) : 0;
-  addFeedback(k, 1 - s, measurement, u);
-  if (blends) addFeedback(k + 1, s, measurement, u);
+  addFeedback(k, 1 - s, u);
+  if (blends) addFeedback(k + 1, s, u);
 }
 
-// The gains of a stage times the deviation from the plan.
-void Policy::addFeedback(size_t stage, double weight, const Measurement& measurement, VectorRef u) {
-  const RowMatrixXd& K = stages_[gains_[stage]].K;
-  if (K.size() == 0) return;
+// The deviation from the plan.
+void Policy::updateError(const Measurement& measurement) {
   auto dq = error_.head(model_.nv()), dv = error_.tail(model_.nv());
   getReference(measurement.time, q_, dv);
   dv = measurement.v - dv;
   model_.difference(q_, measurement.q, dq);
-  u.noalias() += weight * (K * error_);
+}
+
+void Policy::addFeedback(size_t stage, double weight, VectorRef u) const {
+  if (hasGains()) u.noalias() += weight * (stages_[gains_[stage]].K * error_);
 }
 
 Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory) {

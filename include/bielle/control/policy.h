@@ -31,7 +31,7 @@ class Policy : public Controller {
     VectorXd q, v;                   ///< nq, nv: the node at its start
     VectorXd q_change, v_next;       ///< nv: q_{k+1} (-) q_k; v_{k+1}
     VectorXd u;                      ///< nu
-    RowMatrixXd K;                   ///< nu x 2 nv; empty without feedback
+    RowMatrixXd K;                   ///< nu x 2 nv; empty in all stages without feedback
   };
 
   /// \param model  must outlive it   \param stages  at least one, in the order of time
@@ -51,7 +51,9 @@ class Policy : public Controller {
 
  private:
   size_t findStage(double time) const;
-  void addFeedback(size_t stage, double weight, const Measurement& measurement, VectorRef u);
+  bool hasGains() const { return stages_.front().K.size() > 0; }
+  void updateError(const Measurement& measurement);
+  void addFeedback(size_t stage, double weight, VectorRef u) const;
 
   const Model& model_;
   std::vector<Stage> stages_;
