@@ -276,7 +276,7 @@ void BielleWorld::book(double h) {
     const Vector6d twist = calcTwist(points_[i].contact, w_mean_);
     const Vector3d& x = places_[i];
     contact_work_ += h * forces_[i].force.dot(Vector3d(twist.head<3>() + twist.tail<3>().cross(x)));
-    soles_.addForce(points_[i], x, forces_[i].force);
+    soles_.addForce(points_[i].contact, x, forces_[i].force);
   }
 }
 
@@ -307,10 +307,10 @@ Books BielleWorld::getBooks() const {
 }
 
 double BielleWorld::getGap() const {
-  Workspace ws(model_);
-  updatePlacements<double>(model_, ws, getConfiguration());
+  updatePlacements<double>(model_, ws_, getConfiguration());
   double gap = 0;
-  for (const Closure& closure : model_.closures()) gap = std::max(gap, calcClosureResidual(ws, closure).head(3).norm());
+  for (const Closure& closure : model_.closures())
+    gap = std::max(gap, calcClosureResidual(ws_, closure).head(3).norm());
   return gap;
 }
 

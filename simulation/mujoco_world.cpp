@@ -192,9 +192,7 @@ void MujocoWorld::addSoleForces(double share) {
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R_CW(contact.frame);
     Vector3d force = share * (R_CW.transpose() * Vector3d(wrench[0], wrench[1], wrench[2]));
     if (second < 0) force = -force;
-    ContactPoint point;
-    point.contact = second >= 0 ? second : first;
-    soles_.addForce(point, Eigen::Map<const Vector3d>(contact.pos), force);
+    soles_.addForce(second >= 0 ? second : first, Eigen::Map<const Vector3d>(contact.pos), force);
   }
 }
 

@@ -296,7 +296,7 @@ void SimbodyWorld::finishStep(double duration) {
   for (ContactPoint& point : forces_->points) {
     const Vector3d x = forces_->findPlace(state, point);
     const ContactForce force = forces_->calcForce(state, point);
-    if (force.elastic > 0) soles_.addForce(point, x, force.force);
+    if (force.elastic > 0) soles_.addForce(point.contact, x, force.force);
     updateAnchor(forces_->terrain, x, force, point);
   }
 }

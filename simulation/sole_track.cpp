@@ -17,9 +17,9 @@ void SoleTrack::clearForces() {
   for (Vector6d& wrench : wrenches_) wrench.setZero();
 }
 
-void SoleTrack::addForce(const ContactPoint& point, const Vector3d& x, const Vector3d& force) {
-  wrenches_[point.contact].head<3>() += force;
-  wrenches_[point.contact].tail<3>() += x.cross(force);
+void SoleTrack::addForce(int contact, const Vector3d& x, const Vector3d& force) {
+  wrenches_[contact].head<3>() += force;
+  wrenches_[contact].tail<3>() += x.cross(force);
 }
 
 void SoleTrack::updateFoot(size_t contact, const SE3& X_WF) {

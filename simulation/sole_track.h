@@ -12,8 +12,8 @@ class SoleTrack {
 
   void reset();
   void clearForces();
-  /// Adds the force on a point at x (world).
-  void addForce(const ContactPoint& point, const Vector3d& x, const Vector3d& force);
+  /// Adds a force at x (world) on a contact of the model.
+  void addForce(int contact, const Vector3d& x, const Vector3d& force);
   /// Wrenches and slips for the present placements. \param getPlacement  body -> SE3
   template <typename GetPlacement>
   void update(const GetPlacement& getPlacement) {
