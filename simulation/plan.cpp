@@ -8,8 +8,7 @@
 namespace bielle::simulation {
 namespace {
 
-// Torques of a converged motion fall by nothing in more iterations than this.
-constexpr int kMaxIterations = 200;
+constexpr int kMaxIterations = 200;  // more than a motion takes from its own solution
 
 // Limits given by motor are recorded with the options of the motion.
 LimitOptions readLimits(const MotionSummary& summary) {
@@ -46,6 +45,7 @@ std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control
   fixTimings(summary.timings, summary.step, request.schedule, request.stages);
   ProblemOptions options(summary.formulation, summary.step);
   options.limits = readLimits(summary);
+  options.objective = summary.objective;
   Motion motion = makeMotion(model, std::move(request), options);
   plan->ground = motion.ground;
   plan->schedule = motion.schedule;
@@ -54,6 +54,9 @@ std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control
     plan->policy = std::make_unique<Policy>(makePolicy(motion, motion.guess));
     return plan;
   }
+  if (summary.objective.objective == Objective::PeakTorque)
+    throw ModelError(summary.file, "objective 'peak-torque'", "the gains of its solver let no torque exceed the peak",
+                     "give --control open, or solve the motion for another objective");
   FddpOptions solver_options;
   solver_options.max_iterations = kMaxIterations;
   if (motion.bounded) solver_options.bounds = ControlBounds::Enforce;

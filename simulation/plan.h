@@ -25,7 +25,8 @@ struct Plan {
 
 /// Makes the motion again from its request. For gains it is solved again, from the solution in the files: they do not
 /// hold the gains, nor the multipliers of the constraints.
-/// \throws ModelError when the files cannot be read, the motion is not one of the closed robot, or does not converge
+/// \throws ModelError when the files cannot be read, the motion is not one of the closed robot, does not converge, or has the
+/// least peak torque and gains are wanted
 std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control);
 
 }  // namespace bielle::simulation

@@ -1,6 +1,7 @@
 // bielle-simulate: carries a solved motion out in a world.
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -114,17 +115,10 @@ MotionResult makeResult(const Arguments& arguments, const Plan& plan, const Grou
       execution.outcome == Outcome::Stood ? FddpTermination::Converged : FddpTermination::Failed;
   result.solver.message = std::string("carried out: it ") + getName(execution.outcome);
   result.record = execution.record;
-  const MotionRecord& record = result.record;
-  for (size_t m = 0; m < record.u_names.size(); ++m)
-    result.peak_torques.emplace_back(record.u_names[m], record.u.rows() ? record.u.col(m).cwiseAbs().maxCoeff() : 0);
-  std::stable_sort(result.peak_torques.begin(), result.peak_torques.end(),
-                   [](const auto& a, const auto& b) { return a.second > b.second; });
-  result.energy = calcElectricalEnergy(plan.robot.model, record, 0);
-  result.gap_position = execution.largest_gap;
-  result.gap_angle = record.gap.col(1).maxCoeff();
+  result.objective = plan.summary.objective;
+  setFigures(plan.robot.model, result);
+  result.gap_position = execution.largest_gap;  // also between the rows of the record
   result.slip_position = execution.largest_slip;
-  result.com_start = record.com(0, 2);
-  result.com_lowest = record.com.col(2).minCoeff();
   return result;
 }
 
@@ -345,17 +339,14 @@ int main(int argc, char** argv) {
   ignoreClosedPipes();
   CLI::App app{
       "Carries a motion that `bielle solve` wrote out in physics with contact: a controller reads the state of the "
-      "robot "
-      "and commands its motors, feet stand or slip as the ground lets them."};
+      "robot and commands its motors, feet stand or slip as the ground lets them."};
   app.name("bielle simulate");
   Arguments arguments;
   addOptions(app, arguments);
   app.footer(
-      "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude or is less than 0.6 times as "
-      "high\n"
-      "over the ground as planned, or a joint is more than 1.5 rad away from its planned angle. Exit status: 0 it "
-      "stood to\n"
-      "the end, 1 it fell or the world broke off (files are written all the same), 2 bad input.\n"
+      "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude or is less than 0.6 times\n"
+      "as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle. Exit status:\n"
+      "0 it stood to the end, 1 it fell or the world broke off (files are written all the same), 2 bad input.\n"
       "Examples:\n"
       "  bielle solve walk --robot bipetto --speed 0.4 -o walk\n"
       "  bielle simulate walk -o carried-out\n"

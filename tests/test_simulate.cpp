@@ -182,6 +182,36 @@ TEST_CASE("simulate: the same command writes the same bytes; ground, pushes and 
   CHECK(record("other", {"--terrain", "tiles=0.005", "--seed", "2"}) != tiles);
 }
 
+TEST_CASE("simulate: a motion of least energy is carried out as such; one of least peak torque has no gains") {
+  const Scratch scratch;
+  const auto solve = [&](const std::string& objective) {
+    const std::string directory = (scratch.path / objective).string();
+    const CommandResult solved =
+        runCommand({BIELLE_COMMAND, "solve", "squat", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--depth", "0.9",
+                    "--objective", objective, "-o", directory, "--quiet", "--no-report", "--no-check"});
+    CAPTURE(solved.err);
+    REQUIRE(solved.status == 0);
+    return directory;
+  };
+  const auto simulate = [&](const std::string& directory, std::vector<std::string> options) {
+    std::vector<std::string> arguments = {BIELLE_COMMAND, "simulate", directory, "-o", directory + "/carried-out"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return runCommand(arguments);
+  };
+  const auto getEnergy = [](const std::string& directory) {
+    return readSummary(directory)["electrical_energy"]["total_J"].get<double>();
+  };
+  const std::string least = solve("energy");
+  REQUIRE(simulate(least, {"--hold", "0"}).status == 0);
+  CHECK(readSummary(least + "/carried-out")["objective"]["kind"] == "energy");
+  CHECK(getEnergy(least + "/carried-out") == Approx(getEnergy(least)).epsilon(0.02));
+  const std::string peak = solve("peak-torque");
+  const CommandResult refused = simulate(peak, {});
+  CHECK(refused.status == 2);
+  CHECK(refused.err.find("peak-torque") != std::string::npos);
+  CHECK(simulate(peak, {"--control", "open"}).status < 2);
+}
+
 TEST_CASE("simulate: bad input is refused in one line, with status 2") {
   const Scratch scratch;
   const std::string output = (scratch.path / "bad").string();

@@ -200,6 +200,20 @@ MotionTrack makeTrack(const Model& model, const MotionRecord& record) {
   return track;
 }
 
+void setFigures(const Model& model, MotionResult& result) {
+  const MotionRecord& record = result.record;
+  result.peak_torques.clear();
+  for (size_t m = 0; m < record.u_names.size(); ++m)
+    result.peak_torques.emplace_back(record.u_names[m], record.u.rows() ? record.u.col(m).cwiseAbs().maxCoeff() : 0);
+  std::stable_sort(result.peak_torques.begin(), result.peak_torques.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
+  result.energy = calcElectricalEnergy(model, record, result.objective.regeneration);
+  result.gap_position = record.gap.col(0).maxCoeff();
+  result.gap_angle = record.gap.col(1).maxCoeff();
+  result.com_start = record.com(0, 2);
+  result.com_lowest = record.com.col(2).minCoeff();
+}
+
 MotionResult makeResult(const RunInfo& run, const Motion& motion, const ShootingTrajectory& trajectory,
                         const FddpSummary& summary) {
   MotionResult result;
@@ -218,18 +232,9 @@ MotionResult makeResult(const RunInfo& run, const Motion& motion, const Shooting
   result.ground = motion.ground;
   result.solver = summary;
   result.record = makeRecord(motion, trajectory);
-  const MotionRecord& record = result.record;
-  for (size_t m = 0; m < record.u_names.size(); ++m)
-    result.peak_torques.emplace_back(record.u_names[m], record.u.rows() ? record.u.col(m).cwiseAbs().maxCoeff() : 0);
-  std::stable_sort(result.peak_torques.begin(), result.peak_torques.end(),
-                   [](const auto& a, const auto& b) { return a.second > b.second; });
   result.objective = motion.objective;
-  result.energy = calcElectricalEnergy(motion.problem->model(), record, motion.objective.regeneration);
-  result.gap_position = record.gap.col(0).maxCoeff();
-  result.gap_angle = record.gap.col(1).maxCoeff();
-  result.com_start = record.com(0, 2);
-  result.com_lowest = record.com.col(2).minCoeff();
-  const MotionTrack track = makeTrack(motion.problem->model(), record);
+  setFigures(motion.problem->model(), result);
+  const MotionTrack track = makeTrack(motion.problem->model(), result.record);
   for (const Goal& goal : motion.goals) result.goals.push_back({goal, measureGoal(goal, track)});
   calcSlip(motion, track, result);
   return result;

@@ -57,6 +57,16 @@ GoalOutcome readGoal(const Json& json) {
   return outcome;
 }
 
+ObjectiveOptions readObjective(const Json& json) {
+  ObjectiveOptions options;
+  const std::string kind = json.at("kind");
+  for (Objective objective : {Objective::Energy, Objective::PeakTorque})
+    if (kind == getName(objective)) options.objective = objective;
+  options.regularization = json.at("regularization").get<double>();
+  options.scale = json.at("scale");
+  return options;
+}
+
 MotionSummary read(const Json& json) {
   MotionSummary summary;
   summary.motion = json.at("motion");
@@ -68,6 +78,10 @@ MotionSummary read(const Json& json) {
   summary.formulation = formulation == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
   const std::string step = json.value("step", getName(StepRule::Euler));  // older results have none
   summary.step = step == getName(StepRule::Midpoint) ? StepRule::Midpoint : StepRule::Euler;
+  if (json.contains("objective")) {  // older results have none
+    summary.objective = readObjective(json.at("objective"));
+    summary.objective.regeneration = json.at("electrical_energy").at("regeneration");
+  }
   summary.converged = json.at("converged");
   for (const auto& [name, value] : json.at("requested").items()) summary.requested.emplace_back(name, value);
   if (json.contains("goals"))  // older results have none

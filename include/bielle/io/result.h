@@ -45,6 +45,9 @@ struct MotionResult {
 /// The data that goal.h measures, from a record of the model's motion.
 MotionTrack makeTrack(const Model& model, const MotionRecord& record);
 
+/// Sets what follows from the record and the objective: torques, electrical energy, gaps, heights of the centre of mass.
+void setFigures(const Model& model, MotionResult& result);
+
 MotionResult makeResult(const RunInfo& run, const Motion& motion, const ShootingTrajectory& trajectory,
                         const FddpSummary& summary);
 
@@ -66,6 +69,7 @@ struct MotionSummary {
   std::string serial_armature;   ///< of the serial model (parseSerialArmature)
   Formulation formulation = Formulation::Full;
   StepRule step = StepRule::Euler;
+  ObjectiveOptions objective;
   bool converged = false;
   std::vector<std::pair<std::string, double>> requested;
   std::vector<GoalOutcome> goals;
