@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "bench/receding_horizon.h"
-#include "bench/window.h"
+#include "solve/window.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 

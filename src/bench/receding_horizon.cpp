@@ -8,7 +8,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "bench/window.h"
+#include "solve/window.h"
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 

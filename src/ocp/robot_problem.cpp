@@ -179,6 +179,11 @@ RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorX
 
 RobotProblem::~RobotProblem() = default;
 
+void RobotProblem::setTerminalReference(ConstVectorRef q, ConstVectorRef v) {
+  specs_.back().state.q_ref = q;
+  specs_.back().state.v_ref = v;
+}
+
 int RobotProblem::tangentSize(int node) const {
   return transcription_->tangentSize() + (places_[node].in_state ? 1 : 0);
 }

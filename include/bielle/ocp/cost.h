@@ -38,7 +38,7 @@ struct Cost {
   std::string name;
   double weight = 1;
   Activation activation;
-  std::unique_ptr<Residual> residual;
+  std::shared_ptr<const Residual> residual;
   bool defines = false;  ///< it says what the motion is, and keeps its weight whatever is minimized beside it
 };
 
@@ -46,7 +46,7 @@ struct Cost {
 /// bounds over `scale`: the violation that counts as 1.
 struct PathConstraint {
   std::string name;
-  std::unique_ptr<Residual> residual;
+  std::shared_ptr<const Residual> residual;
   VectorXd lower, upper;  ///< n
   VectorXd scale;         ///< n, positive, in the unit of r
 

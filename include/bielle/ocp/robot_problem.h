@@ -150,6 +150,9 @@ class RobotProblem : public ShootingProblem {
   const Model& model() const { return model_; }
   Formulation formulation() const { return formulation_; }
   const StageSpec& spec(int node) const { return specs_[node]; }
+  /// Changes the reference of the state cost of the terminal node: where a horizon that recedes is to end.
+  /// \param q  nq   \param v  nv
+  void setTerminalReference(ConstVectorRef q, ConstVectorRef v);
   bool hasFreeTimings() const { return stateSize() > model_.nq() + model_.nv(); }
   /// Time scale of a stage, 1 where it is fixed.
   double getTimeScale(int stage, const VectorXd& x, const VectorXd& u) const;
