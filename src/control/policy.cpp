@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "bielle/solve/node_evaluator.h"
+#include "control/policy_stages.h"
 #include "solve/lq_sweep.h"
 
 namespace bielle {
@@ -15,31 +15,13 @@ constexpr double kPerturbation = 0.01;    // of Eq. (2); differences are linear 
 
 double getMiddle(const Policy::Stage& stage) { return stage.start + 0.5 * stage.duration; }
 
-// Eq. (2)
-RowMatrixXd calcGains(const Model& model, NodeEvaluator& evaluator, const RowMatrixXd& K) {
-  const int nq = model.nq(), nv = model.nv();
-  const VectorXd x = evaluator.evaluation().x;
-  MatrixXd map(K.cols(), 2 * nv);
-  VectorXd moved = x, step = VectorXd::Zero(nv);
-  for (int i = 0; i < nv; ++i) {
-    step.setZero();
-    step[i] = kPerturbation;
-    moved = x;
-    model.integrate(x.head(nq), step, moved.head(nq));
-    map.col(i) = evaluator.difference(moved) / kPerturbation;
-    moved = x;
-    moved[nq + i] += kPerturbation;
-    map.col(nv + i) = evaluator.difference(moved) / kPerturbation;
-  }
-  return K * map;
-}
-
 std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajectory& trajectory,
                                       const LqSweep* sweep) {
   const RobotProblem& problem = *motion.problem;
   if (problem.hasFreeTimings()) throw std::invalid_argument("makePolicy: durations of the motion are free");
   const Model& model = problem.model();
   NodeEvaluator evaluator(problem);
+  ImpactWorkspace impact(model);
   std::vector<Policy::Stage> stages;
   double time = 0;
   int node = 0, phase_index = 0;
@@ -49,17 +31,11 @@ std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajec
       if (spec.kind == StageKind::Impact) continue;
       const VectorXd &x = trajectory.xs[node], &next = trajectory.xs[node + 1];
       Policy::Stage stage;
-      stage.start = time;
-      stage.duration = spec.dt;
+      fillStage(problem, node, time, x, trajectory.us[node], next, stage);
       stage.phase = phase_index;
-      stage.q = x.head(model.nq());
-      stage.v = x.segment(model.nq(), model.nv());
-      stage.q_change = model.difference(stage.q, next.head(model.nq()));
-      stage.v_next = next.segment(model.nq(), model.nv());
-      stage.u = trajectory.us[node].head(model.nu());
       if (sweep) {
         evaluator.evaluate(node, x, trajectory.us[node]);
-        stage.K = calcGains(model, evaluator, sweep->getNodes()[node].K);
+        calcGains(model, spec.constraints, evaluator, sweep->getNodes()[node].K, impact, stage.K);
       }
       stages.push_back(std::move(stage));
       time += spec.dt;
@@ -79,11 +55,48 @@ VectorXd calcHoldTorques(const Motion& motion, const ShootingTrajectory& traject
 
 }  // namespace
 
+void fillStage(const RobotProblem& problem, int node, double start, const VectorXd& x, const VectorXd& u,
+               const VectorXd& x_next, Policy::Stage& stage) {
+  const Model& model = problem.model();
+  stage.start = start;
+  stage.duration = problem.spec(node).dt;
+  stage.q = x.head(model.nq());
+  stage.v = x.segment(model.nq(), model.nv());
+  stage.q_change.resize(model.nv());
+  model.difference(stage.q, x_next.head(model.nq()), stage.q_change);
+  stage.v_next = x_next.segment(model.nq(), model.nv());
+  stage.u = u.head(model.nu());
+}
+
+void calcGains(const Model& model, const ConstraintSet& constraints, NodeEvaluator& evaluator, const RowMatrixXd& K,
+               ImpactWorkspace& impact, RowMatrixXd& gains) {
+  const int nq = model.nq(), nv = model.nv();
+  const VectorXd x = evaluator.evaluation().x;
+  const bool regular = updateImpact(model, impact, constraints, x.head(nq), x.tail(nv)) == DynamicsStatus::Ok &&
+                       updateImpactDerivatives(model, impact, constraints) == DynamicsStatus::Ok;
+  if (!regular) impact.dv_dv.setIdentity(nv, nv);
+  MatrixXd map(K.cols(), 2 * nv);
+  VectorXd moved = x, step = VectorXd::Zero(nv);
+  for (int i = 0; i < nv; ++i) {
+    step.setZero();
+    step[i] = kPerturbation;
+    moved = x;
+    model.integrate(x.head(nq), step, moved.head(nq));
+    map.col(i) = evaluator.difference(moved) / kPerturbation;
+    moved = x;
+    moved[nq + i] += kPerturbation;
+    map.col(nv + i) = evaluator.difference(moved) / kPerturbation;
+  }
+  const RowMatrixXd product = K * map;
+  gains.resize(K.rows(), 2 * nv);
+  gains.leftCols(nv).noalias() = product.leftCols(nv) * impact.dv_dv;
+  gains.rightCols(nv).noalias() = product.rightCols(nv) * impact.dv_dv;
+}
+
 Policy::Policy(const Model& model, std::vector<Stage> stages, const VectorXd& u_hold)
     : model_(model), stages_(std::move(stages)), u_hold_(u_hold) {
   if (stages_.empty()) throw std::invalid_argument("Policy: there are no stages");
-  last_phase_ = stages_.size() - 1;
-  while (last_phase_ > 0 && stages_[last_phase_ - 1].phase == stages_.back().phase) --last_phase_;
+  findLastPhase();
   setLookAhead(0);
   step_.setZero(model.nv());
   q_ = model.makeNeutral();
@@ -103,6 +116,18 @@ void Policy::setLookAhead(double duration) {
   }
 }
 
+void Policy::exchange(std::vector<Stage>& stages, VectorXd& u_hold) {
+  stages_.swap(stages);
+  u_hold_.swap(u_hold);
+  findLastPhase();
+  setLookAhead(0);
+}
+
+void Policy::findLastPhase() {
+  last_phase_ = stages_.size() - 1;
+  while (last_phase_ > 0 && stages_[last_phase_ - 1].phase == stages_.back().phase) --last_phase_;
+}
+
 size_t Policy::findStage(double time) const {
   const auto after = std::upper_bound(stages_.begin(), stages_.end(), time + kClockTolerance,
                                       [](double t, const Stage& stage) { return t < stage.start; });
@@ -111,7 +136,8 @@ size_t Policy::findStage(double time) const {
 
 void Policy::getReference(double time, VectorRef q, VectorRef v) const {
   const Stage& stage = stages_[findStage(time)];
-  const double s = std::clamp((time - stage.start) / stage.duration, 0.0, 1.0);
+  // Before the first stage it goes back along that one: what acts when it begins may have been measured earlier.
+  const double s = std::clamp((time - stage.start) / stage.duration, &stage == &stages_[0] ? -1.0 : 0.0, 1.0);
   step_ = s * stage.q_change;
   model_.integrate(stage.q, step_, q);
   if (time > getDuration()) {

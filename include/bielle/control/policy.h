@@ -8,9 +8,15 @@
 /// interpolated linearly within a phase of constant contacts and held across its borders. The solver's gains refer to the
 /// tangent space of the problem at x_k; those of (1) are
 ///
-///     K_k = K_k^solver d(x (-) x_k)/d(dq, dv)                                                                       (2)
+///     K_k = K_k^solver d(x (-) x_k)/d(dq, dv) P                                                                     (2)
 ///
-/// (nu x 2 nv): in the reduced formulation a state that is not closed is thus projected on the closed ones. After its end the
+/// (nu x 2 nv): in the reduced formulation a state that is not closed is thus projected on the closed ones. With M the mass
+/// matrix and J the Jacobian of closures and contacts in force at q_k,
+///
+///     P = diag(p, p),    p = 1 - M^-1 J^T (J M^-1 J^T)^+ J                                                          (3)
+///
+/// leaves out motions of feet that stand, as an impact would: the model holds these feet, and would answer the give of a real
+/// ground with forces that no ground has. After its end the
 /// policy holds the last posture with the torques u_hold that carry it at rest, and with the gains of the first stage of the
 /// last phase: those of its last stages look ahead too little to care for where the robot is. Where torques act later than
 /// the state was measured, u* and K are those of the time when they act, the deviation is that of the time of the measurement.
@@ -44,12 +50,15 @@ class Policy : public Controller {
   void setLookAhead(double duration);
 
   void update(const Measurement& measurement, VectorRef u) override;
+  /// Takes other stages and torques u_hold, as many and of the same sizes, and gives its own for them. Allocates nothing.
+  void exchange(std::vector<Stage>& stages, VectorXd& u_hold);
   /// q* and v* of Eq. (1).
   void getReference(double time, VectorRef q, VectorRef v) const;
   double getDuration() const { return stages_.back().start + stages_.back().duration; }  ///< s
   const std::vector<Stage>& getStages() const { return stages_; }
 
  private:
+  void findLastPhase();
   size_t findStage(double time) const;
   bool hasGains() const { return stages_.front().K.size() > 0; }
   void updateError(const Measurement& measurement);
