@@ -26,7 +26,7 @@ Capsule makeSoleCapsule(const ContactFrame& contact) {
 
 }  // namespace
 
-void addLanding(const ContactFrame& contact, const SE3& X_WF, StageSpec& stage) {
+void addLanding(const ContactFrame& contact, const SE3& X_WF, double room, StageSpec& stage) {
   const BodyFrame foot{contact.body, contact.X_BF};
   const bool point = contact.kind != ContactKind::Surface6D;
   const Vector3d position = Vector3d::Constant(kPosition), angle = Vector3d::Constant(kAngle);
@@ -36,6 +36,11 @@ void addLanding(const ContactFrame& contact, const SE3& X_WF, StageSpec& stage) 
   else
     stage.path_constraints.push_back(makeEquation("landing of " + contact.name, makeFramePlacement(foot, X_WF), 6,
                                                   (Vector6d() << position, angle).finished()));
+  VectorXd& upper = stage.path_constraints.back().upper;
+  upper.head<2>().setConstant(room);
+  const double reach = std::hypot(contact.half_length, contact.half_width);
+  if (!point && reach > 0) upper[5] = room / reach;
+  stage.path_constraints.back().lower = -upper;
   stage.path_constraints.push_back(makeEquation("landing velocity of " + contact.name, makeFrameVelocity(foot),
                                                 point ? 3 : 6, Vector6d::Constant(kVelocity)));
 }

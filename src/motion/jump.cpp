@@ -112,7 +112,7 @@ void addTouchdown(const Scene& scene, StageSpec& stage) {
   for (const ContactTarget& target : scene.after) {
     const ContactFrame& contact = scene.model.contacts()[target.contact];
     if (scene.options.published == 0)
-      addLanding(contact, target.X_WT, stage);
+      addLanding(contact, target.X_WT, 0, stage);
     else
       addFreeLanding({contact.body, contact.X_BF}, target.X_WT,
                      {weights.height / h, weights.tilt / h, weights.velocity / h}, stage, " " + contact.name);
@@ -250,6 +250,7 @@ std::vector<OptionEntry> listOptions(JumpOptions& o) {
           {"stretch", &o.stretch, "m", "height of the centre of mass at take-off and touchdown over that at the start"},
           {"clearance", &o.clearance, "m", "least height of the soles at mid-flight"},
           {"friction", &o.friction, "1", "friction coefficient"},
+          {"cone_margin", &o.cone_margin, "1", "part of friction and soles that wrenches leave free"},
           {"time_step", &o.time_step, "s", "length of a shooting stage"},
           {"published", &o.published, "0 or 1", "1: the paper's problem: feet are free in flight; 0: by our costs"},
           {"apex_weight", &o.apex_weight, "1/m^2", "height of the centre of mass at mid-flight"},
@@ -315,7 +316,7 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
       StageSpec& stage = stages.back();
       const double load = calcLoad(scene, phase, com.acceleration);
       addGroundCosts(model, ground, VectorXd::Constant(contacts.size(), load / contacts.size()), stage);
-      if (options.published == 0) addWrenchCones(model, options.friction, stage);
+      if (options.published == 0) addWrenchCones(model, options.friction, options.cone_margin, stage);
       if (phase != Phase::Flight) addHeightCost(scene, "com height", options.com_weight, com.height, false, stage);
       if (phase == Phase::Flight && 2 * i == nodes)
         addHeightCost(scene, "apex", options.apex_weight / options.time_step, com.height, true, stage);

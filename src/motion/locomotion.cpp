@@ -168,7 +168,7 @@ void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
   }
   const ForceAxes axes = isPublished(scene) ? ForceAxes::World : ForceAxes::Contact;
   addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, axes}, loads, stage);
-  if (!isPublished(scene)) addWrenchCones(scene.model, o.friction, stage);
+  if (!isPublished(scene)) addWrenchCones(scene.model, o.friction, o.cone_margin, stage);
 }
 
 Vector6d makeVector(double x, double z, double rotation) {
@@ -186,10 +186,12 @@ void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& ste
   const LocomotionOptions& o = scene.options;
   const BodyFrame foot = getFoot(scene, step.side);
   const SwingNode& swing = node.swings[static_cast<int>(step.side)];
-  addCost(stage, "swing", 1, makeVector(o.swing_weight, o.swing_weight, o.swing_rotation_weight),
+  const bool free = o.foothold_room > 0;  // along the ground
+  addCost(stage, "swing", 1,
+          makeVector(free ? o.foothold_weight : o.swing_weight, o.swing_weight, o.swing_rotation_weight),
           makeFramePlacement(foot, swing.X_WF));
   addCost(stage, "swing velocity", 1,
-          makeVector(o.swing_velocity_weight, o.swing_velocity_weight, o.swing_velocity_weight),
+          makeVector(free ? 0 : o.swing_velocity_weight, o.swing_velocity_weight, o.swing_velocity_weight),
           makeFrameVelocity(foot, swing.V_F), true);
   if (!isPublished(scene)) return;
   addCost(stage, "fly high", o.paper.fly_high, Eigen::Vector2d::Ones(),
@@ -220,9 +222,15 @@ void addSwingConstraints(const Scene& scene, const GaitNode& node, int k, StageS
 }
 
 void addLanding(const Scene& scene, const Footstep& step, StageSpec& stage) {
-  if (!isPublished(scene)) return addLanding(getContact(scene, step.side), step.X_WF, stage);
-  const LandingWeights& weights = scene.options.paper.landing;
   const double h = stage.kind == StageKind::Impact ? 1 : stage.dt;
+  if (!isPublished(scene)) {
+    const LocomotionOptions& o = scene.options;
+    if (o.foothold_room > 0)
+      addCost(stage, "foothold", o.foothold_weight / h, (Vector6d() << 1, 1, 0, 0, 0, 0).finished(),
+              makeFramePlacement(getFoot(scene, step.side), step.X_WF));
+    return addLanding(getContact(scene, step.side), step.X_WF, o.foothold_room, stage);
+  }
+  const LandingWeights& weights = scene.options.paper.landing;
   addFreeLanding(getFoot(scene, step.side), step.X_WF, {weights.height / h, weights.tilt / h, weights.velocity / h},
                  stage);
 }

@@ -204,14 +204,14 @@ void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights
                          makeFrameVelocity(foot)});
 }
 
-void addWrenchCones(const Model& model, double friction, StageSpec& stage) {
-  constexpr double kReserve = 0.01, kLeastLoad = 1e-3;
+void addWrenchCones(const Model& model, double friction, double margin, StageSpec& stage) {
+  constexpr double kLeastLoad = 1e-3;
   const ConstraintSet& set = stage.constraints;
   const double unit = model.mass() * model.gravity().norm();
-  const double mu = (1 - kReserve) * friction / std::sqrt(2);
+  const double mu = (1 - margin) * friction / std::sqrt(2);
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
     const ContactFrame& contact = model.contacts()[set.getContact(c)];
-    const double X = (1 - kReserve) * contact.half_length, Y = (1 - kReserve) * contact.half_width;
+    const double X = (1 - margin) * contact.half_length, Y = (1 - margin) * contact.half_width;
     std::unique_ptr<Residual> cone = makeWrenchCone(set, c, X, Y, mu);
     const int rows = cone->size();
     VectorXd scale = VectorXd::Constant(rows, unit);

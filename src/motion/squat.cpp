@@ -40,7 +40,7 @@ StageSpec makeStage(const Model& model, const SquatOptions& o, const std::vector
   const double weight = model.mass() * model.gravity().norm();
   addGroundCosts(model, {o.force_weight, o.pressure_weight},
                  VectorXd::Constant(contacts.size(), weight / contacts.size()), stage);
-  addWrenchCones(model, o.friction, stage);
+  addWrenchCones(model, o.friction, o.cone_margin, stage);
   return stage;
 }
 
@@ -59,6 +59,7 @@ std::vector<OptionEntry> listOptions(SquatOptions& o) {
           {"force_weight", &o.force_weight, "1", "share the weight evenly between the feet, over (m g)^2"},
           {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
           {"friction", &o.friction, "1", "friction coefficient"},
+          {"cone_margin", &o.cone_margin, "1", "part of friction and soles that wrenches leave free"},
           {"contact_kp", &o.contact_kp, "1/s^2",
            "stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2))"},
           {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"},

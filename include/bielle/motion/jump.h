@@ -49,6 +49,7 @@ struct JumpOptions {
   double stretch = 0.02;     ///< height of the CoM at take-off and touchdown over that at the start, m
   double clearance = 0.04;   ///< least height of the soles at mid-flight, m
   double friction = 0.7;     ///< coefficient, 1
+  double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
   double published = 0;      ///< 1: the paper's problem, see above; 0: our costs
   double time_step = 0.002;  ///< s
 

@@ -9,7 +9,9 @@
 /// What must hold are path constraints:
 /// - wrench cones of the soles on the ground;
 /// - landing, at the first node of a double support or at the impact before it: the foot is on its foothold, flat and
-///   at rest, so that the impulses of an impact vanish;
+///   at rest, so that the impulses of an impact vanish; with `foothold_room` it may be that far off along x and y of the
+///   foothold, and turned by that over the reach of a sole; then costs of the foothold and, less than otherwise, of the
+///   horizontal path of the swing keep it near;
 /// - swing foot: no corner below the ground, and 6 mm over it in the middle half of the swing; distance from the other
 ///   foot;
 /// - at the end the centre of mass is at rest and the torso does not turn.
@@ -72,11 +74,13 @@ struct LocomotionOptions {
   double start_pressure = 0.4;  ///< largest d of Eq. (1) over the soles' half length; 0: timing.start as given
   double stretch = 0;           ///< height of the CoM at take-off and touchdown over that at the start, m
   SwingShape swing;
-  double friction = 0.7;  ///< coefficient, 1
-  double published = 0;   ///< 1: the paper's problem, see above; 0: on footholds
+  double friction = 0.7;             ///< coefficient, 1
+  double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
+  double published = 0;              ///< 1: the paper's problem, see above; 0: on footholds
   /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time. 0: the contact's
   /// stabilisation stops what velocity a foot may have left.
   double rigid_landing = 0;
+  double foothold_room = 0;  ///< how far from its foothold a foot may land, along each of its axes, m
 
   double state_weight = 0.1;           ///< of the state regularization
   double torso_weight = 1e4;           ///< of the torso's roll and pitch within the state regularization
@@ -89,6 +93,7 @@ struct LocomotionOptions {
   double swing_weight = 1e4;           ///< of the path of the swing foot, 1/m^2
   double swing_velocity_weight = 200;  ///< of its velocity, s^2/m^2 (and s^2)
   double swing_rotation_weight = 1e3;  ///< of its orientation, 1
+  double foothold_weight = 20;         ///< of the distance from the foothold, and of the horizontal path, 1/m^2
   double force_weight = 10;            ///< of the contact force reference, over (m g)^2
   double pressure_weight = 10;         ///< of the centre of pressure, over the half size of the sole squared
   double feet_distance = 0.01;         ///< least distance of the soles, or what the footholds leave if less, m

@@ -168,11 +168,12 @@ struct LandingWeights {
 void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights& weights, StageSpec& stage,
                     const std::string& suffix = "");
 
-/// Adds a path constraint for every active contact: the wrench cone of its sole (residual.h), drawn in by one per cent, in
-/// friction and in size, and by a thousandth of the robot's weight in the normal force, lest rounding of a result leave the
-/// cone. Its pyramids of friction/sqrt(2) are inscribed in round cones. A violation of 1 is the weight of the robot.
-/// \param friction  coefficient of the ground, positive
-void addWrenchCones(const Model& model, double friction, StageSpec& stage);
+/// Adds a path constraint for every active contact: the wrench cone of its sole (residual.h), drawn in by `margin`, in friction
+/// and in size, and by a thousandth of the robot's weight in the normal force. Its pyramids of friction/sqrt(2) are inscribed in round cones. A violation of 1 is the weight of the robot.
+/// \param friction  coefficient of the ground, positive   \param margin  part of 1 that is left free; at least a hundredth, or
+/// rounding of a result may leave the cone
+void addWrenchCones(const Model& model, double friction, double margin, StageSpec& stage);
+inline constexpr double kConeMargin = 0.01;
 
 /// Adds the costs of every active contact of the stage. \param loads  vertical force of each, in their order, N
 void addGroundCosts(const Model& model, const GroundCosts& costs, const VectorXd& loads, StageSpec& stage);

@@ -18,6 +18,7 @@ struct SquatOptions {
   double force_weight = 10;      ///< of the contact force reference (half the weight per foot), over (m g)^2
   double pressure_weight = 1;    ///< of the centre of pressure, over the half size of the sole squared
   double friction = 0.7;         ///< friction coefficient, 1
+  double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
   double contact_kp = 1e4;       ///< stabilisation of the contacts, 1/s^2; limited (limitGains)
   double contact_kd = 200;       ///< 1/s; likewise
   double closure_kp = 0;         ///< stabilisation of the closures, 1/s^2
