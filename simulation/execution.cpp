@@ -94,9 +94,9 @@ class FallDetector {
         q_(model.makeNeutral()),
         v_(VectorXd::Zero(model.nv())) {}
 
-  // Why the robot counts as fallen, or nothing.
-  std::string find(double time, const VectorXd& q) {
-    plan_.getReference(time, q_, v_);
+  // Why the robot counts as fallen, or nothing. `plan_time`: the instant of the plan at which it should be.
+  std::string find(double time, double plan_time, const VectorXd& q) {
+    plan_.getReference(plan_time, q_, v_);
     if (const Joint* joint = findStrayJoint(q))
       return "joint " + joint->name + " is far from its planned angle at " + formatTime(time);
     if (!model_.hasFreeFlyer()) return {};
@@ -220,7 +220,7 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
     out.largest_gap = std::max(out.largest_gap, world.getGap());
     if (!advances) break;
     if (tick % ticks_per_row == 0) recorder.addStage(world);
-    fall = detector.find(world.getTime(), world.getConfiguration());
+    fall = detector.find(world.getTime(), controller.getPlanTime(world.getTime()), world.getConfiguration());
     out.largest_deviation = std::max(out.largest_deviation, detector.getDeviation());
     if ((tick + 1) % ticks_per_row != 0 && tick + 1 != ticks && fall.empty()) continue;
     recorder.addNode(world);

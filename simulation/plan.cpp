@@ -1,5 +1,7 @@
 #include "simulation/plan.h"
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "bielle/model/error.h"
@@ -8,6 +10,10 @@
 namespace bielle::simulation {
 namespace {
 
+// Of predictive control. Feet may land elsewhere than planned, on steps a little; wrenches keep away from the edges of the
+// cones, since feedback and errors of the model add to what is planned.
+constexpr double kFootholdRoom = 0.4, kFootholdRoomOnSteps = 0.02;  // m
+constexpr double kFeedbackMargin = 0.2;
 constexpr int kMaxIterations = 200;  // more than a motion takes from its own solution
 
 // Limits given by motor are recorded with the options of the motion.
@@ -25,14 +31,94 @@ LimitOptions readLimits(const MotionSummary& summary) {
   return limits;
 }
 
+// Sets an option of a motion, or of the parts of a sequence, where it has one.
+void setWherePresent(const MotionRequest& request, const std::string& name, double value) {
+  for (const OptionEntry& entry : request.options) {
+    const bool ends = entry.name.size() > name.size() &&
+                      entry.name.compare(entry.name.size() - name.size() - 1, std::string::npos, "." + name) == 0;
+    if (entry.name == name || ends) *entry.value = value;
+  }
+}
+
+// Feet stand where they landed, wherever that is, and land where they must.
+void freeFeet(const Ground& ground, const MotionRequest& request) {
+  setWherePresent(request, "contact_kp", 0);
+  setWherePresent(request, "foothold_room", ground.steps.empty() ? kFootholdRoom : kFootholdRoomOnSteps);
+  setWherePresent(request, "cone_margin", kFeedbackMargin);
+}
+
 LoadedRobot loadRobotOf(const MotionSummary& summary) {
   std::error_code error;
   return loadRobot(std::filesystem::is_regular_file(summary.robot_file, error) ? summary.robot_file : summary.robot);
 }
 
+// A motion, and the solver whose last sweep is about its solution. \returns iterations
+int solveForGains(const std::string& source, Fddp& solver, Motion& motion) {
+  const FddpSummary solved = solver.solve(*motion.problem, motion.guess);
+  if (solved.termination != FddpTermination::Converged)
+    throw ModelError(source, "motion '" + motion.name + "'",
+                     std::string("solved for its gains it is ") + getName(solved.termination),
+                     "give a motion that converges, or --control open");
+  // The sweep is about the trajectory unless the last iteration still took a step.
+  if (!solved.log.empty() && solved.log.back().step > 0) solver.solve(*motion.problem, motion.guess);
+  return solved.iterations;
+}
+
+// A plan with robot and summary, from its request. `guess`: directory of a solution, or empty.
+void finishPlan(const MotionRequest& request, const std::string& guess, PlanControl control,
+                const PredictiveOptions& predictive, Plan& plan) {
+  const MotionSummary& summary = plan.summary;
+  const Model& model = plan.robot.model;
+  const auto makeStages = [&] {
+    MotionPlan stages = request.plan(model, makeStandingPosture(model));
+    fixTimings(summary.timings, summary.step, stages.schedule, stages.stages);
+    return stages;
+  };
+  ProblemOptions options(summary.formulation, summary.step);
+  options.limits = readLimits(summary);
+  options.objective = summary.objective;
+  Motion motion = makeMotion(model, makeStages(), options);
+  plan.ground = motion.ground;
+  plan.schedule = motion.schedule;
+  if (!guess.empty()) setGuess(readResultRecord(guess), motion);
+  if (control == PlanControl::Open && !guess.empty()) {
+    plan.policy = std::make_unique<Policy>(makePolicy(motion, motion.guess));
+    return;
+  }
+  if (summary.objective.objective == Objective::PeakTorque)
+    throw ModelError(summary.file, "objective 'peak-torque'", "the gains of its solver let no torque exceed the peak",
+                     "give --control open, or solve the motion for another objective");
+  FddpOptions solver_options;
+  solver_options.max_iterations = kMaxIterations;
+  if (guess.empty()) solver_options.initial_regularization = kGuessRegularization;
+  if (motion.bounded) solver_options.bounds = ControlBounds::Enforce;
+  Fddp solver(solver_options);
+  plan.iterations = solveForGains(summary.file, solver, motion);
+  plan.policy = std::make_unique<Policy>(control == PlanControl::Open ? makePolicy(motion, motion.guess)
+                                                                      : makePolicy(motion, motion.guess, solver));
+  if (control != PlanControl::Predictive) return;
+  freeFeet(plan.ground, request);
+  plan.predictive = std::make_unique<PredictiveController>(
+      makePredictiveMotion(model, makeStages(), options, predictive), motion.guess, predictive);
+}
+
+double getOption(const MotionRequest& request, const std::string& name) {
+  for (const OptionEntry& entry : request.options)
+    if (entry.name == name) return *entry.value;
+  return 0;
+}
+
+// As many steps as there is time for.
+void chooseSteps(double duration, const MotionRequest& request) {
+  const double step = getOption(request, "single_support") + getOption(request, "double_support");
+  const double rest = getOption(request, "start_support") + getOption(request, "end_support");
+  if (duration <= 0 || step <= 0) return;
+  setOption(request.options, "steps", std::max(2.0, std::floor((duration - rest) / step)));
+}
+
 }  // namespace
 
-std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control) {
+std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control, const PredictiveOptions& predictive) {
   auto plan = std::make_unique<Plan>();
   plan->summary = readSummary(directory);
   const MotionSummary& summary = plan->summary;
@@ -40,35 +126,27 @@ std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control
     throw ModelError(summary.file, "model '" + summary.model + "'", "it is not a motion of the closed robot",
                      "transfer it with `bielle lift`, or solve it without --model serial");
   plan->robot = loadRobotOf(summary);
-  const Model& model = plan->robot.model;
-  MotionPlan request = remakeRequest(summary).plan(model, makeStandingPosture(model));
-  fixTimings(summary.timings, summary.step, request.schedule, request.stages);
-  ProblemOptions options(summary.formulation, summary.step);
-  options.limits = readLimits(summary);
-  options.objective = summary.objective;
-  Motion motion = makeMotion(model, std::move(request), options);
-  plan->ground = motion.ground;
-  plan->schedule = motion.schedule;
-  setGuess(readResultRecord(directory), motion);
-  if (control == PlanControl::Open) {
-    plan->policy = std::make_unique<Policy>(makePolicy(motion, motion.guess));
-    return plan;
-  }
-  if (summary.objective.objective == Objective::PeakTorque)
-    throw ModelError(summary.file, "objective 'peak-torque'", "the gains of its solver let no torque exceed the peak",
-                     "give --control open, or solve the motion for another objective");
-  FddpOptions solver_options;
-  solver_options.max_iterations = kMaxIterations;
-  if (motion.bounded) solver_options.bounds = ControlBounds::Enforce;
-  Fddp solver(solver_options);
-  const FddpSummary solved = solver.solve(*motion.problem, motion.guess);
-  if (solved.termination != FddpTermination::Converged)
-    throw ModelError(summary.file, "gains", std::string("the motion solved again is ") + getName(solved.termination),
-                     "give a motion that converged, or --control open");
-  plan->iterations = solved.iterations;
-  // The sweep is about the trajectory unless the last iteration still took a step.
-  if (!solved.log.empty() && solved.log.back().step > 0) solver.solve(*motion.problem, motion.guess);
-  plan->policy = std::make_unique<Policy>(makePolicy(motion, motion.guess, solver));
+  finishPlan(remakeRequest(summary), directory, control, predictive, *plan);
+  return plan;
+}
+
+std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control, const PredictiveOptions& predictive) {
+  auto plan = std::make_unique<Plan>();
+  const MotionRequest motion = findMotion("", request.motion).makeRequest();
+  const bool walks = std::any_of(motion.options.begin(), motion.options.end(),
+                                 [](const OptionEntry& entry) { return entry.name == "steps"; });
+  if (walks) chooseSteps(request.duration, motion);
+  for (const auto& [name, value] : request.settings) setOption(motion.options, name, value);
+  plan->robot = loadRobot(request.robot);
+  MotionSummary& summary = plan->summary;
+  summary.motion = request.motion;
+  summary.robot = request.robot;
+  summary.robot_file = plan->robot.file;
+  summary.model = "closed";
+  summary.formulation = Formulation::Reduced;
+  summary.step = StepRule::Midpoint;
+  summary.requested = listValues(motion.options);
+  finishPlan(motion, "", control, predictive, *plan);
   return plan;
 }
 

@@ -4,7 +4,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 
 #include "bielle/model/error.h"
@@ -28,6 +30,9 @@ constexpr int kStood = 0, kFell = 1, kBadInput = 2;
 
 struct Arguments {
   std::string directory, output, world = "bielle", control = "gains", terrain = "planned";
+  std::string robot;  // of a motion that is to be solved; empty: `directory` holds one
+  std::optional<double> speed;
+  std::vector<std::string> settings;  // name=value
   std::vector<std::string> pushes;
   double friction = 0;  // 0: that of the plan
   double time_step = 0;
@@ -38,6 +43,7 @@ struct Arguments {
   unsigned seed = 1;
   bool no_report = false, summary_only = false, dry_run = false;
   ExecutionOptions execution;
+  PredictiveOptions predictive;
 };
 
 std::pair<std::string, double> parseNumber(const std::string& flag, const std::string& text, const char* example) {
@@ -141,6 +147,15 @@ nlohmann::ordered_json listEstimation(const EstimationErrors& e) {
           {"contact_errors", e.contact_errors}};
 }
 
+nlohmann::ordered_json listSolves(const PredictiveCounts& counts) {
+  return {{"count", counts.solves},
+          {"missed", counts.missed},
+          {"failed", counts.failed},
+          {"median_ms", 1e3 * counts.calcQuantile(0.5)},
+          {"p99_ms", 1e3 * counts.calcQuantile(0.99)},
+          {"worst_ms", 1e3 * counts.calcQuantile(1)}};
+}
+
 nlohmann::ordered_json listPushes(const std::vector<Push>& pushes) {
   auto list = nlohmann::ordered_json::array();
   for (const Push& push : pushes)
@@ -156,6 +171,9 @@ void extendSummary(const std::string& path, const Arguments& arguments, const Pl
   auto summary = nlohmann::ordered_json::parse(readTextFile(path));
   summary["world"] = arguments.world;
   summary["control"] = arguments.control;
+  if (plan.predictive) summary["solves"] = listSolves(plan.predictive->getCounts());
+  for (const auto& [name, value] : plan.summary.requested)
+    if (name == "speed") summary["commanded_speed"] = value;
   summary["terrain"] = arguments.terrain;
   summary["sensors"] = arguments.sensors;
   if (arguments.sensors == "real") {
@@ -197,6 +215,15 @@ void print(const Arguments& arguments, const Plan& plan, const Execution& e) {
       e.duration, e.distance, e.getMeanSpeed(), e.largest_deviation, e.largest_gap, e.largest_slip, e.imbalance,
       e.energy_balance, 100 * e.saturated_share, e.real_time_factor);
   std::cout << text;
+  if (plan.predictive) {
+    const PredictiveCounts& c = plan.predictive->getCounts();
+    std::snprintf(text, sizeof text,
+                  "  solves              %d, %d failed; median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n"
+                  "                      %d took longer than they would have in real time\n",
+                  c.solves, c.failed, 1e3 * c.calcQuantile(0.5), 1e3 * c.calcQuantile(0.99), 1e3 * c.calcQuantile(1),
+                  c.missed);
+    std::cout << text;
+  }
   if (arguments.sensors != "real") return;
   const EstimationErrors& s = e.estimation;
   std::snprintf(text, sizeof text,
@@ -236,11 +263,28 @@ void parseOptions(Arguments& arguments) {
   makeGround(arguments, {});
 }
 
+// The motion solved before or, where a robot is given, the motion of that name.
+std::unique_ptr<Plan> obtainPlan(const Arguments& arguments) {
+  const std::map<std::string, PlanControl> controls{
+      {"open", PlanControl::Open}, {"gains", PlanControl::Gains}, {"mpc", PlanControl::Predictive}};
+  const PlanControl control = controls.at(arguments.control);
+  if (arguments.robot.empty()) {
+    if (arguments.speed || !arguments.settings.empty())
+      throw ModelError("", arguments.speed ? "--speed" : "--set", "a motion solved before has its own",
+                       "give --robot and the name of a motion");
+    return readPlan(arguments.directory, control, arguments.predictive);
+  }
+  PlanRequest request{arguments.directory, arguments.robot, {}, arguments.execution.duration};
+  if (arguments.speed) request.settings.emplace_back("speed", *arguments.speed);
+  for (const std::string& setting : arguments.settings)
+    request.settings.push_back(parseNumber("--set", setting, "--set steps=8"));
+  return makePlan(request, control, arguments.predictive);
+}
+
 int simulate(Arguments arguments, const std::vector<std::string>& command) {
   parseOptions(arguments);
   if (arguments.dry_run) return kStood;
-  const auto plan =
-      readPlan(arguments.directory, arguments.control == "gains" ? PlanControl::Gains : PlanControl::Open);
+  const auto plan = obtainPlan(arguments);
   const Model& model = plan->robot.model;
   const double look_ahead = arguments.look_ahead.value_or(arguments.sensors == "real" ? kRealLookAhead : 0);
   plan->policy->setLookAhead(1e-3 * look_ahead);
@@ -253,7 +297,7 @@ int simulate(Arguments arguments, const std::vector<std::string>& command) {
   arguments.execution.planned_ground = plan->ground;
   const auto world = makeWorld(arguments.world, model, {ground, arguments.time_step});
   makeOutputDirectory(arguments.output);
-  const Execution execution = execute(model, *plan->policy, *plan->policy, *world, arguments.execution);
+  const Execution execution = execute(model, *plan->policy, plan->getController(), *world, arguments.execution);
   print(arguments, *plan, execution);
   const MotionResult result = makeResult(arguments, *plan, ground, execution, command);
   for (const std::string& path : write(arguments, *plan, execution, result)) std::cout << "  " << path << "\n";
@@ -262,10 +306,20 @@ int simulate(Arguments arguments, const std::vector<std::string>& command) {
 
 void addOptions(CLI::App& app, Arguments& a) {
   const auto positive = CLI::PositiveNumber;
-  app.add_option("DIR", a.directory, "result of `bielle solve`: a motion of the closed robot")->required();
-  app.add_option("-o,--output", a.output,
-                 "directory for trajectory.csv, trajectory.npz and summary.json of the motion that happened, plan.npz (the "
-                 "plan at the same times) and report.html")
+  app.add_option(
+         "DIR", a.directory,
+         "result of `bielle solve`: a motion of the closed robot; with --robot the name of a motion, which is solved "
+         "first")
+      ->required();
+  app.add_option("--robot", a.robot, "name or directory of the robot that is to make the motion of this name");
+  app.add_option("--speed", a.speed, "of that motion [m/s]");
+  app.add_option("--set", a.settings,
+                 "name=value: another option of that motion, as in `bielle solve`; may be repeated")
+      ->allow_extra_args(false);
+  app.add_option(
+         "-o,--output", a.output,
+         "directory for trajectory.csv, trajectory.npz and summary.json of the motion that happened, plan.npz (the "
+         "plan at the same times) and report.html")
       ->required();
   app.add_option(
          "--world", a.world,
@@ -277,8 +331,18 @@ void addOptions(CLI::App& app, Arguments& a) {
   app.add_option(
          "--control", a.control,
          "open: the torques of the plan; gains: and the gains of the solver's last sweep times the deviation from "
-         "the plan, for which the motion is solved again")
-      ->check(CLI::IsMember({"open", "gains"}))
+         "the plan, for which the motion is solved again; mpc: predictive control, which solves the next second anew at "
+         "every stage, from the state that is measured")
+      ->check(CLI::IsMember({"open", "gains", "mpc"}))
+      ->capture_default_str();
+  app.add_option("--nodes", a.predictive.nodes, "stages that predictive control looks ahead")
+      ->check(CLI::Range(10, 1000))
+      ->capture_default_str();
+  app.add_option("--iterations", a.predictive.iterations, "of predictive control, at every stage")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  app.add_option("--threads", a.predictive.threads, "of predictive control; 0: all. Results do not depend on it")
+      ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   app.add_option("--terrain", a.terrain,
                  "planned: the ground of the plan; flat; ramp=SLOPE: height over length [1], from x = 0.3 m on; "

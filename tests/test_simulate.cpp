@@ -212,6 +212,30 @@ TEST_CASE("simulate: a motion of least energy is carried out as such; one of lea
   CHECK(simulate(peak, {"--control", "open"}).status < 2);
 }
 
+TEST_CASE("simulate: predictive control survives a push that gains do not") {
+  const Scratch scratch;
+  const auto simulate = [&](const std::string& control) {
+    const std::string directory = (scratch.path / control).string();
+    const CommandResult result =
+        runCommand({BIELLE_COMMAND, "simulate", "walk", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--speed",
+                    "0.4", "--duration", "2.8", "--control", control, "--push", "t=1.15,impulse=5,direction=180", "-o",
+                    directory, "--no-report"});
+    CAPTURE(result.err);
+    const auto summary = readSummary(directory);
+    CHECK(result.status == (summary["fell"].get<bool>() ? 1 : 0));
+    CHECK(summary["commanded_speed"] == 0.4);
+    return summary;
+  };
+  CHECK(simulate("gains")["fell"] == true);
+  const auto summary = simulate("mpc");
+  CHECK(summary["fell"] == false);
+  CHECK(summary["duration"].get<double>() == Approx(2.8));
+  CHECK(summary["largest_slip"].get<double>() < 0.01);
+  CHECK(summary["solves"]["failed"] == 0);
+  CHECK(summary["solves"]["count"] == 234);  // one for every 12 ms
+  CHECK(summary["solves"]["worst_ms"].get<double>() >= summary["solves"]["median_ms"].get<double>());
+}
+
 TEST_CASE("simulate: bad input is refused in one line, with status 2") {
   const Scratch scratch;
   const std::string output = (scratch.path / "bad").string();

@@ -21,6 +21,8 @@ class Controller {
   virtual ~Controller() = default;
   /// Torques of the motors in their order (nu, N m or N), not cut at their limits. It neither allocates nor throws.
   virtual void update(const Measurement& measurement, VectorRef u) = 0;
+  /// The instant of its plan at which a controller is, s: feet that land early may bring it ahead.
+  virtual double getPlanTime(double time) const { return time; }
 };
 
 }  // namespace bielle

@@ -1,0 +1,69 @@
+#pragma once
+/// \file Predictive control: a plan of the next second or so, made anew at every stage from the measured state.
+///
+/// The problem is the motion's, through a window of N of its stages. Let stage k begin at t_k. From what is measured at t_k
+/// and the torques of that instant the model predicts the state at the next stage,
+///
+///     x_{k+1} = f_k(x(t_k) projected on the closures, u(t_k))                                                       (1)
+///
+/// and while stage k lasts, the window from k+1 on is solved from there, in a few iterations that start from the last
+/// solution, its multipliers moved on by a stage. The window ends near the state that the motion passes at t_{k+1+N}. From
+/// t_{k+1} on the first stages of the solution are a policy (policy.h, Eq. 1). A solution thus takes one stage to come into
+/// force, however fast it is found; if none is found the last policy, which reaches some stages farther, stays.
+///
+/// A foot that is on the ground in the second half of its swing (Measurement::contacts) has landed: the motion goes on with the
+/// stage of its landing, and stays ahead of the plan by what the swing was cut short.
+///
+/// After its last stage the motion is followed by as many copies of that stage as the window is long: the robot stands there.
+#include <memory>
+
+#include "bielle/control/policy.h"
+
+namespace bielle {
+
+struct PredictiveOptions {
+  int nodes = 100;               ///< N
+  int iterations = 2;            ///< of the solver, at every stage
+  double regularization = 1e-5;  ///< of its sweeps
+  double penalty = 10;           ///< of violated constraints (fddp.h, Eq. 10)
+  int threads = 0;               ///< 0: all. Results are bitwise independent of it.
+  /// Weights of the difference between the end of the window and the motion there: of heading and place over the ground, of the
+  /// other coordinates, of the velocities; 1/m^2 or 1, s^2/m^2 or s^2.
+  double end_place = 1, end_posture = 100, end_velocity = 10;
+};
+
+/// Solves since the start.
+struct PredictiveCounts {
+  int solves = 0;
+  int failed = 0;  ///< the last policy stayed in force
+  int early = 0;   ///< feet that landed in the second half of their swing
+  int missed = 0;  ///< took longer than the stage that they had, though their policy came into force at its end
+  std::vector<double> seconds;  ///< of each, until its policy was ready
+
+  /// The least time that is not exceeded by this share of the solves, s; 0 if there are none.
+  double calcQuantile(double share) const;
+};
+
+/// The motion that predictive control solves: `plan`, then as many copies of its last stage as the window is long, which ends
+/// by PredictiveOptions' weights.
+/// \throws ModelError as makeMotion() does
+Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOptions& problem,
+                            const PredictiveOptions& options);
+
+class PredictiveController : public Controller {
+ public:
+  /// \param motion  by makePredictiveMotion() with the same options, in the reduced formulation; moved in. Its model must outlive
+  /// this   \param plan  the solved motion, without the copies of its last stage: where windows end, and what the first one starts from
+  PredictiveController(Motion motion, const ShootingTrajectory& plan, const PredictiveOptions& options);
+  ~PredictiveController() override;
+
+  void update(const Measurement& measurement, VectorRef u) override;
+  double getPlanTime(double time) const override;
+  const PredictiveCounts& getCounts() const;
+
+ private:
+  class Planner;
+  std::unique_ptr<Planner> planner_;
+};
+
+}  // namespace bielle
