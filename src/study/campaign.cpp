@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
@@ -247,18 +248,18 @@ class CampaignRunner {
 std::vector<std::string> solveMotions(const CampaignSpec& spec, const std::string& directory,
                                       const CampaignOptions& options) {
   std::vector<Case> cases;
-  std::vector<std::string> robots;
+  std::set<std::string> robots;  // each once: another motion of one of them changes nothing for the others
   for (const CampaignMotion& motion : spec.motions) {
     if (!motion.directory.empty()) continue;
     Case one{motion.name, {motion.solve}};
     one.steps[0].insert(one.steps[0].end(), {"-o", std::string("@") + kMotion, "--quiet", "--no-report", "--no-check"});
     cases.push_back(one);
-    robots.push_back(loadRobot(motion.robot).directory);
+    robots.insert(loadRobot(motion.robot).directory);
   }
   RunOutcome outcome;
   if (!cases.empty())
     outcome = runCases(directory + "/motions", cases,
-                       {options.bielle, makeIdentity(options.bielle, robots), options.jobs, options.progress});
+                       {options.bielle, makeIdentity(options.bielle, {robots.begin(), robots.end()}), options.jobs, options.progress});
   if (outcome.interrupted) return {};
   std::vector<std::string> directories;
   size_t next = 0;
