@@ -25,7 +25,7 @@ struct PredictiveOptions {
   int nodes = 100;               ///< N
   int iterations = 2;            ///< of the solver, at every stage
   double regularization = 1e-5;  ///< of its sweeps
-  double penalty = 10;           ///< of violated constraints (fddp.h, Eq. 10)
+  double penalty = 1;            ///< of violated constraints (fddp.h, Eq. 10)
   int threads = 0;               ///< 0: all. Results are bitwise independent of it.
   /// Weights of the difference between the end of the window and the motion there: of heading and place over the ground, of the
   /// other coordinates, of the velocities; 1/m^2 or 1, s^2/m^2 or s^2.
