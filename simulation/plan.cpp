@@ -52,6 +52,11 @@ LoadedRobot loadRobotOf(const MotionSummary& summary) {
   return loadRobot(std::filesystem::is_regular_file(summary.robot_file, error) ? summary.robot_file : summary.robot);
 }
 
+void solveFromRest(FddpOptions options, Motion& motion) {
+  options.initial_regularization = kGuessRegularization;
+  Fddp(options).solve(*motion.problem, motion.guess);
+}
+
 // A motion, and the solver whose last sweep is about its solution. \returns iterations
 int solveForGains(const std::string& source, Fddp& solver, Motion& motion) {
   const FddpSummary solved = solver.solve(*motion.problem, motion.guess);
@@ -90,8 +95,9 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
                      "give --control open, or solve the motion for another objective");
   FddpOptions solver_options;
   solver_options.max_iterations = kMaxIterations;
-  if (guess.empty()) solver_options.initial_regularization = kGuessRegularization;
   if (motion.bounded) solver_options.bounds = ControlBounds::Enforce;
+  // From the solution penalties stay small, and gains with them.
+  if (guess.empty()) solveFromRest(solver_options, motion);
   Fddp solver(solver_options);
   plan.iterations = solveForGains(summary.file, solver, motion);
   plan.policy = std::make_unique<Policy>(control == PlanControl::Open ? makePolicy(motion, motion.guess)

@@ -21,7 +21,6 @@ std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajec
   if (problem.hasFreeTimings()) throw std::invalid_argument("makePolicy: durations of the motion are free");
   const Model& model = problem.model();
   NodeEvaluator evaluator(problem);
-  ImpactWorkspace impact(model);
   std::vector<Policy::Stage> stages;
   double time = 0;
   int node = 0, phase_index = 0;
@@ -35,7 +34,7 @@ std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajec
       stage.phase = phase_index;
       if (sweep) {
         evaluator.evaluate(node, x, trajectory.us[node]);
-        calcGains(model, spec.constraints, evaluator, sweep->getNodes()[node].K, impact, stage.K);
+        calcGains(model, evaluator, sweep->getNodes()[node].K, stage.K);
       }
       stages.push_back(std::move(stage));
       time += spec.dt;
@@ -68,13 +67,9 @@ void fillStage(const RobotProblem& problem, int node, double start, const Vector
   stage.u = u.head(model.nu());
 }
 
-void calcGains(const Model& model, const ConstraintSet& constraints, NodeEvaluator& evaluator, const RowMatrixXd& K,
-               ImpactWorkspace& impact, RowMatrixXd& gains) {
+void calcGains(const Model& model, NodeEvaluator& evaluator, const RowMatrixXd& K, RowMatrixXd& gains) {
   const int nq = model.nq(), nv = model.nv();
   const VectorXd x = evaluator.evaluation().x;
-  const bool regular = updateImpact(model, impact, constraints, x.head(nq), x.tail(nv)) == DynamicsStatus::Ok &&
-                       updateImpactDerivatives(model, impact, constraints) == DynamicsStatus::Ok;
-  if (!regular) impact.dv_dv.setIdentity(nv, nv);
   MatrixXd map(K.cols(), 2 * nv);
   VectorXd moved = x, step = VectorXd::Zero(nv);
   for (int i = 0; i < nv; ++i) {
@@ -87,10 +82,7 @@ void calcGains(const Model& model, const ConstraintSet& constraints, NodeEvaluat
     moved[nq + i] += kPerturbation;
     map.col(nv + i) = evaluator.difference(moved) / kPerturbation;
   }
-  const RowMatrixXd product = K * map;
-  gains.resize(K.rows(), 2 * nv);
-  gains.leftCols(nv).noalias() = product.leftCols(nv) * impact.dv_dv;
-  gains.rightCols(nv).noalias() = product.rightCols(nv) * impact.dv_dv;
+  gains.noalias() = K * map;
 }
 
 Policy::Policy(const Model& model, std::vector<Stage> stages, const VectorXd& u_hold)

@@ -1,7 +1,6 @@
 #pragma once
 // The stages of a policy from nodes of a trajectory.
 #include "bielle/control/policy.h"
-#include "bielle/dynamics/impact.h"
 #include "bielle/solve/node_evaluator.h"
 
 namespace bielle {
@@ -11,8 +10,6 @@ void fillStage(const RobotProblem& problem, int node, double start, const Vector
                const VectorXd& x_next, Policy::Stage& stage);
 
 /// Policy's Eq. (2) about the last evaluation. \param K  of the solver, nu x tangent size
-/// \param constraints  in force during the stage
-void calcGains(const Model& model, const ConstraintSet& constraints, NodeEvaluator& evaluator, const RowMatrixXd& K,
-               ImpactWorkspace& impact, RowMatrixXd& gains);
+void calcGains(const Model& model, NodeEvaluator& evaluator, const RowMatrixXd& K, RowMatrixXd& gains);
 
 }  // namespace bielle

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "bielle/dynamics/impact.h"
 #include "bielle/model/error.h"
 #include "control/policy_stages.h"
 #include "solve/lq_sweep.h"
@@ -245,7 +246,7 @@ class PredictiveController::Planner {
                 out);
       out.phase = phases_[k];
       evaluator_.evaluate(k, trajectory_.xs[node], trajectory_.us[node]);
-      calcGains(model_, problem_.spec(k).constraints, evaluator_, solver.getSweep().getNodes()[node].K, impact_, out.K);
+      calcGains(model_, evaluator_, solver.getSweep().getNodes()[node].K, out.K);
       next_u_hold_ = out.u;
       ++stage, ++node;
     }

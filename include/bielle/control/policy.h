@@ -8,15 +8,9 @@
 /// interpolated linearly within a phase of constant contacts and held across its borders. The solver's gains refer to the
 /// tangent space of the problem at x_k; those of (1) are
 ///
-///     K_k = K_k^solver d(x (-) x_k)/d(dq, dv) P                                                                     (2)
+///     K_k = K_k^solver d(x (-) x_k)/d(dq, dv)                                                                       (2)
 ///
-/// (nu x 2 nv): in the reduced formulation a state that is not closed is thus projected on the closed ones. With M the mass
-/// matrix and J the Jacobian of closures and contacts in force at q_k,
-///
-///     P = diag(p, p),    p = 1 - M^-1 J^T (J M^-1 J^T)^+ J                                                          (3)
-///
-/// leaves out motions of feet that stand, as an impact would: the model holds these feet, and would answer the give of a real
-/// ground with forces that no ground has. After its end the
+/// (nu x 2 nv): in the reduced formulation a state that is not closed is thus projected on the closed ones. After its end the
 /// policy holds the last posture with the torques u_hold that carry it at rest, and with the gains of the first stage of the
 /// last phase: those of its last stages look ahead too little to care for where the robot is. Where torques act later than
 /// the state was measured, u* and K are those of the time when they act, the deviation is that of the time of the measurement.
