@@ -118,7 +118,8 @@ TEST_CASE("gait: swings start and end at rest, the pendulum's zero-moment point 
   CHECK((calcSwing(shape, kLeft, end, 1 - 1e-3).p - end.p).norm() < 1e-7);
 
   const FootstepPlan plan = planFootsteps(kLeft, kRight, {0.2, 0, 0}, 5, Side::Right);
-  const GaitTiming timing;
+  GaitTiming timing;
+  timing.time_step = 0.012;
   const Vector3d com(0.01, 0, 0.5);
   const double g = 9.81, h = timing.time_step;
   const Gait gait = makeGait(makeTask(plan), timing, shape, 0, com, g);
@@ -155,6 +156,28 @@ TEST_CASE("walk: Bipetto walks as fast as asked, on its feet") {
   }
 }
 
+TEST_CASE("walk: stages are as short as the fastest swing needs, unless their length is given") {
+  const Model& model = getBipetto();
+  const VectorXd q0 = makeStandingPosture(model);
+  const auto getStep = [&](double speed, double single, double height, double time_step) {
+    WalkOptions options;
+    options.speed = speed;
+    options.gait.timing.single = single;
+    options.gait.timing.time_step = time_step;
+    options.gait.swing.height = height;
+    return planWalk(model, options, q0).schedule.phases.front().dt;
+  };
+  CHECK(getStep(0.5, 0.36, 0.04, 0) == 0.012);
+  CHECK(getStep(-0.8, 0.36, 0.04, 0) == 0.012);
+  // The quintic of a stride of 2 v (0.36 + 0.045) s has 15/8 of its mean velocity in the middle, where the foot is highest.
+  const double fastest = 15.0 / 8 * 2 * 1.2 * 0.405 / (0.95 * 0.36);
+  CHECK(getStep(1.2, 0.36, 0.04, 0) == Approx(1e-3 * std::floor(12 * std::pow(4.1 / fastest, 2))));
+  CHECK(getStep(1.2, 0.36, 0.04, 0.012) == 0.012);
+  CHECK(getStep(0.9, 0.36, 0.04, 0) == 0.012);
+  CHECK(getStep(0.9, 0.18, 0.04, 0) < 0.012);
+  CHECK(getStep(0, 0.1, 0.15, 0) < 0.012);  // the height counts
+}
+
 TEST_CASE("walk: the first double support is as long as the soles need to set off") {
   const Model& model = getBipetto();
   const ContactFrame& sole = model.contacts()[0];
@@ -163,7 +186,7 @@ TEST_CASE("walk: the first double support is as long as the soles need to set of
     return planWalk(model, options, q0).schedule.phases.front().nodes;
   };
   WalkOptions options;
-  const double h = options.gait.timing.time_step;
+  const double h = options.gait.timing.time_step = 0.012;
   CHECK(count(options) == std::lround(options.gait.timing.start / h));
   options.speed = 0.9;
   options.gait.start_pressure = 0.3;
@@ -268,7 +291,7 @@ TEST_CASE("walk: what cannot be done is refused by name") {
                                                                  {"steps", 4.5, "steps"},
                                                                  {"single_support", 0, "single_support"},
                                                                  {"double_support", -1, "double_support"},
-                                                                 {"time_step", 0, "time_step"},
+                                                                 {"time_step", -0.01, "time_step"},
                                                                  {"friction", 0, "friction"},
                                                                  {"swing_height", -0.1, "swing_height"},
                                                                  {"start_pressure", -0.1, "start_pressure"},

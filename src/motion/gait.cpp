@@ -202,6 +202,24 @@ SE3 calcSwing(const SwingShape& shape, const SE3& a, const SE3& b, double s) {
   return X;
 }
 
+double chooseTimeStep(const LocomotionTask& task, const GaitTiming& timing, const SwingShape& shape) {
+  constexpr double kLongest = 0.012, kShortest = 0.002, kUnit = 0.001, kSpeed = 4.1;
+  constexpr int kPoints = 100;
+  double fastest = 0;
+  for (size_t i = 0; i < task.plan.steps.size(); ++i) {
+    const Footstep& step = task.plan.steps[i];
+    const SE3 from = task.plan.getStance(static_cast<int>(i))[static_cast<int>(step.side)];
+    SE3 before = from;
+    for (int k = 1; k <= kPoints; ++k) {
+      const SE3 X = calcSwing(shape, from, step.X_WF, static_cast<double>(k) / kPoints);
+      fastest = std::max(fastest, (X.p - before.p).norm() * kPoints / (timing.single + 2 * timing.flight));
+      before = X;
+    }
+  }
+  if (!(fastest > kSpeed)) return kLongest;
+  return std::max(kShortest, kUnit * std::floor(kLongest * std::pow(kSpeed / fastest, 2) / kUnit));
+}
+
 Gait makeGait(const LocomotionTask& task, const GaitTiming& timing, const SwingShape& shape, double stretch,
               const Vector3d& com, double gravity) {
   const FootstepPlan& plan = task.plan;

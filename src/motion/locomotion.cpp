@@ -341,8 +341,10 @@ Stance makeStance(const Model& model, const LocomotionOptions& options, const Ve
 }
 
 MotionPlan planLocomotion(const Model& model, const Stance& stance, const LocomotionTask& task,
-                          const LocomotionOptions& options) {
-  check(options);
+                          const LocomotionOptions& requested) {
+  check(requested);
+  LocomotionOptions options = requested;
+  if (options.timing.time_step == 0) options.timing.time_step = chooseTimeStep(task, options.timing, options.swing);
   Scene scene{
       model, stance, task, options, makeStartingGait(model, stance, task, options), makeWeights(model, options)};
   if (!isPublished(scene)) check(scene);

@@ -40,6 +40,7 @@ MotionPlan planFlights(const Model& model, const Stance& stance, LocomotionTask 
   gait.timing.flight = options.flight;
   gait.timing.single = options.stance;
   requireOption(options.flight > 0, "flight", "it is not positive", "give seconds, e.g. 0.1");
+  requireOption(gait.timing.time_step > 0, "time_step", "it is not positive", "give seconds, e.g. 0.005");
   requireOption(options.stance >= 4 * gait.timing.time_step, "stance", "it is shorter than four time steps",
                 "give seconds, e.g. 0.25");
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);

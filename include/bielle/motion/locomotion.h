@@ -42,12 +42,13 @@
 namespace bielle {
 
 struct GaitTiming {
-  double start = 0.3;        ///< double support before the first step, s
-  double single = 0.36;      ///< single support, s
-  double both = 0.045;       ///< double support between steps, s
-  double flight = 0;         ///< between single supports, in place of double support, s; 0: a walk
-  double end = 0.45;         ///< double support after the last step, s
-  double time_step = 0.012;  ///< s; fast feet need shorter ones: what steps of order p leave grows with its power p
+  double start = 0.3;    ///< double support before the first step, s
+  double single = 0.36;  ///< single support, s
+  double both = 0.045;   ///< double support between steps, s
+  double flight = 0;     ///< between single supports, in place of double support, s; 0: a walk
+  double end = 0.45;     ///< double support after the last step, s
+  /// Length of a stage, s; 0: by the swings (chooseTimeStep). What steps of order p leave grows with its power p.
+  double time_step = 0;
 
   double stepDuration() const { return single + (flight > 0 ? flight : both); }  ///< s
 };
