@@ -51,21 +51,19 @@ std::vector<CampaignCell> listCells(const CampaignSpec& spec) {
   return cells;
 }
 
-// What results depend on besides the options: the program, the motions and their robots.
-std::string makeHeader(const std::string& simulate, const std::vector<std::string>& directories) {
-  std::vector<fs::path> files = {simulate};
-  for (const std::string& directory : directories) {
-    for (const char* name : {"summary.json", "trajectory.csv", "trajectory.npz"})
-      if (fs::exists(fs::path(directory) / name)) files.push_back(fs::path(directory) / name);
-    const fs::path robot = readSummary(directory).robot_file;
-    std::vector<fs::path> parts;
-    if (fs::is_regular_file(robot))
-      for (const fs::directory_entry& entry : fs::directory_iterator(robot.parent_path()))
-        if (entry.path().extension() == ".urdf" || entry.path().extension() == ".yaml") parts.push_back(entry.path());
-    std::sort(parts.begin(), parts.end());
-    files.insert(files.end(), parts.begin(), parts.end());
-  }
-  return Json{{"campaign", makeIdentity(files)}}.dump();
+// What the results of a motion depend on besides the options and the program: its files and those of its robot.
+std::string identifyMotion(const std::string& directory) {
+  std::vector<fs::path> files;
+  for (const char* name : {"summary.json", "trajectory.csv", "trajectory.npz"})
+    if (fs::exists(fs::path(directory) / name)) files.push_back(fs::path(directory) / name);
+  const fs::path robot = readSummary(directory).robot_file;
+  std::vector<fs::path> parts;
+  if (fs::is_regular_file(robot))
+    for (const fs::directory_entry& entry : fs::directory_iterator(robot.parent_path()))
+      if (entry.path().extension() == ".urdf" || entry.path().extension() == ".yaml") parts.push_back(entry.path());
+  std::sort(parts.begin(), parts.end());
+  files.insert(files.end(), parts.begin(), parts.end());
+  return makeIdentity(files);
 }
 
 class CampaignRunner {
@@ -78,12 +76,13 @@ class CampaignRunner {
         options_(options),
         commands_(spec, motions),
         cells_(listCells(spec)),
-        log_(directory + "/runs.jsonl", makeHeader(options.simulate, motions),
-             "the log is of other motions, robots or another version") {
+        log_(directory + "/runs.jsonl", Json{{"campaign", makeIdentity({fs::path(options.simulate)})}}.dump(),
+             "the log is of another version of the program") {
+    for (const std::string& motion : motions) identities_.push_back(identifyMotion(motion));
     for (const std::string& line : log_.getLines()) {
       try {
         const Json json = parseJson(line);
-        results_[json.at("run")] = json.at("result");
+        results_[{json.at("motion"), json.at("run")}] = json.at("result");
       } catch (const std::exception&) {
         throw ModelError(log_.getPath(), "log", "one of its lines is not as it was written",
                          "remove the file: the runs are done anew");
@@ -137,9 +136,10 @@ class CampaignRunner {
   std::string makeKey(size_t cell, int multiple) const {
     return spec_.motions[cells_[cell][0]].name + " " + join(commands_.make(cells_[cell], makeImpulse(multiple)));
   }
+  const std::string& getIdentity(size_t cell) const { return identities_[cells_[cell][0]]; }
   // -1: it has not been done; else whether the robot stood.
   int findOutcome(size_t cell, int multiple) const {
-    const auto found = results_.find(makeKey(cell, multiple));
+    const auto found = results_.find({getIdentity(cell), makeKey(cell, multiple)});
     return found == results_.end() ? -1 : found->second.at("outcome") == kStood;
   }
   // Runs of a cell by the multiple of the step of the search, or 1 without a search.
@@ -203,8 +203,9 @@ class CampaignRunner {
       return std::nullopt;
     }
     const Json result = readRun(entry, end.status);
-    if (result.at("outcome") != kRefused) log_.append(Json{{"run", entry.key}, {"result", result}}.dump());
-    results_[entry.key] = result;
+    if (result.at("outcome") != kRefused)
+      log_.append(Json{{"motion", getIdentity(entry.cell)}, {"run", entry.key}, {"result", result}}.dump());
+    results_[{getIdentity(entry.cell), entry.key}] = result;
     report(entry.key + ": " + result.at("outcome").get<std::string>());
     return entry.cell;
   }
@@ -226,7 +227,7 @@ class CampaignRunner {
         for (size_t i = 0; i < spec_.axes.size(); ++i) run.values.push_back(spec_.axes[i].values[cells_[cell][i]]);
         if (spec_.search) run.values.push_back(makeImpulse(multiple));
         run.command = join(commands_.make(cells_[cell], makeImpulse(multiple)));
-        run.result = results_.at(makeKey(cell, multiple));
+        run.result = results_.at({getIdentity(cell), makeKey(cell, multiple)});
         out.runs.push_back(std::move(run));
       }
   }
@@ -238,7 +239,8 @@ class CampaignRunner {
   const CampaignCommands commands_;
   const std::vector<CampaignCell> cells_;
   LineLog log_;
-  std::map<std::string, Json> results_;  // by motion and arguments
+  std::vector<std::string> identities_;                          // of the motions
+  std::map<std::pair<std::string, std::string>, Json> results_;  // by identity of the motion, and key
   std::vector<Running> running_;
   size_t done_ = 0;
   bool complete_ = true;
@@ -258,8 +260,9 @@ std::vector<std::string> solveMotions(const CampaignSpec& spec, const std::strin
   }
   RunOutcome outcome;
   if (!cases.empty())
-    outcome = runCases(directory + "/motions", cases,
-                       {options.bielle, makeIdentity(options.bielle, {robots.begin(), robots.end()}), options.jobs, options.progress});
+    outcome = runCases(
+        directory + "/motions", cases,
+        {options.bielle, makeIdentity(options.bielle, {robots.begin(), robots.end()}), options.jobs, options.progress});
   if (outcome.interrupted) return {};
   std::vector<std::string> directories;
   size_t next = 0;

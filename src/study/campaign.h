@@ -2,8 +2,9 @@
 /// \file The runs of a campaign: each a process `bielle-simulate`, each written to a log when it ends.
 ///
 /// The log DIR/runs.jsonl has one line per finished run, in the order in which they ended. Runs in the log are not done
-/// again, and what is not asked for any more does no harm: axes may be extended between two calls. All else follows from
-/// outcomes in the order of the axes, and thus does not depend on the number of processes.
+/// again, and what is not asked for any more does no harm: axes and motions may be added between two calls, and the runs
+/// of a motion that has changed are done anew. All else follows from outcomes in the order of the axes, and thus does not
+/// depend on the number of processes.
 #include <functional>
 #include <string>
 #include <vector>
@@ -40,7 +41,8 @@ struct CampaignResults {
 };
 
 /// Checks options by dry runs, solves the motions that are to be solved (in DIR/motions), and does what the log lacks.
-/// \throws ModelError when an option is refused, a motion cannot be solved, or the directory is of another campaign
+/// \throws ModelError when an option is refused, a motion cannot be solved, or the log is of another version of the
+/// program
 CampaignResults runCampaign(const CampaignSpec& spec, const std::string& directory, const CampaignOptions& options);
 
 }  // namespace bielle::study
