@@ -57,6 +57,7 @@ class PredictiveController : public Controller {
   PredictiveController(Motion motion, const ShootingTrajectory& plan, const PredictiveOptions& options);
   ~PredictiveController() override;
 
+  /// Solves at the first instant of each stage, and then takes as long as that does and allocates some memory; at others it does not.
   void update(const Measurement& measurement, VectorRef u) override;
   double getPlanTime(double time) const override;
   const PredictiveCounts& getCounts() const;

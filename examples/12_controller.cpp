@@ -1,0 +1,73 @@
+/// \file Predictive control in a loop around a world: what a robot's own program would do.
+///
+/// A shooting problem with closures J(q) v = 0, contacts and wrench cones,
+///     min  sum_k l_k(x_k, u_k)    s.t.  x_{k+1} = f_k(x_k, u_k),   c_k(x_k, u_k) within bounds,                 (1)
+/// is solved once. Then, at every stage, its next N stages are solved anew from the state that was measured, and in between
+///     u = u_k + K_k (x (-) x_k)                                                                                  (2)
+/// acts. Someone pushes the robot while it walks, once with (2) about the first solution and once with predictive control: a
+/// foot that lands elsewhere catches the push.
+#include <cstdio>
+
+#include "bielle/control/predictive_controller.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/walk.h"
+#include "simulation/make_world.h"
+
+using namespace bielle;
+
+namespace {
+
+constexpr double kPeriod = 1e-3;                    // of the loop, s
+constexpr double kPushStart = 1.5, kPushEnd = 1.6;  // s
+const Vector3d kPush(-60, 0, 0);                    // N, from the front: 6 N s
+
+// Height of the trunk over the ground at the end, or when it fell below 0.2 m.
+double run(const Model& model, const Policy& plan, Controller& controller) {
+  const auto world = simulation::makeWorld("bielle", model, {});
+  Measurement measured{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
+  plan.getReference(0, measured.q, measured.v);
+  world->reset(measured.q, measured.v);
+  VectorXd u(model.nu());
+  while (world->getTime() < plan.getDuration() + 1 && world->getConfiguration()[2] > 0.2) {
+    measured.time = world->getTime();
+    measured.q = world->getConfiguration();
+    measured.v = world->getVelocity();
+    controller.update(measured, u);
+    world->setTorques(u);
+    const bool pushed = measured.time >= kPushStart && measured.time < kPushEnd;
+    world->setPush(pushed ? kPush : Vector3d::Zero());
+    if (!world->advance(kPeriod)) break;
+  }
+  return world->getConfiguration()[2];
+}
+
+}  // namespace
+
+int main() {
+  const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
+  const Model& model = robot.model;
+  WalkOptions options;
+  options.speed = 0.4;
+  Motion motion = makeWalk(model, options, {});
+  FddpOptions solver_options;
+  solver_options.initial_regularization = kGuessRegularization;
+  solver_options.bounds = ControlBounds::Enforce;
+  Fddp solver(solver_options);
+  if (solver.solve(*motion.problem, motion.guess).termination != FddpTermination::Converged) return 1;
+  Policy gains = makePolicy(motion, motion.guess, solver);
+
+  options.gait.foothold_room = 0.4;  // a foot may land elsewhere
+  options.gait.cone_margin = 0.2;    // wrenches leave room for feedback
+  options.gait.contact_kp = 0;       // and stands where it landed
+  const PredictiveOptions predictive;
+  PredictiveController controller(
+      makePredictiveMotion(model, planWalk(model, options, makeStandingPosture(model)), {}, predictive), motion.guess,
+      predictive);
+
+  const double start = motion.guess.xs[0][2];
+  const double with_gains = run(model, gains, gains), with_prediction = run(model, gains, controller);
+  std::printf("trunk at the start %.3f m; after the push with gains %.3f m, with predictive control %.3f m\n", start,
+              with_gains, with_prediction);
+  std::printf("%d solves, %d failed\n", controller.getCounts().solves, controller.getCounts().failed);
+  return with_gains < 0.9 * start && with_prediction > 0.9 * start ? 0 : 1;
+}
