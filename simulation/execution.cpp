@@ -6,9 +6,11 @@
 #include <ctime>
 #include <limits>
 
+#include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
 #include "io/record_tables.h"
+#include "simulation/robot_errors.h"
 #include "simulation/terrain.h"
 
 namespace bielle::simulation {
@@ -192,12 +194,18 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   FallDetector detector(model, plan, o);
 
   Execution out;
-  Perception perception(model, o.perception);
+  Perception perception(plan.getModel(), o.perception);
   TorqueDelay delay(model.nu(), o.control_period, o.delay);
   VectorXd u = VectorXd::Zero(model.nu());
   Measurement measurement{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
   plan.getReference(0, measurement.q, measurement.v);
-  world.reset(measurement.q, measurement.v);
+  if (&model == &plan.getModel()) {
+    world.reset(measurement.q, measurement.v);
+  } else {
+    const VectorXd q = assembleMachine(plan.getModel(), model, measurement.q);
+    Workspace ws(model);
+    world.reset(q, projectVelocity(model, ws, makeConstraintSet(model), q, measurement.v));
+  }
   perception.reset(world, measurement.q, measurement.v);
   out.start = out.end = world.getBooks();
   recorder.addNode(world);

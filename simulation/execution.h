@@ -65,6 +65,7 @@ struct Execution {
 };
 
 /// From the state in which the policy starts.
+/// \param model  of the world's robot; that of the policy may differ from it in its dimensions (robot_errors.h)
 Execution execute(const Model& model, const Policy& plan, Controller& controller, World& world,
                   const ExecutionOptions& options = {});
 

@@ -18,6 +18,7 @@
 #include "simulation/make_world.h"
 #include "simulation/plan.h"
 #include "simulation/planned_record.h"
+#include "simulation/robot_errors.h"
 #include "simulation/terrain.h"
 
 using namespace bielle;
@@ -40,6 +41,7 @@ struct Arguments {
   double noise = 1;
   std::optional<double> look_ahead;  // ms
   double delay = 0, jitter = 0;      // ms
+  RobotErrors errors;
   unsigned seed = 1;
   bool no_report = false, summary_only = false, dry_run = false;
   ExecutionOptions execution;
@@ -180,6 +182,7 @@ void extendSummary(const std::string& path, const Arguments& arguments, const Pl
     summary["noise"] = arguments.noise;
     summary["estimator"] = listEstimation(e.estimation);
   }
+  summary["robot_errors"] = {{"mass", arguments.errors.mass}, {"rod_m", arguments.errors.rod}};
   summary["delay"] = {{"mean_ms", arguments.delay}, {"jitter_ms", arguments.jitter}};
   summary["seed"] = arguments.seed;
   summary["pushes"] = listPushes(arguments.execution.pushes);
@@ -295,9 +298,12 @@ int simulate(Arguments arguments, const std::vector<std::string>& command) {
   const Ground ground = makeGround(arguments, plan->ground);
   arguments.execution.ground = ground;
   arguments.execution.planned_ground = plan->ground;
-  const auto world = makeWorld(arguments.world, model, {ground, arguments.time_step});
+  arguments.errors.seed = arguments.seed;
+  const Model machine = makeMachine(model, arguments.errors);
+  const Model& robot = arguments.errors.isZero() ? model : machine;
+  const auto world = makeWorld(arguments.world, robot, {ground, arguments.time_step});
   makeOutputDirectory(arguments.output);
-  const Execution execution = execute(model, *plan->policy, plan->getController(), *world, arguments.execution);
+  const Execution execution = execute(robot, *plan->policy, plan->getController(), *world, arguments.execution);
   print(arguments, *plan, execution);
   const MotionResult result = makeResult(arguments, *plan, ground, execution, command);
   for (const std::string& path : write(arguments, *plan, execution, result)) std::cout << "  " << path << "\n";
@@ -351,7 +357,8 @@ void addOptions(CLI::App& app, Arguments& a) {
   app.add_option("--friction", a.friction, "coefficient of the ground [1]; 0: that of the plan")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_option("--seed", a.seed, "of the heights of tiles, of the jitter and of the noise")->capture_default_str();
+  app.add_option("--seed", a.seed, "of the heights of tiles, of the jitter, of the noise and of errors of the robot")
+      ->capture_default_str();
   app.add_option("--push", a.pushes,
                  "t=3,impulse=6,direction=90,duration=0.1: a constant force on the trunk from t [s] on, of an impulse "
                  "[N s], in a direction [degrees, 0: along x, 90: along y] and for a duration [s]; may be repeated")
@@ -382,6 +389,17 @@ void addOptions(CLI::App& app, Arguments& a) {
          "how far before the end of a phase of contacts its last gains are taken [ms]: those after them ask for "
          "more than an estimated state can give (default: 36 with real sensors, else 0)")
       ->check(CLI::Range(0.0, 1000.0));
+  app.add_option(
+         "--mass-error", a.errors.mass,
+         "of the robot in the world [1]: masses and inertias of its bodies are those that the controller believes "
+         "in, times 1 plus or minus this, at random")
+      ->check(CLI::Range(0.0, 0.99))
+      ->capture_default_str();
+  app.add_option("--rod-error", a.errors.rod,
+                 "of the robot in the world [m]: one frame of each closure is moved by up to this along each axis, at "
+                 "random")
+      ->check(CLI::Range(0.0, 0.1))
+      ->capture_default_str();
   app.add_option("--delay", a.delay, "from a measurement until the torques computed from it act [ms]")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();

@@ -155,7 +155,7 @@ TEST_CASE("simulate: with real sensors a walk stands on flat and on uneven groun
     }
 }
 
-TEST_CASE("simulate: the same command writes the same bytes; ground, pushes and seeds matter") {
+TEST_CASE("simulate: the same command writes the same bytes; ground, robot, pushes and seeds matter") {
   const Scratch scratch;
   const auto record = [&](const std::string& name, std::vector<std::string> options) {
     const std::string output = (scratch.path / name).string();
@@ -177,6 +177,11 @@ TEST_CASE("simulate: the same command writes the same bytes; ground, pushes and 
   CHECK(record("felt again", {"--sensors", "real"}) == felt);
   CHECK(record("felt otherwise", {"--sensors", "real", "--seed", "2"}) != felt);
   CHECK(record("felt exactly", {"--sensors", "real", "--noise", "0"}) != felt);
+  const std::string heavy = record("heavy", {"--mass-error", "0.02"});
+  CHECK(heavy != first);
+  CHECK(record("heavy again", {"--mass-error", "0.02"}) == heavy);
+  CHECK(record("heavy otherwise", {"--mass-error", "0.02", "--seed", "2"}) != heavy);
+  CHECK(record("crooked", {"--rod-error", "0.0002"}) != first);
   const std::string tiles = record("tiles", {"--terrain", "tiles=0.005", "--seed", "1"});
   CHECK(tiles != first);
   CHECK(record("other", {"--terrain", "tiles=0.005", "--seed", "2"}) != tiles);

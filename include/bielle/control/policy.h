@@ -49,6 +49,7 @@ class Policy : public Controller {
   /// q* and v* of Eq. (1).
   void getReference(double time, VectorRef q, VectorRef v) const;
   double getDuration() const { return stages_.back().start + stages_.back().duration; }  ///< s
+  const Model& getModel() const { return model_; }
   const std::vector<Stage>& getStages() const { return stages_; }
 
  private:
