@@ -337,7 +337,8 @@ void addOptions(CLI::App& app, Arguments& a) {
   app.add_option(
          "--control", a.control,
          "open: the torques of the plan; gains: and the gains of the solver's last sweep times the deviation from "
-         "the plan, for which the motion is solved again; mpc: predictive control, which solves the next second anew at "
+         "the plan, for which the motion is solved again; mpc: predictive control, which solves the next second anew "
+         "at "
          "every stage, from the state that is measured")
       ->check(CLI::IsMember({"open", "gains", "mpc"}))
       ->capture_default_str();
@@ -420,8 +421,8 @@ void addOptions(CLI::App& app, Arguments& a) {
 int main(int argc, char** argv) {
   ignoreClosedPipes();
   CLI::App app{
-      "Carries a motion that `bielle solve` wrote out in physics with contact: a controller reads the state of the "
-      "robot and commands its motors, feet stand or slip as the ground lets them."};
+      "Carries a motion out in physics with contact, one that `bielle solve` wrote or one that is solved first: a "
+      "controller reads the state of the robot and commands its motors, feet stand or slip as the ground lets them."};
   app.name("bielle simulate");
   Arguments arguments;
   addOptions(app, arguments);
@@ -432,7 +433,8 @@ int main(int argc, char** argv) {
       "Examples:\n"
       "  bielle solve walk --robot bipetto --speed 0.4 -o walk\n"
       "  bielle simulate walk -o carried-out\n"
-      "  bielle simulate walk -o pushed --push t=1.5,impulse=2,direction=90 --friction 0.5");
+      "  bielle simulate walk -o pushed --control mpc --push t=1.5,impulse=7,direction=90\n"
+      "  bielle simulate walk --robot cleobot --speed 0.3 --duration 10 --control mpc -o long");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

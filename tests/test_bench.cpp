@@ -4,9 +4,9 @@
 #include <stdexcept>
 
 #include "bench/receding_horizon.h"
-#include "solve/window.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
+#include "solve/window.h"
 
 using namespace bielle;
 

@@ -8,9 +8,9 @@
 #include <random>
 #include <stdexcept>
 
-#include "solve/window.h"
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "solve/window.h"
 
 namespace bielle {
 namespace {

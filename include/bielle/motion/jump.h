@@ -40,18 +40,18 @@ struct PaperJumpWeights {
 };
 
 struct JumpOptions {
-  double flight = 0.3;       ///< time in the air, s; rounded to an even number of time steps
-  double length = 0;         ///< distance ahead at which the feet land, m
-  double stand = 0.15;       ///< before the push, s
-  double push = 0.3;         ///< D, s
-  double land = 0.3;         ///< s
-  double settle = 0.4;       ///< until the end, s
-  double stretch = 0.02;     ///< height of the CoM at take-off and touchdown over that at the start, m
-  double clearance = 0.04;   ///< least height of the soles at mid-flight, m
-  double friction = 0.7;     ///< coefficient, 1
+  double flight = 0.3;               ///< time in the air, s; rounded to an even number of time steps
+  double length = 0;                 ///< distance ahead at which the feet land, m
+  double stand = 0.15;               ///< before the push, s
+  double push = 0.3;                 ///< D, s
+  double land = 0.3;                 ///< s
+  double settle = 0.4;               ///< until the end, s
+  double stretch = 0.02;             ///< height of the CoM at take-off and touchdown over that at the start, m
+  double clearance = 0.04;           ///< least height of the soles at mid-flight, m
+  double friction = 0.7;             ///< coefficient, 1
   double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
-  double published = 0;      ///< 1: the paper's problem, see above; 0: our costs
-  double time_step = 0.002;  ///< s
+  double published = 0;              ///< 1: the paper's problem, see above; 0: our costs
+  double time_step = 0.002;          ///< s
 
   double apex_weight = 1e4;            ///< of the CoM's height at mid-flight, over h, 1/m^2
   double com_weight = 1e3;             ///< of the CoM's height on the ground, 1/m^2
