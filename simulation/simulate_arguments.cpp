@@ -1,0 +1,189 @@
+#include "simulation/simulate_arguments.h"
+
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include "bielle/model/error.h"
+#include "simulation/make_world.h"
+#include "simulation/terrain.h"
+
+namespace bielle::simulation {
+namespace {
+
+// "t=3,impulse=6,direction=90,duration=0.1"
+Push parsePush(const std::string& text) {
+  constexpr const char* kExample = "--push t=3,impulse=6,direction=90,duration=0.1";
+  Push push;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, ',');) {
+    const auto [name, value] = parseNumber("--push", part, kExample);
+    if (name == "t")
+      push.time = value;
+    else if (name == "impulse")
+      push.impulse = value;
+    else if (name == "direction")
+      push.direction = value;
+    else if (name == "duration")
+      push.duration = value;
+    else
+      throw ModelError("", "--push '" + part + "'", "there is no '" + name + "'", std::string("e.g. ") + kExample);
+  }
+  if (!(push.duration > 0 && push.time >= 0))
+    throw ModelError("", "--push '" + text + "'", "its time or its duration is not positive",
+                     std::string("e.g. ") + kExample);
+  return push;
+}
+
+}  // namespace
+
+std::pair<std::string, double> parseNumber(const std::string& flag, const std::string& text, const char* example) {
+  const size_t equals = text.find('=');
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const char* begin = equals == std::string::npos ? end : text.data() + equals + 1;
+  const auto [stop, error] = std::from_chars(begin, end, value);
+  if (error != std::errc() || stop != end || !std::isfinite(value))
+    throw ModelError("", flag + " '" + text + "'", "it is not of the form name=number", std::string("e.g. ") + example);
+  return {text.substr(0, equals), value};
+}
+
+Ground makeGround(const SimulateArguments& arguments, const Ground& planned) {
+  Ground ground;
+  if (arguments.terrain == "planned") {
+    ground = planned;
+  } else if (arguments.terrain != "flat") {
+    const auto [name, value] = parseNumber("--terrain", arguments.terrain, "--terrain tiles=0.01");
+    if (name == "ramp") {
+      RampOptions ramp;
+      ramp.slope = value;
+      ground = makeRamp(ramp);
+    } else if (name == "tiles") {
+      TileOptions tiles;
+      tiles.height = value;
+      tiles.seed = arguments.seed;
+      ground = makeTiles(tiles);
+    } else {
+      throw ModelError("", "terrain '" + name + "'", "there is no such terrain",
+                       "choose one of: planned, flat, ramp=SLOPE, tiles=HEIGHT");
+    }
+  }
+  ground.friction = arguments.friction > 0 ? arguments.friction : planned.friction;
+  return ground;
+}
+
+void parseOptions(SimulateArguments& arguments) {
+  for (const std::string& push : arguments.pushes) arguments.execution.pushes.push_back(parsePush(push));
+  if (arguments.jitter > arguments.delay)
+    throw ModelError("", "--jitter", "it is longer than the delay", "give at most --delay");
+  arguments.execution.delay = {1e-3 * arguments.delay, 1e-3 * arguments.jitter, arguments.seed};
+  makeGround(arguments, {});
+}
+
+void addOptions(CLI::App& app, SimulateArguments& a) {
+  const auto positive = CLI::PositiveNumber;
+  app.add_option(
+         "DIR", a.directory,
+         "result of `bielle solve`: a motion of the closed robot; with --robot the name of a motion, which is solved "
+         "first")
+      ->required();
+  app.add_option("--robot", a.robot, "name or directory of the robot that is to make the motion of this name");
+  app.add_option("--speed", a.speed, "of that motion [m/s]");
+  app.add_option("--set", a.settings,
+                 "name=value: another option of that motion, as in `bielle solve`; may be repeated")
+      ->allow_extra_args(false);
+  app.add_option(
+         "-o,--output", a.output,
+         "directory for trajectory.csv, trajectory.npz and summary.json of the motion that happened, plan.npz (the "
+         "plan at the same times) and report.html")
+      ->required();
+  app.add_option(
+         "--world", a.world,
+         "bielle: its own dynamics and contact law, fixed steps; simbody: Simbody's dynamics, the same contact law, "
+         "steps of controlled error, 30 times slower; mujoco: MuJoCo, closures and contacts soft constraints "
+         "(where Bielle was built with it)")
+      ->check(CLI::IsMember(listWorlds()))
+      ->capture_default_str();
+  app.add_option(
+         "--control", a.control,
+         "open: the torques of the plan; gains: and the gains of the solver's last sweep times the deviation from "
+         "the plan, for which the motion is solved again; mpc: predictive control, which solves the next second anew "
+         "at "
+         "every stage, from the state that is measured")
+      ->check(CLI::IsMember({"open", "gains", "mpc"}))
+      ->capture_default_str();
+  app.add_option("--nodes", a.predictive.nodes, "stages that predictive control looks ahead")
+      ->check(CLI::Range(10, 1000))
+      ->capture_default_str();
+  app.add_option("--iterations", a.predictive.iterations, "of predictive control, at every stage")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  app.add_option("--threads", a.predictive.threads, "of predictive control; 0: all. Results do not depend on it")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  app.add_option("--terrain", a.terrain,
+                 "planned: the ground of the plan; flat; ramp=SLOPE: height over length [1], from x = 0.3 m on; "
+                 "tiles=HEIGHT: of 0.25 m, heights at random up to that [m], from x = 0.2 m on")
+      ->capture_default_str();
+  app.add_option("--friction", a.friction, "coefficient of the ground [1]; 0: that of the plan")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--seed", a.seed, "of the heights of tiles, of the jitter, of the noise and of errors of the robot")
+      ->capture_default_str();
+  app.add_option("--push", a.pushes,
+                 "t=3,impulse=6,direction=90,duration=0.1: a constant force on the trunk from t [s] on, of an impulse "
+                 "[N s], in a direction [degrees, 0: along x, 90: along y] and for a duration [s]; may be repeated")
+      ->allow_extra_args(false);
+  app.add_option("--duration", a.execution.duration, "of the simulation [s]; 0: that of the plan and --hold")
+      ->check(CLI::Range(0.0, 1e4))
+      ->capture_default_str();
+  app.add_option("--hold", a.execution.hold, "how long the robot stands in its last posture after the plan [s]")
+      ->check(CLI::Range(0.0, 1e4))
+      ->capture_default_str();
+  app.add_option("--time-step", a.time_step, "of worlds with fixed steps [s]; 0: the world's own")
+      ->check(CLI::Range(0.0, 0.1))
+      ->capture_default_str();
+  app.add_option("--control-period", a.execution.control_period, "between updates of the torques [s]")
+      ->check(positive)
+      ->capture_default_str();
+  app.add_option(
+         "--sensors", a.sensors,
+         "ideal: the controller is told the true state; real: what an estimator makes of encoders of the motors and an "
+         "inertial measurement unit in the trunk")
+      ->check(CLI::IsMember({"ideal", "real"}))
+      ->capture_default_str();
+  app.add_option("--noise", a.noise, "of real sensors, over that of their data sheets [1]; 0: exact")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  app.add_option(
+         "--look-ahead", a.look_ahead,
+         "how far before the end of a phase of contacts its last gains are taken [ms]: those after them ask for "
+         "more than an estimated state can give (default: 36 with real sensors, else 0)")
+      ->check(CLI::Range(0.0, 1000.0));
+  app.add_option(
+         "--mass-error", a.errors.mass,
+         "of the robot in the world [1]: masses and inertias of its bodies are those that the controller believes "
+         "in, times 1 plus or minus this, at random")
+      ->check(CLI::Range(0.0, 0.99))
+      ->capture_default_str();
+  app.add_option("--rod-error", a.errors.rod,
+                 "of the robot in the world [m]: one frame of each closure is moved by up to this along each axis, at "
+                 "random")
+      ->check(CLI::Range(0.0, 0.1))
+      ->capture_default_str();
+  app.add_option("--delay", a.delay, "from a measurement until the torques computed from it act [ms]")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  app.add_option("--jitter", a.jitter,
+                 "each delay differs from --delay by at most this, at random [ms]; not above --delay")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  app.add_option("--record-period", a.execution.record_period, "between rows of the trajectory [s]")
+      ->check(positive)
+      ->capture_default_str();
+  app.add_flag("--no-report", a.no_report, "writes no report.html");
+  app.add_flag("--summary-only", a.summary_only, "writes summary.json alone");
+  app.add_flag("--dry-run", a.dry_run, "checks the options; reads no motion, carries nothing out, writes nothing");
+}
+
+}  // namespace bielle::simulation

@@ -1,0 +1,44 @@
+#pragma once
+// The options of bielle-simulate.
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "simulation/execution.h"
+#include "simulation/plan.h"
+#include "simulation/robot_errors.h"
+
+namespace bielle::simulation {
+
+struct SimulateArguments {
+  std::string directory, output, world = "bielle", control = "gains", terrain = "planned";
+  std::string robot;  // of a motion that is to be solved; empty: `directory` holds one
+  std::optional<double> speed;
+  std::vector<std::string> settings;  // name=value
+  std::vector<std::string> pushes;
+  double friction = 0;  // 0: that of the plan
+  double time_step = 0;
+  std::string sensors = "ideal";
+  double noise = 1;
+  std::optional<double> look_ahead;  // ms
+  double delay = 0, jitter = 0;      // ms
+  RobotErrors errors;
+  unsigned seed = 1;
+  bool no_report = false, summary_only = false, dry_run = false;
+  ExecutionOptions execution;
+  PredictiveOptions predictive;
+};
+
+void addOptions(CLI::App& app, SimulateArguments& arguments);
+
+/// Reads pushes and delays, and checks what can be checked without the motion. \throws ModelError
+void parseOptions(SimulateArguments& arguments);
+
+/// "name=1.5". \throws ModelError naming the flag, with an example
+std::pair<std::string, double> parseNumber(const std::string& flag, const std::string& text, const char* example);
+
+/// The ground of the world: "planned", "flat", "ramp=0.05" or "tiles=0.01". \throws ModelError
+Ground makeGround(const SimulateArguments& arguments, const Ground& planned);
+
+}  // namespace bielle::simulation
