@@ -258,6 +258,23 @@ TEST_CASE("walk: with the published weights the feet land where they like") {
   CHECK(solved.measures.load > 5);
 }
 
+TEST_CASE("walk: feet that have room land near their footholds, and stand where they landed") {
+  WalkOptions options;
+  options.speed = 0.4;
+  options.gait.foothold_room = 0.03;
+  const Motion motion = makeWalk(getBipetto(), options);
+  const auto goal = std::find_if(motion.goals.begin(), motion.goals.end(),
+                                 [](const Goal& each) { return each.kind == GoalKind::Footholds; });
+  REQUIRE(goal != motion.goals.end());
+  CHECK(goal->tolerance == Approx(0.03 * std::sqrt(2)));
+  const Solved solved = solve(makeWalk(getBipetto(), options));
+  CHECK(solved.summary.termination == FddpTermination::Converged);
+  CHECK(solved.measures.foothold > 1e-3);
+  CHECK(solved.measures.foothold < 0.03 * std::sqrt(2) + 1e-6);
+  CHECK(solved.measures.tilt_at_landing < 1e-6);
+  CHECK(solved.measures.slip < 2e-3);
+}
+
 TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with its node") {
   WalkOptions options;
   options.steps = 2;

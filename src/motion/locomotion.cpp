@@ -111,11 +111,12 @@ bool isPublished(const Scene& scene) { return scene.options.published != 0; }
 
 std::vector<ContactTarget> makeTargets(const Scene& scene, const GaitPhase& phase) {
   const auto feet = scene.task.plan.getStance(phase.steps_done);
+  const double kp = scene.options.foothold_room > 0 ? 0 : scene.options.contact_kp;  // a foot stands where it landed
   std::vector<ContactTarget> targets;
   for (Side side : {Side::Left, Side::Right}) {
     const int i = static_cast<int>(side);
     if (!phase.stands(side)) continue;
-    targets.push_back({scene.stance.contacts[i], feet[i], scene.options.contact_kp, scene.options.contact_kd});
+    targets.push_back({scene.stance.contacts[i], feet[i], kp, scene.options.contact_kd});
   }
   return targets;
 }
@@ -264,7 +265,8 @@ StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector
 std::vector<Goal> makeFootholdGoals(const Scene& scene, const ContactSchedule& schedule) {
   constexpr double kTolerance = 0.01;  // m
   if (isPublished(scene)) return {};
-  Goal goal{GoalKind::Footholds, "footholds", 0, kTolerance, 0, schedule.numStages()};
+  const double room = std::hypot(scene.options.foothold_room, scene.options.foothold_room);
+  Goal goal{GoalKind::Footholds, "footholds", 0, std::max(kTolerance, room), 0, schedule.numStages()};
   const std::vector<int> landings = listLandings(schedule);
   const std::vector<Footstep>& steps = scene.task.plan.steps;
   for (size_t i = 0; i < std::min(steps.size(), landings.size()); ++i)
