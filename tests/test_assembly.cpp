@@ -111,7 +111,7 @@ TEST_CASE("assembly: the shortest steps close the same robot, and change nothing
   CHECK(result.iterations < 10);
   // No closed configuration nearby is closer to the start, to first order: the way there is across the closed motions.
   const ConstraintSet set = makeConstraintSet(model);
-  MatrixXd J(set.rows, model.nv());
+  MatrixXd J = MatrixXd::Zero(set.rows, model.nv());
   updatePositions(model, ws, result.q);
   for (size_t c = 0; c < set.closures.size(); ++c)
     calcClosureResidualJacobian(ws, set.closures[c], J.middleRows(set.offsets[c], getRows(set.closures[c].kind)));
