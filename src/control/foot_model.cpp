@@ -30,7 +30,7 @@ FootModel::FootModel(const Model& model)
   normal_.setZero(rows, rows);
   residual_.setZero(size);
   f_.setZero(rows);
-  factors_ = Eigen::LLT<MatrixXd>(rows);
+  factors_.compute(MatrixXd::Identity(rows, rows));  // sizes it
   for (Vector6d& wrench : wrenches_) wrench.setZero();
 }
 
