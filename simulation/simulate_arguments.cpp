@@ -1,10 +1,10 @@
 #include "simulation/simulate_arguments.h"
 
-#include <charconv>
 #include <cmath>
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "io/setting.h"
 #include "simulation/make_world.h"
 #include "simulation/terrain.h"
 
@@ -13,11 +13,11 @@ namespace {
 
 // "t=3,impulse=6,direction=90,duration=0.1"
 Push parsePush(const std::string& text) {
-  constexpr const char* kExample = "--push t=3,impulse=6,direction=90,duration=0.1";
+  constexpr const char* kExample = "t=3,impulse=6,direction=90,duration=0.1";
   Push push;
   std::istringstream parts(text);
   for (std::string part; std::getline(parts, part, ',');) {
-    const auto [name, value] = parseNumber("--push", part, kExample);
+    const auto [name, value] = parseSetting("--push", part, kExample);
     if (name == "t")
       push.time = value;
     else if (name == "impulse")
@@ -27,33 +27,26 @@ Push parsePush(const std::string& text) {
     else if (name == "duration")
       push.duration = value;
     else
-      throw ModelError("", "--push '" + part + "'", "there is no '" + name + "'", std::string("e.g. ") + kExample);
+      throw ModelError("", "--push '" + part + "'", "there is no '" + name + "'",
+                       std::string("e.g. --push ") + kExample);
   }
-  if (!(push.duration > 0 && push.time >= 0))
-    throw ModelError("", "--push '" + text + "'", "its time or its duration is not positive",
-                     std::string("e.g. ") + kExample);
+  if (!(push.duration > 0 && push.time >= 0 &&
+        std::isfinite(push.duration + push.time + push.impulse + push.direction)))
+    throw ModelError("", "--push '" + text + "'",
+                     "its duration is not positive, its time negative, or a number not finite",
+                     std::string("e.g. --push ") + kExample);
   return push;
 }
 
 }  // namespace
-
-std::pair<std::string, double> parseNumber(const std::string& flag, const std::string& text, const char* example) {
-  const size_t equals = text.find('=');
-  double value = 0;
-  const char* end = text.data() + text.size();
-  const char* begin = equals == std::string::npos ? end : text.data() + equals + 1;
-  const auto [stop, error] = std::from_chars(begin, end, value);
-  if (error != std::errc() || stop != end || !std::isfinite(value))
-    throw ModelError("", flag + " '" + text + "'", "it is not of the form name=number", std::string("e.g. ") + example);
-  return {text.substr(0, equals), value};
-}
 
 Ground makeGround(const SimulateArguments& arguments, const Ground& planned) {
   Ground ground;
   if (arguments.terrain == "planned") {
     ground = planned;
   } else if (arguments.terrain != "flat") {
-    const auto [name, value] = parseNumber("--terrain", arguments.terrain, "--terrain tiles=0.01");
+    const auto [name, value] = parseSetting("--terrain", arguments.terrain, "tiles=0.01");
+    if (!std::isfinite(value)) throw ModelError("", "terrain '" + name + "'", "it is not finite", "e.g. tiles=0.01");
     if (name == "ramp") {
       RampOptions ramp;
       ramp.slope = value;
@@ -107,9 +100,8 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
   app.add_option(
          "--control", a.control,
          "open: the torques of the plan; gains: and the gains of the solver's last sweep times the deviation from "
-         "the plan, for which the motion is solved again; mpc: predictive control, which solves the next second anew "
-         "at "
-         "every stage, from the state that is measured")
+         "the plan, for which the motion is solved again; mpc: predictive control, which solves "
+         "the next second anew at every stage, from the state that is measured")
       ->check(CLI::IsMember({"open", "gains", "mpc"}))
       ->capture_default_str();
   app.add_option("--nodes", a.predictive.nodes, "stages that predictive control looks ahead")
@@ -155,10 +147,10 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
   app.add_option("--noise", a.noise, "of real sensors, over that of their data sheets [1]; 0: exact")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
-  app.add_option(
-         "--look-ahead", a.look_ahead,
-         "how far before the end of a phase of contacts its last gains are taken [ms]: those after them ask for "
-         "more than an estimated state can give (default: 36 with real sensors, else 0)")
+  app.add_option("--look-ahead", a.look_ahead,
+                 "of gains: how far before the end of a phase of contacts its last ones are taken [ms]: those after "
+                 "them ask for "
+                 "more than an estimated state can give (default: 36 with real sensors, else 0)")
       ->check(CLI::Range(0.0, 1000.0));
   app.add_option(
          "--mass-error", a.errors.mass,

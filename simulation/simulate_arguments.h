@@ -35,9 +35,6 @@ void addOptions(CLI::App& app, SimulateArguments& arguments);
 /// Reads pushes and delays, and checks what can be checked without the motion. \throws ModelError
 void parseOptions(SimulateArguments& arguments);
 
-/// "name=1.5". \throws ModelError naming the flag, with an example
-std::pair<std::string, double> parseNumber(const std::string& flag, const std::string& text, const char* example);
-
 /// The ground of the world: "planned", "flat", "ramp=0.05" or "tiles=0.01". \throws ModelError
 Ground makeGround(const SimulateArguments& arguments, const Ground& planned);
 

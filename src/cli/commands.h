@@ -54,10 +54,6 @@ void addFixedBase(CLI::App& command, RobotArgument& robot);
 // An option of a motion: a number, or a choice by name.
 void addOption(CLI::App& command, const OptionEntry& option);
 
-// name=number. \throws ModelError that shows the example
-std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,
-                                            const std::string& example);
-
 // Sets the command line that results record.
 void setCommandLine(int argc, char** argv);
 const std::vector<std::string>& getCommandLine();

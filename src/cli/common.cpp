@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <charconv>
 #include <iostream>
 #include <sstream>
 
@@ -54,19 +53,6 @@ void addOption(CLI::App& command, const OptionEntry& option) {
           option.help)
       ->check(CLI::IsMember(option.names))
       ->default_str(option.names.at(static_cast<size_t>(*option.value)));
-}
-
-std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,
-                                            const std::string& example) {
-  const size_t equals = setting.find('=');
-  double value = 0;
-  const char* end = setting.data() + setting.size();
-  const char* begin = equals == std::string::npos ? end : setting.data() + equals + 1;
-  const auto [stop, error] = std::from_chars(begin, end, value);
-  if (error != std::errc() || stop != end)
-    throw ModelError("", flag + " '" + setting + "'", "it is not of the form name=number",
-                     "e.g. " + flag + " " + example);
-  return {setting.substr(0, equals), value};
 }
 
 void setCommandLine(int argc, char** argv) { command_line.assign(argv, argv + argc); }

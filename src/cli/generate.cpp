@@ -8,6 +8,7 @@
 #include "bielle/robots/generators.h"
 #include "cli/commands.h"
 #include "cli/table.h"
+#include "io/setting.h"
 
 namespace bielle::cli {
 namespace {

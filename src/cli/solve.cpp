@@ -18,6 +18,7 @@
 #include "cli/objective.h"
 #include "cli/table.h"
 #include "io/motion_registry.h"
+#include "io/setting.h"
 
 namespace bielle::cli {
 namespace {

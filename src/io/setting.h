@@ -1,0 +1,12 @@
+#pragma once
+// Settings on command lines.
+#include <string>
+#include <utility>
+
+namespace bielle {
+
+// name=number. \throws ModelError that shows the example
+std::pair<std::string, double> parseSetting(const std::string& flag, const std::string& setting,
+                                            const std::string& example);
+
+}  // namespace bielle
