@@ -93,6 +93,9 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
   if (summary.objective.objective == Objective::PeakTorque)
     throw ModelError(summary.file, "objective 'peak-torque'", "the gains of its solver let no torque exceed the peak",
                      "give --control open, or solve the motion for another objective");
+  if (control == PlanControl::Predictive && summary.formulation != Formulation::Reduced)
+    throw ModelError(summary.file, "formulation 'full'", "predictive control needs states that are closed",
+                     "solve the motion without --formulation full, or give --control gains");
   FddpOptions solver_options;
   solver_options.max_iterations = kMaxIterations;
   if (motion.bounded) solver_options.bounds = ControlBounds::Enforce;

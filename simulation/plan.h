@@ -1,5 +1,5 @@
 #pragma once
-/// \file A solved motion read from its files, ready to be carried out.
+/// \file A motion ready to be carried out: read from its files, or solved on the spot.
 #include <string>
 
 #include "bielle/control/predictive_controller.h"
@@ -22,14 +22,15 @@ struct Plan {
   ContactSchedule schedule;
   std::unique_ptr<Policy> policy;
   std::unique_ptr<PredictiveController> predictive;  ///< or null
-  Controller& getController() { return predictive ? static_cast<Controller&>(*predictive) : *policy; }
   int iterations = 0;  ///< that the solver took for the gains; 0: the motion in the files was its solution
+
+  Controller& getController() { return predictive ? static_cast<Controller&>(*predictive) : *policy; }
 };
 
 /// Makes the motion again from its request. For gains it is solved again, from the solution in the files: they do not
 /// hold the gains, nor the multipliers of the constraints.
 /// \throws ModelError when the files cannot be read, the motion is not one of the closed robot, does not converge, or has the
-/// least peak torque and gains are wanted
+/// least peak torque or the full formulation, and gains or predictive control are wanted that need others
 std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control,
                                const PredictiveOptions& predictive = {});
 

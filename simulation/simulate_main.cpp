@@ -3,6 +3,7 @@
 #include <map>
 
 #include "bielle/model/error.h"
+#include "io/setting.h"
 #include "io/standard_output.h"
 #include "simulation/make_world.h"
 #include "simulation/simulate_output.h"
@@ -29,7 +30,7 @@ std::unique_ptr<Plan> obtainPlan(const SimulateArguments& arguments) {
   PlanRequest request{arguments.directory, arguments.robot, {}, arguments.execution.duration};
   if (arguments.speed) request.settings.emplace_back("speed", *arguments.speed);
   for (const std::string& setting : arguments.settings)
-    request.settings.push_back(parseNumber("--set", setting, "--set steps=8"));
+    request.settings.push_back(parseSetting("--set", setting, "steps=8"));
   return makePlan(request, control, arguments.predictive);
 }
 
@@ -48,8 +49,9 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   arguments.execution.ground = ground;
   arguments.execution.planned_ground = plan->ground;
   arguments.errors.seed = arguments.seed;
-  const Model machine = makeMachine(model, arguments.errors);
-  const Model& robot = arguments.errors.isZero() ? model : machine;
+  std::optional<Model> machine;
+  if (!arguments.errors.isZero()) machine.emplace(makeMachine(model, arguments.errors));
+  const Model& robot = machine ? *machine : model;
   const auto world = makeWorld(arguments.world, robot, {ground, arguments.time_step});
   makeOutputDirectory(arguments.output);
   const Execution execution = execute(robot, *plan->policy, plan->getController(), *world, arguments.execution);

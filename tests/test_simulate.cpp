@@ -238,6 +238,7 @@ TEST_CASE("simulate: predictive control survives a push that gains do not") {
   CHECK(summary["largest_slip"].get<double>() < 0.01);
   CHECK(summary["solves"]["failed"] == 0);
   CHECK(summary["solves"]["count"] == 234);  // one for every 12 ms
+  CHECK(summary["solves"]["early_landings"].get<int>() >= 0);
   CHECK(summary["solves"]["worst_ms"].get<double>() >= summary["solves"]["median_ms"].get<double>());
 }
 
@@ -247,6 +248,9 @@ TEST_CASE("simulate: bad input is refused in one line, with status 2") {
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {{"--push", "t=1,force=3"}, "force"},
       {{"--push", "t=-1,impulse=3"}, "--push"},
+      {{"--push", "t=1,impulse=inf"}, "--push"},
+      {{"--terrain", "tiles=nan"}, "tiles"},
+      {{"--speed", "0.3"}, "--speed"},
       {{"--terrain", "hills=3"}, "hills"},
       {{"--terrain", "moon"}, "moon"},
       {{"--delay", "1", "--jitter", "2"}, "--jitter"},
@@ -257,6 +261,13 @@ TEST_CASE("simulate: bad input is refused in one line, with status 2") {
     CHECK(result.status == 2);
     CHECK(result.err.find(named) != std::string::npos);
   }
+  const std::string full = (scratch.path / "full").string();
+  REQUIRE(runCommand({BIELLE_COMMAND, "solve", "squat", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--depth",
+                      "0.95", "--formulation", "full", "-o", full, "--quiet", "--no-report", "--no-check"})
+              .status == 0);
+  const CommandResult open_states = runCommand({BIELLE_COMMAND, "simulate", full, "--control", "mpc", "-o", output});
+  CHECK(open_states.status == 2);
+  CHECK(open_states.err.find("formulation") != std::string::npos);
   const CommandResult none = runCommand({BIELLE_COMMAND, "simulate", "/nowhere", "-o", output});
   CHECK(none.status == 2);
   CHECK(none.err.find("/nowhere") != std::string::npos);
