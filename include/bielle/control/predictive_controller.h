@@ -45,19 +45,20 @@ struct PredictiveCounts {
 };
 
 /// The motion that predictive control solves: `plan`, then as many copies of its last stage as the window is long, which ends
-/// by PredictiveOptions' weights.
+/// as the weights of PredictiveOptions say.
 /// \throws ModelError as makeMotion() does
 Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOptions& problem,
                             const PredictiveOptions& options);
 
 class PredictiveController : public Controller {
  public:
-  /// \param motion  by makePredictiveMotion() with the same options, in the reduced formulation; moved in. Its model must outlive
-  /// this   \param plan  the solved motion, without the copies of its last stage: where windows end, and what the first one starts from
+  /// \param motion  by makePredictiveMotion() with the same options, in the reduced formulation; its model must outlive this
+  /// \param plan  the solved motion, without the copies of its last stage: where windows end, and what the first one
+  /// starts from
   PredictiveController(Motion motion, const ShootingTrajectory& plan, const PredictiveOptions& options);
   ~PredictiveController() override;
 
-  /// Solves at the first instant of each stage, and then takes as long as that does and allocates some memory; at others it does not.
+  /// At the first instant of each stage it solves, which takes its time and allocates memory; at others it does not.
   void update(const Measurement& measurement, VectorRef u) override;
   double getPlanTime(double time) const override;
   const PredictiveCounts& getCounts() const;
