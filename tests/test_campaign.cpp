@@ -123,7 +123,7 @@ TEST_CASE("campaign: after an interruption only what is missing is done") {
     CHECK(result.status == 1);
     CHECK_THAT(result.err, Contains("interrupted"));
     CHECK_FALSE(fs::exists(out + "/runs.csv"));
-    CHECK_FALSE(fs::exists(out + "/work"));
+    CHECK_FALSE(fs::exists(out + "/running"));
   }
   const int done = countLines(log) - 1;
   REQUIRE(done >= 3);

@@ -92,7 +92,7 @@ class CampaignRunner {
   ~CampaignRunner() {
     for (const Running& entry : running_) killChild(entry.pid);
     std::error_code ignored;
-    fs::remove_all(directory_ + "/work", ignored);
+    fs::remove_all(directory_ + "/running", ignored);
   }
   CampaignRunner(const CampaignRunner&) = delete;
   CampaignRunner& operator=(const CampaignRunner&) = delete;
@@ -163,7 +163,7 @@ class CampaignRunner {
     std::sort(progress.done.begin(), progress.done.end());
     return progress;
   }
-  std::string getWork(int slot) const { return directory_ + "/work/" + std::to_string(slot); }
+  std::string getPlace(int slot) const { return directory_ + "/running/" + std::to_string(slot); }
 
   void begin(size_t cell) {
     const int multiple = follow(cell).next;
@@ -172,19 +172,19 @@ class CampaignRunner {
     while (std::any_of(running_.begin(), running_.end(), [slot](const Running& entry) { return entry.slot == slot; }))
       ++slot;
     std::error_code ignored;
-    fs::remove_all(getWork(slot), ignored);
-    makeOutputDirectory(getWork(slot));
-    std::vector<std::string> command = {options_.simulate, motions_[cells_[cell][0]], "-o", getWork(slot),
+    fs::remove_all(getPlace(slot), ignored);
+    makeOutputDirectory(getPlace(slot));
+    std::vector<std::string> command = {options_.simulate, motions_[cells_[cell][0]], "-o", getPlace(slot),
                                         "--summary-only"};
     const std::vector<std::string> arguments = commands_.make(cells_[cell], makeImpulse(multiple));
     command.insert(command.end(), arguments.begin(), arguments.end());
-    running_.push_back({startChild(command, getWork(slot) + "/log"), cell, slot, makeKey(cell, multiple)});
+    running_.push_back({startChild(command, getPlace(slot) + "/log"), cell, slot, makeKey(cell, multiple)});
   }
 
   Json readRun(const Running& entry, int status) const {
-    if (status >= 2) return {{"outcome", kRefused}, {"outcome_message", findError(getWork(entry.slot) + "/log")}};
+    if (status >= 2) return {{"outcome", kRefused}, {"outcome_message", findError(getPlace(entry.slot) + "/log")}};
     Json result = Json::object();
-    readJsonFile(getWork(entry.slot) + "/summary.json", "run the campaign again", [&result](const Json& summary) {
+    readJsonFile(getPlace(entry.slot) + "/summary.json", "run the campaign again", [&result](const Json& summary) {
       for (const char* field : kFields) result[field] = summary.at(field);
     });
     return result;
