@@ -1,7 +1,8 @@
 bielle_test(ocp_residuals SOURCES test_ocp_residuals.cpp mechanisms.cpp LIBS bielle_ocp)
 bielle_test(ocp_problem SOURCES test_ocp_problem.cpp mechanisms.cpp LIBS bielle_motion)
+bielle_test(ocp_contract SOURCES test_ocp_contract.cpp mechanisms.cpp LIBS bielle_motion)
 # The test counts allocations: malloc, and operator new(size_t) by its mangled name.
-target_link_options(test_ocp_problem PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
+target_link_options(test_ocp_contract PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 bielle_test(lanes SOURCES test_lanes.cpp LIBS bielle_motion)
 bielle_test(reduced SOURCES test_reduced.cpp mechanisms.cpp LIBS bielle_motion)
 bielle_test(path_constraints SOURCES test_path_constraints.cpp mechanisms.cpp LIBS bielle_motion)

@@ -6,9 +6,8 @@
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "check_derivative.h"
-#include "count_allocations.h"
-#include "discretizations.h"
 #include "problem_probe.h"
+#include "random_problem.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -18,56 +17,6 @@ namespace {
 struct Point {
   VectorXd x, u, x_node;  ///< state, controls, state of the next node
 };
-
-StateCost makeRandomStateCost(std::mt19937& rng, const Model& model, const VectorXd& q) {
-  return {0.7, model.integrate(q, randomVector(rng, model.nv(), 0.6)), randomVector(rng, model.nv()),
-          randomVector(rng, 2 * model.nv()).cwiseAbs()};
-}
-
-// A stage with a cost of every sort that looks at q, v, u and the forces; the barrier is crossed by some rows only.
-StageSpec makeStage(std::mt19937& rng, const Model& model, const VectorXd& q,
-                    const std::vector<ContactTarget>& contacts, StepRule step = StepRule::Euler) {
-  StageSpec stage;
-  stage.step = step;
-  stage.dt = 0.02;
-  stage.constraints = makeConstraintSet(model, contacts);
-  stage.state = makeRandomStateCost(rng, model, q);
-  stage.control = {0.3, randomVector(rng, model.nu()), randomVector(rng, model.nu()).cwiseAbs()};
-  const auto quadratic = [&](int n) { return Activation::makeQuadratic(randomVector(rng, n).cwiseAbs()); };
-  stage.costs.push_back({"com", 2, quadratic(3), makeComPosition(randomVector(rng, 3))});
-  stage.costs.push_back({"com velocity", 2, quadratic(3), makeComVelocity(randomVector(rng, 3))});
-  const BodyFrame frame{model.numBodies() - 1, randomPlacement(rng)};
-  stage.costs.push_back({"velocity", 1, quadratic(6), makeFrameVelocity(frame, randomVector(rng, 6))});
-  for (int c = 0; c < static_cast<int>(stage.constraints.closures.size()); ++c) {
-    const int rows = getRows(stage.constraints.closures[c].kind);
-    stage.costs.push_back(
-        {"force", 1e-2, quadratic(rows), makeContactForce(stage.constraints, c, randomVector(rng, rows, 5))});
-    if (c < stage.constraints.num_loops) continue;
-    std::unique_ptr<Residual> cone = makeWrenchCone(stage.constraints, c, 0.1, 0.04, 0.5);
-    const int n = cone->size();
-    stage.costs.push_back({"cone", 1e-2,
-                           Activation::makeBarrier(VectorXd::Ones(n), VectorXd::Zero(n), VectorXd::Constant(n, 1e12)),
-                           std::move(cone)});
-  }
-  for (const Transmission& linkage : listTransmissions(model, q))
-    stage.costs.push_back({"transmission", 1, quadratic(1), makeTransmission(linkage)});
-  return stage;
-}
-
-StageSpec makeTerminal(std::mt19937& rng, const Model& model, const VectorXd& q) {
-  StageSpec stage = makeStage(rng, model, q, {});
-  stage.constraints = {};
-  stage.costs.resize(3);
-  return stage;
-}
-
-RobotProblem makeProblem(std::mt19937& rng, const Model& model, const VectorXd& q,
-                         const std::vector<ContactTarget>& contacts, const Discretization& how) {
-  std::vector<StageSpec> stages;
-  stages.push_back(makeStage(rng, model, q, contacts, how.step));
-  stages.push_back(makeTerminal(rng, model, q));
-  return RobotProblem(model, q, VectorXd::Zero(model.nv()), std::move(stages), how.formulation);
-}
 
 VectorXd join(const VectorXd& q, const VectorXd& v) {
   VectorXd x(q.size() + v.size());
@@ -334,120 +283,4 @@ TEST_CASE("shooting problem: the squat of Bipetto, half sitting with velocities 
     checkStage(problem, {x, u, makeNextNode(rng, problem, x, u, gap)}, 2e-4);
   }
   checkTerminal(problem, x, 5e-4);
-}
-
-TEST_CASE("shooting problem: a linearization does not depend on what was computed before") {
-  const Discretization how = GENERATE(from_range(kDiscretizations));
-  CAPTURE(how);
-  std::mt19937 rng(26);
-  const Model model = loadRobot("bipetto").model;
-  const auto make = [&] { return makeSquat(model, {}, {how.formulation, how.step}); };
-  const Motion used = make(), fresh = make();
-  ProblemProbe problem(*used.problem), untouched(*fresh.problem);
-  const VectorXd x0 = problem.initialState(), u = used.guess.us[0];
-  const VectorXd x = problem.integrate(x0, randomVector(rng, problem.tangentSize(0), 0.05));
-  StageModel once, again, other;
-  REQUIRE(untouched.linearize(0, x, u, x0, once) == StepStatus::Ok);
-  for (int i = 0; i < 3; ++i) {  // elsewhere, with other forces and velocities
-    const VectorXd away = problem.integrate(x0, randomVector(rng, problem.tangentSize(0), 0.1));
-    REQUIRE(problem.linearize(0, away, u + randomVector(rng, model.nu(), 20), x0, other) == StepStatus::Ok);
-  }
-  for (int i = 0; i < 2; ++i) {  // the second time nothing is new
-    REQUIRE(problem.linearize(0, x, u, x0, again) == StepStatus::Ok);
-    CHECK(calcRelativeError(again.Fx(), once.Fx()) < 1e-9);
-    CHECK(calcRelativeError(again.Fu(), once.Fu()) < 1e-9);
-    CHECK(calcRelativeError(again.lx, once.lx) < 1e-9);
-    CHECK(calcRelativeError(again.lxx().triangularView<Eigen::Lower>(), once.lxx().triangularView<Eigen::Lower>()) <
-          1e-9);
-    CHECK(calcRelativeError(again.lux(), once.lux()) < 1e-9);
-  }
-  CHECK(calcRelativeError(other.Fx(), once.Fx()) > 1e-3);
-}
-
-TEST_CASE("shooting problem: steps and linearizations allocate nothing after the first") {
-  std::mt19937 rng(24);
-  const Model model = loadRobot("bipetto").model;
-  const VectorXd q = makeStandingPosture(model);
-  const Discretization how = GENERATE(from_range(kDiscretizations));
-  CAPTURE(how);
-  const RobotProblem problem = makeProblem(rng, model, q, makeContactTargets(model, q, {0, 1}, 0, 100), how);
-  const VectorXd x = problem.initialState();
-  const VectorXd u = randomVector(rng, model.nu(), 1);
-  const VectorXd small = randomVector(rng, problem.tangentSize(0), 1e-3);
-  const VectorXd x2 = ProblemProbe(problem).integrate(x, small);
-  const auto stage = problem.makeEvaluation(), terminal = problem.makeEvaluation();
-  const auto scratch = problem.makeScratch();
-  StageModel models[2];
-  models[0].resize(problem.tangentSize(0), model.nu(), problem.tangentSize(1));
-  models[1].resize(problem.tangentSize(1), 0, 0);
-  VectorXd moved = x, dx(problem.tangentSize(0));
-  const auto runAll = [&](const VectorXd& at) {
-    std::vector<long> counts(4, 0);
-    const auto measure = [&](int i, auto&& f) {
-      const long before = num_allocations;
-      f();
-      counts[i] = num_allocations - before;
-    };
-    EvaluateTask steps[] = {{0, &at, &u, nullptr, stage.get()}, {1, &x, nullptr, nullptr, terminal.get()}};
-    LinearizeTask linearizations[2];
-    linearizations[0] = {0, stage.get(), terminal.get(), nullptr, &models[0], StepStatus::Failed, {}};
-    linearizations[1] = {1, terminal.get(), nullptr, nullptr, &models[1], StepStatus::Failed, {}};
-    const IntegrateTask move{0, stage.get(), &small, &moved};
-    const DifferenceTask difference{0, stage.get(), &x, &dx};
-    measure(0, [&] { problem.evaluate(steps, 2, scratch.get()); });
-    measure(1, [&] { problem.linearize(linearizations, 2, scratch.get()); });
-    measure(2, [&] { problem.integrate(&move, 1, scratch.get()); });
-    measure(3, [&] { problem.difference(&difference, 1, scratch.get()); });
-    for (const LinearizeTask& task : linearizations) CHECK(task.status == StepStatus::Ok);
-    return counts;
-  };
-  const long before = num_allocations;
-  const VectorXd counted(100);
-  REQUIRE(num_allocations == before + 1);
-  runAll(x);
-  CHECK(runAll(x2) == std::vector<long>(4, 0));
-}
-
-TEST_CASE("shooting problem: what does not fit is refused, what is not finite fails") {
-  std::mt19937 rng(25);
-  const Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 0.7);
-  const Model& model = mechanism.model;
-  const VectorXd v = VectorXd::Zero(4);
-  const auto make = [&](const std::function<void(StageSpec&)>& spoil, Formulation formulation = Formulation::Full) {
-    std::vector<StageSpec> stages;
-    stages.push_back(makeTerminal(rng, model, mechanism.q_closed));
-    stages.push_back(makeTerminal(rng, model, mechanism.q_closed));
-    spoil(stages[0]);
-    return RobotProblem(model, mechanism.q_closed, v, std::move(stages), formulation);
-  };
-  CHECK_NOTHROW(make([](StageSpec&) {}));
-  CHECK_THROWS_AS(make([](StageSpec& s) { s.dt = 0; }), ModelError);
-  CHECK_THROWS_AS(make([](StageSpec& s) { s.state.weights.resize(3); }), ModelError);
-  CHECK_THROWS_AS(make([](StageSpec& s) { s.control.reference.resize(0); }), ModelError);
-  CHECK_THROWS_AS(make([](StageSpec& s) { s.costs[0].activation.weights.resize(2); }), ModelError);
-  CHECK_THROWS_AS(RobotProblem(model, mechanism.q_closed, VectorXd::Zero(3), {}), ModelError);
-  CHECK_THROWS_AS(RobotProblem(model, mechanism.q_closed, v, {}), ModelError);
-  const RobotProblem whole = make([](StageSpec&) {});
-  ProblemProbe problem(whole);
-  VectorXd x = problem.initialState(), next = x;
-  const VectorXd u = VectorXd::Zero(1);
-  double cost = 0;
-  CHECK(problem.step(0, x, u, next, cost) == StepStatus::Ok);
-  x[1] = std::numeric_limits<double>::quiet_NaN();
-  CHECK(problem.step(0, x, u, next, cost) == StepStatus::Failed);
-  StageModel out;
-  CHECK(problem.linearize(0, x, u, next, out) == StepStatus::Failed);
-  CHECK(problem.calcTerminalCost(x, cost) == StepStatus::Failed);
-  CHECK(problem.linearizeTerminal(x, out) == StepStatus::Failed);
-
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  const std::function<void(StageSpec&)> spoils[] = {
-      [&](StageSpec& s) { s.state.weight = nan; }, [&](StageSpec& s) { s.state.q_ref[0] = nan; },
-      [&](StageSpec& s) { s.state.v_ref[1] = nan; }, [&](StageSpec& s) { s.state.weights[2] = nan; }};
-  for (Formulation formulation : {Formulation::Full, Formulation::Reduced})
-    for (const auto& spoil : spoils) {
-      const RobotProblem whole_spoilt = make(spoil, formulation);
-      ProblemProbe spoilt(whole_spoilt);
-      CHECK(spoilt.step(0, spoilt.initialState(), u, next, cost) == StepStatus::Failed);
-    }
 }
