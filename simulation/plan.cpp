@@ -73,7 +73,7 @@ int solveForGains(const std::string& source, Fddp& solver, Motion& motion) {
 void finishPlan(const MotionRequest& request, const std::string& guess, PlanControl control,
                 const PredictiveOptions& predictive, Plan& plan) {
   const MotionSummary& summary = plan.summary;
-  const Model& model = plan.robot.model;
+  const Model& model = plan.getModel();
   const auto makeStages = [&] {
     MotionPlan stages = request.plan(model, makeStandingPosture(model));
     fixTimings(summary.timings, summary.step, stages.schedule, stages.stages);
@@ -111,6 +111,29 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
       makePredictiveMotion(model, makeStages(), options, predictive), motion.guess, predictive);
 }
 
+void setModel(Belief belief, MotionSummary& summary) {
+  summary.model = belief == Belief::Closed ? "closed" : "serial";
+  summary.serial_armature = belief == Belief::Ratio ? "reflected" : "";
+}
+
+// The serial model of a plan that believes in it. Summaries name its armature.
+void makeBelief(Belief belief, Plan& plan) {
+  plan.belief = belief;
+  if (belief == Belief::Closed) return;
+  const Model& closed = plan.robot.model;
+  const std::string& armature = plan.summary.serial_armature;
+  plan.serial = std::make_unique<SerialModel>(
+      makeSerialModel(closed, makeStandingPosture(closed), parseSerialArmature(armature)));
+}
+
+// The controller of the serial model made one of the closed robot.
+void finishBelief(Plan& plan) {
+  if (!plan.serial) return;
+  Controller& inner = plan.predictive ? static_cast<Controller&>(*plan.predictive) : *plan.policy;
+  plan.reference = makeReference(plan.robot.model, *plan.serial, *plan.policy, plan.belief);
+  plan.serial_controller = std::make_unique<SerialController>(plan.robot.model, *plan.serial, inner, plan.belief);
+}
+
 double getOption(const MotionRequest& request, const std::string& name) {
   for (const OptionEntry& entry : request.options)
     if (entry.name == name) return *entry.value;
@@ -127,15 +150,19 @@ void chooseSteps(double duration, const MotionRequest& request) {
 
 }  // namespace
 
-std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control, const PredictiveOptions& predictive) {
+std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control, const PredictiveOptions& predictive,
+                               std::optional<Belief> belief) {
   auto plan = std::make_unique<Plan>();
   plan->summary = readSummary(directory);
   const MotionSummary& summary = plan->summary;
-  if (summary.model != "closed")
-    throw ModelError(summary.file, "model '" + summary.model + "'", "it is not a motion of the closed robot",
-                     "transfer it with `bielle lift`, or solve it without --model serial");
+  const bool serial = summary.model == "serial";
+  const Belief believed = belief.value_or(serial ? Belief::Serial : Belief::Closed);
+  const bool other = serial != (believed != Belief::Closed);
+  if (other) setModel(believed, plan->summary);
   plan->robot = loadRobotOf(summary);
-  finishPlan(remakeRequest(summary), directory, control, predictive, *plan);
+  makeBelief(believed, *plan);
+  finishPlan(remakeRequest(summary), other ? "" : directory, control, predictive, *plan);
+  finishBelief(*plan);
   return plan;
 }
 
@@ -151,11 +178,13 @@ std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control, 
   summary.motion = request.motion;
   summary.robot = request.robot;
   summary.robot_file = plan->robot.file;
-  summary.model = "closed";
+  setModel(request.belief, summary);
   summary.formulation = Formulation::Reduced;
   summary.step = StepRule::Midpoint;
   summary.requested = listValues(motion.options);
+  makeBelief(request.belief, *plan);
   finishPlan(motion, "", control, predictive, *plan);
+  finishBelief(*plan);
   return plan;
 }
 

@@ -104,6 +104,13 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
          "the next second anew at every stage, from the state that is measured")
       ->check(CLI::IsMember({"open", "gains", "mpc"}))
       ->capture_default_str();
+  app.add_option(
+         "--model", a.model,
+         "what the controller takes the robot for. closed: what it is; serial: a serial chain with motors on "
+         "its joints, whose torques the linkages pass on as they do in the present posture; ratio: the same, as "
+         "if the linkages were gears of the ratio that they have where the robot stands (default: the model of "
+         "the motion)")
+      ->check(CLI::IsMember({"closed", "serial", "ratio"}));
   app.add_option("--nodes", a.predictive.nodes, "stages that predictive control looks ahead")
       ->check(CLI::Range(10, 1000))
       ->capture_default_str();

@@ -15,6 +15,7 @@ struct SimulateArguments {
   std::string directory, output, world = "bielle", control = "gains", terrain = "planned";
   std::string robot;  // of a motion that is to be solved; empty: `directory` holds one
   std::optional<double> speed;
+  std::string model;                  // that the controller believes in; empty: that of the motion
   std::vector<std::string> settings;  // name=value
   std::vector<std::string> pushes;
   double friction = 0;  // 0: that of the plan

@@ -21,13 +21,18 @@ std::unique_ptr<Plan> obtainPlan(const SimulateArguments& arguments) {
   const std::map<std::string, PlanControl> controls{
       {"open", PlanControl::Open}, {"gains", PlanControl::Gains}, {"mpc", PlanControl::Predictive}};
   const PlanControl control = controls.at(arguments.control);
+  const std::map<std::string, Belief> beliefs{
+      {"closed", Belief::Closed}, {"serial", Belief::Serial}, {"ratio", Belief::Ratio}};
+  std::optional<Belief> belief;
+  if (!arguments.model.empty()) belief = beliefs.at(arguments.model);
   if (arguments.robot.empty()) {
     if (arguments.speed || !arguments.settings.empty())
       throw ModelError("", arguments.speed ? "--speed" : "--set", "a motion solved before has its own",
                        "give --robot and the name of a motion");
-    return readPlan(arguments.directory, control, arguments.predictive);
+    return readPlan(arguments.directory, control, arguments.predictive, belief);
   }
-  PlanRequest request{arguments.directory, arguments.robot, {}, arguments.execution.duration};
+  PlanRequest request{
+      arguments.directory, arguments.robot, {}, arguments.execution.duration, belief.value_or(Belief::Closed)};
   if (arguments.speed) request.settings.emplace_back("speed", *arguments.speed);
   for (const std::string& setting : arguments.settings)
     request.settings.push_back(parseSetting("--set", setting, "steps=8"));
@@ -54,7 +59,7 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   const Model& robot = machine ? *machine : model;
   const auto world = makeWorld(arguments.world, robot, {ground, arguments.time_step});
   makeOutputDirectory(arguments.output);
-  const Execution execution = execute(robot, *plan->policy, plan->getController(), *world, arguments.execution);
+  const Execution execution = execute(robot, plan->getReference(), plan->getController(), *world, arguments.execution);
   print(arguments, *plan, execution);
   for (const std::string& path : write(arguments, *plan, ground, execution, command)) std::cout << "  " << path << "\n";
   return execution.outcome == Outcome::Stood ? kStood : kFell;

@@ -80,6 +80,10 @@ void extendSummary(const std::string& path, const SimulateArguments& arguments, 
   auto summary = nlohmann::ordered_json::parse(readTextFile(path));
   summary["world"] = arguments.world;
   summary["control"] = arguments.control;
+  summary["believed_model"] = getName(plan.belief);
+  if (plan.belief != Belief::Closed)
+    summary["plan_reachable_until"] =
+        plan.reference.first_missed < 0 ? nullptr : nlohmann::ordered_json(plan.reference.first_missed);
   if (plan.predictive) summary["solves"] = listSolves(plan.predictive->getCounts());
   for (const auto& [name, value] : plan.summary.requested)
     if (name == "speed") summary["commanded_speed"] = value;
@@ -115,7 +119,9 @@ void extendSummary(const std::string& path, const SimulateArguments& arguments, 
 
 void print(const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
   std::cout << plan.summary.motion << " of " << plan.summary.robot << " in world " << arguments.world << ", control "
-            << arguments.control << ": it " << getName(e.outcome);
+            << arguments.control;
+  if (plan.belief != Belief::Closed) std::cout << " that believes in model " << getName(plan.belief);
+  std::cout << ": it " << getName(e.outcome);
   if (!e.message.empty()) std::cout << " (" << e.message << ")";
   char text[600];
   std::snprintf(
@@ -127,6 +133,9 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
       e.duration, e.distance, e.getMeanSpeed(), e.largest_deviation, e.largest_gap, e.largest_slip, e.imbalance,
       e.energy_balance, 100 * e.saturated_share, e.real_time_factor);
   std::cout << text;
+  if (plan.reference.first_missed >= 0)
+    std::cout << "  the linkages cannot follow the plan from " << plan.reference.first_missed
+              << " s on: " << plan.reference.message << "\n";
   if (plan.predictive) {
     const PredictiveCounts& c = plan.predictive->getCounts();
     std::snprintf(text, sizeof text,
@@ -158,7 +167,7 @@ std::vector<std::string> write(const SimulateArguments& arguments, const Plan& p
   std::vector<std::string> paths = writeResult(arguments.output, result);
   extendSummary(summary, arguments, plan, execution);
   paths.push_back((output / "plan.npz").string());
-  writeNpz(paths.back(), makePlannedRecord(plan.robot.model, *plan.policy, execution.record));
+  writeNpz(paths.back(), makePlannedRecord(plan.robot.model, plan.getReference(), execution.record));
   if (!arguments.no_report) {
     paths.push_back((output / "report.html").string());
     writeReport(paths.back(), {arguments.output});

@@ -75,6 +75,24 @@ TEST_CASE("simulate: with gains a walk stands, and its numbers are written") {
   CHECK(record.q.allFinite());
 }
 
+TEST_CASE("simulate: a controller may believe in another model than that of the motion") {
+  const Scratch scratch;
+  const std::string output = (scratch.path / "serial").string();
+  for (const std::string model : {"serial", "ratio"}) {
+    const CommandResult result = simulate(output, {"--model", model, "--summary-only"});
+    CAPTURE(model, result.out, result.err);
+    CHECK(result.status <= 1);  // it may well fall
+    CHECK(result.err.empty());
+    CHECK_THAT(result.out, Catch::Contains("believes in model " + model));
+    const nlohmann::json summary = readSummary(output);
+    CHECK(summary["believed_model"] == model);
+    CHECK(summary["duration"].get<double>() > 0.5);
+    CHECK(summary["fell"] == (result.status == 1));
+    CHECK(summary["plan_reachable_until"].is_null());
+  }
+  CHECK(simulate(output, {"--model", "gears"}).status == 2);
+}
+
 TEST_CASE("simulate: the plan lies beside what happened, and the page shows both") {
   const Scratch scratch;
   const std::string output = (scratch.path / "shown").string();
