@@ -8,3 +8,5 @@ target_compile_definitions(test_design_gradient PRIVATE BIELLE_COMMAND="$<TARGET
 add_dependencies(test_design_gradient bielle_command)
 set_tests_properties(design_gradient PROPERTIES LABELS system)
 bielle_test(design_measures SOURCES test_design_measures.cpp robot_directory.cpp LIBS bielle_design)
+bielle_test(envelope SOURCES test_envelope.cpp LIBS bielle_design)
+set_tests_properties(envelope PROPERTIES LABELS system)

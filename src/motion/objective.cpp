@@ -4,8 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "bielle/motion/motion.h"
-#include "bielle/solve/peak_problem.h"
+#include "bielle/motion/motion_envelope.h"
 
 namespace bielle {
 
@@ -94,17 +93,48 @@ ObjectiveOptions scaleObjective(const Motion& effort, const ObjectiveOptions& op
   return out;
 }
 
-FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer) {
-  FddpOptions solver = options;
-  if (motion.bounded) solver.bounds = ControlBounds::Enforce;
-  if (motion.peak_limits.size() == 0) return Fddp(solver).solve(*motion.problem, motion.guess, observer);
+std::unique_ptr<PeakProblem> makePeakProblem(const Motion& motion) {
+  if (motion.peak_limits.size() == 0) return nullptr;
   const double most = motion.within_limits ? 1 : std::numeric_limits<double>::infinity();
-  const PeakProblem problem(*motion.problem, motion.peak_limits, motion.objective.scale, most);
-  solver.bounds = ControlBounds::Enforce;
-  ShootingTrajectory trajectory = problem.wrap(motion.guess);
-  const FddpSummary summary = Fddp(solver).solve(problem, trajectory, observer);
-  motion.guess = problem.unwrap(trajectory);
+  return std::make_unique<PeakProblem>(*motion.problem, motion.peak_limits, motion.objective.scale, most);
+}
+
+FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer,
+                        Multipliers* multipliers) {
+  FddpOptions solver = options;
+  const std::unique_ptr<PeakProblem> peak = makePeakProblem(motion);
+  if (motion.bounded || peak) solver.bounds = ControlBounds::Enforce;
+  Fddp fddp(solver);
+  FddpSummary summary;
+  if (peak) {
+    ShootingTrajectory trajectory = peak->wrap(motion.guess);
+    summary = fddp.solve(*peak, trajectory, observer);
+    motion.guess = peak->unwrap(trajectory);
+  } else {
+    summary = fddp.solve(*motion.problem, motion.guess, observer);
+  }
+  if (multipliers) *multipliers = fddp.getMultipliers();
   return summary;
+}
+
+MotionEnvelope::MotionEnvelope(const Motion& optimum, const Multipliers& multipliers)
+    : peak_(makePeakProblem(optimum)),
+      trajectory_(peak_ ? peak_->wrap(optimum.guess) : optimum.guess),
+      envelope_(optimum.problem->model(), peak_ ? static_cast<const ShootingProblem&>(*peak_) : *optimum.problem,
+                trajectory_, multipliers) {}
+
+double MotionEnvelope::calcLagrangian(const Motion& changed) const {
+  const std::unique_ptr<PeakProblem> peak = makePeakProblem(changed);
+  return peak ? envelope_.calcLagrangian(*peak) : envelope_.calcLagrangian(*changed.problem);
+}
+
+std::optional<ShootingTrajectory> followOptimum(const Motion& optimum, const Multipliers& multipliers,
+                                                const Motion& changed, int sweeps) {
+  const std::unique_ptr<PeakProblem> from = makePeakProblem(optimum), to = makePeakProblem(changed);
+  if (!from) return followOptimum(*optimum.problem, optimum.guess, multipliers, *changed.problem, sweeps);
+  const std::optional<ShootingTrajectory> out =
+      followOptimum(*from, from->wrap(optimum.guess), multipliers, *to, sweeps);
+  return out ? std::optional<ShootingTrajectory>(to->unwrap(*out)) : std::nullopt;
 }
 
 }  // namespace bielle

@@ -78,7 +78,9 @@ ObjectiveOptions scaleObjective(const Motion& effort, const ObjectiveOptions& op
 /// Solves a motion from its guess, and leaves the solution there: by Fddp, with bounds enforced where there are any. For the
 /// least peak torque it solves the PeakProblem of motion.problem. The guess should then be the motion of least effort: from a
 /// quasi-static guess, motors that share a load have nothing to gain by it.
-FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer = {});
+/// \param multipliers  if given, receives those of the constraints, which MotionEnvelope needs
+FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer = {},
+                        Multipliers* multipliers = nullptr);
 
 /// FddpOptions::initial_regularization for solves from Motion::guess. That guess stands still: undamped, the first steps
 /// throw the swing legs so far that dozens of short ones follow. A solution to start from needs none.

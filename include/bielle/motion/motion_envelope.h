@@ -1,0 +1,38 @@
+#pragma once
+/// \file Derivatives of an optimal motion, of its cost and of itself, with respect to the robot and to what is asked for.
+#include "bielle/motion/motion.h"
+#include "bielle/ocp/envelope.h"
+#include "bielle/ocp/followed_optimum.h"
+#include "bielle/solve/peak_problem.h"
+
+namespace bielle {
+
+/// The problem that solveMotion() solves for the least peak torque; null for other objectives. The motion must outlive it.
+std::unique_ptr<PeakProblem> makePeakProblem(const Motion& motion);
+
+/// Envelope of a solved motion, whatever it minimizes. Other motions are made like it, with the same options, for a robot
+/// that differs a little: postures at the start and at the end, references and footholds are those planned for that robot.
+/// Options hold, among them ObjectiveOptions::scale.
+class MotionEnvelope {
+ public:
+  /// \param optimum  with its solution as its guess; must outlive it   \param multipliers  from solveMotion()
+  MotionEnvelope(const Motion& optimum, const Multipliers& multipliers);
+
+  double cost() const { return envelope_.cost(); }  ///< J*
+  /// As in Envelope.
+  double calcLagrangian(const Motion& changed) const;
+  double calcDerivative(const Motion& ahead, const Motion& behind, double step) const {
+    return (calcLagrangian(ahead) - calcLagrangian(behind)) / (2 * step);
+  }
+
+ private:
+  std::unique_ptr<PeakProblem> peak_;
+  ShootingTrajectory trajectory_;
+  Envelope envelope_;
+};
+
+/// The optimum of another motion like it to first order, as a trajectory of changed.problem (ocp/followed_optimum.h).
+std::optional<ShootingTrajectory> followOptimum(const Motion& optimum, const Multipliers& multipliers,
+                                                const Motion& changed, int sweeps = 2);
+
+}  // namespace bielle

@@ -1,0 +1,237 @@
+// Derivatives of optimal costs by the mechanism. Oracle: motions solved again for changed robots, and their costs differenced
+// to the fourth order.
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+
+#include "bielle/design/parametrization.h"
+#include "bielle/motion/motion_envelope.h"
+#include "bielle/motion/squat.h"
+#include "bielle/motion/walk.h"
+#include "design/spec.h"
+
+using namespace bielle;
+
+namespace {
+
+constexpr double kTolerance = 1e-5;  // relative
+// Shares of the width of the bounds: of the envelope, whose error grows with the square, and between optima.
+constexpr double kStep = 1e-5, kBetweenOptima = 4e-3;
+
+using MakeMotion = std::function<Motion(const Model&)>;
+
+// Costs are then exact to ten digits or more.
+FddpOptions makeTightOptions() {
+  FddpOptions options;
+  options.gradient_tolerance = 1e-13;
+  options.cost_tolerance = 0;
+  options.constraints.tolerance = 1e-10;
+  options.initial_regularization = kGuessRegularization;
+  return options;
+}
+
+struct Optimum {
+  Optimum(Model robot, const MakeMotion& make, const ShootingTrajectory* guess = nullptr,
+          const FddpOptions& options = makeTightOptions())
+      : model(std::move(robot)), motion(make(model)) {
+    if (guess) motion.guess = *guess;
+    summary = solveMotion(motion, options, {}, &multipliers);
+    CAPTURE(summary.message, summary.iterations);
+    REQUIRE(summary.termination == FddpTermination::Converged);
+  }
+  Model model;
+  Motion motion;
+  Multipliers multipliers;
+  FddpSummary summary;
+};
+
+VectorXd calcGradient(const Parametrization& robot, const Optimum& optimum, const MakeMotion& make) {
+  const MotionEnvelope envelope(optimum.motion, optimum.multipliers);
+  VectorXd out(robot.start().size());
+  for (Eigen::Index i = 0; i < out.size(); ++i) {
+    const double step = kStep * (robot.upper()[i] - robot.lower()[i]);
+    const VectorXd dx = step * VectorXd::Unit(out.size(), i);
+    const Model ahead = robot.make(robot.start() + dx), behind = robot.make(robot.start() - dx);
+    out[i] = envelope.calcDerivative(make(ahead), make(behind), step);
+  }
+  return out;
+}
+
+double differentiateOptima(const Parametrization& robot, const MakeMotion& make, const ShootingTrajectory* guess, int i,
+                           double between) {
+  const double step = between * (robot.upper()[i] - robot.lower()[i]);
+  double out = 0;
+  for (const auto& [steps, weight] : {std::pair{-2, 1.0}, {-1, -8.0}, {1, 8.0}, {2, -1.0}}) {
+    const VectorXd dx = steps * step * VectorXd::Unit(robot.start().size(), i);
+    out += weight * Optimum(robot.make(robot.start() + dx), make, guess).summary.cost / (12 * step);
+  }
+  return out;
+}
+
+// \param guess  of all solves; null: that of the motion   \param between  as kBetweenOptima
+void check(const std::string& name, const Parametrization& robot, const MakeMotion& make,
+           const ShootingTrajectory* guess = nullptr, double between = kBetweenOptima) {
+  CAPTURE(name);
+  const Optimum optimum(robot.startModel(), make, guess);
+  CHECK(MotionEnvelope(optimum.motion, optimum.multipliers).cost() == Approx(optimum.summary.cost).epsilon(1e-12));
+  const VectorXd gradient = calcGradient(robot, optimum, make);
+  for (Eigen::Index i = 0; i < gradient.size(); ++i) {
+    const double expected = differentiateOptima(robot, make, guess, static_cast<int>(i), between);
+    CAPTURE(robot.variables()[i].name, gradient[i], expected);
+    std::printf("%-28s %-16s %14.8g %10.1e\n", name.c_str(), robot.variables()[i].name.c_str(), gradient[i],
+                gradient[i] / expected - 1);
+    CHECK(gradient[i] == Approx(expected).epsilon(kTolerance).scale(0));
+  }
+}
+
+DesignVariable makeVariable(const std::string& name, double lower, double upper) {
+  DesignVariable out;
+  out.name = out.parameter = name;
+  out.lower = lower, out.upper = upper;
+  return out;
+}
+
+// Placements, inertias and rotors of a planar leg.
+Parametrization makeFivebar() {
+  return {"fivebar_leg",
+          {},
+          {makeVariable("upper_length", 0.06, 0.14), makeVariable("lower_length", 0.15, 0.25),
+           makeVariable("body_mass", 0.5, 2), makeVariable("armature", 0, 2e-3)}};
+}
+
+// The four-bar of the knees: placements, frames of closures, inertias. \param count  of its five variables
+Parametrization makeBipetto(size_t count = 5) {
+  const Parametrization all =
+      makeParametrization(readDesignSpec(std::string(BIELLE_SOURCE_DIR) + "/examples/knee_design/knee.yaml"));
+  return {all.startModel(), {all.variables().begin(), all.variables().begin() + static_cast<std::ptrdiff_t>(count)}};
+}
+
+// Its lower leg and its foot, which moves the frame of the contact.
+Parametrization makeCleobot() {
+  return {"cleobot",
+          {},
+          {makeVariable("base_radius", 0.05, 0.11), makeVariable("upper_length", 0.15, 0.23),
+           makeVariable("ankle_height", 0.04, 0.08), makeVariable("leg_motor_mass", 0.5, 1)}};
+}
+
+MakeMotion makeSmallSquat(const ProblemOptions& problem) {
+  return [=](const Model& model) {
+    SquatOptions options;
+    options.depth = 0.8, options.duration = 0.8, options.settle = 0.1, options.time_step = 0.02;
+    return makeSquat(model, options, problem);
+  };
+}
+
+MakeMotion makeShortWalk(const ProblemOptions& problem) {
+  return [=](const Model& model) {
+    WalkOptions options;
+    options.speed = 0.4, options.steps = 2;
+    return makeWalk(model, options, problem);
+  };
+}
+
+}  // namespace
+
+TEST_CASE("envelope: squats of three robots, in both formulations, against motions solved again") {
+  for (Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
+    const std::string suffix = std::string(", ") + getName(formulation);
+    check("five-bar leg" + suffix, makeFivebar(), makeSmallSquat(formulation));
+    check("Bipetto" + suffix, makeBipetto(), makeSmallSquat(formulation));
+    check("Cleobot" + suffix, makeCleobot(), makeSmallSquat(formulation));
+  }
+}
+
+TEST_CASE("envelope: walks, and Euler steps") {
+  check("Bipetto walks", makeBipetto(1), makeShortWalk(Formulation::Reduced));
+  check("Bipetto walks, full", makeBipetto(1), makeShortWalk(Formulation::Full));
+  check("Bipetto walks, Euler", makeBipetto(1), makeShortWalk({Formulation::Reduced, StepRule::Euler}));
+  check("Cleobot walks", {"cleobot", {}, {makeVariable("hip_crank", 0.04, 0.1)}}, makeShortWalk(Formulation::Reduced));
+}
+
+TEST_CASE("envelope: controls at bounds, free durations, the least peak torque") {
+  const Parametrization robot = makeFivebar();
+  const Optimum free(robot.startModel(), makeSmallSquat(Formulation::Reduced));
+  double most = 0;
+  for (const VectorXd& u : free.motion.guess.us) most = std::max(most, u.lpNorm<Eigen::Infinity>());
+
+  ProblemOptions bounded(Formulation::Reduced);
+  for (const Motor& motor : robot.startModel().motors()) bounded.limits.efforts[motor.name] = 0.95 * most;
+  const Optimum at_bounds(robot.startModel(), makeSmallSquat(bounded));
+  int touching = 0;
+  for (const VectorXd& u : at_bounds.motion.guess.us) touching += u.lpNorm<Eigen::Infinity>() == 0.95 * most;
+  CHECK(touching > 0);
+  // Where a torque reaches its bound the second derivative jumps, so that differences have to stay on one side.
+  check("bounded torques", robot, makeSmallSquat(bounded), nullptr, 1e-4);
+
+  ProblemOptions timed(Formulation::Reduced);
+  timed.timings.phases = {{kAllPhases, {}}};
+  check("free durations", robot, makeSmallSquat(timed));
+
+  ProblemOptions peak(Formulation::Reduced);
+  peak.objective.objective = Objective::PeakTorque;
+  peak.objective = scaleObjective(free.motion, peak.objective);
+  check("least peak torque", robot, makeSmallSquat(peak), &free.motion.guess);
+}
+
+TEST_CASE("envelope: an optimum followed to first order, against optima of changed robots") {
+  const auto check = [](const Parametrization& robot, const MakeMotion& make, int variable) {
+    const double step = 1e-3 * (robot.upper()[variable] - robot.lower()[variable]);
+    const VectorXd dx = step * VectorXd::Unit(robot.start().size(), variable);
+    const Optimum optimum(robot.startModel(), make);
+    const Optimum ahead(robot.make(robot.start() + dx), make), behind(robot.make(robot.start() - dx), make);
+    double last = 1;
+    for (int sweeps = 1; sweeps <= 4; ++sweeps) {
+      const auto to = followOptimum(optimum.motion, optimum.multipliers, ahead.motion, sweeps),
+                 from = followOptimum(optimum.motion, optimum.multipliers, behind.motion, sweeps);
+      REQUIRE((to && from));
+      double error = 0, size = 0;
+      for (size_t k = 0; k < to->us.size(); ++k) {
+        const VectorXd expected = ahead.motion.guess.us[k] - behind.motion.guess.us[k];
+        error += (to->us[k] - from->us[k] - expected).squaredNorm();
+        size += expected.squaredNorm();
+      }
+      error = std::sqrt(error / size);
+      std::printf("%s, %d sweeps: %.2e\n", robot.variables()[variable].name.c_str(), sweeps, error);
+      CHECK(error < last);
+      last = error;
+    }
+    CHECK(last < 1e-2);
+  };
+  check(makeFivebar(), makeSmallSquat(Formulation::Reduced), 0);
+  check(makeBipetto(), makeSmallSquat(Formulation::Reduced), 0);
+  check(makeBipetto(), makeSmallSquat(Formulation::Full), 2);
+  check(makeBipetto(), makeShortWalk(Formulation::Reduced), 0);
+  check(makeCleobot(), makeShortWalk(Formulation::Reduced), 1);
+}
+
+TEST_CASE("envelope: problems that do not fit the optimum are refused") {
+  const Parametrization robot = makeFivebar();
+  const Optimum optimum(robot.startModel(), makeSmallSquat(Formulation::Reduced));
+  const MotionEnvelope envelope(optimum.motion, optimum.multipliers);
+  CHECK(envelope.calcLagrangian(optimum.motion) == Approx(optimum.summary.cost).epsilon(1e-9));
+  CHECK_THROWS_AS(envelope.calcLagrangian(makeSquat(optimum.model)), std::invalid_argument);
+  CHECK_THROWS_AS(MotionEnvelope(optimum.motion, Multipliers{{VectorXd()}, 1}), std::invalid_argument);
+}
+
+TEST_CASE("envelope: time of twenty parameters", "[.table]") {
+  const auto getSeconds = [] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  };
+  FddpOptions options;
+  options.threads = 1;
+  options.initial_regularization = kGuessRegularization;
+  const auto run = [&](const std::string& name, const Parametrization& robot, const MakeMotion& make) {
+    for (int turn = 0; turn < 3; ++turn) {
+      const double begin = getSeconds();
+      const Optimum optimum(robot.startModel(), make, nullptr, options);
+      const double solved = getSeconds();
+      const double share = 20.0 / static_cast<double>(calcGradient(robot, optimum, make).size());
+      std::printf("%s: solve %.3f s, twenty parameters %.3f s\n", name.c_str(), solved - begin,
+                  share * (getSeconds() - solved));
+    }
+  };
+  const auto make = [&](const Model& model) { return makeWalk(model); };
+  run("Bipetto walks", makeBipetto(), make);
+  run("Cleobot walks", makeCleobot(), make);
+}
