@@ -81,6 +81,43 @@ TEST_CASE("shooting problem: steps and linearizations allocate nothing after the
   CHECK(runAll(x2) == std::vector<long>(4, 0));
 }
 
+TEST_CASE("shooting problem: a stage that replaces another is as if it had always been there") {
+  const Discretization how = GENERATE(from_range(kDiscretizations));
+  CAPTURE(how);
+  const Model model = loadRobot("bipetto").model;
+  const VectorXd q = makeStandingPosture(model), v = VectorXd::Zero(model.nv());
+  std::mt19937 rng(27);
+  const auto makeStage = [&](const std::vector<int>& contacts, double weight) {
+    StageSpec stage;
+    stage.step = how.step;
+    stage.dt = 0.01;
+    stage.constraints = makeConstraintSet(model, makeContactTargets(model, q, contacts, 0, 100));
+    stage.state = {weight, q, v, VectorXd::Constant(2 * model.nv(), weight)};
+    addGroundCosts(model, {}, VectorXd::Constant(static_cast<int>(contacts.size()), 100), stage);
+    return stage;
+  };
+  const std::vector<StageSpec> stages{makeStage({0, 1}, 1), makeStage({0, 1}, 2), StageSpec()};
+  std::vector<StageSpec> others = stages;
+  others[1] = makeStage({1}, 3);
+  RobotProblem replaced(model, q, v, stages, how.formulation);
+  const RobotProblem direct(model, q, v, others, how.formulation);
+  ProblemProbe probe(replaced), expected(direct);
+  const VectorXd x = probe.integrate(replaced.initialState(), randomVector(rng, replaced.tangentSize(0), 0.01)),
+                 u = randomVector(rng, model.nu(), 1);
+  StageModel before, after, wanted;
+  REQUIRE(probe.linearize(1, x, u, x, before) == StepStatus::Ok);  // what was computed before does not matter
+  replaced.replaceStage(1, makeStage({1}, 3));
+  REQUIRE(probe.linearize(1, x, u, x, after) == StepStatus::Ok);
+  REQUIRE(expected.linearize(1, x, u, x, wanted) == StepStatus::Ok);
+  CHECK(after.cost == wanted.cost);
+  CHECK(after.Fx() == wanted.Fx());
+  CHECK(after.lx == wanted.lx);
+  CHECK(before.cost != wanted.cost);
+  StageSpec large = makeStage({0, 1}, 1);
+  addGroundCosts(model, {}, VectorXd::Constant(2, 100), large);
+  CHECK_THROWS_AS(replaced.replaceStage(0, large), std::invalid_argument);
+}
+
 TEST_CASE("shooting problem: what does not fit is refused, what is not finite fails") {
   std::mt19937 rng(25);
   const Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 0.7);

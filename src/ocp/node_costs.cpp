@@ -4,7 +4,7 @@
 
 namespace bielle {
 
-NodeCosts::NodeCosts(const StageSpec& spec, bool running) : spec_(spec), first_rows_(spec.costs.size()) {
+NodeCosts::NodeCosts(const StageSpec& spec, bool running) : spec_(&spec), first_rows_(spec.costs.size()) {
   step_ = running && spec.kind == StageKind::Dynamics;
   const auto add = [this](const Residual& residual, const Cost* cost, const PathConstraint* constraint, int row) {
     blocks_.push_back({&residual, cost, constraint, rows_, row});
@@ -28,7 +28,7 @@ NodeCosts::NodeCosts(const StageSpec& spec, bool running) : spec_(spec), first_r
 }
 
 double NodeCosts::calcControlCost(const VectorXd& u) const {
-  const ControlCost& control = spec_.control;
+  const ControlCost& control = spec_->control;
   return 0.5 * control.weight * (u.head(control.reference.size()) - control.reference).cwiseAbs2().dot(control.weights);
 }
 
@@ -36,11 +36,11 @@ double NodeCosts::calcControlCost(const VectorXd& u) const {
 template <typename Add>
 void NodeCosts::visitValues(const RobotEvaluation& at, const Add& add) const {
   static const std::string kTime = "time", kState = "state", kControl = "control";
-  if (step_ && spec_.time_weight != 0) add(kTime, spec_.time_weight);
-  if (spec_.state.weight != 0) add(kState, at.state_cost);
-  if (spec_.control.weight != 0 && at.u.size() > 0) add(kControl, calcControlCost(at.u));
-  for (size_t c = 0; c < spec_.costs.size(); ++c) {
-    const Cost& cost = spec_.costs[c];
+  if (step_ && spec_->time_weight != 0) add(kTime, spec_->time_weight);
+  if (spec_->state.weight != 0) add(kState, at.state_cost);
+  if (spec_->control.weight != 0 && at.u.size() > 0) add(kControl, calcControlCost(at.u));
+  for (size_t c = 0; c < spec_->costs.size(); ++c) {
+    const Cost& cost = spec_->costs[c];
     const auto r = at.residuals.segment(first_rows_[c], cost.residual->size());
     add(cost.name, cost.weight * cost.activation.calc(r));
   }
@@ -92,12 +92,12 @@ void NodeCosts::differentiate(const NodeView& node, const CountedRows& rows, Res
   for (const auto& [residual, row, n, square] : rows.blocks)
     residual->calcJacobian(node,
                            {jacobians.q.middleRows(row, n), jacobians.v.middleRows(row, n),
-                            jacobians.lambda.block(row, 0, n, spec_.constraints.rows), jacobians.u.middleRows(row, n),
+                            jacobians.lambda.block(row, 0, n, spec_->constraints.rows), jacobians.u.middleRows(row, n),
                             jacobians.speeds.middleRows(row, n), jacobians.s.segment(row, n)});
 }
 
 void NodeCosts::addControlCost(const RobotEvaluation& at, StageModel& out) const {
-  const ControlCost& control = spec_.control;
+  const ControlCost& control = spec_->control;
   if (control.weight == 0) return;
   const double w = getScale(at) * control.weight;
   const Eigen::Index nu = control.reference.size();

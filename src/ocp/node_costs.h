@@ -61,7 +61,7 @@ class NodeCosts {
   template <typename Add>
   void visitValues(const RobotEvaluation& at, const Add& add) const;
 
-  const StageSpec& spec_;
+  const StageSpec* spec_;
   // Of one cost or one path constraint, in the order of the stacked residuals.
   struct Block {
     const Residual* residual;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "bielle/model/error.h"
 #include "ocp/transcription.h"
@@ -155,6 +156,17 @@ void addTimeScaleCost(int leading, const RobotEvaluation& at, ConstVectorRef no_
   getGradient(row) += at.cost / s;
 }
 
+void NodeSizes::include(const StageSpec& spec, const NodeCosts& costs) {
+  rows = std::max(rows, costs.rows());
+  blocks = std::max(blocks, costs.numBlocks());
+  constraint_rows = std::max(constraint_rows, spec.constraints.rows);
+}
+
+void NodeSizes::require(const StageSpec& spec, const NodeCosts& costs) const {
+  if (costs.rows() > rows || costs.numBlocks() > blocks || spec.constraints.rows > constraint_rows)
+    throw std::invalid_argument("RobotProblem: a stage has more costs or constraints than any had at first");
+}
+
 // As allFinite(), but vectorized: a value that is not finite makes the sum NaN. The Hessian is a sum of squares, so any
 // NaN shows on its diagonal.
 bool isFinite(const StageModel& model) { return (0 * model.Ft()).sum() == 0 && model.hessian().diagonal().allFinite(); }
@@ -179,9 +191,18 @@ RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorX
 
 RobotProblem::~RobotProblem() = default;
 
+void RobotProblem::replaceStage(int stage, StageSpec spec) {
+  checkSpec(model_, spec, stage, false);
+  if (spec.timing.phase >= 0 || places_[stage].isFree())
+    throw std::invalid_argument("RobotProblem: the duration of stage " + std::to_string(stage) + " is free");
+  specs_[stage] = std::move(spec);
+  transcription_->updateStage(stage);
+}
+
 void RobotProblem::setTerminalReference(ConstVectorRef q, ConstVectorRef v) {
   specs_.back().state.q_ref = q;
   specs_.back().state.v_ref = v;
+  transcription_->updateStateCost(numStages());
 }
 
 int RobotProblem::tangentSize(int node) const {

@@ -7,9 +7,21 @@
 
 namespace bielle {
 
+// The most that any node of a problem needs of memory that belongs to a thread.
+struct NodeSizes {
+  int rows = 0, blocks = 0, constraint_rows = 0;  // of NodeCosts; of the constraints of the dynamics
+  void include(const StageSpec& spec, const NodeCosts& costs);
+  // \throws std::invalid_argument when a node needs more
+  void require(const StageSpec& spec, const NodeCosts& costs) const;
+};
+
 class Transcription {
  public:
   virtual ~Transcription() = default;
+  // After the spec of a node has been replaced. \throws std::invalid_argument as RobotProblem::replaceStage() does
+  virtual void updateStage(int node) = 0;
+  // After the state cost of a node has changed.
+  virtual void updateStateCost(int node) = 0;
   virtual int tangentSize() const = 0;  // without a time scale
   virtual int getBatchSize() const = 0;
   virtual std::unique_ptr<RobotEvaluation> makeEvaluation() const = 0;

@@ -150,6 +150,10 @@ class RobotProblem : public ShootingProblem {
   const Model& model() const { return model_; }
   Formulation formulation() const { return formulation_; }
   const StageSpec& spec(int node) const { return specs_[node]; }
+  /// Replaces a stage, for horizons that recede without end: evaluations of other nodes stay valid, solves must not be under
+  /// way. \throws ModelError as the constructor does   \throws std::invalid_argument when the duration of the stage is free,
+  /// or it has more costs, constraints or rows of them than any stage of the constructor had, or other bodies in contact
+  void replaceStage(int stage, StageSpec spec);
   /// Changes the reference of the state cost of the terminal node: where a horizon that recedes is to end.
   /// \param q  nq   \param v  nv
   void setTerminalReference(ConstVectorRef q, ConstVectorRef v);

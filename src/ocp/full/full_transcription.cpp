@@ -22,8 +22,17 @@ struct FullScratch : ProblemScratch {
 class FullTranscription : public Transcription {
  public:
   FullTranscription(const Model& model, const NodeList& nodes) : model_(model), nodes_(nodes), specs_(nodes.specs) {
-    for (const StageSpec& spec : specs_) costs_.emplace_back(spec, &spec != &specs_.back());
+    for (const StageSpec& spec : specs_) {
+      costs_.emplace_back(spec, &spec != &specs_.back());
+      sizes_.include(spec, costs_.back());
+    }
   }
+
+  void updateStage(int node) override {
+    costs_[node] = NodeCosts(specs_[node], true);
+    sizes_.require(specs_[node], costs_[node]);
+  }
+  void updateStateCost(int) override {}
 
   int tangentSize() const override { return 2 * model_.nv(); }
   int getBatchSize() const override { return 1; }
@@ -31,12 +40,7 @@ class FullTranscription : public Transcription {
   std::unique_ptr<RobotEvaluation> makeEvaluation() const override { return std::make_unique<FullEvaluation>(model_); }
 
   std::unique_ptr<ProblemScratch> makeScratch() const override {
-    int rows = 0, blocks = 0, constraint_rows = 0;
-    for (size_t k = 0; k < specs_.size(); ++k) {
-      rows = std::max(rows, costs_[k].rows());
-      blocks = std::max(blocks, costs_[k].numBlocks());
-      constraint_rows = std::max(constraint_rows, specs_[k].constraints.rows);
-    }
+    const auto [rows, blocks, constraint_rows] = sizes_;
     auto out = std::make_unique<FullScratch>(model_, constraint_rows);
     out->difference.setZero(model_.nv());
     for (MatrixXd* m : {&out->jacobians.q, &out->jacobians.v}) m->setZero(rows, model_.nv());
@@ -97,6 +101,7 @@ class FullTranscription : public Transcription {
   const NodeList nodes_;
   const std::vector<StageSpec>& specs_;
   std::vector<NodeCosts> costs_;
+  NodeSizes sizes_;
 };
 
 void FullTranscription::evaluate(EvaluateTask& task, FullScratch& scratch) const {

@@ -7,7 +7,7 @@
 namespace bielle {
 
 NodeAssembly::NodeAssembly(const Model& model, const Reduction& reduction, const ReducedLayout& layout,
-                           const std::vector<NodeCosts>& costs)
+                           const NodeSizes& sizes)
     : model_(model), reduction_(reduction), layout_(layout) {
   const int nv = model.nv(), nr = reduction.size, nu = model.nu();
   for (size_t i = 0; i < reduction.free_joints.size(); ++i) {
@@ -24,18 +24,13 @@ NodeAssembly::NodeAssembly(const Model& model, const Reduction& reduction, const
       if (dof != dofs.end()) motors_.push_back({static_cast<int>(i), static_cast<int>(dof - dofs.begin())});
     }
   }
-  int most_rows = 0, most_blocks = 0;
-  for (const NodeCosts& of_node : costs) {
-    most_rows = std::max(most_rows, of_node.rows());
-    most_blocks = std::max(most_blocks, of_node.numBlocks());
-  }
-  const Eigen::Index rows = roundUpToLane(most_rows), padded = roundUpToLane(2 * nr + nu + 1);
+  const Eigen::Index rows = roundUpToLane(sizes.rows), padded = roundUpToLane(2 * nr + nu + 1);
   for (MatrixXd* m : {&jacobians_.q, &jacobians_.v}) m->setZero(rows, nv);
   jacobians_.lambda.setZero(rows, layout.most_constraint_rows);
   for (MatrixXd* m : {&jacobians_.u, &jacobians_.speeds}) m->setZero(rows, nu);
   jacobians_.s.setZero(rows);
-  counted_.reserve(most_blocks, most_rows);
-  for (VectorXd* x : {&Rt_, &Rt_scaled_}) x->setZero(padded * most_rows);
+  counted_.reserve(sizes.blocks, sizes.rows);
+  for (VectorXd* x : {&Rt_, &Rt_scaled_}) x->setZero(padded * sizes.rows);
   for (VectorXd* x : {&gradient_, &no_squares_}) x->setZero(2 * nr + nu + 1);
   for (VectorXd* x : {&y_, &y_s_, &y_v_s_}) x->setZero(nr);
   velocity_.setZero(nv);

@@ -7,9 +7,7 @@ namespace bielle {
 
 class NodeAssembly {
  public:
-  // \param costs  of all nodes
-  NodeAssembly(const Model& model, const Reduction& reduction, const ReducedLayout& layout,
-               const std::vector<NodeCosts>& costs);
+  NodeAssembly(const Model& model, const Reduction& reduction, const ReducedLayout& layout, const NodeSizes& sizes);
 
   // Sets Fx, Fu and gap of a step, and the derivatives of its contact forces for setResiduals(). Overwrites the
   // accelerations of the view.

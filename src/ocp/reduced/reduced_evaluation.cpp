@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <stdexcept>
 
 namespace bielle {
 namespace {
@@ -46,36 +47,52 @@ ReducedLayout::ReducedLayout(const Model& model, const Reduction& reduction, con
       most[tip] = std::max(most[tip], ++count[tip]);
     }
   }
-  std::vector<int> first_slots;  // of each tip
   for (size_t tip = 0; tip < tips.size(); ++tip) {
-    first_slots.push_back(static_cast<int>(slots.size()));
     slots.insert(slots.end(), most[tip], static_cast<int>(tip));
     outers.push_back(makeTip(model, reduction, tips[tip]).outer);
   }
-  std::vector<const StateCost*> different;
-  for (const StageSpec& spec : specs) {
-    const ConstraintSet& set = spec.constraints;
-    std::vector<int> next = first_slots;
-    ContactLayout layout;
-    for (size_t c = 0; c < set.closures.size(); ++c) {
-      const Closure& closure = set.closures[c];
-      const int rows = getRows(closure.kind);
-      if (static_cast<int>(c) < set.num_loops) {
-        layout.closure_rows += rows;
-        continue;
-      }
-      layout.contacts.push_back(
-          {&closure, next[findOrAdd(tips, closure.body1)]++, layout.rows, rows, makeTurn(closure)});
-      layout.rows += rows;
-    }
-    most_contact_rows = std::max(most_contact_rows, layout.rows);
-    most_constraint_rows = std::max(most_constraint_rows, set.rows);
-    contacts.push_back(std::move(layout));
-    size_t cost = 0;
-    while (cost < different.size() && !isSame(*different[cost], spec.state)) ++cost;
-    if (spec.state.weight != 0 && cost == different.size()) different.push_back(&spec.state);
-    state_costs.push_back(spec.state.weight != 0 ? static_cast<int>(cost) : -1);
+  for (size_t k = 0; k < specs.size(); ++k) {
+    contacts.push_back(makeContacts(specs[k]));
+    most_contact_rows = std::max(most_contact_rows, contacts.back().rows);
+    most_constraint_rows = std::max(most_constraint_rows, specs[k].constraints.rows);
+    state_costs.push_back(-1);
+    updateStateCost(static_cast<int>(k), specs);
   }
+}
+
+ContactLayout ReducedLayout::makeContacts(const StageSpec& spec) const {
+  const ConstraintSet& set = spec.constraints;
+  std::vector<char> taken(slots.size(), false);
+  ContactLayout layout;
+  for (size_t c = 0; c < set.closures.size(); ++c) {
+    const Closure& closure = set.closures[c];
+    const int rows = getRows(closure.kind);
+    if (static_cast<int>(c) < set.num_loops) {
+      layout.closure_rows += rows;
+      continue;
+    }
+    size_t slot = 0;
+    while (slot < slots.size() && (taken[slot] || tips[slots[slot]] != closure.body1)) ++slot;
+    if (slot == slots.size()) throw std::invalid_argument("RobotProblem: a stage has contacts that none had at first");
+    taken[slot] = true;
+    layout.contacts.push_back({&closure, static_cast<int>(slot), layout.rows, rows, makeTurn(closure)});
+    layout.rows += rows;
+  }
+  return layout;
+}
+
+void ReducedLayout::updateStage(int node, const std::vector<StageSpec>& specs) {
+  contacts[node] = makeContacts(specs[node]);
+  updateStateCost(node, specs);
+}
+
+void ReducedLayout::updateStateCost(int node, const std::vector<StageSpec>& specs) {
+  state_costs[node] = -1;
+  const StateCost& cost = specs[node].state;
+  if (cost.weight == 0) return;
+  for (size_t k = 0; k < state_costs.size() && state_costs[node] < 0; ++k)
+    if (state_costs[k] >= 0 && isSame(specs[k].state, cost)) state_costs[node] = state_costs[k];
+  if (state_costs[node] < 0) state_costs[node] = next_state_cost_++;
 }
 
 }  // namespace bielle

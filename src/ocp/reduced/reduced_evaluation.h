@@ -56,12 +56,22 @@ struct ContactLayout {
 // All nodes of a problem.
 struct ReducedLayout {
   ReducedLayout(const Model& model, const Reduction& reduction, const std::vector<StageSpec>& specs);
+  // After the spec of a node has been replaced. \throws std::invalid_argument when its contacts need other slots
+  void updateStage(int node, const std::vector<StageSpec>& specs);
+  // After the state cost of a node has changed.
+  void updateStateCost(int node, const std::vector<StageSpec>& specs);
+
   std::vector<int> tips;                 // bodies in contact at some stage
   std::vector<std::vector<int>> outers;  // per tip, reduced coordinates that move it
   std::vector<int> slots;                // tip of each slot
   std::vector<ContactLayout> contacts;   // per node
   int most_contact_rows = 0, most_constraint_rows = 0;
-  std::vector<int> state_costs;  // per node, -1: none; nodes with equal costs have the same number
+  // Per node, -1: none. Nodes with equal costs have the same number, which no other cost ever had.
+  std::vector<int> state_costs;
+
+ private:
+  ContactLayout makeContacts(const StageSpec& spec) const;
+  int next_state_cost_ = 0;
 };
 
 }  // namespace bielle

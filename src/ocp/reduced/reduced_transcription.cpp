@@ -9,11 +9,10 @@ namespace bielle {
 namespace {
 
 struct ReducedScratch : ProblemScratch {
-  ReducedScratch(const Model& model, const Reduction& reduction, const ReducedLayout& layout,
-                 const std::vector<NodeCosts>& costs)
+  ReducedScratch(const Model& model, const Reduction& reduction, const ReducedLayout& layout, const NodeSizes& sizes)
       : kernel(model, reduction, layout),
         views(kLane, LaneView(model, reduction, kernel.tree(), layout)),
-        assembly(model, reduction, layout, costs),
+        assembly(model, reduction, layout, sizes),
         impact(model, reduction) {}
   ReducedKernel kernel;
   std::vector<LaneView> views;  // one per lane
@@ -41,8 +40,18 @@ class ReducedTranscription : public Transcription {
         specs_(nodes.specs),
         reduction_(makeReduction(model, q0)),
         layout_(model, reduction_, specs_) {
-    for (const StageSpec& spec : specs_) costs_.emplace_back(spec, &spec != &specs_.back());
+    for (const StageSpec& spec : specs_) {
+      costs_.emplace_back(spec, &spec != &specs_.back());
+      sizes_.include(spec, costs_.back());
+    }
   }
+
+  void updateStage(int node) override {
+    costs_[node] = NodeCosts(specs_[node], true);
+    sizes_.require(specs_[node], costs_[node]);
+    layout_.updateStage(node, specs_);
+  }
+  void updateStateCost(int node) override { layout_.updateStateCost(node, specs_); }
 
   int tangentSize() const override { return 2 * reduction_.size; }
   int getBatchSize() const override { return static_cast<int>(kLane); }
@@ -50,7 +59,7 @@ class ReducedTranscription : public Transcription {
     return std::make_unique<ReducedEvaluation>(model_, reduction_);
   }
   std::unique_ptr<ProblemScratch> makeScratch() const override {
-    return std::make_unique<ReducedScratch>(model_, reduction_, layout_, costs_);
+    return std::make_unique<ReducedScratch>(model_, reduction_, layout_, sizes_);
   }
 
   void evaluate(EvaluateTask* tasks, int count, ProblemScratch* scratch) const override;
@@ -74,8 +83,9 @@ class ReducedTranscription : public Transcription {
   const NodeList nodes_;
   const std::vector<StageSpec>& specs_;
   const Reduction reduction_;
-  const ReducedLayout layout_;
+  ReducedLayout layout_;
   std::vector<NodeCosts> costs_;
+  NodeSizes sizes_;
 };
 
 void ReducedTranscription::evaluate(EvaluateTask* tasks, int count, ProblemScratch* memory) const {
