@@ -188,4 +188,10 @@ std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control, 
   return plan;
 }
 
+void freeFeet(LocomotionOptions& options) {
+  options.contact_kp = 0;
+  options.foothold_room = kFootholdRoom;
+  options.cone_margin = kFeedbackMargin;
+}
+
 }  // namespace bielle::simulation

@@ -23,6 +23,7 @@ struct Plan {
   MotionSummary summary;
   Ground ground;  ///< that the motion was planned for
   ContactSchedule schedule;
+  std::vector<TimedCommand> commands;  ///< of a walk by command
   Belief belief = Belief::Closed;
   std::unique_ptr<SerialModel> serial;               ///< null for Belief::Closed
   std::unique_ptr<Policy> policy;                    ///< of the model that is believed in
@@ -58,5 +59,9 @@ struct PlanRequest {
 /// \throws ModelError when robot, motion or an option do not exist, or it does not converge
 std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control,
                                const PredictiveOptions& predictive = {});
+
+/// Sets what predictive control wants of steps: feet stand where they landed and may land elsewhere than planned, and wrenches
+/// keep away from the edges of their cones.
+void freeFeet(LocomotionOptions& options);
 
 }  // namespace bielle::simulation

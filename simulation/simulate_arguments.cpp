@@ -67,6 +67,17 @@ Ground makeGround(const SimulateArguments& arguments, const Ground& planned) {
 
 void parseOptions(SimulateArguments& arguments) {
   for (const std::string& push : arguments.pushes) arguments.execution.pushes.push_back(parsePush(push));
+  if (!arguments.commands.empty()) {
+    if (arguments.robot.empty() || arguments.control != "mpc")
+      throw ModelError("", "--command",
+                       "commands are followed by predictive control of a walk that is not solved before",
+                       "give the motion walk, --robot and --control mpc");
+    if (arguments.speed) throw ModelError("", "--speed", "the commands have the speed", "leave it out");
+    if (!arguments.model.empty() && arguments.model != "closed")
+      throw ModelError("", "--model " + arguments.model, "walks by command are those of the closed model",
+                       "leave it out");
+    readCommands(arguments.commands);
+  }
   if (arguments.jitter > arguments.delay)
     throw ModelError("", "--jitter", "it is longer than the delay", "give at most --delay");
   arguments.execution.delay = {1e-3 * arguments.delay, 1e-3 * arguments.jitter, arguments.seed};
@@ -82,6 +93,11 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
       ->required();
   app.add_option("--robot", a.robot, "name or directory of the robot that is to make the motion of this name");
   app.add_option("--speed", a.speed, "of that motion [m/s]");
+  app.add_option(
+      "--command", a.commands,
+      "FILE: YAML, a velocity over time that a walk follows with --control mpc; its steps are made on the way. "
+      "Entries such as {time: 4, forward: 0.3, sideways: 0, turning: 0.4} [s, m/s, m/s to the left, rad/s to the "
+      "left], each until the next one");
   app.add_option("--set", a.settings,
                  "name=value: another option of that motion, as in `bielle solve`; may be repeated")
       ->allow_extra_args(false);

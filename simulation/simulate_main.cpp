@@ -5,6 +5,7 @@
 #include "bielle/model/error.h"
 #include "io/setting.h"
 #include "io/standard_output.h"
+#include "simulation/commanded_plan.h"
 #include "simulation/make_world.h"
 #include "simulation/simulate_output.h"
 
@@ -36,6 +37,7 @@ std::unique_ptr<Plan> obtainPlan(const SimulateArguments& arguments) {
   if (arguments.speed) request.settings.emplace_back("speed", *arguments.speed);
   for (const std::string& setting : arguments.settings)
     request.settings.push_back(parseSetting("--set", setting, "steps=8"));
+  if (!arguments.commands.empty()) return makeCommandedPlan(request, arguments.commands, arguments.predictive);
   return makePlan(request, control, arguments.predictive);
 }
 
@@ -83,7 +85,8 @@ int main(int argc, char** argv) {
       "  bielle solve walk --robot bipetto --speed 0.4 -o walk\n"
       "  bielle simulate walk -o carried-out\n"
       "  bielle simulate walk -o pushed --control mpc --push t=1.5,impulse=7,direction=90\n"
-      "  bielle simulate walk --robot cleobot --speed 0.3 --duration 10 --control mpc -o long");
+      "  bielle simulate walk --robot cleobot --speed 0.3 --duration 10 --control mpc -o long\n"
+      "  bielle simulate walk --robot bipetto --command tour.yaml --duration 20 --control mpc -o tour");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -65,6 +65,16 @@ nlohmann::ordered_json listSolves(const PredictiveCounts& counts) {
           {"worst_ms", 1e3 * counts.calcQuantile(1)}};
 }
 
+nlohmann::ordered_json listCommands(const std::vector<TimedCommand>& commands) {
+  auto list = nlohmann::ordered_json::array();
+  for (const auto& [time, velocity] : commands)
+    list.push_back({{"time_s", time},
+                    {"forward", velocity.forward},
+                    {"sideways", velocity.sideways},
+                    {"turning", velocity.turning}});
+  return list;
+}
+
 nlohmann::ordered_json listPushes(const std::vector<Push>& pushes) {
   auto list = nlohmann::ordered_json::array();
   for (const Push& push : pushes)
@@ -87,6 +97,10 @@ void extendSummary(const std::string& path, const SimulateArguments& arguments, 
   if (plan.predictive) summary["solves"] = listSolves(plan.predictive->getCounts());
   for (const auto& [name, value] : plan.summary.requested)
     if (name == "speed") summary["commanded_speed"] = value;
+  if (!plan.commands.empty()) {
+    summary["commanded_speed"] = calcMeanSpeed(plan.commands, e.duration);
+    summary["commands"] = listCommands(plan.commands);
+  }
   summary["terrain"] = arguments.terrain;
   summary["sensors"] = arguments.sensors;
   if (arguments.sensors == "real") {

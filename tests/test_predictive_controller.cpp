@@ -129,6 +129,33 @@ TEST_CASE("predictive control: states that cannot be solved from leave the last 
   CHECK(controller->getCounts().solves == 3);
 }
 
+TEST_CASE("predictive control: a walk by command is made on the way, to the same bytes for every number of threads") {
+  const Model& model = getBipetto();
+  const std::vector<TimedCommand> commands{{0, {0.4, 0, 0}}, {0.8, {}}};
+  LocomotionOptions gait;
+  gait.contact_kp = 0;
+  gait.foothold_room = 0.4;
+  gait.cone_margin = 0.2;
+  const auto makeWalk = [&] {
+    return CommandedWalk(
+        model, gait, {}, [&](double time) { return findCommand(commands, time); }, makeStandingPosture(model));
+  };
+  ExecutionOptions options;
+  options.duration = 1.5;
+  PredictiveOptions predictive = makeShortWindow(1);
+  predictive.nodes = 60;
+  PredictiveController one(makeWalk(), predictive);
+  predictive.threads = 2;
+  PredictiveController two(makeWalk(), predictive);
+  const Execution a = carryOut(getSquat(), one, options), b = carryOut(getSquat(), two, options);
+  CHECK(a.outcome == Outcome::Stood);
+  CHECK(a.distance > 0.1);
+  CHECK(one.getCounts().failed == 0);
+  CHECK(one.getCounts().solves == 125);
+  CHECK(a.record.q == b.record.q);
+  CHECK(a.record.u == b.record.u);
+}
+
 TEST_CASE("predictive control: it refuses a plan that is not one of its motion") {
   const Model& model = getBipetto();
   const PredictiveOptions options = makeShortWindow(1);

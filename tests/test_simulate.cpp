@@ -260,6 +260,44 @@ TEST_CASE("simulate: predictive control survives a push that gains do not") {
   CHECK(summary["solves"]["worst_ms"].get<double>() >= summary["solves"]["median_ms"].get<double>());
 }
 
+TEST_CASE("simulate: a walk follows commands, turns on the way and stops") {
+  const Scratch scratch;
+  const std::string commands = (scratch.path / "commands.yaml").string(), output = (scratch.path / "walked").string();
+  std::ofstream(commands) << "commands:\n  - {time: 0.1, forward: 0.3}\n  - {time: 1.2, forward: 0.2, turning: 0.5}\n"
+                             "  - {time: 2.4}\n";
+  const auto walk = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> arguments = {
+        BIELLE_COMMAND, "simulate", "walk",       "--robot", BIELLE_SOURCE_DIR "/robots/bipetto",
+        "-o",           output,     "--no-report"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return runCommand(arguments);
+  };
+  const CommandResult result = walk({"--command", commands, "--duration", "4.2", "--control", "mpc"});
+  CAPTURE(result.out, result.err);
+  REQUIRE(result.status == 0);
+  const auto summary = readSummary(output);
+  CHECK(summary["solves"]["failed"] == 0);
+  CHECK(summary["commanded_speed"].get<double>() == Approx((1.1 * 0.3 + 1.2 * 0.2) / 4.2));
+  CHECK(summary["commands"].size() == 3);
+  CHECK(summary["commands"][1]["turning"] == 0.5);
+  CHECK(summary["distance"].get<double>() == Approx(1.1 * 0.3 + 1.2 * 0.2).margin(0.2));
+  const MotionRecord record = readRecord(output + "/trajectory.npz");
+  const auto getHeading = [&](Eigen::Index row) {
+    return 2 * std::atan2(record.q(row, 5), record.q(row, 6));  // of an upright trunk
+  };
+  const Eigen::Index last = record.q.rows() - 1;
+  CHECK(getHeading(last) == Approx(1.2 * 0.5).margin(0.25));
+  CHECK(std::abs(getHeading(240)) < 0.1);              // not yet
+  CHECK(record.v.row(last).head(6).norm() < 0.02);     // it stands
+  CHECK(record.v.row(last / 2).head(6).norm() > 0.1);  // it walked
+  CHECK(walk({"--command", commands, "--control", "gains"}).err.find("mpc") != std::string::npos);
+  CHECK(walk({"--command", commands, "--control", "mpc", "--speed", "1"}).err.find("--speed") != std::string::npos);
+  std::ofstream(commands) << "commands:\n  - {time: 0, forward: 7}\n";
+  const CommandResult refused = walk({"--command", commands, "--control", "mpc"});
+  CHECK(refused.status == 2);
+  CHECK(refused.err.find("commands.yaml, command 1") != std::string::npos);
+}
+
 TEST_CASE("simulate: bad input is refused in one line, with status 2") {
   const Scratch scratch;
   const std::string output = (scratch.path / "bad").string();

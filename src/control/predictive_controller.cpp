@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <stdexcept>
 
 #include "bielle/dynamics/impact.h"
-#include "bielle/model/error.h"
+#include "control/horizon.h"
 #include "control/policy_stages.h"
 #include "solve/lq_sweep.h"
 #include "solve/window.h"
@@ -20,19 +19,7 @@ constexpr int kEarly = 2;                 // stages before its landing at which 
 constexpr int kFirstIterations = 10;      // of the solve before the start
 constexpr size_t kExpectedSolves = 100000;
 
-// Where a window should end.
-StateCost makeEndCost(const Model& model, const VectorXd& q, const PredictiveOptions& o) {
-  const int nv = model.nv();
-  VectorXd weights(2 * nv);
-  weights << o.end_posture * selectMainJoints(model), o.end_velocity * selectMainJoints(model);
-  if (model.hasFreeFlyer()) {
-    weights.head<6>() << o.end_place, o.end_place, o.end_posture, o.end_posture, o.end_posture, o.end_place;
-    weights.segment<6>(nv).setConstant(o.end_velocity);
-  }
-  return {1, q, VectorXd::Zero(nv), weights};
-}
-
-FddpOptions makeSolverOptions(const Motion& motion, const PredictiveOptions& options, int iterations) {
+FddpOptions makeSolverOptions(bool bounded, const PredictiveOptions& options, int iterations) {
   FddpOptions out;
   out.threads = options.threads;
   out.max_iterations = iterations;
@@ -41,53 +28,31 @@ FddpOptions makeSolverOptions(const Motion& motion, const PredictiveOptions& opt
   // One penalty for all solves: each takes a few iterations only, and multipliers are moved on from one to the next.
   out.constraints.initial_penalty = options.penalty;
   out.constraints.penalty_increase = 1;
-  if (motion.bounded) out.bounds = ControlBounds::Enforce;
+  if (bounded) out.bounds = ControlBounds::Enforce;
   return out;
 }
 
 }  // namespace
 
-Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOptions& problem,
-                            const PredictiveOptions& options) {
-  const size_t copies = static_cast<size_t>(options.nodes);
-  const StageSpec last = *(plan.stages.end() - 2);
-  if (last.kind != StageKind::Dynamics)
-    throw ModelError(model.name(), "motion '" + plan.name + "'", "it ends with an impact", "let it end standing");
-  plan.stages.insert(plan.stages.end() - 1, copies, last);
-  plan.schedule.phases.back().nodes += options.nodes;
-  plan.guess.xs.insert(plan.guess.xs.end(), copies, VectorXd(plan.guess.xs.back()));
-  plan.guess.us.insert(plan.guess.us.end(), copies, VectorXd(plan.guess.us.back()));
-  plan.stages.back() = StageSpec();
-  plan.stages.back().state = makeEndCost(model, plan.q_end, options);
-  plan.goals.clear();
-  return makeMotion(model, std::move(plan), problem);
-}
-
 class PredictiveController::Planner {
  public:
-  Planner(Motion motion, const ShootingTrajectory& plan, const PredictiveOptions& options)
+  Planner(std::unique_ptr<Horizon> horizon, const PredictiveOptions& options)
       : options_(options),
-        motion_(std::move(motion)),
-        problem_(*motion_.problem),
+        horizon_(std::move(horizon)),
+        problem_(horizon_->getProblem()),
         model_(problem_.model()),
         window_(problem_, options.nodes),
         evaluator_(problem_),
         impact_(model_),
-        solver_(makeSolverOptions(motion_, options, options.iterations)) {
-    if (problem_.formulation() != Formulation::Reduced || problem_.hasFreeTimings())
-      throw std::invalid_argument("PredictiveController: the problem is not reduced, or its durations are free");
-    last_ = problem_.numStages() - options.nodes;
-    if (static_cast<int>(plan.us.size()) != last_)
-      throw std::invalid_argument("PredictiveController: the plan is not one of the motion");
-    listStages();
-    extendPlan(plan);
+        solver_(makeSolver(options.iterations)) {
     const VectorXd u0 = VectorXd::Zero(model_.nu());
     next_u_hold_ = u_ = u0;
     x_ = problem_.initialState();
     next_stages_.resize(kAhead);
     for (Policy::Stage& stage : next_stages_) stage.K.setZero(model_.nu(), 2 * model_.nv());
-    startFromPlan();
-    Fddp first(makeSolverOptions(motion_, options, kFirstIterations));
+    startFromGuess();
+    if (!horizon_->isSolved()) solveFromRest();
+    Fddp first = makeSolver(kFirstIterations);
     first.solve(window_, trajectory_);
     counts_.seconds.reserve(kExpectedSolves);
     makePolicy(first, 0);
@@ -103,31 +68,18 @@ class PredictiveController::Planner {
   const PredictiveCounts& getCounts() const { return counts_; }
 
  private:
-  void listStages() {
-    double time = 0;
-    for (int k = 0; k < problem_.numStages(); ++k) {
-      starts_.push_back(time);
-      time += problem_.spec(k).dt;
-    }
-    int phase = 0;
-    for (const ContactPhase& p : motion_.schedule.phases) phases_.insert(phases_.end(), p.nodes, phase++);
+  Fddp makeSolver(int iterations) const { return Fddp(makeSolverOptions(horizon_->isBounded(), options_, iterations)); }
+  // From a guess that stands still, step by step to the end.
+  void solveFromRest() {
+    FddpOptions options;
+    options.threads = options_.threads;
+    options.initial_regularization = kGuessRegularization;
+    if (horizon_->isBounded()) options.bounds = ControlBounds::Enforce;
+    Fddp(options).solve(window_, trajectory_);
   }
-  void extendPlan(const ShootingTrajectory& plan) {
-    plan_ = plan;
-    VectorXd rest = plan.xs.back();
-    rest.tail(model_.nv()).setZero();
-    const VectorXd u = calcStaticTorques(model_, problem_.spec(last_).constraints, rest.head(model_.nq())).u;
-    plan_.xs.resize(problem_.numStages() + 1, rest);
-    plan_.us.resize(problem_.numStages(), u);
-  }
-
-  // The stages of the motion, then the copies of the last one, of which there is no end.
-  int getNode(int stage) const { return std::min(stage, last_); }
-  double getPlanned(int stage) const {
-    return stage <= last_ ? starts_[stage] : starts_[last_] + (stage - last_) * problem_.spec(last_).dt;
-  }
-  double getStart(int stage) const { return getPlanned(stage) - advance_; }
-  bool isImpact(int stage) const { return problem_.spec(getNode(stage)).kind == StageKind::Impact; }
+  double getStart(int stage) const { return horizon_->getStart(stage) - advance_; }
+  const StageSpec& getSpec(int stage) const { return problem_.spec(horizon_->getNode(stage)); }
+  bool isImpact(int stage) const { return getSpec(stage).kind == StageKind::Impact; }
 
   void bringIntoForce() {
     policy_->exchange(next_stages_, next_u_hold_);
@@ -146,28 +98,28 @@ class PredictiveController::Planner {
     }
     if (!ready_) {
       ++counts_.failed;
-      solver_ = Fddp(makeSolverOptions(motion_, options_, options_.iterations));
-      startFromPlan();
+      solver_ = makeSolver(options_.iterations);
+      startFromGuess();
     }
     ++counts_.solves;
     counts_.seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-    counts_.missed += counts_.seconds.back() > problem_.spec(getNode(stage_)).dt - measurement.delay;
+    counts_.missed += counts_.seconds.back() > getSpec(stage_).dt - measurement.delay;
   }
 
   // The stage with which a foot stands that swings in this one but is on the ground early, or this stage.
   int findLanding(int stage, const std::vector<char>& contacts) const {
     if (contacts.empty()) return stage;
     const auto stands = [this](int k, int contact) {
-      const std::vector<int>& standing = problem_.spec(getNode(k)).constraints.contacts;
+      const std::vector<int>& standing = getSpec(k).constraints.contacts;
       return std::find(standing.begin(), standing.end(), contact) != standing.end();
     };
     const int contacts_of_model = static_cast<int>(contacts.size());
     for (int contact = 0; contact < contacts_of_model; ++contact) {
       if (!contacts[contact] || stands(stage, contact)) continue;
       int begin = stage, end = stage;  // of the swing
-      while (begin > 0 && !stands(begin - 1, contact)) --begin;
-      while (end < last_ && !stands(end, contact)) ++end;
-      if (end < last_ && stage - begin > (end - begin) / 2 && end - stage >= kEarly) return end;
+      while (begin > horizon_->getBegin() && !stands(begin - 1, contact)) --begin;
+      while (end < horizon_->getEnd() && !stands(end, contact)) ++end;
+      if (end < horizon_->getEnd() && stage - begin > (end - begin) / 2 && end - stage >= kEarly) return end;
     }
     return stage;
   }
@@ -175,7 +127,7 @@ class PredictiveController::Planner {
   // Eq. (1), and through an impact if one follows: the stage from which the next policy is to be in force, and its state.
   bool predict(const Measurement& measurement) {
     policy_->update(measurement, u_);
-    const int node = getNode(stage_);
+    const int node = horizon_->getNode(stage_);
     for (int m = 0; m < model_.nu(); ++m) {
       const double limit = model_.motors()[m].effort_limit;
       u_[m] = std::clamp(u_[m], -limit, limit);
@@ -193,13 +145,13 @@ class PredictiveController::Planner {
     x_ = step->x_next;
     target_ = stage_ + 1;
     if (const int landing = findLanding(target_, measurement.contacts); landing != target_) {
-      advance_ += getPlanned(landing) - getPlanned(target_);
+      advance_ += horizon_->getStart(landing) - horizon_->getStart(target_);
       target_ = landing;
       stage_ = landing - 1;
       ++counts_.early;
     }
     while (isImpact(target_)) {
-      step = &evaluator_.evaluate(getNode(target_), VectorXd(x_), VectorXd::Zero(model_.nu()));
+      step = &evaluator_.evaluate(horizon_->getNode(target_), VectorXd(x_), VectorXd::Zero(model_.nu()));
       if (step->status != StepStatus::Ok) return false;
       x_ = step->x_next;
       ++target_;
@@ -208,11 +160,11 @@ class PredictiveController::Planner {
   }
 
   bool solve() {
-    const int first = getNode(target_), nodes = options_.nodes;
+    const int first = horizon_->getFirst(target_), nodes = options_.nodes;
+    horizon_->prepare(first);
     for (; first_ < first; ++first_) {
       solver_.advance(trajectory_);
-      trajectory_.xs[nodes] = plan_.xs[first_ + 1 + nodes];
-      trajectory_.us[nodes - 1] = plan_.us[first_ + nodes];
+      horizon_->extend(first_ + nodes, trajectory_);
     }
     moveWindow();
     if (solver_.solve(window_, trajectory_).termination == FddpTermination::Failed) return false;
@@ -221,17 +173,20 @@ class PredictiveController::Planner {
   }
 
   void moveWindow() {
-    window_.move(first_, x_);
-    const VectorXd& end = plan_.xs[first_ + options_.nodes];
+    window_.move(horizon_->getNode(first_), x_);
+    const VectorXd& end = horizon_->getState(first_ + options_.nodes);
     problem_.setTerminalReference(end.head(model_.nq()), end.tail(model_.nv()));
   }
 
   // A first guess for the window at the present stage.
-  void startFromPlan() {
-    first_ = getNode(std::max(stage_, 0));
+  void startFromGuess() {
+    first_ = horizon_->getFirst(std::max(stage_, 0));
+    horizon_->prepare(first_);
     const int nodes = options_.nodes;
-    trajectory_.xs.assign(plan_.xs.begin() + first_, plan_.xs.begin() + first_ + nodes + 1);
-    trajectory_.us.assign(plan_.us.begin() + first_, plan_.us.begin() + first_ + nodes);
+    trajectory_.xs.resize(nodes + 1);
+    trajectory_.us.resize(nodes);
+    for (int k = 0; k <= nodes; ++k) trajectory_.xs[k] = horizon_->makeGuess(first_ + k);
+    for (int k = 0; k < nodes; ++k) trajectory_.us[k] = horizon_->getControl(first_ + k);
     x_ = trajectory_.xs[0];
     moveWindow();
   }
@@ -241,10 +196,10 @@ class PredictiveController::Planner {
     int node = 0;
     for (Policy::Stage& out : next_stages_) {
       while (isImpact(stage)) ++stage, ++node;
-      const int k = getNode(stage);
+      const int k = horizon_->getNode(stage);
       fillStage(problem_, k, getStart(stage), trajectory_.xs[node], trajectory_.us[node], trajectory_.xs[node + 1],
                 out);
-      out.phase = phases_[k];
+      out.phase = horizon_->getPhase(stage);
       evaluator_.evaluate(k, trajectory_.xs[node], trajectory_.us[node]);
       calcGains(model_, evaluator_, solver.getSweep().getNodes()[node].K, out.K);
       next_u_hold_ = out.u;
@@ -253,20 +208,16 @@ class PredictiveController::Planner {
   }
 
   const PredictiveOptions options_;
-  Motion motion_;
+  const std::unique_ptr<Horizon> horizon_;
   RobotProblem& problem_;
   const Model& model_;
-  ShootingTrajectory plan_;     // of all stages of the problem
-  std::vector<double> starts_;  // of each stage, s
-  std::vector<int> phases_;     // likewise
-  int last_ = 0;                // the first copy of the last stage; the window moves no farther
   Window window_;
   RobotEvaluator evaluator_;
   ImpactWorkspace impact_;
   Fddp solver_;
   ShootingTrajectory trajectory_;  // of the window
   double advance_ = 0;             // how far feet that landed early have brought the motion ahead of its plan, s
-  int first_ = 0;                  // stage of the motion with which the window begins
+  int first_ = 0;                  // stage with which the window begins
   int stage_ = -1;                 // that was entered last
   int target_ = 0;                 // from which on the policy to be made is in force
   VectorXd x_, measured_, u_;
@@ -287,7 +238,9 @@ double PredictiveCounts::calcQuantile(double share) const {
 
 PredictiveController::PredictiveController(Motion motion, const ShootingTrajectory& plan,
                                            const PredictiveOptions& options)
-    : planner_(std::make_unique<Planner>(std::move(motion), plan, options)) {}
+    : planner_(std::make_unique<Planner>(makeMotionHorizon(std::move(motion), plan, options), options)) {}
+PredictiveController::PredictiveController(CommandedWalk walk, const PredictiveOptions& options)
+    : planner_(std::make_unique<Planner>(makeWalkHorizon(std::move(walk), options), options)) {}
 PredictiveController::~PredictiveController() = default;
 
 void PredictiveController::update(const Measurement& measurement, VectorRef u) { planner_->update(measurement, u); }

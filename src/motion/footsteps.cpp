@@ -42,16 +42,20 @@ SE3 calcMiddle(const SE3& left, const SE3& right) {
   return middle;
 }
 
+SE3 calcNextMiddle(const SE3& P, const StepCommand& command, Side side) {
+  const Side opening = command.lateral > 0 ? Side::Left : Side::Right;
+  const Vector3d move(command.forward, side == opening ? 2 * command.lateral : 0, 0);
+  return P * makeTurn(command.yaw / 2) * SE3{Matrix3d::Identity(), move} * makeTurn(command.yaw / 2);
+}
+
 FootstepPlan planFootsteps(const SE3& left, const SE3& right, const StepCommand& command, int steps, Side first) {
   FootstepPlan plan{{left, right}, {}};
   SE3 P = calcMiddle(left, right);
   const SE3 X_PF[2] = {P.inverseTimes(left), P.inverseTimes(right)};
-  const Side opening = command.lateral > 0 ? Side::Left : Side::Right;
   Side side = first;
   for (int i = 0; i < steps; ++i, side = getOther(side)) {
     const bool last = i + 1 == steps;
-    const Vector3d move(command.forward, side == opening ? 2 * command.lateral : 0, 0);
-    if (!last) P = P * makeTurn(command.yaw / 2) * SE3{Matrix3d::Identity(), move} * makeTurn(command.yaw / 2);
+    if (!last) P = calcNextMiddle(P, command, side);
     plan.steps.push_back({side, P * X_PF[static_cast<int>(side)]});
   }
   return plan;

@@ -19,8 +19,6 @@ double ease(double s) {
   return s * s * s * (10 + s * (6 * s - 15));
 }
 
-int countNodes(double duration, double h) { return static_cast<int>(std::lround(duration / h)); }
-
 void check(const GaitTiming& t, size_t steps) {
   const double h = t.time_step;
   requireOption(h > 0 && h <= 0.1, "time_step", "it is outside 0 .. 0.1 s", "give seconds");
@@ -156,8 +154,9 @@ Bounce calcBounce(const Gait& gait, double h, double stretch, double gravity) {
       begin = {stretch, getSpeed(phase), -gravity};
       end = {stretch, -getSpeed(phase), -gravity};
     } else {
-      if (gait.phases[p - 1].flies()) begin = {stretch, -getSpeed(gait.phases[p - 1]), -gravity};
-      if (gait.phases[p + 1].flies()) end = {stretch, getSpeed(gait.phases[p + 1]), -gravity};
+      if (p > 0 && gait.phases[p - 1].flies()) begin = {stretch, -getSpeed(gait.phases[p - 1]), -gravity};
+      if (p + 1 < gait.phases.size() && gait.phases[p + 1].flies())
+        end = {stretch, getSpeed(gait.phases[p + 1]), -gravity};
     }
     const Quintic height(begin, end, phase.nodes * h);
     for (int i = 0; i < phase.nodes; ++i) {
@@ -191,6 +190,8 @@ VectorXd calcHeights(const FootstepPlan& plan, const Gait& gait, int window) {
 
 }  // namespace
 
+int countNodes(double duration, double time_step) { return static_cast<int>(std::lround(duration / time_step)); }
+
 SE3 calcSwing(const SwingShape& shape, const SE3& a, const SE3& b, double s) {
   const double t = ease((s - shape.leave) / (shape.arrive - shape.leave));
   const double top = std::max(a.p.z(), b.p.z()) + shape.height;
@@ -222,10 +223,15 @@ double chooseTimeStep(const LocomotionTask& task, const GaitTiming& timing, cons
 
 Gait makeGait(const LocomotionTask& task, const GaitTiming& timing, const SwingShape& shape, double stretch,
               const Vector3d& com, double gravity) {
+  check(timing, task.plan.steps.size());
+  return makeGait(task, makePhases(task, timing), timing, shape, stretch, {com, com}, gravity);
+}
+
+Gait makeGait(const LocomotionTask& task, std::vector<GaitPhase> phases, const GaitTiming& timing,
+              const SwingShape& shape, double stretch, const GaitStart& start, double gravity) {
   const FootstepPlan& plan = task.plan;
-  check(timing, plan.steps.size());
   Gait gait;
-  gait.phases = makePhases(task, timing);
+  gait.phases = std::move(phases);
   gait.swings = listSwings(gait.phases, plan.steps.size());
   int stages = 0;
   for (const GaitPhase& phase : gait.phases) stages += phase.nodes;
@@ -236,7 +242,7 @@ Gait makeGait(const LocomotionTask& task, const GaitTiming& timing, const SwingS
 
   const auto end = plan.getStance(static_cast<int>(plan.steps.size()));
   const SE3 P0 = calcMiddle(plan.start[0], plan.start[1]), PN = calcMiddle(end[0], end[1]);
-  const Vector3d rest = PN.act(P0.inverseTimes(SE3{Matrix3d::Identity(), com}).p);
+  const Vector3d rest = PN.act(P0.inverseTimes(SE3{Matrix3d::Identity(), start.rest}).p);
   // The zero-moment point starts and ends under the resting centre of mass.
   Eigen::Matrix2Xd p(2, stages + 1);
   for (int k = 0; k <= stages; ++k) {
@@ -244,13 +250,16 @@ Gait makeGait(const LocomotionTask& task, const GaitTiming& timing, const SwingS
     const auto stance = plan.getStance(gait.phases[node.phase].steps_done);
     const double share = 1 - 2 * std::abs(node.load[0] - 0.5);  // 1 at rest, 0 on one foot
     p.col(k) = (node.load[0] * stance[0].p + node.load[1] * stance[1].p).head<2>();
-    if (node.phase == 0) p.col(k) += share * (com - P0.p).head<2>();
-    if (node.phase + 1 == static_cast<int>(gait.phases.size())) p.col(k) += share * (rest - PN.p).head<2>();
+    if (node.phase == 0) {
+      p.col(k) += share * (start.rest - P0.p).head<2>();
+    } else if (gait.phases[node.phase].steps_done == static_cast<int>(plan.steps.size())) {
+      p.col(k) += share * (rest - PN.p).head<2>();
+    }
     for (double& load : node.load) load *= bounce.load[k];
   }
-  p.col(0) = com.head<2>();
+  p.col(0) = start.com.head<2>();
   p.col(stages) = rest.head<2>();
-  const double height = com.z() - P0.p.z();
+  const double height = start.rest.z() - P0.p.z();
   solvePendulum((bounce.rise.array() + height) / (gravity * h * h), bounce.load, p);
 
   const VectorXd z = calcHeights(plan, gait, countNodes(timing.stepDuration() / 4, h));

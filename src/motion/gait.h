@@ -67,12 +67,24 @@ struct Gait {
   std::vector<SwingSpan> swings;  ///< of each step
 };
 
+/// Where the centre of mass begins.
+struct GaitStart {
+  Vector3d com = Vector3d::Zero();   ///< c_0 of Eq. (1), m
+  Vector3d rest = Vector3d::Zero();  ///< where it would be if the robot stood still on its feet, m
+};
+
 /// \param timing  with the length of the stages
-/// \param com  centre of mass at the start, m
+/// \param com  centre of mass at the start, where the robot stands still, m
 /// \param gravity  m/s^2
 /// \throws ModelError on impossible durations
 Gait makeGait(const LocomotionTask& task, const GaitTiming& timing, const SwingShape& shape, double stretch,
               const Vector3d& com, double gravity);
+/// The same for given phases.
+Gait makeGait(const LocomotionTask& task, std::vector<GaitPhase> phases, const GaitTiming& timing,
+              const SwingShape& shape, double stretch, const GaitStart& start, double gravity);
+
+/// The number of stages of a duration.
+int countNodes(double duration, double time_step);
 
 // First nodes of the phases that begin with a landing, step by step.
 std::vector<int> listLandings(const ContactSchedule& schedule);

@@ -5,11 +5,11 @@
 namespace bielle {
 
 // Stages [first, first + nodes) of a longer problem, from its own initial state, with the terminal costs of that
-// problem.
+// problem. They are counted modulo the number of its stages: a problem may be a ring, whose stages are replaced.
 class Window : public ShootingProblem {
  public:
   Window(const ShootingProblem& whole, int nodes) : whole_(whole), nodes_(nodes), x0_(whole.initialState()) {}
-  // first + nodes must not exceed the stages of the whole problem.
+  // \param first  a stage of the whole problem, which must have more stages than the window
   void move(int first, const VectorXd& x0) {
     first_ = first;
     x0_ = x0;
@@ -18,10 +18,10 @@ class Window : public ShootingProblem {
   int numStages() const override { return nodes_; }
   int stateSize() const override { return whole_.stateSize(); }
   int tangentSize(int node) const override { return whole_.tangentSize(getNode(node)); }
-  int controlSize(int stage) const override { return whole_.controlSize(first_ + stage); }
+  int controlSize(int stage) const override { return whole_.controlSize(getNode(stage)); }
   const VectorXd& initialState() const override { return x0_; }
   void getControlBounds(int stage, VectorRef lower, VectorRef upper) const override {
-    whole_.getControlBounds(first_ + stage, lower, upper);
+    whole_.getControlBounds(getNode(stage), lower, upper);
   }
   int constraintSize(int node) const override { return whole_.constraintSize(getNode(node)); }
   void getConstraintBounds(int node, VectorRef lower, VectorRef upper) const override {
@@ -63,14 +63,15 @@ class Window : public ShootingProblem {
     std::vector<DifferenceTask> differences;
   };
   static Scratch& getScratch(ProblemScratch* scratch) { return static_cast<Scratch&>(*scratch); }
-  int getNode(int node) const { return node < nodes_ ? first_ + node : whole_.numStages(); }
+  int getNode(int node) const { return node < nodes_ ? (first_ + node) % whole_.numStages() : whole_.numStages(); }
   // Calls `work` with tasks numbered by their nodes in the whole problem.
   template <typename Task, typename Work>
   void renumber(Task* tasks, int count, const Work& work) const {
+    const int size = whole_.numStages();
     for (int i = 0; i < count; ++i) tasks[i].node = getNode(tasks[i].node);
     work();
     for (int i = 0; i < count; ++i)
-      tasks[i].node = tasks[i].node == whole_.numStages() ? nodes_ : tasks[i].node - first_;
+      tasks[i].node = tasks[i].node == size ? nodes_ : (tasks[i].node - first_ + size) % size;
   }
 
   const ShootingProblem& whole_;

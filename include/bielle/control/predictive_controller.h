@@ -15,9 +15,14 @@
 /// stage of its landing, and stays ahead of the plan by what the swing was cut short.
 ///
 /// After its last stage the motion is followed by as many copies of that stage as the window is long: the robot stands there.
+///
+/// In place of a solved motion, a walk by command (commanded_walk.h) may be given. Its stages are made when the window reaches
+/// them; nothing is solved before but the first window. A window ends near the pose and the velocity of the trunk that the path
+/// of the centre of mass foresees; joints hardly count there.
 #include <memory>
 
 #include "bielle/control/policy.h"
+#include "bielle/motion/commanded_walk.h"
 
 namespace bielle {
 
@@ -56,6 +61,8 @@ class PredictiveController : public Controller {
   /// \param plan  the solved motion, without the copies of its last stage: where windows end, and what the first one
   /// starts from
   PredictiveController(Motion motion, const ShootingTrajectory& plan, const PredictiveOptions& options);
+  /// \param walk  of which no stage has been made yet; its model must outlive this
+  PredictiveController(CommandedWalk walk, const PredictiveOptions& options);
   ~PredictiveController() override;
 
   /// At the first instant of each stage it solves, which takes its time and allocates memory; at others it does not.

@@ -49,6 +49,9 @@ double calcHeading(const SE3& X);
 /// Pose of the middle of the two feet: level, heading halfway between theirs.
 SE3 calcMiddle(const SE3& left, const SE3& right);
 
+/// P after a step of the given foot from P, Eq. (1).
+SE3 calcNextMiddle(const SE3& P, const StepCommand& command, Side side);
+
 /// `steps` steps by Eq. (1) on level ground, the first one with the foot `first`; the last one brings the feet
 /// together.
 FootstepPlan planFootsteps(const SE3& left, const SE3& right, const StepCommand& command, int steps, Side first);

@@ -1,0 +1,80 @@
+#pragma once
+/// \file A walk without an end: its stages are made one after the other, as a velocity commands.
+///
+/// Costs and constraints are those of locomotion.h, on level ground, for steps by footsteps.h Eq. (1) with
+///     D_i = T (forward, sideways, turning),    T the duration of a step,                                         (1)
+/// of the command at the beginning of step i. While the command is rest the robot stands; after a last step, which brings the
+/// feet together.
+///
+/// The stages of one step are made together. The centre of mass follows the pendulum of gait.h, Eq. (1), through this step and
+/// the two that would follow it under the same command, to rest. It starts where the step before has led to; what is foreseen
+/// beyond a step matters by exp(-2 T / tau), tau the pendulum's time constant, about 0.06.
+#include <deque>
+#include <functional>
+
+#include "bielle/motion/command.h"
+
+namespace bielle {
+
+/// The velocity that is commanded at a time, s. Called once per step and, while the robot stands, every few stages, each time
+/// for a later time.
+using CommandSource = std::function<VelocityCommand(double)>;
+
+class CommandedWalk {
+ public:
+  struct Stage {
+    StageSpec spec;
+    VectorXd
+        x;  ///< nq + nv: the standing posture, moved along the walk; a closed state, whose velocity leads to the next
+    VectorXd u;                             ///< nu, torques that hold the robot at rest on the feet that stand
+    int phase = 0;                          ///< stages with the same feet on the ground, counted from 0 on
+    std::string phase_name;                 ///< e.g. "double support"
+    std::vector<ContactTarget> contacts{};  ///< feet on the ground, with their places
+  };
+
+  /// From the standing posture q0, at time 0.
+  /// \param model  must outlive it   \param options  `flight`, `rigid_landing` and `published` are ignored; a time step of 0
+  /// is 12 ms
+  /// \throws ModelError as planLocomotion() and addLimits() do
+  CommandedWalk(const Model& model, const LocomotionOptions& options, const LimitOptions& limits, CommandSource command,
+                const VectorXd& q0);
+
+  const Model& getModel() const { return model_; }
+  /// The next stage.
+  Stage makeNext();
+  double getTimeStep() const { return options_.timing.time_step; }  ///< s
+  /// The stages of a step on the spot, as large as any stage of the walk: for memory that must hold them.
+  std::vector<StageSpec> makeExamples() const;
+  /// Whether torques are limited, so that a solver must enforce bounds.
+  bool isBounded() const { return bounded_; }
+
+ private:
+  struct Segment;
+  void makeStages();
+  Segment planSegment(const Stance& stance);
+  std::vector<Footstep> planSteps(const VelocityCommand& command, int count) const;
+  Stance makeStanceHere() const;
+  void addLimitsTo(std::vector<StageSpec>& stages);
+  const VectorXd& findStaticTorques(const std::array<bool, 2>& stands, const std::vector<ContactTarget>& contacts);
+
+  const Model& model_;
+  const LocomotionOptions options_;
+  const LimitOptions limits_;
+  const CommandSource command_;
+  const Stance standing_;                   // at the start
+  const SE3 start_;                         // middle of the feet there
+  std::array<VectorXd, 4> static_torques_;  // by the feet that stand
+  enum class State { Standing, Starting, Walking };
+  State state_ = State::Standing;
+  // After the last stage made.
+  std::array<SE3, 2> feet_;
+  SE3 middle_;                // P of footsteps.h Eq. (1)
+  Vector3d com_;              // centre of mass
+  Side swing_ = Side::Right;  // foot of the next step
+  std::array<bool, 2> standing_feet_{};
+  int made_ = 0, phase_ = 0;
+  bool bounded_ = false;
+  std::deque<Stage> stages_;  // made, but not asked for yet
+};
+
+}  // namespace bielle

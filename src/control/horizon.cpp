@@ -1,0 +1,184 @@
+#include "control/horizon.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+// Of the weights of joints at the end of a walk's window, whose postures are not foreseen: without any, the last stages would
+// throw the swing leg about.
+constexpr double kJointShare = 0.01;
+
+// Where a window should end. \param joints  nv: shares of the weights of each joint
+StateCost makeEndCost(const Model& model, const VectorXd& q, const VectorXd& joints, const PredictiveOptions& o) {
+  const int nv = model.nv();
+  VectorXd weights(2 * nv);
+  weights << o.end_posture * joints, o.end_velocity * joints;
+  if (model.hasFreeFlyer()) {
+    weights.head<6>() << o.end_place, o.end_place, o.end_posture, o.end_posture, o.end_posture, o.end_place;
+    weights.segment<6>(nv).setConstant(o.end_velocity);
+  }
+  return {1, q, VectorXd::Zero(nv), weights};
+}
+
+class MotionHorizon : public Horizon {
+ public:
+  MotionHorizon(Motion motion, const ShootingTrajectory& plan, const PredictiveOptions& options)
+      : motion_(std::move(motion)),
+        problem_(*motion_.problem),
+        last_(problem_.numStages() - options.nodes),
+        plan_(plan) {
+    if (problem_.formulation() != Formulation::Reduced || problem_.hasFreeTimings())
+      throw std::invalid_argument("PredictiveController: the problem is not reduced, or its durations are free");
+    if (static_cast<int>(plan.us.size()) != last_)
+      throw std::invalid_argument("PredictiveController: the plan is not one of the motion");
+    double time = 0;
+    for (int k = 0; k < problem_.numStages(); ++k) {
+      starts_.push_back(time);
+      time += problem_.spec(k).dt;
+    }
+    int phase = 0;
+    for (const ContactPhase& p : motion_.schedule.phases) phases_.insert(phases_.end(), p.nodes, phase++);
+    const Model& model = problem_.model();
+    VectorXd rest = plan.xs.back();
+    rest.tail(model.nv()).setZero();
+    const VectorXd u = calcStaticTorques(model, problem_.spec(last_).constraints, rest.head(model.nq())).u;
+    plan_.xs.resize(problem_.numStages() + 1, rest);
+    plan_.us.resize(problem_.numStages(), u);
+  }
+
+  RobotProblem& getProblem() override { return problem_; }
+  bool isBounded() const override { return motion_.bounded; }
+  int getFirst(int stage) const override { return getNode(stage); }  // the window moves no farther than its end
+  void prepare(int) override {}
+  int getBegin() const override { return 0; }
+  int getEnd() const override { return last_; }
+  int getNode(int stage) const override { return std::min(stage, last_); }
+  double getStart(int stage) const override {
+    return stage <= last_ ? starts_[stage] : starts_[last_] + (stage - last_) * problem_.spec(last_).dt;
+  }
+  int getPhase(int stage) const override { return phases_[getNode(stage)]; }
+  const VectorXd& getState(int stage) const override { return plan_.xs[stage]; }
+  VectorXd makeGuess(int stage) const override { return plan_.xs[stage]; }
+  const VectorXd& getControl(int stage) const override { return plan_.us[stage]; }
+  void extend(int stage, ShootingTrajectory& trajectory) const override {
+    trajectory.xs.back() = plan_.xs[stage + 1];
+    trajectory.us.back() = plan_.us[stage];
+  }
+  bool isSolved() const override { return true; }
+
+ private:
+  Motion motion_;
+  RobotProblem& problem_;
+  const int last_;              // the first copy of the last stage
+  ShootingTrajectory plan_;     // of all stages of the problem
+  std::vector<double> starts_;  // of each stage, s
+  std::vector<int> phases_;     // likewise
+};
+
+// The problem is a ring: stage s is its node s modulo their number. Behind a window there is room for one step, in which a
+// foot that lands early began to swing.
+class WalkHorizon : public Horizon {
+ public:
+  WalkHorizon(CommandedWalk walk, const PredictiveOptions& options) : nodes_(options.nodes), walk_(std::move(walk)) {
+    const Model& model = walk_.getModel();
+    std::vector<StageSpec> specs;
+    for (int s = 0; s <= nodes_; ++s) specs.push_back(keep(walk_.makeNext()));
+    for (StageSpec& spec : walk_.makeExamples()) specs.push_back(std::move(spec));
+    size_ = static_cast<int>(specs.size());
+    states_.resize(size_);
+    controls_.resize(size_);
+    phases_.resize(size_);
+    const VectorXd joints = kJointShare * selectMainJoints(model);
+    const VectorXd q0 = states_[0].head(model.nq());
+    specs.emplace_back();
+    specs.back().state = makeEndCost(model, q0, joints, options);
+    problem_ =
+        std::make_unique<RobotProblem>(model, q0, VectorXd::Zero(model.nv()), std::move(specs), Formulation::Reduced);
+  }
+
+  RobotProblem& getProblem() override { return *problem_; }
+  bool isBounded() const override { return walk_.isBounded(); }
+  int getFirst(int stage) const override { return stage; }
+  void prepare(int first) override {
+    while (made_ <= first + nodes_) {
+      const int node = made_ % size_;
+      problem_->replaceStage(node, keep(walk_.makeNext()));
+    }
+  }
+  int getBegin() const override { return std::max(0, made_ - size_); }
+  int getEnd() const override { return made_ - 1; }
+  int getNode(int stage) const override { return stage % size_; }
+  double getStart(int stage) const override { return stage * walk_.getTimeStep(); }
+  int getPhase(int stage) const override { return phases_[getNode(stage)]; }
+  const VectorXd& getState(int stage) const override { return states_[getNode(stage)]; }
+  // At rest: the feet stand, and with them the velocity would be none that the contacts allow.
+  VectorXd makeGuess(int stage) const override {
+    VectorXd x = getState(stage);
+    x.tail(walk_.getModel().nv()).setZero();
+    return x;
+  }
+  const VectorXd& getControl(int stage) const override { return controls_[getNode(stage)]; }
+  // State and control before, which are nearer than the posture that stands. Only a foot that takes off must not push.
+  void extend(int stage, ShootingTrajectory& trajectory) const override {
+    if (countFeet(stage) < countFeet(stage - 1)) trajectory.us.back() = getControl(stage);
+  }
+  bool isSolved() const override { return false; }
+
+ private:
+  size_t countFeet(int stage) const { return problem_->spec(getNode(stage)).constraints.contacts.size(); }
+  // Keeps all but the spec of the next stage.
+  StageSpec keep(CommandedWalk::Stage stage) {
+    if (size_ == 0) {  // the first ones
+      states_.emplace_back();
+      controls_.emplace_back();
+      phases_.emplace_back();
+    }
+    const int node = size_ == 0 ? made_ : made_ % size_;
+    states_[node] = std::move(stage.x);
+    controls_[node] = std::move(stage.u);
+    phases_[node] = stage.phase;
+    ++made_;
+    return std::move(stage.spec);
+  }
+
+  const int nodes_;
+  CommandedWalk walk_;
+  int size_ = 0;                             // of the ring
+  int made_ = 0;                             // stages
+  std::vector<VectorXd> states_, controls_;  // by node
+  std::vector<int> phases_;                  // likewise
+  std::unique_ptr<RobotProblem> problem_;
+};
+
+}  // namespace
+
+Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOptions& problem,
+                            const PredictiveOptions& options) {
+  const size_t copies = static_cast<size_t>(options.nodes);
+  const StageSpec last = *(plan.stages.end() - 2);
+  if (last.kind != StageKind::Dynamics)
+    throw ModelError(model.name(), "motion '" + plan.name + "'", "it ends with an impact", "let it end standing");
+  plan.stages.insert(plan.stages.end() - 1, copies, last);
+  plan.schedule.phases.back().nodes += options.nodes;
+  plan.guess.xs.insert(plan.guess.xs.end(), copies, VectorXd(plan.guess.xs.back()));
+  plan.guess.us.insert(plan.guess.us.end(), copies, VectorXd(plan.guess.us.back()));
+  plan.stages.back() = StageSpec();
+  plan.stages.back().state = makeEndCost(model, plan.q_end, selectMainJoints(model), options);
+  plan.goals.clear();
+  return makeMotion(model, std::move(plan), problem);
+}
+
+std::unique_ptr<Horizon> makeMotionHorizon(Motion motion, const ShootingTrajectory& plan,
+                                           const PredictiveOptions& options) {
+  return std::make_unique<MotionHorizon>(std::move(motion), plan, options);
+}
+
+std::unique_ptr<Horizon> makeWalkHorizon(CommandedWalk walk, const PredictiveOptions& options) {
+  return std::make_unique<WalkHorizon>(std::move(walk), options);
+}
+
+}  // namespace bielle

@@ -1,0 +1,40 @@
+#pragma once
+// The stages through which the windows of predictive control lead.
+#include "bielle/control/predictive_controller.h"
+
+namespace bielle {
+
+// Stages are numbered from the start on, without end. The problem holds those of a window that begins at getFirst() of the
+// stage given to prepare() last, and those from getBegin() to getEnd().
+class Horizon {
+ public:
+  virtual ~Horizon() = default;
+  virtual RobotProblem& getProblem() = 0;
+  virtual bool isBounded() const = 0;
+  // Where the window begins whose solution is to be in force from this stage on.
+  virtual int getFirst(int stage) const = 0;
+  virtual void prepare(int first) = 0;
+  virtual int getBegin() const = 0;
+  virtual int getEnd() const = 0;
+
+  virtual int getNode(int stage) const = 0;      // of the problem
+  virtual double getStart(int stage) const = 0;  // s
+  virtual int getPhase(int stage) const = 0;
+  // Near which a window that ends here should end.
+  virtual const VectorXd& getState(int stage) const = 0;
+  // A first guess of the state and the controls.
+  virtual VectorXd makeGuess(int stage) const = 0;
+  virtual const VectorXd& getControl(int stage) const = 0;
+  // After the trajectory of a window has been moved on: a guess of its last control, at this stage, and of the state after it.
+  virtual void extend(int stage, ShootingTrajectory& trajectory) const = 0;
+  // Whether the guess of the first window is a solution.
+  virtual bool isSolved() const = 0;
+};
+
+// A solved motion, then copies of its last stage.
+std::unique_ptr<Horizon> makeMotionHorizon(Motion motion, const ShootingTrajectory& plan,
+                                           const PredictiveOptions& options);
+// A walk whose stages are made when a window reaches them.
+std::unique_ptr<Horizon> makeWalkHorizon(CommandedWalk walk, const PredictiveOptions& options);
+
+}  // namespace bielle

@@ -1,0 +1,221 @@
+#include "motion/locomotion_stages.h"
+
+#include <cmath>
+
+#include "bielle/dynamics/kinematics.h"
+#include "math/so3.h"
+#include "motion/foot_constraints.h"
+
+namespace bielle {
+namespace {
+
+const ContactFrame& getContact(const Scene& scene, Side side) {
+  return scene.model.contacts()[scene.stance.contacts[static_cast<int>(side)]];
+}
+
+BodyFrame getFoot(const Scene& scene, Side side) {
+  const ContactFrame& contact = getContact(scene, side);
+  return {contact.body, contact.X_BF};
+}
+
+// Quaternion (x y z w) of the base: the initial one with a new heading.
+Eigen::Vector4d makeHeading(const Scene& scene, const GaitNode& node) {
+  const Eigen::Quaterniond start(Eigen::Vector4d(scene.stance.q.segment<4>(3)));
+  return (Eigen::Quaterniond(Eigen::AngleAxisd(node.heading, Vector3d::UnitZ())) * start).coeffs();
+}
+
+StageSpec makeRegularizedStage(const Scene& scene, const GaitNode& node) {
+  const Model& model = scene.model;
+  StageSpec stage;
+  stage.dt = scene.options.timing.time_step;
+  stage.state = {scene.options.state_weight, scene.stance.q, VectorXd::Zero(model.nv()), scene.state_weights};
+  stage.state.q_ref.segment<4>(3) = makeHeading(scene, node);
+  stage.state.v_ref[5] = node.heading_rate;
+  stage.control = {scene.options.control_weight, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
+  return stage;
+}
+
+void addCost(StageSpec& stage, const std::string& name, double weight, const VectorXd& weights,
+             std::unique_ptr<Residual> residual, bool defines = false) {
+  if (weight != 0 && !weights.isZero(0))
+    stage.costs.push_back({name, weight, Activation::makeQuadratic(weights), std::move(residual), defines});
+}
+
+void addComCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
+  const LocomotionOptions& o = scene.options;
+  addCost(stage, "com", 1, Vector3d(o.com_weight, o.com_weight, o.com_height_weight), makeComPosition(node.com));
+  addCost(stage, "com velocity", o.com_velocity_weight, scene.task.direction.cwiseAbs(),
+          makeComVelocity(scene.task.speed * scene.task.direction));
+}
+
+void addForceCosts(const Scene& scene, const GaitNode& node, StageSpec& stage) {
+  const LocomotionOptions& o = scene.options;
+  const double weight = scene.model.mass() * scene.model.gravity().norm();
+  const ConstraintSet& set = stage.constraints;
+  VectorXd loads(set.closures.size() - set.num_loops);
+  for (int i = 0; i < loads.size(); ++i) {
+    const bool left = set.contacts[i] == scene.stance.contacts[0];
+    const double share = isPublished(scene) ? 1.0 / loads.size() : node.load[left ? 0 : 1];
+    loads[i] = std::max(1.0, weight * share);
+  }
+  const ForceAxes axes = isPublished(scene) ? ForceAxes::World : ForceAxes::Contact;
+  addGroundCosts(scene.model, {o.force_weight, o.pressure_weight, axes}, loads, stage);
+  if (!isPublished(scene)) addWrenchCones(scene.model, o.friction, o.cone_margin, stage);
+}
+
+Vector6d makeVector(double x, double z, double rotation) {
+  return (Vector6d() << x, x, z, Vector3d::Constant(rotation)).finished();
+}
+
+// Height of the ground for the fly-high cost; on stairs it rises along the swing.
+double calcGround(const Scene& scene, const GaitNode& node, const Footstep& step) {
+  const auto feet = scene.task.plan.getStance(scene.gait.phases[node.phase].steps_done);
+  const double standing = feet[static_cast<int>(getOther(step.side))].p.z();
+  return standing + node.swings[static_cast<int>(step.side)].progress * (step.X_WF.p.z() - standing);
+}
+
+void addSwingCosts(const Scene& scene, const GaitNode& node, const Footstep& step, StageSpec& stage) {
+  const LocomotionOptions& o = scene.options;
+  const BodyFrame foot = getFoot(scene, step.side);
+  const SwingNode& swing = node.swings[static_cast<int>(step.side)];
+  const bool free = o.foothold_room > 0;  // along the ground
+  addCost(stage, "swing", 1,
+          makeVector(free ? o.foothold_weight : o.swing_weight, o.swing_weight, o.swing_rotation_weight),
+          makeFramePlacement(foot, swing.X_WF));
+  addCost(stage, "swing velocity", 1,
+          makeVector(free ? 0 : o.swing_velocity_weight, o.swing_velocity_weight, o.swing_velocity_weight),
+          makeFrameVelocity(foot, swing.V_F), true);
+  if (!isPublished(scene)) return;
+  addCost(stage, "fly high", o.paper.fly_high, Eigen::Vector2d::Ones(),
+          makeFlyHigh(foot, o.paper.fly_high_slope, calcGround(scene, node, step)));
+  if (o.paper.feet_distance_weight != 0)
+    stage.costs.push_back({"feet distance", o.paper.feet_distance_weight,
+                           Activation::makeBarrier(VectorXd::Ones(1), VectorXd::Constant(1, o.paper.feet_distance),
+                                                   VectorXd::Constant(1, 1e12)),
+                           makeFrameDistance(getFoot(scene, Side::Left), getFoot(scene, Side::Right))});
+}
+
+// A foot at the first node in the air is where it stood.
+void addSwingConstraints(const Scene& scene, const GaitNode& node, int k, StageSpec& stage) {
+  if (isPublished(scene)) return;
+  const std::array<SE3, 2> feet = getFeet(scene, node);
+  bool apart = false;
+  for (Side side : {Side::Left, Side::Right}) {
+    const int foot = static_cast<int>(side), step = scene.gait.phases[node.phase].steps[foot];
+    if (step < 0 || k == scene.gait.swings[step].begin) continue;
+    const SwingSpan& span = scene.gait.swings[step];
+    addClearance(getContact(scene, side), scene.task.ground, scene.ramp,
+                 isMidSwing(k - span.begin, span.end - span.begin) ? kMidSwingClearance : 0, stage);
+    if (!apart)
+      addDistance(getContact(scene, side), feet[foot], getContact(scene, getOther(side)), feet[1 - foot],
+                  scene.options.feet_distance, stage);
+    apart = true;
+  }
+}
+
+void addLanding(const Scene& scene, const Footstep& step, StageSpec& stage) {
+  const double h = stage.kind == StageKind::Impact ? 1 : stage.dt;
+  if (!isPublished(scene)) {
+    const LocomotionOptions& o = scene.options;
+    if (o.foothold_room > 0)
+      addCost(stage, "foothold", o.foothold_weight / h, (Vector6d() << 1, 1, 0, 0, 0, 0).finished(),
+              makeFramePlacement(getFoot(scene, step.side), step.X_WF));
+    return addLanding(getContact(scene, step.side), step.X_WF, o.foothold_room, stage);
+  }
+  const LandingWeights& weights = scene.options.paper.landing;
+  addFreeLanding(getFoot(scene, step.side), step.X_WF, {weights.height / h, weights.tilt / h, weights.velocity / h},
+                 stage);
+}
+
+}  // namespace
+
+VectorXd makeStageWeights(const Model& model, const LocomotionOptions& o) {
+  VectorXd weights = makeStateWeights(model);
+  weights.segment<3>(3) << o.torso_weight, o.torso_weight, o.heading_weight;
+  raiseMotorWeights(model, o.motor_weight, weights);
+  return weights;
+}
+
+std::array<SE3, 2> getFeet(const Scene& scene, const GaitNode& node) {
+  const GaitPhase& phase = scene.gait.phases[node.phase];
+  std::array<SE3, 2> feet = scene.task.plan.getStance(phase.steps_done);
+  for (int i = 0; i < 2; ++i)
+    if (phase.steps[i] >= 0) feet[i] = node.swings[i].X_WF;
+  return feet;
+}
+
+std::vector<ContactTarget> makeTargets(const Scene& scene, const GaitPhase& phase) {
+  const auto feet = scene.task.plan.getStance(phase.steps_done);
+  const double kp = scene.options.foothold_room > 0 ? 0 : scene.options.contact_kp;  // a foot stands where it landed
+  std::vector<ContactTarget> targets;
+  for (Side side : {Side::Left, Side::Right}) {
+    const int i = static_cast<int>(side);
+    if (!phase.stands(side)) continue;
+    targets.push_back({scene.stance.contacts[i], feet[i], kp, scene.options.contact_kd});
+  }
+  return targets;
+}
+
+std::string nameOf(const GaitPhase& phase) {
+  if (phase.flies()) return "flight";
+  if (phase.isDoubleSupport()) return "double support";
+  return getName(phase.stands(Side::Left) ? Side::Left : Side::Right);
+}
+
+StageSpec makeStage(const Scene& scene, int k, const std::vector<ContactTarget>& contacts) {
+  const GaitNode& node = scene.gait.nodes[k];
+  const LocomotionOptions& o = scene.options;
+  const GaitPhase& phase = scene.gait.phases[node.phase];
+  StageSpec stage = makeRegularizedStage(scene, node);
+  stage.constraints = makeConstraintSet(scene.model, contacts);
+  setClosureGains({o.closure_kp, o.closure_kd}, stage.constraints);
+  addComCosts(scene, node, stage);
+  addForceCosts(scene, node, stage);
+  for (int step : phase.steps)
+    if (step >= 0) addSwingCosts(scene, node, scene.task.plan.steps[step], stage);
+  if (node.landed >= 0 && o.rigid_landing == 0) addLanding(scene, scene.task.plan.steps[node.landed], stage);
+  addSwingConstraints(scene, node, k, stage);
+  return stage;
+}
+
+StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector<ContactTarget>& contacts) {
+  StageSpec stage = makeRegularizedStage(scene, node);
+  stage.kind = StageKind::Impact;
+  stage.dt = 0;
+  stage.constraints = makeConstraintSet(scene.model, contacts);
+  stage.state.weight *= scene.options.timing.time_step;
+  stage.control.weight *= scene.options.timing.time_step;  // torques have no effect here and go to zero
+  addLanding(scene, scene.task.plan.steps[node.landed], stage);
+  return stage;
+}
+
+VectorXd makeGuess(const Scene& scene, const GaitNode& node) {
+  const Model& model = scene.model;
+  VectorXd x = VectorXd::Zero(model.nq() + model.nv());
+  x.head(model.nq()) = scene.stance.q;
+  if (isPublished(scene)) {  // on stairs at the height of the path, since fly high grows exponentially below the ground
+    x[2] += node.com.z() - scene.stance.com.z();
+    return x;
+  }
+  const Matrix3d turn = makeAxisRotation(Vector3d::UnitZ(), node.heading);
+  x.head<3>() = node.com + turn * (scene.stance.q.head<3>() - scene.stance.com);
+  x.segment<4>(3) = makeHeading(scene, node);
+  return x;
+}
+
+StageSpec makeTerminalStage(const Scene& scene) {
+  const GaitNode& node = scene.gait.nodes.back();
+  const int nv = scene.model.nv();
+  StageSpec stage = makeRegularizedStage(scene, node);
+  stage.control.weight = 0;
+  if (isPublished(scene)) {
+    stage.state = {scene.options.paper.terminal, scene.stance.q, VectorXd::Zero(nv), VectorXd::Zero(2 * nv)};
+    stage.state.weights.tail(nv) = selectMainJoints(scene.model);
+    return stage;
+  }
+  addCost(stage, "com", scene.options.terminal_weight, Vector3d::Ones(), makeComPosition(node.com), true);
+  addRest(scene.model, stage);
+  return stage;
+}
+
+}  // namespace bielle
