@@ -5,124 +5,13 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/io/result.h"
 #include "bielle/model/error.h"
-#include "bielle/transmission/serial_model.h"
+#include "design/optimum_gradient.h"
 
 namespace bielle {
 namespace {
 
 constexpr double kLimitShare = 1.01;  // of the margin: searches that end at a limit end inside it
-
-// A motion of the start design.
-struct SolvedMotion {
-  MotionRecord record;
-  std::vector<VectorXd> postures;
-  std::optional<SerialTrajectory> serial;  // of its equivalent serial chain, where there is one
-  std::vector<int> kept_dofs;              // of the closed model: those of the chain, in its order
-};
-
-// The outcome of one motion of a design.
-struct Outcome {
-  double missing = 1;  // share of the motion
-  std::string message;
-  MotionMeasures measures;
-  LiftResult lifted;  // of a kept motion
-};
-
-std::vector<double> listSteps(const RobotProblem& problem) {
-  std::vector<double> dt;
-  for (int k = 0; k < problem.numStages(); ++k) dt.push_back(problem.spec(k).dt);
-  return dt;
-}
-
-Motion makeReducedMotion(const Model& model, const DesignMotion& motion) {
-  // Motions that are kept are lifted, which Euler steps alone can be; the others are comparable with them.
-  return makeMotion(model, motion.plan(model, makeStandingPosture(model)), {Formulation::Reduced, StepRule::Euler});
-}
-
-Outcome solveMotion(const Model& model, Motion& motion, const FddpOptions& options,
-                    const std::vector<MotorDrive>& drives) {
-  Outcome out;
-  const FddpSummary summary = Fddp(options).solve(*motion.problem, motion.guess);
-  out.message = motion.name + ": " + getName(summary.termination) + " " + summary.message;
-  if (summary.termination != FddpTermination::Converged) return out;
-  out.measures = calcMotionMeasures(model, listSteps(*motion.problem), motion.guess, drives);
-  out.missing = 0;
-  return out;
-}
-
-// Starts from the solution of the start design: its postures with the loops closed again, its torques.
-void setClosedGuess(const MotionRecord& record, Motion& motion) {
-  setGuess(record, motion);
-  const Model& model = motion.problem->model();
-  for (VectorXd& x : motion.guess.xs) {
-    const AssemblyResult closed = closeConfiguration(model, x.head(model.nq()));
-    if (closed.status == AssemblyStatus::Closed) x.head(model.nq()) = closed.q;
-  }
-}
-
-// Extracts the coordinates of the serial model from a motion of the closed one.
-MotionRecord restrictRecord(const Model& closed, const Model& serial, const Motion& motion, MotionRecord record) {
-  const MotionRecord names = makeRecord(motion, motion.guess);
-  RowMatrixXd q(record.q.rows(), serial.nq()), v(record.v.rows(), serial.nv()), a(record.a.rows(), serial.nv());
-  for (Eigen::Index k = 0; k < q.rows(); ++k) {
-    q.row(k) = restrictConfiguration(closed, serial, record.q.row(k));
-    v.row(k) = restrictVelocity(closed, serial, record.v.row(k));
-    if (k < a.rows()) a.row(k) = restrictVelocity(closed, serial, record.a.row(k));
-  }
-  record.q = q, record.v = v, record.a = a;
-  record.q_names = names.q_names, record.v_names = names.v_names;
-  return record;
-}
-
-void addKeptMotion(const Model& closed, const DesignMotion& motion, SolvedMotion& solved) {
-  const SerialModel serial = makeSerialModel(closed, makeStandingPosture(closed));
-  const Motion serial_motion = makeReducedMotion(serial.model, motion);
-  solved.serial =
-      makeSerialTrajectory(serial_motion, restrictRecord(closed, serial.model, serial_motion, solved.record));
-  solved.kept_dofs = findRestrictedDofs(closed, serial.model);
-}
-
-LiftResult liftMotion(const Model& model, const SerialTrajectory& kept) {
-  return lift(model, makeSerialModel(model, makeStandingPosture(model)), kept);
-}
-
-// Starts from the motion of the start design with the motors recomputed, which is nearly a motion of this design.
-// If that fails, starts from its postures and torques.
-void setStart(const Model& model, const SolvedMotion& solved, Motion& motion) {
-  if (solved.serial) {
-    const LiftResult lifted = liftMotion(model, *solved.serial);
-    const ShootingTrajectory& trajectory = lifted.trajectory;
-    if (lifted.lifted() && trajectory.us.size() == motion.guess.us.size() &&
-        trajectory.xs.size() == motion.guess.xs.size()) {
-      motion.guess = trajectory;
-      return;
-    }
-  }
-  setClosedGuess(solved.record, motion);
-}
-
-Outcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::vector<MotorDrive>& drives,
-                   double margin) {
-  Outcome out;
-  out.lifted = liftMotion(model, kept);
-  const LiftResult& lifted = out.lifted;
-  out.missing = 1 - static_cast<double>(lifted.dt.size()) / static_cast<double>(kept.dt.size() + 1);
-  if (!lifted.lifted()) {
-    out.message = lifted.nodes.empty() ? "nothing could be lifted" : lifted.nodes.back().message;
-    return out;
-  }
-  out.measures = calcMotionMeasures(model, lifted.dt, lifted.trajectory, drives);
-  out.missing = 0;
-  const auto near = std::find_if(lifted.nodes.begin(), lifted.nodes.end(),
-                                 [margin](const LiftNode& node) { return node.margin < margin; });
-  if (near == lifted.nodes.end()) return out;
-  out.missing = static_cast<double>(lifted.nodes.end() - near) / static_cast<double>(lifted.nodes.size());
-  out.message = "a linkage comes nearer to a dead point than the margin: " + std::to_string(near->margin) + " < " +
-                std::to_string(margin);
-  return out;
-}
 
 // Closes the loops with base and feet placed as in a posture of another design of the robot.
 double calcPostureGap(const Model& start, const Model& model, const VectorXd& posture) {
@@ -160,10 +49,18 @@ struct DesignEvaluator::Data {
   std::vector<SolvedMotion> solved;
   Evaluation start;
 
+  // Whether motions of the start design are transferred to other designs.
+  bool mustKeep() const { return options.mode == MotionMode::Kept || options.margin > EvaluationOptions().margin; }
   void readObjective();
   void solveStart();
-  void makeMotions(const Model& model, Evaluation& out, std::vector<LiftResult>* lifted = nullptr) const;
-  Evaluation evaluate(const VectorXd& x, std::vector<LiftResult>* lifted = nullptr) const;
+  void makeMotions(const Model& model, Evaluation& out, std::vector<MotionOutcome>* outcomes = nullptr) const;
+  // \param made  the model of the outcomes, if they are asked for
+  Evaluation evaluate(const VectorXd& x, std::vector<MotionOutcome>* outcomes = nullptr,
+                      std::optional<Model>* made = nullptr) const;
+  std::vector<MotorSlopes> calcKeptSlopes(const Model& model, const VectorXd& x,
+                                          const std::vector<MotionOutcome>& outcomes) const;
+  MeasurePieces calcStartMargins(const Model& model, const VectorXd& x) const;
+  MeasurePieces calcPieces(size_t i, const std::vector<MotorSlopes>& slopes) const;
   bool checkPostures(const Model& model, Evaluation& out) const;
   double calcTerm(size_t i, const Model& model, const std::vector<MotionMeasures>& measures) const;
   void sumUp(const Model& model, Evaluation& out) const;
@@ -193,13 +90,14 @@ const char* getName(DesignStatus status) {
 }
 
 std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std::vector<ObjectiveTerm>& objective) {
-  if (mode != MotionMode::Kept)
-    return GradientObstacle{"it needs gradients, which motions that are made anew for every design do not have",
-                            "give `mode: kept`, or bobyqa or sbplx"};
-  for (const ObjectiveTerm& term : objective)
+  for (const ObjectiveTerm& term : objective) {
+    const std::string name = getName(term.measure);
     if (!hasGradient(term.measure))
-      return GradientObstacle{std::string("it needs gradients, which ") + getName(term.measure) + " does not have",
-                              "choose a torque or an energy, or give bobyqa or sbplx"};
+      return GradientObstacle{"it needs gradients, which " + name + " does not have",
+                              "choose a torque, an energy or the cost, or give bobyqa or sbplx"};
+    if (term.measure == Measure::Cost && mode == MotionMode::Kept)
+      return GradientObstacle{"motions that are kept have no cost", "give `mode: reoptimized`"};
+  }
   return {};
 }
 
@@ -233,22 +131,8 @@ void DesignEvaluator::Data::readObjective() {
 
 void DesignEvaluator::Data::solveStart() {
   const Model& model = robot.startModel();
-  for (const DesignMotion& motion : motions) {
-    Motion problem = makeReducedMotion(model, motion);
-    const Outcome outcome = solveMotion(model, problem, options.solver, drives);
-    if (outcome.missing > 0)
-      throw ModelError(model.name(), "start design", outcome.message, "ask for a motion that the robot can make");
-    SolvedMotion solved_motion{makeRecord(problem, problem.guess), {}, {}, {}};
-    const int last = problem.problem->numStages();
-    for (int p = 0; p < options.postures; ++p)
-      solved_motion.postures.push_back(problem.guess.xs[p * last / std::max(1, options.postures - 1)].head(model.nq()));
-    try {
-      addKeptMotion(model, motion, solved_motion);
-    } catch (const ModelError&) {  // no serial chain, or impacts: motions can be solved but not kept
-      if (options.mode == MotionMode::Kept) throw;
-    }
-    solved.push_back(std::move(solved_motion));
-  }
+  for (const DesignMotion& motion : motions)
+    solved.push_back(solveStartMotion(model, motion, options.solver, options.postures, mustKeep()));
   makeMotions(model, start);
   if (start.status != DesignStatus::Feasible)
     throw ModelError(model.name(), "start design", start.message, "ask for a motion that the robot can make");
@@ -261,27 +145,23 @@ void DesignEvaluator::Data::solveStart() {
   start.value = weight;
 }
 
-void DesignEvaluator::Data::makeMotions(const Model& model, Evaluation& out, std::vector<LiftResult>* lifted) const {
+void DesignEvaluator::Data::makeMotions(const Model& model, Evaluation& out,
+                                        std::vector<MotionOutcome>* outcomes) const {
   double missing = 0;
   for (size_t i = 0; i < motions.size(); ++i) {
-    Outcome outcome;
-    if (options.mode == MotionMode::Kept) {
-      outcome = keepMotion(model, *solved[i].serial, drives, options.margin);
-    } else {
-      Motion motion = makeReducedMotion(model, motions[i]);
-      setStart(model, solved[i], motion);
-      outcome = solveMotion(model, motion, options.solver, drives);
-    }
+    MotionOutcome outcome = options.mode == MotionMode::Kept
+                                ? keepMotion(model, *solved[i].serial, drives, options.margin)
+                                : remakeMotion(model, motions[i], solved[i], options.solver, drives);
     missing += outcome.missing / static_cast<double>(motions.size());
     const bool failed = outcome.missing > 0 || !std::isfinite(outcome.measures.conditioning);
-    if (lifted) lifted->push_back(std::move(outcome.lifted));
     if (failed && out.status == DesignStatus::Feasible) {
       out.status = DesignStatus::MotionFailed;
       out.message = outcome.missing > 0 ? outcome.message : "a dead point of the motors";
       out.value = weight * (1.5 + 0.5 * std::max(missing, 1e-3));
     }
-    if (failed && !lifted) return;
+    if (failed && !outcomes) return;
     out.motions.push_back(outcome.measures);
+    if (outcomes) outcomes->push_back(std::move(outcome));
   }
 }
 
@@ -327,13 +207,17 @@ const Parametrization& DesignEvaluator::robot() const { return data_->robot; }
 const std::vector<DesignMotion>& DesignEvaluator::motions() const { return data_->motions; }
 const std::vector<ObjectiveTerm>& DesignEvaluator::objective() const { return data_->objective; }
 
-Evaluation DesignEvaluator::Data::evaluate(const VectorXd& x, std::vector<LiftResult>* lifted) const {
+Evaluation DesignEvaluator::Data::evaluate(const VectorXd& x, std::vector<MotionOutcome>* outcomes,
+                                           std::optional<Model>* made) const {
   Evaluation out;
   try {
-    const Model model = robot.make(x);
+    Model model = robot.make(x);
     if (!checkPostures(model, out)) return out;
-    makeMotions(model, out, lifted);
-    if (out.status == DesignStatus::Feasible) sumUp(model, out);
+    std::optional<Model> own;
+    std::optional<Model>& kept = made ? *made : own;  // optima refer to it
+    kept = std::move(model);
+    makeMotions(*kept, out, outcomes);
+    if (out.status == DesignStatus::Feasible) sumUp(*kept, out);
   } catch (const ModelError& error) {  // numbers that define no robot, postures from which no motion can start
     out.status = DesignStatus::MotionFailed;
     out.message = error.what();
@@ -344,31 +228,60 @@ Evaluation DesignEvaluator::Data::evaluate(const VectorXd& x, std::vector<LiftRe
 
 Evaluation DesignEvaluator::evaluate(const VectorXd& x) const { return data_->evaluate(x); }
 
-SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
-  if (const auto obstacle = findGradientObstacle(data_->options.mode, data_->objective))
-    throw ModelError(data_->robot.startModel().name(), "search", obstacle->problem, obstacle->remedy);
-  std::vector<LiftResult> lifted;
-  SlopedEvaluation out{data_->evaluate(x, &lifted), {}, {}};
-  if (lifted.size() < data_->motions.size()) return out;
-  const Model model = data_->robot.make(x);
-  const std::vector<ModelVariation> variations = calcDesignVariations(data_->robot, x);
+// Slopes of the motors; a failure is that of the first motion which has none.
+std::vector<MotorSlopes> DesignEvaluator::Data::calcKeptSlopes(const Model& model, const VectorXd& x,
+                                                               const std::vector<MotionOutcome>& outcomes) const {
+  const std::vector<ModelVariation> variations = calcDesignVariations(robot, x);
   std::vector<MotorSlopes> slopes;
-  for (size_t i = 0; i < lifted.size(); ++i) {
-    if (!lifted[i].lifted()) return out;
-    const SolvedMotion& kept = data_->solved[i];
-    slopes.push_back(calcMotorSlopes(model, kept.kept_dofs, *kept.serial, lifted[i], variations));
-    if (slopes.back().failure.empty()) continue;
-    out.evaluation = {DesignStatus::MotionFailed, 2 * data_->weight, {}, {}, slopes.back().failure};
+  for (size_t i = 0; i < outcomes.size(); ++i) {
+    slopes.push_back(calcMotorSlopes(model, solved[i].kept_dofs, *solved[i].serial, outcomes[i].lifted, variations));
+    if (!slopes.back().failure.empty()) break;
+  }
+  return slopes;
+}
+
+// Margins of the motions of the start design in the linkages of x; none where these cannot follow them.
+MeasurePieces DesignEvaluator::Data::calcStartMargins(const Model& model, const VectorXd& x) const {
+  std::vector<MotionOutcome> outcomes;
+  for (const SolvedMotion& start : solved) {
+    outcomes.push_back(keepMotion(model, *start.serial, drives, 0));
+    if (!outcomes.back().lifted.lifted()) return {};
+  }
+  const std::vector<MotorSlopes> slopes = calcKeptSlopes(model, x, outcomes);
+  return slopes.back().failure.empty() ? calcMarginPieces(kLimitShare * options.margin, slopes) : MeasurePieces();
+}
+
+MeasurePieces DesignEvaluator::Data::calcPieces(size_t i, const std::vector<MotorSlopes>& slopes) const {
+  const ObjectiveTerm& term = objective[i];
+  MeasurePieces out = term.measure == Measure::Cost ? calcCostPiece(slopes)
+                                                    : calcMeasurePieces(term.measure, term_motors[i], slopes, drives);
+  const double scale = term.weight / start.terms[i];
+  out.values *= scale;
+  out.gradients *= scale;
+  return out;
+}
+
+SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
+  const Data& data = *data_;
+  if (const auto obstacle = findGradientObstacle(data.options.mode, data.objective))
+    throw ModelError(data.robot.startModel().name(), "search", obstacle->problem, obstacle->remedy);
+  std::vector<MotionOutcome> outcomes;
+  std::optional<Model> model;
+  SlopedEvaluation out{data.evaluate(x, &outcomes, &model), {}, {}};
+  const bool kept = data.options.mode == MotionMode::Kept;
+  const auto is_made = [&](const MotionOutcome& outcome) { return kept ? outcome.lifted.lifted() : !!outcome.motion; };
+  if (outcomes.size() < data.motions.size() || !std::all_of(outcomes.begin(), outcomes.end(), is_made)) return out;
+  const std::vector<MotorSlopes> slopes =
+      kept ? data.calcKeptSlopes(*model, x, outcomes) : calcOptimumSlopes(data.robot, x, data.motions, outcomes);
+  if (!slopes.back().failure.empty()) {
+    out.evaluation = {DesignStatus::MotionFailed, 2 * data.weight, {}, {}, slopes.back().failure};
     return out;
   }
-  for (size_t i = 0; i < data_->objective.size(); ++i) {
-    const ObjectiveTerm& term = data_->objective[i];
-    out.terms.push_back(calcMeasurePieces(term.measure, data_->term_motors[i], slopes, data_->drives));
-    const double scale = term.weight / data_->start.terms[i];
-    out.terms[i].values *= scale;
-    out.terms[i].gradients *= scale;
-  }
-  out.limits = calcMarginPieces(kLimitShare * data_->options.margin, slopes);
+  for (size_t i = 0; i < data.objective.size(); ++i) out.terms.push_back(data.calcPieces(i, slopes));
+  if (kept) out.limits = calcMarginPieces(kLimitShare * data.options.margin, slopes);
+  if (kept || !data.mustKeep()) return out;
+  out.limits = data.calcStartMargins(*model, x);
+  if (out.limits.values.size() == 0) out.terms.clear();
   return out;
 }
 

@@ -17,17 +17,12 @@
 #include <vector>
 
 #include "bielle/design/parametrization.h"
-#include "bielle/motion/motion.h"
+#include "design/design_motions.h"
 #include "design/gradient.h"
 #include "design/measures.h"
 #include "design/workspace.h"
 
 namespace bielle {
-
-struct DesignMotion {
-  std::string name;
-  std::function<MotionPlan(const Model&, const VectorXd& q0)> plan;  ///< called by several threads
-};
 
 enum class MotionMode {
   Reoptimized,  ///< solved for the design, from the solution of the start design
@@ -48,7 +43,8 @@ struct EvaluationOptions {
   int postures = 6;  ///< of each motion, for (2)
   DriveTable drives;
   /// Kept motions whose linkages come nearer to a dead point fail (LiftOptions::singular): least motion of a joint in a
-  /// unit motion of its linkage.
+  /// unit motion of its linkage. Where motions are made anew, a larger margin than this one limits searches with gradients to
+  /// designs whose linkages could also follow the motions of the start design at that distance: their loops close.
   double margin = 1e-3;
 
   /// Engineering tolerances: a solve ends when its cost changes by a relative 1e-8 or less. One thread.
@@ -59,7 +55,7 @@ struct EvaluationOptions {
 struct GradientObstacle {
   std::string problem, remedy;
 };
-/// Empty if motions are kept and every measure has a gradient.
+/// Empty if every measure has a gradient.
 std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std::vector<ObjectiveTerm>& objective);
 
 enum class DesignStatus { Feasible, LoopOpen, MotionFailed };
@@ -92,9 +88,9 @@ class DesignEvaluator {
   ~DesignEvaluator();
 
   Evaluation evaluate(const VectorXd& x) const;
-  /// The same with gradients (gradient.h). If they do not exist, as at a dead point, the design counts as one whose
+  /// The same with gradients (gradient.h, optimum_gradient.h). If they do not exist, as at a dead point, the design counts as one whose
   /// motion fails.
-  /// \throws ModelError when motions are not kept, or a measure has no gradient
+  /// \throws ModelError when a measure has no gradient
   SlopedEvaluation differentiate(const VectorXd& x) const;
   const Evaluation& start() const;  ///< of the start design
   const Parametrization& robot() const;

@@ -188,6 +188,15 @@ MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
   return out;
 }
 
+MeasurePieces calcCostPiece(const std::vector<MotorSlopes>& motions) {
+  MeasurePieces out = makePieces(1, motions.front().du.size());
+  for (const MotorSlopes& motion : motions) {
+    out.values[0] += motion.cost;
+    out.gradients.row(0) += motion.dcost.transpose();
+  }
+  return out;
+}
+
 MeasurePieces calcMarginPieces(double least, const std::vector<MotorSlopes>& motions) {
   const Eigen::Index clusters = motions.front().margin.rows();
   MeasurePieces out = makePieces(motions.size() * clusters * kStretches, motions.front().dmargin.size());

@@ -32,14 +32,16 @@ namespace bielle {
 /// Whether calcMeasurePieces knows the measure.
 bool hasGradient(Measure measure);
 
-/// Torques and speeds of the motors over the N stages of a kept motion, and their derivatives. A stage without duration
-/// has no torque.
+/// Torques and speeds of the motors over the N stages of a motion, and their derivatives. A stage without duration has no
+/// torque.
 struct MotorSlopes {
   std::vector<double> dt;        ///< N, s
   MatrixXd u, v;                 ///< nu x N
   std::vector<MatrixXd> du, dv;  ///< per variable, nu x N
-  MatrixXd margin;               ///< loop clusters x N, mu^2 of Eq. (4)
+  MatrixXd margin;               ///< of kept motions, loop clusters x N, mu^2 of Eq. (4)
   std::vector<MatrixXd> dmargin;
+  double cost = 0;  ///< of motions that were optimized for the design, and its derivatives
+  VectorXd dcost;
   std::string failure;  ///< reason if there are none, or empty
 };
 /// \param kept_dofs  of the model, in the order of the velocities of the serial trajectory
@@ -51,6 +53,9 @@ MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dof
 /// \param drives  by motor; empty: the default of all
 MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
                                 const std::vector<MotorSlopes>& motions, const std::vector<MotorDrive>& drives = {});
+
+/// The sum of the costs of all motions, one piece.
+MeasurePieces calcCostPiece(const std::vector<MotorSlopes>& motions);
 
 /// Eq. (4) as pieces p <= 0: least^2 - mu^2 of every cluster, motion and stretch.
 MeasurePieces calcMarginPieces(double least, const std::vector<MotorSlopes>& motions);

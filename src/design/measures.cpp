@@ -95,6 +95,8 @@ const char* getName(Measure measure) {
       return "energy";
     case Measure::ElectricalEnergy:
       return "electrical_energy";
+    case Measure::Cost:
+      return "cost";
     case Measure::Workspace:
       return "workspace";
     case Measure::Conditioning:
@@ -106,6 +108,7 @@ const char* getName(Measure measure) {
 double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions) {
   double value = 0;
   for (const MotionMeasures& motion : motions) {
+    if (measure == Measure::Cost) value += motion.cost;
     if (measure == Measure::Conditioning) value = std::max(value, motion.conditioning);
     for (int m : motors) {
       const MotorMeasures& motor = motion.motors[m];

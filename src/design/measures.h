@@ -53,17 +53,18 @@ std::vector<MotorMeasures> calcMotorMeasures(const MotorTrace& trace, const std:
 struct MotionMeasures {
   std::vector<MotorMeasures> motors;  ///< in the order of the model
   double conditioning = 1;            ///< the worst over the nodes (conditioning.h)
+  double cost = 0;                    ///< of a motion that was optimized for the design
   MotorTrace trace;
 };
 /// \param trajectory  closed at its nodes
 MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>& dt,
                                   const ShootingTrajectory& trajectory, const std::vector<MotorDrive>& drives = {});
 
-enum class Measure { PeakTorque, RmsTorque, Energy, ElectricalEnergy, Conditioning, Workspace };
+enum class Measure { PeakTorque, RmsTorque, Energy, ElectricalEnergy, Cost, Conditioning, Workspace };
 const char* getName(Measure measure);
 
 /// The largest peak torque, rms torque or conditioning over the named motors and all motions, or the sum of an energy
-/// over them. The workspace does not depend on motions (workspace.h).
+/// over them; the sum of the costs of all motions. The workspace does not depend on motions (workspace.h).
 double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions);
 
 }  // namespace bielle

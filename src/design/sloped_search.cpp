@@ -53,7 +53,7 @@ class EpigraphProblem {
     search_.add(x, here_.value);
     const VectorXd width = search_.problem.upper - search_.problem.lower;
     for (MeasurePieces& term : here_.terms) term.gradients *= width.asDiagonal();
-    here_.limits.gradients *= width.asDiagonal();
+    if (here_.limits.values.size() > 0) here_.limits.gradients *= width.asDiagonal();
   }
 
   // Objective and constraints are requested for the same x in succession, with different t.

@@ -120,12 +120,14 @@ DriveTable readDrives(const Entry& entry) {
 ObjectiveTerm readTerm(const Entry& entry) {
   const Fields fields = entry.getFields({"measure", "motors", "weight", "region"});
   ObjectiveTerm term;
-  term.measure = readChoice<Measure>(require(fields, "measure", entry),
-                                     {Measure::PeakTorque, Measure::RmsTorque, Measure::Energy,
-                                      Measure::ElectricalEnergy, Measure::Conditioning, Measure::Workspace});
+  term.measure =
+      readChoice<Measure>(require(fields, "measure", entry),
+                          {Measure::PeakTorque, Measure::RmsTorque, Measure::Energy, Measure::ElectricalEnergy,
+                           Measure::Cost, Measure::Conditioning, Measure::Workspace});
   const Entry *motors = find(fields, "motors"), *region = find(fields, "region");
   const bool is_workspace = term.measure == Measure::Workspace;
   if (motors && is_workspace) motors->fail("a workspace has no motors", "remove it");
+  if (motors && term.measure == Measure::Cost) motors->fail("a cost is that of the whole motion", "remove it");
   if (region && !is_workspace) region->fail("only a workspace has a region", "remove it");
   if (region) term.region = readRegion(*region);
   if (motors) term.motors = motors->getTexts();
@@ -171,7 +173,6 @@ void readRoot(const Entry& root, DesignSpec& spec) {
   if (const Entry* mode = find(fields, "mode"))
     spec.mode = readChoice<MotionMode>(*mode, {MotionMode::Reoptimized, MotionMode::Kept});
   if (const Entry* margin = find(fields, "margin")) {
-    if (spec.mode != MotionMode::Kept) margin->fail("only motions that are kept have a margin", "give `mode: kept`");
     spec.margin = margin->getNumber();
     if (!(spec.margin >= 1e-3 && spec.margin < 1)) margin->fail("it is outside 0.001 .. 1", "give e.g. 0.1");
   }

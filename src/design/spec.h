@@ -17,7 +17,8 @@
 /// motions:
 ///   - {motion: squat, set: {depth: 0.6}}
 /// mode: reoptimized              # or kept, then with
-/// margin: 0.1                    # from dead points: least motion of a joint in a unit motion of its linkage
+/// margin: 0.1                    # from dead points: least motion of a joint in a unit motion of its linkage; of motions
+///                                # that are kept, or in searches with gradients of those of the start
 /// objective:                     # peak_torque, rms_torque, energy, electrical_energy, conditioning; all motors by
 /// default
 ///   - {measure: peak_torque, motors: [motor_knee_left, motor_knee_right], weight: 1}
@@ -31,7 +32,7 @@
 /// search:
 ///   seed: 1
 ///   searches: 2                  # independent ones, one thread each
-///   stages:                      # crs or isres, then bobyqa or sbplx; slsqp or mma (gradients) in mode kept
+///   stages:                      # crs or isres, then bobyqa or sbplx; slsqp or mma (gradients)
 ///     - {algorithm: crs, evaluations: 200, tolerance: 1e-3}
 /// ```
 #include <string>

@@ -1,0 +1,136 @@
+#include "design/design_motions.h"
+
+#include <algorithm>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/io/result.h"
+#include "bielle/model/error.h"
+#include "bielle/transmission/serial_model.h"
+
+namespace bielle {
+
+Motion makeDesignMotion(const Model& model, const DesignMotion& motion, const VectorXd& posture) {
+  return makeMotion(model, motion.plan(model, posture), {Formulation::Reduced, StepRule::Euler});
+}
+
+namespace {
+
+std::vector<double> listSteps(const RobotProblem& problem) {
+  std::vector<double> dt;
+  for (int k = 0; k < problem.numStages(); ++k) dt.push_back(problem.spec(k).dt);
+  return dt;
+}
+
+// Solves from the guess.
+MotionOutcome solve(Motion motion, const FddpOptions& options, const std::vector<MotorDrive>& drives) {
+  MotionOutcome out;
+  const FddpSummary summary = solveMotion(motion, options, {}, &out.multipliers);
+  out.message = motion.name + ": " + getName(summary.termination) + " " + summary.message;
+  if (summary.termination != FddpTermination::Converged) return out;
+  out.measures = calcMotionMeasures(motion.problem->model(), listSteps(*motion.problem), motion.guess, drives);
+  out.measures.cost = summary.cost;
+  out.missing = 0;
+  out.motion = std::make_unique<Motion>(std::move(motion));
+  return out;
+}
+
+// Starts from the solution of the start design: its postures with the loops closed again, its torques.
+void setClosedGuess(const MotionRecord& record, Motion& motion) {
+  setGuess(record, motion);
+  const Model& model = motion.problem->model();
+  for (VectorXd& x : motion.guess.xs) {
+    const AssemblyResult closed = closeConfiguration(model, x.head(model.nq()));
+    if (closed.status == AssemblyStatus::Closed) x.head(model.nq()) = closed.q;
+  }
+}
+
+// Extracts the coordinates of the serial model from a motion of the closed one.
+MotionRecord restrictRecord(const Model& closed, const Model& serial, const Motion& motion, MotionRecord record) {
+  const MotionRecord names = makeRecord(motion, motion.guess);
+  RowMatrixXd q(record.q.rows(), serial.nq()), v(record.v.rows(), serial.nv()), a(record.a.rows(), serial.nv());
+  for (Eigen::Index k = 0; k < q.rows(); ++k) {
+    q.row(k) = restrictConfiguration(closed, serial, record.q.row(k));
+    v.row(k) = restrictVelocity(closed, serial, record.v.row(k));
+    if (k < a.rows()) a.row(k) = restrictVelocity(closed, serial, record.a.row(k));
+  }
+  record.q = q, record.v = v, record.a = a;
+  record.q_names = names.q_names, record.v_names = names.v_names;
+  return record;
+}
+
+void addKeptMotion(const Model& closed, const DesignMotion& motion, SolvedMotion& solved) {
+  const SerialModel serial = makeSerialModel(closed, makeStandingPosture(closed));
+  const Motion serial_motion = makeDesignMotion(serial.model, motion, makeStandingPosture(serial.model));
+  solved.serial =
+      makeSerialTrajectory(serial_motion, restrictRecord(closed, serial.model, serial_motion, solved.record));
+  solved.kept_dofs = findRestrictedDofs(closed, serial.model);
+}
+
+LiftResult liftMotion(const Model& model, const SerialTrajectory& kept) {
+  return lift(model, makeSerialModel(model, makeStandingPosture(model)), kept);
+}
+
+// Starts from the motion of the start design with the motors recomputed, which is nearly a motion of this design.
+// If that fails, starts from its postures and torques.
+void setStart(const Model& model, const SolvedMotion& solved, Motion& motion) {
+  if (solved.serial) {
+    const LiftResult lifted = liftMotion(model, *solved.serial);
+    const ShootingTrajectory& trajectory = lifted.trajectory;
+    if (lifted.lifted() && trajectory.us.size() == motion.guess.us.size() &&
+        trajectory.xs.size() == motion.guess.xs.size()) {
+      motion.guess = trajectory;
+      return;
+    }
+  }
+  setClosedGuess(solved.record, motion);
+}
+
+}  // namespace
+
+SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, const FddpOptions& options, int postures,
+                              bool must_keep) {
+  const MotionOutcome outcome = solve(makeDesignMotion(model, motion, makeStandingPosture(model)), options, {});
+  if (outcome.missing > 0)
+    throw ModelError(model.name(), "start design", outcome.message, "ask for a motion that the robot can make");
+  const ShootingTrajectory& solution = outcome.motion->guess;
+  SolvedMotion out{makeRecord(*outcome.motion, solution), {}, {}, {}};
+  const int last = static_cast<int>(solution.us.size());
+  for (int p = 0; p < postures; ++p)
+    out.postures.push_back(solution.xs[p * last / std::max(1, postures - 1)].head(model.nq()));
+  try {
+    addKeptMotion(model, motion, out);
+  } catch (const ModelError&) {  // no serial chain, or impacts: motions can be solved but not kept
+    if (must_keep) throw;
+  }
+  return out;
+}
+
+MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const SolvedMotion& start,
+                           const FddpOptions& options, const std::vector<MotorDrive>& drives) {
+  Motion made = makeDesignMotion(model, motion, makeStandingPosture(model));
+  setStart(model, start, made);
+  return solve(std::move(made), options, drives);
+}
+
+MotionOutcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::vector<MotorDrive>& drives,
+                         double margin) {
+  MotionOutcome out;
+  out.lifted = liftMotion(model, kept);
+  const LiftResult& lifted = out.lifted;
+  out.missing = 1 - static_cast<double>(lifted.dt.size()) / static_cast<double>(kept.dt.size() + 1);
+  if (!lifted.lifted()) {
+    out.message = lifted.nodes.empty() ? "nothing could be lifted" : lifted.nodes.back().message;
+    return out;
+  }
+  out.measures = calcMotionMeasures(model, lifted.dt, lifted.trajectory, drives);
+  out.missing = 0;
+  const auto near = std::find_if(lifted.nodes.begin(), lifted.nodes.end(),
+                                 [margin](const LiftNode& node) { return node.margin < margin; });
+  if (near == lifted.nodes.end()) return out;
+  out.missing = static_cast<double>(lifted.nodes.end() - near) / static_cast<double>(lifted.nodes.size());
+  out.message = "a linkage comes nearer to a dead point than the margin: " + std::to_string(near->margin) + " < " +
+                std::to_string(margin);
+  return out;
+}
+
+}  // namespace bielle
