@@ -8,8 +8,11 @@ bielle_packages=(g++ cmake ninja-build libeigen3-dev liburdfdom-dev liburdfdom-h
   libnlopt-cxx-dev gnuplot-nox libjs-three libjs-dygraphs)
 # Simbody and MuJoCo, against which motions and dynamics are checked.
 bielle_check_packages=(libsimbody-dev libmujoco-dev)
-# Further dependencies of the tests: Catch2, Google Benchmark, Python to read NumPy archives, a browser for the reports.
-bielle_test_packages=(catch2 libbenchmark-dev python3 chromium pkg-config)
+# The Python package.
+bielle_python_packages=(pybind11-dev python3-dev python3-numpy)
+# Further dependencies of the tests: Catch2, Google Benchmark, Python to read NumPy archives, a browser for the reports,
+# what tests the Python package.
+bielle_test_packages=(catch2 libbenchmark-dev python3 chromium pkg-config python3-pytest)
 
 # install_missing PACKAGE...: installs the packages that dpkg does not list as installed.
 install_missing() {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "bielle/io/motion_registry.h"
 #include "bielle/model/error.h"
-#include "io/motion_registry.h"
 
 namespace bielle::simulation {
 namespace {

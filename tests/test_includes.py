@@ -38,11 +38,13 @@ OTHERS = {
     "SimTK": ["engines/", "simulation/", "validation/"],
     "simbody/": ["engines/", "simulation/", "validation/"],
     "mujoco/": ["engines/", "simulation/", "validation/"],
+    "pybind11/": ["python/"],
 }
 PUBLIC = "include/bielle/"
-OUTSIDE = ("examples/", "tests/consumer/")  # they see what users see
+OUTSIDE = ("examples/", "python/", "tests/consumer/")  # they see what users see
 GENERATED = ("assets.inc",)
-FOLDERS = ("include/", "src/", "engines/", "simulation/", "validation/", "tests/", "examples/", "benchmarks/")
+FOLDERS = ("include/", "src/", "engines/", "simulation/", "validation/", "tests/", "examples/", "benchmarks/",
+           "python/")
 
 
 def collect(room):
@@ -135,6 +137,9 @@ def check_planted():
             ("src/io/result.cpp", "#include <SimTKsimbody.h>", True),
             ("tests/test_io.cpp", "#include <SimTKsimbody.h>", True),
             ("validation/check.cpp", "#include <SimTKsimbody.h>", False),
+            ("python/src/model.cpp", "#include <pybind11/pybind11.h>", False),
+            ("python/src/model.cpp", '#include "io/plot.h"', True),
+            ("src/io/plot.h", "#include <pybind11/pybind11.h>", True),
             ("simulation/terrain.cpp", '#include "simulation/world.h"', False),
             ("simulation/terrain.cpp", '#include "bielle/io/result.h"', False),
             ("src/cli/solve.cpp", '#include "simulation/world.h"', True),

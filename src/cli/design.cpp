@@ -1,11 +1,11 @@
 // bielle design: lengths of a robot chosen by optimization.
 #include <iostream>
 
+#include "bielle/io/motion_registry.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "cli/table.h"
 #include "design/run.h"
-#include "io/motion_registry.h"
 
 namespace bielle::cli {
 namespace {

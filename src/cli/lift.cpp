@@ -5,12 +5,12 @@
 #include <iostream>
 #include <optional>
 
+#include "bielle/io/motion_registry.h"
 #include "bielle/io/names.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "cli/table.h"
-#include "io/motion_registry.h"
 
 namespace fs = std::filesystem;
 

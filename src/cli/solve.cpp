@@ -9,6 +9,7 @@
 #include <sstream>
 #include <utility>
 
+#include "bielle/io/motion_registry.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "bielle/report/report.h"
@@ -17,7 +18,6 @@
 #include "cli/free_timings.h"
 #include "cli/objective.h"
 #include "cli/table.h"
-#include "io/motion_registry.h"
 #include "io/setting.h"
 
 namespace bielle::cli {
@@ -130,18 +130,6 @@ void warnOfMissedGoals(const MotionResult& result) {
     if (!outcome.met()) std::cerr << "bielle: warning: " << outcome.goal.name << " " << formatOutcome(outcome) << "\n";
 }
 
-// The limits given by motor are listed with the other options.
-Motion makeLimited(const MotionRequest& request, const Model& model, const ProblemOptions& problem) {
-  Motion motion = makeMotion(model, request.plan(model, makeStandingPosture(model)), problem);
-  const LimitOptions& limits = problem.limits;
-  for (const auto& [motor, value] : limits.efforts) motion.requested.emplace_back(kEffortLimit + motor, value);
-  for (const auto& [motor, value] : limits.velocities) motion.requested.emplace_back(kVelocityLimit + motor, value);
-  for (const auto& [motor, value] : limits.powers) motion.requested.emplace_back(kPowerLimit + motor, value);
-  if (limits.dead_point_margin != LimitOptions().dead_point_margin)
-    motion.requested.emplace_back(kDeadPointMargin, limits.dead_point_margin);
-  return motion;
-}
-
 // Lists everything that the serial model omits.
 void printSerialModel(const SerialModel& serial) {
   const auto join = [](const std::vector<std::string>& names) {
@@ -206,7 +194,7 @@ Motion makeFromEffort(const MotionRequest& request, const Model& model, const Pr
   }
   ProblemOptions scaled = problem;
   scaled.objective = scaleObjective(effort, problem.objective, problem.limits);
-  Motion motion = makeLimited(request, model, scaled);
+  Motion motion = makeRequested(request, model, scaled);
   motion.guess = std::move(effort.guess);
   return motion;
 }
@@ -234,7 +222,7 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   if (serial && !problem.step) problem.step = StepRule::Euler;
   const ObjectiveOptions objective = std::exchange(problem.objective, {});
   problem.objective.regeneration = objective.regeneration;  // of reported energies
-  Motion motion = makeLimited(request, model, problem);
+  Motion motion = makeRequested(request, model, problem);
   FddpOptions solver = arguments.solver;
   if (!arguments.warm_start.empty())
     setGuess(readResultRecord(arguments.warm_start), motion);

@@ -1,4 +1,4 @@
-#include "io/motion_registry.h"
+#include "bielle/io/motion_registry.h"
 
 #include <algorithm>
 #include <map>
@@ -157,6 +157,17 @@ MotionRequest makeSequenceRequest(const std::vector<std::string>& motions) {
     return planSequence(model, parts, q0);
   };
   return request;
+}
+
+Motion makeRequested(const MotionRequest& request, const Model& model, const ProblemOptions& problem) {
+  Motion motion = makeMotion(model, request.plan(model, makeStandingPosture(model)), problem);
+  const LimitOptions& limits = problem.limits;
+  for (const auto& [motor, value] : limits.efforts) motion.requested.emplace_back(kEffortLimit + motor, value);
+  for (const auto& [motor, value] : limits.velocities) motion.requested.emplace_back(kVelocityLimit + motor, value);
+  for (const auto& [motor, value] : limits.powers) motion.requested.emplace_back(kPowerLimit + motor, value);
+  if (limits.dead_point_margin != LimitOptions().dead_point_margin)
+    motion.requested.emplace_back(kDeadPointMargin, limits.dead_point_margin);
+  return motion;
 }
 
 MotionRequest remakeRequest(const MotionSummary& summary) {

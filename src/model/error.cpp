@@ -27,6 +27,7 @@ std::string makePrintable(const std::string& text) {
 ModelError::ModelError(const std::string& source, const std::string& element, const std::string& problem,
                        const std::string& remedy)
     : std::runtime_error((source.empty() ? "" : makePrintable(source) + ": ") + makePrintable(element) + ": " +
-                         makePrintable(problem) + (remedy.empty() ? "" : "; " + makePrintable(remedy))) {}
+                         makePrintable(problem) + (remedy.empty() ? "" : "; " + makePrintable(remedy))),
+      parts_(std::make_shared<const Parts>(Parts{source, element, problem, remedy})) {}
 
 }  // namespace bielle

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "bielle/io/motion_registry.h"
 #include "design/spec_parts.h"
-#include "io/motion_registry.h"
 #include "model/text_file.h"
 #include "study/report.h"
 

@@ -12,6 +12,26 @@ struct JointLimits {
   VectorXd lower, upper, velocity;  ///< per dof of the joint, or empty for none; rad, m, rad/s, m/s
 };
 
+/// What a model consists of, as its accessors give it: to store a model, or to compare two.
+struct ModelParts {
+  std::string name;
+  Vector3d gravity = Vector3d::Zero();
+  std::vector<Body> bodies;
+  std::vector<Joint> joints;
+  std::vector<Frame> frames;
+  std::vector<Closure> closures;
+  std::vector<Motor> motors;
+  std::vector<ContactFrame> contacts;
+  std::vector<Reference> references;
+  std::vector<Visual> visuals;
+  std::vector<int> serial_joints;
+  VectorXd lower_limits, upper_limits, velocity_limits, armature;  ///< nv
+};
+ModelParts takeParts(const Model& model);
+/// The model of these parts, to the last bit the one that they were taken from.
+/// 	hrows ModelError when an index or a size among them does not fit
+Model makeModel(ModelParts parts);
+
 /// Collects bodies, joints, closures, motors and frames, then validates them and makes the model.
 /// Bodies are referred to by the name of the link; "world" is the ground. A link must be declared before it is used;
 /// otherwise calls may come in any order. build() throws ModelError naming the element and the remedy.
@@ -48,6 +68,10 @@ class ModelBuilder {
 
   /// Validates and makes the model. Implausible data are reported in `warnings`, if given.
   Model build(std::vector<std::string>* warnings = nullptr) const;
+
+  /// The model of these parts, to the last bit the one that they were taken from.
+  /// \throws ModelError when an index or a size among them does not fit
+  static Model restore(ModelParts parts);
 
  private:
   struct FramePlace {

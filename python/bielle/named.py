@@ -1,0 +1,54 @@
+"""Results of several arrays, by name. With N states every array has an axis of N in front."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+class Dynamics(NamedTuple):
+    """Accelerations and constraint forces. Where they could not be computed they are NaN."""
+
+    a: Array  #: (nv,)
+    forces: Array  #: (rows,), each on body 1 in frame 1 of its closure, N and N m
+    status: Array  #: 0: computed; 1: singular mass matrix; 2: not finite; 3: rows contradict each other
+
+
+class DynamicsDerivatives(NamedTuple):
+    """Derivatives of accelerations (nv, ..) and forces (rows, ..) by the tangent of q, by v and by u."""
+
+    da_dq: Array
+    da_dv: Array
+    da_du: Array
+    dforces_dq: Array
+    dforces_dv: Array
+    dforces_du: Array
+    status: Array  #: as in Dynamics
+
+
+class InverseDynamicsDerivatives(NamedTuple):
+    """Derivatives of generalized forces (nv, nv) by the tangent of q, by v and by a (the mass matrix)."""
+
+    dq: Array
+    dv: Array
+    da: Array
+
+
+class Impact(NamedTuple):
+    """A rigid impact."""
+
+    v: Array  #: velocity after it (nv,)
+    impulses: Array  #: (rows,), N s and N m s
+    status: Array  #: as in Dynamics
+
+
+class ImpactDerivatives(NamedTuple):
+    """Derivatives of an impact by the tangent of q and by v."""
+
+    dv_dq: Array
+    dv_dv: Array
+    dimpulses_dq: Array
+    dimpulses_dv: Array
+    status: Array  #: as in Dynamics

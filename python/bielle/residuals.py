@@ -1,0 +1,59 @@
+"""Residuals of costs and constraints: those of the library, and the base class of one's own."""
+
+from typing import Any, Dict, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ._bielle import LibraryResidual, Node
+from ._bielle import _residuals
+
+center_of_pressure = _residuals.center_of_pressure
+com_position = _residuals.com_position
+com_velocity = _residuals.com_velocity
+contact_force = _residuals.contact_force
+electrical_power = _residuals.electrical_power
+fly_high = _residuals.fly_high
+frame_distance = _residuals.frame_distance
+frame_placement = _residuals.frame_placement
+frame_rotation = _residuals.frame_rotation
+frame_translation = _residuals.frame_translation
+frame_velocity = _residuals.frame_velocity
+joint_position = _residuals.joint_position
+joint_velocity = _residuals.joint_velocity
+motor_power = _residuals.motor_power
+sole_clearance = _residuals.sole_clearance
+wrench_cone = _residuals.wrench_cone
+
+Array = npt.NDArray[np.float64]
+
+
+class Residual:
+    """A residual r of one's own, for costs and constraints.
+
+    The solver calls `calc` and `calc_jacobian` from all its threads, one at a time. They must depend on the node alone,
+    so that results do not depend on the number of threads. What they raise leaves the solve as it is.
+
+    size: number of rows n.
+    depends_on: what r depends on, of "q", "v", "forces", "controls", "speeds", "time_scale".
+    """
+
+    size: int
+    depends_on: Sequence[str] = ("q", "v")
+
+    def calc(self, node: Node) -> npt.ArrayLike:
+        """r (n,)."""
+        raise NotImplementedError
+
+    def calc_jacobian(self, node: Node) -> Dict[str, npt.ArrayLike]:
+        """Derivatives of r by each entry of `depends_on`: by the tangent of q and by v (n, nv), by the forces (n, rows), by
+        controls and speeds (n, nu), by the time scale (n,). Without this function they are central differences, which call
+        `calc` twice per coordinate.
+        """
+        raise NotImplementedError
+
+
+def make(function: str, arguments: Sequence[Any]) -> LibraryResidual:
+    """A residual of the library by the name of its function: what pickle calls."""
+    residual: LibraryResidual = getattr(_residuals, function)(*arguments)
+    return residual

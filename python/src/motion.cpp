@@ -1,0 +1,242 @@
+#include "motion.h"
+
+#include <pybind11/stl.h>
+
+#include <algorithm>
+
+#include "bielle/io/names.h"
+#include "bielle/io/result.h"
+#include "bielle/model/error.h"
+#include "bind.h"
+
+namespace bielle::python {
+
+MotionRequest Request::make() const {
+  MotionRequest request = sequence.empty() ? findMotion("", motion).makeRequest() : makeSequenceRequest(sequence);
+  if (!weights.empty()) {
+    const auto preset = std::find_if(request.presets.begin(), request.presets.end(),
+                                     [this](const MotionPreset& p) { return p.name == weights; });
+    if (preset == request.presets.end())
+      throw ModelError("", "weights '" + weights + "'", "motion '" + motion + "' has none of this name",
+                       request.presets.empty() ? "leave them out" : "choose '" + request.presets.front().name + "'");
+    preset->apply();
+  }
+  for (const auto& [name, value] : options) setOption(request.options, name, value);
+  for (const OptionEntry& option : request.options)
+    requireOption(std::isfinite(*option.value), option.name, "it is not finite", "give a number");
+  for (const MotionFile& file : request.files) {
+    if (!files.count(file.name))
+      throw ModelError("", "file '" + file.name + "'", "motion '" + motion + "' needs it", "give a path: " + file.help);
+    file.read(files.at(file.name));
+  }
+  return request;
+}
+
+BusyGuard::BusyGuard(HeldMotion& held) : held_(held) {
+  if (held.is_busy.exchange(true)) throw std::runtime_error("another thread is solving this motion");
+}
+
+FddpObserver makeObserver(const py::object& callback) {
+  FddpObserver observer;
+  // Copies of the observer are made without the interpreter's lock.
+  observer.callback = [shared = std::make_shared<SharedObject>(callback)](const FddpIteration& iteration) {
+    const py::gil_scoped_acquire lock;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    const bool stop = !shared->get().is_none() && shared->get()(iteration).is(py::bool_(false));
+    return stop ? FddpAction::Stop : FddpAction::Continue;
+  };
+  return observer;
+}
+
+std::shared_ptr<HeldMotion> makeHeldMotion(std::shared_ptr<Model> model, const Request& request,
+                                           const ProblemOptions& options) {
+  auto held = std::make_shared<HeldMotion>();
+  held->model = std::move(model);
+  held->request = request;
+  held->options = options;
+  held->motion = makeRequested(request.make(), *held->model, options);
+  return held;
+}
+
+namespace {
+
+std::shared_ptr<HeldMotion> makeFromPlan(std::shared_ptr<Model> model, const MotionPlan& plan,
+                                         const ProblemOptions& options) {
+  auto held = std::make_shared<HeldMotion>();
+  held->model = std::move(model);
+  held->plan = plan;
+  held->options = options;
+  held->motion = makeMotion(*held->model, plan, options);
+  return held;
+}
+
+FddpSummary solve(HeldMotion& held, FddpOptions options, const py::object& callback) {
+  const BusyGuard guard(held);
+  const FddpObserver observer = makeObserver(callback);
+  const py::gil_scoped_release release;
+  Motion& motion = held.motion;
+  if (motion.peak_limits.size() > 0) return solveMotion(motion, options, observer);
+  if (motion.bounded) options.bounds = ControlBounds::Enforce;
+  held.solver = std::make_unique<Fddp>(options);
+  return held.solver->solve(*motion.problem, motion.guess, observer);
+}
+
+// The guess; the motion takes only one that fits its problem.
+void setTrajectory(HeldMotion& held, const ShootingTrajectory& trajectory) {
+  const BusyGuard guard(held);
+  const RobotProblem& problem = *held.motion.problem;
+  const size_t stages = problem.numStages();
+  if (trajectory.xs.size() != stages + 1 || trajectory.us.size() != stages)
+    throw py::value_error("guess: " + std::to_string(stages + 1) + " states and " + std::to_string(stages) +
+                          " controls wanted, got " + std::to_string(trajectory.xs.size()) + " and " +
+                          std::to_string(trajectory.us.size()));
+  for (size_t k = 0; k <= stages; ++k)
+    if (trajectory.xs[k].size() != problem.stateSize())
+      throw py::value_error("guess.xs: shape (" + std::to_string(problem.stateSize()) + ",) wanted, got (" +
+                            std::to_string(trajectory.xs[k].size()) + ",)");
+  for (size_t k = 0; k < stages; ++k)
+    if (trajectory.us[k].size() != problem.controlSize(static_cast<int>(k)))
+      throw py::value_error("guess.us: shape (" + std::to_string(problem.controlSize(static_cast<int>(k))) +
+                            ",) wanted, got (" + std::to_string(trajectory.us[k].size()) + ",)");
+  held.motion.guess = trajectory;
+}
+
+ShootingTrajectory getTrajectory(const HeldMotion& held) { return held.motion.guess; }
+
+void setWarmStart(HeldMotion& held, const MotionRecord& record) {
+  const BusyGuard guard(held);
+  setGuess(record, held.motion);
+}
+
+py::dict getCosts(const HeldMotion& held, int node) {
+  const RobotProblem& problem = *held.motion.problem;
+  if (node < 0 || node > problem.numStages())
+    throw py::index_error("node: from 0 to " + std::to_string(problem.numStages()));
+  std::vector<CostValue> values;
+  {
+    const py::gil_scoped_release release;
+    RobotEvaluator evaluator(problem);
+    const bool terminal = node == problem.numStages();
+    values = problem.getCosts(
+        node, evaluator.evaluate(node, held.motion.guess.xs[node], terminal ? VectorXd() : held.motion.guess.us[node]));
+  }
+  py::dict out;
+  for (const CostValue& value : values) out[py::str(value.name)] = value.value;
+  return out;
+}
+
+void bindRequests(py::module_& module) {
+  Value<Request>(module, "Request", "A motion by name, with its options: what `bielle solve` is asked for.")
+      .field("motion", &Request::motion, "name, one of `motions`; of a sequence empty")
+      .field("options", &Request::options, "numbers by name")
+      .field("sequence", &Request::sequence, "names of motions that follow one another; options are \"NAME.option\"")
+      .field("weights", &Request::weights, "name of a preset, e.g. \"paper\"; or empty")
+      .field("files", &Request::files, "paths by name, e.g. \"footholds\"");
+  module.def(
+      "motions",
+      [] {
+        py::dict out;
+        for (const MotionEntry& entry : getMotions()) {
+          const MotionRequest request = entry.makeRequest();
+          py::dict options;
+          for (const OptionEntry& option : request.options) {
+            py::dict described;
+            described["default"] = *option.value;
+            described["unit"] = option.unit;
+            described["help"] = option.help;
+            described["names"] = show(option.names, {});
+            options[py::str(option.name)] = described;
+          }
+          py::dict motion;
+          motion["help"] = entry.help;
+          motion["options"] = options;
+          motion["weights"] = show(getNames(request.presets), {});
+          motion["files"] = show(getNames(request.files), {});
+          out[py::str(entry.name)] = motion;
+        }
+        return out;
+      },
+      "The motions by name: what they do, their options with defaults and units, presets of weights, files.");
+}
+
+void bindHeldMotion(py::module_& module) {
+  using Type = py::class_<HeldMotion, std::shared_ptr<HeldMotion>>;
+  Type type(module, "Motion",
+            "A problem ready to be solved: of a plan (Motion(model, plan, options)), or of a request (Motion.make).");
+  type.def(py::init(&makeFromPlan), py::arg("model"), py::arg("plan"), py::arg("options") = ProblemOptions())
+      .def_static("make", &makeHeldMotion, py::arg("model"), py::arg("request"), py::arg("options") = ProblemOptions(),
+                  py::call_guard<py::gil_scoped_release>(), "The motion of a request. Raises ModelError.")
+      .def_static(
+          "plan",
+          [](const Model& model, const Request& request) {
+            const py::gil_scoped_release release;
+            return request.make().plan(model, makeStandingPosture(model));
+          },
+          py::arg("model"), py::arg("request"),
+          "The plan of a request, e.g. to add costs and constraints to its stages.")
+      .def_readonly("model", &HeldMotion::model, "Model")
+      .def_readonly("options", &HeldMotion::options, "ProblemOptions")
+      .def_property_readonly(
+          "request", [](const HeldMotion& h) { return h.request; }, "Request, or None")
+      .def_property_readonly(
+          "name", [](const HeldMotion& h) { return h.motion.name; }, "e.g. \"squat\"")
+      .def_property_readonly(
+          "num_stages", [](const HeldMotion& h) { return h.motion.problem->numStages(); }, "N")
+      .def_property_readonly(
+          "schedule", [](const HeldMotion& h) { return h.motion.schedule; }, "ContactSchedule")
+      .def_property_readonly(
+          "ground", [](const HeldMotion& h) { return h.motion.ground; }, "Ground")
+      .def_property_readonly(
+          "goals", [](const HeldMotion& h) { return show(h.motion.goals, py::cast(h)); }, "Goals")
+      .def_property_readonly(
+          "requested", [](const HeldMotion& h) { return show(h.motion.requested, {}); }, "every option by name")
+      .def_property("guess", &getTrajectory, &setTrajectory, "Trajectory to start from; after a solve the solution")
+      .def(
+          "stage",
+          [](const HeldMotion& h, int node) {
+            if (node < 0 || node > h.motion.problem->numStages()) throw py::index_error("node");
+            return h.motion.problem->spec(node);
+          },
+          py::arg("node"), "Stage of a node, 0 to N.")
+      .def("start_from", &setWarmStart, py::arg("record"),
+           "Takes the guess from the record of another motion of the robot, resampled if its length differs.")
+      .def("costs", &getCosts, py::arg("node"),
+           "Costs of a node of the guess by name, before scaling by the time step.")
+      .def("solve", &solve, py::arg("options") = FddpOptions(), py::arg("callback") = py::none(),
+           "Solves from the guess and leaves the solution there. Returns a Summary.\n\n"
+           "callback: called with each Iteration; False stops. What it raises, like Ctrl-C, ends the solve with the "
+           "current iterate in the guess.")
+      .def_property_readonly(
+          "multipliers",
+          [](const HeldMotion& h) {
+            if (!h.solver) throw std::runtime_error("the motion has not been solved, or has the least peak torque");
+            return h.solver->getMultipliers();
+          },
+          "Multipliers of the last solve");
+  type.def(py::pickle(
+      [](const HeldMotion& h) {
+        return py::make_tuple(h.model, h.request ? py::cast(*h.request) : py::none(),
+                              h.plan ? py::cast(*h.plan) : py::none(), h.options, h.motion.guess);
+      },
+      [](const py::tuple& state) {
+        const auto model = state[0].cast<std::shared_ptr<Model>>();
+        const auto options = state[3].cast<ProblemOptions>();
+        auto held = state[1].is_none() ? makeFromPlan(model, state[2].cast<const MotionPlan&>(), options)
+                                       : makeHeldMotion(model, state[1].cast<const Request&>(), options);
+        held->motion.guess = state[4].cast<ShootingTrajectory>();
+        return held;
+      }));
+  type.def("__repr__", [](const HeldMotion& h) {
+    return "<Motion '" + h.motion.name + "' of " + h.model->name() + ": " +
+           std::to_string(h.motion.problem->numStages()) + " stages>";
+  });
+}
+
+}  // namespace
+
+void bindMotions(py::module_& module) {
+  bindRequests(module);
+  bindHeldMotion(module);
+}
+
+}  // namespace bielle::python

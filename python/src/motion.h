@@ -1,0 +1,52 @@
+#pragma once
+/// \file A motion as Python holds it: with the model that its problem refers to, and what it was made of.
+#include <atomic>
+#include <memory>
+#include <optional>
+
+#include "bielle/io/motion_registry.h"
+#include "residual.h"
+#include "robot.h"
+
+namespace bielle::python {
+
+/// A motion by name, with its options: what `bielle solve` is asked for.
+struct Request {
+  std::string motion;                     // of the registry; of a sequence empty
+  std::vector<std::string> sequence;      // names of its motions
+  std::map<std::string, double> options;  // by name
+  std::string weights;                    // name of a preset, or empty
+  std::map<std::string, std::string> files;
+
+  /// \throws ModelError when motion, option, preset or file do not exist
+  MotionRequest make() const;
+};
+
+struct HeldMotion {
+  std::shared_ptr<Model> model;
+  std::optional<Request> request;  // either this
+  std::optional<MotionPlan> plan;  // or that
+  ProblemOptions options;
+  Motion motion;
+  std::unique_ptr<Fddp> solver;      // of the last solve: gains and multipliers
+  std::atomic<bool> is_busy{false};  // one solve at a time
+};
+
+/// Keeps others from a motion that is being solved. \throws RuntimeError if another thread solves it
+class BusyGuard {
+ public:
+  explicit BusyGuard(HeldMotion& held);
+  ~BusyGuard() { held_.is_busy = false; }
+
+ private:
+  HeldMotion& held_;
+};
+
+std::shared_ptr<HeldMotion> makeHeldMotion(std::shared_ptr<Model> model, const Request& request,
+                                           const ProblemOptions& options);
+
+/// Lets `callback(iteration)` observe a solve that runs without the interpreter's lock, and signals end it: their exceptions
+/// leave it. False from the callback stops it.
+FddpObserver makeObserver(const py::object& callback);
+
+}  // namespace bielle::python

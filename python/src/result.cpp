@@ -1,0 +1,144 @@
+#include "bielle/io/result.h"
+
+#include <pybind11/stl.h>
+
+#include "bielle/report/report.h"
+#include "bind.h"
+#include "motion.h"
+
+namespace bielle::python {
+namespace {
+
+void bindRecord(py::module_& module) {
+  Value<MotionRecord>(module, "Record",
+                      "A motion as numbers: one row per node, or per stage, from its node to the next.")
+      .field("q_names", &MotionRecord::q_names, "of the columns of q")
+      .field("v_names", &MotionRecord::v_names, "of the columns of v and a")
+      .field("u_names", &MotionRecord::u_names, "of the motors")
+      .field("closure_names", &MotionRecord::closure_names, "in their order")
+      .field("contact_names", &MotionRecord::contact_names, "in their order")
+      .field("time", &MotionRecord::time, "(N + 1,), s")
+      .field("q", &MotionRecord::q, "(N + 1, nq)")
+      .field("v", &MotionRecord::v, "(N + 1, nv)")
+      .field("a", &MotionRecord::a, "(N, nv)")
+      .field("u", &MotionRecord::u, "(N, nu), N m or N")
+      .field("closure_wrenches", &MotionRecord::closure_wrenches, "(N, 6 per closure), on body 1, in frame 1")
+      .field("contact_wrenches", &MotionRecord::contact_wrenches, "(N, 6 per contact), of the ground on the foot")
+      .field("has_midpoints", &MotionRecord::has_midpoints, "midpoint steps; else the next two are empty")
+      .field("q_mid", &MotionRecord::q_mid, "(N, nq), where a, u and wrenches belong")
+      .field("v_mid", &MotionRecord::v_mid, "(N, nv)")
+      .field("com", &MotionRecord::com, "(N + 1, 3), m")
+      .field("gap", &MotionRecord::gap, "(N + 1, 2), largest closing error, m and rad");
+  module.def("read_record", &readRecord, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
+             "Reads trajectory.csv or trajectory.npz.");
+  module.def("read_result_record", &readResultRecord, py::arg("directory"), py::call_guard<py::gil_scoped_release>(),
+             "The Record in a directory of a result.");
+}
+
+std::string makePage(const std::vector<std::string>& directories) {
+  const py::gil_scoped_release release;
+  return makeReport(directories);
+}
+
+void bindResult(py::module_& module) {
+  Value<ElectricalEnergy>(module, "ElectricalEnergy", "What the motors take from their supply.")
+      .field("by_motor", &ElectricalEnergy::by_motor, "(nu,), J")
+      .field("total", &ElectricalEnergy::total, "J")
+      .field("regeneration", &ElectricalEnergy::regeneration, "share of what flows back that was taken off")
+      .field("num_assumed", &ElectricalEnergy::num_assumed, "motors whose loss is not known")
+      .field("distance", &ElectricalEnergy::distance, "of the centre of mass on the ground, m")
+      .field("cost_of_transport", &ElectricalEnergy::cost_of_transport, "total over weight and distance");
+  Value<RunInfo>(module, "RunInfo", "The request that led to a motion.")
+      .field("robot", &RunInfo::robot, "name or path, as given")
+      .field("robot_file", &RunInfo::robot_file, "its .urdf, absolute")
+      .field("command", &RunInfo::command, "the command line, or empty")
+      .field("model", &RunInfo::model, "\"closed\" or \"serial\"")
+      .field("serial_armature", &RunInfo::serial_armature, "of the serial model");
+  Value<MotionResult>(module, "Result", "A solved motion.")
+      .field("run", &MotionResult::run, "RunInfo")
+      .field("motion", &MotionResult::motion, "name")
+      .field("formulation", &MotionResult::formulation, "Formulation")
+      .field("step", &MotionResult::step, "StepRule")
+      .field("requested", &MotionResult::requested, "every option by name")
+      .field("goals", &MotionResult::goals, "GoalOutcomes: requested and achieved values")
+      .field("schedule", &MotionResult::schedule, "ContactSchedule, with the time steps that came out")
+      .field("timings", &MotionResult::timings, "PhaseTimings of the phases of free duration")
+      .field("ground", &MotionResult::ground, "Ground")
+      .field("solver", &MotionResult::solver, "Summary")
+      .field("record", &MotionResult::record, "Record: all numbers, node by node")
+      .field("peak_torques", &MotionResult::peak_torques, "largest |u| by motor, largest first, N m or N")
+      .field("objective", &MotionResult::objective, "ObjectiveOptions")
+      .field("energy", &MotionResult::energy, "ElectricalEnergy")
+      .field("gap_position", &MotionResult::gap_position, "largest closing error, m")
+      .field("gap_angle", &MotionResult::gap_angle, "rad")
+      .field("slip_position", &MotionResult::slip_position, "largest displacement of a foot from its touchdown, m")
+      .field("slip_angle", &MotionResult::slip_angle, "rad")
+      .field("com_start", &MotionResult::com_start, "height of the centre of mass, m")
+      .field("com_lowest", &MotionResult::com_lowest, "m")
+      .type()
+      .def_property_readonly("converged", &MotionResult::converged)
+      .def_property_readonly("interrupted", &MotionResult::interrupted)
+      .def(
+          "write", [](const MotionResult& self, const std::string& directory) { return writeResult(directory, self); },
+          py::arg("directory"), py::call_guard<py::gil_scoped_release>(),
+          "Writes trajectory.csv, trajectory.npz and summary.json, as the command does. Returns their paths.");
+  module.def("make_report", &makePage, py::arg("directories"),
+             "The page that shows results, from their directories: 3D replay and plots, offline. HTML.");
+  module.def("write_report", &writeReport, py::arg("path"), py::arg("directories"),
+             py::call_guard<py::gil_scoped_release>(), "Writes that page to a file.");
+}
+
+// Directories of results to start from and what `bielle solve` does with them.
+MotionResult solveRequest(const Robot& robot, const Request& asked, ProblemOptions problem, FddpOptions solver,
+                          const std::optional<MotionRecord>& warm_start, const py::object& callback) {
+  const FddpObserver observer = makeObserver(callback);
+  const py::gil_scoped_release release;
+  const Model& model = *robot.model;
+  const MotionRequest request = asked.make();
+  const ObjectiveOptions objective = std::exchange(problem.objective, {});
+  problem.objective.regeneration = objective.regeneration;
+  Motion motion = makeRequested(request, model, problem);
+  FddpOptions first = solver;
+  if (warm_start)
+    setGuess(*warm_start, motion);
+  else if (request.parts.empty())
+    first.initial_regularization = kGuessRegularization;
+  if (!request.parts.empty() && !warm_start) {
+    PartsOptions parts;
+    parts.problem = problem;
+    parts.solver = first;
+    parts.observer = observer;
+    motion.guess = solveParts(model, request.parts, makeStandingPosture(model), parts);
+    fitTimings(*motion.problem, motion.guess);
+  }
+  if (objective.objective != Objective::Effort) {
+    if (!warm_start) solveMotion(motion, first, observer);
+    problem.objective = scaleObjective(motion, objective, problem.limits);
+    Motion scaled = makeRequested(request, model, problem);
+    scaled.guess = std::move(motion.guess);
+    motion = std::move(scaled);
+    first = solver;
+  }
+  const FddpSummary summary = solveMotion(motion, first, observer);
+  return makeResult({robot.name, robot.file, {}}, motion, motion.guess, summary);
+}
+
+}  // namespace
+
+void bindResults(py::module_& module) {
+  bindRecord(module);
+  bindResult(module);
+  module.def("solve", &solveRequest, py::arg("robot"), py::arg("request"), py::arg("problem") = ProblemOptions(),
+             py::arg("solver") = FddpOptions(), py::arg("warm_start") = py::none(), py::arg("callback") = py::none(),
+             "Solves a Request as `bielle solve` does. Returns a Result.\n\n"
+             "callback: called with each Iteration; False stops. What it raises, like Ctrl-C, ends the solve.");
+  module.def(
+      "make_result",
+      [](const HeldMotion& held, const FddpSummary& summary, const Robot& robot) {
+        const py::gil_scoped_release release;
+        return makeResult({robot.name, robot.file, {}}, held.motion, held.motion.guess, summary);
+      },
+      py::arg("motion"), py::arg("summary"), py::arg("robot"), "The Result of a Motion that was solved.");
+}
+
+}  // namespace bielle::python

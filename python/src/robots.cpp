@@ -1,0 +1,84 @@
+#include <pybind11/stl.h>
+
+#include "bielle/io/robot_writer.h"
+#include "bielle/model/error.h"
+#include "bielle/model/reader.h"
+#include "bielle/robots/generators.h"
+#include "bind.h"
+#include "robot.h"
+
+namespace bielle::python {
+namespace {
+
+Robot load(const std::string& name, const std::optional<std::string>& base) {
+  LoadOptions options;
+  if (base && *base != "free" && *base != "fixed")
+    throw py::value_error("base: 'free' or 'fixed', got '" + *base + "'");
+  if (base) options.base = *base == "free" ? BaseKind::Free : BaseKind::Fixed;
+  LoadedRobot loaded = loadRobot(name, options);
+  return {name, std::make_shared<Model>(std::move(loaded.model)), loaded.file, loaded.directory, loaded.warnings};
+}
+
+Robot generate(const std::string& name, const std::string& directory, const std::map<std::string, double>& parameters) {
+  const GeneratorRequest request = findGenerator(name).makeRequest();
+  for (const auto& [parameter, value] : parameters) setParameter(request.parameters, parameter, value);
+  checkParameters(name, request.parameters);
+  auto model = std::make_shared<Model>(request.make());
+  if (directory.empty()) return {name, std::move(model), "", "", {}};
+  writeRobot(*model, directory);
+  return load(directory, {});
+}
+
+py::dict describeGenerators() {
+  py::dict out;
+  for (const Generator& generator : getGenerators()) {
+    py::dict parameters;
+    const GeneratorRequest request = generator.makeRequest();
+    for (const Parameter& p : request.parameters) {
+      py::dict parameter;
+      parameter["default"] = *p.value;
+      parameter["unit"] = p.unit;
+      parameter["lower"] = p.lower;
+      parameter["upper"] = p.upper;
+      parameter["help"] = p.help;
+      parameters[py::str(p.name)] = parameter;
+    }
+    out[py::str(generator.name)] = parameters;
+  }
+  return out;
+}
+
+}  // namespace
+
+void bindRobots(py::module_& module) {
+  Value<Robot>(module, "Robot",
+               "A robot: its model, and where it came from. `load_robot` and `generate_robot` make them.")
+      .field("name", &Robot::name, "as it was asked for")
+      .field("model", &Robot::model, "Model")
+      .field("file", &Robot::file, "absolute path of the .urdf, or of the .yaml that completes one elsewhere; or empty")
+      .field("directory", &Robot::directory, "where the files are; or empty")
+      .field("warnings", &Robot::warnings, "valid but suspicious: \"file: element: problem\"")
+      .type()
+      .def(
+          "write", [](const Robot& robot, const std::string& directory) { writeRobot(*robot.model, directory); },
+          py::arg("directory"), py::call_guard<py::gil_scoped_release>(),
+          "Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY.");
+  module.def("load_robot", &load, py::arg("name"), py::arg("base") = py::none(),
+             py::call_guard<py::gil_scoped_release>(),
+             "Loads a robot by name, by directory, or by .urdf or .yaml file.\n\n"
+             "base: 'free' or 'fixed' overrides the robot's own. Raises ModelError, whatever the files contain.");
+  module.def(
+      "generate_robot",
+      [](const std::string& name, const std::string& directory, const py::kwargs& parameters) {
+        const auto values = read<std::map<std::string, double>>(parameters, "parameters");
+        const py::gil_scoped_release release;
+        return generate(name, directory, values);
+      },
+      py::arg("name"), py::arg("directory") = "",
+      "Makes a robot from named lengths, angles and masses (see `generators`), with files if a directory is given.");
+  module.def("generators", &describeGenerators, "Parameters of every generator by name: default, unit, bounds, help.");
+  module.def("list_robots", &listRobots, "Names of the robots that can be loaded by name.");
+  module.def("robot_directories", &getRobotDirectories, "Where robots are looked up by name.");
+}
+
+}  // namespace bielle::python

@@ -1,0 +1,90 @@
+#include "bielle/solve/fddp.h"
+#include "bind.h"
+#include "value.h"
+
+namespace bielle::python {
+namespace {
+
+void bindOptions(py::module_& module) {
+  py::enum_<ControlBounds>(module, "ControlBounds")
+      .value("IGNORE", ControlBounds::Ignore)
+      .value("ENFORCE", ControlBounds::Enforce);
+  py::enum_<LastRollout>(module, "LastRollout")
+      .value("CLOSED", LastRollout::Closed)
+      .value("SEGMENTS", LastRollout::Segments);
+  Value<ConstraintOptions>(module, "ConstraintOptions", "How constraints are enforced.")
+      .field("tolerance", &ConstraintOptions::tolerance, "largest violation of a converged solve")
+      .field("initial_penalty", &ConstraintOptions::initial_penalty, "cost over squared violation")
+      .field("penalty_increase", &ConstraintOptions::penalty_increase, "factor when the violation falls too slowly")
+      .field("max_penalty", &ConstraintOptions::max_penalty, "largest");
+  Value<FddpOptions>(module, "SolverOptions", "Options of FDDP.")
+      .field("max_iterations", &FddpOptions::max_iterations, "the solver stops there")
+      .field("gradient_tolerance", &FddpOptions::gradient_tolerance, "(cost per unit of control)^2")
+      .field("gap_tolerance", &FddpOptions::gap_tolerance, "of every entry of the gaps")
+      .field("cost_tolerance", &FddpOptions::cost_tolerance, "relative change of the cost by a full step; 0: never")
+      .field("initial_regularization", &FddpOptions::initial_regularization, "of the first sweep")
+      .field("min_regularization", &FddpOptions::min_regularization, "least")
+      .field("max_regularization", &FddpOptions::max_regularization, "the solve gives up above this")
+      .field("regularization_increase", &FddpOptions::regularization_increase, "factor")
+      .field("regularization_decrease", &FddpOptions::regularization_decrease, "divisor")
+      .field("state_regularization_ratio", &FddpOptions::state_regularization_ratio, "of states over controls")
+      .field("long_step", &FddpOptions::long_step, "a step is long above this")
+      .field("short_step", &FddpOptions::short_step, "a step is short up to this")
+      .field("num_step_lengths", &FddpOptions::num_step_lengths, "1, 1/2, 1/4, ...")
+      .field("acceptance", &FddpOptions::acceptance, "share of the foreseen decrease, in (0, 1)")
+      .field("bounds", &FddpOptions::bounds, "ControlBounds")
+      .field("constraints", &FddpOptions::constraints, "ConstraintOptions")
+      .field("rollout_segments", &FddpOptions::rollout_segments, "largest number of segments of a rollout")
+      .field("last_rollout", &FddpOptions::last_rollout, "LastRollout")
+      .field("threads", &FddpOptions::threads, "0: all; results are bitwise independent of it");
+}
+
+void bindSummary(py::module_& module) {
+  py::enum_<FddpTermination>(module, "Termination")
+      .value("CONVERGED", FddpTermination::Converged)
+      .value("MAX_ITERATIONS", FddpTermination::MaxIterations)
+      .value("REGULARIZATION_MAX", FddpTermination::RegularizationMax)
+      .value("INFEASIBLE", FddpTermination::Infeasible)
+      .value("INTERRUPTED", FddpTermination::Interrupted)
+      .value("FAILED", FddpTermination::Failed);
+  Value<FddpIteration>(module, "Iteration", "One line of the log: the iterate it started from and the step it took.")
+      .field("iteration", &FddpIteration::iteration, "from 0")
+      .field("cost", &FddpIteration::cost, "before the step")
+      .field("violation", &FddpIteration::violation, "largest of the constraints before the step")
+      .field("gap", &FddpIteration::gap, "largest entry before the step")
+      .field("gradient", &FddpIteration::gradient, "squared norm of the projected one")
+      .field("step", &FddpIteration::step, "length, 0: none was taken")
+      .field("regularization", &FddpIteration::regularization, "of the sweep")
+      .field("seconds", &FddpIteration::seconds, "since the start");
+  Value<FddpSummary>(module, "Summary", "How a solve went.")
+      .field("termination", &FddpSummary::termination, "Termination")
+      .field("message", &FddpSummary::message, "why it ended")
+      .field("cost", &FddpSummary::cost, "of the returned trajectory")
+      .field("gap", &FddpSummary::gap, "largest entry of its gaps")
+      .field("iterations", &FddpSummary::iterations, "number")
+      .field("violation", &FddpSummary::violation, "largest of the constraints")
+      .field("complementarity", &FddpSummary::complementarity, "largest multiplier times slack")
+      .field("multiplier", &FddpSummary::multiplier, "largest")
+      .field("penalty", &FddpSummary::penalty, "of violated constraints; 0: there are none")
+      .field("multiplier_updates", &FddpSummary::multiplier_updates, "number")
+      .field("seconds", &FddpSummary::seconds, "s")
+      .field("linearize_seconds", &FddpSummary::linearize_seconds, "summed over the threads, s")
+      .field("sweep_seconds", &FddpSummary::sweep_seconds, "likewise")
+      .field("rollout_seconds", &FddpSummary::rollout_seconds, "likewise")
+      .field("log", &FddpSummary::log, "Iterations")
+      .type()
+      .def_property_readonly("converged",
+                             [](const FddpSummary& s) { return s.termination == FddpTermination::Converged; });
+  Value<Multipliers>(module, "Multipliers", "Of the constraints, node by node.")
+      .field("values", &Multipliers::values, "N + 1 of (constraint size,)")
+      .field("penalty", &Multipliers::penalty, "of violated constraints");
+}
+
+}  // namespace
+
+void bindSolverValues(py::module_& module) {
+  bindOptions(module);
+  bindSummary(module);
+}
+
+}  // namespace bielle::python

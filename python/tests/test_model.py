@@ -1,0 +1,179 @@
+"""Robots, models, and functions of states."""
+
+import numpy as np
+import pytest
+
+import bielle
+
+
+def differentiate(function, model, q, step=1e-6):
+    """Central differences by the tangent of q."""
+    columns = []
+    for direction in np.eye(model.nv):
+        ahead, behind = (function(model.integrate(q, s * direction)) for s in (step, -step))
+        columns.append((ahead - behind) / (2 * step))
+    return np.stack(columns, axis=-1)
+
+
+def test_attributes(model):
+    assert (model.nq, model.nv, model.nu) == (model.neutral().size, model.armature.size, len(model.motors))
+    assert [motor.name for motor in model.motors] == list(model.u_names)
+    assert len(model.q_names) == model.nq and len(model.v_names) == model.nv
+    assert model.mass == pytest.approx(sum(body.inertia.mass for body in model.bodies))
+    assert model.joints[1].kind == bielle.JointKind.FREE_FLYER
+    assert model.mobility(model.standing())["mobility"] == 18
+
+
+def test_arrays_are_read_only_views(model):
+    limits = model.lower_limits
+    assert not limits.flags.writeable and limits.base is not None
+    with pytest.raises(ValueError):
+        limits[0] = 0.0
+
+
+def test_mass_matrix_is_that_of_inverse_dynamics(model, state):
+    q, v, _ = state
+    a = np.random.default_rng(2).standard_normal(model.nv)
+    expected = model.inverse_dynamics(q, v, a)
+    assert model.mass_matrix(q) @ a + model.bias(q, v) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert model.kinetic_energy(q, v) == pytest.approx(v @ model.mass_matrix(q) @ v / 2)
+
+
+def test_forward_dynamics_meets_its_equations(model, state):
+    q, v, u = state
+    feet = ("foot_left",)
+    result = model.forward_dynamics(q, v, u, feet)
+    assert result.status == 0
+    closures = model.num_closure_rows
+    tau = np.zeros(model.nv)
+    tau[[motor.dof for motor in model.motors]] = u
+    # The contact's rows are those of the foot's twist in its own frame.
+    J = np.vstack([model.closure_jacobian(q), model.frame_jacobian(q, "foot_left")])
+    left = model.inverse_dynamics(q, v, result.a) - J.T @ result.forces
+    assert result.forces.size == closures + 6
+    assert left == pytest.approx(tau, abs=1e-8)
+
+
+@pytest.mark.parametrize("contacts", [(), ("foot_left", "foot_right")])
+def test_derivatives_of_forward_dynamics(model, state, contacts):
+    q, v, u = state
+    exact = model.forward_dynamics_derivatives(q, v, u, contacts)
+    expected = differentiate(lambda x: model.forward_dynamics(x, v, u, contacts).a, model, q)
+    scale = np.abs(expected).max()
+    assert np.abs(exact.da_dq - expected).max() < 1e-6 * scale
+    changed = exact.da_dq.copy()
+    changed[7, 9] += 1e-3 * scale
+    assert np.abs(changed - expected).max() > 1e-4 * scale
+    a, b = (model.forward_dynamics(q, v + s * v, u, contacts).a for s in (1e-6, -1e-6))
+    assert exact.da_dv @ v == pytest.approx((a - b) / 2e-6, abs=1e-6 * np.abs(exact.da_dv @ v).max())
+
+
+def test_derivatives_of_impact(model, state):
+    q, v, _ = state
+    exact = model.impact_derivatives(q, v, ("foot_left",))
+    expected = differentiate(lambda x: model.impact(x, v, ("foot_left",)).v, model, q)
+    assert np.abs(exact.dv_dq - expected).max() < 1e-6 * np.abs(expected).max()
+    landed = model.impact(q, v, ("foot_left",))
+    assert model.frame_velocity(q, landed.v, "foot_left") == pytest.approx(np.zeros(6), abs=1e-9)
+
+
+def test_derivatives_of_inverse_dynamics(model, state):
+    q, v, _ = state
+    a = np.ones(model.nv)
+    exact = model.inverse_dynamics_derivatives(q, v, a)
+    expected = differentiate(lambda x: model.inverse_dynamics(x, v, a), model, q)
+    assert np.abs(exact.dq - expected).max() < 1e-6 * np.abs(expected).max()
+    assert exact.da == pytest.approx(model.mass_matrix(q))
+
+
+def test_jacobians(model, state):
+    q, v, _ = state
+    expected = differentiate(model.com, model, q)
+    assert np.abs(model.com_jacobian(q) - expected).max() < 1e-8
+    assert model.com_jacobian(q) @ v == pytest.approx(model.com_velocity(q, v))
+    assert model.frame_jacobian(q, "foot_left") @ v == pytest.approx(model.frame_velocity(q, v, "foot_left"))
+    assert model.closure_jacobian(q) @ v == pytest.approx(np.zeros(model.num_closure_rows), abs=1e-9)
+    assert np.abs(model.closure_residual(q)).max() < 1e-11
+
+
+def test_batches_are_single_states_to_the_last_bit(model, state):
+    q, v, u = state
+    random = np.random.default_rng(3)
+    qs = model.integrate(q, 0.01 * random.standard_normal((37, model.nv)))
+    vs = random.standard_normal((37, model.nv))
+    assert qs.shape == (37, model.nq)
+    many = model.forward_dynamics(qs, vs, u, ("foot_left",))
+    for i in range(37):
+        one = model.forward_dynamics(qs[i], vs[i], u, ("foot_left",))
+        assert np.array_equal(one.a, many.a[i]) and np.array_equal(one.forces, many.forces[i])
+    assert model.placement(qs, "foot_left").shape == (37, 4, 4)
+    assert model.potential_energy(qs).shape == (37,)
+    assert model.com(np.empty((0, model.nq))).shape == (0, 3)
+    assert np.array_equal(model.com(np.asfortranarray(qs)), model.com(qs))
+
+
+def test_wrong_shapes_say_which_was_wanted(model):
+    with pytest.raises(ValueError, match=rf"q: shape \({model.nq},\) or \(N, {model.nq}\) wanted, got \(3,\)"):
+        model.com(np.zeros(3))
+    with pytest.raises(ValueError, match="v: 2 states wanted as before it, got 3"):
+        model.com_velocity(np.tile(model.neutral(), (2, 1)), np.zeros((3, model.nv)))
+    with pytest.raises(ValueError, match=r"SE3.p: shape \(3,\) wanted, got \(2,\)"):
+        bielle.SE3(p=[0, 1])
+    with pytest.raises(TypeError, match="q: numbers wanted"):
+        model.com("bipetto")
+    with pytest.raises(TypeError, match="SE3 has no field 'q'; it has: R, p"):
+        bielle.SE3(q=1)
+
+
+def test_model_errors_have_fields():
+    with pytest.raises(bielle.ModelError) as caught:
+        bielle.load_robot("no such robot")
+    assert caught.value.problem and caught.value.remedy
+    assert str(caught.value).endswith(caught.value.problem + "; " + caught.value.remedy)
+
+
+def test_model_errors_name_the_file(tmp_path):
+    path = tmp_path / "leg.urdf"
+    path.write_text("<robot name='leg'><link name='a'/><joint name='j' type='revolute'/></robot>")
+    with pytest.raises(bielle.ModelError) as caught:
+        bielle.load_robot(str(path))
+    assert caught.value.file == str(path) and "j" in caught.value.element
+
+
+def test_contacts_of_another_robot_are_refused(model):
+    other = bielle.load_robot("fourbar").model
+    with pytest.raises(ValueError, match="not one of the model"):
+        other.static_torques(other.neutral(), model.constraints(("foot_left",)))
+    with pytest.raises(bielle.ModelError, match="there is no contact"):
+        model.constraints(("hand",))
+
+
+def test_a_linkage_built_from_nothing():
+    """A pendulum of a point mass: a = -g/l sin(q)."""
+    builder = bielle.ModelBuilder("pendulum")
+    joint = bielle.Joint(name="pivot", kind=bielle.JointKind.REVOLUTE, axis=[0, 1, 0])
+    builder.add_link("rod", "world", joint, bielle.Inertia(mass=2.0, com=[0, 0, -0.5]))
+    builder.add_motor("pivot", effort_limit=3)
+    pendulum = builder.build()
+    angle = np.linspace(-1, 1, 11)[:, None]
+    a = pendulum.forward_dynamics(angle, np.zeros(1), np.zeros(1)).a
+    assert a == pytest.approx(-9.81 / 0.5 * np.sin(angle))
+    assert pendulum.motors[0].effort_limit == 3
+
+
+def test_generated_robots(tmp_path):
+    assert "upper_length" in bielle.generators()["cleobot"]
+    short = bielle.generate_robot("cleobot", str(tmp_path / "short"), upper_length=0.2)
+    assert short.file.endswith("short.urdf") and short.model.nq == bielle.generate_robot("cleobot").model.nq
+    with pytest.raises(bielle.ModelError):
+        bielle.generate_robot("cleobot", upper_length=-1)
+
+
+def test_ratio_of_a_knee(model):
+    sweep = bielle.sweep_ratio(model, "knee_left", model.standing())
+    start = next(sample for sample in sweep.samples if sample.s == 0)
+    q, index = model.standing(), list(model.v_names).index
+    v = model.project_velocity(q, model.closure_jacobian(q)[0])  # some closed velocity
+    joints = [v[index(name)] for name in sweep.joints]
+    motors = [v[index(name)] for name in sweep.motors]
+    assert start.ratio.R @ joints == pytest.approx(motors)

@@ -1,0 +1,75 @@
+// A model taken apart and put together again.
+#include <cmath>
+
+#include "bielle/model/builder.h"
+
+namespace bielle {
+namespace {
+
+void require(bool ok, const ModelParts& parts, const std::string& element) {
+  if (!ok)
+    throw ModelError("", "robot '" + parts.name + "'", "its " + element + " do not fit", "take them from a model");
+}
+
+void checkParts(const ModelParts& parts) {
+  const int bodies = static_cast<int>(parts.bodies.size());
+  require(bodies > 1 && parts.joints.size() == parts.bodies.size(), parts, "bodies and joints");
+  int nq = 0, nv = 0;
+  for (int i = 0; i < bodies; ++i) {
+    const Joint& joint = parts.joints[i];
+    require(joint.idx_q == nq && joint.idx_v == nv && joint.nq == getNq(joint.kind) && joint.nv == getNv(joint.kind) &&
+                (i == 0 ? joint.parent == -1 : joint.parent >= 0 && joint.parent < i),
+            parts, "joints");
+    nq += joint.nq;
+    nv += joint.nv;
+  }
+  const auto isBody = [bodies](int body) { return body >= 0 && body < bodies; };
+  for (const Frame& frame : parts.frames) require(isBody(frame.body), parts, "frames");
+  for (const Closure& c : parts.closures)
+    require(isBody(c.body1) && isBody(c.body2) && c.body1 != c.body2, parts, "closures");
+  for (const Motor& motor : parts.motors)
+    require(motor.joint > 0 && motor.joint < bodies && motor.dof == parts.joints[motor.joint].idx_v &&
+                parts.joints[motor.joint].nv == 1,
+            parts, "motors");
+  for (const ContactFrame& contact : parts.contacts) require(isBody(contact.body), parts, "contacts");
+  for (const Visual& visual : parts.visuals) require(isBody(visual.body), parts, "visuals");
+  for (int joint : parts.serial_joints) require(joint > 0 && joint < bodies, parts, "serial joints");
+  for (const VectorXd* numbers : {&parts.lower_limits, &parts.upper_limits, &parts.velocity_limits, &parts.armature})
+    require(numbers->size() == nv && nv > 0, parts, "limits");
+}
+
+}  // namespace
+
+ModelParts takeParts(const Model& m) {
+  return {m.name(),         m.gravity(),     m.bodies(),      m.joints(),         m.frames(),
+          m.closures(),     m.motors(),      m.contacts(),    m.references(),     m.visuals(),
+          m.serialJoints(), m.lowerLimits(), m.upperLimits(), m.velocityLimits(), m.armature()};
+}
+
+Model ModelBuilder::restore(ModelParts parts) {
+  checkParts(parts);
+  ModelBuilder builder(parts.name);
+  builder.limits_.resize(parts.bodies.size());
+  Model& draft = builder.model_;
+  draft.gravity_ = parts.gravity;
+  draft.nq_ = parts.joints.back().idx_q + parts.joints.back().nq;
+  draft.nv_ = parts.joints.back().idx_v + parts.joints.back().nv;
+  draft.bodies_ = std::move(parts.bodies);
+  draft.joints_ = std::move(parts.joints);
+  draft.frames_ = std::move(parts.frames);
+  draft.closures_ = std::move(parts.closures);
+  for (Closure& closure : draft.closures_) closure.dofs.clear(), closure.signs.clear();  // found again
+  draft.motors_ = std::move(parts.motors);
+  draft.contacts_ = std::move(parts.contacts);
+  draft.references_ = std::move(parts.references);
+  draft.visuals_ = std::move(parts.visuals);
+  draft.serial_joints_ = std::move(parts.serial_joints);
+  Model model = builder.build();
+  model.lower_ = std::move(parts.lower_limits);
+  model.upper_ = std::move(parts.upper_limits);
+  model.velocity_limit_ = std::move(parts.velocity_limits);
+  model.armature_ = std::move(parts.armature);
+  return model;
+}
+
+}  // namespace bielle

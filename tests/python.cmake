@@ -1,0 +1,12 @@
+# The Python package, by pytest, one test of CTest per file.
+if(TARGET bielle_python)
+  # bielle_python_test(NAME LABEL): python/tests/test_NAME.py
+  function(bielle_python_test name label)
+    add_test(NAME python_${name} COMMAND ${Python3_EXECUTABLE} -m pytest -q -p no:cacheprovider
+      ${PROJECT_SOURCE_DIR}/python/tests/test_${name}.py)
+    set_tests_properties(python_${name} PROPERTIES LABELS ${label}
+      ENVIRONMENT "PYTHONPATH=${PROJECT_BINARY_DIR}/python;PYTHONDONTWRITEBYTECODE=1")
+  endfunction()
+  bielle_python_test(model unit)
+  bielle_python_test(values unit)
+endif()
