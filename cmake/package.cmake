@@ -1,5 +1,5 @@
 # Debian packages by `cpack -G DEB` (scripts/package.sh): `bielle`, the command with its robots, `libbielle0.1`, the shared
-# library that it runs on, and `libbielle-dev`.
+# library that it runs on, `libbielle-dev`, and `python3-bielle`.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME bielle)
 set(CPACK_PACKAGE_CONTACT "the Bielle authors <bielle@localhost>")
@@ -34,6 +34,18 @@ set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev (>= 3.4)")
 set(CPACK_COMPONENT_DEVELOPMENT_DEPENDS library)
+
+if(BIELLE_BUILD_PYTHON)
+  math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
+  list(APPEND CPACK_COMPONENTS_ALL python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-bielle)
+  set(CPACK_COMPONENT_PYTHON_DESCRIPTION
+    "The package bielle for Python: robots, dynamics, motions, costs of one's own, controllers.")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+    "python3 (>= ${Python3_VERSION_MAJOR}.${Python3_VERSION_MINOR}), python3 (<< ${Python3_VERSION_MAJOR}.${next_minor}), python3-numpy")
+  set(CPACK_COMPONENT_PYTHON_DEPENDS library command)  # robots come with the command
+endif()
 
 # Each package says where Debian looks for it whose work it is.
 if(BUILD_SHARED_LIBS)

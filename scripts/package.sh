@@ -1,9 +1,10 @@
 #!/bin/bash
-# Makes the Debian packages `bielle`, `libbielle0.1` and `libbielle-dev` in build-package. Installs what is missing (Debian 12).
+# Makes the Debian packages `bielle`, `libbielle0.1`, `libbielle-dev` and `python3-bielle` in build-package. Installs what is
+# missing (Debian 12).
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
-install_missing "${bielle_packages[@]}" "${bielle_check_packages[@]}" dpkg-dev file
+install_missing "${bielle_packages[@]}" "${bielle_check_packages[@]}" "${bielle_python_packages[@]}" dpkg-dev file
 cd "$bielle_root"
 build build-package --preset package
 cd build-package

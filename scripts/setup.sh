@@ -12,7 +12,8 @@ bielle_check_packages=(libsimbody-dev libmujoco-dev)
 bielle_python_packages=(pybind11-dev python3-dev python3-numpy)
 # Further dependencies of the tests: Catch2, Google Benchmark, Python to read NumPy archives, a browser for the reports,
 # what tests the Python package.
-bielle_test_packages=(catch2 libbenchmark-dev python3 chromium pkg-config python3-pytest)
+bielle_test_packages=(catch2 libbenchmark-dev python3 chromium pkg-config python3-pytest
+  python3-mypy python3-nbconvert python3-ipykernel python3-matplotlib)
 
 # install_missing PACKAGE...: installs the packages that dpkg does not list as installed.
 install_missing() {

@@ -7,11 +7,16 @@
 """
 
 from ._bielle import *
-from . import named, residuals
-from .errors import ModelError
+from . import named as named, residuals as residuals, show as _show
+from .check import check as check
+from .errors import ModelError as ModelError
 from .motions import *
-from .motions import FUNCTIONS as _FUNCTIONS
-from .named import Dynamics, DynamicsDerivatives, Impact, ImpactDerivatives, InverseDynamicsDerivatives
-from .residuals import Residual
-
-globals().update(_FUNCTIONS)
+from .named import (
+    Dynamics as Dynamics,
+    DynamicsDerivatives as DynamicsDerivatives,
+    Impact as Impact,
+    ImpactDerivatives as ImpactDerivatives,
+    InverseDynamicsDerivatives as InverseDynamicsDerivatives,
+    WorldState as WorldState,
+)
+from .residuals import Residual as Residual

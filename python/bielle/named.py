@@ -52,3 +52,12 @@ class ImpactDerivatives(NamedTuple):
     dimpulses_dq: Array
     dimpulses_dv: Array
     status: Array  #: as in Dynamics
+
+
+class WorldState(NamedTuple):
+    """Of a world, or of several."""
+
+    time: Array  #: since reset, s
+    q: Array  #: (nq,)
+    v: Array  #: (nv,)
+    ok: Array  #: bool; False: the integration broke off, and the state is the last one that is finite

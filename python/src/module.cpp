@@ -9,8 +9,8 @@ PYBIND11_MODULE(_bielle, module) {
   module.attr("__name__") = "bielle";
   using namespace bielle::python;
   for (const auto bind : {bindErrors, bindGeometry, bindModelValues, bindModel, bindKinematics, bindDynamics,
-                          bindRobots, bindTransmission, bindResiduals, bindPythonResiduals, bindOcpValues,
-                          bindSolverValues, bindMotionValues, bindMotions, bindResults})
+                          bindRobots, bindTransmission, bindOcpValues, bindResiduals, bindPythonResiduals,
+                          bindSolverValues, bindMotionValues, bindMotions, bindResults, bindControllers, bindWorlds})
     bind(module);
   module.attr("__name__") = name;
 }

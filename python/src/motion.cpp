@@ -32,10 +32,6 @@ MotionRequest Request::make() const {
   return request;
 }
 
-BusyGuard::BusyGuard(HeldMotion& held) : held_(held) {
-  if (held.is_busy.exchange(true)) throw std::runtime_error("another thread is solving this motion");
-}
-
 FddpObserver makeObserver(const py::object& callback) {
   FddpObserver observer;
   // Copies of the observer are made without the interpreter's lock.
@@ -71,7 +67,7 @@ std::shared_ptr<HeldMotion> makeFromPlan(std::shared_ptr<Model> model, const Mot
 }
 
 FddpSummary solve(HeldMotion& held, FddpOptions options, const py::object& callback) {
-  const BusyGuard guard(held);
+  const BusyGuard guard(held.is_busy, "motion");
   const FddpObserver observer = makeObserver(callback);
   const py::gil_scoped_release release;
   Motion& motion = held.motion;
@@ -83,7 +79,7 @@ FddpSummary solve(HeldMotion& held, FddpOptions options, const py::object& callb
 
 // The guess; the motion takes only one that fits its problem.
 void setTrajectory(HeldMotion& held, const ShootingTrajectory& trajectory) {
-  const BusyGuard guard(held);
+  const BusyGuard guard(held.is_busy, "motion");
   const RobotProblem& problem = *held.motion.problem;
   const size_t stages = problem.numStages();
   if (trajectory.xs.size() != stages + 1 || trajectory.us.size() != stages)
@@ -103,9 +99,10 @@ void setTrajectory(HeldMotion& held, const ShootingTrajectory& trajectory) {
 
 ShootingTrajectory getTrajectory(const HeldMotion& held) { return held.motion.guess; }
 
-void setWarmStart(HeldMotion& held, const MotionRecord& record) {
-  const BusyGuard guard(held);
-  setGuess(record, held.motion);
+// Records are bound after motions.
+void setWarmStart(HeldMotion& held, const py::object& record) {
+  const BusyGuard guard(held.is_busy, "motion");
+  setGuess(read<MotionRecord>(record, "record"), held.motion);
 }
 
 py::dict getCosts(const HeldMotion& held, int node) {

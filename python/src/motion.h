@@ -1,10 +1,10 @@
 #pragma once
 /// \file A motion as Python holds it: with the model that its problem refers to, and what it was made of.
-#include <atomic>
 #include <memory>
 #include <optional>
 
 #include "bielle/io/motion_registry.h"
+#include "busy.h"
 #include "residual.h"
 #include "robot.h"
 
@@ -30,16 +30,6 @@ struct HeldMotion {
   Motion motion;
   std::unique_ptr<Fddp> solver;      // of the last solve: gains and multipliers
   std::atomic<bool> is_busy{false};  // one solve at a time
-};
-
-/// Keeps others from a motion that is being solved. \throws RuntimeError if another thread solves it
-class BusyGuard {
- public:
-  explicit BusyGuard(HeldMotion& held);
-  ~BusyGuard() { held_.is_busy = false; }
-
- private:
-  HeldMotion& held_;
 };
 
 std::shared_ptr<HeldMotion> makeHeldMotion(std::shared_ptr<Model> model, const Request& request,

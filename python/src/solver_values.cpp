@@ -48,7 +48,7 @@ void bindSummary(py::module_& module) {
       .value("INTERRUPTED", FddpTermination::Interrupted)
       .value("FAILED", FddpTermination::Failed);
   Value<FddpIteration>(module, "Iteration", "One line of the log: the iterate it started from and the step it took.")
-      .field("iteration", &FddpIteration::iteration, "from 0")
+      .field("iteration", &FddpIteration::iteration, "from 1")
       .field("cost", &FddpIteration::cost, "before the step")
       .field("violation", &FddpIteration::violation, "largest of the constraints before the step")
       .field("gap", &FddpIteration::gap, "largest entry before the step")

@@ -1,4 +1,6 @@
 // Finding the files of robots.
+#include <dlfcn.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
@@ -95,6 +97,10 @@ std::vector<std::string> getRobotDirectories() {
     const fs::path beside = program.parent_path().parent_path() / "share/bielle/robots";
     if (isDirectory(beside)) add(beside.string());
   }
+  // A module of another program, such as Python's, has them beside it.
+  if (Dl_info module; dladdr(reinterpret_cast<const void*>(&readRobotText), &module) != 0 && module.dli_fname)
+    if (const fs::path beside = fs::path(module.dli_fname).parent_path() / "robots"; isDirectory(beside))
+      add(beside.string());
   add(BIELLE_SOURCE_ROBOTS);
   add(BIELLE_INSTALL_ROBOTS);
   return directories;

@@ -73,8 +73,8 @@ LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& option
 std::string findRobotFile(const std::string& name_or_path);
 
 /// Directories searched for robots by name, in this order: those of $BIELLE_ROBOTS (separated by colons),
-/// share/bielle/robots of the installation that the running program belongs to, robots/ of the source tree, and the
-/// configured installation.
+/// share/bielle/robots of the installation that the running program belongs to, robots/ beside the module that this library is
+/// part of (the Python package), robots/ of the source tree, and the configured installation.
 std::vector<std::string> getRobotDirectories();
 
 /// Names of the robots found there, sorted.

@@ -1,0 +1,100 @@
+#include "bielle/control/policy.h"
+#include "bielle/control/predictive_controller.h"
+#include "bind.h"
+#include "controller.h"
+
+namespace bielle::python {
+namespace {
+
+std::shared_ptr<HeldController> makeHeldPolicy(const std::shared_ptr<HeldMotion>& motion, bool gains) {
+  if (gains && !motion->solver)
+    throw std::runtime_error("gains are those of the last solve: solve the motion first, or ask for gains=False");
+  auto held = std::make_shared<HeldController>();
+  held->model = motion->model;
+  auto policy = std::make_unique<Policy>(gains ? makePolicy(motion->motion, motion->motion.guess, *motion->solver)
+                                               : makePolicy(motion->motion, motion->motion.guess));
+  held->policy = policy.get();
+  held->controller = std::move(policy);
+  return held;
+}
+
+std::shared_ptr<HeldController> makePredictive(const std::shared_ptr<Model>& model, const MotionPlan& plan,
+                                               const ShootingTrajectory& solved, const ProblemOptions& problem,
+                                               const PredictiveOptions& options) {
+  const py::gil_scoped_release release;
+  auto held = std::make_shared<HeldController>();
+  held->model = model;
+  auto predictive =
+      std::make_unique<PredictiveController>(makePredictiveMotion(*model, plan, problem, options), solved, options);
+  held->predictive = predictive.get();
+  held->controller = std::move(predictive);
+  return held;
+}
+
+py::array update(HeldController& self, double time, const py::object& q, const py::object& v, double delay) {
+  Measurement measured{time, readVector(q, self.model->nq(), "q"), readVector(v, self.model->nv(), "v")};
+  measured.delay = delay;
+  VectorXd u(self.model->nu());
+  {
+    const py::gil_scoped_release release;
+    const std::lock_guard<std::mutex> lock(self.mutex);
+    self.controller->update(measured, u);
+  }
+  return makeArray(u);
+}
+
+py::object getReference(const HeldController& self, double time) {
+  if (!self.policy) throw std::runtime_error("only the policy of a solved motion has a reference");
+  VectorXd q(self.model->nq()), v(self.model->nv());
+  self.policy->getReference(time, q, v);
+  return py::make_tuple(makeArray(q), makeArray(v));
+}
+
+}  // namespace
+
+void bindControllers(py::module_& module) {
+  Value<PredictiveOptions>(module, "PredictiveOptions", "Options of predictive control.")
+      .field("nodes", &PredictiveOptions::nodes, "stages of a window")
+      .field("iterations", &PredictiveOptions::iterations, "of the solver, at every stage")
+      .field("regularization", &PredictiveOptions::regularization, "of its sweeps")
+      .field("penalty", &PredictiveOptions::penalty, "of violated constraints")
+      .field("threads", &PredictiveOptions::threads, "0: all; results are bitwise independent of it")
+      .field("end_place", &PredictiveOptions::end_place,
+             "weight of heading and place at the end of a window, 1/m^2 or 1")
+      .field("end_posture", &PredictiveOptions::end_posture, "of the other coordinates")
+      .field("end_velocity", &PredictiveOptions::end_velocity, "of the velocities, s^2/m^2 or s^2");
+  py::class_<HeldController, std::shared_ptr<HeldController>>(
+      module, "Controller",
+      "A feedback law: from what is measured to torques. Controller.policy and .predictive make them.")
+      .def_static("policy", &makeHeldPolicy, py::arg("motion"), py::arg("gains") = true,
+                  "Torques of a solved Motion, and the gains of the last sweep about it.")
+      .def_static("predictive", &makePredictive, py::arg("model"), py::arg("plan"), py::arg("solved"),
+                  py::arg("problem") = ProblemOptions(), py::arg("options") = PredictiveOptions(),
+                  "Solves the next second anew at every stage. plan: a MotionPlan; solved: Trajectory of its Motion.")
+      .def("update", &update, py::arg("time"), py::arg("q"), py::arg("v"), py::arg("delay") = 0,
+           "Motor torques (nu,) at a time (s) and a measured state (nq,), (nv,); delay until they act, s.\n\n"
+           "To be called in the order of time.")
+      .def("reference", &getReference, py::arg("time"), "q (nq,) and v (nv,) that a policy follows at a time, s.")
+      .def_property_readonly(
+          "duration",
+          [](const HeldController& self) {
+            if (!self.policy) throw std::runtime_error("only the policy of a solved motion has a duration");
+            return self.policy->getDuration();
+          },
+          "of a policy, s")
+      .def_property_readonly(
+          "counts",
+          [](const HeldController& self) {
+            py::dict out;
+            if (!self.predictive) return out;
+            const PredictiveCounts& counts = self.predictive->getCounts();
+            out["solves"] = counts.solves;
+            out["failed"] = counts.failed;
+            out["early"] = counts.early;
+            out["missed"] = counts.missed;
+            return out;
+          },
+          "of predictive control: solves, failed ones, early landings, solves longer than a stage");
+}
+
+}  // namespace bielle::python

@@ -1,0 +1,143 @@
+#include <exception>
+#include <optional>
+
+#include "bind.h"
+#include "busy.h"
+#include "model_access.h"
+#include "simulation/bielle_world.h"
+
+namespace bielle::python {
+namespace {
+
+using simulation::BielleWorldOptions;
+using simulation::World;
+
+// One world, or many that are stepped together on all cores. Each has its own memory.
+class HeldWorlds {
+ public:
+  HeldWorlds(std::shared_ptr<Model> model, std::optional<int> count, const Ground& ground, double time_step)
+      : model_(std::move(model)), many_(count) {
+    if (count && *count < 1) throw py::value_error("count: at least one world");
+    BielleWorldOptions options;
+    options.world = {ground, time_step};
+    const py::gil_scoped_release release;
+    for (int i = 0; i < count.value_or(1); ++i) worlds_.push_back(simulation::makeBielleWorld(*model_, options));
+  }
+
+  // Many worlds start from the same state, or each from its own.
+  py::object reset(const py::object& q, const py::object& v) {
+    const BusyGuard guard(is_busy_, "world");
+    const MatrixXd q0 = readRows(q, model_->nq(), "q", true), v0 = readRows(v, model_->nv(), "v", true);
+    run([&](World& world, Eigen::Index i) { world.reset(q0.col(i), v0.col(i)); });
+    return observe(std::vector<char>(worlds_.size(), true));
+  }
+
+  py::object step(const py::object& u, double duration, const py::object& push) {
+    if (!(duration > 0 && std::isfinite(duration)))
+      throw py::value_error("duration: a positive number of seconds wanted");
+    const BusyGuard guard(is_busy_, "world");
+    const MatrixXd torques = readRows(u, model_->nu(), "u", true), force = readRows(push, 3, "push", true);
+    std::vector<char> ok(worlds_.size());
+    run([&](World& world, Eigen::Index i) {
+      world.setTorques(torques.col(i));
+      world.setPush(force.col(i));
+      ok[i] = world.advance(duration);
+    });
+    return observe(ok);
+  }
+
+  py::array calcWrenches() {
+    const BusyGuard guard(is_busy_, "world");
+    const Eigen::Index contacts = static_cast<Eigen::Index>(model_->contacts().size());
+    MatrixXd out(6 * contacts, worlds_.size());
+    for (size_t i = 0; i < worlds_.size(); ++i)
+      for (Eigen::Index c = 0; c < contacts; ++c) out.col(i).segment<6>(6 * c) = worlds_[i]->getFeet()[c].wrench;
+    Shape shape = {contacts, 6};
+    return makeRows(out, shape);
+  }
+
+  const std::shared_ptr<Model>& getModel() const { return model_; }
+  const std::optional<int>& getCount() const { return many_; }
+
+ private:
+  // One column per world.
+  MatrixXd readRows(py::handle value, Eigen::Index size, const std::string& what, bool shared) const {
+    const Array array = readArray(value, what);
+    const auto count = static_cast<Eigen::Index>(worlds_.size());
+    if (many_ && !(shared && array.ndim() == 1)) {
+      requireShape(array, {count, size}, what);
+      return Eigen::Map<const MatrixXd>(array.data(), size, count);
+    }
+    requireShape(array, {size}, what);
+    return Eigen::Map<const VectorXd>(array.data(), size).replicate(1, count);
+  }
+
+  py::array makeRows(const MatrixXd& columns, Shape shape) const {
+    if (many_) shape.insert(shape.begin(), columns.cols());
+    Array out(shape);
+    Eigen::Map<MatrixXd>(out.mutable_data(), columns.rows(), columns.cols()) = columns;
+    return std::move(out);
+  }
+
+  py::object observe(const std::vector<char>& ok) const {
+    MatrixXd time(1, worlds_.size()), q(model_->nq(), worlds_.size()), v(model_->nv(), worlds_.size());
+    MatrixXd sound(1, worlds_.size());
+    for (size_t i = 0; i < worlds_.size(); ++i) {
+      time(0, i) = worlds_[i]->getTime();
+      q.col(i) = worlds_[i]->getConfiguration();
+      v.col(i) = worlds_[i]->getVelocity();
+      sound(0, i) = ok[i];
+    }
+    return makeNamed("WorldState", {makeRows(time, {}), makeRows(q, {model_->nq()}), makeRows(v, {model_->nv()}),
+                                    makeRows(sound, {}).attr("astype")("bool")});
+  }
+
+  template <typename Task>
+  void run(const Task& task) {
+    const py::gil_scoped_release release;
+    std::vector<std::exception_ptr> errors(worlds_.size());
+#pragma omp parallel for schedule(dynamic) if (worlds_.size() > 1)
+    for (size_t i = 0; i < worlds_.size(); ++i) {
+      try {
+        task(*worlds_[i], static_cast<Eigen::Index>(i));
+      } catch (...) {
+        errors[i] = std::current_exception();
+      }
+    }
+    for (const std::exception_ptr& error : errors)
+      if (error) std::rethrow_exception(error);
+  }
+
+  std::shared_ptr<Model> model_;
+  std::vector<std::unique_ptr<World>> worlds_;
+  std::optional<int> many_;
+  std::atomic<bool> is_busy_{false};
+};
+
+}  // namespace
+
+void bindWorlds(py::module_& module) {
+  py::class_<HeldWorlds>(
+      module, "World",
+      "Physics with contact: Bielle's own world, in which motors drive a robot and the ground pushes it.\n\n"
+      "With `count`, so many worlds that are stepped together on all cores: arguments and results have "
+      "an axis of them in front.")
+      .def(py::init([](std::shared_ptr<Model> model, const py::object& count, const Ground& ground, double time_step) {
+             return std::make_unique<HeldWorlds>(std::move(model), read<std::optional<int>>(count, "count"), ground,
+                                                 time_step);
+           }),
+           py::arg("model"), py::arg("count") = py::none(), py::arg("ground") = Ground(), py::arg("time_step") = 0.0)
+      .def_property_readonly("model", &HeldWorlds::getModel, "Model")
+      .def_property_readonly(
+          "count", [](const HeldWorlds& self) { return show(self.getCount(), {}); }, "number of worlds, or None")
+      .def("reset", &HeldWorlds::reset, py::arg("q"), py::arg("v"),
+           "Sets closed configurations (nq,) and velocities (nv,) that keep them closed; all else starts anew.")
+      .def("step", &HeldWorlds::step, py::arg("u"), py::arg("duration"), py::arg("push") = py::make_tuple(0, 0, 0),
+           "Advances by a duration (s) under motor torques (nu,), cut at their limits, and a force at the trunk (3,), "
+           "N.\n\n"
+           "Returns the WorldState; its `ok` is False where the integration broke off.")
+      .def_property_readonly("wrenches", &HeldWorlds::calcWrenches,
+                             "of the ground on the feet in their contact frames (contacts, 6), N and N m");
+}
+
+}  // namespace bielle::python

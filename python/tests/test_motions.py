@@ -1,0 +1,158 @@
+"""Motions by name: the same as the command makes them; callbacks, signals, warm starts."""
+
+import os
+import pickle
+import signal
+import subprocess
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import bielle
+
+
+@pytest.fixture(scope="module")
+def squat(robot):
+    return bielle.solve_squat(robot, depth=0.8)
+
+
+def test_files_are_those_of_the_command(robot, squat, tmp_path):
+    command = os.environ.get("BIELLE_COMMAND")
+    if not command:
+        pytest.skip("BIELLE_COMMAND does not name the command")
+    subprocess.run([command, "solve", "squat", "--robot", "bipetto", "--depth", "0.8", "--no-check", "--no-report",
+                    "--quiet", "-o", str(tmp_path / "command")], check=True, stdout=subprocess.DEVNULL)
+    squat.write(str(tmp_path / "python"))
+    for name in ("trajectory.csv", "trajectory.npz"):
+        first, second = ((tmp_path / place / name).read_bytes() for place in ("command", "python"))
+        assert first == second, name
+
+
+def test_result(squat, model):
+    assert squat.converged and squat.solver.termination == bielle.Termination.CONVERGED
+    assert squat.requested["depth"] == 0.8
+    goal = squat.goals[0]
+    assert goal.met and goal.goal.asked == 0.8 and abs(goal.came_out - 0.8) < 0.01
+    record = squat.record
+    assert record.q.shape == (record.time.size, model.nq) and record.q.base is not None
+    assert record.com == pytest.approx(model.com(record.q), abs=1e-9)
+    assert max(squat.peak_torques.values()) == np.abs(record.u).max()
+    twin = pickle.loads(pickle.dumps(squat))
+    assert twin == squat and twin.record.u.tobytes() == record.u.tobytes()
+
+
+def test_options_are_those_of_the_registry(robot):
+    assert set(bielle.motions()) >= {"squat", "walk", "side-walk", "turn", "stairs", "jump", "run", "hop"}
+    for name, motion in bielle.motions().items():
+        assert motion["help"].split()[0] in getattr(bielle, "solve_" + name.replace("-", "_")).__doc__
+    with pytest.raises(TypeError, match="solve_squat has no option 'deep'; it has: depth, "):
+        bielle.solve_squat(robot, deep=0.7)
+    with pytest.raises(bielle.ModelError) as caught:
+        bielle.solve_squat(robot, depth=-1)
+    assert "depth" in caught.value.element
+    with pytest.raises(ValueError, match="foot: 'left', 'right' wanted"):
+        bielle.solve_hop(robot, foot="middle")
+
+
+def test_threads_do_not_matter(robot, squat):
+    alone = bielle.solve_squat(robot, depth=0.8, solver=bielle.SolverOptions(threads=1))
+    assert alone.record == squat.record
+
+
+def test_warm_start(robot, squat, tmp_path):
+    squat.write(str(tmp_path))
+    for start in (squat, squat.record, str(tmp_path)):
+        again = bielle.solve_squat(robot, depth=0.8, warm_start=start)
+        assert again.converged and again.solver.iterations < squat.solver.iterations
+
+
+def test_callback(robot):
+    seen = []
+    stopped = bielle.solve_squat(robot, depth=0.8, callback=lambda i: seen.append(i) or len(seen) < 3)
+    assert [i.iteration for i in seen] == [1, 2, 3]
+    assert stopped.interrupted and seen[2].cost > 0
+
+
+def test_exceptions_of_a_callback_come_out_as_themselves(robot):
+    class OwnError(Exception):
+        pass
+
+    error = OwnError("enough")
+
+    def fail(iteration):
+        raise error
+
+    with pytest.raises(OwnError) as caught:
+        bielle.solve_squat(robot, callback=fail)
+    assert caught.value is error
+
+
+def test_interrupt_leaves_the_iterate_in_the_guess(model):
+    motion = bielle.Motion.make(model, bielle.Request(motion="squat"))
+    start = motion.guess
+
+    def press(iteration):
+        if iteration.iteration == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        motion.solve(callback=press)
+    assert motion.guess != start
+    assert motion.solve().converged
+
+
+def test_other_threads_run_during_a_solve(robot):
+    ticks, done = [], threading.Event()
+
+    def tick():
+        while not done.is_set():
+            ticks.append(time.monotonic())
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    try:
+        before = len(ticks)
+        bielle.solve_walk(robot, speed=0.3, steps=4)
+        assert len(ticks) - before > 20
+    finally:
+        done.set()
+        thread.join()
+
+
+def test_sequence(robot):
+    result = bielle.solve_sequence(robot, ["squat", "squat"], {"squat.depth": 0.9, "squat2.depth": 0.85})
+    assert result.converged and result.requested["squat2.depth"] == 0.85
+
+
+def test_objective_and_limits(robot, squat):
+    problem = bielle.ProblemOptions(objective=bielle.ObjectiveOptions(objective=bielle.Objective.ENERGY))
+    frugal = bielle.solve_squat(robot, depth=0.8, problem=problem)
+    assert frugal.converged and frugal.energy.total < squat.energy.total
+    motor, peak = next(iter(squat.peak_torques.items()))
+    limits = bielle.LimitOptions(efforts={motor: 0.9 * peak})
+    limited = bielle.solve_squat(robot, depth=0.8, problem=bielle.ProblemOptions(limits=limits))
+    assert limited.converged and limited.peak_torques[motor] <= 0.9 * peak * (1 + 1e-9)
+
+
+def test_motions_pickle(model):
+    motion = bielle.Motion.make(model, bielle.Request(motion="squat", options={"depth": 0.9}))
+    twin = pickle.loads(pickle.dumps(motion))
+    assert twin.guess == motion.guess and twin.solve() is not None
+    assert motion.solve().converged and motion.guess == twin.guess
+
+
+def test_one_thread_solves_a_motion_at_a_time(model):
+    motion = bielle.Motion.make(model, bielle.Request(motion="squat"))
+    errors = []
+
+    def meddle(iteration):
+        with pytest.raises(RuntimeError, match="another thread is using this motion"):
+            motion.guess = motion.guess
+        errors.append(iteration)
+        return False
+
+    motion.solve(callback=meddle)
+    assert errors

@@ -1,0 +1,99 @@
+"""Controllers, and worlds in which they act."""
+
+import numpy as np
+import pytest
+
+import bielle
+
+@pytest.fixture(scope="module")
+def motion(model):
+    motion = bielle.Motion.make(model, bielle.Request(motion="squat", options={"depth": 0.9}))
+    assert motion.solve().converged
+    return motion
+
+
+@pytest.fixture(scope="module")
+def controller(motion):
+    return bielle.Controller.policy(motion)
+
+
+def follow(world, controller, duration, period=2e-3):
+    state = world.reset(*controller.reference(0))
+    while state.time < duration:
+        state = world.step(controller.update(float(state.time), state.q, state.v), period)
+        assert state.ok
+    return state
+
+
+def test_policy(motion, controller, model):
+    assert controller.duration == pytest.approx(motion.schedule.phases[0].dt * motion.num_stages)
+    q, v = controller.reference(0.6)
+    there = controller.update(0.6, q, v)
+    assert there == pytest.approx(bielle.Controller.policy(motion, gains=False).update(0.6, q, v))
+    moved = controller.update(0.6, model.integrate(q, 1e-3 * np.eye(model.nv)[2]), v)
+    assert np.abs(moved - there).max() > 0.01
+    with pytest.raises(ValueError, match=r"q: shape \(61,\) wanted, got \(3,\)".replace("61", str(model.nq))):
+        controller.update(0, np.zeros(3), v)
+
+
+def test_gains_need_a_solve(model):
+    with pytest.raises(RuntimeError, match="solve the motion first"):
+        bielle.Controller.policy(bielle.Motion.make(model, bielle.Request(motion="squat")))
+
+
+def test_squat_stands_in_the_world(controller, model):
+    world = bielle.World(model)
+    state = follow(world, controller, controller.duration)
+    q, _ = controller.reference(controller.duration)
+    assert np.abs(state.q[:3] - q[:3]).max() < 0.01
+    assert world.wrenches[:, 2].sum() == pytest.approx(9.81 * model.mass, rel=0.05)
+
+
+def test_a_robot_without_torques_falls(controller, model):
+    world = bielle.World(model)
+    state = world.reset(*controller.reference(0))
+    start = state.q[2]
+    for _ in range(100):
+        state = world.step(np.zeros(model.nu), 0.01)
+    assert state.q[2] < 0.7 * start
+
+
+def test_many_worlds_are_single_ones_to_the_last_bit(controller, model):
+    q, v = controller.reference(0)
+    torques = controller.update(0, q, v) * np.array([[0.0], [0.9], [1.0], [1.1], [1.2]])
+    push = np.array([0, 5.0, 0])
+    many, one = bielle.World(model, count=5), bielle.World(model)
+    assert many.reset(q, v).q.shape == (5, model.nq)
+    for _ in range(20):
+        together = many.step(torques, 0.005, push)
+    assert many.wrenches.shape == (5, len(model.contacts), 6)
+    for i in range(5):
+        one.reset(q, v)
+        for _ in range(20):
+            alone = one.step(torques[i], 0.005, push)
+        assert np.array_equal(alone.q, together.q[i]) and np.array_equal(alone.v, together.v[i])
+        assert np.array_equal(one.wrenches, many.wrenches[i])
+
+
+def test_wrong_arguments(model):
+    world = bielle.World(model, count=2)
+    world.reset(model.standing(), np.zeros(model.nv))
+    with pytest.raises(ValueError, match=rf"u: shape \(2, {model.nu}\) wanted, got \(3, {model.nu}\)"):
+        world.step(np.zeros((3, model.nu)), 0.01)
+    with pytest.raises(ValueError, match="duration"):
+        world.step(np.zeros(model.nu), -1)
+    with pytest.raises(ValueError, match="count: at least one"):
+        bielle.World(model, count=0)
+
+
+def test_predictive_control(motion, model):
+    options = bielle.PredictiveOptions(nodes=20)
+    plan = bielle.Motion.plan(model, motion.request)
+    controller = bielle.Controller.predictive(model, plan, motion.guess, options=options)
+    reference = bielle.Controller.policy(motion)
+    world = bielle.World(model)
+    state = world.reset(*reference.reference(0))
+    for _ in range(100):
+        state = world.step(controller.update(float(state.time), state.q, state.v), 2e-3)
+    assert state.ok and controller.counts["solves"] > 5 and controller.counts["failed"] == 0
+    assert np.abs(state.q[:3] - reference.reference(0.2)[0][:3]).max() < 0.01
