@@ -37,6 +37,7 @@ bool ClosedTree::set(ConstVectorRef q, ConstVectorRef v) {
   for (Cluster& c : clusters_) {
     gatherConfiguration(model_, c.cluster, q_, c.state.basis.q);
     c.zeta.setZero();
+    c.drift.setZero();  // of the state before
     if (!updateClusterState<double>(c.cluster, c.scratch, c.state.basis.q, c.state)) {
       failure_ = describeFailure(c.cluster, c.scratch);
       return false;

@@ -8,7 +8,7 @@
 
 from ._bielle import *
 from . import named as named, residuals as residuals, show as _show
-from .check import check as check
+from .checks import check as check
 from .errors import ModelError as ModelError
 from .motions import *
 from .named import (

@@ -1,0 +1,2548 @@
+"""Written by make_stubs.py."""
+
+from typing import Any, Callable, ClassVar, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+
+import numpy as np
+import numpy.typing as npt
+from numpy.typing import ArrayLike
+
+from .named import Dynamics, DynamicsDerivatives, Impact, ImpactDerivatives, InverseDynamicsDerivatives, WorldState
+from .residuals import Residual
+
+Array = npt.NDArray[np.float64]
+Contacts = Union["ConstraintSet", Sequence[Union[str, "ContactTarget"]]]
+
+class SE3:
+    """A placement X_AB of a frame B in a frame A: p_A = R p_B + p. `X @ Y` chains placements.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, R: ArrayLike = ..., p: ArrayLike = ...) -> None: ...
+    def replace(self, *, R: ArrayLike = ..., p: ArrayLike = ...) -> SE3: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def R(self) -> Array:
+        """rotation (3, 3)"""
+        ...
+    @property
+    def p(self) -> Array:
+        """position (3,), m"""
+        ...
+    def __matmul__(self, arg0: SE3) -> SE3: ...
+    def inverse(self) -> SE3: ...
+    def act(self, point: ArrayLike) -> Array:
+        """Coordinates in A (3,) of a point given in B (3,), m."""
+        ...
+    @property
+    def matrix(self) -> Array:
+        """homogeneous (4, 4)"""
+        ...
+    @property
+    def action(self) -> Array:
+        """Ad(X) (6, 6), which carries twists (linear part first) from B to A"""
+        ...
+    def log(self) -> Array:
+        """Logarithm, a twist (6,), m and rad."""
+        ...
+    @staticmethod
+    def exp(twist: ArrayLike) -> SE3:
+        """Exponential of a twist (6,), linear part first, m and rad."""
+        ...
+
+class Inertia:
+    """Mass, centre of mass and rotational inertia of a body in a frame.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, mass: float = ..., com: ArrayLike = ..., I_com: ArrayLike = ...) -> None: ...
+    def replace(self, *, mass: float = ..., com: ArrayLike = ..., I_com: ArrayLike = ...) -> Inertia: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def mass(self) -> float:
+        """kg"""
+        ...
+    @property
+    def com(self) -> Array:
+        """centre of mass (3,), m"""
+        ...
+    @property
+    def I_com(self) -> Array:
+        """about the centre of mass (3, 3), kg m^2"""
+        ...
+    def transformed(self, X_AB: SE3) -> Inertia:
+        """The same inertia in frame A, this one being in B."""
+        ...
+    def __add__(self, arg0: Inertia) -> Inertia: ...
+    @property
+    def matrix(self) -> Array:
+        """spatial inertia (6, 6)"""
+        ...
+
+class JointKind:
+    FIXED: ClassVar[JointKind]
+    REVOLUTE: ClassVar[JointKind]
+    CONTINUOUS: ClassVar[JointKind]
+    PRISMATIC: ClassVar[JointKind]
+    SPHERICAL: ClassVar[JointKind]
+    UNIVERSAL: ClassVar[JointKind]
+    PLANAR: ClassVar[JointKind]
+    FREE_FLYER: ClassVar[JointKind]
+    __members__: ClassVar[Dict[str, JointKind]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class ClosureKind:
+    WELD_6D: ClassVar[ClosureKind]
+    BALL_3D: ClassVar[ClosureKind]
+    HINGE_5D: ClassVar[ClosureKind]
+    __members__: ClassVar[Dict[str, ClosureKind]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class ContactKind:
+    POINT_3D: ClassVar[ContactKind]
+    SURFACE_6D: ClassVar[ContactKind]
+    __members__: ClassVar[Dict[str, ContactKind]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class VisualShape:
+    BOX: ClassVar[VisualShape]
+    CYLINDER: ClassVar[VisualShape]
+    SPHERE: ClassVar[VisualShape]
+    MESH: ClassVar[VisualShape]
+    __members__: ClassVar[Dict[str, VisualShape]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class Joint:
+    """A joint between a parent body and the body of the same index as the joint.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., kind: JointKind = ..., X_PJ: SE3 = ..., axis: ArrayLike = ..., axis2: ArrayLike = ..., parent: int = ..., idx_q: int = ..., nq: int = ..., idx_v: int = ..., nv: int = ..., position_importance: float = ..., velocity_importance: float = ...) -> None: ...
+    def replace(self, *, name: str = ..., kind: JointKind = ..., X_PJ: SE3 = ..., axis: ArrayLike = ..., axis2: ArrayLike = ..., parent: int = ..., idx_q: int = ..., nq: int = ..., idx_v: int = ..., nv: int = ..., position_importance: float = ..., velocity_importance: float = ...) -> Joint: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """unique"""
+        ...
+    @property
+    def kind(self) -> JointKind:
+        """JointKind"""
+        ...
+    @property
+    def X_PJ(self) -> SE3:
+        """placement of the joint frame in the parent body"""
+        ...
+    @property
+    def axis(self) -> Array:
+        """unit axis (3,); normal of a planar joint; first axis of a universal joint"""
+        ...
+    @property
+    def axis2(self) -> Array:
+        """second axis of a universal joint (3,)"""
+        ...
+    @property
+    def parent(self) -> int:
+        """index of the parent body; filled by the builder, like the next four"""
+        ...
+    @property
+    def idx_q(self) -> int:
+        """first entry in q"""
+        ...
+    @property
+    def nq(self) -> int:
+        """entries in q"""
+        ...
+    @property
+    def idx_v(self) -> int:
+        """first entry in v"""
+        ...
+    @property
+    def nv(self) -> int:
+        """entries in v"""
+        ...
+    @property
+    def position_importance(self) -> float:
+        """in the costs of a posture, relative to other joints"""
+        ...
+    @property
+    def velocity_importance(self) -> float:
+        """likewise"""
+        ...
+
+class Body:
+    """A rigid body; body i > 0 is carried by joint i, body 0 is the world.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., inertia: Inertia = ...) -> None: ...
+    def replace(self, *, name: str = ..., inertia: Inertia = ...) -> Body: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """that of its link"""
+        ...
+    @property
+    def inertia(self) -> Inertia:
+        """in the body frame"""
+        ...
+
+class Frame:
+    """A named frame fixed in a body.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., body: int = ..., X_BF: SE3 = ...) -> None: ...
+    def replace(self, *, name: str = ..., body: int = ..., X_BF: SE3 = ...) -> Frame: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """unique among links and frames"""
+        ...
+    @property
+    def body(self) -> int:
+        """index"""
+        ...
+    @property
+    def X_BF(self) -> SE3:
+        """placement in the body"""
+        ...
+
+class Visual:
+    """A shape drawn for a body.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, shape: VisualShape = ..., body: int = ..., X_BV: SE3 = ..., size: ArrayLike = ..., mesh: str = ..., rgba: ArrayLike = ...) -> None: ...
+    def replace(self, *, shape: VisualShape = ..., body: int = ..., X_BV: SE3 = ..., size: ArrayLike = ..., mesh: str = ..., rgba: ArrayLike = ...) -> Visual: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def shape(self) -> VisualShape:
+        """VisualShape"""
+        ...
+    @property
+    def body(self) -> int:
+        """index; filled by the builder"""
+        ...
+    @property
+    def X_BV(self) -> SE3:
+        """placement in the body (for the builder: in the link)"""
+        ...
+    @property
+    def size(self) -> Array:
+        """(3,) box: edges; cylinder: radius, length, 0; sphere: radius, 0, 0, m; mesh: scale"""
+        ...
+    @property
+    def mesh(self) -> str:
+        """file name as written in the URDF"""
+        ...
+    @property
+    def rgba(self) -> Array:
+        """colour (4,), 0 to 1"""
+        ...
+
+class JointLimits:
+    """Limits of a joint, per dof, or empty for none.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, lower: ArrayLike = ..., upper: ArrayLike = ..., velocity: ArrayLike = ...) -> None: ...
+    def replace(self, *, lower: ArrayLike = ..., upper: ArrayLike = ..., velocity: ArrayLike = ...) -> JointLimits: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def lower(self) -> Array:
+        """(nv,), rad or m"""
+        ...
+    @property
+    def upper(self) -> Array:
+        """(nv,), rad or m"""
+        ...
+    @property
+    def velocity(self) -> Array:
+        """(nv,), rad/s or m/s"""
+        ...
+
+class Closure:
+    """Ties frame 1 on body 1 to frame 2 on body 2.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., kind: ClosureKind = ..., body1: int = ..., body2: int = ..., X_B1: SE3 = ..., X_B2: SE3 = ..., axis: ArrayLike = ..., kp: float = ..., kd: float = ..., dofs: Sequence[int] = ..., signs: Sequence[int] = ...) -> None: ...
+    def replace(self, *, name: str = ..., kind: ClosureKind = ..., body1: int = ..., body2: int = ..., X_B1: SE3 = ..., X_B2: SE3 = ..., axis: ArrayLike = ..., kp: float = ..., kd: float = ..., dofs: Sequence[int] = ..., signs: Sequence[int] = ...) -> Closure: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """unique"""
+        ...
+    @property
+    def kind(self) -> ClosureKind:
+        """ClosureKind"""
+        ...
+    @property
+    def body1(self) -> int:
+        """index"""
+        ...
+    @property
+    def body2(self) -> int:
+        """index"""
+        ...
+    @property
+    def X_B1(self) -> SE3:
+        """placement of frame 1 in body 1"""
+        ...
+    @property
+    def X_B2(self) -> SE3:
+        """placement of frame 2 in body 2"""
+        ...
+    @property
+    def axis(self) -> Array:
+        """free axis of a hinge in both frames (3,)"""
+        ...
+    @property
+    def kp(self) -> float:
+        """stabilisation, 1/s^2"""
+        ...
+    @property
+    def kd(self) -> float:
+        """1/s"""
+        ...
+    @property
+    def dofs(self) -> Tuple[int, ...]:
+        """that move one frame but not the other, increasing"""
+        ...
+    @property
+    def signs(self) -> Tuple[int, ...]:
+        """+1 where the dof moves frame 1, -1 for frame 2"""
+        ...
+
+class LoopCluster:
+    """Closures that share dofs, directly or through other closures.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, closures: Sequence[int] = ..., dofs: Sequence[int] = ..., rows: int = ...) -> None: ...
+    def replace(self, *, closures: Sequence[int] = ..., dofs: Sequence[int] = ..., rows: int = ...) -> LoopCluster: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def closures(self) -> Tuple[int, ...]:
+        """indices"""
+        ...
+    @property
+    def dofs(self) -> Tuple[int, ...]:
+        """union of their dofs, increasing"""
+        ...
+    @property
+    def rows(self) -> int:
+        """sum of their scalar constraints"""
+        ...
+
+class Motor:
+    """An actuator on one dof.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., joint: int = ..., dof: int = ..., armature: float = ..., effort_limit: float = ..., velocity_limit: float = ..., torque_loss: Optional[float] = ...) -> None: ...
+    def replace(self, *, name: str = ..., joint: int = ..., dof: int = ..., armature: float = ..., effort_limit: float = ..., velocity_limit: float = ..., torque_loss: Optional[float] = ...) -> Motor: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """that of its joint"""
+        ...
+    @property
+    def joint(self) -> int:
+        """index"""
+        ...
+    @property
+    def dof(self) -> int:
+        """index into v"""
+        ...
+    @property
+    def armature(self) -> float:
+        """rotor inertia seen at the joint, kg m^2 (kg for a prismatic joint)"""
+        ...
+    @property
+    def effort_limit(self) -> float:
+        """N m or N"""
+        ...
+    @property
+    def velocity_limit(self) -> float:
+        """rad/s or m/s"""
+        ...
+    @property
+    def torque_loss(self) -> Optional[float]:
+        """heat per torque squared, W/(N m)^2 or W/N^2; None: not known"""
+        ...
+
+class ContactFrame:
+    """A frame of a body that may touch the ground, z along its outward normal.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., body: int = ..., X_BF: SE3 = ..., kind: ContactKind = ..., half_length: float = ..., half_width: float = ...) -> None: ...
+    def replace(self, *, name: str = ..., body: int = ..., X_BF: SE3 = ..., kind: ContactKind = ..., half_length: float = ..., half_width: float = ...) -> ContactFrame: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """unique"""
+        ...
+    @property
+    def body(self) -> int:
+        """index"""
+        ...
+    @property
+    def X_BF(self) -> SE3:
+        """placement in the body"""
+        ...
+    @property
+    def kind(self) -> ContactKind:
+        """ContactKind"""
+        ...
+    @property
+    def half_length(self) -> float:
+        """of the sole, along x, m"""
+        ...
+    @property
+    def half_width(self) -> float:
+        """of the sole, along y, m"""
+        ...
+
+class Reference:
+    """Targets of a reference configuration.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., joints: Mapping[str, ArrayLike] = ..., height_frame: str = ..., height: float = ..., feet: Mapping[str, ArrayLike] = ...) -> None: ...
+    def replace(self, *, name: str = ..., joints: Mapping[str, ArrayLike] = ..., height_frame: str = ..., height: float = ..., feet: Mapping[str, ArrayLike] = ...) -> Reference: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """unique"""
+        ...
+    @property
+    def joints(self) -> Dict[str, Array]:
+        """q of joints, by name"""
+        ...
+    @property
+    def height_frame(self) -> str:
+        """whose height is given; empty: joints alone"""
+        ...
+    @property
+    def height(self) -> float:
+        """over the soles, m"""
+        ...
+    @property
+    def feet(self) -> Dict[str, Array]:
+        """positions of the origins of contact frames (3,), by name, m"""
+        ...
+
+class ContactTarget:
+    """A foot on the ground at a given place.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, contact: int = ..., X_WT: SE3 = ..., kp: float = ..., kd: float = ...) -> None: ...
+    def replace(self, *, contact: int = ..., X_WT: SE3 = ..., kp: float = ..., kd: float = ...) -> ContactTarget: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def contact(self) -> int:
+        """index into Model.contacts"""
+        ...
+    @property
+    def X_WT(self) -> SE3:
+        """where the contact frame belongs; matters only with kp > 0"""
+        ...
+    @property
+    def kp(self) -> float:
+        """1/s^2"""
+        ...
+    @property
+    def kd(self) -> float:
+        """1/s"""
+        ...
+
+class ConstraintSet:
+    """The closures in force: those of the model, then contacts.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, closures: Sequence[Closure] = ..., contacts: Sequence[int] = ..., offsets: Sequence[int] = ..., rows: int = ..., num_loops: int = ...) -> None: ...
+    def replace(self, *, closures: Sequence[Closure] = ..., contacts: Sequence[int] = ..., offsets: Sequence[int] = ..., rows: int = ..., num_loops: int = ...) -> ConstraintSet: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def closures(self) -> Tuple[Closure, ...]:
+        """of the model, then contacts as closures to the world"""
+        ...
+    @property
+    def contacts(self) -> Tuple[int, ...]:
+        """indices into Model.contacts, in their order"""
+        ...
+    @property
+    def offsets(self) -> Tuple[int, ...]:
+        """first row of each closure"""
+        ...
+    @property
+    def rows(self) -> int:
+        """scalar constraints"""
+        ...
+    @property
+    def num_loops(self) -> int:
+        """the first closures, which are the model's"""
+        ...
+
+class ModelParts:
+    """What a model consists of.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> None: ...
+    def replace(self, *, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> ModelParts: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """of the robot"""
+        ...
+    @property
+    def gravity(self) -> Array:
+        """(3,), m/s^2"""
+        ...
+    @property
+    def bodies(self) -> Tuple[Body, ...]:
+        """the world first"""
+        ...
+    @property
+    def joints(self) -> Tuple[Joint, ...]:
+        """a placeholder for the world first"""
+        ...
+    @property
+    def frames(self) -> Tuple[Frame, ...]:
+        """links among them"""
+        ...
+    @property
+    def closures(self) -> Tuple[Closure, ...]:
+        """of the loops"""
+        ...
+    @property
+    def motors(self) -> Tuple[Motor, ...]:
+        """in the order of u"""
+        ...
+    @property
+    def contacts(self) -> Tuple[ContactFrame, ...]:
+        """frames that may touch the ground"""
+        ...
+    @property
+    def references(self) -> Tuple[Reference, ...]:
+        """postures by name"""
+        ...
+    @property
+    def visuals(self) -> Tuple[Visual, ...]:
+        """what is drawn"""
+        ...
+    @property
+    def serial_joints(self) -> Tuple[int, ...]:
+        """indices of the joints of the equivalent serial chain"""
+        ...
+    @property
+    def lower_limits(self) -> Array:
+        """(nv,)"""
+        ...
+    @property
+    def upper_limits(self) -> Array:
+        """(nv,)"""
+        ...
+    @property
+    def velocity_limits(self) -> Array:
+        """(nv,)"""
+        ...
+    @property
+    def armature(self) -> Array:
+        """(nv,)"""
+        ...
+
+class Model:
+    """A robot: a spanning tree of bodies and joints, closed by closures. Immutable.
+
+    Functions of states take one state, e.g. q (nq,), or N of them, (N, nq), on all cores; results then have an axis of N in front. SI units; twists and wrenches have their linear part first.
+    """
+    @property
+    def name(self) -> str:
+        """of the robot"""
+        ...
+    @property
+    def nq(self) -> int:
+        """size of a configuration q"""
+        ...
+    @property
+    def nv(self) -> int:
+        """size of a velocity v, and of tangent vectors"""
+        ...
+    @property
+    def nu(self) -> int:
+        """number of motors"""
+        ...
+    @property
+    def num_closure_rows(self) -> int:
+        """scalar constraints of all closures"""
+        ...
+    @property
+    def mass(self) -> float:
+        """kg, without the world"""
+        ...
+    @property
+    def gravity(self) -> Array:
+        """(3,), m/s^2"""
+        ...
+    @property
+    def has_free_flyer(self) -> bool:
+        """whether the first joint is one"""
+        ...
+    @property
+    def bodies(self) -> Tuple[Body, ...]:
+        """the world first"""
+        ...
+    @property
+    def joints(self) -> Tuple[Joint, ...]:
+        """a placeholder for the world first"""
+        ...
+    @property
+    def frames(self) -> Tuple[Frame, ...]:
+        """links among them"""
+        ...
+    @property
+    def closures(self) -> Tuple[Closure, ...]:
+        """of the loops"""
+        ...
+    @property
+    def clusters(self) -> Tuple[LoopCluster, ...]:
+        """closures that share dofs"""
+        ...
+    @property
+    def motors(self) -> Tuple[Motor, ...]:
+        """in the order of u"""
+        ...
+    @property
+    def contacts(self) -> Tuple[ContactFrame, ...]:
+        """frames that may touch the ground"""
+        ...
+    @property
+    def references(self) -> Tuple[Reference, ...]:
+        """postures by name"""
+        ...
+    @property
+    def visuals(self) -> Tuple[Visual, ...]:
+        """what is drawn"""
+        ...
+    @property
+    def serial_joints(self) -> Tuple[int, ...]:
+        """indices of the joints of the equivalent serial chain"""
+        ...
+    @property
+    def lower_limits(self) -> Array:
+        """(nv,), -inf if there is none"""
+        ...
+    @property
+    def upper_limits(self) -> Array:
+        """(nv,)"""
+        ...
+    @property
+    def velocity_limits(self) -> Array:
+        """(nv,), rad/s or m/s"""
+        ...
+    @property
+    def armature(self) -> Array:
+        """(nv,), added to the diagonal of the mass matrix"""
+        ...
+    @property
+    def q_names(self) -> Tuple[str, ...]:
+        """names of the entries of q"""
+        ...
+    @property
+    def v_names(self) -> Tuple[str, ...]:
+        """names of the entries of v"""
+        ...
+    @property
+    def u_names(self) -> Tuple[str, ...]:
+        """names of the motors"""
+        ...
+    def neutral(self) -> Array:
+        """Neutral configuration (nq,)."""
+        ...
+    def standing(self) -> Array:
+        """The starting posture of motions (nq,): the reference `half_sitting`, or the only one.
+
+        Raises ModelError when there is none, or it cannot be closed.
+        """
+        ...
+    def integrate(self, q: ArrayLike, dq: ArrayLike) -> Array:
+        """q (+) dq (nq,), for q (nq,) and a tangent vector dq (nv,); or for many, (N, ..)."""
+        ...
+    def difference(self, q0: ArrayLike, q1: ArrayLike) -> Array:
+        """The dq (nv,) with q0 (+) dq = q1; or many, (N, nv)."""
+        ...
+    def constraints(self, contacts: Contacts = ...) -> ConstraintSet:
+        """ConstraintSet of all closures and the given contacts, by name or as ContactTargets."""
+        ...
+    def close(self, q: ArrayLike) -> Array:
+        """The closed configuration nearest to q (nq,).
+
+        Raises ModelError when the loops do not close.
+        """
+        ...
+    def posture(self, name: str = ...) -> Array:
+        """A reference by name, closed (nq,); without a name some closed configuration.
+
+        Raises ModelError when there is no such reference, or the loops do not close.
+        """
+        ...
+    def mobility(self, q: ArrayLike) -> Dict[str, Any]:
+        """Rows and rank of the closures at q (nq,), and the mobility nv - rank."""
+        ...
+    def __eq__(self, other: object) -> bool: ...
+    def mass_matrix(self, q: ArrayLike) -> Array:
+        """Mass matrix (nv, nv), armature included."""
+        ...
+    def bias(self, q: ArrayLike, v: ArrayLike) -> Array:
+        """Coriolis, centrifugal and gravity terms b(q, v) (nv,), N m or N."""
+        ...
+    def com(self, q: ArrayLike) -> Array:
+        """Centre of mass in the world (3,), m."""
+        ...
+    def com_velocity(self, q: ArrayLike, v: ArrayLike) -> Array:
+        """Velocity of the centre of mass (3,), m/s."""
+        ...
+    def com_jacobian(self, q: ArrayLike) -> Array:
+        """Derivative of the centre of mass by the tangent of q (3, nv)."""
+        ...
+    def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Array:
+        """Momentum about the centre of mass in world axes (6,), kg m/s and kg m^2/s."""
+        ...
+    def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> Array:
+        """Of bodies and rotors, J."""
+        ...
+    def potential_energy(self, q: ArrayLike) -> Array:
+        """Of gravity, zero for a centre of mass at the origin, J."""
+        ...
+    def closure_residual(self, q: ArrayLike) -> Array:
+        """Closing errors of all closures (num_closure_rows,), m and rad; zero if and only if closed."""
+        ...
+    def closure_jacobian(self, q: ArrayLike) -> Array:
+        """Jacobian of the closures' velocities (num_closure_rows, nv), in their frames 1."""
+        ...
+    def project_velocity(self, q: ArrayLike, v: ArrayLike, contacts: Contacts = ...) -> Array:
+        """The velocity (nv,) nearest to v that keeps closures and contacts closed."""
+        ...
+    def placement(self, q: ArrayLike, frame: str) -> Array:
+        """Homogeneous placement (4, 4) of a link, frame or contact in the world."""
+        ...
+    def placements(self, q: ArrayLike) -> Array:
+        """Homogeneous placements of all bodies in the world (num bodies, 4, 4), the world first."""
+        ...
+    def frame_velocity(self, q: ArrayLike, v: ArrayLike, frame: str) -> Array:
+        """Twist of a frame in its own coordinates (6,), m/s and rad/s."""
+        ...
+    def frame_jacobian(self, q: ArrayLike, frame: str) -> Array:
+        """Jacobian of a frame's twist in its own coordinates (6, nv)."""
+        ...
+    def forward_dynamics(self, q: ArrayLike, v: ArrayLike, u: ArrayLike, contacts: Contacts = ...) -> Dynamics:
+        """Accelerations a (nv,) and forces of closures and contacts (rows,) under motor torques u (nu,).
+
+        contacts: names, ContactTargets, or a ConstraintSet. Forces are those on body 1, in frame 1 of each closure.
+        """
+        ...
+    def forward_dynamics_derivatives(self, q: ArrayLike, v: ArrayLike, u: ArrayLike, contacts: Contacts = ...) -> DynamicsDerivatives:
+        """Derivatives of forward_dynamics by the tangent of q, by v and by u: of a (nv, ..) and of the forces (rows, ..)."""
+        ...
+    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
+        """Generalized forces M a + b of the tree (nv,), closures and contacts apart, N m or N."""
+        ...
+    def inverse_dynamics_derivatives(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> InverseDynamicsDerivatives:
+        """Derivatives of inverse_dynamics by the tangent of q, by v and by a (nv, nv)."""
+        ...
+    def static_torques(self, q: ArrayLike, contacts: Contacts = ...) -> Array:
+        """The smallest motor torques that hold the robot still under closures and contacts (nu,), as far as possible."""
+        ...
+    def impact(self, q: ArrayLike, v: ArrayLike, contacts: Contacts) -> Impact:
+        """Rigid impact: the velocity after it (nv,) and the impulses (rows,), N s and N m s."""
+        ...
+    def impact_derivatives(self, q: ArrayLike, v: ArrayLike, contacts: Contacts) -> ImpactDerivatives:
+        """Derivatives of impact by the tangent of q and by v."""
+        ...
+
+class ModelBuilder:
+    """Collects bodies, joints, closures, motors and frames, then validates them and makes the model.
+
+    Bodies go by the name of their link; "world" is the ground. What is referred to must be declared before. Errors are ModelErrors that name the element and the remedy.
+    """
+    def __init__(self, name: str) -> None: ...
+    def add_link(self, link: str, parent_link: str, joint: Joint, inertia: Inertia, limits: JointLimits = ...) -> None:
+        """A link carried by a joint."""
+        ...
+    def add_inertia(self, link: str, inertia: Inertia) -> None: ...
+    def add_frame(self, name: str, link: str, X_LF: SE3) -> None: ...
+    def add_closure(self, name: str, kind: ClosureKind, frame1: str, frame2: str, axis: ArrayLike = ..., kp: float = ..., kd: float = ...) -> None: ...
+    def add_motor(self, joint: str, armature: float = ..., effort_limit: float = ..., velocity_limit: float = ..., torque_loss: Optional[float] = ...) -> None: ...
+    def add_contact(self, name: str, frame: str, kind: ContactKind, half_length: float = ..., half_width: float = ...) -> None: ...
+    def add_reference(self, reference: Reference) -> None: ...
+    def add_visual(self, link: str, visual: Visual) -> None: ...
+    def add_serial_joint(self, joint: str) -> None: ...
+    def set_gravity(self, gravity: ArrayLike) -> None: ...
+    def set_armature(self, joint: str, armature: float) -> None: ...
+    def build(self) -> Model: ...
+
+class Robot:
+    """A robot: its model, and where it came from. `load_robot` and `generate_robot` make them.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., model: Model = ..., file: str = ..., directory: str = ..., warnings: Sequence[str] = ...) -> None: ...
+    def replace(self, *, name: str = ..., model: Model = ..., file: str = ..., directory: str = ..., warnings: Sequence[str] = ...) -> Robot: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """as it was asked for"""
+        ...
+    @property
+    def model(self) -> Model:
+        """Model"""
+        ...
+    @property
+    def file(self) -> str:
+        """absolute path of the .urdf, or of the .yaml that completes one elsewhere; or empty"""
+        ...
+    @property
+    def directory(self) -> str:
+        """where the files are; or empty"""
+        ...
+    @property
+    def warnings(self) -> Tuple[str, ...]:
+        """valid but suspicious: "file: element: problem" """
+        ...
+    def write(self, directory: str) -> None:
+        """Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY."""
+        ...
+
+def load_robot(name: str, base: Optional[str] = ...) -> Robot:
+    """Loads a robot by name, by directory, or by .urdf or .yaml file.
+
+    base: 'free' or 'fixed' overrides the robot's own. Raises ModelError, whatever the files contain.
+    """
+    ...
+
+def generate_robot(name: str, directory: str = ..., **kwargs: Any) -> Robot:
+    """Makes a robot from named lengths, angles and masses (see `generators`), with files if a directory is given."""
+    ...
+
+def generators() -> Dict[str, Dict[str, Dict[str, Any]]]:
+    """Parameters of every generator by name: default, unit, bounds, help."""
+    ...
+
+def list_robots() -> List[str]:
+    """Names of the robots that can be loaded by name."""
+    ...
+
+def robot_directories() -> List[str]:
+    """Where robots are looked up by name."""
+    ...
+
+class DeadPointKind:
+    NONE: ClassVar[DeadPointKind]
+    JOINT: ClassVar[DeadPointKind]
+    MOTOR: ClassVar[DeadPointKind]
+    __members__: ClassVar[Dict[str, DeadPointKind]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class LinkageRatio:
+    """Speeds of the motors of a linkage by those of its joints, v_M = R v_J.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, R: ArrayLike = ..., dR: Sequence[ArrayLike] = ..., condition: float = ...) -> None: ...
+    def replace(self, *, R: ArrayLike = ..., dR: Sequence[ArrayLike] = ..., condition: float = ...) -> LinkageRatio: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def R(self) -> Array:
+        """(m, m), row of the motor, column of the joint"""
+        ...
+    @property
+    def dR(self) -> Tuple[Array, ...]:
+        """derivatives of R by each joint, m of (m, m)"""
+        ...
+    @property
+    def condition(self) -> float:
+        """largest over smallest singular value of R"""
+        ...
+
+class RatioSample:
+    """A linkage at one configuration of a sweep.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, s: float = ..., branch: int = ..., joints: ArrayLike = ..., motors: ArrayLike = ..., ratio: LinkageRatio = ..., dead: DeadPointKind = ..., loses_rank: bool = ..., q: ArrayLike = ...) -> None: ...
+    def replace(self, *, s: float = ..., branch: int = ..., joints: ArrayLike = ..., motors: ArrayLike = ..., ratio: LinkageRatio = ..., dead: DeadPointKind = ..., loses_rank: bool = ..., q: ArrayLike = ...) -> RatioSample: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def s(self) -> float:
+        """length along the curve from the start, rad or m"""
+        ...
+    @property
+    def branch(self) -> int:
+        """counted by dead points of the joint from the start"""
+        ...
+    @property
+    def joints(self) -> Array:
+        """angles of the linkage's joints (m,), rad or m"""
+        ...
+    @property
+    def motors(self) -> Array:
+        """of its motors (m,)"""
+        ...
+    @property
+    def ratio(self) -> LinkageRatio:
+        """at a dead point of the joint: infinite"""
+        ...
+    @property
+    def dead(self) -> DeadPointKind:
+        """DeadPointKind"""
+        ...
+    @property
+    def loses_rank(self) -> bool:
+        """the loops can continue in several ways"""
+        ...
+    @property
+    def q(self) -> Array:
+        """configuration of the cluster; empty for a motor on the joint"""
+        ...
+
+class RatioSweep:
+    """The reduction ratio of a linkage along the motion of one joint.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, joints: Sequence[str] = ..., motors: Sequence[str] = ..., samples: Sequence[RatioSample] = ..., begin: str = ..., end: str = ..., full_turn: bool = ...) -> None: ...
+    def replace(self, *, joints: Sequence[str] = ..., motors: Sequence[str] = ..., samples: Sequence[RatioSample] = ..., begin: str = ..., end: str = ..., full_turn: bool = ...) -> RatioSweep: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def joints(self) -> Tuple[str, ...]:
+        """names, the swept one first"""
+        ...
+    @property
+    def motors(self) -> Tuple[str, ...]:
+        """names"""
+        ...
+    @property
+    def samples(self) -> Tuple[RatioSample, ...]:
+        """in increasing s, dead points included"""
+        ...
+    @property
+    def begin(self) -> str:
+        """why the curve begins there"""
+        ...
+    @property
+    def end(self) -> str:
+        """why it ends there"""
+        ...
+    @property
+    def full_turn(self) -> bool:
+        """both ends are the same configuration"""
+        ...
+
+def sweep_ratio(model: Model, joint: str, q: ArrayLike, step: float = ..., length: float = ...) -> RatioSweep:
+    """Moves a joint through its range from the closed configuration q (nq,), other joints of its linkage held.
+
+    step: largest along the curve, rad or m. Raises ModelError when no linkage drives the joint.
+    """
+    ...
+
+class GroundStep:
+    """A box on the ground, e.g. a stair. Its axes are those of Rz(yaw) Ry(pitch) Rx(roll).
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, top: ArrayLike = ..., length: float = ..., width: float = ..., yaw: float = ..., pitch: float = ..., roll: float = ...) -> None: ...
+    def replace(self, *, top: ArrayLike = ..., length: float = ..., width: float = ..., yaw: float = ..., pitch: float = ..., roll: float = ...) -> GroundStep: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def top(self) -> Array:
+        """centre of its top in the world (3,), m"""
+        ...
+    @property
+    def length(self) -> float:
+        """along its own x, m"""
+        ...
+    @property
+    def width(self) -> float:
+        """along its own y, m"""
+        ...
+    @property
+    def yaw(self) -> float:
+        """rad"""
+        ...
+    @property
+    def pitch(self) -> float:
+        """rad; positive: its x goes down"""
+        ...
+    @property
+    def roll(self) -> float:
+        """rad"""
+        ...
+
+class Ground:
+    """A plane with boxes on it; the highest one counts.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, height: float = ..., friction: float = ..., steps: Sequence[GroundStep] = ...) -> None: ...
+    def replace(self, *, height: float = ..., friction: float = ..., steps: Sequence[GroundStep] = ...) -> Ground: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def height(self) -> float:
+        """of the plane, m"""
+        ...
+    @property
+    def friction(self) -> float:
+        """coefficient, 1"""
+        ...
+    @property
+    def steps(self) -> Tuple[GroundStep, ...]:
+        """GroundSteps"""
+        ...
+    def calc_height(self, x: float, y: float) -> float:
+        """Height of the ground under a point, m."""
+        ...
+
+class ContactPhase:
+    """A period with constant contacts.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., nodes: int = ..., dt: float = ..., contacts: Sequence[ContactTarget] = ...) -> None: ...
+    def replace(self, *, name: str = ..., nodes: int = ..., dt: float = ..., contacts: Sequence[ContactTarget] = ...) -> ContactPhase: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """e.g. "double support" """
+        ...
+    @property
+    def nodes(self) -> int:
+        """number of stages"""
+        ...
+    @property
+    def dt(self) -> float:
+        """length of a stage, s; 0: a rigid impact"""
+        ...
+    @property
+    def contacts(self) -> Tuple[ContactTarget, ...]:
+        """ContactTargets of the feet on the ground"""
+        ...
+
+class ContactSchedule:
+    """Which feet stand where and when.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, phases: Sequence[ContactPhase] = ...) -> None: ...
+    def replace(self, *, phases: Sequence[ContactPhase] = ...) -> ContactSchedule: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def phases(self) -> Tuple[ContactPhase, ...]:
+        """in their order"""
+        ...
+
+class ActivationKind:
+    QUADRATIC: ClassVar[ActivationKind]
+    BARRIER: ClassVar[ActivationKind]
+    ENERGY: ClassVar[ActivationKind]
+    __members__: ClassVar[Dict[str, ActivationKind]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class Activation:
+    """Scalar function of a residual r: 1/2 sum w r^2 (QUADRATIC), the same of what is outside of bounds (BARRIER), or the electrical energy of makeElectricalPower (ENERGY).
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, kind: ActivationKind = ..., weights: ArrayLike = ..., lower: ArrayLike = ..., upper: ArrayLike = ..., losses: ArrayLike = ..., share: float = ..., smoothing: float = ...) -> None: ...
+    def replace(self, *, kind: ActivationKind = ..., weights: ArrayLike = ..., lower: ArrayLike = ..., upper: ArrayLike = ..., losses: ArrayLike = ..., share: float = ..., smoothing: float = ...) -> Activation: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def kind(self) -> ActivationKind:
+        """ActivationKind"""
+        ...
+    @property
+    def weights(self) -> Array:
+        """(n,)"""
+        ...
+    @property
+    def lower(self) -> Array:
+        """(n,), barriers only"""
+        ...
+    @property
+    def upper(self) -> Array:
+        """(n,), barriers only"""
+        ...
+    @property
+    def losses(self) -> Array:
+        """(n/2,), energies only, W/(N m)^2"""
+        ...
+    @property
+    def share(self) -> float:
+        """energies only, 0 to 1"""
+        ...
+    @property
+    def smoothing(self) -> float:
+        """energies only, W"""
+        ...
+    @staticmethod
+    def quadratic(weights: ArrayLike) -> Activation: ...
+    @staticmethod
+    def barrier(weights: ArrayLike, lower: ArrayLike, upper: ArrayLike) -> Activation: ...
+
+class Cost:
+    """weight * activation(residual).
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., weight: float = ..., activation: Activation = ..., residual: Union[LibraryResidual, Residual] = ..., defines: bool = ...) -> None: ...
+    def replace(self, *, name: str = ..., weight: float = ..., activation: Activation = ..., residual: Union[LibraryResidual, Residual] = ..., defines: bool = ...) -> Cost: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """for reports"""
+        ...
+    @property
+    def weight(self) -> float:
+        """not negative"""
+        ...
+    @property
+    def activation(self) -> Activation:
+        """Activation"""
+        ...
+    @property
+    def residual(self) -> Union[LibraryResidual, Residual]:
+        """of the library (bielle.residuals), or a Residual written in Python"""
+        ...
+    @property
+    def defines(self) -> bool:
+        """it says what the motion is, and keeps its weight for every objective"""
+        ...
+
+class PathConstraint:
+    """lower <= r <= upper; equal bounds make an equation.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., residual: Union[LibraryResidual, Residual] = ..., lower: ArrayLike = ..., upper: ArrayLike = ..., scale: ArrayLike = ...) -> None: ...
+    def replace(self, *, name: str = ..., residual: Union[LibraryResidual, Residual] = ..., lower: ArrayLike = ..., upper: ArrayLike = ..., scale: ArrayLike = ...) -> PathConstraint: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """for messages"""
+        ...
+    @property
+    def residual(self) -> Union[LibraryResidual, Residual]:
+        """of the library (bielle.residuals), or written in Python"""
+        ...
+    @property
+    def lower(self) -> Array:
+        """(n,), -inf: open"""
+        ...
+    @property
+    def upper(self) -> Array:
+        """(n,), inf: open"""
+        ...
+    @property
+    def scale(self) -> Array:
+        """(n,), the violation that counts as 1, in the unit of r"""
+        ...
+
+class StateCost:
+    """1/2 weight sum w_i d_i^2 with d = (q (-) q_ref, v - v_ref).
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, weight: float = ..., q_ref: ArrayLike = ..., v_ref: ArrayLike = ..., weights: ArrayLike = ...) -> None: ...
+    def replace(self, *, weight: float = ..., q_ref: ArrayLike = ..., v_ref: ArrayLike = ..., weights: ArrayLike = ...) -> StateCost: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def weight(self) -> float:
+        """0: none"""
+        ...
+    @property
+    def q_ref(self) -> Array:
+        """(nq,)"""
+        ...
+    @property
+    def v_ref(self) -> Array:
+        """(nv,)"""
+        ...
+    @property
+    def weights(self) -> Array:
+        """(2 nv,)"""
+        ...
+
+class ControlCost:
+    """1/2 weight sum w_i (u_i - reference_i)^2.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, weight: float = ..., reference: ArrayLike = ..., weights: ArrayLike = ...) -> None: ...
+    def replace(self, *, weight: float = ..., reference: ArrayLike = ..., weights: ArrayLike = ...) -> ControlCost: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def weight(self) -> float:
+        """0: none"""
+        ...
+    @property
+    def reference(self) -> Array:
+        """(nu,)"""
+        ...
+    @property
+    def weights(self) -> Array:
+        """(nu,)"""
+        ...
+
+class StageKind:
+    DYNAMICS: ClassVar[StageKind]
+    IMPACT: ClassVar[StageKind]
+    __members__: ClassVar[Dict[str, StageKind]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class StepRule:
+    EULER: ClassVar[StepRule]
+    MIDPOINT: ClassVar[StepRule]
+    __members__: ClassVar[Dict[str, StepRule]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class Formulation:
+    FULL: ClassVar[Formulation]
+    REDUCED: ClassVar[Formulation]
+    __members__: ClassVar[Dict[str, Formulation]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class FreeTiming:
+    """Membership of a step in a phase whose duration is a variable.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, phase: int = ..., lower: float = ..., upper: float = ...) -> None: ...
+    def replace(self, *, phase: int = ..., lower: float = ..., upper: float = ...) -> FreeTiming: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def phase(self) -> int:
+        """the same for all steps of the phase; -1: the duration is fixed"""
+        ...
+    @property
+    def lower(self) -> float:
+        """bound of the time scale"""
+        ...
+    @property
+    def upper(self) -> float:
+        """bound of the time scale"""
+        ...
+
+class Stage:
+    """One stage of the horizon, or the terminal node, which has neither dt nor constraints.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, kind: StageKind = ..., step: StepRule = ..., dt: float = ..., timing: FreeTiming = ..., time_weight: float = ..., constraints: ConstraintSet = ..., state: StateCost = ..., control: ControlCost = ..., costs: Sequence[Cost] = ..., path_constraints: Sequence[PathConstraint] = ..., effort_limits: ArrayLike = ...) -> None: ...
+    def replace(self, *, kind: StageKind = ..., step: StepRule = ..., dt: float = ..., timing: FreeTiming = ..., time_weight: float = ..., constraints: ConstraintSet = ..., state: StateCost = ..., control: ControlCost = ..., costs: Sequence[Cost] = ..., path_constraints: Sequence[PathConstraint] = ..., effort_limits: ArrayLike = ...) -> Stage: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def kind(self) -> StageKind:
+        """StageKind"""
+        ...
+    @property
+    def step(self) -> StepRule:
+        """StepRule"""
+        ...
+    @property
+    def dt(self) -> float:
+        """s; 0 for an impact"""
+        ...
+    @property
+    def timing(self) -> FreeTiming:
+        """FreeTiming"""
+        ...
+    @property
+    def time_weight(self) -> float:
+        """cost of a second"""
+        ...
+    @property
+    def constraints(self) -> ConstraintSet:
+        """closures and contacts in force (Model.constraints)"""
+        ...
+    @property
+    def state(self) -> StateCost:
+        """StateCost"""
+        ...
+    @property
+    def control(self) -> ControlCost:
+        """ControlCost"""
+        ...
+    @property
+    def costs(self) -> Tuple[Cost, ...]:
+        """Costs"""
+        ...
+    @property
+    def path_constraints(self) -> Tuple[PathConstraint, ...]:
+        """PathConstraints"""
+        ...
+    @property
+    def effort_limits(self) -> Array:
+        """bounds of |u| (nu,); empty: those of the motors"""
+        ...
+
+class ForceAxes:
+    CONTACT: ClassVar[ForceAxes]
+    WORLD: ClassVar[ForceAxes]
+    __members__: ClassVar[Dict[str, ForceAxes]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class LibraryResidual:
+    """A residual of the library; `bielle.residuals` makes them."""
+    @property
+    def size(self) -> int:
+        ...
+    @property
+    def origin(self) -> Optional[Tuple[str, Tuple[Any, ...]]]:
+        """(function of bielle.residuals, its arguments); None for those inside a planned motion"""
+        ...
+    def __eq__(self, other: object) -> bool: ...
+
+class Node:
+    """What a residual may read; valid during one call. Its arrays are copies."""
+    @property
+    def q(self) -> Array:
+        """configuration (nq,)"""
+        ...
+    @property
+    def v(self) -> Array:
+        """velocity (nv,)"""
+        ...
+    @property
+    def u(self) -> Array:
+        """motor torques (nu,), N m or N; empty at the terminal node"""
+        ...
+    @property
+    def forces(self) -> Array:
+        """of closures and contacts (rows,), N and N m; empty at the terminal node"""
+        ...
+    @property
+    def speeds(self) -> Array:
+        """of the motors when the torques act (nu,), rad/s or m/s"""
+        ...
+    @property
+    def time_scale(self) -> float:
+        """of a free duration"""
+        ...
+    @property
+    def constraints(self) -> ConstraintSet:
+        """ConstraintSet in force"""
+        ...
+    @property
+    def com(self) -> Array:
+        """centre of mass in the world (3,), m"""
+        ...
+    @property
+    def com_jacobian(self) -> Array:
+        """of the centre of mass by the tangent of q (3, nv); in calc_jacobian alone"""
+        ...
+    def placement(self, frame: str) -> SE3:
+        """SE3 of a link, frame or contact in the world."""
+        ...
+    def frame_velocity(self, frame: str) -> Array:
+        """Twist of a frame in its own coordinates (6,), m/s and rad/s."""
+        ...
+    def frame_jacobian(self, frame: str) -> Array:
+        """Jacobian of that twist (6, nv); in calc_jacobian alone."""
+        ...
+
+class ControlBounds:
+    IGNORE: ClassVar[ControlBounds]
+    ENFORCE: ClassVar[ControlBounds]
+    __members__: ClassVar[Dict[str, ControlBounds]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class LastRollout:
+    CLOSED: ClassVar[LastRollout]
+    SEGMENTS: ClassVar[LastRollout]
+    __members__: ClassVar[Dict[str, LastRollout]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class ConstraintOptions:
+    """How constraints are enforced.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, tolerance: float = ..., initial_penalty: float = ..., penalty_increase: float = ..., max_penalty: float = ...) -> None: ...
+    def replace(self, *, tolerance: float = ..., initial_penalty: float = ..., penalty_increase: float = ..., max_penalty: float = ...) -> ConstraintOptions: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def tolerance(self) -> float:
+        """largest violation of a converged solve"""
+        ...
+    @property
+    def initial_penalty(self) -> float:
+        """cost over squared violation"""
+        ...
+    @property
+    def penalty_increase(self) -> float:
+        """factor when the violation falls too slowly"""
+        ...
+    @property
+    def max_penalty(self) -> float:
+        """largest"""
+        ...
+
+class SolverOptions:
+    """Options of FDDP.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, max_iterations: int = ..., gradient_tolerance: float = ..., gap_tolerance: float = ..., cost_tolerance: float = ..., initial_regularization: float = ..., min_regularization: float = ..., max_regularization: float = ..., regularization_increase: float = ..., regularization_decrease: float = ..., state_regularization_ratio: float = ..., long_step: float = ..., short_step: float = ..., num_step_lengths: int = ..., acceptance: float = ..., bounds: ControlBounds = ..., constraints: ConstraintOptions = ..., rollout_segments: int = ..., last_rollout: LastRollout = ..., threads: int = ...) -> None: ...
+    def replace(self, *, max_iterations: int = ..., gradient_tolerance: float = ..., gap_tolerance: float = ..., cost_tolerance: float = ..., initial_regularization: float = ..., min_regularization: float = ..., max_regularization: float = ..., regularization_increase: float = ..., regularization_decrease: float = ..., state_regularization_ratio: float = ..., long_step: float = ..., short_step: float = ..., num_step_lengths: int = ..., acceptance: float = ..., bounds: ControlBounds = ..., constraints: ConstraintOptions = ..., rollout_segments: int = ..., last_rollout: LastRollout = ..., threads: int = ...) -> SolverOptions: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def max_iterations(self) -> int:
+        """the solver stops there"""
+        ...
+    @property
+    def gradient_tolerance(self) -> float:
+        """(cost per unit of control)^2"""
+        ...
+    @property
+    def gap_tolerance(self) -> float:
+        """of every entry of the gaps"""
+        ...
+    @property
+    def cost_tolerance(self) -> float:
+        """relative change of the cost by a full step; 0: never"""
+        ...
+    @property
+    def initial_regularization(self) -> float:
+        """of the first sweep"""
+        ...
+    @property
+    def min_regularization(self) -> float:
+        """least"""
+        ...
+    @property
+    def max_regularization(self) -> float:
+        """the solve gives up above this"""
+        ...
+    @property
+    def regularization_increase(self) -> float:
+        """factor"""
+        ...
+    @property
+    def regularization_decrease(self) -> float:
+        """divisor"""
+        ...
+    @property
+    def state_regularization_ratio(self) -> float:
+        """of states over controls"""
+        ...
+    @property
+    def long_step(self) -> float:
+        """a step is long above this"""
+        ...
+    @property
+    def short_step(self) -> float:
+        """a step is short up to this"""
+        ...
+    @property
+    def num_step_lengths(self) -> int:
+        """1, 1/2, 1/4, ..."""
+        ...
+    @property
+    def acceptance(self) -> float:
+        """share of the foreseen decrease, in (0, 1)"""
+        ...
+    @property
+    def bounds(self) -> ControlBounds:
+        """ControlBounds"""
+        ...
+    @property
+    def constraints(self) -> ConstraintOptions:
+        """ConstraintOptions"""
+        ...
+    @property
+    def rollout_segments(self) -> int:
+        """largest number of segments of a rollout"""
+        ...
+    @property
+    def last_rollout(self) -> LastRollout:
+        """LastRollout"""
+        ...
+    @property
+    def threads(self) -> int:
+        """0: all; results are bitwise independent of it"""
+        ...
+
+class Termination:
+    CONVERGED: ClassVar[Termination]
+    MAX_ITERATIONS: ClassVar[Termination]
+    REGULARIZATION_MAX: ClassVar[Termination]
+    INFEASIBLE: ClassVar[Termination]
+    INTERRUPTED: ClassVar[Termination]
+    FAILED: ClassVar[Termination]
+    __members__: ClassVar[Dict[str, Termination]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class Iteration:
+    """One line of the log: the iterate it started from and the step it took.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, iteration: int = ..., cost: float = ..., violation: float = ..., gap: float = ..., gradient: float = ..., step: float = ..., regularization: float = ..., seconds: float = ...) -> None: ...
+    def replace(self, *, iteration: int = ..., cost: float = ..., violation: float = ..., gap: float = ..., gradient: float = ..., step: float = ..., regularization: float = ..., seconds: float = ...) -> Iteration: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def iteration(self) -> int:
+        """from 1"""
+        ...
+    @property
+    def cost(self) -> float:
+        """before the step"""
+        ...
+    @property
+    def violation(self) -> float:
+        """largest of the constraints before the step"""
+        ...
+    @property
+    def gap(self) -> float:
+        """largest entry before the step"""
+        ...
+    @property
+    def gradient(self) -> float:
+        """squared norm of the projected one"""
+        ...
+    @property
+    def step(self) -> float:
+        """length, 0: none was taken"""
+        ...
+    @property
+    def regularization(self) -> float:
+        """of the sweep"""
+        ...
+    @property
+    def seconds(self) -> float:
+        """since the start"""
+        ...
+
+class Summary:
+    """How a solve went.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, termination: Termination = ..., message: str = ..., cost: float = ..., gap: float = ..., iterations: int = ..., violation: float = ..., complementarity: float = ..., multiplier: float = ..., penalty: float = ..., multiplier_updates: int = ..., seconds: float = ..., linearize_seconds: float = ..., sweep_seconds: float = ..., rollout_seconds: float = ..., log: Sequence[Iteration] = ...) -> None: ...
+    def replace(self, *, termination: Termination = ..., message: str = ..., cost: float = ..., gap: float = ..., iterations: int = ..., violation: float = ..., complementarity: float = ..., multiplier: float = ..., penalty: float = ..., multiplier_updates: int = ..., seconds: float = ..., linearize_seconds: float = ..., sweep_seconds: float = ..., rollout_seconds: float = ..., log: Sequence[Iteration] = ...) -> Summary: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def termination(self) -> Termination:
+        """Termination"""
+        ...
+    @property
+    def message(self) -> str:
+        """why it ended"""
+        ...
+    @property
+    def cost(self) -> float:
+        """of the returned trajectory"""
+        ...
+    @property
+    def gap(self) -> float:
+        """largest entry of its gaps"""
+        ...
+    @property
+    def iterations(self) -> int:
+        """number"""
+        ...
+    @property
+    def violation(self) -> float:
+        """largest of the constraints"""
+        ...
+    @property
+    def complementarity(self) -> float:
+        """largest multiplier times slack"""
+        ...
+    @property
+    def multiplier(self) -> float:
+        """largest"""
+        ...
+    @property
+    def penalty(self) -> float:
+        """of violated constraints; 0: there are none"""
+        ...
+    @property
+    def multiplier_updates(self) -> int:
+        """number"""
+        ...
+    @property
+    def seconds(self) -> float:
+        """s"""
+        ...
+    @property
+    def linearize_seconds(self) -> float:
+        """summed over the threads, s"""
+        ...
+    @property
+    def sweep_seconds(self) -> float:
+        """likewise"""
+        ...
+    @property
+    def rollout_seconds(self) -> float:
+        """likewise"""
+        ...
+    @property
+    def log(self) -> Tuple[Iteration, ...]:
+        """Iterations"""
+        ...
+    @property
+    def converged(self) -> bool:
+        ...
+
+class Multipliers:
+    """Of the constraints, node by node.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, values: Sequence[ArrayLike] = ..., penalty: float = ...) -> None: ...
+    def replace(self, *, values: Sequence[ArrayLike] = ..., penalty: float = ...) -> Multipliers: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def values(self) -> Tuple[Array, ...]:
+        """N + 1 of (constraint size,)"""
+        ...
+    @property
+    def penalty(self) -> float:
+        """of violated constraints"""
+        ...
+
+class Objective:
+    EFFORT: ClassVar[Objective]
+    ENERGY: ClassVar[Objective]
+    PEAK_TORQUE: ClassVar[Objective]
+    __members__: ClassVar[Dict[str, Objective]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class LimitOptions:
+    """Limits of motors and joints.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, enforced: bool = ..., efforts: Mapping[str, float] = ..., velocities: Mapping[str, float] = ..., powers: Mapping[str, float] = ..., dead_point_margin: float = ...) -> None: ...
+    def replace(self, *, enforced: bool = ..., efforts: Mapping[str, float] = ..., velocities: Mapping[str, float] = ..., powers: Mapping[str, float] = ..., dead_point_margin: float = ...) -> LimitOptions: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def enforced(self) -> bool:
+        """False: all limits, including torque, are ignored"""
+        ...
+    @property
+    def efforts(self) -> Dict[str, float]:
+        """by motor, N m or N, instead of the model's"""
+        ...
+    @property
+    def velocities(self) -> Dict[str, float]:
+        """by motor, rad/s or m/s, likewise"""
+        ...
+    @property
+    def powers(self) -> Dict[str, float]:
+        """by motor, W; driving or braking"""
+        ...
+    @property
+    def dead_point_margin(self) -> float:
+        """least share of the transmission at the start; 0: none"""
+        ...
+
+class TimingBounds:
+    """Bounds of a duration over the nominal one.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, lower: float = ..., upper: float = ...) -> None: ...
+    def replace(self, *, lower: float = ..., upper: float = ...) -> TimingBounds: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def lower(self) -> float:
+        """1"""
+        ...
+    @property
+    def upper(self) -> float:
+        """1"""
+        ...
+
+class TimingOptions:
+    """Phases whose durations the solver chooses.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, phases: Mapping[str, TimingBounds] = ..., time_weight: float = ...) -> None: ...
+    def replace(self, *, phases: Mapping[str, TimingBounds] = ..., time_weight: float = ...) -> TimingOptions: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def phases(self) -> Dict[str, TimingBounds]:
+        """TimingBounds by name of the phase; "all": those with contacts"""
+        ...
+    @property
+    def time_weight(self) -> float:
+        """cost of a second of these phases"""
+        ...
+
+class ObjectiveOptions:
+    """What a motion minimizes beside what defines it.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, objective: Objective = ..., regeneration: float = ..., regularization: Optional[float] = ..., scale: float = ...) -> None: ...
+    def replace(self, *, objective: Objective = ..., regeneration: float = ..., regularization: Optional[float] = ..., scale: float = ...) -> ObjectiveOptions: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def objective(self) -> Objective:
+        """Objective"""
+        ...
+    @property
+    def regeneration(self) -> float:
+        """share of energy that flows back and is used again, 0 to 1"""
+        ...
+    @property
+    def regularization(self) -> Optional[float]:
+        """weight of the other costs; None: the default"""
+        ...
+    @property
+    def scale(self) -> float:
+        """cost of a joule, or of the peak"""
+        ...
+
+class ProblemOptions:
+    """Options of a problem besides those of the motion.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, formulation: Formulation = ..., step: Optional[StepRule] = ..., limits: LimitOptions = ..., timings: TimingOptions = ..., objective: ObjectiveOptions = ...) -> None: ...
+    def replace(self, *, formulation: Formulation = ..., step: Optional[StepRule] = ..., limits: LimitOptions = ..., timings: TimingOptions = ..., objective: ObjectiveOptions = ...) -> ProblemOptions: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def formulation(self) -> Formulation:
+        """Formulation"""
+        ...
+    @property
+    def step(self) -> Optional[StepRule]:
+        """StepRule; None: midpoint, or Euler for the paper's problems"""
+        ...
+    @property
+    def limits(self) -> LimitOptions:
+        """LimitOptions"""
+        ...
+    @property
+    def timings(self) -> TimingOptions:
+        """TimingOptions"""
+        ...
+    @property
+    def objective(self) -> ObjectiveOptions:
+        """ObjectiveOptions"""
+        ...
+
+class GoalKind:
+    SPEED: ClassVar[GoalKind]
+    HEIGHT: ClassVar[GoalKind]
+    RISE: ClassVar[GoalKind]
+    FLIGHT_TIME: ClassVar[GoalKind]
+    TURN: ClassVar[GoalKind]
+    DISPLACEMENT: ClassVar[GoalKind]
+    FOOTHOLDS: ClassVar[GoalKind]
+    __members__: ClassVar[Dict[str, GoalKind]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class Foothold:
+    """Where a foot is to land.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, contact: str = ..., node: int = ..., position: ArrayLike = ...) -> None: ...
+    def replace(self, *, contact: str = ..., node: int = ..., position: ArrayLike = ...) -> Foothold: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def contact(self) -> str:
+        """name"""
+        ...
+    @property
+    def node(self) -> int:
+        """where the foot lands"""
+        ...
+    @property
+    def position(self) -> Array:
+        """of the origin of its contact frame (3,), m"""
+        ...
+
+class Goal:
+    """A quantity that is requested, and measured on the trajectory.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, kind: GoalKind = ..., name: str = ..., asked: float = ..., tolerance: float = ..., first: int = ..., last: int = ..., direction: ArrayLike = ..., contacts: Sequence[str] = ..., footholds: Sequence[Foothold] = ...) -> None: ...
+    def replace(self, *, kind: GoalKind = ..., name: str = ..., asked: float = ..., tolerance: float = ..., first: int = ..., last: int = ..., direction: ArrayLike = ..., contacts: Sequence[str] = ..., footholds: Sequence[Foothold] = ...) -> Goal: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def kind(self) -> GoalKind:
+        """GoalKind"""
+        ...
+    @property
+    def name(self) -> str:
+        """e.g. "speed" """
+        ...
+    @property
+    def asked(self) -> float:
+        """requested value"""
+        ...
+    @property
+    def tolerance(self) -> float:
+        """largest difference that still meets the goal"""
+        ...
+    @property
+    def first(self) -> int:
+        """node"""
+        ...
+    @property
+    def last(self) -> int:
+        """node"""
+        ...
+    @property
+    def direction(self) -> Array:
+        """unit (3,)"""
+        ...
+    @property
+    def contacts(self) -> Tuple[str, ...]:
+        """names"""
+        ...
+    @property
+    def footholds(self) -> Tuple[Foothold, ...]:
+        """Footholds"""
+        ...
+
+class GoalOutcome:
+    """Requested and achieved value of a goal.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, goal: Goal = ..., came_out: float = ...) -> None: ...
+    def replace(self, *, goal: Goal = ..., came_out: float = ...) -> GoalOutcome: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def goal(self) -> Goal:
+        """Goal"""
+        ...
+    @property
+    def came_out(self) -> float:
+        """achieved value"""
+        ...
+    @property
+    def met(self) -> bool:
+        """within the tolerance"""
+        ...
+
+class PhaseTiming:
+    """A phase of free duration.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, phase: str = ..., start_node: int = ..., nominal: float = ..., chosen: float = ..., lower: float = ..., upper: float = ...) -> None: ...
+    def replace(self, *, phase: str = ..., start_node: int = ..., nominal: float = ..., chosen: float = ..., lower: float = ..., upper: float = ...) -> PhaseTiming: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def phase(self) -> str:
+        """name"""
+        ...
+    @property
+    def start_node(self) -> int:
+        """first node"""
+        ...
+    @property
+    def nominal(self) -> float:
+        """s"""
+        ...
+    @property
+    def chosen(self) -> float:
+        """s"""
+        ...
+    @property
+    def lower(self) -> float:
+        """bound, s"""
+        ...
+    @property
+    def upper(self) -> float:
+        """bound, s"""
+        ...
+
+class Trajectory:
+    """Node states (N + 1) and controls (N) of a problem.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, xs: Sequence[ArrayLike] = ..., us: Sequence[ArrayLike] = ...) -> None: ...
+    def replace(self, *, xs: Sequence[ArrayLike] = ..., us: Sequence[ArrayLike] = ...) -> Trajectory: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def xs(self) -> Tuple[Array, ...]:
+        """states: (q, v), and a time scale where one is free"""
+        ...
+    @property
+    def us(self) -> Tuple[Array, ...]:
+        """torques, and the time scale at the first step of a free phase"""
+        ...
+
+class MotionPlan:
+    """A motion before it becomes a problem.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., schedule: ContactSchedule = ..., ground: Ground = ..., stages: Sequence[Stage] = ..., guess: Trajectory = ..., q_start: ArrayLike = ..., q_end: ArrayLike = ..., limited: bool = ..., requested: Mapping[str, float] = ..., goals: Sequence[Goal] = ...) -> None: ...
+    def replace(self, *, name: str = ..., schedule: ContactSchedule = ..., ground: Ground = ..., stages: Sequence[Stage] = ..., guess: Trajectory = ..., q_start: ArrayLike = ..., q_end: ArrayLike = ..., limited: bool = ..., requested: Mapping[str, float] = ..., goals: Sequence[Goal] = ...) -> MotionPlan: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """e.g. "squat" """
+        ...
+    @property
+    def schedule(self) -> ContactSchedule:
+        """ContactSchedule"""
+        ...
+    @property
+    def ground(self) -> Ground:
+        """Ground"""
+        ...
+    @property
+    def stages(self) -> Tuple[Stage, ...]:
+        """N running Stages and the terminal one"""
+        ...
+    @property
+    def guess(self) -> Trajectory:
+        """Trajectory to start from"""
+        ...
+    @property
+    def q_start(self) -> Array:
+        """standing posture (nq,)"""
+        ...
+    @property
+    def q_end(self) -> Array:
+        """standing posture (nq,)"""
+        ...
+    @property
+    def limited(self) -> bool:
+        """whether limits of the robot apply"""
+        ...
+    @property
+    def requested(self) -> Dict[str, float]:
+        """every option by name"""
+        ...
+    @property
+    def goals(self) -> Tuple[Goal, ...]:
+        """Goals"""
+        ...
+
+class Request:
+    """A motion by name, with its options: what `bielle solve` is asked for.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, motion: str = ..., options: Mapping[str, float] = ..., sequence: Sequence[str] = ..., weights: str = ..., files: Mapping[str, str] = ...) -> None: ...
+    def replace(self, *, motion: str = ..., options: Mapping[str, float] = ..., sequence: Sequence[str] = ..., weights: str = ..., files: Mapping[str, str] = ...) -> Request: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def motion(self) -> str:
+        """name, one of `motions`; of a sequence empty"""
+        ...
+    @property
+    def options(self) -> Dict[str, float]:
+        """numbers by name"""
+        ...
+    @property
+    def sequence(self) -> Tuple[str, ...]:
+        """names of motions that follow one another; options are "NAME.option" """
+        ...
+    @property
+    def weights(self) -> str:
+        """name of a preset, e.g. "paper"; or empty"""
+        ...
+    @property
+    def files(self) -> Dict[str, str]:
+        """paths by name, e.g. "footholds" """
+        ...
+
+def motions() -> Dict[str, Dict[str, Any]]:
+    """The motions by name: what they do, their options with defaults and units, presets of weights, files."""
+    ...
+
+class Motion:
+    """A problem ready to be solved: of a plan (Motion(model, plan, options)), or of a request (Motion.make)."""
+    def __init__(self, model: Model, plan: MotionPlan, options: ProblemOptions = ...) -> None: ...
+    @staticmethod
+    def make(model: Model, request: Request, options: ProblemOptions = ...) -> Motion:
+        """The motion of a request. Raises ModelError."""
+        ...
+    @staticmethod
+    def plan(model: Model, request: Request) -> MotionPlan:
+        """The plan of a request, e.g. to add costs and constraints to its stages."""
+        ...
+    @property
+    def model(self) -> Model:
+        """Model"""
+        ...
+    @property
+    def options(self) -> ProblemOptions:
+        """ProblemOptions"""
+        ...
+    @property
+    def request(self) -> Optional[Request]:
+        """Request, or None"""
+        ...
+    @property
+    def name(self) -> str:
+        """e.g. "squat" """
+        ...
+    @property
+    def num_stages(self) -> int:
+        """N"""
+        ...
+    @property
+    def schedule(self) -> ContactSchedule:
+        """ContactSchedule"""
+        ...
+    @property
+    def ground(self) -> Ground:
+        """Ground"""
+        ...
+    @property
+    def goals(self) -> Tuple[Goal, ...]:
+        """Goals"""
+        ...
+    @property
+    def requested(self) -> Dict[str, float]:
+        """every option by name"""
+        ...
+    @property
+    def guess(self) -> Trajectory:
+        """Trajectory to start from; after a solve the solution"""
+        ...
+    @guess.setter
+    def guess(self, value: Trajectory) -> None: ...
+    def stage(self, node: int) -> Stage:
+        """Stage of a node, 0 to N."""
+        ...
+    def start_from(self, record: Record) -> None:
+        """Takes the guess from the record of another motion of the robot, resampled if its length differs."""
+        ...
+    def costs(self, node: int) -> Dict[str, float]:
+        """Costs of a node of the guess by name, before scaling by the time step."""
+        ...
+    def solve(self, options: SolverOptions = ..., callback: Optional[Callable[[Iteration], Optional[bool]]] = ...) -> Summary:
+        """Solves from the guess and leaves the solution there. Returns a Summary.
+
+        callback: called with each Iteration; False stops. What it raises, like Ctrl-C, ends the solve with the current iterate in the guess.
+        """
+        ...
+    @property
+    def multipliers(self) -> Multipliers:
+        """Multipliers of the last solve"""
+        ...
+
+class Record:
+    """A motion as numbers: one row per node, or per stage, from its node to the next.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, q_names: Sequence[str] = ..., v_names: Sequence[str] = ..., u_names: Sequence[str] = ..., closure_names: Sequence[str] = ..., contact_names: Sequence[str] = ..., time: ArrayLike = ..., q: ArrayLike = ..., v: ArrayLike = ..., a: ArrayLike = ..., u: ArrayLike = ..., closure_wrenches: ArrayLike = ..., contact_wrenches: ArrayLike = ..., has_midpoints: bool = ..., q_mid: ArrayLike = ..., v_mid: ArrayLike = ..., com: ArrayLike = ..., gap: ArrayLike = ...) -> None: ...
+    def replace(self, *, q_names: Sequence[str] = ..., v_names: Sequence[str] = ..., u_names: Sequence[str] = ..., closure_names: Sequence[str] = ..., contact_names: Sequence[str] = ..., time: ArrayLike = ..., q: ArrayLike = ..., v: ArrayLike = ..., a: ArrayLike = ..., u: ArrayLike = ..., closure_wrenches: ArrayLike = ..., contact_wrenches: ArrayLike = ..., has_midpoints: bool = ..., q_mid: ArrayLike = ..., v_mid: ArrayLike = ..., com: ArrayLike = ..., gap: ArrayLike = ...) -> Record: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def q_names(self) -> Tuple[str, ...]:
+        """of the columns of q"""
+        ...
+    @property
+    def v_names(self) -> Tuple[str, ...]:
+        """of the columns of v and a"""
+        ...
+    @property
+    def u_names(self) -> Tuple[str, ...]:
+        """of the motors"""
+        ...
+    @property
+    def closure_names(self) -> Tuple[str, ...]:
+        """in their order"""
+        ...
+    @property
+    def contact_names(self) -> Tuple[str, ...]:
+        """in their order"""
+        ...
+    @property
+    def time(self) -> Array:
+        """(N + 1,), s"""
+        ...
+    @property
+    def q(self) -> Array:
+        """(N + 1, nq)"""
+        ...
+    @property
+    def v(self) -> Array:
+        """(N + 1, nv)"""
+        ...
+    @property
+    def a(self) -> Array:
+        """(N, nv)"""
+        ...
+    @property
+    def u(self) -> Array:
+        """(N, nu), N m or N"""
+        ...
+    @property
+    def closure_wrenches(self) -> Array:
+        """(N, 6 per closure), on body 1, in frame 1"""
+        ...
+    @property
+    def contact_wrenches(self) -> Array:
+        """(N, 6 per contact), of the ground on the foot"""
+        ...
+    @property
+    def has_midpoints(self) -> bool:
+        """midpoint steps; else the next two are empty"""
+        ...
+    @property
+    def q_mid(self) -> Array:
+        """(N, nq), where a, u and wrenches belong"""
+        ...
+    @property
+    def v_mid(self) -> Array:
+        """(N, nv)"""
+        ...
+    @property
+    def com(self) -> Array:
+        """(N + 1, 3), m"""
+        ...
+    @property
+    def gap(self) -> Array:
+        """(N + 1, 2), largest closing error, m and rad"""
+        ...
+
+def read_record(path: str) -> Record:
+    """Reads trajectory.csv or trajectory.npz."""
+    ...
+
+def read_result_record(directory: str) -> Record:
+    """The Record in a directory of a result."""
+    ...
+
+class ElectricalEnergy:
+    """What the motors take from their supply.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, by_motor: ArrayLike = ..., total: float = ..., regeneration: float = ..., num_assumed: int = ..., distance: float = ..., cost_of_transport: float = ...) -> None: ...
+    def replace(self, *, by_motor: ArrayLike = ..., total: float = ..., regeneration: float = ..., num_assumed: int = ..., distance: float = ..., cost_of_transport: float = ...) -> ElectricalEnergy: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def by_motor(self) -> Array:
+        """(nu,), J"""
+        ...
+    @property
+    def total(self) -> float:
+        """J"""
+        ...
+    @property
+    def regeneration(self) -> float:
+        """share of what flows back that was taken off"""
+        ...
+    @property
+    def num_assumed(self) -> int:
+        """motors whose loss is not known"""
+        ...
+    @property
+    def distance(self) -> float:
+        """of the centre of mass on the ground, m"""
+        ...
+    @property
+    def cost_of_transport(self) -> float:
+        """total over weight and distance"""
+        ...
+
+class RunInfo:
+    """The request that led to a motion.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, robot: str = ..., robot_file: str = ..., command: Sequence[str] = ..., model: str = ..., serial_armature: str = ...) -> None: ...
+    def replace(self, *, robot: str = ..., robot_file: str = ..., command: Sequence[str] = ..., model: str = ..., serial_armature: str = ...) -> RunInfo: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def robot(self) -> str:
+        """name or path, as given"""
+        ...
+    @property
+    def robot_file(self) -> str:
+        """its .urdf, absolute"""
+        ...
+    @property
+    def command(self) -> Tuple[str, ...]:
+        """the command line, or empty"""
+        ...
+    @property
+    def model(self) -> str:
+        """"closed" or "serial" """
+        ...
+    @property
+    def serial_armature(self) -> str:
+        """of the serial model"""
+        ...
+
+class Result:
+    """A solved motion.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., requested: Mapping[str, float] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ...) -> None: ...
+    def replace(self, *, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., requested: Mapping[str, float] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ...) -> Result: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def run(self) -> RunInfo:
+        """RunInfo"""
+        ...
+    @property
+    def motion(self) -> str:
+        """name"""
+        ...
+    @property
+    def formulation(self) -> Formulation:
+        """Formulation"""
+        ...
+    @property
+    def step(self) -> StepRule:
+        """StepRule"""
+        ...
+    @property
+    def requested(self) -> Dict[str, float]:
+        """every option by name"""
+        ...
+    @property
+    def goals(self) -> Tuple[GoalOutcome, ...]:
+        """GoalOutcomes: requested and achieved values"""
+        ...
+    @property
+    def schedule(self) -> ContactSchedule:
+        """ContactSchedule, with the time steps that came out"""
+        ...
+    @property
+    def timings(self) -> Tuple[PhaseTiming, ...]:
+        """PhaseTimings of the phases of free duration"""
+        ...
+    @property
+    def ground(self) -> Ground:
+        """Ground"""
+        ...
+    @property
+    def solver(self) -> Summary:
+        """Summary"""
+        ...
+    @property
+    def record(self) -> Record:
+        """Record: all numbers, node by node"""
+        ...
+    @property
+    def peak_torques(self) -> Dict[str, float]:
+        """largest |u| by motor, largest first, N m or N"""
+        ...
+    @property
+    def objective(self) -> ObjectiveOptions:
+        """ObjectiveOptions"""
+        ...
+    @property
+    def energy(self) -> ElectricalEnergy:
+        """ElectricalEnergy"""
+        ...
+    @property
+    def gap_position(self) -> float:
+        """largest closing error, m"""
+        ...
+    @property
+    def gap_angle(self) -> float:
+        """rad"""
+        ...
+    @property
+    def slip_position(self) -> float:
+        """largest displacement of a foot from its touchdown, m"""
+        ...
+    @property
+    def slip_angle(self) -> float:
+        """rad"""
+        ...
+    @property
+    def com_start(self) -> float:
+        """height of the centre of mass, m"""
+        ...
+    @property
+    def com_lowest(self) -> float:
+        """m"""
+        ...
+    @property
+    def converged(self) -> bool:
+        ...
+    @property
+    def interrupted(self) -> bool:
+        ...
+    def write(self, directory: str) -> List[str]:
+        """Writes trajectory.csv, trajectory.npz and summary.json, as the command does. Returns their paths."""
+        ...
+    def _repr_html_(self) -> str: ...
+
+def make_report(directories: Sequence[str]) -> str:
+    """The page that shows results, from their directories: 3D replay and plots, offline. HTML."""
+    ...
+
+def write_report(path: str, directories: Sequence[str]) -> None:
+    """Writes that page to a file."""
+    ...
+
+def solve(robot: Robot, request: Request, problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[Record] = ..., callback: Optional[Callable[[Iteration], Optional[bool]]] = ...) -> Result:
+    """Solves a Request as `bielle solve` does. Returns a Result.
+
+    callback: called with each Iteration; False stops. What it raises, like Ctrl-C, ends the solve.
+    """
+    ...
+
+def make_result(motion: Motion, summary: Summary, robot: Robot) -> Result:
+    """The Result of a Motion that was solved."""
+    ...
+
+class PredictiveOptions:
+    """Options of predictive control.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, nodes: int = ..., iterations: int = ..., regularization: float = ..., penalty: float = ..., threads: int = ..., end_place: float = ..., end_posture: float = ..., end_velocity: float = ...) -> None: ...
+    def replace(self, *, nodes: int = ..., iterations: int = ..., regularization: float = ..., penalty: float = ..., threads: int = ..., end_place: float = ..., end_posture: float = ..., end_velocity: float = ...) -> PredictiveOptions: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def nodes(self) -> int:
+        """stages of a window"""
+        ...
+    @property
+    def iterations(self) -> int:
+        """of the solver, at every stage"""
+        ...
+    @property
+    def regularization(self) -> float:
+        """of its sweeps"""
+        ...
+    @property
+    def penalty(self) -> float:
+        """of violated constraints"""
+        ...
+    @property
+    def threads(self) -> int:
+        """0: all; results are bitwise independent of it"""
+        ...
+    @property
+    def end_place(self) -> float:
+        """weight of heading and place at the end of a window, 1/m^2 or 1"""
+        ...
+    @property
+    def end_posture(self) -> float:
+        """of the other coordinates"""
+        ...
+    @property
+    def end_velocity(self) -> float:
+        """of the velocities, s^2/m^2 or s^2"""
+        ...
+
+class Controller:
+    """A feedback law: from what is measured to torques. Controller.policy and .predictive make them."""
+    @staticmethod
+    def policy(motion: Motion, gains: bool = ...) -> Controller:
+        """Torques of a solved Motion, and the gains of the last sweep about it."""
+        ...
+    @staticmethod
+    def predictive(model: Model, plan: MotionPlan, solved: Trajectory, problem: ProblemOptions = ..., options: PredictiveOptions = ...) -> Controller:
+        """Solves the next second anew at every stage. plan: a MotionPlan; solved: Trajectory of its Motion."""
+        ...
+    def update(self, time: float, q: ArrayLike, v: ArrayLike, delay: float = ...) -> Array:
+        """Motor torques (nu,) at a time (s) and a measured state (nq,), (nv,); delay until they act, s.
+
+        To be called in the order of time.
+        """
+        ...
+    def reference(self, time: float) -> Tuple[Array, Array]:
+        """q (nq,) and v (nv,) that a policy follows at a time, s."""
+        ...
+    @property
+    def duration(self) -> float:
+        """of a policy, s"""
+        ...
+    @property
+    def counts(self) -> Dict[str, int]:
+        """of predictive control: solves, failed ones, early landings, solves longer than a stage"""
+        ...
+
+class World:
+    """Physics with contact: Bielle's own world, in which motors drive a robot and the ground pushes it.
+
+    With `count`, so many worlds that are stepped together on all cores: arguments and results have an axis of them in front.
+    """
+    def __init__(self, model: Model, count: Optional[int] = ..., ground: Ground = ..., time_step: float = ...) -> None: ...
+    @property
+    def model(self) -> Model:
+        """Model"""
+        ...
+    @property
+    def count(self) -> Optional[int]:
+        """number of worlds, or None"""
+        ...
+    def reset(self, q: ArrayLike, v: ArrayLike) -> WorldState:
+        """Sets closed configurations (nq,) and velocities (nv,) that keep them closed; all else starts anew."""
+        ...
+    def step(self, u: ArrayLike, duration: float, push: ArrayLike = ...) -> WorldState:
+        """Advances by a duration (s) under motor torques (nu,), cut at their limits, and a force at the trunk (3,), N.
+
+        Returns the WorldState; its `ok` is False where the integration broke off.
+        """
+        ...
+    @property
+    def wrenches(self) -> Array:
+        """of the ground on the feet in their contact frames (contacts, 6), N and N m"""
+        ...
+
+class _residuals:
+    """Residuals of the library."""
+    @staticmethod
+    def com_position(reference: ArrayLike) -> LibraryResidual:
+        """Centre of mass minus a reference (3,), m."""
+        ...
+    @staticmethod
+    def com_velocity(reference: ArrayLike) -> LibraryResidual:
+        """Velocity of the centre of mass minus a reference (3,), m/s."""
+        ...
+    @staticmethod
+    def frame_placement(model: Model, frame: str, X_WT: SE3) -> LibraryResidual:
+        """Log6 of the frame in a target (6,), m and rad."""
+        ...
+    @staticmethod
+    def frame_translation(model: Model, frame: str, reference: ArrayLike) -> LibraryResidual:
+        """Position of the frame's origin minus a reference (3,), m."""
+        ...
+    @staticmethod
+    def frame_rotation(model: Model, frame: str, R_WT: ArrayLike) -> LibraryResidual:
+        """Log3 of the frame's rotation in a target (3,), rad."""
+        ...
+    @staticmethod
+    def frame_velocity(model: Model, frame: str, reference: ArrayLike = ...) -> LibraryResidual:
+        """Velocity of the frame's origin and angular velocity in world axes, minus a reference (6,), m/s and rad/s."""
+        ...
+    @staticmethod
+    def fly_high(model: Model, frame: str, slope: float, ground: float = ...) -> LibraryResidual:
+        """Horizontal velocity times exp(-slope height) (2,), m/s; slope in 1/m."""
+        ...
+    @staticmethod
+    def frame_distance(model: Model, a: str, b: str) -> LibraryResidual:
+        """Horizontal distance between two frames (1,), m."""
+        ...
+    @staticmethod
+    def sole_clearance(model: Model, sole: str, half_length: float, half_width: float, ground: Ground, ramp: float) -> LibraryResidual:
+        """Heights of the corners of a sole over the ground (4,), of its origin if it has no size (1,), m."""
+        ...
+    @staticmethod
+    def contact_force(constraints: ConstraintSet, contact: int, reference: ArrayLike, axes: ForceAxes = ...) -> LibraryResidual:
+        """Force of a contact minus a reference (6,) or (3,), N and N m. contact: its index among those in force."""
+        ...
+    @staticmethod
+    def center_of_pressure(constraints: ConstraintSet, contact: int, axes: ForceAxes = ...) -> LibraryResidual:
+        """Centre of pressure of a 6D contact about its origin (2,), m."""
+        ...
+    @staticmethod
+    def wrench_cone(constraints: ConstraintSet, contact: int, half_length: float, half_width: float, friction: float) -> LibraryResidual:
+        """Wrench cone of a rectangular sole (17,), or of a point (5,): inside when all rows are positive, N and N m."""
+        ...
+    @staticmethod
+    def joint_position(model: Model, dofs: Sequence[int]) -> LibraryResidual:
+        """Coordinates of joints with one dof (n,), rad or m; no dofs: all with limits."""
+        ...
+    @staticmethod
+    def joint_velocity(model: Model, dofs: Sequence[int]) -> LibraryResidual:
+        """Velocity coordinates (n,), rad/s or m/s."""
+        ...
+    @staticmethod
+    def motor_power(model: Model, motors: Sequence[int]) -> LibraryResidual:
+        """Mechanical power of motors (n,), W; on steps alone."""
+        ...
+    @staticmethod
+    def electrical_power(model: Model, losses: ArrayLike) -> LibraryResidual:
+        """Electrical powers of all motors, then their torques (2 nu,), W and N m."""
+        ...
