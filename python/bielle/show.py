@@ -1,4 +1,4 @@
-"""How results show themselves in notebooks: the page of the report, which needs no network, in a frame."""
+"""How results show themselves: in one line; in notebooks the page of the report, which needs no network, in a frame."""
 
 import html
 import tempfile
@@ -18,4 +18,11 @@ def show_result(result: Result) -> str:
         return make_frame(make_report([directory]), 720)
 
 
+def format_result(result: Result) -> str:
+    """In one line: motion, robot and outcome."""
+    stages = len(result.record.u)
+    return f"<Result '{result.motion}' of {result.run.robot}: {result.solver.termination.name.lower()}, {stages} stages>"
+
+
+setattr(Result, "__repr__", format_result)
 setattr(Result, "_repr_html_", show_result)

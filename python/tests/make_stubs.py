@@ -161,7 +161,7 @@ def make_class(name, kind):
             lines += make_property(key, attribute, name, fields, sample)
         elif (not key.startswith("__") or key in ("__matmul__", "__add__", "__eq__")) and key != "_fields":
             function = attribute.__func__ if isinstance(attribute, staticmethod) else attribute
-            if inspect.isfunction(function):  # added in Python
+            if inspect.isfunction(function) and key not in HIDDEN:  # added in Python
                 lines += [f"    def {key}(self) -> {inspect.signature(function).return_annotation.__name__}: ..."]
             elif key not in HIDDEN and callable(function):
                 lines += make_function(key, function, name, "    ")
