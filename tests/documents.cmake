@@ -1,5 +1,5 @@
 # Runs every command of the pages as a reader would and compares its output.
-set(pages tutorial modelling signs new_robot motions objectives linkages checks execution speed design python)
+set(pages tutorial modelling signs new_robot motions objectives linkages checks execution speed design)
 if(BIELLE_BUILD_EXAMPLES)
   list(APPEND pages new_motion)
 endif()

@@ -14,7 +14,7 @@ import tempfile
 import time
 
 NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
-BY_HAND = ("BIELLE_ROBOTS=path/to/", "scripts/", "cmake ", "ctest ", "ninja ", "pip ", "apt ", "sudo apt ")
+BY_HAND = ("BIELLE_ROBOTS=path/to/", "scripts/", "cmake ", "ctest ", "ninja ", "apt ", "sudo apt ")
 # These take minutes; a shorter command of the same kind replaces them.
 IN_PLACE_OF = {"bielle study all -o study --jobs 2": "bielle study ratio -o study"}
 

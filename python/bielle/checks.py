@@ -15,7 +15,8 @@ def find_program(name: str) -> str:
     built = Path(__file__).absolute().parents[2] / "bin" / name
     found = str(built) if built.is_file() else shutil.which(name)
     if found is None:
-        raise FileNotFoundError(f"{name} is not on the PATH; build Bielle with -DBIELLE_BUILD_VALIDATION=ON (it needs Simbody)")
+        remedy = "build Bielle with -DBIELLE_BUILD_VALIDATION=ON (it needs Simbody)"
+        raise FileNotFoundError(f"{name} is not on the PATH; {remedy}")
     return found
 
 

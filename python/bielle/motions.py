@@ -77,7 +77,9 @@ def _make_function(motion: str, described: Dict[str, Any]) -> Callable[..., Resu
             raise TypeError(f"{name} has no option '{sorted(unknown)[0]}'; it has: {', '.join(options)}")
         request = Request(
             motion=motion,
-            options={key: _get_number(key, value, options[key]["names"]) for key, value in keywords.items() if key in options},
+            options={
+                key: _get_number(key, value, options[key]["names"]) for key, value in keywords.items() if key in options
+            },
             files={key: str(value) for key, value in keywords.items() if key in files},
             weights=keywords.get("weights", ""),
         )

@@ -46,9 +46,9 @@ class Residual:
         raise NotImplementedError
 
     def calc_jacobian(self, node: Node) -> Dict[str, npt.ArrayLike]:
-        """Derivatives of r by each entry of `depends_on`: by the tangent of q and by v (n, nv), by the forces (n, rows), by
-        controls and speeds (n, nu), by the time scale (n,). Without this function they are central differences, which call
-        `calc` twice per coordinate.
+        """Derivatives of r by each entry of `depends_on`: by the tangent of q and by v (n, nv), by the forces (n, rows),
+        by controls and speeds (n, nu), by the time scale (n,). Without this function they are central differences, which
+        call `calc` twice per coordinate.
         """
         raise NotImplementedError
 

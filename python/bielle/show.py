@@ -21,7 +21,8 @@ def show_result(result: Result) -> str:
 def format_result(result: Result) -> str:
     """In one line: motion, robot and outcome."""
     stages = len(result.record.u)
-    return f"<Result '{result.motion}' of {result.run.robot}: {result.solver.termination.name.lower()}, {stages} stages>"
+    outcome = result.solver.termination.name.lower()
+    return f"<Result '{result.motion}' of {result.run.robot}: {outcome}, {stages} stages>"
 
 
 setattr(Result, "__repr__", format_result)
