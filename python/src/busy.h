@@ -1,5 +1,6 @@
 #pragma once
-/// \file Objects that one thread uses at a time. A lock could be waited for with the interpreter's lock in hand, and for ever.
+/// \file Objects that one thread uses at a time. Not by a lock: a thread that waits for it with the interpreter's lock
+/// in hand would stop the one that it waits for.
 #include <atomic>
 #include <stdexcept>
 #include <string>

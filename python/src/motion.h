@@ -35,8 +35,8 @@ struct HeldMotion {
 std::shared_ptr<HeldMotion> makeHeldMotion(std::shared_ptr<Model> model, const Request& request,
                                            const ProblemOptions& options);
 
-/// Lets `callback(iteration)` observe a solve that runs without the interpreter's lock, and signals end it: their exceptions
-/// leave it. False from the callback stops it.
+/// Lets `callback(iteration)` observe a solve that runs without the interpreter's lock, and signals end it: their
+/// exceptions leave it. False from the callback stops it.
 FddpObserver makeObserver(const py::object& callback);
 
 }  // namespace bielle::python

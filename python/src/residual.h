@@ -1,6 +1,6 @@
 #pragma once
-/// \file Residuals as Python sees them: those of the library know how they were made, those written in Python are called with
-/// the interpreter's lock.
+/// \file Residuals as Python sees them: those of the library know how they were made, those written in Python are called
+/// with the interpreter's lock.
 #include "bielle/ocp/residual.h"
 #include "model_access.h"
 
