@@ -297,6 +297,46 @@ TEST_CASE("a horizon that advances takes its multipliers along") {
   CHECK(after.values[N] == before[N]);
 }
 
+TEST_CASE("solves of one iteration, for receding horizons, linearize once each and reach the optimum together") {
+  using Problem = Constrained<PlantProblem<Linear>>;
+  struct Counted : Problem {
+    explicit Counted(const Problem& problem) : Problem(problem) {}
+    using Problem::linearize;
+    void linearize(LinearizeTask& task, ProblemScratch* scratch) const override {
+      ++linearized;
+      Problem::linearize(task, scratch);
+    }
+    mutable int linearized = 0;
+  };
+  Counted problem{Problem(makeLinear())};
+  problem.rows.push_back(
+      {"speed", 1, problem.stages, -0.4, kFree, [](const Complex* x, const Complex*) { return x[1] + x[2]; }});
+  ShootingTrajectory t = makeGuess(problem), optimum = t;
+  REQUIRE(Fddp().solve(problem, optimum).termination == FddpTermination::Converged);
+  FddpOptions options;
+  options.threads = options.max_iterations = 1;
+  options.last_rollout = LastRollout::Segments;
+  options.constraints.initial_penalty = 1;
+  options.constraints.penalty_increase = 1;
+  Fddp solver(options);
+  problem.linearized = 0;
+  constexpr int kSolves = 25;
+  const auto calcError = [&] {
+    double error = 0;
+    for (size_t k = 0; k < t.us.size(); ++k) error = std::max(error, (t.us[k] - optimum.us[k]).norm());
+    return error;
+  };
+  double first = 0;
+  for (int i = 0; i < kSolves; ++i) {
+    if (i > 0) solver.setMultipliers(solver.getMultipliers());
+    solver.solve(problem, t);
+    CHECK(problem.linearized == (i + 1) * (problem.stages + 1));
+    if (i == 0) first = calcError();
+  }
+  CAPTURE(first);
+  CHECK(calcError() < 0.01 * first);
+}
+
 TEST_CASE("an iteration with constraints allocates nothing after the first, and threads change no bit") {
   auto problem = makeBoundedCartPole();
   std::vector<ShootingTrajectory> results;

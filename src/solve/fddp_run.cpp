@@ -53,6 +53,10 @@ FddpRun::End FddpRun::linearize() {
   }
   if (const End end = evaluate()) return end;
   work_.lagrangian.evaluate(work_.evaluations.getIterate());
+  if (recedes() && !work_.lagrangian.isEmpty()) {
+    work_.lagrangian.updateMultipliers(work_.evaluations.getIterate(), line_.cost);
+    updated_ = true;
+  }
   if (const End end = linearizeAndSweep()) return end;
   updateGaps();
   line_.violation = work_.lagrangian.getViolation();

@@ -61,6 +61,8 @@ class FddpRun {
   End checkProgress();
   FddpSummary finish(FddpTermination termination);
 
+  // Whether multipliers are updated before every linearization, so that no iteration linearizes twice.
+  bool recedes() const { return options_.last_rollout == LastRollout::Segments; }
   bool isInterrupted() const { return observer_.interrupt && observer_.interrupt->load(); }
   int getNumSegments() const { return std::max(1, std::min(options_.rollout_segments, N_ / kShortestSegment)); }
   bool isClosed() const { return line_.gap <= options_.gap_tolerance; }

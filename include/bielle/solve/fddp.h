@@ -74,8 +74,8 @@ class LqSweep;
 
 enum class ControlBounds { Ignore, Enforce };
 
-/// The last allowed iteration either closes the gaps or, in a receding horizon, leaves them to the next solve like
-/// other iterations, and all steps are rolled out in segments.
+/// The last allowed iteration either closes the gaps or, in a receding horizon, leaves them to the next solve like other
+/// iterations; all steps are then rolled out in segments, and Eq. (12) comes before every linearization, which is made once.
 enum class LastRollout { Closed, Segments };
 
 /// How constraints are enforced; without effect on problems that have none.
