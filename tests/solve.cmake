@@ -1,5 +1,6 @@
 bielle_test(lq SOURCES test_lq.cpp LIBS bielle_solve)
 bielle_test(fddp SOURCES test_fddp.cpp LIBS bielle_solve bielle_model)
+bielle_test(flat_models SOURCES test_flat_models.cpp LIBS bielle_solve bielle_model)
 bielle_test(fddp_failures SOURCES test_fddp_failures.cpp LIBS bielle_solve bielle_model)
 # The test counts allocations: malloc, and operator new(size_t) by its mangled name.
 target_link_options(test_fddp PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)

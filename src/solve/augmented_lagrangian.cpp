@@ -19,6 +19,7 @@ constexpr double kNear = 0.03, kNearPenalty = 1e3;  // the latter over the initi
 constexpr double kShare = 0.1, kRestorationShare = 1e-6;
 // Penalty times squared violations over the cost, while violations alone are minimized.
 constexpr double kRestorationWeight = 1e6;
+constexpr double kDominance = 100;  // the same ratio, from which on the least violations are known to a per cent
 
 double clamp(double value, double lower, double upper) { return std::min(std::max(value, lower), upper); }
 
@@ -90,6 +91,15 @@ void AugmentedLagrangian::evaluate(const EvaluationList& iterate) {
       at_.worst_row = static_cast<int>(i);
     }
   }
+}
+
+bool AugmentedLagrangian::isNear() const {
+  const bool grows = options_.penalty_increase > 1 && penalty_ < options_.max_penalty;
+  return !isEmpty() && !isSatisfied() && !restoring_ && grows && at_.violation < kNear;
+}
+
+bool AugmentedLagrangian::dominates(double cost) const {
+  return restoring_ && penalty_ * at_.squares >= kDominance * std::abs(cost);
 }
 
 bool AugmentedLagrangian::isDue(double foreseen) const {

@@ -24,6 +24,10 @@ class AugmentedLagrangian {
   double getViolation() const { return at_.violation; }              ///< the largest
   double getComplementarity() const { return at_.complementarity; }  ///< Eq. (13), of the multipliers after Eq. (12)
   bool isSatisfied() const { return at_.violation <= options_.tolerance; }
+  /// Whether constraints are violated, but so little that multipliers under a growing penalty should mend it.
+  bool isNear() const;
+  /// Whether violations alone are minimized, and outweigh `cost` so far that the least of them has been found.
+  bool dominates(double cost) const;
   /// Whether multipliers should be updated, given the decrease that a full step promises under the present ones.
   bool isDue(double foreseen) const;
 

@@ -14,7 +14,7 @@ const char* getName(FddpTermination termination) {
     case FddpTermination::RegularizationMax:
       return "maximum of regularization";
     case FddpTermination::Infeasible:
-      return "infeasible";
+      return "locally infeasible";
     case FddpTermination::Interrupted:
       return "interrupted";
     case FddpTermination::Failed:

@@ -11,6 +11,8 @@ namespace bielle {
 namespace {
 
 constexpr double kGoodStep = 0.1;  // alpha after which a foreseen decrease is believed
+// A line search starts at less than 1 only below these gaps and violations and beyond this ratio of curvatures, and at least here.
+constexpr double kSmallGap = 1e-6, kClose = 0.03, kSteep = 1.5, kShortestFirst = 0.05;
 constexpr const char* kStalled = "the cost no longer decreases";
 
 }  // namespace
@@ -135,8 +137,8 @@ FddpRun::End FddpRun::updateMultipliers() {
       closing_ = updated_ = true;
       return {};
     }
-    summary_.message = "the constraints cannot all be kept: " + work_.lagrangian.describeWorst(problem_);
-    return FddpTermination::Infeasible;
+    summary_.message = "near here the constraints cannot all be kept: " + work_.lagrangian.describeWorst(problem_);
+    return work_.lagrangian.dominates(line_.cost) ? FddpTermination::Infeasible : FddpTermination::RegularizationMax;
   }
   closing_ = stalled_ = swept_ = false;
   updated_ = true;
@@ -185,7 +187,19 @@ double FddpRun::calcGradient() const {
   return gradient;
 }
 
+// alpha that the next line search starts with, where models are too flat (fddp.h).
+void FddpRun::chooseFirstStep() {
+  const double alpha = accepted_->alpha;
+  first_step_ = 1;
+  const bool creeps = alpha < 1 && last_step_ < 1 && line_.violation < kClose;
+  if (!creeps || line_.gap > kSmallGap) return;
+  const double curvature =
+      2 * (accepted_->merit - calcMerit() - alpha * slope_) / (alpha * alpha);  // of Eq. (1), as it is
+  if (curvature_ > 0 && curvature > kSteep * curvature_) first_step_ = std::max(kShortestFirst, curvature_ / curvature);
+}
+
 void FddpRun::acceptStep() {
+  chooseFirstStep();
   std::swap(trajectory_, accepted_->nodes);
   if (work_.rollout.hasEvaluations()) {
     work_.evaluations.swapTrial();
@@ -206,17 +220,28 @@ FddpRun::End FddpRun::raiseRegularization(const char* reason) {
   regularization_ *= options_.regularization_increase;
   if (regularization_ <= options_.max_regularization) return {};
   AugmentedLagrangian& lagrangian = work_.lagrangian;
+  // A larger penalty lifts what is left to gain over the rounding of the merit.
+  if (lagrangian.isNear() && lagrangian.updateMultipliers(work_.evaluations.getIterate(), line_.cost)) {
+    updated_ = true;
+    resetRegularization();
+    return {};
+  }
   if (!lagrangian.isSatisfied() && lagrangian.restore(work_.evaluations.getIterate(), line_.cost)) {
-    regularization_ = options_.initial_regularization;
-    stalled_ = swept_ = false;
-    closed_merit_.reset();
+    resetRegularization();
     return {};
   }
   summary_.message = std::string(reason) + " even at the largest regularization";
   if (!failure_.empty()) summary_.message += "; node " + std::to_string(failed_node_) + ": " + failure_;
   if (lagrangian.isSatisfied()) return FddpTermination::RegularizationMax;
   summary_.message += "; " + lagrangian.describeWorst(problem_);
-  return FddpTermination::Infeasible;
+  return lagrangian.dominates(line_.cost) ? FddpTermination::Infeasible : FddpTermination::RegularizationMax;
+}
+
+// For a merit that has changed, about the same evaluations.
+void FddpRun::resetRegularization() {
+  regularization_ = options_.initial_regularization;
+  stalled_ = swept_ = false;
+  closed_merit_.reset();
 }
 
 // After an accepted step: logs it, adapts the regularization to its length, and decides whether to continue.

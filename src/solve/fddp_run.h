@@ -56,7 +56,9 @@ class FddpRun {
   bool isRounding() const;
   double calcRounding() const;
   bool isAcceptable(const Trial& trial, double nu) const;
+  void chooseFirstStep();
   void acceptStep();
+  void resetRegularization();
   End raiseRegularization(const char* reason);
   End checkProgress();
   FddpSummary finish(FddpTermination termination);
@@ -93,6 +95,7 @@ class FddpRun {
   std::string failure_;
   double accepted_merit_ = 0;
   std::optional<double> closed_merit_;        // after a full step under the same multipliers, with Eq. (8)
+  double first_step_ = 1;                     // alpha that the next line search starts with
   double last_gradient_ = 0, last_step_ = 1;  // of the iteration before
   FddpSummary summary_;
 };

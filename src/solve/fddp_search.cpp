@@ -54,10 +54,10 @@ bool FddpRun::searchLine() {
   const int segments = getNumSegments();
   if (segments > 1 && options_.last_rollout == LastRollout::Segments && !mustClose())
     return searchInSegments(input, segments, nu);
-  if (segments > 1 && last_step_ == 1 && tryFullStep(input, segments, nu)) return true;
+  if (segments > 1 && last_step_ == 1 && first_step_ == 1 && tryFullStep(input, segments, nu)) return true;
   Rollout& rollout = work_.rollout;
   const int num_trials = rollout.getNumTrials();
-  double alpha = 1;
+  double alpha = first_step_;
   for (int i = 0; i < options_.num_step_lengths; i += num_trials) {
     if (isInterrupted()) return false;
     const int num = std::min(num_trials, options_.num_step_lengths - i);

@@ -58,8 +58,16 @@
 /// whenever it is below 0.03, up to 1000 times the initial one, so that (12) converges faster. Converged means that the
 /// gradient has vanished and no row is violated by more than the tolerance; y_k is then the multiplier of c_k in
 ///     L = J + sum_k y_k . c_k,  positive at upper bounds, negative at lower ones,  and  y_i (bound_i - c_i) vanishes.   (13)
-/// If the violation no longer falls although rho is at its largest, the problem is called infeasible: the trajectory is then a
-/// point where, to first order, the constraints cannot be violated less.
+/// If the violation no longer falls although rho is at its largest, or no step is acceptable, the violations are minimized on
+/// their own, with rho so large that rho |d|^2 is a million times J, or at its largest. If they then stop falling and rho |d|^2 is
+/// still a hundred times J, the problem is called locally infeasible: the trajectory is a point where, to first order, the
+/// constraints cannot be violated less. Otherwise it ends as RegularizationMax.
+///
+/// Models without second derivatives may be too flat along some directions, by a factor that stays the same from step to step.
+/// After two steps alpha < 1 in a row, close to the constraints and with closed gaps, the curvature b of the merit along the
+/// last one is taken from its values. Where it is more than 1.5 times the curvature a of (1), the next line search starts at
+/// a / b instead of 1 (Barzilai and Borwein, "Two-point step size gradient methods", IMA Journal of Numerical Analysis 8,
+/// 1988, in the metric of the models): such a direction then dies out, where it would only change its sign.
 #include <atomic>
 #include <functional>
 #include <iosfwd>
