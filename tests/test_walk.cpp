@@ -156,6 +156,18 @@ TEST_CASE("walk: Bipetto walks as fast as asked, on its feet") {
   }
 }
 
+TEST_CASE("walk: a fast one with short stages, whose contacts are stiff, is found from the guess") {
+  WalkOptions options;
+  options.speed = 0.9;
+  options.gait.timing.time_step = 0.01;
+  Motion motion = makeWalk(getBipetto(), options);
+  FddpOptions solver;
+  solver.initial_regularization = kGuessRegularization;
+  const FddpSummary summary = solveMotion(motion, solver);
+  CAPTURE(summary.message, summary.iterations);
+  CHECK(summary.termination == FddpTermination::Converged);
+}
+
 TEST_CASE("walk: stages are as short as the fastest swing needs, unless their length is given") {
   const Model& model = getBipetto();
   const VectorXd q0 = makeStandingPosture(model);
@@ -293,6 +305,33 @@ TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with i
   CHECK(far.summary.termination == FddpTermination::Infeasible);
   CHECK_THAT(far.summary.message,
              Catch::Contains("landing of foot_") && Catch::Contains("at node " + std::to_string(landing)));
+}
+
+TEST_CASE("walk: it is called infeasible after two attempts") {
+  WalkOptions options;
+  options.steps = 2;
+  options.gait.timing.time_step = 0.03;
+  MotionPlan plan = planWalk(getBipetto(), options, makeStandingPosture(getBipetto()));
+  for (StageSpec& stage : plan.stages)
+    for (PathConstraint& constraint : stage.path_constraints)
+      if (constraint.name.rfind("landing of ", 0) == 0)
+        constraint.residual = makeFramePlacement(getBodyFrame(getBipetto(), constraint.name.substr(11)),
+                                                 SE3{Matrix3d::Identity(), Vector3d(0, 0, 1)});
+  Motion motion = makeMotion(getBipetto(), std::move(plan), {});
+  FddpOptions solver;
+  solver.initial_regularization = kGuessRegularization;
+  const FddpSummary summary = solveMotion(motion, solver);
+  CAPTURE(summary.message);
+  CHECK(summary.termination == FddpTermination::Infeasible);
+  CHECK_THAT(summary.message, Catch::Contains("landing of foot_") && Catch::Contains("two attempts"));
+  // The log starts again, and counts for both.
+  int attempts = 0, steps = 0;
+  for (const FddpIteration& line : summary.log) {
+    attempts += line.iteration == 1;
+    steps += line.step > 0;
+  }
+  CHECK(attempts == 2);
+  CHECK(steps == summary.iterations);
 }
 
 TEST_CASE("walk: what cannot be done is refused by name") {

@@ -99,22 +99,60 @@ std::unique_ptr<PeakProblem> makePeakProblem(const Motion& motion) {
   return std::make_unique<PeakProblem>(*motion.problem, motion.peak_limits, motion.objective.scale, most);
 }
 
-FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer,
-                        Multipliers* multipliers) {
-  FddpOptions solver = options;
+namespace {
+
+struct Attempt {
+  FddpSummary summary;
+  ShootingTrajectory trajectory;
+  Multipliers multipliers;
+};
+
+Attempt attempt(const Motion& motion, FddpOptions solver, const FddpObserver& observer) {
   const std::unique_ptr<PeakProblem> peak = makePeakProblem(motion);
   if (motion.bounded || peak) solver.bounds = ControlBounds::Enforce;
   Fddp fddp(solver);
-  FddpSummary summary;
-  if (peak) {
-    ShootingTrajectory trajectory = peak->wrap(motion.guess);
-    summary = fddp.solve(*peak, trajectory, observer);
-    motion.guess = peak->unwrap(trajectory);
-  } else {
-    summary = fddp.solve(*motion.problem, motion.guess, observer);
+  Attempt out;
+  out.trajectory = peak ? peak->wrap(motion.guess) : motion.guess;
+  out.summary =
+      peak ? fddp.solve(*peak, out.trajectory, observer) : fddp.solve(*motion.problem, out.trajectory, observer);
+  if (peak) out.trajectory = peak->unwrap(out.trajectory);
+  out.multipliers = fddp.getMultipliers();
+  return out;
+}
+
+// The better of two attempts, with the iterations and times of both.
+Attempt join(Attempt first, Attempt second) {
+  const bool both = second.summary.termination == FddpTermination::Infeasible;
+  const FddpSummary &before = first.summary, &after = second.summary;
+  Attempt& better = both && before.violation < after.violation ? first : second;
+  FddpSummary out = better.summary;
+  out.iterations = before.iterations + after.iterations;
+  out.multiplier_updates = before.multiplier_updates + after.multiplier_updates;
+  out.seconds = before.seconds + after.seconds;
+  out.linearize_seconds = before.linearize_seconds + after.linearize_seconds;
+  out.sweep_seconds = before.sweep_seconds + after.sweep_seconds;
+  out.rollout_seconds = before.rollout_seconds + after.rollout_seconds;
+  out.log = before.log;
+  out.log.insert(out.log.end(), after.log.begin(), after.log.end());
+  if (both) out.message += "; the better of two attempts";
+  better.summary = std::move(out);
+  return std::move(better);
+}
+
+}  // namespace
+
+FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer,
+                        Multipliers* multipliers) {
+  constexpr double kCautious = 1e-2;  // regularization of the second attempt
+  Attempt result = attempt(motion, options, observer);
+  if (result.summary.termination == FddpTermination::Infeasible && options.initial_regularization < kCautious) {
+    FddpOptions cautious = options;
+    cautious.initial_regularization = kCautious;
+    result = join(std::move(result), attempt(motion, cautious, observer));
   }
-  if (multipliers) *multipliers = fddp.getMultipliers();
-  return summary;
+  motion.guess = std::move(result.trajectory);
+  if (multipliers) *multipliers = std::move(result.multipliers);
+  return std::move(result.summary);
 }
 
 MotionEnvelope::MotionEnvelope(const Motion& optimum, const Multipliers& multipliers)
