@@ -201,6 +201,16 @@ TEST_CASE("gait: loads of a run carry the weight on average, and its centre of m
   CHECK(impulse * g * h == Approx(0).margin(5e-3));  // m/s, from rest to rest; sums differ from integrals
 }
 
+TEST_CASE("run: stages are as short as the fastest swing needs") {
+  const auto getStep = [](double speed) {
+    RunOptions options;
+    options.speed = speed;
+    return planRun(getBipetto(), options, makeStandingPosture(getBipetto())).schedule.phases.front().dt;
+  };
+  CHECK(getStep(1) == 0.005);
+  CHECK(getStep(1.5) == Approx(0.004));
+}
+
 TEST_CASE("run: Bipetto runs as fast as asked, flies in between, and lands softly") {
   const RunOptions options;
   Motion motion = makeRun(getBipetto(), options, {Formulation::Reduced, StepRule::Midpoint});
@@ -243,9 +253,9 @@ TEST_CASE("run, hop: what cannot be done is refused by name") {
                                                                        {true, "steps", 1, "steps"},
                                                                        {true, "flight", 0, "flight"},
                                                                        {true, "flight", 0.004, "flight"},
-                                                                       {true, "stance", 0.01, "stance"},
+                                                                       {true, "stance", 0.005, "stance"},
                                                                        {true, "stretch", 1, "stretch"},
-                                                                       {true, "time_step", 0, "time_step"},
+                                                                       {true, "time_step", -1, "time_step"},
                                                                        {false, "foot", 2, "foot"},
                                                                        {false, "hops", 0, "hops"},
                                                                        {false, "hops", 1.5, "hops"},

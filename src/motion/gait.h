@@ -24,7 +24,7 @@ namespace bielle {
 /// Placement along a swing from a to b.
 SE3 calcSwing(const SwingShape& shape, const SE3& a, const SE3& b, double s);
 
-/// Length of the stages of a walk, s: 12 ms while no foot swings faster than 4.1 m/s along its path, then less with the
+/// Length of the stages of a walk or, with flights, of a run, s: 12 ms or 5 ms while no foot swings faster than 4.1 m/s along its path, then less with the
 /// square of the speed, in whole milliseconds, at least 2. (What midpoint steps of 12 ms leave, slip and differences of the
 /// velocity, grows with the power 4.5 of the speed in Bipetto's walks from 0.8 to 1.2 m/s, whose feet swing at 3.6 to 5.3
 /// m/s; and with the square of the step.)

@@ -40,7 +40,7 @@ MotionPlan planFlights(const Model& model, const Stance& stance, LocomotionTask 
   gait.timing.flight = options.flight;
   gait.timing.single = options.stance;
   requireOption(options.flight > 0, "flight", "it is not positive", "give seconds, e.g. 0.1");
-  requireOption(gait.timing.time_step > 0, "time_step", "it is not positive", "give seconds, e.g. 0.005");
+  if (gait.timing.time_step == 0) gait.timing.time_step = chooseTimeStep(task, gait.timing, gait.swing);
   requireOption(options.stance >= 4 * gait.timing.time_step, "stance", "it is shorter than four time steps",
                 "give seconds, e.g. 0.25");
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
@@ -52,7 +52,8 @@ MotionPlan planFlights(const Model& model, const Stance& stance, LocomotionTask 
 }
 
 // All flights together.
-Goal makeFlightGoal(const ContactSchedule& schedule, int flights, double flight, double time_step) {
+Goal makeFlightGoal(const ContactSchedule& schedule, int flights, double flight) {
+  const double time_step = schedule.phases.front().dt;
   return {GoalKind::FlightTime, "time in the air", flights * flight, flights * calcTolerance(flight, time_step / 2), 0,
           schedule.numStages()};
 }
@@ -61,7 +62,6 @@ Goal makeFlightGoal(const ContactSchedule& schedule, int flights, double flight,
 
 LocomotionOptions RunOptions::makeGaitDefaults() {
   LocomotionOptions gait;
-  gait.timing.time_step = 0.005;
   gait.swing.arrive = 1;
   gait.force_weight = 100;
   return gait;
@@ -109,7 +109,7 @@ MotionPlan planRun(const Model& model, const RunOptions& o, const VectorXd& q0) 
   std::vector<Goal> goals;
   if (steps >= kSteadySteps)
     goals = makeSpeedGoals(plan.schedule, o.speed, calcMiddle(stance.feet[0], stance.feet[1]).R.col(0));
-  goals.push_back(makeFlightGoal(plan.schedule, steps - 1, o.flight, o.gait.timing.time_step));
+  goals.push_back(makeFlightGoal(plan.schedule, steps - 1, o.flight));
   plan.goals.insert(plan.goals.begin(), goals.begin(), goals.end());
   return plan;
 }
@@ -134,7 +134,7 @@ MotionPlan planHop(const Model& model, const HopOptions& o, const VectorXd& q0) 
               plan.schedule.numStages()};
   length.direction = calcMiddle(stance.feet[0], stance.feet[1]).R.col(0);
   for (int contact : stance.contacts) length.contacts.push_back(model.contacts()[contact].name);
-  const Goal flight = makeFlightGoal(plan.schedule, hops, o.flight, o.gait.timing.time_step);
+  const Goal flight = makeFlightGoal(plan.schedule, hops, o.flight);
   plan.goals.insert(plan.goals.begin(), {flight, length});
   return plan;
 }
