@@ -1,5 +1,6 @@
 bielle_test(walk SOURCES test_walk.cpp LIBS bielle_motion)
 bielle_test(commanded_walk SOURCES test_commanded_walk.cpp LIBS bielle_motion)
+bielle_test(kinematic_guess SOURCES test_kinematic_guess.cpp LIBS bielle_motion)
 bielle_test(run SOURCES test_run.cpp LIBS bielle_motion)
 bielle_test(stairs SOURCES test_stairs.cpp LIBS bielle_motion)
 bielle_test(obstacles SOURCES test_obstacles.cpp robot_directory.cpp LIBS bielle_motion)

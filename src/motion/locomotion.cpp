@@ -6,6 +6,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "motion/foot_constraints.h"
+#include "motion/kinematic_guess.h"
 #include "motion/locomotion_stages.h"
 
 namespace bielle {
@@ -62,6 +63,20 @@ std::vector<Goal> makeFootholdGoals(const Scene& scene, const ContactSchedule& s
     goal.footholds.push_back({scene.model.contacts()[scene.stance.contacts[static_cast<int>(steps[i].side)]].name,
                               landings[i], steps[i].X_WF.p});
   return {goal};
+}
+
+// At rest at every node of the gait, with the feet where it has them.
+std::vector<VectorXd> makeGuesses(const Scene& scene) {
+  std::vector<VectorXd> xs;
+  std::vector<PlannedPosture> postures;
+  for (const GaitNode& node : scene.gait.nodes) {
+    xs.push_back(makeGuess(scene, node));
+    postures.push_back({xs.back().head(scene.model.nq()), getFeet(scene, node)});
+  }
+  if (isPublished(scene)) return xs;
+  const std::vector<VectorXd> qs = placeFeet(scene.model, scene.stance, postures);
+  for (size_t k = 0; k < xs.size(); ++k) xs[k].head(scene.model.nq()) = qs[k];
+  return xs;
 }
 
 }  // namespace
@@ -135,6 +150,7 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   plan.ground = task.ground;
   plan.ground.friction = options.friction;
   plan.limited = options.published == 0;
+  const std::vector<VectorXd> guess = makeGuesses(scene);
   size_t node = 0;
   for (const GaitPhase& phase : scene.gait.phases) {
     const std::vector<ContactTarget> contacts = makeTargets(scene, phase);
@@ -144,17 +160,17 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
       plan.schedule.phases.push_back({"impact", 1, 0, contacts});
       plan.stages.push_back(makeImpact(scene, scene.gait.nodes[node], contacts));
       plan.guess.us.push_back(VectorXd::Zero(model.nu()));
-      plan.guess.xs.push_back(makeGuess(scene, scene.gait.nodes[node]));
+      plan.guess.xs.push_back(guess[node]);
     }
     plan.schedule.phases.push_back({nameOf(phase), phase.nodes, options.timing.time_step, contacts});
     for (int i = 0; i < phase.nodes; ++i, ++node) {
       plan.stages.push_back(makeStage(scene, static_cast<int>(node), contacts));
       plan.guess.us.push_back(u);
-      plan.guess.xs.push_back(makeGuess(scene, scene.gait.nodes[node]));
+      plan.guess.xs.push_back(guess[node]);
     }
   }
   plan.stages.push_back(makeTerminalStage(scene));
-  plan.guess.xs.push_back(makeGuess(scene, scene.gait.nodes.back()));
+  plan.guess.xs.push_back(guess.back());
   const auto end = task.plan.getStance(static_cast<int>(task.plan.steps.size()));
   const SE3 start = calcMiddle(stance.feet[0], stance.feet[1]);
   plan.goals = makeFootholdGoals(scene, plan.schedule);

@@ -1,0 +1,99 @@
+// The guess of walks and stairs: closed postures with the feet where the plan has them.
+#include <catch2/catch.hpp>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/reader.h"
+#include "bielle/motion/stairs.h"
+#include "bielle/motion/walk.h"
+#include "motion/kinematic_guess.h"
+
+using namespace bielle;
+
+namespace {
+
+const Model& getBipetto() {
+  static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
+  return robot.model;
+}
+
+// Largest distance of a standing foot from its place, and gap of a closure, at the nodes of the guess.
+struct Errors {
+  double feet = 0, closures = 0;
+};
+Errors measure(const Motion& motion) {
+  const Model& model = getBipetto();
+  const ConstraintSet closures = makeConstraintSet(model);
+  Workspace ws(model);
+  Errors worst;
+  size_t k = 0;
+  for (const ContactPhase& phase : motion.schedule.phases)
+    for (int i = 0; i < phase.nodes; ++i, ++k) {
+      updatePositions(model, ws, motion.guess.xs[k].head(model.nq()));
+      worst.closures = std::max(worst.closures, calcLargestGap(ws, closures));
+      for (const ContactTarget& target : phase.contacts) {
+        const ContactFrame& contact = model.contacts()[target.contact];
+        const SE3 X = getPlacement(ws, contact.body, contact.X_BF);
+        worst.feet = std::max(worst.feet, (X.p - target.X_WT.p).norm());  // soles may tilt at the end of a long step
+      }
+    }
+  return worst;
+}
+
+Stance makeStance() { return bielle::makeStance(getBipetto(), LocomotionOptions(), makeStandingPosture(getBipetto())); }
+
+double measureTransmissions(const VectorXd& q) {
+  const Model& model = getBipetto();
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  const VectorXd none;
+  const ConstraintSet closures = makeConstraintSet(model);
+  double least = 1;
+  VectorXd value(1);
+  for (const Transmission& transmission : listTransmissions(model, makeStandingPosture(model))) {
+    makeTransmission(transmission)->calc({model, ws, closures, none, none}, value);
+    least = std::min({least, value[0], 1 / value[0]});
+  }
+  return least;
+}
+
+}  // namespace
+
+TEST_CASE("guess: loops are closed, and standing feet are where they stand") {
+  WalkOptions walk;
+  walk.speed = 0.8;
+  StairsOptions stairs;
+  stairs.height = 0.05;
+  for (const Motion& motion : {makeWalk(getBipetto(), walk), makeStairs(getBipetto(), stairs)}) {
+    INFO(motion.name);
+    const Errors errors = measure(motion);
+    CHECK(errors.closures < 1e-10);
+    CHECK(errors.feet < 1e-10);
+  }
+}
+
+TEST_CASE("guess: the base comes down for a long stride, and linkages keep away from dead points") {
+  const Stance stance = makeStance();
+  PlannedPosture planned{stance.q, stance.feet};
+  planned.feet[0].p.x() += 0.2;
+  planned.feet[1].p.x() -= 0.2;
+  const VectorXd q = placeFeet(getBipetto(), stance, {planned}).front();
+  CHECK(q[2] < stance.q[2] - 0.01);
+  CHECK((q.head<2>() - stance.q.head<2>()).norm() < 1e-10);
+  CHECK(measureTransmissions(q) > kLeastTransmission);
+  Workspace ws(getBipetto());
+  updatePositions(getBipetto(), ws, q);
+  for (int i = 0; i < 2; ++i) {
+    const ContactFrame& contact = getBipetto().contacts()[stance.contacts[i]];
+    CHECK((getPlacement(ws, contact.body, contact.X_BF).p - planned.feet[i].p).norm() < 1e-10);
+    CHECK((getPlacement(ws, contact.body, contact.X_BF).R - planned.feet[i].R).norm() < 1e-10);
+  }
+}
+
+TEST_CASE("guess: out of reach, legs are as in the stance") {
+  const Stance stance = makeStance();
+  PlannedPosture planned{stance.q, stance.feet};
+  planned.feet[0].p.x() += 2;
+  const VectorXd q = placeFeet(getBipetto(), stance, {planned}).front();
+  CHECK((q.tail(q.size() - 7) - stance.q.tail(q.size() - 7)).norm() < 1e-12);
+}
