@@ -153,7 +153,22 @@ void SimbodyTree::addBody(int i) {
   throw std::logic_error("a fixed joint carries no body of a model");
 }
 
+void SimbodyTree::addCoupler(const Closure& closure) {
+  const int n = static_cast<int>(closure.terms.size());
+  SimTK::Vector coefficients(n + 1);
+  SimTK::Array_<SimTK::MobilizedBodyIndex> coupled;
+  for (int i = 0; i < n; ++i) {
+    coefficients[i] = closure.terms[i].coefficient;
+    coupled.push_back(bodies[closure.terms[i].joint].getMobilizedBodyIndex());
+  }
+  coefficients[n] = -closure.offset;
+  constraints.push_back({SimTK::Constraint::CoordinateCoupler(
+      matter, new SimTK::Function::Linear(coefficients), coupled,
+      SimTK::Array_<SimTK::MobilizerQIndex>(n, SimTK::MobilizerQIndex(0)))});  // takes the function over
+}
+
 void SimbodyTree::addClosure(const Closure& closure) {
+  if (closure.kind == ClosureKind::Coupler) return addCoupler(closure);
   MobilizedBody &body1 = bodies[closure.body1], &body2 = bodies[closure.body2];
   constraints.emplace_back();
   if (closure.kind == ClosureKind::Weld6D) {

@@ -309,8 +309,7 @@ Books BielleWorld::getBooks() const {
 double BielleWorld::getGap() const {
   updatePlacements<double>(model_, ws_, getConfiguration());
   double gap = 0;
-  for (const Closure& closure : model_.closures())
-    gap = std::max(gap, calcClosureResidual(ws_, closure).head(3).norm());
+  for (const Closure& closure : model_.closures()) gap = std::max(gap, calcClosureGap(ws_, closure).position);
   return gap;
 }
 

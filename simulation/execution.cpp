@@ -51,9 +51,9 @@ class Recorder {
     record_.com.row(node_) = calcCom(model_, ws_);
     record_.gap.row(node_).setZero();
     for (const Closure& closure : model_.closures()) {
-      const RowVectorUpTo6 r = calcClosureResidual(ws_, closure);
-      record_.gap(node_, 0) = std::max(record_.gap(node_, 0), r.head(3).norm());
-      record_.gap(node_, 1) = std::max(record_.gap(node_, 1), r.tail(r.size() - 3).norm());
+      const ClosureGap gap = calcClosureGap(ws_, closure);
+      record_.gap(node_, 0) = std::max(record_.gap(node_, 0), gap.position);
+      record_.gap(node_, 1) = std::max(record_.gap(node_, 1), gap.angle);
     }
     if (node_ > 0)
       record_.a.row(node_ - 1) =

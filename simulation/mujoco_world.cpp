@@ -213,8 +213,7 @@ Books MujocoWorld::getBooks() const {
 double MujocoWorld::getGap() const {
   updatePositions(model_, ws_, q_);
   double gap = 0;
-  for (const Closure& closure : model_.closures())
-    gap = std::max(gap, calcClosureResidual(ws_, closure).head<3>().norm());
+  for (const Closure& closure : model_.closures()) gap = std::max(gap, calcClosureGap(ws_, closure).position);
   return gap;
 }
 

@@ -48,11 +48,9 @@ Model rebuild(const Model& model, const std::vector<Inertia>& inertias, const st
     return name;
   };
   for (size_t c = 0; c < model.closures().size(); ++c) {
-    const Closure& closure = model.closures()[c];
-    const SE3 X_B1(closure.X_B1.R, closure.X_B1.p + shifts[c]);
-    builder.addClosure(closure.name, closure.kind, addFrame(closure.name + "|1", closure.body1, X_B1),
-                       addFrame(closure.name + "|2", closure.body2, closure.X_B2), closure.axis, closure.kp,
-                       closure.kd);
+    Closure closure = model.closures()[c];
+    closure.X_B1.p += shifts[c];
+    builder.copyClosure(model, closure);
   }
   for (const Motor& motor : model.motors())
     builder.addMotor(motor.name, motor.armature, motor.effort_limit, motor.velocity_limit, motor.torque_loss);

@@ -1,4 +1,5 @@
 bielle_test(dynamics SOURCES test_dynamics.cpp mechanisms.cpp LIBS bielle_dynamics)
+bielle_test(couplers SOURCES test_couplers.cpp mechanisms.cpp LIBS bielle_dynamics)
 bielle_test(assembly SOURCES test_assembly.cpp mechanisms.cpp LIBS bielle_dynamics)
 bielle_test(redundant SOURCES test_redundant.cpp mechanisms.cpp LIBS bielle_dynamics)
 bielle_test(variation SOURCES test_variation.cpp moved_model.cpp mechanisms.cpp LIBS bielle_dynamics)

@@ -39,10 +39,44 @@ void addRandomLink(ModelBuilder& builder, std::mt19937& rng, const std::string& 
   builder.addLink(name, parent, joint, randomInertia(rng));
 }
 
+// Joints of both branches; those of the given kind among them if they have one coordinate.
+std::vector<std::string> listCoupled(JointKind kind) {
+  if (getNv(kind) == 1) return {"joint_a0", "joint_b1", "joint_a1k"};
+  return {"joint_a0", "joint_b1"};
+}
+
+void tieTips(ModelBuilder& builder, std::mt19937& rng, ClosureKind closure, const Model& tree, const VectorXd& q,
+             double kp, double kd) {
+  Workspace ws(tree);
+  updatePositions(tree, ws, q);
+  const auto place = [&](const std::string& link) { return ws.X_WB[tree.frames()[tree.findFrame(link)].body]; };
+  const SE3 X_B1 = randomPlacement(rng);
+  builder.addFrame("tip1", "a2k", X_B1);
+  builder.addFrame("tip2", "b2k", place("b2k").inverseTimes(place("a2k") * X_B1));
+  builder.addClosure("loop", closure, "tip1", "tip2", randomVector(rng, 3).normalized(), kp, kd);
+}
+
 }  // namespace
 
-Mechanism makeRandomMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, double kp,
-                              double kd) {
+void addRandomCoupler(ModelBuilder& builder, std::mt19937& rng, const std::string& name,
+                      const std::vector<std::string>& joints, const Model& tree, const VectorXd& q, double kp,
+                      double kd) {
+  std::map<std::string, double> coefficients;
+  double offset = 0;
+  for (const std::string& joint : joints) {
+    const double c = randomVector(rng, 1)[0], coefficient = c < 0 ? c - 0.5 : c + 0.5;
+    coefficients[joint] = coefficient;
+    offset += coefficient * q[tree.joints()[tree.findJoint(joint)].idx_q];
+  }
+  builder.addCoupler(name, coefficients, offset, kp, kd);
+}
+
+namespace {
+
+enum class Belts { None, One, Repeated };
+
+Mechanism makeMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, double kp,
+                        double kd, Belts belts) {
   ModelBuilder builder("random");
   std::string root = "root";
   if (base == MechanismBase::FreeFlyer) {
@@ -63,19 +97,36 @@ Mechanism makeRandomMechanism(std::mt19937& rng, JointKind kind, ClosureKind clo
   }
   const Model tree = builder.build();
   Mechanism out{tree, tree.integrate(tree.makeNeutral(), randomVector(rng, tree.nv(), 0.8))};
-  Workspace ws(tree);
-  updatePositions(tree, ws, out.q_closed);
-  const auto place = [&](const std::string& link) { return ws.X_WB[tree.frames()[tree.findFrame(link)].body]; };
-  const SE3 X_B1 = randomPlacement(rng);
-  builder.addFrame("tip1", "a2k", X_B1);
-  builder.addFrame("tip2", "b2k", place("b2k").inverseTimes(place("a2k") * X_B1));
-  builder.addClosure("loop", closure, "tip1", "tip2", randomVector(rng, 3).normalized(), kp, kd);
+  if (closure == ClosureKind::Coupler)
+    addRandomCoupler(builder, rng, "loop", listCoupled(kind), tree, out.q_closed, kp, kd);
+  else
+    tieTips(builder, rng, closure, tree, out.q_closed, kp, kd);
   builder.addMotor("joint_a0", 0.1);
   builder.addMotor("joint_b0", 0.1);
   builder.addContact("foot", "a1", ContactKind::Surface6D, 0.1, 0.05);
   builder.addContact("point", "b1", ContactKind::Point3D, 0, 0);
+  if (belts != Belts::None) addRandomCoupler(builder, rng, "belt", listCoupled(kind), tree, out.q_closed, kp, kd);
+  out.model = builder.build();
+  if (belts != Belts::Repeated) return out;
+  Closure twin = out.model.closures().back();
+  twin.name = "twin";
+  twin.offset *= 2;
+  for (CouplerTerm& term : twin.terms) term.coefficient *= 2;
+  builder.copyClosure(out.model, twin);
   out.model = builder.build();
   return out;
+}
+
+}  // namespace
+
+Mechanism makeRandomMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, double kp,
+                              double kd) {
+  return makeMechanism(rng, kind, closure, base, kp, kd, Belts::None);
+}
+
+Mechanism makeBeltedMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, bool repeated,
+                              double kp, double kd) {
+  return makeMechanism(rng, kind, closure, base, kp, kd, repeated ? Belts::Repeated : Belts::One);
 }
 
 Mechanism makePlanarFourBar(double ground, double crank, double coupler, double rocker, double angle) {

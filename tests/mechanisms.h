@@ -11,7 +11,8 @@ namespace bielle::testing {
 inline constexpr JointKind kJointKinds[] = {JointKind::Revolute,  JointKind::Continuous, JointKind::Prismatic,
                                             JointKind::Spherical, JointKind::Universal,  JointKind::Planar,
                                             JointKind::FreeFlyer};
-inline constexpr ClosureKind kClosureKinds[] = {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D};
+inline constexpr ClosureKind kClosureKinds[] = {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D,
+                                                ClosureKind::Coupler};
 
 VectorXd randomVector(std::mt19937& rng, int n, double scale = 1);
 SE3 randomPlacement(std::mt19937& rng);
@@ -23,11 +24,22 @@ struct Mechanism {
 };
 
 /// Two branches from a common body, every other joint of the given kind (revolutes between), their tips tied by a
-/// closure of the given kind that holds at q_closed, with mobility left. With `base` a free-flyer, a universal and a
+/// closure of the given kind that holds at q_closed, with mobility left; a coupler ties joints of both branches, those of
+/// the given kind among them if they have one coordinate. With `base` a free-flyer, a universal and a
 /// side branch come along.
 enum class MechanismBase { Fixed, FreeFlyer };
 Mechanism makeRandomMechanism(std::mt19937& rng, JointKind joint, ClosureKind closure, MechanismBase base,
                               double kp = 0, double kd = 0);
+
+/// The same with a coupler beside the closure, between joints of its loop; repeated: with a second coupler that says the
+/// same, so that its row is redundant.
+Mechanism makeBeltedMechanism(std::mt19937& rng, JointKind joint, ClosureKind closure, MechanismBase base,
+                              bool repeated, double kp = 0, double kd = 0);
+
+/// Couples joints of `tree`, with coefficients of 0.5 to 1.5 of either sign, so that it holds at q.
+void addRandomCoupler(ModelBuilder& builder, std::mt19937& rng, const std::string& name,
+                      const std::vector<std::string>& joints, const Model& tree, const VectorXd& q, double kp = 0,
+                      double kd = 0);
 
 /// Planar four-bar (four parallel hinges about y) closed by a 6D weld: rank 3 of 6 rows. Lengths in metres.
 Mechanism makePlanarFourBar(double ground, double crank, double coupler, double rocker, double crank_angle);

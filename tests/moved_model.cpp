@@ -27,11 +27,13 @@ ModelBuilder makeBuilder(const Model& m, const ModelVariation& direction, double
     builder.addLink(getLink(m, i), getLink(m, joint.parent), joint, readInertia(Y));
   }
   for (size_t c = 0; c < m.closures().size(); ++c) {
-    const Closure& closure = m.closures()[c];
-    const std::string frame1 = closure.name + "/1", frame2 = closure.name + "/2";
-    builder.addFrame(frame1, getLink(m, closure.body1), move(closure.X_B1, direction.frames1[c]));
-    builder.addFrame(frame2, getLink(m, closure.body2), move(closure.X_B2, direction.frames2[c]));
-    builder.addClosure(closure.name, closure.kind, frame1, frame2, closure.axis, closure.kp, closure.kd);
+    Closure closure = m.closures()[c];
+    closure.X_B1 = move(closure.X_B1, direction.frames1[c]);
+    closure.X_B2 = move(closure.X_B2, direction.frames2[c]);
+    closure.offset += step * direction.offsets[c];
+    for (size_t i = 0; i < closure.terms.size(); ++i)
+      closure.terms[i].coefficient += step * direction.coefficients[c][static_cast<Eigen::Index>(i)];
+    builder.copyClosure(m, closure);
   }
   for (const Motor& motor : m.motors())
     builder.addMotor(motor.name, motor.armature + step * direction.armature[motor.dof]);

@@ -103,11 +103,12 @@ TEST_CASE("closures: residual rate, velocity and acceleration are time derivativ
       const VectorXd residual_rate = derive([&] { return VectorXd(calcClosureResidual(ws, closure)); });
       const VectorXd acceleration = derive([&] { return VectorXd(calcClosureVelocity(ws, closure)); });
       state(0);
+      const bool coupler = closure_kind == ClosureKind::Coupler;
       Vector6d nu = (ws.X_WB[closure.body1] * closure.X_B1).actInvMotion(ws.V[closure.body1] - ws.V[closure.body2]);
-      CHECK(calcRelativeError(calcClosureResidualRate(ws, closure) * nu, residual_rate) < 1e-8);
+      if (!coupler) CHECK(calcRelativeError(calcClosureResidualRate(ws, closure) * nu, residual_rate) < 1e-8);
       updateAccelerations(model, ws, a);
       CHECK(calcRelativeError(calcClosureAcceleration(ws, closure), acceleration) < 1e-6);
-      if (!open)  // at a closed configuration the residual moves with minus the velocity
+      if (!open || coupler)  // at a closed configuration the residual moves with minus the velocity
         CHECK(calcRelativeError(-calcClosureVelocity(ws, closure), residual_rate) < 1e-8);
     }
   }
@@ -148,7 +149,7 @@ TEST_CASE("constrained dynamics: every joint kind times every closure kind, clos
             out << ocws.a, ocws.lambda;
             return out;
           };
-          const double h = 2e-4;
+          const double h = 5e-4;
           MatrixXd numeric = differentiateTangent(model, q, h, [&](const VectorXd& x) { return solve(x, v, tau); });
           checkDerivative(cws.da_dq, numeric.topRows(nv));
           checkDerivative(cws.dlambda_dq, numeric.bottomRows(set.rows));

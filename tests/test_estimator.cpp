@@ -91,7 +91,7 @@ double getLargest(const VectorXd& x) { return x.cwiseAbs().maxCoeff(); }
 }  // namespace
 
 TEST_CASE("estimator: exact sensors give the state of a robot on one foot") {
-  for (const char* name : {"bipetto", "cleobot", "rsu_biped"}) {
+  for (const char* name : {"bipetto", "cleobot", "rsu_biped", "belt_biped"}) {
     CAPTURE(name);
     const LoadedRobot robot = load(name);
     const Model& model = robot.model;

@@ -41,7 +41,7 @@ def check_robot(bielle, robot, path):
 
 
 def main(bielle, source):
-    robots = ["bipetto", "cleobot", "rsu_biped", "fivebar_leg", "spring_leg", "delta", "fourbar_chain", "fourbar",
+    robots = ["bipetto", "cleobot", "rsu_biped", "belt_biped", "fivebar_leg", "spring_leg", "delta", "fourbar_chain", "fourbar",
               "fivebar"]
     with tempfile.TemporaryDirectory() as place:
         for robot in robots:

@@ -96,7 +96,7 @@ TEST_CASE("MuJoCo has the mass matrix, the bias and the closures of every joint 
 }
 
 TEST_CASE("MuJoCo starts at the closed configuration, and the references are its keyframes") {
-  for (const char* name : {"bipetto", "cleobot", "rsu_biped"}) {
+  for (const char* name : {"bipetto", "cleobot", "rsu_biped", "belt_biped"}) {
     const Model model = loadRobot(name).model;
     const VectorXd q_ref = findClosedConfiguration(model).q;
     const MujocoModel mujoco(model, q_ref);
@@ -117,7 +117,7 @@ TEST_CASE("MuJoCo starts at the closed configuration, and the references are its
 }
 
 TEST_CASE("a robot that nobody drives falls with its loops closed") {
-  for (const char* name : {"bipetto", "cleobot", "rsu_biped", "spring_leg", "delta", "fourbar_chain"}) {
+  for (const char* name : {"bipetto", "cleobot", "rsu_biped", "belt_biped", "spring_leg", "delta", "fourbar_chain"}) {
     const Model model = loadRobot(name).model;
     const MujocoModel mujoco(model, findClosedConfiguration(model).q);
     const auto data = mujoco.makeData();

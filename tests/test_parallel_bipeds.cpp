@@ -1,4 +1,4 @@
-// Cleobot and the biped with RSU ankles squat, walk and jump with the costs of Bipetto. The legs of Cleobot have no
+// Cleobot, the biped with RSU ankles and that with belts squat, walk and jump with the costs of Bipetto. The legs of Cleobot have no
 // equivalent serial chain.
 #include <Eigen/SVD>
 #include <catch2/catch.hpp>
@@ -124,8 +124,18 @@ TEST_CASE("RSU biped: bielle solve squat, walk and jump converge, are checked an
                70, 0.25, {0.015, 0.2});
 }
 
-TEST_CASE("Cleobot and the RSU biped walk at 0.9 m/s") {
-  for (const std::string robot : {"cleobot", "rsu_biped"}) {
+TEST_CASE("belt biped: bielle solve squat, walk and jump converge and are checked") {
+  const double standing = 0.403, rise = 9.81 * 0.3 * 0.3 / 8;
+  checkMotions("belt_biped",
+               {{{"squat"}, 0.7 * standing, standing},
+                {{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
+                {{"walk"}, 0.98 * standing, 1.055 * standing},
+                {{"jump"}, 0.83 * standing, standing + 0.02 + rise}},
+               70, 0.25, {0.015, 0.2});
+}
+
+TEST_CASE("Cleobot, the RSU biped and the belt biped walk at 0.9 m/s") {
+  for (const std::string robot : {"cleobot", "rsu_biped", "belt_biped"}) {
     CAPTURE(robot);
     const RobotDirectory directory;
     const MotionRecord record = solve(robot, {"walk", "--speed", "0.9"}, directory);

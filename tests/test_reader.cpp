@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/error.h"
@@ -171,6 +172,51 @@ TEST_CASE("closures: joints stand for their child, pairs for their common name, 
   CHECK(pin.kp == 3);
   CHECK(pin.kd == 4);
   CHECK(ours.closures()[1].body2 == 0);
+}
+
+TEST_CASE("couplers arrive from the YAML file and from <mimic>, with the gains and the offset given") {
+  const Model ours =
+      load(kToyUrdf,
+           "closures:\n  - {name: belt, type: coupler, joints: {shoulder: -2, rod_joint: 0.5}, offset: 0.3, "
+           "kp: 3, kd: 4}");
+  REQUIRE(ours.closures().size() == 1);
+  const Closure& belt = ours.closures()[0];
+  CHECK(belt.kind == ClosureKind::Coupler);
+  CHECK(belt.name == "belt");
+  REQUIRE(belt.terms.size() == 2);
+  CHECK(belt.terms[0].joint == ours.findJoint("shoulder"));
+  CHECK(belt.terms[0].coefficient == -2);
+  CHECK(belt.terms[1].joint == ours.findJoint("rod_joint"));
+  CHECK(belt.terms[1].coefficient == 0.5);
+  CHECK(belt.offset == 0.3);
+  CHECK(belt.kp == 3);
+  CHECK(belt.kd == 4);
+
+  // rod_joint = 1.5 shoulder + 0.2, beside the closure of the YAML file.
+  const std::string mimic =
+      replaceOnce(kToyUrdf, "<axis xyz=\"0 0 1\"/>", "<mimic joint=\"shoulder\" multiplier=\"1.5\" offset=\"0.2\"/>");
+  const Model model = load(mimic, kToyYaml);
+  REQUIRE(model.closures().size() == 2);
+  const Closure& coupler = model.closures()[1];
+  CHECK(coupler.name == "rod_joint");
+  REQUIRE(coupler.terms.size() == 2);
+  CHECK(coupler.terms[0].coefficient == -1.5);
+  CHECK(coupler.terms[1].coefficient == 1);
+  CHECK(coupler.offset == 0.2);
+  Workspace ws(model);
+  VectorXd q = model.makeNeutral();
+  q[coupler.terms[0].idx_q] = 0.4;
+  q[coupler.terms[1].idx_q] = 1.5 * 0.4 + 0.2;
+  updatePositions(model, ws, q);
+  CHECK(std::abs(calcClosureResidual(ws, coupler)[0]) < 1e-15);
+
+  // A joint that cannot move follows nobody.
+  const std::string fixed = replaceOnce(mimic, "type=\"continuous\"", "type=\"fixed\"");
+  const RobotDirectory directory;
+  const LoadedRobot still = loadRobot(directory.writeRobot(fixed, ""));
+  CHECK(still.model.closures().empty());
+  REQUIRE(still.warnings.size() == 1);
+  CHECK_THAT(still.warnings[0], Catch::Contains("joint 'rod_joint': it is fixed, <mimic> is ignored"));
 }
 
 TEST_CASE("motors, armature, contacts, references, serial joints and gravity arrive") {

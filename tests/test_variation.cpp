@@ -39,6 +39,15 @@ std::vector<ModelVariation> listVariations(std::mt19937& rng, const Model& model
   ModelVariation all(model);
   for (auto* twists : {&all.joints, &all.frames1, &all.frames2, &all.contacts})
     for (Vector6d& twist : *twists) twist = randomVector(rng, 6);
+  for (size_t c = 0; c < model.closures().size(); ++c) {
+    if (model.closures()[c].kind != ClosureKind::Coupler) continue;
+    ModelVariation ratios(model);
+    ratios.coefficients[c] = randomVector(rng, static_cast<int>(model.closures()[c].terms.size()));
+    ratios.offsets[c] = 0.5;
+    out.push_back(ratios);
+    all.coefficients[c] = -ratios.coefficients[c];
+    all.offsets[c] = 0.3;
+  }
   for (int i = 1; i < model.numBodies(); ++i)
     all.inertias[i] = 0.5 * model.bodies()[i].inertia.toMatrix() + 0.05 * randomInertia(rng).toMatrix();
   for (const Motor& motor : model.motors()) all.armature[motor.dof] = 0.3;

@@ -109,6 +109,11 @@ class Tracer {
   ClosureTrace traceClosures(const SimbodyBridge& simbody) const {
     ClosureTrace out;
     for (const Closure& closure : motion_.model.closures()) {
+      if (closure.kind == ClosureKind::Coupler) {
+        out.gaps.push_back(simbody.calcCouplerGap(closure) * Vector6d::Unit(3));
+        out.gap_rates.push_back(simbody.calcCouplerRate(closure) * Vector6d::Unit(3));
+        continue;
+      }
       const SE3 X_12 = (simbody.getPlacement(closure.body1) * closure.X_B1)
                            .inverseTimes(simbody.getPlacement(closure.body2) * closure.X_B2);
       const Vector6d V1 = closure.X_B1.actInvMotion(simbody.calcTwist(closure.body1));

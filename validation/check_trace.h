@@ -8,7 +8,7 @@ namespace bielle::validation {
 
 /// Per closure, of frame 2 in frame 1 without free axes.
 struct ClosureTrace {
-  std::vector<Vector6d> gaps;       ///< position and angle vector
+  std::vector<Vector6d> gaps;       ///< position and angle vector; of a coupler its residual, as an angle
   std::vector<Vector6d> gap_rates;  ///< the same for its velocity
 };
 

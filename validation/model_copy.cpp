@@ -18,10 +18,7 @@ Model copyModel(const Model& model, const ModelChanges& changes) {
   for (int c = 0; c < static_cast<int>(model.closures().size()); ++c) {
     Closure closure = model.closures()[c];
     if (changes.closure) changes.closure(c, closure);
-    const std::string frame1 = closure.name + "/frame1", frame2 = closure.name + "/frame2";
-    builder.addFrame(frame1, link(closure.body1), closure.X_B1);
-    builder.addFrame(frame2, link(closure.body2), closure.X_B2);
-    builder.addClosure(closure.name, closure.kind, frame1, frame2, closure.axis, closure.kp, closure.kd);
+    builder.copyClosure(model, closure);
   }
   for (const ContactFrame& contact : model.contacts()) {
     builder.addFrame(contact.name + "/frame", link(contact.body), contact.X_BF);

@@ -60,7 +60,7 @@ void solveSaddle(const SaddleTerms& terms, MatrixXd& a, MatrixXd& multipliers) {
 }
 
 // Residual of notation.h, whose directions are used below.
-Vector6d calcClosureGap(const Closure& closure, const SE3& X_12) {
+Vector6d calcGap(const Closure& closure, const SE3& X_12) {
   if (closure.kind == ClosureKind::Weld6D) return log6(X_12);
   Vector6d gap = Vector6d::Zero();
   gap.head<3>() = X_12.p;
@@ -72,6 +72,7 @@ Vector6d calcClosureGap(const Closure& closure, const SE3& X_12) {
 
 // Unit twists of frame 1, relative to frame 2, that a closure forbids; notation.h.
 MatrixXd listDirections(const Closure& closure) {
+  if (closure.kind == ClosureKind::Coupler) return Vector6d::Unit(0);
   const Eigen::Matrix<double, 6, 6> all = Eigen::Matrix<double, 6, 6>::Identity();
   if (closure.kind == ClosureKind::Weld6D) return all;
   if (closure.kind == ClosureKind::Ball3D) return all.leftCols(3);
@@ -161,8 +162,11 @@ MatrixXd SimbodyBridge::calcConstraintJacobian() const {
 VectorXd SimbodyBridge::calcWrenchForces(const std::vector<Vector6d>& wrenches) const {
   // Simbody: moment first, about the origin of the body, world axes.
   SimTK::Vector_<SimTK::SpatialVec> body_forces(s_->matter.getNumBodies(), SimTK::SpatialVec(SimTK::Vec3(0)));
+  VectorXd coupled = VectorXd::Zero(s_->model.nv());
   for (size_t c = 0; c < s_->closures.size(); ++c) {
     const Closure& closure = s_->closures[c];
+    for (const CouplerTerm& term : closure.terms) coupled[term.dof] += term.coefficient * wrenches[c][0];
+    if (closure.kind == ClosureKind::Coupler) continue;
     const SE3 X_W1 = getPlacement(closure.body1) * closure.X_B1;
     const Vector3d force = X_W1.R * wrenches[c].head<3>(), moment = X_W1.R * wrenches[c].tail<3>();
     const auto apply = [&](int body, double sign) {
@@ -175,7 +179,19 @@ VectorXd SimbodyBridge::calcWrenchForces(const std::vector<Vector6d>& wrenches) 
   }
   SimTK::Vector generalized;
   s_->matter.multiplyBySystemJacobianTranspose(s_->state, body_forces, generalized);
-  return s_->T.transpose() * s_->gather(generalized);
+  return coupled + s_->T.transpose() * s_->gather(generalized);
+}
+
+double SimbodyBridge::calcCouplerGap(const Closure& coupler) const {
+  double gap = coupler.offset;
+  for (const CouplerTerm& term : coupler.terms) gap -= term.coefficient * s_->bodies[term.joint].getOneQ(s_->state, 0);
+  return gap;
+}
+
+double SimbodyBridge::calcCouplerRate(const Closure& coupler) const {
+  double rate = 0;
+  for (const CouplerTerm& term : coupler.terms) rate += term.coefficient * s_->bodies[term.joint].getOneU(s_->state, 0);
+  return rate;
 }
 
 OracleSolution SimbodyBridge::solveBySimbody() {
@@ -216,7 +232,8 @@ ClosureRows SimbodyBridge::calcClosureRows() const {
     const SE3 X_12 =
         (getPlacement(closure.body1) * closure.X_B1).inverseTimes(getPlacement(closure.body2) * closure.X_B2);
     const MatrixXd directions = listDirections(closure);
-    const Vector6d gap = calcClosureGap(closure, X_12);
+    const Vector6d gap =
+        closure.kind == ClosureKind::Coupler ? calcCouplerGap(closure) * Vector6d::Unit(0) : calcGap(closure, X_12);
     for (Eigen::Index i = 0; i < directions.cols(); ++i) {
       wrenches[c] = directions.col(i);
       rows.push_back(calcWrenchForces(wrenches));

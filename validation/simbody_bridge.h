@@ -57,8 +57,12 @@ class SimbodyBridge {
   VectorXd calcBias() const;           ///< nv
   /// Generalized forces of accelerations a (nv), constraints ignored, armature included.
   VectorXd calcInverseDynamics(ConstVectorRef a) const;
-  /// Generalized forces J^T lambda (nv) of wrenches per closure on body 1 in frame 1, and their opposites on body 2.
+  /// Generalized forces J^T lambda (nv) of wrenches per closure on body 1 in frame 1, and their opposites on body 2; of
+  /// a coupler, the first entry is its force.
   VectorXd calcWrenchForces(const std::vector<Vector6d>& wrenches) const;
+  /// Residual of a coupler and sum of its coefficients times velocities, from the coordinates of Simbody's joints.
+  double calcCouplerGap(const Closure& coupler) const;
+  double calcCouplerRate(const Closure& coupler) const;
   /// Simbody's constraint rows x nv, stacked by closure (signs and rows differ from those of notation.h).
   MatrixXd calcConstraintJacobian() const;
   /// Simbody's realize(Acceleration), which ignores the armature.

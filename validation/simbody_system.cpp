@@ -35,6 +35,10 @@ void SimbodyBridge::System::readForces(const SimTK::Vector& multipliers, OracleS
   out.constraint_force = -(T.transpose() * gather(generalized));
   int row = 0;  // only holonomic constraints: multipliers are consecutive
   for (size_t c = 0; c < closures.size(); ++c) {
+    if (closures[c].kind == ClosureKind::Coupler) {
+      out.wrenches.push_back(-multipliers[row++] * Vector6d::Unit(0));
+      continue;
+    }
     const SE3 X_B1 = closures[c].X_B1;
     const int body1 = closures[c].body1;
     const Matrix3d R_WB = toEigen(bodies[body1].getBodyRotation(state));

@@ -42,14 +42,17 @@
 /// - acceleration  a_c = A_1 - X_12 A_2 + [V_1 x] X_12 V_2 (the paper's eq. 9), the derivative of nu_c in frame 1;
 /// - lambda is the wrench, in frame 1, that acts **on body 1**; body 2 gets the opposite one. So J = d nu_c / d v
 ///   enters (1) with a plus sign and positive power of lambda is power given to the mechanism.
+/// A coupler ties coordinates instead of frames, sum c_i q_i = c_0: residual c_0 - sum c_i q_i, velocity sum c_i v_i,
+/// acceleration sum c_i a_i, and lambda adds c_i lambda to the generalized force of coordinate i.
+///
 /// A foot contact is a closure whose frame 1 is the contact frame and whose body 2 is the world: its lambda is the
 /// wrench of the ground on the foot, in the foot's frame. Contact frames have z along the outward normal of the ground
 /// and x forward when the sole rests on flat ground.
 ///
 /// ## Clusters and reduced coordinates
-/// A *closure* ties bodies of the robot to each other and closes a loop; a *contact* ties a foot to the ground. A
-/// *cluster* is a set of joints tied together by closures: the joints on a loop, and those of other loops that share
-/// some of them. A *reduced joint* is either a joint outside all clusters or a whole cluster, seen as one joint of
+/// A *closure* ties bodies of the robot to each other and closes a loop, or ties coordinates of joints; a *contact* ties
+/// a foot to the ground. A *cluster* is a set of joints tied together by closures: the joints on a loop, and those of
+/// other loops that share some of them. A *reduced joint* is either a joint outside all clusters or a whole cluster, seen as one joint of
 /// several freedoms; reduced joints form a tree.
 ///
 /// | symbol            | cluster with n dofs, closures of rank m, r = n - m freedoms           | defined in       |

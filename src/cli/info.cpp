@@ -37,21 +37,36 @@ std::string findFrameName(const Model& model, int body, const SE3& X_BF) {
   return model.bodies()[body].name;
 }
 
+// "motor - 2 knee"
+std::string describeTerms(const Model& model, const Closure& coupler) {
+  std::string text;
+  for (const CouplerTerm& term : coupler.terms) {
+    const double size = std::abs(term.coefficient);
+    text += term.coefficient < 0 ? (text.empty() ? "-" : " - ") : (text.empty() ? "" : " + ");
+    if (size != 1) text += formatNumber(size) + " ";
+    text += model.joints()[term.joint].name;
+  }
+  return text;
+}
+
 Json describeClosures(const Model& model, const std::vector<Posture>& postures) {
   Json closures = Json::array();
-  for (const Closure& closure : model.closures())
-    closures.push_back({{"name", closure.name},
-                        {"kind", getName(closure.kind)},
-                        {"frame1", findFrameName(model, closure.body1, closure.X_B1)},
-                        {"frame2", findFrameName(model, closure.body2, closure.X_B2)},
-                        {"rows", getRows(closure.kind)},
-                        {"loop_dofs", closure.dofs.size()}});
+  for (const Closure& closure : model.closures()) {
+    const bool coupler = closure.kind == ClosureKind::Coupler;
+    closures.push_back(
+        {{"name", closure.name},
+         {"kind", getName(closure.kind)},
+         {"frame1", coupler ? describeTerms(model, closure) : findFrameName(model, closure.body1, closure.X_B1)},
+         {"frame2", coupler ? "= " + formatNumber(closure.offset) : findFrameName(model, closure.body2, closure.X_B2)},
+         {"rows", getRows(closure.kind)},
+         {"loop_dofs", closure.dofs.size()}});
+  }
   Workspace ws(model);
   for (const Posture& posture : postures) {
     updatePositions(model, ws, posture.q);
     for (size_t c = 0; c < closures.size(); ++c) {
-      const RowVectorUpTo6 r = calcClosureResidual(ws, model.closures()[c]);
-      closures[c]["gap " + posture.name] = {r.head(3).norm(), r.tail(r.size() - 3).norm()};
+      const ClosureGap gap = calcClosureGap(ws, model.closures()[c]);
+      closures[c]["gap " + posture.name] = {gap.position, gap.angle};
     }
   }
   return closures;

@@ -111,9 +111,14 @@ Model RobotDraft::build() const {
     builder.addFrame(name, getLink(body), X_BF);
     return name;
   };
-  for (const Closure& c : m.closures())
+  for (const Closure& c : m.closures()) {
+    if (c.kind == ClosureKind::Coupler) {
+      builder.copyClosure(m, c);
+      continue;
+    }
     builder.addClosure(c.name, c.kind, place(c.name + "/frame1", c.body1, c.X_B1),
                        place(c.name + "/frame2", c.body2, c.X_B2), c.axis, c.kp, c.kd);
+  }
   for (const Motor& motor : m.motors())
     builder.addMotor(motor.name, motor.armature, motor.effort_limit, motor.velocity_limit, motor.torque_loss);
   for (const Joint& joint : m.joints())

@@ -18,7 +18,7 @@ bool isSameButForPlaces(const Model& a, const Model& b) {
   }
   for (size_t c = 0; out && c < a.closures().size(); ++c) {
     const Closure &j = a.closures()[c], &k = b.closures()[c];
-    out = j.kind == k.kind && same(j.axis, k.axis) && j.kp == k.kp && j.kd == k.kd;
+    out = j.kind == k.kind && same(j.axis, k.axis) && j.kp == k.kp && j.kd == k.kd && j.terms.size() == k.terms.size();
   }
   return out;
 }
@@ -35,6 +35,10 @@ void addChange(const Model& from, const Model& to, double weight, ModelVariation
   for (size_t c = 0; c < from.closures().size(); ++c) {
     addTwist(from.closures()[c].X_B1, to.closures()[c].X_B1, out.frames1[c]);
     addTwist(from.closures()[c].X_B2, to.closures()[c].X_B2, out.frames2[c]);
+    out.offsets[c] += weight * (to.closures()[c].offset - from.closures()[c].offset);
+    for (size_t i = 0; i < from.closures()[c].terms.size(); ++i)
+      out.coefficients[c][static_cast<Eigen::Index>(i)] +=
+          weight * (to.closures()[c].terms[i].coefficient - from.closures()[c].terms[i].coefficient);
   }
   for (size_t c = 0; c < from.contacts().size(); ++c)
     addTwist(from.contacts()[c].X_BF, to.contacts()[c].X_BF, out.contacts[c]);

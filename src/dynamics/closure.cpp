@@ -45,6 +45,14 @@ HingeAngle<Lanes> calcHingeAngle(const Lanes& sine, const Lanes& cosine) {
   return out;
 }
 
+// The row of a coupler for values of all coordinates: sum of coefficient times x[index].
+template <typename T>
+T sumTerms(const Closure& c, const VectorX<T>& x, int CouplerTerm::*index) {
+  T sum = 0;
+  for (const CouplerTerm& term : c.terms) sum += term.coefficient * x[term.*index];
+  return sum;
+}
+
 // Transforms full vectors from world coordinates to frame 1 and writes their rows to columns of a matrix.
 template <typename T>
 class RowWriter {
@@ -55,6 +63,10 @@ class RowWriter {
 
   // out = s times the rows of `full`.
   void write(double s, const Vector6<T>& full, T* out) const {
+    if (kind_ == ClosureKind::Coupler) {  // not a matter of frames
+      out[0] = 0;
+      return;
+    }
     const Vector6<T> local = X_W1_.actInvMotion(full);
     for (int i = 0; i < 3; ++i) out[i] = s * local[i];
     if (kind_ == ClosureKind::Ball3D) return;
@@ -106,6 +118,8 @@ VectorUpTo6<T> selectRows(const Closure& c, const Vector6<T>& full) {
       return full;
     case ClosureKind::Ball3D:
       return linear(full);
+    case ClosureKind::Coupler:
+      return full.template head<1>();
     case ClosureKind::Hinge5D:
       break;
   }
@@ -117,6 +131,10 @@ VectorUpTo6<T> selectRows(const Closure& c, const Vector6<T>& full) {
 template <typename T>
 Vector6<T> expandRows(const Closure& c, const VectorUpTo6<T>& lambda) {
   Vector6<T> full = Vector6<T>::Zero();
+  if (c.kind == ClosureKind::Coupler) {
+    full[0] = lambda[0];
+    return full;
+  }
   linear(full) = linear(lambda);
   if (c.kind == ClosureKind::Weld6D) angular(full) = angular(lambda);
   if (c.kind == ClosureKind::Hinge5D) angular(full) = getHingeNormals(c) * lambda.template tail<2>();
@@ -130,6 +148,11 @@ Vector6d expandRows(const Closure& c, ConstVectorRef lambda) {
 template <typename T>
 VectorUpTo6<T> calcClosureResidual(const WorkspaceOf<T>& ws, const Closure& c) {
   requireStage(ws, WorkspaceStage::Placement, "calcClosureResidual", "updatePlacements or updatePositions");
+  if (c.kind == ClosureKind::Coupler) {
+    VectorUpTo6<T> row(1);
+    row[0] = c.offset - sumTerms(c, ws.q, &CouplerTerm::idx_q);
+    return row;
+  }
   return calcClosureResidual(c, calcRelativePlacement(ws, c));
 }
 
@@ -155,6 +178,7 @@ RowsBy6 calcClosureResidualRate(const Closure& c, const SE3& X) {
   // Frame 2 moves in frame 1 with the twist -nu_c.
   if (c.kind == ClosureKind::Weld6D) return -calcLogJacobian6(X) * X.inverse().toActionMatrix();
   RowsBy6 rate = RowsBy6::Zero(getRows(c.kind), 6);
+  if (c.kind == ClosureKind::Coupler) return rate;
   rate.topLeftCorner<3, 3>() = -Matrix3d::Identity();
   rate.topRightCorner<3, 3>() = skew(X.p);
   if (c.kind == ClosureKind::Hinge5D) {
@@ -167,7 +191,18 @@ RowsBy6 calcClosureResidualRate(const Closure& c, const SE3& X) {
   return rate;
 }
 
+ClosureGap calcClosureGap(const Workspace& ws, const Closure& closure) {
+  const RowVectorUpTo6 r = calcClosureResidual(ws, closure);
+  if (closure.kind == ClosureKind::Coupler) return {0, std::abs(r[0])};
+  return {r.head<3>().norm(), r.tail(r.size() - 3).norm()};
+}
+
 void calcClosureResidualJacobian(const Workspace& ws, const Closure& closure, MatrixRef H) {
+  if (closure.kind == ClosureKind::Coupler) {
+    for (int k : closure.dofs) H(0, k) = 0;
+    for (const CouplerTerm& term : closure.terms) H(0, term.dof) = -term.coefficient;
+    return;
+  }
   const RowsBy6 rate = calcClosureResidualRate(ws, closure);
   const SE3 X_W1 = getPlacement(ws, closure.body1, closure.X_B1);
   for (size_t i = 0; i < closure.dofs.size(); ++i)
@@ -176,11 +211,17 @@ void calcClosureResidualJacobian(const Workspace& ws, const Closure& closure, Ma
 
 RowVectorUpTo6 calcClosureVelocity(const Workspace& ws, const Closure& c) {
   requireStage(ws, WorkspaceStage::Velocity, "calcClosureVelocity", "updateVelocities");
+  if (c.kind == ClosureKind::Coupler) return RowVectorUpTo6::Constant(1, sumTerms(c, ws.v, &CouplerTerm::dof));
   return selectRows(c, getFrame1(ws, c).actInvMotion(ws.V[c.body1] - ws.V[c.body2]));
 }
 
 template <typename T>
 VectorUpTo6<T> calcClosureAcceleration(const WorkspaceOf<T>& ws, const Closure& c) {
+  if (c.kind == ClosureKind::Coupler) {
+    VectorUpTo6<T> row(1);
+    row[0] = sumTerms(c, ws.a, &CouplerTerm::dof);
+    return row;
+  }
   const Vector6<T> a = ws.A[c.body1] - ws.A[c.body2] + crossMotion(ws.V[c.body1], ws.V[c.body2]);
   return selectRows<T>(c, getFrame1(ws, c).actInvMotion(a));
 }
@@ -194,6 +235,11 @@ RowVectorUpTo6 calcClosureStabilization(const Workspace& ws, const Closure& c) {
 
 template <typename T>
 void calcClosureJacobian(const WorkspaceOf<T>& ws, const Closure& c, typename ArgumentsOf<T>::Matrix J) {
+  if (c.kind == ClosureKind::Coupler) {
+    for (int k : c.dofs) J(0, k) = 0;
+    for (const CouplerTerm& term : c.terms) J(0, term.dof) = term.coefficient;
+    return;
+  }
   const RowWriter<T> rows(ws, c);
   for (size_t i = 0; i < c.dofs.size(); ++i) rows.write(c.signs[i], ws.J.col(c.dofs[i]), &J(0, c.dofs[i]));
 }
@@ -218,6 +264,13 @@ void calcClosureDerivatives(const Workspace& ws, const Closure& c, MatrixRef da_
 void addStabilizationDerivatives(const Workspace& ws, const Closure& c, MatrixRef ds_dq, MatrixRef ds_dv) {
   requireStage(ws, WorkspaceStage::Velocity, "addStabilizationDerivatives", "updateVelocities");
   if (c.kd == 0 && c.kp == 0) return;
+  if (c.kind == ClosureKind::Coupler) {
+    for (const CouplerTerm& term : c.terms) {
+      ds_dq(0, term.dof) += c.kp * term.coefficient;
+      ds_dv(0, term.dof) += c.kd * term.coefficient;
+    }
+    return;
+  }
   const RowWriter<double> rows(ws, c);
   const SE3 X_W1 = getFrame1(ws, c);
   RowsBy6 rate = RowsBy6::Zero(getRows(c.kind), 6);
@@ -246,6 +299,7 @@ void calcClosureVelocityDerivative(const Workspace& ws, const Closure& c, Matrix
 
 template <typename T>
 Vector6<T> calcClosureWrench(const WorkspaceOf<T>& ws, const Closure& c, typename ArgumentsOf<T>::ConstVector lambda) {
+  if (c.kind == ClosureKind::Coupler) return Vector6<T>::Zero();
   return getFrame1(ws, c).actForce(expandRows<T>(c, lambda));
 }
 

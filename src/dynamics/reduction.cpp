@@ -23,7 +23,12 @@ Model makeClusterModel(const Model& model, const LoopCluster& loops, const std::
     builder.addLink(links[i], links[joint.parent], joint, {});
   }
   for (int c : loops.closures) {
-    const Closure& closure = model.closures()[c];
+    Closure closure = model.closures()[c];
+    closure.kp = closure.kd = 0;
+    if (closure.kind == ClosureKind::Coupler) {
+      builder.copyClosure(model, closure);
+      continue;
+    }
     builder.addFrame(closure.name + "|1", links[closure.body1], closure.X_B1);
     builder.addFrame(closure.name + "|2", links[closure.body2], closure.X_B2);
     builder.addClosure(closure.name, closure.kind, closure.name + "|1", closure.name + "|2", closure.axis);
@@ -76,13 +81,11 @@ void addGroups(ReducedCluster& cluster) {
   }
 }
 
-// The closures of a cluster, with bodies of the whole model.
+// The closures of a cluster, as the whole model has them.
 void placeClosures(const Model& model, ReducedCluster& cluster) {
-  cluster.placed = cluster.closures.closures;
-  for (size_t c = 0; c < cluster.placed.size(); ++c) {
-    const Closure& whole = model.closures()[cluster.closure_indices[c]];
-    cluster.placed[c].body1 = whole.body1;
-    cluster.placed[c].body2 = whole.body2;
+  for (int c : cluster.closure_indices) {
+    cluster.placed.push_back(model.closures()[c]);
+    cluster.placed.back().kp = cluster.placed.back().kd = 0;
   }
 }
 

@@ -41,7 +41,7 @@ struct ReducedCluster {
   Model model;                       ///< joints and closures of the cluster, massless, over their common root
   ConstraintSet closures;            ///< of `model`, without stabilisation
   std::vector<int> closure_indices;  ///< their indices in the whole model
-  std::vector<Closure> placed;       ///< the same closures with the bodies of the whole model, dofs those of `model`
+  std::vector<Closure> placed;       ///< the same closures with bodies and dofs of the whole model
   int root = 0;                      ///< body of the whole model that carries the cluster
   std::vector<int> joints;           ///< joint indices in the whole model, in the order of `model`
   std::vector<int> dofs;             ///< velocity coordinates in the whole model (n)

@@ -81,6 +81,7 @@ void updateDrift(const Model& model, WorkspaceOf<T>& ws) {
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) A += ws.dJ.col(k) * ws.v[k];
     ws.A[i] = A;
   }
+  ws.a.setZero();
   ws.stage = WorkspaceStage::Velocity;  // the accelerations written here are those of a = 0
 }
 
@@ -99,6 +100,7 @@ void updateInverseDynamics(const Model& model, WorkspaceOf<T>& ws, typename Argu
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) A += ws.J.col(k) * a[k] + ws.dJ.col(k) * ws.v[k];
     ws.A[i] = A;
   }
+  ws.a = a;
   sumForces(model, ws, ws.b);
   ws.b += model.armature().cwiseProduct(a);
   ws.stage = WorkspaceStage::Velocity;

@@ -23,6 +23,17 @@ Vector6d calcDisplacement1(const Workspace& ws, const ConstraintSet& set, size_t
          getPlacement(ws, closure.body1, closure.X_B1).actMotion(getFrameTwists(set, c, change).frame1);
 }
 
+// Eq. (9) without dc_0: sum of dc_k x_k + c_k dx_k.
+RowVectorUpTo6 calcTermVariation(const Closure& coupler, const VectorXd& coefficients, const VectorXd& x,
+                                 int CouplerTerm::*index, const VectorXd& dx) {
+  double sum = 0;
+  for (size_t i = 0; i < coupler.terms.size(); ++i) {
+    const CouplerTerm& term = coupler.terms[i];
+    sum += coefficients[static_cast<Eigen::Index>(i)] * x[term.*index] + term.coefficient * dx[term.dof];
+  }
+  return RowVectorUpTo6::Constant(1, sum);
+}
+
 // Rows of a closure, from a full vector in the world.
 RowVectorUpTo6 readRows(const Workspace& ws, const Closure& closure, const Vector6d& world) {
   return selectRows<double>(closure, getPlacement(ws, closure.body1, closure.X_B1).actInvMotion(world));
@@ -31,6 +42,9 @@ RowVectorUpTo6 readRows(const Workspace& ws, const Closure& closure, const Vecto
 RowVectorUpTo6 calcResidualRows(const Workspace& ws, const ConstraintSet& set, size_t c, const ModelVariation& change,
                                 const VariationWorkspace& variation) {
   const Closure& closure = set.closures[c];
+  if (closure.kind == ClosureKind::Coupler)
+    return RowVectorUpTo6::Constant(1, change.offsets[c]) -
+           calcTermVariation(closure, change.coefficients[c], ws.q, &CouplerTerm::idx_q, variation.motion.q);
   const SE3 X_W1 = getPlacement(ws, closure.body1, closure.X_B1), X_W2 = getPlacement(ws, closure.body2, closure.X_B2);
   const Vector6d D_1 = calcDisplacement1(ws, set, c, change, variation);
   const Vector6d D_2 = variation.D[closure.body2] + X_W2.actMotion(getFrameTwists(set, c, change).frame2);
@@ -40,9 +54,24 @@ RowVectorUpTo6 calcResidualRows(const Workspace& ws, const ConstraintSet& set, s
 RowVectorUpTo6 calcVelocityRows(const Workspace& ws, const ConstraintSet& set, size_t c, const ModelVariation& change,
                                 const VariationWorkspace& variation) {
   const Closure& closure = set.closures[c];
+  if (closure.kind == ClosureKind::Coupler)
+    return calcTermVariation(closure, change.coefficients[c], ws.v, &CouplerTerm::dof, variation.motion.v);
   const int b1 = closure.body1, b2 = closure.body2;
   const Vector6d D_1 = calcDisplacement1(ws, set, c, change, variation);
   return readRows(ws, closure, variation.dV[b1] - variation.dV[b2] - crossMotion(D_1, ws.V[b1] - ws.V[b2]));  // Eq. (7)
+}
+
+RowVectorUpTo6 calcAccelerationRows(const Workspace& ws, const ConstraintSet& set, size_t c,
+                                    const ModelVariation& change, const VariationWorkspace& variation) {
+  const Closure& closure = set.closures[c];
+  if (closure.kind == ClosureKind::Coupler)
+    return calcTermVariation(closure, change.coefficients[c], ws.a, &CouplerTerm::dof, variation.motion.a);
+  const int b1 = closure.body1, b2 = closure.body2;
+  const Vector6d a = ws.A[b1] - ws.A[b2] + crossMotion(ws.V[b1], ws.V[b2]);
+  const Vector6d D_1 = calcDisplacement1(ws, set, c, change, variation);
+  return readRows(ws, closure,
+                  variation.dA[b1] - variation.dA[b2] + crossMotion(variation.dV[b1], ws.V[b2]) +
+                      crossMotion(ws.V[b1], variation.dV[b2]) - crossMotion(D_1, a));  // Eq. (8)
 }
 
 // Calls write(c, rows) with the rows of closure c, for all closures.
@@ -104,18 +133,29 @@ ModelVariation::ModelVariation(const Model& model)
     : joints(model.numBodies(), Vector6d::Zero()),
       frames1(model.closures().size(), Vector6d::Zero()),
       frames2(frames1),
+      offsets(model.closures().size(), 0),
       contacts(model.contacts().size(), Vector6d::Zero()),
       inertias(model.numBodies(), Matrix6d::Zero()),
-      armature(VectorXd::Zero(model.nv())) {}
+      armature(VectorXd::Zero(model.nv())) {
+  for (const Closure& closure : model.closures())
+    coefficients.push_back(VectorXd::Zero(static_cast<Eigen::Index>(closure.terms.size())));
+}
 
 MotionVariation::MotionVariation(const Model& model) : q(VectorXd::Zero(model.nv())), v(q), a(q) {}
 
 VariationWorkspace::VariationWorkspace(const Model& model)
-    : D(model.numBodies(), Vector6d::Zero()), dV(D), dA(D), dJ(Matrix6Xd::Zero(6, model.nv())), F(D), dF(D) {}
+    : D(model.numBodies(), Vector6d::Zero()),
+      dV(D),
+      dA(D),
+      dJ(Matrix6Xd::Zero(6, model.nv())),
+      F(D),
+      dF(D),
+      motion(model) {}
 
 void updateVariation(const Model& model, const Workspace& ws, const ModelVariation& change,
                      const MotionVariation& motion, VariationWorkspace& variation) {
   requireStage(ws, WorkspaceStage::Acceleration, "updateVariation", "updateAccelerations");
+  variation.motion = motion;
   for (int i = 1; i < model.numBodies(); ++i) updateJointVariation(model, ws, i, change, motion, variation);
 }
 
@@ -125,6 +165,7 @@ VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, c
   for (int i = 1; i < model.numBodies(); ++i) updateBodyForces(ws, i, change.inertias[i], variation);
   for (size_t c = 0; c < constraints.closures.size(); ++c) {
     const Closure& closure = constraints.closures[c];
+    if (closure.kind == ClosureKind::Coupler) continue;
     const Vector6d W =
         calcClosureWrench<double>(ws, closure, lambda.segment(constraints.offsets[c], getRows(closure.kind)));
     const Vector6d dW = crossForce(calcDisplacement1(ws, constraints, c, change, variation), W);
@@ -132,6 +173,10 @@ VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, c
     variation.F[closure.body2] += W, variation.dF[closure.body2] += dW;
   }
   VectorXd out = model.armature().cwiseProduct(motion.a) + change.armature.cwiseProduct(ws.a);
+  for (size_t c = 0; c < constraints.closures.size(); ++c)
+    for (size_t i = 0; i < constraints.closures[c].terms.size(); ++i)
+      out[constraints.closures[c].terms[i].dof] -=
+          change.coefficients[c][static_cast<Eigen::Index>(i)] * lambda[constraints.offsets[c]];
   for (int i = model.numBodies() - 1; i > 0; --i) {
     const Joint& joint = model.joints()[i];
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k)
@@ -156,12 +201,7 @@ VectorXd calcAccelerationVariation(const Workspace& ws, const ConstraintSet& con
                                    const VariationWorkspace& variation) {
   return stackRows(constraints, [&](size_t c) {
     const Closure& closure = constraints.closures[c];
-    const int b1 = closure.body1, b2 = closure.body2;
-    const Vector6d a = ws.A[b1] - ws.A[b2] + crossMotion(ws.V[b1], ws.V[b2]);
-    const Vector6d D_1 = calcDisplacement1(ws, constraints, c, change, variation);
-    RowVectorUpTo6 rows = readRows(ws, closure,
-                                   variation.dA[b1] - variation.dA[b2] + crossMotion(variation.dV[b1], ws.V[b2]) +
-                                       crossMotion(ws.V[b1], variation.dV[b2]) - crossMotion(D_1, a));  // Eq. (8)
+    RowVectorUpTo6 rows = calcAccelerationRows(ws, constraints, c, change, variation);
     if (closure.kd != 0) rows += closure.kd * calcVelocityRows(ws, constraints, c, change, variation);
     if (closure.kp != 0) rows -= closure.kp * calcResidualRows(ws, constraints, c, change, variation);
     return rows;

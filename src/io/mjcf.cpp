@@ -223,8 +223,15 @@ class Writer {
 
   void writeClosures() {
     if (model_.closures().empty()) return;
+    writeTendons();
     out_ << "  <equality>\n";
     for (const Closure& closure : model_.closures()) {
+      if (closure.kp != 0 || closure.kd != 0)
+        warn("closure '" + closure.name + "'", "its gains kp and kd are replaced by a time constant");
+      if (closure.kind == ClosureKind::Coupler) {
+        writeCoupler(closure);
+        continue;
+      }
       const std::string bodies = attribute("body1", model_.bodies()[closure.body1].name) +
                                  attribute("body2", model_.bodies()[closure.body2].name);
       const auto connect = [&](const std::string& suffix, const Vector3d& point) {
@@ -240,10 +247,39 @@ class Writer {
         out_ << "    <weld" << attribute("name", closure.name) << bodies
              << attribute("anchor", formatVector(closure.X_B2.p)) << "/>\n";
       }
-      if (closure.kp != 0 || closure.kd != 0)
-        warn("closure '" + closure.name + "'", "its gains kp and kd are replaced by a time constant");
     }
     out_ << "  </equality>\n";
+  }
+
+  // An equality of joints ties two of them; the sum over more joints is the length of a fixed tendon.
+  void writeTendons() {
+    std::ostringstream tendons;
+    for (const Closure& closure : model_.closures()) {
+      if (closure.terms.size() <= 2) continue;
+      tendons << "    <fixed" << attribute("name", closure.name) << ">\n";
+      for (const CouplerTerm& term : closure.terms)
+        tendons << "      <joint" << attribute("joint", model_.joints()[term.joint].name)
+                << attribute("coef", formatNumber(term.coefficient)) << "/>\n";
+      tendons << "    </fixed>\n";
+    }
+    if (!tendons.str().empty()) out_ << "  <tendon>\n" << tendons.str() << "  </tendon>\n";
+  }
+
+  // MuJoCo's equalities act on differences from q_ref: the length of the tendon, or y = p0 + p1 x for joints 1 and 2.
+  void writeCoupler(const Closure& closure) {
+    double rest = closure.offset;  // of the differences
+    for (const CouplerTerm& term : closure.terms) rest -= term.coefficient * q_ref_[term.idx_q];
+    if (closure.terms.size() > 2) {
+      out_ << "    <tendon" << attribute("name", closure.name) << attribute("tendon1", closure.name)
+           << attribute("polycoef", formatNumber(rest) + " 0 0 0 0") << "/>\n";
+      return;
+    }
+    const CouplerTerm &y = closure.terms[0], &x = closure.terms[1];
+    out_ << "    <joint" << attribute("name", closure.name) << attribute("joint1", model_.joints()[y.joint].name)
+         << attribute("joint2", model_.joints()[x.joint].name)
+         << attribute("polycoef", formatNumber(rest / y.coefficient) + " " +
+                                      formatNumber(-x.coefficient / y.coefficient) + " 0 0 0")
+         << "/>\n";
   }
 
   void writeMotors() {

@@ -19,9 +19,9 @@ void recordNode(const Model& model, Workspace& ws, const VectorXd& x, int k, Mot
   record.com.row(k) = calcCom(model, ws);
   record.gap.row(k).setZero();
   for (const Closure& closure : model.closures()) {
-    const RowVectorUpTo6 r = calcClosureResidual(ws, closure);
-    record.gap(k, 0) = std::max(record.gap(k, 0), r.head(3).norm());
-    record.gap(k, 1) = std::max(record.gap(k, 1), r.tail(r.size() - 3).norm());
+    const ClosureGap gap = calcClosureGap(ws, closure);
+    record.gap(k, 0) = std::max(record.gap(k, 0), gap.position);
+    record.gap(k, 1) = std::max(record.gap(k, 1), gap.angle);
   }
 }
 

@@ -218,6 +218,7 @@ class Writer {
         writeFrame(made, body, X, out);
     };
     for (const Closure& c : model_.closures()) {
+      if (c.kind == ClosureKind::Coupler) continue;
       write(c.body1, c.X_B1, c.name + "_frame1");
       write(c.body2, c.X_B2, c.name + "_frame2");
     }
@@ -245,13 +246,28 @@ class Writer {
   void writeClosures(std::ostream& out) {
     if (!model_.closures().empty()) out << "\nclosures:\n";
     for (const Closure& c : model_.closures()) {
-      out << "  - {name: " << quote(c.name) << ", frames: [" << quote(findFrame(c.body1, c.X_B1, c.name + "_frame1"))
-          << ", " << quote(findFrame(c.body2, c.X_B2, c.name + "_frame2")) << "], type: " << getName(c.kind);
+      out << "  - {name: " << quote(c.name);
+      if (c.kind == ClosureKind::Coupler)
+        writeTerms(c, out);
+      else
+        out << ", frames: [" << quote(findFrame(c.body1, c.X_B1, c.name + "_frame1")) << ", "
+            << quote(findFrame(c.body2, c.X_B2, c.name + "_frame2")) << "]";
+      out << ", type: " << getName(c.kind);
       if (c.kind == ClosureKind::Hinge5D) out << ", axis: [" << formatVector(c.axis, ", ") << "]";
       if (c.kp != 0) out << ", kp: " << formatNumber(c.kp);
       if (c.kd != 0) out << ", kd: " << formatNumber(c.kd);
       out << "}\n";
     }
+  }
+
+  void writeTerms(const Closure& c, std::ostream& out) const {
+    const char* separator = ", joints: {";
+    for (const CouplerTerm& term : c.terms) {
+      out << separator << quote(model_.joints()[term.joint].name) << ": " << formatNumber(term.coefficient);
+      separator = ", ";
+    }
+    out << "}";
+    if (c.offset != 0) out << ", offset: " << formatNumber(c.offset);
   }
 
   void writeMotors(std::ostream& out) {

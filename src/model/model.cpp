@@ -22,6 +22,8 @@ const char* getName(ClosureKind kind) {
       return "3d";
     case ClosureKind::Hinge5D:
       return "5d";
+    case ClosureKind::Coupler:
+      return "coupler";
   }
   return "?";
 }
@@ -34,6 +36,8 @@ int getRows(ClosureKind kind) {
       return 3;
     case ClosureKind::Hinge5D:
       return 5;
+    case ClosureKind::Coupler:
+      return 1;
   }
   return 0;
 }

@@ -187,11 +187,25 @@ class FrameResolver {
   const YamlFile& yaml_;
 };
 
+// A coupler named as the joint for every joint that mimics another.
+void addMimics(const UrdfFile& urdf, ModelBuilder& builder) {
+  for (const UrdfJoint& j : urdf.joints) {
+    if (j.mimicked.empty()) continue;
+    if (j.mimicked == j.joint.name)
+      throw ModelError(urdf.path, "joint '" + j.joint.name + "'", "it mimics itself", "name another joint");
+    builder.addCoupler(j.joint.name, {{j.joint.name, 1}, {j.mimicked, -j.multiplier}}, j.offset);
+  }
+}
+
 // Closures, motors and contacts refer to the tree by name.
 void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {
   const FrameResolver frames(urdf, yaml);
   for (const ClosureSpec& c : yaml.closures) {
     const std::string element = "closure '" + c.name + "'";
+    if (c.kind == ClosureKind::Coupler) {
+      builder.addCoupler(c.name, c.coefficients, c.offset, c.kp, c.kd);
+      continue;
+    }
     builder.addClosure(c.name, c.kind, frames.find(c.frame1, element), frames.find(c.frame2, element), c.axis, c.kp,
                        c.kd);
   }
@@ -222,6 +236,7 @@ LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& option
   addMotors(urdf, yaml, builder);
   addNamed(urdf, yaml, builder);
   builder.setSource(urdf.path);
+  addMimics(urdf, builder);
 
   LoadedRobot robot;
   robot.warnings = urdf.warnings;

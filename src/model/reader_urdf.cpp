@@ -1,5 +1,5 @@
 // The only file that uses urdfdom. TinyXML, on which urdfdom is based, first provides what urdfdom discards or accepts:
-// the order of the joints, links with two parents, detached cycles, mimic joints, the place of a bad number.
+// the order of the joints, links with two parents, detached cycles, the place of a bad number.
 #include <console_bridge/console.h>
 #include <tinyxml.h>
 #include <urdf_parser/urdf_parser.h>
@@ -29,7 +29,7 @@ constexpr NumberRule kNumbers[] = {
     {"inertia", "iyz", 1},  {"inertia", "izz", 1},     {"limit", "lower", 1},      {"limit", "upper", 1},
     {"limit", "effort", 1}, {"limit", "velocity", 1},  {"dynamics", "damping", 1}, {"dynamics", "friction", 1},
     {"box", "size", 3},     {"cylinder", "radius", 1}, {"cylinder", "length", 1},  {"sphere", "radius", 1},
-    {"mesh", "scale", 3},   {"color", "rgba", 4}};
+    {"mesh", "scale", 3},   {"color", "rgba", 4},      {"mimic", "multiplier", 1}, {"mimic", "offset", 1}};
 
 const std::map<std::string, JointKind> kKinds = {
     {"revolute", JointKind::Revolute}, {"continuous", JointKind::Continuous}, {"prismatic", JointKind::Prismatic},
@@ -121,9 +121,8 @@ void checkJoint(const TiXmlElement& joint, const std::string& path, std::vector<
     for (const auto& [name, kind] : kKinds) known += (known.empty() ? "" : ", ") + name;
     throw ModelError(path, element, "its type '" + type + "' is unknown", "use one of " + known);
   }
-  if (joint.FirstChildElement("mimic"))
-    throw ModelError(path, element, "it mimics another joint, which Bielle does not model",
-                     "model the coupling as a closure, or make the joint free or fixed");
+  if (joint.FirstChildElement("mimic") && kKinds.at(type) == JointKind::Fixed)
+    warnings.push_back(path + ": " + element + ": it is fixed, <mimic> is ignored");
   const TiXmlElement* dynamics = joint.FirstChildElement("dynamics");
   for (const char* attribute : {"damping", "friction"}) {
     double value = 0;
@@ -278,6 +277,11 @@ UrdfJoint makeJoint(const urdf::Joint& joint, JointKind kind, const std::string&
   if (kind == JointKind::Revolute || kind == JointKind::Continuous || kind == JointKind::Prismatic ||
       kind == JointKind::Planar)
     out.joint.axis = toEigen(joint.axis);
+  if (joint.mimic && kind != JointKind::Fixed) {
+    out.mimicked = joint.mimic->joint_name;
+    out.multiplier = joint.mimic->multiplier;
+    out.offset = joint.mimic->offset;
+  }
   if (!joint.limits) return out;
   const urdf::JointLimits& limits = *joint.limits;
   if (limits.effort < 0 || limits.velocity < 0)

@@ -20,9 +20,9 @@ std::string lower(std::string text) {
 }
 
 ClosureKind readClosureKind(const Entry& entry) {
-  for (ClosureKind kind : {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D})
+  for (ClosureKind kind : {ClosureKind::Weld6D, ClosureKind::Ball3D, ClosureKind::Hinge5D, ClosureKind::Coupler})
     if (lower(entry.getText()) == getName(kind)) return kind;
-  entry.fail("closure type '" + entry.getText() + "' is unknown", "use 6d (weld), 5d (hinge) or 3d (ball)");
+  entry.fail("closure type '" + entry.getText() + "' is unknown", "use 6d (weld), 5d (hinge), 3d (ball) or coupler");
 }
 
 JointRetyping readJointType(const Entry& entry) {
@@ -73,20 +73,41 @@ void readPublishedClosures(const Fields& fields, const Entry& root, YamlFile& fi
     closure.frame1 = frames[0];
     closure.frame2 = frames[1];
     closure.kind = readClosureKind(kinds[i]);
+    if (closure.kind == ClosureKind::Coupler)
+      kinds[i].fail("a coupler does not tie frames", "list it under `closures`, with its joints");
     file.closures.push_back(closure);
   }
 }
 
+void readCoupler(const Fields& fields, const Entry& entry, ClosureSpec& closure) {
+  if (const Entry* frames = find(fields, "frames"))
+    frames->fail("a coupler ties coordinates, not frames", "give its joints with their coefficients");
+  closure.name = require(fields, "name", entry).getText();
+  for (const auto& [joint, coefficient] : require(fields, "joints", entry).getMap())
+    if (!closure.coefficients.emplace(joint, coefficient.getNumber()).second)
+      coefficient.fail("the joint is listed twice", "add up its coefficients");
+  if (const Entry* offset = find(fields, "offset")) closure.offset = offset->getNumber();
+}
+
+void readTiedFrames(const Fields& fields, const Entry& entry, ClosureSpec& closure) {
+  for (const char* key : {"joints", "offset"})
+    if (const Entry* found = find(fields, key)) found->fail("only a coupler has it", "use type coupler or remove it");
+  const std::vector<std::string> frames = require(fields, "frames", entry).getTexts(2);
+  const Entry* name = find(fields, "name");
+  closure.name = name ? name->getText() : makeClosureName(frames[0], frames[1]);
+  closure.frame1 = frames[0];
+  closure.frame2 = frames[1];
+}
+
 void readClosures(const Entry& list, YamlFile& file) {
   for (const Entry& entry : list.getList()) {
-    const Fields fields = entry.getFields({"name", "frames", "type", "axis", "kp", "kd"});
-    const std::vector<std::string> frames = require(fields, "frames", entry).getTexts(2);
+    const Fields fields = entry.getFields({"name", "frames", "type", "axis", "joints", "offset", "kp", "kd"});
     ClosureSpec closure;
-    const Entry* name = find(fields, "name");
-    closure.name = name ? name->getText() : makeClosureName(frames[0], frames[1]);
-    closure.frame1 = frames[0];
-    closure.frame2 = frames[1];
     closure.kind = readClosureKind(require(fields, "type", entry));
+    if (closure.kind == ClosureKind::Coupler)
+      readCoupler(fields, entry, closure);
+    else
+      readTiedFrames(fields, entry, closure);
     if (const Entry* axis = find(fields, "axis")) {
       if (closure.kind != ClosureKind::Hinge5D) axis->fail("only a hinge has an axis", "use type 5d or remove it");
       closure.axis = axis->getVector3();

@@ -21,6 +21,8 @@ struct UrdfJoint {
   std::string parent, child;  ///< links
   Joint joint;                ///< name, kind, X_PJ, axis
   std::optional<double> lower, upper, effort, velocity;
+  std::string mimicked;  ///< joint whose coordinate times `multiplier`, plus `offset`, is that of this one; or empty
+  double multiplier = 1, offset = 0;
 };
 
 /// A URDF file, checked to be one tree. Joints are depth first, the children of a link in the order of the file.
@@ -44,6 +46,8 @@ struct ClosureSpec {
   std::string name, frame1, frame2;
   ClosureKind kind = ClosureKind::Weld6D;
   Vector3d axis = Vector3d::UnitZ();
+  std::map<std::string, double> coefficients;  ///< of a coupler, by joint
+  double offset = 0;
   double kp = 0, kd = 0;
 };
 

@@ -78,9 +78,9 @@ NodeTables makeNodeTables(const Model& model, const MotionRecord& record) {
     if (k == 0 && model.numBodies() > 1) R_start = ws.X_WB[1].R;
     if (model.numBodies() > 1) tables.tilt.row(k) = calcRollPitchYaw(ws.X_WB[1].R * R_start.transpose());
     for (size_t c = 0; c < model.closures().size(); ++c) {
-      const RowVectorUpTo6 r = calcClosureResidual(ws, model.closures()[c]);
-      tables.gaps(k, 2 * c) = r.head(3).norm();
-      tables.gaps(k, 2 * c + 1) = r.tail(r.size() - 3).norm();
+      const ClosureGap gap = calcClosureGap(ws, model.closures()[c]);
+      tables.gaps(k, 2 * c) = gap.position;
+      tables.gaps(k, 2 * c + 1) = gap.angle;
     }
     for (int c = 0; c < contacts; ++c) {
       const SE3 X_WF = getPlacement(ws, model.contacts()[c].body, model.contacts()[c].X_BF);

@@ -145,16 +145,28 @@ function listPlots(runs) {
       title: 'Closure gaps',
       unit: 'm',
       log: true,
-      list: run => run.robot.closures.map((closure, c) => ({name: closure.name, values: run.gaps.getColumn(2 * c)}))
+      list: run => listClosures(run, false, c => run.gaps.getColumn(2 * c))
     },
     {
       title: 'Closure forces',
       unit: 'N',
       stairs: true,
-      list: run => run.robot.closures.map(
-          (closure, c) => ({name: closure.name, values: normOfColumns(run.closure_wrenches, 6 * c, 3)}))
+      list: run => listClosures(run, false, c => normOfColumns(run.closure_wrenches, 6 * c, 3))
+    },
+    {
+      title: 'Coupler forces',
+      unit: 'N m',
+      stairs: true,
+      list: run => listClosures(run, true, c => run.closure_wrenches.getColumn(6 * c))
     }
   ];
+}
+
+// Values of all couplers, or of all other closures.
+function listClosures(run, couplers, getValues) {
+  return run.robot.closures.map((closure, c) => ({closure, c}))
+      .filter(({closure}) => (closure.kind === 'coupler') === couplers)
+      .map(({closure, c}) => ({name: closure.name, values: getValues(c)}));
 }
 
 function normOfColumns(table, col, count) {

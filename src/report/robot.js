@@ -228,9 +228,11 @@ class RobotView extends BodyView {
   addClosures() {
     const texture = makeLockTexture(), size = 0.045 * this.size;
     this.largestClosureForce = 0;
-    for (const f of this.listForces(this.run.closure_wrenches))
+    const hasPlace = c => this.run.robot.closures[c].kind !== 'coupler';
+    for (const f of this.listForces(this.run.closure_wrenches, hasPlace))
       this.largestClosureForce = Math.max(this.largestClosureForce, f);
-    this.closures = this.run.robot.closures.map(closure => {
+    this.closures = this.run.robot.closures.map((closure, c) => {
+      if (!hasPlace(c)) return null;
       const frame = setPose(this.add(this.bodies[closure.body], new THREE.Group()), closure.pose);
       const lock = new THREE.Sprite(new THREE.SpriteMaterial({map: texture, depthTest: false, transparent: true}));
       lock.scale.set(size, size, 1);
@@ -327,9 +329,10 @@ class RobotView extends BodyView {
     if (this.ghost) this.ghost.setLook(0.85, 0.35 * opacity);
   }
 
-  * listForces(wrenches) {
+  * listForces(wrenches, counts = () => true) {
     for (let k = 0; k < wrenches.rows; ++k)
       for (let c = 0; c < wrenches.cols; c += 6) {
+        if (!counts(c / 6)) continue;
         const force = Math.hypot(wrenches.get(k, c), wrenches.get(k, c + 1), wrenches.get(k, c + 2));
         if (Number.isFinite(force)) yield force;
       }
@@ -347,7 +350,9 @@ class RobotView extends BodyView {
     const run = this.run, {k, next, share} = run.locate(t);
     const read = (table, row, col) =>
         new THREE.Vector3(table.get(row, col), table.get(row, col + 1), table.get(row, col + 2));
-    this.closures.forEach(({lock, arrow}, c) => {
+    this.closures.forEach((drawn, c) => {
+      if (!drawn) return;
+      const {lock, arrow} = drawn;
       lock.material.color.copy(getGapColor(run.gaps.get(share < 0.5 ? k : next, 2 * c)));
       if (run.closure_wrenches.rows)
         arrow.set(read(run.closure_wrenches, k, 6 * c).multiplyScalar(scales.closure), 0, 0, 0);

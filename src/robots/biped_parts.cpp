@@ -1,6 +1,89 @@
 #include "robots/biped_parts.h"
 
+#include <cmath>
+
 namespace bielle {
+namespace {
+
+const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ(), kOrigin = Vector3d::Zero();
+
+// Hips are weighted in the state regularization as in the paper's walk.
+Joint makeHip(const std::string& name, const Vector3d& place, const Vector3d& axis, double position, double velocity) {
+  Joint joint = makeRevolute(name, place, axis);
+  joint.position_importance = position;
+  joint.velocity_importance = velocity;
+  return joint;
+}
+
+}  // namespace
+
+std::vector<Parameter> listSerialParameters(SerialBipedParameters& p) {
+  return {
+      {"hip_offset", &p.hip_offset, "m", 0.05, 0.4, "of a hip from the middle plane"},
+      {"trunk_height", &p.trunk_height, "m", 0, 0.5, "of the trunk's frame over the hips"},
+      {"thigh_length", &p.thigh_length, "m", 0.05, 1, "hip to knee"},
+      {"shank_length", &p.shank_length, "m", 0.05, 1, "knee to ankle"},
+      {"ankle_height", &p.ankle_height, "m", 0.03, 0.3, "of the ankle over the sole"},
+      {"hip_height", &p.hip_height, "m", 0.1, 2, "of the hips over the soles in the reference half_sitting"},
+      {"sole_length", &p.sole_length, "m", 0.02, 0.5, "along x"},
+      {"sole_offset", &p.sole_offset, "m", -0.2, 0.2, "of the middle of the sole before the ankle"},
+      {"sole_width", &p.sole_width, "m", 0.02, 0.3, "along y"},
+      {"trunk_mass", &p.trunk_mass, "kg", 0.1, 100, "without motors"},
+      {"motor_mass", &p.motor_mass, "kg", 0.01, 10, "of each motor"},
+      {"hip_link_mass", &p.hip_link_mass, "kg", 0.01, 10, "each of two links per hip, without motors"},
+      {"link_density", &p.link_density, "kg/m", 0.01, 50, "of thigh and shank, without motors"},
+      {"foot_mass", &p.foot_mass, "kg", 0.01, 10, "of one foot"},
+      {"armature", &p.armature, "kg m^2", 0, 1, "rotor inertia of every motor"},
+  };
+}
+
+std::vector<Solid> makeSerialTrunk(const SerialBipedParameters& p) {
+  const double plate = 0.055 - p.trunk_height;
+  std::vector<Solid> solids = {
+      makeBox({-0.01, 0, 0.10}, {0.13, 0.22, 0.20}, 0.72 * p.trunk_mass, colors::kShell),
+      makeBox({0, 0, plate + 0.03}, {0.10, 0.34, 0.02}, 0.2 * p.trunk_mass, colors::kSteel),
+      makeCylinder({0, 0, plate / 2}, kZ, 0.03, std::abs(plate) + 0.02, 0.03 * p.trunk_mass, colors::kSteel),
+      makeSphere({-0.01, 0, 0.26}, 0.055, 0.05 * p.trunk_mass, colors::kShell)};
+  for (double s : {1.0, -1.0}) solids.push_back(makeMotor({0, s * p.hip_offset, plate + 0.06}, kZ, p.motor_mass));
+  return solids;
+}
+
+void addHip(const BipedSide& side, const SerialBipedParameters& p, ModelBuilder& builder) {
+  const Vector3d hip(0, side.s * p.hip_offset, -p.trunk_height), behind(-0.07, 0, 0), beside(0, 0.055 * side.s, 0);
+  addSolidLink("hip_yaw" + side.name, "trunk", makeHip("hipz" + side.name, hip, kZ, 10, 5),
+               {makeBox(behind / 2 + 0.045 * kZ, {0.09, 0.03, 0.02}, p.hip_link_mass, colors::kFrame),
+                makeMotor(behind, kX, p.motor_mass)},
+               builder);
+  addSolidLink("hip_roll" + side.name, "hip_yaw" + side.name, makeHip("hipx" + side.name, kOrigin, kX, 3, 3),
+               {makeBox(behind / 4 + beside / 2, {0.04, 0.06, 0.03}, p.hip_link_mass, colors::kFrame),
+                makeMotor(beside, kY, p.motor_mass)},
+               builder);
+}
+
+std::vector<Solid> makeFoot(const SerialBipedParameters& p) {
+  return {makeBox({p.sole_offset, 0, 0.01 - p.ankle_height}, {p.sole_length, p.sole_width, 0.02}, 0.6 * p.foot_mass,
+                  colors::kSole),
+          makeCylinder({0, 0, 0.01 - p.ankle_height / 2}, kZ, 0.012, p.ankle_height - 0.02, 0.1 * p.foot_mass,
+                       colors::kSteel)};
+}
+
+Reference makeSerialHalfSitting(const std::string& robot, const SerialBipedParameters& p) {
+  const double a = p.thigh_length, b = p.shank_length, reach = p.hip_height - p.ankle_height;
+  if (!(reach > std::abs(a - b) && reach < a + b))
+    throw ModelError(robot, "parameter 'hip_height'", "the legs do not reach the ground from there",
+                     "give a height between what thigh and shank can bridge, over ankle_height");
+  const double thigh = std::acos((reach * reach + a * a - b * b) / (2 * reach * a));
+  const double shank = std::acos((reach * reach + b * b - a * a) / (2 * reach * b));
+  Reference reference = makeStanding(p.hip_offset, p.hip_height + p.trunk_height);
+  for (const char* side : {"_left", "_right"}) {
+    const auto set = [&](const char* joint, double angle) { reference.joints[std::string(joint) + side] = {angle}; };
+    set("hipy", -thigh);
+    set("knee", thigh + shank);
+    set("ankley", -shank);
+    for (const char* joint : {"hipz", "hipx", "anklex"}) set(joint, 0);
+  }
+  return reference;
+}
 
 Solid makeMotor(const Vector3d& place, const Vector3d& axis, double mass) {
   constexpr double kRadius = 0.038, kLength = 0.042;  // m

@@ -3,9 +3,31 @@
 #include <string>
 #include <vector>
 
+#include "bielle/robots/generators.h"
 #include "robots/solid.h"
 
 namespace bielle {
+
+// Bipeds with hips of three axes in one point, knees and ankles of two axes; joints of a leg are hipz, hipx, hipy, knee
+// (positive: bent), ankley, anklex.
+struct SerialBipedParameters {
+  double hip_offset = 0.125;                     // of a hip from the middle plane, m
+  double trunk_height = 0.185;                   // of the trunk's frame over the hips, m
+  double thigh_length = 0.22;                    // m
+  double shank_length = 0.24;                    // m
+  double ankle_height = 0.045;                   // over the sole, m
+  double hip_height = 0.39;                      // of the hips over the soles in the reference `half_sitting`, m
+  double sole_length = 0.10, sole_width = 0.10;  // m
+  double sole_offset = 0.017;                    // of the middle of the sole before the ankle, m
+
+  double trunk_mass = 6.72;    // without motors, kg
+  double motor_mass = 0.8;     // each of twelve, kg
+  double hip_link_mass = 1.2;  // each of the two links between trunk and thigh, without motors, kg
+  double link_density = 3;     // of thigh and shank, kg/m
+  double foot_mass = 0.5;      // kg
+  double armature = 1e-3;      // of every motor, kg m^2
+};
+std::vector<Parameter> listSerialParameters(SerialBipedParameters& parameters);
 
 // A leg's side. Frames are parallel to the trunk's in the neutral configuration.
 struct BipedSide {
@@ -33,6 +55,15 @@ void addTrunk(const std::vector<Solid>& solids, ModelBuilder& builder);
 
 // Frame and contact "foot_left", "foot_right" under the link of that foot.
 void addSole(const BipedSide& side, const Vector3d& middle, double length, double width, ModelBuilder& builder);
+
+// Trunk with the motors of hipz in its plate.
+std::vector<Solid> makeSerialTrunk(const SerialBipedParameters& p);
+// Links "hip_yaw_left", "hip_roll_left" with the motors of hipx and hipy in them.
+void addHip(const BipedSide& side, const SerialBipedParameters& p, ModelBuilder& builder);
+// Sole and post of a foot, 0.7 of its mass.
+std::vector<Solid> makeFoot(const SerialBipedParameters& p);
+// Hips over the ankles, by the law of cosines. \throws ModelError if the legs do not reach
+Reference makeSerialHalfSitting(const std::string& robot, const SerialBipedParameters& p);
 
 // Reference `half_sitting` except for its joints: soles under the hips, the trunk's frame at a height.
 Reference makeStanding(double hip_offset, double trunk_height);

@@ -4,6 +4,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/robots/fourbar_chain.h"
+#include "robots/belt_biped.h"
 #include "robots/cleobot.h"
 #include "robots/delta.h"
 #include "robots/fivebar_leg.h"
@@ -58,6 +59,8 @@ const std::vector<Generator>& getGenerators() {
        makeRequests<CleobotParameters>(makeCleobot)},
       {"rsu_biped", "biped with serial hips and knees, ankles driven by two rods with spherical ends (RSU)",
        makeRequests<RsuBipedParameters>(makeRsuBiped)},
+      {"belt_biped", "biped with serial hips, knees driven by belts, ankles by differentials",
+       makeRequests<BeltBipedParameters>(makeBeltBiped)},
       {"fivebar_leg", "planar leg on a rail: two coaxial motors, four rods, a point foot",
        makeRequests<FiveBarLegParameters>(makeFiveBarLeg)},
       {"spring_leg", "leg like Cassie's with rigid springs: tarsus and toe moved by four-bars",

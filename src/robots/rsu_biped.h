@@ -15,34 +15,17 @@
 ///
 /// The architecture is common. Distance of the hips, soles, height of the trunk in half_sitting and total mass are
 /// those of robots/bipetto; all other dimensions and masses are ours, and no such robot was built.
-#include "bielle/model/model.h"
-#include "bielle/robots/generators.h"
+#include "robots/biped_parts.h"
 
 namespace bielle {
 
-struct RsuBipedParameters {
-  double hip_offset = 0.125;                     ///< of a hip from the middle plane, m
-  double trunk_height = 0.185;                   ///< of the trunk's frame over the hips, m
-  double thigh_length = 0.22;                    ///< m
-  double shank_length = 0.24;                    ///< m
-  double ankle_height = 0.045;                   ///< over the sole, m
-  double hip_height = 0.39;                      ///< of the hips over the soles in the reference `half_sitting`, m
-  double sole_length = 0.10, sole_width = 0.10;  ///< m
-  double sole_offset = 0.017;                    ///< of the middle of the sole before the ankle, m
-
+struct RsuBipedParameters : SerialBipedParameters {
   double ankle_arm = 0.05;         ///< a, m
   double ankle_crank = 0.05;       ///< c, m
   double ankle_half_width = 0.06;  ///< w, m
   double motor_height = 0.17;      ///< h, m
   double arm_angle = 0.6;          ///< delta, rad
-
-  double trunk_mass = 6.72;    ///< without motors, kg
-  double motor_mass = 0.8;     ///< each of twelve, kg
-  double hip_link_mass = 1.2;  ///< each of the two links between trunk and thigh, without motors, kg
-  double link_density = 3;     ///< of thigh and shank, kg/m
-  double rod_density = 0.5;    ///< of cranks and rods, kg/m
-  double foot_mass = 0.5;      ///< kg
-  double armature = 1e-3;      ///< of every motor, kg m^2
+  double rod_density = 0.5;        ///< of cranks and rods, kg/m
 };
 
 std::vector<Parameter> listParameters(RsuBipedParameters& parameters);

@@ -11,6 +11,9 @@
 /// where dV, dA, dJ are those of rnea.h; a dof that moves both frames changes nothing. (1) gathers the derivatives of
 /// the paper's gamma_1, gamma_2 and gamma_3 (its eqs. 11 to 15): gamma_1 gives dA_k - V_1 x dV_k, gamma_2 gives dA_k -
 /// V_2 x dV_k and, as frame 1 turns, J_k x A_2; the rest is gamma_3.
+///
+/// A coupler has J_k = c_k, the coefficient of the coordinate. It is constant, so that (1) to (3) and (6) vanish, and
+/// its force acts on the coordinates alone, c_k lambda each: it has no wrench.
 #include "bielle/dynamics/workspace.h"
 
 namespace bielle {
@@ -42,21 +45,28 @@ struct ConstraintSet {
 };
 ConstraintSet makeConstraintSet(const Model& model, const std::vector<ContactTarget>& contacts = {});
 
-/// Selects the rows of a closure from a twist-like vector (6) in frame 1.
+/// Selects the rows of a closure from a twist-like vector (6) in frame 1; of a coupler, the first entry.
 template <typename T>
 VectorUpTo6<T> selectRows(const Closure& closure, const Vector6<T>& full);
-/// Wrench in frame 1 of forces on the rows.
+/// Wrench in frame 1 of forces on the rows. The force of a coupler, which has no wrench, becomes the first entry.
 Vector6d expandRows(const Closure& closure, ConstVectorRef lambda);
 template <typename T>
 Vector6<T> expandRows(const Closure& closure, const VectorUpTo6<T>& lambda);
 
-/// Closing error, m and rad: zero if and only if closed (a hinge turned by pi about a normal has the residual pi).
+/// Closing error, m and rad: zero if and only if closed (a hinge turned by pi about a normal has the residual pi); of a
+/// coupler offset - sum c_k q_k.
 template <typename T>
 VectorUpTo6<T> calcClosureResidual(const WorkspaceOf<T>& ws, const Closure& closure);
 /// The same for the placement X_12 of frame 2 in frame 1.
 template <typename T>
 VectorUpTo6<T> calcClosureResidual(const Closure& closure, const SE3Of<T>& X_12);
-/// Matrix R (rows x 6) with d residual/dt = R nu_c for the full velocity nu_c in frame 1, exact also when open.
+/// Norms of the residual: of its part in m, and of that in rad, to which couplers belong.
+struct ClosureGap {
+  double position = 0, angle = 0;
+};
+ClosureGap calcClosureGap(const Workspace& ws, const Closure& closure);
+/// Matrix R (rows x 6) with d residual/dt = R nu_c for the full velocity nu_c in frame 1, exact also when open; zero
+/// for couplers, which have no frames.
 RowsBy6 calcClosureResidualRate(const Workspace& ws, const Closure& closure);
 /// The same for the placement X_12 of frame 2 in frame 1.
 RowsBy6 calcClosureResidualRate(const Closure& closure, const SE3& X_12);
@@ -86,7 +96,7 @@ void addStabilizationDerivatives(const Workspace& ws, const Closure& closure, Ma
 /// updateVelocities.
 void calcClosureVelocityDerivative(const Workspace& ws, const Closure& closure, MatrixRef dnu_dq);
 
-/// World wrench of a closure force on body 1.
+/// World wrench of a closure force on body 1; zero for a coupler.
 template <typename T>
 Vector6<T> calcClosureWrench(const WorkspaceOf<T>& ws, const Closure& closure,
                              typename ArgumentsOf<T>::ConstVector lambda);

@@ -19,6 +19,9 @@
 /// F being the sums over subtrees. For the closures, in frame 1 (notation.h),
 ///     d residual = R (D_1 - D_2),    d nu_c = dV_1 - dV_2 - D_1 x (V_1 - V_2)                                      (7)
 ///     d a_c = dA_1 - dA_2 + dV_1 x V_2 + V_1 x dV_2 - D_1 x (A_1 - A_2 + V_1 x V_2)                                (8)
+/// A coupler with coefficients c_k and offset c_0 has, with dc their changes,
+///     d residual = dc_0 - sum dc_k q_k - c_k dq_k,   d nu_c = sum dc_k v_k + c_k dv_k                              (9)
+/// and d a_c alike; its force acts on coordinate k with c_k lambda.
 /// Forward dynamics change by Eq. (5) of saddle_point.h. With redundant rows, this holds for changes that keep them
 /// redundant: any other change would alter the rank.
 #include "bielle/dynamics/constrained.h"
@@ -30,12 +33,14 @@ namespace bielle {
 struct ModelVariation {
   explicit ModelVariation(const Model& model);
 
-  std::vector<Vector6d> joints;    ///< nb, of Joint::X_PJ
-  std::vector<Vector6d> frames1;   ///< per closure of the model, of Closure::X_B1
-  std::vector<Vector6d> frames2;   ///< and X_B2
-  std::vector<Vector6d> contacts;  ///< per contact of the model, of ContactFrame::X_BF
-  std::vector<Matrix6d> inertias;  ///< nb, of Inertia::toMatrix() in the body's frame
-  VectorXd armature;               ///< nv
+  std::vector<Vector6d> joints;        ///< nb, of Joint::X_PJ
+  std::vector<Vector6d> frames1;       ///< per closure of the model, of Closure::X_B1
+  std::vector<Vector6d> frames2;       ///< and X_B2
+  std::vector<VectorXd> coefficients;  ///< per closure of the model, of its CouplerTerm::coefficient
+  std::vector<double> offsets;         ///< and Closure::offset
+  std::vector<Vector6d> contacts;      ///< per contact of the model, of ContactFrame::X_BF
+  std::vector<Matrix6d> inertias;      ///< nb, of Inertia::toMatrix() in the body's frame
+  VectorXd armature;                   ///< nv
 };
 
 /// Changes of configuration (tangent), velocity and acceleration, nv each. Initially zero.
@@ -50,6 +55,7 @@ struct VariationWorkspace {
   std::vector<Vector6d> D, dV, dA;  ///< nb, displacements, and changes of V and A in the world
   Matrix6Xd dJ;                     ///< 6 x nv, in the world
   std::vector<Vector6d> F, dF;      ///< nb, forces of subtrees and their changes
+  MotionVariation motion;           ///< of the direction
 };
 
 /// Eqs. (1) to (4); needs updateAccelerations.

@@ -36,7 +36,8 @@ struct WorkspaceOf {
   std::vector<Vector6<T>> h;   ///< nb, momenta Y V
   std::vector<Vector6<T>> hc;  ///< nb, their sums over subtrees
 
-  // Writer: updateAccelerations. Gravity is included: the world accelerates at -g.
+  // Writers: updateAccelerations, and updateDrift and updateInverseDynamics of all but dA. Gravity is included: the
+  // world accelerates at -g.
   VectorX<T> a;               ///< nv
   std::vector<Vector6<T>> A;  ///< nb, body accelerations minus g
   Matrix6X<T> dA;             ///< 6 x nv, see rnea.h

@@ -52,6 +52,13 @@ class ModelBuilder {
   /// Closure between two frames (links are frames too).
   void addClosure(const std::string& name, ClosureKind kind, const std::string& frame1, const std::string& frame2,
                   const Vector3d& axis = Vector3d::UnitZ(), double kp = 0, double kd = 0);
+  /// Couples joints of one coordinate each: the sum of coefficient times coordinate is the offset.
+  /// \param coefficients  by joint; at least two joints
+  void addCoupler(const std::string& name, const std::map<std::string, double>& coefficients, double offset = 0,
+                  double kp = 0, double kd = 0);
+  /// Adds a closure of another model whose links and joints have the same names; its frames get the names
+  /// closure/frame1 and closure/frame2.
+  void copyClosure(const Model& from, const Closure& closure);
   void addMotor(const std::string& joint, double armature = 0,
                 double effort_limit = std::numeric_limits<double>::infinity(),
                 double velocity_limit = std::numeric_limits<double>::infinity(),
@@ -79,6 +86,8 @@ class ModelBuilder {
     SE3 X_BF;
   };
   FramePlace getFrame(const std::string& name, const std::string& element) const;
+  void addChecked(Closure closure);
+  void finishClosure(const Model& model, Closure& closure) const;
   [[noreturn]] void fail(const std::string& element, const std::string& problem, const std::string& remedy) const;
   void finishDofs(Model& model) const;
   void finishClosures(Model& model) const;

@@ -43,21 +43,33 @@ struct Frame {
   SE3 X_BF;
 };
 
-enum class ClosureKind { Weld6D, Ball3D, Hinge5D };
+enum class ClosureKind { Weld6D, Ball3D, Hinge5D, Coupler };
 const char* getName(ClosureKind kind);
-/// Number of scalar constraints: 6, 3, 5.
+/// Number of scalar constraints: 6, 3, 5, 1.
 int getRows(ClosureKind kind);
 
-/// Ties frame 1 on body 1 to frame 2 on body 2; notation.h defines residual, velocity, acceleration and force.
+/// One summand of a coupler: a coefficient times the coordinate of a joint with one.
+struct CouplerTerm {
+  int joint = 0;           ///< body/joint index
+  double coefficient = 0;  ///< dimensionless, or m/rad, .. between coordinates of different units
+  int idx_q = 0, dof = 0;  ///< indices into q and v
+};
+
+/// Ties frame 1 on body 1 to frame 2 on body 2, or, as a coupler, coordinates of joints: sum of coefficient times
+/// coordinate = offset, as belts, gears and differentials do. notation.h defines residual, velocity, acceleration and
+/// force.
 struct Closure {
   std::string name;
   ClosureKind kind = ClosureKind::Weld6D;
-  int body1 = 0, body2 = 0;
+  int body1 = 0, body2 = 0;           ///< of a coupler both are the body that carries all its joints
   SE3 X_B1, X_B2;                     ///< placements of the frames in their bodies
   Vector3d axis = Vector3d::UnitZ();  ///< free axis of a hinge, in frame 1 (and in frame 2)
   double kp = 0, kd = 0;              ///< stabilisation gains, 1/s^2 and 1/s; zero as in the paper
+  std::vector<CouplerTerm> terms;     ///< of a coupler, by increasing dof
+  double offset = 0;                  ///< of a coupler
   /// Dofs that move one frame but not the other, in increasing order; sign +1 if they move frame 1, -1 for frame 2.
-  /// The relative placement of the frames depends only on them. Filled by the builder.
+  /// The relative placement of the frames depends only on them. Of a coupler, all dofs from the body that carries its
+  /// joints to these joints, with sign +1. Filled by the builder.
   std::vector<int> dofs, signs;
 };
 

@@ -10,7 +10,7 @@
 /// - <limit>: `effort` and `velocity` apply to the motor and to the joint (published files often have placeholders
 ///   there: override them by `motors`); 0 means none. `lower` = `upper` = 0, like a missing pair, means none. Joints
 ///   whose number of coordinates is changed by the YAML have no limits.
-/// - <mimic> is rejected (model the coupling as a closure), <dynamics> is ignored with a warning, meshes need not
+/// - <mimic> becomes a coupler named as the joint, <dynamics> is ignored with a warning, meshes need not
 ///   exist.
 /// - Attributes are finite numbers; inertias are those of a body (no negative mass, triangle inequality), up to 1e-6
 ///   of rounding.
