@@ -119,7 +119,8 @@ VectorXd MujocoModel::calcBias(const mjData& data) const {
   getState(data, q, v);
   MatrixXd M = calcFullMassMatrix(data);
   M.diagonal() -= Eigen::Map<const VectorXd>(mj_->dof_armature, model_.nv());
-  return mapBack(q, Eigen::Map<const VectorXd>(data.qfrc_bias, model_.nv()) + M * calcVelocityRate(q, v));
+  return mapBack(q, Eigen::Map<const VectorXd>(data.qfrc_bias, model_.nv()) -
+                        Eigen::Map<const VectorXd>(data.qfrc_passive, model_.nv()) + M * calcVelocityRate(q, v));
 }
 
 VectorXd MujocoModel::calcAcceleration(const mjData& data) const {

@@ -43,6 +43,24 @@ Matrix3d toRotation(ConstVectorRef xyzw) {
 
 Eigen::Matrix2d rotation2(double angle) { return Eigen::Rotation2Dd(angle).toRotationMatrix(); }
 
+// What Simbody has no element for: a constant force with its potential, and friction made smooth (model.h).
+class PreloadAndFriction : public SimTK::Force::Custom::Implementation {
+ public:
+  PreloadAndFriction(const JointForce& force, const MobilizedBody& body) : force_(force), body_(body) {}
+  void calcForce(const SimTK::State& state, SimTK::Vector_<SimTK::SpatialVec>&, SimTK::Vector_<Vec3>&,
+                 SimTK::Vector& mobility_forces) const override {
+    const double u = body_.getOneU(state, 0), friction = force_.friction * u / std::hypot(u, force_.friction_speed);
+    body_.applyOneMobilityForce(state, 0, force_.preload - friction, mobility_forces);
+  }
+  SimTK::Real calcPotentialEnergy(const SimTK::State& state) const override {
+    return -force_.preload * (body_.getOneQ(state, 0) - force_.rest);
+  }
+
+ private:
+  JointForce force_;
+  MobilizedBody body_;
+};
+
 }  // namespace
 
 SimbodyTree::SimbodyTree(const Model& m, const std::vector<Closure>& c, LoopCut cut)
@@ -62,6 +80,7 @@ SimbodyTree::SimbodyTree(const Model& m, const std::vector<Closure>& c, LoopCut 
     else
       addCutLoop(closures[i], cut_joints[i]);
   }
+  for (const JointForce& force : model.jointForces()) addJointForce(force);
   T.setIdentity(model.nv(), model.nv());
   Tdot_v.setZero(model.nv());
 }
@@ -182,6 +201,16 @@ void SimbodyTree::addClosure(const Closure& closure) {
   for (const Vector3d& normal : {normal1, normal2})
     constraints.back().push_back(SimTK::Constraint::ConstantAngle(body1, UnitVec3(toSimTK(closure.X_B1.R * normal)),
                                                                   body2, axis2, SimTK::Pi / 2));
+}
+
+void SimbodyTree::addJointForce(const JointForce& force) {
+  const MobilizedBody& body = bodies[force.joint];
+  const SimTK::MobilizerQIndex q(0);
+  const SimTK::MobilizerUIndex u(0);
+  if (force.stiffness != 0) SimTK::Force::MobilityLinearSpring(forces, body, q, force.stiffness, force.rest);
+  if (force.damping != 0) SimTK::Force::MobilityLinearDamper(forces, body, u, force.damping);
+  if (force.preload != 0 || force.friction != 0)
+    SimTK::Force::Custom(forces, new PreloadAndFriction(force, body));  // takes it over
 }
 
 void SimbodyTree::addCutLoop(const Closure& closure, int joint) {

@@ -9,6 +9,7 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
+#include "dynamics/joint_force.h"
 #include "simulation/closed_tree.h"
 #include "simulation/sole_track.h"
 
@@ -77,7 +78,7 @@ class BielleWorld : public World {
   MatrixXd damping_, system_;                                     // size x size
   Eigen::LLT<MatrixXd> factors_;
   double time_ = 0;
-  double motor_work_ = 0, push_work_ = 0, contact_work_ = 0, stop_work_ = 0;  // done on the robot, J
+  double motor_work_ = 0, push_work_ = 0, contact_work_ = 0, stop_work_ = 0, joint_work_ = 0;  // on the robot, J
   double elastic_start_ = 0, stops_start_ = 0;
   std::string message_;
   mutable Workspace ws_;  // of getBooks() and getGap()
@@ -106,7 +107,7 @@ BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
 void BielleWorld::reset(ConstVectorRef q, ConstVectorRef v) {
   message_.clear();
   if (!tree_.set(q, v)) message_ = tree_.getFailure();
-  time_ = motor_work_ = push_work_ = contact_work_ = stop_work_ = 0;
+  time_ = motor_work_ = push_work_ = contact_work_ = stop_work_ = joint_work_ = 0;
   u_.setZero();
   tau_.setZero();
   push_.setZero();
@@ -264,6 +265,10 @@ void BielleWorld::book(double h) {
     return v;
   };
   for (int m = 0; m < model_.nu(); ++m) motor_work_ += h * u_[m] * calcRate(model_.motors()[m].dof);
+  for (const JointForce& force : model_.jointForces()) {
+    const double rate = calcRate(force.dof);
+    joint_work_ += h * calcDissipativeForce(force, rate) * rate;
+  }
   for (size_t i = 0; i < stops_.size(); ++i)
     if (stop_forces_[i] != 0) stop_work_ += h * stop_forces_[i] * calcRate(stops_[i].dof);
   if (!push_.isZero(0)) {
@@ -303,6 +308,7 @@ Books BielleWorld::getBooks() const {
   books.push_work = push_work_;
   books.contact_loss = -contact_work_ - (books.elastic - stops - (elastic_start_ - stops_start_));
   books.stop_loss = stops_start_ - stops - stop_work_;
+  books.other_loss = -joint_work_;
   return books;
 }
 

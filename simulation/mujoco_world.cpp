@@ -88,7 +88,7 @@ class MujocoWorld : public World {
   VectorXd q_, v_, u_;
   VectorXd q_before_, v_before_, v_mean_, push_force_, row_velocity_;  // MuJoCo's
   double time_ = 0;
-  double motor_work_ = 0, push_work_ = 0, contact_work_ = 0, stop_work_ = 0, closure_work_ = 0;  // on the robot, J
+  double motor_work_ = 0, push_work_ = 0, contact_work_ = 0, stop_work_ = 0, other_work_ = 0;  // on the robot, J
   std::string message_;
 };
 
@@ -99,7 +99,7 @@ void MujocoWorld::reset(ConstVectorRef q, ConstVectorRef v) {
   q_ = q;
   v_ = v;
   u_.setZero();
-  time_ = motor_work_ = push_work_ = contact_work_ = stop_work_ = closure_work_ = 0;
+  time_ = motor_work_ = push_work_ = contact_work_ = stop_work_ = other_work_ = 0;
   soles_.reset();
   message_.clear();
 }
@@ -170,11 +170,13 @@ void MujocoWorld::book(double h) {
     mj_applyFT(&mj, data_.get(), push.data(), nullptr, data_->xipos + 3 * trunk, trunk, push_force_.data());
     push_work_ += h * v_mean_.dot(push_force_);
   }
+  // MuJoCo takes dampers at the end of a step.
+  for (int k = 0; k < mj.nv; ++k) other_work_ -= h * mj.dof_damping[k] * data_->qvel[k] * v_mean_[k];
   mj_mulJacVec(&mj, data_.get(), row_velocity_.data(), v_mean_.data());
   for (int i = 0; i < data_->nefc; ++i) {
     const double work = h * data_->efc_force[i] * row_velocity_[i];
-    if (data_->efc_type[i] == mjCNSTR_EQUALITY)
-      closure_work_ += work;
+    if (data_->efc_type[i] == mjCNSTR_EQUALITY || data_->efc_type[i] == mjCNSTR_FRICTION_DOF)
+      other_work_ += work;
     else if (data_->efc_type[i] == mjCNSTR_LIMIT_JOINT)
       stop_work_ += work;
     else
@@ -206,7 +208,7 @@ Books MujocoWorld::getBooks() const {
   books.push_work = push_work_;
   books.contact_loss = -contact_work_;
   books.stop_loss = -stop_work_;
-  books.other_loss = -closure_work_;
+  books.other_loss = -other_work_;
   return books;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/joint_force.h"
 #include "engines/simbody_tree.h"
 #include "simulation/sole_track.h"
 
@@ -17,10 +18,10 @@ using SimTK::Vec3;
 
 // What the forces of a world do at one instant: power given to the robot, W.
 struct Powers {
-  double motor = 0, push = 0, contact = 0, stop = 0;
+  double motor = 0, push = 0, contact = 0, stop = 0, joint = 0;
 };
 
-// Contacts, stops, motors and push: everything but gravity.
+// Contacts, stops, motors and push: everything but gravity and the forces of joints.
 class WorldForces : public SimTK::Force::Custom::Implementation {
  public:
   WorldForces(const SimbodyTree& tree, const SimbodyWorldOptions& options)
@@ -66,6 +67,10 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
       powers.contact += calcForce(state, point).force.dot(findVelocity(state, point));
     for (const JointStop& stop : stops) powers.stop += calcForce(state, stop).force * getRate(state, stop.dof);
     for (int m = 0; m < tree_.model.nu(); ++m) powers.motor += u[m] * getRate(state, tree_.model.motors()[m].dof);
+    for (const JointForce& force : tree_.model.jointForces()) {
+      const double rate = getRate(state, force.dof);
+      powers.joint += calcDissipativeForce(force, rate) * rate;
+    }
     powers.push = push.dot(toEigen(tree_.bodies[1].findStationVelocityInGround(state, toSimTK(getPushPoint()))));
     return powers;
   }
@@ -291,6 +296,7 @@ void SimbodyWorld::finishStep(double duration) {
   work_.push += 0.5 * duration * (last_.push + now.push);
   work_.contact += 0.5 * duration * (last_.contact + now.contact);
   work_.stop += 0.5 * duration * (last_.stop + now.stop);
+  work_.joint += 0.5 * duration * (last_.joint + now.joint);
   last_ = now;
   soles_.clearForces();
   for (ContactPoint& point : forces_->points) {
@@ -323,6 +329,7 @@ Books SimbodyWorld::getBooks() const {
   books.push_work = work_.push;
   books.contact_loss = -work_.contact - (books.elastic - stops - (elastic_start_ - stops_start_));
   books.stop_loss = stops_start_ - stops - work_.stop;
+  books.other_loss = -work_.joint;
   return books;
 }
 

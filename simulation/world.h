@@ -24,11 +24,11 @@ struct WorldOptions {
 /// books both as other_loss and says so.
 struct Books {
   double kinetic = 0;    ///< of bodies and rotors
-  double potential = 0;  ///< of gravity, zero for a centre of mass at the origin
+  double potential = 0;  ///< of gravity, zero for a centre of mass at the origin, and of springs of joints
   double elastic = 0;    ///< of the springs of contacts and stops
   double motor_work = 0, push_work = 0;
   double contact_loss = 0, stop_loss = 0;  ///< dissipated by friction and damping; not negative
-  double other_loss = 0;                   ///< e.g. damping of joints, of closures
+  double other_loss = 0;                   ///< dampers and friction of joints, damping of closures
 
   double getEnergy() const { return kinetic + potential + elastic; }
 };

@@ -73,10 +73,25 @@ void addRandomCoupler(ModelBuilder& builder, std::mt19937& rng, const std::strin
 
 namespace {
 
-enum class Belts { None, One, Repeated };
+enum class Extra { None, Belt, RepeatedBelt, JointForces };
+
+// On joints in a loop and, with a free base, on one outside.
+void addRandomForces(ModelBuilder& builder, std::mt19937& rng, JointKind kind) {
+  for (const std::string& joint : listCoupled(kind)) {
+    const VectorXd x = randomVector(rng, 6);
+    JointForce force;
+    force.stiffness = 20 + 10 * x[0];
+    force.rest = x[1];
+    force.preload = 5 * x[2];
+    force.damping = 2 + x[3];
+    force.friction = 3 + x[4];
+    force.friction_speed = 0.3 + 0.1 * x[5];
+    builder.addJointForce(joint, force);
+  }
+}
 
 Mechanism makeMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, double kp,
-                        double kd, Belts belts) {
+                        double kd, Extra extra) {
   ModelBuilder builder("random");
   std::string root = "root";
   if (base == MechanismBase::FreeFlyer) {
@@ -105,9 +120,11 @@ Mechanism makeMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, 
   builder.addMotor("joint_b0", 0.1);
   builder.addContact("foot", "a1", ContactKind::Surface6D, 0.1, 0.05);
   builder.addContact("point", "b1", ContactKind::Point3D, 0, 0);
-  if (belts != Belts::None) addRandomCoupler(builder, rng, "belt", listCoupled(kind), tree, out.q_closed, kp, kd);
+  if (extra == Extra::JointForces) addRandomForces(builder, rng, kind);
+  if (extra == Extra::Belt || extra == Extra::RepeatedBelt)
+    addRandomCoupler(builder, rng, "belt", listCoupled(kind), tree, out.q_closed, kp, kd);
   out.model = builder.build();
-  if (belts != Belts::Repeated) return out;
+  if (extra != Extra::RepeatedBelt) return out;
   Closure twin = out.model.closures().back();
   twin.name = "twin";
   twin.offset *= 2;
@@ -121,12 +138,16 @@ Mechanism makeMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, 
 
 Mechanism makeRandomMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, double kp,
                               double kd) {
-  return makeMechanism(rng, kind, closure, base, kp, kd, Belts::None);
+  return makeMechanism(rng, kind, closure, base, kp, kd, Extra::None);
 }
 
 Mechanism makeBeltedMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, bool repeated,
                               double kp, double kd) {
-  return makeMechanism(rng, kind, closure, base, kp, kd, repeated ? Belts::Repeated : Belts::One);
+  return makeMechanism(rng, kind, closure, base, kp, kd, repeated ? Extra::RepeatedBelt : Extra::Belt);
+}
+
+Mechanism makeSprungMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base) {
+  return makeMechanism(rng, kind, closure, base, 0, 0, Extra::JointForces);
 }
 
 Mechanism makePlanarFourBar(double ground, double crank, double coupler, double rocker, double angle) {

@@ -36,6 +36,9 @@ Mechanism makeRandomMechanism(std::mt19937& rng, JointKind joint, ClosureKind cl
 Mechanism makeBeltedMechanism(std::mt19937& rng, JointKind joint, ClosureKind closure, MechanismBase base,
                               bool repeated, double kp = 0, double kd = 0);
 
+/// The same with springs, dampers and friction on joints of its loop.
+Mechanism makeSprungMechanism(std::mt19937& rng, JointKind joint, ClosureKind closure, MechanismBase base);
+
 /// Couples joints of `tree`, with coefficients of 0.5 to 1.5 of either sign, so that it holds at q.
 void addRandomCoupler(ModelBuilder& builder, std::mt19937& rng, const std::string& name,
                       const std::vector<std::string>& joints, const Model& tree, const VectorXd& q, double kp = 0,

@@ -40,6 +40,7 @@ ModelBuilder makeBuilder(const Model& m, const ModelVariation& direction, double
   for (const Joint& joint : m.joints())
     if (joint.nv == 1 && m.findMotor(joint.name) < 0)
       builder.setArmature(joint.name, m.armature()[joint.idx_v] + step * direction.armature[joint.idx_v]);
+  for (const JointForce& force : m.jointForces()) builder.addJointForce(m.joints()[force.joint].name, force);
   for (size_t c = 0; c < m.contacts().size(); ++c) {
     const ContactFrame& contact = m.contacts()[c];
     builder.addFrame(contact.name + "/f", getLink(m, contact.body), move(contact.X_BF, direction.contacts[c]));

@@ -81,6 +81,20 @@ void checkSame(const Model& a, const Model& b) {
     CHECK(ca.body2 == cb.body2);
     CHECK((ca.X_B1.p - cb.X_B1.p).norm() < 1e-11);
     CHECK((ca.X_B2.p - cb.X_B2.p).norm() < 1e-11);
+    CHECK(ca.offset == Approx(cb.offset).epsilon(1e-11));
+    REQUIRE(ca.terms.size() == cb.terms.size());
+    for (size_t i = 0; i < ca.terms.size(); ++i) {
+      CHECK(ca.terms[i].dof == cb.terms[i].dof);
+      CHECK(ca.terms[i].coefficient == Approx(cb.terms[i].coefficient).epsilon(1e-11));
+    }
+  }
+  REQUIRE(a.jointForces().size() == b.jointForces().size());
+  for (size_t i = 0; i < a.jointForces().size(); ++i) {
+    const JointForce &fa = a.jointForces()[i], &fb = b.jointForces()[i];
+    CHECK(fa.joint == fb.joint);
+    for (double JointForce::*field : {&JointForce::stiffness, &JointForce::rest, &JointForce::preload,
+                                      &JointForce::damping, &JointForce::friction, &JointForce::friction_speed})
+      CHECK(fa.*field == Approx(fb.*field).epsilon(1e-11));
   }
   REQUIRE(a.nu() == b.nu());
   for (int m = 0; m < a.nu(); ++m) {
@@ -247,6 +261,18 @@ TEST_CASE("writer: names are escaped, what the files cannot say is refused") {
   const Model driven = motors.build();
   writeRobot(driven, directory.path() + "/motors");
   checkSame(driven, loadRobot(directory.path() + "/motors").model);
+
+  motors.addCoupler("belt", {{"known", 1.0 / 3}, {"unknown", -2}}, 0.7, 3, 4);
+  JointForce force;
+  force.stiffness = 2.5, force.rest = -0.1, force.preload = 3, force.damping = 0.2;
+  motors.addJointForce("known", force);
+  force = {};
+  force.friction = 0.3, force.friction_speed = 0.05;
+  motors.addJointForce("unknown", force);
+  const Model belted = motors.build();
+  writeRobot(belted, directory.path() + "/belted");
+  checkSame(belted, loadRobot(directory.path() + "/belted").model);
+  CHECK(loadRobot(directory.path() + "/belted").model.closures()[0].kd == 4);
 
   const Joint skew = makeUniversal("u", {0, 0, 0}, Vector3d(1, 1, 0).normalized(), Vector3d::UnitZ());
   CHECK_THROWS_WITH(formatRobot(build(skew)), Catch::Contains("universal joint 'u'"));

@@ -9,6 +9,7 @@
 #include "bielle/model/reader.h"
 #include "bielle/motion/walk.h"
 #include "measure_steps.h"
+#include "model/text_file.h"
 #include "robot_directory.h"
 #include "run_command.h"
 
@@ -132,6 +133,22 @@ TEST_CASE("belt biped: bielle solve squat, walk and jump converge and are checke
                 {{"walk"}, 0.98 * standing, 1.055 * standing},
                 {{"jump"}, 0.83 * standing, standing + 0.02 + rise}},
                70, 0.25, {0.015, 0.2});
+}
+
+TEST_CASE("belt biped: springs, dampers and friction of its joints are in the energy that the check counts") {
+  const std::string place = std::string(BIELLE_SOURCE_DIR) + "/robots/belt_biped/belt_biped.";
+  const RobotDirectory files;
+  std::string forces = "joint_forces:\n";
+  for (const std::string side : {"_left", "_right"})
+    forces += "  knee" + side + ": {stiffness: 20, rest: 1, preload: 2, damping: 0.5}\n  motor_ankle1" + side +
+              ": {friction: 0.3, friction_speed: 3}\n  ankley" + side + ": {stiffness: 10, damping: 0.2}\n";
+  const std::string robot = files.writeRobot(readTextFile(place + "urdf"), readTextFile(place + "yaml") + forces);
+  REQUIRE(loadRobot(robot).model.jointForces().size() == 6);
+  for (const std::vector<std::string>& motion :
+       {std::vector<std::string>{"squat"}, {"walk"}, {"walk", "--step", "euler"}}) {
+    const RobotDirectory directory;
+    solve(robot, motion, directory);
+  }
 }
 
 TEST_CASE("Cleobot, the RSU biped and the belt biped walk at 0.9 m/s") {

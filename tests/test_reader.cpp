@@ -219,6 +219,27 @@ TEST_CASE("couplers arrive from the YAML file and from <mimic>, with the gains a
   CHECK_THAT(still.warnings[0], Catch::Contains("joint 'rod_joint': it is fixed, <mimic> is ignored"));
 }
 
+TEST_CASE("springs, dampers and friction arrive, each number in its place") {
+  const Model model = loadWith(
+      "joint_forces: {shoulder: {stiffness: 1, rest: 2, preload: 3, damping: 4, friction: 5, friction_speed: 6}, "
+      "rod_joint: {damping: 7}}");
+  REQUIRE(model.jointForces().size() == 2);
+  const JointForce &first = model.jointForces()[0], &second = model.jointForces()[1];
+  CHECK(first.joint == model.findJoint("shoulder"));
+  CHECK(first.dof == getJoint(model, "shoulder").idx_v);
+  CHECK(first.idx_q == getJoint(model, "shoulder").idx_q);
+  CHECK(first.stiffness == 1);
+  CHECK(first.rest == 2);
+  CHECK(first.preload == 3);
+  CHECK(first.damping == 4);
+  CHECK(first.friction == 5);
+  CHECK(first.friction_speed == 6);
+  CHECK(second.joint == model.findJoint("rod_joint"));
+  CHECK(second.damping == 7);
+  CHECK(second.friction == 0);
+  CHECK(second.friction_speed == 0.01);
+}
+
 TEST_CASE("motors, armature, contacts, references, serial joints and gravity arrive") {
   const Model model = load(kToyUrdf, R"(motors: {shoulder: {effort: .inf, velocity: 9, torque_loss: 0.4}, rod_joint: }
 armature: 0.25

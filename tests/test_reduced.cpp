@@ -152,6 +152,37 @@ TEST_CASE("reduced step: random mechanisms, every joint kind times every closure
       }
 }
 
+TEST_CASE("reduced step: springs, dampers and friction on joints in and outside loops") {
+  const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
+  std::mt19937 rng(17);
+  for (JointKind kind : kJointKinds)
+    for (ClosureKind closure : {ClosureKind::Ball3D, ClosureKind::Coupler}) {
+      CAPTURE(getName(rule), getName(kind), getName(closure));
+      const Mechanism mechanism = makeSprungMechanism(rng, kind, closure, MechanismBase::FreeFlyer);
+      const Model& model = mechanism.model;
+      const State state = makeClosedState(model, mechanism.q_closed, 0, 1, rng);
+      const State node = makeClosedState(model, mechanism.q_closed, 0.05, 1, rng);
+      checkLinearization(model, {{1, {}, 0, 10}}, state, node.x(), rng, StageKind::Dynamics, Formulation::Reduced,
+                         rule);
+    }
+}
+
+TEST_CASE("reduced step: couplers in the loops of other closures") {
+  const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
+  std::mt19937 rng(18);
+  for (JointKind kind : kJointKinds)
+    for (ClosureKind closure : kClosureKinds)
+      for (bool repeated : {false, true}) {
+        CAPTURE(getName(rule), getName(kind), getName(closure), repeated);
+        const Mechanism mechanism = makeBeltedMechanism(rng, kind, closure, MechanismBase::FreeFlyer, repeated);
+        const Model& model = mechanism.model;
+        const State state = makeClosedState(model, mechanism.q_closed, 0, 1, rng);
+        const State node = makeClosedState(model, mechanism.q_closed, 0.05, 1, rng);
+        checkLinearization(model, {{1, {}, 0, 10}}, state, node.x(), rng, StageKind::Dynamics, Formulation::Reduced,
+                           rule);
+      }
+}
+
 TEST_CASE("reduced step: Bipetto, four-bar, five-bar, redundant planar four-bar") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(12);

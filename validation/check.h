@@ -32,8 +32,8 @@
 ///
 /// Energy: with T the kinetic energy, v_m = (v_k + v_{k+1}) / 2, and forces taken at the start of a step,
 ///     T_{k+1} - T_k = h v_m (B u + J^T lambda) + h/2 (g_k v_k + g_{k+1} v_{k+1}) + rest                           (7)
-/// would have no rest if M, the inertial part c of b = c - g and the forces g of gravity did not change during the
-/// step, and velocities did not turn. With T_{k+1} - T(q_k, v_{k+1}) = h v c + O(h^2), since 2 v c = v dM/dt v, to
+/// would have no rest if M, the inertial part c of b = c - g and the forces g of gravity, springs, dampers and friction
+/// did not change during the step, and velocities did not turn. With T_{k+1} - T(q_k, v_{k+1}) = h v c + O(h^2), since 2 v c = v dM/dt v, to
 /// first order
 ///     |rest| <= h |(v c)_{k+1} - (v c)_k| + h^2/2 |a c| + h/2 |(g_{k+1} - g_k) v_{k+1}|
 ///               + |(v_{k+1} - v_k - h a) M v_m|.                                                                  (8)
@@ -48,7 +48,7 @@
 /// q_m it is 2/h (v_m - v-), which is compared with Simbody's at (q_m, v-), without stabilisation, in the row of (4).
 /// e_k of (6) is taken with a at (q_m, v_m), and
 ///     T_{k+1} - T_k + U_{k+1} - U_k = h/2 (v- + w) (B u + J^T lambda) + rest,                                     (10)
-/// U the potential energy. The rest is of third order. For a drift changes T + U at the rate
+/// U the potential energy; dampers and friction count among the torques u here, not in f. The rest is of third order. For a drift changes T + U at the rate
 ///     p(q, v) = v f(q, v),    f = b + M a_n,    a_n = -W^{-1} J^T (J W^{-1} J^T)^+ dJ/dt v                        (11)
 /// with J the rows of the loops that it follows (none in the full formulation), while the kick takes h v' f(q_m, v_m),
 /// v' = (v- + w) / 2. Trapezoids for both drifts, with the errors of the midpoint rule for them, leave

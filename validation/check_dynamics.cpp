@@ -105,19 +105,19 @@ void addEnergyRows(CheckContext& context) {
     const double h = context.motion.getTimeStep(static_cast<int>(k));
     const double rest =
         nodes[k + 1].kinetic - nodes[k].kinetic - stage.motor_work - stage.contact_work - stage.closure_work;
-    const double missing = rest - stage.gravity_work;
+    const double missing = rest - stage.passive_work;
     const double scale = stage.energy_scale + mean;
     interval.add(std::abs(missing) / scale, static_cast<int>(k), describe(std::abs(missing), scale));
     const double raised = nodes[k + 1].potential - nodes[k].potential;
-    total += rest + raised;
+    total += rest + raised - stage.dissipative_work;
     // With the mean velocity an Euler step falls by h^2/2 m g a less than with its final one: h/2 m g times the change
     // of velocity, which cancels in a motion from rest to rest with one step size.
     allowed += stage.energy_scale;
-    if (!midpoint) allowed += std::abs(h - h_before) / 2 * std::abs(nodes[k].gravity_power);
+    if (!midpoint) allowed += std::abs(h - h_before) / 2 * std::abs(nodes[k].passive_power);
     h_before = h;
     exchanged += stage.exchanged + std::abs(raised);
   }
-  if (!midpoint) allowed += h_before / 2 * std::abs(nodes.back().gravity_power);
+  if (!midpoint) allowed += h_before / 2 * std::abs(nodes.back().passive_power);
   context.add(interval, "energy, one interval", "of scale", context.bounds.interval_energy);
   CheckRow row{"energy, whole motion",
                CheckRow::Kind::AtMost,

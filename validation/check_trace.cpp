@@ -100,9 +100,10 @@ class Tracer {
     node.com = simbody.calcCom();
     node.kinetic = simbody.calcKineticEnergy();
     node.potential = simbody.calcPotentialEnergy();
-    node.gravity_power = motion_.model.mass() * motion_.model.gravity().dot(simbody.calcComVelocity());
-    node.gravity = simbody.calcGravityForces();
-    node.inertial_power = v.dot(simbody.calcBias() + node.gravity);
+    node.passive = simbody.calcPassiveForces();
+    node.passive_power = v.dot(node.passive);
+    node.dissipative_power = v.dot(simbody.calcDissipativeForces());
+    node.inertial_power = v.dot(simbody.calcBias() + node.passive);
     return node;
   }
 
@@ -137,10 +138,10 @@ class Tracer {
     normal_ = inverse_root.asDiagonal() * Q.leftCols(factors_.rank());
   }
 
-  // f of Eq. (11), at the state that the bridge has. a_n is the smallest acceleration, in the metric W, that keeps the
+  // f of Eq. (11), at the state that the bridge has; dampers and friction act in the kick. a_n is the smallest acceleration, in the metric W, that keeps the
   // loops closed.
   VectorXd calcDriftForces(const SimbodyBridge& simbody) const {
-    const VectorXd bias = simbody.calcBias();
+    const VectorXd bias = simbody.calcBias() + simbody.calcDissipativeForces();
     if (!metric_.size()) return bias;
     const VectorXd left = simbody.calcConstraintAcceleration(VectorXd::Zero(bias.size())).head(loop_rows_);
     const auto rank = factors_.rank();
@@ -161,13 +162,14 @@ class Tracer {
     if (hasMidpoint(k)) {
       const VectorXd q_mid = motion_.record.q_mid.row(k), q_next = motion_.record.q.row(k + 1);
       stage.position_rest = projectOnTangent(motion_.model.difference(q_mid, q_next) - h / 2 * v_next);
-      stage.gravity_work = here.potential - next.potential;
+      stage.passive_work = here.potential - next.potential + stage.dissipative_work;
       stage.energy_scale += h / 4 * std::abs(here.drift_power - stage.midpoint_power + next.drift_power);
     } else {
       stage.position_rest = projectOnTangent(calcStep(k) - h * v_next);
-      stage.gravity_work = h / 2 * (here.gravity_power + next.gravity_power);
+      stage.passive_work = h / 2 * (here.passive_power + next.passive_power);
+      stage.dissipative_work = h / 2 * (here.dissipative_power + next.dissipative_power);
       stage.energy_scale += h * std::abs(next.inertial_power - here.inertial_power) +
-                            h / 2 * std::abs((next.gravity - here.gravity).dot(v_next));
+                            h / 2 * std::abs((next.passive - here.passive).dot(v_next));
     }
   }
 
@@ -219,7 +221,7 @@ class Tracer {
     stage.finite_difference = calcInertialNorm(M, (next - v) / h - own.a);
 
     traceWork(simbody, motors, wrenches, h / 2 * (v + next), stage);
-    const VectorXd inertial = simbody.calcBias() + simbody.calcGravityForces();
+    const VectorXd inertial = simbody.calcBias() + simbody.calcPassiveForces();
     stage.energy_scale = h * h / 2 * std::abs(a.dot(inertial)) + std::abs((M * (next - v - h * a)).dot(v + next)) / 2;
   }
 
@@ -247,6 +249,7 @@ class Tracer {
     stage.acceleration = own.size;
     stage.finite_difference = calcInertialNorm(M, (next - v) / h - own.a);
     traceWork(simbody, motors, wrenches, h / 2 * (before + after), stage);
+    stage.dissipative_work = h / 2 * (before + after).dot(simbody.calcDissipativeForces());
 
     simbody.setState(q_mid, before, motors);
     const VectorXd foreseen = projectOnTangent(simbody.solveWithArmature(Precision::Double).a);

@@ -19,9 +19,10 @@ struct NodeTrace {
   std::vector<Vector3d> mass_centers;  ///< per body, in the world, m
   Vector3d com;                        ///< of the robot, m
   double kinetic = 0, potential = 0;   ///< energies, of bodies and rotors, J
-  double gravity_power = 0;            ///< m g . v_com, W
-  VectorXd gravity;                    ///< nv, generalized forces of gravity
-  double inertial_power = 0;           ///< v . c, c the bias without gravity: half of v . dM/dt v, W
+  VectorXd passive;                    ///< nv, generalized forces of gravity, springs, dampers and friction
+  double passive_power = 0;            ///< their power, W
+  double dissipative_power = 0;        ///< that of dampers and friction, W
+  double inertial_power = 0;           ///< v . c, c the bias without passive forces: half of v . dM/dt v, W
   double drift_power = 0;              ///< p of Eq. (11), W
 };
 
@@ -39,7 +40,8 @@ struct StageTrace {
   double exchanged = 0;                  ///< sum of the sizes of the work of each motor, J
   double contact_work = 0;               ///< of feet that slip, J
   double closure_work = 0;               ///< of loops that open, J
-  double gravity_work = 0;               ///< over the interval, as Eq. (7) or (10) takes it, J
+  double passive_work = 0;               ///< over the interval, as Eq. (7) or (10) takes it, J
+  double dissipative_work = 0;           ///< the part of dampers and friction, J
   double midpoint_power = 0;             ///< p(q_m, v-) + p(q_m, w) of Eq. (11), W
   double energy_scale = 0;               ///< what the step may lose or gain, the right side of Eq. (8) or (12), J
   std::vector<Vector6d>

@@ -20,6 +20,7 @@ Model copyModel(const Model& model, const ModelChanges& changes) {
     if (changes.closure) changes.closure(c, closure);
     builder.copyClosure(model, closure);
   }
+  for (const JointForce& force : model.jointForces()) builder.addJointForce(model.joints()[force.joint].name, force);
   for (const ContactFrame& contact : model.contacts()) {
     builder.addFrame(contact.name + "/frame", link(contact.body), contact.X_BF);
     builder.addContact(contact.name, contact.name + "/frame", contact.kind, contact.half_length, contact.half_width);

@@ -99,6 +99,7 @@ void SimbodyBridge::setState(ConstVectorRef q, ConstVectorRef v, ConstVectorRef 
   s_->scatter(s_->T.transpose().inverse() * tau, f);
   s_->state.updU() = u;
   s_->torques.setAllMobilityForces(s_->state, f);
+  s_->applied = f;
   s_->system.realize(s_->state, Stage::Dynamics);
 }
 
@@ -121,10 +122,6 @@ double SimbodyBridge::calcKineticEnergy() const {
 
 Vector3d SimbodyBridge::calcCom() const { return toEigen(s_->matter.calcSystemMassCenterLocationInGround(s_->state)); }
 
-Vector3d SimbodyBridge::calcComVelocity() const {
-  return toEigen(s_->matter.calcSystemMassCenterVelocityInGround(s_->state));
-}
-
 double SimbodyBridge::calcPotentialEnergy() const { return s_->system.calcPotentialEnergy(s_->state); }
 
 MatrixXd SimbodyBridge::calcMassMatrix() const {
@@ -143,7 +140,7 @@ VectorXd SimbodyBridge::calcInverseDynamics(ConstVectorRef a) const {
   SimTK::Vector udot(s_->model.nv()), residual;
   s_->scatter(s_->T * a + s_->Tdot_v, udot);
   s_->matter.calcResidualForceIgnoringConstraints(
-      s_->state, SimTK::Vector(), s_->system.getRigidBodyForces(s_->state, Stage::Dynamics), udot, residual);
+      s_->state, s_->calcPassiveForces(), s_->system.getRigidBodyForces(s_->state, Stage::Dynamics), udot, residual);
   return s_->T.transpose() * s_->gather(residual) + s_->model.armature().cwiseProduct(a);
 }
 
@@ -261,11 +258,20 @@ OracleSolution SimbodyBridge::solveImpact() const {
   return s_->makeSolution(v, m);
 }
 
-VectorXd SimbodyBridge::calcGravityForces() const {
+VectorXd SimbodyBridge::calcPassiveForces() const {
   SimTK::Vector generalized;
   s_->matter.multiplyBySystemJacobianTranspose(s_->state, s_->system.getRigidBodyForces(s_->state, Stage::Dynamics),
                                                generalized);
-  return s_->T.transpose() * s_->gather(generalized);
+  return s_->T.transpose() * s_->gather(generalized + s_->calcPassiveForces());
+}
+
+VectorXd SimbodyBridge::calcDissipativeForces() const {
+  VectorXd out = VectorXd::Zero(s_->model.nv());
+  for (const JointForce& force : s_->model.jointForces()) {
+    const double v = s_->bodies[force.joint].getOneU(s_->state, 0);
+    out[force.dof] = -force.damping * v - force.friction * v / std::hypot(v, force.friction_speed);
+  }
+  return out;
 }
 
 void SimbodyBridge::integrate(double duration, double accuracy, VectorXd& q, VectorXd& v) {

@@ -51,7 +51,6 @@ class SimbodyBridge {
   Vector6d calcTwist(int body) const;  ///< of a body, in its own frame
   double calcKineticEnergy() const;    ///< J, of the bodies; of the rotors too (diag(armature))
   Vector3d calcCom() const;            ///< of the whole robot, m (world)
-  Vector3d calcComVelocity() const;    ///< of the whole robot, m/s (world)
   double calcPotentialEnergy() const;  ///< J, zero for a centre of mass at the origin
   MatrixXd calcMassMatrix() const;     ///< nv x nv, armature included
   VectorXd calcBias() const;           ///< nv
@@ -76,8 +75,10 @@ class SimbodyBridge {
   MatrixXd calcResponse(const MatrixXd& J, const MatrixXd& targets) const;
   /// Rigid impact from the velocity set: OracleSolution::a is v+ of M (v+ - v) = J' L, J v+ = 0, wrenches are impulses.
   OracleSolution solveImpact() const;
-  /// Generalized forces of gravity (nv), with the sign of motor forces.
-  VectorXd calcGravityForces() const;
+  /// Generalized forces of gravity and of springs, dampers and friction (nv), with the sign of motor forces.
+  VectorXd calcPassiveForces() const;
+  /// The part of dampers and friction (nv).
+  VectorXd calcDissipativeForces() const;
   /// Solves the system with armature, see above.
   OracleSolution solveWithArmature(Precision precision = Precision::Extended) const;
 

@@ -6,6 +6,10 @@
 
 namespace bielle::validation {
 
+SimTK::Vector SimbodyBridge::System::calcPassiveForces() const {
+  return system.getMobilityForces(state, SimTK::Stage::Dynamics) - applied;
+}
+
 double SimbodyBridge::System::calcRounding() const {
   SimTK::Matrix delassus;
   matter.calcProjectedMInv(state, delassus);

@@ -85,7 +85,7 @@ namespace {
 double calcMissingEnergy(const MotionTrace& trace, int k) {
   const StageTrace& stage = trace.stages[k];
   return trace.nodes[k + 1].kinetic - trace.nodes[k].kinetic - stage.motor_work - stage.contact_work -
-         stage.closure_work - stage.gravity_work;
+         stage.closure_work - stage.passive_work;
 }
 
 }  // namespace

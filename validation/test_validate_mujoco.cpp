@@ -43,6 +43,21 @@ TEST_CASE("every joint kind with every closure kind agrees with MuJoCo") {
   CHECK(without_rate > 1e-3);  // dJ/dt v is not negligible
 }
 
+TEST_CASE("springs, dampers and friction on joints agree with MuJoCo") {
+  std::mt19937 rng(23);
+  ValidationOptions options;
+  options.samples = 3;
+  options.tolerance = 1e-10;
+  for (JointKind joint : {JointKind::Revolute, JointKind::Prismatic}) {
+    const Mechanism mechanism = makeSprungMechanism(rng, joint, ClosureKind::Ball3D, MechanismBase::FreeFlyer);
+    options.start = mechanism.q_closed;
+    const ValidationReport report = validateByMujoco(mechanism.model, options);
+    CAPTURE(getName(joint));
+    INFO(print(report));
+    CHECK(report.passed());
+  }
+}
+
 TEST_CASE("MuJoCo sees a wrong inertia, a moved closure and a wrong armature") {
   std::mt19937 rng(22);
   const Mechanism mechanism =

@@ -51,6 +51,53 @@ TEST_CASE("every joint kind with every closure kind agrees with Simbody") {
       }
 }
 
+TEST_CASE("springs, dampers and friction on joints agree with Simbody") {
+  std::mt19937 rng(13);
+  ValidationOptions options;
+  options.samples = 3;
+  for (JointKind joint : {JointKind::Revolute, JointKind::Continuous, JointKind::Prismatic, JointKind::Spherical}) {
+    const Mechanism mechanism = makeSprungMechanism(rng, joint, ClosureKind::Ball3D, MechanismBase::FreeFlyer);
+    options.start = mechanism.q_closed;
+    const ValidationReport report = validateRobot(mechanism.model, options);
+    CAPTURE(getName(joint));
+    INFO(print(report));
+    CHECK(report.passed());
+  }
+}
+
+TEST_CASE("couplers beside other closures, redundant or not, agree with Simbody") {
+  std::mt19937 rng(14);
+  ValidationOptions options;
+  options.samples = 3;
+  for (JointKind joint : kJointKinds)
+    for (bool repeated : {false, true}) {
+      const Mechanism mechanism =
+          makeBeltedMechanism(rng, joint, ClosureKind::Hinge5D, MechanismBase::FreeFlyer, repeated);
+      options.start = mechanism.q_closed;
+      const ValidationReport report = validateRobot(mechanism.model, options);
+      CAPTURE(getName(joint), repeated);
+      INFO(print(report));
+      CHECK(report.passed());
+      CHECK((report.redundant_states == 0) == !repeated);
+    }
+}
+
+TEST_CASE("a wrong ratio of a coupler is seen") {
+  std::mt19937 rng(15);
+  const Mechanism mechanism =
+      makeRandomMechanism(rng, JointKind::Prismatic, ClosureKind::Coupler, MechanismBase::Fixed);
+  ValidationOptions options;
+  options.samples = 2;
+  options.start = mechanism.q_closed;
+  REQUIRE(validateAgainst(mechanism.model, copyModel(mechanism.model), options).passed());
+  ModelChanges changes;
+  changes.closure = [](int, Closure& closure) { closure.terms[0].coefficient *= 1.001; };
+  const ValidationReport report = validateAgainst(mechanism.model, copyModel(mechanism.model, changes), options);
+  INFO(print(report));
+  CHECK(!report.findRow("accelerations, Simbody solver")->passed());
+  CHECK(!report.findRow("constraint forces J'lambda, with rotors")->passed());
+}
+
 TEST_CASE("the planar four-bar, with redundant rows, agrees with Simbody in accelerations and generalized forces") {
   const Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.45, 0.3, 0.7);
   ValidationOptions options;

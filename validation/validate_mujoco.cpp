@@ -1,5 +1,6 @@
 #include "validate_mujoco.h"
 
+#include <cmath>
 #include <limits>
 
 #include "bielle/dynamics/assembly.h"
@@ -28,12 +29,13 @@ class Comparison {
   Comparison(const Model& model, const Model& oracle, ConstVectorRef q_ref, const ValidationOptions& options,
              ValidationReport& report)
       : model_(model),
+        oracle_(oracle),
         options_(options),
         report_(report),
         mujoco_(oracle, q_ref),
         data_(mujoco_.makeData()),
         moved_(mujoco_.makeData()) {
-    mujoco_.get()->opt.disableflags |= mjDSBL_CONTACT | mjDSBL_LIMIT;
+    mujoco_.get()->opt.disableflags |= mjDSBL_CONTACT | mjDSBL_LIMIT | mjDSBL_FRICTIONLOSS;
   }
 
   void compare(const Sample& sample) {
@@ -45,7 +47,7 @@ class Comparison {
     mujoco_.setState(sample.q, sample.v, *data_);
     mj_forward(mujoco_.get(), data_.get());
     addDifference(report_, "mass matrix", ws.M, mujoco_.calcMassMatrix(*data_), 1e-6, options_.tolerance);
-    addDifference(report_, "bias", ws.b, mujoco_.calcBias(*data_), 1e-6, options_.tolerance);
+    addDifference(report_, "bias", ws.b, mujoco_.calcBias(*data_) - calcFriction(sample.v), 1e-6, options_.tolerance);
     compareAcceleration("as MuJoCo has them", sample, Rows::AsTheyAre, kNoTolerance);
     compareAcceleration("rigid closures", sample, Rows::Rigid, kNoTolerance);
     compareAcceleration("rigid closures, dJ/dt v added", sample, Rows::Complete, kRigidTolerance);
@@ -69,6 +71,14 @@ class Comparison {
         kFloor * weight.cwiseProduct(free).cwiseAbs().maxCoeff(), tolerance);
   }
 
+  // Smooth friction of joints (model.h), which MuJoCo does not have.
+  VectorXd calcFriction(const VectorXd& v) const {
+    VectorXd out = VectorXd::Zero(oracle_.nv());
+    for (const JointForce& force : oracle_.jointForces())
+      out[force.dof] = -force.friction * v[force.dof] / std::hypot(v[force.dof], force.friction_speed);
+    return out;
+  }
+
   // Linear extrapolation to R = 0.
   VectorXd calcRigid(const Sample& sample, Rows rows) {
     const VectorXd soft = calcAcceleration(sample, kSoftness, rows);
@@ -80,7 +90,7 @@ class Comparison {
     const mjModel& mj = *mujoco_.get();
     mjData& data = *data_;
     mujoco_.setState(sample.q, sample.v, data);
-    mujoco_.setForces(sample.q, sample.tau, data);
+    mujoco_.setForces(sample.q, sample.tau + calcFriction(sample.v), data);
     mj_fwdPosition(&mj, &data);
     for (int i = 0; i < data.nefc; ++i) {
       data.efc_R[i] *= softness;
@@ -107,7 +117,7 @@ class Comparison {
     return rate;
   }
 
-  const Model& model_;
+  const Model &model_, &oracle_;
   const ValidationOptions& options_;
   ValidationReport& report_;
   MujocoModel mujoco_;

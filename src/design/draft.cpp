@@ -123,6 +123,7 @@ Model RobotDraft::build() const {
     builder.addMotor(motor.name, motor.armature, motor.effort_limit, motor.velocity_limit, motor.torque_loss);
   for (const Joint& joint : m.joints())
     if (joint.nv > 0 && m.findMotor(joint.name) < 0) builder.setArmature(joint.name, m.armature()[joint.idx_v]);
+  for (const JointForce& force : m.jointForces()) builder.addJointForce(m.joints()[force.joint].name, force);
   for (const ContactFrame& c : m.contacts())
     builder.addContact(c.name, place(c.name + "/frame", c.body, c.X_BF), c.kind, c.half_length, c.half_width);
   for (const Reference& reference : m.references()) builder.addReference(reference);

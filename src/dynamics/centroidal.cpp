@@ -1,4 +1,5 @@
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/joint_force.h"
 
 namespace bielle {
 
@@ -47,7 +48,9 @@ double calcKineticEnergy(const Model& model, const Workspace& ws) {
 }
 
 double calcPotentialEnergy(const Model& model, const Workspace& ws) {
-  return -model.mass() * model.gravity().dot(calcCom(model, ws));
+  double energy = -model.mass() * model.gravity().dot(calcCom(model, ws));
+  for (const JointForce& force : model.jointForces()) energy += calcSpringEnergy(force, ws.q);
+  return energy;
 }
 
 }  // namespace bielle

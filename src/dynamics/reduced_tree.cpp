@@ -176,9 +176,10 @@ void ReducedTreeOf<T>::addClusterWithin(const WorkspaceOf<T>& ws, const ClusterL
         const int dof = link.dofs[k], at = n * c + k;
         const double armature = model_.armature()[dof];
         const T row_y = ws.YJ.col(dof).dot(motion.dA.col(at)) + ws.BtJ.col(dof).dot(motion.dV.col(at)) +
-                        ws.J.col(dof).dot(after_y) + armature * dy(k, c) - (*lift.KN)(k, c);
+                        ws.J.col(dof).dot(after_y) + armature * dy(k, c) - (*lift.KN)(k, c) +
+                        ws.stiffness[dof] * N(k, c) + ws.resistance[dof] * Z(k, c);
         const T row_v = ws.YJ.col(dof).dot(motion.dW.col(at)) + ws.BtJ.col(dof).dot(motion.J.col(at)) +
-                        ws.J.col(dof).dot(after_v) + armature * dv(k, c);
+                        ws.J.col(dof).dot(after_v) + armature * dv(k, c) + ws.resistance[dof] * N(k, c);
         for (int d = 0; d < place.size; ++d) {
           A_y(o + d, o + c) += N(k, d) * row_y;
           A_v(o + d, o + c) += N(k, d) * row_v;

@@ -11,9 +11,10 @@
 ///     A_v(alpha, beta) = (YJ)~_alpha . dW~_beta + (BtJ)~_alpha . J~_beta,     A_v(beta, alpha) = J~_beta . G~_v,alpha
 ///     M(alpha, beta) = J~_beta . (YJ)~_alpha                                                                       (2)
 /// Within a reduced joint the same holds dof by dof, with J~, .. the path sums at dof j and G'~, (YJ)'~ the sums (1)
-/// over the dofs after it, plus the rotors D, less the geometric stiffness K = d(J^T lambda)/dq of its loop forces:
-///     A_y = sum_j N_j (YJ_j . dA~ + BtJ_j . dV~ + J_j . G'~_y + D_j d_y,j - (K N)_j)
-///     A_v = sum_j N_j (YJ_j . dW~ + BtJ_j . J~ + J_j . G'~_v + D_j d_v,j)
+/// over the dofs after it, plus the rotors D and the stiffness k and
+/// resistance r of joint forces, less the geometric stiffness K = d(J^T lambda)/dq of its loop forces:
+///     A_y = sum_j N_j (YJ_j . dA~ + BtJ_j . dV~ + J_j . G'~_y + D_j d_y,j - (K N)_j + k_j N_j + r_j Z_j)
+///     A_v = sum_j N_j (YJ_j . dW~ + BtJ_j . J~ + J_j . G'~_v + D_j d_v,j + r_j N_j)
 ///     M = sum_j N_j (YJ_j . J~ + J_j . (YJ)'~ + D_j N_j)                                                           (3)
 /// The loop forces have no other effect: they are internal to the cluster and cancel in every sum that leaves it.
 #include "dynamics/cluster_motion.h"

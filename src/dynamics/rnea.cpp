@@ -1,6 +1,7 @@
 #include "bielle/dynamics/rnea.h"
 
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/joint_force.h"
 #include "math/lanes.h"
 
 namespace bielle {
@@ -36,7 +37,7 @@ Vector6<T> applyB(const WorkspaceOf<T>& ws, int i, const Vector6<T>& x) {
   return out;
 }
 
-// Generalized forces of the accelerations of the bodies, without rotors.
+// Generalized forces of the accelerations of the bodies, without rotors, less those of springs, dampers and friction.
 template <typename T>
 void sumForces(const Model& model, WorkspaceOf<T>& ws, VectorX<T>& out) {
   for (int i = 1; i < model.numBodies(); ++i) ws.F[i] = calcBodyForce(ws, i, ws.A[i]);
@@ -45,6 +46,7 @@ void sumForces(const Model& model, WorkspaceOf<T>& ws, VectorX<T>& out) {
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) out[k] = ws.J.col(k).dot(ws.F[i]);
     if (joint.parent > 0) ws.F[joint.parent] += ws.F[i];
   }
+  for (const JointForce& force : model.jointForces()) out[force.dof] -= calcJointForce(force, ws);
 }
 
 }  // namespace
@@ -119,6 +121,10 @@ template <typename T>
 void updateInverseDynamicsFactors(const Model& model, WorkspaceOf<T>& ws,
                                   const typename ArgumentsOf<T>::Wrenches& f_ext) {
   requireStage(ws, WorkspaceStage::Acceleration, "updateInverseDynamicsFactors", "updateAccelerations");
+  for (const JointForce& force : model.jointForces()) {
+    ws.stiffness[force.dof] = force.stiffness;
+    ws.resistance[force.dof] = calcResistance(force, ws);
+  }
   for (int i = 1; i < model.numBodies(); ++i) {
     ws.F[i] = calcBodyForce(ws, i, ws.A[i]);
     if (!f_ext.empty()) ws.F[i] -= f_ext[i];

@@ -1,6 +1,7 @@
 #include "bielle/dynamics/variation.h"
 
 #include "bielle/dynamics/kinematics.h"
+#include "dynamics/joint_force.h"
 #include "dynamics/saddle_point.h"
 
 namespace bielle {
@@ -173,6 +174,8 @@ VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, c
     variation.F[closure.body2] += W, variation.dF[closure.body2] += dW;
   }
   VectorXd out = model.armature().cwiseProduct(motion.a) + change.armature.cwiseProduct(ws.a);
+  for (const JointForce& force : model.jointForces())
+    out[force.dof] += force.stiffness * motion.q[force.dof] + calcResistance(force, ws) * motion.v[force.dof];
   for (size_t c = 0; c < constraints.closures.size(); ++c)
     for (size_t i = 0; i < constraints.closures[c].terms.size(); ++i)
       out[constraints.closures[c].terms[i].dof] -=

@@ -23,7 +23,7 @@ WorkspaceOf<T>::WorkspaceOf(const Model& model) {
   Bc.assign(nb, Matrix3<T>::Zero());
   for (Matrix6X<T>* m : {&J, &w_minus, &dJ, &dV, &dA, &YJ, &BtJ, &Gq, &Gv}) m->setZero(6, nv);
   M.setZero(nv, nv);
-  b.setZero(nv);
+  for (VectorX<T>* x : {&b, &stiffness, &resistance}) x->setZero(nv);
   dID_dq.setZero(nv, nv);
   dID_dv.setZero(nv, nv);
 }

@@ -130,12 +130,27 @@ class Writer {
     out_ << indent << "<joint" << attribute("name", joint.name + suffix) << attribute("type", type)
          << attribute("axis", formatVector(axis)) << attribute("ref", formatNumber(q_ref_[joint.idx_q + k]))
          << attribute("armature", formatNumber(model_.armature()[dof]));
+    for (const JointForce& force : model_.jointForces())
+      if (force.dof == dof) writeJointForce(joint, force);
     if (std::isfinite(lower) || std::isfinite(upper)) {
       constexpr double kFar = 1e10;  // for limits on one side; and a range must not be empty
       lower = std::max(lower, -kFar), upper = std::max(std::min(upper, kFar), lower + 1e-9);
       out_ << " limited=\"true\"" << attribute("range", formatNumber(lower) + " " + formatNumber(upper));
     }
     out_ << "/>\n";
+  }
+
+  // A preload moves the rest of the spring.
+  void writeJointForce(const Joint& joint, const JointForce& force) {
+    if (force.stiffness != 0)
+      out_ << attribute("stiffness", formatNumber(force.stiffness))
+           << attribute("springref", formatNumber(force.rest + force.preload / force.stiffness));
+    else if (force.preload != 0)
+      warn("joint '" + joint.name + "'", "its preload without a spring is left out");
+    if (force.damping != 0) out_ << attribute("damping", formatNumber(force.damping));
+    if (force.friction == 0) return;
+    out_ << attribute("frictionloss", formatNumber(force.friction));
+    warn("joint '" + joint.name + "'", "its friction is MuJoCo's there, which sticks");
   }
 
   void writeBall(const Joint& joint, int k, const std::string& indent) {

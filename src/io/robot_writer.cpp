@@ -108,6 +108,7 @@ class Writer {
     writeJointTypes(out);
     writeClosures(out);
     writeMotors(out);
+    writeJointForces(out);
     writeContacts(out);
     writeReferences(out);
     if (!model_.serialJoints().empty()) {
@@ -287,6 +288,20 @@ class Writer {
         others += "  " + quote(joint.name) + ": " + formatNumber(armature) + "\n";
     }
     if (!others.empty()) out << "armature:\n" << others;
+  }
+
+  void writeJointForces(std::ostream& out) {
+    if (!model_.jointForces().empty()) out << "\njoint_forces:  # N m, rad, s; N, m, s where prismatic\n";
+    for (const JointForce& force : model_.jointForces()) {
+      out << "  " << quote(model_.joints()[force.joint].name) << ": {stiffness: " << formatNumber(force.stiffness);
+      if (force.rest != 0) out << ", rest: " << formatNumber(force.rest);
+      if (force.preload != 0) out << ", preload: " << formatNumber(force.preload);
+      if (force.damping != 0) out << ", damping: " << formatNumber(force.damping);
+      if (force.friction != 0)
+        out << ", friction: " << formatNumber(force.friction)
+            << ", friction_speed: " << formatNumber(force.friction_speed);
+      out << "}\n";
+    }
   }
 
   void writeContacts(std::ostream& out) {

@@ -97,6 +97,7 @@ void complete(const YamlFile& own, YamlFile& yaml) {
   replace(own.closures, yaml.closures);
   replace(own.motors, yaml.motors);
   replace(own.armature, yaml.armature);
+  replace(own.joint_forces, yaml.joint_forces);
   replace(own.contacts, yaml.contacts);
   replace(own.references, yaml.references);
   replace(own.serial_joints, yaml.serial_joints);
@@ -209,6 +210,7 @@ void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder)
     builder.addClosure(c.name, c.kind, frames.find(c.frame1, element), frames.find(c.frame2, element), c.axis, c.kp,
                        c.kd);
   }
+  for (const JointForceSpec& spec : yaml.joint_forces) builder.addJointForce(spec.joint, spec.force);
   for (const ContactSpec& c : yaml.contacts)
     builder.addContact(c.name, frames.find(c.frame, "contact '" + c.name + "'"), c.kind, c.half_length, c.half_width);
   for (const std::string& joint : yaml.serial_joints) builder.addSerialJoint(joint);

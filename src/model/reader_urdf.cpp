@@ -127,7 +127,8 @@ void checkJoint(const TiXmlElement& joint, const std::string& path, std::vector<
   for (const char* attribute : {"damping", "friction"}) {
     double value = 0;
     if (dynamics && dynamics->QueryDoubleAttribute(attribute, &value) == TIXML_SUCCESS && value != 0)
-      warnings.push_back(path + ": " + element + ": its " + attribute + " is ignored, joints are frictionless");
+      warnings.push_back(path + ": " + element + ": its " + attribute +
+                         " is ignored; the key joint_forces of the YAML file gives a joint friction");
   }
 }
 

@@ -164,6 +164,23 @@ void readMotors(const Fields& fields, YamlFile& file) {
   }
 }
 
+void readJointForces(const Entry& map, YamlFile& file) {
+  for (const auto& [joint, entry] : map.getMap()) {
+    const Fields fields = entry.getFields({"stiffness", "rest", "preload", "damping", "friction", "friction_speed"});
+    JointForceSpec spec{joint, {}};
+    const auto read = [&fields](const char* key, double& value) {
+      if (const Entry* found = find(fields, key)) value = found->getNumber();
+    };
+    read("stiffness", spec.force.stiffness);
+    read("rest", spec.force.rest);
+    read("preload", spec.force.preload);
+    read("damping", spec.force.damping);
+    read("friction", spec.force.friction);
+    read("friction_speed", spec.force.friction_speed);
+    file.joint_forces.push_back(spec);
+  }
+}
+
 void readContacts(const Entry& map, YamlFile& file) {
   for (const auto& [name, entry] : map.getMap()) {
     const Fields fields = entry.getFields({"frame", "type", "sole"});
@@ -220,13 +237,14 @@ BaseKind readBase(const Entry& entry) {
 
 void readRoot(const Entry& root, YamlFile& file) {
   const Fields fields = root.getFields({"closed_loop", "type", "closure_name", "closures", "name_mot", "motors",
-                                        "armature", "joint_name", "joint_type", "cross_inertia", "base", "contacts",
-                                        "references", "serial_joints", "importance", "gravity", "model"});
+                                        "armature", "joint_forces", "joint_name", "joint_type", "cross_inertia", "base",
+                                        "contacts", "references", "serial_joints", "importance", "gravity", "model"});
   readPublishedClosures(fields, root, file);
   readJointTypes(fields, file);
   if (const Entry* entry = find(fields, "cross_inertia")) file.cross_inertia = readCrossInertia(*entry);
   readMotors(fields, file);
   if (const Entry* entry = find(fields, "closures")) readClosures(*entry, file);
+  if (const Entry* entry = find(fields, "joint_forces")) readJointForces(*entry, file);
   if (const Entry* entry = find(fields, "contacts")) readContacts(*entry, file);
   if (const Entry* entry = find(fields, "references")) readReferences(*entry, file);
   if (const Entry* entry = find(fields, "serial_joints")) file.serial_joints = entry->getTexts();

@@ -56,6 +56,11 @@ struct MotorSpec {
   std::optional<double> armature, effort, velocity, torque_loss;
 };
 
+struct JointForceSpec {
+  std::string joint;
+  JointForce force;
+};
+
 struct ContactSpec {
   std::string name, frame;
   ContactKind kind = ContactKind::Surface6D;
@@ -73,6 +78,7 @@ struct YamlFile {
   std::vector<MotorSpec> motors;
   std::map<std::string, double> armature;  ///< joint -> kg m^2
   std::optional<double> motor_armature;    ///< of every motor
+  std::vector<JointForceSpec> joint_forces;
   std::vector<ContactSpec> contacts;
   std::vector<Reference> references;
   std::vector<std::string> serial_joints;

@@ -128,6 +128,17 @@ void addMotors(const Model& closed, const std::vector<Linkage>& linkages, const 
   }
 }
 
+// Those of joints that stay; a frozen joint takes its forces out of the motion, which the serial model cannot say.
+void addJointForces(const Model& closed, const std::vector<bool>& frozen, ModelBuilder& builder) {
+  for (const JointForce& force : closed.jointForces()) {
+    const std::string& name = closed.joints()[force.joint].name;
+    if (frozen[force.joint])
+      throw ModelError(closed.name(), "force on joint '" + name + "'", "the serial model freezes this joint",
+                       "use the closed model, or move spring, damper and friction to joints that it keeps");
+    builder.addJointForce(name, force);
+  }
+}
+
 void addReferences(const Model& closed, const std::vector<bool>& frozen, SerialModel& out, ModelBuilder& builder) {
   for (Reference reference : closed.references()) {
     for (auto it = reference.joints.begin(); it != reference.joints.end();) {
@@ -199,6 +210,7 @@ SerialModel makeSerialModel(const Model& closed, ConstVectorRef q, const SerialM
   addBodies(closed, q, frozen, builder);
   addAttachments(closed, builder);
   addMotors(closed, linkages, options, out, builder);
+  addJointForces(closed, frozen, builder);
   for (int i : closed.serialJoints()) builder.addSerialJoint(closed.joints()[i].name);
   const Model driven = builder.build();
   for (const Joint& joint : driven.joints()) {

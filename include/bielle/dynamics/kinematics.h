@@ -54,7 +54,8 @@ Vector6d calcCentroidalMomentum(const Model& model, const Workspace& ws);
 
 /// Kinetic energy of bodies and rotors, J; needs updateVelocities.
 double calcKineticEnergy(const Model& model, const Workspace& ws);
-/// Potential energy of gravity, zero for a centre of mass at the origin, J; needs updatePositions.
+/// Potential energy, J: of gravity, zero for a centre of mass at the origin, and of the springs and preloads of joints,
+/// zero at their rest; needs updatePositions.
 double calcPotentialEnergy(const Model& model, const Workspace& ws);
 
 }  // namespace bielle

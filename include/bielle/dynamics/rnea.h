@@ -24,6 +24,8 @@
 /// With Y = (m 1, -m c^; m c^, I) and the momentum (p, l) = Y V about the world origin, hats for cross products, most
 /// of B cancels:
 ///     B = (0, -2 p^; 0, B_a),    B_a = w^ I - I w^ - m (c v^T + v c^T) + 2 m (c.v) 1 - l^                         (11)
+/// Joint forces of the model depend on the coordinate of their own joint alone: -dtau/dq and -dtau/dv add to entry
+/// (k, k) of (7) and (9).
 /// External forces f_ext are taken as fixed in their body's coordinates; the caller adds any other dependence on q.
 #include "bielle/dynamics/workspace.h"
 
@@ -36,7 +38,7 @@ void updateMassMatrix(const Model& model, Workspace& ws);
 template <typename T>
 void updateCompositeInertias(const Model& model, WorkspaceOf<T>& ws);
 
-/// Bias b(q, v), gravity included; needs updateVelocities.
+/// Bias b(q, v), gravity and joint forces included; needs updateVelocities.
 void updateBias(const Model& model, Workspace& ws);
 
 /// Accelerations (field A) for a = 0 alone; needs updateVelocities.
@@ -50,8 +52,8 @@ void updateInverseDynamics(const Model& model, WorkspaceOf<T>& ws, typename Argu
 /// Generalized forces of the motion (q, v, a), all given (updates positions, velocities and accelerations).
 VectorXd calcInverseDynamics(const Model& model, Workspace& ws, ConstVectorRef q, ConstVectorRef v, ConstVectorRef a);
 
-/// The per-dof factors of Eqs. (7) to (9) and the subtree sums behind them (fields F, Yc, Bc, YJ, BtJ, Gq, Gv); needs
-/// updateAccelerations.
+/// The per-dof factors of Eqs. (7) to (9) and the subtree sums behind them (fields F, Yc, Bc, YJ, BtJ, Gq, Gv,
+/// stiffness, resistance); needs updateAccelerations.
 /// \param f_ext per body (nb), world wrenches that move with their body, or empty
 template <typename T>
 void updateInverseDynamicsFactors(const Model& model, WorkspaceOf<T>& ws,
@@ -71,6 +73,9 @@ template <typename T>
 DerivativeEntry<T> calcDerivativeEntry(const Model& model, const WorkspaceOf<T>& ws, int j, int k) {
   const Dof &dj = model.dofs()[j], &dk = model.dofs()[k];
   const bool moves = dj.joint == dk.joint ? !(dj.first_of_universal && dk.second_of_universal) : k < j;
+  if (j == k)
+    return {ws.YJ.col(k).dot(ws.dA.col(k)) + ws.BtJ.col(k).dot(ws.dV.col(k)) + ws.stiffness[k],
+            ws.YJ.col(k).dot(ws.dJ.col(k) + ws.dV.col(k)) + ws.BtJ.col(k).dot(ws.J.col(k)) + ws.resistance[k]};
   if (moves)
     return {ws.YJ.col(j).dot(ws.dA.col(k)) + ws.BtJ.col(j).dot(ws.dV.col(k)),                 // Eq. (7)
             ws.YJ.col(j).dot(ws.dJ.col(k) + ws.dV.col(k)) + ws.BtJ.col(j).dot(ws.J.col(k))};  // Eq. (9)

@@ -44,13 +44,15 @@ struct WorkspaceOf {
 
   // Writers: updateMassMatrix, updateBias
   MatrixX<T> M;                ///< nv x nv, armature included
-  VectorX<T> b;                ///< nv, Coriolis, centrifugal and gravity terms
+  VectorX<T> b;                ///< nv, Coriolis, centrifugal and gravity terms, less the joint forces of the model
   std::vector<Matrix6<T>> Yc;  ///< nb, composite inertias of the subtrees
 
   // Writer: updateInverseDynamicsDerivatives
   std::vector<Vector6<T>> F;    ///< nb, force through each joint (subtree sums)
   std::vector<Matrix3<T>> Bc;   ///< nb, subtree sums of the angular blocks of B (see rnea.h)
   Matrix6X<T> YJ, BtJ, Gq, Gv;  ///< 6 x nv, per dof factors of the derivatives
+  VectorX<T> stiffness;         ///< nv, of joint forces: -dtau/dq
+  VectorX<T> resistance;        ///< nv, of joint forces: -dtau/dv
   MatrixX<T> dID_dq, dID_dv;    ///< nv x nv
 };
 

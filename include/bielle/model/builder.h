@@ -63,6 +63,8 @@ class ModelBuilder {
                 double effort_limit = std::numeric_limits<double>::infinity(),
                 double velocity_limit = std::numeric_limits<double>::infinity(),
                 std::optional<double> torque_loss = {});
+  /// Spring, damper and friction on a joint of one coordinate; its indices are filled here.
+  void addJointForce(const std::string& joint, JointForce force);
   void addContact(const std::string& name, const std::string& frame, ContactKind kind, double half_length,
                   double half_width);
   /// Its joints, contacts and frame must be declared before it.

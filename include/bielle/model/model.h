@@ -73,6 +73,18 @@ struct Closure {
   std::vector<int> dofs, signs;
 };
 
+/// Spring, damper and friction on the coordinate of a joint with one: the generalized force
+///     tau = preload - stiffness (q - rest) - damping v - friction v / sqrt(v^2 + friction_speed^2)
+/// in N m for an angle, in N for a length. The last term is Coulomb friction made smooth: it reaches 0.995 of `friction`
+/// at ten times the friction_speed; below it, it acts like a damper, so that nothing sticks.
+struct JointForce {
+  int joint = 0;                                ///< body/joint index, filled by the builder as the next two
+  int idx_q = 0, dof = 0;                       ///< indices into q and v
+  double stiffness = 0, rest = 0, preload = 0;  ///< N m/rad, rad, N m; or N/m, m, N
+  double damping = 0;                           ///< N m s/rad or N s/m
+  double friction = 0, friction_speed = 0.01;   ///< N m, rad/s; or N, m/s
+};
+
 /// Closures that share dofs, directly or through other closures: the unit in which loops are eliminated.
 struct LoopCluster {
   std::vector<int> closures;  ///< indices of closures
@@ -154,6 +166,7 @@ class Model {
   const std::vector<Closure>& closures() const { return closures_; }
   const std::vector<LoopCluster>& clusters() const { return clusters_; }
   const std::vector<Motor>& motors() const { return motors_; }
+  const std::vector<JointForce>& jointForces() const { return joint_forces_; }  ///< at most one per joint
   const std::vector<ContactFrame>& contacts() const { return contacts_; }
   const std::vector<Reference>& references() const { return references_; }
   const std::vector<Visual>& visuals() const { return visuals_; }
@@ -204,6 +217,7 @@ class Model {
   std::vector<Closure> closures_;
   std::vector<LoopCluster> clusters_;
   std::vector<Motor> motors_;
+  std::vector<JointForce> joint_forces_;
   std::vector<ContactFrame> contacts_;
   std::vector<Reference> references_;
   std::vector<Visual> visuals_;

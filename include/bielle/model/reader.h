@@ -10,8 +10,8 @@
 /// - <limit>: `effort` and `velocity` apply to the motor and to the joint (published files often have placeholders
 ///   there: override them by `motors`); 0 means none. `lower` = `upper` = 0, like a missing pair, means none. Joints
 ///   whose number of coordinates is changed by the YAML have no limits.
-/// - <mimic> becomes a coupler named as the joint, <dynamics> is ignored with a warning, meshes need not
-///   exist.
+/// - <mimic> becomes a coupler named as the joint, after the closures of the YAML; <dynamics> is ignored with a warning;
+///   meshes need not exist.
 /// - Attributes are finite numbers; inertias are those of a body (no negative mass, triangle inequality), up to 1e-6
 ///   of rounding.
 ///
@@ -27,10 +27,12 @@
 /// ## The YAML, our keys (all optional; an unknown key is an error)
 /// - `base: free | fixed`
 /// - `closures: [{name, frames: [A, B], type, axis, kp, kd}, ...]` after those of `closed_loop`; `axis` of a 5d hinge,
-///   in frame 1 (default z); kp in 1/s^2, kd in 1/s (default 0)
+///   in frame 1 (default z); kp in 1/s^2, kd in 1/s (default 0). A coupler: `{name, type: coupler, joints: {joint:
+///   coefficient, ...}, offset, kp, kd}`, sum of coefficient times coordinate = offset (default 0)
 /// - `motors: {joint: {armature, effort, velocity, torque_loss}, ...}` instead of `name_mot`; its limits (.inf for none)
 ///   replace those of the URDF; `torque_loss` in W/(N m)^2 (model.h)
 /// - `armature: {joint: kg m^2, ...}`, or one number for all motors without one in `motors`
+/// - `joint_forces: {joint: {stiffness, rest, preload, damping, friction, friction_speed}, ...}` as in model.h
 /// - `contacts: {name: {frame, type: 6d | 3d, sole: [length, width]}, ...}`; the sole is centred on its frame, length
 ///   along x, m
 /// - `references: {name: {joints: {joint: number or list}, height: {frame, value}, feet: {contact: [x, y, z]}}, ...}`

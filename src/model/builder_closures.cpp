@@ -1,0 +1,141 @@
+// Closures of a model: their checks, their dofs and the clusters that they make.
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+
+#include "bielle/model/builder.h"
+
+namespace bielle {
+
+void ModelBuilder::addClosure(const std::string& name, ClosureKind kind, const std::string& frame1,
+                              const std::string& frame2, const Vector3d& axis, double kp, double kd) {
+  const std::string element = "closure '" + name + "'";
+  const FramePlace f1 = getFrame(frame1, element), f2 = getFrame(frame2, element);
+  if (frame1 == frame2) fail(element, "it closes frame '" + frame1 + "' with itself", "name two frames on two bodies");
+  if (f1.body == f2.body)
+    fail(element, "frames '" + frame1 + "' and '" + frame2 + "' are on the same rigid body",
+         "a closure needs a joint between its frames");
+  if (!(axis.norm() > 1e-12) || !axis.allFinite())
+    fail(element, "its hinge axis is not a direction", "give a non-zero vector");
+  Closure closure;
+  closure.name = name;
+  closure.kind = kind;
+  closure.body1 = f1.body;
+  closure.body2 = f2.body;
+  closure.X_B1 = f1.X_BF;
+  closure.X_B2 = f2.X_BF;
+  closure.axis = axis.normalized();
+  closure.kp = kp;
+  closure.kd = kd;
+  addChecked(std::move(closure));
+}
+
+void ModelBuilder::addCoupler(const std::string& name, const std::map<std::string, double>& coefficients, double offset,
+                              double kp, double kd) {
+  const std::string element = "closure '" + name + "'";
+  Closure closure;
+  closure.name = name;
+  closure.kind = ClosureKind::Coupler;
+  for (const auto& [joint, coefficient] : coefficients) {
+    const int index = model_.findJoint(joint);
+    if (index < 0) fail(element, "there is no moving joint '" + joint + "'", "name joints that are not fixed");
+    const Joint& j = model_.joints_[index];
+    if (j.nv != 1)
+      fail(element,
+           "it couples '" + joint + "', a " + getName(j.kind) + " joint of " + std::to_string(j.nv) + " coordinates",
+           "couple revolute, continuous or prismatic joints");
+    if (!std::isfinite(coefficient) || coefficient == 0)
+      fail(element, "the coefficient of joint '" + joint + "' is zero or not finite", "correct it, or omit the joint");
+    closure.terms.push_back({index, coefficient, j.idx_q, j.idx_v});
+  }
+  if (closure.terms.size() < 2)
+    fail(element, "it couples fewer than two joints", "name at least two, or make the joint fixed");
+  if (!std::isfinite(offset)) fail(element, "its offset is not finite", "correct it");
+  std::sort(closure.terms.begin(), closure.terms.end(),
+            [](const CouplerTerm& a, const CouplerTerm& b) { return a.dof < b.dof; });
+  closure.offset = offset;
+  closure.kp = kp;
+  closure.kd = kd;
+  addChecked(std::move(closure));
+}
+
+void ModelBuilder::addChecked(Closure closure) {
+  const std::string element = "closure '" + closure.name + "'";
+  for (const Closure& other : model_.closures_)
+    if (other.name == closure.name) fail(element, "two closures have this name", "rename one of them");
+  if (!(closure.kp >= 0) || !(closure.kd >= 0) || std::isinf(closure.kp) || std::isinf(closure.kd))
+    fail(element, "a stabilisation gain is not a finite number of 0 or more", "correct kp and kd");
+  model_.closures_.push_back(std::move(closure));
+}
+
+void ModelBuilder::copyClosure(const Model& from, const Closure& closure) {
+  if (closure.kind == ClosureKind::Coupler) {
+    std::map<std::string, double> coefficients;
+    for (const CouplerTerm& term : closure.terms) coefficients[from.joints()[term.joint].name] = term.coefficient;
+    addCoupler(closure.name, coefficients, closure.offset, closure.kp, closure.kd);
+    return;
+  }
+  const auto place = [&](const char* suffix, int body, const SE3& X_BF) {
+    addFrame(closure.name + suffix, body == 0 ? "world" : from.bodies()[body].name, X_BF);
+    return closure.name + suffix;
+  };
+  addClosure(closure.name, closure.kind, place("/frame1", closure.body1, closure.X_B1),
+             place("/frame2", closure.body2, closure.X_B2), closure.axis, closure.kp, closure.kd);
+}
+
+// Bodies of a coupler, dofs and signs of any closure.
+void ModelBuilder::finishClosure(const Model& model, Closure& closure) const {
+  if (closure.kind == ClosureKind::Coupler) {
+    int carrier = model.joints_[closure.terms.front().joint].parent;
+    const auto carriesAll = [&] {
+      return std::all_of(closure.terms.begin(), closure.terms.end(), [&](const CouplerTerm& term) {
+        return model.isAncestorOrSelf(carrier, model.joints_[term.joint].parent);
+      });
+    };
+    while (!carriesAll()) carrier = model.joints_[carrier].parent;
+    closure.body1 = closure.body2 = carrier;
+    std::set<int> dofs;
+    for (const CouplerTerm& term : closure.terms)
+      dofs.insert(model.support_[term.joint].begin() + model.support_[carrier].size(),
+                  model.support_[term.joint].end());
+    closure.dofs.assign(dofs.begin(), dofs.end());
+    closure.signs.assign(dofs.size(), 1);
+    return;
+  }
+  const std::vector<int>&s1 = model.support_[closure.body1], &s2 = model.support_[closure.body2];
+  for (int k = 0; k < model.nv_; ++k) {
+    const bool in1 = std::binary_search(s1.begin(), s1.end(), k), in2 = std::binary_search(s2.begin(), s2.end(), k);
+    if (in1 == in2) continue;
+    closure.dofs.push_back(k);
+    closure.signs.push_back(in1 ? 1 : -1);
+  }
+}
+
+void ModelBuilder::finishClosures(Model& model) const {
+  std::vector<int> owner(model.nv_);  // union-find over dofs
+  std::iota(owner.begin(), owner.end(), 0);
+  const auto find = [&owner](int k) {
+    while (owner[k] != k) k = owner[k] = owner[owner[k]];
+    return k;
+  };
+  for (Closure& closure : model.closures_) {
+    finishClosure(model, closure);
+    for (int k : closure.dofs) owner[find(k)] = find(closure.dofs.front());
+    model.closure_rows_ += getRows(closure.kind);
+  }
+  std::map<int, LoopCluster> clusters;  // by representative dof
+  for (int c = 0; c < static_cast<int>(model.closures_.size()); ++c) {
+    LoopCluster& cluster = clusters[find(model.closures_[c].dofs.front())];
+    cluster.closures.push_back(c);
+    cluster.rows += getRows(model.closures_[c].kind);
+    cluster.dofs.insert(cluster.dofs.end(), model.closures_[c].dofs.begin(), model.closures_[c].dofs.end());
+  }
+  for (auto& [root, cluster] : clusters) {
+    std::sort(cluster.dofs.begin(), cluster.dofs.end());
+    cluster.dofs.erase(std::unique(cluster.dofs.begin(), cluster.dofs.end()), cluster.dofs.end());
+    model.clusters_.push_back(std::move(cluster));
+  }
+}
+
+}  // namespace bielle

@@ -1,0 +1,144 @@
+// Springs, dampers and friction on joints. Oracles: an oscillator in closed form, central differences, power.
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "bielle/dynamics/variation.h"
+#include "check_derivative.h"
+#include "get_error.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+constexpr double kStep = 1e-3;
+
+Joint makeSlide() {
+  Joint joint;
+  joint.name = "slide";
+  joint.kind = JointKind::Prismatic;
+  return joint;
+}
+
+}  // namespace
+
+TEST_CASE("a mass on a spring with damper, preload and friction: its force in closed form") {
+  ModelBuilder builder("oscillator");
+  builder.addLink("mass", "world", makeSlide(), {2, Vector3d::Zero(), 0.1 * Matrix3d::Identity()});
+  JointForce force;
+  force.stiffness = 50, force.rest = 0.1, force.preload = 3, force.damping = 4, force.friction = 5;
+  force.friction_speed = 0.2;
+  builder.addJointForce("slide", force);
+  const Model model = builder.build();
+  REQUIRE(model.jointForces().size() == 1);
+  Workspace ws(model);
+  const double q = 0.4, v = -0.15;
+  const VectorXd bias =
+      calcInverseDynamics(model, ws, VectorXd::Constant(1, q), VectorXd::Constant(1, v), VectorXd::Zero(1));
+  // At three quarters of the friction speed, the friction has 3/5 of its size.
+  const double tau = 3 - 50 * 0.3 + 4 * 0.15 + 5 * 0.6;
+  CHECK(bias[0] == Approx(2 * 9.81 - tau).epsilon(1e-14));
+  CHECK(calcPotentialEnergy(model, ws) == Approx(2 * 9.81 * q + 25 * 0.09 - 3 * 0.3).epsilon(1e-14));
+
+  const auto refuse = [&](const std::string& joint, const JointForce& bad, const char* problem) {
+    ModelBuilder other("other");
+    other.addLink("mass", "world", makeSlide(), {2, Vector3d::Zero(), 0.1 * Matrix3d::Identity()});
+    Joint ball;
+    ball.name = "ball", ball.kind = JointKind::Spherical;
+    other.addLink("other", "mass", ball, {1, Vector3d::Zero(), 0.1 * Matrix3d::Identity()});
+    other.addJointForce("slide", force);
+    CHECK_THAT(getError([&] { other.addJointForce(joint, bad); }), Catch::Contains(problem));
+  };
+  refuse("none", force, "no moving joint");
+  refuse("ball", force, "spherical joint of 3 coordinates");
+  refuse("slide", force, "declared twice");
+}
+
+TEST_CASE("refused numbers of joint forces") {
+  const auto refuse = [](const char* problem, double JointForce::*field, double value) {
+    ModelBuilder builder("oscillator");
+    builder.addLink("mass", "world", makeSlide(), {2, Vector3d::Zero(), 0.1 * Matrix3d::Identity()});
+    JointForce force;
+    force.*field = value;
+    CHECK_THAT(getError([&] { builder.addJointForce("slide", force); }), Catch::Contains(problem));
+  };
+  for (auto field : {&JointForce::stiffness, &JointForce::damping, &JointForce::friction})
+    for (double value : {-1.0, std::nan(""), HUGE_VAL}) refuse("not a finite number of 0 or more", field, value);
+  for (auto field : {&JointForce::rest, &JointForce::preload}) refuse("not finite", field, HUGE_VAL);
+  refuse("friction_speed is not positive", &JointForce::friction_speed, 0);
+}
+
+TEST_CASE("joint forces: inverse and constrained dynamics against differences, every joint kind") {
+  std::mt19937 rng(41);
+  for (JointKind kind : kJointKinds)
+    for (ClosureKind closure : kClosureKinds) {
+      CAPTURE(getName(kind), getName(closure));
+      const Mechanism mechanism = makeSprungMechanism(rng, kind, closure, MechanismBase::FreeFlyer);
+      const Model& model = mechanism.model;
+      const VectorXd& q = mechanism.q_closed;
+      const VectorXd v = randomVector(rng, model.nv()), a = randomVector(rng, model.nv()),
+                     tau = randomVector(rng, model.nv(), 10);
+      Workspace ws(model), other(model);
+      const VectorXd inverse = calcInverseDynamics(model, ws, q, v, a);
+      updateInverseDynamicsDerivatives(model, ws, {});
+      checkDerivative(ws.dID_dq, differentiateTangent(model, q, kStep, [&](const VectorXd& x) {
+                        return calcInverseDynamics(model, other, x, v, a);
+                      }));
+      checkDerivative(ws.dID_dv, differentiate(v, kStep, [&](const VectorXd& x) {
+                        return calcInverseDynamics(model, other, q, x, a);
+                      }));
+      updateMassMatrix(model, ws);
+      updateBias(model, ws);
+      CHECK(calcRelativeError(ws.M * a + ws.b, inverse) < 1e-12);
+
+      const ConstraintSet set = makeConstraintSet(model);
+      ConstrainedWorkspace cws, ocws;
+      REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == DynamicsStatus::Ok);
+      REQUIRE(updateConstrainedDerivatives(model, ws, cws, set) == DynamicsStatus::Ok);
+      const auto solve = [&](const VectorXd& x, const VectorXd& y) {
+        REQUIRE(updateConstrainedDynamics(model, other, ocws, set, x, y, tau) == DynamicsStatus::Ok);
+        return ocws.a;
+      };
+      checkDerivative(cws.da_dq, differentiateTangent(model, q, kStep, [&](const VectorXd& x) { return solve(x, v); }));
+      checkDerivative(cws.da_dv, differentiate(v, kStep, [&](const VectorXd& x) { return solve(q, x); }));
+
+      // Along a change of the motion, the change of inverse dynamics is that of its derivatives.
+      calcInverseDynamics(model, ws, q, v, a);
+      updateInverseDynamicsDerivatives(model, ws, {});
+      updateMassMatrix(model, ws);
+      MotionVariation motion(model);
+      for (VectorXd* x : {&motion.q, &motion.v, &motion.a}) *x = randomVector(rng, model.nv());
+      VariationWorkspace variation(model);
+      const ModelVariation none(model);
+      updateVariation(model, ws, none, motion, variation);
+      checkDerivative(calcInverseDynamicsVariation(model, ws, set, VectorXd::Zero(set.rows), none, motion, variation),
+                      ws.dID_dq * motion.q + ws.dID_dv * motion.v + ws.M * motion.a);
+    }
+}
+
+TEST_CASE("joint forces: the energy falls by what dampers and friction take") {
+  std::mt19937 rng(42);
+  const Mechanism mechanism =
+      makeSprungMechanism(rng, JointKind::Prismatic, ClosureKind::Hinge5D, MechanismBase::FreeFlyer);
+  const Model& model = mechanism.model;
+  const ConstraintSet set = makeConstraintSet(model);
+  Workspace ws(model);
+  ConstrainedWorkspace cws;
+  const VectorXd& q = mechanism.q_closed;
+  const VectorXd v = projectVelocity(model, ws, set, q, randomVector(rng, model.nv()));
+  REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, VectorXd::Zero(model.nv())) == DynamicsStatus::Ok);
+  const VectorXd a = cws.a;
+  const auto energy = [&](const VectorXd& t) {
+    updatePositions(model, ws, model.integrate(q, t[0] * (v + 0.5 * t[0] * a)));
+    updateVelocities(model, ws, v + t[0] * a);
+    return VectorXd::Constant(1, calcKineticEnergy(model, ws) + calcPotentialEnergy(model, ws)).eval();
+  };
+  double power = 0;
+  for (const JointForce& force : model.jointForces()) {
+    const double rate = v[force.dof];
+    power -= rate * (force.damping * rate + force.friction * rate / std::hypot(rate, force.friction_speed));
+  }
+  REQUIRE(power < -0.1);
+  CHECK(differentiate(VectorXd::Zero(1), 1e-3, energy)(0, 0) == Approx(power).epsilon(1e-7));
+}
