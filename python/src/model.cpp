@@ -72,6 +72,7 @@ void bindParts(py::module_& module) {
       .field("frames", &ModelParts::frames, "links among them")
       .field("closures", &ModelParts::closures, "of the loops")
       .field("motors", &ModelParts::motors, "in the order of u")
+      .field("joint_forces", &ModelParts::joint_forces, "springs, dampers and friction")
       .field("contacts", &ModelParts::contacts, "frames that may touch the ground")
       .field("references", &ModelParts::references, "postures by name")
       .field("visuals", &ModelParts::visuals, "what is drawn")

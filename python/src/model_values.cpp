@@ -19,7 +19,8 @@ void bindEnums(py::module_& module) {
   py::enum_<ClosureKind>(module, "ClosureKind")
       .value("WELD_6D", ClosureKind::Weld6D)
       .value("BALL_3D", ClosureKind::Ball3D)
-      .value("HINGE_5D", ClosureKind::Hinge5D);
+      .value("HINGE_5D", ClosureKind::Hinge5D)
+      .value("COUPLER", ClosureKind::Coupler);
   py::enum_<ContactKind>(module, "ContactKind")
       .value("POINT_3D", ContactKind::Point3D)
       .value("SURFACE_6D", ContactKind::Surface6D);
@@ -66,7 +67,22 @@ void bindTree(py::module_& module) {
 }
 
 void bindConstraints(py::module_& module) {
-  Value<Closure>(module, "Closure", "Ties frame 1 on body 1 to frame 2 on body 2.")
+  Value<CouplerTerm>(module, "CouplerTerm", "One summand of a coupler: a coefficient times a coordinate.")
+      .field("joint", &CouplerTerm::joint, "index")
+      .field("coefficient", &CouplerTerm::coefficient, "dimensionless, or m/rad, .. between units")
+      .field("idx_q", &CouplerTerm::idx_q, "index into q")
+      .field("dof", &CouplerTerm::dof, "index into v");
+  Value<JointForce>(module, "JointForce", "Spring, damper and friction on a joint of one coordinate.")
+      .field("joint", &JointForce::joint, "index")
+      .field("idx_q", &JointForce::idx_q, "index into q")
+      .field("dof", &JointForce::dof, "index into v")
+      .field("stiffness", &JointForce::stiffness, "N m/rad or N/m")
+      .field("rest", &JointForce::rest, "rad or m")
+      .field("preload", &JointForce::preload, "N m or N")
+      .field("damping", &JointForce::damping, "N m s/rad or N s/m")
+      .field("friction", &JointForce::friction, "N m or N")
+      .field("friction_speed", &JointForce::friction_speed, "rad/s or m/s");
+  Value<Closure>(module, "Closure", "Ties frame 1 on body 1 to frame 2 on body 2, or couples coordinates.")
       .field("name", &Closure::name, "unique")
       .field("kind", &Closure::kind, "ClosureKind")
       .field("body1", &Closure::body1, "index")
@@ -76,6 +92,8 @@ void bindConstraints(py::module_& module) {
       .field("axis", &Closure::axis, "free axis of a hinge in both frames (3,)")
       .field("kp", &Closure::kp, "stabilisation, 1/s^2")
       .field("kd", &Closure::kd, "1/s")
+      .field("terms", &Closure::terms, "of a coupler")
+      .field("offset", &Closure::offset, "of a coupler")
       .field("dofs", &Closure::dofs, "that move one frame but not the other, increasing")
       .field("signs", &Closure::signs, "+1 where the dof moves frame 1, -1 for frame 2");
   Value<LoopCluster>(module, "LoopCluster", "Closures that share dofs, directly or through other closures.")

@@ -25,8 +25,19 @@ void checkParts(const ModelParts& parts) {
   }
   const auto isBody = [bodies](int body) { return body >= 0 && body < bodies; };
   for (const Frame& frame : parts.frames) require(isBody(frame.body), parts, "frames");
-  for (const Closure& c : parts.closures)
-    require(isBody(c.body1) && isBody(c.body2) && c.body1 != c.body2, parts, "closures");
+  const auto isCoordinate = [&](int joint, int idx_q, int dof) {
+    return joint > 0 && joint < bodies && parts.joints[joint].nv == 1 && idx_q == parts.joints[joint].idx_q &&
+           dof == parts.joints[joint].idx_v;
+  };
+  for (const Closure& c : parts.closures) {
+    const bool coupler = c.kind == ClosureKind::Coupler;
+    require(isBody(c.body1) && isBody(c.body2) && (c.body1 == c.body2) == coupler, parts, "closures");
+    require(coupler ? c.terms.size() >= 2 : c.terms.empty(), parts, "couplers");
+    for (const CouplerTerm& term : c.terms)
+      require(isCoordinate(term.joint, term.idx_q, term.dof), parts, "couplers");
+  }
+  for (const JointForce& force : parts.joint_forces)
+    require(isCoordinate(force.joint, force.idx_q, force.dof), parts, "joint forces");
   for (const Motor& motor : parts.motors)
     require(motor.joint > 0 && motor.joint < bodies && motor.dof == parts.joints[motor.joint].idx_v &&
                 parts.joints[motor.joint].nv == 1,
@@ -43,7 +54,8 @@ void checkParts(const ModelParts& parts) {
 ModelParts takeParts(const Model& m) {
   return {m.name(),         m.gravity(),     m.bodies(),      m.joints(),         m.frames(),
           m.closures(),     m.motors(),      m.contacts(),    m.references(),     m.visuals(),
-          m.serialJoints(), m.lowerLimits(), m.upperLimits(), m.velocityLimits(), m.armature()};
+          m.serialJoints(), m.lowerLimits(), m.upperLimits(), m.velocityLimits(), m.armature(),
+          m.jointForces()};
 }
 
 Model ModelBuilder::restore(ModelParts parts) {
@@ -60,6 +72,7 @@ Model ModelBuilder::restore(ModelParts parts) {
   draft.closures_ = std::move(parts.closures);
   for (Closure& closure : draft.closures_) closure.dofs.clear(), closure.signs.clear();  // found again
   draft.motors_ = std::move(parts.motors);
+  draft.joint_forces_ = std::move(parts.joint_forces);
   draft.contacts_ = std::move(parts.contacts);
   draft.references_ = std::move(parts.references);
   draft.visuals_ = std::move(parts.visuals);

@@ -26,6 +26,7 @@ struct ModelParts {
   std::vector<Visual> visuals;
   std::vector<int> serial_joints;
   VectorXd lower_limits, upper_limits, velocity_limits, armature;  ///< nv
+  std::vector<JointForce> joint_forces;
 };
 ModelParts takeParts(const Model& model);
 /// The model of these parts, to the last bit the one that they were taken from.
