@@ -99,6 +99,7 @@ class ClosureKind:
     WELD_6D: ClassVar[ClosureKind]
     BALL_3D: ClassVar[ClosureKind]
     HINGE_5D: ClassVar[ClosureKind]
+    COUPLER: ClassVar[ClosureKind]
     __members__: ClassVar[Dict[str, ClosureKind]]
     def __init__(self, value: int) -> None: ...
     def __int__(self) -> int: ...
@@ -280,13 +281,83 @@ class JointLimits:
         """(nv,), rad/s or m/s"""
         ...
 
-class Closure:
-    """Ties frame 1 on body 1 to frame 2 on body 2.
+class CouplerTerm:
+    """One summand of a coupler: a coefficient times a coordinate.
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, name: str = ..., kind: ClosureKind = ..., body1: int = ..., body2: int = ..., X_B1: SE3 = ..., X_B2: SE3 = ..., axis: ArrayLike = ..., kp: float = ..., kd: float = ..., dofs: Sequence[int] = ..., signs: Sequence[int] = ...) -> None: ...
-    def replace(self, *, name: str = ..., kind: ClosureKind = ..., body1: int = ..., body2: int = ..., X_B1: SE3 = ..., X_B2: SE3 = ..., axis: ArrayLike = ..., kp: float = ..., kd: float = ..., dofs: Sequence[int] = ..., signs: Sequence[int] = ...) -> Closure: ...
+    def __init__(self, joint: int = ..., coefficient: float = ..., idx_q: int = ..., dof: int = ...) -> None: ...
+    def replace(self, *, joint: int = ..., coefficient: float = ..., idx_q: int = ..., dof: int = ...) -> CouplerTerm: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def joint(self) -> int:
+        """index"""
+        ...
+    @property
+    def coefficient(self) -> float:
+        """dimensionless, or m/rad, .. between units"""
+        ...
+    @property
+    def idx_q(self) -> int:
+        """index into q"""
+        ...
+    @property
+    def dof(self) -> int:
+        """index into v"""
+        ...
+
+class JointForce:
+    """Spring, damper and friction on a joint of one coordinate.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, joint: int = ..., idx_q: int = ..., dof: int = ..., stiffness: float = ..., rest: float = ..., preload: float = ..., damping: float = ..., friction: float = ..., friction_speed: float = ...) -> None: ...
+    def replace(self, *, joint: int = ..., idx_q: int = ..., dof: int = ..., stiffness: float = ..., rest: float = ..., preload: float = ..., damping: float = ..., friction: float = ..., friction_speed: float = ...) -> JointForce: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def joint(self) -> int:
+        """index"""
+        ...
+    @property
+    def idx_q(self) -> int:
+        """index into q"""
+        ...
+    @property
+    def dof(self) -> int:
+        """index into v"""
+        ...
+    @property
+    def stiffness(self) -> float:
+        """N m/rad or N/m"""
+        ...
+    @property
+    def rest(self) -> float:
+        """rad or m"""
+        ...
+    @property
+    def preload(self) -> float:
+        """N m or N"""
+        ...
+    @property
+    def damping(self) -> float:
+        """N m s/rad or N s/m"""
+        ...
+    @property
+    def friction(self) -> float:
+        """N m or N"""
+        ...
+    @property
+    def friction_speed(self) -> float:
+        """rad/s or m/s"""
+        ...
+
+class Closure:
+    """Ties frame 1 on body 1 to frame 2 on body 2, or couples coordinates.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., kind: ClosureKind = ..., body1: int = ..., body2: int = ..., X_B1: SE3 = ..., X_B2: SE3 = ..., axis: ArrayLike = ..., kp: float = ..., kd: float = ..., terms: Sequence[CouplerTerm] = ..., offset: float = ..., dofs: Sequence[int] = ..., signs: Sequence[int] = ...) -> None: ...
+    def replace(self, *, name: str = ..., kind: ClosureKind = ..., body1: int = ..., body2: int = ..., X_B1: SE3 = ..., X_B2: SE3 = ..., axis: ArrayLike = ..., kp: float = ..., kd: float = ..., terms: Sequence[CouplerTerm] = ..., offset: float = ..., dofs: Sequence[int] = ..., signs: Sequence[int] = ...) -> Closure: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def name(self) -> str:
@@ -323,6 +394,14 @@ class Closure:
     @property
     def kd(self) -> float:
         """1/s"""
+        ...
+    @property
+    def terms(self) -> Tuple[CouplerTerm, ...]:
+        """of a coupler"""
+        ...
+    @property
+    def offset(self) -> float:
+        """of a coupler"""
         ...
     @property
     def dofs(self) -> Tuple[int, ...]:
@@ -512,8 +591,8 @@ class ModelParts:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> None: ...
-    def replace(self, *, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> ModelParts: ...
+    def __init__(self, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., joint_forces: Sequence[JointForce] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> None: ...
+    def replace(self, *, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., joint_forces: Sequence[JointForce] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> ModelParts: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def name(self) -> str:
@@ -542,6 +621,10 @@ class ModelParts:
     @property
     def motors(self) -> Tuple[Motor, ...]:
         """in the order of u"""
+        ...
+    @property
+    def joint_forces(self) -> Tuple[JointForce, ...]:
+        """springs, dampers and friction"""
         ...
     @property
     def contacts(self) -> Tuple[ContactFrame, ...]:

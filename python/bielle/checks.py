@@ -23,7 +23,7 @@ def find_program(name: str) -> str:
 def check(result: Union[str, Path, Result]) -> Dict[str, Any]:
     """Checks a Result, or the directory of one, against Simbody, as `bielle check --json` does.
 
-    Returns its table as a dictionary; `passed` tells whether all of it holds.
+    Returns its table as a dictionary; "pass" tells whether all of it holds.
     """
     if isinstance(result, Result):
         with tempfile.TemporaryDirectory() as directory:

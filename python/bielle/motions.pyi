@@ -54,7 +54,7 @@ def solve_walk(robot: Union[str, Robot], *, speed: float = ..., steps: float = .
     single_support: one foot on the ground [s], default 0.36
     double_support: both feet on the ground between two steps [s], default 0.045
     end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, less where a swing is fast [s], default 0
+    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
     swing_height: apex of the swing foot over the higher end of its path [m], default 0.04
     swing_apex: when it is reached, from 0 to 1 [1], default 0.5
     swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0
@@ -103,7 +103,7 @@ def solve_side_walk(robot: Union[str, Robot], *, speed: float = ..., steps: floa
     single_support: one foot on the ground [s], default 0.36
     double_support: both feet on the ground between two steps [s], default 0.045
     end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, less where a swing is fast [s], default 0
+    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
     swing_height: apex of the swing foot over the higher end of its path [m], default 0.04
     swing_apex: when it is reached, from 0 to 1 [1], default 0.5
     swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0
@@ -153,7 +153,7 @@ def solve_turn(robot: Union[str, Robot], *, angle: float = ..., radius: float = 
     single_support: one foot on the ground [s], default 0.36
     double_support: both feet on the ground between two steps [s], default 0.045
     end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, less where a swing is fast [s], default 0
+    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
     swing_height: apex of the swing foot over the higher end of its path [m], default 0.04
     swing_apex: when it is reached, from 0 to 1 [1], default 0.5
     swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0
@@ -204,7 +204,7 @@ def solve_stairs(robot: Union[str, Robot], *, height: float = ..., depth: float 
     start_pressure: it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given [1], default 0.4
     double_support: both feet on the ground between two steps [s], default 0.09
     end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, less where a swing is fast [s], default 0
+    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
     swing_height: apex of the swing foot over the higher end of its path [m], default 0.03
     swing_apex: when it is reached, from 0 to 1 [1], default 0.5
     swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0.1
@@ -252,7 +252,7 @@ def solve_footholds(robot: Union[str, Robot], *, rim: float = ..., start_support
     single_support: one foot on the ground [s], default 0.5
     double_support: both feet on the ground between two steps [s], default 0.09
     end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, less where a swing is fast [s], default 0
+    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
     swing_height: apex of the swing foot over the higher end of its path [m], default 0.04
     swing_apex: when it is reached, from 0 to 1 [1], default 0.5
     swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0.15
@@ -304,7 +304,7 @@ def solve_box(robot: Union[str, Robot], *, height: float = ..., length: float = 
     single_support: one foot on the ground [s], default 0.6
     double_support: both feet on the ground between two steps [s], default 0.09
     end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, less where a swing is fast [s], default 0
+    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
     swing_height: apex of the swing foot over the higher end of its path [m], default 0.03
     swing_apex: when it is reached, from 0 to 1 [1], default 0.5
     swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0.25
@@ -353,7 +353,7 @@ def solve_gap(robot: Union[str, Robot], *, width: float = ..., distance: float =
     single_support: one foot on the ground [s], default 0.36
     double_support: both feet on the ground between two steps [s], default 0.045
     end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, less where a swing is fast [s], default 0
+    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
     swing_height: apex of the swing foot over the higher end of its path [m], default 0.04
     swing_apex: when it is reached, from 0 to 1 [1], default 0.5
     swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0
@@ -438,7 +438,7 @@ def solve_run(robot: Union[str, Robot], *, speed: float = ..., steps: float = ..
     start_support: double support before the first step, at least [s], default 0.3
     start_pressure: it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given [1], default 0.4
     end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, less where a swing is fast [s], default 0.005
+    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
     swing_height: apex of the swing foot over the higher end of its path [m], default 0.04
     swing_apex: when it is reached, from 0 to 1 [1], default 0.5
     swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0
@@ -487,7 +487,7 @@ def solve_hop(robot: Union[str, Robot], *, foot: Union[str, float] = ..., hops: 
     start_support: double support before the first step, at least [s], default 0.6
     start_pressure: it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given [1], default 0.4
     end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, less where a swing is fast [s], default 0.005
+    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
     swing_height: apex of the swing foot over the higher end of its path [m], default 0.02
     swing_apex: when it is reached, from 0 to 1 [1], default 0.5
     swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0

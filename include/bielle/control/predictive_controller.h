@@ -6,7 +6,7 @@
 ///
 ///     x_{k+1} = f_k(x(t_k) projected on the closures, u(t_k))                                                       (1)
 ///
-/// and while stage k lasts, the window from k+1 on is solved from there, in an iteration that starts from the last
+/// and while stage k lasts, the window from k+1 on is solved from there, in a few iterations that start from the last
 /// solution, its multipliers moved on by a stage. The window ends near the state that the motion passes at t_{k+1+N}. From
 /// t_{k+1} on the first stages of the solution are a policy (policy.h, Eq. 1). A solution thus takes one stage to come into
 /// force, however fast it is found; if none is found the last policy, which reaches some stages farther, stays.
@@ -28,7 +28,7 @@ namespace bielle {
 
 struct PredictiveOptions {
   int nodes = 100;               ///< N
-  int iterations = 1;            ///< of the solver, at every stage
+  int iterations = 2;            ///< of the solver, at every stage
   double regularization = 1e-5;  ///< of its sweeps
   double penalty = 1;            ///< of violated constraints (fddp.h, Eq. 10)
   int threads = 0;               ///< 0: all. Results are bitwise independent of it.
