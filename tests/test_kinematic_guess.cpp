@@ -97,3 +97,22 @@ TEST_CASE("guess: out of reach, legs are as in the stance") {
   const VectorXd q = placeFeet(getBipetto(), stance, {planned}).front();
   CHECK((q.tail(q.size() - 7) - stance.q.tail(q.size() - 7)).norm() < 1e-12);
 }
+
+TEST_CASE("guess: one that cannot be evaluated gives way to the posture at the start") {
+  WalkOptions options;  // long, slow strides, in which a knee is nearly straight
+  options.speed = 0.697;
+  options.gait.timing.single = 0.475;
+  options.gait.timing.both = 0.194;
+  options.gait.swing.height = 0.032;
+  options.steps = 4;
+  Motion motion = makeWalk(getBipetto(), options);
+  FddpOptions solver;
+  solver.initial_regularization = kGuessRegularization;
+  solver.max_iterations = 5;
+  ShootingTrajectory guess = motion.guess;
+  CHECK(Fddp(solver).solve(*motion.problem, guess).termination == FddpTermination::Failed);
+  const FddpSummary summary = solveMotion(motion, solver);
+  CAPTURE(summary.message);
+  CHECK(summary.termination == FddpTermination::MaxIterations);
+  CHECK(summary.iterations == 5);
+}

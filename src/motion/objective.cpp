@@ -139,12 +139,24 @@ Attempt join(Attempt first, Attempt second) {
   return std::move(better);
 }
 
+// The posture at the start, carried along with the base of the guess.
+void holdPosture(Motion& motion) {
+  const Model& model = motion.problem->model();
+  const int base = model.hasFreeFlyer() ? 7 : 0, joints = model.nq() - base;
+  const VectorXd posture = motion.problem->initialState().segment(base, joints);
+  for (VectorXd& x : motion.guess.xs) x.segment(base, joints) = posture;
+}
+
 }  // namespace
 
 FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer,
                         Multipliers* multipliers) {
   constexpr double kCautious = 1e-2;  // regularization of the second attempt
   Attempt result = attempt(motion, options, observer);
+  if (result.summary.termination == FddpTermination::Failed && result.summary.iterations == 0) {
+    holdPosture(motion);
+    result = attempt(motion, options, observer);
+  }
   if (result.summary.termination == FddpTermination::Infeasible && options.initial_regularization < kCautious) {
     FddpOptions cautious = options;
     cautious.initial_regularization = kCautious;

@@ -79,7 +79,8 @@ ObjectiveOptions scaleObjective(const Motion& effort, const ObjectiveOptions& op
 /// least peak torque it solves the PeakProblem of motion.problem. The guess should then be the motion of least effort: from a
 /// quasi-static guess, motors that share a load have nothing to gain by it.
 /// A solve that ends as infeasible says so of its neighbourhood alone. It is then tried again from the guess, with shorter first
-/// steps (regularization 1e-2); iterations, times and log are those of both attempts.
+/// steps (regularization 1e-2); iterations, times and log are those of both attempts. Where the guess cannot be evaluated, such as
+/// with a leg that is nearly straight, the posture at the start takes its place.
 /// \param multipliers  if given, receives those of the constraints, which MotionEnvelope needs
 FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer = {},
                         Multipliers* multipliers = nullptr);
