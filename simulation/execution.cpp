@@ -1,10 +1,12 @@
 #include "simulation/execution.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <limits>
+#include <thread>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -145,6 +147,22 @@ double getProcessorTime() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
+// Keeps a world from running ahead of the clock.
+class Pace {
+ public:
+  // \returns how far it is behind, s
+  double await(double time) const {
+    const Clock::time_point due =
+        start_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(time));
+    std::this_thread::sleep_until(due);
+    return std::chrono::duration<double>(Clock::now() - due).count();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start_ = Clock::now();
+};
+
 // Advances by a control period, through all changes of the torques that fall into it.
 bool advance(World& world, TorqueDelay& delay, double time, double period) {
   double elapsed = 0;
@@ -214,7 +232,9 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   double seconds = 0, exchanged = 0;
   bool advances = true;
   std::string fall;
+  const Pace pace;
   for (; tick < ticks && advances && fall.empty(); ++tick) {
+    if (o.real_time) out.largest_lag = std::max(out.largest_lag, pace.await(world.getTime()));
     measurement = perception.update(world);
     measurement.delay = o.delay.delay;
     controller.update(measurement, u);

@@ -34,6 +34,8 @@ struct ExecutionOptions {
   double hold = 1;               ///< s
   double control_period = 1e-3;  ///< s
   double record_period = 5e-3;   ///< s
+  /// Each instant of control awaits its time on the clock: for controllers that work beside the world.
+  bool real_time = false;
   PerceptionOptions perception;  ///< what the controller is told
   DelayOptions delay;
   std::vector<Push> pushes;
@@ -57,6 +59,7 @@ struct Execution {
   double energy_balance = 0;
   double saturated_share = 0;   ///< of motors and time: torques that were cut at their limits
   double real_time_factor = 0;  ///< simulated time over the processor time of the world
+  double largest_lag = 0;       ///< with `real_time`: of an instant of control behind the clock, s
   EstimationErrors estimation;
   Books start, end;
   MotionRecord record;  ///< of what happened; forces of closures are not known (NaN), accelerations are means

@@ -51,14 +51,15 @@ Ground makeGround(const SimulateArguments& arguments, const Ground& planned) {
       RampOptions ramp;
       ramp.slope = value;
       ground = makeRamp(ramp);
-    } else if (name == "tiles") {
+    } else if (name == "tiles" || name == "uneven") {
       TileOptions tiles;
       tiles.height = value;
+      if (name == "uneven") tiles.lowest = -value;
       tiles.seed = arguments.seed;
       ground = makeTiles(tiles);
     } else {
       throw ModelError("", "terrain '" + name + "'", "there is no such terrain",
-                       "choose one of: planned, flat, ramp=SLOPE, tiles=HEIGHT");
+                       "choose one of: planned, flat, ramp=SLOPE, tiles=HEIGHT, uneven=HEIGHT");
     }
   }
   ground.friction = arguments.friction > 0 ? arguments.friction : planned.friction;
@@ -78,6 +79,9 @@ void parseOptions(SimulateArguments& arguments) {
                        "leave it out");
     readCommands(arguments.commands);
   }
+  if (arguments.execution.real_time && arguments.control != "mpc")
+    throw ModelError("", "--real-time", "only predictive control solves anything on the way", "give --control mpc");
+  arguments.predictive.own_thread = arguments.execution.real_time;
   if (arguments.jitter > arguments.delay)
     throw ModelError("", "--jitter", "it is longer than the delay", "give at most --delay");
   arguments.execution.delay = {1e-3 * arguments.delay, 1e-3 * arguments.jitter, arguments.seed};
@@ -136,9 +140,15 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
   app.add_option("--threads", a.predictive.threads, "of predictive control; 0: all. Results do not depend on it")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
+  app.add_flag(
+      "--real-time", a.execution.real_time,
+      "the world keeps to the clock while predictive control solves in a thread of its own: policies that come "
+      "late are waited for by no one, and results depend on the machine");
   app.add_option("--terrain", a.terrain,
                  "planned: the ground of the plan; flat; ramp=SLOPE: height over length [1], from x = 0.3 m on; "
-                 "tiles=HEIGHT: of 0.25 m, heights at random up to that [m], from x = 0.2 m on")
+                 "tiles=HEIGHT: of 0.25 m, heights at random up to that [m], from x = 0.2 m on; uneven=HEIGHT: "
+                 "likewise, from that "
+                 "much below the plan on")
       ->capture_default_str();
   app.add_option("--friction", a.friction, "coefficient of the ground [1]; 0: that of the plan")
       ->check(CLI::NonNegativeNumber)

@@ -37,7 +37,7 @@ void addOptions(CLI::App& app, SimulateArguments& arguments);
 /// Reads pushes and delays, and checks what can be checked without the motion. \throws ModelError
 void parseOptions(SimulateArguments& arguments);
 
-/// The ground of the world: "planned", "flat", "ramp=0.05" or "tiles=0.01". \throws ModelError
+/// The ground of the world: "planned", "flat", "ramp=0.05", "tiles=0.01" or "uneven=0.01". \throws ModelError
 Ground makeGround(const SimulateArguments& arguments, const Ground& planned);
 
 }  // namespace bielle::simulation

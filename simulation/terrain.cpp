@@ -132,6 +132,7 @@ Ground makeRamp(const RampOptions& o) {
 
 Ground makeTiles(const TileOptions& o) {
   require(o.height >= 0 && o.height <= 1, "height", "give metres, e.g. 0.01");
+  require(o.lowest <= 0 && o.lowest >= -1, "lowest", "give metres, e.g. -0.01");
   require(std::isfinite(o.start), "start", "give metres, e.g. 0.2");
   require(o.size > 0, "size", "give metres, e.g. 0.25");
   require(o.length > 0 && o.width > 0 && o.length / o.size * o.width / o.size <= kLargestGrid / 20, "length",
@@ -140,10 +141,12 @@ Ground makeTiles(const TileOptions& o) {
             rows = static_cast<int>(std::ceil(o.width / o.size));
   std::mt19937 generator(o.seed);
   Ground ground;
+  ground.height = o.lowest;
+  if (o.lowest < 0) ground.steps.push_back({{o.start - o.length / 2, 0, 0}, o.length, o.width, 0, 0, 0});
   for (int column = 0; column < columns; ++column)
     for (int row = 0; row < rows; ++row) {
       // The generator is the same everywhere; the standard's distributions are not.
-      const double height = o.height * (generator() / 4294967295.0);
+      const double height = o.lowest + (o.height - o.lowest) * (generator() / 4294967295.0);
       ground.steps.push_back(
           {{o.start + (column + 0.5) * o.size, (row + 0.5 - 0.5 * rows) * o.size, height}, o.size, o.size, 0, 0, 0});
     }

@@ -60,7 +60,8 @@ struct RampOptions {
 };
 Ground makeRamp(const RampOptions& options);
 
-/// Square tiles whose heights are random, evenly distributed between 0 and `height`. They begin `start` ahead of the origin.
+/// Square tiles whose heights are random, evenly distributed between `lowest` and `height`. They begin `start` ahead of the origin;
+/// before them the ground is level, at 0.
 struct TileOptions {
   double height = 0.01;  ///< of the highest, m
   double size = 0.25;    ///< edge of a tile, m
@@ -68,6 +69,7 @@ struct TileOptions {
   double length = 10;    ///< of the field, m
   double width = 4;      ///< of the field, about y = 0, m
   unsigned seed = 1;     ///< the same seed makes the same field on every machine
+  double lowest = 0;     ///< of the lowest, at most 0, m
 };
 Ground makeTiles(const TileOptions& options);
 

@@ -1,9 +1,13 @@
-// Predictive control in Bielle's world: the same bytes for every number of threads; on the plan, and when solves fail.
+// Predictive control in Bielle's world: the same bytes for every number of threads; on the plan, when solves fail, and when they
+// come late.
 #include <catch2/catch.hpp>
+#include <chrono>
+#include <thread>
 
 #include "bielle/control/predictive_controller.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
+#include "count_allocations.h"
 #include "simulation/bielle_world.h"
 #include "simulation/execution.h"
 #include "simulation/make_world.h"
@@ -154,6 +158,134 @@ TEST_CASE("predictive control: a walk by command is made on the way, to the same
   CHECK(one.getCounts().solves == 125);
   CHECK(a.record.q == b.record.q);
   CHECK(a.record.u == b.record.u);
+}
+
+namespace {
+
+// Keeps whoever comes through while it is closed, but not for ever.
+class Gate {
+ public:
+  void close() { closed_ = true; }
+  void open() { closed_ = false; }
+  void pass() {
+    ++passes_;
+    for (int i = 0; closed_; ++i, std::this_thread::sleep_for(std::chrono::milliseconds(1))) {
+      holds_ = true;
+      if (i > 60000) return;
+    }
+    holds_ = false;
+  }
+  bool holds() const { return holds_; }
+  int getPasses() const { return passes_; }
+
+ private:
+  std::atomic<bool> closed_{false}, holds_{false};
+  std::atomic<int> passes_{0};
+};
+
+// A robot that stands until it is commanded otherwise, by a command that comes through a gate.
+struct Standing {
+  explicit Standing(bool own_thread) : q(makeStandingPosture(getBipetto())) {
+    PredictiveOptions options = makeShortWindow(1);
+    options.own_thread = own_thread;
+    const CommandSource source = [this](double) {
+      gate.pass();
+      return VelocityCommand{};
+    };
+    controller = std::make_unique<PredictiveController>(CommandedWalk(getBipetto(), {}, {}, source, q), options);
+    u.setZero(getBipetto().nu());
+    at = {0, q, VectorXd::Zero(getBipetto().nv())};
+    at.q[0] += 0.002;  // not on the plan
+  }
+  ~Standing() { gate.open(); }
+  void update(int tick) {
+    at.time = 1e-3 * tick;
+    controller->update(at, u);
+  }
+
+  const VectorXd q;
+  Gate gate;
+  Measurement at;
+  VectorXd u;
+  std::unique_ptr<PredictiveController> controller;
+};
+
+constexpr int kStageTicks = 12;  // of a walk by command
+
+}  // namespace
+
+TEST_CASE("predictive control: solved in a thread of its own and waited for, policies are the same to the last bit") {
+  Standing own(true), other(false);
+  for (int tick = 0; tick < 20 * kStageTicks; ++tick) {
+    own.update(tick);
+    own.controller->waitForSolve();
+    other.update(tick);
+    REQUIRE(own.u == other.u);
+  }
+  CHECK(own.controller->getCounts().solves == 20);
+  CHECK(own.controller->getCounts().missed == 0);
+  CHECK(own.controller->getCounts().failed == 0);
+}
+
+TEST_CASE(
+    "predictive control: while a solve is held the last policy acts, without waiting; missed stages are counted") {
+  // The first stage after some whose solve asks for the next command.
+  int asking = 5;
+  {
+    Standing trial(true);
+    for (int tick = 0, passes = 0;; ++tick) {
+      passes = trial.gate.getPasses();
+      trial.update(tick);
+      trial.controller->waitForSolve();
+      asking = tick / kStageTicks;
+      REQUIRE(asking < 50);
+      if (asking >= 5 && trial.gate.getPasses() > passes) break;
+    }
+  }
+  Standing standing(true);
+  PredictiveController& controller = *standing.controller;
+  int tick = 0;
+  for (; tick < asking * kStageTicks; ++tick) {
+    standing.update(tick);
+    controller.waitForSolve();
+  }
+  standing.gate.close();
+  standing.update(tick++);
+  for (int i = 0; !standing.gate.holds() && i < 60000; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  REQUIRE(standing.gate.holds());
+  Policy last = controller.getPolicy();
+  VectorXd expected(standing.u.size());
+  const long allocations = num_allocations_here;
+  bool same = true;
+  for (int late = 0; late < 3; ++late)
+    for (int i = 0; i < kStageTicks; ++i, ++tick) {
+      standing.update(tick);
+      last.update(standing.at, expected);
+      same = same && standing.u == expected;
+    }
+  CHECK(num_allocations_here == allocations);
+  CHECK(same);
+  CHECK(standing.gate.holds());  // all that time
+  CHECK(controller.getCounts().solves == asking);
+  CHECK(controller.getCounts().missed == 3);
+  CHECK(controller.getPolicy().getStages().front().start == last.getStages().front().start);
+
+  standing.gate.open();
+  controller.waitForSolve();
+  standing.update(tick);  // it comes into force late, but does
+  const double stage = 1e-3 * kStageTicks;
+  CHECK(controller.getPolicy().getStages().front().start == Approx((asking + 1) * stage));
+  last.update(standing.at, expected);
+  CHECK(standing.u != expected);
+  const long before = num_allocations_here;
+  for (; tick < (asking + 8) * kStageTicks; ++tick) {
+    standing.update(tick);
+    controller.waitForSolve();
+  }
+  CHECK(num_allocations_here == before);  // to take solutions and ask for the next, none either
+  CHECK(controller.getCounts().missed == 3);
+  CHECK(controller.getCounts().solves == asking + 5);  // the late one, and one for each stage since
+  CHECK(controller.getCounts().failed == 0);
 }
 
 TEST_CASE("predictive control: it refuses a plan that is not one of its motion") {

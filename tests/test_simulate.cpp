@@ -310,6 +310,7 @@ TEST_CASE("simulate: bad input is refused in one line, with status 2") {
       {{"--terrain", "hills=3"}, "hills"},
       {{"--terrain", "moon"}, "moon"},
       {{"--delay", "1", "--jitter", "2"}, "--jitter"},
+      {{"--real-time", "--control", "gains"}, "--real-time"},
       {{"--world", "moon"}, "moon"}};
   for (const auto& [options, named] : cases) {
     const CommandResult result = simulate(output, options);

@@ -82,6 +82,15 @@ TEST_CASE("terrain: tiles are of the heights asked, and the same for the same se
   CHECK(highest <= 0.03);
   CHECK(highest > 0.028);
   CHECK(ground.calcHeight(0.19, 0) == 0);
+  TileOptions below = options;
+  below.lowest = -0.03;
+  const Terrain uneven(makeTiles(below));
+  for (size_t i = 0; i < ground.steps.size(); ++i) {
+    const Vector3d& top = ground.steps[i].top;
+    CHECK(uneven.find(top.x(), top.y()).height == Approx(2 * top.z() - 0.03));
+  }
+  CHECK(uneven.find(0.19, 0).height == 0);
+  CHECK(uneven.find(11, 0).height == -0.03);
   TileOptions other = options;
   other.seed = 6;
   CHECK(makeTiles(other).steps[0].top != ground.steps[0].top);

@@ -11,6 +11,10 @@
 /// t_{k+1} on the first stages of the solution are a policy (policy.h, Eq. 1). A solution thus takes one stage to come into
 /// force, however fast it is found; if none is found the last policy, which reaches some stages farther, stays.
 ///
+/// Either update() waits for the solve at the beginning of a stage: the same measurements then give the same torques, on any
+/// machine. Or, for a robot, solves run in a thread of their own, and update() never waits: a solution that is found after t_{k+1}
+/// comes into force when it is found, and stages that begin meanwhile are not solved for.
+///
 /// A foot that is on the ground in the second half of its swing (Measurement::contacts) has landed: the motion goes on with the
 /// stage of its landing, and stays ahead of the plan by what the swing was cut short.
 ///
@@ -32,6 +36,8 @@ struct PredictiveOptions {
   double regularization = 1e-5;  ///< of its sweeps
   double penalty = 1;            ///< of violated constraints (fddp.h, Eq. 10)
   int threads = 0;               ///< 0: all. Results are bitwise independent of it.
+  /// Solves run in a thread of their own; results then depend on how fast it is.
+  bool own_thread = false;
   /// Weights of the difference between the end of the window and the motion there: of heading and place over the ground, of the
   /// other coordinates, of the velocities; 1/m^2 or 1, s^2/m^2 or s^2.
   double end_place = 1, end_posture = 100, end_velocity = 10;
@@ -42,8 +48,10 @@ struct PredictiveCounts {
   int solves = 0;
   int failed = 0;  ///< the last policy stayed in force
   int early = 0;   ///< feet that landed in the second half of their swing
-  int missed = 0;  ///< took longer than the stage that they had, though their policy came into force at its end
-  std::vector<double> seconds;  ///< of each, until its policy was ready
+  /// Stages that began without their policy in real time: solves took longer than the stage before. Without a thread of
+  /// their own it came into force all the same; with one the last policy stayed, and there was no solve in this stage.
+  int missed = 0;
+  std::vector<double> seconds;  ///< of the last 100000, until their policy was ready
 
   /// The least time that is not exceeded by this share of the solves, s; 0 if there are none.
   double calcQuantile(double share) const;
@@ -65,14 +73,18 @@ class PredictiveController : public Controller {
   PredictiveController(CommandedWalk walk, const PredictiveOptions& options);
   ~PredictiveController() override;
 
-  /// At the first instant of each stage it solves, which takes its time and allocates memory; at others it does not.
+  /// At the first instant of each stage it solves, which takes its time and allocates memory; at others, and with
+  /// PredictiveOptions::own_thread at all of them, it does neither.
   void update(const Measurement& measurement, VectorRef u) override;
   double getPlanTime(double time) const override;
   const PredictiveCounts& getCounts() const;
+  const Policy& getPolicy() const;  ///< in force
+  /// Until the solve under way in a thread of its own, if any, has ended; its policy comes into force by update().
+  void waitForSolve() const;
 
  private:
-  class Planner;
-  std::unique_ptr<Planner> planner_;
+  class Loop;
+  std::unique_ptr<Loop> loop_;
 };
 
 }  // namespace bielle

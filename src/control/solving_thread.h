@@ -1,0 +1,42 @@
+#pragma once
+// A thread that solves while control goes on.
+#include <semaphore.h>
+
+#include <atomic>
+#include <thread>
+
+#include "control/window_planner.h"
+
+namespace bielle {
+
+// Request and solution change hands without a lock: an atomic says whose they are. No call but waitUntilDone() and the destructor waits, none allocates.
+class SolvingThread {
+ public:
+  // All of them must outlive it.
+  SolvingThread(WindowPlanner& planner, const WindowPlanner::Request& request, WindowPlanner::Solution& solution);
+  // Waits for the solve under way.
+  ~SolvingThread();
+  SolvingThread(const SolvingThread&) = delete;
+  SolvingThread& operator=(const SolvingThread&) = delete;
+
+  // Idle: request and solution are the caller's, who may begin() a solve. Busy: they are the thread's. Done: they are the
+  // caller's again, who takes the solution and calls setIdle().
+  enum class State { Idle, Busy, Done };
+  State getState() const { return state_.load(std::memory_order_acquire); }
+  void begin();
+  void setIdle() { state_.store(State::Idle, std::memory_order_relaxed); }
+  void waitUntilDone() const;
+
+ private:
+  void run();
+
+  WindowPlanner& planner_;
+  const WindowPlanner::Request& request_;
+  WindowPlanner::Solution& solution_;
+  std::atomic<State> state_{State::Idle};
+  std::atomic<bool> ends_{false};
+  sem_t begins_;
+  std::thread thread_;  // last, when all it uses is there
+};
+
+}  // namespace bielle

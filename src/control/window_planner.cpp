@@ -1,0 +1,192 @@
+#include "control/window_planner.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "control/policy_stages.h"
+#include "solve/lq_sweep.h"
+
+namespace bielle {
+namespace {
+
+constexpr int kAhead = 3;             // stages of a policy: what is left when solves fail
+constexpr int kAheadInThread = 8;     // or when they come late
+constexpr int kEarly = 2;             // stages before its landing at which a foot counts as early
+constexpr int kFirstIterations = 10;  // of the solve before the start
+
+FddpOptions makeSolverOptions(bool bounded, const PredictiveOptions& options, int iterations) {
+  FddpOptions out;
+  out.threads = options.threads;
+  out.max_iterations = iterations;
+  out.initial_regularization = out.min_regularization = options.regularization;
+  out.last_rollout = LastRollout::Segments;
+  // One penalty for all solves: each takes a few iterations only, and multipliers are moved on from one to the next.
+  out.constraints.initial_penalty = options.penalty;
+  out.constraints.penalty_increase = 1;
+  if (bounded) out.bounds = ControlBounds::Enforce;
+  return out;
+}
+
+}  // namespace
+
+WindowPlanner::WindowPlanner(std::unique_ptr<Horizon> horizon, const PredictiveOptions& options)
+    : options_(options),
+      horizon_(std::move(horizon)),
+      problem_(horizon_->getProblem()),
+      model_(problem_.model()),
+      window_(problem_, options.nodes),
+      evaluator_(problem_),
+      impact_(model_),
+      solver_(makeSolver(options.iterations)) {
+  u_.setZero(model_.nu());
+  x_ = problem_.initialState();
+}
+
+WindowPlanner::Solution WindowPlanner::makeEmpty() const {
+  Solution solution;
+  solution.stages.resize(options_.own_thread ? kAheadInThread : kAhead);
+  for (Policy::Stage& stage : solution.stages) stage.K.setZero(model_.nu(), 2 * model_.nv());
+  solution.u_hold.setZero(model_.nu());
+  return solution;
+}
+
+WindowPlanner::Solution WindowPlanner::makeFirst() {
+  startFromGuess(0);
+  if (!horizon_->isSolved()) solveFromRest();
+  Fddp first = makeSolver(kFirstIterations);
+  first.solve(window_, trajectory_);
+  Solution solution = makeEmpty();
+  makePolicy(first, 0, solution);
+  return solution;
+}
+
+void WindowPlanner::solve(const Request& request, Solution& solution) {
+  const auto begin = std::chrono::steady_clock::now();
+  solution.skipped = 0;
+  try {
+    solution.solved = predict(request, solution) && solveWindow(solution);
+  } catch (const std::exception&) {
+    solution.solved = false;
+  }
+  if (!solution.solved) {
+    solver_ = makeSolver(options_.iterations);
+    startFromGuess(request.stage + solution.skipped);
+  }
+  solution.advance = advance_;
+  solution.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+Fddp WindowPlanner::makeSolver(int iterations) const {
+  return Fddp(makeSolverOptions(horizon_->isBounded(), options_, iterations));
+}
+
+// From a guess that stands still, step by step to the end.
+void WindowPlanner::solveFromRest() {
+  FddpOptions options;
+  options.threads = options_.threads;
+  options.initial_regularization = kGuessRegularization;
+  if (horizon_->isBounded()) options.bounds = ControlBounds::Enforce;
+  Fddp(options).solve(window_, trajectory_);
+}
+
+// The stage with which a foot stands that swings in this one but is on the ground early, or this stage.
+int WindowPlanner::findLanding(int stage, const std::vector<char>& contacts) const {
+  if (contacts.empty()) return stage;
+  const auto stands = [this](int k, int contact) {
+    const std::vector<int>& standing = getSpec(k).constraints.contacts;
+    return std::find(standing.begin(), standing.end(), contact) != standing.end();
+  };
+  const int contacts_of_model = static_cast<int>(contacts.size());
+  for (int contact = 0; contact < contacts_of_model; ++contact) {
+    if (!contacts[contact] || stands(stage, contact)) continue;
+    int begin = stage, end = stage;  // of the swing
+    while (begin > horizon_->getBegin() && !stands(begin - 1, contact)) --begin;
+    while (end < horizon_->getEnd() && !stands(end, contact)) ++end;
+    if (end < horizon_->getEnd() && stage - begin > (end - begin) / 2 && end - stage >= kEarly) return end;
+  }
+  return stage;
+}
+
+// Eq. (1), and through an impact if one follows: the stage from which the next policy is to be in force, and its state.
+bool WindowPlanner::predict(const Request& request, Solution& solution) {
+  const int node = horizon_->getNode(request.stage);
+  for (int m = 0; m < model_.nu(); ++m) {
+    const double limit = model_.motors()[m].effort_limit;
+    u_[m] = std::clamp(request.u[m], -limit, limit);
+  }
+  measured_.resize(problem_.stateSize());
+  measured_ << request.measurement.q, request.measurement.v;
+  // About the state that was predicted: there the last window began.
+  if (evaluator_.evaluate(node, x_, u_).status != StepStatus::Ok) return false;
+  measured_ = evaluator_.integrate(evaluator_.difference(measured_));
+  if (updateImpact(model_, impact_, problem_.spec(node).constraints, measured_.head(model_.nq()),
+                   measured_.tail(model_.nv())) == DynamicsStatus::Ok)
+    measured_.tail(model_.nv()) = impact_.v_plus;
+  const RobotEvaluation* step = &evaluator_.evaluate(node, measured_, u_);
+  if (step->status != StepStatus::Ok) return false;
+  x_ = step->x_next;
+  int target = request.stage + 1;
+  if (const int landing = findLanding(target, request.measurement.contacts); landing != target) {
+    advance_ += horizon_->getStart(landing) - horizon_->getStart(target);
+    solution.skipped = landing - target;
+    target = landing;
+  }
+  while (isImpact(target)) {
+    step = &evaluator_.evaluate(horizon_->getNode(target), VectorXd(x_), VectorXd::Zero(model_.nu()));
+    if (step->status != StepStatus::Ok) return false;
+    x_ = step->x_next;
+    ++target;
+  }
+  solution.target = target;
+  return true;
+}
+
+bool WindowPlanner::solveWindow(Solution& solution) {
+  const int first = horizon_->getFirst(solution.target), nodes = options_.nodes;
+  horizon_->prepare(first);
+  for (; first_ < first; ++first_) {
+    solver_.advance(trajectory_);
+    horizon_->extend(first_ + nodes, trajectory_);
+  }
+  moveWindow();
+  if (solver_.solve(window_, trajectory_).termination == FddpTermination::Failed) return false;
+  makePolicy(solver_, solution.target, solution);
+  return true;
+}
+
+void WindowPlanner::moveWindow() {
+  window_.move(horizon_->getNode(first_), x_);
+  const VectorXd& end = horizon_->getState(first_ + options_.nodes);
+  problem_.setTerminalReference(end.head(model_.nq()), end.tail(model_.nv()));
+}
+
+// A first guess for the window that begins with a stage.
+void WindowPlanner::startFromGuess(int stage) {
+  first_ = horizon_->getFirst(stage);
+  horizon_->prepare(first_);
+  const int nodes = options_.nodes;
+  trajectory_.xs.resize(nodes + 1);
+  trajectory_.us.resize(nodes);
+  for (int k = 0; k <= nodes; ++k) trajectory_.xs[k] = horizon_->makeGuess(first_ + k);
+  for (int k = 0; k < nodes; ++k) trajectory_.us[k] = horizon_->getControl(first_ + k);
+  x_ = trajectory_.xs[0];
+  moveWindow();
+}
+
+// The first stages of the window's solution.
+void WindowPlanner::makePolicy(const Fddp& solver, int stage, Solution& solution) {
+  int node = 0;
+  for (Policy::Stage& out : solution.stages) {
+    while (isImpact(stage)) ++stage, ++node;
+    const int k = horizon_->getNode(stage);
+    fillStage(problem_, k, horizon_->getStart(stage) - advance_, trajectory_.xs[node], trajectory_.us[node],
+              trajectory_.xs[node + 1], out);
+    out.phase = horizon_->getPhase(stage);
+    evaluator_.evaluate(k, trajectory_.xs[node], trajectory_.us[node]);
+    calcGains(model_, evaluator_, solver.getSweep().getNodes()[node].K, out.K);
+    solution.u_hold = out.u;
+    ++stage, ++node;
+  }
+}
+
+}  // namespace bielle

@@ -1,0 +1,67 @@
+#pragma once
+// What predictive control solves, window by window. One thread at a time may call it.
+#include "bielle/dynamics/impact.h"
+#include "control/horizon.h"
+#include "solve/window.h"
+
+namespace bielle {
+
+class WindowPlanner {
+ public:
+  // What is known when a stage begins. update() of the controller copies into it and allocates nothing.
+  struct Request {
+    int stage = 0;
+    Measurement measurement;
+    VectorXd u;  // nu, asked for at this instant
+  };
+  // A policy for the stages that follow.
+  struct Solution {
+    bool solved = false;  // else the policy is none
+    int target = 0;       // stage from which on it is in force
+    int skipped = 0;      // stages of a swing that a foot has cut short: the present stage is this much farther
+    double advance = 0;   // how far such feet have brought the motion ahead of its plan until now, s
+    double seconds = 0;   // that it took
+    std::vector<Policy::Stage> stages;
+    VectorXd u_hold;
+  };
+
+  WindowPlanner(std::unique_ptr<Horizon> horizon, const PredictiveOptions& options);
+
+  // For the start of the motion.
+  Solution makeFirst();
+  // Memory for solve(), as large as it needs.
+  Solution makeEmpty() const;
+  // From the state that is predicted for the end of the stage.
+  void solve(const Request& request, Solution& solution);
+
+  const Model& getModel() const { return model_; }
+  // By the plan, s. Any thread may ask.
+  double getStart(int stage) const { return horizon_->getStart(stage); }
+
+ private:
+  const StageSpec& getSpec(int stage) const { return problem_.spec(horizon_->getNode(stage)); }
+  bool isImpact(int stage) const { return getSpec(stage).kind == StageKind::Impact; }
+  Fddp makeSolver(int iterations) const;
+  void solveFromRest();
+  int findLanding(int stage, const std::vector<char>& contacts) const;
+  bool predict(const Request& request, Solution& solution);
+  bool solveWindow(Solution& solution);
+  void moveWindow();
+  void startFromGuess(int stage);
+  void makePolicy(const Fddp& solver, int stage, Solution& solution);
+
+  const PredictiveOptions options_;
+  const std::unique_ptr<Horizon> horizon_;
+  RobotProblem& problem_;
+  const Model& model_;
+  Window window_;
+  RobotEvaluator evaluator_;
+  ImpactWorkspace impact_;
+  Fddp solver_;
+  ShootingTrajectory trajectory_;  // of the window
+  double advance_ = 0;             // how far feet that landed early have brought the motion ahead of its plan, s
+  int first_ = 0;                  // stage with which the window begins
+  VectorXd x_, measured_, u_;
+};
+
+}  // namespace bielle
