@@ -8,7 +8,7 @@
 
 from ._bielle import *
 from . import named as named, residuals as residuals, show as _show
-from .checks import check as check
+from .programs import campaign as campaign, check as check, design as design, simulate as simulate
 from .errors import ModelError as ModelError
 from .motions import *
 from .named import (

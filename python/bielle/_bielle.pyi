@@ -920,6 +920,14 @@ class Robot:
     def write(self, directory: str) -> None:
         """Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY."""
         ...
+    def info(self) -> Dict[str, Any]:
+        """What `bielle info --json` prints: sizes, mobility, joints, closures with their gaps, motors, contacts."""
+        ...
+    def _repr_html_(self) -> str: ...
+
+def make_view(robot: Robot) -> str:
+    """The page that shows a Robot with a slider for each motor; its loops close as they move. Offline. HTML."""
+    ...
 
 def load_robot(name: str, base: Optional[str] = ...) -> Robot:
     """Loads a robot by name, by directory, or by .urdf or .yaml file.
@@ -2200,6 +2208,11 @@ class Motion:
     def multipliers(self) -> Multipliers:
         """Multipliers of the last solve"""
         ...
+    @property
+    def summary(self) -> Optional[Summary]:
+        """Summary of the last solve, or None"""
+        ...
+    def _repr_html_(self) -> str: ...
 
 class Record:
     """A motion as numbers: one row per node, or per stage, from its node to the next.
@@ -2466,6 +2479,368 @@ def make_result(motion: Motion, summary: Summary, robot: Robot) -> Result:
     """The Result of a Motion that was solved."""
     ...
 
+class Replacement:
+    """Motors of one linkage, replaced by motors on its serial joints.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, motors: Sequence[str] = ..., joints: Sequence[str] = ..., R: ArrayLike = ...) -> None: ...
+    def replace(self, *, motors: Sequence[str] = ..., joints: Sequence[str] = ..., R: ArrayLike = ...) -> Replacement: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def motors(self) -> Tuple[str, ...]:
+        """names, of the closed model"""
+        ...
+    @property
+    def joints(self) -> Tuple[str, ...]:
+        """names, which the new motors have too"""
+        ...
+    @property
+    def R(self) -> Array:
+        """ratio at the reference, (motors, joints)"""
+        ...
+
+class SerialModel:
+    """The Approximate Serial model of the paper: linkages frozen, motors on the serial joints.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, model: Model = ..., q_reference: ArrayLike = ..., frozen_joints: Sequence[str] = ..., dropped_closures: Sequence[str] = ..., replacements: Sequence[Replacement] = ..., dropped_targets: Sequence[str] = ...) -> None: ...
+    def replace(self, *, model: Model = ..., q_reference: ArrayLike = ..., frozen_joints: Sequence[str] = ..., dropped_closures: Sequence[str] = ..., replacements: Sequence[Replacement] = ..., dropped_targets: Sequence[str] = ...) -> SerialModel: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def model(self) -> Model:
+        """Model"""
+        ...
+    @property
+    def q_reference(self) -> Array:
+        """(nq,) of the closed model, where the linkages are frozen"""
+        ...
+    @property
+    def frozen_joints(self) -> Tuple[str, ...]:
+        """names"""
+        ...
+    @property
+    def dropped_closures(self) -> Tuple[str, ...]:
+        """names"""
+        ...
+    @property
+    def replacements(self) -> Tuple[Replacement, ...]:
+        """Replacements"""
+        ...
+    @property
+    def dropped_targets(self) -> Tuple[str, ...]:
+        """of references that named frozen joints"""
+        ...
+
+def make_serial_model(model: Model, q: ArrayLike, armature: str = ...) -> SerialModel:
+    """The SerialModel of a robot, frozen at the closed configuration q (nq,).
+
+    armature: of the new motors in kg m^2, or 'reflected'. Raises ModelError when there is no equivalent.
+    """
+    ...
+
+class LiftMethod:
+    NEWTON: ClassVar[LiftMethod]
+    NLOPT: ClassVar[LiftMethod]
+    __members__: ClassVar[Dict[str, LiftMethod]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class LiftStatus:
+    LIFTED: ClassVar[LiftStatus]
+    UNREACHABLE_POSTURE: ClassVar[LiftStatus]
+    SINGULAR_LINKAGE: ClassVar[LiftStatus]
+    INACCURATE: ClassVar[LiftStatus]
+    __members__: ClassVar[Dict[str, LiftStatus]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class LiftOptions:
+    """How a motion is lifted.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, method: LiftMethod = ..., singular: float = ..., acceleration_tolerance: float = ..., position_tolerance: float = ..., velocity_tolerance: float = ...) -> None: ...
+    def replace(self, *, method: LiftMethod = ..., singular: float = ..., acceleration_tolerance: float = ..., position_tolerance: float = ..., velocity_tolerance: float = ...) -> LiftOptions: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def method(self) -> LiftMethod:
+        """LiftMethod"""
+        ...
+    @property
+    def singular(self) -> float:
+        """margin below which a linkage is at a dead point"""
+        ...
+    @property
+    def acceleration_tolerance(self) -> float:
+        """NEWTON: relative to 1 rad/s^2 + the largest"""
+        ...
+    @property
+    def position_tolerance(self) -> float:
+        """NLOPT: of the serial joints, rad and m"""
+        ...
+    @property
+    def velocity_tolerance(self) -> float:
+        """NLOPT: rad/s and m/s"""
+        ...
+
+class LiftNode:
+    """How one node was lifted; errors are the largest of the serial coordinates.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, status: LiftStatus = ..., message: str = ..., joint: str = ..., position_error: float = ..., velocity_error: float = ..., acceleration_error: float = ..., margin: float = ..., evaluations: int = ...) -> None: ...
+    def replace(self, *, status: LiftStatus = ..., message: str = ..., joint: str = ..., position_error: float = ..., velocity_error: float = ..., acceleration_error: float = ..., margin: float = ..., evaluations: int = ...) -> LiftNode: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def status(self) -> LiftStatus:
+        """LiftStatus"""
+        ...
+    @property
+    def message(self) -> str:
+        """why not lifted"""
+        ...
+    @property
+    def joint(self) -> str:
+        """at which the lift ended, or empty"""
+        ...
+    @property
+    def position_error(self) -> float:
+        """rad or m"""
+        ...
+    @property
+    def velocity_error(self) -> float:
+        """rad/s or m/s"""
+        ...
+    @property
+    def acceleration_error(self) -> float:
+        """of the closed dynamics, rad/s^2 or m/s^2"""
+        ...
+    @property
+    def margin(self) -> float:
+        """smallest over the linkages; 0: dead point"""
+        ...
+    @property
+    def evaluations(self) -> int:
+        """by NLopt"""
+        ...
+
+class Lift:
+    """A serial motion carried over to the closed robot.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, lifted: bool = ..., nodes: Sequence[LiftNode] = ..., result: Optional[Result] = ...) -> None: ...
+    def replace(self, *, lifted: bool = ..., nodes: Sequence[LiftNode] = ..., result: Optional[Result] = ...) -> Lift: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def lifted(self) -> bool:
+        """all of it"""
+        ...
+    @property
+    def nodes(self) -> Tuple[LiftNode, ...]:
+        """LiftNodes up to the first failure"""
+        ...
+    @property
+    def result(self) -> Optional[Result]:
+        """Result, as far as it was lifted, or None"""
+        ...
+
+def lift(robot: Robot, serial: SerialModel, motion: Motion, options: LiftOptions = ...) -> Lift:
+    """Carries a solved Motion of serial.model over to the closed robot: the same serial joints, motor torques that follow.
+
+    The motion has Euler steps.
+    """
+    ...
+
+class LengthChange:
+    """The distance between two places of one body; the second one moves.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, begin: str = ..., end: str = ..., across: ArrayLike = ..., stretched: str = ...) -> None: ...
+    def replace(self, *, begin: str = ..., end: str = ..., across: ArrayLike = ..., stretched: str = ...) -> LengthChange: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def begin(self) -> str:
+        """a joint, frame, contact or closure frame"""
+        ...
+    @property
+    def end(self) -> str:
+        """another one on the same body, which moves along the line between them"""
+        ...
+    @property
+    def across(self) -> Array:
+        """unit vector (3,): only the part perpendicular to it counts; zero: all"""
+        ...
+    @property
+    def stretched(self) -> str:
+        """link whose mass, inertia and drawing grow with the length, or empty"""
+        ...
+
+class ShiftChange:
+    """A joint or frame that moves along a direction of the body it is fixed to.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, of: str = ..., along: ArrayLike = ...) -> None: ...
+    def replace(self, *, of: str = ..., along: ArrayLike = ...) -> ShiftChange: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def of(self) -> str:
+        """its name"""
+        ...
+    @property
+    def along(self) -> Array:
+        """unit vector (3,)"""
+        ...
+
+class DesignVariable:
+    """A number of a robot that may change.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., lower: float = ..., upper: float = ..., unit: str = ..., parameter: str = ..., lengths: Sequence[LengthChange] = ..., shifts: Sequence[ShiftChange] = ...) -> None: ...
+    def replace(self, *, name: str = ..., lower: float = ..., upper: float = ..., unit: str = ..., parameter: str = ..., lengths: Sequence[LengthChange] = ..., shifts: Sequence[ShiftChange] = ...) -> DesignVariable: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """of one's choice"""
+        ...
+    @property
+    def lower(self) -> float:
+        """bound"""
+        ...
+    @property
+    def upper(self) -> float:
+        """bound"""
+        ...
+    @property
+    def unit(self) -> str:
+        """"m" unless given"""
+        ...
+    @property
+    def parameter(self) -> str:
+        """of the generator, for generated robots; for given ones:"""
+        ...
+    @property
+    def lengths(self) -> Tuple[LengthChange, ...]:
+        """the first one is the value, the others change by as much"""
+        ...
+    @property
+    def shifts(self) -> Tuple[ShiftChange, ...]:
+        """by the value"""
+        ...
+
+class Parametrization:
+    """A robot as a function of bounded numbers: lengths and shifts of a given one, or parameters of a generator."""
+    def __init__(self, model: Model, variables: Sequence[DesignVariable]) -> None:
+        """Raises ModelError for unknown names, places on different bodies, bounds that exclude the model."""
+        ...
+    @staticmethod
+    def generated(generator: str, variables: Sequence[DesignVariable], settings: Sequence[Tuple[str, float]] = ...) -> Parametrization:
+        """Of a generator (see `generators`); settings: its other parameters by name and value."""
+        ...
+    @property
+    def variables(self) -> Tuple[DesignVariable, ...]:
+        """DesignVariables"""
+        ...
+    @property
+    def start(self) -> Array:
+        """(n,), of the robot as it is"""
+        ...
+    @property
+    def lower(self) -> Array:
+        """bounds (n,)"""
+        ...
+    @property
+    def upper(self) -> Array:
+        """bounds (n,)"""
+        ...
+    def make(self, x: ArrayLike) -> Model:
+        """The Model at x (n,). Raises ModelError when the numbers do not define a robot."""
+        ...
+
+class SearchAlgorithm:
+    CRS: ClassVar[SearchAlgorithm]
+    ISRES: ClassVar[SearchAlgorithm]
+    BOBYQA: ClassVar[SearchAlgorithm]
+    SBPLX: ClassVar[SearchAlgorithm]
+    SLSQP: ClassVar[SearchAlgorithm]
+    MMA: ClassVar[SearchAlgorithm]
+    __members__: ClassVar[Dict[str, SearchAlgorithm]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class SearchStage:
+    """One algorithm of a search.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, algorithm: SearchAlgorithm = ..., evaluations: int = ..., tolerance: float = ...) -> None: ...
+    def replace(self, *, algorithm: SearchAlgorithm = ..., evaluations: int = ..., tolerance: float = ...) -> SearchStage: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def algorithm(self) -> SearchAlgorithm:
+        """SearchAlgorithm"""
+        ...
+    @property
+    def evaluations(self) -> int:
+        """at most"""
+        ...
+    @property
+    def tolerance(self) -> float:
+        """of the steps, relative to the width of the bounds"""
+        ...
+
+class SearchResult:
+    """The best point of a search.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, x: ArrayLike = ..., value: float = ..., evaluations: int = ...) -> None: ...
+    def replace(self, *, x: ArrayLike = ..., value: float = ..., evaluations: int = ...) -> SearchResult: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def x(self) -> Array:
+        """(n,)"""
+        ...
+    @property
+    def value(self) -> float:
+        """of the objective"""
+        ...
+    @property
+    def evaluations(self) -> int:
+        """number"""
+        ...
+
+def minimize(objective: Callable[[Array], Union[float, Tuple[float, ArrayLike]]], start: ArrayLike, lower: ArrayLike, upper: ArrayLike, stages: Sequence[SearchStage], seed: int = ...) -> SearchResult:
+    """Minimizes a function of (n,) within bounds by SearchStages, each from the best point so far.
+
+    objective: returns a number, for SLSQP and MMA with its gradient, (value, (n,)). What it raises, like Ctrl-C, ends the search.
+    """
+    ...
+
+def cost_gradient(motion: Motion, robot: Parametrization, x: ArrayLike) -> Array:
+    """Derivatives (n,) of the optimal cost of a motion by every number of its robot, at x (n,).
+
+    motion: of a Request, solved for `robot.make(x)`. It counts as made and solved anew for every change, yet nothing is solved: the multipliers of the optimum suffice (envelope theorem).
+    """
+    ...
+
 class PredictiveOptions:
     """Options of predictive control.
 
@@ -2535,12 +2910,170 @@ class Controller:
         """of predictive control: solves, failed ones, early landings, solves longer than a stage"""
         ...
 
-class World:
-    """Physics with contact: Bielle's own world, in which motors drive a robot and the ground pushes it.
+class SensorReadings:
+    """What is read at an instant of control.
 
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, time: float = ..., motor_positions: ArrayLike = ..., motor_torques: ArrayLike = ..., angular_velocity: ArrayLike = ..., specific_force: ArrayLike = ...) -> None: ...
+    def replace(self, *, time: float = ..., motor_positions: ArrayLike = ..., motor_torques: ArrayLike = ..., angular_velocity: ArrayLike = ..., specific_force: ArrayLike = ...) -> SensorReadings: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def time(self) -> float:
+        """s"""
+        ...
+    @property
+    def motor_positions(self) -> Array:
+        """(nu,), rad or m"""
+        ...
+    @property
+    def motor_torques(self) -> Array:
+        """(nu,), that acted since the instant before, N m or N"""
+        ...
+    @property
+    def angular_velocity(self) -> Array:
+        """of the IMU in its frame (3,), rad/s"""
+        ...
+    @property
+    def specific_force(self) -> Array:
+        """acceleration less gravity in its frame (3,), m/s^2"""
+        ...
+
+class EstimatorOptions:
+    """Noise is one standard deviation, densities as in data sheets.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, imu: SE3 = ..., bandwidth: float = ..., smoothing: float = ..., gyro_noise: float = ..., accelerometer_noise: float = ..., gyro_offset: float = ..., accelerometer_offset: float = ..., gyro_walk: float = ..., accelerometer_walk: float = ..., tilt: float = ..., foot_position: float = ..., foot_attitude: float = ..., foot_slide: float = ..., foot_turn: float = ..., planned_contact: float = ..., surprising_contact: float = ..., slip: float = ...) -> None: ...
+    def replace(self, *, imu: SE3 = ..., bandwidth: float = ..., smoothing: float = ..., gyro_noise: float = ..., accelerometer_noise: float = ..., gyro_offset: float = ..., accelerometer_offset: float = ..., gyro_walk: float = ..., accelerometer_walk: float = ..., tilt: float = ..., foot_position: float = ..., foot_attitude: float = ..., foot_slide: float = ..., foot_turn: float = ..., planned_contact: float = ..., surprising_contact: float = ..., slip: float = ...) -> EstimatorOptions: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def imu(self) -> SE3:
+        """placement of the IMU in the trunk, SE3"""
+        ...
+    @property
+    def bandwidth(self) -> float:
+        """of the observers of the motors, 1/s"""
+        ...
+    @property
+    def smoothing(self) -> float:
+        """time constant of the accelerations, s"""
+        ...
+    @property
+    def gyro_noise(self) -> float:
+        """rad/s/sqrt(Hz)"""
+        ...
+    @property
+    def accelerometer_noise(self) -> float:
+        """m/s^2/sqrt(Hz)"""
+        ...
+    @property
+    def gyro_offset(self) -> float:
+        """at the start, rad/s"""
+        ...
+    @property
+    def accelerometer_offset(self) -> float:
+        """at the start, m/s^2"""
+        ...
+    @property
+    def gyro_walk(self) -> float:
+        """of the offsets in a second, rad/s"""
+        ...
+    @property
+    def accelerometer_walk(self) -> float:
+        """m/s^2"""
+        ...
+    @property
+    def tilt(self) -> float:
+        """of the trunk at the start, rad"""
+        ...
+    @property
+    def foot_position(self) -> float:
+        """of a foot seen by the encoders, m"""
+        ...
+    @property
+    def foot_attitude(self) -> float:
+        """rad"""
+        ...
+    @property
+    def foot_slide(self) -> float:
+        """of a foot that stands, in a second, m"""
+        ...
+    @property
+    def foot_turn(self) -> float:
+        """rad"""
+        ...
+    @property
+    def planned_contact(self) -> float:
+        """normal force of a foot that stands, over the weight"""
+        ...
+    @property
+    def surprising_contact(self) -> float:
+        """the same where no contact is planned"""
+        ...
+    @property
+    def slip(self) -> float:
+        """a foot has slipped if its deviation, 6 in the mean, exceeds this"""
+        ...
+
+class EstimatorStatus:
+    OK: ClassVar[EstimatorStatus]
+    NEAR_DEAD_POINT: ClassVar[EstimatorStatus]
+    NOT_CLOSED: ClassVar[EstimatorStatus]
+    NOT_FINITE: ClassVar[EstimatorStatus]
+    __members__: ClassVar[Dict[str, EstimatorStatus]]
+    def __init__(self, value: int) -> None: ...
+    def __int__(self) -> int: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def value(self) -> int: ...
+
+class Estimator:
+    """The state of a robot from the encoders of its motors and an IMU in its trunk: passive joints by closing the
+    loops, the trunk by an invariant extended Kalman filter, contacts by the forces on the feet.
+    """
+    def __init__(self, model: Model, q: ArrayLike, options: EstimatorOptions = ...) -> None:
+        """q: a closed configuration (nq,). Raises ModelError when motors do not determine a joint."""
+        ...
+    def reset(self, time: float, q: ArrayLike, v: ArrayLike, contacts: Sequence[str]) -> None:
+        """Starts from a closed state (nq,), (nv,), standing on contacts, by name."""
+        ...
+    def update(self, readings: SensorReadings, planned: Sequence[str] = ...) -> EstimatorStatus:
+        """Takes the readings of an instant. planned: names of the contacts that the plan has now."""
+        ...
+    @property
+    def q(self) -> Array:
+        """(nq,)"""
+        ...
+    @property
+    def v(self) -> Array:
+        """(nv,)"""
+        ...
+    @property
+    def contacts(self) -> Dict[str, bool]:
+        """by name, whether they stand"""
+        ...
+    @property
+    def wrenches(self) -> Array:
+        """of the ground on the feet in their contact frames (contacts, 6), N and N m"""
+        ...
+    @property
+    def margin(self) -> float:
+        """the least that motors move in a unit motion of their linkage; 1 without linkages"""
+        ...
+    @property
+    def message(self) -> str:
+        """of the last status; empty if OK"""
+        ...
+
+class World:
+    """Physics with contact, in which motors drive a robot and the ground pushes it.
+
+    engine: 'bielle', its own, or 'simbody' and 'mujoco' where it was built with them.
     With `count`, so many worlds that are stepped together on all cores: arguments and results have an axis of them in front.
     """
-    def __init__(self, model: Model, count: Optional[int] = ..., ground: Ground = ..., time_step: float = ...) -> None: ...
+    def __init__(self, model: Model, count: Optional[int] = ..., ground: Ground = ..., time_step: float = ..., engine: str = ...) -> None: ...
     @property
     def model(self) -> Model:
         """Model"""
@@ -2548,6 +3081,10 @@ class World:
     @property
     def count(self) -> Optional[int]:
         """number of worlds, or None"""
+        ...
+    @property
+    def engine(self) -> str:
+        """its name"""
         ...
     def reset(self, q: ArrayLike, v: ArrayLike) -> WorldState:
         """Sets closed configurations (nq,) and velocities (nv,) that keep them closed; all else starts anew."""
@@ -2561,6 +3098,18 @@ class World:
     @property
     def wrenches(self) -> Array:
         """of the ground on the feet in their contact frames (contacts, 6), N and N m"""
+        ...
+
+class Sensors:
+    """Encoders of 14 bits on the motors and an IMU (Bosch BMI088) in the trunk of a robot in a World."""
+    def __init__(self, world: World, noise: float = ..., seed: int = ..., imu: SE3 = ...) -> None:
+        """noise: factor of the figures of the data sheets, 0: exact; imu: its place in the trunk."""
+        ...
+    def reset(self, time: float) -> None:
+        """From the state in which the world is; the first readings come after a time, s."""
+        ...
+    def read(self) -> SensorReadings:
+        """SensorReadings at the time of the world; those of the IMU are means since the last."""
         ...
 
 class _residuals:

@@ -1,9 +1,10 @@
-"""How results show themselves: in one line; in notebooks the page of the report, which needs no network, in a frame."""
+"""How things show themselves: in one line; in notebooks by a page in a frame, which needs no network."""
 
 import html
 import tempfile
+from pathlib import Path
 
-from ._bielle import Result, make_report
+from ._bielle import Motion, Result, Robot, Summary, load_robot, make_report, make_result, make_view
 
 
 def make_frame(page: str, height: int) -> str:
@@ -18,6 +19,19 @@ def show_result(result: Result) -> str:
         return make_frame(make_report([directory]), 720)
 
 
+def show_robot(robot: Robot) -> str:
+    """The robot in 3D, with a slider for each motor."""
+    return make_frame(make_view(robot), 560)
+
+
+def show_motion(motion: Motion) -> str:
+    """The 3D replay and the plots of the guess of a motion, which after a solve is the solution."""
+    with tempfile.TemporaryDirectory() as directory:
+        files = str(Path(directory) / "robot")
+        Robot(name=motion.model.name, model=motion.model).write(files)
+        return show_result(make_result(motion, motion.summary or Summary(), load_robot(files)))
+
+
 def format_result(result: Result) -> str:
     """In one line: motion, robot and outcome."""
     stages = len(result.record.u)
@@ -27,3 +41,5 @@ def format_result(result: Result) -> str:
 
 setattr(Result, "__repr__", format_result)
 setattr(Result, "_repr_html_", show_result)
+setattr(Robot, "_repr_html_", show_robot)
+setattr(Motion, "_repr_html_", show_motion)

@@ -21,7 +21,10 @@ void bindSolverValues(py::module_& module);
 void bindMotionValues(py::module_& module);
 void bindMotions(py::module_& module);
 void bindResults(py::module_& module);
+void bindLift(py::module_& module);
+void bindDesign(py::module_& module);
 void bindControllers(py::module_& module);
+void bindEstimator(py::module_& module);
 void bindWorlds(py::module_& module);
 
 }  // namespace bielle::python

@@ -10,7 +10,8 @@ PYBIND11_MODULE(_bielle, module) {
   using namespace bielle::python;
   for (const auto bind : {bindErrors, bindGeometry, bindModelValues, bindModel, bindKinematics, bindDynamics,
                           bindRobots, bindTransmission, bindOcpValues, bindResiduals, bindPythonResiduals,
-                          bindSolverValues, bindMotionValues, bindMotions, bindResults, bindControllers, bindWorlds})
+                          bindSolverValues, bindMotionValues, bindMotions, bindResults, bindLift, bindDesign, bindControllers,
+                          bindEstimator, bindWorlds})
     bind(module);
   module.attr("__name__") = name;
 }

@@ -71,10 +71,18 @@ FddpSummary solve(HeldMotion& held, FddpOptions options, const py::object& callb
   const FddpObserver observer = makeObserver(callback);
   const py::gil_scoped_release release;
   Motion& motion = held.motion;
-  if (motion.peak_limits.size() > 0) return solveMotion(motion, options, observer);
+  held.multipliers.reset(), held.summary.reset();
+  if (motion.peak_limits.size() > 0) {
+    Multipliers multipliers;
+    held.summary = solveMotion(motion, options, observer, &multipliers);
+    held.multipliers = std::move(multipliers);
+    return *held.summary;
+  }
   if (motion.bounded) options.bounds = ControlBounds::Enforce;
   held.solver = std::make_unique<Fddp>(options);
-  return held.solver->solve(*motion.problem, motion.guess, observer);
+  held.summary = held.solver->solve(*motion.problem, motion.guess, observer);
+  held.multipliers = held.solver->getMultipliers();
+  return *held.summary;
 }
 
 // The guess; the motion takes only one that fits its problem.
@@ -206,10 +214,12 @@ void bindHeldMotion(py::module_& module) {
       .def_property_readonly(
           "multipliers",
           [](const HeldMotion& h) {
-            if (!h.solver) throw std::runtime_error("the motion has not been solved, or has the least peak torque");
-            return h.solver->getMultipliers();
+            if (!h.multipliers) throw std::runtime_error("the motion has not been solved");
+            return *h.multipliers;
           },
-          "Multipliers of the last solve");
+          "Multipliers of the last solve")
+      .def_property_readonly(
+          "summary", [](const HeldMotion& h) { return h.summary ? py::cast(*h.summary) : py::object(py::none()); }, "Summary of the last solve, or None");
   type.def(py::pickle(
       [](const HeldMotion& h) {
         return py::make_tuple(h.model, h.request ? py::cast(*h.request) : py::none(),

@@ -28,8 +28,10 @@ struct HeldMotion {
   std::optional<MotionPlan> plan;  // or that
   ProblemOptions options;
   Motion motion;
-  std::unique_ptr<Fddp> solver;      // of the last solve: gains and multipliers
-  std::atomic<bool> is_busy{false};  // one solve at a time
+  std::unique_ptr<Fddp> solver;            // of the last solve: gains
+  std::optional<Multipliers> multipliers;  // likewise
+  std::optional<FddpSummary> summary;      // likewise
+  std::atomic<bool> is_busy{false};        // one solve at a time
 };
 
 std::shared_ptr<HeldMotion> makeHeldMotion(std::shared_ptr<Model> model, const Request& request,

@@ -5,6 +5,8 @@
 #include "bielle/model/reader.h"
 #include "bielle/robots/generators.h"
 #include "bind.h"
+#include "io/robot_info.h"
+#include "report/view.h"
 #include "robot.h"
 
 namespace bielle::python {
@@ -48,6 +50,22 @@ py::dict describeGenerators() {
   return out;
 }
 
+LoadedRobot toLoaded(const Robot& robot) { return {*robot.model, robot.warnings, robot.directory, robot.file}; }
+
+py::object describe(const Robot& robot) {
+  std::string text;
+  {
+    const py::gil_scoped_release release;
+    text = makeRobotInfo(toLoaded(robot)).dump();
+  }
+  return py::module_::import("json").attr("loads")(text);
+}
+
+std::string makePage(const Robot& robot) {
+  const py::gil_scoped_release release;
+  return makeView(toLoaded(robot));
+}
+
 }  // namespace
 
 void bindRobots(py::module_& module) {
@@ -62,7 +80,11 @@ void bindRobots(py::module_& module) {
       .def(
           "write", [](const Robot& robot, const std::string& directory) { writeRobot(*robot.model, directory); },
           py::arg("directory"), py::call_guard<py::gil_scoped_release>(),
-          "Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY.");
+          "Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY.")
+      .def("info", &describe,
+           "What `bielle info --json` prints: sizes, mobility, joints, closures with their gaps, motors, contacts.");
+  module.def("make_view", &makePage, py::arg("robot"),
+             "The page that shows a Robot with a slider for each motor; its loops close as they move. Offline. HTML.");
   module.def("load_robot", &load, py::arg("name"), py::arg("base") = py::none(),
              py::call_guard<py::gil_scoped_release>(),
              "Loads a robot by name, by directory, or by .urdf or .yaml file.\n\n"

@@ -1,10 +1,13 @@
 #include <exception>
 #include <optional>
 
+#include "bielle/model/error.h"
 #include "bind.h"
 #include "busy.h"
+#include "engines.h"
 #include "model_access.h"
 #include "simulation/bielle_world.h"
+#include "simulation/sensors.h"
 
 namespace bielle::python {
 namespace {
@@ -12,16 +15,36 @@ namespace {
 using simulation::BielleWorldOptions;
 using simulation::World;
 
+std::unique_ptr<World> makeOwnWorld(const std::string&, const Model& model, const simulation::WorldOptions& options) {
+  BielleWorldOptions own;
+  own.world = options;
+  return simulation::makeBielleWorld(model, own);
+}
+
+// Of the module that links the engines, which is there where Bielle was built with them.
+MakeWorld findEngines() {
+  try {
+    const py::object capsule = py::module_::import("bielle._engines").attr("make_world");
+    void* function = PyCapsule_GetPointer(capsule.ptr(), kEnginesCapsule);
+    if (!function) throw py::error_already_set();
+    return reinterpret_cast<MakeWorld>(function);
+  } catch (py::error_already_set& error) {
+    if (!error.matches(PyExc_ModuleNotFoundError)) throw;
+    throw ModelError("", "worlds of other engines", "this build has none",
+                     "build Bielle with -DBIELLE_BUILD_SIMULATION=ON (it needs Simbody), or take engine='bielle'");
+  }
+}
+
 // One world, or many that are stepped together on all cores. Each has its own memory.
 class HeldWorlds {
  public:
-  HeldWorlds(std::shared_ptr<Model> model, std::optional<int> count, const Ground& ground, double time_step)
-      : model_(std::move(model)), many_(count) {
+  HeldWorlds(std::shared_ptr<Model> model, std::optional<int> count, const Ground& ground, double time_step,
+             const std::string& engine)
+      : model_(std::move(model)), many_(count), engine_(engine) {
     if (count && *count < 1) throw py::value_error("count: at least one world");
-    BielleWorldOptions options;
-    options.world = {ground, time_step};
+    const MakeWorld make = engine == "bielle" ? makeOwnWorld : findEngines();
     const py::gil_scoped_release release;
-    for (int i = 0; i < count.value_or(1); ++i) worlds_.push_back(simulation::makeBielleWorld(*model_, options));
+    for (int i = 0; i < count.value_or(1); ++i) worlds_.push_back(make(engine, *model_, {ground, time_step}));
   }
 
   // Many worlds start from the same state, or each from its own.
@@ -58,6 +81,16 @@ class HeldWorlds {
 
   const std::shared_ptr<Model>& getModel() const { return model_; }
   const std::optional<int>& getCount() const { return many_; }
+  const std::string& getEngine() const { return engine_; }
+
+  // What reads the state of a single world.
+  template <typename Task>
+  void observeOnly(const Task& task) {
+    if (many_) throw py::value_error("world: a single one wanted, made without `count`");
+    const BusyGuard guard(is_busy_, "world");
+    const py::gil_scoped_release release;
+    task(*worlds_.front());
+  }
 
  private:
   // One column per world.
@@ -111,25 +144,70 @@ class HeldWorlds {
   std::shared_ptr<Model> model_;
   std::vector<std::unique_ptr<World>> worlds_;
   std::optional<int> many_;
+  std::string engine_;
   std::atomic<bool> is_busy_{false};
 };
+
+// The sensors of a robot in one world.
+struct HeldSensors {
+  std::shared_ptr<HeldWorlds> world;
+  std::unique_ptr<simulation::Sensors> sensors;
+};
+
+std::unique_ptr<HeldSensors> makeSensors(const std::shared_ptr<HeldWorlds>& world, double noise, unsigned seed,
+                                         const SE3& imu) {
+  auto held = std::make_unique<HeldSensors>();
+  held->world = world;
+  simulation::SensorOptions options;
+  options.noise = noise;
+  options.seed = seed;
+  options.imu = imu;
+  held->sensors = std::make_unique<simulation::Sensors>(*world->getModel(), options);
+  return held;
+}
+
+SensorReadings readSensors(HeldSensors& self) {
+  SensorReadings out;
+  self.world->observeOnly([&](const World& world) { out = self.sensors->read(world); });
+  return out;
+}
+
+void bindSensors(py::module_& module) {
+  py::class_<HeldSensors>(
+      module, "Sensors",
+      "Encoders of 14 bits on the motors and an IMU (Bosch BMI088) in the trunk of a robot in a World.")
+      .def(py::init(&makeSensors), py::arg("world"), py::arg("noise") = 1.0, py::arg("seed") = 1,
+           py::arg("imu") = SE3(),
+           "noise: factor of the figures of the data sheets, 0: exact; imu: its place in the trunk.")
+      .def(
+          "reset",
+          [](HeldSensors& self, double time) {
+            self.world->observeOnly([&](const World& world) { self.sensors->reset(world, time); });
+          },
+          py::arg("time"), "From the state in which the world is; the first readings come after a time, s.")
+      .def("read", &readSensors, "SensorReadings at the time of the world; those of the IMU are means since the last.");
+}
 
 }  // namespace
 
 void bindWorlds(py::module_& module) {
-  py::class_<HeldWorlds>(
+  py::class_<HeldWorlds, std::shared_ptr<HeldWorlds>>(
       module, "World",
-      "Physics with contact: Bielle's own world, in which motors drive a robot and the ground pushes it.\n\n"
+      "Physics with contact, in which motors drive a robot and the ground pushes it.\n\n"
+      "engine: 'bielle', its own, or 'simbody' and 'mujoco' where it was built with them.\n"
       "With `count`, so many worlds that are stepped together on all cores: arguments and results have "
       "an axis of them in front.")
-      .def(py::init([](std::shared_ptr<Model> model, const py::object& count, const Ground& ground, double time_step) {
-             return std::make_unique<HeldWorlds>(std::move(model), read<std::optional<int>>(count, "count"), ground,
-                                                 time_step);
+      .def(py::init([](std::shared_ptr<Model> model, const py::object& count, const Ground& ground, double time_step,
+                       const std::string& engine) {
+             return std::make_shared<HeldWorlds>(std::move(model), read<std::optional<int>>(count, "count"), ground,
+                                                 time_step, engine);
            }),
-           py::arg("model"), py::arg("count") = py::none(), py::arg("ground") = Ground(), py::arg("time_step") = 0.0)
+           py::arg("model"), py::arg("count") = py::none(), py::arg("ground") = Ground(), py::arg("time_step") = 0.0,
+           py::arg("engine") = "bielle")
       .def_property_readonly("model", &HeldWorlds::getModel, "Model")
       .def_property_readonly(
           "count", [](const HeldWorlds& self) { return show(self.getCount(), {}); }, "number of worlds, or None")
+      .def_property_readonly("engine", &HeldWorlds::getEngine, "its name")
       .def("reset", &HeldWorlds::reset, py::arg("q"), py::arg("v"),
            "Sets closed configurations (nq,) and velocities (nv,) that keep them closed; all else starts anew.")
       .def("step", &HeldWorlds::step, py::arg("u"), py::arg("duration"), py::arg("push") = py::make_tuple(0, 0, 0),
@@ -138,6 +216,7 @@ void bindWorlds(py::module_& module) {
            "Returns the WorldState; its `ok` is False where the integration broke off.")
       .def_property_readonly("wrenches", &HeldWorlds::calcWrenches,
                              "of the ground on the feet in their contact frames (contacts, 6), N and N m");
+  bindSensors(module);
 }
 
 }  // namespace bielle::python

@@ -15,6 +15,7 @@ from bielle import _bielle
 ARGUMENTS = {
     "contacts": "Contacts", "callback": "Optional[Callable[[Iteration], Optional[bool]]]", "gravity": "ArrayLike",
     "torque_loss": "Optional[float]", "count": "Optional[int]", "other": "object", "record": "Record",
+    "objective": "Callable[[Array], Union[float, Tuple[float, ArrayLike]]]",
 }  # fmt: skip
 RESULTS = {
     "Model.forward_dynamics": "Dynamics", "Model.forward_dynamics_derivatives": "DynamicsDerivatives",
@@ -23,7 +24,8 @@ RESULTS = {
     "Controller.reference": "Tuple[Array, Array]", "World.reset": "WorldState", "World.step": "WorldState",
     "World.count": "Optional[int]", "generators": "Dict[str, Dict[str, Dict[str, Any]]]", "motions": "Dict[str, Dict[str, Any]]",
     "Motion.goals": "Tuple[Goal, ...]", "Motion.requested": "Dict[str, float]",
-    "Motion.request": "Optional[Request]", "Motion.costs": "Dict[str, float]", "LibraryResidual.origin": "Optional[Tuple[str, Tuple[Any, ...]]]",
+    "Motion.request": "Optional[Request]", "Motion.summary": "Optional[Summary]", "Robot.info": "Dict[str, Any]",
+    "Parametrization.variables": "Tuple[DesignVariable, ...]", "Estimator.contacts": "Dict[str, bool]", "Motion.costs": "Dict[str, float]", "LibraryResidual.origin": "Optional[Tuple[str, Tuple[Any, ...]]]",
 }  # fmt: skip
 SAMPLES = {"Model": lambda: bielle.load_robot("bipetto").model}
 
@@ -44,7 +46,9 @@ Contacts = Union["ConstraintSet", Sequence[Union[str, "ContactTarget"]]]
 
 
 def widen(kind):
-    """The type of an argument whose result has a type: what converts to it is welcome."""
+    """The type of an argument whose result has a type: what converts to it is welcome. What is called gets the type itself."""
+    if kind.startswith("Callable"):
+        return kind
     kind = re.sub(r"\bArray\b", "ArrayLike", kind)
     kind = re.sub(r"Tuple\[(.*), \.\.\.\]", r"Sequence[\1]", kind)
     return kind.replace("Dict[", "Mapping[")
@@ -53,7 +57,7 @@ def widen(kind):
 def translate(kind, name, owner):
     """A type in the words of pybind11 as one of the stubs."""
     kind = kind.replace("bielle.", "").replace("numpy.ndarray[numpy.float64]", "Array").replace("numpy.ndarray", "Array")
-    if kind in ("object", "handle"):
+    if kind in ("object", "handle", "function"):
         kind = RESULTS.get(owner, "Any") if name == "" else ARGUMENTS.get(name, "ArrayLike")
     elif kind == "dict":
         kind = RESULTS[owner]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bielle import checks
+from bielle import programs
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = sorted((ROOT / "python" / "examples").glob("*.py"))
@@ -30,7 +30,7 @@ def test_page(tmp_path):
     page = (ROOT / "docs" / "python.md").read_text()
     program = "\n".join(re.findall(r"```python\n(.*?)```", page, re.S))
     try:
-        checks.find_program("bielle-check")
+        programs.find_program("bielle-check")
     except FileNotFoundError:
         program = re.sub(r"bielle.check\(.*", "", program)
     (tmp_path / "page.py").write_text(program)

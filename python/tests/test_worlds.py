@@ -97,3 +97,62 @@ def test_predictive_control(motion, model):
         state = world.step(controller.update(float(state.time), state.q, state.v), 2e-3)
     assert state.ok and controller.counts["solves"] > 5 and controller.counts["failed"] == 0
     assert np.abs(state.q[:3] - reference.reference(0.2)[0][:3]).max() < 0.01
+
+
+@pytest.mark.parametrize("engine", ["simbody", "mujoco"])
+def test_squat_stands_in_other_engines(controller, model, engine):
+    engines = pytest.importorskip("bielle._engines")
+    if engine not in engines.names:
+        pytest.skip(f"built without {engine}")
+    world = bielle.World(model, engine=engine)
+    assert world.engine == engine
+    state = follow(world, controller, 0.5 * controller.duration)
+    q, _ = controller.reference(0.5 * controller.duration)
+    assert np.abs(state.q[:3] - q[:3]).max() < 0.02
+    assert world.wrenches[:, 2].sum() == pytest.approx(9.81 * model.mass, rel=0.3)
+
+
+def test_engines_have_names(model):
+    with pytest.raises(bielle.ModelError, match="nowhere"):
+        bielle.World(model, engine="nowhere")
+
+
+def estimate(controller, model, noise, duration):
+    """The largest errors of height and velocity of the trunk, as a squat is followed by what the sensors tell."""
+    world = bielle.World(model)
+    estimator = bielle.Estimator(model, model.standing())
+    sensors = bielle.Sensors(world, noise=noise)
+    feet = [contact.name for contact in model.contacts]
+    state = world.reset(*controller.reference(0))
+    sensors.reset(0)
+    estimator.reset(0, state.q, state.v, feet)
+    errors, torques = [], controller.update(0, state.q, state.v)
+    while state.time < duration:
+        state = world.step(torques, 2e-3)
+        assert estimator.update(sensors.read(), feet) == bielle.EstimatorStatus.OK
+        torques = controller.update(float(state.time), estimator.q, estimator.v)
+        errors.append([abs(estimator.q[2] - state.q[2]), np.abs(estimator.v[:3] - state.v[:3]).max()])
+    assert estimator.contacts == {name: True for name in feet}
+    assert estimator.wrenches[:, 2].sum() == pytest.approx(9.81 * model.mass, rel=0.3)
+    return np.max(errors, axis=0)
+
+
+def test_estimator(controller, model):
+    exact, real = (estimate(controller, model, noise, 0.4) for noise in (0, 1))
+    assert exact[0] < 1e-3 and exact[1] < 0.03
+    assert real[0] < 5e-3 and real[1] < 0.1 and real[0] > exact[0]
+
+
+def test_sensors_need_one_world(model):
+    with pytest.raises(ValueError, match="single"):
+        bielle.Sensors(bielle.World(model, count=2)).read()
+
+
+def test_simulate(motion, robot, tmp_path):
+    result = bielle.make_result(motion, motion.summary, robot)
+    summary = bielle.simulate(result, world="bielle", control="gains")
+    assert not summary["fell"] and summary["duration"] >= 1
+    kept = bielle.simulate(result, tmp_path / "out", world="bielle", control="gains", no_report=True)
+    assert (tmp_path / "out" / "trajectory.npz").is_file() and kept["fell"] is False
+    with pytest.raises(RuntimeError, match="nowhere"):
+        bielle.simulate(result, world="nowhere")

@@ -1,142 +1,12 @@
 // bielle info: the elements of a robot, and whether its loops close.
-#include <cmath>
 #include <iostream>
 
-#include "bielle/dynamics/assembly.h"
-#include "bielle/dynamics/constrained.h"
-#include "bielle/dynamics/kinematics.h"
-#include "bielle/io/names.h"
 #include "cli/commands.h"
 #include "cli/table.h"
+#include "io/robot_info.h"
 
 namespace bielle::cli {
 namespace {
-
-struct Posture {
-  std::string name;
-  VectorXd q;
-  bool closed;
-  std::string message;
-};
-
-// The unchanged neutral configuration, and every reference, closed as far as possible.
-std::vector<Posture> makePostures(const Model& model) {
-  std::vector<Posture> postures = {{"neutral", model.makeNeutral(), true, ""}};
-  for (const Reference& reference : model.references()) {
-    const AssemblyResult result = assembleReference(model, reference.name);
-    postures.push_back({reference.name, result.q, result.status == AssemblyStatus::Closed, result.message});
-  }
-  return postures;
-}
-
-Json orNull(double limit) { return std::isfinite(limit) ? Json(limit) : Json(nullptr); }
-
-std::string findFrameName(const Model& model, int body, const SE3& X_BF) {
-  for (const Frame& frame : model.frames())
-    if (frame.body == body && frame.X_BF.p == X_BF.p && frame.X_BF.R == X_BF.R) return frame.name;
-  return model.bodies()[body].name;
-}
-
-// "motor - 2 knee"
-std::string describeTerms(const Model& model, const Closure& coupler) {
-  std::string text;
-  for (const CouplerTerm& term : coupler.terms) {
-    const double size = std::abs(term.coefficient);
-    text += term.coefficient < 0 ? (text.empty() ? "-" : " - ") : (text.empty() ? "" : " + ");
-    if (size != 1) text += formatNumber(size) + " ";
-    text += model.joints()[term.joint].name;
-  }
-  return text;
-}
-
-Json describeClosures(const Model& model, const std::vector<Posture>& postures) {
-  Json closures = Json::array();
-  for (const Closure& closure : model.closures()) {
-    const bool coupler = closure.kind == ClosureKind::Coupler;
-    closures.push_back(
-        {{"name", closure.name},
-         {"kind", getName(closure.kind)},
-         {"frame1", coupler ? describeTerms(model, closure) : findFrameName(model, closure.body1, closure.X_B1)},
-         {"frame2", coupler ? "= " + formatNumber(closure.offset) : findFrameName(model, closure.body2, closure.X_B2)},
-         {"rows", getRows(closure.kind)},
-         {"loop_dofs", closure.dofs.size()}});
-  }
-  Workspace ws(model);
-  for (const Posture& posture : postures) {
-    updatePositions(model, ws, posture.q);
-    for (size_t c = 0; c < closures.size(); ++c) {
-      const ClosureGap gap = calcClosureGap(ws, model.closures()[c]);
-      closures[c]["gap " + posture.name] = {gap.position, gap.angle};
-    }
-  }
-  return closures;
-}
-
-// At the first reference that closes, else at a closed configuration near neutral.
-Json describeMobility(const Model& model, const std::vector<Posture>& postures) {
-  std::string place = "closed neutral";
-  const AssemblyResult found = findClosedConfiguration(model);
-  VectorXd q = found.q;
-  bool closed = found.status == AssemblyStatus::Closed;
-  for (size_t i = postures.size(); i-- > 1;)
-    if (postures[i].closed) place = postures[i].name, q = postures[i].q, closed = true;
-  const Mobility mobility = calcMobility(model, q);
-  return {{"posture", place},
-          {"closed", closed},
-          {"rows", mobility.rows},
-          {"rank", mobility.rank},
-          {"mobility", mobility.mobility}};
-}
-
-Json describe(const LoadedRobot& robot) {
-  const Model& model = robot.model;
-  const std::vector<Posture> postures = makePostures(model);
-  Json json = {{"name", model.name()},
-               {"directory", robot.directory},
-               {"base", model.hasFreeFlyer() ? "free" : "fixed"},
-               {"mass", model.mass()},
-               {"nq", model.nq()},
-               {"nv", model.nv()},
-               {"nu", model.nu()},
-               {"closure_rows", model.numClosureRows()},
-               {"mobility", describeMobility(model, postures)},
-               {"joints", Json::array()},
-               {"closures", describeClosures(model, postures)},
-               {"clusters", Json::array()},
-               {"motors", Json::array()},
-               {"contacts", Json::array()},
-               {"references", Json::array()},
-               {"warnings", robot.warnings}};
-  for (int i = 1; i < model.numBodies(); ++i) {
-    const Joint& joint = model.joints()[i];
-    json["joints"].push_back({{"name", joint.name},
-                              {"kind", getName(joint.kind)},
-                              {"parent", model.bodies()[joint.parent].name},
-                              {"child", model.bodies()[i].name},
-                              {"nq", joint.nq},
-                              {"nv", joint.nv}});
-  }
-  for (const LoopCluster& cluster : model.clusters()) {
-    Json names = Json::array();
-    for (int c : cluster.closures) names.push_back(model.closures()[c].name);
-    json["clusters"].push_back({{"closures", names}, {"rows", cluster.rows}, {"dofs", cluster.dofs.size()}});
-  }
-  for (const Motor& motor : model.motors())
-    json["motors"].push_back({{"name", motor.name},
-                              {"armature", motor.armature},
-                              {"effort_limit", orNull(motor.effort_limit)},
-                              {"velocity_limit", orNull(motor.velocity_limit)},
-                              {"torque_loss", motor.torque_loss ? Json(*motor.torque_loss) : Json()}});
-  for (const ContactFrame& contact : model.contacts())
-    json["contacts"].push_back({{"name", contact.name},
-                                {"kind", contact.kind == ContactKind::Surface6D ? "6d" : "3d"},
-                                {"body", model.bodies()[contact.body].name},
-                                {"sole", {2 * contact.half_length, 2 * contact.half_width}}});
-  for (size_t i = 1; i < postures.size(); ++i)
-    json["references"].push_back(
-        {{"name", postures[i].name}, {"closed", postures[i].closed}, {"message", postures[i].message}});
-  return json;
-}
 
 void printSection(const Json& robot, const char* key, const char* title, std::vector<std::string> columns) {
   if (robot[key].empty()) return;
@@ -186,7 +56,7 @@ void addInfo(CLI::App& app, Action& action) {
       "  bielle info path/to/my_robot.urdf --fixed-base --json");
   command.callback([&action, robot, as_json] {
     action = [=] {
-      const Json json = describe(robot->load());
+      const Json json = makeRobotInfo(robot->load());
       if (*as_json)
         std::cout << formatJson(json) << "\n";
       else

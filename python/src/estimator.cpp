@@ -1,0 +1,130 @@
+#include "bielle/control/estimator.h"
+
+#include <pybind11/stl.h>
+
+#include "bielle/model/error.h"
+#include "bind.h"
+#include "busy.h"
+#include "model_access.h"
+
+namespace bielle::python {
+namespace {
+
+// An estimator, with the model that it refers to.
+class HeldEstimator {
+ public:
+  HeldEstimator(std::shared_ptr<Model> model, const py::object& q, const EstimatorOptions& options)
+      : model_(std::move(model)), estimator_(*model_, readVector(q, model_->nq(), "q"), options) {}
+
+  void reset(double time, const py::object& q, const py::object& v, const std::vector<std::string>& contacts) {
+    const BusyGuard guard(is_busy_, "estimator");
+    estimator_.reset(time, readVector(q, model_->nq(), "q"), readVector(v, model_->nv(), "v"), find(contacts));
+  }
+
+  EstimatorStatus update(const SensorReadings& readings, const std::vector<std::string>& planned) {
+    for (const VectorXd* numbers : {&readings.motor_positions, &readings.motor_torques})
+      if (numbers->size() != model_->nu())
+        throw py::value_error("readings: numbers of " + std::to_string(model_->nu()) + " motors wanted, got " +
+                              std::to_string(numbers->size()));
+    const BusyGuard guard(is_busy_, "estimator");
+    const std::vector<int> contacts = find(planned);
+    const py::gil_scoped_release release;
+    return estimator_.update(readings, contacts);
+  }
+
+  py::dict getContacts() const {
+    py::dict out;
+    for (size_t c = 0; c < model_->contacts().size(); ++c)
+      out[py::str(model_->contacts()[c].name)] = static_cast<bool>(estimator_.getContacts()[c]);
+    return out;
+  }
+
+  py::array getWrenches() const {
+    RowMatrixXd out(model_->contacts().size(), 6);
+    for (Eigen::Index c = 0; c < out.rows(); ++c) out.row(c) = estimator_.getWrench(static_cast<size_t>(c)).transpose();
+    return makeArray(out);
+  }
+
+  const Estimator& get() const { return estimator_; }
+
+ private:
+  std::vector<int> find(const std::vector<std::string>& names) const {
+    std::vector<int> out;
+    for (const std::string& name : names) {
+      out.push_back(model_->findContact(name));
+      if (out.back() < 0)
+        throw ModelError(model_->name(), "contact '" + name + "'", "there is no contact of this name",
+                         "name one of Model.contacts");
+    }
+    return out;
+  }
+
+  std::shared_ptr<Model> model_;
+  Estimator estimator_;
+  std::atomic<bool> is_busy_{false};
+};
+
+void bindOptions(py::module_& module) {
+  Value<SensorReadings>(module, "SensorReadings", "What is read at an instant of control.")
+      .field("time", &SensorReadings::time, "s")
+      .field("motor_positions", &SensorReadings::motor_positions, "(nu,), rad or m")
+      .field("motor_torques", &SensorReadings::motor_torques, "(nu,), that acted since the instant before, N m or N")
+      .field("angular_velocity", &SensorReadings::angular_velocity, "of the IMU in its frame (3,), rad/s")
+      .field("specific_force", &SensorReadings::specific_force, "acceleration less gravity in its frame (3,), m/s^2");
+  Value<EstimatorOptions>(module, "EstimatorOptions", "Noise is one standard deviation, densities as in data sheets.")
+      .field("imu", &EstimatorOptions::imu, "placement of the IMU in the trunk, SE3")
+      .field("bandwidth", &EstimatorOptions::bandwidth, "of the observers of the motors, 1/s")
+      .field("smoothing", &EstimatorOptions::smoothing, "time constant of the accelerations, s")
+      .field("gyro_noise", &EstimatorOptions::gyro_noise, "rad/s/sqrt(Hz)")
+      .field("accelerometer_noise", &EstimatorOptions::accelerometer_noise, "m/s^2/sqrt(Hz)")
+      .field("gyro_offset", &EstimatorOptions::gyro_offset, "at the start, rad/s")
+      .field("accelerometer_offset", &EstimatorOptions::accelerometer_offset, "at the start, m/s^2")
+      .field("gyro_walk", &EstimatorOptions::gyro_walk, "of the offsets in a second, rad/s")
+      .field("accelerometer_walk", &EstimatorOptions::accelerometer_walk, "m/s^2")
+      .field("tilt", &EstimatorOptions::tilt, "of the trunk at the start, rad")
+      .field("foot_position", &EstimatorOptions::foot_position, "of a foot seen by the encoders, m")
+      .field("foot_attitude", &EstimatorOptions::foot_attitude, "rad")
+      .field("foot_slide", &EstimatorOptions::foot_slide, "of a foot that stands, in a second, m")
+      .field("foot_turn", &EstimatorOptions::foot_turn, "rad")
+      .field("planned_contact", &EstimatorOptions::planned_contact,
+             "normal force of a foot that stands, over the weight")
+      .field("surprising_contact", &EstimatorOptions::surprising_contact, "the same where no contact is planned")
+      .field("slip", &EstimatorOptions::slip, "a foot has slipped if its deviation, 6 in the mean, exceeds this");
+  py::enum_<EstimatorStatus>(module, "EstimatorStatus")
+      .value("OK", EstimatorStatus::Ok)
+      .value("NEAR_DEAD_POINT", EstimatorStatus::NearDeadPoint, "a linkage hardly follows its motors")
+      .value("NOT_CLOSED", EstimatorStatus::NotClosed,
+             "no closed configuration belongs to the motors: the last one is kept")
+      .value("NOT_FINITE", EstimatorStatus::NotFinite, "readings were not finite and are ignored");
+}
+
+}  // namespace
+
+void bindEstimator(py::module_& module) {
+  bindOptions(module);
+  py::class_<HeldEstimator>(
+      module, "Estimator",
+      "The state of a robot from the encoders of its motors and an IMU in its trunk: passive joints by closing the\n"
+      "loops, the trunk by an invariant extended Kalman filter, contacts by the forces on the feet.")
+      .def(py::init<std::shared_ptr<Model>, const py::object&, const EstimatorOptions&>(), py::arg("model"),
+           py::arg("q"), py::arg("options") = EstimatorOptions(),
+           "q: a closed configuration (nq,). Raises ModelError when motors do not determine a joint.")
+      .def("reset", &HeldEstimator::reset, py::arg("time"), py::arg("q"), py::arg("v"), py::arg("contacts"),
+           "Starts from a closed state (nq,), (nv,), standing on contacts, by name.")
+      .def("update", &HeldEstimator::update, py::arg("readings"), py::arg("planned") = std::vector<std::string>(),
+           "Takes the readings of an instant. planned: names of the contacts that the plan has now.")
+      .def_property_readonly(
+          "q", [](const HeldEstimator& e) { return makeArray(e.get().getMeasurement().q); }, "(nq,)")
+      .def_property_readonly(
+          "v", [](const HeldEstimator& e) { return makeArray(e.get().getMeasurement().v); }, "(nv,)")
+      .def_property_readonly("contacts", &HeldEstimator::getContacts, "by name, whether they stand")
+      .def_property_readonly("wrenches", &HeldEstimator::getWrenches,
+                             "of the ground on the feet in their contact frames (contacts, 6), N and N m")
+      .def_property_readonly(
+          "margin", [](const HeldEstimator& e) { return e.get().getMargin(); },
+          "the least that motors move in a unit motion of their linkage; 1 without linkages")
+      .def_property_readonly(
+          "message", [](const HeldEstimator& e) { return e.get().getMessage(); }, "of the last status; empty if OK");
+}
+
+}  // namespace bielle::python

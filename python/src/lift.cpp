@@ -1,0 +1,117 @@
+#include "bielle/transmission/lift.h"
+
+#include <pybind11/stl.h>
+
+#include "bielle/io/result.h"
+#include "bind.h"
+#include "motion.h"
+
+namespace bielle::python {
+namespace {
+
+// A serial model whose model is shared with the motions made of it.
+struct NamedSerial {
+  std::shared_ptr<Model> model;
+  VectorXd q_reference;
+  std::vector<std::string> frozen_joints, dropped_closures;
+  std::vector<SerialModel::Replacement> replacements;
+  std::vector<std::string> dropped_targets;
+};
+
+NamedSerial makeSerial(const Model& closed, const py::object& q, const std::string& armature) {
+  const VectorXd reference = readVector(q, closed.nq(), "q");
+  const py::gil_scoped_release release;
+  SerialModel serial = makeSerialModel(closed, reference, parseSerialArmature(armature));
+  return {std::make_shared<Model>(std::move(serial.model)),
+          serial.q_reference,
+          serial.frozen_joints,
+          serial.dropped_closures,
+          serial.replacements,
+          serial.dropped_targets};
+}
+
+struct Lift {
+  bool lifted = false;
+  std::vector<LiftNode> nodes;
+  std::optional<MotionResult> result;
+};
+
+Lift liftMotion(const Robot& robot, const NamedSerial& named, HeldMotion& motion, const LiftOptions& options) {
+  if (!motion.multipliers) throw std::runtime_error("motion: solve it first");
+  if (!same(motion.model, named.model)) throw py::value_error("motion: one of the serial model wanted");
+  if (motion.options.step != StepRule::Euler)
+    throw py::value_error("motion: only motions of Euler steps, whose accelerations belong to their nodes, are lifted");
+  const BusyGuard guard(motion.is_busy, "motion");
+  const py::gil_scoped_release release;
+  const SerialModel serial = {*named.model,           named.q_reference,  named.frozen_joints,
+                              named.dropped_closures, named.replacements, named.dropped_targets};
+  const MotionResult solved = makeResult({robot.name, robot.file, {}}, motion.motion, motion.motion.guess, {});
+  const LiftResult lifted = lift(*robot.model, serial, makeSerialTrajectory(motion.motion, solved.record), options);
+  Lift out = {lifted.lifted(), lifted.nodes, {}};
+  if (!lifted.trajectory.us.empty())
+    out.result = makeLiftedResult({robot.name, robot.file, {}, "closed", ""}, *robot.model, motion.motion, lifted, 0);
+  return out;
+}
+
+void bindSerial(py::module_& module) {
+  Value<SerialModel::Replacement>(module, "Replacement",
+                                  "Motors of one linkage, replaced by motors on its serial joints.")
+      .field("motors", &SerialModel::Replacement::motors, "names, of the closed model")
+      .field("joints", &SerialModel::Replacement::joints, "names, which the new motors have too")
+      .field("R", &SerialModel::Replacement::R, "ratio at the reference, (motors, joints)");
+  Value<NamedSerial>(module, "SerialModel",
+                     "The Approximate Serial model of the paper: linkages frozen, motors on the serial joints.")
+      .field("model", &NamedSerial::model, "Model")
+      .field("q_reference", &NamedSerial::q_reference, "(nq,) of the closed model, where the linkages are frozen")
+      .field("frozen_joints", &NamedSerial::frozen_joints, "names")
+      .field("dropped_closures", &NamedSerial::dropped_closures, "names")
+      .field("replacements", &NamedSerial::replacements, "Replacements")
+      .field("dropped_targets", &NamedSerial::dropped_targets, "of references that named frozen joints");
+  module.def("make_serial_model", &makeSerial, py::arg("model"), py::arg("q"), py::arg("armature") = "",
+             "The SerialModel of a robot, frozen at the closed configuration q (nq,).\n\n"
+             "armature: of the new motors in kg m^2, or 'reflected'. Raises ModelError when there is no equivalent.");
+}
+
+void bindOutcome(py::module_& module) {
+  py::enum_<LiftMethod>(module, "LiftMethod")
+      .value("NEWTON", LiftMethod::Newton, "each node by itself, torques from inverse dynamics")
+      .value("NLOPT", LiftMethod::Nlopt, "one step of the closed dynamics after the other, torques by SLSQP");
+  py::enum_<LiftStatus>(module, "LiftStatus")
+      .value("LIFTED", LiftStatus::Lifted)
+      .value("UNREACHABLE_POSTURE", LiftStatus::UnreachablePosture)
+      .value("SINGULAR_LINKAGE", LiftStatus::SingularLinkage)
+      .value("INACCURATE", LiftStatus::Inaccurate);
+  Value<LiftOptions>(module, "LiftOptions", "How a motion is lifted.")
+      .field("method", &LiftOptions::method, "LiftMethod")
+      .field("singular", &LiftOptions::singular, "margin below which a linkage is at a dead point")
+      .field("acceleration_tolerance", &LiftOptions::acceleration_tolerance,
+             "NEWTON: relative to 1 rad/s^2 + the largest")
+      .field("position_tolerance", &LiftOptions::position_tolerance, "NLOPT: of the serial joints, rad and m")
+      .field("velocity_tolerance", &LiftOptions::velocity_tolerance, "NLOPT: rad/s and m/s");
+  Value<LiftNode>(module, "LiftNode", "How one node was lifted; errors are the largest of the serial coordinates.")
+      .field("status", &LiftNode::status, "LiftStatus")
+      .field("message", &LiftNode::message, "why not lifted")
+      .field("joint", &LiftNode::joint, "at which the lift ended, or empty")
+      .field("position_error", &LiftNode::position_error, "rad or m")
+      .field("velocity_error", &LiftNode::velocity_error, "rad/s or m/s")
+      .field("acceleration_error", &LiftNode::acceleration_error, "of the closed dynamics, rad/s^2 or m/s^2")
+      .field("margin", &LiftNode::margin, "smallest over the linkages; 0: dead point")
+      .field("evaluations", &LiftNode::evaluations, "by NLopt");
+  Value<Lift>(module, "Lift", "A serial motion carried over to the closed robot.")
+      .field("lifted", &Lift::lifted, "all of it")
+      .field("nodes", &Lift::nodes, "LiftNodes up to the first failure")
+      .field("result", &Lift::result, "Result, as far as it was lifted, or None");
+  module.def("lift", &liftMotion, py::arg("robot"), py::arg("serial"), py::arg("motion"),
+             py::arg("options") = LiftOptions(),
+             "Carries a solved Motion of serial.model over to the closed robot: the same serial joints, motor torques "
+             "that follow.\n\nThe motion has Euler steps.");
+}
+
+}  // namespace
+
+void bindLift(py::module_& module) {
+  bindSerial(module);
+  bindOutcome(module);
+}
+
+}  // namespace bielle::python
