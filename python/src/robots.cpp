@@ -1,12 +1,12 @@
 #include <pybind11/stl.h>
 
+#include "bielle/io/robot_info.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
+#include "bielle/report/view.h"
 #include "bielle/robots/generators.h"
 #include "bind.h"
-#include "io/robot_info.h"
-#include "report/view.h"
 #include "robot.h"
 
 namespace bielle::python {
@@ -56,7 +56,7 @@ py::object describe(const Robot& robot) {
   std::string text;
   {
     const py::gil_scoped_release release;
-    text = makeRobotInfo(toLoaded(robot)).dump();
+    text = makeRobotInfo(toLoaded(robot));
   }
   return py::module_::import("json").attr("loads")(text);
 }

@@ -1,9 +1,9 @@
 // bielle info: the elements of a robot, and whether its loops close.
 #include <iostream>
 
+#include "bielle/io/robot_info.h"
 #include "cli/commands.h"
 #include "cli/table.h"
-#include "io/robot_info.h"
 
 namespace bielle::cli {
 namespace {
@@ -56,7 +56,7 @@ void addInfo(CLI::App& app, Action& action) {
       "  bielle info path/to/my_robot.urdf --fixed-base --json");
   command.callback([&action, robot, as_json] {
     action = [=] {
-      const Json json = makeRobotInfo(robot->load());
+      const Json json = parseJson(makeRobotInfo(robot->load()));
       if (*as_json)
         std::cout << formatJson(json) << "\n";
       else

@@ -1,5 +1,5 @@
 // bielle view ROBOT: the robot as a page, with a slider for each motor.
-#include "report/view.h"
+#include "bielle/report/view.h"
 
 #include <filesystem>
 #include <iostream>

@@ -1,4 +1,4 @@
-#include "io/robot_info.h"
+#include "bielle/io/robot_info.h"
 
 #include <cmath>
 #include <cstdio>
@@ -7,6 +7,7 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
+#include "io/json_text.h"
 
 namespace bielle {
 namespace {
@@ -95,7 +96,7 @@ Json describeMobility(const Model& model, const std::vector<Posture>& postures) 
 
 }  // namespace
 
-Json makeRobotInfo(const LoadedRobot& robot) {
+std::string makeRobotInfo(const LoadedRobot& robot) {
   const Model& model = robot.model;
   const std::vector<Posture> postures = makePostures(model);
   Json json = {{"name", model.name()},
@@ -142,7 +143,7 @@ Json makeRobotInfo(const LoadedRobot& robot) {
   for (size_t i = 1; i < postures.size(); ++i)
     json["references"].push_back(
         {{"name", postures[i].name}, {"closed", postures[i].closed}, {"message", postures[i].message}});
-  return json;
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace bielle

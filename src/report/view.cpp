@@ -1,4 +1,4 @@
-#include "report/view.h"
+#include "bielle/report/view.h"
 
 #include <algorithm>
 #include <cmath>

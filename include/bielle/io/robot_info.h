@@ -1,0 +1,13 @@
+#pragma once
+/// \file What a robot consists of, and whether its loops close: what `bielle info` prints.
+#include <string>
+
+#include "bielle/model/reader.h"
+
+namespace bielle {
+
+/// A JSON object: sizes, mass, mobility, and lists of joints, closures, clusters, motors, contacts and references. The gaps of
+/// closures, [m, rad], are given at the neutral configuration and at each reference.
+std::string makeRobotInfo(const LoadedRobot& robot);
+
+}  // namespace bielle
