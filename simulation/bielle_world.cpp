@@ -90,7 +90,7 @@ BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
       terrain_(options.world.ground),
       loops_(makeConstraintSet(model)),
       tree_(model, findPosture(model), listTips(model)),
-      points_(makeContactPoints(model, options.contact)),
+      points_(makeContactPoints(model, options.world.ground, options.contact)),
       forces_(points_.size()),
       places_(points_.size(), Vector3d::Zero()),
       stops_(makeJointStops(model)),

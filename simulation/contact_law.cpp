@@ -27,19 +27,20 @@ Vector3d shorten(const Vector3d& vector, double length) {
 
 }  // namespace
 
-std::vector<ContactPoint> makeContactPoints(const Model& model, const ContactOptions& options) {
+std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& ground, const ContactOptions& options) {
+  const int grid = ground.steps.empty() ? 2 : options.grid;
   const double sole = model.mass() * model.gravity().norm() / options.sinkage;
   std::vector<ContactPoint> points;
   for (size_t c = 0; c < model.contacts().size(); ++c) {
     const ContactFrame& contact = model.contacts()[c];
     const bool is_surface = contact.kind == ContactKind::Surface6D;
-    const int count = is_surface ? 4 : 1;
-    for (int corner = 0; corner < count; ++corner) {
+    const int count = is_surface ? grid * grid : 1;
+    for (int i = 0; i < count; ++i) {
       ContactPoint point;
       point.contact = static_cast<int>(c);
       point.body = contact.body;
-      const double x = is_surface ? (corner & 1 ? -1 : 1) * contact.half_length : 0;
-      const double y = is_surface ? (corner & 2 ? -1 : 1) * contact.half_width : 0;
+      const auto place = [&](int along) { return is_surface ? 1 - 2.0 * along / (grid - 1) : 0; };  // from 1 to -1
+      const double x = place(i % grid) * contact.half_length, y = place(i / grid) * contact.half_width;
       point.p = contact.X_BF.act(Vector3d(x, y, 0));
       point.stiffness = sole / count;
       point.damping = options.damping;

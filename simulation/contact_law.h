@@ -1,7 +1,8 @@
 #pragma once
 /// \file Compliant contact with friction that sticks, for worlds that have no contact of their own.
 ///
-/// A sole touches with the corners of its rectangle, a point contact with its origin. A point at x with velocity x' is by
+/// A sole touches with the corners of its rectangle or, where the ground has steps, whose edges may lie anywhere under it, with a
+/// grid of points; a point contact with its origin. A point at x with velocity x' is by
 /// d deep in the ground, whose normal there is n (Terrain::touch); T = 1 - n n^T. With the stiffness k of the point,
 ///
 ///     f_n = k d max(0, 1 + c d'),   d' = -n . x'          while d > 0, else no force                              (1)
@@ -36,6 +37,7 @@ struct ContactOptions {
   double sinkage = 1e-4;       ///< of one sole under the robot's weight, m; gives k
   double damping = 20;         ///< c, s/m
   double shear_ratio = 1;      ///< k_t / k
+  int grid = 5;                ///< points along each side of a sole on ground with steps
   double shear_damping = 0.3;  ///< c_t over that which damps the robot's mass on one sole's bristles critically
 };
 
@@ -50,8 +52,9 @@ struct ContactPoint {
   bool touches = false;                           ///< as of the last update of the anchor
 };
 
-/// The points of all contacts of a model, contact by contact.
-std::vector<ContactPoint> makeContactPoints(const Model& model, const ContactOptions& options = {});
+/// The points of all contacts of a model on a ground, contact by contact; those of a sole share its stiffness.
+std::vector<ContactPoint> makeContactPoints(const Model& model, const Ground& ground,
+                                            const ContactOptions& options = {});
 
 struct ContactForce {
   Vector3d force = Vector3d::Zero();    ///< on the point, N (world)

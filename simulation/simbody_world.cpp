@@ -27,7 +27,7 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
   WorldForces(const SimbodyTree& tree, const SimbodyWorldOptions& options)
       : tree_(tree),
         terrain(options.world.ground),
-        points(makeContactPoints(tree.model, options.contact)),
+        points(makeContactPoints(tree.model, options.world.ground, options.contact)),
         stops(makeJointStops(tree.model)),
         u(VectorXd::Zero(tree.model.nu())) {}
 

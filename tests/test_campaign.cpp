@@ -194,13 +194,16 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
   CHECK_THAT(runCampaign(late, out).err, Contains("key 'phase' (line 2)") && Contains("no phase 99"));
 }
 
-TEST_CASE("campaign: the example's specification is read") {
-  const study::CampaignSpec spec = study::readCampaignSpec(BIELLE_SOURCE_DIR "/examples/campaign/pushes.yaml");
-  REQUIRE(spec.search);
-  CHECK(spec.search->count == 32);
-  size_t combinations = 1;
-  for (const study::CampaignAxis& axis : spec.axes) combinations *= axis.values.size();
-  CHECK(combinations == 32);
+TEST_CASE("campaign: the specifications of the examples are read") {
+  const std::vector<std::pair<std::string, size_t>> examples{
+      {"pushes", 32}, {"pushes_predictive", 80}, {"pushes_felt", 80}, {"unknown", 60}};
+  for (const auto& [name, expected] : examples) {
+    const study::CampaignSpec spec = study::readCampaignSpec(BIELLE_SOURCE_DIR "/examples/campaign/" + name + ".yaml");
+    CHECK(spec.search.has_value() == (name == "pushes"));
+    size_t combinations = 1;
+    for (const study::CampaignAxis& axis : spec.axes) combinations *= axis.values.size();
+    CHECK(combinations == expected);
+  }
 }
 
 TEST_CASE("campaign: an impulse counts as survived if all smaller ones were") {

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 #include <random>
 
+#include "bielle/model/reader.h"
 #include "simulation/contact_law.h"
 
 namespace bielle::simulation {
@@ -97,6 +98,33 @@ TEST_CASE("contact law: its damping is the derivative by the velocity") {
     poisoned(2, 2) *= 1.001;
     CHECK((poisoned - numeric).norm() > 1e-5 * numeric.norm());
   }
+}
+
+TEST_CASE("contact law: a sole lies on the edge of a step, but has no more than corners on level ground") {
+  const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
+  const ContactFrame& sole = robot.model.contacts()[0];
+  // A step whose edge is under the sole: no corner of it is over the step.
+  Ground ground;
+  ground.steps.push_back({{0, 0, 0.01}, 1.2 * sole.half_length, 1, 0, 0, 0});
+  const Terrain terrain(ground);
+  double flat = 0, stepped = 0, force = 0;
+  int corners = 0;
+  for (const ContactPoint& point : makeContactPoints(robot.model, {})) {
+    flat += point.stiffness;
+    ++corners;
+  }
+  CHECK(corners == 8);
+  for (const ContactPoint& point : makeContactPoints(robot.model, ground)) {
+    stepped += point.stiffness;
+    if (point.contact != 0) continue;
+    const Vector3d p = sole.X_BF.inverse().act(point.p);
+    CHECK(std::abs(p.x()) <= sole.half_length * (1 + 1e-12));
+    force += calcContactForce(terrain, point, Vector3d(p.x(), p.y(), 0.0099), Vector3d::Zero()).force.z();
+  }
+  CHECK(stepped == Approx(flat));
+  const double weight = robot.model.mass() * robot.model.gravity().norm();
+  CHECK(force ==
+        Approx(weight * 3 / 5));  // three rows of five points are over the step, as deep as its weight makes a sole
 }
 
 TEST_CASE("contact law: stops push back from both sides") {

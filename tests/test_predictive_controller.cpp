@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "bielle/control/predictive_controller.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "count_allocations.h"
@@ -286,6 +287,83 @@ TEST_CASE(
   CHECK(controller.getCounts().missed == 3);
   CHECK(controller.getCounts().solves == asking + 5);  // the late one, and one for each stage since
   CHECK(controller.getCounts().failed == 0);
+}
+
+namespace {
+
+// Lets a walk by command follow its own policy, while the contacts that it is told are scripted.
+struct Walking {
+  Walking() {
+    LocomotionOptions gait;
+    gait.contact_kp = 0;
+    gait.foothold_room = 0.4;
+    gait.cone_margin = 0.2;
+    const CommandSource source = [](double) { return VelocityCommand{0.4, 0, 0}; };
+    PredictiveOptions options = makeShortWindow(1);
+    options.nodes = 60;
+    const VectorXd q = makeStandingPosture(model);
+    CommandedWalk walk(model, gait, {}, source, q);
+    CommandedWalk plan = walk;
+    for (int k = 0; k < 200; ++k) planned.push_back(plan.makeNext().spec.constraints.contacts);
+    controller = std::make_unique<PredictiveController>(std::move(walk), options);
+    at = {0, q, VectorXd::Zero(model.nv())};
+    u.setZero(model.nu());
+  }
+  bool stands(int stage, int foot) const {
+    return std::find(planned[stage].begin(), planned[stage].end(), foot) != planned[stage].end();
+  }
+  // The first stage in which a foot stands again, or a swing of the foot begins.
+  int findChange(int foot, bool lands) const {
+    int stage = 1;
+    while (stands(stage - 1, foot) == lands || stands(stage, foot) != lands) ++stage;
+    return stage;
+  }
+  // One stage, with the contacts that are given.
+  void update(const std::vector<char>& contacts) {
+    at.contacts = contacts;
+    for (int i = 0; i < kStageTicks; ++i, ++tick) {
+      at.time = 1e-3 * tick;
+      controller->getPolicy().getReference(at.time, at.q, at.v);
+      controller->update(at, u);
+    }
+  }
+  void updateAsPlanned(int stage) { update({char(stands(stage, 0)), char(stands(stage, 1))}); }
+  double getHeight(int foot) {
+    updatePlacements(model, ws, at.q);
+    const ContactFrame& contact = model.contacts()[foot];
+    return getPlacement(ws, contact.body, contact.X_BF).p.z();
+  }
+  // How far the motion is behind its plan, in stages.
+  double getLag() const { return (at.time - controller->getPlanTime(at.time)) / (1e-3 * kStageTicks); }
+
+  const Model& model = getBipetto();
+  Workspace ws{model};
+  std::vector<std::vector<int>> planned;  // feet that stand, per stage
+  std::unique_ptr<PredictiveController> controller;
+  Measurement at;
+  VectorXd u;
+  int tick = 0;
+};
+
+}  // namespace
+
+TEST_CASE("predictive control: a foot that finds ground early stands from then on") {
+  Walking walk;
+  const int foot = walk.findChange(0, false) < walk.findChange(1, false) ? 0 : 1;
+  const int begin = walk.findChange(foot, false), landing = walk.findChange(foot, true);
+  const int touch = begin + 3 * (landing - begin) / 4;
+  for (int stage = 0; stage < touch; ++stage) walk.updateAsPlanned(stage);
+  CHECK(walk.getHeight(foot) > 5e-3);
+  CHECK(walk.getLag() == Approx(0).margin(1e-6));
+  walk.update({1, 1});
+  CHECK(walk.controller->getCounts().early == 1);
+  CHECK(walk.getLag() == Approx(touch + 1 - landing));
+  walk.update({1, 1});
+  const double height = walk.getHeight(foot);
+  for (int i = 0; i < 2; ++i) walk.update({1, 1});
+  CHECK(walk.getHeight(foot) == Approx(height).margin(2e-3));  // above the ground of the plan
+  CHECK(walk.getHeight(foot) > 3e-3);
+  CHECK(walk.controller->getCounts().failed == 0);
 }
 
 TEST_CASE("predictive control: it refuses a plan that is not one of its motion") {
