@@ -344,6 +344,16 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
   sub.add_option("--max-iterations", arguments->solver.max_iterations, "the solver stops there")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
+  sub.add_option_function<std::string>(
+         "--inequalities",
+         [arguments](const std::string& name) {
+           arguments->solver.constraints.inequalities = name == getName(Inequalities::InteriorPoint)
+                                                            ? Inequalities::InteriorPoint
+                                                            : Inequalities::AugmentedLagrangian;
+         },
+         "how the solver keeps those constraints that are not equations")
+      ->check(CLI::IsMember({getName(Inequalities::AugmentedLagrangian), getName(Inequalities::InteriorPoint)}))
+      ->default_str(getName(arguments->solver.constraints.inequalities));
   sub.add_option("--threads", arguments->solver.threads, "0: all; results do not depend on it")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();

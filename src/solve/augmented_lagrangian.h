@@ -1,7 +1,9 @@
 #pragma once
-// The constraints of a shooting problem, by an augmented Lagrangian (fddp.h, Eqs. 10 to 13).
+// The constraints of a shooting problem, by an augmented Lagrangian (fddp.h, Eqs. 10 to 13); the inequalities among them
+// likewise, or by a barrier (Eqs. 14 to 17).
 #include "bielle/solve/fddp.h"
 #include "solve/node_evaluations.h"
+#include "solve/slack_barrier.h"
 
 namespace bielle {
 
@@ -13,8 +15,10 @@ class AugmentedLagrangian {
   void resize(const ShootingProblem& problem, const ConstraintOptions& options);
   bool isEmpty() const { return rows_ == 0; }
 
-  /// Contribution of one node to Eq. (10).
-  double calc(int node, const VectorXd& c) const;
+  /// Contribution of one node to the merit of a trial of length alpha, Eqs. (10), (14) and (15).
+  double calc(int node, const VectorXd& c, double alpha) const;
+  /// The next iterate to be evaluated is a trial of length alpha.
+  void acceptStep(double alpha) { step_ = alpha; }
   /// Computes the weights of Eq. (11) and the measures below at the current iterate.
   void evaluate(const EvaluationList& iterate);
   /// Null if the node has no constraints.
@@ -23,7 +27,10 @@ class AugmentedLagrangian {
   double getValue() const { return at_.value; }                      ///< sum of the contributions to Eq. (10)
   double getViolation() const { return at_.violation; }              ///< the largest
   double getComplementarity() const { return at_.complementarity; }  ///< Eq. (13), of the multipliers after Eq. (12)
-  bool isSatisfied() const { return at_.violation <= options_.tolerance; }
+  /// Of slacks: the sum of y r, and what a full step adds to the change of the merit foreseen by the sweep, Eq. (17).
+  double getGap() const { return slacks_.gap; }
+  double getOffset() const { return slacks_.offset; }
+  bool isSatisfied() const;
   /// Whether constraints are violated, but so little that multipliers under a growing penalty should mend it.
   bool isNear() const;
   /// Whether violations alone are minimized, and outweigh `cost` so far that the least of them has been found.
@@ -60,12 +67,21 @@ class AugmentedLagrangian {
   };
   struct Measures {
     double value = 0, violation = 0, complementarity = 0;
-    double gain = 0;     // increase of `value` by Eq. (12), to first order: |y+ - y|^2 / (2 rho)
-    double squares = 0;  // sum of the squared violations
+    double penalized = 0;  // largest violation of the rows that Eq. (10) enforces
+    double gain = 0;       // increase of `value` by Eq. (12), to first order: |y+ - y|^2 / (2 rho)
+    double squares = 0;    // sum of the squared violations
     int worst_node = 0, worst_row = 0;
   };
   double calcContribution(double d, double multiplier) const;
   void startRestoration(double cost);
+  // Whether inequalities are enforced by the barrier at present, and whether Eq. (10) enforces a row.
+  bool hasBarrier() const { return !barrier_.isEmpty() && !restoring_; }
+  bool isPenalized(const Node& node, Eigen::Index i) const { return !hasBarrier() || node.lower[i] == node.upper[i]; }
+  // Whether the barrier is at its least and the equations hold, so that an update changes nothing.
+  bool isExhausted() const {
+    return barrier_.getParameter() <= options_.final_barrier && at_.penalized <= options_.tolerance;
+  }
+  void moveSlacks(const EvaluationList& iterate);
 
   ConstraintOptions options_;
   std::vector<Node> nodes_;
@@ -75,6 +91,10 @@ class AugmentedLagrangian {
   double penalty_ = 1;
   double far_penalty_ = 1;  // without what was added close to the solution; where the next solve starts
   Measures at_;
+  SlackBarrier barrier_;  // empty unless inequalities are enforced by it
+  SlackBarrier::Measures slacks_;
+  bool has_slacks_ = false;
+  double step_ = 0;            // that led to an iterate whose slacks are still those of the one before
   double last_violation_ = 0;  // at the last update of the multipliers
   int num_updates_ = 0;
 };

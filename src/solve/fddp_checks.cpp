@@ -26,6 +26,10 @@ void checkOptions(const FddpOptions& o) {
           "regularization_increase must exceed 1, regularization_decrease must not be below");
   require(o.state_regularization_ratio >= 0, "state_regularization_ratio must not be negative");
   require(o.rollout_segments >= 1, "rollout_segments must be at least 1");
+  require(o.constraints.inequalities == Inequalities::AugmentedLagrangian || o.last_rollout == LastRollout::Closed,
+          "a receding horizon has no interior point");
+  require(o.constraints.final_barrier > 0 && o.constraints.initial_barrier >= o.constraints.final_barrier,
+          "final_barrier must be positive and not exceed initial_barrier");
   require(o.acceptance > 0 && o.acceptance < 1, "acceptance must lie between 0 and 1");
 }
 

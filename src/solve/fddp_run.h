@@ -69,7 +69,8 @@ class FddpRun {
   int getNumSegments() const { return std::max(1, std::min(options_.rollout_segments, N_ / kShortestSegment)); }
   bool isClosed() const { return line_.gap <= options_.gap_tolerance; }
   bool isStationary() const { return isClosed() && (stalled_ || line_.gradient <= options_.gradient_tolerance); }
-  double calcForeseen() const { return -slope_ - 0.5 * curvature_; }  // decrease by a full step
+  // Decrease by a full step.
+  double calcForeseen() const { return -slope_ - 0.5 * curvature_ - work_.lagrangian.getOffset(); }
   double calcMerit() const { return line_.cost + work_.lagrangian.getValue(); }
   double calcGradient() const;
 
