@@ -1,6 +1,6 @@
 """solve.py COMMAND: what a solve costs from Python, over the command, and with a cost written in Python.
 
-CPU times of the solver alone, with one thread; the least of several runs, because other load lengthens all of them.
+Times of the solver alone, with one thread, of both in turn; the least of several runs, because other load lengthens all of them.
 """
 
 import json
@@ -36,7 +36,7 @@ def run_command(command: str) -> float:
         subprocess.run([command, "solve", "walk", "--robot", "bipetto", "--threads", "1", "--quiet", "--no-check",
                         "--no-report", "-o", directory], check=True, stdout=subprocess.DEVNULL)  # fmt: skip
         with open(directory + "/summary.json") as file:
-            return float(json.load(file)["solver"]["seconds"])
+            return float(json.load(file)["seconds"])
 
 
 def run_python() -> float:
@@ -57,8 +57,8 @@ def run_own_cost(own: bool) -> float:
 
 
 if __name__ == "__main__":
-    command = min(run_command(sys.argv[1]) for _ in range(RUNS))
-    python = min(run_python() for _ in range(RUNS))
+    turns = [(run_command(sys.argv[1]), run_python()) for _ in range(RUNS)]
+    command, python = (float(least) for least in np.min(turns, axis=0))
     print(f"walk: {command:.3f} s by the command, {python:.3f} s from Python, {100 * (python / command - 1):+.1f} %")
     library, own = (float(np.min([run_own_cost(own) for _ in range(RUNS)])) for own in (False, True))
     print(f"squat, per iteration: {1e3 * library:.2f} ms, with a cost in Python {1e3 * own:.2f} ms, {own / library:.2f} times")
