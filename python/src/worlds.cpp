@@ -22,7 +22,7 @@ std::unique_ptr<World> makeOwnWorld(const std::string&, const Model& model, cons
 }
 
 // Of the module that links the engines, which is there where Bielle was built with them.
-MakeWorld findEngines() {
+MakeWorld findEngine(const std::string& engine) {
   try {
     const py::object capsule = py::module_::import("bielle._engines").attr("make_world");
     void* function = PyCapsule_GetPointer(capsule.ptr(), kEnginesCapsule);
@@ -30,7 +30,7 @@ MakeWorld findEngines() {
     return reinterpret_cast<MakeWorld>(function);
   } catch (py::error_already_set& error) {
     if (!error.matches(PyExc_ModuleNotFoundError)) throw;
-    throw ModelError("", "worlds of other engines", "this build has none",
+    throw ModelError("", "world '" + engine + "'", "this build has no engine but its own",
                      "build Bielle with -DBIELLE_BUILD_SIMULATION=ON (it needs Simbody), or take engine='bielle'");
   }
 }
@@ -42,7 +42,7 @@ class HeldWorlds {
              const std::string& engine)
       : model_(std::move(model)), many_(count), engine_(engine) {
     if (count && *count < 1) throw py::value_error("count: at least one world");
-    const MakeWorld make = engine == "bielle" ? makeOwnWorld : findEngines();
+    const MakeWorld make = engine == "bielle" ? makeOwnWorld : findEngine(engine);
     const py::gil_scoped_release release;
     for (int i = 0; i < count.value_or(1); ++i) worlds_.push_back(make(engine, *model_, {ground, time_step}));
   }
