@@ -1,5 +1,6 @@
 // The guess of walks and stairs: closed postures with the feet where the plan has them.
 #include <catch2/catch.hpp>
+#include <cmath>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -75,8 +76,8 @@ TEST_CASE("guess: loops are closed, and standing feet are where they stand") {
 TEST_CASE("guess: the base comes down for a long stride, and linkages keep away from dead points") {
   const Stance stance = makeStance();
   PlannedPosture planned{stance.q, stance.feet};
-  planned.feet[0].p.x() += 0.2;
-  planned.feet[1].p.x() -= 0.2;
+  planned.feet[0].p.x() += 0.23;
+  planned.feet[1].p.x() -= 0.23;
   const VectorXd q = placeFeet(getBipetto(), stance, {planned}).front();
   CHECK(q[2] < stance.q[2] - 0.01);
   CHECK((q.head<2>() - stance.q.head<2>()).norm() < 1e-10);
@@ -96,6 +97,31 @@ TEST_CASE("guess: out of reach, legs are as in the stance") {
   planned.feet[0].p.x() += 2;
   const VectorXd q = placeFeet(getBipetto(), stance, {planned}).front();
   CHECK((q.tail(q.size() - 7) - stance.q.tail(q.size() - 7)).norm() < 1e-12);
+}
+
+TEST_CASE("guess: how high the centre of mass can be over a foot") {
+  const Stance stance = makeStance();
+  const LegReach reach(getBipetto(), stance);
+  const double height = stance.com.z() - stance.feet[0].p.z();
+  const auto measure = [&](double ahead, double z) {  // transmissions with flat soles, or 0 if there is no such posture
+    PlannedPosture planned{stance.q, stance.feet};
+    for (SE3& foot : planned.feet) foot.p.x() -= ahead;
+    planned.q[2] += z - height;
+    const VectorXd q = placeFeet(getBipetto(), stance, {planned}).front();
+    return std::abs(q[2] - planned.q[2]) < 1e-12 ? measureTransmissions(q) : 0;
+  };
+  for (double ahead : {-0.08, 0.0, 0.08}) {
+    CAPTURE(ahead);
+    const auto [shortest, longest] = reach.calc(ahead, 0);
+    CHECK(shortest < height);
+    CHECK(longest > height);
+    for (double z : {shortest, longest}) CHECK(measure(ahead, z) > 0.45);  // heights are interpolated
+    for (double z : {shortest - 0.02, longest + 0.02}) CHECK(measure(ahead, z) < 0.5);
+  }
+  // Ahead of a foot the ankle bends as well as the knee, and so the leg less. A leg set aside is a slanted strut.
+  CHECK(reach.calc(0.1, 0).shortest > reach.calc(0, 0).shortest + 0.02);
+  CHECK(reach.calc(-0.1, 0).shortest < reach.calc(0, 0).shortest);
+  CHECK(reach.calc(0, 0.1).longest == Approx(std::sqrt(std::pow(reach.calc(0, 0).longest, 2) - 0.01)));
 }
 
 TEST_CASE("guess: one that cannot be evaluated gives way to the posture at the start") {

@@ -174,7 +174,7 @@ VectorXd calcHeights(const FootstepPlan& plan, const Gait& gait, int window) {
     return std::min(stance[0].p.z(), stance[1].p.z());
   };
   const int size = static_cast<int>(gait.nodes.size());
-  VectorXd raw(size), z = VectorXd::Zero(size);
+  VectorXd raw(size);
   for (int k = 0; k < size; ++k) {
     const GaitPhase& phase = gait.phases[gait.nodes[k].phase];
     raw[k] = getLower(phase.steps_done);
@@ -182,13 +182,19 @@ VectorXd calcHeights(const FootstepPlan& plan, const Gait& gait, int window) {
       if (phase.steps[foot] == phase.steps_done)
         raw[k] += gait.nodes[k].swings[foot].progress * (getLower(phase.steps_done + 1) - raw[k]);
   }
+  return smoothen(raw, window);
+}
+
+}  // namespace
+
+VectorXd smoothen(const VectorXd& raw, int window) {
+  const int size = static_cast<int>(raw.size());
+  VectorXd z = VectorXd::Zero(size);
   for (int k = 0; k < size; ++k)
     for (int i = -window; i <= window; ++i)
       z[k] += (1 - std::abs(i) / (window + 1.0)) / (window + 1.0) * raw[std::clamp(k + i, 0, size - 1)];
   return z;
 }
-
-}  // namespace
 
 int countNodes(double duration, double time_step) { return static_cast<int>(std::lround(duration / time_step)); }
 

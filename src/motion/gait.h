@@ -83,6 +83,9 @@ Gait makeGait(const LocomotionTask& task, const GaitTiming& timing, const SwingS
 Gait makeGait(const LocomotionTask& task, std::vector<GaitPhase> phases, const GaitTiming& timing,
               const SwingShape& shape, double stretch, const GaitStart& start, double gravity);
 
+/// Mean over +- window nodes, weighted by a triangle.
+VectorXd smoothen(const VectorXd& raw, int window);
+
 /// The number of stages of a duration.
 int countNodes(double duration, double time_step);
 

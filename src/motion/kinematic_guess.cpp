@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "bielle/dynamics/assembly.h"
@@ -9,8 +10,6 @@
 
 namespace bielle {
 namespace {
-
-enum class Soles { AsPlanned, Tilted };
 
 SE3 getBase(const VectorXd& q) {
   return {Eigen::Quaterniond(Eigen::Vector4d(q.segment<4>(3))).toRotationMatrix(), q.head<3>()};
@@ -22,64 +21,117 @@ class FeetPlacer {
       : model_(model), stance_(stance), ws_(model), closures_(makeConstraintSet(model)) {
     for (const Transmission& transmission : listTransmissions(model, stance.q))
       transmissions_.push_back(makeTransmission(transmission));
-    const SE3 base = getBase(stance.q);
-    for (int i = 0; i < 2; ++i) {
-      lengths_[i] = base.p.z() - stance.feet[i].p.z();
-      hips_[i] = base.inverse().act(stance.feet[i].p + lengths_[i] * Vector3d::UnitZ());
-    }
+    height_ = stance.com.z() - 0.5 * (stance.feet[0].p.z() + stance.feet[1].p.z());
     options_.step = AssemblyStep::Shortest;
     options_.max_iterations = 15;
     options_.continuation_steps = 0;
   }
 
   VectorXd place(const PlannedPosture& planned, const VectorXd& before) {
-    VectorXd base = planned.q.head<7>();
-    base[2] -= calcLowering(planned);
-    for (const auto& [start, soles] : {std::pair(&before, Soles::AsPlanned), std::pair(&stance_.q, Soles::AsPlanned),
-                                       std::pair(&stance_.q, Soles::Tilted)})
-      if (const std::optional<VectorXd> q = assemble(base, planned, *start, soles)) return *q;
+    constexpr std::array<bool, 2> kBoth{true, true}, kNone{false, false};
+    constexpr double kNear = 0.06, kFar = 0.24;  // of the base, over the height of the centre of mass
+    for (const auto& [least, most] : {std::pair(kEasyTransmission, kNear), std::pair(kLeastTransmission, kFar)})
+      for (const std::array<bool, 2>& flat : {kBoth, planned.stands})
+        if (std::optional<VectorXd> q = placeNear(planned, flat, before, least, most)) return std::move(*q);
+    const VectorXd base = planned.q.head<7>();
+    if (const std::optional<VectorXd> q = assemble(base, planned.feet, kNone, stance_.q, kLeastTransmission)) return *q;
     VectorXd q = stance_.q;
     q.head<7>() = base;
     return q;
   }
 
- private:
-  // Legs as struts between the feet and points over them, as high as the base in the stance.
-  double calcLowering(const PlannedPosture& planned) const {
-    constexpr double kLowest = 0.5;  // of the height of the base in the stance
-    double lowering = 0;
-    for (int i = 0; i < 2; ++i) {
-      const Vector3d strut = getBase(planned.q).act(hips_[i]) - planned.feet[i].p;
-      const double reach = std::sqrt(std::max(0.0, lengths_[i] * lengths_[i] - strut.head<2>().squaredNorm()));
-      lowering = std::max(lowering, strut.z() - std::max(reach, kLowest * lengths_[i]));
+  // The heights at which the base can be over the feet of the stance moved back by x, around one of them.
+  // \param q  starts from here; then a posture of medium height  \param height  of the centre of mass in it
+  bool findHeights(double x, VectorXd& q, double& height, double& shortest, double& longest) {
+    constexpr double kStep = 0.015, kMost = 0.4;  // of the height of the centre of mass
+    const double step = kStep * height_;
+    std::array<SE3, 2> feet = stance_.feet;
+    const Vector3d forward = calcMiddle(feet[0], feet[1]).R.col(0);
+    for (SE3& foot : feet) foot.p -= x * forward;
+    const auto assembleAt = [&](double z, const VectorXd& start) {
+      VectorXd base = stance_.q.head<7>();
+      base[2] += z - height_;
+      return assemble(base, feet, {true, true}, start, kEasyTransmission);
+    };
+    std::optional<VectorXd> found;
+    for (int i = 0; i <= 8 && !found; i = i > 0 ? -i : 1 - i) {
+      found = assembleAt(height + i * step, q);
+      if (found) height += i * step;
     }
-    return lowering;
+    if (!found) return false;
+    q = *found;
+    VectorXd middle = q;
+    const auto travel = [&](double way) {
+      VectorXd at = q;
+      double z = height;
+      while (std::abs(z + way - height_) <= kMost * height_) {
+        std::optional<VectorXd> next = assembleAt(z + way, at);
+        if (!next) break;
+        at = std::move(*next);
+        z += way;
+      }
+      return z;
+    };
+    shortest = travel(-step);
+    longest = travel(step);
+    if (const std::optional<VectorXd> medium = assembleAt(0.5 * (shortest + longest), q)) {
+      q = *medium;
+      height = 0.5 * (shortest + longest);
+    }
+    return true;
+  }
+  double getHeight() const { return height_; }
+
+ private:
+  static constexpr double kEasyTransmission = 0.5;  // well before the dead points
+
+  // With the base as little raised or lowered as can be. \param most  of it, over the height of the centre of mass
+  std::optional<VectorXd> placeNear(const PlannedPosture& planned, const std::array<bool, 2>& flat,
+                                    const VectorXd& before, double least, double most) {
+    const double step = most / 4;
+    for (int i = 0; i <= 4; i = i > 0 ? -i : 1 - i) {
+      VectorXd base = planned.q.head<7>();
+      base[2] -= i * step * height_;
+      for (const VectorXd* start : {&before, &stance_.q})
+        if (std::optional<VectorXd> q = assemble(base, planned.feet, flat, *start, least)) return q;
+    }
+    return {};
   }
 
-  std::optional<VectorXd> assemble(const VectorXd& base, const PlannedPosture& planned, const VectorXd& start,
-                                   Soles soles) {
+  // Keeps ranges of joints, and linkages on their side of dead points.
+  // \param flat  soles that are parallel to what is planned
+  std::optional<VectorXd> assemble(const VectorXd& base, const std::array<SE3, 2>& feet,
+                                   const std::array<bool, 2>& flat, const VectorXd& start, double least) {
     AssemblyProblem problem;
     problem.q_ref = start;
     problem.q_ref.head<7>() = base;
     problem.frames.push_back({"base", 1, SE3(), getBase(base)});
     for (int i = 0; i < 2; ++i) {
       const ContactFrame& contact = model_.contacts()[stance_.contacts[i]];
-      problem.frames.push_back({contact.name, contact.body, contact.X_BF, planned.feet[i]});
-      if (soles == Soles::Tilted || contact.kind != ContactKind::Surface6D)
-        problem.frames.back().mask.tail<3>().setConstant(false);
+      problem.frames.push_back({contact.name, contact.body, contact.X_BF, feet[i]});
+      if (!flat[i] || contact.kind != ContactKind::Surface6D) problem.frames.back().mask.tail<3>().setConstant(false);
     }
     AssemblyResult result = bielle::assemble(model_, problem, options_);
-    if (result.status != AssemblyStatus::Closed || !keepsBranches(result.q)) return {};
+    if (result.status != AssemblyStatus::Closed || !keepsRanges(result.q) || !keepsBranches(result.q, least)) return {};
     return std::move(result.q);
   }
 
-  bool keepsBranches(const VectorXd& q) {
+  bool keepsBranches(const VectorXd& q, double least) {
     updatePositions(model_, ws_, q);
     const VectorXd none;
     VectorXd value(1);
     for (const std::unique_ptr<Residual>& transmission : transmissions_) {
       transmission->calc({model_, ws_, closures_, none, none}, value);
-      if (!(value[0] > kLeastTransmission && value[0] * kLeastTransmission < 1)) return false;
+      if (!(value[0] > least && value[0] * least < 1)) return false;
+    }
+    return true;
+  }
+
+  bool keepsRanges(const VectorXd& q) const {
+    for (int k = 0; k < model_.nv(); ++k) {
+      const Joint& joint = model_.joints()[model_.dofs()[k].joint];
+      if (joint.nv != 1) continue;
+      if (q[joint.idx_q] < model_.lowerLimits()[k] || q[joint.idx_q] > model_.upperLimits()[k]) return false;
     }
     return true;
   }
@@ -89,8 +141,7 @@ class FeetPlacer {
   Workspace ws_;
   ConstraintSet closures_;
   std::vector<std::unique_ptr<Residual>> transmissions_;
-  std::array<Vector3d, 2> hips_;   // in the base
-  std::array<double, 2> lengths_;  // of the struts, m
+  double height_ = 0;  // of the centre of mass over the feet
   AssemblyOptions options_;
 };
 
@@ -101,6 +152,38 @@ std::vector<VectorXd> placeFeet(const Model& model, const Stance& stance, const 
   std::vector<VectorXd> qs;
   for (const PlannedPosture& planned : postures) qs.push_back(placer.place(planned, qs.empty() ? stance.q : qs.back()));
   return qs;
+}
+
+LegReach::LegReach(const Model& model, const Stance& stance) {
+  constexpr double kSpacing = 0.1;  // over the height of the centre of mass
+  constexpr int kSide = 10;
+  FeetPlacer placer(model, stance);
+  spacing_ = kSpacing * placer.getHeight();
+  std::array<std::vector<Heights>, 2> sides;
+  for (int side = 0; side < 2; ++side) {
+    VectorXd q = stance.q;
+    double height = placer.getHeight();
+    for (int i = side; i <= kSide; ++i) {
+      Heights at;
+      if (!placer.findHeights((side == 0 ? i : -i) * spacing_, q, height, at.shortest, at.longest)) break;
+      sides[side].push_back(at);
+    }
+  }
+  behind_ = static_cast<int>(sides[1].size());
+  heights_.assign(sides[1].rbegin(), sides[1].rend());
+  heights_.insert(heights_.end(), sides[0].begin(), sides[0].end());
+}
+
+LegReach::Heights LegReach::calc(double ahead, double aside) const {
+  if (heights_.empty()) return {0, std::numeric_limits<double>::infinity()};
+  const int last = static_cast<int>(heights_.size()) - 1;
+  const double s = std::clamp(ahead / spacing_ + behind_, 0.0, static_cast<double>(last));
+  const int i = std::min(static_cast<int>(s), std::max(0, last - 1)), j = std::min(i + 1, last);
+  const auto mix = [&](double a, double b) {
+    const double length = a + (s - i) * (b - a);
+    return std::sqrt(std::max(0.0, length * length - aside * aside));
+  };
+  return {mix(heights_[i].shortest, heights_[j].shortest), mix(heights_[i].longest, heights_[j].longest)};
 }
 
 }  // namespace bielle

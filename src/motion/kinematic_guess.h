@@ -11,13 +11,32 @@ namespace bielle {
 struct PlannedPosture {
   VectorXd q;               ///< nq, with the base in its place
   std::array<SE3, 2> feet;  ///< left, right
+  std::array<bool, 2> stands{true, true};  ///< on the ground
 };
 
 /// Closed configurations with the feet of `stance` where they are planned. The base keeps its place and its rotation, but is
-/// lowered where a leg would have to be longer than in the stance. Each posture is found from the one before, or else from the
-/// stance, and leaves linkages on their side of dead points (Transmission, by kLeastTransmission). If that fails, soles
-/// may tilt; if that fails too, the joints are those of the stance.
+/// raised or lowered as little as legs need. Each posture is found from the one before, or else from the stance, within ranges of
+/// joints, and leaves linkages well before their dead points (Transmission, from 0.5 to 2), or at least on their side (by
+/// kLeastTransmission). If that fails, soles in the air may tilt, then all; if that fails too, the joints are those of the stance.
 std::vector<VectorXd> placeFeet(const Model& model, const Stance& stance, const std::vector<PlannedPosture>& postures);
 inline constexpr double kLeastTransmission = 0.15;
+
+/// How high the centre of mass can be over a foot with a flat sole while the base keeps its rotation: as far as joints have range
+/// and linkages are well before their dead points (transmissions from 0.5 to 2). Found by moving the base of a stance.
+class LegReach {
+ public:
+  struct Heights {
+    double shortest = 0, longest = 0;  ///< m
+  };
+
+  LegReach(const Model& model, const Stance& stance);
+  /// \param ahead, aside  of the foot, where it is farther forward and to the side than in the stance the centre of mass is, m
+  Heights calc(double ahead, double aside) const;
+
+ private:
+  double spacing_ = 1;  // of the table by `ahead`
+  int behind_ = 0;      // entries before that of the stance
+  std::vector<Heights> heights_;
+};
 
 }  // namespace bielle

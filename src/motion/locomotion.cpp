@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "math/so3.h"
 #include "motion/foot_constraints.h"
 #include "motion/kinematic_guess.h"
 #include "motion/locomotion_stages.h"
@@ -65,13 +67,45 @@ std::vector<Goal> makeFootholdGoals(const Scene& scene, const ContactSchedule& s
   return {goal};
 }
 
+// Raises the path of the centre of mass where a leg would have to bend too far, and lowers it where one would be too short;
+// between two legs that cannot both be helped it stays in the middle.
+void keepReach(Scene& scene) {
+  const Stance& stance = scene.stance;
+  const LegReach reach(scene.model, stance);
+  Gait& gait = scene.gait;
+  const int size = static_cast<int>(gait.nodes.size());
+  VectorXd lift(size);
+  for (int k = 0; k < size; ++k) {
+    const GaitNode& node = gait.nodes[k];
+    const std::array<SE3, 2> feet = getFeet(scene, node);
+    const Matrix3d turn = makeAxisRotation(Vector3d::UnitZ(), node.heading);
+    const Matrix3d axes = turn * calcMiddle(stance.feet[0], stance.feet[1]).R;
+    double lower = -std::numeric_limits<double>::infinity(), upper = -lower;
+    for (int i = 0; i < 2; ++i) {
+      const Vector3d apart = axes.transpose() * (node.com + turn * (stance.feet[i].p - stance.com) - feet[i].p);
+      const LegReach::Heights heights = reach.calc(apart.x(), apart.y());
+      lower = std::max(lower, feet[i].p.z() + heights.shortest);
+      upper = std::min(upper, feet[i].p.z() + heights.longest);
+    }
+    const double z = node.com.z();
+    lift[k] = (lower < upper ? std::clamp(z, lower, upper) : 0.5 * (lower + upper)) - z;
+  }
+  const double h = scene.options.timing.time_step;
+  const VectorXd smooth = smoothen(lift, countNodes(scene.options.timing.stepDuration() / 4, h));
+  for (int k = 0; k < size; ++k) gait.nodes[k].com.z() += smooth[k];
+  for (int k = 0; k + 1 < size; ++k) gait.nodes[k].com_velocity = (gait.nodes[k + 1].com - gait.nodes[k].com) / h;
+}
+
 // At rest at every node of the gait, with the feet where it has them.
 std::vector<VectorXd> makeGuesses(const Scene& scene) {
   std::vector<VectorXd> xs;
   std::vector<PlannedPosture> postures;
   for (const GaitNode& node : scene.gait.nodes) {
     xs.push_back(makeGuess(scene, node));
-    postures.push_back({xs.back().head(scene.model.nq()), getFeet(scene, node)});
+    const GaitPhase& phase = scene.gait.phases[node.phase];
+    postures.push_back({xs.back().head(scene.model.nq()),
+                        getFeet(scene, node),
+                        {phase.stands(Side::Left), phase.stands(Side::Right)}});
   }
   if (isPublished(scene)) return xs;
   const std::vector<VectorXd> qs = placeFeet(scene.model, scene.stance, postures);
@@ -140,7 +174,10 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   if (options.timing.time_step == 0) options.timing.time_step = chooseTimeStep(task, options.timing, options.swing);
   Scene scene{
       model, stance, task, options, makeStartingGait(model, stance, task, options), makeStageWeights(model, options)};
-  if (!isPublished(scene)) check(scene);
+  if (!isPublished(scene)) {
+    check(scene);
+    if (options.timing.flight == 0) keepReach(scene);
+  }
   std::vector<ContactTarget> soles;
   for (const GaitPhase& phase : scene.gait.phases)
     for (const ContactTarget& sole : makeTargets(scene, phase)) soles.push_back(sole);

@@ -1,7 +1,9 @@
 #pragma once
 /// \file Steps as an optimal control problem, shared by walk, side walk, turn, stairs, run and hop.
 ///
-/// Wishes are costs of a stage; those with zero weight are omitted. References of body and feet are those of gait.h.
+/// Wishes are costs of a stage; those with zero weight are omitted. References of body and feet are those of gait.h; but without
+/// flights the centre of mass is raised where a leg with a flat sole would have to bend too far, as on high stairs, and lowered
+/// where one would be too short.
 /// - state regularization about the standing posture at rest, the base heading as the feet do; motor torques;
 /// - centre of mass: position and velocity;
 /// - swing foot: placement along its path, and its velocity;
