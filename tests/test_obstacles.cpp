@@ -20,6 +20,7 @@ const Model& getBipetto() {
 
 StepMeasures solve(Motion& motion) {
   FddpOptions solver;
+  solver.initial_regularization = kGuessRegularization;
   solver.max_iterations = 150;
   const FddpSummary summary = Fddp(solver).solve(*motion.problem, motion.guess);
   CAPTURE(summary.message, summary.iterations);

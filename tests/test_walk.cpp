@@ -23,6 +23,7 @@ struct Solved {
 
 Solved solve(Motion motion) {
   FddpOptions options;
+  options.initial_regularization = kGuessRegularization;
   options.max_iterations = 100;
   Solved solved;
   solved.summary = Fddp(options).solve(*motion.problem, motion.guess);

@@ -30,9 +30,14 @@ class FeetPlacer {
   VectorXd place(const PlannedPosture& planned, const VectorXd& before) {
     constexpr std::array<bool, 2> kBoth{true, true}, kNone{false, false};
     constexpr double kNear = 0.06, kFar = 0.24;  // of the base, over the height of the centre of mass
-    for (const auto& [least, most] : {std::pair(kEasyTransmission, kNear), std::pair(kLeastTransmission, kFar)})
-      for (const std::array<bool, 2>& flat : {kBoth, planned.stands})
-        if (std::optional<VectorXd> q = placeNear(planned, flat, before, least, most)) return std::move(*q);
+    struct Way {
+      std::array<bool, 2> flat;
+      double least, most;
+    };
+    for (const Way& way :
+         {Way{kBoth, kEasyTransmission, kNear}, Way{kBoth, kLeastTransmission, kNear},
+          Way{planned.stands, kEasyTransmission, kNear}, Way{planned.stands, kLeastTransmission, kFar}})
+      if (std::optional<VectorXd> q = placeNear(planned, way.flat, before, way.least, way.most)) return std::move(*q);
     const VectorXd base = planned.q.head<7>();
     if (const std::optional<VectorXd> q = assemble(base, planned.feet, kNone, stance_.q, kLeastTransmission)) return *q;
     VectorXd q = stance_.q;
