@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kPeriod = 1e-3;                    // of the loop, s
 constexpr double kPushStart = 1.5, kPushEnd = 1.6;  // s
-const Vector3d kPush(-60, 0, 0);                    // N, from the front: 6 N s
+const Vector3d kPush(-70, 0, 0);                    // N, from the front: 7 N s
 
 // Height of the trunk over the ground at the end, or when it fell below 0.2 m.
 double run(const Model& model, const Policy& plan, Controller& controller) {
