@@ -8,4 +8,6 @@ bielle_test(reduced SOURCES test_reduced.cpp mechanisms.cpp LIBS bielle_motion)
 bielle_test(path_constraints SOURCES test_path_constraints.cpp mechanisms.cpp LIBS bielle_motion)
 bielle_test(timings SOURCES test_timings.cpp mechanisms.cpp LIBS bielle_motion)
 target_link_options(test_timings PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
+# Every duration is optimized again and again: many minutes under sanitizers.
+set_tests_properties(timings PROPERTIES LABELS system)
 bielle_test(energy SOURCES test_energy.cpp mechanisms.cpp LIBS bielle_motion)

@@ -9,6 +9,8 @@ if(BIELLE_BUILD_SIMULATION)
   target_link_options(test_bielle_world PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
   bielle_test(predictive_controller SOURCES test_predictive_controller.cpp LIBS bielle_simulation)
   target_link_options(test_predictive_controller PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
+  # Whole walks, step by step: many minutes under sanitizers.
+  set_tests_properties(predictive_controller PROPERTIES LABELS system)
   bielle_test(simbody_world SOURCES test_simbody_world.cpp world_trials.cpp LIBS bielle_simulation)
   set_tests_properties(simbody_world PROPERTIES LABELS system)
   if(TARGET bielle_mujoco)
