@@ -11,5 +11,5 @@ target_link_options(test_timings PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 # Every duration is optimized again and again: many minutes under sanitizers.
 set_tests_properties(timings PROPERTIES LABELS system)
 bielle_test(energy SOURCES test_energy.cpp mechanisms.cpp LIBS bielle_motion)
-# So many short steps.
+# Differences over every mechanism and discretization: many minutes under sanitizers.
 set_tests_properties(energy PROPERTIES LABELS system)
