@@ -13,7 +13,7 @@ bielle_test(limits SOURCES test_limits.cpp robot_directory.cpp LIBS bielle_motio
 bielle_test(dead_points SOURCES test_dead_points.cpp LIBS bielle_motion bielle_robots)
 bielle_test(formulations SOURCES test_formulations.cpp LIBS bielle_motion)
 # Whole motions: minutes under sanitizers.
-set_tests_properties(walk run stairs obstacles goals jump limits sequence timed_motions PROPERTIES LABELS system)
+set_tests_properties(walk kinematic_guess run stairs obstacles goals jump limits sequence timed_motions PROPERTIES LABELS system)
 bielle_test(hostile_numbers SOURCES test_hostile_numbers.cpp mechanisms.cpp LIBS bielle_io bielle_robots)
 set_tests_properties(hostile_numbers PROPERTIES LABELS system)
 bielle_test(paper_walk SOURCES test_paper_walk.cpp LIBS bielle_motion nlohmann_json::nlohmann_json)
