@@ -3,6 +3,9 @@ set(pages tutorial modelling signs new_robot motions objectives linkages checks 
 if(BIELLE_BUILD_EXAMPLES)
   list(APPEND pages new_motion)
 endif()
+if(TARGET bielle-workers)
+  list(APPEND pages workers)
+endif()
 if(BIELLE_BUILD_VALIDATION)
   add_test(NAME documents_readme COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_documents.py
     ${PROJECT_BINARY_DIR}/bin ${PROJECT_SOURCE_DIR} README.md)

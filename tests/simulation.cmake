@@ -27,4 +27,8 @@ if(BIELLE_BUILD_SIMULATION)
   target_compile_definitions(test_campaign PRIVATE BIELLE_COMMAND="$<TARGET_FILE:bielle_command>")
   add_dependencies(test_campaign bielle_command bielle-simulate)
   set_tests_properties(campaign PROPERTIES LABELS system)
+  # Without Work Queue it says that it is skipped. Workers mostly nap.
+  add_test(NAME workers COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_workers.py
+    $<TARGET_FILE:bielle_command>)
+  set_tests_properties(workers PROPERTIES LABELS system SKIP_RETURN_CODE 77)
 endif()

@@ -16,15 +16,17 @@ ROOMS = {
     "io": ["transmission"],
     "report": ["io"],
     "design": ["io", "robots"],
-    "study": ["design"],
+    "tasks": ["io"],
+    "study": ["design", "tasks"],
     "bench": ["io", "robots"],
     "cli": ["report", "study", "bench"],
     "control": ["motion"],
     "engines": ["io"],
     "simulation": ["control", "engines", "report", "robots"],
     "validation": ["engines"],
+    "workers": [],
 }
-TOP = ("engines", "simulation", "validation")  # rooms outside src
+TOP = ("engines", "simulation", "validation", "workers")  # rooms outside src
 # Prefixes of third-party headers, and the files or folders that may include them.
 OTHERS = {
     "yaml-cpp/": ["src/model/yaml_entry.cpp"],
@@ -33,7 +35,8 @@ OTHERS = {
     "zip.h": ["src/io/npz.cpp"],
     "nlopt": ["src/transmission/slsqp.cpp", "src/design/nlopt_search.h"],
     "CLI/": ["src/cli/", "simulation/", "validation/"],
-    "nlohmann/": ["src/", "simulation/", "validation/", "tests/"],
+    "nlohmann/": ["src/", "simulation/", "validation/", "workers/", "tests/"],
+    "cctools/": ["workers/"],
     "Simbody": ["engines/", "simulation/", "validation/"],
     "SimTK": ["engines/", "simulation/", "validation/"],
     "simbody/": ["engines/", "simulation/", "validation/"],
@@ -43,8 +46,8 @@ OTHERS = {
 PUBLIC = "include/bielle/"
 OUTSIDE = ("examples/", "python/", "tests/consumer/")  # they see what users see
 GENERATED = ("assets.inc",)
-FOLDERS = ("include/", "src/", "engines/", "simulation/", "validation/", "tests/", "examples/", "benchmarks/",
-           "python/")
+FOLDERS = ("include/", "src/", "engines/", "simulation/", "validation/", "workers/", "tests/", "examples/",
+           "benchmarks/", "python/")
 
 
 def collect(room):
@@ -107,6 +110,8 @@ def check_file(path, text, files):
             problems.append(f"{path}:{number}: {line.strip()}: {problem}")
     if path.startswith("src/") and path.endswith("CMakeLists.txt") and "simbody" in text.lower():
         problems.append(f"{path}: only validation links Simbody")
+    if path.endswith("CMakeLists.txt") and not path.startswith("workers/") and "work_queue" in text.lower():
+        problems.append(f"{path}: only workers links Work Queue")
     return problems
 
 
@@ -147,6 +152,9 @@ def check_planted():
             ("src/io/result.cpp", '#include "validation/check.h"', True),
             ("src/io/result.cpp", '#include "check.h"', True),
             ("src/hall/result.cpp", '#include "io/plot.h"', True),
+            ("workers/main.cpp", "#include <cctools/work_queue.h>", False),
+            ("src/tasks/worker_tasks.cpp", "#include <cctools/work_queue.h>", True),
+            ("simulation/CMakeLists.txt", "find_library(WORK_QUEUE work_queue)", True),
             ("src/io/CMakeLists.txt", "find_package(Simbody)", True)]:
         assert bool(check_file(path, text, files)) == is_wrong, (path, text)
     assert check_document("docs/speed.md", "see `math/so4.h`", files)

@@ -1,12 +1,11 @@
 // bielle campaign: motions carried out again and again, under many conditions.
-#include <algorithm>
 #include <filesystem>
 #include <iostream>
-#include <thread>
 
 #include "bielle/model/error.h"
 #include "cli/case_run.h"
 #include "cli/commands.h"
+#include "cli/task_options.h"
 #include "study/campaign_report.h"
 
 namespace bielle::cli {
@@ -16,7 +15,7 @@ using namespace bielle::study;
 
 struct CampaignArguments {
   std::string spec, directory;
-  int jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  TaskArguments tasks;
 };
 
 int run(const CampaignArguments& arguments) {
@@ -27,9 +26,11 @@ int run(const CampaignArguments& arguments) {
   if (options.simulate.find('/') == std::string::npos)
     throw ModelError("", options.simulate, "it is not beside this program",
                      "build Bielle with -DBIELLE_BUILD_SIMULATION=ON (it needs Simbody)");
-  options.jobs = arguments.jobs;
+  auto engine = makeTaskEngine(arguments.tasks);
+  options.engine = engine.get();
   options.progress = [](const std::string& line) { std::cerr << line << std::endl; };
   const CampaignResults results = runCampaign(spec, arguments.directory, options);
+  engine.reset();  // signals have their usual effect again
   if (results.interrupted) {
     std::cerr << "bielle: error: interrupted; the same command goes on from here" << std::endl;
     return kFailed;
@@ -50,9 +51,7 @@ void addCampaign(CLI::App& app, Action& action) {
       .add_option("-o,--output", arguments->directory,
                   "directory for runs.csv, campaign.md, summary.json, map.svg and the log runs.jsonl; made if need be")
       ->required();
-  command.add_option("--jobs", arguments->jobs, "runs at a time, one process each; results do not depend on it")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
+  addTaskOptions(command, "runs at a time, one process each; results do not depend on it", arguments->tasks);
   command.footer(
       "SPEC: every combination of the values is one run of `bielle simulate`.\n"
       "  motions:\n"

@@ -18,9 +18,11 @@ int runAndWrite(const CaseRun& run, const std::function<void(const CaseOutcomes&
   RunOptions options;
   options.program = std::filesystem::read_symlink("/proc/self/exe");
   options.identity = makeIdentity(options.program, run.robots);
-  options.jobs = run.jobs;
+  auto engine = makeTaskEngine(run.tasks);
+  options.engine = engine.get();
   options.progress = [](const std::string& line) { std::cout << line << std::endl; };
   const RunOutcome outcome = runCases(run.directory, cases, options);
+  engine.reset();  // signals have their usual effect again
   if (outcome.interrupted) {
     std::cerr << "bielle: error: interrupted; the same command goes on from here" << std::endl;
     return kFailed;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/task_options.h"
 #include "study/cases.h"
 
 namespace bielle::cli {
@@ -15,7 +16,7 @@ struct CaseRun {
   std::string directory;            // of the directories of the cases
   std::vector<study::Case> cases;   // those of the same name are run once
   std::vector<std::string> robots;  // directories of their robots
-  int jobs = 1;
+  TaskArguments tasks;
 };
 
 // Runs the cases with a line for each, then `write`, which makes the requested output from them. Returns the exit

@@ -1,7 +1,4 @@
 // bielle compare: robots on the same motions, side by side.
-#include <algorithm>
-#include <thread>
-
 #include "bielle/io/result.h"
 #include "cli/case_run.h"
 #include "cli/commands.h"
@@ -14,7 +11,7 @@ using namespace bielle::study;
 
 struct CompareArguments {
   std::string spec, directory;
-  int jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  TaskArguments tasks;
 };
 
 // A motion that is also one of the speeds makes the same case.
@@ -48,7 +45,7 @@ int run(const CompareArguments& arguments) {
   const ArchitectureSpec spec = readArchitectureSpec(arguments.spec);
   makeOutputDirectory(arguments.directory);
   const std::vector<Contender> contenders = makeContenders(spec, arguments.directory + "/robots");
-  CaseRun cases{arguments.directory + "/cases", makeCases(spec, contenders), {}, arguments.jobs};
+  CaseRun cases{arguments.directory + "/cases", makeCases(spec, contenders), {}, arguments.tasks};
   for (const Contender& contender : contenders) cases.robots.push_back(contender.directory);
   return runAndWrite(cases, [&](const CaseOutcomes& outcomes) {
     std::vector<std::string> notes;
@@ -69,9 +66,7 @@ void addCompare(CLI::App& app, Action& action) {
       .add_option("-o,--output", arguments->directory,
                   "directory for compare.md, compare.csv, figures, robots/ and cases/; made if need be")
       ->required();
-  command.add_option("--jobs", arguments->jobs, "cases at a time, one process each")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
+  addTaskOptions(command, "cases at a time, one process each", arguments->tasks);
   command.footer(
       "SPEC:\n"
       "  robots:                         (a robot, or a generator with its parameters, by the name it is to have)\n"

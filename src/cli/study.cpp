@@ -1,8 +1,6 @@
 // bielle study: the paper's comparison, case by case.
-#include <algorithm>
 #include <iostream>
 #include <sstream>
-#include <thread>
 
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
@@ -18,7 +16,7 @@ using namespace bielle::study;
 struct StudyArguments {
   std::string name, directory = "study", robot = "bipetto";
   std::vector<double> values;
-  int jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  TaskArguments tasks;
 };
 
 std::vector<Study> chooseStudies(const StudyArguments& arguments) {
@@ -59,7 +57,7 @@ int run(const StudyArguments& arguments) {
   const std::vector<Study> studies = chooseStudies(arguments);
   const ComparedRobot robot = loadComparedRobot(arguments.robot);
   makeOutputDirectory(arguments.directory);
-  CaseRun cases{arguments.directory + "/cases", {}, {robot.robot.directory}, arguments.jobs};
+  CaseRun cases{arguments.directory + "/cases", {}, {robot.robot.directory}, arguments.tasks};
   for (const Study& study : studies)
     for (const Case& one : makeCases(study, arguments.robot)) cases.cases.push_back(one);
   return runAndWrite(cases, [&](const CaseOutcomes& outcomes) {
@@ -97,9 +95,7 @@ void addStudy(CLI::App& app, Action& action) {
       ->check(CLI::IsMember(names));
   command.add_option("-o,--output", arguments->directory, "directory for NAME.csv, NAME.md, figures and cases/")
       ->capture_default_str();
-  command.add_option("--jobs", arguments->jobs, "cases at a time, one process each")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
+  addTaskOptions(command, "cases at a time, one process each", arguments->tasks);
   command
       .add_option("--robot", arguments->robot,
                   "name, directory or .urdf file of a robot with an approximate serial model")

@@ -134,7 +134,7 @@ Case makeArchitectureCase(const Contender& contender, const MotionSpec& motion) 
     solve.push_back(option + "=" + formatValue(value));
   }
   solve.insert(solve.end(), {"-o", std::string("@") + kMotion});
-  return {contender.name + "-" + makeName(motion), {solve}};
+  return {contender.name + "-" + makeName(motion), {solve}, contender.directory};
 }
 
 }  // namespace bielle::study

@@ -14,8 +14,9 @@
 #include "io/line_log.h"
 #include "model/text_file.h"
 #include "study/campaign_command.h"
+#include "study/campaign_result.h"
 #include "study/cases.h"
-#include "study/child.h"
+#include "study/shipping.h"
 
 namespace fs = std::filesystem;
 
@@ -24,11 +25,6 @@ namespace {
 
 constexpr size_t kMostCells = 1'000'000;
 constexpr const char* kMotion = "motion";
-// Of the summary of a run; times of the processor, which differ from run to run, are not among them.
-constexpr const char* kFields[] = {"outcome",        "outcome_message",   "duration",     "distance",
-                                   "mean_speed",     "largest_deviation", "largest_slip", "largest_gap",
-                                   "energy_balance", "saturated_share"};
-
 std::string join(const std::vector<std::string>& words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
@@ -78,7 +74,11 @@ class CampaignRunner {
         cells_(listCells(spec)),
         log_(directory + "/runs.jsonl", Json{{"campaign", makeIdentity({fs::path(options.simulate)})}}.dump(),
              "the log is of another version of the program") {
-    for (const std::string& motion : motions) identities_.push_back(identifyMotion(motion));
+    for (size_t i = 0; i < motions.size(); ++i) {
+      identities_.push_back(identifyMotion(motions[i]));
+      shipped_.push_back(
+          shipMotion(motions[i], directory + "/running/motion" + std::to_string(i), options.engine->isRemote()));
+    }
     for (const std::string& line : log_.getLines()) {
       try {
         const Json json = parseJson(line);
@@ -90,7 +90,7 @@ class CampaignRunner {
     }
   }
   ~CampaignRunner() {
-    for (const Running& entry : running_) killChild(entry.pid);
+    if (!running_.empty()) options_.engine->stop();
     std::error_code ignored;
     fs::remove_all(directory_ + "/running", ignored);
   }
@@ -104,20 +104,19 @@ class CampaignRunner {
       waiting.push_back(i);
       done_ += follow(i).done.size();
     }
-    SignalWatch watch;
     while (true) {
-      while (!waiting.empty() && static_cast<int>(running_.size()) < options_.jobs) {
+      while (!waiting.empty() && options_.engine->hasRoom()) {
         const size_t cell = waiting.front();
         waiting.pop_front();
         begin(cell);
       }
       if (running_.empty()) break;
-      if (watch.wait()) {
+      const std::optional<tasks::TaskEnd> end = options_.engine->wait();
+      if (!end) {
         out.interrupted = true;
         return out;
       }
-      for (const ChildEnd& end : SignalWatch::collect())
-        if (const auto cell = finish(end)) waiting.push_front(*cell);
+      if (const auto cell = finish(*end)) waiting.push_front(*cell);
     }
     out.complete = complete_;
     collect(out);
@@ -126,10 +125,11 @@ class CampaignRunner {
 
  private:
   struct Running {
-    pid_t pid = 0;
     size_t cell = 0;
     int slot = 0;  // of its directory
+    int attempt = 1;
     std::string key;
+    tasks::Task task;
   };
 
   std::string makeImpulse(int multiple) const { return spec_.search ? formatImpulse(*spec_.search, multiple) : ""; }
@@ -168,41 +168,53 @@ class CampaignRunner {
   void begin(size_t cell) {
     const int multiple = follow(cell).next;
     if (multiple == 0) return;
-    int slot = 0;
-    while (std::any_of(running_.begin(), running_.end(), [slot](const Running& entry) { return entry.slot == slot; }))
-      ++slot;
-    std::error_code ignored;
-    fs::remove_all(getPlace(slot), ignored);
-    makeOutputDirectory(getPlace(slot));
-    std::vector<std::string> command = {options_.simulate, motions_[cells_[cell][0]], "-o", getPlace(slot),
-                                        "--summary-only"};
+    Running entry;
+    entry.cell = cell;
+    entry.key = makeKey(cell, multiple);
+    if (free_slots_.empty()) free_slots_.push_back(static_cast<int>(running_.size()));
+    entry.slot = free_slots_.back();
+    free_slots_.pop_back();
+    entry.task = shipped_[cells_[cell][0]];
+    entry.task.programs = {options_.simulate};
+    entry.task.arguments = {"@motion", "-o", "@out", "--summary-only"};
     const std::vector<std::string> arguments = commands_.make(cells_[cell], makeImpulse(multiple));
-    command.insert(command.end(), arguments.begin(), arguments.end());
-    running_.push_back({startChild(command, getPlace(slot) + "/log"), cell, slot, makeKey(cell, multiple)});
+    entry.task.arguments.insert(entry.task.arguments.end(), arguments.begin(), arguments.end());
+    entry.task.outputs = {"out"};
+    entry.task.directory = getPlace(entry.slot);
+    if (options_.engine->isRemote()) shipFiles(entry.task);
+    submit(std::move(entry));
   }
 
-  Json readRun(const Running& entry, int status) const {
-    if (status >= 2) return {{"outcome", kRefused}, {"outcome_message", findError(getPlace(entry.slot) + "/log")}};
-    Json result = Json::object();
-    readJsonFile(getPlace(entry.slot) + "/summary.json", "run the campaign again", [&result](const Json& summary) {
-      for (const char* field : kFields) result[field] = summary.at(field);
-    });
-    return result;
+  void submit(Running entry) {
+    std::error_code ignored;
+    fs::remove_all(entry.task.directory, ignored);
+    makeOutputDirectory(entry.task.directory);
+    const int id = options_.engine->submit(entry.task);
+    running_.emplace(id, std::move(entry));
   }
 
-  // The cell of a child that has ended, if more may have to be done for it.
-  std::optional<size_t> finish(const ChildEnd& end) {
-    const auto found =
-        std::find_if(running_.begin(), running_.end(), [&](const Running& entry) { return entry.pid == end.pid; });
+  // The cell of a task that has ended, if more may have to be done for it.
+  std::optional<size_t> finish(const tasks::TaskEnd& end) {
+    const auto found = running_.find(end.id);
     if (found == running_.end()) return std::nullopt;
-    const Running entry = *found;
+    Running entry = std::move(found->second);
     running_.erase(found);
-    if (end.status >= 127) {
-      complete_ = false;
-      report(entry.key + ": ended by " + (end.status == 127 ? "a failure to start" : "a signal"));
+    Json result;
+    try {
+      result = readCampaignResult(entry.task, end.status);
+    } catch (const std::exception& error) {
+      const bool again = entry.attempt < options_.engine->attempts();
+      report(entry.key + ": " + error.what() + (again ? "; once more" : ""), again);
+      if (again) {
+        ++entry.attempt;
+        submit(std::move(entry));
+      } else {
+        free_slots_.push_back(entry.slot);
+        complete_ = false;
+      }
       return std::nullopt;
     }
-    const Json result = readRun(entry, end.status);
+    free_slots_.push_back(entry.slot);
     if (result.at("outcome") != kRefused)
       log_.append(Json{{"motion", getIdentity(entry.cell)}, {"run", entry.key}, {"result", result}}.dump());
     results_[{getIdentity(entry.cell), entry.key}] = result;
@@ -210,8 +222,8 @@ class CampaignRunner {
     return entry.cell;
   }
 
-  void report(const std::string& text) {
-    ++done_;
+  void report(const std::string& text, bool again = false) {
+    if (!again) ++done_;
     if (options_.progress)
       options_.progress("[" + std::to_string(done_) + (spec_.search ? "" : "/" + std::to_string(cells_.size())) + "] " +
                         text);
@@ -241,7 +253,9 @@ class CampaignRunner {
   LineLog log_;
   std::vector<std::string> identities_;                          // of the motions
   std::map<std::pair<std::string, std::string>, Json> results_;  // by identity of the motion, and key
-  std::vector<Running> running_;
+  std::vector<tasks::Task> shipped_;                             // the part of a task that depends on the motion alone
+  std::map<int, Running> running_;                               // by the number of the task
+  std::vector<int> free_slots_;
   size_t done_ = 0;
   bool complete_ = true;
 };
@@ -253,16 +267,16 @@ std::vector<std::string> solveMotions(const CampaignSpec& spec, const std::strin
   std::set<std::string> robots;  // each once: another motion of one of them changes nothing for the others
   for (const CampaignMotion& motion : spec.motions) {
     if (!motion.directory.empty()) continue;
-    Case one{motion.name, {motion.solve}};
+    Case one{motion.name, {motion.solve}, motion.robot};
     one.steps[0].insert(one.steps[0].end(), {"-o", std::string("@") + kMotion, "--quiet", "--no-report", "--no-check"});
     cases.push_back(one);
     robots.insert(loadRobot(motion.robot).directory);
   }
   RunOutcome outcome;
   if (!cases.empty())
-    outcome = runCases(
-        directory + "/motions", cases,
-        {options.bielle, makeIdentity(options.bielle, {robots.begin(), robots.end()}), options.jobs, options.progress});
+    outcome = runCases(directory + "/motions", cases,
+                       {options.bielle, makeIdentity(options.bielle, {robots.begin(), robots.end()}), options.engine,
+                        options.progress});
   if (outcome.interrupted) return {};
   std::vector<std::string> directories;
   size_t next = 0;

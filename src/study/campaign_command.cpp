@@ -8,8 +8,8 @@
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "study/cases.h"
-#include "study/child.h"
 #include "study/report.h"
+#include "tasks/child.h"
 
 namespace bielle::study {
 namespace {
@@ -41,7 +41,7 @@ std::string findComplaint(const std::string& simulate, const std::vector<std::st
   std::vector<std::string> command = {simulate, "motion", "-o", "none", "--dry-run"};
   command.insert(command.end(), arguments.begin(), arguments.end());
   int state = 0;
-  waitpid(startChild(command, log), &state, 0);
+  waitpid(tasks::startChild(command, log), &state, 0);
   if (WIFEXITED(state) && WEXITSTATUS(state) == 0) return "";
   std::string complaint = findError(log);
   if (complaint.empty()) {

@@ -5,12 +5,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <optional>
 
 #include "bielle/io/result.h"
@@ -19,14 +19,12 @@
 #include "io/json_text.h"
 #include "io/text_file.h"
 #include "model/text_file.h"
-#include "study/child.h"
+#include "study/case_task.h"
 
 namespace fs = std::filesystem;
 
 namespace bielle::study {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 // Locks the directory for the lifetime of this process.
 class DirectoryLock {
@@ -85,6 +83,7 @@ std::string describeOutcome(const CaseOutcome& outcome) {
   std::snprintf(time, sizeof time, " (%.1f s)", seconds);
   if (last.status >= 128) return "ended by signal " + std::to_string(last.status - 128) + time;
   if (last.status == 127) return std::string("the command could not be started") + time;
+  if (last.status == kNoResult) return "no result: " + last.error + time;
   if (last.status >= 2) return "refused: " + last.error + time;
   for (const StepOutcome& step : outcome.steps)
     if (step.status != 0) return std::string("done, with a failure") + time;
@@ -96,7 +95,7 @@ class CaseRunner {
   CaseRunner(const std::string& directory, const std::vector<Case>& cases, const RunOptions& options)
       : directory_(directory), cases_(cases), options_(options) {}
   ~CaseRunner() {
-    for (const Running& entry : running_) killChild(entry.pid);
+    if (!running_.empty()) options_.engine->stop();
   }
   CaseRunner(const CaseRunner&) = delete;
   CaseRunner& operator=(const CaseRunner&) = delete;
@@ -104,30 +103,27 @@ class CaseRunner {
   RunOutcome run() {
     outcome_.cases.resize(cases_.size());
     size_t next = 0;
-    SignalWatch watch;
     while (true) {
-      while (next < cases_.size() && static_cast<int>(running_.size()) < options_.jobs) begin(next++);
+      while (next < cases_.size() && options_.engine->hasRoom()) begin(next++);
       if (running_.empty()) return outcome_;
-      if (watch.wait()) {
+      const std::optional<tasks::TaskEnd> end = options_.engine->wait();
+      if (!end) {
         outcome_.interrupted = true;
         return outcome_;
       }
-      for (const ChildEnd& end : SignalWatch::collect()) advance(end);
+      advance(*end);
     }
   }
 
  private:
   struct Running {
     size_t index = 0;
-    pid_t pid = 0;
-    Clock::time_point start;
+    int attempt = 1;
+    tasks::Task task;
   };
 
   std::string getPath(size_t index, const std::string& file = "") const {
     return directory_ + "/" + cases_[index].name + (file.empty() ? "" : "/" + file);
-  }
-  std::string getLog(size_t index) const {
-    return getPath(index, "step" + std::to_string(outcome_.cases[index].steps.size() + 1) + ".log");
   }
 
   void begin(size_t index) {
@@ -146,44 +142,61 @@ class CaseRunner {
   }
 
   void startStep(size_t index) {
-    std::vector<std::string> arguments = {options_.program};
-    for (const std::string& argument : cases_[index].steps[outcome_.cases[index].steps.size()])
-      arguments.push_back(argument.rfind("@", 0) == 0 ? getPath(index, argument.substr(1)) : argument);
-    const pid_t pid = startChild(arguments, getLog(index));
-    running_.push_back({index, pid, Clock::now()});
+    const int step = static_cast<int>(outcome_.cases[index].steps.size());
+    submit(
+        {index, 1, makeStepTask(cases_[index], step, getPath(index), options_.program, options_.engine->isRemote())});
   }
 
-  void advance(const ChildEnd& end) {
-    const auto found =
-        std::find_if(running_.begin(), running_.end(), [&](const Running& entry) { return entry.pid == end.pid; });
+  void submit(Running entry) {
+    const int id = options_.engine->submit(entry.task);
+    running_.emplace(id, std::move(entry));
+  }
+
+  void advance(const tasks::TaskEnd& end) {
+    const auto found = running_.find(end.id);
     if (found == running_.end()) return;
-    const Running entry = *found;
+    Running entry = std::move(found->second);
     running_.erase(found);
+    int status = end.status;
+    std::string error = findError(tasks::getOutput(entry.task, entry.task.log));
+    if (options_.engine->isRemote())
+      if (const std::string problem = findProblem(entry.task, status); !problem.empty()) {
+        if (entry.attempt < options_.engine->attempts()) {
+          report(cases_[entry.index].name + ": " + problem + "; once more");
+          ++entry.attempt;
+          submit(std::move(entry));
+          return;
+        }
+        if (status < 127) status = kNoResult;
+        error = problem;
+      }
     CaseOutcome& outcome = outcome_.cases[entry.index];
-    const double seconds = std::chrono::duration<double>(Clock::now() - entry.start).count();
-    const std::string error = findError(getLog(entry.index));
-    outcome.steps.push_back({end.status, seconds, error});
-    if (end.status < 2 && outcome.steps.size() < cases_[entry.index].steps.size()) {
+    outcome.steps.push_back({status, end.seconds, error});
+    if (status < 2 && outcome.steps.size() < cases_[entry.index].steps.size()) {
       startStep(entry.index);
       return;
     }
-    outcome.complete = end.status < 127;
-    if (outcome.complete)
+    outcome.complete = status < kNoResult;
+    if (outcome.complete) {
+      if (options_.engine->isRemote()) bringHome(cases_[entry.index], getPath(entry.index), options_.program);
       writeOutcome(getPath(entry.index, "case.json"), describeRequest(cases_[entry.index], options_), outcome);
+    }
     finish(entry.index);
   }
 
   void finish(size_t index) {
     ++finished_;
+    report(cases_[index].name + ": " + describeOutcome(outcome_.cases[index]));
+  }
+  void report(const std::string& text) const {
     if (options_.progress)
-      options_.progress("[" + std::to_string(finished_) + "/" + std::to_string(cases_.size()) + "] " +
-                        cases_[index].name + ": " + describeOutcome(outcome_.cases[index]));
+      options_.progress("[" + std::to_string(finished_) + "/" + std::to_string(cases_.size()) + "] " + text);
   }
 
   const std::string directory_;
   const std::vector<Case>& cases_;
   const RunOptions& options_;
-  std::vector<Running> running_;
+  std::map<int, Running> running_;  // by the number of the task
   size_t finished_ = 0;
   RunOutcome outcome_;
 };
@@ -197,6 +210,14 @@ std::string findError(const std::string& log) {
   while (std::getline(file, line))
     if (line.rfind(prefix, 0) == 0) error = line.substr(prefix.size());
   return error;
+}
+
+std::string describeLog(const std::string& log) {
+  std::ifstream file(log);
+  std::string line, last;
+  while (std::getline(file, line))
+    if (!line.empty()) last = line;
+  return last.empty() ? "" : ": " + last.substr(0, 200);
 }
 
 std::string makeIdentity(const std::string& program, const std::vector<std::string>& robots) {

@@ -1,6 +1,6 @@
 #pragma once
-// Cases, the units of a study. A case is a few consecutive runs of the command `bielle`, whose results go into a
-// separate directory. A completed case is not repeated.
+// Cases, the units of a study. A case is a few consecutive runs of the command `bielle`, each a task, whose results go into
+// a separate directory. A completed case is not repeated.
 //
 // The directory of a case holds the results, the output of each run (step1.log, ...), and case.json: the request and
 // its outcome. case.json is written last, so that a case without one was interrupted; it is repeated from the
@@ -10,13 +10,18 @@
 #include <string>
 #include <vector>
 
+#include "tasks/engine.h"
+
 namespace bielle::study {
 
 struct Case {
   std::string name;  // of its directory; the same name means the same case
-  // Arguments of `bielle`, run by run. "@NAME" is the path of NAME in the directory of the case.
+  // Arguments of `bielle`, run by run. "@NAME" is the path of NAME in the directory of the case; behind "-o" it is written.
   std::vector<std::vector<std::string>> steps;
+  std::string robot;  // the argument that names it, which goes with the case
 };
+
+constexpr int kNoResult = 126;
 
 // Outcome of a run of the command: 0 done, 1 not converged or failed (with results), 2 rejected.
 struct StepOutcome {
@@ -27,14 +32,15 @@ struct StepOutcome {
 
 struct CaseOutcome {
   std::vector<StepOutcome> steps;  // up to the first that was rejected or crashed
-  bool complete = false;           // else a run was ended by a signal (status 128 + signal), and nothing is kept
-  bool kept = false;               // from an earlier run
+  bool complete = false;  // else a run was ended by a signal (status 128 + signal), or a worker returned what is no
+                          // result (kNoResult), and nothing is kept
+  bool kept = false;      // from an earlier run
 };
 
 struct RunOptions {
-  std::string program;   // path of the command
+  std::string program;   // path of the command; its companions are beside it
   std::string identity;  // other dependencies of the results: a case with another identity is repeated
-  int jobs = 1;          // processes at a time
+  tasks::TaskEngine* engine = nullptr;
   std::function<void(const std::string&)> progress;
 };
 
@@ -50,6 +56,8 @@ std::string makeIdentity(const std::vector<std::filesystem::path>& files);
 
 // The last error message in the output of a run of the command, without its prefix; empty if there is none.
 std::string findError(const std::string& log);
+// ": " and its last line, for a program that broke down; empty if it printed nothing.
+std::string describeLog(const std::string& log);
 
 // Runs the cases in directory/NAME. \throws ModelError when directories or files cannot be made, or another study uses
 // the directory

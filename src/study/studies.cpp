@@ -55,7 +55,7 @@ const std::vector<Study>& getStudies() {
 }
 
 Case makeClosedCase(const Study& study, double value, const std::string& robot) {
-  return {makeName(study, value, "closed"), {makeSolve(study, value, robot, kClosed)}};
+  return {makeName(study, value, "closed"), {makeSolve(study, value, robot, kClosed)}, robot};
 }
 
 Case makeSerialCase(const Study& study, double value, const std::string& robot) {
@@ -64,11 +64,12 @@ Case makeSerialCase(const Study& study, double value, const std::string& robot) 
   return {makeName(study, value, "serial"),
           {solve,
            {"lift", std::string("@") + kSerial, "-o", std::string("@") + kLifted},
-           {"lift", std::string("@") + kSerial, "-o", std::string("@") + kStepped, "--method", "nlopt"}}};
+           {"lift", std::string("@") + kSerial, "-o", std::string("@") + kStepped, "--method", "nlopt"}},
+          robot};
 }
 
 Case makeRatioCase(const std::string& robot) {
-  return {"ratio", {{"ratio", robot, "--joint", ComparedJoints().knees[0], "-o", std::string("@") + kRatio}}};
+  return {"ratio", {{"ratio", robot, "--joint", ComparedJoints().knees[0], "-o", std::string("@") + kRatio}}, robot};
 }
 
 std::vector<Case> makeCases(const Study& study, const std::string& robot) {

@@ -6,12 +6,21 @@
 #include <string>
 #include <vector>
 
-namespace bielle::study {
+namespace bielle::tasks {
 
 // Starts a program (arguments[0] is its path) with both outputs in the file `log` and no input. It is in a separate
 // process group, so that Ctrl-C does not reach it, and dies with its parent, however that ends.
 // \throws ModelError when there can be no new process
 pid_t startChild(const std::vector<std::string>& arguments, const std::string& log);
+
+// A program that is spoken with: what is written to `in` it reads, what it prints is read from `out`; its errors go where
+// ours go.
+struct PipedChild {
+  pid_t pid = 0;
+  int in = -1, out = -1;
+};
+// Otherwise as startChild.
+PipedChild startPipedChild(const std::vector<std::string>& arguments);
 
 struct ChildEnd {
   pid_t pid = 0;
@@ -28,6 +37,8 @@ class SignalWatch {
 
   // Sleeps until one of the signals comes; true if the user asks for the end.
   bool wait();
+  // Sleeps until the file can be read or has been closed; true if the user asks for the end before.
+  bool waitForFile(int file);
   // The children that have ended since the last call, without waiting.
   static std::vector<ChildEnd> collect();
 
@@ -39,4 +50,4 @@ class SignalWatch {
 // Ends a child at once and waits until it is gone.
 void killChild(pid_t pid);
 
-}  // namespace bielle::study
+}  // namespace bielle::tasks

@@ -1,0 +1,118 @@
+#include "tasks/child.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/signalfd.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "bielle/model/error.h"
+
+namespace bielle::tasks {
+namespace {
+
+// From the fork to the new program: calls that are safe there only.
+[[noreturn]] void becomeProgram(char** argv, pid_t parent, int in, int out, int error) {
+  setpgid(0, 0);
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) _exit(127);  // it ended before the call
+  sigset_t none;
+  sigemptyset(&none);
+  sigprocmask(SIG_SETMASK, &none, nullptr);
+  if (in < 0 || out < 0) _exit(127);
+  dup2(in, STDIN_FILENO);
+  dup2(out, STDOUT_FILENO);
+  dup2(error, STDERR_FILENO);
+  execv(argv[0], argv);
+  _exit(127);
+}
+
+template <typename Become>
+pid_t startProgram(const std::vector<std::string>& arguments, const Become& become) {
+  std::vector<std::string> copy = arguments;
+  std::vector<char*> argv;
+  for (std::string& argument : copy) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  const pid_t parent = getpid(), child = fork();
+  if (child == 0) become(argv.data(), parent);
+  if (child < 0) throw ModelError("", "new process", std::strerror(errno), "run fewer jobs");
+  return child;
+}
+
+}  // namespace
+
+pid_t startChild(const std::vector<std::string>& arguments, const std::string& log) {
+  return startProgram(arguments, [&log](char** argv, pid_t parent) {
+    const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    becomeProgram(argv, parent, open("/dev/null", O_RDONLY), out, out);
+  });
+}
+
+PipedChild startPipedChild(const std::vector<std::string>& arguments) {
+  int in[2], out[2];
+  if (pipe2(in, O_CLOEXEC) != 0) throw ModelError("", "new pipe", std::strerror(errno), "close other files");
+  if (pipe2(out, O_CLOEXEC) != 0) {
+    close(in[0]), close(in[1]);
+    throw ModelError("", "new pipe", std::strerror(errno), "close other files");
+  }
+  PipedChild child{0, in[1], out[0]};
+  try {
+    child.pid = startProgram(
+        arguments, [&](char** argv, pid_t parent) { becomeProgram(argv, parent, in[0], out[1], STDERR_FILENO); });
+  } catch (...) {
+    for (const int file : {in[0], in[1], out[0], out[1]}) close(file);
+    throw;
+  }
+  close(in[0]), close(out[1]);
+  return child;
+}
+
+SignalWatch::SignalWatch() {
+  signal(SIGCHLD, SIG_DFL);  // if ignored, children would leave no status
+  sigemptyset(&watched_);
+  for (const int number : {SIGINT, SIGTERM, SIGCHLD}) sigaddset(&watched_, number);
+  sigprocmask(SIG_BLOCK, &watched_, &before_);
+}
+
+SignalWatch::~SignalWatch() { sigprocmask(SIG_SETMASK, &before_, nullptr); }
+
+bool SignalWatch::wait() {
+  int number = 0;
+  while (sigwait(&watched_, &number) != 0) {
+  }
+  return number != SIGCHLD;
+}
+
+bool SignalWatch::waitForFile(int file) {
+  sigset_t asked;
+  sigemptyset(&asked);
+  sigaddset(&asked, SIGINT), sigaddset(&asked, SIGTERM);
+  const int signals = signalfd(-1, &asked, SFD_CLOEXEC);
+  pollfd files[] = {{file, POLLIN, 0}, {signals, POLLIN, 0}};
+  while (poll(files, 2, -1) < 0 && errno == EINTR) {
+  }
+  signalfd_siginfo taken;  // else it would be delivered when signals are no longer blocked
+  const bool is_asked = files[1].revents != 0 && read(signals, &taken, sizeof taken) > 0;
+  close(signals);
+  return is_asked;
+}
+
+std::vector<ChildEnd> SignalWatch::collect() {
+  std::vector<ChildEnd> ends;
+  int state = 0;
+  for (pid_t pid = waitpid(-1, &state, WNOHANG); pid > 0; pid = waitpid(-1, &state, WNOHANG))
+    ends.push_back({pid, WIFEXITED(state) ? WEXITSTATUS(state) : 128 + WTERMSIG(state)});
+  return ends;
+}
+
+void killChild(pid_t pid) {
+  kill(pid, SIGKILL);
+  while (waitpid(pid, nullptr, 0) < 0 && errno == EINTR) {
+  }
+}
+
+}  // namespace bielle::tasks
