@@ -1,6 +1,8 @@
 // Walking motions, measured on their trajectories by kinematics and dynamics.
+#include <algorithm>
 #include <catch2/catch.hpp>
 
+#include "bielle/dynamics/impact.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/walk.h"
@@ -286,6 +288,63 @@ TEST_CASE("walk: feet that have room land near their footholds, and stand where 
   CHECK(solved.measures.foothold < 0.03 * std::sqrt(2) + 1e-6);
   CHECK(solved.measures.tilt_at_landing < 1e-6);
   CHECK(solved.measures.slip < 2e-3);
+}
+
+TEST_CASE("walk: feet that come down strike within the cone of friction") {
+  WalkOptions walk;
+  walk.steps = 2;
+  walk.gait.rigid_landing = 1;
+  walk.gait.landing_speed = 0.05;
+  walk.gait.friction = 0.35;
+  const Model& model = getBipetto();
+  const MotionPlan plan = planWalk(model, walk, makeStandingPosture(model));
+  // The largest tangential impulse over the normal one of a foot that lands.
+  const auto strike = [&](const MotionPlan& solved, Formulation formulation) {
+    Motion motion = makeMotion(model, solved, ProblemOptions(formulation));
+    FddpOptions options;
+    options.initial_regularization = kGuessRegularization;
+    const FddpSummary summary = Fddp(options).solve(*motion.problem, motion.guess);
+    CAPTURE(summary.message, summary.iterations);
+    REQUIRE(summary.termination == FddpTermination::Converged);
+    double largest = 0;
+    int impacts = 0;
+    ImpactWorkspace impact(model);
+    for (int k = 0; k < motion.problem->numStages(); ++k) {
+      const StageSpec& stage = motion.problem->spec(k);
+      if (stage.kind != StageKind::Impact) continue;
+      const ConstraintSet& set = stage.constraints;
+      const VectorXd& x = motion.guess.xs[k];
+      REQUIRE(updateImpact(model, impact, set, x.head(model.nq()), x.segment(model.nq(), model.nv())) ==
+              DynamicsStatus::Ok);
+      double normal = 0;
+      for (size_t c = set.num_loops; c < set.closures.size(); ++c) {
+        const Vector3d impulse = impact.impulse.segment<3>(set.offsets[c]);
+        if (impulse.z() < normal) continue;  // the foot that stood gets next to none
+        normal = impulse.z();
+        largest = std::max(largest, impulse.head<2>().norm() / normal);
+      }
+      CHECK(normal > 1e-3 * model.mass());
+      ++impacts;
+    }
+    CHECK(impacts == 2);
+    return largest;
+  };
+  for (Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
+    const double within = strike(plan, formulation);
+    CHECK(within < 0.35);
+    CHECK(within > 0.35 / std::sqrt(2) * 0.98);  // a side of the pyramid binds
+  }
+  MotionPlan slippery = plan;
+  for (StageSpec& stage : slippery.stages)
+    if (stage.kind == StageKind::Impact)
+      stage.path_constraints.erase(
+          std::remove_if(stage.path_constraints.begin(), stage.path_constraints.end(),
+                         [](const PathConstraint& c) { return c.name.find("wrench cone") == 0; }),
+          stage.path_constraints.end());
+  CHECK(strike(slippery, Formulation::Reduced) > 0.35);
+
+  walk.gait.rigid_landing = 0;
+  CHECK_THROWS_WITH(planWalk(model, walk, makeStandingPosture(model)), Catch::Contains("landing_speed"));
 }
 
 TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with its node") {

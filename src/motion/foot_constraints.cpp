@@ -26,7 +26,7 @@ Capsule makeSoleCapsule(const ContactFrame& contact) {
 
 }  // namespace
 
-void addLanding(const ContactFrame& contact, const SE3& X_WF, double room, StageSpec& stage) {
+void addLanding(const ContactFrame& contact, const SE3& X_WF, double room, double speed, StageSpec& stage) {
   const BodyFrame foot{contact.body, contact.X_BF};
   const bool point = contact.kind != ContactKind::Surface6D;
   const Vector3d position = Vector3d::Constant(kPosition), angle = Vector3d::Constant(kAngle);
@@ -43,6 +43,9 @@ void addLanding(const ContactFrame& contact, const SE3& X_WF, double room, Stage
   stage.path_constraints.back().lower = -upper;
   stage.path_constraints.push_back(makeEquation("landing velocity of " + contact.name, makeFrameVelocity(foot),
                                                 point ? 3 : 6, Vector6d::Constant(kVelocity)));
+  PathConstraint& velocity = stage.path_constraints.back();
+  velocity.lower.head<3>().setConstant(-speed);
+  velocity.upper.head<3>() << speed, speed, -speed;
 }
 
 void addClearance(const ContactFrame& contact, const Ground& ground, double ramp, double least, StageSpec& stage) {

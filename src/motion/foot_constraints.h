@@ -5,8 +5,8 @@
 namespace bielle {
 
 // The sole lies at a place, at rest; of a contact at a point only the point does. It may be `room` m off along x and y of the
-// place, and turned about z such that its corners move by as much.
-void addLanding(const ContactFrame& contact, const SE3& X_WF, double room, StageSpec& stage);
+// place, and turned about z such that its corners move by as much; and it comes down at `speed`, m/s.
+void addLanding(const ContactFrame& contact, const SE3& X_WF, double room, double speed, StageSpec& stage);
 
 // All corners of the sole are at least `least` m over the ground, whose steps have ramps (makeSoleClearance).
 void addClearance(const ContactFrame& contact, const Ground& ground, double ramp, double least, StageSpec& stage);

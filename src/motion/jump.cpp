@@ -112,7 +112,7 @@ void addTouchdown(const Scene& scene, StageSpec& stage) {
   for (const ContactTarget& target : scene.after) {
     const ContactFrame& contact = scene.model.contacts()[target.contact];
     if (scene.options.published == 0)
-      addLanding(contact, target.X_WT, 0, stage);
+      addLanding(contact, target.X_WT, 0, 0, stage);
     else
       addFreeLanding({contact.body, contact.X_BF}, target.X_WT,
                      {weights.height / h, weights.tilt / h, weights.velocity / h}, stage, " " + contact.name);

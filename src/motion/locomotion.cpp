@@ -21,6 +21,10 @@ void check(const LocomotionOptions& o) {
   requirePositive(listOptions(copy), {"friction"});
   requireOption(o.swing.apex > 0 && o.swing.apex < 1, "swing_apex", "it is not between 0 and 1", "e.g. 0.5");
   requireOption(o.swing.leave < o.swing.arrive, "swing_leave", "it is not before swing_arrive", "e.g. 0 and 1");
+  requireOption(o.landing_speed == 0 || o.rigid_landing != 0, "landing_speed",
+                "without an impact nothing stops a foot that lands", "add rigid_landing=1, or leave it out");
+  requireOption(o.landing_speed < 0.1, "landing_speed", "feet that land at 0.1 m/s or more do not pass the check",
+                "give a lower speed, e.g. 0.05");
   requireOption(o.swing.arrive <= 1, "swing_arrive", "it is over 1", "give a part of the swing, e.g. 1");
 }
 

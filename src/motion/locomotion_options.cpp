@@ -23,6 +23,7 @@ std::vector<OptionEntry> listOptions(LocomotionOptions& o) {
        "1: the paper's problem: feet land where they like; 0: on footholds, by our costs"},
       {"rigid_landing", &o.rigid_landing, "0 or 1",
        "1: a rigid impact at every landing, as a stage of its own; 0: none"},
+      {"landing_speed", &o.landing_speed, "m/s", "with rigid_landing: how fast feet come down, below 0.1; 0: at rest"},
       {"foothold_room", &o.foothold_room, "m", "how far from its foothold a foot may land, along x and y; 0: on it"},
       {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
       {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},

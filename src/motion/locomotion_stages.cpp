@@ -120,7 +120,7 @@ void addLanding(const Scene& scene, const Footstep& step, StageSpec& stage) {
     if (o.foothold_room > 0)
       addCost(stage, "foothold", o.foothold_weight / h, (Vector6d() << 1, 1, 0, 0, 0, 0).finished(),
               makeFramePlacement(getFoot(scene, step.side), step.X_WF));
-    return addLanding(getContact(scene, step.side), step.X_WF, o.foothold_room, stage);
+    return addLanding(getContact(scene, step.side), step.X_WF, o.foothold_room, o.landing_speed, stage);
   }
   const LandingWeights& weights = scene.options.paper.landing;
   addFreeLanding(getFoot(scene, step.side), step.X_WF, {weights.height / h, weights.tilt / h, weights.velocity / h},
@@ -186,6 +186,10 @@ StageSpec makeImpact(const Scene& scene, const GaitNode& node, const std::vector
   stage.state.weight *= scene.options.timing.time_step;
   stage.control.weight *= scene.options.timing.time_step;  // torques have no effect here and go to zero
   addLanding(scene, scene.task.plan.steps[node.landed], stage);
+  const LocomotionOptions& o = scene.options;
+  if (o.landing_speed > 0 && !isPublished(scene))
+    addImpulseCones(scene.model, o.friction, o.cone_margin,
+                    scene.stance.contacts[static_cast<int>(scene.task.plan.steps[node.landed].side)], stage);
   return stage;
 }
 

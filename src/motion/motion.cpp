@@ -204,26 +204,47 @@ void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights
                          makeFrameVelocity(foot)});
 }
 
+namespace {
+
+// Rows of the cone over `unit` and, of torques, lengths of the sole are not below `least` (rows).
+template <typename Least>
+void addCone(const Model& model, int c, double friction, double margin, double unit, const Least& calcLeast,
+             StageSpec& stage) {
+  const ConstraintSet& set = stage.constraints;
+  const ContactFrame& contact = model.contacts()[set.getContact(c)];
+  const double X = (1 - margin) * contact.half_length, Y = (1 - margin) * contact.half_width;
+  std::unique_ptr<Residual> cone = makeWrenchCone(set, c, X, Y, (1 - margin) * friction / std::sqrt(2));
+  const int rows = cone->size();
+  VectorXd scale = VectorXd::Constant(rows, unit);
+  if (rows > 5) {
+    const double least = 0.01;  // m, of soles without size
+    scale.segment<2>(5) *= std::max(least, Y);
+    scale.segment<2>(7) *= std::max(least, X);
+    scale.tail<8>() *= std::max(least, X + Y);
+  }
+  stage.path_constraints.push_back({"wrench cone of " + contact.name, std::move(cone),
+                                    VectorXd(calcLeast(rows).cwiseProduct(scale)),
+                                    VectorXd::Constant(rows, std::numeric_limits<double>::infinity()), scale});
+}
+
+}  // namespace
+
 void addWrenchCones(const Model& model, double friction, double margin, StageSpec& stage) {
   constexpr double kLeastLoad = 1e-3;
   const ConstraintSet& set = stage.constraints;
-  const double unit = model.mass() * model.gravity().norm();
-  const double mu = (1 - margin) * friction / std::sqrt(2);
+  const auto calcLeast = [=](int rows) { return VectorXd(kLeastLoad * VectorXd::Unit(rows, 0)); };
+  for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c)
+    addCone(model, c, friction, margin, model.mass() * model.gravity().norm(), calcLeast, stage);
+}
+
+void addImpulseCones(const Model& model, double friction, double margin, int landing, StageSpec& stage) {
+  constexpr double kApex = 1e-4;
+  const ConstraintSet& set = stage.constraints;
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
-    const ContactFrame& contact = model.contacts()[set.getContact(c)];
-    const double X = (1 - margin) * contact.half_length, Y = (1 - margin) * contact.half_width;
-    std::unique_ptr<Residual> cone = makeWrenchCone(set, c, X, Y, mu);
-    const int rows = cone->size();
-    VectorXd scale = VectorXd::Constant(rows, unit);
-    if (rows > 5) {
-      const double least = 0.01;  // m, of soles without size
-      scale.segment<2>(5) *= std::max(least, Y);
-      scale.segment<2>(7) *= std::max(least, X);
-      scale.tail<8>() *= std::max(least, X + Y);
-    }
-    stage.path_constraints.push_back({"wrench cone of " + contact.name, std::move(cone),
-                                      kLeastLoad * unit * VectorXd::Unit(rows, 0),
-                                      VectorXd::Constant(rows, std::numeric_limits<double>::infinity()), scale});
+    const double least = set.getContact(c) == landing ? 0 : -kApex;
+    addCone(
+        model, c, friction, margin, model.mass(), [=](int rows) { return VectorXd(VectorXd::Constant(rows, least)); },
+        stage);
   }
 }
 

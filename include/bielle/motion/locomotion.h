@@ -83,6 +83,7 @@ struct LocomotionOptions {
   /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time. 0: the contact's
   /// stabilisation stops what velocity a foot may have left.
   double rigid_landing = 0;
+  double landing_speed = 0;  ///< with rigid_landing: at which a foot comes down, m/s; 0: at rest
   double foothold_room = 0;  ///< how far from its foothold a foot may land, along each of its axes, m
 
   double state_weight = 0.1;           ///< of the state regularization

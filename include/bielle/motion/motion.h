@@ -173,11 +173,16 @@ struct LandingWeights {
 void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights& weights, StageSpec& stage,
                     const std::string& suffix = "");
 
-/// Adds a path constraint for every active contact: the wrench cone of its sole (residual.h), drawn in by `margin`, in friction
-/// and in size, and by a thousandth of the robot's weight in the normal force. Its pyramids of friction/sqrt(2) are inscribed in round cones. A violation of 1 is the weight of the robot.
+/// Adds a path constraint for every active contact: the wrench cone of its sole (residual.h), drawn in by `margin`, in
+/// friction and in size, and by a thousandth of the robot's weight in the normal force. Its pyramids of friction/sqrt(2) are
+/// inscribed in round cones. A violation of 1 is the weight of the robot.
 /// \param friction  coefficient of the ground, positive   \param margin  part of 1 that is left free; at least a hundredth, or
 /// rounding of a result may leave the cone
 void addWrenchCones(const Model& model, double friction, double margin, StageSpec& stage);
+/// The same of the impulses of an impact, where a violation of 1 is the mass of the robot times 1 m/s. Feet that stood
+/// before may get next to none, so that their cones are lowered by 1e-4 of that: at the apex a cone has no interior.
+/// \param landing  index of the contact that lands, not at rest
+void addImpulseCones(const Model& model, double friction, double margin, int landing, StageSpec& stage);
 inline constexpr double kConeMargin = 0.01;
 
 /// Adds the costs of every active contact of the stage. \param loads  vertical force of each, in their order, N
