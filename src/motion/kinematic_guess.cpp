@@ -30,16 +30,14 @@ class FeetPlacer {
   VectorXd place(const PlannedPosture& planned, const VectorXd& before) {
     constexpr std::array<bool, 2> kBoth{true, true}, kNone{false, false};
     constexpr double kNear = 0.06, kFar = 0.24;  // of the base, over the height of the centre of mass
-    struct Way {
-      std::array<bool, 2> flat;
-      double least, most;
-    };
-    for (const Way& way :
-         {Way{kBoth, kEasyTransmission, kNear}, Way{kBoth, kLeastTransmission, kNear},
-          Way{planned.stands, kEasyTransmission, kNear}, Way{planned.stands, kLeastTransmission, kFar}})
-      if (std::optional<VectorXd> q = placeNear(planned, way.flat, before, way.least, way.most)) return std::move(*q);
+    if (std::optional<VectorXd> q = placeNear(planned, kBoth, before, kNear, kEasyTransmission)) return std::move(*q);
+    if (planned.stands != kBoth)
+      if (std::optional<VectorXd> q = placeNear(planned, planned.stands, before, kNear, kEasyTransmission))
+        return std::move(*q);
+    if (std::optional<VectorXd> q = placeNear(planned, planned.stands, before, kFar, kLeastTransmission))
+      return std::move(*q);
     const VectorXd base = planned.q.head<7>();
-    if (const std::optional<VectorXd> q = assemble(base, planned.feet, kNone, stance_.q, kLeastTransmission)) return *q;
+    if (std::optional<Posture> posture = assemble(base, planned.feet, kNone, stance_.q)) return std::move(posture->q);
     VectorXd q = stance_.q;
     q.head<7>() = base;
     return q;
@@ -53,10 +51,12 @@ class FeetPlacer {
     std::array<SE3, 2> feet = stance_.feet;
     const Vector3d forward = calcMiddle(feet[0], feet[1]).R.col(0);
     for (SE3& foot : feet) foot.p -= x * forward;
-    const auto assembleAt = [&](double z, const VectorXd& start) {
+    const auto assembleAt = [&](double z, const VectorXd& start) -> std::optional<VectorXd> {
       VectorXd base = stance_.q.head<7>();
       base[2] += z - height_;
-      return assemble(base, feet, {true, true}, start, kEasyTransmission);
+      std::optional<Posture> posture = assemble(base, feet, {true, true}, start);
+      if (!posture || posture->transmission <= kEasyTransmission) return {};
+      return std::move(posture->q);
     };
     std::optional<VectorXd> found;
     for (int i = 0; i <= 8 && !found; i = i > 0 ? -i : 1 - i) {
@@ -90,23 +90,33 @@ class FeetPlacer {
  private:
   static constexpr double kEasyTransmission = 0.5;  // well before the dead points
 
-  // With the base as little raised or lowered as can be. \param most  of it, over the height of the centre of mass
+  struct Posture {
+    VectorXd q;
+    double transmission;  // the least, or the least inverse, over that of the stance
+  };
+
+  // With the base as little raised or lowered as can be; the first whose transmission is easy enough, else the first.
+  // \param most  of the way of the base, over the height of the centre of mass
   std::optional<VectorXd> placeNear(const PlannedPosture& planned, const std::array<bool, 2>& flat,
-                                    const VectorXd& before, double least, double most) {
+                                    const VectorXd& before, double most, double easy) {
     const double step = most / 4;
+    std::optional<VectorXd> first;
     for (int i = 0; i <= 4; i = i > 0 ? -i : 1 - i) {
       VectorXd base = planned.q.head<7>();
       base[2] -= i * step * height_;
-      for (const VectorXd* start : {&before, &stance_.q})
-        if (std::optional<VectorXd> q = assemble(base, planned.feet, flat, *start, least)) return q;
+      for (const VectorXd* start : {&before, &stance_.q}) {
+        std::optional<Posture> posture = assemble(base, planned.feet, flat, *start);
+        if (posture && posture->transmission > easy) return std::move(posture->q);
+        if (posture && !first) first = std::move(posture->q);
+      }
     }
-    return {};
+    return first;
   }
 
   // Keeps ranges of joints, and linkages on their side of dead points.
   // \param flat  soles that are parallel to what is planned
-  std::optional<VectorXd> assemble(const VectorXd& base, const std::array<SE3, 2>& feet,
-                                   const std::array<bool, 2>& flat, const VectorXd& start, double least) {
+  std::optional<Posture> assemble(const VectorXd& base, const std::array<SE3, 2>& feet, const std::array<bool, 2>& flat,
+                                  const VectorXd& start) {
     AssemblyProblem problem;
     problem.q_ref = start;
     problem.q_ref.head<7>() = base;
@@ -117,19 +127,22 @@ class FeetPlacer {
       if (!flat[i] || contact.kind != ContactKind::Surface6D) problem.frames.back().mask.tail<3>().setConstant(false);
     }
     AssemblyResult result = bielle::assemble(model_, problem, options_);
-    if (result.status != AssemblyStatus::Closed || !keepsRanges(result.q) || !keepsBranches(result.q, least)) return {};
-    return std::move(result.q);
+    if (result.status != AssemblyStatus::Closed || !keepsRanges(result.q)) return {};
+    const double transmission = calcTransmission(result.q);
+    if (transmission <= kLeastTransmission) return {};
+    return Posture{std::move(result.q), transmission};
   }
 
-  bool keepsBranches(const VectorXd& q, double least) {
+  double calcTransmission(const VectorXd& q) {
     updatePositions(model_, ws_, q);
     const VectorXd none;
     VectorXd value(1);
+    double least = std::numeric_limits<double>::infinity();
     for (const std::unique_ptr<Residual>& transmission : transmissions_) {
       transmission->calc({model_, ws_, closures_, none, none}, value);
-      if (!(value[0] > least && value[0] * least < 1)) return false;
+      least = std::min({least, value[0], 1 / value[0]});
     }
-    return true;
+    return least;
   }
 
   bool keepsRanges(const VectorXd& q) const {

@@ -9,8 +9,8 @@ namespace bielle {
 
 /// Where base and feet are to be.
 struct PlannedPosture {
-  VectorXd q;               ///< nq, with the base in its place
-  std::array<SE3, 2> feet;  ///< left, right
+  VectorXd q;                              ///< nq, with the base in its place
+  std::array<SE3, 2> feet;                 ///< left, right
   std::array<bool, 2> stands{true, true};  ///< on the ground
 };
 
