@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <ctime>
 #include <limits>
 #include <thread>
@@ -12,6 +11,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
 #include "io/record_tables.h"
+#include "model/number_text.h"
 #include "simulation/robot_errors.h"
 #include "simulation/terrain.h"
 
@@ -126,11 +126,7 @@ class FallDetector {
     }
     return nullptr;
   }
-  static std::string formatTime(double time) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.3f s", time);
-    return text;
-  }
+  static std::string formatTime(double time) { return formatNumber(time, "%.3f s"); }
 
   const Model& model_;
   const Policy& plan_;

@@ -1,6 +1,5 @@
 #include "cli/table.h"
 
-#include <cstdio>
 #include <ostream>
 
 namespace bielle::cli {
@@ -40,12 +39,6 @@ void printTable(std::ostream& out, const Json& objects, const std::vector<std::s
     for (const std::string& key : keys) rows.back().push_back(formatCell(object.at(key)));
   }
   printTable(out, rows);
-}
-
-std::string formatNumber(double value, const char* format) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
 }
 
 }  // namespace bielle::cli

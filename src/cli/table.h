@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "io/json_text.h"
+#include "model/number_text.h"
 
 namespace bielle::cli {
 
@@ -15,8 +16,5 @@ void printTable(std::ostream& out, const std::vector<Row>& rows, const std::stri
 
 // A list of objects: one line each under a header, the given keys as columns.
 void printTable(std::ostream& out, const Json& objects, const std::vector<std::string>& keys);
-
-// Formats a number, e.g. by "%.6g".
-std::string formatNumber(double value, const char* format = "%.6g");
 
 }  // namespace bielle::cli

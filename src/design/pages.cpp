@@ -7,17 +7,14 @@
 #include "design/figures.h"
 #include "design/run.h"
 #include "io/text_file.h"
+#include "model/number_text.h"
 
 namespace fs = std::filesystem;
 
 namespace bielle {
 namespace {
 
-std::string format(double value, const char* pattern = "%.4g") {
-  char text[40];
-  std::snprintf(text, sizeof text, pattern, value);
-  return text;
-}
+std::string format(double value, const char* pattern = "%.4g") { return formatNumber(value, pattern); }
 
 std::string formatChange(double before, double after) {
   return before > 0 ? format(100 * (after / before - 1), "%+.1f %%") : "";

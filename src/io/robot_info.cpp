@@ -1,13 +1,13 @@
 #include "bielle/io/robot_info.h"
 
 #include <cmath>
-#include <cstdio>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
 #include "io/json_text.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {
@@ -35,12 +35,6 @@ std::string findFrameName(const Model& model, int body, const SE3& X_BF) {
   for (const Frame& frame : model.frames())
     if (frame.body == body && frame.X_BF.p == X_BF.p && frame.X_BF.R == X_BF.R) return frame.name;
   return model.bodies()[body].name;
-}
-
-std::string formatNumber(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
 }
 
 // "motor - 2 knee"

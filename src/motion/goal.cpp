@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
+
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {
@@ -125,11 +126,7 @@ bool GoalOutcome::met() const { return std::abs(came_out - goal.asked) <= goal.t
 std::string formatOutcome(const GoalOutcome& outcome) {
   const Goal& goal = outcome.goal;
   const std::string name = getUnit(goal.kind), unit = name == "1" ? "" : " " + name;
-  const auto format = [](double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.4g", value);
-    return std::string(text);
-  };
+  const auto format = [](double value) { return formatNumber(value, "%.4g"); };
   const bool exact = goal.kind == GoalKind::Footholds;  // the requested distance is zero
   std::string text = exact ? "asked within " + format(goal.tolerance) : "asked " + format(goal.asked);
   text += unit + ", came out " + format(outcome.came_out) + unit;

@@ -1,12 +1,12 @@
 #include "study/architectures.h"
 
 #include <cmath>
-#include <cstdio>
 
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/error.h"
 #include "design/draft.h"
 #include "design/spec_parts.h"
+#include "model/number_text.h"
 #include "model/text_file.h"
 
 namespace bielle::study {
@@ -15,11 +15,7 @@ namespace {
 using Entry = YamlEntry;
 using Fields = YamlFields;
 
-std::string formatValue(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.12g", value);
-  return text;
-}
+std::string formatValue(double value) { return formatNumber(value, "%.12g"); }
 
 std::vector<Architecture> readRobots(const Entry& entry) {
   std::vector<Architecture> robots;

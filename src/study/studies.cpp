@@ -1,6 +1,6 @@
 #include "study/studies.h"
 
-#include <cstdio>
+#include "model/number_text.h"
 
 namespace bielle::study {
 namespace {
@@ -12,19 +12,13 @@ std::vector<double> makeRange(int first, int last, int step, double denominator)
   return values;
 }
 
-std::string formatValue(double value, const char* format) {
-  char text[32];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
-
 std::string makeName(const Study& study, double value, const char* model) {
-  return study.stem + "-" + study.parameter + formatValue(value, "-%.4g-") + model;
+  return study.stem + "-" + study.parameter + formatNumber(value, "-%.4g-") + model;
 }
 
 std::vector<std::string> makeSolve(const Study& study, double value, const std::string& robot, const char* output) {
   std::vector<std::string> arguments = {
-      "solve",      study.motion, "--robot", robot,   "--set",   study.parameter + "=" + formatValue(value, "%.12g"),
+      "solve",      study.motion, "--robot", robot,   "--set",   study.parameter + "=" + formatNumber(value, "%.12g"),
       "--threads",  "1",          "--step",  "euler", "--quiet", "--no-check",
       "--no-report"};
   arguments.insert(arguments.end(), study.settings.begin(), study.settings.end());
