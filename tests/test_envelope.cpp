@@ -5,8 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "bielle/design/parametrization.h"
-#include "bielle/motion/motion_envelope.h"
+#include "bielle/design/cost_gradient.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
 #include "design/spec.h"
@@ -15,9 +14,8 @@ using namespace bielle;
 
 namespace {
 
-constexpr double kTolerance = 1e-5;  // relative
-// Shares of the width of the bounds: of the envelope, whose error grows with the square, and between optima.
-constexpr double kStep = 1e-5, kBetweenOptima = 4e-3;
+constexpr double kTolerance = 1e-5;      // relative
+constexpr double kBetweenOptima = 4e-3;  // step, over the width of the bounds
 
 using MakeMotion = std::function<Motion(const Model&)>;
 
@@ -47,15 +45,7 @@ struct Optimum {
 };
 
 VectorXd calcGradient(const Parametrization& robot, const Optimum& optimum, const MakeMotion& make) {
-  const MotionEnvelope envelope(optimum.motion, optimum.multipliers);
-  VectorXd out(robot.start().size());
-  for (Eigen::Index i = 0; i < out.size(); ++i) {
-    const double step = kStep * (robot.upper()[i] - robot.lower()[i]);
-    const VectorXd dx = step * VectorXd::Unit(out.size(), i);
-    const Model ahead = robot.make(robot.start() + dx), behind = robot.make(robot.start() - dx);
-    out[i] = envelope.calcDerivative(make(ahead), make(behind), step);
-  }
-  return out;
+  return calcCostGradient(robot, robot.start(), MotionEnvelope(optimum.motion, optimum.multipliers), make);
 }
 
 double differentiateOptima(const Parametrization& robot, const MakeMotion& make, const ShootingTrajectory* guess, int i,

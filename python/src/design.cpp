@@ -2,9 +2,8 @@
 
 #include <cmath>
 
-#include "bielle/design/parametrization.h"
+#include "bielle/design/cost_gradient.h"
 #include "bielle/design/search.h"
-#include "bielle/motion/motion_envelope.h"
 #include "bind.h"
 #include "model_access.h"
 #include "motion.h"
@@ -32,23 +31,6 @@ std::shared_ptr<HeldParametrization> parametrizeGenerated(const std::string& gen
       HeldParametrization{nullptr, generator, settings, Parametrization(generator, settings, variables)});
 }
 
-constexpr double kStep = 2e-5;  // of the width of the bounds
-
-// By the envelope theorem: two models, and two evaluations of all stages, per variable.
-VectorXd calcCostGradient(const HeldMotion& held, const Parametrization& robot, const VectorXd& x) {
-  const MotionEnvelope envelope(held.motion, *held.multipliers);
-  VectorXd gradient(x.size());
-  for (Eigen::Index i = 0; i < x.size(); ++i) {
-    const double h = kStep * (robot.upper()[i] - robot.lower()[i]);
-    const auto calcSide = [&](double side) {
-      const Model model = robot.make(x + side * h * VectorXd::Unit(x.size(), i));
-      return envelope.calcLagrangian(makeRequested(held.request->make(), model, held.options));
-    };
-    gradient[i] = (calcSide(1) - calcSide(-1)) / (2 * h);
-  }
-  return gradient;
-}
-
 py::array costGradient(HeldMotion& held, const HeldParametrization& robot, const py::object& x) {
   if (!held.request)
     throw std::runtime_error("motion: one of a plan cannot be made for other robots; make it of a Request");
@@ -58,7 +40,10 @@ py::array costGradient(HeldMotion& held, const HeldParametrization& robot, const
   VectorXd gradient;
   {
     const py::gil_scoped_release release;
-    gradient = calcCostGradient(held, robot.robot, point);
+    const MotionEnvelope envelope(held.motion, *held.multipliers);
+    gradient = calcCostGradient(robot.robot, point, envelope, [&held](const Model& model) {
+      return makeRequested(held.request->make(), model, held.options);
+    });
   }
   return makeArray(gradient);
 }

@@ -3,14 +3,13 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "bielle/design/cost_gradient.h"
 #include "bielle/model/error.h"
-#include "bielle/motion/motion_envelope.h"
 
 namespace bielle {
 namespace {
 
-constexpr double kStep = 2e-5;  // of the width of the bounds
-constexpr int kSweeps = 3;      // leave an error of some per mille of the change of torques
+constexpr int kSweeps = 3;  // leave an error of some per mille of the change of torques
 
 MotorSlopes makeSlopes(const MotionOutcome& outcome, Eigen::Index variables) {
   const MotorTrace& trace = outcome.measures.trace;
@@ -49,7 +48,7 @@ std::vector<MotorSlopes> calcOptimumSlopes(const Parametrization& robot, const V
       envelopes.push_back(std::make_unique<MotionEnvelope>(*outcome.motion, outcome.multipliers));
     }
     for (Eigen::Index i = 0; i < x.size(); ++i) {
-      const double h = kStep * (robot.upper()[i] - robot.lower()[i]);
+      const double h = kDesignStep * (robot.upper()[i] - robot.lower()[i]);
       for (const double side : {1.0, -1.0}) {
         const Model model = robot.make(x + side * h * VectorXd::Unit(x.size(), i));
         const VectorXd posture = makeStandingPosture(model);

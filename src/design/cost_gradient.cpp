@@ -1,0 +1,25 @@
+#include "bielle/design/cost_gradient.h"
+
+#include <cmath>
+
+#include "bielle/model/error.h"
+
+namespace bielle {
+
+VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const MotionEnvelope& envelope,
+                          const std::function<Motion(const Model&)>& make) {
+  VectorXd gradient(x.size());
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    const double step = kDesignStep * (robot.upper()[i] - robot.lower()[i]);
+    const VectorXd dx = step * VectorXd::Unit(x.size(), i);
+    const Model ahead = robot.make(x + dx), behind = robot.make(x - dx);
+    gradient[i] = envelope.calcDerivative(make(ahead), make(behind), step);
+    if (!std::isfinite(gradient[i]))
+      throw ModelError(robot.startModel().name(), "variable '" + robot.variables()[static_cast<size_t>(i)].name + "'",
+                       "no gradient: the motion cannot be carried over to robots beside this one",
+                       "move x away from where the mechanism ends to close");
+  }
+  return gradient;
+}
+
+}  // namespace bielle
