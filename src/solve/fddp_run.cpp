@@ -70,7 +70,10 @@ FddpRun::End FddpRun::linearize() {
 
 FddpRun::End FddpRun::evaluate() {
   const int failed = work_.evaluations.update(problem_, trajectory_, threads_);
-  if (failed < 0) return {};
+  if (failed < 0) {
+    for (int k = 0; k <= N_; ++k) line_.cost += work_.evaluations.getIterate()[k]->cost;
+    return {};
+  }
   const std::string& reason = work_.evaluations.getIterate()[failed]->failure;
   summary_.message = "node " + std::to_string(failed) + ": the problem could not be evaluated";
   if (!reason.empty()) summary_.message += ": " + reason;
@@ -91,7 +94,6 @@ void FddpRun::updateGaps() {
   const std::vector<StageModel>& models = work_.backward.getModels();
   gap_sum_ = 0;
   for (int k = 0; k <= N_; ++k) {
-    line_.cost += models[k].cost;
     if (models[k].gap.size() == 0) continue;
     const double largest = models[k].gap.lpNorm<Eigen::Infinity>();
     line_.gap = std::max(line_.gap, largest);
