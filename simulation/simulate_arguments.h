@@ -13,7 +13,7 @@ namespace bielle::simulation {
 
 struct SimulateArguments {
   std::string directory, output, world = "bielle", control = "gains", terrain = "planned";
-  std::string robot;  // of a motion that is to be solved; empty: `directory` holds one
+  std::string robot;     // of a motion that is to be solved; empty: `directory` holds one
   std::string commands;  // file; empty: none
   std::optional<double> speed;
   std::string model;                  // that the controller believes in; empty: that of the motion

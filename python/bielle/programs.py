@@ -2,11 +2,12 @@
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Union
+from typing import Any, Dict, List, Optional, Tuple, Union
 
 from ._bielle import Result, Robot, load_robot
 
@@ -25,23 +26,33 @@ def find_program(name: str) -> str:
     return found
 
 
-def run_program(name: str, arguments: List[str], progress: bool = False) -> str:
+def run_program(name: str, arguments: List[str], progress: bool = False, statuses: Tuple[int, ...] = (0,)) -> str:
     """What a program prints. Its progress goes where Python's errors go, if it is wanted.
 
-    Raises RuntimeError with its message unless it ends with status 0 or 1. Ctrl-C ends it, too.
+    Raises RuntimeError with its message unless it ends with one of the statuses. What breaks Python off, like Ctrl-C,
+    interrupts the program, which then ends in its own way.
     """
-    with subprocess.Popen([find_program(name), *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                          text=True) as process:  # fmt: skip
-        assert process.stdout is not None and process.stderr is not None
-        errors = []
-        for line in process.stderr:
-            errors.append(line)
-            if progress:
-                sys.stderr.write(line)
-        printed = process.stdout.read()
-    if process.returncode not in (0, 1):
+    errors = []
+    # A session of its own, so that Ctrl-C in a terminal does not reach it twice; a file, as a pipe could fill up unread.
+    with tempfile.TemporaryFile("w+") as printed, subprocess.Popen(
+        [find_program(name), *arguments], stdout=printed, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        assert process.stderr is not None
+        try:
+            for line in process.stderr:
+                errors.append(line)
+                if progress:
+                    sys.stderr.write(line)
+        except BaseException:
+            process.send_signal(signal.SIGINT)
+            process.communicate()
+            raise
+        process.wait()
+        printed.seek(0)
+        output = printed.read()
+    if process.returncode not in statuses:
         raise RuntimeError("".join(errors).strip() or f"{name} broke off with status {process.returncode}")
-    return printed
+    return output
 
 
 def check(result: Union[Directory, Result]) -> Dict[str, Any]:
@@ -53,7 +64,7 @@ def check(result: Union[Directory, Result]) -> Dict[str, Any]:
         with tempfile.TemporaryDirectory() as directory:
             result.write(directory)
             return check(directory)
-    table: Dict[str, Any] = json.loads(run_program("bielle-check", ["--json", str(result)]))
+    table: Dict[str, Any] = json.loads(run_program("bielle-check", ["--json", str(result)], statuses=(0, 1)))
     return table
 
 
@@ -85,7 +96,8 @@ def simulate(
     if directory is None:
         with tempfile.TemporaryDirectory() as output:
             return simulate(result, output, progress, **options, summary_only=True)
-    run_program("bielle-simulate", [str(result), "-o", str(directory), *make_arguments(options)], progress)
+    arguments = [str(result), "-o", str(directory), *make_arguments(options)]
+    run_program("bielle-simulate", arguments, progress, statuses=(0, 1))  # 1: it fell
     summary: Dict[str, Any] = json.loads((Path(directory) / "summary.json").read_text())
     return summary
 

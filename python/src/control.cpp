@@ -7,6 +7,7 @@ namespace bielle::python {
 namespace {
 
 std::shared_ptr<HeldController> makeHeldPolicy(const std::shared_ptr<HeldMotion>& motion, bool gains) {
+  requireStill(*motion);
   if (gains && !motion->solver)
     throw std::runtime_error("gains are those of the last solve: solve the motion first, or ask for gains=False");
   auto held = std::make_shared<HeldController>();
@@ -59,6 +60,8 @@ void bindControllers(py::module_& module) {
       .field("regularization", &PredictiveOptions::regularization, "of its sweeps")
       .field("penalty", &PredictiveOptions::penalty, "of violated constraints")
       .field("threads", &PredictiveOptions::threads, "0: all; results are bitwise independent of it")
+      .field("own_thread", &PredictiveOptions::own_thread,
+             "solves run beside control; results then depend on how fast they are")
       .field("end_place", &PredictiveOptions::end_place,
              "weight of heading and place at the end of a window, 1/m^2 or 1")
       .field("end_posture", &PredictiveOptions::end_posture, "of the other coordinates")

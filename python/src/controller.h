@@ -10,6 +10,11 @@
 namespace bielle::python {
 
 struct HeldController {
+  // A solve in a thread of its own may wait for the interpreter's lock, and its controller waits for the thread.
+  ~HeldController() {
+    const py::gil_scoped_release release;
+    controller.reset();
+  }
   std::shared_ptr<Model> model;
   std::unique_ptr<Controller> controller;
   const Policy* policy = nullptr;  // it, if it is one

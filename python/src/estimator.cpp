@@ -2,7 +2,6 @@
 
 #include <pybind11/stl.h>
 
-#include "bielle/model/error.h"
 #include "bind.h"
 #include "busy.h"
 #include "model_access.h"
@@ -32,30 +31,31 @@ class HeldEstimator {
     return estimator_.update(readings, contacts);
   }
 
-  py::dict getContacts() const {
+  py::dict getContacts() {
+    const BusyGuard guard(is_busy_, "estimator");
     py::dict out;
     for (size_t c = 0; c < model_->contacts().size(); ++c)
       out[py::str(model_->contacts()[c].name)] = static_cast<bool>(estimator_.getContacts()[c]);
     return out;
   }
 
-  py::array getWrenches() const {
+  py::array getWrenches() {
+    const BusyGuard guard(is_busy_, "estimator");
     RowMatrixXd out(model_->contacts().size(), 6);
     for (Eigen::Index c = 0; c < out.rows(); ++c) out.row(c) = estimator_.getWrench(static_cast<size_t>(c)).transpose();
     return makeArray(out);
   }
 
-  const Estimator& get() const { return estimator_; }
+  template <typename Read>
+  auto read(const Read& read) {
+    const BusyGuard guard(is_busy_, "estimator");
+    return read(estimator_);
+  }
 
  private:
   std::vector<int> find(const std::vector<std::string>& names) const {
     std::vector<int> out;
-    for (const std::string& name : names) {
-      out.push_back(model_->findContact(name));
-      if (out.back() < 0)
-        throw ModelError(model_->name(), "contact '" + name + "'", "there is no contact of this name",
-                         "name one of Model.contacts");
-    }
+    for (const std::string& name : names) out.push_back(findContact(*model_, name));
     return out;
   }
 
@@ -114,17 +114,27 @@ void bindEstimator(py::module_& module) {
       .def("update", &HeldEstimator::update, py::arg("readings"), py::arg("planned") = std::vector<std::string>(),
            "Takes the readings of an instant. planned: names of the contacts that the plan has now.")
       .def_property_readonly(
-          "q", [](const HeldEstimator& e) { return makeArray(e.get().getMeasurement().q); }, "(nq,)")
+          "q",
+          [](HeldEstimator& e) {
+            return e.read([](const Estimator& own) { return makeArray(own.getMeasurement().q); });
+          },
+          "(nq,)")
       .def_property_readonly(
-          "v", [](const HeldEstimator& e) { return makeArray(e.get().getMeasurement().v); }, "(nv,)")
+          "v",
+          [](HeldEstimator& e) {
+            return e.read([](const Estimator& own) { return makeArray(own.getMeasurement().v); });
+          },
+          "(nv,)")
       .def_property_readonly("contacts", &HeldEstimator::getContacts, "by name, whether they stand")
       .def_property_readonly("wrenches", &HeldEstimator::getWrenches,
                              "of the ground on the feet in their contact frames (contacts, 6), N and N m")
       .def_property_readonly(
-          "margin", [](const HeldEstimator& e) { return e.get().getMargin(); },
+          "margin", [](HeldEstimator& e) { return e.read([](const Estimator& own) { return own.getMargin(); }); },
           "the least that motors move in a unit motion of their linkage; 1 without linkages")
       .def_property_readonly(
-          "message", [](const HeldEstimator& e) { return e.get().getMessage(); }, "of the last status; empty if OK");
+          "message",
+          [](HeldEstimator& e) { return e.read([](const Estimator& own) { return std::string(own.getMessage()); }); },
+          "of the last status; empty if OK");
 }
 
 }  // namespace bielle::python

@@ -33,6 +33,14 @@ ConstraintSet requireFit(const Model& model, const ConstraintSet& set) {
   return set;
 }
 
+int findContact(const Model& model, const std::string& name) {
+  const int contact = model.findContact(name);
+  if (contact < 0)
+    throw ModelError(model.name(), "contact '" + name + "'", "there is no contact of this name",
+                     "name one of Model.contacts");
+  return contact;
+}
+
 ConstraintSet readConstraints(const Model& model, py::handle contacts) {
   if (py::isinstance<ConstraintSet>(contacts)) return requireFit(model, contacts.cast<ConstraintSet>());
   std::vector<ContactTarget> targets;
@@ -44,12 +52,8 @@ ConstraintSet readConstraints(const Model& model, py::handle contacts) {
                               std::to_string(model.contacts().size()));
       continue;
     }
-    const std::string name = read<std::string>(contact, "contacts");
     ContactTarget target;
-    target.contact = model.findContact(name);
-    if (target.contact < 0)
-      throw ModelError(model.name(), "contact '" + name + "'", "there is no contact of this name",
-                       "name one of Model.contacts");
+    target.contact = findContact(model, read<std::string>(contact, "contacts"));
     targets.push_back(target);
   }
   return makeConstraintSet(model, targets);

@@ -26,6 +26,9 @@ struct Convert<std::shared_ptr<Model>> {
 /// The link, frame or contact of a name. \throws ModelError when the robot has none
 Frame findFrame(const Model& model, const std::string& name);
 
+/// Index of a contact. \throws ModelError when the robot has none of this name
+int findContact(const Model& model, const std::string& name);
+
 /// Closures and contacts in force, from a ConstraintSet, or from a sequence of names of contacts and ContactTargets.
 ConstraintSet readConstraints(const Model& model, py::handle contacts);
 

@@ -32,11 +32,24 @@ MotionRequest Request::make() const {
   return request;
 }
 
-FddpObserver makeObserver(const py::object& callback) {
+void requireStill(const HeldMotion& held) {
+  if (held.is_busy && !held.is_observed) throw std::runtime_error("another thread is using this motion");
+}
+
+FddpObserver makeObserver(const py::object& callback, bool* is_called) {
+  struct Mark {
+    explicit Mark(bool* flag) : flag(flag) { set(true); }
+    ~Mark() { set(false); }
+    void set(bool value) const {
+      if (flag) *flag = value;
+    }
+    bool* flag;
+  };
   FddpObserver observer;
   // Copies of the observer are made without the interpreter's lock.
-  observer.callback = [shared = std::make_shared<SharedObject>(callback)](const FddpIteration& iteration) {
+  observer.callback = [shared = std::make_shared<SharedObject>(callback), is_called](const FddpIteration& iteration) {
     const py::gil_scoped_acquire lock;
+    const Mark mark(is_called);
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     const bool stop = !shared->get().is_none() && shared->get()(iteration).is(py::bool_(false));
     return stop ? FddpAction::Stop : FddpAction::Continue;
@@ -68,21 +81,26 @@ std::shared_ptr<HeldMotion> makeFromPlan(std::shared_ptr<Model> model, const Mot
 
 FddpSummary solve(HeldMotion& held, FddpOptions options, const py::object& callback) {
   const BusyGuard guard(held.is_busy, "motion");
-  const FddpObserver observer = makeObserver(callback);
-  const py::gil_scoped_release release;
+  const FddpObserver observer = makeObserver(callback, &held.is_observed);
   Motion& motion = held.motion;
+  // What properties read changes under the interpreter's lock only.
   held.multipliers.reset(), held.summary.reset();
-  if (motion.peak_limits.size() > 0) {
-    Multipliers multipliers;
-    held.summary = solveMotion(motion, options, observer, &multipliers);
-    held.multipliers = std::move(multipliers);
-    return *held.summary;
+  Multipliers multipliers;
+  FddpSummary summary;
+  {
+    const py::gil_scoped_release release;
+    if (motion.peak_limits.size() > 0) {
+      summary = solveMotion(motion, options, observer, &multipliers);
+    } else {
+      if (motion.bounded) options.bounds = ControlBounds::Enforce;
+      held.solver = std::make_unique<Fddp>(options);
+      summary = held.solver->solve(*motion.problem, motion.guess, observer);
+      multipliers = held.solver->getMultipliers();
+    }
   }
-  if (motion.bounded) options.bounds = ControlBounds::Enforce;
-  held.solver = std::make_unique<Fddp>(options);
-  held.summary = held.solver->solve(*motion.problem, motion.guess, observer);
-  held.multipliers = held.solver->getMultipliers();
-  return *held.summary;
+  held.multipliers = std::move(multipliers);
+  held.summary = summary;
+  return summary;
 }
 
 // The guess; the motion takes only one that fits its problem.
@@ -105,7 +123,10 @@ void setTrajectory(HeldMotion& held, const ShootingTrajectory& trajectory) {
   held.motion.guess = trajectory;
 }
 
-ShootingTrajectory getTrajectory(const HeldMotion& held) { return held.motion.guess; }
+ShootingTrajectory getTrajectory(const HeldMotion& held) {
+  requireStill(held);
+  return held.motion.guess;
+}
 
 // Records are bound after motions.
 void setWarmStart(HeldMotion& held, const py::object& record) {
@@ -117,16 +138,12 @@ py::dict getCosts(const HeldMotion& held, int node) {
   const RobotProblem& problem = *held.motion.problem;
   if (node < 0 || node > problem.numStages())
     throw py::index_error("node: from 0 to " + std::to_string(problem.numStages()));
-  std::vector<CostValue> values;
-  {
-    const py::gil_scoped_release release;
-    RobotEvaluator evaluator(problem);
-    const bool terminal = node == problem.numStages();
-    values = problem.getCosts(
-        node, evaluator.evaluate(node, held.motion.guess.xs[node], terminal ? VectorXd() : held.motion.guess.us[node]));
-  }
+  requireStill(held);
+  RobotEvaluator evaluator(problem);
+  const VectorXd u = node == problem.numStages() ? VectorXd() : held.motion.guess.us[node];
   py::dict out;
-  for (const CostValue& value : values) out[py::str(value.name)] = value.value;
+  for (const CostValue& value : problem.getCosts(node, evaluator.evaluate(node, held.motion.guess.xs[node], u)))
+    out[py::str(value.name)] = value.value;
   return out;
 }
 
@@ -219,9 +236,11 @@ void bindHeldMotion(py::module_& module) {
           },
           "Multipliers of the last solve")
       .def_property_readonly(
-          "summary", [](const HeldMotion& h) { return h.summary ? py::cast(*h.summary) : py::object(py::none()); }, "Summary of the last solve, or None");
+          "summary", [](const HeldMotion& h) { return h.summary ? py::cast(*h.summary) : py::object(py::none()); },
+          "Summary of the last solve, or None");
   type.def(py::pickle(
       [](const HeldMotion& h) {
+        requireStill(h);
         return py::make_tuple(h.model, h.request ? py::cast(*h.request) : py::none(),
                               h.plan ? py::cast(*h.plan) : py::none(), h.options, h.motion.guess);
       },

@@ -32,13 +32,18 @@ struct HeldMotion {
   std::optional<Multipliers> multipliers;  // likewise
   std::optional<FddpSummary> summary;      // likewise
   std::atomic<bool> is_busy{false};        // one solve at a time
+  bool is_observed = false;                // that solve waits for its callback; under the interpreter's lock
 };
+
+/// \throws RuntimeError while another thread changes the guess and the gains. A callback of the solve may read them.
+void requireStill(const HeldMotion& held);
 
 std::shared_ptr<HeldMotion> makeHeldMotion(std::shared_ptr<Model> model, const Request& request,
                                            const ProblemOptions& options);
 
 /// Lets `callback(iteration)` observe a solve that runs without the interpreter's lock, and signals end it: their
 /// exceptions leave it. False from the callback stops it.
-FddpObserver makeObserver(const py::object& callback);
+/// \param is_called  true while it is; or null
+FddpObserver makeObserver(const py::object& callback, bool* is_called = nullptr);
 
 }  // namespace bielle::python

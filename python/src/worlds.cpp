@@ -83,10 +83,14 @@ class HeldWorlds {
   const std::optional<int>& getCount() const { return many_; }
   const std::string& getEngine() const { return engine_; }
 
-  // What reads the state of a single world.
+  void requireSingle() const {
+    if (many_) throw py::value_error("world: a single one wanted, made without `count`");
+  }
+
+  // Reads the state of a single world.
   template <typename Task>
   void observeOnly(const Task& task) {
-    if (many_) throw py::value_error("world: a single one wanted, made without `count`");
+    requireSingle();
     const BusyGuard guard(is_busy_, "world");
     const py::gil_scoped_release release;
     task(*worlds_.front());
@@ -152,10 +156,12 @@ class HeldWorlds {
 struct HeldSensors {
   std::shared_ptr<HeldWorlds> world;
   std::unique_ptr<simulation::Sensors> sensors;
+  bool is_reset = false;
 };
 
 std::unique_ptr<HeldSensors> makeSensors(const std::shared_ptr<HeldWorlds>& world, double noise, unsigned seed,
                                          const SE3& imu) {
+  world->requireSingle();
   auto held = std::make_unique<HeldSensors>();
   held->world = world;
   simulation::SensorOptions options;
@@ -167,6 +173,7 @@ std::unique_ptr<HeldSensors> makeSensors(const std::shared_ptr<HeldWorlds>& worl
 }
 
 SensorReadings readSensors(HeldSensors& self) {
+  if (!self.is_reset) throw std::runtime_error("sensors: reset them first, which tells when readings begin");
   SensorReadings out;
   self.world->observeOnly([&](const World& world) { out = self.sensors->read(world); });
   return out;
@@ -183,6 +190,7 @@ void bindSensors(py::module_& module) {
           "reset",
           [](HeldSensors& self, double time) {
             self.world->observeOnly([&](const World& world) { self.sensors->reset(world, time); });
+            self.is_reset = true;
           },
           py::arg("time"), "From the state in which the world is; the first readings come after a time, s.")
       .def("read", &readSensors, "SensorReadings at the time of the world; those of the IMU are means since the last.");

@@ -146,13 +146,14 @@ def test_motions_pickle(model):
 
 def test_one_thread_solves_a_motion_at_a_time(model):
     motion = bielle.Motion.make(model, bielle.Request(motion="squat"))
-    errors = []
+    guesses = []
 
     def meddle(iteration):
+        iterate = motion.guess
         with pytest.raises(RuntimeError, match="another thread is using this motion"):
-            motion.guess = motion.guess
-        errors.append(iteration)
+            motion.guess = iterate
+        guesses.append(iterate)
         return False
 
     motion.solve(callback=meddle)
-    assert errors
+    assert guesses == [motion.guess]

@@ -186,9 +186,16 @@ def test_own_constraint(model, height):
     bounded = bielle.Motion(
         model, plan.replace(stages=[s.replace(path_constraints=s.path_constraints + (limit,)) for s in plan.stages])
     )
-    assert bounded.solve().converged
+    summary = bounded.solve()
+    assert summary.converged
     assert find_farthest(bounded) == pytest.approx(most, abs=1e-8)
     assert max(y.max() for y in bounded.multipliers.values if y.size) > 0
+
+    bounded.guess = free.guess
+    interior = bielle.ConstraintOptions(inequalities=bielle.Inequalities.INTERIOR_POINT)
+    within = bounded.solve(bielle.SolverOptions(constraints=interior))
+    assert within.converged and find_farthest(bounded) <= most + 1e-8
+    assert within.cost == pytest.approx(summary.cost, rel=1e-5) and within.cost != summary.cost
 
 
 def test_residuals_of_the_library_compare_and_pickle(model):
@@ -253,3 +260,18 @@ def test_solves_on_several_python_threads(model, height):
     for thread in threads:
         thread.join()
     assert results == [expected] * 4
+
+
+def test_a_residual_does_not_read_what_its_solve_changes(model):
+    class Peek(ComHeight):
+        def calc(self, node):
+            for read in [lambda: motion.guess, lambda: motion.costs(0), lambda: pickle.dumps(motion)] if solving else []:
+                with pytest.raises(RuntimeError, match="another thread is using this motion"):
+                    read()
+            return super().calc(node)
+
+    solving = False
+    motion = make_motion(model, bielle.Cost("own", 1e3, bielle.Activation.quadratic(np.ones(1)), Peek(0.6)))
+    assert "own" in motion.costs(0)
+    solving = True
+    motion.solve(bielle.SolverOptions(max_iterations=1))

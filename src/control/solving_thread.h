@@ -9,7 +9,8 @@
 
 namespace bielle {
 
-// Request and solution change hands without a lock: an atomic says whose they are. No call but waitUntilDone() and the destructor waits, none allocates.
+// Request and solution change hands without a lock: an atomic says whose they are. No call waits but waitUntilDone() and
+// the destructor, and none allocates.
 class SolvingThread {
  public:
   // All of them must outlive it.
