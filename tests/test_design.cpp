@@ -256,6 +256,23 @@ TEST_CASE("design: searches find a minimum, the same one for the same seed") {
   CHECK_THROWS_AS(minimizeByStages(problem, {{}}, 1), ModelError);
 }
 
+TEST_CASE("evaluations: what is not one is refused") {
+  LoggedEvaluation e{"slsqp", VectorXd::Constant(2, 0.1), DesignStatus::Feasible, 0.75, 1.5, {}, {}};
+  e.terms.push_back({VectorXd::Constant(2, 0.3), MatrixXd::Constant(2, 2, 0.7)});
+  const std::string line = formatEvaluation(e);
+  CHECK(formatEvaluation(readEvaluation(line)) == line);
+  for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{{"0.75", "null"},
+                                                                                 {"0.75", "NaN"},
+                                                                                 {"0.75", "1e999"},
+                                                                                 {"[0.7,0.7]", "[0.7]"},
+                                                                                 {"[0.7,0.7]", "[0.7,null]"},
+                                                                                 {"[[0.7,0.7],", "["},
+                                                                                 {"feasible", "perfect"},
+                                                                                 {"\"value\"", "\"worth\""},
+                                                                                 {"}", ""}})
+    CHECK_THROWS(readEvaluation(replaceOnce(line, from, to)));
+}
+
 namespace {
 
 const char* const kSpec = R"(robot: ROBOT

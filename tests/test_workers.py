@@ -261,6 +261,42 @@ def test_cases():
         assert summaries[0][name] == summaries[1][name], name
 
 
+def test_design():
+    """Two searches, whose manager is interrupted and killed on the way."""
+    port = find_port()
+    with open("design.yaml", "w") as file:
+        file.write("""robot: bipetto
+variables:
+  - name: crank
+    bounds: [0.04, 0.06]
+    length:
+      - {from: motor_knee_right, to: transmission_knee_right, across: [0, 0, 1], stretch: knee_crank_right}
+      - {from: motor_knee_left, to: transmission_knee_left, across: [0, 0, 1], stretch: knee_crank_left}
+motions: [{motion: squat, set: {depth: 0.95, duration: 0.6, settle: 0.06, time_step: 0.03}}]
+objective: [{measure: peak_torque, motors: [motor_knee_left, motor_knee_right]}]
+search: {searches: 2, stages: [{algorithm: crs, evaluations: 4}, {algorithm: slsqp, evaluations: 2}]}
+""")
+
+    def list_evaluations(out):
+        logs = [read(f"{out}/search{i}.jsonl").splitlines(True) for i in (1, 2)]
+        evaluations = [[json.loads(line) for line in log[1:] if line.endswith("\n")] for log in logs]
+        return [{name: value for name, value in e.items() if name != "seconds"} for log in evaluations for e in log]
+    subprocess.run([built, "design", "design.yaml", "-o", "design-alone"], check=True, stdout=subprocess.DEVNULL)
+    command = [built, "design", "design.yaml", "-o", "design-together", "--workers", str(port), "--password", "password"]
+    with Workers(port, 2, BIELLE_ROBOTS="/nowhere"):
+        for count, number, status in ((2, signal.SIGINT, 1), (5, signal.SIGKILL, -signal.SIGKILL)):
+            manager = start(command, "design.log")
+            wait_for(lambda: len(list_evaluations("design-together")) >= count)
+            manager.send_signal(number)
+            assert manager.wait() == status, read("design.log")
+        assert "interrupted; the same command goes on" in read("design.log")
+        assert start(command, "design.log").wait() == 0, read("design.log")
+    for name in ("design.md", "best/best.urdf", "best/best.yaml"):
+        assert read(f"design-alone/{name}") == read(f"design-together/{name}") != "", name
+    assert list_evaluations("design-alone") == list_evaluations("design-together") != []
+    assert not os.path.exists("design-together/running")
+
+
 if __name__ == "__main__":
     built = os.path.abspath(sys.argv[1])
     companions = os.path.dirname(built)

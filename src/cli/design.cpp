@@ -1,18 +1,25 @@
 // bielle design: lengths of a robot chosen by optimization.
+#include <filesystem>
 #include <iostream>
+#include <optional>
 
 #include "bielle/io/motion_registry.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "cli/table.h"
+#include "cli/task_options.h"
 #include "design/run.h"
+#include "io/text_file.h"
+#include "study/design_tasks.h"
 
 namespace bielle::cli {
 namespace {
 
 struct DesignArguments {
-  std::string spec, directory;
-  int jobs = 2;
+  DesignArguments() { tasks.jobs = 2; }
+
+  std::string spec, directory, request;
+  TaskArguments tasks;
 };
 
 // Every call makes its own request, because several threads make plans.
@@ -26,8 +33,37 @@ DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion)
   return {motion.motion, [make](const Model& model, const VectorXd& q0) { return make().plan(model, q0); }};
 }
 
+// One design, for others that search.
+int evaluateRequest(const DesignEvaluator& evaluator, const study::DesignRequest& request, const std::string& file) {
+  if (request.x.size() != evaluator.robot().start().size())
+    throw ModelError("", "--evaluate", "the design has another number of variables", "give one number for each");
+  writeTextFile(file, formatEvaluation(evaluateDesign(evaluator, request.stage, request.x)) + "\n");
+  return kOk;
+}
+
+// \param engine  of the evaluations, or none: threads here
+DesignRun runSearches(const DesignArguments& arguments, const DesignEvaluator& evaluator, const DesignSpec& spec,
+                      tasks::TaskEngine* engine) {
+  DesignRunOptions options;
+  options.directory = arguments.directory;
+  options.jobs = arguments.tasks.jobs;
+  options.progress = [](const std::string& line) { std::cout << line << std::endl; };
+  if (!engine) return runDesign(evaluator, spec, options);
+  study::DesignTasks tasks(spec, {std::filesystem::read_symlink("/proc/self/exe"), arguments.directory + "/running",
+                                  engine, options.progress});
+  options.evaluations = &tasks;
+  return runDesign(evaluator, spec, options);
+}
+
 int run(const DesignArguments& arguments) {
-  const DesignSpec spec = readDesignSpec(arguments.spec);
+  DesignSpec spec = readDesignSpec(arguments.spec);
+  std::optional<study::DesignRequest> request;
+  if (!arguments.request.empty()) {
+    request = study::readRequest(arguments.request);
+    if (!request->robot.empty()) spec.robot.name = request->robot;
+  }
+  // Before there are threads: the engine blocks signals, which none of them may take.
+  const auto engine = arguments.tasks.workers.empty() ? nullptr : makeTaskEngine(arguments.tasks);
   const Parametrization robot = makeParametrization(spec);
   std::vector<DesignMotion> motions;
   for (const MotionSpec& motion : spec.motions) motions.push_back(makeDesignMotion(spec.path, motion));
@@ -36,12 +72,8 @@ int run(const DesignArguments& arguments) {
   options.drives = spec.drives;
   options.margin = spec.margin;
   const DesignEvaluator evaluator(robot, motions, spec.objective, options);
-
-  DesignRunOptions run_options;
-  run_options.directory = arguments.directory;
-  run_options.jobs = arguments.jobs;
-  run_options.progress = [](const std::string& line) { std::cout << line << std::endl; };
-  const DesignRun run = runDesign(evaluator, spec, run_options);
+  if (request) return evaluateRequest(evaluator, *request, arguments.directory);
+  const DesignRun run = runSearches(arguments, evaluator, spec, engine.get());
 
   const int count = run.counts[0] + run.counts[1] + run.counts[2];
   std::vector<Row> rows = {
@@ -73,9 +105,11 @@ void addDesign(CLI::App& app, Action& action) {
       .add_option("-o,--output", arguments->directory,
                   "directory for best/ (a robot), design.md, figures and the logs; made if need be")
       ->required();
-  command.add_option("--jobs", arguments->jobs, "searches at a time, one thread each; results do not depend on it")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
+  addTaskOptions(command, "searches at a time, one thread each; results do not depend on it", arguments->tasks);
+  command.add_option(
+      "--evaluate", arguments->request,
+      "evaluate one design alone, {\"stage\": \"sbplx\", \"x\": [0.05]} in this file, as workers do; -o is "
+      "the file for its line of a log");
   command.footer(
       "SPEC, lengths in m:\n"
       "  robot: bipetto             (or `generator: cleobot`, with variables {name, parameter, bounds})\n"
@@ -111,7 +145,7 @@ void addDesign(CLI::App& app, Action& action) {
       "      - {algorithm: sbplx, evaluations: 100, tolerance: 1e-3}\n"
       "Every evaluation is logged: after Ctrl-C or a crash the same command goes on from there and ends the same way.\n"
       "Designs whose loops do not close, or whose motion fails, are penalized and counted.\n"
-      "Exit status: 0 done, 2 bad input.\n"
+      "Exit status: 0 done, 1 interrupted (with workers) or a task failed, 2 bad input.\n"
       "Example:\n  bielle design examples/knee_design/knee.yaml -o knee");
   command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
 }

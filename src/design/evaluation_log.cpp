@@ -1,5 +1,8 @@
 #include "design/evaluation_log.h"
 
+#include <cmath>
+#include <stdexcept>
+
 #include "bielle/model/error.h"
 #include "io/json_text.h"
 
@@ -7,13 +10,20 @@ namespace bielle {
 namespace {
 
 DesignStatus readStatus(const std::string& name) {
-  for (DesignStatus status : {DesignStatus::LoopOpen, DesignStatus::MotionFailed})
+  for (DesignStatus status : {DesignStatus::Feasible, DesignStatus::LoopOpen, DesignStatus::MotionFailed})
     if (name == getName(status)) return status;
-  return DesignStatus::Feasible;
+  throw std::runtime_error("there is no status '" + name + "'");
+}
+
+double readNumber(const Json& json) {
+  const double number = json;
+  if (!std::isfinite(number)) throw std::runtime_error("a number is not finite");
+  return number;
 }
 
 VectorXd readVector(const Json& json) {
-  const std::vector<double> x = json;
+  std::vector<double> x;
+  for (const Json& entry : json) x.push_back(readNumber(entry));
   return VectorXd::Map(x.data(), static_cast<Eigen::Index>(x.size()));
 }
 
@@ -23,7 +33,11 @@ MeasurePieces readPieces(const Json& json) {
   const VectorXd values = readVector(json.at("pieces"));
   const Json& rows = json.at("gradients");
   MatrixXd gradients(values.size(), values.size() ? static_cast<Eigen::Index>(rows.at(0).size()) : 0);
-  for (Eigen::Index i = 0; i < gradients.rows(); ++i) gradients.row(i) = readVector(rows.at(i)).transpose();
+  for (Eigen::Index i = 0; i < gradients.rows(); ++i) {
+    const VectorXd row = readVector(rows.at(i));
+    if (row.size() != gradients.cols()) throw std::runtime_error("gradients have different sizes");
+    gradients.row(i) = row.transpose();
+  }
   return {values, gradients};
 }
 
@@ -33,13 +47,26 @@ Json formatPieces(const MeasurePieces& pieces) {
   return {{"pieces", formatVector(pieces.values)}, {"gradients", rows}};
 }
 
-LoggedEvaluation readLine(const std::string& line) {
-  const Json json = Json::parse(line);
+}  // namespace
+
+std::string formatEvaluation(const LoggedEvaluation& e) {
+  Json json = {{"stage", e.stage},
+               {"x", formatVector(e.x)},
+               {"status", getName(e.status)},
+               {"value", e.value},
+               {"seconds", e.seconds}};
+  if (!e.terms.empty()) json["limits"] = formatPieces(e.limits);
+  for (const MeasurePieces& term : e.terms) json["terms"].push_back(formatPieces(term));
+  return json.dump();
+}
+
+LoggedEvaluation readEvaluation(const std::string& line) {
+  const Json json = parseJson(line);
   LoggedEvaluation out{json.at("stage"),
                        readVector(json.at("x")),
                        readStatus(json.at("status")),
-                       json.at("value"),
-                       json.at("seconds"),
+                       readNumber(json.at("value")),
+                       readNumber(json.at("seconds")),
                        {},
                        {}};
   if (!json.contains("terms")) return out;
@@ -48,16 +75,14 @@ LoggedEvaluation readLine(const std::string& line) {
   return out;
 }
 
-}  // namespace
-
 EvaluationLog::EvaluationLog(const std::string& path, const std::string& header)
     : log_(path, header, "the log is of another design problem, robot or version") {
   int line = 1;
   for (const std::string& text : log_.getLines()) {
     ++line;
     try {
-      left_.push_back(readLine(text));
-    } catch (const Json::exception&) {
+      left_.push_back(readEvaluation(text));
+    } catch (const std::exception&) {
       throw ModelError(path, "line " + std::to_string(line), "it is not as it was written",
                        "remove the file: the search is done anew");
     }
@@ -74,15 +99,6 @@ std::optional<LoggedEvaluation> EvaluationLog::replay(const std::string& stage, 
   return evaluation;
 }
 
-void EvaluationLog::append(const LoggedEvaluation& e) {
-  Json json = {{"stage", e.stage},
-               {"x", formatVector(e.x)},
-               {"status", getName(e.status)},
-               {"value", e.value},
-               {"seconds", e.seconds}};
-  if (!e.terms.empty()) json["limits"] = formatPieces(e.limits);
-  for (const MeasurePieces& term : e.terms) json["terms"].push_back(formatPieces(term));
-  log_.append(json.dump());
-}
+void EvaluationLog::append(const LoggedEvaluation& e) { log_.append(formatEvaluation(e)); }
 
 }  // namespace bielle

@@ -47,7 +47,8 @@ class DesignRunner {
 
   DesignRun run() {
     std::vector<std::thread> threads;
-    for (int i = 0; i < std::min(options_.jobs, spec_.searches); ++i) threads.emplace_back([this] { work(); });
+    const int jobs = options_.evaluations ? spec_.searches : std::min(options_.jobs, spec_.searches);
+    for (int i = 0; i < jobs; ++i) threads.emplace_back([this] { work(); });
     for (std::thread& thread : threads) thread.join();
     if (error_) std::rethrow_exception(error_);
     for (const auto& search : run_.searches)
@@ -71,6 +72,7 @@ class DesignRunner {
         next_ = logs_.size();
         stop_ = true;
       }
+      if (options_.evaluations) options_.evaluations->leave();
     }
   }
 
@@ -90,17 +92,8 @@ class DesignRunner {
     std::optional<LoggedEvaluation> found = logs_[i]->replay(getName(stage.algorithm), x);
     const bool replayed = found.has_value();
     if (!replayed) {
-      const double begin = getThreadSeconds();
-      const SlopedEvaluation sloped = needsGradient(stage.algorithm) ? evaluator_.differentiate(x)
-                                                                     : SlopedEvaluation{evaluator_.evaluate(x), {}, {}};
-      const Evaluation& evaluation = sloped.evaluation;
-      found = {getName(stage.algorithm),
-               x,
-               evaluation.status,
-               evaluation.value,
-               getThreadSeconds() - begin,
-               sloped.terms,
-               sloped.limits};
+      found = options_.evaluations ? options_.evaluations->evaluate(stage.algorithm, x)
+                                   : evaluateDesign(evaluator_, stage.algorithm, x);
       logs_[i]->append(*found);
     }
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -135,6 +128,15 @@ class DesignRunner {
 };
 
 }  // namespace
+
+LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorithm stage, const VectorXd& x) {
+  const double begin = getThreadSeconds();
+  const SlopedEvaluation sloped =
+      needsGradient(stage) ? evaluator.differentiate(x) : SlopedEvaluation{evaluator.evaluate(x), {}, {}};
+  const Evaluation& evaluation = sloped.evaluation;
+  return {getName(stage), x, evaluation.status, evaluation.value, getThreadSeconds() - begin, sloped.terms,
+          sloped.limits};
+}
 
 DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options) {
   return DesignRunner(evaluator, spec, options).run();

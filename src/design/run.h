@@ -13,12 +13,6 @@
 
 namespace bielle {
 
-struct DesignRunOptions {
-  std::string directory;
-  int jobs = 2;                                           ///< searches at a time, one thread each
-  std::function<void(const std::string& line)> progress;  ///< called by one thread at a time
-};
-
 struct LoggedEvaluation {
   std::string stage;  ///< algorithm
   VectorXd x;
@@ -27,6 +21,31 @@ struct LoggedEvaluation {
   double seconds = 0;                ///< processor time at its end
   std::vector<MeasurePieces> terms;  ///< SlopedEvaluation, in stages that need gradients
   MeasurePieces limits;
+};
+
+/// The evaluation of a design as a stage of a search needs it, with its gradients or without.
+LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorithm stage, const VectorXd& x);
+
+/// Its line in a log.
+std::string formatEvaluation(const LoggedEvaluation& evaluation);
+/// \throws std::exception when the text is no such line, or one of its numbers is not finite
+LoggedEvaluation readEvaluation(const std::string& line);
+
+/// A place where designs are evaluated other than in the threads of the searches.
+class DesignEvaluations {
+ public:
+  virtual ~DesignEvaluations() = default;
+  /// What evaluateDesign gives. Called by the threads of all searches. \throws std::exception when there will be none
+  virtual LoggedEvaluation evaluate(SearchAlgorithm stage, const VectorXd& x) = 0;
+  /// A search has ended; called once by each.
+  virtual void leave() = 0;
+};
+
+struct DesignRunOptions {
+  std::string directory;
+  int jobs = 2;                                           ///< searches at a time, one thread each
+  DesignEvaluations* evaluations = nullptr;               ///< then all searches go on at a time
+  std::function<void(const std::string& line)> progress;  ///< called by one thread at a time
 };
 
 struct DesignRun {

@@ -41,14 +41,15 @@ std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry) {
   return motions;
 }
 
+std::string locateRobot(const RobotSpec& spec, const std::string& file) {
+  const fs::path beside = fs::path(file).parent_path() / spec.name;
+  std::error_code error;
+  const bool is_path = spec.name.find('/') != std::string::npos && fs::exists(beside, error);
+  return is_path ? beside.string() : spec.name;
+}
+
 Model makeRobot(const RobotSpec& spec, const std::string& file) {
-  if (spec.generator.empty()) {
-    // A path is relative to the file; a name stays unchanged.
-    const fs::path beside = fs::path(file).parent_path() / spec.name;
-    std::error_code error;
-    const bool is_path = spec.name.find('/') != std::string::npos && fs::exists(beside, error);
-    return loadRobot(is_path ? beside.string() : spec.name).model;
-  }
+  if (spec.generator.empty()) return loadRobot(locateRobot(spec, file)).model;
   const GeneratorRequest request = findGenerator(spec.generator).makeRequest();
   for (const auto& [name, value] : spec.settings) setParameter(request.parameters, name, value);
   return request.make();

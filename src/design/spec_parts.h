@@ -19,6 +19,7 @@ std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry);
 
 // \param file  the file that names the robot: paths are relative to it
 // \throws ModelError when there is no such robot, generator or parameter
+std::string locateRobot(const RobotSpec& spec, const std::string& file);
 Model makeRobot(const RobotSpec& spec, const std::string& file);
 
 }  // namespace bielle

@@ -31,6 +31,15 @@ std::string join(const std::vector<std::string>& words) {
   return text;
 }
 
+// Removes what an earlier task has written, without the directories: removing those takes milliseconds.
+void clearFiles(const fs::path& directory) {
+  std::error_code ignored;
+  std::vector<fs::path> files;
+  for (fs::recursive_directory_iterator it(directory, ignored), end; !ignored && it != end; it.increment(ignored))
+    if (!it->is_directory(ignored) || it->is_symlink(ignored)) files.push_back(it->path());
+  for (const fs::path& file : files) fs::remove(file, ignored);
+}
+
 std::vector<CampaignCell> listCells(const CampaignSpec& spec) {
   size_t count = 1;
   for (const CampaignAxis& axis : spec.axes) {
@@ -186,8 +195,7 @@ class CampaignRunner {
   }
 
   void submit(Running entry) {
-    std::error_code ignored;
-    fs::remove_all(entry.task.directory, ignored);
+    clearFiles(entry.task.directory);
     makeOutputDirectory(entry.task.directory);
     const int id = options_.engine->submit(entry.task);
     running_.emplace(id, std::move(entry));
