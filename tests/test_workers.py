@@ -53,7 +53,7 @@ printf '{"outcome": "%s", "outcome_message": "", "duration": 1, "distance": %s, 
 exit $status
 """
 GRID = "motions: [squat]\noptions:\n  friction: [%s]\n  seed: [0, 1, 2, 3, 4, 5, 6, 7]\n"
-COUNT, SMALL = 160, 40
+COUNT, SMALL = 120, 24
 
 
 def find_port():
