@@ -3,7 +3,8 @@
 
 All of them run on this machine, and evaluations nap: what is measured is what it costs to hand tasks out and to take results,
 by the real command, its checks and its log. The share of time that is busy is the sum of all naps over the time from the
-begin of the first to the end of the last, times the number of workers.
+begin of the first to the end of the last, times the number of workers; and the same without begin and end. Workers keep
+their files in memory.
 """
 import argparse
 import os
@@ -67,7 +68,18 @@ def find_child(pid):
         return int(file.read().split()[0])
 
 
-def measure(program, workers, nap, rounds, port):
+def calc_busy(naps, workers, rounds):
+    """The share of busy time from the first nap to the last, and in its middle: without the time in which workers join and
+    the one in which there is no more for all of them."""
+    first, last = min(start for start, _ in naps), max(end for _, end in naps)
+    whole = sum(end - start for start, end in naps) / workers / (last - first)
+    starts = sorted(start for start, _ in naps)
+    begin, end = starts[min(4, rounds // 4) * workers], starts[-workers]
+    middle = sum(max(0, min(b, end) - max(a, begin)) for a, b in naps) / workers / (end - begin)
+    return last - first, whole, middle
+
+
+def measure(program, workers, nap, rounds, port, scratch):
     count = workers * rounds
     with open("spec.yaml", "w", encoding="utf-8") as file:
         file.write("motions: [squat]\noptions: {seed: [%s]}\n" % ", ".join(map(str, range(count))))
@@ -79,7 +91,7 @@ def measure(program, workers, nap, rounds, port):
                                    stderr=log, stdout=log)
     while "motion" not in "".join(os.listdir(f"out-{nap}/running") if os.path.isdir(f"out-{nap}/running") else []):
         time.sleep(0.05)
-    joined = [subprocess.Popen(["work_queue_worker", "--cores", "1", "--disk", "100", "--memory", "100", "-s", "workers",
+    joined = [subprocess.Popen(["work_queue_worker", "--cores", "1", "--disk", "100", "--memory", "100", "-s", scratch,
                                 "localhost", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                                start_new_session=True, env=environment) for _ in range(workers)]
     spent = [0, 0]
@@ -97,9 +109,7 @@ def measure(program, workers, nap, rounds, port):
     assert manager.returncode == 0, "\n".join(read_lines("manager.log")[-5:])
     naps = [tuple(map(float, line.split())) for line in read_lines("record")]
     assert len(naps) == count, (len(naps), count)
-    first, last = min(start for start, _ in naps), max(end for _, end in naps)
-    busy = sum(end - start for start, end in naps) / workers / (last - first)
-    return count, last - first, busy, spent
+    return count, *calc_busy(naps, workers, rounds), spent
 
 
 def main():
@@ -115,7 +125,6 @@ def main():
     with tempfile.TemporaryDirectory() as place:
         os.chdir(place)
         os.makedirs("bin")
-        os.makedirs("workers")
         for name in ("bielle", "bielle-workers"):
             shutil.copy(os.path.join(os.path.dirname(built), name), "bin")
         with open("nap.c", "w", encoding="utf-8") as file:
@@ -123,15 +132,17 @@ def main():
         subprocess.run(["cc", "-O2", "-static", "nap.c", "-o", "bin/bielle-simulate"], check=True)
         subprocess.run([built, "solve", "squat", "--robot", "bipetto", "--depth", "0.9", "-o", "squat", "--quiet",
                         "--no-report", "--no-check"], check=True, stdout=subprocess.DEVNULL)
-        print("| workers | nap [s] | tasks | time [s] | busy | the command, per task [ms] | bielle-workers [ms] |")
-        print("|---|---|---|---|---|---|---|")
+        scratch = tempfile.mkdtemp(dir="/dev/shm" if os.path.isdir("/dev/shm") else place)
+        print("| workers | nap [s] | tasks | time [s] | busy, whole | middle | command, per task [ms] | bielle-workers [ms] |")
+        print("|---|---|---|---|---|---|---|---|")
         for workers in arguments.workers:
             for nap in arguments.nap:
                 shutil.rmtree(f"out-{nap}", ignore_errors=True)
-                count, seconds, busy, spent = measure(os.path.abspath("bin/bielle"), workers, nap, arguments.rounds,
-                                                      arguments.port)
-                print(f"| {workers} | {nap:g} | {count} | {seconds:.1f} | {100 * busy:.0f} % | "
+                count, seconds, whole, middle, spent = measure(os.path.abspath("bin/bielle"), workers, nap, arguments.rounds,
+                                                               arguments.port, scratch)
+                print(f"| {workers} | {nap:g} | {count} | {seconds:.1f} | {100 * whole:.0f} % | {100 * middle:.0f} % | "
                       f"{1e3 * spent[0] / count:.2f} | {1e3 * spent[1] / count:.2f} |", flush=True)
+        shutil.rmtree(scratch)
         os.chdir("/")
 
 

@@ -29,8 +29,7 @@ status=$((sum % 3 == 0))
 number=0.$sum
 for bad in "${BAD:-/nowhere}"/*; do
   [ -e "$BAD-$sum" ] && [ ! -e "$BAD-always" ] && break
-  mv "$bad" "$bad.$$" 2>/dev/null || continue
-  mv "$bad.$$" "$BAD-$sum"
+  mv "$bad" "$BAD-$sum" 2>/dev/null || continue
   case $(basename "$bad") in
     nan) number=NaN ;;
     null) number=null ;;

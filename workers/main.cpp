@@ -10,6 +10,7 @@ extern "C" {
 
 #include <chrono>
 #include <cstdlib>
+#include <cstring>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -21,8 +22,8 @@ namespace {
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-constexpr int kBrokenStatus = 127;  // of tasks that did not run to their end
-constexpr int kKeepAlive = 30;      // s; a machine that says nothing for so long is gone, its tasks go to others
+constexpr int kMostOutput = 10'000;  // bytes
+constexpr int kKeepAlive = 30;       // s; a machine that says nothing for so long is gone, its tasks go to others
 constexpr auto kCountAgain = std::chrono::milliseconds(200);  // how old a count of the workers may be
 
 struct QueueDeleter {
@@ -63,7 +64,7 @@ class Manager {
     // Outputs that are missing tell the caller enough, beside the status.
     const bool ran = (task->result & ~WORK_QUEUE_RESULT_OUTPUT_MISSING) == WORK_QUEUE_RESULT_SUCCESS;
     say({{"task", std::stoi(task->tag)},
-         {"status", ran ? task->return_status : kBrokenStatus},
+         {"output", ran && task->output ? std::string(task->output, strnlen(task->output, kMostOutput)) : ""},
          {"seconds", 1e-6 * static_cast<double>(task->time_workers_execute_last)},
          {"cores", countCores()}});
   }
@@ -75,7 +76,9 @@ class Manager {
       throw std::runtime_error("Work Queue takes no file " + there);
   }
 
-  static void say(const json& message) { std::cout << message.dump() << std::endl; }
+  static void say(const json& message) {
+    std::cout << message.dump(-1, ' ', false, json::error_handler_t::replace) << std::endl;
+  }
 
   // Of the workers that have joined. Counting goes through all of them.
   int countCores() {

@@ -6,9 +6,13 @@
 ///     it says   {"port": 9123}                                                         once, when workers can join
 ///     we say    {"task": 1, "command": "...", "inputs": [["/here", "there"], ...], "outputs": [["there", "/here"], ...]}
 ///     we say    {"wait": true}                                         and nothing more until the answer has come:
-///     it says   {"task": 1, "status": 0, "seconds": 1.5, "cores": 64}         a task has ended; cores that have joined
+///     it says   {"task": 1, "output": "0\n", "seconds": 1.5, "cores": 64}      it has ended; cores that have joined
+/// Handing a task out costs milliseconds of both machines. Short tasks that read the same files therefore go in bundles, one
+/// command line after the other, whose output is their exit statuses; as long as there are enough for all workers.
+///
 /// It opens the port that it is told and no other, and ends with us. Workers that are lost, it replaces by others by itself.
-#include <functional>
+#include <deque>
+#include <map>
 #include <set>
 
 #include "tasks/child.h"
@@ -39,6 +43,13 @@ class WorkerTasks : public TaskEngine {
   bool isRemote() const override { return true; }
 
  private:
+  struct Held {
+    int id;
+    Task task;
+  };
+
+  int getBundleSize() const;
+  void sendBundles();
   void send(const std::string& line);
   bool receive(std::string& line);  // false if the user asks for the end
 
@@ -46,8 +57,12 @@ class WorkerTasks : public TaskEngine {
   PipedChild companion_;
   std::string received_;  // not yet read
   int port_ = 0, next_ = 0;
-  int cores_ = 256;  // as long as none has been counted
-  std::set<int> running_;
+  int cores_ = 256;         // as long as none has been counted
+  double mean_ = 0;         // of the durations of tasks, the last ones above all, s; 0: not known
+  std::set<int> running_;   // submitted and not returned by wait()
+  std::vector<Held> held_;  // of them, those that have not been sent
+  std::map<int, std::vector<int>> bundles_;
+  std::deque<TaskEnd> ended_;
 };
 
 }  // namespace bielle::tasks
