@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "bielle/io/record.h"
+#include "bielle/io/refinement.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "cli_command.h"
@@ -161,6 +162,28 @@ TEST_CASE("the rule of the steps is what was asked for") {
   CHECK(run(makeShortSquat(directory.str(), {"--step", "euler"})).status == 0);
   CHECK(directory.readSummary()["step"] == "euler");
   checkRefused(run(makeShortSquat(directory.str(), {"--step", "best"})), "best");
+}
+
+TEST_CASE("stages that turn out too long are halved, unless their length was asked for") {
+  const OutputDirectory directory;
+  const std::vector<std::string> walk{
+      "solve", "walk",           "--robot", "bipetto", "-o", directory.str(), "--speed", "0.4", "--single-support",
+      "0.25",  "--swing-height", "0.14",    "--steps", "2"};
+  const auto solve = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), walk.begin(), walk.end());
+    return run(more);
+  };
+  const Model model = loadRobot("bipetto").model;
+  const CommandResult halved = solve({"--no-check"});
+  INFO(halved.out << halved.err);
+  CHECK(halved.status == 0);
+  CHECK_THAT(halved.out, Catch::Contains("once more, in stages half as long"));
+  CHECK(directory.readSummary()["requested"]["time_step"] == 0.006);
+  CHECK(calcStepError(model, directory.readTrajectory()) < 0.5 * kLargestStepError);
+  const CommandResult asked = solve({"--no-check", "--quiet", "--set", "time_step=0.012"});
+  CHECK(asked.status == 0);
+  CHECK(directory.readSummary()["requested"]["time_step"] == 0.012);
+  CHECK(calcStepError(model, directory.readTrajectory()) > kLargestStepError);
 }
 
 TEST_CASE("scripts that name a kind of barrier get the limits that motions keep anyway") {

@@ -2,6 +2,7 @@
 
 #include <pybind11/stl.h>
 
+#include "bielle/io/refinement.h"
 #include "bielle/report/report.h"
 #include "bind.h"
 #include "motion.h"
@@ -119,8 +120,16 @@ MotionResult solveRequest(const Robot& robot, const Request& asked, ProblemOptio
     motion = std::move(scaled);
     first = solver;
   }
+  const RunInfo run{robot.name, robot.file, {}};
   const FddpSummary summary = solveMotion(motion, first, observer);
-  return makeResult({robot.name, robot.file, {}}, motion, motion.guess, summary);
+  MotionResult result = makeResult(run, motion, motion.guess, summary);
+  if (!result.converged() || objective.objective != Objective::Effort || problem.timings.areGiven()) return result;
+  if (std::optional<Motion> refined = refineStages(request, model, problem, motion, result.record)) {
+    const FddpSummary again = solveMotion(*refined, solver, observer);
+    if (again.termination == FddpTermination::Converged)
+      result = makeResult(run, *refined, refined->guess, addUp(summary, again));
+  }
+  return result;
 }
 
 }  // namespace

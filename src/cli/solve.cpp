@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "bielle/io/motion_registry.h"
+#include "bielle/io/refinement.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "bielle/report/report.h"
@@ -243,7 +244,20 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   const FddpSummary summary = solveMotion(motion, solver, makeObserver(arguments));
   const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed",
                     serial ? arguments.serial_armature : ""};
-  const MotionResult result = makeResult(run, motion, motion.guess, summary);
+  MotionResult result = makeResult(run, motion, motion.guess, summary);
+  if (result.converged() && problem.objective.objective == Objective::Effort && !problem.timings.areGiven()) {
+    if (std::optional<Motion> refined = refineStages(request, model, problem, motion, result.record)) {
+      if (!arguments.quiet)
+        std::cout << "velocities differ from their finite differences by "
+                  << formatNumber(100 * calcStepError(model, result.record), "%.2f")
+                  << " %: once more, in stages half as long" << std::endl;
+      const FddpSummary again = solveMotion(*refined, arguments.solver, makeObserver(arguments));
+      if (again.termination == FddpTermination::Converged)
+        result = makeResult(run, *refined, refined->guess, addUp(summary, again));
+      else
+        std::cout << "in stages half as long: " << getName(again.termination) << "; the longer ones are kept\n";
+    }
+  }
   printResult(result, writeResult(arguments.directory, result));
   const bool failed = !arguments.no_check && !checkResult(arguments.directory);
   if (!arguments.no_report) addReport(arguments.directory);  // the check is part of it
