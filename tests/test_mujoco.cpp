@@ -8,6 +8,7 @@
 #include "bielle/model/reader.h"
 #include "engines/mujoco_model.h"
 #include "mechanisms.h"
+#include "robot_directory.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -202,4 +203,144 @@ TEST_CASE("MuJoCo takes motors in their order, with their limits, joints with th
   CHECK(mj.jnt_range[0] == -0.5);
   CHECK(mj.jnt_range[1] == 1.5);
   CHECK(mujoco.getBody(1) == mj_name2id(&mj, mjOBJ_BODY, "a & b"));
+}
+
+namespace {
+
+// A file of MuJoCo's language in most of what the reader reads (not fullinertia, whose principal axes MuJoCo finds to 2e-9): classes, angles in degrees, all orientations, bodies of
+// several joints and of none, inertias by shapes, weld and connect.
+const char* const kHandWritten = R"(<mujoco model="hand">
+  <compiler eulerseq="zYx" autolimits="true"/>
+  <option gravity="0.3 -0.2 -9.5"/>
+  <default>
+    <joint damping="0.3" armature="0.02"/>
+    <geom density="700"/>
+    <default class="leg">
+      <joint armature="0.05" axis="0 1 0"/>
+      <default class="foot"><geom type="box" size="0.1 0.05 0.02" mass="0.4"/></default>
+    </default>
+  </default>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <body name="trunk" pos="0.1 0.2 0.7" euler="20 -30 40">
+      <freejoint name="root"/>
+      <inertial pos="0.01 0.02 0.1" mass="5" diaginertia="0.2 0.3 0.25"/>
+      <site name="imu" pos="0 0 0.1" zaxis="1 2 3"/>
+      <body name="hip" pos="0 0.1 -0.1" axisangle="1 1 0 25" childclass="leg">
+        <joint name="roll" axis="1 0 0" pos="0.01 0.02 0.03" ref="10"/>
+        <joint name="pitch" pos="0 0.01 0" range="-90 45" springref="15" stiffness="3"/>
+        <joint name="stretch" type="slide" axis="0 0 -1" ref="0.05" armature="0.3"/>
+        <geom type="capsule" fromto="0 0 0 0.02 0.01 -0.3" size="0.04"/>
+        <geom type="ellipsoid" size="0.05 0.04 0.03" pos="0 0.03 -0.1" quat="0.7 0.1 0.3 -0.2"/>
+        <body name="shin" pos="0.02 0.01 -0.3" xyaxes="1 0.1 0 0 1 0.2">
+          <joint name="knee" pos="0.005 0 0.01" ref="-20"/>
+          <geom type="cylinder" size="0.03 0.15" pos="0 0 -0.15" mass="1.1"/>
+          <body name="plate" pos="0 0 -0.3" zaxis="0.1 0 1"><geom class="foot"/>
+            <body name="toe" pos="0.1 0 0">
+              <joint name="toe_ball" type="ball" pos="0 0.01 0" damping="0"/><geom size="0.03" type="sphere"/>
+            </body>
+          </body>
+        </body>
+      </body>
+      <body name="rod" pos="0.1 0 -0.1">
+        <joint name="rod_x" axis="1 0 0.5"/><joint name="rod_y" axis="0 1 0"/>
+        <inertial pos="0 0 -0.2" mass="0.3" diaginertia="0.003 0.003 0.0005" euler="0 30 10"/>
+        <body name="slider" pos="0 0 -0.3"><joint type="slide" name="slider"/>
+          <inertial pos="0 0 0" mass="0.2" diaginertia="0.001 0.001 0.001"/></body>
+      </body>
+    </body>
+  </worldbody>
+  <equality>
+    <connect name="tie" body1="slider" body2="shin" anchor="0.01 0.02 0.05"/>
+    <weld name="glue" body1="plate" body2="rod" relpose="0.1 0.2 0.3 0.8 0.1 0.2 0.3" anchor="0.01 0.03 -0.02"/>
+    <joint name="belt" joint1="knee" joint2="pitch" polycoef="0.1 -0.5 0 0 0"/>
+  </equality>
+  <actuator><motor name="m" joint="knee" gear="5" ctrlrange="-3 3"/></actuator>
+</mujoco>)";
+
+}  // namespace
+
+TEST_CASE("MuJoCo and the reader of its files read the same mechanism") {
+  const RobotDirectory directory;
+  const std::string path = directory.write("hand.xml", kHandWritten);
+  const LoadedRobot robot = loadRobot(path);
+  const Model& model = robot.model;
+  char error[500] = "";
+  const std::unique_ptr<mjModel, void (*)(mjModel*)> mj(mj_loadXML(path.c_str(), nullptr, error, sizeof error),
+                                                        mj_deleteModel);
+  CAPTURE(std::string(error));
+  REQUIRE(mj);
+  const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(mj.get()), mj_deleteData);
+  REQUIRE(mj->nv == model.nv());
+  REQUIRE(mj->nq == model.nq());
+  REQUIRE(mj->njnt == model.numBodies() - 1);
+
+  // Ours has the same joints with the same q, but for the order of quaternions and the frame of the free velocity.
+  std::mt19937 rng(17);
+  Workspace ws(model);
+  double mass = 0, bias = 0, gap = 0, place = 0;
+  for (int sample = 0; sample < 5; ++sample) {
+    const VectorXd v = randomVector(rng, model.nv());
+    const VectorXd q = model.integrate(model.makeNeutral(), randomVector(rng, model.nv(), 0.7));
+    MatrixXd T = MatrixXd::Zero(model.nv(), model.nv());  // qvel = T v
+    VectorXd rate = VectorXd::Zero(model.nv());           // dT/dt v
+    for (int j = 0; j < mj->njnt; ++j) {
+      const Joint& joint = model.joints()[model.findJoint(mj_id2name(mj.get(), mjOBJ_JOINT, j))];
+      const VectorXd own = q.segment(joint.idx_q, joint.nq);
+      VectorXd qpos = own;
+      Eigen::Block<MatrixXd> block = T.block(mj->jnt_dofadr[j], joint.idx_v, joint.nv, joint.nv);
+      block.setIdentity();
+      if (joint.nq >= 4) qpos.tail<4>() << own[joint.nq - 1], own.segment<3>(joint.nq - 4);
+      if (joint.nq == 7) {
+        const Matrix3d R = Eigen::Quaterniond(Eigen::Vector4d(own.tail<4>())).toRotationMatrix();
+        block.topLeftCorner<3, 3>() = R;
+        const VectorXd w = v.segment(joint.idx_v, 6);
+        rate.segment<3>(mj->jnt_dofadr[j]) = R * Vector3d(w.tail<3>()).cross(Vector3d(w.head<3>()));
+      }
+      Eigen::Map<VectorXd>(data->qpos + mj->jnt_qposadr[j], joint.nq) = qpos;
+    }
+    Eigen::Map<VectorXd>(data->qvel, mj->nv) = T * v;
+    mj_forward(mj.get(), data.get());
+    RowMatrixXd full(mj->nv, mj->nv);
+    mj_fullM(mj.get(), full.data(), data->qM);
+    updatePositions(model, ws, q);
+    updateVelocities(model, ws, v);
+    updateMassMatrix(model, ws);
+    updateBias(model, ws);
+    mass = std::max(mass, calcRelativeError(T.transpose() * full * T, ws.M));
+    const Eigen::Map<VectorXd> force(data->qfrc_bias, mj->nv), passive(data->qfrc_passive, mj->nv),
+        armature(mj->dof_armature, mj->nv);
+    bias = std::max(
+        bias, calcRelativeError(T.transpose() * (force - passive + full * rate - armature.cwiseProduct(rate)), ws.b));
+    const int imu = model.findFrame("imu");
+    const Vector3d site = getPlacement(ws, model.frames()[imu].body, model.frames()[imu].X_BF).p;
+    place = std::max(place, (site - Eigen::Map<Vector3d>(data->site_xpos)).norm());
+    // Rows of connect and weld hold the differences of positions; the next are rotations, in another measure.
+    const auto tie = [&](const char* name) {
+      const Closure& c = model.closures()[model.findClosure(name)];
+      return Vector3d(getPlacement(ws, c.body1, c.X_B1).p - getPlacement(ws, c.body2, c.X_B2).p);
+    };
+    gap = std::max(gap, (tie("tie") - Eigen::Map<Vector3d>(data->efc_pos)).norm());
+    gap = std::max(gap, (tie("glue") - Eigen::Map<Vector3d>(data->efc_pos + 3)).norm());
+    const Closure& belt = model.closures()[model.findClosure("belt")];
+    double residual = -belt.offset;
+    for (const CouplerTerm& term : belt.terms) residual += term.coefficient * q[term.idx_q];
+    gap = std::max(gap, std::abs(residual - data->efc_pos[9]));
+    CHECK(std::abs(residual) > 1e-3);
+  }
+  CHECK(mass < kTolerance);
+  CHECK(bias < kTolerance);
+  CHECK(gap < kTolerance);
+  CHECK(place < kTolerance);
+
+  REQUIRE(model.nu() == 1);
+  CHECK(model.motors()[0].effort_limit == 15);
+  CHECK(model.lowerLimits()[model.joints()[model.findJoint("pitch")].idx_v] == Approx(-EIGEN_PI / 2).epsilon(1e-15));
+  REQUIRE(robot.warnings.size() >= 2);
+  const auto warns = [&](const std::string& text) {
+    return std::any_of(robot.warnings.begin(), robot.warnings.end(),
+                       [&](const std::string& w) { return w.find(text) != std::string::npos; });
+  };
+  CHECK(warns("<light> (line 13): left out"));
+  CHECK(warns("<motor> (line 47): its input is the torque or force of its joint here"));
 }

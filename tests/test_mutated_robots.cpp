@@ -8,6 +8,8 @@
 #include <random>
 #include <regex>
 
+#include "bielle/dynamics/assembly.h"
+#include "io/mjcf.h"
 #include "robot_directory.h"
 #include "robot_trial.h"
 
@@ -198,4 +200,31 @@ TEST_CASE("Mutated robot files are models or clear errors") {
   CHECK(count[Trial::Valid] > kTrials / 20);
   CHECK(count[Trial::Refused] > kTrials / 4);
   CHECK(said.size() > 30);
+}
+
+TEST_CASE("Mutated files of MuJoCo are models or clear errors") {
+  constexpr int kTrials = 4000;
+  std::vector<std::string> files;
+  for (const char* name : {"fourbar", "fivebar_leg", "spring_leg", "belt_biped"}) {
+    const Model model = loadRobot(BIELLE_SOURCE_DIR "/robots/" + std::string(name)).model;
+    files.push_back(formatMjcf(model, findClosedConfiguration(model).q).xml);
+  }
+  const RobotDirectory directory;
+  std::map<Trial, int> count;
+  std::map<std::string, int> said;
+  for (int i = 0; i < kTrials; ++i) {
+    Random rng(i);
+    const std::string path =
+        directory.write("robot.xml", mutate(files[choose(rng, static_cast<int>(files.size()))], rng));
+    const TrialResult result = tryRobot(path);
+    ++count[result.trial];
+    if (result.trial == Trial::Refused) ++said[result.message.substr(result.message.rfind("; "))];
+    CAPTURE(i, result.message);
+    CHECK(result.trial != Trial::Wrong);
+  }
+  std::cout << kTrials << " mutated files of MuJoCo: " << count[Trial::Valid] << " models, " << count[Trial::Refused]
+            << " refused with " << said.size() << " different remedies\n";
+  CHECK(count[Trial::Valid] > kTrials / 20);
+  CHECK(count[Trial::Refused] > kTrials / 4);
+  CHECK(said.size() > 20);
 }

@@ -137,7 +137,9 @@ void addBench(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("bench", "Measure speed: per node, whole solves, receding horizon, growth");
   const auto arguments = std::make_shared<Arguments>();
   arguments->robot.name = "bipetto";
-  command.add_option("--robot", arguments->robot.name, "name, directory or .urdf file of a robot with two feet")
+  command
+      .add_option("--robot", arguments->robot.name,
+                  "name, directory, .urdf or MuJoCo .xml file of a robot with two feet")
       ->capture_default_str();
   command.add_option("--threads", arguments->options.threads, "compared with one thread")
       ->check(CLI::Range(1, 1024))

@@ -98,7 +98,7 @@ void addStudy(CLI::App& app, Action& action) {
   addTaskOptions(command, "cases at a time, one process each", arguments->tasks);
   command
       .add_option("--robot", arguments->robot,
-                  "name, directory or .urdf file of a robot with an approximate serial model")
+                  "name, directory, .urdf or MuJoCo .xml file of a robot with an approximate serial model")
       ->capture_default_str();
   command.add_option("--values", arguments->values, "values of the parameter of one study, instead of its own");
   command.footer(

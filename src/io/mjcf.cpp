@@ -222,6 +222,21 @@ class Writer {
     }
     for (const ContactFrame& contact : model_.contacts())
       if (contact.body == body) writeSole(contact, indent);
+    for (const Frame& frame : model_.frames())
+      if (frame.body == body && frame.name != model_.bodies()[body].name) writeFrame(frame, indent);
+  }
+
+  // Contacts are sites of their names, too.
+  void writeFrame(const Frame& frame, const std::string& indent) {
+    const int contact = model_.findContact(frame.name);
+    if (contact < 0) {
+      out_ << indent << "<site" << attribute("name", frame.name) << formatPlacement(frame.X_BF)
+           << " size=\"0.001\" group=\"4\"/>\n";
+      return;
+    }
+    const ContactFrame& other = model_.contacts()[contact];
+    if (other.body != frame.body || other.X_BF.p != frame.X_BF.p || other.X_BF.R != frame.X_BF.R)
+      warn("frame '" + frame.name + "'", "it is left out: a contact elsewhere has this name");
   }
 
   void writeSole(const ContactFrame& contact, const std::string& indent) {
@@ -357,6 +372,15 @@ class Writer {
           model_.armature()[joint.idx_v] != 0)
         warn("joint '" + joint.name + "'", "its armature acts on accelerations in the frame of its parent");
     }
+    for (const Reference& reference : model_.references())
+      if (!reference.height_frame.empty() || !reference.feet.empty())
+        warn("reference '" + reference.name + "'", "of it only the assembled posture is written, as a keyframe");
+    if (!model_.serialJoints().empty()) warn("serial joints", "they are left out");
+    for (const Joint& joint : model_.joints())
+      if (joint.position_importance != 1 || joint.velocity_importance != 1)
+        warn("joint '" + joint.name + "'", "its importance is left out");
+    for (const Motor& motor : model_.motors())
+      if (motor.torque_loss) warn("motor '" + motor.name + "'", "its torque_loss is left out");
     if (!speeds.empty()) warn("joints " + speeds, "their limits of speed are left out");
     for (const std::string& mesh : meshes_) meshes += (meshes.empty() ? "'" : ", '") + mesh + "'";
     if (!meshes.empty()) warn("meshes " + meshes, "they are left out");

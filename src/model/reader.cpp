@@ -1,4 +1,4 @@
-// Combines the two files of a robot.
+// Combines the two files of a robot, or the contents of one of MuJoCo.
 #include "bielle/model/reader.h"
 
 #include <algorithm>
@@ -26,7 +26,10 @@ void retypeJoints(const YamlFile& yaml, UrdfFile& urdf) {
       continue;
     }
     // The limits of the file belong to its own coordinate.
-    if (getNv(type.kind) != getNv(it->joint.kind)) it->lower = it->upper = it->effort = it->velocity = std::nullopt;
+    if (getNv(type.kind) != getNv(it->joint.kind)) {
+      it->lower = it->upper = VectorXd();
+      it->effort = it->velocity = std::nullopt;
+    }
     it->joint.kind = type.kind;
     if (type.kind != JointKind::Universal) continue;
     it->joint.axis = type.axis;
@@ -77,6 +80,10 @@ struct RobotFiles {
 };
 
 RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
+  if (path.extension() == ".xml") {
+    MjcfFile file = readMjcf(path.string());
+    return {std::move(file.tree), std::move(file.settings)};
+  }
   RobotFiles files{readUrdf(path.string()), {}};
   std::filesystem::path settings = path;
   settings.replace_extension(".yaml");
@@ -126,6 +133,16 @@ RobotFiles readRobotFiles(const std::filesystem::path& path) {
   return files;
 }
 
+// Free bodies of a file that has its own base, fixed to the ground.
+void fixBase(UrdfFile& tree, YamlFile& yaml) {
+  for (UrdfJoint& j : tree.joints) {
+    if (j.joint.kind != JointKind::FreeFlyer || j.parent != tree.root) continue;
+    j.joint.kind = JointKind::Fixed;
+    yaml.armature.erase(j.joint.name);
+    for (Reference& reference : yaml.references) reference.joints.erase(j.joint.name);
+  }
+}
+
 // The root link: carried by a free-flyer, or part of the ground. A root named "world" is the ground itself.
 void addRoot(const UrdfFile& urdf, BaseKind base, ModelBuilder& builder) {
   if (urdf.root == "world") return;
@@ -137,15 +154,11 @@ void addRoot(const UrdfFile& urdf, BaseKind base, ModelBuilder& builder) {
 
 void addJoints(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {
   for (const UrdfJoint& j : urdf.joints) {
-    JointLimits limits;
+    JointLimits limits = {j.lower, j.upper, {}};
     std::optional<double> velocity = j.velocity;
     for (const MotorSpec& motor : yaml.motors)
       if (motor.joint == j.joint.name && motor.velocity) velocity = motor.velocity;
-    if (getNv(j.joint.kind) == 1) {
-      if (j.lower) limits.lower = VectorXd::Constant(1, *j.lower);
-      if (j.upper) limits.upper = VectorXd::Constant(1, *j.upper);
-      if (velocity) limits.velocity = VectorXd::Constant(1, *velocity);
-    }
+    if (velocity && getNv(j.joint.kind) == 1) limits.velocity = VectorXd::Constant(1, *velocity);
     builder.addLink(j.child, j.parent, j.joint, urdf.links.at(j.child).inertia, limits);
   }
   for (const auto& [name, link] : urdf.links)
@@ -231,8 +244,10 @@ LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& option
   if (yaml.cross_inertia) splitUniversalJoints(*yaml.cross_inertia, urdf);
   setImportance(yaml, urdf);
 
+  const BaseKind base = options.base.value_or(yaml.base.value_or(BaseKind::Free));
+  if (urdf.has_own_base && base == BaseKind::Fixed) fixBase(urdf, yaml);
   ModelBuilder builder(urdf.name, urdf.path);
-  addRoot(urdf, options.base.value_or(yaml.base.value_or(BaseKind::Free)), builder);
+  addRoot(urdf, base, builder);
   addJoints(urdf, yaml, builder);
   builder.setSource(yaml.path);
   addMotors(urdf, yaml, builder);

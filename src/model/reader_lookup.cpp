@@ -33,7 +33,10 @@ bool isDirectory(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-// robot.urdf, else the one named as the directory, else the only one; without any, the YAML named as the directory.
+bool isTree(const fs::path& path) { return path.extension() == ".urdf" || path.extension() == ".xml"; }
+
+// robot.urdf, else the one named as the directory, else the only one; without any, the YAML or MJCF named as the
+// directory.
 std::string findInDirectory(const fs::path& directory) {
   const fs::path named = fs::absolute(directory).lexically_normal();
   const std::string stem = (named.has_filename() ? named : named.parent_path()).filename().string();
@@ -44,7 +47,8 @@ std::string findInDirectory(const fs::path& directory) {
   for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error))
     if (it->path().extension() == ".urdf" && isFile(it->path())) found.push_back(it->path().string());
   if (found.size() == 1) return found.front();
-  if (found.empty() && isFile(directory / (stem + ".yaml"))) return (directory / (stem + ".yaml")).string();
+  for (const char* extension : {".yaml", ".xml"})
+    if (found.empty() && isFile(directory / (stem + extension))) return (directory / (stem + extension)).string();
   std::sort(found.begin(), found.end());
   throw ModelError(directory.string(), "directory",
                    found.empty() ? "it holds no .urdf file" : "it holds several .urdf files: " + join(found),
@@ -54,7 +58,7 @@ std::string findInDirectory(const fs::path& directory) {
 // In the directories of robots; empty when there is none.
 std::string findByName(const std::string& name) {
   for (const std::string& directory : getRobotDirectories())
-    for (const std::string& file : {name + ".urdf", std::string("robot.urdf"), name + ".yaml"})
+    for (const std::string& file : {name + ".urdf", std::string("robot.urdf"), name + ".yaml", name + ".xml"})
       if (const fs::path path = fs::path(directory) / name / file; isFile(path)) return path.string();
   return "";
 }
@@ -109,10 +113,10 @@ std::vector<std::string> getRobotDirectories() {
 std::string findModel(const YamlFile& yaml) {
   for (const std::string& model : yaml.models) {
     const fs::path place = fs::path(yaml.path).parent_path() / model;
-    if (isFile(place) && place.extension() == ".urdf") return place.string();
-    if (isDirectory(place) && fs::path(findInDirectory(place)).extension() == ".urdf") return findInDirectory(place);
+    if (isFile(place) && isTree(place)) return place.string();
+    if (isDirectory(place) && isTree(findInDirectory(place))) return findInDirectory(place);
     const std::string file = findByName(model);
-    if (fs::path(file).extension() == ".urdf") return file;
+    if (isTree(file)) return file;
   }
   return "";
 }
@@ -123,7 +127,9 @@ std::vector<std::string> listRobots() {
     std::error_code error;
     for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
       const std::string name = it->path().filename().string();
-      if (isFile(it->path() / (name + ".urdf")) || completesModel(it->path() / (name + ".yaml"))) names.insert(name);
+      if (isFile(it->path() / (name + ".urdf")) || isFile(it->path() / (name + ".xml")) ||
+          completesModel(it->path() / (name + ".yaml")))
+        names.insert(name);
     }
   }
   return {names.begin(), names.end()};
@@ -132,7 +138,7 @@ std::vector<std::string> listRobots() {
 std::string findRobotFile(const std::string& name_or_path) {
   const fs::path path = name_or_path;
   const bool is_name = !name_or_path.empty() && name_or_path.find('/') == std::string::npos &&
-                       path.extension() != ".urdf" && path.extension() != ".yaml";
+                       path.extension() != ".yaml" && !isTree(path);
   if (is_name)
     if (const std::string file = findByName(name_or_path); !file.empty()) return file;
   if (isDirectory(path)) return findInDirectory(path);

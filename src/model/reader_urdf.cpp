@@ -1,10 +1,8 @@
 // The only file that uses urdfdom. TinyXML, on which urdfdom is based, first provides what urdfdom discards or accepts:
 // the order of the joints, links with two parents, detached cycles, the place of a bad number.
 #include <console_bridge/console.h>
-#include <tinyxml.h>
 #include <urdf_parser/urdf_parser.h>
 
-#include <cctype>
 #include <cmath>
 #include <locale>
 #include <mutex>
@@ -13,11 +11,10 @@
 
 #include "bielle/model/error.h"
 #include "model/robot_files.h"
+#include "model/xml_document.h"
 
 namespace bielle {
 namespace {
-
-constexpr int kMaxDepth = 200;  // of nested elements; TinyXML recurses without a limit
 
 struct NumberRule {
   const char *tag, *attribute;
@@ -60,17 +57,6 @@ class LogCapture : public console_bridge::OutputHandler {
   std::string text_;
 };
 
-void checkDepth(const std::string& xml, const std::string& path) {
-  int depth = 0;
-  for (size_t i = 0; i + 1 < xml.size(); ++i) {
-    if (xml[i] == '<' && std::isalpha(static_cast<unsigned char>(xml[i + 1]))) ++depth;
-    if ((xml[i] == '<' && xml[i + 1] == '/') || (xml[i] == '/' && xml[i + 1] == '>')) --depth;
-    if (depth > kMaxDepth)
-      throw ModelError(path, "element 'robot'", "elements are nested deeper than " + std::to_string(kMaxDepth),
-                       "close them; a URDF needs five levels");
-  }
-}
-
 bool areFiniteNumbers(const std::string& text, int count) {
   std::istringstream stream(text);
   stream.imbue(std::locale::classic());
@@ -92,11 +78,6 @@ void checkNumbers(const TiXmlElement& element, const std::string& owner, const s
   }
   for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement())
     checkNumbers(*e, owner, path);
-}
-
-std::string getAttribute(const TiXmlElement* element, const char* attribute) {
-  const char* text = element ? element->Attribute(attribute) : nullptr;
-  return text ? text : "";
 }
 
 // Names of the links or of the joints; also checks their numbers.
@@ -133,9 +114,6 @@ void checkJoint(const TiXmlElement& joint, const std::string& path, std::vector<
 }
 
 const TiXmlElement& getRobot(const TiXmlDocument& document, const std::string& path) {
-  if (document.Error())
-    throw ModelError(path, "line " + std::to_string(document.ErrorRow()),
-                     std::string("it is not well-formed XML: ") + document.ErrorDesc(), "correct the syntax");
   const TiXmlElement* robot = document.RootElement();
   if (!robot || robot->ValueStr() != "robot")
     throw ModelError(path, "document", "its outermost element is not <robot>", "give a URDF file");
@@ -174,9 +152,8 @@ std::vector<Edge> collectEdges(const TiXmlElement& robot, const std::set<std::st
 }
 
 Tree makeTree(const std::string& xml, const std::string& path) {
-  checkDepth(xml, path);
   TiXmlDocument document;
-  document.Parse(xml.c_str());
+  parseXml(xml, path, document);
   const TiXmlElement& robot = getRobot(document, path);
   const std::set<std::string> links = collectNames(robot, "link", path);
   if (links.empty()) throw ModelError(path, "element 'robot'", "it has no link", "declare at least one");
@@ -288,9 +265,9 @@ UrdfJoint makeJoint(const urdf::Joint& joint, JointKind kind, const std::string&
   if (limits.effort < 0 || limits.velocity < 0)
     throw ModelError(path, "joint '" + joint.name + "'", "its effort or velocity limit is negative",
                      "give a positive limit, or 0 for none");
-  if ((limits.lower != 0 || limits.upper != 0) && kind != JointKind::Continuous) {
-    out.lower = limits.lower;
-    out.upper = limits.upper;
+  if ((limits.lower != 0 || limits.upper != 0) && kind != JointKind::Continuous && getNv(kind) == 1) {
+    out.lower = VectorXd::Constant(1, limits.lower);
+    out.upper = VectorXd::Constant(1, limits.upper);
   }
   if (limits.effort > 0) out.effort = limits.effort;
   if (limits.velocity > 0) out.velocity = limits.velocity;

@@ -18,19 +18,21 @@ struct UrdfLink {
 };
 
 struct UrdfJoint {
-  std::string parent, child;  ///< links
-  Joint joint;                ///< name, kind, X_PJ, axis
-  std::optional<double> lower, upper, effort, velocity;
+  std::string parent, child;               ///< links
+  Joint joint;                             ///< name, kind, X_PJ, axis
+  VectorXd lower, upper;                   ///< per coordinate of its velocity, or empty for none
+  std::optional<double> effort, velocity;  ///< of joints with one coordinate
   std::string mimicked;  ///< joint whose coordinate times `multiplier`, plus `offset`, is that of this one; or empty
   double multiplier = 1, offset = 0;
 };
 
-/// A URDF file, checked to be one tree. Joints are depth first, the children of a link in the order of the file.
+/// A URDF file, or the tree of another one, checked to be one tree. Joints are depth first, the children of a link in the order of the file.
 struct UrdfFile {
   std::string path, name, root;
   std::map<std::string, UrdfLink> links;
   std::vector<UrdfJoint> joints;
   std::vector<std::string> warnings;
+  bool has_own_base = false;  ///< it says itself what is free: the option of a free base has no effect
 };
 
 /// \throws ModelError for anything but one tree of named links with finite numbers
@@ -90,10 +92,19 @@ struct YamlFile {
 /// \throws ModelError for unknown keys, wrong types, lists that do not match
 YamlFile readYaml(const std::string& path);
 
+/// A file of MuJoCo as the contents of both files.
+struct MjcfFile {
+  UrdfFile tree;
+  YamlFile settings;
+};
+
+/// \throws ModelError for what is not MJCF, or cannot be read as a robot
+MjcfFile readMjcf(const std::string& path);
+
 /// The whole content of a file. \throws ModelError when it cannot be read, or is too large
 std::string readRobotText(const std::string& path);
 
-/// The URDF of the robot that a file with the key `model` completes; empty if none of them exists.
+/// The URDF or MJCF of the robot that a file with the key `model` completes; empty if none of them exists.
 std::string findModel(const YamlFile& yaml);
 
 }  // namespace bielle

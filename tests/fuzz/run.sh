@@ -7,15 +7,18 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 seconds=${1:-600}
 shift || true
 targets=("$@")
-[ ${#targets[@]} -gt 0 ] || targets=(urdf yaml json csv npz)
+[ ${#targets[@]} -gt 0 ] || targets=(urdf yaml mjcf json csv npz)
 build=$root/build-fuzz
 mkdir -p "$build/findings" "$build/seeds"
 
 # Seeds: the robots of the source tree, a small robot's YAML with every key, and a result that the command makes.
 if [ ! -e "$build/seeds/done" ]; then
-  mkdir -p "$build"/seeds/{urdf,yaml,json,csv,npz}
+  mkdir -p "$build"/seeds/{urdf,yaml,mjcf,json,csv,npz}
   cp "$root"/robots/*/*.urdf "$build/seeds/urdf"
   cp "$root"/robots/*/*.yaml "$root"/tests/fuzz/toy.yaml "$build/seeds/yaml"
+  for robot in fourbar fivebar_leg spring_leg belt_biped; do
+    "${BIELLE:-$root/build/bin/bielle}" export "$root/robots/$robot" --format mjcf -o "$build/seeds/mjcf/$robot.xml" >/dev/null
+  done
   "${BIELLE:-$root/build/bin/bielle}" solve squat --robot bipetto --depth 0.95 --set duration=0.4 --set settle=0 \
     --set time_step=0.1 --max-iterations 1 --quiet --no-check --no-report -o "$build/seeds/result" >/dev/null || true
   cp "$build/seeds/result/trajectory.csv" "$build/seeds/csv"
@@ -31,7 +34,10 @@ for target in "${targets[@]}"; do
   mkdir -p "$build/corpus/$target"
   log=$build/fuzz_$target.log
   dictionary=()
-  case $target in urdf | yaml) dictionary=("-dict=$root/tests/fuzz/robot.dict") ;; esac
+  case $target in
+    urdf | yaml) dictionary=("-dict=$root/tests/fuzz/robot.dict") ;;
+    mjcf) dictionary=("-dict=$root/tests/fuzz/mjcf.dict") ;;
+  esac
   if nice "$build/tests/fuzz/fuzz_$target" "$build/corpus/$target" "$build/seeds/$target" -max_total_time="$seconds" \
     -timeout=10 -rss_limit_mb=2048 -malloc_limit_mb=1024 -max_len=65536 -print_final_stats=1 \
     -artifact_prefix="$build/findings/$target-" "${dictionary[@]}" >"$log" 2>&1; then

@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// Robots from files: a URDF and, optionally, a YAML file with the same stem beside it for data that URDF cannot
-/// express.
+/// express; or one file of MuJoCo.
 ///
 /// ## The URDF
 /// Links and joints of one tree. Bodies are added depth first, the children of a link in the order of their joints in
@@ -43,7 +43,21 @@
 /// - `serial_joints: [joint, ...]`, `gravity: [x, y, z]` (m/s^2)
 /// - `model: NAME or path relative to this file`, or a list of them: this file, with no URDF beside it, completes the
 ///   first of these published robots that exists; names are looked up in the directories of robots. Its keys take
-///   precedence over those of that robot's YAML file.
+///   precedence over those of that robot's YAML file. It may be one in MuJoCo's format.
+///
+/// ## Files of MuJoCo (MJCF, .xml), of version 2.2.2 and today's
+/// Read are bodies and <frame>; inertias, or those of shapes without <inertial>; joints of all kinds with range, ref,
+/// armature, stiffness, springref, damping and frictionloss; the equalities connect, weld, joint and tendon (of fixed
+/// tendons) with polynomials of degree 1; motors with gear and limits (servos become motors); classes of defaults; gravity;
+/// keyframes as references; sites as frames; shapes to be drawn. Ranges hold unless `limited` is false.
+/// - The frame of a body has its origin on its joint; a body with several joints becomes a chain of links BODY/JOINT
+///   without mass. Quaternions of balls count from the pose in the file. Motors are named after their joints and give the
+///   force of the joint. Without keyframes, the reference `qpos0` is the posture of the file, where MuJoCo closes loops.
+/// - What io/mjcf.h writes is put together again: connects NAME.1 and NAME.2 to a hinge, the elements of a universal, planar
+///   or free joint, the spheres of a sole at their site.
+/// - What is left out is told in `warnings`, with its lines; what would be another mechanism without it is an error:
+///   <include>, <attach>, <replicate> and <composite>, other equalities, polynomials of higher degree, masses of meshes.
+///   At most 16 MB and 3000 bodies and sites.
 #include <optional>
 #include <string>
 #include <vector>
@@ -62,12 +76,12 @@ struct LoadedRobot {
   Model model;
   std::vector<std::string> warnings;  ///< "file: element: problem", valid but suspicious
   std::string directory;              ///< where the files were found
-  std::string file;                   ///< absolute path of the .urdf, or of the .yaml that completes one elsewhere
+  std::string file;                   ///< absolute path of the .urdf or .xml, or of the .yaml that completes one elsewhere
 };
 
-/// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf, robot.urdf or bipetto.yaml in the directories of
+/// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf, robot.urdf, bipetto.yaml or .xml in the directories of
 /// getRobotDirectories()), by directory (its robot.urdf, else the .urdf named as the directory, else its only .urdf,
-/// else the .yaml named as the directory), by .urdf file or by .yaml file with the key `model`.
+/// else the .yaml or .xml named as the directory), by .urdf file, by .xml file of MuJoCo or by .yaml file with the key `model`.
 /// \throws ModelError naming the file, the element and the remedy, and no other exception, whatever the files contain
 LoadedRobot loadRobot(const std::string& name_or_path, const LoadOptions& options = {});
 

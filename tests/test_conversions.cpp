@@ -1,0 +1,372 @@
+// Robots out into other formats and in again: mass matrix, bias, closures and motors are the same, and wrong numbers show.
+#include <catch2/catch.hpp>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <regex>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
+#include "bielle/model/reader.h"
+#include "bielle/robots/generators.h"
+#include "get_error.h"
+#include "io/mjcf.h"
+#include "io/mjcf_coordinates.h"
+#include "mechanisms.h"
+#include "robot_directory.h"
+#include "robot_trial.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double kTolerance = 1e-10;
+
+// Largest differences over random states: relative of matrices, in m and rad of closures.
+struct Difference {
+  double mass_matrix = 0, bias = 0, closures = 0;
+  std::string missing;  // the first element that differs in kind, number or name
+  bool isZero() const {
+    return missing.empty() && mass_matrix < kTolerance && bias < kTolerance && closures < kTolerance;
+  }
+};
+
+// The configuration of b that places all bodies as q does those of a; balls of b count from q_ref.
+VectorXd mapConfiguration(const Model& a, const Model& b, ConstVectorRef q_ref, ConstVectorRef q) {
+  VectorXd out = b.makeNeutral();
+  for (const Joint& joint : a.joints()) {
+    if (joint.nq == 0) continue;
+    const Joint& other = b.joints()[b.findJoint(joint.name)];
+    out.segment(other.idx_q, other.nq) = q.segment(joint.idx_q, joint.nq);
+    if (joint.kind != JointKind::Spherical) continue;
+    const Eigen::Quaterniond r0(Eigen::Vector4d(q_ref.segment<4>(joint.idx_q))),
+        r(Eigen::Vector4d(q.segment<4>(joint.idx_q)));
+    out.segment<4>(other.idx_q) = (r0.conjugate() * r).coeffs();
+  }
+  return out;
+}
+
+VectorXd mapVelocity(const Model& a, const Model& b, ConstVectorRef v) {
+  VectorXd out(b.nv());
+  for (const Joint& joint : a.joints())
+    if (joint.nv) out.segment(b.joints()[b.findJoint(joint.name)].idx_v, joint.nv) = v.segment(joint.idx_v, joint.nv);
+  return out;
+}
+
+std::string compareParts(const Model& a, const Model& b) {
+  if (a.nq() != b.nq() || a.nv() != b.nv() || a.numBodies() != b.numBodies()) return "joints";
+  for (int i = 1; i < a.numBodies(); ++i) {
+    const Joint& joint = a.joints()[i];
+    const int j = b.findJoint(joint.name);
+    if (j < 0 || a.bodies()[i].name != b.bodies()[j].name || getNv(b.joints()[j].kind) != joint.nv) return joint.name;
+    for (int k = 0; k < joint.nv; ++k) {
+      const int ka = joint.idx_v + k, kb = b.joints()[j].idx_v + k;
+      if (joint.kind != JointKind::Spherical && joint.kind != JointKind::FreeFlyer &&
+          (a.lowerLimits()[ka] != b.lowerLimits()[kb] || a.upperLimits()[ka] != b.upperLimits()[kb]))
+        return "limits of " + joint.name;
+      if (a.armature()[ka] != b.armature()[kb]) return "armature of " + joint.name;
+    }
+  }
+  if (a.nu() != b.nu()) return "motors";
+  for (int i = 0; i < a.nu(); ++i)
+    if (a.motors()[i].name != b.motors()[i].name || a.motors()[i].effort_limit != b.motors()[i].effort_limit)
+      return "motor " + a.motors()[i].name;
+  for (const Frame& frame : a.frames())
+    if (b.findFrame(frame.name) < 0) return "frame " + frame.name;
+  if (a.closures().size() != b.closures().size() || a.numClosureRows() != b.numClosureRows()) return "closures";
+  for (const Closure& closure : a.closures())
+    if (const int i = b.findClosure(closure.name); i < 0 || b.closures()[i].kind != closure.kind) return closure.name;
+  const auto isShape = [](const Visual& visual) { return visual.shape != Visual::Shape::Mesh; };
+  if (std::count_if(a.visuals().begin(), a.visuals().end(), isShape) != static_cast<std::ptrdiff_t>(b.visuals().size()))
+    return "shapes";
+  for (const ContactFrame& contact : a.contacts()) {
+    const int i = b.findContact(contact.name);
+    if (i < 0 || b.contacts()[i].kind != contact.kind) return contact.name;
+    if (std::abs(b.contacts()[i].half_length - contact.half_length) > 1e-11 ||
+        std::abs(b.contacts()[i].half_width - contact.half_width) > 1e-11)
+      return contact.name;
+  }
+  if (a.contacts().size() != b.contacts().size()) return "contacts";
+  if (a.gravity() != b.gravity()) return "gravity";
+  return "";
+}
+
+// Differences of the residuals of a closure, wherever the bodies stand.
+double compareClosure(const Workspace& wa, const Closure& ca, const Workspace& wb, const Closure& cb, ConstVectorRef qa,
+                      ConstVectorRef qb) {
+  if (ca.kind == ClosureKind::Coupler) {
+    double ra = -ca.offset, rb = -cb.offset;
+    for (const CouplerTerm& t : ca.terms) ra += t.coefficient * qa[t.idx_q];
+    for (const CouplerTerm& t : cb.terms) rb += t.coefficient * qb[t.idx_q];
+    // The first coefficient of a pair is 1 in MuJoCo.
+    const double factor = ca.terms.size() == 2 ? ca.terms[0].coefficient / cb.terms[0].coefficient : 1;
+    return std::abs(ra - factor * rb);
+  }
+  const SE3 a1 = getPlacement(wa, ca.body1, ca.X_B1), a2 = getPlacement(wa, ca.body2, ca.X_B2),
+            b1 = getPlacement(wb, cb.body1, cb.X_B1), b2 = getPlacement(wb, cb.body2, cb.X_B2);
+  double worst = ((a1.p - a2.p) - (b1.p - b2.p)).norm();
+  if (ca.kind == ClosureKind::Weld6D)
+    worst = std::max(worst, (a1.R * a2.R.transpose() - b1.R * b2.R.transpose()).norm());
+  if (ca.kind == ClosureKind::Hinge5D) {
+    const Vector3d of_a = (a1.R * ca.axis).cross(a2.R * ca.axis), of_b = (b1.R * cb.axis).cross(b2.R * cb.axis);
+    worst = std::max(worst, (of_a - of_b).norm());  // the axes may point to either side together
+  }
+  return worst;
+}
+
+Difference compare(const Model& a, const Model& b, ConstVectorRef q_ref) {
+  Difference out;
+  out.missing = compareParts(a, b);
+  if (!out.missing.empty()) return out;
+  std::mt19937 rng(11);
+  Workspace wa(a), wb(b);
+  MatrixXd order = MatrixXd::Zero(b.nv(), a.nv());  // of velocities
+  for (int k = 0; k < a.nv(); ++k) order.col(k) = mapVelocity(a, b, VectorXd::Unit(a.nv(), k));
+  for (int i = 0; i < 4; ++i) {
+    const VectorXd qa = a.integrate(q_ref, randomVector(rng, a.nv(), 0.5)), va = randomVector(rng, a.nv());
+    const VectorXd qb = mapConfiguration(a, b, q_ref, qa), vb = order * va;
+    updatePositions(a, wa, qa), updatePositions(b, wb, qb);
+    updateVelocities(a, wa, va), updateVelocities(b, wb, vb);
+    updateMassMatrix(a, wa), updateMassMatrix(b, wb);
+    updateBias(a, wa), updateBias(b, wb);
+    out.mass_matrix = std::max(out.mass_matrix, calcRelativeError(order.transpose() * wb.M * order, wa.M));
+    out.bias = std::max(out.bias, calcRelativeError(order.transpose() * wb.b, wa.b));
+    for (const Closure& closure : a.closures())
+      out.closures =
+          std::max(out.closures, compareClosure(wa, closure, wb, b.closures()[b.findClosure(closure.name)], qa, qb));
+  }
+  return out;
+}
+
+Model readMjcfText(const std::string& text) {
+  const RobotDirectory directory;
+  return loadRobot(directory.write("robot.xml", text)).model;
+}
+
+// A file and the way that the original stands in it.
+struct Written {
+  std::string xml;
+  VectorXd q_ref;
+};
+
+Written write(const Model& model) {
+  const VectorXd q_ref = findClosedConfiguration(model).q;
+  return {formatMjcf(model, q_ref).xml, q_ref};
+}
+
+void checkRoundTrip(const Model& model, ConstVectorRef q_ref) {
+  const Difference d = compare(model, readMjcfText(formatMjcf(model, q_ref).xml), q_ref);
+  CHECK(d.missing == "");
+  CHECK(d.mass_matrix < kTolerance);
+  CHECK(d.bias < kTolerance);
+  CHECK(d.closures < kTolerance);
+}
+
+}  // namespace
+
+TEST_CASE("every robot comes back from MJCF with its mass matrix, closures, motors and soles") {
+  const bool published = fs::is_directory(std::string(BIELLE_SOURCE_DIR) + "/../shared/robots");
+  if (!published) WARN("skipped: battobot and digit, whose published models are not at hand");
+  for (const std::string& name : listRobots()) {
+    if (!published && (name == "battobot" || name == "digit")) continue;
+    CAPTURE(name);
+    const Model model = loadRobot(name).model;
+    const Written written = write(model);
+    checkRoundTrip(model, written.q_ref);
+    // The loops close from the postures that came along.
+    const Model back = readMjcfText(written.xml);
+    CHECK(findClosedConfiguration(back).status == AssemblyStatus::Closed);
+    for (const Reference& reference : model.references()) {
+      const AssemblyResult a = assembleReference(model, reference.name), b = assembleReference(back, reference.name);
+      const VectorXd q = mapConfiguration(model, back, written.q_ref, a.q);
+      CHECK(back.difference(q, b.q).cwiseAbs().maxCoeff() < 1e-9);
+    }
+  }
+}
+
+TEST_CASE("generated robots come back from MJCF") {
+  for (const Generator& generator : getGenerators()) {
+    CAPTURE(generator.name);
+    const Model model = generator.makeRequest().make();
+    checkRoundTrip(model, findClosedConfiguration(model).q);
+  }
+}
+
+TEST_CASE("random mechanisms come back from MJCF: every joint, closure, base, springs and belts") {
+  unsigned seed = 0;
+  for (JointKind joint : kJointKinds)
+    for (ClosureKind closure : kClosureKinds)
+      for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
+        CAPTURE(getName(joint), getName(closure), base == MechanismBase::FreeFlyer);
+        std::mt19937 rng(++seed);
+        const Mechanism plain = makeRandomMechanism(rng, joint, closure, base);
+        checkRoundTrip(plain.model, plain.q_closed);
+        const Mechanism belted = makeBeltedMechanism(rng, joint, closure, base, true);
+        checkRoundTrip(belted.model, belted.q_closed);
+        const Mechanism sprung = makeSprungMechanism(rng, joint, closure, base);
+        const Model back = readMjcfText(formatMjcf(sprung.model, sprung.q_closed).xml);
+        REQUIRE(back.jointForces().size() == sprung.model.jointForces().size());
+        for (const JointForce& force : sprung.model.jointForces()) {
+          const auto same = [&](const JointForce& other) {
+            return back.joints()[other.joint].name == sprung.model.joints()[force.joint].name &&
+                   other.stiffness == force.stiffness && other.damping == force.damping &&
+                   other.friction == force.friction &&
+                   // A preload is the rest of a spring there, and lost without one.
+                   (force.stiffness == 0 ||
+                    std::abs(other.stiffness * other.rest - force.stiffness * force.rest - force.preload) < 1e-12);
+          };
+          CHECK(std::any_of(back.jointForces().begin(), back.jointForces().end(), same));
+        }
+      }
+}
+
+TEST_CASE("a number of the file that is wrong by a millionth shows") {
+  struct Poison {
+    const char *robot, *tag, *attribute;
+    int number;  // of the attribute, of which the first with a value is changed
+    double Difference::*shows;
+  };
+  const Poison poisons[] = {{"belt_biped", "inertial", "mass", 0, &Difference::mass_matrix},
+                            {"belt_biped", "inertial", "diaginertia", 2, &Difference::mass_matrix},
+                            {"belt_biped", "inertial", "pos", 2, &Difference::bias},
+                            {"belt_biped", "body name=\"shank_left\"", "pos", 2, &Difference::mass_matrix},
+                            {"belt_biped", "joint", "coef", 0, &Difference::closures},
+                            {"belt_biped", "joint", "polycoef", 1, &Difference::closures},
+                            {"belt_biped", "joint", "ref", 0, &Difference::mass_matrix},
+                            {"bipetto", "weld", "anchor", 2, &Difference::closures},
+                            {"cleobot", "connect", "anchor", 0, &Difference::closures},
+                            {"spring_leg", "connect", "anchor", 0, &Difference::closures},
+                            {"bipetto", "joint", "armature", 0, nullptr},
+                            {"bipetto", "joint", "range", 1, nullptr},
+                            {"fourbar", "motor", "ctrlrange", 1, nullptr}};
+  for (const Poison& poison : poisons) {
+    CAPTURE(poison.robot, poison.tag, poison.attribute);
+    const Model model = loadRobot(poison.robot).model;
+    const Written written = write(model);
+    REQUIRE(compare(model, readMjcfText(written.xml), written.q_ref).isZero());
+    const std::regex pattern("<" + std::string(poison.tag) + " [^>]*\\b" + poison.attribute + "=\"(?:[^ \"]+ ){" +
+                             std::to_string(poison.number) + "}([^ \"]+)");
+    bool changed = false;
+    for (std::sregex_iterator it(written.xml.begin(), written.xml.end(), pattern), end; it != end && !changed; ++it) {
+      const double value = std::stod((*it)[1]);
+      if (std::abs(value) < 1e-3) continue;
+      changed = true;
+      char text[40];
+      std::snprintf(text, sizeof text, "%.17g", value * (1 - 1e-6));
+      std::string xml = written.xml;
+      xml.replace(it->position(1), it->length(1), text);
+      const Difference d = compare(model, readMjcfText(xml), written.q_ref);
+      if (poison.shows)
+        CHECK(d.*poison.shows > 10 * kTolerance);
+      else
+        CHECK(d.missing != "");
+    }
+    CHECK(changed);
+  }
+}
+
+namespace {
+
+// A swing with a body, into which elements are put.
+std::string makeSwing(const std::string& in_body, const std::string& in_root = "", const std::string& in_world = "") {
+  return "<mujoco model=\"swing\">" + in_root + "<worldbody>" + in_world + "<body name=\"bob\" pos=\"0 0 1\">" +
+         "<joint name=\"swing\" axis=\"0 1 0\"/><inertial pos=\"0 0 -1\" mass=\"2\" diaginertia=\".1 .1 .1\"/>" +
+         "<body name=\"tip\"><joint name=\"turn\"/><inertial pos=\"0 0 0\" mass=\"1\" fullinertia=\"3 4 5 .1 .2 "
+         ".3\"/>" +
+         in_body + "</body></body></worldbody></mujoco>\n";
+}
+
+}  // namespace
+
+TEST_CASE("what the reader of MJCF leaves out is told with its line, and what it cannot leave out is refused") {
+  const RobotDirectory directory;
+  const auto load = [&](const std::string& text) { return loadRobot(directory.write("swing.xml", text)); };
+  const LoadedRobot plain = load(makeSwing(""));
+  CHECK(plain.warnings.empty());
+  const Matrix3d full = (Matrix3d() << 3, .1, .2, .1, 4, .3, .2, .3, 5).finished();
+  CHECK(plain.model.bodies()[2].inertia.I_com == full);
+
+  const auto checkWarning = [&](const std::string& text, const std::string& warning) {
+    CAPTURE(warning);
+    const std::vector<std::string> found = load(text).warnings;
+    REQUIRE(found.size() == 1);
+    CHECK(found[0] == directory.path() + "/swing.xml: " + warning);
+  };
+  checkWarning(makeSwing("\n<camera name=\"eye\"/>\n<camera name=\"other\"/>"), "<camera> (lines 2, 3): left out");
+  checkWarning(makeSwing("\n<geom type=\"plane\" size=\"1 1 1\"/>"),
+               "<geom> (line 2): a geom of type 'plane' is left out");
+  checkWarning(makeSwing("", "\n<sensor>\n<gyro site=\"a\"/></sensor>"), "<sensor> <gyro> (line 3): left out");
+  checkWarning(makeSwing("", "\n<tendon><spatial/></tendon>"), "<spatial> (line 2): the tendon is left out");
+  checkWarning(makeSwing("", "\n<actuator><muscle joint=\"swing\"/></actuator>"),
+               "<muscle> (line 2): the actuator is left out: motors drive joints here");
+  checkWarning(makeSwing("", "\n<actuator><position name=\"swing\" joint=\"swing\" forcerange=\"-2 2\"/></actuator>"),
+               "<position> (line 2): its servo is left out: it is a motor of ideal torque here");
+  checkWarning(makeSwing("", "\n<equality><weld active=\"false\" body1=\"bob\"/></equality>"),
+               "<weld> (line 2): it is not active, and left out");
+  checkWarning(makeSwing("", "\n<option wind=\"1 0 0\" density=\"1.2\"/>"),
+               "<option> (line 2): left out: 'density', 'wind'");
+
+  const auto checkError = [&](const std::string& text, const std::string& element, const std::string& problem) {
+    CAPTURE(problem);
+    const std::string error = getError([&] { load(text); });
+    CHECK_THAT(error, Catch::StartsWith(directory.path() + "/swing.xml: " + element + ": " + problem));
+    CHECK(error.find("; ") != std::string::npos);
+  };
+  checkError("<mujoco>", "document", "it is not well-formed XML");
+  checkError("<robot/>", "document", "its outermost element is not <mujoco>");
+  checkError(makeSwing("", "<include file=\"a.xml\"/>"), "<include> (line 1)", "such elements are not read");
+  checkError(makeSwing("<replicate/>"), "<replicate> (line 1)", "such elements are not read");
+  checkError(makeSwing("\n<joint name=\"swing\"/>"), "joint 'swing' (line 2)", "two joints have this name");
+  checkError(makeSwing("\n<joint name=\"x\" type=\"free\"/>"), "body 'tip' (line 1)", "it has a free joint");
+  checkError(makeSwing("\n<joint name=\"x\" axis=\"0 0 0\"/>"), "joint 'x' (line 2)", "its axis is not a direction");
+  checkError(makeSwing("\n<joint name=\"x\" range=\"1\"/>"), "joint 'x' (line 2)",
+             "its attribute 'range' is not made of 2");
+  checkError(makeSwing("\n<joint name=\"x\" damping=\"nan\"/>"), "joint 'x' (line 2)",
+             "its attribute 'damping' is not");
+  checkError(makeSwing("\n<joint name=\"x\" limited=\"true\"/>"), "joint 'x' (line 2)",
+             "it is limited, without a range");
+  checkError(makeSwing("\n<site name=\"a\" quat=\"1 0 0 0\" zaxis=\"0 0 1\"/>"), "site 'a' (line 2)", "it has several");
+  checkError(makeSwing("\n<geom class=\"none\"/>"), "geom (line 2)", "there is no default class 'none'");
+  checkError(makeSwing("\n<body><geom type=\"mesh\" mesh=\"a\"/></body>"), "geom (line 2)",
+             "the mass of the body comes");
+  checkError(makeSwing("", "<equality>\n<flex/></equality>"), "flex (line 2)", "such equalities are not read");
+  checkError(makeSwing("", "<equality>\n<joint joint1=\"swing\" joint2=\"turn\" polycoef=\"0 1 2 0 0\"/></equality>"),
+             "joint (line 2)", "its polycoef is of degree 2 or more");
+  checkError(makeSwing("", "<equality>\n<joint joint1=\"swing\"/></equality>"), "joint (line 2)", "it holds one joint");
+  checkError(makeSwing("", "<equality>\n<connect body1=\"none\" anchor=\"0 0 0\"/></equality>"), "connect (line 2)",
+             "there is no body 'none'");
+  checkError(makeSwing("", "<actuator>\n<motor joint=\"none\"/></actuator>"), "motor (line 2)",
+             "there is no joint 'none'");
+  checkError(makeSwing("", "<keyframe>\n<key qpos=\"1 2 3\"/></keyframe>"), "key (line 2)",
+             "its attribute 'qpos' is not");
+  checkError(makeSwing("", "<compiler coordinate=\"global\"/>"), "compiler (line 1)", "its coordinates are global");
+}
+
+TEST_CASE("files of today's MuJoCo: frames, sites in equalities, inertia by shapes, classes of defaults") {
+  // The same arm twice: by hand, and by frames, defaults and shapes.
+  const Model a = readMjcfText(R"(<mujoco><compiler angle="radian"/><worldbody>
+    <body name="arm" pos="1 2 4"><joint name="lift" axis="0 0 -1" pos="0 0.1 0" armature="0.2" range="-1 2"/>
+      <inertial pos="0 0 0" mass="6" diaginertia="0.5 0.26 0.4"/><geom type="box" size="0.2 0.4 0.3"/>
+      <body name="rod" pos="0 0 1"><joint name="ball" type="ball"/>
+        <inertial pos="0 0 1" mass="1" diaginertia="0.1 0.1 0.01"/><site name="end" pos="0 0 2"/></body></body>
+    <site name="wall" pos="0.5 2 7"/></worldbody>
+    <equality><connect name="tie" site1="wall" site2="end"/></equality></mujoco>)");
+  const Model b = readMjcfText(R"(<mujoco><compiler angle="radian"/>
+    <default><default class="strong"><joint armature="0.2" range="-1 2" axis="0 1 0"/></default></default><worldbody>
+    <frame pos="1 0 0"><frame pos="0 2 4"><body name="arm"><frame euler="-1.5707963267948966 0 0" childclass="strong">
+      <joint name="lift" pos="0 0 0.1"/></frame>
+      <geom type="box" size="0.2 0.4 0.3" mass="6"/>
+      <body name="rod" pos="0 0 1"><joint name="ball" type="ball"/>
+        <inertial pos="0 0 1" mass="1" fullinertia="0.1 0.1 0.01 0 0 0"/><site name="end" pos="0 0 2"/></body>
+    </body></frame></frame><site name="wall" pos="0.5 2 7"/></worldbody>
+    <equality><connect name="tie" site1="wall" site2="end"/></equality></mujoco>)");
+  const Difference d = compare(a, b, a.makeNeutral());
+  CHECK(d.missing == "");
+  CHECK(d.mass_matrix < kTolerance);
+  CHECK(d.bias < kTolerance);
+  CHECK(d.closures < kTolerance);
+}
