@@ -9,6 +9,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "bielle/io/robot_writer.h"
 #include "bielle/model/reader.h"
 #include "bielle/robots/generators.h"
 #include "get_error.h"
@@ -57,6 +58,8 @@ VectorXd mapVelocity(const Model& a, const Model& b, ConstVectorRef v) {
   return out;
 }
 
+bool areSame(double a, double b) { return a == b || std::abs(a - b) < 1e-11; }
+
 std::string compareParts(const Model& a, const Model& b) {
   if (a.nq() != b.nq() || a.nv() != b.nv() || a.numBodies() != b.numBodies()) return "joints";
   for (int i = 1; i < a.numBodies(); ++i) {
@@ -66,7 +69,7 @@ std::string compareParts(const Model& a, const Model& b) {
     for (int k = 0; k < joint.nv; ++k) {
       const int ka = joint.idx_v + k, kb = b.joints()[j].idx_v + k;
       if (joint.kind != JointKind::Spherical && joint.kind != JointKind::FreeFlyer &&
-          (a.lowerLimits()[ka] != b.lowerLimits()[kb] || a.upperLimits()[ka] != b.upperLimits()[kb]))
+          (!areSame(a.lowerLimits()[ka], b.lowerLimits()[kb]) || !areSame(a.upperLimits()[ka], b.upperLimits()[kb])))
         return "limits of " + joint.name;
       if (a.armature()[ka] != b.armature()[kb]) return "armature of " + joint.name;
     }
@@ -369,4 +372,63 @@ TEST_CASE("files of today's MuJoCo: frames, sites in equalities, inertia by shap
   CHECK(d.mass_matrix < kTolerance);
   CHECK(d.bias < kTolerance);
   CHECK(d.closures < kTolerance);
+}
+
+TEST_CASE("a robot of MuJoCo becomes one of ours and stays the same") {
+  const RobotDirectory directory;
+  for (const char* name : {"bipetto", "cleobot", "belt_biped", "spring_leg", "delta"}) {
+    CAPTURE(name);
+    const Model a = readMjcfText(write(loadRobot(name).model).xml);
+    const RobotText text = formatRobot(a);
+    const Model b = loadRobot(directory.writeRobot(text.urdf, text.yaml)).model;
+    const Difference d = compare(a, b, a.makeNeutral());
+    CHECK(d.missing == "");
+    CHECK(d.mass_matrix < kTolerance);
+    CHECK(d.bias < kTolerance);
+    CHECK(d.closures < kTolerance);
+  }
+}
+
+TEST_CASE("a URDF alone is the tree with its mimics, friction and limits, and tells what it lost") {
+  ModelBuilder builder("gripper");
+  const Inertia inertia = {1, Vector3d(0, 0, 0.1), 0.01 * Matrix3d::Identity()};
+  std::string parent = "world";
+  for (const char* name : {"a", "b", "c", "d"}) {
+    Joint joint;
+    joint.name = std::string("joint_") + name;
+    joint.kind = JointKind::Revolute;
+    joint.axis = Vector3d::UnitY();
+    joint.X_PJ.p = {0, 0, 0.3};
+    builder.addLink(name, parent, joint, inertia);
+    parent = name;
+  }
+  builder.addCoupler("pair", {{"joint_a", 2}, {"joint_b", -3}}, 0.6);
+  builder.addCoupler("same", {{"joint_b", 1}, {"joint_c", 1}});
+  builder.addCoupler("three", {{"joint_a", 2}, {"joint_b", -3}, {"joint_c", 1}});
+  builder.addMotor("joint_a", 0.1, 7, 3);
+  JointForce force;
+  force.stiffness = 2, force.damping = 0.5, force.friction = 0.25;
+  builder.addJointForce("joint_d", force);
+  const Model model = builder.build();
+  const UrdfText text = formatUrdf(model);
+  for (const char* lost : {"closure 'three'", "joint 'joint_d': its spring", "'joint_a': their armature", "motors"})
+    CHECK(std::any_of(text.warnings.begin(), text.warnings.end(),
+                      [&](const std::string& w) { return w.find(lost) != std::string::npos; }));
+  CHECK(text.warnings.size() == 4);
+  CHECK(text.urdf.find("<dynamics damping=\"0.5\" friction=\"0.25\"/>") != std::string::npos);
+  CHECK(text.urdf.find("effort=\"7\" velocity=\"3\"") != std::string::npos);
+  const RobotDirectory directory;
+  const Model back = loadRobot(directory.writeRobot(text.urdf, "")).model;
+  REQUIRE(back.closures().size() == 2);
+  // Both say the same of every configuration on them: q_b = 2/3 q_a - 0.2, q_c = -q_b.
+  for (const Closure& closure : back.closures()) {
+    const bool is_pair = closure.name == "joint_b";
+    CHECK((is_pair || closure.name == "joint_c"));
+    const VectorXd q = (VectorXd(4) << 0.9, 0.4, -0.4, 0).finished();
+    double residual = -closure.offset;
+    for (const CouplerTerm& term : closure.terms) residual += term.coefficient * q[term.idx_q];
+    CHECK(std::abs(residual) < 1e-15);
+    CHECK(closure.terms.size() == 2);
+  }
+  CHECK_THAT(getError([] { formatUrdf(loadRobot("cleobot").model); }), Catch::Contains("a URDF has no such joints"));
 }

@@ -56,6 +56,7 @@ int run(int argc, char** argv) {
   addReport(app, action);
   addView(app, action);
   addExport(app, action);
+  addConvert(app, action);
   addInfo(app, action);
   addEval(app, action);
   addRobots(app, action);

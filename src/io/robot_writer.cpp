@@ -81,6 +81,30 @@ class Writer {
                  first.X_PJ.R.isIdentity(0);
   }
 
+  /// A URDF that must do without a YAML file; what it cannot say goes to `warnings`.
+  UrdfText formatUrdfAlone() {
+    alone_ = true;
+    for (int i = 1; i < model_.numBodies(); ++i) {
+      const JointKind kind = model_.joints()[i].kind;
+      if (kind == JointKind::Spherical || kind == JointKind::Universal)
+        refuse(model_, std::string(getName(kind)) + " joint '" + model_.joints()[i].name + "'",
+               "a URDF has no such joints");
+    }
+    for (const Closure& c : model_.closures()) {
+      // The joint that mimics: the later one, or the other one if that mimics already.
+      int y = 1;
+      if (c.terms.size() == 2 && mimics_.count(c.terms[1].joint)) y = 0;
+      if (c.terms.size() != 2 || mimics_.count(c.terms[y].joint))
+        warn("closure '" + c.name + "'", "it is left out, a URDF is a tree");
+      else
+        mimics_[c.terms[y].joint] = {c.terms[1 - y].joint, -c.terms[1 - y].coefficient / c.terms[y].coefficient,
+                                     c.offset / c.terms[y].coefficient};
+    }
+    const std::string text = formatUrdf("");
+    listOmissions();
+    return {text, warnings_};
+  }
+
   std::string formatUrdf(const std::string& remark) {
     std::ostringstream links;
     for (int i = free_root_ ? 1 : 0; i < model_.numBodies(); ++i) {
@@ -180,6 +204,7 @@ class Writer {
     if (joint.nv == 1 || joint.kind == JointKind::Planar)
       out << "    <axis xyz=\"" << formatVector(joint.axis) << "\"/>\n";
     writeLimits(joint, out);
+    if (alone_) writeMimicAndDynamics(i, out);
     out << "  </joint>\n";
   }
 
@@ -192,10 +217,46 @@ class Writer {
     const bool slow = velocity.allFinite();
     if ((!ranged && !open) || (joint.nv != 1 && (ranged || slow)))
       refuse(model_, "joint '" + joint.name + "'", "it is limited on one side, or has several coordinates with limits");
-    if (!ranged && !slow && (joint.kind == JointKind::Continuous || joint.nv != 1)) return;
+    const int motor = alone_ ? model_.findMotor(joint.name) : -1;
+    const double effort = motor < 0 ? HUGE_VAL : model_.motors()[motor].effort_limit;
+    if (!ranged && !slow && std::isinf(effort) && (joint.kind == JointKind::Continuous || joint.nv != 1)) return;
     out << "    <limit";
     if (ranged) out << " lower=\"" << formatRounded(lower[0]) << "\" upper=\"" << formatRounded(upper[0]) << "\"";
-    out << " effort=\"0\" velocity=\"" << formatNumber(slow ? velocity[0] : 0) << "\"/>\n";
+    out << " effort=\"" << formatNumber(std::isfinite(effort) ? effort : 0) << "\" velocity=\""
+        << formatNumber(slow ? velocity[0] : 0) << "\"/>\n";
+  }
+
+  void writeMimicAndDynamics(int i, std::ostream& out) {
+    if (const auto it = mimics_.find(i); it != mimics_.end())
+      out << "    <mimic joint=\"" << escapeXml(model_.joints()[it->second.joint].name) << "\" multiplier=\""
+          << formatNumber(it->second.multiplier, "%.17g") << "\" offset=\"" << formatNumber(it->second.offset, "%.17g")
+          << "\"/>\n";
+    for (const JointForce& force : model_.jointForces()) {
+      if (force.joint != i) continue;
+      if (force.damping != 0 || force.friction != 0)
+        out << "    <dynamics damping=\"" << formatNumber(force.damping) << "\" friction=\""
+            << formatNumber(force.friction) << "\"/>\n";
+      if (force.stiffness != 0 || force.preload != 0)
+        warn("joint '" + model_.joints()[i].name + "'", "its spring is left out");
+    }
+  }
+
+  void warn(const std::string& element, const std::string& problem) {
+    warnings_.push_back(model_.name() + ": " + element + ": " + problem);
+  }
+
+  // What only the YAML file can say.
+  void listOmissions() {
+    std::string armatures;
+    for (int i = 1; i < model_.numBodies(); ++i)
+      if (const Joint& joint = model_.joints()[i]; model_.armature()[joint.idx_v] != 0)
+        armatures += (armatures.empty() ? "'" : ", '") + joint.name + "'";
+    if (!armatures.empty()) warn("joints " + armatures, "their armature is left out");
+    if (!model_.motors().empty()) warn("motors", "which joints they drive is left out");
+    for (const ContactFrame& c : model_.contacts()) warn("contact '" + c.name + "'", "it is left out");
+    for (const Reference& reference : model_.references()) warn("reference '" + reference.name + "'", "it is left out");
+    if (!model_.serialJoints().empty()) warn("serial joints", "they are left out");
+    if (model_.gravity() != Vector3d(0, 0, -9.81)) warn("gravity", "it is left out");
   }
 
   void writeFrame(const std::string& name, int body, const SE3& X_BF, std::ostream& out) {
@@ -346,6 +407,15 @@ class Writer {
   std::set<std::string> bodies_;
   bool free_root_ = false;  // the root link is carried by the free-flyer that the reader makes
   std::map<std::string, std::string> colors_;
+
+  // Of a URDF without a YAML file.
+  struct Mimic {
+    int joint = 0;
+    double multiplier = 1, offset = 0;
+  };
+  bool alone_ = false;
+  std::map<int, Mimic> mimics_;
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace
@@ -354,6 +424,8 @@ RobotText formatRobot(const Model& model, const std::string& remark) {
   Writer writer(model);
   return {writer.formatUrdf(remark), writer.formatYaml(remark)};
 }
+
+UrdfText formatUrdf(const Model& model) { return Writer(model).formatUrdfAlone(); }
 
 void writeRobot(const Model& model, const std::string& directory, const std::string& remark) {
   namespace fs = std::filesystem;

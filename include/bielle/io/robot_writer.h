@@ -1,6 +1,7 @@
 #pragma once
 /// \file A model written as the files that loadRobot reads (model/reader.h).
 #include <string>
+#include <vector>
 
 #include "bielle/model/model.h"
 
@@ -17,6 +18,16 @@ struct RobotText {
 /// \throws ModelError naming anything that the files cannot express: a universal joint whose axes are not axes of its
 ///   frame, limits of joints with several coordinates
 RobotText formatRobot(const Model& model, const std::string& remark = "");
+
+struct UrdfText {
+  std::string urdf;
+  std::vector<std::string> warnings;  ///< each names something that is left out
+};
+
+/// A URDF alone, for programs that read no more: couplers of two joints as <mimic>, dampers and friction as <dynamics>,
+/// limits of motors as those of their joints.
+/// \throws ModelError naming a joint that URDF does not have (universal, spherical), or as above
+UrdfText formatUrdf(const Model& model);
 
 /// Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY.
 /// \throws ModelError as above, or when they cannot be written

@@ -1,0 +1,68 @@
+// bielle convert: a robot in another format.
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/io/robot_writer.h"
+#include "cli/commands.h"
+#include "io/mjcf.h"
+#include "io/text_file.h"
+
+namespace bielle::cli {
+namespace {
+
+struct ConvertArguments {
+  RobotArgument robot;
+  std::string format = "bielle", output;
+};
+
+void warn(const std::vector<std::string>& warnings) {
+  for (const std::string& warning : warnings) std::cerr << "bielle: warning: " << warning << "\n";
+}
+
+int convert(const ConvertArguments& arguments) {
+  const LoadedRobot robot = arguments.robot.load();
+  if (arguments.format == "bielle") {
+    writeRobot(robot.model, arguments.output,
+               "Written by `bielle convert` from " + std::filesystem::path(robot.file).filename().string() + ".");
+  } else if (arguments.format == "urdf") {
+    const UrdfText text = formatUrdf(robot.model);
+    warn(text.warnings);
+    writeTextFile(arguments.output, text.urdf);
+  } else {
+    const MjcfText text = formatMjcf(robot.model, findClosedConfiguration(robot.model).q);
+    warn(text.warnings);
+    writeTextFile(arguments.output, text.xml);
+  }
+  std::cout << arguments.output << "\n";
+  return kOk;
+}
+
+}  // namespace
+
+void addConvert(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("convert", "Write a robot in another format");
+  const auto arguments = std::make_shared<ConvertArguments>();
+  command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf or MuJoCo .xml file")->required();
+  command
+      .add_option("--to", arguments->format,
+                  "bielle: a directory with URDF and YAML, which says all; mjcf: a file of MuJoCo; urdf: a URDF alone")
+      ->check(CLI::IsMember({"bielle", "mjcf", "urdf"}))
+      ->capture_default_str();
+  addFixedBase(command, arguments->robot);
+  command
+      .add_option("-o,--output", arguments->output, "the file; bielle: the directory, whose last name its files get")
+      ->required();
+  command.footer(
+      "What a format cannot say is told in a warning that names it; what would be another mechanism without it is "
+      "refused.\n"
+      "A URDF alone is a tree: loops are left out, couplers of two joints become <mimic>.\n"
+      "Examples:\n"
+      "  bielle convert bipetto --to mjcf -o bipetto.xml\n"
+      "  bielle convert bipetto.xml -o my_bipetto\n"
+      "  bielle convert belt_biped --to urdf -o belt.urdf");
+  command.callback([&action, arguments] { action = [=] { return convert(*arguments); }; });
+}
+
+}  // namespace bielle::cli
