@@ -3,5 +3,5 @@ bielle_test(parallel_bipeds SOURCES test_parallel_bipeds.cpp robot_directory.cpp
 target_compile_definitions(test_parallel_bipeds PRIVATE BIELLE_COMMAND="$<TARGET_FILE:bielle_command>")
 add_dependencies(test_parallel_bipeds bielle_command)
 set_tests_properties(parallel_bipeds PROPERTIES LABELS system)
-bielle_test(published SOURCES test_published.cpp LIBS bielle_motion bielle_robots)
+bielle_test(published SOURCES test_published.cpp robot_directory.cpp LIBS bielle_io bielle_robots)
 set_tests_properties(published PROPERTIES LABELS system)

@@ -13,6 +13,7 @@
 #include "bielle/model/reader.h"
 #include "bielle/robots/generators.h"
 #include "get_error.h"
+#include "io/adopt.h"
 #include "io/mjcf.h"
 #include "io/mjcf_coordinates.h"
 #include "mechanisms.h"
@@ -431,4 +432,51 @@ TEST_CASE("a URDF alone is the tree with its mimics, friction and limits, and te
     CHECK(closure.terms.size() == 2);
   }
   CHECK_THAT(getError([] { formatUrdf(loadRobot("cleobot").model); }), Catch::Contains("a URDF has no such joints"));
+}
+
+TEST_CASE("an adopted robot has the feet, the serial joints and a posture of the one that it was") {
+  for (const char* name : {"rsu_biped", "cleobot", "bipetto"}) {
+    CAPTURE(name);
+    const Model original = loadRobot(name).model;
+    ModelParts parts = takeParts(original);
+    parts.contacts.clear();
+    parts.references.clear();
+    parts.serial_joints.clear();
+    for (Motor& motor : parts.motors) motor.armature = 0, motor.effort_limit = 1;
+    parts.armature.setZero();
+    const RobotText bare = formatRobot(ModelBuilder::restore(parts));
+    const RobotDirectory directory;
+    const LoadedRobot published = loadRobot(directory.writeRobot(bare.urdf, bare.yaml));
+    const Adoption adoption = adoptRobot(published, "../robot.urdf");
+    CAPTURE(adoption.yaml);
+    const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;
+
+    REQUIRE(model.contacts().size() == 2);
+    for (const ContactFrame& contact : original.contacts()) {
+      const int i = model.findContact(contact.name);
+      REQUIRE(i >= 0);
+      CHECK(model.bodies()[model.contacts()[i].body].name == original.bodies()[contact.body].name);
+      CHECK((model.contacts()[i].X_BF.p - contact.X_BF.p).norm() < 0.05);
+    }
+    REQUIRE(model.references().size() == 1);
+    const AssemblyResult posture = assembleReference(model, "half_sitting");
+    CHECK(posture.status == AssemblyStatus::Closed);
+    Workspace ws(model);
+    updatePositions(model, ws, posture.q);
+    for (const ContactFrame& contact : model.contacts()) {
+      const SE3 X = getPlacement(ws, contact.body, contact.X_BF);
+      CHECK(std::abs(X.p.z()) < 1e-9);
+      CHECK(X.R(2, 2) > 1 - 1e-9);
+      CHECK((X.p.y() > 0) == (contact.name == "foot_left"));
+    }
+    for (const Motor& motor : model.motors()) {
+      CHECK(motor.armature == 1e-3);
+      CHECK(std::isinf(motor.effort_limit));
+    }
+    CHECK(adoption.guesses.size() >= 5);
+    if (name == std::string("rsu_biped")) CHECK(model.serialJoints().size() == 12);
+  }
+  const LoadedRobot delta = loadRobot("delta");
+  CHECK_THAT(getError([&] { adoptRobot(delta, "delta"); }),
+             Catch::Contains("it has a fixed base; only robots that stand"));
 }

@@ -31,7 +31,7 @@ TOP = ("engines", "simulation", "validation", "workers")  # rooms outside src
 OTHERS = {
     "yaml-cpp/": ["src/model/yaml_entry.cpp"],
     "urdf_": ["src/model/reader_urdf.cpp"],
-    "tinyxml": ["src/model/reader_urdf.cpp"],
+    "tinyxml": ["src/model/xml_document.h"],
     "zip.h": ["src/io/npz.cpp"],
     "nlopt": ["src/transmission/slsqp.cpp", "src/design/nlopt_search.h"],
     "CLI/": ["src/cli/", "simulation/", "validation/"],

@@ -10,10 +10,13 @@
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
+#include "io/adopt.h"
 #include "measure_steps.h"
+#include "robot_directory.h"
 #include "robots/spring_leg.h"
 
 using namespace bielle;
+using bielle::testing::RobotDirectory;
 namespace fs = std::filesystem;
 
 namespace {
@@ -203,4 +206,19 @@ TEST_CASE("the published model of Bipetto, completed, squats as Bipetto does") {
               j = ours.joints()[ours.findJoint(joint)].idx_q;
     for (size_t k = 0; k < a.guess.xs.size(); ++k) CHECK(std::abs(a.guess.xs[k][i] - b.guess.xs[k][j]) < 1e-3);
   }
+}
+
+TEST_CASE("Digit's published model, adopted, squats") {
+  if (!isAtHand("digit_like_2legs")) return;
+  const fs::path published = fs::absolute(kPublished + "/digit_like_2legs/robot.urdf").lexically_normal();
+  const Adoption adoption = adoptRobot(loadRobot(published.string()), published.string());
+  const RobotDirectory directory;
+  const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;
+  REQUIRE(model.contacts().size() == 2);
+  SquatOptions options;
+  options.depth = 0.8;
+  Motion squat = makeSquat(model, options);
+  const FddpSummary summary = solve(squat);
+  CAPTURE(adoption.yaml, summary.message);
+  CHECK(summary.termination == FddpTermination::Converged);
 }

@@ -20,6 +20,7 @@ void addReport(CLI::App& app, Action& action);
 void addView(CLI::App& app, Action& action);
 void addExport(CLI::App& app, Action& action);
 void addConvert(CLI::App& app, Action& action);
+void addAdopt(CLI::App& app, Action& action);
 void addInfo(CLI::App& app, Action& action);
 void addEval(CLI::App& app, Action& action);
 void addDesign(CLI::App& app, Action& action);

@@ -57,6 +57,7 @@ int run(int argc, char** argv) {
   addView(app, action);
   addExport(app, action);
   addConvert(app, action);
+  addAdopt(app, action);
   addInfo(app, action);
   addEval(app, action);
   addRobots(app, action);

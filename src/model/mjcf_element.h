@@ -1,8 +1,6 @@
 #pragma once
 /// \file Access to the elements of a file of MuJoCo (MJCF): attributes with the defaults of their classes, numbers, and
 /// notes of all that nobody asked for.
-#include <tinyxml.h>
-
 #include <map>
 #include <memory>
 #include <set>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "bielle/math/se3.h"
+#include "model/xml_document.h"
 
 namespace bielle {
 

@@ -103,6 +103,8 @@ void complete(const YamlFile& own, YamlFile& yaml) {
   replace(own.joint_types, yaml.joint_types);
   replace(own.closures, yaml.closures);
   replace(own.motors, yaml.motors);
+  for (const MotorSpec& motor : own.motors)
+    if (motor.armature) yaml.armature.erase(motor.joint);
   replace(own.armature, yaml.armature);
   replace(own.joint_forces, yaml.joint_forces);
   replace(own.contacts, yaml.contacts);

@@ -65,7 +65,8 @@ std::string identifyMotion(const std::string& directory) {
   std::vector<fs::path> parts;
   if (fs::is_regular_file(robot))
     for (const fs::directory_entry& entry : fs::directory_iterator(robot.parent_path()))
-      if (entry.path().extension() == ".urdf" || entry.path().extension() == ".yaml") parts.push_back(entry.path());
+      if (const fs::path type = entry.path().extension(); type == ".urdf" || type == ".yaml" || type == ".xml")
+        parts.push_back(entry.path());
   std::sort(parts.begin(), parts.end());
   files.insert(files.end(), parts.begin(), parts.end());
   return makeIdentity(files);

@@ -1,0 +1,53 @@
+// bielle adopt: a file that completes a robot of others.
+#include "io/adopt.h"
+
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "bielle/model/error.h"
+#include "cli/commands.h"
+#include "io/text_file.h"
+
+namespace fs = std::filesystem;
+
+namespace bielle::cli {
+namespace {
+
+int adopt(const RobotArgument& argument, const std::string& directory) {
+  const LoadedRobot robot = argument.load();
+  if (fs::path(robot.file).extension() == ".yaml")
+    throw ModelError(robot.file, "robot", "it is a file that completes another robot already", "edit it");
+  const fs::path place = fs::absolute(directory).lexically_normal();
+  const std::string name = (place.has_filename() ? place : place.parent_path()).filename().string();
+  const Adoption adoption = adoptRobot(robot, fs::path(robot.file).lexically_relative(place).string());
+  std::error_code error;
+  fs::create_directories(place, error);
+  const fs::path file = place / (name + ".yaml");
+  if (error)
+    throw ModelError(directory, "directory", "it cannot be made: " + error.message(), "give another one with -o");
+  if (fs::exists(file)) throw ModelError(file.string(), "file", "it exists", "give another directory, or remove it");
+  writeTextFile(file.string(), adoption.yaml);
+  std::cout << (fs::path(directory) / (name + ".yaml")).lexically_normal().string() << "\n";
+  for (const std::string& guess : adoption.guesses) std::cout << "  " << guess << "\n";
+  return kOk;
+}
+
+}  // namespace
+
+void addAdopt(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("adopt", "Complete a robot of others: feet, soles, posture, motors");
+  const auto robot = std::make_shared<RobotArgument>();
+  const auto directory = std::make_shared<std::string>();
+  command.add_option("ROBOT", robot->name, "name, directory, .urdf or MuJoCo .xml file")->required();
+  command.add_option("-o,--output", *directory, "directory of the new robot; its file gets its last name")->required();
+  command.footer(
+      "Writes DIR/NAME.yaml, which refers to the robot's own files and is to be corrected by hand: comments explain "
+      "every guess.\n"
+      "Example:\n"
+      "  bielle adopt path/to/published.urdf -o mine\n"
+      "  bielle solve squat --robot mine -o squat");
+  command.callback([&action, robot, directory] { action = [=] { return adopt(*robot, *directory); }; });
+}
+
+}  // namespace bielle::cli

@@ -1,0 +1,277 @@
+#include "io/adopt.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/model/builder.h"
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kUpright = 0.9;                      // least cosine between the z axis of a sole and up
+constexpr double kMirror = 0.06, kSameHeight = 0.02;  // of a pair of feet, m: published models are not quite symmetric
+constexpr double kHighest = 0.94, kLowest = 0.5, kStep = 0.04;  // shares of the height of the base
+constexpr double kOver = 0.005;                                 // from the centre of mass to the middle of the feet, m
+constexpr int kShifts = 20;
+constexpr double kRotor = 1e-3, kLever = 0.02, kSole = 0.1;
+
+struct Foot {
+  int frame = 0;
+  SE3 X_WF;
+  bool is_named = false;
+};
+
+std::string format(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", std::abs(value) < 1e-9 ? 0.0 : value);
+  return text;
+}
+
+std::string quote(const std::string& name) {
+  std::string out = "\"";
+  for (char c : name) out += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
+  return out + "\"";
+}
+
+bool isNamedFoot(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  return name.find("foot") != std::string::npos || name.find("sole") != std::string::npos;
+}
+
+double round(double length) { return std::round(length * 1e4) / 1e4; }
+
+class Adopter {
+ public:
+  Adopter(const LoadedRobot& robot, const std::string& path) : model_(robot.model), path_(path), ws_(robot.model) {
+    if (!model_.hasFreeFlyer())
+      fail("it has a fixed base",
+           "only robots that stand on feet are adopted; `bielle solve` takes others as they are");
+    const AssemblyResult closed = findClosedConfiguration(model_);
+    if (closed.status != AssemblyStatus::Closed) fail("its loops do not close: " + closed.message, "correct the robot");
+    updatePositions(model_, ws_, closed.q);
+  }
+
+  Adoption write() {
+    findFeet();
+    out_ << "# A first guess by `bielle adopt`: correct what is wrong, then delete the comment above it.\nmodel: "
+         << quote(path_) << "\n";
+    writeMotors();
+    writeContacts();
+    writePosture();
+    writeSerialJoints();
+    return {out_.str(), guesses_};
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& problem, const std::string& remedy) const {
+    throw ModelError(path_, "robot '" + model_.name() + "'", problem, remedy);
+  }
+
+  // A guess as a comment, before what it explains.
+  void guess(const std::string& text) {
+    guesses_.push_back(text);
+    out_ << "\n# " << text << "\n";
+  }
+
+  void findFeet() {
+    std::vector<Foot> candidates;
+    for (size_t i = 0; i < model_.frames().size(); ++i) {
+      const Frame& frame = model_.frames()[i];
+      const SE3 X = getPlacement(ws_, frame.body, frame.X_BF);
+      if (frame.body > 1 && X.R(2, 2) > kUpright)
+        candidates.push_back({static_cast<int>(i), X, isNamedFoot(frame.name)});
+    }
+    if (candidates.empty())
+      fail("no frame on a leg has its z axis up in the closed neutral configuration",
+           "add a link without mass under each foot, z up and x forward");
+    std::sort(candidates.begin(), candidates.end(), [](const Foot& a, const Foot& b) {
+      return std::make_tuple(!a.is_named, a.X_WF.p.z()) < std::make_tuple(!b.is_named, b.X_WF.p.z());
+    });
+    feet_ = {candidates.front()};
+    double nearest = kMirror;
+    const Foot& first = candidates.front();
+    const Vector3d image(first.X_WF.p.x(), -first.X_WF.p.y(), first.X_WF.p.z());
+    for (const Foot& other : candidates) {
+      const Vector3d apart = other.X_WF.p - image;
+      if (model_.frames()[other.frame].body == model_.frames()[first.frame].body || other.is_named != first.is_named ||
+          std::abs(apart.z()) > kSameHeight || std::abs(first.X_WF.p.y()) < kSameHeight || apart.norm() >= nearest)
+        continue;
+      nearest = apart.norm();
+      feet_.resize(1);
+      feet_.push_back(other);
+    }
+    // Left is where y is positive.
+    if (feet_.size() == 2 && feet_[0].X_WF.p.y() < 0) std::swap(feet_[0], feet_[1]);
+  }
+
+  std::string getContactName(size_t i) const {
+    return feet_.size() == 1 ? "foot" : i == 0 ? "foot_left" : "foot_right";
+  }
+
+  void writeMotors() {
+    if (model_.motors().empty())
+      return guess("Motors: none are given, and none are guessed: name joints under `motors`.");
+    const double least = model_.mass() * 9.81 * kLever;
+    bool unlimited = false, guessed = false;
+    std::ostringstream lines;
+    for (const Motor& motor : model_.motors()) {
+      const bool is_weak = motor.effort_limit < least;
+      unlimited |= is_weak;
+      guessed |= motor.armature == 0;
+      const auto limit = [&](double value) { return is_weak || std::isinf(value) ? ".inf" : format(value); };
+      lines << "  " << quote(motor.name) << ": {armature: " << format(motor.armature > 0 ? motor.armature : kRotor)
+            << ", effort: " << limit(motor.effort_limit) << ", velocity: " << limit(motor.velocity_limit) << "}\n";
+    }
+    guess(
+        "Motors: those of the robot." +
+        std::string(guessed ? " Rotors of 1e-3 kg m^2 where none is given, so that light linkages do not race." : "") +
+        (unlimited ? " Limits below " + format(least) +
+                         " N m, which could not hold the weight on 20 mm, are taken for "
+                         "placeholders."
+                   : ""));
+    out_ << "motors:\n" << lines.str();
+  }
+
+  // Length and width of the shapes of a foot along x and y of its frame; empty without shapes.
+  std::vector<double> measureSole(const Foot& foot) const {
+    const Frame& frame = model_.frames()[foot.frame];
+    Eigen::Vector2d half = Eigen::Vector2d::Zero();
+    for (const Visual& visual : model_.visuals()) {
+      if (visual.body != frame.body || visual.shape == Visual::Shape::Mesh) continue;
+      Vector3d size = visual.size / 2;
+      if (visual.shape == Visual::Shape::Cylinder) size = {visual.size[0], visual.size[0], visual.size[1] / 2};
+      if (visual.shape == Visual::Shape::Sphere) size = Vector3d::Constant(visual.size[0]);
+      const SE3 X = frame.X_BF.inverse() * visual.X_BV;
+      for (int corner = 0; corner < 8; ++corner) {
+        const Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+        half = half.cwiseMax(X.act(sign.cwiseProduct(size)).head<2>().cwiseAbs());
+      }
+    }
+    if (half.isZero()) return {};
+    return {2 * half.x(), 2 * half.y()};
+  }
+
+  void writeContacts() {
+    std::ostringstream lines;
+    bool is_measured = true;
+    ModelParts parts = takeParts(model_);
+    parts.contacts.clear();
+    parts.references.clear();
+    for (size_t i = 0; i < feet_.size(); ++i) {
+      const Frame& frame = model_.frames()[feet_[i].frame];
+      std::vector<double> sole = measureSole(feet_[i]);
+      is_measured &= !sole.empty();
+      if (sole.empty()) sole = {kSole, kSole};
+      lines << "  " << getContactName(i) << ": {frame: " << quote(frame.name) << ", type: 6d, sole: ["
+            << format(sole[0]) << ", " << format(sole[1]) << "]}\n";
+      parts.contacts.push_back(
+          {getContactName(i), frame.body, frame.X_BF, ContactKind::Surface6D, sole[0] / 2, sole[1] / 2});
+    }
+    guess("Feet: the lowest frames with z up" +
+          std::string(feet_[0].is_named ? " that are named like feet" : ", whose names do not say so") +
+          (feet_.size() == 2 ? ", mirror images of each other; left is where y is positive."
+                             : ": one, without a mirror image."));
+    guesses_.push_back(is_measured
+                           ? "Soles: the extent of the shapes of the feet, which may be more than the flat part."
+                           : "Soles: 0.1 m square, because the feet have no shapes but meshes, which are not read.");
+    out_ << "# " << guesses_.back() << "\ncontacts:\n" << lines.str();
+    with_feet_ = ModelBuilder::restore(std::move(parts));
+  }
+
+  // The posture at this share of the height of the base over the feet.
+  Reference makePosture(double share) const {
+    const SE3& base = ws_.X_WB[1];
+    Vector3d middle = Vector3d::Zero();
+    for (const Foot& foot : feet_) middle += foot.X_WF.p / static_cast<double>(feet_.size());
+    Reference reference;
+    reference.name = "half_sitting";
+    reference.height_frame = model_.bodies()[1].name;
+    double apart = 0;  // from the middle
+    for (size_t i = 0; i < feet_.size() && feet_.size() == 2; ++i)
+      apart = std::max({apart, std::abs(feet_[i].X_WF.p.y() - middle.y()), 2 * with_feet_->contacts()[i].half_width});
+    reference.height = round(share * (base.p.z() - middle.z()));
+    for (size_t i = 0; i < feet_.size(); ++i)
+      reference.feet[getContactName(i)] = {0, (i == 0 ? 1 : -1) * round(apart), 0};
+    reference.joints[model_.joints()[1].name] = {round(base.p.x() - middle.x()), 0, reference.height, 0, 0, 0, 1};
+    return reference;
+  }
+
+  // Whether it closes within the ranges of the joints; moves the base so that the centre of mass is over the feet.
+  bool stand(Reference& reference) const {
+    Workspace ws(*with_feet_);
+    std::vector<double>& base = reference.joints.begin()->second;
+    double off = 0;
+    for (int i = 0; i < kShifts; ++i) {
+      const AssemblyResult result = assemble(*with_feet_, makeReferenceProblem(*with_feet_, reference));
+      if (result.status != AssemblyStatus::Closed) return false;
+      for (const Joint& joint : model_.joints())
+        if (joint.nv == 1 && (result.q[joint.idx_q] < model_.lowerLimits()[joint.idx_v] ||
+                              result.q[joint.idx_q] > model_.upperLimits()[joint.idx_v]))
+          return false;
+      updatePositions(*with_feet_, ws, result.q);
+      off = calcCom(*with_feet_, ws).x();
+      if (std::abs(off) < kOver) return true;
+      base[0] = round(base[0] - off);
+    }
+    return false;
+  }
+
+  void writePosture() {
+    for (double share = kHighest; share > kLowest; share -= kStep) {
+      Reference r = makePosture(share);
+      if (!stand(r)) continue;
+      guess(
+          "Posture: feet flat, as far apart as in the neutral configuration and two soles at least, under the centre "
+          "of mass;");
+      const std::string more = "the base at " + format(100 * share) +
+                               " % of its height there. It closes; angles under `joints` choose how legs bend.";
+      guesses_.back() += " " + more;
+      const std::vector<double>& base = r.joints.begin()->second;
+      out_ << "# " << more << "\nreferences:\n  half_sitting:\n    joints:\n      " << quote(r.joints.begin()->first)
+           << ": [" << format(base[0]) << ", 0, " << format(base[2])
+           << ", 0, 0, 0, 1]\n    height: {frame: " << quote(r.height_frame) << ", value: " << format(r.height)
+           << "}\n    feet:\n";
+      for (const auto& [name, place] : r.feet) out_ << "      " << name << ": [0, " << format(place.y()) << ", 0]\n";
+      return;
+    }
+    guess(
+        "Posture: none that stands on flat feet within the ranges of the joints was found: give one under "
+        "`references`.");
+  }
+
+  void writeSerialJoints() {
+    std::string lines, legs;
+    for (const Foot& foot : feet_) {
+      std::vector<std::string> joints;
+      bool is_simple = true;
+      for (int i = model_.frames()[foot.frame].body; i > 1; i = model_.joints()[i].parent) {
+        is_simple &= model_.joints()[i].nv == 1;
+        joints.insert(joints.begin(), "  - " + quote(model_.joints()[i].name) + "\n");
+      }
+      if (!is_simple || joints.size() != 6)
+        return guess("Serial joints: none guessed, because " + std::to_string(joints.size()) +
+                     " joints lead from the base to a foot: name six per leg under `serial_joints`.");
+      for (const std::string& joint : joints) lines += joint;
+    }
+    guess("Serial joints: all from the base to the feet.");
+    out_ << "serial_joints:\n" << lines;
+  }
+
+  const Model& model_;
+  const std::string path_;
+  Workspace ws_;
+  std::vector<Foot> feet_;
+  std::optional<Model> with_feet_;
+  std::ostringstream out_;
+  std::vector<std::string> guesses_;
+};
+
+}  // namespace
+
+Adoption adoptRobot(const LoadedRobot& robot, const std::string& model) { return Adopter(robot, model).write(); }
+
+}  // namespace bielle
