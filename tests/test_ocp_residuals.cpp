@@ -9,6 +9,7 @@
 #include "bielle/ocp/cost.h"
 #include "check_derivative.h"
 #include "math/so3.h"
+#include "ocp/ground_forces.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -44,7 +45,7 @@ struct TestNode {
 
 struct NamedResidual {
   std::string name;
-  std::unique_ptr<Residual> residual;
+  std::shared_ptr<const Residual> residual;
 };
 
 // One of every kind. Two contacts are in force; `dofs` have one coordinate each.
@@ -52,7 +53,7 @@ std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, 
                                          const BodyFrame& a, const BodyFrame& b, const std::vector<int>& dofs,
                                          const VectorXd& q_closed) {
   std::vector<NamedResidual> out;
-  const auto add = [&out](const std::string& name, std::unique_ptr<Residual> residual) {
+  const auto add = [&out](const std::string& name, std::shared_ptr<const Residual> residual) {
     out.push_back({name, std::move(residual)});
   };
   add("com position", makeComPosition(randomVector(rng, 3)));
@@ -75,9 +76,14 @@ std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, 
     add("contact force", makeContactForce(set, c, randomVector(rng, rows, 10)));
     add("contact force in the world", makeContactForce(set, c, randomVector(rng, rows, 10), ForceAxes::World));
     add("wrench cone", makeWrenchCone(set, c, 0.1, 0.04, 0.6));
+    ConstraintSet aslant = set;
+    aslant.closures[c].X_B2 = randomPlacement(rng);
+    add("contact force on the ground", useGroundAxes(*makeContactForce(aslant, c, randomVector(rng, rows, 10))));
+    add("wrench cone on the ground", useGroundAxes(*makeWrenchCone(aslant, c, 0.1, 0.04, 0.6)));
     if (rows != 6) continue;
     add("centre of pressure", makeCenterOfPressure(set, c));
     add("centre of pressure in the world", makeCenterOfPressure(set, c, ForceAxes::World));
+    add("centre of pressure on the ground", useGroundAxes(*makeCenterOfPressure(aslant, c)));
   }
   for (const Transmission& linkage : listTransmissions(model, q_closed))
     add("transmission of " + linkage.joints, makeTransmission(linkage));
@@ -251,6 +257,39 @@ TEST_CASE("force residuals: a force at a known point of the sole") {
   lambda[row + 2] = 0.5;  // hardly loaded: bounded, and its derivative follows
   CHECK(node.calc(*makeCenterOfPressure(set, constraint), q, v, lambda).allFinite());
   checkResidual(model, set, *makeCenterOfPressure(set, constraint), q, v, lambda);
+}
+
+TEST_CASE("force residuals: a sole that rests aslant is carried by the ground it was planned for") {
+  const Model model = loadRobot("bipetto").model;
+  const Matrix3d heading = makeAxisRotation(Vector3d::UnitZ(), 0.4);
+  const ConstraintSet set = makeConstraintSet(model, {{0, {heading, Vector3d::Zero()}, 0, 0}});
+  const int constraint = set.num_loops, row = set.offsets[constraint];
+  const auto cone = makeWrenchCone(set, constraint, 0.1, 0.04, 0.3);
+  const auto on_ground = useGroundAxes(*cone);
+  REQUIRE(on_ground);
+  CHECK_FALSE(useGroundAxes(*makeComPosition(Vector3d::Zero())));
+  TestNode node(model, set);
+  const VectorXd v = VectorXd::Zero(model.nv());
+  VectorXd q = model.makeNeutral();
+  const auto turnFoot = [&](double roll) {
+    const Matrix3d R = heading * makeAxisRotation(Vector3d::UnitX(), roll);
+    updatePositions(model, node.ws, model.makeNeutral());
+    const ContactFrame& foot = model.contacts()[0];
+    const Eigen::Quaterniond turn(R * (node.ws.X_WB[foot.body].R * foot.X_BF.R).transpose() * node.ws.X_WB[1].R);
+    q.segment<4>(3) = turn.coeffs();
+    return R;
+  };
+  // 100 N along the vertical, in the middle of the sole.
+  for (double roll : {0.0, 0.4}) {
+    const Matrix3d R = turnFoot(roll);
+    VectorXd lambda = VectorXd::Zero(set.rows);
+    lambda.segment<3>(row) = R.transpose() * Vector3d(0, 0, 100);
+    const VectorXd own = node.calc(*cone, q, v, lambda), ground = node.calc(*on_ground, q, v, lambda);
+    CAPTURE(roll);
+    CHECK((ground.head<5>() - (VectorXd(5) << 100, 30, 30, 30, 30).finished()).norm() < 1e-10);
+    CHECK((own.head<5>().minCoeff() > 0) == (roll == 0));
+    if (roll == 0) CHECK((own - ground).norm() < 1e-10);
+  }
 }
 
 TEST_CASE("sole clearance: over steps, beside them and between") {

@@ -2,9 +2,12 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/ocp/residual.h"
+#include "ocp/ground_forces.h"
 
 namespace bielle {
 namespace {
+
+constexpr int kMostRows = 17;  // of a force residual
 
 class ComPosition : public Residual {
  public:
@@ -37,40 +40,46 @@ class ComVelocity : public Residual {
 };
 
 // Residuals linear or smooth in the force of one contact, F = blockdiag(R, R) lambda with R = 1 in the axes of the
-// contact and R = R_WF in those of the world.
+// contact, R = R_WF in those of the world and R = R_WT^T R_WF in those of the ground where the contact belongs.
 class ForceResidual : public Residual {
  public:
   ForceResidual(const ConstraintSet& set, int constraint, ForceAxes axes)
       : row_(set.offsets[constraint]),
         rows_(getRows(set.closures[constraint].kind)),
-        in_world_(axes == ForceAxes::World),
+        turns_(axes == ForceAxes::World),
         body_(set.closures[constraint].body1),
-        R_BF_(set.closures[constraint].X_B1.R) {}
+        R_BF_(set.closures[constraint].X_B1.R),
+        R_TW_(set.closures[constraint].X_B2.R.transpose()) {}
   bool needsForces() const override { return true; }
-  bool needsMotion() const override { return in_world_; }
+  bool needsMotion() const override { return turns_; }
+  void useGroundAxes() {
+    turns_ = true;
+    R_AW_ = R_TW_;
+  }
 
  protected:
   using Force = VectorUpTo6<double>;
-  using Gradient = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;  // dr/dF, n x rows
+  // dr/dF, n x rows
+  using Gradient = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMostRows, 6>;
 
   Force getForce(const NodeView& node) const {
     Force f = node.lambda.segment(row_, rows_);
-    if (!in_world_) return f;
+    if (!turns_) return f;
     const Matrix3d R = getAxes(node);
     for (int i = 0; i < rows_; i += 3) f.segment<3>(i) = (R * f.segment<3>(i)).eval();
     return f;
   }
 
-  // dF/dlambda = blockdiag(R, R), and the forces turn with the body: dF/dq_k = J_k x F, axis by axis.
+  // dF/dlambda = blockdiag(R, R), and the forces turn with the body: dF/dq_k = (R_AW J_k) x F, axis by axis.
   void addChain(const NodeView& node, const Force& f, const Gradient& gradient, ResidualRows rows) const {
-    if (!in_world_) {
+    if (!turns_) {
       rows.lambda.middleCols(row_, rows_) = gradient;
       return;
     }
     const Matrix3d R = getAxes(node);
     for (int i = 0; i < rows_; i += 3) rows.lambda.middleCols<3>(row_ + i).noalias() = gradient.middleCols<3>(i) * R;
     for (int k : node.model.supportDofs(body_)) {
-      const Vector3d w = node.ws.J.col(k).tail<3>();
+      const Vector3d w = R_AW_ * node.ws.J.col(k).tail<3>();
       rows.q.col(k).setZero();
       for (int i = 0; i < rows_; i += 3)
         rows.q.col(k) += gradient.middleCols<3>(i) * w.cross(Vector3d(f.segment<3>(i)));
@@ -80,11 +89,12 @@ class ForceResidual : public Residual {
   int row_, rows_;
 
  private:
-  Matrix3d getAxes(const NodeView& node) const { return node.ws.X_WB[body_].R * R_BF_; }
+  Matrix3d getAxes(const NodeView& node) const { return R_AW_ * node.ws.X_WB[body_].R * R_BF_; }
 
-  bool in_world_;
+  bool turns_;
   int body_;
-  Matrix3d R_BF_;
+  Matrix3d R_BF_, R_TW_;
+  Matrix3d R_AW_ = Matrix3d::Identity();  // from the world to the axes of F
 };
 
 class ContactForce : public ForceResidual {
@@ -150,11 +160,22 @@ class WrenchCone : public ForceResidual {
   }
   int size() const override { return static_cast<int>(A_.rows()); }
   void calc(const NodeView& node, VectorRef r) const override { r.noalias() = A_ * getForce(node); }
-  void calcJacobian(const NodeView&, ResidualRows rows) const override { rows.lambda.middleCols(row_, rows_) = A_; }
+  void calcJacobian(const NodeView& node, ResidualRows rows) const override {
+    addChain(node, getForce(node), A_, rows);
+  }
 
  private:
   MatrixXd A_;
 };
+
+template <typename T>
+std::shared_ptr<const Residual> copyInGroundAxes(const Residual& residual) {
+  const T* found = dynamic_cast<const T*>(&residual);
+  if (!found) return nullptr;
+  auto copy = std::make_shared<T>(*found);
+  copy->useGroundAxes();
+  return copy;
+}
 
 class JointPosition : public Residual {
  public:
@@ -260,6 +281,11 @@ std::unique_ptr<Residual> makeCenterOfPressure(const ConstraintSet& set, int con
 std::unique_ptr<Residual> makeWrenchCone(const ConstraintSet& set, int constraint, double half_length,
                                          double half_width, double mu) {
   return std::make_unique<WrenchCone>(set, constraint, half_length, half_width, mu);
+}
+std::shared_ptr<const Residual> useGroundAxes(const Residual& residual) {
+  if (auto copy = copyInGroundAxes<ContactForce>(residual)) return copy;
+  if (auto copy = copyInGroundAxes<CenterOfPressure>(residual)) return copy;
+  return copyInGroundAxes<WrenchCone>(residual);
 }
 std::unique_ptr<Residual> makeJointPosition(const Model& model, const std::vector<int>& dofs) {
   return std::make_unique<JointPosition>(model, dofs);
