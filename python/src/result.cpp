@@ -123,7 +123,7 @@ MotionResult solveRequest(const Robot& robot, const Request& asked, ProblemOptio
   const RunInfo run{robot.name, robot.file, {}};
   const FddpSummary summary = solveMotion(motion, first, observer);
   MotionResult result = makeResult(run, motion, motion.guess, summary);
-  if (!result.converged() || objective.objective != Objective::Effort || problem.timings.areGiven()) return result;
+  if (!result.converged()) return result;
   if (std::optional<Motion> refined = refineStages(request, model, problem, motion, result.record)) {
     const FddpSummary again = solveMotion(*refined, solver, observer);
     if (again.termination == FddpTermination::Converged)

@@ -245,12 +245,11 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed",
                     serial ? arguments.serial_armature : ""};
   MotionResult result = makeResult(run, motion, motion.guess, summary);
-  if (result.converged() && problem.objective.objective == Objective::Effort && !problem.timings.areGiven()) {
+  if (result.converged()) {
     if (std::optional<Motion> refined = refineStages(request, model, problem, motion, result.record)) {
       if (!arguments.quiet)
-        std::cout << "velocities differ from their finite differences by "
-                  << formatNumber(100 * calcStepError(model, result.record), "%.2f")
-                  << " %: once more, in stages half as long" << std::endl;
+        std::cout << "velocities differ from their finite differences by more than "
+                  << formatNumber(100 * kLargestStepError) << " %: once more, in stages half as long" << std::endl;
       const FddpSummary again = solveMotion(*refined, arguments.solver, makeObserver(arguments));
       if (again.termination == FddpTermination::Converged)
         result = makeResult(run, *refined, refined->guess, addUp(summary, again));

@@ -50,6 +50,7 @@ double calcStepError(const Model& model, const MotionRecord& record) {
 
 std::optional<Motion> refineStages(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
                                    const Motion& solved, const MotionRecord& record) {
+  if (problem.objective.objective != Objective::Effort || problem.timings.areGiven()) return {};
   const auto step = std::find_if(request.options.begin(), request.options.end(),
                                  [](const OptionEntry& option) { return option.name == "time_step"; });
   if (step == request.options.end() || *step->value != 0) return {};

@@ -12,8 +12,9 @@ namespace bielle {
 double calcStepError(const Model& model, const MotionRecord& record);
 inline constexpr double kLargestStepError = 0.004;
 
-/// The motion of a request once more, in stages half as long and with the solution as its guess, if their length was left
-/// to the motion (`time_step` 0) and calcStepError() of the solution exceeds kLargestStepError. Sets `time_step`.
+/// The motion of least effort of a request once more, in stages half as long and with the solution as its guess, if their
+/// length was left to the motion (`time_step` 0), no duration is free and calcStepError() of the solution exceeds
+/// kLargestStepError. Sets `time_step`.
 /// \param record  of the solution of `solved`
 std::optional<Motion> refineStages(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
                                    const Motion& solved, const MotionRecord& record);
