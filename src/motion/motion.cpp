@@ -206,9 +206,8 @@ void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights
 
 namespace {
 
-// Rows of the cone over `unit` and, of torques, lengths of the sole are not below `least` (rows).
-template <typename Least>
-void addCone(const Model& model, int c, double friction, double margin, double unit, const Least& calcLeast,
+// \param unit  force or impulse that counts as 1   \param normal, others  least of the normal row and of all others, over it
+void addCone(const Model& model, int c, double friction, double margin, double unit, double normal, double others,
              StageSpec& stage) {
   const ConstraintSet& set = stage.constraints;
   const ContactFrame& contact = model.contacts()[set.getContact(c)];
@@ -222,8 +221,9 @@ void addCone(const Model& model, int c, double friction, double margin, double u
     scale.segment<2>(7) *= std::max(least, X);
     scale.tail<8>() *= std::max(least, X + Y);
   }
-  stage.path_constraints.push_back({"wrench cone of " + contact.name, std::move(cone),
-                                    VectorXd(calcLeast(rows).cwiseProduct(scale)),
+  VectorXd lower = others * scale;
+  lower[0] = normal * unit;
+  stage.path_constraints.push_back({"wrench cone of " + contact.name, std::move(cone), lower,
                                     VectorXd::Constant(rows, std::numeric_limits<double>::infinity()), scale});
 }
 
@@ -232,9 +232,8 @@ void addCone(const Model& model, int c, double friction, double margin, double u
 void addWrenchCones(const Model& model, double friction, double margin, StageSpec& stage) {
   constexpr double kLeastLoad = 1e-3;
   const ConstraintSet& set = stage.constraints;
-  const auto calcLeast = [=](int rows) { return VectorXd(kLeastLoad * VectorXd::Unit(rows, 0)); };
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c)
-    addCone(model, c, friction, margin, model.mass() * model.gravity().norm(), calcLeast, stage);
+    addCone(model, c, friction, margin, model.mass() * model.gravity().norm(), kLeastLoad, 0, stage);
 }
 
 void addImpulseCones(const Model& model, double friction, double margin, int landing, StageSpec& stage) {
@@ -242,9 +241,7 @@ void addImpulseCones(const Model& model, double friction, double margin, int lan
   const ConstraintSet& set = stage.constraints;
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
     const double least = set.getContact(c) == landing ? 0 : -kApex;
-    addCone(
-        model, c, friction, margin, model.mass(), [=](int rows) { return VectorXd(VectorXd::Constant(rows, least)); },
-        stage);
+    addCone(model, c, friction, margin, model.mass(), least, least, stage);
   }
 }
 
