@@ -62,13 +62,10 @@ std::string identifyMotion(const std::string& directory) {
   for (const char* name : {"summary.json", "trajectory.csv", "trajectory.npz"})
     if (fs::exists(fs::path(directory) / name)) files.push_back(fs::path(directory) / name);
   const fs::path robot = readSummary(directory).robot_file;
-  std::vector<fs::path> parts;
-  if (fs::is_regular_file(robot))
-    for (const fs::directory_entry& entry : fs::directory_iterator(robot.parent_path()))
-      if (const fs::path type = entry.path().extension(); type == ".urdf" || type == ".yaml" || type == ".xml")
-        parts.push_back(entry.path());
-  std::sort(parts.begin(), parts.end());
-  files.insert(files.end(), parts.begin(), parts.end());
+  if (fs::is_regular_file(robot)) {
+    const std::vector<fs::path> parts = listRobotFiles(robot.parent_path());
+    files.insert(files.end(), parts.begin(), parts.end());
+  }
   return makeIdentity(files);
 }
 

@@ -220,11 +220,21 @@ std::string describeLog(const std::string& log) {
   return last.empty() ? "" : ": " + last.substr(0, 200);
 }
 
+std::vector<fs::path> listRobotFiles(const fs::path& directory) {
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory))
+    if (const fs::path type = entry.path().extension(); type == ".urdf" || type == ".yaml" || type == ".xml")
+      files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
 std::string makeIdentity(const std::string& program, const std::vector<std::string>& robots) {
   std::vector<fs::path> files;
-  for (const std::string& robot : robots)
-    for (const fs::directory_entry& entry : fs::directory_iterator(robot))
-      if (entry.path().extension() == ".urdf" || entry.path().extension() == ".yaml") files.push_back(entry.path());
+  for (const std::string& robot : robots) {
+    const std::vector<fs::path> parts = listRobotFiles(robot);
+    files.insert(files.end(), parts.begin(), parts.end());
+  }
   std::sort(files.begin(), files.end());
   files.push_back(program);
   return makeIdentity(files);

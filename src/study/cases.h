@@ -49,6 +49,9 @@ struct RunOutcome {
   bool interrupted = false;  // by the user; unfinished cases were dropped
 };
 
+// The files in a directory that robots are read from, sorted.
+std::vector<std::filesystem::path> listRobotFiles(const std::filesystem::path& directory);
+
 // Dependencies of the results: the program and the files of the robots in these directories.
 std::string makeIdentity(const std::string& program, const std::vector<std::string>& robots);
 // The same of any files, the program among them.
