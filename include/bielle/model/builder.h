@@ -29,9 +29,6 @@ struct ModelParts {
   std::vector<JointForce> joint_forces;
 };
 ModelParts takeParts(const Model& model);
-/// The model of these parts, to the last bit the one that they were taken from.
-/// 	hrows ModelError when an index or a size among them does not fit
-Model makeModel(ModelParts parts);
 
 /// Collects bodies, joints, closures, motors and frames, then validates them and makes the model.
 /// Bodies are referred to by the name of the link; "world" is the ground. A link must be declared before it is used;

@@ -76,7 +76,7 @@ struct LoadedRobot {
   Model model;
   std::vector<std::string> warnings;  ///< "file: element: problem", valid but suspicious
   std::string directory;              ///< where the files were found
-  std::string file;                   ///< absolute path of the .urdf or .xml, or of the .yaml that completes one elsewhere
+  std::string file;  ///< absolute path of the .urdf or .xml, or of the .yaml that completes one elsewhere
 };
 
 /// Loads a robot by name (`bipetto`: DIR/bipetto/bipetto.urdf, robot.urdf, bipetto.yaml or .xml in the directories of

@@ -33,8 +33,8 @@ class CommandedWalk {
   };
 
   /// From the standing posture q0, at time 0.
-  /// \param model  must outlive it   \param options  `flight`, `rigid_landing`, `landing_speed` and `published` are ignored; a time step of 0
-  /// is 12 ms
+  /// \param model  must outlive it   \param options  `flight`, `rigid_landing`, `landing_speed` and `published` are
+  /// ignored; a time step of 0 is 12 ms
   /// \throws ModelError as planLocomotion() and addLimits() do
   CommandedWalk(const Model& model, const LocomotionOptions& options, const LimitOptions& limits, CommandSource command,
                 const VectorXd& q0);
