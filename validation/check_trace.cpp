@@ -190,10 +190,14 @@ class Tracer {
   bool hasMidpoint(int k) const { return motion_.record.has_midpoints && !motion_.isImpact(k); }
 
   // Velocities and impulses of an impact by Simbody's mass matrix and constraints, those of loops and of the feet that
-  // stand afterwards.
+  // stand afterwards. Loops that are open, as the full formulation leaves them, have no velocity that all rows agree on:
+  // they keep the recorded one, which the row of opening velocities bounds.
   void traceImpact(const SimbodyBridge& simbody, int k, StageTrace& stage) const {
     const VectorXd v = motion_.record.v.row(k), next = motion_.record.v.row(k + 1), change = next - v;
-    const OracleSolution solution = simbody.solveImpact();
+    const MatrixXd J = simbody.calcConstraintJacobian();
+    VectorXd rates = VectorXd::Zero(J.rows());
+    if (motion_.summary.formulation == Formulation::Full) rates.head(loop_rows_) = J.topRows(loop_rows_) * next;
+    const OracleSolution solution = simbody.solveImpact(rates);
     stage.balance = VectorXd::Zero(motion_.model.nv());
     stage.velocity_rest = next - solution.a;
     stage.contact_work = change.dot(simbody.calcMassMatrix() * (v + change / 2));  // energy lost in the impact

@@ -251,10 +251,10 @@ MatrixXd SimbodyBridge::calcResponse(const MatrixXd& J, const MatrixXd& targets)
   return a;
 }
 
-OracleSolution SimbodyBridge::solveImpact() const {
-  const MatrixXd M = calcMassMatrix(), J = calcConstraintJacobian();
+OracleSolution SimbodyBridge::solveImpact(ConstVectorRef rates) const {
+  const MatrixXd M = calcMassMatrix();
   MatrixXd v, m;
-  solveSaddle<double>({M, J, M * s_->v, VectorXd::Zero(J.rows())}, v, m);
+  solveSaddle<double>({M, calcConstraintJacobian(), M * s_->v, rates}, v, m);
   return s_->makeSolution(v, m);
 }
 

@@ -73,8 +73,9 @@ class SimbodyBridge {
   ClosureRows calcClosureRows() const;
   /// The part of the accelerations (nv x k) that J a = targets (rows x k) adds: M a + J' m = 0, armature included.
   MatrixXd calcResponse(const MatrixXd& J, const MatrixXd& targets) const;
-  /// Rigid impact from the velocity set: OracleSolution::a is v+ of M (v+ - v) = J' L, J v+ = 0, wrenches are impulses.
-  OracleSolution solveImpact() const;
+  /// Rigid impact from the velocity set: OracleSolution::a is v+ of M (v+ - v) = J' L, J v+ = rates (in the order of
+  /// calcConstraintJacobian; 0 where nothing opens), wrenches are impulses.
+  OracleSolution solveImpact(ConstVectorRef rates) const;
   /// Generalized forces of gravity and of springs, dampers and friction (nv), with the sign of motor forces.
   VectorXd calcPassiveForces() const;
   /// The part of dampers and friction (nv).
