@@ -231,7 +231,7 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   const Pace pace;
   for (; tick < ticks && advances && fall.empty(); ++tick) {
     if (o.real_time) out.largest_lag = std::max(out.largest_lag, pace.await(world.getTime()));
-    measurement = perception.update(world);
+    measurement = perception.update(world, controller.getPlanTime(world.getTime()));
     measurement.delay = o.delay.delay;
     controller.update(measurement, u);
     delay.send(measurement.time, u);

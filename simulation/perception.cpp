@@ -64,7 +64,7 @@ void Perception::reset(const World& world, ConstVectorRef q, ConstVectorRef v) {
     estimator_->update(sensors_->readAtRest(world.getTime() - i * kRestPeriod, u), contacts);
 }
 
-const Measurement& Perception::update(const World& world) {
+const Measurement& Perception::update(const World& world, double plan_time) {
   if (!sensors_) {
     measurement_.time = world.getTime();
     measurement_.q = world.getConfiguration();
@@ -72,7 +72,7 @@ const Measurement& Perception::update(const World& world) {
     for (size_t c = 0; c < measurement_.contacts.size(); ++c) measurement_.contacts[c] = world.getFeet()[c].touches;
     return measurement_;
   }
-  estimator_->update(sensors_->read(world), getPlanned(world.getTime()));
+  estimator_->update(sensors_->read(world), getPlanned(plan_time));
   addErrors(world);
   return estimator_->getMeasurement();
 }

@@ -31,8 +31,8 @@ class Perception {
   /// From the state in which the world is. The estimator starts from q and v (nq, nv), where the plan does; the robot has stood
   /// there for two seconds, from which offsets of the IMU are known.
   void reset(const World& world, ConstVectorRef q, ConstVectorRef v);
-  /// At the time of the world. No allocation.
-  const Measurement& update(const World& world);
+  /// At the time of the world. No allocation. \param plan_time  at which the controller is in its plan, s
+  const Measurement& update(const World& world, double plan_time);
   bool isReal() const { return sensors_.has_value(); }
   EstimationErrors getErrors() const;  ///< zero where the truth is told
 

@@ -60,6 +60,7 @@ nlohmann::ordered_json listSolves(const PredictiveCounts& counts) {
           {"missed", counts.missed},
           {"failed", counts.failed},
           {"early_landings", counts.early},
+          {"late_landings", counts.late},
           {"median_ms", 1e3 * counts.calcQuantile(0.5)},
           {"p99_ms", 1e3 * counts.calcQuantile(0.99)},
           {"worst_ms", 1e3 * counts.calcQuantile(1)}};

@@ -366,6 +366,70 @@ TEST_CASE("predictive control: a foot that finds ground early stands from then o
   CHECK(walk.controller->getCounts().failed == 0);
 }
 
+TEST_CASE("predictive control: a foot that finds no ground is lowered until it does, and the motion waits for it") {
+  Walking walk;
+  const int foot = walk.findChange(0, false) < walk.findChange(1, false) ? 0 : 1, landing = walk.findChange(foot, true);
+  for (int stage = 0; stage < landing; ++stage) walk.updateAsPlanned(stage);
+  CHECK(std::abs(walk.getHeight(foot)) < 3e-3);
+  std::vector<char> hangs{1, 1};
+  hangs[foot] = 0;
+  for (int i = 0; i < 6; ++i) walk.update(hangs);
+  CHECK(walk.controller->getCounts().late == 1);
+  CHECK(walk.getLag() > 3);
+  CHECK(walk.getHeight(foot) < -5e-3);
+  for (int i = 0; i < 3; ++i) walk.update({1, 1});
+  const double height = walk.getHeight(foot), lag = walk.getLag();
+  CHECK(height < -5e-3);
+  for (int i = 0; i < 3; ++i) walk.update({1, 1});
+  CHECK(walk.getHeight(foot) == Approx(height).margin(2e-3));  // it stands there
+  CHECK(walk.getLag() == Approx(lag));
+  CHECK(walk.controller->getCounts().late == 1);
+  CHECK(walk.controller->getCounts().failed == 0);
+}
+
+TEST_CASE("predictive control: the motion does not wait for ever for ground that is not there") {
+  Walking walk;
+  const int foot = walk.findChange(0, false) < walk.findChange(1, false) ? 0 : 1, landing = walk.findChange(foot, true);
+  for (int stage = 0; stage < landing; ++stage) walk.updateAsPlanned(stage);
+  std::vector<char> hangs{1, 1};
+  hangs[foot] = 0;
+  for (int i = 0; i < 25; ++i) walk.update(hangs);
+  const double lag = walk.getLag();
+  CHECK(lag > 5);
+  for (int i = 0; i < 5; ++i) walk.update(hangs);
+  CHECK(walk.getLag() == Approx(lag));
+  CHECK(walk.getHeight(foot) > -0.1);
+  CHECK(walk.controller->getCounts().late == 1);
+}
+
+namespace {
+
+// Gains of a squat; a controller that is not beyond an instant of its plan.
+class HeldBack : public Controller {
+ public:
+  explicit HeldBack(double longest) : policy_(*getSquat().gains), longest_(longest) {}
+  void update(const Measurement& measurement, VectorRef u) override { policy_.update(measurement, u); }
+  double getPlanTime(double time) const override { return std::min(time, longest_); }
+
+ private:
+  Policy policy_;
+  const double longest_;
+};
+
+}  // namespace
+
+TEST_CASE("estimator: contacts are expected where the controller is in its plan, whatever the time") {
+  ExecutionOptions options;
+  options.duration = 0.4;
+  options.perception.sensors = SensorOptions{};
+  options.perception.estimator.surprising_contact = 2;  // of the weight: only expected feet stand
+  options.perception.planned.phases = {{"double support", 10, 0.01, {{0, {}, 0, 0}, {1, {}, 0, 0}}},
+                                       {"flight", 30, 0.01, {}}};
+  HeldBack held(0.05), on_time(1);
+  CHECK(carryOut(getSquat(), held, options).estimation.contact_errors < 0.05);
+  CHECK(carryOut(getSquat(), on_time, options).estimation.contact_errors > 0.5);
+}
+
 TEST_CASE("predictive control: it refuses a plan that is not one of its motion") {
   const Model& model = getBipetto();
   const PredictiveOptions options = makeShortWindow(1);

@@ -2934,7 +2934,7 @@ class Controller:
         ...
     @property
     def counts(self) -> Dict[str, int]:
-        """of predictive control: solves, failed ones, early landings, solves longer than a stage"""
+        """of predictive control: solves, failed ones, early and late landings, solves longer than a stage"""
         ...
 
 class SensorReadings:

@@ -94,10 +94,11 @@ void bindControllers(py::module_& module) {
             out["solves"] = counts.solves;
             out["failed"] = counts.failed;
             out["early"] = counts.early;
+            out["late"] = counts.late;
             out["missed"] = counts.missed;
             return out;
           },
-          "of predictive control: solves, failed ones, early landings, solves longer than a stage");
+          "of predictive control: solves, failed ones, early and late landings, solves longer than a stage");
 }
 
 }  // namespace bielle::python

@@ -43,7 +43,7 @@ class PredictiveController::Loop {
     while (measurement.time + kClockTolerance >= getStart(stage_ + 1)) ++stage_;  // an impact takes no time
     if (stage_ != before) enter(measurement, u);
   }
-  double getPlanTime(double time) const { return time + advance_; }
+  double getPlanTime(double time) const { return awaited_ >= 0 ? awaited_ : time + advance_; }
   const PredictiveCounts& getCounts() const { return counts_; }
   const Policy& getPolicy() const { return *policy_; }
   void waitForSolve() const {
@@ -72,8 +72,10 @@ class PredictiveController::Loop {
     ready_ = solution_.solved;
     stage_ += solution_.skipped;
     advance_ = solution_.advance;
+    awaited_ = solution_.awaited;
     counts_.failed += !solution_.solved;
-    counts_.early += solution_.skipped > 0;
+    counts_.early += solution_.early;
+    counts_.late += solution_.late;
     if (counts_.seconds.size() < kTimes)
       counts_.seconds.push_back(solution_.seconds);
     else
@@ -85,9 +87,10 @@ class PredictiveController::Loop {
   WindowPlanner::Request request_;
   WindowPlanner::Solution solution_;  // that is not in force yet, or memory for the next one
   std::unique_ptr<Policy> policy_;
-  int stage_ = -1;      // the present one
-  bool ready_ = false;  // the solution awaits the stage from which on it is in force
-  double advance_ = 0;  // of the clock of the motion, s
+  int stage_ = -1;       // the present one
+  bool ready_ = false;   // the solution awaits the stage from which on it is in force
+  double advance_ = 0;   // of the clock of the motion, s
+  double awaited_ = -1;  // the landing of a late foot, s of the motion; negative: none is late
   PredictiveCounts counts_;
   std::unique_ptr<SolvingThread> thread_;  // last: it ends first
 };

@@ -4,15 +4,20 @@
 #include <chrono>
 
 #include "control/policy_stages.h"
+#include "motion/foot_constraints.h"
 #include "solve/lq_sweep.h"
 
 namespace bielle {
 namespace {
 
-constexpr int kAhead = 3;             // stages of a policy: what is left when solves fail
-constexpr int kAheadInThread = 8;     // or when they come late
-constexpr int kEarly = 2;             // stages before its landing at which a foot counts as early
-constexpr int kFirstIterations = 10;  // of the solve before the start
+constexpr int kAhead = 3;               // stages of a policy: what is left when solves fail
+constexpr int kAheadInThread = 8;       // or when they come late
+constexpr int kEarly = 2;               // stages before its landing at which a foot counts as early
+constexpr int kLate = 1;                // stages after its landing at which a foot counts as late
+constexpr int kLowering = 2;            // stages in which it is then foreseen to land
+constexpr double kLoweringSpeed = 0.3;  // m/s
+constexpr double kDepth = 0.05;         // to which it is lowered, m
+constexpr int kFirstIterations = 10;    // of the solve before the start
 
 FddpOptions makeSolverOptions(bool bounded, const PredictiveOptions& options, int iterations) {
   FddpOptions out;
@@ -63,6 +68,7 @@ WindowPlanner::Solution WindowPlanner::makeFirst() {
 void WindowPlanner::solve(const Request& request, Solution& solution) {
   const auto begin = std::chrono::steady_clock::now();
   solution.skipped = 0;
+  solution.early = solution.late = false;
   try {
     solution.solved = predict(request, solution) && solveWindow(solution);
   } catch (const std::exception&) {
@@ -73,6 +79,7 @@ void WindowPlanner::solve(const Request& request, Solution& solution) {
     startFromGuess(request.stage + solution.skipped);
   }
   solution.advance = advance_;
+  solution.awaited = late_.foot >= 0 ? horizon_->getStart(late_.landing) : -1;
   solution.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
@@ -89,13 +96,13 @@ void WindowPlanner::solveFromRest() {
   Fddp(options).solve(window_, trajectory_);
 }
 
+bool WindowPlanner::stands(int stage, int contact) const {
+  const std::vector<int>& standing = getSpec(stage).constraints.contacts;
+  return std::find(standing.begin(), standing.end(), contact) != standing.end();
+}
+
 // The stage with which a foot stands that swings in this one but is on the ground early, or this stage.
 int WindowPlanner::findLanding(int stage, const std::vector<char>& contacts) const {
-  if (contacts.empty()) return stage;
-  const auto stands = [this](int k, int contact) {
-    const std::vector<int>& standing = getSpec(k).constraints.contacts;
-    return std::find(standing.begin(), standing.end(), contact) != standing.end();
-  };
   const int contacts_of_model = static_cast<int>(contacts.size());
   for (int contact = 0; contact < contacts_of_model; ++contact) {
     if (!contacts[contact] || stands(stage, contact)) continue;
@@ -105,6 +112,53 @@ int WindowPlanner::findLanding(int stage, const std::vector<char>& contacts) con
     if (end < horizon_->getEnd() && stage - begin > (end - begin) / 2 && end - stage >= kEarly) return end;
   }
   return stage;
+}
+
+// The foot that should stand with a stage and has not found the ground, while another one carries; or -1.
+int WindowPlanner::findLateFoot(int landing, const std::vector<char>& contacts) const {
+  const int begin = landing - kLowering;
+  if (begin < horizon_->getBegin() || isImpact(landing)) return -1;
+  const int contacts_of_model = static_cast<int>(contacts.size());
+  for (int contact = 0; contact < contacts_of_model; ++contact) {
+    if (contacts[contact] || !stands(landing, contact)) continue;
+    bool swings = true, carried = false;
+    for (int k = begin; k < landing; ++k) swings = swings && !stands(k, contact);
+    for (int other = 0; other < contacts_of_model; ++other)
+      carried = carried || (other != contact && stands(begin, other) && stands(landing, other));
+    if (swings && carried) return contact;
+  }
+  return -1;
+}
+
+void WindowPlanner::lower(int foot, int landing) {
+  late_ = {foot, landing, 0};
+  for (int k = landing - kLowering; k <= landing; ++k) {
+    StageSpec spec = getSpec(k);
+    lowerFoot(model_.contacts()[foot], kLoweringSpeed, spec);
+    problem_.replaceStage(horizon_->getNode(k), std::move(spec));
+  }
+}
+
+// The stage that follows, by the feet that stand: the next one; that with which an early foot stands; or, while a foot is late,
+// that from which on it is foreseen to land, over and over again.
+int WindowPlanner::chooseNext(const Request& request, Solution& solution) {
+  const std::vector<char>& contacts = request.measurement.contacts;
+  const int next = request.stage + 1;
+  if (contacts.empty()) return next;
+  if (late_.foot < 0) {
+    const int landing = findLanding(next, contacts);
+    solution.early = landing != next;
+    if (solution.early) return landing;
+    while (late_.foot < 0 && checked_ < request.stage - kLate)
+      if (const int foot = findLateFoot(++checked_, contacts); foot >= 0) lower(foot, checked_);
+    if (late_.foot < 0) return next;
+    solution.late = true;
+  }
+  const int begin = late_.landing - kLowering;
+  late_.waited += horizon_->getStart(begin + 1) - horizon_->getStart(begin);
+  if (!contacts[late_.foot] && kLoweringSpeed * late_.waited < kDepth) return begin;
+  late_.foot = -1;
+  return late_.landing;
 }
 
 // Eq. (1), and through an impact if one follows: the stage from which the next policy is to be in force, and its state.
@@ -125,12 +179,9 @@ bool WindowPlanner::predict(const Request& request, Solution& solution) {
   const RobotEvaluation* step = &evaluator_.evaluate(node, measured_, u_);
   if (step->status != StepStatus::Ok) return false;
   x_ = step->x_next;
-  int target = request.stage + 1;
-  if (const int landing = findLanding(target, request.measurement.contacts); landing != target) {
-    advance_ += horizon_->getStart(landing) - horizon_->getStart(target);
-    solution.skipped = landing - target;
-    target = landing;
-  }
+  int target = chooseNext(request, solution);
+  solution.skipped = target - (request.stage + 1);
+  advance_ += horizon_->getStart(target) - horizon_->getStart(request.stage + 1);
   while (isImpact(target)) {
     step = &evaluator_.evaluate(horizon_->getNode(target), VectorXd(x_), VectorXd::Zero(model_.nu()));
     if (step->status != StepStatus::Ok) return false;
@@ -144,7 +195,10 @@ bool WindowPlanner::predict(const Request& request, Solution& solution) {
 bool WindowPlanner::solveWindow(Solution& solution) {
   const int first = horizon_->getFirst(solution.target), nodes = options_.nodes;
   horizon_->prepare(first);
+  if (late_.foot >= 0) retreat(first);
   for (; first_ < first; ++first_) {
+    past_us_.push_back(trajectory_.us.front());
+    if (past_us_.size() > static_cast<size_t>(kLowering + kLate + 1)) past_us_.pop_front();
     solver_.advance(trajectory_);
     horizon_->extend(first_ + nodes, trajectory_);
   }
@@ -152,6 +206,24 @@ bool WindowPlanner::solveWindow(Solution& solution) {
   if (solver_.solve(window_, trajectory_).termination == FddpTermination::Failed) return false;
   makePolicy(solver_, solution.target, solution);
   return true;
+}
+
+// The window begins earlier, or at the same stage again, from where the robot is now. Stages may have been replaced: all
+// are evaluated anew.
+void WindowPlanner::retreat(int first) {
+  Multipliers multipliers = solver_.getMultipliers();
+  const bool known = !multipliers.values.empty();
+  for (; first_ > first; --first_) {
+    trajectory_.xs.insert(trajectory_.xs.begin(), x_);
+    trajectory_.xs.pop_back();
+    trajectory_.us.insert(trajectory_.us.begin(), past_us_.empty() ? trajectory_.us.front() : past_us_.back());
+    trajectory_.us.pop_back();
+    if (!past_us_.empty()) past_us_.pop_back();
+    if (!known) continue;
+    multipliers.values.insert(multipliers.values.begin(), VectorXd());
+    multipliers.values.erase(multipliers.values.end() - 2);  // before those of the end
+  }
+  if (known) solver_.setMultipliers(multipliers);
 }
 
 void WindowPlanner::moveWindow() {

@@ -1,5 +1,7 @@
 #pragma once
 // What predictive control solves, window by window. One thread at a time may call it.
+#include <deque>
+
 #include "bielle/dynamics/impact.h"
 #include "control/horizon.h"
 #include "solve/window.h"
@@ -16,10 +18,12 @@ class WindowPlanner {
   };
   // A policy for the stages that follow.
   struct Solution {
-    bool solved = false;  // else the policy is none
-    int target = 0;       // stage from which on it is in force
-    int skipped = 0;      // stages of a swing that a foot has cut short: the present stage is this much farther
+    bool solved = false;               // else the policy is none
+    int target = 0;                    // stage from which on it is in force
+    bool early = false, late = false;  // a foot stands early; a foot that should stand is waited for from now on
+    int skipped = 0;      // stages by which such a foot brings the motion ahead: the present stage is this much farther
     double advance = 0;   // how far such feet have brought the motion ahead of its plan until now, s
+    double awaited = -1;  // the instant of the plan with which a late foot is to stand, s; negative: none is late
     double seconds = 0;   // that it took
     std::vector<Policy::Stage> stages;
     VectorXd u_hold;
@@ -43,9 +47,14 @@ class WindowPlanner {
   bool isImpact(int stage) const { return getSpec(stage).kind == StageKind::Impact; }
   Fddp makeSolver(int iterations) const;
   void solveFromRest();
+  bool stands(int stage, int contact) const;
   int findLanding(int stage, const std::vector<char>& contacts) const;
+  int findLateFoot(int landing, const std::vector<char>& contacts) const;
+  void lower(int foot, int landing);
+  int chooseNext(const Request& request, Solution& solution);
   bool predict(const Request& request, Solution& solution);
   bool solveWindow(Solution& solution);
+  void retreat(int first);
   void moveWindow();
   void startFromGuess(int stage);
   void makePolicy(const Fddp& solver, int stage, Solution& solution);
@@ -59,8 +68,15 @@ class WindowPlanner {
   ImpactWorkspace impact_;
   Fddp solver_;
   ShootingTrajectory trajectory_;  // of the window
-  double advance_ = 0;             // how far feet that landed early have brought the motion ahead of its plan, s
-  int first_ = 0;                  // stage with which the window begins
+  std::deque<VectorXd> past_us_;   // of the stages before the window, as many as it may go back
+  double advance_ = 0;  // how far feet that landed early or late have brought the motion ahead of its plan, s
+  int checked_ = 0;     // the last stage whose feet were looked for
+  // A foot that is waited for, or -1; the stage with which it is to stand; for how long, s.
+  struct Late {
+    int foot = -1, landing = -1;
+    double waited = 0;
+  } late_;
+  int first_ = 0;  // stage with which the window begins
   VectorXd x_, measured_, u_;
 };
 

@@ -56,6 +56,24 @@ void addClearance(const ContactFrame& contact, const Ground& ground, double ramp
                                     VectorXd::Constant(n, kFree), VectorXd::Constant(n, kPosition)});
 }
 
+void lowerFoot(const ContactFrame& contact, double speed, StageSpec& stage) {
+  const BodyFrame foot{contact.body, contact.X_BF};
+  Vector6d down = Vector6d::Zero();
+  down[2] = -speed;
+  for (Cost& cost : stage.costs) {
+    if (cost.name == "swing") cost.activation.weights[2] = 0;
+    if (cost.name == "swing velocity") cost.residual = makeFrameVelocity(foot, down);
+  }
+  for (PathConstraint& constraint : stage.path_constraints) {
+    if (constraint.name == "clearance of " + contact.name) constraint.lower.setConstant(-kFree);
+    if (constraint.name == "landing of " + contact.name) {
+      constraint.lower[2] = -kFree;
+      constraint.upper[2] = kFree;
+    }
+    if (constraint.name == "landing velocity of " + contact.name) constraint.lower[2] = constraint.upper[2] = -speed;
+  }
+}
+
 double chooseRamp(const Model& model, const Ground& ground, const std::vector<ContactTarget>& soles) {
   constexpr double kWidest = 0.02, kLeast = 1e-3;  // m
   double room = kWidest;

@@ -13,6 +13,10 @@ void addClearance(const ContactFrame& contact, const Ground& ground, double ramp
 // Whether check and motion ask for full clearance at node i of n in the air: in the middle half.
 inline bool isMidSwing(int i, int n) { return 4 * i >= n && 4 * i <= 3 * n; }
 inline constexpr double kMidSwingClearance = 6e-3;  // m
+// A foot that is about to land, or lands, finds its ground lower than planned: it goes on down at `speed`, m/s, from and to
+// any height, as flat and over the same place as before.
+void lowerFoot(const ContactFrame& contact, double speed, StageSpec& stage);
+
 // Width of the ramps around steps that leave the soles on the ground free, at most 2 cm, m.
 double chooseRamp(const Model& model, const Ground& ground, const std::vector<ContactTarget>& soles);
 

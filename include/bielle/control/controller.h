@@ -22,7 +22,7 @@ class Controller {
   /// Torques of the motors in their order (nu, N m or N), not cut at their limits. It does not throw, and allocates
   /// nothing unless a controller says so.
   virtual void update(const Measurement& measurement, VectorRef u) = 0;
-  /// The instant of its plan at which a controller is, s: feet that land early may bring it ahead.
+  /// The instant of its plan at which a controller is, s: feet that land early or late bring it ahead or hold it back.
   virtual double getPlanTime(double time) const { return time; }
 };
 

@@ -16,7 +16,10 @@
 /// comes into force when it is found, and stages that begin meanwhile are not solved for.
 ///
 /// A foot that is on the ground in the second half of its swing (Measurement::contacts) has landed: the motion goes on with the
-/// stage of its landing, and stays ahead of the plan by what the swing was cut short.
+/// stage of its landing, and stays ahead of the plan by what the swing was cut short. A foot that is not on the ground one stage
+/// after its landing, while another one carries, is lowered at 0.3 m/s until it is, by 5 cm at most: the last stages of its swing
+/// are rewritten and come into force again, and the motion stays behind the plan by as much. Meanwhile getPlanTime() is the
+/// instant of the landing.
 ///
 /// After its last stage the motion is followed by as many copies of that stage as the window is long: the robot stands there.
 ///
@@ -48,6 +51,7 @@ struct PredictiveCounts {
   int solves = 0;
   int failed = 0;  ///< the last policy stayed in force
   int early = 0;   ///< feet that landed in the second half of their swing
+  int late = 0;    ///< feet that had not landed when they should have stood
   /// Stages that began without their policy in real time: solves took longer than the stage before. Without a thread of
   /// their own it came into force all the same; with one the last policy stayed, and there was no solve in this stage.
   int missed = 0;
