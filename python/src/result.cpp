@@ -2,7 +2,7 @@
 
 #include <pybind11/stl.h>
 
-#include "bielle/io/refinement.h"
+#include "bielle/io/request_solver.h"
 #include "bielle/report/report.h"
 #include "bind.h"
 #include "motion.h"
@@ -77,8 +77,9 @@ void bindResult(py::module_& module) {
       .field("com_start", &MotionResult::com_start, "height of the centre of mass, m")
       .field("com_lowest", &MotionResult::com_lowest, "m")
       .type()
-      .def_property_readonly("converged", &MotionResult::converged)
-      .def_property_readonly("interrupted", &MotionResult::interrupted)
+      .def_property_readonly("converged", &MotionResult::converged, "whether the solver ended at an optimum")
+      .def_property_readonly("interrupted", &MotionResult::interrupted,
+                             "whether a callback ended it; the record is that of the last iterate")
       .def(
           "write", [](const MotionResult& self, const std::string& directory) { return writeResult(directory, self); },
           py::arg("directory"), py::call_guard<py::gil_scoped_release>(),
@@ -89,47 +90,14 @@ void bindResult(py::module_& module) {
              py::call_guard<py::gil_scoped_release>(), "Writes that page to a file.");
 }
 
-// Directories of results to start from and what `bielle solve` does with them.
-MotionResult solveRequest(const Robot& robot, const Request& asked, ProblemOptions problem, FddpOptions solver,
-                          const std::optional<MotionRecord>& warm_start, const py::object& callback) {
+MotionResult solveRequest(const Robot& robot, const Request& asked, const ProblemOptions& problem,
+                          const FddpOptions& options, const std::optional<MotionRecord>& warm_start,
+                          const py::object& callback) {
   const FddpObserver observer = makeObserver(callback);
   const py::gil_scoped_release release;
-  const Model& model = *robot.model;
   const MotionRequest request = asked.make();
-  const ObjectiveOptions objective = std::exchange(problem.objective, {});
-  problem.objective.regeneration = objective.regeneration;
-  Motion motion = makeRequested(request, model, problem);
-  FddpOptions first = solver;
-  if (warm_start)
-    setGuess(*warm_start, motion);
-  else if (request.parts.empty())
-    first.initial_regularization = kGuessRegularization;
-  if (!request.parts.empty() && !warm_start) {
-    PartsOptions parts;
-    parts.problem = problem;
-    parts.solver = first;
-    parts.observer = observer;
-    motion.guess = solveParts(model, request.parts, makeStandingPosture(model), parts);
-    fitTimings(*motion.problem, motion.guess);
-  }
-  if (objective.objective != Objective::Effort) {
-    if (!warm_start) solveMotion(motion, first, observer);
-    problem.objective = scaleObjective(motion, objective, problem.limits);
-    Motion scaled = makeRequested(request, model, problem);
-    scaled.guess = std::move(motion.guess);
-    motion = std::move(scaled);
-    first = solver;
-  }
-  const RunInfo run{robot.name, robot.file, {}};
-  const FddpSummary summary = solveMotion(motion, first, observer);
-  MotionResult result = makeResult(run, motion, motion.guess, summary);
-  if (!result.converged()) return result;
-  if (std::optional<Motion> refined = refineStages(request, model, problem, motion, result.record)) {
-    const FddpSummary again = solveMotion(*refined, solver, observer);
-    if (again.termination == FddpTermination::Converged)
-      result = makeResult(run, *refined, refined->guess, addUp(summary, again));
-  }
-  return result;
+  RequestSolver solver(request, *robot.model, {problem, options, warm_start}, {observer, observer, {}, {}});
+  return solver.solve({robot.name, robot.file, {}});
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "bielle/io/motion_registry.h"
-#include "bielle/io/refinement.h"
+#include "bielle/io/request_solver.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "bielle/report/report.h"
@@ -159,45 +159,15 @@ bool checkResult(const std::string& directory) {
   return !status || *status == kOk;
 }
 
-// Prints a line per iteration, unless quiet, and stops at a signal.
-FddpObserver makeObserver(const SolveArguments& arguments) {
-  FddpObserver observer;
-  observer.interrupt = &interrupted;
-  if (!arguments.quiet) observer.callback = makeFddpPrinter(std::cout);
+// Prints what is done and a line per iteration, unless quiet, and stops at a signal.
+RequestObserver makeObserver(const SolveArguments& arguments) {
+  RequestObserver observer;
+  observer.motion.interrupt = observer.part.interrupt = &interrupted;
+  observer.warn = [](const std::string& line) { std::cout << line << std::endl; };
+  if (arguments.quiet) return observer;
+  observer.motion.callback = makeFddpPrinter(std::cout);
+  observer.tell = observer.warn;
   return observer;
-}
-
-// Solves each motion of a sequence separately.
-ShootingTrajectory solveParts(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
-                              const SolveArguments& arguments, const FddpOptions& solver) {
-  PartsOptions options;
-  options.problem = problem;
-  options.solver = solver;
-  options.observer.interrupt = &interrupted;
-  options.report = [&arguments](const std::string& part, const FddpSummary& summary) {
-    if (arguments.quiet) return;
-    std::cout << "by itself, " << part << ": " << getName(summary.termination) << ", " << summary.iterations
-              << " iterations, " << formatNumber(summary.seconds, "%.2f") << " s" << std::endl;
-  };
-  return bielle::solveParts(model, request.parts, makeStandingPosture(model), options);
-}
-
-// A motion of another objective: it starts from that of least effort, or from a given result, and is scaled by it.
-Motion makeFromEffort(const MotionRequest& request, const Model& model, const ProblemOptions& problem, Motion effort,
-                      const SolveArguments& arguments, const FddpOptions& solver) {
-  if (arguments.warm_start.empty()) {
-    if (!arguments.quiet) std::cout << "first, the motion of least effort:" << std::endl;
-    const FddpSummary summary = solveMotion(effort, solver, makeObserver(arguments));
-    if (!arguments.quiet)
-      std::cout << "least effort: " << getName(summary.termination) << ", " << summary.iterations << " iterations, "
-                << formatNumber(summary.seconds, "%.2f") << " s\nfrom there, " << getName(problem.objective.objective)
-                << ":" << std::endl;
-  }
-  ProblemOptions scaled = problem;
-  scaled.objective = scaleObjective(effort, problem.objective, problem.limits);
-  Motion motion = makeRequested(request, model, scaled);
-  motion.guess = std::move(effort.guess);
-  return motion;
 }
 
 int solve(const SolveArguments& arguments, const MotionRequest& request) {
@@ -221,42 +191,13 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   problem.timings = makeTimings(arguments.timings);
   problem.step = arguments.step;
   if (serial && !problem.step) problem.step = StepRule::Euler;
-  const ObjectiveOptions objective = std::exchange(problem.objective, {});
-  problem.objective.regeneration = objective.regeneration;  // of reported energies
-  Motion motion = makeRequested(request, model, problem);
-  FddpOptions solver = arguments.solver;
-  if (!arguments.warm_start.empty())
-    setGuess(readResultRecord(arguments.warm_start), motion);
-  else if (request.parts.empty())
-    solver.initial_regularization = kGuessRegularization;
+  RequestOptions options{problem, arguments.solver, {}};
+  if (!arguments.warm_start.empty()) options.warm_start = readResultRecord(arguments.warm_start);
+  RequestSolver solver(request, model, std::move(options), makeObserver(arguments));
   makeOutputDirectory(arguments.directory);
-
   watchSignals();
-  if (!request.parts.empty() && arguments.warm_start.empty()) {
-    motion.guess = solveParts(request, model, problem, arguments, solver);
-    fitTimings(*motion.problem, motion.guess);
-  }
-  if (objective.objective != Objective::Effort) {
-    problem.objective = objective;
-    motion = makeFromEffort(request, model, problem, std::move(motion), arguments, solver);
-    solver = arguments.solver;
-  }
-  const FddpSummary summary = solveMotion(motion, solver, makeObserver(arguments));
-  const RunInfo run{arguments.robot.name, robot.file, getCommandLine(), serial ? "serial" : "closed",
-                    serial ? arguments.serial_armature : ""};
-  MotionResult result = makeResult(run, motion, motion.guess, summary);
-  if (result.converged()) {
-    if (std::optional<Motion> refined = refineStages(request, model, problem, motion, result.record)) {
-      if (!arguments.quiet)
-        std::cout << "velocities differ from their finite differences by more than "
-                  << formatNumber(100 * kLargestStepError) << " %: once more, in stages half as long" << std::endl;
-      const FddpSummary again = solveMotion(*refined, arguments.solver, makeObserver(arguments));
-      if (again.termination == FddpTermination::Converged)
-        result = makeResult(run, *refined, refined->guess, addUp(summary, again));
-      else
-        std::cout << "in stages half as long: " << getName(again.termination) << "; the longer ones are kept\n";
-    }
-  }
+  const MotionResult result = solver.solve({arguments.robot.name, robot.file, getCommandLine(),
+                                            serial ? "serial" : "closed", serial ? arguments.serial_armature : ""});
   printResult(result, writeResult(arguments.directory, result));
   const bool failed = !arguments.no_check && !checkResult(arguments.directory);
   if (!arguments.no_report) addReport(arguments.directory);  // the check is part of it

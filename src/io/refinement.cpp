@@ -61,10 +61,4 @@ std::optional<Motion> refineStages(const MotionRequest& request, const Model& mo
   return motion;
 }
 
-FddpSummary addUp(const FddpSummary& first, FddpSummary second) {
-  second.iterations += first.iterations;
-  second.seconds += first.seconds;
-  return second;
-}
-
 }  // namespace bielle

@@ -42,9 +42,8 @@ void printFddpIteration(std::ostream& out, const FddpIteration& line) {
 }
 
 std::function<FddpAction(const FddpIteration&)> makeFddpPrinter(std::ostream& out) {
-  return [&out, first = true](const FddpIteration& line) mutable {
-    if (first) printFddpHeader(out);
-    first = false;
+  return [&out](const FddpIteration& line) {
+    if (line.iteration == 1) printFddpHeader(out);
     printFddpIteration(out, line);
     out.flush();
     return FddpAction::Continue;

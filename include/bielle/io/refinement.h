@@ -19,7 +19,4 @@ inline constexpr double kLargestStepError = 0.004;
 std::optional<Motion> refineStages(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
                                    const Motion& solved, const MotionRecord& record);
 
-/// The second solve, with the iterations and the time of both.
-FddpSummary addUp(const FddpSummary& first, FddpSummary second);
-
 }  // namespace bielle

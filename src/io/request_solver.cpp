@@ -1,0 +1,89 @@
+#include "bielle/io/request_solver.h"
+
+#include <utility>
+
+#include "bielle/io/refinement.h"
+#include "model/number_text.h"
+
+namespace bielle {
+namespace {
+
+// "converged, 12 iterations, 0.21 s"
+std::string format(const FddpSummary& summary) {
+  return getName(summary.termination) + std::string(", ") + std::to_string(summary.iterations) + " iterations, " +
+         formatNumber(summary.seconds, "%.2f") + " s";
+}
+
+// The second solve, with the iterations and the time of both.
+FddpSummary addUp(const FddpSummary& first, FddpSummary second) {
+  second.iterations += first.iterations;
+  second.seconds += first.seconds;
+  return second;
+}
+
+}  // namespace
+
+RequestSolver::RequestSolver(const MotionRequest& request, const Model& model, RequestOptions options,
+                             RequestObserver observer)
+    : request_(request), model_(model), options_(std::move(options)), observer_(std::move(observer)) {
+  objective_ = std::exchange(options_.problem.objective, {});
+  options_.problem.objective.regeneration = objective_.regeneration;  // of reported energies
+  motion_ = makeRequested(request_, model_, options_.problem);
+  if (options_.warm_start) setGuess(*options_.warm_start, motion_);
+}
+
+MotionResult RequestSolver::solve(const RunInfo& run) {
+  FddpOptions solver = options_.solver;
+  if (!options_.warm_start && request_.parts.empty()) solver.initial_regularization = kGuessRegularization;
+  if (!options_.warm_start && !request_.parts.empty()) startFromParts();
+  if (objective_.objective != Objective::Effort) {
+    startFromEffort(solver);
+    solver = options_.solver;
+  }
+  const FddpSummary summary = solveMotion(motion_, solver, observer_.motion);
+  MotionResult result = makeResult(run, motion_, motion_.guess, summary);
+  if (!result.converged()) return result;
+  std::optional<Motion> refined = refineStages(request_, model_, options_.problem, motion_, result.record);
+  if (!refined) return result;
+  tell("velocities differ from their finite differences by more than " + formatNumber(100 * kLargestStepError) +
+       " %: once more, in stages half as long");
+  const FddpSummary again = solveMotion(*refined, options_.solver, observer_.motion);
+  if (again.termination == FddpTermination::Converged)
+    return makeResult(run, *refined, refined->guess, addUp(summary, again));
+  if (observer_.warn)
+    observer_.warn(std::string("in stages half as long: ") + getName(again.termination) + "; the longer ones are kept");
+  return result;
+}
+
+// Solves each motion of a sequence by itself.
+void RequestSolver::startFromParts() {
+  PartsOptions parts;
+  parts.problem = options_.problem;
+  parts.solver = options_.solver;
+  parts.observer = observer_.part;
+  parts.report = [this](const std::string& part, const FddpSummary& summary) {
+    tell("by itself, " + part + ": " + format(summary));
+  };
+  motion_.guess = solveParts(model_, request_.parts, makeStandingPosture(model_), parts);
+  fitTimings(*motion_.problem, motion_.guess);
+}
+
+// Replaces the motion of least effort by that of the objective, which starts from there, or from a given result.
+void RequestSolver::startFromEffort(const FddpOptions& solver) {
+  if (!options_.warm_start) {
+    tell("first, the motion of least effort:");
+    const FddpSummary summary = solveMotion(motion_, solver, observer_.motion);
+    tell("least effort: " + format(summary));
+    tell(std::string("from there, ") + getName(objective_.objective) + ":");
+  }
+  options_.problem.objective = scaleObjective(motion_, objective_, options_.problem.limits);
+  Motion motion = makeRequested(request_, model_, options_.problem);
+  motion.guess = std::move(motion_.guess);
+  motion_ = std::move(motion);
+}
+
+void RequestSolver::tell(const std::string& line) const {
+  if (observer_.tell) observer_.tell(line);
+}
+
+}  // namespace bielle
