@@ -54,6 +54,7 @@ ReportRun readRun(const std::string& directory) {
   std::error_code error;
   if (fs::exists(place / "check.json", error)) run.check = readJson(place / "check.json");
   run.robot = loadRobotOf(run.summary, place / "summary.json");
+  run.summary.erase("robot_file");  // pages are given away, and need no path of this machine
   if (getText(run.summary, "model") == "serial")
     run.robot.model = makeSerialModel(run.robot.model, makeStandingPosture(run.robot.model)).model;
   const fs::path archive = place / "trajectory.npz", plan = place / "plan.npz";
