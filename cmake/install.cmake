@@ -1,5 +1,6 @@
 # The installation: headers, libraries, robots, the command, and the package `find_package(bielle)` finds.
-# Three components: `command` is what runs, `library` the shared library, `development` what others build with.
+# Components: `command` is what runs, `library` the shared library, `development` what others build with, `workers` the one
+# program that is under the GPL where it is given away.
 include(CMakePackageConfigHelpers)
 
 get_property(layers GLOBAL PROPERTY BIELLE_LAYERS)
@@ -18,7 +19,7 @@ if(BIELLE_BUILD_SIMULATION)
   list(APPEND programs bielle-simulate)
 endif()
 if(TARGET bielle-workers)
-  list(APPEND programs bielle-workers)
+  install(TARGETS bielle-workers RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT workers)
 endif()
 install(TARGETS ${programs} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
 if(BUILD_SHARED_LIBS)

@@ -1,5 +1,5 @@
 # Debian packages by `cpack -G DEB` (scripts/package.sh): `bielle`, the command with its robots, `libbielle0.1`, the shared
-# library that it runs on, `libbielle-dev`, and `python3-bielle`.
+# library that it runs on, `libbielle-dev`, `python3-bielle`, and `bielle-workers`, which is under the GPL.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME bielle)
 set(CPACK_PACKAGE_CONTACT "the Bielle authors <bielle@localhost>")
@@ -20,7 +20,7 @@ set(CPACK_DEBIAN_COMMAND_PACKAGE_NAME bielle)
 set(CPACK_COMPONENT_COMMAND_DESCRIPTION
   "The command: it models legged robots whose joints are driven through linkages, generates motions by
  optimal control and checks them. Robots, manual pages and completion included.")
-set(CPACK_DEBIAN_COMMAND_PACKAGE_SUGGESTS "gnuplot-nox, chromium, ffmpeg, bash-completion")
+set(CPACK_DEBIAN_COMMAND_PACKAGE_SUGGESTS "bielle-workers, gnuplot-nox, chromium, ffmpeg, bash-completion")
 
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libbielle${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
 set(CPACK_COMPONENT_LIBRARY_DESCRIPTION
@@ -42,16 +42,30 @@ if(BIELLE_BUILD_PYTHON)
   set(CPACK_COMPONENT_PYTHON_DESCRIPTION
     "The package bielle for Python: robots, dynamics, motions, costs of one's own, controllers.")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-matplotlib, jupyter-notebook")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
     "python3 (>= ${Python3_VERSION_MAJOR}.${Python3_VERSION_MINOR}), python3 (<< ${Python3_VERSION_MAJOR}.${next_minor}), python3-numpy")
   set(CPACK_COMPONENT_PYTHON_DEPENDS library command)  # robots come with the command
+endif()
+
+if(TARGET bielle-workers)
+  list(APPEND CPACK_COMPONENTS_ALL workers)
+  set(CPACK_DEBIAN_WORKERS_PACKAGE_NAME bielle-workers)
+  set(CPACK_COMPONENT_WORKERS_DESCRIPTION
+    "Tasks of Bielle on other machines: what the option --workers of the command needs, by Work Queue.")
+  set(CPACK_DEBIAN_WORKERS_PACKAGE_RECOMMENDS coop-computing-tools)  # work_queue_worker; Work Queue itself is linked in
+  set(CPACK_DEBIAN_WORKERS_PACKAGE_ENHANCES bielle)
 endif()
 
 # Each package says where Debian looks for it whose work it is.
 if(BUILD_SHARED_LIBS)
   foreach(component IN LISTS CPACK_COMPONENTS_ALL)
     string(TOUPPER ${component} upper)
-    install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/${CPACK_DEBIAN_${upper}_PACKAGE_NAME}
+    set(license ${PROJECT_SOURCE_DIR}/LICENSE)
+    if(component STREQUAL workers)
+      set(license ${PROJECT_SOURCE_DIR}/workers/copyright)
+    endif()
+    install(FILES ${license} DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/${CPACK_DEBIAN_${upper}_PACKAGE_NAME}
       RENAME copyright COMPONENT ${component})
   endforeach()
 endif()

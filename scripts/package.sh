@@ -1,10 +1,11 @@
 #!/bin/bash
-# Makes the Debian packages `bielle`, `libbielle0.1`, `libbielle-dev` and `python3-bielle` in build-package. Installs what is
-# missing (Debian 12).
+# Makes the Debian packages `bielle`, `libbielle0.1`, `libbielle-dev`, `python3-bielle` and `bielle-workers` in
+# build-package. Installs what is missing (Debian 12).
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
-install_missing "${bielle_packages[@]}" "${bielle_check_packages[@]}" "${bielle_python_packages[@]}" dpkg-dev file
+install_missing "${bielle_packages[@]}" "${bielle_check_packages[@]}" "${bielle_python_packages[@]}" \
+  "${bielle_worker_packages[@]}" dpkg-dev file
 cd "$bielle_root"
 build build-package --preset package
 cd build-package

@@ -37,5 +37,37 @@ cat > "$bare/tmp/main.cpp" <<'PROGRAM'
 int main() { std::printf("%d motors\n", bielle::loadRobot("bipetto").model.nu()); }
 PROGRAM
 inside sh -ec 'cd /tmp; g++ -O1 main.cpp $(pkg-config --cflags --libs bielle) -o main; ./main | grep "12 motors"'
+# The Python package: worlds of three engines, a cost written in Python, the programs.
+inside sh -ec 'apt-get install -qq -y --no-install-recommends /tmp/python3-bielle_*.deb'
+cat > "$bare/tmp/page.py" <<'PROGRAM'
+import bielle, numpy as np, pickle
+squat = bielle.solve_squat("bipetto", depth=0.7)
+assert squat.converged and bielle.check(squat)["pass"]
+assert pickle.loads(pickle.dumps(squat)) == squat
+model = bielle.load_robot("bipetto").model
+for engine in ("bielle", "simbody", "mujoco"):
+    world = bielle.World(model, engine=engine)
+    world.reset(model.standing(), np.zeros(model.nv))
+    assert world.step(np.zeros(model.nu), 0.01).ok
+assert "<iframe" in squat._repr_html_()
+assert not bielle.simulate(squat, world="bielle", control="gains")["fell"]
+print("python3-bielle", *squat.goals)
+PROGRAM
+inside sh -ec 'cd /tmp; python3 page.py'
+# Workers, which are a package of their own.
+inside sh -ec 'apt-get install -qq -y --no-install-recommends /tmp/bielle-workers_*.deb coop-computing-tools'
+cat > "$bare/tmp/grid.yaml" <<'GRID'
+motions: squat
+options:
+  seed: [1, 2]
+GRID
+inside sh -ec '
+  cd /tmp
+  echo secret > password
+  bielle campaign grid.yaml -o grid --workers 9123 --password password &
+  work_queue_worker --password password --connect-timeout 60 --single-shot localhost 9123
+  wait $!
+  grep "2 runs: 2 stood" grid/campaign.md
+  grep "GNU General Public" /usr/share/doc/bielle-workers/copyright'
 umount "$bare/proc"
 echo "the packages install and run on a bare machine"
