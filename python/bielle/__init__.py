@@ -7,7 +7,7 @@
 """
 
 from ._bielle import *
-from . import named as named, residuals as residuals, show as _show
+from . import named as named, plot as plot, residuals as residuals, show as _show
 from .programs import campaign as campaign, check as check, design as design, simulate as simulate
 from .errors import ModelError as ModelError
 from .motions import *

@@ -117,3 +117,4 @@ for _motion, _described in motions().items():
     _function = _make_function(_motion, _described)
     FUNCTIONS[_function.__name__] = _function
 globals().update(FUNCTIONS)
+__all__ = ["FUNCTIONS", "motions", "solve_request", "solve_sequence", *FUNCTIONS]

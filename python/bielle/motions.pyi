@@ -2,11 +2,12 @@
 
 from typing import Callable, Dict, Iterable, Mapping, Optional, Union
 
-from ._bielle import Iteration, ProblemOptions, Record, Request, Result, Robot, SolverOptions
+from ._bielle import Iteration, ProblemOptions, Record, Request, Result, Robot, SolverOptions, motions
 
 Callback = Callable[[Iteration], Optional[bool]]
 WarmStart = Union[str, Record, Result]
 FUNCTIONS: Dict[str, Callable[..., Result]]
+__all__ = ['FUNCTIONS', 'motions', 'solve_request', 'solve_sequence', 'solve_squat', 'solve_walk', 'solve_side_walk', 'solve_turn', 'solve_stairs', 'solve_footholds', 'solve_box', 'solve_gap', 'solve_jump', 'solve_run', 'solve_hop']
 
 def solve_request(robot: Union[str, Robot], request: Request, problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result: ...
 def solve_sequence(robot: Union[str, Robot], sequence: Iterable[str], options: Mapping[str, float] = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result: ...

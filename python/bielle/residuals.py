@@ -1,12 +1,12 @@
 """Residuals of costs and constraints: those of the library, and the base class of one's own."""
 
-from typing import Any, Dict, Sequence
+from typing import Any, Dict, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 import numpy.typing as npt
 
-from ._bielle import LibraryResidual, Node
-from ._bielle import _residuals
+from . import _bielle
+from ._bielle import LibraryResidual, Model, MotionPlan, Node, ProblemOptions, Request, _residuals
 
 center_of_pressure = _residuals.center_of_pressure
 com_position = _residuals.com_position
@@ -51,6 +51,34 @@ class Residual:
         call `calc` twice per coordinate.
         """
         raise NotImplementedError
+
+    def __eq__(self, other: object) -> bool:
+        """By class and attributes, so that stages compare and their pickled twins are equal."""
+        if type(self) is not type(other):
+            return NotImplemented
+        mine, others = vars(self), vars(other)
+        return mine.keys() == others.keys() and all(np.array_equal(value, others[key]) for key, value in mine.items())
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{key}={value!r}' for key, value in vars(self).items())})"
+
+
+class Recipe(NamedTuple):
+    """What the library makes a plan or, with options, a motion of. Pickled, it comes back as the list of the residuals
+    that the library puts there.
+    """
+
+    model: Model
+    made_of: Union[Request, MotionPlan]
+    options: Optional[ProblemOptions]
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        return make_residuals, tuple(self)
+
+
+def make_residuals(model: Model, made_of: Union[Request, MotionPlan], options: Optional[ProblemOptions]) -> Any:
+    """The residuals of a recipe."""
+    return _bielle._make_residuals(model, made_of, options)  # type: ignore[attr-defined]
 
 
 def make(function: str, arguments: Sequence[Any]) -> LibraryResidual:

@@ -20,7 +20,7 @@ void bindGeometry(py::module_& module) {
       .field("p", &SE3::p, "position (3,), m")
       .type()
       .def("__matmul__", [](const SE3& a, const SE3& b) { return a * b; })
-      .def("inverse", &SE3::inverse)
+      .def("inverse", &SE3::inverse, "X_BA of X_AB.")
       .def(
           "act", [](const SE3& X, py::handle point) { return makeArray(X.act(readMatrix<Vector3d>(point, "point"))); },
           py::arg("point"), "Coordinates in A (3,) of a point given in B (3,), m.")

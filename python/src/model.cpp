@@ -1,3 +1,5 @@
+#include <pybind11/stl.h>
+
 #include "bielle/dynamics/assembly.h"
 #include "bielle/io/names.h"
 #include "bielle/model/builder.h"
@@ -216,16 +218,27 @@ void bindBuilder(py::module_& module) {
       "must be declared before. Errors are ModelErrors that name the element and the remedy.")
       .def(py::init<std::string>(), py::arg("name"))
       .def("add_link", &ModelBuilder::addLink, py::arg("link"), py::arg("parent_link"), py::arg("joint"),
-           py::arg("inertia"), py::arg("limits") = JointLimits(), "A link carried by a joint.")
-      .def("add_inertia", &ModelBuilder::addInertia, py::arg("link"), py::arg("inertia"))
-      .def("add_frame", &ModelBuilder::addFrame, py::arg("name"), py::arg("link"), py::arg("X_LF"))
+           py::arg("inertia"), py::arg("limits") = JointLimits(),
+           "A link carried by a Joint, whose X_PJ places it in the parent link; its Inertia in the frame of the link.")
+      .def("add_inertia", &ModelBuilder::addInertia, py::arg("link"), py::arg("inertia"),
+           "More inertia on a link, in the frame of that link.")
+      .def("add_frame", &ModelBuilder::addFrame, py::arg("name"), py::arg("link"), py::arg("X_LF"),
+           "A named frame on a link; X_LF is its placement there (SE3, m).")
       .def(
           "add_closure",
           [](ModelBuilder& self, const std::string& name, ClosureKind kind, const std::string& frame1,
              const std::string& frame2, py::handle axis, double kp,
              double kd) { self.addClosure(name, kind, frame1, frame2, readMatrix<Vector3d>(axis, "axis"), kp, kd); },
           py::arg("name"), py::arg("kind"), py::arg("frame1"), py::arg("frame2"),
-          py::arg("axis") = py::make_tuple(0, 0, 1), py::arg("kp") = 0, py::arg("kd") = 0)
+          py::arg("axis") = py::make_tuple(0, 0, 1), py::arg("kp") = 0, py::arg("kd") = 0,
+          "Closes a loop: two frames coincide, as far as the ClosureKind says.\n\n"
+          "axis: (3,), of a hinge, in frame 1; kp [1/s^2], kd [1/s]: Baumgarte stabilization.")
+      .def("add_coupler", &ModelBuilder::addCoupler, py::arg("name"), py::arg("coefficients"), py::arg("offset") = 0,
+           py::arg("kp") = 0, py::arg("kd") = 0,
+           "A belt or a gear: the sum of coefficients times coordinates is the offset, rad or m.\n\n"
+           "coefficients: by name of joint, at least two; kp [1/s^2], kd [1/s]: Baumgarte stabilization.")
+      .def("add_joint_force", &ModelBuilder::addJointForce, py::arg("joint"), py::arg("force"),
+           "Spring, damper and friction (JointForce) on a joint of one coordinate.")
       .def(
           "add_motor",
           [](ModelBuilder& self, const std::string& joint, double armature, double effort, double velocity,
@@ -233,18 +246,26 @@ void bindBuilder(py::module_& module) {
             self.addMotor(joint, armature, effort, velocity, read<std::optional<double>>(loss, "torque_loss"));
           },
           py::arg("joint"), py::arg("armature") = 0, py::arg("effort_limit") = std::numeric_limits<double>::infinity(),
-          py::arg("velocity_limit") = std::numeric_limits<double>::infinity(), py::arg("torque_loss") = py::none())
+          py::arg("velocity_limit") = std::numeric_limits<double>::infinity(), py::arg("torque_loss") = py::none(),
+          "A motor on a joint of one dof; they are numbered in the order of their calls.\n\n"
+          "armature: kg m^2 or kg; effort_limit: N m or N; velocity_limit: rad/s or m/s; torque_loss: "
+          "W/(N m)^2, or None if it is not known.")
       .def("add_contact", &ModelBuilder::addContact, py::arg("name"), py::arg("frame"), py::arg("kind"),
-           py::arg("half_length") = 0, py::arg("half_width") = 0)
-      .def("add_reference", &ModelBuilder::addReference, py::arg("reference"))
-      .def("add_visual", &ModelBuilder::addVisual, py::arg("link"), py::arg("visual"))
-      .def("add_serial_joint", &ModelBuilder::addSerialJoint, py::arg("joint"))
+           py::arg("half_length") = 0, py::arg("half_width") = 0,
+           "A frame that may touch the ground; half_length, half_width of a sole along its x and y, m.")
+      .def("add_reference", &ModelBuilder::addReference, py::arg("reference"), "A posture by name.")
+      .def("add_visual", &ModelBuilder::addVisual, py::arg("link"), py::arg("visual"), "What is drawn of a link.")
+      .def("add_serial_joint", &ModelBuilder::addSerialJoint, py::arg("joint"),
+           "A joint of the equivalent serial chain, for reduction ratios and serial models.")
       .def(
           "set_gravity",
           [](ModelBuilder& self, py::handle gravity) { self.setGravity(readMatrix<Vector3d>(gravity, "gravity")); },
-          py::arg("gravity"))
-      .def("set_armature", &ModelBuilder::setArmature, py::arg("joint"), py::arg("armature"))
-      .def("build", [](const ModelBuilder& self) { return std::make_shared<Model>(self.build()); });
+          py::arg("gravity"), "(3,), m/s^2; (0, 0, -9.81) unless it is called.")
+      .def("set_armature", &ModelBuilder::setArmature, py::arg("joint"), py::arg("armature"),
+           "Inertia that is added to every dof of a joint, kg m^2 or kg.")
+      .def(
+          "build", [](const ModelBuilder& self) { return std::make_shared<Model>(self.build()); },
+          "The Model. Raises ModelError naming the element that is wrong.");
 }
 
 }  // namespace

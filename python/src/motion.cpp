@@ -79,6 +79,43 @@ std::shared_ptr<HeldMotion> makeFromPlan(std::shared_ptr<Model> model, const Mot
   return held;
 }
 
+py::object makeRecipe(const py::object& model, const py::object& made_of, const py::object& options) {
+  return py::module_::import("bielle.residuals").attr("Recipe")(model, made_of, options);
+}
+
+MotionPlan plan(const std::shared_ptr<Model>& model, const Request& request) {
+  const py::gil_scoped_release release;
+  return request.make().plan(*model, makeStandingPosture(*model));
+}
+
+std::vector<LibraryResidual> rememberStages(const HeldMotion& held, const py::object& recipe) {
+  std::vector<StageSpec> stages;
+  for (int node = 0; node <= held.motion.problem->numStages(); ++node)
+    stages.push_back(held.motion.problem->spec(node));
+  return rememberResiduals(stages, recipe);
+}
+
+StageSpec getStage(HeldMotion& held, int node) {
+  if (node < 0 || node > held.motion.problem->numStages())
+    throw py::index_error("node: from 0 to " + std::to_string(held.motion.problem->numStages()));
+  if (!held.is_remembered)
+    rememberStages(held, makeRecipe(py::cast(held.model), held.request ? py::cast(*held.request) : py::cast(*held.plan),
+                                    py::cast(held.options)));
+  held.is_remembered = true;
+  return held.motion.problem->spec(node);
+}
+
+// The residuals that the library puts into the plan of a request, or, with options, into the motion of it or of a plan.
+py::list makeResiduals(const std::shared_ptr<Model>& model, const py::object& made_of, const py::object& options) {
+  const py::object recipe = makeRecipe(py::cast(model), made_of, options);
+  if (options.is_none()) return py::cast(rememberResiduals(plan(model, made_of.cast<const Request&>()).stages, recipe));
+  const auto problem = options.cast<ProblemOptions>();
+  return py::cast(rememberStages(py::isinstance<Request>(made_of)
+                                     ? *makeHeldMotion(model, made_of.cast<const Request&>(), problem)
+                                     : *makeFromPlan(model, made_of.cast<const MotionPlan&>(), problem),
+                                 recipe));
+}
+
 FddpSummary solve(HeldMotion& held, FddpOptions options, const py::object& callback) {
   const BusyGuard guard(held.is_busy, "motion");
   const FddpObserver observer = makeObserver(callback, &held.is_observed);
@@ -190,9 +227,10 @@ void bindHeldMotion(py::module_& module) {
                   py::call_guard<py::gil_scoped_release>(), "The motion of a request. Raises ModelError.")
       .def_static(
           "plan",
-          [](const Model& model, const Request& request) {
-            const py::gil_scoped_release release;
-            return request.make().plan(model, makeStandingPosture(model));
+          [](const std::shared_ptr<Model>& model, const Request& request) {
+            MotionPlan made = plan(model, request);
+            rememberResiduals(made.stages, makeRecipe(py::cast(model), py::cast(request), py::none()));
+            return made;
           },
           py::arg("model"), py::arg("request"),
           "The plan of a request, e.g. to add costs and constraints to its stages.")
@@ -213,13 +251,7 @@ void bindHeldMotion(py::module_& module) {
       .def_property_readonly(
           "requested", [](const HeldMotion& h) { return show(h.motion.requested, {}); }, "every option by name")
       .def_property("guess", &getTrajectory, &setTrajectory, "Trajectory to start from; after a solve the solution")
-      .def(
-          "stage",
-          [](const HeldMotion& h, int node) {
-            if (node < 0 || node > h.motion.problem->numStages()) throw py::index_error("node");
-            return h.motion.problem->spec(node);
-          },
-          py::arg("node"), "Stage of a node, 0 to N.")
+      .def("stage", &getStage, py::arg("node"), "Stage of a node, 0 to N, with what limits of the robot add to it.")
       .def("start_from", &setWarmStart, py::arg("record"),
            "Takes the guess from the record of another motion of the robot, resampled if its length differs.")
       .def("costs", &getCosts, py::arg("node"),
@@ -263,6 +295,7 @@ void bindHeldMotion(py::module_& module) {
 void bindMotions(py::module_& module) {
   bindRequests(module);
   bindHeldMotion(module);
+  module.def("_make_residuals", &makeResiduals);
 }
 
 }  // namespace bielle::python

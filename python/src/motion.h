@@ -32,6 +32,7 @@ struct HeldMotion {
   std::optional<Multipliers> multipliers;  // likewise
   std::optional<FddpSummary> summary;      // likewise
   std::atomic<bool> is_busy{false};        // one solve at a time
+  bool is_remembered = false;              // rememberResiduals() knows those of its stages
   bool is_observed = false;                // that solve waits for its callback; under the interpreter's lock
 };
 

@@ -48,14 +48,15 @@ void bindCosts(py::module_& module) {
       .def_static(
           "quadratic",
           [](py::handle weights) { return Activation::makeQuadratic(readMatrix<VectorXd>(weights, "weights")); },
-          py::arg("weights"))
+          py::arg("weights"), "1/2 sum w r^2, with weights (n,).")
       .def_static(
           "barrier",
           [](py::handle weights, py::handle lower, py::handle upper) {
             return Activation::makeBarrier(readMatrix<VectorXd>(weights, "weights"),
                                            readMatrix<VectorXd>(lower, "lower"), readMatrix<VectorXd>(upper, "upper"));
           },
-          py::arg("weights"), py::arg("lower"), py::arg("upper"));
+          py::arg("weights"), py::arg("lower"), py::arg("upper"),
+          "1/2 sum w d^2, where d is how far r is outside of its bounds; all (n,), in the unit of r.");
   Value<Cost>(module, "Cost", "weight * activation(residual).")
       .field("name", &Cost::name, "for reports")
       .field("weight", &Cost::weight, "not negative")

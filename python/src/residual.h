@@ -2,6 +2,7 @@
 /// \file Residuals as Python sees them: those of the library know how they were made, those written in Python are called
 /// with the interpreter's lock.
 #include "bielle/ocp/residual.h"
+#include "bielle/ocp/robot_problem.h"
 #include "model_access.h"
 
 namespace bielle::python {
@@ -30,6 +31,11 @@ py::object getPythonResidual(const Residual& residual);
 struct LibraryResidual {
   std::shared_ptr<const Residual> residual;
 };
+
+/// Remembers how to make the residuals of these stages again, as far as they do not tell it themselves: those that the
+/// library has put into a motion. Returns them in the order of the stages. As often as a motion is made of the recipe, a
+/// bielle.residuals.Recipe, they are the same.
+std::vector<LibraryResidual> rememberResiduals(const std::vector<StageSpec>& stages, const py::object& recipe);
 
 template <>
 struct Convert<std::shared_ptr<const Residual>> {

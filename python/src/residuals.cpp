@@ -1,6 +1,8 @@
 // The residuals of the library, with what they were made of, so that they can be compared and pickled.
 #include <pybind11/stl.h>
 
+#include <unordered_map>
+
 #include "bielle/ocp/contact_schedule.h"
 #include "bind.h"
 #include "residual.h"
@@ -34,6 +36,27 @@ class MadeResidual : public Residual {
 py::object getOrigin(const LibraryResidual& residual) {
   const auto* made = dynamic_cast<const MadeResidual*>(residual.residual.get());
   return made ? py::object(made->getOrigin()) : py::none();
+}
+
+// A residual that the library has put into a motion: the index-th of those that are made of a recipe.
+struct PlannedResidual {
+  std::weak_ptr<const Residual> residual;
+  std::shared_ptr<SharedObject> recipe;
+  size_t index;
+};
+
+// Under the interpreter's lock. Leaked, as the interpreter may be gone before static objects are.
+using PlannedResiduals = std::unordered_map<const Residual*, PlannedResidual>;
+PlannedResiduals& getPlannedResiduals() {
+  static auto* planned = new PlannedResiduals;
+  return *planned;
+}
+
+// (recipe, index), or None.
+py::object getPlace(const std::shared_ptr<const Residual>& residual) {
+  const auto found = getPlannedResiduals().find(residual.get());
+  if (found == getPlannedResiduals().end() || found->second.residual.lock() != residual) return py::none();
+  return py::make_tuple(found->second.recipe->get(), found->second.index);
 }
 
 // An argument as it is kept: arrays as lists, which compare and pickle.
@@ -190,26 +213,50 @@ void bindJointResiduals(py::module_& m) {
 
 }  // namespace
 
+std::vector<LibraryResidual> rememberResiduals(const std::vector<StageSpec>& stages, const py::object& recipe) {
+  PlannedResiduals& planned = getPlannedResiduals();
+  for (auto it = planned.begin(); it != planned.end();)
+    it = it->second.residual.expired() ? planned.erase(it) : std::next(it);
+  const auto shared = std::make_shared<SharedObject>(recipe);
+  std::vector<LibraryResidual> out;
+  const auto remember = [&](const std::shared_ptr<const Residual>& residual) {
+    if (!residual || getPythonResidual(*residual) || dynamic_cast<const MadeResidual*>(residual.get())) return;
+    if (planned.try_emplace(residual.get(), PlannedResidual{residual, shared, out.size()}).second)
+      out.push_back({residual});
+  };
+  for (const StageSpec& stage : stages) {
+    for (const Cost& cost : stage.costs) remember(cost.residual);
+    for (const PathConstraint& constraint : stage.path_constraints) remember(constraint.residual);
+  }
+  return out;
+}
+
 void bindResiduals(py::module_& module) {
   py::enum_<ForceAxes>(module, "ForceAxes").value("CONTACT", ForceAxes::Contact).value("WORLD", ForceAxes::World);
   py::class_<LibraryResidual>(module, "LibraryResidual", "A residual of the library; `bielle.residuals` makes them.")
-      .def_property_readonly("size", [](const LibraryResidual& r) { return r.residual->size(); })
-      .def_property_readonly("origin", &getOrigin,
-                             "(function of bielle.residuals, its arguments); None for those inside a planned motion")
+      .def_property_readonly(
+          "size", [](const LibraryResidual& r) { return r.residual->size(); }, "number of rows")
+      .def_property_readonly(
+          "origin", &getOrigin,
+          "(function of bielle.residuals, its arguments); None for those that the library put into a motion")
       .def("__eq__",
            [](const LibraryResidual& self, const Object& other) -> Object {
              if (!py::isinstance<LibraryResidual>(other)) return py::reinterpret_borrow<Object>(Py_NotImplemented);
              const auto& second = other.cast<const LibraryResidual&>();
-             const Object origin = getOrigin(self);
-             return py::bool_(self.residual == second.residual ||
-                              (!origin.is_none() && origin.equal(getOrigin(second))));
+             if (self.residual == second.residual) return py::bool_(true);
+             const Object origin = getOrigin(self), place = getPlace(self.residual);
+             return py::bool_((!origin.is_none() && origin.equal(getOrigin(second))) ||
+                              (!place.is_none() && place.equal(getPlace(second.residual))));
            })
+      .def("__copy__", [](const Object& self) { return self; })
+      .def("__deepcopy__", [](const Object& self, const py::dict&) { return self; })
       .def("__reduce__",
            [](const LibraryResidual& self) {
-             const Object origin = getOrigin(self);
-             if (origin.is_none())
-               throw py::type_error("this residual is part of a planned motion: pickle the request that made it");
-             return py::make_tuple(py::module_::import("bielle.residuals").attr("make"), origin);
+             const Object origin = getOrigin(self), place = getPlace(self.residual);
+             if (!origin.is_none()) return py::make_tuple(py::module_::import("bielle.residuals").attr("make"), origin);
+             if (place.is_none()) throw py::type_error("nothing tells what this residual was made of");
+             // A pickled recipe comes back as the list of what is made of it.
+             return py::make_tuple(py::module_::import("operator").attr("getitem"), place);
            })
       .def("__repr__", [](const LibraryResidual& self) {
         const Object origin = getOrigin(self);

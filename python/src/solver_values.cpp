@@ -79,8 +79,9 @@ void bindSummary(py::module_& module) {
       .field("rollout_seconds", &FddpSummary::rollout_seconds, "likewise")
       .field("log", &FddpSummary::log, "Iterations")
       .type()
-      .def_property_readonly("converged",
-                             [](const FddpSummary& s) { return s.termination == FddpTermination::Converged; });
+      .def_property_readonly(
+          "converged", [](const FddpSummary& s) { return s.termination == FddpTermination::Converged; },
+          "whether the solver ended at an optimum");
   Value<Multipliers>(module, "Multipliers", "Of the constraints, node by node.")
       .field("values", &Multipliers::values, "N + 1 of (constraint size,)")
       .field("penalty", &Multipliers::penalty, "of violated constraints");

@@ -45,14 +45,21 @@ class HeldWorlds {
     const MakeWorld make = engine == "bielle" ? makeOwnWorld : findEngine(engine);
     const py::gil_scoped_release release;
     for (int i = 0; i < count.value_or(1); ++i) worlds_.push_back(make(engine, *model_, {ground, time_step}));
+    ok_.assign(worlds_.size(), true);
   }
 
-  // Many worlds start from the same state, or each from its own.
-  py::object reset(const py::object& q, const py::object& v) {
+  // Many worlds start from the same state, or each from its own; all of them, or those of a mask.
+  py::object reset(const py::object& q, const py::object& v, const py::object& where) {
     const BusyGuard guard(is_busy_, "world");
     const MatrixXd q0 = readRows(q, model_->nq(), "q", true), v0 = readRows(v, model_->nv(), "v", true);
-    run([&](World& world, Eigen::Index i) { world.reset(q0.col(i), v0.col(i)); });
-    return observe(std::vector<char>(worlds_.size(), true));
+    const VectorXd chosen = where.is_none() ? VectorXd::Ones(worlds_.size())
+                                            : readVector(where, static_cast<Eigen::Index>(worlds_.size()), "where");
+    run([&](World& world, Eigen::Index i) {
+      if (chosen[i] == 0) return;
+      world.reset(q0.col(i), v0.col(i));
+      ok_[i] = true;
+    });
+    return observe();
   }
 
   py::object step(const py::object& u, double duration, const py::object& push) {
@@ -60,13 +67,12 @@ class HeldWorlds {
       throw py::value_error("duration: a positive number of seconds wanted");
     const BusyGuard guard(is_busy_, "world");
     const MatrixXd torques = readRows(u, model_->nu(), "u", true), force = readRows(push, 3, "push", true);
-    std::vector<char> ok(worlds_.size());
     run([&](World& world, Eigen::Index i) {
       world.setTorques(torques.col(i));
       world.setPush(force.col(i));
-      ok[i] = world.advance(duration);
+      ok_[i] = world.advance(duration);
     });
-    return observe(ok);
+    return observe();
   }
 
   py::array calcWrenches() {
@@ -116,14 +122,14 @@ class HeldWorlds {
     return std::move(out);
   }
 
-  py::object observe(const std::vector<char>& ok) const {
+  py::object observe() const {
     MatrixXd time(1, worlds_.size()), q(model_->nq(), worlds_.size()), v(model_->nv(), worlds_.size());
     MatrixXd sound(1, worlds_.size());
     for (size_t i = 0; i < worlds_.size(); ++i) {
       time(0, i) = worlds_[i]->getTime();
       q.col(i) = worlds_[i]->getConfiguration();
       v.col(i) = worlds_[i]->getVelocity();
-      sound(0, i) = ok[i];
+      sound(0, i) = ok_[i];
     }
     return makeNamed("WorldState", {makeRows(time, {}), makeRows(q, {model_->nq()}), makeRows(v, {model_->nv()}),
                                     makeRows(sound, {}).attr("astype")("bool")});
@@ -147,6 +153,7 @@ class HeldWorlds {
 
   std::shared_ptr<Model> model_;
   std::vector<std::unique_ptr<World>> worlds_;
+  std::vector<char> ok_;  // of each, since its last step or reset
   std::optional<int> many_;
   std::string engine_;
   std::atomic<bool> is_busy_{false};
@@ -216,8 +223,10 @@ void bindWorlds(py::module_& module) {
       .def_property_readonly(
           "count", [](const HeldWorlds& self) { return show(self.getCount(), {}); }, "number of worlds, or None")
       .def_property_readonly("engine", &HeldWorlds::getEngine, "its name")
-      .def("reset", &HeldWorlds::reset, py::arg("q"), py::arg("v"),
-           "Sets closed configurations (nq,) and velocities (nv,) that keep them closed; all else starts anew.")
+      .def("reset", &HeldWorlds::reset, py::arg("q"), py::arg("v"), py::arg("where") = py::none(),
+           "Sets closed configurations (nq,) and velocities (nv,) that keep them closed; all else starts anew.\n\n"
+           "where: (count,), True for the worlds that start anew while the others stay as they are; None: all. "
+           "Returns the WorldState.")
       .def("step", &HeldWorlds::step, py::arg("u"), py::arg("duration"), py::arg("push") = py::make_tuple(0, 0, 0),
            "Advances by a duration (s) under motor torques (nu,), cut at their limits, and a force at the trunk (3,), "
            "N.\n\n"

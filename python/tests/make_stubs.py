@@ -193,10 +193,11 @@ COMMON = (
 
 
 def make_motions():
+    names = ["FUNCTIONS", "motions", "solve_request", "solve_sequence", *bielle.FUNCTIONS]
     lines = ['"""Written by make_stubs.py."""', "", "from typing import Callable, Dict, Iterable, Mapping, Optional, Union", "",
-             "from ._bielle import Iteration, ProblemOptions, Record, Request, Result, Robot, SolverOptions", "",
+             "from ._bielle import Iteration, ProblemOptions, Record, Request, Result, Robot, SolverOptions, motions", "",
              "Callback = Callable[[Iteration], Optional[bool]]", "WarmStart = Union[str, Record, Result]",
-             "FUNCTIONS: Dict[str, Callable[..., Result]]", "",
+             "FUNCTIONS: Dict[str, Callable[..., Result]]", f"__all__ = {names!r}", "",
              f"def solve_request(robot: Union[str, Robot], request: Request, {COMMON}) -> Result: ...",
              "def solve_sequence(robot: Union[str, Robot], sequence: Iterable[str], options: Mapping[str, float] = ..., "
              f"{COMMON}) -> Result: ..."]  # fmt: skip

@@ -2,6 +2,7 @@
 
 import copy
 import gc
+import inspect
 import multiprocessing
 import pickle
 
@@ -22,7 +23,71 @@ VALUES = {
 }
 
 
-@pytest.fixture(params=VALUES)
+NOT_VALUES = {"ModelBuilder", "Node", "Controller", "Estimator", "World", "Sensors"}  # they hold what goes on
+
+
+def make_plan():
+    return bielle.Motion.plan(bielle.load_robot("fivebar_leg").model, bielle.Request(motion="squat"))
+
+
+def make_serial():
+    model = bielle.load_robot("bipetto").model
+    return bielle.make_serial_model(model, model.standing())
+
+
+VALUES.update(
+    {
+        "MotionPlan": make_plan,
+        "Stage": lambda: make_plan().stages[0],
+        "Cost": lambda: make_plan().stages[0].costs[0],
+        "LibraryResidual": lambda: make_plan().stages[0].costs[0].residual,
+        "Motion": lambda: bielle.Motion(bielle.load_robot("fivebar_leg").model, make_plan()),
+        "Parametrization": lambda: bielle.Parametrization.generated(
+            "fivebar_leg", [bielle.DesignVariable(name="upper", lower=0.1, upper=0.3, parameter="upper_length")]
+        ),
+        "SerialModel": make_serial,
+        "ModelError": lambda: bielle.ModelError("m", "file", "element", "problem", "remedy"),
+    }
+)
+
+
+def list_public_types():
+    return {name: kind for name, kind in vars(bielle).items() if inspect.isclass(kind) and not name.startswith("_")}
+
+
+@pytest.mark.parametrize("name", sorted(set(list_public_types()) - NOT_VALUES))
+def test_every_public_value_pickles(name):
+    kind = list_public_types()[name]
+    if hasattr(kind, "__members__"):
+        values = list(kind.__members__.values())
+    elif name in VALUES:
+        values = [VALUES[name]()]
+    elif hasattr(kind, "_fields") and issubclass(kind, tuple):
+        values = [kind(*(np.arange(3.0) + i for i in range(len(kind._fields))))]
+    else:
+        values = [kind()]
+    for value in values:
+        for twin in (pickle.loads(pickle.dumps(value)), copy.copy(value), copy.deepcopy(value)):
+            assert type(twin) is type(value) and repr(twin) == repr(value)
+            assert same(twin, value)
+
+
+def same(a, b):
+    """Of errors and tuples of arrays, which have no == of their own; of Motion and Parametrization by what they make."""
+    if isinstance(a, bielle.ModelError):
+        return (str(a), vars(a)) == (str(b), vars(b))
+    if isinstance(a, bielle.Residual):
+        return vars(a) == vars(b)
+    if isinstance(a, bielle.Motion):
+        return a.guess == b.guess and all(a.stage(k) == b.stage(k) for k in range(a.num_stages + 1))
+    if isinstance(a, bielle.Parametrization):
+        return a.variables == b.variables
+    if isinstance(a, tuple):
+        return all(np.array_equal(x, y) for x, y in zip(a, b))
+    return a == b and not a != b
+
+
+@pytest.fixture(params=["SE3", "Inertia", "Joint", "Motor", "Reference", "ConstraintSet", "Robot", "Model"])
 def value(request):
     return VALUES[request.param]()
 
@@ -81,6 +146,33 @@ def calc_mass(model):
     return model.mass_matrix(model.standing()).tobytes()
 
 
+def return_it(value):
+    return value
+
+
+def test_every_value_survives_spawn():
+    values = [make() for make in VALUES.values()]
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        for value, twin in zip(values, pool.map(return_it, values)):
+            assert type(twin) is type(value) and same(twin, value)
+
+
+def test_plans_compare_and_differ():
+    plan, again = make_plan(), make_plan()
+    assert plan == again and plan.stages[0].costs[0].residual == again.stages[0].costs[0].residual
+    deeper = bielle.Motion.plan(
+        bielle.load_robot("fivebar_leg").model, bielle.Request(motion="squat", options={"depth": 0.9})
+    )
+    assert plan != deeper
+
+
+def test_names_are_those_of_the_package():
+    from typing import Dict, List
+
+    assert Dict not in vars(bielle).values() and List not in vars(bielle).values()
+    assert not hasattr(bielle, "Callback")
+
+
 def test_spawned_processes(model):
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         assert pool.map(calc_mass, [model, model]) == [calc_mass(model)] * 2
@@ -106,5 +198,22 @@ def test_nothing_leaks():
     gc.collect()
     before = read_memory()
     churn(10000)
+    gc.collect()
+    assert read_memory() - before < 1_000_000
+
+
+def test_plans_do_not_leak():
+    model = bielle.load_robot("fivebar_leg").model
+    request = bielle.Request(motion="squat", options={"time_step": 0.1})
+
+    def churn(count):
+        for _ in range(count):
+            plan = bielle.Motion.plan(model, request)
+            assert bielle.Motion(model, plan).stage(0).costs[0].residual == plan.stages[0].costs[0].residual
+
+    churn(20)
+    gc.collect()
+    before = read_memory()
+    churn(200)
     gc.collect()
     assert read_memory() - before < 1_000_000
