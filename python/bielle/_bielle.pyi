@@ -2136,7 +2136,7 @@ class MotionPlan:
         ...
     @property
     def schedule(self) -> ContactSchedule:
-        """ContactSchedule"""
+        """ContactSchedule; without phases, that of the stages"""
         ...
     @property
     def ground(self) -> Ground:

@@ -69,13 +69,40 @@ std::shared_ptr<HeldMotion> makeHeldMotion(std::shared_ptr<Model> model, const R
 
 namespace {
 
-std::shared_ptr<HeldMotion> makeFromPlan(std::shared_ptr<Model> model, const MotionPlan& plan,
-                                         const ProblemOptions& options) {
+// The schedule that stages follow: a phase for each run of stages that differ in nothing that a phase tells.
+ContactSchedule makeSchedule(const std::vector<StageSpec>& stages) {
+  ContactSchedule schedule;
+  for (size_t k = 0; k + 1 < stages.size(); ++k) {
+    const StageSpec& stage = stages[k];
+    if (k == 0 || stage.dt != stages[k - 1].dt || stage.timing.phase != stages[k - 1].timing.phase ||
+        !same(stage.constraints, stages[k - 1].constraints)) {
+      ContactPhase phase;
+      phase.name = "phase " + std::to_string(schedule.phases.size() + 1);
+      phase.dt = stage.dt;
+      for (size_t c = stage.constraints.num_loops; c < stage.constraints.closures.size(); ++c) {
+        ContactTarget target;
+        target.contact = stage.constraints.getContact(static_cast<int>(c));
+        target.X_WT = stage.constraints.closures[c].X_B2;
+        phase.contacts.push_back(target);
+      }
+      schedule.phases.push_back(phase);
+    }
+    ++schedule.phases.back().nodes;
+  }
+  return schedule;
+}
+
+// Plans that were made from nothing need no schedule: results tell that of their stages.
+std::shared_ptr<HeldMotion> makeFromPlan(std::shared_ptr<Model> model, MotionPlan plan, const ProblemOptions& options) {
+  if (plan.schedule.phases.empty()) plan.schedule = makeSchedule(plan.stages);
+  if (const int nodes = plan.schedule.numStages(); nodes + 1 != static_cast<int>(plan.stages.size()))
+    throw py::value_error("schedule: " + std::to_string(nodes) + " stages in its phases, and " +
+                          std::to_string(plan.stages.size()) + " of the plan, the terminal one among them");
   auto held = std::make_shared<HeldMotion>();
   held->model = std::move(model);
-  held->plan = plan;
+  held->plan = std::move(plan);
   held->options = options;
-  held->motion = makeMotion(*held->model, plan, options);
+  held->motion = makeMotion(*held->model, *held->plan, options);
   return held;
 }
 

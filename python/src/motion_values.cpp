@@ -82,7 +82,7 @@ void bindTrajectory(py::module_& module) {
       .field("us", &ShootingTrajectory::us, "torques, and the time scale at the first step of a free phase");
   Value<MotionPlan>(module, "MotionPlan", "A motion before it becomes a problem.")
       .field("name", &MotionPlan::name, "e.g. \"squat\"")
-      .field("schedule", &MotionPlan::schedule, "ContactSchedule")
+      .field("schedule", &MotionPlan::schedule, "ContactSchedule; without phases, that of the stages")
       .field("ground", &MotionPlan::ground, "Ground")
       .field("stages", &MotionPlan::stages, "N running Stages and the terminal one")
       .field("guess", &MotionPlan::guess, "Trajectory to start from")

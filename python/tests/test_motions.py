@@ -157,3 +157,61 @@ def test_one_thread_solves_a_motion_at_a_time(model):
 
     motion.solve(callback=meddle)
     assert guesses == [motion.guess]
+
+
+def make_hopper():
+    """A leg of two links on a vertical rail, made from nothing; the posture in which its foot is at the origin."""
+    builder = bielle.ModelBuilder("hopper")
+    rail = bielle.Joint(name="rail", kind=bielle.JointKind.PRISMATIC, axis=[0, 0, 1])
+    builder.add_link("hip", "world", rail, bielle.Inertia(mass=1, I_com=1e-3 * np.eye(3)))
+    for link, parent, joint, z in (("thigh", "hip", "hip_pitch", 0), ("shin", "thigh", "knee", -0.2)):
+        pivot = bielle.Joint(name=joint, kind=bielle.JointKind.REVOLUTE, axis=[0, 1, 0], X_PJ=bielle.SE3(p=[0, 0, z]))
+        builder.add_link(link, parent, pivot, bielle.Inertia(mass=0.2, com=[0, 0, -0.1], I_com=1e-3 * np.eye(3)))
+        builder.add_motor(joint, armature=1e-3)
+    builder.add_frame("foot", "shin", bielle.SE3(p=[0, 0, -0.2]))
+    builder.add_contact("foot", "foot", bielle.ContactKind.POINT_3D)
+    model = builder.build()
+    q = np.array([0, 0.5, -1.0])
+    q[0] = -model.placement(q, "foot")[2, 3]
+    return model, q
+
+
+def make_hop(model, q, height, timing):
+    """A push-off and a flight, at whose end the centre of mass is at a height."""
+    foot = bielle.SE3(p=model.placement(q, "foot")[:3, 3])
+    common = dict(
+        dt=0.02,
+        state=bielle.StateCost(weight=1e-2, q_ref=q, v_ref=np.zeros(3), weights=np.ones(6)),
+        control=bielle.ControlCost(weight=1e-2, reference=np.zeros(2), weights=np.ones(2)),
+    )
+    push = bielle.Stage(constraints=model.constraints([bielle.ContactTarget(X_WT=foot)]), timing=timing, **common)
+    flight = bielle.Stage(constraints=model.constraints(), **common)
+    x, y = model.com(q)[:2]
+    apex = bielle.residuals.com_position([x, y, height])
+    end = flight.replace(costs=[bielle.Cost("apex", 1e3, bielle.Activation.quadratic([0, 0, 1]), apex)])
+    guess = bielle.Trajectory(xs=[np.r_[q, 0, 0, 0]] * 24, us=[model.static_torques(q, ["foot"])] * 23)
+    return bielle.MotionPlan(name="hop", stages=[push] * 15 + [flight] * 8 + [end], guess=guess, q_start=q, q_end=q)
+
+
+@pytest.mark.parametrize("timing", [bielle.FreeTiming(), bielle.FreeTiming(phase=0, lower=0.5, upper=2)])
+def test_a_problem_made_from_nothing(timing, tmp_path):
+    model, q = make_hopper()
+    motion = bielle.Motion(model, make_hop(model, q, 0.55, timing))
+    assert motion.solve(bielle.SolverOptions(initial_regularization=1e-5)).converged
+    assert model.com(motion.guess.xs[-1][:3])[2] == pytest.approx(0.55, abs=0.01)
+    assert [(phase.nodes, len(phase.contacts)) for phase in motion.schedule.phases] == [(15, 1), (8, 0)]
+    assert "<iframe" in motion._repr_html_()
+    bielle.Robot(name="hopper", model=model).write(str(tmp_path / "hopper"))
+    result = bielle.make_result(motion, motion.summary, bielle.load_robot(str(tmp_path / "hopper")))
+    assert result.converged and (result.schedule.phases[0].dt != 0.02) == (timing.phase >= 0)
+    assert np.abs(result.record.contact_wrenches[15:]).max() == 0
+    forces = np.linalg.norm(result.record.contact_wrenches[:15, :3], axis=1)  # in the frame of the foot, which is inclined
+    assert forces.mean() > 9.81 * model.mass
+
+
+def test_schedules_fit_their_stages():
+    model, q = make_hopper()
+    plan = make_hop(model, q, 0.55, bielle.FreeTiming())
+    schedule = bielle.ContactSchedule(phases=[bielle.ContactPhase(name="all", nodes=7, dt=0.02)])
+    with pytest.raises(ValueError, match="7 stages in its phases, and 24 of the plan"):
+        bielle.Motion(model, plan.replace(schedule=schedule))
