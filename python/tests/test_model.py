@@ -161,6 +161,22 @@ def test_a_linkage_built_from_nothing():
     assert pendulum.motors[0].effort_limit == 3
 
 
+def test_couplers_and_springs_from_nothing():
+    """Two pendulums on a belt of ratio 2, the first one on a spring."""
+    builder = bielle.ModelBuilder("belt")
+    for name in ("a", "b"):
+        joint = bielle.Joint(name=name, kind=bielle.JointKind.REVOLUTE, axis=[0, 0, 1])
+        builder.add_link(f"link_{name}", "world", joint, bielle.Inertia(mass=1, I_com=np.eye(3)))
+    builder.add_coupler("belt", {"a": 2, "b": -1})
+    builder.add_joint_force("a", bielle.JointForce(stiffness=10))
+    model = builder.build()
+    assert model.closure_residual([0.1, 0.2]) == pytest.approx([0])
+    a = model.forward_dynamics([0.1, 0.2], np.zeros(2), []).a
+    assert a == pytest.approx([-10 * 0.1 / (1 + 4), -2 * 10 * 0.1 / (1 + 4)])
+    with pytest.raises(bielle.ModelError):
+        builder.add_coupler("slack", {"a": 1})
+
+
 def test_generated_robots(tmp_path):
     assert "upper_length" in bielle.generators()["cleobot"]
     short = bielle.generate_robot("cleobot", str(tmp_path / "short"), upper_length=0.2)

@@ -215,3 +215,19 @@ def test_schedules_fit_their_stages():
     schedule = bielle.ContactSchedule(phases=[bielle.ContactPhase(name="all", nodes=7, dt=0.02)])
     with pytest.raises(ValueError, match="7 stages in its phases, and 24 of the plan"):
         bielle.Motion(model, plan.replace(schedule=schedule))
+
+
+def test_figures(squat, model):
+    plot = pytest.importorskip("matplotlib.pyplot")
+    axes = plot.figure().add_subplot()
+    assert bielle.plot.torques(squat, axes=axes) is axes and len(axes.lines) == 4
+    name = next(iter(squat.peak_torques))
+    assert np.array_equal(axes.lines[0].get_ydata(), squat.record.u[:, squat.record.u_names.index(name)])
+    axes.clear()
+    loads = bielle.plot.loads(squat.record, axes=axes).lines
+    assert sum(line.get_ydata().mean() for line in loads) == pytest.approx(9.81 * model.mass, rel=0.01)
+    axes.clear()
+    assert bielle.plot.convergence(squat, axes=axes).lines[0].get_xdata()[-1] == squat.solver.log[-1].iteration
+    with pytest.raises(ValueError, match="'nobody' is not among"):
+        bielle.plot.coordinates(squat, ["nobody"], axes=axes)
+    plot.close("all")

@@ -75,6 +75,20 @@ def test_many_worlds_are_single_ones_to_the_last_bit(controller, model):
         assert np.array_equal(one.wrenches, many.wrenches[i])
 
 
+def test_some_worlds_start_anew():
+    model = bielle.load_robot("fivebar_leg").model
+    q, v = model.standing(), np.zeros(model.nv)
+    world = bielle.World(model, count=3)
+    world.reset(q, v)
+    before = world.step(np.zeros(model.nu), 0.05)
+    after = world.reset(q, v, where=[False, True, False])
+    assert np.array_equal(after.q[1], q) and after.time[1] == 0 and not np.array_equal(before.q[1], q)
+    for i in (0, 2):
+        assert np.array_equal(after.q[i], before.q[i]) and after.time[i] == before.time[i]
+    with pytest.raises(ValueError, match=r"where: shape \(3,\) wanted, got \(2,\)"):
+        world.reset(q, v, where=[True, False])
+
+
 def test_wrong_arguments(model):
     world = bielle.World(model, count=2)
     world.reset(model.standing(), np.zeros(model.nv))
