@@ -260,9 +260,18 @@ TEST_CASE("constraints that contradict each other are named, with what is left o
   options.constraints.inequalities = GENERATE(values(kAll));
   const FddpSummary summary = Fddp(options).solve(problem, t);
   CAPTURE(summary.message, summary.iterations);
+  const auto namesOne = [](const FddpSummary& of) {
+    return of.message.find("tip at node 60") != std::string::npos ||
+           of.message.find("wall at node 60") != std::string::npos;
+  };
   CHECK(summary.termination == FddpTermination::Infeasible);
-  CHECK((summary.message.find("tip at node 60") != std::string::npos ||
-         summary.message.find("wall at node 60") != std::string::npos));
+  CHECK(namesOne(summary));
+  FddpOptions few = options;  // a solve that is cut off before names them too
+  few.max_iterations = summary.iterations - 1;
+  ShootingTrajectory unfinished = makeGuess(problem);
+  const FddpSummary cut_off = Fddp(few).solve(problem, unfinished);
+  CHECK(cut_off.termination == FddpTermination::MaxIterations);
+  CHECK(namesOne(cut_off));
   // One of the two is violated by half of what lies between them at least. The sum of squares cannot be less, to first order.
   CHECK(summary.violation > 0.05 - 1e-6);
   CHECK(summary.violation < 0.1);

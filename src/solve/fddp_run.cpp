@@ -299,6 +299,8 @@ FddpSummary FddpRun::finish(FddpTermination termination) {
       break;
     case FddpTermination::MaxIterations:
       summary_.message = "the largest number of iterations is reached";
+      if (work_.lagrangian.getViolation() > options_.constraints.tolerance)
+        summary_.message += "; " + work_.lagrangian.describeWorst(problem_);
       break;
     case FddpTermination::Interrupted:
       summary_.message = "stopped from outside";

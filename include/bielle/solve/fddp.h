@@ -126,7 +126,7 @@ struct Multipliers {
 };
 
 struct FddpOptions {
-  int max_iterations = 200;
+  int max_iterations = 300;
   /// Converged if Eq. (6) is below this, in (units of cost per unit of control)^2, and the gaps are closed.
   double gradient_tolerance = 1e-9;
   /// The gaps are closed if every entry is below this, in units of the tangent space.
