@@ -186,6 +186,35 @@ TEST_CASE("stages that turn out too long are halved, unless their length was ask
   CHECK(calcStepError(model, directory.readTrajectory()) > kLargestStepError);
 }
 
+TEST_CASE("motions that miss their differences where a linkage is near its dead point are planned farther from it") {
+  const OutputDirectory directory;
+  REQUIRE(run({"solve", "squat", "--robot", "bipetto", "-o", directory.str(), "--quiet", "--no-check", "--no-report"})
+              .status == 0);
+  const Model model = loadRobot("bipetto").model;
+  const MotionRequest request = findMotion("", "squat").makeRequest();
+  const MotionRecord record = directory.readTrajectory();
+  const auto disturb = [&record](int node) {
+    MotionRecord disturbed = record;
+    disturbed.v(node, 0) += 0.1;
+    return disturbed;
+  };
+  const int deepest = 96, high = 10;  // the knees are near their dead point in the lowest posture alone
+  CHECK_FALSE(avoidDeadPoints(request, model, {}, record));
+  CHECK_FALSE(avoidDeadPoints(request, model, {}, disturb(high)));
+  const std::optional<Motion> planned = avoidDeadPoints(request, model, {}, disturb(deepest));
+  REQUIRE(planned);
+  int bounded = 0;
+  for (const PathConstraint& constraint : planned->problem->spec(deepest).path_constraints)
+    if (constraint.name.find("dead points") == 0) {
+      ++bounded;
+      CHECK(constraint.lower[0] == kWideDeadPointMargin);
+    }
+  CHECK(bounded >= 2);
+  ProblemOptions wide;
+  wide.limits.dead_point_margin = kWideDeadPointMargin;
+  CHECK_FALSE(avoidDeadPoints(request, model, wide, disturb(deepest)));
+}
+
 TEST_CASE("scripts that name a kind of barrier get the limits that motions keep anyway") {
   const OutputDirectory directory;
   for (const char* kind : {"quadratic", "log"})

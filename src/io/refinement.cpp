@@ -27,12 +27,23 @@ MotionRecord halveSteps(const MotionRecord& record) {
   return out;
 }
 
-}  // namespace
+// The option for the length of stages; null for motions that have none.
+double* findTimeStep(const MotionRequest& request) {
+  for (const OptionEntry& option : request.options)
+    if (option.name == "time_step") return option.value;
+  return nullptr;
+}
 
-double calcStepError(const Model& model, const MotionRecord& record) {
-  if (!record.has_midpoints) return 0;
+struct StepError {
+  double share = 0;        // of the largest acceleration
+  Eigen::Index stage = 0;  // where it is largest
+};
+
+StepError findStepError(const Model& model, const MotionRecord& record) {
+  StepError worst;
+  if (!record.has_midpoints) return worst;
   Workspace ws(model);
-  double error = 0, largest = 0;
+  double largest = 0;
   for (Eigen::Index k = 0; k < record.a.rows(); ++k) {
     const double h = record.time[k + 1] - record.time[k];
     if (h == 0) continue;  // an impact
@@ -42,23 +53,58 @@ double calcStepError(const Model& model, const MotionRecord& record) {
       return std::sqrt(std::max(0.0, a.dot(ws.M.selfadjointView<Eigen::Lower>() * a)));
     };
     const VectorXd a = record.a.row(k);
-    error = std::max(error, calcNorm((record.v.row(k + 1) - record.v.row(k)).transpose() / h - a));
+    const double error = calcNorm((record.v.row(k + 1) - record.v.row(k)).transpose() / h - a);
+    if (error > worst.share) worst = {error, k};
     largest = std::max(largest, calcNorm(a));
   }
-  return largest > 0 ? error / largest : 0;
+  worst.share = largest > 0 ? worst.share / largest : 0;
+  return worst;
 }
+
+// Whether a linkage is near the margin that keeps it from its dead points, within two nodes of a stage.
+bool isNearDeadPoint(const Model& model, const MotionRecord& record, Eigen::Index stage, double margin) {
+  constexpr double kNear = 1.5;  // over the margin
+  const ConstraintSet closures = makeConstraintSet(model);
+  const VectorXd none;
+  VectorXd value(1);
+  Workspace ws(model);
+  const Eigen::Index first = std::max<Eigen::Index>(0, stage - 2), last = std::min(record.q.rows(), stage + 4);
+  for (const Transmission& transmission : listTransmissions(model, record.q.row(0).transpose())) {
+    const std::unique_ptr<Residual> residual = makeTransmission(transmission);
+    for (Eigen::Index k = first; k < last; ++k) {
+      updatePositions(model, ws, record.q.row(k).transpose());
+      residual->calc({model, ws, closures, none, none}, value);
+      if (std::min(value[0], 1 / value[0]) < kNear * margin) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+double calcStepError(const Model& model, const MotionRecord& record) { return findStepError(model, record).share; }
 
 std::optional<Motion> refineStages(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
                                    const Motion& solved, const MotionRecord& record) {
   if (problem.objective.objective != Objective::Effort || problem.timings.areGiven()) return {};
-  const auto step = std::find_if(request.options.begin(), request.options.end(),
-                                 [](const OptionEntry& option) { return option.name == "time_step"; });
-  if (step == request.options.end() || *step->value != 0) return {};
-  if (calcStepError(model, record) <= kLargestStepError) return {};
-  *step->value = solved.schedule.phases.front().dt / 2;
+  double* step = findTimeStep(request);
+  if (!step || *step != 0 || calcStepError(model, record) <= kLargestStepError) return {};
+  *step = solved.schedule.phases.front().dt / 2;
   Motion motion = makeRequested(request, model, problem);
   setGuess(halveSteps(record), motion);
   return motion;
+}
+
+std::optional<Motion> avoidDeadPoints(const MotionRequest& request, const Model& model, ProblemOptions problem,
+                                      const MotionRecord& record) {
+  double& margin = problem.limits.dead_point_margin;
+  const bool widened = problem.limits.enforced && margin > 0 && margin < kWideDeadPointMargin;
+  if (!widened || !request.parts.empty()) return {};
+  if (problem.objective.objective != Objective::Effort || problem.timings.areGiven()) return {};
+  const StepError error = findStepError(model, record);
+  if (error.share <= kLargestStepError || !isNearDeadPoint(model, record, error.stage, margin)) return {};
+  margin = kWideDeadPointMargin;
+  return makeRequested(request, model, problem);
 }
 
 }  // namespace bielle

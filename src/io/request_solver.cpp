@@ -33,8 +33,9 @@ RequestSolver::RequestSolver(const MotionRequest& request, const Model& model, R
 }
 
 MotionResult RequestSolver::solve(const RunInfo& run) {
-  FddpOptions solver = options_.solver;
-  if (!options_.warm_start && request_.parts.empty()) solver.initial_regularization = kGuessRegularization;
+  FddpOptions from_plan = options_.solver;
+  from_plan.initial_regularization = kGuessRegularization;
+  FddpOptions solver = !options_.warm_start && request_.parts.empty() ? from_plan : options_.solver;
   if (!options_.warm_start && !request_.parts.empty()) startFromParts();
   if (objective_.objective != Objective::Effort) {
     startFromEffort(solver);
@@ -44,15 +45,28 @@ MotionResult RequestSolver::solve(const RunInfo& run) {
   MotionResult result = makeResult(run, motion_, motion_.guess, summary);
   if (!result.converged()) return result;
   std::optional<Motion> refined = refineStages(request_, model_, options_.problem, motion_, result.record);
-  if (!refined) return result;
-  tell("velocities differ from their finite differences by more than " + formatNumber(100 * kLargestStepError) +
-       " %: once more, in stages half as long");
-  const FddpSummary again = solveMotion(*refined, options_.solver, observer_.motion);
-  if (again.termination == FddpTermination::Converged)
-    return makeResult(run, *refined, refined->guess, addUp(summary, again));
-  if (observer_.warn)
-    observer_.warn(std::string("in stages half as long: ") + getName(again.termination) + "; the longer ones are kept");
+  if (refined) improve(*refined, options_.solver, "in stages half as long", run, result);
+  refined = avoidDeadPoints(request_, model_, options_.problem, result.record);
+  if (refined) improve(*refined, from_plan, "with linkages farther from their dead points", run, result);
   return result;
+}
+
+// Solves a motion in place of one whose velocities differ from their finite differences too much, and takes it if they
+// agree better.
+void RequestSolver::improve(Motion& motion, const FddpOptions& solver, const std::string& how, const RunInfo& run,
+                            MotionResult& result) const {
+  tell("velocities differ from their finite differences by more than " + formatNumber(100 * kLargestStepError) +
+       " %: once more, " + how);
+  const FddpSummary summary = solveMotion(motion, solver, observer_.motion);
+  MotionResult improved = makeResult(run, motion, motion.guess, addUp(result.solver, summary));
+  if (improved.converged() && calcStepError(model_, improved.record) < calcStepError(model_, result.record)) {
+    result = std::move(improved);
+    return;
+  }
+  result.solver = addUp(summary, result.solver);
+  if (observer_.warn)
+    observer_.warn(how + ": " + getName(summary.termination) + (improved.converged() ? ", no better" : "") +
+                   "; the motion before is kept");
 }
 
 // Solves each motion of a sequence by itself.

@@ -1,5 +1,5 @@
 #pragma once
-/// \file Stages that turn out too long for a motion.
+/// \file Motions whose stages turn out too long, and what is tried in their place.
 #include <optional>
 
 #include "bielle/io/motion_registry.h"
@@ -18,5 +18,12 @@ inline constexpr double kLargestStepError = 0.004;
 /// \param record  of the solution of `solved`
 std::optional<Motion> refineStages(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
                                    const Motion& solved, const MotionRecord& record);
+
+/// The motion of least effort of a request, no sequence, once more from its plan, with linkages farther from their dead points
+/// (kWideDeadPointMargin), if calcStepError() exceeds kLargestStepError where one of them is near its margin, and no duration is
+/// free: near a dead point motors reverse within a stage, of whatever length. The length of stages stays as it is.
+std::optional<Motion> avoidDeadPoints(const MotionRequest& request, const Model& model, ProblemOptions problem,
+                                      const MotionRecord& record);
+inline constexpr double kWideDeadPointMargin = 0.4;
 
 }  // namespace bielle

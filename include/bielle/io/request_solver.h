@@ -24,7 +24,8 @@ struct RequestObserver {
 };
 
 /// Solves one request, once. A sequence starts from its motions, each solved by itself; a motion of another objective from
-/// that of least effort, by which it is scaled; stages that turn out too long are halved (refineStages()).
+/// that of least effort, by which it is scaled; stages that turn out too long are halved (refineStages()), and where that
+/// does not help, linkages stay farther from their dead points (avoidDeadPoints()).
 class RequestSolver {
  public:
   /// Makes the motion and its guess. \throws ModelError as makeRequested() and setGuess() do
@@ -37,6 +38,8 @@ class RequestSolver {
  private:
   void startFromParts();
   void startFromEffort(const FddpOptions& solver);
+  void improve(Motion& motion, const FddpOptions& solver, const std::string& how, const RunInfo& run,
+               MotionResult& result) const;
   void tell(const std::string& line) const;
 
   const MotionRequest& request_;
