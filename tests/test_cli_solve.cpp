@@ -188,8 +188,7 @@ TEST_CASE("stages that turn out too long are halved, unless their length was ask
 
 TEST_CASE("motions that miss their differences where a linkage is near its dead point are planned farther from it") {
   const OutputDirectory directory;
-  REQUIRE(run({"solve", "squat", "--robot", "bipetto", "-o", directory.str(), "--quiet", "--no-check", "--no-report"})
-              .status == 0);
+  REQUIRE(run({"solve", "squat", "--robot", "bipetto", "-o", directory.str(), "--quiet", "--no-check"}).status == 0);
   const Model model = loadRobot("bipetto").model;
   const MotionRequest request = findMotion("", "squat").makeRequest();
   const MotionRecord record = directory.readTrajectory();
