@@ -123,8 +123,8 @@ void BielleWorld::reset(ConstVectorRef q, ConstVectorRef v) {
 
 void BielleWorld::setTorques(ConstVectorRef u) {
   for (int m = 0; m < model_.nu(); ++m) {
-    const double limit = model_.motors()[m].effort_limit;
-    u_[m] = std::clamp(u[m], -limit, limit);
+    const Motor& motor = model_.motors()[m];
+    u_[m] = motor.clampEffort(u[m], tree_.getVelocity()[motor.dof]);
   }
   calcMotorForces(model_, u_, tau_);
 }

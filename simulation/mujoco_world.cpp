@@ -106,8 +106,8 @@ void MujocoWorld::reset(ConstVectorRef q, ConstVectorRef v) {
 
 void MujocoWorld::setTorques(ConstVectorRef u) {
   for (int m = 0; m < model_.nu(); ++m) {
-    const double limit = model_.motors()[m].effort_limit;
-    u_[m] = data_->ctrl[m] = std::clamp(u[m], -limit, limit);
+    const Motor& motor = model_.motors()[m];
+    u_[m] = data_->ctrl[m] = motor.clampEffort(u[m], v_[motor.dof]);
   }
 }
 

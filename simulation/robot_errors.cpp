@@ -52,8 +52,7 @@ Model rebuild(const Model& model, const std::vector<Inertia>& inertias, const st
     closure.X_B1.p += shifts[c];
     builder.copyClosure(model, closure);
   }
-  for (const Motor& motor : model.motors())
-    builder.addMotor(motor.name, motor.armature, motor.effort_limit, motor.velocity_limit, motor.torque_loss);
+  for (const Motor& motor : model.motors()) builder.addMotor(motor);
   for (const JointForce& force : model.jointForces()) builder.addJointForce(model.joints()[force.joint].name, force);
   for (const ContactFrame& contact : model.contacts())
     builder.addContact(contact.name, addFrame(contact.name + "|contact", contact.body, contact.X_BF), contact.kind,

@@ -247,8 +247,8 @@ void SimbodyWorld::reset(ConstVectorRef q, ConstVectorRef v) {
 
 void SimbodyWorld::setTorques(ConstVectorRef u) {
   for (int m = 0; m < model_.nu(); ++m) {
-    const double limit = model_.motors()[m].effort_limit;
-    forces_->u[m] = std::clamp(u[m], -limit, limit);
+    const Motor& motor = model_.motors()[m];
+    forces_->u[m] = motor.clampEffort(u[m], v_[motor.dof]);
   }
   changed_ = true;
 }

@@ -390,6 +390,41 @@ TEST_CASE("a robot of MuJoCo becomes one of ours and stays the same") {
   }
 }
 
+TEST_CASE("windings and gears of motors go out and come in again, and other formats tell that they are lost") {
+  ModelParts parts = takeParts(loadRobot("bipetto").model);
+  Motor &first = parts.motors[0], &second = parts.motors[3];
+  first.drive = {"", 9, 5.79e-5, 0.095, 0.16, 48, 28, 12, 0.9, 0.8, 0.49};
+  first.torque_loss = 0.123456789012;
+  first.continuous_effort = 7;
+  second.drive.efficiency = 0.7;
+  const Model a = ModelBuilder::restore(parts);
+  const RobotDirectory directory;
+  const RobotText text = formatRobot(a);
+  const Model b = loadRobot(directory.writeRobot(text.urdf, text.yaml)).model;
+  for (int m : {0, 3, 4}) {
+    const Motor &before = a.motors()[m], &after = b.motors()[m];
+    const MotorDrive &x = before.drive, &y = after.drive;
+    CAPTURE(before.name);
+    CHECK(x.isGiven() == y.isGiven());
+    for (auto field :
+         {&MotorDrive::ratio, &MotorDrive::rotor_inertia, &MotorDrive::torque_constant, &MotorDrive::resistance,
+          &MotorDrive::voltage, &MotorDrive::current, &MotorDrive::continuous_current, &MotorDrive::efficiency,
+          &MotorDrive::back_efficiency, &MotorDrive::mass})
+      CHECK(areSame(x.*field, y.*field));
+    CHECK(before.torque_loss.has_value() == after.torque_loss.has_value());
+    CHECK(areSame(before.getTorqueLoss(), after.getTorqueLoss()));
+    CHECK(areSame(before.continuous_effort, after.continuous_effort));
+    CHECK(after.armature == before.armature);
+  }
+  // Written again it is the same file: what follows from the drive is now given.
+  CHECK(formatRobot(b).yaml == formatRobot(loadRobot(directory.writeRobot(text.urdf, formatRobot(b).yaml)).model).yaml);
+  using Catch::Contains;
+  std::string warnings;
+  for (const std::string& warning : formatMjcf(a, write(a).q_ref).warnings) warnings += warning + "\n";
+  CHECK_THAT(warnings, Contains("motor '" + first.name + "': its winding and gear") &&
+                           Contains("motor '" + second.name + "': its winding and gear"));
+}
+
 TEST_CASE("a URDF alone is the tree with its mimics, friction and limits, and tells what it lost") {
   ModelBuilder builder("gripper");
   const Inertia inertia = {1, Vector3d(0, 0, 0.1), 0.01 * Matrix3d::Identity()};

@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/model/builder.h"
 #include "bielle/motion/objective.h"
 #include "bielle/ocp/robot_problem.h"
 #include "check_derivative.h"
@@ -130,6 +131,136 @@ TEST_CASE("energy: derivatives by states, torques and durations, every joint kin
           checkStage(problem, k, x, u, rng);
         }
       }
+}
+
+namespace {
+
+// The model with windings behind lossy gears.
+Model addDrives(const Model& model) {
+  ModelParts parts = takeParts(model);
+  for (size_t m = 0; m < parts.motors.size(); ++m) {
+    MotorDrive& drive = parts.motors[m].drive;
+    drive.ratio = 5 + m;
+    drive.torque_constant = 0.1;
+    drive.resistance = 0.3 + 0.1 * m;
+    drive.voltage = 24;
+    drive.efficiency = 0.8;
+    drive.back_efficiency = 0.6;
+    parts.motors[m].torque_loss = 0.2 + 0.1 * m;
+  }
+  return ModelBuilder::restore(std::move(parts));
+}
+
+}  // namespace
+
+TEST_CASE("energy: derivatives of voltages, and of powers behind lossy gears, in every discretization") {
+  const Discretization how = GENERATE(from_range(listDiscretizations()));
+  std::mt19937 rng(18);
+  for (JointKind kind : kJointKinds) {
+    CAPTURE(how, getName(kind));
+    const Mechanism mechanism = makeRandomMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::Fixed, 3, 2);
+    const Model model = addDrives(mechanism.model);
+    const int nu = model.nu();
+    REQUIRE(nu > 0);
+    std::vector<int> motors;
+    for (int m = nu; m-- > 0;) motors.push_back(m);
+    Workspace ws(model);
+    const VectorXd& q = mechanism.q_closed;
+    const VectorXd v = projectVelocity(model, ws, makeConstraintSet(model), q, randomVector(rng, model.nv()));
+    std::vector<StageSpec> stages(2);
+    StageSpec& stage = stages[0];
+    stage.step = how.step;
+    stage.dt = kStep;
+    if (how.free) stage.timing = {0, 0.5, 2};
+    stage.constraints = makeConstraintSet(model);
+    stage.costs.push_back({"energy", kWeight, Activation::makeEnergy(VectorXd::Ones(nu), makeLosses(model), 0.3, 4),
+                           makeElectricalPower(model)});
+    const VectorXd bounds = VectorXd::Constant(nu, 24);
+    stage.path_constraints.push_back({"voltage", makeMotorVoltage(model, motors), -bounds, bounds, bounds});
+    const RobotProblem problem(model, q, v, std::move(stages), how.formulation);
+    VectorXd u = randomVector(rng, problem.controlSize(0), 5);
+    if (how.free) u[nu] = 0.8;
+    const VectorXd x = problem.initialState();
+    RobotEvaluator evaluator(problem), moved(problem), next(problem);
+    next.evaluate(1, evaluator.evaluate(0, x, u).x_next);
+    const ConstraintWeights weights{randomVector(rng, nu), VectorXd::Zero(nu)};
+    const auto at = problem.makeEvaluation();
+    const auto scratch = problem.makeScratch();
+    EvaluateTask evaluate{0, &x, &u, nullptr, at.get()};
+    problem.evaluate(&evaluate, 1, scratch.get());
+    StageModel out;
+    out.resize(problem.tangentSize(0), problem.controlSize(0), problem.tangentSize(1));
+    LinearizeTask task{0, at.get(), &next.evaluation(), &weights, &out, StepStatus::Failed, {}};
+    problem.linearize(&task, 1, scratch.get());
+    REQUIRE(task.status == StepStatus::Ok);
+    const Eigen::Index nx = out.lx.size();
+    const MatrixXd J = differentiate(VectorXd::Zero(u.size() + nx), 1e-4, [&](const VectorXd& d) {
+      const VectorXd x1 = d.tail(nx).isZero(0) ? x : evaluator.integrate(d.tail(nx));
+      const RobotEvaluation& to = moved.evaluate(0, x1, u + d.head(u.size()));
+      return VectorXd::Constant(1, to.cost + weights.gradient.dot(to.constraints));
+    });
+    VectorXd gradient(u.size() + nx);
+    gradient << out.lu, out.lx;
+    checkDerivative(gradient.transpose(), J, "gradient");
+    // The voltages are those of the velocities of the evaluation.
+    const auto& here = static_cast<const RobotEvaluation&>(evaluator.evaluation());
+    const VectorXd w = here.v_mid.size() > 0 ? here.v_mid : VectorXd(x.segment(model.nq(), model.nv()));
+    for (int i = 0; i < nu; ++i) {
+      const Motor& motor = model.motors()[motors[i]];
+      const double volts = motor.drive.resistance * u[motors[i]] / (0.8 * motor.drive.ratio * 0.1) +
+                           motor.drive.ratio * 0.1 * w[motor.dof];
+      CHECK(24 * here.constraints[i] == Approx(volts));
+    }
+  }
+}
+
+TEST_CASE("energy: the smoothed power behind a gear is that of the motor, but for what it says") {
+  Motor motor;
+  motor.torque_loss = 0.25;
+  motor.drive.efficiency = 0.8;
+  motor.drive.back_efficiency = 0.6;
+  CHECK(calcElectricalPower(motor, 2, 3, 0) == Approx(6 / 0.8 + 0.25 * 4 / 0.64));
+  CHECK(calcElectricalPower(motor, 4, -3, 0.5) == Approx(0.5 * (-12 * 0.6 + 0.25 * 16 * 0.36)));
+  const Motor ideal;
+  CHECK(calcElectricalPower(ideal, 2, 3, 0) == 6 + kDefaultTorqueLoss * 4);
+  const double gap = (1 / 0.8 - 0.6) / 2 * kGearSmoothing;
+  const Model model = addDrives(makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 0.7).model);
+  const ConstraintSet set;
+  const Workspace ws(model);
+  const auto power = makeElectricalPower(model);
+  for (double u : {-7.0, 0.5, 20.0})
+    for (double w = -10; w <= 10; w += 0.37) {
+      const VectorXd torque = VectorXd::Constant(1, u), speed = VectorXd::Constant(1, w), none;
+      VectorXd r(2);
+      power->calc({model, ws, set, torque, none, 1, &speed}, r);
+      const double p = u * w, loss = *model.motors()[0].torque_loss, c = model.motors()[0].getEffortFactor(p);
+      // Of the sign of p its smoothed one misses at most e^2 / (2 p^2).
+      const double heat = loss * u * u * (1 / 0.64 - 0.36) / 2 * std::min(1.0, kGearSmoothing / (2 * p * p));
+      CHECK(r[0] <= c * p + loss * c * c * u * u + heat + 1e-12);
+      CHECK(r[0] >= c * p + loss * c * c * u * u - gap - heat - 1e-12);
+    }
+}
+
+TEST_CASE("energy: torques that a motor can give at a speed") {
+  Motor motor;
+  motor.effort_limit = 10;
+  motor.drive.ratio = 9;
+  motor.drive.torque_constant = 0.1;
+  motor.drive.resistance = 0.2;
+  motor.drive.efficiency = 0.8;
+  motor.drive.voltage = 24;
+  const double stall = 24 * 0.8 * 0.9 / 0.2, fastest = 24 / 0.9;
+  for (double w : {-30.0, -24.0, -3.0, 0.0, 1.0, 22.0, 26.0, 27.0, 60.0})
+    for (double u : {-200.0, -9.0, 0.0, 3.0, 200.0}) {
+      const double given = motor.clampEffort(u, w), upper = std::clamp(stall * (1 - w / fastest), -10.0, 10.0),
+                   lower = std::clamp(-stall * (1 + w / fastest), -10.0, 10.0);
+      CAPTURE(w, u, lower, upper);
+      CHECK(given == Approx(std::clamp(u, lower, upper)));
+      if (std::abs(w) < fastest) CHECK(std::abs(motor.getVoltsPerEffort() * given + 0.9 * w) <= 24 + 1e-12);
+    }
+  motor.drive = {};
+  CHECK(motor.clampEffort(-200, 60) == -10);
+  CHECK(motor.clampEffort(3, 60) == 3);
 }
 
 TEST_CASE("energy: the smoothed cost exceeds the exact one by no more than it says") {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <regex>
 
+#include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/jump.h"
@@ -223,4 +224,65 @@ TEST_CASE("costs: bounds of a barrier that do not have the size of its residual 
   expectRefusal([](Activation& a) { a.lower.conservativeResize(2); });
   expectRefusal([](Activation& a) { a.upper.resize(0); });
   expectRefusal([](Activation& a) { a.weights.conservativeResize(5); });
+}
+
+namespace {
+
+// Bipetto with the same motor at all joints.
+Model makeDriven(const MotorDrive& drive) {
+  ModelParts parts = takeParts(getBipetto());
+  for (Motor& motor : parts.motors) motor.drive = drive;
+  return ModelBuilder::restore(std::move(parts));
+}
+
+// Largest voltage over that of the supply, exact MotorDrive Eq. (1), from torques and the speeds of the same instant.
+double calcVoltageUse(const Motion& motion) {
+  const Model& model = motion.problem->model();
+  RobotEvaluator evaluator(*motion.problem);
+  double largest = 0;
+  for (int k = 0; k < motion.problem->numStages(); ++k) {
+    const RobotEvaluation& at = evaluator.evaluate(k, motion.guess.xs[k], motion.guess.us[k]);
+    for (int m = 0; m < model.nu(); ++m) {
+      const MotorDrive& drive = model.motors()[m].drive;
+      const double w = at.v_mid.size() > 0 ? at.v_mid[model.motors()[m].dof] : at.x[model.nq() + model.motors()[m].dof];
+      const double c = at.u[m] * w < 0 ? drive.back_efficiency : 1 / drive.efficiency,
+                   k_t = drive.ratio * drive.torque_constant;
+      largest = std::max(largest, std::abs(drive.resistance * c * at.u[m] / k_t + k_t * w) / drive.voltage);
+    }
+  }
+  return largest;
+}
+
+}  // namespace
+
+TEST_CASE("limits: motors keep to the voltage of their supply, and use it") {
+  SquatOptions options;
+  options.duration = 1.2;
+  MotorDrive drive;
+  drive.ratio = 9;
+  drive.torque_constant = 0.1;
+  drive.resistance = 0.05;  // little, so that what counts is speed: torques that hold the robot cannot be less
+  drive.voltage = 1e3;
+  drive.efficiency = 0.9;
+  drive.back_efficiency = 0.8;
+  const Model plenty = makeDriven(drive);
+  Motion free = makeSquat(plenty, options);
+  const FddpSummary without = solve(free);
+  REQUIRE(without.termination == FddpTermination::Converged);
+  drive.voltage = 0.8 * 1e3 * calcVoltageUse(free);
+  const Model tight = makeDriven(drive);
+  for (Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
+    CAPTURE(getName(formulation), drive.voltage);
+    Motion limited = makeSquat(tight, options, {formulation, {}});
+    const FddpSummary with = solve(limited);
+    CHECK(with.termination == FddpTermination::Converged);
+    CHECK(with.cost > without.cost);
+    CHECK(calcVoltageUse(limited) <= 1 + 1e-7);
+    CHECK(calcVoltageUse(limited) > 0.99);
+    LimitOptions none;
+    none.enforced = false;
+    Motion again = makeSquat(tight, options, {formulation, none});
+    CHECK(solve(again).termination == FddpTermination::Converged);
+    CHECK(calcVoltageUse(again) > 1.1);
+  }
 }

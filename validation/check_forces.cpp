@@ -74,6 +74,51 @@ void addImpactRows(CheckContext& context) {
   context.add(impulses.cone, "impact: wrench cone of the sole", "m", context.bounds.wrench_cone, nothing);
 }
 
+// c of MotorDrive Eq. (1), by the sign of the power.
+double getCurrentFactor(const Motor& motor, double u, double w) {
+  return u * w < 0 ? motor.drive.back_efficiency : 1 / motor.drive.efficiency;
+}
+
+double getSpeed(const CheckContext& context, int k, const Motor& motor) {
+  const MotionRecord& record = context.motion.record;
+  return record.has_midpoints ? record.v_mid(k, motor.dof) : record.v(k, motor.dof);
+}
+
+// MotorDrive Eq. (1), with the torque and the speed of the same instant.
+LimitUse addVoltages(const CheckContext& context) {
+  LimitUse use;
+  for (int k = 0; k < context.motion.numStages(); ++k) {
+    if (context.motion.isImpact(k)) continue;
+    for (int m = 0; m < context.model().nu(); ++m) {
+      const Motor& motor = context.model().motors()[m];
+      const MotorDrive& drive = motor.drive;
+      if (!motor.hasEnvelope()) continue;
+      const double u = context.motion.record.u(k, m), w = getSpeed(context, k, motor),
+                   current = getCurrentFactor(motor, u, w) * u / (drive.ratio * drive.torque_constant);
+      use.add(drive.resistance * current + drive.ratio * drive.torque_constant * w, drive.voltage, "V", k, motor.name);
+    }
+  }
+  return use;
+}
+
+// Of the motion, were it repeated for ever.
+LimitUse addHeat(const CheckContext& context) {
+  const MotionRecord& record = context.motion.record;
+  const int stages = context.motion.numStages();
+  LimitUse use;
+  for (int m = 0; m < context.model().nu(); ++m) {
+    const Motor& motor = context.model().motors()[m];
+    double sum = 0;
+    for (int k = 0; k < stages; ++k) {
+      const double u = record.u(k, m), c = getCurrentFactor(motor, u, getSpeed(context, k, motor));
+      sum += (record.time[k + 1] - record.time[k]) * std::pow(c * u, 2);
+    }
+    use.add(std::sqrt(sum / (record.time[stages] - record.time[0])), motor.continuous_effort, "N m rms", stages,
+            motor.name);
+  }
+  return use;
+}
+
 }  // namespace
 
 void addForceRows(CheckContext& context) {
@@ -126,6 +171,7 @@ void addLimitRows(CheckContext& context) {
         effort.add(record.u(k, m), motor.effort_limit, slides ? "N" : "N m", k, motor.name);
       velocity.add(record.v(k, motor.dof), motor.velocity_limit, slides ? "m/s" : "rad/s", k, motor.name);
     }
+  const LimitUse voltage = addVoltages(context), heat = addHeat(context);
   LimitUse speed;  // of joints without a motor
   for (int k = 0; k <= context.motion.numStages(); ++k)
     for (int i = 1; i < model.numBodies(); ++i)
@@ -138,6 +184,8 @@ void addLimitRows(CheckContext& context) {
   context.add(speed.worst(), "joints: velocity over limit", "1", 1, "no limits given");
   context.add(effort.worst(), "motors: effort over limit", "1", 1, "no limits given");
   context.add(velocity.worst(), "motors: velocity over limit", "1", 1, "no limits given");
+  context.add(voltage.worst(), "motors: voltage over supply", "1", context.bounds.voltage, "no windings given");
+  context.add(heat.worst(), "motors: rms torque over thermal", "1", 1, "no thermal limits given");
 }
 
 }  // namespace bielle::validation

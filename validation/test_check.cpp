@@ -231,6 +231,43 @@ TEST_CASE("check: limits of joints and motors, and soles that overlap") {
         Names{"distance of the soles"});
 }
 
+TEST_CASE("check: voltages and heat of motors, where their windings are known") {
+  CheckedMotion motion = getMidpointSquat().checked;
+  const char *voltage = "motors: voltage over supply", *heat = "motors: rms torque over thermal";
+  const CheckReport without = checkMotion(motion);
+  CHECK_FALSE(without.findRow(voltage)->value);
+  CHECK_FALSE(without.findRow(heat)->value);
+  const int m = motion.model.findMotor("motor_knee_left"), dof = motion.model.motors()[m].dof;
+  ModelParts parts = takeParts(motion.model);
+  Motor& motor = parts.motors[m];
+  motor.drive.ratio = 9;
+  motor.drive.torque_constant = 0.1;
+  motor.drive.resistance = 0.5;
+  motor.drive.efficiency = 0.9;
+  motor.drive.back_efficiency = 0.8;
+  double largest = 0, heats = 0, time = 0;
+  for (int k = 0; k < motion.numStages(); ++k) {
+    const double u = motion.record.u(k, m), w = motion.record.v_mid(k, dof), c = u * w < 0 ? 0.8 : 1 / 0.9;
+    const double h = motion.record.time[k + 1] - motion.record.time[k];
+    largest = std::max(largest, std::abs(0.5 * c * u / 0.9 + 0.9 * w));
+    heats += h * c * u * c * u;
+    time += h;
+  }
+  const auto check = [&](double volts, double continuous) {
+    motor.drive.voltage = volts;
+    motor.continuous_effort = continuous;
+    motion.model = ModelBuilder::restore(parts);
+    return checkMotion(motion);
+  };
+  const double rms = std::sqrt(heats / time);
+  const CheckReport good = check(largest, (1 + 1e-9) * rms);
+  CHECK(getFailures(good) == Names());
+  CHECK(getValue(good, voltage) == Approx(1));
+  CHECK(getValue(good, heat) == Approx(1));
+  CHECK(getFailures(check(0.999 * largest, 1.001 * rms)) == Names{voltage});
+  CHECK(getFailures(check(1.001 * largest, 0.999 * rms)) == Names{heat});
+}
+
 TEST_CASE("check: files that are missing, broken or of another robot are refused") {
   const RobotDirectory directory;
   const auto refuse = [&directory](const std::string& what) {

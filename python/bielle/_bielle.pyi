@@ -435,13 +435,66 @@ class LoopCluster:
         """sum of their scalar constraints"""
         ...
 
+class MotorDrive:
+    """Winding and gear of a motor; without torque_constant the winding is not known.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, type: str = ..., ratio: float = ..., rotor_inertia: float = ..., torque_constant: float = ..., resistance: float = ..., voltage: float = ..., current: float = ..., continuous_current: float = ..., efficiency: float = ..., back_efficiency: float = ..., mass: float = ...) -> None: ...
+    def replace(self, *, type: str = ..., ratio: float = ..., rotor_inertia: float = ..., torque_constant: float = ..., resistance: float = ..., voltage: float = ..., current: float = ..., continuous_current: float = ..., efficiency: float = ..., back_efficiency: float = ..., mass: float = ...) -> MotorDrive: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def type(self) -> str:
+        """name in a catalogue, or empty"""
+        ...
+    @property
+    def ratio(self) -> float:
+        """turns of the rotor per turn of the joint; rad/m of a prismatic joint"""
+        ...
+    @property
+    def rotor_inertia(self) -> float:
+        """kg m^2"""
+        ...
+    @property
+    def torque_constant(self) -> float:
+        """N m/A"""
+        ...
+    @property
+    def resistance(self) -> float:
+        """between two terminals, ohm"""
+        ...
+    @property
+    def voltage(self) -> float:
+        """of the supply, V"""
+        ...
+    @property
+    def current(self) -> float:
+        """most, A"""
+        ...
+    @property
+    def continuous_current(self) -> float:
+        """that the winding bears for ever, A"""
+        ...
+    @property
+    def efficiency(self) -> float:
+        """of the gear while the motor drives"""
+        ...
+    @property
+    def back_efficiency(self) -> float:
+        """of the gear while the joint drives the motor"""
+        ...
+    @property
+    def mass(self) -> float:
+        """kg; 0: not known"""
+        ...
+
 class Motor:
     """An actuator on one dof.
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, name: str = ..., joint: int = ..., dof: int = ..., armature: float = ..., effort_limit: float = ..., velocity_limit: float = ..., torque_loss: Optional[float] = ...) -> None: ...
-    def replace(self, *, name: str = ..., joint: int = ..., dof: int = ..., armature: float = ..., effort_limit: float = ..., velocity_limit: float = ..., torque_loss: Optional[float] = ...) -> Motor: ...
+    def __init__(self, name: str = ..., joint: int = ..., dof: int = ..., armature: float = ..., effort_limit: float = ..., velocity_limit: float = ..., torque_loss: Optional[float] = ..., continuous_effort: float = ..., drive: MotorDrive = ...) -> None: ...
+    def replace(self, *, name: str = ..., joint: int = ..., dof: int = ..., armature: float = ..., effort_limit: float = ..., velocity_limit: float = ..., torque_loss: Optional[float] = ..., continuous_effort: float = ..., drive: MotorDrive = ...) -> Motor: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def name(self) -> str:
@@ -470,6 +523,14 @@ class Motor:
     @property
     def torque_loss(self) -> Optional[float]:
         """heat per torque squared, W/(N m)^2 or W/N^2; None: not known"""
+        ...
+    @property
+    def continuous_effort(self) -> float:
+        """root mean square that it bears for ever, N m or N"""
+        ...
+    @property
+    def drive(self) -> MotorDrive:
+        """winding and gear"""
         ...
 
 class ContactFrame:
@@ -2434,8 +2495,8 @@ class Result:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., requested: Mapping[str, float] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ...) -> None: ...
-    def replace(self, *, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., requested: Mapping[str, float] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ...) -> Result: ...
+    def __init__(self, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., requested: Mapping[str, float] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., rms_torques: Mapping[str, float] = ..., continuous_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ...) -> None: ...
+    def replace(self, *, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., requested: Mapping[str, float] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., rms_torques: Mapping[str, float] = ..., continuous_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ...) -> Result: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def run(self) -> RunInfo:
@@ -2484,6 +2545,14 @@ class Result:
     @property
     def peak_torques(self) -> Dict[str, float]:
         """largest |u| by motor, largest first, N m or N"""
+        ...
+    @property
+    def rms_torques(self) -> Dict[str, float]:
+        """root mean square torque of the motor by motor, N m or N"""
+        ...
+    @property
+    def continuous_torques(self) -> Dict[str, float]:
+        """that motors bear for ever, where known, N m or N"""
         ...
     @property
     def objective(self) -> ObjectiveOptions:
@@ -3250,6 +3319,10 @@ class _residuals:
     @staticmethod
     def motor_power(model: Model, motors: Sequence[int]) -> LibraryResidual:
         """Mechanical power of motors (n,), W; on steps alone."""
+        ...
+    @staticmethod
+    def motor_voltage(model: Model, motors: Sequence[int]) -> LibraryResidual:
+        """Voltages of motors with a winding and a supply (n,), V; on steps alone."""
         ...
     @staticmethod
     def electrical_power(model: Model, losses: ArrayLike) -> LibraryResidual:

@@ -22,6 +22,7 @@ frame_velocity = _residuals.frame_velocity
 joint_position = _residuals.joint_position
 joint_velocity = _residuals.joint_velocity
 motor_power = _residuals.motor_power
+motor_voltage = _residuals.motor_voltage
 sole_clearance = _residuals.sole_clearance
 wrench_cone = _residuals.wrench_cone
 

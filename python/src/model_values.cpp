@@ -100,6 +100,19 @@ void bindConstraints(py::module_& module) {
       .field("closures", &LoopCluster::closures, "indices")
       .field("dofs", &LoopCluster::dofs, "union of their dofs, increasing")
       .field("rows", &LoopCluster::rows, "sum of their scalar constraints");
+  Value<MotorDrive>(module, "MotorDrive",
+                    "Winding and gear of a motor; without torque_constant the winding is not known.")
+      .field("type", &MotorDrive::type, "name in a catalogue, or empty")
+      .field("ratio", &MotorDrive::ratio, "turns of the rotor per turn of the joint; rad/m of a prismatic joint")
+      .field("rotor_inertia", &MotorDrive::rotor_inertia, "kg m^2")
+      .field("torque_constant", &MotorDrive::torque_constant, "N m/A")
+      .field("resistance", &MotorDrive::resistance, "between two terminals, ohm")
+      .field("voltage", &MotorDrive::voltage, "of the supply, V")
+      .field("current", &MotorDrive::current, "most, A")
+      .field("continuous_current", &MotorDrive::continuous_current, "that the winding bears for ever, A")
+      .field("efficiency", &MotorDrive::efficiency, "of the gear while the motor drives")
+      .field("back_efficiency", &MotorDrive::back_efficiency, "of the gear while the joint drives the motor")
+      .field("mass", &MotorDrive::mass, "kg; 0: not known");
   Value<Motor>(module, "Motor", "An actuator on one dof.")
       .field("name", &Motor::name, "that of its joint")
       .field("joint", &Motor::joint, "index")
@@ -107,7 +120,9 @@ void bindConstraints(py::module_& module) {
       .field("armature", &Motor::armature, "rotor inertia seen at the joint, kg m^2 (kg for a prismatic joint)")
       .field("effort_limit", &Motor::effort_limit, "N m or N")
       .field("velocity_limit", &Motor::velocity_limit, "rad/s or m/s")
-      .field("torque_loss", &Motor::torque_loss, "heat per torque squared, W/(N m)^2 or W/N^2; None: not known");
+      .field("torque_loss", &Motor::torque_loss, "heat per torque squared, W/(N m)^2 or W/N^2; None: not known")
+      .field("continuous_effort", &Motor::continuous_effort, "root mean square that it bears for ever, N m or N")
+      .field("drive", &Motor::drive, "winding and gear");
   Value<ContactFrame>(module, "ContactFrame",
                       "A frame of a body that may touch the ground, z along its outward normal.")
       .field("name", &ContactFrame::name, "unique")

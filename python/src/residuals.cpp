@@ -204,6 +204,12 @@ void bindJointResiduals(py::module_& m) {
       },
       py::arg("model"), py::arg("motors"), "Mechanical power of motors (n,), W; on steps alone.");
   def(
+      m, "motor_voltage",
+      +[](SharedModel model, const std::vector<int>& motors) -> Made {
+        return makeMotorVoltage(*model, requireIndices(motors, model->nu(), "motor"));
+      },
+      py::arg("model"), py::arg("motors"), "Voltages of motors with a winding and a supply (n,), V; on steps alone.");
+  def(
       m, "electrical_power",
       +[](SharedModel model, Object losses) -> Made {
         return makeElectricalPower(readVector(losses, model->nu(), "losses"));

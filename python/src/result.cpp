@@ -68,6 +68,9 @@ void bindResult(py::module_& module) {
       .field("solver", &MotionResult::solver, "Summary")
       .field("record", &MotionResult::record, "Record: all numbers, node by node")
       .field("peak_torques", &MotionResult::peak_torques, "largest |u| by motor, largest first, N m or N")
+      .field("rms_torques", &MotionResult::rms_torques, "root mean square torque of the motor by motor, N m or N")
+      .field("continuous_torques", &MotionResult::continuous_torques,
+             "that motors bear for ever, where known, N m or N")
       .field("objective", &MotionResult::objective, "ObjectiveOptions")
       .field("energy", &MotionResult::energy, "ElectricalEnergy")
       .field("gap_position", &MotionResult::gap_position, "largest closing error, m")

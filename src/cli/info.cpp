@@ -34,6 +34,8 @@ void printInfo(const Json& robot) {
                {"name", "kind", "frame1", "frame2", "rows", "loop_dofs"});
   printSection(robot, "clusters", "clusters of closures", {"closures", "rows", "dofs"});
   printSection(robot, "motors", "motors", {"name", "armature", "effort_limit", "velocity_limit"});
+  printSection(robot, "drives", "windings and gears of motors (N m/A, ohm, V, A, N m)",
+               {"name", "type", "ratio", "torque_constant", "resistance", "voltage", "current", "continuous_effort"});
   printSection(robot, "contacts", "contacts (length and width in m)", {"name", "kind", "body", "sole"});
   printSection(robot, "references", "references", {"name", "closed", "message"});
 }

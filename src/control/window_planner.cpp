@@ -165,8 +165,8 @@ int WindowPlanner::chooseNext(const Request& request, Solution& solution) {
 bool WindowPlanner::predict(const Request& request, Solution& solution) {
   const int node = horizon_->getNode(request.stage);
   for (int m = 0; m < model_.nu(); ++m) {
-    const double limit = model_.motors()[m].effort_limit;
-    u_[m] = std::clamp(request.u[m], -limit, limit);
+    const Motor& motor = model_.motors()[m];
+    u_[m] = motor.clampEffort(request.u[m], request.measurement.v[motor.dof]);
   }
   measured_.resize(problem_.stateSize());
   measured_ << request.measurement.q, request.measurement.v;

@@ -119,8 +119,7 @@ Model RobotDraft::build() const {
     builder.addClosure(c.name, c.kind, place(c.name + "/frame1", c.body1, c.X_B1),
                        place(c.name + "/frame2", c.body2, c.X_B2), c.axis, c.kp, c.kd);
   }
-  for (const Motor& motor : m.motors())
-    builder.addMotor(motor.name, motor.armature, motor.effort_limit, motor.velocity_limit, motor.torque_loss);
+  for (const Motor& motor : m.motors()) builder.addMotor(motor);
   for (const Joint& joint : m.joints())
     if (joint.nv > 0 && m.findMotor(joint.name) < 0) builder.setArmature(joint.name, m.armature()[joint.idx_v]);
   for (const JointForce& force : m.jointForces()) builder.addJointForce(m.joints()[force.joint].name, force);

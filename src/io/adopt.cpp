@@ -6,6 +6,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/io/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 
@@ -124,7 +125,8 @@ class Adopter {
       guessed |= motor.armature == 0;
       const auto limit = [&](double value) { return is_weak || std::isinf(value) ? ".inf" : format(value); };
       lines << "  " << quote(motor.name) << ": {armature: " << format(motor.armature > 0 ? motor.armature : kRotor)
-            << ", effort: " << limit(motor.effort_limit) << ", velocity: " << limit(motor.velocity_limit) << "}\n";
+            << ", effort: " << limit(motor.effort_limit) << ", velocity: " << limit(motor.velocity_limit)
+            << formatMotorData(motor) << "}\n";
     }
     guess(
         "Motors: those of the robot." +

@@ -379,8 +379,12 @@ class Writer {
     for (const Joint& joint : model_.joints())
       if (joint.position_importance != 1 || joint.velocity_importance != 1)
         warn("joint '" + joint.name + "'", "its importance is left out");
-    for (const Motor& motor : model_.motors())
-      if (motor.torque_loss) warn("motor '" + motor.name + "'", "its torque_loss is left out");
+    for (const Motor& motor : model_.motors()) {
+      if (motor.drive.isGiven() || std::isfinite(motor.continuous_effort))
+        warn("motor '" + motor.name + "'", "its winding and gear are left out");
+      else if (motor.torque_loss)
+        warn("motor '" + motor.name + "'", "its torque_loss is left out");
+    }
     if (!speeds.empty()) warn("joints " + speeds, "their limits of speed are left out");
     for (const std::string& mesh : meshes_) meshes += (meshes.empty() ? "'" : ", '") + mesh + "'";
     if (!meshes.empty()) warn("meshes " + meshes, "they are left out");

@@ -166,6 +166,8 @@ Json makeSummary(const MotionResult& result) {
           {"contact_slip", {{"position_m", result.slip_position}, {"angle_rad", result.slip_angle}}},
           {"com_height", {{"start_m", result.com_start}, {"lowest_m", result.com_lowest}}},
           {"peak_torques", listByName(result.peak_torques)},
+          {"rms_torques", listByName(result.rms_torques)},
+          {"continuous_torques", listByName(result.continuous_torques)},
           {"objective",
            {{"kind", getName(result.objective.objective)},
             {"regularization", result.objective.getRegularization()},
@@ -207,6 +209,15 @@ void setFigures(const Model& model, MotionResult& result) {
     result.peak_torques.emplace_back(record.u_names[m], record.u.rows() ? record.u.col(m).cwiseAbs().maxCoeff() : 0);
   std::stable_sort(result.peak_torques.begin(), result.peak_torques.end(),
                    [](const auto& a, const auto& b) { return a.second > b.second; });
+  const VectorXd rms = calcRmsEfforts(model, record);
+  result.rms_torques.clear();
+  result.continuous_torques.clear();
+  for (int m = 0; m < model.nu(); ++m) {
+    const Motor& motor = model.motors()[m];
+    result.rms_torques.emplace_back(motor.name, rms[m]);
+    if (std::isfinite(motor.continuous_effort))
+      result.continuous_torques.emplace_back(motor.name, motor.continuous_effort);
+  }
   result.energy = calcElectricalEnergy(model, record, result.objective.regeneration);
   result.gap_position = record.gap.col(0).maxCoeff();
   result.gap_angle = record.gap.col(1).maxCoeff();

@@ -88,6 +88,23 @@ Json describeMobility(const Model& model, const std::vector<Posture>& postures) 
           {"mobility", mobility.mobility}};
 }
 
+Json describeDrive(const Motor& motor) {
+  const MotorDrive& drive = motor.drive;
+  return {{"name", motor.name},
+          {"type", drive.type},
+          {"ratio", drive.ratio},
+          {"rotor_inertia", drive.rotor_inertia},
+          {"torque_constant", drive.torque_constant},
+          {"resistance", drive.resistance},
+          {"voltage", orNull(drive.voltage)},
+          {"current", orNull(drive.current)},
+          {"continuous_current", orNull(drive.continuous_current)},
+          {"continuous_effort", orNull(motor.continuous_effort)},
+          {"efficiency", drive.efficiency},
+          {"back_efficiency", drive.back_efficiency},
+          {"mass", drive.mass}};
+}
+
 }  // namespace
 
 std::string makeRobotInfo(const LoadedRobot& robot) {
@@ -106,6 +123,7 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
                {"closures", describeClosures(model, postures)},
                {"clusters", Json::array()},
                {"motors", Json::array()},
+               {"drives", Json::array()},
                {"contacts", Json::array()},
                {"references", Json::array()},
                {"warnings", robot.warnings}};
@@ -129,6 +147,8 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
                               {"effort_limit", orNull(motor.effort_limit)},
                               {"velocity_limit", orNull(motor.velocity_limit)},
                               {"torque_loss", motor.torque_loss ? Json(*motor.torque_loss) : Json()}});
+  for (const Motor& motor : model.motors())
+    if (motor.drive.isGiven() || std::isfinite(motor.continuous_effort)) json["drives"].push_back(describeDrive(motor));
   for (const ContactFrame& contact : model.contacts())
     json["contacts"].push_back({{"name", contact.name},
                                 {"kind", contact.kind == ContactKind::Surface6D ? "6d" : "3d"},

@@ -253,6 +253,9 @@ class Writer {
         armatures += (armatures.empty() ? "'" : ", '") + joint.name + "'";
     if (!armatures.empty()) warn("joints " + armatures, "their armature is left out");
     if (!model_.motors().empty()) warn("motors", "which joints they drive is left out");
+    for (const Motor& motor : model_.motors())
+      if (motor.drive.isGiven() || std::isfinite(motor.continuous_effort))
+        warn("motor '" + motor.name + "'", "its winding and gear are left out");
     for (const ContactFrame& c : model_.contacts()) warn("contact '" + c.name + "'", "it is left out");
     for (const Reference& reference : model_.references()) warn("reference '" + reference.name + "'", "it is left out");
     if (!model_.serialJoints().empty()) warn("serial joints", "they are left out");
@@ -338,8 +341,7 @@ class Writer {
       out << "  " << quote(motor.name) << ": {armature: " << formatNumber(motor.armature);
       if (std::isfinite(motor.effort_limit)) out << ", effort: " << formatNumber(motor.effort_limit);
       if (std::isfinite(motor.velocity_limit)) out << ", velocity: " << formatNumber(motor.velocity_limit);
-      if (motor.torque_loss) out << ", torque_loss: " << formatNumber(*motor.torque_loss);
-      out << "}\n";
+      out << formatMotorData(motor) << "}\n";
     }
     std::string others;
     for (int i = 1; i < model_.numBodies(); ++i) {
@@ -423,6 +425,27 @@ class Writer {
 RobotText formatRobot(const Model& model, const std::string& remark) {
   Writer writer(model);
   return {writer.formatUrdf(remark), writer.formatYaml(remark)};
+}
+
+std::string formatMotorData(const Motor& motor) {
+  std::string text;
+  const auto add = [&text](const char* key, double value, double unless) {
+    if (value != unless) text += std::string(", ") + key + ": " + formatNumber(value);
+  };
+  if (motor.torque_loss) text += ", torque_loss: " + formatNumber(*motor.torque_loss);
+  add("continuous_effort", motor.continuous_effort, HUGE_VAL);
+  const MotorDrive &drive = motor.drive, ideal;
+  add("ratio", drive.ratio, ideal.ratio);
+  add("rotor_inertia", drive.rotor_inertia, ideal.rotor_inertia);
+  add("torque_constant", drive.torque_constant, ideal.torque_constant);
+  add("resistance", drive.resistance, ideal.resistance);
+  add("voltage", drive.voltage, ideal.voltage);
+  add("current", drive.current, ideal.current);
+  add("continuous_current", drive.continuous_current, ideal.continuous_current);
+  add("efficiency", drive.efficiency, ideal.efficiency);
+  add("back_efficiency", drive.back_efficiency, ideal.back_efficiency);
+  add("mass", drive.mass, ideal.mass);
+  return text;
 }
 
 UrdfText formatUrdf(const Model& model) { return Writer(model).formatUrdfAlone(); }

@@ -93,21 +93,56 @@ void ModelBuilder::addFrame(const std::string& name, const std::string& link, co
 
 void ModelBuilder::addMotor(const std::string& joint, double armature, double effort_limit, double velocity_limit,
                             std::optional<double> torque_loss) {
-  const std::string element = "motor '" + joint + "'";
-  const int index = model_.findJoint(joint);
-  if (index < 0) fail(element, "there is no moving joint of this name", "name a joint of the robot that is not fixed");
-  const Joint& j = model_.joints_[index];
+  addMotor({joint, 0, 0, armature, effort_limit, velocity_limit, torque_loss});
+}
+
+void ModelBuilder::addMotor(Motor motor) {
+  const std::string element = "motor '" + motor.name + "'";
+  motor.joint = model_.findJoint(motor.name);
+  if (motor.joint < 0)
+    fail(element, "there is no moving joint of this name", "name a joint of the robot that is not fixed");
+  const Joint& j = model_.joints_[motor.joint];
   if (j.nv != 1)
     fail(element, "it is on a " + std::string(getName(j.kind)) + " joint of " + std::to_string(j.nv) + " coordinates",
          "motors drive revolute, continuous or prismatic joints");
-  if (model_.findMotor(joint) >= 0) fail(element, "the joint has two motors", "list it once");
-  if (!(armature >= 0) || std::isinf(armature))
+  motor.dof = j.idx_v;
+  if (model_.findMotor(motor.name) >= 0) fail(element, "the joint has two motors", "list it once");
+  if (!(motor.armature >= 0) || std::isinf(motor.armature))
     fail(element, "its armature is not a finite number of 0 or more", "give a rotor inertia");
-  if (!(effort_limit > 0)) fail(element, "its effort limit is not positive", "give a positive limit or none");
-  if (!(velocity_limit > 0)) fail(element, "its velocity limit is not positive", "give a positive limit or none");
-  if (torque_loss && !(*torque_loss >= 0 && std::isfinite(*torque_loss)))
+  if (!(motor.effort_limit > 0)) fail(element, "its effort limit is not positive", "give a positive limit or none");
+  if (!(motor.velocity_limit > 0)) fail(element, "its velocity limit is not positive", "give a positive limit or none");
+  if (motor.torque_loss && !(*motor.torque_loss >= 0 && std::isfinite(*motor.torque_loss)))
     fail(element, "its torque_loss is not a finite number of 0 or more", "give W/(N m)^2, or leave it out");
-  model_.motors_.push_back({joint, index, j.idx_v, armature, effort_limit, velocity_limit, torque_loss});
+  if (!(motor.continuous_effort > 0))
+    fail(element, "its continuous effort is not positive", "give what it bears for ever, or leave it out");
+  applyDrive(element, motor);
+  model_.motors_.push_back(std::move(motor));
+}
+
+void ModelBuilder::applyDrive(const std::string& element, Motor& motor) const {
+  const MotorDrive& drive = motor.drive;
+  for (double value : {drive.rotor_inertia, drive.torque_constant, drive.resistance, drive.mass})
+    if (!(value >= 0) || std::isinf(value))
+      fail(element, "its rotor_inertia, torque_constant, resistance or mass is not a finite number of 0 or more",
+           "give it in kg m^2, N m/A, ohm or kg, or leave it out");
+  if (!(drive.ratio > 0) || std::isinf(drive.ratio))
+    fail(element, "its ratio is not positive", "give turns of the rotor per turn of the joint");
+  for (double value : {drive.voltage, drive.current, drive.continuous_current})
+    if (!(value > 0)) fail(element, "its voltage or a current is not positive", "give V and A, or leave them out");
+  for (double value : {drive.efficiency, drive.back_efficiency})
+    if (!(value > 0 && value <= 1)) fail(element, "an efficiency is outside 0 .. 1", "give a share, e.g. 0.9");
+  if (motor.armature == 0) motor.armature = drive.ratio * drive.ratio * drive.rotor_inertia;
+  if (!drive.hasWinding()) {
+    if (drive.resistance > 0 || std::isfinite(std::min({drive.voltage, drive.current, drive.continuous_current})))
+      fail(element, "its resistance, voltage or currents mean nothing without its torque constant",
+           "add torque_constant, N m/A");
+    return;
+  }
+  const double torque = drive.ratio * drive.torque_constant;  // of an ampere, N m
+  motor.effort_limit = std::min(motor.effort_limit, drive.efficiency * torque * drive.current);
+  motor.velocity_limit = std::min(motor.velocity_limit, drive.voltage / torque);
+  motor.continuous_effort = std::min(motor.continuous_effort, torque * drive.continuous_current);
+  if (drive.resistance > 0 && !motor.torque_loss) motor.torque_loss = drive.resistance / (torque * torque);
 }
 
 void ModelBuilder::addJointForce(const std::string& joint, JointForce force) {

@@ -1,8 +1,27 @@
 #include "bielle/model/model.h"
 
+#include <algorithm>
+
 #include "model/joint.h"
 
 namespace bielle {
+
+bool MotorDrive::isGiven() const {
+  return !type.empty() || ratio != 1 || rotor_inertia != 0 || hasWinding() || resistance != 0 ||
+         std::isfinite(std::min({voltage, current, continuous_current})) || efficiency != 1 || back_efficiency != 1 ||
+         mass != 0;
+}
+
+double Motor::clampEffort(double u, double w) const {
+  double lower = -effort_limit, upper = effort_limit;
+  if (hasEnvelope() && drive.resistance > 0) {
+    const double induced = getVoltsPerSpeed() * w, per_effort = getVoltsPerEffort();
+    // Beyond the speed at which the induced voltage is that of the supply the motor brakes, whatever is asked.
+    lower = std::clamp((-drive.voltage - induced) / per_effort, -effort_limit, effort_limit);
+    upper = std::clamp((drive.voltage - induced) / per_effort, -effort_limit, effort_limit);
+  }
+  return std::clamp(u, lower, upper);
+}
 namespace {
 
 template <typename Items>

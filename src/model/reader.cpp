@@ -176,11 +176,16 @@ void addMotors(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder
     if (motor.armature && armature.count(motor.joint))
       throw ModelError(yaml.path, "motor '" + motor.joint + "'", "'motors' and 'armature' both give its armature",
                        "keep one of them");
-    const double from_map = armature.count(motor.joint) ? armature[motor.joint] : yaml.motor_armature.value_or(0);
+    const bool armature_of_joint = armature.count(motor.joint) > 0;
+    const double from_map = armature_of_joint ? armature[motor.joint] : yaml.motor_armature.value_or(0);
     armature.erase(motor.joint);
-    builder.addMotor(motor.joint, motor.armature.value_or(from_map),
-                     motor.effort.value_or(found ? joint->effort.value_or(inf) : inf),
-                     motor.velocity.value_or(found ? joint->velocity.value_or(inf) : inf), motor.torque_loss);
+    const MotorDrive& drive = motor.drive;
+    const bool has_rotor = drive.rotor_inertia != 0 && !armature_of_joint;
+    builder.addMotor({motor.joint, 0, 0,
+                      motor.armature.value_or(has_rotor ? drive.ratio * drive.ratio * drive.rotor_inertia : from_map),
+                      motor.effort.value_or(found ? joint->effort.value_or(inf) : inf),
+                      motor.velocity.value_or(found ? joint->velocity.value_or(inf) : inf), motor.torque_loss,
+                      motor.continuous_effort.value_or(inf), drive});
   }
   for (const auto& [joint, value] : armature) builder.setArmature(joint, value);
 }

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "bielle/model/error.h"
+#include "model/motor_catalogue.h"
 #include "model/robot_files.h"
 #include "model/yaml_entry.h"
 
@@ -142,18 +143,9 @@ void readMotors(const Fields& fields, YamlFile& file) {
   const Entry *names = find(fields, "name_mot"), *motors = find(fields, "motors");
   if (motors) {
     if (names) file.warnings.push_back(file.path + ": key 'name_mot': it is ignored, 'motors' lists the motors");
-    for (const auto& [joint, entry] : motors->getMap()) {
-      const Fields f = entry.getFields({"armature", "effort", "velocity", "torque_loss"});
-      MotorSpec motor;
-      motor.joint = joint;
-      if (const Entry* e = find(f, "armature")) motor.armature = e->getNumber();
-      if (const Entry* e = find(f, "effort")) motor.effort = e->getNumber(true);
-      if (const Entry* e = find(f, "velocity")) motor.velocity = e->getNumber(true);
-      if (const Entry* e = find(f, "torque_loss")) motor.torque_loss = e->getNumber();
-      file.motors.push_back(motor);
-    }
+    file.motors = readMotorSpecs(*motors, file.path, find(fields, "motor_catalogue"));
   } else if (names) {
-    for (const std::string& joint : names->getTexts()) file.motors.push_back({joint, {}, {}, {}, {}});
+    for (const std::string& joint : names->getTexts()) file.motors.push_back({joint, {}, {}, {}, {}, {}, {}});
   }
   if (const Entry* armature = find(fields, "armature")) {
     if (!armature->isMap()) {
@@ -236,9 +228,10 @@ BaseKind readBase(const Entry& entry) {
 }
 
 void readRoot(const Entry& root, YamlFile& file) {
-  const Fields fields = root.getFields({"closed_loop", "type", "closure_name", "closures", "name_mot", "motors",
-                                        "armature", "joint_forces", "joint_name", "joint_type", "cross_inertia", "base",
-                                        "contacts", "references", "serial_joints", "importance", "gravity", "model"});
+  const Fields fields =
+      root.getFields({"closed_loop", "type", "closure_name", "closures", "name_mot", "motors", "motor_catalogue",
+                      "armature", "joint_forces", "joint_name", "joint_type", "cross_inertia", "base", "contacts",
+                      "references", "serial_joints", "importance", "gravity", "model"});
   readPublishedClosures(fields, root, file);
   readJointTypes(fields, file);
   if (const Entry* entry = find(fields, "cross_inertia")) file.cross_inertia = readCrossInertia(*entry);

@@ -55,7 +55,8 @@ struct ClosureSpec {
 
 struct MotorSpec {
   std::string joint;
-  std::optional<double> armature, effort, velocity, torque_loss;
+  std::optional<double> armature, effort, velocity, torque_loss, continuous_effort;
+  MotorDrive drive;
 };
 
 struct JointForceSpec {

@@ -84,6 +84,14 @@ std::vector<Bound> listPowers(const Model& model, const LimitOptions& options) {
   return bounds;
 }
 
+std::vector<Bound> listVoltages(const Model& model) {
+  std::vector<Bound> bounds;
+  for (int m = 0; m < model.nu(); ++m)
+    if (const Motor& motor = model.motors()[m]; motor.hasEnvelope())
+      bounds.push_back({"voltage of " + motor.name, m, -motor.drive.voltage, motor.drive.voltage});
+  return bounds;
+}
+
 void addConstraint(const Bound& bound, std::unique_ptr<Residual> residual, StageSpec& stage) {
   const auto make = [](double value) { return VectorXd::Constant(1, value); };
   stage.path_constraints.push_back(
@@ -98,19 +106,22 @@ bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& 
   requireOption(margin >= 0 && margin < 1, "dead_point_margin", "it is outside 0 .. 1", "give a share, e.g. 0.15");
   const VectorXd efforts = getEffortLimits(model, options);
   const std::vector<Bound> ranges = listRanges(model, q0), velocities = listVelocities(model, options),
-                           powers = listPowers(model, options);
+                           powers = listPowers(model, options), voltages = listVoltages(model);
   const std::vector<Transmission> transmissions =
       margin > 0 ? listTransmissions(model, q0) : std::vector<Transmission>();
   for (size_t k = 0; k < stages.size(); ++k) {
     StageSpec& stage = stages[k];
     stage.effort_limits = efforts;
+    const bool step = k + 1 < stages.size() && stage.kind == StageKind::Dynamics;
+    for (size_t i = 0; step && i < voltages.size(); ++i)
+      addConstraint(voltages[i], makeMotorVoltage(model, {voltages[i].index}), stage);
     if (k == 0) continue;
     for (const Bound& bound : ranges) addConstraint(bound, makeJointPosition(model, {bound.index}), stage);
     for (const Bound& bound : velocities) addConstraint(bound, makeJointVelocity({bound.index}), stage);
     for (const Transmission& t : transmissions)
       addConstraint({"dead points of " + t.joints, 0, margin, 1 / margin, 1}, makeTransmission(t), stage);
-    if (k + 1 == stages.size() || stage.kind == StageKind::Impact) continue;
-    for (const Bound& bound : powers) addConstraint(bound, makeMotorPower(model, {bound.index}), stage);
+    for (size_t i = 0; step && i < powers.size(); ++i)
+      addConstraint(powers[i], makeMotorPower(model, {powers[i].index}), stage);
   }
   return efforts.array().isFinite().any();
 }

@@ -19,8 +19,8 @@ double ObjectiveOptions::getRegularization() const {
   return regularization.value_or(getDefaultRegularization(objective));
 }
 
-double calcElectricalPower(double u, double w, double loss, double regeneration) {
-  const double power = u * w + loss * u * u;
+double calcElectricalPower(const Motor& motor, double u, double w, double regeneration) {
+  const double c = motor.getEffortFactor(u * w), power = c * (u * w) + motor.getTorqueLoss() * (c * u) * (c * u);
   return power > 0 ? power : regeneration * power;
 }
 
@@ -42,7 +42,11 @@ void setObjective(const Model& model, const ObjectiveOptions& options, std::vect
                 "it is not positive", "give a share of the other costs, e.g. 0.1");
   if (options.objective == Objective::Effort) return;
   VectorXd losses(model.nu());
-  for (int m = 0; m < model.nu(); ++m) losses[m] = model.motors()[m].getTorqueLoss();
+  for (int m = 0; m < model.nu(); ++m) {  // c^2 half way between driving and being driven
+    const Motor& motor = model.motors()[m];
+    const double c_1 = 1 / motor.drive.efficiency, c_2 = motor.drive.back_efficiency;
+    losses[m] = motor.getTorqueLoss() * ((c_1 * c_1 + c_2 * c_2) / 2);
+  }
   for (StageSpec& stage : stages) {
     weaken(options.getRegularization(), stage);
     const bool step = &stage != &stages.back() && stage.kind == StageKind::Dynamics;
@@ -50,7 +54,7 @@ void setObjective(const Model& model, const ObjectiveOptions& options, std::vect
     const VectorXd weights = VectorXd::Ones(model.nu());
     stage.costs.push_back({"electrical energy", options.scale,
                            Activation::makeEnergy(weights, losses, options.regeneration, kPowerSmoothing),
-                           makeElectricalPower(losses)});
+                           makeElectricalPower(model)});
   }
 }
 
@@ -72,7 +76,7 @@ double calcObjective(const Motion& motion, const ObjectiveOptions& options, cons
     for (int m = 0; m < model.nu(); ++m) {
       const Motor& motor = model.motors()[m];
       const double w = at.v_mid.size() > 0 ? at.v_mid[motor.dof] : at.x[model.nq() + motor.dof];
-      energy += at.dt * calcElectricalPower(at.u[m], w, motor.getTorqueLoss(), options.regeneration);
+      energy += at.dt * calcElectricalPower(motor, at.u[m], w, options.regeneration);
       if (at.dt > 0) peak = std::max(peak, std::abs(at.u[m]) / peak_limits[m]);
     }
   }

@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/model/error.h"
 #include "bielle/ocp/residual.h"
 #include "ocp/ground_forces.h"
 
@@ -238,29 +239,71 @@ class MotorPower : public Residual {
   std::vector<int> motors_, dofs_;
 };
 
-class ElectricalPower : public Residual {
+class MotorVoltage : public Residual {
  public:
-  explicit ElectricalPower(const VectorXd& losses) : losses_(losses) {}
-  int size() const override { return static_cast<int>(2 * losses_.size()); }
+  MotorVoltage(const Model& model, std::vector<int> motors) : motors_(std::move(motors)) {
+    for (int m : motors_) {
+      const Motor& motor = model.motors().at(m);
+      if (!motor.hasEnvelope())
+        throw ModelError(model.name(), "motor '" + motor.name + "'", "it has no winding or no voltage of its supply",
+                         "give its torque_constant and its voltage");
+      per_effort_.push_back(motor.getVoltsPerEffort());
+      per_speed_.push_back(motor.getVoltsPerSpeed());
+    }
+  }
+  int size() const override { return static_cast<int>(motors_.size()); }
   bool needsControls() const override { return true; }
   bool needsSpeeds() const override { return true; }
   void calc(const NodeView& node, VectorRef r) const override {
-    for (Eigen::Index m = 0; m < losses_.size(); ++m) {
-      const double u = node.u[m];
-      r[m] = u * (*node.speeds)[m] + losses_[m] * u * u;
-      r[losses_.size() + m] = u;
-    }
+    for (size_t i = 0; i < motors_.size(); ++i)
+      r[i] = per_effort_[i] * node.u[motors_[i]] + per_speed_[i] * (*node.speeds)[motors_[i]];
   }
-  void calcJacobian(const NodeView& node, ResidualRows rows) const override {
-    for (Eigen::Index m = 0; m < losses_.size(); ++m) {
-      rows.speeds(m, m) = node.u[m];
-      rows.u(m, m) = (*node.speeds)[m] + 2 * losses_[m] * node.u[m];
-      rows.u(losses_.size() + m, m) = 1;
+  void calcJacobian(const NodeView&, ResidualRows rows) const override {
+    for (size_t i = 0; i < motors_.size(); ++i) {
+      rows.u(i, motors_[i]) = per_effort_[i];
+      rows.speeds(i, motors_[i]) = per_speed_[i];
     }
   }
 
  private:
-  VectorXd losses_;
+  std::vector<int> motors_;
+  std::vector<double> per_effort_, per_speed_;
+};
+
+class ElectricalPower : public Residual {
+ public:
+  struct Law {
+    double loss, drive = 1, back = 1;  // loss, c_1, c_2
+    double getMean(int power) const { return power == 1 ? (drive + back) / 2 : (drive * drive + back * back) / 2; }
+    double getHalf(int power) const { return power == 1 ? (drive - back) / 2 : (drive * drive - back * back) / 2; }
+  };
+  explicit ElectricalPower(std::vector<Law> motors) : motors_(std::move(motors)) {}
+  int size() const override { return static_cast<int>(2 * motors_.size()); }
+  bool needsControls() const override { return true; }
+  bool needsSpeeds() const override { return true; }
+  void calc(const NodeView& node, VectorRef r) const override {
+    for (size_t m = 0; m < motors_.size(); ++m) {
+      const Law& law = motors_[m];
+      const double u = node.u[m], p = u * (*node.speeds)[m], root = std::hypot(p, kGearSmoothing);
+      r[m] = law.getMean(1) * p + law.getHalf(1) * (root - kGearSmoothing) +
+             law.loss * u * u * (law.getMean(2) + law.getHalf(2) * p / root);
+      r[motors_.size() + m] = u;
+    }
+  }
+  void calcJacobian(const NodeView& node, ResidualRows rows) const override {
+    for (size_t m = 0; m < motors_.size(); ++m) {
+      const Law& law = motors_[m];
+      const double u = node.u[m], w = (*node.speeds)[m], p = u * w, root = std::hypot(p, kGearSmoothing);
+      const double turn = kGearSmoothing * kGearSmoothing / (root * root * root);  // ds/dp
+      const double by_p = law.getMean(1) + law.getHalf(1) * p / root + law.loss * u * u * law.getHalf(2) * turn;
+      rows.speeds(m, m) = u * by_p;
+      rows.u(m, m) = w * by_p + 2 * law.loss * u * (law.getMean(2) + law.getHalf(2) * p / root);
+      rows.u(motors_.size() + m, m) = 1;
+    }
+  }
+
+ private:
+  std::vector<Law> motors_;
 };
 
 }  // namespace
@@ -296,8 +339,19 @@ std::unique_ptr<Residual> makeJointVelocity(const std::vector<int>& dofs) {
 std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors) {
   return std::make_unique<MotorPower>(model, motors);
 }
+std::unique_ptr<Residual> makeMotorVoltage(const Model& model, const std::vector<int>& motors) {
+  return std::make_unique<MotorVoltage>(model, motors);
+}
 std::unique_ptr<Residual> makeElectricalPower(const VectorXd& losses) {
-  return std::make_unique<ElectricalPower>(losses);
+  std::vector<ElectricalPower::Law> motors;
+  for (double loss : losses) motors.push_back({loss});
+  return std::make_unique<ElectricalPower>(std::move(motors));
+}
+std::unique_ptr<Residual> makeElectricalPower(const Model& model) {
+  std::vector<ElectricalPower::Law> motors;
+  for (const Motor& motor : model.motors())
+    motors.push_back({motor.getTorqueLoss(), 1 / motor.drive.efficiency, motor.drive.back_efficiency});
+  return std::make_unique<ElectricalPower>(std::move(motors));
 }
 
 }  // namespace bielle

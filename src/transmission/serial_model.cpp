@@ -117,7 +117,7 @@ void addMotors(const Model& closed, const std::vector<Linkage>& linkages, const 
                                     [m](const Linkage& linkage) { return contains(linkage.motors, m); });
     const Motor& motor = closed.motors()[m];
     if (owner == linkages.end()) {
-      builder.addMotor(motor.name, motor.armature, motor.effort_limit, motor.velocity_limit, motor.torque_loss);
+      builder.addMotor(motor);
       continue;
     }
     const size_t index = owner - linkages.begin();

@@ -16,6 +16,10 @@ struct ElectricalEnergy {
   static constexpr double kLeastDistance = 0.2;  ///< m
 };
 
+/// Root mean squares over the time of the motion of the torques c u, c of MotorDrive Eq. (1): what heats the windings (nu), N m
+/// or N.
+VectorXd calcRmsEfforts(const Model& model, const MotionRecord& record);
+
 /// \param regeneration  within 0 .. 1
 ElectricalEnergy calcElectricalEnergy(const Model& model, const MotionRecord& record, double regeneration);
 

@@ -31,7 +31,9 @@ struct MotionResult {
   FddpSummary solver;
   MotionRecord record;
 
-  std::vector<std::pair<std::string, double>> peak_torques;  ///< largest |u| by motor, largest first, N m or N
+  std::vector<std::pair<std::string, double>> peak_torques;        ///< largest |u| by motor, largest first, N m or N
+  std::vector<std::pair<std::string, double>> rms_torques;         ///< calcRmsEfforts() by motor, N m or N
+  std::vector<std::pair<std::string, double>> continuous_torques;  ///< that motors bear for ever, where known, N m or N
   ObjectiveOptions objective;
   ElectricalEnergy energy;
   double gap_position = 0, gap_angle = 0;    ///< largest closing error of the motion, m and rad

@@ -33,4 +33,8 @@ UrdfText formatUrdf(const Model& model);
 /// \throws ModelError as above, or when they cannot be written
 void writeRobot(const Model& model, const std::string& directory, const std::string& remark = "");
 
+/// What the entry of a motor in a YAML file says beside its armature and limits: its loss, its drive and what it bears for ever,
+/// each as ", key: value".
+std::string formatMotorData(const Motor& motor);
+
 }  // namespace bielle

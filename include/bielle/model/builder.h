@@ -61,6 +61,9 @@ class ModelBuilder {
                 double effort_limit = std::numeric_limits<double>::infinity(),
                 double velocity_limit = std::numeric_limits<double>::infinity(),
                 std::optional<double> torque_loss = {});
+  /// A motor on the joint of its name; its indices are filled here. What its drive says of limits, armature and loss holds where
+  /// they are not given: limits are the smaller of both, and an armature of 0 counts as not given.
+  void addMotor(Motor motor);
   /// Spring, damper and friction on a joint of one coordinate; its indices are filled here.
   void addJointForce(const std::string& joint, JointForce force);
   void addContact(const std::string& name, const std::string& frame, ContactKind kind, double half_length,
@@ -91,6 +94,7 @@ class ModelBuilder {
   [[noreturn]] void fail(const std::string& element, const std::string& problem, const std::string& remedy) const;
   void finishDofs(Model& model) const;
   void finishClosures(Model& model) const;
+  void applyDrive(const std::string& element, Motor& motor) const;
   void checkInertias(std::vector<std::string>* warnings) const;
   void checkReference(const Reference& reference) const;
 

@@ -1,5 +1,6 @@
 #pragma once
 /// \file The immutable model of a robot: a spanning tree of bodies and joints, closed by closures.
+#include <cmath>
 #include <limits>
 #include <map>
 #include <optional>
@@ -92,6 +93,28 @@ struct LoopCluster {
   int rows = 0;               ///< sum of their scalar constraints
 };
 
+/// Winding and gear of a motor, as far as they are known. With the ratio n of the gear, the torque constant k_t, which is that
+/// of the induced voltage as well, and the resistance R, a joint that turns at w under the torque u takes the current and
+/// the voltage
+///     i = c u / (n k_t),    U = R i + n k_t w,    c = 1/e where u w > 0,  c = e_b where u w < 0                       (1)
+/// e and e_b being the efficiencies of the gear while it drives the joint and while the joint drives it. A winding of
+/// three phases counts as one of direct current: R between two terminals.
+struct MotorDrive {
+  std::string type;            ///< name in a catalogue, or empty
+  double ratio = 1;            ///< n, turns of the rotor per turn of the joint; rad/m of a prismatic joint
+  double rotor_inertia = 0;    ///< of rotor and fast gear, kg m^2; n^2 times that is the armature
+  double torque_constant = 0;  ///< k_t, N m/A = V s/rad; 0: the winding is not known
+  double resistance = 0;       ///< R, ohm
+  double voltage = std::numeric_limits<double>::infinity();             ///< most |U|, that of the supply, V
+  double current = std::numeric_limits<double>::infinity();             ///< most |i|, A
+  double continuous_current = std::numeric_limits<double>::infinity();  ///< that the winding bears for ever, A
+  double efficiency = 1, back_efficiency = 1;                           ///< e and e_b, above 0 and up to 1
+  double mass = 0;  ///< kg, that the robot has already; 0: not known
+
+  bool hasWinding() const { return torque_constant > 0; }
+  bool isGiven() const;  ///< whether anything differs from the ideal motor that it is without data
+};
+
 /// An actuator on one dof.
 struct Motor {
   std::string name;     ///< that of its joint
@@ -103,7 +126,23 @@ struct Motor {
   /// Heat per torque squared, W/(N m)^2 or W/N^2: R / (n k_t)^2 of a winding of resistance R and torque constant k_t behind
   /// a gear of ratio n. Empty: not known, kDefaultTorqueLoss is assumed.
   std::optional<double> torque_loss{};
+  /// Most that the root mean square of c u may be over a long time, c of MotorDrive Eq. (1), N m or N.
+  double continuous_effort = std::numeric_limits<double>::infinity();
+  MotorDrive drive{};
+
   double getTorqueLoss() const;
+  /// c of MotorDrive Eq. (1). \param power  u w, W; c is 1/e at 0
+  double getEffortFactor(double power) const { return power >= 0 ? 1 / drive.efficiency : drive.back_efficiency; }
+  /// Whether torque and speed limit each other.
+  bool hasEnvelope() const { return drive.hasWinding() && std::isfinite(drive.voltage); }
+  /// Factors of u and w in the voltage of MotorDrive Eq. (1) with c = 1/e. That is exact while the motor drives. While it is
+  /// driven, the true one is within the supply if this one and n k_t w alone are, which the limit of speed ensures.
+  double getVoltsPerEffort() const {
+    return drive.resistance / (drive.efficiency * drive.ratio * drive.torque_constant);
+  }
+  double getVoltsPerSpeed() const { return drive.ratio * drive.torque_constant; }
+  /// The torque next to u that the motor can give at the speed w: within its limit and the row above.
+  double clampEffort(double u, double w) const;
 };
 
 /// Ours, of the order of geared motors of 0.8 kg that hold some 15 N m with 50 W of heat, W/(N m)^2.

@@ -30,7 +30,14 @@
 ///   in frame 1 (default z); kp in 1/s^2, kd in 1/s (default 0). A coupler: `{name, type: coupler, joints: {joint:
 ///   coefficient, ...}, offset, kp, kd}`, sum of coefficient times coordinate = offset (default 0)
 /// - `motors: {joint: {armature, effort, velocity, torque_loss}, ...}` instead of `name_mot`; its limits (.inf for none)
-///   replace those of the URDF; `torque_loss` in W/(N m)^2 (model.h)
+///   replace those of the URDF; `torque_loss` in W/(N m)^2 (model.h). Of winding and gear, as in MotorDrive (model.h): `ratio`,
+///   `rotor_inertia`, `torque_constant`, `resistance`, `voltage`, `current`, `continuous_current`, `efficiency`,
+///   `back_efficiency`, `mass`; what follows from them holds where it is not given, and the smaller of two limits.
+///   `continuous_effort` is the thermal limit, N m. `type: NAME` takes all of this from a catalogue, and keys beside it
+///   replace its entries; with another `ratio`, its effort and velocity are those behind that gear
+/// - `motor_catalogue: FILE`, or a list of them, relative to this file; then comes the file motors.yaml in each directory of
+///   robots. A catalogue is `motors: {NAME: {source: where its figures are from, ...}, ...}` with the keys of winding and gear, and
+///   `effort` and `velocity` at the shaft of its gear
 /// - `armature: {joint: kg m^2, ...}`, or one number for all motors without one in `motors`
 /// - `joint_forces: {joint: {stiffness, rest, preload, damping, friction, friction_speed}, ...}` as in model.h
 /// - `contacts: {name: {frame, type: 6d | 3d, sole: [length, width]}, ...}`; the sole is centred on its frame, length

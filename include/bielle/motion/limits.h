@@ -5,6 +5,8 @@
 /// - Ranges of joints with one degree of freedom, velocities, and powers |u v| of motors: path constraints at every
 ///   node but the first, whose state is given. A violation of 1 is half the width of a range (1 rad or 1 m where one
 ///   side is open), or the limit of a velocity or power.
+/// - Voltages of motors whose winding and supply are known (Motor::hasEnvelope()), in every step: the faster a motor turns, the
+///   less torque it has. A violation of 1 is the voltage of the supply.
 /// - Dead points of linkages: the transmission of each (makeTransmission) stays within margin .. 1/margin of that at the
 ///   start, at the same nodes. Beyond a dead point a linkage snaps into another configuration.
 #include <map>

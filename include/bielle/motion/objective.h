@@ -5,7 +5,8 @@
 /// - Energy: the electrical energy of the motors,
 ///       E = sum_m integral of max(P_m, 0) + r min(P_m, 0),   P = u w + loss u^2,                                   (1)
 ///   with u the torque of a motor and w its speed at the same instant (robot_problem.h), its loss that of the model, and r
-///   the share of what flows back that is used again. max is smoothed (cost.h): the cost exceeds (1) by at most
+///   the share of what flows back that is used again. Behind a gear with losses P = c u w + loss (c u)^2 with the factor c of
+///   MotorDrive Eq. (1), smoothed as makeElectricalPower() says. max is smoothed (cost.h): the cost exceeds (1) by at most
 ///   (1 - r) kPowerSmoothing / 2 per motor and second.
 /// - Peak torque: s^2 with s the largest |u_m| / L_m of all motors and stages (solve/peak_problem.h), L_m the effort limit
 ///   of the motor. Motors without a limit do not count; if none has one, all L_m are m g times kReferenceLever.
@@ -42,8 +43,8 @@ struct ObjectiveOptions {
 /// and jumps of least peak torque take hundreds of iterations.
 double getDefaultRegularization(Objective objective);
 
-/// What a motor takes from its supply while it turns at w with the torque u, of Eq. (1), W.
-double calcElectricalPower(double u, double w, double loss, double regeneration);
+/// What a motor takes from its supply while it turns at w with the torque u, of Eq. (1), not smoothed, W.
+double calcElectricalPower(const Motor& motor, double u, double w, double regeneration);
 
 /// Weakens the costs that do not define the motion, and adds that of the energy.
 /// \throws ModelError when a number is out of its range

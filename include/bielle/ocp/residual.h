@@ -132,8 +132,17 @@ std::vector<Transmission> listTransmissions(const Model& model, ConstVectorRef q
 std::unique_ptr<Residual> makeTransmission(const Transmission& transmission);
 /// Mechanical power u_m v_m of motors, given by their indices in the model (n), W.
 std::unique_ptr<Residual> makeMotorPower(const Model& model, const std::vector<int>& motors);
+/// Voltages of motors, given by their indices in the model, from their torques and their speeds when the torques act, with the
+/// factors Motor::getVoltsPerEffort() and getVoltsPerSpeed() (n), V. \throws ModelError for one without an envelope
+std::unique_ptr<Residual> makeMotorVoltage(const Model& model, const std::vector<int>& motors);
 /// Electrical powers P_m = u_m w_m + loss_m u_m^2 of all motors, w their speeds when the torques act, then their torques
 /// (2 nu), W and N m: what Activation::makeEnergy reads. \param losses  nu, W/(N m)^2
 std::unique_ptr<Residual> makeElectricalPower(const VectorXd& losses);
+/// The same with the losses of the model and those of its gears, P_m = g(p) + loss_m u_m^2 h(p) with p = u_m w_m. With
+/// s = p / sqrt(p^2 + e^2), which stands for the sign of p, and c_1 = 1/efficiency, c_2 = back_efficiency,
+///     g = (c_1 + c_2)/2 p + (c_1 - c_2)/2 (sqrt(p^2 + e^2) - e),    h = (c_1^2 + c_2^2)/2 + (c_1^2 - c_2^2)/2 s:
+/// c p and c^2 of MotorDrive Eq. (1), smoothed over e = kGearSmoothing; g is at most (c_1 - c_2)/2 e less than c p.
+std::unique_ptr<Residual> makeElectricalPower(const Model& model);
+inline constexpr double kGearSmoothing = 1;  ///< W
 
 }  // namespace bielle
