@@ -164,7 +164,7 @@ TEST_CASE("design gradient: parameters of a five-bar leg") {
   const Parametrization robot("fivebar_leg", {}, variables);
   const std::vector<Measure> measures = {Measure::PeakTorque, Measure::RmsTorque, Measure::Energy,
                                          Measure::ElectricalEnergy};
-  const std::vector<MotorDrive> drives = {{0.7, 0.4}, {1.5, 0.4}};
+  const std::vector<MotorConversion> drives = {{0.7, 0.4}, {1.5, 0.4}};
   const auto calcPieces = [&](const VectorXd& x, const std::vector<ModelVariation>& directions) {
     const Model leg = robot.make(x);
     const LegMotion motion = makeLegMotion(leg);

@@ -86,7 +86,7 @@ Vector2d getFoot(const WorkspaceGrid& grid, size_t point) {
 }  // namespace
 
 TEST_CASE("measures: electrical energy of stages by hand") {
-  MotorDrive drive;
+  MotorConversion drive;
   drive.motor_constant = 2, drive.regeneration = 0.5;
   // Heat (u / 2)^2 = 2.25 W, 4 W, 2.25 W, 2.25 W; at the shaft 1.5 W, 8 W, -12 W, -1.5 W.
   const MotorTrace trace = makeTrace({0.1, 0.3, 0.2, 0.4}, {3, -4, 3, -3}, {0.5, -2, -4, 0.5});
@@ -95,7 +95,8 @@ TEST_CASE("measures: electrical energy of stages by hand") {
   CHECK(measures.energy == Approx(0.1 * 1.5 + 0.3 * 8 + 0.2 * 12 + 0.4 * 1.5));
   drive.regeneration = 0;
   CHECK(calcMotorMeasures(trace, {drive})[0].electrical_energy == Approx(0.1 * 3.75 + 0.3 * 12 + 0.4 * 0.75));
-  CHECK(calcMotorMeasures(trace)[0].electrical_energy == calcMotorMeasures(trace, {MotorDrive()})[0].electrical_energy);
+  CHECK(calcMotorMeasures(trace)[0].electrical_energy ==
+        calcMotorMeasures(trace, {MotorConversion()})[0].electrical_energy);
 }
 
 TEST_CASE("measures: electrical energy of a harmonic motion") {
@@ -109,7 +110,7 @@ TEST_CASE("measures: electrical energy of a harmonic motion") {
       u.push_back(U * std::cos(2 * M_PI * k / n));
       v.push_back(V * std::cos(2 * M_PI * k / n - phi));
     }
-    MotorDrive drive;
+    MotorConversion drive;
     drive.motor_constant = K, drive.regeneration = 1;
     const MotorMeasures measures = calcMotorMeasures(makeTrace(std::vector<double>(n, T / n), u, v), {drive})[0];
     CHECK(measures.electrical_energy == Approx(T * (U * V * std::cos(phi) / 2 + U * U / (2 * K * K))));
@@ -122,7 +123,7 @@ TEST_CASE("measures: drives by name") {
   DriveTable table;
   table.common.motor_constant = 1.5;
   table.motor_constants = {{"motor_back", 2.5}};
-  const std::vector<MotorDrive> drives = makeDrives(leg, table);
+  const std::vector<MotorConversion> drives = makeDrives(leg, table);
   REQUIRE(drives.size() == 2);
   CHECK(drives[leg.findMotor("motor_front")].motor_constant == 1.5);
   CHECK(drives[leg.findMotor("motor_back")].motor_constant == 2.5);

@@ -22,7 +22,7 @@ std::vector<double> listSteps(const RobotProblem& problem) {
 }
 
 // Solves from the guess.
-MotionOutcome solve(Motion motion, const FddpOptions& options, const std::vector<MotorDrive>& drives) {
+MotionOutcome solve(Motion motion, const FddpOptions& options, const std::vector<MotorConversion>& drives) {
   MotionOutcome out;
   const FddpSummary summary = solveMotion(motion, options, {}, &out.multipliers);
   out.message = motion.name + ": " + getName(summary.termination) + " " + summary.message;
@@ -106,13 +106,13 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
 }
 
 MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const SolvedMotion& start,
-                           const FddpOptions& options, const std::vector<MotorDrive>& drives) {
+                           const FddpOptions& options, const std::vector<MotorConversion>& drives) {
   Motion made = makeDesignMotion(model, motion, makeStandingPosture(model));
   setStart(model, start, made);
   return solve(std::move(made), options, drives);
 }
 
-MotionOutcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::vector<MotorDrive>& drives,
+MotionOutcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::vector<MotorConversion>& drives,
                          double margin) {
   MotionOutcome out;
   out.lifted = liftMotion(model, kept);

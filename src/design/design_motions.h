@@ -47,10 +47,10 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
 
 /// Solved for a design, from the solution of the start design.
 MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const SolvedMotion& start,
-                           const FddpOptions& options, const std::vector<MotorDrive>& drives);
+                           const FddpOptions& options, const std::vector<MotorConversion>& drives);
 
 /// Postures and accelerations of the start design, motors recomputed. \param margin  EvaluationOptions::margin
-MotionOutcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::vector<MotorDrive>& drives,
+MotionOutcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::vector<MotorConversion>& drives,
                          double margin);
 
 }  // namespace bielle

@@ -42,7 +42,7 @@ struct DesignEvaluator::Data {
   std::vector<DesignMotion> motions;
   std::vector<ObjectiveTerm> objective;
   EvaluationOptions options;
-  std::vector<MotorDrive> drives;
+  std::vector<MotorConversion> drives;
   std::vector<std::vector<int>> term_motors;
   std::vector<std::optional<WorkspaceGrid>> term_grids;
   double weight = 0;  // W

@@ -44,7 +44,7 @@ void addEnergy(const MotorSlopes& motion, int m, MeasurePieces& out) {
 }
 
 // Eq. (2) with the power at the terminals.
-void addElectricalEnergy(const MotorSlopes& motion, int m, const MotorDrive& drive, MeasurePieces& out) {
+void addElectricalEnergy(const MotorSlopes& motion, int m, const MotorConversion& drive, MeasurePieces& out) {
   const double heat = 1 / (drive.motor_constant * drive.motor_constant);
   for (int k = 0; k < countNodes(motion); ++k) {
     const double u = motion.u(m, k), v = motion.v(m, k), P = u * v + heat * u * u;
@@ -170,7 +170,7 @@ MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dof
 }
 
 MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
-                                const std::vector<MotorSlopes>& motions, const std::vector<MotorDrive>& drives) {
+                                const std::vector<MotorSlopes>& motions, const std::vector<MotorConversion>& drives) {
   const size_t variables = motions.front().du.size(), pairs = motors.size() * motions.size();
   const int stretches = measure == Measure::PeakTorque ? kStretches : 1;
   const bool sum = measure == Measure::Energy || measure == Measure::ElectricalEnergy;
@@ -180,7 +180,7 @@ MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
     for (int m : motors) {
       if (measure == Measure::Energy) addEnergy(motion, m, out);
       if (measure == Measure::ElectricalEnergy)
-        addElectricalEnergy(motion, m, drives.empty() ? MotorDrive() : drives[static_cast<size_t>(m)], out);
+        addElectricalEnergy(motion, m, drives.empty() ? MotorConversion() : drives[static_cast<size_t>(m)], out);
       if (measure == Measure::RmsTorque) addRms(motion, m, piece, out);
       for (int s = 0; s < stretches; ++s, ++piece)
         if (measure == Measure::PeakTorque) addPeak(motion, m, s, piece, out);

@@ -52,7 +52,8 @@ MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dof
 /// Eqs. (1) to (3) over the named motors and all motions: the number of pieces depends only on these.
 /// \param drives  by motor; empty: the default of all
 MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
-                                const std::vector<MotorSlopes>& motions, const std::vector<MotorDrive>& drives = {});
+                                const std::vector<MotorSlopes>& motions,
+                                const std::vector<MotorConversion>& drives = {});
 
 /// The sum of the costs of all motions, one piece.
 MeasurePieces calcCostPiece(const std::vector<MotorSlopes>& motions);

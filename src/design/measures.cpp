@@ -9,7 +9,7 @@
 namespace bielle {
 namespace {
 
-MotorMeasures calcMeasures(const MotorTrace& trace, Eigen::Index motor, const MotorDrive& drive) {
+MotorMeasures calcMeasures(const MotorTrace& trace, Eigen::Index motor, const MotorConversion& drive) {
   MotorMeasures out;
   double squares = 0, duration = 0;
   for (size_t k = 0; k < trace.dt.size(); ++k) {
@@ -29,7 +29,7 @@ MotorMeasures calcMeasures(const MotorTrace& trace, Eigen::Index motor, const Mo
 
 }  // namespace
 
-std::vector<MotorDrive> makeDrives(const Model& model, const DriveTable& table) {
+std::vector<MotorConversion> makeDrives(const Model& model, const DriveTable& table) {
   const auto require = [&](bool ok, const std::string& element, const std::string& problem, const std::string& remedy) {
     if (!ok) throw ModelError(model.name(), "drives: " + element, problem, remedy);
   };
@@ -40,7 +40,7 @@ std::vector<MotorDrive> makeDrives(const Model& model, const DriveTable& table) 
   requireConstant(table.common.motor_constant, "motor_constant");
   require(table.common.regeneration >= 0 && table.common.regeneration <= 1, "regeneration", "it is outside 0 .. 1",
           "give the share that is given back");
-  std::vector<MotorDrive> drives(model.motors().size(), table.common);
+  std::vector<MotorConversion> drives(model.motors().size(), table.common);
   for (const auto& [name, constant] : table.motor_constants) {
     const int motor = model.findMotor(name);
     require(motor >= 0, "motor '" + name + "'", "there is no such motor", "`bielle info` lists them");
@@ -67,15 +67,15 @@ MotorTrace makeMotorTrace(const Model& model, const std::vector<double>& dt, con
   return trace;
 }
 
-std::vector<MotorMeasures> calcMotorMeasures(const MotorTrace& trace, const std::vector<MotorDrive>& drives) {
+std::vector<MotorMeasures> calcMotorMeasures(const MotorTrace& trace, const std::vector<MotorConversion>& drives) {
   std::vector<MotorMeasures> out;
   for (Eigen::Index m = 0; m < trace.torque.rows(); ++m)
-    out.push_back(calcMeasures(trace, m, drives.empty() ? MotorDrive() : drives[static_cast<size_t>(m)]));
+    out.push_back(calcMeasures(trace, m, drives.empty() ? MotorConversion() : drives[static_cast<size_t>(m)]));
   return out;
 }
 
 MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>& dt,
-                                  const ShootingTrajectory& trajectory, const std::vector<MotorDrive>& drives) {
+                                  const ShootingTrajectory& trajectory, const std::vector<MotorConversion>& drives) {
   MotionMeasures out;
   out.trace = makeMotorTrace(model, dt, trajectory);
   out.motors = calcMotorMeasures(out.trace, drives);

@@ -15,7 +15,7 @@ namespace bielle {
 ///     P = u v + (u / K_m)^2                                                                                        (1)
 /// It consumes max(P, 0) and recovers the share r of the negative part, so that braking first covers its own heat.
 /// No friction, no iron losses, no standby.
-struct MotorDrive {
+struct MotorConversion {
   /// K_m, N m/sqrt(W) (N/sqrt(W) of a linear motor). The default is ours, of the order of geared motors of 0.8 kg that
   /// hold some 15 N m with 50 W of heat.
   double motor_constant = 2;
@@ -24,11 +24,11 @@ struct MotorDrive {
 
 /// Drives by motor: one constant for all, others by name.
 struct DriveTable {
-  MotorDrive common;
+  MotorConversion common;
   std::vector<std::pair<std::string, double>> motor_constants;
 };
 /// \throws ModelError for unknown motors, constants that are not positive, shares outside 0 .. 1
-std::vector<MotorDrive> makeDrives(const Model& model, const DriveTable& table);
+std::vector<MotorConversion> makeDrives(const Model& model, const DriveTable& table);
 
 /// Measures of one motor over a motion of N stages.
 struct MotorMeasures {
@@ -48,7 +48,7 @@ struct MotorTrace {
 MotorTrace makeMotorTrace(const Model& model, const std::vector<double>& dt, const ShootingTrajectory& trajectory);
 
 /// \param drives  by motor; empty: the default of all
-std::vector<MotorMeasures> calcMotorMeasures(const MotorTrace& trace, const std::vector<MotorDrive>& drives = {});
+std::vector<MotorMeasures> calcMotorMeasures(const MotorTrace& trace, const std::vector<MotorConversion>& drives = {});
 
 struct MotionMeasures {
   std::vector<MotorMeasures> motors;  ///< in the order of the model
@@ -58,7 +58,8 @@ struct MotionMeasures {
 };
 /// \param trajectory  closed at its nodes
 MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>& dt,
-                                  const ShootingTrajectory& trajectory, const std::vector<MotorDrive>& drives = {});
+                                  const ShootingTrajectory& trajectory,
+                                  const std::vector<MotorConversion>& drives = {});
 
 enum class Measure { PeakTorque, RmsTorque, Energy, ElectricalEnergy, Cost, Conditioning, Workspace };
 const char* getName(Measure measure);

@@ -63,7 +63,7 @@ void measure(const ArchitectureSpec& spec, const Contender& contender, const Mot
   out.exists = true;
   out.trace = readTrace(record);
   const std::vector<MotorMeasures> motors =
-      calcMotorMeasures(out.trace, std::vector<MotorDrive>(record.u_names.size(), spec.drive));
+      calcMotorMeasures(out.trace, std::vector<MotorConversion>(record.u_names.size(), spec.drive));
   for (const std::vector<int>& members : groupMotors(spec.groups, record.u_names))
     out.groups.push_back(calcLoad(members, motors));
   for (const MotorMeasures& motor : motors) {

@@ -41,7 +41,7 @@ struct ArchitectureSpec {
   std::vector<MotionSpec> speeds;  // slowest first; may be empty
   std::vector<double> speed_values;
   std::vector<MotorGroup> groups;  // the last one has no words: all motors
-  MotorDrive drive;
+  MotorConversion drive;
 };
 
 // \throws ModelError naming the file, the key with its line, and the remedy
