@@ -19,7 +19,9 @@ def configure(name, *options):
     subprocess.run([cmake, "-S", source, "-B", build, "--preset", "package", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON", *options],
                    check=True, stdout=subprocess.DEVNULL)
     with open(os.path.join(build, "compile_commands.json")) as file:
-        commands = [entry["command"] for entry in json.load(file)]
+        # Neither the library nor Eigen is in bielle-workers, which may have flags of its own.
+        workers = os.path.join(source, "workers")
+        commands = [entry["command"] for entry in json.load(file) if not entry["file"].startswith(workers)]
     with open(os.path.join(build, "bielle.pc")) as file:
         return build, commands, file.read()
 
