@@ -5,7 +5,6 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
-#include "bielle/io/result.h"
 
 namespace bielle {
 namespace {
@@ -84,14 +83,23 @@ bool isNearDeadPoint(const Model& model, const MotionRecord& record, Eigen::Inde
 
 double calcStepError(const Model& model, const MotionRecord& record) { return findStepError(model, record).share; }
 
+double calcStageExcess(const Model& model, const MotionResult& result) {
+  if (!result.record.has_midpoints) return 0;
+  double reach = 0;  // of a corner, from the middle of the sole
+  for (const ContactFrame& contact : model.contacts())
+    reach = std::max(reach, std::hypot(contact.half_length, contact.half_width));
+  return std::max(calcStepError(model, result.record) / kLargestStepError,
+                  (result.slip_position + reach * result.slip_angle) / kLargestSlip);
+}
+
 std::optional<Motion> refineStages(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
-                                   const Motion& solved, const MotionRecord& record) {
-  if (problem.objective.objective != Objective::Effort || problem.timings.areGiven()) return {};
+                                   const Motion& solved, const MotionResult& result) {
+  if (problem.objective.objective == Objective::PeakTorque || problem.timings.areGiven()) return {};
   double* step = findTimeStep(request);
-  if (!step || *step != 0 || calcStepError(model, record) <= kLargestStepError) return {};
+  if (!step || *step != 0 || calcStageExcess(model, result) <= 1) return {};
   *step = solved.schedule.phases.front().dt / 2;
   Motion motion = makeRequested(request, model, problem);
-  setGuess(halveSteps(record), motion);
+  setGuess(halveSteps(result.record), motion);
   return motion;
 }
 

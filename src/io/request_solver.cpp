@@ -44,22 +44,20 @@ MotionResult RequestSolver::solve(const RunInfo& run) {
   const FddpSummary summary = solveMotion(motion_, solver, observer_.motion);
   MotionResult result = makeResult(run, motion_, motion_.guess, summary);
   if (!result.converged()) return result;
-  std::optional<Motion> refined = refineStages(request_, model_, options_.problem, motion_, result.record);
+  std::optional<Motion> refined = refineStages(request_, model_, options_.problem, motion_, result);
   if (refined) improve(*refined, options_.solver, "in stages half as long", run, result);
   refined = avoidDeadPoints(request_, model_, options_.problem, result.record);
   if (refined) improve(*refined, from_plan, "with linkages farther from their dead points", run, result);
   return result;
 }
 
-// Solves a motion in place of one whose velocities differ from their finite differences too much, and takes it if they
-// agree better.
+// Solves a motion in place of one whose stages are too long, and takes it if its own are less so.
 void RequestSolver::improve(Motion& motion, const FddpOptions& solver, const std::string& how, const RunInfo& run,
                             MotionResult& result) const {
-  tell("velocities differ from their finite differences by more than " + formatNumber(100 * kLargestStepError) +
-       " %: once more, " + how);
+  tell("stages are too long for how quickly it moves: once more, " + how);
   const FddpSummary summary = solveMotion(motion, solver, observer_.motion);
   MotionResult improved = makeResult(run, motion, motion.guess, addUp(result.solver, summary));
-  if (improved.converged() && calcStepError(model_, improved.record) < calcStepError(model_, result.record)) {
+  if (improved.converged() && calcStageExcess(model_, improved) < calcStageExcess(model_, result)) {
     result = std::move(improved);
     return;
   }
