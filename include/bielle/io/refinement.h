@@ -14,13 +14,14 @@ double calcStepError(const Model& model, const MotionRecord& record);
 inline constexpr double kLargestStepError = 0.004;
 
 /// How much too long the stages of a solved motion are, which they are above 1: the larger of calcStepError() over
-/// kLargestStepError and of the way of standing soles over kLargestSlip. `bielle check` allows 0.1 mm off the ground. Of Euler steps 0.
+/// kLargestStepError and of the way of standing soles over kLargestSlip; `bielle check` allows 0.1 mm off the ground. Of Euler
+/// steps 0.
 double calcStageExcess(const Model& model, const MotionResult& result);
 inline constexpr double kLargestSlip = 1e-4;  // m, of a corner, at most
 
-/// The motion of a request once more, in stages half as long and with the solution as its guess, if their length was left to the
-/// motion (`time_step` 0), no duration is free, the objective is not the least peak torque and calcStageExcess() of the solution is above 1.
-/// Sets `time_step`.
+/// The motion of a request once more, in stages half as long and with the solution as its guess, if their length was left to
+/// the motion (`time_step` 0), no duration is free, the objective is not the least peak torque, and calcStageExcess() of the
+/// solution is above 1. Sets `time_step`.
 /// \param result  the solution of `solved`
 std::optional<Motion> refineStages(const MotionRequest& request, const Model& model, const ProblemOptions& problem,
                                    const Motion& solved, const MotionResult& result);
