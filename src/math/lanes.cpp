@@ -1,6 +1,7 @@
 #include "math/lanes.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace bielle {
 namespace {
@@ -15,22 +16,25 @@ constexpr double kRound = 6755399441055744.0;  // 1.5 * 2^52: adding and subtrac
 using Vector = Lanes::Vector;
 typedef double Anywhere __attribute__((vector_size(kLane * sizeof(double)), aligned(sizeof(double)), may_alias));
 
-// Rows become columns: exchanges entries across the diagonal at distance 1, 2 and 4.
-void transpose(std::array<Vector, kLane>& rows) {
-  const LaneMask::Vector low[] = {{0, 8, 2, 10, 4, 12, 6, 14}, {0, 1, 8, 9, 4, 5, 12, 13}, {0, 1, 2, 3, 8, 9, 10, 11}};
-  const LaneMask::Vector high[] = {
-      {1, 9, 3, 11, 5, 13, 7, 15}, {2, 3, 10, 11, 6, 7, 14, 15}, {4, 5, 6, 7, 12, 13, 14, 15}};
-#pragma GCC unroll 3
-  for (int step = 0; step < 3; ++step) {
-    const int distance = 1 << step;
+// Exchanges entries across the diagonal between rows at this distance. Entry I of the upper row stays where I & distance
+// is 0, and that of the lower row where it is not; the others come from the other row, whose entries count from kLane on.
+template <int distance, int... I>
+void exchange(std::array<Vector, kLane>& rows, std::integer_sequence<int, I...>) {
 #pragma GCC unroll 8
-    for (int i = 0; i < kLane; ++i) {
-      if (i & distance) continue;
-      const Vector a = rows[i], b = rows[i + distance];
-      rows[i] = __builtin_shuffle(a, b, low[step]);
-      rows[i + distance] = __builtin_shuffle(a, b, high[step]);
-    }
+  for (int i = 0; i < kLane; ++i) {
+    if (i & distance) continue;
+    const Vector a = rows[i], b = rows[i + distance];
+    rows[i] = __builtin_shufflevector(a, b, (I & distance ? I - distance + kLane : I)...);
+    rows[i + distance] = __builtin_shufflevector(a, b, (I & distance ? I + kLane : I + distance)...);
   }
+}
+
+// Rows become columns.
+void transpose(std::array<Vector, kLane>& rows) {
+  constexpr std::make_integer_sequence<int, kLane> entries;
+  exchange<1>(rows, entries);
+  exchange<2>(rows, entries);
+  exchange<4>(rows, entries);
 }
 
 }  // namespace

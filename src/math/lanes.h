@@ -58,8 +58,8 @@ inline LaneMask operator&&(const LaneMask& a, const LaneMask& b) { return {a.v &
 inline LaneMask operator||(const LaneMask& a, const LaneMask& b) { return {a.v | b.v}; }
 inline LaneMask operator!(const LaneMask& a) { return {~a.v}; }
 inline bool any(const LaneMask& a) {
-  const LaneMask::Vector halves = a.v | __builtin_shuffle(a.v, LaneMask::Vector{4, 5, 6, 7, 0, 1, 2, 3});
-  const LaneMask::Vector quarters = halves | __builtin_shuffle(halves, LaneMask::Vector{2, 3, 0, 1, 6, 7, 4, 5});
+  const LaneMask::Vector halves = a.v | __builtin_shufflevector(a.v, a.v, 4, 5, 6, 7, 0, 1, 2, 3);
+  const LaneMask::Vector quarters = halves | __builtin_shufflevector(halves, halves, 2, 3, 0, 1, 6, 7, 4, 5);
   return (quarters[0] | quarters[1]) != 0;
 }
 inline bool any(bool a) { return a; }
