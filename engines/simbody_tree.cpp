@@ -61,6 +61,30 @@ class PreloadAndFriction : public SimTK::Force::Custom::Implementation {
   MobilizedBody body_;
 };
 
+// Simbody's constant force between two points has no potential.
+class PointPreload : public SimTK::Force::Custom::Implementation {
+ public:
+  PointPreload(const PointSpring& spring, const MobilizedBody& body1, const MobilizedBody& body2)
+      : spring_(spring), body1_(body1), body2_(body2) {}
+  void calcForce(const SimTK::State& state, SimTK::Vector_<SimTK::SpatialVec>& body_forces, SimTK::Vector_<Vec3>&,
+                 SimTK::Vector&) const override {
+    const Vec3 force = spring_.preload * findLine(state).normalize();
+    body1_.applyForceToBodyPoint(state, toSimTK(spring_.point1), force, body_forces);
+    body2_.applyForceToBodyPoint(state, toSimTK(spring_.point2), -force, body_forces);
+  }
+  SimTK::Real calcPotentialEnergy(const SimTK::State& state) const override {
+    return spring_.preload * (findLine(state).norm() - spring_.rest);
+  }
+
+ private:
+  Vec3 findLine(const SimTK::State& state) const {
+    return body2_.findStationLocationInGround(state, toSimTK(spring_.point2)) -
+           body1_.findStationLocationInGround(state, toSimTK(spring_.point1));
+  }
+  PointSpring spring_;
+  MobilizedBody body1_, body2_;
+};
+
 }  // namespace
 
 SimbodyTree::SimbodyTree(const Model& m, const std::vector<Closure>& c, LoopCut cut)
@@ -81,6 +105,7 @@ SimbodyTree::SimbodyTree(const Model& m, const std::vector<Closure>& c, LoopCut 
       addCutLoop(closures[i], cut_joints[i]);
   }
   for (const JointForce& force : model.jointForces()) addJointForce(force);
+  for (const PointSpring& spring : model.pointSprings()) addPointSpring(spring);
   T.setIdentity(model.nv(), model.nv());
   Tdot_v.setZero(model.nv());
 }
@@ -211,6 +236,15 @@ void SimbodyTree::addJointForce(const JointForce& force) {
   if (force.damping != 0) SimTK::Force::MobilityLinearDamper(forces, body, u, force.damping);
   if (force.preload != 0 || force.friction != 0)
     SimTK::Force::Custom(forces, new PreloadAndFriction(force, body));  // takes it over
+}
+
+void SimbodyTree::addPointSpring(const PointSpring& spring) {
+  const MobilizedBody &body1 = bodies[spring.body1], &body2 = bodies[spring.body2];
+  const Vec3 point1 = toSimTK(spring.point1), point2 = toSimTK(spring.point2);
+  if (spring.stiffness != 0)
+    SimTK::Force::TwoPointLinearSpring(forces, body1, point1, body2, point2, spring.stiffness, spring.rest);
+  if (spring.damping != 0) SimTK::Force::TwoPointLinearDamper(forces, body1, point1, body2, point2, spring.damping);
+  if (spring.preload != 0) SimTK::Force::Custom(forces, new PointPreload(spring, body1, body2));  // takes it over
 }
 
 void SimbodyTree::addCutLoop(const Closure& closure, int joint) {

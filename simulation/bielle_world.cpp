@@ -10,6 +10,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
 #include "dynamics/joint_force.h"
+#include "dynamics/point_spring.h"
 #include "simulation/closed_tree.h"
 #include "simulation/sole_track.h"
 
@@ -19,11 +20,12 @@ namespace {
 constexpr int kMaxNewton = 8;
 constexpr double kNewtonTolerance = 1e-10;  // of a change of velocity, relative to 1 (m/s, rad/s) and the largest
 
-// The bodies of all contacts, then the trunk.
+// The bodies of all contacts, then the trunk, then those of point springs, two of each.
 std::vector<int> listTips(const Model& model) {
   std::vector<int> tips;
   for (const ContactFrame& contact : model.contacts()) tips.push_back(contact.body);
   tips.push_back(1);
+  for (const PointSpring& spring : model.pointSprings()) tips.push_back(spring.body1), tips.push_back(spring.body2);
   return tips;
 }
 
@@ -268,6 +270,16 @@ void BielleWorld::book(double h) {
   for (const JointForce& force : model_.jointForces()) {
     const double rate = calcRate(force.dof);
     joint_work_ += h * calcDissipativeForce(force, rate) * rate;
+  }
+  int tip = static_cast<int>(model_.contacts().size()) + 1;
+  for (const PointSpring& spring : model_.pointSprings()) {
+    const Vector3d p1 = tree_.getPlacement(spring.body1).act(spring.point1),
+                   p2 = tree_.getPlacement(spring.body2).act(spring.point2);
+    const Vector6d twist1 = calcTwist(tip, w_mean_), twist2 = calcTwist(tip + 1, w_mean_);
+    const double rate = calcLineDirection<double>(p2 - p1).dot(
+        Vector3d(twist2.head<3>() + twist2.tail<3>().cross(p2) - twist1.head<3>() - twist1.tail<3>().cross(p1)));
+    joint_work_ -= h * spring.damping * rate * rate;
+    tip += 2;
   }
   for (size_t i = 0; i < stops_.size(); ++i)
     if (stop_forces_[i] != 0) stop_work_ += h * stop_forces_[i] * calcRate(stops_[i].dof);

@@ -172,6 +172,13 @@ void MujocoWorld::book(double h) {
   }
   // MuJoCo takes dampers at the end of a step.
   for (int k = 0; k < mj.nv; ++k) other_work_ -= h * mj.dof_damping[k] * data_->qvel[k] * v_mean_[k];
+  // Those of tendons at its start. The robot is written with sparse matrices.
+  for (int t = 0; t < mj.ntendon; ++t) {
+    double rate = 0;
+    for (int i = data_->ten_J_rowadr[t]; i < data_->ten_J_rowadr[t] + data_->ten_J_rownnz[t]; ++i)
+      rate += data_->ten_J[i] * v_mean_[data_->ten_J_colind[i]];
+    other_work_ -= h * mj.tendon_damping[t] * data_->ten_velocity[t] * rate;
+  }
   mj_mulJacVec(&mj, data_.get(), row_velocity_.data(), v_mean_.data());
   for (int i = 0; i < data_->nefc; ++i) {
     const double work = h * data_->efc_force[i] * row_velocity_[i];

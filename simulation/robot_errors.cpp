@@ -54,6 +54,7 @@ Model rebuild(const Model& model, const std::vector<Inertia>& inertias, const st
   }
   for (const Motor& motor : model.motors()) builder.addMotor(motor);
   for (const JointForce& force : model.jointForces()) builder.addJointForce(model.joints()[force.joint].name, force);
+  for (const PointSpring& spring : model.pointSprings()) builder.copyPointSpring(model, spring);
   for (const ContactFrame& contact : model.contacts())
     builder.addContact(contact.name, addFrame(contact.name + "|contact", contact.body, contact.X_BF), contact.kind,
                        contact.half_length, contact.half_width);

@@ -54,11 +54,17 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
     const MobilizedBody& body = tree_.bodies[tree_.model.dofs()[stop.dof].joint];
     return calcStopForce(stop, body.getOneQ(state, 0), state.getU()[tree_.u_index[stop.dof]]);
   }
+  Vector3d findPlace(const State& state, int body, const Vector3d& p) const {
+    return toEigen(tree_.bodies[body].findStationLocationInGround(state, toSimTK(p)));
+  }
+  Vector3d findVelocity(const State& state, int body, const Vector3d& p) const {
+    return toEigen(tree_.bodies[body].findStationVelocityInGround(state, toSimTK(p)));
+  }
   Vector3d findPlace(const State& state, const ContactPoint& point) const {
-    return toEigen(tree_.bodies[point.body].findStationLocationInGround(state, toSimTK(point.p)));
+    return findPlace(state, point.body, point.p);
   }
   Vector3d findVelocity(const State& state, const ContactPoint& point) const {
-    return toEigen(tree_.bodies[point.body].findStationVelocityInGround(state, toSimTK(point.p)));
+    return findVelocity(state, point.body, point.p);
   }
 
   Powers calcPowers(const State& state) const {
@@ -70,6 +76,13 @@ class WorldForces : public SimTK::Force::Custom::Implementation {
     for (const JointForce& force : tree_.model.jointForces()) {
       const double rate = getRate(state, force.dof);
       powers.joint += calcDissipativeForce(force, rate) * rate;
+    }
+    for (const PointSpring& spring : tree_.model.pointSprings()) {
+      const Vector3d direction =
+          findPlace(state, spring.body2, spring.point2) - findPlace(state, spring.body1, spring.point1);
+      const double rate = direction.normalized().dot(findVelocity(state, spring.body2, spring.point2) -
+                                                     findVelocity(state, spring.body1, spring.point1));
+      powers.joint -= spring.damping * rate * rate;
     }
     powers.push = push.dot(toEigen(tree_.bodies[1].findStationVelocityInGround(state, toSimTK(getPushPoint()))));
     return powers;

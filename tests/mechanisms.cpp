@@ -73,7 +73,7 @@ void addRandomCoupler(ModelBuilder& builder, std::mt19937& rng, const std::strin
 
 namespace {
 
-enum class Extra { None, Belt, RepeatedBelt, JointForces };
+enum class Extra { None, Belt, RepeatedBelt, Forces };
 
 // On joints in a loop and, with a free base, on one outside.
 void addRandomForces(ModelBuilder& builder, std::mt19937& rng, JointKind kind) {
@@ -88,6 +88,26 @@ void addRandomForces(ModelBuilder& builder, std::mt19937& rng, JointKind kind) {
     force.friction_speed = 0.3 + 0.1 * x[5];
     builder.addJointForce(joint, force);
   }
+}
+
+// Within the loop, from it to the ground and, with a free base, to the branch outside.
+void addRandomPointSprings(ModelBuilder& builder, std::mt19937& rng, MechanismBase base) {
+  const auto add = [&](const std::string& link1, const std::string& link2) {
+    const VectorXd x = randomVector(rng, 4);
+    PointSpring spring;
+    spring.name = link1 + "--" + link2;
+    spring.point1 = randomVector(rng, 3, 0.3);
+    spring.point2 = randomVector(rng, 3, 0.3);
+    spring.stiffness = 30 + 10 * x[0];
+    spring.rest = 0.4 + 0.2 * x[1];
+    spring.preload = 3 * x[2];
+    spring.damping = 2 + x[3];
+    builder.addPointSpring(link1, link2, spring);
+  };
+  add("a1", "b1k");
+  add("a0k", "a2k");
+  add("world", "b2");
+  if (base == MechanismBase::FreeFlyer) add("side", "b0k");
 }
 
 Mechanism makeMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base, double kp,
@@ -120,7 +140,10 @@ Mechanism makeMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, 
   builder.addMotor("joint_b0", 0.1);
   builder.addContact("foot", "a1", ContactKind::Surface6D, 0.1, 0.05);
   builder.addContact("point", "b1", ContactKind::Point3D, 0, 0);
-  if (extra == Extra::JointForces) addRandomForces(builder, rng, kind);
+  if (extra == Extra::Forces) {
+    addRandomForces(builder, rng, kind);
+    addRandomPointSprings(builder, rng, base);
+  }
   if (extra == Extra::Belt || extra == Extra::RepeatedBelt)
     addRandomCoupler(builder, rng, "belt", listCoupled(kind), tree, out.q_closed, kp, kd);
   out.model = builder.build();
@@ -147,7 +170,7 @@ Mechanism makeBeltedMechanism(std::mt19937& rng, JointKind kind, ClosureKind clo
 }
 
 Mechanism makeSprungMechanism(std::mt19937& rng, JointKind kind, ClosureKind closure, MechanismBase base) {
-  return makeMechanism(rng, kind, closure, base, 0, 0, Extra::JointForces);
+  return makeMechanism(rng, kind, closure, base, 0, 0, Extra::Forces);
 }
 
 Mechanism makePlanarFourBar(double ground, double crank, double coupler, double rocker, double angle) {

@@ -36,7 +36,8 @@ Mechanism makeRandomMechanism(std::mt19937& rng, JointKind joint, ClosureKind cl
 Mechanism makeBeltedMechanism(std::mt19937& rng, JointKind joint, ClosureKind closure, MechanismBase base,
                               bool repeated, double kp = 0, double kd = 0);
 
-/// The same with springs, dampers and friction on joints of its loop.
+/// The same with springs, dampers and friction on joints of its loop, and springs and dampers between points of bodies: of
+/// one branch, of both, of the ground and, with a free base, of the side branch.
 Mechanism makeSprungMechanism(std::mt19937& rng, JointKind joint, ClosureKind closure, MechanismBase base);
 
 /// Couples joints of `tree`, with coefficients of 0.5 to 1.5 of either sign, so that it holds at q.

@@ -41,6 +41,16 @@ ModelBuilder makeBuilder(const Model& m, const ModelVariation& direction, double
     if (joint.nv == 1 && m.findMotor(joint.name) < 0)
       builder.setArmature(joint.name, m.armature()[joint.idx_v] + step * direction.armature[joint.idx_v]);
   for (const JointForce& force : m.jointForces()) builder.addJointForce(m.joints()[force.joint].name, force);
+  for (size_t s = 0; s < m.pointSprings().size(); ++s) {
+    PointSpring spring = m.pointSprings()[s];
+    spring.point1 += step * direction.points1[s];
+    spring.point2 += step * direction.points2[s];
+    spring.stiffness += step * direction.springs[s][0];
+    spring.rest += step * direction.springs[s][1];
+    spring.preload += step * direction.springs[s][2];
+    spring.damping += step * direction.springs[s][3];
+    builder.copyPointSpring(m, spring);
+  }
   for (size_t c = 0; c < m.contacts().size(); ++c) {
     const ContactFrame& contact = m.contacts()[c];
     builder.addFrame(contact.name + "/f", getLink(m, contact.body), move(contact.X_BF, direction.contacts[c]));

@@ -60,6 +60,13 @@ TEST_CASE("bielle world: a stop holds a joint, and takes energy") {
   testing::checkStopped(*makeTestWorld(), getBipetto(), kTolerances);
 }
 
+TEST_CASE("bielle world: springs and dampers between points move a linkage, and are booked") {
+  const Model model = testing::makeSprungFivebar();
+  BielleWorldOptions options;
+  options.world.time_step = 1e-4;
+  testing::checkSprung(*makeBielleWorld(model, options), model, 1e-3, 1e-4);
+}
+
 TEST_CASE("bielle world: accelerations in the air are those of the full system") {
   const Model& model = getBipetto();
   const Flight flight = makeFlight();

@@ -95,6 +95,9 @@ std::string compareParts(const Model& a, const Model& b) {
       return contact.name;
   }
   if (a.contacts().size() != b.contacts().size()) return "contacts";
+  if (a.pointSprings().size() != b.pointSprings().size()) return "point springs";
+  for (size_t s = 0; s < a.pointSprings().size(); ++s)
+    if (a.pointSprings()[s].name != b.pointSprings()[s].name) return a.pointSprings()[s].name;
   if (a.gravity() != b.gravity()) return "gravity";
   return "";
 }
@@ -225,7 +228,69 @@ TEST_CASE("random mechanisms come back from MJCF: every joint, closure, base, sp
           };
           CHECK(std::any_of(back.jointForces().begin(), back.jointForces().end(), same));
         }
+        ModelParts parts = takeParts(plain.model);  // without friction, which MuJoCo has otherwise
+        parts.point_springs = sprung.model.pointSprings();
+        REQUIRE(parts.point_springs.size() >= 3);
+        checkRoundTrip(ModelBuilder::restore(parts), plain.q_closed);
       }
+}
+
+TEST_CASE("springs between points in MJCF: what it cannot say, other tendons, and a poisoned number") {
+  ModelBuilder builder("springs");
+  Joint joint;
+  joint.name = "slide", joint.kind = JointKind::Prismatic;
+  builder.addLink("mass", "world", joint, {2, Vector3d::Zero(), 0.1 * Matrix3d::Identity()});
+  builder.addFrame("spring.1", "mass", {Matrix3d::Identity(), {0, 1, 0}});  // the name of a site that would be made
+  PointSpring spring;
+  spring.name = "spring", spring.point1 = {0.2, 0, 0}, spring.stiffness = 10, spring.rest = 0.3, spring.preload = 1;
+  spring.damping = 2;
+  builder.addPointSpring("world", "mass", spring);
+  const Model good = builder.build();
+  const MjcfText text = formatMjcf(good, VectorXd::Zero(1));
+  CHECK(text.warnings.empty());
+  CHECK(compare(good, readMjcfText(text.xml), VectorXd::Zero(1)).bias < kTolerance);
+  CHECK(readMjcfText(text.xml).pointSprings()[0].rest == Approx(0.2).epsilon(1e-14));
+  for (const char* number : {"stiffness=\"10\"", "springlength=\"0.2", "damping=\"2\""}) {
+    CAPTURE(number);
+    const size_t at = text.xml.find(number);
+    REQUIRE(at != std::string::npos);
+    std::string poisoned = text.xml;
+    poisoned.insert(at + std::string(number).size() - (poisoned[at + std::string(number).size() - 1] == '"' ? 1 : 0),
+                    std::string(number).find('.') == std::string::npos ? ".001" : "001");
+    CHECK(compare(good, readMjcfText(poisoned), VectorXd::Zero(1)).bias > 1e-6);
+  }
+
+  spring.name = "short", spring.preload = 4;
+  builder.addPointSpring("world", "mass", spring);
+  spring.name = "constant", spring.stiffness = 0;
+  builder.addPointSpring("world", "mass", spring);
+  const std::vector<std::string> warnings = formatMjcf(builder.build(), VectorXd::Zero(1)).warnings;
+  REQUIRE(warnings.size() == 2);
+  CHECK_THAT(warnings[0], Catch::Contains("point spring 'short': it would have no tension below a length of 0"));
+  CHECK_THAT(warnings[1], Catch::Contains("point spring 'constant': its preload without a stiffness is left out"));
+
+  const RobotDirectory directory;
+  const LoadedRobot other = loadRobot(directory.write("robot.xml", R"(<mujoco>
+  <worldbody><site name="a"/><body name="mass" pos="0 0 0.5"><joint name="slide" type="slide"/>
+    <inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/><site name="b"/><site name="c"/></body></worldbody>
+  <default><tendon stiffness="3"/></default>
+  <tendon>
+    <spatial><site site="a"/><site site="b"/></spatial>
+    <spatial name="bent"><site site="a"/><site site="b"/><site site="c"/></spatial>
+    <spatial name="pulley"><site site="a"/><pulley divisor="2"/><site site="b"/></spatial>
+    <spatial name="slack" springlength="0.1 0.2"><site site="a"/><site site="b"/></spatial>
+    <spatial name="cable" stiffness="0"><site site="a"/><site site="b"/></spatial>
+    <spatial name="rope" damping="1" frictionloss="1" range="0 1" limited="true"><site site="a"/><site site="b"/></spatial>
+  </tendon></mujoco>)"));
+  REQUIRE(other.model.pointSprings().size() == 2);
+  CHECK(other.model.pointSprings()[0].name == "tendon_6");
+  CHECK(other.model.pointSprings()[0].rest == Approx(0.5));  // as the file stands
+  CHECK(other.model.pointSprings()[0].stiffness == 3);
+  CHECK(other.model.pointSprings()[1].damping == 1);
+  for (const char* told : {"does not run between two sites", "bends about a <pulley>", "slack between two lengths",
+                           "no spring or damper", "frictionloss is left out", "limits of its length are left out"})
+    CHECK(std::any_of(other.warnings.begin(), other.warnings.end(),
+                      [&](const std::string& w) { return w.find(told) != std::string::npos; }));
 }
 
 TEST_CASE("a number of the file that is wrong by a millionth shows") {

@@ -96,6 +96,18 @@ void checkSame(const Model& a, const Model& b) {
                                       &JointForce::damping, &JointForce::friction, &JointForce::friction_speed})
       CHECK(fa.*field == Approx(fb.*field).epsilon(1e-11));
   }
+  REQUIRE(a.pointSprings().size() == b.pointSprings().size());
+  for (size_t i = 0; i < a.pointSprings().size(); ++i) {
+    const PointSpring &sa = a.pointSprings()[i], &sb = b.pointSprings()[i];
+    CHECK(sa.name == sb.name);
+    CHECK(sa.body1 == sb.body1);
+    CHECK(sa.body2 == sb.body2);
+    CHECK((sa.point1 - sb.point1).norm() < 1e-11);
+    CHECK((sa.point2 - sb.point2).norm() < 1e-11);
+    for (double PointSpring::*field :
+         {&PointSpring::stiffness, &PointSpring::rest, &PointSpring::preload, &PointSpring::damping})
+      CHECK(sa.*field == Approx(sb.*field).epsilon(1e-11));
+  }
   REQUIRE(a.nu() == b.nu());
   for (int m = 0; m < a.nu(); ++m) {
     CHECK(a.motors()[m].name == b.motors()[m].name);
@@ -269,6 +281,12 @@ TEST_CASE("writer: names are escaped, what the files cannot say is refused") {
   force = {};
   force.friction = 0.3, force.friction_speed = 0.05;
   motors.addJointForce("unknown", force);
+  PointSpring spring;
+  spring.name = "a: \"spring\"", spring.point1 = {0.1, 0.2, 0.3}, spring.point2 = {-1.0 / 3, 0, 0};
+  spring.stiffness = 1000, spring.rest = 0.2, spring.preload = -30, spring.damping = 4;
+  motors.addPointSpring("world", "known", spring);
+  spring.name = "damper", spring.stiffness = spring.preload = 0;
+  motors.addPointSpring("unknown", "known", spring);
   const Model belted = motors.build();
   writeRobot(belted, directory.path() + "/belted");
   checkSame(belted, loadRobot(directory.path() + "/belted").model);

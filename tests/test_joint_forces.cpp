@@ -1,10 +1,11 @@
-// Springs, dampers and friction on joints. Oracles: an oscillator in closed form, central differences, power.
+// Springs, dampers and friction on joints, springs and dampers between points. Oracles: an oscillator in closed form, central differences, power.
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/dynamics/variation.h"
 #include "check_derivative.h"
+#include "dynamics/reduction.h"
 #include "get_error.h"
 
 using namespace bielle;
@@ -67,6 +68,65 @@ TEST_CASE("refused numbers of joint forces") {
     for (double value : {-1.0, std::nan(""), HUGE_VAL}) refuse("not a finite number of 0 or more", field, value);
   for (auto field : {&JointForce::rest, &JointForce::preload}) refuse("not finite", field, HUGE_VAL);
   refuse("friction_speed is not positive", &JointForce::friction_speed, 0);
+}
+
+TEST_CASE("a spring and damper between two points: its force and energy in closed form") {
+  const auto make = [](PointSpring spring) {
+    ModelBuilder builder("oscillator");
+    builder.addLink("mass", "world", makeSlide(), {2, Vector3d::Zero(), 0.1 * Matrix3d::Identity()});
+    builder.addFrame("anchor", "world", {Matrix3d::Identity(), {0.1, 0, 0}});
+    spring.name = "spring";
+    builder.addPointSpring("anchor", "mass", spring);
+    return builder.build();
+  };
+  PointSpring spring;
+  spring.point1 = {0.3, 0, 0}, spring.point2 = {0.1, 0, 0};  // 0.3 m beside the slide
+  spring.stiffness = 50, spring.rest = 0.2, spring.preload = 3, spring.damping = 4;
+  const Model model = make(spring);
+  REQUIRE(model.pointSprings().size() == 1);
+  CHECK(model.pointSprings()[0].dofs == std::vector<int>{0});
+  CHECK(model.pointSprings()[0].signs == std::vector<int>{-1});
+  Workspace ws(model);
+  const auto calcForce = [](const Model& m, Workspace& w, double q, double v) {
+    return 2 * 9.81 -
+           calcInverseDynamics(m, w, VectorXd::Constant(1, q), VectorXd::Constant(1, v), VectorXd::Zero(1))[0];
+  };
+  // At q = 0.4 the line is 0.5 m long and its rate is 0.8 v; it pulls the mass down.
+  const double tension = 3 + 50 * 0.3 + 4 * 0.8 * -0.15;
+  CHECK(calcForce(model, ws, 0.4, -0.15) == Approx(-0.8 * tension).epsilon(1e-14));
+  CHECK(calcPotentialEnergy(model, ws) == Approx(2 * 9.81 * 0.4 + 25 * 0.09 + 3 * 0.3).epsilon(1e-14));
+
+  // Where the points meet, everything stays finite, and a preload has no direction.
+  spring.point1 = {-0.1, 0, 0}, spring.point2 = Vector3d::Zero();
+  const Model meeting = make(spring);
+  Workspace other(meeting);
+  CHECK(calcForce(meeting, other, 0, -0.15) == 0);
+  CHECK(calcForce(meeting, other, 1e-6, -0.15) == Approx(7 + 4 * 0.15).epsilon(1e-4));
+  updateInverseDynamicsDerivatives(meeting, other, {});
+  CHECK((other.dID_dq.allFinite() && other.dID_dv.allFinite()));
+  CHECK_THAT(getError([&] { makeReduction(meeting, VectorXd::Zero(1)); }), Catch::Contains("its points meet"));
+}
+
+TEST_CASE("refused springs between points") {
+  const auto refuse = [](const char* problem, const auto& change, const std::string& frame2 = "mass") {
+    ModelBuilder builder("oscillator");
+    builder.addLink("mass", "world", makeSlide(), {2, Vector3d::Zero(), 0.1 * Matrix3d::Identity()});
+    PointSpring spring;
+    spring.name = "spring";
+    builder.addPointSpring("world", "mass", spring);
+    spring.name = "other";
+    change(spring);
+    CHECK_THAT(getError([&] { builder.addPointSpring("world", frame2, spring); }), Catch::Contains(problem));
+  };
+  const auto nothing = [](PointSpring&) {};
+  refuse("two of them have this name", [](PointSpring& spring) { spring.name = "spring"; });
+  refuse("there is no link or frame 'none'", nothing, "none");
+  refuse("on the same rigid body", nothing, "world");
+  for (auto field : {&PointSpring::stiffness, &PointSpring::rest, &PointSpring::damping})
+    for (double value : {-1.0, std::nan(""), HUGE_VAL})
+      refuse("not a finite number of 0 or more", [&](PointSpring& spring) { spring.*field = value; });
+  refuse("its preload is not finite", [](PointSpring& spring) { spring.preload = std::nan(""); });
+  refuse("a point is not finite", [](PointSpring& spring) { spring.point1.x() = HUGE_VAL; });
 }
 
 TEST_CASE("joint forces: inverse and constrained dynamics against differences, every joint kind") {
@@ -138,6 +198,17 @@ TEST_CASE("joint forces: the energy falls by what dampers and friction take") {
   for (const JointForce& force : model.jointForces()) {
     const double rate = v[force.dof];
     power -= rate * (force.damping * rate + force.friction * rate / std::hypot(rate, force.friction_speed));
+  }
+  REQUIRE(!model.pointSprings().empty());
+  for (const PointSpring& spring : model.pointSprings()) {
+    const auto length = [&](const VectorXd& t) {
+      updatePositions(model, ws, model.integrate(q, t[0] * v));
+      const Vector3d line = ws.X_WB[spring.body2].act(spring.point2) - ws.X_WB[spring.body1].act(spring.point1);
+      return VectorXd::Constant(1, line.norm()).eval();
+    };
+    const double rate = differentiate(VectorXd::Zero(1), 1e-3, length)(0, 0);
+    REQUIRE(spring.damping * rate * rate > 1e-3);
+    power -= spring.damping * rate * rate;
   }
   REQUIRE(power < -0.1);
   CHECK(differentiate(VectorXd::Zero(1), 1e-3, energy)(0, 0) == Approx(power).epsilon(1e-7));

@@ -54,6 +54,11 @@ TEST_CASE("mujoco world: a robot is pushed, and the work of the push is booked")
   checkPushed(*makeMujocoWorld(model), model, kTolerances);
 }
 
+TEST_CASE("mujoco world: springs and dampers between points move a linkage, and are booked") {
+  const Model model = makeSprungFivebar();
+  checkSprung(*makeFineWorld(model, 5e-5), model, 5e-3, 1e-3);
+}
+
 TEST_CASE("mujoco world: a robot stands on a box that is turned and inclined, one of hundreds") {
   const Model model = loadRobot("bipetto").model;
   const PostureHold posture(model);

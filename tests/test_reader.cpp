@@ -240,6 +240,33 @@ TEST_CASE("springs, dampers and friction arrive, each number in its place") {
   CHECK(second.friction_speed == 0.01);
 }
 
+TEST_CASE("springs between points arrive, each number in its place") {
+  const Model model = loadWith(
+      "point_springs: {first: {frames: [hand, world], points: [[1, 2, 3], [4, 5, 6]], stiffness: 7, rest: 8, preload: "
+      "-9, "
+      "damping: 10}, second: {frames: [rod_joint, arm], damping: 11}}");
+  REQUIRE(model.pointSprings().size() == 2);
+  const PointSpring &first = model.pointSprings()[0], &second = model.pointSprings()[1];
+  CHECK(first.name == "first");
+  CHECK(first.body1 == model.findJoint("shoulder"));
+  CHECK(first.body2 == 0);
+  CHECK((first.point1 - Vector3d(1.2, 2, 3)).norm() < 1e-15);  // of the hand, which is fixed to the arm
+  CHECK(first.point2 == Vector3d(4, 5, 6));
+  CHECK(first.stiffness == 7);
+  CHECK(first.rest == 8);
+  CHECK(first.preload == -9);
+  CHECK(first.damping == 10);
+  // The base is free: its dofs move the hand, but not the ground.
+  CHECK(first.dofs == model.supportDofs(first.body1));
+  CHECK(first.signs == std::vector<int>(7, 1));
+  CHECK(second.body1 == model.findJoint("rod_joint"));
+  CHECK(second.body2 == first.body1);
+  CHECK(second.damping == 11);
+  CHECK(second.stiffness == 0);
+  CHECK(second.dofs == std::vector<int>{6, 7});
+  CHECK(second.signs == std::vector<int>{-1, 1});
+}
+
 TEST_CASE("motors, armature, contacts, references, serial joints and gravity arrive") {
   const Model model = load(kToyUrdf, R"(motors: {shoulder: {effort: .inf, velocity: 9, torque_loss: 0.4}, rod_joint: }
 armature: 0.25

@@ -152,7 +152,7 @@ TEST_CASE("reduced step: random mechanisms, every joint kind times every closure
       }
 }
 
-TEST_CASE("reduced step: springs, dampers and friction on joints in and outside loops") {
+TEST_CASE("reduced step: springs, dampers and friction on joints in and outside loops, and between points of both") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(17);
   for (JointKind kind : kJointKinds)

@@ -51,6 +51,14 @@ std::vector<ModelVariation> listVariations(std::mt19937& rng, const Model& model
   for (int i = 1; i < model.numBodies(); ++i)
     all.inertias[i] = 0.5 * model.bodies()[i].inertia.toMatrix() + 0.05 * randomInertia(rng).toMatrix();
   for (const Motor& motor : model.motors()) all.armature[motor.dof] = 0.3;
+  for (size_t s = 0; s < model.pointSprings().size(); ++s) {
+    ModelVariation ends(model), numbers(model);
+    all.points1[s] = ends.points1[s] = randomVector(rng, 3);
+    all.points2[s] = ends.points2[s] = randomVector(rng, 3);
+    all.springs[s] = numbers.springs[s] = randomVector(rng, 4);
+    out.push_back(ends);
+    out.push_back(numbers);
+  }
   ModelVariation inertias(model);
   inertias.inertias = all.inertias, inertias.armature = all.armature;
   out.push_back(inertias);
@@ -180,6 +188,33 @@ TEST_CASE("variation: forward dynamics, every joint kind times every closure kin
           checkDerivative(analytic.a, numeric.topRows(model.nv()));
           checkDerivative(analytic.lambda, numeric.bottomRows(set.rows));
         }
+}
+
+TEST_CASE("variation: forward dynamics with springs and dampers on joints and between points") {
+  std::mt19937 rng(24);
+  for (JointKind kind : kJointKinds) {
+    CAPTURE(getName(kind));
+    const Mechanism mechanism = makeSprungMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer);
+    const Model& model = mechanism.model;
+    const ConstraintSet set = makeConstraintSet(model);
+    const VectorXd v = randomVector(rng, model.nv()), tau = calcMotorForces(model, randomVector(rng, 2, 10));
+    Workspace ws(model);
+    ConstrainedWorkspace cws;
+    REQUIRE(updateConstrainedDynamics(model, ws, cws, set, mechanism.q_closed, v, tau) == DynamicsStatus::Ok);
+    const std::vector<ModelVariation> directions = listVariations(rng, model);
+    const DynamicsVariation analytic = calcConstrainedVariation(model, ws, cws, set, directions);
+    const MatrixXd numeric = differentiateModel(model, directions, kStep, [&](const Model& moved) {
+      Workspace other(moved);
+      ConstrainedWorkspace ocws;
+      REQUIRE(updateConstrainedDynamics(moved, other, ocws, makeConstraintSet(moved), mechanism.q_closed, v, tau) ==
+              DynamicsStatus::Ok);
+      VectorXd out(moved.nv() + set.rows);
+      out << ocws.a, ocws.lambda;
+      return out;
+    });
+    checkDerivative(analytic.a, numeric.topRows(model.nv()));
+    checkDerivative(analytic.lambda, numeric.bottomRows(set.rows));
+  }
 }
 
 TEST_CASE("variation: redundant rows, changes that leave them so") {

@@ -4,7 +4,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/model/builder.h"
 #include "bielle/motion/motion.h"
 
 namespace bielle::simulation::testing {
@@ -147,6 +150,74 @@ void checkStopped(World& world, const Model& model, const TrialTolerances& toler
   Books poisoned = end;
   poisoned.stop_loss *= 0.5;
   CHECK(calcImbalance(start, poisoned) > calcImbalance(start, end));
+}
+
+Model makeSprungFivebar() {
+  ModelParts parts = takeParts(loadRobot("fivebar").model);
+  PointSpring spring;
+  spring.name = "across", spring.body1 = 1, spring.body2 = parts.joints.back().parent;
+  spring.point1 = {0.05, 0, 0.02}, spring.point2 = {0.1, 0.01, 0};
+  spring.stiffness = 60, spring.rest = 0.1, spring.preload = 1, spring.damping = 1;
+  parts.point_springs.push_back(spring);
+  spring.name = "down", spring.body1 = 0, spring.body2 = 2;
+  spring.point1 = {0.1, 0.02, -0.3};
+  parts.point_springs.push_back(spring);
+  return ModelBuilder::restore(parts);
+}
+
+namespace {
+
+// By steps of h in x = (q, v) with accelerations of the full system.
+VectorXd swing(const Model& model, VectorXd q, double duration, double h) {
+  Workspace ws(model);
+  ConstrainedWorkspace cws;
+  const ConstraintSet loops = makeConstraintSet(model);
+  VectorXd v = VectorXd::Zero(model.nv());
+  const VectorXd tau = v;
+  const auto calcAcceleration = [&](const VectorXd& x, const VectorXd& rate) {
+    REQUIRE(updateConstrainedDynamics(model, ws, cws, loops, x, rate, tau) == DynamicsStatus::Ok);
+    return cws.a;
+  };
+  for (int i = 0; i < std::lround(duration / h); ++i) {  // all joints turn about fixed axes: q + dq
+    const VectorXd v1 = v, a1 = calcAcceleration(q, v1), v2 = v + h / 2 * a1;
+    const VectorXd a2 = calcAcceleration(q + h / 2 * v1, v2), v3 = v + h / 2 * a2;
+    const VectorXd a3 = calcAcceleration(q + h / 2 * v2, v3), v4 = v + h * a3;
+    const VectorXd a4 = calcAcceleration(q + h * v3, v4);
+    q += h / 6 * (v1 + 2 * v2 + 2 * v3 + v4);
+    v += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
+  }
+  return q;
+}
+
+}  // namespace
+
+void checkSprung(World& world, const Model& model, double balance, double error) {
+  constexpr double kDuration = 0.5;
+  const VectorXd q = findClosedConfiguration(model).q;
+  world.reset(q, VectorXd::Zero(model.nv()));
+  const Books start = world.getBooks();
+  REQUIRE(world.advance(kDuration));
+  const Books end = world.getBooks();
+  const VectorXd expected = swing(model, q, kDuration, 1e-3);
+  REQUIRE((expected - q).cwiseAbs().maxCoeff() > 0.1);
+  CHECK((world.getConfiguration() - expected).cwiseAbs().maxCoeff() < error);
+  CHECK(calcImbalance(start, end) < balance);
+  // Dampers that are booked by half, or springs that are not, must show.
+  Books poisoned = end;
+  poisoned.other_loss /= 2;
+  CHECK(calcImbalance(start, poisoned) > 2 * balance);
+  ModelParts slack = takeParts(model);
+  slack.point_springs.clear();
+  const Model without = ModelBuilder::restore(slack);
+  Workspace ws(model), other(without);
+  const auto calcSpringEnergy = [&](const VectorXd& x) {
+    updatePositions(model, ws, x);
+    updatePositions(without, other, x);
+    return calcPotentialEnergy(model, ws) - calcPotentialEnergy(without, other);
+  };
+  poisoned = end;
+  poisoned.potential -= calcSpringEnergy(world.getConfiguration()) - calcSpringEnergy(q);
+  CHECK(calcImbalance(start, poisoned) > 2 * balance);
 }
 
 }  // namespace bielle::simulation::testing

@@ -39,4 +39,10 @@ void checkPushed(World& world, const Model& model, const TrialTolerances& tolera
 // In the air, a motor drives a hip into its stop.
 void checkStopped(World& world, const Model& model, const TrialTolerances& tolerances);
 
+// A five-bar with springs and dampers between its rods and to the ground.
+Model makeSprungFivebar();
+// It swings for half a second, like the full system under the method of Runge and Kutta, and the springs are booked.
+// \param error  of the coordinates at the end, rad
+void checkSprung(World& world, const Model& model, double balance, double error);
+
 }  // namespace bielle::simulation::testing

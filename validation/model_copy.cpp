@@ -21,6 +21,7 @@ Model copyModel(const Model& model, const ModelChanges& changes) {
     builder.copyClosure(model, closure);
   }
   for (const JointForce& force : model.jointForces()) builder.addJointForce(model.joints()[force.joint].name, force);
+  for (const PointSpring& spring : model.pointSprings()) builder.copyPointSpring(model, spring);
   for (const ContactFrame& contact : model.contacts()) {
     builder.addFrame(contact.name + "/frame", link(contact.body), contact.X_BF);
     builder.addContact(contact.name, contact.name + "/frame", contact.kind, contact.half_length, contact.half_width);

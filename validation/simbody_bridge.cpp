@@ -271,7 +271,22 @@ VectorXd SimbodyBridge::calcDissipativeForces() const {
     const double v = s_->bodies[force.joint].getOneU(s_->state, 0);
     out[force.dof] = -force.damping * v - force.friction * v / std::hypot(v, force.friction_speed);
   }
-  return out;
+  SimTK::Vector_<SimTK::SpatialVec> body_forces(s_->matter.getNumBodies(), SimTK::SpatialVec(SimTK::Vec3(0)));
+  for (const PointSpring& spring : s_->model.pointSprings()) {
+    const SimTK::MobilizedBody &body1 = s_->bodies[spring.body1], &body2 = s_->bodies[spring.body2];
+    const SimTK::Vec3 p1 = toSimTK(spring.point1), p2 = toSimTK(spring.point2);
+    const SimTK::Vec3 direction =
+        (body2.findStationLocationInGround(s_->state, p2) - body1.findStationLocationInGround(s_->state, p1))
+            .normalize();
+    const double rate = SimTK::dot(
+        direction, body2.findStationVelocityInGround(s_->state, p2) - body1.findStationVelocityInGround(s_->state, p1));
+    const SimTK::Vec3 force = spring.damping * rate * direction;
+    body1.applyForceToBodyPoint(s_->state, p1, force, body_forces);
+    body2.applyForceToBodyPoint(s_->state, p2, -force, body_forces);
+  }
+  SimTK::Vector generalized;
+  s_->matter.multiplyBySystemJacobianTranspose(s_->state, body_forces, generalized);
+  return out + s_->T.transpose() * s_->gather(generalized);
 }
 
 void SimbodyBridge::integrate(double duration, double accuracy, VectorXd& q, VectorXd& v) {

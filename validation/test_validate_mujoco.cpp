@@ -43,7 +43,7 @@ TEST_CASE("every joint kind with every closure kind agrees with MuJoCo") {
   CHECK(without_rate > 1e-3);  // dJ/dt v is not negligible
 }
 
-TEST_CASE("springs, dampers and friction on joints agree with MuJoCo") {
+TEST_CASE("springs and dampers on joints and between points, and friction, agree with MuJoCo") {
   std::mt19937 rng(23);
   ValidationOptions options;
   options.samples = 3;

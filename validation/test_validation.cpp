@@ -51,7 +51,7 @@ TEST_CASE("every joint kind with every closure kind agrees with Simbody") {
       }
 }
 
-TEST_CASE("springs, dampers and friction on joints agree with Simbody") {
+TEST_CASE("springs and dampers on joints and between points, and friction, agree with Simbody") {
   std::mt19937 rng(13);
   ValidationOptions options;
   options.samples = 3;

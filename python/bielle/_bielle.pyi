@@ -353,6 +353,59 @@ class JointForce:
         """rad/s or m/s"""
         ...
 
+class PointSpring:
+    """Spring and damper between two points of two bodies.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, name: str = ..., body1: int = ..., body2: int = ..., point1: ArrayLike = ..., point2: ArrayLike = ..., stiffness: float = ..., rest: float = ..., preload: float = ..., damping: float = ..., dofs: Sequence[int] = ..., signs: Sequence[int] = ...) -> None: ...
+    def replace(self, *, name: str = ..., body1: int = ..., body2: int = ..., point1: ArrayLike = ..., point2: ArrayLike = ..., stiffness: float = ..., rest: float = ..., preload: float = ..., damping: float = ..., dofs: Sequence[int] = ..., signs: Sequence[int] = ...) -> PointSpring: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def name(self) -> str:
+        """unique"""
+        ...
+    @property
+    def body1(self) -> int:
+        """index; filled by the builder, like the next"""
+        ...
+    @property
+    def body2(self) -> int:
+        """index"""
+        ...
+    @property
+    def point1(self) -> Array:
+        """(3,) in body 1 (for the builder: in frame 1), m"""
+        ...
+    @property
+    def point2(self) -> Array:
+        """(3,) in body 2, m"""
+        ...
+    @property
+    def stiffness(self) -> float:
+        """N/m"""
+        ...
+    @property
+    def rest(self) -> float:
+        """length, m"""
+        ...
+    @property
+    def preload(self) -> float:
+        """tension at the rest length, N"""
+        ...
+    @property
+    def damping(self) -> float:
+        """N s/m"""
+        ...
+    @property
+    def dofs(self) -> Tuple[int, ...]:
+        """that move one point but not the other, increasing"""
+        ...
+    @property
+    def signs(self) -> Tuple[int, ...]:
+        """+1 where the dof moves point 1, -1 for point 2"""
+        ...
+
 class Closure:
     """Ties frame 1 on body 1 to frame 2 on body 2, or couples coordinates.
 
@@ -654,8 +707,8 @@ class ModelParts:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., joint_forces: Sequence[JointForce] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> None: ...
-    def replace(self, *, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., joint_forces: Sequence[JointForce] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> ModelParts: ...
+    def __init__(self, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., joint_forces: Sequence[JointForce] = ..., point_springs: Sequence[PointSpring] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> None: ...
+    def replace(self, *, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., joint_forces: Sequence[JointForce] = ..., point_springs: Sequence[PointSpring] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> ModelParts: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def name(self) -> str:
@@ -688,6 +741,10 @@ class ModelParts:
     @property
     def joint_forces(self) -> Tuple[JointForce, ...]:
         """springs, dampers and friction"""
+        ...
+    @property
+    def point_springs(self) -> Tuple[PointSpring, ...]:
+        """springs and dampers between points"""
         ...
     @property
     def contacts(self) -> Tuple[ContactFrame, ...]:
@@ -782,6 +839,14 @@ class Model:
     @property
     def motors(self) -> Tuple[Motor, ...]:
         """in the order of u"""
+        ...
+    @property
+    def joint_forces(self) -> Tuple[JointForce, ...]:
+        """springs, dampers and friction on joints"""
+        ...
+    @property
+    def point_springs(self) -> Tuple[PointSpring, ...]:
+        """springs and dampers between points"""
         ...
     @property
     def contacts(self) -> Tuple[ContactFrame, ...]:
@@ -960,6 +1025,9 @@ class ModelBuilder:
         ...
     def add_joint_force(self, joint: str, force: JointForce) -> None:
         """Spring, damper and friction (JointForce) on a joint of one coordinate."""
+        ...
+    def add_point_spring(self, frame1: str, frame2: str, spring: PointSpring) -> None:
+        """Spring and damper (PointSpring) between a point of frame 1 and one of frame 2, links or frames."""
         ...
     def add_motor(self, joint: str, armature: float = ..., effort_limit: float = ..., velocity_limit: float = ..., torque_loss: Optional[float] = ...) -> None:
         """A motor on a joint of one dof; they are numbered in the order of their calls.

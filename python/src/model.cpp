@@ -79,6 +79,7 @@ void bindParts(py::module_& module) {
       .field("closures", &ModelParts::closures, "of the loops")
       .field("motors", &ModelParts::motors, "in the order of u")
       .field("joint_forces", &ModelParts::joint_forces, "springs, dampers and friction")
+      .field("point_springs", &ModelParts::point_springs, "springs and dampers between points")
       .field("contacts", &ModelParts::contacts, "frames that may touch the ground")
       .field("references", &ModelParts::references, "postures by name")
       .field("visuals", &ModelParts::visuals, "what is drawn")
@@ -111,6 +112,8 @@ void addAttributes(ModelType& type) {
   addAttribute(type, "closures", &Model::closures, "of the loops");
   addAttribute(type, "clusters", &Model::clusters, "closures that share dofs");
   addAttribute(type, "motors", &Model::motors, "in the order of u");
+  addAttribute(type, "joint_forces", &Model::jointForces, "springs, dampers and friction on joints");
+  addAttribute(type, "point_springs", &Model::pointSprings, "springs and dampers between points");
   addAttribute(type, "contacts", &Model::contacts, "frames that may touch the ground");
   addAttribute(type, "references", &Model::references, "postures by name");
   addAttribute(type, "visuals", &Model::visuals, "what is drawn");
@@ -239,6 +242,8 @@ void bindBuilder(py::module_& module) {
            "coefficients: by name of joint, at least two; kp [1/s^2], kd [1/s]: Baumgarte stabilization.")
       .def("add_joint_force", &ModelBuilder::addJointForce, py::arg("joint"), py::arg("force"),
            "Spring, damper and friction (JointForce) on a joint of one coordinate.")
+      .def("add_point_spring", &ModelBuilder::addPointSpring, py::arg("frame1"), py::arg("frame2"), py::arg("spring"),
+           "Spring and damper (PointSpring) between a point of frame 1 and one of frame 2, links or frames.")
       .def(
           "add_motor",
           [](ModelBuilder& self, const std::string& joint, double armature, double effort, double velocity,

@@ -82,6 +82,18 @@ void bindConstraints(py::module_& module) {
       .field("damping", &JointForce::damping, "N m s/rad or N s/m")
       .field("friction", &JointForce::friction, "N m or N")
       .field("friction_speed", &JointForce::friction_speed, "rad/s or m/s");
+  Value<PointSpring>(module, "PointSpring", "Spring and damper between two points of two bodies.")
+      .field("name", &PointSpring::name, "unique")
+      .field("body1", &PointSpring::body1, "index; filled by the builder, like the next")
+      .field("body2", &PointSpring::body2, "index")
+      .field("point1", &PointSpring::point1, "(3,) in body 1 (for the builder: in frame 1), m")
+      .field("point2", &PointSpring::point2, "(3,) in body 2, m")
+      .field("stiffness", &PointSpring::stiffness, "N/m")
+      .field("rest", &PointSpring::rest, "length, m")
+      .field("preload", &PointSpring::preload, "tension at the rest length, N")
+      .field("damping", &PointSpring::damping, "N s/m")
+      .field("dofs", &PointSpring::dofs, "that move one point but not the other, increasing")
+      .field("signs", &PointSpring::signs, "+1 where the dof moves point 1, -1 for point 2");
   Value<Closure>(module, "Closure", "Ties frame 1 on body 1 to frame 2 on body 2, or couples coordinates.")
       .field("name", &Closure::name, "unique")
       .field("kind", &Closure::kind, "ClosureKind")

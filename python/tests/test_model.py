@@ -1,5 +1,7 @@
 """Robots, models, and functions of states."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -175,6 +177,23 @@ def test_couplers_and_springs_from_nothing():
     assert a == pytest.approx([-10 * 0.1 / (1 + 4), -2 * 10 * 0.1 / (1 + 4)])
     with pytest.raises(bielle.ModelError):
         builder.add_coupler("slack", {"a": 1})
+
+
+def test_a_spring_between_two_points():
+    """A mass on a vertical slide, pulled by a spring from a point beside it."""
+    builder = bielle.ModelBuilder("mass")
+    joint = bielle.Joint(name="slide", kind=bielle.JointKind.PRISMATIC, axis=[0, 0, 1])
+    builder.add_link("mass", "world", joint, bielle.Inertia(mass=2, I_com=np.eye(3)))
+    spring = bielle.PointSpring(name="spring", point1=[0.3, 0, 0], stiffness=50, rest=0.2, preload=3, damping=4)
+    builder.add_point_spring("world", "mass", spring)
+    model = builder.build()
+    assert model.point_springs[0].body2 == 1 and model.point_springs[0].signs == (-1,) and model.joint_forces == ()
+    tension = 3 + 50 * 0.3 - 4 * 0.8 * 0.15
+    assert model.forward_dynamics([0.4], [-0.15], []).a == pytest.approx([-9.81 - 0.8 * tension / 2])
+    assert pickle.loads(pickle.dumps(model)).point_springs == model.point_springs
+    assert spring.replace(rest=0.3).rest == 0.3
+    with pytest.raises(bielle.ModelError):
+        builder.add_point_spring("mass", "mass", spring.replace(name="none"))
 
 
 def test_generated_robots(tmp_path):

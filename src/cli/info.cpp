@@ -11,7 +11,7 @@ namespace {
 void printSection(const Json& robot, const char* key, const char* title, std::vector<std::string> columns) {
   if (robot[key].empty()) return;
   for (const auto& item : robot[key].front().items())  // one column per posture
-    if (item.key().rfind("gap ", 0) == 0) columns.push_back(item.key());
+    if (item.key().rfind("gap ", 0) == 0 || item.key().rfind("length ", 0) == 0) columns.push_back(item.key());
   std::cout << "\n" << title << "\n";
   printTable(std::cout, robot[key], columns);
 }
@@ -36,6 +36,8 @@ void printInfo(const Json& robot) {
   printSection(robot, "motors", "motors", {"name", "armature", "effort_limit", "velocity_limit"});
   printSection(robot, "drives", "windings and gears of motors (N m/A, ohm, V, A, N m)",
                {"name", "type", "ratio", "torque_constant", "resistance", "voltage", "current", "continuous_effort"});
+  printSection(robot, "point_springs", "springs and dampers between points (N/m, m, N, N s/m)",
+               {"name", "body1", "body2", "stiffness", "rest", "preload", "damping"});
   printSection(robot, "contacts", "contacts (length and width in m)", {"name", "kind", "body", "sole"});
   printSection(robot, "references", "references", {"name", "closed", "message"});
 }

@@ -88,6 +88,12 @@ int RobotDraft::findFrameAt(int body, const SE3& X_BF) const {
   return -1;
 }
 
+int RobotDraft::findFrameAt(int body, const Vector3d& p) const {
+  for (size_t i = 0; i < model_.frames().size(); ++i)
+    if (model_.frames()[i].body == body && model_.frames()[i].X_BF.p == p) return static_cast<int>(i);
+  return -1;
+}
+
 Model RobotDraft::build() const {
   const Model& m = model_;
   ModelBuilder builder(m.name());
@@ -105,7 +111,7 @@ Model RobotDraft::build() const {
     const Frame& frame = m.frames()[i];
     if (frame.name != getLink(frame.body)) builder.addFrame(frame.name, getLink(frame.body), {frames_[i]});
   }
-  // Closures and contacts made from a frame move with it.
+  // Closures, springs and contacts made from a frame move with it.
   const auto place = [&](const std::string& name, int body, const SE3& X_BF) {
     if (const int frame = findFrameAt(body, X_BF); frame >= 0) return m.frames()[frame].name;
     builder.addFrame(name, getLink(body), X_BF);
@@ -123,6 +129,14 @@ Model RobotDraft::build() const {
   for (const Joint& joint : m.joints())
     if (joint.nv > 0 && m.findMotor(joint.name) < 0) builder.setArmature(joint.name, m.armature()[joint.idx_v]);
   for (const JointForce& force : m.jointForces()) builder.addJointForce(m.joints()[force.joint].name, force);
+  for (PointSpring spring : m.pointSprings()) {
+    const auto move = [&](int body, Vector3d& point) {
+      if (const int frame = findFrameAt(body, point); frame >= 0) point = frames_[frame].p;
+    };
+    move(spring.body1, spring.point1);
+    move(spring.body2, spring.point2);
+    builder.copyPointSpring(m, spring);
+  }
   for (const ContactFrame& c : m.contacts())
     builder.addContact(c.name, place(c.name + "/frame", c.body, c.X_BF), c.kind, c.half_length, c.half_width);
   for (const Reference& reference : m.references()) builder.addReference(reference);

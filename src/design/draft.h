@@ -23,7 +23,7 @@ class RobotDraft {
   /// A place by name in the frame of `body`: that of getPlace, or the origin for the joint that carries `body`.
   /// \throws ModelError when it is fixed to another body
   Vector3d getPlaceIn(int body, const std::string& name) const;
-  /// Moves a joint with everything that it carries, or a frame with the closures and contacts attached to it.
+  /// Moves a joint with everything that it carries, or a frame with the closures, springs and contacts attached to it.
   void setPlace(const std::string& name, const Vector3d& p);
 
   /// Stretches a link along `direction` (unit) by `factor`, with `origin` and the mass per length unchanged:
@@ -41,6 +41,7 @@ class RobotDraft {
   int findMovable(const std::string& name, bool& is_joint) const;
   int findLink(const std::string& name) const;
   int findFrameAt(int body, const SE3& X_BF) const;
+  int findFrameAt(int body, const Vector3d& p) const;
   std::string getLink(int body) const { return body == 0 ? "world" : model_.bodies()[body].name; }
 
   const Model& model_;

@@ -11,7 +11,8 @@ constexpr double kStep = 1e-3;  // of the width of the bounds
 bool isSameButForPlaces(const Model& a, const Model& b) {
   const auto same = [](const Vector3d& x, const Vector3d& y) { return (x - y).norm() < 1e-12; };
   bool out = a.numBodies() == b.numBodies() && a.closures().size() == b.closures().size() &&
-             a.contacts().size() == b.contacts().size() && same(a.gravity(), b.gravity());
+             a.contacts().size() == b.contacts().size() && a.pointSprings().size() == b.pointSprings().size() &&
+             same(a.gravity(), b.gravity());
   for (int i = 1; out && i < a.numBodies(); ++i) {
     const Joint &j = a.joints()[i], &k = b.joints()[i];
     out = j.kind == k.kind && same(j.axis, k.axis) && same(j.axis2, k.axis2);
@@ -39,6 +40,15 @@ void addChange(const Model& from, const Model& to, double weight, ModelVariation
     for (size_t i = 0; i < from.closures()[c].terms.size(); ++i)
       out.coefficients[c][static_cast<Eigen::Index>(i)] +=
           weight * (to.closures()[c].terms[i].coefficient - from.closures()[c].terms[i].coefficient);
+  }
+  const auto getNumbers = [](const PointSpring& s) {
+    return Eigen::Vector4d(s.stiffness, s.rest, s.preload, s.damping);
+  };
+  for (size_t s = 0; s < from.pointSprings().size(); ++s) {
+    const PointSpring &a = from.pointSprings()[s], &b = to.pointSprings()[s];
+    out.points1[s] += weight * (b.point1 - a.point1);
+    out.points2[s] += weight * (b.point2 - a.point2);
+    out.springs[s] += weight * (getNumbers(b) - getNumbers(a));
   }
   for (size_t c = 0; c < from.contacts().size(); ++c)
     addTwist(from.contacts()[c].X_BF, to.contacts()[c].X_BF, out.contacts[c]);

@@ -1,5 +1,6 @@
 #include "bielle/dynamics/kinematics.h"
 #include "dynamics/joint_force.h"
+#include "dynamics/point_spring.h"
 
 namespace bielle {
 
@@ -50,6 +51,7 @@ double calcKineticEnergy(const Model& model, const Workspace& ws) {
 double calcPotentialEnergy(const Model& model, const Workspace& ws) {
   double energy = -model.mass() * model.gravity().dot(calcCom(model, ws));
   for (const JointForce& force : model.jointForces()) energy += calcSpringEnergy(force, ws.q);
+  for (const PointSpring& spring : model.pointSprings()) energy += calcSpringEnergy(spring, ws);
   return energy;
 }
 

@@ -1,16 +1,24 @@
 #include "dynamics/reduced_tree.h"
 
+#include <map>
+
 #include "bielle/dynamics/rnea.h"
+#include "dynamics/point_spring.h"
 
 namespace bielle {
+namespace {
+
+template <typename Columns>
+void resize(const ReducedJoint& place, Columns& columns) {
+  columns.outer = place.outer;
+  for (auto* m : {&columns.J, &columns.dV, &columns.dA, &columns.dW}) m->setZero(6, place.outer.size());
+}
+
+}  // namespace
 
 template <typename T>
 ReducedTreeOf<T>::ReducedTreeOf(const Model& model, const Reduction& reduction, const std::vector<int>& tips)
     : model_(model), reduction_(reduction) {
-  const auto resize = [](const ReducedJoint& place, Columns& columns) {
-    columns.outer = place.outer;
-    for (Matrix6X<T>* m : {&columns.J, &columns.dV, &columns.dA, &columns.dW}) m->setZero(6, place.outer.size());
-  };
   size_t groups = 0;
   for (const ReducedJoint& place : reduction.joints) {
     Link link;
@@ -25,11 +33,32 @@ ReducedTreeOf<T>::ReducedTreeOf(const Model& model, const Reduction& reduction, 
     for (Matrix6X<T>* m : {&link.YJ, &link.BtJ, &link.Gy, &link.Gv}) m->setZero(6, place.size);
     links_.push_back(std::move(link));
   }
-  for (int body : tips) {
-    tips_.push_back({makeTip(model, reduction, body), {}});
-    resize(tips_.back().place, tips_.back().columns);
-  }
+  for (int body : tips) tips_.push_back(makeColumns(body));
+  for (const PointSpring& spring : model.pointSprings()) springs_.push_back(makeSpringEnds(spring));
   for (Matrix6X<T>* m : {&after_y_, &after_v_}) m->setZero(6, groups);
+}
+
+template <typename T>
+typename ReducedTreeOf<T>::Tip ReducedTreeOf<T>::makeColumns(int body) const {
+  Tip tip{makeTip(model_, reduction_, body), {}};
+  resize(tip.place, tip.columns);
+  return tip;
+}
+
+template <typename T>
+typename ReducedTreeOf<T>::SpringEnds ReducedTreeOf<T>::makeSpringEnds(const PointSpring& spring) const {
+  SpringEnds out{makeColumns(spring.body1), makeColumns(spring.body2), {}};
+  std::map<int, SpringCoordinate> coordinates;
+  const auto enter = [&](const std::vector<int>& outer, int SpringCoordinate::*column) {
+    for (size_t o = 0; o < outer.size(); ++o) {
+      coordinates[outer[o]].index = outer[o];
+      coordinates[outer[o]].*column = static_cast<int>(o);
+    }
+  };
+  enter(out.tip1.place.outer, &SpringCoordinate::column1);
+  enter(out.tip2.place.outer, &SpringCoordinate::column2);
+  for (const auto& [index, coordinate] : coordinates) out.coordinates.push_back(coordinate);
+  return out;
 }
 
 template <typename T>
@@ -205,6 +234,30 @@ void ReducedTreeOf<T>::addClusterWithin(const WorkspaceOf<T>& ws, const ClusterL
 }
 
 template <typename T>
+void ReducedTreeOf<T>::addPointSpring(const WorkspaceOf<T>& ws, const PointSpring& spring, const SpringEnds& ends,
+                                      typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v) const {
+  const PointSpringLine<T> line(ws, spring);
+  const Columns &in1 = ends.tip1.columns, &in2 = ends.tip2.columns;
+  const auto read = [](const Matrix6X<T>& columns, int at) {
+    return at < 0 ? Vector6<T>(Vector6<T>::Zero()) : Vector6<T>(columns.col(at));
+  };
+  for (const SpringCoordinate& by : ends.coordinates) {
+    const auto change = line.calcChange(read(in1.J, by.column1), read(in2.J, by.column2), read(in1.dV, by.column1),
+                                        read(in2.dV, by.column2));
+    for (const SpringCoordinate& of : ends.coordinates) {
+      if (of.column1 >= 0) {
+        A_y(of.index, by.index) -= in1.J.col(of.column1).dot(change.wrench1);
+        A_v(of.index, by.index) -= in1.J.col(of.column1).dot(change.wrench_v);
+      }
+      if (of.column2 >= 0) {
+        A_y(of.index, by.index) += in2.J.col(of.column2).dot(change.wrench2);
+        A_v(of.index, by.index) += in2.J.col(of.column2).dot(change.wrench_v);
+      }
+    }
+  }
+}
+
+template <typename T>
 void ReducedTreeOf<T>::updateDerivatives(const WorkspaceOf<T>& ws, const std::vector<ClusterLiftOf<T>>& lifts,
                                          typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v) {
   A_y.setZero();
@@ -232,6 +285,11 @@ void ReducedTreeOf<T>::updateDerivatives(const WorkspaceOf<T>& ws, const std::ve
     }
   }
   for (Tip& tip : tips_) updateColumns(ws, lifts, tip.place, Depth::All, tip.columns);
+  for (size_t s = 0; s < springs_.size(); ++s) {
+    SpringEnds& ends = springs_[s];
+    for (Tip* tip : {&ends.tip1, &ends.tip2}) updateColumns(ws, lifts, tip->place, Depth::Velocities, tip->columns);
+    addPointSpring(ws, model_.pointSprings()[s], ends, A_y, A_v);
+  }
 }
 
 template class ReducedTreeOf<double>;

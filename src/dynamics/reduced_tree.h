@@ -17,6 +17,7 @@
 ///     A_v = sum_j N_j (YJ_j . dW~ + BtJ_j . J~ + J_j . G'~_v + D_j d_v,j + r_j N_j)
 ///     M = sum_j N_j (YJ_j . J~ + J_j . (YJ)'~ + D_j N_j)                                                           (3)
 /// The loop forces have no other effect: they are internal to the cluster and cancel in every sum that leaves it.
+/// Springs between points add Eq. (4) of point_spring.h, with the columns J~, dV~ of their bodies.
 #include "dynamics/cluster_motion.h"
 
 namespace bielle {
@@ -75,10 +76,24 @@ class ReducedTreeOf {
     ReducedJoint place;
     Columns columns;
   };
+  // Of a point spring. A coordinate moves one of its bodies or both: columns of its ends, -1 if it does not.
+  struct SpringCoordinate {
+    int index = 0;
+    int column1 = -1, column2 = -1;
+  };
+  struct SpringEnds {
+    Tip tip1, tip2;
+    std::vector<SpringCoordinate> coordinates;
+  };
+  Tip makeColumns(int body) const;
+  SpringEnds makeSpringEnds(const PointSpring& spring) const;
+  void addPointSpring(const WorkspaceOf<T>& ws, const PointSpring& spring, const SpringEnds& ends,
+                      typename ArgumentsOf<T>::Matrix A_y, typename ArgumentsOf<T>::Matrix A_v) const;
   const Model& model_;
   const Reduction& reduction_;
   std::vector<Link> links_;
   std::vector<Tip> tips_;
+  std::vector<SpringEnds> springs_;
   Matrix6X<T> after_y_, after_v_;  // sums (1) over the dofs after a group
 };
 

@@ -8,6 +8,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/builder.h"
+#include "dynamics/point_spring.h"
 
 namespace bielle {
 namespace {
@@ -127,6 +128,11 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
                          "close the configuration first (assemble, closeConfiguration)");
     out.clusters.push_back(std::move(cluster));
   }
+  for (const PointSpring& spring : model.pointSprings())
+    if (calcPointSpringLength(spring, whole) < kShortestSpring)
+      throw ModelError(model.name(), "point spring '" + spring.name + "'",
+                       "its points meet at the given configuration, where its force has no direction",
+                       "move one of its points, or begin at another posture");
   // Reduced joints and their reduced coordinates, in the order of the first joint of each.
   std::vector<int> cluster_joint(out.clusters.size(), -1);
   std::vector<int>& joint_of = out.joint_of_body;

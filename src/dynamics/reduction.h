@@ -75,7 +75,8 @@ struct Reduction {
 };
 
 /// \param q closed configuration at which ranks are determined
-/// \throws ModelError when q is not closed (to 1e-8) or the model has no mobility
+/// \throws ModelError when q is not closed (to 1e-8), the points of a point spring are closer than kShortestSpring or the
+/// model has no mobility
 Reduction makeReduction(const Model& model, ConstVectorRef q);
 
 /// Parent, path and outer coordinates of a frame fixed to a body (without coordinates of its own).

@@ -2,6 +2,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "dynamics/joint_force.h"
+#include "dynamics/point_spring.h"
 #include "math/lanes.h"
 
 namespace bielle {
@@ -37,10 +38,21 @@ Vector6<T> applyB(const WorkspaceOf<T>& ws, int i, const Vector6<T>& x) {
   return out;
 }
 
+// The forces of bodies less those of the springs and dampers between their points.
+template <typename T>
+void subtractPointSprings(const Model& model, WorkspaceOf<T>& ws) {
+  for (const PointSpring& spring : model.pointSprings()) {
+    const Vector6<T> W = PointSpringLine<T>(ws, spring).calcWrench();
+    ws.F[spring.body1] -= W;
+    ws.F[spring.body2] += W;
+  }
+}
+
 // Generalized forces of the accelerations of the bodies, without rotors, less those of springs, dampers and friction.
 template <typename T>
 void sumForces(const Model& model, WorkspaceOf<T>& ws, VectorX<T>& out) {
   for (int i = 1; i < model.numBodies(); ++i) ws.F[i] = calcBodyForce(ws, i, ws.A[i]);
+  subtractPointSprings(model, ws);
   for (int i = model.numBodies() - 1; i > 0; --i) {
     const Joint& joint = model.joints()[i];
     for (int k = joint.idx_v; k < joint.idx_v + joint.nv; ++k) out[k] = ws.J.col(k).dot(ws.F[i]);
@@ -131,6 +143,7 @@ void updateInverseDynamicsFactors(const Model& model, WorkspaceOf<T>& ws,
     ws.Yc[i] = ws.Y[i];
     calcB(ws, i, model.bodies()[i].inertia.mass, ws.Bc[i]);
   }
+  subtractPointSprings(model, ws);
   for (int i = model.numBodies() - 1; i > 0; --i) {
     const Joint& joint = model.joints()[i];
     for (int j = joint.idx_v; j < joint.idx_v + joint.nv; ++j) {
@@ -152,9 +165,37 @@ void updateInverseDynamicsFactors(const Model& model, WorkspaceOf<T>& ws,
   }
 }
 
+namespace {
+
+// Eq. (4) of point_spring.h.
+void addPointSpringDerivatives(const Model& model, Workspace& ws, const PointSpring& spring) {
+  const PointSpringLine<double> line(ws, spring);
+  const Vector6d zero = Vector6d::Zero();
+  for (size_t i = 0; i < spring.dofs.size(); ++i) {
+    const int k = spring.dofs[i];
+    const Vector6d J = ws.J.col(k), dV = ws.dV.col(k);
+    const auto change = spring.signs[i] > 0 ? line.calcChange(J, zero, dV, zero) : line.calcChange(zero, J, zero, dV);
+    const Vector6d wrench_v = change.wrench_v;
+    for (int j : model.supportDofs(spring.body1)) {
+      ws.dID_dq(j, k) -= ws.J.col(j).dot(change.wrench1);
+      ws.dID_dv(j, k) -= ws.J.col(j).dot(wrench_v);
+    }
+    for (int j : model.supportDofs(spring.body2)) {
+      ws.dID_dq(j, k) += ws.J.col(j).dot(change.wrench2);
+      ws.dID_dv(j, k) += ws.J.col(j).dot(wrench_v);
+    }
+  }
+}
+
+}  // namespace
+
 void updateInverseDynamicsDerivatives(const Model& model, Workspace& ws, const std::vector<Vector6d>& f_ext) {
   requireStage(ws, WorkspaceStage::Acceleration, "updateInverseDynamicsDerivatives", "updateAccelerations");
   updateInverseDynamicsFactors(model, ws, f_ext);
+  if (!model.pointSprings().empty()) {  // they add to entries of dofs on different paths, which stay zero without them
+    ws.dID_dq.setZero();
+    ws.dID_dv.setZero();
+  }
   const auto write = [&](int j, int k) {
     const auto entry = calcDerivativeEntry(model, ws, j, k);
     ws.dID_dq(j, k) = entry.q;
@@ -168,6 +209,7 @@ void updateInverseDynamicsDerivatives(const Model& model, Workspace& ws, const s
         write(k, j);
       }
     }
+  for (const PointSpring& spring : model.pointSprings()) addPointSpringDerivatives(model, ws, spring);
 }
 
 template void updateCompositeInertias(const Model&, Workspace&);

@@ -2,6 +2,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "dynamics/joint_force.h"
+#include "dynamics/point_spring.h"
 #include "dynamics/saddle_point.h"
 
 namespace bielle {
@@ -128,6 +129,34 @@ void updateBodyForces(const Workspace& ws, int i, const Matrix6d& inertia, Varia
   out.dF[i] = vary(A, out.dA[i]) + crossForce(out.dV[i], h) + crossForce(V, vary(V, out.dV[i]));
 }
 
+// The force of point spring s and its change, as those of body forces: less what acts on the bodies.
+void addPointSpringVariation(const Model& model, const Workspace& ws, size_t s, const ModelVariation& change,
+                             VariationWorkspace& out) {
+  const PointSpring& spring = model.pointSprings()[s];
+  const PointSpringLine<double> line(ws, spring);
+  struct End {
+    Vector3d dp, dp_rate;
+  };
+  const auto move = [&](int body, const Vector3d& p, const Vector3d& change_in_body) {
+    const auto at = &PointSpringLine<double>::calcVelocityAt;
+    const Vector3d dp = at(out.D[body], p) + ws.X_WB[body].R * change_in_body;
+    return End{dp, at(out.dV[body], p) + angular(ws.V[body]).cross(dp)};
+  };
+  const End end1 = move(spring.body1, line.p1, change.points1[s]),
+            end2 = move(spring.body2, line.p2, change.points2[s]);
+  const Vector3d force = line.tension * line.u;
+  const double dtension =
+      change.springs[s].dot(Eigen::Vector4d(line.length - spring.rest, -spring.stiffness, 1, line.rate));
+  const Vector3d dforce = line.calcForceChange(end2.dp - end1.dp, end2.dp_rate - end1.dp_rate) + dtension * line.u;
+  const auto subtract = [&](int body, double sign, const Vector3d& p, const Vector3d& dp) {
+    out.F[body] -= sign * line.makeWrench(p, force);
+    out.dF[body] -= sign * line.makeWrench(p, dforce);
+    out.dF[body].tail<3>() -= sign * dp.cross(force);
+  };
+  subtract(spring.body1, 1, line.p1, end1.dp);
+  subtract(spring.body2, -1, line.p2, end2.dp);
+}
+
 }  // namespace
 
 ModelVariation::ModelVariation(const Model& model)
@@ -135,6 +164,9 @@ ModelVariation::ModelVariation(const Model& model)
       frames1(model.closures().size(), Vector6d::Zero()),
       frames2(frames1),
       offsets(model.closures().size(), 0),
+      points1(model.pointSprings().size(), Vector3d::Zero()),
+      points2(points1),
+      springs(model.pointSprings().size(), Eigen::Vector4d::Zero()),
       contacts(model.contacts().size(), Vector6d::Zero()),
       inertias(model.numBodies(), Matrix6d::Zero()),
       armature(VectorXd::Zero(model.nv())) {
@@ -173,6 +205,7 @@ VectorXd calcInverseDynamicsVariation(const Model& model, const Workspace& ws, c
     variation.F[closure.body1] -= W, variation.dF[closure.body1] -= dW;
     variation.F[closure.body2] += W, variation.dF[closure.body2] += dW;
   }
+  for (size_t s = 0; s < model.pointSprings().size(); ++s) addPointSpringVariation(model, ws, s, change, variation);
   VectorXd out = model.armature().cwiseProduct(motion.a) + change.armature.cwiseProduct(ws.a);
   for (const JointForce& force : model.jointForces())
     out[force.dof] += force.stiffness * motion.q[force.dof] + calcResistance(force, ws) * motion.v[force.dof];

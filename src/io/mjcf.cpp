@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 #include <sstream>
+#include <tuple>
 
 #include "bielle/dynamics/assembly.h"
 #include "io/mjcf_coordinates.h"
@@ -61,6 +62,7 @@ class Writer {
     writeShapes(0, "    ");
     for (int child : children_[0]) writeBody(child, "    ");
     out_ << "  </worldbody>\n";
+    writeTendons();
     writeClosures();
     writeMotors();
     writeKeyframes();
@@ -224,6 +226,7 @@ class Writer {
       if (contact.body == body) writeSole(contact, indent);
     for (const Frame& frame : model_.frames())
       if (frame.body == body && frame.name != model_.bodies()[body].name) writeFrame(frame, indent);
+    writeSpringSites(body, indent);
   }
 
   // Contacts are sites of their names, too.
@@ -253,7 +256,6 @@ class Writer {
 
   void writeClosures() {
     if (model_.closures().empty()) return;
-    writeTendons();
     out_ << "  <equality>\n";
     for (const Closure& closure : model_.closures()) {
       if (closure.kp != 0 || closure.kd != 0)
@@ -281,7 +283,8 @@ class Writer {
     out_ << "  </equality>\n";
   }
 
-  // An equality of joints ties two of them; the sum over more joints is the length of a fixed tendon.
+  // An equality of joints ties two of them; the sum over more joints is the length of a fixed tendon. A spring between
+  // points is a spatial one.
   void writeTendons() {
     std::ostringstream tendons;
     for (const Closure& closure : model_.closures()) {
@@ -292,7 +295,52 @@ class Writer {
                 << attribute("coef", formatNumber(term.coefficient)) << "/>\n";
       tendons << "    </fixed>\n";
     }
+    for (const PointSpring& spring : model_.pointSprings()) writePointSpring(spring, tendons);
     if (!tendons.str().empty()) out_ << "  <tendon>\n" << tendons.str() << "  </tendon>\n";
+  }
+
+  // A preload moves the rest of the spring, which MuJoCo wants to be 0 or more.
+  void writePointSpring(const PointSpring& spring, std::ostream& out) {
+    out << "    <spatial" << attribute("name", spring.name);
+    if (spring.stiffness != 0) {
+      const double rest = spring.rest - spring.preload / spring.stiffness;
+      if (rest < 0)
+        warn("point spring '" + spring.name + "'",
+             "it would have no tension below a length of 0: its preload is written as " +
+                 formatNumber(spring.stiffness * spring.rest) + " N");
+      out << attribute("stiffness", formatNumber(spring.stiffness))
+          << attribute("springlength", formatNumber(std::max(rest, 0.0)));
+    } else if (spring.preload != 0) {
+      warn("point spring '" + spring.name + "'", "its preload without a stiffness is left out");
+    }
+    if (spring.damping != 0) out << attribute("damping", formatNumber(spring.damping));
+    out << ">\n";
+    for (const auto& [body, point, end] :
+         {std::tuple{spring.body1, spring.point1, 1}, {spring.body2, spring.point2, 2}})
+      out << "      <site" << attribute("site", findSite(spring, body, point, end)) << "/>\n";
+    out << "    </spatial>\n";
+  }
+
+  // A frame of the model there, or one made for this end of the spring.
+  std::string findSite(const PointSpring& spring, int body, const Vector3d& point, int end) const {
+    for (const Frame& frame : model_.frames())
+      if (frame.body == body && frame.X_BF.p == point && frame.name != model_.bodies()[body].name &&
+          model_.findContact(frame.name) < 0)
+        return frame.name;
+    std::string name = spring.name + "." + std::to_string(end);
+    while (model_.findFrame(name) >= 0 || model_.findContact(name) >= 0) name += "'";
+    return name;
+  }
+
+  void writeSpringSites(int body, const std::string& indent) {
+    for (const PointSpring& spring : model_.pointSprings())
+      for (const auto& [owner, point, end] :
+           {std::tuple{spring.body1, spring.point1, 1}, {spring.body2, spring.point2, 2}}) {
+        const std::string name = findSite(spring, body, point, end);
+        if (owner == body && model_.findFrame(name) < 0)
+          out_ << indent << "<site" << attribute("name", name) << attribute("pos", formatVector(point))
+               << " size=\"0.001\" group=\"4\"/>\n";
+      }
   }
 
   // MuJoCo's equalities act on differences from q_ref: the length of the tendon, or y = p0 + p1 x for joints 1 and 2.

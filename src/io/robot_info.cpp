@@ -6,6 +6,7 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
+#include "dynamics/point_spring.h"
 #include "io/json_text.h"
 #include "model/number_text.h"
 
@@ -72,6 +73,25 @@ Json describeClosures(const Model& model, const std::vector<Posture>& postures) 
   return closures;
 }
 
+Json describePointSprings(const Model& model, const std::vector<Posture>& postures) {
+  Json springs = Json::array();
+  for (const PointSpring& spring : model.pointSprings())
+    springs.push_back({{"name", spring.name},
+                       {"body1", model.bodies()[spring.body1].name},
+                       {"body2", model.bodies()[spring.body2].name},
+                       {"stiffness", spring.stiffness},
+                       {"rest", spring.rest},
+                       {"preload", spring.preload},
+                       {"damping", spring.damping}});
+  Workspace ws(model);
+  for (const Posture& posture : postures) {
+    updatePositions(model, ws, posture.q);
+    for (size_t s = 0; s < springs.size(); ++s)
+      springs[s]["length " + posture.name] = calcPointSpringLength(model.pointSprings()[s], ws);
+  }
+  return springs;
+}
+
 // At the first reference that closes, else at a closed configuration near neutral.
 Json describeMobility(const Model& model, const std::vector<Posture>& postures) {
   std::string place = "closed neutral";
@@ -124,6 +144,7 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
                {"clusters", Json::array()},
                {"motors", Json::array()},
                {"drives", Json::array()},
+               {"point_springs", describePointSprings(model, postures)},
                {"contacts", Json::array()},
                {"references", Json::array()},
                {"warnings", robot.warnings}};

@@ -133,6 +133,7 @@ class Writer {
     writeClosures(out);
     writeMotors(out);
     writeJointForces(out);
+    writePointSprings(out);
     writeContacts(out);
     writeReferences(out);
     if (!model_.serialJoints().empty()) {
@@ -256,6 +257,8 @@ class Writer {
     for (const Motor& motor : model_.motors())
       if (motor.drive.isGiven() || std::isfinite(motor.continuous_effort))
         warn("motor '" + motor.name + "'", "its winding and gear are left out");
+    for (const PointSpring& spring : model_.pointSprings())
+      warn("point spring '" + spring.name + "'", "it is left out");
     for (const ContactFrame& c : model_.contacts()) warn("contact '" + c.name + "'", "it is left out");
     for (const Reference& reference : model_.references()) warn("reference '" + reference.name + "'", "it is left out");
     if (!model_.serialJoints().empty()) warn("serial joints", "they are left out");
@@ -364,6 +367,22 @@ class Writer {
         out << ", friction: " << formatNumber(force.friction)
             << ", friction_speed: " << formatNumber(force.friction_speed);
       out << "}\n";
+    }
+  }
+
+  void writePointSprings(std::ostream& out) {
+    if (!model_.pointSprings().empty()) out << "\npoint_springs:  # N/m, m, N, N s/m\n";
+    for (const PointSpring& spring : model_.pointSprings()) {
+      out << "  " << quote(spring.name) << ":\n    frames: [" << quote(model_.bodies()[spring.body1].name) << ", "
+          << quote(model_.bodies()[spring.body2].name) << "]\n    points: [[" << formatVector(spring.point1, ", ")
+          << "], [" << formatVector(spring.point2, ", ") << "]]\n";
+      const auto write = [&out](const char* key, double value) {
+        out << "    " << key << ": " << formatNumber(value) << "\n";
+      };
+      write("stiffness", spring.stiffness);
+      write("rest", spring.rest);
+      if (spring.preload != 0) write("preload", spring.preload);
+      if (spring.damping != 0) write("damping", spring.damping);
     }
   }
 

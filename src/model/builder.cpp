@@ -168,6 +168,33 @@ void ModelBuilder::addJointForce(const std::string& joint, JointForce force) {
   model_.joint_forces_.push_back(force);
 }
 
+void ModelBuilder::addPointSpring(const std::string& frame1, const std::string& frame2, PointSpring spring) {
+  const std::string element = "point spring '" + spring.name + "'";
+  for (const PointSpring& other : model_.point_springs_)
+    if (other.name == spring.name) fail(element, "two of them have this name", "rename one of them");
+  const FramePlace f1 = getFrame(frame1, element), f2 = getFrame(frame2, element);
+  if (f1.body == f2.body)
+    fail(element, "frames '" + frame1 + "' and '" + frame2 + "' are on the same rigid body, where it has no effect",
+         "name frames of two bodies, or remove it");
+  if (!spring.point1.allFinite() || !spring.point2.allFinite())
+    fail(element, "a point is not finite", "give three numbers in metres");
+  for (double value : {spring.stiffness, spring.rest, spring.damping})
+    if (!(value >= 0) || std::isinf(value))
+      fail(element, "its stiffness, rest or damping is not a finite number of 0 or more",
+           "give N/m, m and N s/m; a preload may be negative");
+  if (!std::isfinite(spring.preload)) fail(element, "its preload is not finite", "give N");
+  spring.body1 = f1.body;
+  spring.body2 = f2.body;
+  spring.point1 = f1.X_BF.act(spring.point1);
+  spring.point2 = f2.X_BF.act(spring.point2);
+  model_.point_springs_.push_back(std::move(spring));
+}
+
+void ModelBuilder::copyPointSpring(const Model& from, const PointSpring& spring) {
+  const auto link = [&from](int body) { return body == 0 ? "world" : from.bodies()[body].name; };
+  addPointSpring(link(spring.body1), link(spring.body2), spring);
+}
+
 void ModelBuilder::addContact(const std::string& name, const std::string& frame, ContactKind kind, double half_length,
                               double half_width) {
   const std::string element = "contact '" + name + "'";
@@ -249,6 +276,7 @@ Model ModelBuilder::build(std::vector<std::string>* warnings) const {
   Model model = model_;
   finishDofs(model);
   finishClosures(model);
+  finishPointSprings(model);
   for (int i = 1; i < model.numBodies(); ++i) model.mass_ += model.bodies_[i].inertia.mass;
   return model;
 }

@@ -1,4 +1,4 @@
-// Closures of a model: their checks, their dofs and the clusters that they make.
+// Closures of a model: their checks, their dofs and the clusters that they make; and the dofs of its point springs.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -7,6 +7,21 @@
 #include "bielle/model/builder.h"
 
 namespace bielle {
+namespace {
+
+// Dofs that move one of the bodies of a closure or spring but not the other, and their signs.
+template <typename Tie>
+void findRelativeDofs(const Model& model, Tie& tie) {
+  const std::vector<int>&s1 = model.supportDofs(tie.body1), &s2 = model.supportDofs(tie.body2);
+  for (int k = 0; k < model.nv(); ++k) {
+    const bool in1 = std::binary_search(s1.begin(), s1.end(), k), in2 = std::binary_search(s2.begin(), s2.end(), k);
+    if (in1 == in2) continue;
+    tie.dofs.push_back(k);
+    tie.signs.push_back(in1 ? 1 : -1);
+  }
+}
+
+}  // namespace
 
 void ModelBuilder::addClosure(const std::string& name, ClosureKind kind, const std::string& frame1,
                               const std::string& frame2, const Vector3d& axis, double kp, double kd) {
@@ -103,13 +118,11 @@ void ModelBuilder::finishClosure(const Model& model, Closure& closure) const {
     closure.signs.assign(dofs.size(), 1);
     return;
   }
-  const std::vector<int>&s1 = model.support_[closure.body1], &s2 = model.support_[closure.body2];
-  for (int k = 0; k < model.nv_; ++k) {
-    const bool in1 = std::binary_search(s1.begin(), s1.end(), k), in2 = std::binary_search(s2.begin(), s2.end(), k);
-    if (in1 == in2) continue;
-    closure.dofs.push_back(k);
-    closure.signs.push_back(in1 ? 1 : -1);
-  }
+  findRelativeDofs(model, closure);
+}
+
+void ModelBuilder::finishPointSprings(Model& model) const {
+  for (PointSpring& spring : model.point_springs_) findRelativeDofs(model, spring);
 }
 
 void ModelBuilder::finishClosures(Model& model) const {

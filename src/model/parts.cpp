@@ -33,11 +33,12 @@ void checkParts(const ModelParts& parts) {
     const bool coupler = c.kind == ClosureKind::Coupler;
     require(isBody(c.body1) && isBody(c.body2) && (c.body1 == c.body2) == coupler, parts, "closures");
     require(coupler ? c.terms.size() >= 2 : c.terms.empty(), parts, "couplers");
-    for (const CouplerTerm& term : c.terms)
-      require(isCoordinate(term.joint, term.idx_q, term.dof), parts, "couplers");
+    for (const CouplerTerm& term : c.terms) require(isCoordinate(term.joint, term.idx_q, term.dof), parts, "couplers");
   }
   for (const JointForce& force : parts.joint_forces)
     require(isCoordinate(force.joint, force.idx_q, force.dof), parts, "joint forces");
+  for (const PointSpring& spring : parts.point_springs)
+    require(isBody(spring.body1) && isBody(spring.body2) && spring.body1 != spring.body2, parts, "point springs");
   for (const Motor& motor : parts.motors)
     require(motor.joint > 0 && motor.joint < bodies && motor.dof == parts.joints[motor.joint].idx_v &&
                 parts.joints[motor.joint].nv == 1,
@@ -52,10 +53,9 @@ void checkParts(const ModelParts& parts) {
 }  // namespace
 
 ModelParts takeParts(const Model& m) {
-  return {m.name(),         m.gravity(),     m.bodies(),      m.joints(),         m.frames(),
-          m.closures(),     m.motors(),      m.contacts(),    m.references(),     m.visuals(),
-          m.serialJoints(), m.lowerLimits(), m.upperLimits(), m.velocityLimits(), m.armature(),
-          m.jointForces()};
+  return {m.name(),        m.gravity(),        m.bodies(),     m.joints(),      m.frames(),       m.closures(),
+          m.motors(),      m.contacts(),       m.references(), m.visuals(),     m.serialJoints(), m.lowerLimits(),
+          m.upperLimits(), m.velocityLimits(), m.armature(),   m.jointForces(), m.pointSprings()};
 }
 
 Model ModelBuilder::restore(ModelParts parts) {
@@ -73,6 +73,8 @@ Model ModelBuilder::restore(ModelParts parts) {
   for (Closure& closure : draft.closures_) closure.dofs.clear(), closure.signs.clear();  // found again
   draft.motors_ = std::move(parts.motors);
   draft.joint_forces_ = std::move(parts.joint_forces);
+  draft.point_springs_ = std::move(parts.point_springs);
+  for (PointSpring& spring : draft.point_springs_) spring.dofs.clear(), spring.signs.clear();  // found again
   draft.contacts_ = std::move(parts.contacts);
   draft.references_ = std::move(parts.references);
   draft.visuals_ = std::move(parts.visuals);

@@ -107,6 +107,7 @@ void complete(const YamlFile& own, YamlFile& yaml) {
     if (motor.armature) yaml.armature.erase(motor.joint);
   replace(own.armature, yaml.armature);
   replace(own.joint_forces, yaml.joint_forces);
+  replace(own.point_springs, yaml.point_springs);
   replace(own.contacts, yaml.contacts);
   replace(own.references, yaml.references);
   replace(own.serial_joints, yaml.serial_joints);
@@ -231,6 +232,10 @@ void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder)
                        c.kd);
   }
   for (const JointForceSpec& spec : yaml.joint_forces) builder.addJointForce(spec.joint, spec.force);
+  for (const PointSpringSpec& s : yaml.point_springs) {
+    const std::string element = "point spring '" + s.spring.name + "'";
+    builder.addPointSpring(frames.find(s.frame1, element), frames.find(s.frame2, element), s.spring);
+  }
   for (const ContactSpec& c : yaml.contacts)
     builder.addContact(c.name, frames.find(c.frame, "contact '" + c.name + "'"), c.kind, c.half_length, c.half_width);
   for (const std::string& joint : yaml.serial_joints) builder.addSerialJoint(joint);

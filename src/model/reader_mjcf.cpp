@@ -845,6 +845,7 @@ class Reader {
   }
 
   void readTendon(const TiXmlElement& element) {
+    if (element.ValueStr() == "spatial") return readSpatialTendon(element);
     if (element.ValueStr() != "fixed") return noteElement(element, "the tendon is left out");
     MjcfElement e(element, "", settings_, "tendon");
     FixedTendon tendon;
@@ -860,6 +861,40 @@ class Reader {
     const std::string name = getAttribute(&element, "name");
     if (name.empty()) return noteElement(element, "the tendon is left out");
     if (!tendons_.emplace(name, tendon).second) e.fail("two tendons have this name", "rename one of them");
+  }
+
+  // A spring or damper between two sites; a tendon that bends or carries only load of its own has no like here.
+  void readSpatialTendon(const TiXmlElement& element) {
+    MjcfElement e(element, "", settings_, "tendon");
+    std::vector<const TiXmlElement*> sites;
+    for (const TiXmlElement* s = element.FirstChildElement(); s; s = s->NextSiblingElement()) {
+      if (s->ValueStr() != "site") return e.leaveOut("it bends about a <" + s->ValueStr() + ">, and is left out");
+      sites.push_back(s);
+    }
+    if (sites.size() != 2) return e.leaveOut("it does not run between two sites, and is left out");
+    const auto find = [&](const TiXmlElement& site) {
+      MjcfElement end(site, "", settings_, "");
+      return findSite(end, "site");
+    };
+    const BodyPlace one = find(*sites[0]), two = find(*sites[1]);
+    PointSpringSpec spec{one.link, two.link, {}};
+    PointSpring& spring = spec.spring;
+    spring.point1 = one.X_LB.p;
+    spring.point2 = two.X_LB.p;
+    spring.stiffness = e.getNumber("stiffness", 0);
+    spring.damping = e.getNumber("damping", 0);
+    const std::vector<double> lengths = e.getNumbers("springlength", 1, 2);
+    // Without one, or with -1, as long as the file stands.
+    spring.rest = lengths.empty() || lengths[0] < 0 ? (two.X_WB.p - one.X_WB.p).norm() : lengths[0];
+    for (const char* without_meaning : {"width", "material", "rgba", "group", "user"}) e.find(without_meaning);
+    if (lengths.size() == 2 && lengths[1] != lengths[0])
+      return e.leaveOut("its spring is slack between two lengths, and it is left out");
+    if (spring.stiffness == 0 && spring.damping == 0) return e.leaveOut("it has no spring or damper, and is left out");
+    if (e.isLimited("limited", "range")) e.note("the limits of its length are left out"), e.find("range");
+    if (e.getNumber("frictionloss", 0) != 0) e.note("its frictionloss is left out");
+    spring.name = getAttribute(&element, "name");
+    if (spring.name.empty()) spring.name = "tendon_" + std::to_string(e.line());
+    yaml_.point_springs.push_back(spec);
   }
 
   // L1 - L1_ref = a + b (L2 - L2_ref) of sums of coordinates

@@ -173,6 +173,31 @@ void readJointForces(const Entry& map, YamlFile& file) {
   }
 }
 
+void readPointSprings(const Entry& map, YamlFile& file) {
+  for (const auto& [name, entry] : map.getMap()) {
+    const Fields fields = entry.getFields({"frames", "points", "stiffness", "rest", "preload", "damping"});
+    const std::vector<std::string> frames = require(fields, "frames", entry).getTexts(2);
+    PointSpringSpec spec{frames[0], frames[1], {}};
+    PointSpring& spring = spec.spring;
+    spring.name = name;
+    if (const Entry* points = find(fields, "points")) {
+      const std::vector<Entry> list = points->getList(2);
+      spring.point1 = list[0].getVector3();
+      spring.point2 = list[1].getVector3();
+    }
+    const auto read = [&fields](const char* key, double& value) {
+      if (const Entry* found = find(fields, key)) value = found->getNumber();
+    };
+    read("stiffness", spring.stiffness);
+    read("rest", spring.rest);
+    read("preload", spring.preload);
+    read("damping", spring.damping);
+    if (spring.stiffness != 0 && !find(fields, "rest"))
+      entry.fail("it has a stiffness but no rest", "give its length without load, m, or at its preload");
+    file.point_springs.push_back(std::move(spec));
+  }
+}
+
 void readContacts(const Entry& map, YamlFile& file) {
   for (const auto& [name, entry] : map.getMap()) {
     const Fields fields = entry.getFields({"frame", "type", "sole"});
@@ -228,16 +253,17 @@ BaseKind readBase(const Entry& entry) {
 }
 
 void readRoot(const Entry& root, YamlFile& file) {
-  const Fields fields =
-      root.getFields({"closed_loop", "type", "closure_name", "closures", "name_mot", "motors", "motor_catalogue",
-                      "armature", "joint_forces", "joint_name", "joint_type", "cross_inertia", "base", "contacts",
-                      "references", "serial_joints", "importance", "gravity", "model"});
+  const Fields fields = root.getFields(
+      {"closed_loop", "type",         "closure_name",  "closures",   "name_mot",   "motors",        "motor_catalogue",
+       "armature",    "joint_forces", "point_springs", "joint_name", "joint_type", "cross_inertia", "base",
+       "contacts",    "references",   "serial_joints", "importance", "gravity",    "model"});
   readPublishedClosures(fields, root, file);
   readJointTypes(fields, file);
   if (const Entry* entry = find(fields, "cross_inertia")) file.cross_inertia = readCrossInertia(*entry);
   readMotors(fields, file);
   if (const Entry* entry = find(fields, "closures")) readClosures(*entry, file);
   if (const Entry* entry = find(fields, "joint_forces")) readJointForces(*entry, file);
+  if (const Entry* entry = find(fields, "point_springs")) readPointSprings(*entry, file);
   if (const Entry* entry = find(fields, "contacts")) readContacts(*entry, file);
   if (const Entry* entry = find(fields, "references")) readReferences(*entry, file);
   if (const Entry* entry = find(fields, "serial_joints")) file.serial_joints = entry->getTexts();

@@ -64,6 +64,11 @@ struct JointForceSpec {
   JointForce force;
 };
 
+struct PointSpringSpec {
+  std::string frame1, frame2;
+  PointSpring spring;  ///< its points in these frames
+};
+
 struct ContactSpec {
   std::string name, frame;
   ContactKind kind = ContactKind::Surface6D;
@@ -82,6 +87,7 @@ struct YamlFile {
   std::map<std::string, double> armature;  ///< joint -> kg m^2
   std::optional<double> motor_armature;    ///< of every motor
   std::vector<JointForceSpec> joint_forces;
+  std::vector<PointSpringSpec> point_springs;
   std::vector<ContactSpec> contacts;
   std::vector<Reference> references;
   std::vector<std::string> serial_joints;

@@ -139,6 +139,19 @@ void addJointForces(const Model& closed, const std::vector<bool>& frozen, ModelB
   }
 }
 
+// The same of springs between points.
+void addPointSprings(const Model& closed, const std::vector<bool>& frozen, ModelBuilder& builder) {
+  for (const PointSpring& spring : closed.pointSprings()) {
+    for (int k : spring.dofs)
+      if (const int joint = closed.dofs()[k].joint; frozen[joint])
+        throw ModelError(
+            closed.name(), "point spring '" + spring.name + "'",
+            "the serial model freezes joint '" + closed.joints()[joint].name + "', which moves one end of it",
+            "use the closed model, or attach it to bodies that the serial model keeps");
+    builder.copyPointSpring(closed, spring);
+  }
+}
+
 void addReferences(const Model& closed, const std::vector<bool>& frozen, SerialModel& out, ModelBuilder& builder) {
   for (Reference reference : closed.references()) {
     for (auto it = reference.joints.begin(); it != reference.joints.end();) {
@@ -211,6 +224,7 @@ SerialModel makeSerialModel(const Model& closed, ConstVectorRef q, const SerialM
   addAttachments(closed, builder);
   addMotors(closed, linkages, options, out, builder);
   addJointForces(closed, frozen, builder);
+  addPointSprings(closed, frozen, builder);
   for (int i : closed.serialJoints()) builder.addSerialJoint(closed.joints()[i].name);
   const Model driven = builder.build();
   for (const Joint& joint : driven.joints()) {

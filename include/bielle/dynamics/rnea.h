@@ -25,7 +25,8 @@
 /// of B cancels:
 ///     B = (0, -2 p^; 0, B_a),    B_a = w^ I - I w^ - m (c v^T + v c^T) + 2 m (c.v) 1 - l^                         (11)
 /// Joint forces of the model depend on the coordinate of their own joint alone: -dtau/dq and -dtau/dv add to entry
-/// (k, k) of (7) and (9).
+/// (k, k) of (7) and (9). A spring between two points is a wrench on both bodies that counts among f_ext, and whose change in
+/// the coordinates of the bodies is added to both ends: Eq. (4) of dynamics/point_spring.h.
 /// External forces f_ext are taken as fixed in their body's coordinates; the caller adds any other dependence on q.
 #include "bielle/dynamics/workspace.h"
 

@@ -22,6 +22,10 @@
 /// A coupler with coefficients c_k and offset c_0 has, with dc their changes,
 ///     d residual = dc_0 - sum dc_k q_k - c_k dq_k,   d nu_c = sum dc_k v_k + c_k dv_k                              (9)
 /// and d a_c alike; its force acts on coordinate k with c_k lambda.
+/// The force f u of a point spring (model.h) changes, with dp_i the displacement of its point and dp'_i the change of the
+/// velocity of that, with r = p_2 - p_1 and u = r / l, by
+///     dl = u . dr,   du = (dr - u dl) / l,   dl' = du . r' + u . dr'
+///     d(f u) = (k dl + c dl' + dk (l - rest) - k d rest + d preload + dc l') u + f du                             (10)
 /// Forward dynamics change by Eq. (5) of saddle_point.h. With redundant rows, this holds for changes that keep them
 /// redundant: any other change would alter the rank.
 #include "bielle/dynamics/constrained.h"
@@ -33,14 +37,17 @@ namespace bielle {
 struct ModelVariation {
   explicit ModelVariation(const Model& model);
 
-  std::vector<Vector6d> joints;        ///< nb, of Joint::X_PJ
-  std::vector<Vector6d> frames1;       ///< per closure of the model, of Closure::X_B1
-  std::vector<Vector6d> frames2;       ///< and X_B2
-  std::vector<VectorXd> coefficients;  ///< per closure of the model, of its CouplerTerm::coefficient
-  std::vector<double> offsets;         ///< and Closure::offset
-  std::vector<Vector6d> contacts;      ///< per contact of the model, of ContactFrame::X_BF
-  std::vector<Matrix6d> inertias;      ///< nb, of Inertia::toMatrix() in the body's frame
-  VectorXd armature;                   ///< nv
+  std::vector<Vector6d> joints;          ///< nb, of Joint::X_PJ
+  std::vector<Vector6d> frames1;         ///< per closure of the model, of Closure::X_B1
+  std::vector<Vector6d> frames2;         ///< and X_B2
+  std::vector<VectorXd> coefficients;    ///< per closure of the model, of its CouplerTerm::coefficient
+  std::vector<double> offsets;           ///< and Closure::offset
+  std::vector<Vector3d> points1;         ///< per point spring of the model, of PointSpring::point1
+  std::vector<Vector3d> points2;         ///< and point2
+  std::vector<Eigen::Vector4d> springs;  ///< and of its stiffness, rest, preload and damping
+  std::vector<Vector6d> contacts;        ///< per contact of the model, of ContactFrame::X_BF
+  std::vector<Matrix6d> inertias;        ///< nb, of Inertia::toMatrix() in the body's frame
+  VectorXd armature;                     ///< nv
 };
 
 /// Changes of configuration (tangent), velocity and acceleration, nv each. Initially zero.

@@ -27,6 +27,7 @@ struct ModelParts {
   std::vector<int> serial_joints;
   VectorXd lower_limits, upper_limits, velocity_limits, armature;  ///< nv
   std::vector<JointForce> joint_forces;
+  std::vector<PointSpring> point_springs;
 };
 ModelParts takeParts(const Model& model);
 
@@ -66,6 +67,11 @@ class ModelBuilder {
   void addMotor(Motor motor);
   /// Spring, damper and friction on a joint of one coordinate; its indices are filled here.
   void addJointForce(const std::string& joint, JointForce force);
+  /// Spring and damper between two bodies. Its points are given in frames 1 and 2 (links are frames too); its bodies and
+  /// dofs are filled here.
+  void addPointSpring(const std::string& frame1, const std::string& frame2, PointSpring spring);
+  /// Adds one of another model whose links have the same names.
+  void copyPointSpring(const Model& from, const PointSpring& spring);
   void addContact(const std::string& name, const std::string& frame, ContactKind kind, double half_length,
                   double half_width);
   /// Its joints, contacts and frame must be declared before it.
@@ -94,6 +100,7 @@ class ModelBuilder {
   [[noreturn]] void fail(const std::string& element, const std::string& problem, const std::string& remedy) const;
   void finishDofs(Model& model) const;
   void finishClosures(Model& model) const;
+  void finishPointSprings(Model& model) const;
   void applyDrive(const std::string& element, Motor& motor) const;
   void checkInertias(std::vector<std::string>* warnings) const;
   void checkReference(const Reference& reference) const;

@@ -86,6 +86,24 @@ struct JointForce {
   double friction = 0, friction_speed = 0.01;   ///< N m, rad/s; or N, m/s
 };
 
+/// Spring and damper between a point of body 1 and a point of body 2. With l their distance and l' its rate, the tension
+///     f = preload + stiffness (l - rest) + damping l'
+/// pulls both points towards each other along their line; a negative one, as that of a compressed spring, pushes them
+/// apart. The preload is the tension at the rest length. So that nothing is undefined where the points meet, the distance is
+/// l = sqrt(|r|^2 + kShortestLine^2), r being the vector between the points, and the direction of the force r / l.
+struct PointSpring {
+  std::string name;
+  int body1 = 0, body2 = 0;                                       ///< filled by the builder
+  Vector3d point1 = Vector3d::Zero(), point2 = Vector3d::Zero();  ///< in the frames of the bodies, m
+  double stiffness = 0, rest = 0, preload = 0, damping = 0;       ///< N/m, m, N, N s/m
+  /// Dofs that move one point but not the other, in increasing order; sign +1 if they move point 1, -1 for point 2. Filled
+  /// by the builder.
+  std::vector<int> dofs, signs;
+};
+
+/// m, below any length that matters: a line of 1 mm is longer by 5e-16 m.
+inline constexpr double kShortestLine = 1e-9;
+
 /// Closures that share dofs, directly or through other closures: the unit in which loops are eliminated.
 struct LoopCluster {
   std::vector<int> closures;  ///< indices of closures
@@ -206,6 +224,7 @@ class Model {
   const std::vector<LoopCluster>& clusters() const { return clusters_; }
   const std::vector<Motor>& motors() const { return motors_; }
   const std::vector<JointForce>& jointForces() const { return joint_forces_; }  ///< at most one per joint
+  const std::vector<PointSpring>& pointSprings() const { return point_springs_; }
   const std::vector<ContactFrame>& contacts() const { return contacts_; }
   const std::vector<Reference>& references() const { return references_; }
   const std::vector<Visual>& visuals() const { return visuals_; }
@@ -257,6 +276,7 @@ class Model {
   std::vector<LoopCluster> clusters_;
   std::vector<Motor> motors_;
   std::vector<JointForce> joint_forces_;
+  std::vector<PointSpring> point_springs_;
   std::vector<ContactFrame> contacts_;
   std::vector<Reference> references_;
   std::vector<Visual> visuals_;

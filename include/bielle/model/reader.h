@@ -40,6 +40,9 @@
 ///   `effort` and `velocity` at the shaft of its gear
 /// - `armature: {joint: kg m^2, ...}`, or one number for all motors without one in `motors`
 /// - `joint_forces: {joint: {stiffness, rest, preload, damping, friction, friction_speed}, ...}` as in model.h
+/// - `point_springs: {name: {frames: [A, B], points: [[x, y, z], [x, y, z]], stiffness, rest, preload, damping}, ...}`
+///   between a point of A and one of B (m, default their origins), links or joints as in `closed_loop`; PointSpring in
+///   model.h
 /// - `contacts: {name: {frame, type: 6d | 3d, sole: [length, width]}, ...}`; the sole is centred on its frame, length
 ///   along x, m
 /// - `references: {name: {joints: {joint: number or list}, height: {frame, value}, feet: {contact: [x, y, z]}}, ...}`
@@ -55,7 +58,7 @@
 /// ## Files of MuJoCo (MJCF, .xml), of version 2.2.2 and today's
 /// Read are bodies and <frame>; inertias, or those of shapes without <inertial>; joints of all kinds with range, ref,
 /// armature, stiffness, springref, damping and frictionloss; the equalities connect, weld, joint and tendon (of fixed
-/// tendons) with polynomials of degree 1; motors with gear and limits (servos become motors); classes of defaults; gravity;
+/// tendons) with polynomials of degree 1; springs and dampers of spatial tendons between two sites; motors with gear and limits (servos become motors); classes of defaults; gravity;
 /// keyframes as references; sites as frames; shapes to be drawn. Ranges hold unless `limited` is false.
 /// - The frame of a body has its origin on its joint; a body with several joints becomes a chain of links BODY/JOINT
 ///   without mass. Quaternions of balls count from the pose in the file. Motors are named after their joints and give the
