@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "bielle/io/robot_writer.h"
+#include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
@@ -145,6 +146,24 @@ TEST_CASE("design: a stretched body stays a possible one") {
   const Vector3d across = direction.cross(kZ).normalized();
   const auto second = [&](const Inertia& i) { return i.I_com.trace() / 2 - across.dot(i.I_com * across); };
   CHECK(second(made.bodies()[body].inertia) == Approx(0.2 * second(bipetto.bodies()[body].inertia)));
+}
+
+TEST_CASE("design: a spring moves with the frame that it was attached to") {
+  ModelParts parts = takeParts(loadBipetto());
+  const auto frame = std::find_if(parts.frames.begin(), parts.frames.end(),
+                                  [&](const Frame& f) { return f.body > 0 && f.name != parts.bodies[f.body].name; });
+  REQUIRE(frame != parts.frames.end());
+  PointSpring spring;
+  spring.name = "spring", spring.body2 = frame->body, spring.point2 = frame->X_BF.p, spring.rest = 0.1;
+  parts.point_springs.push_back(spring);
+  const Model model = ModelBuilder::restore(parts);
+  RobotDraft draft(model);
+  const Vector3d place = frame->X_BF.p + Vector3d(0.01, 0.02, 0.03);
+  draft.setPlace(frame->name, place);
+  const Model made = draft.build();
+  REQUIRE(made.pointSprings().size() == 1);
+  CHECK(made.pointSprings()[0].point2 == place);
+  CHECK(made.pointSprings()[0].point1 == Vector3d::Zero());
 }
 
 TEST_CASE("design: a heavier trunk") {

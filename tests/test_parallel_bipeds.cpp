@@ -135,14 +135,24 @@ TEST_CASE("belt biped: bielle solve squat, walk and jump converge and are checke
                70, 0.25, {0.015, 0.2});
 }
 
-TEST_CASE("belt biped: springs, dampers and friction of its joints are in the energy that the check counts") {
+TEST_CASE(
+    "belt biped: springs, dampers and friction, on joints and between points, are in the energy that the check "
+    "counts") {
   const std::string place = std::string(BIELLE_SOURCE_DIR) + "/robots/belt_biped/belt_biped.";
   const RobotDirectory files;
   std::string forces = "joint_forces:\n";
   for (const std::string side : {"_left", "_right"})
     forces += "  knee" + side + ": {stiffness: 20, rest: 1, preload: 2, damping: 0.5}\n  motor_ankle1" + side +
               ": {friction: 0.3, friction_speed: 3}\n  ankley" + side + ": {stiffness: 10, damping: 0.2}\n";
+  forces += "point_springs:\n";
+  for (const std::string side : {"_left", "_right"})
+    forces +=
+        "  calf" + side + ": {frames: [thigh" + side + ", shank" + side +
+        "], points: [[-0.04, 0, -0.05], [-0.04, 0, -0.06]], stiffness: 300, rest: 0.2, preload: 2, damping: 3}\n" +
+        "  heel" + side + ": {frames: [shank" + side + ", foot" + side +
+        "], points: [[-0.03, 0, -0.1], [-0.06, 0, 0.01]], stiffness: 200, rest: 0.15, damping: 2}\n";
   const std::string robot = files.writeRobot(readTextFile(place + "urdf"), readTextFile(place + "yaml") + forces);
+  REQUIRE(loadRobot(robot).model.pointSprings().size() == 4);
   REQUIRE(loadRobot(robot).model.jointForces().size() == 6);
   for (const std::vector<std::string>& motion :
        {std::vector<std::string>{"squat"}, {"walk"}, {"walk", "--step", "euler"}}) {

@@ -7,6 +7,7 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
@@ -144,6 +145,20 @@ TEST_CASE("serial model: what was changed is told, motors keep their places") {
   const SerialModel heavy = makeSerialModel(robot.closed, robot.q, reflected);
   const Motor& knee = heavy.model.motors()[heavy.model.findMotor("knee_left")];
   CHECK(knee.armature == Approx(1e-3 * 1.3589 * 1.3589).epsilon(1e-2));
+}
+
+TEST_CASE("serial model: springs between points stay, unless a joint between them is frozen") {
+  const Model fourbar = loadRobot("fourbar").model;
+  const VectorXd q = findClosedConfiguration(fourbar).q;
+  const auto attach = [&](const char* joint) {
+    ModelParts parts = takeParts(fourbar);
+    PointSpring spring;
+    spring.name = "spring", spring.body2 = fourbar.findJoint(joint), spring.point1 = {0, 0, 0.3};
+    parts.point_springs.push_back(spring);
+    return makeSerialModel(ModelBuilder::restore(parts), q).model;
+  };
+  CHECK(attach("rocker_joint").pointSprings().size() == 1);
+  CHECK_THROWS_WITH(attach("crank_coupler"), Catch::Contains("point spring 'spring': the serial model freezes joint"));
 }
 
 TEST_CASE("serial model: refused where there is no serial chain") {
