@@ -7,6 +7,7 @@
 #include "bielle/io/robot_writer.h"
 #include "cli/commands.h"
 #include "io/mjcf.h"
+#include "io/sdf.h"
 #include "io/text_file.h"
 
 namespace bielle::cli {
@@ -30,6 +31,10 @@ int convert(const ConvertArguments& arguments) {
     const UrdfText text = formatUrdf(robot.model);
     warn(text.warnings);
     writeTextFile(arguments.output, text.urdf);
+  } else if (arguments.format == "sdf") {
+    const SdfText text = formatSdf(robot.model, findClosedConfiguration(robot.model).q);
+    warn(text.warnings);
+    writeTextFile(arguments.output, text.xml);
   } else {
     const MjcfText text = formatMjcf(robot.model, findClosedConfiguration(robot.model).q);
     warn(text.warnings);
@@ -46,9 +51,11 @@ void addConvert(CLI::App& app, Action& action) {
   const auto arguments = std::make_shared<ConvertArguments>();
   command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf or MuJoCo .xml file")->required();
   command
-      .add_option("--to", arguments->format,
-                  "bielle: a directory with URDF and YAML, which says all; mjcf: a file of MuJoCo; urdf: a URDF alone")
-      ->check(CLI::IsMember({"bielle", "mjcf", "urdf"}))
+      .add_option(
+          "--to", arguments->format,
+          "bielle: a directory with URDF and YAML, which says all; mjcf: a file of MuJoCo; sdf: one of Gazebo, loops "
+          "included; urdf: a URDF alone")
+      ->check(CLI::IsMember({"bielle", "mjcf", "sdf", "urdf"}))
       ->capture_default_str();
   addFixedBase(command, arguments->robot);
   command
@@ -57,6 +64,7 @@ void addConvert(CLI::App& app, Action& action) {
   command.footer(
       "What a format cannot say is told in a warning that names it; what would be another mechanism without it is "
       "refused.\n"
+      "In SDF, coordinates count from the posture that is written; couplers are left out.\n"
       "A URDF alone is a tree: loops are left out, couplers of two joints become <mimic>.\n"
       "Examples:\n"
       "  bielle convert bipetto --to mjcf -o bipetto.xml\n"
