@@ -64,7 +64,7 @@ TEST_CASE("bielle world: springs and dampers between points move a linkage, and 
   const Model model = testing::makeSprungFivebar();
   BielleWorldOptions options;
   options.world.time_step = 1e-4;
-  testing::checkSprung(*makeBielleWorld(model, options), model, 1e-3, 1e-4);
+  CHECK(testing::checkSprung(*makeBielleWorld(model, options), model, 1e-3) < 1e-4);
 }
 
 TEST_CASE("bielle world: accelerations in the air are those of the full system") {

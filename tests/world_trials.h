@@ -42,7 +42,7 @@ void checkStopped(World& world, const Model& model, const TrialTolerances& toler
 // A five-bar with springs and dampers between its rods and to the ground.
 Model makeSprungFivebar();
 // It swings for half a second, like the full system under the method of Runge and Kutta, and the springs are booked.
-// \param error  of the coordinates at the end, rad
-void checkSprung(World& world, const Model& model, double balance, double error);
+// \returns the largest error of the coordinates at the end, rad
+double checkSprung(World& world, const Model& model, double balance);
 
 }  // namespace bielle::simulation::testing
