@@ -181,7 +181,7 @@ void ModelBuilder::addPointSpring(const std::string& frame1, const std::string& 
   for (double value : {spring.stiffness, spring.rest, spring.damping})
     if (!(value >= 0) || std::isinf(value))
       fail(element, "its stiffness, rest or damping is not a finite number of 0 or more",
-           "give N/m, m and N s/m; a preload may be negative");
+           "give N/m, m and N s/m (a preload may be negative)");
   if (!std::isfinite(spring.preload)) fail(element, "its preload is not finite", "give N");
   spring.body1 = f1.body;
   spring.body2 = f2.body;
