@@ -24,6 +24,7 @@ RESULTS = {
     "Controller.reference": "Tuple[Array, Array]", "World.reset": "WorldState", "World.step": "WorldState",
     "World.count": "Optional[int]", "generators": "Dict[str, Dict[str, Dict[str, Any]]]", "motions": "Dict[str, Dict[str, Any]]",
     "Motion.goals": "Tuple[Goal, ...]", "Motion.requested": "Dict[str, float]",
+    "Model.joint_forces": "Tuple[JointForce, ...]", "Model.point_springs": "Tuple[PointSpring, ...]",
     "Motion.request": "Optional[Request]", "Motion.summary": "Optional[Summary]", "Robot.info": "Dict[str, Any]",
     "Parametrization.variables": "Tuple[DesignVariable, ...]", "Estimator.contacts": "Dict[str, bool]", "Motion.costs": "Dict[str, float]", "LibraryResidual.origin": "Optional[Tuple[str, Tuple[Any, ...]]]",
 }  # fmt: skip
@@ -125,6 +126,8 @@ def make_property(name, attribute, owner, fields, sample):
     qualified = f"{owner}.{name}"
     if name in fields:
         kind = fields[name]
+    elif qualified in RESULTS:
+        kind = RESULTS[qualified]
     elif sample is not None:
         kind = name_type(getattr(sample, name))
     else:
