@@ -65,7 +65,7 @@ inside sh -ec '
   cd /tmp
   echo secret > password
   bielle campaign grid.yaml -o grid --workers 9123 --password password &
-  work_queue_worker --password password --connect-timeout 60 --single-shot localhost 9123
+  work_queue_worker --password password --connect-timeout 60 --single-shot 127.0.0.1 9123
   wait $!
   grep "2 runs: 2 stood" grid/campaign.md
   grep "GNU General Public" /usr/share/doc/bielle-workers/copyright'
