@@ -46,7 +46,8 @@ inline SimTK::Transform toSimTK(const SE3& X) { return {toSimTKRotation(X.R), to
 enum class LoopCut { AsModelled, FewestRows };
 
 struct SimbodyTree {
-  /// Bodies, constraints, gravity, joint forces and point springs (TwoPointLinearSpring, TwoPointLinearDamper). Other forces, bodies and constraints may be added until finish().
+  /// Bodies, constraints, gravity, joint forces and point springs (TwoPointLinearSpring, TwoPointLinearDamper). Other forces,
+  /// bodies and constraints may be added until finish().
   /// \param closures  of the model, and any others such as contacts
   SimbodyTree(const Model& model, const std::vector<Closure>& closures, LoopCut cut = LoopCut::AsModelled);
   SimbodyTree(const SimbodyTree&) = delete;

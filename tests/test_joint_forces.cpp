@@ -1,4 +1,5 @@
-// Springs, dampers and friction on joints, springs and dampers between points. Oracles: an oscillator in closed form, central differences, power.
+// Springs, dampers and friction on joints, springs and dampers between points. Oracles: an oscillator in closed form, central
+// differences, power.
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"

@@ -26,7 +26,8 @@ struct UrdfJoint {
   double multiplier = 1, offset = 0;
 };
 
-/// A URDF file, or the tree of another one, checked to be one tree. Joints are depth first, the children of a link in the order of the file.
+/// A URDF file, or the tree of another one, checked to be one tree. Joints are depth first, the children of a link in the order
+/// of the file.
 struct UrdfFile {
   std::string path, name, root;
   std::map<std::string, UrdfLink> links;

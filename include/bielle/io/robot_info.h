@@ -6,8 +6,9 @@
 
 namespace bielle {
 
-/// A JSON object: sizes, mass, mobility, and lists of joints, closures, clusters, motors, point springs, contacts and references. The gaps of
-/// closures, [m, rad], and the lengths of point springs, m, are given at the neutral configuration and at each reference.
+/// A JSON object: sizes, mass, mobility, and lists of joints, closures, clusters, motors, point springs, contacts and
+/// references. The gaps of closures, [m, rad], and the lengths of point springs, m, are given at the neutral configuration and
+/// at each reference.
 std::string makeRobotInfo(const LoadedRobot& robot);
 
 }  // namespace bielle
