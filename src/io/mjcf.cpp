@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "bielle/dynamics/assembly.h"
+#include "io/format_warnings.h"
 #include "io/mjcf_coordinates.h"
 #include "io/xml_text.h"
 #include "math/so3.h"
@@ -68,7 +69,7 @@ class Writer {
     writeKeyframes();
     out_ << "</mujoco>\n";
     listOmissions();
-    return {out_.str(), warnings_};
+    return {out_.str(), warnings_.get()};
   }
 
  private:
@@ -398,9 +399,7 @@ class Writer {
     return text;
   }
 
-  void warn(const std::string& element, const std::string& problem) {
-    warnings_.push_back(model_.name() + ": " + element + ": " + problem);
-  }
+  void warn(const std::string& element, const std::string& problem) { warnings_.add(element, problem); }
 
   void reportLimits(const Joint& joint, int first) {
     for (int k = joint.idx_v + first; k < joint.idx_v + joint.nv; ++k)
@@ -423,16 +422,7 @@ class Writer {
     for (const Reference& reference : model_.references())
       if (!reference.height_frame.empty() || !reference.feet.empty())
         warn("reference '" + reference.name + "'", "of it only the assembled posture is written, as a keyframe");
-    if (!model_.serialJoints().empty()) warn("serial joints", "they are left out");
-    for (const Joint& joint : model_.joints())
-      if (joint.position_importance != 1 || joint.velocity_importance != 1)
-        warn("joint '" + joint.name + "'", "its importance is left out");
-    for (const Motor& motor : model_.motors()) {
-      if (motor.drive.isGiven() || std::isfinite(motor.continuous_effort))
-        warn("motor '" + motor.name + "'", "its winding and gear are left out");
-      else if (motor.torque_loss)
-        warn("motor '" + motor.name + "'", "its torque_loss is left out");
-    }
+    warnings_.addYamlOnly();
     if (!speeds.empty()) warn("joints " + speeds, "their limits of speed are left out");
     for (const std::string& mesh : meshes_) meshes += (meshes.empty() ? "'" : ", '") + mesh + "'";
     if (!meshes.empty()) warn("meshes " + meshes, "they are left out");
@@ -445,7 +435,7 @@ class Writer {
   std::vector<int> order_;  // bodies as written
   std::ostringstream out_;
   std::set<std::string> meshes_;
-  std::vector<std::string> warnings_;
+  FormatWarnings warnings_{model_};
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "io/format_warnings.h"
 #include "io/text_file.h"
 #include "io/xml_text.h"
 
@@ -101,8 +102,9 @@ class Writer {
                                      c.offset / c.terms[y].coefficient};
     }
     const std::string text = formatUrdf("");
-    listOmissions();
-    return {text, warnings_};
+    warnings_.addBeyondTree();
+    warnings_.addYamlOnly();
+    return {text, warnings_.get()};
   }
 
   std::string formatUrdf(const std::string& remark) {
@@ -242,28 +244,7 @@ class Writer {
     }
   }
 
-  void warn(const std::string& element, const std::string& problem) {
-    warnings_.push_back(model_.name() + ": " + element + ": " + problem);
-  }
-
-  // What only the YAML file can say.
-  void listOmissions() {
-    std::string armatures;
-    for (int i = 1; i < model_.numBodies(); ++i)
-      if (const Joint& joint = model_.joints()[i]; model_.armature()[joint.idx_v] != 0)
-        armatures += (armatures.empty() ? "'" : ", '") + joint.name + "'";
-    if (!armatures.empty()) warn("joints " + armatures, "their armature is left out");
-    if (!model_.motors().empty()) warn("motors", "which joints they drive is left out");
-    for (const Motor& motor : model_.motors())
-      if (motor.drive.isGiven() || std::isfinite(motor.continuous_effort))
-        warn("motor '" + motor.name + "'", "its winding and gear are left out");
-    for (const PointSpring& spring : model_.pointSprings())
-      warn("point spring '" + spring.name + "'", "it is left out");
-    for (const ContactFrame& c : model_.contacts()) warn("contact '" + c.name + "'", "it is left out");
-    for (const Reference& reference : model_.references()) warn("reference '" + reference.name + "'", "it is left out");
-    if (!model_.serialJoints().empty()) warn("serial joints", "they are left out");
-    if (model_.gravity() != Vector3d(0, 0, -9.81)) warn("gravity", "it is left out");
-  }
+  void warn(const std::string& element, const std::string& problem) { warnings_.add(element, problem); }
 
   void writeFrame(const std::string& name, int body, const SE3& X_BF, std::ostream& out) {
     out << "  <link name=\"" << escapeXml(name) << "\"/>\n  <joint name=\"" << escapeXml(name)
@@ -436,7 +417,7 @@ class Writer {
   };
   bool alone_ = false;
   std::map<int, Mimic> mimics_;
-  std::vector<std::string> warnings_;
+  FormatWarnings warnings_{model_};
 };
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "io/format_warnings.h"
 #include "io/xml_text.h"
 #include "math/so3.h"
 #include "model/joint.h"
@@ -42,7 +43,7 @@ class Writer {
     for (const Closure& closure : model_.closures()) writeClosure(closure);
     out_ << "  </model>\n</sdf>\n";
     listOmissions();
-    return {out_.str(), warnings_};
+    return {out_.str(), warnings_.get()};
   }
 
  private:
@@ -217,32 +218,17 @@ class Writer {
     if (closure.kp != 0 || closure.kd != 0) warn(element, "its gains kp and kd are left out");
   }
 
-  void warn(const std::string& element, const std::string& problem) {
-    warnings_.push_back(model_.name() + ": " + element + ": " + problem);
-  }
+  void warn(const std::string& element, const std::string& problem) { warnings_.add(element, problem); }
 
   void listOmissions() {
     if (!shifted_.empty()) warn("joints " + shifted_, "their coordinates count from these values, rad or m");
-    std::string armatures;
-    for (int i = 1; i < model_.numBodies(); ++i)
-      if (const Joint& joint = model_.joints()[i]; model_.armature()[joint.idx_v] != 0)
-        armatures += (armatures.empty() ? "'" : ", '") + joint.name + "'";
-    if (!armatures.empty()) warn("joints " + armatures, "their armature is left out");
-    if (!model_.motors().empty()) warn("motors", "which joints they drive is left out");
-    for (const Motor& motor : model_.motors())
-      if (motor.drive.isGiven() || std::isfinite(motor.continuous_effort))
-        warn("motor '" + motor.name + "'", "its winding, gear and efficiency are left out");
-    for (const PointSpring& spring : model_.pointSprings())
-      warn("point spring '" + spring.name + "'", "it is left out");
-    for (const ContactFrame& c : model_.contacts()) warn("contact '" + c.name + "'", "it is left out");
     for (const Visual& visual : model_.visuals())
       if (visual.body == 0) {
         warn("shapes of the ground", "they are left out");
         break;
       }
-    for (const Reference& reference : model_.references()) warn("reference '" + reference.name + "'", "it is left out");
-    if (!model_.serialJoints().empty()) warn("serial joints", "they are left out");
-    if (model_.gravity() != Vector3d(0, 0, -9.81)) warn("gravity", "it is left out: that of a world counts");
+    warnings_.addBeyondTree();
+    warnings_.addYamlOnly();
   }
 
   const Model& model_;
@@ -250,7 +236,7 @@ class Writer {
   std::ostringstream out_;
   std::set<std::string> taken_;  // names of joints
   std::string shifted_;          // joints with their coordinates at q_ref
-  std::vector<std::string> warnings_;
+  FormatWarnings warnings_{model_};
 };
 
 }  // namespace

@@ -1,0 +1,29 @@
+#pragma once
+/// \file What a format for other programs cannot say, told in warnings.
+#include <string>
+#include <vector>
+
+#include "bielle/model/model.h"
+
+namespace bielle {
+
+class FormatWarnings {
+ public:
+  explicit FormatWarnings(const Model& model) : model_(model) {}
+
+  /// "robot: element: problem"
+  void add(const std::string& element, const std::string& problem);
+  /// What our YAML file alone says: serial joints, importance of joints, windings, gears and losses of motors.
+  void addYamlOnly();
+  /// What a file of bodies and joints, URDF or SDF, does not say: armature, motors, springs between points, contacts, references
+  /// and gravity.
+  void addBeyondTree();
+
+  const std::vector<std::string>& get() const { return warnings_; }
+
+ private:
+  const Model& model_;
+  std::vector<std::string> warnings_;
+};
+
+}  // namespace bielle

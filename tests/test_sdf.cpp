@@ -1,0 +1,157 @@
+// Robots as SDF: bodies, joints and loops where they are, and what is lost.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <regex>
+#include <sstream>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/io/robot_writer.h"
+#include "bielle/model/builder.h"
+#include "bielle/model/reader.h"
+#include "get_error.h"
+#include "io/sdf.h"
+
+using namespace bielle;
+using namespace bielle::testing;
+
+namespace {
+
+// The poses of links and joints of an SDF file in the world, by name; their frames are those of their bodies.
+struct SdfPlaces {
+  std::map<std::string, SE3> links;
+  struct TiedFrame {
+    std::string type, parent, child;
+    SE3 X_WJ;
+  };
+  std::map<std::string, TiedFrame> joints;
+  std::vector<double> masses;
+};
+
+SE3 readPose(const std::string& text) {
+  std::istringstream in(text);
+  Vector3d p, angles;
+  for (double* x : {&p[0], &p[1], &p[2], &angles[0], &angles[1], &angles[2]}) in >> *x;
+  REQUIRE(!in.fail());
+  const auto turn = [](double angle, const Vector3d& axis) { return Eigen::AngleAxisd(angle, axis); };
+  return {(turn(angles[2], Vector3d::UnitZ()) * turn(angles[1], Vector3d::UnitY()) * turn(angles[0], Vector3d::UnitX()))
+              .toRotationMatrix(),
+          p};
+}
+
+SdfPlaces readSdf(const std::string& xml) {
+  SdfPlaces out;
+  const auto forEach = [&xml](const std::string& pattern, const auto& visit) {
+    const std::regex regex(pattern);
+    for (std::sregex_iterator it(xml.begin(), xml.end(), regex), end; it != end; ++it) visit(*it);
+  };
+  forEach("<link name=\"([^\"]*)\">\\s*<pose(?: relative_to=\"([^\"]*)\")?>([^<]*)</pose>", [&](const std::smatch& m) {
+    out.links[m[1]] = (m[2].matched ? out.links.at(m[2]) : SE3()) * readPose(m[3]);
+  });
+  forEach("<mass>([^<]*)</mass>", [&](const std::smatch& m) { out.masses.push_back(std::stod(m[1])); });
+  forEach(
+      "<joint name=\"([^\"]*)\" "
+      "type=\"([^\"]*)\">\\s*(?:<pose>([^<]*)</pose>\\s*)?<parent>([^<]*)</parent>\\s*<child>([^<]*)<",
+      [&](const std::smatch& m) {
+        const SE3 X_WL = out.links.at(m[5]);
+        out.joints[m[1]] = {m[2], m[4], m[5], m[3].matched ? X_WL * readPose(m[3]) : X_WL};
+      });
+  return out;
+}
+
+// Of the places of bodies and of the frames of closures, and of masses.
+double calcSdfError(const Model& model, ConstVectorRef q_ref, const std::string& xml) {
+  const SdfPlaces sdf = readSdf(xml);
+  Workspace ws(model);
+  updatePositions(model, ws, q_ref);
+  double worst = 0;
+  const auto compare = [&worst](const SE3& a, const SE3& b) {
+    worst = std::max({worst, (a.p - b.p).norm(), (a.R - b.R).norm()});
+  };
+  REQUIRE(static_cast<int>(sdf.links.size()) == model.numBodies() - 1);
+  for (int i = 1; i < model.numBodies(); ++i) {
+    compare(sdf.links.at(model.bodies()[i].name), ws.X_WB[i]);
+    worst = std::max(worst, std::abs(sdf.masses[i - 1] - model.bodies()[i].inertia.mass));
+  }
+  for (const Closure& closure : model.closures()) {
+    if (closure.kind == ClosureKind::Coupler) continue;
+    const SdfPlaces::TiedFrame& joint =
+        sdf.joints.at(sdf.joints.count(closure.name) ? closure.name : closure.name + "_closure");
+    const bool first = joint.child == model.bodies()[closure.body1].name;
+    compare(joint.X_WJ, first ? ws.X_WB[closure.body1] * closure.X_B1 : ws.X_WB[closure.body2] * closure.X_B2);
+    CHECK(joint.parent == model.bodies()[first ? closure.body2 : closure.body1].name);
+    CHECK(joint.type == (closure.kind == ClosureKind::Weld6D   ? "fixed"
+                         : closure.kind == ClosureKind::Ball3D ? "ball"
+                                                               : "continuous"));
+  }
+  return worst;
+}
+
+}  // namespace
+
+TEST_CASE("SDF: bodies, joints and loops stand where they are, and what is lost is told") {
+  for (const char* name : {"bipetto", "cleobot", "delta", "fivebar", "rsu_biped", "belt_biped", "spring_leg"}) {
+    CAPTURE(name);
+    const Model model = loadRobot(name).model;
+    const VectorXd q_ref = findClosedConfiguration(model).q;
+    SdfText text = formatSdf(model, q_ref);
+    CHECK(calcSdfError(model, q_ref, text.xml) < 1e-12);
+    const auto tells = [&](const std::string& lost) {
+      return std::any_of(text.warnings.begin(), text.warnings.end(),
+                         [&](const std::string& w) { return w.find(lost) != std::string::npos; });
+    };
+    for (const Closure& closure : model.closures())
+      CHECK(tells("closure '" + closure.name + "': it is left out") == (closure.kind == ClosureKind::Coupler));
+    for (const ContactFrame& contact : model.contacts()) CHECK(tells("contact '" + contact.name + "'"));
+    for (const Reference& reference : model.references()) CHECK(tells("reference '" + reference.name + "'"));
+    // A wrong pose must show.
+    const size_t at = text.xml.find("<pose", text.xml.rfind("<link "));
+    text.xml.insert(text.xml.find('>', at) + 1, "1");
+    CHECK(calcSdfError(model, q_ref, text.xml) > 0.1);
+  }
+}
+
+TEST_CASE("SDF: limits, springs and names move or change as told, and planar joints are refused") {
+  ModelBuilder builder("two");
+  Joint joint;
+  joint.name = "a", joint.kind = JointKind::Revolute;
+  JointLimits limits;
+  limits.lower = VectorXd::Constant(1, -1), limits.upper = VectorXd::Constant(1, 2);
+  builder.addLink("a", "world", joint, {1, Vector3d::Zero(), Matrix3d::Identity()}, limits);
+  JointForce force;
+  force.stiffness = 4, force.rest = 0.25, force.preload = 1;
+  builder.addJointForce("a", force);
+  builder.addMotor("a", 0, 7, 3);
+  const SdfText text = formatSdf(builder.build(), VectorXd::Constant(1, 0.5));
+  for (const char* part : {"<joint name=\"a_joint\" type=\"revolute\">", "<lower>-1.5</lower><upper>1.5</upper>",
+                           "<effort>7</effort><velocity>3</velocity>", "<spring_reference>0</spring_reference>",
+                           "<spring_stiffness>4</spring_stiffness>"})
+    CHECK_THAT(text.xml, Catch::Contains(part));
+  REQUIRE(text.warnings.size() == 3);
+  CHECK_THAT(text.warnings[0], Catch::Contains("joint 'a': it is named 'a_joint'"));
+  CHECK_THAT(text.warnings[1], Catch::Contains("joints 'a' 0.5: their coordinates count from these values"));
+  CHECK_THAT(text.warnings[2], Catch::Contains("motors"));
+  joint.name = "slide", joint.kind = JointKind::Planar;
+  builder.addLink("plate", "a", joint, {1, Vector3d::Zero(), Matrix3d::Identity()});
+  CHECK_THAT(getError([&] { formatSdf(builder.build(), builder.build().makeNeutral()); }),
+             Catch::Contains("joint 'slide': it is planar"));
+}
+
+TEST_CASE("SDF and a URDF alone tell what only our files say of joints and motors") {
+  ModelParts parts = takeParts(loadRobot("belt_biped").model);
+  parts.joints[1].position_importance = 3;
+  parts.motors[0].torque_loss = 0.2;
+  parts.motors[1].drive.efficiency = 0.7;
+  const Model model = ModelBuilder::restore(parts);
+  const VectorXd q_ref = findClosedConfiguration(model).q;
+  for (const std::vector<std::string>& warnings : {formatSdf(model, q_ref).warnings, formatUrdf(model).warnings}) {
+    const auto tells = [&](const std::string& lost) {
+      return std::any_of(warnings.begin(), warnings.end(),
+                         [&](const std::string& w) { return w.find(lost) != std::string::npos; });
+    };
+    CHECK(tells("joint '" + model.joints()[1].name + "': its importance"));
+    CHECK(tells("motor '" + model.motors()[0].name + "': its torque_loss"));
+    CHECK(tells("motor '" + model.motors()[1].name + "': its winding and gear"));
+    CHECK(tells("serial joints"));
+  }
+}
