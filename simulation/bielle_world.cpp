@@ -276,8 +276,8 @@ void BielleWorld::book(double h) {
     const Vector3d p1 = tree_.getPlacement(spring.body1).act(spring.point1),
                    p2 = tree_.getPlacement(spring.body2).act(spring.point2);
     const Vector6d twist1 = calcTwist(tip, w_mean_), twist2 = calcTwist(tip + 1, w_mean_);
-    const double rate = calcLineDirection<double>(p2 - p1).dot(
-        Vector3d(twist2.head<3>() + twist2.tail<3>().cross(p2) - twist1.head<3>() - twist1.tail<3>().cross(p1)));
+    const auto at = &PointSpringLine<double>::calcVelocityAt;
+    const double rate = calcLineDirection<double>(p2 - p1).dot(at(twist2, p2) - at(twist1, p1));
     joint_work_ -= h * spring.damping * rate * rate;
     tip += 2;
   }

@@ -135,9 +135,7 @@ TEST_CASE("belt biped: bielle solve squat, walk and jump converge and are checke
                70, 0.25, {0.015, 0.2});
 }
 
-TEST_CASE(
-    "belt biped: springs, dampers and friction, on joints and between points, are in the energy that the check "
-    "counts") {
+TEST_CASE("belt biped: springs, dampers and friction are in the energy that the check counts") {
   const std::string place = std::string(BIELLE_SOURCE_DIR) + "/robots/belt_biped/belt_biped.";
   const RobotDirectory files;
   std::string forces = "joint_forces:\n";

@@ -242,9 +242,8 @@ TEST_CASE("springs, dampers and friction arrive, each number in its place") {
 
 TEST_CASE("springs between points arrive, each number in its place") {
   const Model model = loadWith(
-      "point_springs: {first: {frames: [hand, world], points: [[1, 2, 3], [4, 5, 6]], stiffness: 7, rest: 8, preload: "
-      "-9, "
-      "damping: 10}, second: {frames: [rod_joint, arm], damping: 11}}");
+      "point_springs: {first: {frames: [hand, world], points: [[1, 2, 3], [4, 5, 6]], stiffness: 7, rest: 8, "
+      "preload: -9, damping: 10}, second: {frames: [rod_joint, arm], damping: 11}}");
   REQUIRE(model.pointSprings().size() == 2);
   const PointSpring &first = model.pointSprings()[0], &second = model.pointSprings()[1];
   CHECK(first.name == "first");

@@ -155,6 +155,34 @@ TEST_CASE("variation: inverse dynamics and closures along a motion are those of 
   }
 }
 
+namespace {
+
+// Variations of accelerations and constraint forces against differences, in all directions at once: the frame that a weld is
+// read in moves nothing.
+void checkForwardDynamics(std::mt19937& rng, const Model& model, const std::vector<ContactTarget>& contacts,
+                          const VectorXd& q) {
+  const ConstraintSet set = makeConstraintSet(model, contacts);
+  const VectorXd v = randomVector(rng, model.nv()), tau = calcMotorForces(model, randomVector(rng, 2, 10));
+  Workspace ws(model);
+  ConstrainedWorkspace cws;
+  REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == DynamicsStatus::Ok);
+  const std::vector<ModelVariation> directions = listVariations(rng, model);
+  const DynamicsVariation analytic = calcConstrainedVariation(model, ws, cws, set, directions);
+  const MatrixXd numeric = differentiateModel(model, directions, kStep, [&](const Model& moved) {
+    Workspace other(moved);
+    ConstrainedWorkspace ocws;
+    REQUIRE(updateConstrainedDynamics(moved, other, ocws, makeConstraintSet(moved, contacts), q, v, tau) ==
+            DynamicsStatus::Ok);
+    VectorXd out(moved.nv() + set.rows);
+    out << ocws.a, ocws.lambda;
+    return out;
+  });
+  checkDerivative(analytic.a, numeric.topRows(model.nv()));
+  checkDerivative(analytic.lambda, numeric.bottomRows(set.rows));
+}
+
+}  // namespace
+
 TEST_CASE("variation: forward dynamics, every joint kind times every closure kind, closed and open") {
   std::mt19937 rng(22);
   for (JointKind kind : kJointKinds)
@@ -163,30 +191,11 @@ TEST_CASE("variation: forward dynamics, every joint kind times every closure kin
         for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
           CAPTURE(getName(kind), getName(closure), open, base == MechanismBase::Fixed);
           const Mechanism mechanism = makeRandomMechanism(rng, kind, closure, base, open ? 3 : 0, open ? 2 : 0);
-          const Model& model = mechanism.model;
           std::vector<ContactTarget> contacts;
           if (base == MechanismBase::FreeFlyer) contacts = {{0, randomPlacement(rng), 5, 4}, {1, SE3(), 0, 10}};
-          const ConstraintSet set = makeConstraintSet(model, contacts);
           VectorXd q = mechanism.q_closed;
-          if (open) q = model.integrate(q, randomVector(rng, model.nv(), 0.1));
-          const VectorXd v = randomVector(rng, model.nv()), tau = calcMotorForces(model, randomVector(rng, 2, 10));
-          Workspace ws(model);
-          ConstrainedWorkspace cws;
-          REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == DynamicsStatus::Ok);
-          const std::vector<ModelVariation> directions = listVariations(rng, model);
-          const DynamicsVariation analytic = calcConstrainedVariation(model, ws, cws, set, directions);
-          const MatrixXd numeric = differentiateModel(model, directions, kStep, [&](const Model& moved) {
-            Workspace other(moved);
-            ConstrainedWorkspace ocws;
-            REQUIRE(updateConstrainedDynamics(moved, other, ocws, makeConstraintSet(moved, contacts), q, v, tau) ==
-                    DynamicsStatus::Ok);
-            VectorXd out(moved.nv() + set.rows);
-            out << ocws.a, ocws.lambda;
-            return out;
-          });
-          // All directions at once: the frame that a weld is read in moves nothing.
-          checkDerivative(analytic.a, numeric.topRows(model.nv()));
-          checkDerivative(analytic.lambda, numeric.bottomRows(set.rows));
+          if (open) q = mechanism.model.integrate(q, randomVector(rng, mechanism.model.nv(), 0.1));
+          checkForwardDynamics(rng, mechanism.model, contacts, q);
         }
 }
 
@@ -195,25 +204,7 @@ TEST_CASE("variation: forward dynamics with springs and dampers on joints and be
   for (JointKind kind : kJointKinds) {
     CAPTURE(getName(kind));
     const Mechanism mechanism = makeSprungMechanism(rng, kind, ClosureKind::Ball3D, MechanismBase::FreeFlyer);
-    const Model& model = mechanism.model;
-    const ConstraintSet set = makeConstraintSet(model);
-    const VectorXd v = randomVector(rng, model.nv()), tau = calcMotorForces(model, randomVector(rng, 2, 10));
-    Workspace ws(model);
-    ConstrainedWorkspace cws;
-    REQUIRE(updateConstrainedDynamics(model, ws, cws, set, mechanism.q_closed, v, tau) == DynamicsStatus::Ok);
-    const std::vector<ModelVariation> directions = listVariations(rng, model);
-    const DynamicsVariation analytic = calcConstrainedVariation(model, ws, cws, set, directions);
-    const MatrixXd numeric = differentiateModel(model, directions, kStep, [&](const Model& moved) {
-      Workspace other(moved);
-      ConstrainedWorkspace ocws;
-      REQUIRE(updateConstrainedDynamics(moved, other, ocws, makeConstraintSet(moved), mechanism.q_closed, v, tau) ==
-              DynamicsStatus::Ok);
-      VectorXd out(moved.nv() + set.rows);
-      out << ocws.a, ocws.lambda;
-      return out;
-    });
-    checkDerivative(analytic.a, numeric.topRows(model.nv()));
-    checkDerivative(analytic.lambda, numeric.bottomRows(set.rows));
+    checkForwardDynamics(rng, mechanism.model, {}, mechanism.q_closed);
   }
 }
 
