@@ -1,5 +1,7 @@
 """Controllers, and worlds in which they act."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -110,10 +112,15 @@ def test_predictive_control(motion, model, own_thread):
     state = world.reset(*reference.reference(0))
     for _ in range(100):
         state = world.step(controller.update(float(state.time), state.q, state.v), 2e-3)
-    # In a thread of its own it solves while this world, which waits for nobody, goes on.
-    assert controller.counts["solves"] > (0 if own_thread else 5)
     assert state.ok and controller.counts["failed"] == 0
     assert np.abs(state.q[:3] - reference.reference(0.2)[0][:3]).max() < 0.01
+    # In a thread of its own it solves while this world, which waits for nobody, goes on: on a busy machine it may still be at
+    # the first problem now.
+    deadline = time.monotonic() + 60
+    while own_thread and controller.counts["solves"] == 0 and time.monotonic() < deadline:
+        time.sleep(0.01)
+        controller.update(float(state.time), state.q, state.v)
+    assert controller.counts["solves"] > (0 if own_thread else 5)
 
 
 @pytest.mark.parametrize("engine", ["simbody", "mujoco"])
