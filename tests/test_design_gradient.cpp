@@ -312,8 +312,8 @@ TEST_CASE("design gradient: motions made anew, against motions made anew for nei
       CHECK(here.terms[term].values[active] == Approx(weight * here.evaluation.terms[term]).epsilon(1e-9));
       const double numeric = weight * (ahead.terms[term] - behind.terms[term]) / (2 * dx[i]);
       CAPTURE(i, term, here.terms[term].gradients(active, i), numeric);
-      // The cost by the envelope theorem; others by three sweeps, which leave some per mille.
-      const double tolerance = term == 0 ? 1e-4 : 3e-2;
+      // The cost by the envelope theorem; others by sweeps that leave a thousandth, at optima known to 1e-6.
+      const double tolerance = term == 0 ? 1e-4 : 5e-3;
       CHECK(here.terms[term].gradients(active, i) == Approx(numeric).epsilon(tolerance).scale(0));
     }
   }

@@ -6,8 +6,11 @@
 #include <cstdio>
 
 #include "bielle/design/cost_gradient.h"
+#include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
+#include "design/gradient.h"
+#include "design/measures.h"
 #include "design/spec.h"
 
 using namespace bielle;
@@ -166,35 +169,157 @@ TEST_CASE("envelope: controls at bounds, free durations, the least peak torque")
   check("least peak torque", robot, makeSmallSquat(peak), &free.motion.guess);
 }
 
+namespace {
+
+// Torques, then speeds, of all motors and stages, and back.
+VectorXd readMotors(const std::vector<double>& dt, const Motion& motion, const ShootingTrajectory& trajectory) {
+  const MotorTrace trace = makeMotorTrace(motion.problem->model(), dt, trajectory);
+  VectorXd out(2 * trace.torque.size());
+  out << trace.torque.reshaped(), trace.speed.reshaped();
+  return out;
+}
+
+// A motion on either side of a variable, solved again, and three derivatives of its torques and speeds: the implicit one
+// with the Hessian of the solver, that with second-order terms, and the difference of the optima.
+class FollowedMotors {
+ public:
+  FollowedMotors(const Parametrization& robot, const MakeMotion& make, int variable)
+      : step_(1e-3 * (robot.upper()[variable] - robot.lower()[variable])),
+        dx_(step_ * VectorXd::Unit(robot.start().size(), variable)),
+        here_(robot.startModel(), make),
+        ahead_(robot.make(robot.start() + dx_), make, &here_.motion.guess),
+        behind_(robot.make(robot.start() - dx_), make, &here_.motion.guess) {
+    for (int k = 0; k < here_.motion.problem->numStages(); ++k) dt_.push_back(here_.motion.problem->spec(k).dt);
+    solved_ = differ(ahead_.motion.guess, behind_.motion.guess);
+  }
+
+  VectorXd sweep(int sweeps) const {
+    const auto to = followOptimum(here_.motion, here_.multipliers, ahead_.motion, sweeps),
+               from = followOptimum(here_.motion, here_.multipliers, behind_.motion, sweeps);
+    REQUIRE((to && from));
+    return differ(*to, *from);
+  }
+  OptimumDerivative differentiate() const {
+    const auto out = differentiateOptimum(
+        here_.motion, here_.multipliers, ahead_.motion, behind_.motion, step_,
+        [&](const Motion& motion, const ShootingTrajectory& t) { return readMotors(dt_, motion, t); });
+    REQUIRE(out);
+    return *out;
+  }
+  const VectorXd& solved() const { return solved_; }
+
+  // Of torques, as roots of mean squares, relative.
+  double getError(const VectorXd& derivative) const {
+    const Eigen::Index n = solved_.size() / 2;
+    return (derivative - solved_).head(n).norm() / solved_.head(n).norm();
+  }
+
+  // That of a measure of one motor, over the measure, for a change of the variable by the width of its bounds.
+  double calcSlope(Measure measure, int motor, const VectorXd& derivative) const {
+    const MotorTrace trace = makeMotorTrace(here_.model, dt_, here_.motion.guess);
+    const Eigen::Index nu = trace.torque.rows(), N = trace.torque.cols();
+    MotorSlopes slopes;
+    slopes.dt = dt_, slopes.u = trace.torque, slopes.v = trace.speed;
+    slopes.du = {derivative.head(nu * N).reshaped(nu, N)}, slopes.dv = {derivative.tail(nu * N).reshaped(nu, N)};
+    const MeasurePieces pieces = calcMeasurePieces(measure, {motor}, {slopes});
+    Eigen::Index active = 0;
+    const double value = pieces.values.maxCoeff(&active);
+    return pieces.gradients(active, 0) / value * step_ / 1e-3;
+  }
+  // The same by the measures of the optima themselves.
+  double calcSolvedSlope(Measure measure, int motor) const {
+    const auto get = [&](const Optimum& optimum) {
+      const MotionMeasures measures = calcMotionMeasures(optimum.model, dt_, optimum.motion.guess);
+      return getMeasure(measure, {motor}, {measures});
+    };
+    return (get(ahead_) - get(behind_)) / (2e-3 * get(here_));
+  }
+  const std::string& getMotor(int motor) const { return here_.model.motors()[motor].name; }
+
+ private:
+  VectorXd differ(const ShootingTrajectory& to, const ShootingTrajectory& from) const {
+    return (readMotors(dt_, ahead_.motion, to) - readMotors(dt_, behind_.motion, from)) / (2 * step_);
+  }
+
+  double step_;
+  VectorXd dx_;
+  Optimum here_, ahead_, behind_;
+  std::vector<double> dt_;
+  VectorXd solved_;
+};
+
+}  // namespace
+
 TEST_CASE("envelope: an optimum followed to first order, against optima of changed robots") {
   const auto check = [](const Parametrization& robot, const MakeMotion& make, int variable) {
-    const double step = 1e-3 * (robot.upper()[variable] - robot.lower()[variable]);
-    const VectorXd dx = step * VectorXd::Unit(robot.start().size(), variable);
-    const Optimum optimum(robot.startModel(), make);
-    const Optimum ahead(robot.make(robot.start() + dx), make), behind(robot.make(robot.start() - dx), make);
+    const FollowedMotors motors(robot, make, variable);
+    std::printf("%s:", robot.variables()[variable].name.c_str());
     double last = 1;
     for (int sweeps = 1; sweeps <= 4; ++sweeps) {
-      const auto to = followOptimum(optimum.motion, optimum.multipliers, ahead.motion, sweeps),
-                 from = followOptimum(optimum.motion, optimum.multipliers, behind.motion, sweeps);
-      REQUIRE((to && from));
-      double error = 0, size = 0;
-      for (size_t k = 0; k < to->us.size(); ++k) {
-        const VectorXd expected = ahead.motion.guess.us[k] - behind.motion.guess.us[k];
-        error += (to->us[k] - from->us[k] - expected).squaredNorm();
-        size += expected.squaredNorm();
-      }
-      error = std::sqrt(error / size);
-      std::printf("%s, %d sweeps: %.2e\n", robot.variables()[variable].name.c_str(), sweeps, error);
+      const double error = motors.getError(motors.sweep(sweeps));
+      std::printf(" %.1e", error);
       CHECK(error < last);
       last = error;
     }
     CHECK(last < 1e-2);
+    const OptimumDerivative derivative = motors.differentiate();
+    const double error = motors.getError(derivative.value);
+    std::printf(", extrapolated %.1e after %d\n", error, derivative.sweeps);
+    CHECK(derivative.residual <= kFollowTolerance);
+    CHECK(error < 3 * kFollowTolerance);
+    VectorXd poisoned = derivative.value;
+    Eigen::Index largest = 0;
+    motors.solved().head(poisoned.size() / 2).cwiseAbs().maxCoeff(&largest);
+    poisoned[largest] *= -1;
+    CHECK(motors.getError(poisoned) > 3 * kFollowTolerance);
   };
   check(makeFivebar(), makeSmallSquat(Formulation::Reduced), 0);
   check(makeBipetto(), makeSmallSquat(Formulation::Reduced), 0);
   check(makeBipetto(), makeSmallSquat(Formulation::Full), 2);
   check(makeBipetto(), makeShortWalk(Formulation::Reduced), 0);
   check(makeCleobot(), makeShortWalk(Formulation::Reduced), 1);
+}
+
+TEST_CASE("envelope: where Gauss-Newton Hessians point the wrong way, second-order terms do not") {
+  struct Case {
+    std::string name;
+    Parametrization robot;
+    MakeMotion make;
+    int variable;
+    Measure measure;
+    int motor;
+  };
+  const MakeMotion jump = [](const Model& model) {
+    JumpOptions options;
+    options.flight = 0.3, options.time_step = 0.01;
+    return makeJump(model, options);
+  };
+  const MakeMotion squat = [](const Model& model) {
+    SquatOptions options;
+    options.depth = 0.5, options.duration = 0.4, options.settle = 0.1, options.time_step = 0.02;
+    return makeSquat(model, options);
+  };
+  const std::vector<Case> cases = {
+      {"five-bar leg jumps", makeFivebar(), jump, 2, Measure::RmsTorque, 0},
+      {"five-bar leg jumps", makeFivebar(), jump, 2, Measure::Energy, 0},
+      {"five-bar leg squats", makeFivebar(), squat, 0, Measure::Energy, 1},
+      {"Bipetto squats", makeBipetto(1), makeSmallSquat(Formulation::Reduced), 0, Measure::PeakTorque, 4},
+      {"Bipetto walks", makeBipetto(1), makeShortWalk(Formulation::Reduced), 0, Measure::RmsTorque, 4}};
+  for (const Case& c : cases) {
+    const FollowedMotors motors(c.robot, c.make, c.variable);
+    const OptimumDerivative derivative = motors.differentiate();
+    const auto slope = [&](const VectorXd& of) { return motors.calcSlope(c.measure, c.motor, of); };
+    const double first = slope(motors.sweep(1)), second = slope(derivative.value);
+    const double solved = motors.calcSolvedSlope(c.measure, c.motor);
+    std::printf("%-20s %-12s %-12s %-14s %8.4f %8.4f %8.4f %8.4f %8.4f (%d sweeps, left %.1e)\n", c.name.c_str(),
+                c.robot.variables()[c.variable].name.c_str(), motors.getMotor(c.motor).c_str(), getName(c.measure),
+                first, slope(motors.sweep(2)), slope(motors.sweep(3)), second, solved, derivative.sweeps,
+                derivative.residual);
+    CAPTURE(c.name, getName(c.measure), first, second, solved);
+    CHECK(first * solved < 0);
+    CHECK(second == Approx(solved).epsilon(0.02).scale(0));
+    CHECK(first != Approx(solved).epsilon(0.02).scale(0));
+  }
 }
 
 TEST_CASE("envelope: problems that do not fit the optimum are refused") {

@@ -9,8 +9,6 @@
 namespace bielle {
 namespace {
 
-constexpr int kSweeps = 3;  // leave an error of some per mille of the change of torques
-
 MotorSlopes makeSlopes(const MotionOutcome& outcome, Eigen::Index variables) {
   const MotorTrace& trace = outcome.measures.trace;
   MotorSlopes out;
@@ -22,16 +20,27 @@ MotorSlopes makeSlopes(const MotionOutcome& outcome, Eigen::Index variables) {
   return out;
 }
 
-// Adds one side of a difference along variable i.
-bool addSide(const MotionOutcome& outcome, const MotionEnvelope& envelope, const Motion& changed, Eigen::Index i,
-             double weight, MotorSlopes& slopes) {
-  const double cost = envelope.calcLagrangian(changed);
-  const auto optimum = followOptimum(*outcome.motion, outcome.multipliers, changed, kSweeps);
-  if (!std::isfinite(cost) || !optimum) return false;
-  const MotorTrace trace = makeMotorTrace(changed.problem->model(), slopes.dt, *optimum);
-  slopes.dcost[i] += weight * cost;
-  slopes.du[static_cast<size_t>(i)] += weight * trace.torque;
-  slopes.dv[static_cast<size_t>(i)] += weight * trace.speed;
+// Torques, then speeds.
+VectorXd readMotors(const Motion& motion, const std::vector<double>& dt, const ShootingTrajectory& trajectory) {
+  const MotorTrace trace = makeMotorTrace(motion.problem->model(), dt, trajectory);
+  VectorXd out(2 * trace.torque.size());
+  out << trace.torque.reshaped(), trace.speed.reshaped();
+  return out;
+}
+
+// The derivatives by variable i, from motions at `step` on either side; false if there are none.
+bool addSlopes(const MotionOutcome& outcome, const MotionEnvelope& envelope, const Motion& ahead, const Motion& behind,
+               double step, Eigen::Index i, MotorSlopes& slopes) {
+  const double dcost = envelope.calcDerivative(ahead, behind, step);
+  const auto dmotors = differentiateOptimum(*outcome.motion, outcome.multipliers, ahead, behind, step,
+                                            [&](const Motion& motion, const ShootingTrajectory& trajectory) {
+                                              return readMotors(motion, slopes.dt, trajectory);
+                                            });
+  if (!std::isfinite(dcost) || !dmotors) return false;
+  const Eigen::Index nu = slopes.u.rows(), N = slopes.u.cols();
+  slopes.dcost[i] = dcost;
+  slopes.du[static_cast<size_t>(i)] = dmotors->value.head(nu * N).reshaped(nu, N);
+  slopes.dv[static_cast<size_t>(i)] = dmotors->value.tail(nu * N).reshaped(nu, N);
   return true;
 }
 
@@ -49,16 +58,16 @@ std::vector<MotorSlopes> calcOptimumSlopes(const Parametrization& robot, const V
     }
     for (Eigen::Index i = 0; i < x.size(); ++i) {
       const double h = kDesignStep * (robot.upper()[i] - robot.lower()[i]);
-      for (const double side : {1.0, -1.0}) {
-        const Model model = robot.make(x + side * h * VectorXd::Unit(x.size(), i));
-        const VectorXd posture = makeStandingPosture(model);
-        for (size_t m = 0; m < motions.size(); ++m) {
-          const Motion changed = makeDesignMotion(model, motions[m], posture);
-          if (addSide(outcomes[m], *envelopes[m], changed, i, side / (2 * h), out[m])) continue;
-          out.back().failure = "no gradient along " + robot.variables()[static_cast<size_t>(i)].name + ": " +
-                               motions[m].name + " cannot be followed";
-          return out;
-        }
+      const VectorXd dx = h * VectorXd::Unit(x.size(), i);
+      const Model to = robot.make(x + dx), from = robot.make(x - dx);
+      const VectorXd posture_to = makeStandingPosture(to), posture_from = makeStandingPosture(from);
+      for (size_t m = 0; m < motions.size(); ++m) {
+        const Motion ahead = makeDesignMotion(to, motions[m], posture_to);
+        const Motion behind = makeDesignMotion(from, motions[m], posture_from);
+        if (addSlopes(outcomes[m], *envelopes[m], ahead, behind, h, i, out[m])) continue;
+        out.back().failure = "no gradient along " + robot.variables()[static_cast<size_t>(i)].name + ": " +
+                             motions[m].name + " cannot be followed";
+        return out;
       }
     }
   } catch (const std::invalid_argument& error) {  // an optimum that is none to second order, a plan with other stages

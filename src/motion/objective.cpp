@@ -191,4 +191,21 @@ std::optional<ShootingTrajectory> followOptimum(const Motion& optimum, const Mul
   return out ? std::optional<ShootingTrajectory>(to->unwrap(*out)) : std::nullopt;
 }
 
+std::optional<OptimumDerivative> differentiateOptimum(
+    const Motion& optimum, const Multipliers& multipliers, const Motion& ahead, const Motion& behind, double step,
+    const std::function<VectorXd(const Motion&, const ShootingTrajectory&)>& read) {
+  const std::unique_ptr<PeakProblem> at = makePeakProblem(optimum), to = makePeakProblem(ahead),
+                                     from = makePeakProblem(behind);
+  if (!at)
+    return differentiateOptimum(*optimum.problem, optimum.guess, multipliers, *ahead.problem, *behind.problem, step,
+                                [&](const ShootingProblem& changed, const ShootingTrajectory& trajectory) {
+                                  return read(&changed == ahead.problem.get() ? ahead : behind, trajectory);
+                                });
+  return differentiateOptimum(*at, at->wrap(optimum.guess), multipliers, *to, *from, step,
+                              [&](const ShootingProblem& changed, const ShootingTrajectory& trajectory) {
+                                return &changed == to.get() ? read(ahead, to->unwrap(trajectory))
+                                                            : read(behind, from->unwrap(trajectory));
+                              });
+}
+
 }  // namespace bielle

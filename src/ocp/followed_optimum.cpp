@@ -1,5 +1,6 @@
 #include "bielle/ocp/followed_optimum.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <stdexcept>
 
@@ -42,7 +43,7 @@ class Follower {
     return std::all_of(z_.xs.begin(), z_.xs.end(), [](const VectorXd& x) { return x.allFinite(); });
   }
 
-  ShootingTrajectory take() { return std::move(z_); }
+  const ShootingTrajectory& get() const { return z_; }
 
  private:
   bool evaluate() {
@@ -63,18 +64,63 @@ class Follower {
   std::vector<VectorXd> dx_, du_;
 };
 
+// About the path of a changed problem; none where it cannot follow.
+std::optional<Follower> startFollower(const ShootingProblem& problem, const ShootingTrajectory& optimum,
+                                      const Multipliers& multipliers, const ShootingProblem& changed) {
+  requireSameSizes(problem, changed);
+  std::optional<ShootingTrajectory> path = calcPath(problem, optimum, changed);
+  if (!path) return {};
+  return std::optional<Follower>(std::in_place, changed, std::move(*path), multipliers);
+}
+
+// Eq. (4) of s_0 .. s_n, n > 0, with its residual.
+OptimumDerivative extrapolate(const std::vector<VectorXd>& s) {
+  const Eigen::Index n = static_cast<Eigen::Index>(s.size()) - 1;
+  MatrixXd steps(s[0].size(), n), ends(s[0].size(), n);
+  for (Eigen::Index j = 0; j < n; ++j) ends.col(j) = s[j + 1], steps.col(j) = s[j + 1] - s[j];
+  // The last weight is what the others leave of 1.
+  VectorXd g = VectorXd::Ones(n);
+  if (n > 1) {
+    const MatrixXd others = steps.leftCols(n - 1).colwise() - steps.col(n - 1);
+    g.head(n - 1) = -others.colPivHouseholderQr().solve(steps.col(n - 1));
+    g[n - 1] = 1 - g.head(n - 1).sum();
+  }
+  OptimumDerivative out{ends * g, static_cast<int>(n), 0};
+  const double size = out.value.norm();
+  out.residual = size > 0 ? (steps * g).norm() / size : 0;
+  return out;
+}
+
 }  // namespace
 
 std::optional<ShootingTrajectory> followOptimum(const ShootingProblem& problem, const ShootingTrajectory& optimum,
                                                 const Multipliers& multipliers, const ShootingProblem& changed,
                                                 int sweeps) {
-  requireSameSizes(problem, changed);
-  std::optional<ShootingTrajectory> path = calcPath(problem, optimum, changed);
-  if (!path) return {};
-  Follower follower(changed, std::move(*path), multipliers);
+  std::optional<Follower> follower = startFollower(problem, optimum, multipliers, changed);
+  if (!follower) return {};
   for (int i = 0; i < sweeps; ++i)
-    if (!follower.step()) return {};
-  return follower.take();
+    if (!follower->step()) return {};
+  return follower->get();
+}
+
+std::optional<OptimumDerivative> differentiateOptimum(const ShootingProblem& problem, const ShootingTrajectory& optimum,
+                                                      const Multipliers& multipliers, const ShootingProblem& ahead,
+                                                      const ShootingProblem& behind, double step,
+                                                      const OptimumReader& read) {
+  std::optional<Follower> to = startFollower(problem, optimum, multipliers, ahead),
+                          from = startFollower(problem, optimum, multipliers, behind);
+  if (!to || !from) return {};
+  const auto difference = [&]() -> VectorXd {
+    return (read(ahead, to->get()) - read(behind, from->get())) / (2 * step);
+  };
+  std::vector<VectorXd> s = {difference()};
+  OptimumDerivative out;
+  do {
+    if (!to->step() || !from->step()) return {};
+    s.push_back(difference());
+    out = extrapolate(s);
+  } while (out.residual > kFollowTolerance && out.sweeps < kMostSweeps);
+  return out;
 }
 
 }  // namespace bielle

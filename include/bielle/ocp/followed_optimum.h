@@ -8,7 +8,7 @@
 ///
 /// with active constraints and bounds those of P(0), the former by an augmented Lagrangian whose penalty is so large that
 /// the multipliers may stay. The solver's K leaves out second derivatives of dynamics and constraints. With the exact
-/// gradient about the step of (1), the next sweep makes up for most of what the one before left out,
+/// gradient about the step of (1), the next sweep makes up for part of what the one before left out,
 ///
 ///     z_{j+1} = z_j (+) dz_j,    K dz_j = -grad L(p, z_j),                                                         (2)
 ///
@@ -16,6 +16,17 @@
 /// derivative of an optimum jumps; that of (1) holds them.
 ///
 /// Differences of (2) across p, both ahead and behind, are derivatives of the optimum, in which what the solve left cancels.
+/// Let s_j be that of some smooth function of z_j. With H the exact Hessian of the Lagrangian along the constraints,
+///
+///     s_{j+1} = s_j - K^-1 (H s_j + dgrad L/dp),                                                                   (3)
+///
+/// is linear, and converges where the eigenvalues of K^-1 H are in (0, 2), slowly where they are near the ends. s_1 alone is
+/// the implicit derivative with the solver's K in place of H, which may have the wrong sign (docs/design.md). Reduced rank
+/// extrapolation, the same as GMRES preconditioned by K where s has all of dz (Sidi, "Vector Extrapolation Methods", 2017,
+/// ch. 2), combines sweeps such that as little as possible of their steps remains:
+///
+///     s = sum_j g_j s_{j+1},    min_g |sum_j g_j (s_{j+1} - s_j)|,    sum_j g_j = 1.                               (4)
+#include <functional>
 #include <optional>
 
 #include "bielle/solve/fddp.h"
@@ -28,5 +39,25 @@ namespace bielle {
 std::optional<ShootingTrajectory> followOptimum(const ShootingProblem& problem, const ShootingTrajectory& optimum,
                                                 const Multipliers& multipliers, const ShootingProblem& changed,
                                                 int sweeps = 2);
+
+struct OptimumDerivative {
+  VectorXd value;       ///< s of Eq. (4), over the unit of p
+  int sweeps = 0;       ///< done on either side
+  double residual = 0;  ///< the norm that (4) minimizes, over that of s
+};
+
+/// Numbers made of an optimum of a changed problem, smooth in it; of the same size for all problems.
+using OptimumReader = std::function<VectorXd(const ShootingProblem& changed, const ShootingTrajectory& optimum)>;
+
+inline constexpr double kFollowTolerance = 1e-3;  ///< of OptimumDerivative::residual
+inline constexpr int kMostSweeps = 10;            ///< after which it may be larger
+
+/// The derivative of what is read from the optimum. None if it cannot be followed.
+/// \param ahead, behind  problems at `step` (units of p) on either side of that of the optimum
+/// \throws std::invalid_argument as followOptimum()
+std::optional<OptimumDerivative> differentiateOptimum(const ShootingProblem& problem, const ShootingTrajectory& optimum,
+                                                      const Multipliers& multipliers, const ShootingProblem& ahead,
+                                                      const ShootingProblem& behind, double step,
+                                                      const OptimumReader& read);
 
 }  // namespace bielle
