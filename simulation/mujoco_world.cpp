@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/loop_conflict.h"
 #include "bielle/model/error.h"
 #include "engines/mujoco_model.h"
 #include "simulation/mujoco_ground.h"
@@ -27,9 +27,7 @@ MjcfOptions makeRobotOptions(const MujocoWorldOptions& options, const MujocoGrou
 
 VectorXd findPosture(const Model& model) {
   const AssemblyResult closed = findClosedConfiguration(model);
-  if (closed.status != AssemblyStatus::Closed)
-    throw ModelError(model.name(), closed.worst, "its loop cannot be closed: " + closed.message,
-                     "give a reference posture near a closed one");
+  if (closed.status != AssemblyStatus::Closed) throw makeClosingError(model, model.name(), closed);
   return closed.q;
 }
 

@@ -1,6 +1,6 @@
 #include <pybind11/stl.h>
 
-#include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/loop_conflict.h"
 #include "bielle/io/names.h"
 #include "bielle/model/builder.h"
 #include "bielle/motion/motion.h"
@@ -193,6 +193,7 @@ void addAssembly(ModelType& type) {
         {
           const py::gil_scoped_release release;
           result = name.empty() ? findClosedConfiguration(m) : assembleReference(m, name);
+          if (name.empty() && result.status != AssemblyStatus::Closed) throw makeClosingError(m, m.name(), result);
         }
         return makeArray(requireClosed(m, result).q);
       },

@@ -1,9 +1,7 @@
 #include <algorithm>
 #include <iostream>
-#include <sstream>
 
-#include "bielle/dynamics/assembly.h"
-#include "bielle/model/error.h"
+#include "bielle/dynamics/loop_conflict.h"
 #include "cli/commands.h"
 
 namespace bielle::cli {
@@ -25,12 +23,7 @@ LoadedRobot RobotArgument::load() const {
   LoadedRobot robot = loadRobot(name, options);
   for (const std::string& warning : robot.warnings) std::cerr << "bielle: warning: " << warning << "\n";
   const AssemblyResult closed = findClosedConfiguration(robot.model);
-  if (closed.status != AssemblyStatus::Closed) {
-    std::ostringstream gap;
-    gap << "its loop cannot be closed: from no start does it come nearer than " << closed.gap << " (m or rad)";
-    throw ModelError(robot.directory, closed.worst, gap.str(),
-                     "check the lengths and frames along the loop, or give a reference posture near a closed one");
-  }
+  if (closed.status != AssemblyStatus::Closed) throw makeClosingError(robot.model, robot.directory, closed);
   return robot;
 }
 

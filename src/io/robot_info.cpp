@@ -8,6 +8,7 @@
 #include "bielle/io/names.h"
 #include "dynamics/point_spring.h"
 #include "io/json_text.h"
+#include "model/frame_name.h"
 #include "model/number_text.h"
 
 namespace bielle {
@@ -31,12 +32,6 @@ std::vector<Posture> makePostures(const Model& model) {
 }
 
 Json orNull(double limit) { return std::isfinite(limit) ? Json(limit) : Json(nullptr); }
-
-std::string findFrameName(const Model& model, int body, const SE3& X_BF) {
-  for (const Frame& frame : model.frames())
-    if (frame.body == body && frame.X_BF.p == X_BF.p && frame.X_BF.R == X_BF.R) return frame.name;
-  return model.bodies()[body].name;
-}
 
 // "motor - 2 knee"
 std::string describeTerms(const Model& model, const Closure& coupler) {

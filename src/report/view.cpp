@@ -4,10 +4,9 @@
 #include <cmath>
 #include <deque>
 
-#include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/loop_conflict.h"
 #include "bielle/io/result.h"
-#include "bielle/model/error.h"
 #include "io/text_file.h"
 #include "report/pack.h"
 #include "report/page.h"
@@ -49,8 +48,7 @@ VectorXd makeStart(const LoadedRobot& robot) {
   AssemblyResult start;
   if (!model.references().empty()) start = assembleReference(model, model.references().front().name);
   if (start.status != AssemblyStatus::Closed) start = findClosedConfiguration(model);
-  if (start.status != AssemblyStatus::Closed)
-    throw ModelError(robot.directory, start.worst, "its loop cannot be closed", "check the lengths along the loop");
+  if (start.status != AssemblyStatus::Closed) throw makeClosingError(model, robot.directory, start);
   return start.q;
 }
 
