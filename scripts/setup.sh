@@ -12,6 +12,8 @@ bielle_check_packages=(libsimbody-dev libmujoco-dev)
 bielle_python_packages=(pybind11-dev python3-dev python3-numpy)
 # Work Queue, for tasks on other machines (bielle-workers). Without it everything else is built.
 bielle_worker_packages=(coop-computing-tools coop-computing-tools-dev)
+# pagmo, for fronts of several objectives (bielle design). Without it everything else is built.
+bielle_front_packages=(libpagmo-dev)
 # Further dependencies of the tests: Catch2, Google Benchmark, Python to read NumPy archives, a browser for the reports,
 # what tests the Python package.
 bielle_test_packages=(catch2 libbenchmark-dev python3 chromium pkg-config python3-pytest

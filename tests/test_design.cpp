@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/builder.h"
@@ -16,6 +17,7 @@
 #include "bielle/robots/fourbar_chain.h"
 #include "bielle/robots/generators.h"
 #include "design/draft.h"
+#include "design/front_search.h"
 #include "design/run.h"
 #include "robot_directory.h"
 #include "run_command.h"
@@ -275,8 +277,87 @@ TEST_CASE("design: searches find a minimum, the same one for the same seed") {
   CHECK_THROWS_AS(minimizeByStages(problem, {{}}, 1), ModelError);
 }
 
+namespace {
+
+bool dominates(const std::vector<double>& a, const std::vector<double>& b) {
+  bool better = false;
+  for (size_t i = 0; i < a.size(); ++i) {
+    if (a[i] > b[i]) return false;
+    better |= a[i] < b[i];
+  }
+  return better;
+}
+
+int countDominated(const std::vector<std::vector<double>>& points) {
+  return static_cast<int>(std::count_if(points.begin(), points.end(), [&](const auto& b) {
+    return std::any_of(points.begin(), points.end(), [&](const auto& a) { return dominates(a, b); });
+  }));
+}
+
+}  // namespace
+
+TEST_CASE("design: the front of two distances is the line between the points") {
+  if (!hasFrontSearch()) return;
+  const Eigen::Vector2d a(0.2, 0.3), b(0.8, 0.6);
+  std::vector<VectorXd> designs;
+  std::vector<std::vector<double>> objectives;
+  int batches = 0;
+  FrontProblem problem{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 1), Eigen::Vector2d(1, 0), 2, {}};
+  problem.evaluate = [&](const std::vector<VectorXd>& xs) {
+    ++batches;
+    std::vector<std::vector<double>> out;
+    for (const VectorXd& x : xs) {
+      out.push_back({(x - a).squaredNorm(), (x - b).squaredNorm()});
+      designs.push_back(x);
+      objectives.push_back(out.back());
+    }
+    return out;
+  };
+  for (SearchAlgorithm algorithm : {SearchAlgorithm::Nsga2, SearchAlgorithm::Moead}) {
+    const FrontOptions options{algorithm, 24, 40};
+    const auto search = [&](unsigned seed) {
+      designs.clear(), objectives.clear(), batches = 0;
+      searchFront(problem, options, seed);
+      return designs;
+    };
+    const std::vector<VectorXd> first = search(7);
+    CAPTURE(getName(algorithm), designs.size(), batches);
+    CHECK(first.front() == problem.start);
+    CHECK(first.size() == 24 * 41);
+    if (algorithm == SearchAlgorithm::Nsga2) CHECK(batches == 41);
+    const std::vector<size_t> front = selectFront(objectives, 24);
+    CHECK(front.size() == 24);
+    std::vector<std::vector<double>> chosen;
+    double gap = 0, off = 0;
+    const Eigen::Vector2d along = (b - a).normalized(), across(-along.y(), along.x());
+    for (size_t i : front) {
+      if (!chosen.empty()) gap = std::max(gap, objectives[i][0] - chosen.back()[0]);
+      chosen.push_back(objectives[i]);
+      off = std::max(off, std::abs(across.dot(designs[i] - a)));
+    }
+    CHECK(countDominated(chosen) == 0);
+    // A design beside the line by d is dominated by those within 2 d^2 / |b - a| along it: of 24 on 0.67 by one if d > 0.1.
+    CHECK(off < 0.1);
+    if (algorithm == SearchAlgorithm::Nsga2) CHECK(gap < 0.15);  // of 0.45; the weights of MOEA/D leave wider ones
+    CHECK(chosen.front()[0] < 0.01);
+    CHECK(chosen.back()[1] < 0.01);
+    chosen.push_back({chosen[3][0] + 1e-9, chosen[3][1]});  // would the checks see one?
+    CHECK(countDominated(chosen) == 1);
+    CHECK(search(7) == first);
+    CHECK(search(8) != first);
+  }
+  problem.evaluate = [](const auto&) -> std::vector<std::vector<double>> { throw ModelError("a", "b", "c", "d"); };
+  CHECK_THROWS_AS(searchFront(problem, {}, 1), ModelError);
+
+  const std::vector<std::vector<double>> points = {{3, 1}, {2, 2}, {2, 3}, {1, 4}, {4, 1}, {2.1, 1.9}};
+  CHECK(selectFront(points, 10) == std::vector<size_t>{3, 1, 5, 0});
+  CHECK(selectFront(points, 3) == std::vector<size_t>{3, 1, 0});
+  CHECK(selectFront({{1, 1}}, 5) == std::vector<size_t>{0});
+  CHECK(selectFront({}, 5).empty());
+}
+
 TEST_CASE("evaluations: what is not one is refused") {
-  LoggedEvaluation e{"slsqp", VectorXd::Constant(2, 0.1), DesignStatus::Feasible, 0.75, 1.5, {}, {}};
+  LoggedEvaluation e{"slsqp", VectorXd::Constant(2, 0.1), DesignStatus::Feasible, 0.75, 1.5, {}, {}, {0.5, 2}};
   e.terms.push_back({VectorXd::Constant(2, 0.3), MatrixXd::Constant(2, 2, 0.7)});
   const std::string line = formatEvaluation(e);
   CHECK(formatEvaluation(readEvaluation(line)) == line);
@@ -286,6 +367,7 @@ TEST_CASE("evaluations: what is not one is refused") {
                                                                                  {"[0.7,0.7]", "[0.7]"},
                                                                                  {"[0.7,0.7]", "[0.7,null]"},
                                                                                  {"[[0.7,0.7],", "["},
+                                                                                 {"[0.5,2.0]", "[0.5,null]"},
                                                                                  {"feasible", "perfect"},
                                                                                  {"\"value\"", "\"worth\""},
                                                                                  {"}", ""}})
@@ -370,6 +452,118 @@ TEST_CASE("design: a search that is killed goes on and ends the same way") {
   const CommandResult other = runCommand({BIELLE_COMMAND, "design", spec, "-o", killed});
   CHECK(other.status == 2);
   CHECK_THAT(other.err, Contains("the log is of another design problem"));
+}
+
+namespace {
+
+const char* const kFrontSpec = R"(generator: fivebar_leg
+variables:
+  - {name: upper, parameter: upper_length, bounds: [0.06, 0.14]}
+  - {name: lower, parameter: lower_length, bounds: [0.15, 0.25]}
+motions:
+  - {motion: squat, set: {depth: 0.8}}
+objective:
+  - {measure: peak_torque}
+  - {measure: cost}
+search:
+  pareto: {population: 12, generations: 4, refine: {algorithm: slsqp, evaluations: 3}}
+)";
+
+// The objectives of a table: of the start, then of the front.
+std::vector<std::vector<double>> readFront(const std::string& page) {
+  std::vector<std::vector<double>> out;
+  std::istringstream lines(page.substr(page.find("## Front")));
+  for (std::string line, bar, name; std::getline(lines, line);) {
+    std::istringstream row(line);
+    std::vector<double> values(2);
+    if (row >> bar >> name >> bar >> values[0] >> bar >> values[1] && bar == "|") out.push_back(values);
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("design: a front that is killed goes on and ends at the same bytes") {
+  if (!hasFrontSearch()) return;
+  const RobotDirectory directory;
+  const std::string spec = directory.write("spec.yaml", kFrontSpec);
+  const std::string whole = directory.path() + "/whole", killed = directory.path() + "/killed";
+  const CommandResult first = runCommand({BIELLE_COMMAND, "design", spec, "-o", whole, "--jobs", "1"});
+  INFO(first.err);
+  REQUIRE(first.status == 0);
+  const std::string page = readFile(whole + "/design.md");
+  const std::vector<std::vector<double>> front = readFront(page);
+  REQUIRE(front.size() > 4);
+  for (size_t i = 1; i < front.size(); ++i) {
+    CAPTURE(i);
+    // To the digits of the table, one is better than its neighbours in one way and worse in the other.
+    if (i > 1) CHECK(front[i][0] >= front[i - 1][0]);
+    if (i > 1) CHECK(front[i][1] < front[i - 1][1]);
+    CHECK_NOTHROW(loadRobot(whole + "/front/" + (i < 10 ? "0" : "") + std::to_string(i)));
+  }
+  CHECK(std::any_of(front.begin() + 1, front.end(), [&](const auto& d) { return dominates(d, front[0]); }));
+  CHECK_FALSE(fs::exists(whole + "/front/" + (front.size() < 10 ? "0" : "") + std::to_string(front.size())));
+  CHECK(fs::exists(whole + "/design_front.svg") == fs::exists(whole + "/design.svg"));
+  CHECK_THAT(readFile(whole + "/front.jsonl"), Contains("slsqp") && Contains("gradients"));
+
+  for (const char* progress : {"nsga2, evaluation 20", "slsqp, evaluation"}) {  // in a generation, in the refinement
+    Command command({BIELLE_COMMAND, "design", spec, "-o", killed, "--jobs", "3"});
+    REQUIRE(command.waitForOutput(progress, 120));
+    command.sendSignal(9);
+    CHECK(command.wait().status == 128 + 9);
+    CHECK_FALSE(fs::exists(killed + "/design.md"));
+  }
+  const int done = countLines(killed + "/front.jsonl") - 1;
+  const CommandResult last = runCommand({BIELLE_COMMAND, "design", spec, "-o", killed, "--jobs", "2"});
+  INFO(last.err);
+  REQUIRE(last.status == 0);
+  CHECK_THAT(last.out, Contains(", " + std::to_string(done) + " of them from the logs"));
+  std::vector<std::string> files = {"/design.md", "/best/best.urdf", "/best/best.yaml", "/front/01/01.urdf",
+                                    "/front/02/02.yaml"};
+  if (fs::exists(whole + "/design.svg")) files.insert(files.end(), {"/design.svg", "/design_front.svg"});
+  for (const std::string& file : files) {
+    CAPTURE(file);
+    CHECK_FALSE(readFile(whole + file).empty());
+    CHECK(readFile(whole + file) == readFile(killed + file));
+  }
+  // Nothing twice, and nothing else: the same lines but for their order and times.
+  const auto list = [&](const std::string& out) {
+    std::vector<std::string> lines;
+    std::ifstream log(out + "/front.jsonl");
+    for (std::string line; std::getline(log, line);)
+      if (const size_t at = line.find("\"seconds\""); at != std::string::npos) lines.push_back(line.substr(0, at));
+    std::sort(lines.begin(), lines.end());
+    return lines;
+  };
+  const std::vector<std::string> lines = list(whole);
+  CHECK(std::adjacent_find(lines.begin(), lines.end()) == lines.end());
+  CHECK(list(killed) == lines);
+}
+
+TEST_CASE("design: fronts that cannot be are refused") {
+  const RobotDirectory directory;
+  const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
+    const std::string spec =
+        directory.write("spec.yaml", from.empty() ? kFrontSpec : replaceOnce(kFrontSpec, from, to));
+    const CommandResult result = runCommand({BIELLE_COMMAND, "design", spec, "-o", directory.path() + "/out"});
+    CAPTURE(to, result.err);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, Contains(problem) && Contains("line "));
+    CHECK_FALSE(fs::exists(directory.path() + "/out"));
+  };
+  if (!hasFrontSearch()) {
+    check("", "", "install libpagmo-dev");
+    return;
+  }
+  check("  - {measure: cost}\n", "", "one objective has no front");
+  check("population: 12", "population: 10", "multiple of 4");
+  check("{population: 12", "{algorithm: crs, population: 12", "use one of nsga2, moead");
+  check("algorithm: slsqp", "algorithm: sbplx", "use one of slsqp, mma");
+  check("measure: cost", "measure: conditioning", "which conditioning does not have");
+  check("search:\n", "search:\n  searches: 2\n", "it excludes `stages` and `searches`");
+  CHECK_THROWS_AS(minimizeByStages({VectorXd::Zero(1), VectorXd::Ones(1), VectorXd::Zero(1), {}, {}},
+                                   {{SearchAlgorithm::Nsga2, 10, 0}}, 1),
+                  std::invalid_argument);
 }
 
 TEST_CASE("design: what is wrong is told with its place and remedy") {

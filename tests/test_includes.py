@@ -34,6 +34,7 @@ OTHERS = {
     "tinyxml": ["src/model/xml_document.h"],
     "zip.h": ["src/io/npz.cpp"],
     "nlopt": ["src/transmission/slsqp.cpp", "src/design/nlopt_search.h"],
+    "pagmo/": ["src/design/front_search.cpp"],
     "CLI/": ["src/cli/", "simulation/", "validation/"],
     "nlohmann/": ["src/", "simulation/", "validation/", "workers/", "tests/"],
     "cctools/": ["workers/"],

@@ -296,6 +296,43 @@ search: {searches: 2, stages: [{algorithm: crs, evaluations: 4}, {algorithm: sls
     assert not os.path.exists("design-together/running")
 
 
+def test_front():
+    """A generation at a time, by three workers, whose manager is killed on the way."""
+    port = find_port()
+    with open("front.yaml", "w") as file:
+        file.write("""generator: fivebar_leg
+variables:
+  - {name: upper, parameter: upper_length, bounds: [0.06, 0.14]}
+  - {name: lower, parameter: lower_length, bounds: [0.15, 0.25]}
+motions: [{motion: squat, set: {depth: 0.8}}]
+objective: [{measure: peak_torque}, {measure: cost}]
+search: {pareto: {population: 8, generations: 2, refine: {algorithm: slsqp, evaluations: 2}}}
+""")
+    alone = subprocess.run([built, "design", "front.yaml", "-o", "front-alone"], capture_output=True, text=True)
+    if "libpagmo-dev" in alone.stderr:
+        print("front: built without pagmo")
+        return
+    assert alone.returncode == 0, alone.stderr
+
+    def list_evaluations(out):
+        log = read(f"{out}/front.jsonl").splitlines(True) if os.path.exists(f"{out}/front.jsonl") else []
+        evaluations = [json.loads(line) for line in log[1:] if line.endswith("\n")]
+        return sorted(json.dumps({name: value for name, value in e.items() if name != "seconds"}) for e in evaluations)
+    command = [built, "design", "front.yaml", "-o", "front-together", "--workers", str(port), "--password", "password"]
+    with Workers(port, 3, BIELLE_ROBOTS="/nowhere"):
+        manager = start(command, "front.log")
+        wait_for(lambda: len(list_evaluations("front-together")) >= 3)
+        manager.kill()
+        manager.wait()
+        done = len(list_evaluations("front-together"))
+        assert start(command, "front.log").wait() == 0, read("front.log")
+    assert f", {done} of them from the logs" in read("front.log"), read("front.log")
+    for name in ("design.md", "best/best.urdf", "front/01/01.urdf", "front/02/02.yaml"):
+        assert read(f"front-alone/{name}") == read(f"front-together/{name}") != "", name
+    assert list_evaluations("front-alone") == list_evaluations("front-together") != []
+    assert not os.path.exists("front-together/running")
+
+
 if __name__ == "__main__":
     built = os.path.abspath(sys.argv[1])
     companions = os.path.dirname(built)

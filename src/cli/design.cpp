@@ -88,6 +88,7 @@ int run(const DesignArguments& arguments) {
                                                    formatNumber(run.best[k], "%.5g") + " " +
                                                    robot.variables()[i].unit});
   }
+  if (spec.front) rows.push_back({"front", std::to_string(run.front.size()) + " designs that no other dominates"});
   printTable(std::cout, rows);
   for (const std::string& path : writeDesign(arguments.directory, evaluator, spec, run))
     std::cout << "  " << path << "\n";
@@ -103,9 +104,10 @@ void addDesign(CLI::App& app, Action& action) {
       ->required();
   command
       .add_option("-o,--output", arguments->directory,
-                  "directory for best/ (a robot), design.md, figures and the logs; made if need be")
+                  "directory for best/ (a robot), front/ (robots), design.md, figures and the logs; made if need be")
       ->required();
-  addTaskOptions(command, "searches at a time, one thread each; results do not depend on it", arguments->tasks);
+  addTaskOptions(command, "searches, or designs of a front, at a time, one thread each; results do not depend on it",
+                 arguments->tasks);
   command.add_option(
       "--evaluate", arguments->request,
       "evaluate one design alone, {\"stage\": \"sbplx\", \"x\": [0.05]} in this file, as workers do; -o is "
@@ -143,6 +145,8 @@ void addDesign(CLI::App& app, Action& action) {
       "                              mma: gradients, far fewer evaluations)\n"
       "      - {algorithm: crs, evaluations: 200}\n"
       "      - {algorithm: sbplx, evaluations: 100, tolerance: 1e-3}\n"
+      "    pareto:                  (instead of `searches` and `stages`: the front of several objectives)\n"
+      "      {algorithm: nsga2, population: 24, generations: 10, refine: {algorithm: slsqp, evaluations: 6}}\n"
       "Every evaluation is logged: after Ctrl-C or a crash the same command goes on from there and ends the same way.\n"
       "Designs whose loops do not close, or whose motion fails, are penalized and counted.\n"
       "Exit status: 0 done, 1 interrupted (with workers) or a task failed, 2 bad input.\n"

@@ -50,11 +50,8 @@ Json formatPieces(const MeasurePieces& pieces) {
 }  // namespace
 
 std::string formatEvaluation(const LoggedEvaluation& e) {
-  Json json = {{"stage", e.stage},
-               {"x", formatVector(e.x)},
-               {"status", getName(e.status)},
-               {"value", e.value},
-               {"seconds", e.seconds}};
+  Json json = {{"stage", e.stage}, {"x", formatVector(e.x)}, {"status", getName(e.status)},
+               {"value", e.value}, {"seconds", e.seconds},   {"measures", e.measures}};
   if (!e.terms.empty()) json["limits"] = formatPieces(e.limits);
   for (const MeasurePieces& term : e.terms) json["terms"].push_back(formatPieces(term));
   return json.dump();
@@ -68,7 +65,9 @@ LoggedEvaluation readEvaluation(const std::string& line) {
                        readNumber(json.at("value")),
                        readNumber(json.at("seconds")),
                        {},
+                       {},
                        {}};
+  for (const Json& measure : json.at("measures")) out.measures.push_back(readNumber(measure));
   if (!json.contains("terms")) return out;
   for (const Json& term : json.at("terms")) out.terms.push_back(readPieces(term));
   out.limits = readPieces(json.at("limits"));

@@ -17,6 +17,8 @@ class EvaluationLog {
 
   // The next evaluation of the log, if there is one. \throws ModelError when it belongs to another design
   std::optional<LoggedEvaluation> replay(const std::string& stage, const VectorXd& x);
+  // All that are left, at once.
+  std::deque<LoggedEvaluation> takeAll() { return std::move(left_); }
   void append(const LoggedEvaluation& evaluation);
 
  private:

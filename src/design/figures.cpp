@@ -39,6 +39,31 @@ Plot makeCourse(const DesignEvaluator& evaluator, const DesignRun& run) {
   return plot;
 }
 
+// Two objectives: all feasible designs, the start and the front.
+Plot makeFrontPlot(const DesignEvaluator& evaluator, const DesignRun& run, size_t x, size_t y) {
+  const std::vector<ObjectiveTerm>& terms = evaluator.objective();
+  Plot plot{"Front", describeTerm(terms[x]), describeTerm(terms[y]), PlotScale::Free, {}};
+  Curve designs{"designs", kSerialColor, CurveStyle::Points, false, {}};
+  const auto& front = run.front;
+  const auto calcMost = [&](size_t k) {
+    double most = evaluator.start().terms[k];
+    for (const FrontDesign& design : front) most = std::max(most, design.measures[k]);
+    return 1.2 * most;
+  };
+  const double most_x = calcMost(x), most_y = calcMost(y);  // designs far away would hide the front
+  for (const LoggedEvaluation& e : run.searches.front())
+    if (e.status == DesignStatus::Feasible && e.measures[x] <= most_x && e.measures[y] <= most_y)
+      designs.points.emplace_back(e.measures[x], e.measures[y]);
+  // Of more than two objectives, the front is no line.
+  const bool line = terms.size() == 2;
+  Curve best{"front", kLiftedColor, line ? CurveStyle::LinesPoints : CurveStyle::Points, false, {}};
+  for (const FrontDesign& design : front) best.points.emplace_back(design.measures[x], design.measures[y]);
+  Curve start{
+      "start", kClosedColor, CurveStyle::Crosses, false, {{evaluator.start().terms[x], evaluator.start().terms[y]}}};
+  plot.curves = {designs, best, start};
+  return plot;
+}
+
 // The motors of the objective that have the largest torques in this motion, in the order of the model.
 std::vector<int> chooseMotors(const DesignEvaluator& evaluator, const MotionMeasures& before,
                               const MotionMeasures& after) {
@@ -117,8 +142,19 @@ DesignFigure makeMechanismFigure(const DesignEvaluator& evaluator, const DesignR
 
 }  // namespace
 
+std::string describeTerm(const ObjectiveTerm& term) {
+  std::string text = getName(term.measure);
+  for (const std::string& motor : term.motors) text += (&motor == &term.motors.front() ? " of " : ", ") + motor;
+  return text;
+}
+
 std::vector<DesignFigure> makeDesignFigures(const DesignEvaluator& evaluator, const DesignRun& run) {
   std::vector<DesignFigure> figures = {{"design", {makeCourse(evaluator, run)}}};
+  if (!run.front.empty()) {
+    figures.push_back({"design_front", {}});
+    for (size_t k = 1; k < evaluator.objective().size(); ++k)
+      figures.back().plots.push_back(makeFrontPlot(evaluator, run, 0, k));
+  }
   std::set<std::string> names;
   for (size_t i = 0; i < run.evaluation.motions.size(); ++i) {
     std::string name = "design_" + evaluator.motions()[i].name;

@@ -25,11 +25,7 @@ void writeRow(std::ostream& out, const std::string& name, double before, double 
       << " |\n";
 }
 
-std::string describeTerm(const ObjectiveTerm& term) {
-  std::string text = getName(term.measure);
-  for (const std::string& motor : term.motors) text += (&motor == &term.motors.front() ? " of " : ", ") + motor;
-  return text;
-}
+std::string getFrontName(size_t i) { return (i < 9 ? "0" : "") + std::to_string(i + 1); }
 
 void writeVariables(std::ostream& out, const Parametrization& robot, const VectorXd& best) {
   out << "| variable | unit | bounds | before | after |\n|---|---|---|---|---|\n";
@@ -39,6 +35,27 @@ void writeVariables(std::ostream& out, const Parametrization& robot, const Vecto
     out << "| " << v.name << " | " << v.unit << " | " << format(v.lower) << " .. " << format(v.upper) << " | "
         << format(robot.start()[k], "%.5g") << " | " << format(best[k], "%.5g") << " |\n";
   }
+}
+
+// The robots of the front, and the start.
+void writeFront(std::ostream& out, const DesignEvaluator& evaluator, const DesignRun& run) {
+  const Parametrization& robot = evaluator.robot();
+  out << "\n## Front\n\nNo design found is better than one of these in all objectives. The robots are in `front`; "
+         "`best` has the "
+         "least value, the weighted sum of the objectives relative to the start.\n\n| robot";
+  for (const ObjectiveTerm& term : evaluator.objective()) out << " | " << describeTerm(term);
+  for (const DesignVariable& v : robot.variables()) out << " | " << v.name << " [" << v.unit << "]";
+  out << " |\n|---";
+  for (size_t i = 0; i < evaluator.objective().size() + robot.variables().size(); ++i) out << "|---";
+  out << "|\n";
+  const auto write = [&](const std::string& name, const std::vector<double>& measures, const VectorXd& x) {
+    out << "| " << name;
+    for (double measure : measures) out << " | " << format(measure);
+    for (double value : x) out << " | " << format(value, "%.5g");
+    out << " |\n";
+  };
+  write("start", evaluator.start().terms, robot.start());
+  for (size_t i = 0; i < run.front.size(); ++i) write(getFrontName(i), run.front[i].measures, run.front[i].x);
 }
 
 // Keeps the table short: only changes of at least a thousandth are listed.
@@ -71,10 +88,13 @@ std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec,
   for (size_t i = 0; i < evaluator.objective().size() && i < run.evaluation.terms.size(); ++i)
     writeRow(out, describeTerm(evaluator.objective()[i]), evaluator.start().terms[i], run.evaluation.terms[i]);
   writeRow(out, "value", evaluator.start().value, run.value);
+  if (spec.front) writeFront(out, evaluator, run);
   out << "\n"
-      << run.counts[0] + run.counts[1] + run.counts[2] << " designs in " << run.searches.size()
-      << " searches: " << run.counts[0] << " feasible, " << run.counts[1] << " whose loops do not close, "
-      << run.counts[2] << " whose motion fails.\n";
+      << run.counts[0] + run.counts[1] + run.counts[2]
+      << (spec.front ? " evaluations of designs: "
+                     : " designs in " + std::to_string(run.searches.size()) + " searches: ")
+      << run.counts[0] << " feasible, " << run.counts[1] << " whose loops do not close, " << run.counts[2]
+      << " whose motion fails.\n";
   for (size_t i = 0; i < run.evaluation.motions.size(); ++i)
     writeMotion(out, robot.startModel(), evaluator.motions()[i].name, evaluator.start().motions[i],
                 run.evaluation.motions[i]);
@@ -89,6 +109,10 @@ std::vector<std::string> writeDesign(const std::string& directory, const DesignE
   writeRobot(evaluator.robot().make(run.best), best, "Written by `bielle design`.");
   writeTextFile(page, formatPage(evaluator, spec, run));
   std::vector<std::string> paths = {best, page};
+  for (size_t i = 0; i < run.front.size(); ++i) {
+    paths.push_back(directory + "/front/" + getFrontName(i));
+    writeRobot(evaluator.robot().make(run.front[i].x), paths.back(), "Written by `bielle design`.");
+  }
   for (const DesignFigure& figure : makeDesignFigures(evaluator, run)) {
     const std::string path = directory + "/" + figure.name + ".svg";
     if (drawPlots(path, figure.plots)) paths.push_back(path);

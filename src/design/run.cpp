@@ -11,6 +11,7 @@
 
 #include "bielle/io/result.h"
 #include "design/evaluation_log.h"
+#include "design/front_run.h"
 #include "io/json_text.h"
 
 namespace bielle {
@@ -22,16 +23,6 @@ double getThreadSeconds() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-std::string makeHeader(const DesignEvaluator& evaluator, const DesignSpec& spec, int search) {
-  const VectorXd& start = evaluator.robot().start();
-  const Json json = {{"bielle", getBuildInfo().bielle},
-                     {"search", search + 1},
-                     {"spec", spec.text},
-                     {"start", std::vector<double>(start.begin(), start.end())},
-                     {"measures", evaluator.start().terms}};
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 class DesignRunner {
  public:
   DesignRunner(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options)
@@ -39,7 +30,7 @@ class DesignRunner {
     makeOutputDirectory(options.directory);
     for (int i = 0; i < spec.searches; ++i)
       logs_.push_back(std::make_unique<EvaluationLog>(options.directory + "/search" + std::to_string(i + 1) + ".jsonl",
-                                                      makeHeader(evaluator, spec, i)));
+                                                      makeLogHeader(evaluator, spec, std::to_string(i + 1))));
     run_.searches.resize(logs_.size());
     run_.best = evaluator.robot().start();
     run_.value = best_shown_ = evaluator.start().value;
@@ -48,6 +39,7 @@ class DesignRunner {
   DesignRun run() {
     std::vector<std::thread> threads;
     const int jobs = options_.evaluations ? spec_.searches : std::min(options_.jobs, spec_.searches);
+    if (options_.evaluations) options_.evaluations->enter(jobs);
     for (int i = 0; i < jobs; ++i) threads.emplace_back([this] { work(); });
     for (std::thread& thread : threads) thread.join();
     if (error_) std::rethrow_exception(error_);
@@ -129,17 +121,28 @@ class DesignRunner {
 
 }  // namespace
 
+std::string makeLogHeader(const DesignEvaluator& evaluator, const DesignSpec& spec, const std::string& search) {
+  const VectorXd& start = evaluator.robot().start();
+  const Json json = {{"bielle", getBuildInfo().bielle},
+                     {"search", search},
+                     {"spec", spec.text},
+                     {"start", std::vector<double>(start.begin(), start.end())},
+                     {"measures", evaluator.start().terms}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorithm stage, const VectorXd& x) {
   const double begin = getThreadSeconds();
   const SlopedEvaluation sloped =
       needsGradient(stage) ? evaluator.differentiate(x) : SlopedEvaluation{evaluator.evaluate(x), {}, {}};
   const Evaluation& evaluation = sloped.evaluation;
-  return {getName(stage), x, evaluation.status, evaluation.value, getThreadSeconds() - begin, sloped.terms,
-          sloped.limits};
+  return {
+      getName(stage),  x, evaluation.status, evaluation.value, getThreadSeconds() - begin, sloped.terms, sloped.limits,
+      evaluation.terms};
 }
 
 DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options) {
-  return DesignRunner(evaluator, spec, options).run();
+  return spec.front ? runFront(evaluator, spec, options) : DesignRunner(evaluator, spec, options).run();
 }
 
 }  // namespace bielle

@@ -3,7 +3,8 @@
 ///
 /// Every search writes DIR/searchN.jsonl, N from 1: a line that describes the problem, then one line per evaluation,
 /// flushed before the search continues. Searches are deterministic: an interrupted one is repeated with the evaluations
-/// in its log and so resumes where it stopped. An incomplete line is dropped.
+/// in its log and so resumes where it stopped. An incomplete line is dropped. The search for a front writes DIR/front.jsonl,
+/// in which the evaluations of a generation are in the order in which they were ready.
 #include <array>
 #include <functional>
 #include <string>
@@ -18,9 +19,10 @@ struct LoggedEvaluation {
   VectorXd x;
   DesignStatus status = DesignStatus::Feasible;
   double value = 0;
-  double seconds = 0;                ///< processor time at its end
-  std::vector<MeasurePieces> terms;  ///< SlopedEvaluation, in stages that need gradients
-  MeasurePieces limits;
+  double seconds = 0;                     ///< processor time at its end
+  std::vector<MeasurePieces> terms = {};  ///< SlopedEvaluation, in stages that need gradients
+  MeasurePieces limits = {};
+  std::vector<double> measures = {};  ///< Evaluation::terms: if feasible, one for each of the objective
 };
 
 /// The evaluation of a design as a stage of a search needs it, with its gradients or without.
@@ -35,34 +37,44 @@ LoggedEvaluation readEvaluation(const std::string& line);
 class DesignEvaluations {
  public:
   virtual ~DesignEvaluations() = default;
-  /// What evaluateDesign gives. Called by the threads of all searches. \throws std::exception when there will be none
+  /// As many threads as this will ask for designs, from now on.
+  virtual void enter(int threads) = 0;
+  /// What evaluateDesign gives. Called by all of them. \throws std::exception when there will be none
   virtual LoggedEvaluation evaluate(SearchAlgorithm stage, const VectorXd& x) = 0;
-  /// A search has ended; called once by each.
+  /// One of them asks for no more; called once by each.
   virtual void leave() = 0;
 };
 
 struct DesignRunOptions {
   std::string directory;
-  int jobs = 2;                                           ///< searches at a time, one thread each
-  DesignEvaluations* evaluations = nullptr;               ///< then all searches go on at a time
+  int jobs = 2;                              ///< searches, or designs of a front, at a time, one thread each
+  DesignEvaluations* evaluations = nullptr;  ///< then all of them go on at a time
   std::function<void(const std::string& line)> progress;  ///< called by one thread at a time
+};
+
+/// One that no design found dominates, among several objectives.
+struct FrontDesign {
+  VectorXd x;
+  std::vector<double> measures;  ///< as in LoggedEvaluation
 };
 
 struct DesignRun {
   std::vector<std::vector<LoggedEvaluation>> searches;
-  VectorXd best;                ///< the feasible design with the least value; the start if none is better
-  double value = 0;             ///< its value
-  Evaluation evaluation;        ///< of the best design, repeated
-  std::array<int, 3> counts{};  ///< evaluations by status
-  int replayed = 0;             ///< evaluations found in the logs
-  double seconds = 0;           ///< processor time of all evaluations, including those of earlier runs
+  VectorXd best;                   ///< the feasible design with the least value; the start if none is better
+  double value = 0;                ///< its value
+  Evaluation evaluation;           ///< of the best design, repeated
+  std::array<int, 3> counts{};     ///< evaluations by status
+  int replayed = 0;                ///< evaluations found in the logs
+  double seconds = 0;              ///< processor time of all evaluations, including those of earlier runs
+  std::vector<FrontDesign> front;  ///< if one is asked for, by increasing first measure
 };
 
 /// \throws ModelError when a log belongs to another problem, is used by another process, or cannot be written
 DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options);
 
-/// Writes DIR/best (a robot), design.md (before and after) and, if gnuplot is installed, design.svg (values over the
-/// evaluations), design_MOTION.svg (torques and speeds before and after) and design_mechanism.svg (both mechanisms).
+/// Writes DIR/best (a robot), DIR/front/01 and so on (those of the front, if there is one), design.md (before and after) and, if gnuplot is installed, design.svg (values over the
+/// evaluations), design_front.svg, design_MOTION.svg (torques and speeds before and after) and design_mechanism.svg (both
+/// mechanisms).
 /// The same run, resumed or not, writes the same bytes. Returns the paths. \throws ModelError when a file cannot be
 /// written
 std::vector<std::string> writeDesign(const std::string& directory, const DesignEvaluator& evaluator,

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include "design/nlopt_search.h"
 
@@ -29,8 +30,10 @@ nlopt::algorithm getAlgorithm(SearchAlgorithm algorithm) {
       return nlopt::GN_ISRES;
     case SearchAlgorithm::Bobyqa:
       return nlopt::LN_BOBYQA;
-    default:
+    case SearchAlgorithm::Sbplx:
       return nlopt::LN_SBPLX;
+    default:
+      throw std::invalid_argument(std::string(getName(algorithm)) + " is not for one objective");
   }
 }
 
@@ -88,9 +91,13 @@ const char* getName(SearchAlgorithm algorithm) {
     case SearchAlgorithm::Slsqp:
       return "slsqp";
     case SearchAlgorithm::Mma:
+      return "mma";
+    case SearchAlgorithm::Nsga2:
+      return "nsga2";
+    case SearchAlgorithm::Moead:
       break;
   }
-  return "mma";
+  return "moead";
 }
 
 bool needsGradient(SearchAlgorithm algorithm) {

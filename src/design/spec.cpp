@@ -137,29 +137,58 @@ ObjectiveTerm readTerm(const Entry& entry) {
 }
 
 // The mode and the objective have been read.
+SearchStage readStage(const Entry& item, const std::vector<SearchAlgorithm>& algorithms, const DesignSpec& spec) {
+  const Fields fields = item.getFields({"algorithm", "evaluations", "tolerance"});
+  SearchStage stage;
+  stage.algorithm = readChoice<SearchAlgorithm>(require(fields, "algorithm", item), algorithms);
+  if (needsGradient(stage.algorithm))
+    if (const auto obstacle = findGradientObstacle(spec.mode, spec.objective))
+      item.fail(obstacle->problem, obstacle->remedy);
+  stage.evaluations = readCount(require(fields, "evaluations", item), 1000000);
+  if (const Entry* tolerance = find(fields, "tolerance")) stage.tolerance = tolerance->getNumber();
+  if (!(stage.tolerance >= 0 && stage.tolerance < 1))
+    item.fail("its tolerance is outside 0 .. 1", "give a share of the bounds, e.g. 1e-3");
+  return stage;
+}
+
+FrontSpec readFront(const Entry& entry, const DesignSpec& spec) {
+  if (!hasFrontSearch())
+    entry.fail("this program was built without pagmo, which searches for fronts",
+               "install libpagmo-dev and build it again, or give `stages`");
+  const Fields fields = entry.getFields({"algorithm", "population", "generations", "refine"});
+  FrontSpec front;
+  FrontOptions& options = front.options;
+  if (const Entry* algorithm = find(fields, "algorithm"))
+    options.algorithm = readChoice<SearchAlgorithm>(*algorithm, {SearchAlgorithm::Nsga2, SearchAlgorithm::Moead});
+  if (const Entry* population = find(fields, "population")) {
+    options.population = readCount(*population, 10000);
+    if (options.population < 8 || options.population % 4 != 0)
+      population->fail("it is not a multiple of 4 of at least 8", "give e.g. 24");
+  }
+  if (const Entry* generations = find(fields, "generations")) options.generations = readCount(*generations, 100000);
+  if (const Entry* refine = find(fields, "refine"))
+    front.refine = readStage(*refine, {SearchAlgorithm::Slsqp, SearchAlgorithm::Mma}, spec);
+  if (spec.objective.size() < 2) entry.fail("one objective has no front", "give a second one, or `stages`");
+  return front;
+}
+
 void readSearch(const Entry& entry, DesignSpec& spec) {
-  const Fields fields = entry.getFields({"seed", "searches", "stages"});
+  const Fields fields = entry.getFields({"seed", "searches", "stages", "pareto"});
   if (const Entry* seed = find(fields, "seed")) spec.seed = static_cast<unsigned>(readCount(*seed, 1000000000));
   if (const Entry* searches = find(fields, "searches")) spec.searches = readCount(*searches, 1000);
   const Entry* stages = find(fields, "stages");
+  if (const Entry* pareto = find(fields, "pareto")) {
+    if (stages || find(fields, "searches"))
+      pareto->fail("it excludes `stages` and `searches`", "remove them, or `pareto`");
+    spec.front = readFront(*pareto, spec);
+  }
   if (!stages) return;
   spec.stages.clear();
-  for (const Entry& item : stages->getList()) {
-    const Fields stage_fields = item.getFields({"algorithm", "evaluations", "tolerance"});
-    SearchStage stage;
-    stage.algorithm =
-        readChoice<SearchAlgorithm>(require(stage_fields, "algorithm", item),
+  for (const Entry& item : stages->getList())
+    spec.stages.push_back(readStage(item,
                                     {SearchAlgorithm::Crs, SearchAlgorithm::Isres, SearchAlgorithm::Bobyqa,
-                                     SearchAlgorithm::Sbplx, SearchAlgorithm::Slsqp, SearchAlgorithm::Mma});
-    if (needsGradient(stage.algorithm))
-      if (const auto obstacle = findGradientObstacle(spec.mode, spec.objective))
-        item.fail(obstacle->problem, obstacle->remedy);
-    stage.evaluations = readCount(require(stage_fields, "evaluations", item), 1000000);
-    if (const Entry* tolerance = find(stage_fields, "tolerance")) stage.tolerance = tolerance->getNumber();
-    if (!(stage.tolerance >= 0 && stage.tolerance < 1))
-      item.fail("its tolerance is outside 0 .. 1", "give a share of the bounds, e.g. 1e-3");
-    spec.stages.push_back(stage);
-  }
+                                     SearchAlgorithm::Sbplx, SearchAlgorithm::Slsqp, SearchAlgorithm::Mma},
+                                    spec));
   if (spec.stages.empty()) stages->fail("there are no stages", "give one, or leave the key out");
 }
 

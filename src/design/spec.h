@@ -35,12 +35,14 @@
 ///   stages:                      # crs or isres, then bobyqa or sbplx; slsqp or mma (gradients)
 ///     - {algorithm: crs, evaluations: 200, tolerance: 1e-3}
 /// ```
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "bielle/design/search.h"
 #include "design/evaluation.h"
+#include "design/front_search.h"
 
 namespace bielle {
 
@@ -57,6 +59,12 @@ struct MotionSpec {
   Settings settings;
 };
 
+/// Several objectives kept apart.
+struct FrontSpec {
+  FrontOptions options;
+  std::optional<SearchStage> refine;  ///< from every point of the front, with gradients
+};
+
 struct DesignSpec {
   std::string path, text;  ///< the file and its content
   RobotSpec robot;
@@ -69,6 +77,7 @@ struct DesignSpec {
   unsigned seed = 1;
   int searches = 2;
   std::vector<SearchStage> stages = {{SearchAlgorithm::Crs, 200, 1e-3}, {SearchAlgorithm::Sbplx, 100, 1e-3}};
+  std::optional<FrontSpec> front;  ///< then there are no searches and stages
 };
 
 /// \throws ModelError naming the file, the key with its line, and the remedy

@@ -29,6 +29,7 @@ LoggedEvaluation readResult(const tasks::Task& task, const DesignRequest& reques
   demand(e.stage == getName(request.stage) && e.x.size() == request.x.size() && e.x == request.x,
          "it is of another design");
   demand(e.seconds >= 0, "its time is negative");
+  demand(e.measures.size() == (e.status == DesignStatus::Feasible ? terms : 0), "its measures are not those asked for");
   demand(e.terms.empty() || (needsGradient(request.stage) && e.terms.size() == terms),
          "its terms are not those asked for");
   demand(!e.terms.empty() || !needsGradient(request.stage) || e.status != DesignStatus::Feasible, "it lacks gradients");
@@ -51,25 +52,25 @@ std::string formatRequest(const DesignRequest& request) {
 
 DesignRequest readRequest(const std::string& path) {
   DesignRequest request;
-  readJsonFile(
-      path, "give a stage and a design, e.g. {\"stage\": \"crs\", \"x\": [0.05]}", [&request](const Json& json) {
-        const std::vector<double> x = json.at("x");
-        request.x = VectorXd::Map(x.data(), static_cast<Eigen::Index>(x.size()));
-        request.robot = json.value("robot", "");
-        const std::string stage = json.at("stage");
-        for (const SearchAlgorithm known : {SearchAlgorithm::Crs, SearchAlgorithm::Isres, SearchAlgorithm::Bobyqa,
-                                            SearchAlgorithm::Sbplx, SearchAlgorithm::Slsqp, SearchAlgorithm::Mma})
-          if (stage == getName(known)) {
-            request.stage = known;
-            return;
-          }
-        throw std::runtime_error("there is no stage '" + stage + "'");
-      });
+  readJsonFile(path, "give a stage and a design, e.g. {\"stage\": \"crs\", \"x\": [0.05]}",
+               [&request](const Json& json) {
+                 const std::vector<double> x = json.at("x");
+                 request.x = VectorXd::Map(x.data(), static_cast<Eigen::Index>(x.size()));
+                 request.robot = json.value("robot", "");
+                 const std::string stage = json.at("stage");
+                 for (const SearchAlgorithm known :
+                      {SearchAlgorithm::Crs, SearchAlgorithm::Isres, SearchAlgorithm::Bobyqa, SearchAlgorithm::Sbplx,
+                       SearchAlgorithm::Slsqp, SearchAlgorithm::Mma, SearchAlgorithm::Nsga2, SearchAlgorithm::Moead})
+                   if (stage == getName(known)) {
+                     request.stage = known;
+                     return;
+                   }
+                 throw std::runtime_error("there is no stage '" + stage + "'");
+               });
   return request;
 }
 
-DesignTasks::DesignTasks(const DesignSpec& spec, const DesignTaskOptions& options)
-    : spec_(spec), options_(options), thinking_(spec.searches) {
+DesignTasks::DesignTasks(const DesignSpec& spec, const DesignTaskOptions& options) : spec_(spec), options_(options) {
   if (spec.robot.generator.empty()) {
     const std::string robot = locateRobot(spec.robot, spec.path);
     robots_ = listRobotDirectories(robot);
@@ -87,6 +88,11 @@ DesignTasks::~DesignTasks() {
   thread_.join();
   std::error_code ignored;
   fs::remove_all(options_.directory, ignored);
+}
+
+void DesignTasks::enter(int threads) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  thinking_ += threads;
 }
 
 LoggedEvaluation DesignTasks::evaluate(SearchAlgorithm stage, const VectorXd& x) {
@@ -156,7 +162,7 @@ void DesignTasks::submit(Order& order) {
 void DesignTasks::finish(Order& order, int status) {
   try {
     order.result = readResult(order.task, order.request, spec_.objective.size(), status);
-    ++thinking_;  // the search that sleeps
+    ++thinking_;  // the thread that sleeps
     std::error_code ignored;
     fs::remove_all(order.task.directory, ignored);
   } catch (const std::exception& error) {

@@ -1,8 +1,9 @@
 #pragma once
 /// \file Evaluations of designs as tasks: each a run of `bielle design SPEC --evaluate FILE`.
 ///
-/// A search asks for one design after the other, so that there are as many tasks at a time as searches. Between tasks that end
-/// nothing is submitted until every search has said what it wants next: the engine then has all of it.
+/// A search asks for one design after the other, so that there are as many tasks at a time as searches; that for a front asks for
+/// a whole generation, each of its designs by a thread of its own. Between tasks that end nothing is submitted until every
+/// thread has said what it wants next: the engine then has all of it.
 #include <condition_variable>
 #include <exception>
 #include <functional>
@@ -40,6 +41,7 @@ class DesignTasks : public DesignEvaluations {
   DesignTasks(const DesignTasks&) = delete;
   DesignTasks& operator=(const DesignTasks&) = delete;
 
+  void enter(int threads) override;
   LoggedEvaluation evaluate(SearchAlgorithm stage, const VectorXd& x) override;
   void leave() override;
 
@@ -62,9 +64,9 @@ class DesignTasks : public DesignEvaluations {
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  int thinking_;                   // searches that have not said what they want next
+  int thinking_ = 0;               // threads that have not said what they want next
   int next_slot_ = 0;              // of the directories of tasks
-  std::vector<Order*> waiting_;    // of the searches, which sleep until they have results
+  std::vector<Order*> waiting_;    // of the threads, which sleep until they have results
   std::map<int, Order*> running_;  // by the number of the task
   std::exception_ptr error_;
   bool closed_ = false;

@@ -17,7 +17,9 @@ enum class SearchAlgorithm {
   Bobyqa,  ///< quadratic models; local
   Sbplx,   ///< simplex on subspaces; local, takes kinks
   Slsqp,   ///< sequential quadratic programs (Kraft 1994); local, needs gradients
-  Mma      ///< moving asymptotes (Svanberg 2002); local, needs gradients
+  Mma,     ///< moving asymptotes (Svanberg 2002); local, needs gradients
+  Nsga2,   ///< non-dominated sorting (Deb et al. 2002); of several objectives kept apart, not for minimizeByStages()
+  Moead    ///< decomposition (Zhang and Li 2007); likewise
 };
 const char* getName(SearchAlgorithm algorithm);
 bool needsGradient(SearchAlgorithm algorithm);
@@ -55,6 +57,7 @@ struct SearchResult {
 /// Each stage starts from the best point so far, the first one from the start. A stage with gradients is skipped if
 /// that point is infeasible, and steps back from infeasible points as from worse ones. The same seed gives the same
 /// points, in any thread. Exceptions of the objective propagate.
+/// \throws std::invalid_argument for algorithms of several objectives
 SearchResult minimizeByStages(const SearchProblem& problem, const std::vector<SearchStage>& stages, unsigned seed);
 
 }  // namespace bielle
