@@ -17,6 +17,7 @@
 #include "robot_directory.h"
 #include "robots/cleobot.h"
 #include "robots/delta.h"
+#include "robots/kangaroo.h"
 #include "robots/solid.h"
 #include "robots/spring_leg.h"
 
@@ -146,10 +147,12 @@ const std::map<std::string, Expected>& getExpected() {
   // A planar loop of hinges has three rows that count less the turn about its own hinge: 2. Five-bar leg: rail and four
   // hinges, 5 - 2. Spring leg: 10 joints, the heel rod's ball 3, the planar loop of the toe 2. Delta: 16 joints, the
   // platform moves in 3 directions. Chain: 3 joints and one planar loop per four-bar.
+  // Kangaroo: robots/kangaroo.h counts 38 joints, 80 rows and the rank of 32 of a leg.
   static const std::map<std::string, Expected> expected = {
-      {"cleobot", {30, 30, 18, 12, 24.6}},   {"rsu_biped", {12, 12, 18, 12, 25.68}},
-      {"belt_biped", {6, 6, 18, 12, 25.64}}, {"fivebar_leg", {5, 2, 3, 2, 1.83}},
-      {"spring_leg", {8, 5, 5, 5, 8.297}},   {"delta", {25, 13, 3, 3, 3.918}},
+      {"kangaroo", {160, 64, 18, 12, 40.37}}, {"kangaroo_leg", {80, 32, 7, 6, 28.19}},
+      {"cleobot", {30, 30, 18, 12, 24.6}},    {"rsu_biped", {12, 12, 18, 12, 25.68}},
+      {"belt_biped", {6, 6, 18, 12, 25.64}},  {"fivebar_leg", {5, 2, 3, 2, 1.83}},
+      {"spring_leg", {8, 5, 5, 5, 8.297}},    {"delta", {25, 13, 3, 3, 3.918}},
       {"fourbar_chain", {15, 6, 3, 3, 4.8}},
   };
   return expected;
@@ -430,4 +433,51 @@ TEST_CASE("spring leg: the heel rod keeps the tarsus nearly parallel to itself w
     CHECK(result.q[model.joints()[model.findJoint("knee")].idx_q] == Approx(bend).margin(0.05));
     CHECK(std::abs(log3(ws.X_WB[tarsus].R).y()) < 0.1 * std::abs(bend));
   }
+}
+
+TEST_CASE("kangaroo: cranks turn with knee and ankle, screws and guides slide as far as their triangles say") {
+  const KangarooParameters p;
+  const Model model = makeKangarooLeg(p);
+  const auto index = [&](const std::string& name) {
+    REQUIRE(model.findJoint(name) >= 0);
+    return model.joints()[model.findJoint(name)].idx_q;
+  };
+  const auto getArm = [](double arm, double angle, double turn) {  // forward, turned about y
+    return Eigen::Vector2d(arm * std::cos(angle - turn), arm * std::sin(angle - turn));
+  };
+  for (const auto& [knee, pitch, roll] : {std::array<double, 3>{-0.2, 0.3, 0}, {0.6, -0.4, 0.1}, {1.3, -0.7, -0.15}}) {
+    CAPTURE(knee, pitch, roll);
+    AssemblyProblem problem;
+    problem.q_ref = model.makeNeutral();
+    problem.weights = VectorXd::Constant(model.nv(), 1e-6);
+    for (const auto& [name, angle] :
+         {std::pair<std::string, double>{"knee_left", knee}, {"ankley_left", pitch}, {"anklex_left", roll}}) {
+      problem.q_ref[index(name)] = angle;
+      problem.weights[model.joints()[model.findJoint(name)].idx_v] = 1;
+    }
+    const AssemblyResult result = assemble(model, problem);
+    REQUIRE(result.status == AssemblyStatus::Closed);
+    const auto get = [&](const std::string& name) { return result.q[index(name)]; };
+    REQUIRE(get("knee_left") == Approx(knee).margin(1e-6));
+    CHECK(get("knee_crank_left_hinge") == Approx(get("knee_left")).margin(1e-9));
+    const Eigen::Vector2d pivot(0, -p.thigh_length + p.knee_crank_height);
+    const Eigen::Vector2d start(p.knee_arm * std::cos(p.knee_angle), -p.knee_screw_drop);
+    const auto reach = [&](double turn) { return (pivot + getArm(p.knee_arm, p.knee_angle, turn) - start).norm(); };
+    CHECK(get("motor_knee_screw_left") == Approx(reach(get("knee_left")) - reach(0)).margin(1e-9));
+    CHECK(get("knee_screw_left_guide_slide") == Approx(get("motor_knee_screw_left")).margin(1e-9));
+    // Without roll, the links of the ankle stay parallel to the shank; with it, the outer crank goes the other way.
+    const double outer = get("upper_crank1_left_hinge"), inner = get("upper_crank2_left_hinge");
+    CHECK(get("lower_crank1_left_hinge") == Approx(outer).margin(1e-9));
+    CHECK(get("lower_crank2_left_hinge") == Approx(inner).margin(1e-9));
+    if (roll == 0) {
+      CHECK(outer == Approx(get("ankley_left")).margin(1e-9));
+      CHECK(inner == Approx(get("ankley_left")).margin(1e-9));
+    } else {
+      CHECK((outer - inner) * roll > 0.5 * roll * roll);
+      CHECK((outer + inner) / 2 == Approx(get("ankley_left")).margin(0.1));
+    }
+  }
+  KangarooParameters short_thigh;
+  short_thigh.knee_screw_drop = 0.3;
+  CHECK_THROWS_WITH(makeKangaroo(short_thigh), Catch::Contains("no room on the thigh"));
 }

@@ -1,4 +1,4 @@
-// Cleobot, the biped with RSU ankles and that with belts squat, walk and jump with the costs of Bipetto. The legs of Cleobot have no
+// Cleobot, the bipeds with RSU ankles, with belts and with ball screws squat, walk and jump with the costs of Bipetto. The legs of Cleobot have no
 // equivalent serial chain.
 #include <Eigen/SVD>
 #include <catch2/catch.hpp>
@@ -133,6 +133,29 @@ TEST_CASE("belt biped: bielle solve squat, walk and jump converge and are checke
                 {{"walk"}, 0.98 * standing, 1.055 * standing},
                 {{"jump"}, 0.83 * standing, standing + 0.02 + rise}},
                70, 0.25, {0.015, 0.2});
+}
+
+TEST_CASE("Kangaroo on ball screws: squat and walk are solved and checked, with 96 redundant rows") {
+  const double standing = 0.744;
+  struct Case {
+    std::string motion;
+    double lowest, lean;  // m, rad
+  };
+  for (const Case& each : {Case{"squat", 0.7 * standing, 0.4}, Case{"walk", 0.998 * standing, 0.25}}) {
+    CAPTURE(each.motion);
+    const RobotDirectory directory;
+    const MotionRecord record = solve("kangaroo", {each.motion}, directory);
+    CHECK(record.gap.maxCoeff() < 1e-10);
+    CHECK(record.com.col(2).minCoeff() == Approx(each.lowest).margin(0.01));
+    CHECK(record.u.cwiseAbs().maxCoeff() < 2500);  // N
+    for (int k = 0; k < record.q.rows(); ++k) {
+      const Eigen::Quaterniond trunk(Eigen::Vector4d(record.q.row(k).segment<4>(3)));
+      CHECK((trunk * Vector3d::UnitZ()).z() > std::cos(each.lean));
+    }
+  }
+  const RobotDirectory directory;
+  const MotionRecord record = solve("kangaroo_leg", {"squat"}, directory);
+  CHECK(record.com.col(2).minCoeff() == Approx(0.7 * record.com(0, 2)).margin(0.015));
 }
 
 TEST_CASE("belt biped: springs, dampers and friction are in the energy that the check counts") {

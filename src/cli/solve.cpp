@@ -83,7 +83,15 @@ std::string formatConstraints(const FddpSummary& solver) {
          std::to_string(solver.multiplier_updates) + " updates";
 }
 
-void printResult(const MotionResult& result, const std::vector<std::string>& paths) {
+// Of a robot that has both kinds of motors, N m and N.
+std::string makeTorqueLabel(const Model& model) {
+  bool turning = false, sliding = false;
+  for (const Motor& motor : model.motors())
+    (model.joints()[motor.joint].kind == JointKind::Prismatic ? sliding : turning) = true;
+  return !sliding ? "peak torques [N m]" : turning ? "peak torques [N m], forces [N]" : "peak forces [N]";
+}
+
+void printResult(const Model& model, const MotionResult& result, const std::vector<std::string>& paths) {
   const FddpSummary& solver = result.solver;
   std::string torques;
   for (size_t i = 0; i < std::min<size_t>(4, result.peak_torques.size()); ++i)
@@ -107,7 +115,7 @@ void printResult(const MotionResult& result, const std::vector<std::string>& pat
                               {"constraints", formatConstraints(solver)},
                               {"closure gap", pair(result.gap_position, result.gap_angle)},
                               {"contact slip", pair(result.slip_position, result.slip_angle)},
-                              {"peak torques [N m]", torques},
+                              {makeTorqueLabel(model), torques},
                               {"electrical energy", formatEnergy(result.energy)}});
   printTimings(result.timings);
   for (const std::string& path : paths) std::cout << "  " << path << "\n";
@@ -198,7 +206,7 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   watchSignals();
   const MotionResult result = solver.solve({arguments.robot.name, robot.file, getCommandLine(),
                                             serial ? "serial" : "closed", serial ? arguments.serial_armature : ""});
-  printResult(result, writeResult(arguments.directory, result));
+  printResult(model, result, writeResult(arguments.directory, result));
   const bool failed = !arguments.no_check && !checkResult(arguments.directory);
   if (!arguments.no_report) addReport(arguments.directory);  // the check is part of it
   warnOfMissedGoals(result);

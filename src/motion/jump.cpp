@@ -5,6 +5,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "motion/foot_constraints.h"
+#include "motion/motor_scale.h"
 #include "motion/quintic.h"
 
 namespace bielle {
@@ -69,7 +70,7 @@ StageSpec makeStage(const Scene& scene, const std::vector<ContactTarget>& contac
   stage.constraints = makeConstraintSet(model, contacts);
   if (o.published == 0) setClosureGains(scene.gains, stage.constraints);
   stage.state = {o.state_weight, scene.q0, VectorXd::Zero(model.nv()), scene.state_weights};
-  stage.control = {o.control_weight, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
+  stage.control = {o.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model)};
   return stage;
 }
 

@@ -5,6 +5,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "math/so3.h"
 #include "motion/foot_constraints.h"
+#include "motion/motor_scale.h"
 #include "ocp/ground_forces.h"
 
 namespace bielle {
@@ -32,7 +33,7 @@ StageSpec makeRegularizedStage(const Scene& scene, const GaitNode& node) {
   stage.state = {scene.options.state_weight, scene.stance.q, VectorXd::Zero(model.nv()), scene.state_weights};
   stage.state.q_ref.segment<4>(3) = makeHeading(scene, node);
   stage.state.v_ref[5] = node.heading_rate;
-  stage.control = {scene.options.control_weight, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
+  stage.control = {scene.options.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model)};
   return stage;
 }
 

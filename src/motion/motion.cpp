@@ -9,6 +9,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/error.h"
+#include "motion/motor_scale.h"
 
 namespace bielle {
 
@@ -190,7 +191,7 @@ VectorXd makeStateWeights(const Model& model) {
 void raiseMotorWeights(const Model& model, double weight, VectorXd& weights) {
   for (const Motor& motor : model.motors()) {
     double& w = weights[model.nv() + motor.dof];
-    w = std::max(w, weight);
+    w = std::max(w, isLinear(model, motor) ? weight / (kScrewArm * kScrewArm) : weight);
   }
 }
 

@@ -5,6 +5,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "motion/foot_constraints.h"
+#include "motion/motor_scale.h"
 
 namespace bielle {
 namespace {
@@ -34,7 +35,7 @@ StageSpec makeStage(const Model& model, const SquatOptions& o, const std::vector
   stage.state = {o.state_weight, q0, VectorXd::Zero(model.nv()), makeStateWeights(model)};
   if (model.hasFreeFlyer()) stage.state.weights.segment<2>(3).setConstant(o.torso_weight);
   raiseMotorWeights(model, o.motor_weight, stage.state.weights);
-  stage.control = {o.control_weight, VectorXd::Zero(model.nu()), VectorXd::Ones(model.nu())};
+  stage.control = {o.control_weight, VectorXd::Zero(model.nu()), makeControlWeights(model)};
   stage.costs.push_back(
       {"com height", o.com_weight, Activation::makeQuadratic(Vector3d::UnitZ()), makeComPosition(com), true});
   const double weight = model.mass() * model.gravity().norm();

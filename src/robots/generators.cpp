@@ -8,6 +8,7 @@
 #include "robots/cleobot.h"
 #include "robots/delta.h"
 #include "robots/fivebar_leg.h"
+#include "robots/kangaroo.h"
 #include "robots/rsu_biped.h"
 #include "robots/spring_leg.h"
 
@@ -61,6 +62,10 @@ const std::vector<Generator>& getGenerators() {
        makeRequests<RsuBipedParameters>(makeRsuBiped)},
       {"belt_biped", "biped with serial hips, knees driven by belts, ankles by differentials",
        makeRequests<BeltBipedParameters>(makeBeltBiped)},
+      {"kangaroo", "biped moved by ball screws alone: hip differentials, parallelograms; 96 redundant rows",
+       makeRequests<KangarooParameters>(makeKangaroo)},
+      {"kangaroo_leg", "its left leg, the trunk on a vertical rail; 48 redundant rows",
+       makeRequests<KangarooParameters>(makeKangarooLeg)},
       {"fivebar_leg", "planar leg on a rail: two coaxial motors, four rods, a point foot",
        makeRequests<FiveBarLegParameters>(makeFiveBarLeg)},
       {"spring_leg", "leg like Cassie's with rigid springs: tarsus and toe moved by four-bars",
