@@ -3,7 +3,7 @@ set(pages tutorial modelling signs new_robot motions objectives linkages checks 
 if(BIELLE_BUILD_EXAMPLES)
   list(APPEND pages new_motion)
 endif()
-if(PAGMO_LIBRARY AND BOOST_SERIALIZATION_LIBRARY AND PAGMO_INCLUDE_DIR)
+if(PAGMO_LIBRARY AND PAGMO_INCLUDE_DIR)
   list(APPEND pages fronts)
 endif()
 if(TARGET bielle-workers)
