@@ -481,3 +481,52 @@ TEST_CASE("kangaroo: cranks turn with knee and ankle, screws and guides slide as
   short_thigh.knee_screw_drop = 0.3;
   CHECK_THROWS_WITH(makeKangaroo(short_thigh), Catch::Contains("no room on the thigh"));
 }
+
+namespace {
+
+// Angles of the motors (time steps x motors) of a leg that falls from its neutral posture for 0.1 s, by Runge-Kutta steps.
+MatrixXd simulateFall(const Model& model, double step) {
+  const ConstraintSet set = makeConstraintSet(model);
+  Workspace ws(model);
+  ConstrainedWorkspace cws;
+  const VectorXd tau = VectorXd::Zero(model.nv());
+  VectorXd q = findClosedConfiguration(model).q, v = VectorXd::Zero(model.nv());
+  const auto accelerate = [&](const VectorXd& q_at, const VectorXd& v_at) {
+    REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q_at, v_at, tau) == DynamicsStatus::Ok);
+    return VectorXd(cws.a);
+  };
+  const int steps = static_cast<int>(std::lround(0.1 / step));
+  MatrixXd out(steps, model.nu());
+  for (int i = 0; i < steps; ++i) {
+    const VectorXd a1 = accelerate(q, v);
+    const VectorXd v2 = v + step / 2 * a1, a2 = accelerate(model.integrate(q, step / 2 * v), v2);
+    const VectorXd v3 = v + step / 2 * a2, a3 = accelerate(model.integrate(q, step / 2 * v2), v3);
+    const VectorXd v4 = v + step * a3, a4 = accelerate(model.integrate(q, step * v3), v4);
+    q = model.integrate(q, step / 6 * (v + 2 * v2 + 2 * v3 + v4));
+    v += step / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
+    for (int m = 0; m < model.nu(); ++m) out(i, m) = q[model.joints()[model.motors()[m].joint].idx_q];
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("spring leg: with leaf springs it moves as with rigid ones, up to 1/k") {
+  const double step = 5e-5;
+  const MatrixXd rigid = simulateFall(makeSpringLeg(), step);
+  CHECK(rigid.bottomRows(1).cwiseAbs().maxCoeff() > 0.05);
+  double last = 0;
+  for (const double stiffness : {1e3, 1e4, 1e5}) {
+    SpringLegParameters p;
+    p.shin_stiffness = p.heel_stiffness = stiffness;
+    const Model model = makeSpringLeg(p);
+    CHECK(model.mass() == Approx(makeSpringLeg().mass()));
+    const Mobility mobility = calcMobility(model, findClosedConfiguration(model).q);
+    CHECK(mobility.rank == 5);
+    CHECK(mobility.mobility == 7);
+    const double error = (simulateFall(model, step) - rigid).cwiseAbs().maxCoeff();
+    CAPTURE(stiffness, error);
+    if (last > 0) CHECK(std::log10(last / error) == Approx(1).margin(0.1));
+    last = error;
+  }
+}

@@ -80,6 +80,35 @@ void addHip(const SpringLegParameters& p, ModelBuilder& builder) {
                builder);
 }
 
+// A hinge that a leaf spring holds at neutral.
+void addLeaf(const std::string& joint, double stiffness, ModelBuilder& builder) {
+  JointForce force;
+  force.stiffness = stiffness;
+  builder.addJointForce(joint, force);
+}
+
+void addShin(const SpringLegParameters& p, const Shape& shape, ModelBuilder& builder) {
+  const Joint knee = makeRevolute("knee", shape.knee, kY);
+  const std::vector<Solid> solids = makeLimb(kOrigin, shape.shin, 0.015, p.shin_mass, kOrigin);
+  if (p.shin_stiffness == 0) return addSolidLink("shin", "thigh", knee, solids, builder);
+  addSolidLink("knee_link", "thigh", knee, {solids.back()}, builder);
+  addSolidLink("shin", "knee_link", makeRevolute("shin_spring", kOrigin, kY), {solids.front()}, builder);
+  addLeaf("shin_spring", p.shin_stiffness, builder);
+}
+
+void addTarsus(const SpringLegParameters& p, const Shape& shape, ModelBuilder& builder) {
+  std::vector<Solid> tarsus = makeLimb(kOrigin, shape.tarsus, 0.015, 0.8 * p.tarsus_mass, shape.crank_pivot);
+  const Solid heel = makeRod(shape.heel, kOrigin, 0.012, 0.2 * p.tarsus_mass / p.heel_length, colors::kFrame);
+  const bool sprung = p.heel_stiffness > 0;
+  if (!sprung) tarsus.push_back(heel);
+  addSolidLink("tarsus_link", "shin", makeRevolute("tarsus", shape.shin, kY), tarsus, builder);
+  if (sprung) {
+    addSolidLink("heel_leaf", "tarsus_link", makeRevolute("heel_spring", kOrigin, kY), {heel}, builder);
+    addLeaf("heel_spring", p.heel_stiffness, builder);
+  }
+  builder.addFrame("heel", sprung ? "heel_leaf" : "tarsus_link", {Matrix3d::Identity(), shape.heel});
+}
+
 // From the toe's crank on the tarsus to its lever.
 void addToe(const SpringLegParameters& p, const Shape& shape, ModelBuilder& builder) {
   const Vector3d sole(p.sole_offset, 0, -p.ankle_height);
@@ -130,7 +159,9 @@ std::vector<Parameter> listParameters(SpringLegParameters& p) {
           {"heel_rod_mass", &p.heel_rod_mass, "kg", 0.001, 5, "of the heel rod"},
           {"crank_mass", &p.crank_mass, "kg", 0.001, 5, "of the toe's crank"},
           {"plantar_mass", &p.plantar_mass, "kg", 0.001, 5, "of the plantar rod"},
-          {"armature", &p.armature, "kg m^2", 0, 1, "rotor inertia of every motor, behind its gear"}};
+          {"armature", &p.armature, "kg m^2", 0, 1, "rotor inertia of every motor, behind its gear"},
+          {"shin_stiffness", &p.shin_stiffness, "N m/rad", 0, 1e9, "of the leaf between knee and shin, 0: rigid"},
+          {"heel_stiffness", &p.heel_stiffness, "N m/rad", 0, 1e9, "of the leaf between tarsus and heel, 0: rigid"}};
 }
 
 Model makeSpringLeg(const SpringLegParameters& parameters) {
@@ -144,12 +175,8 @@ Model makeSpringLeg(const SpringLegParameters& parameters) {
   addHip(p, builder);
   addSolidLink("thigh", "hip_yaw_link", makeRevolute("hip_pitch", -p.pitch_drop * kZ, kY),
                makeLimb(kOrigin, shape.knee, 0.02, p.thigh_mass, shape.knee / 2), builder);
-  addSolidLink("shin", "thigh", makeRevolute("knee", shape.knee, kY),
-               makeLimb(kOrigin, shape.shin, 0.015, p.shin_mass, kOrigin), builder);
-  std::vector<Solid> tarsus = makeLimb(kOrigin, shape.tarsus, 0.015, 0.8 * p.tarsus_mass, shape.crank_pivot);
-  tarsus.push_back(makeRod(shape.heel, kOrigin, 0.012, 0.2 * p.tarsus_mass / p.heel_length, colors::kFrame));
-  addSolidLink("tarsus_link", "shin", makeRevolute("tarsus", shape.shin, kY), tarsus, builder);
-  builder.addFrame("heel", "tarsus_link", {Matrix3d::Identity(), shape.heel});
+  addShin(p, shape, builder);
+  addTarsus(p, shape, builder);
   addToe(p, shape, builder);
   // The rod must not spin: its universal joint turns about y and about the axis that is more perpendicular to the rod.
   const Vector3d second = std::abs(shape.rod.x()) > std::abs(shape.rod.z()) ? kZ : kX;

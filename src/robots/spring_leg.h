@@ -1,5 +1,5 @@
 #pragma once
-/// \file A leg like Cassie's with rigid leaf springs: tarsus and toe are moved by four-bars.
+/// \file A leg like Cassie's, its leaf springs rigid or not: tarsus and toe are moved by four-bars.
 ///
 /// Hip roll, yaw and pitch, knee, tarsus and toe; the last four move in the sagittal plane. With O the hip pitch axis,
 /// K the knee, T the tarsus joint, P the toe pivot, H the heel on the tarsus, d(a) = (sin a, -cos a) the direction of
@@ -12,6 +12,11 @@
 /// The toe's four-bar: a crank of length c about C = T + m d(a3 - f), the plantar rod of length k, the lever of length
 /// v on the foot, at the angle g when the sole is level; the crank points backward. It is closed by a hinge: five rows,
 /// rank two, on three joints. Mobility 5, one per motor: hip_roll, hip_yaw, hip_pitch, knee, motor_toe.
+///
+/// Cassie's leaves are at the root of the shin and of the heel. With a stiffness, each is a hinge about y with a spring that
+/// is at rest in the neutral configuration: shin_spring at K carries the shin, heel_spring at T the heel; the motor of the
+/// knee then turns the knee's link. Each adds a joint, and one to the mobility. The stiffer they are, the less they bend:
+/// by tau / k under a torque tau.
 ///
 /// Lengths, angles between them and masses of links are those of the leg of Digit, Cassie's successor, as modelled in
 /// `digit_like_2legs` of example-parallel-robots (LAAS-CNRS and Inria, 2024, BSD 3-Clause), its right leg. Simplified:
@@ -59,6 +64,9 @@ struct SpringLegParameters {
   double crank_mass = 0.0091;     ///< kg
   double plantar_mass = 0.024;    ///< kg
   double armature = 0.01;         ///< of a motor behind its gear, kg m^2
+
+  double shin_stiffness = 0;  ///< of the leaf between knee and shin, N m/rad; 0: rigid
+  double heel_stiffness = 0;  ///< of the leaf between tarsus and heel, N m/rad; 0: rigid
 };
 
 std::vector<Parameter> listParameters(SpringLegParameters& parameters);
