@@ -282,6 +282,71 @@ TEST_CASE("constraints that contradict each other are named, with what is left o
   CHECK(calcControlGradient(makeGuess(problem).us, violations).norm() > 1e-2);
 }
 
+namespace {
+
+// A point in the plane that moves by u in each stage.
+struct Point {
+  static constexpr int kStates = 2, kControls = 2;
+  template <class S>
+  static std::array<S, 2> calcRate(const std::array<S, 2>&, const std::array<S, 2>& u) {
+    return u;
+  }
+};
+
+// The point must end on a winding road, and hardly gains by going along it.
+Complex getHeight(const Complex* x, const Complex*) { return x[1] - std::sin(20.0 * x[0]); }
+Constrained<PlantProblem<Point>> makeWindingRoad(double goal, double other_road) {
+  PlantProblem<Point> point;
+  point.stages = 1;
+  point.dt = 1;
+  point.control_weight = 1e-6;
+  point.goal << goal, 0;
+  point.terminal_weight << 1e-3, 0;
+  Constrained<PlantProblem<Point>> p(point);
+  p.rows.push_back({"road", 1, 1, 0, 0, getHeight});
+  if (other_road != 0) p.rows.push_back({"other road", 1, 1, other_road, other_road, getHeight});
+  return p;
+}
+
+}  // namespace
+
+TEST_CASE("where the cost creeps along curved constraints, it is accepted within them") {
+  const auto solve = [](double acceptable_decrease, double other_road) {
+    auto problem = makeWindingRoad(10, other_road);
+    ShootingTrajectory t = makeGuess(problem);
+    FddpOptions options;
+    options.max_iterations = 100;
+    options.acceptable_decrease = acceptable_decrease;
+    options.constraints.initial_penalty = 10;
+    const FddpSummary summary = Fddp(options).solve(problem, t);
+    const std::vector<VectorXd> c = calcConstraints(problem, t.us);
+    if (summary.termination == FddpTermination::Converged) CHECK(std::abs(c[1][0]) <= options.constraints.tolerance);
+    CHECK(summary.cost == Approx(calcCost(problem, t.us)).epsilon(1e-9));
+    return summary;
+  };
+  const FddpSummary creeping = solve(0, 0);
+  CAPTURE(creeping.iterations, creeping.cost, creeping.message);
+  CHECK(creeping.termination == FddpTermination::MaxIterations);
+
+  const FddpSummary accepted = solve(0.2, 0);
+  CAPTURE(accepted.iterations, accepted.cost, accepted.message);
+  CHECK(accepted.termination == FddpTermination::Converged);
+  CHECK(accepted.acceptable);
+  CHECK(accepted.message.find("not stationary") != std::string::npos);
+  CHECK(accepted.log.back().gradient > FddpOptions().gradient_tolerance);
+  CHECK(accepted.violation <= 1e-8);
+  // The last twenty costs before the constraints were closed differ by a fifth at most; they fall no faster if less is asked.
+  CHECK(accepted.iterations < creeping.iterations);
+  CHECK(accepted.cost < 1.5 * creeping.cost);
+
+  // What cannot hold is never accepted.
+  const FddpSummary impossible = solve(0.2, 0.02);
+  CAPTURE(impossible.message);
+  CHECK(impossible.termination != FddpTermination::Converged);
+  CHECK_FALSE(impossible.acceptable);
+  CHECK(impossible.violation > 5e-3);
+}
+
 TEST_CASE("multipliers are worth keeping") {
   auto problem = makeBoundedCartPole();
   ShootingTrajectory t = makeGuess(problem);

@@ -34,7 +34,7 @@ struct SolveArguments {
   std::vector<std::string> settings;                                      // name=value
   std::vector<std::string> effort_limits, velocity_limits, power_limits;  // motor=value
   TimingArguments timings;
-  FddpOptions solver;
+  FddpOptions solver = makeMotionSolverOptions();
   std::string warm_start;  // directory of a result, or empty
   bool quiet = false, no_check = false, no_report = false;
 };

@@ -155,6 +155,7 @@ Json makeSummary(const MotionResult& result) {
           {"interrupted", result.interrupted()},
           {"termination", getName(result.solver.termination)},
           {"message", result.solver.message},
+          {"acceptable", result.solver.acceptable},
           {"cost", result.solver.cost},
           {"iterations", result.solver.iterations},
           {"seconds", result.solver.seconds},

@@ -153,6 +153,13 @@ void holdPosture(Motion& motion) {
 
 }  // namespace
 
+FddpOptions makeMotionSolverOptions() {
+  FddpOptions out;
+  out.short_step = 0.25;
+  out.acceptable_decrease = 1e-4;
+  return out;
+}
+
 FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer,
                         Multipliers* multipliers) {
   constexpr double kCautious = 1e-2;  // regularization of the second attempt

@@ -12,6 +12,7 @@ namespace bielle {
 namespace {
 
 constexpr double kFall = 0.25;  // ratio to which a violation must decrease, or the penalty is raised
+constexpr double kHalf = 0.5;   // the same by a step of settle()
 // Below this violation the penalty is raised at every update, and multipliers converge the faster. Farther away a large
 // penalty would only shorten the steps.
 constexpr double kNear = 0.03, kNearPenalty = 1e3;  // the latter over the initial penalty, at most
@@ -182,6 +183,25 @@ bool AugmentedLagrangian::restore(const EvaluationList& iterate, double cost) {
   startRestoration(cost);
   evaluate(iterate);
   return true;
+}
+
+bool AugmentedLagrangian::settle(const EvaluationList& iterate, bool full) {
+  const bool falls = at_.penalized <= kHalf * last_violation_;
+  last_violation_ = at_.penalized;
+  if (penalty_ < options_.max_penalty) {
+    penalty_ = std::min(options_.max_penalty, options_.penalty_increase * penalty_);
+  } else if (full && !falls) {
+    ++num_updates_;
+    adoptMultipliers();
+  }
+  evaluate(iterate);
+  return falls;
+}
+
+void AugmentedLagrangian::endSettling(const EvaluationList& iterate) {
+  penalty_ = far_penalty_;
+  last_violation_ = std::numeric_limits<double>::infinity();
+  evaluate(iterate);
 }
 
 void AugmentedLagrangian::startRestoration(double cost) {

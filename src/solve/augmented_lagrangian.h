@@ -44,6 +44,13 @@ class AugmentedLagrangian {
   bool updateMultipliers(const EvaluationList& iterate, double cost);
   /// Minimizes the violations alone from now on, as updateMultipliers() does in the end. False if that was so already.
   bool restore(const EvaluationList& iterate, double cost);
+  /// Whether settle() makes sense: no barrier, and violations are not minimized on their own.
+  bool canSettle() const { return !isEmpty() && barrier_.isEmpty() && !restoring_; }
+  /// Raises the penalty; once it is at its maximum, updates the multipliers if a full step has not halved the violation.
+  /// Returns whether the violation has been halved.
+  bool settle(const EvaluationList& iterate, bool full);
+  /// Back to the penalty before.
+  void endSettling(const EvaluationList& iterate);
   int getNumUpdates() const { return num_updates_; }
   /// Eq. (12) alone: at a stationary point, the multipliers of the constraints.
   void adoptMultipliers();

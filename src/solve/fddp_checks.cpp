@@ -24,6 +24,7 @@ void checkOptions(const FddpOptions& o) {
           "initial_regularization must lie between min_regularization and max_regularization");
   require(o.regularization_increase > 1 && o.regularization_decrease >= 1,
           "regularization_increase must exceed 1, regularization_decrease must not be below");
+  require(o.acceptable_decrease >= 0, "acceptable_decrease must not be negative");
   require(o.state_regularization_ratio >= 0, "state_regularization_ratio must not be negative");
   require(o.rollout_segments >= 1, "rollout_segments must be at least 1");
   require(o.constraints.inequalities == Inequalities::AugmentedLagrangian || o.last_rollout == LastRollout::Closed,

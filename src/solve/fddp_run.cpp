@@ -13,6 +13,8 @@ namespace {
 constexpr double kGoodStep = 0.1;  // alpha after which a foreseen decrease is believed
 // A line search starts at less than 1 only below these gaps and violations and beyond this ratio of curvatures, and at least here.
 constexpr double kSmallGap = 1e-6, kClose = 0.03, kSteep = 1.5, kShortestFirst = 0.05;
+constexpr int kSettling = 30;           // steps that settle() takes, at most
+constexpr double kSettlingFactor = 10;  // of the regularization, between these steps
 constexpr const char* kStalled = "the cost no longer decreases";
 
 }  // namespace
@@ -59,6 +61,8 @@ FddpRun::End FddpRun::linearize() {
     work_.lagrangian.updateMultipliers(work_.evaluations.getIterate(), line_.cost);
     updated_ = true;
   }
+  if (settling_ == 0 && isCreeping()) settling_ = kSettling;
+  if (settling_ > 0) settle();
   if (const End end = linearizeAndSweep()) return end;
   updateGaps();
   line_.violation = work_.lagrangian.getViolation();
@@ -66,6 +70,38 @@ FddpRun::End FddpRun::linearize() {
   summary_.cost = line_.cost;
   summary_.gap = line_.gap;
   return {};
+}
+
+bool FddpRun::isCreeping() const {
+  const double share = options_.acceptable_decrease;
+  const std::vector<FddpIteration>& log = summary_.log;
+  if (share == 0 || recedes() || !work_.lagrangian.canSettle() || static_cast<int>(log.size()) < next_settling_)
+    return false;
+  double least = line_.cost, most = line_.cost;
+  for (size_t i = log.size() - kCreeping; i < log.size(); ++i) {
+    if (log[i].violation > kClose || log[i].gap > kClose) return false;
+    least = std::min(least, log[i].cost);
+    most = std::max(most, log[i].cost);
+  }
+  return most - least <= share * std::abs(line_.cost);
+}
+
+// Closes the constraints where the trajectory is: the penalty grows, and the trajectory moves along the constraints the less the
+// more that would open them.
+void FddpRun::settle() {
+  AugmentedLagrangian& lagrangian = work_.lagrangian;
+  const bool full = last_step_ == 1, falls = lagrangian.settle(work_.evaluations.getIterate(), full);
+  updated_ = true;
+  closed_merit_.reset();
+  if (--settling_ == 0) {
+    lagrangian.endSettling(work_.evaluations.getIterate());
+    resetRegularization();
+    next_settling_ = summary_.iterations + kCreeping;
+  } else if (!full) {
+    regularization_ = std::min(options_.max_regularization, kSettlingFactor * regularization_);
+  } else if (!falls) {
+    regularization_ = std::max(options_.min_regularization, regularization_ / kSettlingFactor);
+  }
 }
 
 FddpRun::End FddpRun::evaluate() {
@@ -107,6 +143,11 @@ FddpRun::End FddpRun::findStep() {
   while (true) {
     if (isInterrupted()) return FddpTermination::Interrupted;
     if (const End end = updateStep()) return end;
+    if (settling_ > 0 && isClosed() && work_.lagrangian.isSatisfied()) {
+      summary_.message = "the constraints hold, and the cost hardly falls any more; it is not stationary";
+      summary_.acceptable = true;
+      return FddpTermination::Converged;
+    }
     if (isStationary() && work_.lagrangian.isSatisfied()) {
       if (line_.gradient > options_.gradient_tolerance) summary_.message = kStalled;
       return FddpTermination::Converged;
@@ -263,6 +304,7 @@ FddpRun::End FddpRun::checkProgress() {
     return FddpTermination::Converged;
   }
   if (summary_.iterations >= options_.max_iterations) return FddpTermination::MaxIterations;
+  if (settling_ > 0) return {};
   if (line_.step > options_.long_step) {
     regularization_ = std::max(options_.min_regularization, regularization_ / options_.regularization_decrease);
   } else if (line_.step <= options_.short_step) {

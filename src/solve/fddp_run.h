@@ -33,12 +33,16 @@ class FddpRun {
 
  private:
   static constexpr int kShortestSegment = 6;  // stages
+  static constexpr int kCreeping = 20;        // iterations in which the cost must have hardly changed
 
   /// Reason for ending the iterations, if they end.
   using End = std::optional<FddpTermination>;
 
   void start();
   End linearize();
+  // Whether the constraints nearly hold and the cost has hardly changed for a while, although models promise more.
+  bool isCreeping() const;
+  void settle();
   End evaluate();
   End linearizeAndSweep();
   void updateGaps();
@@ -87,12 +91,14 @@ class FddpRun {
   double slope_ = 0, curvature_ = 0;                      // Eq. (1)
   double regularization_ = 0, first_regularization_ = 0;  // the latter of the first sweep of an iteration
   int threads_ = 1;
-  bool swept_ = false;         // a sweep is still to be looked at
-  bool updated_ = false;       // multipliers are new in this iteration
-  bool closing_ = false;       // the next step must close the gaps, since the constraints are infeasible
-  bool stalled_ = false;       // the merit cannot be seen to decrease, because of rounding
-  Trial* accepted_ = nullptr;  // the trial that ends a line search
-  int failed_node_ = -1;       // where the first failed trial of a line search failed, and why
+  bool swept_ = false;             // a sweep is still to be looked at
+  bool updated_ = false;           // multipliers are new in this iteration
+  bool closing_ = false;           // the next step must close the gaps, since the constraints are infeasible
+  int settling_ = 0;               // steps left in which constraints are closed where the trajectory is
+  int next_settling_ = kCreeping;  // iterations before the next such steps
+  bool stalled_ = false;           // the merit cannot be seen to decrease, because of rounding
+  Trial* accepted_ = nullptr;      // the trial that ends a line search
+  int failed_node_ = -1;           // where the first failed trial of a line search failed, and why
   std::string failure_;
   double accepted_merit_ = 0;
   std::optional<double> closed_merit_;        // after a full step under the same multipliers, with Eq. (8)

@@ -12,7 +12,7 @@ namespace bielle {
 
 struct RequestOptions {
   ProblemOptions problem;
-  FddpOptions solver;
+  FddpOptions solver = makeMotionSolverOptions();
   std::optional<MotionRecord> warm_start;  ///< a motion of the same robot to start from
 };
 

@@ -63,6 +63,14 @@
 /// still a hundred times J, the problem is called locally infeasible: the trajectory is a point where, to first order, the
 /// constraints cannot be violated less. Otherwise it ends as RegularizationMax.
 ///
+/// Near an optimum that is flat along curved constraints steps become short, and the cost creeps. With acceptable_decrease, a cost
+/// that has stayed within that share of itself for 20 iterations, with no violation above 0.03, is accepted: y is kept and rho
+/// grows tenfold with each step, up to its largest; mu_u grows tenfold after each step alpha < 1, so that the trajectory moves
+/// towards the constraints and hardly along them, and shrinks as much after a full step that has not halved the violation. If all
+/// rows hold after at most 30 such steps, the solve ends as Converged, with FddpSummary::acceptable: within the constraints, but
+/// not stationary. (An acceptable level, as in Waechter and Biegler, "On the implementation of an interior-point filter
+/// line-search algorithm", Mathematical Programming 106, 2006.) Otherwise it goes on as before.
+///
 /// Inequalities can be enforced by a primal-dual interior point instead (Inequalities::InteriorPoint; Pavlov, Shames, Manzie,
 /// "Interior point differential dynamic programming", IEEE Transactions on Control Systems Technology 29, 2021, with infeasible
 /// starts); equations keep Eqs. (10) to (12). Every finite bound has a slack s > 0 and a multiplier y > 0. With c the excess over
@@ -135,6 +143,9 @@ struct FddpOptions {
   /// case if no such step decreases J, and (1) foresees less than the rounding of all nodes may hide, N 1e-14 |J|.
   double cost_tolerance = 1e-13;
 
+  /// Share of J; 0: never. Accepts a trajectory that keeps all constraints where J hardly falls any more.
+  double acceptable_decrease = 0;
+
   double initial_regularization = 1e-9;  ///< mu_u of the first sweep; from a guess far from the optimum start higher
   double min_regularization = 1e-9;
   double max_regularization = 1e9;        ///< the solve gives up above this
@@ -183,8 +194,9 @@ const char* getName(FddpTermination termination);
 struct FddpSummary {
   FddpTermination termination = FddpTermination::Failed;
   std::string message;
-  double cost = 0;  ///< J of the returned trajectory
-  double gap = 0;   ///< max_k |gap_k|_inf of the returned trajectory (after a last step alpha < 1: by Eq. 3)
+  bool acceptable = false;  ///< Converged by acceptable_decrease: the gradient has not vanished
+  double cost = 0;          ///< J of the returned trajectory
+  double gap = 0;           ///< max_k |gap_k|_inf of the returned trajectory (after a last step alpha < 1: by Eq. 3)
   int iterations = 0;
   // Of constraints, at the returned trajectory if it ended as Converged, RegularizationMax or Infeasible, else before the last step.
   double violation = 0;        ///< the largest, in the units of c
