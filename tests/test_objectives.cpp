@@ -22,7 +22,7 @@ Solved finish(Motion motion, const ShootingTrajectory* guess) {
   out.summary = solveMotion(out.motion, {});
   CAPTURE(out.summary.message);
   REQUIRE(out.summary.termination == FddpTermination::Converged);
-  out.result = makeResult({"robot", {}}, out.motion, out.motion.guess, out.summary);
+  out.result = makeResult({"robot", {}, {}}, out.motion, out.motion.guess, out.summary);
   for (const GoalOutcome& outcome : out.result.goals) CHECK(outcome.met());
   return out;
 }

@@ -1,7 +1,6 @@
 // The least peak of the controls. Oracles: central differences; the closed form of the least force that moves a mass from rest
 // to rest; bisection over fixed bounds of the controls, each solved for itself.
 #include <catch2/catch.hpp>
-#include <random>
 
 #include "bielle/solve/node_evaluator.h"
 #include "bielle/solve/peak_problem.h"
@@ -72,7 +71,7 @@ Solution solvePeak(const ShootingProblem& inner, const PeakProblem& problem) {
 // Blocks of the model of a node against differences of steps and costs; the Hessian is that of the inner problem, by the
 // map from (w, s, dx) to (u, dx).
 template <class Inner>
-void checkNode(const Inner& inner, const PeakProblem& problem, int node, std::mt19937& rng) {
+void checkNode(const Inner& inner, const PeakProblem& problem, int node) {
   CAPTURE(node);
   const int N = problem.numStages();
   const bool running = node < N;
@@ -129,7 +128,6 @@ void checkNode(const Inner& inner, const PeakProblem& problem, int node, std::mt
 }  // namespace
 
 TEST_CASE("peak: derivatives of first, later and last nodes") {
-  std::mt19937 rng(5);
   std::srand(7);
   const PlantProblem<Linear> inner = makeLinear();
   const PeakProblem problem(inner, Eigen::Vector2d(2, kFree), 3, kFree);
@@ -137,7 +135,7 @@ TEST_CASE("peak: derivatives of first, later and last nodes") {
   CHECK(problem.controlSize(1) == 2);
   CHECK(problem.tangentSize(0) == 3);
   CHECK(problem.tangentSize(1) == 4);
-  for (int node : {0, 1, 17, inner.stages}) checkNode(inner, problem, node, rng);
+  for (int node : {0, 1, 17, inner.stages}) checkNode(inner, problem, node);
 }
 
 TEST_CASE("peak: the least force that moves a mass is that of the closed form") {

@@ -1,5 +1,6 @@
 #include "bielle/io/request_solver.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "bielle/io/refinement.h"
@@ -36,19 +37,36 @@ MotionResult RequestSolver::solve(const RunInfo& run) {
   FddpOptions from_plan = options_.solver;
   from_plan.initial_regularization = kGuessRegularization;
   FddpOptions solver = !options_.warm_start && request_.parts.empty() ? from_plan : options_.solver;
+  FddpOptions again = options_.solver;
   if (!options_.warm_start && !request_.parts.empty()) startFromParts();
   if (objective_.objective != Objective::Effort) {
     startFromEffort(solver);
-    solver = options_.solver;
+    // Costs of other objectives fall slowly all the way, by steps that are often short.
+    again.short_step = std::min(again.short_step, FddpOptions().short_step);
+    again.acceptable_decrease = 0;
+    solver = again;
   }
   const FddpSummary summary = solveMotion(motion_, solver, observer_.motion);
   MotionResult result = makeResult(run, motion_, motion_.guess, summary);
   if (!result.converged()) return result;
   std::optional<Motion> refined = refineStages(request_, model_, options_.problem, motion_, result);
-  if (refined) improve(*refined, options_.solver, "in stages half as long", run, result);
+  if (refined) improve(*refined, again, "in stages half as long", run, result);
   refined = avoidDeadPoints(request_, model_, options_.problem, result.record);
   if (refined) improve(*refined, from_plan, "with linkages farther from their dead points", run, result);
+  refuseLongStages(result);
   return result;
+}
+
+// An optimum whose stages are still too long is one of equations that the robot does not obey: it has not converged to a motion.
+void RequestSolver::refuseLongStages(MotionResult& result) const {
+  const double error = calcStepError(model_, result.record);
+  if (!(error > kAllowedStepError)) return;
+  result.solver.termination = FddpTermination::Failed;
+  result.solver.message =
+      "its stages are too long for how quickly it moves: between nodes velocities change by up to " +
+      formatNumber(100 * error, "%.2g") +
+      " % of the largest acceleration more or less than the accelerations say; ask for a slower or shorter "
+      "motion, or set a shorter time_step";
 }
 
 // Solves a motion in place of one whose stages are too long, and takes it if its own are less so.

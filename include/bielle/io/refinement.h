@@ -9,9 +9,9 @@
 namespace bielle {
 
 /// How far differences of velocities across midpoint steps are off the accelerations in their middle: the largest, in the
-/// norm of the inertia of the robot, over the largest acceleration. `bielle check` allows 0.005. Of Euler steps 0.
+/// norm of the inertia of the robot, over the largest acceleration. `bielle check` allows kAllowedStepError. Of Euler steps 0.
 double calcStepError(const Model& model, const MotionRecord& record);
-inline constexpr double kLargestStepError = 0.004;
+inline constexpr double kLargestStepError = 0.004, kAllowedStepError = 0.005;
 
 /// How much too long the stages of a solved motion are, which they are above 1: the larger of calcStepError() over
 /// kLargestStepError and of the way of standing soles over kLargestSlip; `bielle check` allows 0.1 mm off the ground. Of Euler

@@ -12,6 +12,7 @@ namespace bielle {
 
 struct RequestOptions {
   ProblemOptions problem;
+  /// For objectives other than effort, steps are short up to 1/100 at most, and no cost is acceptable before it is stationary.
   FddpOptions solver = makeMotionSolverOptions();
   std::optional<MotionRecord> warm_start;  ///< a motion of the same robot to start from
 };
@@ -25,7 +26,7 @@ struct RequestObserver {
 
 /// Solves one request, once. A sequence starts from its motions, each solved by itself; a motion of another objective from
 /// that of least effort, by which it is scaled; stages that turn out too long are halved (refineStages()), and where that
-/// does not help, linkages stay farther from their dead points (avoidDeadPoints()).
+/// does not help, linkages stay farther from their dead points (avoidDeadPoints()). What is still too long then ends as Failed.
 class RequestSolver {
  public:
   /// Makes the motion and its guess. \throws ModelError as makeRequested() and setGuess() do
@@ -37,6 +38,7 @@ class RequestSolver {
 
  private:
   void startFromParts();
+  void refuseLongStages(MotionResult& result) const;
   void startFromEffort(const FddpOptions& solver);
   void improve(Motion& motion, const FddpOptions& solver, const std::string& how, const RunInfo& run,
                MotionResult& result) const;
