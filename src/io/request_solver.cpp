@@ -1,6 +1,5 @@
 #include "bielle/io/request_solver.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "bielle/io/refinement.h"
@@ -41,9 +40,7 @@ MotionResult RequestSolver::solve(const RunInfo& run) {
   if (!options_.warm_start && !request_.parts.empty()) startFromParts();
   if (objective_.objective != Objective::Effort) {
     startFromEffort(solver);
-    // Costs of other objectives fall slowly all the way, by steps that are often short.
-    again.short_step = std::min(again.short_step, FddpOptions().short_step);
-    again.acceptable_decrease = 0;
+    again.acceptable_decrease = 0;  // costs of other objectives fall slowly all the way
     solver = again;
   }
   const FddpSummary summary = solveMotion(motion_, solver, observer_.motion);

@@ -155,7 +155,6 @@ void holdPosture(Motion& motion) {
 
 FddpOptions makeMotionSolverOptions() {
   FddpOptions out;
-  out.short_step = 0.25;
   out.acceptable_decrease = 1e-4;
   return out;
 }

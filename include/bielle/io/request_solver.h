@@ -12,7 +12,7 @@ namespace bielle {
 
 struct RequestOptions {
   ProblemOptions problem;
-  /// For objectives other than effort, steps are short up to 1/100 at most, and no cost is acceptable before it is stationary.
+  /// For objectives other than effort no cost is acceptable before it is stationary.
   FddpOptions solver = makeMotionSolverOptions();
   std::optional<MotionRecord> warm_start;  ///< a motion of the same robot to start from
 };

@@ -75,8 +75,8 @@ struct Motion {
 /// its guess; \param limits  those of the motion
 ObjectiveOptions scaleObjective(const Motion& effort, const ObjectiveOptions& options, const LimitOptions& limits = {});
 
-/// Those of FddpOptions but for two, which motions of least effort near the limits of friction or of a linkage need: steps are
-/// short up to 1/4, and a cost that has changed by less than 1e-4 of itself in 20 iterations is acceptable.
+/// Those of FddpOptions, but that a cost that has changed by less than 1e-4 of itself in 20 iterations is acceptable: motions of
+/// least effort near the limits of friction or of a linkage need that.
 FddpOptions makeMotionSolverOptions();
 
 /// Solves a motion from its guess, and leaves the solution there: by Fddp, with bounds enforced where there are any. For the
