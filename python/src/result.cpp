@@ -109,7 +109,8 @@ void bindResults(py::module_& module) {
   bindRecord(module);
   bindResult(module);
   module.def("solve", &solveRequest, py::arg("robot"), py::arg("request"), py::arg("problem") = ProblemOptions(),
-             py::arg("solver") = makeMotionSolverOptions(), py::arg("warm_start") = py::none(), py::arg("callback") = py::none(),
+             py::arg("solver") = makeMotionSolverOptions(), py::arg("warm_start") = py::none(),
+             py::arg("callback") = py::none(),
              "Solves a Request as `bielle solve` does. Returns a Result.\n\n"
              "callback: called with each Iteration; False stops. What it raises, like Ctrl-C, ends the solve.");
   module.def(

@@ -28,8 +28,9 @@ void bindOptions(py::module_& module) {
       .field("gradient_tolerance", &FddpOptions::gradient_tolerance, "(cost per unit of control)^2")
       .field("gap_tolerance", &FddpOptions::gap_tolerance, "of every entry of the gaps")
       .field("cost_tolerance", &FddpOptions::cost_tolerance, "relative change of the cost by a full step; 0: never")
-      .field("acceptable_decrease", &FddpOptions::acceptable_decrease,
-             "share of the cost; a solve whose cost falls by less in 20 iterations ends within the constraints; 0: never")
+      .field(
+          "acceptable_decrease", &FddpOptions::acceptable_decrease,
+          "share of the cost; a solve whose cost falls by less in 20 iterations ends within the constraints; 0: never")
       .field("initial_regularization", &FddpOptions::initial_regularization, "of the first sweep")
       .field("min_regularization", &FddpOptions::min_regularization, "least")
       .field("max_regularization", &FddpOptions::max_regularization, "the solve gives up above this")

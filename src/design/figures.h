@@ -16,8 +16,9 @@ struct DesignFigure {
 // A term of the objective in words.
 std::string describeTerm(const ObjectiveTerm& term);
 
-// `design`: values over evaluations. `design_front`: where several objectives are kept apart, the first over each of the others. `design_MOTION`: torques and speeds over time, of the start and of the best
-// design. `design_mechanism`: both, from the side and from the front, in their standing posture.
+// `design`: values over evaluations. `design_front`: where several objectives are kept apart, the first over each of the
+// others. `design_MOTION`: torques and speeds over time, of the start and of the best design. `design_mechanism`: both, from
+// the side and from the front, in their standing posture.
 std::vector<DesignFigure> makeDesignFigures(const DesignEvaluator& evaluator, const DesignRun& run);
 
 }  // namespace bielle

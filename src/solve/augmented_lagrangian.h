@@ -49,7 +49,7 @@ class AugmentedLagrangian {
   /// Raises the penalty; once it is at its maximum, updates the multipliers if a full step has not halved the violation.
   /// Returns whether the violation has been halved.
   bool settle(const EvaluationList& iterate, bool full);
-  /// Back to the penalty before.
+  /// Back to the penalty far from the solution.
   void endSettling(const EvaluationList& iterate);
   int getNumUpdates() const { return num_updates_; }
   /// Eq. (12) alone: at a stationary point, the multipliers of the constraints.

@@ -61,6 +61,7 @@ FddpRun::End FddpRun::linearize() {
     work_.lagrangian.updateMultipliers(work_.evaluations.getIterate(), line_.cost);
     updated_ = true;
   }
+  if (!work_.lagrangian.canSettle()) settling_ = 0;  // what minimizes violations alone may move far
   if (settling_ == 0 && isCreeping()) settling_ = kSettling;
   if (settling_ > 0) settle();
   if (const End end = linearizeAndSweep()) return end;
