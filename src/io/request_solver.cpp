@@ -60,10 +60,10 @@ void RequestSolver::refuseLongStages(MotionResult& result) const {
   if (!(error > kAllowedStepError)) return;
   result.solver.termination = FddpTermination::Failed;
   result.solver.message =
-      "its stages are too long for how quickly it moves: between nodes velocities change by up to " +
+      "its stages are too long for how quickly it moves: across a stage the velocities differ from what the "
+      "accelerations give by up to " +
       formatNumber(100 * error, "%.2g") +
-      " % of the largest acceleration more or less than the accelerations say; ask for a slower or shorter "
-      "motion, or set a shorter time_step";
+      " % of the largest acceleration; ask for a slower or shorter motion, or set a shorter time_step";
 }
 
 // Solves a motion in place of one whose stages are too long, and takes it if its own are less so.
