@@ -39,8 +39,6 @@ class FrontRunner {
     }
     run_.replayed = static_cast<int>(known_.size());
     run_.searches.resize(1);
-    run_.best = evaluator.robot().start();
-    run_.value = evaluator.start().value;
   }
 
   DesignRun run() {
@@ -54,12 +52,7 @@ class FrontRunner {
       refine(*front.refine);
       selectDesigns();
     }
-    for (const LoggedEvaluation& e : run_.searches[0]) {
-      ++run_.counts[static_cast<size_t>(e.status)];
-      run_.seconds += e.seconds;
-      if (e.status == DesignStatus::Feasible && e.value < run_.value) run_.value = e.value, run_.best = e.x;
-    }
-    run_.evaluation = evaluator_.evaluate(run_.best);
+    addUpSearches(evaluator_, run_);
     return std::move(run_);
   }
 

@@ -7,6 +7,9 @@ namespace bielle {
 // The first line of a log. \param search  which one of the specification
 std::string makeLogHeader(const DesignEvaluator& evaluator, const DesignSpec& spec, const std::string& search);
 
+// Counts the evaluations of all searches, finds the best and evaluates it.
+void addUpSearches(const DesignEvaluator& evaluator, DesignRun& run);
+
 // As runDesign().
 DesignRun runFront(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options);
 

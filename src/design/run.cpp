@@ -32,8 +32,7 @@ class DesignRunner {
       logs_.push_back(std::make_unique<EvaluationLog>(options.directory + "/search" + std::to_string(i + 1) + ".jsonl",
                                                       makeLogHeader(evaluator, spec, std::to_string(i + 1))));
     run_.searches.resize(logs_.size());
-    run_.best = evaluator.robot().start();
-    run_.value = best_shown_ = evaluator.start().value;
+    best_shown_ = evaluator.start().value;
   }
 
   DesignRun run() {
@@ -43,13 +42,7 @@ class DesignRunner {
     for (int i = 0; i < jobs; ++i) threads.emplace_back([this] { work(); });
     for (std::thread& thread : threads) thread.join();
     if (error_) std::rethrow_exception(error_);
-    for (const auto& search : run_.searches)
-      for (const LoggedEvaluation& e : search) {
-        ++run_.counts[static_cast<size_t>(e.status)];
-        run_.seconds += e.seconds;
-        if (e.status == DesignStatus::Feasible && e.value < run_.value) run_.value = e.value, run_.best = e.x;
-      }
-    run_.evaluation = evaluator_.evaluate(run_.best);
+    addUpSearches(evaluator_, run_);
     return std::move(run_);
   }
 
@@ -129,6 +122,18 @@ std::string makeLogHeader(const DesignEvaluator& evaluator, const DesignSpec& sp
                      {"start", std::vector<double>(start.begin(), start.end())},
                      {"measures", evaluator.start().terms}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+void addUpSearches(const DesignEvaluator& evaluator, DesignRun& run) {
+  run.best = evaluator.robot().start();
+  run.value = evaluator.start().value;
+  for (const auto& search : run.searches)
+    for (const LoggedEvaluation& e : search) {
+      ++run.counts[static_cast<size_t>(e.status)];
+      run.seconds += e.seconds;
+      if (e.status == DesignStatus::Feasible && e.value < run.value) run.value = e.value, run.best = e.x;
+    }
+  run.evaluation = evaluator.evaluate(run.best);
 }
 
 LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorithm stage, const VectorXd& x) {
