@@ -6,6 +6,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/io/robot_writer.h"
 #include "cli/commands.h"
+#include "io/drake.h"
 #include "io/mjcf.h"
 #include "io/sdf.h"
 #include "io/text_file.h"
@@ -31,6 +32,10 @@ int convert(const ConvertArguments& arguments) {
     const UrdfText text = formatUrdf(robot.model);
     warn(text.warnings);
     writeTextFile(arguments.output, text.urdf);
+  } else if (arguments.format == "drake") {
+    const UrdfText text = formatDrake(robot.model);
+    warn(text.warnings);
+    writeTextFile(arguments.output, text.urdf);
   } else if (arguments.format == "sdf") {
     const SdfText text = formatSdf(robot.model, findClosedConfiguration(robot.model).q);
     warn(text.warnings);
@@ -51,11 +56,11 @@ void addConvert(CLI::App& app, Action& action) {
   const auto arguments = std::make_shared<ConvertArguments>();
   command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf or MuJoCo .xml file")->required();
   command
-      .add_option(
-          "--to", arguments->format,
-          "bielle: a directory with URDF and YAML, which says all; mjcf: a file of MuJoCo; sdf: one of Gazebo, loops "
-          "included; urdf: a URDF alone")
-      ->check(CLI::IsMember({"bielle", "mjcf", "sdf", "urdf"}))
+      .add_option("--to", arguments->format,
+                  "bielle: a directory with URDF and YAML, which says all; drake: a URDF with loops and motors for "
+                  "Drake; mjcf: "
+                  "a file of MuJoCo; sdf: one of Gazebo, loops included; urdf: a URDF alone")
+      ->check(CLI::IsMember({"bielle", "drake", "mjcf", "sdf", "urdf"}))
       ->capture_default_str();
   addFixedBase(command, arguments->robot);
   command
@@ -65,6 +70,7 @@ void addConvert(CLI::App& app, Action& action) {
       "What a format cannot say is told in a warning that names it; what would be another mechanism without it is "
       "refused.\n"
       "In SDF, coordinates count from the posture that is written; couplers are left out.\n"
+      "For Drake, loops are ball constraints: one for a ball, two for a hinge, three for a weld.\n"
       "A URDF alone is a tree: loops are left out, couplers of two joints become <mimic>.\n"
       "Examples:\n"
       "  bielle convert bipetto --to mjcf -o bipetto.xml\n"

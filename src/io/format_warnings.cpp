@@ -8,27 +8,39 @@ void FormatWarnings::add(const std::string& element, const std::string& problem)
   warnings_.push_back(model_.name() + ": " + element + ": " + problem);
 }
 
-void FormatWarnings::addYamlOnly() {
+void FormatWarnings::addYamlOnly(bool has_gears) {
   if (!model_.serialJoints().empty()) add("serial joints", "they are left out");
   for (const Joint& joint : model_.joints())
     if (joint.position_importance != 1 || joint.velocity_importance != 1)
       add("joint '" + joint.name + "'", "its importance is left out");
   for (const Motor& motor : model_.motors()) {
-    if (motor.drive.isGiven() || std::isfinite(motor.continuous_effort))
-      add("motor '" + motor.name + "'", "its winding and gear are left out");
+    MotorDrive drive = motor.drive;
+    if (has_gears) drive.ratio = 1, drive.rotor_inertia = 0;
+    if (drive.isGiven() || std::isfinite(motor.continuous_effort))
+      add("motor '" + motor.name + "'",
+          has_gears ? "its winding and the losses of its gear are left out" : "its winding and gear are left out");
     else if (motor.torque_loss)
       add("motor '" + motor.name + "'", "its torque_loss is left out");
   }
 }
 
-void FormatWarnings::addBeyondTree() {
+void FormatWarnings::addArmature(bool of_motors) {
   std::string armatures;
   for (int i = 1; i < model_.numBodies(); ++i)
-    if (const Joint& joint = model_.joints()[i]; joint.nv > 0 && model_.armature()[joint.idx_v] != 0)
+    if (const Joint& joint = model_.joints()[i];
+        joint.nv > 0 && model_.armature()[joint.idx_v] != 0 && (of_motors || model_.findMotor(joint.name) < 0))
       armatures += (armatures.empty() ? "'" : ", '") + joint.name + "'";
   if (!armatures.empty()) add("joints " + armatures, "their armature is left out");
+}
+
+void FormatWarnings::addBeyondTree() {
+  addArmature(true);
   if (!model_.motors().empty()) add("motors", "which joints they drive is left out");
   for (const PointSpring& spring : model_.pointSprings()) add("point spring '" + spring.name + "'", "it is left out");
+  addTargets();
+}
+
+void FormatWarnings::addTargets() {
   for (const ContactFrame& contact : model_.contacts()) add("contact '" + contact.name + "'", "it is left out");
   for (const Reference& reference : model_.references()) add("reference '" + reference.name + "'", "it is left out");
   if (model_.gravity() != Vector3d(0, 0, -9.81)) add("gravity", "it is left out");

@@ -14,7 +14,12 @@ class FormatWarnings {
   /// "robot: element: problem"
   void add(const std::string& element, const std::string& problem);
   /// What our YAML file alone says: serial joints, importance of joints, windings, gears and losses of motors.
-  void addYamlOnly();
+  /// \param has_gears  whether the file says the ratio and the rotor's inertia
+  void addYamlOnly(bool has_gears = false);
+  /// Armature of joints. \param of_motors  also of those with a motor
+  void addArmature(bool of_motors);
+  /// Contacts, references and gravity.
+  void addTargets();
   /// What a file of bodies and joints, URDF or SDF, does not say: armature, motors, springs between points, contacts, references
   /// and gravity.
   void addBeyondTree();

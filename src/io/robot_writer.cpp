@@ -9,6 +9,7 @@
 #include "bielle/model/error.h"
 #include "io/format_warnings.h"
 #include "io/text_file.h"
+#include "io/urdf_dialect.h"
 #include "io/xml_text.h"
 
 namespace bielle {
@@ -82,29 +83,29 @@ class Writer {
                  first.X_PJ.R.isIdentity(0);
   }
 
-  /// A URDF that must do without a YAML file; what it cannot say goes to `warnings`.
-  UrdfText formatUrdfAlone() {
-    alone_ = true;
+  /// A URDF that must do without a YAML file; what it cannot say of its tree goes to `warnings`.
+  std::string formatUrdfAlone(const UrdfDialect& dialect, FormatWarnings& warnings) {
+    dialect_ = &dialect;
+    warnings_ = &warnings;
     for (int i = 1; i < model_.numBodies(); ++i) {
       const JointKind kind = model_.joints()[i].kind;
-      if (kind == JointKind::Spherical || kind == JointKind::Universal)
+      if (!dialect.for_drake && (kind == JointKind::Spherical || kind == JointKind::Universal))
         refuse(model_, std::string(getName(kind)) + " joint '" + model_.joints()[i].name + "'",
                "a URDF has no such joints");
     }
     for (const Closure& c : model_.closures()) {
+      if (dialect.for_drake && c.kind != ClosureKind::Coupler) continue;
       // The joint that mimics: the later one, or the other one if that mimics already.
       int y = 1;
       if (c.terms.size() == 2 && mimics_.count(c.terms[1].joint)) y = 0;
       if (c.terms.size() != 2 || mimics_.count(c.terms[y].joint))
-        warn("closure '" + c.name + "'", "it is left out, a URDF is a tree");
+        warn("closure '" + c.name + "'", dialect.for_drake ? "it is left out: <mimic> couples a joint to one other"
+                                                           : "it is left out, a URDF is a tree");
       else
         mimics_[c.terms[y].joint] = {c.terms[1 - y].joint, -c.terms[1 - y].coefficient / c.terms[y].coefficient,
                                      c.offset / c.terms[y].coefficient};
     }
-    const std::string text = formatUrdf("");
-    warnings_.addBeyondTree();
-    warnings_.addYamlOnly();
-    return {text, warnings_.get()};
+    return formatUrdf("");
   }
 
   std::string formatUrdf(const std::string& remark) {
@@ -119,10 +120,10 @@ class Writer {
     std::ostringstream out;
     out << "<?xml version=\"1.0\"?>\n";
     if (!remark.empty()) out << "<!-- " << remark << " -->\n";
-    out << "<robot name=\"" << escapeXml(model_.name()) << "\">\n";
+    out << "<robot name=\"" << escapeXml(model_.name()) << "\"" << (dialect_ ? dialect_->attributes : "") << ">\n";
     for (const auto& [color, name] : colors_)
       out << "  <material name=\"" << name << "\"><color rgba=\"" << color << "\"/></material>\n";
-    out << links.str() << "</robot>\n";
+    out << links.str() << (dialect_ ? dialect_->elements : "") << "</robot>\n";
     return out.str();
   }
 
@@ -201,32 +202,59 @@ class Writer {
     if (joint.kind == JointKind::Planar) type = "planar";
     if (joint.kind == JointKind::FreeFlyer) type = "floating";
     if (joint.kind == JointKind::Revolute) type = "revolute";
-    out << "  <joint name=\"" << escapeXml(joint.name) << "\" type=\"" << type << "\">\n    "
+    const bool is_custom = isForDrake() && (joint.kind == JointKind::Spherical || joint.kind == JointKind::Universal);
+    if (is_custom) type = joint.kind == JointKind::Spherical ? "ball" : "universal";
+    const std::string tag = is_custom ? "drake:joint" : "joint";
+    out << "  <" << tag << " name=\"" << escapeXml(joint.name) << "\" type=\"" << type << "\">\n    "
         << formatOrigin(joint.X_PJ) << "\n    <parent link=\"" << escapeXml(model_.bodies()[joint.parent].name)
         << "\"/>\n    <child link=\"" << escapeXml(model_.bodies()[i].name) << "\"/>\n";
     if (joint.nv == 1 || joint.kind == JointKind::Planar)
       out << "    <axis xyz=\"" << formatVector(joint.axis) << "\"/>\n";
     writeLimits(joint, out);
-    if (alone_) writeMimicAndDynamics(i, out);
-    out << "  </joint>\n";
+    if (dialect_) writeMimicAndDynamics(i, out);
+    out << "  </" << tag << ">\n";
   }
+
+  bool isForDrake() const { return dialect_ && dialect_->for_drake; }
 
   void writeLimits(const Joint& joint, std::ostream& out) {
     const auto lower = model_.lowerLimits().segment(joint.idx_v, joint.nv),
                upper = model_.upperLimits().segment(joint.idx_v, joint.nv),
                velocity = model_.velocityLimits().segment(joint.idx_v, joint.nv);
+    if (isForDrake()) return writeDrakeLimits(joint, lower, upper, velocity, out);
     const bool ranged = lower.allFinite() && upper.allFinite();
     const bool open = lower.array().isInf().all() && upper.array().isInf().all();
     const bool slow = velocity.allFinite();
     if ((!ranged && !open) || (joint.nv != 1 && (ranged || slow)))
       refuse(model_, "joint '" + joint.name + "'", "it is limited on one side, or has several coordinates with limits");
-    const int motor = alone_ ? model_.findMotor(joint.name) : -1;
-    const double effort = motor < 0 ? HUGE_VAL : model_.motors()[motor].effort_limit;
+    const double effort = dialect_ ? getEffortLimit(joint) : HUGE_VAL;
     if (!ranged && !slow && std::isinf(effort) && (joint.kind == JointKind::Continuous || joint.nv != 1)) return;
     out << "    <limit";
     if (ranged) out << " lower=\"" << formatRounded(lower[0]) << "\" upper=\"" << formatRounded(upper[0]) << "\"";
     out << " effort=\"" << formatNumber(std::isfinite(effort) ? effort : 0) << "\" velocity=\""
         << formatNumber(slow ? velocity[0] : 0) << "\"/>\n";
+  }
+
+  double getEffortLimit(const Joint& joint) const {
+    const int motor = model_.findMotor(joint.name);
+    return motor < 0 ? HUGE_VAL : model_.motors()[motor].effort_limit;
+  }
+
+  // Each alone, because a 0 would be a limit.
+  void writeDrakeLimits(const Joint& joint, ConstVectorRef lower, ConstVectorRef upper, ConstVectorRef velocity,
+                        std::ostream& out) {
+    if (joint.nv != 1) {
+      if (!(lower.array().isInf().all() && upper.array().isInf().all() && velocity.array().isInf().all()))
+        warn("joint '" + joint.name + "'", "the limits of its coordinates are left out");
+      return;
+    }
+    std::string text;
+    for (const auto& [name, value] : {std::pair("lower", lower[0]),
+                                      {"upper", upper[0]},
+                                      {"effort", getEffortLimit(joint)},
+                                      {"velocity", velocity[0]}})
+      if (std::isfinite(value)) text += std::string(" ") + name + "=\"" + formatNumber(value, "%.17g") + "\"";
+    if (!text.empty()) out << "    <limit" << text << "/>\n";
   }
 
   void writeMimicAndDynamics(int i, std::ostream& out) {
@@ -236,7 +264,10 @@ class Writer {
           << "\"/>\n";
     for (const JointForce& force : model_.jointForces()) {
       if (force.joint != i) continue;
-      if (force.damping != 0 || force.friction != 0)
+      if (isForDrake()) {
+        if (force.damping != 0) out << "    <dynamics damping=\"" << formatNumber(force.damping, "%.17g") << "\"/>\n";
+        if (force.friction != 0) warn("joint '" + model_.joints()[i].name + "'", "its friction is left out");
+      } else if (force.damping != 0 || force.friction != 0)
         out << "    <dynamics damping=\"" << formatNumber(force.damping) << "\" friction=\""
             << formatNumber(force.friction) << "\"/>\n";
       if (force.stiffness != 0 || force.preload != 0)
@@ -244,7 +275,7 @@ class Writer {
     }
   }
 
-  void warn(const std::string& element, const std::string& problem) { warnings_.add(element, problem); }
+  void warn(const std::string& element, const std::string& problem) { warnings_->add(element, problem); }
 
   void writeFrame(const std::string& name, int body, const SE3& X_BF, std::ostream& out) {
     out << "  <link name=\"" << escapeXml(name) << "\"/>\n  <joint name=\"" << escapeXml(name)
@@ -267,7 +298,7 @@ class Writer {
         writeFrame(made, body, X, out);
     };
     for (const Closure& c : model_.closures()) {
-      if (c.kind == ClosureKind::Coupler) continue;
+      if (c.kind == ClosureKind::Coupler || isForDrake()) continue;
       write(c.body1, c.X_B1, c.name + "_frame1");
       write(c.body2, c.X_B2, c.name + "_frame2");
     }
@@ -415,9 +446,9 @@ class Writer {
     int joint = 0;
     double multiplier = 1, offset = 0;
   };
-  bool alone_ = false;
+  const UrdfDialect* dialect_ = nullptr;
   std::map<int, Mimic> mimics_;
-  FormatWarnings warnings_{model_};
+  FormatWarnings* warnings_ = nullptr;
 };
 
 }  // namespace
@@ -448,7 +479,17 @@ std::string formatMotorData(const Motor& motor) {
   return text;
 }
 
-UrdfText formatUrdf(const Model& model) { return Writer(model).formatUrdfAlone(); }
+std::string formatUrdfTree(const Model& model, const UrdfDialect& dialect, FormatWarnings& warnings) {
+  return Writer(model).formatUrdfAlone(dialect, warnings);
+}
+
+UrdfText formatUrdf(const Model& model) {
+  FormatWarnings warnings(model);
+  const std::string text = formatUrdfTree(model, {}, warnings);
+  warnings.addBeyondTree();
+  warnings.addYamlOnly();
+  return {text, warnings.get()};
+}
 
 void writeRobot(const Model& model, const std::string& directory, const std::string& remark) {
   namespace fs = std::filesystem;

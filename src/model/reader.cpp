@@ -79,22 +79,7 @@ struct RobotFiles {
   YamlFile yaml;
 };
 
-RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
-  if (path.extension() == ".xml") {
-    MjcfFile file = readMjcf(path.string());
-    return {std::move(file.tree), std::move(file.settings)};
-  }
-  RobotFiles files{readUrdf(path.string()), {}};
-  std::filesystem::path settings = path;
-  settings.replace_extension(".yaml");
-  if (std::filesystem::exists(settings)) files.yaml = readYaml(settings.string());
-  if (!files.yaml.models.empty())
-    throw ModelError(files.yaml.path, "key 'model'", "there is a URDF beside this file, " + path.string(),
-                     "remove the key, or put the file where there is none");
-  return files;
-}
-
-// Keys of the file that completes a published robot take precedence over the published ones.
+// Keys of the file that completes a robot take precedence over what the robot's own files say.
 void complete(const YamlFile& own, YamlFile& yaml) {
   const auto replace = [](const auto& from, auto& to) {
     if (!from.empty()) to = from;
@@ -117,6 +102,24 @@ void complete(const YamlFile& own, YamlFile& yaml) {
   if (own.motor_armature) yaml.motor_armature = own.motor_armature;
   if (own.gravity) yaml.gravity = own.gravity;
   yaml.warnings.insert(yaml.warnings.end(), own.warnings.begin(), own.warnings.end());
+}
+
+RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
+  if (path.extension() == ".xml") {
+    MjcfFile file = readMjcf(path.string());
+    return {std::move(file.tree), std::move(file.settings)};
+  }
+  RobotFiles files;
+  files.urdf = readUrdf(path.string(), files.yaml);
+  std::filesystem::path settings = path;
+  settings.replace_extension(".yaml");
+  if (!std::filesystem::exists(settings)) return files;
+  const YamlFile own = readYaml(settings.string());
+  if (!own.models.empty())
+    throw ModelError(own.path, "key 'model'", "there is a URDF beside this file, " + path.string(),
+                     "remove the key, or put the file where there is none");
+  complete(own, files.yaml);
+  return files;
 }
 
 RobotFiles readRobotFiles(const std::filesystem::path& path) {

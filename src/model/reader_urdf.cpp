@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "model/reader_drake.h"
 #include "model/robot_files.h"
 #include "model/xml_document.h"
 
@@ -31,6 +32,8 @@ constexpr NumberRule kNumbers[] = {
 const std::map<std::string, JointKind> kKinds = {
     {"revolute", JointKind::Revolute}, {"continuous", JointKind::Continuous}, {"prismatic", JointKind::Prismatic},
     {"fixed", JointKind::Fixed},       {"floating", JointKind::FreeFlyer},    {"planar", JointKind::Planar}};
+const std::map<std::string, JointKind> kDrakeKinds = {
+    {"ball", JointKind::Spherical}, {"planar", JointKind::Planar}, {"universal", JointKind::Universal}};
 
 struct Tree {
   std::string robot, root;
@@ -83,7 +86,8 @@ void checkNumbers(const TiXmlElement& element, const std::string& owner, const s
 // Names of the links or of the joints; also checks their numbers.
 std::set<std::string> collectNames(const TiXmlElement& robot, const std::string& tag, const std::string& path) {
   std::set<std::string> names;
-  for (const TiXmlElement* e = robot.FirstChildElement(tag); e; e = e->NextSiblingElement(tag)) {
+  for (const TiXmlElement* e = robot.FirstChildElement(); e; e = e->NextSiblingElement()) {
+    if (tag == "joint" ? !isJoint(*e) : e->ValueStr() != tag) continue;
     const std::string name = getAttribute(e, "name"), line = " (line " + std::to_string(e->Row()) + ")";
     if (name.empty()) throw ModelError(path, tag + line, "it has no name", "give it a name attribute");
     const std::string element = tag + " '" + name + "'";
@@ -94,19 +98,26 @@ std::set<std::string> collectNames(const TiXmlElement& robot, const std::string&
   return names;
 }
 
-// Errors in a joint that urdfdom accepts.
-void checkJoint(const TiXmlElement& joint, const std::string& path, std::vector<std::string>& warnings) {
+const std::map<std::string, JointKind>& getKinds(const TiXmlElement& joint) {
+  return joint.ValueStr() == "joint" ? kKinds : kDrakeKinds;
+}
+
+// Errors in a joint that urdfdom accepts. What Drake takes its damping for is read beside it.
+void checkJoint(const TiXmlElement& joint, bool for_drake, const std::string& path,
+                std::vector<std::string>& warnings) {
+  const std::map<std::string, JointKind>& kinds = getKinds(joint);
   const std::string element = "joint '" + getAttribute(&joint, "name") + "'", type = getAttribute(&joint, "type");
-  if (!kKinds.count(type)) {
+  if (!kinds.count(type)) {
     std::string known;
-    for (const auto& [name, kind] : kKinds) known += (known.empty() ? "" : ", ") + name;
+    for (const auto& [name, kind] : kinds) known += (known.empty() ? "" : ", ") + name;
     throw ModelError(path, element, "its type '" + type + "' is unknown", "use one of " + known);
   }
-  if (joint.FirstChildElement("mimic") && kKinds.at(type) == JointKind::Fixed)
+  if (joint.FirstChildElement("mimic") && kinds.at(type) == JointKind::Fixed)
     warnings.push_back(path + ": " + element + ": it is fixed, <mimic> is ignored");
   const TiXmlElement* dynamics = joint.FirstChildElement("dynamics");
   for (const char* attribute : {"damping", "friction"}) {
     double value = 0;
+    if (for_drake && attribute == std::string("damping")) continue;
     if (dynamics && dynamics->QueryDoubleAttribute(attribute, &value) == TIXML_SUCCESS && value != 0)
       warnings.push_back(path + ": " + element + ": its " + attribute +
                          " is ignored; the key joint_forces of the YAML file gives a joint friction");
@@ -132,10 +143,12 @@ std::vector<Edge> collectEdges(const TiXmlElement& robot, const std::set<std::st
                                std::vector<std::string>& warnings) {
   std::vector<Edge> edges;
   std::map<std::string, std::string> carrier;  // link -> the joint that carries it
-  for (const TiXmlElement* j = robot.FirstChildElement("joint"); j; j = j->NextSiblingElement("joint")) {
-    checkJoint(*j, path, warnings);
+  const bool for_drake = isForDrake(robot);
+  for (const TiXmlElement* j = robot.FirstChildElement(); j; j = j->NextSiblingElement()) {
+    if (!isJoint(*j)) continue;
+    checkJoint(*j, for_drake, path, warnings);
     const Edge edge = {getAttribute(j, "name"), getAttribute(j->FirstChildElement("parent"), "link"),
-                       getAttribute(j->FirstChildElement("child"), "link"), kKinds.at(getAttribute(j, "type"))};
+                       getAttribute(j->FirstChildElement("child"), "link"), getKinds(*j).at(getAttribute(j, "type"))};
     for (const auto& [end, link] : {std::pair("parent", edge.parent), std::pair("child", edge.child)})
       if (!links.count(link))
         throw ModelError(path, "joint '" + edge.joint + "'",
@@ -151,10 +164,7 @@ std::vector<Edge> collectEdges(const TiXmlElement& robot, const std::set<std::st
   return edges;
 }
 
-Tree makeTree(const std::string& xml, const std::string& path) {
-  TiXmlDocument document;
-  parseXml(xml, path, document);
-  const TiXmlElement& robot = getRobot(document, path);
+Tree makeTree(const TiXmlElement& robot, const std::string& path) {
   const std::set<std::string> links = collectNames(robot, "link", path);
   if (links.empty()) throw ModelError(path, "element 'robot'", "it has no link", "declare at least one");
   collectNames(robot, "joint", path);
@@ -255,6 +265,10 @@ UrdfJoint makeJoint(const urdf::Joint& joint, JointKind kind, const std::string&
   if (kind == JointKind::Revolute || kind == JointKind::Continuous || kind == JointKind::Prismatic ||
       kind == JointKind::Planar)
     out.joint.axis = toEigen(joint.axis);
+  if (kind == JointKind::Universal) {  // of Drake, which knows no others
+    out.joint.axis = Vector3d::UnitX();
+    out.joint.axis2 = Vector3d::UnitY();
+  }
   if (joint.mimic && kind != JointKind::Fixed) {
     out.mimicked = joint.mimic->joint_name;
     out.multiplier = joint.mimic->multiplier;
@@ -276,9 +290,14 @@ UrdfJoint makeJoint(const urdf::Joint& joint, JointKind kind, const std::string&
 
 }  // namespace
 
-UrdfFile readUrdf(const std::string& path) {
-  const std::string xml = readRobotText(path);
-  Tree tree = makeTree(xml, path);
+UrdfFile readUrdf(const std::string& path, YamlFile& settings) {
+  std::string xml = readRobotText(path);
+  TiXmlDocument document;
+  parseXml(xml, path, document);
+  const TiXmlElement& robot = getRobot(document, path);
+  Tree tree = makeTree(robot, path);
+  const bool for_drake = isForDrake(robot);
+  if (for_drake) xml = formatWithoutDrake(document);
   urdf::ModelInterfaceSharedPtr model;
   std::string complaints;
   {
@@ -297,6 +316,7 @@ UrdfFile readUrdf(const std::string& path) {
   file.warnings = std::move(tree.warnings);
   for (const auto& [name, link] : model->links_) file.links[name] = makeLink(*link, path);
   for (const auto& [name, kind] : tree.joints) file.joints.push_back(makeJoint(*model->joints_.at(name), kind, path));
+  if (for_drake) readDrakeElements(robot, file, settings);
   return file;
 }
 

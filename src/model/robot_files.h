@@ -36,9 +36,6 @@ struct UrdfFile {
   bool has_own_base = false;  ///< it says itself what is free: the option of a free base has no effect
 };
 
-/// \throws ModelError for anything but one tree of named links with finite numbers
-UrdfFile readUrdf(const std::string& path);
-
 /// Joint kind that replaces that of the URDF, with the axes of a universal joint in the joint's frame.
 struct JointRetyping {
   JointKind kind = JointKind::Fixed;
@@ -96,6 +93,10 @@ struct YamlFile {
   std::optional<Vector3d> gravity;
   std::vector<std::string> warnings;
 };
+
+/// \param settings  gets what elements of Drake in the file say
+/// \throws ModelError for anything but one tree of named links with finite numbers
+UrdfFile readUrdf(const std::string& path, YamlFile& settings);
 
 /// \throws ModelError for unknown keys, wrong types, lists that do not match
 YamlFile readYaml(const std::string& path);

@@ -10,8 +10,8 @@
 /// - <limit>: `effort` and `velocity` apply to the motor and to the joint (published files often have placeholders
 ///   there: override them by `motors`); 0 means none. `lower` = `upper` = 0, like a missing pair, means none. Joints
 ///   whose number of coordinates is changed by the YAML have no limits.
-/// - <mimic> becomes a coupler named as the joint, after the closures of the YAML; <dynamics> is ignored with a warning;
-///   meshes need not exist.
+/// - <mimic> becomes a coupler named as the joint, after the closures of the YAML; <dynamics> is ignored with a warning; meshes
+///   need not exist. Files for Drake (io/drake.h) also say loops, springs, motors, damping, ball and universal joints.
 /// - Attributes are finite numbers; inertias are those of a body (no negative mass, triangle inequality), up to 1e-6
 ///   of rounding.
 ///

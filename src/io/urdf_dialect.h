@@ -1,0 +1,21 @@
+#pragma once
+/// \file What a URDF without a YAML file says to whom (private to the writers of URDF).
+#include <string>
+
+#include "bielle/model/model.h"
+#include "io/format_warnings.h"
+
+namespace bielle {
+
+struct UrdfDialect {
+  /// Joints as <drake:joint> where URDF has none, limits only where there are some, no friction, no frames for loops.
+  bool for_drake = false;
+  std::string attributes;  ///< of <robot>, each with a space before it
+  std::string elements;    ///< after all links and joints
+};
+
+/// The tree with its mimics; whatever of it the dialect cannot say goes to `warnings`.
+/// \throws ModelError for joints that it does not have
+std::string formatUrdfTree(const Model& model, const UrdfDialect& dialect, FormatWarnings& warnings);
+
+}  // namespace bielle

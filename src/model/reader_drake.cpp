@@ -1,0 +1,247 @@
+#include "model/reader_drake.h"
+
+#include <algorithm>
+#include <cmath>
+#include <locale>
+#include <set>
+#include <sstream>
+
+#include "bielle/model/error.h"
+
+namespace bielle {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+bool isOfDrake(const std::string& name) { return name.rfind("drake:", 0) == 0; }
+
+bool hasDrakeElement(const TiXmlElement& element) {
+  for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement())
+    if (isOfDrake(e->ValueStr()) || hasDrakeElement(*e)) return true;
+  return false;
+}
+
+class DrakeReader {
+ public:
+  DrakeReader(const TiXmlElement& robot, UrdfFile& file, YamlFile& settings)
+      : robot_(robot), file_(file), settings_(settings) {}
+
+  void read() {
+    for (const TiXmlElement* e = robot_.FirstChildElement(); e; e = e->NextSiblingElement())
+      if (isJoint(*e)) readJoint(*e);
+    for (const TiXmlElement* e = robot_.FirstChildElement(); e; e = e->NextSiblingElement()) {
+      const std::string& tag = e->ValueStr();
+      if (tag == "transmission")
+        readTransmission(*e);
+      else if (tag == "drake:ball_constraint")
+        readBallConstraint(*e);
+      else if (tag == "drake:linear_spring_damper")
+        readSpringDamper(*e);
+      // What may collide is of no meaning here.
+      else if (isOfDrake(tag) && tag != "drake:joint" && tag != "drake:collision_filter_group")
+        warn(*e, "it is left out");
+    }
+  }
+
+ private:
+  static std::string getElement(const TiXmlElement& e) {
+    return "<" + e.ValueStr() + "> (line " + std::to_string(e.Row()) + ")";
+  }
+
+  [[noreturn]] void fail(const TiXmlElement& e, const std::string& problem, const std::string& remedy) const {
+    throw ModelError(file_.path, getElement(e), problem, remedy);
+  }
+
+  void warn(const TiXmlElement& e, const std::string& problem) {
+    file_.warnings.push_back(file_.path + ": " + getElement(e) + ": " + problem);
+  }
+
+  const TiXmlElement& getChild(const TiXmlElement& e, const std::string& tag) const {
+    const TiXmlElement* child = e.FirstChildElement(tag);
+    if (!child) fail(e, "it has no <" + tag + ">", "give one");
+    return *child;
+  }
+
+  // Finite numbers of an attribute.
+  std::vector<double> getNumbers(const TiXmlElement& e, const char* attribute, size_t count) const {
+    const std::string text = getAttribute(&e, attribute);
+    std::istringstream stream(text);
+    stream.imbue(std::locale::classic());
+    std::vector<double> values;
+    for (double value; values.size() <= count && stream >> value;)
+      if (std::isfinite(value)) values.push_back(value);
+    if (!stream.eof() || values.size() != count)
+      fail(e,
+           std::string("its attribute '") + attribute + "', \"" + text + "\", is not made of " + std::to_string(count) +
+               " finite number(s)",
+           "correct it");
+    return values;
+  }
+
+  double getNumber(const TiXmlElement& e) const { return getNumbers(e, "value", 1)[0]; }
+
+  double getChildNumber(const TiXmlElement& e, const std::string& tag, bool may_be_zero) const {
+    const TiXmlElement& child = getChild(e, tag);
+    const double value = getNumber(child);
+    if (value < 0 || (value == 0 && !may_be_zero))
+      fail(child, "its value is not " + std::string(may_be_zero ? "zero or more" : "positive"), "correct it");
+    return value;
+  }
+
+  Vector3d getChildVector(const TiXmlElement& e, const std::string& tag) const {
+    const std::vector<double> values = getNumbers(getChild(e, tag), "value", 3);
+    return {values[0], values[1], values[2]};
+  }
+
+  std::string getLink(const TiXmlElement& e, const std::string& tag) const {
+    const TiXmlElement& child = getChild(e, tag);
+    const std::string name = getAttribute(&child, "name");
+    if (!file_.links.count(name))
+      fail(child, "there is no link '" + name + "'", "declare the link or correct the name");
+    return name;
+  }
+
+  UrdfJoint* findJoint(const std::string& name) {
+    const auto it = std::find_if(file_.joints.begin(), file_.joints.end(),
+                                 [&name](const UrdfJoint& joint) { return joint.joint.name == name; });
+    return it == file_.joints.end() ? nullptr : &*it;
+  }
+
+  void readJoint(const TiXmlElement& e) {
+    UrdfJoint& joint = *findJoint(getAttribute(&e, "name"));
+    const bool is_single = getNv(joint.joint.kind) == 1;
+    if (const TiXmlElement* limit = e.FirstChildElement("limit"); limit && is_single) {
+      const bool lower = limit->Attribute("lower"), upper = limit->Attribute("upper");
+      if (lower != upper && joint.joint.kind != JointKind::Continuous) {
+        joint.lower = VectorXd::Constant(1, lower ? getNumbers(*limit, "lower", 1)[0] : -kInfinity);
+        joint.upper = VectorXd::Constant(1, upper ? getNumbers(*limit, "upper", 1)[0] : kInfinity);
+      }
+      if (limit->Attribute("effort") && !joint.effort) effortless_.insert(joint.joint.name);
+    }
+    const TiXmlElement* dynamics = e.FirstChildElement("dynamics");
+    if (!dynamics || !dynamics->Attribute("damping")) return;
+    const double damping = getNumbers(*dynamics, "damping", 1)[0];
+    if (damping == 0) return;
+    if (!is_single) return warn(*dynamics, "the damping of a joint with several coordinates is left out");
+    JointForceSpec spec{joint.joint.name, {}};
+    spec.force.damping = damping;
+    settings_.joint_forces.push_back(spec);
+  }
+
+  void readTransmission(const TiXmlElement& e) {
+    const TiXmlElement* kind = e.FirstChildElement("type");
+    const char* text = kind ? kind->GetText() : e.Attribute("type");
+    if (!text) fail(e, "it has no <type>", "give transmission_interface/SimpleTransmission");
+    if (std::string(text).find("SimpleTransmission") == std::string::npos)
+      return warn(e, "it is left out: it is no SimpleTransmission");
+    const TiXmlElement &driven = getChild(e, "joint"), &actuator = getChild(e, "actuator");
+    const std::string name = getAttribute(&driven, "name");
+    const UrdfJoint* joint = findJoint(name);
+    if (!joint) fail(driven, "there is no joint '" + name + "'", "correct the name");
+    if (getNv(joint->joint.kind) != 1) return warn(e, "it is left out: joint '" + name + "' has not one coordinate");
+    if (effortless_.count(name)) return warn(e, "it is left out: the limit of effort of joint '" + name + "' is 0");
+    for (const MotorSpec& other : settings_.motors)
+      if (other.joint == name) return warn(e, "it is left out: joint '" + name + "' has a motor already");
+    MotorSpec motor;
+    motor.joint = name;
+    const double inertia =
+        actuator.FirstChildElement("drake:rotor_inertia") ? getChildNumber(actuator, "drake:rotor_inertia", true) : 0;
+    const double ratio =
+        actuator.FirstChildElement("drake:gear_ratio") ? getChildNumber(actuator, "drake:gear_ratio", false) : 1;
+    if (ratio == 1) {
+      motor.armature = inertia;
+    } else {
+      motor.drive.ratio = ratio;  // the armature is that of the drive
+      motor.drive.rotor_inertia = inertia;
+    }
+    if (const TiXmlElement* gains = actuator.FirstChildElement("drake:controller_gains"))
+      warn(*gains, "it is left out");
+    settings_.motors.push_back(motor);
+  }
+
+  // A frame of the tree with this name, or with underscores behind it if that is taken.
+  std::string addFrame(std::string name, const std::string& link, const Vector3d& point) {
+    if (point.isZero(0)) return link;
+    while (file_.links.count(name) || findJoint(name)) name += "_";
+    UrdfJoint joint;
+    joint.parent = link;
+    joint.child = name;
+    joint.joint.name = name + "_frame";
+    joint.joint.kind = JointKind::Fixed;
+    joint.joint.X_PJ.p = point;
+    while (findJoint(joint.joint.name)) joint.joint.name += "_";
+    UrdfLink frame;
+    frame.name = name;
+    file_.links[name] = frame;
+    file_.joints.push_back(joint);
+    return name;
+  }
+
+  // Drake gives them no names; ours are in an attribute that it does not look at.
+  static std::string getName(const TiXmlElement& e, const std::string& prefix) {
+    const std::string name = getAttribute(&e, "name");
+    return name.empty() ? prefix + std::to_string(e.Row()) : name;
+  }
+
+  void readBallConstraint(const TiXmlElement& e) {
+    const std::string tag = e.ValueStr();
+    ClosureSpec closure;
+    closure.name = getName(e, "ball_");
+    closure.kind = ClosureKind::Ball3D;
+    const std::string a = getLink(e, tag + "_body_A"), b = getLink(e, tag + "_body_B");
+    const Vector3d p_AP = getChildVector(e, tag + "_p_AP"), p_BQ = getChildVector(e, tag + "_p_BQ");
+    closure.frame1 = addFrame(closure.name + "_frame1", a, p_AP);
+    closure.frame2 = addFrame(closure.name + "_frame2", b, p_BQ);
+    settings_.closures.push_back(closure);
+  }
+
+  void readSpringDamper(const TiXmlElement& e) {
+    const std::string tag = e.ValueStr();
+    PointSpringSpec spec{getLink(e, tag + "_body_A"), getLink(e, tag + "_body_B"), {}};
+    spec.spring.name = getName(e, "spring_");
+    spec.spring.point1 = getChildVector(e, tag + "_p_AP");
+    spec.spring.point2 = getChildVector(e, tag + "_p_BQ");
+    spec.spring.rest = getChildNumber(e, tag + "_free_length", false);
+    spec.spring.stiffness = getChildNumber(e, tag + "_stiffness", true);
+    spec.spring.damping = getChildNumber(e, tag + "_damping", true);
+    if (spec.spring.stiffness == 0 && spec.spring.damping == 0)
+      return warn(e, "it is left out: it is neither spring nor damper");
+    settings_.point_springs.push_back(spec);
+  }
+
+  const TiXmlElement& robot_;
+  UrdfFile& file_;
+  YamlFile& settings_;
+  std::set<std::string> effortless_;  // joints with a limit of effort of zero, which Drake does not drive
+};
+
+}  // namespace
+
+bool isForDrake(const TiXmlElement& robot) { return robot.Attribute("xmlns:drake") || hasDrakeElement(robot); }
+
+bool isJoint(const TiXmlElement& element) {
+  return element.ValueStr() == "joint" || element.ValueStr() == "drake:joint";
+}
+
+std::string formatWithoutDrake(const TiXmlDocument& document) {
+  TiXmlDocument plain(document);
+  for (TiXmlElement* e = plain.RootElement()->FirstChildElement(); e; e = e->NextSiblingElement()) {
+    if (!isJoint(*e)) continue;
+    if (e->ValueStr() == "drake:joint" && getAttribute(e, "type") != "planar") e->SetAttribute("type", "floating");
+    e->SetValue("joint");
+    if (!e->FirstChildElement("limit")) e->InsertEndChild(TiXmlElement("limit"));
+    TiXmlElement* limit = e->FirstChildElement("limit");
+    for (const char* attribute : {"effort", "velocity"})
+      if (!limit->Attribute(attribute)) limit->SetAttribute(attribute, "0");
+  }
+  TiXmlPrinter printer;
+  plain.Accept(&printer);
+  return printer.Str();
+}
+
+void readDrakeElements(const TiXmlElement& robot, UrdfFile& file, YamlFile& settings) {
+  settings.path = file.path;
+  DrakeReader(robot, file, settings).read();
+}
+
+}  // namespace bielle
