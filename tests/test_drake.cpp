@@ -394,6 +394,10 @@ TEST_CASE("files of Drake's users are read, completed by a YAML file, and their 
   checkWarning(change("upper=\"2\"", "upper=\"2\" effort=\"0\""), "<transmission> (line 7): it is left out");
   checkWarning(change("<drake:gear_ratio", "<drake:controller_gains p=\"1\" d=\"1\"/><drake:gear_ratio"),
                "<drake:controller_gains> (line 8): it is left out");
+  checkWarning(change("<drake:gear_ratio", "<mechanicalReduction>50</mechanicalReduction><drake:gear_ratio"),
+               "<mechanicalReduction> (line 8): it is left out, as by Drake");
+  CHECK(load(change("<drake:gear_ratio", "<mechanicalReduction>1</mechanicalReduction><drake:gear_ratio"))
+            .warnings.empty());
   checkWarning(change("<origin xyz=\"0 0 1\"/>", "<origin xyz=\"0 0 1\"/><dynamics damping=\"1\"/>"),
                "<dynamics> (line 6): the damping");
   checkWarning(change("<limit upper=\"2\"/>", "<limit upper=\"2\"/><dynamics friction=\"1\"/>"),

@@ -56,6 +56,8 @@ class DrakeReader {
     file_.warnings.push_back(file_.path + ": " + getElement(e) + ": " + problem);
   }
 
+  static std::string getText(const TiXmlElement& e) { return e.GetText() ? e.GetText() : ""; }
+
   const TiXmlElement& getChild(const TiXmlElement& e, const std::string& tag) const {
     const TiXmlElement* child = e.FirstChildElement(tag);
     if (!child) fail(e, "it has no <" + tag + ">", "give one");
@@ -130,9 +132,9 @@ class DrakeReader {
 
   void readTransmission(const TiXmlElement& e) {
     const TiXmlElement* kind = e.FirstChildElement("type");
-    const char* text = kind ? kind->GetText() : e.Attribute("type");
-    if (!text) fail(e, "it has no <type>", "give transmission_interface/SimpleTransmission");
-    if (std::string(text).find("SimpleTransmission") == std::string::npos)
+    const std::string type = kind ? getText(*kind) : getAttribute(&e, "type");
+    if (type.empty()) fail(e, "it has no <type>", "give transmission_interface/SimpleTransmission");
+    if (type.find("SimpleTransmission") == std::string::npos)
       return warn(e, "it is left out: it is no SimpleTransmission");
     const TiXmlElement &driven = getChild(e, "joint"), &actuator = getChild(e, "actuator");
     const std::string name = getAttribute(&driven, "name");
@@ -156,6 +158,10 @@ class DrakeReader {
     }
     if (const TiXmlElement* gains = actuator.FirstChildElement("drake:controller_gains"))
       warn(*gains, "it is left out");
+    for (const TiXmlElement* owner : {&e, &actuator})
+      if (const TiXmlElement* reduction = owner->FirstChildElement("mechanicalReduction");
+          reduction && getText(*reduction) != "1")
+        warn(*reduction, "it is left out, as by Drake; <drake:gear_ratio> gives the gear");
     settings_.motors.push_back(motor);
   }
 
