@@ -19,6 +19,7 @@
 #include "robots/delta.h"
 #include "robots/kangaroo.h"
 #include "robots/solid.h"
+#include "robots/spring_biped.h"
 #include "robots/spring_leg.h"
 
 using namespace bielle;
@@ -147,13 +148,14 @@ const std::map<std::string, Expected>& getExpected() {
   // A planar loop of hinges has three rows that count less the turn about its own hinge: 2. Five-bar leg: rail and four
   // hinges, 5 - 2. Spring leg: 10 joints, the heel rod's ball 3, the planar loop of the toe 2. Delta: 16 joints, the
   // platform moves in 3 directions. Chain: 3 joints and one planar loop per four-bar.
+  // Spring biped, per leg: 17 coordinates (two more of leaves than motors), 9 rows of balls, and 6 of the base.
   // Kangaroo: robots/kangaroo.h counts 38 joints, 80 rows and the rank of 32 of a leg.
   static const std::map<std::string, Expected> expected = {
       {"kangaroo", {160, 64, 18, 12, 40.37}}, {"kangaroo_leg", {80, 32, 7, 6, 28.19}},
       {"cleobot", {30, 30, 18, 12, 24.6}},    {"rsu_biped", {12, 12, 18, 12, 25.68}},
       {"belt_biped", {6, 6, 18, 12, 25.64}},  {"fivebar_leg", {5, 2, 3, 2, 1.83}},
       {"spring_leg", {8, 5, 5, 5, 8.297}},    {"delta", {25, 13, 3, 3, 3.918}},
-      {"fourbar_chain", {15, 6, 3, 3, 4.8}},
+      {"fourbar_chain", {15, 6, 3, 3, 4.8}},  {"spring_biped", {18, 18, 22, 12, 33.31}},
   };
   return expected;
 }
@@ -432,6 +434,28 @@ TEST_CASE("spring leg: the heel rod keeps the tarsus nearly parallel to itself w
     updatePositions(model, ws, result.q);
     CHECK(result.q[model.joints()[model.findJoint("knee")].idx_q] == Approx(bend).margin(0.05));
     CHECK(std::abs(log3(ws.X_WB[tarsus].R).y()) < 0.1 * std::abs(bend));
+  }
+}
+
+TEST_CASE("spring biped: it stands as high as Cassie at the start of its published model, the tarsus as inclined") {
+  // cassie.xml starts with the pelvis at 1.01 m, toes on the ground. In its hinges' angles, (0.497, -1.200, 1.427) rad of hip,
+  // knee and tarsus are a closed posture: thigh 0.497, knee to tarsus joint -0.567, tarsus to toe 0.627 rad from straight down.
+  const SpringBipedParameters p;
+  const Model model = makeSpringBiped(p);
+  Workspace ws(model);
+  updatePositions(model, ws, model.makeNeutral());
+  const auto locate = [&](const std::string& name) {
+    const Frame& frame = model.frames()[model.findFrame(name)];
+    return getPlacement(ws, frame.body, frame.X_BF).p;
+  };
+  CHECK(-locate("foot_left").z() == Approx(1.01).margin(0.01));
+  const Vector3d tarsus = locate("toe_left") - locate("tarsus_link_left");
+  CHECK(tarsus.norm() == Approx(p.tarsus_length));
+  CHECK(std::atan2(tarsus.x(), -tarsus.z()) == Approx(0.627).margin(0.015));
+  for (const char* name : {"foot", "heel", "shin", "plantar_rod1", "plantar_rod2"}) {
+    CAPTURE(name);
+    const Vector3d left = locate(name + std::string("_left")), right = locate(name + std::string("_right"));
+    CHECK((left - Vector3d(1, -1, 1).cwiseProduct(right)).norm() < 1e-12);
   }
 }
 

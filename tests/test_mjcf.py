@@ -42,7 +42,7 @@ def check_robot(bielle, robot, path):
 
 def main(bielle, source):
     robots = ["bipetto", "cleobot", "rsu_biped", "belt_biped", "kangaroo", "kangaroo_leg", "fivebar_leg",
-              "spring_leg", "delta", "fourbar_chain", "fourbar", "fivebar"]
+              "spring_leg", "spring_biped", "delta", "fourbar_chain", "fourbar", "fivebar"]
     with tempfile.TemporaryDirectory() as place:
         for robot in robots:
             check_robot(bielle, os.path.join(source, "robots", robot), os.path.join(place, robot + ".xml"))

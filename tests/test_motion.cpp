@@ -237,6 +237,23 @@ TEST_CASE("a foot beside its place returns as the limits of the gains have it") 
   CHECK(std::abs(d) < 1e-3 * kOff);
 }
 
+TEST_CASE("standing posture: springs that no motor holds are bent by the weight") {
+  const Model model = loadOwn("spring_biped");
+  const VectorXd unloaded = assembleReference(model, "half_sitting").q, q = makeStandingPosture(model);
+  const ConstraintSet set = makeConstraintSet(model, makeContactTargets(model, unloaded, {0, 1}, 0, 0));
+  CHECK(calcStaticTorques(model, set, unloaded).residual > 1);  // N m
+  CHECK(calcStaticTorques(model, set, q).residual < 1e-6);
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  for (const Closure& closure : set.closures) CHECK(calcClosureResidual(ws, closure).norm() < 1e-10);
+  for (const JointForce& spring : model.jointForces()) {
+    CAPTURE(model.joints()[spring.joint].name, q[spring.idx_q]);
+    CHECK(std::abs(q[spring.idx_q]) > 0.01);
+    CHECK(std::abs(q[spring.idx_q]) < 0.1);
+  }
+  CHECK(makeStandingPosture(loadOwn("belt_biped")) == assembleReference(loadOwn("belt_biped"), "half_sitting").q);
+}
+
 TEST_CASE("contacts keep their index in the constraints of a stage") {
   const Model model = loadOwn("bipetto");
   const ConstraintSet set = makeConstraintSet(model, {{1, {}, 0, 0}, {0, {}, 0, 0}});

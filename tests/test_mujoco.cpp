@@ -118,7 +118,8 @@ TEST_CASE("MuJoCo starts at the closed configuration, and the references are its
 }
 
 TEST_CASE("a robot that nobody drives falls with its loops closed") {
-  for (const char* name : {"bipetto", "cleobot", "rsu_biped", "belt_biped", "spring_leg", "delta", "fourbar_chain"}) {
+  for (const char* name :
+       {"bipetto", "cleobot", "rsu_biped", "belt_biped", "spring_leg", "spring_biped", "delta", "fourbar_chain"}) {
     const Model model = loadRobot(name).model;
     const MujocoModel mujoco(model, findClosedConfiguration(model).q);
     const auto data = mujoco.makeData();

@@ -158,6 +158,40 @@ TEST_CASE("Kangaroo on ball screws: squat and walk are solved and checked, with 
   CHECK(record.com.col(2).minCoeff() == Approx(0.7 * record.com(0, 2)).margin(0.015));
 }
 
+TEST_CASE("spring biped: squat, walks and a hop are solved and checked; its leaves take energy in at the landing") {
+  const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/spring_biped").model;
+  const double standing = 0.849;
+  const auto calcElastic = [&](const VectorXd& q) {
+    double energy = 0;
+    for (const JointForce& spring : model.jointForces()) energy += spring.stiffness * std::pow(q[spring.idx_q], 2) / 2;
+    return energy;
+  };
+  struct Case {
+    std::vector<std::string> motion;
+    double lowest;  // m
+  };
+  for (const Case& each : {Case{{"squat"}, 0.7 * standing},
+                           {{"walk", "--speed", "0.3"}, 0.998 * standing},
+                           {{"walk", "--speed", "0.5"}, 0.998 * standing},
+                           {{"hop"}, 0.952 * standing}}) {
+    CAPTURE(each.motion);
+    const RobotDirectory directory;
+    const MotionRecord record = solve("spring_biped", each.motion, directory);
+    CHECK(record.gap.maxCoeff() < 1e-10);
+    CHECK(record.com.col(2).minCoeff() == Approx(each.lowest).margin(0.01));
+    double most = 0;
+    for (int k = 0; k < record.q.rows(); ++k) {
+      const Eigen::Quaterniond trunk(Eigen::Vector4d(record.q.row(k).segment<4>(3)));
+      CHECK((trunk * Vector3d::UnitZ()).z() > std::cos(0.4));
+      most = std::max(most, calcElastic(record.q.row(k)));
+    }
+    const double start = calcElastic(record.q.row(0));
+    CAPTURE(start, most);
+    CHECK(start > 0.5);                                         // J, under the weight
+    if (each.motion.front() == "hop") CHECK(most > 4 * start);  // one leg bears more than the whole weight
+  }
+}
+
 TEST_CASE("belt biped: springs, dampers and friction are in the energy that the check counts") {
   const std::string place = std::string(BIELLE_SOURCE_DIR) + "/robots/belt_biped/belt_biped.";
   const RobotDirectory files;

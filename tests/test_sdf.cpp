@@ -90,7 +90,8 @@ double calcSdfError(const Model& model, ConstVectorRef q_ref, const std::string&
 }  // namespace
 
 TEST_CASE("SDF: bodies, joints and loops stand where they are, and what is lost is told") {
-  for (const char* name : {"bipetto", "cleobot", "delta", "fivebar", "rsu_biped", "belt_biped", "spring_leg"}) {
+  for (const char* name :
+       {"bipetto", "cleobot", "delta", "fivebar", "rsu_biped", "belt_biped", "spring_leg", "spring_biped"}) {
     CAPTURE(name);
     const Model model = loadRobot(name).model;
     const VectorXd q_ref = findClosedConfiguration(model).q;

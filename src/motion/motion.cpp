@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -91,36 +92,99 @@ Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& opt
   return motion;
 }
 
-StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constraints, ConstVectorRef q) {
+namespace {
+
+// Torques of these dofs, in their order, that hold the robot still as in motion.h Eq. (1), in the least-squares sense.
+struct StaticHold {
+  VectorXd tau;
+  double residual = 0;
+};
+
+StaticHold calcStaticHold(const Model& model, const ConstraintSet& constraints, ConstVectorRef q,
+                          const std::vector<int>& dofs) {
   Workspace ws(model);
   updatePositions(model, ws, q);
   updateVelocities(model, ws, VectorXd::Zero(model.nv()));
   updateBias(model, ws);
-  // Unknowns (u, lambda / scale): forces weigh less than torques of the same number, so that the ground carries the
+  // Unknowns (tau, lambda / scale): forces weigh less than torques of the same number, so that the ground carries the
   // robot.
   const double scale = std::max(1.0, model.mass() * model.gravity().norm());
-  MatrixXd A = MatrixXd::Zero(model.nv(), model.nu() + constraints.rows);
-  for (int m = 0; m < model.nu(); ++m) A(model.motors()[m].dof, m) = 1;
+  const int n = static_cast<int>(dofs.size());
+  MatrixXd A = MatrixXd::Zero(model.nv(), n + constraints.rows);
+  for (int i = 0; i < n; ++i) A(dofs[i], i) = 1;
   MatrixXd J = MatrixXd::Zero(constraints.rows, model.nv());
   for (size_t c = 0; c < constraints.closures.size(); ++c)
     calcClosureJacobian(ws, constraints.closures[c],
                         J.middleRows(constraints.offsets[c], getRows(constraints.closures[c].kind)));
   A.rightCols(constraints.rows) = scale * J.transpose();
   const VectorXd solution = A.completeOrthogonalDecomposition().solve(ws.b);
-  return {solution.head(model.nu()), (A * solution - ws.b).cwiseAbs().maxCoeff()};
+  return {solution.head(n), (A * solution - ws.b).cwiseAbs().maxCoeff()};
+}
+
+std::vector<int> listMotorDofs(const Model& model) {
+  std::vector<int> dofs;
+  for (const Motor& motor : model.motors()) dofs.push_back(motor.dof);
+  return dofs;
+}
+
+// The reference, standing on all contacts with its springs bent by the weight that motors cannot take from them. What a spring
+// lacks of the torque that would hold it bends it by that over its stiffness; as stiff springs move little, a few rounds
+// settle it. Where they do not (the robot would fall over), springs stay as the reference has them.
+VectorXd settleSprings(const Model& model, const Reference& reference, const VectorXd& unloaded) {
+  std::vector<const JointForce*> springs;
+  std::vector<int> dofs = listMotorDofs(model);
+  for (const JointForce& force : model.jointForces())
+    if (force.stiffness > 0 && std::find(dofs.begin(), dofs.end(), force.dof) == dofs.end() &&
+        reference.joints.count(model.joints()[force.joint].name) == 0)
+      springs.push_back(&force);
+  if (springs.empty()) return unloaded;
+  std::vector<int> contacts(model.contacts().size());
+  std::iota(contacts.begin(), contacts.end(), 0);
+  const ConstraintSet constraints = makeConstraintSet(model, makeContactTargets(model, unloaded, contacts, 0, 0));
+  const double tolerance = 1e-9 * std::max(1.0, model.mass() * model.gravity().norm());  // N m or N
+  if (calcStaticHold(model, constraints, unloaded, dofs).residual < tolerance) return unloaded;
+  for (const JointForce* spring : springs) dofs.push_back(spring->dof);
+  constexpr int kRounds = 50;
+  constexpr double kFirm = 1e3;  // weight of a spring's angle among those of the reference
+  AssemblyProblem problem = makeReferenceProblem(model, reference);
+  VectorXd angles(springs.size());
+  for (size_t i = 0; i < springs.size(); ++i) angles[i] = unloaded[springs[i]->idx_q];
+  VectorXd q = unloaded;
+  for (int round = 0; round < kRounds; ++round) {
+    const StaticHold hold = calcStaticHold(model, constraints, q, dofs);
+    const VectorXd lack = hold.tau.tail(springs.size());
+    if (hold.residual > tolerance) break;
+    if (lack.cwiseAbs().maxCoeff() < tolerance) return q;
+    for (size_t i = 0; i < springs.size(); ++i) {
+      angles[i] -= lack[i] / springs[i]->stiffness;
+      problem.q_ref[springs[i]->idx_q] = angles[i];
+      problem.weights[springs[i]->dof] = kFirm;
+    }
+    const AssemblyResult next = assemble(model, problem);
+    if (next.status != AssemblyStatus::Closed) break;
+    q = next.q;
+  }
+  return unloaded;
+}
+
+}  // namespace
+
+StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constraints, ConstVectorRef q) {
+  const StaticHold hold = calcStaticHold(model, constraints, q, listMotorDofs(model));
+  return {hold.tau, hold.residual};
 }
 
 VectorXd makeStandingPosture(const Model& model) {
   if (model.references().empty())
     throw ModelError(model.name(), "references", "the robot has no reference posture to start from",
                      "add `references: {half_sitting: ...}` to its YAML file");
-  std::string name = model.references().front().name;
+  const Reference* standing = &model.references().front();
   for (const Reference& reference : model.references())
-    if (reference.name == "half_sitting") name = reference.name;
-  const AssemblyResult result = assembleReference(model, name);
+    if (reference.name == "half_sitting") standing = &reference;
+  const AssemblyResult result = assembleReference(model, standing->name);
   if (result.status != AssemblyStatus::Closed)
-    throw ModelError(model.name(), "reference '" + name + "'", result.message, "correct its targets");
-  return result.q;
+    throw ModelError(model.name(), "reference '" + standing->name + "'", result.message, "correct its targets");
+  return settleSprings(model, *standing, result.q);
 }
 
 VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X) {

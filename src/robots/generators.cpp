@@ -10,6 +10,7 @@
 #include "robots/fivebar_leg.h"
 #include "robots/kangaroo.h"
 #include "robots/rsu_biped.h"
+#include "robots/spring_biped.h"
 #include "robots/spring_leg.h"
 
 namespace bielle {
@@ -68,6 +69,8 @@ const std::vector<Generator>& getGenerators() {
        makeRequests<KangarooParameters>(makeKangarooLeg)},
       {"fivebar_leg", "planar leg on a rail: two coaxial motors, four rods, a point foot",
        makeRequests<FiveBarLegParameters>(makeFiveBarLeg)},
+      {"spring_biped", "biped like Cassie: heel rods, leaf springs at shin and heel",
+       makeRequests<SpringBipedParameters>(makeSpringBiped)},
       {"spring_leg", "leg like Cassie's with rigid springs: tarsus and toe moved by four-bars",
        makeRequests<SpringLegParameters>(makeSpringLeg)},
       {"delta", "Clavel's delta, all of hinges: many more rows than rank", makeRequests<DeltaParameters>(makeDelta)},

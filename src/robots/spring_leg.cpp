@@ -29,17 +29,17 @@ struct Shape {
   Vector3d crank_pivot, crank, lever, rod2;  // T to C, the crank, P to the end of the lever, the plantar rod
 };
 
-Shape makeShape(const SpringLegParameters& p) {
+// \param side  +1: the rod is rod_offset to the left
+Shape makeShape(const std::string& robot, const SpringLegParameters& p, double side) {
   Shape shape;
   shape.knee = p.thigh_length * makeDirection(p.thigh_angle);
   shape.shin = p.shin_length * makeDirection(p.shin_angle);
-  shape.rod_start = p.rod_offset * kY;
+  shape.rod_start = side * p.rod_offset * kY;
   const Vector3d T = shape.knee + shape.shin;
   const double rod_in_plane = std::sqrt(std::max(0.0, std::pow(p.heel_rod_length, 2) - std::pow(p.rod_offset, 2)));
   const std::optional<Vector3d> H = findMeeting(kOrigin, rod_in_plane, T, p.heel_length);
   if (!H)
-    throw ModelError("spring_leg", "parameter 'heel_rod_length'",
-                     "the rod does not reach the heel in the neutral posture",
+    throw ModelError(robot, "parameter 'heel_rod_length'", "the rod does not reach the heel in the neutral posture",
                      "change it, heel_length, thigh_angle or shin_angle");
   shape.heel = *H - T;
   shape.rod = *H - shape.rod_start;
@@ -50,7 +50,7 @@ Shape makeShape(const SpringLegParameters& p) {
   const Vector3d lever_end = shape.tarsus + shape.lever;
   const std::optional<Vector3d> E = findMeeting(shape.crank_pivot, p.crank_length, lever_end, p.plantar_length);
   if (!E)
-    throw ModelError("spring_leg", "parameter 'plantar_length'",
+    throw ModelError(robot, "parameter 'plantar_length'",
                      "the plantar rod does not reach from crank to lever in the neutral posture",
                      "change it, crank_place, crank_length, lever_length or lever_angle");
   shape.crank = *E - shape.crank_pivot;
@@ -58,26 +58,45 @@ Shape makeShape(const SpringLegParameters& p) {
   return shape;
 }
 
-Solid makeMotor(const Vector3d& place, const Vector3d& axis, double mass) {
+// A leg being built.
+struct Leg {
+  const SpringLegParameters& p;
+  const SpringLegMount& mount;
+  Shape shape;
+  ModelBuilder& builder;
+
+  std::string name(const std::string& part) const { return part + mount.suffix; }
+};
+
+Solid makeLegMotor(const Vector3d& place, const Vector3d& axis, double mass) {
   return makeCylinder(place, axis, 0.045, 0.05, mass, colors::kMotor);
 }
 
 // A link of `mass` between two points, a share of it in a motor (or joint) at `place`.
 std::vector<Solid> makeLimb(const Vector3d& a, const Vector3d& b, double radius, double mass, const Vector3d& place) {
-  return {makeRod(a, b, radius, 0.5 * mass / (b - a).norm(), colors::kFrame), makeMotor(place, kY, 0.5 * mass)};
+  return {makeRod(a, b, radius, 0.5 * mass / (b - a).norm(), colors::kFrame), makeLegMotor(place, kY, 0.5 * mass)};
 }
 
-// Roll and yaw over the pitch axis, with the motors of what follows.
-void addHip(const SpringLegParameters& p, ModelBuilder& builder) {
+// The joint of a rod that must not spin: it turns about y and about the axis that is more perpendicular to the rod.
+Joint makeRodJoint(const std::string& name, const Vector3d& place, const Vector3d& rod) {
+  return makeUniversal(name, place, kY, std::abs(rod.x()) > std::abs(rod.z()) ? kZ : kX);
+}
+
+// Roll and yaw over the pitch axis, with the motors of what follows, and the thigh.
+void addHip(const Leg& leg) {
+  const SpringLegParameters& p = leg.p;
   const Vector3d yaw(-p.yaw_offset, 0, -p.yaw_drop), pitch = -p.pitch_drop * kZ;
-  addSolidLink("hip_roll_link", "world", makeRevolute("hip_roll", kOrigin, kX),
+  addSolidLink(leg.name("hip_roll_link"), leg.mount.base, makeRevolute(leg.name("hip_roll"), leg.mount.hip, kX),
                {makeRod(kOrigin, yaw, 0.02, 0.3 * p.hip_roll_mass / yaw.norm(), colors::kFrame),
-                makeMotor(yaw, kZ, 0.7 * p.hip_roll_mass)},
-               builder);
-  addSolidLink("hip_yaw_link", "hip_roll_link", makeRevolute("hip_yaw", yaw, kZ),
+                makeLegMotor(yaw, kZ, 0.7 * p.hip_roll_mass)},
+               leg.builder);
+  addSolidLink(leg.name("hip_yaw_link"), leg.name("hip_roll_link"), makeRevolute(leg.name("hip_yaw"), yaw, kZ),
                {makeRod(kOrigin, pitch, 0.02, 0.3 * p.hip_yaw_mass / p.pitch_drop, colors::kFrame),
-                makeMotor(pitch + 0.05 * kY, kY, 0.7 * p.hip_yaw_mass)},
-               builder);
+                makeLegMotor(pitch + leg.mount.side * 0.05 * kY, kY, 0.7 * p.hip_yaw_mass)},
+               leg.builder);
+  const Vector3d& knee = leg.shape.knee;
+  addSolidLink(leg.name("thigh"), leg.name("hip_yaw_link"), makeRevolute(leg.name("hip_pitch"), pitch, kY),
+               makeLimb(kOrigin, knee, 0.02, p.thigh_mass, knee / 2), leg.builder);
 }
 
 // A hinge that a leaf spring holds at neutral.
@@ -87,43 +106,83 @@ void addLeaf(const std::string& joint, double stiffness, ModelBuilder& builder) 
   builder.addJointForce(joint, force);
 }
 
-void addShin(const SpringLegParameters& p, const Shape& shape, ModelBuilder& builder) {
-  const Joint knee = makeRevolute("knee", shape.knee, kY);
-  const std::vector<Solid> solids = makeLimb(kOrigin, shape.shin, 0.015, p.shin_mass, kOrigin);
-  if (p.shin_stiffness == 0) return addSolidLink("shin", "thigh", knee, solids, builder);
-  addSolidLink("knee_link", "thigh", knee, {solids.back()}, builder);
-  addSolidLink("shin", "knee_link", makeRevolute("shin_spring", kOrigin, kY), {solids.front()}, builder);
-  addLeaf("shin_spring", p.shin_stiffness, builder);
+void addShin(const Leg& leg) {
+  const SpringLegParameters& p = leg.p;
+  const std::string shin = leg.name("shin"), thigh = leg.name("thigh"), spring = leg.name("shin_spring");
+  const Joint knee = makeRevolute(leg.name("knee"), leg.shape.knee, kY);
+  const std::vector<Solid> solids = makeLimb(kOrigin, leg.shape.shin, 0.015, p.shin_mass, kOrigin);
+  if (p.shin_stiffness == 0) return addSolidLink(shin, thigh, knee, solids, leg.builder);
+  addSolidLink(leg.name("knee_link"), thigh, knee, {solids.back()}, leg.builder);
+  addSolidLink(shin, leg.name("knee_link"), makeRevolute(spring, kOrigin, kY), {solids.front()}, leg.builder);
+  addLeaf(spring, p.shin_stiffness, leg.builder);
 }
 
-void addTarsus(const SpringLegParameters& p, const Shape& shape, ModelBuilder& builder) {
+void addTarsus(const Leg& leg) {
+  const SpringLegParameters& p = leg.p;
+  const Shape& shape = leg.shape;
+  const std::string link = leg.name("tarsus_link"), leaf = leg.name("heel_leaf"), spring = leg.name("heel_spring");
   std::vector<Solid> tarsus = makeLimb(kOrigin, shape.tarsus, 0.015, 0.8 * p.tarsus_mass, shape.crank_pivot);
   const Solid heel = makeRod(shape.heel, kOrigin, 0.012, 0.2 * p.tarsus_mass / p.heel_length, colors::kFrame);
   const bool sprung = p.heel_stiffness > 0;
   if (!sprung) tarsus.push_back(heel);
-  addSolidLink("tarsus_link", "shin", makeRevolute("tarsus", shape.shin, kY), tarsus, builder);
+  addSolidLink(link, leg.name("shin"), makeRevolute(leg.name("tarsus"), shape.shin, kY), tarsus, leg.builder);
   if (sprung) {
-    addSolidLink("heel_leaf", "tarsus_link", makeRevolute("heel_spring", kOrigin, kY), {heel}, builder);
-    addLeaf("heel_spring", p.heel_stiffness, builder);
+    addSolidLink(leaf, link, makeRevolute(spring, kOrigin, kY), {heel}, leg.builder);
+    addLeaf(spring, p.heel_stiffness, leg.builder);
   }
-  builder.addFrame("heel", sprung ? "heel_leaf" : "tarsus_link", {Matrix3d::Identity(), shape.heel});
+  leg.builder.addFrame(leg.name("heel"), sprung ? leaf : link, {Matrix3d::Identity(), shape.heel});
 }
 
-// From the toe's crank on the tarsus to its lever.
-void addToe(const SpringLegParameters& p, const Shape& shape, ModelBuilder& builder) {
+// Sole and levers; a foot that rolls does so in a cross at the toe's pivot.
+void addFoot(const Leg& leg, const std::vector<Vector3d>& levers) {
+  const SpringLegParameters& p = leg.p;
   const Vector3d sole(p.sole_offset, 0, -p.ankle_height);
-  addSolidLink("toe", "tarsus_link", makeRevolute("toe_joint", shape.tarsus, kY),
-               {makeBox(sole + 0.01 * kZ, {p.toe_length, 0.04, 0.02}, 0.8 * p.foot_mass, colors::kSole),
-                makeRod(kOrigin, shape.lever, 0.007, 0.2 * p.foot_mass / p.lever_length, colors::kSteel)},
-               builder);
-  builder.addFrame("foot", "toe", {Matrix3d::Identity(), sole});
-  builder.addFrame("lever_end", "toe", {Matrix3d::Identity(), shape.lever});
-  addSolidLink("toe_crank", "tarsus_link", makeRevolute("motor_toe", shape.crank_pivot, kY),
-               {makeRod(kOrigin, shape.crank, 0.007, p.crank_mass / p.crank_length, colors::kSteel)}, builder);
-  addSolidLink("plantar_rod", "toe_crank", makeRevolute("plantar_joint", shape.crank, kY),
-               {makeRod(kOrigin, shape.rod2, 0.005, p.plantar_mass / p.plantar_length, colors::kRod)}, builder);
-  builder.addFrame("plantar_end", "plantar_rod", {Matrix3d::Identity(), shape.rod2});
-  builder.addClosure("plantar", ClosureKind::Hinge5D, "lever_end", "plantar_end", kY);
+  std::vector<Solid> foot = {
+      makeBox(sole + 0.01 * kZ, {p.toe_length, p.toe_width, 0.02}, 0.8 * p.foot_mass, colors::kSole)};
+  for (const Vector3d& lever : levers)
+    foot.push_back(makeRod(kOrigin, lever, 0.007, 0.2 * p.foot_mass / levers.size() / lever.norm(), colors::kSteel));
+  Joint joint = makeRevolute(leg.name("toe_joint"), leg.shape.tarsus, kY);
+  std::string base = leg.name("tarsus_link");
+  if (leg.mount.toe == SpringLegToe::PitchRoll) {
+    addSolidLink(leg.name("toe_cross"), base, joint,
+                 {makeCylinder(kOrigin, kY, 0.008, 0.04, p.toe_cross_mass, colors::kSteel)}, leg.builder);
+    base = leg.name("toe_cross");
+    joint = makeRevolute(leg.name("toe_roll"), kOrigin, kX);
+  }
+  addSolidLink(leg.name("toe"), base, joint, foot, leg.builder);
+  leg.builder.addFrame(leg.name("foot"), leg.name("toe"), {Matrix3d::Identity(), sole});
+}
+
+// A crank about y that pulls the toe by a plantar rod, in the plane at `beside` the leg's own.
+// \param number  follows the names   \param share  of the masses of cranks and of rods
+void addCrank(const Leg& leg, const std::string& number, const Vector3d& beside, double share) {
+  const SpringLegParameters& p = leg.p;
+  const Shape& shape = leg.shape;
+  const bool rolls = leg.mount.toe == SpringLegToe::PitchRoll;
+  const auto name = [&](const std::string& part) { return leg.name(part + number); };
+  leg.builder.addFrame(name("lever_end"), leg.name("toe"), {Matrix3d::Identity(), shape.lever + beside});
+  addSolidLink(
+      name("toe_crank"), leg.name("tarsus_link"), makeRevolute(name("motor_toe"), shape.crank_pivot + beside, kY),
+      {makeRod(kOrigin, shape.crank, 0.007, share * p.crank_mass / p.crank_length, colors::kSteel)}, leg.builder);
+  const Joint joint = rolls ? makeRodJoint(name("plantar_joint"), shape.crank, shape.rod2)
+                            : makeRevolute(name("plantar_joint"), shape.crank, kY);
+  addSolidLink(name("plantar_rod"), name("toe_crank"), joint,
+               {makeRod(kOrigin, shape.rod2, 0.005, share * p.plantar_mass / p.plantar_length, colors::kRod)},
+               leg.builder);
+  leg.builder.addFrame(name("plantar_end"), name("plantar_rod"), {Matrix3d::Identity(), shape.rod2});
+  leg.builder.addClosure(name("plantar"), rolls ? ClosureKind::Ball3D : ClosureKind::Hinge5D, name("lever_end"),
+                         name("plantar_end"), rolls ? kZ : kY);
+}
+
+void addToe(const Leg& leg) {
+  if (leg.mount.toe == SpringLegToe::Pitch) {
+    addFoot(leg, {leg.shape.lever});
+    return addCrank(leg, "", kOrigin, 1);
+  }
+  const Vector3d beside = leg.mount.side * leg.p.crank_spread / 2 * kY;
+  addFoot(leg, {leg.shape.lever + beside, leg.shape.lever - beside});
+  addCrank(leg, "1", beside, 0.5);
+  addCrank(leg, "2", -beside, 0.5);
 }
 
 }  // namespace
@@ -145,6 +204,7 @@ std::vector<Parameter> listParameters(SpringLegParameters& p) {
           {"ankle_height", &p.ankle_height, "m", 0.021, 0.3, "of the toe's pivot over the sole"},
           {"sole_offset", &p.sole_offset, "m", -0.2, 0.2, "of the middle of the sole before that pivot"},
           {"toe_length", &p.toe_length, "m", 0.02, 0.5, "of the sole"},
+          {"toe_width", &p.toe_width, "m", 0.005, 0.3, "of the sole"},
           {"yaw_offset", &p.yaw_offset, "m", -0.3, 0.3, "of the yaw axis behind the middle of the roll axis"},
           {"yaw_drop", &p.yaw_drop, "m", 0.01, 0.5, "of the frame of the yaw axis under the roll axis"},
           {"pitch_drop", &p.pitch_drop, "m", 0.01, 0.5, "of the pitch axis under that frame"},
@@ -164,26 +224,35 @@ std::vector<Parameter> listParameters(SpringLegParameters& p) {
           {"heel_stiffness", &p.heel_stiffness, "N m/rad", 0, 1e9, "of the leaf between tarsus and heel, 0: rigid"}};
 }
 
+void addSpringLeg(const std::string& robot, const SpringLegParameters& p, const SpringLegMount& mount,
+                  ModelBuilder& builder) {
+  if (!(p.crank_place < p.tarsus_length))
+    throw ModelError(robot, "parameter 'crank_place'", "the crank would sit beyond the toe",
+                     "give less than tarsus_length");
+  const Leg leg{p, mount, makeShape(robot, p, mount.side), builder};
+  addHip(leg);
+  addShin(leg);
+  addTarsus(leg);
+  addToe(leg);
+  const Shape& shape = leg.shape;
+  addSolidLink(leg.name("heel_rod"), leg.name("thigh"),
+               makeRodJoint(leg.name("heel_rod_joint"), shape.rod_start, shape.rod),
+               {makeRod(kOrigin, shape.rod, 0.006, p.heel_rod_mass / p.heel_rod_length, colors::kRod)}, builder);
+  builder.addFrame(leg.name("heel_rod_end"), leg.name("heel_rod"), {Matrix3d::Identity(), shape.rod});
+  builder.addClosure(leg.name("heel_rod"), ClosureKind::Ball3D, leg.name("heel"), leg.name("heel_rod_end"));
+}
+
+Vector3d calcSolePlace(const std::string& robot, const SpringLegParameters& p) {
+  const Shape shape = makeShape(robot, p, 1);
+  return Vector3d(-p.yaw_offset, 0, -p.yaw_drop - p.pitch_drop) + shape.knee + shape.shin + shape.tarsus +
+         Vector3d(p.sole_offset, 0, -p.ankle_height);
+}
+
 Model makeSpringLeg(const SpringLegParameters& parameters) {
   SpringLegParameters p = parameters;
   checkParameters("spring_leg", listParameters(p));
-  if (!(p.crank_place < p.tarsus_length))
-    throw ModelError("spring_leg", "parameter 'crank_place'", "the crank would sit beyond the toe",
-                     "give less than tarsus_length");
-  const Shape shape = makeShape(p);
   ModelBuilder builder("spring_leg");
-  addHip(p, builder);
-  addSolidLink("thigh", "hip_yaw_link", makeRevolute("hip_pitch", -p.pitch_drop * kZ, kY),
-               makeLimb(kOrigin, shape.knee, 0.02, p.thigh_mass, shape.knee / 2), builder);
-  addShin(p, shape, builder);
-  addTarsus(p, shape, builder);
-  addToe(p, shape, builder);
-  // The rod must not spin: its universal joint turns about y and about the axis that is more perpendicular to the rod.
-  const Vector3d second = std::abs(shape.rod.x()) > std::abs(shape.rod.z()) ? kZ : kX;
-  addSolidLink("heel_rod", "thigh", makeUniversal("heel_rod_joint", shape.rod_start, kY, second),
-               {makeRod(kOrigin, shape.rod, 0.006, p.heel_rod_mass / p.heel_rod_length, colors::kRod)}, builder);
-  builder.addFrame("heel_rod_end", "heel_rod", {Matrix3d::Identity(), shape.rod});
-  builder.addClosure("heel_rod", ClosureKind::Ball3D, "heel", "heel_rod_end");
+  addSpringLeg("spring_leg", p, {}, builder);
   for (const char* joint : {"hip_roll", "hip_yaw", "hip_pitch", "knee", "motor_toe"})
     builder.addMotor(joint, p.armature);
   for (const char* joint : {"hip_roll", "hip_yaw", "hip_pitch", "knee", "toe_joint"}) builder.addSerialJoint(joint);

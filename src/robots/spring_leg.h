@@ -23,7 +23,7 @@
 /// parts beside the sagittal plane are moved into it (shin 0.025, tarsus 0.014 m), except for the upper end of the heel
 /// rod; the toe only pitches, and its two cranks and rods are merged into one with the mass of both. Toe, posture,
 /// radii and armature are ours.
-#include "bielle/model/model.h"
+#include "bielle/model/builder.h"
 #include "bielle/robots/generators.h"
 
 namespace bielle {
@@ -50,6 +50,7 @@ struct SpringLegParameters {
   double ankle_height = 0.0509;    ///< of P over the sole, m
   double sole_offset = 0.0235;     ///< of the middle of the sole before P, m
   double toe_length = 0.16;        ///< of the sole, m
+  double toe_width = 0.04;         ///< of the sole, m
 
   double thigh_angle = 0.6;   ///< a1 in the neutral configuration, rad
   double shin_angle = -0.85;  ///< a2, rad
@@ -63,6 +64,8 @@ struct SpringLegParameters {
   double heel_rod_mass = 0.0314;  ///< kg
   double crank_mass = 0.0091;     ///< kg
   double plantar_mass = 0.024;    ///< kg
+  double crank_spread = 0.06;     ///< between two cranks (SpringLegToe::PitchRoll), m
+  double toe_cross_mass = 0.05;   ///< between its two axes, kg
   double armature = 0.01;         ///< of a motor behind its gear, kg m^2
 
   double shin_stiffness = 0;  ///< of the leaf between knee and shin, N m/rad; 0: rigid
@@ -73,5 +76,27 @@ std::vector<Parameter> listParameters(SpringLegParameters& parameters);
 
 /// \throws ModelError when a parameter is outside its bounds, a rod does not reach, or the crank is beyond the toe
 Model makeSpringLeg(const SpringLegParameters& parameters = {});
+
+enum class SpringLegToe {
+  Pitch,     ///< joint toe_joint, moved by one crank
+  PitchRoll  ///< joints toe_joint and toe_roll, moved by two cranks side by side, their rods with balls at the toe
+};
+
+/// Where a leg hangs.
+struct SpringLegMount {
+  std::string base = "world";       ///< link that carries the roll joint
+  std::string suffix;               ///< of all names
+  Vector3d hip = Vector3d::Zero();  ///< middle of the roll axis, in the base, m
+  double side = 1;                  ///< +1, or -1 for the mirror image
+  SpringLegToe toe = SpringLegToe::Pitch;
+};
+
+/// Links, frames and closures of a leg; its motors are the caller's.
+/// \throws ModelError as makeSpringLeg()
+void addSpringLeg(const std::string& robot, const SpringLegParameters& parameters, const SpringLegMount& mount,
+                  ModelBuilder& builder);
+
+/// The middle of the sole in the neutral configuration, from the middle of the roll axis, m.
+Vector3d calcSolePlace(const std::string& robot, const SpringLegParameters& parameters);
 
 }  // namespace bielle

@@ -121,8 +121,8 @@ struct StaticTorques {
 };
 StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constraints, ConstVectorRef q);
 
-/// The robot's starting posture: its reference `half_sitting`, or the only reference it has.
-/// \throws ModelError when there is none, or it cannot be closed
+/// The starting posture: the reference `half_sitting`, or the only one; springs that it does not name and no motor holds are
+/// bent until the robot stands still, if it can. \throws ModelError when there is no reference, or it cannot be closed
 VectorXd makeStandingPosture(const Model& model);
 
 /// The posture q moved over the ground by X, a displacement and a rotation about the vertical. A robot without a
