@@ -17,6 +17,11 @@ if(BIELLE_BUILD_VALIDATION)
       ${PROJECT_BINARY_DIR}/bin ${PROJECT_SOURCE_DIR} docs/${page}.md)
     set_tests_properties(documents_${page} PROPERTIES LABELS system)
   endforeach()
+  # The figure of the jump with and without springs, by coarser stages and without the second solve of each.
+  add_test(NAME springs_figure COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/examples/springs/jump.py
+    --objective effort --time-step 0.005 -o ${CMAKE_CURRENT_BINARY_DIR}/springs.png)
+  set_tests_properties(springs_figure PROPERTIES LABELS system SKIP_RETURN_CODE 77
+    ENVIRONMENT "PATH=${PROJECT_BINARY_DIR}/bin:$ENV{PATH}")
   set_tests_properties(documents_readme PROPERTIES LABELS system TIMEOUT 900)
 endif()
 

@@ -14,7 +14,7 @@ import tempfile
 import time
 
 NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
-BY_HAND = ("BIELLE_ROBOTS=path/to/", "scripts/", "cmake ", "ctest ", "ninja ", "apt ", "sudo apt ")
+BY_HAND = ("BIELLE_ROBOTS=path/to/", "scripts/", "cmake ", "ctest ", "ninja ", "apt ", "sudo apt ", "python3 examples/")
 # These take minutes; a shorter command of the same kind replaces them.
 IN_PLACE_OF = {"bielle study all -o study --jobs 2": "bielle study ratio -o study"}
 
@@ -70,6 +70,8 @@ def check_by_hand(text, source, place):
         assert not command or command.startswith(BY_HAND), f"{place}: '{command}' could be run: use a block of ```sh"
         if command.startswith("scripts/"):
             subprocess.run(["bash", "-n", os.path.join(source, command.split()[0])], check=True)
+        if command.startswith("python3 "):
+            assert os.path.exists(os.path.join(source, command.split()[1])), f"{place}: there is no {command.split()[1]}"
 
 
 def check_program(text, source, place):
