@@ -144,7 +144,8 @@ const std::map<std::string, Expected>& getExpected() {
   // Cleobot, Gruebler per leg. Hip: 7 bodies, 42 - 3 * 5 (motors) - 3 * 4 (universal) - 4 * 3 (balls) = 3. Lower leg: 7
   // bodies, 42 - 6 * 5 (motors and knees) - 3 * 3 (balls) = 3. The base has 6.
   // RSU biped, per leg: four serial joints, and the ankle with its chains: 6 bodies, 36 - 4 * 5 - 2 * 4 - 2 * 3 = 2.
-  // Belt biped, per leg: four serial joints, three couplers over six more coordinates with three motors among them.
+  // Belt biped, per leg: four serial joints, three couplers over six more coordinates with three motors among them. One coupler
+  // with the belt of the knee alone, two with the differential of the ankle alone; fewer pulleys of 0.1 kg.
   // A planar loop of hinges has three rows that count less the turn about its own hinge: 2. Five-bar leg: rail and four
   // hinges, 5 - 2. Spring leg: 10 joints, the heel rod's ball 3, the planar loop of the toe 2. Delta: 16 joints, the
   // platform moves in 3 directions. Chain: 3 joints and one planar loop per four-bar.
@@ -156,6 +157,7 @@ const std::map<std::string, Expected>& getExpected() {
       {"belt_biped", {6, 6, 18, 12, 25.64}},  {"fivebar_leg", {5, 2, 3, 2, 1.83}},
       {"spring_leg", {8, 5, 5, 5, 8.297}},    {"delta", {25, 13, 3, 3, 3.918}},
       {"fourbar_chain", {15, 6, 3, 3, 4.8}},  {"spring_biped", {18, 18, 22, 12, 33.31}},
+      {"belt_knee", {2, 2, 18, 12, 25.24}},   {"differential_ankle", {4, 4, 18, 12, 25.44}},
   };
   return expected;
 }

@@ -135,6 +135,15 @@ TEST_CASE("belt biped: bielle solve squat, walk and jump converge and are checke
                70, 0.25, {0.015, 0.2});
 }
 
+TEST_CASE("belt knee and differential ankle: bielle solve squat and walk converge and are checked") {
+  const double standing = 0.403;
+  for (const char* name : {"belt_knee", "differential_ankle"}) {
+    CAPTURE(name);
+    checkMotions(name, {{{"squat"}, 0.7 * standing, standing}, {{"walk"}, 0.98 * standing, 1.055 * standing}}, 70, 0.25,
+                 {0.015, 0.2});
+  }
+}
+
 TEST_CASE("Kangaroo on ball screws: squat and walk are solved and checked, with 96 redundant rows") {
   const double standing = 0.744;
   struct Case {

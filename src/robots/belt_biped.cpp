@@ -1,12 +1,20 @@
 #include "robots/belt_biped.h"
 
+#include <algorithm>
+
 namespace bielle {
 namespace {
 
 const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ(), kOrigin = Vector3d::Zero();
 
+// What drives knees and ankles; otherwise a motor on each axis does.
+struct Drives {
+  bool belt = true, differential = true;
+};
+
 struct Leg : BipedSide {
   const BeltBipedParameters& p;
+  Drives drives;
 };
 
 // A pulley about y, turned by its motor.
@@ -23,12 +31,13 @@ void addKnee(const Leg& leg, ModelBuilder& builder) {
   addSolidLink("thigh" + leg.name, "hip_roll" + leg.name, makeRevolute("hipy" + leg.name, kOrigin, kY),
                {makeRod(kOrigin, knee, 0.022, p.link_density, colors::kFrame), makeMotor(inner, kY, p.motor_mass)},
                builder);
-  addPulley(leg, "knee", "thigh", inner / 2, builder);
+  if (leg.drives.belt) addPulley(leg, "knee", "thigh", inner / 2, builder);
   const Vector3d motors = -p.ankle_motor_drop * kZ, side = 0.03 * kY;
   addSolidLink("shank" + leg.name, "thigh" + leg.name, makeRevolute("knee" + leg.name, knee, kY),
                {makeRod(kOrigin, ankle, 0.018, p.link_density, colors::kOutput),
                 makeMotor(motors + side, kY, p.motor_mass), makeMotor(motors - side, kY, p.motor_mass)},
                builder);
+  if (!leg.drives.belt) return;
   builder.addCoupler("knee_belt" + leg.name, {{"motor_knee" + leg.name, 1}, {"knee" + leg.name, -p.knee_ratio}});
 }
 
@@ -41,6 +50,7 @@ void addAnkle(const Leg& leg, ModelBuilder& builder) {
   foot.push_back(makeCylinder(kOrigin, kX, 0.02, 0.03, 0.3 * p.foot_mass, colors::kSteel));
   addSolidLink("foot_link" + leg.name, "ankle_cross" + leg.name, makeRevolute("anklex" + leg.name, kOrigin, kX), foot,
                builder);
+  if (!leg.drives.differential) return;
   const std::string motors[] = {"motor_ankle1" + leg.name, "motor_ankle2" + leg.name};
   for (int i : {0, 1})
     addPulley(leg, "ankle" + std::to_string(i + 1), "shank",
@@ -56,11 +66,30 @@ void addLeg(const Leg& leg, ModelBuilder& builder) {
   addHip(leg, p, builder);
   addKnee(leg, builder);
   addAnkle(leg, builder);
-  for (const char* joint : {"hipz", "hipx", "hipy", "motor_knee", "motor_ankle1", "motor_ankle2"})
+  const Drives& d = leg.drives;
+  for (const char* joint : {"hipz", "hipx", "hipy", d.belt ? "motor_knee" : "knee",
+                            d.differential ? "motor_ankle1" : "ankley", d.differential ? "motor_ankle2" : "anklex"})
     builder.addMotor(joint + leg.name, p.armature);
   for (const char* joint : {"hipz", "hipx", "hipy", "knee", "ankley", "anklex"})
     builder.addSerialJoint(joint + leg.name);
   addSole(leg, {p.sole_offset, 0, -p.ankle_height}, p.sole_length, p.sole_width, builder);
+}
+
+Model makeBiped(const std::string& robot, const BeltBipedParameters& p, const std::vector<Parameter>& parameters,
+                const Drives& drives) {
+  checkParameters(robot, parameters);
+  ModelBuilder builder(robot);
+  addTrunk(makeSerialTrunk(p), builder);
+  for (const Leg& leg : {Leg{{1, "_left"}, p, drives}, Leg{{-1, "_right"}, p, drives}}) addLeg(leg, builder);
+  builder.addReference(makeSerialHalfSitting(robot, p));
+  return builder.build();
+}
+
+std::vector<Parameter> leaveOut(const std::string& name, BeltBipedParameters& p) {
+  std::vector<Parameter> parameters = listParameters(p);
+  parameters.erase(
+      std::find_if(parameters.begin(), parameters.end(), [&](const Parameter& q) { return q.name == name; }));
+  return parameters;
 }
 
 }  // namespace
@@ -77,14 +106,22 @@ std::vector<Parameter> listParameters(BeltBipedParameters& p) {
   return parameters;
 }
 
+std::vector<Parameter> listParameters(BeltKneeParameters& p) { return leaveOut("ankle_ratio", p); }
+std::vector<Parameter> listParameters(DifferentialAnkleParameters& p) { return leaveOut("knee_ratio", p); }
+
 Model makeBeltBiped(const BeltBipedParameters& parameters) {
   BeltBipedParameters p = parameters;
-  checkParameters("belt_biped", listParameters(p));
-  ModelBuilder builder("belt_biped");
-  addTrunk(makeSerialTrunk(p), builder);
-  for (const Leg& leg : {Leg{{1, "_left"}, p}, Leg{{-1, "_right"}, p}}) addLeg(leg, builder);
-  builder.addReference(makeSerialHalfSitting("belt_biped", p));
-  return builder.build();
+  return makeBiped("belt_biped", p, listParameters(p), {});
+}
+
+Model makeBeltKnee(const BeltKneeParameters& parameters) {
+  BeltKneeParameters p = parameters;
+  return makeBiped("belt_knee", p, listParameters(p), {true, false});
+}
+
+Model makeDifferentialAnkle(const DifferentialAnkleParameters& parameters) {
+  DifferentialAnkleParameters p = parameters;
+  return makeBiped("differential_ankle", p, listParameters(p), {false, true});
 }
 
 }  // namespace bielle

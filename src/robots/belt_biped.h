@@ -1,5 +1,5 @@
 #pragma once
-/// \file A biped with serial hips, knees driven by belts and ankles driven by differentials.
+/// \file A biped with serial hips, knees driven by belts and ankles driven by differentials, and two with one of these alone.
 ///
 /// x forward, y left, z up; s = +1 for the left leg, -1 for the right one. All frames are parallel in the neutral
 /// configuration, which is closed: legs straight, motors at 0. Joints of a leg: those of SerialBipedParameters.
@@ -11,6 +11,9 @@
 /// so that equal turns pitch the foot and opposite ones roll it, each motor with half of the torque. Angles of motors
 /// are those of their pulleys relative to the link that carries them. (1) and (2) are couplers: belts and gears have no
 /// mass of their own, pulleys have.
+///
+/// With belts alone, motors drive the ankles' joints directly; with differentials alone, those of the knees. The masses of the motors
+/// stay in their places, the pulleys go.
 ///
 /// The architecture is common. Distance of the hips, soles, height of the trunk in half_sitting and total mass are
 /// about those of robots/bipetto; all other dimensions and masses are ours, and no such robot was built.
@@ -29,5 +32,15 @@ std::vector<Parameter> listParameters(BeltBipedParameters& parameters);
 
 /// \throws ModelError when a parameter is outside its bounds, or the legs do not reach from hip_height to the ground
 Model makeBeltBiped(const BeltBipedParameters& parameters = {});
+
+/// Its knees driven by belts, its ankles serial.
+struct BeltKneeParameters : BeltBipedParameters {};
+std::vector<Parameter> listParameters(BeltKneeParameters& parameters);
+Model makeBeltKnee(const BeltKneeParameters& parameters = {});
+
+/// Its knees serial, its ankles driven by differentials.
+struct DifferentialAnkleParameters : BeltBipedParameters {};
+std::vector<Parameter> listParameters(DifferentialAnkleParameters& parameters);
+Model makeDifferentialAnkle(const DifferentialAnkleParameters& parameters = {});
 
 }  // namespace bielle
