@@ -387,18 +387,21 @@ TEST_CASE("a URDF alone is the tree with its mimics, friction and limits, and te
   builder.addCoupler("three", {{"joint_a", 2}, {"joint_b", -3}, {"joint_c", 1}});
   builder.addMotor("joint_a", 0.1, 7, 3);
   JointForce force;
-  force.stiffness = 2, force.damping = 0.5, force.friction = 0.25;
+  force.stiffness = 2, force.damping = 0.5, force.friction = 0.25, force.friction_speed = 0.02;
   builder.addJointForce("joint_d", force);
   const Model model = builder.build();
   const UrdfText text = formatUrdf(model);
-  for (const char* lost : {"closure 'three'", "joint 'joint_d': its spring", "'joint_a': their armature", "motors"})
+  for (const char* lost : {"closure 'three'", "joint 'joint_d': its spring", "joint 'joint_d': its friction_speed",
+                           "'joint_a': their armature", "motors"})
     CHECK(std::any_of(text.warnings.begin(), text.warnings.end(),
                       [&](const std::string& w) { return w.find(lost) != std::string::npos; }));
-  CHECK(text.warnings.size() == 4);
+  CHECK(text.warnings.size() == 5);
   CHECK(text.urdf.find("<dynamics damping=\"0.5\" friction=\"0.25\"/>") != std::string::npos);
   CHECK(text.urdf.find("effort=\"7\" velocity=\"3\"") != std::string::npos);
   const RobotDirectory directory;
   const Model back = loadRobot(directory.writeRobot(text.urdf, "")).model;
+  REQUIRE(back.jointForces().size() == 1);
+  CHECK((back.jointForces()[0].damping == 0.5 && back.jointForces()[0].friction == 0.25));
   REQUIRE(back.closures().size() == 2);
   // Both say the same of every configuration on them: q_b = 2/3 q_a - 0.2, q_c = -q_b.
   for (const Closure& closure : back.closures()) {

@@ -73,7 +73,10 @@ Model makeExpected(const Model& model) {
     parts.lower_limits.segment(joint.idx_v, joint.nv).setConstant(-HUGE_VAL);
     parts.upper_limits.segment(joint.idx_v, joint.nv).setConstant(HUGE_VAL);
   }
-  for (JointForce& force : parts.joint_forces) force.stiffness = force.rest = force.preload = force.friction = 0;
+  for (JointForce& force : parts.joint_forces) {
+    force.stiffness = force.rest = force.preload = 0;
+    force.friction_speed = JointForce().friction_speed;
+  }
   std::vector<PointSpring> springs;
   for (PointSpring& spring : parts.point_springs) {
     if (spring.stiffness == 0) spring.preload = 0;
@@ -274,7 +277,7 @@ TEST_CASE("Drake's URDF in its words, and what they lose") {
   for (const char* part :
        {"<robot name=\"toy &lt;1>\" xmlns:drake=\"http://drake.mit.edu\">",
         "<drake:joint name=\"cross\" type=\"universal\">", "<drake:joint name=\"knob\" type=\"ball\">",
-        "<limit lower=\"-1\" effort=\"7\" velocity=\"3\"/>", "<dynamics damping=\"0.5\"/>",
+        "<limit lower=\"-1\" effort=\"7\" velocity=\"3\"/>", "<dynamics damping=\"0.5\" friction=\"0.25\"/>",
         "<drake:ball_constraint_body_A name=\"ground_\"/>", "<drake:ball_constraint_p_AP value=\"3 0 0\"/>",
         "<drake:ball_constraint_p_BQ value=\"0 0.5 0\"/>", "<drake:ball_constraint_p_AP value=\"0 0.55000000000000004",
         "<drake:linear_spring_damper_free_length value=\"0.25\"/>",
@@ -284,10 +287,10 @@ TEST_CASE("Drake's URDF in its words, and what they lose") {
         "<drake:gear_ratio value=\"5\"/>"})
     CHECK_THAT(text.urdf, Catch::Contains(part));
   CHECK(text.urdf.find("effort=\"0\"") == std::string::npos);  // of which Drake would make no motor
-  for (const char* lost :
-       {"closure 'pin': its gains", "link 'plate': its frame is turned", "point spring 'short': it is left out",
-        "point spring 'constant': its preload", "joint 'slide': its friction", "joint 'slide': its spring",
-        "joints 'knob': their armature", "gravity", "motor 'swing': its winding and the losses"})
+  for (const char* lost : {"closure 'pin': its gains", "link 'plate': its frame is turned",
+                           "point spring 'short': it is left out", "point spring 'constant': its preload",
+                           "joint 'slide': its friction is written, but", "joint 'slide': its spring",
+                           "joints 'knob': their armature", "gravity", "motor 'swing': its winding and the losses"})
     CHECK(contains(text.warnings, lost));
   CHECK(text.warnings.size() == 9);
   const Model back = readDrake(text.urdf);
@@ -319,8 +322,8 @@ TEST_CASE("a number of Drake's URDF that is wrong by a millionth shows") {
   for (const char* start :
        {"ball_constraint_p_AP value=\"", "ball_constraint_p_BQ value=\"0 ", "rotor_inertia value=\"",
         "gear_ratio value=\"", "linear_spring_damper_p_AP value=\"", "linear_spring_damper_free_length value=\"",
-        "linear_spring_damper_stiffness value=\"", "linear_spring_damper_damping value=\"", "damping=\"", "effort=\"",
-        "velocity=\"", "lower=\"", "mass value=\""}) {
+        "linear_spring_damper_stiffness value=\"", "linear_spring_damper_damping value=\"", "damping=\"", "friction=\"",
+        "effort=\"", "velocity=\"", "lower=\"", "mass value=\""}) {
     CAPTURE(start);
     const size_t at = urdf.find(start) + std::string(start).size(), end = urdf.find_first_of(" \"", at);
     REQUIRE(urdf.find(start) != std::string::npos);
@@ -399,9 +402,11 @@ TEST_CASE("files of Drake's users are read, completed by a YAML file, and their 
   CHECK(load(change("<drake:gear_ratio", "<mechanicalReduction>1</mechanicalReduction><drake:gear_ratio"))
             .warnings.empty());
   checkWarning(change("<origin xyz=\"0 0 1\"/>", "<origin xyz=\"0 0 1\"/><dynamics damping=\"1\"/>"),
-               "<dynamics> (line 6): the damping");
-  checkWarning(change("<limit upper=\"2\"/>", "<limit upper=\"2\"/><dynamics friction=\"1\"/>"),
-               "joint 'turn': its friction is ignored");
+               "joint 'ball': its <dynamics> (line 6) is left out");
+  const std::string plane =
+      change("type=\"ball\">", "type=\"planar\"><axis xyz=\"0 0 1\"/><dynamics damping=\"0 0 2\"/>");
+  checkWarning(plane, "joint 'ball': its <dynamics> (line 6) is left out");
+  CHECK(load(replaceOnce(plane, "damping=\"0 0 2", "damping=\"0 0 0")).warnings.empty());
 
   const auto checkError = [&](const std::string& urdf, const std::string& problem) {
     CAPTURE(problem);

@@ -240,6 +240,49 @@ TEST_CASE("springs, dampers and friction arrive, each number in its place") {
   CHECK(second.friction_speed == 0.01);
 }
 
+TEST_CASE("damping and friction of <dynamics> are those of the joint, unless the YAML file says others") {
+  const std::string urdf = replaceOnce(kToyUrdf, "<axis xyz=\"0 1 0\"/>",
+                                       "<axis xyz=\"0 1 0\"/><dynamics damping=\"0.5\" friction=\"0.25\"/>");
+  const Model model = load(urdf, "");
+  REQUIRE(model.jointForces().size() == 1);
+  const JointForce& force = model.jointForces()[0];
+  CHECK(force.joint == model.findJoint("shoulder"));
+  CHECK(force.damping == 0.5);
+  CHECK(force.friction == 0.25);
+  CHECK(force.friction_speed == JointForce().friction_speed);
+  CHECK((force.stiffness == 0 && force.rest == 0 && force.preload == 0));
+  CHECK(load(kToyUrdf, "").jointForces().empty());
+
+  const RobotDirectory directory;
+  const auto getForces = [&](const std::string& yaml, size_t warnings) {
+    const LoadedRobot robot = loadRobot(directory.writeRobot(urdf, yaml));
+    CHECK(robot.warnings.size() == warnings);
+    return robot.model.jointForces();
+  };
+  const std::vector<JointForce> other = getForces("joint_forces: {rod_joint: {damping: 7}}", 0);
+  REQUIRE(other.size() == 2);
+  CHECK((other[0].damping == 7 && other[1].damping == 0.5));
+  const std::vector<JointForce> own = getForces("joint_forces: {shoulder: {friction: 3, friction_speed: 0.1}}", 0);
+  REQUIRE(own.size() == 1);
+  CHECK((own[0].damping == 0 && own[0].friction == 3 && own[0].friction_speed == 0.1));
+  CHECK(getForces("joint_forces: {shoulder: {}}", 0).empty());
+  CHECK(getForces("joint_name: [shoulder]\njoint_type: [SPHERICAL]", 1).empty());
+  CHECK(getForces("joint_name: [shoulder]\njoint_type: [CONTINUOUS]", 0).size() == 1);
+
+  // A file that completes the robot has the last word, joint by joint.
+  directory.write("own/own.yaml",
+                  "model: " + directory.path() + "/robot.urdf\njoint_forces: {rod_joint: {stiffness: 2}}\n");
+  directory.writeRobot(urdf, "joint_forces: {shoulder: {damping: 4}, rod_joint: {damping: 5}}");
+  const Model completed = loadRobot(directory.path() + "/own").model;
+  REQUIRE(completed.jointForces().size() == 2);
+  CHECK(completed.jointForces()[0].damping == 4);
+  CHECK((completed.jointForces()[1].damping == 0 && completed.jointForces()[1].stiffness == 2));
+
+  for (const char* wrong : {"damping=\"-0.5\"", "friction=\"-0.25\""})
+    CHECK_THROWS_WITH(load(replaceOnce(urdf, "damping=\"0.5\" friction=\"0.25\"", wrong), ""),
+                      Catch::Contains("joint 'shoulder': the damping or friction of its <dynamics> is negative; give"));
+}
+
 TEST_CASE("springs between points arrive, each number in its place") {
   const Model model = loadWith(
       "point_springs: {first: {frames: [hand, world], points: [[1, 2, 3], [4, 5, 6]], stiffness: 7, rest: 8, "
@@ -413,8 +456,9 @@ TEST_CASE("what is possible but odd is a warning") {
   CHECK_THAT(warn(replaceOnce(kToyUrdf, "<mass value=\"3\"/>", "<mass value=\"1000\"/>"), kToyYaml),
              Contains(urdf + "link 'base': a mass of 1000"));
   CHECK_THAT(
-      warn(replaceOnce(kToyUrdf, "<axis xyz=\"0 0 1\"/>", "<dynamics damping=\"0.1\" friction=\"0\"/>"), kToyYaml),
-      Contains(urdf + "joint 'rod_joint'") && Contains("damping is ignored"));
+      warn(replaceOnce(kToyUrdf, "<parent link=\"arm\"/>", "<parent link=\"arm\"/>\n<dynamics damping=\"0.1\"/>"),
+           kToyYaml),
+      Contains(urdf + "joint 'wrist': its <dynamics> (line 33) is left out"));
   CHECK_THAT(warn(kToyUrdf, "name_mot: [shoulder]\nmotors: {rod_joint: {}}"), Contains(yaml + "key 'name_mot'"));
 }
 

@@ -68,6 +68,19 @@ Json describeClosures(const Model& model, const std::vector<Posture>& postures) 
   return closures;
 }
 
+Json describeJointForces(const Model& model) {
+  Json forces = Json::array();
+  for (const JointForce& force : model.jointForces())
+    forces.push_back({{"name", model.joints()[force.joint].name},
+                      {"stiffness", force.stiffness},
+                      {"rest", force.rest},
+                      {"preload", force.preload},
+                      {"damping", force.damping},
+                      {"friction", force.friction},
+                      {"friction_speed", force.friction_speed}});
+  return forces;
+}
+
 Json describePointSprings(const Model& model, const std::vector<Posture>& postures) {
   Json springs = Json::array();
   for (const PointSpring& spring : model.pointSprings())
@@ -139,6 +152,7 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
                {"clusters", Json::array()},
                {"motors", Json::array()},
                {"drives", Json::array()},
+               {"joint_forces", describeJointForces(model)},
                {"point_springs", describePointSprings(model, postures)},
                {"contacts", Json::array()},
                {"references", Json::array()},

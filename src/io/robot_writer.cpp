@@ -264,14 +264,14 @@ class Writer {
           << "\"/>\n";
     for (const JointForce& force : model_.jointForces()) {
       if (force.joint != i) continue;
-      if (isForDrake()) {
-        if (force.damping != 0) out << "    <dynamics damping=\"" << formatNumber(force.damping, "%.17g") << "\"/>\n";
-        if (force.friction != 0) warn("joint '" + model_.joints()[i].name + "'", "its friction is left out");
-      } else if (force.damping != 0 || force.friction != 0)
-        out << "    <dynamics damping=\"" << formatNumber(force.damping) << "\" friction=\""
-            << formatNumber(force.friction) << "\"/>\n";
-      if (force.stiffness != 0 || force.preload != 0)
-        warn("joint '" + model_.joints()[i].name + "'", "its spring is left out");
+      const std::string element = "joint '" + model_.joints()[i].name + "'";
+      if (force.damping != 0 || force.friction != 0)
+        out << "    <dynamics damping=\"" << formatNumber(force.damping, "%.17g") << "\" friction=\""
+            << formatNumber(force.friction, "%.17g") << "\"/>\n";
+      if (force.friction != 0 && force.friction_speed != JointForce().friction_speed)
+        warn(element, "its friction_speed is left out");
+      if (force.friction != 0 && isForDrake()) warn(element, "its friction is written, but Drake leaves it out");
+      if (force.stiffness != 0 || force.preload != 0) warn(element, "its spring is left out");
     }
   }
 

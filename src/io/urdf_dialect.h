@@ -8,7 +8,7 @@
 namespace bielle {
 
 struct UrdfDialect {
-  /// Joints as <drake:joint> where URDF has none, limits only where there are some, no friction, no frames for loops.
+  /// Joints as <drake:joint> where URDF has none, limits only where there are some, no frames for loops.
   bool for_drake = false;
   std::string attributes;  ///< of <robot>, each with a space before it
   std::string elements;    ///< after all links and joints

@@ -162,6 +162,7 @@ void ModelBuilder::addJointForce(const std::string& joint, JointForce force) {
     fail(element, "its rest or preload is not finite", "correct it");
   if (!(force.friction_speed > 0) || std::isinf(force.friction_speed))
     fail(element, "its friction_speed is not positive", "give the speed below which friction acts like a damper");
+  if (force.stiffness == 0 && force.preload == 0 && force.damping == 0 && force.friction == 0) return;
   force.joint = index;
   force.idx_q = j.idx_q;
   force.dof = j.idx_v;

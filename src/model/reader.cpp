@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
@@ -25,10 +26,14 @@ void retypeJoints(const YamlFile& yaml, UrdfFile& urdf) {
                               "', is skipped; correct its name or remove it");
       continue;
     }
-    // The limits of the file belong to its own coordinate.
+    // The limits and the friction of the file belong to its own coordinate.
     if (getNv(type.kind) != getNv(it->joint.kind)) {
       it->lower = it->upper = VectorXd();
       it->effort = it->velocity = std::nullopt;
+      if (it->damping != 0 || it->friction != 0)
+        urdf.warnings.push_back(urdf.path + ": joint '" + name +
+                                "': its <dynamics> is left out, since the YAML file makes it " + getName(type.kind));
+      it->damping = it->friction = 0;
     }
     it->joint.kind = type.kind;
     if (type.kind != JointKind::Universal) continue;
@@ -91,7 +96,12 @@ void complete(const YamlFile& own, YamlFile& yaml) {
   for (const MotorSpec& motor : own.motors)
     if (motor.armature) yaml.armature.erase(motor.joint);
   replace(own.armature, yaml.armature);
-  replace(own.joint_forces, yaml.joint_forces);
+  for (const JointForceSpec& spec : own.joint_forces) {  // by joint
+    const auto is_same = [&spec](const JointForceSpec& other) { return other.joint == spec.joint; };
+    yaml.joint_forces.erase(std::remove_if(yaml.joint_forces.begin(), yaml.joint_forces.end(), is_same),
+                            yaml.joint_forces.end());
+    yaml.joint_forces.push_back(spec);
+  }
   replace(own.point_springs, yaml.point_springs);
   replace(own.contacts, yaml.contacts);
   replace(own.references, yaml.references);
@@ -222,6 +232,22 @@ void addMimics(const UrdfFile& urdf, ModelBuilder& builder) {
   }
 }
 
+// Those of the YAML file, and <dynamics> of joints that it does not name.
+void addJointForces(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {
+  std::set<std::string> named;
+  for (const JointForceSpec& spec : yaml.joint_forces) {
+    named.insert(spec.joint);
+    builder.addJointForce(spec.joint, spec.force);
+  }
+  for (const UrdfJoint& j : urdf.joints) {
+    if ((j.damping == 0 && j.friction == 0) || named.count(j.joint.name)) continue;
+    JointForce force;
+    force.damping = j.damping;
+    force.friction = j.friction;
+    builder.addJointForce(j.joint.name, force);
+  }
+}
+
 // Closures, motors and contacts refer to the tree by name.
 void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {
   const FrameResolver frames(urdf, yaml);
@@ -234,7 +260,7 @@ void addNamed(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder)
     builder.addClosure(c.name, c.kind, frames.find(c.frame1, element), frames.find(c.frame2, element), c.axis, c.kp,
                        c.kd);
   }
-  for (const JointForceSpec& spec : yaml.joint_forces) builder.addJointForce(spec.joint, spec.force);
+  addJointForces(urdf, yaml, builder);
   for (const PointSpringSpec& s : yaml.point_springs) {
     const std::string element = "point spring '" + s.spring.name + "'";
     builder.addPointSpring(frames.find(s.frame1, element), frames.find(s.frame2, element), s.spring);

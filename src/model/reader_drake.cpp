@@ -111,23 +111,14 @@ class DrakeReader {
 
   void readJoint(const TiXmlElement& e) {
     UrdfJoint& joint = *findJoint(getAttribute(&e, "name"));
-    const bool is_single = getNv(joint.joint.kind) == 1;
-    if (const TiXmlElement* limit = e.FirstChildElement("limit"); limit && is_single) {
-      const bool lower = limit->Attribute("lower"), upper = limit->Attribute("upper");
-      if (lower != upper && joint.joint.kind != JointKind::Continuous) {
-        joint.lower = VectorXd::Constant(1, lower ? getNumbers(*limit, "lower", 1)[0] : -kInfinity);
-        joint.upper = VectorXd::Constant(1, upper ? getNumbers(*limit, "upper", 1)[0] : kInfinity);
-      }
-      if (limit->Attribute("effort") && !joint.effort) effortless_.insert(joint.joint.name);
+    const TiXmlElement* limit = e.FirstChildElement("limit");
+    if (!limit || getNv(joint.joint.kind) != 1) return;
+    const bool lower = limit->Attribute("lower"), upper = limit->Attribute("upper");
+    if (lower != upper && joint.joint.kind != JointKind::Continuous) {
+      joint.lower = VectorXd::Constant(1, lower ? getNumbers(*limit, "lower", 1)[0] : -kInfinity);
+      joint.upper = VectorXd::Constant(1, upper ? getNumbers(*limit, "upper", 1)[0] : kInfinity);
     }
-    const TiXmlElement* dynamics = e.FirstChildElement("dynamics");
-    if (!dynamics || !dynamics->Attribute("damping")) return;
-    const double damping = getNumbers(*dynamics, "damping", 1)[0];
-    if (damping == 0) return;
-    if (!is_single) return warn(*dynamics, "the damping of a joint with several coordinates is left out");
-    JointForceSpec spec{joint.joint.name, {}};
-    spec.force.damping = damping;
-    settings_.joint_forces.push_back(spec);
+    if (limit->Attribute("effort") && !joint.effort) effortless_.insert(joint.joint.name);
   }
 
   void readTransmission(const TiXmlElement& e) {
@@ -234,6 +225,8 @@ std::string formatWithoutDrake(const TiXmlDocument& document) {
   for (TiXmlElement* e = plain.RootElement()->FirstChildElement(); e; e = e->NextSiblingElement()) {
     if (!isJoint(*e)) continue;
     if (e->ValueStr() == "drake:joint" && getAttribute(e, "type") != "planar") e->SetAttribute("type", "floating");
+    if (TiXmlElement* dynamics = e->FirstChildElement("dynamics"); dynamics && e->ValueStr() == "drake:joint")
+      e->RemoveChild(dynamics);  // of several numbers
     e->SetValue("joint");
     if (!e->FirstChildElement("limit")) e->InsertEndChild(TiXmlElement("limit"));
     TiXmlElement* limit = e->FirstChildElement("limit");

@@ -70,6 +70,8 @@ bool areFiniteNumbers(const std::string& text, int count) {
 }
 
 void checkNumbers(const TiXmlElement& element, const std::string& owner, const std::string& path) {
+  // Of damping, joints of Drake may have several numbers, or none that we use.
+  if (element.ValueStr() == "dynamics" && element.Parent()->ValueStr() == "drake:joint") return;
   for (const NumberRule& rule : kNumbers) {
     const char* text = element.ValueStr() == rule.tag ? element.Attribute(rule.attribute) : nullptr;
     if (text && !areFiniteNumbers(text, rule.count))
@@ -102,9 +104,12 @@ const std::map<std::string, JointKind>& getKinds(const TiXmlElement& joint) {
   return joint.ValueStr() == "joint" ? kKinds : kDrakeKinds;
 }
 
-// Errors in a joint that urdfdom accepts. What Drake takes its damping for is read beside it.
-void checkJoint(const TiXmlElement& joint, bool for_drake, const std::string& path,
-                std::vector<std::string>& warnings) {
+bool isGiven(const TiXmlElement& element, const char* attribute) {
+  return getAttribute(&element, attribute).find_first_not_of("+-0. ") != std::string::npos;
+}
+
+// Errors in a joint that urdfdom accepts.
+void checkJoint(const TiXmlElement& joint, const std::string& path, std::vector<std::string>& warnings) {
   const std::map<std::string, JointKind>& kinds = getKinds(joint);
   const std::string element = "joint '" + getAttribute(&joint, "name") + "'", type = getAttribute(&joint, "type");
   if (!kinds.count(type)) {
@@ -115,13 +120,9 @@ void checkJoint(const TiXmlElement& joint, bool for_drake, const std::string& pa
   if (joint.FirstChildElement("mimic") && kinds.at(type) == JointKind::Fixed)
     warnings.push_back(path + ": " + element + ": it is fixed, <mimic> is ignored");
   const TiXmlElement* dynamics = joint.FirstChildElement("dynamics");
-  for (const char* attribute : {"damping", "friction"}) {
-    double value = 0;
-    if (for_drake && attribute == std::string("damping")) continue;
-    if (dynamics && dynamics->QueryDoubleAttribute(attribute, &value) == TIXML_SUCCESS && value != 0)
-      warnings.push_back(path + ": " + element + ": its " + attribute +
-                         " is ignored; the key joint_forces of the YAML file gives a joint friction");
-  }
+  if (dynamics && getNv(kinds.at(type)) != 1 && (isGiven(*dynamics, "damping") || isGiven(*dynamics, "friction")))
+    warnings.push_back(path + ": " + element + ": its <dynamics> (line " + std::to_string(dynamics->Row()) +
+                       ") is left out: joints of one coordinate have damping and friction");
 }
 
 const TiXmlElement& getRobot(const TiXmlDocument& document, const std::string& path) {
@@ -143,10 +144,9 @@ std::vector<Edge> collectEdges(const TiXmlElement& robot, const std::set<std::st
                                std::vector<std::string>& warnings) {
   std::vector<Edge> edges;
   std::map<std::string, std::string> carrier;  // link -> the joint that carries it
-  const bool for_drake = isForDrake(robot);
   for (const TiXmlElement* j = robot.FirstChildElement(); j; j = j->NextSiblingElement()) {
     if (!isJoint(*j)) continue;
-    checkJoint(*j, for_drake, path, warnings);
+    checkJoint(*j, path, warnings);
     const Edge edge = {getAttribute(j, "name"), getAttribute(j->FirstChildElement("parent"), "link"),
                        getAttribute(j->FirstChildElement("child"), "link"), getKinds(*j).at(getAttribute(j, "type"))};
     for (const auto& [end, link] : {std::pair("parent", edge.parent), std::pair("child", edge.child)})
@@ -273,6 +273,13 @@ UrdfJoint makeJoint(const urdf::Joint& joint, JointKind kind, const std::string&
     out.mimicked = joint.mimic->joint_name;
     out.multiplier = joint.mimic->multiplier;
     out.offset = joint.mimic->offset;
+  }
+  if (joint.dynamics && getNv(kind) == 1) {
+    out.damping = joint.dynamics->damping;
+    out.friction = joint.dynamics->friction;
+    if (out.damping < 0 || out.friction < 0)
+      throw ModelError(path, "joint '" + joint.name + "'", "the damping or friction of its <dynamics> is negative",
+                       "give 0 or more");
   }
   if (!joint.limits) return out;
   const urdf::JointLimits& limits = *joint.limits;

@@ -10,8 +10,8 @@
 /// - <limit>: `effort` and `velocity` apply to the motor and to the joint (published files often have placeholders
 ///   there: override them by `motors`); 0 means none. `lower` = `upper` = 0, like a missing pair, means none. Joints
 ///   whose number of coordinates is changed by the YAML have no limits.
-/// - <mimic> becomes a coupler named as the joint, after the closures of the YAML; <dynamics> is ignored with a warning; meshes
-///   need not exist. Files for Drake (io/drake.h) also say loops, springs, motors, damping, ball and universal joints.
+/// - <mimic> becomes a coupler named as the joint, after the closures of the YAML; <dynamics> its damping and friction, unless
+///   `joint_forces` names it; meshes need not exist. Files for Drake (io/drake.h) also say loops, springs, motors, other joints.
 /// - Attributes are finite numbers; inertias are those of a body (no negative mass, triangle inequality), up to 1e-6
 ///   of rounding.
 ///
@@ -39,7 +39,7 @@
 ///   robots. A catalogue is `motors: {NAME: {source: where its figures are from, ...}, ...}` with the keys of winding and gear, and
 ///   `effort` and `velocity` at the shaft of its gear
 /// - `armature: {joint: kg m^2, ...}`, or one number for all motors without one in `motors`
-/// - `joint_forces: {joint: {stiffness, rest, preload, damping, friction, friction_speed}, ...}` as in model.h
+/// - `joint_forces: {joint: {stiffness, rest, preload, damping, friction, friction_speed}, ...}` as in model.h; `{}` for none
 /// - `point_springs: {name: {frames: [A, B], points: [[x, y, z], [x, y, z]], stiffness, rest, preload, damping}, ...}`
 ///   between a point of A and one of B (m, default their origins), links or joints as in `closed_loop`; PointSpring in
 ///   model.h
