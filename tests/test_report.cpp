@@ -206,6 +206,26 @@ TEST_CASE("bodies without shapes are drawn as rods, meshes as they are on the di
   }
 }
 
+TEST_CASE("springs and dampers between points are on the page, with the bodies and points that they tie") {
+  const RobotDirectory directory;
+  directory.write("arm/arm.urdf", kArm);
+  directory.write("arm/arm.yaml",
+                  "point_springs:\n  coil: {frames: [world, a], points: [[1, 2, 3], [0.5, 0, 0]], stiffness: 9}\n"
+                  "  dashpot: {frames: [a, world], damping: 2}\n");
+  writeStillResult(directory.path() + "/r", directory.path() + "/arm", getArmNames());
+  const json springs = getData(makeReport({directory.path() + "/r"}))["runs"][0]["robot"]["springs"];
+  REQUIRE(springs.size() == 2);
+  CHECK(springs[0] == json({{"name", "coil"},
+                            {"body1", 0},
+                            {"point1", {1.0, 2.0, 3.0}},
+                            {"body2", 1},
+                            {"point2", {0.5, 0.0, 0.0}},
+                            {"pulls", true},
+                            {"damps", false}}));
+  CHECK((springs[1]["body1"] == 1 && springs[1]["body2"] == 0));
+  CHECK((!springs[1]["pulls"].get<bool>() && springs[1]["damps"].get<bool>()));
+}
+
 TEST_CASE("a directory that is none of ours is refused with the file and the remedy") {
   const RobotDirectory directory;
   directory.write("arm.urdf", kArm);

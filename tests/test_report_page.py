@@ -265,6 +265,46 @@ class ReportPage(unittest.TestCase):
         self.browser.evaluate("document.querySelector('#sliders > button').click()")
         self.assertLess(differ(start, self.browser.evaluate(PICTURE)), 200)
 
+    def test_springs_between_points_follow_the_bodies(self):
+        robot = self.root / "sprung"
+        robot.mkdir()
+        source = pathlib.Path(__file__).parent.parent / "robots/fivebar_leg"
+        (robot / "sprung.yaml").write_text(f"""model: {source}
+point_springs:
+  coil: {{frames: [world, upper_front], points: [[0.3, 0, 0.2], [0.05, 0, 0]], stiffness: 9, damping: 1}}
+  dashpot: {{frames: [lower_front, upper_back], damping: 1}}
+""")
+        page = self.root / "sprung.html"
+        run("view", robot, "-o", page)
+        self.browser.open(page)
+        ends = """report.scene.robots[0].springs.map(s => {
+          const root = report.scene.robots[0].root;
+          root.updateMatrixWorld(true);
+          const far = new THREE.Vector3(0, 0, 1).applyMatrix4(s.object.matrixWorld);
+          return [s.object.position.toArray(), root.worldToLocal(far).toArray(), s.object.children.length];
+        })"""
+        bodies = """['upper_front', 'upper_back', 'lower_front'].map(name => {
+          const joints = {upper_front: 'motor_front', upper_back: 'motor_back', lower_front: 'knee_front'};
+          const body = report.scene.robots[0].bodies[1 + report.runs[0].robot.joints.findIndex(j => j.name === joints[name])];
+          return [body.position.toArray(), body.localToWorld(new THREE.Vector3(0.05, 0, 0)).toArray()];
+        })"""
+        seen = []
+        for share in (0.5, 0.6):
+            self.browser.evaluate(f"""(() => {{ const slider = document.querySelectorAll('.motor input')[0];
+              slider.value = Number(slider.min) + {share} * (slider.max - slider.min);
+              slider.dispatchEvent(new Event('input')); }})()""")
+            coil, dashpot = self.browser.evaluate(ends)
+            front, back, lower = self.browser.evaluate(bodies)
+            for found, expected in zip(coil[0] + coil[1] + dashpot[0] + dashpot[1],
+                                       [0.3, 0, 0.2] + front[1] + lower[0] + back[0]):
+                self.assertAlmostEqual(found, expected, delta=1e-6)
+            self.assertEqual([coil[2], dashpot[2]], [3, 2])
+            seen.append(coil[1])
+        self.assertGreater(max(abs(a - b) for a, b in zip(*seen)), 1e-3)
+        shown = self.browser.evaluate(PICTURE)
+        self.browser.evaluate("report.scene.robots[0].springs.forEach(s => { s.object.visible = false; })")
+        self.assertGreater(differ(shown, self.browser.evaluate(PICTURE)), 20)
+
     def test_stills_have_the_size_asked_for(self):
         picture = self.root / "stills.png"
         run("report", self.squat, "--png", picture, "--times", "0,0.3,0.6", "--size", "96x80", "--columns", "2")

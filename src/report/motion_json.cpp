@@ -43,6 +43,19 @@ Json describeContacts(const Model& model) {
   return contacts;
 }
 
+Json describeSprings(const Model& model) {
+  Json springs = Json::array();
+  for (const PointSpring& spring : model.pointSprings())
+    springs.push_back({{"name", spring.name},
+                       {"body1", spring.body1},
+                       {"point1", packVector(spring.point1)},
+                       {"body2", spring.body2},
+                       {"point2", packVector(spring.point2)},
+                       {"pulls", spring.stiffness != 0 || spring.preload != 0},
+                       {"damps", spring.damping != 0}});
+  return springs;
+}
+
 // Whether a contact is on the ground during a stage.
 bool isLoaded(const MotionRecord& record, int stage, int contact) {
   return !record.contact_wrenches.row(stage).segment<6>(6 * contact).isZero(0);
@@ -131,6 +144,7 @@ Json describeRobot(const LoadedRobot& robot) {
                {"joints", describeJoints(model)},
                {"motors", motors},
                {"closures", closures},
+               {"springs", describeSprings(model)},
                {"contacts", describeContacts(model)}});
   if (model.numBodies() > 1) json["trunk_com"] = packVector(model.bodies()[1].inertia.com);
   return json;

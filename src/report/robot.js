@@ -75,6 +75,54 @@ class Arrow {
   }
 }
 
+// Turns of wire about z, from 0 to 1, with straight ends.
+class Helix extends THREE.Curve {
+  constructor(radius, turns) {
+    super();
+    this.radius = radius;
+    this.turns = turns;
+  }
+
+  getPoint(t) {
+    const share = Math.min(1, Math.max(0, (t - 0.1) / 0.8)), angle = 2 * Math.PI * this.turns * share;
+    const radius = this.radius * Math.min(1, 20 * share, 20 * (1 - share));
+    return new THREE.Vector3(radius * Math.cos(angle), radius * Math.sin(angle), t);
+  }
+}
+
+// A spring or damper between two points: a coil, a rod in a barrel, or both. Along z, of unit length; scaled by its length.
+class SpringView {
+  constructor(spring, material, size) {
+    const add = geometry => {
+      const mesh = new THREE.Mesh(geometry, material);
+      mesh.castShadow = true;
+      this.object.add(mesh);
+    };
+    const addCylinder = (radius, length) =>
+        add(new THREE.CylinderBufferGeometry(radius, radius, length, 16).rotateX(Math.PI / 2).translate(0, 0, length / 2));
+    this.spring = spring;
+    this.object = new THREE.Group();
+    if (spring.pulls) add(new THREE.TubeBufferGeometry(new Helix(0.016 * size, 8), 200, 0.0035 * size, 6));
+    if (!spring.damps) return;
+    addCylinder(0.003 * size, 1);
+    addCylinder(0.008 * size, 0.45);
+  }
+
+  // From the placements of its bodies.
+  place(bodies) {
+    const [from, to] = [['body1', 'point1'], ['body2', 'point2']].map(([body, point]) => {
+      const placed = bodies[this.spring[body]];
+      return new THREE.Vector3(...this.spring[point]).applyQuaternion(placed.quaternion).add(placed.position);
+    });
+    const length = from.distanceTo(to);
+    this.object.visible = length > 1e-9;
+    if (!this.object.visible) return;
+    this.object.position.copy(from);
+    this.object.quaternion.setFromUnitVectors(UP, to.sub(from).divideScalar(length));
+    this.object.scale.z = length;
+  }
+}
+
 // A padlock that faces the camera.
 function makeLockTexture() {
   const canvas = makeElement('canvas');
@@ -127,6 +175,9 @@ class BodyView {
     this.bodies = [];
     for (let i = 0; i < run.placements.cols / 7; ++i) this.bodies.push(this.add(this.root, new THREE.Group()));
     for (const visual of run.robot.visuals) this.addVisual(visual);
+    this.springs = [];
+    this.setPlacements(0);
+    this.addSprings();
     this.setPlacements(0);
   }
 
@@ -146,6 +197,17 @@ class BodyView {
     const mesh = setPose(new THREE.Mesh(geometry, material), visual.pose);
     mesh.castShadow = mesh.receiveShadow = true;
     this.bodies[visual.body].add(mesh);
+  }
+
+  addSprings() {
+    const box = new THREE.Box3().setFromObject(this.root), color = makeColor('#f08c00');
+    const size = box.isEmpty() ? 1 : box.getSize(new THREE.Vector3()).length();
+    for (const spring of this.run.robot.springs) {
+      const material = new THREE.MeshStandardMaterial({color, roughness: 0.5, metalness: 0.2});
+      this.materials.push({material, color, opacity: 1});
+      this.springs.push(new SpringView(spring, material, size));
+      this.root.add(this.springs[this.springs.length - 1].object);
+    }
   }
 
   // Appearance of the bodies: the share of the run's colour, and their opacity.
@@ -174,6 +236,7 @@ class BodyView {
       body.quaternion.set(d[a + 3], d[a + 4], d[a + 5], d[a + 6])
           .slerp(goal.set(d[b + 3], d[b + 4], d[b + 5], d[b + 6]), share);
     });
+    for (const spring of this.springs) spring.place(this.bodies);
   }
 }
 
