@@ -7,19 +7,25 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 seconds=${1:-600}
 shift || true
 targets=("$@")
-[ ${#targets[@]} -gt 0 ] || targets=(urdf yaml mjcf json csv npz)
+[ ${#targets[@]} -gt 0 ] || targets=(urdf drake yaml motors mjcf json csv npz)
 build=$root/build-fuzz
+bielle=${BIELLE:-$root/build/bin/bielle}
 mkdir -p "$build/findings" "$build/seeds"
 
 # Seeds: the robots of the source tree, a small robot's YAML with every key, and a result that the command makes.
 if [ ! -e "$build/seeds/done" ]; then
-  mkdir -p "$build"/seeds/{urdf,yaml,mjcf,json,csv,npz}
+  mkdir -p "$build"/seeds/{urdf,drake,yaml,motors,mjcf,json,csv,npz}
   cp "$root"/robots/*/*.urdf "$build/seeds/urdf"
   cp "$root"/robots/*/*.yaml "$root"/tests/fuzz/toy.yaml "$build/seeds/yaml"
+  sed 's/^  ak80-9:/  m:/' "$root/robots/motors.yaml" >"$build/seeds/motors/all.yaml"
+  printf 'motors: {m: {source: s, ratio: 9, rotor_inertia: 1e-5, torque_constant: 0.1, resistance: 0.2, voltage: 48, current: 20, continuous_current: 9, efficiency: 0.9, back_efficiency: 0.8, mass: 0.5, effort: 10, velocity: 40}}\n' >"$build/seeds/motors/one.yaml"
   for robot in fourbar fivebar_leg spring_leg belt_biped; do
-    "${BIELLE:-$root/build/bin/bielle}" export "$root/robots/$robot" --format mjcf -o "$build/seeds/mjcf/$robot.xml" >/dev/null
+    "$bielle" convert "$root/robots/$robot" --to mjcf -o "$build/seeds/mjcf/$robot.xml" >/dev/null 2>&1
+    "$bielle" convert "$root/robots/$robot" --to drake -o "$build/seeds/drake/$robot.urdf" >/dev/null 2>&1
   done
-  "${BIELLE:-$root/build/bin/bielle}" solve squat --robot bipetto --depth 0.95 --set duration=0.4 --set settle=0 \
+  "$bielle" convert "$root/validation/elements/point_spring.yaml" --to mjcf -o "$build/seeds/mjcf/springs.xml" >/dev/null 2>&1
+  "$bielle" convert "$root/validation/elements/point_spring.yaml" --to drake -o "$build/seeds/drake/springs.urdf" >/dev/null 2>&1
+  "$bielle" solve squat --robot bipetto --depth 0.95 --set duration=0.4 --set settle=0 \
     --set time_step=0.1 --max-iterations 1 --quiet --no-check --no-report -o "$build/seeds/result" >/dev/null || true
   cp "$build/seeds/result/trajectory.csv" "$build/seeds/csv"
   cp "$build/seeds/result/trajectory.npz" "$build/seeds/npz"
@@ -35,7 +41,7 @@ for target in "${targets[@]}"; do
   log=$build/fuzz_$target.log
   dictionary=()
   case $target in
-    urdf | yaml) dictionary=("-dict=$root/tests/fuzz/robot.dict") ;;
+    urdf | drake | yaml | motors) dictionary=("-dict=$root/tests/fuzz/robot.dict") ;;
     mjcf) dictionary=("-dict=$root/tests/fuzz/mjcf.dict") ;;
   esac
   if nice "$build/tests/fuzz/fuzz_$target" "$build/corpus/$target" "$build/seeds/$target" -max_total_time="$seconds" \
