@@ -210,7 +210,7 @@ TEST_CASE("springs and dampers between points are on the page, with the bodies a
   const RobotDirectory directory;
   directory.write("arm/arm.urdf", kArm);
   directory.write("arm/arm.yaml",
-                  "point_springs:\n  coil: {frames: [world, a], points: [[1, 2, 3], [0.5, 0, 0]], stiffness: 9}\n"
+                  "point_springs:\n  coil: {frames: [world, a], points: [[1, 2, 3], [0.5, 0, 0]], stiffness: 9, rest: 1}\n"
                   "  dashpot: {frames: [a, world], damping: 2}\n");
   writeStillResult(directory.path() + "/r", directory.path() + "/arm", getArmNames());
   const json springs = getData(makeReport({directory.path() + "/r"}))["runs"][0]["robot"]["springs"];

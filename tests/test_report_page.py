@@ -271,7 +271,7 @@ class ReportPage(unittest.TestCase):
         source = pathlib.Path(__file__).parent.parent / "robots/fivebar_leg"
         (robot / "sprung.yaml").write_text(f"""model: {source}
 point_springs:
-  coil: {{frames: [world, upper_front], points: [[0.3, 0, 0.2], [0.05, 0, 0]], stiffness: 9, damping: 1}}
+  coil: {{frames: [world, upper_front], points: [[0.3, 0, 0.2], [0.05, 0, 0]], stiffness: 9, rest: 0.2, damping: 1}}
   dashpot: {{frames: [lower_front, upper_back], damping: 1}}
 """)
         page = self.root / "sprung.html"
