@@ -29,7 +29,7 @@ TEST_CASE("bench: every work is measured, in both formulations") {
   std::vector<std::string> told;
   options.progress = [&told](const std::string& what) { told.push_back(what); };
   const BenchReport report = runBench(loadOwn("bipetto"), options);
-  CHECK(told.size() == 12);
+  CHECK(told.size() == 14);
   CHECK(report.robot == "bipetto");
   CHECK_FALSE(report.processor.empty());
   CHECK_THAT(report.flags, Catch::Contains("-O"));
@@ -47,10 +47,11 @@ TEST_CASE("bench: every work is measured, in both formulations") {
   }
   REQUIRE(report.solves.size() == 8);
   for (const SolveTime& t : report.solves) CHECK((t.seconds > 0 && t.iterations > 0));
-  REQUIRE(report.receding.size() == 4);
+  REQUIRE(report.receding.size() == 8);
   for (const RecedingHorizon& t : report.receding) {
     CHECK(t.all.shifts == 20);  // the walk is begun anew on the way
     CHECK(t.up);
+    CHECK((t.cones ? t.violation < 0.01 : t.violation == 0));
     for (const ShiftTimes& times : {t.all, t.undisturbed}) {
       if (times.shifts == 0) continue;
       CHECK((times.median > 0 && times.median <= times.percentile_99 && times.percentile_99 <= times.worst));

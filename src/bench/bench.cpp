@@ -8,6 +8,7 @@
 #include "bench/receding_horizon.h"
 #include "bielle/dynamics/assembly.h"
 #include "bielle/io/result.h"
+#include "bielle/motion/locomotion.h"
 #include "bielle/motion/squat.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "motion/benchmark_walk.h"
@@ -165,7 +166,8 @@ class Bench {
     measureUnit();
     for (Formulation formulation : kFormulations) measureWalk(formulation);
     for (Formulation formulation : kFormulations) measureSolves(formulation);
-    for (Formulation formulation : kFormulations) measureReceding(formulation);
+    for (Formulation formulation : kFormulations)
+      for (bool cones : {false, true}) measureReceding(formulation, cones);
     for (Formulation formulation : kFormulations) measureChains(formulation);
     for (Formulation formulation : kFormulations) measureHorizons(formulation);
     measureUnit();
@@ -276,10 +278,11 @@ class Bench {
     measureSolve("benchmark walk", formulation, [&] { return makeBenchmarkWalk(model_, getWalk(), formulation); });
   }
 
-  RecedingOptions getReceding(Formulation formulation, int threads) const {
+  RecedingOptions getReceding(Formulation formulation, bool cones, int threads) const {
     RecedingOptions options;
     options.threads = threads;
     options.walk = getWalk();
+    if (cones) options.walk.friction = LocomotionOptions{}.friction;
     if (whole_) {
       const bool full = formulation == Formulation::Full;
       options.shifts = full ? std::max(1, options_.shifts / 30) : options_.shifts;
@@ -290,10 +293,10 @@ class Bench {
     options.first_iterations = 5;
     return options;
   }
-  void measureReceding(Formulation formulation) {
-    tell("receding horizon", formulation);
+  void measureReceding(Formulation formulation, bool cones) {
+    tell(cones ? "receding horizon with wrench cones" : "receding horizon", formulation);
     for (int threads : getThreads())
-      report_.receding.push_back(runRecedingHorizon(model_, formulation, getReceding(formulation, threads)));
+      report_.receding.push_back(runRecedingHorizon(model_, formulation, getReceding(formulation, cones, threads)));
   }
 
   void measureChains(Formulation formulation) {

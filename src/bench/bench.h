@@ -66,12 +66,15 @@ struct ShiftTimes {
 /// The walk on a horizon of 100 nodes that shifts by one stage before each single FDDP iteration: the plan is shifted,
 /// and its new last stage holds still. The first plan has no time limit. The next state is that of the step, disturbed
 /// by noise of 1e-4 rad and m, 1e-3 rad/s and m/s, on closed loops and with a velocity consistent with loops and stance
-/// feet. When the horizon reaches the end of the walk, it starts again with other noise.
+/// feet. With cones their multipliers move on with the plan. When the horizon reaches the end of the walk, it starts again with other noise.
 struct RecedingHorizon {
   Formulation formulation = Formulation::Full;
+  bool cones = false;  ///< soles keep their wrench cones
   int threads = 1;
-  ShiftTimes all;           ///< a shift and its iteration, wall clock
-  ShiftTimes undisturbed;   ///< of the shifts that were not preempted by another program
+  ShiftTimes all;          ///< a shift and its iteration, wall clock
+  ShiftTimes undisturbed;  ///< of the shifts that were not preempted by another program
+  double violation =
+      0;  ///< of the cones in the steps that are taken, largest, over the weight (and the soles for torques)
   double least_height = 0;  ///< of the first body over its initial height, 1
   double largest_tilt = 0;  ///< of the first body from where it was upright, rad
   bool up = false;          ///< all solves succeeded, height over 0.8, tilt below 0.5 rad

@@ -92,12 +92,14 @@ class Receding {
                                   std::to_string(whole_.numStages()) + " stages");
     out_.formulation = formulation;
     out_.threads = options.threads;
+    out_.cones = options.walk.friction > 0;
     out_.least_height = 1;
     out_.up = true;
   }
 
   RecedingHorizon run() {
-    const ShootingTrajectory plan = makePlan();
+    Multipliers multipliers;
+    const ShootingTrajectory plan = makePlan(multipliers);
     FddpOptions single;
     single.threads = options_.threads;
     single.max_iterations = 1;
@@ -106,7 +108,10 @@ class Receding {
     Fddp solver(single);
     ShootingTrajectory trajectory = plan;
     solver.solve(window_, trajectory);  // sizes the memory
-    while (out_.up && static_cast<int>(times_.size()) < options_.shifts) walk(plan, solver);
+    while (out_.up && static_cast<int>(times_.size()) < options_.shifts) {
+      if (out_.cones) solver.setMultipliers(multipliers);
+      walk(plan, solver);
+    }
     out_.all = summarize(times_);
     out_.undisturbed = summarize(undisturbed_);
     return out_;
@@ -114,14 +119,16 @@ class Receding {
 
  private:
   // The plan before the first shift, without a time limit.
-  ShootingTrajectory makePlan() {
+  ShootingTrajectory makePlan(Multipliers& multipliers) {
     const int nodes = options_.nodes;
     ShootingTrajectory plan{{motion_.guess.xs.begin(), motion_.guess.xs.begin() + nodes + 1},
                             {motion_.guess.us.begin(), motion_.guess.us.begin() + nodes}};
     FddpOptions options;
     options.threads = options_.threads;
     options.max_iterations = options_.first_iterations;
-    Fddp(options).solve(window_, plan);
+    Fddp solver(options);
+    solver.solve(window_, plan);
+    multipliers = solver.getMultipliers();
     return plan;
   }
 
@@ -137,12 +144,22 @@ class Receding {
       out_.up = solved && step.status == StepStatus::Ok;
       if (!out_.up) break;
       next = step.x_next;
+      out_.violation = std::max(out_.violation, calcViolation(k, step));
       x = disturbance_.apply(whole_.spec(k + 1).constraints, next);
       const Torso torso = findTorso(model_, ws_, x);
       out_.least_height = std::min(out_.least_height, torso.height / start.height);
       out_.largest_tilt = std::max(out_.largest_tilt, std::acos(std::min(1.0, torso.up.dot(start.up))));
       out_.up = out_.least_height > 0.8 && out_.largest_tilt < 0.5;
     }
+  }
+
+  double calcViolation(int k, const NodeEvaluation& step) const {
+    VectorXd lower(step.constraints.size()), upper = lower;
+    whole_.getConstraintBounds(k, lower, upper);
+    double worst = 0;
+    for (Eigen::Index i = 0; i < lower.size(); ++i)
+      worst = std::max({worst, lower[i] - step.constraints[i], step.constraints[i] - upper[i]});
+    return worst;
   }
 
   bool solve(int k, Fddp& solver, ShootingTrajectory& trajectory) {

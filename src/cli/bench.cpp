@@ -72,6 +72,7 @@ Json describeReceding(const BenchReport& report) {
   Json list = Json::array();
   for (const RecedingHorizon& t : report.receding)
     list.push_back({{"formulation", getName(t.formulation)},
+                    {"wrench cones", t.cones},
                     {"threads", t.threads},
                     {"shifts", t.all.shifts},
                     {"median [ms]", round3(1e3 * t.all.median)},
@@ -81,6 +82,7 @@ Json describeReceding(const BenchReport& report) {
                     {"their 99 % [ms]", round3(1e3 * t.undisturbed.percentile_99)},
                     {"their worst [ms]", round3(1e3 * t.undisturbed.worst)},
                     {"rate [Hz]", round3(1 / t.all.median)},
+                    {"violation", round3(t.violation)},
                     {"least height", round3(t.least_height)},
                     {"largest tilt [rad]", round3(t.largest_tilt)},
                     {"up", t.up}});

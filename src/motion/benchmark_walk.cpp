@@ -111,6 +111,7 @@ StageSpec makeStage(const Scene& scene, PhaseKind kind, const std::vector<Contac
   stage.costs.push_back(
       {"centre of mass", o.com_weight, Activation::makeQuadratic(Vector3d(1, 0, 1)), makeComPosition(com)});
   addForceCosts(scene, contacts, stage);
+  if (o.friction > 0) addWrenchCones(scene.model, o.friction, kConeMargin, stage);
   const auto getFrame = [&scene](int contact) {
     return BodyFrame{scene.model.contacts()[contact].body, scene.model.contacts()[contact].X_BF};
   };

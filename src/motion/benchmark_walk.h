@@ -10,6 +10,7 @@
 /// - force of every stance foot: the weight divided by their number, along z;
 /// - height of the swing foot: a half sine, `step_height` at mid-swing;
 /// - velocity of both feet at the switches, zero, its weight divided by h.
+/// With a friction, standing soles also keep their wrench cones, as in motions (addWrenchCones).
 /// The last node has only the state regularization.
 #include "bielle/motion/motion.h"
 
@@ -32,6 +33,7 @@ struct BenchmarkWalkOptions {
   double height_weight = 1e4;      ///< of the height of the swing foot, 1/m^2
   double switch_weight = 1e2;      ///< of the velocity of both feet at the switches times h, s^2/m^2
   double terminal_weight = 1e3;    ///< of the velocities at the end
+  double friction = 0;             ///< of the wrench cones of standing soles, 1; 0: there are none
   double contact_kp = 0;           ///< stabilisation of the contacts, 1/s^2
   double contact_kd = 100;         ///< 1/s
   std::string left = "foot_left";  ///< contact frames
