@@ -88,6 +88,12 @@ void checkEqual(const MotionRecord& a, const MotionRecord& b) {
   CHECK(areEqual(a.gap, b.gap));
 }
 
+bool areEqual(const Multipliers& a, const Multipliers& b) {
+  return a.penalty == b.penalty && a.values.size() == b.values.size() &&
+         std::equal(a.values.begin(), a.values.end(), b.values.begin(),
+                    [](const VectorXd& x, const VectorXd& y) { return x.size() == y.size() && x == y; });
+}
+
 std::string getErrorOfReading(const std::string& path) {
   return getError([&] { readRecord(path); });
 }
@@ -162,6 +168,34 @@ TEST_CASE("trajectories come back from CSV and NumPy files to the last bit") {
   MotionRecord other = record;
   other.u(1, 1) = std::nextafter(other.u(1, 1), 1e9);
   CHECK_FALSE(areEqual(other.u, record.u));  // the comparison sees the last bit
+}
+
+TEST_CASE("multipliers come back from NumPy files, and are refused where their rows do not fit") {
+  const TemporaryDirectory directory;
+  const ShortSquat squat;
+  MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
+  CHECK(record.multipliers.penalty == 0);
+  const auto write = [&] {
+    writeNpz(directory / "t.npz", record);
+    return directory / "t.npz";
+  };
+  CHECK(areEqual(readRecord(write()).multipliers, Multipliers()));
+  const size_t nodes = static_cast<size_t>(record.time.size());
+  for (size_t k = 0; k < nodes; ++k)
+    record.multipliers.values.push_back(VectorXd::LinSpaced(static_cast<Eigen::Index>(k % 3), -1.0 / 3, 7));
+  record.multipliers.penalty = 0.1;
+  CHECK(areEqual(readRecord(write()).multipliers, record.multipliers));
+  MotionRecord other = record;
+  other.multipliers.values[2][1] = std::nextafter(other.multipliers.values[2][1], 1e9);
+  CHECK_FALSE(areEqual(other.multipliers, record.multipliers));  // the comparison sees the last bit
+
+  record.multipliers.values[2][1] = std::numeric_limits<double>::infinity();
+  CHECK_THAT(getErrorOfReading(write()), Catch::Contains("'multipliers': it has numbers that are not finite"));
+  record.multipliers.values.pop_back();
+  CHECK_THAT(getErrorOfReading(write()), Catch::Contains("how many each node has"));
+  record.multipliers.values.assign(nodes, VectorXd(0));
+  record.multipliers.penalty = std::numeric_limits<double>::infinity();
+  CHECK_THAT(getErrorOfReading(write()), Catch::Contains("penalty"));
 }
 
 TEST_CASE("midpoint steps are recorded with the points to which their accelerations belong") {

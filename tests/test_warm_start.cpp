@@ -55,6 +55,35 @@ TEST_CASE("warm start: a result is its own solution, and near that of a walk a l
   CHECK(faster_warm.cost == Approx(faster_cold.cost).epsilon(1e-6));
 }
 
+TEST_CASE("warm start: what a solve was cut off with goes on where it was, multipliers included") {
+  Motion motion = makeShortWalk(0.4), whole = makeShortWalk(0.4), again = makeShortWalk(0.4),
+         other = makeShortWalk(0.4, 0.6);
+  const FddpSummary cold = solveMotion(whole, {});
+  FddpOptions few;
+  few.max_iterations = cold.iterations - 3;
+  MotionRecord record;
+  REQUIRE(solveMotion(motion, few, {}, &record.multipliers).termination == FddpTermination::MaxIterations);
+  const Multipliers kept = record.multipliers;
+  record = makeRecord(motion, motion.guess);
+
+  setGuess(record, again);
+  Multipliers multipliers;
+  const FddpSummary without = solveMotion(again, {}, {}, &multipliers);
+  setGuess(record, again);
+  multipliers = kept;
+  const FddpSummary with = solveMotion(again, {}, {}, &multipliers);
+  CHECK(with.termination == FddpTermination::Converged);
+  CHECK(with.iterations < without.iterations);
+  CHECK(with.cost == Approx(cold.cost).epsilon(1e-8));
+  CHECK(multipliers.penalty > 0);
+
+  // Those of a motion with other nodes are not taken.
+  const FddpSummary alone = solveMotion(other, {});
+  other = makeShortWalk(0.4, 0.6);
+  multipliers = kept;
+  CHECK(solveMotion(other, {}, {}, &multipliers).cost == alone.cost);
+}
+
 TEST_CASE("warm start: other lengths are resampled, feet carried to their places, other robots refused") {
   Motion motion = makeShortWalk(0.4);
   MotionRecord record = makeRecord(motion, motion.guess);

@@ -29,7 +29,8 @@ void bindRecord(py::module_& module) {
       .field("q_mid", &MotionRecord::q_mid, "(N, nq), where a, u and wrenches belong")
       .field("v_mid", &MotionRecord::v_mid, "(N, nv)")
       .field("com", &MotionRecord::com, "(N + 1, 3), m")
-      .field("gap", &MotionRecord::gap, "(N + 1, 2), largest closing error, m and rad");
+      .field("gap", &MotionRecord::gap, "(N + 1, 2), largest closing error, m and rad")
+      .field("multipliers", &MotionRecord::multipliers, "of the constraints, for warm starts; penalty 0 if not known");
   module.def("read_record", &readRecord, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
              "Reads trajectory.csv or trajectory.npz.");
   module.def("read_result_record", &readResultRecord, py::arg("directory"), py::call_guard<py::gil_scoped_release>(),

@@ -1,4 +1,6 @@
 // Trajectories as NumPy archives.
+#include <cmath>
+
 #include "bielle/model/error.h"
 #include "io/npz.h"
 #include "io/record_tables.h"
@@ -27,6 +29,45 @@ std::vector<size_t> makeShape(const RecordTable& table, size_t rows) {
   return {rows, columns / table.entries, static_cast<size_t>(table.entries)};
 }
 
+void addMultipliers(const Multipliers& multipliers, NpyArrays& arrays) {
+  if (!(multipliers.penalty > 0)) return;
+  NpyArray values, rows;
+  for (const VectorXd& node : multipliers.values) {
+    values.numbers.insert(values.numbers.end(), node.begin(), node.end());
+    rows.numbers.push_back(static_cast<double>(node.size()));
+  }
+  values.shape = {values.numbers.size()};
+  rows.shape = {rows.numbers.size()};
+  arrays["multipliers"] = std::move(values);
+  arrays["multiplier_rows"] = std::move(rows);
+  arrays["multiplier_penalty"] = {{1}, {multipliers.penalty}, {}, false};
+}
+
+Multipliers takeMultipliers(const std::string& path, size_t nodes, NpyArrays& arrays) {
+  Multipliers out;
+  if (arrays.count("multipliers") == 0) return out;
+  const std::vector<double> values = takeArray(path, "multipliers", false, arrays).numbers,
+                            rows = takeArray(path, "multiplier_rows", false, arrays).numbers,
+                            penalty = takeArray(path, "multiplier_penalty", false, arrays).numbers;
+  const auto refuse = [&path](const char* problem) {
+    throw ModelError(path, "array 'multipliers'", problem, "give a trajectory that Bielle wrote");
+  };
+  if (rows.size() != nodes) refuse("it does not say how many each node has");
+  if (penalty.size() != 1 || !(penalty[0] > 0) || !std::isfinite(penalty[0])) refuse("its penalty is not positive");
+  size_t used = 0;
+  for (double count : rows) {
+    if (!(count >= 0 && count <= static_cast<double>(values.size() - used)) || count != std::floor(count))
+      refuse("its length does not fit the rows of the nodes");
+    const size_t size = static_cast<size_t>(count);
+    out.values.push_back(VectorXd::Map(values.data() + used, static_cast<Eigen::Index>(size)));
+    if (!out.values.back().allFinite()) refuse("it has numbers that are not finite");
+    used += size;
+  }
+  if (used != values.size()) refuse("its length does not fit the rows of the nodes");
+  out.penalty = penalty[0];
+  return out;
+}
+
 }  // namespace
 
 std::string formatNpz(const MotionRecord& record) {
@@ -38,6 +79,7 @@ std::string formatNpz(const MotionRecord& record) {
     const RowMatrixXd& data = record.*table.data;
     arrays[table.array] = {makeShape(table, data.rows()), {data.data(), data.data() + data.size()}, {}, false};
   }
+  addMultipliers(record.multipliers, arrays);
   return formatArchive(arrays);
 }
 
@@ -59,6 +101,7 @@ MotionRecord readNpz(const std::string& path) {
                        "give a trajectory that Bielle wrote");
     record.*table.data = RowMatrixXd::Map(array.numbers.data(), rows, table.columns.size());
   }
+  record.multipliers = takeMultipliers(path, nodes, arrays);
   return record;
 }
 

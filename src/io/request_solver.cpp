@@ -43,8 +43,11 @@ MotionResult RequestSolver::solve(const RunInfo& run) {
     again.acceptable_decrease = 0;  // costs of other objectives fall slowly all the way
     solver = again;
   }
-  const FddpSummary summary = solveMotion(motion_, solver, observer_.motion);
+  Multipliers multipliers;
+  if (options_.warm_start) multipliers = options_.warm_start->multipliers;
+  const FddpSummary summary = solveMotion(motion_, solver, observer_.motion, &multipliers);
   MotionResult result = makeResult(run, motion_, motion_.guess, summary);
+  result.record.multipliers = std::move(multipliers);
   if (!result.converged()) return result;
   std::optional<Motion> refined = refineStages(request_, model_, options_.problem, motion_, result);
   if (refined) improve(*refined, again, "in stages half as long", run, result);
@@ -70,8 +73,10 @@ void RequestSolver::refuseLongStages(MotionResult& result) const {
 void RequestSolver::improve(Motion& motion, const FddpOptions& solver, const std::string& how, const RunInfo& run,
                             MotionResult& result) const {
   tell("stages are too long for how quickly it moves: once more, " + how);
-  const FddpSummary summary = solveMotion(motion, solver, observer_.motion);
+  Multipliers multipliers;
+  const FddpSummary summary = solveMotion(motion, solver, observer_.motion, &multipliers);
   MotionResult improved = makeResult(run, motion, motion.guess, addUp(result.solver, summary));
+  improved.record.multipliers = std::move(multipliers);
   if (improved.converged() && calcStageExcess(model_, improved) < calcStageExcess(model_, result)) {
     result = std::move(improved);
     return;

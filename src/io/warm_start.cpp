@@ -24,16 +24,33 @@ void requireSame(const std::vector<std::string>& recorded, const std::vector<std
                      "give a result of the same robot");
 }
 
-// Moves the base over the ground so that the feet of a phase are, on average, at their places.
-void carryToFeet(const Model& model, Workspace& ws, const ContactPhase& phase, VectorRef x) {
-  if (!model.hasFreeFlyer() || phase.contacts.empty()) return;
+// From the feet of a phase, on average, to their places.
+Vector3d calcWayToFeet(const Model& model, Workspace& ws, const ContactPhase& phase, const VectorXd& x) {
+  Vector3d way = Vector3d::Zero();
+  if (!model.hasFreeFlyer() || phase.contacts.empty()) return way;
   updatePlacements(model, ws, x.head(model.nq()));
-  Vector3d error = Vector3d::Zero();
   for (const ContactTarget& target : phase.contacts) {
     const ContactFrame& foot = model.contacts()[target.contact];
-    error += target.X_WT.p - getPlacement(ws, foot.body, foot.X_BF).p;
+    way += target.X_WT.p - getPlacement(ws, foot.body, foot.X_BF).p;
   }
-  x.head<3>() += error / static_cast<double>(phase.contacts.size());
+  return way / static_cast<double>(phase.contacts.size());
+}
+
+// Moves the base over the ground so that the feet are where the motion has them, unless they slip no farther than in a solved
+// motion: states then stay consistent with velocities, and a solution stays one.
+void carryToFeet(Motion& motion) {
+  constexpr double kSlip = 5e-4;  // m
+  const Model& model = motion.problem->model();
+  Workspace ws(model);
+  std::vector<Vector3d> ways;
+  double farthest = 0;
+  for (size_t k = 0; k < motion.guess.xs.size(); ++k) {
+    ways.push_back(calcWayToFeet(model, ws, motion.schedule.getPhase(static_cast<int>(k)), motion.guess.xs[k]));
+    farthest = std::max(farthest, ways.back().norm());
+  }
+  if (farthest <= kSlip) return;
+  for (size_t k = 0; k < ways.size(); ++k)
+    if (model.hasFreeFlyer()) motion.guess.xs[k].head<3>() += ways[k];
 }
 
 // Time scales of phases of free duration, from a record of as many nodes.
@@ -65,16 +82,15 @@ void setGuess(const MotionRecord& record, Motion& motion) {
     throw ModelError("", "warm start", "the recorded motion is empty or has numbers that are not finite",
                      "give the result of a solve that went through");
   const int nodes = motion.problem->numStages() + 1;
-  Workspace ws(model);
   for (int k = 0; k < nodes; ++k) {
     const int row = matchRow(k, nodes, record.q.rows());
     VectorXd& x = motion.guess.xs[k];
     x.head(model.nq()) = record.q.row(row).transpose();
     x.segment(model.nq(), model.nv()) = record.v.row(row).transpose();
-    carryToFeet(model, ws, motion.schedule.getPhase(k), x);
     if (k + 1 < nodes)
       motion.guess.us[k].head(model.nu()) = record.u.row(matchRow(k, nodes - 1, record.u.rows())).transpose();
   }
+  carryToFeet(motion);
   if (record.time.size() == nodes) setTimeScales(record, motion);
 }
 

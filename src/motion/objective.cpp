@@ -111,14 +111,26 @@ struct Attempt {
   Multipliers multipliers;
 };
 
-Attempt attempt(const Motion& motion, FddpOptions solver, const FddpObserver& observer) {
+// Whether a problem has these rows of constraints at its nodes.
+bool haveRows(const ShootingProblem& problem, const Multipliers& multipliers) {
+  if (!(multipliers.penalty > 0) || static_cast<int>(multipliers.values.size()) != problem.numStages() + 1)
+    return false;
+  for (int k = 0; k <= problem.numStages(); ++k)
+    if (multipliers.values[k].size() != problem.constraintSize(k)) return false;
+  return true;
+}
+
+// \param start  multipliers to start from if the problem has their rows, else from zero
+Attempt attempt(const Motion& motion, FddpOptions solver, const FddpObserver& observer, const Multipliers& start = {}) {
   const std::unique_ptr<PeakProblem> peak = makePeakProblem(motion);
   if (motion.bounded || peak) solver.bounds = ControlBounds::Enforce;
+  const ShootingProblem& problem = peak ? static_cast<const ShootingProblem&>(*peak) : *motion.problem;
   Fddp fddp(solver);
+  // The penalty that a solve ended with is too stiff for another motion.
+  if (haveRows(problem, start)) fddp.setMultipliers({start.values, solver.constraints.initial_penalty});
   Attempt out;
   out.trajectory = peak ? peak->wrap(motion.guess) : motion.guess;
-  out.summary =
-      peak ? fddp.solve(*peak, out.trajectory, observer) : fddp.solve(*motion.problem, out.trajectory, observer);
+  out.summary = fddp.solve(problem, out.trajectory, observer);
   if (peak) out.trajectory = peak->unwrap(out.trajectory);
   out.multipliers = fddp.getMultipliers();
   return out;
@@ -162,7 +174,7 @@ FddpOptions makeMotionSolverOptions() {
 FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer,
                         Multipliers* multipliers) {
   constexpr double kCautious = 1e-2;  // regularization of the second attempt
-  Attempt result = attempt(motion, options, observer);
+  Attempt result = attempt(motion, options, observer, multipliers ? *multipliers : Multipliers());
   if (result.summary.termination == FddpTermination::Failed && result.summary.iterations == 0) {
     holdPosture(motion);
     result = attempt(motion, options, observer);

@@ -103,8 +103,8 @@ BuildInfo getBuildInfo();
 
 /// Replaces the guess of a motion by states and torques of a record of the same robot: node by node if the lengths
 /// agree, with the durations of phases where they are free; otherwise each node takes the recorded one at the same
-/// fraction of the duration. The base is moved so that
-/// the stance feet are at the places of the new motion.
+/// fraction of the duration. The base is moved so that the stance feet are at the places of the new motion, if they are more
+/// than 0.5 mm away anywhere. Multipliers are for solveMotion() to take.
 /// \throws ModelError when the coordinates or motors differ, or the record has numbers that are not finite
 void setGuess(const MotionRecord& record, Motion& motion);
 

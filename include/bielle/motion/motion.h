@@ -85,7 +85,8 @@ FddpOptions makeMotionSolverOptions();
 /// A solve that ends as infeasible says so of its neighbourhood alone. It is then tried again from the guess, with shorter first
 /// steps (regularization 1e-2); iterations, times and log are those of both attempts. Where the guess cannot be evaluated, such as
 /// with a leg that is nearly straight, the posture at the start takes its place.
-/// \param multipliers  if given, receives those of the constraints, which MotionEnvelope needs
+/// \param multipliers  if given, those of the constraints, which MotionEnvelope needs: to start from, where the motion has
+///   constraints of as many rows at every node, and those of the solution
 FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer = {},
                         Multipliers* multipliers = nullptr);
 
