@@ -357,6 +357,14 @@ const char* const kDrakeFile = R"(<robot name="swing" xmlns:drake="http://drake.
 
 }  // namespace
 
+TEST_CASE("numbers of Drake's URDF are written however large they are") {
+  ModelParts parts = takeParts(loadRobot("fourbar").model);
+  parts.joints.back().X_PJ.p = Vector3d(12345.6789, -1e300, 0.1);
+  const std::string urdf = formatDrake(ModelBuilder::restore(parts)).urdf;
+  CHECK_THAT(urdf, Catch::Contains("xyz=\"12345.6789 -1e+300 0.1\""));
+  CHECK_THAT(urdf, !Catch::Contains("inf"));
+}
+
 TEST_CASE("files of Drake's users are read, completed by a YAML file, and their mistakes are told") {
   const RobotDirectory directory;
   const auto load = [&](const std::string& urdf) { return loadRobot(directory.writeRobot(urdf, "")); };

@@ -22,7 +22,10 @@ std::string formatNumber(double value, const char* format = "%.12g") {
 }
 
 // Rounds a length, an angle or a direction to 1e-12.
-std::string formatRounded(double value) { return formatNumber(std::round(value * 1e12) / 1e12, "%.15g"); }
+std::string formatRounded(double value) {
+  constexpr double kWhole = 1e4;  // whose last digit is over 1e-12
+  return formatNumber(std::abs(value) < kWhole ? std::round(value * 1e12) / 1e12 : value, "%.15g");
+}
 
 std::string formatVector(const Vector3d& v, const char* separator = " ") {
   return formatRounded(v.x()) + separator + formatRounded(v.y()) + separator + formatRounded(v.z());
