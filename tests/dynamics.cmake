@@ -3,7 +3,7 @@ bielle_test(couplers SOURCES test_couplers.cpp mechanisms.cpp LIBS bielle_dynami
 bielle_test(joint_forces SOURCES test_joint_forces.cpp moved_model.cpp mechanisms.cpp LIBS bielle_dynamics)
 bielle_test(assembly SOURCES test_assembly.cpp test_loop_conflicts.cpp mechanisms.cpp LIBS bielle_dynamics)
 bielle_test(redundant SOURCES test_redundant.cpp mechanisms.cpp LIBS bielle_dynamics)
-bielle_test(variation SOURCES test_variation.cpp moved_model.cpp mechanisms.cpp LIBS bielle_dynamics)
+bielle_test(variation SOURCES test_variation.cpp test_distance.cpp moved_model.cpp mechanisms.cpp LIBS bielle_dynamics)
 bielle_test(errata SOURCES test_errata.cpp mechanisms.cpp LIBS bielle_dynamics)
 bielle_test(impact SOURCES test_impact.cpp mechanisms.cpp LIBS bielle_dynamics)
 target_link_options(test_impact PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)

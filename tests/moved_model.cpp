@@ -1,6 +1,12 @@
 #include "moved_model.h"
 
+#include <Eigen/QR>
+#include <catch2/catch.hpp>
+
+#include "bielle/dynamics/kept_motion.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/builder.h"
+#include "mechanisms.h"
 
 namespace bielle::testing {
 namespace {
@@ -56,6 +62,13 @@ ModelBuilder makeBuilder(const Model& m, const ModelVariation& direction, double
     builder.addFrame(contact.name + "/f", getLink(m, contact.body), move(contact.X_BF, direction.contacts[c]));
     builder.addContact(contact.name, contact.name + "/f", contact.kind, contact.half_length, contact.half_width);
   }
+  for (size_t s = 0; s < m.shapes().size(); ++s) {
+    Shape shape = m.shapes()[s];
+    shape.X_BS = move(shape.X_BS, direction.shapes[s].frame);
+    shape.half += step * direction.shapes[s].half;
+    shape.radius += step * direction.shapes[s].radius;
+    builder.addShape(getLink(m, shape.body), shape);
+  }
   return builder;
 }
 
@@ -70,6 +83,52 @@ Model addContactsEverywhere(const Model& model) {
   for (int i = 1; i < model.numBodies(); ++i)
     builder.addContact("sole of " + getLink(model, i), getLink(model, i), ContactKind::Surface6D, 0.1, 0.05);
   return builder.build();
+}
+
+MatrixXd differentiateModel(const Model& model, const std::vector<ModelVariation>& directions, double h,
+                            const std::function<VectorXd(const Model&)>& f) {
+  MatrixXd out;
+  for (size_t i = 0; i < directions.size(); ++i) {
+    const VectorXd column = differentiate(VectorXd::Zero(1), h,
+                                          [&](const VectorXd& t) { return f(moveModel(model, directions[i], t[0])); });
+    if (i == 0) out.resize(column.size(), static_cast<Eigen::Index>(directions.size()));
+    out.col(static_cast<Eigen::Index>(i)) = column;
+  }
+  return out;
+}
+
+std::vector<int> chooseKept(const Model& model, const VectorXd& q) {
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  const ConstraintSet loops = makeConstraintSet(model);
+  MatrixXd J = MatrixXd::Zero(loops.rows, model.nv());
+  for (size_t c = 0; c < loops.closures.size(); ++c)
+    calcClosureJacobian(ws, loops.closures[c], J.middleRows(loops.offsets[c], getRows(loops.closures[c].kind)));
+  // Pivots first are the dofs that the loops determine best.
+  Eigen::ColPivHouseholderQR<MatrixXd> qr;
+  qr.setThreshold(1e-7);
+  qr.compute(J);
+  std::vector<int> kept;
+  for (Eigen::Index i = qr.rank(); i < J.cols(); ++i) kept.push_back(qr.colsPermutation().indices()[i]);
+  return kept;
+}
+
+VectorXd closeHeld(const Model& model, const VectorXd& q, const std::vector<int>& held,
+                   const std::vector<ContactTarget>& contacts) {
+  Workspace ws(model);
+  const ConstraintSet loops = makeConstraintSet(model, contacts);
+  updatePositions(model, ws, q);
+  const Closing closing(model, ws, loops, held);
+  const VectorXd still = VectorXd::Zero(static_cast<Eigen::Index>(held.size()));
+  VectorXd d = VectorXd::Zero(model.nv()), residual(loops.rows);
+  for (int i = 0; i < 12; ++i) {
+    updatePositions(model, ws, model.integrate(q, d));
+    for (size_t c = 0; c < loops.closures.size(); ++c)
+      residual.segment(loops.offsets[c], getRows(loops.closures[c].kind)) = calcClosureResidual(ws, loops.closures[c]);
+    d += closing.solve(residual, still);
+  }
+  REQUIRE(residual.cwiseAbs().maxCoeff() < 1e-12);
+  return d;
 }
 
 }  // namespace bielle::testing

@@ -369,6 +369,37 @@ TEST_CASE("windings and gears of motors go out and come in again, and other form
                            Contains("motor '" + second.name + "': its winding and gear"));
 }
 
+TEST_CASE("shapes go out and come in again") {
+  ModelParts parts = takeParts(loadRobot("bipetto").model);
+  const auto fitted = parts.shapes;
+  Shape ball, rod = makeCapsule(0, {0.1, 0.2, 0}, {0.1, -0.3, 0.05}, 0.03), box;
+  ball.radius = 0.1;
+  box.half = {0.1, 0.2, 0.05};
+  box.X_BS = {Eigen::AngleAxisd(0.3, Vector3d::UnitY()).toRotationMatrix(), Vector3d(0.01, 0.02, 0.03)};
+  int body = 3;
+  for (Shape* shape : {&ball, &rod, &box}) {
+    shape->body = body++;
+    parts.shapes.push_back(*shape);
+  }
+  const Model a = ModelBuilder::restore(parts);
+  CHECK(a.shapes().size() < fitted.size() + 3);  // three bodies have shapes of their own
+  const RobotDirectory directory;
+  const RobotText text = formatRobot(a);
+  for (const Model& b : {loadRobot(directory.writeRobot(text.urdf, text.yaml)).model, readMjcfText(write(a).xml)}) {
+    REQUIRE(b.visuals().size() == a.visuals().size());  // shapes of files are not drawn
+    REQUIRE(b.shapes().size() == a.shapes().size());
+    for (const Shape& before : a.shapes()) {
+      const std::string& name = a.bodies()[before.body].name;
+      CAPTURE(name);
+      CHECK(std::any_of(b.shapes().begin(), b.shapes().end(), [&](const Shape& after) {
+        return b.bodies()[after.body].name == name && after.fitted == before.fitted &&
+               (after.half - before.half).norm() < 1e-11 && areSame(after.radius, before.radius) &&
+               (after.X_BS.p - before.X_BS.p).norm() < 1e-11 && (after.X_BS.R - before.X_BS.R).norm() < 1e-10;
+      }));
+    }
+  }
+}
+
 TEST_CASE("a URDF alone is the tree with its mimics, friction and limits, and tells what it lost") {
   ModelBuilder builder("gripper");
   const Inertia inertia = {1, Vector3d(0, 0, 0.1), 0.01 * Matrix3d::Identity()};

@@ -7,6 +7,7 @@
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/reader.h"
 #include "bielle/ocp/cost.h"
+#include "bielle/ocp/ground_distance.h"
 #include "check_derivative.h"
 #include "math/so3.h"
 #include "ocp/ground_forces.h"
@@ -70,7 +71,8 @@ std::vector<NamedResidual> makeResiduals(std::mt19937& rng, const Model& model, 
   add("sole clearance", makeSoleClearance(a, 0.1, 0.05, ground, 3));
   add("point clearance", makeSoleClearance(b, 0, 0, ground, 3));
   const auto random = [&rng] { return Vector3d(randomVector(rng, 3, 0.2)); };
-  add("capsule distance", makeCapsuleDistance({a.body, random(), random(), 0.05}, {b.body, random(), random(), 0.02}));
+  add("distance of capsules",
+      makeShapeDistance(makeCapsule(a.body, random(), random(), 0.05), makeCapsule(b.body, random(), random(), 0.02)));
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c) {
     const int rows = getRows(set.closures[c].kind);
     add("contact force", makeContactForce(set, c, randomVector(rng, rows, 10)));
@@ -322,13 +324,13 @@ TEST_CASE("sole clearance: over steps, beside them and between") {
   CHECK(less > 50);
 }
 
-TEST_CASE("capsule distance: of segments that cross, pass, end and are points") {
+TEST_CASE("distance of capsules: of segments that cross, pass, end and are points") {
   const Model model = loadRobot("bipetto").model;
   const ConstraintSet set = makeConstraintSet(model);
   TestNode node(model, set);
   const int body = 1;
   const auto calc = [&](const Vector3d& a0, const Vector3d& a1, const Vector3d& b0, const Vector3d& b1) {
-    const auto residual = makeCapsuleDistance({body, a0, a1, 0.1}, {body, b0, b1, 0.3});
+    const auto residual = makeShapeDistance(makeCapsule(body, a0, a1, 0.1), makeCapsule(body, b0, b1, 0.3));
     return node.calc(*residual, model.makeNeutral(), VectorXd::Zero(model.nv()), {})[0] + 0.4;
   };
   const Vector3d x = Vector3d::UnitX(), y = Vector3d::UnitY(), z = Vector3d::UnitZ();
@@ -352,6 +354,50 @@ TEST_CASE("capsule distance: of segments that cross, pass, end and are points") 
         least = std::min(least, (a0 + s * (a1 - a0) / steps - b0 - t * (b1 - b0) / steps).norm());
     CHECK(calc(a0, a1, b0, b1) <= least + 1e-12);
     CHECK(calc(a0, a1, b0, b1) > least - 0.02);
+  }
+}
+
+TEST_CASE("distance from the ground: the plane, the sides and edges of steps, inclined tops; with its derivative") {
+  Ground ground;
+  ground.height = 0.1;
+  Shape box;
+  box.half = {0.2, 0.1, 0.05};
+  const auto calc = [&](const Shape& shape, const Vector3d& p) {
+    return calcGroundDistance(ground, shape, {Matrix3d::Identity(), p}).distance;
+  };
+  CHECK(calc(box, {3, 4, 1}) == Approx(0.85));
+  CHECK(calc(box, {3, 4, 0.1}) == Approx(-0.05));
+  CHECK(calc(makeCapsule(0, {0, 0, 0.3}, {0, 1, 0.7}, 0.1), Vector3d::Zero()) == Approx(0.1));
+  ground.steps = {{{1, 0, 0.5}, 0.6, 2}};                            // from x = 0.7 to 1.3, 0.4 over the plane
+  CHECK(calc(box, {0.4, 0, 0.3}) == Approx(0.1));                    // beside its side
+  CHECK(calc(box, {0.1, 0, 0.7}) == Approx(std::hypot(0.4, 0.15)));  // off its edge
+  CHECK(calc(box, {1, 0, 0.7}) == Approx(0.15));                     // over its top
+  CHECK(calc(box, {0.6, 0, 0.3}) == Approx(-0.1));                   // in its side
+  ground.steps[0].pitch = 0.2;
+  const Vector3d up(std::sin(0.2), 0, std::cos(0.2));
+  Shape ball;
+  ball.radius = 0.05;
+  CHECK(calc(ball, Vector3d(1, 0.3, 0.5) + 0.2 * up) == Approx(0.15));
+
+  const Model model = loadRobot("bipetto").model;
+  std::mt19937 rng(17);
+  const VectorXd q = model.integrate(model.makeNeutral(), randomVector(rng, model.nv(), 0.3));
+  ground.steps[0].top = {0.3, 0.1, 0.2};
+  ground.steps[0].yaw = 0.3;
+  Workspace ws(model);
+  constexpr double kShortStep = 5e-5;  // some edges are nearly level here: farther off, another corner is lowest
+  for (const Shape& shape : model.shapes()) {
+    const auto calcHere = [&] { return calcGroundDistance(ground, shape, ws.X_WB[shape.body]); };
+    updatePositions(model, ws, q);
+    MatrixXd gradient = MatrixXd::Zero(1, model.nv());
+    addDistanceGradient(model, ws, shape, Shape(), calcHere(), gradient);
+    checkDerivative(gradient,
+                    differentiateTangent(model, q, kShortStep,
+                                         [&](const VectorXd& x) {
+                                           updatePlacements(model, ws, x);
+                                           return VectorXd(VectorXd::Constant(1, calcHere().distance));
+                                         }),
+                    model.bodies()[shape.body].name);
   }
 }
 

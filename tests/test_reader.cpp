@@ -7,6 +7,7 @@
 #include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "get_error.h"
@@ -76,6 +77,48 @@ TEST_CASE("the toy robot has what its files say") {
   CHECK(model.visuals()[0].shape == Visual::Shape::Box);
   CHECK(model.visuals()[0].size == Vector3d(0.2, 0.02, 0.02));
   CHECK(model.visuals()[0].rgba == Eigen::Vector4d(1, 0, 0, 1));
+}
+
+TEST_CASE("shapes are those of <collision>, else fitted to visuals; meshes are named") {
+  const auto load = [](const std::string& in_link) {
+    const RobotDirectory directory;
+    return loadRobot(directory.writeRobot("<robot name='r'><link name='base'/><link name='arm'>" + in_link +
+                                              "</link><joint name='j' type='continuous'><parent link='base'/>"
+                                              "<child link='arm'/></joint></robot>",
+                                          "base: fixed"));
+  };
+  const auto collide = [](const std::string& geometry) {
+    return "<collision><origin xyz='1 2 3'/><geometry>" + geometry + "</geometry></collision>";
+  };
+  const std::string drawn = "<visual><geometry><cylinder radius='0.01' length='0.2'/></geometry></visual>";
+  const Model given =
+      load(drawn + collide("<box size='0.2 0.4 0.6'/>") + collide("<sphere radius='0.3'/>") +
+           collide("<cylinder radius='0.1' length='1'/>") + collide("<cylinder radius='0.1' length='0.2'/>"))
+          .model;
+  REQUIRE(given.shapes().size() == 4);
+  const auto check = [](const Shape& shape, const Vector3d& half, double radius, const Vector3d& p, bool fitted) {
+    CHECK(shape.body == 1);
+    CHECK((shape.half - half).norm() < 1e-15);
+    CHECK(shape.radius == radius);
+    CHECK(shape.X_BS.p == p);
+    CHECK(shape.fitted == fitted);
+  };
+  const Vector3d p(1, 2, 3), none = Vector3d::Zero();
+  check(given.shapes()[0], {0.1, 0.2, 0.3}, 0, p, false);
+  check(given.shapes()[1], none, 0.3, p, false);
+  check(given.shapes()[2], {0, 0, 0.5}, 0.1, p, false);    // a long cylinder: a capsule around it
+  check(given.shapes()[3], {0.1, 0.1, 0.1}, 0, p, false);  // a short one: a box around it
+
+  const Model fitted = load(drawn).model;
+  REQUIRE(fitted.shapes().size() == 1);
+  check(fitted.shapes()[0], {0, 0, 0.1}, 0.01, none, true);
+  CHECK(ModelBuilder::restore(takeParts(fitted)).shapes().size() == 1);
+
+  const LoadedRobot meshed = load(drawn + collide("<mesh filename='arm.stl'/>"));
+  REQUIRE(meshed.model.shapes().size() == 1);
+  CHECK(meshed.model.shapes()[0].fitted);
+  REQUIRE(meshed.warnings.size() == 1);
+  CHECK_THAT(meshed.warnings[0], Catch::Contains("link 'arm': its collision mesh 'arm.stl' is not read"));
 }
 
 TEST_CASE("bodies come depth first, children in the order of the file, not of the alphabet") {

@@ -66,55 +66,6 @@ std::vector<ModelVariation> listVariations(std::mt19937& rng, const Model& model
   return out;
 }
 
-// Central differences of fourth order of f(moved model), one column per direction.
-MatrixXd differentiateModel(const Model& model, const std::vector<ModelVariation>& directions, double h,
-                            const std::function<VectorXd(const Model&)>& f) {
-  MatrixXd out;
-  for (size_t i = 0; i < directions.size(); ++i) {
-    const VectorXd column = differentiate(VectorXd::Zero(1), h,
-                                          [&](const VectorXd& t) { return f(moveModel(model, directions[i], t[0])); });
-    if (i == 0) out.resize(column.size(), static_cast<Eigen::Index>(directions.size()));
-    out.col(static_cast<Eigen::Index>(i)) = column;
-  }
-  return out;
-}
-
-// As many dofs as the loops leave free, those that determine the others best.
-std::vector<int> chooseKept(const Model& model, const VectorXd& q) {
-  Workspace ws(model);
-  updatePositions(model, ws, q);
-  const ConstraintSet loops = makeConstraintSet(model);
-  MatrixXd J = MatrixXd::Zero(loops.rows, model.nv());
-  for (size_t c = 0; c < loops.closures.size(); ++c)
-    calcClosureJacobian(ws, loops.closures[c], J.middleRows(loops.offsets[c], getRows(loops.closures[c].kind)));
-  // Pivots first are the dofs that the loops determine best.
-  Eigen::ColPivHouseholderQR<MatrixXd> qr;
-  qr.setThreshold(1e-7);
-  qr.compute(J);
-  std::vector<int> kept;
-  for (Eigen::Index i = qr.rank(); i < J.cols(); ++i) kept.push_back(qr.colsPermutation().indices()[i]);
-  return kept;
-}
-
-// d with q (+) d closed and held dofs at zero, from a configuration nearby; with contacts, these stay where they are.
-VectorXd closeHeld(const Model& model, const VectorXd& q, const std::vector<int>& held,
-                   const std::vector<ContactTarget>& contacts = {}) {
-  Workspace ws(model);
-  const ConstraintSet loops = makeConstraintSet(model, contacts);
-  updatePositions(model, ws, q);
-  const Closing closing(model, ws, loops, held);
-  const VectorXd still = VectorXd::Zero(static_cast<Eigen::Index>(held.size()));
-  VectorXd d = VectorXd::Zero(model.nv()), residual(loops.rows);
-  for (int i = 0; i < 12; ++i) {
-    updatePositions(model, ws, model.integrate(q, d));
-    for (size_t c = 0; c < loops.closures.size(); ++c)
-      residual.segment(loops.offsets[c], getRows(loops.closures[c].kind)) = calcClosureResidual(ws, loops.closures[c]);
-    d += closing.solve(residual, still);
-  }
-  CHECK(residual.cwiseAbs().maxCoeff() < 1e-12);
-  return d;
-}
-
 }  // namespace
 
 TEST_CASE("variation: inverse dynamics and closures along a motion are those of their Jacobians") {

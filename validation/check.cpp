@@ -55,7 +55,7 @@ std::string Worst::describePlace(const CheckedMotion& motion) const {
 
 CheckRow Worst::makeRow(const std::string& name, const std::string& unit, double bound, const CheckedMotion& motion,
                         const std::string& nothing) const {
-  CheckRow row{name, kind_, {}, bound, unit, nothing};
+  CheckRow row{name, judged_, {}, bound, unit, nothing};
   if (empty()) return row;
   row.value = value_;
   row.note = describePlace(motion);
@@ -106,6 +106,7 @@ CheckReport checkMotion(const CheckedMotion& motion) {
   addEnergyRows(context);
   addStanceRows(context);
   addSwingRows(context);
+  addShapeRows(context);
   addForceRows(context);
   addLimitRows(context);
   addGoalRows(context);

@@ -91,6 +91,7 @@ struct CheckBounds {
   double clearance = 5e-3;        ///< m, of a swinging sole in the middle half of its path
   double below_ground = 1e-3;     ///< m, of a foot in the air, at any time
   double feet_distance = 0;       ///< m, between soles seen from above
+  double shapes = 0;              ///< m, between shapes of two legs, and of shapes over the ground
 
   double pressure = 0;         ///< m, of the centre of pressure beyond the sole
   double wrench_cone = 0;      ///< m, least margin of the whole wrench of a sole (wrench_cone.h)

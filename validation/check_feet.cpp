@@ -160,7 +160,7 @@ void addSwingRows(CheckContext& context) {
   for (int k = 0; k <= context.motion.numStages(); ++k)
     for (int i = 1; i < model.numBodies(); ++i) {
       if (model.bodies()[i].inertia.mass == 0) continue;
-      const Vector3d& p = context.trace.nodes[k].mass_centers[i];
+      const Vector3d p = context.trace.nodes[k].bodies[i].act(model.bodies()[i].inertia.com);
       bodies.add(p.z() - context.motion.summary.ground.calcHeight(p.x(), p.y()), k, model.bodies()[i].name);
     }
   if (model.hasFreeFlyer()) context.add(bodies, "bodies: least height", "m", 0, "no body has mass");

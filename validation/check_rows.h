@@ -11,7 +11,9 @@ namespace bielle::validation {
 // The worst of many values and its node: the largest for an upper bound, the least for a lower one.
 class Worst {
  public:
-  explicit Worst(CheckRow::Kind kind = CheckRow::Kind::AtMost) : kind_(kind) {}
+  explicit Worst(CheckRow::Kind kind = CheckRow::Kind::AtMost) : Worst(kind, kind) {}
+  // `judged`: the kind of the row, a note perhaps.
+  Worst(CheckRow::Kind kind, CheckRow::Kind judged) : kind_(kind), judged_(judged) {}
 
   // NaN is worse than any number: a computation that fails must not pass.
   void add(double value, int node, const std::string& what = "") {
@@ -31,7 +33,7 @@ class Worst {
                    const std::string& nothing = "") const;
 
  private:
-  CheckRow::Kind kind_;
+  CheckRow::Kind kind_, judged_;
   double value_ = 0;
   int node_ = -1;
   std::string what_;
@@ -55,6 +57,7 @@ void addDynamicsRows(CheckContext& context);
 void addEnergyRows(CheckContext& context);
 void addStanceRows(CheckContext& context);
 void addSwingRows(CheckContext& context);
+void addShapeRows(CheckContext& context);
 void addForceRows(CheckContext& context);
 void addLimitRows(CheckContext& context);
 void addGoalRows(CheckContext& context);

@@ -95,8 +95,7 @@ class Tracer {
       node.foot_twists.push_back(contact.X_BF.actInvMotion(simbody.calcTwist(contact.body)));
     }
     node.closures = traceClosures(simbody);
-    for (int i = 0; i < motion_.model.numBodies(); ++i)
-      node.mass_centers.push_back(simbody.getPlacement(i).act(motion_.model.bodies()[i].inertia.com));
+    for (int i = 0; i < motion_.model.numBodies(); ++i) node.bodies.push_back(simbody.getPlacement(i));
     node.com = simbody.calcCom();
     node.kinetic = simbody.calcKineticEnergy();
     node.potential = simbody.calcPotentialEnergy();

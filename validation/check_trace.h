@@ -16,14 +16,14 @@ struct NodeTrace {
   std::vector<SE3> feet;              ///< per contact of the model, placement of its frame in the world
   std::vector<Vector6d> foot_twists;  ///< of that frame, in its own coordinates
   ClosureTrace closures;
-  std::vector<Vector3d> mass_centers;  ///< per body, in the world, m
-  Vector3d com;                        ///< of the robot, m
-  double kinetic = 0, potential = 0;   ///< energies, of bodies and rotors, J
-  VectorXd passive;                    ///< nv, generalized forces of gravity, springs, dampers and friction
-  double passive_power = 0;            ///< their power, W
-  double dissipative_power = 0;        ///< that of dampers and friction, W
-  double inertial_power = 0;           ///< v . c, c the bias without passive forces: half of v . dM/dt v, W
-  double drift_power = 0;              ///< p of Eq. (11), W
+  std::vector<SE3> bodies;            ///< placements in the world
+  Vector3d com;                       ///< of the robot, m
+  double kinetic = 0, potential = 0;  ///< energies, of bodies and rotors, J
+  VectorXd passive;                   ///< nv, generalized forces of gravity, springs, dampers and friction
+  double passive_power = 0;           ///< their power, W
+  double dissipative_power = 0;       ///< that of dampers and friction, W
+  double inertial_power = 0;          ///< v . c, c the bias without passive forces: half of v . dM/dt v, W
+  double drift_power = 0;             ///< p of Eq. (11), W
 };
 
 /// A stage, from its node to the next.

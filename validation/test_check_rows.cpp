@@ -1,4 +1,5 @@
 // Every row can fail: motions altered so that one of them does, and NaN.
+#include "bielle/model/builder.h"
 #include "check_rows.h"
 #include "simbody_bridge.h"
 #include "test_motions.h"
@@ -42,6 +43,38 @@ std::vector<std::pair<std::string, RowMatrixXd*>> listTables(MotionRecord& recor
 }
 
 }  // namespace
+
+TEST_CASE("check: shapes of the files are judged, those fitted to visuals inform") {
+  const CheckedMotion good = getSquat().checked;
+  const Model& model = good.model;
+  const char* const legs = "shapes: distance of the legs";
+  const char* const ground = "shapes: distance from the ground";
+  const CheckReport fitted = checkMotion(good);
+  for (const char* row : {legs, ground}) {
+    CAPTURE(row);
+    REQUIRE(fitted.findRow(row));
+    CHECK(fitted.findRow(row)->kind == CheckRow::Kind::Note);
+    CHECK(fitted.findRow(row)->value);
+  }
+  const auto check = [&](double radius) {
+    CheckedMotion motion = good;
+    ModelParts parts = takeParts(model);
+    for (const char* joint : {"knee_left", "knee_right"}) {
+      Shape ball;
+      ball.body = model.findJoint(joint);
+      ball.radius = radius;
+      parts.shapes.push_back(ball);
+    }
+    motion.model = ModelBuilder::restore(parts);
+    return checkMotion(motion);
+  };
+  const CheckReport narrow = check(0.01);
+  CHECK(narrow.passed());
+  for (const char* row : {legs, ground}) CHECK(narrow.findRow(row)->kind == CheckRow::Kind::AtLeast);
+  CHECK(getFailures(check(0.14)) == Names{legs});
+  CHECK(*check(0.14).findRow(legs)->value == Approx(*narrow.findRow(legs)->value - 0.26));
+  CHECK(getFailures(check(0.5)) == Names{legs, ground});
+}
 
 TEST_CASE("check: a number that is none fails in every column, and one that overflows in what is made of it") {
   const CheckedMotion good = getSquat().checked;

@@ -1,6 +1,7 @@
 #include "bielle/dynamics/kinematics.h"
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/dynamics/distance.h"
 #include "bielle/dynamics/rnea.h"
 #include "bind.h"
 #include "model_access.h"
@@ -193,6 +194,53 @@ void addFrames(ModelType& type) {
       py::arg("q"), py::arg("frame"), "Jacobian of a frame's twist in its own coordinates (6, nv).");
 }
 
+const bielle::Shape& getShape(const Model& m, int index) {
+  if (index < 0 || index >= static_cast<int>(m.shapes().size()))
+    throw py::index_error("there is no shape " + std::to_string(index) + ", the robot has " +
+                          std::to_string(m.shapes().size()));
+  return m.shapes()[index];
+}
+
+void addDistances(ModelType& type) {
+  type.def_property_readonly(
+      "shape_pairs",
+      [](const Model& m) {
+        py::list pairs;
+        for (const ShapePair& pair : listShapePairs(m)) pairs.append(py::make_tuple(pair.a, pair.b, pair.of_two_legs));
+        return pairs;
+      },
+      "Pairs of shapes on bodies that are not neighbours: two indices into `shapes`, and whether they are of two "
+      "legs.");
+  type.def(
+      "shape_distance",
+      [](const Model& m, const py::object& q, int a, int b) {
+        const bielle::Shape &first = getShape(m, a), &second = getShape(m, b);
+        return mapStates({{"q", q, m.nq()}}, {{}}, [&] {
+          return [&, ws = std::make_shared<Workspace>(m)](State& s) {
+            updatePlacements<double>(m, *ws, s.in[0]);
+            s.out[0][0] = calcDistance(first, ws->X_WB[first.body], second, ws->X_WB[second.body]).distance;
+          };
+        })[0];
+      },
+      py::arg("q"), py::arg("a"), py::arg("b"),
+      "Distance () of two shapes by their indices, m; negative where they overlap.");
+  type.def(
+      "shape_distance_gradient",
+      [](const Model& m, const py::object& q, int a, int b) {
+        const bielle::Shape &first = getShape(m, a), &second = getShape(m, b);
+        return mapStates({{"q", q, m.nq()}}, {{m.nv()}}, [&] {
+          return [&, ws = std::make_shared<Workspace>(m)](State& s) {
+            updatePositions(m, *ws, s.in[0]);
+            MatrixXd gradient = MatrixXd::Zero(1, m.nv());
+            addDistanceGradient(m, *ws, first, second,
+                                calcDistance(first, ws->X_WB[first.body], second, ws->X_WB[second.body]), gradient);
+            s.out[0] = gradient.row(0);
+          };
+        })[0];
+      },
+      py::arg("q"), py::arg("a"), py::arg("b"), "Derivative of the distance by the tangent of q (nv,), m/rad or 1.");
+}
+
 }  // namespace
 
 void bindKinematics(py::module_& module) {
@@ -200,6 +248,7 @@ void bindKinematics(py::module_& module) {
   addWholeBody(type);
   addClosures(type);
   addFrames(type);
+  addDistances(type);
 }
 
 }  // namespace bielle::python

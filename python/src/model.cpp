@@ -83,6 +83,7 @@ void bindParts(py::module_& module) {
       .field("contacts", &ModelParts::contacts, "frames that may touch the ground")
       .field("references", &ModelParts::references, "postures by name")
       .field("visuals", &ModelParts::visuals, "what is drawn")
+      .field("shapes", &ModelParts::shapes, "the room that bodies take up")
       .field("serial_joints", &ModelParts::serial_joints, "indices of the joints of the equivalent serial chain")
       .field("lower_limits", &ModelParts::lower_limits, "(nv,)")
       .field("upper_limits", &ModelParts::upper_limits, "(nv,)")
@@ -117,6 +118,7 @@ void addAttributes(ModelType& type) {
   addAttribute(type, "contacts", &Model::contacts, "frames that may touch the ground");
   addAttribute(type, "references", &Model::references, "postures by name");
   addAttribute(type, "visuals", &Model::visuals, "what is drawn");
+  addAttribute(type, "shapes", &Model::shapes, "the room that bodies take up, as boxes with rounded edges");
   addAttribute(type, "serial_joints", &Model::serialJoints, "indices of the joints of the equivalent serial chain");
   addAttribute(type, "lower_limits", &Model::lowerLimits, "(nv,), -inf if there is none");
   addAttribute(type, "upper_limits", &Model::upperLimits, "(nv,)");
@@ -260,6 +262,7 @@ void bindBuilder(py::module_& module) {
            py::arg("half_length") = 0, py::arg("half_width") = 0,
            "A frame that may touch the ground; half_length, half_width of a sole along its x and y, m.")
       .def("add_reference", &ModelBuilder::addReference, py::arg("reference"), "A posture by name.")
+      .def("add_shape", &ModelBuilder::addShape, py::arg("link"), py::arg("shape"), "The room that a link takes up.")
       .def("add_visual", &ModelBuilder::addVisual, py::arg("link"), py::arg("visual"), "What is drawn of a link.")
       .def("add_serial_joint", &ModelBuilder::addSerialJoint, py::arg("joint"),
            "A joint of the equivalent serial chain, for reduction ratios and serial models.")

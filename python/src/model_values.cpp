@@ -60,6 +60,14 @@ void bindTree(py::module_& module) {
              "(3,) box: edges; cylinder: radius, length, 0; sphere: radius, 0, 0, m; mesh: scale")
       .field("mesh", &Visual::mesh, "file name as written in the URDF")
       .field("rgba", &Visual::rgba, "colour (4,), 0 to 1");
+  Value<bielle::Shape>(module, "Shape",
+                       "The room that a body takes up: all points within a radius of a box fixed in it.")
+      .field("body", &bielle::Shape::body, "index; filled by the builder")
+      .field("X_BS", &bielle::Shape::X_BS, "placement in the body (for the builder: in the link)")
+      .field("half", &bielle::Shape::half,
+             "half of the edges of the box (3,), m: zero of a sphere, (0, 0, l) of a capsule")
+      .field("radius", &bielle::Shape::radius, "m; zero of a box")
+      .field("fitted", &bielle::Shape::fitted, "to a visual, because the files of the robot give its body no shape");
   Value<JointLimits>(module, "JointLimits", "Limits of a joint, per dof, or empty for none.")
       .field("lower", &JointLimits::lower, "(nv,), rad or m")
       .field("upper", &JointLimits::upper, "(nv,), rad or m")

@@ -88,6 +88,19 @@ def test_derivatives_of_inverse_dynamics(model, state):
     assert exact.da == pytest.approx(model.mass_matrix(q))
 
 
+def test_distances_of_shapes(model, state):
+    q = state[0]
+    a, b, _ = next(pair for pair in model.shape_pairs if pair[2])
+    expected = differentiate(lambda x: model.shape_distance(x, a, b), model, q)
+    exact = model.shape_distance_gradient(q, a, b)
+    assert np.abs(exact - expected).max() < 1e-6
+    assert np.abs(exact).max() > 1e-2
+    assert model.shape_distance(np.stack([q, q]), b, a) == pytest.approx([model.shape_distance(q, a, b)] * 2)
+    assert all(shape.fitted and shape.radius >= 0 for shape in model.shapes)
+    with pytest.raises(IndexError):
+        model.shape_distance(q, a, len(model.shapes))
+
+
 def test_jacobians(model, state):
     q, v, _ = state
     expected = differentiate(model.com, model, q)

@@ -41,6 +41,10 @@ void printInfo(const Json& robot) {
   printSection(robot, "point_springs", "springs and dampers between points (N/m, m, N, N s/m)",
                {"name", "body1", "body2", "stiffness", "rest", "preload", "damping"});
   printSection(robot, "contacts", "contacts (length and width in m)", {"name", "kind", "body", "sole"});
+  const Json& shapes = robot["shapes"];
+  const std::string title = "least distances of shapes (m), " + shapes["given"].dump() + " of them from the files, " +
+                            shapes["fitted"].dump() + " fitted to visuals";
+  printSection(robot, "distances", title.c_str(), {"between", "distance", "body1", "body2", "posture"});
   printSection(robot, "references", "references", {"name", "closed", "message"});
 }
 

@@ -4,7 +4,7 @@
 
 namespace bielle {
 
-RobotDraft::RobotDraft(const Model& model) : model_(model), visuals_(model.visuals()) {
+RobotDraft::RobotDraft(const Model& model) : model_(model), visuals_(model.visuals()), shapes_(model.shapes()) {
   for (const Joint& joint : model.joints()) joints_.push_back(joint.X_PJ);
   for (const Frame& frame : model.frames()) frames_.push_back(frame.X_BF);
   for (const Body& body : model.bodies()) inertias_.push_back(body.inertia);
@@ -78,6 +78,13 @@ void RobotDraft::stretch(const std::string& link, const Vector3d& origin, const 
     for (int i = 0; i < 3; ++i)
       if (along[i] > 0.99) visual.size[i] *= factor;
   }
+  for (Shape& shape : shapes_) {
+    if (shape.body != body) continue;
+    shape.X_BS.p = origin + D * (shape.X_BS.p - origin);
+    const Vector3d along = (shape.X_BS.R.transpose() * direction).cwiseAbs();
+    for (int i = 0; i < 3; ++i)
+      if (along[i] > 0.99) shape.half[i] *= factor;
+  }
 }
 
 int RobotDraft::findFrameAt(int body, const SE3& X_BF) const {
@@ -141,6 +148,7 @@ Model RobotDraft::build() const {
     builder.addContact(c.name, place(c.name + "/frame", c.body, c.X_BF), c.kind, c.half_length, c.half_width);
   for (const Reference& reference : m.references()) builder.addReference(reference);
   for (const Visual& visual : visuals_) builder.addVisual(getLink(visual.body), visual);
+  for (const Shape& shape : shapes_) builder.addShape(getLink(shape.body), shape);
   for (int joint : m.serialJoints()) builder.addSerialJoint(m.joints()[joint].name);
   return builder.build();
 }

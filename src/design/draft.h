@@ -48,6 +48,7 @@ class RobotDraft {
   std::vector<SE3> joints_, frames_;
   std::vector<Inertia> inertias_;
   std::vector<Visual> visuals_;
+  std::vector<Shape> shapes_;
 };
 
 }  // namespace bielle

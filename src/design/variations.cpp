@@ -12,7 +12,7 @@ bool isSameButForPlaces(const Model& a, const Model& b) {
   const auto same = [](const Vector3d& x, const Vector3d& y) { return (x - y).norm() < 1e-12; };
   bool out = a.numBodies() == b.numBodies() && a.closures().size() == b.closures().size() &&
              a.contacts().size() == b.contacts().size() && a.pointSprings().size() == b.pointSprings().size() &&
-             same(a.gravity(), b.gravity());
+             a.shapes().size() == b.shapes().size() && same(a.gravity(), b.gravity());
   for (int i = 1; out && i < a.numBodies(); ++i) {
     const Joint &j = a.joints()[i], &k = b.joints()[i];
     out = j.kind == k.kind && same(j.axis, k.axis) && same(j.axis2, k.axis2);
@@ -52,6 +52,12 @@ void addChange(const Model& from, const Model& to, double weight, ModelVariation
   }
   for (size_t c = 0; c < from.contacts().size(); ++c)
     addTwist(from.contacts()[c].X_BF, to.contacts()[c].X_BF, out.contacts[c]);
+  for (size_t s = 0; s < from.shapes().size(); ++s) {
+    const Shape &a = from.shapes()[s], &b = to.shapes()[s];
+    addTwist(a.X_BS, b.X_BS, out.shapes[s].frame);
+    out.shapes[s].half += weight * (b.half - a.half);
+    out.shapes[s].radius += weight * (b.radius - a.radius);
+  }
   out.armature += weight * (to.armature() - from.armature());
 }
 

@@ -168,6 +168,7 @@ ModelVariation::ModelVariation(const Model& model)
       points2(points1),
       springs(model.pointSprings().size(), Eigen::Vector4d::Zero()),
       contacts(model.contacts().size(), Vector6d::Zero()),
+      shapes(model.shapes().size()),
       inertias(model.numBodies(), Matrix6d::Zero()),
       armature(VectorXd::Zero(model.nv())) {
   for (const Closure& closure : model.closures())

@@ -32,6 +32,7 @@ void turnBody(int i, const SE3& X_BN, ModelParts& parts) {
   for (Frame& frame : parts.frames)
     if (frame.name != parts.bodies[i].name) turn(frame.body, frame.X_BF);
   for (Visual& visual : parts.visuals) turn(visual.body, visual.X_BV);
+  for (Shape& shape : parts.shapes) turn(shape.body, shape.X_BS);
   for (ContactFrame& contact : parts.contacts) turn(contact.body, contact.X_BF);
   for (Closure& closure : parts.closures) turn(closure.body1, closure.X_B1), turn(closure.body2, closure.X_B2);
   for (PointSpring& spring : parts.point_springs) {

@@ -80,19 +80,22 @@ class Writer {
   }
 
   void writeSettings() {
-    out_ << "  <compiler angle=\"radian\" inertiafromgeom=\"false\"/>\n  <option"
-         << attribute("timestep", formatNumber(options_.time_step))
-         << attribute("gravity", formatVector(model_.gravity()))
-         << " cone=\"elliptic\" solver=\"Newton\" jacobian=\"sparse\" tolerance=\"1e-10\"/>\n  <default>\n    <joint"
-         << formatStiffness("limit", options_.contact_time) << "/>\n    <equality"
-         << formatStiffness("", options_.closure_time)
-         << "/>\n    <default class=\"drawn\">\n      <geom contype=\"0\" conaffinity=\"0\" group=\"1\"/>\n"
-         << "    </default>\n    <default class=\"ground\">\n"
-         << "      <geom contype=\"0\" conaffinity=\"1\" rgba=\"0.8 0.8 0.8 1\"/>\n    </default>\n"
-         << "    <default class=\"sole\">\n      <geom type=\"sphere\" contype=\"1\" conaffinity=\"0\" condim=\"3\" "
-         << "priority=\"1\"" << attribute("size", formatNumber(options_.sole_radius))
-         << attribute("friction", formatNumber(options_.friction) + " 0 0")
-         << formatStiffness("", options_.contact_time) << "/>\n    </default>\n  </default>\n";
+    out_
+        << "  <compiler angle=\"radian\" inertiafromgeom=\"false\"/>\n  <option"
+        << attribute("timestep", formatNumber(options_.time_step))
+        << attribute("gravity", formatVector(model_.gravity()))
+        << " cone=\"elliptic\" solver=\"Newton\" jacobian=\"sparse\" tolerance=\"1e-10\"/>\n  <default>\n    <joint"
+        << formatStiffness("limit", options_.contact_time) << "/>\n    <equality"
+        << formatStiffness("", options_.closure_time)
+        << "/>\n    <default class=\"drawn\">\n      <geom contype=\"0\" conaffinity=\"0\" group=\"1\"/>\n"
+        << "    </default>\n    <default class=\"shape\">\n"  // for distances: no other geom has the bit that it asks for
+        << "      <geom contype=\"2\" conaffinity=\"0\" group=\"3\"/>\n"
+        << "    </default>\n    <default class=\"ground\">\n"
+        << "      <geom contype=\"0\" conaffinity=\"1\" rgba=\"0.8 0.8 0.8 1\"/>\n    </default>\n"
+        << "    <default class=\"sole\">\n      <geom type=\"sphere\" contype=\"1\" conaffinity=\"0\" condim=\"3\" "
+        << "priority=\"1\"" << attribute("size", formatNumber(options_.sole_radius))
+        << attribute("friction", formatNumber(options_.friction) + " 0 0") << formatStiffness("", options_.contact_time)
+        << "/>\n    </default>\n  </default>\n";
   }
 
   void writeBody(int i, const std::string& indent) {
@@ -223,11 +226,25 @@ class Writer {
            << attribute("size", is_box ? formatVector(size / 2) : formatVector(Vector3d(size[0], size[1] / 2, 0)))
            << formatPlacement(visual.X_BV) << attribute("rgba", formatVector(visual.rgba)) << "/>\n";
     }
+    for (const Shape& shape : model_.shapes())
+      if (shape.body == body && !shape.fitted) writeShape(shape, indent);
     for (const ContactFrame& contact : model_.contacts())
       if (contact.body == body) writeSole(contact, indent);
     for (const Frame& frame : model_.frames())
       if (frame.body == body && frame.name != model_.bodies()[body].name) writeFrame(frame, indent);
     writeSpringSites(body, indent);
+  }
+
+  // A box with rounded edges is written as the box around it.
+  void writeShape(const Shape& shape, const std::string& indent) {
+    const bool is_sphere = shape.half.isZero(), is_capsule = !is_sphere && shape.half.head<2>().isZero();
+    const Vector3d size = is_sphere || is_capsule ? Vector3d(shape.radius, shape.half.z(), 0)
+                                                  : Vector3d(shape.half + Vector3d::Constant(shape.radius));
+    out_ << indent << "<geom class=\"shape\""
+         << attribute("type", is_sphere    ? "sphere"
+                              : is_capsule ? "capsule"
+                                           : "box")
+         << attribute("size", formatVector(size)) << formatPlacement(shape.X_BS) << "/>\n";
   }
 
   // Contacts are sites of their names, too.

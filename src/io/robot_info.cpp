@@ -1,11 +1,14 @@
 #include "bielle/io/robot_info.h"
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
+#include "bielle/ocp/ground_distance.h"
 #include "dynamics/point_spring.h"
 #include "io/json_text.h"
 #include "model/frame_name.h"
@@ -116,6 +119,47 @@ Json describeMobility(const Model& model, const std::vector<Posture>& postures) 
           {"mobility", mobility.mobility}};
 }
 
+// Least distances of shapes between two legs, within legs and trunk, and to the ground under the feet, which are left out.
+Json describeDistances(const Model& model, const Posture& posture) {
+  Workspace ws(model);
+  updatePlacements(model, ws, posture.q);
+  Json distances = Json::array();
+  const auto add = [&](const char* between, double distance, const std::string& body1, const std::string& body2) {
+    distances.push_back(
+        {{"between", between}, {"distance", distance}, {"body1", body1}, {"body2", body2}, {"posture", posture.name}});
+  };
+  const auto getBody = [&](int shape) { return model.bodies()[model.shapes()[shape].body].name; };
+  std::vector<ShapePair> legs, others;
+  for (const ShapePair& pair : listShapePairs(model)) (pair.of_two_legs ? legs : others).push_back(pair);
+  for (const auto& [between, pairs] : {std::pair{"legs", legs}, {"other bodies", others}})
+    if (const NearestPair nearest = findNearestPair(model, ws.X_WB, pairs); nearest.pair >= 0)
+      add(between, nearest.distance.distance, getBody(pairs[nearest.pair].b), getBody(pairs[nearest.pair].a));
+  std::set<int> feet = {0};
+  Ground ground;
+  ground.height = std::numeric_limits<double>::infinity();
+  for (const ContactFrame& contact : model.contacts()) {
+    feet.insert(contact.body);
+    ground.height = std::min(ground.height, getPlacement(ws, contact.body, contact.X_BF).p.z());
+  }
+  int lowest = -1;
+  double least = 0;
+  for (int s = 0; s < static_cast<int>(model.shapes().size()) && feet.size() > 1; ++s) {
+    const Shape& shape = model.shapes()[s];
+    if (feet.count(shape.body)) continue;
+    const double distance = calcGroundDistance(ground, shape, ws.X_WB[shape.body]).distance;
+    if (lowest < 0 || distance < least) least = distance, lowest = s;
+  }
+  if (lowest >= 0) add("ground", least, getBody(lowest), "ground");
+  return distances;
+}
+
+// Of the first reference that closes, else of the neutral configuration.
+const Posture& chooseStanding(const std::vector<Posture>& postures) {
+  for (size_t i = 1; i < postures.size(); ++i)
+    if (postures[i].closed) return postures[i];
+  return postures.front();
+}
+
 Json describeDrive(const Motor& motor) {
   const MotorDrive& drive = motor.drive;
   return {{"name", motor.name},
@@ -138,6 +182,7 @@ Json describeDrive(const Motor& motor) {
 std::string makeRobotInfo(const LoadedRobot& robot) {
   const Model& model = robot.model;
   const std::vector<Posture> postures = makePostures(model);
+  const size_t given = std::count_if(model.shapes().begin(), model.shapes().end(), [](auto& s) { return !s.fitted; });
   Json json = {{"name", model.name()},
                {"directory", robot.directory},
                {"base", model.hasFreeFlyer() ? "free" : "fixed"},
@@ -154,6 +199,8 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
                {"drives", Json::array()},
                {"joint_forces", describeJointForces(model)},
                {"point_springs", describePointSprings(model, postures)},
+               {"shapes", {{"given", given}, {"fitted", model.shapes().size() - given}}},
+               {"distances", describeDistances(model, chooseStanding(postures))},
                {"contacts", Json::array()},
                {"references", Json::array()},
                {"warnings", robot.warnings}};

@@ -81,6 +81,7 @@ class Writer {
     bool ground = false;  // any other element on the ground requires a separate link
     for (const Frame& frame : model.frames()) ground |= frame.body == 0 && frame.name != "world";
     for (const Visual& visual : model.visuals()) ground |= visual.body == 0;
+    for (const Shape& shape : model.shapes()) ground |= shape.body == 0 && !shape.fitted;
     for (int i = 2; i < model.numBodies(); ++i) ground |= model.joints()[i].parent == 0;
     free_root_ = !ground && model.hasFreeFlyer() && first.name == "root_joint" && first.X_PJ.p.isZero(0) &&
                  first.X_PJ.R.isIdentity(0);
@@ -175,6 +176,8 @@ class Writer {
     }
     for (const Visual& visual : model_.visuals())
       if (visual.body == i) writeVisual(visual, out);
+    for (const Shape& shape : model_.shapes())
+      if (shape.body == i && !shape.fitted) writeShape(shape, out);
     out << "  </link>\n";
   }
 
@@ -196,6 +199,24 @@ class Writer {
         break;
     }
     out << "</geometry>\n      <material name=\"" << getMaterial(visual.rgba) << "\"/>\n    </visual>\n";
+  }
+
+  // URDF has no capsules: a cylinder that is long enough is read as one (fitShape). What else is rounded is written as the box
+  // around it.
+  void writeShape(const Shape& shape, std::ostream& out) {
+    out << "    <collision>\n      " << formatOrigin(shape.X_BS) << "\n      <geometry>";
+    const Vector3d& half = shape.half;
+    Visual cylinder;
+    cylinder.shape = Visual::Shape::Cylinder;
+    cylinder.size = {shape.radius, 2 * half.z(), 0};
+    if (half.isZero())
+      out << "<sphere radius=\"" << formatRounded(shape.radius) << "\"/>";
+    else if (half.head<2>().isZero() && shape.radius > 0 && fitShape(cylinder)->radius > 0)
+      out << "<cylinder radius=\"" << formatRounded(shape.radius) << "\" length=\"" << formatRounded(2 * half.z())
+          << "\"/>";
+    else
+      out << "<box size=\"" << formatVector(2 * (half + Vector3d::Constant(shape.radius))) << "\"/>";
+    out << "</geometry>\n    </collision>\n";
   }
 
   void writeJoint(int i, std::ostream& out) {

@@ -84,7 +84,25 @@ class Writer {
     int count = 0;
     for (const Visual& visual : model_.visuals())
       if (visual.body == i) writeVisual(visual, ++count);
+    count = 0;
+    for (const Shape& shape : model_.shapes())
+      if (shape.body == i && !shape.fitted) writeShape(shape, ++count);
     out_ << "    </link>\n";
+  }
+
+  // A box with rounded edges is written as the box around it.
+  void writeShape(const Shape& shape, int count) {
+    out_ << "      <collision name=\"collision_" << count << "\">\n";
+    writePose(shape.X_BS, 0, "        ");
+    out_ << "        <geometry>";
+    const std::string radius = "<radius>" + formatExact(shape.radius) + "</radius>";
+    if (shape.half.isZero())
+      out_ << "<sphere>" << radius << "</sphere>";
+    else if (shape.half.head<2>().isZero() && shape.radius > 0)
+      out_ << "<capsule>" << radius << "<length>" << formatExact(2 * shape.half.z()) << "</length></capsule>";
+    else
+      out_ << "<box><size>" << formatVector(2 * (shape.half + Vector3d::Constant(shape.radius))) << "</size></box>";
+    out_ << "</geometry>\n      </collision>\n";
   }
 
   void writeVisual(const Visual& visual, int count) {

@@ -246,6 +246,17 @@ void ModelBuilder::addVisual(const std::string& link, Visual visual) {
   model_.visuals_.push_back(std::move(visual));
 }
 
+void ModelBuilder::addShape(const std::string& link, Shape shape) {
+  if (shape.fitted) return;
+  const std::string element = "shape of link '" + link + "'";
+  const FramePlace place = getFrame(link, element);
+  if (!shape.half.allFinite() || !(shape.half.minCoeff() >= 0) || !std::isfinite(shape.radius) || !(shape.radius >= 0))
+    fail(element, "a size is negative or not finite", "give lengths of 0 or more, m");
+  shape.body = place.body;
+  shape.X_BS = place.X_BF * shape.X_BS;
+  model_.shapes_.push_back(shape);
+}
+
 void ModelBuilder::addSerialJoint(const std::string& joint) {
   const int index = model_.findJoint(joint);
   if (index < 0)
@@ -278,8 +289,16 @@ Model ModelBuilder::build(std::vector<std::string>* warnings) const {
   finishDofs(model);
   finishClosures(model);
   finishPointSprings(model);
+  finishShapes(model);
   for (int i = 1; i < model.numBodies(); ++i) model.mass_ += model.bodies_[i].inertia.mass;
   return model;
+}
+
+void ModelBuilder::finishShapes(Model& model) const {
+  std::vector<bool> has_shape(model.bodies_.size(), false);
+  for (const Shape& shape : model.shapes_) has_shape[shape.body] = true;
+  for (const Visual& visual : model.visuals_)
+    if (const auto shape = has_shape[visual.body] ? std::nullopt : fitShape(visual)) model.shapes_.push_back(*shape);
 }
 
 void ModelBuilder::checkInertias(std::vector<std::string>* warnings) const {

@@ -33,6 +33,44 @@ int findByName(const Items& items, const std::string& name) {
 
 }  // namespace
 
+Shape makeCapsule(int body, const Vector3d& from, const Vector3d& to, double radius) {
+  const double length = (to - from).norm();
+  Shape shape;
+  shape.body = body;
+  shape.X_BS.p = (from + to) / 2;
+  if (length > 0)
+    shape.X_BS.R = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), (to - from) / length).toRotationMatrix();
+  shape.half.z() = length / 2;
+  shape.radius = radius;
+  return shape;
+}
+
+std::optional<Shape> fitShape(const Visual& visual) {
+  Shape shape;
+  shape.body = visual.body;
+  shape.X_BS = visual.X_BV;
+  shape.fitted = true;
+  const double radius = visual.size[0], length = visual.size[1];  // of cylinders and spheres
+  switch (visual.shape) {
+    case Visual::Shape::Box:
+      shape.half = visual.size / 2;
+      return shape;
+    case Visual::Shape::Sphere:
+      shape.radius = radius;
+      return shape;
+    case Visual::Shape::Cylinder: {
+      const double box = 4 * length,
+                   capsule = EIGEN_PI * (length + 4. / 3 * radius);  // volumes over the radius squared
+      shape.half = box < capsule ? Vector3d(radius, radius, length / 2) : Vector3d(0, 0, length / 2);
+      if (capsule <= box) shape.radius = radius;
+      return shape;
+    }
+    case Visual::Shape::Mesh:
+      return {};
+  }
+  return {};
+}
+
 const char* getName(ClosureKind kind) {
   switch (kind) {
     case ClosureKind::Weld6D:

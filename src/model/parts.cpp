@@ -45,6 +45,7 @@ void checkParts(const ModelParts& parts) {
             parts, "motors");
   for (const ContactFrame& contact : parts.contacts) require(isBody(contact.body), parts, "contacts");
   for (const Visual& visual : parts.visuals) require(isBody(visual.body), parts, "visuals");
+  for (const Shape& shape : parts.shapes) require(isBody(shape.body), parts, "shapes");
   for (int joint : parts.serial_joints) require(joint > 0 && joint < bodies, parts, "serial joints");
   for (const VectorXd* numbers : {&parts.lower_limits, &parts.upper_limits, &parts.velocity_limits, &parts.armature})
     require(numbers->size() == nv && nv > 0, parts, "limits");
@@ -55,7 +56,7 @@ void checkParts(const ModelParts& parts) {
 ModelParts takeParts(const Model& m) {
   return {m.name(),        m.gravity(),        m.bodies(),     m.joints(),      m.frames(),       m.closures(),
           m.motors(),      m.contacts(),       m.references(), m.visuals(),     m.serialJoints(), m.lowerLimits(),
-          m.upperLimits(), m.velocityLimits(), m.armature(),   m.jointForces(), m.pointSprings()};
+          m.upperLimits(), m.velocityLimits(), m.armature(),   m.jointForces(), m.pointSprings(), m.shapes()};
 }
 
 Model ModelBuilder::restore(ModelParts parts) {
@@ -78,6 +79,8 @@ Model ModelBuilder::restore(ModelParts parts) {
   draft.contacts_ = std::move(parts.contacts);
   draft.references_ = std::move(parts.references);
   draft.visuals_ = std::move(parts.visuals);
+  for (const Shape& shape : parts.shapes)
+    if (!shape.fitted) draft.shapes_.push_back(shape);  // the others are fitted again
   draft.serial_joints_ = std::move(parts.serial_joints);
   Model model = builder.build();
   model.lower_ = std::move(parts.lower_limits);

@@ -61,7 +61,7 @@ void splitUniversalJoints(double cross_inertia, UrdfFile& urdf) {
     second.joint.name += getSuffix(j.joint.axis2);
     second.joint.axis = j.joint.axis2;
     second.joint.X_PJ = SE3();
-    urdf.links[first.child] = {first.child, {kMass, Vector3d::Zero(), cross_inertia * Matrix3d::Identity()}, {}};
+    urdf.links[first.child] = {first.child, {kMass, Vector3d::Zero(), cross_inertia * Matrix3d::Identity()}, {}, {}};
     joints.push_back(second);
   }
   urdf.joints = std::move(joints);
@@ -179,6 +179,8 @@ void addJoints(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder
   }
   for (const auto& [name, link] : urdf.links)
     for (const Visual& visual : link.visuals) builder.addVisual(name, visual);
+  for (const auto& [name, link] : urdf.links)
+    for (const Shape& shape : link.shapes) builder.addShape(name, shape);
 }
 
 void addMotors(const UrdfFile& urdf, const YamlFile& yaml, ModelBuilder& builder) {

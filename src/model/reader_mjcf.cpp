@@ -23,7 +23,7 @@ MjcfReader::MjcfReader(const std::string& path, const TiXmlElement& root) : root
   settings_.path = path;
   tree_.path = yaml_.path = path;
   tree_.root = "world";
-  tree_.links["world"] = {"world", {}, {}};
+  tree_.links["world"].name = "world";
   tree_.has_own_base = true;
   places_["world"] = {"world", {}, {}};
   taken_ = {"world"};

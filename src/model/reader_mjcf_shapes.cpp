@@ -10,6 +10,19 @@ namespace {
 
 constexpr const char* kGeomAttributes[] = {"mass", "density", "mesh", "contype", "conaffinity", "rgba", "material"};
 
+// The room that a geom takes up, if it is no mesh.
+bool addShape(bool is_capsule, const Vector3d& size, const Visual& visual, UrdfLink& link) {
+  std::optional<Shape> shape = fitShape(visual);
+  if (!shape) return false;
+  if (is_capsule) {
+    shape->half = {0, 0, size[1]};
+    shape->radius = size[0];
+  }
+  shape->fitted = false;
+  link.shapes.push_back(*shape);
+  return true;
+}
+
 // Sizes of soles are differences of places: their rounding is removed.
 double round(double length) { return std::round(std::abs(length) * 1e12) / 1e12; }
 
@@ -177,6 +190,7 @@ void MjcfReader::readVisual(const Child& child, const BodyPlace& place) {
   MjcfElement e(*child.element, child.childclass, settings_);
   const Shape shape = readShape(e, child.X_BF);
   for (const char* read : kGeomAttributes) e.find(read);
+  const bool is_drawn = e.getNumber("group", 0) < 3;  // of groups 0 to 5, those that MuJoCo's viewer shows at first
   const bool touches = e.getNumber("contype", 1) != 0 || e.getNumber("conaffinity", 1) != 0;
   Visual visual;
   visual.X_BV = place.X_LB * shape.X_BG;
@@ -199,8 +213,10 @@ void MjcfReader::readVisual(const Child& child, const BodyPlace& place) {
   } else {
     return e.leaveOut("a geom of type '" + shape.type + "' is left out");
   }
+  if (touches && addShape(shape.type == "capsule", size, visual, tree_.links[place.link]))
+    e.note("distances count its shape; it touches nothing here (feet: the key contacts of a YAML file)");
+  if (!is_drawn) return;
   if (shape.type == "capsule") e.note("a capsule is drawn as a cylinder");
-  if (touches) e.note("it is drawn; it touches nothing here (feet: the key contacts of a YAML file)");
   tree_.links[place.link].visuals.push_back(visual);
 }
 

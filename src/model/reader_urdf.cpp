@@ -207,34 +207,42 @@ SE3 toSE3(const urdf::Pose& pose) {
   return {Eigen::Quaterniond(r.w, r.x, r.y, r.z).normalized().toRotationMatrix(), toEigen(pose.position)};
 }
 
-Visual makeVisual(const urdf::Visual& visual, const std::string& link, const std::string& path) {
+// What a visual and a collision have in common.
+template <typename Element>
+Visual makeShape(const Element& element, const char* kind, const std::string& link, const std::string& path) {
   Visual out;
-  out.X_BV = toSE3(visual.origin);
-  if (!visual.geometry)
-    throw ModelError(path, "link '" + link + "'", "a visual has no geometry", "give one or remove it");
-  switch (visual.geometry->type) {
+  out.X_BV = toSE3(element.origin);
+  if (!element.geometry)
+    throw ModelError(path, "link '" + link + "'", std::string("a ") + kind + " has no geometry",
+                     "give one or remove it");
+  switch (element.geometry->type) {
     case urdf::Geometry::BOX:
       out.shape = Visual::Shape::Box;
-      out.size = toEigen(static_cast<const urdf::Box&>(*visual.geometry).dim);
+      out.size = toEigen(static_cast<const urdf::Box&>(*element.geometry).dim);
       break;
     case urdf::Geometry::CYLINDER: {
-      const auto& cylinder = static_cast<const urdf::Cylinder&>(*visual.geometry);
+      const auto& cylinder = static_cast<const urdf::Cylinder&>(*element.geometry);
       out.shape = Visual::Shape::Cylinder;
       out.size = {cylinder.radius, cylinder.length, 0};
       break;
     }
     case urdf::Geometry::SPHERE:
       out.shape = Visual::Shape::Sphere;
-      out.size = {static_cast<const urdf::Sphere&>(*visual.geometry).radius, 0, 0};
+      out.size = {static_cast<const urdf::Sphere&>(*element.geometry).radius, 0, 0};
       break;
     case urdf::Geometry::MESH: {
-      const auto& mesh = static_cast<const urdf::Mesh&>(*visual.geometry);
+      const auto& mesh = static_cast<const urdf::Mesh&>(*element.geometry);
       out.shape = Visual::Shape::Mesh;
       out.size = toEigen(mesh.scale);
       out.mesh = mesh.filename;
       break;
     }
   }
+  return out;
+}
+
+Visual makeVisual(const urdf::Visual& visual, const std::string& link, const std::string& path) {
+  Visual out = makeShape(visual, "visual", link, path);
   if (visual.material) {
     const urdf::Color& color = visual.material->color;
     out.rgba = {color.r, color.g, color.b, color.a};
@@ -242,7 +250,7 @@ Visual makeVisual(const urdf::Visual& visual, const std::string& link, const std
   return out;
 }
 
-UrdfLink makeLink(const urdf::Link& link, const std::string& path) {
+UrdfLink makeLink(const urdf::Link& link, const std::string& path, std::vector<std::string>& warnings) {
   UrdfLink out;
   out.name = link.name;
   if (link.inertial) {
@@ -252,6 +260,16 @@ UrdfLink makeLink(const urdf::Link& link, const std::string& path) {
     out.inertia = Inertia{in.mass, Vector3d::Zero(), I}.transformed(toSE3(in.origin));
   }
   for (const auto& visual : link.visual_array) out.visuals.push_back(makeVisual(*visual, link.name, path));
+  for (const auto& collision : link.collision_array) {
+    const Visual geometry = makeShape(*collision, "collision", link.name, path);
+    if (std::optional<Shape> shape = fitShape(geometry)) {
+      shape->fitted = false;
+      out.shapes.push_back(*shape);
+    } else {
+      warnings.push_back(path + ": link '" + link.name + "': its collision mesh '" + geometry.mesh +
+                         "' is not read; give it boxes, cylinders or spheres");
+    }
+  }
   return out;
 }
 
@@ -321,7 +339,7 @@ UrdfFile readUrdf(const std::string& path, YamlFile& settings) {
   file.name = tree.robot;
   file.root = tree.root;
   file.warnings = std::move(tree.warnings);
-  for (const auto& [name, link] : model->links_) file.links[name] = makeLink(*link, path);
+  for (const auto& [name, link] : model->links_) file.links[name] = makeLink(*link, path, file.warnings);
   for (const auto& [name, kind] : tree.joints) file.joints.push_back(makeJoint(*model->joints_.at(name), kind, path));
   if (for_drake) readDrakeElements(robot, file, settings);
   return file;

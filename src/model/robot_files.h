@@ -15,6 +15,7 @@ struct UrdfLink {
   std::string name;
   Inertia inertia;  ///< in the link frame; zero without an <inertial> element
   std::vector<Visual> visuals;
+  std::vector<Shape> shapes;
 };
 
 struct UrdfJoint {

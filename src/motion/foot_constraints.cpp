@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "bielle/dynamics/distance.h"
+
 namespace bielle {
 namespace {
 
@@ -17,11 +19,11 @@ PathConstraint makeEquation(const std::string& name, std::unique_ptr<Residual> r
   return {name, std::move(residual), -bound, bound, scale};
 }
 
-Capsule makeSoleCapsule(const ContactFrame& contact) {
+Shape makeSoleCapsule(const ContactFrame& contact) {
   const bool along_x = contact.half_length >= contact.half_width;
   const Vector3d half = along_x ? Vector3d(contact.half_length, 0, 0) : Vector3d(0, contact.half_width, 0);
-  return {contact.body, contact.X_BF.act(-half), contact.X_BF.act(half),
-          std::min(contact.half_length, contact.half_width)};
+  return makeCapsule(contact.body, contact.X_BF.act(-half), contact.X_BF.act(half),
+                     std::min(contact.half_length, contact.half_width));
 }
 
 }  // namespace
@@ -94,10 +96,10 @@ void addDistance(const ContactFrame& swinging, const SE3& X_path, const ContactF
   constexpr double kTracking = 0.01;  // m
   for (const ContactFrame* contact : {&swinging, &standing})
     if (contact->half_length == 0 || contact->half_width == 0) return;
-  const Capsule a = makeSoleCapsule(swinging), b = makeSoleCapsule(standing);
+  const Shape a = makeSoleCapsule(swinging), b = makeSoleCapsule(standing);
   const double of_path =
-      calcCapsuleDistance(a, X_path * swinging.X_BF.inverse(), b, X_standing * standing.X_BF.inverse());
-  stage.path_constraints.push_back({"distance of " + swinging.name + " and " + standing.name, makeCapsuleDistance(a, b),
+      calcDistance(a, X_path * swinging.X_BF.inverse(), b, X_standing * standing.X_BF.inverse()).distance;
+  stage.path_constraints.push_back({"distance of " + swinging.name + " and " + standing.name, makeShapeDistance(a, b),
                                     VectorXd::Constant(1, std::min(least, of_path - kTracking)),
                                     VectorXd::Constant(1, kFree), VectorXd::Constant(1, kPosition)});
 }

@@ -1,7 +1,8 @@
-// Residuals that keep bodies apart: soles over the ground, capsules from each other.
+// Residuals that keep bodies apart: soles over the ground, shapes from each other.
 #include <algorithm>
 #include <cmath>
 
+#include "bielle/dynamics/distance.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/ocp/residual.h"
 
@@ -81,55 +82,22 @@ class SoleClearance : public Residual {
   std::vector<Vector3d> corners_;
 };
 
-// Closest points p1 + s d1 and p2 + t d2 of two segments, s and t in [0, 1] (Ericson, "Real-Time Collision Detection",
-// 5.1.9).
-std::pair<double, double> calcClosest(const Vector3d& p1, const Vector3d& d1, const Vector3d& p2, const Vector3d& d2) {
-  const auto clamp = [](double x) { return std::clamp(x, 0.0, 1.0); };
-  const Vector3d r = p1 - p2;
-  const double a = d1.squaredNorm(), e = d2.squaredNorm(), b = d1.dot(d2), c = d1.dot(r), f = d2.dot(r);
-  if (a == 0) return {0, e == 0 ? 0 : clamp(f / e)};
-  if (e == 0) return {clamp(-c / a), 0};
-  const double denominator = a * e - b * b;
-  const double s = denominator > 1e-12 * a * e ? clamp((b * f - c * e) / denominator) : 0.5;
-  const double t = (b * s + f) / e;
-  if (t < 0) return {clamp(-c / a), 0};
-  if (t > 1) return {clamp((b - c) / a), 1};
-  return {s, t};
-}
-
-// Of the middle lines of two capsules.
-std::pair<Vector3d, Vector3d> calcClosestPoints(const Capsule& a, const SE3& X_WA, const Capsule& b, const SE3& X_WB) {
-  const Vector3d a0 = X_WA.act(a.from), da = X_WA.act(a.to) - a0, b0 = X_WB.act(b.from), db = X_WB.act(b.to) - b0;
-  const auto [s, t] = calcClosest(a0, da, b0, db);
-  return {a0 + s * da, b0 + t * db};
-}
-
-class CapsuleDistance : public Residual {
+class ShapeDistanceResidual : public Residual {
  public:
-  CapsuleDistance(const Capsule& a, const Capsule& b) : a_(a), b_(b) {}
+  ShapeDistanceResidual(const Shape& a, const Shape& b) : a_(a), b_(b) {}
   int size() const override { return 1; }
   void calc(const NodeView& node, VectorRef r) const override {
-    r[0] = calcCapsuleDistance(a_, node.ws.X_WB[a_.body], b_, node.ws.X_WB[b_.body]);
+    r[0] = calcDistance(a_, node.ws.X_WB[a_.body], b_, node.ws.X_WB[b_.body]).distance;
   }
-  // The closest points may count as fixed to their bodies: moving them along their segments changes nothing, to first
-  // order.
   void calcJacobian(const NodeView& node, ResidualRows rows) const override {
-    const auto [pa, pb] = calcClosestPoints(a_, node.ws.X_WB[a_.body], b_, node.ws.X_WB[b_.body]);
-    const Vector3d normal = (pa - pb) / std::max((pa - pb).norm(), 1e-9);
+    const ShapeDistance distance = calcDistance(a_, node.ws.X_WB[a_.body], b_, node.ws.X_WB[b_.body]);
     for (int body : {a_.body, b_.body})
       for (int k : node.model.supportDofs(body)) rows.q(0, k) = 0;
-    const auto add = [&](int body, const Vector3d& p, double sign) {
-      for (int k : node.model.supportDofs(body)) {
-        const auto J = node.ws.J.col(k);
-        rows.q(0, k) += sign * normal.dot(J.head<3>() + J.tail<3>().cross(p));
-      }
-    };
-    add(a_.body, pa, 1);
-    add(b_.body, pb, -1);
+    addDistanceGradient(node.model, node.ws, a_, b_, distance, rows.q.topRows(1));
   }
 
  private:
-  Capsule a_, b_;
+  Shape a_, b_;
 };
 
 }  // namespace
@@ -138,13 +106,8 @@ std::unique_ptr<Residual> makeSoleClearance(const BodyFrame& sole, double half_l
                                             const Ground& ground, double ramp) {
   return std::make_unique<SoleClearance>(sole, half_length, half_width, ground, ramp);
 }
-std::unique_ptr<Residual> makeCapsuleDistance(const Capsule& a, const Capsule& b) {
-  return std::make_unique<CapsuleDistance>(a, b);
-}
-
-double calcCapsuleDistance(const Capsule& a, const SE3& X_WA, const Capsule& b, const SE3& X_WB) {
-  const auto [pa, pb] = calcClosestPoints(a, X_WA, b, X_WB);
-  return (pa - pb).norm() - a.radius - b.radius;
+std::unique_ptr<Residual> makeShapeDistance(const Shape& a, const Shape& b) {
+  return std::make_unique<ShapeDistanceResidual>(a, b);
 }
 
 }  // namespace bielle

@@ -85,6 +85,7 @@ void addAttachments(const Model& closed, ModelBuilder& builder) {
     builder.addContact(contact.name, name, contact.kind, contact.half_length, contact.half_width);
   }
   for (const Visual& visual : closed.visuals()) builder.addVisual(closed.bodies()[visual.body].name, visual);
+  for (const Shape& shape : closed.shapes()) builder.addShape(closed.bodies()[shape.body].name, shape);
   builder.setGravity(closed.gravity());
 }
 

@@ -32,6 +32,13 @@
 
 namespace bielle {
 
+/// Change of a shape: twist of its frame, and of its sizes.
+struct ShapeVariation {
+  Vector6d frame = Vector6d::Zero();  ///< of Shape::X_BS
+  Vector3d half = Vector3d::Zero();
+  double radius = 0;
+};
+
 /// A direction in which a model changes, per unit of a length or number. Twists are those of a frame in its own
 /// coordinates: X exp6(t twist). Initially zero.
 struct ModelVariation {
@@ -46,6 +53,7 @@ struct ModelVariation {
   std::vector<Vector3d> points2;         ///< and point2
   std::vector<Eigen::Vector4d> springs;  ///< and of its stiffness, rest, preload and damping
   std::vector<Vector6d> contacts;        ///< per contact of the model, of ContactFrame::X_BF
+  std::vector<ShapeVariation> shapes;    ///< per shape of the model
   std::vector<Matrix6d> inertias;        ///< nb, of Inertia::toMatrix() in the body's frame
   VectorXd armature;                     ///< nv
 };

@@ -28,6 +28,7 @@ struct ModelParts {
   VectorXd lower_limits, upper_limits, velocity_limits, armature;  ///< nv
   std::vector<JointForce> joint_forces;
   std::vector<PointSpring> point_springs;
+  std::vector<Shape> shapes;
 };
 ModelParts takeParts(const Model& model);
 
@@ -77,6 +78,8 @@ class ModelBuilder {
   /// Its joints, contacts and frame must be declared before it.
   void addReference(Reference reference);
   void addVisual(const std::string& link, Visual visual);
+  /// Bodies without any get shapes fitted to their visuals by build(). Fitted ones are not added.
+  void addShape(const std::string& link, Shape shape);
   void addSerialJoint(const std::string& joint);
   void setGravity(const Vector3d& gravity);
   /// Sets the rotor inertia on every dof of a joint without a motor (a motor has its own).
@@ -101,6 +104,7 @@ class ModelBuilder {
   void finishDofs(Model& model) const;
   void finishClosures(Model& model) const;
   void finishPointSprings(Model& model) const;
+  void finishShapes(Model& model) const;
   void applyDrive(const std::string& element, Motor& motor) const;
   void checkInertias(std::vector<std::string>* warnings) const;
   void checkReference(const Reference& reference) const;

@@ -198,6 +198,21 @@ struct Visual {
   Eigen::Vector4d rgba = {0.7, 0.7, 0.7, 1};
 };
 
+/// The room that a body takes up: a box with rounded edges, all points within `radius` of those with |x_i| <= half_i in
+/// the frame of the shape. A sphere has half = 0, a capsule half = (0, 0, l), a box radius = 0.
+struct Shape {
+  int body = 0;
+  SE3 X_BS;
+  Vector3d half = Vector3d::Zero();  ///< m
+  double radius = 0;                 ///< m
+  bool fitted = false;               ///< to a visual, because the files of the robot give its body no shape
+};
+/// All points within `radius` of a segment between two points of a body, m.
+Shape makeCapsule(int body, const Vector3d& from, const Vector3d& to, double radius);
+/// The shape around a visual: a box and a sphere are their own; around a cylinder it is a box or a capsule with the segment
+/// of its length, whichever is less. Empty for a mesh.
+std::optional<Shape> fitShape(const Visual& visual);
+
 /// One scalar velocity coordinate.
 struct Dof {
   int joint = 0;    ///< joint/body that carries it
@@ -228,6 +243,8 @@ class Model {
   const std::vector<ContactFrame>& contacts() const { return contacts_; }
   const std::vector<Reference>& references() const { return references_; }
   const std::vector<Visual>& visuals() const { return visuals_; }
+  /// Those that the files give, then those fitted to the visuals of bodies without.
+  const std::vector<Shape>& shapes() const { return shapes_; }
   /// Indices of the joints of the equivalent serial chain (hips, knee, ankles).
   const std::vector<int>& serialJoints() const { return serial_joints_; }
   const VectorXd& lowerLimits() const { return lower_; }  ///< per dof, -inf if there is none
@@ -280,6 +297,7 @@ class Model {
   std::vector<ContactFrame> contacts_;
   std::vector<Reference> references_;
   std::vector<Visual> visuals_;
+  std::vector<Shape> shapes_;
   std::vector<int> serial_joints_;
   std::vector<std::vector<int>> support_;
   std::vector<char> ancestry_;  // numBodies() x numBodies(), row: the ancestor

@@ -59,7 +59,7 @@
 /// Read are bodies and <frame>; inertias, or those of shapes without <inertial>; joints of all kinds with range, ref,
 /// armature, stiffness, springref, damping and frictionloss; the equalities connect, weld, joint and tendon (of fixed
 /// tendons) with polynomials of degree 1; springs and dampers of spatial tendons between two sites; motors with gear and limits
-/// (servos become motors); classes of defaults; gravity; keyframes as references; sites as frames; shapes to be drawn. Ranges
+/// (servos become motors); classes of defaults; gravity; keyframes as references; sites as frames; geoms as shapes. Ranges
 /// hold unless `limited` is false.
 /// - The frame of a body has its origin on its joint; a body with several joints becomes a chain of links BODY/JOINT
 ///   without mass. Quaternions of balls count from the pose in the file. Motors are named after their joints and give the

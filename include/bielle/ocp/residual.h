@@ -84,16 +84,8 @@ std::unique_ptr<Residual> makeFrameDistance(const BodyFrame& a, const BodyFrame&
 /// height.
 std::unique_ptr<Residual> makeSoleClearance(const BodyFrame& sole, double half_length, double half_width,
                                             const Ground& ground, double ramp);
-/// All points within `radius` of a segment that is fixed to a body.
-struct Capsule {
-  int body = 0;
-  Vector3d from, to;  ///< ends of the segment in the axes of the body, m
-  double radius = 0;  ///< m
-};
-/// Distance between two capsules (1), m; negative where they overlap.
-std::unique_ptr<Residual> makeCapsuleDistance(const Capsule& a, const Capsule& b);
-/// The same between bodies at given places.
-double calcCapsuleDistance(const Capsule& a, const SE3& X_WA, const Capsule& b, const SE3& X_WB);
+/// Distance between two shapes (1), m; negative where they overlap (distance.h).
+std::unique_ptr<Residual> makeShapeDistance(const Shape& a, const Shape& b);
 /// The axes in which the force of a contact is expressed; its moment is always about the origin of the contact frame.
 enum class ForceAxes { Contact, World };
 /// Rows of the force of a contact minus a reference, N and N m (6 or 3). `constraint` is the index in the
