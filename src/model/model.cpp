@@ -66,7 +66,11 @@ std::optional<Shape> fitShape(const Visual& visual) {
       return shape;
     }
     case Visual::Shape::Mesh:
-      return {};
+      if (!visual.bounds) return {};
+      shape.X_BS = visual.X_BV * visual.bounds->X_BS;
+      shape.half = visual.bounds->half;
+      shape.radius = visual.bounds->radius;
+      return shape;
   }
   return {};
 }

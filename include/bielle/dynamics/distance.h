@@ -8,7 +8,8 @@
 /// up to rounding. Where cores overlap, d is negative: the least displacement that parts them is to a face of Eq. (1), and
 ///     d = max over n of |n c| - sum_i |n G_i|,  n normal to two columns of G                                        (2)
 /// (the separating axes of Gottschalk, Lin, Manocha, "OBBTree", 1996). The distance is d less both radii. Eq. (1) is ours and
-/// not FCL's or ccd's: rounded boxes are all that robots have here, and those libraries iterate to a tolerance of 1e-6.
+/// not a library's for convex shapes at large: rounded boxes are all that robots have here, and derivatives want exact
+/// nearest points, where general methods iterate to a tolerance.
 ///
 /// Moving the nearest points within their shapes changes nothing to first order, so that with D the displacement of a body
 /// (variation.h)

@@ -188,16 +188,6 @@ struct Reference {
   std::map<std::string, Vector3d> feet;  ///< contact frame -> position of its origin, m (world)
 };
 
-/// A shape drawn for a body, from the visuals of the URDF.
-struct Visual {
-  enum class Shape { Box, Cylinder, Sphere, Mesh } shape = Shape::Box;
-  int body = 0;
-  SE3 X_BV;
-  Vector3d size = Vector3d::Zero();  ///< box: edges; cylinder: radius, length, 0; sphere: radius, 0, 0; mesh: scale
-  std::string mesh;                  ///< file name as written in the URDF
-  Eigen::Vector4d rgba = {0.7, 0.7, 0.7, 1};
-};
-
 /// The room that a body takes up: a box with rounded edges, all points within `radius` of those with |x_i| <= half_i in
 /// the frame of the shape. A sphere has half = 0, a capsule half = (0, 0, l), a box radius = 0.
 struct Shape {
@@ -207,10 +197,22 @@ struct Shape {
   double radius = 0;                 ///< m
   bool fitted = false;               ///< to a visual, because the files of the robot give its body no shape
 };
+/// A shape drawn for a body, from the visuals of the URDF.
+struct Visual {
+  enum class Shape { Box, Cylinder, Sphere, Mesh } shape = Shape::Box;
+  int body = 0;
+  SE3 X_BV;
+  Vector3d size = Vector3d::Zero();  ///< box: edges; cylinder: radius, length, 0; sphere: radius, 0, 0; mesh: scale
+  std::string mesh;                  ///< file name as written in the URDF
+  Eigen::Vector4d rgba = {0.7, 0.7, 0.7, 1};
+  /// Around a mesh whose file was read, with its scale, in the frame of the visual; its body is without meaning.
+  std::optional<bielle::Shape> bounds;
+};
+
 /// All points within `radius` of a segment between two points of a body, m.
 Shape makeCapsule(int body, const Vector3d& from, const Vector3d& to, double radius);
 /// The shape around a visual: a box and a sphere are their own; around a cylinder it is a box or a capsule with the segment
-/// of its length, whichever is less. Empty for a mesh.
+/// of its length, whichever is less; around a mesh it is `bounds`, if there are any.
 std::optional<Shape> fitShape(const Visual& visual);
 
 /// One scalar velocity coordinate.
