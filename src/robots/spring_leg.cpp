@@ -23,15 +23,15 @@ std::optional<Vector3d> findMeeting(const Vector3d& a, double rod_a, const Vecto
 }
 
 // Points of the neutral configuration relative to their frames, all frames parallel.
-struct Shape {
+struct Outline {
   Vector3d knee, shin, tarsus, heel;         // O to K, K to T, T to P, T to H
   Vector3d rod_start, rod;                   // on the thigh, and from there to H
   Vector3d crank_pivot, crank, lever, rod2;  // T to C, the crank, P to the end of the lever, the plantar rod
 };
 
 // \param side  +1: the rod is rod_offset to the left
-Shape makeShape(const std::string& robot, const SpringLegParameters& p, double side) {
-  Shape shape;
+Outline makeShape(const std::string& robot, const SpringLegParameters& p, double side) {
+  Outline shape;
   shape.knee = p.thigh_length * makeDirection(p.thigh_angle);
   shape.shin = p.shin_length * makeDirection(p.shin_angle);
   shape.rod_start = side * p.rod_offset * kY;
@@ -62,7 +62,7 @@ Shape makeShape(const std::string& robot, const SpringLegParameters& p, double s
 struct Leg {
   const SpringLegParameters& p;
   const SpringLegMount& mount;
-  Shape shape;
+  Outline shape;
   ModelBuilder& builder;
 
   std::string name(const std::string& part) const { return part + mount.suffix; }
@@ -119,7 +119,7 @@ void addShin(const Leg& leg) {
 
 void addTarsus(const Leg& leg) {
   const SpringLegParameters& p = leg.p;
-  const Shape& shape = leg.shape;
+  const Outline& shape = leg.shape;
   const std::string link = leg.name("tarsus_link"), leaf = leg.name("heel_leaf"), spring = leg.name("heel_spring");
   std::vector<Solid> tarsus = makeLimb(kOrigin, shape.tarsus, 0.015, 0.8 * p.tarsus_mass, shape.crank_pivot);
   const Solid heel = makeRod(shape.heel, kOrigin, 0.012, 0.2 * p.tarsus_mass / p.heel_length, colors::kFrame);
@@ -157,7 +157,7 @@ void addFoot(const Leg& leg, const std::vector<Vector3d>& levers) {
 // \param number  follows the names   \param share  of the masses of cranks and of rods
 void addCrank(const Leg& leg, const std::string& number, const Vector3d& beside, double share) {
   const SpringLegParameters& p = leg.p;
-  const Shape& shape = leg.shape;
+  const Outline& shape = leg.shape;
   const bool rolls = leg.mount.toe == SpringLegToe::PitchRoll;
   const auto name = [&](const std::string& part) { return leg.name(part + number); };
   leg.builder.addFrame(name("lever_end"), leg.name("toe"), {Matrix3d::Identity(), shape.lever + beside});
@@ -234,7 +234,7 @@ void addSpringLeg(const std::string& robot, const SpringLegParameters& p, const 
   addShin(leg);
   addTarsus(leg);
   addToe(leg);
-  const Shape& shape = leg.shape;
+  const Outline& shape = leg.shape;
   addSolidLink(leg.name("heel_rod"), leg.name("thigh"),
                makeRodJoint(leg.name("heel_rod_joint"), shape.rod_start, shape.rod),
                {makeRod(kOrigin, shape.rod, 0.006, p.heel_rod_mass / p.heel_rod_length, colors::kRod)}, builder);
@@ -243,7 +243,7 @@ void addSpringLeg(const std::string& robot, const SpringLegParameters& p, const 
 }
 
 Vector3d calcSolePlace(const std::string& robot, const SpringLegParameters& p) {
-  const Shape shape = makeShape(robot, p, 1);
+  const Outline shape = makeShape(robot, p, 1);
   return Vector3d(-p.yaw_offset, 0, -p.yaw_drop - p.pitch_drop) + shape.knee + shape.shin + shape.tarsus +
          Vector3d(p.sole_offset, 0, -p.ankle_height);
 }
