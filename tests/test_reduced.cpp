@@ -69,6 +69,21 @@ State makeClosedState(const Model& model, const VectorXd& q, double distance, do
           projectVelocity(model, ws, makeConstraintSet(model), result.q, randomVector(rng, model.nv(), speed))};
 }
 
+// Sanitizers make differences thirty times as slow and find errors of memory in any mechanism: they see every third one.
+class Selection {
+ public:
+  bool isLeftOut() {
+#ifdef __SANITIZE_ADDRESS__
+    return count_++ % 3 != 0;
+#else
+    return false;
+#endif
+  }
+
+ private:
+  int count_ = 0;
+};
+
 double calcGap(const Model& model, const VectorXd& x) {
   Workspace ws(model);
   updatePositions(model, ws, x.head(model.nq()));
@@ -130,9 +145,11 @@ void checkLinearization(const Model& model, const std::vector<ContactTarget>& co
 TEST_CASE("reduced step: random mechanisms, every joint kind times every closure kind") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(11);
+  Selection selection;
   for (JointKind kind : kJointKinds)
     for (ClosureKind closure : kClosureKinds)
       for (MechanismBase base : {MechanismBase::Fixed, MechanismBase::FreeFlyer}) {
+        if (selection.isLeftOut()) continue;
         CAPTURE(getName(rule), getName(kind), getName(closure), base == MechanismBase::Fixed);
         const Mechanism mechanism = makeRandomMechanism(rng, kind, closure, base);
         const Model& model = mechanism.model;
@@ -170,9 +187,11 @@ TEST_CASE("reduced step: springs, dampers and friction on joints in and outside 
 TEST_CASE("reduced step: couplers in the loops of other closures") {
   const StepRule rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   std::mt19937 rng(18);
+  Selection selection;
   for (JointKind kind : kJointKinds)
     for (ClosureKind closure : kClosureKinds)
       for (bool repeated : {false, true}) {
+        if (selection.isLeftOut()) continue;
         CAPTURE(getName(rule), getName(kind), getName(closure), repeated);
         const Mechanism mechanism = makeBeltedMechanism(rng, kind, closure, MechanismBase::FreeFlyer, repeated);
         const Model& model = mechanism.model;
