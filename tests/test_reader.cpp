@@ -1,8 +1,10 @@
 // The model matches its files: the published format, our own keys, warnings, and the search for robots.
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <sstream>
 
 #include "bielle/dynamics/closure.h"
 #include "bielle/dynamics/kinematics.h"
@@ -118,7 +120,102 @@ TEST_CASE("shapes are those of <collision>, else fitted to visuals; meshes are n
   REQUIRE(meshed.model.shapes().size() == 1);
   CHECK(meshed.model.shapes()[0].fitted);
   REQUIRE(meshed.warnings.size() == 1);
-  CHECK_THAT(meshed.warnings[0], Catch::Contains("link 'arm': its collision mesh 'arm.stl' is not read"));
+  CHECK_THAT(meshed.warnings[0], Catch::Contains("1 mesh(es) cannot be read, among them 'arm.stl'"));
+}
+
+namespace {
+
+// The corners of a turned box with the given half edges, each one three times: eight triangles.
+std::vector<Vector3d> listCorners(const Vector3d& half, const Matrix3d& R) {
+  std::vector<Vector3d> corners;
+  for (int i = 0; i < 24; ++i)
+    corners.push_back(
+        R * Vector3d(i & 1 ? half.x() : -half.x(), i & 2 ? half.y() : -half.y(), i & 4 ? half.z() : -half.z()));
+  return corners;
+}
+
+std::string makeBinaryStl(const std::vector<Vector3d>& corners) {
+  std::string stl(80, ' ');
+  const auto append = [&](const auto& value) { stl.append(reinterpret_cast<const char*>(&value), sizeof value); };
+  append(static_cast<std::uint32_t>(corners.size() / 3));
+  for (size_t i = 0; i < corners.size(); ++i) {
+    if (i % 3 == 0)
+      for (int k = 0; k < 3; ++k) append(0.0f);
+    for (int k = 0; k < 3; ++k) append(static_cast<float>(corners[i][k]));
+    if (i % 3 == 2) stl.append(2, '\0');
+  }
+  return stl;
+}
+
+std::string makeText(const std::vector<Vector3d>& corners, const std::string& keyword) {
+  std::ostringstream out;
+  out.precision(9);
+  for (const Vector3d& p : corners) out << "  " << keyword << ' ' << p.transpose() << '\n';
+  return out.str();
+}
+
+}  // namespace
+
+TEST_CASE(
+    "shapes are fitted to meshes of STL and OBJ files: boxes and capsules around all vertices, damaged files to none") {
+  const RobotDirectory directory;
+  const auto load = [&](const std::string& mesh, const std::string& content, const std::string& kind = "visual") {
+    directory.write(mesh, content);
+    return loadRobot(directory.writeRobot(
+        "<robot name='r'><link name='base'/><link name='arm'><" + kind +
+            "><origin xyz='1 2 3'/><geometry><mesh filename='" + mesh + "' scale='0.1 0.1 0.1'/></geometry></" + kind +
+            "></link><joint name='j' type='continuous'><parent link='base'/><child link='arm'/></joint></robot>",
+        "base: fixed"));
+  };
+  // A box that lies askew, in every format.
+  const Matrix3d R = Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  const std::vector<Vector3d> corners = listCorners({4, 2, 1}, R);
+  for (const auto& [mesh, content] : {std::pair<std::string, std::string>("a.stl", makeBinaryStl(corners)),
+                                      {"b.STL", "solid b\n" + makeText(corners, "vertex")},
+                                      {"c.obj", makeText(corners, "v") + "vn 0 0 1\nf 1 2 3\n"}}) {
+    CAPTURE(mesh);
+    for (const std::string kind : {"visual", "collision"}) {
+      const LoadedRobot robot = load(mesh, content, kind);
+      CHECK(robot.warnings.empty());
+      REQUIRE(robot.model.shapes().size() == 1);
+      const Shape& shape = robot.model.shapes()[0];
+      CHECK(shape.fitted == (kind == "visual"));
+      CHECK(shape.radius == 0);
+      CHECK(shape.half.prod() == Approx(0.4 * 0.2 * 0.1).epsilon(1e-5));
+      for (const Vector3d& p : corners) {
+        const Vector3d local = shape.X_BS.inverse().act(0.1 * p + Vector3d(1, 2, 3));
+        CHECK((local.cwiseAbs() - shape.half).maxCoeff() < 1e-7);
+      }
+      CHECK(ModelBuilder::restore(takeParts(robot.model)).shapes().size() == 1);
+    }
+  }
+  // A long cylinder: a capsule holds it with least room.
+  std::vector<Vector3d> rod;
+  for (int i = 0; i < 72; ++i) {
+    const double angle = EIGEN_PI / 18 * i;
+    rod.push_back(R * Vector3d(std::cos(angle), std::sin(angle), i % 2 ? 10 : -10));
+  }
+  const Shape capsule = load("rod.obj", makeText(rod, "v")).model.shapes().at(0);
+  CHECK(capsule.radius == Approx(0.1).epsilon(1e-6));
+  CHECK(capsule.half.x() == 0);
+  CHECK(capsule.half.z() == Approx(1).epsilon(1e-4));  // what is written is rounded
+  CHECK(std::abs((capsule.X_BS.R.transpose() * R)(2, 2)) == Approx(1));
+
+  const std::string binary = makeBinaryStl(corners);
+  std::vector<Vector3d> infinite = corners;
+  infinite[4].x() = kInf;
+  for (const auto& [mesh, content] : {std::pair<std::string, std::string>("d.stl", binary.substr(0, 100)),
+                                      {"d.stl", ""},
+                                      {"d.stl", makeBinaryStl(infinite)},
+                                      {"d.stl", "vertex 1 2"},
+                                      {"d.obj", "v 1 2 x"},
+                                      {"d.dae", binary}}) {
+    CAPTURE(mesh, content);
+    const LoadedRobot robot = load(mesh, content);
+    CHECK(robot.model.shapes().empty());
+    REQUIRE(robot.warnings.size() == 1);
+    CHECK_THAT(robot.warnings[0], Catch::Contains("cannot be read, among them 'd."));
+  }
 }
 
 TEST_CASE("bodies come depth first, children in the order of the file, not of the alphabet") {

@@ -229,13 +229,42 @@ class Frame:
         """placement in the body"""
         ...
 
+class Shape:
+    """The room that a body takes up: all points within a radius of a box fixed in it.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, body: int = ..., X_BS: SE3 = ..., half: ArrayLike = ..., radius: float = ..., fitted: bool = ...) -> None: ...
+    def replace(self, *, body: int = ..., X_BS: SE3 = ..., half: ArrayLike = ..., radius: float = ..., fitted: bool = ...) -> Shape: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def body(self) -> int:
+        """index; filled by the builder"""
+        ...
+    @property
+    def X_BS(self) -> SE3:
+        """placement in the body (for the builder: in the link)"""
+        ...
+    @property
+    def half(self) -> Array:
+        """half of the edges of the box (3,), m: zero of a sphere, (0, 0, l) of a capsule"""
+        ...
+    @property
+    def radius(self) -> float:
+        """m; zero of a box"""
+        ...
+    @property
+    def fitted(self) -> bool:
+        """to a visual, because the files of the robot give its body no shape"""
+        ...
+
 class Visual:
     """A shape drawn for a body.
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, shape: VisualShape = ..., body: int = ..., X_BV: SE3 = ..., size: ArrayLike = ..., mesh: str = ..., rgba: ArrayLike = ...) -> None: ...
-    def replace(self, *, shape: VisualShape = ..., body: int = ..., X_BV: SE3 = ..., size: ArrayLike = ..., mesh: str = ..., rgba: ArrayLike = ...) -> Visual: ...
+    def __init__(self, shape: VisualShape = ..., body: int = ..., X_BV: SE3 = ..., size: ArrayLike = ..., mesh: str = ..., rgba: ArrayLike = ..., bounds: Optional[Shape] = ...) -> None: ...
+    def replace(self, *, shape: VisualShape = ..., body: int = ..., X_BV: SE3 = ..., size: ArrayLike = ..., mesh: str = ..., rgba: ArrayLike = ..., bounds: Optional[Shape] = ...) -> Visual: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def shape(self) -> VisualShape:
@@ -260,6 +289,10 @@ class Visual:
     @property
     def rgba(self) -> Array:
         """colour (4,), 0 to 1"""
+        ...
+    @property
+    def bounds(self) -> Optional[Shape]:
+        """shape around a mesh that was read, in the frame of the visual, or None"""
         ...
 
 class JointLimits:
@@ -707,8 +740,8 @@ class ModelParts:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., joint_forces: Sequence[JointForce] = ..., point_springs: Sequence[PointSpring] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> None: ...
-    def replace(self, *, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., joint_forces: Sequence[JointForce] = ..., point_springs: Sequence[PointSpring] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> ModelParts: ...
+    def __init__(self, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., joint_forces: Sequence[JointForce] = ..., point_springs: Sequence[PointSpring] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., shapes: Sequence[Shape] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> None: ...
+    def replace(self, *, name: str = ..., gravity: ArrayLike = ..., bodies: Sequence[Body] = ..., joints: Sequence[Joint] = ..., frames: Sequence[Frame] = ..., closures: Sequence[Closure] = ..., motors: Sequence[Motor] = ..., joint_forces: Sequence[JointForce] = ..., point_springs: Sequence[PointSpring] = ..., contacts: Sequence[ContactFrame] = ..., references: Sequence[Reference] = ..., visuals: Sequence[Visual] = ..., shapes: Sequence[Shape] = ..., serial_joints: Sequence[int] = ..., lower_limits: ArrayLike = ..., upper_limits: ArrayLike = ..., velocity_limits: ArrayLike = ..., armature: ArrayLike = ...) -> ModelParts: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def name(self) -> str:
@@ -757,6 +790,10 @@ class ModelParts:
     @property
     def visuals(self) -> Tuple[Visual, ...]:
         """what is drawn"""
+        ...
+    @property
+    def shapes(self) -> Tuple[Shape, ...]:
+        """the room that bodies take up"""
         ...
     @property
     def serial_joints(self) -> Tuple[int, ...]:
@@ -859,6 +896,10 @@ class Model:
     @property
     def visuals(self) -> Tuple[Visual, ...]:
         """what is drawn"""
+        ...
+    @property
+    def shapes(self) -> Tuple[Shape, ...]:
+        """the room that bodies take up, as boxes with rounded edges"""
         ...
     @property
     def serial_joints(self) -> Tuple[int, ...]:
@@ -971,6 +1012,16 @@ class Model:
     def frame_jacobian(self, q: ArrayLike, frame: str) -> Array:
         """Jacobian of a frame's twist in its own coordinates (6, nv)."""
         ...
+    @property
+    def shape_pairs(self) -> List[Tuple[int, int, bool]]:
+        """Pairs of shapes on bodies that are not neighbours: two indices into `shapes`, and whether they are of two legs."""
+        ...
+    def shape_distance(self, q: ArrayLike, a: int, b: int) -> Array:
+        """Distance of two shapes by their indices, m. Negative where they overlap."""
+        ...
+    def shape_distance_gradient(self, q: ArrayLike, a: int, b: int) -> Array:
+        """Derivative of the distance by the tangent of q (nv,), m/rad or 1."""
+        ...
     def forward_dynamics(self, q: ArrayLike, v: ArrayLike, u: ArrayLike, contacts: Contacts = ...) -> Dynamics:
         """Accelerations a (nv,) and forces of closures and contacts (rows,) under motor torques u (nu,).
 
@@ -1040,6 +1091,9 @@ class ModelBuilder:
         ...
     def add_reference(self, reference: Reference) -> None:
         """A posture by name."""
+        ...
+    def add_shape(self, link: str, shape: Shape) -> None:
+        """The room that a link takes up."""
         ...
     def add_visual(self, link: str, visual: Visual) -> None:
         """What is drawn of a link."""

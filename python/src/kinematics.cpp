@@ -223,7 +223,7 @@ void addDistances(ModelType& type) {
         })[0];
       },
       py::arg("q"), py::arg("a"), py::arg("b"),
-      "Distance () of two shapes by their indices, m; negative where they overlap.");
+      "Distance of two shapes by their indices, m. Negative where they overlap.");
   type.def(
       "shape_distance_gradient",
       [](const Model& m, const py::object& q, int a, int b) {

@@ -52,14 +52,6 @@ void bindTree(py::module_& module) {
       .field("name", &Frame::name, "unique among links and frames")
       .field("body", &Frame::body, "index")
       .field("X_BF", &Frame::X_BF, "placement in the body");
-  Value<Visual>(module, "Visual", "A shape drawn for a body.")
-      .field("shape", &Visual::shape, "VisualShape")
-      .field("body", &Visual::body, "index; filled by the builder")
-      .field("X_BV", &Visual::X_BV, "placement in the body (for the builder: in the link)")
-      .field("size", &Visual::size,
-             "(3,) box: edges; cylinder: radius, length, 0; sphere: radius, 0, 0, m; mesh: scale")
-      .field("mesh", &Visual::mesh, "file name as written in the URDF")
-      .field("rgba", &Visual::rgba, "colour (4,), 0 to 1");
   Value<bielle::Shape>(module, "Shape",
                        "The room that a body takes up: all points within a radius of a box fixed in it.")
       .field("body", &bielle::Shape::body, "index; filled by the builder")
@@ -68,6 +60,15 @@ void bindTree(py::module_& module) {
              "half of the edges of the box (3,), m: zero of a sphere, (0, 0, l) of a capsule")
       .field("radius", &bielle::Shape::radius, "m; zero of a box")
       .field("fitted", &bielle::Shape::fitted, "to a visual, because the files of the robot give its body no shape");
+  Value<Visual>(module, "Visual", "A shape drawn for a body.")
+      .field("shape", &Visual::shape, "VisualShape")
+      .field("body", &Visual::body, "index; filled by the builder")
+      .field("X_BV", &Visual::X_BV, "placement in the body (for the builder: in the link)")
+      .field("size", &Visual::size,
+             "(3,) box: edges; cylinder: radius, length, 0; sphere: radius, 0, 0, m; mesh: scale")
+      .field("mesh", &Visual::mesh, "file name as written in the URDF")
+      .field("rgba", &Visual::rgba, "colour (4,), 0 to 1")
+      .field("bounds", &Visual::bounds, "shape around a mesh that was read, in the frame of the visual, or None");
   Value<JointLimits>(module, "JointLimits", "Limits of a joint, per dof, or empty for none.")
       .field("lower", &JointLimits::lower, "(nv,), rad or m")
       .field("upper", &JointLimits::upper, "(nv,), rad or m")

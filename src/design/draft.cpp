@@ -69,22 +69,29 @@ void RobotDraft::stretch(const std::string& link, const Vector3d& origin, const 
   inertia.mass *= factor;
   inertia.com = origin + D * (inertia.com - origin);
   inertia.I_com = stretched.trace() * Matrix3d::Identity() - stretched;
+  const auto stretchShape = [&](Shape& shape) {
+    shape.X_BS.p = origin + D * (shape.X_BS.p - origin);
+    const Vector3d along = (shape.X_BS.R.transpose() * direction).cwiseAbs();
+    for (int i = 0; i < 3; ++i)
+      if (along[i] > 0.99) shape.half[i] *= factor;
+  };
   for (Visual& visual : visuals_) {
     if (visual.body != body) continue;
+    std::optional<Shape> bounds = visual.bounds ? fitShape(visual) : std::nullopt;
     visual.X_BV.p = origin + D * (visual.X_BV.p - origin);
+    if (bounds) {
+      stretchShape(*bounds);
+      bounds->X_BS = visual.X_BV.inverse() * bounds->X_BS;
+      visual.bounds = bounds;
+    }
     const Vector3d along = (visual.X_BV.R.transpose() * direction).cwiseAbs();
     if (visual.shape == Visual::Shape::Cylinder && along.z() > 0.99) visual.size[1] *= factor;
     if (visual.shape != Visual::Shape::Box) continue;
     for (int i = 0; i < 3; ++i)
       if (along[i] > 0.99) visual.size[i] *= factor;
   }
-  for (Shape& shape : shapes_) {
-    if (shape.body != body) continue;
-    shape.X_BS.p = origin + D * (shape.X_BS.p - origin);
-    const Vector3d along = (shape.X_BS.R.transpose() * direction).cwiseAbs();
-    for (int i = 0; i < 3; ++i)
-      if (along[i] > 0.99) shape.half[i] *= factor;
-  }
+  for (Shape& shape : shapes_)
+    if (shape.body == body) stretchShape(shape);
 }
 
 int RobotDraft::findFrameAt(int body, const SE3& X_BF) const {

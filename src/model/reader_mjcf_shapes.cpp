@@ -1,8 +1,10 @@
 // Inertias from geoms or as given; geoms to be drawn, sites as frames, soles.
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "bielle/model/error.h"
+#include "model/mesh.h"
 #include "model/reader_mjcf.h"
 
 namespace bielle {
@@ -210,6 +212,8 @@ void MjcfReader::readVisual(const Child& child, const BodyPlace& place) {
     visual.shape = Visual::Shape::Mesh;
     visual.size = mesh->second.size;
     visual.mesh = mesh->second.mesh;
+    visual.bounds = fitMesh(visual.mesh, std::filesystem::path(settings_.path).parent_path().string(), visual.size);
+    if (!visual.bounds) e.note("its mesh cannot be read: it has no shape, distances leave it out");
   } else {
     return e.leaveOut("a geom of type '" + shape.type + "' is left out");
   }

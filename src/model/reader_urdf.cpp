@@ -4,12 +4,14 @@
 #include <urdf_parser/urdf_parser.h>
 
 #include <cmath>
+#include <filesystem>
 #include <locale>
 #include <mutex>
 #include <set>
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "model/mesh.h"
 #include "model/reader_drake.h"
 #include "model/robot_files.h"
 #include "model/xml_document.h"
@@ -235,6 +237,7 @@ Visual makeShape(const Element& element, const char* kind, const std::string& li
       out.shape = Visual::Shape::Mesh;
       out.size = toEigen(mesh.scale);
       out.mesh = mesh.filename;
+      out.bounds = fitMesh(out.mesh, std::filesystem::path(path).parent_path().string(), out.size);
       break;
     }
   }
@@ -250,7 +253,8 @@ Visual makeVisual(const urdf::Visual& visual, const std::string& link, const std
   return out;
 }
 
-UrdfLink makeLink(const urdf::Link& link, const std::string& path, std::vector<std::string>& warnings) {
+// `unread`: meshes that give its body no shape.
+UrdfLink makeLink(const urdf::Link& link, const std::string& path, std::vector<std::string>& unread) {
   UrdfLink out;
   out.name = link.name;
   if (link.inertial) {
@@ -266,10 +270,12 @@ UrdfLink makeLink(const urdf::Link& link, const std::string& path, std::vector<s
       shape->fitted = false;
       out.shapes.push_back(*shape);
     } else {
-      warnings.push_back(path + ": link '" + link.name + "': its collision mesh '" + geometry.mesh +
-                         "' is not read; give it boxes, cylinders or spheres");
+      unread.push_back(geometry.mesh);
     }
   }
+  if (out.shapes.empty())
+    for (const Visual& visual : out.visuals)
+      if (!fitShape(visual)) unread.push_back(visual.mesh);
   return out;
 }
 
@@ -313,6 +319,13 @@ UrdfJoint makeJoint(const urdf::Joint& joint, JointKind kind, const std::string&
   return out;
 }
 
+std::string warnOfMeshes(const std::vector<std::string>& unread, const std::string& path) {
+  return path + ": " + std::to_string(unread.size()) + " mesh(es) cannot be read, among them '" + unread.front() +
+         "': what they show has no shape, distances leave it out; put STL or OBJ files in their places or give "
+         "<collision> "
+         "with boxes, cylinders or spheres";
+}
+
 }  // namespace
 
 UrdfFile readUrdf(const std::string& path, YamlFile& settings) {
@@ -339,7 +352,9 @@ UrdfFile readUrdf(const std::string& path, YamlFile& settings) {
   file.name = tree.robot;
   file.root = tree.root;
   file.warnings = std::move(tree.warnings);
-  for (const auto& [name, link] : model->links_) file.links[name] = makeLink(*link, path, file.warnings);
+  std::vector<std::string> unread;
+  for (const auto& [name, link] : model->links_) file.links[name] = makeLink(*link, path, unread);
+  if (!unread.empty()) file.warnings.push_back(warnOfMeshes(unread, path));
   for (const auto& [name, kind] : tree.joints) file.joints.push_back(makeJoint(*model->joints_.at(name), kind, path));
   if (for_drake) readDrakeElements(robot, file, settings);
   return file;

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <sstream>
 
 #include "bielle/dynamics/kinematics.h"
 #include "io/fastenings.h"
+#include "model/mesh.h"
 #include "report/pack.h"
 
 namespace fs = std::filesystem;
@@ -19,31 +18,10 @@ namespace {
 
 constexpr std::uintmax_t kLargestMesh = 3'000'000, kAllMeshes = 12'000'000;  // bytes
 
-// Possible locations of a mesh file. `package://name/rest` stands for name/rest in any directory above the robot's or
-// in $ROS_PACKAGE_PATH, or for rest beside the robot.
-std::vector<fs::path> listMeshPlaces(const std::string& mesh, const fs::path& directory) {
-  const std::string package = "package://", file = "file://";
-  if (mesh.rfind(file, 0) == 0) return {mesh.substr(file.size())};
-  if (mesh.rfind(package, 0) != 0) return {directory / mesh};
-  const fs::path named = mesh.substr(package.size());
-  std::vector<fs::path> places;
-  const std::string text = named.string();
-  places.push_back(directory / fs::path(text.substr(std::min(text.size(), text.find('/') + 1))));
-  std::error_code error;
-  for (fs::path up = fs::absolute(directory, error); !up.empty(); up = up.parent_path()) {
-    places.push_back(up / named);
-    if (up == up.root_path()) break;
-  }
-  const char* variable = std::getenv("ROS_PACKAGE_PATH");
-  std::istringstream packages(variable ? variable : "");
-  for (std::string place; std::getline(packages, place, ':');) places.push_back(fs::path(place) / named);
-  return places;
-}
-
 // Reads each file once.
 class MeshStore {
  public:
-  explicit MeshStore(fs::path directory) : directory_(std::move(directory)) {}
+  explicit MeshStore(std::string directory) : directory_(std::move(directory)) {}
 
   // Index among the meshes of the page, -1 if it is omitted.
   int find(const std::string& mesh) {
@@ -59,20 +37,17 @@ class MeshStore {
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     if (extension != ".stl") return -1;
-    for (const fs::path& place : listMeshPlaces(mesh, directory_)) {
-      std::error_code error;
-      if (!fs::is_regular_file(place, error)) continue;
-      const std::uintmax_t size = fs::file_size(place, error);
-      if (error || size > kLargestMesh || total_ + size > kAllMeshes) return -1;
-      std::ifstream file(place, std::ios::binary);
-      total_ += size;
-      meshes_.push_back(encodeBase64({std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()}));
-      return static_cast<int>(meshes_.size()) - 1;
-    }
-    return -1;
+    const fs::path place = findMesh(mesh, directory_);
+    std::error_code error;
+    const std::uintmax_t size = place.empty() ? 0 : fs::file_size(place, error);
+    if (place.empty() || error || size > kLargestMesh || total_ + size > kAllMeshes) return -1;
+    std::ifstream file(place, std::ios::binary);
+    total_ += size;
+    meshes_.push_back(encodeBase64({std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()}));
+    return static_cast<int>(meshes_.size()) - 1;
   }
 
-  fs::path directory_;
+  std::string directory_;
   std::map<std::string, int> known_;
   std::uintmax_t total_ = 0;
   Json meshes_ = Json::array();

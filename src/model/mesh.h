@@ -1,0 +1,19 @@
+#pragma once
+// Meshes that robot files name.
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "bielle/model/model.h"
+
+namespace bielle {
+
+// The file of a mesh, empty if there is none. `package://name/rest` stands for name/rest in any directory above the robot's
+// or in $ROS_PACKAGE_PATH, or for rest beside the robot.
+std::filesystem::path findMesh(const std::string& mesh, const std::string& directory);
+
+// The box or capsule of least volume around the vertices of an STL or OBJ file, along the axes of the file or the principal
+// ones of the vertices; none if the file is missing, of another kind, damaged, or larger than 100 MB.
+std::optional<Shape> fitMesh(const std::string& mesh, const std::string& directory, const Vector3d& scale);
+
+}  // namespace bielle
