@@ -18,6 +18,7 @@
 #include "robots/cleobot.h"
 #include "robots/delta.h"
 #include "robots/kangaroo.h"
+#include "robots/leg_biped.h"
 #include "robots/solid.h"
 #include "robots/spring_biped.h"
 #include "robots/spring_leg.h"
@@ -158,6 +159,7 @@ const std::map<std::string, Expected>& getExpected() {
       {"spring_leg", {8, 5, 5, 5, 8.297}},    {"delta", {25, 13, 3, 3, 3.918}},
       {"fourbar_chain", {15, 6, 3, 3, 4.8}},  {"spring_biped", {18, 18, 22, 12, 33.31}},
       {"belt_knee", {2, 2, 18, 12, 25.24}},   {"differential_ankle", {4, 4, 18, 12, 25.44}},
+      {"leg_biped", {10, 10, 18, 12, 25.86}},
   };
   return expected;
 }
@@ -316,7 +318,7 @@ TEST_CASE("generators: names stay when lengths change, bounds and names are chec
       CHECK(p.lower <= *p.value);
       CHECK(*p.value <= p.upper);
       CHECK_FALSE(p.help.empty());
-      *p.value *= p.name == "count" ? 1 : 1.01;
+      *p.value *= p.name == "count" || !p.choices.empty() ? 1 : 1.01;
     }
     const Model other = request.make();
     REQUIRE(other.numBodies() == model.numBodies());
@@ -331,6 +333,66 @@ TEST_CASE("generators: names stay when lengths change, bounds and names are chec
     CHECK_THROWS_WITH(setParameter(request.parameters, "no_such", 1), Catch::Contains(first.name));
   }
   CHECK_THROWS_WITH(findGenerator("no_such"), Catch::Contains("cleobot"));
+}
+
+TEST_CASE("leg biped: nine combinations stand, move in 18 ways, and weigh what their parts add") {
+  // Per leg. Knee: a pulley; or crank and rod with their balls, the arm. Ankle: two pulleys; or two chains, and a heel of 0.3
+  // of the foot's mass either way. Rods are as long as what they are parallel to.
+  const double chain = 0.5 * 0.05 + 0.03 + 0.02, of_knee[] = {0, 0.1, chain + 0.5 * (0.22 + 0.05)};
+  const double of_ankle[] = {0, 0.2, 2 * (chain + 0.5 * 0.17)};
+  const int rows_of_knee[] = {0, 1, 3}, rows_of_ankle[] = {0, 2, 6};
+  const double bare = makeLegBiped([] {
+                        LegBipedParameters p;
+                        p.knee = p.ankle = 0;
+                        return p;
+                      }())
+                          .mass();
+  for (int knee = 0; knee < 3; ++knee)
+    for (int ankle = 0; ankle < 3; ++ankle) {
+      CAPTURE(knee, ankle);
+      LegBipedParameters p;
+      p.knee = knee, p.ankle = ankle;
+      const Model model = makeLegBiped(p);
+      CHECK(model.mass() - bare == Approx(2 * (of_knee[knee] + of_ankle[ankle])).margin(1e-12));
+      CHECK(model.nu() == 12);
+      const AssemblyResult standing = assembleReference(model, "half_sitting");
+      REQUIRE(standing.status == AssemblyStatus::Closed);
+      const Mobility mobility = calcMobility(model, standing.q);
+      CHECK(mobility.rows == 2 * (rows_of_knee[knee] + rows_of_ankle[ankle]));
+      CHECK(mobility.mobility == 18);
+    }
+  // The four-bar as it is meant: square at the middle angle, where it gears by arm over crank; a parallelogram turns with the knee.
+  const auto close = [](double crank, double angle) {  // to knee, motor
+    LegBipedParameters p;
+    p.knee_crank = crank;
+    const Model model = makeLegBiped(p);
+    const int knee = model.joints()[model.findJoint("knee_left")].idx_q;
+    const int motor = model.joints()[model.findJoint("motor_knee_left")].idx_q;
+    VectorXd q = model.makeNeutral();
+    q[knee] = q[motor] = angle;
+    q[model.joints()[model.findJoint("elbow_knee_left")].idx_q] = -angle;  // the rod stays upright
+    const AssemblyResult closed = closeConfiguration(model, q);
+    REQUIRE(closed.status == AssemblyStatus::Closed);
+    return Eigen::Vector2d(closed.q[knee], closed.q[motor]);
+  };
+  const Eigen::Vector2d parallel = close(0.05, 1.7), square = close(0.04, 1.2);
+  CHECK(parallel[0] == Approx(1.7).epsilon(1e-9));
+  CHECK(parallel[1] == Approx(parallel[0]).epsilon(1e-9));
+  CHECK(square.isApproxToConstant(1.2, 1e-9));
+  const Eigen::Vector2d change = close(0.04, 1.2 + 1e-3) - close(0.04, 1.2 - 1e-3);
+  CHECK(change[1] / change[0] == Approx(0.05 / 0.04).epsilon(0.01));
+
+  LegBipedParameters p;
+  p.knee = 1.5;
+  CHECK_THROWS_WITH(makeLegBiped(p),
+                    Catch::Contains("parameter 'knee'") && Catch::Contains("not the number of a choice"));
+  p.knee = 3;
+  CHECK_THROWS_WITH(makeLegBiped(p), Catch::Contains("outside 0 .. 2"));
+  const std::vector<Parameter> parameters = listParameters(p);
+  const auto found =
+      std::find_if(parameters.begin(), parameters.end(), [](const auto& q) { return q.name == "ankle"; });
+  CHECK(findChoice(*found, "rsu") == 2);
+  CHECK_THROWS_WITH(findChoice(*found, "belt"), Catch::Contains("serial, differential, rsu"));
 }
 
 TEST_CASE("Cleobot: its neutral configuration stands closed, the legs are mirror images") {

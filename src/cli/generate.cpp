@@ -18,11 +18,27 @@ struct GenerateArguments {
   std::string directory;
 };
 
+std::string formatRange(const Parameter& p) {
+  if (p.choices.empty()) return formatNumber(p.lower) + " .. " + formatNumber(p.upper);
+  std::string text;
+  for (const std::string& choice : p.choices) text += (text.empty() ? "" : ", ") + choice;
+  return text;
+}
+
+// name=number, or the name of a choice.
+std::pair<std::string, double> readSetting(const std::vector<Parameter>& parameters, const std::string& setting) {
+  const size_t equals = setting.find('=');
+  for (const Parameter& p : parameters)
+    if (!p.choices.empty() && setting.substr(0, equals) == p.name && equals != std::string::npos)
+      return {p.name, findChoice(p, setting.substr(equals + 1))};
+  return parseSetting("--set", setting, parameters.front().name + "=0.1");
+}
+
 std::string formatParameters(const Generator& generator) {
   std::vector<Row> rows;
   for (const Parameter& p : generator.makeRequest().parameters)
-    rows.push_back({p.name, formatNumber(*p.value), "[" + p.unit + "]",
-                    formatNumber(p.lower) + " .. " + formatNumber(p.upper), p.help});
+    rows.push_back({p.name, p.choices.empty() ? formatNumber(*p.value) : p.choices[static_cast<size_t>(*p.value)],
+                    p.choices.empty() ? "[" + p.unit + "]" : "", formatRange(p), p.help});
   std::ostringstream text;
   printTable(text, rows);
   return text.str();
@@ -32,7 +48,7 @@ int generate(const Generator& generator, const GenerateArguments& arguments) {
   const GeneratorRequest request = generator.makeRequest();
   std::string changes;
   for (const std::string& setting : arguments.settings) {
-    const auto [name, value] = parseSetting("--set", setting, request.parameters.front().name + "=0.1");
+    const auto [name, value] = readSetting(request.parameters, setting);
     setParameter(request.parameters, name, value);
     changes += (changes.empty() ? " with " : ", ") + setting;
   }

@@ -4,12 +4,11 @@
 
 #include "bielle/model/error.h"
 #include "bielle/robots/fourbar_chain.h"
-#include "robots/belt_biped.h"
 #include "robots/cleobot.h"
 #include "robots/delta.h"
 #include "robots/fivebar_leg.h"
 #include "robots/kangaroo.h"
-#include "robots/rsu_biped.h"
+#include "robots/leg_biped.h"
 #include "robots/spring_biped.h"
 #include "robots/spring_leg.h"
 
@@ -59,6 +58,9 @@ const std::vector<Generator>& getGenerators() {
   static const std::vector<Generator> generators = {
       {"cleobot", "biped with parallel legs: 3-RRS lower legs, hips turned by three crank-and-rod chains",
        makeRequests<CleobotParameters>(makeCleobot)},
+      {"leg_biped",
+       "biped composed of parts: knees by motors, belts or four-bars, ankles by motors, differentials or rods",
+       makeRequests<LegBipedParameters>(makeLegBiped)},
       {"rsu_biped", "biped with serial hips and knees, ankles driven by two rods with spherical ends (RSU)",
        makeRequests<RsuBipedParameters>(makeRsuBiped)},
       {"belt_biped", "biped with serial hips, knees driven by belts, ankles by differentials",

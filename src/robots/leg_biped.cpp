@@ -1,0 +1,247 @@
+#include "robots/leg_biped.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace bielle {
+namespace {
+
+const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ(), kOrigin = Vector3d::Zero();
+
+struct Leg : BipedSide {
+  const LegBipedParameters& p;
+  KneePart knee;
+  AnklePart ankle;
+  bool motors_on_joints;  // those of serial parts; otherwise where belts and differentials have them
+
+  Vector3d inner() const { return -s * 0.04 * kY; }  // the knee's motor, from the hip
+  Vector3d ankle_place() const { return -p.shank_length * kZ; }
+  // Backward, up by an angle.
+  static Vector3d arm(double angle) { return {-std::cos(angle), 0, std::sin(angle)}; }
+  // Index 1 outer, 2 inner.
+  Vector3d beside(int index, double distance) const { return (index == 1 ? s : -s) * distance * kY; }
+};
+
+// A pulley about y, turned by its motor.
+void addPulley(const Leg& leg, const std::string& name, const std::string& base, const Vector3d& place,
+               ModelBuilder& builder) {
+  constexpr double kRadius = 0.02, kWidth = 0.012;  // m
+  addSolidLink("pulley_" + name + leg.name, base + leg.name, makeRevolute("motor_" + name + leg.name, place, kY),
+               {makeCylinder(kOrigin, kY, kRadius, kWidth, leg.p.pulley_mass, colors::kSteel)}, builder);
+}
+
+Vector3d getKneeArm(const Leg& leg) { return leg.p.knee_arm * Leg::arm(-leg.p.knee_middle); }
+
+// Crank on the thigh, and rod.
+void addKneeChain(const Leg& leg, ModelBuilder& builder) {
+  const LegBipedParameters& p = leg.p;
+  CrankChain chain;
+  chain.name = "knee" + leg.name;
+  chain.motor = leg.inner();
+  chain.elbow = chain.motor + p.knee_crank * Leg::arm(-p.knee_middle);
+  chain.end = chain.elbow + Vector3d(p.knee_crank - p.knee_arm, 0, -p.thigh_length);
+  chain.axis2 = kX;
+  addCrankChain(chain, "thigh" + leg.name, p.rod_density, p.armature, builder);
+}
+
+void closeFourBar(const Leg& leg, ModelBuilder& builder) {
+  builder.addFrame("knee_arm" + leg.name, "shank" + leg.name, {Matrix3d::Identity(), leg.inner() + getKneeArm(leg)});
+  builder.addClosure("knee_rod" + leg.name, ClosureKind::Ball3D, "knee_arm" + leg.name, "rod_end_knee" + leg.name);
+}
+
+std::vector<Solid> makeShank(const Leg& leg) {
+  const LegBipedParameters& p = leg.p;
+  std::vector<Solid> solids = {makeRod(kOrigin, leg.ankle_place(), 0.018, p.link_density, colors::kOutput)};
+  if (leg.knee == KneePart::FourBar)
+    solids.push_back(makeRod(leg.inner(), leg.inner() + getKneeArm(leg), 0.010, p.rod_density, colors::kSteel));
+  if (leg.ankle == AnklePart::Serial && leg.motors_on_joints) {
+    solids.push_back(makeMotor(leg.ankle_place(), kY, p.ankle_motor_mass));
+    return solids;
+  }
+  const bool rsu = leg.ankle == AnklePart::Rsu;
+  const Vector3d place = rsu ? Vector3d(leg.ankle_place() + p.motor_height * kZ) : Vector3d(-p.ankle_motor_drop * kZ);
+  const Vector3d side = (rsu ? p.ankle_half_width : 0.03) * kY;
+  for (double sign : {1.0, -1.0}) solids.push_back(makeMotor(place + sign * side, kY, p.ankle_motor_mass));
+  return solids;
+}
+
+// Thigh, shank and what moves the knee.
+void addKnee(const Leg& leg, ModelBuilder& builder) {
+  const LegBipedParameters& p = leg.p;
+  const Vector3d knee = -p.thigh_length * kZ;
+  const bool at_knee = leg.knee == KneePart::Serial && leg.motors_on_joints;
+  addSolidLink("thigh" + leg.name, "hip_roll" + leg.name, makeRevolute("hipy" + leg.name, kOrigin, kY),
+               {makeRod(kOrigin, knee, 0.022, p.link_density, colors::kFrame),
+                makeMotor(at_knee ? knee : leg.inner(), kY, p.knee_motor_mass)},
+               builder);
+  for (const char* joint : {"hipz", "hipx", "hipy"}) builder.addMotor(joint + leg.name, p.armature);
+  if (leg.knee == KneePart::Belt) addPulley(leg, "knee", "thigh", leg.inner() / 2, builder);
+  if (leg.knee == KneePart::FourBar) addKneeChain(leg, builder);
+  addSolidLink("shank" + leg.name, "thigh" + leg.name, makeRevolute("knee" + leg.name, knee, kY), makeShank(leg),
+               builder);
+  if (leg.knee == KneePart::FourBar) return closeFourBar(leg, builder);
+  builder.addMotor((leg.knee == KneePart::Belt ? "motor_knee" : "knee") + leg.name, p.armature);
+  if (leg.knee == KneePart::Belt)
+    builder.addCoupler("knee_belt" + leg.name, {{"motor_knee" + leg.name, 1}, {"knee" + leg.name, -p.knee_ratio}});
+}
+
+void addDifferential(const Leg& leg, ModelBuilder& builder) {
+  const LegBipedParameters& p = leg.p;
+  const std::string motors[] = {"motor_ankle1" + leg.name, "motor_ankle2" + leg.name};
+  for (int i : {1, 2})
+    addPulley(leg, "ankle" + std::to_string(i), "shank", -p.ankle_motor_drop * kZ + leg.beside(i, 0.055), builder);
+  builder.addCoupler("ankle_pitch" + leg.name,
+                     {{motors[0], 0.5}, {motors[1], 0.5}, {"ankley" + leg.name, -p.ankle_ratio}});
+  builder.addCoupler("ankle_roll" + leg.name,
+                     {{motors[0], 0.5 * leg.s}, {motors[1], -0.5 * leg.s}, {"anklex" + leg.name, -p.ankle_ratio}});
+  for (const std::string& motor : motors) builder.addMotor(motor, p.armature);
+}
+
+Vector3d getHeel(const Leg& leg, int index) {
+  return leg.p.ankle_arm * Leg::arm(leg.p.arm_angle) + leg.beside(index, leg.p.ankle_half_width);
+}
+
+void addAnkleChain(const Leg& leg, int index, ModelBuilder& builder) {
+  const LegBipedParameters& p = leg.p;
+  CrankChain chain;
+  chain.name = "ankle" + std::to_string(index) + leg.name;
+  chain.motor = leg.ankle_place() + p.motor_height * kZ + leg.beside(index, p.ankle_half_width);
+  chain.elbow = chain.motor + p.ankle_crank * Leg::arm(p.arm_angle);
+  chain.end = leg.ankle_place() + getHeel(leg, index);
+  chain.axis2 = kX;
+  addCrankChain(chain, "shank" + leg.name, p.rod_density, p.armature, builder);
+  builder.addClosure(chain.name, ClosureKind::Ball3D, "heel" + std::to_string(index) + leg.name,
+                     "rod_end_" + chain.name);
+}
+
+// Ankle, foot and what moves them.
+void addAnkle(const Leg& leg, ModelBuilder& builder) {
+  const LegBipedParameters& p = leg.p;
+  std::vector<Solid> cross = {makeCylinder(kOrigin, kY, 0.008, 0.05, 0.08, colors::kSteel)};
+  if (leg.ankle == AnklePart::Serial && leg.motors_on_joints)
+    cross.push_back(makeMotor({-0.06, 0, 0}, kX, p.ankle_motor_mass));
+  addSolidLink("ankle_cross" + leg.name, "shank" + leg.name, makeRevolute("ankley" + leg.name, leg.ankle_place(), kY),
+               cross, builder);
+  builder.addLink("foot_link" + leg.name, "ankle_cross" + leg.name, makeRevolute("anklex" + leg.name, kOrigin, kX), {});
+  std::vector<Solid> foot = makeFoot(p);
+  if (leg.ankle != AnklePart::Rsu)
+    foot.push_back(makeCylinder(kOrigin, kX, 0.02, 0.03, 0.3 * p.foot_mass, colors::kSteel));
+  const Vector3d root(p.sole_offset - 0.4 * p.sole_length, 0, 0.02 - p.ankle_height);
+  for (int i = 1; i <= 2 && leg.ankle == AnklePart::Rsu; ++i) {
+    const Vector3d heel = getHeel(leg, i);
+    foot.push_back(
+        makeCylinder((root + heel) / 2, heel - root, 0.009, (heel - root).norm(), 0.15 * p.foot_mass, colors::kSteel));
+    builder.addFrame("heel" + std::to_string(i) + leg.name, "foot_link" + leg.name, {Matrix3d::Identity(), heel});
+  }
+  addSolids("foot_link" + leg.name, foot, builder);
+  if (leg.ankle == AnklePart::Differential) addDifferential(leg, builder);
+  for (int i = 1; i <= 2 && leg.ankle == AnklePart::Rsu; ++i) addAnkleChain(leg, i, builder);
+  for (const char* joint : {"ankley", "anklex"})
+    if (leg.ankle == AnklePart::Serial) builder.addMotor(joint + leg.name, p.armature);
+}
+
+void addLeg(const Leg& leg, ModelBuilder& builder) {
+  const LegBipedParameters& p = leg.p;
+  addHip(leg, p, builder);
+  addKnee(leg, builder);
+  addAnkle(leg, builder);
+  for (const char* joint : {"hipz", "hipx", "hipy", "knee", "ankley", "anklex"})
+    builder.addSerialJoint(joint + leg.name);
+  addSole(leg, {p.sole_offset, 0, -p.ankle_height}, p.sole_length, p.sole_width, builder);
+}
+
+Model makeBiped(const std::string& robot, const LegBipedParameters& p, bool motors_on_joints = true) {
+  ModelBuilder builder(robot);
+  addTrunk(makeSerialTrunk(p), builder);
+  const auto knee = static_cast<KneePart>(p.knee);
+  const auto ankle = static_cast<AnklePart>(p.ankle);
+  for (const BipedSide& side : {BipedSide{1, "_left"}, BipedSide{-1, "_right"}})
+    addLeg({side, p, knee, ankle, motors_on_joints}, builder);
+  builder.addReference(makeSerialHalfSitting(robot, p));
+  return builder.build();
+}
+
+// A biped of certain parts, its parameters checked.
+template <typename Parameters>
+Model makeOf(KneePart knee, AnklePart ankle, const std::string& robot, Parameters p, bool motors_on_joints) {
+  checkParameters(robot, listParameters(p));
+  p.knee = static_cast<double>(knee), p.ankle = static_cast<double>(ankle);
+  p.knee_motor_mass = p.ankle_motor_mass = p.motor_mass;
+  return makeBiped(robot, p, motors_on_joints);
+}
+
+// Those of all bipeds, and some more.
+std::vector<Parameter> listSome(LegBipedParameters& p, const std::set<std::string>& own) {
+  std::vector<Parameter> some = listSerialParameters(p);
+  for (const Parameter& parameter : listParameters(p))
+    if (own.count(parameter.name)) some.push_back(parameter);
+  return some;
+}
+
+}  // namespace
+
+std::vector<Parameter> listParameters(LegBipedParameters& p) {
+  std::vector<Parameter> parameters = listSerialParameters(p);
+  for (Parameter& parameter : parameters)
+    if (parameter.name == "motor_mass") parameter.help = "of each motor of the hips";
+  const std::vector<Parameter> own = {
+      {"knee", &p.knee, "1", 0, 2, "part that moves the knee", {"serial", "belt", "four_bar"}},
+      {"ankle", &p.ankle, "1", 0, 2, "part that moves the ankle", {"serial", "differential", "rsu"}},
+      {"knee_motor_mass", &p.knee_motor_mass, "kg", 0.01, 10, "of each motor of the knees"},
+      {"ankle_motor_mass", &p.ankle_motor_mass, "kg", 0.01, 10, "of each motor of the ankles"},
+      {"knee_ratio", &p.knee_ratio, "1", 0.1, 20, "of a belt: turns of the knee's motor per turn of the knee"},
+      {"knee_crank", &p.knee_crank, "m", 0.01, 0.2, "of a four-bar: length of the crank at the hip"},
+      {"knee_arm", &p.knee_arm, "m", 0.01, 0.2, "of a four-bar: length of the arm at the knee"},
+      {"knee_middle", &p.knee_middle, "rad", 0, 2, "of a four-bar: angle of the knee where both are square to the rod"},
+      {"ankle_ratio", &p.ankle_ratio, "1", 0.1, 20,
+       "of a differential: mean turns of the ankle's motors per turn of the ankle"},
+      {"ankle_motor_drop", &p.ankle_motor_drop, "m", 0, 0.5, "of a differential: of the ankle motors below the knee"},
+      {"pulley_mass", &p.pulley_mass, "kg", 0.001, 2, "of each motor's pulley, with belt and differential"},
+      {"ankle_arm", &p.ankle_arm, "m", 0.01, 0.2, "of rods (RSU): of their balls behind the ankle"},
+      {"ankle_crank", &p.ankle_crank, "m", 0.01, 0.2, "of rods (RSU): length of the cranks"},
+      {"ankle_half_width", &p.ankle_half_width, "m", 0.01, 0.2, "of rods (RSU): beside the ankle"},
+      {"motor_height", &p.motor_height, "m", 0.05, 0.8, "of rods (RSU): of the ankle motors over the ankle"},
+      {"arm_angle", &p.arm_angle, "rad", -1.2, 1.2,
+       "of rods (RSU): cranks and arms over the horizontal, legs straight"},
+      {"rod_density", &p.rod_density, "kg/m", 0.01, 20, "of cranks and rods"},
+  };
+  parameters.insert(parameters.end(), own.begin(), own.end());
+  return parameters;
+}
+
+Model makeLegBiped(const LegBipedParameters& parameters) {
+  LegBipedParameters p = parameters;
+  checkParameters("leg_biped", listParameters(p));
+  return makeBiped("leg_biped", p);
+}
+
+std::vector<Parameter> listParameters(BeltBipedParameters& p) {
+  return listSome(p, {"knee_ratio", "ankle_ratio", "ankle_motor_drop", "pulley_mass"});
+}
+Model makeBeltBiped(const BeltBipedParameters& p) {
+  return makeOf(KneePart::Belt, AnklePart::Differential, "belt_biped", p, true);
+}
+
+std::vector<Parameter> listParameters(RsuBipedParameters& p) {
+  return listSome(p, {"ankle_arm", "ankle_crank", "ankle_half_width", "motor_height", "arm_angle", "rod_density"});
+}
+Model makeRsuBiped(const RsuBipedParameters& p) {
+  return makeOf(KneePart::Serial, AnklePart::Rsu, "rsu_biped", p, true);
+}
+
+std::vector<Parameter> listParameters(BeltKneeParameters& p) {
+  return listSome(p, {"knee_ratio", "ankle_motor_drop", "pulley_mass"});
+}
+Model makeBeltKnee(const BeltKneeParameters& p) {
+  return makeOf(KneePart::Belt, AnklePart::Serial, "belt_knee", p, false);
+}
+
+std::vector<Parameter> listParameters(DifferentialAnkleParameters& p) {
+  return listSome(p, {"ankle_ratio", "ankle_motor_drop", "pulley_mass"});
+}
+Model makeDifferentialAnkle(const DifferentialAnkleParameters& p) {
+  return makeOf(KneePart::Serial, AnklePart::Differential, "differential_ankle", p, false);
+}
+
+}  // namespace bielle
