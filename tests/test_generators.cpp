@@ -17,6 +17,7 @@
 #include "robot_directory.h"
 #include "robots/cleobot.h"
 #include "robots/delta.h"
+#include "robots/humanoid.h"
 #include "robots/kangaroo.h"
 #include "robots/leg_biped.h"
 #include "robots/solid.h"
@@ -159,7 +160,7 @@ const std::map<std::string, Expected>& getExpected() {
       {"spring_leg", {8, 5, 5, 5, 8.297}},    {"delta", {25, 13, 3, 3, 3.918}},
       {"fourbar_chain", {15, 6, 3, 3, 4.8}},  {"spring_biped", {18, 18, 22, 12, 33.31}},
       {"belt_knee", {2, 2, 18, 12, 25.24}},   {"differential_ankle", {4, 4, 18, 12, 25.44}},
-      {"leg_biped", {10, 10, 18, 12, 25.86}},
+      {"leg_biped", {10, 10, 18, 12, 25.86}}, {"humanoid", {18, 18, 26, 20, 29.2}},
   };
   return expected;
 }
@@ -333,6 +334,26 @@ TEST_CASE("generators: names stay when lengths change, bounds and names are chec
     CHECK_THROWS_WITH(setParameter(request.parameters, "no_such", 1), Catch::Contains(first.name));
   }
   CHECK_THROWS_WITH(findGenerator("no_such"), Catch::Contains("cleobot"));
+}
+
+TEST_CASE("humanoid: fingers mimic the one that has the motor, tips stay parallel") {
+  const Model model = makeHumanoid();
+  const auto index = [&](const char* joint) { return model.joints()[model.findJoint(joint)].idx_q; };
+  VectorXd q = assembleReference(model, "half_sitting").q;
+  q[index("finger1_joint_left")] = 0.3;
+  const AssemblyResult closed = closeConfiguration(model, q);
+  REQUIRE(closed.status == AssemblyStatus::Closed);
+  const double finger = closed.q[index("finger1_joint_left")];
+  CHECK(std::abs(finger) > 0.05);
+  CHECK(closed.q[index("finger2_joint_left")] == Approx(-finger));
+  CHECK(closed.q[index("fingertip1_joint_left")] == Approx(-finger));
+  CHECK(closed.q[index("fingertip2_joint_left")] == Approx(finger));
+  CHECK(closed.q[index("finger1_joint_right")] == Approx(0).margin(1e-9));
+  Workspace ws(model);
+  updatePlacements(model, ws, closed.q);
+  const auto getAttitude = [&](const char* joint) { return ws.X_WB[model.findJoint(joint)].R; };
+  for (const char* tip : {"fingertip1_joint_left", "fingertip2_joint_left"})
+    CHECK((getAttitude(tip) - getAttitude("elbow_left")).norm() < 1e-9);
 }
 
 TEST_CASE("leg biped: nine combinations stand, move in 18 ways, and weigh what their parts add") {

@@ -7,6 +7,7 @@
 #include "robots/cleobot.h"
 #include "robots/delta.h"
 #include "robots/fivebar_leg.h"
+#include "robots/humanoid.h"
 #include "robots/kangaroo.h"
 #include "robots/leg_biped.h"
 #include "robots/spring_biped.h"
@@ -63,6 +64,8 @@ const std::vector<Generator>& getGenerators() {
        makeRequests<LegBipedParameters>(makeLegBiped)},
       {"rsu_biped", "biped with serial hips and knees, ankles driven by two rods with spherical ends (RSU)",
        makeRequests<RsuBipedParameters>(makeRsuBiped)},
+      {"humanoid", "rsu_biped with two arms and grippers whose fingers mimic each other",
+       makeRequests<HumanoidParameters>(makeHumanoid)},
       {"belt_biped", "biped with serial hips, knees driven by belts, ankles by differentials",
        makeRequests<BeltBipedParameters>(makeBeltBiped)},
       {"belt_knee", "biped with knees driven by belts, all else serial",

@@ -151,13 +151,17 @@ void addLeg(const Leg& leg, ModelBuilder& builder) {
   addSole(leg, {p.sole_offset, 0, -p.ankle_height}, p.sole_length, p.sole_width, builder);
 }
 
-Model makeBiped(const std::string& robot, const LegBipedParameters& p, bool motors_on_joints = true) {
-  ModelBuilder builder(robot);
+void addBiped(const LegBipedParameters& p, bool motors_on_joints, ModelBuilder& builder) {
   addTrunk(makeSerialTrunk(p), builder);
   const auto knee = static_cast<KneePart>(p.knee);
   const auto ankle = static_cast<AnklePart>(p.ankle);
   for (const BipedSide& side : {BipedSide{1, "_left"}, BipedSide{-1, "_right"}})
     addLeg({side, p, knee, ankle, motors_on_joints}, builder);
+}
+
+Model makeBiped(const std::string& robot, const LegBipedParameters& p, bool motors_on_joints = true) {
+  ModelBuilder builder(robot);
+  addBiped(p, motors_on_joints, builder);
   builder.addReference(makeSerialHalfSitting(robot, p));
   return builder.build();
 }
@@ -210,6 +214,8 @@ std::vector<Parameter> listParameters(LegBipedParameters& p) {
   return parameters;
 }
 
+void addLegBiped(const LegBipedParameters& p, ModelBuilder& builder) { addBiped(p, true, builder); }
+
 Model makeLegBiped(const LegBipedParameters& parameters) {
   LegBipedParameters p = parameters;
   checkParameters("leg_biped", listParameters(p));
@@ -223,7 +229,8 @@ Model makeBeltBiped(const BeltBipedParameters& p) {
   return makeOf(KneePart::Belt, AnklePart::Differential, "belt_biped", p, true);
 }
 
-std::vector<Parameter> listParameters(RsuBipedParameters& p) {
+std::vector<Parameter> listParameters(RsuBipedParameters& p) { return listRsuParameters(p); }
+std::vector<Parameter> listRsuParameters(LegBipedParameters& p) {
   return listSome(p, {"ankle_arm", "ankle_crank", "ankle_half_width", "motor_height", "arm_angle", "rod_density"});
 }
 Model makeRsuBiped(const RsuBipedParameters& p) {

@@ -64,6 +64,9 @@ struct LegBipedParameters : SerialBipedParameters {
 };
 std::vector<Parameter> listParameters(LegBipedParameters& parameters);
 
+/// Trunk, legs and soles, for a robot with more on its trunk.
+void addLegBiped(const LegBipedParameters& parameters, ModelBuilder& builder);
+
 /// \throws ModelError when a parameter is outside its bounds, or the legs do not reach from hip_height to the ground
 Model makeLegBiped(const LegBipedParameters& parameters = {});
 
@@ -74,6 +77,8 @@ Model makeBeltBiped(const BeltBipedParameters& parameters = {});
 
 struct RsuBipedParameters : LegBipedParameters {};
 std::vector<Parameter> listParameters(RsuBipedParameters& parameters);
+/// Those of a biped with serial knees and RSU ankles.
+std::vector<Parameter> listRsuParameters(LegBipedParameters& parameters);
 Model makeRsuBiped(const RsuBipedParameters& parameters = {});
 
 /// The belt biped with its belts or its differentials alone. The other motors act on the joints, but their masses stay in their

@@ -1,0 +1,93 @@
+#include "robots/humanoid.h"
+
+namespace bielle {
+namespace {
+
+const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ(), kOrigin = Vector3d::Zero();
+
+struct Arm : BipedSide {
+  const HumanoidParameters& p;
+
+  std::string part(const std::string& base) const { return base + name; }
+};
+
+// A finger of two links at +-y of the hand; the second one carries on where the first one ends.
+void addFinger(const Arm& arm, const std::string& number, double sign, ModelBuilder& builder) {
+  constexpr double kRadius = 0.006, kGap = 0.02;  // m
+  const HumanoidParameters& p = arm.p;
+  const Vector3d root(0, sign * kGap, -p.forearm_length - 0.03), end(0, 0, -p.finger_length);
+  const std::vector<Solid> link = {makeRod(kOrigin, end, kRadius, p.finger_mass / p.finger_length, colors::kSteel)};
+  addSolidLink(arm.part("finger" + number), arm.part("forearm"),
+               makeRevolute(arm.part("finger" + number + "_joint"), root, kX), link, builder);
+  addSolidLink(arm.part("fingertip" + number), arm.part("finger" + number),
+               makeRevolute(arm.part("fingertip" + number + "_joint"), end, kX), link, builder);
+}
+
+void addArm(const Arm& arm, ModelBuilder& builder) {
+  const HumanoidParameters& p = arm.p;
+  const Vector3d elbow(0, 0, -p.upper_arm_length), hand(0, 0, -p.forearm_length);
+  addSolidLink(arm.part("shoulder"), "trunk",
+               makeRevolute(arm.part("armpitch"), arm.mirror(0, p.shoulder_offset, p.shoulder_height), kY),
+               {makeMotor(kOrigin, kX, p.arm_motor_mass)}, builder);
+  addSolidLink(arm.part("upper_arm"), arm.part("shoulder"), makeRevolute(arm.part("armroll"), kOrigin, kX),
+               {makeRod(kOrigin, elbow, 0.02, p.arm_density, colors::kFrame), makeMotor(elbow, kY, p.arm_motor_mass)},
+               builder);
+  addSolidLink(arm.part("forearm"), arm.part("upper_arm"), makeRevolute(arm.part("elbow"), elbow, kY),
+               {makeRod(kOrigin, hand, 0.018, p.arm_density, colors::kOutput),
+                makeBox(hand - 0.015 * kZ, {0.03, 0.05, 0.03}, 0.5 * p.arm_motor_mass, colors::kMotor)},
+               builder);
+  for (const char* joint : {"armpitch", "armroll", "elbow"}) builder.addMotor(arm.part(joint), p.armature);
+  addFinger(arm, "1", 1, builder);
+  addFinger(arm, "2", -1, builder);
+  const std::string driven = arm.part("finger1_joint");
+  builder.addMotor(driven, p.finger_armature);
+  const std::pair<const char*, double> mimics[] = {
+      {"finger2_joint", -1}, {"fingertip1_joint", -p.finger_ratio}, {"fingertip2_joint", p.finger_ratio}};
+  for (const auto& [joint, ratio] : mimics)
+    builder.addCoupler(arm.part(joint), {{arm.part(joint), 1}, {driven, -ratio}});
+  for (const char* joint : {"armpitch", "armroll", "elbow", "finger1_joint"}) builder.addSerialJoint(arm.part(joint));
+}
+
+}  // namespace
+
+std::vector<Parameter> listParameters(HumanoidParameters& p) {
+  std::vector<Parameter> parameters = listRsuParameters(p);
+  for (Parameter& parameter : parameters)
+    if (parameter.name == "motor_mass") parameter.help = "of each motor of the legs";
+  const std::vector<Parameter> own = {
+      {"shoulder_height", &p.shoulder_height, "m", 0, 1, "of the shoulders over the trunk's frame"},
+      {"shoulder_offset", &p.shoulder_offset, "m", 0.05, 0.5, "of a shoulder from the middle plane"},
+      {"upper_arm_length", &p.upper_arm_length, "m", 0.05, 1, "shoulder to elbow"},
+      {"forearm_length", &p.forearm_length, "m", 0.05, 1, "elbow to the hand"},
+      {"finger_length", &p.finger_length, "m", 0.01, 0.2, "of each of the two links of a finger"},
+      {"finger_ratio", &p.finger_ratio, "1", 0.1, 3,
+       "turns of a fingertip back per turn of its finger; 1: tips stay parallel"},
+      {"arm_density", &p.arm_density, "kg/m", 0.01, 50, "of upper arm and forearm, without motors"},
+      {"arm_motor_mass", &p.arm_motor_mass, "kg", 0.01, 10, "of each motor of an arm; a hand weighs half of it"},
+      {"finger_mass", &p.finger_mass, "kg", 0.001, 1, "of each link of a finger"},
+      {"finger_armature", &p.finger_armature, "kg m^2", 0, 1, "rotor inertia of the gripper's motor"},
+  };
+  parameters.insert(parameters.end(), own.begin(), own.end());
+  return parameters;
+}
+
+Model makeHumanoid(const HumanoidParameters& parameters) {
+  HumanoidParameters p = parameters;
+  checkParameters("humanoid", listParameters(p));
+  p.knee = static_cast<double>(KneePart::Serial), p.ankle = static_cast<double>(AnklePart::Rsu);
+  p.knee_motor_mass = p.ankle_motor_mass = p.motor_mass;
+  ModelBuilder builder("humanoid");
+  addLegBiped(p, builder);
+  Reference half_sitting = makeSerialHalfSitting("humanoid", p);
+  for (const BipedSide& side : {BipedSide{1, "_left"}, BipedSide{-1, "_right"}}) {
+    addArm({side, p}, builder);
+    half_sitting.joints["armpitch" + side.name] = {0.3};
+    half_sitting.joints["armroll" + side.name] = {side.s * 0.15};
+    half_sitting.joints["elbow" + side.name] = {-0.8};
+    half_sitting.joints["finger1_joint" + side.name] = {0};
+  }
+  builder.addReference(half_sitting);
+  return builder.build();
+}
+
+}  // namespace bielle
