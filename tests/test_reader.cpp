@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <random>
 #include <sstream>
 
 #include "bielle/dynamics/closure.h"
@@ -216,6 +217,38 @@ TEST_CASE(
     REQUIRE(robot.warnings.size() == 1);
     CHECK_THAT(robot.warnings[0], Catch::Contains("cannot be read, among them 'd."));
   }
+}
+
+TEST_CASE("mutated meshes give finite shapes or none") {
+  const RobotDirectory directory;
+  std::mt19937 rng(71);
+  const std::vector<Vector3d> corners = listCorners({4, 2, 1}, Matrix3d::Identity());
+  int fitted = 0, none = 0;
+  for (const auto& [mesh, content] : {std::pair<std::string, std::string>("a.stl", makeBinaryStl(corners)),
+                                      {"b.stl", makeText(corners, "vertex")},
+                                      {"c.obj", makeText(corners, "v")}})
+    for (int i = 0; i < 300; ++i) {
+      std::string mutated = content;
+      for (int n = 0; n <= i % 4; ++n) mutated[rng() % mutated.size()] = static_cast<char>(rng());
+      if (i % 10 == 9) mutated.resize(rng() % mutated.size());
+      CAPTURE(mesh, i);
+      directory.write(mesh, mutated);
+      const Model model =
+          loadRobot(directory.writeRobot("<robot name='r'><link name='base'><visual><geometry><mesh filename='" + mesh +
+                                             "'/></geometry></visual></link></robot>",
+                                         "base: free"))
+              .model;
+      (model.shapes().empty() ? none : fitted) += 1;
+      for (const Shape& shape : model.shapes()) {
+        CHECK(shape.X_BS.p.allFinite());
+        CHECK((shape.X_BS.R.transpose() * shape.X_BS.R - Matrix3d::Identity()).norm() < 1e-9);
+        CHECK(shape.half.allFinite());
+        CHECK(shape.half.minCoeff() >= 0);
+        CHECK(std::isfinite(shape.radius));
+      }
+    }
+  CHECK(fitted > 100);
+  CHECK(none > 50);
 }
 
 TEST_CASE("bodies come depth first, children in the order of the file, not of the alphabet") {
