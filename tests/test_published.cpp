@@ -154,7 +154,7 @@ TEST_CASE("Digit squats, walks and climbs stairs with the feet and the posture t
   if (!isAtHand("digit_like_2legs")) return;
   const LoadedRobot robot = loadCompleted("digit");
   const Model& model = robot.model;
-  CHECK(robot.warnings.empty());
+  CHECK(robot.warnings.size() == 1);  // its meshes are elsewhere
   CHECK(robot.file.substr(robot.file.size() - 10) == "digit.yaml");
   CHECK(model.nu() == 12);
   CHECK(model.armature().sum() == Approx(12e-3));

@@ -142,15 +142,13 @@ class Adopter {
   std::vector<double> measureSole(const Foot& foot) const {
     const Frame& frame = model_.frames()[foot.frame];
     Eigen::Vector2d half = Eigen::Vector2d::Zero();
-    for (const Visual& visual : model_.visuals()) {
-      if (visual.body != frame.body || visual.shape == Visual::Shape::Mesh) continue;
-      Vector3d size = visual.size / 2;
-      if (visual.shape == Visual::Shape::Cylinder) size = {visual.size[0], visual.size[0], visual.size[1] / 2};
-      if (visual.shape == Visual::Shape::Sphere) size = Vector3d::Constant(visual.size[0]);
-      const SE3 X = frame.X_BF.inverse() * visual.X_BV;
+    for (const Shape& shape : model_.shapes()) {
+      if (shape.body != frame.body) continue;
+      const SE3 X = frame.X_BF.inverse() * shape.X_BS;
       for (int corner = 0; corner < 8; ++corner) {
         const Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
-        half = half.cwiseMax(X.act(sign.cwiseProduct(size)).head<2>().cwiseAbs());
+        const Vector3d place = X.act(sign.cwiseProduct(shape.half)).cwiseAbs();
+        half = half.cwiseMax(place.head<2>() + Eigen::Vector2d::Constant(shape.radius));
       }
     }
     if (half.isZero()) return {};
@@ -179,7 +177,7 @@ class Adopter {
                              : ": one, without a mirror image."));
     guesses_.push_back(is_measured
                            ? "Soles: the extent of the shapes of the feet, which may be more than the flat part."
-                           : "Soles: 0.1 m square, because the feet have no shapes but meshes, which are not read.");
+                           : "Soles: 0.1 m square, because the feet have no shapes, or meshes that cannot be read.");
     out_ << "# " << guesses_.back() << "\ncontacts:\n" << lines.str();
     with_feet_ = ModelBuilder::restore(std::move(parts));
   }
