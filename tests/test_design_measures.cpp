@@ -121,7 +121,7 @@ TEST_CASE("measures: electrical energy of a harmonic motion") {
 TEST_CASE("measures: drives by name") {
   const Model leg = makeFiveBarLeg();
   DriveTable table;
-  table.common.motor_constant = 1.5;
+  table.motor_constant = 1.5;
   table.motor_constants = {{"motor_back", 2.5}};
   const std::vector<MotorConversion> drives = makeDrives(leg, table);
   REQUIRE(drives.size() == 2);
@@ -132,7 +132,7 @@ TEST_CASE("measures: drives by name") {
   table.motor_constants = {{"motor_back", 0}};
   CHECK_THROWS_WITH(makeDrives(leg, table), Contains("not positive"));
   table = {};
-  table.common.regeneration = 1.1;
+  table.regeneration = 1.1;
   CHECK_THROWS_WITH(makeDrives(leg, table), Contains("0 .. 1"));
 }
 

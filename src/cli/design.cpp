@@ -1,6 +1,7 @@
 // bielle design: lengths of a robot chosen by optimization.
 #include <filesystem>
 #include <iostream>
+#include <numeric>
 #include <optional>
 
 #include "bielle/io/motion_registry.h"
@@ -71,22 +72,25 @@ int run(const DesignArguments& arguments) {
   options.mode = spec.mode;
   options.drives = spec.drives;
   options.margin = spec.margin;
+  options.constraints = spec.constraints;
   const DesignEvaluator evaluator(robot, motions, spec.objective, options);
   if (request) return evaluateRequest(evaluator, *request, arguments.directory);
   const DesignRun run = runSearches(arguments, evaluator, spec, engine.get());
 
-  const int count = run.counts[0] + run.counts[1] + run.counts[2];
+  const int count = std::accumulate(run.counts.begin(), run.counts.end(), 0);
   std::vector<Row> rows = {
       {"value", formatNumber(evaluator.start().value, "%.4f") + " -> " + formatNumber(run.value, "%.4f")},
       {"evaluations", std::to_string(count) + ", " + std::to_string(run.replayed) + " of them from the logs; " +
                           formatNumber(run.seconds, "%.0f") + " s of processor time"},
       {"infeasible",
-       std::to_string(run.counts[1]) + " loop open, " + std::to_string(run.counts[2]) + " motion failed"}};
+       std::to_string(run.counts[1]) + " loop open, " + std::to_string(run.counts[2]) + " motion failed" +
+           (spec.constraints.empty() ? "" : ", " + std::to_string(run.counts[3]) + " constraint violated")}};
   for (size_t i = 0; i < robot.variables().size(); ++i) {
     const Eigen::Index k = static_cast<Eigen::Index>(i);
-    rows.push_back({robot.variables()[i].name, formatNumber(robot.start()[k], "%.5g") + " -> " +
-                                                   formatNumber(run.best[k], "%.5g") + " " +
-                                                   robot.variables()[i].unit});
+    const DesignVariable& variable = robot.variables()[i];
+    const std::string from =
+        variable.isChoice() ? describeValue(variable, robot.start()[k]) : formatNumber(robot.start()[k], "%.5g");
+    rows.push_back({variable.name, from + " -> " + describeValue(variable, run.best[k])});
   }
   if (spec.front) rows.push_back({"front", std::to_string(run.front.size()) + " designs that no other dominates"});
   printTable(std::cout, rows);
@@ -124,6 +128,9 @@ void addDesign(CLI::App& app, Action& action) {
       "    - name: motor_x\n"
       "      bounds: [-0.01, 0.01]\n"
       "      shift: [{of: motor_knee_right, along: [1, 0, 0]}, {of: motor_knee_left, along: [1, 0, 0]}]\n"
+      "    - {name: gear, ratio: \"*knee*\", bounds: [6, 20]}             (turns of the rotor; * is any text in a motor's name)\n"
+      "    - {name: motor, motor: \"*knee*\", choices: [ak80-9, ak10-9], mass: knee_motor_mass}     (of a generator)\n"
+      "  architecture: [four_bar_knee, belt_knee, rsu_ankle, differential_ankle]     (parts of `generator: leg_biped`)\n"
       "  motions:\n"
       "    - {motion: squat, set: {depth: 0.6}}\n"
       "  mode: reoptimized          (or `kept`: postures of the start design, motor torques computed anew)\n"
@@ -136,6 +143,9 @@ void addDesign(CLI::App& app, Action& action) {
       "    - {measure: peak_torque, motors: [motor_knee_left, motor_knee_right], weight: 1}\n"
       "    - {measure: workspace, region: {foot: foot_left, x: [-0.2, 0.2], z: [-0.1, 0.1]}}     (share that is "
       "reached)\n"
+      "  constraints:               (on all motions: envelope, heat [at most 1], mass [kg], margin, distance [m], ...)\n"
+      "    - {measure: heat}\n"
+      "    - {measure: distance, at_least: 0.005}\n"
       "  drives: {motor_constant: 2, regeneration: 0}     (for electrical_energy; N m/sqrt(W) at the joints)\n"
       "  search:\n"
       "    seed: 1\n"

@@ -8,31 +8,40 @@
 namespace bielle {
 namespace {
 
-std::vector<int> findMotors(const Model& model, const ReducedCluster& cluster) {
+std::vector<int> findRows(const Model& model, const ReducedCluster& cluster, LinkageSide side) {
   std::vector<int> positions;
-  for (size_t i = 0; i < cluster.dofs.size(); ++i)
-    for (const Motor& motor : model.motors())
-      if (motor.dof == cluster.dofs[i]) positions.push_back(static_cast<int>(i));
+  for (size_t i = 0; i < cluster.dofs.size(); ++i) {
+    const auto has = [&](int dof) { return dof == cluster.dofs[i]; };
+    bool found = false;
+    if (side == LinkageSide::Motors)
+      for (const Motor& motor : model.motors()) found = found || has(motor.dof);
+    else
+      for (int joint : model.serialJoints()) {
+        const Joint& j = model.joints()[joint];
+        for (int k = 0; k < j.nv; ++k) found = found || has(j.idx_v + k);
+      }
+    if (found) positions.push_back(static_cast<int>(i));
+  }
   return positions;
 }
 
-double calcConditioning(const MatrixXd& N, const std::vector<int>& motors) {
+double calcConditioning(const MatrixXd& N, const std::vector<int>& rows) {
   const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(N).householderQ() * MatrixXd::Identity(N.rows(), N.cols());
-  MatrixXd Q_M(motors.size(), Q.cols());
-  for (size_t i = 0; i < motors.size(); ++i) Q_M.row(static_cast<Eigen::Index>(i)) = Q.row(motors[i]);
+  MatrixXd Q_M(rows.size(), Q.cols());
+  for (size_t i = 0; i < rows.size(); ++i) Q_M.row(static_cast<Eigen::Index>(i)) = Q.row(rows[i]);
   const double least = Eigen::JacobiSVD<MatrixXd>(Q_M).singularValues().tail<1>()[0];
   return least > 0 ? 1 / least : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace
 
-LinkageConditioning::LinkageConditioning(const Model& model, ConstVectorRef q) : model_(model) {
+LinkageConditioning::LinkageConditioning(const Model& model, ConstVectorRef q, LinkageSide side) : model_(model) {
   if (model.closures().empty()) return;
   reduction_ = makeReduction(model, q);
   for (const ReducedCluster& cluster : reduction_.clusters) {
-    const std::vector<int> motors = findMotors(model, cluster);
-    if (cluster.size > 0 && static_cast<int>(motors.size()) >= cluster.size)
-      entries_.push_back({&cluster, motors, ClusterPoint(cluster), VectorXd(cluster.model.nq())});
+    const std::vector<int> rows = findRows(model, cluster, side);
+    if (cluster.size > 0 && static_cast<int>(rows.size()) >= cluster.size)
+      entries_.push_back({&cluster, rows, ClusterPoint(cluster), VectorXd(cluster.model.nq())});
   }
 }
 
@@ -41,7 +50,7 @@ double LinkageConditioning::calc(ConstVectorRef q) {
   for (Entry& entry : entries_) {
     gatherConfiguration(model_, *entry.cluster, q, entry.q);
     if (!entry.point.update(*entry.cluster, entry.q)) return std::numeric_limits<double>::infinity();
-    worst = std::max(worst, calcConditioning(entry.point.basis().N, entry.motors));
+    worst = std::max(worst, calcConditioning(entry.point.basis().N, entry.rows));
   }
   return worst;
 }

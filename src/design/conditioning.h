@@ -6,14 +6,20 @@
 
 namespace bielle {
 
+/// What a linkage is determined by.
+enum class LinkageSide {
+  Motors,
+  Joints  ///< serial joints; the inverse is their least motion in a unit motion of the linkage, 0 at a dead point
+};
+
 /// With Q an orthonormal basis of the closed motions of a loop cluster and Q_M its rows of motors, 1 / sigma_min(Q_M):
 /// the largest motion of the linkage per unit motion of its motors. 1 or more; infinite if the motors do not determine
-/// the linkage. Clusters with fewer motors than mobility are omitted.
+/// the linkage. Clusters with fewer motors than mobility are omitted. The same for joints.
 class LinkageConditioning {
  public:
   /// The model must outlive it.
   /// \param q  closed configuration at which ranks are determined. \throws ModelError as makeReduction
-  LinkageConditioning(const Model& model, ConstVectorRef q);
+  LinkageConditioning(const Model& model, ConstVectorRef q, LinkageSide side = LinkageSide::Motors);
   LinkageConditioning(const LinkageConditioning&) = delete;
   LinkageConditioning& operator=(const LinkageConditioning&) = delete;
   /// The worst cluster at a closed configuration; infinite if one has lost rank.
@@ -22,7 +28,7 @@ class LinkageConditioning {
  private:
   struct Entry {
     const ReducedCluster* cluster;
-    std::vector<int> motors;  // positions among the dofs of the cluster
+    std::vector<int> rows;  // positions among the dofs of the cluster
     ClusterPoint point;
     VectorXd q;
   };

@@ -8,8 +8,8 @@ namespace bielle {
 
 VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const MotionEnvelope& envelope,
                           const std::function<Motion(const Model&)>& make) {
-  VectorXd gradient(x.size());
-  for (Eigen::Index i = 0; i < x.size(); ++i) {
+  VectorXd gradient = VectorXd::Zero(x.size());
+  for (Eigen::Index i : robot.listContinuous()) {
     const double step = kDesignStep * (robot.upper()[i] - robot.lower()[i]);
     const VectorXd dx = step * VectorXd::Unit(x.size(), i);
     const Model ahead = robot.make(x + dx), behind = robot.make(x - dx);

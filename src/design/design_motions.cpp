@@ -105,10 +105,10 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
   return out;
 }
 
-MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const SolvedMotion& start,
+MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const SolvedMotion* start,
                            const FddpOptions& options, const std::vector<MotorConversion>& drives) {
   Motion made = makeDesignMotion(model, motion, makeStandingPosture(model));
-  setStart(model, start, made);
+  if (start) setStart(model, *start, made);
   return solve(std::move(made), options, drives);
 }
 

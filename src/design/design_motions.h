@@ -45,8 +45,8 @@ struct MotionOutcome {
 SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, const FddpOptions& options, int postures,
                               bool must_keep);
 
-/// Solved for a design, from the solution of the start design.
-MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const SolvedMotion& start,
+/// Solved for a design, from the solution of the start design, or from the guess of the plan if there is none.
+MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const SolvedMotion* start,
                            const FddpOptions& options, const std::vector<MotorConversion>& drives);
 
 /// Postures and accelerations of the start design, motors recomputed. \param margin  EvaluationOptions::margin

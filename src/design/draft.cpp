@@ -4,7 +4,7 @@
 
 namespace bielle {
 
-RobotDraft::RobotDraft(const Model& model) : model_(model), visuals_(model.visuals()), shapes_(model.shapes()) {
+RobotDraft::RobotDraft(const Model& model) : model_(model), visuals_(model.visuals()), shapes_(model.shapes()), motors_(model.motors()) {
   for (const Joint& joint : model.joints()) joints_.push_back(joint.X_PJ);
   for (const Frame& frame : model.frames()) frames_.push_back(frame.X_BF);
   for (const Body& body : model.bodies()) inertias_.push_back(body.inertia);
@@ -139,7 +139,7 @@ Model RobotDraft::build() const {
     builder.addClosure(c.name, c.kind, place(c.name + "/frame1", c.body1, c.X_B1),
                        place(c.name + "/frame2", c.body2, c.X_B2), c.axis, c.kp, c.kd);
   }
-  for (const Motor& motor : m.motors()) builder.addMotor(motor);
+  for (const Motor& motor : motors_) builder.addMotor(motor);
   for (const Joint& joint : m.joints())
     if (joint.nv > 0 && m.findMotor(joint.name) < 0) builder.setArmature(joint.name, m.armature()[joint.idx_v]);
   for (const JointForce& force : m.jointForces()) builder.addJointForce(m.joints()[force.joint].name, force);

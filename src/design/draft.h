@@ -35,6 +35,9 @@ class RobotDraft {
   /// Scales mass and inertia of a link by a positive factor; its centre of mass stays.
   void scaleMass(const std::string& link, double factor);
 
+  /// A motor in place of that with its index.
+  void setMotor(int index, const Motor& motor) { motors_[static_cast<size_t>(index)] = motor; }
+
   Model build() const;
 
  private:
@@ -49,6 +52,7 @@ class RobotDraft {
   std::vector<Inertia> inertias_;
   std::vector<Visual> visuals_;
   std::vector<Shape> shapes_;
+  std::vector<Motor> motors_;
 };
 
 }  // namespace bielle

@@ -7,9 +7,17 @@
 /// point. Infeasible designs are not errors; their values are
 ///     f = 2 W + W mean_p min(1, 10 g_p)      some posture p of the start's motions is infeasible                   (2)
 ///     f = 1.5 W + 0.5 W s                    all are feasible, but a motion failed                                 (3)
+///     f = 1.5 W + 0.5 W / (n + 1) V / (1 + V)        all n motions are made, but constraints are violated          (4)
+/// with V the sum of the violations of constraints, each relative to its bound (in centimetres for a distance), and
 /// with g_p (m or rad) the largest closing error that remains when loops, base and feet are moved to posture p, and s
 /// in (0, 1] the missing share of the motion (kept motions), else 1. (2) is continuous in the design, so that searches
-/// return to designs whose loops close.
+/// return to designs whose loops close. So designs that violate constraints less are better than those that violate them more, and
+/// these better than those without motions (Deb 2000, "An efficient constraint handling method for genetic algorithms"). The start
+/// may violate constraints.
+///
+/// Designs of other parts of a generator (Parametrization::getArchitecture) are other robots: postures and first motions are those of
+/// the start with these parts, made when they are needed. Where the start with these parts cannot make a motion, it is solved for each
+/// design from the guess of its plan, and no posture is checked.
 #include <functional>
 #include <memory>
 #include <optional>
@@ -37,11 +45,20 @@ struct ObjectiveTerm {
   WorkspaceRegion region = {};      ///< only for the workspace, which has no motors
 };
 
+/// A bound on a measure, for all motions.
+struct DesignConstraint {
+  Measure measure = Measure::Envelope;  ///< but for the cost and the workspace
+  std::vector<std::string> motors;      ///< empty: all
+  double bound = 1;
+  bool at_least = false;  ///< else at most
+};
+
 struct EvaluationOptions {
   MotionMode mode = MotionMode::Reoptimized;
   FddpOptions solver = makeSolverOptions();
   int postures = 6;  ///< of each motion, for (2)
   DriveTable drives;
+  std::vector<DesignConstraint> constraints;
   /// Kept motions whose linkages come nearer to a dead point fail (LiftOptions::singular): least motion of a joint in a
   /// unit motion of its linkage. Where motions are made anew, a larger margin than this one limits searches with gradients to
   /// designs whose linkages could also follow the motions of the start design at that distance: their loops close.
@@ -56,16 +73,19 @@ struct GradientObstacle {
   std::string problem, remedy;
 };
 /// Empty if every measure has a gradient.
-std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std::vector<ObjectiveTerm>& objective);
+std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std::vector<ObjectiveTerm>& objective,
+                                                     const std::vector<DesignConstraint>& constraints,
+                                                     const std::vector<DesignVariable>& variables);
 
-enum class DesignStatus { Feasible, LoopOpen, MotionFailed };
+enum class DesignStatus { Feasible, LoopOpen, MotionFailed, Violated };
 const char* getName(DesignStatus status);
 
 struct Evaluation {
   DesignStatus status = DesignStatus::Feasible;
   double value = 0;                     ///< f
-  std::vector<double> terms;            ///< m_i, if feasible
-  std::vector<MotionMeasures> motions;  ///< if feasible
+  std::vector<double> terms;            ///< m_i, if feasible or violated
+  std::vector<MotionMeasures> motions;  ///< likewise
+  std::vector<double> constraints;      ///< their measures, likewise
   std::string message;                  ///< reason if infeasible
 };
 
@@ -92,10 +112,11 @@ class DesignEvaluator {
   /// motion fails.
   /// \throws ModelError when a measure has no gradient
   SlopedEvaluation differentiate(const VectorXd& x) const;
-  const Evaluation& start() const;  ///< of the start design
+  const Evaluation& start() const;  ///< of the start design, feasible or violated
   const Parametrization& robot() const;
   const std::vector<DesignMotion>& motions() const;
   const std::vector<ObjectiveTerm>& objective() const;
+  const std::vector<DesignConstraint>& constraints() const;
 
  private:
   struct Data;

@@ -7,6 +7,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
+#include "design/motor_change.h"
 #include "io/fastenings.h"
 
 namespace bielle {
@@ -70,10 +71,11 @@ std::vector<int> chooseMotors(const DesignEvaluator& evaluator, const MotionMeas
   const Model& model = evaluator.robot().startModel();
   std::set<int> named;
   for (const ObjectiveTerm& term : evaluator.objective())
-    for (const std::string& motor : term.motors) named.insert(model.findMotor(motor));
+    for (int motor : findMotors(model, term.motors)) named.insert(motor);
   if (named.empty())
     for (int m = 0; m < model.nu(); ++m) named.insert(m);
   std::vector<int> motors(named.begin(), named.end());
+  while (!motors.empty() && motors.back() >= static_cast<int>(after.motors.size())) motors.pop_back();  // other parts
   const auto peak = [&](int m) { return std::max(before.motors[m].peak_torque, after.motors[m].peak_torque); };
   std::stable_sort(motors.begin(), motors.end(), [&](int a, int b) { return peak(a) > peak(b); });
   motors.resize(std::min(motors.size(), kMostMotors));
@@ -142,11 +144,13 @@ DesignFigure makeMechanismFigure(const DesignEvaluator& evaluator, const DesignR
 
 }  // namespace
 
-std::string describeTerm(const ObjectiveTerm& term) {
-  std::string text = getName(term.measure);
-  for (const std::string& motor : term.motors) text += (&motor == &term.motors.front() ? " of " : ", ") + motor;
+std::string describeMeasure(Measure measure, const std::vector<std::string>& motors) {
+  std::string text = getName(measure);
+  for (const std::string& motor : motors) text += (&motor == &motors.front() ? " of " : ", ") + motor;
   return text;
 }
+
+std::string describeTerm(const ObjectiveTerm& term) { return describeMeasure(term.measure, term.motors); }
 
 std::vector<DesignFigure> makeDesignFigures(const DesignEvaluator& evaluator, const DesignRun& run) {
   std::vector<DesignFigure> figures = {{"design", {makeCourse(evaluator, run)}}};

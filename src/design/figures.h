@@ -14,6 +14,7 @@ struct DesignFigure {
 };
 
 // A term of the objective in words.
+std::string describeMeasure(Measure measure, const std::vector<std::string>& motors);
 std::string describeTerm(const ObjectiveTerm& term);
 
 // `design`: values over evaluations. `design_front`: where several objectives are kept apart, the first over each of the

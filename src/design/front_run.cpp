@@ -44,8 +44,10 @@ class FrontRunner {
   DesignRun run() {
     const Parametrization& robot = evaluator_.robot();
     const FrontSpec& front = *spec_.front;
+    std::vector<bool> whole;
+    for (const DesignVariable& variable : robot.variables()) whole.push_back(variable.isChoice());
     searchFront({robot.lower(), robot.upper(), robot.start(), static_cast<int>(evaluator_.objective().size()),
-                 [this](const std::vector<VectorXd>& designs) { return evaluate(designs); }},
+                 [this](const std::vector<VectorXd>& designs) { return evaluate(designs); }, whole},
                 front.options, spec_.seed);
     selectDesigns();
     if (front.refine) {
@@ -160,14 +162,18 @@ class FrontRunner {
   std::vector<LoggedEvaluation> descend(const VectorXd& start, const SearchStage& stage) {
     std::vector<LoggedEvaluation> found;
     std::vector<double> bounds;
-    SearchProblem problem{evaluator_.robot().lower(), evaluator_.robot().upper(), start, {}, {}};
+    const Parametrization& robot = evaluator_.robot();
+    const Continuous continuous(robot, start);
+    if (continuous.start().size() == 0) return found;
+    SearchProblem problem{
+        continuous.pick(robot.lower()), continuous.pick(robot.upper()), continuous.start(), {}, {}};
     problem.sloped = [&](const VectorXd& x, const SearchStage&) {
-      found.push_back(get(stage.algorithm, x));
+      found.push_back(get(stage.algorithm, continuous.expand(x)));
       const LoggedEvaluation& e = found.back();
       if (bounds.empty())
         for (const MeasurePieces& term : e.terms) bounds.push_back(term.values.maxCoeff());
-      SlopedValue out{e.value, e.terms, e.limits};
-      for (size_t k = 0; k < e.terms.size() && k < bounds.size(); ++k) append(e.terms[k], bounds[k], out.limits);
+      SlopedValue out = continuous.pick(e);
+      for (size_t k = 0; k < out.terms.size() && k < bounds.size(); ++k) append(out.terms[k], bounds[k], out.limits);
       return out;
     };
     minimizeByStages(problem, {stage}, spec_.seed);

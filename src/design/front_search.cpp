@@ -17,33 +17,52 @@ namespace {
 constexpr double kCrossover = 0.9, kCrossoverIndex = 20, kMutationIndex = 20;
 constexpr unsigned kMostNeighbours = 20;  // of MOEA/D
 
-VectorXd makeDesign(const double* x, Eigen::Index size) { return VectorXd::Map(x, size); }
-
-// As pagmo wants problems: a value with these members.
+// As pagmo wants problems: a value with these members. Whole numbers come last there; its NSGA-II gives them the value of either parent
+// or any other.
 struct PagmoProblem {
   const FrontProblem* problem = nullptr;
+  std::vector<Eigen::Index> order = {};  // variables in pagmo's order
+  pagmo::vector_double::size_type num_whole = 0;
 
+  explicit PagmoProblem(const FrontProblem* p = nullptr) : problem(p) {
+    for (const bool whole : {false, true})
+      for (Eigen::Index i = 0; p && i < p->start.size(); ++i) {
+        const bool is_whole = static_cast<size_t>(i) < p->whole.size() && p->whole[static_cast<size_t>(i)];
+        if (is_whole != whole) continue;
+        order.push_back(i);
+        num_whole += whole;
+      }
+  }
+  VectorXd makeDesign(const double* x) const {
+    VectorXd design(static_cast<Eigen::Index>(order.size()));
+    design(order) = VectorXd::Map(x, design.size());
+    return design;
+  }
+  pagmo::vector_double sort(const VectorXd& x) const {
+    const VectorXd sorted = x(order);
+    return {sorted.begin(), sorted.end()};
+  }
   pagmo::vector_double fitness(const pagmo::vector_double& x) const {
-    return problem->evaluate({makeDesign(x.data(), problem->start.size())}).front();
+    return problem->evaluate({makeDesign(x.data())}).front();
   }
   pagmo::vector_double::size_type get_nobj() const {
     return static_cast<pagmo::vector_double::size_type>(problem ? problem->objectives : 1);
   }
+  pagmo::vector_double::size_type get_nix() const { return num_whole; }
   std::pair<pagmo::vector_double, pagmo::vector_double> get_bounds() const {
     if (!problem) return {{0}, {1}};
-    return {{problem->lower.begin(), problem->lower.end()}, {problem->upper.begin(), problem->upper.end()}};
+    return {sort(problem->lower), sort(problem->upper)};
   }
 };
 
 // A generation at once.
 struct PagmoBatch {
   pagmo::vector_double operator()(const pagmo::problem& of, const pagmo::vector_double& xs) const {
-    const FrontProblem& problem = *of.extract<PagmoProblem>()->problem;
-    const auto n = static_cast<size_t>(problem.start.size());
+    const PagmoProblem& problem = *of.extract<PagmoProblem>();
     std::vector<VectorXd> designs;
-    for (size_t i = 0; i < xs.size(); i += n) designs.push_back(makeDesign(&xs[i], problem.start.size()));
+    for (size_t i = 0; i < xs.size(); i += problem.order.size()) designs.push_back(problem.makeDesign(&xs[i]));
     pagmo::vector_double out;
-    for (const std::vector<double>& objectives : problem.evaluate(designs))
+    for (const std::vector<double>& objectives : problem.problem->evaluate(designs))
       out.insert(out.end(), objectives.begin(), objectives.end());
     return out;
   }
@@ -68,15 +87,18 @@ pagmo::algorithm makeAlgorithm(const FrontProblem& problem, const FrontOptions& 
 bool hasFrontSearch() { return true; }
 
 void searchFront(const FrontProblem& problem, const FrontOptions& options, unsigned seed) {
-  pagmo::population population(pagmo::problem(PagmoProblem{&problem}), 0, seed);
+  const PagmoProblem of_pagmo(&problem);
+  if (of_pagmo.num_whole > 0 && options.algorithm == SearchAlgorithm::Moead)
+    throw std::invalid_argument("moead has no whole numbers");
+  pagmo::population population(pagmo::problem(of_pagmo), 0, seed);
   std::vector<VectorXd> designs = {problem.start};
   while (static_cast<int>(designs.size()) < options.population) {
     const pagmo::vector_double x = population.random_decision_vector();
-    designs.push_back(makeDesign(x.data(), problem.start.size()));
+    designs.push_back(of_pagmo.makeDesign(x.data()));
   }
   const std::vector<std::vector<double>> objectives = problem.evaluate(designs);
   for (size_t i = 0; i < designs.size(); ++i)
-    population.push_back(pagmo::vector_double(designs[i].begin(), designs[i].end()), objectives[i]);
+    population.push_back(of_pagmo.sort(designs[i]), objectives[i]);
   makeAlgorithm(problem, options, seed).evolve(population);
 }
 

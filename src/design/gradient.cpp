@@ -95,7 +95,18 @@ VectorXd findFastest(const MatrixXd& T, const std::vector<int>& columns) {
 
 }  // namespace
 
-bool hasGradient(Measure measure) { return measure != Measure::Conditioning && measure != Measure::Workspace; }
+bool hasGradient(Measure measure) {
+  switch (measure) {
+    case Measure::PeakTorque:
+    case Measure::RmsTorque:
+    case Measure::Energy:
+    case Measure::ElectricalEnergy:
+    case Measure::Cost:
+      return true;
+    default:
+      return false;
+  }
+}
 
 namespace {
 

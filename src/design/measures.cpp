@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bielle/dynamics/distance.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "design/conditioning.h"
+#include "design/motor_change.h"
 
 namespace bielle {
 namespace {
@@ -27,6 +30,22 @@ MotorMeasures calcMeasures(const MotorTrace& trace, Eigen::Index motor, const Mo
   return out;
 }
 
+// What limits leave free counts as 0 of them.
+void addShares(const MotorTrace& trace, Eigen::Index m, const Motor& motor, MotorMeasures& out) {
+  double squares = 0, duration = 0;
+  for (size_t k = 0; k < trace.dt.size(); ++k) {
+    const Eigen::Index stage = static_cast<Eigen::Index>(k);
+    const double u = trace.torque(m, stage), v = trace.speed(m, stage);
+    out.envelope = std::max({out.envelope, std::abs(u) / motor.effort_limit, std::abs(v) / motor.velocity_limit});
+    if (motor.hasEnvelope() && trace.dt[k] > 0)
+      out.envelope = std::max(out.envelope, std::abs(motor.getVoltsPerEffort() * u + motor.getVoltsPerSpeed() * v) /
+                                                motor.drive.voltage);
+    squares += trace.dt[k] * std::pow(motor.getEffortFactor(u * v) * u, 2);
+    duration += trace.dt[k];
+  }
+  if (duration > 0) out.heat = std::sqrt(squares / duration) / motor.continuous_effort;
+}
+
 }  // namespace
 
 std::vector<MotorConversion> makeDrives(const Model& model, const DriveTable& table) {
@@ -37,15 +56,17 @@ std::vector<MotorConversion> makeDrives(const Model& model, const DriveTable& ta
     require(value > 0 && std::isfinite(value), element, "it is not positive",
             "give newton metres per square root of watt");
   };
-  requireConstant(table.common.motor_constant, "motor_constant");
-  require(table.common.regeneration >= 0 && table.common.regeneration <= 1, "regeneration", "it is outside 0 .. 1",
+  if (table.motor_constant) requireConstant(*table.motor_constant, "motor_constant");
+  require(table.regeneration >= 0 && table.regeneration <= 1, "regeneration", "it is outside 0 .. 1",
           "give the share that is given back");
-  std::vector<MotorConversion> drives(model.motors().size(), table.common);
+  std::vector<MotorConversion> drives;
+  for (const Motor& motor : model.motors())
+    drives.push_back({table.motor_constant.value_or(1 / std::sqrt(motor.getTorqueLoss())), table.regeneration});
   for (const auto& [name, constant] : table.motor_constants) {
-    const int motor = model.findMotor(name);
-    require(motor >= 0, "motor '" + name + "'", "there is no such motor", "`bielle info` lists them");
+    const std::vector<int> motors = findMotors(model, {name});
+    require(!motors.empty(), "motor '" + name + "'", "there is no such motor", "`bielle info` lists them");
     requireConstant(constant, "motor '" + name + "'");
-    drives[static_cast<size_t>(motor)].motor_constant = constant;
+    for (int motor : motors) drives[static_cast<size_t>(motor)].motor_constant = constant;
   }
   return drives;
 }
@@ -85,6 +106,39 @@ MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>&
   return out;
 }
 
+void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, const std::set<Measure>& asked,
+                      MotionMeasures& measures) {
+  for (size_t m = 0; m < measures.motors.size(); ++m)
+    addShares(measures.trace, static_cast<Eigen::Index>(m), model.motors()[m], measures.motors[m]);
+  if (asked.count(Measure::Margin)) {
+    LinkageConditioning conditioning(model, trajectory.xs.front().head(model.nq()), LinkageSide::Joints);
+    for (const VectorXd& x : trajectory.xs)
+      measures.margin = std::min(measures.margin, 1 / conditioning.calc(x.head(model.nq())));
+  }
+  if (!asked.count(Measure::Distance)) return;
+  Workspace ws(model);
+  const std::vector<ShapePair> pairs = listShapePairs(model);
+  for (const VectorXd& x : trajectory.xs) {
+    updatePlacements(model, ws, x.head(model.nq()));
+    const NearestPair nearest = findNearestPair(model, ws.X_WB, pairs);
+    if (nearest.pair >= 0) measures.distance = std::min(measures.distance, nearest.distance.distance);
+  }
+}
+
+bool isOfMotors(Measure measure) {
+  switch (measure) {
+    case Measure::PeakTorque:
+    case Measure::RmsTorque:
+    case Measure::Energy:
+    case Measure::ElectricalEnergy:
+    case Measure::Envelope:
+    case Measure::Heat:
+      return true;
+    default:
+      return false;
+  }
+}
+
 const char* getName(Measure measure) {
   switch (measure) {
     case Measure::PeakTorque:
@@ -99,6 +153,16 @@ const char* getName(Measure measure) {
       return "cost";
     case Measure::Workspace:
       return "workspace";
+    case Measure::Mass:
+      return "mass";
+    case Measure::Envelope:
+      return "envelope";
+    case Measure::Heat:
+      return "heat";
+    case Measure::Margin:
+      return "margin";
+    case Measure::Distance:
+      return "distance";
     case Measure::Conditioning:
       break;
   }
@@ -107,13 +171,19 @@ const char* getName(Measure measure) {
 
 double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions) {
   double value = 0;
+  if (measure == Measure::Margin) value = 1;
+  if (measure == Measure::Distance) value = std::numeric_limits<double>::infinity();
   for (const MotionMeasures& motion : motions) {
+    if (measure == Measure::Margin) value = std::min(value, motion.margin);
+    if (measure == Measure::Distance) value = std::min(value, motion.distance);
     if (measure == Measure::Cost) value += motion.cost;
     if (measure == Measure::Conditioning) value = std::max(value, motion.conditioning);
     for (int m : motors) {
       const MotorMeasures& motor = motion.motors[m];
       if (measure == Measure::PeakTorque) value = std::max(value, motor.peak_torque);
       if (measure == Measure::RmsTorque) value = std::max(value, motor.rms_torque);
+      if (measure == Measure::Envelope) value = std::max(value, motor.envelope);
+      if (measure == Measure::Heat) value = std::max(value, motor.heat);
       if (measure == Measure::Energy) value += motor.energy;
       if (measure == Measure::ElectricalEnergy) value += motor.electrical_energy;
     }

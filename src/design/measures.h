@@ -1,5 +1,8 @@
 #pragma once
 /// \file Measures of the effort of motors and linkages in a motion.
+#include <limits>
+#include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -9,6 +12,21 @@
 #include "bielle/solve/shooting_problem.h"
 
 namespace bielle {
+
+enum class Measure {
+  PeakTorque,
+  RmsTorque,
+  Energy,
+  ElectricalEnergy,
+  Cost,
+  Conditioning,
+  Workspace,
+  Mass,      ///< of the robot, kg
+  Envelope,  ///< most of a motor's torque, speed or voltage over what it can give
+  Heat,      ///< most of a motor's root mean square torque over what it bears for ever
+  Margin,    ///< from dead points: least motion of a joint in a unit motion of its linkage
+  Distance   ///< least one of bodies that are not neighbours, m
+};
 
 /// Conversion of electrical into mechanical power. For a motor with motor constant K (torque over the square root of
 /// the heat it makes) behind a gear of ratio n, the model's motor has K_m = n K. The power at its terminals is
@@ -22,9 +40,10 @@ struct MotorConversion {
   double regeneration = 0;  ///< r, 0 .. 1
 };
 
-/// Drives by motor: one constant for all, others by name.
+/// Drives by motor: constants by name, else one for all, else those of the robot's motors, 1 / sqrt(Motor::getTorqueLoss()).
 struct DriveTable {
-  MotorConversion common;
+  std::optional<double> motor_constant;
+  double regeneration = 0;
   std::vector<std::pair<std::string, double>> motor_constants;
 };
 /// \throws ModelError for unknown motors, constants that are not positive, shares outside 0 .. 1
@@ -37,6 +56,8 @@ struct MotorMeasures {
   double peak_speed = 0;         ///< max |v|, rad/s or m/s
   double energy = 0;             ///< sum h |u v|, J: braking energy is not recovered
   double electrical_energy = 0;  ///< sum h (max(P, 0) + r min(P, 0)), Eq. (1), J
+  double envelope = 0;           ///< most of |u|, |v| or the voltage over its limit
+  double heat = 0;               ///< root mean square of c u over Motor::continuous_effort (model.h)
 };
 
 /// Torques and speeds of the motors over N stages; speeds are those at the beginning of a stage.
@@ -54,6 +75,8 @@ struct MotionMeasures {
   std::vector<MotorMeasures> motors;  ///< in the order of the model
   double conditioning = 1;            ///< the worst over the nodes (conditioning.h)
   double cost = 0;                    ///< of a motion that was optimized for the design
+  double margin = 1;                  ///< least inverse of the conditioning by joints, 0 at a dead point
+  double distance = std::numeric_limits<double>::infinity();  ///< least one of shapes, of those listShapePairs() names, m
   MotorTrace trace;
 };
 /// \param trajectory  closed at its nodes
@@ -61,11 +84,17 @@ MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>&
                                   const ShootingTrajectory& trajectory,
                                   const std::vector<MotorConversion>& drives = {});
 
-enum class Measure { PeakTorque, RmsTorque, Energy, ElectricalEnergy, Cost, Conditioning, Workspace };
+/// Envelope and heat of the limits of the motors, into the motors of a motion; margin and distance if they are among those asked for.
+/// \param trajectory  closed at its nodes
+void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, const std::set<Measure>& asked,
+                      MotionMeasures& measures);
+
 const char* getName(Measure measure);
+bool isOfMotors(Measure measure);
 
 /// The largest peak torque, rms torque or conditioning over the named motors and all motions, or the sum of an energy
-/// over them; the sum of the costs of all motions. The workspace does not depend on motions (workspace.h).
+/// over them; the sum of the costs of all motions; the largest share of a limit; the least margin or distance. Workspace
+/// (workspace.h) and mass do not depend on motions.
 double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions);
 
 }  // namespace bielle

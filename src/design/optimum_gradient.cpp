@@ -56,7 +56,7 @@ std::vector<MotorSlopes> calcOptimumSlopes(const Parametrization& robot, const V
       out.push_back(makeSlopes(outcome, x.size()));
       envelopes.push_back(std::make_unique<MotionEnvelope>(*outcome.motion, outcome.multipliers));
     }
-    for (Eigen::Index i = 0; i < x.size(); ++i) {
+    for (Eigen::Index i : robot.listContinuous()) {
       const double h = kDesignStep * (robot.upper()[i] - robot.lower()[i]);
       const VectorXd dx = h * VectorXd::Unit(x.size(), i);
       const Model to = robot.make(x + dx), from = robot.make(x - dx);

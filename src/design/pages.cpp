@@ -1,4 +1,5 @@
 // The output of a design run: the robot, the table, the figures.
+#include <algorithm>
 #include <filesystem>
 #include <sstream>
 
@@ -27,13 +28,38 @@ void writeRow(std::ostream& out, const std::string& name, double before, double 
 
 std::string getFrontName(size_t i) { return (i < 9 ? "0" : "") + std::to_string(i + 1); }
 
+std::string formatBounds(const DesignVariable& v) {
+  if (!v.isChoice()) return format(v.lower) + " .. " + format(v.upper);
+  std::string text;
+  for (const std::string& choice : v.choices) text += (text.empty() ? "" : ", ") + choice;
+  return text;
+}
+
+// Without the unit.
+std::string formatValue(const DesignVariable& v, double value) {
+  return v.isChoice() ? describeValue(v, value) : format(value, "%.5g");
+}
+
+void writeConstraints(std::ostream& out, const DesignEvaluator& evaluator, const DesignRun& run) {
+  if (evaluator.constraints().empty()) return;
+  out << "\n| constraint | bound | before | after |\n|---|---|---|---|\n";
+  for (size_t i = 0; i < evaluator.constraints().size() && i < run.evaluation.constraints.size(); ++i) {
+    const DesignConstraint& constraint = evaluator.constraints()[i];
+    out << "| " << describeMeasure(constraint.measure, constraint.motors) << " | at "
+        << (constraint.at_least ? "least " : "most ") << format(constraint.bound) << " | "
+        << format(evaluator.start().constraints[i]) << " | " << format(run.evaluation.constraints[i]) << " |\n";
+  }
+  if (run.evaluation.status == DesignStatus::Violated)
+    out << "\n**No design found keeps all constraints**; this is the start, where " << run.evaluation.message << ".\n";
+}
+
 void writeVariables(std::ostream& out, const Parametrization& robot, const VectorXd& best) {
   out << "| variable | unit | bounds | before | after |\n|---|---|---|---|---|\n";
   for (size_t i = 0; i < robot.variables().size(); ++i) {
     const DesignVariable& v = robot.variables()[i];
     const Eigen::Index k = static_cast<Eigen::Index>(i);
-    out << "| " << v.name << " | " << v.unit << " | " << format(v.lower) << " .. " << format(v.upper) << " | "
-        << format(robot.start()[k], "%.5g") << " | " << format(best[k], "%.5g") << " |\n";
+    out << "| " << v.name << " | " << (v.isChoice() ? "" : v.unit) << " | " << formatBounds(v) << " | "
+        << formatValue(v, robot.start()[k]) << " | " << formatValue(v, best[k]) << " |\n";
   }
 }
 
@@ -44,14 +70,16 @@ void writeFront(std::ostream& out, const DesignEvaluator& evaluator, const Desig
          "`best` has the "
          "least value, the weighted sum of the objectives relative to the start.\n\n| robot";
   for (const ObjectiveTerm& term : evaluator.objective()) out << " | " << describeTerm(term);
-  for (const DesignVariable& v : robot.variables()) out << " | " << v.name << " [" << v.unit << "]";
+  for (const DesignVariable& v : robot.variables())
+    out << " | " << v.name << (v.isChoice() || v.unit == "1" ? "" : " [" + v.unit + "]");
   out << " |\n|---";
   for (size_t i = 0; i < evaluator.objective().size() + robot.variables().size(); ++i) out << "|---";
   out << "|\n";
   const auto write = [&](const std::string& name, const std::vector<double>& measures, const VectorXd& x) {
     out << "| " << name;
     for (double measure : measures) out << " | " << format(measure);
-    for (double value : x) out << " | " << format(value, "%.5g");
+    for (size_t i = 0; i < robot.variables().size(); ++i)
+      out << " | " << formatValue(robot.variables()[i], x[static_cast<Eigen::Index>(i)]);
     out << " |\n";
   };
   write("start", evaluator.start().terms, robot.start());
@@ -61,13 +89,14 @@ void writeFront(std::ostream& out, const DesignEvaluator& evaluator, const Desig
 // Keeps the table short: only changes of at least a thousandth are listed.
 bool isChanged(double before, double after) { return std::abs(after - before) > 1e-3 * std::abs(before); }
 
-void writeMotion(std::ostream& out, const Model& model, const std::string& name, const MotionMeasures& before,
+void writeMotion(std::ostream& out, const Model& model, const Model& best, const std::string& name, const MotionMeasures& before,
                  const MotionMeasures& after) {
   out << "\n### " << name << "\n\n| measure | before | after | change |\n|---|---|---|---|\n";
-  for (int m = 0; m < model.nu(); ++m) {
+  for (int m = 0; m < std::min(model.nu(), best.nu()); ++m) {
     const MotorMeasures &a = before.motors[m], &b = after.motors[m];
     if (!isChanged(a.peak_torque, b.peak_torque) && !isChanged(a.peak_speed, b.peak_speed)) continue;
-    const std::string& motor = model.motors()[m].name;
+    const std::string &name_before = model.motors()[m].name, &name_after = best.motors()[m].name;
+    const std::string motor = name_before == name_after ? name_before : name_before + ", then " + name_after;
     writeRow(out, motor + ": peak torque [N m]", a.peak_torque, b.peak_torque);
     writeRow(out, motor + ": rms torque [N m]", a.rms_torque, b.rms_torque);
     writeRow(out, motor + ": peak speed [rad/s]", a.peak_speed, b.peak_speed);
@@ -88,15 +117,17 @@ std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec,
   for (size_t i = 0; i < evaluator.objective().size() && i < run.evaluation.terms.size(); ++i)
     writeRow(out, describeTerm(evaluator.objective()[i]), evaluator.start().terms[i], run.evaluation.terms[i]);
   writeRow(out, "value", evaluator.start().value, run.value);
+  writeConstraints(out, evaluator, run);
   if (spec.front) writeFront(out, evaluator, run);
   out << "\n"
-      << run.counts[0] + run.counts[1] + run.counts[2]
+      << run.counts[0] + run.counts[1] + run.counts[2] + run.counts[3]
       << (spec.front ? " evaluations of designs: "
                      : " designs in " + std::to_string(run.searches.size()) + " searches: ")
       << run.counts[0] << " feasible, " << run.counts[1] << " whose loops do not close, " << run.counts[2]
-      << " whose motion fails.\n";
+      << " whose motion fails" << (evaluator.constraints().empty() ? "" : ", " + std::to_string(run.counts[3]) + " that violate constraints")
+      << ".\n";
   for (size_t i = 0; i < run.evaluation.motions.size(); ++i)
-    writeMotion(out, robot.startModel(), evaluator.motions()[i].name, evaluator.start().motions[i],
+    writeMotion(out, robot.startModel(), robot.make(run.best), evaluator.motions()[i].name, evaluator.start().motions[i],
                 run.evaluation.motions[i]);
   return out.str();
 }

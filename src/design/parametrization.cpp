@@ -1,5 +1,6 @@
 #include "bielle/design/parametrization.h"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <sstream>
@@ -7,6 +8,8 @@
 #include "bielle/model/error.h"
 #include "bielle/robots/generators.h"
 #include "design/draft.h"
+#include "design/motor_change.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {
@@ -32,16 +35,30 @@ void setLength(RobotDraft& draft, const LengthChange& change, double length, dou
   if (!change.stretched.empty()) draft.stretch(change.stretched, line.from, line.along / now, length / original);
 }
 
+int getChoice(const DesignVariable& variable, double value) {
+  return std::clamp(static_cast<int>(std::lround(value)), 0, static_cast<int>(variable.choices.size()) - 1);
+}
+
 }  // namespace
+
+std::string describeValue(const DesignVariable& variable, double value) {
+  if (variable.isChoice()) return variable.choices[static_cast<size_t>(getChoice(variable, value))];
+  return formatNumber(value, "%.5g") + (variable.unit == "1" ? "" : " " + variable.unit);
+}
 
 Parametrization::Parametrization(Model model, std::vector<DesignVariable> variables, std::string source)
     : source_(std::move(source)), variables_(std::move(variables)), model_(std::move(model)) {
   start_ = VectorXd::Zero(static_cast<Eigen::Index>(variables_.size()));
   for (size_t i = 0; i < variables_.size(); ++i) {
     const DesignVariable& variable = variables_[i];
-    if (!variable.parameter.empty() || variable.lengths.empty() == variable.shifts.empty())
-      throw ModelError(source_, "variable '" + variable.name + "'", "it is neither a length nor a shift, or both",
-                       "give one of `length` and `shift`; `parameter` is for generated robots");
+    const std::string element = "variable '" + variable.name + "'";
+    if (variable.isChoice())
+      throw ModelError(source_, element, "a given robot has no parts to choose, and the masses of its motors are in its links",
+                       "give the `ratio` of its motors, or a generator");
+    const int kinds = !variable.lengths.empty() + !variable.shifts.empty() + !variable.motors.empty();
+    if (!variable.parameter.empty() || kinds != 1)
+      throw ModelError(source_, element, "it is not one of a length, a shift and a ratio",
+                       "give `length`, `shift` or `ratio`; `parameter` is for generated robots");
     RobotDraft draft(model_);
     for (const ShiftChange& shift : variable.shifts) draft.getPlace(shift.of);
     for (size_t k = 0; k < variable.lengths.size(); ++k) {
@@ -49,7 +66,7 @@ Parametrization::Parametrization(Model model, std::vector<DesignVariable> variab
       const double length = getLine(draft, change).along.norm();
       if (k == 0) start_[static_cast<Eigen::Index>(i)] = length;
       if (!(length > 1e-9 && length + variable.lower - start_[static_cast<Eigen::Index>(i)] > 1e-9))
-        throw ModelError(source_, "variable '" + variable.name + "'",
+        throw ModelError(source_, element,
                          "the distance of '" + change.from + "' and '" + change.to + "' is zero, or would become so",
                          "name two places apart, and raise the lower bound");
       setLength(draft, change, length, length);
@@ -64,30 +81,93 @@ Parametrization::Parametrization(const std::string& generator, std::vector<std::
       generator_(generator),
       settings_(std::move(settings)),
       variables_(std::move(variables)) {
-  for (const DesignVariable& variable : variables_)
-    if (variable.parameter.empty())
-      throw ModelError(source_, "variable '" + variable.name + "'", "it is no parameter of the generator",
-                       "give `parameter`; `length` and `shift` are for given robots");
-  start_.resize(static_cast<Eigen::Index>(variables_.size()));
-  model_ = generate(nullptr, &start_);
+  const GeneratorRequest request = findGenerator(generator_).makeRequest();
+  for (const auto& [name, value] : settings_) setParameter(request.parameters, name, value);
+  start_ = VectorXd::Zero(static_cast<Eigen::Index>(variables_.size()));
+  for (size_t i = 0; i < variables_.size(); ++i) {
+    const DesignVariable& variable = variables_[i];
+    if (variable.parameter.empty() && variable.motors.empty())
+      throw ModelError(source_, "variable '" + variable.name + "'", "it is no parameter of the generator, and no motor's",
+                       "give `parameter`, `ratio` or `motor`; `length` and `shift` are for given robots");
+    if (variable.parameter.empty()) continue;
+    double& start = start_[static_cast<Eigen::Index>(i)];
+    for (const Parameter& parameter : request.parameters) {
+      if (parameter.name != variable.parameter) continue;
+      start = *parameter.value;
+      for (size_t k = 0; k < variable.choices.size(); ++k)
+        if (findChoice(parameter, variable.choices[k]) == *parameter.value) start = static_cast<double>(k);
+      if (variable.isChoice() && variable.choices[static_cast<size_t>(getChoice(variable, start))] !=
+                                     parameter.choices[static_cast<size_t>(*parameter.value)])
+        start = 0;
+    }
+    if (!variable.isChoice()) setParameter(request.parameters, variable.parameter, start);  // refuses unknown names
+  }
   finish();
 }
 
-Model Parametrization::generate(const VectorXd* x, VectorXd* start) const {
+Model Parametrization::generate(const VectorXd& x) const {
   const GeneratorRequest request = findGenerator(generator_).makeRequest();
   for (const auto& [name, value] : settings_) setParameter(request.parameters, name, value);
   for (size_t i = 0; i < variables_.size(); ++i) {
-    const Eigen::Index k = static_cast<Eigen::Index>(i);
-    if (x) setParameter(request.parameters, variables_[i].parameter, (*x)[k]);
+    const DesignVariable& variable = variables_[i];
+    const double value = x[static_cast<Eigen::Index>(i)];
+    const size_t choice = variable.isChoice() ? static_cast<size_t>(getChoice(variable, value)) : 0;
+    if (!variable.mass.empty()) setParameter(request.parameters, variable.mass, variable.types[choice].drive.mass);
+    if (variable.parameter.empty()) continue;
+    if (!variable.isChoice()) setParameter(request.parameters, variable.parameter, value);
     for (const Parameter& parameter : request.parameters)
-      if (start && parameter.name == variables_[i].parameter) (*start)[k] = *parameter.value;
-    if (start) setParameter(request.parameters, variables_[i].parameter, (*start)[k]);  // refuses unknown names
+      if (variable.isChoice() && parameter.name == variable.parameter)
+        *parameter.value = findChoice(parameter, variable.choices[choice]);
   }
   return request.make();
 }
 
+// Types come before ratios, whatever the order of the variables.
+Model Parametrization::changeMotors(Model model, const VectorXd& x) const {
+  const auto is_of_motors = [](const DesignVariable& variable) { return !variable.motors.empty(); };
+  if (std::none_of(variables_.begin(), variables_.end(), is_of_motors)) return model;
+  std::vector<Motor> motors = model.motors();
+  for (const bool types : {true, false})
+    for (size_t i = 0; i < variables_.size(); ++i) {
+      const DesignVariable& variable = variables_[i];
+      const double value = x[static_cast<Eigen::Index>(i)];
+      if (variable.motors.empty() || variable.isChoice() != types) continue;
+      for (int m : findMotors(model, variable.motors)) {
+        Motor& motor = motors[static_cast<size_t>(m)];
+        types ? setType(variable.types[static_cast<size_t>(getChoice(variable, value))], motor) : setRatio(value, motor);
+      }
+    }
+  RobotDraft draft(model);
+  for (size_t m = 0; m < motors.size(); ++m) draft.setMotor(static_cast<int>(m), motors[m]);
+  return draft.build();
+}
+
+// Of variables of motors: what is given, or that of the first of them.
+void Parametrization::readStart() {
+  const Model robot = generator_.empty() ? model_ : generate(start_);
+  for (const bool types : {true, false})
+    for (size_t i = 0; i < variables_.size(); ++i) {
+      const DesignVariable& variable = variables_[i];
+      double& start = start_[static_cast<Eigen::Index>(i)];
+      if (!variable.motors.empty() && variable.isChoice() == types) {
+        const std::vector<int> motors = findMotors(robot, variable.motors);
+        if (motors.empty())
+          throw ModelError(source_, "variable '" + variable.name + "'", "the robot has no such motor",
+                           "`bielle info` lists them; * stands for any text");
+        const Motor& motor = robot.motors()[static_cast<size_t>(motors.front())];
+        if (!types) start = motor.drive.ratio;
+        for (size_t k = 0; k < variable.choices.size(); ++k)
+          if (variable.choices[k] == motor.drive.type) start = static_cast<double>(k);
+      }
+      if (variable.start && variable.isChoice() == types) start = *variable.start;
+    }
+}
+
 void Parametrization::finish() {
   if (variables_.empty()) throw ModelError(source_, "variables", "there are none", "name at least one");
+  for (DesignVariable& variable : variables_)
+    if (variable.isChoice()) variable.lower = 0, variable.upper = static_cast<double>(variable.choices.size()) - 1;
+  readStart();
   lower_ = upper_ = start_;
   std::set<std::string> names;
   for (size_t i = 0; i < variables_.size(); ++i) {
@@ -98,21 +178,59 @@ void Parametrization::finish() {
     bounds << variable.lower << " .. " << variable.upper;
     const std::string element = "variable '" + variable.name + "'";
     if (!names.insert(variable.name).second) throw ModelError(source_, element, "it is given twice", "rename one");
+    if (variable.isChoice() && variable.choices.size() < 2)
+      throw ModelError(source_, element, "there is nothing to choose", "give two choices or more");
     if (!(std::isfinite(variable.lower) && std::isfinite(variable.upper) && variable.lower < variable.upper))
       throw ModelError(source_, element, "its bounds " + bounds.str() + " are crossed", "give the lower one first");
     if (!(start_[k] >= variable.lower && start_[k] <= variable.upper)) {
       std::ostringstream problem;
       problem << "the robot has " << start_[k] << " " << variable.unit << ", outside of its bounds " << bounds.str();
-      throw ModelError(source_, element, problem.str(), "widen the bounds");
+      throw ModelError(source_, element, problem.str(),
+                       variable.motors.empty() ? "widen the bounds" : "widen the bounds, or give `start`");
     }
   }
-  make(start_);
+  if (generator_.empty()) {
+    changePlaces(start_);  // \throws what cannot be changed
+    model_ = changeMotors(std::move(model_), start_);
+    return;
+  }
+  model_ = make(start_);
+}
+
+std::vector<int> Parametrization::getArchitecture(const VectorXd& x) const {
+  std::vector<int> parts;
+  for (size_t i = 0; i < variables_.size(); ++i)
+    if (variables_[i].isArchitecture()) parts.push_back(getChoice(variables_[i], x[static_cast<Eigen::Index>(i)]));
+  return parts;
+}
+
+std::vector<Eigen::Index> Parametrization::listContinuous() const {
+  std::vector<Eigen::Index> out;
+  for (size_t i = 0; i < variables_.size(); ++i)
+    if (!variables_[i].isChoice()) out.push_back(static_cast<Eigen::Index>(i));
+  return out;
+}
+
+std::vector<VectorXd> Parametrization::listCombinations() const {
+  std::vector<VectorXd> out = {start_};
+  for (size_t i = 0; i < variables_.size(); ++i) {
+    const size_t known = out.size(), count = variables_[i].choices.size();
+    for (size_t choice = 0; choice < count; ++choice)
+      for (size_t k = 0; k < known && static_cast<double>(choice) != start_[static_cast<Eigen::Index>(i)]; ++k) {
+        out.push_back(out[k]);
+        out.back()[static_cast<Eigen::Index>(i)] = static_cast<double>(choice);
+      }
+  }
+  return out;
 }
 
 Model Parametrization::make(const VectorXd& x) const {
   if (x.size() != start_.size() || !x.allFinite())
     throw ModelError(source_, "design", "its numbers are not as many as the variables, or not finite");
-  if (!generator_.empty()) return generate(&x, nullptr);
+  return changeMotors(generator_.empty() ? changePlaces(x) : generate(x), x);
+}
+
+Model Parametrization::changePlaces(const VectorXd& x) const {
   const RobotDraft original(model_);
   RobotDraft draft(model_);
   for (size_t i = 0; i < variables_.size(); ++i) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <exception>
@@ -28,16 +29,20 @@ class DesignRunner {
   DesignRunner(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options)
       : evaluator_(evaluator), spec_(spec), options_(options) {
     makeOutputDirectory(options.directory);
-    for (int i = 0; i < spec.searches; ++i)
+    for (const VectorXd& combination : evaluator.robot().listCombinations())
+      starts_.insert(starts_.end(), static_cast<size_t>(spec.searches), combination);
+    for (size_t i = 0; i < starts_.size(); ++i)
       logs_.push_back(std::make_unique<EvaluationLog>(options.directory + "/search" + std::to_string(i + 1) + ".jsonl",
                                                       makeLogHeader(evaluator, spec, std::to_string(i + 1))));
     run_.searches.resize(logs_.size());
-    best_shown_ = evaluator.start().value;
+    const Evaluation& start = evaluator.start();
+    best_shown_ = start.status == DesignStatus::Feasible ? start.value : HUGE_VAL;
   }
 
   DesignRun run() {
     std::vector<std::thread> threads;
-    const int jobs = options_.evaluations ? spec_.searches : std::min(options_.jobs, spec_.searches);
+    const int searches = static_cast<int>(starts_.size());
+    const int jobs = options_.evaluations ? searches : std::min(options_.jobs, searches);
     if (options_.evaluations) options_.evaluations->enter(jobs);
     for (int i = 0; i < jobs; ++i) threads.emplace_back([this] { work(); });
     for (std::thread& thread : threads) thread.join();
@@ -63,13 +68,19 @@ class DesignRunner {
 
   void search(size_t i) {
     const Parametrization& robot = evaluator_.robot();
-    const auto objective = [&](const VectorXd& x, const SearchStage& stage) { return evaluate(i, x, stage).value; };
-    const auto sloped = [&](const VectorXd& x, const SearchStage& stage) {
-      const LoggedEvaluation e = evaluate(i, x, stage);
-      return SlopedValue{e.value, e.terms, e.limits};
+    const Continuous continuous(robot, starts_[i]);
+    if (continuous.start().size() == 0) {
+      evaluate(i, starts_[i], spec_.stages.front());
+      return;
+    }
+    const auto objective = [&](const VectorXd& x, const SearchStage& stage) {
+      return evaluate(i, continuous.expand(x), stage).value;
     };
-    minimizeByStages({robot.lower(), robot.upper(), robot.start(), objective, sloped}, spec_.stages,
-                     spec_.seed + static_cast<unsigned>(i));
+    const auto sloped = [&](const VectorXd& x, const SearchStage& stage) {
+      return continuous.pick(evaluate(i, continuous.expand(x), stage));
+    };
+    minimizeByStages({continuous.pick(robot.lower()), continuous.pick(robot.upper()), continuous.start(), objective, sloped},
+                     spec_.stages, spec_.seed + static_cast<unsigned>(i));
   }
 
   LoggedEvaluation evaluate(size_t i, const VectorXd& x, const SearchStage& stage) {
@@ -103,6 +114,7 @@ class DesignRunner {
   const DesignEvaluator& evaluator_;
   const DesignSpec& spec_;
   const DesignRunOptions& options_;
+  std::vector<VectorXd> starts_;  // of the searches
   std::vector<std::unique_ptr<EvaluationLog>> logs_;
   DesignRun run_;
   double best_shown_ = 0;
@@ -113,6 +125,24 @@ class DesignRunner {
 };
 
 }  // namespace
+
+Continuous::Continuous(const Parametrization& robot, const VectorXd& x) : x_(x), indices_(robot.listContinuous()) {}
+
+VectorXd Continuous::expand(const VectorXd& of_search) const {
+  VectorXd x = x_;
+  x(indices_) = of_search;
+  return x;
+}
+
+SlopedValue Continuous::pick(const LoggedEvaluation& e) const {
+  const auto pick_pieces = [&](const MeasurePieces& pieces) {
+    return MeasurePieces{pieces.values, pieces.gradients(Eigen::all, indices_)};
+  };
+  SlopedValue out{e.value, {}, {}};
+  for (const MeasurePieces& term : e.terms) out.terms.push_back(pick_pieces(term));
+  if (e.limits.values.size() > 0) out.limits = pick_pieces(e.limits);
+  return out;
+}
 
 std::string makeLogHeader(const DesignEvaluator& evaluator, const DesignSpec& spec, const std::string& search) {
   const VectorXd& start = evaluator.robot().start();
@@ -126,13 +156,15 @@ std::string makeLogHeader(const DesignEvaluator& evaluator, const DesignSpec& sp
 
 void addUpSearches(const DesignEvaluator& evaluator, DesignRun& run) {
   run.best = evaluator.robot().start();
-  run.value = evaluator.start().value;
+  const Evaluation& start = evaluator.start();
+  run.value = start.status == DesignStatus::Feasible ? start.value : HUGE_VAL;
   for (const auto& search : run.searches)
     for (const LoggedEvaluation& e : search) {
       ++run.counts[static_cast<size_t>(e.status)];
       run.seconds += e.seconds;
       if (e.status == DesignStatus::Feasible && e.value < run.value) run.value = e.value, run.best = e.x;
     }
+  if (run.value == HUGE_VAL) run.value = start.value;
   run.evaluation = evaluator.evaluate(run.best);
 }
 
@@ -143,7 +175,7 @@ LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorith
   const Evaluation& evaluation = sloped.evaluation;
   return {
       getName(stage),  x, evaluation.status, evaluation.value, getThreadSeconds() - begin, sloped.terms, sloped.limits,
-      evaluation.terms};
+      evaluation.status == DesignStatus::Feasible ? evaluation.terms : std::vector<double>()};
 }
 
 DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options) {

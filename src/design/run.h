@@ -1,6 +1,7 @@
 #pragma once
 /// \file The searches of a design problem, logged and resumable, and their results.
 ///
+/// Every combination of choices is searched by itself, as often as the specification says.
 /// Every search writes DIR/searchN.jsonl, N from 1: a line that describes the problem, then one line per evaluation,
 /// flushed before the search continues. Searches are deterministic: an interrupted one is repeated with the evaluations
 /// in its log and so resumes where it stopped. An incomplete line is dropped. The search for a front writes DIR/front.jsonl,
@@ -60,10 +61,10 @@ struct FrontDesign {
 
 struct DesignRun {
   std::vector<std::vector<LoggedEvaluation>> searches;
-  VectorXd best;                   ///< the feasible design with the least value; the start if none is better
+  VectorXd best;                   ///< the feasible design with the least value; the start if none is better, or none is feasible
   double value = 0;                ///< its value
   Evaluation evaluation;           ///< of the best design, repeated
-  std::array<int, 3> counts{};     ///< evaluations by status
+  std::array<int, 4> counts{};     ///< evaluations by status
   int replayed = 0;                ///< evaluations found in the logs
   double seconds = 0;              ///< processor time of all evaluations, including those of earlier runs
   std::vector<FrontDesign> front;  ///< if one is asked for, by increasing first measure

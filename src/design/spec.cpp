@@ -1,6 +1,14 @@
 #include "design/spec.h"
 
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "bielle/model/error.h"
+#include "bielle/robots/generators.h"
 #include "design/spec_parts.h"
+#include "model/motor_catalogue.h"
 #include "model/text_file.h"
 
 namespace bielle {
@@ -51,26 +59,132 @@ ShiftChange readShift(const Entry& entry) {
   return {require(fields, "of", entry).getText(), readDirection(require(fields, "along", entry))};
 }
 
-DesignVariable readVariable(const Entry& entry) {
-  const Fields fields = entry.getFields({"name", "unit", "bounds", "length", "shift", "parameter"});
+// Names of motors: a list, or its only element.
+std::vector<std::string> readNames(const Entry& entry) {
+  return entry.isList() ? entry.getTexts() : std::vector<std::string>{entry.getText()};
+}
+
+// Number of a choice by its name.
+double readChoiceNumber(const Entry& entry, const std::vector<std::string>& choices) {
+  const auto found = std::find(choices.begin(), choices.end(), entry.getText());
+  if (found == choices.end()) entry.fail("'" + entry.getText() + "' is none of the choices", "give one of them");
+  return static_cast<double>(found - choices.begin());
+}
+
+void readChoices(const Entry& choices, const Fields& fields, const DesignSpec& spec, const Entry* catalogues,
+                 DesignVariable& variable) {
+  variable.choices = choices.getTexts();
+  if (std::set<std::string>(variable.choices.begin(), variable.choices.end()).size() < variable.choices.size() ||
+      variable.choices.size() < 2)
+    choices.fail("there is nothing to choose, or one of them is there twice", "give two different choices or more");
+  if (spec.robot.generator.empty())
+    choices.fail("a given robot has no parts to choose, and the masses of its motors are in its links",
+                 "give the `ratio` of its motors, or a generator");
+  const std::vector<Parameter> parameters = findGenerator(spec.robot.generator).makeRequest().parameters;
+  const auto getParameter = [&](const Entry& entry) -> const Parameter& {
+    for (const Parameter& parameter : parameters)
+      if (parameter.name == entry.getText()) return parameter;
+    entry.fail("the generator has no parameter '" + entry.getText() + "'",
+               "`bielle generate " + spec.robot.generator + " --help` lists them");
+  };
+  if (const Entry* parameter = find(fields, "parameter"))
+    for (const Entry& name : choices.getList()) {
+      try {
+        findChoice(getParameter(*parameter), name.getText());
+      } catch (const ModelError& error) {
+        name.fail("'" + name.getText() + "' is none of the choices of '" + parameter->getText() + "'",
+                  "`bielle generate " + spec.robot.generator + " --help` lists them");
+      }
+    }
+  if (!find(fields, "motor")) return;
+  variable.types = readMotorTypes(choices.getList(), spec.path, catalogues);
+  const Entry* mass = find(fields, "mass");
+  if (!mass) return;
+  variable.mass = getParameter(*mass).name;
+  for (size_t i = 0; i < variable.types.size(); ++i)
+    if (!(variable.types[i].drive.mass > 0))
+      choices.getList()[i].fail("its mass is not in the catalogue", "add it there, or leave `mass` out");
+}
+
+DesignVariable readVariable(const Entry& entry, const DesignSpec& spec, const Entry* catalogues) {
+  const Fields fields = entry.getFields(
+      {"name", "unit", "bounds", "length", "shift", "parameter", "ratio", "motor", "choices", "mass", "start"});
   DesignVariable variable;
   variable.name = require(fields, "name", entry).getText();
-  if (const Entry* unit = find(fields, "unit")) variable.unit = unit->getText();
-  const Entry& bounds = require(fields, "bounds", entry);
-  const std::vector<double> values = bounds.getNumbers(2);
-  variable.lower = values[0], variable.upper = values[1];
-  if (!(variable.lower < variable.upper))
-    bounds.fail("the bounds of variable '" + variable.name + "' are crossed", "give the lower one first");
   if (const Entry* lengths = find(fields, "length"))
     for (const Entry& item : getItems(*lengths)) variable.lengths.push_back(readLength(item));
   if (const Entry* shifts = find(fields, "shift"))
     for (const Entry& item : getItems(*shifts)) variable.shifts.push_back(readShift(item));
   if (const Entry* parameter = find(fields, "parameter")) variable.parameter = parameter->getText();
-  const int kinds = !variable.lengths.empty() + !variable.shifts.empty() + !variable.parameter.empty();
+  const Entry *ratio = find(fields, "ratio"), *motor = find(fields, "motor"), *choices = find(fields, "choices");
+  if (ratio) variable.motors = readNames(*ratio), variable.unit = "1";
+  if (motor) variable.motors = readNames(*motor);
+  const int kinds =
+      !variable.lengths.empty() + !variable.shifts.empty() + !variable.parameter.empty() + (ratio != nullptr) + (motor != nullptr);
   if (kinds != 1)
-    entry.fail("variable '" + variable.name + "' is not one of a length, a shift and a parameter",
-               "give `length`, `shift` or `parameter`");
+    entry.fail("variable '" + variable.name + "' is not one of a length, a shift, a parameter, a ratio and a motor",
+               "give `length`, `shift`, `parameter`, `ratio` or `motor`");
+  if (const Entry* unit = find(fields, "unit")) variable.unit = unit->getText();
+  const Entry* start = find(fields, "start");
+  if (start && !choices && !ratio)
+    start->fail("only ratios and choices have one", "remove it; the others start as the robot is");
+  if (const Entry* mass = find(fields, "mass"); mass && !motor)
+    mass->fail("only motors have one", "give `motor` with its choices, or remove it");
+  if (motor && !choices) entry.fail("'" + variable.name + "' has no choices", "list motors of a catalogue as `choices`");
+  if (choices) {
+    if (!motor && variable.parameter.empty())
+      choices->fail("only parameters and motors are chosen", "give `parameter` or `motor`, or `bounds` instead");
+    if (const Entry* bounds = find(fields, "bounds")) bounds->fail("choices have no bounds", "remove them");
+    readChoices(*choices, fields, spec, catalogues, variable);
+    variable.unit = "1";
+    if (start) variable.start = readChoiceNumber(*start, variable.choices);
+    return variable;
+  }
+  if (start) variable.start = start->getNumber();
+  const Entry& bounds = require(fields, "bounds", entry);
+  const std::vector<double> values = bounds.getNumbers(2);
+  variable.lower = values[0], variable.upper = values[1];
+  if (!(variable.lower < variable.upper))
+    bounds.fail("the bounds of variable '" + variable.name + "' are crossed", "give the lower one first");
+  if (ratio && !(variable.lower > 0)) bounds.fail("a ratio is not positive", "give turns of the rotor per turn");
   return variable;
+}
+
+// A variable for each part of the generator that several are named of; one alone is a setting.
+void readArchitecture(const Entry& entry, DesignSpec& spec) {
+  if (spec.robot.generator.empty())
+    entry.fail("a given robot has one architecture", "give a generator of parts, e.g. leg_biped");
+  const std::vector<Parameter> parameters = findGenerator(spec.robot.generator).makeRequest().parameters;
+  std::map<std::string, DesignVariable> parts;
+  std::string known;
+  for (const Parameter& p : parameters)
+    for (const std::string& choice : p.choices) known += (known.empty() ? "" : ", ") + choice + "_" + p.name;
+  if (known.empty())
+    entry.fail("generator '" + spec.robot.generator + "' does not put parts together", "give one that does, e.g. leg_biped");
+  for (const Entry& item : entry.getList()) {
+    bool found = false;
+    for (const Parameter& p : parameters)
+      for (const std::string& choice : p.choices) {
+        if (choice + "_" + p.name != item.getText()) continue;
+        found = true;
+        DesignVariable& part = parts[p.name];
+        if (std::find(part.choices.begin(), part.choices.end(), choice) != part.choices.end())
+          item.fail("'" + item.getText() + "' is there twice", "remove one");
+        part.choices.push_back(choice);
+      }
+    if (!found) item.fail("there is no part '" + item.getText() + "'", "use some of " + known);
+  }
+  for (const Parameter& p : parameters) {
+    if (!parts.count(p.name)) continue;
+    DesignVariable& part = parts[p.name];
+    if (part.choices.size() == 1) {
+      spec.robot.settings.emplace_back(p.name, findChoice(p, part.choices.front()));
+      continue;
+    }
+    part.name = part.parameter = p.name;
+    part.unit = "1";
+    spec.variables.push_back(part);
+  }
 }
 
 WorkspaceAxis readAxis(const Entry& entry) {
@@ -111,8 +225,8 @@ WorkspaceRegion readRegion(const Entry& entry) {
 DriveTable readDrives(const Entry& entry) {
   const Fields fields = entry.getFields({"motor_constant", "motors", "regeneration"});
   DriveTable drives;
-  if (const Entry* constant = find(fields, "motor_constant")) drives.common.motor_constant = constant->getNumber();
-  if (const Entry* share = find(fields, "regeneration")) drives.common.regeneration = share->getNumber();
+  if (const Entry* constant = find(fields, "motor_constant")) drives.motor_constant = constant->getNumber();
+  if (const Entry* share = find(fields, "regeneration")) drives.regeneration = share->getNumber();
   if (const Entry* motors = find(fields, "motors")) drives.motor_constants = readSettings(*motors);
   return drives;
 }
@@ -123,10 +237,11 @@ ObjectiveTerm readTerm(const Entry& entry) {
   term.measure =
       readChoice<Measure>(require(fields, "measure", entry),
                           {Measure::PeakTorque, Measure::RmsTorque, Measure::Energy, Measure::ElectricalEnergy,
-                           Measure::Cost, Measure::Conditioning, Measure::Workspace});
+                           Measure::Cost, Measure::Conditioning, Measure::Workspace, Measure::Mass});
   const Entry *motors = find(fields, "motors"), *region = find(fields, "region");
   const bool is_workspace = term.measure == Measure::Workspace;
   if (motors && is_workspace) motors->fail("a workspace has no motors", "remove it");
+  if (motors && term.measure == Measure::Mass) motors->fail("a mass is that of the robot", "remove it");
   if (motors && term.measure == Measure::Cost) motors->fail("a cost is that of the whole motion", "remove it");
   if (region && !is_workspace) region->fail("only a workspace has a region", "remove it");
   if (region) term.region = readRegion(*region);
@@ -136,13 +251,38 @@ ObjectiveTerm readTerm(const Entry& entry) {
   return term;
 }
 
-// The mode and the objective have been read.
+DesignConstraint readConstraint(const Entry& entry) {
+  const Fields fields = entry.getFields({"measure", "motors", "at_most", "at_least"});
+  DesignConstraint constraint;
+  constraint.measure =
+      readChoice<Measure>(require(fields, "measure", entry),
+                          {Measure::Envelope, Measure::Heat, Measure::Mass, Measure::Margin, Measure::Distance,
+                           Measure::PeakTorque, Measure::RmsTorque, Measure::Energy, Measure::ElectricalEnergy,
+                           Measure::Conditioning});
+  const Entry *most = find(fields, "at_most"), *least = find(fields, "at_least"), *motors = find(fields, "motors");
+  if (motors && !isOfMotors(constraint.measure)) motors->fail("it is not of motors", "remove it");
+  if (motors) constraint.motors = motors->getTexts();
+  const bool is_share = constraint.measure == Measure::Envelope || constraint.measure == Measure::Heat;
+  if ((most && least) || (!most && !least && !is_share))
+    entry.fail("it has not one bound", "give one of `at_most` and `at_least`");
+  const bool is_least = constraint.measure == Measure::Margin || constraint.measure == Measure::Distance;
+  if (is_least && most) most->fail("it is better if it is larger", "give `at_least`");
+  if (!is_least && constraint.measure != Measure::Mass && least)
+    least->fail("it is better if it is smaller", "give `at_most`");
+  if (most) constraint.bound = most->getNumber();
+  if (least) constraint.bound = least->getNumber(), constraint.at_least = true;
+  if (constraint.measure != Measure::Distance && !(constraint.bound > 0))
+    (most ? *most : *least).fail("the bound is not positive", "give a positive number");
+  return constraint;
+}
+
+// The mode, the objective and the constraints have been read.
 SearchStage readStage(const Entry& item, const std::vector<SearchAlgorithm>& algorithms, const DesignSpec& spec) {
   const Fields fields = item.getFields({"algorithm", "evaluations", "tolerance"});
   SearchStage stage;
   stage.algorithm = readChoice<SearchAlgorithm>(require(fields, "algorithm", item), algorithms);
   if (needsGradient(stage.algorithm))
-    if (const auto obstacle = findGradientObstacle(spec.mode, spec.objective))
+    if (const auto obstacle = findGradientObstacle(spec.mode, spec.objective, spec.constraints, spec.variables))
       item.fail(obstacle->problem, obstacle->remedy);
   stage.evaluations = readCount(require(fields, "evaluations", item), 1000000);
   if (const Entry* tolerance = find(fields, "tolerance")) stage.tolerance = tolerance->getNumber();
@@ -168,6 +308,10 @@ FrontSpec readFront(const Entry& entry, const DesignSpec& spec) {
   if (const Entry* generations = find(fields, "generations")) options.generations = readCount(*generations, 100000);
   if (const Entry* refine = find(fields, "refine"))
     front.refine = readStage(*refine, {SearchAlgorithm::Slsqp, SearchAlgorithm::Mma}, spec);
+  const bool has_choices = std::any_of(spec.variables.begin(), spec.variables.end(),
+                                       [](const DesignVariable& variable) { return variable.isChoice(); });
+  if (has_choices && options.algorithm == SearchAlgorithm::Moead)
+    entry.fail("moead moves continuously between choices, which have no order", "give nsga2");
   if (spec.objective.size() < 2) entry.fail("one objective has no front", "give a second one, or `stages`");
   return front;
 }
@@ -194,9 +338,14 @@ void readSearch(const Entry& entry, DesignSpec& spec) {
 
 void readRoot(const Entry& root, DesignSpec& spec) {
   const Fields fields = root.getFields(
-      {"robot", "generator", "set", "variables", "motions", "mode", "margin", "objective", "drives", "search"});
+      {"robot", "generator", "set", "architecture", "variables", "motor_catalogue", "motions", "mode", "margin",
+       "objective", "constraints", "drives", "search"});
   spec.robot = readRobotSpec(fields, root);
-  for (const Entry& item : require(fields, "variables", root).getList()) spec.variables.push_back(readVariable(item));
+  const Entry *architecture = find(fields, "architecture"), *variables = find(fields, "variables");
+  if (architecture) readArchitecture(*architecture, spec);
+  if (!architecture || variables)
+    for (const Entry& item : require(fields, "variables", root).getList())
+      spec.variables.push_back(readVariable(item, spec, find(fields, "motor_catalogue")));
   if (const Entry* motions = find(fields, "motions")) spec.motions = readMotionSpecs(*motions);
   if (const Entry* drives = find(fields, "drives")) spec.drives = readDrives(*drives);
   if (const Entry* mode = find(fields, "mode"))
@@ -206,6 +355,8 @@ void readRoot(const Entry& root, DesignSpec& spec) {
     if (!(spec.margin >= 1e-3 && spec.margin < 1)) margin->fail("it is outside 0.001 .. 1", "give e.g. 0.1");
   }
   for (const Entry& item : require(fields, "objective", root).getList()) spec.objective.push_back(readTerm(item));
+  if (const Entry* constraints = find(fields, "constraints"))
+    for (const Entry& item : constraints->getList()) spec.constraints.push_back(readConstraint(item));
   if (const Entry* search = find(fields, "search")) readSearch(*search, spec);
 }
 

@@ -14,6 +14,13 @@
 ///     bounds: [-0.01, 0.01]
 ///     shift: {of: motor_knee_right, along: [1, 0, 0]}
 ///   - {name: foot, parameter: ankle_height, unit: m, bounds: [0.05, 0.08]}    # of a generator
+///   - {name: gear, ratio: "*knee*", bounds: [6, 20], start: 9}     # turns of the rotor per turn of the joint; * is any text
+///   # Of a generator, choices: of a part, and of a motor of robots/motors.yaml or of motor_catalogue, whose mass is a parameter.
+///   - {name: knee, parameter: knee, choices: [belt, four_bar]}
+///   - {name: knee_motor, motor: "*knee*", choices: [ak80-9, ak10-9], mass: knee_motor_mass, start: ak10-9}
+/// architecture: [four_bar_knee, belt_knee, rsu_ankle, differential_ankle]   # of a generator of parts: a variable for each
+///                                # of its parts that several are named of, CHOICE_PARAMETER
+/// motor_catalogue: motors.yaml   # or a list of them, relative to this file; searched first
 /// motions:
 ///   - {motion: squat, set: {depth: 0.6}}
 /// mode: reoptimized              # or kept, then with
@@ -25,8 +32,14 @@
 ///   - measure: workspace         # 1 / share of the places of a foot that can be reached (workspace.h)
 ///     region:                    # ranges [from, to] or [from, to, points] (m, rad), numbers (held), or free
 ///       {foot: foot_left, base: torso, x: [-0.2, 0.2, 9], z: [-0.1, 0.1], yaw: free, max_conditioning: 10}
+/// constraints:                   # measures of all motions within bounds; envelope and heat at most 1 unless told otherwise
+///   - {measure: envelope}        # torque, speed and voltage over what a motor can give
+///   - {measure: heat}            # root mean square torque over what it bears for ever
+///   - {measure: mass, at_most: 26}
+///   - {measure: margin, at_least: 0.2}       # from dead points
+///   - {measure: distance, at_least: 0.005}   # of bodies that are not neighbours, m
 /// drives:                        # for electrical_energy (measures.h)
-///   motor_constant: 2            # N m/sqrt(W) at the joints, all motors except those of `motors`
+///   motor_constant: 2            # N m/sqrt(W) at the joints, all motors except those of `motors`; else those of the robot
 ///   motors: {motor_knee_left: 3, motor_knee_right: 3}
 ///   regeneration: 0              # recovered share of negative electrical power
 /// search:
@@ -73,6 +86,7 @@ struct DesignSpec {
   MotionMode mode = MotionMode::Reoptimized;
   double margin = EvaluationOptions().margin;
   std::vector<ObjectiveTerm> objective;
+  std::vector<DesignConstraint> constraints;
   DriveTable drives;
   unsigned seed = 1;
   int searches = 2;

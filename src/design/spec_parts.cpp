@@ -1,5 +1,6 @@
 #include "design/spec_parts.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "bielle/model/error.h"
@@ -24,7 +25,13 @@ RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map) {
     map.fail("it names neither a robot nor a generator, or both", "give one of `robot` and `generator`");
   if (const YamlEntry* set = find(fields, "set")) {
     if (spec.generator.empty()) set->fail("a given robot has no parameters", "remove it, or give a generator");
-    spec.settings = readSettings(*set);
+    const std::vector<Parameter> parameters = findGenerator(spec.generator).makeRequest().parameters;
+    for (const auto& [name, value] : set->getMap()) {
+      const auto parameter = std::find_if(parameters.begin(), parameters.end(),
+                                          [&name = name](const Parameter& p) { return p.name == name; });
+      const bool choice = parameter != parameters.end() && !parameter->choices.empty();
+      spec.settings.emplace_back(name, choice ? findChoice(*parameter, value.getText()) : value.getNumber());
+    }
   }
   return spec;
 }

@@ -66,7 +66,7 @@ void addChange(const Model& from, const Model& to, double weight, ModelVariation
 std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x) {
   const Model here = robot.make(x);
   std::vector<ModelVariation> out(x.size(), ModelVariation(here));
-  for (Eigen::Index i = 0; i < x.size(); ++i) {
+  for (Eigen::Index i : robot.listContinuous()) {
     const double h = kStep * (robot.upper()[i] - robot.lower()[i]);
     for (const auto& [steps, weight] : {std::pair{-2, 1.0}, {-1, -8.0}, {1, 8.0}, {2, -1.0}}) {
       const Model there = robot.make(x + steps * h * VectorXd::Unit(x.size(), i));

@@ -125,4 +125,19 @@ std::vector<MotorSpec> readMotorSpecs(const YamlEntry& motors, const std::string
   return specs;
 }
 
+std::vector<Motor> readMotorTypes(const std::vector<YamlEntry>& names, const std::string& path,
+                                  const YamlEntry* catalogues) {
+  const Catalogues known(path, catalogues);
+  std::vector<Motor> motors;
+  for (const YamlEntry& name : names) {
+    const MotorSpec& spec = known.get(name);
+    Motor motor;
+    motor.drive = spec.drive;
+    if (spec.effort) motor.effort_limit = *spec.effort;
+    if (spec.velocity) motor.velocity_limit = *spec.velocity;
+    motors.push_back(motor);
+  }
+  return motors;
+}
+
 }  // namespace bielle

@@ -11,7 +11,7 @@ namespace bielle {
 /// and two evaluations of their stages per variable; nothing is solved.
 /// \param x       for which the motion of the envelope is optimal
 /// \param make    a motion like it for another robot: same options, posture, footholds and references planned for anew
-/// \return (variables)
+/// \return (variables), zero of choices
 /// \throws ModelError when a neighbour of x has no such motion
 VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const MotionEnvelope& envelope,
                           const std::function<Motion(const Model&)>& make);

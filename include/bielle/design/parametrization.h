@@ -1,6 +1,7 @@
 #pragma once
-/// \file A robot as a function of named, bounded numbers: parameters of a generator, or lengths and shifts of a given
-/// robot.
+/// \file A robot as a function of named, bounded numbers: parameters of a generator, lengths and shifts of a given robot, ratios of
+/// gears, and choices: of parts of a generator, which are architectures, and of motors out of a catalogue.
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,7 +30,21 @@ struct DesignVariable {
   std::string parameter;  ///< of the generator, or
   std::vector<LengthChange> lengths;
   std::vector<ShiftChange> shifts;
+  /// Motors whose gear has the value as its ratio, turns of the rotor per turn of the joint (* stands for any text); or, with
+  /// choices, whose type this is.
+  std::vector<std::string> motors;
+  /// Names of the values 0, 1, ... of a choice: of the parameter, or of motors.
+  std::vector<std::string> choices;
+  std::vector<Motor> types;     ///< of choices of motors, in their order
+  std::string mass;             ///< parameter of the generator that is the mass of one motor of the type, or empty
+  std::optional<double> start;  ///< of ratios and choices, where it is not that of the robot
+
+  bool isChoice() const { return !choices.empty(); }
+  bool isArchitecture() const { return isChoice() && !parameter.empty(); }
 };
+
+/// A value with its unit, or the name of a choice.
+std::string describeValue(const DesignVariable& variable, double value);
 
 /// Makes robots from numbers, fast and without files; names and orders are those of the initial model.
 class Parametrization {
@@ -48,12 +63,22 @@ class Parametrization {
   const VectorXd& upper() const { return upper_; }
   const Model& startModel() const { return model_; }
 
-  /// A given robot is changed in the order of the variables.
+  /// Numbers of the parts that a generator puts together at x: models of the same ones have the same bodies, joints and motors.
+  std::vector<int> getArchitecture(const VectorXd& x) const;
+  /// Variables that are no choices, by their numbers.
+  std::vector<Eigen::Index> listContinuous() const;
+  /// Every combination of all choices, each with the other variables at their start; that of the start comes first.
+  std::vector<VectorXd> listCombinations() const;
+
+  /// A given robot is changed in the order of the variables. Choices are rounded to whole numbers.
   /// \throws ModelError when the numbers do not define a robot
   Model make(const VectorXd& x) const;
 
  private:
-  Model generate(const VectorXd* x, VectorXd* start) const;
+  void readStart();
+  Model generate(const VectorXd& x) const;
+  Model changePlaces(const VectorXd& x) const;
+  Model changeMotors(Model model, const VectorXd& x) const;
   void finish();
 
   std::string source_, generator_;
@@ -63,7 +88,7 @@ class Parametrization {
   VectorXd start_, lower_, upper_;
 };
 
-/// Derivative of the model with respect to every variable at x. Placements, inertias and armatures are smooth functions
+/// Derivative of the model with respect to every variable at x, zero of choices. Placements, inertias and armatures are smooth functions
 /// of the numbers, polynomials of at most the third degree for lengths and shifts; they are differenced by the
 /// five-point rule over a thousandth of the bounds, which is exact for polynomials up to the fourth degree.
 /// \throws ModelError when a variable changes anything but placements, inertias and armatures (an axis, a gain)
