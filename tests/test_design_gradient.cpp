@@ -151,6 +151,13 @@ TEST_CASE("design gradient: the margin is that of the lift") {
   CHECK(least < 0.5);
   CHECK_NOTHROW(make(least * (1 - 1e-6)));
   CHECK_THROWS_WITH(make(least * (1 + 1e-6)), Contains("nearer to a dead point"));
+  // The measure of constraints comes to it from the singular values of the closed motions.
+  EvaluationOptions options;
+  options.mode = MotionMode::Kept;
+  options.constraints = {{Measure::Margin, {}, 0.5, true}};
+  const DesignEvaluator bounded(robot, {makeSmallSquat()}, {{Measure::RmsTorque, {}, 1}}, options);
+  CHECK(bounded.start().constraints[0] == Approx(least).epsilon(1e-9));
+  CHECK(bounded.start().status == DesignStatus::Violated);
 }
 
 TEST_CASE("design gradient: parameters of a five-bar leg") {

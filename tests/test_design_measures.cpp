@@ -9,6 +9,7 @@
 #include "design/spec.h"
 #include "robot_directory.h"
 #include "robots/fivebar_leg.h"
+#include "robots/solid.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -116,6 +117,47 @@ TEST_CASE("measures: electrical energy of a harmonic motion") {
     CHECK(measures.electrical_energy == Approx(T * (U * V * std::cos(phi) / 2 + U * U / (2 * K * K))));
     CHECK(measures.rms_torque == Approx(U / std::sqrt(2)));
   }
+}
+
+TEST_CASE("measures: shares of limits by hand, distances of shapes") {
+  const auto build = [](bool near) {
+    ModelBuilder builder("limits");
+    for (const char* name : {"a", "b", "c"})
+      addSolidLink(
+          name,
+          name == std::string("a")   ? "world"
+          : name == std::string("b") ? "a"
+                                     : "b",
+          makeRevolute(std::string("to_") + name, {name == std::string("a") ? 0 : 0.3, 0, 0}, Vector3d::UnitY()),
+          {makeSphere({name == std::string("c") && near ? -0.5 : 0.0, 0, 0}, 0.05, 1, colors::kRod)}, builder);
+    Motor motor;
+    motor.name = "to_a";
+    motor.drive.ratio = 10, motor.drive.rotor_inertia = 1e-4, motor.drive.torque_constant = 0.1;
+    motor.drive.resistance = 0.5, motor.drive.voltage = 24, motor.drive.continuous_current = 5;
+    motor.drive.efficiency = 0.8, motor.drive.back_efficiency = 0.5;
+    builder.addMotor(motor);
+    return builder.build();
+  };
+  const Model model = build(false);
+  MotionMeasures measures;
+  measures.trace = makeTrace({0.1, 0.3, 0.2}, {3, -4, 6}, {2, 10, 15});
+  measures.motors = calcMotorMeasures(measures.trace);
+  ShootingTrajectory trajectory;
+  trajectory.xs = {VectorXd::Zero(model.nq() + model.nv())};
+  addLimitMeasures(model, trajectory, {Measure::Distance}, measures);
+  // A newton metre is an ampere less the loss in the gear: 0.5 / 0.8 V; a radian per second is a volt.
+  CHECK(measures.motors[0].envelope == Approx((6 * 0.5 / 0.8 + 15) / 24));
+  CHECK(measures.motors[0].heat ==
+        Approx(std::sqrt((0.1 * std::pow(3 / 0.8, 2) + 0.3 * std::pow(4 * 0.5, 2) + 0.2 * std::pow(6 / 0.8, 2)) / 0.6) /
+               5));
+  CHECK(measures.distance == Approx(0.6 - 2 * 0.05));  // of a and c, which no joint connects
+  CHECK(measures.margin == 1);                         // not asked for
+  measures.distance = std::numeric_limits<double>::infinity();
+  addLimitMeasures(build(true), trajectory, {Measure::Distance}, measures);
+  CHECK(measures.distance == Approx(0.1 - 2 * 0.05).margin(1e-12));
+  CHECK(getMeasure(Measure::Envelope, {0}, {measures, measures}) == measures.motors[0].envelope);
+  // What the winding says of heat is the default of electrical energies.
+  CHECK(makeDrives(model, {})[0].motor_constant == Approx(10 * 0.1 / std::sqrt(0.5)));
 }
 
 TEST_CASE("measures: drives by name") {

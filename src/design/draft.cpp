@@ -4,7 +4,8 @@
 
 namespace bielle {
 
-RobotDraft::RobotDraft(const Model& model) : model_(model), visuals_(model.visuals()), shapes_(model.shapes()), motors_(model.motors()) {
+RobotDraft::RobotDraft(const Model& model)
+    : model_(model), visuals_(model.visuals()), shapes_(model.shapes()), motors_(model.motors()) {
   for (const Joint& joint : model.joints()) joints_.push_back(joint.X_PJ);
   for (const Frame& frame : model.frames()) frames_.push_back(frame.X_BF);
   for (const Body& body : model.bodies()) inertias_.push_back(body.inertia);

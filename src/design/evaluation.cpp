@@ -44,7 +44,7 @@ double calcPostureGap(const Model& start, const Model& model, const VectorXd& po
 
 namespace {
 
-constexpr double kSlack = 1e-3;      // of a bound, which constraints may be beyond: solvers keep their own to a tolerance
+constexpr double kSlack = 1e-3;  // of a bound, which constraints may be beyond: solvers keep their own to a tolerance
 constexpr double kCentimetre = 0.01;  // the scale of distances, whose bound may be 0
 
 // The designs of one architecture, and their start.
@@ -57,8 +57,8 @@ struct Base {
 };
 
 double calcViolation(const DesignConstraint& constraint, double value) {
-  const double scale = constraint.measure == Measure::Distance || constraint.bound == 0 ? kCentimetre
-                                                                                        : std::abs(constraint.bound);
+  const double scale =
+      constraint.measure == Measure::Distance || constraint.bound == 0 ? kCentimetre : std::abs(constraint.bound);
   const double beyond = (constraint.at_least ? constraint.bound - value : value - constraint.bound) / scale;
   return beyond > kSlack ? std::min(beyond, 1e6) : 0;  // linkages without a bound on their motion are infinitely far
 }
@@ -102,7 +102,8 @@ struct DesignEvaluator::Data {
   std::vector<MotorSlopes> calcKeptSlopes(const Base& base, const Model& model, const VectorXd& x,
                                           const std::vector<MotionOutcome>& outcomes) const;
   MeasurePieces calcStartMargins(const Base& base, const Model& model, const VectorXd& x) const;
-  MeasurePieces calcPieces(size_t i, const Base& base, const Model& model, const std::vector<MotorSlopes>& slopes) const;
+  MeasurePieces calcPieces(size_t i, const Base& base, const Model& model,
+                           const std::vector<MotorSlopes>& slopes) const;
   bool checkPostures(const Base& base, const Model& model, Evaluation& out) const;
   double calcTerm(size_t i, const Base& base, const Model& model, const std::vector<MotionMeasures>& measures) const;
   void checkConstraints(const Base& base, const Model& model, Evaluation& out) const;
@@ -193,7 +194,8 @@ void DesignEvaluator::Data::readNames(Base& base) const {
     const auto is_limited = [&](int m) {
       const Motor& motor = model.motors()[static_cast<size_t>(m)];
       const bool heat = std::isfinite(motor.continuous_effort);
-      const bool envelope = std::isfinite(motor.effort_limit) || std::isfinite(motor.velocity_limit) || motor.hasEnvelope();
+      const bool envelope =
+          std::isfinite(motor.effort_limit) || std::isfinite(motor.velocity_limit) || motor.hasEnvelope();
       return constraint.measure == Measure::Heat ? heat : constraint.measure != Measure::Envelope || envelope;
     };
     if (std::none_of(named.begin(), named.end(), is_limited))
@@ -396,7 +398,7 @@ MeasurePieces DesignEvaluator::Data::calcPieces(size_t i, const Base& base, cons
   const ObjectiveTerm& term = objective[i];
   MeasurePieces out = term.measure == Measure::Cost ? calcCostPiece(slopes)
                                                     : calcMeasurePieces(term.measure, base.term_motors[i], slopes,
-                                                                         makeDrives(model, options.drives));
+                                                                        makeDrives(model, options.drives));
   const double scale = term.weight / start.terms[i];
   out.values *= scale;
   out.gradients *= scale;
@@ -405,8 +407,8 @@ MeasurePieces DesignEvaluator::Data::calcPieces(size_t i, const Base& base, cons
 
 SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
   Data& data = *data_;
-  if (const auto obstacle = findGradientObstacle(data.options.mode, data.objective, data.options.constraints,
-                                                 data.robot.variables()))
+  if (const auto obstacle =
+          findGradientObstacle(data.options.mode, data.objective, data.options.constraints, data.robot.variables()))
     throw ModelError(data.robot.startModel().name(), "search", obstacle->problem, obstacle->remedy);
   std::vector<MotionOutcome> outcomes;
   std::optional<Model> model;

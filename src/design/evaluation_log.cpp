@@ -10,7 +10,8 @@ namespace bielle {
 namespace {
 
 DesignStatus readStatus(const std::string& name) {
-  for (DesignStatus status : {DesignStatus::Feasible, DesignStatus::LoopOpen, DesignStatus::MotionFailed, DesignStatus::Violated})
+  for (DesignStatus status :
+       {DesignStatus::Feasible, DesignStatus::LoopOpen, DesignStatus::MotionFailed, DesignStatus::Violated})
     if (name == getName(status)) return status;
   throw std::runtime_error("there is no status '" + name + "'");
 }

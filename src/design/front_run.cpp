@@ -165,8 +165,7 @@ class FrontRunner {
     const Parametrization& robot = evaluator_.robot();
     const Continuous continuous(robot, start);
     if (continuous.start().size() == 0) return found;
-    SearchProblem problem{
-        continuous.pick(robot.lower()), continuous.pick(robot.upper()), continuous.start(), {}, {}};
+    SearchProblem problem{continuous.pick(robot.lower()), continuous.pick(robot.upper()), continuous.start(), {}, {}};
     problem.sloped = [&](const VectorXd& x, const SearchStage&) {
       found.push_back(get(stage.algorithm, continuous.expand(x)));
       const LoggedEvaluation& e = found.back();

@@ -20,8 +20,8 @@ constexpr unsigned kMostNeighbours = 20;  // of MOEA/D
 // As pagmo wants problems: a value with these members. Whole numbers come last there; its NSGA-II gives them the value of either parent
 // or any other.
 struct PagmoProblem {
-  const FrontProblem* problem = nullptr;
-  std::vector<Eigen::Index> order = {};  // variables in pagmo's order
+  const FrontProblem* problem;
+  std::vector<Eigen::Index> order;  // variables in pagmo's order
   pagmo::vector_double::size_type num_whole = 0;
 
   explicit PagmoProblem(const FrontProblem* p = nullptr) : problem(p) {
@@ -97,8 +97,7 @@ void searchFront(const FrontProblem& problem, const FrontOptions& options, unsig
     designs.push_back(of_pagmo.makeDesign(x.data()));
   }
   const std::vector<std::vector<double>> objectives = problem.evaluate(designs);
-  for (size_t i = 0; i < designs.size(); ++i)
-    population.push_back(of_pagmo.sort(designs[i]), objectives[i]);
+  for (size_t i = 0; i < designs.size(); ++i) population.push_back(of_pagmo.sort(designs[i]), objectives[i]);
   makeAlgorithm(problem, options, seed).evolve(population);
 }
 

@@ -17,7 +17,7 @@ struct FrontProblem {
   VectorXd lower, upper;
   VectorXd start;  ///< one of the first generation
   int objectives = 2;
-  FrontObjectives evaluate;  ///< of a whole generation with Nsga2, of one design after the other with Moead
+  FrontObjectives evaluate;      ///< of a whole generation with Nsga2, of one design after the other with Moead
   std::vector<bool> whole = {};  ///< variables that are numbers of choices, without an order among them; not for Moead
 };
 

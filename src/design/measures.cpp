@@ -38,8 +38,8 @@ void addShares(const MotorTrace& trace, Eigen::Index m, const Motor& motor, Moto
     const double u = trace.torque(m, stage), v = trace.speed(m, stage);
     out.envelope = std::max({out.envelope, std::abs(u) / motor.effort_limit, std::abs(v) / motor.velocity_limit});
     if (motor.hasEnvelope() && trace.dt[k] > 0)
-      out.envelope = std::max(out.envelope, std::abs(motor.getVoltsPerEffort() * u + motor.getVoltsPerSpeed() * v) /
-                                                motor.drive.voltage);
+      out.envelope = std::max(
+          out.envelope, std::abs(motor.getVoltsPerEffort() * u + motor.getVoltsPerSpeed() * v) / motor.drive.voltage);
     squares += trace.dt[k] * std::pow(motor.getEffortFactor(u * v) * u, 2);
     duration += trace.dt[k];
   }

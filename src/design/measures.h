@@ -76,7 +76,8 @@ struct MotionMeasures {
   double conditioning = 1;            ///< the worst over the nodes (conditioning.h)
   double cost = 0;                    ///< of a motion that was optimized for the design
   double margin = 1;                  ///< least inverse of the conditioning by joints, 0 at a dead point
-  double distance = std::numeric_limits<double>::infinity();  ///< least one of shapes, of those listShapePairs() names, m
+  double distance =
+      std::numeric_limits<double>::infinity();  ///< least one of shapes, of those listShapePairs() names, m
   MotorTrace trace;
 };
 /// \param trajectory  closed at its nodes

@@ -89,8 +89,8 @@ void writeFront(std::ostream& out, const DesignEvaluator& evaluator, const Desig
 // Keeps the table short: only changes of at least a thousandth are listed.
 bool isChanged(double before, double after) { return std::abs(after - before) > 1e-3 * std::abs(before); }
 
-void writeMotion(std::ostream& out, const Model& model, const Model& best, const std::string& name, const MotionMeasures& before,
-                 const MotionMeasures& after) {
+void writeMotion(std::ostream& out, const Model& model, const Model& best, const std::string& name,
+                 const MotionMeasures& before, const MotionMeasures& after) {
   out << "\n### " << name << "\n\n| measure | before | after | change |\n|---|---|---|---|\n";
   for (int m = 0; m < std::min(model.nu(), best.nu()); ++m) {
     const MotorMeasures &a = before.motors[m], &b = after.motors[m];
@@ -124,11 +124,12 @@ std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec,
       << (spec.front ? " evaluations of designs: "
                      : " designs in " + std::to_string(run.searches.size()) + " searches: ")
       << run.counts[0] << " feasible, " << run.counts[1] << " whose loops do not close, " << run.counts[2]
-      << " whose motion fails" << (evaluator.constraints().empty() ? "" : ", " + std::to_string(run.counts[3]) + " that violate constraints")
+      << " whose motion fails"
+      << (evaluator.constraints().empty() ? "" : ", " + std::to_string(run.counts[3]) + " that violate constraints")
       << ".\n";
   for (size_t i = 0; i < run.evaluation.motions.size(); ++i)
-    writeMotion(out, robot.startModel(), robot.make(run.best), evaluator.motions()[i].name, evaluator.start().motions[i],
-                run.evaluation.motions[i]);
+    writeMotion(out, robot.startModel(), robot.make(run.best), evaluator.motions()[i].name,
+                evaluator.start().motions[i], run.evaluation.motions[i]);
   return out.str();
 }
 

@@ -53,7 +53,8 @@ Parametrization::Parametrization(Model model, std::vector<DesignVariable> variab
     const DesignVariable& variable = variables_[i];
     const std::string element = "variable '" + variable.name + "'";
     if (variable.isChoice())
-      throw ModelError(source_, element, "a given robot has no parts to choose, and the masses of its motors are in its links",
+      throw ModelError(source_, element,
+                       "a given robot has no parts to choose, and the masses of its motors are in its links",
                        "give the `ratio` of its motors, or a generator");
     const int kinds = !variable.lengths.empty() + !variable.shifts.empty() + !variable.motors.empty();
     if (!variable.parameter.empty() || kinds != 1)
@@ -87,7 +88,8 @@ Parametrization::Parametrization(const std::string& generator, std::vector<std::
   for (size_t i = 0; i < variables_.size(); ++i) {
     const DesignVariable& variable = variables_[i];
     if (variable.parameter.empty() && variable.motors.empty())
-      throw ModelError(source_, "variable '" + variable.name + "'", "it is no parameter of the generator, and no motor's",
+      throw ModelError(source_, "variable '" + variable.name + "'",
+                       "it is no parameter of the generator, and no motor's",
                        "give `parameter`, `ratio` or `motor`; `length` and `shift` are for given robots");
     if (variable.parameter.empty()) continue;
     double& start = start_[static_cast<Eigen::Index>(i)];
@@ -134,7 +136,8 @@ Model Parametrization::changeMotors(Model model, const VectorXd& x) const {
       if (variable.motors.empty() || variable.isChoice() != types) continue;
       for (int m : findMotors(model, variable.motors)) {
         Motor& motor = motors[static_cast<size_t>(m)];
-        types ? setType(variable.types[static_cast<size_t>(getChoice(variable, value))], motor) : setRatio(value, motor);
+        types ? setType(variable.types[static_cast<size_t>(getChoice(variable, value))], motor)
+              : setRatio(value, motor);
       }
     }
   RobotDraft draft(model);
@@ -142,24 +145,31 @@ Model Parametrization::changeMotors(Model model, const VectorXd& x) const {
   return draft.build();
 }
 
-// Of variables of motors: what is given, or that of the first of them.
+// Of variables of motors: what is given, or that of the first of them. A type brings its ratio.
 void Parametrization::readStart() {
   const Model robot = generator_.empty() ? model_ : generate(start_);
-  for (const bool types : {true, false})
+  std::vector<Motor> motors = robot.motors();
+  for (const bool choices : {true, false})
     for (size_t i = 0; i < variables_.size(); ++i) {
       const DesignVariable& variable = variables_[i];
+      if (variable.isChoice() != choices) continue;
       double& start = start_[static_cast<Eigen::Index>(i)];
-      if (!variable.motors.empty() && variable.isChoice() == types) {
-        const std::vector<int> motors = findMotors(robot, variable.motors);
-        if (motors.empty())
-          throw ModelError(source_, "variable '" + variable.name + "'", "the robot has no such motor",
-                           "`bielle info` lists them; * stands for any text");
-        const Motor& motor = robot.motors()[static_cast<size_t>(motors.front())];
-        if (!types) start = motor.drive.ratio;
-        for (size_t k = 0; k < variable.choices.size(); ++k)
-          if (variable.choices[k] == motor.drive.type) start = static_cast<double>(k);
+      if (variable.motors.empty()) {
+        start = variable.start.value_or(start);
+        continue;
       }
-      if (variable.start && variable.isChoice() == types) start = *variable.start;
+      const std::vector<int> named = findMotors(robot, variable.motors);
+      if (named.empty())
+        throw ModelError(source_, "variable '" + variable.name + "'", "the robot has no such motor",
+                         "`bielle info` lists them; * stands for any text");
+      const MotorDrive& drive = motors[static_cast<size_t>(named.front())].drive;
+      if (!choices) start = drive.ratio;
+      for (size_t k = 0; k < variable.choices.size(); ++k)
+        if (variable.choices[k] == drive.type) start = static_cast<double>(k);
+      start = variable.start.value_or(start);
+      for (int m : named)
+        if (choices)
+          setType(variable.types[static_cast<size_t>(getChoice(variable, start))], motors[static_cast<size_t>(m)]);
     }
 }
 
@@ -184,7 +194,7 @@ void Parametrization::finish() {
       throw ModelError(source_, element, "its bounds " + bounds.str() + " are crossed", "give the lower one first");
     if (!(start_[k] >= variable.lower && start_[k] <= variable.upper)) {
       std::ostringstream problem;
-      problem << "the robot has " << start_[k] << " " << variable.unit << ", outside of its bounds " << bounds.str();
+      problem << "the robot has " << describeValue(variable, start_[k]) << ", outside of its bounds " << bounds.str();
       throw ModelError(source_, element, problem.str(),
                        variable.motors.empty() ? "widen the bounds" : "widen the bounds, or give `start`");
     }

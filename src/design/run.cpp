@@ -79,8 +79,9 @@ class DesignRunner {
     const auto sloped = [&](const VectorXd& x, const SearchStage& stage) {
       return continuous.pick(evaluate(i, continuous.expand(x), stage));
     };
-    minimizeByStages({continuous.pick(robot.lower()), continuous.pick(robot.upper()), continuous.start(), objective, sloped},
-                     spec_.stages, spec_.seed + static_cast<unsigned>(i));
+    minimizeByStages(
+        {continuous.pick(robot.lower()), continuous.pick(robot.upper()), continuous.start(), objective, sloped},
+        spec_.stages, spec_.seed + static_cast<unsigned>(i));
   }
 
   LoggedEvaluation evaluate(size_t i, const VectorXd& x, const SearchStage& stage) {
@@ -173,9 +174,14 @@ LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorith
   const SlopedEvaluation sloped =
       needsGradient(stage) ? evaluator.differentiate(x) : SlopedEvaluation{evaluator.evaluate(x), {}, {}};
   const Evaluation& evaluation = sloped.evaluation;
-  return {
-      getName(stage),  x, evaluation.status, evaluation.value, getThreadSeconds() - begin, sloped.terms, sloped.limits,
-      evaluation.status == DesignStatus::Feasible ? evaluation.terms : std::vector<double>()};
+  return {getName(stage),
+          x,
+          evaluation.status,
+          evaluation.value,
+          getThreadSeconds() - begin,
+          sloped.terms,
+          sloped.limits,
+          evaluation.status == DesignStatus::Feasible ? evaluation.terms : std::vector<double>()};
 }
 
 DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options) {

@@ -61,8 +61,8 @@ struct FrontDesign {
 
 struct DesignRun {
   std::vector<std::vector<LoggedEvaluation>> searches;
-  VectorXd best;                   ///< the feasible design with the least value; the start if none is better, or none is feasible
-  double value = 0;                ///< its value
+  VectorXd best;     ///< the feasible design with the least value; the start if none is better, or none is feasible
+  double value = 0;  ///< its value
   Evaluation evaluation;           ///< of the best design, repeated
   std::array<int, 4> counts{};     ///< evaluations by status
   int replayed = 0;                ///< evaluations found in the logs

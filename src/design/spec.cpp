@@ -119,8 +119,8 @@ DesignVariable readVariable(const Entry& entry, const DesignSpec& spec, const En
   const Entry *ratio = find(fields, "ratio"), *motor = find(fields, "motor"), *choices = find(fields, "choices");
   if (ratio) variable.motors = readNames(*ratio), variable.unit = "1";
   if (motor) variable.motors = readNames(*motor);
-  const int kinds =
-      !variable.lengths.empty() + !variable.shifts.empty() + !variable.parameter.empty() + (ratio != nullptr) + (motor != nullptr);
+  const int kinds = !variable.lengths.empty() + !variable.shifts.empty() + !variable.parameter.empty() +
+                    (ratio != nullptr) + (motor != nullptr);
   if (kinds != 1)
     entry.fail("variable '" + variable.name + "' is not one of a length, a shift, a parameter, a ratio and a motor",
                "give `length`, `shift`, `parameter`, `ratio` or `motor`");
@@ -130,7 +130,8 @@ DesignVariable readVariable(const Entry& entry, const DesignSpec& spec, const En
     start->fail("only ratios and choices have one", "remove it; the others start as the robot is");
   if (const Entry* mass = find(fields, "mass"); mass && !motor)
     mass->fail("only motors have one", "give `motor` with its choices, or remove it");
-  if (motor && !choices) entry.fail("'" + variable.name + "' has no choices", "list motors of a catalogue as `choices`");
+  if (motor && !choices)
+    entry.fail("'" + variable.name + "' has no choices", "list motors of a catalogue as `choices`");
   if (choices) {
     if (!motor && variable.parameter.empty())
       choices->fail("only parameters and motors are chosen", "give `parameter` or `motor`, or `bounds` instead");
@@ -160,7 +161,8 @@ void readArchitecture(const Entry& entry, DesignSpec& spec) {
   for (const Parameter& p : parameters)
     for (const std::string& choice : p.choices) known += (known.empty() ? "" : ", ") + choice + "_" + p.name;
   if (known.empty())
-    entry.fail("generator '" + spec.robot.generator + "' does not put parts together", "give one that does, e.g. leg_biped");
+    entry.fail("generator '" + spec.robot.generator + "' does not put parts together",
+               "give one that does, e.g. leg_biped");
   for (const Entry& item : entry.getList()) {
     bool found = false;
     for (const Parameter& p : parameters)
@@ -254,11 +256,10 @@ ObjectiveTerm readTerm(const Entry& entry) {
 DesignConstraint readConstraint(const Entry& entry) {
   const Fields fields = entry.getFields({"measure", "motors", "at_most", "at_least"});
   DesignConstraint constraint;
-  constraint.measure =
-      readChoice<Measure>(require(fields, "measure", entry),
-                          {Measure::Envelope, Measure::Heat, Measure::Mass, Measure::Margin, Measure::Distance,
-                           Measure::PeakTorque, Measure::RmsTorque, Measure::Energy, Measure::ElectricalEnergy,
-                           Measure::Conditioning});
+  constraint.measure = readChoice<Measure>(
+      require(fields, "measure", entry),
+      {Measure::Envelope, Measure::Heat, Measure::Mass, Measure::Margin, Measure::Distance, Measure::PeakTorque,
+       Measure::RmsTorque, Measure::Energy, Measure::ElectricalEnergy, Measure::Conditioning});
   const Entry *most = find(fields, "at_most"), *least = find(fields, "at_least"), *motors = find(fields, "motors");
   if (motors && !isOfMotors(constraint.measure)) motors->fail("it is not of motors", "remove it");
   if (motors) constraint.motors = motors->getTexts();
@@ -337,9 +338,8 @@ void readSearch(const Entry& entry, DesignSpec& spec) {
 }
 
 void readRoot(const Entry& root, DesignSpec& spec) {
-  const Fields fields = root.getFields(
-      {"robot", "generator", "set", "architecture", "variables", "motor_catalogue", "motions", "mode", "margin",
-       "objective", "constraints", "drives", "search"});
+  const Fields fields = root.getFields({"robot", "generator", "set", "architecture", "variables", "motor_catalogue",
+                                        "motions", "mode", "margin", "objective", "constraints", "drives", "search"});
   spec.robot = readRobotSpec(fields, root);
   const Entry *architecture = find(fields, "architecture"), *variables = find(fields, "variables");
   if (architecture) readArchitecture(*architecture, spec);

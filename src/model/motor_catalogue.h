@@ -16,6 +16,7 @@ std::vector<MotorSpec> readMotorSpecs(const YamlEntry& motors, const std::string
 
 // Motors of a catalogue by their names: what drives a joint, whose name they lack. `path` and `catalogues` as above.
 // \throws ModelError listing the names
-std::vector<Motor> readMotorTypes(const std::vector<YamlEntry>& names, const std::string& path, const YamlEntry* catalogues);
+std::vector<Motor> readMotorTypes(const std::vector<YamlEntry>& names, const std::string& path,
+                                  const YamlEntry* catalogues);
 
 }  // namespace bielle
