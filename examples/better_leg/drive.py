@@ -1,0 +1,25 @@
+#!/usr/bin/env python3
+"""drive.py MOTOR HIP KNEE ANKLE DIRECTORY: a copy of Bipetto with motors of robots/motors.yaml behind gears of
+these ratios, its masses as published."""
+import pathlib
+import shutil
+import sys
+
+motor, target = sys.argv[1], pathlib.Path(sys.argv[5])
+ratios = dict(zip(("hip", "knee", "ankle"), sys.argv[2:5]))
+source = pathlib.Path(__file__).resolve().parents[2] / "robots" / "bipetto"
+target.mkdir(parents=True, exist_ok=True)
+shutil.copy(source / "bipetto.urdf", target / f"{target.name}.urdf")
+lines, in_motors = [], False
+for line in (source / "bipetto.yaml").read_text().splitlines():
+    if line.startswith("armature:"):
+        continue
+    if line.startswith("name_mot:"):
+        line, in_motors = "motors:", True
+    elif in_motors and line.startswith("  - "):
+        ratio = next(value for name, value in ratios.items() if name in line)
+        line = f"  {line[4:]}: {{type: {motor}, ratio: {ratio}}}"
+    else:
+        in_motors = False
+    lines.append(line)
+(target / f"{target.name}.yaml").write_text("\n".join(lines) + "\n")
