@@ -4,9 +4,11 @@
 #include "bielle/control/estimator.h"
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/dynamics/rnea.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/motion.h"
+#include "control/foot_model.h"
 #include "count_allocations.h"
 #include "math/so3.h"
 
@@ -118,6 +120,64 @@ TEST_CASE("estimator: exact sensors give the state of a robot on one foot") {
     const double weight = model.mass() * 9.81;
     CHECK(estimator.getWrench(0)[2] == Approx(weight).epsilon(0.05));
     CHECK(std::abs(estimator.getWrench(1)[2]) < 0.05 * weight);
+  }
+}
+
+TEST_CASE("estimator: a push on the trunk is no force of the ground on a foot in the air") {
+  for (const char* name : {"bipetto", "cleobot"}) {
+    CAPTURE(name);
+    const LoadedRobot robot = load(name);
+    const Model& model = robot.model;
+    const VectorXd q = makeStandingPosture(model), rest = VectorXd::Zero(model.nv());
+    const double weight = model.mass() * 9.81;
+    const PassiveJoints joints(model, q);
+    Workspace ws(model);
+    updatePositions(model, ws, q);
+    updateVelocities<double>(model, ws, rest);
+    updateInverseDynamics<double>(model, ws, rest);
+    MatrixXd T = MatrixXd::Zero(model.nv(), 6 + model.nu());  // of the speeds of trunk and motors
+    T.topLeftCorner<6, 6>().setIdentity();
+    for (int m = 0; m < model.nu(); ++m) joints.expand(VectorXd::Unit(model.nu(), m), T.col(6 + m));
+    MatrixXd J = MatrixXd::Zero(6, model.nv());  // of the foot that stands, about the world's origin
+    for (int k : model.supportDofs(model.contacts()[0].body)) J.col(k) = ws.J.col(k);
+    // At rest: T^T b = B u + (J T)^T f + push, of which the rows of the trunk give f and the others u.
+    Vector6d push = Vector6d::Zero();
+    const Matrix3d R = getTrunk(q).R;
+    push.head<3>() = R.transpose() * Vector3d(0.1, 0.4, 0) * weight;
+    const MatrixXd A = J * T;
+    const VectorXd b = T.transpose() * ws.b;
+    const Vector6d f = A.leftCols<6>().transpose().lu().solve(b.head<6>() - push);
+    SensorReadings readings;
+    readings.motor_torques = b.tail(model.nu()) - A.rightCols(model.nu()).transpose() * f;
+    readings.motor_positions.setZero(model.nu());
+    for (int m = 0; m < model.nu(); ++m) readings.motor_positions[m] = q[model.joints()[model.motors()[m].joint].idx_q];
+    readings.specific_force = -(R.transpose() * model.gravity());
+    Estimator estimator(model, q);
+    estimator.reset(0, q, rest, {0});
+    for (int i = 1; i <= 100; ++i) {
+      readings.time = i * kPeriod;
+      estimator.update(readings, {0});
+      REQUIRE(estimator.getContacts() == std::vector<char>{1, 0});
+    }
+    REQUIRE(f.head<2>().norm() > 0.4 * weight);
+    CHECK(estimator.getWrench(0).head<3>().norm() == Approx(f.head<3>().norm()).epsilon(0.03));
+    CHECK(estimator.getWrench(1).head<3>().norm() < 0.03 * weight);
+  }
+}
+
+TEST_CASE("estimator: feet that stand are at rest, unless they roll") {
+  const LoadedRobot robot = load("bipetto");
+  const Model& model = robot.model;
+  const VectorXd q = makeStandingPosture(model), rest = VectorXd::Zero(model.nv());
+  const PassiveJoints joints(model, q);
+  FootModel feet(model);
+  feet.update(joints, q, rest, rest, VectorXd::Zero(model.nu()));
+  const VectorXd unit = VectorXd::LinSpaced(model.nu(), -1, 1);
+  for (const auto& [size, stays] : {std::pair(0.05, false), {5.0, true}}) {
+    VectorXd speeds = size * unit;
+    feet.calmFeet({1, 1}, VectorXd::Zero(6), speeds);
+    CHECK((speeds == size * unit) == stays);
+    if (!stays) CHECK(getLargest(speeds) < 1e-3 * size);  // twelve motors, two feet
   }
 }
 

@@ -7,6 +7,8 @@ namespace bielle {
 namespace {
 
 constexpr double kLength = 0.2;           // L of Eq. (2), m
+constexpr double kTrunk = 0.1;            // w of Eq. (2), 1
+constexpr double kRest = 0.25;            // of Eq. (3): a faster foot is not at rest, m/s
 constexpr double kRegularization = 1e-4;  // e of Eq. (2), 1
 
 int countRows(ContactKind kind) { return kind == ContactKind::Surface6D ? 6 : 3; }
@@ -22,7 +24,7 @@ FootModel::FootModel(const Model& model)
   }
   const int size = trunk_ + model.nu();
   scales_.setConstant(size, 1 / kLength);
-  if (trunk_) scales_.head<3>().setOnes();
+  if (trunk_) scales_.head<6>() << Vector3d::Constant(kTrunk), Vector3d::Constant(kTrunk / kLength);
   for (int m = 0; m < model.nu(); ++m)
     if (model.joints()[model.motors()[m].joint].kind == JointKind::Prismatic) scales_[trunk_ + m] = 1;
   for (MatrixXd* x : {&A_, &standing_}) x->setZero(rows, size);
@@ -67,11 +69,15 @@ void FootModel::update(const PassiveJoints& joints, ConstVectorRef q, ConstVecto
 void FootModel::calmFeet(const std::vector<char>& standing, ConstVectorRef twist, VectorRef speeds) {
   if (wrenches_.empty()) return;
   standing_ = A_;
-  for (size_t c = 0; c < wrenches_.size(); ++c)
-    if (!standing[c]) standing_.middleRows(offsets_[c], countRows(model_.contacts()[c].kind)).setZero();
   motion_ << twist.head(trunk_), speeds;
   motion_.array() /= scales_.array();
   f_.noalias() = standing_ * motion_;
+  for (size_t c = 0; c < wrenches_.size(); ++c) {
+    const int rows = countRows(model_.contacts()[c].kind);
+    if (standing[c] && f_.segment(offsets_[c], rows).norm() < kRest) continue;
+    standing_.middleRows(offsets_[c], rows).setZero();
+    f_.segment(offsets_[c], rows).setZero();
+  }
   const auto motors = standing_.rightCols(model_.nu());
   normal_.noalias() = motors * motors.transpose();
   normal_.diagonal().array() += kRegularization;

@@ -5,13 +5,17 @@
 ///     T^T (M a + b) = T^T B u + sum_i (J_i T)^T f_i                                                                 (1)
 /// with f_i the wrench of the ground on foot i. Where the acceleration a is taken from a filter, the f_i that fit best are
 ///     argmin |D (T^T (M a + b - B u) - A^T f)|^2 + e |f|^2,   A_i = J_i T                                           (2)
-/// with D = diag(1, 1/L) for forces and torques, moments in f over L too, L = 0.2 m. The trunk's six rows weigh all feet
-/// together, the rows of its motors each leg.
+/// with D = diag(w, w/L) for forces and moments on the trunk, diag(1, 1/L) for those of motors, moments in f over L too,
+/// L = 0.2 m, w = 0.1. The trunk's six rows weigh all feet together, the rows of its motors each leg. What pushes the trunk is
+/// in its rows alone and no force of the ground: where the motors tell f, they decide (w = 1 took 100 N on the trunk for 60 N
+/// on a foot in the air).
 ///
 /// Standing feet are at rest. With A = (A_b, A_m) of trunk and motors, the speeds w of the motors that agree with that, given
 /// the twist V of the trunk, and are nearest to observed ones are
 ///     w - A_m^T (A_m A_m^T + e)^-1 (A_b V + A_m w)                                                                  (3)
 /// Encoders know speeds late, the trunk's twist is known at once: without (3) the two would make standing feet seem to move.
+/// A foot that seems to move by more than 0.25 m/s (its rotation times L included), which is more than they are late by, does
+/// move: it rolls over an edge, or slips.
 #include <Eigen/Cholesky>
 #include <vector>
 
