@@ -35,12 +35,13 @@ struct PagmoProblem {
   }
   VectorXd makeDesign(const double* x) const {
     VectorXd design(static_cast<Eigen::Index>(order.size()));
-    design(order) = VectorXd::Map(x, design.size());
+    for (size_t i = 0; i < order.size(); ++i) design[order[i]] = x[i];
     return design;
   }
   pagmo::vector_double sort(const VectorXd& x) const {
-    const VectorXd sorted = x(order);
-    return {sorted.begin(), sorted.end()};
+    pagmo::vector_double sorted;
+    for (const Eigen::Index i : order) sorted.push_back(x[i]);
+    return sorted;
   }
   pagmo::vector_double fitness(const pagmo::vector_double& x) const {
     return problem->evaluate({makeDesign(x.data())}).front();

@@ -44,9 +44,11 @@ Model makeFiveBarLeg(const FiveBarLegParameters& parameters) {
     throw ModelError("fivebar_leg", "parameter 'lower_length'", "the lower rods do not meet below the motors",
                      "make them longer, or change stand_angle");
   ModelBuilder builder("fivebar_leg");
-  builder.addVisual(
-      "world",
-      {Visual::Shape::Box, 0, {Matrix3d::Identity(), {0, 0.06, depth}}, {0.02, 0.01, 2 * depth}, "", colors::kSteel});
+  Visual post;
+  post.X_BV.p = {0, 0.06, depth};
+  post.size = {0.02, 0.01, 2 * depth};
+  post.rgba = colors::kSteel;
+  builder.addVisual("world", post);
   Joint rail;
   rail.name = "rail";
   rail.kind = JointKind::Prismatic;

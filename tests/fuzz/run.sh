@@ -7,18 +7,22 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 seconds=${1:-600}
 shift || true
 targets=("$@")
-[ ${#targets[@]} -gt 0 ] || targets=(urdf drake yaml motors mjcf json csv npz)
+[ ${#targets[@]} -gt 0 ] || targets=(urdf drake yaml motors mjcf mesh json csv npz)
 build=$root/build-fuzz
 bielle=${BIELLE:-$root/build/bin/bielle}
 mkdir -p "$build/findings" "$build/seeds"
 
 # Seeds: the robots of the source tree, a small robot's YAML with every key, and a result that the command makes.
 if [ ! -e "$build/seeds/done" ]; then
-  mkdir -p "$build"/seeds/{urdf,drake,yaml,motors,mjcf,json,csv,npz}
+  mkdir -p "$build"/seeds/{urdf,drake,yaml,motors,mjcf,mesh,json,csv,npz}
   cp "$root"/robots/*/*.urdf "$build/seeds/urdf"
   cp "$root"/robots/*/*.yaml "$root"/tests/fuzz/toy.yaml "$build/seeds/yaml"
   sed 's/^  ak80-9:/  m:/' "$root/robots/motors.yaml" >"$build/seeds/motors/all.yaml"
   printf 'motors: {m: {source: s, ratio: 9, rotor_inertia: 1e-5, torque_constant: 0.1, resistance: 0.2, voltage: 48, current: 20, continuous_current: 9, efficiency: 0.9, back_efficiency: 0.8, mass: 0.5, effort: 10, velocity: 40}}\n' >"$build/seeds/motors/one.yaml"
+  # A triangle as STL, binary (a header of 80 bytes, the number of triangles) and text, and as OBJ.
+  printf '%80s\1\0\0\0%48s\0\0' '' '' >"$build/seeds/mesh/binary.stl"
+  printf 'solid t\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0.5\n' >"$build/seeds/mesh/text.stl"
+  printf 'v 0 0 0\nv 1 0 0\nv 0 1 0.5\nf 1 2 3\n' >"$build/seeds/mesh/t.obj"
   for robot in fourbar fivebar_leg spring_leg belt_biped; do
     "$bielle" convert "$root/robots/$robot" --to mjcf -o "$build/seeds/mjcf/$robot.xml" >/dev/null 2>&1
     "$bielle" convert "$root/robots/$robot" --to drake -o "$build/seeds/drake/$robot.urdf" >/dev/null 2>&1

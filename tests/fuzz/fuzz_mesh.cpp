@@ -1,0 +1,19 @@
+// An STL or OBJ file: a shape of finite size, or none.
+#include "model/mesh.h"
+#include "scratch.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace bielle;
+  const fuzz::Scratch& scratch = fuzz::getScratch();
+  const std::string content = fuzz::toText(data, size);
+  for (const char* mesh : {"mesh.stl", "mesh.obj"}) {
+    scratch.write(mesh, content);
+    const std::optional<Shape> shape = fitMesh(mesh, scratch.path(), Vector3d(1, 2, -3));
+    if (!shape) continue;
+    if (!shape->X_BS.p.allFinite() || !shape->half.allFinite() || !(shape->half.minCoeff() >= 0) ||
+        !(shape->radius >= 0) || !std::isfinite(shape->radius) ||
+        !((shape->X_BS.R.transpose() * shape->X_BS.R).isIdentity(1e-9)))
+      fuzz::fail(std::string(mesh) + ": its shape is none");
+  }
+  return 0;
+}
