@@ -40,10 +40,6 @@ double calcPostureGap(const Model& start, const Model& model, const VectorXd& po
   return result.status == AssemblyStatus::Closed ? 0 : std::max(result.gap, options.tolerance);
 }
 
-}  // namespace
-
-namespace {
-
 constexpr double kSlack = 1e-3;  // of a bound, which constraints may be beyond: solvers keep their own to a tolerance
 constexpr double kCentimetre = 0.01;  // the scale of distances, whose bound may be 0
 

@@ -23,7 +23,7 @@ struct UrdfJoint {
   Joint joint;                             ///< name, kind, X_PJ, axis
   VectorXd lower, upper;                   ///< per coordinate of its velocity, or empty for none
   std::optional<double> effort, velocity;  ///< of joints with one coordinate
-  double damping = 0, friction = 0;  ///< of <dynamics>
+  double damping = 0, friction = 0;        ///< of <dynamics>
   std::string mimicked;  ///< joint whose coordinate times `multiplier`, plus `offset`, is that of this one; or empty
   double multiplier = 1, offset = 0;
 };
