@@ -70,13 +70,16 @@ class Recorder {
       record_.contact_wrenches.block<1, 6>(stage, 6 * c) = world.getFeet()[c].wrench;
   }
   Vector3d getCom() const { return record_.com.row(node_ - 1); }
-  // What was recorded, without the rows that were not reached.
-  MotionRecord finish() {
-    const int stages = node_ - 1;
-    record_.time.conservativeResize(node_);
-    for (const RecordTable& table : listTables(record_))
-      (record_.*table.data).conservativeResize(stages + (table.per == RecordTable::Per::Node ? 1 : 0), Eigen::NoChange);
-    return std::move(record_);
+  // What was recorded from an instant on, a stage at least.
+  MotionRecord getRecord(double since) const {
+    int first = 0;
+    while (first + 2 < node_ && record_.time[first] < since) ++first;
+    MotionRecord record = record_;
+    record.time = record_.time.segment(first, node_ - first);
+    for (const RecordTable& table : listTables(record))
+      record.*table.data =
+          (record_.*table.data).middleRows(first, node_ - first - (table.per == RecordTable::Per::Node ? 0 : 1));
+    return record;
   }
 
  private:
@@ -189,18 +192,22 @@ double calcExchange(const Books& before, const Books& now) {
 
 const char* getName(Outcome outcome) {
   switch (outcome) {
+    case Outcome::Running:
+      return "running";
     case Outcome::Stood:
       return "stood";
     case Outcome::Fell:
       return "fell";
     case Outcome::BrokeOff:
       return "broke off";
+    case Outcome::Stopped:
+      return "was stopped";
   }
   return "?";
 }
 
 Execution execute(const Model& model, const Policy& plan, Controller& controller, World& world,
-                  const ExecutionOptions& o) {
+                  const ExecutionOptions& o, const ExecutionObserver& observer) {
   const double duration = o.duration > 0 ? o.duration : plan.getDuration() + o.hold;
   const int ticks = std::max(1, static_cast<int>(std::lround(duration / o.control_period)));
   const int ticks_per_row = std::max(1, static_cast<int>(std::lround(o.record_period / o.control_period)));
@@ -226,10 +233,23 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   const Vector3d com_start = recorder.getCom();
   int cut = 0, tick = 0;
   double seconds = 0, exchanged = 0;
-  bool advances = true;
+  bool advances = true, goes_on = true;
   std::string fall;
+  const auto describe = [&](double since) {
+    Execution so_far = out;
+    so_far.outcome = Outcome::Running;
+    so_far.duration = world.getTime();
+    so_far.distance = (recorder.getCom() - com_start).head<2>().norm();
+    so_far.imbalance = calcImbalance(so_far.start, so_far.end);
+    so_far.energy_balance = exchanged > 0 ? so_far.imbalance / exchanged : 0;
+    so_far.saturated_share = static_cast<double>(cut) / (std::max(1, tick) * std::max(1, model.nu()));
+    so_far.real_time_factor = seconds > 0 ? so_far.duration / seconds : 0;
+    so_far.estimation = perception.getErrors();
+    so_far.record = recorder.getRecord(since);
+    return so_far;
+  };
   const Pace pace;
-  for (; tick < ticks && advances && fall.empty(); ++tick) {
+  for (; tick < ticks && advances && goes_on && fall.empty(); ++tick) {
     if (o.real_time) out.largest_lag = std::max(out.largest_lag, pace.await(world.getTime()));
     measurement = perception.update(world, controller.getPlanTime(world.getTime()));
     measurement.delay = o.delay.delay;
@@ -251,17 +271,14 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
     const Books books = world.getBooks();
     exchanged += calcExchange(out.end, books);
     out.end = books;
+    if (observer && fall.empty() && tick + 1 < ticks) goes_on = observer(world.getTime(), duration, describe);
   }
-  out.outcome = !advances ? Outcome::BrokeOff : !fall.empty() ? Outcome::Fell : Outcome::Stood;
+  out = describe(0);
+  out.outcome = !advances       ? Outcome::BrokeOff
+                : !fall.empty() ? Outcome::Fell
+                : tick == ticks ? Outcome::Stood
+                                : Outcome::Stopped;
   out.message = advances ? fall : world.getMessage();
-  out.duration = world.getTime();
-  out.distance = (recorder.getCom() - com_start).head<2>().norm();
-  out.imbalance = calcImbalance(out.start, out.end);
-  out.energy_balance = exchanged > 0 ? out.imbalance / exchanged : 0;
-  out.saturated_share = static_cast<double>(cut) / (std::max(1, tick) * std::max(1, model.nu()));
-  out.real_time_factor = seconds > 0 ? out.duration / seconds : 0;
-  out.estimation = perception.getErrors();
-  out.record = recorder.finish();
   return out;
 }
 

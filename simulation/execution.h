@@ -1,5 +1,6 @@
 #pragma once
 /// \file Carrying a plan out: a controller and a world, instant by instant, and what came of it.
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -43,7 +44,7 @@ struct ExecutionOptions {
   Ground ground, planned_ground;  ///< of the world; that the plan was made for
 };
 
-enum class Outcome { Stood, Fell, BrokeOff };
+enum class Outcome { Running, Stood, Fell, BrokeOff, Stopped };
 const char* getName(Outcome outcome);
 
 struct Execution {
@@ -67,9 +68,14 @@ struct Execution {
   double getMeanSpeed() const { return duration > 0 ? distance / duration : 0; }  ///< m/s
 };
 
+/// What has happened up to now, with the rows of its record from an instant [s] on.
+using ExecutionSoFar = std::function<Execution(double since)>;
+/// Looks on: is called after every row of the record, at `time` of `duration`, s. \returns whether to go on
+using ExecutionObserver = std::function<bool(double time, double duration, const ExecutionSoFar& so_far)>;
+
 /// From the state in which the policy starts.
 /// \param model  of the world's robot; that of the policy may differ from it in its dimensions (robot_errors.h)
 Execution execute(const Model& model, const Policy& plan, Controller& controller, World& world,
-                  const ExecutionOptions& options = {});
+                  const ExecutionOptions& options = {}, const ExecutionObserver& observer = {});
 
 }  // namespace bielle::simulation

@@ -79,6 +79,9 @@ void parseOptions(SimulateArguments& arguments) {
                        "leave it out");
     readCommands(arguments.commands);
   }
+  if (arguments.execution.real_time && arguments.live)
+    throw ModelError("", "--live", "writing files would hold the world up, which is to keep to the clock",
+                     "leave out --real-time");
   if (arguments.execution.real_time && arguments.control != "mpc")
     throw ModelError("", "--real-time", "only predictive control solves anything on the way", "give --control mpc");
   arguments.predictive.own_thread = arguments.execution.real_time;
@@ -206,8 +209,12 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
   app.add_option("--record-period", a.execution.record_period, "between rows of the trajectory [s]")
       ->check(positive)
       ->capture_default_str();
-  app.add_flag("--no-report", a.no_report, "writes no report.html");
-  app.add_flag("--summary-only", a.summary_only, "writes summary.json alone");
+  CLI::Option* live = app.add_flag(
+      "--live", a.live,
+      "writes the files, with the last 10 s, every other second while the motion is carried out; report.html, open in "
+      "a browser, shows what happens");
+  app.add_flag("--no-report", a.no_report, "writes no report.html")->excludes(live);
+  app.add_flag("--summary-only", a.summary_only, "writes summary.json alone")->excludes(live);
   app.add_flag("--dry-run", a.dry_run, "checks the options; reads no motion, carries nothing out, writes nothing");
 }
 

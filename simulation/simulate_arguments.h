@@ -27,7 +27,7 @@ struct SimulateArguments {
   double delay = 0, jitter = 0;      // ms
   RobotErrors errors;
   unsigned seed = 1;
-  bool no_report = false, summary_only = false, dry_run = false;
+  bool live = false, no_report = false, summary_only = false, dry_run = false;
   ExecutionOptions execution;
   PredictiveOptions predictive;
 };

@@ -1,6 +1,7 @@
 // bielle-simulate: carries a motion out in a world.
 #include <iostream>
 #include <map>
+#include <memory>
 
 #include "bielle/model/error.h"
 #include "io/setting.h"
@@ -8,6 +9,7 @@
 #include "simulation/commanded_plan.h"
 #include "simulation/make_world.h"
 #include "simulation/simulate_output.h"
+#include "simulation/watch.h"
 
 using namespace bielle;
 using namespace bielle::simulation;
@@ -61,9 +63,20 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   const Model& robot = machine ? *machine : model;
   const auto world = makeWorld(arguments.world, robot, {ground, arguments.time_step});
   makeOutputDirectory(arguments.output);
-  const Execution execution = execute(robot, plan->getReference(), plan->getController(), *world, arguments.execution);
+  const auto writeFiles = [&](const Execution& execution) {
+    return write(arguments, *plan, ground, execution, command);
+  };
+  ExecutionObserver observer;
+  if (!arguments.summary_only) {  // a campaign's, which looks at nothing else
+    const auto watch = std::make_shared<Watch>(arguments.live ? writeFiles : Watch::Show());
+    observer = [watch](double time, double duration, const ExecutionSoFar& so_far) {
+      return watch->update(time, duration, so_far);
+    };
+  }
+  const Execution execution =
+      execute(robot, plan->getReference(), plan->getController(), *world, arguments.execution, observer);
   print(arguments, *plan, execution);
-  for (const std::string& path : write(arguments, *plan, ground, execution, command)) std::cout << "  " << path << "\n";
+  for (const std::string& path : writeFiles(execution)) std::cout << "  " << path << "\n";
   return execution.outcome == Outcome::Stood ? kStood : kFell;
 }
 
@@ -80,7 +93,8 @@ int main(int argc, char** argv) {
   app.footer(
       "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude or is less than 0.6 times\n"
       "as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle. Exit status:\n"
-      "0 it stood to the end, 1 it fell or the world broke off (files are written all the same), 2 bad input.\n"
+      "0 it stood to the end, 1 it fell, was stopped by Ctrl-C, or the world broke off (files are written all the\n"
+      "same), 2 bad input.\n"
       "Examples:\n"
       "  bielle solve walk --robot bipetto --speed 0.4 -o walk\n"
       "  bielle simulate walk -o carried-out\n"

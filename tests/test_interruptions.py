@@ -179,6 +179,41 @@ def test_signals():
     assert len(outcomes) >= 3
 
 
+def read_summary(directory):
+    with open(os.path.join(directory, "summary.json")) as file:
+        return json.load(file)
+
+
+def test_motions_carried_out():
+    """A motion that is watched is in its files before it ends; SIGINT ends it with all of them, SIGKILL with the last ones."""
+    if not os.access(os.path.join(os.path.dirname(program), "bielle-simulate"), os.X_OK):
+        print("  built without worlds")
+        return
+    run(*SQUAT, "--quiet", "--no-report", "-o", "plan", status=0)
+    command = [program, "simulate", "plan", "--hold", "100", "-o", "carried_out"]
+    for number, outcome in ((signal.SIGINT, "was stopped"), (signal.SIGTERM, "was stopped"), (signal.SIGKILL, "running")):
+        shutil.rmtree("carried_out", ignore_errors=True)
+        child = subprocess.Popen([*command, "--live"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        begin = time.time()
+        while not os.path.exists("carried_out/report.html"):  # the last one that is written
+            assert time.time() - begin < 60 and child.poll() is None
+            time.sleep(0.01)
+        assert read_summary("carried_out")["outcome"] == "running"
+        child.send_signal(number)
+        out, error = child.communicate(timeout=60)
+        assert child.returncode == (-number if number == signal.SIGKILL else 1), (child.returncode, error)
+        assert "report.html" in check_whole("carried_out")
+        summary = read_summary("carried_out")
+        assert summary["outcome"] == outcome and not summary["fell"], summary["outcome"]
+        if number == signal.SIGKILL:
+            continue
+        assert "it was stopped" in out
+        with open("carried_out/trajectory.csv") as file:
+            times = [float(row["time"]) for row in csv.DictReader(file)]
+        assert times[0] == 0 and abs(times[-1] - summary["duration"]) < 1e-9 and times[-1] < 100
+    run(*command, "--live", "--real-time", "--control", "mpc", status=2, error="leave out --real-time")
+
+
 def test_deep_json():
     """Elements nested so deep that whatever recurses over them would end the program."""
     run(*SQUAT, "--quiet", "--no-report", "-o", "deep", status=0)

@@ -225,6 +225,42 @@ class ReportPage(unittest.TestCase):
             for row, value in zip(rows, values):
                 self.assertAlmostEqual(float(row["u." + name]), value, delta=1e-5)
 
+    def test_a_motion_under_way_is_followed(self):
+        """The page is loaded again by itself, and goes on with the view and at the time where it was."""
+        running = self.root / "running"
+        shutil.copytree(self.squat, running, dirs_exist_ok=True)
+        summary = json.loads((self.squat / "summary.json").read_text())
+        summary.update(outcome="running", converged=False, world="bielle", control="gains")
+        (running / "summary.json").write_text(json.dumps(summary))
+        run("report", running)
+        self.browser.open(running / "report.html")
+
+        def ask(expression):
+            deadline = time.monotonic() + 60
+            while True:
+                try:
+                    return self.browser.evaluate("typeof report === 'object' && report.live && " + expression)
+                except RuntimeError:  # the page was left meanwhile
+                    self.assertLess(time.monotonic(), deadline)
+
+        self.assertEqual(ask("[document.querySelectorAll('.badge.bad').length, report.transport.playing]"), [0, True])
+        ask("(report.transport.setTime(0.25), report.transport.setPlaying(false), report.camera.following = false,"
+            " report.camera.three.position.set(3, 2, 1), true)")
+        summary.update(outcome="stood", converged=True)
+        (running / "summary.json").write_text(json.dumps(summary))
+        run("report", running)
+        deadline = time.monotonic() + 60
+        while not ask("report.runs[0].summary.outcome === 'stood'"):
+            self.assertLess(time.monotonic(), deadline)
+            time.sleep(0.1)
+        self.assertAlmostEqual(self.browser.evaluate("report.transport.time"), 0.25)
+        self.assertFalse(self.browser.evaluate("report.transport.playing"))
+        position = self.browser.evaluate("report.camera.three.position.toArray()")
+        for value, expected in zip(position, (3, 2, 1)):
+            self.assertAlmostEqual(value, expected, places=3)
+        self.browser.open(running / "report.html")  # what was kept was for once
+        self.assertEqual(self.browser.evaluate("report.transport.time"), 0)
+
     def test_hostile_names_are_text(self):
         run("report", self.root / "hostile")
         self.browser.open(self.root / "hostile/report.html")

@@ -24,6 +24,7 @@ class Report {
     if (this.scene) this.addViewerControls();
     this.transport.setTime(this.options.time);
     this.transport.setPlaying(this.options.playing);
+    this.live = new Live(this);
     requestAnimationFrame(now => this.tick(now));
   }
 

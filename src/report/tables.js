@@ -46,7 +46,8 @@ function describeOutcome(run) {
 function fillBadges(parent, runs) {
   for (const run of runs) {
     const text = (runs.length > 1 ? run.label + ': ' : '') + describeOutcome(run);
-    addElement(parent, 'span', 'badge ' + (run.summary.converged ? 'good' : 'bad'), text);
+    const judgement = run.summary.outcome === 'running' ? '' : run.summary.converged ? 'good' : 'bad';
+    addElement(parent, 'span', 'badge ' + judgement, text);
     if (run.summary.outcome !== undefined)
       addElement(parent, 'span', 'badge', 'world ' + run.summary.world + ', control ' + run.summary.control);
     const missed = getGoals(run).filter(goal => !goal.met).map(goal => goal.name);

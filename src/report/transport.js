@@ -7,7 +7,9 @@ class Transport {
   // `onTime` is called with every new time.
   constructor(runs, onTime) {
     this.runs = runs;
+    this.begin = Math.min(...runs.map(run => run.time[0]));
     this.end = Math.max(...runs.map(run => run.end));
+    this.repeats = true;
     this.onTime = onTime;
     this.time = 0;
     this.speed = 1;
@@ -15,6 +17,7 @@ class Transport {
     this.button = document.getElementById('play');
     this.scrub = document.getElementById('scrub');
     this.clock = document.getElementById('clock');
+    this.scrub.min = this.begin;
     this.scrub.max = this.end;
     this.button.onclick = () => this.setPlaying(!this.playing);
     this.scrub.oninput = () => this.setTime(Number(this.scrub.value));
@@ -27,10 +30,13 @@ class Transport {
   fillSpeeds() {
     const select = document.getElementById('speed');
     for (const speed of SPEEDS) addElement(select, 'option', '', speed + '×').value = speed;
-    select.value = this.speed;
-    select.onchange = () => {
-      this.speed = Number(select.value);
-    };
+    select.onchange = () => this.setSpeed(Number(select.value));
+    this.setSpeed(this.speed);
+  }
+
+  setSpeed(speed) {
+    this.speed = speed;
+    document.getElementById('speed').value = speed;
   }
 
   handleKey(event) {
@@ -40,7 +46,7 @@ class Transport {
       ' ': () => this.setPlaying(!this.playing),
       ArrowLeft: () => this.step(-1),
       ArrowRight: () => this.step(1),
-      Home: () => this.setTime(0),
+      Home: () => this.setTime(this.begin),
       End: () => this.setTime(this.end)
     };
     if (!actions[event.key]) return;
@@ -49,14 +55,14 @@ class Transport {
   }
 
   setTime(t) {
-    this.time = Math.min(this.end, Math.max(0, t));
+    this.time = Math.min(this.end, Math.max(this.begin, t));
     this.scrub.value = this.time;
     this.clock.textContent = this.time.toFixed(3) + ' / ' + this.end.toFixed(2) + ' s';
     this.onTime(this.time);
   }
 
   setPlaying(on) {
-    if (on && this.time >= this.end) this.setTime(0);
+    if (on && this.time >= this.end && this.repeats) this.setTime(this.begin);
     this.playing = on;
     this.last = undefined;
     this.button.textContent = on ? '❚❚' : '▶';
@@ -78,8 +84,8 @@ class Transport {
       this.rest = this.time >= this.end ? (this.rest || 0) + (now - this.last) : 0;
       if (this.time < this.end)
         this.setTime(next);
-      else if (this.rest > 700)
-        this.setTime(0);
+      else if (this.rest > 700 && this.repeats)
+        this.setTime(this.begin);
     }
     this.last = now;
   }
