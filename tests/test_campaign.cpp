@@ -196,7 +196,7 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
 
 TEST_CASE("campaign: the specifications of the examples are read") {
   const std::vector<std::pair<std::string, size_t>> examples{
-      {"pushes", 32}, {"pushes_predictive", 80}, {"pushes_felt", 80}, {"unknown", 60}};
+      {"pushes", 32}, {"pushes_predictive", 80}, {"pushes_felt", 80}, {"unknown", 60}, {"worlds", 44}};
   for (const auto& [name, expected] : examples) {
     const study::CampaignSpec spec = study::readCampaignSpec(BIELLE_SOURCE_DIR "/examples/campaign/" + name + ".yaml");
     CHECK(spec.search.has_value() == (name == "pushes"));
