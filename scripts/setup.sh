@@ -41,6 +41,9 @@ install_missing() {
     { "${sudo[@]}" apt-get update && "${sudo[@]}" apt-get install -y --no-install-recommends "${missing[@]}"; }
 }
 
+# Objects come out of ccache where somebody has installed it, unless another launcher is asked for.
+if command -v ccache >/dev/null; then export CMAKE_CXX_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER-ccache}; fi
+
 # build DIRECTORY CMAKE_OPTION...: configures, then builds `bielle_targets` (default: everything) on as many cores as memory
 # allows, at 1.5 GB per compiler.
 bielle_targets=(all)
