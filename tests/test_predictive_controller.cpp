@@ -293,7 +293,7 @@ namespace {
 
 // Lets a walk by command follow its own policy, while the contacts that it is told are scripted.
 struct Walking {
-  Walking() {
+  explicit Walking(double look_ahead = 0) {
     LocomotionOptions gait;
     gait.contact_kp = 0;
     gait.foothold_room = 0.4;
@@ -301,6 +301,7 @@ struct Walking {
     const CommandSource source = [](double) { return VelocityCommand{0.4, 0, 0}; };
     PredictiveOptions options = makeShortWindow(1);
     options.nodes = 60;
+    options.look_ahead = look_ahead;
     const VectorXd q = makeStandingPosture(model);
     CommandedWalk walk(model, gait, {}, source, q);
     CommandedWalk plan = walk;
@@ -364,6 +365,28 @@ TEST_CASE("predictive control: a foot that finds ground early stands from then o
   CHECK(walk.getHeight(foot) == Approx(height).margin(2e-3));  // above the ground of the plan
   CHECK(walk.getHeight(foot) > 3e-3);
   CHECK(walk.controller->getCounts().failed == 0);
+}
+
+TEST_CASE("predictive control: gains that look ahead are those of an earlier solution of the same phase") {
+  constexpr int kStages = 3;
+  Walking walk(kStages * 1e-3 * kStageTicks), nearby;
+  const int foot = walk.findChange(0, false) < walk.findChange(1, false) ? 0 : 1;
+  const int landing = walk.findChange(foot, true);
+  const auto collect = [landing](Walking& by) {
+    std::vector<RowMatrixXd> gains;
+    for (int stage = 0; stage <= landing; ++stage) {
+      by.updateAsPlanned(stage);
+      gains.push_back(by.controller->getPolicy().getStages().front().K);
+    }
+    return gains;
+  };
+  const std::vector<RowMatrixXd> far = collect(walk), near = collect(nearby);
+  for (int k : {landing - 2, landing - 1}) {
+    CHECK(far[k] == far[landing - kStages]);
+    CHECK(near[k] != near[landing - kStages]);
+  }
+  CHECK(far[landing - kStages] != far[landing - kStages - 1]);
+  CHECK(far[landing] != far[landing - 1]);
 }
 
 TEST_CASE("predictive control: a foot that finds no ground is lowered until it does, and the motion waits for it") {

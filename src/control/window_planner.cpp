@@ -10,14 +10,15 @@
 namespace bielle {
 namespace {
 
-constexpr int kAhead = 3;               // stages of a policy: what is left when solves fail
-constexpr int kAheadInThread = 8;       // or when they come late
-constexpr int kEarly = 2;               // stages before its landing at which a foot counts as early
-constexpr int kLate = 1;                // stages after its landing at which a foot counts as late
-constexpr int kLowering = 2;            // stages in which it is then foreseen to land
-constexpr double kLoweringSpeed = 0.3;  // m/s
-constexpr double kDepth = 0.05;         // to which it is lowered, m
-constexpr int kFirstIterations = 10;    // of the solve before the start
+constexpr double kClockTolerance = 1e-9;  // s: durations are sums of stages
+constexpr int kAhead = 3;                 // stages of a policy: what is left when solves fail
+constexpr int kAheadInThread = 8;         // or when they come late
+constexpr int kEarly = 2;                 // stages before its landing at which a foot counts as early
+constexpr int kLate = 1;                  // stages after its landing at which a foot counts as late
+constexpr int kLowering = 2;              // stages in which it is then foreseen to land
+constexpr double kLoweringSpeed = 0.3;    // m/s
+constexpr double kDepth = 0.05;           // to which it is lowered, m
+constexpr int kFirstIterations = 10;      // of the solve before the start
 
 FddpOptions makeSolverOptions(bool bounded, const PredictiveOptions& options, int iterations) {
   FddpOptions out;
@@ -245,18 +246,48 @@ void WindowPlanner::startFromGuess(int stage) {
   moveWindow();
 }
 
+// Less than the look-ahead is left of its phase.
+bool WindowPlanner::isNearEnd(int stage) const {
+  const double end = horizon_->getStart(stage) + options_.look_ahead - kClockTolerance;
+  for (int k = stage + 1; horizon_->getStart(k) < end; ++k)
+    if (horizon_->getPhase(k) != horizon_->getPhase(stage)) return true;
+  return false;
+}
+
+// Gains of a stage that is near the end of its phase: of the stage before it in the policy, or of an earlier solution.
+const RowMatrixXd* WindowPlanner::findEarlierGains(const Policy::Stage* before, int phase) const {
+  if (before && before->phase == phase) return &before->K;
+  for (const KeptGains& kept : kept_)
+    if (kept.phase == phase) return &kept.K;
+  return nullptr;
+}
+
+void WindowPlanner::keepGains(int phase, const RowMatrixXd& K) {
+  if (kept_[0].phase != phase) std::swap(kept_[0], kept_[1]);
+  kept_[0].phase = phase;
+  kept_[0].K = K;
+}
+
 // The first stages of the window's solution.
 void WindowPlanner::makePolicy(const Fddp& solver, int stage, Solution& solution) {
   int node = 0;
+  const Policy::Stage* before = nullptr;
   for (Policy::Stage& out : solution.stages) {
     while (isImpact(stage)) ++stage, ++node;
     const int k = horizon_->getNode(stage);
     fillStage(problem_, k, horizon_->getStart(stage) - advance_, trajectory_.xs[node], trajectory_.us[node],
               trajectory_.xs[node + 1], out);
     out.phase = horizon_->getPhase(stage);
-    evaluator_.evaluate(k, trajectory_.xs[node], trajectory_.us[node]);
-    calcGains(model_, evaluator_, solver.getSweep().getNodes()[node].K, out.K);
+    const RowMatrixXd* earlier = isNearEnd(stage) ? findEarlierGains(before, out.phase) : nullptr;
+    if (earlier) {
+      out.K = *earlier;
+    } else {
+      evaluator_.evaluate(k, trajectory_.xs[node], trajectory_.us[node]);
+      calcGains(model_, evaluator_, solver.getSweep().getNodes()[node].K, out.K);
+      if (out.phase == solution.stages.front().phase) keepGains(out.phase, out.K);
+    }
     solution.u_hold = out.u;
+    before = &out;
     ++stage, ++node;
   }
 }

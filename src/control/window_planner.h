@@ -57,6 +57,13 @@ class WindowPlanner {
   void retreat(int first);
   void moveWindow();
   void startFromGuess(int stage);
+  struct KeptGains {
+    int phase = -1;
+    RowMatrixXd K;
+  };
+  bool isNearEnd(int stage) const;
+  const RowMatrixXd* findEarlierGains(const Policy::Stage* before, int phase) const;
+  void keepGains(int phase, const RowMatrixXd& K);
   void makePolicy(const Fddp& solver, int stage, Solution& solution);
 
   const PredictiveOptions options_;
@@ -77,6 +84,9 @@ class WindowPlanner {
     double waited = 0;
   } late_;
   int first_ = 0;  // stage with which the window begins
+  // Gains of the last stage of a phase that was far enough from its end; of the present phase and the one before, to which a
+  // late foot leads back.
+  KeptGains kept_[2];
   VectorXd x_, measured_, u_;
 };
 
