@@ -11,9 +11,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
 #include "io/record_tables.h"
-#include "model/number_text.h"
 #include "simulation/robot_errors.h"
-#include "simulation/terrain.h"
 
 namespace bielle::simulation {
 namespace {
@@ -89,56 +87,6 @@ class Recorder {
   int node_ = 0;
 };
 
-// Compares the trunk with the plan.
-class FallDetector {
- public:
-  FallDetector(const Model& model, const Policy& plan, const ExecutionOptions& options)
-      : model_(model),
-        plan_(plan),
-        criterion_(options.fall),
-        ground_(options.ground),
-        planned_ground_(options.planned_ground),
-        q_(model.makeNeutral()),
-        v_(VectorXd::Zero(model.nv())) {}
-
-  // Why the robot counts as fallen, or nothing. `plan_time`: the instant of the plan at which it should be.
-  std::string find(double time, double plan_time, const VectorXd& q) {
-    plan_.getReference(plan_time, q_, v_);
-    if (const Joint* joint = findStrayJoint(q))
-      return "joint " + joint->name + " is far from its planned angle at " + formatTime(time);
-    if (!model_.hasFreeFlyer()) return {};
-    const Vector3d p = q.head<3>(), planned = q_.head<3>();
-    deviation_ = (p - planned).norm();
-    const auto getUp = [](const VectorXd& at) {
-      return Vector3d(Eigen::Quaterniond(at[6], at[3], at[4], at[5]).toRotationMatrix().row(2));
-    };
-    const double tilt = std::acos(std::clamp(getUp(q).dot(getUp(q_)), -1.0, 1.0));
-    const double height = (p.z() - ground_.find(p.x(), p.y()).height) /
-                          (planned.z() - planned_ground_.find(planned.x(), planned.y()).height);
-    if (tilt > criterion_.tilt) return "the trunk leans far from its planned attitude at " + formatTime(time);
-    if (height < criterion_.height) return "the trunk is far below its planned height at " + formatTime(time);
-    return {};
-  }
-  double getDeviation() const { return deviation_; }  // of the last find(), m
-
- private:
-  const Joint* findStrayJoint(const VectorXd& q) const {
-    for (const Joint& joint : model_.joints()) {
-      const bool turns = joint.kind == JointKind::Revolute || joint.kind == JointKind::Continuous;
-      if (turns && std::abs(q[joint.idx_q] - q_[joint.idx_q]) > criterion_.joint) return &joint;
-    }
-    return nullptr;
-  }
-  static std::string formatTime(double time) { return formatNumber(time, "%.3f s"); }
-
-  const Model& model_;
-  const Policy& plan_;
-  const FallCriterion criterion_;
-  const Terrain ground_, planned_ground_;
-  VectorXd q_, v_;
-  double deviation_ = 0;
-};
-
 // Time that this thread has had a processor, s: other load on the machine does not count.
 double getProcessorTime() {
   timespec time;
@@ -212,7 +160,7 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   const int ticks = std::max(1, static_cast<int>(std::lround(duration / o.control_period)));
   const int ticks_per_row = std::max(1, static_cast<int>(std::lround(o.record_period / o.control_period)));
   Recorder recorder(model, (ticks + ticks_per_row - 1) / ticks_per_row);
-  FallDetector detector(model, plan, o);
+  FallDetector detector(model, plan, o.fall, o.ground, o.planned_ground);
 
   Execution out;
   Perception perception(plan.getModel(), o.perception);
@@ -266,6 +214,7 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
     if (tick % ticks_per_row == 0) recorder.addStage(world);
     fall = detector.find(world.getTime(), controller.getPlanTime(world.getTime()), world.getConfiguration());
     out.largest_deviation = std::max(out.largest_deviation, detector.getDeviation());
+    out.largest_joint_deviation = std::max(out.largest_joint_deviation, detector.getJointDeviation());
     if ((tick + 1) % ticks_per_row != 0 && tick + 1 != ticks && fall.empty()) continue;
     recorder.addNode(world);
     const Books books = world.getBooks();

@@ -6,6 +6,7 @@
 
 #include "bielle/control/policy.h"
 #include "bielle/io/record.h"
+#include "simulation/fall_detector.h"
 #include "simulation/perception.h"
 #include "simulation/torque_delay.h"
 #include "simulation/world.h"
@@ -18,16 +19,6 @@ struct Push {
   double impulse = 0;     ///< N s
   double direction = 0;   ///< about the vertical, from the x axis of the world; 90: to the left, degrees
   double duration = 0.1;  ///< s
-};
-
-/// When a robot counts as fallen: its trunk (the body of the first joint)
-/// - leans by more than `tilt` from its planned attitude, whatever its heading, or
-/// - is less than `height` times as high over the ground as planned at that time,
-/// or a revolute joint is more than `joint` away from its planned angle: a leg that whirls about carries nothing.
-struct FallCriterion {
-  double tilt = 0.8;    ///< rad
-  double height = 0.6;  ///< 1
-  double joint = 1.5;   ///< rad
 };
 
 struct ExecutionOptions {
@@ -49,13 +40,14 @@ const char* getName(Outcome outcome);
 
 struct Execution {
   Outcome outcome = Outcome::BrokeOff;
-  std::string message;           ///< what made it count as fallen, or why the world broke off
-  double duration = 0;           ///< until the end, the fall or the break, s
-  double distance = 0;           ///< of the centre of mass over the ground, from the start to the end, m
-  double largest_gap = 0;        ///< of closures, m
-  double largest_slip = 0;       ///< of a sole since its touchdown, m
-  double largest_deviation = 0;  ///< of the trunk from its planned place, m
-  double imbalance = 0;          ///< Books' Eq. (1), left less right side, J
+  std::string message;                 ///< what made it count as fallen, or why the world broke off
+  double duration = 0;                 ///< until the end, the fall or the break, s
+  double distance = 0;                 ///< of the centre of mass over the ground, from the start to the end, m
+  double largest_gap = 0;              ///< of closures, m
+  double largest_slip = 0;             ///< of a sole since its touchdown, m
+  double largest_deviation = 0;        ///< of the trunk from its planned place, m
+  double largest_joint_deviation = 0;  ///< of a revolute joint from its planned angle, rad
+  double imbalance = 0;                ///< Books' Eq. (1), left less right side, J
   /// The imbalance over the energy that motors, pushes and losses moved, row by row of the record.
   double energy_balance = 0;
   double saturated_share = 0;   ///< of motors and time: torques that were cut at their limits

@@ -46,10 +46,11 @@ std::unique_ptr<Plan> obtainPlan(const SimulateArguments& arguments) {
 int simulate(SimulateArguments arguments, const std::vector<std::string>& command) {
   parseOptions(arguments);
   if (arguments.dry_run) return kStood;
+  const double look_ahead = 1e-3 * arguments.look_ahead.value_or(arguments.sensors == "real" ? kRealLookAhead : 0);
+  arguments.predictive.look_ahead = look_ahead;
   const auto plan = obtainPlan(arguments);
   const Model& model = plan->robot.model;
-  const double look_ahead = arguments.look_ahead.value_or(arguments.sensors == "real" ? kRealLookAhead : 0);
-  plan->policy->setLookAhead(1e-3 * look_ahead);
+  plan->policy->setLookAhead(look_ahead);
   if (arguments.sensors == "real") {
     arguments.execution.perception.sensors = SensorOptions{makeRealParts(), arguments.noise, arguments.seed, {}};
     arguments.execution.perception.planned = plan->schedule;
@@ -57,6 +58,7 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   const Ground ground = makeGround(arguments, plan->ground);
   arguments.execution.ground = ground;
   arguments.execution.planned_ground = plan->ground;
+  arguments.execution.fall.only_whirling = plan->predictive != nullptr;
   arguments.errors.seed = arguments.seed;
   std::optional<Model> machine;
   if (!arguments.errors.isZero()) machine.emplace(makeMachine(model, arguments.errors));
@@ -92,7 +94,9 @@ int main(int argc, char** argv) {
   addOptions(app, arguments);
   app.footer(
       "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude or is less than 0.6 times\n"
-      "as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle. Exit status:\n"
+      "as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle; with "
+      "--control\n"
+      "mpc only if its linkage has passed a dead point, it has none, or is half a turn away. Exit status:\n"
       "0 it stood to the end, 1 it fell, was stopped by Ctrl-C, or the world broke off (files are written all the\n"
       "same), 2 bad input.\n"
       "Examples:\n"

@@ -122,6 +122,7 @@ void extendSummary(const std::string& path, const SimulateArguments& arguments, 
   summary["mean_speed"] = e.getMeanSpeed();
   summary["largest_deviation"] = e.largest_deviation;
   summary["largest_gap"] = e.largest_gap;
+  summary["largest_joint_deviation"] = e.largest_joint_deviation;
   summary["largest_slip"] = e.largest_slip;
   summary["energy_balance"] = e.energy_balance;
   summary["books"] = listBooks(e);

@@ -49,6 +49,8 @@ class PassiveJoints {
     const Follower& follower = followers_[place.cluster];
     for (size_t m = 0; m < follower.motors.size(); ++m) visit(follower.motors[m], follower.T(place.index, m));
   }
+  /// Whether a joint belongs to a linkage.
+  bool isLinked(const Joint& joint) const { return places_[joint.idx_v].cluster >= 0; }
   /// Smallest singular value of N_m of all clusters, 1 if there are none; and the name of a closure of the weakest.
   double getMargin() const { return margin_; }
   std::string getWeakest() const { return weakest_ ? *weakest_ : ""; }

@@ -1,0 +1,80 @@
+// When joints that are far from their plan are a fall, on a four-bar linkage.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "bielle/dynamics/assembly.h"
+#include "bielle/model/reader.h"
+#include "simulation/fall_detector.h"
+
+namespace bielle::simulation {
+namespace {
+
+constexpr double kCrank = 1.047198;  // of the plan, rad
+
+struct Linkage {
+  Linkage() : model(loadRobot(BIELLE_SOURCE_DIR "/robots/fourbar").model), planned(4) {
+    planned << kCrank, -0.541627, 1.633456, 2.013707;  // crank, crank to coupler, rocker, rocker to coupler
+    // Reflected it closes as well, with its crank below: the other assembly.
+    reflected = close(-planned);
+    planned = close(planned);
+    Policy::Stage stage;
+    stage.duration = 1;
+    stage.q = planned;
+    stage.v = stage.q_change = stage.v_next = VectorXd::Zero(model.nv());
+    stage.u = VectorXd::Zero(model.nu());
+    plan = std::make_unique<Policy>(model, std::vector<Policy::Stage>{stage}, stage.u);
+  }
+  VectorXd close(const VectorXd& near) const {
+    AssemblyProblem problem;
+    problem.q_ref = near;
+    const AssemblyResult result = assemble(model, problem);
+    REQUIRE(result.status == AssemblyStatus::Closed);
+    return result.q;
+  }
+  // As the linkage follows its crank.
+  VectorXd turn(const VectorXd& from, double crank) const {
+    PassiveJoints joints(model, from);
+    VectorXd q = from;
+    const double start = from[0];
+    constexpr int kSteps = 100;
+    for (int i = 1; i <= kSteps; ++i) {
+      const VectorXd at = VectorXd::Constant(1, start + (crank - start) * i / kSteps);
+      REQUIRE(joints.update(at, q) == ClosingStatus::Closed);
+    }
+    return q;
+  }
+  bool isFallen(const VectorXd& q, bool only_whirling) const {
+    FallCriterion criterion;
+    criterion.only_whirling = only_whirling;
+    return !FallDetector(model, *plan, criterion, {}, {}).find(0, 0, q).empty();
+  }
+
+  Model model;
+  VectorXd planned, reflected;
+  std::unique_ptr<Policy> plan;
+};
+
+}  // namespace
+
+TEST_CASE("falls: joints far from their plan are one unless their linkage follows its motors back") {
+  const Linkage linkage;
+  CHECK_FALSE(linkage.isFallen(linkage.turn(linkage.planned, kCrank + 0.7), false));
+  for (double turn : {-1.6, 1.6, 3.1}) {
+    const VectorXd turned = linkage.turn(linkage.planned, kCrank + turn);
+    CHECK(linkage.isFallen(turned, false));
+    CHECK_FALSE(linkage.isFallen(turned, true));
+  }
+  CHECK(linkage.isFallen(linkage.turn(linkage.planned, kCrank + 3.2), true));
+}
+
+TEST_CASE("falls: a linkage that has passed a dead point is one, even with its motor where it is planned") {
+  const Linkage linkage;
+  for (double turn : {0.0, 0.7, 1.6}) {
+    const VectorXd crossed = linkage.turn(linkage.reflected, kCrank + turn);
+    CHECK(std::abs(crossed[2] - linkage.planned[2]) > 1.5);
+    CHECK(linkage.isFallen(crossed, false));
+    CHECK(linkage.isFallen(crossed, true));
+  }
+}
+
+}  // namespace bielle::simulation
