@@ -94,9 +94,8 @@ int main(int argc, char** argv) {
   addOptions(app, arguments);
   app.footer(
       "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude or is less than 0.6 times\n"
-      "as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle; with "
-      "--control\n"
-      "mpc only if its linkage has passed a dead point, it has none, or is half a turn away. Exit status:\n"
+      "as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle (with\n"
+      "--control mpc: and its linkage has passed a dead point, or is half a turn away, or it has none). Exit status:\n"
       "0 it stood to the end, 1 it fell, was stopped by Ctrl-C, or the world broke off (files are written all the\n"
       "same), 2 bad input.\n"
       "Examples:\n"
