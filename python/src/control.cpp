@@ -59,6 +59,8 @@ void bindControllers(py::module_& module) {
       .field("iterations", &PredictiveOptions::iterations, "of the solver, at every stage")
       .field("regularization", &PredictiveOptions::regularization, "of its sweeps")
       .field("penalty", &PredictiveOptions::penalty, "of violated constraints")
+      .field("look_ahead", &PredictiveOptions::look_ahead,
+             "gains of stages nearer to the end of their phase are those of an earlier one, s")
       .field("threads", &PredictiveOptions::threads, "0: all; results are bitwise independent of it")
       .field("own_thread", &PredictiveOptions::own_thread,
              "solves run beside control; results then depend on how fast they are")
