@@ -101,7 +101,7 @@ TEST_CASE("guess: out of reach, legs are as in the stance") {
 
 TEST_CASE("guess: how high the centre of mass can be over a foot") {
   const Stance stance = makeStance();
-  const LegReach reach(getBipetto(), stance);
+  LegReach reach(getBipetto(), stance);
   const double height = stance.com.z() - stance.feet[0].p.z();
   const auto measure = [&](double ahead, double z) {  // transmissions with flat soles, or 0 if there is no such posture
     PlannedPosture planned{stance.q, stance.feet};

@@ -3,17 +3,23 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "motion/neighbour_plans.h"
 
 namespace bielle {
 
 VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const MotionEnvelope& envelope,
                           const std::function<Motion(const Model&)>& make) {
   VectorXd gradient = VectorXd::Zero(x.size());
+  NeighbourPlans plans;
+  const auto plan = [&](const Model& model) {
+    const NeighbourPlans::Use use(plans);
+    return make(model);
+  };
   for (Eigen::Index i : robot.listContinuous()) {
     const double step = kDesignStep * (robot.upper()[i] - robot.lower()[i]);
     const VectorXd dx = step * VectorXd::Unit(x.size(), i);
     const Model ahead = robot.make(x + dx), behind = robot.make(x - dx);
-    gradient[i] = envelope.calcDerivative(make(ahead), make(behind), step);
+    gradient[i] = envelope.calcDerivative(plan(ahead), plan(behind), step);
     if (!std::isfinite(gradient[i]))
       throw ModelError(robot.startModel().name(), "variable '" + robot.variables()[static_cast<size_t>(i)].name + "'",
                        "no gradient: the motion cannot be carried over to robots beside this one",

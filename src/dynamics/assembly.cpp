@@ -10,6 +10,7 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "dynamics/assembly_refinement.h"
 #include "math/so3.h"
 
 namespace bielle {
@@ -192,6 +193,43 @@ AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, cons
          << " iterations; the targets may be out of reach, or the start on the wrong branch of the mechanism";
     result.message = text.str();
   }
+  return result;
+}
+
+AssemblyResult refineAssembly(const Model& model, const AssemblyProblem& problem, ConstVectorRef near) {
+  constexpr int kMost = 30;
+  constexpr double kShort = 1e-9;  // of steps: nothing that is solved by Newton steps stops before
+  const AssemblyOptions options;
+  const VectorXd weights = problem.weights.size() ? problem.weights : VectorXd::Ones(model.nv());
+  HardConditions conditions(model, problem);
+  AssemblyResult result;
+  result.q = near;
+  double last = std::numeric_limits<double>::infinity();
+  for (result.iterations = 0; result.iterations < kMost; ++result.iterations) {
+    conditions.update(result.q);
+    const VectorXd wish = model.difference(result.q, problem.q_ref);
+    VectorXd step = wish;
+    if (conditions.rows() > 0) {
+      Eigen::CompleteOrthogonalDecomposition<MatrixXd> factors;
+      factors.setThreshold(options.rank_tolerance);
+      factors.compute(conditions.H);
+      step = -factors.solve(conditions.h);
+      const MatrixXd Z = factors.colsPermutation() * factors.matrixZ().transpose();
+      const MatrixXd N = Z.rightCols(Z.cols() - factors.rank());
+      const MatrixXd WN = weights.asDiagonal() * N;
+      if (N.cols() > 0) step += N * WN.colPivHouseholderQr().solve(weights.cwiseProduct(wish - step));
+    }
+    const double size = step.size() ? step.cwiseAbs().maxCoeff() : 0;
+    if (!(size < options.step_limit)) break;
+    if (last < kShort && size > 0.5 * last) break;
+    result.q = model.integrate(result.q, step);
+    last = size;
+    if (size == 0) break;
+  }
+  conditions.update(result.q);
+  result.gap = conditions.calcLoopGap();
+  const bool met = conditions.rows() == 0 || conditions.h.cwiseAbs().maxCoeff() <= options.tolerance;
+  if (met && last < kShort) result.status = AssemblyStatus::Closed;
   return result;
 }
 

@@ -172,36 +172,62 @@ std::vector<VectorXd> placeFeet(const Model& model, const Stance& stance, const 
   return qs;
 }
 
-LegReach::LegReach(const Model& model, const Stance& stance) {
-  constexpr double kSpacing = 0.1;  // over the height of the centre of mass
-  constexpr int kSide = 10;
-  FeetPlacer placer(model, stance);
-  spacing_ = kSpacing * placer.getHeight();
-  std::array<std::vector<Heights>, 2> sides;
-  for (int side = 0; side < 2; ++side) {
-    VectorXd q = stance.q;
-    double height = placer.getHeight();
-    for (int i = side; i <= kSide; ++i) {
+struct LegReach::Data {
+  // Heights at multiples of the spacing ahead of the stance, or behind it, as far as they are known.
+  struct Direction {
+    double sign = 1;
+    VectorXd q;
+    double height = 0;
+    std::vector<Heights> heights{};
+    bool ended = false;  // no more of them
+  };
+
+  Data(const Model& model, const Stance& stance)
+      : placer(model, stance),
+        spacing(0.1 * placer.getHeight()),
+        ahead{1, stance.q, placer.getHeight()},
+        behind{-1, stance.q, placer.getHeight()} {}
+
+  // Of both directions the first entry is one beside the other's: at the stance, and one spacing behind it.
+  void extend(Direction& direction, int count) {
+    constexpr int kMost = 10;
+    const int first = direction.sign > 0 ? 0 : 1;
+    while (!direction.ended && static_cast<int>(direction.heights.size()) < count) {
       Heights at;
-      if (!placer.findHeights((side == 0 ? i : -i) * spacing_, q, height, at.shortest, at.longest)) break;
-      sides[side].push_back(at);
+      const int i = first + static_cast<int>(direction.heights.size());
+      direction.ended = i > kMost || !placer.findHeights(direction.sign * i * spacing, direction.q, direction.height,
+                                                         at.shortest, at.longest);
+      if (!direction.ended) direction.heights.push_back(at);
     }
   }
-  behind_ = static_cast<int>(sides[1].size());
-  heights_.assign(sides[1].rbegin(), sides[1].rend());
-  heights_.insert(heights_.end(), sides[0].begin(), sides[0].end());
-}
+  const Heights& get(int i) const {
+    return i >= 0 ? ahead.heights[static_cast<size_t>(i)] : behind.heights[static_cast<size_t>(-i - 1)];
+  }
 
-LegReach::Heights LegReach::calc(double ahead, double aside) const {
-  if (heights_.empty()) return {0, std::numeric_limits<double>::infinity()};
-  const int last = static_cast<int>(heights_.size()) - 1;
-  const double s = std::clamp(ahead / spacing_ + behind_, 0.0, static_cast<double>(last));
-  const int i = std::min(static_cast<int>(s), std::max(0, last - 1)), j = std::min(i + 1, last);
+  FeetPlacer placer;
+  double spacing;
+  Direction ahead, behind;
+};
+
+LegReach::LegReach(const Model& model, const Stance& stance) : data_(std::make_unique<Data>(model, stance)) {}
+LegReach::~LegReach() = default;
+
+LegReach::Heights LegReach::calc(double ahead, double aside) {
+  Data& data = *data_;
+  const double way = std::clamp(ahead / data.spacing, -100.0, 100.0);  // more than there are
+  const int below = static_cast<int>(std::floor(way));
+  data.extend(data.ahead, below + 2);
+  data.extend(data.behind, -below);
+  const int first = -static_cast<int>(data.behind.heights.size()),
+            last = static_cast<int>(data.ahead.heights.size()) - 1;
+  if (last < first) return {0, std::numeric_limits<double>::infinity()};
+  const double s = std::clamp(way, static_cast<double>(first), static_cast<double>(last));
+  const int i = std::clamp(below, first, std::max(first, last - 1)), j = std::min(i + 1, last);
   const auto mix = [&](double a, double b) {
     const double length = a + (s - i) * (b - a);
     return std::sqrt(std::max(0.0, length * length - aside * aside));
   };
-  return {mix(heights_[i].shortest, heights_[j].shortest), mix(heights_[i].longest, heights_[j].longest)};
+  return {mix(data.get(i).shortest, data.get(j).shortest), mix(data.get(i).longest, data.get(j).longest)};
 }
 
 }  // namespace bielle

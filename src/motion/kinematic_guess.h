@@ -1,6 +1,7 @@
 #pragma once
 // Postures with the feet where a plan has them: the guess of a motion.
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "bielle/motion/locomotion.h"
@@ -22,21 +23,23 @@ std::vector<VectorXd> placeFeet(const Model& model, const Stance& stance, const 
 inline constexpr double kLeastTransmission = 0.15;
 
 /// How high the centre of mass can be over a foot with a flat sole while the base keeps its rotation: as far as joints have range
-/// and linkages are well before their dead points (transmissions from 0.5 to 2). Found by moving the base of a stance.
+/// and linkages are well before their dead points (transmissions from 0.5 to 2). Found by moving the base of a stance, as far ahead and
+/// behind as is asked for.
 class LegReach {
  public:
   struct Heights {
     double shortest = 0, longest = 0;  ///< m
   };
 
+  /// Both must outlive it.
   LegReach(const Model& model, const Stance& stance);
+  ~LegReach();
   /// \param ahead, aside  of the foot, where it is farther forward and to the side than in the stance the centre of mass is, m
-  Heights calc(double ahead, double aside) const;
+  Heights calc(double ahead, double aside);
 
  private:
-  double spacing_ = 1;  // of the table by `ahead`
-  int behind_ = 0;      // entries before that of the stance
-  std::vector<Heights> heights_;
+  struct Data;
+  std::unique_ptr<Data> data_;
 };
 
 }  // namespace bielle

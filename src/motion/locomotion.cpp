@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
@@ -10,6 +11,7 @@
 #include "motion/foot_constraints.h"
 #include "motion/kinematic_guess.h"
 #include "motion/locomotion_stages.h"
+#include "motion/neighbour_plans.h"
 
 namespace bielle {
 namespace {
@@ -71,11 +73,19 @@ std::vector<Goal> makeFootholdGoals(const Scene& scene, const ContactSchedule& s
   return {goal};
 }
 
+// Of heights from their limits, over the height of the centre of mass: more than the steps in which LegReach measures those, so
+// that robots a little beside one another have no limits if one of them is that far from all.
+constexpr double kReachMargin = 0.02;
+
 // Raises the path of the centre of mass where a leg would have to bend too far, and lowers it where one would be too short;
 // between two legs that cannot both be helped it stays in the middle.
 void keepReach(Scene& scene) {
   const Stance& stance = scene.stance;
-  const LegReach reach(scene.model, stance);
+  NeighbourPlans* neighbours = NeighbourPlans::get();
+  std::optional<bool>* reaches = neighbours ? &neighbours->getReach() : nullptr;
+  if (reaches && reaches->value_or(false)) return;
+  bool all = true;
+  LegReach reach(scene.model, stance);
   Gait& gait = scene.gait;
   const int size = static_cast<int>(gait.nodes.size());
   VectorXd lift(size);
@@ -91,9 +101,12 @@ void keepReach(Scene& scene) {
       lower = std::max(lower, feet[i].p.z() + heights.shortest);
       upper = std::min(upper, feet[i].p.z() + heights.longest);
     }
-    const double z = node.com.z();
+    const double z = node.com.z(), margin = kReachMargin * (stance.com.z() - stance.feet[0].p.z());
+    all &= lower + margin < z && z < upper - margin;
     lift[k] = (lower < upper ? std::clamp(z, lower, upper) : 0.5 * (lower + upper)) - z;
   }
+  if (reaches) *reaches = all;
+  if (all) return;
   const double h = scene.options.timing.time_step;
   const VectorXd smooth = smoothen(lift, countNodes(scene.options.timing.stepDuration() / 4, h));
   for (int k = 0; k < size; ++k) gait.nodes[k].com.z() += smooth[k];
@@ -111,7 +124,7 @@ std::vector<VectorXd> makeGuesses(const Scene& scene) {
                         getFeet(scene, node),
                         {phase.stands(Side::Left), phase.stands(Side::Right)}});
   }
-  if (isPublished(scene)) return xs;
+  if (isPublished(scene) || NeighbourPlans::get()) return xs;
   const std::vector<VectorXd> qs = placeFeet(scene.model, scene.stance, postures);
   for (size_t k = 0; k < xs.size(); ++k) xs[k].head(scene.model.nq()) = qs[k];
   return xs;
@@ -195,8 +208,9 @@ MotionPlan planLocomotion(const Model& model, const Stance& stance, const Locomo
   size_t node = 0;
   for (const GaitPhase& phase : scene.gait.phases) {
     const std::vector<ContactTarget> contacts = makeTargets(scene, phase);
-    const VectorXd u = phase.flies() ? VectorXd::Zero(model.nu()).eval()
-                                     : calcStaticTorques(model, makeConstraintSet(model, contacts), stance.q).u;
+    const VectorXd u = phase.flies() || NeighbourPlans::get()
+                           ? VectorXd::Zero(model.nu()).eval()
+                           : calcStaticTorques(model, makeConstraintSet(model, contacts), stance.q).u;
     if (scene.gait.nodes[node].landed >= 0 && options.rigid_landing != 0) {
       plan.schedule.phases.push_back({"impact", 1, 0, contacts});
       plan.stages.push_back(makeImpact(scene, scene.gait.nodes[node], contacts));

@@ -10,7 +10,9 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/error.h"
+#include "dynamics/assembly_refinement.h"
 #include "motion/motor_scale.h"
+#include "motion/neighbour_plans.h"
 
 namespace bielle {
 
@@ -181,7 +183,18 @@ VectorXd makeStandingPosture(const Model& model) {
   const Reference* standing = &model.references().front();
   for (const Reference& reference : model.references())
     if (reference.name == "half_sitting") standing = &reference;
-  const AssemblyResult result = assembleReference(model, standing->name);
+  NeighbourPlans* neighbours = NeighbourPlans::get();
+  AssemblyResult result;
+  if (neighbours && neighbours->posture.size() == model.nq())
+    result = refineAssembly(model, makeReferenceProblem(model, *standing), neighbours->posture);
+  if (result.status != AssemblyStatus::Closed) {
+    result = assembleReference(model, standing->name);
+    if (neighbours && result.status == AssemblyStatus::Closed) {  // as exact as those of the others
+      const AssemblyResult refined = refineAssembly(model, makeReferenceProblem(model, *standing), result.q);
+      if (refined.status == AssemblyStatus::Closed) result = refined;
+      neighbours->posture = result.q;
+    }
+  }
   if (result.status != AssemblyStatus::Closed)
     throw ModelError(model.name(), "reference '" + standing->name + "'", result.message, "correct its targets");
   return settleSprings(model, *standing, result.q);

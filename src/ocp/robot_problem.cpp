@@ -11,9 +11,15 @@ namespace bielle {
 namespace {
 
 void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool terminal) {
-  const std::string element = "stage " + std::to_string(index);
-  const auto require = [&](bool ok, const std::string& what, const std::string& remedy) {
-    if (!ok) throw ModelError(model.name(), element, what, remedy);
+  // Messages are put together when they are needed: a problem has thousands of these.
+  const auto refuse = [&](const std::string& what, const char* remedy) {
+    throw ModelError(model.name(), "stage " + std::to_string(index), what, remedy);
+  };
+  const auto require = [&](bool ok, const char* what, const char* remedy) {
+    if (!ok) refuse(what, remedy);
+  };
+  const auto requireOf = [&](bool ok, const char* kind, const std::string& name, const char* what, const char* remedy) {
+    if (!ok) refuse(std::string(kind) + " '" + name + "'" + what, remedy);
   };
   if (spec.kind == StageKind::Impact)
     require(spec.dt == 0, "an impact that takes time", "give it a time step of 0");
@@ -36,27 +42,29 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool ter
             "the control cost has wrong sizes", "reference and weights: nu");
   require(spec.effort_limits.size() == 0 || spec.effort_limits.size() == model.nu(),
           "its effort limits have a wrong size", "effort_limits: nu, or empty");
-  const auto requireForces = [&](const Residual& residual, const std::string& name) {
-    require(!terminal || !(residual.needsForces() || residual.needsControls()),
-            name + " is about forces or controls, of which the terminal node has none", "leave it out there");
-    require(spec.kind == StageKind::Dynamics || !residual.needsSpeeds(),
-            name + " is about speeds under torques, of which an impact has none", "leave it out there");
+  const auto requireForces = [&](const Residual& residual, const char* kind, const std::string& name) {
+    requireOf(!terminal || !(residual.needsForces() || residual.needsControls()), kind, name,
+              " is about forces or controls, of which the terminal node has none", "leave it out there");
+    requireOf(spec.kind == StageKind::Dynamics || !residual.needsSpeeds(), kind, name,
+              " is about speeds under torques, of which an impact has none", "leave it out there");
   };
   for (const Cost& cost : spec.costs) {
-    require(cost.residual && cost.activation.hasSize(cost.residual->size()),
-            "cost '" + cost.name + "': weights or bounds do not have the size of the residual",
-            "give one weight per row of the residual and, for a barrier, one lower and one upper bound");
-    requireForces(*cost.residual, "cost '" + cost.name + "'");
+    requireOf(cost.residual && cost.activation.hasSize(cost.residual->size()), "cost", cost.name,
+              ": weights or bounds do not have the size of the residual",
+              "give one weight per row of the residual and, for a barrier, one lower and one upper bound");
+    requireForces(*cost.residual, "cost", cost.name);
   }
   for (const PathConstraint& constraint : spec.path_constraints) {
-    const std::string name = "path constraint '" + constraint.name + "'";
-    require(constraint.residual && constraint.hasSize(constraint.residual->size()),
-            name + ": bounds or scale do not have the size of the residual", "give one of each per row");
-    require((constraint.scale.array() > 0).all(), name + ": a scale is not positive",
-            "give what counts as a violation of 1");
-    require((constraint.lower.array() <= constraint.upper.array()).all(), name + ": a lower bound exceeds the upper",
-            "exchange them");
-    requireForces(*constraint.residual, name);
+    const auto requireIt = [&](bool ok, const char* what, const char* remedy) {
+      requireOf(ok, "path constraint", constraint.name, what, remedy);
+    };
+    requireIt(constraint.residual && constraint.hasSize(constraint.residual->size()),
+              ": bounds or scale do not have the size of the residual", "give one of each per row");
+    requireIt((constraint.scale.array() > 0).all(), ": a scale is not positive",
+              "give what counts as a violation of 1");
+    requireIt((constraint.lower.array() <= constraint.upper.array()).all(), ": a lower bound exceeds the upper",
+              "exchange them");
+    requireForces(*constraint.residual, "path constraint", constraint.name);
   }
 }
 
