@@ -413,7 +413,7 @@ TEST_CASE("design: choices and constraints that cannot be are refused with their
   check("generator: leg_biped\nset: {ankle: differential, motor_mass: 0.7}", "robot: bipetto", "one architecture");
   check("ankle: differential", "ankle: belt", "none of its choices");
   check("ak80-9, strong", "ak80-9, weak", "there is no motor 'weak'");
-  check("ak80-9, strong", "ak80-9", "nothing to choose");
+  check("ak80-9, strong", "", "nothing to choose");
   check("ak80-9, strong], mass", "ec90-flat-90w, strong], mass", "its mass is not in the catalogue");
   check("mass: knee_motor_mass", "mass: knee_mass", "no parameter 'knee_mass'");
   check("start: strong", "start: weak", "none of the choices");
@@ -425,7 +425,9 @@ TEST_CASE("design: choices and constraints that cannot be are refused with their
   check("mass, at_most: 26.5", "margin, at_most: 0.1", "give `at_least`");
   check("mass, at_most: 26.5", "cost, at_most: 0.1", "use one of envelope");
   check("envelope}", "envelope, motors: [\"hip*\"]}", "none of the motors has such a limit");
-  check("crs, evaluations", "slsqp, evaluations", "which constraints do not have");
+  check("mass, at_most: 26.5}\nsearch: {searches: 1, stages: [{algorithm: crs",
+        "conditioning, at_most: 5}\nsearch: {searches: 1, stages: [{algorithm: slsqp",
+        "which the constraint on conditioning does not have");
   if (hasFrontSearch())
     check("searches: 1, stages: [{algorithm: crs, evaluations: 3}]", "pareto: {algorithm: moead}", "give nsga2");
 }
@@ -569,7 +571,7 @@ TEST_CASE("design: the front of two distances is the line between the points") {
 }
 
 TEST_CASE("evaluations: what is not one is refused") {
-  LoggedEvaluation e{"slsqp", VectorXd::Constant(2, 0.1), DesignStatus::Feasible, 0.75, 1.5, {}, {}, {0.5, 2}};
+  LoggedEvaluation e{"slsqp", VectorXd::Constant(2, 0.1), DesignStatus::Feasible, 0.75, 1.5, {}, {}, {0.5, 2}, {3}};
   e.terms.push_back({VectorXd::Constant(2, 0.3), MatrixXd::Constant(2, 2, 0.7)});
   const std::string line = formatEvaluation(e);
   CHECK(formatEvaluation(readEvaluation(line)) == line);
@@ -580,6 +582,7 @@ TEST_CASE("evaluations: what is not one is refused") {
                                                                                  {"[0.7,0.7]", "[0.7,null]"},
                                                                                  {"[[0.7,0.7],", "["},
                                                                                  {"[0.5,2.0]", "[0.5,null]"},
+                                                                                 {"[3.0]", "[null]"},
                                                                                  {"feasible", "perfect"},
                                                                                  {"\"value\"", "\"worth\""},
                                                                                  {"}", ""}})
@@ -750,6 +753,43 @@ TEST_CASE("design: a front that is killed goes on and ends at the same bytes") {
   const std::vector<std::string> lines = list(whole);
   CHECK(std::adjacent_find(lines.begin(), lines.end()) == lines.end());
   CHECK(list(killed) == lines);
+}
+
+TEST_CASE("design: a front with constraints is refined within them, and resumed at the same bytes") {
+  if (!hasFrontSearch()) return;
+  const RobotDirectory directory;
+  std::string text = replaceOnce(kFrontSpec, "population: 12, generations: 4", "population: 8, generations: 2");
+  text = replaceOnce(text, "search:\n", "constraints:\n  - {measure: rms_torque, at_most: 0.7}\nsearch:\n");
+  const std::string spec = directory.write("spec.yaml", text), whole = directory.path() + "/whole",
+                    cut = directory.path() + "/cut";
+  const CommandResult first = runCommand({BIELLE_COMMAND, "design", spec, "-o", whole, "--jobs", "2"});
+  INFO(first.err << first.out);
+  REQUIRE(first.status == 0);
+  std::ifstream log(whole + "/front.jsonl");
+  std::string line, half;
+  std::getline(log, line);
+  half = line + "\n";
+  int refined = 0, violated = 0, lines = 0;
+  while (std::getline(log, line)) {
+    const LoggedEvaluation e = readEvaluation(line);
+    if (lines++ < 30) half += line + "\n";
+    CHECK(isComplete(e, 2, 1));  // what a design that violates the constraint has is in its line, too
+    violated += e.status == DesignStatus::Violated && e.constraints.at(0) > 0.7;
+    if (e.status != DesignStatus::Feasible) continue;
+    CHECK(e.constraints.at(0) < 0.7 * 1.001);
+    refined += e.stage == "slsqp" && e.limits.values.size() > 0;
+  }
+  CHECK(refined > 5);
+  CHECK(violated > 0);
+  CHECK(lines > 30);
+  fs::create_directory(cut);
+  std::ofstream(cut + "/front.jsonl", std::ios::binary) << half;
+  REQUIRE(runCommand({BIELLE_COMMAND, "design", spec, "-o", cut, "--jobs", "1"}).status == 0);
+  for (const char* file : {"/design.md", "/best/best.urdf", "/front/01/01.urdf"}) {
+    CAPTURE(file);
+    CHECK_FALSE(readFile(whole + file).empty());
+    CHECK(readFile(whole + file) == readFile(cut + file));
+  }
 }
 
 TEST_CASE("design: fronts that cannot be are refused") {

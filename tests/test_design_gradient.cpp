@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
@@ -23,11 +24,13 @@ namespace {
 
 const std::string kKnee = std::string(BIELLE_SOURCE_DIR) + "/examples/knee_design/knee.yaml";
 
-DesignMotion makeSmallSquat() {
+DesignMotion makeSquat(double depth) {
   SquatOptions options;
-  options.depth = 0.9, options.duration = 0.8, options.settle = 0.1, options.time_step = 0.02;
+  options.depth = depth, options.duration = 0.8, options.settle = 0.1, options.time_step = 0.02;
   return {"squat", [options](const Model& model, const VectorXd& q0) { return planSquat(model, options, q0); }};
 }
+
+DesignMotion makeSmallSquat() { return makeSquat(0.9); }
 
 DesignMotion makeShortWalk() {
   WalkOptions options;
@@ -171,7 +174,8 @@ TEST_CASE("design gradient: parameters of a five-bar leg") {
   const Parametrization robot("fivebar_leg", {}, variables);
   const std::vector<Measure> measures = {Measure::PeakTorque, Measure::RmsTorque, Measure::Energy,
                                          Measure::ElectricalEnergy};
-  const std::vector<MotorConversion> drives = {{0.7, 0.4}, {1.5, 0.4}};
+  RobotSlopes drives;
+  drives.drives = {{0.7, 0.4}, {1.5, 0.4}};
   const auto calcPieces = [&](const VectorXd& x, const std::vector<ModelVariation>& directions) {
     const Model leg = robot.make(x);
     const LegMotion motion = makeLegMotion(leg);
@@ -324,6 +328,197 @@ TEST_CASE("design gradient: motions made anew, against motions made anew for nei
       CHECK(here.terms[term].gradients(active, i) == Approx(numeric).epsilon(tolerance).scale(0));
     }
   }
+}
+
+namespace {
+
+// A four-bar knee with motors of the catalogue, and what it is bounded by. Gears change limits and losses, lengths the rest.
+const char* const kBounded = R"(generator: leg_biped
+set: {knee: four_bar, knee_crank: 0.042, knee_middle: 1.26}
+variables:
+  - {name: crank, parameter: knee_crank, bounds: [0.035, 0.065]}
+  - {name: middle, parameter: knee_middle, unit: rad, bounds: [1, 1.6]}
+  - {name: motor, motor: "*knee*", choices: [ak80-9, ak10-9], mass: knee_motor_mass, start: ak10-9}
+  - {name: gear, ratio: "*knee*", bounds: [9, 18], start: 12}
+motions:
+  - {motion: squat, set: {depth: 0.9, duration: 0.8, settle: 0.1, time_step: 0.02}}
+mode: MODE
+objective:
+  - {measure: electrical_energy, motors: ["*knee*"]}
+  - {measure: mass}
+constraints:
+  - {measure: envelope, motors: ["*knee*"], at_most: 0.2}
+  - {measure: heat, motors: ["*knee*"], at_most: 0.3}
+  - {measure: mass, at_most: 26}
+  - {measure: rms_torque, motors: ["*knee*"], at_most: 12}
+  - {measure: electrical_energy, motors: ["*knee*"], at_most: 30}
+  - {measure: margin, at_least: 0.2}
+search: {searches: 1, stages: [{algorithm: slsqp, evaluations: 12}]}
+)";
+
+// The measure of a constraint as its pieces have it, g <= 0.
+double calcLimit(const DesignConstraint& constraint, double measure) {
+  const double b = constraint.bound;
+  if (constraint.measure == Measure::Margin) return (square(b) - square(measure)) / (2 * square(b));
+  return (measure - b) / b;
+}
+
+// For each constraint the largest of its pieces: its gradient, by the continuous variables.
+MatrixXd pickActive(const DesignEvaluator& evaluator, const SlopedEvaluation& here, const VectorXd& x) {
+  const std::vector<Eigen::Index> continuous = evaluator.robot().listContinuous();
+  const auto count = static_cast<Eigen::Index>(evaluator.constraints().size());
+  MatrixXd out(count, static_cast<Eigen::Index>(continuous.size()));
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const DesignConstraint& constraint = evaluator.constraints()[static_cast<size_t>(i)];
+    const double expected = calcLimit(constraint, here.evaluation.constraints[static_cast<size_t>(i)]);
+    Eigen::Index active = 0;
+    const double distance = (here.limits.values.array() - expected).abs().minCoeff(&active);
+    CAPTURE(getName(constraint.measure), expected, here.limits.values[active], x);
+    CHECK(distance < 1e-3);  // half of the slack at most
+    out.row(i) = here.limits.gradients(active, continuous);
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("design gradient: constraints, of motions kept and made anew, against differences of their measures") {
+  const RobotDirectory directory;
+  for (const MotionMode mode : {MotionMode::Kept, MotionMode::Reoptimized}) {
+    const bool kept = mode == MotionMode::Kept;
+    CAPTURE(kept);
+    const DesignSpec spec = readDesignSpec(directory.write("spec.yaml", replaceOnce(kBounded, "MODE", getName(mode))));
+    const Parametrization robot = makeParametrization(spec);
+    EvaluationOptions options;
+    options.mode = mode;
+    options.solver.gradient_tolerance = 1e-13;
+    options.solver.cost_tolerance = 0;
+    options.constraints = spec.constraints;
+    const DesignEvaluator evaluator(robot, {makeSquat(0.7)}, spec.objective, options);
+    const std::vector<Eigen::Index> continuous = robot.listContinuous();
+    REQUIRE(continuous.size() == 3);
+    const VectorXd x = robot.start(), width = robot.upper() - robot.lower();
+    const SlopedEvaluation here = evaluator.differentiate(x);
+    REQUIRE((here.terms.size() == 2 && here.evaluation.constraints.size() == 6));
+    const Eigen::Index rows = 8;
+    MatrixXd analytic(rows, 3), numeric(rows, 3);
+    analytic.topRows(6) = pickActive(evaluator, here, x);
+    for (int term = 0; term < 2; ++term) analytic.row(6 + term) = here.terms[term].gradients(0, continuous);
+    for (size_t k = 0; k < continuous.size(); ++k) {
+      const double step = 1e-3 * width[continuous[k]];
+      const VectorXd dx = step * VectorXd::Unit(x.size(), continuous[k]);
+      const Evaluation ahead = evaluator.evaluate(x + dx), behind = evaluator.evaluate(x - dx);
+      REQUIRE((ahead.constraints.size() == 6 && behind.constraints.size() == 6));
+      for (size_t i = 0; i < 6; ++i)
+        numeric(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+            (calcLimit(spec.constraints[i], ahead.constraints[i]) -
+             calcLimit(spec.constraints[i], behind.constraints[i])) /
+            (2 * step);
+      for (size_t term = 0; term < 2; ++term)
+        numeric(static_cast<Eigen::Index>(6 + term), static_cast<Eigen::Index>(k)) =
+            (ahead.terms[term] - behind.terms[term]) / (2 * step * evaluator.start().terms[term]);
+    }
+    // Over the width of the bounds, so that rows can be compared: what differences of second order and sweeps leave, and no more.
+    analytic *= width(continuous).asDiagonal();
+    numeric *= width(continuous).asDiagonal();
+    const double tolerance = kept ? 1e-4 : 5e-3;
+    INFO(analytic << "\n\n" << numeric);
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const double size = numeric.row(i).cwiseAbs().maxCoeff();
+      CAPTURE(i, size);
+      CHECK(size > 1e-5);  // that of the mass
+      CHECK((analytic.row(i) - numeric.row(i)).cwiseAbs().maxCoeff() < tolerance * size);
+      for (Eigen::Index k = 0; k < 3; ++k) {  // would an entry be missed?
+        Eigen::RowVectorXd poisoned = analytic.row(i);
+        poisoned[k] += 2 * tolerance * size;
+        CHECK((poisoned - numeric.row(i)).cwiseAbs().maxCoeff() >= tolerance * size);
+      }
+    }
+    CHECK(std::abs(analytic(5, 0)) > 0.01);  // the margin feels the crank, limits and losses the gear
+    for (const int row : {0, 1, 4, 6}) CHECK(std::abs(analytic(row, 2)) > 0.01);
+  }
+}
+
+TEST_CASE("design gradient: distances of shapes, of motions kept and made anew") {
+  // Balls on all bodies, large ones on the crank of a knee and on the trunk.
+  ModelParts parts = takeParts(makeParametrization(readDesignSpec(kKnee)).startModel());
+  const auto find = [&](const std::string& name) {
+    const auto found =
+        std::find_if(parts.bodies.begin(), parts.bodies.end(), [&](const Body& body) { return body.name == name; });
+    REQUIRE(found != parts.bodies.end());
+    return static_cast<int>(found - parts.bodies.begin());
+  };
+  parts.shapes.clear();
+  parts.visuals.clear();  // or shapes would be fitted to them
+  for (int body = 1; body < static_cast<int>(parts.bodies.size());
+       ++body) {  // bodies without shapes count as parts of others
+    const bool crank = body == find("knee_crank_left"), large = crank || body == 1;
+    Shape shape;
+    shape.body = body, shape.radius = large ? 0.03 : 1e-4;
+    shape.X_BS.p = crank ? Vector3d(0.05, 0, 0) : Vector3d::Zero().eval();
+    parts.shapes.push_back(shape);
+  }
+  const Parametrization all = makeParametrization(readDesignSpec(kKnee));
+  const Parametrization robot(ModelBuilder::restore(parts), {all.variables()[0], all.variables()[4]});
+  for (const MotionMode mode : {MotionMode::Kept, MotionMode::Reoptimized}) {
+    EvaluationOptions options;
+    options.mode = mode;
+    options.solver.gradient_tolerance = 1e-13;
+    options.solver.cost_tolerance = 0;
+    options.constraints = {{Measure::Distance, {}, 0.02, true}};
+    const DesignEvaluator evaluator(robot, {makeSmallSquat()}, {{Measure::RmsTorque, {}, 1}}, options);
+    const VectorXd x = robot.start();
+    const SlopedEvaluation here = evaluator.differentiate(x);
+    const double measure = here.evaluation.constraints.at(0);
+    REQUIRE(std::isfinite(measure));
+    Eigen::Index active = 0;
+    CHECK((here.limits.values.array() - (0.02 - measure) / 0.01).abs().minCoeff(&active) < 1e-9);
+    for (Eigen::Index i = 0; i < 2; ++i) {
+      const double step = 1e-3 * (robot.upper()[i] - robot.lower()[i]);
+      const VectorXd dx = step * VectorXd::Unit(2, i);
+      const double numeric =
+          -(evaluator.evaluate(x + dx).constraints.at(0) - evaluator.evaluate(x - dx).constraints.at(0)) /
+          (2 * step * 0.01);
+      CAPTURE(getName(mode), i, measure, numeric, here.limits.gradients(active, i));
+      CHECK(std::abs(numeric) > 0.1);
+      CHECK(here.limits.gradients(active, i) == Approx(numeric).epsilon(mode == MotionMode::Kept ? 1e-4 : 5e-3));
+    }
+  }
+}
+
+TEST_CASE("design gradient: a search ends on the bound of a constraint that stands in its way") {
+  const RobotDirectory directory;
+  for (const std::string mode : {"kept", "reoptimized"})
+    for (const std::string algorithm : {"slsqp", "mma"}) {
+      CAPTURE(algorithm, mode);
+      if (algorithm == "mma" && mode == "reoptimized")
+        continue;  // it takes more steps, of which these are the dear ones
+      std::string text = replaceOnce(kBounded, "MODE", mode);
+      const size_t constraints = text.find("  - {measure: envelope"), search = text.find("search:");
+      text.replace(constraints, search - constraints,
+                   "  - {measure: mass, at_most: 25.9}\n  - {measure: margin, at_least: 0.25}\n");
+      text = replaceOnce(text, "  - {measure: mass}\n", "");
+      text = replaceOnce(text, "depth: 0.9", "depth: 0.7");
+      text = replaceOnce(
+          text, "slsqp, evaluations: 12",
+          algorithm + (algorithm == "mma" ? ", evaluations: 60" : ", evaluations: 20") + ", tolerance: 1e-5");
+      text = replaceOnce(text, "[ak80-9, ak10-9], mass: knee_motor_mass, start: ak10-9", "[ak10-9]");
+      const DesignSpec spec = readDesignSpec(directory.write("spec.yaml", text));
+      const Parametrization robot = makeParametrization(spec);
+      EvaluationOptions options;
+      options.mode = spec.mode;
+      options.constraints = spec.constraints;
+      const DesignEvaluator evaluator(robot, {makeSquat(0.7)}, spec.objective, options);
+      DesignRunOptions run;
+      run.directory = directory.path() + "/" + algorithm + mode;
+      const DesignRun done = runDesign(evaluator, spec, run);
+      REQUIRE(done.evaluation.status == DesignStatus::Feasible);
+      CHECK(done.value < 0.9);
+      const double margin = done.evaluation.constraints[1];
+      CAPTURE(done.best.transpose(), done.value, done.evaluation.constraints[0], margin);
+      CHECK(margin == Approx(0.25).epsilon(algorithm == "mma" ? 1e-2 : 2e-3));
+      CHECK(margin > 0.25 * (1 - kConstraintSlack));
+    }
 }
 
 TEST_CASE("design gradient: bielle design by gradients of motions made anew") {

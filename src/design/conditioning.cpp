@@ -25,12 +25,11 @@ std::vector<int> findRows(const Model& model, const ReducedCluster& cluster, Lin
   return positions;
 }
 
-double calcConditioning(const MatrixXd& N, const std::vector<int>& rows) {
+double calcInverse(const MatrixXd& N, const std::vector<int>& rows) {
   const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(N).householderQ() * MatrixXd::Identity(N.rows(), N.cols());
   MatrixXd Q_M(rows.size(), Q.cols());
   for (size_t i = 0; i < rows.size(); ++i) Q_M.row(static_cast<Eigen::Index>(i)) = Q.row(rows[i]);
-  const double least = Eigen::JacobiSVD<MatrixXd>(Q_M).singularValues().tail<1>()[0];
-  return least > 0 ? 1 / least : std::numeric_limits<double>::infinity();
+  return Eigen::JacobiSVD<MatrixXd>(Q_M).singularValues().tail<1>()[0];
 }
 
 }  // namespace
@@ -45,14 +44,21 @@ LinkageConditioning::LinkageConditioning(const Model& model, ConstVectorRef q, L
   }
 }
 
-double LinkageConditioning::calc(ConstVectorRef q) {
-  double worst = 1;
-  for (Entry& entry : entries_) {
+VectorXd LinkageConditioning::calcInverses(ConstVectorRef q) {
+  VectorXd out = VectorXd::Zero(static_cast<Eigen::Index>(entries_.size()));
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    Entry& entry = entries_[i];
     gatherConfiguration(model_, *entry.cluster, q, entry.q);
-    if (!entry.point.update(*entry.cluster, entry.q)) return std::numeric_limits<double>::infinity();
-    worst = std::max(worst, calcConditioning(entry.point.basis().N, entry.rows));
+    if (entry.point.update(*entry.cluster, entry.q))
+      out[static_cast<Eigen::Index>(i)] = calcInverse(entry.point.basis().N, entry.rows);
   }
-  return worst;
+  return out;
+}
+
+double LinkageConditioning::calc(ConstVectorRef q) {
+  if (entries_.empty()) return 1;
+  const double least = calcInverses(q).minCoeff();
+  return least > 0 ? std::max(1.0, 1 / least) : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace bielle

@@ -24,6 +24,8 @@ class LinkageConditioning {
   LinkageConditioning& operator=(const LinkageConditioning&) = delete;
   /// The worst cluster at a closed configuration; infinite if one has lost rank.
   double calc(ConstVectorRef q);
+  /// The inverse of each cluster, in their order: sigma_min(Q_M), 0 if it has lost rank.
+  VectorXd calcInverses(ConstVectorRef q);
 
  private:
   struct Entry {

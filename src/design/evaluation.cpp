@@ -40,9 +40,6 @@ double calcPostureGap(const Model& start, const Model& model, const VectorXd& po
   return result.status == AssemblyStatus::Closed ? 0 : std::max(result.gap, options.tolerance);
 }
 
-constexpr double kSlack = 1e-3;  // of a bound, which constraints may be beyond: solvers keep their own to a tolerance
-constexpr double kCentimetre = 0.01;  // the scale of distances, whose bound may be 0
-
 // The designs of one architecture, and their start.
 struct Base {
   std::once_flag made;
@@ -51,13 +48,6 @@ struct Base {
   std::vector<std::optional<WorkspaceGrid>> term_grids;
   std::vector<std::optional<SolvedMotion>> solved;  // none where the start has no such motion
 };
-
-double calcViolation(const DesignConstraint& constraint, double value) {
-  const double scale =
-      constraint.measure == Measure::Distance || constraint.bound == 0 ? kCentimetre : std::abs(constraint.bound);
-  const double beyond = (constraint.at_least ? constraint.bound - value : value - constraint.bound) / scale;
-  return beyond > kSlack ? std::min(beyond, 1e6) : 0;  // linkages without a bound on their motion are infinitely far
-}
 
 std::vector<int> findNamed(const Model& model, const std::vector<std::string>& names, const char* where) {
   std::vector<std::string> unknown;
@@ -98,8 +88,10 @@ struct DesignEvaluator::Data {
   std::vector<MotorSlopes> calcKeptSlopes(const Base& base, const Model& model, const VectorXd& x,
                                           const std::vector<MotionOutcome>& outcomes) const;
   MeasurePieces calcStartMargins(const Base& base, const Model& model, const VectorXd& x) const;
-  MeasurePieces calcPieces(size_t i, const Base& base, const Model& model,
-                           const std::vector<MotorSlopes>& slopes) const;
+  MeasurePieces calcPieces(size_t i, const Base& base, const std::vector<MotorSlopes>& slopes,
+                           const RobotSlopes& robot_slopes) const;
+  MeasurePieces calcLimits(const Base& base, const std::vector<MotorSlopes>& slopes,
+                           const RobotSlopes& robot_slopes) const;
   bool checkPostures(const Base& base, const Model& model, Evaluation& out) const;
   double calcTerm(size_t i, const Base& base, const Model& model, const std::vector<MotionMeasures>& measures) const;
   void checkConstraints(const Base& base, const Model& model, Evaluation& out) const;
@@ -132,21 +124,17 @@ const char* getName(DesignStatus status) {
 }
 
 std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std::vector<ObjectiveTerm>& objective,
-                                                     const std::vector<DesignConstraint>& constraints,
-                                                     const std::vector<DesignVariable>& variables) {
-  if (!constraints.empty())
-    return GradientObstacle{"it needs gradients, which constraints do not have", "give bobyqa or sbplx"};
-  const bool has_ratio = std::any_of(variables.begin(), variables.end(), [](const DesignVariable& variable) {
-    return !variable.motors.empty() && !variable.isChoice();
-  });
+                                                     const std::vector<DesignConstraint>& constraints) {
+  for (const DesignConstraint& constraint : constraints)
+    if (!hasGradient(constraint.measure))
+      return GradientObstacle{
+          std::string("it needs gradients, which the constraint on ") + getName(constraint.measure) + " does not have",
+          "give bobyqa or sbplx, or leave that constraint out"};
   for (const ObjectiveTerm& term : objective) {
     const std::string name = getName(term.measure);
     if (!hasGradient(term.measure))
       return GradientObstacle{"it needs gradients, which " + name + " does not have",
-                              "choose a torque, an energy or the cost, or give bobyqa or sbplx"};
-    if (term.measure == Measure::ElectricalEnergy && has_ratio)
-      return GradientObstacle{"it needs gradients, which electrical_energy does not have by the ratio of a gear",
-                              "choose a torque, the energy or the cost, or give bobyqa or sbplx"};
+                              "choose a torque, an energy, the cost or the mass, or give bobyqa or sbplx"};
     if (term.measure == Measure::Cost && mode == MotionMode::Kept)
       return GradientObstacle{"motions that are kept have no cost", "give `mode: reoptimized`"};
   }
@@ -185,8 +173,7 @@ void DesignEvaluator::Data::readNames(Base& base) const {
     if (term.measure == Measure::Workspace) base.term_grids.back() = makeWorkspaceGrid(model, term.region);
   }
   for (const DesignConstraint& constraint : options.constraints) {
-    const std::vector<int> named = findNamed(model, constraint.motors, "constraints");
-    base.constraint_motors.push_back(named);
+    std::vector<int> named = findNamed(model, constraint.motors, "constraints");
     const auto is_limited = [&](int m) {
       const Motor& motor = model.motors()[static_cast<size_t>(m)];
       const bool heat = std::isfinite(motor.continuous_effort);
@@ -194,10 +181,12 @@ void DesignEvaluator::Data::readNames(Base& base) const {
           std::isfinite(motor.effort_limit) || std::isfinite(motor.velocity_limit) || motor.hasEnvelope();
       return constraint.measure == Measure::Heat ? heat : constraint.measure != Measure::Envelope || envelope;
     };
-    if (std::none_of(named.begin(), named.end(), is_limited))
+    named.erase(std::remove_if(named.begin(), named.end(), [&](int m) { return !is_limited(m); }), named.end());
+    if (named.empty())
       throw ModelError(model.name(), std::string("constraints: ") + getName(constraint.measure),
                        "none of the motors has such a limit",
                        "choose `motor` out of a catalogue, or give their windings in the robot's YAML file");
+    base.constraint_motors.push_back(std::move(named));
   }
 }
 
@@ -370,7 +359,8 @@ std::vector<MotorSlopes> DesignEvaluator::Data::calcKeptSlopes(const Base& base,
   std::vector<MotorSlopes> slopes;
   for (size_t i = 0; i < outcomes.size(); ++i) {
     const SolvedMotion& from = *base.solved[i];
-    slopes.push_back(calcMotorSlopes(model, from.kept_dofs, *from.serial, outcomes[i].lifted, variations));
+    slopes.push_back(calcMotorSlopes(model, from.kept_dofs, *from.serial, outcomes[i].lifted, variations,
+                                     asked.count(Measure::Distance) > 0));
     if (!slopes.back().failure.empty()) break;
   }
   return slopes;
@@ -389,22 +379,36 @@ MeasurePieces DesignEvaluator::Data::calcStartMargins(const Base& base, const Mo
   return slopes.back().failure.empty() ? calcMarginPieces(kLimitShare * options.margin, slopes) : MeasurePieces();
 }
 
-MeasurePieces DesignEvaluator::Data::calcPieces(size_t i, const Base& base, const Model& model,
-                                                const std::vector<MotorSlopes>& slopes) const {
+MeasurePieces DesignEvaluator::Data::calcPieces(size_t i, const Base& base, const std::vector<MotorSlopes>& slopes,
+                                                const RobotSlopes& robot_slopes) const {
   const ObjectiveTerm& term = objective[i];
-  MeasurePieces out = term.measure == Measure::Cost ? calcCostPiece(slopes)
-                                                    : calcMeasurePieces(term.measure, base.term_motors[i], slopes,
-                                                                        makeDrives(model, options.drives));
+  MeasurePieces out = term.measure == Measure::Cost
+                          ? calcCostPiece(slopes)
+                          : calcMeasurePieces(term.measure, base.term_motors[i], slopes, robot_slopes);
   const double scale = term.weight / start.terms[i];
   out.values *= scale;
   out.gradients *= scale;
   return out;
 }
 
+// Of the constraints. Motions made anew keep to the envelopes of motors as exactly as the solver keeps to anything: where they go along
+// one, the design cannot move its share, which would be the violated constraint of a search if it were not given that much.
+MeasurePieces DesignEvaluator::Data::calcLimits(const Base& base, const std::vector<MotorSlopes>& slopes,
+                                                const RobotSlopes& robot_slopes) const {
+  MeasurePieces out;
+  for (size_t i = 0; i < options.constraints.size(); ++i) {
+    const DesignConstraint& constraint = options.constraints[i];
+    MeasurePieces pieces = calcConstraintPieces(constraint, base.constraint_motors[i], slopes, robot_slopes);
+    if (constraint.measure == Measure::Envelope && options.mode == MotionMode::Reoptimized)
+      pieces.values.array() -= 0.5 * kConstraintSlack;
+    append(pieces, out);
+  }
+  return out;
+}
+
 SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
   Data& data = *data_;
-  if (const auto obstacle =
-          findGradientObstacle(data.options.mode, data.objective, data.options.constraints, data.robot.variables()))
+  if (const auto obstacle = findGradientObstacle(data.options.mode, data.objective, data.options.constraints))
     throw ModelError(data.robot.startModel().name(), "search", obstacle->problem, obstacle->remedy);
   std::vector<MotionOutcome> outcomes;
   std::optional<Model> model;
@@ -413,17 +417,24 @@ SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
   const Base& base = data.getBase(x);
   const auto is_made = [&](const MotionOutcome& outcome) { return kept ? outcome.lifted.lifted() : !!outcome.motion; };
   if (outcomes.size() < data.motions.size() || !std::all_of(outcomes.begin(), outcomes.end(), is_made)) return out;
-  const std::vector<MotorSlopes> slopes =
-      kept ? data.calcKeptSlopes(base, *model, x, outcomes) : calcOptimumSlopes(data.robot, x, data.motions, outcomes);
+  const std::vector<MotorSlopes> slopes = kept ? data.calcKeptSlopes(base, *model, x, outcomes)
+                                               : calcOptimumSlopes(data.robot, x, data.motions, outcomes, data.asked);
   if (!slopes.back().failure.empty()) {
     out.evaluation = {DesignStatus::MotionFailed, 2 * data.weight, {}, {}, {}, slopes.back().failure};
     return out;
   }
-  for (size_t i = 0; i < data.objective.size(); ++i) out.terms.push_back(data.calcPieces(i, base, *model, slopes));
+  const RobotSlopes robot_slopes = calcRobotSlopes(data.robot, x, data.options.drives);
+  for (size_t i = 0; i < data.objective.size(); ++i)
+    out.terms.push_back(data.calcPieces(i, base, slopes, robot_slopes));
   if (kept) out.limits = calcMarginPieces(kLimitShare * data.options.margin, slopes);
-  if (kept || !data.mustKeep()) return out;
-  out.limits = data.calcStartMargins(base, *model, x);
-  if (out.limits.values.size() == 0) out.terms.clear();
+  if (!kept && data.mustKeep()) {
+    out.limits = data.calcStartMargins(base, *model, x);
+    if (out.limits.values.size() == 0) {
+      out.terms.clear();
+      return out;
+    }
+  }
+  append(data.calcLimits(base, slopes, robot_slopes), out.limits);
   return out;
 }
 

@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "bielle/design/parametrization.h"
+#include "design/constraint.h"
 #include "design/design_motions.h"
 #include "design/gradient.h"
 #include "design/measures.h"
@@ -43,14 +44,6 @@ struct ObjectiveTerm {
   std::vector<std::string> motors;  ///< empty: all
   double weight = 1;                ///< w_i
   WorkspaceRegion region = {};      ///< only for the workspace, which has no motors
-};
-
-/// A bound on a measure, for all motions.
-struct DesignConstraint {
-  Measure measure = Measure::Envelope;  ///< but for the cost and the workspace
-  std::vector<std::string> motors;      ///< empty: all
-  double bound = 1;
-  bool at_least = false;  ///< else at most
 };
 
 struct EvaluationOptions {
@@ -72,10 +65,9 @@ struct EvaluationOptions {
 struct GradientObstacle {
   std::string problem, remedy;
 };
-/// Empty if every measure has a gradient.
+/// Empty if every measure has a gradient, of the objective and of the constraints.
 std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std::vector<ObjectiveTerm>& objective,
-                                                     const std::vector<DesignConstraint>& constraints,
-                                                     const std::vector<DesignVariable>& variables);
+                                                     const std::vector<DesignConstraint>& constraints);
 
 enum class DesignStatus { Feasible, LoopOpen, MotionFailed, Violated };
 const char* getName(DesignStatus status);
@@ -92,10 +84,10 @@ struct Evaluation {
 /// An evaluation and the gradients of its terms.
 struct SlopedEvaluation {
   Evaluation evaluation;
-  /// w_i m_i / m_i0 of Eq. (1) in pieces; also for designs whose motions come too near to dead points, but empty for
-  /// other infeasible ones.
+  /// w_i m_i / m_i0 of Eq. (1) in pieces; also for designs whose motions come too near to dead points or that violate constraints,
+  /// but empty for other infeasible ones.
   std::vector<MeasurePieces> terms;
-  MeasurePieces limits;  ///< a hundredth tighter than EvaluationOptions::margin, <= 0
+  MeasurePieces limits;  ///< a hundredth tighter than EvaluationOptions::margin, and constraints; <= 0
 };
 
 /// The constructor makes the motions of the start design. Designs are then evaluated independently, so that results do

@@ -53,6 +53,7 @@ Json formatPieces(const MeasurePieces& pieces) {
 std::string formatEvaluation(const LoggedEvaluation& e) {
   Json json = {{"stage", e.stage}, {"x", formatVector(e.x)}, {"status", getName(e.status)},
                {"value", e.value}, {"seconds", e.seconds},   {"measures", e.measures}};
+  if (!e.constraints.empty()) json["constraints"] = e.constraints;
   if (!e.terms.empty()) json["limits"] = formatPieces(e.limits);
   for (const MeasurePieces& term : e.terms) json["terms"].push_back(formatPieces(term));
   return json.dump();
@@ -67,8 +68,11 @@ LoggedEvaluation readEvaluation(const std::string& line) {
                        readNumber(json.at("seconds")),
                        {},
                        {},
+                       {},
                        {}};
   for (const Json& measure : json.at("measures")) out.measures.push_back(readNumber(measure));
+  if (json.contains("constraints"))
+    for (const Json& measure : json.at("constraints")) out.constraints.push_back(readNumber(measure));
   if (!json.contains("terms")) return out;
   for (const Json& term : json.at("terms")) out.terms.push_back(readPieces(term));
   out.limits = readPieces(json.at("limits"));

@@ -153,7 +153,8 @@ std::string describeMeasure(Measure measure, const std::vector<std::string>& mot
 std::string describeTerm(const ObjectiveTerm& term) { return describeMeasure(term.measure, term.motors); }
 
 std::vector<DesignFigure> makeDesignFigures(const DesignEvaluator& evaluator, const DesignRun& run) {
-  std::vector<DesignFigure> figures = {{"design", {makeCourse(evaluator, run)}}};
+  std::vector<DesignFigure> figures;
+  if (run.counts[0] > 0) figures.push_back({"design", {makeCourse(evaluator, run)}});
   if (!run.front.empty()) {
     figures.push_back({"design_front", {}});
     for (size_t k = 1; k < evaluator.objective().size(); ++k)

@@ -31,9 +31,9 @@ class FrontRunner {
     makeOutputDirectory(options.directory);
     log_ = std::make_unique<EvaluationLog>(options.directory + "/front.jsonl", makeLogHeader(evaluator, spec, "front"));
     for (LoggedEvaluation& e : log_->takeAll()) {
-      if (e.measures.size() != (e.status == DesignStatus::Feasible ? evaluator.objective().size() : 0))
+      if (!isComplete(e, evaluator.objective().size(), evaluator.constraints().size()))
         throw ModelError(options.directory + "/front.jsonl", "log",
-                         "an evaluation has other measures than the objective",
+                         "an evaluation has other measures than objective and constraints",
                          "remove the file: the search is done anew");
       known_.emplace(makeKey(e.stage, e.x), std::move(e));
     }
@@ -172,20 +172,12 @@ class FrontRunner {
       if (bounds.empty())
         for (const MeasurePieces& term : e.terms) bounds.push_back(term.values.maxCoeff());
       SlopedValue out = continuous.pick(e);
-      for (size_t k = 0; k < out.terms.size() && k < bounds.size(); ++k) append(out.terms[k], bounds[k], out.limits);
+      for (size_t k = 0; k < out.terms.size() && k < bounds.size(); ++k)
+        append({out.terms[k].values.array() - bounds[k], out.terms[k].gradients}, out.limits);
       return out;
     };
     minimizeByStages(problem, {stage}, spec_.seed);
     return found;
-  }
-
-  // Adds pieces - bound <= 0.
-  static void append(const MeasurePieces& term, double bound, MeasurePieces& limits) {
-    const Eigen::Index old = limits.values.size(), size = term.values.size();
-    limits.values.conservativeResize(old + size);
-    limits.values.tail(size) = term.values.array() - bound;
-    limits.gradients.conservativeResize(old + size, term.gradients.cols());
-    limits.gradients.bottomRows(size) = term.gradients;
   }
 
   const DesignEvaluator& evaluator_;

@@ -3,7 +3,11 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <set>
 
+#include "bielle/dynamics/distance.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 
 namespace bielle {
@@ -44,25 +48,68 @@ void addEnergy(const MotorSlopes& motion, int m, MeasurePieces& out) {
 }
 
 // Eq. (2) with the power at the terminals.
-void addElectricalEnergy(const MotorSlopes& motion, int m, const MotorConversion& drive, MeasurePieces& out) {
+void addElectricalEnergy(const MotorSlopes& motion, int m, const RobotSlopes& robot, MeasurePieces& out) {
+  const MotorConversion drive = robot.drives.empty() ? MotorConversion() : robot.drives[static_cast<size_t>(m)];
   const double heat = 1 / (drive.motor_constant * drive.motor_constant);
+  const auto getChange = [&](size_t i) { return robot.dfactors.empty() ? 0 : robot.dfactors[i](kLoss, m); };
   for (int k = 0; k < countNodes(motion); ++k) {
     const double u = motion.u(m, k), v = motion.v(m, k), P = u * v + heat * u * u;
     const double weight = motion.dt[k] * (P < 0 ? drive.regeneration : 1);
     out.values[0] += weight * P;
     for (size_t i = 0; i < motion.du.size(); ++i)
-      out.gradients(0, i) += weight * ((v + 2 * heat * u) * motion.du[i](m, k) + u * motion.dv[i](m, k));
+      out.gradients(0, i) +=
+          weight * ((v + 2 * heat * u) * motion.du[i](m, k) + u * motion.dv[i](m, k) + u * u * getChange(i));
   }
 }
 
+// Eq. (1) of c u over the continuous torque.
+void addHeat(const MotorSlopes& motion, int m, const RobotSlopes& robot, Eigen::Index piece, MeasurePieces& out) {
+  const Motor& motor = robot.motors[static_cast<size_t>(m)];
+  MotorSlopes scaled;
+  scaled.dt = motion.dt;
+  VectorXd c(countNodes(motion));
+  for (int k = 0; k < countNodes(motion); ++k) c[k] = motor.getEffortFactor(motion.u(m, k) * motion.v(m, k));
+  scaled.u = motion.u.row(m) * c.asDiagonal();
+  for (const MatrixXd& du : motion.du) scaled.du.emplace_back(du.row(m) * c.asDiagonal());
+  addRms(scaled, 0, piece, out);
+  const double rms = out.values[piece], per_effort = robot.factors(kPerContinuous, m);
+  out.values[piece] *= per_effort;
+  out.gradients.row(piece) *= per_effort;
+  for (size_t i = 0; i < motion.du.size(); ++i) out.gradients(piece, i) += rms * robot.dfactors[i](kPerContinuous, m);
+}
+
 // Nodes of a stretch: begin, end.
-std::pair<int, int> getStretch(const MotorSlopes& motion, int stretch) {
-  return {stretch * countNodes(motion) / kStretches, (stretch + 1) * countNodes(motion) / kStretches};
+std::pair<int, int> getStretch(int nodes, int stretch) {
+  return {stretch * nodes / kStretches, (stretch + 1) * nodes / kStretches};
+}
+
+// The largest share of a limit in a stretch. Without duration there is no voltage: that of an impact is not known.
+void addEnvelope(const MotorSlopes& motion, int m, int stretch, const RobotSlopes& robot, Eigen::Index piece,
+                 MeasurePieces& out) {
+  const auto [begin, end] = getStretch(countNodes(motion), stretch);
+  const std::pair<MotorFactor, MotorFactor> kinds[] = {
+      {kPerEffort, kMotorFactors}, {kMotorFactors, kPerSpeed}, {kVoltsPerEffort, kVoltsPerSpeed}};
+  const auto get = [m](const MotorFactors& factors, MotorFactor factor) {
+    return factor == kMotorFactors ? 0.0 : factors(factor, m);
+  };
+  for (int k = begin; k < end; ++k)
+    for (const auto& [of_u, of_v] : kinds) {
+      if (of_u == kVoltsPerEffort && !(motion.dt[k] > 0)) continue;
+      const double u = motion.u(m, k), v = motion.v(m, k), by_u = get(robot.factors, of_u),
+                   by_v = get(robot.factors, of_v), share = by_u * u + by_v * v;
+      if (!(std::abs(share) > out.values[piece])) continue;
+      out.values[piece] = std::abs(share);
+      for (size_t i = 0; i < motion.du.size(); ++i) {
+        const double change = by_u * motion.du[i](m, k) + get(robot.dfactors[i], of_u) * u + by_v * motion.dv[i](m, k) +
+                              get(robot.dfactors[i], of_v) * v;
+        out.gradients(piece, i) = share < 0 ? -change : change;
+      }
+    }
 }
 
 // Eq. (3)
 void addPeak(const MotorSlopes& motion, int m, int stretch, Eigen::Index piece, MeasurePieces& out) {
-  const auto [begin, end] = getStretch(motion, stretch);
+  const auto [begin, end] = getStretch(countNodes(motion), stretch);
   for (int k = begin; k < end; ++k) {
     if (!(std::abs(motion.u(m, k)) > out.values[piece])) continue;
     out.values[piece] = std::abs(motion.u(m, k));
@@ -102,6 +149,11 @@ bool hasGradient(Measure measure) {
     case Measure::Energy:
     case Measure::ElectricalEnergy:
     case Measure::Cost:
+    case Measure::Mass:
+    case Measure::Envelope:
+    case Measure::Heat:
+    case Measure::Margin:
+    case Measure::Distance:
       return true;
     default:
       return false;
@@ -109,6 +161,53 @@ bool hasGradient(Measure measure) {
 }
 
 namespace {
+
+// Distances of the nearest shapes along a kept motion.
+class DistanceRecorder {
+ public:
+  DistanceRecorder(const Model& model, const std::vector<VectorXd>& xs, const std::vector<ModelVariation>& variations)
+      : model_(model), variations_(variations), pairs_(listShapePairs(model)), ws_(model), workspace_(model) {
+    if (pairs_.empty()) return;
+    distance_.resize(static_cast<Eigen::Index>(xs.size()));
+    for (Eigen::Index k = 0; k < distance_.size(); ++k)
+      distance_[k] = find(xs[static_cast<size_t>(k)]).distance.distance;
+    for (const auto& [row, node] : listLeast(distance_)) nodes_.insert(node);
+    slopes_.assign(variations.size(), Eigen::RowVectorXd::Zero(distance_.size()));
+  }
+
+  bool isAsked(Eigen::Index k) const { return nodes_.count(k) > 0; }
+  // At node k, by variation i, with the change of q that goes with it.
+  void record(Eigen::Index k, const VectorXd& x, size_t i, const VectorXd& dq) {
+    const NearestPair nearest = find(x);
+    const ShapePair& pair = pairs_[static_cast<size_t>(nearest.pair)];
+    const VectorXd still = VectorXd::Zero(model_.nv());
+    updateVelocities(model_, ws_, still);
+    updateAccelerations(model_, ws_, still);
+    MotionVariation motion(model_);
+    motion.q = dq;
+    updateVariation(model_, ws_, variations_[i], motion, workspace_);
+    slopes_[i][k] = calcDistanceVariation(model_, ws_, pair.a, pair.b, nearest.distance, variations_[i], workspace_);
+  }
+  void take(MotorSlopes& out) {
+    out.distance = std::move(distance_);
+    out.ddistance = std::move(slopes_);
+  }
+
+ private:
+  NearestPair find(const VectorXd& x) {
+    updatePositions(model_, ws_, x.head(model_.nq()));
+    return findNearestPair(model_, ws_.X_WB, pairs_);
+  }
+
+  const Model& model_;
+  const std::vector<ModelVariation>& variations_;
+  std::vector<ShapePair> pairs_;
+  Workspace ws_;
+  VariationWorkspace workspace_;
+  Eigen::RowVectorXd distance_;
+  std::vector<Eigen::RowVectorXd> slopes_;
+  std::set<Eigen::Index> nodes_;
+};
 
 class SlopeRecorder {
  public:
@@ -140,6 +239,8 @@ class SlopeRecorder {
       const KeptMotionStatus varied = motion_.calcVariation(variations_[i], variation_);
       if (varied != KeptMotionStatus::Ok) return varied;
       write(k, variation_.u, variation_.motion.v, out_.du[i], out_.dv[i]);
+      if (distances_ && distances_->isAsked(k))
+        distances_->record(k, lifted.trajectory.xs[static_cast<size_t>(k)], i, variation_.motion.q);
       for (size_t c = 0; c < clusters_.size(); ++c) {
         const double slope = (motion_.tangent() * fastest[c])
                                  .dot(motion_.calcTangentVariation(variations_[i], variation_.motion, fastest[c]));
@@ -149,6 +250,7 @@ class SlopeRecorder {
     return status;
   }
 
+  void setDistances(DistanceRecorder* distances) { distances_ = distances; }
   MotorSlopes take() { return std::move(out_); }
 
  private:
@@ -163,13 +265,21 @@ class SlopeRecorder {
   KeptMotion motion_;
   KeptMotion::Variation variation_;
   MotorSlopes out_;
+  DistanceRecorder* distances_ = nullptr;
 };
 
 }  // namespace
 
 MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dofs, const SerialTrajectory& trajectory,
-                            const LiftResult& lifted, const std::vector<ModelVariation>& variations) {
+                            const LiftResult& lifted, const std::vector<ModelVariation>& variations, bool distances) {
   SlopeRecorder recorder(model, kept_dofs, lifted.dt, variations);
+  std::optional<DistanceRecorder> least;
+  if (distances) {
+    const std::vector<VectorXd>& xs = lifted.trajectory.xs;
+    least.emplace(model, std::vector<VectorXd>(xs.begin(), xs.begin() + static_cast<std::ptrdiff_t>(lifted.dt.size())),
+                  variations);
+    recorder.setDistances(&*least);
+  }
   for (int k = 0; k < static_cast<int>(lifted.dt.size()); ++k) {
     const KeptMotionStatus status = recorder.record(k, trajectory, lifted);
     if (status == KeptMotionStatus::Ok) continue;
@@ -177,24 +287,30 @@ MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dof
     out.failure = "no gradient at node " + std::to_string(k) + ": " + getMessage(status);
     return out;
   }
-  return recorder.take();
+  MotorSlopes out = recorder.take();
+  if (least) least->take(out);
+  return out;
 }
 
 MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
-                                const std::vector<MotorSlopes>& motions, const std::vector<MotorConversion>& drives) {
+                                const std::vector<MotorSlopes>& motions, const RobotSlopes& robot) {
+  if (measure == Measure::Mass) return {VectorXd::Constant(1, robot.mass), robot.dmass.transpose()};
   const size_t variables = motions.front().du.size(), pairs = motors.size() * motions.size();
-  const int stretches = measure == Measure::PeakTorque ? kStretches : 1;
+  const bool peaks = measure == Measure::PeakTorque || measure == Measure::Envelope;
   const bool sum = measure == Measure::Energy || measure == Measure::ElectricalEnergy;
+  const int stretches = peaks ? kStretches : 1;
   MeasurePieces out = makePieces(sum ? 1 : pairs * stretches, variables);
   Eigen::Index piece = 0;
   for (const MotorSlopes& motion : motions)
     for (int m : motors) {
       if (measure == Measure::Energy) addEnergy(motion, m, out);
-      if (measure == Measure::ElectricalEnergy)
-        addElectricalEnergy(motion, m, drives.empty() ? MotorConversion() : drives[static_cast<size_t>(m)], out);
+      if (measure == Measure::ElectricalEnergy) addElectricalEnergy(motion, m, robot, out);
       if (measure == Measure::RmsTorque) addRms(motion, m, piece, out);
-      for (int s = 0; s < stretches; ++s, ++piece)
+      if (measure == Measure::Heat) addHeat(motion, m, robot, piece, out);
+      for (int s = 0; s < stretches; ++s, ++piece) {
         if (measure == Measure::PeakTorque) addPeak(motion, m, s, piece, out);
+        if (measure == Measure::Envelope) addEnvelope(motion, m, s, robot, piece, out);
+      }
     }
   return out;
 }
@@ -208,22 +324,60 @@ MeasurePieces calcCostPiece(const std::vector<MotorSlopes>& motions) {
   return out;
 }
 
-MeasurePieces calcMarginPieces(double least, const std::vector<MotorSlopes>& motions) {
-  const Eigen::Index clusters = motions.front().margin.rows();
-  MeasurePieces out = makePieces(motions.size() * clusters * kStretches, motions.front().dmargin.size());
-  Eigen::Index piece = 0;
-  for (const MotorSlopes& motion : motions)
-    for (Eigen::Index c = 0; c < clusters; ++c)
-      for (int s = 0; s < kStretches; ++s, ++piece) {
-        out.values[piece] = least * least - 1;  // no margin is larger than 1
-        const auto [begin, end] = getStretch(motion, s);
-        for (int k = begin; k < end; ++k) {
-          if (!(least * least - motion.margin(c, k) > out.values[piece])) continue;
-          out.values[piece] = least * least - motion.margin(c, k);
-          for (size_t i = 0; i < motion.dmargin.size(); ++i) out.gradients(piece, i) = -motion.dmargin[i](c, k);
-        }
-      }
+std::vector<std::pair<Eigen::Index, Eigen::Index>> listLeast(const MatrixXd& values) {
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> out;
+  for (Eigen::Index row = 0; row < values.rows(); ++row)
+    for (int s = 0; s < kStretches; ++s) {
+      const auto [begin, end] = getStretch(static_cast<int>(values.cols()), s);
+      Eigen::Index least = 0;
+      if (begin == end) continue;
+      values.row(row).segment(begin, end - begin).minCoeff(&least);
+      out.emplace_back(row, begin + least);
+    }
   return out;
+}
+
+namespace {
+
+// Pieces out of entries of matrices and of their derivatives.
+struct PieceList {
+  std::vector<double> values;
+  std::vector<VectorXd> gradients;
+
+  template <typename Matrix>
+  void add(const Matrix& value, const std::vector<Matrix>& derivatives, Eigen::Index row, Eigen::Index column) {
+    values.push_back(value(row, column));
+    gradients.emplace_back(static_cast<Eigen::Index>(derivatives.size()));
+    for (size_t i = 0; i < derivatives.size(); ++i)
+      gradients.back()[static_cast<Eigen::Index>(i)] = derivatives[i](row, column);
+  }
+  MeasurePieces take(size_t variables) const {
+    MeasurePieces out = makePieces(values.size(), variables);
+    for (size_t piece = 0; piece < values.size(); ++piece) {
+      out.values[static_cast<Eigen::Index>(piece)] = values[piece];
+      out.gradients.row(static_cast<Eigen::Index>(piece)) = gradients[piece].transpose();
+    }
+    return out;
+  }
+};
+
+}  // namespace
+
+MeasurePieces calcMarginPieces(double least, const std::vector<MotorSlopes>& motions) {
+  PieceList list;
+  for (const MotorSlopes& motion : motions)
+    for (const auto& [cluster, node] : listLeast(motion.margin)) list.add(motion.margin, motion.dmargin, cluster, node);
+  MeasurePieces out = list.take(motions.front().du.size());
+  out.values = least * least - out.values.array();
+  out.gradients *= -1;
+  return out;
+}
+
+MeasurePieces calcDistancePieces(const std::vector<MotorSlopes>& motions) {
+  PieceList list;
+  for (const MotorSlopes& motion : motions)
+    for (const auto& [row, node] : listLeast(motion.distance)) list.add(motion.distance, motion.ddistance, row, node);
+  return list.take(motions.front().du.size());
 }
 
 }  // namespace bielle

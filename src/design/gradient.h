@@ -1,5 +1,6 @@
 #pragma once
-/// \file Gradients of motor measures of a kept motion (MotionMode::Kept), with respect to the variables of a design.
+/// \file Gradients of the measures of motions, with respect to the variables of a design; and of those of kept motions
+/// (MotionMode::Kept) what they are made of.
 ///
 /// Joints, base and feet keep their motion, as do the contact forces as far as the motion does not determine them. With
 /// the model's change along a variable x_i (variation.h), postures, speeds and torques of the motors change at every
@@ -7,18 +8,20 @@
 /// with its gradient:
 ///     rms torque of one motor in one motion     p = (sum h u^2 / T)^1/2,  dp = sum h u du / (T p)                  (1)
 ///     energy                                    p = sum h |u v|,          dp = sum h sign(u v) (du v + u dv)       (2)
-///     electrical energy, Eq. (1) of measures.h  p = sum h r P,            dp = sum h r (du v + u dv + 2 u du / K_m^2)
+///     electrical energy, Eq. (1) of measures.h  p = sum h r P,  dp = sum h r (du v + u dv + 2 u du / K_m^2 + u^2 d(1/K_m^2))
 ///     peak torque in a stretch of the motion    p = |u(k)|,               dp = sign(u(k)) du(k)                    (3)
 /// with r = 1 where P is positive, else the share that is recovered, and k the node of the largest |u| in the stretch.
 /// A peak torque has a piece for every motor, motion and stretch: when one peak falls another becomes the largest, and
-/// a search that minimizes the largest needs both gradients.
+/// a search that minimizes the largest needs both gradients. So has the envelope of a motor, with |u| over its limit, |v|
+/// over its, or the share of the supply in place of |u|, whichever is the largest of a stretch. Heat is Eq. (1) of c u (model.h)
+/// over the motor's continuous torque. Limits and losses change with gears, and the mass with most variables (robot_slopes.h).
 ///
 /// A kept motion is infeasible where a linkage reaches a dead point of its joints, and torques fall just before it,
 /// which attracts searches. With T_c the tangent of a loop cluster for unit speeds of its joints, w the right singular
 /// vector of its largest singular value and mu = 1 / |T_c w| its margin (ratio.h), designs are kept away from it by
 ///     mu(k)^2 >= least^2,    d mu^2 = -2 mu^4 (T_c w) . d(T_c w)                                                   (4)
 /// for the smallest mu in every stretch. The square falls linearly towards a dead point, where mu itself has a vertical
-/// slope.
+/// slope. Of motions made anew, mu and the distances of shapes move with the optimum (optimum_gradient.h).
 #include <string>
 
 #include "bielle/design/parametrization.h"
@@ -26,6 +29,7 @@
 #include "bielle/dynamics/kept_motion.h"
 #include "bielle/transmission/lift.h"
 #include "design/measures.h"
+#include "design/robot_slopes.h"
 
 namespace bielle {
 
@@ -35,30 +39,39 @@ bool hasGradient(Measure measure);
 /// Torques and speeds of the motors over the N stages of a motion, and their derivatives. A stage without duration has no
 /// torque.
 struct MotorSlopes {
-  std::vector<double> dt;        ///< N, s
-  MatrixXd u, v;                 ///< nu x N
-  std::vector<MatrixXd> du, dv;  ///< per variable, nu x N
-  MatrixXd margin;               ///< of kept motions, loop clusters x N, mu^2 of Eq. (4)
-  std::vector<MatrixXd> dmargin;
-  double cost = 0;  ///< of motions that were optimized for the design, and its derivatives
+  std::vector<double> dt;         ///< N, s
+  MatrixXd u, v;                  ///< nu x N
+  std::vector<MatrixXd> du, dv;   ///< per variable, nu x N
+  MatrixXd margin;                ///< loop clusters x nodes, mu^2 of Eq. (4); of motions made anew if it was asked for
+  std::vector<MatrixXd> dmargin;  ///< of motions made anew only at the entries that listLeast() names
+  Eigen::RowVectorXd distance;    ///< of the nearest shapes at all nodes, if it was asked for
+  std::vector<Eigen::RowVectorXd> ddistance;  ///< only at the entries that listLeast() names
+  double cost = 0;                            ///< of motions that were optimized for the design, and its derivatives
   VectorXd dcost;
   std::string failure;  ///< reason if there are none, or empty
 };
 /// \param kept_dofs  of the model, in the order of the velocities of the serial trajectory
-/// \param lifted  the whole trajectory, lifted to the model
+/// \param lifted  the whole trajectory, lifted to the model   \param distances  whether there are distances among them
 MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dofs, const SerialTrajectory& trajectory,
-                            const LiftResult& lifted, const std::vector<ModelVariation>& variations);
+                            const LiftResult& lifted, const std::vector<ModelVariation>& variations,
+                            bool distances = false);
 
-/// Eqs. (1) to (3) over the named motors and all motions: the number of pieces depends only on these.
-/// \param drives  by motor; empty: the default of all
+/// Eqs. (1) to (3) over the named motors and all motions, and the mass: the number of pieces depends only on these.
+/// \param robot  without drives: the default of all motors
 MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
-                                const std::vector<MotorSlopes>& motions,
-                                const std::vector<MotorConversion>& drives = {});
+                                const std::vector<MotorSlopes>& motions, const RobotSlopes& robot = {});
 
 /// The sum of the costs of all motions, one piece.
 MeasurePieces calcCostPiece(const std::vector<MotorSlopes>& motions);
 
+/// The least entry of every row in every stretch of the columns, the first of equal ones: row, column. Of motions with fewer nodes
+/// than stretches some have none.
+std::vector<std::pair<Eigen::Index, Eigen::Index>> listLeast(const MatrixXd& values);
+
 /// Eq. (4) as pieces p <= 0: least^2 - mu^2 of every cluster, motion and stretch.
 MeasurePieces calcMarginPieces(double least, const std::vector<MotorSlopes>& motions);
+
+/// The least distance of every motion and stretch: the least of these pieces counts, not the largest.
+MeasurePieces calcDistancePieces(const std::vector<MotorSlopes>& motions);
 
 }  // namespace bielle

@@ -4,78 +4,178 @@
 #include <stdexcept>
 
 #include "bielle/design/cost_gradient.h"
+#include "bielle/dynamics/distance.h"
+#include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "design/conditioning.h"
+#include "motion/neighbour_plans.h"
 
 namespace bielle {
 namespace {
 
-MotorSlopes makeSlopes(const MotionOutcome& outcome, Eigen::Index variables) {
-  const MotorTrace& trace = outcome.measures.trace;
-  MotorSlopes out;
-  out.dt = trace.dt, out.u = trace.torque, out.v = trace.speed;
-  out.du.assign(static_cast<size_t>(variables), MatrixXd::Zero(out.u.rows(), out.u.cols()));
-  out.dv = out.du;
-  out.cost = outcome.measures.cost;
-  out.dcost.setZero(variables);
-  return out;
-}
+// Margins of linkages and distances of shapes at the states of a robot.
+class StateMeasures {
+ public:
+  StateMeasures(const Model& model, const VectorXd& x, const std::set<Measure>& asked) : model_(model), ws_(model) {
+    if (asked.count(Measure::Margin)) conditioning_.emplace(model, x.head(model.nq()), LinkageSide::Joints);
+    if (asked.count(Measure::Distance)) pairs_ = listShapePairs(model);
+  }
 
-// Torques, then speeds.
-VectorXd readMotors(const Motion& motion, const std::vector<double>& dt, const ShootingTrajectory& trajectory) {
-  const MotorTrace trace = makeMotorTrace(motion.problem->model(), dt, trajectory);
-  VectorXd out(2 * trace.torque.size());
-  out << trace.torque.reshaped(), trace.speed.reshaped();
-  return out;
-}
+  bool hasMargins() const { return conditioning_.has_value(); }
+  VectorXd calcMargins(const VectorXd& x) {  // mu^2 of Eq. (4) of gradient.h, of every cluster
+    return conditioning_->calcInverses(x.head(model_.nq())).cwiseAbs2();
+  }
+  NearestPair findNearest(const VectorXd& x) {
+    updatePlacements(model_, ws_, x.head(model_.nq()));
+    return findNearestPair(model_, ws_.X_WB, pairs_);
+  }
+  bool hasPairs() const { return !pairs_.empty(); }
+  double calcDistance(const VectorXd& x, int pair) {
+    updatePlacements(model_, ws_, x.head(model_.nq()));
+    const Shape &a = model_.shapes()[static_cast<size_t>(pairs_[static_cast<size_t>(pair)].a)],
+                &b = model_.shapes()[static_cast<size_t>(pairs_[static_cast<size_t>(pair)].b)];
+    return bielle::calcDistance(a, ws_.X_WB[a.body], b, ws_.X_WB[b.body]).distance;
+  }
 
-// The derivatives by variable i, from motions at `step` on either side; false if there are none.
-bool addSlopes(const MotionOutcome& outcome, const MotionEnvelope& envelope, const Motion& ahead, const Motion& behind,
-               double step, Eigen::Index i, MotorSlopes& slopes) {
-  const double dcost = envelope.calcDerivative(ahead, behind, step);
-  const auto dmotors = differentiateOptimum(*outcome.motion, outcome.multipliers, ahead, behind, step,
-                                            [&](const Motion& motion, const ShootingTrajectory& trajectory) {
-                                              return readMotors(motion, slopes.dt, trajectory);
-                                            });
-  if (!std::isfinite(dcost) || !dmotors) return false;
-  const Eigen::Index nu = slopes.u.rows(), N = slopes.u.cols();
-  slopes.dcost[i] = dcost;
-  slopes.du[static_cast<size_t>(i)] = dmotors->value.head(nu * N).reshaped(nu, N);
-  slopes.dv[static_cast<size_t>(i)] = dmotors->value.tail(nu * N).reshaped(nu, N);
-  return true;
-}
+ private:
+  const Model& model_;
+  Workspace ws_;
+  std::optional<LinkageConditioning> conditioning_;
+  std::vector<ShapePair> pairs_;
+};
+
+// The slopes of one motion, and what is read of its neighbours for them.
+class OptimumSlopes {
+ public:
+  OptimumSlopes(const MotionOutcome& outcome, Eigen::Index variables, const std::set<Measure>& asked)
+      : outcome_(outcome), asked_(asked), envelope_(*outcome.motion, outcome.multipliers) {
+    const MotorTrace& trace = outcome.measures.trace;
+    const auto count = static_cast<size_t>(variables);
+    out_.dt = trace.dt, out_.u = trace.torque, out_.v = trace.speed;
+    out_.du.assign(count, MatrixXd::Zero(out_.u.rows(), out_.u.cols()));
+    out_.dv = out_.du;
+    out_.cost = outcome.measures.cost;
+    out_.dcost.setZero(variables);
+    addStates();
+    out_.dmargin.assign(count, MatrixXd::Zero(out_.margin.rows(), out_.margin.cols()));
+    out_.ddistance.assign(count, Eigen::RowVectorXd::Zero(out_.distance.size()));
+  }
+
+  // The derivatives by variable i, from motions at `step` on either side; false if there are none.
+  bool add(const Motion& ahead, const Motion& behind, double step, Eigen::Index i) {
+    const double dcost = envelope_.calcDerivative(ahead, behind, step);
+    StateMeasures at_ahead(ahead.problem->model(), ahead.problem->initialState(), asked_),
+        at_behind(behind.problem->model(), behind.problem->initialState(), asked_);
+    const auto derivative = differentiateOptimum(*outcome_.motion, outcome_.multipliers, ahead, behind, step,
+                                                 [&](const Motion& motion, const ShootingTrajectory& trajectory) {
+                                                   return read(motion.problem->model(), trajectory,
+                                                               &motion == &ahead ? at_ahead : at_behind);
+                                                 });
+    if (!std::isfinite(dcost) || !derivative) return false;
+    out_.dcost[i] = dcost;
+    write(derivative->value, static_cast<size_t>(i));
+    return true;
+  }
+
+  MotorSlopes take() { return std::move(out_); }
+
+ private:
+  void addStates() {
+    const std::vector<VectorXd>& xs = outcome_.motion->guess.xs;
+    const auto nodes = static_cast<Eigen::Index>(xs.size());
+    StateMeasures at(outcome_.motion->problem->model(), xs.front(), asked_);
+    if (at.hasMargins()) {
+      out_.margin.resize(at.calcMargins(xs.front()).size(), nodes);
+      for (Eigen::Index k = 0; k < nodes; ++k) out_.margin.col(k) = at.calcMargins(xs[static_cast<size_t>(k)]);
+      margins_ = listLeast(out_.margin);
+    }
+    if (!at.hasPairs()) return;
+    out_.distance.resize(nodes);
+    for (Eigen::Index k = 0; k < nodes; ++k) {
+      const NearestPair nearest = at.findNearest(xs[static_cast<size_t>(k)]);
+      out_.distance[k] = nearest.distance.distance;
+      pairs_.push_back(nearest.pair);
+    }
+    distances_ = listLeast(out_.distance);
+  }
+
+  // Torques, speeds, margins, distances.
+  VectorXd read(const Model& model, const ShootingTrajectory& trajectory, StateMeasures& at) const {
+    const MotorTrace trace = makeMotorTrace(model, out_.dt, trajectory);
+    const Eigen::Index size = trace.torque.size();
+    VectorXd out(2 * size + static_cast<Eigen::Index>(margins_.size() + distances_.size()));
+    out.head(size) = trace.torque.reshaped();
+    out.segment(size, size) = trace.speed.reshaped();
+    Eigen::Index next = 2 * size;
+    for (const auto& [cluster, node] : margins_)
+      out[next++] = at.calcMargins(trajectory.xs[static_cast<size_t>(node)])[cluster];
+    for (const auto& [row, node] : distances_)
+      out[next++] = at.calcDistance(trajectory.xs[static_cast<size_t>(node)], pairs_[static_cast<size_t>(node)]);
+    return out;
+  }
+
+  void write(const VectorXd& derivative, size_t i) {
+    const Eigen::Index nu = out_.u.rows(), N = out_.u.cols(), size = nu * N;
+    out_.du[i] = derivative.head(size).reshaped(nu, N);
+    out_.dv[i] = derivative.segment(size, size).reshaped(nu, N);
+    Eigen::Index next = 2 * size;
+    for (const auto& [cluster, node] : margins_) out_.dmargin[i](cluster, node) = derivative[next++];
+    for (const auto& [row, node] : distances_) out_.ddistance[i](row, node) = derivative[next++];
+  }
+
+  const MotionOutcome& outcome_;
+  const std::set<Measure>& asked_;
+  MotionEnvelope envelope_;
+  MotorSlopes out_;
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> margins_, distances_;  // where they are read
+  std::vector<int> pairs_;                                                  // the nearest at every node
+};
 
 }  // namespace
 
 std::vector<MotorSlopes> calcOptimumSlopes(const Parametrization& robot, const VectorXd& x,
                                            const std::vector<DesignMotion>& motions,
-                                           const std::vector<MotionOutcome>& outcomes) {
-  std::vector<MotorSlopes> out;
-  std::vector<std::unique_ptr<MotionEnvelope>> envelopes;
+                                           const std::vector<MotionOutcome>& outcomes, const std::set<Measure>& asked) {
+  const auto fail = [](const std::string& reason) {
+    std::vector<MotorSlopes> out(1);
+    out.back().failure = "no gradient" + reason;
+    return out;
+  };
   try {
-    for (const MotionOutcome& outcome : outcomes) {
-      out.push_back(makeSlopes(outcome, x.size()));
-      envelopes.push_back(std::make_unique<MotionEnvelope>(*outcome.motion, outcome.multipliers));
-    }
+    std::vector<std::unique_ptr<OptimumSlopes>> slopes;
+    for (const MotionOutcome& outcome : outcomes)
+      slopes.push_back(std::make_unique<OptimumSlopes>(outcome, x.size(), asked));
+    std::vector<NeighbourPlans> plans(motions.size());
+    NeighbourPlans postures;
+    const auto stand = [&](const Model& model) {
+      const NeighbourPlans::Use use(postures);
+      return makeStandingPosture(model);
+    };
+    const auto plan = [&](size_t m, const Model& model, const VectorXd& posture) {
+      const NeighbourPlans::Use use(plans[m]);
+      return makeDesignMotion(model, motions[m], posture);
+    };
     for (Eigen::Index i : robot.listContinuous()) {
       const double h = kDesignStep * (robot.upper()[i] - robot.lower()[i]);
       const VectorXd dx = h * VectorXd::Unit(x.size(), i);
       const Model to = robot.make(x + dx), from = robot.make(x - dx);
-      const VectorXd posture_to = makeStandingPosture(to), posture_from = makeStandingPosture(from);
+      const VectorXd posture_to = stand(to), posture_from = stand(from);
       for (size_t m = 0; m < motions.size(); ++m) {
-        const Motion ahead = makeDesignMotion(to, motions[m], posture_to);
-        const Motion behind = makeDesignMotion(from, motions[m], posture_from);
-        if (addSlopes(outcomes[m], *envelopes[m], ahead, behind, h, i, out[m])) continue;
-        out.back().failure = "no gradient along " + robot.variables()[static_cast<size_t>(i)].name + ": " +
-                             motions[m].name + " cannot be followed";
-        return out;
+        const Motion ahead = plan(m, to, posture_to);
+        const Motion behind = plan(m, from, posture_from);
+        if (slopes[m]->add(ahead, behind, h, i)) continue;
+        return fail(" along " + robot.variables()[static_cast<size_t>(i)].name + ": " + motions[m].name +
+                    " cannot be followed");
       }
     }
+    std::vector<MotorSlopes> out;
+    for (const auto& of_motion : slopes) out.push_back(of_motion->take());
+    return out;
   } catch (const std::invalid_argument& error) {  // an optimum that is none to second order, a plan with other stages
-    out.back().failure = std::string("no gradient: ") + error.what();
+    return fail(std::string(": ") + error.what());
   } catch (const ModelError& error) {
-    out.back().failure = std::string("no gradient: ") + error.what();
+    return fail(std::string(": ") + error.what());
   }
-  return out;
 }
 
 }  // namespace bielle

@@ -21,7 +21,11 @@ std::string formatChange(double before, double after) {
   return before > 0 ? format(100 * (after / before - 1), "%+.1f %%") : "";
 }
 
+// Rounding of what is nothing.
+double dropNoise(double value) { return std::abs(value) < 1e-9 ? 0 : value; }
+
 void writeRow(std::ostream& out, const std::string& name, double before, double after) {
+  before = dropNoise(before), after = dropNoise(after);
   out << "| " << name << " | " << format(before) << " | " << format(after) << " | " << formatChange(before, after)
       << " |\n";
 }
@@ -53,13 +57,22 @@ void writeConstraints(std::ostream& out, const DesignEvaluator& evaluator, const
     out << "\n**No design found keeps all constraints**; this is the start, where " << run.evaluation.message << ".\n";
 }
 
+// What the best design has of a variable that is no choice: nearer to a bound than a thousandth of the way between them, the bound
+// may be what decided.
+std::string markBound(const DesignVariable& v, double value) {
+  const double near = 1e-3 * (v.upper - v.lower);
+  if (v.isChoice()) return "";
+  if (value - v.lower < near) return " (lower bound)";
+  return v.upper - value < near ? " (upper bound)" : "";
+}
+
 void writeVariables(std::ostream& out, const Parametrization& robot, const VectorXd& best) {
   out << "| variable | unit | bounds | before | after |\n|---|---|---|---|---|\n";
   for (size_t i = 0; i < robot.variables().size(); ++i) {
     const DesignVariable& v = robot.variables()[i];
     const Eigen::Index k = static_cast<Eigen::Index>(i);
     out << "| " << v.name << " | " << (v.isChoice() ? "" : v.unit) << " | " << formatBounds(v) << " | "
-        << formatValue(v, robot.start()[k]) << " | " << formatValue(v, best[k]) << " |\n";
+        << formatValue(v, robot.start()[k]) << " | " << formatValue(v, best[k]) << markBound(v, best[k]) << " |\n";
   }
 }
 
@@ -87,7 +100,7 @@ void writeFront(std::ostream& out, const DesignEvaluator& evaluator, const Desig
 }
 
 // Keeps the table short: only changes of at least a thousandth are listed.
-bool isChanged(double before, double after) { return std::abs(after - before) > 1e-3 * std::abs(before); }
+bool isChanged(double before, double after) { return std::abs(dropNoise(after - before)) > 1e-3 * std::abs(before); }
 
 void writeMotion(std::ostream& out, const Model& model, const Model& best, const std::string& name,
                  const MotionMeasures& before, const MotionMeasures& after) {

@@ -188,9 +188,8 @@ void Parametrization::finish() {
     bounds << variable.lower << " .. " << variable.upper;
     const std::string element = "variable '" + variable.name + "'";
     if (!names.insert(variable.name).second) throw ModelError(source_, element, "it is given twice", "rename one");
-    if (variable.isChoice() && variable.choices.size() < 2)
-      throw ModelError(source_, element, "there is nothing to choose", "give two choices or more");
-    if (!(std::isfinite(variable.lower) && std::isfinite(variable.upper) && variable.lower < variable.upper))
+    if (!(std::isfinite(variable.lower) && std::isfinite(variable.upper) &&
+          (variable.isChoice() || variable.lower < variable.upper)))
       throw ModelError(source_, element, "its bounds " + bounds.str() + " are crossed", "give the lower one first");
     if (!(start_[k] >= variable.lower && start_[k] <= variable.upper)) {
       std::ostringstream problem;

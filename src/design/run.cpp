@@ -169,6 +169,16 @@ void addUpSearches(const DesignEvaluator& evaluator, DesignRun& run) {
   run.evaluation = evaluator.evaluate(run.best);
 }
 
+namespace {
+
+// Logs have no infinity: that of a distance without shapes.
+std::vector<double> listFinite(std::vector<double> values) {
+  for (double& value : values) value = std::clamp(value, -1e300, 1e300);
+  return values;
+}
+
+}  // namespace
+
 LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorithm stage, const VectorXd& x) {
   const double begin = getThreadSeconds();
   const SlopedEvaluation sloped =
@@ -181,7 +191,13 @@ LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorith
           getThreadSeconds() - begin,
           sloped.terms,
           sloped.limits,
-          evaluation.status == DesignStatus::Feasible ? evaluation.terms : std::vector<double>()};
+          evaluation.terms,
+          listFinite(evaluation.constraints)};
+}
+
+bool isComplete(const LoggedEvaluation& e, size_t objectives, size_t constraints) {
+  const bool measured = e.status == DesignStatus::Feasible || e.status == DesignStatus::Violated;
+  return e.measures.size() == (measured ? objectives : 0) && e.constraints.size() == (measured ? constraints : 0);
 }
 
 DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options) {

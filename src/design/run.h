@@ -23,11 +23,15 @@ struct LoggedEvaluation {
   double seconds = 0;                     ///< processor time at its end
   std::vector<MeasurePieces> terms = {};  ///< SlopedEvaluation, in stages that need gradients
   MeasurePieces limits = {};
-  std::vector<double> measures = {};  ///< Evaluation::terms: if feasible, one for each of the objective
+  std::vector<double> measures = {};     ///< Evaluation::terms: if feasible or violated, one for each of the objective
+  std::vector<double> constraints = {};  ///< likewise, one for each constraint
 };
 
 /// The evaluation of a design as a stage of a search needs it, with its gradients or without.
 LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorithm stage, const VectorXd& x);
+
+/// Whether it has as many numbers as its status asks for.
+bool isComplete(const LoggedEvaluation& evaluation, size_t objectives, size_t constraints);
 
 /// Its line in a log.
 std::string formatEvaluation(const LoggedEvaluation& evaluation);

@@ -74,9 +74,9 @@ double readChoiceNumber(const Entry& entry, const std::vector<std::string>& choi
 void readChoices(const Entry& choices, const Fields& fields, const DesignSpec& spec, const Entry* catalogues,
                  DesignVariable& variable) {
   variable.choices = choices.getTexts();
-  if (std::set<std::string>(variable.choices.begin(), variable.choices.end()).size() < variable.choices.size() ||
-      variable.choices.size() < 2)
-    choices.fail("there is nothing to choose, or one of them is there twice", "give two different choices or more");
+  if (std::set<std::string>(variable.choices.begin(), variable.choices.end()).size() < variable.choices.size())
+    choices.fail("one of them is there twice", "remove it");
+  if (variable.choices.empty()) choices.fail("there is nothing to choose", "give one or more");
   if (spec.robot.generator.empty())
     choices.fail("a given robot has no parts to choose, and the masses of its motors are in its links",
                  "give the `ratio` of its motors, or a generator");
@@ -283,7 +283,7 @@ SearchStage readStage(const Entry& item, const std::vector<SearchAlgorithm>& alg
   SearchStage stage;
   stage.algorithm = readChoice<SearchAlgorithm>(require(fields, "algorithm", item), algorithms);
   if (needsGradient(stage.algorithm))
-    if (const auto obstacle = findGradientObstacle(spec.mode, spec.objective, spec.constraints, spec.variables))
+    if (const auto obstacle = findGradientObstacle(spec.mode, spec.objective, spec.constraints))
       item.fail(obstacle->problem, obstacle->remedy);
   stage.evaluations = readCount(require(fields, "evaluations", item), 1000000);
   if (const Entry* tolerance = find(fields, "tolerance")) stage.tolerance = tolerance->getNumber();

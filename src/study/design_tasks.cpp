@@ -19,7 +19,8 @@ constexpr std::size_t kMostBytes = 64'000'000;
 constexpr const char *kRequest = "request.json", *kResult = "evaluation.json";
 
 // What a worker returned, for this request. \throws std::exception saying what is wrong
-LoggedEvaluation readResult(const tasks::Task& task, const DesignRequest& request, size_t terms, int status) {
+LoggedEvaluation readResult(const tasks::Task& task, const DesignRequest& request, size_t terms, size_t constraints,
+                            int status) {
   const std::string log = tasks::getOutput(task, task.log);
   if (status != 0) throw std::runtime_error("it ended with status " + std::to_string(status) + describeLog(log));
   const LoggedEvaluation e = readEvaluation(tasks::readOutput(tasks::getOutput(task, kResult), kMostBytes));
@@ -29,7 +30,7 @@ LoggedEvaluation readResult(const tasks::Task& task, const DesignRequest& reques
   demand(e.stage == getName(request.stage) && e.x.size() == request.x.size() && e.x == request.x,
          "it is of another design");
   demand(e.seconds >= 0, "its time is negative");
-  demand(e.measures.size() == (e.status == DesignStatus::Feasible ? terms : 0), "its measures are not those asked for");
+  demand(isComplete(e, terms, constraints), "its measures are not those asked for");
   demand(e.terms.empty() || (needsGradient(request.stage) && e.terms.size() == terms),
          "its terms are not those asked for");
   demand(!e.terms.empty() || !needsGradient(request.stage) || e.status != DesignStatus::Feasible, "it lacks gradients");
@@ -161,7 +162,7 @@ void DesignTasks::submit(Order& order) {
 
 void DesignTasks::finish(Order& order, int status) {
   try {
-    order.result = readResult(order.task, order.request, spec_.objective.size(), status);
+    order.result = readResult(order.task, order.request, spec_.objective.size(), spec_.constraints.size(), status);
     ++thinking_;  // the thread that sleeps
     std::error_code ignored;
     fs::remove_all(order.task.directory, ignored);

@@ -1,0 +1,55 @@
+#include "design/constraint.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bielle {
+namespace {
+
+constexpr double kCentimetre = 0.01;  // the scale of distances, whose bound may be 0
+
+double getScale(const DesignConstraint& constraint) {
+  return constraint.measure == Measure::Distance || constraint.bound == 0 ? kCentimetre : std::abs(constraint.bound);
+}
+
+}  // namespace
+
+double calcViolation(const DesignConstraint& constraint, double value) {
+  const double beyond =
+      (constraint.at_least ? constraint.bound - value : value - constraint.bound) / getScale(constraint);
+  return beyond > kConstraintSlack ? std::min(beyond, 1e6)
+                                   : 0;  // linkages without a bound on their motion are infinitely far
+}
+
+MeasurePieces calcConstraintPieces(const DesignConstraint& constraint, const std::vector<int>& motors,
+                                   const std::vector<MotorSlopes>& motions, const RobotSlopes& robot) {
+  const double bound = constraint.bound;
+  MeasurePieces out;
+  if (constraint.measure == Measure::Margin) {
+    // The square of the margin, over twice its bound: near the bound the same as the margin itself.
+    out = calcMarginPieces(bound, motions);
+    out.values /= 2 * bound * bound;
+    out.gradients /= 2 * bound * bound;
+    return out;
+  }
+  if (constraint.measure == Measure::Distance) {
+    out = calcDistancePieces(motions);
+  } else {
+    out = calcMeasurePieces(constraint.measure, motors, motions, robot);
+  }
+  const double sign = constraint.at_least ? -1 : 1, scale = sign / getScale(constraint);
+  out.values = scale * (out.values.array() - bound);
+  out.gradients *= scale;
+  return out;
+}
+
+void append(const MeasurePieces& pieces, MeasurePieces& all) {
+  const Eigen::Index old = all.values.size(), size = pieces.values.size();
+  if (size == 0) return;
+  all.values.conservativeResize(old + size);
+  all.values.tail(size) = pieces.values;
+  all.gradients.conservativeResize(old + size, pieces.gradients.cols());
+  all.gradients.bottomRows(size) = pieces.gradients;
+}
+
+}  // namespace bielle

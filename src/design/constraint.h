@@ -1,0 +1,34 @@
+#pragma once
+/// \file Bounds on the measures of a design, with their gradients.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "design/gradient.h"
+#include "design/measures.h"
+
+namespace bielle {
+
+/// A bound on a measure, for all motions.
+struct DesignConstraint {
+  Measure measure = Measure::Envelope;  ///< but for the cost and the workspace
+  std::vector<std::string> motors;      ///< empty: all
+  double bound = 1;
+  bool at_least = false;  ///< else at most
+};
+
+/// Beyond a bound, over it: so much counts as kept, since solvers keep their own constraints to a tolerance.
+inline constexpr double kConstraintSlack = 1e-3;
+
+/// How far a value is beyond the bound, over the bound (a distance: over a centimetre); 0 within the slack.
+double calcViolation(const DesignConstraint& constraint, double value);
+
+/// The same of the pieces of its measure, as p <= 0.
+/// \param motors  those of the constraint, by their numbers   \param motions  with distances and, of motions made anew, margins
+MeasurePieces calcConstraintPieces(const DesignConstraint& constraint, const std::vector<int>& motors,
+                                   const std::vector<MotorSlopes>& motions, const RobotSlopes& robot);
+
+/// Adds pieces to others by the same variables.
+void append(const MeasurePieces& pieces, MeasurePieces& all);
+
+}  // namespace bielle
