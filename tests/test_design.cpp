@@ -462,6 +462,11 @@ TEST_CASE("design: choices among numbers, on the front of two distances") {
   }
   CHECK(chosen == std::set<double>{0, 2});
   CHECK_THROWS_AS(searchFront(problem, {SearchAlgorithm::Moead, 24, 3}, 3), std::invalid_argument);
+  // One choice alone stays what it is.
+  problem.lower[1] = problem.upper[1] = problem.start[1] = 2;
+  seen.clear();
+  searchFront(problem, {SearchAlgorithm::Nsga2, 8, 3}, 3);
+  CHECK(seen == std::set<std::pair<double, double>>{{2, 0}});
 }
 
 TEST_CASE("design: searches find a minimum, the same one for the same seed") {

@@ -18,7 +18,7 @@ constexpr double kCrossover = 0.9, kCrossoverIndex = 20, kMutationIndex = 20;
 constexpr unsigned kMostNeighbours = 20;  // of MOEA/D
 
 // As pagmo wants problems: a value with these members. Whole numbers come last there; its NSGA-II gives them the value of either parent
-// or any other.
+// or any other, and refuses those that have only one, which it does not see.
 struct PagmoProblem {
   const FrontProblem* problem;
   std::vector<Eigen::Index> order;  // variables in pagmo's order
@@ -28,13 +28,13 @@ struct PagmoProblem {
     for (const bool whole : {false, true})
       for (Eigen::Index i = 0; p && i < p->start.size(); ++i) {
         const bool is_whole = static_cast<size_t>(i) < p->whole.size() && p->whole[static_cast<size_t>(i)];
-        if (is_whole != whole) continue;
+        if (is_whole != whole || p->lower[i] == p->upper[i]) continue;
         order.push_back(i);
         num_whole += whole;
       }
   }
   VectorXd makeDesign(const double* x) const {
-    VectorXd design(static_cast<Eigen::Index>(order.size()));
+    VectorXd design = problem->start;
     for (size_t i = 0; i < order.size(); ++i) design[order[i]] = x[i];
     return design;
   }
