@@ -82,7 +82,12 @@ class Browser:
         self.call("Page.navigate", url="about:blank")
         self.call("Page.navigate", url="file://" + os.path.abspath(path) + fragment)
         deadline = time.monotonic() + 120
-        while time.monotonic() < deadline and self.evaluate("document.readyState") != "complete":
+        while time.monotonic() < deadline:
+            try:
+                if self.evaluate("document.readyState") == "complete":
+                    return
+            except RuntimeError:  # a page that loads itself anew was left meanwhile
+                pass
             time.sleep(0.05)
 
     def evaluate(self, expression):
