@@ -46,6 +46,7 @@ WindowPlanner::WindowPlanner(std::unique_ptr<Horizon> horizon, const PredictiveO
       solver_(makeSolver(options.iterations)) {
   u_.setZero(model_.nu());
   x_ = problem_.initialState();
+  for (KeptGains& kept : kept_) kept.K.setZero(model_.nu(), 2 * model_.nv());
 }
 
 WindowPlanner::Solution WindowPlanner::makeEmpty() const {

@@ -15,10 +15,10 @@ double getScale(const DesignConstraint& constraint) {
 }  // namespace
 
 double calcViolation(const DesignConstraint& constraint, double value) {
+  constexpr double kMost = 1e6;  // linkages at a singularity are infinitely far beyond
   const double beyond =
       (constraint.at_least ? constraint.bound - value : value - constraint.bound) / getScale(constraint);
-  return beyond > kConstraintSlack ? std::min(beyond, 1e6)
-                                   : 0;  // linkages without a bound on their motion are infinitely far
+  return beyond > kConstraintSlack ? std::min(beyond, kMost) : 0;
 }
 
 MeasurePieces calcConstraintPieces(const DesignConstraint& constraint, const std::vector<int>& motors,

@@ -41,7 +41,7 @@ struct PredictiveOptions {
   /// Stages that begin less than this before the end of their phase of contacts take the gains of the last stage before them
   /// that did not, if need be of an earlier solution (Policy::setLookAhead() says why), s; 0: each stage has its own.
   double look_ahead = 0;
-  int threads = 0;               ///< 0: all. Results are bitwise independent of it.
+  int threads = 0;  ///< 0: all. Results are bitwise independent of it.
   /// Solves run in a thread of their own; results then depend on how fast it is.
   bool own_thread = false;
   /// Weights of the difference between the end of the window and the motion there: of heading and place over the ground, of the
