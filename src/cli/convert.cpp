@@ -10,6 +10,7 @@
 #include "io/mjcf.h"
 #include "io/sdf.h"
 #include "io/text_file.h"
+#include "model/payload.h"
 
 namespace bielle::cli {
 namespace {
@@ -17,6 +18,8 @@ namespace {
 struct ConvertArguments {
   RobotArgument robot;
   std::string format = "bielle", output;
+  double payload = 0;
+  std::vector<double> payload_at;
 };
 
 void warn(const std::vector<std::string>& warnings) {
@@ -24,7 +27,10 @@ void warn(const std::vector<std::string>& warnings) {
 }
 
 int convert(const ConvertArguments& arguments) {
-  const LoadedRobot robot = arguments.robot.load();
+  LoadedRobot robot = arguments.robot.load();
+  Payload payload{arguments.payload, {}};
+  if (!arguments.payload_at.empty()) payload.at = Eigen::Map<const Vector3d>(arguments.payload_at.data());
+  robot.model = addPayload(robot.model, payload);
   if (arguments.format == "bielle") {
     writeRobot(robot.model, arguments.output,
                "Written by `bielle convert` from " + std::filesystem::path(robot.file).filename().string() + ".");
@@ -63,6 +69,15 @@ void addConvert(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"bielle", "drake", "mjcf", "sdf", "urdf"}))
       ->capture_default_str();
   addFixedBase(command, arguments->robot);
+  CLI::Option* payload =
+      command.add_option("--payload", arguments->payload, "mass fixed to the trunk [kg], as part of it")
+          ->check(CLI::Range(0.0, 1e6))
+          ->capture_default_str();
+  command
+      .add_option("--payload-at", arguments->payload_at,
+                  "x y z [m] in the frame of the trunk; the trunk's centre of mass if not given")
+      ->expected(3)
+      ->needs(payload);
   command
       .add_option("-o,--output", arguments->output, "the file; bielle: the directory, whose last name its files get")
       ->required();
@@ -75,6 +90,7 @@ void addConvert(CLI::App& app, Action& action) {
       "Examples:\n"
       "  bielle convert bipetto --to mjcf -o bipetto.xml\n"
       "  bielle convert bipetto.xml -o my_bipetto\n"
+      "  bielle convert bipetto --payload 5 --payload-at 0 0 0.3 -o loaded\n"
       "  bielle convert belt_biped --to urdf -o belt.urdf");
   command.callback([&action, arguments] { action = [=] { return convert(*arguments); }; });
 }

@@ -31,7 +31,8 @@ DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion)
     return request;
   };
   make();  // names are checked now
-  return {motion.motion, [make](const Model& model, const VectorXd& q0) { return make().plan(model, q0); }};
+  return {motion.motion, [make](const Model& model, const VectorXd& q0) { return make().plan(model, q0); },
+          motion.weight, motion.payload};
 }
 
 // One design, for others that search.
@@ -135,6 +136,7 @@ void addDesign(CLI::App& app, Action& action) {
       "leg_biped`)\n"
       "  motions:\n"
       "    - {motion: squat, set: {depth: 0.6}}\n"
+      "    - {motion: walk, weight: 0.5, payload: 5}     (share in objectives; kg fixed to the trunk)\n"
       "  mode: reoptimized          (or `kept`: postures of the start design, motor torques computed anew)\n"
       "  margin: 0.1                (the least that a joint moves in a unit motion of its linkage; for motions that "
       "are\n"

@@ -22,7 +22,8 @@ double calcViolation(const DesignConstraint& constraint, double value) {
 }
 
 MeasurePieces calcConstraintPieces(const DesignConstraint& constraint, const std::vector<int>& motors,
-                                   const std::vector<MotorSlopes>& motions, const RobotSlopes& robot) {
+                                   const std::vector<MotorSlopes>& motions, const std::vector<double>& weights,
+                                   const RobotSlopes& robot) {
   const double bound = constraint.bound;
   MeasurePieces out;
   if (constraint.measure == Measure::Margin) {
@@ -35,21 +36,12 @@ MeasurePieces calcConstraintPieces(const DesignConstraint& constraint, const std
   if (constraint.measure == Measure::Distance) {
     out = calcDistancePieces(motions);
   } else {
-    out = calcMeasurePieces(constraint.measure, motors, motions, robot);
+    out = calcMeasurePieces(constraint.measure, motors, motions, weights, robot);
   }
   const double sign = constraint.at_least ? -1 : 1, scale = sign / getScale(constraint);
   out.values = scale * (out.values.array() - bound);
   out.gradients *= scale;
   return out;
-}
-
-void append(const MeasurePieces& pieces, MeasurePieces& all) {
-  const Eigen::Index old = all.values.size(), size = pieces.values.size();
-  if (size == 0) return;
-  all.values.conservativeResize(old + size);
-  all.values.tail(size) = pieces.values;
-  all.gradients.conservativeResize(old + size, pieces.gradients.cols());
-  all.gradients.bottomRows(size) = pieces.gradients;
 }
 
 }  // namespace bielle

@@ -9,7 +9,7 @@
 
 namespace bielle {
 
-/// A bound on a measure, for all motions.
+/// A bound on a measure, for every motion whatever its weight; on energies for their sum with the weights.
 struct DesignConstraint {
   Measure measure = Measure::Envelope;  ///< but for the cost and the workspace
   std::vector<std::string> motors;      ///< empty: all
@@ -25,10 +25,9 @@ double calcViolation(const DesignConstraint& constraint, double value);
 
 /// The same of the pieces of its measure, as p <= 0.
 /// \param motors  those of the constraint, by their numbers   \param motions  with distances and, of motions made anew, margins
+/// \param weights  as of getMeasure()
 MeasurePieces calcConstraintPieces(const DesignConstraint& constraint, const std::vector<int>& motors,
-                                   const std::vector<MotorSlopes>& motions, const RobotSlopes& robot);
-
-/// Adds pieces to others by the same variables.
-void append(const MeasurePieces& pieces, MeasurePieces& all);
+                                   const std::vector<MotorSlopes>& motions, const std::vector<double>& weights,
+                                   const RobotSlopes& robot);
 
 }  // namespace bielle

@@ -6,8 +6,25 @@
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "bielle/transmission/serial_model.h"
+#include "model/number_text.h"
 
 namespace bielle {
+
+std::string describeMotion(const DesignMotion& motion) {
+  std::string text = motion.name;
+  if (motion.payload.mass > 0) text += " with " + formatNumber(motion.payload.mass, "%.4g") + " kg";
+  if (motion.weight != 1) text += ", weight " + formatNumber(motion.weight, "%.4g");
+  return text;
+}
+
+std::vector<size_t> groupByPayload(const std::vector<DesignMotion>& motions) {
+  std::vector<size_t> groups;
+  for (const DesignMotion& motion : motions) {
+    const auto has_same = [&](const DesignMotion& other) { return other.payload == motion.payload; };
+    groups.push_back(static_cast<size_t>(std::find_if(motions.begin(), motions.end(), has_same) - motions.begin()));
+  }
+  return groups;
+}
 
 Motion makeDesignMotion(const Model& model, const DesignMotion& motion, const VectorXd& posture) {
   return makeMotion(model, motion.plan(model, posture), {Formulation::Reduced, StepRule::Euler});
@@ -21,16 +38,20 @@ std::vector<double> listSteps(const RobotProblem& problem) {
   return dt;
 }
 
-// Solves from the guess.
-MotionOutcome solve(Motion motion, const FddpOptions& options, const std::vector<MotorConversion>& drives) {
-  MotionOutcome out;
+// Solves from the guess. \param out  with the loaded robot, that of the motion
+void solve(Motion motion, const FddpOptions& options, const std::vector<MotorConversion>& drives, MotionOutcome& out) {
   const FddpSummary summary = solveMotion(motion, options, {}, &out.multipliers);
   out.message = motion.name + ": " + getName(summary.termination) + " " + summary.message;
-  if (summary.termination != FddpTermination::Converged) return out;
+  if (summary.termination != FddpTermination::Converged) return;
   out.measures = calcMotionMeasures(motion.problem->model(), listSteps(*motion.problem), motion.guess, drives);
   out.measures.cost = summary.cost;
   out.missing = 0;
   out.motion = std::make_unique<Motion>(std::move(motion));
+}
+
+MotionOutcome load(const Model& model, const DesignMotion& motion) {
+  MotionOutcome out;
+  out.loaded = std::make_unique<Model>(addPayload(model, motion.payload));
   return out;
 }
 
@@ -89,7 +110,8 @@ void setStart(const Model& model, const SolvedMotion& solved, Motion& motion) {
 
 SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, const FddpOptions& options, int postures,
                               bool must_keep) {
-  const MotionOutcome outcome = solve(makeDesignMotion(model, motion, makeStandingPosture(model)), options, {});
+  MotionOutcome outcome = load(model, motion);
+  solve(makeDesignMotion(*outcome.loaded, motion, makeStandingPosture(*outcome.loaded)), options, {}, outcome);
   if (outcome.missing > 0)
     throw ModelError(model.name(), "start design", outcome.message, "ask for a motion that the robot can make");
   const ShootingTrajectory& solution = outcome.motion->guess;
@@ -98,7 +120,7 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
   for (int p = 0; p < postures; ++p)
     out.postures.push_back(solution.xs[p * last / std::max(1, postures - 1)].head(model.nq()));
   try {
-    addKeptMotion(model, motion, out);
+    addKeptMotion(*outcome.loaded, motion, out);
   } catch (const ModelError&) {  // no serial chain, or impacts: motions can be solved but not kept
     if (must_keep) throw;
   }
@@ -107,22 +129,24 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
 
 MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const SolvedMotion* start,
                            const FddpOptions& options, const std::vector<MotorConversion>& drives) {
-  Motion made = makeDesignMotion(model, motion, makeStandingPosture(model));
-  if (start) setStart(model, *start, made);
-  return solve(std::move(made), options, drives);
+  MotionOutcome out = load(model, motion);
+  Motion made = makeDesignMotion(*out.loaded, motion, makeStandingPosture(*out.loaded));
+  if (start) setStart(*out.loaded, *start, made);
+  solve(std::move(made), options, drives, out);
+  return out;
 }
 
-MotionOutcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::vector<MotorConversion>& drives,
-                         double margin) {
-  MotionOutcome out;
-  out.lifted = liftMotion(model, kept);
+MotionOutcome keepMotion(const Model& model, const DesignMotion& motion, const SerialTrajectory& kept,
+                         const std::vector<MotorConversion>& drives, double margin) {
+  MotionOutcome out = load(model, motion);
+  out.lifted = liftMotion(*out.loaded, kept);
   const LiftResult& lifted = out.lifted;
   out.missing = 1 - static_cast<double>(lifted.dt.size()) / static_cast<double>(kept.dt.size() + 1);
   if (!lifted.lifted()) {
     out.message = lifted.nodes.empty() ? "nothing could be lifted" : lifted.nodes.back().message;
     return out;
   }
-  out.measures = calcMotionMeasures(model, lifted.dt, lifted.trajectory, drives);
+  out.measures = calcMotionMeasures(*out.loaded, lifted.dt, lifted.trajectory, drives);
   out.missing = 0;
   const auto near = std::find_if(lifted.nodes.begin(), lifted.nodes.end(),
                                  [margin](const LiftNode& node) { return node.margin < margin; });

@@ -10,16 +10,25 @@
 #include "bielle/motion/motion.h"
 #include "bielle/transmission/lift.h"
 #include "design/measures.h"
+#include "model/payload.h"
 
 namespace bielle {
 
 struct DesignMotion {
   std::string name;
-  std::function<MotionPlan(const Model&, const VectorXd& q0)> plan;  ///< called by several threads
+  std::function<MotionPlan(const Model&, const VectorXd& q0)> plan;  ///< called by several threads; the model is loaded
+  double weight = 1;     ///< its share in objectives and in sums over motions, 0 or more
+  Payload payload = {};  ///< that the robot carries in it
 };
 
-/// Its problem, from a standing posture. Motions that are kept are lifted, which Euler steps alone can be; the others are
-/// comparable with them.
+/// With its payload, and its weight unless that is 1.
+std::string describeMotion(const DesignMotion& motion);
+
+/// For every motion the number of the first one with the same payload.
+std::vector<size_t> groupByPayload(const std::vector<DesignMotion>& motions);
+
+/// Its problem for a robot with its payload, from a standing posture. Motions that are kept are lifted, which Euler steps
+/// alone can be; the others are comparable with them.
 Motion makeDesignMotion(const Model& model, const DesignMotion& motion, const VectorXd& posture);
 
 /// A motion of the start design.
@@ -32,15 +41,17 @@ struct SolvedMotion {
 
 /// The outcome of one motion of a design.
 struct MotionOutcome {
-  double missing = 1;  ///< share of the motion
+  std::unique_ptr<Model> loaded;  ///< the robot with the payload of the motion
+  double missing = 1;             ///< share of the motion
   std::string message;
   MotionMeasures measures;
   LiftResult lifted;               ///< of a kept motion
-  std::unique_ptr<Motion> motion;  ///< of one that was made anew: the optimum, whose model must outlive it
+  std::unique_ptr<Motion> motion;  ///< of one that was made anew: the optimum, of the loaded robot
   Multipliers multipliers;
 };
 
-/// \param postures  that are listed   \param must_keep  whether the motion has to have a serial equivalent
+/// \param model  without payload, here and below   \param postures  that are listed
+/// \param must_keep  whether the motion has to have a serial equivalent
 /// \throws ModelError when the motion fails
 SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, const FddpOptions& options, int postures,
                               bool must_keep);
@@ -50,7 +61,7 @@ MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const
                            const FddpOptions& options, const std::vector<MotorConversion>& drives);
 
 /// Postures and accelerations of the start design, motors recomputed. \param margin  EvaluationOptions::margin
-MotionOutcome keepMotion(const Model& model, const SerialTrajectory& kept, const std::vector<MotorConversion>& drives,
-                         double margin);
+MotionOutcome keepMotion(const Model& model, const DesignMotion& motion, const SerialTrajectory& kept,
+                         const std::vector<MotorConversion>& drives, double margin);
 
 }  // namespace bielle

@@ -3,8 +3,10 @@
 ///
 /// With m_i the measures of a design and m_i0 those of the start, the value of a feasible design is
 ///     f = sum_i w_i m_i / m_i0,                                                                                    (1)
-/// W = sum_i w_i at the start. The measure of a workspace is the inverse of the reached share, of at least half a
-/// point. Infeasible designs are not errors; their values are
+/// W = sum_i w_i at the start. Measures of motions are multiplied by the weights of these before the largest is taken or all
+/// are added, those in constraints only where they are added: other constraints hold for every motion as they are. Robots are
+/// loaded with the payload of each motion; the mass of a robot is that without. The measure of a workspace is the inverse of
+/// the reached share, of at least half a point. Infeasible designs are not errors; their values are
 ///     f = 2 W + W mean_p min(1, 10 g_p)      some posture p of the start's motions is infeasible                   (2)
 ///     f = 1.5 W + 0.5 W s                    all are feasible, but a motion failed                                 (3)
 ///     f = 1.5 W + 0.5 W / (n + 1) V / (1 + V)        all n motions are made, but constraints are violated          (4)

@@ -292,34 +292,57 @@ MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dof
   return out;
 }
 
-MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
-                                const std::vector<MotorSlopes>& motions, const RobotSlopes& robot) {
-  if (measure == Measure::Mass) return {VectorXd::Constant(1, robot.mass), robot.dmass.transpose()};
-  const size_t variables = motions.front().du.size(), pairs = motors.size() * motions.size();
+void append(const MeasurePieces& pieces, MeasurePieces& all) {
+  const Eigen::Index old = all.values.size(), size = pieces.values.size();
+  if (size == 0) return;
+  all.values.conservativeResize(old + size);
+  all.values.tail(size) = pieces.values;
+  all.gradients.conservativeResize(old + size, pieces.gradients.cols());
+  all.gradients.bottomRows(size) = pieces.gradients;
+}
+
+namespace {
+
+// Of one motion.
+MeasurePieces calcMotionPieces(Measure measure, const std::vector<int>& motors, const MotorSlopes& motion,
+                               const RobotSlopes& robot) {
+  if (measure == Measure::Cost) return {VectorXd::Constant(1, motion.cost), motion.dcost.transpose()};
   const bool peaks = measure == Measure::PeakTorque || measure == Measure::Envelope;
-  const bool sum = measure == Measure::Energy || measure == Measure::ElectricalEnergy;
   const int stretches = peaks ? kStretches : 1;
-  MeasurePieces out = makePieces(sum ? 1 : pairs * stretches, variables);
+  MeasurePieces out = makePieces(isSum(measure) ? 1 : motors.size() * static_cast<size_t>(stretches), motion.du.size());
   Eigen::Index piece = 0;
-  for (const MotorSlopes& motion : motions)
-    for (int m : motors) {
-      if (measure == Measure::Energy) addEnergy(motion, m, out);
-      if (measure == Measure::ElectricalEnergy) addElectricalEnergy(motion, m, robot, out);
-      if (measure == Measure::RmsTorque) addRms(motion, m, piece, out);
-      if (measure == Measure::Heat) addHeat(motion, m, robot, piece, out);
-      for (int s = 0; s < stretches; ++s, ++piece) {
-        if (measure == Measure::PeakTorque) addPeak(motion, m, s, piece, out);
-        if (measure == Measure::Envelope) addEnvelope(motion, m, s, robot, piece, out);
-      }
+  for (int m : motors) {
+    if (measure == Measure::Energy) addEnergy(motion, m, out);
+    if (measure == Measure::ElectricalEnergy) addElectricalEnergy(motion, m, robot, out);
+    if (measure == Measure::RmsTorque) addRms(motion, m, piece, out);
+    if (measure == Measure::Heat) addHeat(motion, m, robot, piece, out);
+    for (int s = 0; s < stretches; ++s, ++piece) {
+      if (measure == Measure::PeakTorque) addPeak(motion, m, s, piece, out);
+      if (measure == Measure::Envelope) addEnvelope(motion, m, s, robot, piece, out);
     }
+  }
   return out;
 }
 
-MeasurePieces calcCostPiece(const std::vector<MotorSlopes>& motions) {
-  MeasurePieces out = makePieces(1, motions.front().du.size());
-  for (const MotorSlopes& motion : motions) {
-    out.values[0] += motion.cost;
-    out.gradients.row(0) += motion.dcost.transpose();
+}  // namespace
+
+MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
+                                const std::vector<MotorSlopes>& motions, const std::vector<double>& weights,
+                                const RobotSlopes& robot) {
+  if (measure == Measure::Mass) return {VectorXd::Constant(1, robot.mass), robot.dmass.transpose()};
+  MeasurePieces out;
+  if (isSum(measure)) out = makePieces(1, motions.front().du.size());
+  for (size_t i = 0; i < motions.size(); ++i) {
+    MeasurePieces pieces = calcMotionPieces(measure, motors, motions[i], robot);
+    const double weight = weights.empty() ? 1 : weights[i];
+    pieces.values *= weight;
+    pieces.gradients *= weight;
+    if (!isSum(measure)) {
+      append(pieces, out);
+      continue;
+    }
+    out.values += pieces.values;
+    out.gradients += pieces.gradients;
   }
   return out;
 }
@@ -339,45 +362,35 @@ std::vector<std::pair<Eigen::Index, Eigen::Index>> listLeast(const MatrixXd& val
 
 namespace {
 
-// Pieces out of entries of matrices and of their derivatives.
-struct PieceList {
-  std::vector<double> values;
-  std::vector<VectorXd> gradients;
-
-  template <typename Matrix>
-  void add(const Matrix& value, const std::vector<Matrix>& derivatives, Eigen::Index row, Eigen::Index column) {
-    values.push_back(value(row, column));
-    gradients.emplace_back(static_cast<Eigen::Index>(derivatives.size()));
-    for (size_t i = 0; i < derivatives.size(); ++i)
-      gradients.back()[static_cast<Eigen::Index>(i)] = derivatives[i](row, column);
-  }
-  MeasurePieces take(size_t variables) const {
-    MeasurePieces out = makePieces(values.size(), variables);
-    for (size_t piece = 0; piece < values.size(); ++piece) {
-      out.values[static_cast<Eigen::Index>(piece)] = values[piece];
-      out.gradients.row(static_cast<Eigen::Index>(piece)) = gradients[piece].transpose();
-    }
-    return out;
-  }
-};
+// One entry of a matrix and of its derivatives.
+template <typename Matrix>
+MeasurePieces getPiece(const Matrix& value, const std::vector<Matrix>& derivatives, Eigen::Index row,
+                       Eigen::Index column) {
+  MeasurePieces out = makePieces(1, derivatives.size());
+  out.values[0] = value(row, column);
+  for (size_t i = 0; i < derivatives.size(); ++i)
+    out.gradients(0, static_cast<Eigen::Index>(i)) = derivatives[i](row, column);
+  return out;
+}
 
 }  // namespace
 
 MeasurePieces calcMarginPieces(double least, const std::vector<MotorSlopes>& motions) {
-  PieceList list;
+  MeasurePieces out = makePieces(0, motions.front().du.size());
   for (const MotorSlopes& motion : motions)
-    for (const auto& [cluster, node] : listLeast(motion.margin)) list.add(motion.margin, motion.dmargin, cluster, node);
-  MeasurePieces out = list.take(motions.front().du.size());
+    for (const auto& [cluster, node] : listLeast(motion.margin))
+      append(getPiece(motion.margin, motion.dmargin, cluster, node), out);
   out.values = least * least - out.values.array();
   out.gradients *= -1;
   return out;
 }
 
 MeasurePieces calcDistancePieces(const std::vector<MotorSlopes>& motions) {
-  PieceList list;
+  MeasurePieces out = makePieces(0, motions.front().du.size());
   for (const MotorSlopes& motion : motions)
-    for (const auto& [row, node] : listLeast(motion.distance)) list.add(motion.distance, motion.ddistance, row, node);
-  return list.take(motions.front().du.size());
+    for (const auto& [row, node] : listLeast(motion.distance))
+      append(getPiece(motion.distance, motion.ddistance, row, node), out);
+  return out;
 }
 
 }  // namespace bielle

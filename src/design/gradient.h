@@ -56,13 +56,15 @@ MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dof
                             const LiftResult& lifted, const std::vector<ModelVariation>& variations,
                             bool distances = false);
 
-/// Eqs. (1) to (3) over the named motors and all motions, and the mass: the number of pieces depends only on these.
-/// \param robot  without drives: the default of all motors
-MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
-                                const std::vector<MotorSlopes>& motions, const RobotSlopes& robot = {});
+/// Adds pieces to others by the same variables.
+void append(const MeasurePieces& pieces, MeasurePieces& all);
 
-/// The sum of the costs of all motions, one piece.
-MeasurePieces calcCostPiece(const std::vector<MotorSlopes>& motions);
+/// Eqs. (1) to (3) over the named motors and all motions, the cost of all motions, and the mass: the number of pieces depends
+/// only on these.
+/// \param weights  of the motions, as of getMeasure()   \param robot  without drives: the default of all motors
+MeasurePieces calcMeasurePieces(Measure measure, const std::vector<int>& motors,
+                                const std::vector<MotorSlopes>& motions, const std::vector<double>& weights = {},
+                                const RobotSlopes& robot = {});
 
 /// The least entry of every row in every stretch of the columns, the first of equal ones: row, column. Of motions with fewer nodes
 /// than stretches some have none.

@@ -169,24 +169,41 @@ const char* getName(Measure measure) {
   return "conditioning";
 }
 
-double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions) {
+bool isSum(Measure measure) {
+  return measure == Measure::Energy || measure == Measure::ElectricalEnergy || measure == Measure::Cost;
+}
+
+namespace {
+
+// Of one motion.
+double getMeasure(Measure measure, const std::vector<int>& motors, const MotionMeasures& motion) {
+  if (measure == Measure::Cost) return motion.cost;
+  double value = measure == Measure::Conditioning ? motion.conditioning : 0;
+  for (int m : motors) {
+    const MotorMeasures& motor = motion.motors[static_cast<size_t>(m)];
+    if (measure == Measure::PeakTorque) value = std::max(value, motor.peak_torque);
+    if (measure == Measure::RmsTorque) value = std::max(value, motor.rms_torque);
+    if (measure == Measure::Envelope) value = std::max(value, motor.envelope);
+    if (measure == Measure::Heat) value = std::max(value, motor.heat);
+    if (measure == Measure::Energy) value += motor.energy;
+    if (measure == Measure::ElectricalEnergy) value += motor.electrical_energy;
+  }
+  return value;
+}
+
+}  // namespace
+
+double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions,
+                  const std::vector<double>& weights) {
   double value = 0;
   if (measure == Measure::Margin) value = 1;
   if (measure == Measure::Distance) value = std::numeric_limits<double>::infinity();
-  for (const MotionMeasures& motion : motions) {
-    if (measure == Measure::Margin) value = std::min(value, motion.margin);
-    if (measure == Measure::Distance) value = std::min(value, motion.distance);
-    if (measure == Measure::Cost) value += motion.cost;
-    if (measure == Measure::Conditioning) value = std::max(value, motion.conditioning);
-    for (int m : motors) {
-      const MotorMeasures& motor = motion.motors[m];
-      if (measure == Measure::PeakTorque) value = std::max(value, motor.peak_torque);
-      if (measure == Measure::RmsTorque) value = std::max(value, motor.rms_torque);
-      if (measure == Measure::Envelope) value = std::max(value, motor.envelope);
-      if (measure == Measure::Heat) value = std::max(value, motor.heat);
-      if (measure == Measure::Energy) value += motor.energy;
-      if (measure == Measure::ElectricalEnergy) value += motor.electrical_energy;
-    }
+  for (size_t i = 0; i < motions.size(); ++i) {
+    if (measure == Measure::Margin) value = std::min(value, motions[i].margin);
+    if (measure == Measure::Distance) value = std::min(value, motions[i].distance);
+    if (measure == Measure::Margin || measure == Measure::Distance) continue;
+    const double of_motion = (weights.empty() ? 1 : weights[i]) * getMeasure(measure, motors, motions[i]);
+    value = isSum(measure) ? value + of_motion : std::max(value, of_motion);
   }
   return value;
 }

@@ -92,10 +92,14 @@ void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, 
 
 const char* getName(Measure measure);
 bool isOfMotors(Measure measure);
+/// Whether that of all motions is the sum over them, as of energies and costs.
+bool isSum(Measure measure);
 
 /// The largest peak torque, rms torque or conditioning over the named motors and all motions, or the sum of an energy
 /// over them; the sum of the costs of all motions; the largest share of a limit; the least margin or distance. Workspace
 /// (workspace.h) and mass do not depend on motions.
-double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions);
+/// \param weights  by which the measure of each motion is multiplied before; empty: 1. Margins and distances have none
+double getMeasure(Measure measure, const std::vector<int>& motors, const std::vector<MotionMeasures>& motions,
+                  const std::vector<double>& weights = {});
 
 }  // namespace bielle

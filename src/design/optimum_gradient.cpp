@@ -1,6 +1,7 @@
 #include "design/optimum_gradient.h"
 
 #include <cmath>
+#include <map>
 #include <stdexcept>
 
 #include "bielle/design/cost_gradient.h"
@@ -131,6 +132,43 @@ class OptimumSlopes {
   std::vector<int> pairs_;                                                  // the nearest at every node
 };
 
+// Motions of robots a little beside one another.
+class NeighbourMotions {
+ public:
+  // One of them, loaded as the motions ask for.
+  struct Robot {
+    explicit Robot(Model robot) : model(std::move(robot)) {}
+    struct Loaded {
+      Model model;
+      VectorXd posture;
+    };
+    Model model;
+    std::map<size_t, Loaded> loaded;  // by the first motion with that payload
+  };
+
+  explicit NeighbourMotions(const std::vector<DesignMotion>& motions)
+      : motions_(motions), groups_(groupByPayload(motions)), plans_(motions.size()), postures_(motions.size()) {}
+
+  // It refers to the robot.
+  Motion plan(size_t m, Robot& robot) {
+    const size_t group = groups_[m];
+    auto found = robot.loaded.find(group);
+    if (found == robot.loaded.end()) {
+      Model model = addPayload(robot.model, motions_[m].payload);
+      const NeighbourPlans::Use use(postures_[group]);
+      VectorXd posture = makeStandingPosture(model);
+      found = robot.loaded.emplace(group, Robot::Loaded{std::move(model), std::move(posture)}).first;
+    }
+    const NeighbourPlans::Use use(plans_[m]);
+    return makeDesignMotion(found->second.model, motions_[m], found->second.posture);
+  }
+
+ private:
+  const std::vector<DesignMotion>& motions_;
+  std::vector<size_t> groups_;
+  std::vector<NeighbourPlans> plans_, postures_;  // of each motion; of each group, by its first motion
+};
+
 }  // namespace
 
 std::vector<MotorSlopes> calcOptimumSlopes(const Parametrization& robot, const VectorXd& x,
@@ -145,24 +183,14 @@ std::vector<MotorSlopes> calcOptimumSlopes(const Parametrization& robot, const V
     std::vector<std::unique_ptr<OptimumSlopes>> slopes;
     for (const MotionOutcome& outcome : outcomes)
       slopes.push_back(std::make_unique<OptimumSlopes>(outcome, x.size(), asked));
-    std::vector<NeighbourPlans> plans(motions.size());
-    NeighbourPlans postures;
-    const auto stand = [&](const Model& model) {
-      const NeighbourPlans::Use use(postures);
-      return makeStandingPosture(model);
-    };
-    const auto plan = [&](size_t m, const Model& model, const VectorXd& posture) {
-      const NeighbourPlans::Use use(plans[m]);
-      return makeDesignMotion(model, motions[m], posture);
-    };
+    NeighbourMotions neighbours(motions);
     for (Eigen::Index i : robot.listContinuous()) {
       const double h = kDesignStep * (robot.upper()[i] - robot.lower()[i]);
       const VectorXd dx = h * VectorXd::Unit(x.size(), i);
-      const Model to = robot.make(x + dx), from = robot.make(x - dx);
-      const VectorXd posture_to = stand(to), posture_from = stand(from);
+      NeighbourMotions::Robot to(robot.make(x + dx)), from(robot.make(x - dx));
       for (size_t m = 0; m < motions.size(); ++m) {
-        const Motion ahead = plan(m, to, posture_to);
-        const Motion behind = plan(m, from, posture_from);
+        const Motion ahead = neighbours.plan(m, to);
+        const Motion behind = neighbours.plan(m, from);
         if (slopes[m]->add(ahead, behind, h, i)) continue;
         return fail(" along " + robot.variables()[static_cast<size_t>(i)].name + ": " + motions[m].name +
                     " cannot be followed");

@@ -141,7 +141,7 @@ std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec,
       << (evaluator.constraints().empty() ? "" : ", " + std::to_string(run.counts[3]) + " that violate constraints")
       << ".\n";
   for (size_t i = 0; i < run.evaluation.motions.size(); ++i)
-    writeMotion(out, robot.startModel(), robot.make(run.best), evaluator.motions()[i].name,
+    writeMotion(out, robot.startModel(), robot.make(run.best), describeMotion(evaluator.motions()[i]),
                 evaluator.start().motions[i], run.evaluation.motions[i]);
   return out.str();
 }

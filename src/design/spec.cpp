@@ -346,7 +346,7 @@ void readRoot(const Entry& root, DesignSpec& spec) {
   if (!architecture || variables)
     for (const Entry& item : require(fields, "variables", root).getList())
       spec.variables.push_back(readVariable(item, spec, find(fields, "motor_catalogue")));
-  if (const Entry* motions = find(fields, "motions")) spec.motions = readMotionSpecs(*motions);
+  if (const Entry* motions = find(fields, "motions")) spec.motions = readMotionSpecs(*motions, true);
   if (const Entry* drives = find(fields, "drives")) spec.drives = readDrives(*drives);
   if (const Entry* mode = find(fields, "mode"))
     spec.mode = readChoice<MotionMode>(*mode, {MotionMode::Reoptimized, MotionMode::Kept});

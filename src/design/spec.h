@@ -23,6 +23,8 @@
 /// motor_catalogue: motors.yaml   # or a list of them, relative to this file; searched first
 /// motions:
 ///   - {motion: squat, set: {depth: 0.6}}
+///   - {motion: walk, weight: 0.5, payload: 5, payload_at: [0.1, 0, 0.2]}    # share in objectives and sums; kg fixed to the
+///                                # trunk, in its frame (m), at its centre of mass if not given
 /// mode: reoptimized              # or kept, then with
 /// margin: 0.1                    # from dead points: least motion of a joint in a unit motion of its linkage; of motions
 ///                                # that are kept, or in searches with gradients of those of the start
@@ -56,6 +58,7 @@
 #include "bielle/design/search.h"
 #include "design/evaluation.h"
 #include "design/front_search.h"
+#include "model/payload.h"
 
 namespace bielle {
 
@@ -70,6 +73,8 @@ struct RobotSpec {
 struct MotionSpec {
   std::string motion;
   Settings settings;
+  double weight = 1;     ///< DesignMotion
+  Payload payload = {};  ///< likewise
 };
 
 /// Several objectives kept apart.

@@ -36,15 +36,36 @@ RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map) {
   return spec;
 }
 
-std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry) {
+namespace {
+
+void readShare(const YamlFields& fields, MotionSpec& motion) {
+  const YamlEntry *weight = find(fields, "weight"), *payload = find(fields, "payload"),
+                  *place = find(fields, "payload_at");
+  if (weight) motion.weight = weight->getNumber();
+  if (!(motion.weight >= 0)) weight->fail("it is negative", "give its share in objectives, 0 or more");
+  if (payload) motion.payload.mass = payload->getNumber();
+  if (!(motion.payload.mass >= 0)) payload->fail("it is negative", "give the kilograms that the trunk carries");
+  if (place && !payload) place->fail("there is no payload", "give `payload` in kg, or remove it");
+  if (place) motion.payload.at = place->getVector3();
+}
+
+}  // namespace
+
+std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry, bool weighed) {
   std::vector<MotionSpec> motions;
+  std::vector<std::string> keys = {"motion", "set"};
+  if (weighed) keys.insert(keys.end(), {"weight", "payload", "payload_at"});
   for (const YamlEntry& item : entry.getList()) {
-    const YamlFields fields = item.getFields({"motion", "set"});
+    const YamlFields fields = item.getFields(keys);
     MotionSpec motion;
     motion.motion = require(fields, "motion", item).getText();
     if (const YamlEntry* set = find(fields, "set")) motion.settings = readSettings(*set);
+    if (weighed) readShare(fields, motion);
     motions.push_back(motion);
   }
+  const auto counts = [](const MotionSpec& motion) { return motion.weight > 0; };
+  if (!motions.empty() && std::none_of(motions.begin(), motions.end(), counts))
+    entry.fail("no motion has a weight", "give one a positive `weight`");
   return motions;
 }
 

@@ -14,8 +14,8 @@ Settings readSettings(const YamlEntry& entry);
 // The keys `robot` or `generator` and `set` of a map.
 RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map);
 
-// A list of {motion: NAME, set: {...}}.
-std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry);
+// A list of {motion: NAME, set: {...}}. \param weighed  also with `weight`, `payload` and `payload_at`
+std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry, bool weighed = false);
 
 // \param file  the file that names the robot: paths are relative to it
 // \throws ModelError when there is no such robot, generator or parameter

@@ -1,5 +1,5 @@
-// Derivatives of a parametrized robot with respect to its numbers.
-#include "bielle/design/parametrization.h"
+#include "design/variations.h"
+
 #include "bielle/model/error.h"
 
 namespace bielle {
@@ -63,13 +63,14 @@ void addChange(const Model& from, const Model& to, double weight, ModelVariation
 
 }  // namespace
 
-std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x) {
-  const Model here = robot.make(x);
+std::vector<ModelVariation> calcVariations(const Parametrization& robot, const VectorXd& x,
+                                           const std::function<Model(const VectorXd& x)>& make) {
+  const Model here = make(x);
   std::vector<ModelVariation> out(x.size(), ModelVariation(here));
   for (Eigen::Index i : robot.listContinuous()) {
     const double h = kStep * (robot.upper()[i] - robot.lower()[i]);
     for (const auto& [steps, weight] : {std::pair{-2, 1.0}, {-1, -8.0}, {1, 8.0}, {2, -1.0}}) {
-      const Model there = robot.make(x + steps * h * VectorXd::Unit(x.size(), i));
+      const Model there = make(x + steps * h * VectorXd::Unit(x.size(), i));
       if (!isSameButForPlaces(here, there))
         throw ModelError(here.name(), "variable '" + robot.variables()[i].name + "'",
                          "it changes an axis, gain or gravity: motor torques have no gradient along it",
@@ -78,6 +79,10 @@ std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, c
     }
   }
   return out;
+}
+
+std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x) {
+  return calcVariations(robot, x, [&robot](const VectorXd& at) { return robot.make(at); });
 }
 
 }  // namespace bielle

@@ -1,0 +1,59 @@
+#pragma once
+// What a DesignEvaluator knows, for the files that it is made of: evaluation.cpp and, with gradients, sloped_evaluation.cpp.
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "design/architecture_start.h"
+#include "design/evaluation.h"
+
+namespace bielle {
+
+struct DesignEvaluator::Data {
+  struct Base {
+    std::once_flag made;
+    std::optional<ArchitectureStart> start;
+  };
+
+  const Parametrization& robot;
+  std::vector<DesignMotion> motions;
+  std::vector<ObjectiveTerm> objective;
+  EvaluationOptions options;
+  double weight = 0;  // W, of the objectives
+  std::set<Measure> asked;
+  Evaluation start;
+  std::mutex mutex;
+  std::map<std::vector<int>, std::unique_ptr<Base>> bases;  // by architecture
+
+  // Whether motions of the start design are transferred to other designs.
+  bool mustKeep() const { return options.mode == MotionMode::Kept || options.margin > EvaluationOptions().margin; }
+  void checkSpec();
+  void solveStart();
+  // Of the motions, in an objective and in a constraint on a measure.
+  std::vector<double> listWeights() const;
+  std::vector<double> listWeights(const DesignConstraint& constraint) const;
+  // The start of the architecture of x, made if need be. Called by several threads.
+  const ArchitectureStart& getBase(const VectorXd& x);
+  void makeMotions(const ArchitectureStart& base, const Model& model, Evaluation& out,
+                   std::vector<MotionOutcome>* outcomes = nullptr) const;
+  // \param made  the robot without payload, if it is asked for
+  Evaluation evaluate(const VectorXd& x, std::vector<MotionOutcome>* outcomes = nullptr,
+                      std::optional<Model>* made = nullptr);
+  std::vector<MotorSlopes> calcKeptSlopes(const ArchitectureStart& base, const VectorXd& x,
+                                          const std::vector<MotionOutcome>& outcomes) const;
+  MeasurePieces calcStartMargins(const ArchitectureStart& base, const Model& model, const VectorXd& x) const;
+  MeasurePieces calcPieces(size_t i, const ArchitectureStart& base, const std::vector<MotorSlopes>& slopes,
+                           const RobotSlopes& robot_slopes) const;
+  MeasurePieces calcLimits(const ArchitectureStart& base, const std::vector<MotorSlopes>& slopes,
+                           const RobotSlopes& robot_slopes) const;
+  bool checkPostures(const ArchitectureStart& base, const Model& model, Evaluation& out) const;
+  double calcTerm(size_t i, const ArchitectureStart& base, const Model& model,
+                  const std::vector<MotionMeasures>& measures) const;
+  void checkConstraints(const ArchitectureStart& base, const Model& model, Evaluation& out) const;
+  void sumUp(const ArchitectureStart& base, const Model& model, Evaluation& out) const;
+};
+
+}  // namespace bielle
