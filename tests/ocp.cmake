@@ -4,7 +4,7 @@ bielle_test(ocp_contract SOURCES test_ocp_contract.cpp mechanisms.cpp LIBS biell
 # The test counts allocations: malloc, and operator new(size_t) by its mangled name.
 target_link_options(test_ocp_contract PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 bielle_test(lanes SOURCES test_lanes.cpp LIBS bielle_motion)
-bielle_test(reduced SOURCES test_reduced.cpp mechanisms.cpp LIBS bielle_motion)
+bielle_test(reduced SOURCES test_reduced.cpp mechanisms.cpp LIBS bielle_motion bielle_robots)
 bielle_test(path_constraints SOURCES test_path_constraints.cpp mechanisms.cpp LIBS bielle_motion)
 bielle_test(timings SOURCES test_timings.cpp mechanisms.cpp LIBS bielle_motion)
 target_link_options(test_timings PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)

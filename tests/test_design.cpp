@@ -389,6 +389,33 @@ TEST_CASE("design: architectures and motors are chosen, with what belongs to the
   CHECK(best.motors()[best.findMotor("motor_knee_left")].drive.torque_constant > 0);
 }
 
+TEST_CASE("design: hips are chosen by the name of the choice alone, and motors of either are found") {
+  const RobotDirectory directory;
+  const DesignSpec spec = readDesignSpec(directory.write("spec.yaml", R"(generator: leg_biped
+architecture: [three_rrs, serial_hip, belt]
+variables: [{name: gear, ratio: "*hip*", bounds: [1, 3]}]
+objective: [{measure: mass}]
+)"));
+  const Parametrization robot = makeParametrization(spec);
+  REQUIRE(robot.variables()[0].choices == std::vector<std::string>{"three_rrs", "serial"});
+  CHECK(robot.start()[0] == 1);  // serial, as the generator's
+  const std::vector<VectorXd> all = robot.listCombinations();
+  REQUIRE(all.size() == 2);
+  for (const VectorXd& x : all) {
+    VectorXd geared = x;
+    geared[1] = 2;
+    const Model model = robot.make(geared);
+    const bool parallel = x[0] == 0;
+    CHECK((model.findMotor("motor_hip3_left") >= 0) == parallel);
+    CHECK((model.findMotor("hipz_left") >= 0) == !parallel);
+    CHECK(model.findJoint("pulley_knee_left") < 0);
+    CHECK(model.findMotor("motor_knee_left") >= 0);
+    CHECK(model.mass() == Approx(robot.startModel().mass()));
+    const Motor& motor = model.motors()[model.findMotor(parallel ? "motor_hip3_left" : "hipz_left")];
+    CHECK(motor.armature == Approx(4 * 1e-3));
+  }
+}
+
 TEST_CASE("design: choices and constraints that cannot be are refused with their lines") {
   const RobotDirectory directory;
   directory.write("own.yaml", kOwnMotors);
@@ -409,6 +436,8 @@ TEST_CASE("design: choices and constraints that cannot be are refused with their
   };
   check("belt_knee,", "chain_knee,", "there is no part 'chain_knee'");
   check("belt_knee,", "belt_knee, belt_knee,", "there twice");
+  check("belt_knee,", "belt, belt_knee,", "there twice");
+  check("belt_knee,", "serial,", "there is no part 'serial'; use some of serial_knee");  // of which joint?
   check("leg_biped\nset: {ankle: differential, motor_mass: 0.7}", "cleobot", "does not put parts together");
   check("generator: leg_biped\nset: {ankle: differential, motor_mass: 0.7}", "robot: bipetto", "one architecture");
   check("ankle: differential", "ankle: belt", "none of its choices");

@@ -11,6 +11,7 @@
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
+#include "bielle/motion/walk.h"
 #include "design/run.h"
 #include "robot_directory.h"
 #include "run_command.h"
@@ -198,6 +199,29 @@ TEST_CASE("design constraints: gradients with weights and payloads of motions, a
       CHECK(all.constraints[i] == Approx(std::max(a.constraints[i], b.constraints[i])).epsilon(1e-12));
     CHECK(all.constraints[5] == Approx(std::min(a.constraints[5], b.constraints[5])).epsilon(1e-12));
     CHECK((all.terms[1] == robot.startModel().mass() && all.constraints[2] == all.terms[1]));
+  }
+}
+
+TEST_CASE("design constraints: gradients by the dimensions of a 3-RRS hip, whose closures have redundant rows") {
+  const RobotDirectory directory;
+  const DesignSpec spec = readDesignSpec(directory.write("spec.yaml", R"(generator: leg_biped
+set: {hip: three_rrs, knee: belt}
+variables:
+  - {name: middle, parameter: hip_middle, unit: rad, bounds: [-1.2, 0]}
+  - {name: radius, parameter: hip_radius, bounds: [0.05, 0.09]}
+motions: [{motion: walk}]
+objective: [{measure: electrical_energy, motors: ["*hip*"]}, {measure: energy, motors: ["*hip1*", "*hip3*"]}]
+constraints: [{measure: rms_torque, motors: ["*hip*"], at_most: 10}]
+)"));
+  const Parametrization robot = makeParametrization(spec);
+  WalkOptions options;
+  options.speed = 0.4, options.steps = 2;
+  const DesignMotion walk = {
+      "walk", [options](const Model& model, const VectorXd& q0) { return planWalk(model, options, q0); }};
+  for (const MotionMode mode : {MotionMode::Kept, MotionMode::Reoptimized}) {
+    CAPTURE(getName(mode));
+    checkSlopes(calcSlopes(DesignEvaluator(robot, {walk}, spec.objective, makeExactOptions(mode, spec.constraints))),
+                getTolerance(mode));
   }
 }
 

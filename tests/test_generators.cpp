@@ -356,7 +356,7 @@ TEST_CASE("humanoid: fingers mimic the one that has the motor, tips stay paralle
     CHECK((getAttitude(tip) - getAttitude("elbow_left")).norm() < 1e-9);
 }
 
-TEST_CASE("leg biped: nine combinations stand, move in 18 ways, and weigh what their parts add") {
+TEST_CASE("leg biped: eighteen combinations stand, move in 18 ways, and weigh what their parts add") {
   // Per leg. Knee: a pulley; or crank and rod with their balls, the arm. Ankle: two pulleys; or two chains, and a heel of 0.3
   // of the foot's mass either way. Rods are as long as what they are parallel to.
   const double chain = 0.5 * 0.05 + 0.03 + 0.02, of_knee[] = {0, 0.1, chain + 0.5 * (0.22 + 0.05)};
@@ -369,19 +369,22 @@ TEST_CASE("leg biped: nine combinations stand, move in 18 ways, and weigh what t
                       }())
                           .mass();
   for (int knee = 0; knee < 3; ++knee)
-    for (int ankle = 0; ankle < 3; ++ankle) {
-      CAPTURE(knee, ankle);
-      LegBipedParameters p;
-      p.knee = knee, p.ankle = ankle;
-      const Model model = makeLegBiped(p);
-      CHECK(model.mass() - bare == Approx(2 * (of_knee[knee] + of_ankle[ankle])).margin(1e-12));
-      CHECK(model.nu() == 12);
-      const AssemblyResult standing = assembleReference(model, "half_sitting");
-      REQUIRE(standing.status == AssemblyStatus::Closed);
-      const Mobility mobility = calcMobility(model, standing.q);
-      CHECK(mobility.rows == 2 * (rows_of_knee[knee] + rows_of_ankle[ankle]));
-      CHECK(mobility.mobility == 18);
-    }
+    for (int ankle = 0; ankle < 3; ++ankle)
+      for (int hip = 0; hip < 2; ++hip) {
+        CAPTURE(knee, ankle, hip);
+        LegBipedParameters p;
+        p.knee = knee, p.ankle = ankle, p.hip = hip;
+        const Model model = makeLegBiped(p);
+        CHECK(model.mass() - bare == Approx(2 * (of_knee[knee] + of_ankle[ankle])).margin(1e-12));
+        CHECK(model.nu() == 12);
+        const AssemblyResult standing = assembleReference(model, "half_sitting");
+        REQUIRE(standing.status == AssemblyStatus::Closed);
+        const Mobility mobility = calcMobility(model, standing.q);
+        const int others = rows_of_knee[knee] + rows_of_ankle[ankle];
+        CHECK(mobility.rows == 2 * (others + 9 * hip));
+        CHECK(mobility.rank == 2 * (others + 6 * hip));
+        CHECK(mobility.mobility == 18);
+      }
   // The four-bar as it is meant: square at the middle angle, where it gears by arm over crank; a parallelogram turns with the knee.
   const auto close = [](double crank, double angle) {  // to knee, motor
     LegBipedParameters p;
@@ -414,6 +417,60 @@ TEST_CASE("leg biped: nine combinations stand, move in 18 ways, and weigh what t
       std::find_if(parameters.begin(), parameters.end(), [](const auto& q) { return q.name == "ankle"; });
   CHECK(findChoice(*found, "rsu") == 2);
   CHECK_THROWS_WITH(findChoice(*found, "belt"), Catch::Contains("serial, differential, rsu"));
+}
+
+TEST_CASE("leg biped: motors of a 3-RRS hip by spherical trigonometry, one to one in its middle posture") {
+  LegBipedParameters p;
+  p.hip = 1, p.knee = p.ankle = 0;
+  const Model model = makeLegBiped(p);
+  const auto getIndex = [&](const std::string& joint) { return model.joints()[model.findJoint(joint)].idx_q; };
+  const char* const hinges[] = {"hipz", "hipx", "hipy"};
+  // Near yaw, roll and pitch, along the way from straight legs.
+  const auto close = [&](const Vector3d& hip, const std::string& side) {
+    VectorXd q = model.makeNeutral();
+    for (int step = 1; step <= 40; ++step) {
+      for (int i = 0; i < 3; ++i) q[getIndex(hinges[i] + side)] = step * hip[i] / 40;
+      const AssemblyResult result = closeConfiguration(model, q);
+      REQUIRE(result.status == AssemblyStatus::Closed);
+      q = result.q;
+    }
+    return q;
+  };
+  for (const double s : {1.0, -1.0}) {
+    const std::string side = s > 0 ? "_left" : "_right";
+    const Vector3d u[] = {{-1, 0, 0}, {0, -s, 0}, {0, 0, 1}}, w[] = {{0, 0, 1}, {1, 0, 0}, {0, -s, 0}};
+    const Vector3d v[] = {{0, s, 0}, {0, 0, -1}, {std::cos(p.hip_middle), 0, std::sin(p.hip_middle)}};
+    // The axis of the hinge, turned about that of the motor, stays square to the ball: (w cos a + u x w sin a) . R v = 0.
+    const auto calcMotor = [&](int i, const Vector3d& hip) {
+      const Matrix3d R = (Eigen::AngleAxisd(hip[0], Vector3d::UnitZ()) * Eigen::AngleAxisd(hip[1], Vector3d::UnitX()) *
+                          Eigen::AngleAxisd(hip[2], Vector3d::UnitY()))
+                             .toRotationMatrix();
+      return std::atan(-w[i].dot(R * v[i]) / u[i].cross(w[i]).dot(R * v[i]));
+    };
+    for (const Vector3d& hip :
+         {Vector3d(0, 0, 0), {0, 0, -0.6}, {0.4, 0, -0.6}, {0, 0.3, -0.2}, {-0.3, 0.25, -1.2}, {0.2, -0.4, 0.3}}) {
+      CAPTURE(side, hip.transpose());
+      const VectorXd q = close(hip, side);
+      Vector3d closed;
+      for (int i = 0; i < 3; ++i) closed[i] = q[getIndex(hinges[i] + side)];
+      CHECK((closed - hip).norm() < 0.2);
+      for (int i = 0; i < 3; ++i)
+        CHECK(q[getIndex("motor_hip" + std::to_string(i + 1) + side)] == Approx(calcMotor(i, closed)).margin(1e-9));
+    }
+    // Turns of the motors per turn of roll, pitch and yaw.
+    const auto calcRatios = [&](double pitch) {
+      Matrix3d ratios;
+      const int axes[] = {1, 2, 0};
+      for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k) {
+          const Vector3d step = 1e-5 * Vector3d::Unit(axes[k]), hip(0, 0, pitch);
+          ratios(i, k) = (calcMotor(i, hip + step) - calcMotor(i, hip - step)) / 2e-5;
+        }
+      return ratios;
+    };
+    CHECK((calcRatios(p.hip_middle).cwiseAbs() - Matrix3d::Identity()).norm() < 1e-8);
+    CHECK(calcRatios(p.hip_middle + 1.5).cwiseAbs().maxCoeff() > 10);
+  }
 }
 
 TEST_CASE("Cleobot: its neutral configuration stands closed, the legs are mirror images") {

@@ -8,6 +8,7 @@
 #include "bielle/io/record.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/walk.h"
+#include "design/conditioning.h"
 #include "measure_steps.h"
 #include "model/text_file.h"
 #include "robot_directory.h"
@@ -133,6 +134,23 @@ TEST_CASE("belt biped: bielle solve squat, walk and jump converge and are checke
                 {{"walk"}, 0.98 * standing, 1.055 * standing},
                 {{"jump"}, 0.83 * standing, standing + 0.02 + rise}},
                70, 0.25, {0.015, 0.2});
+}
+
+TEST_CASE(
+    "leg biped with 3-RRS hips: bielle solve squat and walk converge, are checked and stay far from singularities") {
+  const RobotDirectory directory;
+  const std::string robot = directory.path() + "/parallel";
+  REQUIRE(run({"generate", "leg_biped", "--set", "hip=three_rrs", "-o", robot}).status == 0);
+  const Model model = loadRobot(robot).model;
+  for (const std::string motion : {"squat", "walk"}) {
+    CAPTURE(motion);
+    const MotionRecord record = solve(robot, {motion}, directory);
+    CHECK(record.gap.maxCoeff() < 1e-10);
+    CHECK(record.com.col(2).minCoeff() == Approx(motion == "squat" ? 0.7 * 0.395 : 0.393).margin(0.005));
+    CHECK(record.u.cwiseAbs().maxCoeff() < 50);
+    LinkageConditioning conditioning(model, record.q.row(0), LinkageSide::Joints);
+    for (int k = 0; k < record.q.rows(); ++k) CHECK(conditioning.calc(record.q.row(k)) < 1 / 0.2);
+  }
 }
 
 TEST_CASE("belt knee and differential ankle: bielle solve squat and walk converge and are checked") {

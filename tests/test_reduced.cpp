@@ -7,6 +7,7 @@
 #include "bielle/model/reader.h"
 #include "bielle/motion/motion.h"
 #include "bielle/ocp/robot_problem.h"
+#include "bielle/robots/generators.h"
 #include "check_derivative.h"
 #include "dynamics/reduction.h"
 #include "mechanisms.h"
@@ -225,6 +226,37 @@ TEST_CASE("reduced step: Bipetto, four-bar, five-bar, redundant planar four-bar"
   }
 }
 
+namespace {
+
+// Bipeds of every hip, knee and ankle.
+std::vector<Model> makeLegBipeds() {
+  std::vector<Model> models;
+  for (const double hip : {0, 1})
+    for (const double knee : {0, 1, 2})
+      for (const double ankle : {0, 1, 2}) {
+        const GeneratorRequest request = findGenerator("leg_biped").makeRequest();
+        setParameter(request.parameters, "hip", hip);
+        setParameter(request.parameters, "knee", knee);
+        setParameter(request.parameters, "ankle", ankle);
+        models.push_back(request.make());
+      }
+  return models;
+}
+
+}  // namespace
+
+TEST_CASE("reduced step: every combination of the parts of leg_biped") {
+  std::mt19937 rng(19);
+  for (const Model& model : makeLegBipeds()) {
+    CAPTURE(model.findMotor("motor_hip1_left"), model.findMotor("motor_knee_left"),
+            model.findMotor("motor_ankle1_left"));
+    const VectorXd standing = makeStandingPosture(model);
+    const State state = makeClosedState(model, standing, 0.05, 1, rng);
+    const State node = makeClosedState(model, state.q, 0.02, 1, rng);
+    checkLinearization(model, makeContactTargets(model, standing, {0, 1}, 500, 100), state, node.x(), rng);
+  }
+}
+
 TEST_CASE("impact stages, in both formulations: random mechanisms and Bipetto, with and without a gap") {
   std::mt19937 rng(14);
   std::vector<Mechanism> mechanisms;
@@ -259,19 +291,22 @@ TEST_CASE("impact stages, in both formulations: random mechanisms and Bipetto, w
 
 TEST_CASE("reduced accelerations are those of the full formulation") {
   std::mt19937 rng(13);
-  const Model model = loadRobot("bipetto").model;
-  const State state = makeClosedState(model, makeStandingPosture(model), 0.05, 1, rng);
-  const std::vector<ContactTarget> contacts = {{0, {}, 0, 0}, {1, {}, 0, 0}};
-  const double h = 1e-5;
-  std::vector<StageSpec> stages = makeStages(model, contacts, state.q, rng);
-  for (StageSpec& stage : stages) stage.dt = h;
-  const RobotProblem whole(model, state.q, state.v, std::move(stages), Formulation::Reduced);
-  ProblemProbe problem(whole);
-  const VectorXd u = randomVector(rng, model.nu(), 5);
-  VectorXd x_next(state.x().size()), a, lambda;
-  double cost = 0;
-  REQUIRE(problem.step(0, state.x(), u, x_next, cost) == StepStatus::Ok);
-  REQUIRE(problem.calcDynamics(0, state.x(), u, a, lambda) == StepStatus::Ok);
-  // The projection moves the velocity by O(h^2), the acceleration seen by O(h).
-  CHECK(((x_next.tail(model.nv()) - state.v) / h - a).norm() < 1e-2 * a.norm());
+  std::vector<Model> models = makeLegBipeds();
+  models.push_back(loadRobot("bipetto").model);
+  for (const Model& model : models) {
+    const State state = makeClosedState(model, makeStandingPosture(model), 0.05, 1, rng);
+    const std::vector<ContactTarget> contacts = {{0, {}, 0, 0}, {1, {}, 0, 0}};
+    const double h = 1e-5;
+    std::vector<StageSpec> stages = makeStages(model, contacts, state.q, rng);
+    for (StageSpec& stage : stages) stage.dt = h;
+    const RobotProblem whole(model, state.q, state.v, std::move(stages), Formulation::Reduced);
+    ProblemProbe problem(whole);
+    const VectorXd u = randomVector(rng, model.nu(), 5);
+    VectorXd x_next(state.x().size()), a, lambda;
+    double cost = 0;
+    REQUIRE(problem.step(0, state.x(), u, x_next, cost) == StepStatus::Ok);
+    REQUIRE(problem.calcDynamics(0, state.x(), u, a, lambda) == StepStatus::Ok);
+    // The projection moves the velocity by O(h^2), the acceleration seen by O(h).
+    CHECK(((x_next.tail(model.nv()) - state.v) / h - a).norm() < 1e-2 * a.norm());
+  }
 }

@@ -157,9 +157,13 @@ void readArchitecture(const Entry& entry, DesignSpec& spec) {
     entry.fail("a given robot has one architecture", "give a generator of parts, e.g. leg_biped");
   const std::vector<Parameter> parameters = findGenerator(spec.robot.generator).makeRequest().parameters;
   std::map<std::string, DesignVariable> parts;
+  std::map<std::string, int> count;  // of parameters with such a choice
   std::string known;
   for (const Parameter& p : parameters)
-    for (const std::string& choice : p.choices) known += (known.empty() ? "" : ", ") + choice + "_" + p.name;
+    for (const std::string& choice : p.choices) {
+      known += (known.empty() ? "" : ", ") + choice + "_" + p.name;
+      ++count[choice];
+    }
   if (known.empty())
     entry.fail("generator '" + spec.robot.generator + "' does not put parts together",
                "give one that does, e.g. leg_biped");
@@ -167,7 +171,7 @@ void readArchitecture(const Entry& entry, DesignSpec& spec) {
     bool found = false;
     for (const Parameter& p : parameters)
       for (const std::string& choice : p.choices) {
-        if (choice + "_" + p.name != item.getText()) continue;
+        if (choice + "_" + p.name != item.getText() && (choice != item.getText() || count[choice] > 1)) continue;
         found = true;
         DesignVariable& part = parts[p.name];
         if (std::find(part.choices.begin(), part.choices.end(), choice) != part.choices.end())

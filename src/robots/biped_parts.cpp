@@ -37,27 +37,46 @@ std::vector<Parameter> listSerialParameters(SerialBipedParameters& p) {
   };
 }
 
+Vector3d getHip(const BipedSide& side, const SerialBipedParameters& p) {
+  return side.mirror(0, p.hip_offset, -p.trunk_height);
+}
+
+namespace {
+
+// Height of the plate over the hips, in the trunk.
+double getPlate(const SerialBipedParameters& p) { return 0.055 - p.trunk_height; }
+
+}  // namespace
+
 std::vector<Solid> makeSerialTrunk(const SerialBipedParameters& p) {
-  const double plate = 0.055 - p.trunk_height;
-  std::vector<Solid> solids = {
-      makeBox({-0.01, 0, 0.10}, {0.13, 0.22, 0.20}, 0.72 * p.trunk_mass, colors::kShell),
-      makeBox({0, 0, plate + 0.03}, {0.10, 0.34, 0.02}, 0.2 * p.trunk_mass, colors::kSteel),
-      makeCylinder({0, 0, plate / 2}, kZ, 0.03, std::abs(plate) + 0.02, 0.03 * p.trunk_mass, colors::kSteel),
-      makeSphere({-0.01, 0, 0.26}, 0.055, 0.05 * p.trunk_mass, colors::kShell)};
-  for (double s : {1.0, -1.0}) solids.push_back(makeMotor({0, s * p.hip_offset, plate + 0.06}, kZ, p.motor_mass));
-  return solids;
+  const double plate = getPlate(p);
+  return {makeBox({-0.01, 0, 0.10}, {0.13, 0.22, 0.20}, 0.72 * p.trunk_mass, colors::kShell),
+          makeBox({0, 0, plate + 0.03}, {0.10, 0.34, 0.02}, 0.2 * p.trunk_mass, colors::kSteel),
+          makeCylinder({0, 0, plate / 2}, kZ, 0.03, std::abs(plate) + 0.02, 0.03 * p.trunk_mass, colors::kSteel),
+          makeSphere({-0.01, 0, 0.26}, 0.055, 0.05 * p.trunk_mass, colors::kShell)};
+}
+
+std::vector<Solid> makeHipYawMotors(const SerialBipedParameters& p) {
+  std::vector<Solid> motors;
+  for (double s : {1.0, -1.0}) motors.push_back(makeMotor({0, s * p.hip_offset, getPlate(p) + 0.06}, kZ, p.motor_mass));
+  return motors;
+}
+
+void addHipLinks(const BipedSide& side, const SerialBipedParameters& p, const std::vector<Solid>& yaw,
+                 const std::vector<Solid>& roll, ModelBuilder& builder) {
+  addSolidLink("hip_yaw" + side.name, "trunk", makeHip("hipz" + side.name, getHip(side, p), kZ, 10, 5), yaw, builder);
+  addSolidLink("hip_roll" + side.name, "hip_yaw" + side.name, makeHip("hipx" + side.name, kOrigin, kX, 3, 3), roll,
+               builder);
 }
 
 void addHip(const BipedSide& side, const SerialBipedParameters& p, ModelBuilder& builder) {
-  const Vector3d hip(0, side.s * p.hip_offset, -p.trunk_height), behind(-0.07, 0, 0), beside(0, 0.055 * side.s, 0);
-  addSolidLink("hip_yaw" + side.name, "trunk", makeHip("hipz" + side.name, hip, kZ, 10, 5),
-               {makeBox(behind / 2 + 0.045 * kZ, {0.09, 0.03, 0.02}, p.hip_link_mass, colors::kFrame),
-                makeMotor(behind, kX, p.motor_mass)},
-               builder);
-  addSolidLink("hip_roll" + side.name, "hip_yaw" + side.name, makeHip("hipx" + side.name, kOrigin, kX, 3, 3),
-               {makeBox(behind / 4 + beside / 2, {0.04, 0.06, 0.03}, p.hip_link_mass, colors::kFrame),
-                makeMotor(beside, kY, p.motor_mass)},
-               builder);
+  const Vector3d behind(-0.07, 0, 0), beside(0, 0.055 * side.s, 0);
+  addHipLinks(side, p,
+              {makeBox(behind / 2 + 0.045 * kZ, {0.09, 0.03, 0.02}, p.hip_link_mass, colors::kFrame),
+               makeMotor(behind, kX, p.motor_mass)},
+              {makeBox(behind / 4 + beside / 2, {0.04, 0.06, 0.03}, p.hip_link_mass, colors::kFrame),
+               makeMotor(beside, kY, p.motor_mass)},
+              builder);
 }
 
 std::vector<Solid> makeFoot(const SerialBipedParameters& p) {

@@ -56,9 +56,16 @@ void addTrunk(const std::vector<Solid>& solids, ModelBuilder& builder);
 // Frame and contact "foot_left", "foot_right" under the link of that foot.
 void addSole(const BipedSide& side, const Vector3d& middle, double length, double width, ModelBuilder& builder);
 
-// Trunk with the motors of hipz in its plate.
+// Centre of a hip, in the trunk.
+Vector3d getHip(const BipedSide& side, const SerialBipedParameters& p);
+// Trunk without the motors of the hips.
 std::vector<Solid> makeSerialTrunk(const SerialBipedParameters& p);
-// Links "hip_yaw_left", "hip_roll_left" with the motors of hipx and hipy in them.
+// Motors of hipz, in the plate of the trunk.
+std::vector<Solid> makeHipYawMotors(const SerialBipedParameters& p);
+// Joints hipz and hipx, without motors, and their links "hip_yaw_left", "hip_roll_left" out of these solids.
+void addHipLinks(const BipedSide& side, const SerialBipedParameters& p, const std::vector<Solid>& yaw,
+                 const std::vector<Solid>& roll, ModelBuilder& builder);
+// The same with the motors of hipx and hipy in the links.
 void addHip(const BipedSide& side, const SerialBipedParameters& p, ModelBuilder& builder);
 // Sole and post of a foot, 0.7 of its mass.
 std::vector<Solid> makeFoot(const SerialBipedParameters& p);

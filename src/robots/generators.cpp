@@ -60,7 +60,8 @@ const std::vector<Generator>& getGenerators() {
       {"cleobot", "biped with parallel legs: 3-RRS lower legs, hips turned by three crank-and-rod chains",
        makeRequests<CleobotParameters>(makeCleobot)},
       {"leg_biped",
-       "biped composed of parts: knees by motors, belts or four-bars, ankles by motors, differentials or rods",
+       "biped composed of parts: hips by motors or 3-RRS limbs, knees by motors, belts or four-bars, ankles by motors, "
+       "differentials or rods",
        makeRequests<LegBipedParameters>(makeLegBiped)},
       {"rsu_biped", "biped with serial hips and knees, ankles driven by two rods with spherical ends (RSU)",
        makeRequests<RsuBipedParameters>(makeRsuBiped)},

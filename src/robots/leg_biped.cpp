@@ -11,6 +11,7 @@ const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::Un
 
 struct Leg : BipedSide {
   const LegBipedParameters& p;
+  HipPart hip;
   KneePart knee;
   AnklePart ankle;
   bool motors_on_joints;  // those of serial parts; otherwise where belts and differentials have them
@@ -22,6 +23,82 @@ struct Leg : BipedSide {
   // Index 1 outer, 2 inner.
   Vector3d beside(int index, double distance) const { return (index == 1 ? s : -s) * distance * kY; }
 };
+
+// Limb of a 3-RRS hip, Eq. (0a), about its centre; legs straight.
+struct HipLimb {
+  std::string name;  // "hip1_left"
+  Vector3d motor, elbow, ball;
+};
+
+HipLimb makeHipLimb(const Leg& leg, int index) {
+  const double r = leg.p.hip_radius, inside = 0.7 * r, middle = leg.p.hip_middle;
+  const std::string name = "hip" + std::to_string(index) + leg.name;
+  if (index == 1) return {name, -r * kX, r * kZ, leg.s * r * kY};
+  if (index == 2) return {name, -leg.s * r * kY, r * kX, -r * kZ};
+  return {name, inside * kZ, -leg.s * inside * kY, inside * Vector3d(std::cos(middle), 0, std::sin(middle))};
+}
+
+// Share of the passive hinges in the mass of the links between trunk and thigh.
+constexpr double kHipCross = 0.1;
+
+// Of the limbs and of the thigh's arms to their balls, kg/m: all links of the hip weigh what those of a serial one do.
+double calcLimbDensity(const Leg& leg) {
+  double length = 0;
+  for (int i = 1; i <= 3; ++i) {
+    const HipLimb limb = makeHipLimb(leg, i);
+    length += (limb.elbow - limb.motor).norm() + (limb.ball - limb.elbow).norm() + limb.ball.norm();
+  }
+  return 2 * (1 - kHipCross) * leg.p.hip_link_mass / length;
+}
+
+// Passive hinges and three limbs: motor, link, hinge, link.
+void addParallelHip(const Leg& leg, ModelBuilder& builder) {
+  const LegBipedParameters& p = leg.p;
+  const double cross = kHipCross * p.hip_link_mass, density = calcLimbDensity(leg);
+  addHipLinks(leg, p, {makeCylinder(kOrigin, kX, 0.008, 0.05, cross, colors::kSteel)},
+              {makeCylinder(kOrigin, kY, 0.008, 0.05, cross, colors::kSteel)}, builder);
+  for (int i = 1; i <= 3; ++i) {
+    const HipLimb limb = makeHipLimb(leg, i);
+    const Vector3d to_elbow = limb.elbow - limb.motor, to_ball = limb.ball - limb.elbow;
+    const std::string upper = "upper_" + limb.name, lower = "lower_" + limb.name;
+    addSolidLink(upper, "trunk",
+                 makeRevolute("motor_" + limb.name, getHip(leg, p) + limb.motor, limb.motor.normalized()),
+                 {makeRod(kOrigin, to_elbow, 0.010, density, colors::kFrame)}, builder);
+    addSolidLink(lower, upper, makeRevolute("elbow_" + limb.name, to_elbow, limb.elbow.normalized()),
+                 {makeRod(kOrigin, to_ball, 0.008, density, colors::kOutput)}, builder);
+    builder.addFrame("limb_end_" + limb.name, lower, {Matrix3d::Identity(), to_ball});
+  }
+}
+
+// The thigh's arms to the balls.
+std::vector<Solid> makeHipArms(const Leg& leg) {
+  std::vector<Solid> arms;
+  for (int i = 1; i <= 3 && leg.hip == HipPart::ThreeRrs; ++i)
+    arms.push_back(makeRod(kOrigin, makeHipLimb(leg, i).ball, 0.009, calcLimbDensity(leg), colors::kFrame));
+  return arms;
+}
+
+void closeParallelHip(const Leg& leg, ModelBuilder& builder) {
+  for (int i = 1; i <= 3; ++i) {
+    const HipLimb limb = makeHipLimb(leg, i);
+    builder.addFrame("thigh_end_" + limb.name, "thigh" + leg.name, {Matrix3d::Identity(), limb.ball});
+    builder.addClosure(limb.name, ClosureKind::Ball3D, "thigh_end_" + limb.name, "limb_end_" + limb.name);
+    builder.addMotor("motor_" + limb.name, leg.p.armature);
+  }
+}
+
+// Motors of the hips on the trunk.
+std::vector<Solid> makeHipMotors(const std::vector<Leg>& legs) {
+  const LegBipedParameters& p = legs.front().p;
+  if (legs.front().hip == HipPart::Serial) return makeHipYawMotors(p);
+  std::vector<Solid> motors;
+  for (const Leg& leg : legs)
+    for (int i = 1; i <= 3; ++i) {
+      const Vector3d place = makeHipLimb(leg, i).motor;
+      motors.push_back(makeMotor(getHip(leg, p) + place, place, p.motor_mass));
+    }
+  return motors;
+}
 
 // A pulley about y, turned by its motor.
 void addPulley(const Leg& leg, const std::string& name, const std::string& base, const Vector3d& place,
@@ -71,11 +148,13 @@ void addKnee(const Leg& leg, ModelBuilder& builder) {
   const LegBipedParameters& p = leg.p;
   const Vector3d knee = -p.thigh_length * kZ;
   const bool at_knee = leg.knee == KneePart::Serial && leg.motors_on_joints;
-  addSolidLink("thigh" + leg.name, "hip_roll" + leg.name, makeRevolute("hipy" + leg.name, kOrigin, kY),
-               {makeRod(kOrigin, knee, 0.022, p.link_density, colors::kFrame),
-                makeMotor(at_knee ? knee : leg.inner(), kY, p.knee_motor_mass)},
-               builder);
-  for (const char* joint : {"hipz", "hipx", "hipy"}) builder.addMotor(joint + leg.name, p.armature);
+  std::vector<Solid> thigh = {makeRod(kOrigin, knee, 0.022, p.link_density, colors::kFrame),
+                              makeMotor(at_knee ? knee : leg.inner(), kY, p.knee_motor_mass)};
+  for (const Solid& arm : makeHipArms(leg)) thigh.push_back(arm);
+  addSolidLink("thigh" + leg.name, "hip_roll" + leg.name, makeRevolute("hipy" + leg.name, kOrigin, kY), thigh, builder);
+  for (const char* joint : {"hipz", "hipx", "hipy"})
+    if (leg.hip == HipPart::Serial) builder.addMotor(joint + leg.name, p.armature);
+  if (leg.hip == HipPart::ThreeRrs) closeParallelHip(leg, builder);
   if (leg.knee == KneePart::Belt) addPulley(leg, "knee", "thigh", leg.inner() / 2, builder);
   if (leg.knee == KneePart::FourBar) addKneeChain(leg, builder);
   addSolidLink("shank" + leg.name, "thigh" + leg.name, makeRevolute("knee" + leg.name, knee, kY), makeShank(leg),
@@ -143,7 +222,10 @@ void addAnkle(const Leg& leg, ModelBuilder& builder) {
 
 void addLeg(const Leg& leg, ModelBuilder& builder) {
   const LegBipedParameters& p = leg.p;
-  addHip(leg, p, builder);
+  if (leg.hip == HipPart::Serial)
+    addHip(leg, p, builder);
+  else
+    addParallelHip(leg, builder);
   addKnee(leg, builder);
   addAnkle(leg, builder);
   for (const char* joint : {"hipz", "hipx", "hipy", "knee", "ankley", "anklex"})
@@ -152,11 +234,16 @@ void addLeg(const Leg& leg, ModelBuilder& builder) {
 }
 
 void addBiped(const LegBipedParameters& p, bool motors_on_joints, ModelBuilder& builder) {
-  addTrunk(makeSerialTrunk(p), builder);
+  const auto hip = static_cast<HipPart>(p.hip);
   const auto knee = static_cast<KneePart>(p.knee);
   const auto ankle = static_cast<AnklePart>(p.ankle);
+  std::vector<Leg> legs;
   for (const BipedSide& side : {BipedSide{1, "_left"}, BipedSide{-1, "_right"}})
-    addLeg({side, p, knee, ankle, motors_on_joints}, builder);
+    legs.push_back({side, p, hip, knee, ankle, motors_on_joints});
+  std::vector<Solid> trunk = makeSerialTrunk(p);
+  for (const Solid& motor : makeHipMotors(legs)) trunk.push_back(motor);
+  addTrunk(trunk, builder);
+  for (const Leg& leg : legs) addLeg(leg, builder);
 }
 
 Model makeBiped(const std::string& robot, const LegBipedParameters& p, bool motors_on_joints = true) {
@@ -170,7 +257,7 @@ Model makeBiped(const std::string& robot, const LegBipedParameters& p, bool moto
 template <typename Parameters>
 Model makeOf(KneePart knee, AnklePart ankle, const std::string& robot, Parameters p, bool motors_on_joints) {
   checkParameters(robot, listParameters(p));
-  p.knee = static_cast<double>(knee), p.ankle = static_cast<double>(ankle);
+  p.knee = static_cast<double>(knee), p.ankle = static_cast<double>(ankle), p.hip = 0;
   p.knee_motor_mass = p.ankle_motor_mass = p.motor_mass;
   return makeBiped(robot, p, motors_on_joints);
 }
@@ -192,8 +279,11 @@ std::vector<Parameter> listParameters(LegBipedParameters& p) {
   const std::vector<Parameter> own = {
       {"knee", &p.knee, "1", 0, 2, "part that moves the knee", {"serial", "belt", "four_bar"}},
       {"ankle", &p.ankle, "1", 0, 2, "part that moves the ankle", {"serial", "differential", "rsu"}},
+      {"hip", &p.hip, "1", 0, 1, "part that moves the hip", {"serial", "three_rrs"}},
       {"knee_motor_mass", &p.knee_motor_mass, "kg", 0.01, 10, "of each motor of the knees"},
       {"ankle_motor_mass", &p.ankle_motor_mass, "kg", 0.01, 10, "of each motor of the ankles"},
+      {"hip_radius", &p.hip_radius, "m", 0.03, 0.2, "of three RRS limbs: of their hinges and balls about the hip"},
+      {"hip_middle", &p.hip_middle, "rad", -1.5, 1.5, "of three RRS limbs: hipy where all of them are square"},
       {"knee_ratio", &p.knee_ratio, "1", 0.1, 20, "of a belt: turns of the knee's motor per turn of the knee"},
       {"knee_crank", &p.knee_crank, "m", 0.01, 0.2, "of a four-bar: length of the crank at the hip"},
       {"knee_arm", &p.knee_arm, "m", 0.01, 0.2, "of a four-bar: length of the arm at the knee"},

@@ -1,9 +1,22 @@
 #pragma once
-/// \file Bipeds composed of parts: serial hips, a part that moves the knees and one that moves the ankles.
+/// \file Bipeds composed of parts: one that moves the hips, one that moves the knees and one that moves the ankles.
 ///
 /// x forward, y left, z up; s = +1 for the left leg, -1 for the right one. All frames are parallel in the neutral
 /// configuration, legs straight. Joints of a leg: those of SerialBipedParameters. Every leg has six motors: three at the hip,
 /// one of the knee, two of the ankle. A part says where its motors are, and adds what leads from them to the joints:
+///
+/// Hip: yaw, roll and pitch in one point, hinges in this order.
+/// - serial: motors on the joints, that of the yaw on the trunk and the two others on the links between trunk and thigh.
+/// - three_rrs: the hinges are passive, and three limbs turn the thigh: a motor on the trunk, a link, a hinge, a link and a ball
+///   at the thigh each. The axes of motor and hinge meet in the centre O of the hip, so that hinge and ball of a limb move on a
+///   sphere of radius r about it (0.7 r for limb 3). Directions from O of motor, hinge and ball, legs straight:
+///       limb 1:  u = (-1, 0, 0),   w = (0, 0, 1),    v = (0, s, 0)                                              (0a)
+///       limb 2:  u = (0, -s, 0),   w = (1, 0, 0),    v = (0, 0, -1)
+///       limb 3:  u = (0, 0, 1),    w = (0, -s, 0),   v = (cos theta, 0, sin theta)
+///   A limb moves the thigh by a moment about the normal w x v of its second link. Without yaw and roll that of limbs 1 and 2 is
+///   the axis of their own motor at any pitch, and so is that of limb 3 at the middle pitch hipy = theta: there the motors turn
+///   roll, pitch and yaw one to one. A quarter turn of the pitch from theta the normals of limbs 1 and 3 are parallel, and the
+///   hip is singular. Hinges and limb both place a ball on its sphere, so a closure has three rows and rank two: 3 + 3 2 - 3 2 = 3.
 ///
 /// Knee, with its motor at the hip, on the thigh, but for the serial one:
 /// - serial: a motor on the joint, at the knee.
@@ -29,8 +42,9 @@
 /// (1) and (2) are couplers: belts and gears have no mass of their own, pulleys have. The rods have: a four-bar is 3 rows over
 /// crank, universal joint and knee.
 ///
-/// Parts are meant to be compared: trunk, hips, thighs, shanks, feet and soles are the same to the last gram, as is the number of
-/// motors and the mass of each, and every part pays for what it adds (pulleys, cranks, rods) and for where its motors are.
+/// Parts are meant to be compared: trunk, links of the hips, thighs, shanks, feet and soles are the same to the last gram, as is
+/// the number of motors and the mass of each, and every part pays for what it adds (pulleys, cranks, rods) and for where its
+/// motors are.
 ///
 /// The architectures are common. Distance of the hips, soles, height of the trunk in half_sitting and total mass are about those
 /// of robots/bipetto; all other dimensions and masses are ours, and no such robot was built.
@@ -38,13 +52,17 @@
 
 namespace bielle {
 
+enum class HipPart { Serial, ThreeRrs };
 enum class KneePart { Serial, Belt, FourBar };
 enum class AnklePart { Serial, Differential, Rsu };
 
 struct LegBipedParameters : SerialBipedParameters {
-  double knee = 2, ankle = 1;  ///< KneePart, AnklePart
+  double knee = 2, ankle = 1, hip = 0;  ///< KneePart, AnklePart, HipPart
 
   double knee_motor_mass = 0.8, ankle_motor_mass = 0.8;  ///< each, kg; motor_mass is that of the hips'
+
+  double hip_radius = 0.07;  ///< r of three RRS limbs, m
+  double hip_middle = -0.6;  ///< theta of them, rad
 
   double knee_ratio = 2;     ///< n of a belt: turns of the motor's pulley per turn of the knee
   double knee_crank = 0.05;  ///< c of a four-bar, m
