@@ -1,9 +1,8 @@
 #include "simulation/watch.h"
 
-#include <atomic>
-#include <csignal>
 #include <iostream>
 
+#include "io/interrupt.h"
 #include "model/number_text.h"
 
 namespace bielle::simulation {
@@ -13,17 +12,10 @@ constexpr std::chrono::seconds kBetweenPages{2}, kBetweenLines{5};
 constexpr int kShare = 10;     // of the time that is not spent on pages, over that which is
 constexpr double kShown = 10;  // last part of the motion, s: a page costs the same however long the motion has lasted
 
-std::atomic<bool> stopped{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
-
 }  // namespace
 
 Watch::Watch(Show show) : show_(std::move(show)), next_page_(Clock::now()), next_line_(Clock::now() + kBetweenLines) {
-  struct sigaction action = {};
-  action.sa_handler = [](int) { stopped = true; };
-  action.sa_flags = SA_RESETHAND | SA_RESTART;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
+  watchInterrupts();
 }
 
 bool Watch::update(double time, double duration, const ExecutionSoFar& so_far) {
@@ -37,7 +29,7 @@ bool Watch::update(double time, double duration, const ExecutionSoFar& so_far) {
     const Clock::time_point end = Clock::now();
     next_page_ = end + std::max<Clock::duration>(kBetweenPages, kShare * (end - now));
   }
-  return !stopped;
+  return !isInterrupted();
 }
 
 }  // namespace bielle::simulation

@@ -1,8 +1,6 @@
 // bielle solve MOTION: makes the problem, solves it, writes the result.
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <csignal>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -19,6 +17,7 @@
 #include "cli/free_timings.h"
 #include "cli/objective.h"
 #include "cli/table.h"
+#include "io/interrupt.h"
 #include "io/setting.h"
 
 namespace bielle::cli {
@@ -38,18 +37,6 @@ struct SolveArguments {
   std::string warm_start;  // directory of a result, or empty
   bool quiet = false, no_check = false, no_report = false;
 };
-
-std::atomic<bool> interrupted{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
-
-// The first signal makes the solver stop, the second one has its usual effect.
-void watchSignals() {
-  struct sigaction action = {};
-  action.sa_handler = [](int) { interrupted = true; };
-  action.sa_flags = SA_RESETHAND | SA_RESTART;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
 
 LimitOptions makeLimits(const SolveArguments& arguments) {
   LimitOptions limits = arguments.problem.limits;
@@ -170,7 +157,7 @@ bool checkResult(const std::string& directory) {
 // Prints what is done and a line per iteration, unless quiet, and stops at a signal.
 RequestObserver makeObserver(const SolveArguments& arguments) {
   RequestObserver observer;
-  observer.motion.interrupt = observer.part.interrupt = &interrupted;
+  observer.motion.interrupt = observer.part.interrupt = &isInterrupted();
   observer.warn = [](const std::string& line) { std::cout << line << std::endl; };
   if (arguments.quiet) return observer;
   observer.motion.callback = makeFddpPrinter(std::cout);
@@ -203,7 +190,7 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
   if (!arguments.warm_start.empty()) options.warm_start = readResultRecord(arguments.warm_start);
   RequestSolver solver(request, model, std::move(options), makeObserver(arguments));
   makeOutputDirectory(arguments.directory);
-  watchSignals();
+  watchInterrupts();
   const MotionResult result = solver.solve({arguments.robot.name, robot.file, getCommandLine(),
                                             serial ? "serial" : "closed", serial ? arguments.serial_armature : ""});
   printResult(model, result, writeResult(arguments.directory, result));
