@@ -7,7 +7,7 @@
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "io/format_warnings.h"
-#include "io/urdf_dialect.h"
+#include "io/urdf_writer.h"
 #include "io/xml_text.h"
 #include "model/number_text.h"
 

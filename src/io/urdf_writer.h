@@ -1,5 +1,5 @@
 #pragma once
-/// \file What a URDF without a YAML file says to whom (private to the writers of URDF).
+/// \file The tree of a robot as a URDF: beside a YAML file, or without one for whom it may concern.
 #include <string>
 
 #include "bielle/model/model.h"
@@ -17,5 +17,9 @@ struct UrdfDialect {
 /// The tree with its mimics; whatever of it the dialect cannot say goes to `warnings`.
 /// \throws ModelError for joints that it does not have
 std::string formatUrdfTree(const Model& model, const UrdfDialect& dialect, FormatWarnings& warnings);
+
+/// The URDF of a pair with a YAML file: frames of closures and contacts without a name get one.
+/// \param remark  comment at its head
+std::string formatUrdfBesideYaml(const Model& model, const std::string& remark);
 
 }  // namespace bielle
