@@ -62,6 +62,23 @@ if(BUILD_SHARED_LIBS)
   endforeach()
 endif()
 
+# bielle_precompile(TARGET KIND): headers that most files include are parsed once for all targets of a KIND, whose flags are the
+# same. A file that forgets one of them still compiles, so that only builds that must be soon done do it.
+option(BIELLE_PRECOMPILE "Precompile headers: the build takes less time, but missing includes are not noticed" OFF)
+function(bielle_precompile target kind)
+  if(NOT BIELLE_PRECOMPILE)
+    return()
+  endif()
+  get_property(first GLOBAL PROPERTY BIELLE_PRECOMPILED_${kind})
+  if(first)
+    target_precompile_headers(${target} REUSE_FROM ${first})
+  else()
+    set_property(GLOBAL PROPERTY BIELLE_PRECOMPILED_${kind} ${target})
+    target_precompile_headers(${target} PRIVATE <algorithm> <array> <cmath> <filesystem> <functional> <iostream> <map> <memory>
+      <optional> <set> <sstream> <string> <vector> <Eigen/Dense> "${PROJECT_SOURCE_DIR}/include/bielle/model/model.h" ${ARGN})
+  endif()
+endfunction()
+
 # bielle_layer(NAME SOURCES... INCLUDE DIRECTORIES... PUBLIC LIBRARIES... PRIVATE LIBRARIES...): the target bielle_NAME.
 function(bielle_layer name)
   cmake_parse_arguments(ARG "" "" "SOURCES;INCLUDE;PUBLIC;PRIVATE" ${ARGN})
@@ -91,6 +108,7 @@ function(bielle_layer name)
     target_include_directories(bielle_${name} PRIVATE ${PROJECT_SOURCE_DIR}/src ${ARG_INCLUDE})
     target_link_libraries(bielle_${name}
       PUBLIC bielle_headers ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:bielle_warnings>)
+    bielle_precompile(bielle_${name} layers)
   endif()
   add_library(bielle::${name} ALIAS bielle_${name})
   set_target_properties(bielle_${name} PROPERTIES EXPORT_NAME ${name})

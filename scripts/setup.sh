@@ -41,8 +41,12 @@ install_missing() {
     { "${sudo[@]}" apt-get update && "${sudo[@]}" apt-get install -y --no-install-recommends "${missing[@]}"; }
 }
 
-# Objects come out of ccache where somebody has installed it, unless another launcher is asked for.
-if command -v ccache >/dev/null; then export CMAKE_CXX_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER-ccache}; fi
+# Objects come out of ccache where somebody has installed it, unless another launcher is asked for. It takes precompiled headers
+# into account under these conditions alone.
+if command -v ccache >/dev/null; then
+  export CMAKE_CXX_COMPILER_LAUNCHER=${CMAKE_CXX_COMPILER_LAUNCHER-ccache}
+  export CCACHE_SLOPPINESS=pch_defines,time_macros
+fi
 
 # build DIRECTORY CMAKE_OPTION...: configures, then builds `bielle_targets` (default: everything) on as many cores as memory
 # allows, at 1.5 GB per compiler.

@@ -1,4 +1,4 @@
-bielle_test(cli SOURCES test_cli.cpp test_cli_solve.cpp run_command.cpp LIBS bielle_io)
+bielle_test(cli SOURCES test_cli.cpp test_cli_solve.cpp LIBS bielle_io)
 target_link_libraries(test_cli PRIVATE nlohmann_json::nlohmann_json)
 target_compile_definitions(test_cli PRIVATE BIELLE_COMMAND="$<TARGET_FILE:bielle_command>")
 add_dependencies(test_cli bielle_command)

@@ -1,7 +1,7 @@
 bielle_test(model SOURCES test_model.cpp LIBS bielle_model)
-bielle_test(reader SOURCES test_reader.cpp robot_directory.cpp LIBS bielle_dynamics)
-bielle_test(reader_errors SOURCES test_reader_errors.cpp robot_directory.cpp LIBS bielle_model)
+bielle_test(reader SOURCES test_reader.cpp LIBS bielle_dynamics)
+bielle_test(reader_errors SOURCES test_reader_errors.cpp LIBS bielle_model)
 bielle_test(robots SOURCES test_robots.cpp LIBS bielle_model)
 # Labelled `system`: tests/fuzz covers more under sanitizers.
-bielle_test(mutated_robots SOURCES test_mutated_robots.cpp robot_directory.cpp LIBS bielle_io)
+bielle_test(mutated_robots SOURCES test_mutated_robots.cpp LIBS bielle_io)
 set_tests_properties(mutated_robots PROPERTIES LABELS system)

@@ -1,4 +1,4 @@
-bielle_test(report SOURCES test_report.cpp robot_directory.cpp LIBS bielle_report)
+bielle_test(report SOURCES test_report.cpp LIBS bielle_report)
 target_link_libraries(test_report PRIVATE nlohmann_json::nlohmann_json)
 # In a browser; skipped where there is no Chromium.
 if(TARGET bielle_command)

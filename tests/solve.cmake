@@ -8,5 +8,5 @@ bielle_test(fddp_batches SOURCES test_fddp_batches.cpp LIBS bielle_solve bielle_
 target_link_options(test_fddp_batches PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 bielle_test(constraints SOURCES test_constraints.cpp LIBS bielle_solve bielle_model)
 target_link_options(test_constraints PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
-bielle_test(peak SOURCES test_peak.cpp mechanisms.cpp LIBS bielle_solve bielle_dynamics)
+bielle_test(peak SOURCES test_peak.cpp LIBS bielle_solve bielle_dynamics)
 target_link_options(test_peak PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)

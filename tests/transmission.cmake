@@ -1,6 +1,6 @@
-bielle_test(ratio SOURCES test_ratio.cpp mechanisms.cpp robot_directory.cpp LIBS bielle_transmission bielle_robots)
+bielle_test(ratio SOURCES test_ratio.cpp LIBS bielle_transmission bielle_robots)
 bielle_test(serial SOURCES test_serial.cpp LIBS bielle_transmission)
-bielle_test(transmission_cli SOURCES test_transmission_cli.cpp run_command.cpp LIBS bielle_io)
+bielle_test(transmission_cli SOURCES test_transmission_cli.cpp LIBS bielle_io)
 target_link_libraries(test_transmission_cli PRIVATE nlohmann_json::nlohmann_json)
 target_compile_definitions(test_transmission_cli PRIVATE BIELLE_COMMAND="$<TARGET_FILE:bielle_command>")
 add_dependencies(test_transmission_cli bielle_command)
