@@ -266,6 +266,85 @@ TEST_CASE("design constraints: a payload is a mass on the trunk of the robot's o
     }
 }
 
+namespace {
+
+// Rods at the ankles: they come too near to the motors on the shank when the robot squats, the less so the longer the cranks.
+const char* const kRods = R"(generator: leg_biped
+set: {knee: four_bar, ankle: rsu, knee_crank: 0.04}
+variables: [{name: crank, parameter: ankle_crank, bounds: [0.05, 0.07]}]
+motions: [{motion: squat, set: {depth: 0.7, duration: 0.8, settle: 0.1, time_step: 0.02}}]
+mode: MODE
+objective: [{measure: electrical_energy, motors: ["*ankle*"]}]
+constraints: [{measure: distance, at_least: 0.002, except: [["hip_yaw*", "crank_knee*"]]}]
+search: {searches: 1, stages: [{algorithm: slsqp, evaluations: 8}]}
+)";
+
+}  // namespace
+
+TEST_CASE("design constraints: distances leave out what overlaps as drawn, and rods are moved away from the leg") {
+  const RobotDirectory directory;
+  for (const MotionMode mode : {MotionMode::Kept, MotionMode::Reoptimized}) {
+    CAPTURE(getName(mode));
+    const DesignSpec spec = readDesignSpec(directory.write("spec.yaml", replaceOnce(kRods, "MODE", getName(mode))));
+    const Parametrization robot = makeParametrization(spec);
+    const DesignEvaluator evaluator(robot, {makeSquat(0.7)}, spec.objective, makeExactOptions(mode, spec.constraints));
+    const std::vector<std::string> left_out = evaluator.listLeftOut(robot.start());
+    const auto is_left_out = [&](const std::string& pair) {
+      return std::count(left_out.begin(), left_out.end(), pair) == 1;
+    };
+    for (const std::string side : {"_left", "_right"}) {
+      CHECK(is_left_out("shank" + side + " and foot_link" + side));         // they overlap
+      CHECK(is_left_out("hip_yaw" + side + " and crank_knee" + side));      // named
+      CHECK_FALSE(is_left_out("shank" + side + " and rod_ankle1" + side));  // on its way
+      CHECK_FALSE(is_left_out("hip_roll" + side + " and crank_knee" + side));
+    }
+    CHECK(evaluator.start().status == DesignStatus::Violated);
+    CHECK_THAT(evaluator.start().message, Contains("distance is -0.00") && Contains("and rod_ankle"));
+
+    // Where cranks and arms are equal, as at the start, rods and shank are parallel, and the nearest points are not unique.
+    const VectorXd x = VectorXd::Constant(1, 0.052);
+    const SlopedEvaluation here = evaluator.differentiate(x);
+    Eigen::Index active = 0;
+    here.limits.values.maxCoeff(&active);
+    const double step = 1e-3 * (robot.upper()[0] - robot.lower()[0]);
+    const auto calc = [&](double at) { return evaluator.evaluate(VectorXd::Constant(1, at)).constraints.at(0); };
+    const double numeric = -(calc(x[0] + step) - calc(x[0] - step)) / (2 * step * 0.01),
+                 analytic = here.limits.gradients(active, 0), tolerance = getTolerance(mode) * std::abs(numeric);
+    CAPTURE(numeric, analytic);
+    CHECK(numeric < -50);  // longer cranks hold the rods off
+    CHECK(std::abs(analytic - numeric) < tolerance);
+    CHECK(std::abs(analytic + 2 * tolerance - numeric) >= tolerance);  // would an error be missed?
+
+    DesignRunOptions run;
+    run.directory = directory.path() + "/" + getName(mode);
+    const DesignRun done = runDesign(evaluator, spec, run);
+    REQUIRE(done.evaluation.status == DesignStatus::Feasible);
+    CHECK(done.evaluation.constraints[0] > 0.002 - kConstraintSlack * 0.01);
+    CHECK(done.best[0] > robot.start()[0] + 0.002);
+  }
+  const std::string path = directory.write("spec.yaml", replaceOnce(kRods, "MODE", "kept")),
+                    out = directory.path() + "/out";
+  const CommandResult result = runCommand({BIELLE_COMMAND, "design", path, "-o", out});
+  INFO(result.err);
+  REQUIRE(result.status == 0);
+  std::ifstream file(out + "/design.md");
+  const std::string page{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  CHECK_THAT(page, Contains("The distance leaves out bodies") && Contains("shank_left and foot_link_left"));
+
+  const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
+    const std::string wrong = directory.write("wrong.yaml", replaceOnce(replaceOnce(kRods, "MODE", "kept"), from, to));
+    const auto make = [&] {
+      const DesignSpec spec = readDesignSpec(wrong);
+      const Parametrization robot = makeParametrization(spec);
+      DesignEvaluator(robot, {makeSquat(0.9)}, spec.objective, makeExactOptions(MotionMode::Kept, spec.constraints));
+    };
+    CHECK_THROWS_WITH(make(), Contains(problem));
+  };
+  check("\"hip_yaw*\"", "\"hip_jaw*\"", "except [hip_jaw*, crank_knee*]: there are no two such bodies; `bielle info`");
+  check("[\"hip_yaw*\", \"crank_knee*\"]", "[\"hip_yaw*\"]", "it has 1 element(s)");
+  check("measure: distance, at_least: 0.002", "measure: margin, at_least: 0.2", "only distances leave bodies out");
+}
+
 TEST_CASE("design constraints: weights and payloads that cannot be are refused with their lines") {
   const RobotDirectory directory;
   const auto check = [&](const std::string& keys, const std::string& problem) {

@@ -144,7 +144,7 @@ TEST_CASE("measures: shares of limits by hand, distances of shapes") {
   measures.motors = calcMotorMeasures(measures.trace);
   ShootingTrajectory trajectory;
   trajectory.xs = {VectorXd::Zero(model.nq() + model.nv())};
-  addLimitMeasures(model, trajectory, {Measure::Distance}, measures);
+  addLimitMeasures(model, trajectory, {Measure::Distance}, {}, measures);
   // A newton metre is an ampere less the loss in the gear: 0.5 / 0.8 V; a radian per second is a volt.
   CHECK(measures.motors[0].envelope == Approx((6 * 0.5 / 0.8 + 15) / 24));
   CHECK(measures.motors[0].heat ==
@@ -153,7 +153,7 @@ TEST_CASE("measures: shares of limits by hand, distances of shapes") {
   CHECK(measures.distance == Approx(0.6 - 2 * 0.05));  // of a and c, which no joint connects
   CHECK(measures.margin == 1);                         // not asked for
   measures.distance = std::numeric_limits<double>::infinity();
-  addLimitMeasures(build(true), trajectory, {Measure::Distance}, measures);
+  addLimitMeasures(build(true), trajectory, {Measure::Distance}, {}, measures);
   CHECK(measures.distance == Approx(0.1 - 2 * 0.05).margin(1e-12));
   CHECK(getMeasure(Measure::Envelope, {0}, {measures, measures}) == measures.motors[0].envelope);
   // What the winding says of heat is the default of electrical energies.

@@ -7,6 +7,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
+#include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/ocp/residual.h"
@@ -292,6 +293,26 @@ TEST_CASE("virtual work balances where the motor stands still too, and another r
     CHECK(calcBalanceError(robot.model, robot.linkage, robot.getWhole(sample), other) > 1e-6);
   }
   CHECK(dead == 2);
+}
+
+TEST_CASE("belts: a sweep is one turn of the joint, whatever the ratio") {
+  const Model belt = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/belt_biped").model;
+  for (const double ratio : {2.0, 1.58, 3.3}) {
+    CAPTURE(ratio);
+    ModelParts parts = takeParts(belt);
+    for (Closure& closure : parts.closures)
+      for (CouplerTerm& term : closure.terms)
+        if (closure.name == "knee_belt_left" && term.coefficient < 0) term.coefficient = -ratio;
+    const Model model = ModelBuilder::restore(parts);
+    const VectorXd q = findClosedConfiguration(model).q;
+    const RatioSweep sweep = sweepRatio(model, makeLinkage(model, q, {"knee_left"}), q);
+    CHECK(sweep.full_turn);
+    CHECK(sweep.getDeadPoints().empty());
+    const double range = sweep.samples.back().joints[0] - sweep.samples.front().joints[0];
+    CHECK(range <= 2 * kPi);
+    CHECK(range > 2 * kPi - SweepOptions().step);
+    for (const RatioSample& sample : sweep.samples) CHECK(sample.ratio.R(0, 0) == Approx(ratio).epsilon(1e-9));
+  }
 }
 
 TEST_CASE("joints without a linkage of their own: direct, or refused") {

@@ -162,10 +162,11 @@ void printReport(std::ostream& out, const RatioReport& report) {
   }
   out << report.robot << ": " << join(report.linkage.joint_names) << " driven by " << join(report.linkage.motor_names)
       << "\n";
+  const std::string ends = sweep.begin == sweep.end ? sweep.end + ", either way" : sweep.begin + "; " + sweep.end;
   printTable(out, std::vector<Row>{
                       {"range of " + report.linkage.joint_names[sweep.joint],
                        formatNumber(low, "%.6f") + " to " + formatNumber(high, "%.6f") + " (rad, or m), first branch"},
-                      {"ends", sweep.full_turn ? "none: a full turn" : sweep.begin + "; " + sweep.end},
+                      {"ends", sweep.full_turn ? "none: a full turn" : ends},
                       {"dead points", std::to_string(sweep.getDeadPoints().size())},
                       {"virtual work", "off by " + formatNumber(report.balance_error, "%.1e") + " at most, relative"}});
   out << "\nratio R = motor speed / joint speed" << (report.linkage.isDirect() ? ": the motor sits on the joint" : "")

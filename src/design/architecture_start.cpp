@@ -74,8 +74,13 @@ void readNames(const std::vector<ObjectiveTerm>& objective, const std::vector<De
 ArchitectureStart makeArchitectureStart(Model model, const std::vector<DesignMotion>& motions,
                                         const std::vector<ObjectiveTerm>& objective, const EvaluationOptions& options,
                                         bool must_solve, bool must_keep) {
-  ArchitectureStart start{std::move(model), {}, {}, {}, {}};
+  ArchitectureStart start{std::move(model), {}, {}, {}, {}, {}};
   readNames(objective, options.constraints, start);
+  for (const DesignConstraint& constraint : options.constraints) {
+    if (constraint.measure != Measure::Distance) continue;
+    start.left_out.merge(findOverlaps(start.model));
+    start.left_out.merge(findBodyPairs(start.model, constraint.except));
+  }
   for (const DesignMotion& motion : motions) {
     start.solved.emplace_back();
     try {

@@ -13,6 +13,7 @@ struct ArchitectureStart {
       constraint_motors;                                 ///< by objective and by constraint, numbers of the model
   std::vector<std::optional<WorkspaceGrid>> term_grids;  ///< by objective, of workspaces
   std::vector<std::optional<SolvedMotion>> solved;       ///< none where the start has no such motion
+  BodyPairs left_out;                                    ///< of constraints on distances
 };
 
 /// \param must_solve  whether a motion that fails is an error

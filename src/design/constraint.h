@@ -1,5 +1,6 @@
 #pragma once
 /// \file Bounds on the measures of a design, with their gradients.
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@ struct DesignConstraint {
   std::vector<std::string> motors;      ///< empty: all
   double bound = 1;
   bool at_least = false;  ///< else at most
+  std::vector<std::array<std::string, 2>> except =
+      {};  ///< of a distance: pairs of bodies that it leaves out (near_bodies.h)
 };
 
 /// Beyond a bound, over it: so much counts as kept, since solvers keep their own constraints to a tolerance.

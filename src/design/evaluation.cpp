@@ -58,6 +58,13 @@ void DesignEvaluator::Data::checkSpec() {
   }
   for (const DesignConstraint& constraint : options.constraints) {
     asked.insert(constraint.measure);
+    for (const auto& names : constraint.except) {  // bodies of one architecture may be missing in others
+      const auto has = [&](const VectorXd& x) { return !findBodyPairs(robot.make(x), {names}).empty(); };
+      const std::vector<VectorXd> all = robot.listCombinations();
+      if (std::none_of(all.begin(), all.end(), has))
+        throw ModelError(model.name(), "constraints: distance: except [" + names[0] + ", " + names[1] + "]",
+                         "there are no two such bodies", "`bielle info` lists them; * stands for any text");
+    }
     if (constraint.measure == Measure::Margin && model.serialJoints().empty())
       throw ModelError(model.name(), "constraints: margin", "the robot has no serial joints, whose motion it is",
                        "name them in its YAML file, `serial_joints`");
@@ -131,7 +138,7 @@ void DesignEvaluator::Data::makeMotions(const ArchitectureStart& base, const Mod
     }
     if (failed && !outcomes) return;
     if (!failed)
-      addLimitMeasures(model, outcome.motion ? outcome.motion->guess : outcome.lifted.trajectory, asked,
+      addLimitMeasures(model, outcome.motion ? outcome.motion->guess : outcome.lifted.trajectory, asked, base.left_out,
                        outcome.measures);
     out.motions.push_back(outcome.measures);
     if (outcomes) outcomes->push_back(std::move(outcome));
@@ -155,6 +162,16 @@ double DesignEvaluator::Data::calcTerm(size_t i, const ArchitectureStart& base, 
   return 1 / std::max(calcCoverage(model, *grid).share, 0.5 / static_cast<double>(grid->placements.size()));
 }
 
+namespace {
+
+// The bodies of the least distance of all motions.
+std::string getNearest(const std::vector<MotionMeasures>& motions) {
+  const auto is_nearer = [](const MotionMeasures& a, const MotionMeasures& b) { return a.distance < b.distance; };
+  return std::min_element(motions.begin(), motions.end(), is_nearer)->nearest;
+}
+
+}  // namespace
+
 void DesignEvaluator::Data::checkConstraints(const ArchitectureStart& base, const Model& model, Evaluation& out) const {
   double sum = 0;
   for (size_t i = 0; i < options.constraints.size(); ++i) {
@@ -167,7 +184,8 @@ void DesignEvaluator::Data::checkConstraints(const ArchitectureStart& base, cons
     if (violation > 0)
       out.message += (sum > 0 ? ", " : "") + std::string(getName(constraint.measure)) + " is " +
                      formatNumber(value, "%.4g") + (constraint.at_least ? " < " : " > ") +
-                     formatNumber(constraint.bound, "%.4g");
+                     formatNumber(constraint.bound, "%.4g") +
+                     (constraint.measure == Measure::Distance ? " (" + getNearest(out.motions) + ")" : "");
     sum += violation;
   }
   if (sum == 0) return;
@@ -192,6 +210,12 @@ DesignEvaluator::DesignEvaluator(const Parametrization& robot, std::vector<Desig
 DesignEvaluator::~DesignEvaluator() = default;
 
 const Evaluation& DesignEvaluator::start() const { return data_->start; }
+std::vector<std::string> DesignEvaluator::listLeftOut(const VectorXd& x) const {
+  const ArchitectureStart& base = data_->getBase(x);
+  std::vector<std::string> names;
+  for (const auto& [a, b] : base.left_out) names.push_back(describePair(base.model, a, b));
+  return names;
+}
 const Parametrization& DesignEvaluator::robot() const { return data_->robot; }
 const std::vector<DesignMotion>& DesignEvaluator::motions() const { return data_->motions; }
 const std::vector<ObjectiveTerm>& DesignEvaluator::objective() const { return data_->objective; }

@@ -107,6 +107,8 @@ class DesignEvaluator {
   /// \throws ModelError when a measure has no gradient
   SlopedEvaluation differentiate(const VectorXd& x) const;
   const Evaluation& start() const;  ///< of the start design, feasible or violated
+  /// Pairs of bodies that constraints on distances leave out, of the architecture of x.
+  std::vector<std::string> listLeftOut(const VectorXd& x) const;
   const Parametrization& robot() const;
   const std::vector<DesignMotion>& motions() const;
   const std::vector<ObjectiveTerm>& objective() const;

@@ -40,10 +40,15 @@ Plot makeCourse(const DesignEvaluator& evaluator, const DesignRun& run) {
   return plot;
 }
 
+std::string describeAxis(const ObjectiveTerm& term) {
+  const std::string unit = getUnit(term.measure);
+  return describeTerm(term) + (unit.empty() ? "" : " [" + unit + "]");
+}
+
 // Two objectives: all feasible designs, the start and the front.
 Plot makeFrontPlot(const DesignEvaluator& evaluator, const DesignRun& run, size_t x, size_t y) {
   const std::vector<ObjectiveTerm>& terms = evaluator.objective();
-  Plot plot{"Front", describeTerm(terms[x]), describeTerm(terms[y]), PlotScale::Free, {}};
+  Plot plot{"Front", describeAxis(terms[x]), describeAxis(terms[y]), PlotScale::Free, {}};
   Curve designs{"designs", kSerialColor, CurveStyle::Points, false, {}};
   const auto& front = run.front;
   const auto calcMost = [&](size_t k) {

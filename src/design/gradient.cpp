@@ -165,8 +165,9 @@ namespace {
 // Distances of the nearest shapes along a kept motion.
 class DistanceRecorder {
  public:
-  DistanceRecorder(const Model& model, const std::vector<VectorXd>& xs, const std::vector<ModelVariation>& variations)
-      : model_(model), variations_(variations), pairs_(listShapePairs(model)), ws_(model), workspace_(model) {
+  DistanceRecorder(const Model& model, const BodyPairs& left_out, const std::vector<VectorXd>& xs,
+                   const std::vector<ModelVariation>& variations)
+      : model_(model), variations_(variations), pairs_(listPairsBut(left_out, model)), ws_(model), workspace_(model) {
     if (pairs_.empty()) return;
     distance_.resize(static_cast<Eigen::Index>(xs.size()));
     for (Eigen::Index k = 0; k < distance_.size(); ++k)
@@ -271,12 +272,14 @@ class SlopeRecorder {
 }  // namespace
 
 MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dofs, const SerialTrajectory& trajectory,
-                            const LiftResult& lifted, const std::vector<ModelVariation>& variations, bool distances) {
+                            const LiftResult& lifted, const std::vector<ModelVariation>& variations,
+                            const BodyPairs* left_out) {
   SlopeRecorder recorder(model, kept_dofs, lifted.dt, variations);
   std::optional<DistanceRecorder> least;
-  if (distances) {
+  if (left_out) {
     const std::vector<VectorXd>& xs = lifted.trajectory.xs;
-    least.emplace(model, std::vector<VectorXd>(xs.begin(), xs.begin() + static_cast<std::ptrdiff_t>(lifted.dt.size())),
+    least.emplace(model, *left_out,
+                  std::vector<VectorXd>(xs.begin(), xs.begin() + static_cast<std::ptrdiff_t>(lifted.dt.size())),
                   variations);
     recorder.setDistances(&*least);
   }

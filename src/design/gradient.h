@@ -51,10 +51,11 @@ struct MotorSlopes {
   std::string failure;  ///< reason if there are none, or empty
 };
 /// \param kept_dofs  of the model, in the order of the velocities of the serial trajectory
-/// \param lifted  the whole trajectory, lifted to the model   \param distances  whether there are distances among them
+/// \param lifted  the whole trajectory, lifted to the model
+/// \param left_out  of distances, if there are distances among them
 MotorSlopes calcMotorSlopes(const Model& model, const std::vector<int>& kept_dofs, const SerialTrajectory& trajectory,
                             const LiftResult& lifted, const std::vector<ModelVariation>& variations,
-                            bool distances = false);
+                            const BodyPairs* left_out = nullptr);
 
 /// Adds pieces to others by the same variables.
 void append(const MeasurePieces& pieces, MeasurePieces& all);

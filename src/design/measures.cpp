@@ -107,7 +107,7 @@ MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>&
 }
 
 void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, const std::set<Measure>& asked,
-                      MotionMeasures& measures) {
+                      const BodyPairs& left_out, MotionMeasures& measures) {
   for (size_t m = 0; m < measures.motors.size(); ++m)
     addShares(measures.trace, static_cast<Eigen::Index>(m), model.motors()[m], measures.motors[m]);
   if (asked.count(Measure::Margin)) {
@@ -117,11 +117,15 @@ void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, 
   }
   if (!asked.count(Measure::Distance)) return;
   Workspace ws(model);
-  const std::vector<ShapePair> pairs = listShapePairs(model);
+  const std::vector<ShapePair> pairs = listPairsBut(left_out, model);
   for (const VectorXd& x : trajectory.xs) {
     updatePlacements(model, ws, x.head(model.nq()));
     const NearestPair nearest = findNearestPair(model, ws.X_WB, pairs);
-    if (nearest.pair >= 0) measures.distance = std::min(measures.distance, nearest.distance.distance);
+    if (nearest.pair < 0 || !(nearest.distance.distance < measures.distance)) continue;
+    measures.distance = nearest.distance.distance;
+    const ShapePair& pair = pairs[static_cast<size_t>(nearest.pair)];
+    measures.nearest = describePair(model, model.shapes()[static_cast<size_t>(pair.b)].body,
+                                    model.shapes()[static_cast<size_t>(pair.a)].body);
   }
 }
 
@@ -136,6 +140,23 @@ bool isOfMotors(Measure measure) {
       return true;
     default:
       return false;
+  }
+}
+
+const char* getUnit(Measure measure) {
+  switch (measure) {
+    case Measure::PeakTorque:
+    case Measure::RmsTorque:
+      return "N m";
+    case Measure::Energy:
+    case Measure::ElectricalEnergy:
+      return "J";
+    case Measure::Mass:
+      return "kg";
+    case Measure::Distance:
+      return "m";
+    default:
+      return "";
   }
 }
 

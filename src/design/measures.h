@@ -10,6 +10,7 @@
 #include "bielle/model/model.h"
 #include "bielle/solve/fddp.h"
 #include "bielle/solve/shooting_problem.h"
+#include "design/near_bodies.h"
 
 namespace bielle {
 
@@ -76,8 +77,8 @@ struct MotionMeasures {
   double conditioning = 1;            ///< the worst over the nodes (conditioning.h)
   double cost = 0;                    ///< of a motion that was optimized for the design
   double margin = 1;                  ///< least inverse of the conditioning by joints, 0 at a dead point
-  double distance =
-      std::numeric_limits<double>::infinity();  ///< least one of shapes, of those listShapePairs() names, m
+  double distance = std::numeric_limits<double>::infinity();  ///< least one of shapes, of those listPairsBut() names, m
+  std::string nearest;                                        ///< the two bodies of it
   MotorTrace trace;
 };
 /// \param trajectory  closed at its nodes
@@ -86,11 +87,13 @@ MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>&
                                   const std::vector<MotorConversion>& drives = {});
 
 /// Envelope and heat of the limits of the motors, into the motors of a motion; margin and distance if they are among those asked for.
-/// \param trajectory  closed at its nodes
+/// \param trajectory  closed at its nodes   \param left_out  of distances
 void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, const std::set<Measure>& asked,
-                      MotionMeasures& measures);
+                      const BodyPairs& left_out, MotionMeasures& measures);
 
 const char* getName(Measure measure);
+/// Of torques that of motors that turn, and empty where there is none.
+const char* getUnit(Measure measure);
 bool isOfMotors(Measure measure);
 /// Whether that of all motions is the sum over them, as of energies and costs.
 bool isSum(Measure measure);

@@ -5,6 +5,7 @@
 
 #include "bielle/io/result.h"
 #include "bielle/io/robot_writer.h"
+#include "bielle/model/error.h"
 #include "design/figures.h"
 #include "design/run.h"
 #include "io/text_file.h"
@@ -44,6 +45,27 @@ std::string formatValue(const DesignVariable& v, double value) {
   return v.isChoice() ? describeValue(v, value) : format(value, "%.5g");
 }
 
+// Whether a design changes with variable i: parameters of parts that it does not have change nothing.
+bool matters(const Parametrization& robot, const VectorXd& x, size_t i) {
+  const auto format_with = [&](double value) {
+    VectorXd other = x;
+    other[static_cast<Eigen::Index>(i)] = value;
+    const RobotText text = formatRobot(robot.make(other));
+    return text.urdf + text.yaml;
+  };
+  const DesignVariable& variable = robot.variables()[i];
+  try {
+    return variable.isArchitecture() || format_with(variable.lower) != format_with(variable.upper);
+  } catch (const ModelError&) {  // one of them defines no robot
+    return true;
+  }
+}
+
+// The value of variable i without its unit, or that it means nothing.
+std::string formatOwn(const Parametrization& robot, const VectorXd& x, size_t i) {
+  return matters(robot, x, i) ? formatValue(robot.variables()[i], x[static_cast<Eigen::Index>(i)]) : "–";
+}
+
 void writeConstraints(std::ostream& out, const DesignEvaluator& evaluator, const DesignRun& run) {
   if (evaluator.constraints().empty()) return;
   out << "\n| constraint | bound | before | after |\n|---|---|---|---|\n";
@@ -53,6 +75,12 @@ void writeConstraints(std::ostream& out, const DesignEvaluator& evaluator, const
         << (constraint.at_least ? "least " : "most ") << format(constraint.bound) << " | "
         << format(evaluator.start().constraints[i]) << " | " << format(run.evaluation.constraints[i]) << " |\n";
   }
+  const std::vector<std::string> left_out = evaluator.listLeftOut(run.best);
+  for (const std::string& pair : left_out)
+    out << (&pair == &left_out.front() ? "\nThe distance leaves out bodies that overlap as they are drawn, or by name: "
+                                       : "; ")
+        << pair;
+  if (!left_out.empty()) out << ".\n";
   if (run.evaluation.status == DesignStatus::Violated)
     out << "\n**No design found keeps all constraints**; this is the start, where " << run.evaluation.message << ".\n";
 }
@@ -72,7 +100,8 @@ void writeVariables(std::ostream& out, const Parametrization& robot, const Vecto
     const DesignVariable& v = robot.variables()[i];
     const Eigen::Index k = static_cast<Eigen::Index>(i);
     out << "| " << v.name << " | " << (v.isChoice() ? "" : v.unit) << " | " << formatBounds(v) << " | "
-        << formatValue(v, robot.start()[k]) << " | " << formatValue(v, best[k]) << markBound(v, best[k]) << " |\n";
+        << formatOwn(robot, robot.start(), i) << " | " << formatOwn(robot, best, i)
+        << (matters(robot, best, i) ? markBound(v, best[k]) : "") << " |\n";
   }
 }
 
@@ -91,8 +120,7 @@ void writeFront(std::ostream& out, const DesignEvaluator& evaluator, const Desig
   const auto write = [&](const std::string& name, const std::vector<double>& measures, const VectorXd& x) {
     out << "| " << name;
     for (double measure : measures) out << " | " << format(measure);
-    for (size_t i = 0; i < robot.variables().size(); ++i)
-      out << " | " << formatValue(robot.variables()[i], x[static_cast<Eigen::Index>(i)]);
+    for (size_t i = 0; i < robot.variables().size(); ++i) out << " | " << formatOwn(robot, x, i);
     out << " |\n";
   };
   write("start", evaluator.start().terms, robot.start());

@@ -44,7 +44,8 @@ std::vector<MotorSlopes> DesignEvaluator::Data::calcKeptSlopes(const Architectur
           calcVariations(robot, x, [&](const VectorXd& at) { return addPayload(robot.make(at), motions[i].payload); });
     const SolvedMotion& from = *base.solved[i];
     slopes.push_back(calcMotorSlopes(*outcomes[i].loaded, from.kept_dofs, *from.serial, outcomes[i].lifted,
-                                     variations.at(groups[i]), asked.count(Measure::Distance) > 0));
+                                     variations.at(groups[i]),
+                                     asked.count(Measure::Distance) > 0 ? &base.left_out : nullptr));
     if (!slopes.back().failure.empty()) break;
   }
   return slopes;
@@ -102,8 +103,9 @@ SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
   const ArchitectureStart& base = data.getBase(x);
   const auto is_made = [&](const MotionOutcome& outcome) { return kept ? outcome.lifted.lifted() : !!outcome.motion; };
   if (outcomes.size() < data.motions.size() || !std::all_of(outcomes.begin(), outcomes.end(), is_made)) return out;
-  const std::vector<MotorSlopes> slopes = kept ? data.calcKeptSlopes(base, x, outcomes)
-                                               : calcOptimumSlopes(data.robot, x, data.motions, outcomes, data.asked);
+  const std::vector<MotorSlopes> slopes =
+      kept ? data.calcKeptSlopes(base, x, outcomes)
+           : calcOptimumSlopes(data.robot, x, data.motions, outcomes, data.asked, base.left_out);
   if (!slopes.back().failure.empty()) {
     out.evaluation = {DesignStatus::MotionFailed, 2 * data.weight, {}, {}, {}, slopes.back().failure};
     return out;

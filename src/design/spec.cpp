@@ -258,7 +258,7 @@ ObjectiveTerm readTerm(const Entry& entry) {
 }
 
 DesignConstraint readConstraint(const Entry& entry) {
-  const Fields fields = entry.getFields({"measure", "motors", "at_most", "at_least"});
+  const Fields fields = entry.getFields({"measure", "motors", "at_most", "at_least", "except"});
   DesignConstraint constraint;
   constraint.measure = readChoice<Measure>(
       require(fields, "measure", entry),
@@ -276,6 +276,13 @@ DesignConstraint readConstraint(const Entry& entry) {
     least->fail("it is better if it is smaller", "give `at_most`");
   if (most) constraint.bound = most->getNumber();
   if (least) constraint.bound = least->getNumber(), constraint.at_least = true;
+  if (const Entry* except = find(fields, "except")) {
+    if (constraint.measure != Measure::Distance) except->fail("only distances leave bodies out", "remove it");
+    for (const Entry& pair : except->getList()) {
+      const std::vector<std::string> names = pair.getTexts(2);
+      constraint.except.push_back({names[0], names[1]});
+    }
+  }
   if (constraint.measure != Measure::Distance && !(constraint.bound > 0))
     (most ? *most : *least).fail("the bound is not positive", "give a positive number");
   return constraint;

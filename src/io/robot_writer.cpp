@@ -211,6 +211,7 @@ std::string formatMotorData(const Motor& motor) {
   if (motor.torque_loss) text += ", torque_loss: " + formatRobotNumber(*motor.torque_loss);
   add("continuous_effort", motor.continuous_effort, HUGE_VAL);
   const MotorDrive &drive = motor.drive, ideal;
+  if (!drive.type.empty()) text += ", catalogue_type: " + quote(drive.type);
   add("ratio", drive.ratio, ideal.ratio);
   add("rotor_inertia", drive.rotor_inertia, ideal.rotor_inertia);
   add("torque_constant", drive.torque_constant, ideal.torque_constant);

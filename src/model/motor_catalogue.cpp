@@ -102,12 +102,16 @@ std::vector<MotorSpec> readMotorSpecs(const YamlEntry& motors, const std::string
   if (catalogues) known.emplace(path, catalogues);
   std::vector<MotorSpec> specs;
   for (const auto& [joint, entry] : motors.getMap()) {
-    const YamlFields fields = entry.getFields(
-        join({"type", "armature", "effort", "velocity", "torque_loss", "continuous_effort"}, kDriveKeys));
+    const YamlFields fields = entry.getFields(join(
+        {"type", "catalogue_type", "armature", "effort", "velocity", "torque_loss", "continuous_effort"}, kDriveKeys));
     MotorSpec motor;
     if (const YamlEntry* type = find(fields, "type")) {
       if (!known) known.emplace(path, catalogues);
       motor = known->get(*type);
+    }
+    if (const YamlEntry* name = find(fields, "catalogue_type")) {
+      if (find(fields, "type")) name->fail("the motor has a `type` already", "remove one of them");
+      motor.drive.type = name->getText();
     }
     motor.joint = joint;
     const double own_ratio = motor.drive.ratio;

@@ -44,11 +44,25 @@ std::vector<Limit> listLimits(const Model& model, const ReducedCluster& cluster)
   return limits;
 }
 
+// Entry in q of the cluster of a joint that turns and is coupled by belts and gears alone, or -1. Ratios repeat with every
+// turn of it, though the motor may need many until it is where it was, or may never come there.
+int findGearedJoint(const Model& model, const Linkage& linkage, int joint) {
+  const ReducedCluster& cluster = *linkage.cluster;
+  const int index = linkage.joints[static_cast<size_t>(joint)];
+  const JointKind kind = model.joints()[static_cast<size_t>(index)].kind;
+  if (kind != JointKind::Revolute && kind != JointKind::Continuous) return -1;
+  for (const Closure& closure : cluster.model.closures())
+    if (closure.kind != ClosureKind::Coupler) return -1;
+  const auto found = std::find(cluster.joints.begin(), cluster.joints.end(), index);
+  return cluster.model.joints()[static_cast<size_t>(found - cluster.joints.begin()) + 1].idx_q;
+}
+
 // One direction of the curve from its start.
 class Walk {
  public:
-  Walk(const Model& model, const Linkage& linkage, LinkageCurve& curve, const SweepOptions& options)
+  Walk(const Model& model, const Linkage& linkage, int joint, LinkageCurve& curve, const SweepOptions& options)
       : model_(model),
+        geared_(findGearedJoint(model, linkage, joint)),
         linkage_(linkage),
         curve_(curve),
         options_(options),
@@ -130,8 +144,15 @@ class Walk {
     }
   }
 
-  // Whether the step from `at` to `next` passes the start, in the direction of the start.
+  // Whether the step from `at` to `next` passes the start, in the direction of the start, or a turn of a joint with gears.
   bool returns(const CurvePoint& start, const CurvePoint& at, const CurvePoint& next) {
+    if (geared_ >= 0) {
+      const double before = std::abs(at.q[geared_] - start.q[geared_]),
+                   after = std::abs(next.q[geared_] - start.q[geared_]);
+      if (after < 2 * kPi) return false;
+      turn = std::abs(at.s) + (2 * kPi - before) / (after - before) * std::abs(next.s - at.s);
+      return true;
+    }
     if (std::abs(at.s) < 2 * options_.step) return false;
     const Model& cluster = linkage_.cluster->model;
     const VectorXd before = calcWrappedDifference(cluster, start.q, at.q);
@@ -145,6 +166,7 @@ class Walk {
   }
 
   const Model& model_;
+  int geared_;
   const Linkage& linkage_;
   LinkageCurve& curve_;
   const SweepOptions& options_;
@@ -217,7 +239,7 @@ RatioSweep sweepRatio(const Model& model, const Linkage& linkage, ConstVectorRef
                      "start from another configuration");
   RatioSweep sweep;
   sweep.joint = joint;
-  Walk up(model, linkage, curve, options), down(model, linkage, curve, options);
+  Walk up(model, linkage, joint, curve, options), down(model, linkage, joint, curve, options);
   up.run(start, 1);
   sweep.end = up.end;
   sweep.full_turn = up.turn > 0;
