@@ -38,7 +38,10 @@ FddpSummary Fddp::solve(const ShootingProblem& problem, ShootingTrajectory& traj
 }
 
 Multipliers Fddp::getMultipliers() const { return work_->lagrangian.getMultipliers(); }
-void Fddp::setMultipliers(const Multipliers& multipliers) { work_->lagrangian.setMultipliers(multipliers); }
+void Fddp::setMultipliers(const Multipliers& multipliers) {
+  work_->lagrangian.setMultipliers(multipliers);
+  work_->evaluations.outdate();
+}
 
 void Fddp::advance(ShootingTrajectory& trajectory) {
   const size_t N = trajectory.us.size();

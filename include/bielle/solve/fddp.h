@@ -246,8 +246,8 @@ class Fddp {
   /// The last state and control are repeated.
   void advance(ShootingTrajectory& trajectory);
 
-  /// Those that the last solve() ended with; and those that the next one is to start from, instead of zero. advance() moves
-  /// them on. \throws std::invalid_argument when the penalty is not positive
+  /// Those that the last solve() ended with; and those that the next one is to start from, instead of zero, with all its nodes
+  /// evaluated anew. advance() moves them on. \throws std::invalid_argument when the penalty is not positive
   Multipliers getMultipliers() const;
   void setMultipliers(const Multipliers& multipliers);
 
