@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "bielle/dynamics/kinematics.h"
 #include "control/policy_stages.h"
 #include "motion/foot_constraints.h"
 #include "solve/lq_sweep.h"
@@ -14,6 +15,7 @@ constexpr double kClockTolerance = 1e-9;  // s: durations are sums of stages
 constexpr int kAhead = 3;                 // stages of a policy: what is left when solves fail
 constexpr int kAheadInThread = 8;         // or when they come late
 constexpr int kEarly = 2;                 // stages before its landing at which a foot counts as early
+constexpr double kLandingWay = 0.01;      // that it may then be farther off than where it may land, m
 constexpr int kLate = 1;                  // stages after its landing at which a foot counts as late
 constexpr int kLowering = 2;              // stages in which it is then foreseen to land
 constexpr double kLoweringSpeed = 0.3;    // m/s
@@ -43,6 +45,7 @@ WindowPlanner::WindowPlanner(std::unique_ptr<Horizon> horizon, const PredictiveO
       window_(problem_, options.nodes),
       evaluator_(problem_),
       impact_(model_),
+      feet_(model_),
       solver_(makeSolver(options.iterations)) {
   u_.setZero(model_.nu());
   x_ = problem_.initialState();
@@ -103,15 +106,36 @@ bool WindowPlanner::stands(int stage, int contact) const {
   return std::find(standing.begin(), standing.end(), contact) != standing.end();
 }
 
+// Where a foot is to stand with a stage.
+const SE3& WindowPlanner::getFoothold(int stage, int contact) const {
+  const ConstraintSet& set = getSpec(stage).constraints;
+  int c = set.num_loops;
+  while (set.getContact(c) != contact) ++c;
+  return set.closures[c].X_B2;
+}
+
+// Near enough to where it should land.
+bool WindowPlanner::isOverFoothold(int landing, int contact, ConstVectorRef q) {
+  const SE3& X_WT = getFoothold(landing, contact);
+  const ContactFrame& foot = model_.contacts()[contact];
+  updatePlacements<double>(model_, feet_, q);
+  const Vector3d off = X_WT.R.transpose() * (getPlacement(feet_, foot.body, foot.X_BF).p - X_WT.p);
+  const double room = getLandingRoom(foot, getSpec(landing)) + kLandingWay;
+  return off.head<2>().cwiseAbs().maxCoeff() <= room;
+}
+
 // The stage with which a foot stands that swings in this one but is on the ground early, or this stage.
-int WindowPlanner::findLanding(int stage, const std::vector<char>& contacts) const {
+int WindowPlanner::findLanding(int stage, const Measurement& measurement) {
+  const std::vector<char>& contacts = measurement.contacts;
   const int contacts_of_model = static_cast<int>(contacts.size());
   for (int contact = 0; contact < contacts_of_model; ++contact) {
     if (!contacts[contact] || stands(stage, contact)) continue;
     int begin = stage, end = stage;  // of the swing
     while (begin > horizon_->getBegin() && !stands(begin - 1, contact)) --begin;
     while (end < horizon_->getEnd() && !stands(end, contact)) ++end;
-    if (end < horizon_->getEnd() && stage - begin > (end - begin) / 2 && end - stage >= kEarly) return end;
+    if (end < horizon_->getEnd() && stage - begin > (end - begin) / 2 && end - stage >= kEarly &&
+        isOverFoothold(end, contact, measurement.q))
+      return end;
   }
   return stage;
 }
@@ -148,7 +172,7 @@ int WindowPlanner::chooseNext(const Request& request, Solution& solution) {
   const int next = request.stage + 1;
   if (contacts.empty()) return next;
   if (late_.foot < 0) {
-    const int landing = findLanding(next, contacts);
+    const int landing = findLanding(next, request.measurement);
     solution.early = landing != next;
     if (solution.early) return landing;
     while (late_.foot < 0 && checked_ < request.stage - kLate)

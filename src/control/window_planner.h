@@ -48,7 +48,9 @@ class WindowPlanner {
   Fddp makeSolver(int iterations) const;
   void solveFromRest();
   bool stands(int stage, int contact) const;
-  int findLanding(int stage, const std::vector<char>& contacts) const;
+  int findLanding(int stage, const Measurement& measurement);
+  bool isOverFoothold(int landing, int contact, ConstVectorRef q);
+  const SE3& getFoothold(int stage, int contact) const;
   int findLateFoot(int landing, const std::vector<char>& contacts) const;
   void lower(int foot, int landing);
   int chooseNext(const Request& request, Solution& solution);
@@ -73,6 +75,7 @@ class WindowPlanner {
   Window window_;
   RobotEvaluator evaluator_;
   ImpactWorkspace impact_;
+  Workspace feet_;
   Fddp solver_;
   ShootingTrajectory trajectory_;  // of the window
   std::deque<VectorXd> past_us_;   // of the stages before the window, as many as it may go back

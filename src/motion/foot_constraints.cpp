@@ -50,6 +50,12 @@ void addLanding(const ContactFrame& contact, const SE3& X_WF, double room, doubl
   velocity.upper.head<3>() << speed, speed, -speed;
 }
 
+double getLandingRoom(const ContactFrame& contact, const StageSpec& stage) {
+  for (const PathConstraint& constraint : stage.path_constraints)
+    if (constraint.name == "landing of " + contact.name) return constraint.upper[0];
+  return kFree;
+}
+
 void addClearance(const ContactFrame& contact, const Ground& ground, double ramp, double least, StageSpec& stage) {
   auto residual =
       makeSoleClearance({contact.body, contact.X_BF}, contact.half_length, contact.half_width, ground, ramp);

@@ -8,6 +8,9 @@ namespace bielle {
 // place, and turned about z such that its corners move by as much; and it comes down at `speed`, m/s.
 void addLanding(const ContactFrame& contact, const SE3& X_WF, double room, double speed, StageSpec& stage);
 
+// How far from its foothold a foot may land with this stage, along x and y, m; infinite where the stage has no landing of it.
+double getLandingRoom(const ContactFrame& contact, const StageSpec& stage);
+
 // All corners of the sole are at least `least` m over the ground, whose steps have ramps (makeSoleClearance).
 void addClearance(const ContactFrame& contact, const Ground& ground, double ramp, double least, StageSpec& stage);
 // Whether check and motion ask for full clearance at node i of n in the air: in the middle half.

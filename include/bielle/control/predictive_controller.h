@@ -15,11 +15,11 @@
 /// machine. Or, for a robot, solves run in a thread of their own, and update() never waits: a solution that is found after t_{k+1}
 /// comes into force when it is found, and stages that begin meanwhile are not solved for.
 ///
-/// A foot that is on the ground in the second half of its swing (Measurement::contacts) has landed: the motion goes on with the
-/// stage of its landing, and stays ahead of the plan by what the swing was cut short. A foot that is not on the ground one stage
-/// after its landing, while another one carries, is lowered at 0.3 m/s until it is, by 5 cm at most: the last stages of its swing
-/// are rewritten and come into force again, and the motion stays behind the plan by as much. Meanwhile getPlanTime() is the
-/// instant of the landing.
+/// A foot that is on the ground in the second half of its swing (Measurement::contacts), where it may land, has landed: the
+/// motion goes on with the stage of its landing, and stays ahead of the plan by what the swing was cut short. A foot that is not
+/// on the ground one stage after its landing, while another one carries, is lowered at 0.3 m/s until it is, by 5 cm at most: the
+/// last stages of its swing are rewritten and come into force again, and the motion stays behind the plan by as much. Meanwhile
+/// getPlanTime() is the instant of the landing.
 ///
 /// After its last stage the motion is followed by as many copies of that stage as the window is long: the robot stands there.
 ///
