@@ -298,6 +298,19 @@ TEST_CASE("design gradient: bielle design by gradients, resumed, in fewer evalua
   CHECK(mma == Approx(slsqp).epsilon(1e-2));
 }
 
+TEST_CASE("design gradient: what needs no motion is designed without one") {
+  const RobotDirectory directory;
+  const std::string spec = directory.write("spec.yaml",
+                                           "generator: leg_biped\nvariables:\n"
+                                           "  - {name: mass, parameter: motor_mass, unit: kg, bounds: [0.5, 3]}\n"
+                                           "objective: [{measure: mass}]\n"
+                                           "search: {searches: 1, stages: [{algorithm: slsqp, evaluations: 4}]}\n");
+  const CommandResult result = runCommand({BIELLE_COMMAND, "design", spec, "-o", directory.path() + "/out"});
+  INFO(result.err);
+  REQUIRE(result.status == 0);
+  CHECK_THAT(result.out, Contains("-> 0.5 kg"));
+}
+
 TEST_CASE("design gradient: motions made anew, against motions made anew for neighbours") {
   const Parametrization robot = makeParametrization(readDesignSpec(kKnee));
   const std::vector<std::string> knees = {"motor_knee_left", "motor_knee_right"};

@@ -379,7 +379,7 @@ MeasurePieces getPiece(const Matrix& value, const std::vector<Matrix>& derivativ
 }  // namespace
 
 MeasurePieces calcMarginPieces(double least, const std::vector<MotorSlopes>& motions) {
-  MeasurePieces out = makePieces(0, motions.front().du.size());
+  MeasurePieces out;
   for (const MotorSlopes& motion : motions)
     for (const auto& [cluster, node] : listLeast(motion.margin))
       append(getPiece(motion.margin, motion.dmargin, cluster, node), out);
@@ -389,7 +389,7 @@ MeasurePieces calcMarginPieces(double least, const std::vector<MotorSlopes>& mot
 }
 
 MeasurePieces calcDistancePieces(const std::vector<MotorSlopes>& motions) {
-  MeasurePieces out = makePieces(0, motions.front().du.size());
+  MeasurePieces out;
   for (const MotorSlopes& motion : motions)
     for (const auto& [row, node] : listLeast(motion.distance))
       append(getPiece(motion.distance, motion.ddistance, row, node), out);

@@ -12,6 +12,12 @@ namespace {
 
 constexpr double kLimitShare = 1.01;  // of the margin: searches that end at a limit end inside it
 
+// Why there are no slopes, or empty: that of the last motion, after which none were calculated.
+const std::string& getFailure(const std::vector<MotorSlopes>& slopes) {
+  static const std::string none;
+  return slopes.empty() ? none : slopes.back().failure;
+}
+
 }  // namespace
 
 std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std::vector<ObjectiveTerm>& objective,
@@ -62,7 +68,7 @@ MeasurePieces DesignEvaluator::Data::calcStartMargins(const ArchitectureStart& b
     if (!outcomes.back().lifted.lifted()) return {};
   }
   const std::vector<MotorSlopes> slopes = calcKeptSlopes(base, x, outcomes);
-  return slopes.back().failure.empty() ? calcMarginPieces(kLimitShare * options.margin, slopes) : MeasurePieces();
+  return getFailure(slopes).empty() ? calcMarginPieces(kLimitShare * options.margin, slopes) : MeasurePieces();
 }
 
 MeasurePieces DesignEvaluator::Data::calcPieces(size_t i, const ArchitectureStart& base,
@@ -106,8 +112,8 @@ SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
   const std::vector<MotorSlopes> slopes =
       kept ? data.calcKeptSlopes(base, x, outcomes)
            : calcOptimumSlopes(data.robot, x, data.motions, outcomes, data.asked, base.left_out);
-  if (!slopes.back().failure.empty()) {
-    out.evaluation = {DesignStatus::MotionFailed, 2 * data.weight, {}, {}, {}, slopes.back().failure};
+  if (const std::string& failure = getFailure(slopes); !failure.empty()) {
+    out.evaluation = {DesignStatus::MotionFailed, 2 * data.weight, {}, {}, {}, failure};
     return out;
   }
   const RobotSlopes robot_slopes = calcRobotSlopes(data.robot, x, data.options.drives);
@@ -116,7 +122,7 @@ SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
   if (kept) out.limits = calcMarginPieces(kLimitShare * data.options.margin, slopes);
   if (!kept && data.mustKeep()) {
     out.limits = data.calcStartMargins(base, *model, x);
-    if (out.limits.values.size() == 0) {
+    if (out.limits.values.size() == 0 && !slopes.empty()) {
       out.terms.clear();
       return out;
     }
