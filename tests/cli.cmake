@@ -1,9 +1,5 @@
-bielle_test(cli SOURCES test_cli.cpp test_cli_solve.cpp LIBS bielle_io)
+bielle_command_test(cli SOURCES test_cli.cpp test_cli_solve.cpp LIBS bielle_io)
 target_link_libraries(test_cli PRIVATE nlohmann_json::nlohmann_json)
-target_compile_definitions(test_cli PRIVATE BIELLE_COMMAND="$<TARGET_FILE:bielle_command>")
-add_dependencies(test_cli bielle_command)
-# The whole path from a program to its motion: not for the builds with sanitizers.
-set_tests_properties(cli PROPERTIES LABELS system)
 
 # A separate project finds, links and runs an installation of the current build.
 add_test(NAME install COMMAND ${CMAKE_COMMAND}

@@ -2,7 +2,9 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <stdexcept>
 
 namespace fs = std::filesystem;
@@ -61,6 +63,16 @@ std::string replaceOnce(const std::string& text, const std::string& from, const 
   if (at == std::string::npos || text.find(from, at + 1) != std::string::npos)
     throw std::logic_error("not exactly one '" + from + "'");
   return text.substr(0, at) + to + text.substr(at + from.size());
+}
+
+std::string readFile(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+int countLines(const std::filesystem::path& path) {
+  const std::string text = readFile(path);
+  return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
 }
 
 RobotDirectory::RobotDirectory() {

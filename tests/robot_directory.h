@@ -1,5 +1,5 @@
 #pragma once
-// A small robot as text, to be mutated, and a temporary directory to read it from.
+// A small robot as text, to be mutated, a temporary directory to read it from, and what files hold.
 #include <filesystem>
 #include <string>
 
@@ -11,6 +11,10 @@ extern const char* const kToyYaml;
 
 /// `text` with the one place that reads `from` reading `to`; throws std::logic_error unless there is exactly one.
 std::string replaceOnce(const std::string& text, const std::string& from, const std::string& to);
+
+/// The whole file, empty if there is none; and its lines.
+std::string readFile(const std::filesystem::path& path);
+int countLines(const std::filesystem::path& path);
 
 /// A fresh directory, removed with everything in it at the end.
 class RobotDirectory {

@@ -1,7 +1,4 @@
 bielle_test(generators SOURCES test_generators.cpp test_conversions.cpp test_drake.cpp test_sdf.cpp LIBS bielle_io bielle_robots)
-bielle_test(parallel_bipeds SOURCES test_parallel_bipeds.cpp LIBS bielle_design)
-target_compile_definitions(test_parallel_bipeds PRIVATE BIELLE_COMMAND="$<TARGET_FILE:bielle_command>")
-add_dependencies(test_parallel_bipeds bielle_command)
-set_tests_properties(parallel_bipeds PROPERTIES LABELS system)
+bielle_command_test(parallel_bipeds SOURCES test_parallel_bipeds.cpp LIBS bielle_design)
 bielle_test(published SOURCES test_published.cpp LIBS bielle_io bielle_robots)
 set_tests_properties(published PROPERTIES LABELS system)

@@ -6,17 +6,16 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
-#include "bielle/motion/squat.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "bielle/robots/generators.h"
 #include "design/draft.h"
 #include "design/run.h"
+#include "design_trials.h"
 #include "robot_directory.h"
 #include "run_command.h"
 
@@ -42,8 +41,6 @@ DesignVariable makeShift(const std::string& name, double lower, double upper, st
   return variable;
 }
 
-Model loadBipetto() { return loadRobot(kRobots + "bipetto").model; }
-
 std::vector<DesignVariable> makeKnee() {
   return {makeLength("crank", 0.03, 0.08,
                      {{"motor_knee_right", "transmission_knee_right", kZ, "knee_crank_right"},
@@ -51,24 +48,7 @@ std::vector<DesignVariable> makeKnee() {
           makeShift("motor", -0.03, 0.03, {{"motor_knee_right", kX}, {"motor_knee_left", kX}})};
 }
 
-// A squat of no depth, short: the cheapest motion there is.
-DesignMotion makeSmallSquat() {
-  SquatOptions options;
-  options.depth = 0.95, options.duration = 0.6, options.settle = 0.06, options.time_step = 0.03;
-  return {"squat", [options](const Model& model, const VectorXd& q0) { return planSquat(model, options, q0); }};
-}
-
 const std::vector<ObjectiveTerm> kKneePeak = {{Measure::PeakTorque, {"motor_knee_left", "motor_knee_right"}, 1}};
-
-std::string readFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-int countLines(const std::string& path) {
-  const std::string text = readFile(path);
-  return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
-}
 
 }  // namespace
 

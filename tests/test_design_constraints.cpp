@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
-#include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
 #include "design/run.h"
+#include "design_trials.h"
 #include "robot_directory.h"
 #include "run_command.h"
 
@@ -22,19 +20,7 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-const std::string kKnee = std::string(BIELLE_SOURCE_DIR) + "/examples/knee_design/knee.yaml";
-
-DesignMotion makeSquat(double depth) {
-  SquatOptions options;
-  options.depth = depth, options.duration = 0.8, options.settle = 0.1, options.time_step = 0.02;
-  return {"squat", [options](const Model& model, const VectorXd& q0) { return planSquat(model, options, q0); }};
-}
-
 double square(double x) { return x * x; }
-
-}  // namespace
-
-namespace {
 
 // A four-bar knee with motors of the catalogue, and what it is bounded by. Gears change limits and losses, lengths the rest.
 const char* const kBounded = R"(generator: leg_biped
@@ -83,10 +69,6 @@ MatrixXd pickActive(const DesignEvaluator& evaluator, const SlopedEvaluation& he
   }
   return out;
 }
-
-}  // namespace
-
-namespace {
 
 EvaluationOptions makeExactOptions(MotionMode mode, const std::vector<DesignConstraint>& constraints = {}) {
   EvaluationOptions options;
@@ -230,10 +212,7 @@ TEST_CASE("design constraints: a payload is a mass on the trunk of the robot's o
   const Parametrization knee = makeParametrization(readDesignSpec(kKnee));
   writeRobot(knee.startModel(), directory.path() + "/bare", "");
   const Model bare = loadRobot(directory.path() + "/bare").model;
-  const auto read = [&](const std::string& name) {
-    std::ifstream file(directory.path() + "/bare/" + name);
-    return std::string{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  };
+  const auto read = [&](const std::string& name) { return readFile(directory.path() + "/bare/" + name); };
   const Body& trunk = bare.bodies()[1];
   const auto load = [&](const Vector3d& at) {
     std::ostringstream bag;
@@ -327,8 +306,7 @@ TEST_CASE("design constraints: distances leave out what overlaps as drawn, and r
   const CommandResult result = runCommand({BIELLE_COMMAND, "design", path, "-o", out});
   INFO(result.err);
   REQUIRE(result.status == 0);
-  std::ifstream file(out + "/design.md");
-  const std::string page{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const std::string page = readFile(out + "/design.md");
   CHECK_THAT(page, Contains("The distance leaves out bodies") && Contains("shank_left and foot_link_left"));
 
   const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {

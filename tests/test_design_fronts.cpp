@@ -4,13 +4,11 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <set>
 #include <sstream>
 
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
-#include "bielle/motion/squat.h"
 #include "design/front_search.h"
 #include "design/run.h"
 #include "robot_directory.h"
@@ -21,19 +19,7 @@ using namespace bielle::testing;
 using Catch::Matchers::Contains;
 namespace fs = std::filesystem;
 
-namespace {
-
-std::string readFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-int countLines(const std::string& path) {
-  const std::string text = readFile(path);
-  return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
-}
-
-}  // namespace
+namespace {}  // namespace
 
 TEST_CASE("design: choices among numbers, on the front of two distances") {
   if (!hasFrontSearch()) return;

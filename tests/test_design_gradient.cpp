@@ -4,15 +4,14 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
-#include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
 #include "check_derivative.h"
 #include "design/run.h"
+#include "design_trials.h"
 #include "robot_directory.h"
 #include "run_command.h"
 
@@ -21,16 +20,6 @@ using namespace bielle::testing;
 using Catch::Matchers::Contains;
 
 namespace {
-
-const std::string kKnee = std::string(BIELLE_SOURCE_DIR) + "/examples/knee_design/knee.yaml";
-
-DesignMotion makeSquat(double depth) {
-  SquatOptions options;
-  options.depth = depth, options.duration = 0.8, options.settle = 0.1, options.time_step = 0.02;
-  return {"squat", [options](const Model& model, const VectorXd& q0) { return planSquat(model, options, q0); }};
-}
-
-DesignMotion makeSmallSquat() { return makeSquat(0.9); }
 
 DesignMotion makeShortWalk() {
   WalkOptions options;
@@ -54,7 +43,7 @@ TEST_CASE("design gradient: Bipetto's knee, torques and energy of kept motions")
   const std::vector<std::string> knees = {"motor_knee_left", "motor_knee_right"};
   EvaluationOptions options;
   options.mode = MotionMode::Kept;
-  const DesignEvaluator evaluator(robot, {makeSmallSquat(), makeShortWalk()},
+  const DesignEvaluator evaluator(robot, {makeSquat(0.9), makeShortWalk()},
                                   {{Measure::PeakTorque, knees, 1},
                                    {Measure::RmsTorque, knees, 2},
                                    {Measure::Energy, knees, 0.5},
@@ -147,7 +136,7 @@ TEST_CASE("design gradient: the margin is that of the lift") {
     EvaluationOptions options;
     options.mode = MotionMode::Kept;
     options.margin = margin;
-    return DesignEvaluator(robot, {makeSmallSquat()}, {{Measure::RmsTorque, {}, 1}}, options);
+    return DesignEvaluator(robot, {makeSquat(0.9)}, {{Measure::RmsTorque, {}, 1}}, options);
   };
   const MeasurePieces limits = make(0.1).differentiate(robot.start()).limits;
   const double least = std::sqrt(square(1.01 * 0.1) - limits.values.maxCoeff());
@@ -158,7 +147,7 @@ TEST_CASE("design gradient: the margin is that of the lift") {
   EvaluationOptions options;
   options.mode = MotionMode::Kept;
   options.constraints = {{Measure::Margin, {}, 0.5, true}};
-  const DesignEvaluator bounded(robot, {makeSmallSquat()}, {{Measure::RmsTorque, {}, 1}}, options);
+  const DesignEvaluator bounded(robot, {makeSquat(0.9)}, {{Measure::RmsTorque, {}, 1}}, options);
   CHECK(bounded.start().constraints[0] == Approx(least).epsilon(1e-9));
   CHECK(bounded.start().status == DesignStatus::Violated);
 }
@@ -238,11 +227,6 @@ TEST_CASE("design gradient: searches with gradients take kinks and limits") {
 
 namespace {
 
-std::string readFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
 // Bipetto's knee with a short squat, searched by one algorithm.
 std::string makeSpec(const std::string& algorithm) {
   std::string text = readFile(kKnee);
@@ -309,6 +293,13 @@ TEST_CASE("design gradient: what needs no motion is designed without one") {
   INFO(result.err);
   REQUIRE(result.status == 0);
   CHECK_THAT(result.out, Contains("-> 0.5 kg"));
+
+  const std::string bounded = directory.write(
+      "bounded.yaml",
+      replaceOnce(readFile(spec), "search:", "constraints: [{measure: electrical_energy, at_most: 10}]\nsearch:"));
+  const CommandResult refused = runCommand({BIELLE_COMMAND, "design", bounded, "-o", directory.path() + "/bounded"});
+  CHECK(refused.status == 2);
+  CHECK_THAT(refused.err, Contains("motions: there are none"));
 }
 
 TEST_CASE("design gradient: motions made anew, against motions made anew for neighbours") {
@@ -317,7 +308,7 @@ TEST_CASE("design gradient: motions made anew, against motions made anew for nei
   EvaluationOptions options;
   options.solver.gradient_tolerance = 1e-13;
   options.solver.cost_tolerance = 0;
-  const DesignEvaluator evaluator(robot, {makeSmallSquat(), makeShortWalk()},
+  const DesignEvaluator evaluator(robot, {makeSquat(0.9), makeShortWalk()},
                                   {{Measure::Cost, {}, 1},
                                    {Measure::PeakTorque, knees, 1},
                                    {Measure::RmsTorque, knees, 2},
@@ -377,6 +368,6 @@ TEST_CASE("design gradient: stages that need gradients are refused where there a
 
   const Parametrization robot = makeParametrization(readDesignSpec(kKnee));
   CHECK_THROWS_WITH(
-      DesignEvaluator(robot, {makeSmallSquat()}, {{Measure::Conditioning, {}, 1}}).differentiate(robot.start()),
+      DesignEvaluator(robot, {makeSquat(0.9)}, {{Measure::Conditioning, {}, 1}}).differentiate(robot.start()),
       Contains("conditioning"));
 }

@@ -3,16 +3,14 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <set>
 
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
-#include "bielle/motion/squat.h"
 #include "design/front_search.h"
 #include "design/motor_change.h"
 #include "design/run.h"
+#include "design_trials.h"
 #include "robot_directory.h"
 #include "run_command.h"
 
@@ -20,26 +18,6 @@ using namespace bielle;
 using namespace bielle::testing;
 using Catch::Matchers::Contains;
 namespace fs = std::filesystem;
-
-namespace {
-
-const std::string kRobots = std::string(BIELLE_SOURCE_DIR) + "/robots/";
-
-Model loadBipetto() { return loadRobot(kRobots + "bipetto").model; }
-
-// A squat of no depth, short: the cheapest motion there is.
-DesignMotion makeSmallSquat() {
-  SquatOptions options;
-  options.depth = 0.95, options.duration = 0.6, options.settle = 0.06, options.time_step = 0.03;
-  return {"squat", [options](const Model& model, const VectorXd& q0) { return planSquat(model, options, q0); }};
-}
-
-std::string readFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-}  // namespace
 
 TEST_CASE("design: a gear scales what is behind it, a type brings what is in it") {
   Motor motor;

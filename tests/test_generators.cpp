@@ -2,8 +2,6 @@
 #include <Eigen/Eigenvalues>
 #include <catch2/catch.hpp>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 
 #include "bielle/dynamics/assembly.h"
@@ -30,11 +28,6 @@ using namespace bielle::testing;
 namespace {
 
 const std::string kRobots = std::string(BIELLE_SOURCE_DIR) + "/robots/";
-
-std::string readFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 // The same text, numbers to their rounding: the last digit is the compiler's.
 void checkSameText(const std::string& a, const std::string& b) {

@@ -2,7 +2,6 @@
 // people and programs make (values out of range, names exchanged, lines lost or doubled, files truncated) and some that
 // nobody makes. tests/fuzz continues from there, guided by coverage.
 #include <catch2/catch.hpp>
-#include <fstream>
 #include <iostream>
 #include <map>
 #include <random>
@@ -21,11 +20,6 @@ namespace {
 struct RobotFiles {
   std::string name, urdf, yaml;
 };
-
-std::string readFile(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 // The toy, and the smaller ones of the robots of the source tree.
 std::vector<RobotFiles> collectRobots() {

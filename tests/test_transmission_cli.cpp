@@ -9,6 +9,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/model/reader.h"
 #include "bielle/transmission/ratio.h"
+#include "robot_directory.h"
 #include "run_command.h"
 
 namespace fs = std::filesystem;
@@ -28,13 +29,6 @@ void checkRefused(const CommandResult& result, const std::string& text) {
   CHECK(result.status == 2);
   CHECK(result.out.empty());
   CHECK_THAT(result.err, Catch::StartsWith("bielle: error: ") && Catch::Contains(text));
-}
-
-std::string readFile(const fs::path& path) {
-  std::ifstream file(path);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
 }
 
 class OutputDirectory {

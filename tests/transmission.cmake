@@ -1,7 +1,4 @@
 bielle_test(ratio SOURCES test_ratio.cpp LIBS bielle_transmission bielle_robots)
 bielle_test(serial SOURCES test_serial.cpp LIBS bielle_transmission)
-bielle_test(transmission_cli SOURCES test_transmission_cli.cpp LIBS bielle_io)
+bielle_command_test(transmission_cli SOURCES test_transmission_cli.cpp LIBS bielle_io)
 target_link_libraries(test_transmission_cli PRIVATE nlohmann_json::nlohmann_json)
-target_compile_definitions(test_transmission_cli PRIVATE BIELLE_COMMAND="$<TARGET_FILE:bielle_command>")
-add_dependencies(test_transmission_cli bielle_command)
-set_tests_properties(transmission_cli PROPERTIES LABELS system)

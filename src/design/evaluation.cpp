@@ -37,9 +37,11 @@ const char* getName(DesignStatus status) {
 void DesignEvaluator::Data::checkSpec() {
   const Model& model = robot.startModel();
   makeDrives(model, options.drives);  // \throws what is wrong with them
-  const bool needs_motions = std::any_of(objective.begin(), objective.end(), [](const ObjectiveTerm& term) {
-    return term.measure != Measure::Workspace && term.measure != Measure::Mass;
-  });
+  const auto is_of_motions = [](const auto& asked_for) {
+    return asked_for.measure != Measure::Workspace && asked_for.measure != Measure::Mass;
+  };
+  const bool needs_motions = std::any_of(objective.begin(), objective.end(), is_of_motions) ||
+                             std::any_of(options.constraints.begin(), options.constraints.end(), is_of_motions);
   if (motions.empty() && needs_motions)
     throw ModelError(model.name(), "motions", "there are none", "name at least one");
   for (const DesignMotion& motion : motions) {
@@ -98,7 +100,7 @@ std::vector<double> DesignEvaluator::Data::listWeights() const {
 }
 
 std::vector<double> DesignEvaluator::Data::listWeights(const DesignConstraint& constraint) const {
-  return isSum(constraint.measure) ? listWeights() : std::vector<double>(motions.size(), 1);
+  return isSum(constraint.measure) ? listWeights() : std::vector<double>();
 }
 
 void DesignEvaluator::Data::solveStart() {

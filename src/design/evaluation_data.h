@@ -32,7 +32,7 @@ struct DesignEvaluator::Data {
   bool mustKeep() const { return options.mode == MotionMode::Kept || options.margin > EvaluationOptions().margin; }
   void checkSpec();
   void solveStart();
-  // Of the motions, in an objective and in a constraint on a measure.
+  // Of the motions, in an objective and in a constraint on a measure; empty: 1.
   std::vector<double> listWeights() const;
   std::vector<double> listWeights(const DesignConstraint& constraint) const;
   // The start of the architecture of x, made if need be. Called by several threads.
