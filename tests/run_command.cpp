@@ -12,13 +12,10 @@
 #include <stdexcept>
 #include <thread>
 
+#include "robot_directory.h"
+
 namespace bielle::testing {
 namespace {
-
-std::string readText(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 void redirect(const std::string& path, int flags, int descriptor) { dup2(open(path.c_str(), flags, 0600), descriptor); }
 
@@ -53,7 +50,7 @@ Command::~Command() {
 bool Command::waitForOutput(const std::string& text, double seconds) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
   while (std::chrono::steady_clock::now() < deadline) {
-    if (readText(directory_ + "/out").find(text) != std::string::npos) return true;
+    if (readFile(directory_ + "/out").find(text) != std::string::npos) return true;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   return false;
@@ -67,8 +64,8 @@ CommandResult Command::wait() {
   pid_ = -1;
   CommandResult result;
   result.status = WIFEXITED(state) ? WEXITSTATUS(state) : 128 + WTERMSIG(state);
-  result.out = readText(directory_ + "/out");
-  result.err = readText(directory_ + "/err");
+  result.out = readFile(directory_ + "/out");
+  result.err = readFile(directory_ + "/err");
   return result;
 }
 

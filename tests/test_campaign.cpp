@@ -22,16 +22,6 @@ using nlohmann::json;
 
 namespace {
 
-std::string readText(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
-int countLines(const fs::path& path) {
-  const std::string text = readText(path);
-  return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
-}
-
 const char* const kMotion =
     "{name: walk, solve: walk, robot: " BIELLE_SOURCE_DIR "/robots/bipetto, set: {speed: 0.4, steps: 2}}";
 
@@ -49,7 +39,7 @@ CommandResult runCampaign(const std::string& spec, const std::string& out, const
 // The text of everything that a campaign writes but the log, whose order is that of arrival.
 std::string readResults(const fs::path& out) {
   std::string text;
-  for (const char* name : {"runs.csv", "campaign.md", "summary.json", "map.svg"}) text += readText(out / name);
+  for (const char* name : {"runs.csv", "campaign.md", "summary.json", "map.svg"}) text += readFile(out / name);
   return text;
 }
 
@@ -78,13 +68,13 @@ TEST_CASE("campaign: a grid of runs, the same bytes with one process or several,
   REQUIRE(result.status == 0);
   CHECK(countProgress(result) == 12);
   CHECK(countLines(out + "/runs.jsonl") == 13);
-  const json summary = json::parse(readText(out + "/summary.json"));
+  const json summary = json::parse(readFile(out + "/summary.json"));
   CHECK(summary["runs"] == 12);
   CHECK(summary["outcomes"]["stood"].get<int>() + summary["outcomes"]["fell"].get<int>() == 12);
   CHECK(summary["axes"]["friction"]["0.7"]["stood"] > 0);
   CHECK(summary["axes"]["friction"]["0.7"]["runs"] == 6);
   CHECK(summary["axes"]["push impulse"]["60"]["stood"] == 0);
-  CHECK_THAT(readText(out + "/campaign.md"), Contains("| friction | stood | of |"));
+  CHECK_THAT(readFile(out + "/campaign.md"), Contains("| friction | stood | of |"));
 
   // A run by itself: phase 1 of the plan, the first step, lasts from 0.3 to 0.66 s.
   const std::string alone = directory.path() + "/alone";
@@ -92,8 +82,8 @@ TEST_CASE("campaign: a grid of runs, the same bytes with one process or several,
       runCommand({BIELLE_COMMAND, "simulate", out + "/motions/walk/motion", "-o", alone, "--summary-only", "--friction",
                   "0.7", "--duration", "0.9", "--push", "t=0.48,direction=90,impulse=1"});
   REQUIRE(simulated.status < 2);
-  const json one = json::parse(readText(alone + "/summary.json"));
-  std::istringstream log(readText(out + "/runs.jsonl"));
+  const json one = json::parse(readFile(alone + "/summary.json"));
+  std::istringstream log(readFile(out + "/runs.jsonl"));
   int found = 0;
   for (std::string line; std::getline(log, line);) {
     const json entry = json::parse(line);
@@ -153,7 +143,7 @@ TEST_CASE("campaign: the largest impulse that is survived, by bisection") {
   CAPTURE(result.err);
   REQUIRE(result.status == 0);
   CHECK(countProgress(result) <= 6);
-  const json found = json::parse(readText(out + "/summary.json"))["largest_impulses"][0];
+  const json found = json::parse(readFile(out + "/summary.json"))["largest_impulses"][0];
   CHECK(found["bounded"] == true);
   const int survived = found["survived_Ns"];
   REQUIRE(survived >= 1);

@@ -31,11 +31,6 @@ groups: {hips: [hip], knees and ankles: [knee, ankle]}
 drives: {motor_constant: 1.5, regeneration: 1}
 )";
 
-std::string readText(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
 // Lines of compare.csv by column; no cell holds a comma.
 std::vector<std::map<std::string, std::string>> readTable(const fs::path& path) {
   const auto split = [](const std::string& line) {
@@ -110,7 +105,7 @@ TEST_CASE("compare: same mass, same motion, numbers of the cases, and only what 
     CHECK(std::stod(row["electrical_energy_J"]) == Approx(sums.electrical).epsilon(1e-7));
     CHECK(row["cost_of_transport"].empty());  // it stays where it is
   }
-  const std::string page = readText(out + "/compare.md");
+  const std::string page = readFile(out + "/compare.md");
   CHECK_THAT(page, Contains("| mass [kg] | 26.000 | 26.000 |"));
   CHECK_THAT(page, Contains("largest that passes"));
 
@@ -122,7 +117,7 @@ TEST_CASE("compare: same mass, same motion, numbers of the cases, and only what 
   size_t kept = 0;
   for (size_t at = text.find(": kept"); at != std::string::npos; at = text.find(": kept", at + 1)) ++kept;
   CHECK(kept == 3);
-  CHECK(readText(out + "/compare.md") == page);
+  CHECK(readFile(out + "/compare.md") == page);
 }
 
 TEST_CASE("compare: what is wrong is told with its place and remedy") {

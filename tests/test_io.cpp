@@ -17,6 +17,7 @@
 #include "get_error.h"
 #include "io/opensim.h"
 #include "problem_probe.h"
+#include "robot_directory.h"
 
 namespace fs = std::filesystem;
 using namespace bielle;
@@ -36,11 +37,6 @@ class TemporaryDirectory {
  private:
   fs::path path_;
 };
-
-std::string readText(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 void writeText(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
 
@@ -219,7 +215,7 @@ TEST_CASE("midpoint steps are recorded with the points to which their accelerati
   writeResult(directory / "", result);
   CHECK(readSummary(directory / "").step == StepRule::Midpoint);
   // Summaries of Euler steps may leave the rule out.
-  std::string text = readText(directory / "summary.json");
+  std::string text = readFile(directory / "summary.json");
   const std::string entry = "\"step\": \"midpoint\",";
   REQUIRE(text.find(entry) != std::string::npos);
   text.replace(text.find(entry), entry.size(), "");
@@ -305,7 +301,7 @@ TEST_CASE("files that are no trajectories are refused with the file and the plac
   const ShortSquat squat;
   writeCsv(directory / "good.csv", makeRecord(squat.motion, squat.motion.guess));
   writeNpz(directory / "good.npz", makeRecord(squat.motion, squat.motion.guess));
-  const std::string csv = readText(directory / "good.csv"), npz = readText(directory / "good.npz");
+  const std::string csv = readFile(directory / "good.csv"), npz = readFile(directory / "good.npz");
 
   CHECK_THAT(getErrorOfReading(directory / "none.csv"), Catch::Contains("none.csv: file: it cannot be read"));
   CHECK_THAT(getErrorOfReading(directory / "none.npz"), Catch::Contains("none.npz: file: it cannot be read"));
@@ -350,7 +346,7 @@ TEST_CASE("a result is three whole files, written again over the old ones") {
     CHECK(std::distance(fs::directory_iterator(place), fs::directory_iterator()) == 3);
     checkEqual(readRecord(paths[0]), result.record);
     checkEqual(readRecord(paths[1]), result.record);
-    CHECK_THAT(readText(paths[2]), Catch::Contains("\"termination\": \"interrupted\"") &&
+    CHECK_THAT(readFile(paths[2]), Catch::Contains("\"termination\": \"interrupted\"") &&
                                        Catch::Contains("\"interrupted\": true") && Catch::Contains("\"cost\": 2.5"));
   }
 }

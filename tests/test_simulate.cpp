@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "bielle/io/record.h"
+#include "robot_directory.h"
 #include "run_command.h"
 
 namespace bielle {
@@ -13,17 +14,11 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::CommandResult;
+using testing::readFile;
 using testing::runCommand;
 
-std::string read(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 nlohmann::json readSummary(const fs::path& directory) {
-  return nlohmann::json::parse(read(directory / "summary.json"));
+  return nlohmann::json::parse(readFile(directory / "summary.json"));
 }
 
 // A walk of two steps, solved once.
@@ -110,7 +105,7 @@ TEST_CASE("simulate: the plan lies beside what happened, and the page shows both
   const nlohmann::json pushes = readSummary(output)["pushes"];
   REQUIRE(pushes.size() == 1);
   CHECK(pushes[0]["direction_deg"] == 90);
-  CHECK(read(output + "/report.html").find("\"plan\":{") != std::string::npos);
+  CHECK(readFile(output + "/report.html").find("\"plan\":{") != std::string::npos);
   const std::string bare = (scratch.path / "bare").string();
   REQUIRE(simulate(bare, {"--no-report", "--duration", "0.1"}).status == 0);
   CHECK_FALSE(fs::exists(bare + "/report.html"));
@@ -180,7 +175,7 @@ TEST_CASE("simulate: the same command writes the same bytes; ground, robot, push
     options.insert(options.end(), {"--duration", "0.9"});
     const CommandResult result = simulate(output, options);
     REQUIRE(result.status < 2);
-    return read(output + "/trajectory.csv");
+    return readFile(output + "/trajectory.csv");
   };
   const std::string first = record("first", {});
   CHECK(record("again", {}) == first);

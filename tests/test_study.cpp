@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "bielle/io/record.h"
+#include "robot_directory.h"
 #include "run_command.h"
 
 namespace fs = std::filesystem;
@@ -23,11 +24,6 @@ using namespace bielle::testing;
 using nlohmann::json;
 
 namespace {
-
-std::string readText(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 class StudyDirectory {
  public:
@@ -96,7 +92,7 @@ bool isAtWork(const std::string& text) {
   for (const fs::directory_entry& entry : fs::directory_iterator("/proc")) {
     const std::string name = entry.path().filename();
     if (name.find_first_not_of("0123456789") != std::string::npos || name == std::to_string(getpid())) continue;
-    if (readText(entry.path() / "cmdline").find(text) != std::string::npos) return true;
+    if (readFile(entry.path() / "cmdline").find(text) != std::string::npos) return true;
   }
   return false;
 }
@@ -134,7 +130,7 @@ TEST_CASE("a study compares the closed model with the lifted serial one") {
     CHECK(std::stod(row.at("knee_mean_Nm")) < std::stod(row.at("knee_peak_Nm")));
   }
   // One line per value in the page, with the numbers of the table; the figure is there.
-  const std::string page = readText(directory / "squat.md");
+  const std::string page = readFile(directory / "squat.md");
   CHECK_THAT(page,
              Catch::Contains("\n| 0.9 | converged | converged | lifted | lifted |") &&
                  Catch::Contains("\n| 0.95 | converged | converged | lifted | lifted |") &&
@@ -145,7 +141,7 @@ TEST_CASE("a study compares the closed model with the lifted serial one") {
   char peak[32];
   std::snprintf(peak, sizeof peak, "| %.1f |", std::stod(rows[0].at("knee_peak_Nm")));
   CHECK_THAT(page, Catch::Contains(peak));
-  CHECK_THAT(readText(directory / "squat.svg"), Catch::Contains("<svg") && Catch::Contains("serial, lifted"));
+  CHECK_THAT(readFile(directory / "squat.svg"), Catch::Contains("<svg") && Catch::Contains("serial, lifted"));
 }
 
 TEST_CASE("what a motion refuses is a result of the study") {
@@ -159,9 +155,9 @@ TEST_CASE("what a motion refuses is a result of the study") {
                Catch::Contains(row.at("model") == "lifted" || row.at("model") == "stepped" ? "not done" : "refused: "));
     CHECK(row.at("knee_peak_Nm").empty());
   }
-  CHECK_THAT(readText(directory / "squat.md"),
+  CHECK_THAT(readFile(directory / "squat.md"),
              Catch::Contains("closed: 0 of 2 converge") && Catch::Contains("| differs |"));
-  CHECK_THAT(readText(directory / "squat.svg"), Catch::Contains("no results"));
+  CHECK_THAT(readFile(directory / "squat.svg"), Catch::Contains("no results"));
 }
 
 TEST_CASE("a killed study leaves no process behind and goes on where it was") {
@@ -174,7 +170,7 @@ TEST_CASE("a killed study leaves no process behind and goes on where it was") {
   CHECK(waitUntilIdle(directory.str() + "/cases"));
   const fs::path first = directory / "cases/squat-depth-0.92-closed",
                  third = directory / "cases/squat-depth-0.94-closed";
-  const std::string kept = readText(first / "case.json");
+  const std::string kept = readFile(first / "case.json");
   CHECK(json::parse(kept).at("outcome").at(0).at("status") == 0);
   CHECK_FALSE(fs::exists(directory / "squat.csv"));
   // The case that was cut short is done anew: nothing of it stays.
@@ -189,7 +185,7 @@ TEST_CASE("a killed study leaves no process behind and goes on where it was") {
                             Catch::Contains("squat-depth-0.92-serial: kept") &&
                             Catch::Contains("squat-depth-0.94-closed: done (") &&
                             Catch::Contains("squat-depth-0.96-serial: done ("));
-  CHECK(readText(first / "case.json") == kept);
+  CHECK(readFile(first / "case.json") == kept);
   CHECK_FALSE(fs::exists(third / "half"));
   CHECK(readTable(directory / "squat.csv").size() == 12);
 }
@@ -209,13 +205,13 @@ TEST_CASE("a study that is interrupted says so; cases of another request are don
   CHECK(waitUntilIdle(directory.str() + "/cases"));
 
   const fs::path record = directory / "cases/squat-depth-0.92-closed/case.json";
-  json changed = json::parse(readText(record));
+  json changed = json::parse(readFile(record));
   changed["request"]["identity"] = "another version";
   std::ofstream(record) << changed;
   const CommandResult again = directory.run("squat", {"--values", "0.92"});
   CHECK(again.status == 0);
   CHECK_THAT(again.out, Catch::Contains("squat-depth-0.92-closed: done ("));
-  CHECK(json::parse(readText(record)) != changed);
+  CHECK(json::parse(readFile(record)) != changed);
 }
 
 TEST_CASE("without gnuplot a study has no figures, and says so") {
@@ -227,7 +223,7 @@ TEST_CASE("without gnuplot a study has no figures, and says so") {
   CHECK_THAT(result.err, Catch::Contains("squat.svg: not drawn, there is no gnuplot"));
   CHECK_FALSE(fs::exists(directory / "squat.svg"));
   CHECK(fs::exists(directory / "squat.csv"));
-  CHECK_THAT(readText(directory / "squat.md"), Catch::Contains("there is no gnuplot"));
+  CHECK_THAT(readFile(directory / "squat.md"), Catch::Contains("there is no gnuplot"));
 }
 
 TEST_CASE("bad studies are refused") {
