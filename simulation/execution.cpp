@@ -160,7 +160,6 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   const int ticks = std::max(1, static_cast<int>(std::lround(duration / o.control_period)));
   const int ticks_per_row = std::max(1, static_cast<int>(std::lround(o.record_period / o.control_period)));
   Recorder recorder(model, (ticks + ticks_per_row - 1) / ticks_per_row);
-  FallDetector detector(model, plan, o.fall, o.ground, o.planned_ground);
 
   Execution out;
   Perception perception(plan.getModel(), o.perception);
@@ -175,6 +174,7 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
     Workspace ws(model);
     world.reset(q, projectVelocity(model, ws, makeConstraintSet(model), q, measurement.v));
   }
+  FallDetector detector(model, plan, world.getConfiguration(), o.fall, o.ground, o.planned_ground);
   perception.reset(world, measurement.q, measurement.v);
   out.start = out.end = world.getBooks();
   recorder.addNode(world);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "bielle/model/error.h"
 #include "model/number_text.h"
 
 namespace bielle::simulation {
@@ -18,8 +19,8 @@ bool isTurning(const Joint& joint) { return joint.kind == JointKind::Revolute ||
 
 }  // namespace
 
-FallDetector::FallDetector(const Model& model, const Policy& plan, const FallCriterion& criterion, const Ground& ground,
-                           const Ground& planned_ground)
+FallDetector::FallDetector(const Model& model, const Policy& plan, const VectorXd& q, const FallCriterion& criterion,
+                           const Ground& ground, const Ground& planned_ground)
     : model_(model),
       plan_(plan),
       criterion_(criterion),
@@ -29,10 +30,9 @@ FallDetector::FallDetector(const Model& model, const Policy& plan, const FallCri
       v_(VectorXd::Zero(model.nv())),
       motors_(model.nu()) {
   if (!criterion.only_whirling || model.closures().empty()) return;
-  plan.getReference(0, q_, v_);
   try {
-    linkages_.emplace(model, q_);
-  } catch (const std::exception&) {
+    linkages_.emplace(model, q);
+  } catch (const ModelError&) {
     // Motors do not determine all joints: nothing can be said of where linkages would follow them.
   }
 }

@@ -26,9 +26,10 @@ struct FallCriterion {
 /// Compares a robot with its plan.
 class FallDetector {
  public:
-  /// \param model  of the robot, \param plan  must outlive it   \param ground  of the world   \param planned_ground  of the plan
-  FallDetector(const Model& model, const Policy& plan, const FallCriterion& criterion, const Ground& ground,
-               const Ground& planned_ground);
+  /// \param model  of the robot, which may differ from that of the plan, \param plan  must outlive it
+  /// \param q  closed configuration of the robot (nq)   \param ground  of the world   \param planned_ground  of the plan
+  FallDetector(const Model& model, const Policy& plan, const VectorXd& q, const FallCriterion& criterion,
+               const Ground& ground, const Ground& planned_ground);
 
   /// Why the robot counts as fallen, or nothing. \param plan_time  the instant of the plan at which it should be
   std::string find(double time, double plan_time, const VectorXd& q);

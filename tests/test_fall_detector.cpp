@@ -4,7 +4,9 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/model/reader.h"
+#include "bielle/motion/motion.h"
 #include "simulation/fall_detector.h"
+#include "simulation/robot_errors.h"
 
 namespace bielle::simulation {
 namespace {
@@ -46,7 +48,7 @@ struct Linkage {
   bool isFallen(const VectorXd& q, bool only_whirling) const {
     FallCriterion criterion;
     criterion.only_whirling = only_whirling;
-    return !FallDetector(model, *plan, criterion, {}, {}).find(0, 0, q).empty();
+    return !FallDetector(model, *plan, planned, criterion, {}, {}).find(0, 0, q).empty();
   }
 
   Model model;
@@ -75,6 +77,38 @@ TEST_CASE("falls: a linkage that has passed a dead point is one, even with its m
     CHECK(linkage.isFallen(crossed, false));
     CHECK(linkage.isFallen(crossed, true));
   }
+}
+
+// Motors of an ankle turned by 1.6 rad from the plan, on a robot whose rods are not those of its model.
+TEST_CASE("falls: linkages of a robot that differs from its model are followed back as well") {
+  const Model model = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto").model;
+  const Model machine = makeMachine(model, {0, 5e-4, 1});
+  const VectorXd q0 = makeStandingPosture(model);
+  const int first = model.findMotor("motor_ankle1_right"), second = model.findMotor("motor_ankle2_right");
+  const auto turn = [&](const Model& of, const VectorXd& from, double to_first, double to_second) {
+    PassiveJoints joints(of, from);
+    VectorXd q = from, start(of.nu());
+    for (int m = 0; m < of.nu(); ++m) start[m] = from[of.joints()[of.motors()[m].joint].idx_q];
+    VectorXd end = start;
+    end[first] = to_first;
+    end[second] = to_second;
+    constexpr int kSteps = 40;
+    for (int i = 1; i <= kSteps; ++i)
+      REQUIRE(joints.update(start + (end - start) * i / kSteps, q) == ClosingStatus::Closed);
+    return q;
+  };
+  Policy::Stage stage;
+  stage.duration = 1;
+  stage.q = turn(model, q0, -1.0, 0.5);
+  stage.v = stage.q_change = stage.v_next = VectorXd::Zero(model.nv());
+  stage.u = VectorXd::Zero(model.nu());
+  const Policy plan(model, {stage}, stage.u);
+  const VectorXd q_start = assembleMachine(model, machine, stage.q);
+  const VectorXd q = turn(machine, q_start, 0.58, -1.2);
+  FallCriterion criterion;
+  CHECK_FALSE(FallDetector(machine, plan, q_start, criterion, {}, {}).find(0, 0, q).empty());
+  criterion.only_whirling = true;
+  CHECK(FallDetector(machine, plan, q_start, criterion, {}, {}).find(0, 0, q).empty());
 }
 
 }  // namespace bielle::simulation
