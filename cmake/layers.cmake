@@ -108,7 +108,9 @@ function(bielle_layer name)
     target_include_directories(bielle_${name} PRIVATE ${PROJECT_SOURCE_DIR}/src ${ARG_INCLUDE})
     target_link_libraries(bielle_${name}
       PUBLIC bielle_headers ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:bielle_warnings>)
-    bielle_precompile(bielle_${name} layers)
+    if(NOT OpenMP::OpenMP_CXX IN_LIST ARG_PRIVATE)  # its flags are others
+      bielle_precompile(bielle_${name} layers)
+    endif()
   endif()
   add_library(bielle::${name} ALIAS bielle_${name})
   set_target_properties(bielle_${name} PROPERTIES EXPORT_NAME ${name})
