@@ -8,6 +8,7 @@ if(BIELLE_BUILD_SIMULATION)
   bielle_test(serial_belief SOURCES test_serial_belief.cpp LIBS bielle_simulation)
   bielle_test(bielle_world SOURCES test_bielle_world.cpp world_trials.cpp LIBS bielle_simulation)
   target_link_options(test_bielle_world PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
+  bielle_test(dead_point_stop SOURCES test_dead_point_stop.cpp LIBS bielle_simulation)
   bielle_test(predictive_controller SOURCES test_predictive_controller.cpp LIBS bielle_simulation)
   target_link_options(test_predictive_controller PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
   # Whole walks, step by step: many minutes under sanitizers.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "control/dead_point_stop.h"
 #include "control/solving_thread.h"
 
 namespace bielle {
@@ -17,7 +18,9 @@ constexpr size_t kTimes = 100000;         // that are kept
 class PredictiveController::Loop {
  public:
   Loop(std::unique_ptr<Horizon> horizon, const PredictiveOptions& options)
-      : planner_(std::move(horizon), options), solution_(planner_.makeEmpty()) {
+      : planner_(std::move(horizon), options),
+        solution_(planner_.makeEmpty()),
+        dead_point_stop_(planner_.getModel(), planner_.getStartPosture(), options.dead_point_stop) {
     const Model& model = planner_.getModel();
     WindowPlanner::Solution first = planner_.makeFirst();
     policy_ = std::make_unique<Policy>(model, std::move(first.stages), first.u_hold);
@@ -39,6 +42,7 @@ class PredictiveController::Loop {
       ready_ = false;
     }
     policy_->update(measurement, u);
+    dead_point_stop_.add(measurement, u);
     const int before = stage_;
     while (measurement.time + kClockTolerance >= getStart(stage_ + 1)) ++stage_;  // an impact takes no time
     if (stage_ != before) enter(measurement, u);
@@ -86,6 +90,7 @@ class PredictiveController::Loop {
   WindowPlanner planner_;
   WindowPlanner::Request request_;
   WindowPlanner::Solution solution_;  // that is not in force yet, or memory for the next one
+  DeadPointStop dead_point_stop_;
   std::unique_ptr<Policy> policy_;
   int stage_ = -1;       // the present one
   bool ready_ = false;   // the solution awaits the stage from which on it is in force

@@ -39,6 +39,7 @@ class WindowPlanner {
   void solve(const Request& request, Solution& solution);
 
   const Model& getModel() const { return model_; }
+  VectorXd getStartPosture() const { return problem_.initialState().head(model_.nq()); }
   // By the plan, s. Any thread may ask.
   double getStart(int stage) const { return horizon_->getStart(stage); }
 

@@ -38,35 +38,27 @@ class TransmissionMap {
   // Its derivative, to the dofs of the cluster in a row of nv.
   void calcJacobian(const Model& model, ConstVectorRef q, MatrixRef row) const {
     const Lease lease(*this);
+    gatherConfiguration(model, cluster_, q, lease->q);
+    for (int dof : cluster_.dofs) row(0, dof) = 0;
+    if (!updateTangent(*lease)) return;
+    updateDerivative(*lease);
+    for (size_t k = 0; k < cluster_.dofs.size(); ++k) row(0, cluster_.dofs[k]) = lease->derivative[k];
+  }
+
+  // rho, and its derivative by the motors of the model (nu).
+  double calcByMotors(const Model& model, ConstVectorRef q, VectorRef gradient) const {
+    const Lease lease(*this);
     Scratch& s = *lease;
     gatherConfiguration(model, cluster_, q, s.q);
-    for (int dof : cluster_.dofs) row(0, dof) = 0;
-    if (!updateTangent(s)) return;
-    const int m = static_cast<int>(motors_.size());
-    const double rho = s.Q.determinant() / reference_;
-    // z = (P_J - Q P_M)^T Q^{-T}: by columns the y_j of Eq. (2) before J^+.
-    s.inverse = s.Q.inverse();
-    s.z.setZero();
-    for (int i = 0; i < m; ++i)
-      for (int j = 0; j < m; ++j) s.z(joints_[i], j) += s.inverse(j, i);
-    for (int j = 0; j < m; ++j) s.z(motors_[j], j) -= 1;
-    const ClusterBasis& basis = s.point.basis();
-    s.z.array().colwise() *= cluster_.inverse_metric.array();
-    s.y.noalias() = basis.J * s.z;
-    s.point.solveGram(s.y);
-    Workspace& ws = s.point.workspace();
-    for (int j = 0; j < m; ++j) {
-      updateVelocities(cluster_.model, ws, s.T.col(j));
-      s.drift.setZero();
-      for (size_t c = 0; c < cluster_.closures.closures.size(); ++c) {
-        const Closure& closure = cluster_.closures.closures[c];
-        calcClosureVelocityDerivative(ws, closure,
-                                      s.drift.middleRows(cluster_.closures.offsets[c], getRows(closure.kind)));
-      }
-      for (int i = 0; i < cluster_.rank; ++i)
-        for (size_t k = 0; k < cluster_.dofs.size(); ++k)
-          row(0, cluster_.dofs[k]) -= rho * s.y(i, j) * s.drift(basis.rows[i], k);
+    gradient.setZero();
+    if (!updateTangent(s)) return 0;
+    updateDerivative(s);
+    for (size_t j = 0; j < motors_.size(); ++j) {
+      const int dof = cluster_.dofs[motors_[j]];
+      for (int m = 0; m < model.nu(); ++m)
+        if (model.motors()[m].dof == dof) gradient[m] = s.derivative.dot(s.T.col(j));
     }
+    return s.Q.determinant() / reference_;
   }
 
  private:
@@ -78,6 +70,7 @@ class TransmissionMap {
           z(T),
           y(of.cluster_.rank, of.motors_.size()),
           drift(of.cluster_.closures.rows, of.cluster_.dofs.size()),
+          derivative(of.cluster_.dofs.size()),
           of_motors(of.motors_.size(), of.motors_.size()),
           Q(of_motors),
           inverse(of_motors) {}
@@ -85,6 +78,7 @@ class TransmissionMap {
     ClusterPoint point;
     VectorXd q;
     MatrixXd T, z, y, drift;
+    VectorXd derivative;
     Small of_motors, Q, inverse;
   };
 
@@ -121,6 +115,36 @@ class TransmissionMap {
     s.T.noalias() = N * s.inverse;
     for (int i = 0; i < m; ++i) s.Q.row(i) = s.T.row(joints_[i]);
     return s.Q.allFinite();
+  }
+
+  // d rho/d v at the configuration of the last updateTangent(), dofs of the cluster.
+  void updateDerivative(Scratch& s) const {
+    const int m = static_cast<int>(motors_.size());
+    const double rho = s.Q.determinant() / reference_;
+    // z = (P_J - Q P_M)^T Q^{-T}: by columns the y_j of Eq. (2) before J^+.
+    s.inverse = s.Q.inverse();
+    s.z.setZero();
+    s.derivative.setZero();
+    for (int i = 0; i < m; ++i)
+      for (int j = 0; j < m; ++j) s.z(joints_[i], j) += s.inverse(j, i);
+    for (int j = 0; j < m; ++j) s.z(motors_[j], j) -= 1;
+    const ClusterBasis& basis = s.point.basis();
+    s.z.array().colwise() *= cluster_.inverse_metric.array();
+    s.y.noalias() = basis.J * s.z;
+    s.point.solveGram(s.y);
+    Workspace& ws = s.point.workspace();
+    for (int j = 0; j < m; ++j) {
+      updateVelocities(cluster_.model, ws, s.T.col(j));
+      s.drift.setZero();
+      for (size_t c = 0; c < cluster_.closures.closures.size(); ++c) {
+        const Closure& closure = cluster_.closures.closures[c];
+        calcClosureVelocityDerivative(ws, closure,
+                                      s.drift.middleRows(cluster_.closures.offsets[c], getRows(closure.kind)));
+      }
+      for (int i = 0; i < cluster_.rank; ++i)
+        for (size_t k = 0; k < cluster_.dofs.size(); ++k)
+          s.derivative[k] -= rho * s.y(i, j) * s.drift(basis.rows[i], k);
+    }
   }
 
   std::string describe(const Model& model) const {
@@ -178,6 +202,10 @@ std::vector<Transmission> listTransmissions(const Model& model, ConstVectorRef q
                                                             model, q_reference)});
   }
   return out;
+}
+
+double calcTransmission(const Transmission& transmission, const Model& model, ConstVectorRef q, VectorRef gradient) {
+  return transmission.data->calcByMotors(model, q, gradient);
 }
 
 std::unique_ptr<Residual> makeTransmission(const Transmission& transmission) {

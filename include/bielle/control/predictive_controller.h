@@ -21,6 +21,8 @@
 /// last stages of its swing are rewritten and come into force again, and the motion stays behind the plan by as much. Meanwhile
 /// getPlanTime() is the instant of the landing.
 ///
+/// Motors brake before dead points of their linkages, at every instant of control (src/control/dead_point_stop.h).
+///
 /// After its last stage the motion is followed by as many copies of that stage as the window is long: the robot stands there.
 ///
 /// In place of a solved motion, a walk by command (commanded_walk.h) may be given. Its stages are made when the window reaches
@@ -41,6 +43,9 @@ struct PredictiveOptions {
   /// Stages that begin less than this before the end of their phase of contacts take the gains of the last stage before them
   /// that did not, if need be of an earlier solution (Policy::setLookAhead() says why), s; 0: each stage has its own.
   double look_ahead = 0;
+  /// Motors brake before the transmission of a linkage falls below this share of that at the start, or exceeds its reciprocal:
+  /// between a dead point and the margin that plans keep (LimitOptions::dead_point_margin); 0: they do not.
+  double dead_point_stop = 0.08;
   int threads = 0;  ///< 0: all. Results are bitwise independent of it.
   /// Solves run in a thread of their own; results then depend on how fast it is.
   bool own_thread = false;

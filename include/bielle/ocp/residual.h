@@ -120,6 +120,8 @@ struct Transmission {
 /// The transmissions of all such clusters. \param q_reference  nq, closed
 /// \throws ModelError when the reference is open or a dead point
 std::vector<Transmission> listTransmissions(const Model& model, ConstVectorRef q_reference);
+/// det Q / det Q_0 at a closed configuration (nq). \param gradient  nu: by the motors, which the other joints follow
+double calcTransmission(const Transmission& transmission, const Model& model, ConstVectorRef q, VectorRef gradient);
 /// det Q / det Q_0 (1).
 std::unique_ptr<Residual> makeTransmission(const Transmission& transmission);
 /// Mechanical power u_m v_m of motors, given by their indices in the model (n), W.

@@ -1,0 +1,37 @@
+#pragma once
+/// \file Torques that keep linkages from passing their dead points, at every instant of control.
+///
+/// Plans keep a margin to dead points (limits.h); a robot that is thrown off its plan may use it up, and past a dead point its
+/// linkage snaps into another configuration. With rho the transmission of a linkage (residual.h), s = rho where its joints, s =
+/// 1/rho where its motors come to a dead point, and g = ds/dv_M by its motors, the way to the stop at s = s_0 is
+///     d = (s - s_0) / |g|,    d' = g . v_M / |g|                                                                    (1)
+/// to first order, of the motors, rad or m; s goes through zero at the dead point, so that d does not turn round there.
+/// The motors of a linkage that will be past the stop after the time T, if they go on like this, brake:
+///     u += D max(0, -(d/T + d')) g/|g|                                                                              (2)
+/// with D the most that damps them in an instant of control h: D = k I/(h + delay), where I is their inertia along g.
+#include <vector>
+
+#include "bielle/control/controller.h"
+#include "bielle/ocp/residual.h"
+
+namespace bielle {
+
+class DeadPointStop {
+ public:
+  /// \param model  must outlive it   \param q  nq: closed, where all transmissions are 1   \param stop  s_0; 0: no stops
+  DeadPointStop(const Model& model, ConstVectorRef q, double stop);
+  /// Adds (2) to the torques (nu). It neither allocates nor throws.
+  void add(const Measurement& measurement, VectorRef u);
+
+ private:
+  void brake(double s, double ds, const Measurement& measurement, VectorRef u) const;
+
+  const Model& model_;
+  const double stop_;
+  std::vector<Transmission> transmissions_;
+  VectorXd inertia_;   // of each motor with what follows it (nu)
+  VectorXd gradient_;  // nu
+  double time_ = 0, period_ = 0;
+};
+
+}  // namespace bielle
