@@ -14,6 +14,7 @@ namespace {
 // cones, since feedback and errors of the model add to what is planned.
 constexpr double kFootholdRoom = 0.4, kFootholdRoomOnSteps = 0.02;  // m
 constexpr double kFeedbackMargin = 0.2;
+constexpr double kStopShare = 0.5;   // of the margin to dead points that the plan keeps
 constexpr int kMaxIterations = 200;  // more than a motion takes from its own solution
 
 // Limits given by motor are recorded with the options of the motion.
@@ -107,8 +108,11 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
                                                                       : makePolicy(motion, motion.guess, solver));
   if (control != PlanControl::Predictive) return;
   freeFeet(plan.ground, request);
-  plan.predictive = std::make_unique<PredictiveController>(
-      makePredictiveMotion(model, makeStages(), options, predictive), motion.guess, predictive);
+  // A plan may be closer to a dead point than motors would let it come, or start from one: without a margin there is no stop.
+  PredictiveOptions stopping = predictive;
+  stopping.dead_point_stop = std::min(stopping.dead_point_stop, kStopShare * options.limits.dead_point_margin);
+  plan.predictive = std::make_unique<PredictiveController>(makePredictiveMotion(model, makeStages(), options, stopping),
+                                                           motion.guess, stopping);
 }
 
 void setModel(Belief belief, MotionSummary& summary) {

@@ -1,6 +1,5 @@
 #include "control/dead_point_stop.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "bielle/dynamics/kinematics.h"

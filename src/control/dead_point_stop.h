@@ -7,8 +7,9 @@
 ///     d = (s - s_0) / |g|,    d' = g . v_M / |g|                                                                    (1)
 /// to first order, of the motors, rad or m; s goes through zero at the dead point, so that d does not turn round there.
 /// The motors of a linkage that will be past the stop after the time T, if they go on like this, brake:
-///     u += D max(0, -(d/T + d')) g/|g|                                                                              (2)
-/// with D the most that damps them in an instant of control h: D = k I/(h + delay), where I is their inertia along g.
+///     u += D max(0, -(d/T + d')) g/|g|,    D = k I/(h + delay)                                                      (2)
+/// I is their inertia along g, with the bodies that they carry. More damping than that would make them swing, since torques are
+/// held for an instant of control, h, and act later by the delay.
 #include <vector>
 
 #include "bielle/control/controller.h"
@@ -19,6 +20,7 @@ namespace bielle {
 class DeadPointStop {
  public:
   /// \param model  must outlive it   \param q  nq: closed, where all transmissions are 1   \param stop  s_0; 0: no stops
+  /// \throws ModelError when there are stops and q is open or a dead point
   DeadPointStop(const Model& model, ConstVectorRef q, double stop);
   /// Adds (2) to the torques (nu). It neither allocates nor throws.
   void add(const Measurement& measurement, VectorRef u);

@@ -43,9 +43,9 @@ struct PredictiveOptions {
   /// Stages that begin less than this before the end of their phase of contacts take the gains of the last stage before them
   /// that did not, if need be of an earlier solution (Policy::setLookAhead() says why), s; 0: each stage has its own.
   double look_ahead = 0;
-  /// Motors brake before the transmission of a linkage falls below this share of that at the start, or exceeds its reciprocal:
-  /// between a dead point and the margin that plans keep (LimitOptions::dead_point_margin); 0: they do not.
-  double dead_point_stop = 0.08;
+  /// Motors brake before the transmission of a linkage falls below this share of that at the start, or exceeds its reciprocal.
+  /// It should be less than the margin that the motion keeps (LimitOptions::dead_point_margin); 0: they do not brake.
+  double dead_point_stop = 0.075;
   int threads = 0;  ///< 0: all. Results are bitwise independent of it.
   /// Solves run in a thread of their own; results then depend on how fast it is.
   bool own_thread = false;
@@ -79,9 +79,9 @@ class PredictiveController : public Controller {
  public:
   /// \param motion  by makePredictiveMotion() with the same options, in the reduced formulation; its model must outlive this
   /// \param plan  the solved motion, without the copies of its last stage: where windows end, and what the first one
-  /// starts from
+  /// starts from   \throws ModelError when motors brake and the start is a dead point
   PredictiveController(Motion motion, const ShootingTrajectory& plan, const PredictiveOptions& options);
-  /// \param walk  of which no stage has been made yet; its model must outlive this
+  /// \param walk  of which no stage has been made yet; its model must outlive this   \throws ModelError likewise
   PredictiveController(CommandedWalk walk, const PredictiveOptions& options);
   ~PredictiveController() override;
 
