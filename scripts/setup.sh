@@ -48,6 +48,14 @@ if command -v ccache >/dev/null; then
   export CCACHE_SLOPPINESS=pch_defines,time_macros
 fi
 
+# run_tests DIRECTORY CTEST_OPTION...: as many tests at once as there are cores, with one thread each: more would wait for each
+# other.
+run_tests() {
+  local directory=$1
+  shift
+  OMP_NUM_THREADS=1 ctest --test-dir "$directory" --parallel "$(nproc)" --output-on-failure "$@"
+}
+
 # build DIRECTORY CMAKE_OPTION...: configures, then builds `bielle_targets` (default: everything) on as many cores as memory
 # allows, at 1.5 GB per compiler.
 bielle_targets=(all)

@@ -7,6 +7,4 @@ install_missing "${bielle_packages[@]}" "${bielle_check_packages[@]}" "${bielle_
   "${bielle_worker_packages[@]}" "${bielle_front_packages[@]}" "${bielle_test_packages[@]}"
 cd "$bielle_root"
 build build/test --preset release -DBIELLE_PRECOMPILE=ON
-# As many tests run at once as there are cores; threads of theirs would stand in each other's way.
-export OMP_NUM_THREADS=1
-ctest --test-dir build/test --parallel "$(nproc)" --output-on-failure
+run_tests build/test
