@@ -171,7 +171,8 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
       {head + "push: {time: -1, impulse: 1}\n", {"(line 2)", "not positive"}},
       {head + "push: {time: 1, largest_impulse: {up_to: 1, step: 2}}\n", {"(line 2)", "up_to"}},
       {"motions: [{name: w, solve: wakl, robot: bipetto}]\n", {"wakl"}},
-      {"motions: [{name: w, solve: walk, robot: bipetto, set: {sped: 1}}]\n", {"sped"}}};
+      {"motions: [{name: w, solve: walk, robot: bipetto, set: {sped: 1}}]\n", {"sped"}},
+      {"motions: [{name: w, solve: walk, robot: bipetto, options: {set: 1}}]\n", {"key 'set' (line 1)", "beside"}}};
   for (const auto& [text, words] : cases) {
     const CommandResult result = runCampaign(directory.write("spec.yaml", text), out);
     CAPTURE(text, result.err);
@@ -186,7 +187,7 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
 
 TEST_CASE("campaign: the specifications of the examples are read") {
   const std::vector<std::pair<std::string, size_t>> examples{
-      {"pushes", 32}, {"pushes_predictive", 80}, {"pushes_felt", 80}, {"unknown", 60}, {"worlds", 44}};
+      {"pushes", 32}, {"pushes_predictive", 80}, {"pushes_felt", 80}, {"unknown", 500}, {"worlds", 198}};
   for (const auto& [name, expected] : examples) {
     const study::CampaignSpec spec = study::readCampaignSpec(BIELLE_SOURCE_DIR "/examples/campaign/" + name + ".yaml");
     CHECK(spec.search.has_value() == (name == "pushes"));
@@ -194,6 +195,18 @@ TEST_CASE("campaign: the specifications of the examples are read") {
     for (const study::CampaignAxis& axis : spec.axes) combinations *= axis.values.size();
     CHECK(combinations == expected);
   }
+}
+
+TEST_CASE("campaign: motions are solved with the options that they are given") {
+  const RobotDirectory directory;
+  const std::string spec = directory.write(
+      "spec.yaml",
+      std::string("motions:\n  - {name: w, solve: walk, robot: bipetto, set: {steps: 2}, options: {no-limits: "
+                  "true, dead-point-margin: 0.25}}\n"));
+  const std::vector<study::CampaignMotion> motions = study::readCampaignSpec(spec).motions;
+  REQUIRE(motions.size() == 1);
+  CHECK(motions[0].solve == std::vector<std::string>{"solve", "walk", "--robot", "bipetto", "--set", "steps=2",
+                                                     "--no-limits", "--dead-point-margin", "0.25"});
 }
 
 TEST_CASE("campaign: an impulse counts as survived if all smaller ones were") {

@@ -51,7 +51,7 @@ CampaignMotion readSolvedMotion(const YamlEntry& entry, const std::string& file)
 }
 
 CampaignMotion readRequest(const YamlEntry& entry, const std::string& file) {
-  const YamlFields fields = entry.getFields({"name", "solve", "robot", "set"});
+  const YamlFields fields = entry.getFields({"name", "solve", "robot", "set", "options"});
   CampaignMotion motion;
   motion.name = require(fields, "name", entry).getText();
   if (motion.name.find('/') != std::string::npos || motion.name[0] == '.')
@@ -66,6 +66,13 @@ CampaignMotion readRequest(const YamlEntry& entry, const std::string& file) {
       setOption(request.options, name, value);  // checks the name
       motion.solve.push_back("--set");
       motion.solve.push_back(name + "=" + formatExact(value));
+    }
+  if (const YamlEntry* options = find(fields, "options"))
+    for (const auto& [name, value] : options->getMap()) {
+      if (name == "output" || name == "set" || name == "robot")
+        value.fail("it cannot be set here", name == "output" ? "remove it" : "use the key beside `options`");
+      motion.solve.push_back("--" + name);
+      if (value.getText() != "true") motion.solve.push_back(value.getText());
     }
   return motion;
 }

@@ -4,7 +4,8 @@
 /// ```yaml
 /// motions:
 ///   - walk                       # directory of a solved motion, from this file
-///   - {name: quick, solve: walk, robot: bipetto, set: {speed: 0.6}}     # solved first, once
+///   - {name: quick, solve: walk, robot: bipetto, set: {speed: 0.6}}     # solved first, once;
+///                                # likewise options: {dead-point-margin: 0.3}, others of `bielle solve` by their names
 /// options:                       # of `bielle simulate`, by their names: one value or a list of them
 ///   world: [bielle, mujoco]
 ///   friction: [0.5, 0.7]         # true stands for an option without a value, false for none
