@@ -70,6 +70,27 @@ int solveForGains(const std::string& source, Fddp& solver, Motion& motion) {
   return solved.iterations;
 }
 
+void checkControl(const MotionSummary& summary, PlanControl control) {
+  if (summary.objective.objective == Objective::PeakTorque)
+    throw ModelError(summary.file, "objective 'peak-torque'", "the gains of its solver let no torque exceed the peak",
+                     "give --control open, or solve the motion for another objective");
+  if (control == PlanControl::Predictive && summary.formulation != Formulation::Reduced)
+    throw ModelError(summary.file, "formulation 'full'", "predictive control needs states that are closed",
+                     "solve the motion without --formulation full, or give --control gains");
+}
+
+// Solves the motion from its guess, for the gains of the solver's last sweep, or from rest.
+Policy solvePolicy(const std::string& source, bool from_rest, PlanControl control, Motion& motion, int& iterations) {
+  FddpOptions options;
+  options.max_iterations = kMaxIterations;
+  if (motion.bounded) options.bounds = ControlBounds::Enforce;
+  // From the solution penalties stay small, and gains with them.
+  if (from_rest) solveFromRest(options, motion);
+  Fddp solver(options);
+  iterations = solveForGains(source, solver, motion);
+  return control == PlanControl::Gains ? makePolicy(motion, motion.guess, solver) : makePolicy(motion, motion.guess);
+}
+
 // A plan with robot and summary, from its request. `guess`: directory of a solution, or empty.
 void finishPlan(const MotionRequest& request, const std::string& guess, PlanControl control,
                 const PredictiveOptions& predictive, Plan& plan) {
@@ -87,25 +108,13 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
   plan.ground = motion.ground;
   plan.schedule = motion.schedule;
   if (!guess.empty()) setGuess(readResultRecord(guess), motion);
-  if (control == PlanControl::Open && !guess.empty()) {
-    plan.policy = std::make_unique<Policy>(makePolicy(motion, motion.guess));
-    return;
-  }
-  if (summary.objective.objective == Objective::PeakTorque)
-    throw ModelError(summary.file, "objective 'peak-torque'", "the gains of its solver let no torque exceed the peak",
-                     "give --control open, or solve the motion for another objective");
-  if (control == PlanControl::Predictive && summary.formulation != Formulation::Reduced)
-    throw ModelError(summary.file, "formulation 'full'", "predictive control needs states that are closed",
-                     "solve the motion without --formulation full, or give --control gains");
-  FddpOptions solver_options;
-  solver_options.max_iterations = kMaxIterations;
-  if (motion.bounded) solver_options.bounds = ControlBounds::Enforce;
-  // From the solution penalties stay small, and gains with them.
-  if (guess.empty()) solveFromRest(solver_options, motion);
-  Fddp solver(solver_options);
-  plan.iterations = solveForGains(summary.file, solver, motion);
-  plan.policy = std::make_unique<Policy>(control == PlanControl::Open ? makePolicy(motion, motion.guess)
-                                                                      : makePolicy(motion, motion.guess, solver));
+  // A solution in the files is only solved again for its gains; predictive control has its own.
+  const bool is_open = control == PlanControl::Open;
+  const bool is_known = !guess.empty() && (is_open || (control == PlanControl::Predictive && summary.converged));
+  if (!is_open || !is_known) checkControl(summary, control);
+  plan.policy =
+      std::make_unique<Policy>(is_known ? makePolicy(motion, motion.guess)
+                                        : solvePolicy(summary.file, guess.empty(), control, motion, plan.iterations));
   if (control != PlanControl::Predictive) return;
   freeFeet(plan.ground, request);
   // A plan may be closer to a dead point than motors would let it come, or start from one: without a margin there is no stop.

@@ -42,8 +42,8 @@ struct Plan {
   }
 };
 
-/// Makes the motion again from its request. For gains it is solved again, from the solution in the files: they do not
-/// hold the gains, nor the multipliers of the constraints.
+/// Makes the motion again from its request. For gains it is solved again, from the solution in the files, which do not
+/// hold them; for predictive control only if that has not converged.
 /// \param belief  what the controller takes the robot for; empty: the model of the motion, which is solved anew for another
 /// \throws ModelError when the files cannot be read, the motion does not converge, or has the least peak torque or the full formulation, and gains or predictive control are wanted that need others
 std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control,
