@@ -42,7 +42,7 @@ class Recorder {
   }
 
   // The state of the next node; forces and torques that acted on the way to it are added by addStage().
-  void addNode(const World& world) {
+  void addNode(const World& world, const std::vector<PredictedFoothold>& footholds) {
     const VectorXd &q = world.getConfiguration(), &v = world.getVelocity();
     record_.time[node_] = world.getTime();
     record_.q.row(node_) = q;
@@ -58,6 +58,7 @@ class Recorder {
     if (node_ > 0)
       record_.a.row(node_ - 1) =
           (record_.v.row(node_) - record_.v.row(node_ - 1)) / (record_.time[node_] - record_.time[node_ - 1]);
+    addFootholds(footholds);
     ++node_;
   }
   void addStage(const World& world) {
@@ -73,6 +74,7 @@ class Recorder {
     int first = 0;
     while (first + 2 < node_ && record_.time[first] < since) ++first;
     MotionRecord record = record_;
+    if (record.footholds.rows() > 0) record.footholds = record_.footholds.middleRows(first, node_ - first);
     record.time = record_.time.segment(first, node_ - first);
     for (const RecordTable& table : listTables(record))
       record.*table.data =
@@ -81,6 +83,17 @@ class Recorder {
   }
 
  private:
+  void addFootholds(const std::vector<PredictedFoothold>& footholds) {
+    constexpr int kEntries = MotionRecord::kFootholdEntries;
+    RowMatrixXd& table = record_.footholds;
+    if (table.rows() == 0 && !footholds.empty())
+      table.setConstant(record_.time.size(), kEntries * static_cast<int>(model_.contacts().size()),
+                        std::numeric_limits<double>::quiet_NaN());
+    for (const PredictedFoothold& foothold : footholds)
+      table.row(node_).segment<kEntries>(kEntries * foothold.contact) << foothold.time, foothold.X_WF.p.transpose(),
+          Eigen::Quaterniond(foothold.X_WF.R).coeffs().transpose();
+  }
+
   const Model& model_;
   Workspace ws_;
   MotionRecord record_;
@@ -177,7 +190,7 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   FallDetector detector(model, plan, world.getConfiguration(), o.fall, o.ground, o.planned_ground);
   perception.reset(world, measurement.q, measurement.v);
   out.start = out.end = world.getBooks();
-  recorder.addNode(world);
+  recorder.addNode(world, controller.getFootholds());
   const Vector3d com_start = recorder.getCom();
   int cut = 0, tick = 0;
   double seconds = 0, exchanged = 0;
@@ -216,7 +229,7 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
     out.largest_deviation = std::max(out.largest_deviation, detector.getDeviation());
     out.largest_joint_deviation = std::max(out.largest_joint_deviation, detector.getJointDeviation());
     if ((tick + 1) % ticks_per_row != 0 && tick + 1 != ticks && fall.empty()) continue;
-    recorder.addNode(world);
+    recorder.addNode(world, controller.getFootholds());
     const Books books = world.getBooks();
     exchanged += calcExchange(out.end, books);
     out.end = books;

@@ -9,6 +9,7 @@ namespace bielle::simulation {
 
 MotionRecord makePlannedRecord(const Model& model, const Policy& plan, const MotionRecord& happened) {
   MotionRecord planned = happened;  // its names and times
+  planned.footholds.resize(0, 0);
   for (const RecordTable& table : listTables(planned))
     (planned.*table.data).setConstant(std::numeric_limits<double>::quiet_NaN());
   Policy policy = plan;  // update() is not const

@@ -6,7 +6,8 @@
 namespace bielle::simulation {
 
 /// The plan at the times of `happened`: q, v, the centre of mass and the torques without feedback; after the end of the
-/// plan, the posture it holds. Accelerations, wrenches and gaps, which a policy does not know, are NaN.
+/// plan, the posture it holds. Accelerations, wrenches and gaps, which a policy does not know, are NaN; there are
+/// no predicted footholds.
 MotionRecord makePlannedRecord(const Model& model, const Policy& plan, const MotionRecord& happened);
 
 }  // namespace bielle::simulation

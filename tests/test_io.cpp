@@ -15,7 +15,9 @@
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "get_error.h"
+#include "io/npz.h"
 #include "io/opensim.h"
+#include "io/text_file.h"
 #include "problem_probe.h"
 #include "robot_directory.h"
 
@@ -192,6 +194,28 @@ TEST_CASE("multipliers come back from NumPy files, and are refused where their r
   record.multipliers.values.assign(nodes, VectorXd(0));
   record.multipliers.penalty = std::numeric_limits<double>::infinity();
   CHECK_THAT(getErrorOfReading(write()), Catch::Contains("penalty"));
+}
+
+TEST_CASE("predicted footholds come back from NumPy files, and are refused where their shape does not fit") {
+  const TemporaryDirectory directory;
+  const ShortSquat squat;
+  MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
+  const auto write = [&] {
+    writeNpz(directory / "t.npz", record);
+    return directory / "t.npz";
+  };
+  CHECK(readRecord(write()).footholds.size() == 0);
+  const Eigen::Index columns = MotionRecord::kFootholdEntries * static_cast<int>(record.contact_names.size());
+  REQUIRE(columns > 0);
+  record.footholds = RowMatrixXd::Random(record.time.size(), columns);
+  CHECK(areEqual(readRecord(write()).footholds, record.footholds));
+  record.footholds(1, 1) = std::numeric_limits<double>::quiet_NaN();  // none there
+  CHECK(std::isnan(readRecord(write()).footholds(1, 1)));
+  NpyArrays arrays = readArchive(write());
+  arrays["footholds"].shape.front() = arrays["footholds"].shape.front() * arrays["footholds"].shape[1];
+  arrays["footholds"].shape[1] = 1;
+  writeTextFile(directory / "t.npz", formatArchive(arrays));
+  CHECK_THAT(getErrorOfReading(directory / "t.npz"), Catch::Contains("'footholds': its shape does not fit"));
 }
 
 TEST_CASE("midpoint steps are recorded with the points to which their accelerations belong") {

@@ -92,6 +92,38 @@ TEST_CASE("predictive control: a foot that finds ground early stands from then o
   CHECK(walk.controller->getCounts().failed == 0);
 }
 
+TEST_CASE("predictive control: footholds are foreseen where feet come to stand") {
+  Walking walk;
+  const int foot = walk.findChange(0, false) < walk.findChange(1, false) ? 0 : 1;
+  const int begin = walk.findChange(foot, false), landing = walk.findChange(foot, true);
+  const auto find = [&](int contact) {
+    for (const PredictedFoothold& foothold : walk.controller->getFootholds())
+      if (foothold.contact == contact) return foothold;
+    FAIL("none is foreseen");
+    return PredictedFoothold();
+  };
+  for (int stage = 0; stage < begin; ++stage) walk.updateAsPlanned(stage);
+  const PredictedFoothold early = find(foot);
+  CHECK(early.time == Approx(1e-3 * kStageTicks * landing));
+  const auto getFoot = [&] {
+    updatePlacements(walk.model, walk.ws, walk.at.q);
+    const ContactFrame& contact = walk.model.contacts()[foot];
+    return getPlacement(walk.ws, contact.body, contact.X_BF);
+  };
+  CHECK((early.X_WF.p - getFoot().p).norm() > 0.05);  // a step away
+  for (int stage = begin; stage < landing - 1; ++stage) walk.updateAsPlanned(stage);
+  const PredictedFoothold late = find(foot);
+  for (int stage = landing - 1; stage < landing + 2; ++stage) walk.updateAsPlanned(stage);
+  CHECK((late.X_WF.p - getFoot().p).norm() < 2e-3);
+  CHECK((early.X_WF.p - getFoot().p).norm() < 0.02);
+  // Then it is the other one's turn.
+  int next = landing + 1;
+  while (walk.stands(next, 1 - foot)) ++next;
+  while (!walk.stands(next, 1 - foot)) ++next;
+  CHECK(find(1 - foot).time == Approx(1e-3 * kStageTicks * next));
+  CHECK(find(1 - foot).X_WF.p.x() > getFoot().p.x() + 0.05);
+}
+
 TEST_CASE("predictive control: a foot that touches early has landed where it may land, and not elsewhere") {
   for (double room : {0.4, 0.02}) {
     CAPTURE(room);

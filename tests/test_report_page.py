@@ -4,6 +4,7 @@ usage: test_report_page.py BIELLE. Ends with status 77 where there is no Chromiu
 """
 import csv
 import json
+import math
 import os
 import pathlib
 import shutil
@@ -13,6 +14,7 @@ import sys
 import tempfile
 import time
 import unittest
+import zipfile
 
 from browser import Browser
 
@@ -84,6 +86,15 @@ def write_hostile_result(directory):
 def differ(a, b):
     """How many of the points changed visibly."""
     return sum(abs(x - y) > 5 for x, y in zip(a, b))
+
+
+def add_array(archive, name, shape, numbers):
+    """To a NumPy archive, of float64."""
+    header = str({"descr": "<f8", "fortran_order": False, "shape": shape}).encode()
+    header += b" " * (-(len(header) + 11) % 64) + b"\n"
+    with zipfile.ZipFile(archive, "a") as file:
+        file.writestr(name + ".npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header +
+                      struct.pack(f"<{len(numbers)}d", *numbers))
 
 
 class ReportPage(unittest.TestCase):
@@ -200,6 +211,10 @@ class ReportPage(unittest.TestCase):
             "time_step=0.02", "--depth", "0.7", "--quiet", "--no-report", "-o", other)
         shutil.copytree(self.squat, happened, dirs_exist_ok=True)
         shutil.copy(other / "trajectory.npz", happened / "plan.npz")
+        with open(self.squat / "trajectory.csv", newline="") as file:
+            nodes = len(list(csv.DictReader(file)))
+        add_array(happened / "trajectory.npz", "footholds", (nodes, 2, 8),
+                  nodes * [0.4, 0.2, 0.1, 0, 0, 0, 0, 1, *8 * [math.nan]])  # of one foot, which is to land at 0.4 s
         summary = json.loads((self.squat / "summary.json").read_text())
         summary.update(outcome="fell", fall_time=0.5, converged=False, world="bielle", control="gains", pushes=[
             {"time_s": 0.2, "impulse_Ns": 2, "direction_deg": 90, "duration_s": 0.1}])
@@ -208,11 +223,14 @@ class ReportPage(unittest.TestCase):
         self.browser.open(happened / "report.html")
         badges = self.browser.evaluate("Array.from(document.querySelectorAll('.badge')).map(b => b.textContent)")
         self.assertEqual(badges[:2], ["fell at 0.500 s", "world bielle, control gains"])
-        for layer, time in (("plan", 0.3), ("push", 0.25)):
+        for layer, time in (("plan", 0.3), ("push", 0.25), ("footholds", 0.3)):
             shown = self.picture(time)
             self.browser.evaluate(f"report.scene.setLayer('{layer}', false)")
             self.assertGreater(differ(shown, self.browser.evaluate(PICTURE)), 50, layer)
             self.browser.evaluate(f"report.scene.setLayer('{layer}', true)")
+        self.assertEqual([(self.picture(t), self.browser.evaluate(
+            "report.scene.robots[0].footholds.map(outline => outline.visible)"))[1] for t in (0.3, 0.45)],
+                         [[True, False], [False, False]])
         pushes = [self.browser.evaluate(f"report.runs[0].calcPush({t})") for t in (0.19, 0.25, 0.31)]
         self.assertEqual([pushes[0], pushes[2]], [[0, 0], [0, 0]])
         self.assertAlmostEqual(pushes[1][1], 20)

@@ -1,5 +1,6 @@
 // The command `bielle simulate`: what it writes, its exit statuses, and that it repeats itself to the byte.
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -252,6 +253,20 @@ TEST_CASE("simulate: predictive control survives a push that gains do not") {
   CHECK(summary["solves"]["failed"] == 0);
   CHECK(summary["solves"]["count"] == 234);  // one for every 12 ms
   CHECK(summary["solves"]["early_landings"].get<int>() >= 0);
+  // When and where each foot is to land next; of what is not planned anew nothing is foreseen.
+  const MotionRecord record = readRecord((scratch.path / "mpc" / "trajectory.npz").string());
+  REQUIRE(record.footholds.rows() == record.time.size());
+  REQUIRE(record.footholds.cols() == 2 * MotionRecord::kFootholdEntries);
+  for (int k = 0; k < record.time.size(); ++k)
+    for (int foot = 0; foot < 2; ++foot) {
+      const auto foothold = record.footholds.row(k).segment<3>(foot * MotionRecord::kFootholdEntries);
+      if (std::isnan(foothold[0])) continue;
+      CHECK(foothold[0] > record.time[k] - 0.06);  // a late foot is waited for
+      CHECK(foothold[0] < record.time[k] + 1.25);
+      CHECK(std::abs(foothold[1] - record.com(k, 0)) < 0.6);
+    }
+  CHECK(std::isfinite(record.footholds(100, 0)));
+  CHECK(readRecord((scratch.path / "gains" / "trajectory.npz").string()).footholds.size() == 0);
   CHECK(summary["solves"]["worst_ms"].get<double>() >= summary["solves"]["median_ms"].get<double>());
 }
 

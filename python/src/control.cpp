@@ -1,3 +1,5 @@
+#include <pybind11/stl.h>
+
 #include "bielle/control/policy.h"
 #include "bielle/control/predictive_controller.h"
 #include "bind.h"
@@ -51,6 +53,12 @@ py::object getReference(const HeldController& self, double time) {
   return py::make_tuple(makeArray(q), makeArray(v));
 }
 
+std::vector<PredictedFoothold> getFootholds(HeldController& self) {
+  const py::gil_scoped_release release;
+  const std::lock_guard<std::mutex> lock(self.mutex);
+  return self.controller->getFootholds();
+}
+
 }  // namespace
 
 void bindControllers(py::module_& module) {
@@ -61,6 +69,8 @@ void bindControllers(py::module_& module) {
       .field("penalty", &PredictiveOptions::penalty, "of violated constraints")
       .field("look_ahead", &PredictiveOptions::look_ahead,
              "gains of stages nearer to the end of their phase are those of an earlier one, s")
+      .field("dead_point_stop", &PredictiveOptions::dead_point_stop,
+             "motors brake before the transmission of a linkage is this share of that at the start, or its reciprocal")
       .field("threads", &PredictiveOptions::threads, "0: all; results are bitwise independent of it")
       .field("own_thread", &PredictiveOptions::own_thread,
              "solves run beside control; results then depend on how fast they are")
@@ -68,6 +78,10 @@ void bindControllers(py::module_& module) {
              "weight of heading and place at the end of a window, 1/m^2 or 1")
       .field("end_posture", &PredictiveOptions::end_posture, "of the other coordinates")
       .field("end_velocity", &PredictiveOptions::end_velocity, "of the velocities, s^2/m^2 or s^2");
+  Value<PredictedFoothold>(module, "PredictedFoothold", "Where a foot is foreseen to stand next.")
+      .field("contact", &PredictedFoothold::contact, "of the model")
+      .field("time", &PredictedFoothold::time, "of its landing, s")
+      .field("X_WF", &PredictedFoothold::X_WF, "of the contact's frame in the world");
   py::class_<HeldController, std::shared_ptr<HeldController>>(
       module, "Controller",
       "A feedback law: from what is measured to torques. Controller.policy and .predictive make them.")
@@ -100,7 +114,10 @@ void bindControllers(py::module_& module) {
             out["missed"] = counts.missed;
             return out;
           },
-          "of predictive control: solves, failed ones, early and late landings, solves longer than a stage");
+          "of predictive control: solves, failed ones, early and late landings, solves longer than a stage")
+      .def_property_readonly(
+          "footholds", &getFootholds,
+          "of predictive control: a PredictedFoothold for each contact that is to land in its window");
 }
 
 }  // namespace bielle::python

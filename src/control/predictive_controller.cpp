@@ -24,6 +24,7 @@ class PredictiveController::Loop {
     const Model& model = planner_.getModel();
     WindowPlanner::Solution first = planner_.makeFirst();
     policy_ = std::make_unique<Policy>(model, std::move(first.stages), first.u_hold);
+    footholds_ = std::move(first.footholds);
     request_.measurement.q = model.makeNeutral();
     request_.measurement.v.setZero(model.nv());
     request_.measurement.contacts.resize(model.contacts().size());
@@ -50,6 +51,7 @@ class PredictiveController::Loop {
   double getPlanTime(double time) const { return awaited_ >= 0 ? awaited_ : time + advance_; }
   const PredictiveCounts& getCounts() const { return counts_; }
   const Policy& getPolicy() const { return *policy_; }
+  const std::vector<PredictedFoothold>& getFootholds() const { return footholds_; }
   void waitForSolve() const {
     if (thread_) thread_->waitUntilDone();
   }
@@ -77,6 +79,7 @@ class PredictiveController::Loop {
     stage_ += solution_.skipped;
     advance_ = solution_.advance;
     awaited_ = solution_.awaited;
+    if (solution_.solved) footholds_ = solution_.footholds;  // there is room for those of all contacts
     counts_.failed += !solution_.solved;
     counts_.early += solution_.early;
     counts_.late += solution_.late;
@@ -92,6 +95,7 @@ class PredictiveController::Loop {
   WindowPlanner::Solution solution_;  // that is not in force yet, or memory for the next one
   DeadPointStop dead_point_stop_;
   std::unique_ptr<Policy> policy_;
+  std::vector<PredictedFoothold> footholds_;
   int stage_ = -1;       // the present one
   bool ready_ = false;   // the solution awaits the stage from which on it is in force
   double advance_ = 0;   // of the clock of the motion, s
@@ -117,6 +121,7 @@ PredictiveController::~PredictiveController() = default;
 
 void PredictiveController::update(const Measurement& measurement, VectorRef u) { loop_->update(measurement, u); }
 double PredictiveController::getPlanTime(double time) const { return loop_->getPlanTime(time); }
+const std::vector<PredictedFoothold>& PredictiveController::getFootholds() const { return loop_->getFootholds(); }
 const PredictiveCounts& PredictiveController::getCounts() const { return loop_->getCounts(); }
 const Policy& PredictiveController::getPolicy() const { return loop_->getPolicy(); }
 void PredictiveController::waitForSolve() const { loop_->waitForSolve(); }

@@ -57,6 +57,7 @@ WindowPlanner::Solution WindowPlanner::makeEmpty() const {
   solution.stages.resize(options_.own_thread ? kAheadInThread : kAhead);
   for (Policy::Stage& stage : solution.stages) stage.K.setZero(model_.nu(), 2 * model_.nv());
   solution.u_hold.setZero(model_.nu());
+  solution.footholds.reserve(model_.contacts().size());
   return solution;
 }
 
@@ -67,6 +68,7 @@ WindowPlanner::Solution WindowPlanner::makeFirst() {
   first.solve(window_, trajectory_);
   Solution solution = makeEmpty();
   makePolicy(first, 0, solution);
+  predictFootholds(0, solution);
   return solution;
 }
 
@@ -231,6 +233,7 @@ bool WindowPlanner::solveWindow(Solution& solution) {
   moveWindow();
   if (solver_.solve(window_, trajectory_).termination == FddpTermination::Failed) return false;
   makePolicy(solver_, solution.target, solution);
+  predictFootholds(solution.target, solution);
   return true;
 }
 
@@ -314,6 +317,22 @@ void WindowPlanner::makePolicy(const Fddp& solver, int stage, Solution& solution
     solution.u_hold = out.u;
     before = &out;
     ++stage, ++node;
+  }
+}
+
+// Where feet that are in the air at some stage of the window, which begins with this one, first stand after it.
+void WindowPlanner::predictFootholds(int stage, Solution& solution) {
+  solution.footholds.clear();
+  const int contacts = static_cast<int>(model_.contacts().size());
+  const int end = std::min(stage + options_.nodes, horizon_->getEnd());
+  for (int contact = 0; contact < contacts; ++contact) {
+    int landing = stage + 1;
+    while (landing < end && (stands(landing - 1, contact) || !stands(landing, contact))) ++landing;
+    if (landing >= end) continue;
+    const ContactFrame& foot = model_.contacts()[contact];
+    updatePlacements<double>(model_, feet_, trajectory_.xs[landing - stage].head(model_.nq()));
+    solution.footholds.push_back(
+        {contact, horizon_->getStart(landing) - advance_, getPlacement(feet_, foot.body, foot.X_BF)});
   }
 }
 

@@ -27,6 +27,7 @@ class WindowPlanner {
     double seconds = 0;   // that it took
     std::vector<Policy::Stage> stages;
     VectorXd u_hold;
+    std::vector<PredictedFoothold> footholds;
   };
 
   WindowPlanner(std::unique_ptr<Horizon> horizon, const PredictiveOptions& options);
@@ -68,6 +69,7 @@ class WindowPlanner {
   const RowMatrixXd* findEarlierGains(const Policy::Stage* before, int phase) const;
   void keepGains(int phase, const RowMatrixXd& K);
   void makePolicy(const Fddp& solver, int stage, Solution& solution);
+  void predictFootholds(int stage, Solution& solution);
 
   const PredictiveOptions options_;
   const std::unique_ptr<Horizon> horizon_;

@@ -68,6 +68,15 @@ Multipliers takeMultipliers(const std::string& path, size_t nodes, NpyArrays& ar
   return out;
 }
 
+RowMatrixXd takeFootholds(const std::string& path, size_t nodes, size_t contacts, NpyArrays& arrays) {
+  if (arrays.count("footholds") == 0) return {};
+  const NpyArray array = takeArray(path, "footholds", false, arrays);
+  if (array.shape != std::vector<size_t>{nodes, contacts, MotionRecord::kFootholdEntries})
+    throw ModelError(path, "array 'footholds'", "its shape does not fit the contacts and the nodes",
+                     "give a trajectory that Bielle wrote");
+  return RowMatrixXd::Map(array.numbers.data(), nodes, contacts * MotionRecord::kFootholdEntries);
+}
+
 }  // namespace
 
 std::string formatNpz(const MotionRecord& record) {
@@ -79,6 +88,11 @@ std::string formatNpz(const MotionRecord& record) {
     const RowMatrixXd& data = record.*table.data;
     arrays[table.array] = {makeShape(table, data.rows()), {data.data(), data.data() + data.size()}, {}, false};
   }
+  if (record.footholds.size() > 0)
+    arrays["footholds"] = {{nodes, record.contact_names.size(), MotionRecord::kFootholdEntries},
+                           {record.footholds.data(), record.footholds.data() + record.footholds.size()},
+                           {},
+                           false};
   addMultipliers(record.multipliers, arrays);
   return formatArchive(arrays);
 }
@@ -101,6 +115,7 @@ MotionRecord readNpz(const std::string& path) {
                        "give a trajectory that Bielle wrote");
     record.*table.data = RowMatrixXd::Map(array.numbers.data(), rows, table.columns.size());
   }
+  record.footholds = takeFootholds(path, nodes, record.contact_names.size(), arrays);
   record.multipliers = takeMultipliers(path, nodes, arrays);
   return record;
 }

@@ -153,19 +153,21 @@ Json describeRobot(const LoadedRobot& robot) {
 Json describeMotion(const ReportRun& run) {
   const MotionRecord& record = run.record;
   const NodeTables tables = makeNodeTables(run.robot.model, record);
-  return {{"time", packTable(record.time)},
-          {"placements", packTable(tables.placements)},
-          {"tilt", packTable(tables.tilt)},
-          {"feet", packTable(tables.feet)},
-          {"footprints", tables.footprints},
-          {"gaps", packTable(tables.gaps)},
-          {"q", packTable(record.q)},
-          {"v", packTable(record.v)},
-          {"u", packTable(record.u)},
-          {"closure_wrenches", packTable(record.closure_wrenches)},
-          {"contact_wrenches", packTable(record.contact_wrenches)},
-          {"pressure", packTable(makePressureCentres(run.robot.model, record))},
-          {"com", packTable(record.com)}};
+  Json json = {{"time", packTable(record.time)},
+               {"placements", packTable(tables.placements)},
+               {"tilt", packTable(tables.tilt)},
+               {"feet", packTable(tables.feet)},
+               {"footprints", tables.footprints},
+               {"gaps", packTable(tables.gaps)},
+               {"q", packTable(record.q)},
+               {"v", packTable(record.v)},
+               {"u", packTable(record.u)},
+               {"closure_wrenches", packTable(record.closure_wrenches)},
+               {"contact_wrenches", packTable(record.contact_wrenches)},
+               {"pressure", packTable(makePressureCentres(run.robot.model, record))},
+               {"com", packTable(record.com)}};
+  if (record.footholds.rows() > 0) json["footholds"] = packTable(record.footholds);
+  return json;
 }
 
 Json describePlan(const ReportRun& run) {

@@ -23,7 +23,7 @@ ReportRun readRun(const std::string& directory);
 // The robot: its drawing (drawing.h), joints, motors, closures, contacts.
 Json describeRobot(const LoadedRobot& robot);
 
-// Quantities at every node and stage; placements of all bodies and of the feet come from q.
+// Quantities at every node and stage; placements of all bodies and of the feet come from q. Predicted footholds if there are.
 Json describeMotion(const ReportRun& run);
 
 // The plan of a motion that was carried out: what of describeMotion() does not depend on forces of contacts and

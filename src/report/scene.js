@@ -4,7 +4,7 @@
 const LAYERS = [
   ['locks', 'closures', true], ['contactForces', 'contact forces', true], ['closureForces', 'closure forces', false],
   ['com', 'centre of mass', true], ['traces', 'traces', true], ['footprints', 'footprints', true],
-  ['plan', 'plan', true], ['push', 'pushes', true]
+  ['footholds', 'predicted footholds', true], ['plan', 'plan', true], ['push', 'pushes', true]
 ];
 
 class Scene {

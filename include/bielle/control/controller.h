@@ -15,6 +15,13 @@ struct Measurement {
   double getActionTime() const { return time + delay; }  ///< when they act, s
 };
 
+/// Where a foot is foreseen to stand next.
+struct PredictedFoothold {
+  int contact = 0;  ///< of the model
+  double time = 0;  ///< of its landing, since the start of the controller, s
+  SE3 X_WF;         ///< of the contact's frame in the world
+};
+
 /// Called at every instant of control, in the order of time.
 class Controller {
  public:
@@ -24,6 +31,11 @@ class Controller {
   virtual void update(const Measurement& measurement, VectorRef u) = 0;
   /// The instant of its plan at which a controller is, s: feet that land early or late bring it ahead or hold it back.
   virtual double getPlanTime(double time) const { return time; }
+  /// Of the feet that are to land within the time for which a controller plans; empty if it plans nothing itself.
+  virtual const std::vector<PredictedFoothold>& getFootholds() const {
+    static const std::vector<PredictedFoothold> none;
+    return none;
+  }
 };
 
 }  // namespace bielle

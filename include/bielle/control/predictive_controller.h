@@ -89,6 +89,8 @@ class PredictiveController : public Controller {
   /// PredictiveOptions::own_thread at all of them, it does neither.
   void update(const Measurement& measurement, VectorRef u) override;
   double getPlanTime(double time) const override;
+  /// Of the last solution: the first landing of each contact in its window.
+  const std::vector<PredictedFoothold>& getFootholds() const override;
   const PredictiveCounts& getCounts() const;
   const Policy& getPolicy() const;  ///< in force
   /// Until the solve under way in a thread of its own, if any, has ended; its policy comes into force by update().

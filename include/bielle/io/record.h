@@ -27,7 +27,11 @@ struct MotionRecord {
   RowMatrixXd q_mid, v_mid;      ///< N x nq, N x nv; of an impact, which takes no time, q and v of its node
   RowMatrixXd com;               ///< N + 1 x 3, m
   RowMatrixXd gap;               ///< N + 1 x 2, largest closing error: norms of position (m) and of angle (rad)
-  Multipliers multipliers;       ///< of the constraints, for warm starts; without penalty if they are not known
+  /// Of motions under predictive control, else empty: N + 1 x 8 per contact, where it is foreseen to stand next: when (s),
+  /// position (m) and quaternion x, y, z, w of its frame in the world. NaN: within its window it is not to land.
+  RowMatrixXd footholds;
+  static constexpr int kFootholdEntries = 8;
+  Multipliers multipliers;  ///< of the constraints, for warm starts; without penalty if they are not known
 };
 
 MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajectory);
@@ -35,11 +39,11 @@ MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajecto
 /// One row per node under one header: time, q.<name>, v.<name>, a.<name>, u.<motor>, closure.<name>.<entry>,
 /// contact.<name>.<entry>, com.x, com.y, com.z, gap.position, gap.angle and, of midpoint steps, q_mid.<name> and
 /// v_mid.<name>. No stage starts at the last node: its cells of a, u, q_mid, v_mid and of the wrenches are empty.
-/// Numbers are the shortest that read back to the same bits. Multipliers are left out.
+/// Numbers are the shortest that read back to the same bits. Footholds and multipliers are left out.
 void writeCsv(const std::string& path, const MotionRecord& record);
 
-/// NumPy archive of the members above by the same names; wrenches are N x closures x 6 and N x contacts x 6. Multipliers, if
-/// known, are `multipliers` (node after node), `multiplier_rows` (N + 1, how many each node has) and `multiplier_penalty` (1).
+/// NumPy archive of the members above by the same names; wrenches are N x closures x 6 and N x contacts x 6. Footholds, if
+/// there are any, are N + 1 x contacts x 8. Multipliers, if known, are `multipliers` (node after node), `multiplier_rows` (N + 1, how many each node has) and `multiplier_penalty` (1).
 void writeNpz(const std::string& path, const MotionRecord& record);
 
 /// Reads a file written by the functions above; its extension (.csv, .npz) selects the format.
