@@ -2478,8 +2478,8 @@ class Record:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, q_names: Sequence[str] = ..., v_names: Sequence[str] = ..., u_names: Sequence[str] = ..., closure_names: Sequence[str] = ..., contact_names: Sequence[str] = ..., time: ArrayLike = ..., q: ArrayLike = ..., v: ArrayLike = ..., a: ArrayLike = ..., u: ArrayLike = ..., closure_wrenches: ArrayLike = ..., contact_wrenches: ArrayLike = ..., has_midpoints: bool = ..., q_mid: ArrayLike = ..., v_mid: ArrayLike = ..., com: ArrayLike = ..., gap: ArrayLike = ..., multipliers: Multipliers = ...) -> None: ...
-    def replace(self, *, q_names: Sequence[str] = ..., v_names: Sequence[str] = ..., u_names: Sequence[str] = ..., closure_names: Sequence[str] = ..., contact_names: Sequence[str] = ..., time: ArrayLike = ..., q: ArrayLike = ..., v: ArrayLike = ..., a: ArrayLike = ..., u: ArrayLike = ..., closure_wrenches: ArrayLike = ..., contact_wrenches: ArrayLike = ..., has_midpoints: bool = ..., q_mid: ArrayLike = ..., v_mid: ArrayLike = ..., com: ArrayLike = ..., gap: ArrayLike = ..., multipliers: Multipliers = ...) -> Record: ...
+    def __init__(self, q_names: Sequence[str] = ..., v_names: Sequence[str] = ..., u_names: Sequence[str] = ..., closure_names: Sequence[str] = ..., contact_names: Sequence[str] = ..., time: ArrayLike = ..., q: ArrayLike = ..., v: ArrayLike = ..., a: ArrayLike = ..., u: ArrayLike = ..., closure_wrenches: ArrayLike = ..., contact_wrenches: ArrayLike = ..., has_midpoints: bool = ..., q_mid: ArrayLike = ..., v_mid: ArrayLike = ..., com: ArrayLike = ..., gap: ArrayLike = ..., footholds: ArrayLike = ..., multipliers: Multipliers = ...) -> None: ...
+    def replace(self, *, q_names: Sequence[str] = ..., v_names: Sequence[str] = ..., u_names: Sequence[str] = ..., closure_names: Sequence[str] = ..., contact_names: Sequence[str] = ..., time: ArrayLike = ..., q: ArrayLike = ..., v: ArrayLike = ..., a: ArrayLike = ..., u: ArrayLike = ..., closure_wrenches: ArrayLike = ..., contact_wrenches: ArrayLike = ..., has_midpoints: bool = ..., q_mid: ArrayLike = ..., v_mid: ArrayLike = ..., com: ArrayLike = ..., gap: ArrayLike = ..., footholds: ArrayLike = ..., multipliers: Multipliers = ...) -> Record: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def q_names(self) -> Tuple[str, ...]:
@@ -2548,6 +2548,10 @@ class Record:
     @property
     def gap(self) -> Array:
         """(N + 1, 2), largest closing error, m and rad"""
+        ...
+    @property
+    def footholds(self) -> Array:
+        """(N + 1, 8 per contact), predicted: when, s, position, m, quaternion x y z w; (0, 0) without predictive control"""
         ...
     @property
     def multipliers(self) -> Multipliers:
@@ -3119,8 +3123,8 @@ class PredictiveOptions:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, nodes: int = ..., iterations: int = ..., regularization: float = ..., penalty: float = ..., look_ahead: float = ..., threads: int = ..., own_thread: bool = ..., end_place: float = ..., end_posture: float = ..., end_velocity: float = ...) -> None: ...
-    def replace(self, *, nodes: int = ..., iterations: int = ..., regularization: float = ..., penalty: float = ..., look_ahead: float = ..., threads: int = ..., own_thread: bool = ..., end_place: float = ..., end_posture: float = ..., end_velocity: float = ...) -> PredictiveOptions: ...
+    def __init__(self, nodes: int = ..., iterations: int = ..., regularization: float = ..., penalty: float = ..., look_ahead: float = ..., dead_point_stop: float = ..., threads: int = ..., own_thread: bool = ..., end_place: float = ..., end_posture: float = ..., end_velocity: float = ...) -> None: ...
+    def replace(self, *, nodes: int = ..., iterations: int = ..., regularization: float = ..., penalty: float = ..., look_ahead: float = ..., dead_point_stop: float = ..., threads: int = ..., own_thread: bool = ..., end_place: float = ..., end_posture: float = ..., end_velocity: float = ...) -> PredictiveOptions: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def nodes(self) -> int:
@@ -3143,6 +3147,10 @@ class PredictiveOptions:
         """gains of stages nearer to the end of their phase are those of an earlier one, s"""
         ...
     @property
+    def dead_point_stop(self) -> float:
+        """motors brake before the transmission of a linkage is this share of that at the start, or its reciprocal"""
+        ...
+    @property
     def threads(self) -> int:
         """0: all; results are bitwise independent of it"""
         ...
@@ -3161,6 +3169,27 @@ class PredictiveOptions:
     @property
     def end_velocity(self) -> float:
         """of the velocities, s^2/m^2 or s^2"""
+        ...
+
+class PredictedFoothold:
+    """Where a foot is foreseen to stand next.
+
+    Immutable; `replace` makes a changed copy.
+    """
+    def __init__(self, contact: int = ..., time: float = ..., X_WF: SE3 = ...) -> None: ...
+    def replace(self, *, contact: int = ..., time: float = ..., X_WF: SE3 = ...) -> PredictedFoothold: ...
+    def __eq__(self, other: object) -> bool: ...
+    @property
+    def contact(self) -> int:
+        """of the model"""
+        ...
+    @property
+    def time(self) -> float:
+        """of its landing, s"""
+        ...
+    @property
+    def X_WF(self) -> SE3:
+        """of the contact's frame in the world"""
         ...
 
 class Controller:
@@ -3189,6 +3218,10 @@ class Controller:
     @property
     def counts(self) -> Dict[str, int]:
         """of predictive control: solves, failed ones, early and late landings, solves longer than a stage"""
+        ...
+    @property
+    def footholds(self) -> List[PredictedFoothold]:
+        """of predictive control: a PredictedFoothold for each contact that is to land in its window"""
         ...
 
 class SensorReadings:
