@@ -30,7 +30,7 @@ struct MotionRecord {
   /// Of motions under predictive control, else empty: N + 1 x 8 per contact, where it is foreseen to stand next: when (s),
   /// position (m) and quaternion x, y, z, w of its frame in the world. NaN: within its window it is not to land.
   RowMatrixXd footholds;
-  static constexpr int kFootholdEntries = 8;
+  static constexpr int kFootholdEntries = 8;  ///< columns of `footholds` per contact
   Multipliers multipliers;  ///< of the constraints, for warm starts; without penalty if they are not known
 };
 
@@ -42,8 +42,9 @@ MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajecto
 /// Numbers are the shortest that read back to the same bits. Footholds and multipliers are left out.
 void writeCsv(const std::string& path, const MotionRecord& record);
 
-/// NumPy archive of the members above by the same names; wrenches are N x closures x 6 and N x contacts x 6. Footholds, if
-/// there are any, are N + 1 x contacts x 8. Multipliers, if known, are `multipliers` (node after node), `multiplier_rows` (N + 1, how many each node has) and `multiplier_penalty` (1).
+/// NumPy archive of the members above by the same names; wrenches are N x closures x 6 and N x contacts x 6, footholds, if there
+/// are any, N + 1 x contacts x 8. Multipliers, if known, are `multipliers` (node after node), `multiplier_rows` (N + 1, how many
+/// each node has) and `multiplier_penalty` (1).
 void writeNpz(const std::string& path, const MotionRecord& record);
 
 /// Reads a file written by the functions above; its extension (.csv, .npz) selects the format.
