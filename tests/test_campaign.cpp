@@ -202,7 +202,7 @@ TEST_CASE("campaign: motions are solved with the options that they are given") {
   const std::string spec = directory.write(
       "spec.yaml",
       std::string("motions:\n  - {name: w, solve: walk, robot: bipetto, set: {steps: 2}, options: {no-limits: "
-                  "true, dead-point-margin: 0.25}}\n"));
+                  "true, no-check: false, dead-point-margin: 0.25}}\n"));
   const std::vector<study::CampaignMotion> motions = study::readCampaignSpec(spec).motions;
   REQUIRE(motions.size() == 1);
   CHECK(motions[0].solve == std::vector<std::string>{"solve", "walk", "--robot", "bipetto", "--set", "steps=2",

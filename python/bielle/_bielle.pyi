@@ -2551,7 +2551,7 @@ class Record:
         ...
     @property
     def footholds(self) -> Array:
-        """(N + 1, 8 per contact), predicted: when, s, position, m, quaternion x y z w; (0, 0) without predictive control"""
+        """(N + 1, 8 per contact), predicted: when, s; where, m, and quaternion x y z w; (0, 0) if not known"""
         ...
     @property
     def multipliers(self) -> Multipliers:

@@ -31,7 +31,7 @@ void bindRecord(py::module_& module) {
       .field("com", &MotionRecord::com, "(N + 1, 3), m")
       .field("gap", &MotionRecord::gap, "(N + 1, 2), largest closing error, m and rad")
       .field("footholds", &MotionRecord::footholds,
-             "(N + 1, 8 per contact), predicted: when, s, position, m, quaternion x y z w; (0, 0) without predictive control")
+             "(N + 1, 8 per contact), predicted: when, s; where, m, and quaternion x y z w; (0, 0) if not known")
       .field("multipliers", &MotionRecord::multipliers, "of the constraints, for warm starts; penalty 0 if not known");
   module.def("read_record", &readRecord, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
              "Reads trajectory.csv or trajectory.npz.");

@@ -87,9 +87,7 @@ std::vector<std::string> CampaignCommands::make(const CampaignCell& cell, const 
       case Kind::Motion:
         break;
       case Kind::Option:
-        if (value == "false") break;
-        arguments.push_back("--" + axis.name);
-        if (value != "true") arguments.push_back(value);
+        addOption(axis.name, value, arguments);
         break;
       case Kind::PushTime:
         addToPush("t", value);

@@ -71,8 +71,7 @@ CampaignMotion readRequest(const YamlEntry& entry, const std::string& file) {
     for (const auto& [name, value] : options->getMap()) {
       if (name == "output" || name == "set" || name == "robot")
         value.fail("it cannot be set here", name == "output" ? "remove it" : "use the key beside `options`");
-      motion.solve.push_back("--" + name);
-      if (value.getText() != "true") motion.solve.push_back(value.getText());
+      addOption(name, value.getText(), motion.solve);
     }
   return motion;
 }
@@ -120,6 +119,12 @@ void readPush(const YamlEntry& entry, CampaignSpec& spec) {
 }
 
 }  // namespace
+
+void addOption(const std::string& name, const std::string& value, std::vector<std::string>& arguments) {
+  if (value == "false") return;
+  arguments.push_back("--" + name);
+  if (value != "true") arguments.push_back(value);
+}
 
 CampaignSpec readCampaignSpec(const std::string& path) {
   CampaignSpec spec;
