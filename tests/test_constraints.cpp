@@ -429,6 +429,33 @@ TEST_CASE("solves of one iteration, for receding horizons, linearize once each a
   CHECK(calcError() < 0.01 * first);
 }
 
+TEST_CASE("in receding horizons a row that binds does not come free and is violated in every other iteration") {
+  Constrained<PlantProblem<Linear>> problem(makeLinear());
+  ShootingTrajectory t = makeGuess(problem);
+  REQUIRE(Fddp().solve(problem, t).termination == FddpTermination::Converged);  // violates what now comes
+  problem.rows.push_back(
+      {"speed", 1, problem.stages, -0.4, kFree, [](const Complex* x, const Complex*) { return x[1] + x[2]; }});
+  const auto calcViolation = [&] {
+    double violation = 0;
+    for (int k = 1; k <= problem.stages; ++k) violation = std::max(violation, -0.4 - (t.xs[k][1] + t.xs[k][2]));
+    return violation;
+  };
+  const double first = calcViolation();
+  REQUIRE(first > 0.1);
+  FddpOptions options;
+  options.threads = options.max_iterations = 1;
+  options.last_rollout = LastRollout::Segments;
+  options.constraints.initial_penalty = 1000;  // the cost alone would let rows be violated by little
+  options.constraints.penalty_increase = 1;
+  Fddp solver(options);
+  for (int i = 0; i < 6; ++i) {
+    if (i > 0) solver.setMultipliers(solver.getMultipliers());
+    solver.solve(problem, t);
+    CAPTURE(i, first);
+    if (i > 0) CHECK(calcViolation() < 0.05 * first);  // after the first, rows that had no multipliers are violated
+  }
+}
+
 TEST_CASE("an iteration with constraints allocates nothing after the first, and threads change no bit") {
   auto problem = makeBoundedCartPole();
   const Inequalities inequalities = GENERATE(values(kAll));

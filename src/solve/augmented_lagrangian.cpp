@@ -48,6 +48,7 @@ void AugmentedLagrangian::resize(const ShootingProblem& problem, const Constrain
     const int rows = problem.constraintSize(k);
     if (!kept_ || node.multipliers.size() != rows) node.multipliers.setZero(rows);
     for (VectorXd* v : {&node.lower, &node.upper, &node.weights.gradient, &node.weights.hessian}) v->setZero(rows);
+    node.held.assign(rows, false);
     problem.getConstraintBounds(k, node.lower, node.upper);
     if (!(node.lower.array() <= node.upper.array()).all())
       throw std::invalid_argument("Fddp: a lower bound of the constraints of node " + std::to_string(k) +
@@ -64,7 +65,8 @@ void AugmentedLagrangian::resize(const ShootingProblem& problem, const Constrain
 }
 
 double AugmentedLagrangian::Node::calcDistance(double c, Eigen::Index row, double penalty) const {
-  const double z = c + multipliers[row] / penalty;
+  const double y = multipliers[row], z = c + y / penalty;
+  if (held[row]) return z - (y > 0 ? upper : lower)[row];
   return z - clamp(z, lower[row], upper[row]);
 }
 
@@ -93,6 +95,24 @@ void AugmentedLagrangian::moveSlacks(const EvaluationList& iterate) {
 }
 
 void AugmentedLagrangian::evaluate(const EvaluationList& iterate) {
+  release();
+  measure(iterate);
+}
+
+void AugmentedLagrangian::hold(const EvaluationList& iterate) {
+  for (Node& node : nodes_)
+    for (size_t i = 0; i < node.held.size(); ++i) node.held[i] = node.multipliers[static_cast<Eigen::Index>(i)] != 0;
+  holds_ = true;
+  measure(iterate);
+}
+
+void AugmentedLagrangian::release() {
+  if (holds_)
+    for (Node& node : nodes_) node.held.assign(node.held.size(), false);
+  holds_ = false;
+}
+
+void AugmentedLagrangian::measure(const EvaluationList& iterate) {
   at_ = {};
   slacks_ = {};
   if (hasBarrier()) moveSlacks(iterate);
@@ -115,7 +135,7 @@ void AugmentedLagrangian::evaluate(const EvaluationList& iterate) {
       at_.penalized = std::max(at_.penalized, violation);
       const double d = node.calcDistance(c[i], i, penalty_), y = penalty_ * d, change = y - node.multipliers[i];
       node.weights.gradient[i] = y;
-      node.weights.hessian[i] = d != 0 || node.lower[i] == node.upper[i] ? penalty_ : 0;
+      node.weights.hessian[i] = d != 0 || node.held[i] || node.lower[i] == node.upper[i] ? penalty_ : 0;
       at_.value += calcContribution(d, node.multipliers[i]);
       at_.gain += change * change / (2 * penalty_);
       if (y != 0)
@@ -152,6 +172,7 @@ bool AugmentedLagrangian::isDue(double foreseen) const {
 }
 
 bool AugmentedLagrangian::updateMultipliers(const EvaluationList& iterate, double cost) {
+  if (holds_) evaluate(iterate);  // (12) is of the clamped d
   const bool falls = at_.penalized <= std::max(kFall * last_violation_, options_.tolerance);
   if (restoring_ && !falls) return false;
   last_violation_ = at_.penalized;
@@ -205,6 +226,7 @@ void AugmentedLagrangian::endSettling(const EvaluationList& iterate) {
 }
 
 void AugmentedLagrangian::startRestoration(double cost) {
+  release();
   restoring_ = true;
   penalty_ =
       std::clamp(kRestorationWeight * std::abs(cost) / at_.squares, options_.initial_penalty, options_.max_penalty);

@@ -42,6 +42,8 @@ class AugmentedLagrangian {
   /// and evaluates again. Once the penalty has reached its maximum, the violations alone are minimized: without multipliers,
   /// under a penalty that dominates `cost`. Returns false if that has been done and has not reduced them: infeasible.
   bool updateMultipliers(const EvaluationList& iterate, double cost);
+  /// Holds the rows that have a multiplier at their bounds (fddp.h, Eq. 18) until evaluate() or updateMultipliers().
+  void hold(const EvaluationList& iterate);
   /// Minimizes the violations alone from now on, as updateMultipliers() does in the end. False if that was so already.
   bool restore(const EvaluationList& iterate, double cost);
   /// Whether settle() makes sense: no barrier, and violations are not minimized on their own.
@@ -67,6 +69,7 @@ class AugmentedLagrangian {
  private:
   struct Node {
     VectorXd lower, upper, multipliers;
+    std::vector<char> held;  // Eq. (18), by row
     ConstraintWeights weights;
     const ConstraintWeights* getWeights() const { return lower.size() > 0 ? &weights : nullptr; }
     // d of Eq. (10)
@@ -88,11 +91,14 @@ class AugmentedLagrangian {
   bool isExhausted() const {
     return barrier_.getParameter() <= options_.final_barrier && at_.penalized <= options_.tolerance;
   }
+  void release();
+  void measure(const EvaluationList& iterate);
   void moveSlacks(const EvaluationList& iterate);
 
   ConstraintOptions options_;
   std::vector<Node> nodes_;
   Eigen::Index rows_ = 0;   // of all nodes
+  bool holds_ = false;      // some rows may be held
   bool restoring_ = false;  // minimizes the violations alone
   bool kept_ = false;       // the next resize() keeps multipliers and penalty
   double penalty_ = 1;

@@ -59,6 +59,7 @@ FddpRun::End FddpRun::linearize() {
   work_.lagrangian.evaluate(work_.evaluations.getIterate());
   if (recedes() && !work_.lagrangian.isEmpty()) {
     work_.lagrangian.updateMultipliers(work_.evaluations.getIterate(), line_.cost);
+    work_.lagrangian.hold(work_.evaluations.getIterate());
     updated_ = true;
   }
   if (!work_.lagrangian.canSettle()) settling_ = 0;  // what minimizes violations alone may move far
@@ -169,7 +170,7 @@ FddpRun::End FddpRun::findStep() {
 // New multipliers are due once the cost can hardly fall under the old ones.
 bool FddpRun::mustUpdateMultipliers() const {
   const AugmentedLagrangian& lagrangian = work_.lagrangian;
-  if (lagrangian.isEmpty()) return false;
+  if (lagrangian.isEmpty() || (recedes() && !stalled_)) return false;  // (12) came before this linearization
   if (isStationary()) return true;
   const bool first_sweep = regularization_ == first_regularization_;  // a damped one promises little
   return !updated_ && first_sweep && last_step_ >= kGoodStep && lagrangian.isDue(calcForeseen());

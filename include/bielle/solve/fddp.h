@@ -88,6 +88,13 @@
 /// Eq. (12) is accompanied by mu <- min(mu / 5, mu^(3/2)), unless a gap exceeds 10 mu. Converged means, besides, that mu is at its
 /// least and no gap exceeds the tolerance. Violations are minimized on their own by Eq. (10).
 ///
+/// With LastRollout::Segments (12) comes before every linearization, where (10) is not at its minimum. Rows with y_k != 0 after it
+/// are then held at their bounds, like equations (a primal-dual active set: Hintermueller, Ito, Kunisch, SIAM Journal on
+/// Optimization 13, 2002): in (10) and (11) they have
+///     d_k = z_k - upper (y_k > 0) or z_k - lower (y_k < 0).                                                          (18)
+/// By (10) and (11) alone a violated row is drawn inside by as much as it was violated, is free there since it is farther from its
+/// bound than y_k / rho, and is violated again: in a walk's window, wrench cones by 0.5 after every other iteration.
+///
 /// Models without second derivatives may be too flat along some directions, by a factor that stays the same from step to step.
 /// After two steps alpha < 1 in a row, close to the constraints and with closed gaps, the curvature b of the merit along the
 /// last one is taken from its values. Where it is more than 1.5 times the curvature a of (1), the next line search starts at
