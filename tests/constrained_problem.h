@@ -1,6 +1,7 @@
 #pragma once
-// Constraints for the small problems of solve_problems.h, with derivatives by complex steps.
+// Constraints for the small problems of solve_problems.h, with derivatives by complex steps, and one such problem.
 #include <functional>
+#include <limits>
 #include <string>
 
 #include "solve_problems.h"
@@ -93,5 +94,24 @@ class Constrained : public Base {
     return row.value(x.data(), running ? u.data() : nullptr);
   }
 };
+
+constexpr double kFree = std::numeric_limits<double>::infinity();
+
+inline Complex getTip(const Complex* x, const Complex*) { return x[0] + 0.5 * std::sin(x[1]); }
+
+// A cart that catches its pole: the tip must not go far, there is a limit to the force that falls with the speed, and the
+// end is exactly at rest.
+constexpr double kFarthest = 0.74, kPush = 6;
+inline Constrained<PlantProblem<CartPole>> makeBoundedCartPole() {
+  Constrained<PlantProblem<CartPole>> p(makeCartPole());
+  const int N = p.stages;
+  p.start << 0.3, 0.3, 0, 0;
+  p.terminal_weight.setConstant(1);
+  p.rows.push_back({"tip", 1, N, -kFree, kFarthest, getTip});
+  p.rows.push_back({"push", 0, N - 1, -kPush, kFree, [](const Complex* x, const Complex* u) { return u[0] - x[2]; }});
+  for (int i = 0; i < 4; ++i)
+    p.rows.push_back({"end " + std::to_string(i), N, N, 0, 0, [i](const Complex* x, const Complex*) { return x[i]; }});
+  return p;
+}
 
 }  // namespace bielle::test

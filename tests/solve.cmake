@@ -8,5 +8,6 @@ bielle_test(fddp_batches SOURCES test_fddp_batches.cpp LIBS bielle_solve bielle_
 target_link_options(test_fddp_batches PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 bielle_test(constraints SOURCES test_constraints.cpp LIBS bielle_solve bielle_model)
 target_link_options(test_constraints PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
+bielle_test(receding_constraints SOURCES test_receding_constraints.cpp LIBS bielle_solve bielle_model)
 bielle_test(peak SOURCES test_peak.cpp LIBS bielle_solve bielle_dynamics)
 target_link_options(test_peak PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)

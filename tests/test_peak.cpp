@@ -15,8 +15,6 @@ using testing::checkDerivative;
 
 namespace {
 
-constexpr double kFree = std::numeric_limits<double>::infinity();
-
 // Position and velocity; the second force has half the effect of the first.
 struct Mass {
   static constexpr int kStates = 2, kControls = 2;
