@@ -48,7 +48,6 @@ void AugmentedLagrangian::resize(const ShootingProblem& problem, const Constrain
     const int rows = problem.constraintSize(k);
     if (!kept_ || node.multipliers.size() != rows) node.multipliers.setZero(rows);
     for (VectorXd* v : {&node.lower, &node.upper, &node.weights.gradient, &node.weights.hessian}) v->setZero(rows);
-    node.held.assign(rows, false);
     problem.getConstraintBounds(k, node.lower, node.upper);
     if (!(node.lower.array() <= node.upper.array()).all())
       throw std::invalid_argument("Fddp: a lower bound of the constraints of node " + std::to_string(k) +
@@ -61,13 +60,13 @@ void AugmentedLagrangian::resize(const ShootingProblem& problem, const Constrain
   last_violation_ = std::numeric_limits<double>::infinity();
   at_ = {};
   num_updates_ = 0;
-  kept_ = restoring_ = false;
+  kept_ = restoring_ = holds_ = false;
 }
 
-double AugmentedLagrangian::Node::calcDistance(double c, Eigen::Index row, double penalty) const {
-  const double y = multipliers[row], z = c + y / penalty;
-  if (held[row]) return z - (y > 0 ? upper : lower)[row];
-  return z - clamp(z, lower[row], upper[row]);
+double AugmentedLagrangian::calcDistance(const Node& node, Eigen::Index row, double c) const {
+  const double y = node.multipliers[row], z = c + y / penalty_;
+  if (isHeld(node, row)) return z - (y > 0 ? node.upper : node.lower)[row];
+  return z - clamp(z, node.lower[row], node.upper[row]);
 }
 
 double AugmentedLagrangian::calcContribution(double d, double multiplier) const {
@@ -78,7 +77,7 @@ double AugmentedLagrangian::calc(int node, const VectorXd& c, double alpha) cons
   const Node& own = nodes_[node];
   double sum = hasBarrier() ? barrier_.calc(node, c, alpha) : 0;
   for (Eigen::Index i = 0; i < own.lower.size(); ++i)
-    if (isPenalized(own, i)) sum += calcContribution(own.calcDistance(c[i], i, penalty_), own.multipliers[i]);
+    if (isPenalized(own, i)) sum += calcContribution(calcDistance(own, i, c[i]), own.multipliers[i]);
   return sum;
 }
 
@@ -95,21 +94,13 @@ void AugmentedLagrangian::moveSlacks(const EvaluationList& iterate) {
 }
 
 void AugmentedLagrangian::evaluate(const EvaluationList& iterate) {
-  release();
+  holds_ = false;
   measure(iterate);
 }
 
 void AugmentedLagrangian::hold(const EvaluationList& iterate) {
-  for (Node& node : nodes_)
-    for (size_t i = 0; i < node.held.size(); ++i) node.held[i] = node.multipliers[static_cast<Eigen::Index>(i)] != 0;
   holds_ = true;
   measure(iterate);
-}
-
-void AugmentedLagrangian::release() {
-  if (holds_)
-    for (Node& node : nodes_) node.held.assign(node.held.size(), false);
-  holds_ = false;
 }
 
 void AugmentedLagrangian::measure(const EvaluationList& iterate) {
@@ -133,9 +124,9 @@ void AugmentedLagrangian::measure(const EvaluationList& iterate) {
         continue;
       }
       at_.penalized = std::max(at_.penalized, violation);
-      const double d = node.calcDistance(c[i], i, penalty_), y = penalty_ * d, change = y - node.multipliers[i];
+      const double d = calcDistance(node, i, c[i]), y = penalty_ * d, change = y - node.multipliers[i];
       node.weights.gradient[i] = y;
-      node.weights.hessian[i] = d != 0 || node.held[i] || node.lower[i] == node.upper[i] ? penalty_ : 0;
+      node.weights.hessian[i] = d != 0 || isHeld(node, i) || node.lower[i] == node.upper[i] ? penalty_ : 0;
       at_.value += calcContribution(d, node.multipliers[i]);
       at_.gain += change * change / (2 * penalty_);
       if (y != 0)
@@ -172,7 +163,6 @@ bool AugmentedLagrangian::isDue(double foreseen) const {
 }
 
 bool AugmentedLagrangian::updateMultipliers(const EvaluationList& iterate, double cost) {
-  if (holds_) evaluate(iterate);  // (12) is of the clamped d
   const bool falls = at_.penalized <= std::max(kFall * last_violation_, options_.tolerance);
   if (restoring_ && !falls) return false;
   last_violation_ = at_.penalized;
@@ -183,7 +173,7 @@ bool AugmentedLagrangian::updateMultipliers(const EvaluationList& iterate, doubl
   } else {
     if (restoring_) has_slacks_ = false;
     restoring_ = false;
-    adoptMultipliers();
+    adoptMultipliers(iterate);
     if (slacks_.largest_gap <= kSlackGap * mu || at_.penalized <= options_.tolerance)
       barrier_.setParameter(std::max(options_.final_barrier, std::min(kBarrierFall * mu, std::pow(mu, 1.5))));
     if (!falls) {
@@ -213,7 +203,7 @@ bool AugmentedLagrangian::settle(const EvaluationList& iterate, bool full) {
     penalty_ = std::min(options_.max_penalty, options_.penalty_increase * penalty_);
   } else if (full && !falls) {
     ++num_updates_;
-    adoptMultipliers();
+    adoptMultipliers(iterate);
   }
   evaluate(iterate);
   return falls;
@@ -226,14 +216,14 @@ void AugmentedLagrangian::endSettling(const EvaluationList& iterate) {
 }
 
 void AugmentedLagrangian::startRestoration(double cost) {
-  release();
   restoring_ = true;
   penalty_ =
       std::clamp(kRestorationWeight * std::abs(cost) / at_.squares, options_.initial_penalty, options_.max_penalty);
   for (Node& node : nodes_) node.multipliers.setZero();
 }
 
-void AugmentedLagrangian::adoptMultipliers() {
+void AugmentedLagrangian::adoptMultipliers(const EvaluationList& iterate) {
+  if (holds_) evaluate(iterate);  // Eq. (12) is of the d of Eq. (10)
   for (Node& node : nodes_) node.multipliers = node.weights.gradient;
 }
 

@@ -42,7 +42,7 @@ class AugmentedLagrangian {
   /// and evaluates again. Once the penalty has reached its maximum, the violations alone are minimized: without multipliers,
   /// under a penalty that dominates `cost`. Returns false if that has been done and has not reduced them: infeasible.
   bool updateMultipliers(const EvaluationList& iterate, double cost);
-  /// Holds the rows that have a multiplier at their bounds (fddp.h, Eq. 18) until evaluate() or updateMultipliers().
+  /// Holds the rows that have a multiplier at their bounds (fddp.h, Eq. 18) until the next evaluate().
   void hold(const EvaluationList& iterate);
   /// Minimizes the violations alone from now on, as updateMultipliers() does in the end. False if that was so already.
   bool restore(const EvaluationList& iterate, double cost);
@@ -55,7 +55,7 @@ class AugmentedLagrangian {
   void endSettling(const EvaluationList& iterate);
   int getNumUpdates() const { return num_updates_; }
   /// Eq. (12) alone: at a stationary point, the multipliers of the constraints.
-  void adoptMultipliers();
+  void adoptMultipliers(const EvaluationList& iterate);
 
   double getPenalty() const { return penalty_; }
   double getLargestMultiplier() const;
@@ -69,11 +69,8 @@ class AugmentedLagrangian {
  private:
   struct Node {
     VectorXd lower, upper, multipliers;
-    std::vector<char> held;  // Eq. (18), by row
     ConstraintWeights weights;
     const ConstraintWeights* getWeights() const { return lower.size() > 0 ? &weights : nullptr; }
-    // d of Eq. (10)
-    double calcDistance(double c, Eigen::Index row, double penalty) const;
   };
   struct Measures {
     double value = 0, violation = 0, complementarity = 0;
@@ -82,6 +79,8 @@ class AugmentedLagrangian {
     double squares = 0;    // sum of the squared violations
     int worst_node = 0, worst_row = 0;
   };
+  bool isHeld(const Node& node, Eigen::Index row) const { return holds_ && node.multipliers[row] != 0; }
+  double calcDistance(const Node& node, Eigen::Index row, double c) const;  // d of Eq. (10) or (18)
   double calcContribution(double d, double multiplier) const;
   void startRestoration(double cost);
   // Whether inequalities are enforced by the barrier at present, and whether Eq. (10) enforces a row.
@@ -91,14 +90,13 @@ class AugmentedLagrangian {
   bool isExhausted() const {
     return barrier_.getParameter() <= options_.final_barrier && at_.penalized <= options_.tolerance;
   }
-  void release();
   void measure(const EvaluationList& iterate);
   void moveSlacks(const EvaluationList& iterate);
 
   ConstraintOptions options_;
   std::vector<Node> nodes_;
   Eigen::Index rows_ = 0;   // of all nodes
-  bool holds_ = false;      // some rows may be held
+  bool holds_ = false;      // by Eq. (18)
   bool restoring_ = false;  // minimizes the violations alone
   bool kept_ = false;       // the next resize() keeps multipliers and penalty
   double penalty_ = 1;

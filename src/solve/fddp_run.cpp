@@ -318,7 +318,7 @@ FddpRun::End FddpRun::checkProgress() {
 FddpSummary FddpRun::finish(FddpTermination termination) {
   summary_.termination = termination;
   if (!work_.lagrangian.isEmpty()) {
-    if (termination == FddpTermination::Converged) work_.lagrangian.adoptMultipliers();
+    if (termination == FddpTermination::Converged) work_.lagrangian.adoptMultipliers(work_.evaluations.getIterate());
     summary_.violation = work_.lagrangian.getViolation();
     summary_.complementarity = work_.lagrangian.getComplementarity();
     summary_.multiplier = work_.lagrangian.getLargestMultiplier();
