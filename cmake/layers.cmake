@@ -62,11 +62,11 @@ if(BUILD_SHARED_LIBS)
   endforeach()
 endif()
 
-# bielle_precompile(TARGET KIND): headers that most files include are parsed once for all targets of a KIND, whose flags are the
-# same. A file that forgets one of them still compiles, so that only builds that must be soon done do it.
-option(BIELLE_PRECOMPILE "Precompile headers: the build takes less time, but missing includes are not noticed" OFF)
+# bielle_precompile(TARGET KIND HEADERS...): headers that most files include are parsed once for all targets of a KIND, whose
+# flags are the same. A file that forgets one of them still compiles; scripts/check_includes.sh finds it.
+option(BIELLE_PRECOMPILE "Precompile headers" ON)
 function(bielle_precompile target kind)
-  if(NOT BIELLE_PRECOMPILE)
+  if(NOT BIELLE_PRECOMPILE OR BUILD_SHARED_LIBS)
     return()
   endif()
   get_property(first GLOBAL PROPERTY BIELLE_PRECOMPILED_${kind})
@@ -75,13 +75,41 @@ function(bielle_precompile target kind)
   else()
     set_property(GLOBAL PROPERTY BIELLE_PRECOMPILED_${kind} ${target})
     target_precompile_headers(${target} PRIVATE <algorithm> <array> <cmath> <filesystem> <functional> <iostream> <map> <memory>
-      <optional> <set> <sstream> <string> <vector> <Eigen/Dense> "${PROJECT_SOURCE_DIR}/include/bielle/model/model.h" ${ARGN})
+      <optional> <set> <sstream> <string> <vector> <Eigen/Dense> "${PROJECT_SOURCE_DIR}/src/math/decompositions.h"
+      "${PROJECT_SOURCE_DIR}/include/bielle/model/model.h" ${ARGN})
   endif()
 endfunction()
 
-# bielle_layer(NAME SOURCES... INCLUDE DIRECTORIES... PUBLIC LIBRARIES... PRIVATE LIBRARIES...): the target bielle_NAME.
+# bielle_fast(TARGET): a room whose speed `bielle bench` shows. Its files are compiled at -O3, each by itself even in a unity
+# build, so that what the compiler makes of a function does not depend on its neighbours.
+function(bielle_fast target)
+  if(NOT BIELLE_SANITIZE)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
+  endif()
+  get_target_property(libraries ${target} LINK_LIBRARIES)
+  if(NOT "OpenMP::OpenMP_CXX" IN_LIST libraries)  # its flags are others
+    bielle_precompile(${target} fast)
+  endif()
+endfunction()
+
+# bielle_plain(TARGET): everything else. -O1 takes three quarters of the time to compile; GCC 12 then reports its AVX-512
+# intrinsics once more.
+function(bielle_plain target)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1> $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized>)
+  bielle_precompile(${target} plain <nlohmann/json.hpp> <CLI/CLI.hpp>)
+endfunction()
+
+function(bielle_tune target fast)
+  if(fast)
+    bielle_fast(${target})
+  else()
+    bielle_plain(${target})
+  endif()
+endfunction()
+
+# bielle_layer(NAME [FAST] SOURCES... INCLUDE DIRECTORIES... PUBLIC LIBRARIES... PRIVATE LIBRARIES...): the target bielle_NAME.
 function(bielle_layer name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;INCLUDE;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "FAST" "" "SOURCES;INCLUDE;PUBLIC;PRIVATE" ${ARGN})
   set_property(GLOBAL APPEND PROPERTY BIELLE_LAYERS bielle_${name})
   if(BUILD_SHARED_LIBS)
     add_library(bielle_${name} INTERFACE)
@@ -93,6 +121,7 @@ function(bielle_layer name)
       add_library(${objects} OBJECT ${ARG_SOURCES})
       target_include_directories(${objects} PRIVATE ${PROJECT_SOURCE_DIR}/src ${ARG_INCLUDE})
       target_link_libraries(${objects} PRIVATE bielle_headers ${ARG_PUBLIC} ${ARG_PRIVATE} bielle_warnings)
+      bielle_tune(${objects} ${ARG_FAST})
       if(level)
         target_compile_options(${objects} PRIVATE -march=${level} -mtune=generic)
         if(level STREQUAL x86-64-v3 AND CMAKE_CXX_COMPILER_ID STREQUAL GNU
@@ -108,9 +137,7 @@ function(bielle_layer name)
     target_include_directories(bielle_${name} PRIVATE ${PROJECT_SOURCE_DIR}/src ${ARG_INCLUDE})
     target_link_libraries(bielle_${name}
       PUBLIC bielle_headers ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:bielle_warnings>)
-    if(NOT OpenMP::OpenMP_CXX IN_LIST ARG_PRIVATE)  # its flags are others
-      bielle_precompile(bielle_${name} layers)
-    endif()
+    bielle_tune(bielle_${name} ${ARG_FAST})
   endif()
   add_library(bielle::${name} ALIAS bielle_${name})
   set_target_properties(bielle_${name} PROPERTIES EXPORT_NAME ${name})

@@ -1,6 +1,5 @@
 #include "simulation/bielle_world.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -11,6 +10,7 @@
 #include "bielle/motion/motion.h"
 #include "dynamics/joint_force.h"
 #include "dynamics/point_spring.h"
+#include "math/decompositions.h"
 #include "simulation/closed_tree.h"
 #include "simulation/sole_track.h"
 

@@ -10,14 +10,13 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
+#include "control/clock.h"
 #include "io/record_tables.h"
+#include "math/constants.h"
 #include "simulation/robot_errors.h"
 
 namespace bielle::simulation {
 namespace {
-
-constexpr double kClockTolerance = 1e-9;  // changes of torques this close to an instant of control belong to it, s
-constexpr double kDegree = 3.14159265358979323846 / 180;
 
 Vector3d calcPush(const std::vector<Push>& pushes, double time) {
   Vector3d force = Vector3d::Zero();

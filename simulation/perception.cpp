@@ -4,13 +4,13 @@
 #include <cmath>
 
 #include "bielle/motion/motion.h"
+#include "control/clock.h"
 
 namespace bielle::simulation {
 namespace {
 
 constexpr int kRestReadings = 2000;
-constexpr double kRestPeriod = 1e-3;      // s
-constexpr double kClockTolerance = 1e-9;  // s
+constexpr double kRestPeriod = 1e-3;  // s
 
 Matrix3d getAttitude(const VectorXd& q) { return Eigen::Quaterniond(q[6], q[3], q[4], q[5]).toRotationMatrix(); }
 

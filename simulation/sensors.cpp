@@ -2,12 +2,13 @@
 
 #include <cmath>
 
+#include "math/constants.h"
 #include "math/so3.h"
 
 namespace bielle::simulation {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846, kDegree = kPi / 180, kGravity = 9.80665;
+constexpr double kGravity = 9.80665;
 
 SE3 getTrunk(const VectorXd& q) { return {Eigen::Quaterniond(q[6], q[3], q[4], q[5]).toRotationMatrix(), q.head<3>()}; }
 

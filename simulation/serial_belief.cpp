@@ -1,7 +1,6 @@
 #include "simulation/serial_belief.h"
 
-#include <Eigen/LU>
-
+#include "math/decompositions.h"
 #include "transmission/posture_lift.h"
 
 namespace bielle::simulation {

@@ -5,11 +5,12 @@
 #include <limits>
 #include <stdexcept>
 
+#include "control/clock.h"
+
 namespace bielle::simulation {
 namespace {
 
 // Clocks that sum up their steps may differ by this much; without it, steps as short as rounding would arise.
-constexpr double kClockTolerance = 1e-9;  // s
 
 size_t countUnderWay(double period, const DelayOptions& o) {
   if (!(o.jitter >= 0 && o.jitter <= o.delay && std::isfinite(o.delay) && period > 0))

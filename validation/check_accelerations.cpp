@@ -1,9 +1,9 @@
 #include "check_accelerations.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <cmath>
 #include <vector>
+
+#include "math/decompositions.h"
 
 namespace bielle::validation {
 namespace {

@@ -5,11 +5,10 @@
 
 #include "bielle/model/error.h"
 #include "check_rows.h"
+#include "math/constants.h"
 
 namespace bielle::validation {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 class GoalMeter {
  public:

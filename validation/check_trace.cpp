@@ -1,11 +1,11 @@
 #include "check_trace.h"
 
-#include <Eigen/QR>
 #include <array>
 #include <memory>
 
 #include "check_accelerations.h"
 #include "largest.h"
+#include "math/decompositions.h"
 #include "math/so3.h"
 #include "simbody_bridge.h"
 

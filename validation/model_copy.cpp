@@ -1,8 +1,7 @@
 #include "model_copy.h"
 
-#include <Eigen/Eigenvalues>
-
 #include "bielle/model/builder.h"
+#include "math/decompositions.h"
 
 namespace bielle::validation {
 

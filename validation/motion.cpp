@@ -1,11 +1,9 @@
 #include "motion.h"
 
-#include <Eigen/LU>
-#include <Eigen/QR>
-
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "largest.h"
+#include "math/decompositions.h"
 #include "model/joint.h"
 #include "simbody_bridge.h"
 

@@ -2,9 +2,9 @@
 
 #include <Simbody.h>
 
-#include <Eigen/QR>
 #include <stdexcept>
 
+#include "math/decompositions.h"
 #include "simbody_system.h"
 
 namespace bielle::validation {
@@ -13,7 +13,7 @@ namespace {
 using SimTK::Stage;
 
 // Rows, and pivots of scaled rows, below this share of the largest one are rounding of redundant rows.
-constexpr double kRankThreshold = 1e-10;
+constexpr double kMapRankThreshold = 1e-10;
 
 VectorXd toVector(const SimTK::Vector& v) {
   VectorXd out(v.size());
@@ -38,7 +38,7 @@ void solveSaddle(const SaddleTerms& terms, MatrixXd& a, MatrixXd& multipliers) {
   const VectorXd D = M.diagonal().cwiseSqrt().cwiseInverse();
   VectorXr E = J.rowwise().norm().template cast<Real>();
   const Real largest = m > 0 ? E.maxCoeff() : 0;
-  for (int i = 0; i < m; ++i) E[i] = E[i] > kRankThreshold * largest ? 1 / (J.row(i) * D.asDiagonal()).norm() : 0;
+  for (int i = 0; i < m; ++i) E[i] = E[i] > kMapRankThreshold * largest ? 1 / (J.row(i) * D.asDiagonal()).norm() : 0;
   const VectorXr D_r = D.template cast<Real>();
   const auto scale = D_r.asDiagonal();
   const MatrixXr DMD = scale * M.template cast<Real>() * scale;
@@ -47,7 +47,7 @@ void solveSaddle(const SaddleTerms& terms, MatrixXd& a, MatrixXd& multipliers) {
   MatrixXr z = MatrixXr::Zero(nv, force.cols()), y = MatrixXr::Zero(m, force.cols());
   MatrixXr N = MatrixXr::Identity(nv, nv);
   Eigen::CompleteOrthogonalDecomposition<MatrixXr> rows, columns;
-  for (auto* factor : {&rows, &columns}) factor->setThreshold(kRankThreshold);
+  for (auto* factor : {&rows, &columns}) factor->setThreshold(kMapRankThreshold);
   if (m > 0) {
     columns.compute(EJD.transpose());
     N = MatrixXr(columns.householderQ()).rightCols(nv - columns.rank());
@@ -60,7 +60,7 @@ void solveSaddle(const SaddleTerms& terms, MatrixXd& a, MatrixXd& multipliers) {
 }
 
 // Residual of notation.h, whose directions are used below.
-Vector6d calcGap(const Closure& closure, const SE3& X_12) {
+Vector6d calcClosureGap(const Closure& closure, const SE3& X_12) {
   if (closure.kind == ClosureKind::Weld6D) return log6(X_12);
   Vector6d gap = Vector6d::Zero();
   gap.head<3>() = X_12.p;
@@ -229,8 +229,8 @@ ClosureRows SimbodyBridge::calcClosureRows() const {
     const SE3 X_12 =
         (getPlacement(closure.body1) * closure.X_B1).inverseTimes(getPlacement(closure.body2) * closure.X_B2);
     const MatrixXd directions = listDirections(closure);
-    const Vector6d gap =
-        closure.kind == ClosureKind::Coupler ? calcCouplerGap(closure) * Vector6d::Unit(0) : calcGap(closure, X_12);
+    const Vector6d gap = closure.kind == ClosureKind::Coupler ? calcCouplerGap(closure) * Vector6d::Unit(0)
+                                                              : calcClosureGap(closure, X_12);
     for (Eigen::Index i = 0; i < directions.cols(); ++i) {
       wrenches[c] = directions.col(i);
       rows.push_back(calcWrenchForces(wrenches));

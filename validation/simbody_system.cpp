@@ -1,8 +1,9 @@
 #include "simbody_system.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <limits>
+
+#include "math/decompositions.h"
 
 namespace bielle::validation {
 

@@ -1,6 +1,5 @@
 #include "validate.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -10,6 +9,7 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "math/decompositions.h"
 #include "model_copy.h"
 #include "motion.h"
 #include "samples.h"

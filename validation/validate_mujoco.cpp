@@ -13,9 +13,9 @@
 namespace bielle::validation {
 namespace {
 
-constexpr double kFloor = 1e-2;     // as in validate.cpp
-constexpr double kRateStep = 1e-5;  // of differences of J, s
-constexpr double kSoftness = 1e-4;  // of R; below it, rounding shows
+constexpr double kMujocoFloor = 1e-2;  // as in validate.cpp
+constexpr double kRateStep = 1e-5;     // of differences of J, s
+constexpr double kSoftness = 1e-4;     // of R; below it, rounding shows
 constexpr double kRigidTolerance = 1e-7, kNoTolerance = std::numeric_limits<double>::infinity();
 
 enum class Rows {
@@ -24,10 +24,10 @@ enum class Rows {
   Complete    // and with dJ/dt v
 };
 
-class Comparison {
+class MujocoComparison {
  public:
-  Comparison(const Model& model, const Model& oracle, ConstVectorRef q_ref, const ValidationOptions& options,
-             ValidationReport& report)
+  MujocoComparison(const Model& model, const Model& oracle, ConstVectorRef q_ref, const ValidationOptions& options,
+                   ValidationReport& report)
       : model_(model),
         oracle_(oracle),
         options_(options),
@@ -68,7 +68,7 @@ class Comparison {
     addDifference(
         report_, "accelerations, " + label, weight.cwiseProduct(cws.a),
         weight.cwiseProduct(rows == Rows::AsTheyAre ? calcAcceleration(sample, 1, rows) : calcRigid(sample, rows)),
-        kFloor * weight.cwiseProduct(free).cwiseAbs().maxCoeff(), tolerance);
+        kMujocoFloor * weight.cwiseProduct(free).cwiseAbs().maxCoeff(), tolerance);
   }
 
   // Smooth friction of joints (model.h), which MuJoCo does not have.
@@ -133,7 +133,7 @@ ValidationReport validateAgainstMujoco(const Model& model, const Model& oracle, 
   SampleSource source(model, options);
   report.failure = source.failure;
   if (!report.failure.empty()) return report;
-  Comparison comparison(model, oracle, source.getStart(), options, report);
+  MujocoComparison comparison(model, oracle, source.getStart(), options, report);
   for (int i = 0; i < options.samples; ++i) comparison.compare(source.draw());
   return report;
 }

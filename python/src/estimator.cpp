@@ -64,7 +64,7 @@ class HeldEstimator {
   std::atomic<bool> is_busy_{false};
 };
 
-void bindOptions(py::module_& module) {
+void bindEstimatorOptions(py::module_& module) {
   Value<SensorReadings>(module, "SensorReadings", "What is read at an instant of control.")
       .field("time", &SensorReadings::time, "s")
       .field("motor_positions", &SensorReadings::motor_positions, "(nu,), rad or m")
@@ -101,7 +101,7 @@ void bindOptions(py::module_& module) {
 }  // namespace
 
 void bindEstimator(py::module_& module) {
-  bindOptions(module);
+  bindEstimatorOptions(module);
   py::class_<HeldEstimator>(
       module, "Estimator",
       "The state of a robot from the encoders of its motors and an IMU in its trunk: passive joints by closing the\n"

@@ -39,7 +39,7 @@ void bindRecord(py::module_& module) {
              "The Record in a directory of a result.");
 }
 
-std::string makePage(const std::vector<std::string>& directories) {
+std::string makeResultPage(const std::vector<std::string>& directories) {
   const py::gil_scoped_release release;
   return makeReport(directories);
 }
@@ -90,7 +90,7 @@ void bindResult(py::module_& module) {
           "write", [](const MotionResult& self, const std::string& directory) { return writeResult(directory, self); },
           py::arg("directory"), py::call_guard<py::gil_scoped_release>(),
           "Writes trajectory.csv, trajectory.npz and summary.json, as the command does. Returns their paths.");
-  module.def("make_report", &makePage, py::arg("directories"),
+  module.def("make_report", &makeResultPage, py::arg("directories"),
              "The page that shows results, from their directories: 3D replay and plots, offline. HTML.");
   module.def("write_report", &writeReport, py::arg("path"), py::arg("directories"),
              py::call_guard<py::gil_scoped_release>(), "Writes that page to a file.");

@@ -61,7 +61,7 @@ py::object describe(const Robot& robot) {
   return py::module_::import("json").attr("loads")(text);
 }
 
-std::string makePage(const Robot& robot) {
+std::string makeViewPage(const Robot& robot) {
   const py::gil_scoped_release release;
   return makeView(toLoaded(robot));
 }
@@ -83,7 +83,7 @@ void bindRobots(py::module_& module) {
           "Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY.")
       .def("info", &describe,
            "What `bielle info --json` prints: sizes, mobility, joints, closures with their gaps, motors, contacts.");
-  module.def("make_view", &makePage, py::arg("robot"),
+  module.def("make_view", &makeViewPage, py::arg("robot"),
              "The page that shows a Robot with a slider for each motor; its loops close as they move. Offline. HTML.");
   module.def("load_robot", &load, py::arg("name"), py::arg("base") = py::none(),
              py::call_guard<py::gil_scoped_release>(),

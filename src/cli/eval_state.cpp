@@ -9,6 +9,7 @@
 
 #include "bielle/io/names.h"
 #include "bielle/model/error.h"
+#include "model/listing.h"
 #include "model/text_file.h"
 
 namespace bielle::cli {
@@ -32,12 +33,6 @@ namespace {
 using nlohmann::json;
 
 constexpr int kDeepest = 20;  // elements of a state are not nested deeper; reading them recurses
-
-std::string join(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
-}
 
 class StateReader {
  public:
@@ -84,7 +79,7 @@ class StateReader {
     if (!object.is_object()) fail(element, "it is no object", "write {...}");
     for (const auto& item : object.items())
       if (std::find(known.begin(), known.end(), item.key()) == known.end())
-        fail(element, "there is no key '" + item.key() + "'", "the keys are: " + join(known));
+        fail(element, "there is no key '" + item.key() + "'", "the keys are: " + listItems(known));
   }
 
   json getObject(const json& state, const char* key) const {
@@ -129,7 +124,7 @@ class StateReader {
   void readJoint(const std::string& name, const json& value) {
     const std::string element = "joint '" + name + "'";
     const int index = model_.findJoint(name);
-    if (index <= 0) fail(element, "the robot has no such joint", "its joints are: " + join(listJoints()));
+    if (index <= 0) fail(element, "the robot has no such joint", "its joints are: " + listItems(listJoints()));
     checkKeys(value, element, {"q", "v"});
     const Joint& joint = model_.joints()[index];
     if (value.contains("q"))
@@ -154,7 +149,7 @@ class StateReader {
     const int motor = model_.findMotor(name);
     if (motor < 0)
       fail(element, model_.findJoint(name) > 0 ? "this joint has no motor" : "the robot has no such joint",
-           "the motors are: " + join(getNames(model_.motors())));
+           "the motors are: " + listItems(getNames(model_.motors())));
     const VectorXd torque = readNumbers(value, element);
     if (torque.size() != 1) fail(element, std::to_string(torque.size()) + " numbers", "give one, in N m or N");
     state_.u[motor] = torque[0];
@@ -167,7 +162,7 @@ class StateReader {
       const int contact = model_.findContact(name);
       if (contact < 0)
         fail("contact '" + name + "'", "the robot has no such contact",
-             "its contacts are: " + join(getNames(model_.contacts())));
+             "its contacts are: " + listItems(getNames(model_.contacts())));
       if (std::count(state_.contacts.begin(), state_.contacts.end(), contact))
         fail("contact '" + name + "'", "it is listed twice", "keep one of them");
       state_.contacts.push_back(contact);

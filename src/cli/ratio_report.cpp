@@ -11,6 +11,7 @@
 #include "io/aside_file.h"
 #include "io/figure.h"
 #include "io/text_file.h"
+#include "model/listing.h"
 
 namespace fs = std::filesystem;
 
@@ -34,22 +35,21 @@ std::vector<double> listEntries(const MatrixXd& R) {
   return entries;
 }
 
-Json listNumbers(const std::vector<double>& numbers) {  // JSON has no infinity
+Json listFinite(const std::vector<double>& numbers) {  // JSON has no infinity
   Json list = Json::array();
   for (const double x : numbers) list.push_back(std::isfinite(x) ? Json(x) : Json(nullptr));
   return list;
 }
 
 Json describeSample(const RatioSample& sample, int swept) {
-  return {
-      {"s", sample.s},
-      {"branch", sample.branch},
-      {"joints", listNumbers({sample.joints.begin(), sample.joints.end()})},
-      {"motors", listNumbers({sample.motors.begin(), sample.motors.end()})},
-      {"R", listNumbers(listEntries(sample.ratio.R))},
-      {"dR", sample.dead == DeadPointKind::Joint ? Json(nullptr) : listNumbers(listEntries(sample.ratio.dR[swept]))},
-      {"condition", listNumbers({sample.ratio.condition})[0]},
-      {"dead", getName(sample.dead)}};
+  return {{"s", sample.s},
+          {"branch", sample.branch},
+          {"joints", listFinite({sample.joints.begin(), sample.joints.end()})},
+          {"motors", listFinite({sample.motors.begin(), sample.motors.end()})},
+          {"R", listFinite(listEntries(sample.ratio.R))},
+          {"dR", sample.dead == DeadPointKind::Joint ? Json(nullptr) : listFinite(listEntries(sample.ratio.dR[swept]))},
+          {"condition", listFinite({sample.ratio.condition})[0]},
+          {"dead", getName(sample.dead)}};
 }
 
 Json describeSamples(const std::vector<RatioSample>& samples, int swept) {
@@ -122,12 +122,6 @@ std::vector<RatioSample> thinOut(const std::vector<RatioSample>& samples) {
   return some;
 }
 
-std::string join(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
 }  // namespace
 
 Json describeReport(const RatioReport& report) {
@@ -160,8 +154,8 @@ void printReport(std::ostream& out, const RatioReport& report) {
     low = std::min(low, sample.joints[sweep.joint]);
     high = std::max(high, sample.joints[sweep.joint]);
   }
-  out << report.robot << ": " << join(report.linkage.joint_names) << " driven by " << join(report.linkage.motor_names)
-      << "\n";
+  out << report.robot << ": " << listItems(report.linkage.joint_names) << " driven by "
+      << listItems(report.linkage.motor_names) << "\n";
   const std::string ends = sweep.begin == sweep.end ? sweep.end + ", either way" : sweep.begin + "; " + sweep.end;
   printTable(out, std::vector<Row>{
                       {"range of " + report.linkage.joint_names[sweep.joint],

@@ -51,13 +51,13 @@ void readSize(const std::string& text, FilmOptions& film) {
                      "e.g. --size 640x480");
 }
 
-int report(const ReportArguments& arguments) {
+int writePages(const ReportArguments& arguments) {
   FilmOptions film = arguments.film;
   readSize(arguments.size, film);
   film.side_by_side = !arguments.ghosts;
   const auto first = fs::path(arguments.directories.front());
   const std::string page = arguments.output.empty() ? (first / "report.html").string() : arguments.output;
-  writeReport(page, arguments.directories);
+  bielle::writeReport(page, arguments.directories);
   std::cout << page << "\n";
   if (!arguments.png.empty()) {
     if (film.times.empty()) film.times = makeTimes(calcDuration(arguments.directories), 6);
@@ -110,7 +110,7 @@ void addReport(CLI::App& app, Action& action) {
       "  bielle report squat-closed squat-serial -o comparison.html\n"
       "  bielle report squat --png squat.png --times 0,0.5,1 --view side --show closureForces\n"
       "  bielle report squat --mp4 squat.mp4 --size 960x720");
-  command.callback([&action, arguments] { action = [=] { return report(*arguments); }; });
+  command.callback([&action, arguments] { action = [=] { return writePages(*arguments); }; });
 }
 
 }  // namespace bielle::cli

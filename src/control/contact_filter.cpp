@@ -1,8 +1,8 @@
 #include "control/contact_filter.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 
+#include "math/decompositions.h"
 #include "math/so3.h"
 
 namespace bielle {

@@ -7,6 +7,7 @@
 #include "control/contact_filter.h"
 #include "control/foot_model.h"
 #include "control/passive_joints.h"
+#include "model/listing.h"
 
 namespace bielle {
 namespace {
@@ -20,10 +21,6 @@ std::vector<int> listSizes(const Model& model) {
 ContactFilterNoise makeNoise(const EstimatorOptions& o) {
   return {o.gyro_noise, o.accelerometer_noise, o.gyro_walk,     o.accelerometer_walk,
           o.foot_slide, o.foot_turn,           o.foot_position, o.foot_attitude};
-}
-
-bool contains(const std::vector<int>& list, size_t value) {
-  return std::find(list.begin(), list.end(), static_cast<int>(value)) != list.end();
 }
 
 }  // namespace

@@ -16,11 +16,11 @@
 /// Encoders know speeds late, the trunk's twist is known at once: without (3) the two would make standing feet seem to move.
 /// A foot that seems to move by more than 0.25 m/s (its rotation times L included), which is more than they are late by, does
 /// move: it rolls over an edge, or slips.
-#include <Eigen/Cholesky>
 #include <vector>
 
 #include "bielle/dynamics/workspace.h"
 #include "control/passive_joints.h"
+#include "math/decompositions.h"
 
 namespace bielle {
 

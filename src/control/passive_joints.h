@@ -7,11 +7,11 @@
 /// and its configuration by Newton steps, d = T (q_m - q) closed again by reduction.h, Eq. (2). The smallest singular value
 /// of N_m, the least that the motors move in a unit motion of the cluster, is zero at a dead point, where the linkage
 /// moves though its motors stand. Near one, N_m^-1 is replaced by the damped V diag(s / (s^2 + e^2 - s_min^2)) U^T.
-#include <Eigen/SVD>
 #include <string>
 #include <vector>
 
 #include "dynamics/reduction.h"
+#include "math/decompositions.h"
 
 namespace bielle {
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "control/clock.h"
 #include "control/policy_stages.h"
 #include "solve/lq_sweep.h"
 
@@ -10,8 +11,7 @@ namespace bielle {
 namespace {
 
 // A clock that sums up its steps may be this much early; without it, stages would begin one instant of control late.
-constexpr double kClockTolerance = 1e-9;  // s
-constexpr double kPerturbation = 0.01;    // of Eq. (2); differences are linear in it but for rounding
+constexpr double kPerturbation = 0.01;  // of Eq. (2); differences are linear in it but for rounding
 
 double getMiddle(const Policy::Stage& stage) { return stage.start + 0.5 * stage.duration; }
 

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "control/clock.h"
 #include "control/dead_point_stop.h"
 #include "control/solving_thread.h"
 
 namespace bielle {
 namespace {
 
-constexpr double kClockTolerance = 1e-9;  // s: a clock that sums up its steps may be this much early
-constexpr size_t kTimes = 100000;         // that are kept
+constexpr size_t kTimes = 100000;  // that are kept
 
 }  // namespace
 

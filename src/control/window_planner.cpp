@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "bielle/dynamics/kinematics.h"
+#include "control/clock.h"
 #include "control/policy_stages.h"
 #include "motion/foot_constraints.h"
 #include "solve/lq_sweep.h"
@@ -11,16 +12,15 @@
 namespace bielle {
 namespace {
 
-constexpr double kClockTolerance = 1e-9;  // s: durations are sums of stages
-constexpr int kAhead = 3;                 // stages of a policy: what is left when solves fail
-constexpr int kAheadInThread = 8;         // or when they come late
-constexpr int kEarly = 2;                 // stages before its landing at which a foot counts as early
-constexpr double kLandingWay = 0.01;      // that it may then be farther off than where it may land, m
-constexpr int kLate = 1;                  // stages after its landing at which a foot counts as late
-constexpr int kLowering = 2;              // stages in which it is then foreseen to land
-constexpr double kLoweringSpeed = 0.3;    // m/s
-constexpr double kDepth = 0.05;           // to which it is lowered, m
-constexpr int kFirstIterations = 10;      // of the solve before the start
+constexpr int kAhead = 3;               // stages of a policy: what is left when solves fail
+constexpr int kAheadInThread = 8;       // or when they come late
+constexpr int kEarly = 2;               // stages before its landing at which a foot counts as early
+constexpr double kLandingWay = 0.01;    // that it may then be farther off than where it may land, m
+constexpr int kLate = 1;                // stages after its landing at which a foot counts as late
+constexpr int kLowering = 2;            // stages in which it is then foreseen to land
+constexpr double kLoweringSpeed = 0.3;  // m/s
+constexpr double kDepth = 0.05;         // to which it is lowered, m
+constexpr int kFirstIterations = 10;    // of the solve before the start
 
 FddpOptions makeSolverOptions(bool bounded, const PredictiveOptions& options, int iterations) {
   FddpOptions out;

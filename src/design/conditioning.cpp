@@ -1,9 +1,9 @@
 #include "design/conditioning.h"
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <limits>
+
+#include "math/decompositions.h"
 
 namespace bielle {
 namespace {

@@ -1,6 +1,5 @@
 #include "design/gradient.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -9,6 +8,7 @@
 #include "bielle/dynamics/distance.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "math/decompositions.h"
 
 namespace bielle {
 namespace {

@@ -1,7 +1,5 @@
 #include "bielle/dynamics/assembly.h"
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +9,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "dynamics/assembly_refinement.h"
+#include "math/decompositions.h"
 #include "math/so3.h"
 
 namespace bielle {

@@ -1,6 +1,5 @@
 #include "bielle/dynamics/constrained.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
@@ -8,6 +7,7 @@
 #include "bielle/dynamics/rnea.h"
 #include "dynamics/constrained_parts.h"
 #include "dynamics/saddle_point.h"
+#include "math/decompositions.h"
 
 namespace bielle {
 

@@ -1,12 +1,12 @@
 #include "bielle/dynamics/distance.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "bielle/dynamics/kinematics.h"
 #include "dynamics/cell.h"
+#include "math/decompositions.h"
 
 namespace bielle {
 namespace {

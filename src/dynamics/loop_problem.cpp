@@ -1,12 +1,12 @@
 #include "dynamics/loop_problem.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/builder.h"
+#include "math/decompositions.h"
 #include "math/so3.h"
 
 namespace bielle {

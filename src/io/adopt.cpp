@@ -32,7 +32,7 @@ std::string format(double value) {
   return text;
 }
 
-std::string quote(const std::string& name) {
+std::string quoteYaml(const std::string& name) {
   std::string out = "\"";
   for (char c : name) out += (c == '"' || c == '\\') ? std::string("\\") + c : std::string(1, c);
   return out + "\"";
@@ -59,7 +59,7 @@ class Adopter {
   Adoption write() {
     findFeet();
     out_ << "# A first guess by `bielle adopt`: correct what is wrong, then delete the comment above it.\nmodel: "
-         << quote(path_) << "\n";
+         << quoteYaml(path_) << "\n";
     writeMotors();
     writeContacts();
     writePosture();
@@ -124,7 +124,7 @@ class Adopter {
       unlimited |= is_weak;
       guessed |= motor.armature == 0;
       const auto limit = [&](double value) { return is_weak || std::isinf(value) ? ".inf" : format(value); };
-      lines << "  " << quote(motor.name) << ": {armature: " << format(motor.armature > 0 ? motor.armature : kRotor)
+      lines << "  " << quoteYaml(motor.name) << ": {armature: " << format(motor.armature > 0 ? motor.armature : kRotor)
             << ", effort: " << limit(motor.effort_limit) << ", velocity: " << limit(motor.velocity_limit)
             << formatMotorData(motor) << "}\n";
     }
@@ -166,7 +166,7 @@ class Adopter {
       std::vector<double> sole = measureSole(feet_[i]);
       is_measured &= !sole.empty();
       if (sole.empty()) sole = {kSole, kSole};
-      lines << "  " << getContactName(i) << ": {frame: " << quote(frame.name) << ", type: 6d, sole: ["
+      lines << "  " << getContactName(i) << ": {frame: " << quoteYaml(frame.name) << ", type: 6d, sole: ["
             << format(sole[0]) << ", " << format(sole[1]) << "]}\n";
       parts.contacts.push_back(
           {getContactName(i), frame.body, frame.X_BF, ContactKind::Surface6D, sole[0] / 2, sole[1] / 2});
@@ -231,9 +231,9 @@ class Adopter {
                                " % of its height there. It closes; angles under `joints` choose how legs bend.";
       guesses_.back() += " " + more;
       const std::vector<double>& base = r.joints.begin()->second;
-      out_ << "# " << more << "\nreferences:\n  half_sitting:\n    joints:\n      " << quote(r.joints.begin()->first)
-           << ": [" << format(base[0]) << ", 0, " << format(base[2])
-           << ", 0, 0, 0, 1]\n    height: {frame: " << quote(r.height_frame) << ", value: " << format(r.height)
+      out_ << "# " << more << "\nreferences:\n  half_sitting:\n    joints:\n      "
+           << quoteYaml(r.joints.begin()->first) << ": [" << format(base[0]) << ", 0, " << format(base[2])
+           << ", 0, 0, 0, 1]\n    height: {frame: " << quoteYaml(r.height_frame) << ", value: " << format(r.height)
            << "}\n    feet:\n";
       for (const auto& [name, place] : r.feet) out_ << "      " << name << ": [0, " << format(place.y()) << ", 0]\n";
       return;
@@ -250,7 +250,7 @@ class Adopter {
       bool is_simple = true;
       for (int i = model_.frames()[foot.frame].body; i > 1; i = model_.joints()[i].parent) {
         is_simple &= model_.joints()[i].nv == 1;
-        joints.insert(joints.begin(), "  - " + quote(model_.joints()[i].name) + "\n");
+        joints.insert(joints.begin(), "  - " + quoteYaml(model_.joints()[i].name) + "\n");
       }
       if (!is_simple || joints.size() != 6)
         return guess("Serial joints: none guessed, because " + std::to_string(joints.size()) +

@@ -7,18 +7,13 @@
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "io/format_warnings.h"
+#include "io/robot_text.h"
 #include "io/urdf_writer.h"
 #include "io/xml_text.h"
 #include "model/number_text.h"
 
 namespace bielle {
 namespace {
-
-std::string formatExact(double value) { return formatNumber(value + 0.0, "%.17g"); }  // + 0.0: no negative zero
-
-std::string formatVector(const Vector3d& v) {
-  return formatExact(v.x()) + " " + formatExact(v.y()) + " " + formatExact(v.z());
-}
 
 // Gives body i another frame N, fixed to its own frame B; its joint does not move.
 void turnBody(int i, const SE3& X_BN, ModelParts& parts) {
@@ -41,9 +36,9 @@ void turnBody(int i, const SE3& X_BN, ModelParts& parts) {
   }
 }
 
-class Writer {
+class DrakeWriter {
  public:
-  explicit Writer(const Model& model) : warnings_(model), parts_(takeParts(model)) {
+  explicit DrakeWriter(const Model& model) : warnings_(model), parts_(takeParts(model)) {
     for (size_t i = 1; i < parts_.joints.size(); ++i)
       if (parts_.joints[i].kind == JointKind::Universal) alignUniversal(static_cast<int>(i));
     addGround();
@@ -127,8 +122,8 @@ class Writer {
     out_ << "\n  <drake:ball_constraint name=\"" << escapeXml(name) << "\">\n";
     writeEntry("ball_constraint_body_A", "name", getLink(c.body1));
     writeEntry("ball_constraint_body_B", "name", getLink(c.body2));
-    writeEntry("ball_constraint_p_AP", "value", formatVector(c.X_B1.act(point)));
-    writeEntry("ball_constraint_p_BQ", "value", formatVector(c.X_B2.act(point)));
+    writeEntry("ball_constraint_p_AP", "value", formatExact(c.X_B1.act(point)));
+    writeEntry("ball_constraint_p_BQ", "value", formatExact(c.X_B2.act(point)));
     out_ << "  </drake:ball_constraint>\n";
   }
 
@@ -146,9 +141,9 @@ class Writer {
     if (!(rest > 0)) rest = 1;  // of a damper alone, on which it has no effect
     out_ << "\n  <drake:linear_spring_damper name=\"" << escapeXml(spring.name) << "\">\n";
     writeEntry("linear_spring_damper_body_A", "name", getLink(spring.body1));
-    writeEntry("linear_spring_damper_p_AP", "value", formatVector(spring.point1));
+    writeEntry("linear_spring_damper_p_AP", "value", formatExact(spring.point1));
     writeEntry("linear_spring_damper_body_B", "name", getLink(spring.body2));
-    writeEntry("linear_spring_damper_p_BQ", "value", formatVector(spring.point2));
+    writeEntry("linear_spring_damper_p_BQ", "value", formatExact(spring.point2));
     writeEntry("linear_spring_damper_free_length", "value", formatExact(rest));
     writeEntry("linear_spring_damper_stiffness", "value", formatExact(spring.stiffness));
     writeEntry("linear_spring_damper_damping", "value", formatExact(spring.damping));
@@ -184,6 +179,6 @@ class Writer {
 
 }  // namespace
 
-UrdfText formatDrake(const Model& model) { return Writer(model).write(); }
+UrdfText formatDrake(const Model& model) { return DrakeWriter(model).write(); }
 
 }  // namespace bielle

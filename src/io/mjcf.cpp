@@ -1,6 +1,5 @@
 #include "io/mjcf.h"
 
-#include <Eigen/Eigenvalues>
 #include <charconv>
 #include <cmath>
 #include <set>
@@ -11,6 +10,7 @@
 #include "io/format_warnings.h"
 #include "io/mjcf_coordinates.h"
 #include "io/xml_text.h"
+#include "math/decompositions.h"
 #include "math/so3.h"
 #include "model/joint.h"
 
@@ -20,7 +20,7 @@ namespace {
 // MuJoCo refuses masses and moments of inertia of moving bodies up to 1e-15.
 constexpr double kLeastInertia = 1e-14;
 
-std::string formatNumber(double value) {
+std::string formatMjcf(double value) {
   char digits[32];
   return {digits, std::to_chars(digits, digits + sizeof digits, value + 0.0).ptr};  // + 0.0: no negative zero
 }
@@ -28,7 +28,7 @@ std::string formatNumber(double value) {
 template <typename Vector>
 std::string formatVector(const Vector& v) {
   std::string text;
-  for (Eigen::Index i = 0; i < v.size(); ++i) text += (i ? " " : "") + formatNumber(v[i]);
+  for (Eigen::Index i = 0; i < v.size(); ++i) text += (i ? " " : "") + formatMjcf(v[i]);
   return text;
 }
 
@@ -45,9 +45,9 @@ std::string formatPlacement(const SE3& X) {
   return attribute("pos", formatVector(X.p)) + attribute("quat", formatQuaternion(X.R));
 }
 
-class Writer {
+class MjcfWriter {
  public:
-  Writer(const Model& model, ConstVectorRef q_ref, const MjcfOptions& options)
+  MjcfWriter(const Model& model, ConstVectorRef q_ref, const MjcfOptions& options)
       : model_(model), q_ref_(q_ref), options_(options), children_(model.numBodies()) {
     for (int i = 1; i < model.numBodies(); ++i) children_[model.joints()[i].parent].push_back(i);
   }
@@ -74,16 +74,15 @@ class Writer {
 
  private:
   std::string formatStiffness(const std::string& suffix, double time) const {
-    return attribute("solref" + suffix, formatNumber(time) + " 1") +
+    return attribute("solref" + suffix, formatMjcf(time) + " 1") +
            attribute("solimp" + suffix,
-                     formatNumber(options_.impedance) + " " + formatNumber(options_.impedance) + " 0.001 0.5 2");
+                     formatMjcf(options_.impedance) + " " + formatMjcf(options_.impedance) + " 0.001 0.5 2");
   }
 
   void writeSettings() {
     out_
         << "  <compiler angle=\"radian\" inertiafromgeom=\"false\"/>\n  <option"
-        << attribute("timestep", formatNumber(options_.time_step))
-        << attribute("gravity", formatVector(model_.gravity()))
+        << attribute("timestep", formatMjcf(options_.time_step)) << attribute("gravity", formatVector(model_.gravity()))
         << " cone=\"elliptic\" solver=\"Newton\" jacobian=\"sparse\" tolerance=\"1e-10\"/>\n  <default>\n    <joint"
         << formatStiffness("limit", options_.contact_time) << "/>\n    <equality"
         << formatStiffness("", options_.closure_time)
@@ -93,8 +92,8 @@ class Writer {
         << "    </default>\n    <default class=\"ground\">\n"
         << "      <geom contype=\"0\" conaffinity=\"1\" rgba=\"0.8 0.8 0.8 1\"/>\n    </default>\n"
         << "    <default class=\"sole\">\n      <geom type=\"sphere\" contype=\"1\" conaffinity=\"0\" condim=\"3\" "
-        << "priority=\"1\"" << attribute("size", formatNumber(options_.sole_radius))
-        << attribute("friction", formatNumber(options_.friction) + " 0 0") << formatStiffness("", options_.contact_time)
+        << "priority=\"1\"" << attribute("size", formatMjcf(options_.sole_radius))
+        << attribute("friction", formatMjcf(options_.friction) + " 0 0") << formatStiffness("", options_.contact_time)
         << "/>\n    </default>\n  </default>\n";
   }
 
@@ -124,7 +123,7 @@ class Writer {
       warn("body '" + model_.bodies()[i].name + "'",
            "its inertia is not that of a body with mass; the smallest that MuJoCo accepts is written");
     out_ << indent << "<inertial" << formatPlacement({R, inertia.com})
-         << attribute("mass", formatNumber(std::max(inertia.mass, kLeastInertia)))
+         << attribute("mass", formatMjcf(std::max(inertia.mass, kLeastInertia)))
          << attribute("diaginertia", formatVector(moments)) << "/>\n";
   }
 
@@ -134,14 +133,14 @@ class Writer {
     const int dof = joint.idx_v + k;
     double lower = model_.lowerLimits()[dof], upper = model_.upperLimits()[dof];
     out_ << indent << "<joint" << attribute("name", joint.name + suffix) << attribute("type", type)
-         << attribute("axis", formatVector(axis)) << attribute("ref", formatNumber(q_ref_[joint.idx_q + k]))
-         << attribute("armature", formatNumber(model_.armature()[dof]));
+         << attribute("axis", formatVector(axis)) << attribute("ref", formatMjcf(q_ref_[joint.idx_q + k]))
+         << attribute("armature", formatMjcf(model_.armature()[dof]));
     for (const JointForce& force : model_.jointForces())
       if (force.dof == dof) writeJointForce(joint, force);
     if (std::isfinite(lower) || std::isfinite(upper)) {
       constexpr double kFar = 1e10;  // for limits on one side; and a range must not be empty
       lower = std::max(lower, -kFar), upper = std::max(std::min(upper, kFar), lower + 1e-9);
-      out_ << " limited=\"true\"" << attribute("range", formatNumber(lower) + " " + formatNumber(upper));
+      out_ << " limited=\"true\"" << attribute("range", formatMjcf(lower) + " " + formatMjcf(upper));
     }
     out_ << "/>\n";
   }
@@ -149,19 +148,19 @@ class Writer {
   // A preload moves the rest of the spring.
   void writeJointForce(const Joint& joint, const JointForce& force) {
     if (force.stiffness != 0)
-      out_ << attribute("stiffness", formatNumber(force.stiffness))
-           << attribute("springref", formatNumber(force.rest + force.preload / force.stiffness));
+      out_ << attribute("stiffness", formatMjcf(force.stiffness))
+           << attribute("springref", formatMjcf(force.rest + force.preload / force.stiffness));
     else if (force.preload != 0)
       warn("joint '" + joint.name + "'", "its preload without a spring is left out");
-    if (force.damping != 0) out_ << attribute("damping", formatNumber(force.damping));
+    if (force.damping != 0) out_ << attribute("damping", formatMjcf(force.damping));
     if (force.friction == 0) return;
-    out_ << attribute("frictionloss", formatNumber(force.friction));
+    out_ << attribute("frictionloss", formatMjcf(force.friction));
     warn("joint '" + joint.name + "'", "its friction is MuJoCo's there, which sticks");
   }
 
   void writeBall(const Joint& joint, int k, const std::string& indent) {
     out_ << indent << "<joint type=\"ball\"" << attribute("name", joint.name)
-         << attribute("armature", formatNumber(model_.armature()[joint.idx_v + k])) << "/>\n";
+         << attribute("armature", formatMjcf(model_.armature()[joint.idx_v + k])) << "/>\n";
     reportLimits(joint, k);
   }
 
@@ -200,7 +199,7 @@ class Writer {
   void writeFreeFlyer(const Joint& joint, const std::string& indent) {
     if (isMjcfFree(joint)) {
       out_ << indent << "<joint type=\"free\"" << attribute("name", joint.name)
-           << attribute("armature", formatNumber(model_.armature()[joint.idx_v])) << "/>\n";
+           << attribute("armature", formatMjcf(model_.armature()[joint.idx_v])) << "/>\n";
       reportLimits(joint, 0);
       return;
     }
@@ -310,7 +309,7 @@ class Writer {
       tendons << "    <fixed" << attribute("name", closure.name) << ">\n";
       for (const CouplerTerm& term : closure.terms)
         tendons << "      <joint" << attribute("joint", model_.joints()[term.joint].name)
-                << attribute("coef", formatNumber(term.coefficient)) << "/>\n";
+                << attribute("coef", formatMjcf(term.coefficient)) << "/>\n";
       tendons << "    </fixed>\n";
     }
     for (const PointSpring& spring : model_.pointSprings()) writePointSpring(spring, tendons);
@@ -325,13 +324,13 @@ class Writer {
       if (rest < 0)
         warn("point spring '" + spring.name + "'",
              "it would have no tension below a length of 0: its preload is written as " +
-                 formatNumber(spring.stiffness * spring.rest) + " N");
-      out << attribute("stiffness", formatNumber(spring.stiffness))
-          << attribute("springlength", formatNumber(std::max(rest, 0.0)));
+                 formatMjcf(spring.stiffness * spring.rest) + " N");
+      out << attribute("stiffness", formatMjcf(spring.stiffness))
+          << attribute("springlength", formatMjcf(std::max(rest, 0.0)));
     } else if (spring.preload != 0) {
       warn("point spring '" + spring.name + "'", "its preload without a stiffness is left out");
     }
-    if (spring.damping != 0) out << attribute("damping", formatNumber(spring.damping));
+    if (spring.damping != 0) out << attribute("damping", formatMjcf(spring.damping));
     out << ">\n";
     for (const auto& [body, point, end] :
          {std::tuple{spring.body1, spring.point1, 1}, {spring.body2, spring.point2, 2}})
@@ -367,14 +366,14 @@ class Writer {
     for (const CouplerTerm& term : closure.terms) rest -= term.coefficient * q_ref_[term.idx_q];
     if (closure.terms.size() > 2) {
       out_ << "    <tendon" << attribute("name", closure.name) << attribute("tendon1", closure.name)
-           << attribute("polycoef", formatNumber(rest) + " 0 0 0 0") << "/>\n";
+           << attribute("polycoef", formatMjcf(rest) + " 0 0 0 0") << "/>\n";
       return;
     }
     const CouplerTerm &y = closure.terms[0], &x = closure.terms[1];
     out_ << "    <joint" << attribute("name", closure.name) << attribute("joint1", model_.joints()[y.joint].name)
          << attribute("joint2", model_.joints()[x.joint].name)
-         << attribute("polycoef", formatNumber(rest / y.coefficient) + " " +
-                                      formatNumber(-x.coefficient / y.coefficient) + " 0 0 0")
+         << attribute("polycoef",
+                      formatMjcf(rest / y.coefficient) + " " + formatMjcf(-x.coefficient / y.coefficient) + " 0 0 0")
          << "/>\n";
   }
 
@@ -385,7 +384,7 @@ class Writer {
       out_ << "    <motor" << attribute("name", motor.name) << attribute("joint", motor.name) << " gear=\"1\"";
       if (std::isfinite(motor.effort_limit))
         out_ << " ctrllimited=\"true\""
-             << attribute("ctrlrange", formatNumber(-motor.effort_limit) + " " + formatNumber(motor.effort_limit));
+             << attribute("ctrlrange", formatMjcf(-motor.effort_limit) + " " + formatMjcf(motor.effort_limit));
       out_ << "/>\n";
     }
     out_ << "  </actuator>\n";
@@ -458,7 +457,7 @@ class Writer {
 }  // namespace
 
 MjcfText formatMjcf(const Model& model, ConstVectorRef q_ref, const MjcfOptions& options) {
-  return Writer(model, q_ref, options).write();
+  return MjcfWriter(model, q_ref, options).write();
 }
 
 }  // namespace bielle

@@ -14,7 +14,7 @@ std::string makeLabel(std::string name) {
   return name;
 }
 
-void append(double value, std::string& text) {
+void appendCell(double value, std::string& text) {
   char digits[32];
   text += "\t";
   text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
@@ -31,11 +31,11 @@ std::string format(const MotionRecord& record, const std::vector<RecordTable>& t
     }
   for (Eigen::Index k = 0; k < record.time.size(); ++k) {
     std::string row;
-    append(record.time[k], row);
+    appendCell(record.time[k], row);
     for (const RecordTable& table : tables) {
       const RowMatrixXd& data = record.*table.data;
       for (Eigen::Index i = 0; i < data.cols() && data.rows() > 0; ++i)
-        append(data(std::min(k, data.rows() - 1), i), row);
+        appendCell(data(std::min(k, data.rows() - 1), i), row);
     }
     rows += row.substr(1) + "\n";
   }

@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* kRemedy = "give a trajectory that Bielle wrote";
 
-[[noreturn]] void fail(const std::string& path, const std::string& element, const std::string& problem) {
+[[noreturn]] void failCsv(const std::string& path, const std::string& element, const std::string& problem) {
   throw ModelError(path, element, problem, kRemedy);
 }
 
@@ -19,14 +19,14 @@ constexpr size_t kMostColumns = 1 << 20;
 std::string nameLine(int node) { return "line " + std::to_string(node + 2); }
 
 // A name with a comma, a quote or a line break is quoted, as usual in CSV.
-std::string quote(const std::string& name) {
+std::string quoteCsv(const std::string& name) {
   if (name.find_first_of(",\"\n\r") == std::string::npos) return name;
   std::string text = "\"";
   for (char c : name) text += c == '"' ? std::string("\"\"") : std::string(1, c);
   return text + "\"";
 }
 
-void append(double value, std::string& text) {
+void appendField(double value, std::string& text) {
   char digits[32];
   text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
 }
@@ -77,16 +77,16 @@ void addName(const std::string& column, MotionRecord& record) {
 
 std::string formatCsv(const MotionRecord& record) {
   std::string text;
-  for (const std::string& column : makeHeader(record)) text += (text.empty() ? "" : ",") + quote(column);
+  for (const std::string& column : makeHeader(record)) text += (text.empty() ? "" : ",") + quoteCsv(column);
   const std::vector<RecordTable> tables = listTables(record);
   for (int k = 0; k < record.time.size(); ++k) {
     text += "\n";
-    append(record.time[k], text);
+    appendField(record.time[k], text);
     for (const RecordTable& table : tables) {
       const RowMatrixXd& data = record.*table.data;
       for (int i = 0; i < data.cols(); ++i) {
         text += ",";
-        if (k < data.rows()) append(data(k, i), text);
+        if (k < data.rows()) appendField(data(k, i), text);
       }
     }
   }
@@ -99,14 +99,14 @@ MotionRecord readCsv(const std::string& path) {
   MotionRecord record;
   const std::vector<std::string> header = readLine(text, at, kMostColumns);
   for (const std::string& column : header) addName(column, record);
-  if (makeHeader(record) != header) fail(path, "header", "its columns are not those of a trajectory");
+  if (makeHeader(record) != header) failCsv(path, "header", "its columns are not those of a trajectory");
   // Counted before memory is allocated for them.
   const size_t first_row = at;
   int nodes = 0;
   for (; at < text.size(); ++nodes)
     if (readLine(text, at, header.size()).size() != header.size())
-      fail(path, nameLine(nodes), "it has not the " + std::to_string(header.size()) + " cells of the header");
-  if (nodes == 0) fail(path, "file", "it has no node");
+      failCsv(path, nameLine(nodes), "it has not the " + std::to_string(header.size()) + " cells of the header");
+  if (nodes == 0) failCsv(path, "file", "it has no node");
 
   resizeRecord(nodes - 1, record);
   const std::vector<RecordTable> tables = listTables(record);
@@ -120,7 +120,7 @@ MotionRecord readCsv(const std::string& path) {
       const char* end = cell.data() + cell.size();
       const auto [stop, error] = std::from_chars(cell.data(), end, value);
       if (error != std::errc() || stop != end)
-        fail(path, line + ", column '" + header[column] + "'", "'" + cell + "' is not a number");
+        failCsv(path, line + ", column '" + header[column] + "'", "'" + cell + "' is not a number");
       ++column;
     };
     read(record.time[k]);
@@ -130,7 +130,7 @@ MotionRecord readCsv(const std::string& path) {
         if (k < data.rows())
           read(data(k, i));
         else if (!row[column++].empty())
-          fail(path, line, "the last node holds values of a stage");
+          failCsv(path, line, "the last node holds values of a stage");
       }
     }
   }

@@ -21,6 +21,12 @@ std::string formatRounded(const Vector3d& v, const char* separator) {
   return formatRounded(v.x()) + separator + formatRounded(v.y()) + separator + formatRounded(v.z());
 }
 
+std::string formatExact(double value) { return formatNumber(value + 0.0, "%.17g"); }  // + 0.0: no negative zero
+
+std::string formatExact(const Vector3d& v) {
+  return formatExact(v.x()) + " " + formatExact(v.y()) + " " + formatExact(v.z());
+}
+
 bool hasImpliedFreeFlyer(const Model& model) {
   const Joint& first = model.joints()[1];
   bool ground = false;  // any other element on the ground requires a separate link

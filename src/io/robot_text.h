@@ -13,6 +13,10 @@ std::string formatRobotNumber(double value, const char* format = "%.12g");
 std::string formatRounded(double value);
 std::string formatRounded(const Vector3d& v, const char* separator = " ");
 
+/// Every digit of a number: what is read back is the same.
+std::string formatExact(double value);
+std::string formatExact(const Vector3d& v);
+
 /// The root link is carried by the free-flyer that the reader makes: nothing else is on the ground.
 bool hasImpliedFreeFlyer(const Model& model);
 

@@ -13,7 +13,7 @@ namespace bielle {
 namespace {
 
 // A name in YAML syntax.
-std::string quote(const std::string& name) {
+std::string quoteName(const std::string& name) {
   const bool plain =
       !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) &&
       name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") == std::string::npos;
@@ -55,7 +55,7 @@ class YamlWriter {
     writeReferences(out);
     if (!model_.serialJoints().empty()) {
       out << "\nserial_joints:\n";
-      for (int i : model_.serialJoints()) out << "  - " << quote(model_.joints()[i].name) << "\n";
+      for (int i : model_.serialJoints()) out << "  - " << quoteName(model_.joints()[i].name) << "\n";
     }
     writeImportance(out);
     return out.str();
@@ -67,7 +67,7 @@ class YamlWriter {
     for (int i = 1; i < model_.numBodies(); ++i) {
       const Joint& joint = model_.joints()[i];
       if (joint.kind != JointKind::Spherical && joint.kind != JointKind::Universal) continue;
-      names += "  - " + quote(joint.name) + "\n";
+      names += "  - " + quoteName(joint.name) + "\n";
       if (joint.kind == JointKind::Spherical) {
         types += "  - SPHERICAL\n";
         continue;
@@ -83,12 +83,12 @@ class YamlWriter {
   void writeClosures(std::ostream& out) {
     if (!model_.closures().empty()) out << "\nclosures:\n";
     for (const Closure& c : model_.closures()) {
-      out << "  - {name: " << quote(c.name);
+      out << "  - {name: " << quoteName(c.name);
       if (c.kind == ClosureKind::Coupler)
         writeTerms(c, out);
       else
-        out << ", frames: [" << quote(findFrameName(model_, c.body1, c.X_B1, c.name + "_frame1")) << ", "
-            << quote(findFrameName(model_, c.body2, c.X_B2, c.name + "_frame2")) << "]";
+        out << ", frames: [" << quoteName(findFrameName(model_, c.body1, c.X_B1, c.name + "_frame1")) << ", "
+            << quoteName(findFrameName(model_, c.body2, c.X_B2, c.name + "_frame2")) << "]";
       out << ", type: " << getName(c.kind);
       if (c.kind == ClosureKind::Hinge5D) out << ", axis: [" << formatRounded(c.axis, ", ") << "]";
       if (c.kp != 0) out << ", kp: " << formatRobotNumber(c.kp);
@@ -100,7 +100,7 @@ class YamlWriter {
   void writeTerms(const Closure& c, std::ostream& out) const {
     const char* separator = ", joints: {";
     for (const CouplerTerm& term : c.terms) {
-      out << separator << quote(model_.joints()[term.joint].name) << ": " << formatRobotNumber(term.coefficient);
+      out << separator << quoteName(model_.joints()[term.joint].name) << ": " << formatRobotNumber(term.coefficient);
       separator = ", ";
     }
     out << "}";
@@ -110,7 +110,7 @@ class YamlWriter {
   void writeMotors(std::ostream& out) {
     if (!model_.motors().empty()) out << "\nmotors:  # armature in kg m^2 (kg where prismatic), N m and rad/s\n";
     for (const Motor& motor : model_.motors()) {
-      out << "  " << quote(motor.name) << ": {armature: " << formatRobotNumber(motor.armature);
+      out << "  " << quoteName(motor.name) << ": {armature: " << formatRobotNumber(motor.armature);
       if (std::isfinite(motor.effort_limit)) out << ", effort: " << formatRobotNumber(motor.effort_limit);
       if (std::isfinite(motor.velocity_limit)) out << ", velocity: " << formatRobotNumber(motor.velocity_limit);
       out << formatMotorData(motor) << "}\n";
@@ -120,7 +120,7 @@ class YamlWriter {
       const Joint& joint = model_.joints()[i];
       const double armature = model_.armature()[joint.idx_v];
       if (armature != 0 && model_.findMotor(joint.name) < 0)
-        others += "  " + quote(joint.name) + ": " + formatRobotNumber(armature) + "\n";
+        others += "  " + quoteName(joint.name) + ": " + formatRobotNumber(armature) + "\n";
     }
     if (!others.empty()) out << "armature:\n" << others;
   }
@@ -128,7 +128,8 @@ class YamlWriter {
   void writeJointForces(std::ostream& out) {
     if (!model_.jointForces().empty()) out << "\njoint_forces:  # N m, rad, s; N, m, s where prismatic\n";
     for (const JointForce& force : model_.jointForces()) {
-      out << "  " << quote(model_.joints()[force.joint].name) << ": {stiffness: " << formatRobotNumber(force.stiffness);
+      out << "  " << quoteName(model_.joints()[force.joint].name)
+          << ": {stiffness: " << formatRobotNumber(force.stiffness);
       if (force.rest != 0) out << ", rest: " << formatRobotNumber(force.rest);
       if (force.preload != 0) out << ", preload: " << formatRobotNumber(force.preload);
       if (force.damping != 0) out << ", damping: " << formatRobotNumber(force.damping);
@@ -142,9 +143,9 @@ class YamlWriter {
   void writePointSprings(std::ostream& out) {
     if (!model_.pointSprings().empty()) out << "\npoint_springs:  # N/m, m, N, N s/m\n";
     for (const PointSpring& spring : model_.pointSprings()) {
-      out << "  " << quote(spring.name) << ":\n    frames: [" << quote(model_.bodies()[spring.body1].name) << ", "
-          << quote(model_.bodies()[spring.body2].name) << "]\n    points: [[" << formatRounded(spring.point1, ", ")
-          << "], [" << formatRounded(spring.point2, ", ") << "]]\n";
+      out << "  " << quoteName(spring.name) << ":\n    frames: [" << quoteName(model_.bodies()[spring.body1].name)
+          << ", " << quoteName(model_.bodies()[spring.body2].name) << "]\n    points: [["
+          << formatRounded(spring.point1, ", ") << "], [" << formatRounded(spring.point2, ", ") << "]]\n";
       const auto write = [&out](const char* key, double value) {
         out << "    " << key << ": " << formatRobotNumber(value) << "\n";
       };
@@ -158,8 +159,8 @@ class YamlWriter {
   void writeContacts(std::ostream& out) {
     if (!model_.contacts().empty()) out << "\ncontacts:\n";
     for (const ContactFrame& c : model_.contacts()) {
-      out << "  " << quote(c.name) << ": {frame: " << quote(findFrameName(model_, c.body, c.X_BF, c.name + "_sole"))
-          << ", type: ";
+      out << "  " << quoteName(c.name)
+          << ": {frame: " << quoteName(findFrameName(model_, c.body, c.X_BF, c.name + "_sole")) << ", type: ";
       if (c.kind == ContactKind::Point3D)
         out << "3d";
       else
@@ -172,7 +173,7 @@ class YamlWriter {
     std::string lines;
     for (const Joint& joint : model_.joints())
       if (joint.position_importance != 1 || joint.velocity_importance != 1)
-        lines += "  " + quote(joint.name) + ": [" + formatRobotNumber(joint.position_importance) + ", " +
+        lines += "  " + quoteName(joint.name) + ": [" + formatRobotNumber(joint.position_importance) + ", " +
                  formatRobotNumber(joint.velocity_importance) + "]\n";
     if (!lines.empty()) out << "\nimportance:\n" << lines;
   }
@@ -180,17 +181,17 @@ class YamlWriter {
   void writeReferences(std::ostream& out) {
     if (!model_.references().empty()) out << "\nreferences:\n";
     for (const Reference& reference : model_.references()) {
-      out << "  " << quote(reference.name) << ":\n";
+      out << "  " << quoteName(reference.name) << ":\n";
       if (!reference.joints.empty()) out << "    joints:\n";
       for (const auto& [name, values] : reference.joints)
-        out << "      " << quote(name) << ": " << (values.size() == 1 ? formatRounded(values[0]) : formatList(values))
-            << "\n";
+        out << "      " << quoteName(name) << ": "
+            << (values.size() == 1 ? formatRounded(values[0]) : formatList(values)) << "\n";
       if (!reference.height_frame.empty())
-        out << "    height: {frame: " << quote(reference.height_frame) << ", value: " << formatRounded(reference.height)
-            << "}\n";
+        out << "    height: {frame: " << quoteName(reference.height_frame)
+            << ", value: " << formatRounded(reference.height) << "}\n";
       if (!reference.feet.empty()) out << "    feet:\n";
       for (const auto& [name, place] : reference.feet)
-        out << "      " << quote(name) << ": [" << formatRounded(place, ", ") << "]\n";
+        out << "      " << quoteName(name) << ": [" << formatRounded(place, ", ") << "]\n";
     }
   }
 
@@ -211,7 +212,7 @@ std::string formatMotorData(const Motor& motor) {
   if (motor.torque_loss) text += ", torque_loss: " + formatRobotNumber(*motor.torque_loss);
   add("continuous_effort", motor.continuous_effort, HUGE_VAL);
   const MotorDrive &drive = motor.drive, ideal;
-  if (!drive.type.empty()) text += ", catalogue_type: " + quote(drive.type);
+  if (!drive.type.empty()) text += ", catalogue_type: " + quoteName(drive.type);
   add("ratio", drive.ratio, ideal.ratio);
   add("rotor_inertia", drive.rotor_inertia, ideal.rotor_inertia);
   add("torque_constant", drive.torque_constant, ideal.torque_constant);

@@ -6,6 +6,7 @@
 
 #include "bielle/model/error.h"
 #include "io/format_warnings.h"
+#include "io/robot_text.h"
 #include "io/xml_text.h"
 #include "math/so3.h"
 #include "model/joint.h"
@@ -14,23 +15,17 @@
 namespace bielle {
 namespace {
 
-std::string formatExact(double value) { return formatNumber(value + 0.0, "%.17g"); }  // + 0.0: no negative zero
-
-std::string formatVector(const Vector3d& v) {
-  return formatExact(v.x()) + " " + formatExact(v.y()) + " " + formatExact(v.z());
-}
-
 // x y z roll pitch yaw, R = Rz(yaw) Ry(pitch) Rx(roll)
 std::string formatPose(const SE3& X) {
   const double level = std::hypot(X.R(0, 0), X.R(1, 0)), pitch = std::atan2(-X.R(2, 0), level);
   Vector3d angles(std::atan2(X.R(2, 1), X.R(2, 2)), pitch, std::atan2(X.R(1, 0), X.R(0, 0)));
   if (level < 1e-9) angles = {std::atan2(-X.R(1, 2), X.R(1, 1)), pitch, 0};  // roll and yaw turn about one axis
-  return formatVector(X.p) + " " + formatVector(angles);
+  return formatExact(X.p) + " " + formatExact(angles);
 }
 
-class Writer {
+class SdfWriter {
  public:
-  Writer(const Model& model, ConstVectorRef q_ref) : model_(model), q_ref_(q_ref) {}
+  SdfWriter(const Model& model, ConstVectorRef q_ref) : model_(model), q_ref_(q_ref) {}
 
   SdfText write() {
     out_ << "<?xml version=\"1.0\"?>\n<sdf version=\"1.7\">\n  <model name=\"" << escapeXml(model_.name()) << "\">\n";
@@ -71,7 +66,7 @@ class Writer {
     out_ << "    <link name=\"" << getLink(i) << "\">\n";
     writePose(calcPlacement(i), model_.joints()[i].parent, "      ");
     const Matrix3d& I = inertia.I_com;
-    out_ << "      <inertial>\n        <pose>" << formatVector(inertia.com) << " 0 0 0</pose>\n        <mass>"
+    out_ << "      <inertial>\n        <pose>" << formatExact(inertia.com) << " 0 0 0</pose>\n        <mass>"
          << formatExact(inertia.mass) << "</mass>\n        <inertia>";
     const auto write = [&](const char* name, double value) {
       out_ << "<" << name << ">" << formatExact(value) << "</" << name << ">";
@@ -101,7 +96,7 @@ class Writer {
     else if (shape.half.head<2>().isZero() && shape.radius > 0)
       out_ << "<capsule>" << radius << "<length>" << formatExact(2 * shape.half.z()) << "</length></capsule>";
     else
-      out_ << "<box><size>" << formatVector(2 * (shape.half + Vector3d::Constant(shape.radius))) << "</size></box>";
+      out_ << "<box><size>" << formatExact(2 * (shape.half + Vector3d::Constant(shape.radius))) << "</size></box>";
     out_ << "</geometry>\n      </collision>\n";
   }
 
@@ -112,7 +107,7 @@ class Writer {
     const Vector3d& size = visual.size;
     switch (visual.shape) {
       case Visual::Shape::Box:
-        out_ << "<box><size>" << formatVector(size) << "</size></box>";
+        out_ << "<box><size>" << formatExact(size) << "</size></box>";
         break;
       case Visual::Shape::Cylinder:
         out_ << "<cylinder><radius>" << formatExact(size[0]) << "</radius><length>" << formatExact(size[1])
@@ -122,10 +117,10 @@ class Writer {
         out_ << "<sphere><radius>" << formatExact(size[0]) << "</radius></sphere>";
         break;
       case Visual::Shape::Mesh:
-        out_ << "<mesh><uri>" << escapeXml(visual.mesh) << "</uri><scale>" << formatVector(size) << "</scale></mesh>";
+        out_ << "<mesh><uri>" << escapeXml(visual.mesh) << "</uri><scale>" << formatExact(size) << "</scale></mesh>";
         break;
     }
-    const std::string color = formatVector(visual.rgba.head<3>()) + " " + formatExact(visual.rgba[3]);
+    const std::string color = formatExact(visual.rgba.head<3>()) + " " + formatExact(visual.rgba[3]);
     out_ << "</geometry>\n        <material><ambient>" << color << "</ambient><diffuse>" << color
          << "</diffuse></material>\n      </visual>\n";
   }
@@ -165,7 +160,7 @@ class Writer {
     const double q = q_ref_[joint.idx_q + k], lower = model_.lowerLimits()[dof] - q,
                  upper = model_.upperLimits()[dof] - q;
     const double effort = motor < 0 ? HUGE_VAL : model_.motors()[motor].effort_limit;
-    out_ << "      <" << tag << ">\n        <xyz>" << formatVector(axis) << "</xyz>\n";
+    out_ << "      <" << tag << ">\n        <xyz>" << formatExact(axis) << "</xyz>\n";
     if (q != 0) shifted_ += (shifted_.empty() ? "'" : ", '") + joint.name + "' " + formatNumber(q);
     constexpr double kFar = 1e16;  // none, in SDF
     std::ostringstream limit;
@@ -231,7 +226,7 @@ class Writer {
     writePose(X, 0, "      ");
     out_ << "      <parent>" << getLink(parent) << "</parent>\n      <child>" << getLink(child) << "</child>\n";
     if (closure.kind == ClosureKind::Hinge5D)
-      out_ << "      <axis><xyz>" << formatVector(closure.axis) << "</xyz></axis>\n";
+      out_ << "      <axis><xyz>" << formatExact(closure.axis) << "</xyz></axis>\n";
     out_ << "    </joint>\n";
     if (closure.kp != 0 || closure.kd != 0) warn(element, "its gains kp and kd are left out");
   }
@@ -259,6 +254,6 @@ class Writer {
 
 }  // namespace
 
-SdfText formatSdf(const Model& model, ConstVectorRef q_ref) { return Writer(model, q_ref).write(); }
+SdfText formatSdf(const Model& model, ConstVectorRef q_ref) { return SdfWriter(model, q_ref).write(); }
 
 }  // namespace bielle

@@ -1,8 +1,9 @@
 #include "bielle/model/builder.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "math/decompositions.h"
 
 namespace bielle {
 

@@ -1,6 +1,5 @@
 #include "model/mesh.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cctype>
 #include <cstdint>
@@ -9,6 +8,8 @@
 #include <fstream>
 #include <iterator>
 #include <sstream>
+
+#include "math/decompositions.h"
 
 namespace fs = std::filesystem;
 

@@ -36,7 +36,7 @@ void readDrive(const YamlFields& fields, MotorDrive& drive) {
   readNumber(fields, "mass", drive.mass);
 }
 
-std::vector<std::string> join(std::vector<std::string> keys, const std::vector<std::string>& more) {
+std::vector<std::string> append(std::vector<std::string> keys, const std::vector<std::string>& more) {
   keys.insert(keys.end(), more.begin(), more.end());
   return keys;
 }
@@ -47,7 +47,7 @@ Catalogue readCatalogue(const std::string& path) {
   Catalogue catalogue;
   readYamlDocument(path, readRobotText(path), [&](const YamlEntry& root) {
     for (const auto& [name, entry] : require(root.getFields({"motors"}), "motors", root).getMap()) {
-      const YamlFields fields = entry.getFields(join({"source", "effort", "velocity"}, kDriveKeys));
+      const YamlFields fields = entry.getFields(append({"source", "effort", "velocity"}, kDriveKeys));
       require(fields, "source", entry).getText();
       MotorSpec spec;
       spec.drive.type = name;
@@ -102,7 +102,7 @@ std::vector<MotorSpec> readMotorSpecs(const YamlEntry& motors, const std::string
   if (catalogues) known.emplace(path, catalogues);
   std::vector<MotorSpec> specs;
   for (const auto& [joint, entry] : motors.getMap()) {
-    const YamlFields fields = entry.getFields(join(
+    const YamlFields fields = entry.getFields(append(
         {"type", "catalogue_type", "armature", "effort", "velocity", "torque_loss", "continuous_effort"}, kDriveKeys));
     MotorSpec motor;
     if (const YamlEntry* type = find(fields, "type")) {

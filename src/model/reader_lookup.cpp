@@ -7,6 +7,7 @@
 #include <set>
 
 #include "bielle/model/error.h"
+#include "model/listing.h"
 #include "model/robot_files.h"
 #include "model/text_file.h"
 
@@ -16,12 +17,6 @@ namespace bielle {
 namespace {
 
 constexpr std::uintmax_t kLargestFile = 256'000'000;
-
-std::string join(const std::vector<std::string>& items) {
-  std::string text;
-  for (const std::string& item : items) text += (text.empty() ? "" : ", ") + item;
-  return text.empty() ? "none" : text;
-}
 
 bool isFile(const fs::path& path) {
   std::error_code error;
@@ -51,7 +46,7 @@ std::string findInDirectory(const fs::path& directory) {
     if (found.empty() && isFile(directory / (stem + extension))) return (directory / (stem + extension)).string();
   std::sort(found.begin(), found.end());
   throw ModelError(directory.string(), "directory",
-                   found.empty() ? "it holds no .urdf file" : "it holds several .urdf files: " + join(found),
+                   found.empty() ? "it holds no .urdf file" : "it holds several .urdf files: " + listItems(found),
                    found.empty() ? "put robot.urdf there" : "give one of them by its path");
 }
 
@@ -144,9 +139,9 @@ std::string findRobotFile(const std::string& name_or_path) {
   if (isDirectory(path)) return findInDirectory(path);
   if (isFile(path)) return name_or_path;
   throw ModelError("", "robot '" + name_or_path + "'",
-                   is_name ? "there is none of this name in " + join(getRobotDirectories()) + ", nor such a path"
+                   is_name ? "there is none of this name in " + listItems(getRobotDirectories()) + ", nor such a path"
                            : "there is no such file or directory",
-                   "give a path, or one of the known names: " + join(listRobots()));
+                   "give a path, or one of the known names: " + listItems(listRobots()));
 }
 
 }  // namespace bielle

@@ -5,14 +5,13 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "math/constants.h"
 
 namespace bielle {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 // Data common to all stages.
-struct Scene {
+struct BenchmarkScene {
   const Model& model;
   const BenchmarkWalkOptions& options;
   VectorXd q0;
@@ -23,13 +22,13 @@ struct Scene {
 
 enum class PhaseKind { Double, RightStance, LeftStance, Switch };
 
-struct Phase {
+struct BenchmarkPhase {
   PhaseKind kind;
   int nodes;
 };
 
-std::vector<Phase> makePhases(const Model& model, const BenchmarkWalkOptions& o) {
-  std::vector<Phase> phases{{PhaseKind::Double, o.start_nodes}};
+std::vector<BenchmarkPhase> makePhases(const Model& model, const BenchmarkWalkOptions& o) {
+  std::vector<BenchmarkPhase> phases{{PhaseKind::Double, o.start_nodes}};
   for (int i = 0; i < o.cycles; ++i)
     for (PhaseKind stance : {PhaseKind::RightStance, PhaseKind::LeftStance}) {
       phases.push_back({stance, o.swing_nodes});
@@ -37,7 +36,7 @@ std::vector<Phase> makePhases(const Model& model, const BenchmarkWalkOptions& o)
     }
   int used = 0;
   bool possible = o.time_step > 0;
-  for (const Phase& phase : phases) {
+  for (const BenchmarkPhase& phase : phases) {
     possible = possible && phase.nodes > 0;
     used += phase.nodes;
   }
@@ -73,13 +72,13 @@ const char* getName(PhaseKind kind) {
   return "?";
 }
 
-std::vector<int> getStance(const Scene& scene, PhaseKind kind) {
+std::vector<int> getStance(const BenchmarkScene& scene, PhaseKind kind) {
   if (kind == PhaseKind::RightStance) return {scene.right};
   if (kind == PhaseKind::LeftStance) return {scene.left};
   return {scene.left, scene.right};
 }
 
-StageSpec makeRegularizedStage(const Scene& scene, double state_weight, double control_weight) {
+StageSpec makeRegularizedStage(const BenchmarkScene& scene, double state_weight, double control_weight) {
   const Model& model = scene.model;
   StageSpec stage;
   stage.dt = scene.options.time_step;
@@ -88,7 +87,7 @@ StageSpec makeRegularizedStage(const Scene& scene, double state_weight, double c
   return stage;
 }
 
-void addForceCosts(const Scene& scene, const std::vector<ContactTarget>& contacts, StageSpec& stage) {
+void addForceCosts(const BenchmarkScene& scene, const std::vector<ContactTarget>& contacts, StageSpec& stage) {
   const double weight = scene.model.mass() * scene.model.gravity().norm();
   for (size_t i = 0; i < contacts.size(); ++i) {
     const int constraint = stage.constraints.num_loops + static_cast<int>(i);
@@ -102,8 +101,8 @@ void addForceCosts(const Scene& scene, const std::vector<ContactTarget>& contact
 }
 
 // `progress` in the phase, over (0, 1); `time` along the walk, s.
-StageSpec makeStage(const Scene& scene, PhaseKind kind, const std::vector<ContactTarget>& contacts, double progress,
-                    double time) {
+StageSpec makeStage(const BenchmarkScene& scene, PhaseKind kind, const std::vector<ContactTarget>& contacts,
+                    double progress, double time) {
   const BenchmarkWalkOptions& o = scene.options;
   StageSpec stage = makeRegularizedStage(scene, o.state_weight, o.control_weight);
   stage.constraints = makeConstraintSet(scene.model, contacts);
@@ -128,7 +127,7 @@ StageSpec makeStage(const Scene& scene, PhaseKind kind, const std::vector<Contac
   return stage;
 }
 
-StageSpec makeTerminalStage(const Scene& scene) {
+StageSpec makeTerminalStage(const BenchmarkScene& scene) {
   StageSpec stage = makeRegularizedStage(scene, 1, 0);
   const int nv = scene.model.nv();
   stage.state.weights.head(nv) *= scene.options.state_weight;
@@ -139,14 +138,14 @@ StageSpec makeTerminalStage(const Scene& scene) {
 }  // namespace
 
 Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o, Formulation formulation) {
-  const std::vector<Phase> phases = makePhases(model, o);
-  Scene scene{model,
-              o,
-              makeStandingPosture(model),
-              makeStateWeights(model).cwiseMax(o.importance_floor),
-              {},
-              findFoot(model, o.left),
-              findFoot(model, o.right)};
+  const std::vector<BenchmarkPhase> phases = makePhases(model, o);
+  BenchmarkScene scene{model,
+                       o,
+                       makeStandingPosture(model),
+                       makeStateWeights(model).cwiseMax(o.importance_floor),
+                       {},
+                       findFoot(model, o.left),
+                       findFoot(model, o.right)};
   Workspace ws(model);
   updatePositions(model, ws, scene.q0);
   scene.com0 = calcCom(model, ws);
@@ -155,7 +154,7 @@ Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o, Form
   plan.name = "benchmark walk";
   std::vector<StageSpec>& stages = plan.stages;
   const int last_switch = o.start_nodes + 2 * o.cycles * (o.swing_nodes + o.switch_nodes);
-  for (const Phase& phase : phases) {
+  for (const BenchmarkPhase& phase : phases) {
     const std::vector<ContactTarget> contacts =
         makeContactTargets(model, scene.q0, getStance(scene, phase.kind), o.contact_kp, o.contact_kd);
     plan.schedule.phases.push_back({getName(phase.kind), phase.nodes, o.time_step, contacts});

@@ -3,12 +3,11 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "math/constants.h"
 #include "math/so3.h"
 
 namespace bielle {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 SE3 makeTurn(double yaw) { return {makeAxisRotation(Vector3d::UnitZ(), yaw), Vector3d::Zero()}; }
 

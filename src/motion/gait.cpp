@@ -5,13 +5,12 @@
 
 #include "bielle/model/error.h"
 #include "bielle/motion/motion.h"
+#include "math/constants.h"
 #include "math/so3.h"
 #include "motion/quintic.h"
 
 namespace bielle {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Quintic from 0 to 1 with no velocity and no acceleration at its ends.
 double ease(double s) {

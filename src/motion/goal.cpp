@@ -5,12 +5,11 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "math/constants.h"
 #include "model/number_text.h"
 
 namespace bielle {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 struct KindText {
   GoalKind kind;

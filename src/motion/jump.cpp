@@ -12,7 +12,7 @@ namespace bielle {
 namespace {
 
 // Data common to all stages.
-struct Scene {
+struct JumpScene {
   const Model& model;
   const JumpOptions& options;
   JumpFigures figures;
@@ -24,45 +24,45 @@ struct Scene {
   std::vector<ContactTarget> after;   // at the landing
 };
 
-enum class Phase { Stand, Push, Flight, Land, Settle };
+enum class JumpPhase { Stand, Push, Flight, Land, Settle };
 
-int countNodes(double seconds, double time_step, int least) {
+int countStages(double seconds, double time_step, int least) {
   return std::max(least, static_cast<int>(std::lround(seconds / time_step)));
 }
 
-int countNodes(const JumpOptions& o, Phase phase) {
+int countStages(const JumpOptions& o, JumpPhase phase) {
   switch (phase) {
-    case Phase::Stand:
-      return countNodes(o.stand, o.time_step, 0);
-    case Phase::Push:
-      return countNodes(o.push, o.time_step, 1);
-    case Phase::Flight:
-      return 2 * countNodes(o.flight / 2, o.time_step, 1);
-    case Phase::Land:
-      return countNodes(o.land, o.time_step, 1);
-    case Phase::Settle:
-      return countNodes(o.settle, o.time_step, 0);
+    case JumpPhase::Stand:
+      return countStages(o.stand, o.time_step, 0);
+    case JumpPhase::Push:
+      return countStages(o.push, o.time_step, 1);
+    case JumpPhase::Flight:
+      return 2 * countStages(o.flight / 2, o.time_step, 1);
+    case JumpPhase::Land:
+      return countStages(o.land, o.time_step, 1);
+    case JumpPhase::Settle:
+      return countStages(o.settle, o.time_step, 0);
   }
   return 0;
 }
 
-const char* getName(Phase phase) {
+const char* getName(JumpPhase phase) {
   switch (phase) {
-    case Phase::Stand:
+    case JumpPhase::Stand:
       return "stand";
-    case Phase::Push:
+    case JumpPhase::Push:
       return "push";
-    case Phase::Flight:
+    case JumpPhase::Flight:
       return "flight";
-    case Phase::Land:
+    case JumpPhase::Land:
       return "land";
-    case Phase::Settle:
+    case JumpPhase::Settle:
       return "settle";
   }
   return "";
 }
 
-StageSpec makeStage(const Scene& scene, const std::vector<ContactTarget>& contacts) {
+StageSpec makeStage(const JumpScene& scene, const std::vector<ContactTarget>& contacts) {
   const Model& model = scene.model;
   const JumpOptions& o = scene.options;
   StageSpec stage;
@@ -75,12 +75,12 @@ StageSpec makeStage(const Scene& scene, const std::vector<ContactTarget>& contac
 }
 
 // Eq. (3) at the progress s of the flight.
-Vector3d calcFootOffset(const Scene& scene, double s) {
+Vector3d calcFootOffset(const JumpScene& scene, double s) {
   const double p = 4 * s * (1 - s), height = std::max(scene.figures.rise, scene.options.clearance);
   return s * s * (3 - 2 * s) * scene.shift + height * p * p * (2 - p) * Vector3d::UnitZ();
 }
 
-void addSwingCosts(const Scene& scene, double s, StageSpec& stage) {
+void addSwingCosts(const JumpScene& scene, double s, StageSpec& stage) {
   const JumpOptions& o = scene.options;
   const Vector3d p = Vector3d::Constant(o.swing_weight), r = Vector3d::Constant(o.swing_rotation_weight);
   for (const ContactTarget& start : scene.before) {
@@ -92,14 +92,14 @@ void addSwingCosts(const Scene& scene, double s, StageSpec& stage) {
   }
 }
 
-void addHeightCost(const Scene& scene, const std::string& name, double weight, double height, bool defines,
+void addHeightCost(const JumpScene& scene, const std::string& name, double weight, double height, bool defines,
                    StageSpec& stage) {
   stage.costs.push_back({name, weight, Activation::makeQuadratic(Vector3d::UnitZ()),
                          makeComPosition(scene.com + height * Vector3d::UnitZ()), defines});
 }
 
 // Node i of n in flight. The first one is where the feet stood.
-void addFlightConstraints(const Scene& scene, int i, int n, StageSpec& stage) {
+void addFlightConstraints(const JumpScene& scene, int i, int n, StageSpec& stage) {
   if (i == 0 || scene.options.published != 0) return;
   Ground ground;
   ground.height = scene.before.front().X_WT.p.z();
@@ -107,7 +107,7 @@ void addFlightConstraints(const Scene& scene, int i, int n, StageSpec& stage) {
     addClearance(scene.model.contacts()[start.contact], ground, 0, isMidSwing(i, n) ? kMidSwingClearance : 0, stage);
 }
 
-void addTouchdown(const Scene& scene, StageSpec& stage) {
+void addTouchdown(const JumpScene& scene, StageSpec& stage) {
   const LandingWeights& weights = scene.options.paper.touchdown;
   const double h = stage.dt;
   for (const ContactTarget& target : scene.after) {
@@ -120,7 +120,7 @@ void addTouchdown(const Scene& scene, StageSpec& stage) {
   }
 }
 
-StageSpec makeTerminalStage(const Scene& scene) {
+StageSpec makeTerminalStage(const JumpScene& scene) {
   const JumpOptions& o = scene.options;
   StageSpec stage = makeStage(scene, {});
   stage.constraints = {};
@@ -139,9 +139,9 @@ StageSpec makeTerminalStage(const Scene& scene) {
   return stage;
 }
 
-Scene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
-  Scene scene{model, o, calcJumpFigures(o, model.gravity().norm()), q0, makeStateWeights(model), {}, {}, {}, {},
-              {},    {}};
+JumpScene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
+  JumpScene scene{model, o, calcJumpFigures(o, model.gravity().norm()), q0, makeStateWeights(model), {}, {}, {}, {},
+                  {},    {}};
   if (model.hasFreeFlyer()) scene.state_weights.segment<3>(3).setConstant(o.torso_weight);
   if (o.published != 0) {  // hips count like other joints, the heading does not
     scene.state_weights.head(model.nv()) = selectMainJoints(model);
@@ -166,24 +166,24 @@ Scene makeScene(const Model& model, const JumpOptions& o, const VectorXd& q0) {
 }
 
 // Load on all feet together, Eq. (2); the paper uses its average while pushing and landing.
-double calcLoad(const Scene& scene, Phase phase, double com_acceleration) {
+double calcLoad(const JumpScene& scene, JumpPhase phase, double com_acceleration) {
   const double m = scene.model.mass(), g = scene.model.gravity().norm();
   const JumpFigures& f = scene.figures;
   if (scene.options.published == 0) return m * (g + com_acceleration);
-  if (phase == Phase::Push) return m * (g + f.take_off / f.push);
-  if (phase == Phase::Land) return m * (g + f.take_off / f.land);
+  if (phase == JumpPhase::Push) return m * (g + f.take_off / f.push);
+  if (phase == JumpPhase::Land) return m * (g + f.take_off / f.land);
   return m * g;
 }
 
 // The initial posture, moving by Eq. (1).
-VectorXd makeGuess(const Scene& scene, Phase phase, double t) {
+VectorXd makeGuess(const JumpScene& scene, JumpPhase phase, double t) {
   const Model& model = scene.model;
   VectorXd x(model.nq() + model.nv());
   x << scene.q0, VectorXd::Zero(model.nv());
   if (!model.hasFreeFlyer()) return x;
   const JumpFigures& f = scene.figures;
-  if (phase == Phase::Land || phase == Phase::Settle) x.head<3>() += scene.shift;
-  if (phase != Phase::Flight) return x;
+  if (phase == JumpPhase::Land || phase == JumpPhase::Settle) x.head<3>() += scene.shift;
+  if (phase != JumpPhase::Flight) return x;
   const double g = model.gravity().norm();
   x.head<3>() += scene.shift * t / f.flight + (f.take_off * t - 0.5 * g * t * t) * Vector3d::UnitZ();
   const Vector3d velocity = scene.shift / f.flight + (f.take_off - g * t) * Vector3d::UnitZ();
@@ -191,7 +191,7 @@ VectorXd makeGuess(const Scene& scene, Phase phase, double t) {
   return x;
 }
 
-std::vector<Goal> makeGoals(const Scene& scene, int nodes) {
+std::vector<Goal> makeGoals(const JumpScene& scene, int nodes) {
   const JumpOptions& o = scene.options;
   const double height = o.stretch + scene.figures.rise;  // Eq. (1)
   Goal length{GoalKind::Displacement, "length", o.length, calcTolerance(o.length, 0.01), 0, nodes};
@@ -218,8 +218,8 @@ void check(const Model& model, const JumpOptions& o) {
 }  // namespace
 
 JumpFigures calcJumpFigures(const JumpOptions& o, double gravity) {
-  const auto last = [&o](Phase phase) { return countNodes(o, phase) * o.time_step; };
-  JumpFigures f{last(Phase::Stand), last(Phase::Push), last(Phase::Flight), last(Phase::Land), 0, 0};
+  const auto last = [&o](JumpPhase phase) { return countStages(o, phase) * o.time_step; };
+  JumpFigures f{last(JumpPhase::Stand), last(JumpPhase::Push), last(JumpPhase::Flight), last(JumpPhase::Land), 0, 0};
   f.take_off = 0.5 * gravity * f.flight;
   f.rise = gravity * f.flight * f.flight / 8;
   return f;
@@ -292,7 +292,7 @@ void setPaperWeights(JumpOptions& o) {
 
 MotionPlan planJump(const Model& model, const JumpOptions& options, const VectorXd& q0) {
   check(model, options);
-  const Scene scene = makeScene(model, options, q0);
+  const JumpScene scene = makeScene(model, options, q0);
   MotionPlan plan;
   plan.name = "jump";
   plan.ground.height = scene.before.front().X_WT.p.z();
@@ -302,11 +302,11 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
   const double g = model.gravity().norm();
   const GroundCosts ground{options.force_weight, options.pressure_weight,
                            options.published != 0 ? ForceAxes::World : ForceAxes::Contact};
-  for (Phase phase : {Phase::Stand, Phase::Push, Phase::Flight, Phase::Land, Phase::Settle}) {
-    const bool over = phase == Phase::Land || phase == Phase::Settle;
+  for (JumpPhase phase : {JumpPhase::Stand, JumpPhase::Push, JumpPhase::Flight, JumpPhase::Land, JumpPhase::Settle}) {
+    const bool over = phase == JumpPhase::Land || phase == JumpPhase::Settle;
     const std::vector<ContactTarget> none,
-        &contacts = phase == Phase::Flight ? none : (over ? scene.after : scene.before);
-    const int nodes = countNodes(options, phase);
+        &contacts = phase == JumpPhase::Flight ? none : (over ? scene.after : scene.before);
+    const int nodes = countStages(options, phase);
     if (nodes == 0) continue;
     plan.schedule.phases.push_back({getName(phase), nodes, options.time_step, contacts});
     const VectorXd u = contacts.empty() ? VectorXd::Zero(model.nu()).eval()
@@ -318,18 +318,18 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
       const double load = calcLoad(scene, phase, com.acceleration);
       addGroundCosts(model, ground, VectorXd::Constant(contacts.size(), load / contacts.size()), stage);
       if (options.published == 0) addWrenchCones(model, options.friction, options.cone_margin, stage);
-      if (phase != Phase::Flight) addHeightCost(scene, "com height", options.com_weight, com.height, false, stage);
-      if (phase == Phase::Flight && 2 * i == nodes)
+      if (phase != JumpPhase::Flight) addHeightCost(scene, "com height", options.com_weight, com.height, false, stage);
+      if (phase == JumpPhase::Flight && 2 * i == nodes)
         addHeightCost(scene, "apex", options.apex_weight / options.time_step, com.height, true, stage);
-      if (phase == Phase::Flight && i > 0) addSwingCosts(scene, static_cast<double>(i) / nodes, stage);
-      if (phase == Phase::Flight) addFlightConstraints(scene, i, nodes, stage);
-      if (phase == Phase::Land && i == 0) addTouchdown(scene, stage);
+      if (phase == JumpPhase::Flight && i > 0) addSwingCosts(scene, static_cast<double>(i) / nodes, stage);
+      if (phase == JumpPhase::Flight) addFlightConstraints(scene, i, nodes, stage);
+      if (phase == JumpPhase::Land && i == 0) addTouchdown(scene, stage);
       plan.guess.xs.push_back(makeGuess(scene, phase, i * options.time_step));
       plan.guess.us.push_back(u);
     }
   }
   stages.push_back(makeTerminalStage(scene));
-  plan.guess.xs.push_back(makeGuess(scene, Phase::Settle, 0));
+  plan.guess.xs.push_back(makeGuess(scene, JumpPhase::Settle, 0));
   plan.q_start = q0;
   plan.q_end = carryPosture(model, q0, {Matrix3d::Identity(), scene.shift});
   JumpOptions copy = options;

@@ -1,6 +1,5 @@
 #include "bielle/motion/motion.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +10,7 @@
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/error.h"
 #include "dynamics/assembly_refinement.h"
+#include "math/decompositions.h"
 #include "motion/motor_scale.h"
 #include "motion/neighbour_plans.h"
 

@@ -12,7 +12,7 @@ namespace {
 constexpr int kSteadySteps = 8;  // shorter runs do not reach their speed: the steps at both ends are half as long
 
 // Supports and flights have options of their own.
-std::vector<OptionEntry> join(std::vector<OptionEntry> entries, LocomotionOptions& gait) {
+std::vector<OptionEntry> joinGait(std::vector<OptionEntry> entries, LocomotionOptions& gait) {
   for (OptionEntry& entry : listOptions(gait))
     if (entry.name != "single_support" && entry.name != "double_support" && entry.name != "published")
       entries.push_back(std::move(entry));
@@ -75,15 +75,15 @@ LocomotionOptions HopOptions::makeGaitDefaults() {
 }
 
 std::vector<OptionEntry> listOptions(RunOptions& o) {
-  return join({{"speed", &o.speed, "m/s", "of the steady steps; negative: backward"},
-               {"steps", &o.steps, "1", "number of steps, the last one brings the feet together"},
-               {"flight", &o.flight, "s", "both feet in the air between two steps"},
-               {"stance", &o.stance, "s", "one foot on the ground"}},
-              o.gait);
+  return joinGait({{"speed", &o.speed, "m/s", "of the steady steps; negative: backward"},
+                   {"steps", &o.steps, "1", "number of steps, the last one brings the feet together"},
+                   {"flight", &o.flight, "s", "both feet in the air between two steps"},
+                   {"stance", &o.stance, "s", "one foot on the ground"}},
+                  o.gait);
 }
 
 std::vector<OptionEntry> listOptions(HopOptions& o) {
-  return join(
+  return joinGait(
       {{"foot", &o.foot, "0 or 1", "to hop on; 0: left, 1: right", {"left", "right"}},
        {"hops", &o.hops, "1", "number of flights"},
        {"flight", &o.flight, "s", "time in the air of each"},

@@ -4,13 +4,12 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
+#include "math/constants.h"
 #include "motion/foot_constraints.h"
 #include "motion/motor_scale.h"
 
 namespace bielle {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 void check(const Model& model, const SquatOptions& o) {
   requireOption(o.depth >= 0.05 && o.depth <= 2, "depth", "it is outside 0.05 .. 2",

@@ -36,7 +36,7 @@ void addGoals(std::vector<Goal> goals, MotionPlan& plan) {
   plan.goals.insert(plan.goals.begin(), goals.begin(), goals.end());
 }
 
-std::vector<OptionEntry> join(std::vector<OptionEntry> entries, LocomotionOptions& gait) {
+std::vector<OptionEntry> joinGaitOptions(std::vector<OptionEntry> entries, LocomotionOptions& gait) {
   for (OptionEntry& entry : listOptions(gait)) entries.push_back(std::move(entry));
   return entries;
 }
@@ -44,22 +44,22 @@ std::vector<OptionEntry> join(std::vector<OptionEntry> entries, LocomotionOption
 }  // namespace
 
 std::vector<OptionEntry> listOptions(WalkOptions& o) {
-  return join({{"speed", &o.speed, "m/s", "of the steady steps; negative: backward"},
-               {"steps", &o.steps, "1", "number of steps, the last one brings the feet together"}},
-              o.gait);
+  return joinGaitOptions({{"speed", &o.speed, "m/s", "of the steady steps; negative: backward"},
+                          {"steps", &o.steps, "1", "number of steps, the last one brings the feet together"}},
+                         o.gait);
 }
 
 std::vector<OptionEntry> listOptions(SideWalkOptions& o) {
-  return join({{"speed", &o.speed, "m/s", "to the left, of the steady steps; negative: to the right"},
-               {"steps", &o.steps, "1", "number of steps: one opens the stance, the next one closes it"}},
-              o.gait);
+  return joinGaitOptions({{"speed", &o.speed, "m/s", "to the left, of the steady steps; negative: to the right"},
+                          {"steps", &o.steps, "1", "number of steps: one opens the stance, the next one closes it"}},
+                         o.gait);
 }
 
 std::vector<OptionEntry> listOptions(TurnOptions& o) {
-  return join({{"angle", &o.angle, "rad", "to turn to the left; negative: to the right"},
-               {"radius", &o.radius, "m", "of the arc to walk along; 0: on the spot"},
-               {"steps", &o.steps, "1", "number of steps, the last one brings the feet together"}},
-              o.gait);
+  return joinGaitOptions({{"angle", &o.angle, "rad", "to turn to the left; negative: to the right"},
+                          {"radius", &o.radius, "m", "of the arc to walk along; 0: on the spot"},
+                          {"steps", &o.steps, "1", "number of steps, the last one brings the feet together"}},
+                         o.gait);
 }
 
 void setPaperWeights(WalkOptions& o) {

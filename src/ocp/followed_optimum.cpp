@@ -1,9 +1,9 @@
 #include "bielle/ocp/followed_optimum.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <stdexcept>
 
+#include "math/decompositions.h"
 #include "ocp/optimum_path.h"
 
 namespace bielle {

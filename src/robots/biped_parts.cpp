@@ -5,8 +5,6 @@
 namespace bielle {
 namespace {
 
-const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ(), kOrigin = Vector3d::Zero();
-
 // Hips are weighted in the state regularization as in the paper's walk.
 Joint makeHip(const std::string& name, const Vector3d& place, const Vector3d& axis, double position, double velocity) {
   Joint joint = makeRevolute(name, place, axis);

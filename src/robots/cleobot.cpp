@@ -2,13 +2,11 @@
 
 #include <cmath>
 
+#include "math/constants.h"
 #include "robots/biped_parts.h"
 
 namespace bielle {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ();
 
 // One side of the robot.
 struct Side : BipedSide {

@@ -2,23 +2,21 @@
 
 #include <cmath>
 
+#include "math/constants.h"
 #include "robots/solid.h"
 
 namespace bielle {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-const Vector3d kZ = Vector3d::UnitZ(), kOrigin = Vector3d::Zero();
-
 // Directions and points of one arm, Eqs. (1) and (2); the platform's centre is at -depth z.
-struct Arm {
+struct DeltaArm {
   Vector3d radial, tangent, normal;
   Vector3d motor, elbow, wrist;
 };
 
-Arm makeArm(const DeltaParameters& p, int index, double depth) {
+DeltaArm makeArm(const DeltaParameters& p, int index, double depth) {
   const double azimuth = 2 * kPi * index / 3;
-  Arm arm;
+  DeltaArm arm;
   arm.radial = {std::cos(azimuth), std::sin(azimuth), 0};
   arm.tangent = kZ.cross(arm.radial);
   arm.motor = p.base_radius * arm.radial;
@@ -29,13 +27,13 @@ Arm makeArm(const DeltaParameters& p, int index, double depth) {
 }
 
 // A bar between the rods of a parallelogram, its middle at a point.
-Solid makeBar(const DeltaParameters& p, const Arm& arm, const Vector3d& middle) {
+Solid makeBar(const DeltaParameters& p, const DeltaArm& arm, const Vector3d& middle) {
   const Vector3d side = p.half_width * arm.tangent;
   return makeRod(middle - side, middle + side, 0.008, p.rod_density, colors::kSteel);
 }
 
 // Motor to lower bar; the parallelogram is closed between its second rod and the lower bar.
-void addArm(const DeltaParameters& p, const Arm& arm, const std::string& name, ModelBuilder& builder) {
+void addArm(const DeltaParameters& p, const DeltaArm& arm, const std::string& name, ModelBuilder& builder) {
   const Vector3d side = p.half_width * arm.tangent, forearm = arm.wrist - arm.elbow, upper = arm.elbow - arm.motor;
   addSolidLink("upper" + name, "world", makeRevolute("motor" + name, arm.motor, arm.tangent),
                {makeRod(kOrigin, upper, 0.02, 2 * p.rod_density, colors::kMotor)}, builder);
@@ -80,7 +78,7 @@ Model makeDelta(const DeltaParameters& parameters) {
   const double depth = p.upper_length * std::sin(p.arm_angle) + std::sqrt(square);
 
   ModelBuilder builder("delta");
-  std::vector<Arm> arms;
+  std::vector<DeltaArm> arms;
   for (int i = 0; i < 3; ++i) arms.push_back(makeArm(p, i, depth));
   Solid plate =
       makeCylinder(-depth * kZ - arms[0].wrist, kZ, p.platform_radius, 0.02, p.platform_mass, colors::kOutput);

@@ -7,8 +7,6 @@
 namespace bielle {
 namespace {
 
-const Vector3d kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ(), kOrigin = Vector3d::Zero();
-
 // Upper and lower rod of one side; they pass each other beside the plane of the foot.
 void addSide(const FiveBarLegParameters& p, const std::string& name, double sign, double depth, ModelBuilder& builder) {
   const Vector3d knee = p.upper_length * Vector3d(sign * std::sin(p.stand_angle), 0, -std::cos(p.stand_angle));

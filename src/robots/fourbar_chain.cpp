@@ -8,7 +8,7 @@ namespace bielle {
 namespace {
 
 // A round rod from the origin along x, slender without a radius.
-Inertia makeRod(double length, double density, double radius) {
+Inertia calcRodInertia(double length, double density, double radius) {
   Inertia rod;
   rod.mass = density * length;
   rod.com = {length / 2, 0, 0};
@@ -19,7 +19,7 @@ Inertia makeRod(double length, double density, double radius) {
 
 void addRod(const std::string& link, const std::string& parent, const Joint& joint, double length,
             const FourBarChainOptions& o, ModelBuilder& builder) {
-  builder.addLink(link, parent, joint, makeRod(length, o.density, o.radius));
+  builder.addLink(link, parent, joint, calcRodInertia(length, o.density, o.radius));
   if (o.radius == 0) return;
   Visual visual;
   visual.shape = Visual::Shape::Cylinder;

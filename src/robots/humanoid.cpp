@@ -3,16 +3,14 @@
 namespace bielle {
 namespace {
 
-const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ(), kOrigin = Vector3d::Zero();
-
-struct Arm : BipedSide {
+struct HumanoidArm : BipedSide {
   const HumanoidParameters& p;
 
   std::string part(const std::string& base) const { return base + name; }
 };
 
 // A finger of two links at +-y of the hand; the second one carries on where the first one ends.
-void addFinger(const Arm& arm, const std::string& number, double sign, ModelBuilder& builder) {
+void addFinger(const HumanoidArm& arm, const std::string& number, double sign, ModelBuilder& builder) {
   constexpr double kRadius = 0.006, kGap = 0.02;  // m
   const HumanoidParameters& p = arm.p;
   const Vector3d root(0, sign * kGap, -p.forearm_length - 0.03), end(0, 0, -p.finger_length);
@@ -23,7 +21,7 @@ void addFinger(const Arm& arm, const std::string& number, double sign, ModelBuil
                makeRevolute(arm.part("fingertip" + number + "_joint"), end, kX), link, builder);
 }
 
-void addArm(const Arm& arm, ModelBuilder& builder) {
+void addArm(const HumanoidArm& arm, ModelBuilder& builder) {
   const HumanoidParameters& p = arm.p;
   const Vector3d elbow(0, 0, -p.upper_arm_length), hand(0, 0, -p.forearm_length);
   addSolidLink(arm.part("shoulder"), "trunk",

@@ -6,7 +6,6 @@
 namespace bielle {
 namespace {
 
-const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ(), kOrigin = Vector3d::Zero();
 // A motor that holds 0.25 N m with 1 W of heat, behind a screw of 10 mm per turn: W/N^2.
 constexpr double kForceLoss = 4e-5;
 constexpr double kRodRadius = 0.006, kPairGap = 0.012, kGuideGap = 0.025;  // m
@@ -24,8 +23,8 @@ struct Tie {
 
 // A leg being built. Links are added as a reader of files finds them, children in the order of their names; closures follow
 // when all are there.
-struct Leg : BipedSide {
-  Leg(const KangarooParameters& parameters, double side, ModelBuilder& model_builder)
+struct KangarooLeg : BipedSide {
+  KangarooLeg(const KangarooParameters& parameters, double side, ModelBuilder& model_builder)
       : BipedSide{side, side > 0 ? "_left" : "_right"}, p(parameters), builder(model_builder) {}
 
   std::string link(const std::string& part) const { return part + name; }
@@ -61,7 +60,7 @@ Joint makeSlide(const std::string& name, const Vector3d& place, const Vector3d& 
 }
 
 // The tube, turned by `mount`, the rod that slides in it, and the motor; a guide is a second slide, welded to the rod.
-void addScrew(Leg& leg, const Screw& screw, const Joint& mount, ClosureKind end, const Vector3d& axis) {
+void addScrew(KangarooLeg& leg, const Screw& screw, const Joint& mount, ClosureKind end, const Vector3d& axis) {
   const KangarooParameters& p = leg.p;
   const Vector3d way = screw.tip - screw.start, beside = -leg.s * kGuideGap * kY;
   const std::string tube = screw.name + "_tube", rod = screw.name + "_rod", guide = screw.name + "_guide";
@@ -83,12 +82,12 @@ void addScrew(Leg& leg, const Screw& screw, const Joint& mount, ClosureKind end,
 }
 
 // In a plane: hinges about `axis` at both ends.
-void addPlanarScrew(Leg& leg, const Screw& screw, const Vector3d& axis) {
+void addPlanarScrew(KangarooLeg& leg, const Screw& screw, const Vector3d& axis) {
   addScrew(leg, screw, makeRevolute(screw.name + "_hinge", screw.start, axis), ClosureKind::Hinge5D, axis);
 }
 
 // Two rods beside each other from `start` on one link to `end` on another; `way` from there to here, neutral.
-void addRodPair(Leg& leg, const std::string& name, const std::string& upper, const Vector3d& start,
+void addRodPair(KangarooLeg& leg, const std::string& name, const std::string& upper, const Vector3d& start,
                 const std::string& lower, const Vector3d& end, const Vector3d& way) {
   for (const auto& [suffix, side] : {std::pair<const char*, double>{"1", leg.s}, {"2", -leg.s}}) {
     const Vector3d beside = side * kPairGap * kY;
@@ -100,7 +99,7 @@ void addRodPair(Leg& leg, const std::string& name, const std::string& upper, con
 }
 
 // Yaw and roll links with the hip screws between them and the thigh.
-void addHip(Leg& leg, const Vector3d& hip) {
+void addHip(KangarooLeg& leg, const Vector3d& hip) {
   const KangarooParameters& p = leg.p;
   const Vector3d arm = leg.s * p.yaw_arm * kY, plate(p.hip_screw_place, 0, p.hip_screw_top);
   const Vector3d fork(p.hip_screw_place, 0, -p.hip_screw_drop);
@@ -122,14 +121,14 @@ void addHip(Leg& leg, const Vector3d& hip) {
                leg.builder);
 }
 
-void addYaw(Leg& leg, const Vector3d& hip) {
+void addYaw(KangarooLeg& leg, const Vector3d& hip) {
   const Vector3d arm = leg.s * leg.p.yaw_arm * kY;
   addPlanarScrew(leg, {leg.link("yaw"), "trunk", leg.link("hip_yaw"), hip + arm - leg.p.yaw_screw * kX, hip + arm, arm},
                  kZ);
   leg.close();
 }
 
-void addKnee(Leg& leg) {
+void addKnee(KangarooLeg& leg) {
   const KangarooParameters& p = leg.p;
   const Vector3d knee = -p.thigh_length * kZ, pivot = knee + p.knee_crank_height * kZ;
   const Vector3d arm = p.knee_arm * Vector3d(-std::cos(p.knee_angle), 0, -std::sin(p.knee_angle));
@@ -145,7 +144,7 @@ void addKnee(Leg& leg) {
                leg.builder);
 }
 
-void addFoot(Leg& leg) {
+void addFoot(KangarooLeg& leg) {
   const KangarooParameters& p = leg.p;
   addSolidLink(leg.link("ankle_cross"), leg.link("shank"), makeRevolute(leg.link("ankley"), -p.shank_length * kZ, kY),
                {makeCylinder(kOrigin, kY, 0.008, 0.05, 0.1, colors::kSteel)}, leg.builder);
@@ -161,7 +160,7 @@ void addFoot(Leg& leg) {
 }
 
 // Foot, screws, lower cranks with their links, upper cranks with their rods; index 1 outer, 2 inner.
-void addAnkle(Leg& leg) {
+void addAnkle(KangarooLeg& leg) {
   const KangarooParameters& p = leg.p;
   addFoot(leg);
   const Vector3d ankle = -p.shank_length * kZ;
@@ -191,7 +190,7 @@ void addAnkle(Leg& leg) {
   }
 }
 
-void addLeg(Leg& leg, const Vector3d& hip) {
+void addLeg(KangarooLeg& leg, const Vector3d& hip) {
   const KangarooParameters& p = leg.p;
   addHip(leg, hip);
   addKnee(leg);
@@ -271,10 +270,10 @@ Model makeKangaroo(const KangarooParameters& parameters) {
   check("kangaroo", p);
   ModelBuilder builder("kangaroo");
   addTrunk(makeTrunk(p), builder);
-  Leg legs[] = {{p, 1, builder}, {p, -1, builder}};
-  const auto getHip = [&](const Leg& leg) { return Vector3d(0, leg.s * p.hip_offset, -p.trunk_height); };
-  for (Leg& leg : legs) addLeg(leg, getHip(leg));
-  for (Leg& leg : legs) addYaw(leg, getHip(leg));
+  KangarooLeg legs[] = {{p, 1, builder}, {p, -1, builder}};
+  const auto getHip = [&](const KangarooLeg& leg) { return Vector3d(0, leg.s * p.hip_offset, -p.trunk_height); };
+  for (KangarooLeg& leg : legs) addLeg(leg, getHip(leg));
+  for (KangarooLeg& leg : legs) addYaw(leg, getHip(leg));
   builder.addReference(makeSerialHalfSitting("kangaroo", p));
   return builder.build();
 }
@@ -289,7 +288,7 @@ Model makeKangarooLeg(const KangarooParameters& parameters) {
   rail.axis = kZ;
   rail.X_PJ.p = (p.trunk_height + p.thigh_length + p.shank_length + p.ankle_height) * kZ;
   addSolidLink("trunk", "world", rail, makeTrunk(p), builder);
-  Leg leg(p, 1, builder);
+  KangarooLeg leg(p, 1, builder);
   addLeg(leg, -p.trunk_height * kZ);
   addYaw(leg, -p.trunk_height * kZ);
   Reference standing = makeSerialHalfSitting("kangaroo_leg", p);

@@ -7,9 +7,7 @@
 namespace bielle {
 namespace {
 
-const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ(), kOrigin = Vector3d::Zero();
-
-struct Leg : BipedSide {
+struct ComposedLeg : BipedSide {
   const LegBipedParameters& p;
   HipPart hip;
   KneePart knee;
@@ -30,7 +28,7 @@ struct HipLimb {
   Vector3d motor, elbow, ball;
 };
 
-HipLimb makeHipLimb(const Leg& leg, int index) {
+HipLimb makeHipLimb(const ComposedLeg& leg, int index) {
   const double r = leg.p.hip_radius, inside = 0.7 * r, middle = leg.p.hip_middle;
   const std::string name = "hip" + std::to_string(index) + leg.name;
   if (index == 1) return {name, -r * kX, r * kZ, leg.s * r * kY};
@@ -42,7 +40,7 @@ HipLimb makeHipLimb(const Leg& leg, int index) {
 constexpr double kHipCross = 0.1;
 
 // Of the limbs and of the thigh's arms to their balls, kg/m: all links of the hip weigh what those of a serial one do.
-double calcLimbDensity(const Leg& leg) {
+double calcLimbDensity(const ComposedLeg& leg) {
   double length = 0;
   for (int i = 1; i <= 3; ++i) {
     const HipLimb limb = makeHipLimb(leg, i);
@@ -52,7 +50,7 @@ double calcLimbDensity(const Leg& leg) {
 }
 
 // Passive hinges and three limbs: motor, link, hinge, link.
-void addParallelHip(const Leg& leg, ModelBuilder& builder) {
+void addParallelHip(const ComposedLeg& leg, ModelBuilder& builder) {
   const LegBipedParameters& p = leg.p;
   const double cross = kHipCross * p.hip_link_mass, density = calcLimbDensity(leg);
   addHipLinks(leg, p, {makeCylinder(kOrigin, kX, 0.008, 0.05, cross, colors::kSteel)},
@@ -71,14 +69,14 @@ void addParallelHip(const Leg& leg, ModelBuilder& builder) {
 }
 
 // The thigh's arms to the balls.
-std::vector<Solid> makeHipArms(const Leg& leg) {
+std::vector<Solid> makeHipArms(const ComposedLeg& leg) {
   std::vector<Solid> arms;
   for (int i = 1; i <= 3 && leg.hip == HipPart::ThreeRrs; ++i)
     arms.push_back(makeRod(kOrigin, makeHipLimb(leg, i).ball, 0.009, calcLimbDensity(leg), colors::kFrame));
   return arms;
 }
 
-void closeParallelHip(const Leg& leg, ModelBuilder& builder) {
+void closeParallelHip(const ComposedLeg& leg, ModelBuilder& builder) {
   for (int i = 1; i <= 3; ++i) {
     const HipLimb limb = makeHipLimb(leg, i);
     builder.addFrame("thigh_end_" + limb.name, "thigh" + leg.name, {Matrix3d::Identity(), limb.ball});
@@ -88,11 +86,11 @@ void closeParallelHip(const Leg& leg, ModelBuilder& builder) {
 }
 
 // Motors of the hips on the trunk.
-std::vector<Solid> makeHipMotors(const std::vector<Leg>& legs) {
+std::vector<Solid> makeHipMotors(const std::vector<ComposedLeg>& legs) {
   const LegBipedParameters& p = legs.front().p;
   if (legs.front().hip == HipPart::Serial) return makeHipYawMotors(p);
   std::vector<Solid> motors;
-  for (const Leg& leg : legs)
+  for (const ComposedLeg& leg : legs)
     for (int i = 1; i <= 3; ++i) {
       const Vector3d place = makeHipLimb(leg, i).motor;
       motors.push_back(makeMotor(getHip(leg, p) + place, place, p.motor_mass));
@@ -101,33 +99,33 @@ std::vector<Solid> makeHipMotors(const std::vector<Leg>& legs) {
 }
 
 // A pulley about y, turned by its motor.
-void addPulley(const Leg& leg, const std::string& name, const std::string& base, const Vector3d& place,
+void addPulley(const ComposedLeg& leg, const std::string& name, const std::string& base, const Vector3d& place,
                ModelBuilder& builder) {
   constexpr double kRadius = 0.02, kWidth = 0.012;  // m
   addSolidLink("pulley_" + name + leg.name, base + leg.name, makeRevolute("motor_" + name + leg.name, place, kY),
                {makeCylinder(kOrigin, kY, kRadius, kWidth, leg.p.pulley_mass, colors::kSteel)}, builder);
 }
 
-Vector3d getKneeArm(const Leg& leg) { return leg.p.knee_arm * Leg::arm(-leg.p.knee_middle); }
+Vector3d getKneeArm(const ComposedLeg& leg) { return leg.p.knee_arm * ComposedLeg::arm(-leg.p.knee_middle); }
 
 // Crank on the thigh, and rod.
-void addKneeChain(const Leg& leg, ModelBuilder& builder) {
+void addKneeChain(const ComposedLeg& leg, ModelBuilder& builder) {
   const LegBipedParameters& p = leg.p;
   CrankChain chain;
   chain.name = "knee" + leg.name;
   chain.motor = leg.inner();
-  chain.elbow = chain.motor + p.knee_crank * Leg::arm(-p.knee_middle);
+  chain.elbow = chain.motor + p.knee_crank * ComposedLeg::arm(-p.knee_middle);
   chain.end = chain.elbow + Vector3d(p.knee_crank - p.knee_arm, 0, -p.thigh_length);
   chain.axis2 = kX;
   addCrankChain(chain, "thigh" + leg.name, p.rod_density, p.armature, builder);
 }
 
-void closeFourBar(const Leg& leg, ModelBuilder& builder) {
+void closeFourBar(const ComposedLeg& leg, ModelBuilder& builder) {
   builder.addFrame("knee_arm" + leg.name, "shank" + leg.name, {Matrix3d::Identity(), leg.inner() + getKneeArm(leg)});
   builder.addClosure("knee_rod" + leg.name, ClosureKind::Ball3D, "knee_arm" + leg.name, "rod_end_knee" + leg.name);
 }
 
-std::vector<Solid> makeShank(const Leg& leg) {
+std::vector<Solid> makeShank(const ComposedLeg& leg) {
   const LegBipedParameters& p = leg.p;
   std::vector<Solid> solids = {makeRod(kOrigin, leg.ankle_place(), 0.018, p.link_density, colors::kOutput)};
   if (leg.knee == KneePart::FourBar)
@@ -144,7 +142,7 @@ std::vector<Solid> makeShank(const Leg& leg) {
 }
 
 // Thigh, shank and what moves the knee.
-void addKnee(const Leg& leg, ModelBuilder& builder) {
+void addKnee(const ComposedLeg& leg, ModelBuilder& builder) {
   const LegBipedParameters& p = leg.p;
   const Vector3d knee = -p.thigh_length * kZ;
   const bool at_knee = leg.knee == KneePart::Serial && leg.motors_on_joints;
@@ -165,7 +163,7 @@ void addKnee(const Leg& leg, ModelBuilder& builder) {
     builder.addCoupler("knee_belt" + leg.name, {{"motor_knee" + leg.name, 1}, {"knee" + leg.name, -p.knee_ratio}});
 }
 
-void addDifferential(const Leg& leg, ModelBuilder& builder) {
+void addDifferential(const ComposedLeg& leg, ModelBuilder& builder) {
   const LegBipedParameters& p = leg.p;
   const std::string motors[] = {"motor_ankle1" + leg.name, "motor_ankle2" + leg.name};
   for (int i : {1, 2})
@@ -177,16 +175,16 @@ void addDifferential(const Leg& leg, ModelBuilder& builder) {
   for (const std::string& motor : motors) builder.addMotor(motor, p.armature);
 }
 
-Vector3d getHeel(const Leg& leg, int index) {
-  return leg.p.ankle_arm * Leg::arm(leg.p.arm_angle) + leg.beside(index, leg.p.ankle_half_width);
+Vector3d getHeel(const ComposedLeg& leg, int index) {
+  return leg.p.ankle_arm * ComposedLeg::arm(leg.p.arm_angle) + leg.beside(index, leg.p.ankle_half_width);
 }
 
-void addAnkleChain(const Leg& leg, int index, ModelBuilder& builder) {
+void addAnkleChain(const ComposedLeg& leg, int index, ModelBuilder& builder) {
   const LegBipedParameters& p = leg.p;
   CrankChain chain;
   chain.name = "ankle" + std::to_string(index) + leg.name;
   chain.motor = leg.ankle_place() + p.motor_height * kZ + leg.beside(index, p.ankle_half_width);
-  chain.elbow = chain.motor + p.ankle_crank * Leg::arm(p.arm_angle);
+  chain.elbow = chain.motor + p.ankle_crank * ComposedLeg::arm(p.arm_angle);
   chain.end = leg.ankle_place() + getHeel(leg, index);
   chain.axis2 = kX;
   addCrankChain(chain, "shank" + leg.name, p.rod_density, p.armature, builder);
@@ -195,7 +193,7 @@ void addAnkleChain(const Leg& leg, int index, ModelBuilder& builder) {
 }
 
 // Ankle, foot and what moves them.
-void addAnkle(const Leg& leg, ModelBuilder& builder) {
+void addAnkle(const ComposedLeg& leg, ModelBuilder& builder) {
   const LegBipedParameters& p = leg.p;
   std::vector<Solid> cross = {makeCylinder(kOrigin, kY, 0.008, 0.05, 0.08, colors::kSteel)};
   if (leg.ankle == AnklePart::Serial && leg.motors_on_joints)
@@ -220,7 +218,7 @@ void addAnkle(const Leg& leg, ModelBuilder& builder) {
     if (leg.ankle == AnklePart::Serial) builder.addMotor(joint + leg.name, p.armature);
 }
 
-void addLeg(const Leg& leg, ModelBuilder& builder) {
+void addLeg(const ComposedLeg& leg, ModelBuilder& builder) {
   const LegBipedParameters& p = leg.p;
   if (leg.hip == HipPart::Serial)
     addHip(leg, p, builder);
@@ -237,13 +235,13 @@ void addBiped(const LegBipedParameters& p, bool motors_on_joints, ModelBuilder& 
   const auto hip = static_cast<HipPart>(p.hip);
   const auto knee = static_cast<KneePart>(p.knee);
   const auto ankle = static_cast<AnklePart>(p.ankle);
-  std::vector<Leg> legs;
+  std::vector<ComposedLeg> legs;
   for (const BipedSide& side : {BipedSide{1, "_left"}, BipedSide{-1, "_right"}})
     legs.push_back({side, p, hip, knee, ankle, motors_on_joints});
   std::vector<Solid> trunk = makeSerialTrunk(p);
   for (const Solid& motor : makeHipMotors(legs)) trunk.push_back(motor);
   addTrunk(trunk, builder);
-  for (const Leg& leg : legs) addLeg(leg, builder);
+  for (const ComposedLeg& leg : legs) addLeg(leg, builder);
 }
 
 Model makeBiped(const std::string& robot, const LegBipedParameters& p, bool motors_on_joints = true) {

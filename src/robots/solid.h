@@ -21,6 +21,9 @@ struct Solid {
   Eigen::Vector4d rgba = {0.7, 0.7, 0.7, 1};
 };
 
+inline const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ(),
+                      kOrigin = Vector3d::Zero();
+
 /// Colours by the function of a part.
 namespace colors {
 inline const Eigen::Vector4d kShell(0.92, 0.92, 0.90, 1), kFrame(0.62, 0.81, 0.93, 1), kOutput(0.23, 0.38, 0.71, 1),

@@ -8,8 +8,6 @@
 namespace bielle {
 namespace {
 
-const Vector3d kX = Vector3d::UnitX(), kY = Vector3d::UnitY(), kZ = Vector3d::UnitZ(), kOrigin = Vector3d::Zero();
-
 // d(a) of Eq. (1).
 Vector3d makeDirection(double angle) { return {std::sin(angle), 0, -std::cos(angle)}; }
 
@@ -59,7 +57,7 @@ Outline makeShape(const std::string& robot, const SpringLegParameters& p, double
 }
 
 // A leg being built.
-struct Leg {
+struct SpringLeg {
   const SpringLegParameters& p;
   const SpringLegMount& mount;
   Outline shape;
@@ -83,7 +81,7 @@ Joint makeRodJoint(const std::string& name, const Vector3d& place, const Vector3
 }
 
 // Roll and yaw over the pitch axis, with the motors of what follows, and the thigh.
-void addHip(const Leg& leg) {
+void addHip(const SpringLeg& leg) {
   const SpringLegParameters& p = leg.p;
   const Vector3d yaw(-p.yaw_offset, 0, -p.yaw_drop), pitch = -p.pitch_drop * kZ;
   addSolidLink(leg.name("hip_roll_link"), leg.mount.base, makeRevolute(leg.name("hip_roll"), leg.mount.hip, kX),
@@ -106,7 +104,7 @@ void addLeaf(const std::string& joint, double stiffness, ModelBuilder& builder) 
   builder.addJointForce(joint, force);
 }
 
-void addShin(const Leg& leg) {
+void addShin(const SpringLeg& leg) {
   const SpringLegParameters& p = leg.p;
   const std::string shin = leg.name("shin"), thigh = leg.name("thigh"), spring = leg.name("shin_spring");
   const Joint knee = makeRevolute(leg.name("knee"), leg.shape.knee, kY);
@@ -117,7 +115,7 @@ void addShin(const Leg& leg) {
   addLeaf(spring, p.shin_stiffness, leg.builder);
 }
 
-void addTarsus(const Leg& leg) {
+void addTarsus(const SpringLeg& leg) {
   const SpringLegParameters& p = leg.p;
   const Outline& shape = leg.shape;
   const std::string link = leg.name("tarsus_link"), leaf = leg.name("heel_leaf"), spring = leg.name("heel_spring");
@@ -134,7 +132,7 @@ void addTarsus(const Leg& leg) {
 }
 
 // Sole and levers; a foot that rolls does so in a cross at the toe's pivot.
-void addFoot(const Leg& leg, const std::vector<Vector3d>& levers) {
+void addFoot(const SpringLeg& leg, const std::vector<Vector3d>& levers) {
   const SpringLegParameters& p = leg.p;
   const Vector3d sole(p.sole_offset, 0, -p.ankle_height);
   std::vector<Solid> foot = {
@@ -155,7 +153,7 @@ void addFoot(const Leg& leg, const std::vector<Vector3d>& levers) {
 
 // A crank about y that pulls the toe by a plantar rod, in the plane at `beside` the leg's own.
 // \param number  follows the names   \param share  of the masses of cranks and of rods
-void addCrank(const Leg& leg, const std::string& number, const Vector3d& beside, double share) {
+void addCrank(const SpringLeg& leg, const std::string& number, const Vector3d& beside, double share) {
   const SpringLegParameters& p = leg.p;
   const Outline& shape = leg.shape;
   const bool rolls = leg.mount.toe == SpringLegToe::PitchRoll;
@@ -174,7 +172,7 @@ void addCrank(const Leg& leg, const std::string& number, const Vector3d& beside,
                          name("plantar_end"), rolls ? kZ : kY);
 }
 
-void addToe(const Leg& leg) {
+void addToe(const SpringLeg& leg) {
   if (leg.mount.toe == SpringLegToe::Pitch) {
     addFoot(leg, {leg.shape.lever});
     return addCrank(leg, "", kOrigin, 1);
@@ -229,7 +227,7 @@ void addSpringLeg(const std::string& robot, const SpringLegParameters& p, const 
   if (!(p.crank_place < p.tarsus_length))
     throw ModelError(robot, "parameter 'crank_place'", "the crank would sit beyond the toe",
                      "give less than tarsus_length");
-  const Leg leg{p, mount, makeShape(robot, p, mount.side), builder};
+  const SpringLeg leg{p, mount, makeShape(robot, p, mount.side), builder};
   addHip(leg);
   addShin(leg);
   addTarsus(leg);

@@ -1,7 +1,8 @@
 #include "solve/box_qp.h"
 
-#include <Eigen/Cholesky>
 #include <limits>
+
+#include "math/decompositions.h"
 
 namespace bielle {
 

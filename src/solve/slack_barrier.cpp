@@ -9,8 +9,8 @@ namespace bielle {
 
 namespace {
 
-// A step may use up kBoundary of a multiplier, and of a slack as well, unless this is then below mu / (kFall y); always half of it.
-constexpr double kBoundary = 0.995, kFall = 2, kHalf = 0.5;
+// A step may use up kBoundary of a multiplier, and of a slack as well, unless this is then below mu / (kBarrierFall y); always half of it.
+constexpr double kBoundary = 0.995, kBarrierFall = 2, kBarrierHalf = 0.5;
 constexpr double kFirstSlack = 1;  // least, in the units of c, in which a violation of 1 is a large one
 constexpr double kCentrality = 2;  // largest ratio of y s and mu, and its inverse
 
@@ -34,7 +34,7 @@ void SlackBarrier::setBounds(int node, const VectorXd& lower, const VectorXd& up
 
 // Eq. (15)
 double SlackBarrier::Side::calcSlack(double excess, double alpha, double mu) const {
-  const double least = std::max((1 - kBoundary) * s, std::min(kHalf * s, mu / (kFall * y)));
+  const double least = std::max((1 - kBoundary) * s, std::min(kBarrierHalf * s, mu / (kBarrierFall * y)));
   return std::max((1 - alpha) * gap - excess, least);
 }
 

@@ -13,9 +13,10 @@
 namespace bielle::study {
 namespace {
 
-const char* const kColors[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#e377c2", "#17becf"};
+const char* const kContenderColors[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd",
+                                        "#ff7f0e", "#8c564b", "#e377c2", "#17becf"};
 
-const char* getColor(size_t robot) { return kColors[robot % std::size(kColors)]; }
+const char* getColor(size_t robot) { return kContenderColors[robot % std::size(kContenderColors)]; }
 
 struct Row {
   std::string name, key;  // for the page; for the columns of the table

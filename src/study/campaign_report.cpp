@@ -18,10 +18,11 @@ namespace {
 constexpr const char *kImpulse = "push impulse", *kDirection = "push direction";
 constexpr size_t kLeastDirections = 3;  // of a map
 constexpr int kMapSize = 620;
-const char* const kColors[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#e377c2", "#17becf"};
+const char* const kOutcomeColors[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd",
+                                      "#ff7f0e", "#8c564b", "#e377c2", "#17becf"};
 
 // Values of a column in the order of the runs.
-std::vector<std::string> listValues(const CampaignResults& results, size_t column) {
+std::vector<std::string> listAxisValues(const CampaignResults& results, size_t column) {
   std::vector<std::string> values;
   for (const CampaignRun& run : results.runs)
     if (std::find(values.begin(), values.end(), run.values[column]) == values.end())
@@ -29,7 +30,7 @@ std::vector<std::string> listValues(const CampaignResults& results, size_t colum
   return values;
 }
 
-std::optional<size_t> findColumn(const CampaignResults& results, const char* name) {
+std::optional<size_t> findAxis(const CampaignResults& results, const char* name) {
   const auto found = std::find(results.columns.begin(), results.columns.end(), name);
   if (found == results.columns.end()) return std::nullopt;
   return static_cast<size_t>(found - results.columns.begin());
@@ -39,7 +40,7 @@ std::optional<size_t> findColumn(const CampaignResults& results, const char* nam
 std::vector<size_t> listVaried(const CampaignResults& results) {
   std::vector<size_t> varied;
   for (size_t i = 0; i < results.columns.size(); ++i)
-    if (results.columns[i] != kImpulse && results.columns[i] != kDirection && listValues(results, i).size() > 1)
+    if (results.columns[i] != kImpulse && results.columns[i] != kDirection && listAxisValues(results, i).size() > 1)
       varied.push_back(i);
   return varied;
 }
@@ -120,7 +121,7 @@ void printHead(std::ostream& page, const std::vector<std::string>& cells) {
 
 void printShares(std::ostream& page, const CampaignResults& results) {
   for (size_t i = 0; i < results.columns.size(); ++i) {
-    const std::vector<std::string> values = listValues(results, i);
+    const std::vector<std::string> values = listAxisValues(results, i);
     // Of a search, which tries many impulses that are too large on purpose, shares would mean nothing.
     if (values.size() < 2 || results.searched) continue;
     const std::map<std::string, Share> shares = countByValue(results, i);
@@ -134,9 +135,9 @@ void printShares(std::ostream& page, const CampaignResults& results) {
 void printImpulses(std::ostream& page, const CampaignResults& results) {
   const Groups groups = groupImpulses(results);
   if (groups.empty()) return;
-  const std::optional<size_t> direction = findColumn(results, kDirection);
+  const std::optional<size_t> direction = findAxis(results, kDirection);
   const std::vector<std::string> directions =
-      direction ? listValues(results, *direction) : std::vector<std::string>{"0"};
+      direction ? listAxisValues(results, *direction) : std::vector<std::string>{"0"};
   std::vector<std::string> head;
   for (const size_t column : listVaried(results)) head.push_back(results.columns[column]);
   for (const std::string& value : directions) head.push_back(value + "°");
@@ -179,7 +180,7 @@ Json makeSummary(const CampaignResults& results) {
   Json axes = Json::object(), impulses = Json::array();
   for (size_t i = 0; i < results.columns.size(); ++i) {
     const std::map<std::string, Share> shares = countByValue(results, i);
-    for (const std::string& value : listValues(results, i))
+    for (const std::string& value : listAxisValues(results, i))
       axes[results.columns[i]][value] = {{"runs", shares.at(value).runs}, {"stood", shares.at(value).stood}};
   }
   for (const SurvivedImpulse& found : findSurvivedImpulses(results)) {
@@ -218,7 +219,7 @@ std::string makeMapScript(const Groups& groups, size_t direction) {
     std::string title;
     for (const std::string& value : groups[i].first) title += (title.empty() ? "" : ", ") + value;
     script << (i ? ", " : "plot ") << "$g" << i << " with linespoints pt 7 ps 0.6 lw 2 lc rgb '"
-           << kColors[i % std::size(kColors)] << "'"
+           << kOutcomeColors[i % std::size(kOutcomeColors)] << "'"
            << (title.empty() ? " notitle" : " title " + quoteGnuplot(title) + " noenhanced");
   }
   return script.str();
@@ -227,7 +228,7 @@ std::string makeMapScript(const Groups& groups, size_t direction) {
 }  // namespace
 
 std::vector<SurvivedImpulse> findSurvivedImpulses(const CampaignResults& results) {
-  const std::optional<size_t> column = findColumn(results, kImpulse);
+  const std::optional<size_t> column = findAxis(results, kImpulse);
   if (!column) return {};
   // The column of the impulse is the last, so that runs of one condition follow one another.
   std::vector<SurvivedImpulse> all;
@@ -256,9 +257,9 @@ std::vector<std::string> writeCampaign(const std::string& directory, const Campa
                                        std::vector<std::string>& notes) {
   const auto locate = [&directory](const char* name) { return (fs::path(directory) / name).string(); };
   std::vector<std::string> paths;
-  const std::optional<size_t> direction = findColumn(results, kDirection);
+  const std::optional<size_t> direction = findAxis(results, kDirection);
   const Groups groups = groupImpulses(results);
-  bool has_map = direction && !groups.empty() && listValues(results, *direction).size() >= kLeastDirections;
+  bool has_map = direction && !groups.empty() && listAxisValues(results, *direction).size() >= kLeastDirections;
   if (has_map && !drawSvg(locate("map.svg"), makeMapScript(groups, *direction), kMapSize + 160, kMapSize)) {
     notes.push_back("map.svg was not drawn: gnuplot is not installed");
     has_map = false;

@@ -9,7 +9,7 @@
 namespace bielle::study {
 namespace {
 
-constexpr std::size_t kMostBytes = 4'000'000;
+constexpr std::size_t kLongestSummary = 4'000'000;
 // Times of the processor, which differ from run to run, are not among them.
 constexpr const char *kTexts[] = {"outcome", "outcome_message"},
                      *kNumbers[] = {"duration",     "distance",    "mean_speed",     "largest_deviation",
@@ -21,7 +21,7 @@ bool isNumber(const Json& value, bool broke_off) {
   return value.is_number() ? std::isfinite(value.get<double>()) : value.is_null() && broke_off;
 }
 
-Json readSummary(const std::string& text, int status) {
+Json readRunSummary(const std::string& text, int status) {
   const Json summary = parseJson(text);
   Json result = Json::object();
   for (const char* field : kTexts) {
@@ -50,7 +50,7 @@ Json readCampaignResult(const tasks::Task& task, int status) {
   if (status >= 128) throw std::runtime_error("ended by signal " + std::to_string(status - 128) + describeLog(log));
   if (status >= 2 || status < 0) throw std::runtime_error("exit status " + std::to_string(status) + describeLog(log));
   try {
-    return readSummary(tasks::readOutput(tasks::getOutput(task, "out/summary.json"), kMostBytes), status);
+    return readRunSummary(tasks::readOutput(tasks::getOutput(task, "out/summary.json"), kLongestSummary), status);
   } catch (const std::exception& problem) {
     throw std::runtime_error(std::string("what it returned is no result: ") + problem.what());
   }

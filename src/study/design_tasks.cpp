@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 namespace bielle::study {
 namespace {
 
-constexpr std::size_t kMostBytes = 64'000'000;
+constexpr std::size_t kLongestAnswer = 64'000'000;
 constexpr const char *kRequest = "request.json", *kResult = "evaluation.json";
 
 // What a worker returned, for this request. \throws std::exception saying what is wrong
@@ -23,7 +23,7 @@ LoggedEvaluation readResult(const tasks::Task& task, const DesignRequest& reques
                             int status) {
   const std::string log = tasks::getOutput(task, task.log);
   if (status != 0) throw std::runtime_error("it ended with status " + std::to_string(status) + describeLog(log));
-  const LoggedEvaluation e = readEvaluation(tasks::readOutput(tasks::getOutput(task, kResult), kMostBytes));
+  const LoggedEvaluation e = readEvaluation(tasks::readOutput(tasks::getOutput(task, kResult), kLongestAnswer));
   const auto demand = [](bool holds, const char* what) {
     if (!holds) throw std::runtime_error(std::string("what it returned is no result: ") + what);
   };

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 namespace bielle::study {
 namespace {
 
-constexpr const char* kRemedy = "remove its directory, so that the case is done anew";
+constexpr const char* kCaseRemedy = "remove its directory, so that the case is done anew";
 
 // Nodes of the window.
 std::pair<int, int> findWindow(Window window, const MotionSummary& summary, int nodes) {
@@ -30,11 +30,11 @@ std::pair<int, int> findWindow(Window window, const MotionSummary& summary, int 
   if (steps.size() < 5) return {0, nodes - 1};
   const std::pair<int, int> found(steps[2].first, steps[steps.size() - 3].second);
   if (found.first > found.second || found.second >= nodes)
-    throw ModelError(summary.file, "phases", "they are not as long as the trajectory", kRemedy);
+    throw ModelError(summary.file, "phases", "they are not as long as the trajectory", kCaseRemedy);
   return found;
 }
 
-Load calcLoad(const MotionRecord& record, const std::vector<std::string>& motors, int first, int last) {
+Load calcPhaseLoad(const MotionRecord& record, const std::vector<std::string>& motors, int first, int last) {
   Load load;
   double sum = 0;
   int count = 0;
@@ -54,7 +54,7 @@ Load calcLoad(const MotionRecord& record, const std::vector<std::string>& motors
 
 // Numbers of summary.json that readSummary omits.
 void readSolver(const std::string& file, Performance& out) {
-  readJsonFile(file, kRemedy, [&out](const Json& json) {
+  readJsonFile(file, kCaseRemedy, [&out](const Json& json) {
     out.iterations = json.value("iterations", 0);
     out.seconds = json.value("seconds", kMissing);
   });
@@ -68,8 +68,8 @@ void measure(const Study& study, const std::string& directory, const std::vector
   const MotionRecord& record = *out.record;
   std::tie(out.first_node, out.last_node) =
       findWindow(study.window, *out.summary, static_cast<int>(record.time.size()));
-  out.knee = calcLoad(record, knee_motors, out.first_node, out.last_node);
-  out.ankle = calcLoad(record, ankle_motors, out.first_node, out.last_node);
+  out.knee = calcPhaseLoad(record, knee_motors, out.first_node, out.last_node);
+  out.ankle = calcPhaseLoad(record, ankle_motors, out.first_node, out.last_node);
   const auto height = record.com.col(2);
   out.com_mean = height.segment(out.first_node, out.last_node - out.first_node + 1).mean();
   const double duration = record.time[out.last_node] - record.time[out.first_node];
@@ -85,7 +85,7 @@ LiftFacts readLift(const std::string& directory, const Performance& lifted) {
   LiftFacts facts;
   const std::string file = directory + "/lift.json";
   if (!fs::exists(file)) return facts;
-  readJsonFile(file, kRemedy, [&](const Json& json) {
+  readJsonFile(file, kCaseRemedy, [&](const Json& json) {
     if (!lifted.success) {
       facts.message = json.at("message");
       facts.joint = json.at("joint");

@@ -1,6 +1,5 @@
 #include "bielle/transmission/lift.h"
 
-#include <Eigen/SVD>
 #include <cmath>
 #include <memory>
 #include <sstream>
@@ -8,6 +7,7 @@
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/error.h"
+#include "math/decompositions.h"
 #include "transmission/posture_lift.h"
 #include "transmission/slsqp.h"
 

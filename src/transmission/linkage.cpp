@@ -1,23 +1,18 @@
 #include "transmission/linkage.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
 
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
 #include "bielle/model/error.h"
+#include "math/decompositions.h"
+#include "model/listing.h"
 
 namespace bielle {
 namespace {
 
 constexpr double kSingular = 1e-12;  // singular values of N_J, whose rows are at most of unit length
-
-std::string join(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
-}
 
 int findScalarJoint(const Model& model, const std::string& name) {
   const std::string element = "joint '" + name + "'";
@@ -28,7 +23,7 @@ int findScalarJoint(const Model& model, const std::string& name) {
         "`bielle info` lists the joints; the serial ones are: " + [&model] {
           std::vector<std::string> serial;
           for (int i : model.serialJoints()) serial.push_back(model.joints()[i].name);
-          return join(serial);
+          return listItems(serial);
         }());
   const Joint& joint = model.joints()[index];
   if (joint.nv != 1)
@@ -37,10 +32,6 @@ int findScalarJoint(const Model& model, const std::string& name) {
         "it is a " + std::string(getName(joint.kind)) + " joint of " + std::to_string(joint.nv) + " coordinates",
         "a ratio needs joints of one coordinate");
   return index;
-}
-
-bool contains(const std::vector<int>& list, int value) {
-  return std::find(list.begin(), list.end(), value) != list.end();
 }
 
 // Position within the cluster of the joint with index i in the whole model.
@@ -84,12 +75,13 @@ Linkage makeLoopLinkage(const Model& model, const ReducedCluster& cluster, std::
     }
   const std::string mobility = "its linkage has mobility " + std::to_string(cluster.size);
   if (static_cast<int>(linkage.motors.size()) != cluster.size)
-    throw ModelError(model.name(), element,
-                     mobility + " and " + std::to_string(linkage.motors.size()) + " motors (" + join(motor_names) + ")",
-                     "a ratio needs as many motors as mobility");
+    throw ModelError(
+        model.name(), element,
+        mobility + " and " + std::to_string(linkage.motors.size()) + " motors (" + listItems(motor_names) + ")",
+        "a ratio needs as many motors as mobility");
   if (static_cast<int>(joints.size()) != cluster.size)
     throw ModelError(model.name(), element,
-                     mobility + ", driven by " + join(motor_names) + "; " + std::to_string(joints.size()) +
+                     mobility + ", driven by " + listItems(motor_names) + "; " + std::to_string(joints.size()) +
                          " joint(s) of it are named or listed as serial joints",
                      "name " + std::to_string(cluster.size) + " joints of this linkage");
   linkage.joints = std::move(joints);

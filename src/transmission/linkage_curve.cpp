@@ -1,10 +1,9 @@
 #include "transmission/linkage_curve.h"
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <cmath>
 
 #include "bielle/dynamics/kinematics.h"
+#include "math/decompositions.h"
 
 namespace bielle {
 namespace {

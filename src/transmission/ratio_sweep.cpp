@@ -3,12 +3,12 @@
 
 #include "bielle/model/error.h"
 #include "bielle/transmission/ratio.h"
+#include "math/constants.h"
 #include "transmission/linkage_curve.h"
 
 namespace bielle {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kSmallestStep = 1e-7;    // of the default step
 constexpr double kBeforeRankLoss = 0.99;  // of the step that leads to it
 

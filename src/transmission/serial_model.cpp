@@ -1,6 +1,5 @@
 #include "bielle/transmission/serial_model.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -8,7 +7,9 @@
 #include <set>
 
 #include "bielle/model/builder.h"
+#include "math/decompositions.h"
 #include "model/joint.h"
+#include "model/listing.h"
 #include "transmission/linkage.h"
 
 namespace bielle {
@@ -16,16 +17,6 @@ namespace {
 
 constexpr double kSmallestMargin = 1e-6;  // of a linkage that its joints determine
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-std::string join(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
-}
-
-bool contains(const std::vector<int>& list, int value) {
-  return std::find(list.begin(), list.end(), value) != list.end();
-}
 
 // The linkages of the robot with their serial joints; each must be determined by them.
 std::vector<Linkage> listLinkages(const Model& closed, const Reduction& reduction) {
@@ -40,13 +31,14 @@ std::vector<Linkage> listLinkages(const Model& closed, const Reduction& reductio
         coordinates += closed.joints()[i].nv;
       }
     if (joints.empty() || coordinates != cluster.size)
-      throw ModelError(
-          closed.name(), "closures " + join(closures),
-          "there is no equivalent serial chain: their linkage has mobility " + std::to_string(cluster.size) +
-              ", the serial joints in it (" + join(joints) + ") have " + std::to_string(coordinates) + " coordinates",
-          joints.empty() ? "use the closed model; if one-axis joints of the linkage do determine it, as a knee or "
-                           "an ankle would, list them as serial_joints"
-                         : "list serial joints that determine the linkage, or use the closed model");
+      throw ModelError(closed.name(), "closures " + listItems(closures),
+                       "there is no equivalent serial chain: their linkage has mobility " +
+                           std::to_string(cluster.size) + ", the serial joints in it (" + listItems(joints) +
+                           ") have " + std::to_string(coordinates) + " coordinates",
+                       joints.empty()
+                           ? "use the closed model; if one-axis joints of the linkage do determine it, as a knee or "
+                             "an ankle would, list them as serial_joints"
+                           : "list serial joints that determine the linkage, or use the closed model");
     linkages.push_back(makeLinkage(closed, reduction, joints));
   }
   return linkages;
@@ -211,7 +203,7 @@ SerialModel makeSerialModel(const Model& closed, ConstVectorRef q, const SerialM
     double margin = 0;
     if (!point.update(*linkage.cluster, q_cluster) || !calcLinkageTangent(linkage, point, T, &margin) ||
         margin < kSmallestMargin || !calcLinkageRatio(linkage, point, ratio))
-      throw ModelError(closed.name(), "joints " + join(linkage.joint_names),
+      throw ModelError(closed.name(), "joints " + listItems(linkage.joint_names),
                        "their linkage is at a dead point at the reference, they do not determine it",
                        "freeze it at another configuration");
     out.replacements.push_back({linkage.motor_names, linkage.joint_names, ratio.R});

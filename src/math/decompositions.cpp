@@ -1,0 +1,7 @@
+#include "math/decompositions.h"
+
+namespace Eigen {
+
+BIELLE_DENSE()
+
+}  // namespace Eigen
