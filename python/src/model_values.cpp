@@ -52,14 +52,13 @@ void bindTree(py::module_& module) {
       .field("name", &Frame::name, "unique among links and frames")
       .field("body", &Frame::body, "index")
       .field("X_BF", &Frame::X_BF, "placement in the body");
-  Value<bielle::Shape>(module, "Shape",
-                       "The room that a body takes up: all points within a radius of a box fixed in it.")
+  Value<bielle::Shape>(module, "Shape", "A shape of a body: all points within a radius of a box fixed in it.")
       .field("body", &bielle::Shape::body, "index; filled by the builder")
       .field("X_BS", &bielle::Shape::X_BS, "placement in the body (for the builder: in the link)")
       .field("half", &bielle::Shape::half,
              "half of the edges of the box (3,), m: zero of a sphere, (0, 0, l) of a capsule")
       .field("radius", &bielle::Shape::radius, "m; zero of a box")
-      .field("fitted", &bielle::Shape::fitted, "to a visual, because the files of the robot give its body no shape");
+      .field("fitted", &bielle::Shape::fitted, "fitted to a visual, because the robot's files give its body no shape");
   Value<Visual>(module, "Visual", "A shape drawn for a body.")
       .field("shape", &Visual::shape, "VisualShape")
       .field("body", &Visual::body, "index; filled by the builder")
@@ -130,7 +129,8 @@ void bindConstraints(py::module_& module) {
       .field("resistance", &MotorDrive::resistance, "between two terminals, ohm")
       .field("voltage", &MotorDrive::voltage, "of the supply, V")
       .field("current", &MotorDrive::current, "most, A")
-      .field("continuous_current", &MotorDrive::continuous_current, "that the winding bears for ever, A")
+      .field("continuous_current", &MotorDrive::continuous_current,
+             "current that the winding can sustain indefinitely, A")
       .field("efficiency", &MotorDrive::efficiency, "of the gear while the motor drives")
       .field("back_efficiency", &MotorDrive::back_efficiency, "of the gear while the joint drives the motor")
       .field("mass", &MotorDrive::mass, "kg; 0: not known");
@@ -142,7 +142,8 @@ void bindConstraints(py::module_& module) {
       .field("effort_limit", &Motor::effort_limit, "N m or N")
       .field("velocity_limit", &Motor::velocity_limit, "rad/s or m/s")
       .field("torque_loss", &Motor::torque_loss, "heat per torque squared, W/(N m)^2 or W/N^2; None: not known")
-      .field("continuous_effort", &Motor::continuous_effort, "root mean square that it bears for ever, N m or N")
+      .field("continuous_effort", &Motor::continuous_effort,
+             "root mean square that it can sustain indefinitely, N m or N")
       .field("drive", &Motor::drive, "winding and gear");
   Value<ContactFrame>(module, "ContactFrame",
                       "A frame of a body that may touch the ground, z along its outward normal.")

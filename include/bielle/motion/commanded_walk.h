@@ -74,7 +74,7 @@ class CommandedWalk {
   std::array<bool, 2> standing_feet_{};
   int made_ = 0, phase_ = 0;
   bool bounded_ = false;
-  std::deque<Stage> stages_;  // made, but not asked for yet
+  std::deque<Stage> stages_;  // made, but not requested yet
 };
 
 }  // namespace bielle

@@ -52,8 +52,8 @@ struct MotionPlan {
   ShootingTrajectory guess;       ///< quasi-static
   VectorXd q_start, q_end;        ///< standing postures, nq
   bool limited = true;            ///< whether limits of the robot apply: not in the paper's problems
-  std::vector<std::pair<std::string, double>> requested;  ///< every option by name
-  std::vector<Goal> goals;                                ///< what is to come out, to be measured on the trajectory
+  std::vector<std::pair<std::string, double>> options;  ///< every option by name
+  std::vector<Goal> goals;                              ///< what is to come out, to be measured on the trajectory
 };
 
 /// A problem ready to be solved, with the data that reports need.
@@ -62,9 +62,9 @@ struct Motion {
   ContactSchedule schedule;
   Ground ground;
   std::unique_ptr<RobotProblem> problem;
-  ShootingTrajectory guess;                               ///< quasi-static
-  std::vector<std::pair<std::string, double>> requested;  ///< every option by name
-  std::vector<Goal> goals;                                ///< what is to come out, to be measured on the trajectory
+  ShootingTrajectory guess;                             ///< quasi-static
+  std::vector<std::pair<std::string, double>> options;  ///< every option by name
+  std::vector<Goal> goals;                              ///< what is to come out, to be measured on the trajectory
   bool bounded = false;  ///< a torque or a duration is limited: to be solved with ControlBounds::Enforce
   ObjectiveOptions objective{};
   VectorXd peak_limits{};      ///< of the peak torque, nu (getPeakLimits); empty for other objectives

@@ -1,5 +1,5 @@
 #pragma once
-/// \file Derivatives of an optimal motion, of its cost and of itself, with respect to the robot and to what is asked for.
+/// \file Derivatives of an optimal motion, of its cost and of itself, with respect to the robot and to the request.
 #include "bielle/motion/motion.h"
 #include "bielle/ocp/envelope.h"
 #include "bielle/ocp/followed_optimum.h"

@@ -10,7 +10,7 @@
 /// last but one are half as long as the others. The first single support pushes off, the last one, before a step
 /// without flight, catches the body. The speed is a goal of runs of eight or more steps; shorter ones do not reach it.
 ///
-/// In a hop the robot lifts one foot, takes off from the other one and lands on it again, as often as asked; then the
+/// In a hop the robot lifts one foot, takes off from the other one and lands on it again, as often as requested; then the
 /// foot in the air lands beside it.
 #include "bielle/motion/locomotion.h"
 
