@@ -99,14 +99,14 @@ MotionRecord readCsv(const std::string& path) {
   MotionRecord record;
   const std::vector<std::string> header = readLine(text, at, kMostColumns);
   for (const std::string& column : header) addName(column, record);
-  if (makeHeader(record) != header) fail(path, "header", "its columns are not those of a trajectory");
+  if (makeHeader(record) != header) fail(path, "header", "it does not have the columns of a trajectory");
   // Counted before memory is allocated for them.
   const size_t first_row = at;
   int nodes = 0;
   for (; at < text.size(); ++nodes)
     if (readLine(text, at, header.size()).size() != header.size())
-      fail(path, nameLine(nodes), "it has not the " + std::to_string(header.size()) + " cells of the header");
-  if (nodes == 0) fail(path, "file", "it has no node");
+      fail(path, nameLine(nodes), "expected " + std::to_string(header.size()) + " cells as in the header");
+  if (nodes == 0) fail(path, "file", "it has no nodes");
 
   resizeRecord(nodes - 1, record);
   const std::vector<RecordTable> tables = listTables(record);
