@@ -364,8 +364,8 @@ TEST_CASE("design: what is wrong is told with its place and remedy") {
     CHECK_THAT(result.err, Contains(problem));
     CHECK_FALSE(fs::exists(directory.path() + "/out"));
   };
-  check("[0.03, 0.08]", "[0.08, 0.03]", "crossed");
-  check("[0.03, 0.08]", "[0.06, 0.08]", "outside of its bounds");
+  check("[0.03, 0.08]", "[0.08, 0.03]", "wrong order");
+  check("[0.03, 0.08]", "[0.06, 0.08]", "outside its bounds");
   check("[0.03, 0.08]", "[0.03]", "give 2");
   check("to: transmission_knee_right", "to: transmission", "there is no such joint or frame");
   check("from: motor_knee_right", "from: knee_left", "not to 'knee_crank_right'");
