@@ -188,7 +188,7 @@ class Joint:
         ...
     @property
     def velocity_importance(self) -> float:
-        """likewise"""
+        """likewise for its velocity"""
         ...
 
 class Body:
@@ -485,11 +485,11 @@ class Closure:
         ...
     @property
     def terms(self) -> Tuple[CouplerTerm, ...]:
-        """of a coupler"""
+        """terms of a coupler"""
         ...
     @property
     def offset(self) -> float:
-        """of a coupler"""
+        """offset of a coupler"""
         ...
     @property
     def dofs(self) -> Tuple[int, ...]:
@@ -551,7 +551,7 @@ class MotorDrive:
         ...
     @property
     def voltage(self) -> float:
-        """of the supply, V"""
+        """voltage of the supply, V"""
         ...
     @property
     def current(self) -> float:
@@ -563,11 +563,11 @@ class MotorDrive:
         ...
     @property
     def efficiency(self) -> float:
-        """of the gear while the motor drives"""
+        """efficiency of the gear while the motor drives"""
         ...
     @property
     def back_efficiency(self) -> float:
-        """of the gear while the joint drives the motor"""
+        """efficiency of the gear while the joint drives the motor"""
         ...
     @property
     def mass(self) -> float:
@@ -645,11 +645,11 @@ class ContactFrame:
         ...
     @property
     def half_length(self) -> float:
-        """of the sole, along x, m"""
+        """half the length of the sole, along x, m"""
         ...
     @property
     def half_width(self) -> float:
-        """of the sole, along y, m"""
+        """half the width of the sole, along y, m"""
         ...
 
 class Reference:
@@ -670,7 +670,7 @@ class Reference:
         ...
     @property
     def height_frame(self) -> str:
-        """whose height is given; empty: joints alone"""
+        """frame whose height is given; empty: only joints are given"""
         ...
     @property
     def height(self) -> float:
@@ -716,7 +716,7 @@ class ConstraintSet:
     def __eq__(self, other: object) -> bool: ...
     @property
     def closures(self) -> Tuple[Closure, ...]:
-        """of the model, then contacts as closures to the world"""
+        """closures of the model, then contacts as closures to the world"""
         ...
     @property
     def contacts(self) -> Tuple[int, ...]:
@@ -745,7 +745,7 @@ class ModelParts:
     def __eq__(self, other: object) -> bool: ...
     @property
     def name(self) -> str:
-        """of the robot"""
+        """name of the robot"""
         ...
     @property
     def gravity(self) -> Array:
@@ -765,7 +765,7 @@ class ModelParts:
         ...
     @property
     def closures(self) -> Tuple[Closure, ...]:
-        """of the loops"""
+        """closures of the loops"""
         ...
     @property
     def motors(self) -> Tuple[Motor, ...]:
@@ -823,7 +823,7 @@ class Model:
     """
     @property
     def name(self) -> str:
-        """of the robot"""
+        """name of the robot"""
         ...
     @property
     def nq(self) -> int:
@@ -867,7 +867,7 @@ class Model:
         ...
     @property
     def closures(self) -> Tuple[Closure, ...]:
-        """of the loops"""
+        """closures of the loops"""
         ...
     @property
     def clusters(self) -> Tuple[LoopCluster, ...]:
@@ -986,10 +986,10 @@ class Model:
         """Momentum about the centre of mass in world axes (6,), kg m/s and kg m^2/s."""
         ...
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> Array:
-        """Of bodies and rotors, J."""
+        """Kinetic energy of bodies and rotors, J."""
         ...
     def potential_energy(self, q: ArrayLike) -> Array:
-        """Of gravity, zero for a centre of mass at the origin, J."""
+        """Potential energy of gravity, zero for a centre of mass at the origin, J."""
         ...
     def closure_residual(self, q: ArrayLike) -> Array:
         """Closing errors of all closures (num_closure_rows,), m and rad; zero if and only if closed."""
@@ -1229,7 +1229,7 @@ class RatioSample:
         ...
     @property
     def motors(self) -> Array:
-        """of its motors (m,)"""
+        """angles of its motors (m,), rad or m"""
         ...
     @property
     def ratio(self) -> LinkageRatio:
@@ -1331,7 +1331,7 @@ class Ground:
     def __eq__(self, other: object) -> bool: ...
     @property
     def height(self) -> float:
-        """of the plane, m"""
+        """height of the plane, m"""
         ...
     @property
     def friction(self) -> float:
@@ -1462,11 +1462,11 @@ class Cost:
         ...
     @property
     def residual(self) -> Union[LibraryResidual, Residual]:
-        """of the library (bielle.residuals), or a Residual written in Python"""
+        """residual of the library (bielle.residuals), or a Residual written in Python"""
         ...
     @property
     def defines(self) -> bool:
-        """it says what the motion is, and keeps its weight for every objective"""
+        """it defines the motion, and keeps its weight for every objective"""
         ...
 
 class PathConstraint:
@@ -1483,7 +1483,7 @@ class PathConstraint:
         ...
     @property
     def residual(self) -> Union[LibraryResidual, Residual]:
-        """of the library (bielle.residuals), or written in Python"""
+        """residual of the library (bielle.residuals), or written in Python"""
         ...
     @property
     def lower(self) -> Array:
@@ -1785,11 +1785,11 @@ class ConstraintOptions:
         ...
     @property
     def initial_barrier(self) -> float:
-        """of an interior point, in the unit of the cost"""
+        """initial barrier of the interior point method, in the unit of the cost"""
         ...
     @property
     def final_barrier(self) -> float:
-        """that of a converged solve"""
+        """barrier of a converged solve"""
         ...
 
 class SolverOptions:
@@ -1810,7 +1810,7 @@ class SolverOptions:
         ...
     @property
     def gap_tolerance(self) -> float:
-        """of every entry of the gaps"""
+        """largest entry of the gaps"""
         ...
     @property
     def cost_tolerance(self) -> float:
@@ -1822,7 +1822,7 @@ class SolverOptions:
         ...
     @property
     def initial_regularization(self) -> float:
-        """of the first sweep"""
+        """regularization of the first sweep"""
         ...
     @property
     def min_regularization(self) -> float:
@@ -1842,7 +1842,7 @@ class SolverOptions:
         ...
     @property
     def state_regularization_ratio(self) -> float:
-        """of states over controls"""
+        """ratio of the regularization of states to that of controls"""
         ...
     @property
     def long_step(self) -> float:
@@ -1858,7 +1858,7 @@ class SolverOptions:
         ...
     @property
     def acceptance(self) -> float:
-        """share of the foreseen decrease, in (0, 1)"""
+        """share of the predicted decrease, in (0, 1)"""
         ...
     @property
     def bounds(self) -> ControlBounds:
@@ -1926,11 +1926,11 @@ class Iteration:
         ...
     @property
     def step(self) -> float:
-        """length, 0: none was taken"""
+        """step length; 0: no step was taken"""
         ...
     @property
     def regularization(self) -> float:
-        """of the sweep"""
+        """regularization of the sweep"""
         ...
     @property
     def seconds(self) -> float:
@@ -1938,7 +1938,7 @@ class Iteration:
         ...
 
 class Summary:
-    """How a solve went.
+    """The outcome of a solve.
 
     Immutable; `replace` makes a changed copy.
     """
@@ -1959,7 +1959,7 @@ class Summary:
         ...
     @property
     def cost(self) -> float:
-        """of the returned trajectory"""
+        """cost of the returned trajectory"""
         ...
     @property
     def gap(self) -> float:
@@ -1983,7 +1983,7 @@ class Summary:
         ...
     @property
     def penalty(self) -> float:
-        """of violated constraints; 0: there are none"""
+        """penalty of violated constraints; 0: there are none"""
         ...
     @property
     def multiplier_updates(self) -> int:
@@ -2015,7 +2015,7 @@ class Summary:
         ...
 
 class Multipliers:
-    """Of the constraints, node by node.
+    """Multipliers of the constraints, node by node.
 
     Immutable; `replace` makes a changed copy.
     """
@@ -2028,7 +2028,7 @@ class Multipliers:
         ...
     @property
     def penalty(self) -> float:
-        """of violated constraints"""
+        """penalty of violated constraints"""
         ...
 
 class Objective:
@@ -2483,15 +2483,15 @@ class Record:
     def __eq__(self, other: object) -> bool: ...
     @property
     def q_names(self) -> Tuple[str, ...]:
-        """of the columns of q"""
+        """names of the columns of q"""
         ...
     @property
     def v_names(self) -> Tuple[str, ...]:
-        """of the columns of v and a"""
+        """names of the columns of v and a"""
         ...
     @property
     def u_names(self) -> Tuple[str, ...]:
-        """of the motors"""
+        """names of the motors"""
         ...
     @property
     def closure_names(self) -> Tuple[str, ...]:
@@ -2555,7 +2555,7 @@ class Record:
         ...
     @property
     def multipliers(self) -> Multipliers:
-        """of the constraints, for warm starts; penalty 0 if not known"""
+        """multipliers of the constraints, for warm starts; penalty 0 if not known"""
         ...
 
 def read_record(path: str) -> Record:
@@ -2625,7 +2625,7 @@ class RunInfo:
         ...
     @property
     def serial_armature(self) -> str:
-        """of the serial model"""
+        """armature of the serial model"""
         ...
 
 class Result:
@@ -2900,7 +2900,7 @@ class LiftNode:
         ...
     @property
     def acceleration_error(self) -> float:
-        """of the closed dynamics, rad/s^2 or m/s^2"""
+        """error of the closed dynamics, rad/s^2 or m/s^2"""
         ...
     @property
     def margin(self) -> float:
@@ -3097,7 +3097,7 @@ class SearchResult:
         ...
     @property
     def value(self) -> float:
-        """of the objective"""
+        """value of the objective"""
         ...
     @property
     def evaluations(self) -> int:

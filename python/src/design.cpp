@@ -172,7 +172,7 @@ void bindSearch(py::module_& module) {
       .field("tolerance", &SearchStage::tolerance, "tolerance of the steps, relative to the width of the bounds");
   Value<SearchResult>(module, "SearchResult", "The best point of a search.")
       .field("x", &SearchResult::x, "(n,)")
-      .field("value", &SearchResult::value, "of the objective")
+      .field("value", &SearchResult::value, "value of the objective")
       .field("evaluations", &SearchResult::evaluations, "number");
   module.def("minimize", &minimize, py::arg("objective"), py::arg("start"), py::arg("lower"), py::arg("upper"),
              py::arg("stages"), py::arg("seed") = 1,

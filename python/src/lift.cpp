@@ -75,7 +75,7 @@ void bindSerial(py::module_& module) {
 
 void bindOutcome(py::module_& module) {
   py::enum_<LiftMethod>(module, "LiftMethod")
-      .value("NEWTON", LiftMethod::Newton, "each node by itself, torques from inverse dynamics")
+      .value("NEWTON", LiftMethod::Newton, "each node separately, torques from inverse dynamics")
       .value("NLOPT", LiftMethod::Nlopt, "one step of the closed dynamics after the other, torques by SLSQP");
   py::enum_<LiftStatus>(module, "LiftStatus")
       .value("LIFTED", LiftStatus::Lifted)
@@ -95,7 +95,7 @@ void bindOutcome(py::module_& module) {
       .field("joint", &LiftNode::joint, "at which the lift ended, or empty")
       .field("position_error", &LiftNode::position_error, "rad or m")
       .field("velocity_error", &LiftNode::velocity_error, "rad/s or m/s")
-      .field("acceleration_error", &LiftNode::acceleration_error, "of the closed dynamics, rad/s^2 or m/s^2")
+      .field("acceleration_error", &LiftNode::acceleration_error, "error of the closed dynamics, rad/s^2 or m/s^2")
       .field("margin", &LiftNode::margin, "smallest over the linkages; 0: dead point")
       .field("evaluations", &LiftNode::evaluations, "by NLopt");
   Value<Lift>(module, "Lift", "A serial motion lifted to the closed robot.")

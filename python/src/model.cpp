@@ -71,12 +71,12 @@ namespace {
 
 void bindParts(py::module_& module) {
   Value<ModelParts>(module, "ModelParts", "The parts of a model.")
-      .field("name", &ModelParts::name, "of the robot")
+      .field("name", &ModelParts::name, "name of the robot")
       .field("gravity", &ModelParts::gravity, "(3,), m/s^2")
       .field("bodies", &ModelParts::bodies, "the world first")
       .field("joints", &ModelParts::joints, "a placeholder for the world first")
       .field("frames", &ModelParts::frames, "links among them")
-      .field("closures", &ModelParts::closures, "of the loops")
+      .field("closures", &ModelParts::closures, "closures of the loops")
       .field("motors", &ModelParts::motors, "in the order of u")
       .field("joint_forces", &ModelParts::joint_forces, "springs, dampers and friction")
       .field("point_springs", &ModelParts::point_springs, "springs and dampers between points")
@@ -99,7 +99,7 @@ void addAttribute(ModelType& type, const char* name, Result (Model::*get)() cons
 }
 
 void addAttributes(ModelType& type) {
-  addAttribute(type, "name", &Model::name, "of the robot");
+  addAttribute(type, "name", &Model::name, "name of the robot");
   addAttribute(type, "nq", &Model::nq, "size of a configuration q");
   addAttribute(type, "nv", &Model::nv, "size of a velocity v, and of tangent vectors");
   addAttribute(type, "nu", &Model::nu, "number of motors");
@@ -110,7 +110,7 @@ void addAttributes(ModelType& type) {
   addAttribute(type, "bodies", &Model::bodies, "the world first");
   addAttribute(type, "joints", &Model::joints, "a placeholder for the world first");
   addAttribute(type, "frames", &Model::frames, "links among them");
-  addAttribute(type, "closures", &Model::closures, "of the loops");
+  addAttribute(type, "closures", &Model::closures, "closures of the loops");
   addAttribute(type, "clusters", &Model::clusters, "closures that share dofs");
   addAttribute(type, "motors", &Model::motors, "in the order of u");
   addAttribute(type, "joint_forces", &Model::jointForces, "springs, dampers and friction on joints");

@@ -13,9 +13,9 @@ namespace {
 void bindRecord(py::module_& module) {
   Value<MotionRecord>(module, "Record",
                       "A motion as numbers: one row per node, or per stage, from its node to the next.")
-      .field("q_names", &MotionRecord::q_names, "of the columns of q")
-      .field("v_names", &MotionRecord::v_names, "of the columns of v and a")
-      .field("u_names", &MotionRecord::u_names, "of the motors")
+      .field("q_names", &MotionRecord::q_names, "names of the columns of q")
+      .field("v_names", &MotionRecord::v_names, "names of the columns of v and a")
+      .field("u_names", &MotionRecord::u_names, "names of the motors")
       .field("closure_names", &MotionRecord::closure_names, "in their order")
       .field("contact_names", &MotionRecord::contact_names, "in their order")
       .field("time", &MotionRecord::time, "(N + 1,), s")
@@ -32,7 +32,8 @@ void bindRecord(py::module_& module) {
       .field("gap", &MotionRecord::gap, "(N + 1, 2), largest closing error, m and rad")
       .field("footholds", &MotionRecord::footholds,
              "(N + 1, 8 per contact), predicted: when, s; where, m, and quaternion x y z w; (0, 0) if not known")
-      .field("multipliers", &MotionRecord::multipliers, "of the constraints, for warm starts; penalty 0 if not known");
+      .field("multipliers", &MotionRecord::multipliers,
+             "multipliers of the constraints, for warm starts; penalty 0 if not known");
   module.def("read_record", &readRecord, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
              "Reads trajectory.csv or trajectory.npz.");
   module.def("read_result_record", &readResultRecord, py::arg("directory"), py::call_guard<py::gil_scoped_release>(),
@@ -57,7 +58,7 @@ void bindResult(py::module_& module) {
       .field("robot_file", &RunInfo::robot_file, "its .urdf, absolute")
       .field("command", &RunInfo::command, "the command line, or empty")
       .field("model", &RunInfo::model, "\"closed\" or \"serial\"")
-      .field("serial_armature", &RunInfo::serial_armature, "of the serial model");
+      .field("serial_armature", &RunInfo::serial_armature, "armature of the serial model");
   Value<MotionResult>(module, "Result", "A solved motion.")
       .field("run", &MotionResult::run, "RunInfo")
       .field("motion", &MotionResult::motion, "name")

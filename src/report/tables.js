@@ -89,7 +89,7 @@ function fillSummary(parent, runs) {
     ['world', run => run.summary.world],
     ['control', run => run.summary.control],
     ['ground', run => run.summary.terrain],
-    ['trunk off its plan', run => units(run.summary.largest_deviation, 'm at most')],
+    ['trunk deviation', run => units(run.summary.largest_deviation, 'm at most')],
     ['energy balance', run => units(dig(run.summary, 'books', 'imbalance_J'), 'J')],
     ['minimized', solved(run => dig(run.summary, 'objective', 'kind'))],
     ['cost', solved(run => run.summary.cost)],
