@@ -42,7 +42,7 @@ void printInfo(const Json& robot) {
                {"name", "body1", "body2", "stiffness", "rest", "preload", "damping"});
   printSection(robot, "contacts", "contacts (length and width in m)", {"name", "kind", "body", "sole"});
   const Json& shapes = robot["shapes"];
-  const std::string title = "smallest distances between shapes (m), " + shapes["given"].dump() + " from the files, " +
+  const std::string title = "least distances between shapes (m), " + shapes["given"].dump() + " from the files, " +
                             shapes["fitted"].dump() + " fitted to visuals";
   printSection(robot, "distances", title.c_str(), {"between", "distance", "body1", "body2", "posture"});
   printSection(robot, "references", "references", {"name", "closed", "message"});
