@@ -55,7 +55,8 @@ TEST_CASE("solve prints requested and achieved values; a goal that is missed is 
   const CommandResult met = run(makeShortSquat(directory.str(), {"--quiet"}));
   INFO(met.out << met.err);
   CHECK(met.status == 0);
-  CHECK_THAT(met.out, Catch::Contains("depth  requested 0.95, achieved 0.9") && !Catch::Contains("missed"));
+  CHECK_THAT(met.out, Catch::Contains("  depth  ") && Catch::Contains("  requested 0.95, achieved 0.9") &&
+                          !Catch::Contains("missed"));
   CHECK_THAT(met.err, !Catch::Contains("warning"));
   CHECK(directory.readSummary()["goals"][0]["met"] == true);
   const CommandResult missed = run(makeShortSquat(directory.str(), {"--quiet", "--set", "com_weight=1"}));

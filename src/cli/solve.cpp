@@ -90,20 +90,19 @@ void printResult(const Model& model, const MotionResult& result, const std::vect
   std::cout << "\n" << result.motion << " of " << result.run.robot << ": " << getName(solver.termination);
   if (!solver.message.empty()) std::cout << " (" << solver.message << ")";
   std::cout << "\n";
-  std::vector<Row> goals;
-  for (const GoalOutcome& outcome : result.goals) goals.push_back({outcome.goal.name, formatOutcome(outcome)});
-  printTable(std::cout, goals);
-  printTable(std::cout,
-             std::vector<Row>{{"cost", formatNumber(solver.cost, "%.6f")},
-                              {"iterations", std::to_string(solver.iterations)},
-                              {"time", formatNumber(solver.seconds, "%.2f") + " s"},
-                              {"centre of mass", formatNumber(result.com_start, "%.4f") + " m high, lowest at " +
-                                                     formatNumber(result.com_lowest, "%.4f") + " m"},
-                              {"constraints", formatConstraints(solver)},
-                              {"closure gap", pair(result.gap_position, result.gap_angle)},
-                              {"contact slip", pair(result.slip_position, result.slip_angle)},
-                              {makeTorqueLabel(model), torques},
-                              {"electrical energy", formatEnergy(result.energy)}});
+  std::vector<Row> rows;
+  for (const GoalOutcome& outcome : result.goals) rows.push_back({outcome.goal.name, formatOutcome(outcome)});
+  rows.insert(rows.end(), {{"cost", formatNumber(solver.cost, "%.6f")},
+                           {"iterations", std::to_string(solver.iterations)},
+                           {"time", formatNumber(solver.seconds, "%.2f") + " s"},
+                           {"centre of mass", formatNumber(result.com_start, "%.4f") + " m high, lowest at " +
+                                                  formatNumber(result.com_lowest, "%.4f") + " m"},
+                           {"constraints", formatConstraints(solver)},
+                           {"closure gap", pair(result.gap_position, result.gap_angle)},
+                           {"contact slip", pair(result.slip_position, result.slip_angle)},
+                           {makeTorqueLabel(model), torques},
+                           {"electrical energy", formatEnergy(result.energy)}});
+  printTable(std::cout, rows);
   printTimings(result.timings);
   for (const std::string& path : paths) std::cout << "  " << path << "\n";
 }
