@@ -163,7 +163,7 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
                   "  solves              %d, %d failed; median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n"
                   "                      %d stages began without a new policy%s\n",
                   c.solves, c.failed, 1e3 * c.calcQuantile(0.5), 1e3 * c.calcQuantile(0.99), 1e3 * c.calcQuantile(1),
-                  c.missed, arguments.execution.real_time ? "" : " (in real time)");
+                  c.missed, arguments.execution.real_time ? "" : " (if run in real time)");
     std::cout << text;
   }
   if (arguments.sensors != "real") return;

@@ -120,7 +120,7 @@ TEST_CASE("compare: same mass, same motion, numbers of the cases, and only what 
   CHECK(readFile(out + "/compare.md") == page);
 }
 
-TEST_CASE("compare: what is wrong is told with its place and remedy") {
+TEST_CASE("compare: errors are reported with their places and remedies") {
   const RobotDirectory directory;
   const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
     const std::string spec = directory.write("spec.yaml", replaceOnce(kSpec, from, to));

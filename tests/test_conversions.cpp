@@ -229,7 +229,7 @@ std::string makeSwing(const std::string& in_body, const std::string& in_root = "
 
 }  // namespace
 
-TEST_CASE("what the reader of MJCF leaves out is told with its line, and what it cannot leave out is refused") {
+TEST_CASE("what the reader of MJCF leaves out is reported with its line, and what it cannot leave out is refused") {
   const RobotDirectory directory;
   const auto load = [&](const std::string& text) { return loadRobot(directory.write("swing.xml", text)); };
   const LoadedRobot plain = load(makeSwing(""));

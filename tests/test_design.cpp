@@ -354,7 +354,7 @@ TEST_CASE("design: a search that is killed goes on and ends the same way") {
   CHECK_THAT(other.err, Contains("the log is of another design problem"));
 }
 
-TEST_CASE("design: what is wrong is told with its place and remedy") {
+TEST_CASE("design: errors are reported with their places and remedies") {
   const RobotDirectory directory;
   const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
     const std::string spec = directory.write("spec.yaml", replaceOnce(makeSpec(), from, to));

@@ -210,7 +210,7 @@ TEST_CASE("goals: a sequence has those of its motions, at their nodes") {
   }
 }
 
-TEST_CASE("goals: trajectories that miss are told so") {
+TEST_CASE("goals: trajectories that miss are reported") {
   Motion walk = makeWalk(getBipetto());
   const FddpSummary summary = Fddp().solve(*walk.problem, walk.guess);
   const auto measure = [&](const ShootingTrajectory& trajectory) {

@@ -502,7 +502,7 @@ TEST_CASE("a file with the key model completes a robot that is elsewhere") {
   CHECK_THROWS_WITH(loadRobot("both"), Contains("there is a URDF beside this file"));
 }
 
-TEST_CASE("robots are found by name, directory and file, and a robot that is nowhere is told where it was sought") {
+TEST_CASE("robots are found by name, directory and file; the error for an unknown one lists the places searched") {
   const RobotDirectory first, second;
   second.write("toy/toy.urdf", kToyUrdf);
   second.write("toy/toy.yaml", kToyYaml);

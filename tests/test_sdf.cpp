@@ -89,7 +89,7 @@ double calcSdfError(const Model& model, ConstVectorRef q_ref, const std::string&
 
 }  // namespace
 
-TEST_CASE("SDF: bodies, joints and loops stand where they are, and what is lost is told") {
+TEST_CASE("SDF: bodies, joints and loops stand where they are, and what is lost is reported") {
   for (const char* name :
        {"bipetto", "cleobot", "delta", "fivebar", "rsu_biped", "belt_biped", "spring_leg", "spring_biped"}) {
     CAPTURE(name);

@@ -115,7 +115,7 @@ TEST_CASE("serial model: the closed one with its linkages locked") {
   }
 }
 
-TEST_CASE("serial model: what was changed is told, motors keep their places") {
+TEST_CASE("serial model: what was changed is reported, motors keep their places") {
   const Bipetto robot;
   std::vector<std::string> motors;
   for (const Motor& motor : robot.serial.model.motors()) {

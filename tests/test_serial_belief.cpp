@@ -112,7 +112,7 @@ TEST_CASE("serial belief: the plan is one of the closed robot") {
   }
 }
 
-TEST_CASE("serial belief: where linkages cannot follow is told") {
+TEST_CASE("serial belief: places where linkages cannot follow are reported") {
   const Trial trial(0);
   const Policy plan = makeBend(trial.serial, trial.q_s, 3);
   const SerialReference reference = makeReference(trial.robot.model, trial.serial, plan, Belief::Serial);
