@@ -86,7 +86,8 @@ int main(int argc, char** argv) {
   const double worst = printFootholds(motion, trajectory);
   const int steps = static_cast<int>(options.steps);
   if (steps >= 5)  // the first two and the last two are not steady
-    std::printf("\n%.4f m/s asked, %.4f m/s walked\n", options.speed, calcSpeed(motion, result.record, 1, steps - 3));
+    std::printf("\n%.4f m/s requested, %.4f m/s walked\n", options.speed,
+                calcSpeed(motion, result.record, 1, steps - 3));
   std::printf("%s after %d iterations and %.2f s, feet within %.2f mm of their footholds, slip %.2f mm\n",
               getName(summary.termination), summary.iterations, summary.seconds, 1e3 * worst,
               1e3 * result.slip_position);

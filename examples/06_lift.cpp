@@ -62,7 +62,7 @@ bool planAndLift(const Model& closed, const SerialModel& serial, double depth) {
   for (const LiftNode& node : lifted.nodes) acceleration = std::max(acceleration, node.acceleration_error);
   for (const VectorXd& x : lifted.trajectory.xs)
     speed = std::max(speed, std::abs(x[closed.nq() + closed.motors()[closed.findMotor("motor_knee_right")].dof]));
-  std::printf("  lifted: right knee motor up to %.2f N m and %.2f rad/s; the serial knee was asked for %.2f N m\n",
+  std::printf("  lifted: right knee motor up to %.2f N m and %.2f rad/s; the serial knee required %.2f N m\n",
               findPeak(result, "motor_knee_right"), speed,
               record.u.col(serial.model.findMotor("knee_right")).cwiseAbs().maxCoeff());
   bool ok = check("serial accelerations in the closed dynamics [rad/s^2]", acceleration, 1e-5);

@@ -82,7 +82,7 @@ Motion makeSway(const Model& model, const SwayOptions& o) {
   plan.guess.xs.assign(nodes + 1, x0);
   plan.guess.us.assign(nodes, calcStaticTorques(model, makeConstraintSet(model, feet), q0).u);
   plan.q_start = plan.q_end = q0;
-  plan.requested = {{"amplitude", o.amplitude}, {"period", o.period}};
+  plan.options = {{"amplitude", o.amplitude}, {"period", o.period}};
   return makeMotion(model, std::move(plan), {});
 }
 

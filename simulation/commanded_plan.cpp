@@ -46,7 +46,7 @@ void foresee(CommandedWalk walk, double duration, Plan& plan) {
 std::unique_ptr<Plan> makeCommandedPlan(const PlanRequest& request, const std::string& file,
                                         const PredictiveOptions& predictive) {
   if (request.motion != "walk")
-    throw ModelError(file, "motion '" + request.motion + "'", "it takes no commands", "give 'walk'");
+    throw ModelError(file, "motion '" + request.motion + "'", "it does not follow commands", "give 'walk'");
   auto plan = std::make_unique<Plan>();
   plan->commands = readCommands(file);
   plan->robot = loadRobot(request.robot);
@@ -63,7 +63,7 @@ std::unique_ptr<Plan> makeCommandedPlan(const PlanRequest& request, const std::s
   summary.model = "closed";
   summary.formulation = Formulation::Reduced;
   summary.step = StepRule::Midpoint;
-  summary.requested = listValues(listOptions(options));
+  summary.options = listValues(listOptions(options));
   const CommandSource source = [commands = plan->commands](double time) { return findCommand(commands, time); };
   const CommandedWalk walk(model, options, {}, source, makeStandingPosture(model));
   foresee(walk, request.duration > 0 ? request.duration : plan->commands.back().time, *plan);

@@ -159,7 +159,7 @@ const char* getName(Outcome outcome) {
     case Outcome::Fell:
       return "fell";
     case Outcome::BrokeOff:
-      return "broke off";
+      return "failed";
     case Outcome::Stopped:
       return "was stopped";
   }

@@ -45,7 +45,7 @@ class FallDetector {
   const Policy& plan_;
   const FallCriterion criterion_;
   const Terrain ground_, planned_ground_;
-  std::optional<PassiveJoints> linkages_;  // only where they are asked for
+  std::optional<PassiveJoints> linkages_;  // only where requested
   VectorXd q_, v_;                         // as planned
   VectorXd q_back_, motors_;               // turned back; of the motors
   double deviation_ = 0, joint_deviation_ = 0;

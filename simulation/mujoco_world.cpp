@@ -145,7 +145,8 @@ bool MujocoWorld::step() {
     message_ = std::string("MuJoCo: ") + error.what();
   }
   const auto warned = [this](int warning) { return data_->warning[warning].number > 0; };
-  if (warned(mjWARN_CONTACTFULL) || warned(mjWARN_CNSTRFULL)) message_ = "MuJoCo's memory does not hold all contacts";
+  if (warned(mjWARN_CONTACTFULL) || warned(mjWARN_CNSTRFULL))
+    message_ = "MuJoCo's memory is too small for all contacts";
   if (warned(mjWARN_BADQPOS) || warned(mjWARN_BADQVEL) || warned(mjWARN_BADQACC))
     message_ = "MuJoCo's accelerations are no longer finite";
   if (warned(mjWARN_BADCTRL)) message_ = "the torques are not finite";

@@ -21,13 +21,13 @@ constexpr int kMaxIterations = 200;  // more than a motion takes from its own so
 LimitOptions readLimits(const MotionSummary& summary) {
   LimitOptions limits;
   const auto read = [&summary](const std::string& prefix, std::map<std::string, double>& to) {
-    for (const auto& [name, value] : summary.requested)
+    for (const auto& [name, value] : summary.options)
       if (name.rfind(prefix, 0) == 0) to[name.substr(prefix.size())] = value;
   };
   read(kEffortLimit, limits.efforts);
   read(kVelocityLimit, limits.velocities);
   read(kPowerLimit, limits.powers);
-  for (const auto& [name, value] : summary.requested)
+  for (const auto& [name, value] : summary.options)
     if (name == kDeadPointMargin) limits.dead_point_margin = value;
   return limits;
 }
@@ -63,7 +63,7 @@ int solveForGains(const std::string& source, Fddp& solver, Motion& motion) {
   const FddpSummary solved = solver.solve(*motion.problem, motion.guess);
   if (solved.termination != FddpTermination::Converged)
     throw ModelError(source, "motion '" + motion.name + "'",
-                     std::string("solved for its gains it is ") + getName(solved.termination),
+                     std::string("the solve for its gains ended as: ") + getName(solved.termination),
                      "give a motion that converges, or --control open");
   // The sweep is about the trajectory unless the last iteration still took a step.
   if (!solved.log.empty() && solved.log.back().step > 0) solver.solve(*motion.problem, motion.guess);
@@ -72,10 +72,10 @@ int solveForGains(const std::string& source, Fddp& solver, Motion& motion) {
 
 void checkControl(const MotionSummary& summary, PlanControl control) {
   if (summary.objective.objective == Objective::PeakTorque)
-    throw ModelError(summary.file, "objective 'peak-torque'", "the gains of its solver let no torque exceed the peak",
+    throw ModelError(summary.file, "objective 'peak-torque'", "its gains never let a torque exceed the peak",
                      "give --control open, or solve the motion for another objective");
   if (control == PlanControl::Predictive && summary.formulation != Formulation::Reduced)
-    throw ModelError(summary.file, "formulation 'full'", "predictive control needs states that are closed",
+    throw ModelError(summary.file, "formulation 'full'", "predictive control needs states with closed loops",
                      "solve the motion without --formulation full, or give --control gains");
 }
 
@@ -194,7 +194,7 @@ std::unique_ptr<Plan> makePlan(const PlanRequest& request, PlanControl control, 
   setModel(request.belief, summary);
   summary.formulation = Formulation::Reduced;
   summary.step = StepRule::Midpoint;
-  summary.requested = listValues(motion.options);
+  summary.options = listValues(motion.options);
   makeBelief(request.belief, *plan);
   finishPlan(motion, "", control, predictive, *plan);
   finishBelief(*plan);

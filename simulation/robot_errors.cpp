@@ -67,7 +67,8 @@ Model rebuild(const Model& model, const std::vector<Inertia>& inertias, const st
 
 Model makeMachine(const Model& model, const RobotErrors& errors) {
   if (!(errors.mass >= 0 && errors.mass < 1))
-    throw ModelError(model.name(), "masses", "an error of " + std::to_string(errors.mass) + " leaves none",
+    throw ModelError(model.name(), "masses",
+                     "an error of " + std::to_string(errors.mass) + " can make them zero or negative",
                      "give 0 to less than 1");
   std::mt19937 generator(errors.seed);
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -88,13 +89,12 @@ VectorXd assembleMachine(const Model& model, const Model& machine, ConstVectorRe
   const AssemblyResult closed = closeConfiguration(machine, q);
   if (closed.status != AssemblyStatus::Closed)
     throw ModelError(machine.name(), closed.worst, "its loop cannot be closed: " + closed.message,
-                     "allow smaller errors; loops with redundant rows allow none");
+                     "allow smaller errors; loops with redundant rows allow no errors");
   PassiveJoints joints(machine, closed.q);
   VectorXd motors(machine.nu()), out = q;
   for (int m = 0; m < machine.nu(); ++m) motors[m] = q[machine.joints()[machine.motors()[m].joint].idx_q];
   if (joints.update(motors, out) != ClosingStatus::Closed)
-    throw ModelError(machine.name(), "closures", "they do not close at the positions of the motors",
-                     "allow smaller errors");
+    throw ModelError(machine.name(), "closures", "they cannot close at the motors' positions", "allow smaller errors");
   if (machine.hasFreeFlyer() && !machine.contacts().empty())
     out[2] += calcLeastHeight(model, q) - calcLeastHeight(machine, out);
   return out;

@@ -33,7 +33,7 @@ Push parsePush(const std::string& text) {
   if (!(push.duration > 0 && push.time >= 0 &&
         std::isfinite(push.duration + push.time + push.impulse + push.direction)))
     throw ModelError("", "--push '" + text + "'",
-                     "its duration is not positive, its time negative, or a number not finite",
+                     "the duration is not positive, the time is negative, or a number is not finite",
                      std::string("e.g. --push ") + kExample);
   return push;
 }
@@ -70,20 +70,17 @@ void parseOptions(SimulateArguments& arguments) {
   for (const std::string& push : arguments.pushes) arguments.execution.pushes.push_back(parsePush(push));
   if (!arguments.commands.empty()) {
     if (arguments.robot.empty() || arguments.control != "mpc")
-      throw ModelError("", "--command",
-                       "commands are followed by predictive control of a walk that is not solved before",
+      throw ModelError("", "--command", "only predictive control can follow commands, with a walk that it plans itself",
                        "give the motion walk, --robot and --control mpc");
-    if (arguments.speed) throw ModelError("", "--speed", "the commands have the speed", "leave it out");
+    if (arguments.speed) throw ModelError("", "--speed", "the commands already set the speed", "leave it out");
     if (!arguments.model.empty() && arguments.model != "closed")
-      throw ModelError("", "--model " + arguments.model, "walks by command are those of the closed model",
-                       "leave it out");
+      throw ModelError("", "--model " + arguments.model, "commanded walks need the closed model", "leave it out");
     readCommands(arguments.commands);
   }
   if (arguments.execution.real_time && arguments.live)
-    throw ModelError("", "--live", "writing files would hold the world up, which is to keep to the clock",
-                     "leave out --real-time");
+    throw ModelError("", "--live", "writing files would delay the world in real time", "leave out --real-time");
   if (arguments.execution.real_time && arguments.control != "mpc")
-    throw ModelError("", "--real-time", "only predictive control solves anything on the way", "give --control mpc");
+    throw ModelError("", "--real-time", "only predictive control solves while the motion runs", "give --control mpc");
   arguments.predictive.own_thread = arguments.execution.real_time;
   if (arguments.jitter > arguments.delay)
     throw ModelError("", "--jitter", "it is longer than the delay", "give at most --delay");
@@ -95,127 +92,114 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
   const auto positive = CLI::PositiveNumber;
   app.add_option(
          "DIR", a.directory,
-         "result of `bielle solve`: a motion of the closed robot; with --robot the name of a motion, which is solved "
-         "first")
+         "result of `bielle solve` for the closed robot; with --robot the name of a motion, which is solved first")
       ->required();
-  app.add_option("--robot", a.robot, "name or directory of the robot that is to make the motion of this name");
-  app.add_option("--speed", a.speed, "of that motion [m/s]");
-  app.add_option(
-      "--command", a.commands,
-      "FILE: YAML, a velocity over time that a walk follows with --control mpc; its steps are made on the way. "
-      "Entries such as {time: 4, forward: 0.3, sideways: 0, turning: 0.4} [s, m/s, m/s to the left, rad/s to the "
-      "left], each until the next one");
+  app.add_option("--robot", a.robot, "name or directory of the robot for which the motion is solved");
+  app.add_option("--speed", a.speed, "speed of the motion that is solved first [m/s]");
+  app.add_option("--command", a.commands,
+                 "YAML file with velocity commands for a walk with --control mpc, which plans its steps as it goes. "
+                 "Entries: {time: 4, forward: 0.3, sideways: 0, turning: 0.4} [s, m/s, m/s to the left, rad/s to the "
+                 "left], each valid until the next");
   app.add_option("--set", a.settings,
-                 "name=value: another option of that motion, as in `bielle solve`; may be repeated")
+                 "name=value: another option of the motion that is solved first, as in `bielle solve`; may be repeated")
       ->allow_extra_args(false);
-  app.add_option(
-         "-o,--output", a.output,
-         "directory for trajectory.csv, trajectory.npz and summary.json of the motion that happened, plan.npz (the "
-         "plan at the same times) and report.html")
+  app.add_option("-o,--output", a.output,
+                 "directory for trajectory.csv, trajectory.npz and summary.json of the executed motion, plan.npz (the "
+                 "plan at the same times) and report.html")
       ->required();
-  app.add_option(
-         "--world", a.world,
-         "bielle: its own dynamics and contact law, fixed steps; simbody: Simbody's dynamics, the same contact law, "
-         "steps of controlled error, 30 times slower; mujoco: MuJoCo, closures and contacts soft constraints "
-         "(where Bielle was built with it)")
+  app.add_option("--world", a.world,
+                 "bielle: Bielle's dynamics and contact law, fixed steps; simbody: Simbody's dynamics, the same "
+                 "contact law, error-controlled steps, 30 times slower; mujoco: MuJoCo, soft closures and contacts (if "
+                 "Bielle was built with it)")
       ->check(CLI::IsMember(listWorlds()))
       ->capture_default_str();
-  app.add_option(
-         "--control", a.control,
-         "open: the torques of the plan; gains: and the gains of the solver's last sweep times the deviation from "
-         "the plan, for which the motion is solved again; mpc: predictive control, which solves "
-         "the next second anew at every stage, from the state that is measured")
+  app.add_option("--control", a.control,
+                 "open: the planned torques; gains: the planned torques and linear feedback with the solver's gains, "
+                 "for which the motion is solved again; mpc: predictive control, which solves the next second again at "
+                 "every stage from the measured state")
       ->check(CLI::IsMember({"open", "gains", "mpc"}))
       ->capture_default_str();
-  app.add_option(
-         "--model", a.model,
-         "what the controller takes the robot for. closed: what it is; serial: a serial chain with motors on "
-         "its joints, whose torques the linkages pass on as they do in the present posture; ratio: the same, as "
-         "if the linkages were gears of the ratio that they have where the robot stands (default: the model of "
-         "the motion)")
+  app.add_option("--model", a.model,
+                 "the controller's model of the robot. closed: with its linkages; serial: a serial chain with motors "
+                 "on its joints, converted by the linkages' ratios in the current posture; ratio: the same, with the "
+                 "constant ratios of the standing posture (default: the motion's model)")
       ->check(CLI::IsMember({"closed", "serial", "ratio"}));
-  app.add_option("--nodes", a.predictive.nodes, "stages that predictive control looks ahead")
+  app.add_option("--nodes", a.predictive.nodes, "number of stages in the horizon of predictive control")
       ->check(CLI::Range(10, 1000))
       ->capture_default_str();
-  app.add_option("--iterations", a.predictive.iterations, "of predictive control, at every stage")
+  app.add_option("--iterations", a.predictive.iterations, "solver iterations of predictive control at every stage")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
-  app.add_option("--threads", a.predictive.threads, "of predictive control; 0: all. Results do not depend on it")
+  app.add_option("--threads", a.predictive.threads,
+                 "number of threads of predictive control; 0: all; results do not depend on it")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
-  app.add_flag(
-      "--real-time", a.execution.real_time,
-      "the world keeps to the clock while predictive control solves in a thread of its own: policies that come "
-      "late are waited for by no one, and results depend on the machine");
+  app.add_flag("--real-time", a.execution.real_time,
+               "run the world in real time while predictive control solves in a separate thread. Late policies take "
+               "effect on arrival; results depend on the machine");
   app.add_option("--terrain", a.terrain,
-                 "planned: the ground of the plan; flat; ramp=SLOPE: height over length [1], from x = 0.3 m on; "
-                 "tiles=HEIGHT: of 0.25 m, heights at random up to that [m], from x = 0.2 m on; uneven=HEIGHT: "
-                 "likewise, from that "
-                 "much below the plan on")
+                 "planned: the plan's ground; flat; ramp=SLOPE: height over length [1], from x = 0.3 m on; "
+                 "tiles=HEIGHT: 0.25 m long, random heights from 0 to HEIGHT [m], from x = 0.2 m on; uneven=HEIGHT: "
+                 "likewise, from -HEIGHT to HEIGHT")
       ->capture_default_str();
-  app.add_option("--friction", a.friction, "coefficient of the ground [1]; 0: that of the plan")
+  app.add_option("--friction", a.friction, "coefficient of friction of the ground [1]; 0: the plan's")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_option("--seed", a.seed, "of the heights of tiles, of the jitter, of the noise and of errors of the robot")
+  app.add_option("--seed", a.seed, "seed of the tiles' heights, the jitter, the noise and the robot's errors")
       ->capture_default_str();
   app.add_option("--push", a.pushes,
-                 "t=3,impulse=6,direction=90,duration=0.1: a constant force on the trunk from t [s] on, of an impulse "
-                 "[N s], in a direction [degrees, 0: along x, 90: along y] and for a duration [s]; may be repeated")
+                 "a constant force on the trunk, e.g. t=3,impulse=6,direction=90,duration=0.1: start [s], impulse [N "
+                 "s], direction [degrees; 0: along x, 90: along y] and duration [s]; may be repeated")
       ->allow_extra_args(false);
-  app.add_option("--duration", a.execution.duration, "of the simulation [s]; 0: that of the plan and --hold")
+  app.add_option("--duration", a.execution.duration, "duration of the simulation [s]; 0: that of the plan plus --hold")
       ->check(CLI::Range(0.0, 1e4))
       ->capture_default_str();
-  app.add_option("--hold", a.execution.hold, "how long the robot stands in its last posture after the plan [s]")
+  app.add_option("--hold", a.execution.hold, "time that the robot stands in its last posture after the plan [s]")
       ->check(CLI::Range(0.0, 1e4))
       ->capture_default_str();
-  app.add_option("--time-step", a.time_step, "of worlds with fixed steps [s]; 0: the world's own")
+  app.add_option("--time-step", a.time_step, "time step of worlds with fixed steps [s]; 0: the world's default")
       ->check(CLI::Range(0.0, 0.1))
       ->capture_default_str();
-  app.add_option("--control-period", a.execution.control_period, "between updates of the torques [s]")
+  app.add_option("--control-period", a.execution.control_period, "period of torque updates [s]")
       ->check(positive)
       ->capture_default_str();
-  app.add_option(
-         "--sensors", a.sensors,
-         "ideal: the controller is told the true state; real: what an estimator makes of encoders of the motors and an "
-         "inertial measurement unit in the trunk")
+  app.add_option("--sensors", a.sensors,
+                 "ideal: the controller receives the true state; real: an estimate from motor encoders and an inertial "
+                 "measurement unit in the trunk")
       ->check(CLI::IsMember({"ideal", "real"}))
       ->capture_default_str();
-  app.add_option("--noise", a.noise, "of real sensors, over that of their data sheets [1]; 0: exact")
+  app.add_option("--noise", a.noise, "noise of real sensors, relative to their data sheets [1]; 0: exact")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
   app.add_option("--look-ahead", a.look_ahead,
-                 "of gains: how far before the end of a phase of contacts its last ones are taken [ms]: those after "
-                 "them ask for "
-                 "more than an estimated state can give (default: 36 with real sensors, else 0)")
+                 "reuse the gains from this long before each contact change, since later gains need a more precise "
+                 "state than an estimated one [ms] (default: 36 with real sensors, else 0)")
       ->check(CLI::Range(0.0, 1000.0));
-  app.add_option(
-         "--mass-error", a.errors.mass,
-         "of the robot in the world [1]: masses and inertias of its bodies are those that the controller believes "
-         "in, times 1 plus or minus this, at random")
+  app.add_option("--mass-error", a.errors.mass,
+                 "largest relative error of masses [1]: the simulated robot's masses and inertias are the "
+                 "controller's, times a random factor within 1 plus or minus this")
       ->check(CLI::Range(0.0, 0.99))
       ->capture_default_str();
   app.add_option("--rod-error", a.errors.rod,
-                 "of the robot in the world [m]: one frame of each closure is moved by up to this along each axis, at "
-                 "random")
+                 "largest error of rods [m]: in the simulated robot one frame of each closure is moved at random by up "
+                 "to this along each axis")
       ->check(CLI::Range(0.0, 0.1))
       ->capture_default_str();
-  app.add_option("--delay", a.delay, "from a measurement until the torques computed from it act [ms]")
+  app.add_option("--delay", a.delay, "delay between a measurement and the torques computed from it [ms]")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
-  app.add_option("--jitter", a.jitter,
-                 "each delay differs from --delay by at most this, at random [ms]; not above --delay")
+  app.add_option("--jitter", a.jitter, "largest random deviation of each delay from --delay [ms]; at most --delay")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
-  app.add_option("--record-period", a.execution.record_period, "between rows of the trajectory [s]")
+  app.add_option("--record-period", a.execution.record_period, "period of the recorded rows [s]")
       ->check(positive)
       ->capture_default_str();
   CLI::Option* live = app.add_flag(
       "--live", a.live,
-      "writes the files, with the last 10 s, every other second while the motion is carried out; report.html, open in "
-      "a browser, shows what happens");
-  app.add_flag("--no-report", a.no_report, "writes no report.html")->excludes(live);
-  app.add_flag("--summary-only", a.summary_only, "writes summary.json alone")->excludes(live);
-  app.add_flag("--dry-run", a.dry_run, "checks the options; reads no motion, carries nothing out, writes nothing");
+      "write the files every two seconds during execution, with the last 10 s; an open report.html follows the motion");
+  app.add_flag("--no-report", a.no_report, "do not write report.html")->excludes(live);
+  app.add_flag("--summary-only", a.summary_only, "write only summary.json")->excludes(live);
+  app.add_flag("--dry-run", a.dry_run, "check the options only: read no motion, execute nothing, write nothing");
 }
 
 }  // namespace bielle::simulation

@@ -30,7 +30,7 @@ std::unique_ptr<Plan> obtainPlan(const SimulateArguments& arguments) {
   if (!arguments.model.empty()) belief = beliefs.at(arguments.model);
   if (arguments.robot.empty()) {
     if (arguments.speed || !arguments.settings.empty())
-      throw ModelError("", arguments.speed ? "--speed" : "--set", "a motion solved before has its own",
+      throw ModelError("", arguments.speed ? "--speed" : "--set", "a solved motion has its own",
                        "give --robot and the name of a motion");
     return readPlan(arguments.directory, control, arguments.predictive, belief);
   }
@@ -87,17 +87,19 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
 int main(int argc, char** argv) {
   ignoreClosedPipes();
   CLI::App app{
-      "Carries a motion out in physics with contact, one that `bielle solve` wrote or one that is solved first: a "
-      "controller reads the state of the robot and commands its motors, feet stand or slip as the ground lets them."};
+      "Executes a motion in a physics simulation with contact: a result of `bielle solve`, or a motion that is solved "
+      "first. A controller reads the robot's state and commands its motors; feet stand or slip as friction allows."};
   app.name("bielle simulate");
   SimulateArguments arguments;
   addOptions(app, arguments);
   app.footer(
       "A robot falls when its trunk leans by more than 0.8 rad from its planned attitude or is less than 0.6 times\n"
-      "as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle (with\n"
-      "--control mpc: and its linkage has passed a dead point, or is half a turn away, or it has none). Exit status:\n"
-      "0 it stood to the end, 1 it fell, was stopped by Ctrl-C, or the world broke off (files are written all the\n"
-      "same), 2 bad input.\n"
+      "as high over the ground as planned, or a joint is more than 1.5 rad away from its planned angle. With\n"
+      "--control mpc, a joint driven by a linkage counts only if the linkage has passed a dead point or the joint is "
+      "half\n"
+      "a turn away. Exit status: 0 it stood to the end, 1 it fell, was stopped by Ctrl-C, or the simulation failed "
+      "(files\n"
+      "are written all the same), 2 bad input.\n"
       "Examples:\n"
       "  bielle solve walk --robot bipetto --speed 0.4 -o walk\n"
       "  bielle simulate walk -o carried-out\n"

@@ -21,13 +21,13 @@ MotionResult makeResult(const SimulateArguments& arguments, const Plan& plan, co
   result.run = {plan.summary.robot, plan.robot.file, command};
   result.motion = plan.summary.motion;
   result.formulation = plan.summary.formulation;
-  result.requested = plan.summary.requested;
+  result.options = plan.summary.options;
   const int stages = static_cast<int>(execution.record.u.rows());
   result.schedule.phases.push_back({"simulated", stages, arguments.execution.record_period, {}});
   result.ground = ground;
   result.solver.termination =
       execution.outcome == Outcome::Stood ? FddpTermination::Converged : FddpTermination::Failed;
-  result.solver.message = std::string("carried out: it ") + getName(execution.outcome);
+  result.solver.message = std::string("executed: it ") + getName(execution.outcome);
   result.record = execution.record;
   result.objective = plan.summary.objective;
   setFigures(plan.robot.model, result);
@@ -96,7 +96,7 @@ void extendSummary(const std::string& path, const SimulateArguments& arguments, 
     summary["plan_reachable_until"] =
         plan.reference.first_missed < 0 ? nullptr : nlohmann::ordered_json(plan.reference.first_missed);
   if (plan.predictive) summary["solves"] = listSolves(plan.predictive->getCounts());
-  for (const auto& [name, value] : plan.summary.requested)
+  for (const auto& [name, value] : plan.summary.options)
     if (name == "speed") summary["commanded_speed"] = value;
   if (!plan.commands.empty()) {
     summary["commanded_speed"] = calcMeanSpeed(plan.commands, e.duration);
@@ -137,18 +137,22 @@ void extendSummary(const std::string& path, const SimulateArguments& arguments, 
 void print(const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
   std::cout << plan.summary.motion << " of " << plan.summary.robot << " in world " << arguments.world << ", control "
             << arguments.control;
-  if (plan.belief != Belief::Closed) std::cout << " that believes in model " << getName(plan.belief);
+  if (plan.belief != Belief::Closed) std::cout << " with model " << getName(plan.belief);
   std::cout << ": it " << getName(e.outcome);
   if (!e.message.empty()) std::cout << " (" << e.message << ")";
   char text[600];
-  std::snprintf(
-      text, sizeof text,
-      "\n  duration            %.3f s\n  distance            %.3f m, %.3f m/s\n"
-      "  trunk off its plan  %.4f m at most\n  closures            open by %.1e m at most\n"
-      "  soles               slip by %.1e m at most\n  energy balance      %.1e J, %.1e of what was exchanged\n"
-      "  torques             %.2f %% cut at their limits\n  speed               %.2g times real time\n",
-      e.duration, e.distance, e.getMeanSpeed(), e.largest_deviation, e.largest_gap, e.largest_slip, e.imbalance,
-      e.energy_balance, 100 * e.saturated_share, e.real_time_factor);
+  std::snprintf(text, sizeof text,
+                "\n"
+                "  duration            %.3f s\n"
+                "  distance            %.3f m, %.3f m/s\n"
+                "  trunk deviation     %.4f m at most\n"
+                "  closures            gap %.1e m at most\n"
+                "  soles               slip %.1e m at most\n"
+                "  energy balance      %.1e J, %.1e of the energy exchanged\n"
+                "  torques             %.2f %% saturated\n"
+                "  speed               %.2g times real time\n",
+                e.duration, e.distance, e.getMeanSpeed(), e.largest_deviation, e.largest_gap, e.largest_slip,
+                e.imbalance, e.energy_balance, 100 * e.saturated_share, e.real_time_factor);
   std::cout << text;
   if (plan.reference.first_missed >= 0)
     std::cout << "  the linkages cannot follow the plan from " << plan.reference.first_missed
@@ -157,16 +161,17 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
     const PredictiveCounts& c = plan.predictive->getCounts();
     std::snprintf(text, sizeof text,
                   "  solves              %d, %d failed; median %.1f ms, 99 %% %.1f ms, worst %.1f ms\n"
-                  "                      %d stages began without %s\n",
+                  "                      %d stages began without a new policy%s\n",
                   c.solves, c.failed, 1e3 * c.calcQuantile(0.5), 1e3 * c.calcQuantile(0.99), 1e3 * c.calcQuantile(1),
-                  c.missed, arguments.execution.real_time ? "theirs" : "theirs, had this been real time");
+                  c.missed, arguments.execution.real_time ? "" : " (if run in real time)");
     std::cout << text;
   }
   if (arguments.sensors != "real") return;
   const EstimationErrors& s = e.estimation;
   std::snprintf(text, sizeof text,
-                "  estimated trunk     off by %.4f m and %.4f m/s rms, tilt by %.4f rad\n"
-                "  drift               %.4f m of %.3f m\n  contacts            wrong for %.2f %% of the time\n",
+                "  estimated trunk     rms error %.4f m, %.4f m/s, tilt %.4f rad\n"
+                "  drift               %.4f m of %.3f m\n"
+                "  contacts            wrong for %.2f %% of the time\n",
                 s.position_rms, s.velocity_rms, s.tilt_rms, s.drift, s.way, 100 * s.contact_errors);
   std::cout << text;
 }

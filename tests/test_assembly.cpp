@@ -1,4 +1,4 @@
-// Oracles: the placements asked for, measured by kinematics of the assembled configuration, and closed-form linkages.
+// Oracles: the requested placements, measured by kinematics of the assembled configuration, and closed-form linkages.
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/assembly.h"

@@ -165,14 +165,14 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
       {head + "options:\n  friction: [0.5, -1]\n", {"key 'friction' (line 3)", "friction"}},
       {head + "options: {world: [bielle, moon]}\n", {"key 'world' (line 2)", "moon"}},
       {head + "options: {friction: [0.5, 0.5]}\n", {"friction", "given twice"}},
-      {head + "options: {push: t=1}\n", {"key 'push' (line 2)", "beside `options`"}},
+      {head + "options: {push: t=1}\n", {"key 'push' (line 2)", "next to `options`"}},
       {head + "push: {time: 1, phase: 1, impulse: 1}\n", {"key 'push' (line 2)", "give one of them"}},
       {head + "push: {time: soon, impulse: 1}\n", {"key 'time' (line 2)", "not a number"}},
       {head + "push: {time: -1, impulse: 1}\n", {"(line 2)", "not positive"}},
       {head + "push: {time: 1, largest_impulse: {up_to: 1, step: 2}}\n", {"(line 2)", "up_to"}},
       {"motions: [{name: w, solve: wakl, robot: bipetto}]\n", {"wakl"}},
       {"motions: [{name: w, solve: walk, robot: bipetto, set: {sped: 1}}]\n", {"sped"}},
-      {"motions: [{name: w, solve: walk, robot: bipetto, options: {set: 1}}]\n", {"key 'set' (line 1)", "beside"}}};
+      {"motions: [{name: w, solve: walk, robot: bipetto, options: {set: 1}}]\n", {"key 'set' (line 1)", "next to"}}};
   for (const auto& [text, words] : cases) {
     const CommandResult result = runCampaign(directory.write("spec.yaml", text), out);
     CAPTURE(text, result.err);

@@ -31,7 +31,7 @@ std::vector<Verdict> judgeStairs(const Comparison& entry) {
 
 }  // namespace
 
-TEST_CASE("claims: a linkage that cannot follow is told by its joint, not by what its message says") {
+TEST_CASE("claims: a linkage that cannot follow is identified by its joint, not by its message") {
   const std::vector<Verdict> knee = {Verdict::Agrees, Verdict::Differs}, ankle = {Verdict::Differs, Verdict::Agrees};
   CHECK(judgeStairs(makeFailure("knee_left", "out of reach")) == knee);
   CHECK(judgeStairs(makeFailure("ankley_right", "out of reach")) == ankle);

@@ -73,7 +73,7 @@ TEST_CASE("bad input is one line of error and status 2") {
   checkRefused(run({"dance"}), "dance");
   checkRefused(run({"solve"}), "motion is required");
   checkRefused(run({"solve", "squat", "-o", "x"}), "--robot");
-  checkRefused(run({"info", "nobody"}), "robot 'nobody': there is none of this name");
+  checkRefused(run({"info", "nobody"}), "robot 'nobody': there is no robot of this name");
   checkRefused(run({"info", "/no/such.urdf"}), "there is no such file");
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "depht=0.7"})), "option 'depht'");
   checkRefused(run(makeShortSquat(directory.str(), {"--set", "friction"})), "name=number");
@@ -225,11 +225,11 @@ TEST_CASE("eval understands other ways to write a configuration") {
   refuse(R"({"joints": {"wheel": {"q": NaN}}})", "JSON: ");
   refuse(R"({"joints": {"wheel": {"q": 1e999}}})", "JSON: ");
   refuse(R"({"joints": {"wheel": {"w": 1}}})", "joint 'wheel': there is no key 'w'");
-  refuse(R"({"joints": {"wheel": 1}})", "joint 'wheel': it is no object");
+  refuse(R"({"joints": {"wheel": 1}})", "joint 'wheel': it is not an object");
   refuse(R"({"joints": {"world": {"q": 1}}})", "joint 'world': the robot has no such joint; its joints are: wheel");
   refuse(R"({"joints": {"wheel": {}, "wheel": {"q": 1}}})", "key 'wheel': it is given twice");
   refuse(R"({"torque": {}})", "state: there is no key 'torque'");
-  refuse(R"([1])", "state: it is no object");
+  refuse(R"([1])", "state: it is not an object");
   refuse(R"({"contacts": ["foot"]})", "contact 'foot': the robot has no such contact");
   refuse(R"({"torques": {"wheel": 1}})", "torque 'wheel': this joint has no motor; the motors are: none");
   refuse("", "JSON: ");

@@ -120,7 +120,7 @@ TEST_CASE("compare: same mass, same motion, numbers of the cases, and only what 
   CHECK(readFile(out + "/compare.md") == page);
 }
 
-TEST_CASE("compare: what is wrong is told with its place and remedy") {
+TEST_CASE("compare: errors are reported with their places and remedies") {
   const RobotDirectory directory;
   const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
     const std::string spec = directory.write("spec.yaml", replaceOnce(kSpec, from, to));
@@ -133,7 +133,7 @@ TEST_CASE("compare: what is wrong is told with its place and remedy") {
   check("robot: bipetto", "robot: bipeto", "bipeto");
   check("generator: rsu_biped", "generator: rsu_bipeds", "rsu_bipeds");
   check("trunk_mass: 5", "trunk: 5", "trunk");
-  check("mass: 26", "mass: 10", "weighs");
+  check("mass: 26", "mass: 10", "its mass without the trunk");
   check("mass: 26", "mass: -1", "not positive");
   check("step: 0.05", "step: 0", "steps");
   check("motor_constant: 1.5", "motor_constant: 0", "not positive");

@@ -316,7 +316,7 @@ TEST_CASE("where the cost creeps along curved constraints, it is accepted within
   CHECK(accepted.message.find("not stationary") != std::string::npos);
   CHECK(accepted.log.back().gradient > FddpOptions().gradient_tolerance);
   CHECK(accepted.violation <= 1e-8);
-  // The last twenty costs before the constraints were closed differ by a fifth at most; they fall no faster if less is asked.
+  // The last twenty costs before the constraints were closed differ by a fifth at most; they fall no faster if less is requested.
   CHECK(accepted.iterations < creeping.iterations);
   CHECK(accepted.cost < 1.5 * creeping.cost);
 

@@ -144,7 +144,7 @@ TEST_CASE("springs between points in MJCF: what it cannot say, other tendons, an
   builder.addPointSpring("world", "mass", spring);
   const std::vector<std::string> warnings = formatMjcf(builder.build(), VectorXd::Zero(1)).warnings;
   REQUIRE(warnings.size() == 2);
-  CHECK_THAT(warnings[0], Catch::Contains("point spring 'short': it would have no tension below a length of 0"));
+  CHECK_THAT(warnings[0], Catch::Contains("point spring 'short': its length without tension would be negative"));
   CHECK_THAT(warnings[1], Catch::Contains("point spring 'constant': its preload without a stiffness is left out"));
 
   const RobotDirectory directory;
@@ -229,7 +229,7 @@ std::string makeSwing(const std::string& in_body, const std::string& in_root = "
 
 }  // namespace
 
-TEST_CASE("what the reader of MJCF leaves out is told with its line, and what it cannot leave out is refused") {
+TEST_CASE("what the reader of MJCF leaves out is reported with its line, and what it cannot leave out is refused") {
   const RobotDirectory directory;
   const auto load = [&](const std::string& text) { return loadRobot(directory.write("swing.xml", text)); };
   const LoadedRobot plain = load(makeSwing(""));
@@ -250,9 +250,9 @@ TEST_CASE("what the reader of MJCF leaves out is told with its line, and what it
   checkWarning(makeSwing("", "\n<tendon><spatial/></tendon>"),
                "<spatial> (line 2): it does not run between two sites, and is left out");
   checkWarning(makeSwing("", "\n<actuator><muscle joint=\"swing\"/></actuator>"),
-               "<muscle> (line 2): the actuator is left out: motors drive joints here");
+               "<muscle> (line 2): the actuator is left out: motors can only drive joints");
   checkWarning(makeSwing("", "\n<actuator><position name=\"swing\" joint=\"swing\" forcerange=\"-2 2\"/></actuator>"),
-               "<position> (line 2): its servo is left out: it is a motor of ideal torque here");
+               "<position> (line 2): its servo is left out: it becomes an ideal torque motor");
   checkWarning(makeSwing("", "\n<equality><weld active=\"false\" body1=\"bob\"/></equality>"),
                "<weld> (line 2): it is not active, and left out");
   checkWarning(makeSwing("", "\n<option wind=\"1 0 0\" density=\"1.2\"/>"),
@@ -276,15 +276,16 @@ TEST_CASE("what the reader of MJCF leaves out is told with its line, and what it
   checkError(makeSwing("\n<joint name=\"x\" damping=\"nan\"/>"), "joint 'x' (line 2)",
              "its attribute 'damping' is not");
   checkError(makeSwing("\n<joint name=\"x\" limited=\"true\"/>"), "joint 'x' (line 2)",
-             "it is limited, without a range");
+             "it is limited but has no range");
   checkError(makeSwing("\n<site name=\"a\" quat=\"1 0 0 0\" zaxis=\"0 0 1\"/>"), "site 'a' (line 2)", "it has several");
   checkError(makeSwing("\n<geom class=\"none\"/>"), "geom (line 2)", "there is no default class 'none'");
   checkError(makeSwing("\n<body><geom type=\"mesh\" mesh=\"a\"/></body>"), "geom (line 2)",
              "the mass of the body comes");
-  checkError(makeSwing("", "<equality>\n<flex/></equality>"), "flex (line 2)", "such equalities are not read");
+  checkError(makeSwing("", "<equality>\n<flex/></equality>"), "flex (line 2)", "such equalities are not supported");
   checkError(makeSwing("", "<equality>\n<joint joint1=\"swing\" joint2=\"turn\" polycoef=\"0 1 2 0 0\"/></equality>"),
              "joint (line 2)", "its polycoef is of degree 2 or more");
-  checkError(makeSwing("", "<equality>\n<joint joint1=\"swing\"/></equality>"), "joint (line 2)", "it holds one joint");
+  checkError(makeSwing("", "<equality>\n<joint joint1=\"swing\"/></equality>"), "joint (line 2)",
+             "it constrains a single joint");
   checkError(makeSwing("", "<equality>\n<connect body1=\"none\" anchor=\"0 0 0\"/></equality>"), "connect (line 2)",
              "there is no body 'none'");
   checkError(makeSwing("", "<actuator>\n<motor joint=\"none\"/></actuator>"), "motor (line 2)",
@@ -444,7 +445,8 @@ TEST_CASE("a URDF alone is the tree with its mimics, friction and limits, and te
     CHECK(std::abs(residual) < 1e-15);
     CHECK(closure.terms.size() == 2);
   }
-  CHECK_THAT(getError([] { formatUrdf(loadRobot("cleobot").model); }), Catch::Contains("a URDF has no such joints"));
+  CHECK_THAT(getError([] { formatUrdf(loadRobot("cleobot").model); }),
+             Catch::Contains("URDF does not support such joints"));
 }
 
 TEST_CASE("an adopted robot has the feet, the serial joints and a posture of the one that it was") {

@@ -354,7 +354,7 @@ TEST_CASE("design: a search that is killed goes on and ends the same way") {
   CHECK_THAT(other.err, Contains("the log is of another design problem"));
 }
 
-TEST_CASE("design: what is wrong is told with its place and remedy") {
+TEST_CASE("design: errors are reported with their places and remedies") {
   const RobotDirectory directory;
   const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
     const std::string spec = directory.write("spec.yaml", replaceOnce(makeSpec(), from, to));
@@ -364,8 +364,8 @@ TEST_CASE("design: what is wrong is told with its place and remedy") {
     CHECK_THAT(result.err, Contains(problem));
     CHECK_FALSE(fs::exists(directory.path() + "/out"));
   };
-  check("[0.03, 0.08]", "[0.08, 0.03]", "crossed");
-  check("[0.03, 0.08]", "[0.06, 0.08]", "outside of its bounds");
+  check("[0.03, 0.08]", "[0.08, 0.03]", "wrong order");
+  check("[0.03, 0.08]", "[0.06, 0.08]", "outside its bounds");
   check("[0.03, 0.08]", "[0.03]", "give 2");
   check("to: transmission_knee_right", "to: transmission", "there is no such joint or frame");
   check("from: motor_knee_right", "from: knee_left", "not to 'knee_crank_right'");

@@ -307,7 +307,7 @@ TEST_CASE("design constraints: distances leave out what overlaps as drawn, and r
   INFO(result.err);
   REQUIRE(result.status == 0);
   const std::string page = readFile(out + "/design.md");
-  CHECK_THAT(page, Contains("The distance leaves out bodies") && Contains("shank_left and foot_link_left"));
+  CHECK_THAT(page, Contains("The distance ignores bodies") && Contains("shank_left and foot_link_left"));
 
   const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
     const std::string wrong = directory.write("wrong.yaml", replaceOnce(replaceOnce(kRods, "MODE", "kept"), from, to));
@@ -320,7 +320,7 @@ TEST_CASE("design constraints: distances leave out what overlaps as drawn, and r
   };
   check("\"hip_yaw*\"", "\"hip_jaw*\"", "except [hip_jaw*, crank_knee*]: there are no two such bodies; `bielle info`");
   check("[\"hip_yaw*\", \"crank_knee*\"]", "[\"hip_yaw*\"]", "it has 1 element(s)");
-  check("measure: distance, at_least: 0.002", "measure: margin, at_least: 0.2", "only distances leave bodies out");
+  check("measure: distance, at_least: 0.002", "measure: margin, at_least: 0.2", "only distances can exclude bodies");
 }
 
 TEST_CASE("design constraints: weights and payloads that cannot be are refused with their lines") {
@@ -335,7 +335,7 @@ TEST_CASE("design constraints: weights and payloads that cannot be are refused w
   check("weight: -1", "it is negative; give its share");
   check("weight: .nan", "it is not finite");
   check("weight: 0", "no motion has a weight");
-  check("payload: -2", "it is negative; give the kilograms");
+  check("payload: -2", "it is negative; give the mass");
   check("payload_at: [0, 0, 0]", "there is no payload");
   check("payload: 2, payload_at: [0, 0]", "it has 2 element(s)");
   check("payload: 2, payload_place: 3", "payload_place");

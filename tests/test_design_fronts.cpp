@@ -275,12 +275,12 @@ TEST_CASE("design: fronts that cannot be are refused") {
     check("", "", "install libpagmo-dev");
     return;
   }
-  check("  - {measure: cost}\n", "", "one objective has no front");
+  check("  - {measure: cost}\n", "", "a single objective has no front");
   check("population: 12", "population: 10", "multiple of 4");
   check("{population: 12", "{algorithm: crs, population: 12", "use one of nsga2, moead");
   check("algorithm: slsqp", "algorithm: sbplx", "use one of slsqp, mma");
   check("measure: cost", "measure: conditioning", "which conditioning does not have");
-  check("search:\n", "search:\n  searches: 2\n", "it excludes `stages` and `searches`");
+  check("search:\n", "search:\n  searches: 2\n", "it cannot be combined with `stages` and `searches`");
   CHECK_THROWS_AS(minimizeByStages({VectorXd::Zero(1), VectorXd::Ones(1), VectorXd::Zero(1), {}, {}},
                                    {{SearchAlgorithm::Nsga2, 10, 0}}, 1),
                   std::invalid_argument);

@@ -142,7 +142,7 @@ TEST_CASE("design gradient: the margin is that of the lift") {
   const double least = std::sqrt(square(1.01 * 0.1) - limits.values.maxCoeff());
   CHECK(least < 0.5);
   CHECK_NOTHROW(make(least * (1 - 1e-6)));
-  CHECK_THROWS_WITH(make(least * (1 + 1e-6)), Contains("nearer to a dead point"));
+  CHECK_THROWS_WITH(make(least * (1 + 1e-6)), Contains("closer to a dead point"));
   // The measure of constraints comes to it from the singular values of the closed motions.
   EvaluationOptions options;
   options.mode = MotionMode::Kept;
@@ -362,7 +362,7 @@ TEST_CASE("design gradient: stages that need gradients are refused where there a
     CHECK_THAT(result.err, Contains(problem) && Contains("line "));
   };
   check("  - {measure: peak_torque, motors: [motor_knee_left, motor_knee_right]}", "  - {measure: cost}",
-        "motions that are kept have no cost");
+        "kept motions have no cost");
   check("measure: peak_torque", "measure: conditioning", "which conditioning does not have");
   check("margin: 0.15", "margin: 1.5", "outside");
 

@@ -151,7 +151,7 @@ TEST_CASE("measures: shares of limits by hand, distances of shapes") {
         Approx(std::sqrt((0.1 * std::pow(3 / 0.8, 2) + 0.3 * std::pow(4 * 0.5, 2) + 0.2 * std::pow(6 / 0.8, 2)) / 0.6) /
                5));
   CHECK(measures.distance == Approx(0.6 - 2 * 0.05));  // of a and c, which no joint connects
-  CHECK(measures.margin == 1);                         // not asked for
+  CHECK(measures.margin == 1);                         // not requested
   measures.distance = std::numeric_limits<double>::infinity();
   addLimitMeasures(build(true), trajectory, {Measure::Distance}, {}, measures);
   CHECK(measures.distance == Approx(0.1 - 2 * 0.05).margin(1e-12));
@@ -242,7 +242,7 @@ TEST_CASE("workspace: joint ranges, axes and what is refused") {
   region.base = "hand";
   refuse("no such link");
   region.axes[0] = makeRange(1, 0, 3);
-  refuse("crossed");
+  refuse("wrong order");
   region.axes[0] = region.axes[1] = region.axes[2] = makeRange(0, 1, 100);
   refuse("100000");
 
@@ -283,12 +283,12 @@ objective:
     const std::string path = directory.write("wrong.yaml", replaceOnce(text, from, to));
     CHECK_THROWS_WITH(readDesignSpec(path), Contains(problem));
   };
-  refuse("x: [-0.35, 0.35, 23]", "x: [0.35, -0.35, 23]", "crossed");
-  refuse("x: [-0.35, 0.35, 23]", "x: [0.35]", "no range");
+  refuse("x: [-0.35, 0.35, 23]", "x: [0.35, -0.35, 23]", "wrong order");
+  refuse("x: [-0.35, 0.35, 23]", "x: [0.35]", "not a range");
   refuse("x: [-0.35, 0.35, 23]", "x: most", "not a number");
-  refuse("region: {", "region: {max_conditioning: 0.5, ", "below 1");
+  refuse("region: {", "region: {max_conditioning: 0.5, ", "at least 1");
   refuse("workspace, region", "energy, region", "only a workspace");
-  refuse("region: {", "motors: [motor_front], region: {", "has no motors");
+  refuse("region: {", "motors: [motor_front], region: {", "does not depend on motors");
   CHECK_THROWS_WITH(DesignEvaluator(robot, {}, {{Measure::Energy, {}, 1, {}}}), Contains("motions"));
   EvaluationOptions kept;
   kept.mode = MotionMode::Kept;

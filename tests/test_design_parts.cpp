@@ -229,22 +229,22 @@ TEST_CASE("design: choices and constraints that cannot be are refused with their
     CHECK_THROWS_WITH(read(), Contains(problem));
   };
   check("belt_knee,", "chain_knee,", "there is no part 'chain_knee'");
-  check("belt_knee,", "belt_knee, belt_knee,", "there twice");
-  check("belt_knee,", "belt, belt_knee,", "there twice");
+  check("belt_knee,", "belt_knee, belt_knee,", "listed twice");
+  check("belt_knee,", "belt, belt_knee,", "listed twice");
   check("belt_knee,", "serial,", "there is no part 'serial'; use some of serial_knee");  // of which joint?
-  check("leg_biped\nset: {ankle: differential, motor_mass: 0.7}", "cleobot", "does not put parts together");
+  check("leg_biped\nset: {ankle: differential, motor_mass: 0.7}", "cleobot", "does not compose robots from parts");
   check("generator: leg_biped\nset: {ankle: differential, motor_mass: 0.7}", "robot: bipetto", "one architecture");
-  check("ankle: differential", "ankle: belt", "none of its choices");
+  check("ankle: differential", "ankle: belt", "not one of its choices");
   check("ak80-9, strong", "ak80-9, weak", "there is no motor 'weak'");
   check("ak80-9, strong", "", "nothing to choose");
   check("ak80-9, strong], mass", "ec90-flat-90w, strong], mass", "its mass is not in the catalogue");
   check("mass: knee_motor_mass", "mass: knee_mass", "no parameter 'knee_mass'");
-  check("start: strong", "start: weak", "none of the choices");
+  check("start: strong", "start: weak", "not one of the choices");
   check("choices: [ak80-9, strong], mass: knee_motor_mass, start: strong", "bounds: [0, 1]", "has no choices");
   check("bounds: [5, 20]", "bounds: [-5, 20]", "not positive");
   check("bounds: [5, 20]", "bounds: [7, 20]", "or give `start`");
   check("ratio: \"*knee*\"", "ratio: knee", "no such motor");
-  check("at_most: 26.5", "", "it has not one bound");
+  check("at_most: 26.5", "", "it does not have exactly one bound");
   check("mass, at_most: 26.5", "margin, at_most: 0.1", "give `at_least`");
   check("mass, at_most: 26.5", "cost, at_most: 0.1", "use one of envelope");
   check("envelope}", "envelope, motors: [\"hip*\"]}", "none of the motors has such a limit");
@@ -252,5 +252,5 @@ TEST_CASE("design: choices and constraints that cannot be are refused with their
         "conditioning, at_most: 5}\nsearch: {searches: 1, stages: [{algorithm: slsqp",
         "which the constraint on conditioning does not have");
   if (hasFrontSearch())
-    check("searches: 1, stages: [{algorithm: crs, evaluations: 3}]", "pareto: {algorithm: moead}", "give nsga2");
+    check("searches: 1, stages: [{algorithm: crs, evaluations: 3}]", "pareto: {algorithm: moead}", "use nsga2");
 }

@@ -365,7 +365,7 @@ TEST_CASE("numbers of Drake's URDF are written however large they are") {
   CHECK_THAT(urdf, !Catch::Contains("inf"));
 }
 
-TEST_CASE("files of Drake's users are read, completed by a YAML file, and their mistakes are told") {
+TEST_CASE("files of Drake's users are read, completed by a YAML file, and their mistakes are reported") {
   const RobotDirectory directory;
   const auto load = [&](const std::string& urdf) { return loadRobot(directory.writeRobot(urdf, "")); };
   const LoadedRobot robot = load(kDrakeFile);

@@ -220,7 +220,7 @@ TEST_CASE("Eq. 21: the velocity to be met is that at the end of the step") {
     updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), c.q, v, calcMotorForces(model, torques));
     return v + h * cws.a;
   };
-  const VectorXd end = step(u);  // a step that the robot can make, asked for with both indices
+  const VectorXd end = step(u);  // a step that the robot can make, requested with both indices
   const auto calcSlope = [&](const VectorXd& target) {
     return differentiate(u, 1e-2, [&](const VectorXd& torques) {
       return VectorXd::Constant(1, 0.5 * (step(torques) - target).squaredNorm());

@@ -186,7 +186,7 @@ TEST_CASE("kangaroo: cranks turn with knee and ankle, screws and guides slide as
   }
   KangarooParameters short_thigh;
   short_thigh.knee_screw_drop = 0.3;
-  CHECK_THROWS_WITH(makeKangaroo(short_thigh), Catch::Contains("no room on the thigh"));
+  CHECK_THROWS_WITH(makeKangaroo(short_thigh), Catch::Contains("no room for the knee screw"));
 }
 
 namespace {

@@ -299,7 +299,7 @@ TEST_CASE("writer: names are escaped, what the files cannot say is refused") {
   CHECK_THROWS_WITH(formatRobot(build(skew)), Catch::Contains("universal joint 'u'"));
   JointLimits half;
   half.lower = VectorXd::Constant(1, -1);
-  CHECK_THROWS_WITH(formatRobot(build(joint, half)), Catch::Contains("limited on one side"));
+  CHECK_THROWS_WITH(formatRobot(build(joint, half)), Catch::Contains("a limit on one side only"));
 }
 
 TEST_CASE("generators: names stay when lengths change, bounds and names are checked") {

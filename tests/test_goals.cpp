@@ -32,8 +32,8 @@ MotionTrack makeTrackOfTwoFeet() {
   return track;
 }
 
-Goal makeGoal(GoalKind kind, double asked, double tolerance, int first = 0, int last = 10) {
-  return {kind, getName(kind), asked, tolerance, first, last};
+Goal makeGoal(GoalKind kind, double requested, double tolerance, int first = 0, int last = 10) {
+  return {kind, getName(kind), requested, tolerance, first, last};
 }
 
 const Model& getBipetto() {
@@ -136,21 +136,21 @@ TEST_CASE("goals: nodes and contacts that the trajectory does not have are refus
 TEST_CASE("goals: a miss is said with its share and tolerance; what is not a number is a miss") {
   GoalOutcome outcome{makeGoal(GoalKind::Speed, 0.5, 0.025), 0.4213};
   CHECK_FALSE(outcome.met());
-  CHECK(formatOutcome(outcome) == "asked 0.5 m/s, came out 0.4213 m/s: 84 %, missed (tolerance 0.025 m/s)");
-  outcome.came_out = 0.51;
+  CHECK(formatOutcome(outcome) == "requested 0.5 m/s, achieved 0.4213 m/s: 84 %, missed (tolerance 0.025 m/s)");
+  outcome.achieved = 0.51;
   CHECK(outcome.met());
-  CHECK(formatOutcome(outcome) == "asked 0.5 m/s, came out 0.51 m/s: 102 %");
-  outcome.came_out = std::nan("");
+  CHECK(formatOutcome(outcome) == "requested 0.5 m/s, achieved 0.51 m/s: 102 %");
+  outcome.achieved = std::nan("");
   CHECK_FALSE(outcome.met());
-  CHECK(formatOutcome({makeGoal(GoalKind::Height, 0.7, 0.015), 0.7011}) == "asked 0.7, came out 0.7011");
+  CHECK(formatOutcome({makeGoal(GoalKind::Height, 0.7, 0.015), 0.7011}) == "requested 0.7, achieved 0.7011");
   CHECK(formatOutcome({makeGoal(GoalKind::Footholds, 0, 0.01), 0.0123}) ==
-        "asked within 0.01 m, came out 0.0123 m, missed");
+        "requested within 0.01 m, achieved 0.0123 m, missed");
 }
 
-TEST_CASE("goals: what motions of Bipetto are asked for comes out") {
+TEST_CASE("goals: motions of Bipetto achieve what was requested") {
   struct Row {
     std::string name;
-    double asked;
+    double requested;
   };
   const auto expect = [](const MotionResult& result, const std::vector<Row>& rows) {
     CAPTURE(result.motion);
@@ -159,7 +159,7 @@ TEST_CASE("goals: what motions of Bipetto are asked for comes out") {
     for (const Row& row : rows) {
       const GoalOutcome& outcome = find(result, row.name);
       CAPTURE(row.name, formatOutcome(outcome));
-      CHECK(outcome.goal.asked == Approx(row.asked));
+      CHECK(outcome.goal.requested == Approx(row.requested));
       CHECK(outcome.met());
     }
   };
@@ -210,7 +210,7 @@ TEST_CASE("goals: a sequence has those of its motions, at their nodes") {
   }
 }
 
-TEST_CASE("goals: trajectories that miss are told so") {
+TEST_CASE("goals: trajectories that miss are reported") {
   Motion walk = makeWalk(getBipetto());
   const FddpSummary summary = Fddp().solve(*walk.problem, walk.guess);
   const auto measure = [&](const ShootingTrajectory& trajectory) {
@@ -220,13 +220,13 @@ TEST_CASE("goals: trajectories that miss are told so") {
   ShootingTrajectory slow = walk.guess;
   for (VectorXd& x : slow.xs) x[0] *= 0.84;
   const GoalOutcome speed = find(measure(slow), "speed");
-  CHECK(speed.came_out == Approx(0.84 * find(good, "speed").came_out).epsilon(0.02));
+  CHECK(speed.achieved == Approx(0.84 * find(good, "speed").achieved).epsilon(0.02));
   CHECK_FALSE(speed.met());
   CHECK_FALSE(find(measure(slow), "footholds").met());
   // One foot beside its foothold at one landing, by 2 cm; nothing else changes.
   ShootingTrajectory beside = walk.guess;
   beside.xs[find(good, "footholds").goal.footholds[2].node][1] += 0.02;
-  CHECK(find(measure(beside), "footholds").came_out == Approx(0.02).margin(0.002));
+  CHECK(find(measure(beside), "footholds").achieved == Approx(0.02).margin(0.002));
   CHECK_FALSE(find(measure(beside), "footholds").met());
   CHECK(find(measure(beside), "speed").met());
 
@@ -235,7 +235,7 @@ TEST_CASE("goals: trajectories that miss are told so") {
   lazy.com_weight = 10;
   const MotionResult shallow = solve(makeSquat(getBipetto(), lazy));
   CHECK(shallow.converged());
-  CHECK(find(shallow, "depth").came_out > 0.72);
+  CHECK(find(shallow, "depth").achieved > 0.72);
   CHECK_FALSE(find(shallow, "depth").met());
 }
 
@@ -255,8 +255,8 @@ TEST_CASE("goals: a squat far out of reach stays finite, and says by how much it
     const MotionResult result = makeResult({"bipetto", "", {}}, motion, motion.guess, summary);
     const GoalOutcome& outcome = find(result, "depth");
     CHECK_FALSE(outcome.met());
-    CHECK(outcome.came_out > least);
-    CHECK(outcome.came_out < most);
+    CHECK(outcome.achieved > least);
+    CHECK(outcome.achieved < most);
     CHECK(formatOutcome(outcome).find("missed") != std::string::npos);
   }
 }

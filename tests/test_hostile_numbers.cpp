@@ -283,7 +283,7 @@ void tryMotion(Random& rng, const Model& model, Motion (*make)(const Model&, con
                int& solved, int& refused) {
   Options options;
   const std::vector<OptionEntry> entries = listOptions(options);
-  for (const OptionEntry& entry : entries) {  // few stages where nothing else is asked
+  for (const OptionEntry& entry : entries) {  // few stages where nothing else is requested
     if (entry.name == "time_step") *entry.value = 0.03;
     if (entry.name == "duration") *entry.value = 0.3;
     if (entry.name == "settle" || entry.name == "stand") *entry.value = 0.1;

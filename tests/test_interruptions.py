@@ -59,10 +59,10 @@ def test_standard_output():
         with open("state.json", "w") as file:
             file.write("{}")
         with open("/dev/full", "w") as full:
-            run(program, *command, status=2, error="standard output: it was not taken whole", stdout=full)
+            run(program, *command, status=2, error="standard output: the output could not be written completely", stdout=full)
         read, write = os.pipe()
         os.close(read)
-        run(program, *command, status=2, error="standard output: it was not taken whole", stdout=write)
+        run(program, *command, status=2, error="standard output: the output could not be written completely", stdout=write)
         os.close(write)
 
 

@@ -188,9 +188,9 @@ TEST_CASE("multipliers come back from NumPy files, and are refused where their r
   CHECK_FALSE(areEqual(other.multipliers, record.multipliers));  // the comparison sees the last bit
 
   record.multipliers.values[2][1] = std::numeric_limits<double>::infinity();
-  CHECK_THAT(getErrorOfReading(write()), Catch::Contains("'multipliers': it has numbers that are not finite"));
+  CHECK_THAT(getErrorOfReading(write()), Catch::Contains("'multipliers': it contains numbers that are not finite"));
   record.multipliers.values.pop_back();
-  CHECK_THAT(getErrorOfReading(write()), Catch::Contains("how many each node has"));
+  CHECK_THAT(getErrorOfReading(write()), Catch::Contains("number of multipliers of each node"));
   record.multipliers.values.assign(nodes, VectorXd(0));
   record.multipliers.penalty = std::numeric_limits<double>::infinity();
   CHECK_THAT(getErrorOfReading(write()), Catch::Contains("penalty"));
@@ -388,15 +388,15 @@ TEST_CASE("a summary reads back: phases, stances, ground; what is none is refuse
   CHECK(summary.formulation == result.formulation);
   CHECK(summary.step == result.step);
   CHECK_FALSE(summary.converged);
-  CHECK(summary.requested == result.requested);
+  CHECK(summary.options == result.options);
   REQUIRE(summary.goals.size() == 1);
   CHECK(summary.goals[0].goal.name == "depth");
   CHECK(summary.goals[0].goal.kind == GoalKind::Height);
-  CHECK(summary.goals[0].goal.asked == result.goals[0].goal.asked);
+  CHECK(summary.goals[0].goal.requested == result.goals[0].goal.requested);
   CHECK(summary.goals[0].goal.tolerance == result.goals[0].goal.tolerance);
   CHECK(summary.goals[0].goal.last == squat.motion.problem->numStages());
   CHECK(summary.goals[0].goal.contacts == result.record.contact_names);
-  CHECK(summary.goals[0].came_out == result.goals[0].came_out);
+  CHECK(summary.goals[0].achieved == result.goals[0].achieved);
   CHECK_FALSE(summary.goals[0].met());  // the guess stands
   REQUIRE(summary.phases.size() == 1);
   CHECK(summary.phases[0].time_step == result.schedule.phases[0].dt);

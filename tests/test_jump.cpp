@@ -144,7 +144,7 @@ TEST_CASE("jump: the paper's problem has a solution, which flies as a stone") {
   CHECK(out.tilt < 0.2);
 }
 
-TEST_CASE("jump: Bipetto flies as long and as far as asked, and lands softly") {
+TEST_CASE("jump: Bipetto flies as long and as far as requested, and lands softly") {
   struct Row {
     Formulation formulation;
     double flight, length;

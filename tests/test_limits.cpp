@@ -200,9 +200,8 @@ TEST_CASE("limits: impossible ones are refused by name") {
 }
 
 TEST_CASE("limits: a range without width, or without the starting posture, is refused") {
-  for (const auto& [range, problem] :
-       {std::pair("lower=\"0.1\" upper=\"0.1\"", "has no width"),
-        std::pair("lower=\"0.1\" upper=\"0.2\"", "does not hold the starting posture")}) {
+  for (const auto& [range, problem] : {std::pair("lower=\"0.1\" upper=\"0.1\"", "has zero width"),
+                                       std::pair("lower=\"0.1\" upper=\"0.2\"", "excludes the starting posture")}) {
     const testing::RobotDirectory directory;
     const Model model = loadRobot(replaceRange(directory, range)).model;
     CHECK_THROWS_WITH(makeSquat(model), Catch::Contains("joint 'hipx_") && Catch::Contains(problem));

@@ -149,8 +149,8 @@ TEST_CASE("conflicts: loops that close alone but not together; one beside them h
     checkRemedies(model, conflicts[0]);
     const ModelError error = makeClosingError(model, "robot.urdf", open);
     CHECK_THAT(error.problem(),
-               Catch::Contains("loops 'rod_up' and 'rod_down' cannot close together, though each alone"));
-    CHECK_THAT(error.remedy(), Catch::Contains("the least change that would close them is one of: "));
+               Catch::Contains("loops 'rod_up' and 'rod_down' cannot close together, although each can alone"));
+    CHECK_THAT(error.remedy(), Catch::Contains("the smallest change that closes them is one of: "));
   }
 }
 

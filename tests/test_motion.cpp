@@ -24,7 +24,7 @@ struct Outcome {
   double gap = 0;                                 ///< largest closure residual at any node, m or rad
   double slide = 0;                               ///< largest displacement of a contact, m
   double lowest = 1e9, highest = -1e9, last = 0;  ///< height of the CoM over its initial height
-  double worst_height = 0;                        ///< largest distance of the CoM from the height asked for, m
+  double worst_height = 0;                        ///< largest distance of the CoM from the requested height, m
 };
 
 Outcome measure(const Model& model, const SquatOptions& options, const std::vector<VectorXd>& xs) {
@@ -66,7 +66,7 @@ double calcDefect(const RobotProblem& problem, const ShootingTrajectory& t) {
 
 }  // namespace
 
-TEST_CASE("squat: Bipetto goes down or up as asked, loops closed, feet in place") {
+TEST_CASE("squat: Bipetto goes down or up as requested, loops closed, feet in place") {
   const Model model = loadOwn("bipetto");
   struct Row {
     Formulation formulation;

@@ -343,5 +343,5 @@ TEST_CASE("MuJoCo and the reader of its files read the same mechanism") {
                        [&](const std::string& w) { return w.find(text) != std::string::npos; });
   };
   CHECK(warns("<light> (line 13): left out"));
-  CHECK(warns("<motor> (line 47): its input is the torque or force of its joint here"));
+  CHECK(warns("<motor> (line 47): its input becomes the torque or force at its joint"));
 }

@@ -101,7 +101,7 @@ TEST_CASE("footholds: a file's errors name the entry, impossible steps their num
   CHECK_THROWS_AS(readFootholds("no_such_file.yaml"), ModelError);
   for (const auto& [text, word] : std::vector<std::pair<std::string, std::string>>{
            {"- {foot: right, x: 0.2, y: -0.1, pitch: 0.1}", "level"},
-           {"- {foot: right, x: 0.2, y: -0.1}\n- {foot: right, x: 0.3, y: -0.1}", "in turn"},
+           {"- {foot: right, x: 0.2, y: -0.1}\n- {foot: right, x: 0.3, y: -0.1}", "alternately"},
            {"- {foot: right, x: 0.9, y: -0.1}", "reach"},
            {"- {foot: right, x: 0.2, y: -0.1, z: 0.05}\n- {foot: left, x: 0.2, y: 0.0}", "in the ground"}}) {
     CAPTURE(text);
@@ -118,7 +118,7 @@ TEST_CASE("box: Bipetto steps onto it and down again") {
   Motion motion = makeBox(getBipetto(), options);
   checkGround(motion);
   const Goal& height = motion.goals.at(0);
-  CHECK(height.asked == options.height);
+  CHECK(height.requested == options.height);
   const StepMeasures m = solve(motion);
   checkFeet(m);
   CHECK(m.tilt < 0.2);
@@ -128,7 +128,7 @@ TEST_CASE("box: Bipetto steps onto it and down again") {
   CHECK(m.touchdown_coms.at(1).z() - m.start.z() == Approx(options.height).margin(0.03));
 }
 
-TEST_CASE("gap: the ground is missing where it was asked for, and no foot stands there") {
+TEST_CASE("gap: the ground is missing where it was requested, and no foot stands there") {
   GapOptions options;
   options.width = 0.2;
   Motion motion = makeGap(getBipetto(), options);

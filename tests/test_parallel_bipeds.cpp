@@ -308,6 +308,6 @@ TEST_CASE("bielle generate writes a robot that every command takes, and refuses 
   refuse("fivebar_leg", "lower_length=0.05", "do not meet");
   refuse("rsu_biped", "hip_height=0.8", "do not reach the ground");
   refuse("spring_leg", "crank_place=0.5", "beyond the toe");
-  refuse("fourbar_chain", "count=2.5", "no whole number");
+  refuse("fourbar_chain", "count=2.5", "not a whole number");
   refuse("fourbar_chain", "rocker=2", "do not meet");
 }

@@ -333,5 +333,5 @@ TEST_CASE("joints without a linkage of their own: direct, or refused") {
   refuse("bipetto", {"knee_left", "knee_right"}, "not in the linkage of 'knee_left'");
   refuse("bipetto", {"ankley_left", "ankley_left"}, "named twice");
   refuse("fivebar", {"elbow_left"}, "name 2 joints of this linkage");
-  refuse("bipetto", {}, "none is named");
+  refuse("bipetto", {}, "none are named");
 }

@@ -217,7 +217,7 @@ TEST_CASE("couplers arrive from the YAML file and from <mimic>, with the gains a
   const LoadedRobot still = loadRobot(directory.writeRobot(fixed, ""));
   CHECK(still.model.closures().empty());
   REQUIRE(still.warnings.size() == 1);
-  CHECK_THAT(still.warnings[0], Catch::Contains("joint 'rod_joint': it is fixed, <mimic> is ignored"));
+  CHECK_THAT(still.warnings[0], Catch::Contains("joint 'rod_joint': it is fixed, so <mimic> is ignored"));
 }
 
 TEST_CASE("springs, dampers and friction arrive, each number in its place") {
@@ -453,7 +453,7 @@ TEST_CASE("what is possible but odd is a warning") {
   using Catch::Contains;
   const std::string urdf = directory.path() + "/robot.urdf: ", yaml = directory.path() + "/robot.yaml: ";
   CHECK_THAT(warn(kToyUrdf, "joint_name: [elbow]\njoint_type: [SPHERICAL]"),
-             Contains(yaml + "key 'joint_name'") && Contains("absent") && Contains("'elbow'"));
+             Contains(yaml + "key 'joint_name'") && Contains("not in the URDF") && Contains("'elbow'"));
   CHECK_THAT(warn(replaceOnce(kToyUrdf, "<mass value=\"3\"/>", "<mass value=\"1000\"/>"), kToyYaml),
              Contains(urdf + "link 'base': a mass of 1000"));
   CHECK_THAT(
@@ -502,7 +502,7 @@ TEST_CASE("a file with the key model completes a robot that is elsewhere") {
   CHECK_THROWS_WITH(loadRobot("both"), Contains("there is a URDF beside this file"));
 }
 
-TEST_CASE("robots are found by name, directory and file, and a robot that is nowhere is told where it was sought") {
+TEST_CASE("robots are found by name, directory and file; the error for an unknown one lists the places searched") {
   const RobotDirectory first, second;
   second.write("toy/toy.urdf", kToyUrdf);
   second.write("toy/toy.yaml", kToyYaml);

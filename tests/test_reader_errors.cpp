@@ -124,7 +124,7 @@ const std::vector<Mistake> kYamlMistakes = {
      "free-flyer joint of 6", "revolute"},
     {kType, kType + "\nclosures: [{name: belt, type: coupler, joints: {shoulder: 1, rod_joint: 1}, kd: -1}]",
      "closure 'belt'", "gain", "kp and kd"},
-    {"type: [6D]", "type: [coupler]", "key 'type'[0]", "does not tie frames", "closures"},
+    {"type: [6D]", "type: [coupler]", "key 'type'[0]", "does not connect frames", "closures"},
     {kMotors, "name_mot: [elbow]", "motor 'elbow'", "no moving joint", "name a joint"},
     {kMotors, "name_mot: [wrist]", "motor 'wrist'", "no moving joint", "not fixed"},
     {kMotors, "name_mot: [shoulder, shoulder]", "motor 'shoulder'", "two motors", "once"},
@@ -147,7 +147,7 @@ const std::vector<Mistake> kYamlMistakes = {
     {kMotors, "motors: {shoulder: {torque_constant: 1, current: 0}}", "motor 'shoulder'", "not positive", "V and A"},
     {kMotors, "motors: {shoulder: {efficiency: 1.1}}", "motor 'shoulder'", "efficiency is outside", "0.9"},
     {kMotors, "motors: {shoulder: {back_efficiency: 0}}", "motor 'shoulder'", "efficiency is outside", "0.9"},
-    {kMotors, "motors: {shoulder: {continuous_effort: 0}}", "motor 'shoulder'", "continuous effort", "for ever"},
+    {kMotors, "motors: {shoulder: {continuous_effort: 0}}", "motor 'shoulder'", "continuous effort", "indefinitely"},
     {kMotors, "motors: {shoulder: {type: ak81}}", "key 'motors': key 'shoulder': key 'type'",
      "no motor 'ak81' in a catalogue", "ak80-9"},
     {kMotors, "motors: {shoulder: }\nmotor_catalogue: none.yaml", "key 'motor_catalogue' (line 4)",
@@ -241,7 +241,7 @@ TEST_CASE("files that are no robot at all are errors") {
   CHECK(getErrorOfLoading(directory.writeRobot("<world/>", "")).find("not <robot>") != std::string::npos);
   CHECK(getErrorOfLoading(directory.writeRobot("<robot name='a'/>", "")).find("no link") != std::string::npos);
   CHECK(getErrorOfLoading(directory.writeRobot("<robot name='a'><link name='b'/></robot>", "base: fixed"))
-            .find("no moving joint; declare") != std::string::npos);
+            .find("no moving joints; declare") != std::string::npos);
   CHECK(getErrorOfLoading(directory.writeRobot(kToyUrdf, "- a list")).find("document (line 1): it is not a map") !=
         std::string::npos);
   std::string deep = "<robot name='a'>";

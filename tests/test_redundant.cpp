@@ -251,7 +251,7 @@ TEST_CASE("a published delta robot: redundant loops close, and accelerations obe
   CHECK(calcRelativeError(ws.M * cws.a + ws.b - cws.J.transpose() * cws.lambda, tau) < 1e-9);
 }
 
-TEST_CASE("redundant rows that contradict each other are told, those that agree are not") {
+TEST_CASE("redundant rows that contradict each other are reported, those that agree are not") {
   // The rocker's end is tied to the same place twice; the loop is open by a tenth of a millimetre.
   const Model model = makeCutAtThePin(ClosureKind::Hinge5D);
   VectorXd q = ClosedForm(1.1).q().head(3);

@@ -209,9 +209,10 @@ TEST_CASE("bodies without shapes are drawn as rods, meshes as they are on the di
 TEST_CASE("springs and dampers between points are on the page, with the bodies and points that they tie") {
   const RobotDirectory directory;
   directory.write("arm/arm.urdf", kArm);
-  directory.write("arm/arm.yaml",
-                  "point_springs:\n  coil: {frames: [world, a], points: [[1, 2, 3], [0.5, 0, 0]], stiffness: 9, rest: 1}\n"
-                  "  dashpot: {frames: [a, world], damping: 2}\n");
+  directory.write(
+      "arm/arm.yaml",
+      "point_springs:\n  coil: {frames: [world, a], points: [[1, 2, 3], [0.5, 0, 0]], stiffness: 9, rest: 1}\n"
+      "  dashpot: {frames: [a, world], damping: 2}\n");
   writeStillResult(directory.path() + "/r", directory.path() + "/arm", getArmNames());
   const json springs = getData(makeReport({directory.path() + "/r"}))["runs"][0]["robot"]["springs"];
   REQUIRE(springs.size() == 2);
@@ -239,7 +240,7 @@ TEST_CASE("a directory that is none of ours is refused with the file and the rem
   directory.write("r/summary.json", "{");
   refuse("summary.json: JSON: ");
   directory.write("r/summary.json", "[]");
-  refuse("it is no object");
+  refuse("it is not an object");
   directory.write("r/summary.json", "{}");
   refuse("key 'robot'");
   directory.write("r/summary.json", R"({"robot": 3})");
@@ -247,7 +248,7 @@ TEST_CASE("a directory that is none of ours is refused with the file and the rem
   MotionRecord other = getArmNames();
   other.q_names = {"elbow"};
   writeStillResult(place, robot, other);
-  refuse("not those of the robot");
+  refuse("differ from those of the robot");
   writeStillResult(place, "nobody", getArmNames());
   refuse("nobody");
   writeStillResult(place, "nobody", getArmNames(), {{"robot_file", robot}});

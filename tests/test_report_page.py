@@ -71,8 +71,8 @@ def write_hostile_result(directory):
         for k in range(11):
             out.writerow([k / 10, k / 20, 0.5, "" if k == 10 else 0, 0, 0, -1, 0, 0])
     summary = {"robot": str(directory / "robot.urdf"), "motion": HOSTILE, "termination": HOSTILE,
-               "message": "</script>" + HOSTILE, "requested": {HOSTILE: 1}, "command": [HOSTILE],
-               "goals": [None, {"name": HOSTILE, "kind": HOSTILE, "unit": HOSTILE, "asked": 1, "came_out": None}],
+               "message": "</script>" + HOSTILE, "options": {HOSTILE: 1}, "command": [HOSTILE],
+               "goals": [None, {"name": HOSTILE, "kind": HOSTILE, "unit": HOSTILE, "requested": 1, "achieved": None}],
                "log_columns": ["iteration", "cost", HOSTILE], "log": [[0, 1, 2], [1, 0.5, 3]],
                "phases": [{"name": HOSTILE, "start_node": 0, "nodes": 10}],
                "ground": {"height": -1.2, "friction": 0.6, "steps": [
@@ -126,9 +126,9 @@ class ReportPage(unittest.TestCase):
             "Array.from(document.querySelectorAll('#goals td')).map(cell => cell.textContent)")
         summary = json.loads((self.squat / "summary.json").read_text())
         self.assertEqual(cells[:2], ["depth", "0.8"])
-        self.assertAlmostEqual(float(cells[2]), summary["goals"][0]["came_out"], places=3)
+        self.assertAlmostEqual(float(cells[2]), summary["goals"][0]["achieved"], places=3)
         self.assertEqual(cells[3], "met")
-        summary["goals"][0].update(came_out=0.9, met=False)
+        summary["goals"][0].update(achieved=0.9, met=False)
         missed = self.root / "missed"
         shutil.copytree(self.squat, missed, dirs_exist_ok=True)
         (missed / "summary.json").write_text(json.dumps(summary))
@@ -384,7 +384,7 @@ point_springs:
         result = subprocess.run([BIELLE, "report", str(self.squat), "--png", str(self.root / "none.png")],
                                 capture_output=True, text=True, env={**os.environ, "PATH": "/nonexistent"})
         self.assertEqual(result.returncode, 2)
-        self.assertIn("no Chromium is on the PATH", result.stderr)
+        self.assertIn("is not on the PATH", result.stderr)
         self.assertFalse((self.root / "none.png").exists())
 
     def test_complaints_are_heard(self):

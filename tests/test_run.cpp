@@ -211,7 +211,7 @@ TEST_CASE("run: stages are as short as the fastest swing needs") {
   CHECK(getStep(1.5) == Approx(0.004));
 }
 
-TEST_CASE("run: Bipetto runs as fast as asked, flies in between, and lands softly") {
+TEST_CASE("run: Bipetto runs as fast as requested, flies in between, and lands softly") {
   const RunOptions options;
   Motion motion = makeRun(getBipetto(), options, {Formulation::Reduced, StepRule::Midpoint});
   const Solved solved = solve(motion);
@@ -226,7 +226,7 @@ TEST_CASE("run: Bipetto runs as fast as asked, flies in between, and lands softl
   CHECK(m.torque < 80);
 }
 
-TEST_CASE("hop: Bipetto hops on the foot asked for, and ahead") {
+TEST_CASE("hop: Bipetto hops on the requested foot, and ahead") {
   for (const auto& [foot, length] : {std::pair(0.0, 0.0), std::pair(1.0, 0.15)}) {
     CAPTURE(foot, length);
     HopOptions options;

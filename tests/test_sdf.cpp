@@ -89,7 +89,7 @@ double calcSdfError(const Model& model, ConstVectorRef q_ref, const std::string&
 
 }  // namespace
 
-TEST_CASE("SDF: bodies, joints and loops stand where they are, and what is lost is told") {
+TEST_CASE("SDF: bodies, joints and loops stand where they are, and what is lost is reported") {
   for (const char* name :
        {"bipetto", "cleobot", "delta", "fivebar", "rsu_biped", "belt_biped", "spring_leg", "spring_biped"}) {
     CAPTURE(name);
@@ -130,7 +130,7 @@ TEST_CASE("SDF: limits, springs and names move or change as told, and planar joi
     CHECK_THAT(text.xml, Catch::Contains(part));
   REQUIRE(text.warnings.size() == 3);
   CHECK_THAT(text.warnings[0], Catch::Contains("joint 'a': it is named 'a_joint'"));
-  CHECK_THAT(text.warnings[1], Catch::Contains("joints 'a' 0.5: their coordinates count from these values"));
+  CHECK_THAT(text.warnings[1], Catch::Contains("joints 'a' 0.5: their coordinates are measured from these values"));
   CHECK_THAT(text.warnings[2], Catch::Contains("motors"));
   joint.name = "slide", joint.kind = JointKind::Planar;
   builder.addLink("plate", "a", joint, {1, Vector3d::Zero(), Matrix3d::Identity()});

@@ -115,7 +115,7 @@ TEST_CASE("serial model: the closed one with its linkages locked") {
   }
 }
 
-TEST_CASE("serial model: what was changed is told, motors keep their places") {
+TEST_CASE("serial model: what was changed is reported, motors keep their places") {
   const Bipetto robot;
   std::vector<std::string> motors;
   for (const Motor& motor : robot.serial.model.motors()) {
@@ -165,7 +165,7 @@ TEST_CASE("serial model: refused where there is no serial chain") {
   const Model fivebar = loadRobot("fivebar").model;
   CHECK_THROWS_WITH(makeSerialModel(fivebar, findClosedConfiguration(fivebar).q),
                     Catch::Contains("closures pin: there is no equivalent serial chain") &&
-                        Catch::Contains("mobility 2, the serial joints in it (none)"));
+                        Catch::Contains("mobility 2, but its serial joints (none)"));
   // Crank and coupler aligned: the rocker does not tell where the linkage goes.
   const Model fourbar = loadRobot("fourbar").model;
   AssemblyProblem problem;
@@ -250,7 +250,7 @@ TEST_CASE("a lift fails where the linkage ends, and says so") {
   const size_t beyond = static_cast<size_t>(std::ceil((kRockerEnd - start) / 0.02));
   CHECK(lifted.nodes.size() == beyond + 1);
   CHECK(lifted.nodes.back().status == LiftStatus::UnreachablePosture);
-  CHECK_THAT(lifted.nodes.back().message, Catch::Contains("joint 'rocker_joint' is asked for"));
+  CHECK_THAT(lifted.nodes.back().message, Catch::Contains("joint 'rocker_joint' must reach"));
   CHECK(lifted.nodes.back().joint == "rocker_joint");
   CHECK(lifted.nodes.front().joint.empty());
   CHECK(lifted.trajectory.xs.size() == beyond);

@@ -43,7 +43,7 @@ struct Trial {
     tau = VectorXd::LinSpaced(model.nu(), 3, -5);
   }
 
-  // Power of the motors less that of the torques that were asked for, over the latter.
+  // Power of the motors less that of the torques that were requested, over the latter.
   double calcPowerError(Belief belief) {
     Constant inner(tau);
     SerialController controller(robot.model, serial, inner, belief);
@@ -83,7 +83,7 @@ Policy makeBend(const SerialModel& serial, const VectorXd& q0, double angle) {
 
 }  // namespace
 
-TEST_CASE("serial belief: the motors give the power that was asked for, by the ratio of the posture") {
+TEST_CASE("serial belief: the motors give the power that was requested, by the ratio of the posture") {
   Trial standing(0), bent(0.3);
   CHECK(standing.calcPowerError(Belief::Serial) < 1e-10);
   CHECK(bent.calcPowerError(Belief::Serial) < 1e-10);
@@ -112,7 +112,7 @@ TEST_CASE("serial belief: the plan is one of the closed robot") {
   }
 }
 
-TEST_CASE("serial belief: where linkages cannot follow is told") {
+TEST_CASE("serial belief: places where linkages cannot follow are reported") {
   const Trial trial(0);
   const Policy plan = makeBend(trial.serial, trial.q_s, 3);
   const SerialReference reference = makeReference(trial.robot.model, trial.serial, plan, Belief::Serial);

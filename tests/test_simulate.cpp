@@ -79,7 +79,7 @@ TEST_CASE("simulate: a controller may believe in another model than that of the 
     CAPTURE(model, result.out, result.err);
     CHECK(result.status <= 1);  // it may well fall
     CHECK(result.err.empty());
-    CHECK_THAT(result.out, Catch::Contains("believes in model " + model));
+    CHECK_THAT(result.out, Catch::Contains("with model " + model));
     const nlohmann::json summary = readSummary(output);
     CHECK(summary["believed_model"] == model);
     CHECK(summary["duration"].get<double>() > 0.5);

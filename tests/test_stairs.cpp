@@ -42,7 +42,7 @@ TEST_CASE("stairs: Bipetto goes up and down, every foot on its step") {
   }
 }
 
-TEST_CASE("stairs: the ground is where it was asked for") {
+TEST_CASE("stairs: the ground is where it was requested") {
   StairsOptions options;
   options.height = 0.05;
   options.depth = 0.2;

@@ -197,7 +197,7 @@ TEST_CASE("a study that is interrupted says so; cases of another request are don
   // Nobody else may work in the same directory meanwhile.
   const CommandResult other = directory.run("squat", {"--values", "0.93"});
   CHECK(other.status == 2);
-  CHECK_THAT(other.err, Catch::Contains("another study is at work there"));
+  CHECK_THAT(other.err, Catch::Contains("another study is using it"));
   study.sendSignal(SIGINT);
   const CommandResult end = study.wait();
   CHECK(end.status == 1);
@@ -220,10 +220,10 @@ TEST_CASE("without gnuplot a study has no figures, and says so") {
   arguments.insert(arguments.begin(), {"/usr/bin/env", "PATH=/nowhere"});
   const CommandResult result = runCommand(arguments);
   CHECK(result.status == 0);
-  CHECK_THAT(result.err, Catch::Contains("squat.svg: not drawn, there is no gnuplot"));
+  CHECK_THAT(result.err, Catch::Contains("squat.svg: not drawn: gnuplot is not installed"));
   CHECK_FALSE(fs::exists(directory / "squat.svg"));
   CHECK(fs::exists(directory / "squat.csv"));
-  CHECK_THAT(readFile(directory / "squat.md"), Catch::Contains("there is no gnuplot"));
+  CHECK_THAT(readFile(directory / "squat.md"), Catch::Contains("gnuplot is not installed"));
 }
 
 TEST_CASE("bad studies are refused") {

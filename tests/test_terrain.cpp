@@ -68,7 +68,7 @@ TEST_CASE("terrain: ramps start level, up and down") {
   }
 }
 
-TEST_CASE("terrain: tiles are of the heights asked, and the same for the same seed") {
+TEST_CASE("terrain: tiles are of the requested heights, and the same for the same seed") {
   const TileOptions options{0.03, 0.25, 0.2, 10, 4, 5};
   const Ground ground = makeTiles(options), again = makeTiles(options);
   double lowest = 1, highest = 0;

@@ -90,7 +90,7 @@ TEST_CASE("a walk chooses the best duration of each phase") {
   CHECK(inside >= 2);
 }
 
-TEST_CASE("a result has the durations that came out, and a warm start goes on from them") {
+TEST_CASE("a result has the final durations, and a warm start goes on from them") {
   const Model model = loadRobot("bipetto").model;
   const Solution walk = solve(makeTimedWalk(model));
   const MotionResult result = makeResult({"bipetto", "", {}}, walk.motion, walk.motion.guess, walk.summary);
@@ -126,7 +126,7 @@ TEST_CASE("a result has the durations that came out, and a warm start goes on fr
   CHECK(solve(std::move(again)).summary.cost == Approx(walk.summary.cost).epsilon(1e-7));
 }
 
-TEST_CASE("a plan with the durations that came out makes the same steps") {
+TEST_CASE("a plan with the final durations makes the same steps") {
   const Model model = loadRobot("bipetto").model;
   const Solution walk = solve(makeTimedWalk(model));
   MotionPlan plan = planWalk(model, makeOptions(), makeStandingPosture(model));

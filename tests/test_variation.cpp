@@ -319,7 +319,7 @@ TEST_CASE("variation: Bipetto on one foot with its motors held, when its rods ch
                   }));
 }
 
-TEST_CASE("variation: what cannot be is told") {
+TEST_CASE("variation: impossible changes are reported") {
   const Mechanism mechanism = makePlanarFourBar(0.4, 0.15, 0.35, 0.3, 1.1);
   const ConstraintSet set = makeConstraintSet(mechanism.model);
   const VectorXd none, one = VectorXd::Ones(1);

@@ -140,7 +140,7 @@ TEST_CASE("gait: swings start and end at rest, the pendulum's zero-moment point 
   }
 }
 
-TEST_CASE("walk: Bipetto walks as fast as asked, on its feet") {
+TEST_CASE("walk: Bipetto walks as fast as requested, on its feet") {
   for (double speed : {0.3, 0.5, 0.8, 1.0}) {
     CAPTURE(speed);
     WalkOptions options;
@@ -237,7 +237,7 @@ TEST_CASE("walk: the full formulation walks alike") {
   CHECK(calcSpeed(full.measures).x() == Approx(0.5).epsilon(0.05));
 }
 
-TEST_CASE("side walk and turns: where they were asked to go") {
+TEST_CASE("side walk and turns: where they were requested to go") {
   SideWalkOptions side;
   side.speed = -0.4;
   const Solved right = solve(makeSideWalk(getBipetto(), side));

@@ -159,8 +159,8 @@ def test_bad_results():
     with Workers(port, 4, BAD=os.path.abspath("bad"), NAP="0"):
         assert campaign("poisoned", port, "bad.log").wait() == 0, read("bad.log")
     told = read("bad.log")
-    assert not os.listdir("bad") and told.count("; once more") == len(kinds), told
-    for words in ("distance is no number", "no outcome 'flew'", "exit status was", "parse error", "did not write it",
+    assert not os.listdir("bad") and told.count("; retrying") == len(kinds), told
+    for words in ("distance is not a number", "no outcome 'flew'", "exit status was", "parse error", "did not write it",
                   "exit status 3", "signal 9", "larger than"):
         assert words in told, (words, told)
     check_same("poisoned")
@@ -173,7 +173,7 @@ def test_bad_results():
         open(f"bad/{kind}", "w").close()
     with Workers(port, 1, BAD=os.path.abspath("bad"), NAP="0"):
         assert campaign("never", port, "never.log", "one.yaml").wait() == 1
-    assert "some runs broke down" in read("never.log") and not list_runs("never")
+    assert "some runs failed" in read("never.log") and not list_runs("never")
 
 
 def test_interruption():
@@ -197,7 +197,7 @@ def test_password():
         file.write("guess\n")
     manager = campaign("guarded", port, "guarded.log", "one.yaml")
     with Workers(port, 1, password="wrong", NAP="0", DONE=os.path.abspath("guarded-done")):
-        wait_for(lambda: "workers join by" in read("guarded.log"))
+        wait_for(lambda: "start workers with" in read("guarded.log"))
         time.sleep(1.5)
         assert not os.path.exists("guarded-done") and manager.poll() is None
     with Workers(port, 1, NAP="0"):
@@ -209,8 +209,8 @@ def test_arguments():
         result = subprocess.run([command or program, "campaign", "one.yaml", "-o", "x", *arguments], text=True,
                                 capture_output=True)
         assert result.returncode == 2 and words in result.stderr, (arguments, result)
-    refuse("--workers", "70000", words="it is no port")
-    refuse("--workers", "soon", words="it is no port")
+    refuse("--workers", "70000", words="it is not a port")
+    refuse("--workers", "soon", words="it is not a port")
     refuse("--workers", "auto", "--password", "nowhere", words="nowhere")
     refuse("--password", "password", words="--workers")
     open("empty", "w").close()
@@ -288,7 +288,7 @@ search: {searches: 2, stages: [{algorithm: crs, evaluations: 4}, {algorithm: sls
             wait_for(lambda: len(list_evaluations("design-together")) >= count)
             manager.send_signal(number)
             assert manager.wait() == status, read("design.log")
-        assert "interrupted; the same command goes on" in read("design.log")
+        assert "interrupted; run the same command again" in read("design.log")
         assert start(command, "design.log").wait() == 0, read("design.log")
     for name in ("design.md", "best/best.urdf", "best/best.yaml"):
         assert read(f"design-alone/{name}") == read(f"design-together/{name}") != "", name

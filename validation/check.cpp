@@ -136,7 +136,7 @@ void printReport(std::ostream& out, const CheckReport& report, CheckPrint print)
   const auto missed =
       std::count_if(report.rows.begin(), report.rows.end(), [](const auto& r) { return r.isMissedGoal(); });
   out << "check of " << report.motion << ", " << report.robot << ", " << report.nodes
-      << " nodes: " << (failed == 0 ? "passed" : "FAILED by " + countRows(failed, "row"))
+      << " nodes: " << (failed == 0 ? "passed" : "FAILED: " + countRows(failed, "row"))
       << (missed == 0 ? "" : ", " + countRows(missed, "goal") + " missed") << "\n";
   for (const CheckRow& row : report.rows)
     if (print == CheckPrint::All || !row.passed() || row.isMissedGoal()) printRow(out, row);

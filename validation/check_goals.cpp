@@ -14,8 +14,8 @@ class GoalMeter {
  public:
   GoalMeter(const CheckContext& context, const Goal& goal) : context_(context), goal_(goal) {
     require(goal.first <= goal.last && goal.last <= context.motion.numStages(), "its nodes do not fit the trajectory");
-    require(std::isfinite(goal.asked) && std::isfinite(goal.tolerance) && goal.direction.allFinite(),
-            "a number of it is not finite");
+    require(std::isfinite(goal.requested) && std::isfinite(goal.tolerance) && goal.direction.allFinite(),
+            "it contains a number that is not finite");
   }
 
   double measure() const {
@@ -45,7 +45,7 @@ class GoalMeter {
   void require(bool ok, const std::string& problem) const {
     if (!ok)
       throw ModelError(context_.motion.summary.file, "goal '" + goal_.name + "'", problem,
-                       "make it anew with `bielle solve`");
+                       "recreate it with `bielle solve`");
   }
   const Vector3d& getCom(int node) const { return context_.trace.nodes[node].com; }
   const Vector3d& getFoot(const std::string& name, int node) const {
@@ -111,19 +111,19 @@ class GoalMeter {
 
 void addGoalRows(CheckContext& context) {
   Worst claims;
-  for (const GoalOutcome& told : context.motion.summary.goals) {
-    const Goal& goal = told.goal;
+  for (const GoalOutcome& reported : context.motion.summary.goals) {
+    const Goal& goal = reported.goal;
     const double value = GoalMeter(context, goal).measure();
     const std::string unit = getUnit(goal.kind);
     char note[64];
-    std::snprintf(note, sizeof note, "asked; tolerance %.3g%s", goal.tolerance,
+    std::snprintf(note, sizeof note, "requested; tolerance %.3g%s", goal.tolerance,
                   unit == "1" ? "" : (" " + unit).c_str());
-    context.rows.push_back({"goal: " + goal.name, CheckRow::Kind::Goal, value, goal.asked, unit, note});
+    context.rows.push_back({"goal: " + goal.name, CheckRow::Kind::Goal, value, goal.requested, unit, note});
     context.rows.back().tolerance = goal.tolerance;
-    const double difference = std::abs(value - told.came_out);
+    const double difference = std::abs(value - reported.achieved);
     claims.add(std::isnan(difference) ? std::numeric_limits<double>::infinity() : difference, goal.last, goal.name);
   }
-  context.add(claims, "goals: told, against measured", "", context.bounds.goal, "no goal was told");
+  context.add(claims, "goals: reported vs. measured", "", context.bounds.goal, "no goal was reported");
 }
 
 }  // namespace bielle::validation

@@ -13,7 +13,7 @@
 namespace bielle::validation {
 namespace {
 
-const char* const kRemedy = "make it anew with `bielle solve`";
+const char* const kRemedy = "recreate it with `bielle solve`";
 
 void require(bool ok, const CheckedMotion& motion, const std::string& element, const std::string& problem) {
   if (!ok) throw ModelError(motion.summary.file, element, problem, kRemedy);
@@ -35,7 +35,7 @@ void checkNames(const CheckedMotion& motion) {
     if (names == expected) return;
     throw ModelError(motion.summary.file, std::string("trajectory of '") + model.name() + "'",
                      std::string("its ") + what + " are not those of the robot",
-                     "check it with the robot it was made for, or make it anew");
+                     "check it with the robot it was made for, or recreate it");
   };
   compare("positions", record.q_names, makePositionNames(model));
   compare("velocities", record.v_names, makeVelocityNames(model));
@@ -48,7 +48,7 @@ void checkPhases(const CheckedMotion& motion) {
   int node = 0;
   for (const MotionSummary::Phase& phase : motion.summary.phases) {
     const std::string element = "phase '" + phase.name + "'";
-    require(phase.start_node == node, motion, element, "it does not start where the one before ends");
+    require(phase.start_node == node, motion, element, "it does not start where the previous phase ends");
     require(phase.nodes >= 0 && phase.nodes <= motion.numStages() - node, motion, element,
             "its nodes do not fit into the trajectory");
     node += phase.nodes;
@@ -89,11 +89,11 @@ bool CheckedMotion::stands(int contact, int node) const {
 
 void checkConsistency(const CheckedMotion& motion) {
   require(motion.record.has_midpoints == (motion.summary.step == StepRule::Midpoint), motion, "entry 'step'",
-          "the trajectory has midpoints and the summary names Euler steps, or the reverse");
+          "the trajectory has midpoints but the summary names Euler steps, or the reverse");
   checkNames(motion);
-  require(motion.numStages() >= 1, motion, "trajectory", "it has no stage");
+  require(motion.numStages() >= 1, motion, "trajectory", "it has no stages");
   require(isFinite(motion.summary.ground) && motion.summary.ground.friction >= 0, motion, "entry 'ground'",
-          "a number is not finite, or the friction negative");
+          "a number is not finite, or the friction is negative");
   checkPhases(motion);
 }
 

@@ -20,15 +20,15 @@ constexpr int kPasses = 0, kFails = 1, kBadInput = 2;
 int main(int argc, char** argv) {
   ignoreClosedPipes();
   CLI::App app{
-      "Checks a motion that `bielle solve` wrote, from its files alone: forces and energies by Simbody's dynamics, "
-      "steps, "
-      "loops, feet, friction, limits. Status 0: passes; 1: a check fails; 2: bad input."};
+      "Checks a result of `bielle solve` from its files alone: forces and energies with Simbody's dynamics, steps, "
+      "loops, feet, friction, limits. Exit status: 0 passed, 1 a check failed, 2 bad input."};
   app.name("bielle check");
   std::string directory;
   bool json = false, brief = false;
-  app.add_option("DIR", directory, "with trajectory.npz and summary.json; check.json is written there")->required();
+  app.add_option("DIR", directory, "directory with trajectory.npz and summary.json; check.json is written there")
+      ->required();
   app.add_flag("--json", json, "print JSON instead of the table");
-  app.add_flag("--brief", brief, "print one line, and what fails")->excludes("--json");
+  app.add_flag("--brief", brief, "print one line and the rows that fail")->excludes("--json");
   app.footer("Example:\n  bielle solve squat --robot bipetto --depth 0.7 -o squat && bielle check squat");
   try {
     app.parse(argc, argv);

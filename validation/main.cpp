@@ -48,38 +48,38 @@ ValidationReport validate([[maybe_unused]] const std::string& engine, const Mode
 int main(int argc, char** argv) {
   ignoreClosedPipes();
   CLI::App app{
-      "Compares the dynamics of robots with Simbody's or MuJoCo's on random closed states. Status 0: all agree; 1: a "
-      "row fails; "
-      "2: bad input."};
+      "Compares the dynamics of robots with Simbody's or MuJoCo's at random closed states. Exit status: 0 all agree, 1 "
+      "a row failed, 2 bad input."};
   std::vector<std::string> robots;
   ValidationOptions options;
   std::string base, engine = "simbody";
   bool json = false;
-  app.add_option("ROBOT", robots, "names, directories or .urdf files; by default all robots known by name");
-  app.add_option("--samples", options.samples, "random states per robot")
+  app.add_option("ROBOT", robots, "names, directories or .urdf files; default: all robots known by name");
+  app.add_option("--samples", options.samples, "number of random states per robot")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
-  app.add_option("--seed", options.seed, "of the random states")->capture_default_str();
+  app.add_option("--seed", options.seed, "seed of the random states")->capture_default_str();
   app.add_option("--tolerance", options.tolerance, "relative difference allowed")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--derivatives", options.derivative_samples, "states whose derivatives are compared")
+  app.add_option("--derivatives", options.derivative_samples, "number of states whose derivatives are compared")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_option("--motion", options.motion_duration,
-                 "seconds of a free motion integrated by both programs, 0 for none")
+                 "duration of a free motion integrated by both programs [s]; 0: none")
       ->check(CLI::Range(0.0, 60.0))
       ->capture_default_str();
-  app.add_option("--motion-step", options.motion_step, "of our integrator there [s]; fast mechanisms need less")
+  app.add_option("--motion-step", options.motion_step,
+                 "time step of Bielle's integrator for it [s]; fast mechanisms need less")
       ->check(CLI::Range(1e-6, 0.1))
       ->capture_default_str();
-  app.add_option("--base", base, "overrides the robot's own base")->check(CLI::IsMember({"free", "fixed"}));
+  app.add_option("--base", base, "base to use instead of the robot's own")->check(CLI::IsMember({"free", "fixed"}));
   std::vector<std::string> engines = {"simbody"};
 #ifdef BIELLE_WITH_MUJOCO
   engines.push_back("mujoco");
 #endif
   app.add_option("--engine", engine,
-                 "simbody: every quantity; mujoco: mass matrix, bias and accelerations, whose closures are soft there")
+                 "simbody: every quantity; mujoco: mass matrix, bias and accelerations (its closures are soft)")
       ->check(CLI::IsMember(engines))
       ->capture_default_str();
   app.add_flag("--json", json, "print JSON instead of tables");

@@ -292,7 +292,7 @@ TEST_CASE("check: files that are missing, broken or of another robot are refused
   poison("/phases/0/start_node", 1, "does not start");
   poison("/phases/0/nodes", 199, "not as long");
   poison("/phases/0/nodes", 201, "do not fit");
-  poison("/phases/0/nodes", -3, "no number of nodes");
+  poison("/phases/0/nodes", -3, "not a number of nodes");
   poison("/phases", Json::array(), "not as long");
   poison("/phases/0/contacts/0/name", "hand", "no contact 'hand'");
   poison("/phases/0/contacts/0/name", "foot_right", "stands twice");

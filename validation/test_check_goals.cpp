@@ -18,7 +18,7 @@ using namespace bielle::validation;
 
 namespace {
 
-constexpr const char* kClaims = "goals: told, against measured";
+constexpr const char* kClaims = "goals: reported vs. measured";
 
 const LoadedRobot& getBipetto() {
   static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
@@ -71,23 +71,23 @@ TEST_CASE("check: every kind of goal comes out of Simbody's kinematics as the su
     const CheckReport report = checkMotion(motion);
     CAPTURE(motion.summary.motion);
     REQUIRE(!motion.summary.goals.empty());
-    for (const GoalOutcome& told : motion.summary.goals) {
-      CAPTURE(told.goal.name, told.came_out);
-      const CheckRow& row = find(report, "goal: " + told.goal.name);
-      CHECK(*row.value == Approx(told.came_out).margin(1e-10));
-      CHECK(row.bound == told.goal.asked);
-      CHECK(row.isMissedGoal() == !told.met());
-      kinds.insert(told.goal.kind);
+    for (const GoalOutcome& reported : motion.summary.goals) {
+      CAPTURE(reported.goal.name, reported.achieved);
+      const CheckRow& row = find(report, "goal: " + reported.goal.name);
+      CHECK(*row.value == Approx(reported.achieved).margin(1e-10));
+      CHECK(row.bound == reported.goal.requested);
+      CHECK(row.isMissedGoal() == !reported.met());
+      kinds.insert(reported.goal.kind);
     }
     CHECK(find(report, kClaims).passed());
   }
   CHECK(kinds.size() == 7);
 }
 
-TEST_CASE("check: a goal that is missed is told, and fails nothing") {
+TEST_CASE("check: a missed goal is reported, and fails nothing") {
   CheckedMotion motion = makeShortWalk();
-  for (GoalOutcome& told : motion.summary.goals)
-    if (told.goal.kind == GoalKind::Speed) told.goal.asked *= 1.2;
+  for (GoalOutcome& reported : motion.summary.goals)
+    if (reported.goal.kind == GoalKind::Speed) reported.goal.requested *= 1.2;
   const CheckReport report = checkMotion(motion);
   const CheckRow& row = find(report, "goal: speed");
   CHECK(row.isMissedGoal());
@@ -95,7 +95,7 @@ TEST_CASE("check: a goal that is missed is told, and fails nothing") {
   for (CheckPrint print : {CheckPrint::All, CheckPrint::Failures}) {
     std::ostringstream text;
     printReport(text, report, print);
-    CHECK_THAT(text.str(), Catch::Contains("1 goal missed") && Catch::Contains("MISS  asked; tolerance 0.025 m/s"));
+    CHECK_THAT(text.str(), Catch::Contains("1 goal missed") && Catch::Contains("MISS  requested; tolerance 0.025 m/s"));
   }
   CHECK_THAT(formatReport(report), Catch::Contains("\"met\": false"));
 }
@@ -107,9 +107,9 @@ TEST_CASE("check: a summary that tells of a goal what the trajectory does not do
     poison(motion);
     CHECK_FALSE(find(checkMotion(motion), kClaims).passed());
   };
-  expectFailure([](CheckedMotion& m) { m.summary.goals[0].came_out = m.summary.goals[0].goal.asked; });
-  expectFailure([](CheckedMotion& m) { m.summary.goals[0].came_out = std::nan(""); });
-  expectFailure([](CheckedMotion& m) { m.summary.goals[1].came_out += 1e-6; });
+  expectFailure([](CheckedMotion& m) { m.summary.goals[0].achieved = m.summary.goals[0].goal.requested; });
+  expectFailure([](CheckedMotion& m) { m.summary.goals[0].achieved = std::nan(""); });
+  expectFailure([](CheckedMotion& m) { m.summary.goals[1].achieved += 1e-6; });
   // The trajectory is slower than it was when the summary was written.
   expectFailure([](CheckedMotion& m) { m.record.q.col(0) *= 0.84; });
 }
@@ -123,7 +123,7 @@ TEST_CASE("check: goals that do not fit their trajectory are refused") {
   };
   refuse("nodes do not fit", [](Goal& speed, Goal&) { speed.last = 100000; });
   refuse("no time passes", [](Goal& speed, Goal&) { speed.last = speed.first; });
-  refuse("not finite", [](Goal& speed, Goal&) { speed.asked = std::nan(""); });
+  refuse("not finite", [](Goal& speed, Goal&) { speed.requested = std::nan(""); });
   refuse("nodes do not fit", [](Goal&, Goal& footholds) { footholds.footholds[0].node = 100000; });
   refuse("no contact 'hand'", [](Goal&, Goal& footholds) { footholds.footholds[0].contact = "hand"; });
 }

@@ -39,9 +39,10 @@ class Manager {
     // Set by nobody here: with a name, Work Queue reports to a public catalogue.
     for (const char* name : {"WORK_QUEUE_NAME", "WORK_QUEUE_PORT"}) unsetenv(name);
     queue_.reset(work_queue_create(port == 0 ? -1 : port));
-    if (!queue_) throw std::runtime_error("port " + std::to_string(port) + " cannot be opened: another process has it");
+    if (!queue_)
+      throw std::runtime_error("port " + std::to_string(port) + " cannot be opened: another process is using it");
     if (password && !work_queue_specify_password_file(queue_.get(), password))
-      throw std::runtime_error(std::string(password) + ": file: no password can be read there");
+      throw std::runtime_error(std::string(password) + ": file: it contains no password");
     work_queue_specify_keepalive_interval(queue_.get(), kKeepAlive);
     work_queue_specify_keepalive_timeout(queue_.get(), kKeepAlive);
     say({{"port", work_queue_port(queue_.get())}});
@@ -73,7 +74,7 @@ class Manager {
   static void specify(work_queue_task* task, const std::string& here, const std::string& there,
                       work_queue_file_type_t type, work_queue_file_flags_t flags) {
     if (!work_queue_task_specify_file(task, here.c_str(), there.c_str(), type, flags))
-      throw std::runtime_error("Work Queue takes no file " + there);
+      throw std::runtime_error("Work Queue does not accept file " + there);
   }
 
   static void say(const json& message) {
@@ -100,7 +101,7 @@ class Manager {
 
 int main(int argc, char** argv) {
   if (argc < 2 || argc > 3) {
-    std::cerr << "bielle-workers PORT [FILE]: `bielle campaign --workers PORT --password FILE` starts it\n";
+    std::cerr << "usage: bielle-workers PORT [FILE]; started by `bielle campaign --workers PORT --password FILE`\n";
     return 2;
   }
   try {

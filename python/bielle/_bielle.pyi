@@ -188,7 +188,7 @@ class Joint:
         ...
     @property
     def velocity_importance(self) -> float:
-        """likewise"""
+        """likewise for its velocity"""
         ...
 
 class Body:
@@ -230,7 +230,7 @@ class Frame:
         ...
 
 class Shape:
-    """The room that a body takes up: all points within a radius of a box fixed in it.
+    """A shape of a body: all points within a radius of a box fixed in it.
 
     Immutable; `replace` makes a changed copy.
     """
@@ -255,7 +255,7 @@ class Shape:
         ...
     @property
     def fitted(self) -> bool:
-        """to a visual, because the files of the robot give its body no shape"""
+        """fitted to a visual, because the robot's files give its body no shape"""
         ...
 
 class Visual:
@@ -485,11 +485,11 @@ class Closure:
         ...
     @property
     def terms(self) -> Tuple[CouplerTerm, ...]:
-        """of a coupler"""
+        """terms of a coupler"""
         ...
     @property
     def offset(self) -> float:
-        """of a coupler"""
+        """offset of a coupler"""
         ...
     @property
     def dofs(self) -> Tuple[int, ...]:
@@ -551,7 +551,7 @@ class MotorDrive:
         ...
     @property
     def voltage(self) -> float:
-        """of the supply, V"""
+        """voltage of the supply, V"""
         ...
     @property
     def current(self) -> float:
@@ -559,15 +559,15 @@ class MotorDrive:
         ...
     @property
     def continuous_current(self) -> float:
-        """that the winding bears for ever, A"""
+        """current that the winding can sustain indefinitely, A"""
         ...
     @property
     def efficiency(self) -> float:
-        """of the gear while the motor drives"""
+        """efficiency of the gear while the motor drives"""
         ...
     @property
     def back_efficiency(self) -> float:
-        """of the gear while the joint drives the motor"""
+        """efficiency of the gear while the joint drives the motor"""
         ...
     @property
     def mass(self) -> float:
@@ -612,7 +612,7 @@ class Motor:
         ...
     @property
     def continuous_effort(self) -> float:
-        """root mean square that it bears for ever, N m or N"""
+        """root mean square that it can sustain indefinitely, N m or N"""
         ...
     @property
     def drive(self) -> MotorDrive:
@@ -645,11 +645,11 @@ class ContactFrame:
         ...
     @property
     def half_length(self) -> float:
-        """of the sole, along x, m"""
+        """half the length of the sole, along x, m"""
         ...
     @property
     def half_width(self) -> float:
-        """of the sole, along y, m"""
+        """half the width of the sole, along y, m"""
         ...
 
 class Reference:
@@ -670,7 +670,7 @@ class Reference:
         ...
     @property
     def height_frame(self) -> str:
-        """whose height is given; empty: joints alone"""
+        """frame whose height is given; empty: only joints are given"""
         ...
     @property
     def height(self) -> float:
@@ -716,7 +716,7 @@ class ConstraintSet:
     def __eq__(self, other: object) -> bool: ...
     @property
     def closures(self) -> Tuple[Closure, ...]:
-        """of the model, then contacts as closures to the world"""
+        """closures of the model, then contacts as closures to the world"""
         ...
     @property
     def contacts(self) -> Tuple[int, ...]:
@@ -736,7 +736,7 @@ class ConstraintSet:
         ...
 
 class ModelParts:
-    """What a model consists of.
+    """The parts of a model.
 
     Immutable; `replace` makes a changed copy.
     """
@@ -745,7 +745,7 @@ class ModelParts:
     def __eq__(self, other: object) -> bool: ...
     @property
     def name(self) -> str:
-        """of the robot"""
+        """name of the robot"""
         ...
     @property
     def gravity(self) -> Array:
@@ -765,7 +765,7 @@ class ModelParts:
         ...
     @property
     def closures(self) -> Tuple[Closure, ...]:
-        """of the loops"""
+        """closures of the loops"""
         ...
     @property
     def motors(self) -> Tuple[Motor, ...]:
@@ -793,7 +793,7 @@ class ModelParts:
         ...
     @property
     def shapes(self) -> Tuple[Shape, ...]:
-        """the room that bodies take up"""
+        """shapes of the bodies, for distances"""
         ...
     @property
     def serial_joints(self) -> Tuple[int, ...]:
@@ -823,7 +823,7 @@ class Model:
     """
     @property
     def name(self) -> str:
-        """of the robot"""
+        """name of the robot"""
         ...
     @property
     def nq(self) -> int:
@@ -867,7 +867,7 @@ class Model:
         ...
     @property
     def closures(self) -> Tuple[Closure, ...]:
-        """of the loops"""
+        """closures of the loops"""
         ...
     @property
     def clusters(self) -> Tuple[LoopCluster, ...]:
@@ -899,7 +899,7 @@ class Model:
         ...
     @property
     def shapes(self) -> Tuple[Shape, ...]:
-        """the room that bodies take up, as boxes with rounded edges"""
+        """shapes of the bodies for distances, as boxes with rounded edges"""
         ...
     @property
     def serial_joints(self) -> Tuple[int, ...]:
@@ -986,10 +986,10 @@ class Model:
         """Momentum about the centre of mass in world axes (6,), kg m/s and kg m^2/s."""
         ...
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> Array:
-        """Of bodies and rotors, J."""
+        """Kinetic energy of bodies and rotors, J."""
         ...
     def potential_energy(self, q: ArrayLike) -> Array:
-        """Of gravity, zero for a centre of mass at the origin, J."""
+        """Potential energy of gravity, zero for a centre of mass at the origin, J."""
         ...
     def closure_residual(self, q: ArrayLike) -> Array:
         """Closing errors of all closures (num_closure_rows,), m and rad; zero if and only if closed."""
@@ -1050,7 +1050,7 @@ class Model:
 class ModelBuilder:
     """Collects bodies, joints, closures, motors and frames, then validates them and makes the model.
 
-    Bodies go by the name of their link; "world" is the ground. What is referred to must be declared before. Errors are ModelErrors that name the element and the remedy.
+    Bodies go by the name of their link; "world" is the ground. Elements must be declared before they are referred to. Errors are ModelErrors that name the element and the remedy.
     """
     def __init__(self, name: str) -> None: ...
     def add_link(self, link: str, parent_link: str, joint: Joint, inertia: Inertia, limits: JointLimits = ...) -> None:
@@ -1063,7 +1063,7 @@ class ModelBuilder:
         """A named frame on a link; X_LF is its placement there (SE3, m)."""
         ...
     def add_closure(self, name: str, kind: ClosureKind, frame1: str, frame2: str, axis: ArrayLike = ..., kp: float = ..., kd: float = ...) -> None:
-        """Closes a loop: two frames coincide, as far as the ClosureKind says.
+        """Closes a loop: two frames coincide as specified by the ClosureKind.
 
         axis: (3,), of a hinge, in frame 1; kp [1/s^2], kd [1/s]: Baumgarte stabilization.
         """
@@ -1093,7 +1093,7 @@ class ModelBuilder:
         """A posture by name."""
         ...
     def add_shape(self, link: str, shape: Shape) -> None:
-        """The room that a link takes up."""
+        """A shape of a link, for distances."""
         ...
     def add_visual(self, link: str, visual: Visual) -> None:
         """What is drawn of a link."""
@@ -1108,7 +1108,7 @@ class ModelBuilder:
         """Inertia that is added to every dof of a joint, kg m^2 or kg."""
         ...
     def build(self) -> Model:
-        """The Model. Raises ModelError naming the element that is wrong."""
+        """The Model. Raises ModelError naming the faulty element."""
         ...
 
 class Robot:
@@ -1121,7 +1121,7 @@ class Robot:
     def __eq__(self, other: object) -> bool: ...
     @property
     def name(self) -> str:
-        """as it was asked for"""
+        """as requested"""
         ...
     @property
     def model(self) -> Model:
@@ -1229,7 +1229,7 @@ class RatioSample:
         ...
     @property
     def motors(self) -> Array:
-        """of its motors (m,)"""
+        """angles of its motors (m,), rad or m"""
         ...
     @property
     def ratio(self) -> LinkageRatio:
@@ -1331,7 +1331,7 @@ class Ground:
     def __eq__(self, other: object) -> bool: ...
     @property
     def height(self) -> float:
-        """of the plane, m"""
+        """height of the plane, m"""
         ...
     @property
     def friction(self) -> float:
@@ -1462,11 +1462,11 @@ class Cost:
         ...
     @property
     def residual(self) -> Union[LibraryResidual, Residual]:
-        """of the library (bielle.residuals), or a Residual written in Python"""
+        """residual of the library (bielle.residuals), or a Residual written in Python"""
         ...
     @property
     def defines(self) -> bool:
-        """it says what the motion is, and keeps its weight for every objective"""
+        """it defines the motion, and keeps its weight for every objective"""
         ...
 
 class PathConstraint:
@@ -1483,7 +1483,7 @@ class PathConstraint:
         ...
     @property
     def residual(self) -> Union[LibraryResidual, Residual]:
-        """of the library (bielle.residuals), or written in Python"""
+        """residual of the library (bielle.residuals), or written in Python"""
         ...
     @property
     def lower(self) -> Array:
@@ -1670,12 +1670,12 @@ class LibraryResidual:
         ...
     @property
     def origin(self) -> Optional[Tuple[str, Tuple[Any, ...]]]:
-        """(function of bielle.residuals, its arguments); None for those that the library put into a motion"""
+        """(function of bielle.residuals, its arguments); None for residuals that the library put into a motion"""
         ...
     def __eq__(self, other: object) -> bool: ...
 
 class Node:
-    """What a residual may read; valid during one call. Its arrays are copies."""
+    """Data that a residual can read; valid during one call. Its arrays are copies."""
     @property
     def q(self) -> Array:
         """configuration (nq,)"""
@@ -1690,15 +1690,15 @@ class Node:
         ...
     @property
     def forces(self) -> Array:
-        """of closures and contacts (rows,), N and N m; empty at the terminal node"""
+        """forces of closures and contacts (rows,), N and N m; empty at the terminal node"""
         ...
     @property
     def speeds(self) -> Array:
-        """of the motors when the torques act (nu,), rad/s or m/s"""
+        """motor speeds when the torques act (nu,), rad/s or m/s"""
         ...
     @property
     def time_scale(self) -> float:
-        """of a free duration"""
+        """time scale of a free duration"""
         ...
     @property
     def constraints(self) -> ConstraintSet:
@@ -1710,7 +1710,7 @@ class Node:
         ...
     @property
     def com_jacobian(self) -> Array:
-        """of the centre of mass by the tangent of q (3, nv); in calc_jacobian alone"""
+        """Jacobian of the centre of mass by the tangent of q (3, nv); only in calc_jacobian"""
         ...
     def placement(self, frame: str) -> SE3:
         """SE3 of a link, frame or contact in the world."""
@@ -1719,7 +1719,7 @@ class Node:
         """Twist of a frame in its own coordinates (6,), m/s and rad/s."""
         ...
     def frame_jacobian(self, frame: str) -> Array:
-        """Jacobian of that twist (6, nv); in calc_jacobian alone."""
+        """Jacobian of that twist (6, nv); only in calc_jacobian."""
         ...
 
 class ControlBounds:
@@ -1785,11 +1785,11 @@ class ConstraintOptions:
         ...
     @property
     def initial_barrier(self) -> float:
-        """of an interior point, in the unit of the cost"""
+        """initial barrier of the interior point method, in the unit of the cost"""
         ...
     @property
     def final_barrier(self) -> float:
-        """that of a converged solve"""
+        """barrier of a converged solve"""
         ...
 
 class SolverOptions:
@@ -1810,7 +1810,7 @@ class SolverOptions:
         ...
     @property
     def gap_tolerance(self) -> float:
-        """of every entry of the gaps"""
+        """largest entry of the gaps"""
         ...
     @property
     def cost_tolerance(self) -> float:
@@ -1822,7 +1822,7 @@ class SolverOptions:
         ...
     @property
     def initial_regularization(self) -> float:
-        """of the first sweep"""
+        """regularization of the first sweep"""
         ...
     @property
     def min_regularization(self) -> float:
@@ -1842,7 +1842,7 @@ class SolverOptions:
         ...
     @property
     def state_regularization_ratio(self) -> float:
-        """of states over controls"""
+        """ratio of the regularization of states to that of controls"""
         ...
     @property
     def long_step(self) -> float:
@@ -1858,7 +1858,7 @@ class SolverOptions:
         ...
     @property
     def acceptance(self) -> float:
-        """share of the foreseen decrease, in (0, 1)"""
+        """share of the predicted decrease, in (0, 1)"""
         ...
     @property
     def bounds(self) -> ControlBounds:
@@ -1926,11 +1926,11 @@ class Iteration:
         ...
     @property
     def step(self) -> float:
-        """length, 0: none was taken"""
+        """step length; 0: no step was taken"""
         ...
     @property
     def regularization(self) -> float:
-        """of the sweep"""
+        """regularization of the sweep"""
         ...
     @property
     def seconds(self) -> float:
@@ -1938,7 +1938,7 @@ class Iteration:
         ...
 
 class Summary:
-    """How a solve went.
+    """The outcome of a solve.
 
     Immutable; `replace` makes a changed copy.
     """
@@ -1959,7 +1959,7 @@ class Summary:
         ...
     @property
     def cost(self) -> float:
-        """of the returned trajectory"""
+        """cost of the returned trajectory"""
         ...
     @property
     def gap(self) -> float:
@@ -1983,7 +1983,7 @@ class Summary:
         ...
     @property
     def penalty(self) -> float:
-        """of violated constraints; 0: there are none"""
+        """penalty of violated constraints; 0: there are none"""
         ...
     @property
     def multiplier_updates(self) -> int:
@@ -2015,7 +2015,7 @@ class Summary:
         ...
 
 class Multipliers:
-    """Of the constraints, node by node.
+    """Multipliers of the constraints, node by node.
 
     Immutable; `replace` makes a changed copy.
     """
@@ -2028,7 +2028,7 @@ class Multipliers:
         ...
     @property
     def penalty(self) -> float:
-        """of violated constraints"""
+        """penalty of violated constraints"""
         ...
 
 class Objective:
@@ -2061,7 +2061,7 @@ class LimitOptions:
         ...
     @property
     def velocities(self) -> Dict[str, float]:
-        """by motor, rad/s or m/s, likewise"""
+        """by motor, rad/s or m/s, instead of the model's"""
         ...
     @property
     def powers(self) -> Dict[str, float]:
@@ -2073,7 +2073,7 @@ class LimitOptions:
         ...
 
 class TimingBounds:
-    """Bounds of a duration over the nominal one.
+    """Bounds of a duration relative to the nominal one.
 
     Immutable; `replace` makes a changed copy.
     """
@@ -2103,11 +2103,11 @@ class TimingOptions:
         ...
     @property
     def time_weight(self) -> float:
-        """cost of a second of these phases"""
+        """cost per second of these phases"""
         ...
 
 class ObjectiveOptions:
-    """What a motion minimizes beside what defines it.
+    """What a motion minimizes besides the costs that define it.
 
     Immutable; `replace` makes a changed copy.
     """
@@ -2120,7 +2120,7 @@ class ObjectiveOptions:
         ...
     @property
     def regeneration(self) -> float:
-        """share of energy that flows back and is used again, 0 to 1"""
+        """share of the regenerated energy that is reused, 0 to 1"""
         ...
     @property
     def regularization(self) -> Optional[float]:
@@ -2194,7 +2194,7 @@ class Foothold:
         ...
     @property
     def position(self) -> Array:
-        """of the origin of its contact frame (3,), m"""
+        """position of the origin of its contact frame (3,), m"""
         ...
 
 class Goal:
@@ -2202,8 +2202,8 @@ class Goal:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, kind: GoalKind = ..., name: str = ..., asked: float = ..., tolerance: float = ..., first: int = ..., last: int = ..., direction: ArrayLike = ..., contacts: Sequence[str] = ..., footholds: Sequence[Foothold] = ...) -> None: ...
-    def replace(self, *, kind: GoalKind = ..., name: str = ..., asked: float = ..., tolerance: float = ..., first: int = ..., last: int = ..., direction: ArrayLike = ..., contacts: Sequence[str] = ..., footholds: Sequence[Foothold] = ...) -> Goal: ...
+    def __init__(self, kind: GoalKind = ..., name: str = ..., requested: float = ..., tolerance: float = ..., first: int = ..., last: int = ..., direction: ArrayLike = ..., contacts: Sequence[str] = ..., footholds: Sequence[Foothold] = ...) -> None: ...
+    def replace(self, *, kind: GoalKind = ..., name: str = ..., requested: float = ..., tolerance: float = ..., first: int = ..., last: int = ..., direction: ArrayLike = ..., contacts: Sequence[str] = ..., footholds: Sequence[Foothold] = ...) -> Goal: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def kind(self) -> GoalKind:
@@ -2214,7 +2214,7 @@ class Goal:
         """e.g. "speed" """
         ...
     @property
-    def asked(self) -> float:
+    def requested(self) -> float:
         """requested value"""
         ...
     @property
@@ -2247,15 +2247,15 @@ class GoalOutcome:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, goal: Goal = ..., came_out: float = ...) -> None: ...
-    def replace(self, *, goal: Goal = ..., came_out: float = ...) -> GoalOutcome: ...
+    def __init__(self, goal: Goal = ..., achieved: float = ...) -> None: ...
+    def replace(self, *, goal: Goal = ..., achieved: float = ...) -> GoalOutcome: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def goal(self) -> Goal:
         """Goal"""
         ...
     @property
-    def came_out(self) -> float:
+    def achieved(self) -> float:
         """achieved value"""
         ...
     @property
@@ -2318,8 +2318,8 @@ class MotionPlan:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, name: str = ..., schedule: ContactSchedule = ..., ground: Ground = ..., stages: Sequence[Stage] = ..., guess: Trajectory = ..., q_start: ArrayLike = ..., q_end: ArrayLike = ..., limited: bool = ..., requested: Mapping[str, float] = ..., goals: Sequence[Goal] = ...) -> None: ...
-    def replace(self, *, name: str = ..., schedule: ContactSchedule = ..., ground: Ground = ..., stages: Sequence[Stage] = ..., guess: Trajectory = ..., q_start: ArrayLike = ..., q_end: ArrayLike = ..., limited: bool = ..., requested: Mapping[str, float] = ..., goals: Sequence[Goal] = ...) -> MotionPlan: ...
+    def __init__(self, name: str = ..., schedule: ContactSchedule = ..., ground: Ground = ..., stages: Sequence[Stage] = ..., guess: Trajectory = ..., q_start: ArrayLike = ..., q_end: ArrayLike = ..., limited: bool = ..., options: Mapping[str, float] = ..., goals: Sequence[Goal] = ...) -> None: ...
+    def replace(self, *, name: str = ..., schedule: ContactSchedule = ..., ground: Ground = ..., stages: Sequence[Stage] = ..., guess: Trajectory = ..., q_start: ArrayLike = ..., q_end: ArrayLike = ..., limited: bool = ..., options: Mapping[str, float] = ..., goals: Sequence[Goal] = ...) -> MotionPlan: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def name(self) -> str:
@@ -2354,8 +2354,8 @@ class MotionPlan:
         """whether limits of the robot apply"""
         ...
     @property
-    def requested(self) -> Dict[str, float]:
-        """every option by name"""
+    def options(self) -> Dict[str, float]:
+        """every option of the motion by name"""
         ...
     @property
     def goals(self) -> Tuple[Goal, ...]:
@@ -2363,7 +2363,7 @@ class MotionPlan:
         ...
 
 class Request:
-    """A motion by name, with its options: what `bielle solve` is asked for.
+    """A motion by name, with its options: the input of `bielle solve`.
 
     Immutable; `replace` makes a changed copy.
     """
@@ -2372,7 +2372,7 @@ class Request:
     def __eq__(self, other: object) -> bool: ...
     @property
     def motion(self) -> str:
-        """name, one of `motions`; of a sequence empty"""
+        """name, one of `motions`; empty for a sequence"""
         ...
     @property
     def options(self) -> Dict[str, float]:
@@ -2439,8 +2439,8 @@ class Motion:
         """Goals"""
         ...
     @property
-    def requested(self) -> Dict[str, float]:
-        """every option by name"""
+    def options(self) -> Dict[str, float]:
+        """every option of the motion by name"""
         ...
     @property
     def guess(self) -> Trajectory:
@@ -2449,10 +2449,10 @@ class Motion:
     @guess.setter
     def guess(self, value: Trajectory) -> None: ...
     def stage(self, node: int) -> Stage:
-        """Stage of a node, 0 to N, with what limits of the robot add to it."""
+        """Stage of a node, 0 to N, including the constraints from the robot's limits."""
         ...
     def start_from(self, record: Record) -> None:
-        """Takes the guess from the record of another motion of the robot, resampled if its length differs."""
+        """Sets the guess from the record of another motion of the robot, resampled if its length differs."""
         ...
     def costs(self, node: int) -> Dict[str, float]:
         """Costs of a node of the guess by name, before scaling by the time step."""
@@ -2460,7 +2460,7 @@ class Motion:
     def solve(self, options: SolverOptions = ..., callback: Optional[Callable[[Iteration], Optional[bool]]] = ...) -> Summary:
         """Solves from the guess and leaves the solution there. Returns a Summary.
 
-        callback: called with each Iteration; False stops. What it raises, like Ctrl-C, ends the solve with the current iterate in the guess.
+        callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve with the current iterate in the guess.
         """
         ...
     @property
@@ -2483,15 +2483,15 @@ class Record:
     def __eq__(self, other: object) -> bool: ...
     @property
     def q_names(self) -> Tuple[str, ...]:
-        """of the columns of q"""
+        """names of the columns of q"""
         ...
     @property
     def v_names(self) -> Tuple[str, ...]:
-        """of the columns of v and a"""
+        """names of the columns of v and a"""
         ...
     @property
     def u_names(self) -> Tuple[str, ...]:
-        """of the motors"""
+        """names of the motors"""
         ...
     @property
     def closure_names(self) -> Tuple[str, ...]:
@@ -2555,7 +2555,7 @@ class Record:
         ...
     @property
     def multipliers(self) -> Multipliers:
-        """of the constraints, for warm starts; penalty 0 if not known"""
+        """multipliers of the constraints, for warm starts; penalty 0 if not known"""
         ...
 
 def read_record(path: str) -> Record:
@@ -2584,7 +2584,7 @@ class ElectricalEnergy:
         ...
     @property
     def regeneration(self) -> float:
-        """share of what flows back that was taken off"""
+        """share of the regenerated energy that is subtracted"""
         ...
     @property
     def num_assumed(self) -> int:
@@ -2592,11 +2592,11 @@ class ElectricalEnergy:
         ...
     @property
     def distance(self) -> float:
-        """of the centre of mass on the ground, m"""
+        """horizontal distance of the centre of mass, m"""
         ...
     @property
     def cost_of_transport(self) -> float:
-        """total over weight and distance"""
+        """total divided by weight and distance"""
         ...
 
 class RunInfo:
@@ -2625,7 +2625,7 @@ class RunInfo:
         ...
     @property
     def serial_armature(self) -> str:
-        """of the serial model"""
+        """armature of the serial model"""
         ...
 
 class Result:
@@ -2633,8 +2633,8 @@ class Result:
 
     Immutable; `replace` makes a changed copy.
     """
-    def __init__(self, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., requested: Mapping[str, float] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., rms_torques: Mapping[str, float] = ..., continuous_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ...) -> None: ...
-    def replace(self, *, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., requested: Mapping[str, float] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., rms_torques: Mapping[str, float] = ..., continuous_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ...) -> Result: ...
+    def __init__(self, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., options: Mapping[str, float] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., rms_torques: Mapping[str, float] = ..., continuous_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ...) -> None: ...
+    def replace(self, *, run: RunInfo = ..., motion: str = ..., formulation: Formulation = ..., step: StepRule = ..., options: Mapping[str, float] = ..., goals: Sequence[GoalOutcome] = ..., schedule: ContactSchedule = ..., timings: Sequence[PhaseTiming] = ..., ground: Ground = ..., solver: Summary = ..., record: Record = ..., peak_torques: Mapping[str, float] = ..., rms_torques: Mapping[str, float] = ..., continuous_torques: Mapping[str, float] = ..., objective: ObjectiveOptions = ..., energy: ElectricalEnergy = ..., gap_position: float = ..., gap_angle: float = ..., slip_position: float = ..., slip_angle: float = ..., com_start: float = ..., com_lowest: float = ...) -> Result: ...
     def __eq__(self, other: object) -> bool: ...
     @property
     def run(self) -> RunInfo:
@@ -2653,8 +2653,8 @@ class Result:
         """StepRule"""
         ...
     @property
-    def requested(self) -> Dict[str, float]:
-        """every option by name"""
+    def options(self) -> Dict[str, float]:
+        """every option of the motion by name"""
         ...
     @property
     def goals(self) -> Tuple[GoalOutcome, ...]:
@@ -2662,7 +2662,7 @@ class Result:
         ...
     @property
     def schedule(self) -> ContactSchedule:
-        """ContactSchedule, with the time steps that came out"""
+        """ContactSchedule, with the final time steps"""
         ...
     @property
     def timings(self) -> Tuple[PhaseTiming, ...]:
@@ -2686,11 +2686,11 @@ class Result:
         ...
     @property
     def rms_torques(self) -> Dict[str, float]:
-        """root mean square torque of the motor by motor, N m or N"""
+        """root mean square torque by motor, N m or N"""
         ...
     @property
     def continuous_torques(self) -> Dict[str, float]:
-        """that motors bear for ever, where known, N m or N"""
+        """torques that motors can sustain indefinitely, where known, N m or N"""
         ...
     @property
     def objective(self) -> ObjectiveOptions:
@@ -2748,7 +2748,7 @@ def write_report(path: str, directories: Sequence[str]) -> None:
 def solve(robot: Robot, request: Request, problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[Record] = ..., callback: Optional[Callable[[Iteration], Optional[bool]]] = ...) -> Result:
     """Solves a Request as `bielle solve` does. Returns a Result.
 
-    callback: called with each Iteration; False stops. What it raises, like Ctrl-C, ends the solve.
+    callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve.
     """
     ...
 
@@ -2807,7 +2807,7 @@ class SerialModel:
         ...
     @property
     def dropped_targets(self) -> Tuple[str, ...]:
-        """of references that named frozen joints"""
+        """targets of references that named frozen joints"""
         ...
 
 def make_serial_model(model: Model, q: ArrayLike, armature: str = ...) -> SerialModel:
@@ -2900,7 +2900,7 @@ class LiftNode:
         ...
     @property
     def acceleration_error(self) -> float:
-        """of the closed dynamics, rad/s^2 or m/s^2"""
+        """error of the closed dynamics, rad/s^2 or m/s^2"""
         ...
     @property
     def margin(self) -> float:
@@ -2912,7 +2912,7 @@ class LiftNode:
         ...
 
 class Lift:
-    """A serial motion carried over to the closed robot.
+    """A serial motion lifted to the closed robot.
 
     Immutable; `replace` makes a changed copy.
     """
@@ -2933,9 +2933,9 @@ class Lift:
         ...
 
 def lift(robot: Robot, serial: SerialModel, motion: Motion, options: LiftOptions = ...) -> Lift:
-    """Carries a solved Motion of serial.model over to the closed robot: the same serial joints, motor torques that follow.
+    """Lifts a solved Motion of serial.model to the closed robot: the same serial joints, and the motor torques that follow from them.
 
-    The motion has Euler steps.
+    The motion must have Euler steps.
     """
     ...
 
@@ -2991,7 +2991,7 @@ class DesignVariable:
     def __eq__(self, other: object) -> bool: ...
     @property
     def name(self) -> str:
-        """of one's choice"""
+        """any unique name"""
         ...
     @property
     def lower(self) -> float:
@@ -3007,11 +3007,11 @@ class DesignVariable:
         ...
     @property
     def parameter(self) -> str:
-        """of the generator, for generated robots; for given ones:"""
+        """parameter of the generator, for generated robots; for given ones:"""
         ...
     @property
     def lengths(self) -> Tuple[LengthChange, ...]:
-        """the first one is the value, the others change by as much"""
+        """the first one is the value; the others change by the same amount"""
         ...
     @property
     def shifts(self) -> Tuple[ShiftChange, ...]:
@@ -3025,7 +3025,7 @@ class Parametrization:
         ...
     @staticmethod
     def generated(generator: str, variables: Sequence[DesignVariable], settings: Sequence[Tuple[str, float]] = ...) -> Parametrization:
-        """Of a generator (see `generators`); settings: its other parameters by name and value."""
+        """Parametrizes a generator (see `generators`); settings: its other parameters by name and value."""
         ...
     @property
     def variables(self) -> Tuple[DesignVariable, ...]:
@@ -3033,7 +3033,7 @@ class Parametrization:
         ...
     @property
     def start(self) -> Array:
-        """(n,), of the robot as it is"""
+        """values of the given robot (n,)"""
         ...
     @property
     def lower(self) -> Array:
@@ -3080,7 +3080,7 @@ class SearchStage:
         ...
     @property
     def tolerance(self) -> float:
-        """of the steps, relative to the width of the bounds"""
+        """tolerance of the steps, relative to the width of the bounds"""
         ...
 
 class SearchResult:
@@ -3097,7 +3097,7 @@ class SearchResult:
         ...
     @property
     def value(self) -> float:
-        """of the objective"""
+        """value of the objective"""
         ...
     @property
     def evaluations(self) -> int:
@@ -3107,14 +3107,14 @@ class SearchResult:
 def minimize(objective: Callable[[Array], Union[float, Tuple[float, ArrayLike]]], start: ArrayLike, lower: ArrayLike, upper: ArrayLike, stages: Sequence[SearchStage], seed: int = ...) -> SearchResult:
     """Minimizes a function of (n,) within bounds by SearchStages, each from the best point so far.
 
-    objective: returns a number, for SLSQP and MMA with its gradient, (value, (n,)). What it raises, like Ctrl-C, ends the search.
+    objective: returns a number, for SLSQP and MMA with its gradient, (value, (n,)). An exception it raises, or Ctrl-C, ends the search.
     """
     ...
 
 def cost_gradient(motion: Motion, robot: Parametrization, x: ArrayLike) -> Array:
     """Derivatives (n,) of the optimal cost of a motion by every number of its robot, at x (n,).
 
-    motion: of a Request, solved for `robot.make(x)`. It counts as made and solved anew for every change, yet nothing is solved: the multipliers of the optimum suffice (envelope theorem).
+    motion: made from a Request and solved for `robot.make(x)`. The derivatives are those of motions solved again for every change, but nothing is solved: the multipliers of the optimum suffice (envelope theorem).
     """
     ...
 
@@ -3128,27 +3128,27 @@ class PredictiveOptions:
     def __eq__(self, other: object) -> bool: ...
     @property
     def nodes(self) -> int:
-        """stages of a window"""
+        """number of stages of a window"""
         ...
     @property
     def iterations(self) -> int:
-        """of the solver, at every stage"""
+        """solver iterations at every stage"""
         ...
     @property
     def regularization(self) -> float:
-        """of its sweeps"""
+        """regularization of its sweeps"""
         ...
     @property
     def penalty(self) -> float:
-        """of violated constraints"""
+        """penalty of violated constraints"""
         ...
     @property
     def look_ahead(self) -> float:
-        """gains of stages nearer to the end of their phase are those of an earlier one, s"""
+        """near the end of a contact phase, the last gains computed at least this long before it are reused, s"""
         ...
     @property
     def dead_point_stop(self) -> float:
-        """motors brake before the transmission of a linkage is this share of that at the start, or its reciprocal"""
+        """motors brake before the transmission of a linkage reaches this share of that at the start, or the reciprocal"""
         ...
     @property
     def threads(self) -> int:
@@ -3156,7 +3156,7 @@ class PredictiveOptions:
         ...
     @property
     def own_thread(self) -> bool:
-        """solves run beside control; results then depend on how fast they are"""
+        """solves run in parallel with control; results then depend on their speed"""
         ...
     @property
     def end_place(self) -> float:
@@ -3164,15 +3164,15 @@ class PredictiveOptions:
         ...
     @property
     def end_posture(self) -> float:
-        """of the other coordinates"""
+        """weight of the other coordinates"""
         ...
     @property
     def end_velocity(self) -> float:
-        """of the velocities, s^2/m^2 or s^2"""
+        """weight of the velocities, s^2/m^2 or s^2"""
         ...
 
 class PredictedFoothold:
-    """Where a foot is foreseen to stand next.
+    """The predicted next foothold of a foot.
 
     Immutable; `replace` makes a changed copy.
     """
@@ -3181,31 +3181,31 @@ class PredictedFoothold:
     def __eq__(self, other: object) -> bool: ...
     @property
     def contact(self) -> int:
-        """of the model"""
+        """index into the model's contacts"""
         ...
     @property
     def time(self) -> float:
-        """of its landing, s"""
+        """time of its landing, s"""
         ...
     @property
     def X_WF(self) -> SE3:
-        """of the contact's frame in the world"""
+        """placement of the contact's frame in the world"""
         ...
 
 class Controller:
-    """A feedback law: from what is measured to torques. Controller.policy and .predictive make them."""
+    """A feedback law: from measured states to torques. Controller.policy and .predictive make them."""
     @staticmethod
     def policy(motion: Motion, gains: bool = ...) -> Controller:
-        """Torques of a solved Motion, and the gains of the last sweep about it."""
+        """Torques of a solved Motion, and feedback with the gains of its last sweep."""
         ...
     @staticmethod
     def predictive(model: Model, plan: MotionPlan, solved: Trajectory, problem: ProblemOptions = ..., options: PredictiveOptions = ...) -> Controller:
-        """Solves the next second anew at every stage. plan: a MotionPlan; solved: Trajectory of its Motion."""
+        """Solves the next second again at every stage. plan: a MotionPlan; solved: Trajectory of its Motion."""
         ...
     def update(self, time: float, q: ArrayLike, v: ArrayLike, delay: float = ...) -> Array:
         """Motor torques (nu,) at a time (s) and a measured state (nq,), (nv,); delay until they act, s.
 
-        To be called in the order of time.
+        Call it in order of time.
         """
         ...
     def reference(self, time: float) -> Tuple[Array, Array]:
@@ -3213,19 +3213,19 @@ class Controller:
         ...
     @property
     def duration(self) -> float:
-        """of a policy, s"""
+        """duration of a policy, s"""
         ...
     @property
     def counts(self) -> Dict[str, int]:
-        """of predictive control: solves, failed ones, early and late landings, solves longer than a stage"""
+        """counts of predictive control: solves, failed solves, early and late landings, solves longer than a stage"""
         ...
     @property
     def footholds(self) -> List[PredictedFoothold]:
-        """of predictive control: a PredictedFoothold for each contact that is to land in its window"""
+        """predictive control only: a PredictedFoothold for each contact that lands within the window"""
         ...
 
 class SensorReadings:
-    """What is read at an instant of control.
+    """Sensor readings at one instant of control.
 
     Immutable; `replace` makes a changed copy.
     """
@@ -3242,15 +3242,15 @@ class SensorReadings:
         ...
     @property
     def motor_torques(self) -> Array:
-        """(nu,), that acted since the instant before, N m or N"""
+        """(nu,), torques that acted since the previous instant, N m or N"""
         ...
     @property
     def angular_velocity(self) -> Array:
-        """of the IMU in its frame (3,), rad/s"""
+        """angular velocity of the IMU in its frame (3,), rad/s"""
         ...
     @property
     def specific_force(self) -> Array:
-        """acceleration less gravity in its frame (3,), m/s^2"""
+        """acceleration minus gravity in its frame (3,), m/s^2"""
         ...
 
 class EstimatorOptions:
@@ -3267,7 +3267,7 @@ class EstimatorOptions:
         ...
     @property
     def bandwidth(self) -> float:
-        """of the observers of the motors, 1/s"""
+        """bandwidth of the motor observers, 1/s"""
         ...
     @property
     def smoothing(self) -> float:
@@ -3283,43 +3283,43 @@ class EstimatorOptions:
         ...
     @property
     def gyro_offset(self) -> float:
-        """at the start, rad/s"""
+        """offset at the start, rad/s"""
         ...
     @property
     def accelerometer_offset(self) -> float:
-        """at the start, m/s^2"""
+        """offset at the start, m/s^2"""
         ...
     @property
     def gyro_walk(self) -> float:
-        """of the offsets in a second, rad/s"""
+        """change of the offset in one second, rad/s"""
         ...
     @property
     def accelerometer_walk(self) -> float:
-        """m/s^2"""
+        """change of the offset in one second, m/s^2"""
         ...
     @property
     def tilt(self) -> float:
-        """of the trunk at the start, rad"""
+        """tilt of the trunk at the start, rad"""
         ...
     @property
     def foot_position(self) -> float:
-        """of a foot seen by the encoders, m"""
+        """position of a foot from the encoders, m"""
         ...
     @property
     def foot_attitude(self) -> float:
-        """rad"""
+        """attitude of a foot from the encoders, rad"""
         ...
     @property
     def foot_slide(self) -> float:
-        """of a foot that stands, in a second, m"""
+        """displacement of a standing foot in one second, m"""
         ...
     @property
     def foot_turn(self) -> float:
-        """rad"""
+        """rotation of a standing foot in one second, rad"""
         ...
     @property
     def planned_contact(self) -> float:
-        """normal force of a foot that stands, over the weight"""
+        """normal force of a standing foot relative to the weight"""
         ...
     @property
     def surprising_contact(self) -> float:
@@ -3327,7 +3327,7 @@ class EstimatorOptions:
         ...
     @property
     def slip(self) -> float:
-        """a foot has slipped if its deviation, 6 in the mean, exceeds this"""
+        """a foot has slipped if its deviation, 6 on average, exceeds this"""
         ...
 
 class EstimatorStatus:
@@ -3351,10 +3351,10 @@ class Estimator:
         """q: a closed configuration (nq,). Raises ModelError when motors do not determine a joint."""
         ...
     def reset(self, time: float, q: ArrayLike, v: ArrayLike, contacts: Sequence[str]) -> None:
-        """Starts from a closed state (nq,), (nv,), standing on contacts, by name."""
+        """Starts from a closed state (nq,), (nv,), standing on the named contacts."""
         ...
     def update(self, readings: SensorReadings, planned: Sequence[str] = ...) -> EstimatorStatus:
-        """Takes the readings of an instant. planned: names of the contacts that the plan has now."""
+        """Processes the readings of an instant. planned: names of the contacts in the plan at this time."""
         ...
     @property
     def q(self) -> Array:
@@ -3366,11 +3366,11 @@ class Estimator:
         ...
     @property
     def contacts(self) -> Dict[str, bool]:
-        """by name, whether they stand"""
+        """whether each contact stands, by name"""
         ...
     @property
     def wrenches(self) -> Array:
-        """of the ground on the feet in their contact frames (contacts, 6), N and N m"""
+        """wrenches from the ground on the feet in their contact frames (contacts, 6), N and N m"""
         ...
     @property
     def margin(self) -> float:
@@ -3378,14 +3378,14 @@ class Estimator:
         ...
     @property
     def message(self) -> str:
-        """of the last status; empty if OK"""
+        """message of the last status; empty if OK"""
         ...
 
 class World:
     """Physics with contact, in which motors drive a robot and the ground pushes it.
 
     engine: 'bielle', its own, or 'simbody' and 'mujoco' where it was built with them.
-    With `count`, so many worlds that are stepped together on all cores: arguments and results have an axis of them in front.
+    With `count`, that many worlds are stepped together on all cores: arguments and results have a leading axis of worlds.
     """
     def __init__(self, model: Model, count: Optional[int] = ..., ground: Ground = ..., time_step: float = ..., engine: str = ...) -> None: ...
     @property
@@ -3401,32 +3401,32 @@ class World:
         """its name"""
         ...
     def reset(self, q: ArrayLike, v: ArrayLike, where: ArrayLike = ...) -> WorldState:
-        """Sets closed configurations (nq,) and velocities (nv,) that keep them closed; all else starts anew.
+        """Sets closed configurations (nq,) and velocities (nv,) that keep them closed; everything else starts again.
 
-        where: (count,), True for the worlds that start anew while the others stay as they are; None: all. Returns the WorldState.
+        where: (count,), True for the worlds that are reset while the others stay unchanged; None: all. Returns the WorldState.
         """
         ...
     def step(self, u: ArrayLike, duration: float, push: ArrayLike = ...) -> WorldState:
         """Advances by a duration (s) under motor torques (nu,), cut at their limits, and a force at the trunk (3,), N.
 
-        Returns the WorldState; its `ok` is False where the integration broke off.
+        Returns the WorldState; its `ok` is False where the integration failed.
         """
         ...
     @property
     def wrenches(self) -> Array:
-        """of the ground on the feet in their contact frames (contacts, 6), N and N m"""
+        """wrenches from the ground on the feet in their contact frames (contacts, 6), N and N m"""
         ...
 
 class Sensors:
     """Encoders of 14 bits on the motors and an IMU (Bosch BMI088) in the trunk of a robot in a World."""
     def __init__(self, world: World, noise: float = ..., seed: int = ..., imu: SE3 = ...) -> None:
-        """noise: factor of the figures of the data sheets, 0: exact; imu: its place in the trunk."""
+        """noise: factor of the data-sheet noise, 0: exact; imu: its placement in the trunk."""
         ...
     def reset(self, time: float) -> None:
-        """From the state in which the world is; the first readings come after a time, s."""
+        """Starts from the world's current state; the first readings come after a time, s."""
         ...
     def read(self) -> SensorReadings:
-        """SensorReadings at the time of the world; those of the IMU are means since the last."""
+        """SensorReadings at the time of the world; IMU readings are means since the last call."""
         ...
 
 class _residuals:
@@ -3489,11 +3489,11 @@ class _residuals:
         ...
     @staticmethod
     def motor_power(model: Model, motors: Sequence[int]) -> LibraryResidual:
-        """Mechanical power of motors (n,), W; on steps alone."""
+        """Mechanical power of motors (n,), W; on steps only."""
         ...
     @staticmethod
     def motor_voltage(model: Model, motors: Sequence[int]) -> LibraryResidual:
-        """Voltages of motors with a winding and a supply (n,), V; on steps alone."""
+        """Voltages of motors with a winding and a supply (n,), V; on steps only."""
         ...
     @staticmethod
     def electrical_power(model: Model, losses: ArrayLike) -> LibraryResidual:

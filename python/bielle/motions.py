@@ -107,7 +107,7 @@ def _get_number(option: str, value: Any, names: List[str]) -> float:
     """The number of an option, which may be a choice by name."""
     if isinstance(value, str):
         if value not in names:
-            raise ValueError(f"{option}: {', '.join(map(repr, names)) or 'a number'} wanted, got {value!r}")
+            raise ValueError(f"{option}: expected {', '.join(map(repr, names)) or 'a number'}, got {value!r}")
         return float(list(names).index(value))
     return float(value)
 

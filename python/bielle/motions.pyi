@@ -20,7 +20,7 @@ def solve_squat(robot: Union[str, Robot], *, depth: float = ..., duration: float
     solver: SolverOptions: iterations, threads, tolerances
     warm_start: a Result, a Record or the directory of a result to start from
     callback: called with each Iteration; returning False stops the solver
-    depth: lowest height of the centre of mass over its initial height [1], default 0.7
+    depth: lowest height of the centre of mass divided by its initial height [1], default 0.7
     duration: time to go down and come back [s], default 2.4
     settle: time at rest before and after [s], default 0.3
     time_step: length of a shooting stage [s], default 0.015
@@ -29,14 +29,14 @@ def solve_squat(robot: Union[str, Robot], *, depth: float = ..., duration: float
     torso_weight: keep the torso upright, within the state regularization [1], default 10
     motor_weight: keep motors slow, within the state regularization [1], default 1
     control_weight: keep motor torques small [1/(N m)^2], default 0.001
-    force_weight: share the weight evenly between the feet, over (m g)^2 [1], default 10
+    force_weight: share the weight evenly between the feet, relative to (m g)^2 [1], default 10
     pressure_weight: keep the centre of pressure in the middle of the sole [1], default 1
     friction: friction coefficient [1], default 0.7
-    cone_margin: part of friction and soles that wrenches leave free [1], default 0.01
-    contact_kp: stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2)) [1/s^2], default 10000
-    contact_kd: stabilisation of the contacts, velocity (limited to 1/h) [1/s], default 200
-    closure_kp: stabilisation of the closures, position [1/s^2], default 0
-    closure_kd: stabilisation of the closures, velocity [1/s], default 0
+    cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
+    contact_kp: position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2)) [1/s^2], default 10000
+    contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 200
+    closure_kp: position gain of the stabilisation of closures [1/s^2], default 0
+    closure_kd: velocity gain of the stabilisation of closures [1/s], default 0
     """
     ...
 
@@ -48,44 +48,44 @@ def solve_walk(robot: Union[str, Robot], *, speed: float = ..., steps: float = .
     solver: SolverOptions: iterations, threads, tolerances
     warm_start: a Result, a Record or the directory of a result to start from
     callback: called with each Iteration; returning False stops the solver
-    speed: of the steady steps; negative: backward [m/s], default 0.5
-    steps: number of steps, the last one brings the feet together [1], default 6
-    start_support: double support before the first step, at least [s], default 0.3
-    start_pressure: it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given [1], default 0.4
-    single_support: one foot on the ground [s], default 0.36
-    double_support: both feet on the ground between two steps [s], default 0.045
-    end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
-    swing_height: apex of the swing foot over the higher end of its path [m], default 0.04
-    swing_apex: when it is reached, from 0 to 1 [1], default 0.5
-    swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0
-    swing_arrive: when it is over its foothold, from 0 to 1 [1], default 0.95
+    speed: speed of the steady steps; negative: backward [m/s], default 0.5
+    steps: number of steps; the last one brings the feet together [1], default 6
+    start_support: least duration of double support before the first step [s], default 0.3
+    start_pressure: start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never [1], default 0.4
+    single_support: duration with one foot on the ground [s], default 0.36
+    double_support: duration with both feet on the ground between two steps [s], default 0.045
+    end_support: duration of double support after the last step [s], default 0.45
+    time_step: length of a shooting stage; 0: 12 ms, 5 ms with flights, less for fast swings [s], default 0
+    swing_height: apex of the swing foot above the higher end of its path [m], default 0.04
+    swing_apex: time of the apex as a fraction of the swing, from 0 to 1 [1], default 0.5
+    swing_leave: time at which the swing foot starts to move horizontally, from 0 to 1 [1], default 0
+    swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.95
     friction: friction coefficient [1], default 0.7
-    cone_margin: part of friction and soles that wrenches leave free [1], default 0.01
-    published: 1: the paper's problem: feet land where they like; 0: on footholds, by our costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a stage of its own; 0: none [0 or 1], default 0
-    landing_speed: with rigid_landing: how fast feet come down, below 0.1; 0: at rest [m/s], default 0
-    foothold_room: how far from its foothold a foot may land, along x and y; 0: on it [m], default 0
+    cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
+    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
+    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
+    foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
     torso_weight: keep the torso upright, within the state regularization [1], default 10000
-    heading_weight: head where the feet do, within the state regularization [1], default 1000
+    heading_weight: keep the heading of the feet, within the state regularization [1], default 1000
     motor_weight: keep motors slow, within the state regularization [1], default 1
     control_weight: keep motor torques small [1/(N m)^2], default 0.001
     com_weight: horizontal position of the centre of mass [1/m^2], default 100
     com_height_weight: height of the centre of mass [1/m^2], default 3000
-    com_velocity_weight: velocity of the centre of mass, along the way [s^2/m^2], default 0
+    com_velocity_weight: velocity of the centre of mass in the direction of travel [s^2/m^2], default 0
     swing_weight: path of the swing foot [1/m^2], default 10000
     swing_velocity_weight: velocity of the swing foot along its path [s^2/m^2], default 200
     swing_rotation_weight: orientation of the swing foot [1], default 1000
     foothold_weight: with foothold_room: land near the foothold, swing near its horizontal path [1/m^2], default 20
-    force_weight: pass the weight evenly from foot to foot, over (m g)^2 [1], default 10
+    force_weight: transfer the weight evenly between the feet, relative to (m g)^2 [1], default 10
     pressure_weight: keep the centre of pressure in the middle of the sole [1], default 10
-    feet_distance: least distance of the soles, or what the footholds leave if less [m], default 0.01
-    terminal_weight: place of the centre of mass at the end [1/m^2], default 1000
-    contact_kp: stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2)) [1/s^2], default 2000
-    contact_kd: stabilisation of the contacts, velocity (limited to 1/h) [1/s], default 100
-    closure_kp: stabilisation of the closures, position (full formulation) [1/s^2], default 10000
-    closure_kd: stabilisation of the closures, velocity (full formulation) [1/s], default 100
+    feet_distance: least distance between the soles, or that of the footholds if smaller [m], default 0.01
+    terminal_weight: position of the centre of mass at the end [1/m^2], default 1000
+    contact_kp: position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2)) [1/s^2], default 2000
+    contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 100
+    closure_kp: position gain of the stabilisation of closures (full formulation) [1/s^2], default 10000
+    closure_kd: velocity gain of the stabilisation of closures (full formulation) [1/s], default 100
     weights: 'paper'
     """
     ...
@@ -98,44 +98,44 @@ def solve_side_walk(robot: Union[str, Robot], *, speed: float = ..., steps: floa
     solver: SolverOptions: iterations, threads, tolerances
     warm_start: a Result, a Record or the directory of a result to start from
     callback: called with each Iteration; returning False stops the solver
-    speed: to the left, of the steady steps; negative: to the right [m/s], default 0.2
+    speed: speed of the steady steps to the left; negative: to the right [m/s], default 0.2
     steps: number of steps: one opens the stance, the next one closes it [1], default 6
-    start_support: double support before the first step, at least [s], default 0.3
-    start_pressure: it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given [1], default 0.4
-    single_support: one foot on the ground [s], default 0.36
-    double_support: both feet on the ground between two steps [s], default 0.045
-    end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
-    swing_height: apex of the swing foot over the higher end of its path [m], default 0.04
-    swing_apex: when it is reached, from 0 to 1 [1], default 0.5
-    swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0
-    swing_arrive: when it is over its foothold, from 0 to 1 [1], default 0.95
+    start_support: least duration of double support before the first step [s], default 0.3
+    start_pressure: start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never [1], default 0.4
+    single_support: duration with one foot on the ground [s], default 0.36
+    double_support: duration with both feet on the ground between two steps [s], default 0.045
+    end_support: duration of double support after the last step [s], default 0.45
+    time_step: length of a shooting stage; 0: 12 ms, 5 ms with flights, less for fast swings [s], default 0
+    swing_height: apex of the swing foot above the higher end of its path [m], default 0.04
+    swing_apex: time of the apex as a fraction of the swing, from 0 to 1 [1], default 0.5
+    swing_leave: time at which the swing foot starts to move horizontally, from 0 to 1 [1], default 0
+    swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.95
     friction: friction coefficient [1], default 0.7
-    cone_margin: part of friction and soles that wrenches leave free [1], default 0.01
-    published: 1: the paper's problem: feet land where they like; 0: on footholds, by our costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a stage of its own; 0: none [0 or 1], default 0
-    landing_speed: with rigid_landing: how fast feet come down, below 0.1; 0: at rest [m/s], default 0
-    foothold_room: how far from its foothold a foot may land, along x and y; 0: on it [m], default 0
+    cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
+    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
+    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
+    foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
     torso_weight: keep the torso upright, within the state regularization [1], default 10000
-    heading_weight: head where the feet do, within the state regularization [1], default 1000
+    heading_weight: keep the heading of the feet, within the state regularization [1], default 1000
     motor_weight: keep motors slow, within the state regularization [1], default 1
     control_weight: keep motor torques small [1/(N m)^2], default 0.001
     com_weight: horizontal position of the centre of mass [1/m^2], default 100
     com_height_weight: height of the centre of mass [1/m^2], default 3000
-    com_velocity_weight: velocity of the centre of mass, along the way [s^2/m^2], default 0
+    com_velocity_weight: velocity of the centre of mass in the direction of travel [s^2/m^2], default 0
     swing_weight: path of the swing foot [1/m^2], default 10000
     swing_velocity_weight: velocity of the swing foot along its path [s^2/m^2], default 200
     swing_rotation_weight: orientation of the swing foot [1], default 1000
     foothold_weight: with foothold_room: land near the foothold, swing near its horizontal path [1/m^2], default 20
-    force_weight: pass the weight evenly from foot to foot, over (m g)^2 [1], default 10
+    force_weight: transfer the weight evenly between the feet, relative to (m g)^2 [1], default 10
     pressure_weight: keep the centre of pressure in the middle of the sole [1], default 10
-    feet_distance: least distance of the soles, or what the footholds leave if less [m], default 0.01
-    terminal_weight: place of the centre of mass at the end [1/m^2], default 1000
-    contact_kp: stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2)) [1/s^2], default 2000
-    contact_kd: stabilisation of the contacts, velocity (limited to 1/h) [1/s], default 100
-    closure_kp: stabilisation of the closures, position (full formulation) [1/s^2], default 10000
-    closure_kd: stabilisation of the closures, velocity (full formulation) [1/s], default 100
+    feet_distance: least distance between the soles, or that of the footholds if smaller [m], default 0.01
+    terminal_weight: position of the centre of mass at the end [1/m^2], default 1000
+    contact_kp: position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2)) [1/s^2], default 2000
+    contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 100
+    closure_kp: position gain of the stabilisation of closures (full formulation) [1/s^2], default 10000
+    closure_kd: velocity gain of the stabilisation of closures (full formulation) [1/s], default 100
     weights: 'paper'
     """
     ...
@@ -148,97 +148,97 @@ def solve_turn(robot: Union[str, Robot], *, angle: float = ..., radius: float = 
     solver: SolverOptions: iterations, threads, tolerances
     warm_start: a Result, a Record or the directory of a result to start from
     callback: called with each Iteration; returning False stops the solver
-    angle: to turn to the left; negative: to the right [rad], default 1.57
-    radius: of the arc to walk along; 0: on the spot [m], default 0
-    steps: number of steps, the last one brings the feet together [1], default 8
-    start_support: double support before the first step, at least [s], default 0.3
-    start_pressure: it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given [1], default 0.4
-    single_support: one foot on the ground [s], default 0.36
-    double_support: both feet on the ground between two steps [s], default 0.045
-    end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
-    swing_height: apex of the swing foot over the higher end of its path [m], default 0.04
-    swing_apex: when it is reached, from 0 to 1 [1], default 0.5
-    swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0
-    swing_arrive: when it is over its foothold, from 0 to 1 [1], default 0.95
+    angle: angle to turn to the left; negative: to the right [rad], default 1.57
+    radius: radius of the arc to walk along; 0: turn on the spot [m], default 0
+    steps: number of steps; the last one brings the feet together [1], default 8
+    start_support: least duration of double support before the first step [s], default 0.3
+    start_pressure: start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never [1], default 0.4
+    single_support: duration with one foot on the ground [s], default 0.36
+    double_support: duration with both feet on the ground between two steps [s], default 0.045
+    end_support: duration of double support after the last step [s], default 0.45
+    time_step: length of a shooting stage; 0: 12 ms, 5 ms with flights, less for fast swings [s], default 0
+    swing_height: apex of the swing foot above the higher end of its path [m], default 0.04
+    swing_apex: time of the apex as a fraction of the swing, from 0 to 1 [1], default 0.5
+    swing_leave: time at which the swing foot starts to move horizontally, from 0 to 1 [1], default 0
+    swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.95
     friction: friction coefficient [1], default 0.7
-    cone_margin: part of friction and soles that wrenches leave free [1], default 0.01
-    published: 1: the paper's problem: feet land where they like; 0: on footholds, by our costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a stage of its own; 0: none [0 or 1], default 0
-    landing_speed: with rigid_landing: how fast feet come down, below 0.1; 0: at rest [m/s], default 0
-    foothold_room: how far from its foothold a foot may land, along x and y; 0: on it [m], default 0
+    cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
+    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
+    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
+    foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
     torso_weight: keep the torso upright, within the state regularization [1], default 10000
-    heading_weight: head where the feet do, within the state regularization [1], default 1000
+    heading_weight: keep the heading of the feet, within the state regularization [1], default 1000
     motor_weight: keep motors slow, within the state regularization [1], default 1
     control_weight: keep motor torques small [1/(N m)^2], default 0.001
     com_weight: horizontal position of the centre of mass [1/m^2], default 100
     com_height_weight: height of the centre of mass [1/m^2], default 3000
-    com_velocity_weight: velocity of the centre of mass, along the way [s^2/m^2], default 0
+    com_velocity_weight: velocity of the centre of mass in the direction of travel [s^2/m^2], default 0
     swing_weight: path of the swing foot [1/m^2], default 10000
     swing_velocity_weight: velocity of the swing foot along its path [s^2/m^2], default 200
     swing_rotation_weight: orientation of the swing foot [1], default 1000
     foothold_weight: with foothold_room: land near the foothold, swing near its horizontal path [1/m^2], default 20
-    force_weight: pass the weight evenly from foot to foot, over (m g)^2 [1], default 10
+    force_weight: transfer the weight evenly between the feet, relative to (m g)^2 [1], default 10
     pressure_weight: keep the centre of pressure in the middle of the sole [1], default 10
-    feet_distance: least distance of the soles, or what the footholds leave if less [m], default 0.01
-    terminal_weight: place of the centre of mass at the end [1/m^2], default 1000
-    contact_kp: stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2)) [1/s^2], default 2000
-    contact_kd: stabilisation of the contacts, velocity (limited to 1/h) [1/s], default 100
-    closure_kp: stabilisation of the closures, position (full formulation) [1/s^2], default 10000
-    closure_kd: stabilisation of the closures, velocity (full formulation) [1/s], default 100
+    feet_distance: least distance between the soles, or that of the footholds if smaller [m], default 0.01
+    terminal_weight: position of the centre of mass at the end [1/m^2], default 1000
+    contact_kp: position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2)) [1/s^2], default 2000
+    contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 100
+    closure_kp: position gain of the stabilisation of closures (full formulation) [1/s^2], default 10000
+    closure_kd: velocity gain of the stabilisation of closures (full formulation) [1/s], default 100
     """
     ...
 
 def solve_stairs(robot: Union[str, Robot], *, height: float = ..., depth: float = ..., slope: float = ..., stairs: float = ..., speed: float = ..., width: float = ..., start_support: float = ..., start_pressure: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: float = ..., rigid_landing: float = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
-    """up or down stairs, one foot per step.
+    """climb or descend stairs, one foot per step.
 
     robot: a Robot, or the name of one
     problem: ProblemOptions: formulation, limits, free durations, objective
     solver: SolverOptions: iterations, threads, tolerances
     warm_start: a Result, a Record or the directory of a result to start from
     callback: called with each Iteration; returning False stops the solver
-    height: of a step; negative: down [m], default 0.06
-    depth: of a step [m], default 0.2
-    slope: height over depth; unless 0, it takes the place of the height [1], default 0
-    stairs: number of steps of the stairs [1], default 4
-    speed: forward velocity; with the depth it gives the duration of a step [m/s], default 0.3
-    width: of the stairs [m], default 0.8
-    start_support: double support before the first step, at least [s], default 0.3
-    start_pressure: it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given [1], default 0.4
-    double_support: both feet on the ground between two steps [s], default 0.09
-    end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
-    swing_height: apex of the swing foot over the higher end of its path [m], default 0.03
-    swing_apex: when it is reached, from 0 to 1 [1], default 0.5
-    swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0.1
-    swing_arrive: when it is over its foothold, from 0 to 1 [1], default 0.9
+    height: height of a step; negative: down [m], default 0.06
+    depth: depth of a step [m], default 0.2
+    slope: height over depth; replaces the height unless 0 [1], default 0
+    stairs: number of steps of the staircase [1], default 4
+    speed: forward speed; with the depth it determines the duration of a step [m/s], default 0.3
+    width: width of the stairs [m], default 0.8
+    start_support: least duration of double support before the first step [s], default 0.3
+    start_pressure: start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never [1], default 0.4
+    double_support: duration with both feet on the ground between two steps [s], default 0.09
+    end_support: duration of double support after the last step [s], default 0.45
+    time_step: length of a shooting stage; 0: 12 ms, 5 ms with flights, less for fast swings [s], default 0
+    swing_height: apex of the swing foot above the higher end of its path [m], default 0.03
+    swing_apex: time of the apex as a fraction of the swing, from 0 to 1 [1], default 0.5
+    swing_leave: time at which the swing foot starts to move horizontally, from 0 to 1 [1], default 0.1
+    swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.9
     friction: friction coefficient [1], default 0.7
-    cone_margin: part of friction and soles that wrenches leave free [1], default 0.01
-    published: 1: the paper's problem: feet land where they like; 0: on footholds, by our costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a stage of its own; 0: none [0 or 1], default 0
-    landing_speed: with rigid_landing: how fast feet come down, below 0.1; 0: at rest [m/s], default 0
-    foothold_room: how far from its foothold a foot may land, along x and y; 0: on it [m], default 0
+    cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
+    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
+    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
+    foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
     torso_weight: keep the torso upright, within the state regularization [1], default 10000
-    heading_weight: head where the feet do, within the state regularization [1], default 1000
+    heading_weight: keep the heading of the feet, within the state regularization [1], default 1000
     motor_weight: keep motors slow, within the state regularization [1], default 1
     control_weight: keep motor torques small [1/(N m)^2], default 0.001
     com_weight: horizontal position of the centre of mass [1/m^2], default 100
     com_height_weight: height of the centre of mass [1/m^2], default 1000
-    com_velocity_weight: velocity of the centre of mass, along the way [s^2/m^2], default 0
+    com_velocity_weight: velocity of the centre of mass in the direction of travel [s^2/m^2], default 0
     swing_weight: path of the swing foot [1/m^2], default 10000
     swing_velocity_weight: velocity of the swing foot along its path [s^2/m^2], default 200
     swing_rotation_weight: orientation of the swing foot [1], default 1000
     foothold_weight: with foothold_room: land near the foothold, swing near its horizontal path [1/m^2], default 20
-    force_weight: pass the weight evenly from foot to foot, over (m g)^2 [1], default 10
+    force_weight: transfer the weight evenly between the feet, relative to (m g)^2 [1], default 10
     pressure_weight: keep the centre of pressure in the middle of the sole [1], default 10
-    feet_distance: least distance of the soles, or what the footholds leave if less [m], default 0.01
-    terminal_weight: place of the centre of mass at the end [1/m^2], default 1000
-    contact_kp: stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2)) [1/s^2], default 2000
-    contact_kd: stabilisation of the contacts, velocity (limited to 1/h) [1/s], default 100
-    closure_kp: stabilisation of the closures, position (full formulation) [1/s^2], default 10000
-    closure_kd: stabilisation of the closures, velocity (full formulation) [1/s], default 100
+    feet_distance: least distance between the soles, or that of the footholds if smaller [m], default 0.01
+    terminal_weight: position of the centre of mass at the end [1/m^2], default 1000
+    contact_kp: position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2)) [1/s^2], default 2000
+    contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 100
+    closure_kp: position gain of the stabilisation of closures (full formulation) [1/s^2], default 10000
+    closure_kd: velocity gain of the stabilisation of closures (full formulation) [1/s], default 100
     weights: 'paper'
     """
     ...
@@ -251,96 +251,96 @@ def solve_footholds(robot: Union[str, Robot], *, rim: float = ..., start_support
     solver: SolverOptions: iterations, threads, tolerances
     warm_start: a Result, a Record or the directory of a result to start from
     callback: called with each Iteration; returning False stops the solver
-    rim: of the stones around the soles [m], default 0.02
-    start_support: double support before the first step, at least [s], default 0.3
-    start_pressure: it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given [1], default 0.4
-    single_support: one foot on the ground [s], default 0.5
-    double_support: both feet on the ground between two steps [s], default 0.09
-    end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
-    swing_height: apex of the swing foot over the higher end of its path [m], default 0.04
-    swing_apex: when it is reached, from 0 to 1 [1], default 0.5
-    swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0.15
-    swing_arrive: when it is over its foothold, from 0 to 1 [1], default 0.85
+    rim: width of the stones around the soles [m], default 0.02
+    start_support: least duration of double support before the first step [s], default 0.3
+    start_pressure: start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never [1], default 0.4
+    single_support: duration with one foot on the ground [s], default 0.5
+    double_support: duration with both feet on the ground between two steps [s], default 0.09
+    end_support: duration of double support after the last step [s], default 0.45
+    time_step: length of a shooting stage; 0: 12 ms, 5 ms with flights, less for fast swings [s], default 0
+    swing_height: apex of the swing foot above the higher end of its path [m], default 0.04
+    swing_apex: time of the apex as a fraction of the swing, from 0 to 1 [1], default 0.5
+    swing_leave: time at which the swing foot starts to move horizontally, from 0 to 1 [1], default 0.15
+    swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.85
     friction: friction coefficient [1], default 0.7
-    cone_margin: part of friction and soles that wrenches leave free [1], default 0.01
-    published: 1: the paper's problem: feet land where they like; 0: on footholds, by our costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a stage of its own; 0: none [0 or 1], default 0
-    landing_speed: with rigid_landing: how fast feet come down, below 0.1; 0: at rest [m/s], default 0
-    foothold_room: how far from its foothold a foot may land, along x and y; 0: on it [m], default 0
+    cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
+    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
+    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
+    foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
     torso_weight: keep the torso upright, within the state regularization [1], default 10000
-    heading_weight: head where the feet do, within the state regularization [1], default 1000
+    heading_weight: keep the heading of the feet, within the state regularization [1], default 1000
     motor_weight: keep motors slow, within the state regularization [1], default 1
     control_weight: keep motor torques small [1/(N m)^2], default 0.001
     com_weight: horizontal position of the centre of mass [1/m^2], default 100
     com_height_weight: height of the centre of mass [1/m^2], default 1000
-    com_velocity_weight: velocity of the centre of mass, along the way [s^2/m^2], default 0
+    com_velocity_weight: velocity of the centre of mass in the direction of travel [s^2/m^2], default 0
     swing_weight: path of the swing foot [1/m^2], default 10000
     swing_velocity_weight: velocity of the swing foot along its path [s^2/m^2], default 200
     swing_rotation_weight: orientation of the swing foot [1], default 1000
     foothold_weight: with foothold_room: land near the foothold, swing near its horizontal path [1/m^2], default 20
-    force_weight: pass the weight evenly from foot to foot, over (m g)^2 [1], default 10
+    force_weight: transfer the weight evenly between the feet, relative to (m g)^2 [1], default 10
     pressure_weight: keep the centre of pressure in the middle of the sole [1], default 10
-    feet_distance: least distance of the soles, or what the footholds leave if less [m], default 0.01
-    terminal_weight: place of the centre of mass at the end [1/m^2], default 1000
-    contact_kp: stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2)) [1/s^2], default 2000
-    contact_kd: stabilisation of the contacts, velocity (limited to 1/h) [1/s], default 100
-    closure_kp: stabilisation of the closures, position (full formulation) [1/s^2], default 10000
-    closure_kd: stabilisation of the closures, velocity (full formulation) [1/s], default 100
+    feet_distance: least distance between the soles, or that of the footholds if smaller [m], default 0.01
+    terminal_weight: position of the centre of mass at the end [1/m^2], default 1000
+    contact_kp: position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2)) [1/s^2], default 2000
+    contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 100
+    closure_kp: position gain of the stabilisation of closures (full formulation) [1/s^2], default 10000
+    closure_kd: velocity gain of the stabilisation of closures (full formulation) [1/s], default 100
     footholds: path of a file
     """
     ...
 
 def solve_box(robot: Union[str, Robot], *, height: float = ..., length: float = ..., width: float = ..., distance: float = ..., down: float = ..., start_support: float = ..., start_pressure: float = ..., single_support: float = ..., double_support: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., published: float = ..., rigid_landing: float = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
-    """a step onto a box, and down again if asked.
+    """a step onto a box, and down again if requested.
 
     robot: a Robot, or the name of one
     problem: ProblemOptions: formulation, limits, free durations, objective
     solver: SolverOptions: iterations, threads, tolerances
     warm_start: a Result, a Record or the directory of a result to start from
     callback: called with each Iteration; returning False stops the solver
-    height: of the box [m], default 0.1
-    length: of its top; the feet stand on its middle [m], default 0.2
-    width: of the box [m], default 0.8
-    distance: from the soles to the box [m], default 0.05
-    down: 1: and down again behind the box [0 or 1], default 0
-    start_support: double support before the first step, at least [s], default 0.3
-    start_pressure: it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given [1], default 0.4
-    single_support: one foot on the ground [s], default 0.6
-    double_support: both feet on the ground between two steps [s], default 0.09
-    end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
-    swing_height: apex of the swing foot over the higher end of its path [m], default 0.03
-    swing_apex: when it is reached, from 0 to 1 [1], default 0.5
-    swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0.25
-    swing_arrive: when it is over its foothold, from 0 to 1 [1], default 0.75
+    height: height of the box [m], default 0.1
+    length: length of its top; the feet stand in the middle [m], default 0.2
+    width: width of the box [m], default 0.8
+    distance: distance from the soles to the box [m], default 0.05
+    down: 1: step down again behind the box [0 or 1], default 0
+    start_support: least duration of double support before the first step [s], default 0.3
+    start_pressure: start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never [1], default 0.4
+    single_support: duration with one foot on the ground [s], default 0.6
+    double_support: duration with both feet on the ground between two steps [s], default 0.09
+    end_support: duration of double support after the last step [s], default 0.45
+    time_step: length of a shooting stage; 0: 12 ms, 5 ms with flights, less for fast swings [s], default 0
+    swing_height: apex of the swing foot above the higher end of its path [m], default 0.03
+    swing_apex: time of the apex as a fraction of the swing, from 0 to 1 [1], default 0.5
+    swing_leave: time at which the swing foot starts to move horizontally, from 0 to 1 [1], default 0.25
+    swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.75
     friction: friction coefficient [1], default 0.7
-    cone_margin: part of friction and soles that wrenches leave free [1], default 0.01
-    published: 1: the paper's problem: feet land where they like; 0: on footholds, by our costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a stage of its own; 0: none [0 or 1], default 0
-    landing_speed: with rigid_landing: how fast feet come down, below 0.1; 0: at rest [m/s], default 0
-    foothold_room: how far from its foothold a foot may land, along x and y; 0: on it [m], default 0
+    cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
+    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
+    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
+    foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
     torso_weight: keep the torso upright, within the state regularization [1], default 10000
-    heading_weight: head where the feet do, within the state regularization [1], default 1000
+    heading_weight: keep the heading of the feet, within the state regularization [1], default 1000
     motor_weight: keep motors slow, within the state regularization [1], default 1
     control_weight: keep motor torques small [1/(N m)^2], default 0.001
     com_weight: horizontal position of the centre of mass [1/m^2], default 100
     com_height_weight: height of the centre of mass [1/m^2], default 1000
-    com_velocity_weight: velocity of the centre of mass, along the way [s^2/m^2], default 0
+    com_velocity_weight: velocity of the centre of mass in the direction of travel [s^2/m^2], default 0
     swing_weight: path of the swing foot [1/m^2], default 10000
     swing_velocity_weight: velocity of the swing foot along its path [s^2/m^2], default 200
     swing_rotation_weight: orientation of the swing foot [1], default 1000
     foothold_weight: with foothold_room: land near the foothold, swing near its horizontal path [1/m^2], default 20
-    force_weight: pass the weight evenly from foot to foot, over (m g)^2 [1], default 10
+    force_weight: transfer the weight evenly between the feet, relative to (m g)^2 [1], default 10
     pressure_weight: keep the centre of pressure in the middle of the sole [1], default 10
-    feet_distance: least distance of the soles, or what the footholds leave if less [m], default 0.01
-    terminal_weight: place of the centre of mass at the end [1/m^2], default 1000
-    contact_kp: stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2)) [1/s^2], default 2000
-    contact_kd: stabilisation of the contacts, velocity (limited to 1/h) [1/s], default 100
-    closure_kp: stabilisation of the closures, position (full formulation) [1/s^2], default 10000
-    closure_kd: stabilisation of the closures, velocity (full formulation) [1/s], default 100
+    feet_distance: least distance between the soles, or that of the footholds if smaller [m], default 0.01
+    terminal_weight: position of the centre of mass at the end [1/m^2], default 1000
+    contact_kp: position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2)) [1/s^2], default 2000
+    contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 100
+    closure_kp: position gain of the stabilisation of closures (full formulation) [1/s^2], default 10000
+    closure_kd: velocity gain of the stabilisation of closures (full formulation) [1/s], default 100
     """
     ...
 
@@ -352,50 +352,50 @@ def solve_gap(robot: Union[str, Robot], *, width: float = ..., distance: float =
     solver: SolverOptions: iterations, threads, tolerances
     warm_start: a Result, a Record or the directory of a result to start from
     callback: called with each Iteration; returning False stops the solver
-    width: of the gap, along the way [m], default 0.15
-    distance: of the soles from its edges, on both sides [m], default 0.02
-    depth: of the ground in the gap under its banks [m], default 0.3
-    start_support: double support before the first step, at least [s], default 0.3
-    start_pressure: it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given [1], default 0.4
-    single_support: one foot on the ground [s], default 0.36
-    double_support: both feet on the ground between two steps [s], default 0.045
-    end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
-    swing_height: apex of the swing foot over the higher end of its path [m], default 0.04
-    swing_apex: when it is reached, from 0 to 1 [1], default 0.5
-    swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0
-    swing_arrive: when it is over its foothold, from 0 to 1 [1], default 0.95
+    width: width of the gap in the direction of travel [m], default 0.15
+    distance: distance of the soles from its edges, on both sides [m], default 0.02
+    depth: depth of the gap's floor below its banks [m], default 0.3
+    start_support: least duration of double support before the first step [s], default 0.3
+    start_pressure: start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never [1], default 0.4
+    single_support: duration with one foot on the ground [s], default 0.36
+    double_support: duration with both feet on the ground between two steps [s], default 0.045
+    end_support: duration of double support after the last step [s], default 0.45
+    time_step: length of a shooting stage; 0: 12 ms, 5 ms with flights, less for fast swings [s], default 0
+    swing_height: apex of the swing foot above the higher end of its path [m], default 0.04
+    swing_apex: time of the apex as a fraction of the swing, from 0 to 1 [1], default 0.5
+    swing_leave: time at which the swing foot starts to move horizontally, from 0 to 1 [1], default 0
+    swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 0.95
     friction: friction coefficient [1], default 0.7
-    cone_margin: part of friction and soles that wrenches leave free [1], default 0.01
-    published: 1: the paper's problem: feet land where they like; 0: on footholds, by our costs [0 or 1], default 0
-    rigid_landing: 1: a rigid impact at every landing, as a stage of its own; 0: none [0 or 1], default 0
-    landing_speed: with rigid_landing: how fast feet come down, below 0.1; 0: at rest [m/s], default 0
-    foothold_room: how far from its foothold a foot may land, along x and y; 0: on it [m], default 0
+    cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
+    published: 1: the paper's problem, with free landing places; 0: footholds and Bielle's costs [0 or 1], default 0
+    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
+    foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
     torso_weight: keep the torso upright, within the state regularization [1], default 10000
-    heading_weight: head where the feet do, within the state regularization [1], default 1000
+    heading_weight: keep the heading of the feet, within the state regularization [1], default 1000
     motor_weight: keep motors slow, within the state regularization [1], default 1
     control_weight: keep motor torques small [1/(N m)^2], default 0.001
     com_weight: horizontal position of the centre of mass [1/m^2], default 100
     com_height_weight: height of the centre of mass [1/m^2], default 3000
-    com_velocity_weight: velocity of the centre of mass, along the way [s^2/m^2], default 0
+    com_velocity_weight: velocity of the centre of mass in the direction of travel [s^2/m^2], default 0
     swing_weight: path of the swing foot [1/m^2], default 10000
     swing_velocity_weight: velocity of the swing foot along its path [s^2/m^2], default 200
     swing_rotation_weight: orientation of the swing foot [1], default 1000
     foothold_weight: with foothold_room: land near the foothold, swing near its horizontal path [1/m^2], default 20
-    force_weight: pass the weight evenly from foot to foot, over (m g)^2 [1], default 10
+    force_weight: transfer the weight evenly between the feet, relative to (m g)^2 [1], default 10
     pressure_weight: keep the centre of pressure in the middle of the sole [1], default 10
-    feet_distance: least distance of the soles, or what the footholds leave if less [m], default 0.01
-    terminal_weight: place of the centre of mass at the end [1/m^2], default 1000
-    contact_kp: stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2)) [1/s^2], default 2000
-    contact_kd: stabilisation of the contacts, velocity (limited to 1/h) [1/s], default 100
-    closure_kp: stabilisation of the closures, position (full formulation) [1/s^2], default 10000
-    closure_kd: stabilisation of the closures, velocity (full formulation) [1/s], default 100
+    feet_distance: least distance between the soles, or that of the footholds if smaller [m], default 0.01
+    terminal_weight: position of the centre of mass at the end [1/m^2], default 1000
+    contact_kp: position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2)) [1/s^2], default 2000
+    contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 100
+    closure_kp: position gain of the stabilisation of closures (full formulation) [1/s^2], default 10000
+    closure_kd: velocity gain of the stabilisation of closures (full formulation) [1/s], default 100
     """
     ...
 
 def solve_jump(robot: Union[str, Robot], *, flight: float = ..., length: float = ..., stand: float = ..., push: float = ..., land: float = ..., settle: float = ..., stretch: float = ..., clearance: float = ..., friction: float = ..., cone_margin: float = ..., time_step: float = ..., published: float = ..., apex_weight: float = ..., com_weight: float = ..., state_weight: float = ..., torso_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., swing_weight: float = ..., swing_rotation_weight: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., weights: str = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
-    """push, fly for a given time, land: the height of the centre of mass at mid-flight follows from the time.
+    """push off, fly for a given time, land; the time determines the height of the centre of mass at mid-flight.
 
     robot: a Robot, or the name of one
     problem: ProblemOptions: formulation, limits, free durations, objective
@@ -403,30 +403,30 @@ def solve_jump(robot: Union[str, Robot], *, flight: float = ..., length: float =
     warm_start: a Result, a Record or the directory of a result to start from
     callback: called with each Iteration; returning False stops the solver
     flight: time in the air, rounded to an even number of time steps; the height follows [s], default 0.3
-    length: how far ahead the feet land [m], default 0
-    stand: before the push [s], default 0.15
-    push: feet on the ground, faster and faster [s], default 0.3
-    land: feet on the ground again, until the body is caught [s], default 0.3
-    settle: back to rest [s], default 0.4
-    stretch: height of the centre of mass at take-off and touchdown over that at the start [m], default 0.02
+    length: distance from take-off to landing, forward [m], default 0
+    stand: time at rest before the push [s], default 0.15
+    push: time of acceleration with the feet on the ground [s], default 0.3
+    land: time from touchdown until the body is braked [s], default 0.3
+    settle: time to come back to rest [s], default 0.4
+    stretch: height of the centre of mass at take-off and touchdown above that at the start [m], default 0.02
     clearance: least height of the soles at mid-flight [m], default 0.04
     friction: friction coefficient [1], default 0.7
-    cone_margin: part of friction and soles that wrenches leave free [1], default 0.01
+    cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
     time_step: length of a shooting stage [s], default 0.002
-    published: 1: the paper's problem: feet are free in flight; 0: by our costs [0 or 1], default 0
+    published: 1: the paper's problem, with feet free in flight; 0: Bielle's costs [0 or 1], default 0
     apex_weight: height of the centre of mass at mid-flight [1/m^2], default 10000
     com_weight: height of the centre of mass on the ground [1/m^2], default 1000
     state_weight: stay near the standing posture, at rest [1], default 0.02
     torso_weight: keep the torso upright, within the state regularization [1], default 2000
     motor_weight: keep motors slow, within the state regularization [1], default 1
     control_weight: keep motor torques small [1/(N m)^2], default 0.003
-    force_weight: share the load evenly between feet and in time, over (m g)^2 [1], default 30
+    force_weight: share the load evenly between the feet and over time, relative to (m g)^2 [1], default 30
     pressure_weight: keep the centre of pressure in the middle of the sole [1], default 1
-    swing_weight: path of the feet in flight [1/m^2], default 100000
-    swing_rotation_weight: soles stay level in flight [1], default 100
-    terminal_weight: place of the centre of mass at the end [1/m^2], default 1000
-    contact_kp: stabilisation of contacts and closures, position (limited to 1/(3 h^2), h the time step; Euler steps: 1/(2 h^2)) [1/s^2], default 10000
-    contact_kd: stabilisation of contacts and closures, velocity (limited to 1/h) [1/s], default 200
+    swing_weight: follow the path of the feet in flight [1/m^2], default 100000
+    swing_rotation_weight: keep the soles level in flight [1], default 100
+    terminal_weight: position of the centre of mass at the end [1/m^2], default 1000
+    contact_kp: position gain of the stabilisation of contacts and closures (at most 1/(3 h^2) with the time step h; Euler steps: 1/(2 h^2)) [1/s^2], default 10000
+    contact_kd: velocity gain of the stabilisation of contacts and closures (at most 1/h) [1/s], default 200
     weights: 'paper'
     """
     ...
@@ -439,93 +439,93 @@ def solve_run(robot: Union[str, Robot], *, speed: float = ..., steps: float = ..
     solver: SolverOptions: iterations, threads, tolerances
     warm_start: a Result, a Record or the directory of a result to start from
     callback: called with each Iteration; returning False stops the solver
-    speed: of the steady steps; negative: backward [m/s], default 1
-    steps: number of steps, the last one brings the feet together [1], default 8
-    flight: both feet in the air between two steps [s], default 0.08
-    stance: one foot on the ground [s], default 0.24
-    start_support: double support before the first step, at least [s], default 0.3
-    start_pressure: it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given [1], default 0.4
-    end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
-    swing_height: apex of the swing foot over the higher end of its path [m], default 0.04
-    swing_apex: when it is reached, from 0 to 1 [1], default 0.5
-    swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0
-    swing_arrive: when it is over its foothold, from 0 to 1 [1], default 1
+    speed: speed of the steady steps; negative: backward [m/s], default 1
+    steps: number of steps; the last one brings the feet together [1], default 8
+    flight: time in the air between two steps [s], default 0.08
+    stance: time with one foot on the ground [s], default 0.24
+    start_support: least duration of double support before the first step [s], default 0.3
+    start_pressure: start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never [1], default 0.4
+    end_support: duration of double support after the last step [s], default 0.45
+    time_step: length of a shooting stage; 0: 12 ms, 5 ms with flights, less for fast swings [s], default 0
+    swing_height: apex of the swing foot above the higher end of its path [m], default 0.04
+    swing_apex: time of the apex as a fraction of the swing, from 0 to 1 [1], default 0.5
+    swing_leave: time at which the swing foot starts to move horizontally, from 0 to 1 [1], default 0
+    swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 1
     friction: friction coefficient [1], default 0.7
-    cone_margin: part of friction and soles that wrenches leave free [1], default 0.01
-    rigid_landing: 1: a rigid impact at every landing, as a stage of its own; 0: none [0 or 1], default 0
-    landing_speed: with rigid_landing: how fast feet come down, below 0.1; 0: at rest [m/s], default 0
-    foothold_room: how far from its foothold a foot may land, along x and y; 0: on it [m], default 0
+    cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
+    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
+    foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
     torso_weight: keep the torso upright, within the state regularization [1], default 10000
-    heading_weight: head where the feet do, within the state regularization [1], default 1000
+    heading_weight: keep the heading of the feet, within the state regularization [1], default 1000
     motor_weight: keep motors slow, within the state regularization [1], default 1
     control_weight: keep motor torques small [1/(N m)^2], default 0.001
     com_weight: horizontal position of the centre of mass [1/m^2], default 100
     com_height_weight: height of the centre of mass [1/m^2], default 3000
-    com_velocity_weight: velocity of the centre of mass, along the way [s^2/m^2], default 0
+    com_velocity_weight: velocity of the centre of mass in the direction of travel [s^2/m^2], default 0
     swing_weight: path of the swing foot [1/m^2], default 10000
     swing_velocity_weight: velocity of the swing foot along its path [s^2/m^2], default 200
     swing_rotation_weight: orientation of the swing foot [1], default 1000
     foothold_weight: with foothold_room: land near the foothold, swing near its horizontal path [1/m^2], default 20
-    force_weight: pass the weight evenly from foot to foot, over (m g)^2 [1], default 100
+    force_weight: transfer the weight evenly between the feet, relative to (m g)^2 [1], default 100
     pressure_weight: keep the centre of pressure in the middle of the sole [1], default 10
-    feet_distance: least distance of the soles, or what the footholds leave if less [m], default 0.01
-    terminal_weight: place of the centre of mass at the end [1/m^2], default 1000
-    contact_kp: stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2)) [1/s^2], default 2000
-    contact_kd: stabilisation of the contacts, velocity (limited to 1/h) [1/s], default 100
-    closure_kp: stabilisation of the closures, position (full formulation) [1/s^2], default 10000
-    closure_kd: stabilisation of the closures, velocity (full formulation) [1/s], default 100
-    stretch: height of the centre of mass at take-off and touchdown over that at the start [m], default 0
+    feet_distance: least distance between the soles, or that of the footholds if smaller [m], default 0.01
+    terminal_weight: position of the centre of mass at the end [1/m^2], default 1000
+    contact_kp: position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2)) [1/s^2], default 2000
+    contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 100
+    closure_kp: position gain of the stabilisation of closures (full formulation) [1/s^2], default 10000
+    closure_kd: velocity gain of the stabilisation of closures (full formulation) [1/s], default 100
+    stretch: height of the centre of mass at take-off and touchdown above that at the start [m], default 0
     """
     ...
 
 def solve_hop(robot: Union[str, Robot], *, foot: Union[str, float] = ..., hops: float = ..., flight: float = ..., length: float = ..., stance: float = ..., start_support: float = ..., start_pressure: float = ..., end_support: float = ..., time_step: float = ..., swing_height: float = ..., swing_apex: float = ..., swing_leave: float = ..., swing_arrive: float = ..., friction: float = ..., cone_margin: float = ..., rigid_landing: float = ..., landing_speed: float = ..., foothold_room: float = ..., state_weight: float = ..., torso_weight: float = ..., heading_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., com_weight: float = ..., com_height_weight: float = ..., com_velocity_weight: float = ..., swing_weight: float = ..., swing_velocity_weight: float = ..., swing_rotation_weight: float = ..., foothold_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., feet_distance: float = ..., terminal_weight: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., stretch: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
-    """one foot is lifted, the other one takes off and lands again.
+    """lift one foot, take off and land on the other one.
 
     robot: a Robot, or the name of one
     problem: ProblemOptions: formulation, limits, free durations, objective
     solver: SolverOptions: iterations, threads, tolerances
     warm_start: a Result, a Record or the directory of a result to start from
     callback: called with each Iteration; returning False stops the solver
-    foot: to hop on; 0: left, 1: right [0 or 1], default 0
+    foot: foot to hop on; 0: left, 1: right [0 or 1], default 0
     hops: number of flights [1], default 1
-    flight: time in the air of each [s], default 0.15
-    length: of each hop, forward; negative: backward [m], default 0
-    stance: on one foot before the first flight, between flights and after the last one [s], default 0.3
-    start_support: double support before the first step, at least [s], default 0.6
-    start_pressure: it is lengthened until the centre of pressure stays within this part of the soles; 0: it is as given [1], default 0.4
-    end_support: double support after the last step [s], default 0.45
-    time_step: length of a shooting stage; 0: 12 ms, with flights 5 ms, less where a swing is fast [s], default 0
-    swing_height: apex of the swing foot over the higher end of its path [m], default 0.02
-    swing_apex: when it is reached, from 0 to 1 [1], default 0.5
-    swing_leave: when the swing foot starts to move horizontally, from 0 to 1 [1], default 0
-    swing_arrive: when it is over its foothold, from 0 to 1 [1], default 1
+    flight: time in the air of each hop [s], default 0.15
+    length: length of each hop, forward; negative: backward [m], default 0
+    stance: time on one foot before the first flight, between flights and after the last one [s], default 0.3
+    start_support: least duration of double support before the first step [s], default 0.6
+    start_pressure: start_support is lengthened until the centre of pressure stays within this share of the soles; 0: never [1], default 0.4
+    end_support: duration of double support after the last step [s], default 0.45
+    time_step: length of a shooting stage; 0: 12 ms, 5 ms with flights, less for fast swings [s], default 0
+    swing_height: apex of the swing foot above the higher end of its path [m], default 0.02
+    swing_apex: time of the apex as a fraction of the swing, from 0 to 1 [1], default 0.5
+    swing_leave: time at which the swing foot starts to move horizontally, from 0 to 1 [1], default 0
+    swing_arrive: time at which the swing foot is above its foothold, from 0 to 1 [1], default 1
     friction: friction coefficient [1], default 0.7
-    cone_margin: part of friction and soles that wrenches leave free [1], default 0.01
-    rigid_landing: 1: a rigid impact at every landing, as a stage of its own; 0: none [0 or 1], default 0
-    landing_speed: with rigid_landing: how fast feet come down, below 0.1; 0: at rest [m/s], default 0
-    foothold_room: how far from its foothold a foot may land, along x and y; 0: on it [m], default 0
+    cone_margin: share of friction and soles that wrenches leave unused [1], default 0.01
+    rigid_landing: 1: a rigid impact at every landing, as a separate stage; 0: none [0 or 1], default 0
+    landing_speed: with rigid_landing: landing velocity of the feet, below 0.1; 0: at rest [m/s], default 0
+    foothold_room: largest distance along x and y between a foot's landing place and its foothold; 0: exactly on it [m], default 0
     state_weight: stay near the standing posture, at rest [1], default 0.1
     torso_weight: keep the torso upright, within the state regularization [1], default 10000
-    heading_weight: head where the feet do, within the state regularization [1], default 1000
+    heading_weight: keep the heading of the feet, within the state regularization [1], default 1000
     motor_weight: keep motors slow, within the state regularization [1], default 1
     control_weight: keep motor torques small [1/(N m)^2], default 0.001
     com_weight: horizontal position of the centre of mass [1/m^2], default 100
     com_height_weight: height of the centre of mass [1/m^2], default 3000
-    com_velocity_weight: velocity of the centre of mass, along the way [s^2/m^2], default 0
+    com_velocity_weight: velocity of the centre of mass in the direction of travel [s^2/m^2], default 0
     swing_weight: path of the swing foot [1/m^2], default 10000
     swing_velocity_weight: velocity of the swing foot along its path [s^2/m^2], default 200
     swing_rotation_weight: orientation of the swing foot [1], default 1000
     foothold_weight: with foothold_room: land near the foothold, swing near its horizontal path [1/m^2], default 20
-    force_weight: pass the weight evenly from foot to foot, over (m g)^2 [1], default 100
+    force_weight: transfer the weight evenly between the feet, relative to (m g)^2 [1], default 100
     pressure_weight: keep the centre of pressure in the middle of the sole [1], default 10
-    feet_distance: least distance of the soles, or what the footholds leave if less [m], default 0.01
-    terminal_weight: place of the centre of mass at the end [1/m^2], default 1000
-    contact_kp: stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2)) [1/s^2], default 2000
-    contact_kd: stabilisation of the contacts, velocity (limited to 1/h) [1/s], default 100
-    closure_kp: stabilisation of the closures, position (full formulation) [1/s^2], default 10000
-    closure_kd: stabilisation of the closures, velocity (full formulation) [1/s], default 100
-    stretch: height of the centre of mass at take-off and touchdown over that at the start [m], default 0
+    feet_distance: least distance between the soles, or that of the footholds if smaller [m], default 0.01
+    terminal_weight: position of the centre of mass at the end [1/m^2], default 1000
+    contact_kp: position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2)) [1/s^2], default 2000
+    contact_kd: velocity gain of the stabilisation of contacts (at most 1/h) [1/s], default 100
+    closure_kp: position gain of the stabilisation of closures (full formulation) [1/s^2], default 10000
+    closure_kd: velocity gain of the stabilisation of closures (full formulation) [1/s], default 100
+    stretch: height of the centre of mass at take-off and touchdown above that at the start [m], default 0
     """
     ...

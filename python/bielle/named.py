@@ -60,4 +60,4 @@ class WorldState(NamedTuple):
     time: Array  #: since reset, s
     q: Array  #: (nq,)
     v: Array  #: (nv,)
-    ok: Array  #: bool; False: the integration broke off, and the state is the last one that is finite
+    ok: Array  #: bool; False: the integration failed, and the state is the last finite one

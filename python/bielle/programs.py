@@ -1,4 +1,4 @@
-"""What Bielle's programs do, from Python: checks against Simbody, motions carried out, campaigns, designs."""
+"""Bielle's programs from Python: checks against Simbody, executed motions, campaigns, designs."""
 
 import json
 import shutil
@@ -16,7 +16,7 @@ Directory = Union[str, Path]
 
 
 def find_program(name: str) -> str:
-    """A program of Bielle: that of the build which this package is part of, else the one on the PATH."""
+    """A program of Bielle: from the build that contains this package, else from the PATH."""
     built = Path(__file__).absolute().parents[2] / "bin" / name
     found = str(built) if built.is_file() else shutil.which(name)
     if found is None:
@@ -27,10 +27,10 @@ def find_program(name: str) -> str:
 
 
 def run_program(name: str, arguments: List[str], progress: bool = False, statuses: Tuple[int, ...] = (0,)) -> str:
-    """What a program prints. Its progress goes where Python's errors go, if it is wanted.
+    """The output of a program. With `progress`, its standard error is shown.
 
-    Raises RuntimeError with its message unless it ends with one of the statuses. What breaks Python off, like Ctrl-C,
-    interrupts the program, which then ends in its own way.
+    Raises RuntimeError with its message unless it ends with one of the statuses. An exception in Python, such as Ctrl-C,
+    interrupts the program, which then ends by itself.
     """
     errors = []
     # A session of its own, so that Ctrl-C in a terminal does not reach it twice; a file, as a pipe could fill up unread.
@@ -51,14 +51,14 @@ def run_program(name: str, arguments: List[str], progress: bool = False, statuse
         printed.seek(0)
         output = printed.read()
     if process.returncode not in statuses:
-        raise RuntimeError("".join(errors).strip() or f"{name} broke off with status {process.returncode}")
+        raise RuntimeError("".join(errors).strip() or f"{name} failed with status {process.returncode}")
     return output
 
 
 def check(result: Union[Directory, Result]) -> Dict[str, Any]:
     """Checks a Result, or the directory of one, against Simbody, as `bielle check --json` does.
 
-    Returns its table as a dictionary; "pass" tells whether all of it holds.
+    Returns its table as a dictionary; "pass" is true if every row passes.
     """
     if isinstance(result, Result):
         with tempfile.TemporaryDirectory() as directory:
@@ -83,9 +83,9 @@ def make_arguments(options: Dict[str, Setting]) -> List[str]:
 def simulate(
     result: Union[Directory, Result], directory: Optional[Directory] = None, progress: bool = False, **options: Setting
 ) -> Dict[str, Any]:
-    """Carries a motion out in physics with contact, as `bielle simulate` does. Returns its summary as a dictionary.
+    """Executes a motion in a physics simulation with contact, as `bielle simulate` does. Returns its summary as a dictionary.
 
-    result: a Result, or the directory of one; of a walk by command, the name of the motion
+    result: a Result, or the directory of one; for a commanded walk, the name of the motion
     directory: for the trajectory, the summary and the report; None: nothing is kept
     options: those of the command, e.g. world="mujoco", control="mpc", push="t=1,impulse=5,direction=90,duration=0.1"
     """
@@ -103,9 +103,9 @@ def simulate(
 
 
 def campaign(spec: Directory, directory: Directory, jobs: int = 2, progress: bool = True) -> Dict[str, Any]:
-    """Carries motions out many times, as `bielle campaign` does. Returns its summary as a dictionary.
+    """Executes motions many times, as `bielle campaign` does. Returns its summary as a dictionary.
 
-    What is in the directory already is not done again.
+    Finished runs in the directory are not repeated.
     """
     run_program("bielle", ["campaign", str(spec), "-o", str(directory), "--jobs", str(jobs)], progress)
     summary: Dict[str, Any] = json.loads((Path(directory) / "summary.json").read_text())
@@ -115,7 +115,7 @@ def campaign(spec: Directory, directory: Directory, jobs: int = 2, progress: boo
 def design(spec: Directory, directory: Directory, jobs: int = 2) -> Robot:
     """Chooses lengths of a robot by optimization over its motions, as `bielle design` does. Returns the best robot.
 
-    design.md and figures are in the directory. What is in its logs already is not done again.
+    design.md and figures are in the directory. Evaluations in its logs are not repeated.
     """
     run_program("bielle", ["design", str(spec), "-o", str(directory), "--jobs", str(jobs)])
     return load_robot(str(Path(directory) / "best"))

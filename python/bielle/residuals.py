@@ -1,4 +1,4 @@
-"""Residuals of costs and constraints: those of the library, and the base class of one's own."""
+"""Residuals of costs and constraints: those of the library, and the base class of user-defined ones."""
 
 from typing import Any, Dict, NamedTuple, Optional, Sequence, Tuple, Union
 
@@ -30,10 +30,10 @@ Array = npt.NDArray[np.float64]
 
 
 class Residual:
-    """A residual r of one's own, for costs and constraints.
+    """A user-defined residual r for costs and constraints.
 
-    The solver calls `calc` and `calc_jacobian` from all its threads, one at a time. They must depend on the node alone,
-    so that results do not depend on the number of threads. What they raise leaves the solve as it is.
+    The solver calls `calc` and `calc_jacobian` from all its threads, one at a time. They must depend only on the node,
+    so that results do not depend on the number of threads. Exceptions they raise leave the solve unchanged.
 
     size: number of rows n.
     depends_on: what r depends on, of "q", "v", "forces", "controls", "speeds", "time_scale".
@@ -65,7 +65,7 @@ class Residual:
 
 
 class Recipe(NamedTuple):
-    """What the library makes a plan or, with options, a motion of. Pickled, it comes back as the list of the residuals
+    """What the library makes a plan or, with options, a motion from. Unpickled, it is the list of the residuals
     that the library puts there.
     """
 

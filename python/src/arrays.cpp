@@ -19,9 +19,9 @@ py::array makeView(const double* data, const Shape& shape, const Shape& strides,
 
 Array readArray(py::handle value, const std::string& what) {
   const py::array given = py::array::ensure(value);
-  if (!given) throw py::type_error(what + ": numbers wanted, got " + std::string(py::str(py::type::of(value))));
+  if (!given) throw py::type_error(what + ": expected numbers, got " + std::string(py::str(py::type::of(value))));
   if (std::string("biuf").find(given.dtype().kind()) == std::string::npos)
-    throw py::type_error(what + ": numbers wanted, got an array of " + std::string(py::str(given.dtype())));
+    throw py::type_error(what + ": expected numbers, got an array of " + std::string(py::str(given.dtype())));
   return Array(given);
 }
 
@@ -29,7 +29,7 @@ void requireShape(const Array& array, const Shape& shape, const std::string& wha
   bool same = array.ndim() == static_cast<py::ssize_t>(shape.size());
   for (size_t i = 0; same && i < shape.size(); ++i) same = shape[i] < 0 || array.shape(i) == shape[i];
   if (same) return;
-  throw py::value_error(what + ": shape " + formatShape(shape) + " wanted, got " +
+  throw py::value_error(what + ": expected shape " + formatShape(shape) + ", got " +
                         formatShape(Shape(array.shape(), array.shape() + array.ndim())));
 }
 

@@ -11,7 +11,7 @@ namespace {
 std::shared_ptr<HeldController> makeHeldPolicy(const std::shared_ptr<HeldMotion>& motion, bool gains) {
   requireStill(*motion);
   if (gains && !motion->solver)
-    throw std::runtime_error("gains are those of the last solve: solve the motion first, or ask for gains=False");
+    throw std::runtime_error("gains come from the last solve: solve the motion first, or give gains=False");
   auto held = std::make_shared<HeldController>();
   held->model = motion->model;
   auto policy = std::make_unique<Policy>(gains ? makePolicy(motion->motion, motion->motion.guess, *motion->solver)
@@ -63,36 +63,37 @@ std::vector<PredictedFoothold> getFootholds(HeldController& self) {
 
 void bindControllers(py::module_& module) {
   Value<PredictiveOptions>(module, "PredictiveOptions", "Options of predictive control.")
-      .field("nodes", &PredictiveOptions::nodes, "stages of a window")
-      .field("iterations", &PredictiveOptions::iterations, "of the solver, at every stage")
-      .field("regularization", &PredictiveOptions::regularization, "of its sweeps")
-      .field("penalty", &PredictiveOptions::penalty, "of violated constraints")
+      .field("nodes", &PredictiveOptions::nodes, "number of stages of a window")
+      .field("iterations", &PredictiveOptions::iterations, "solver iterations at every stage")
+      .field("regularization", &PredictiveOptions::regularization, "regularization of its sweeps")
+      .field("penalty", &PredictiveOptions::penalty, "penalty of violated constraints")
       .field("look_ahead", &PredictiveOptions::look_ahead,
-             "gains of stages nearer to the end of their phase are those of an earlier one, s")
+             "near the end of a contact phase, the last gains computed at least this long before it are reused, s")
       .field("dead_point_stop", &PredictiveOptions::dead_point_stop,
-             "motors brake before the transmission of a linkage is this share of that at the start, or its reciprocal")
+             "motors brake before the transmission of a linkage reaches this share of that at the start, or the "
+             "reciprocal")
       .field("threads", &PredictiveOptions::threads, "0: all; results are bitwise independent of it")
       .field("own_thread", &PredictiveOptions::own_thread,
-             "solves run beside control; results then depend on how fast they are")
+             "solves run in parallel with control; results then depend on their speed")
       .field("end_place", &PredictiveOptions::end_place,
              "weight of heading and place at the end of a window, 1/m^2 or 1")
-      .field("end_posture", &PredictiveOptions::end_posture, "of the other coordinates")
-      .field("end_velocity", &PredictiveOptions::end_velocity, "of the velocities, s^2/m^2 or s^2");
-  Value<PredictedFoothold>(module, "PredictedFoothold", "Where a foot is foreseen to stand next.")
-      .field("contact", &PredictedFoothold::contact, "of the model")
-      .field("time", &PredictedFoothold::time, "of its landing, s")
-      .field("X_WF", &PredictedFoothold::X_WF, "of the contact's frame in the world");
+      .field("end_posture", &PredictiveOptions::end_posture, "weight of the other coordinates")
+      .field("end_velocity", &PredictiveOptions::end_velocity, "weight of the velocities, s^2/m^2 or s^2");
+  Value<PredictedFoothold>(module, "PredictedFoothold", "The predicted next foothold of a foot.")
+      .field("contact", &PredictedFoothold::contact, "index into the model's contacts")
+      .field("time", &PredictedFoothold::time, "time of its landing, s")
+      .field("X_WF", &PredictedFoothold::X_WF, "placement of the contact's frame in the world");
   py::class_<HeldController, std::shared_ptr<HeldController>>(
       module, "Controller",
-      "A feedback law: from what is measured to torques. Controller.policy and .predictive make them.")
+      "A feedback law: from measured states to torques. Controller.policy and .predictive make them.")
       .def_static("policy", &makeHeldPolicy, py::arg("motion"), py::arg("gains") = true,
-                  "Torques of a solved Motion, and the gains of the last sweep about it.")
+                  "Torques of a solved Motion, and feedback with the gains of its last sweep.")
       .def_static("predictive", &makePredictive, py::arg("model"), py::arg("plan"), py::arg("solved"),
                   py::arg("problem") = ProblemOptions(), py::arg("options") = PredictiveOptions(),
-                  "Solves the next second anew at every stage. plan: a MotionPlan; solved: Trajectory of its Motion.")
+                  "Solves the next second again at every stage. plan: a MotionPlan; solved: Trajectory of its Motion.")
       .def("update", &update, py::arg("time"), py::arg("q"), py::arg("v"), py::arg("delay") = 0,
            "Motor torques (nu,) at a time (s) and a measured state (nq,), (nv,); delay until they act, s.\n\n"
-           "To be called in the order of time.")
+           "Call it in order of time.")
       .def("reference", &getReference, py::arg("time"), "q (nq,) and v (nv,) that a policy follows at a time, s.")
       .def_property_readonly(
           "duration",
@@ -100,7 +101,7 @@ void bindControllers(py::module_& module) {
             if (!self.policy) throw std::runtime_error("only the policy of a solved motion has a duration");
             return self.policy->getDuration();
           },
-          "of a policy, s")
+          "duration of a policy, s")
       .def_property_readonly(
           "counts",
           [](const HeldController& self) {
@@ -114,10 +115,10 @@ void bindControllers(py::module_& module) {
             out["missed"] = counts.missed;
             return out;
           },
-          "of predictive control: solves, failed ones, early and late landings, solves longer than a stage")
+          "counts of predictive control: solves, failed solves, early and late landings, solves longer than a stage")
       .def_property_readonly(
           "footholds", &getFootholds,
-          "of predictive control: a PredictedFoothold for each contact that is to land in its window");
+          "predictive control only: a PredictedFoothold for each contact that lands within the window");
 }
 
 }  // namespace bielle::python

@@ -37,7 +37,7 @@ struct Convert {
     try {
       return value.cast<M>();
     } catch (const py::cast_error&) {
-      throw py::type_error(what + ": " + std::string(py::type_id<M>()) + " wanted, got " +
+      throw py::type_error(what + ": expected " + std::string(py::type_id<M>()) + ", got " +
                            std::string(py::repr(py::type::of(value))));
     }
   }
@@ -99,7 +99,7 @@ struct Convert<std::vector<E>> {
   }
   static std::vector<E> read(py::handle value, const std::string& what) {
     if (py::isinstance<py::str>(value) || !py::isinstance<py::iterable>(value))
-      throw py::type_error(what + ": a sequence wanted, got " + std::string(py::repr(py::type::of(value))));
+      throw py::type_error(what + ": expected a sequence, got " + std::string(py::repr(py::type::of(value))));
     std::vector<E> out;
     for (const py::handle entry : value)
       out.push_back(python::read<E>(entry, what + "[" + std::to_string(out.size()) + "]"));
@@ -123,7 +123,7 @@ struct Convert<std::array<E, N>> {
   }
   static std::array<E, N> read(py::handle value, const std::string& what) {
     const std::vector<E> list = List::read(value, what);
-    if (list.size() != N) throw py::value_error(what + ": " + std::to_string(N) + " entries wanted");
+    if (list.size() != N) throw py::value_error(what + ": expected " + std::to_string(N) + " entries");
     std::array<E, N> out;
     std::copy(list.begin(), list.end(), out.begin());
     return out;
@@ -145,7 +145,7 @@ struct ConvertNamed {
   }
   static Named read(py::handle value, const std::string& what) {
     if (!py::isinstance<py::dict>(value))
-      throw py::type_error(what + ": a dictionary wanted, got " + std::string(py::repr(py::type::of(value))));
+      throw py::type_error(what + ": expected a dictionary, got " + std::string(py::repr(py::type::of(value))));
     Named out;
     for (const auto& [name, entry] : py::reinterpret_borrow<py::dict>(value)) {
       const std::string key = python::read<std::string>(name, what + ", a name");

@@ -33,8 +33,9 @@ std::shared_ptr<HeldParametrization> parametrizeGenerated(const std::string& gen
 
 py::array costGradient(HeldMotion& held, const HeldParametrization& robot, const py::object& x) {
   if (!held.request)
-    throw std::runtime_error("motion: one of a plan cannot be made for other robots; make it of a Request");
-  if (!held.multipliers) throw std::runtime_error("motion: solve it first; gradients are those of an optimum");
+    throw std::runtime_error(
+        "motion: a motion made from a plan cannot be made for other robots; make it from a Request");
+  if (!held.multipliers) throw std::runtime_error("motion: solve it first; gradients need an optimum");
   const VectorXd point = readVector(x, robot.robot.start().size(), "x");
   const BusyGuard guard(held.is_busy, "motion");
   VectorXd gradient;
@@ -50,14 +51,14 @@ py::array costGradient(HeldMotion& held, const HeldParametrization& robot, const
 
 double requireFinite(double value) {
   if (!std::isfinite(value))
-    throw py::value_error("objective: a finite number wanted; give what is infeasible a large one");
+    throw py::value_error("objective: expected a finite number; return a large one for infeasible points");
   return value;
 }
 
 // What an objective returned: a number, or a number and its gradient.
 SlopedValue readSloped(const py::object& returned, Eigen::Index size) {
   if (!py::isinstance<py::tuple>(returned) || py::len(returned) != 2)
-    throw py::type_error("objective: (value, gradient) wanted by slsqp and mma, got " +
+    throw py::type_error("objective: slsqp and mma expect (value, gradient), got " +
                          std::string(py::repr(py::type::of(returned))));
   SlopedValue out;
   out.value = requireFinite(read<double>(returned[py::int_(0)], "objective, its value"));
@@ -78,7 +79,7 @@ SearchResult minimize(const py::function& objective, const py::object& start, co
   problem.lower = readVector(lower, problem.start.size(), "lower");
   problem.upper = readVector(upper, problem.start.size(), "upper");
   if ((problem.lower.array() > problem.start.array()).any() || (problem.start.array() > problem.upper.array()).any())
-    throw py::value_error("start: between lower and upper wanted");
+    throw py::value_error("start: expected values between lower and upper");
   const auto call = [&objective](const VectorXd& x) {
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     return objective(makeArray(x));
@@ -99,12 +100,13 @@ void bindVariables(py::module_& module) {
       .field("of", &ShiftChange::of, "its name")
       .field("along", &ShiftChange::along, "unit vector (3,)");
   Value<DesignVariable>(module, "DesignVariable", "A number of a robot that may change.")
-      .field("name", &DesignVariable::name, "of one's choice")
+      .field("name", &DesignVariable::name, "any unique name")
       .field("lower", &DesignVariable::lower, "bound")
       .field("upper", &DesignVariable::upper, "bound")
       .field("unit", &DesignVariable::unit, "\"m\" unless given")
-      .field("parameter", &DesignVariable::parameter, "of the generator, for generated robots; for given ones:")
-      .field("lengths", &DesignVariable::lengths, "the first one is the value, the others change by as much")
+      .field("parameter", &DesignVariable::parameter,
+             "parameter of the generator, for generated robots; for given ones:")
+      .field("lengths", &DesignVariable::lengths, "the first one is the value; the others change by the same amount")
       .field("shifts", &DesignVariable::shifts, "by the value");
 }
 
@@ -117,13 +119,13 @@ void bindParametrization(py::module_& module) {
            "Raises ModelError for unknown names, places on different bodies, bounds that exclude the model.")
       .def_static("generated", &parametrizeGenerated, py::arg("generator"), py::arg("variables"),
                   py::arg("settings") = std::vector<std::pair<std::string, double>>(),
-                  "Of a generator (see `generators`); settings: its other parameters by name and value.")
+                  "Parametrizes a generator (see `generators`); settings: its other parameters by name and value.")
       .def_property_readonly(
           "variables", [](const HeldParametrization& p) { return show(p.robot.variables(), py::cast(p)); },
           "DesignVariables")
       .def_property_readonly(
           "start", [](const py::object& p) { return makeView(p.cast<HeldParametrization&>().robot.start(), p); },
-          "(n,), of the robot as it is")
+          "values of the given robot (n,)")
       .def_property_readonly(
           "lower", [](const py::object& p) { return makeView(p.cast<HeldParametrization&>().robot.lower(), p); },
           "bounds (n,)")
@@ -157,26 +159,26 @@ void bindParametrization(py::module_& module) {
 }
 
 void bindSearch(py::module_& module) {
-  py::enum_<SearchAlgorithm>(module, "SearchAlgorithm", "Of NLopt.")
+  py::enum_<SearchAlgorithm>(module, "SearchAlgorithm", "Algorithms of NLopt.")
       .value("CRS", SearchAlgorithm::Crs, "controlled random search; global")
       .value("ISRES", SearchAlgorithm::Isres, "evolution strategy; global")
       .value("BOBYQA", SearchAlgorithm::Bobyqa, "quadratic models; local")
-      .value("SBPLX", SearchAlgorithm::Sbplx, "simplex on subspaces; local, takes kinks")
+      .value("SBPLX", SearchAlgorithm::Sbplx, "simplex on subspaces; local, tolerates kinks")
       .value("SLSQP", SearchAlgorithm::Slsqp, "sequential quadratic programs; local, needs gradients")
       .value("MMA", SearchAlgorithm::Mma, "moving asymptotes; local, needs gradients");
   Value<SearchStage>(module, "SearchStage", "One algorithm of a search.")
       .field("algorithm", &SearchStage::algorithm, "SearchAlgorithm")
       .field("evaluations", &SearchStage::evaluations, "at most")
-      .field("tolerance", &SearchStage::tolerance, "of the steps, relative to the width of the bounds");
+      .field("tolerance", &SearchStage::tolerance, "tolerance of the steps, relative to the width of the bounds");
   Value<SearchResult>(module, "SearchResult", "The best point of a search.")
       .field("x", &SearchResult::x, "(n,)")
-      .field("value", &SearchResult::value, "of the objective")
+      .field("value", &SearchResult::value, "value of the objective")
       .field("evaluations", &SearchResult::evaluations, "number");
   module.def("minimize", &minimize, py::arg("objective"), py::arg("start"), py::arg("lower"), py::arg("upper"),
              py::arg("stages"), py::arg("seed") = 1,
              "Minimizes a function of (n,) within bounds by SearchStages, each from the best point so far.\n\n"
-             "objective: returns a number, for SLSQP and MMA with its gradient, (value, (n,)). What it raises, like "
-             "Ctrl-C, ends the search.");
+             "objective: returns a number, for SLSQP and MMA with its gradient, (value, (n,)). An exception it raises, "
+             "or Ctrl-C, ends the search.");
 }
 
 }  // namespace
@@ -188,8 +190,8 @@ void bindDesign(py::module_& module) {
   module.def(
       "cost_gradient", &costGradient, py::arg("motion"), py::arg("robot"), py::arg("x"),
       "Derivatives (n,) of the optimal cost of a motion by every number of its robot, at x (n,).\n\n"
-      "motion: of a Request, solved for `robot.make(x)`. It counts as made and solved anew for every change, yet "
-      "nothing is solved: the multipliers of the optimum suffice (envelope theorem).");
+      "motion: made from a Request and solved for `robot.make(x)`. The derivatives are those of motions solved again "
+      "for every change, but nothing is solved: the multipliers of the optimum suffice (envelope theorem).");
 }
 
 }  // namespace bielle::python

@@ -23,7 +23,7 @@ class HeldEstimator {
   EstimatorStatus update(const SensorReadings& readings, const std::vector<std::string>& planned) {
     for (const VectorXd* numbers : {&readings.motor_positions, &readings.motor_torques})
       if (numbers->size() != model_->nu())
-        throw py::value_error("readings: numbers of " + std::to_string(model_->nu()) + " motors wanted, got " +
+        throw py::value_error("readings: expected " + std::to_string(model_->nu()) + " numbers, one per motor, got " +
                               std::to_string(numbers->size()));
     const BusyGuard guard(is_busy_, "estimator");
     const std::vector<int> contacts = find(planned);
@@ -65,36 +65,37 @@ class HeldEstimator {
 };
 
 void bindEstimatorOptions(py::module_& module) {
-  Value<SensorReadings>(module, "SensorReadings", "What is read at an instant of control.")
+  Value<SensorReadings>(module, "SensorReadings", "Sensor readings at one instant of control.")
       .field("time", &SensorReadings::time, "s")
       .field("motor_positions", &SensorReadings::motor_positions, "(nu,), rad or m")
-      .field("motor_torques", &SensorReadings::motor_torques, "(nu,), that acted since the instant before, N m or N")
-      .field("angular_velocity", &SensorReadings::angular_velocity, "of the IMU in its frame (3,), rad/s")
-      .field("specific_force", &SensorReadings::specific_force, "acceleration less gravity in its frame (3,), m/s^2");
+      .field("motor_torques", &SensorReadings::motor_torques,
+             "(nu,), torques that acted since the previous instant, N m or N")
+      .field("angular_velocity", &SensorReadings::angular_velocity,
+             "angular velocity of the IMU in its frame (3,), rad/s")
+      .field("specific_force", &SensorReadings::specific_force, "acceleration minus gravity in its frame (3,), m/s^2");
   Value<EstimatorOptions>(module, "EstimatorOptions", "Noise is one standard deviation, densities as in data sheets.")
       .field("imu", &EstimatorOptions::imu, "placement of the IMU in the trunk, SE3")
-      .field("bandwidth", &EstimatorOptions::bandwidth, "of the observers of the motors, 1/s")
+      .field("bandwidth", &EstimatorOptions::bandwidth, "bandwidth of the motor observers, 1/s")
       .field("smoothing", &EstimatorOptions::smoothing, "time constant of the accelerations, s")
       .field("gyro_noise", &EstimatorOptions::gyro_noise, "rad/s/sqrt(Hz)")
       .field("accelerometer_noise", &EstimatorOptions::accelerometer_noise, "m/s^2/sqrt(Hz)")
-      .field("gyro_offset", &EstimatorOptions::gyro_offset, "at the start, rad/s")
-      .field("accelerometer_offset", &EstimatorOptions::accelerometer_offset, "at the start, m/s^2")
-      .field("gyro_walk", &EstimatorOptions::gyro_walk, "of the offsets in a second, rad/s")
-      .field("accelerometer_walk", &EstimatorOptions::accelerometer_walk, "m/s^2")
-      .field("tilt", &EstimatorOptions::tilt, "of the trunk at the start, rad")
-      .field("foot_position", &EstimatorOptions::foot_position, "of a foot seen by the encoders, m")
-      .field("foot_attitude", &EstimatorOptions::foot_attitude, "rad")
-      .field("foot_slide", &EstimatorOptions::foot_slide, "of a foot that stands, in a second, m")
-      .field("foot_turn", &EstimatorOptions::foot_turn, "rad")
+      .field("gyro_offset", &EstimatorOptions::gyro_offset, "offset at the start, rad/s")
+      .field("accelerometer_offset", &EstimatorOptions::accelerometer_offset, "offset at the start, m/s^2")
+      .field("gyro_walk", &EstimatorOptions::gyro_walk, "change of the offset in one second, rad/s")
+      .field("accelerometer_walk", &EstimatorOptions::accelerometer_walk, "change of the offset in one second, m/s^2")
+      .field("tilt", &EstimatorOptions::tilt, "tilt of the trunk at the start, rad")
+      .field("foot_position", &EstimatorOptions::foot_position, "position of a foot from the encoders, m")
+      .field("foot_attitude", &EstimatorOptions::foot_attitude, "attitude of a foot from the encoders, rad")
+      .field("foot_slide", &EstimatorOptions::foot_slide, "displacement of a standing foot in one second, m")
+      .field("foot_turn", &EstimatorOptions::foot_turn, "rotation of a standing foot in one second, rad")
       .field("planned_contact", &EstimatorOptions::planned_contact,
-             "normal force of a foot that stands, over the weight")
+             "normal force of a standing foot relative to the weight")
       .field("surprising_contact", &EstimatorOptions::surprising_contact, "the same where no contact is planned")
-      .field("slip", &EstimatorOptions::slip, "a foot has slipped if its deviation, 6 in the mean, exceeds this");
+      .field("slip", &EstimatorOptions::slip, "a foot has slipped if its deviation, 6 on average, exceeds this");
   py::enum_<EstimatorStatus>(module, "EstimatorStatus")
       .value("OK", EstimatorStatus::Ok)
       .value("NEAR_DEAD_POINT", EstimatorStatus::NearDeadPoint, "a linkage hardly follows its motors")
-      .value("NOT_CLOSED", EstimatorStatus::NotClosed,
-             "no closed configuration belongs to the motors: the last one is kept")
+      .value("NOT_CLOSED", EstimatorStatus::NotClosed, "no closed configuration fits the motors: the last one is kept")
       .value("NOT_FINITE", EstimatorStatus::NotFinite, "readings were not finite and are ignored");
 }
 
@@ -110,9 +111,9 @@ void bindEstimator(py::module_& module) {
            py::arg("q"), py::arg("options") = EstimatorOptions(),
            "q: a closed configuration (nq,). Raises ModelError when motors do not determine a joint.")
       .def("reset", &HeldEstimator::reset, py::arg("time"), py::arg("q"), py::arg("v"), py::arg("contacts"),
-           "Starts from a closed state (nq,), (nv,), standing on contacts, by name.")
+           "Starts from a closed state (nq,), (nv,), standing on the named contacts.")
       .def("update", &HeldEstimator::update, py::arg("readings"), py::arg("planned") = std::vector<std::string>(),
-           "Takes the readings of an instant. planned: names of the contacts that the plan has now.")
+           "Processes the readings of an instant. planned: names of the contacts in the plan at this time.")
       .def_property_readonly(
           "q",
           [](HeldEstimator& e) {
@@ -125,16 +126,16 @@ void bindEstimator(py::module_& module) {
             return e.read([](const Estimator& own) { return makeArray(own.getMeasurement().v); });
           },
           "(nv,)")
-      .def_property_readonly("contacts", &HeldEstimator::getContacts, "by name, whether they stand")
+      .def_property_readonly("contacts", &HeldEstimator::getContacts, "whether each contact stands, by name")
       .def_property_readonly("wrenches", &HeldEstimator::getWrenches,
-                             "of the ground on the feet in their contact frames (contacts, 6), N and N m")
+                             "wrenches from the ground on the feet in their contact frames (contacts, 6), N and N m")
       .def_property_readonly(
           "margin", [](HeldEstimator& e) { return e.read([](const Estimator& own) { return own.getMargin(); }); },
           "the least that motors move in a unit motion of their linkage; 1 without linkages")
       .def_property_readonly(
           "message",
           [](HeldEstimator& e) { return e.read([](const Estimator& own) { return std::string(own.getMessage()); }); },
-          "of the last status; empty if OK");
+          "message of the last status; empty if OK");
 }
 
 }  // namespace bielle::python

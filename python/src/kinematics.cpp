@@ -87,11 +87,11 @@ void addWholeBody(ModelType& type) {
   defKinematics(
       type, "kinetic_energy", true, always({}),
       [](const Model& m, Workspace& ws, State& s) { s.out[0][0] = calcKineticEnergy(m, ws); },
-      "Of bodies and rotors, J.");
+      "Kinetic energy of bodies and rotors, J.");
   defKinematics(
       type, "potential_energy", false, always({}),
       [](const Model& m, Workspace& ws, State& s) { s.out[0][0] = calcPotentialEnergy(m, ws); },
-      "Of gravity, zero for a centre of mass at the origin, J.");
+      "Potential energy of gravity, zero for a centre of mass at the origin, J.");
 }
 
 void addClosures(ModelType& type) {

@@ -38,9 +38,10 @@ struct Lift {
 
 Lift liftMotion(const Robot& robot, const NamedSerial& named, HeldMotion& motion, const LiftOptions& options) {
   if (!motion.multipliers) throw std::runtime_error("motion: solve it first");
-  if (!same(motion.model, named.model)) throw py::value_error("motion: one of the serial model wanted");
+  if (!same(motion.model, named.model)) throw py::value_error("motion: expected a motion of the serial model");
   if (motion.options.step != StepRule::Euler)
-    throw py::value_error("motion: only motions of Euler steps, whose accelerations belong to their nodes, are lifted");
+    throw py::value_error(
+        "motion: only motions with Euler steps, which have accelerations at their nodes, can be lifted");
   const BusyGuard guard(motion.is_busy, "motion");
   const py::gil_scoped_release release;
   const SerialModel serial = {*named.model,           named.q_reference,  named.frozen_joints,
@@ -66,7 +67,7 @@ void bindSerial(py::module_& module) {
       .field("frozen_joints", &NamedSerial::frozen_joints, "names")
       .field("dropped_closures", &NamedSerial::dropped_closures, "names")
       .field("replacements", &NamedSerial::replacements, "Replacements")
-      .field("dropped_targets", &NamedSerial::dropped_targets, "of references that named frozen joints");
+      .field("dropped_targets", &NamedSerial::dropped_targets, "targets of references that named frozen joints");
   module.def("make_serial_model", &makeSerial, py::arg("model"), py::arg("q"), py::arg("armature") = "",
              "The SerialModel of a robot, frozen at the closed configuration q (nq,).\n\n"
              "armature: of the new motors in kg m^2, or 'reflected'. Raises ModelError when there is no equivalent.");
@@ -74,7 +75,7 @@ void bindSerial(py::module_& module) {
 
 void bindOutcome(py::module_& module) {
   py::enum_<LiftMethod>(module, "LiftMethod")
-      .value("NEWTON", LiftMethod::Newton, "each node by itself, torques from inverse dynamics")
+      .value("NEWTON", LiftMethod::Newton, "each node separately, torques from inverse dynamics")
       .value("NLOPT", LiftMethod::Nlopt, "one step of the closed dynamics after the other, torques by SLSQP");
   py::enum_<LiftStatus>(module, "LiftStatus")
       .value("LIFTED", LiftStatus::Lifted)
@@ -94,17 +95,17 @@ void bindOutcome(py::module_& module) {
       .field("joint", &LiftNode::joint, "at which the lift ended, or empty")
       .field("position_error", &LiftNode::position_error, "rad or m")
       .field("velocity_error", &LiftNode::velocity_error, "rad/s or m/s")
-      .field("acceleration_error", &LiftNode::acceleration_error, "of the closed dynamics, rad/s^2 or m/s^2")
+      .field("acceleration_error", &LiftNode::acceleration_error, "error of the closed dynamics, rad/s^2 or m/s^2")
       .field("margin", &LiftNode::margin, "smallest over the linkages; 0: dead point")
       .field("evaluations", &LiftNode::evaluations, "by NLopt");
-  Value<Lift>(module, "Lift", "A serial motion carried over to the closed robot.")
+  Value<Lift>(module, "Lift", "A serial motion lifted to the closed robot.")
       .field("lifted", &Lift::lifted, "all of it")
       .field("nodes", &Lift::nodes, "LiftNodes up to the first failure")
       .field("result", &Lift::result, "Result, as far as it was lifted, or None");
   module.def("lift", &liftMotion, py::arg("robot"), py::arg("serial"), py::arg("motion"),
              py::arg("options") = LiftOptions(),
-             "Carries a solved Motion of serial.model over to the closed robot: the same serial joints, motor torques "
-             "that follow.\n\nThe motion has Euler steps.");
+             "Lifts a solved Motion of serial.model to the closed robot: the same serial joints, and the motor torques "
+             "that follow from them.\n\nThe motion must have Euler steps.");
 }
 
 }  // namespace

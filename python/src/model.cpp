@@ -31,7 +31,7 @@ ConstraintSet requireFit(const Model& model, const ConstraintSet& set) {
     rows += getRows(closure.kind);
   }
   if (!fits || rows != set.rows || set.num_loops + set.contacts.size() != set.closures.size())
-    throw py::value_error("contacts: this ConstraintSet is not one of the model; Model.constraints makes them");
+    throw py::value_error("contacts: this ConstraintSet does not belong to the model; make it with Model.constraints");
   return set;
 }
 
@@ -70,20 +70,20 @@ py::object makeNamed(const char* type, const std::vector<py::array>& arrays) {
 namespace {
 
 void bindParts(py::module_& module) {
-  Value<ModelParts>(module, "ModelParts", "What a model consists of.")
-      .field("name", &ModelParts::name, "of the robot")
+  Value<ModelParts>(module, "ModelParts", "The parts of a model.")
+      .field("name", &ModelParts::name, "name of the robot")
       .field("gravity", &ModelParts::gravity, "(3,), m/s^2")
       .field("bodies", &ModelParts::bodies, "the world first")
       .field("joints", &ModelParts::joints, "a placeholder for the world first")
       .field("frames", &ModelParts::frames, "links among them")
-      .field("closures", &ModelParts::closures, "of the loops")
+      .field("closures", &ModelParts::closures, "closures of the loops")
       .field("motors", &ModelParts::motors, "in the order of u")
       .field("joint_forces", &ModelParts::joint_forces, "springs, dampers and friction")
       .field("point_springs", &ModelParts::point_springs, "springs and dampers between points")
       .field("contacts", &ModelParts::contacts, "frames that may touch the ground")
       .field("references", &ModelParts::references, "postures by name")
       .field("visuals", &ModelParts::visuals, "what is drawn")
-      .field("shapes", &ModelParts::shapes, "the room that bodies take up")
+      .field("shapes", &ModelParts::shapes, "shapes of the bodies, for distances")
       .field("serial_joints", &ModelParts::serial_joints, "indices of the joints of the equivalent serial chain")
       .field("lower_limits", &ModelParts::lower_limits, "(nv,)")
       .field("upper_limits", &ModelParts::upper_limits, "(nv,)")
@@ -99,7 +99,7 @@ void addAttribute(ModelType& type, const char* name, Result (Model::*get)() cons
 }
 
 void addAttributes(ModelType& type) {
-  addAttribute(type, "name", &Model::name, "of the robot");
+  addAttribute(type, "name", &Model::name, "name of the robot");
   addAttribute(type, "nq", &Model::nq, "size of a configuration q");
   addAttribute(type, "nv", &Model::nv, "size of a velocity v, and of tangent vectors");
   addAttribute(type, "nu", &Model::nu, "number of motors");
@@ -110,7 +110,7 @@ void addAttributes(ModelType& type) {
   addAttribute(type, "bodies", &Model::bodies, "the world first");
   addAttribute(type, "joints", &Model::joints, "a placeholder for the world first");
   addAttribute(type, "frames", &Model::frames, "links among them");
-  addAttribute(type, "closures", &Model::closures, "of the loops");
+  addAttribute(type, "closures", &Model::closures, "closures of the loops");
   addAttribute(type, "clusters", &Model::clusters, "closures that share dofs");
   addAttribute(type, "motors", &Model::motors, "in the order of u");
   addAttribute(type, "joint_forces", &Model::jointForces, "springs, dampers and friction on joints");
@@ -118,7 +118,7 @@ void addAttributes(ModelType& type) {
   addAttribute(type, "contacts", &Model::contacts, "frames that may touch the ground");
   addAttribute(type, "references", &Model::references, "postures by name");
   addAttribute(type, "visuals", &Model::visuals, "what is drawn");
-  addAttribute(type, "shapes", &Model::shapes, "the room that bodies take up, as boxes with rounded edges");
+  addAttribute(type, "shapes", &Model::shapes, "shapes of the bodies for distances, as boxes with rounded edges");
   addAttribute(type, "serial_joints", &Model::serialJoints, "indices of the joints of the equivalent serial chain");
   addAttribute(type, "lower_limits", &Model::lowerLimits, "(nv,), -inf if there is none");
   addAttribute(type, "upper_limits", &Model::upperLimits, "(nv,)");
@@ -171,7 +171,7 @@ void addConfigurations(ModelType& type) {
 
 const AssemblyResult& requireClosed(const Model& model, const AssemblyResult& result) {
   if (result.status != AssemblyStatus::Closed)
-    throw ModelError(model.name(), "posture", result.message, "start from a configuration that is nearer");
+    throw ModelError(model.name(), "posture", result.message, "start from a closer configuration");
   return result;
 }
 
@@ -219,9 +219,9 @@ void addAssembly(ModelType& type) {
 void bindBuilder(py::module_& module) {
   py::class_<ModelBuilder>(
       module, "ModelBuilder",
-      "Collects bodies, joints, closures, motors and frames, then validates them and makes the "
-      "model.\n\nBodies go by the name of their link; \"world\" is the ground. What is referred to "
-      "must be declared before. Errors are ModelErrors that name the element and the remedy.")
+      "Collects bodies, joints, closures, motors and frames, then validates them and makes the model.\n\nBodies go by "
+      "the name of their link; \"world\" is the ground. Elements must be declared before they are referred to. Errors "
+      "are ModelErrors that name the element and the remedy.")
       .def(py::init<std::string>(), py::arg("name"))
       .def("add_link", &ModelBuilder::addLink, py::arg("link"), py::arg("parent_link"), py::arg("joint"),
            py::arg("inertia"), py::arg("limits") = JointLimits(),
@@ -237,7 +237,7 @@ void bindBuilder(py::module_& module) {
              double kd) { self.addClosure(name, kind, frame1, frame2, readMatrix<Vector3d>(axis, "axis"), kp, kd); },
           py::arg("name"), py::arg("kind"), py::arg("frame1"), py::arg("frame2"),
           py::arg("axis") = py::make_tuple(0, 0, 1), py::arg("kp") = 0, py::arg("kd") = 0,
-          "Closes a loop: two frames coincide, as far as the ClosureKind says.\n\n"
+          "Closes a loop: two frames coincide as specified by the ClosureKind.\n\n"
           "axis: (3,), of a hinge, in frame 1; kp [1/s^2], kd [1/s]: Baumgarte stabilization.")
       .def("add_coupler", &ModelBuilder::addCoupler, py::arg("name"), py::arg("coefficients"), py::arg("offset") = 0,
            py::arg("kp") = 0, py::arg("kd") = 0,
@@ -262,7 +262,7 @@ void bindBuilder(py::module_& module) {
            py::arg("half_length") = 0, py::arg("half_width") = 0,
            "A frame that may touch the ground; half_length, half_width of a sole along its x and y, m.")
       .def("add_reference", &ModelBuilder::addReference, py::arg("reference"), "A posture by name.")
-      .def("add_shape", &ModelBuilder::addShape, py::arg("link"), py::arg("shape"), "The room that a link takes up.")
+      .def("add_shape", &ModelBuilder::addShape, py::arg("link"), py::arg("shape"), "A shape of a link, for distances.")
       .def("add_visual", &ModelBuilder::addVisual, py::arg("link"), py::arg("visual"), "What is drawn of a link.")
       .def("add_serial_joint", &ModelBuilder::addSerialJoint, py::arg("joint"),
            "A joint of the equivalent serial chain, for reduction ratios and serial models.")
@@ -274,7 +274,7 @@ void bindBuilder(py::module_& module) {
            "Inertia that is added to every dof of a joint, kg m^2 or kg.")
       .def(
           "build", [](const ModelBuilder& self) { return std::make_shared<Model>(self.build()); },
-          "The Model. Raises ModelError naming the element that is wrong.");
+          "The Model. Raises ModelError naming the faulty element.");
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ struct Convert<std::shared_ptr<Model>> {
   static std::string type() { return "Model"; }
   static py::object show(const std::shared_ptr<Model>& member, py::handle) { return py::cast(member); }
   static std::shared_ptr<Model> read(py::handle value, const std::string& what) {
-    if (!py::isinstance<Model>(value)) throw py::type_error(what + ": a Model wanted");
+    if (!py::isinstance<Model>(value)) throw py::type_error(what + ": expected a Model");
     return value.cast<std::shared_ptr<Model>>();
   }
   static bool same(const std::shared_ptr<Model>& a, const std::shared_ptr<Model>& b);

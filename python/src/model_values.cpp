@@ -44,7 +44,7 @@ void bindTree(py::module_& module) {
       .field("idx_v", &Joint::idx_v, "first entry in v")
       .field("nv", &Joint::nv, "entries in v")
       .field("position_importance", &Joint::position_importance, "in the costs of a posture, relative to other joints")
-      .field("velocity_importance", &Joint::velocity_importance, "likewise");
+      .field("velocity_importance", &Joint::velocity_importance, "likewise for its velocity");
   Value<Body>(module, "Body", "A rigid body; body i > 0 is carried by joint i, body 0 is the world.")
       .field("name", &Body::name, "that of its link")
       .field("inertia", &Body::inertia, "in the body frame");
@@ -52,14 +52,13 @@ void bindTree(py::module_& module) {
       .field("name", &Frame::name, "unique among links and frames")
       .field("body", &Frame::body, "index")
       .field("X_BF", &Frame::X_BF, "placement in the body");
-  Value<bielle::Shape>(module, "Shape",
-                       "The room that a body takes up: all points within a radius of a box fixed in it.")
+  Value<bielle::Shape>(module, "Shape", "A shape of a body: all points within a radius of a box fixed in it.")
       .field("body", &bielle::Shape::body, "index; filled by the builder")
       .field("X_BS", &bielle::Shape::X_BS, "placement in the body (for the builder: in the link)")
       .field("half", &bielle::Shape::half,
              "half of the edges of the box (3,), m: zero of a sphere, (0, 0, l) of a capsule")
       .field("radius", &bielle::Shape::radius, "m; zero of a box")
-      .field("fitted", &bielle::Shape::fitted, "to a visual, because the files of the robot give its body no shape");
+      .field("fitted", &bielle::Shape::fitted, "fitted to a visual, because the robot's files give its body no shape");
   Value<Visual>(module, "Visual", "A shape drawn for a body.")
       .field("shape", &Visual::shape, "VisualShape")
       .field("body", &Visual::body, "index; filled by the builder")
@@ -113,8 +112,8 @@ void bindConstraints(py::module_& module) {
       .field("axis", &Closure::axis, "free axis of a hinge in both frames (3,)")
       .field("kp", &Closure::kp, "stabilisation, 1/s^2")
       .field("kd", &Closure::kd, "1/s")
-      .field("terms", &Closure::terms, "of a coupler")
-      .field("offset", &Closure::offset, "of a coupler")
+      .field("terms", &Closure::terms, "terms of a coupler")
+      .field("offset", &Closure::offset, "offset of a coupler")
       .field("dofs", &Closure::dofs, "that move one frame but not the other, increasing")
       .field("signs", &Closure::signs, "+1 where the dof moves frame 1, -1 for frame 2");
   Value<LoopCluster>(module, "LoopCluster", "Closures that share dofs, directly or through other closures.")
@@ -128,11 +127,12 @@ void bindConstraints(py::module_& module) {
       .field("rotor_inertia", &MotorDrive::rotor_inertia, "kg m^2")
       .field("torque_constant", &MotorDrive::torque_constant, "N m/A")
       .field("resistance", &MotorDrive::resistance, "between two terminals, ohm")
-      .field("voltage", &MotorDrive::voltage, "of the supply, V")
+      .field("voltage", &MotorDrive::voltage, "voltage of the supply, V")
       .field("current", &MotorDrive::current, "most, A")
-      .field("continuous_current", &MotorDrive::continuous_current, "that the winding bears for ever, A")
-      .field("efficiency", &MotorDrive::efficiency, "of the gear while the motor drives")
-      .field("back_efficiency", &MotorDrive::back_efficiency, "of the gear while the joint drives the motor")
+      .field("continuous_current", &MotorDrive::continuous_current,
+             "current that the winding can sustain indefinitely, A")
+      .field("efficiency", &MotorDrive::efficiency, "efficiency of the gear while the motor drives")
+      .field("back_efficiency", &MotorDrive::back_efficiency, "efficiency of the gear while the joint drives the motor")
       .field("mass", &MotorDrive::mass, "kg; 0: not known");
   Value<Motor>(module, "Motor", "An actuator on one dof.")
       .field("name", &Motor::name, "that of its joint")
@@ -142,7 +142,8 @@ void bindConstraints(py::module_& module) {
       .field("effort_limit", &Motor::effort_limit, "N m or N")
       .field("velocity_limit", &Motor::velocity_limit, "rad/s or m/s")
       .field("torque_loss", &Motor::torque_loss, "heat per torque squared, W/(N m)^2 or W/N^2; None: not known")
-      .field("continuous_effort", &Motor::continuous_effort, "root mean square that it bears for ever, N m or N")
+      .field("continuous_effort", &Motor::continuous_effort,
+             "root mean square that it can sustain indefinitely, N m or N")
       .field("drive", &Motor::drive, "winding and gear");
   Value<ContactFrame>(module, "ContactFrame",
                       "A frame of a body that may touch the ground, z along its outward normal.")
@@ -150,12 +151,12 @@ void bindConstraints(py::module_& module) {
       .field("body", &ContactFrame::body, "index")
       .field("X_BF", &ContactFrame::X_BF, "placement in the body")
       .field("kind", &ContactFrame::kind, "ContactKind")
-      .field("half_length", &ContactFrame::half_length, "of the sole, along x, m")
-      .field("half_width", &ContactFrame::half_width, "of the sole, along y, m");
+      .field("half_length", &ContactFrame::half_length, "half the length of the sole, along x, m")
+      .field("half_width", &ContactFrame::half_width, "half the width of the sole, along y, m");
   Value<Reference>(module, "Reference", "Targets of a reference configuration.")
       .field("name", &Reference::name, "unique")
       .field("joints", &Reference::joints, "q of joints, by name")
-      .field("height_frame", &Reference::height_frame, "whose height is given; empty: joints alone")
+      .field("height_frame", &Reference::height_frame, "frame whose height is given; empty: only joints are given")
       .field("height", &Reference::height, "over the soles, m")
       .field("feet", &Reference::feet, "positions of the origins of contact frames (3,), by name, m");
   Value<ContactTarget>(module, "ContactTarget", "A foot on the ground at a given place.")
@@ -164,7 +165,7 @@ void bindConstraints(py::module_& module) {
       .field("kp", &ContactTarget::kp, "1/s^2")
       .field("kd", &ContactTarget::kd, "1/s");
   Value<ConstraintSet>(module, "ConstraintSet", "The closures in force: those of the model, then contacts.")
-      .field("closures", &ConstraintSet::closures, "of the model, then contacts as closures to the world")
+      .field("closures", &ConstraintSet::closures, "closures of the model, then contacts as closures to the world")
       .field("contacts", &ConstraintSet::contacts, "indices into Model.contacts, in their order")
       .field("offsets", &ConstraintSet::offsets, "first row of each closure")
       .field("rows", &ConstraintSet::rows, "scalar constraints")

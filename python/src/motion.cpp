@@ -17,7 +17,7 @@ MotionRequest Request::make() const {
     const auto preset = std::find_if(request.presets.begin(), request.presets.end(),
                                      [this](const MotionPreset& p) { return p.name == weights; });
     if (preset == request.presets.end())
-      throw ModelError("", "weights '" + weights + "'", "motion '" + motion + "' has none of this name",
+      throw ModelError("", "weights '" + weights + "'", "motion '" + motion + "' has no weights of this name",
                        request.presets.empty() ? "leave them out" : "choose '" + request.presets.front().name + "'");
     preset->apply();
   }
@@ -173,17 +173,17 @@ void setTrajectory(HeldMotion& held, const ShootingTrajectory& trajectory) {
   const RobotProblem& problem = *held.motion.problem;
   const size_t stages = problem.numStages();
   if (trajectory.xs.size() != stages + 1 || trajectory.us.size() != stages)
-    throw py::value_error("guess: " + std::to_string(stages + 1) + " states and " + std::to_string(stages) +
-                          " controls wanted, got " + std::to_string(trajectory.xs.size()) + " and " +
+    throw py::value_error("guess: expected " + std::to_string(stages + 1) + " states and " + std::to_string(stages) +
+                          " controls, got " + std::to_string(trajectory.xs.size()) + " and " +
                           std::to_string(trajectory.us.size()));
   for (size_t k = 0; k <= stages; ++k)
     if (trajectory.xs[k].size() != problem.stateSize())
-      throw py::value_error("guess.xs: shape (" + std::to_string(problem.stateSize()) + ",) wanted, got (" +
+      throw py::value_error("guess.xs: expected shape (" + std::to_string(problem.stateSize()) + ",), got (" +
                             std::to_string(trajectory.xs[k].size()) + ",)");
   for (size_t k = 0; k < stages; ++k)
     if (trajectory.us[k].size() != problem.controlSize(static_cast<int>(k)))
-      throw py::value_error("guess.us: shape (" + std::to_string(problem.controlSize(static_cast<int>(k))) +
-                            ",) wanted, got (" + std::to_string(trajectory.us[k].size()) + ",)");
+      throw py::value_error("guess.us: expected shape (" + std::to_string(problem.controlSize(static_cast<int>(k))) +
+                            ",), got (" + std::to_string(trajectory.us[k].size()) + ",)");
   held.motion.guess = trajectory;
 }
 
@@ -212,8 +212,8 @@ py::dict getCosts(const HeldMotion& held, int node) {
 }
 
 void bindRequests(py::module_& module) {
-  Value<Request>(module, "Request", "A motion by name, with its options: what `bielle solve` is asked for.")
-      .field("motion", &Request::motion, "name, one of `motions`; of a sequence empty")
+  Value<Request>(module, "Request", "A motion by name, with its options: the input of `bielle solve`.")
+      .field("motion", &Request::motion, "name, one of `motions`; empty for a sequence")
       .field("options", &Request::options, "numbers by name")
       .field("sequence", &Request::sequence, "names of motions that follow one another; options are \"NAME.option\"")
       .field("weights", &Request::weights, "name of a preset, e.g. \"paper\"; or empty")
@@ -276,17 +276,19 @@ void bindHeldMotion(py::module_& module) {
       .def_property_readonly(
           "goals", [](const HeldMotion& h) { return show(h.motion.goals, py::cast(h)); }, "Goals")
       .def_property_readonly(
-          "requested", [](const HeldMotion& h) { return show(h.motion.requested, {}); }, "every option by name")
+          "options", [](const HeldMotion& h) { return show(h.motion.options, {}); },
+          "every option of the motion by name")
       .def_property("guess", &getTrajectory, &setTrajectory, "Trajectory to start from; after a solve the solution")
-      .def("stage", &getStage, py::arg("node"), "Stage of a node, 0 to N, with what limits of the robot add to it.")
+      .def("stage", &getStage, py::arg("node"),
+           "Stage of a node, 0 to N, including the constraints from the robot's limits.")
       .def("start_from", &setWarmStart, py::arg("record"),
-           "Takes the guess from the record of another motion of the robot, resampled if its length differs.")
+           "Sets the guess from the record of another motion of the robot, resampled if its length differs.")
       .def("costs", &getCosts, py::arg("node"),
            "Costs of a node of the guess by name, before scaling by the time step.")
       .def("solve", &solve, py::arg("options") = FddpOptions(), py::arg("callback") = py::none(),
            "Solves from the guess and leaves the solution there. Returns a Summary.\n\n"
-           "callback: called with each Iteration; False stops. What it raises, like Ctrl-C, ends the solve with the "
-           "current iterate in the guess.")
+           "callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve with "
+           "the current iterate in the guess.")
       .def_property_readonly(
           "multipliers",
           [](const HeldMotion& h) {

@@ -10,7 +10,7 @@
 
 namespace bielle::python {
 
-/// A motion by name, with its options: what `bielle solve` is asked for.
+/// A motion by name, with its options: the input of `bielle solve`.
 struct Request {
   std::string motion;                     // of the registry; of a sequence empty
   std::vector<std::string> sequence;      // names of its motions

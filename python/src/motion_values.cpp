@@ -14,20 +14,19 @@ void bindProblemOptions(py::module_& module) {
   Value<LimitOptions>(module, "LimitOptions", "Limits of motors and joints.")
       .field("enforced", &LimitOptions::enforced, "False: all limits, including torque, are ignored")
       .field("efforts", &LimitOptions::efforts, "by motor, N m or N, instead of the model's")
-      .field("velocities", &LimitOptions::velocities, "by motor, rad/s or m/s, likewise")
+      .field("velocities", &LimitOptions::velocities, "by motor, rad/s or m/s, instead of the model's")
       .field("powers", &LimitOptions::powers, "by motor, W; driving or braking")
       .field("dead_point_margin", &LimitOptions::dead_point_margin,
              "least share of the transmission at the start; 0: none");
-  Value<TimingBounds>(module, "TimingBounds", "Bounds of a duration over the nominal one.")
+  Value<TimingBounds>(module, "TimingBounds", "Bounds of a duration relative to the nominal one.")
       .field("lower", &TimingBounds::lower, "1")
       .field("upper", &TimingBounds::upper, "1");
   Value<TimingOptions>(module, "TimingOptions", "Phases whose durations the solver chooses.")
       .field("phases", &TimingOptions::phases, "TimingBounds by name of the phase; \"all\": those with contacts")
-      .field("time_weight", &TimingOptions::time_weight, "cost of a second of these phases");
-  Value<ObjectiveOptions>(module, "ObjectiveOptions", "What a motion minimizes beside what defines it.")
+      .field("time_weight", &TimingOptions::time_weight, "cost per second of these phases");
+  Value<ObjectiveOptions>(module, "ObjectiveOptions", "What a motion minimizes besides the costs that define it.")
       .field("objective", &ObjectiveOptions::objective, "Objective")
-      .field("regeneration", &ObjectiveOptions::regeneration,
-             "share of energy that flows back and is used again, 0 to 1")
+      .field("regeneration", &ObjectiveOptions::regeneration, "share of the regenerated energy that is reused, 0 to 1")
       .field("regularization", &ObjectiveOptions::regularization, "weight of the other costs; None: the default")
       .field("scale", &ObjectiveOptions::scale, "cost of a joule, or of the peak");
   Value<ProblemOptions>(module, "ProblemOptions", "Options of a problem besides those of the motion.")
@@ -50,11 +49,11 @@ void bindGoals(py::module_& module) {
   Value<Foothold>(module, "Foothold", "Where a foot is to land.")
       .field("contact", &Foothold::contact, "name")
       .field("node", &Foothold::node, "where the foot lands")
-      .field("position", &Foothold::position, "of the origin of its contact frame (3,), m");
+      .field("position", &Foothold::position, "position of the origin of its contact frame (3,), m");
   Value<Goal>(module, "Goal", "A quantity that is requested, and measured on the trajectory.")
       .field("kind", &Goal::kind, "GoalKind")
       .field("name", &Goal::name, "e.g. \"speed\"")
-      .field("asked", &Goal::asked, "requested value")
+      .field("requested", &Goal::requested, "requested value")
       .field("tolerance", &Goal::tolerance, "largest difference that still meets the goal")
       .field("first", &Goal::first, "node")
       .field("last", &Goal::last, "node")
@@ -63,7 +62,7 @@ void bindGoals(py::module_& module) {
       .field("footholds", &Goal::footholds, "Footholds");
   Value<GoalOutcome>(module, "GoalOutcome", "Requested and achieved value of a goal.")
       .field("goal", &GoalOutcome::goal, "Goal")
-      .field("came_out", &GoalOutcome::came_out, "achieved value")
+      .field("achieved", &GoalOutcome::achieved, "achieved value")
       .type()
       .def_property_readonly("met", &GoalOutcome::met, "within the tolerance")
       .def("__str__", &formatOutcome);
@@ -89,7 +88,7 @@ void bindTrajectory(py::module_& module) {
       .field("q_start", &MotionPlan::q_start, "standing posture (nq,)")
       .field("q_end", &MotionPlan::q_end, "standing posture (nq,)")
       .field("limited", &MotionPlan::limited, "whether limits of the robot apply")
-      .field("requested", &MotionPlan::requested, "every option by name")
+      .field("options", &MotionPlan::options, "every option of the motion by name")
       .field("goals", &MotionPlan::goals, "Goals");
 }
 

@@ -15,7 +15,7 @@ void bindGround(py::module_& module) {
       .field("pitch", &GroundStep::pitch, "rad; positive: its x goes down")
       .field("roll", &GroundStep::roll, "rad");
   Value<Ground>(module, "Ground", "A plane with boxes on it; the highest one counts.")
-      .field("height", &Ground::height, "of the plane, m")
+      .field("height", &Ground::height, "height of the plane, m")
       .field("friction", &Ground::friction, "coefficient, 1")
       .field("steps", &Ground::steps, "GroundSteps")
       .type()
@@ -61,11 +61,11 @@ void bindCosts(py::module_& module) {
       .field("name", &Cost::name, "for reports")
       .field("weight", &Cost::weight, "not negative")
       .field("activation", &Cost::activation, "Activation")
-      .field("residual", &Cost::residual, "of the library (bielle.residuals), or a Residual written in Python")
-      .field("defines", &Cost::defines, "it says what the motion is, and keeps its weight for every objective");
+      .field("residual", &Cost::residual, "residual of the library (bielle.residuals), or a Residual written in Python")
+      .field("defines", &Cost::defines, "it defines the motion, and keeps its weight for every objective");
   Value<PathConstraint>(module, "PathConstraint", "lower <= r <= upper; equal bounds make an equation.")
       .field("name", &PathConstraint::name, "for messages")
-      .field("residual", &PathConstraint::residual, "of the library (bielle.residuals), or written in Python")
+      .field("residual", &PathConstraint::residual, "residual of the library (bielle.residuals), or written in Python")
       .field("lower", &PathConstraint::lower, "(n,), -inf: open")
       .field("upper", &PathConstraint::upper, "(n,), inf: open")
       .field("scale", &PathConstraint::scale, "(n,), the violation that counts as 1, in the unit of r");

@@ -26,7 +26,7 @@ class Node {
 
 py::array getSpeeds(const Node& node) {
   if (!node.get().speeds)
-    throw std::runtime_error("speeds are known only to residuals that depend on 'speeds', on steps");
+    throw std::runtime_error("speeds are available only on steps, to residuals that depend on 'speeds'");
   return makeArray(*node.get().speeds);
 }
 
@@ -47,11 +47,11 @@ constexpr const char* kBlockNames[kBlocks] = {"q", "v", "forces", "controls", "s
 class PythonResidual : public Residual {
  public:
   explicit PythonResidual(const py::object& self) : self_(self), size_(self.attr("size").cast<int>()) {
-    if (size_ < 1) throw py::value_error("size: a residual has at least one row");
+    if (size_ < 1) throw py::value_error("size: a residual needs at least one row");
     for (const py::handle name : self.attr("depends_on")) {
       const auto* found = std::find(kBlockNames, kBlockNames + kBlocks, read<std::string>(name, "depends_on"));
       if (found == kBlockNames + kBlocks)
-        throw py::value_error("depends_on: 'q', 'v', 'forces', 'controls', 'speeds' or 'time_scale' wanted, got '" +
+        throw py::value_error("depends_on: expected 'q', 'v', 'forces', 'controls', 'speeds' or 'time_scale', got '" +
                               std::string(py::str(name)) + "'");
       depends_[found - kBlockNames] = true;
     }
@@ -100,7 +100,7 @@ class PythonResidual : public Residual {
 
   void readJacobian(const NodeView& node, ResidualRows rows) const {
     const py::object result = call(node, "calc_jacobian");
-    if (!py::isinstance<py::dict>(result)) throw py::type_error(describe() + ".calc_jacobian: a dictionary wanted");
+    if (!py::isinstance<py::dict>(result)) throw py::type_error(describe() + ".calc_jacobian: expected a dictionary");
     const auto jacobian = py::reinterpret_borrow<py::dict>(result);
     for (const auto& [key, value] : jacobian) {
       const auto* found = std::find(kBlockNames, kBlockNames + kBlocks, std::string(py::str(key)));
@@ -115,7 +115,7 @@ class PythonResidual : public Residual {
   }
   void readBlock(const py::dict& jacobian, const char* name, MatrixRef block) const {
     const std::string what = describe() + ".calc_jacobian, " + name;
-    if (!jacobian.contains(name)) throw py::key_error(what + ": missing, though it is in depends_on");
+    if (!jacobian.contains(name)) throw py::key_error(what + ": missing, although it is in depends_on");
     const Array array = readArray(jacobian[name], what);
     requireShape(array, {block.rows(), block.cols()}, what);
     block = Eigen::Map<const RowMatrixXd>(array.data(), block.rows(), block.cols());
@@ -176,7 +176,7 @@ class PythonResidual : public Residual {
 std::shared_ptr<const Residual> makePythonResidual(const py::object& residual) {
   if (!py::isinstance(residual, py::module_::import("bielle.residuals").attr("Residual")))
     throw py::type_error(
-        "residual: one of bielle.residuals, or an object of a class derived from bielle.Residual, wanted");
+        "residual: expected one of bielle.residuals, or an object of a class derived from bielle.Residual");
   return std::make_shared<PythonResidual>(residual);
 }
 
@@ -186,7 +186,7 @@ py::object getPythonResidual(const Residual& residual) {
 }
 
 void bindPythonResiduals(py::module_& module) {
-  py::class_<Node>(module, "Node", "What a residual may read; valid during one call. Its arrays are copies.")
+  py::class_<Node>(module, "Node", "Data that a residual can read; valid during one call. Its arrays are copies.")
       .def_property_readonly(
           "q", [](const Node& n) { return makeArray(n.get().ws.q); }, "configuration (nq,)")
       .def_property_readonly(
@@ -196,10 +196,10 @@ void bindPythonResiduals(py::module_& module) {
           "motor torques (nu,), N m or N; empty at the terminal node")
       .def_property_readonly(
           "forces", [](const Node& n) { return makeArray(n.get().lambda); },
-          "of closures and contacts (rows,), N and N m; empty at the terminal node")
-      .def_property_readonly("speeds", &getSpeeds, "of the motors when the torques act (nu,), rad/s or m/s")
+          "forces of closures and contacts (rows,), N and N m; empty at the terminal node")
+      .def_property_readonly("speeds", &getSpeeds, "motor speeds when the torques act (nu,), rad/s or m/s")
       .def_property_readonly(
-          "time_scale", [](const Node& n) { return n.get().time_scale; }, "of a free duration")
+          "time_scale", [](const Node& n) { return n.get().time_scale; }, "time scale of a free duration")
       .def_property_readonly(
           "constraints", [](const Node& n) { return n.get().constraints; }, "ConstraintSet in force")
       .def_property_readonly(
@@ -211,7 +211,7 @@ void bindPythonResiduals(py::module_& module) {
             calcComJacobian(n.get().model, n.get().ws, J);
             return makeArray(J);
           },
-          "of the centre of mass by the tangent of q (3, nv); in calc_jacobian alone")
+          "Jacobian of the centre of mass by the tangent of q (3, nv); only in calc_jacobian")
       .def(
           "placement",
           [](const Node& n, const std::string& name) {
@@ -232,7 +232,7 @@ void bindPythonResiduals(py::module_& module) {
             const Frame frame = findFrame(n.get().model, name);
             return makeArray(calcFrameJacobian(n.get().model, n.get().ws, frame.body, frame.X_BF));
           },
-          py::arg("frame"), "Jacobian of that twist (6, nv); in calc_jacobian alone.");
+          py::arg("frame"), "Jacobian of that twist (6, nv); only in calc_jacobian.");
 }
 
 }  // namespace bielle::python

@@ -202,13 +202,13 @@ void bindJointResiduals(py::module_& m) {
       +[](SharedModel model, const std::vector<int>& motors) -> Made {
         return makeMotorPower(*model, requireIndices(motors, model->nu(), "motor"));
       },
-      py::arg("model"), py::arg("motors"), "Mechanical power of motors (n,), W; on steps alone.");
+      py::arg("model"), py::arg("motors"), "Mechanical power of motors (n,), W; on steps only.");
   def(
       m, "motor_voltage",
       +[](SharedModel model, const std::vector<int>& motors) -> Made {
         return makeMotorVoltage(*model, requireIndices(motors, model->nu(), "motor"));
       },
-      py::arg("model"), py::arg("motors"), "Voltages of motors with a winding and a supply (n,), V; on steps alone.");
+      py::arg("model"), py::arg("motors"), "Voltages of motors with a winding and a supply (n,), V; on steps only.");
   def(
       m, "electrical_power",
       +[](SharedModel model, Object losses) -> Made {
@@ -244,7 +244,7 @@ void bindResiduals(py::module_& module) {
           "size", [](const LibraryResidual& r) { return r.residual->size(); }, "number of rows")
       .def_property_readonly(
           "origin", &getOrigin,
-          "(function of bielle.residuals, its arguments); None for those that the library put into a motion")
+          "(function of bielle.residuals, its arguments); None for residuals that the library put into a motion")
       .def("__eq__",
            [](const LibraryResidual& self, const Object& other) -> Object {
              if (!py::isinstance<LibraryResidual>(other)) return py::reinterpret_borrow<Object>(Py_NotImplemented);
@@ -260,7 +260,7 @@ void bindResiduals(py::module_& module) {
            [](const LibraryResidual& self) {
              const Object origin = getOrigin(self), place = getPlace(self.residual);
              if (!origin.is_none()) return py::make_tuple(py::module_::import("bielle.residuals").attr("make"), origin);
-             if (place.is_none()) throw py::type_error("nothing tells what this residual was made of");
+             if (place.is_none()) throw py::type_error("the origin of this residual is unknown");
              // A pickled recipe comes back as the list of what is made of it.
              return py::make_tuple(py::module_::import("operator").attr("getitem"), place);
            })

@@ -13,9 +13,9 @@ namespace {
 void bindRecord(py::module_& module) {
   Value<MotionRecord>(module, "Record",
                       "A motion as numbers: one row per node, or per stage, from its node to the next.")
-      .field("q_names", &MotionRecord::q_names, "of the columns of q")
-      .field("v_names", &MotionRecord::v_names, "of the columns of v and a")
-      .field("u_names", &MotionRecord::u_names, "of the motors")
+      .field("q_names", &MotionRecord::q_names, "names of the columns of q")
+      .field("v_names", &MotionRecord::v_names, "names of the columns of v and a")
+      .field("u_names", &MotionRecord::u_names, "names of the motors")
       .field("closure_names", &MotionRecord::closure_names, "in their order")
       .field("contact_names", &MotionRecord::contact_names, "in their order")
       .field("time", &MotionRecord::time, "(N + 1,), s")
@@ -32,7 +32,8 @@ void bindRecord(py::module_& module) {
       .field("gap", &MotionRecord::gap, "(N + 1, 2), largest closing error, m and rad")
       .field("footholds", &MotionRecord::footholds,
              "(N + 1, 8 per contact), predicted: when, s; where, m, and quaternion x y z w; (0, 0) if not known")
-      .field("multipliers", &MotionRecord::multipliers, "of the constraints, for warm starts; penalty 0 if not known");
+      .field("multipliers", &MotionRecord::multipliers,
+             "multipliers of the constraints, for warm starts; penalty 0 if not known");
   module.def("read_record", &readRecord, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
              "Reads trajectory.csv or trajectory.npz.");
   module.def("read_result_record", &readResultRecord, py::arg("directory"), py::call_guard<py::gil_scoped_release>(),
@@ -48,32 +49,32 @@ void bindResult(py::module_& module) {
   Value<ElectricalEnergy>(module, "ElectricalEnergy", "What the motors take from their supply.")
       .field("by_motor", &ElectricalEnergy::by_motor, "(nu,), J")
       .field("total", &ElectricalEnergy::total, "J")
-      .field("regeneration", &ElectricalEnergy::regeneration, "share of what flows back that was taken off")
+      .field("regeneration", &ElectricalEnergy::regeneration, "share of the regenerated energy that is subtracted")
       .field("num_assumed", &ElectricalEnergy::num_assumed, "motors whose loss is not known")
-      .field("distance", &ElectricalEnergy::distance, "of the centre of mass on the ground, m")
-      .field("cost_of_transport", &ElectricalEnergy::cost_of_transport, "total over weight and distance");
+      .field("distance", &ElectricalEnergy::distance, "horizontal distance of the centre of mass, m")
+      .field("cost_of_transport", &ElectricalEnergy::cost_of_transport, "total divided by weight and distance");
   Value<RunInfo>(module, "RunInfo", "The request that led to a motion.")
       .field("robot", &RunInfo::robot, "name or path, as given")
       .field("robot_file", &RunInfo::robot_file, "its .urdf, absolute")
       .field("command", &RunInfo::command, "the command line, or empty")
       .field("model", &RunInfo::model, "\"closed\" or \"serial\"")
-      .field("serial_armature", &RunInfo::serial_armature, "of the serial model");
+      .field("serial_armature", &RunInfo::serial_armature, "armature of the serial model");
   Value<MotionResult>(module, "Result", "A solved motion.")
       .field("run", &MotionResult::run, "RunInfo")
       .field("motion", &MotionResult::motion, "name")
       .field("formulation", &MotionResult::formulation, "Formulation")
       .field("step", &MotionResult::step, "StepRule")
-      .field("requested", &MotionResult::requested, "every option by name")
+      .field("options", &MotionResult::options, "every option of the motion by name")
       .field("goals", &MotionResult::goals, "GoalOutcomes: requested and achieved values")
-      .field("schedule", &MotionResult::schedule, "ContactSchedule, with the time steps that came out")
+      .field("schedule", &MotionResult::schedule, "ContactSchedule, with the final time steps")
       .field("timings", &MotionResult::timings, "PhaseTimings of the phases of free duration")
       .field("ground", &MotionResult::ground, "Ground")
       .field("solver", &MotionResult::solver, "Summary")
       .field("record", &MotionResult::record, "Record: all numbers, node by node")
       .field("peak_torques", &MotionResult::peak_torques, "largest |u| by motor, largest first, N m or N")
-      .field("rms_torques", &MotionResult::rms_torques, "root mean square torque of the motor by motor, N m or N")
+      .field("rms_torques", &MotionResult::rms_torques, "root mean square torque by motor, N m or N")
       .field("continuous_torques", &MotionResult::continuous_torques,
-             "that motors bear for ever, where known, N m or N")
+             "torques that motors can sustain indefinitely, where known, N m or N")
       .field("objective", &MotionResult::objective, "ObjectiveOptions")
       .field("energy", &MotionResult::energy, "ElectricalEnergy")
       .field("gap_position", &MotionResult::gap_position, "largest closing error, m")
@@ -96,13 +97,13 @@ void bindResult(py::module_& module) {
              py::call_guard<py::gil_scoped_release>(), "Writes that page to a file.");
 }
 
-MotionResult solveRequest(const Robot& robot, const Request& asked, const ProblemOptions& problem,
+MotionResult solveRequest(const Robot& robot, const Request& request, const ProblemOptions& problem,
                           const FddpOptions& options, const std::optional<MotionRecord>& warm_start,
                           const py::object& callback) {
   const FddpObserver observer = makeObserver(callback);
   const py::gil_scoped_release release;
-  const MotionRequest request = asked.make();
-  RequestSolver solver(request, *robot.model, {problem, options, warm_start}, {observer, observer, {}, {}});
+  const MotionRequest motion_request = request.make();
+  RequestSolver solver(motion_request, *robot.model, {problem, options, warm_start}, {observer, observer, {}, {}});
   return solver.solve({robot.name, robot.file, {}});
 }
 
@@ -115,7 +116,7 @@ void bindResults(py::module_& module) {
              py::arg("solver") = makeMotionSolverOptions(), py::arg("warm_start") = py::none(),
              py::arg("callback") = py::none(),
              "Solves a Request as `bielle solve` does. Returns a Result.\n\n"
-             "callback: called with each Iteration; False stops. What it raises, like Ctrl-C, ends the solve.");
+             "callback: called with each Iteration; False stops. An exception it raises, or Ctrl-C, ends the solve.");
   module.def(
       "make_result",
       [](const HeldMotion& held, const FddpSummary& summary, const Robot& robot) {

@@ -7,7 +7,7 @@
 namespace bielle::python {
 
 struct Robot {
-  std::string name;              // as it was asked for
+  std::string name;              // as requested
   std::shared_ptr<Model> model;  // shared with all that is made of it
   std::string file, directory;   // empty: not from files
   std::vector<std::string> warnings;

@@ -71,7 +71,7 @@ std::string makeViewPage(const Robot& robot) {
 void bindRobots(py::module_& module) {
   Value<Robot>(module, "Robot",
                "A robot: its model, and where it came from. `load_robot` and `generate_robot` make them.")
-      .field("name", &Robot::name, "as it was asked for")
+      .field("name", &Robot::name, "as requested")
       .field("model", &Robot::model, "Model")
       .field("file", &Robot::file, "absolute path of the .urdf, or of the .yaml that completes one elsewhere; or empty")
       .field("directory", &Robot::directory, "where the files are; or empty")

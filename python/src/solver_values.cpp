@@ -13,34 +13,37 @@ void bindOptions(py::module_& module) {
       .value("CLOSED", LastRollout::Closed)
       .value("SEGMENTS", LastRollout::Segments);
   py::enum_<Inequalities>(module, "Inequalities")
-      .value("AUGMENTED_LAGRANGIAN", Inequalities::AugmentedLagrangian, "as equations where they bind")
-      .value("INTERIOR_POINT", Inequalities::InteriorPoint, "kept off by a barrier that falls from sweep to sweep");
+      .value("AUGMENTED_LAGRANGIAN", Inequalities::AugmentedLagrangian, "as equations where they are active")
+      .value("INTERIOR_POINT", Inequalities::InteriorPoint,
+             "kept away from their bounds by a barrier that decreases from sweep to sweep");
   Value<ConstraintOptions>(module, "ConstraintOptions", "How constraints are enforced.")
       .field("tolerance", &ConstraintOptions::tolerance, "largest violation of a converged solve")
       .field("initial_penalty", &ConstraintOptions::initial_penalty, "cost over squared violation")
       .field("penalty_increase", &ConstraintOptions::penalty_increase, "factor when the violation falls too slowly")
       .field("max_penalty", &ConstraintOptions::max_penalty, "largest")
       .field("inequalities", &ConstraintOptions::inequalities, "Inequalities")
-      .field("initial_barrier", &ConstraintOptions::initial_barrier, "of an interior point, in the unit of the cost")
-      .field("final_barrier", &ConstraintOptions::final_barrier, "that of a converged solve");
+      .field("initial_barrier", &ConstraintOptions::initial_barrier,
+             "initial barrier of the interior point method, in the unit of the cost")
+      .field("final_barrier", &ConstraintOptions::final_barrier, "barrier of a converged solve");
   Value<FddpOptions>(module, "SolverOptions", "Options of FDDP.")
       .field("max_iterations", &FddpOptions::max_iterations, "the solver stops there")
       .field("gradient_tolerance", &FddpOptions::gradient_tolerance, "(cost per unit of control)^2")
-      .field("gap_tolerance", &FddpOptions::gap_tolerance, "of every entry of the gaps")
+      .field("gap_tolerance", &FddpOptions::gap_tolerance, "largest entry of the gaps")
       .field("cost_tolerance", &FddpOptions::cost_tolerance, "relative change of the cost by a full step; 0: never")
       .field(
           "acceptable_decrease", &FddpOptions::acceptable_decrease,
           "share of the cost; a solve whose cost falls by less in 20 iterations ends within the constraints; 0: never")
-      .field("initial_regularization", &FddpOptions::initial_regularization, "of the first sweep")
+      .field("initial_regularization", &FddpOptions::initial_regularization, "regularization of the first sweep")
       .field("min_regularization", &FddpOptions::min_regularization, "least")
       .field("max_regularization", &FddpOptions::max_regularization, "the solve gives up above this")
       .field("regularization_increase", &FddpOptions::regularization_increase, "factor")
       .field("regularization_decrease", &FddpOptions::regularization_decrease, "divisor")
-      .field("state_regularization_ratio", &FddpOptions::state_regularization_ratio, "of states over controls")
+      .field("state_regularization_ratio", &FddpOptions::state_regularization_ratio,
+             "ratio of the regularization of states to that of controls")
       .field("long_step", &FddpOptions::long_step, "a step is long above this")
       .field("short_step", &FddpOptions::short_step, "a step is short up to this")
       .field("num_step_lengths", &FddpOptions::num_step_lengths, "1, 1/2, 1/4, ...")
-      .field("acceptance", &FddpOptions::acceptance, "share of the foreseen decrease, in (0, 1)")
+      .field("acceptance", &FddpOptions::acceptance, "share of the predicted decrease, in (0, 1)")
       .field("bounds", &FddpOptions::bounds, "ControlBounds")
       .field("constraints", &FddpOptions::constraints, "ConstraintOptions")
       .field("rollout_segments", &FddpOptions::rollout_segments, "largest number of segments of a rollout")
@@ -62,20 +65,20 @@ void bindSummary(py::module_& module) {
       .field("violation", &FddpIteration::violation, "largest of the constraints before the step")
       .field("gap", &FddpIteration::gap, "largest entry before the step")
       .field("gradient", &FddpIteration::gradient, "squared norm of the projected one")
-      .field("step", &FddpIteration::step, "length, 0: none was taken")
-      .field("regularization", &FddpIteration::regularization, "of the sweep")
+      .field("step", &FddpIteration::step, "step length; 0: no step was taken")
+      .field("regularization", &FddpIteration::regularization, "regularization of the sweep")
       .field("seconds", &FddpIteration::seconds, "since the start");
-  Value<FddpSummary>(module, "Summary", "How a solve went.")
+  Value<FddpSummary>(module, "Summary", "The outcome of a solve.")
       .field("termination", &FddpSummary::termination, "Termination")
       .field("message", &FddpSummary::message, "why it ended")
       .field("acceptable", &FddpSummary::acceptable, "converged by acceptable_decrease: the gradient has not vanished")
-      .field("cost", &FddpSummary::cost, "of the returned trajectory")
+      .field("cost", &FddpSummary::cost, "cost of the returned trajectory")
       .field("gap", &FddpSummary::gap, "largest entry of its gaps")
       .field("iterations", &FddpSummary::iterations, "number")
       .field("violation", &FddpSummary::violation, "largest of the constraints")
       .field("complementarity", &FddpSummary::complementarity, "largest multiplier times slack")
       .field("multiplier", &FddpSummary::multiplier, "largest")
-      .field("penalty", &FddpSummary::penalty, "of violated constraints; 0: there are none")
+      .field("penalty", &FddpSummary::penalty, "penalty of violated constraints; 0: there are none")
       .field("multiplier_updates", &FddpSummary::multiplier_updates, "number")
       .field("seconds", &FddpSummary::seconds, "s")
       .field("linearize_seconds", &FddpSummary::linearize_seconds, "summed over the threads, s")
@@ -86,9 +89,9 @@ void bindSummary(py::module_& module) {
       .def_property_readonly(
           "converged", [](const FddpSummary& s) { return s.termination == FddpTermination::Converged; },
           "whether the solver ended at an optimum");
-  Value<Multipliers>(module, "Multipliers", "Of the constraints, node by node.")
+  Value<Multipliers>(module, "Multipliers", "Multipliers of the constraints, node by node.")
       .field("values", &Multipliers::values, "N + 1 of (constraint size,)")
-      .field("penalty", &Multipliers::penalty, "of violated constraints");
+      .field("penalty", &Multipliers::penalty, "penalty of violated constraints");
 }
 
 }  // namespace

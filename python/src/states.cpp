@@ -17,12 +17,12 @@ Rows readRows(const StateInput& input, py::ssize_t& count) {
   const bool many = array.ndim() == 2;
   const bool fits = (many || array.ndim() == 1) && array.shape(array.ndim() - 1) == input.size;
   if (!fits)
-    throw py::value_error(std::string(input.name) + ": shape " + formatShape({input.size}) + " or (N, " +
-                          std::to_string(input.size) + ") wanted, got " +
+    throw py::value_error(std::string(input.name) + ": expected shape " + formatShape({input.size}) + " or (N, " +
+                          std::to_string(input.size) + "), got " +
                           formatShape(Shape(array.shape(), array.shape() + array.ndim())));
   if (many && count >= 0 && array.shape(0) != count)
-    throw py::value_error(std::string(input.name) + ": " + std::to_string(count) + " states wanted as before it, got " +
-                          std::to_string(array.shape(0)));
+    throw py::value_error(std::string(input.name) + ": expected " + std::to_string(count) +
+                          " states like the arguments before it, got " + std::to_string(array.shape(0)));
   if (many) count = array.shape(0);
   const double* data = array.data();
   return {std::move(array), data, input.size, many ? input.size : 0};

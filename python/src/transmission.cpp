@@ -43,7 +43,7 @@ void bindTransmission(py::module_& module) {
       .field("s", &RatioSample::s, "length along the curve from the start, rad or m")
       .field("branch", &RatioSample::branch, "counted by dead points of the joint from the start")
       .field("joints", &RatioSample::joints, "angles of the linkage's joints (m,), rad or m")
-      .field("motors", &RatioSample::motors, "of its motors (m,)")
+      .field("motors", &RatioSample::motors, "angles of its motors (m,), rad or m")
       .field("ratio", &RatioSample::ratio, "at a dead point of the joint: infinite")
       .field("dead", &RatioSample::dead, "DeadPointKind")
       .field("loses_rank", &RatioSample::loses_rank, "the loops can continue in several ways")

@@ -30,8 +30,8 @@ MakeWorld findEngine(const std::string& engine) {
     return reinterpret_cast<MakeWorld>(function);
   } catch (py::error_already_set& error) {
     if (!error.matches(PyExc_ModuleNotFoundError)) throw;
-    throw ModelError("", "world '" + engine + "'", "this build has no engine but its own",
-                     "build Bielle with -DBIELLE_BUILD_SIMULATION=ON (it needs Simbody), or take engine='bielle'");
+    throw ModelError("", "world '" + engine + "'", "this build only has its own engine",
+                     "build Bielle with -DBIELLE_BUILD_SIMULATION=ON (it needs Simbody), or use engine='bielle'");
   }
 }
 
@@ -64,7 +64,7 @@ class HeldWorlds {
 
   py::object step(const py::object& u, double duration, const py::object& push) {
     if (!(duration > 0 && std::isfinite(duration)))
-      throw py::value_error("duration: a positive number of seconds wanted");
+      throw py::value_error("duration: expected a positive number of seconds");
     const BusyGuard guard(is_busy_, "world");
     const MatrixXd torques = readRows(u, model_->nu(), "u", true), force = readRows(push, 3, "push", true);
     run([&](World& world, Eigen::Index i) {
@@ -90,7 +90,7 @@ class HeldWorlds {
   const std::string& getEngine() const { return engine_; }
 
   void requireSingle() const {
-    if (many_) throw py::value_error("world: a single one wanted, made without `count`");
+    if (many_) throw py::value_error("world: expected a single world, made without `count`");
   }
 
   // Reads the state of a single world.
@@ -180,7 +180,7 @@ std::unique_ptr<HeldSensors> makeSensors(const std::shared_ptr<HeldWorlds>& worl
 }
 
 SensorReadings readSensors(HeldSensors& self) {
-  if (!self.is_reset) throw std::runtime_error("sensors: reset them first, which tells when readings begin");
+  if (!self.is_reset) throw std::runtime_error("sensors: reset them first, which sets the time of the first reading");
   SensorReadings out;
   self.world->observeOnly([&](const World& world) { out = self.sensors->read(world); });
   return out;
@@ -191,16 +191,16 @@ void bindSensors(py::module_& module) {
       module, "Sensors",
       "Encoders of 14 bits on the motors and an IMU (Bosch BMI088) in the trunk of a robot in a World.")
       .def(py::init(&makeSensors), py::arg("world"), py::arg("noise") = 1.0, py::arg("seed") = 1,
-           py::arg("imu") = SE3(),
-           "noise: factor of the figures of the data sheets, 0: exact; imu: its place in the trunk.")
+           py::arg("imu") = SE3(), "noise: factor of the data-sheet noise, 0: exact; imu: its placement in the trunk.")
       .def(
           "reset",
           [](HeldSensors& self, double time) {
             self.world->observeOnly([&](const World& world) { self.sensors->reset(world, time); });
             self.is_reset = true;
           },
-          py::arg("time"), "From the state in which the world is; the first readings come after a time, s.")
-      .def("read", &readSensors, "SensorReadings at the time of the world; those of the IMU are means since the last.");
+          py::arg("time"), "Starts from the world's current state; the first readings come after a time, s.")
+      .def("read", &readSensors,
+           "SensorReadings at the time of the world; IMU readings are means since the last call.");
 }
 
 }  // namespace
@@ -210,8 +210,8 @@ void bindWorlds(py::module_& module) {
       module, "World",
       "Physics with contact, in which motors drive a robot and the ground pushes it.\n\n"
       "engine: 'bielle', its own, or 'simbody' and 'mujoco' where it was built with them.\n"
-      "With `count`, so many worlds that are stepped together on all cores: arguments and results have "
-      "an axis of them in front.")
+      "With `count`, that many worlds are stepped together on all cores: arguments and results have a leading axis of "
+      "worlds.")
       .def(py::init([](std::shared_ptr<Model> model, const py::object& count, const Ground& ground, double time_step,
                        const std::string& engine) {
              return std::make_shared<HeldWorlds>(std::move(model), read<std::optional<int>>(count, "count"), ground,
@@ -224,15 +224,16 @@ void bindWorlds(py::module_& module) {
           "count", [](const HeldWorlds& self) { return show(self.getCount(), {}); }, "number of worlds, or None")
       .def_property_readonly("engine", &HeldWorlds::getEngine, "its name")
       .def("reset", &HeldWorlds::reset, py::arg("q"), py::arg("v"), py::arg("where") = py::none(),
-           "Sets closed configurations (nq,) and velocities (nv,) that keep them closed; all else starts anew.\n\n"
-           "where: (count,), True for the worlds that start anew while the others stay as they are; None: all. "
-           "Returns the WorldState.")
+           "Sets closed configurations (nq,) and velocities (nv,) that keep them closed; everything else starts "
+           "again.\n\n"
+           "where: (count,), True for the worlds that are reset while the others stay unchanged; None: all. Returns "
+           "the WorldState.")
       .def("step", &HeldWorlds::step, py::arg("u"), py::arg("duration"), py::arg("push") = py::make_tuple(0, 0, 0),
            "Advances by a duration (s) under motor torques (nu,), cut at their limits, and a force at the trunk (3,), "
            "N.\n\n"
-           "Returns the WorldState; its `ok` is False where the integration broke off.")
+           "Returns the WorldState; its `ok` is False where the integration failed.")
       .def_property_readonly("wrenches", &HeldWorlds::calcWrenches,
-                             "of the ground on the feet in their contact frames (contacts, 6), N and N m");
+                             "wrenches from the ground on the feet in their contact frames (contacts, 6), N and N m");
   bindSensors(module);
 }
 

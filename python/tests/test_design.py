@@ -30,7 +30,7 @@ def test_a_robot_as_a_function_of_numbers(knee, model):
     assert np.abs(moved.closure_residual(q)).max() == pytest.approx(2e-3, rel=0.2)
     again = pickle.loads(pickle.dumps(knee))
     assert again.variables == knee.variables and again.make([2e-3, 0]) == moved
-    with pytest.raises(ValueError, match=r"x: shape \(2,\) wanted"):
+    with pytest.raises(ValueError, match=r"x: expected shape \(2,\)"):
         knee.make([0])
     with pytest.raises(bielle.ModelError, match="nowhere"):
         bielle.Parametrization(model, [shift("motor_x", "nowhere")])

@@ -128,13 +128,13 @@ def test_batches_are_single_states_to_the_last_bit(model, state):
 
 
 def test_wrong_shapes_say_which_was_wanted(model):
-    with pytest.raises(ValueError, match=rf"q: shape \({model.nq},\) or \(N, {model.nq}\) wanted, got \(3,\)"):
+    with pytest.raises(ValueError, match=rf"q: expected shape \({model.nq},\) or \(N, {model.nq}\), got \(3,\)"):
         model.com(np.zeros(3))
-    with pytest.raises(ValueError, match="v: 2 states wanted as before it, got 3"):
+    with pytest.raises(ValueError, match="v: expected 2 states like the arguments before it, got 3"):
         model.com_velocity(np.tile(model.neutral(), (2, 1)), np.zeros((3, model.nv)))
-    with pytest.raises(ValueError, match=r"SE3.p: shape \(3,\) wanted, got \(2,\)"):
+    with pytest.raises(ValueError, match=r"SE3.p: expected shape \(3,\), got \(2,\)"):
         bielle.SE3(p=[0, 1])
-    with pytest.raises(TypeError, match="q: numbers wanted"):
+    with pytest.raises(TypeError, match="q: expected numbers"):
         model.com("bipetto")
     with pytest.raises(TypeError, match="SE3 has no field 'q'; it has: R, p"):
         bielle.SE3(q=1)
@@ -157,7 +157,7 @@ def test_model_errors_name_the_file(tmp_path):
 
 def test_contacts_of_another_robot_are_refused(model):
     other = bielle.load_robot("fourbar").model
-    with pytest.raises(ValueError, match="not one of the model"):
+    with pytest.raises(ValueError, match="does not belong to the model"):
         other.static_torques(other.neutral(), model.constraints(("foot_left",)))
     with pytest.raises(bielle.ModelError, match="there is no contact"):
         model.constraints(("hand",))

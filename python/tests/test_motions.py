@@ -32,9 +32,9 @@ def test_files_are_those_of_the_command(robot, squat, tmp_path):
 
 def test_result(squat, model):
     assert squat.converged and squat.solver.termination == bielle.Termination.CONVERGED
-    assert squat.requested["depth"] == 0.8
+    assert squat.options["depth"] == 0.8
     goal = squat.goals[0]
-    assert goal.met and goal.goal.asked == 0.8 and abs(goal.came_out - 0.8) < 0.01
+    assert goal.met and goal.goal.requested == 0.8 and abs(goal.achieved - 0.8) < 0.01
     record = squat.record
     assert record.q.shape == (record.time.size, model.nq) and record.q.base is not None
     assert record.com == pytest.approx(model.com(record.q), abs=1e-9)
@@ -52,7 +52,7 @@ def test_options_are_those_of_the_registry(robot):
     with pytest.raises(bielle.ModelError) as caught:
         bielle.solve_squat(robot, depth=-1)
     assert "depth" in caught.value.element
-    with pytest.raises(ValueError, match="foot: 'left', 'right' wanted"):
+    with pytest.raises(ValueError, match="foot: expected 'left', 'right'"):
         bielle.solve_hop(robot, foot="middle")
 
 
@@ -124,7 +124,7 @@ def test_other_threads_run_during_a_solve(robot):
 
 def test_sequence(robot):
     result = bielle.solve_sequence(robot, ["squat", "squat"], {"squat.depth": 0.9, "squat2.depth": 0.85})
-    assert result.converged and result.requested["squat2.depth"] == 0.85
+    assert result.converged and result.options["squat2.depth"] == 0.85
 
 
 def test_objective_and_limits(robot, squat):

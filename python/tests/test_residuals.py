@@ -133,15 +133,15 @@ def test_wrong_shapes_say_which_was_wanted(model, height):
         def calc_jacobian(self, node):
             return {}
 
-    with pytest.raises(ValueError, match=r"Long.calc: shape \(1,\) wanted, got \(2,\)"):
+    with pytest.raises(ValueError, match=r"Long.calc: expected shape \(1,\), got \(2,\)"):
         solve(model, Long(height))
-    with pytest.raises(ValueError, match=rf"Wide.calc_jacobian, q: shape \(1, {model.nv}\) wanted, got \(1, 3\)"):
+    with pytest.raises(ValueError, match=rf"Wide.calc_jacobian, q: expected shape \(1, {model.nv}\), got \(1, 3\)"):
         solve(model, Wide(height))
     with pytest.raises(KeyError, match="q: missing"):
         solve(model, Missing(height))
     with pytest.raises(TypeError, match="derived from bielle.Residual"):
         bielle.Cost("c", 1, bielle.Activation.quadratic([1]), "height")
-    with pytest.raises(ValueError, match="depends_on: .* wanted, got 'x'"):
+    with pytest.raises(ValueError, match="depends_on: expected .*, got 'x'"):
         bielle.Cost("c", 1, bielle.Activation.quadratic([1]), type("X", (ComHeight,), {"depends_on": ("x",)})(1))
 
 
@@ -214,7 +214,7 @@ def test_residuals_of_the_library_compare_and_pickle(model):
     assert made[0] == made[1] and made[0] != residuals.com_position([0, 0, 0.5]) and made[0] != made[2]
     with pytest.raises(IndexError, match="contact 1: the constraints have 1"):
         residuals.contact_force(feet, 1, np.zeros(6))
-    with pytest.raises(ValueError, match=r"reference: shape \(6,\) wanted, got \(3,\)"):
+    with pytest.raises(ValueError, match=r"reference: expected shape \(6,\), got \(3,\)"):
         residuals.contact_force(feet, 0, np.zeros(3))
 
 

@@ -34,7 +34,7 @@ def test_policy(motion, controller, model):
     assert there == pytest.approx(bielle.Controller.policy(motion, gains=False).update(0.6, q, v))
     moved = controller.update(0.6, model.integrate(q, 1e-3 * np.eye(model.nv)[2]), v)
     assert np.abs(moved - there).max() > 0.01
-    with pytest.raises(ValueError, match=r"q: shape \(61,\) wanted, got \(3,\)".replace("61", str(model.nq))):
+    with pytest.raises(ValueError, match=r"q: expected shape \(61,\), got \(3,\)".replace("61", str(model.nq))):
         controller.update(0, np.zeros(3), v)
 
 
@@ -87,14 +87,14 @@ def test_some_worlds_start_anew():
     assert np.array_equal(after.q[1], q) and after.time[1] == 0 and not np.array_equal(before.q[1], q)
     for i in (0, 2):
         assert np.array_equal(after.q[i], before.q[i]) and after.time[i] == before.time[i]
-    with pytest.raises(ValueError, match=r"where: shape \(3,\) wanted, got \(2,\)"):
+    with pytest.raises(ValueError, match=r"where: expected shape \(3,\), got \(2,\)"):
         world.reset(q, v, where=[True, False])
 
 
 def test_wrong_arguments(model):
     world = bielle.World(model, count=2)
     world.reset(model.standing(), np.zeros(model.nv))
-    with pytest.raises(ValueError, match=rf"u: shape \(2, {model.nu}\) wanted, got \(3, {model.nu}\)"):
+    with pytest.raises(ValueError, match=rf"u: expected shape \(2, {model.nu}\), got \(3, {model.nu}\)"):
         world.step(np.zeros((3, model.nu)), 0.01)
     with pytest.raises(ValueError, match="duration"):
         world.step(np.zeros(model.nu), -1)

@@ -17,7 +17,7 @@ namespace {
 int adopt(const RobotArgument& argument, const std::string& directory) {
   const LoadedRobot robot = argument.load();
   if (fs::path(robot.file).extension() == ".yaml")
-    throw ModelError(robot.file, "robot", "it is a file that completes another robot already", "edit it");
+    throw ModelError(robot.file, "robot", "it already completes another robot", "edit it");
   const fs::path place = fs::absolute(directory).lexically_normal();
   const std::string name = (place.has_filename() ? place : place.parent_path()).filename().string();
   const Adoption adoption = adoptRobot(robot, fs::path(robot.file).lexically_relative(place).string());
@@ -25,8 +25,9 @@ int adopt(const RobotArgument& argument, const std::string& directory) {
   fs::create_directories(place, error);
   const fs::path file = place / (name + ".yaml");
   if (error)
-    throw ModelError(directory, "directory", "it cannot be made: " + error.message(), "give another one with -o");
-  if (fs::exists(file)) throw ModelError(file.string(), "file", "it exists", "give another directory, or remove it");
+    throw ModelError(directory, "directory", "it cannot be created: " + error.message(), "give another one with -o");
+  if (fs::exists(file))
+    throw ModelError(file.string(), "file", "it already exists", "give another directory, or remove it");
   writeTextFile(file.string(), adoption.yaml);
   std::cout << (fs::path(directory) / (name + ".yaml")).lexically_normal().string() << "\n";
   for (const std::string& guess : adoption.guesses) std::cout << "  " << guess << "\n";
@@ -36,14 +37,14 @@ int adopt(const RobotArgument& argument, const std::string& directory) {
 }  // namespace
 
 void addAdopt(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("adopt", "Complete a robot of others: feet, soles, posture, motors");
+  CLI::App& command = *app.add_subcommand("adopt", "Complete a published robot: feet, soles, posture, motors");
   const auto robot = std::make_shared<RobotArgument>();
   const auto directory = std::make_shared<std::string>();
   command.add_option("ROBOT", robot->name, "name, directory, .urdf or MuJoCo .xml file")->required();
-  command.add_option("-o,--output", *directory, "directory of the new robot; its file gets its last name")->required();
+  command.add_option("-o,--output", *directory, "directory of the new robot; its last part names the robot's file")
+      ->required();
   command.footer(
-      "Writes DIR/NAME.yaml, which refers to the robot's own files and is to be corrected by hand: comments explain "
-      "every guess.\n"
+      "Writes DIR/NAME.yaml, which refers to the robot's own files. Correct it by hand: comments explain every guess.\n"
       "Example:\n"
       "  bielle adopt path/to/published.urdf -o mine\n"
       "  bielle solve squat --robot mine -o squat");

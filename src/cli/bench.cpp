@@ -79,8 +79,8 @@ Json describeReceding(const BenchReport& report) {
                     {"99 % [ms]", round3(1e3 * t.all.percentile_99)},
                     {"worst [ms]", round3(1e3 * t.all.worst)},
                     {"undisturbed", t.undisturbed.shifts},
-                    {"their 99 % [ms]", round3(1e3 * t.undisturbed.percentile_99)},
-                    {"their worst [ms]", round3(1e3 * t.undisturbed.worst)},
+                    {"undisturbed 99 % [ms]", round3(1e3 * t.undisturbed.percentile_99)},
+                    {"undisturbed worst [ms]", round3(1e3 * t.undisturbed.worst)},
                     {"rate [Hz]", round3(1 / t.all.median)},
                     {"violation", round3(t.violation)},
                     {"least height", round3(t.least_height)},
@@ -136,28 +136,28 @@ void addBench(CLI::App& app, Action& action) {
     BenchOptions options;
     bool as_json = false, quick = false;
   };
-  CLI::App& command = *app.add_subcommand("bench", "Measure speed: per node, whole solves, receding horizon, growth");
+  CLI::App& command = *app.add_subcommand("bench", "Measure speed: per node, whole solves, receding horizon, scaling");
   const auto arguments = std::make_shared<Arguments>();
   arguments->robot.name = "bipetto";
   command
       .add_option("--robot", arguments->robot.name,
                   "name, directory, .urdf or MuJoCo .xml file of a robot with two feet")
       ->capture_default_str();
-  command.add_option("--threads", arguments->options.threads, "compared with one thread")
+  command.add_option("--threads", arguments->options.threads, "number of threads to compare with one")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   command
       .add_option("--shifts", arguments->options.shifts,
-                  "of the receding horizon; the full formulation makes a thirtieth of them")
+                  "shifts of the receding horizon; the full formulation makes a thirtieth of them")
       ->check(CLI::Range(1, 10000000))
       ->capture_default_str();
-  command.add_flag("--quick", arguments->quick, "small sizes, measured once: only to see that it works");
+  command.add_flag("--quick", arguments->quick, "small sizes, measured once, to see that everything works");
   command.add_flag("--json", arguments->as_json, "print JSON");
   command.footer(
       "A unit is one product of two 108 x 108 matrices by Eigen, on one thread, in the same run. Times are the\n"
-      "least of some repetitions, but for whole solves (one run) and the receding horizon: median, 99th percentile\n"
-      "and worst of its shifts, and of the undisturbed ones, during which the system gave no processor to another\n"
-      "program. Progress is reported on the standard error. Takes some minutes.\n"
+      "least of several repetitions. Whole solves run once. The receding horizon reports the median, 99th percentile\n"
+      "and worst of its shifts, and the same of the undisturbed shifts, during which no other program took the\n"
+      "processor. Progress is reported on the standard error. Takes a few minutes.\n"
       "Examples:\n"
       "  bielle bench\n"
       "  bielle bench --threads 4 --json > bench.json");

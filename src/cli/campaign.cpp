@@ -24,7 +24,7 @@ int run(const CampaignArguments& arguments) {
   options.bielle = std::filesystem::read_symlink("/proc/self/exe");
   options.simulate = findCompanion("bielle-simulate");
   if (options.simulate.find('/') == std::string::npos)
-    throw ModelError("", options.simulate, "it is not beside this program",
+    throw ModelError("", options.simulate, "it is not installed beside this program",
                      "build Bielle with -DBIELLE_BUILD_SIMULATION=ON (it needs Simbody)");
   auto engine = makeTaskEngine(arguments.tasks);
   options.engine = engine.get();
@@ -32,26 +32,27 @@ int run(const CampaignArguments& arguments) {
   const CampaignResults results = runCampaign(spec, arguments.directory, options);
   engine.reset();  // signals have their usual effect again
   if (results.interrupted) {
-    std::cerr << "bielle: error: interrupted; the same command goes on from here" << std::endl;
+    std::cerr << "bielle: error: interrupted; run the same command again to continue" << std::endl;
     return kFailed;
   }
   std::vector<std::string> notes;
   printPaths(writeCampaign(arguments.directory, results, notes), notes);
-  if (!results.complete) std::cerr << "bielle: error: some runs broke down; the same command tries them anew\n";
+  if (!results.complete) std::cerr << "bielle: error: some runs failed; run the same command again to retry them\n";
   return results.complete ? kOk : kFailed;
 }
 
 }  // namespace
 
 void addCampaign(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("campaign", "Carry motions out many times: pushes, grounds, worlds, seeds");
+  CLI::App& command = *app.add_subcommand("campaign", "Execute motions many times: pushes, grounds, worlds, seeds");
   const auto arguments = std::make_shared<CampaignArguments>();
   command.add_option("SPEC", arguments->spec, "YAML file: motions, options of `bielle simulate`, pushes")->required();
   command
-      .add_option("-o,--output", arguments->directory,
-                  "directory for runs.csv, campaign.md, summary.json, map.svg and the log runs.jsonl; made if need be")
+      .add_option(
+          "-o,--output", arguments->directory,
+          "directory for runs.csv, campaign.md, summary.json, map.svg and the log runs.jsonl; created if necessary")
       ->required();
-  addTaskOptions(command, "runs at a time, one process each; results do not depend on it", arguments->tasks);
+  addTaskOptions(command, "runs at a time, each in its own process; results do not depend on it", arguments->tasks);
   command.footer(
       "SPEC: every combination of the values is one run of `bielle simulate`.\n"
       "  motions:\n"
@@ -69,7 +70,7 @@ void addCampaign(CLI::App& app, Action& action) {
       "Runs that are in the log are not done again: after Ctrl-C, a crash or with more values in SPEC, the same "
       "command\n"
       "does what is missing. A robot that falls is a result.\n"
-      "Exit status: 0 done, 1 interrupted or a run broke down, 2 bad input.\n"
+      "Exit status: 0 done, 1 interrupted or a run failed, 2 bad input.\n"
       "Example:\n"
       "  bielle campaign pushes.yaml -o pushes");
   command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });

@@ -24,7 +24,7 @@ int runAndWrite(const CaseRun& run, const std::function<void(const CaseOutcomes&
   const RunOutcome outcome = runCases(run.directory, cases, options);
   engine.reset();  // signals have their usual effect again
   if (outcome.interrupted) {
-    std::cerr << "bielle: error: interrupted; the same command goes on from here" << std::endl;
+    std::cerr << "bielle: error: interrupted; run the same command again to continue" << std::endl;
     return kFailed;
   }
   CaseOutcomes outcomes;
@@ -34,7 +34,7 @@ int runAndWrite(const CaseRun& run, const std::function<void(const CaseOutcomes&
     complete &= outcome.cases[i].complete;
   }
   write(outcomes);
-  if (!complete) std::cerr << "bielle: error: some cases broke down; the same command tries them anew" << std::endl;
+  if (!complete) std::cerr << "bielle: error: some cases failed; run the same command again to retry them" << std::endl;
   return complete ? kOk : kFailed;
 }
 

@@ -23,8 +23,8 @@ std::string findCompanion(const std::string& program) {
 
 void addCompanions(CLI::App& app) {
   app.add_subcommand("validate", "Compare the dynamics with Simbody's (see bielle validate --help)");
-  app.add_subcommand("check", "Check a motion by its files and Simbody (see bielle check --help)");
-  app.add_subcommand("simulate", "Carry a motion out in physics with contact (see bielle simulate --help)");
+  app.add_subcommand("check", "Check a motion's files with Simbody (see bielle check --help)");
+  app.add_subcommand("simulate", "Execute a motion in a physics simulation with contact (see bielle simulate --help)");
 }
 
 int becomeCompanion(const std::string& name, char** arguments) {
@@ -50,12 +50,12 @@ std::optional<int> runCompanion(const std::string& name, std::vector<std::string
   };
   const int error = posix_spawnp(&child, program.c_str(), nullptr, nullptr, argv.data(), environ);
   if (error == ENOENT && program == name) return {};  // beside this program it exists
-  if (error != 0) return fail(std::string("cannot be started: ") + std::strerror(error));
+  if (error != 0) return fail(std::string("could not be started: ") + std::strerror(error));
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
     if (errno != EINTR) return fail(std::string("was lost: ") + std::strerror(errno));
   if (WIFEXITED(status)) return WEXITSTATUS(status);
-  return fail("was ended by signal " + std::to_string(WTERMSIG(status)));
+  return fail("was terminated by signal " + std::to_string(WTERMSIG(status)));
 }
 
 }  // namespace bielle::cli

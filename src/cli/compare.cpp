@@ -58,21 +58,21 @@ int run(const CompareArguments& arguments) {
 }  // namespace
 
 void addCompare(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("compare", "Robots that make the same motions, side by side");
+  CLI::App& command = *app.add_subcommand("compare", "Compare robots that make the same motions, side by side");
   const auto arguments = std::make_shared<CompareArguments>();
   command.add_option("SPEC", arguments->spec, "YAML file: robots, their mass, motions, speeds, groups of motors")
       ->required();
   command
       .add_option("-o,--output", arguments->directory,
-                  "directory for compare.md, compare.csv, figures, robots/ and cases/; made if need be")
+                  "directory for compare.md, compare.csv, figures, robots/ and cases/; created if necessary")
       ->required();
-  addTaskOptions(command, "cases at a time, one process each", arguments->tasks);
+  addTaskOptions(command, "cases at a time, each in its own process", arguments->tasks);
   command.footer(
       "SPEC:\n"
-      "  robots:                         (a robot, or a generator with its parameters, by the name it is to have)\n"
+      "  robots:                         (name: a robot, or a generator with its parameters)\n"
       "    bipetto: {robot: bipetto}\n"
       "    cleobot: {generator: cleobot, set: {hip_height: 0.48}}\n"
-      "  mass: 25.7                      (kg, of every robot, by its trunk; left out: they stay as they are)\n"
+      "  mass: 25.7                      (kg, of every robot, by changing its trunk; default: unchanged)\n"
       "  motions:\n"
       "    - {motion: squat, set: {depth: 0.6}}\n"
       "    - {motion: walk, set: {speed: 0.5}}\n"
@@ -80,10 +80,11 @@ void addCompare(CLI::App& app, Action& action) {
       "  groups: {hips: [hip], knees and ankles: [knee, ankle, leg]}     (motors by parts of their names)\n"
       "  drives: {motor_constant: 2, regeneration: 0}     (N m/sqrt(W) at the joints; share given back)\n"
       "Peak and rms torques by group, power, mechanical and electrical energy, cost of transport; of the speeds, the\n"
-      "largest whose motion converges and passes `bielle check`. A case is a process of its own; those that have been\n"
-      "done are kept: after Ctrl-C or a crash the same command goes on.\n"
-      "Exit status: 0 done, 1 interrupted or a case broke down, 2 bad input.\n"
-      "Example:\n  bielle compare examples/architectures/architectures.yaml -o architectures");
+      "largest whose motion converges and passes `bielle check`. Each case runs in its own process; finished cases\n"
+      "are kept: after Ctrl-C or a crash, run the same command again to continue.\n"
+      "Exit status: 0 done, 1 interrupted or a case failed, 2 bad input.\n"
+      "Example:\n"
+      "  bielle compare examples/architectures/architectures.yaml -o architectures");
   command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
 }
 

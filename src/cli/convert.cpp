@@ -63,28 +63,26 @@ void addConvert(CLI::App& app, Action& action) {
   command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf or MuJoCo .xml file")->required();
   command
       .add_option("--to", arguments->format,
-                  "bielle: a directory with URDF and YAML, which says all; drake: a URDF with loops and motors for "
-                  "Drake; mjcf: "
-                  "a file of MuJoCo; sdf: one of Gazebo, loops included; urdf: a URDF alone")
+                  "bielle: a directory with URDF and YAML, without losses; drake: a URDF with loops and motors for "
+                  "Drake; mjcf: a MuJoCo file; sdf: a Gazebo file with loops; urdf: a URDF alone")
       ->check(CLI::IsMember({"bielle", "drake", "mjcf", "sdf", "urdf"}))
       ->capture_default_str();
   addFixedBase(command, arguments->robot);
-  CLI::Option* payload =
-      command.add_option("--payload", arguments->payload, "mass fixed to the trunk [kg], as part of it")
-          ->check(CLI::Range(0.0, 1e6))
-          ->capture_default_str();
+  CLI::Option* payload = command.add_option("--payload", arguments->payload, "mass fixed to the trunk [kg]")
+                             ->check(CLI::Range(0.0, 1e6))
+                             ->capture_default_str();
   command
       .add_option("--payload-at", arguments->payload_at,
-                  "x y z [m] in the frame of the trunk; the trunk's centre of mass if not given")
+                  "x y z [m] in the frame of the trunk; default: the trunk's centre of mass")
       ->expected(3)
       ->needs(payload);
   command
-      .add_option("-o,--output", arguments->output, "the file; bielle: the directory, whose last name its files get")
+      .add_option("-o,--output", arguments->output,
+                  "the file; for bielle the directory, whose last part names its files")
       ->required();
   command.footer(
-      "What a format cannot say is told in a warning that names it; what would be another mechanism without it is "
-      "refused.\n"
-      "In SDF, coordinates count from the posture that is written; couplers are left out.\n"
+      "Lost elements are listed as warnings; a conversion that would change the mechanism is refused.\n"
+      "In SDF, coordinates are measured from the posture in the file; couplers are left out.\n"
       "For Drake, loops are ball constraints: one for a ball, two for a hinge, three for a weld.\n"
       "A URDF alone is a tree: loops are left out, couplers of two joints become <mimic>.\n"
       "Examples:\n"

@@ -38,7 +38,8 @@ DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion)
 // One design, for others that search.
 int evaluateRequest(const DesignEvaluator& evaluator, const study::DesignRequest& request, const std::string& file) {
   if (request.x.size() != evaluator.robot().start().size())
-    throw ModelError("", "--evaluate", "the design has another number of variables", "give one number for each");
+    throw ModelError("", "--evaluate", "it does not have one number for each variable of the design",
+                     "give one number for each");
   writeTextFile(file, formatEvaluation(evaluateDesign(evaluator, request.stage, request.x)) + "\n");
   return kOk;
 }
@@ -93,7 +94,7 @@ int run(const DesignArguments& arguments) {
         variable.isChoice() ? describeValue(variable, robot.start()[k]) : formatNumber(robot.start()[k], "%.5g");
     rows.push_back({variable.name, from + " -> " + describeValue(variable, run.best[k])});
   }
-  if (spec.front) rows.push_back({"front", std::to_string(run.front.size()) + " designs that no other dominates"});
+  if (spec.front) rows.push_back({"front", std::to_string(run.front.size()) + " non-dominated designs"});
   printTable(std::cout, rows);
   for (const std::string& path : writeDesign(arguments.directory, evaluator, spec, run))
     std::cout << "  " << path << "\n";
@@ -108,45 +109,44 @@ void addDesign(CLI::App& app, Action& action) {
   command.add_option("SPEC", arguments->spec, "YAML file: robot, variables with bounds, motions, objective, search")
       ->required();
   command
-      .add_option("-o,--output", arguments->directory,
-                  "directory for best/ (a robot), front/ (robots), design.md, figures and the logs; made if need be")
+      .add_option(
+          "-o,--output", arguments->directory,
+          "directory for best/ (a robot), front/ (robots), design.md, figures and the logs; created if necessary")
       ->required();
-  addTaskOptions(command, "searches, or designs of a front, at a time, one thread each; results do not depend on it",
+  addTaskOptions(command, "searches, or designs of a front, at a time, each on one thread; results do not depend on it",
                  arguments->tasks);
-  command.add_option(
-      "--evaluate", arguments->request,
-      "evaluate one design alone, {\"stage\": \"sbplx\", \"x\": [0.05]} in this file, as workers do; -o is "
-      "the file for its line of a log");
+  command.add_option("--evaluate", arguments->request,
+                     "evaluate only the design in this file, {\"stage\": \"sbplx\", \"x\": [0.05]}, as workers do; -o "
+                     "names the file for its line of the log");
   command.footer(
       "SPEC, lengths in m:\n"
       "  robot: bipetto             (or `generator: cleobot`, with variables {name, parameter, bounds})\n"
       "  variables:\n"
       "    - name: crank\n"
       "      bounds: [0.04, 0.06]\n"
-      "      length:                (of several the first is the value, the others change by as much)\n"
+      "      length:                (the first is the value; the others change by the same amount)\n"
       "        - {from: motor_knee_right, to: transmission_knee_right, across: [0, 0, 1], stretch: knee_crank_right}\n"
       "        - {from: motor_knee_left, to: transmission_knee_left, across: [0, 0, 1], stretch: knee_crank_left}\n"
       "    - name: motor_x\n"
       "      bounds: [-0.01, 0.01]\n"
       "      shift: [{of: motor_knee_right, along: [1, 0, 0]}, {of: motor_knee_left, along: [1, 0, 0]}]\n"
-      "    - {name: gear, ratio: \"*knee*\", bounds: [6, 20]}             (turns of the rotor; * is any text in a "
-      "motor's name)\n"
-      "    - {name: motor, motor: \"*knee*\", choices: [ak80-9, ak10-9], mass: knee_motor_mass}     (of a generator)\n"
+      "    - {name: gear, ratio: \"*knee*\", bounds: [6, 20]}             (turns of the rotor; * stands for any text "
+      "in a motor's name)\n"
+      "    - {name: motor, motor: \"*knee*\", choices: [ak80-9, ak10-9], mass: knee_motor_mass}     (with a "
+      "generator)\n"
       "  architecture: [four_bar_knee, belt_knee, rsu_ankle, differential_ankle]     (parts of `generator: "
       "leg_biped`)\n"
       "  motions:\n"
       "    - {motion: squat, set: {depth: 0.6}}\n"
       "    - {motion: walk, weight: 0.5, payload: 5}     (share in objectives; kg fixed to the trunk)\n"
-      "  mode: reoptimized          (or `kept`: postures of the start design, motor torques computed anew)\n"
-      "  margin: 0.1                (the least that a joint moves in a unit motion of its linkage; for motions that "
-      "are\n"
-      "                              kept, or for searches with gradients those of the start design)\n"
+      "  mode: reoptimized          (or `kept`: the start design's postures, new motor torques)\n"
+      "  margin: 0.1                (the least that a joint moves in a unit motion of its linkage; for motions\n"
+      "                              that are kept; for searches with gradients, the start design's motions)\n"
       "  objective:                 (peak_torque, rms_torque, energy, electrical_energy [J], cost, conditioning, "
       "workspace;\n"
-      "                              over their start values; all motors when none are named)\n"
+      "                              relative to their start values; all motors unless some are named)\n"
       "    - {measure: peak_torque, motors: [motor_knee_left, motor_knee_right], weight: 1}\n"
-      "    - {measure: workspace, region: {foot: foot_left, x: [-0.2, 0.2], z: [-0.1, 0.1]}}     (share that is "
-      "reached)\n"
+      "    - {measure: workspace, region: {foot: foot_left, x: [-0.2, 0.2], z: [-0.1, 0.1]}}     (share reached)\n"
       "  constraints:               (on all motions: envelope, heat [at most 1], mass [kg], margin, distance [m], "
       "...)\n"
       "    - {measure: heat}\n"
@@ -155,17 +155,19 @@ void addDesign(CLI::App& app, Action& action) {
       "  search:\n"
       "    seed: 1\n"
       "    searches: 2\n"
-      "    stages:                  (crs or isres, then bobyqa or sbplx; but for conditioning and workspace also slsqp "
-      "or\n"
+      "    stages:                  (crs or isres, then bobyqa or sbplx; except for conditioning and workspace also "
+      "slsqp or\n"
       "                              mma: gradients, far fewer evaluations)\n"
       "      - {algorithm: crs, evaluations: 200}\n"
       "      - {algorithm: sbplx, evaluations: 100, tolerance: 1e-3}\n"
       "    pareto:                  (instead of `searches` and `stages`: the front of several objectives)\n"
       "      {algorithm: nsga2, population: 24, generations: 10, refine: {algorithm: slsqp, evaluations: 6}}\n"
-      "Every evaluation is logged: after Ctrl-C or a crash the same command goes on from there and ends the same way.\n"
+      "Every evaluation is logged: after Ctrl-C or a crash, run the same command again to continue; the result is the "
+      "same.\n"
       "Designs whose loops do not close, or whose motion fails, are penalized and counted.\n"
       "Exit status: 0 done, 1 interrupted (with workers) or a task failed, 2 bad input.\n"
-      "Example:\n  bielle design examples/knee_design/knee.yaml -o knee");
+      "Example:\n"
+      "  bielle design examples/knee_design/knee.yaml -o knee");
   command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
 }
 

@@ -119,21 +119,22 @@ void addEval(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("eval", "Compute accelerations, forces and derivatives at one state");
   const auto arguments = std::make_shared<EvalArguments>();
   command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf or MuJoCo .xml file")->required();
-  command.add_option("--state", arguments->state, "JSON file of the state, - for the standard input")->required();
-  command.add_flag("--derivatives", arguments->derivatives, "add the derivatives by q, v and u");
+  command.add_option("--state", arguments->state, "JSON file with the state; - for the standard input")->required();
+  command.add_flag("--derivatives", arguments->derivatives, "add the derivatives with respect to q, v and u");
   addFixedBase(command, arguments->robot);
-  command.footer(
-      std::string(kStateHelp) +
-      "The answer is JSON on the standard output: accelerations by joint (rates of v); wrenches of closures and "
-      "contacts\n(fx fy fz nx ny nz, N and N m, in frame 1, on body 1; for a contact: of the ground on the foot); "
-      "closure residuals; rank and\nmobility of the closures; mass, com, energies, the diagonal of the mass matrix and "
-      "the bias; with --derivatives row-major\nmatrices. Rows and columns are named by `order`: da_* has rows v, "
-      "dlambda_* rows lambda; *_dq has columns v (the tangent of q),\n*_du columns u. The state is taken as it is: "
-      "give "
-      "one that is closed. Where closures are redundant, forces are those of least norm.\n"
-      "Examples:\n"
-      "  bielle eval bipetto --state state.json --derivatives\n"
-      "  echo '{\"torques\": {\"crank_joint\": 1}}' | bielle eval fourbar --state -");
+  command.footer(std::string(kStateHelp) +
+                 "The output is JSON: accelerations by joint (rates of v); wrenches of closures and contacts\n"
+                 "(fx fy fz nx ny nz, N and N m, in frame 1, on body 1; for a contact: from the ground on the foot); "
+                 "closure residuals; rank and\n"
+                 "mobility of the closures; mass, com, energies, the diagonal of the mass matrix and the bias; with "
+                 "--derivatives row-major\n"
+                 "matrices. Rows and columns are named by `order`: da_* has rows v, dlambda_* rows lambda; *_dq has "
+                 "columns v (the tangent of q),\n"
+                 "*_du columns u. The state is not changed: give one whose loops are closed. Where closures are "
+                 "redundant, forces have the least norm.\n"
+                 "Examples:\n"
+                 "  bielle eval bipetto --state state.json --derivatives\n"
+                 "  echo '{\"torques\": {\"crank_joint\": 1}}' | bielle eval fourbar --state -");
   command.callback([&action, arguments] { action = [arguments] { return evaluate(*arguments); }; });
 }
 

@@ -15,7 +15,7 @@
 namespace bielle::cli {
 
 const char* const kStateHelp =
-    "The state is a JSON object; what is left out is neutral, at rest, without torque and in the air:\n"
+    "The state is a JSON object. Defaults: neutral position, zero velocity, zero torque, no contact:\n"
     "  {\"joints\": {\"knee_right\": {\"q\": 0.5, \"v\": 0.1}, \"root_joint\": {\"q\": [0, 0, 0.6, 0, 0, 0, 1]}},\n"
     "   \"torques\": {\"motor_knee_right\": 3.5}, \"contacts\": [\"foot_left\", \"foot_right\"]}\n"
     "Order of the numbers of a joint (SI, rad; quaternions are normalised; one number needs no brackets):\n"
@@ -61,7 +61,8 @@ class StateReader {
   json parse(const std::string& text) const {
     std::vector<std::set<std::string>> keys;
     const auto check = [&](int depth, json::parse_event_t event, json& parsed) {
-      if (depth > kDeepest) fail("document", "it is nested too deep", "write {\"joints\": {...}, \"torques\": {...}}");
+      if (depth > kDeepest)
+        fail("document", "it is nested too deeply", "write {\"joints\": {...}, \"torques\": {...}}");
       if (event == json::parse_event_t::object_start) keys.emplace_back();
       if (event == json::parse_event_t::object_end) keys.pop_back();
       if (event == json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second)
@@ -76,7 +77,7 @@ class StateReader {
   }
 
   void checkKeys(const json& object, const std::string& element, const std::vector<std::string>& known) const {
-    if (!object.is_object()) fail(element, "it is no object", "write {...}");
+    if (!object.is_object()) fail(element, "it is not an object", "write {...}");
     for (const auto& item : object.items())
       if (std::find(known.begin(), known.end(), item.key()) == known.end())
         fail(element, "there is no key '" + item.key() + "'", "the keys are: " + listItems(known));
@@ -84,7 +85,7 @@ class StateReader {
 
   json getObject(const json& state, const char* key) const {
     if (!state.contains(key)) return json::object();
-    if (!state[key].is_object()) fail(std::string("key '") + key + "'", "it is no object", "write {...} by name");
+    if (!state[key].is_object()) fail(std::string("key '") + key + "'", "it is not an object", "write {...} by name");
     return state[key];
   }
 
@@ -156,7 +157,7 @@ class StateReader {
   }
 
   void readContacts(const json& list) {
-    if (!list.is_array()) fail("key 'contacts'", "it is no list", "write [\"name\", ...]");
+    if (!list.is_array()) fail("key 'contacts'", "it is not a list", "write [\"name\", ...]");
     for (const json& item : list) {
       const std::string name = item.is_string() ? item.get<std::string>() : item.dump();
       const int contact = model_.findContact(name);

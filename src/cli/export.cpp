@@ -42,9 +42,9 @@ int exportTrajectory(const ExportArguments& arguments) {
 }  // namespace
 
 void addExport(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("export", "Write a trajectory or a robot in the format of another program");
+  CLI::App& command = *app.add_subcommand("export", "Write a trajectory or a robot in another program's format");
   const auto arguments = std::make_shared<ExportArguments>();
-  command.add_option("source", arguments->robot.name, "directory of `bielle solve`; mjcf: a robot")->required();
+  command.add_option("source", arguments->robot.name, "result directory of `bielle solve`; mjcf: a robot")->required();
   command
       .add_option("--format", arguments->format,
                   "mot: coordinates over time (OpenSim); sto: everything over time (OpenSim); mjcf: the robot (MuJoCo)")
@@ -58,7 +58,7 @@ void addExport(CLI::App& app, Action& action) {
       "PlotJuggler and spreadsheets read it; trajectory.npz holds arrays q and v with Pinocchio's frames and orders "
       "within\n"
       "a joint, and q_names and v_names to sort the joints by.\n"
-      "mjcf: loops are closed by MuJoCo's soft constraints, so stiff that they need its steps of 0.25 ms.\n"
+      "mjcf: loops are closed by MuJoCo's soft constraints, which are so stiff that they need steps of 0.25 ms.\n"
       "Examples:\n"
       "  bielle export squat --format mot\n"
       "  bielle export squat --format sto -o squat.sto\n"

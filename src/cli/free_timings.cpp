@@ -14,7 +14,7 @@ namespace {
 std::pair<std::string, TimingBounds> parseBounds(const std::string& text) {
   const size_t colon = text.rfind(':');
   const char* example = "left foot=0.8:1.2";
-  requireOption(colon != std::string::npos, "free-timings", "'" + text + "' has no two bounds",
+  requireOption(colon != std::string::npos, "free-timings", "'" + text + "' does not have two bounds",
                 std::string("give PHASE=LOWER:UPPER, e.g. '") + example + "'");
   const auto [name, lower] = parseSetting("--free-timings", text.substr(0, colon), example);
   const double upper = parseSetting("--free-timings", name + "=" + text.substr(colon + 1), example).second;
@@ -31,12 +31,12 @@ void addTimingOptions(CLI::App& sub, TimingArguments& arguments) {
            for (const std::string& phase : phases)
              if (!phase.empty()) arguments.phases.push_back(phase);
          },
-         "let the solver choose how long phases last; footholds and paths stay. PHASE=LOWER:UPPER bounds one of "
-         "them [of the nominal duration], `all` those with contacts; alone: all=0.6:1.6")
+         "let the solver choose the durations of phases; footholds and paths stay. PHASE=LOWER:UPPER bounds one phase "
+         "[share of the nominal duration], `all` every phase with contacts; default: all=0.6:1.6")
       ->type_name("PHASE=LOWER:UPPER")
       ->expected(0, -1);
   sub.add_option("--time-weight", arguments.time_weight,
-                 "cost of a second of the phases whose duration is free: the more, the faster the rhythm [1/s]")
+                 "cost per second of the phases whose duration is free; a larger one gives a faster rhythm [1/s]")
       ->capture_default_str();
 }
 
@@ -50,13 +50,13 @@ TimingOptions makeTimings(const TimingArguments& arguments) {
 
 void printTimings(const std::vector<PhaseTiming>& timings) {
   if (timings.empty()) return;
-  std::cout << "durations chosen:\n";
+  std::cout << "chosen durations:\n";
   std::vector<Row> rows;
   const auto format = [](double seconds) { return formatNumber(seconds, "%.3f"); };
   for (const PhaseTiming& timing : timings)
     rows.push_back(
         {timing.phase, format(timing.chosen) + " s",
-         "for " + format(timing.nominal) + ", within " + format(timing.lower) + " .. " + format(timing.upper)});
+         "nominal " + format(timing.nominal) + ", within " + format(timing.lower) + " .. " + format(timing.upper)});
   printTable(std::cout, rows);
 }
 

@@ -18,7 +18,7 @@ void addTimingOptions(CLI::App& sub, TimingArguments& arguments);
 // \throws ModelError when the text of a phase makes no sense
 TimingOptions makeTimings(const TimingArguments& arguments);
 
-// A table of the durations that came out, unless there are none.
+// A table of the chosen durations, unless there are none.
 void printTimings(const std::vector<PhaseTiming>& timings);
 
 }  // namespace bielle::cli

@@ -62,7 +62,7 @@ int generate(const Generator& generator, const GenerateArguments& arguments) {
 }  // namespace
 
 void addGenerate(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("generate", "Write a robot made of named lengths, angles and masses");
+  CLI::App& command = *app.add_subcommand("generate", "Generate a robot from named lengths, angles and masses");
   command.callback([&action] {
     if (!action) throw CLI::RequiredError("A robot");
   });
@@ -71,7 +71,7 @@ void addGenerate(CLI::App& app, Action& action) {
     const auto arguments = std::make_shared<GenerateArguments>();
     sub.add_option("--set", arguments->settings, "NAME=VALUE, may be repeated")->type_name("NAME=VALUE");
     sub.add_option("-o,--output", arguments->directory,
-                   "directory of the robot; its files get its last name, and every command takes it as a robot")
+                   "directory of the robot; its last part names the files, and every command accepts it as a robot")
         ->required();
     sub.footer("Parameters of --set, with default, unit and bounds:\n" + formatParameters(generator) +
                "Example:\n  bielle generate " + generator.name + " -o my_" + generator.name);
@@ -80,8 +80,10 @@ void addGenerate(CLI::App& app, Action& action) {
     });
   }
   command.footer(
-      "Examples:\n  bielle generate cleobot --set upper_length=0.25 -o longer\n  bielle info longer\n"
-      "`bielle generate ROBOT --help` lists what can be set.");
+      "Examples:\n"
+      "  bielle generate cleobot --set upper_length=0.25 -o longer\n"
+      "  bielle info longer\n"
+      "`bielle generate ROBOT --help` lists the parameters.");
 }
 
 }  // namespace bielle::cli

@@ -27,7 +27,7 @@ void printInfo(const Json& robot) {
                               {"motors", count("nu")},
                               {"closure rows", count("closure_rows") + ", rank " + mobility["rank"].dump() + " at " +
                                                    mobility["posture"].get<std::string>() +
-                                                   (mobility["closed"].get<bool>() ? "" : ", which is not closed")},
+                                                   (mobility["closed"].get<bool>() ? "" : ", where loops are open")},
                               {"mobility", mobility["mobility"].dump()}});
   printSection(robot, "joints", "joints", {"name", "kind", "parent", "child", "nq", "nv"});
   printSection(robot, "closures", "closures (gaps in m and rad)",
@@ -42,7 +42,7 @@ void printInfo(const Json& robot) {
                {"name", "body1", "body2", "stiffness", "rest", "preload", "damping"});
   printSection(robot, "contacts", "contacts (length and width in m)", {"name", "kind", "body", "sole"});
   const Json& shapes = robot["shapes"];
-  const std::string title = "least distances of shapes (m), " + shapes["given"].dump() + " of them from the files, " +
+  const std::string title = "least distances between shapes (m), " + shapes["given"].dump() + " from the files, " +
                             shapes["fitted"].dump() + " fitted to visuals";
   printSection(robot, "distances", title.c_str(), {"between", "distance", "body1", "body2", "posture"});
   printSection(robot, "references", "references", {"name", "closed", "message"});
@@ -59,8 +59,8 @@ void addInfo(CLI::App& app, Action& action) {
   command.add_flag("--json", *as_json, "print JSON");
   command.footer(
       "The gap of a closure is given at the neutral configuration and at each reference: the distance of its frames in "
-      "m "
-      "and\nthe angle between them in rad. Warnings about the files go to the standard error.\n"
+      "m and\n"
+      "the angle between them in rad. Warnings about the files are printed on the standard error.\n"
       "Examples:\n"
       "  bielle info bipetto\n"
       "  bielle info path/to/my_robot.urdf --fixed-base --json");

@@ -65,7 +65,7 @@ int run(const LiftArguments& arguments) {
                      "make one with `bielle solve " + summary.motion + " --model serial`");
   if (summary.step != StepRule::Euler)
     throw ModelError(summary.file, std::string("step '") + getName(summary.step) + "'",
-                     "only motions of Euler steps, whose accelerations belong to their nodes, are lifted",
+                     "only motions with Euler steps, which have accelerations at their nodes, can be lifted",
                      "make one with `bielle solve " + summary.motion + " --model serial --step euler`");
   const MotionRecord record = readRecord((fs::path(arguments.serial_directory) / "trajectory.npz").string());
   RobotArgument robot_argument;
@@ -97,12 +97,12 @@ int run(const LiftArguments& arguments) {
 }  // namespace
 
 void addLift(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("lift", "Carry a motion of the serial model over to the closed robot");
+  CLI::App& command = *app.add_subcommand("lift", "Lift a motion of the serial model to the closed robot");
   const auto arguments = std::make_shared<LiftArguments>();
   command.add_option("DIR", arguments->serial_directory, "result of `bielle solve MOTION --model serial`")->required();
   command
       .add_option("-o,--output", arguments->directory,
-                  "directory for lift.json, trajectory.csv, trajectory.npz and summary.json; made if need be")
+                  "directory for lift.json, trajectory.csv, trajectory.npz and summary.json; created if necessary")
       ->required();
   command
       .add_option_function<std::string>(
@@ -110,26 +110,28 @@ void addLift(CLI::App& app, Action& action) {
           [arguments](const std::string& name) {
             arguments->options.method = name == "nlopt" ? LiftMethod::Nlopt : LiftMethod::Newton;
           },
-          "newton: each node by itself, torques from inverse dynamics; nlopt: one step of the closed dynamics after "
-          "the "
-          "other, torques by SLSQP, as in the paper's appendix")
+          "newton: each node separately, torques from inverse dynamics; nlopt: one step of the closed dynamics after "
+          "the other, torques by SLSQP, as in the paper's appendix")
       ->check(CLI::IsMember({"newton", "nlopt"}))
       ->default_str("newton");
   command.add_option("--singular", arguments->options.singular, "margin below which a linkage is at a dead point [1]")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  command.add_option("--position-tolerance", arguments->options.position_tolerance, "of nlopt's states [rad, m]")
+  command
+      .add_option("--position-tolerance", arguments->options.position_tolerance,
+                  "tolerance of nlopt's positions [rad, m]")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command.add_option("--velocity-tolerance", arguments->options.velocity_tolerance, "of nlopt's states [rad/s, m/s]")
+  command
+      .add_option("--velocity-tolerance", arguments->options.velocity_tolerance,
+                  "tolerance of nlopt's velocities [rad/s, m/s]")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command.footer(
-      "The closed robot takes the postures, velocities and accelerations of the serial one where its linkages can; "
-      "motor\n"
-      "torques follow. A lift that fails says at which node and why, and writes what was lifted. Exit status: 0 "
-      "lifted,\n"
-      "1 not lifted, 2 bad input.\n"
+      "The closed robot takes on the serial model's postures, velocities and accelerations wherever its linkages "
+      "allow;\n"
+      "motor torques follow from these. A failed lift reports the node and the reason, and writes the lifted part.\n"
+      "Exit status: 0 lifted, 1 not lifted, 2 bad input.\n"
       "Examples:\n"
       "  bielle solve squat --robot bipetto --depth 0.8 --model serial -o serial\n"
       "  bielle lift serial -o lifted\n"

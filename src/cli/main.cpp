@@ -42,7 +42,7 @@ int run(int argc, char** argv) {
   if (first == "validate" || first == "check" || first == "simulate")
     return becomeCompanion("bielle-" + first, argv + 1);
 
-  CLI::App app{"Legged robots driven through linkages: their dynamics, and motions by optimal control."};
+  CLI::App app{"Legged robots driven through linkages: dynamics, and motions by optimal control."};
   app.name("bielle");
   app.set_version_flag("--version", describeVersion());
   app.footer(

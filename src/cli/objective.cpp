@@ -16,16 +16,15 @@ void addObjectiveOptions(CLI::App& sub, ObjectiveOptions& options) {
            for (Objective objective : objectives)
              if (name == getName(objective)) options.objective = objective;
          },
-         "effort: weighted squares; energy: least electrical energy of the motors; peak-torque: least largest torque "
-         "over its limit. The last two start from the motion of least effort")
+         "effort: weighted squares; energy: electrical energy of the motors; peak-torque: largest ratio of a torque to "
+         "its limit. The last two start from the motion of least effort")
       ->check(CLI::IsMember(names))
       ->default_str(getName(options.objective));
   sub.add_option("--regeneration", options.regeneration,
-                 "share of the electrical energy that flows back from a motor which is used again [1]")
+                 "share of the regenerated electrical energy that is reused [1]")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  sub.add_option("--regularization", options.regularization,
-                 "share of the other costs that remains; 0.2 unless given [1]")
+  sub.add_option("--regularization", options.regularization, "share of the other costs that is kept; default: 0.2 [1]")
       ->check(CLI::PositiveNumber);
 }
 

@@ -76,7 +76,7 @@ void addRatio(CLI::App& app, Action& action) {
   command.add_option("ROBOT", arguments->robot.name, "name, directory, .urdf or MuJoCo .xml file")->required();
   command
       .add_option("--joint", arguments->joints,
-                  "joint that is swept; then the others of its linkage, unless the robot's serial joints tell them")
+                  "joint to sweep; then the other joints of its linkage, unless the robot's serial joints name them")
       ->required();
   command.add_option("--reference", arguments->reference, "start from this reference of the robot; default: the first");
   command.add_option("-o,--output", arguments->directory,
@@ -84,7 +84,9 @@ void addRatio(CLI::App& app, Action& action) {
   command.add_option("--step", arguments->sweep.step, "largest step along the linkage, all its joints together [rad]")
       ->check(CLI::Range(1e-4, 0.2))
       ->capture_default_str();
-  command.add_option("--grid", arguments->grid, "angles of the first joint in the map of a linkage with two motors")
+  command
+      .add_option("--grid", arguments->grid,
+                  "number of angles of the first joint in the map of a linkage with two motors")
       ->check(CLI::Range(2, 500))
       ->capture_default_str();
   command.add_flag("--json", arguments->json, "print JSON");
@@ -92,17 +94,16 @@ void addRatio(CLI::App& app, Action& action) {
   command.footer(
       "The ratio R is the speed of a motor over that of a joint [rad/rad], v_motor = R v_joint; motor torques u give "
       "the\n"
-      "joint torques R^T u. dR is its derivative with respect to the angle that is swept [1/rad]. The linkage is "
-      "followed\n"
+      "joint torques R^T u. dR is its derivative with respect to the swept angle [1/rad]. The linkage is followed\n"
       "from its start until a joint limit, a loss of rank, or a full turn, through its dead points:\n"
-      "  joint  the joint stands still while the motor turns: R is infinite, the angle turns back, another branch "
+      "  joint  the joint stands still while the motor turns: R is infinite, the angle reverses, another branch "
       "begins\n"
       "  motor  the motor stands still while the joint turns: R is zero (singular), the motor does not hold the joint\n"
       "A linkage with two motors gets a 2 x 2 R, its condition number, and a map over both joints, up to the first "
       "dead\n"
       "points. Virtual work is checked by the constrained dynamics of the whole robot at every sample. Figures are "
       "drawn\n"
-      "by gnuplot, if there is one. Exit status: 0 done, 1 the virtual work does not balance, 2 bad input.\n"
+      "by gnuplot, if installed. Exit status: 0 done, 1 virtual work does not balance, 2 bad input.\n"
       "Examples:\n"
       "  bielle ratio bipetto --joint knee_right\n"
       "  bielle ratio bipetto --joint ankley_right -o ankle\n"

@@ -162,7 +162,7 @@ void printReport(std::ostream& out, const RatioReport& report) {
                        formatNumber(low, "%.6f") + " to " + formatNumber(high, "%.6f") + " (rad, or m), first branch"},
                       {"ends", sweep.full_turn ? "none: a full turn" : ends},
                       {"dead points", std::to_string(sweep.getDeadPoints().size())},
-                      {"virtual work", "off by " + formatNumber(report.balance_error, "%.1e") + " at most, relative"}});
+                      {"virtual work", "largest relative error " + formatNumber(report.balance_error, "%.1e")}});
   out << "\nratio R = motor speed / joint speed" << (report.linkage.isDirect() ? ": the motor sits on the joint" : "")
       << "\n";
   printSamples(out, report.linkage, thinOut(sweep.samples), sweep.joint);

@@ -47,7 +47,7 @@ void readSize(const std::string& text, FilmOptions& film) {
   char rest = 0;
   if (std::sscanf(text.c_str(), "%dx%d%c", &film.width, &film.height, &rest) != 2 || film.width < 16 ||
       film.height < 16 || film.width > 8192 || film.height > 8192)
-    throw ModelError("", "--size '" + text + "'", "it is not of the form WIDTHxHEIGHT, from 16 to 8192 pixels",
+    throw ModelError("", "--size '" + text + "'", "it is not of the form WIDTHxHEIGHT with 16 to 8192 pixels each",
                      "e.g. --size 640x480");
 }
 
@@ -74,23 +74,26 @@ int writePages(const ReportArguments& arguments) {
 }
 
 void addFilmOptions(CLI::App& command, ReportArguments& arguments) {
-  const std::string layers = " (locks, contactForces, closureForces, com, traces, footprints, plan, push; with commas)";
-  command.add_option("--png", arguments.png, "also draws still pictures, side by side in this file; needs chromium");
-  command.add_option("--times", arguments.film.times, "of the pictures [s], with commas; default: six over the motion")
+  const std::string layers =
+      " (locks, contactForces, closureForces, com, traces, footprints, plan, push; separated by commas)";
+  command.add_option("--png", arguments.png, "also draw still pictures, side by side in this file; needs chromium");
+  command
+      .add_option("--times", arguments.film.times,
+                  "times of the pictures [s], separated by commas; default: six over the motion")
       ->delimiter(',')
       ->check(CLI::NonNegativeNumber);
   command.add_option("--columns", arguments.film.columns, "pictures in a row; default: all, at most six")
       ->check(CLI::Range(1, 100));
-  command.add_option("--mp4", arguments.mp4, "also makes a film in real time; needs chromium and ffmpeg");
-  command.add_option("--rate", arguments.rate, "of the film [1/s]")
+  command.add_option("--mp4", arguments.mp4, "also make a film in real time; needs chromium and ffmpeg");
+  command.add_option("--rate", arguments.rate, "frame rate of the film [1/s]")
       ->check(CLI::Range(1.0, 240.0))
       ->capture_default_str();
-  command.add_option("--size", arguments.size, "of one picture, pixels")->capture_default_str();
-  command.add_option("--view", arguments.film.view, "from where")
+  command.add_option("--size", arguments.size, "size of one picture [pixels]")->capture_default_str();
+  command.add_option("--view", arguments.film.view, "direction of view")
       ->check(CLI::IsMember({"oblique", "front", "side", "top"}))
       ->capture_default_str();
-  command.add_flag("--ghosts", arguments.ghosts, "several robots in one place, not side by side");
-  command.add_flag("--see-through", arguments.film.see_through, "bodies are transparent");
+  command.add_flag("--ghosts", arguments.ghosts, "show several robots in one place, not side by side");
+  command.add_flag("--see-through", arguments.film.see_through, "make bodies transparent");
   command.add_option("--show", arguments.film.show, "layers to show" + layers);
   command.add_option("--hide", arguments.film.hide, "layers to hide");
 }
@@ -100,11 +103,12 @@ void addFilmOptions(CLI::App& command, ReportArguments& arguments) {
 void addReport(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("report", "Show results as a page: replay in 3D, plots, tables");
   const auto arguments = std::make_shared<ReportArguments>();
-  command.add_option("directories", arguments->directories, "of `bielle solve`; several are compared")->required();
+  command.add_option("directories", arguments->directories, "results of `bielle solve`; several are compared")
+      ->required();
   command.add_option("-o,--output", arguments->output, "the page; default: report.html in the first directory");
   addFilmOptions(command, *arguments);
   command.footer(
-      "The page holds all it needs: open it with a browser, send it to others, no network. Space plays and pauses.\n"
+      "The page is self-contained: open it with any browser, without a network. Space plays and pauses.\n"
       "Examples:\n"
       "  bielle report squat\n"
       "  bielle report squat-closed squat-serial -o comparison.html\n"

@@ -13,7 +13,7 @@ int listKnownRobots() {
   for (const std::string& name : listRobots()) rows.push_back({name, findRobotFile(name)});
   printTable(std::cout, rows, "");
   if (!rows.empty()) return kOk;
-  std::cerr << "bielle: no robot was found in:\n";
+  std::cerr << "bielle: no robots found in:\n";
   for (const std::string& directory : directories) std::cerr << "  " << directory << "\n";
   return kFailed;
 }
@@ -23,7 +23,7 @@ int listKnownRobots() {
 void addRobots(CLI::App& app, Action& action) {
   CLI::App& command = *app.add_subcommand("robots", "List the robots known by name");
   command.footer(
-      "Robots are looked for in the directories of $BIELLE_ROBOTS (separated by colons), then in those of Bielle.\n"
+      "Robots are sought in the directories of $BIELLE_ROBOTS (separated by colons), then in those of Bielle.\n"
       "Examples:\n"
       "  bielle robots\n"
       "  BIELLE_ROBOTS=$HOME/robots bielle robots");

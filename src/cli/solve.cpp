@@ -46,7 +46,7 @@ LimitOptions makeLimits(const SolveArguments& arguments) {
     limits.velocities.insert(parseSetting("--velocity-limit", setting, "motor_knee_right=15"));
   for (const std::string& setting : arguments.power_limits)
     limits.powers.insert(parseSetting("--power-limit", setting, "motor_knee_right=40"));
-  requireOption(limits.enforced || !limits.areGiven(), "no-limits", "it contradicts a limit given for a motor",
+  requireOption(limits.enforced || !limits.areGiven(), "no-limits", "it contradicts the limit given for a motor",
                 "leave out one of them");
   return limits;
 }
@@ -63,9 +63,9 @@ std::string formatOptionList(const MotionEntry& motion) {
 
 std::string formatConstraints(const FddpSummary& solver) {
   if (solver.penalty == 0) return "none";
-  if (solver.violation == 0 && solver.multiplier == 0) return "kept, none binds";
+  if (solver.violation == 0 && solver.multiplier == 0) return "satisfied, none active";
   const std::string violation = formatNumber(solver.violation, "%.1e");
-  return (solver.violation > 0 ? "violated by " + violation + " at most" : std::string("kept")) +
+  return (solver.violation > 0 ? "violated by at most " + violation : std::string("satisfied")) +
          ", largest multiplier " + formatNumber(solver.multiplier, "%.3g") + " after " +
          std::to_string(solver.multiplier_updates) + " updates";
 }
@@ -90,20 +90,19 @@ void printResult(const Model& model, const MotionResult& result, const std::vect
   std::cout << "\n" << result.motion << " of " << result.run.robot << ": " << getName(solver.termination);
   if (!solver.message.empty()) std::cout << " (" << solver.message << ")";
   std::cout << "\n";
-  std::vector<Row> goals;
-  for (const GoalOutcome& outcome : result.goals) goals.push_back({outcome.goal.name, formatOutcome(outcome)});
-  printTable(std::cout, goals);
-  printTable(std::cout,
-             std::vector<Row>{{"cost", formatNumber(solver.cost, "%.6f")},
-                              {"iterations", std::to_string(solver.iterations)},
-                              {"time", formatNumber(solver.seconds, "%.2f") + " s"},
-                              {"centre of mass", formatNumber(result.com_start, "%.4f") + " m high, lowest at " +
-                                                     formatNumber(result.com_lowest, "%.4f") + " m"},
-                              {"constraints", formatConstraints(solver)},
-                              {"closure gap", pair(result.gap_position, result.gap_angle)},
-                              {"contact slip", pair(result.slip_position, result.slip_angle)},
-                              {makeTorqueLabel(model), torques},
-                              {"electrical energy", formatEnergy(result.energy)}});
+  std::vector<Row> rows;
+  for (const GoalOutcome& outcome : result.goals) rows.push_back({outcome.goal.name, formatOutcome(outcome)});
+  rows.insert(rows.end(), {{"cost", formatNumber(solver.cost, "%.6f")},
+                           {"iterations", std::to_string(solver.iterations)},
+                           {"time", formatNumber(solver.seconds, "%.2f") + " s"},
+                           {"centre of mass", formatNumber(result.com_start, "%.4f") + " m high, lowest at " +
+                                                  formatNumber(result.com_lowest, "%.4f") + " m"},
+                           {"constraints", formatConstraints(solver)},
+                           {"closure gap", pair(result.gap_position, result.gap_angle)},
+                           {"contact slip", pair(result.slip_position, result.slip_angle)},
+                           {makeTorqueLabel(model), torques},
+                           {"electrical energy", formatEnergy(result.energy)}});
+  printTable(std::cout, rows);
   printTimings(result.timings);
   for (const std::string& path : paths) std::cout << "  " << path << "\n";
 }
@@ -115,7 +114,7 @@ void addReport(const std::string& directory) {
     writeReport(path, {directory});
     std::cout << "  " << path << "\n";
   } catch (const std::exception& error) {
-    std::cerr << "bielle: warning: no report was written: " << error.what() << "\n";
+    std::cerr << "bielle: warning: the report could not be written: " << error.what() << "\n";
   }
 }
 
@@ -123,7 +122,7 @@ void addReport(const std::string& directory) {
 void warnOfMissedGoals(const MotionResult& result) {
   std::cout.flush();
   for (const GoalOutcome& outcome : result.goals)
-    if (!outcome.met()) std::cerr << "bielle: warning: " << outcome.goal.name << " " << formatOutcome(outcome) << "\n";
+    if (!outcome.met()) std::cerr << "bielle: warning: " << outcome.goal.name << ": " << formatOutcome(outcome) << "\n";
 }
 
 // Lists everything that the serial model omits.
@@ -138,7 +137,7 @@ void printSerialModel(const SerialModel& serial) {
   std::vector<Row> rows = {{"frozen", join(serial.frozen_joints)}, {"dropped", join(serial.dropped_closures)}};
   for (const SerialModel::Replacement& replacement : serial.replacements)
     rows.push_back({"motors", join(replacement.motors) + " -> " + join(replacement.joints)});
-  if (!serial.dropped_targets.empty()) rows.push_back({"targets", join(serial.dropped_targets) + " (not asked for)"});
+  if (!serial.dropped_targets.empty()) rows.push_back({"targets", join(serial.dropped_targets) + " (not used)"});
   printTable(std::cout, rows);
   std::cout << "\n";
 }
@@ -149,8 +148,8 @@ bool checkResult(const std::string& directory) {
   if (!status)
     std::cout << "  not checked: bielle-check is not built (-DBIELLE_BUILD_VALIDATION=ON)\n";
   else if (*status != kOk && *status != kFailed)
-    std::cerr << "bielle: error: " << directory << ": bielle-check broke off with status " << *status
-              << "; see what it said, `bielle check " << directory << "` tries again" << std::endl;
+    std::cerr << "bielle: error: " << directory << ": bielle-check failed with status " << *status
+              << "; see its message, and run `bielle check " << directory << "` to retry" << std::endl;
   return !status || *status == kOk;
 }
 
@@ -228,11 +227,10 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
   LimitOptions& limits = arguments->problem.limits;
   sub.add_flag_callback(
       "--no-limits", [&limits] { limits.enforced = false; },
-      "ignore the robot's limits of torques, joint ranges and velocities, which motions keep otherwise");
-  sub.add_option(
-         "--dead-point-margin", limits.dead_point_margin,
-         "least transmission of a linkage, the speeds of its joints per speeds of its motors, as a share of that at "
-         "the start; its inverse is the largest; 0: none")
+      "ignore the robot's limits of torque, joint range and velocity, which motions otherwise respect");
+  sub.add_option("--dead-point-margin", limits.dead_point_margin,
+                 "least transmission of a linkage (joint speed over motor speed), relative to that at the start; the "
+                 "largest is its inverse; 0: no bounds")
       ->capture_default_str();
   // Lets scripts run that name a kind of barrier: limits are kept by constraints. No group: --help leaves it out.
   sub.add_option_function<std::string>("--limits",
@@ -240,9 +238,10 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
       ->check(CLI::IsMember({"none", "quadratic", "log"}))
       ->group("");
   sub.add_option("--limit", arguments->effort_limits,
-                 "motor=largest torque [N m] in place of the robot's; may be repeated")
+                 "motor=largest torque [N m], instead of the robot's; may be repeated")
       ->allow_extra_args(false);
-  sub.add_option("--velocity-limit", arguments->velocity_limits, "motor=largest velocity [rad/s], likewise")
+  sub.add_option("--velocity-limit", arguments->velocity_limits,
+                 "motor=largest velocity [rad/s], instead of the robot's; may be repeated")
       ->allow_extra_args(false);
   sub.add_option("--power-limit", arguments->power_limits,
                  "motor=largest mechanical power [W], driving or braking; may be repeated")
@@ -252,7 +251,7 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
 void addOutput(CLI::App& sub, const std::shared_ptr<SolveArguments>& arguments) {
   sub.add_option("--robot", arguments->robot.name, "name, directory, .urdf or MuJoCo .xml file")->required();
   sub.add_option("-o,--output", arguments->directory,
-                 "directory for trajectory.csv, trajectory.npz, summary.json and report.html; made if need be")
+                 "directory for trajectory.csv, trajectory.npz, summary.json and report.html; created if necessary")
       ->required();
 }
 
@@ -266,7 +265,8 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
            arguments->problem.formulation =
                name == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
          },
-         "reduced: loops are closed at every node; full: all joints of the spanning tree, closures by accelerations")
+         "reduced: loops are closed at every node; full: all joints of the spanning tree, loops closed by "
+         "accelerations")
       ->check(CLI::IsMember({getName(Formulation::Full), getName(Formulation::Reduced)}))
       ->default_str(getName(arguments->problem.formulation));
   sub.add_option_function<std::string>(
@@ -274,23 +274,23 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
          [arguments](const std::string& name) {
            arguments->step = name == getName(StepRule::Euler) ? StepRule::Euler : StepRule::Midpoint;
          },
-         "midpoint: steps of second order; euler: of first order, as in the paper. If none is given, published "
-         "problems and --model serial take euler")
+         "midpoint: second-order steps; euler: first-order steps, as in the paper. Published problems and --model "
+         "serial use euler unless a rule is given")
       ->check(CLI::IsMember({getName(StepRule::Euler), getName(StepRule::Midpoint)}))
       ->default_str(getName(StepRule::Midpoint));
   sub.add_option_function<std::string>(
          "--model", [arguments](const std::string& name) { arguments->serial = name == "serial"; },
-         "closed: with its linkages; serial: linkages frozen at the standing posture, motors on the serial joints")
+         "closed: with linkages; serial: linkages frozen at the standing posture, motors on the serial joints")
       ->check(CLI::IsMember({"closed", "serial"}))
       ->default_str("closed");
   sub.add_option("--serial-armature", arguments->serial_armature,
-                 "of the motors on serial joints [kg m^2], or `reflected`: what the rotors weigh there at the standing "
-                 "posture")
+                 "armature of the motors on serial joints [kg m^2], or `reflected`: the rotors' inertia seen there at "
+                 "the standing posture")
       ->capture_default_str();
   addLimitOptions(sub, arguments);
   addTimingOptions(sub, arguments->timings);
   addObjectiveOptions(sub, arguments->problem.objective);
-  sub.add_option("--max-iterations", arguments->solver.max_iterations, "the solver stops there")
+  sub.add_option("--max-iterations", arguments->solver.max_iterations, "largest number of iterations")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   sub.add_option_function<std::string>(
@@ -300,25 +300,24 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
                                                             ? Inequalities::InteriorPoint
                                                             : Inequalities::AugmentedLagrangian;
          },
-         "how the solver keeps those constraints that are not equations")
+         "how the solver enforces inequality constraints")
       ->check(CLI::IsMember({getName(Inequalities::AugmentedLagrangian), getName(Inequalities::InteriorPoint)}))
       ->default_str(getName(arguments->solver.constraints.inequalities));
-  sub.add_option("--threads", arguments->solver.threads, "0: all; results do not depend on it")
+  sub.add_option("--threads", arguments->solver.threads, "number of threads; 0: all; results do not depend on it")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   sub.add_option("--warm-start", arguments->warm_start,
-                 "directory of another result of this robot to start from, resampled if its length differs");
-  sub.add_flag("--quiet", arguments->quiet, "no line per iteration");
-  sub.add_flag("--no-report", arguments->no_report, "no report.html");
+                 "directory of another result of this robot as the initial guess, resampled if its length differs");
+  sub.add_flag("--quiet", arguments->quiet, "do not print a line per iteration");
+  sub.add_flag("--no-report", arguments->no_report, "do not write report.html");
   sub.add_flag("--no-check", arguments->no_check, "do not run `bielle check` on the result");
 }
 
 constexpr const char* kOutcome =
-    "Ctrl-C stops the solver; the iterate it has by then is written, and marked as interrupted. Exit status: 0 "
-    "converged\nand checked, 1 not converged, or the check failed or broke off (results are written all the same), 2 "
-    "bad input.\nA goal that is missed (what came out differs from what was asked) does not change the status; a "
-    "warning "
-    "says so at the end.";
+    "Ctrl-C stops the solver; its last iterate is written and marked as interrupted. Exit status: 0 converged and\n"
+    "checked, 1 not converged, or the check failed or did not finish (results are written all the same), 2 bad input.\n"
+    "A missed goal (achieved and requested values differ by more than its tolerance) does not change the status; a\n"
+    "warning at the end reports it.";
 
 void addMotion(CLI::App& command, const MotionEntry& motion, Action& action) {
   CLI::App& sub = *command.add_subcommand(motion.name, motion.help);
@@ -351,19 +350,21 @@ void addSequence(CLI::App& command, Action& action) {
     names.push_back(motion.name);
     known += (known.empty() ? "" : ", ") + motion.name;
   }
-  sub.add_option("--motions", *motions, "in order, with commas between them: " + known + "; one may come again")
+  sub.add_option("--motions", *motions, "in order, separated by commas: " + known + "; a motion may be repeated")
       ->delimiter(',')
       ->check(CLI::IsMember(names).description(""))
       ->capture_default_str();
   addSolverOptions(sub, arguments);
-  sub.footer(
-      std::string("Options of --set are those of the motions (`bielle solve MOTION --help`) after their names, as "
-                  "walk.speed;\nwhere a motion comes again it is walk2, walk3 and so on. Each motion starts where the "
-                  "one before ends.\nEach is solved by itself first, which makes the guess for the whole, unless "
-                  "--warm-start gives one.\nExamples:\n  ") +
-      kSequenceExample +
-      "\n  bielle solve sequence --robot bipetto --motions walk,turn,walk --set walk2.speed=0.3 -o " + "there\n" +
-      kOutcome);
+  sub.footer(std::string(
+                 "Options of --set are those of the motions (`bielle solve MOTION --help`), prefixed by their names: "
+                 "walk.speed.\n"
+                 "A repeated motion is called walk2, walk3 and so on. Each motion starts where the previous one ends.\n"
+                 "Each is first solved separately to make the guess for the whole, unless --warm-start gives one.\n"
+                 "Examples:\n"
+                 "  ") +
+             kSequenceExample +
+             "\n  bielle solve sequence --robot bipetto --motions walk,turn,walk --set walk2.speed=0.3 -o " +
+             "there\n" + kOutcome);
   sub.callback(
       [&action, arguments, motions] { action = [=] { return solve(*arguments, makeSequenceRequest(*motions)); }; });
 }
@@ -382,7 +383,7 @@ void addSolve(CLI::App& app, Action& action) {
   }
   addSequence(command, action);
   examples += std::string("  ") + kSequenceExample + "\n";
-  command.footer(examples + "`bielle solve MOTION --help` lists what can be set.");
+  command.footer(examples + "`bielle solve MOTION --help` lists the options.");
 }
 
 }  // namespace bielle::cli

@@ -74,7 +74,7 @@ int run(const StudyArguments& arguments) {
 }  // namespace
 
 void addStudy(CLI::App& app, Action& action) {
-  CLI::App& command = *app.add_subcommand("study", "The paper's comparison of closed and serial models, done again");
+  CLI::App& command = *app.add_subcommand("study", "Reproduce the paper's comparison of closed and serial models");
   const auto arguments = std::make_shared<StudyArguments>();
   std::vector<std::string> names = {"all"};
   std::string list;
@@ -95,24 +95,24 @@ void addStudy(CLI::App& app, Action& action) {
       ->check(CLI::IsMember(names));
   command.add_option("-o,--output", arguments->directory, "directory for NAME.csv, NAME.md, figures and cases/")
       ->capture_default_str();
-  addTaskOptions(command, "cases at a time, one process each", arguments->tasks);
+  addTaskOptions(command, "cases at a time, each in its own process", arguments->tasks);
   command
       .add_option("--robot", arguments->robot,
                   "name, directory, .urdf or MuJoCo .xml file of a robot with an approximate serial model")
       ->capture_default_str();
   command.add_option("--values", arguments->values, "values of the parameter of one study, instead of its own");
-  command.footer(
-      "Studies:\n" + list +
-      "Every motion is made twice: by the closed model, and by the approximate serial one, lifted to the closed model "
-      "afterwards.\nA case is a process of its own. Cases that have been done are kept: after Ctrl-C, a crash or a "
-      "change of "
-      "--values,\nthe same command does what is missing. A motion that does not converge or cannot be lifted is a "
-      "result.\n"
-      "Exit status: 0 done, 1 interrupted or a case broke down, 2 bad input.\n"
-      "Examples:\n"
-      "  bielle study squat -o study --jobs 2\n"
-      "  bielle study squat --values 0.6 0.62 0.64\n"
-      "  bielle study all");
+  command.footer("Studies:\n" + list +
+                 "Every motion is solved twice: with the closed model, and with the approximate serial model, then "
+                 "lifted to the closed\n"
+                 "one. Each case runs in its own process. Finished cases are kept: after Ctrl-C, a crash or a change "
+                 "of --values,\n"
+                 "run the same command again for the missing ones. A motion that does not converge or cannot be lifted "
+                 "is a result.\n"
+                 "Exit status: 0 done, 1 interrupted or a case failed, 2 bad input.\n"
+                 "Examples:\n"
+                 "  bielle study squat -o study --jobs 2\n"
+                 "  bielle study squat --values 0.6 0.62 0.64\n"
+                 "  bielle study all");
   command.callback([&action, arguments] { action = [=] { return run(*arguments); }; });
 }
 

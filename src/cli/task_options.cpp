@@ -23,7 +23,7 @@ int readPort(const std::string& text) {
   const bool is_number = !text.empty() && text.size() <= 5 && text.find_first_not_of("0123456789") == std::string::npos;
   const int port = is_number ? std::stoi(text) : 0;
   if (port < 1 || port > kMostPort)
-    throw ModelError("", "--workers " + text, "it is no port", "give 1 to 65535, or auto for any that is free");
+    throw ModelError("", "--workers " + text, "it is not a port", "give 1 to 65535, or auto for any free port");
   return port;
 }
 
@@ -39,12 +39,11 @@ TaskArguments::TaskArguments() : jobs(static_cast<int>(std::max(1u, std::thread:
 
 void addTaskOptions(CLI::App& command, const std::string& jobs_help, TaskArguments& arguments) {
   command.add_option("--jobs", arguments.jobs, jobs_help)->check(CLI::Range(1, 1024))->capture_default_str();
-  CLI::Option* workers = command.add_option("--workers", arguments.workers,
-                                            "port, or auto for a free one, where workers of Work Queue "
-                                            "(work_queue_worker HOST PORT) join from any machine to "
-                                            "do what is to be done, instead of processes here");
-  command.add_option("--password", arguments.password, "file with the password that the workers have to know")
-      ->needs(workers);
+  CLI::Option* workers =
+      command.add_option("--workers", arguments.workers,
+                         "port, or auto for a free one, at which Work Queue workers on any machine (work_queue_worker "
+                         "HOST PORT) connect to run the tasks, instead of local processes");
+  command.add_option("--password", arguments.password, "file with the workers' password")->needs(workers);
 }
 
 std::unique_ptr<tasks::TaskEngine> makeTaskEngine(const TaskArguments& arguments) {
@@ -54,13 +53,13 @@ std::unique_ptr<tasks::TaskEngine> makeTaskEngine(const TaskArguments& arguments
     throw ModelError(arguments.password, "file", "it is empty", "write a password into it");
   const std::string program = findCompanion("bielle-workers");
   if (program.find('/') == std::string::npos)
-    throw ModelError("", program, "it is not beside this program",
+    throw ModelError("", program, "it is not installed beside this program",
                      "install the packages coop-computing-tools and coop-computing-tools-dev, and build Bielle again");
   auto engine = std::make_unique<tasks::WorkerTasks>(tasks::WorkerOptions{program, port, arguments.password});
-  std::cerr << "workers join by: work_queue_worker " << (arguments.password.empty() ? "" : "--password FILE ")
+  std::cerr << "start workers with: work_queue_worker " << (arguments.password.empty() ? "" : "--password FILE ")
             << getHost() << " " << engine->port() << std::endl;
   if (arguments.password.empty())
-    std::cerr << "bielle: warning: without --password whoever reaches this port can take tasks and return results"
+    std::cerr << "bielle: warning: without --password anyone who reaches this port can take tasks and return results"
               << std::endl;
   return engine;
 }

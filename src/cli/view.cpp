@@ -33,7 +33,7 @@ void addView(CLI::App& app, Action& action) {
   addFixedBase(command, arguments->robot);
   command.add_option("-o,--output", arguments->output, "the page; default: NAME.html here");
   command.footer(
-      "The loops close as the sliders move, from samples computed beforehand; the page says where they cannot.\n"
+      "The loops close as the sliders move, from precomputed samples; the page reports where they cannot close.\n"
       "Examples:\n"
       "  bielle view bipetto\n"
       "  bielle view robots/fourbar -o fourbar.html");

@@ -209,7 +209,7 @@ std::string Estimator::getMessage() const {
     case EstimatorStatus::NearDeadPoint:
       return "the linkage of closure '" + parts_->joints.getWeakest() + "' is near a dead point of its motors";
     case EstimatorStatus::NotClosed:
-      return "the loops do not close at the positions of the motors";
+      return "the loops do not close at the motors' positions";
     case EstimatorStatus::NotFinite:
       return "readings are not finite";
   }

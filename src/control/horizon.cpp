@@ -34,7 +34,7 @@ class MotionHorizon : public Horizon {
     if (problem_.formulation() != Formulation::Reduced || problem_.hasFreeTimings())
       throw std::invalid_argument("PredictiveController: the problem is not reduced, or its durations are free");
     if (static_cast<int>(plan.us.size()) != last_)
-      throw std::invalid_argument("PredictiveController: the plan is not one of the motion");
+      throw std::invalid_argument("PredictiveController: the plan does not belong to the motion");
     double time = 0;
     for (int k = 0; k < problem_.numStages(); ++k) {
       starts_.push_back(time);
@@ -161,7 +161,8 @@ Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOp
   const size_t copies = static_cast<size_t>(options.nodes);
   const StageSpec last = *(plan.stages.end() - 2);
   if (last.kind != StageKind::Dynamics)
-    throw ModelError(model.name(), "motion '" + plan.name + "'", "it ends with an impact", "let it end standing");
+    throw ModelError(model.name(), "motion '" + plan.name + "'", "it ends with an impact",
+                     "let it end with the robot standing");
   plan.stages.insert(plan.stages.end() - 1, copies, last);
   plan.schedule.phases.back().nodes += options.nodes;
   plan.guess.xs.insert(plan.guess.xs.end(), copies, VectorXd(plan.guess.xs.back()));

@@ -59,8 +59,8 @@ PassiveJoints::PassiveJoints(const Model& model, ConstVectorRef q) : model_(mode
     const int motor = model.findMotor(joint.name);
     if (joint.kind == JointKind::FreeFlyer && i == 1) continue;
     if (motor < 0)
-      throw ModelError(model.name(), "joint '" + joint.name + "'", "no motor determines where it is",
-                       "an estimator needs a motor, or a linkage that follows motors");
+      throw ModelError(model.name(), "joint '" + joint.name + "'", "no motor determines its position",
+                       "an estimator needs a motor, or a linkage driven by motors");
     places_[joint.idx_v] = {-1, motor};
   }
   reset(q);

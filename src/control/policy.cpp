@@ -18,7 +18,7 @@ double getMiddle(const Policy::Stage& stage) { return stage.start + 0.5 * stage.
 std::vector<Policy::Stage> makeStages(const Motion& motion, const ShootingTrajectory& trajectory,
                                       const LqSweep* sweep) {
   const RobotProblem& problem = *motion.problem;
-  if (problem.hasFreeTimings()) throw std::invalid_argument("makePolicy: durations of the motion are free");
+  if (problem.hasFreeTimings()) throw std::invalid_argument("makePolicy: the motion has free durations");
   const Model& model = problem.model();
   NodeEvaluator evaluator(problem);
   std::vector<Policy::Stage> stages;

@@ -14,7 +14,7 @@ class WindowPlanner {
   struct Request {
     int stage = 0;
     Measurement measurement;
-    VectorXd u;  // nu, asked for at this instant
+    VectorXd u;  // nu, required at this instant
   };
   // A policy for the stages that follow.
   struct Solution {

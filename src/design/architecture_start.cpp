@@ -64,7 +64,7 @@ void readNames(const std::vector<ObjectiveTerm>& objective, const std::vector<De
     if (named.empty())
       throw ModelError(model.name(), std::string("constraints: ") + getName(constraint.measure),
                        "none of the motors has such a limit",
-                       "choose `motor` out of a catalogue, or give their windings in the robot's YAML file");
+                       "choose `motor` from a catalogue, or give the windings in the robot's YAML file");
     start.constraint_motors.push_back(std::move(named));
   }
 }

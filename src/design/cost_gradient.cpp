@@ -22,8 +22,8 @@ VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const
     gradient[i] = envelope.calcDerivative(plan(ahead), plan(behind), step);
     if (!std::isfinite(gradient[i]))
       throw ModelError(robot.startModel().name(), "variable '" + robot.variables()[static_cast<size_t>(i)].name + "'",
-                       "no gradient: the motion cannot be carried over to robots beside this one",
-                       "move x away from where the mechanism ends to close");
+                       "no gradient: the motion cannot be transferred to neighbouring robots",
+                       "move x away from the limit at which the mechanism no longer closes");
   }
   return gradient;
 }

@@ -113,7 +113,7 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
   MotionOutcome outcome = load(model, motion);
   solve(makeDesignMotion(*outcome.loaded, motion, makeStandingPosture(*outcome.loaded)), options, {}, outcome);
   if (outcome.missing > 0)
-    throw ModelError(model.name(), "start design", outcome.message, "ask for a motion that the robot can make");
+    throw ModelError(model.name(), "start design", outcome.message, "request a motion that the robot can make");
   const ShootingTrajectory& solution = outcome.motion->guess;
   SolvedMotion out{makeRecord(*outcome.motion, solution), {}, {}, {}};
   const int last = static_cast<int>(solution.us.size());
@@ -152,7 +152,7 @@ MotionOutcome keepMotion(const Model& model, const DesignMotion& motion, const S
                                  [margin](const LiftNode& node) { return node.margin < margin; });
   if (near == lifted.nodes.end()) return out;
   out.missing = static_cast<double>(lifted.nodes.end() - near) / static_cast<double>(lifted.nodes.size());
-  out.message = "a linkage comes nearer to a dead point than the margin: " + std::to_string(near->margin) + " < " +
+  out.message = "a linkage is closer to a dead point than the margin allows: " + std::to_string(near->margin) + " < " +
                 std::to_string(margin);
   return out;
 }

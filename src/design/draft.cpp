@@ -19,7 +19,7 @@ int RobotDraft::findMovable(const std::string& name, bool& is_joint) const {
     throw ModelError(model_.name(), "place '" + name + "'", "there is no such joint or frame",
                      "`bielle info` lists them");
   if (getLink(model_.frames()[frame].body) == name)
-    throw ModelError(model_.name(), "place '" + name + "'", "it is a link, the origin of its own coordinates",
+    throw ModelError(model_.name(), "place '" + name + "'", "it is a link, which is the origin of its own coordinates",
                      "name the joint that carries it");
   return frame;
 }

@@ -56,10 +56,10 @@ void DesignEvaluator::Data::checkSpec() {
       throw ModelError(model.name(), std::string("objective: ") + getName(term.measure), "its weight is not positive",
                        "give a positive number");
     weight += term.weight;
-    asked.insert(term.measure);
+    requested.insert(term.measure);
   }
   for (const DesignConstraint& constraint : options.constraints) {
-    asked.insert(constraint.measure);
+    requested.insert(constraint.measure);
     for (const auto& names : constraint.except) {  // bodies of one architecture may be missing in others
       const auto has = [&](const VectorXd& x) { return !findBodyPairs(robot.make(x), {names}).empty(); };
       const std::vector<VectorXd> all = robot.listCombinations();
@@ -68,7 +68,7 @@ void DesignEvaluator::Data::checkSpec() {
                          "there are no two such bodies", "`bielle info` lists them; * stands for any text");
     }
     if (constraint.measure == Measure::Margin && model.serialJoints().empty())
-      throw ModelError(model.name(), "constraints: margin", "the robot has no serial joints, whose motion it is",
+      throw ModelError(model.name(), "constraints: margin", "the robot has no serial joints, which the margin is about",
                        "name them in its YAML file, `serial_joints`");
   }
 }
@@ -108,13 +108,13 @@ void DesignEvaluator::Data::solveStart() {
   const Model& model = base.model;
   makeMotions(base, model, start);
   if (start.status != DesignStatus::Feasible)
-    throw ModelError(model.name(), "start design", start.message, "ask for a motion that the robot can make");
+    throw ModelError(model.name(), "start design", start.message, "request a motion that the robot can make");
   for (size_t i = 0; i < objective.size(); ++i) {
     start.terms.push_back(calcTerm(i, base, model, start.motions));
     if (!(start.terms[i] > 0 && std::isfinite(start.terms[i])))
       throw ModelError(model.name(), std::string("objective: ") + getName(objective[i].measure),
-                       "the start design has zero or infinity",
-                       "choose another measure, other motors or weights of motions");
+                       "its value at the start design is zero or infinite",
+                       "choose another measure, other motors or other weights of motions");
   }
   start.value = weight;
   checkConstraints(base, model, start);
@@ -127,7 +127,8 @@ void DesignEvaluator::Data::makeMotions(const ArchitectureStart& base, const Mod
   for (size_t i = 0; i < motions.size(); ++i) {
     const SolvedMotion* from = base.solved[i] ? &*base.solved[i] : nullptr;
     if (!from && options.mode == MotionMode::Kept)
-      throw ModelError(model.name(), motions[i].name, "the start with these parts cannot make it", "leave them out");
+      throw ModelError(model.name(), motions[i].name, "the start design with these parts cannot make it",
+                       "leave them out");
     MotionOutcome outcome = options.mode == MotionMode::Kept
                                 ? keepMotion(model, motions[i], *from->serial, drives, options.margin)
                                 : remakeMotion(model, motions[i], from, options.solver, drives);
@@ -140,8 +141,8 @@ void DesignEvaluator::Data::makeMotions(const ArchitectureStart& base, const Mod
     }
     if (failed && !outcomes) return;
     if (!failed)
-      addLimitMeasures(model, outcome.motion ? outcome.motion->guess : outcome.lifted.trajectory, asked, base.left_out,
-                       outcome.measures);
+      addLimitMeasures(model, outcome.motion ? outcome.motion->guess : outcome.lifted.trajectory, requested,
+                       base.left_out, outcome.measures);
     out.motions.push_back(outcome.measures);
     if (outcomes) outcomes->push_back(std::move(outcome));
   }
@@ -151,7 +152,7 @@ bool DesignEvaluator::Data::checkPostures(const ArchitectureStart& base, const M
   const double gap = calcMeanGap(base, model);
   if (gap == 0) return true;
   out.status = DesignStatus::LoopOpen;
-  out.message = "a loop cannot be closed where the start design can be";
+  out.message = "a loop cannot be closed at a posture where the start design can";
   out.value = weight * (2 + gap);
   return false;
 }

@@ -23,7 +23,7 @@ struct DesignEvaluator::Data {
   std::vector<ObjectiveTerm> objective;
   EvaluationOptions options;
   double weight = 0;  // W, of the objectives
-  std::set<Measure> asked;
+  std::set<Measure> requested;
   Evaluation start;
   std::mutex mutex;
   std::map<std::vector<int>, std::unique_ptr<Base>> bases;  // by architecture
@@ -39,7 +39,7 @@ struct DesignEvaluator::Data {
   const ArchitectureStart& getBase(const VectorXd& x);
   void makeMotions(const ArchitectureStart& base, const Model& model, Evaluation& out,
                    std::vector<MotionOutcome>* outcomes = nullptr) const;
-  // \param made  the robot without payload, if it is asked for
+  // \param made  the robot without payload, if it is requested
   Evaluation evaluate(const VectorXd& x, std::vector<MotionOutcome>* outcomes = nullptr,
                       std::optional<Model>* made = nullptr);
   std::vector<MotorSlopes> calcKeptSlopes(const ArchitectureStart& base, const VectorXd& x,

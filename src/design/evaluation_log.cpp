@@ -87,8 +87,8 @@ EvaluationLog::EvaluationLog(const std::string& path, const std::string& header)
     try {
       left_.push_back(readEvaluation(text));
     } catch (const std::exception&) {
-      throw ModelError(path, "line " + std::to_string(line), "it is not as it was written",
-                       "remove the file: the search is done anew");
+      throw ModelError(path, "line " + std::to_string(line), "it was changed or damaged",
+                       "remove the file to repeat the search");
     }
   }
 }
@@ -98,8 +98,8 @@ std::optional<LoggedEvaluation> EvaluationLog::replay(const std::string& stage, 
   const LoggedEvaluation evaluation = left_.front();
   left_.pop_front();
   if (evaluation.stage != stage || evaluation.x != x)
-    throw ModelError(log_.getPath(), "log", "its evaluations are not those of this search",
-                     "remove the file: the search is done anew");
+    throw ModelError(log_.getPath(), "log", "its evaluations do not belong to this search",
+                     "remove the file to repeat the search");
   return evaluation;
 }
 

@@ -33,8 +33,8 @@ class FrontRunner {
     for (LoggedEvaluation& e : log_->takeAll()) {
       if (!isComplete(e, evaluator.objective().size(), evaluator.constraints().size()))
         throw ModelError(options.directory + "/front.jsonl", "log",
-                         "an evaluation has other measures than objective and constraints",
-                         "remove the file: the search is done anew");
+                         "an evaluation does not have the measures of the objective and constraints",
+                         "remove the file to repeat the search");
       known_.emplace(makeKey(e.stage, e.x), std::move(e));
     }
     run_.replayed = static_cast<int>(known_.size());

@@ -77,7 +77,8 @@ pagmo::algorithm makeAlgorithm(const FrontProblem& problem, const FrontOptions& 
     nsga2.set_bfe(pagmo::bfe(PagmoBatch()));
     return pagmo::algorithm(nsga2);
   }
-  if (options.algorithm != SearchAlgorithm::Moead) throw std::invalid_argument("no algorithm for several objectives");
+  if (options.algorithm != SearchAlgorithm::Moead)
+    throw std::invalid_argument("the algorithm does not support several objectives");
   const unsigned neighbours = std::min(kMostNeighbours, static_cast<unsigned>(options.population) / 2);
   return pagmo::algorithm(pagmo::moead(generations, "low discrepancy", "tchebycheff", neighbours, 1.0, 0.5,
                                        kMutationIndex, 0.9, 2, true, seed));
@@ -90,7 +91,7 @@ bool hasFrontSearch() { return true; }
 void searchFront(const FrontProblem& problem, const FrontOptions& options, unsigned seed) {
   const PagmoProblem of_pagmo(&problem);
   if (of_pagmo.num_whole > 0 && options.algorithm == SearchAlgorithm::Moead)
-    throw std::invalid_argument("moead has no whole numbers");
+    throw std::invalid_argument("moead does not support integers");
   pagmo::population population(pagmo::problem(of_pagmo), 0, seed);
   std::vector<VectorXd> designs = {problem.start};
   while (static_cast<int>(designs.size()) < options.population) {

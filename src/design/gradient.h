@@ -42,9 +42,9 @@ struct MotorSlopes {
   std::vector<double> dt;         ///< N, s
   MatrixXd u, v;                  ///< nu x N
   std::vector<MatrixXd> du, dv;   ///< per variable, nu x N
-  MatrixXd margin;                ///< loop clusters x nodes, mu^2 of Eq. (4); of motions made anew if it was asked for
+  MatrixXd margin;                ///< loop clusters x nodes, mu^2 of Eq. (4); of motions made anew if it was requested
   std::vector<MatrixXd> dmargin;  ///< of motions made anew only at the entries that listLeast() names
-  Eigen::RowVectorXd distance;    ///< of the nearest shapes at all nodes, if it was asked for
+  Eigen::RowVectorXd distance;    ///< of the nearest shapes at all nodes, if it was requested
   std::vector<Eigen::RowVectorXd> ddistance;  ///< only at the entries that listLeast() names
   double cost = 0;                            ///< of motions that were optimized for the design, and its derivatives
   VectorXd dcost;

@@ -106,16 +106,16 @@ MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>&
   return out;
 }
 
-void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, const std::set<Measure>& asked,
+void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, const std::set<Measure>& requested,
                       const BodyPairs& left_out, MotionMeasures& measures) {
   for (size_t m = 0; m < measures.motors.size(); ++m)
     addShares(measures.trace, static_cast<Eigen::Index>(m), model.motors()[m], measures.motors[m]);
-  if (asked.count(Measure::Margin)) {
+  if (requested.count(Measure::Margin)) {
     LinkageConditioning conditioning(model, trajectory.xs.front().head(model.nq()), LinkageSide::Joints);
     for (const VectorXd& x : trajectory.xs)
       measures.margin = std::min(measures.margin, 1 / conditioning.calc(x.head(model.nq())));
   }
-  if (!asked.count(Measure::Distance)) return;
+  if (!requested.count(Measure::Distance)) return;
   Workspace ws(model);
   const std::vector<ShapePair> pairs = listPairsBut(left_out, model);
   for (const VectorXd& x : trajectory.xs) {

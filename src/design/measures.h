@@ -86,9 +86,9 @@ MotionMeasures calcMotionMeasures(const Model& model, const std::vector<double>&
                                   const ShootingTrajectory& trajectory,
                                   const std::vector<MotorConversion>& drives = {});
 
-/// Envelope and heat of the limits of the motors, into the motors of a motion; margin and distance if they are among those asked for.
+/// Envelope and heat of the limits of the motors, into the motors of a motion; margin and distance if they are among those requested.
 /// \param trajectory  closed at its nodes   \param left_out  of distances
-void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, const std::set<Measure>& asked,
+void addLimitMeasures(const Model& model, const ShootingTrajectory& trajectory, const std::set<Measure>& requested,
                       const BodyPairs& left_out, MotionMeasures& measures);
 
 const char* getName(Measure measure);

@@ -17,10 +17,10 @@ namespace {
 // Margins of linkages and distances of shapes at the states of a robot.
 class StateMeasures {
  public:
-  StateMeasures(const Model& model, const VectorXd& x, const std::set<Measure>& asked, const BodyPairs& left_out)
+  StateMeasures(const Model& model, const VectorXd& x, const std::set<Measure>& requested, const BodyPairs& left_out)
       : model_(model), ws_(model) {
-    if (asked.count(Measure::Margin)) conditioning_.emplace(model, x.head(model.nq()), LinkageSide::Joints);
-    if (asked.count(Measure::Distance)) pairs_ = listPairsBut(left_out, model);
+    if (requested.count(Measure::Margin)) conditioning_.emplace(model, x.head(model.nq()), LinkageSide::Joints);
+    if (requested.count(Measure::Distance)) pairs_ = listPairsBut(left_out, model);
   }
 
   bool hasMargins() const { return conditioning_.has_value(); }
@@ -49,9 +49,9 @@ class StateMeasures {
 // The slopes of one motion, and what is read of its neighbours for them.
 class OptimumSlopes {
  public:
-  OptimumSlopes(const MotionOutcome& outcome, Eigen::Index variables, const std::set<Measure>& asked,
+  OptimumSlopes(const MotionOutcome& outcome, Eigen::Index variables, const std::set<Measure>& requested,
                 const BodyPairs& left_out)
-      : outcome_(outcome), asked_(asked), left_out_(left_out), envelope_(*outcome.motion, outcome.multipliers) {
+      : outcome_(outcome), requested_(requested), left_out_(left_out), envelope_(*outcome.motion, outcome.multipliers) {
     const MotorTrace& trace = outcome.measures.trace;
     const auto count = static_cast<size_t>(variables);
     out_.dt = trace.dt, out_.u = trace.torque, out_.v = trace.speed;
@@ -67,8 +67,8 @@ class OptimumSlopes {
   // The derivatives by variable i, from motions at `step` on either side; false if there are none.
   bool add(const Motion& ahead, const Motion& behind, double step, Eigen::Index i) {
     const double dcost = envelope_.calcDerivative(ahead, behind, step);
-    StateMeasures at_ahead(ahead.problem->model(), ahead.problem->initialState(), asked_, left_out_),
-        at_behind(behind.problem->model(), behind.problem->initialState(), asked_, left_out_);
+    StateMeasures at_ahead(ahead.problem->model(), ahead.problem->initialState(), requested_, left_out_),
+        at_behind(behind.problem->model(), behind.problem->initialState(), requested_, left_out_);
     const auto derivative = differentiateOptimum(*outcome_.motion, outcome_.multipliers, ahead, behind, step,
                                                  [&](const Motion& motion, const ShootingTrajectory& trajectory) {
                                                    return read(motion.problem->model(), trajectory,
@@ -86,7 +86,7 @@ class OptimumSlopes {
   void addStates() {
     const std::vector<VectorXd>& xs = outcome_.motion->guess.xs;
     const auto nodes = static_cast<Eigen::Index>(xs.size());
-    StateMeasures at(outcome_.motion->problem->model(), xs.front(), asked_, left_out_);
+    StateMeasures at(outcome_.motion->problem->model(), xs.front(), requested_, left_out_);
     if (at.hasMargins()) {
       out_.margin.resize(at.calcMargins(xs.front()).size(), nodes);
       for (Eigen::Index k = 0; k < nodes; ++k) out_.margin.col(k) = at.calcMargins(xs[static_cast<size_t>(k)]);
@@ -127,7 +127,7 @@ class OptimumSlopes {
   }
 
   const MotionOutcome& outcome_;
-  const std::set<Measure>& asked_;
+  const std::set<Measure>& requested_;
   const BodyPairs& left_out_;
   MotionEnvelope envelope_;
   MotorSlopes out_;
@@ -176,8 +176,8 @@ class NeighbourMotions {
 
 std::vector<MotorSlopes> calcOptimumSlopes(const Parametrization& robot, const VectorXd& x,
                                            const std::vector<DesignMotion>& motions,
-                                           const std::vector<MotionOutcome>& outcomes, const std::set<Measure>& asked,
-                                           const BodyPairs& left_out) {
+                                           const std::vector<MotionOutcome>& outcomes,
+                                           const std::set<Measure>& requested, const BodyPairs& left_out) {
   const auto fail = [](const std::string& reason) {
     std::vector<MotorSlopes> out(1);
     out.back().failure = "no gradient" + reason;
@@ -186,7 +186,7 @@ std::vector<MotorSlopes> calcOptimumSlopes(const Parametrization& robot, const V
   try {
     std::vector<std::unique_ptr<OptimumSlopes>> slopes;
     for (const MotionOutcome& outcome : outcomes)
-      slopes.push_back(std::make_unique<OptimumSlopes>(outcome, x.size(), asked, left_out));
+      slopes.push_back(std::make_unique<OptimumSlopes>(outcome, x.size(), requested, left_out));
     NeighbourMotions neighbours(motions);
     for (Eigen::Index i : robot.listContinuous()) {
       const double h = kDesignStep * (robot.upper()[i] - robot.lower()[i]);

@@ -12,11 +12,11 @@
 namespace bielle {
 
 /// Slopes of every motion at x. \param outcomes  of remakeMotion() for the design x, all solved
-/// \param asked  whether there are margins and distances among them   \param left_out  of distances
+/// \param requested  whether there are margins and distances among them   \param left_out  of distances
 /// If one of them cannot be followed, the last one has a failure.
 std::vector<MotorSlopes> calcOptimumSlopes(const Parametrization& robot, const VectorXd& x,
                                            const std::vector<DesignMotion>& motions,
-                                           const std::vector<MotionOutcome>& outcomes, const std::set<Measure>& asked,
-                                           const BodyPairs& left_out);
+                                           const std::vector<MotionOutcome>& outcomes,
+                                           const std::set<Measure>& requested, const BodyPairs& left_out);
 
 }  // namespace bielle

@@ -77,12 +77,12 @@ void writeConstraints(std::ostream& out, const DesignEvaluator& evaluator, const
   }
   const std::vector<std::string> left_out = evaluator.listLeftOut(run.best);
   for (const std::string& pair : left_out)
-    out << (&pair == &left_out.front() ? "\nThe distance leaves out bodies that overlap as they are drawn, or by name: "
-                                       : "; ")
+    out << (&pair == &left_out.front() ? "\nThe distance ignores bodies that overlap as drawn, or by name: " : "; ")
         << pair;
   if (!left_out.empty()) out << ".\n";
   if (run.evaluation.status == DesignStatus::Violated)
-    out << "\n**No design found keeps all constraints**; this is the start, where " << run.evaluation.message << ".\n";
+    out << "\n**No design satisfies all constraints**; this is the start design, where " << run.evaluation.message
+        << ".\n";
 }
 
 // What the best design has of a variable that is no choice: nearer to a bound than a thousandth of the way between them, the bound
@@ -108,9 +108,11 @@ void writeVariables(std::ostream& out, const Parametrization& robot, const Vecto
 // The robots of the front, and the start.
 void writeFront(std::ostream& out, const DesignEvaluator& evaluator, const DesignRun& run) {
   const Parametrization& robot = evaluator.robot();
-  out << "\n## Front\n\nNo design found is better than one of these in all objectives. The robots are in `front`; "
-         "`best` has the "
-         "least value, the weighted sum of the objectives relative to the start.\n\n| robot";
+  out << "\n"
+         "## Front\n\n"
+         "None of these designs is dominated by another one found. The robots are in `front`; `best` has the smallest "
+         "value, the weighted sum of the objectives relative to the start.\n\n"
+         "| robot";
   for (const ObjectiveTerm& term : evaluator.objective()) out << " | " << describeTerm(term);
   for (const DesignVariable& v : robot.variables())
     out << " | " << v.name << (v.isChoice() || v.unit == "1" ? "" : " [" + v.unit + "]");

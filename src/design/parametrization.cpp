@@ -54,11 +54,11 @@ Parametrization::Parametrization(Model model, std::vector<DesignVariable> variab
     const std::string element = "variable '" + variable.name + "'";
     if (variable.isChoice())
       throw ModelError(source_, element,
-                       "a given robot has no parts to choose, and the masses of its motors are in its links",
+                       "a given robot has no parts to choose, and its links include the masses of its motors",
                        "give the `ratio` of its motors, or a generator");
     const int kinds = !variable.lengths.empty() + !variable.shifts.empty() + !variable.motors.empty();
     if (!variable.parameter.empty() || kinds != 1)
-      throw ModelError(source_, element, "it is not one of a length, a shift and a ratio",
+      throw ModelError(source_, element, "it is not a length, a shift or a ratio",
                        "give `length`, `shift` or `ratio`; `parameter` is for generated robots");
     RobotDraft draft(model_);
     for (const ShiftChange& shift : variable.shifts) draft.getPlace(shift.of);
@@ -68,8 +68,8 @@ Parametrization::Parametrization(Model model, std::vector<DesignVariable> variab
       if (k == 0) start_[static_cast<Eigen::Index>(i)] = length;
       if (!(length > 1e-9 && length + variable.lower - start_[static_cast<Eigen::Index>(i)] > 1e-9))
         throw ModelError(source_, element,
-                         "the distance of '" + change.from + "' and '" + change.to + "' is zero, or would become so",
-                         "name two places apart, and raise the lower bound");
+                         "the distance of '" + change.from + "' and '" + change.to + "' is zero, or would become zero",
+                         "name two separate places, or raise the lower bound");
       setLength(draft, change, length, length);
     }
   }
@@ -89,7 +89,7 @@ Parametrization::Parametrization(const std::string& generator, std::vector<std::
     const DesignVariable& variable = variables_[i];
     if (variable.parameter.empty() && variable.motors.empty())
       throw ModelError(source_, "variable '" + variable.name + "'",
-                       "it is no parameter of the generator, and no motor's",
+                       "it is neither a parameter of the generator nor one of its motors",
                        "give `parameter`, `ratio` or `motor`; `length` and `shift` are for given robots");
     if (variable.parameter.empty()) continue;
     double& start = start_[static_cast<Eigen::Index>(i)];
@@ -190,10 +190,11 @@ void Parametrization::finish() {
     if (!names.insert(variable.name).second) throw ModelError(source_, element, "it is given twice", "rename one");
     if (!(std::isfinite(variable.lower) && std::isfinite(variable.upper) &&
           (variable.isChoice() || variable.lower < variable.upper)))
-      throw ModelError(source_, element, "its bounds " + bounds.str() + " are crossed", "give the lower one first");
+      throw ModelError(source_, element, "its bounds " + bounds.str() + " are in the wrong order",
+                       "give the lower one first");
     if (!(start_[k] >= variable.lower && start_[k] <= variable.upper)) {
       std::ostringstream problem;
-      problem << "the robot has " << describeValue(variable, start_[k]) << ", outside of its bounds " << bounds.str();
+      problem << "the robot has " << describeValue(variable, start_[k]) << ", outside its bounds " << bounds.str();
       throw ModelError(source_, element, problem.str(),
                        variable.motors.empty() ? "widen the bounds" : "widen the bounds, or give `start`");
     }
@@ -235,7 +236,7 @@ std::vector<VectorXd> Parametrization::listCombinations() const {
 
 Model Parametrization::make(const VectorXd& x) const {
   if (x.size() != start_.size() || !x.allFinite())
-    throw ModelError(source_, "design", "its numbers are not as many as the variables, or not finite");
+    throw ModelError(source_, "design", "it does not have one finite number for each variable");
   return changeMotors(generator_.empty() ? changePlaces(x) : generate(x), x);
 }
 

@@ -71,7 +71,7 @@ struct DesignRun {
   std::array<int, 4> counts{};     ///< evaluations by status
   int replayed = 0;                ///< evaluations found in the logs
   double seconds = 0;              ///< processor time of all evaluations, including those of earlier runs
-  std::vector<FrontDesign> front;  ///< if one is asked for, by increasing first measure
+  std::vector<FrontDesign> front;  ///< if one is requested, by increasing first measure
 };
 
 /// \throws ModelError when a log belongs to another problem, is used by another process, or cannot be written

@@ -33,7 +33,7 @@ nlopt::algorithm getAlgorithm(SearchAlgorithm algorithm) {
     case SearchAlgorithm::Sbplx:
       return nlopt::LN_SBPLX;
     default:
-      throw std::invalid_argument(std::string(getName(algorithm)) + " is not for one objective");
+      throw std::invalid_argument(std::string(getName(algorithm)) + " does not support a single objective");
   }
 }
 

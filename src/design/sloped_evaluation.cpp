@@ -26,14 +26,14 @@ std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std:
     if (!hasGradient(constraint.measure))
       return GradientObstacle{
           std::string("it needs gradients, which the constraint on ") + getName(constraint.measure) + " does not have",
-          "give bobyqa or sbplx, or leave that constraint out"};
+          "use bobyqa or sbplx, or leave out that constraint"};
   for (const ObjectiveTerm& term : objective) {
     const std::string name = getName(term.measure);
     if (!hasGradient(term.measure))
       return GradientObstacle{"it needs gradients, which " + name + " does not have",
-                              "choose a torque, an energy, the cost or the mass, or give bobyqa or sbplx"};
+                              "choose a torque, an energy, the cost or the mass, or use bobyqa or sbplx"};
     if (term.measure == Measure::Cost && mode == MotionMode::Kept)
-      return GradientObstacle{"motions that are kept have no cost", "give `mode: reoptimized`"};
+      return GradientObstacle{"kept motions have no cost", "give `mode: reoptimized`"};
   }
   return {};
 }
@@ -51,7 +51,7 @@ std::vector<MotorSlopes> DesignEvaluator::Data::calcKeptSlopes(const Architectur
     const SolvedMotion& from = *base.solved[i];
     slopes.push_back(calcMotorSlopes(*outcomes[i].loaded, from.kept_dofs, *from.serial, outcomes[i].lifted,
                                      variations.at(groups[i]),
-                                     asked.count(Measure::Distance) > 0 ? &base.left_out : nullptr));
+                                     requested.count(Measure::Distance) > 0 ? &base.left_out : nullptr));
     if (!slopes.back().failure.empty()) break;
   }
   return slopes;
@@ -111,7 +111,7 @@ SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
   if (outcomes.size() < data.motions.size() || !std::all_of(outcomes.begin(), outcomes.end(), is_made)) return out;
   const std::vector<MotorSlopes> slopes =
       kept ? data.calcKeptSlopes(base, x, outcomes)
-           : calcOptimumSlopes(data.robot, x, data.motions, outcomes, data.asked, base.left_out);
+           : calcOptimumSlopes(data.robot, x, data.motions, outcomes, data.requested, base.left_out);
   if (const std::string& failure = getFailure(slopes); !failure.empty()) {
     out.evaluation = {DesignStatus::MotionFailed, 2 * data.weight, {}, {}, {}, failure};
     return out;

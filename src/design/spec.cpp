@@ -30,7 +30,7 @@ Enum readChoice(const Entry& entry, const std::vector<Enum>& choices) {
 
 Vector3d readDirection(const Entry& entry) {
   const Vector3d direction = entry.getVector3();
-  if (direction.norm() < 1e-9) entry.fail("it is no direction", "give three numbers that are not all zero");
+  if (direction.norm() < 1e-9) entry.fail("it is not a direction", "give three numbers that are not all zero");
   return direction.normalized();
 }
 
@@ -67,7 +67,7 @@ std::vector<std::string> readNames(const Entry& entry) {
 // Number of a choice by its name.
 double readChoiceNumber(const Entry& entry, const std::vector<std::string>& choices) {
   const auto found = std::find(choices.begin(), choices.end(), entry.getText());
-  if (found == choices.end()) entry.fail("'" + entry.getText() + "' is none of the choices", "give one of them");
+  if (found == choices.end()) entry.fail("'" + entry.getText() + "' is not one of the choices", "give one of them");
   return static_cast<double>(found - choices.begin());
 }
 
@@ -75,10 +75,10 @@ void readChoices(const Entry& choices, const Fields& fields, const DesignSpec& s
                  DesignVariable& variable) {
   variable.choices = choices.getTexts();
   if (std::set<std::string>(variable.choices.begin(), variable.choices.end()).size() < variable.choices.size())
-    choices.fail("one of them is there twice", "remove it");
+    choices.fail("one of them is listed twice", "remove it");
   if (variable.choices.empty()) choices.fail("there is nothing to choose", "give one or more");
   if (spec.robot.generator.empty())
-    choices.fail("a given robot has no parts to choose, and the masses of its motors are in its links",
+    choices.fail("a given robot has no parts to choose, and its links include the masses of its motors",
                  "give the `ratio` of its motors, or a generator");
   const std::vector<Parameter> parameters = findGenerator(spec.robot.generator).makeRequest().parameters;
   const auto getParameter = [&](const Entry& entry) -> const Parameter& {
@@ -92,7 +92,7 @@ void readChoices(const Entry& choices, const Fields& fields, const DesignSpec& s
       try {
         findChoice(getParameter(*parameter), name.getText());
       } catch (const ModelError& error) {
-        name.fail("'" + name.getText() + "' is none of the choices of '" + parameter->getText() + "'",
+        name.fail("'" + name.getText() + "' is not one of the choices of '" + parameter->getText() + "'",
                   "`bielle generate " + spec.robot.generator + " --help` lists them");
       }
     }
@@ -122,19 +122,20 @@ DesignVariable readVariable(const Entry& entry, const DesignSpec& spec, const En
   const int kinds = !variable.lengths.empty() + !variable.shifts.empty() + !variable.parameter.empty() +
                     (ratio != nullptr) + (motor != nullptr);
   if (kinds != 1)
-    entry.fail("variable '" + variable.name + "' is not one of a length, a shift, a parameter, a ratio and a motor",
+    entry.fail("variable '" + variable.name + "' is not a length, a shift, a parameter, a ratio or a motor",
                "give `length`, `shift`, `parameter`, `ratio` or `motor`");
   if (const Entry* unit = find(fields, "unit")) variable.unit = unit->getText();
   const Entry* start = find(fields, "start");
   if (start && !choices && !ratio)
-    start->fail("only ratios and choices have one", "remove it; the others start as the robot is");
+    start->fail("only ratios and choices have a start value",
+                "remove it; other variables start from the robot's values");
   if (const Entry* mass = find(fields, "mass"); mass && !motor)
-    mass->fail("only motors have one", "give `motor` with its choices, or remove it");
+    mass->fail("only motors have a mass", "give `motor` with its choices, or remove it");
   if (motor && !choices)
     entry.fail("'" + variable.name + "' has no choices", "list motors of a catalogue as `choices`");
   if (choices) {
     if (!motor && variable.parameter.empty())
-      choices->fail("only parameters and motors are chosen", "give `parameter` or `motor`, or `bounds` instead");
+      choices->fail("only parameters and motors have choices", "give `parameter` or `motor`, or `bounds` instead");
     if (const Entry* bounds = find(fields, "bounds")) bounds->fail("choices have no bounds", "remove them");
     readChoices(*choices, fields, spec, catalogues, variable);
     variable.unit = "1";
@@ -146,7 +147,7 @@ DesignVariable readVariable(const Entry& entry, const DesignSpec& spec, const En
   const std::vector<double> values = bounds.getNumbers(2);
   variable.lower = values[0], variable.upper = values[1];
   if (!(variable.lower < variable.upper))
-    bounds.fail("the bounds of variable '" + variable.name + "' are crossed", "give the lower one first");
+    bounds.fail("the bounds of variable '" + variable.name + "' are in the wrong order", "give the lower one first");
   if (ratio && !(variable.lower > 0)) bounds.fail("a ratio is not positive", "give turns of the rotor per turn");
   return variable;
 }
@@ -165,7 +166,7 @@ void readArchitecture(const Entry& entry, DesignSpec& spec) {
       ++count[choice];
     }
   if (known.empty())
-    entry.fail("generator '" + spec.robot.generator + "' does not put parts together",
+    entry.fail("generator '" + spec.robot.generator + "' does not compose robots from parts",
                "give one that does, e.g. leg_biped");
   for (const Entry& item : entry.getList()) {
     bool found = false;
@@ -175,7 +176,7 @@ void readArchitecture(const Entry& entry, DesignSpec& spec) {
         found = true;
         DesignVariable& part = parts[p.name];
         if (std::find(part.choices.begin(), part.choices.end(), choice) != part.choices.end())
-          item.fail("'" + item.getText() + "' is there twice", "remove one");
+          item.fail("'" + item.getText() + "' is listed twice", "remove one");
         part.choices.push_back(choice);
       }
     if (!found) item.fail("there is no part '" + item.getText() + "'", "use some of " + known);
@@ -204,9 +205,9 @@ WorkspaceAxis readAxis(const Entry& entry) {
     return axis;
   }
   const std::vector<Entry> items = entry.getList();
-  if (items.size() != 2 && items.size() != 3) entry.fail("it is no range", "give [from, to] or [from, to, points]");
+  if (items.size() != 2 && items.size() != 3) entry.fail("it is not a range", "give [from, to] or [from, to, points]");
   axis.lower = items[0].getNumber(), axis.upper = items[1].getNumber();
-  if (!(axis.lower < axis.upper)) entry.fail("the range is crossed", "give the lower bound first");
+  if (!(axis.lower < axis.upper)) entry.fail("the range is in the wrong order", "give the lower bound first");
   if (items.size() == 3) axis.points = readCount(items[2], 1000);
   return axis;
 }
@@ -221,7 +222,8 @@ WorkspaceRegion readRegion(const Entry& entry) {
   if (const Entry* base = find(fields, "base")) region.base = base->getText();
   if (const Entry* bound = find(fields, "max_conditioning")) {
     region.max_conditioning = bound->getNumber();
-    if (!(region.max_conditioning >= 1)) bound->fail("no linkage is below 1", "give a number of 1 or more");
+    if (!(region.max_conditioning >= 1))
+      bound->fail("the conditioning of a linkage is at least 1", "give a number of 1 or more");
   }
   for (size_t i = 0; i < axes.size(); ++i)
     if (const Entry* axis = find(fields, axes[i])) region.axes[i] = readAxis(*axis);
@@ -246,9 +248,9 @@ ObjectiveTerm readTerm(const Entry& entry) {
                            Measure::Cost, Measure::Conditioning, Measure::Workspace, Measure::Mass});
   const Entry *motors = find(fields, "motors"), *region = find(fields, "region");
   const bool is_workspace = term.measure == Measure::Workspace;
-  if (motors && is_workspace) motors->fail("a workspace has no motors", "remove it");
-  if (motors && term.measure == Measure::Mass) motors->fail("a mass is that of the robot", "remove it");
-  if (motors && term.measure == Measure::Cost) motors->fail("a cost is that of the whole motion", "remove it");
+  if (motors && is_workspace) motors->fail("a workspace does not depend on motors", "remove it");
+  if (motors && term.measure == Measure::Mass) motors->fail("the mass is that of the whole robot", "remove it");
+  if (motors && term.measure == Measure::Cost) motors->fail("the cost is that of the whole motion", "remove it");
   if (region && !is_workspace) region->fail("only a workspace has a region", "remove it");
   if (region) term.region = readRegion(*region);
   if (motors) term.motors = motors->getTexts();
@@ -265,19 +267,19 @@ DesignConstraint readConstraint(const Entry& entry) {
       {Measure::Envelope, Measure::Heat, Measure::Mass, Measure::Margin, Measure::Distance, Measure::PeakTorque,
        Measure::RmsTorque, Measure::Energy, Measure::ElectricalEnergy, Measure::Conditioning});
   const Entry *most = find(fields, "at_most"), *least = find(fields, "at_least"), *motors = find(fields, "motors");
-  if (motors && !isOfMotors(constraint.measure)) motors->fail("it is not of motors", "remove it");
+  if (motors && !isOfMotors(constraint.measure)) motors->fail("the measure does not depend on motors", "remove it");
   if (motors) constraint.motors = motors->getTexts();
   const bool is_share = constraint.measure == Measure::Envelope || constraint.measure == Measure::Heat;
   if ((most && least) || (!most && !least && !is_share))
-    entry.fail("it has not one bound", "give one of `at_most` and `at_least`");
+    entry.fail("it does not have exactly one bound", "give one of `at_most` and `at_least`");
   const bool is_least = constraint.measure == Measure::Margin || constraint.measure == Measure::Distance;
-  if (is_least && most) most->fail("it is better if it is larger", "give `at_least`");
+  if (is_least && most) most->fail("larger values of this measure are better", "give `at_least`");
   if (!is_least && constraint.measure != Measure::Mass && least)
-    least->fail("it is better if it is smaller", "give `at_most`");
+    least->fail("smaller values of this measure are better", "give `at_most`");
   if (most) constraint.bound = most->getNumber();
   if (least) constraint.bound = least->getNumber(), constraint.at_least = true;
   if (const Entry* except = find(fields, "except")) {
-    if (constraint.measure != Measure::Distance) except->fail("only distances leave bodies out", "remove it");
+    if (constraint.measure != Measure::Distance) except->fail("only distances can exclude bodies", "remove it");
     for (const Entry& pair : except->getList()) {
       const std::vector<std::string> names = pair.getTexts(2);
       constraint.except.push_back({names[0], names[1]});
@@ -315,7 +317,7 @@ FrontSpec readFront(const Entry& entry, const DesignSpec& spec) {
   if (const Entry* population = find(fields, "population")) {
     options.population = readCount(*population, 10000);
     if (options.population < 8 || options.population % 4 != 0)
-      population->fail("it is not a multiple of 4 of at least 8", "give e.g. 24");
+      population->fail("it is not a multiple of 4, or less than 8", "give e.g. 24");
   }
   if (const Entry* generations = find(fields, "generations")) options.generations = readCount(*generations, 100000);
   if (const Entry* refine = find(fields, "refine"))
@@ -323,8 +325,8 @@ FrontSpec readFront(const Entry& entry, const DesignSpec& spec) {
   const bool has_choices = std::any_of(spec.variables.begin(), spec.variables.end(),
                                        [](const DesignVariable& variable) { return variable.isChoice(); });
   if (has_choices && options.algorithm == SearchAlgorithm::Moead)
-    entry.fail("moead moves continuously between choices, which have no order", "give nsga2");
-  if (spec.objective.size() < 2) entry.fail("one objective has no front", "give a second one, or `stages`");
+    entry.fail("moead needs continuous variables, but choices have no order", "use nsga2");
+  if (spec.objective.size() < 2) entry.fail("a single objective has no front", "give a second one, or `stages`");
   return front;
 }
 
@@ -335,7 +337,7 @@ void readSearch(const Entry& entry, DesignSpec& spec) {
   const Entry* stages = find(fields, "stages");
   if (const Entry* pareto = find(fields, "pareto")) {
     if (stages || find(fields, "searches"))
-      pareto->fail("it excludes `stages` and `searches`", "remove them, or `pareto`");
+      pareto->fail("it cannot be combined with `stages` and `searches`", "remove them, or `pareto`");
     spec.front = readFront(*pareto, spec);
   }
   if (!stages) return;

@@ -22,7 +22,7 @@ RobotSpec readRobotSpec(const YamlFields& fields, const YamlEntry& map) {
   if (const YamlEntry* robot = find(fields, "robot")) spec.name = robot->getText();
   if (const YamlEntry* generator = find(fields, "generator")) spec.generator = generator->getText();
   if (spec.name.empty() == spec.generator.empty())
-    map.fail("it names neither a robot nor a generator, or both", "give one of `robot` and `generator`");
+    map.fail("it does not name exactly one robot or generator", "give one of `robot` and `generator`");
   if (const YamlEntry* set = find(fields, "set")) {
     if (spec.generator.empty()) set->fail("a given robot has no parameters", "remove it, or give a generator");
     const std::vector<Parameter> parameters = findGenerator(spec.generator).makeRequest().parameters;
@@ -42,9 +42,9 @@ void readShare(const YamlFields& fields, MotionSpec& motion) {
   const YamlEntry *weight = find(fields, "weight"), *payload = find(fields, "payload"),
                   *place = find(fields, "payload_at");
   if (weight) motion.weight = weight->getNumber();
-  if (!(motion.weight >= 0)) weight->fail("it is negative", "give its share in objectives, 0 or more");
+  if (!(motion.weight >= 0)) weight->fail("it is negative", "give its share of the objectives, 0 or more");
   if (payload) motion.payload.mass = payload->getNumber();
-  if (!(motion.payload.mass >= 0)) payload->fail("it is negative", "give the kilograms that the trunk carries");
+  if (!(motion.payload.mass >= 0)) payload->fail("it is negative", "give the mass that the trunk carries in kg");
   if (place && !payload) place->fail("there is no payload", "give `payload` in kg, or remove it");
   if (place) motion.payload.at = place->getVector3();
 }

@@ -73,8 +73,8 @@ std::vector<ModelVariation> calcVariations(const Parametrization& robot, const V
       const Model there = make(x + steps * h * VectorXd::Unit(x.size(), i));
       if (!isSameButForPlaces(here, there))
         throw ModelError(here.name(), "variable '" + robot.variables()[i].name + "'",
-                         "it changes an axis, gain or gravity: motor torques have no gradient along it",
-                         "search without gradients, by bobyqa or sbplx");
+                         "it changes an axis, a gain or gravity, for which motor torques have no gradient",
+                         "search without gradients, with bobyqa or sbplx");
       addChange(here, there, weight / (12 * h), out[i]);
     }
   }

@@ -23,7 +23,7 @@ using Kind = WorkspaceAxis::Kind;
 
 int findContact(const Model& model, const std::string& name) {
   if (model.contacts().empty())
-    throw ModelError(model.name(), "workspace", "the robot has no contact", "name its feet in its YAML file");
+    throw ModelError(model.name(), "workspace", "the robot has no contacts", "name its feet in its YAML file");
   const int contact = name.empty() ? 0 : model.findContact(name);
   if (contact < 0)
     throw ModelError(model.name(), "workspace: foot '" + name + "'", "there is no such contact",
@@ -55,7 +55,8 @@ std::array<WorkspaceAxis, 6> fillAxes(const Model& model, const WorkspaceRegion&
     if (axis.kind == Kind::Default) axis.kind = i > 2 && foot.kind == ContactKind::Point3D ? Kind::Free : Kind::Range;
     if (axis.kind == Kind::Free || axis.lower == axis.upper) axis.points = 1;
     if (!(axis.lower <= axis.upper && axis.points > 0))
-      throw ModelError(model.name(), std::string("workspace: ") + kAxes[i], "its range is crossed, or has no points",
+      throw ModelError(model.name(), std::string("workspace: ") + kAxes[i],
+                       "its range is in the wrong order, or has no points",
                        "give the lower bound first, and at least one point");
     total *= axis.points;
   }

@@ -189,7 +189,7 @@ AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, cons
   } else {
     std::ostringstream text;
     text << worst << " stays open by " << gap << " (m or rad) after " << result.iterations
-         << " iterations; the targets may be out of reach, or the start on the wrong branch of the mechanism";
+         << " iterations; the targets may be out of reach, or the start may be on the wrong branch of the mechanism";
     result.message = text.str();
   }
   return result;
@@ -274,7 +274,7 @@ AssemblyProblem makeReferenceProblem(const Model& model, const Reference& refere
       throw ModelError(
           model.name(), element,
           "joint '" + name + "' has " + std::to_string(joint.nq) + " values, not " + std::to_string(values.size()),
-          "give its q as notation.h orders it");
+          "give its q in the order of notation.h");
     problem.q_ref.segment(joint.idx_q, joint.nq) = Eigen::Map<const VectorXd>(values.data(), joint.nq);
     problem.weights.segment(joint.idx_v, joint.nv).setOnes();
   }

@@ -286,7 +286,7 @@ std::string describeFailure(const ReducedCluster& cluster, const ClusterScratchO
   const ConstraintSet& set = cluster.closures;
   if (getLane(scratch.closed, lane))
     return "closure '" + set.closures.front().name + "': the rank of its loops is no longer " +
-           std::to_string(cluster.rank) + ": a configuration where they can move in other ways";
+           std::to_string(cluster.rank) + ": a configuration where they gain other motions";
   size_t worst = 0;
   double largest = -1;
   for (size_t c = 0; c < set.closures.size(); ++c)
@@ -294,7 +294,8 @@ std::string describeFailure(const ReducedCluster& cluster, const ClusterScratchO
       const double gap = std::abs(getLane(scratch.residual[set.offsets[c] + r], lane));
       if (gap > largest) largest = gap, worst = c;
     }
-  return "closure '" + set.closures[worst].name + "' does not close: the step is too large, or out of its reach";
+  return "closure '" + set.closures[worst].name +
+         "' does not close: the step is too large, or the target is out of reach";
 }
 
 void ClusterPoint::selectIndependent(const MatrixXd& all, MatrixXd& out) const {

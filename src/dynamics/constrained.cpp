@@ -57,11 +57,11 @@ const char* getMessage(DynamicsStatus status) {
     case DynamicsStatus::Ok:
       return "ok";
     case DynamicsStatus::MassMatrixSingular:
-      return "the mass matrix is singular: a joint moves no inertia; give its links a mass or the joint an armature";
+      return "the mass matrix is singular: a joint moves no inertia; give its links mass or the joint an armature";
     case DynamicsStatus::NotFinite:
       return "the accelerations are not finite";
     case DynamicsStatus::ContradictoryRows:
-      return "redundant rows of closures and contacts contradict each other: close the loops, or let their "
+      return "redundant rows of closures and contacts contradict each other: close the loops, or make their "
              "stabilisations agree";
   }
   return "?";

@@ -73,11 +73,11 @@ const char* getMessage(KeptMotionStatus status) {
     case KeptMotionStatus::Ok:
       return "ok";
     case KeptMotionStatus::Undetermined:
-      return "the coordinates that are kept do not determine the loops: a dead point";
+      return "the kept coordinates do not determine the loops: a dead point";
     case KeptMotionStatus::Unbalanced:
-      return "motors and contacts cannot give this motion";
+      return "motors and contacts cannot produce this motion";
     case KeptMotionStatus::Open:
-      return "the change opens a loop that has more rows than it needs";
+      return "the change opens a loop with redundant rows";
   }
   return "?";
 }

@@ -267,24 +267,24 @@ std::string describeConflict(const Model& model, const LoopConflict& conflict) {
   for (size_t i = 0; i < n; ++i)
     names += (i == 0 ? "'" : i + 1 < n ? ", '" : " and '") + model.closures()[conflict.closures[i]].name + "'";
   if (n == 1)
-    return "loop " + names + " cannot close" + (model.closures().size() > 1 ? ", whatever the others do" : "");
-  if (n == 2) return "loops " + names + " cannot close together, though each alone does";
-  return "loops " + names + " cannot close together, though without any one of them the others do";
+    return "loop " + names + " cannot close" + (model.closures().size() > 1 ? ", whatever the other loops do" : "");
+  if (n == 2) return "loops " + names + " cannot close together, although each can alone";
+  return "loops " + names + " cannot close together, although without any one of them the others can";
 }
 
 std::string describeRemedies(const Model& model, const LoopConflict& conflict) {
   std::string out;
   for (const LoopRemedy& remedy : conflict.remedies) out += (out.empty() ? "" : ", or ") + describe(model, remedy);
   return out.empty() ? out
-                     : "the least change that would close " +
-                           std::string(conflict.closures.size() == 1 ? "it" : "them") + " is one of: " + out;
+                     : "the smallest change that closes " + std::string(conflict.closures.size() == 1 ? "it" : "them") +
+                           " is one of: " + out;
 }
 
 ModelError makeClosingError(const Model& model, const std::string& source, const AssemblyResult& open) {
   std::string element = open.worst;
-  std::string problem = "its loop cannot be closed: from no start does it come nearer than " +
+  std::string problem = "its loop cannot be closed: from every start it stays open by at least " +
                         formatNumber(open.gap, "%.6g") + " (m or rad)";
-  std::string remedy = "check the lengths and frames along the loop, or give a reference posture near a closed one";
+  std::string remedy = "check the lengths and frames along the loop, or give a reference posture close to a closed one";
   const std::vector<LoopConflict> conflicts = findLoopConflicts(model, open.q);
   if (conflicts.empty()) return {source, element, problem, remedy};
   const LoopConflict& conflict = conflicts.front();

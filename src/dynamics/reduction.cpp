@@ -131,8 +131,8 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
   for (const PointSpring& spring : model.pointSprings())
     if (calcPointSpringLength(spring, whole) < kShortestSpring)
       throw ModelError(model.name(), "point spring '" + spring.name + "'",
-                       "its points meet at the given configuration, where its force has no direction",
-                       "move one of its points, or begin at another posture");
+                       "its points coincide at the given configuration, where its force has no direction",
+                       "move one of its points, or start from another posture");
   // Reduced joints and their reduced coordinates, in the order of the first joint of each.
   std::vector<int> cluster_joint(out.clusters.size(), -1);
   std::vector<int>& joint_of = out.joint_of_body;
@@ -162,7 +162,7 @@ Reduction makeReduction(const Model& model, ConstVectorRef q) {
     out.joints.push_back(reduced);
   }
   if (out.size == 0)
-    throw ModelError(model.name(), "closures", "they leave the robot no mobility", "see `bielle info` for ranks");
+    throw ModelError(model.name(), "closures", "they leave the robot without mobility", "see `bielle info` for ranks");
   return out;
 }
 

@@ -50,7 +50,7 @@ class Adopter {
   Adopter(const LoadedRobot& robot, const std::string& path) : model_(robot.model), path_(path), ws_(robot.model) {
     if (!model_.hasFreeFlyer())
       fail("it has a fixed base",
-           "only robots that stand on feet are adopted; `bielle solve` takes others as they are");
+           "only robots that stand on feet can be adopted; `bielle solve` accepts others unchanged");
     const AssemblyResult closed = findClosedConfiguration(model_);
     if (closed.status != AssemblyStatus::Closed) fail("its loops do not close: " + closed.message, "correct the robot");
     updatePositions(model_, ws_, closed.q);
@@ -58,7 +58,7 @@ class Adopter {
 
   Adoption write() {
     findFeet();
-    out_ << "# A first guess by `bielle adopt`: correct what is wrong, then delete the comment above it.\nmodel: "
+    out_ << "# A first guess by `bielle adopt`: correct each entry, then delete the comment above it.\nmodel: "
          << quoteYaml(path_) << "\n";
     writeMotors();
     writeContacts();
@@ -115,7 +115,7 @@ class Adopter {
 
   void writeMotors() {
     if (model_.motors().empty())
-      return guess("Motors: none are given, and none are guessed: name joints under `motors`.");
+      return guess("Motors: none are given, and none are guessed. Name joints under `motors`.");
     const double least = model_.mass() * 9.81 * kLever;
     bool unlimited = false, guessed = false;
     std::ostringstream lines;
@@ -128,13 +128,15 @@ class Adopter {
             << ", effort: " << limit(motor.effort_limit) << ", velocity: " << limit(motor.velocity_limit)
             << formatMotorData(motor) << "}\n";
     }
-    guess(
-        "Motors: those of the robot." +
-        std::string(guessed ? " Rotors of 1e-3 kg m^2 where none is given, so that light linkages do not race." : "") +
-        (unlimited ? " Limits below " + format(least) +
-                         " N m, which could not hold the weight on 20 mm, are taken for "
-                         "placeholders."
-                   : ""));
+    guess("Motors: those of the robot." +
+          std::string(
+              guessed
+                  ? " Rotors of 1e-3 kg m^2 where none are given, so that light linkages do not accelerate too fast."
+                  : "") +
+          (unlimited ? " Limits below " + format(least) +
+                           " N m, which could not hold the weight on 20 mm, are taken for "
+                           "placeholders."
+                     : ""));
     out_ << "motors:\n" << lines.str();
   }
 
@@ -172,12 +174,11 @@ class Adopter {
           {getContactName(i), frame.body, frame.X_BF, ContactKind::Surface6D, sole[0] / 2, sole[1] / 2});
     }
     guess("Feet: the lowest frames with z up" +
-          std::string(feet_[0].is_named ? " that are named like feet" : ", whose names do not say so") +
+          std::string(feet_[0].is_named ? " that are named like feet" : ", although not named like feet") +
           (feet_.size() == 2 ? ", mirror images of each other; left is where y is positive."
-                             : ": one, without a mirror image."));
-    guesses_.push_back(is_measured
-                           ? "Soles: the extent of the shapes of the feet, which may be more than the flat part."
-                           : "Soles: 0.1 m square, because the feet have no shapes, or meshes that cannot be read.");
+                             : ": only one, without a mirror image."));
+    guesses_.push_back(is_measured ? "Soles: the extent of the feet's shapes, which may exceed the flat part."
+                                   : "Soles: 0.1 m square, because the feet have no readable shapes.");
     out_ << "# " << guesses_.back() << "\ncontacts:\n" << lines.str();
     with_feet_ = ModelBuilder::restore(std::move(parts));
   }
@@ -225,10 +226,11 @@ class Adopter {
       Reference r = makePosture(share);
       if (!stand(r)) continue;
       guess(
-          "Posture: feet flat, as far apart as in the neutral configuration and two soles at least, under the centre "
-          "of mass;");
-      const std::string more = "the base at " + format(100 * share) +
-                               " % of its height there. It closes; angles under `joints` choose how legs bend.";
+          "Posture: feet flat below the centre of mass, as far apart as in the neutral configuration but at least two "
+          "soles;");
+      const std::string more =
+          "the base at " + format(100 * share) +
+          " % of its height there. Its loops close; angles under `joints` determine how the legs bend.";
       guesses_.back() += " " + more;
       const std::vector<double>& base = r.joints.begin()->second;
       out_ << "# " << more << "\nreferences:\n  half_sitting:\n    joints:\n      "
@@ -238,9 +240,7 @@ class Adopter {
       for (const auto& [name, place] : r.feet) out_ << "      " << name << ": [0, " << format(place.y()) << ", 0]\n";
       return;
     }
-    guess(
-        "Posture: none that stands on flat feet within the ranges of the joints was found: give one under "
-        "`references`.");
+    guess("Posture: none was found with flat feet and joints within their ranges. Give one under `references`.");
   }
 
   void writeSerialJoints() {
@@ -254,7 +254,7 @@ class Adopter {
       }
       if (!is_simple || joints.size() != 6)
         return guess("Serial joints: none guessed, because " + std::to_string(joints.size()) +
-                     " joints lead from the base to a foot: name six per leg under `serial_joints`.");
+                     " joints lead from the base to a foot. Name six per leg under `serial_joints`.");
       for (const std::string& joint : joints) lines += joint;
     }
     guess("Serial joints: all from the base to the feet.");

@@ -65,8 +65,8 @@ class DrakeWriter {
     Joint& joint = parts_.joints[i];
     if (std::abs(joint.axis.dot(joint.axis2)) > 1e-12)
       throw ModelError(parts_.name, "universal joint '" + joint.name + "'",
-                       "its axes are not at right angles: Drake has no such joints",
-                       "change the model, or make two revolute joints of it");
+                       "its axes are not perpendicular, which Drake does not support",
+                       "change the model, or replace it by two revolute joints");
     if (joint.axis == Vector3d::UnitX() && joint.axis2 == Vector3d::UnitY()) return;
     SE3 X_BN;
     X_BN.R << joint.axis, joint.axis2, joint.axis.cross(joint.axis2);
@@ -137,7 +137,7 @@ class DrakeWriter {
     if (spring.stiffness == 0 && spring.damping == 0) return;
     if (spring.stiffness != 0 && !(rest > 0))
       return warn(element, "it is left out: it would have no tension at a length of " + formatNumber(rest) +
-                               " m, which Drake wants to be positive");
+                               " m, which Drake requires to be positive");
     if (!(rest > 0)) rest = 1;  // of a damper alone, on which it has no effect
     out_ << "\n  <drake:linear_spring_damper name=\"" << escapeXml(spring.name) << "\">\n";
     writeEntry("linear_spring_damper_body_A", "name", getLink(spring.body1));
@@ -167,7 +167,7 @@ class DrakeWriter {
   void warnMassless() {
     for (size_t i = 1; i < parts_.bodies.size(); ++i)
       if (!(parts_.bodies[i].inertia.mass > 0))
-        warn("link '" + parts_.bodies[i].name + "'", "it has no mass, with which Drake may not compute");
+        warn("link '" + parts_.bodies[i].name + "'", "it has no mass, which Drake may reject");
   }
 
   FormatWarnings warnings_;

@@ -35,7 +35,7 @@ void FormatWarnings::addArmature(bool of_motors) {
 
 void FormatWarnings::addBeyondTree() {
   addArmature(true);
-  if (!model_.motors().empty()) add("motors", "which joints they drive is left out");
+  if (!model_.motors().empty()) add("motors", "their assignment to joints is left out");
   for (const PointSpring& spring : model_.pointSprings()) add("point spring '" + spring.name + "'", "it is left out");
   addTargets();
 }

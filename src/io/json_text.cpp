@@ -27,7 +27,7 @@ std::string formatJson(const Json& json, int indent) {
 
 Json parseJson(const std::string& text) {
   return Json::parse(text, [](int depth, Json::parse_event_t, Json&) {
-    if (depth > kDeepestJson) throw std::runtime_error("it is nested too deep");
+    if (depth > kDeepestJson) throw std::runtime_error("it is nested too deeply");
     return true;
   });
 }
@@ -36,7 +36,7 @@ void readJsonFile(const std::string& path, const std::string& remedy, const std:
   const std::string text = readTextFile(path, remedy);
   try {
     const Json json = parseJson(text);
-    if (!json.is_object()) throw std::runtime_error("it is no object");
+    if (!json.is_object()) throw std::runtime_error("it is not an object");
     read(json);
   } catch (const std::exception& error) {
     throw ModelError(path, "JSON", error.what(), remedy);

@@ -15,8 +15,8 @@ SerialTrajectory makeSerialTrajectory(const Motion& motion, const MotionRecord& 
   const int stages = problem.numStages();
   if (record.a.rows() != stages || record.q_names != makePositionNames(model) ||
       record.v_names != makeVelocityNames(model) || record.contact_names != getNames(model.contacts()))
-    throw ModelError(model.name(), "trajectory", "its stages, joints or contacts are not those of this motion",
-                     "make it anew with `bielle solve --model serial`");
+    throw ModelError(model.name(), "trajectory", "its stages, joints or contacts differ from those of this motion",
+                     "recreate it with `bielle solve --model serial`");
   SerialTrajectory out;
   for (int k = 0; k <= stages; ++k) {
     out.q.push_back(record.q.row(k));
@@ -45,7 +45,7 @@ MotionResult makeLiftedResult(const RunInfo& run, const Model& closed, const Mot
   Motion motion;
   motion.name = serial.name;
   motion.ground = serial.ground;
-  motion.requested = serial.requested;
+  motion.options = serial.options;
   for (const Goal& goal : serial.goals)  // if a lift stops early, those that it reached
     if (goal.last <= static_cast<int>(lifted.trajectory.us.size())) motion.goals.push_back(goal);
   int left = static_cast<int>(lifted.trajectory.us.size());

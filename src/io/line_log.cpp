@@ -19,7 +19,7 @@ LineLog::LineLog(const std::string& path, const std::string& header, const std::
   if (file_ < 0) failToWrite(path, std::strerror(errno));
   try {
     if (flock(file_, LOCK_EX | LOCK_NB) != 0)
-      throw ModelError(path, "log", "another process is at work there", "wait for it, or give another directory");
+      throw ModelError(path, "log", "another process is using it", "wait for it, or give another directory");
     read(header, mismatch);
   } catch (...) {
     close(file_);

@@ -121,7 +121,7 @@ class MjcfWriter {
     while (moments[0] + moments[1] < moments[2]) moments[0] = std::nextafter(moments[0], 1e300);
     if (inertia.mass < kLeastInertia || moments[0] > principal.eigenvalues()[0] + 1e-9 * moments[2])
       warn("body '" + model_.bodies()[i].name + "'",
-           "its inertia is not that of a body with mass; the smallest that MuJoCo accepts is written");
+           "its inertia is not that of a body with mass; the smallest inertia that MuJoCo accepts is written");
     out_ << indent << "<inertial" << formatPlacement({R, inertia.com})
          << attribute("mass", formatMjcf(std::max(inertia.mass, kLeastInertia)))
          << attribute("diaginertia", formatVector(moments)) << "/>\n";
@@ -155,7 +155,7 @@ class MjcfWriter {
     if (force.damping != 0) out_ << attribute("damping", formatMjcf(force.damping));
     if (force.friction == 0) return;
     out_ << attribute("frictionloss", formatMjcf(force.friction));
-    warn("joint '" + joint.name + "'", "its friction is MuJoCo's there, which sticks");
+    warn("joint '" + joint.name + "'", "its friction becomes MuJoCo's, which sticks");
   }
 
   void writeBall(const Joint& joint, int k, const std::string& indent) {
@@ -256,7 +256,7 @@ class MjcfWriter {
     }
     const ContactFrame& other = model_.contacts()[contact];
     if (other.body != frame.body || other.X_BF.p != frame.X_BF.p || other.X_BF.R != frame.X_BF.R)
-      warn("frame '" + frame.name + "'", "it is left out: a contact elsewhere has this name");
+      warn("frame '" + frame.name + "'", "it is left out: another contact has this name");
   }
 
   void writeSole(const ContactFrame& contact, const std::string& indent) {
@@ -323,7 +323,7 @@ class MjcfWriter {
       const double rest = spring.rest - spring.preload / spring.stiffness;
       if (rest < 0)
         warn("point spring '" + spring.name + "'",
-             "it would have no tension below a length of 0: its preload is written as " +
+             "its length without tension would be negative: its preload is written as " +
                  formatMjcf(spring.stiffness * spring.rest) + " N");
       out << attribute("stiffness", formatMjcf(spring.stiffness))
           << attribute("springlength", formatMjcf(std::max(rest, 0.0)));
@@ -437,9 +437,9 @@ class MjcfWriter {
     }
     for (const Reference& reference : model_.references())
       if (!reference.height_frame.empty() || !reference.feet.empty())
-        warn("reference '" + reference.name + "'", "of it only the assembled posture is written, as a keyframe");
+        warn("reference '" + reference.name + "'", "only its assembled posture is written, as a keyframe");
     warnings_.addYamlOnly();
-    if (!speeds.empty()) warn("joints " + speeds, "their limits of speed are left out");
+    if (!speeds.empty()) warn("joints " + speeds, "their speed limits are left out");
     for (const std::string& mesh : meshes_) meshes += (meshes.empty() ? "'" : ", '") + mesh + "'";
     if (!meshes.empty()) warn("meshes " + meshes, "they are left out");
   }

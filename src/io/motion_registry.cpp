@@ -50,14 +50,13 @@ MotionRequest makeFootholdsRequest() {
   return request;
 }
 
-constexpr const char* kPaper = "the problem published with the paper: no footholds, a velocity instead";
-constexpr const char* kPaperJump =
-    "the problem published with the paper: no paths of the feet, the height at mid-flight alone";
+constexpr const char* kPaper = "the problem published with the paper: a velocity instead of footholds";
+constexpr const char* kPaperJump = "the problem published with the paper: only the height at mid-flight, no foot paths";
 
 // The motions of a sequence from the names of its options: "walk2.speed" is one of a walk.
-std::vector<std::string> listParts(const std::vector<std::pair<std::string, double>>& requested) {
+std::vector<std::string> listParts(const std::vector<std::pair<std::string, double>>& options) {
   std::vector<std::string> labels, motions;
-  for (const auto& [name, value] : requested) {
+  for (const auto& [name, value] : options) {
     const size_t dot = name.find('.');
     if (dot == std::string::npos) continue;
     const std::string label = name.substr(0, dot);
@@ -73,7 +72,7 @@ std::vector<std::string> listParts(const std::vector<std::pair<std::string, doub
 const std::vector<MotionEntry>& getMotions() {
   static const std::vector<MotionEntry> motions = {
       {"squat",
-       "down and up again, feet flat: the height of the centre of mass follows a sine",
+       "go down and up again with feet flat; the height of the centre of mass follows a sine",
        "bielle solve squat --robot bipetto --depth 0.7 -o squat",
        {"depth", "duration"},
        makeRequests<SquatOptions>(planSquat)},
@@ -93,7 +92,7 @@ const std::vector<MotionEntry>& getMotions() {
        {"angle", "radius", "steps", "single_support", "double_support", "swing_height"},
        makeRequests<TurnOptions>(planTurn)},
       {"stairs",
-       "up or down stairs, one foot per step",
+       "climb or descend stairs, one foot per step",
        "bielle solve stairs --robot bipetto --height 0.06 --stairs 4 -o stairs",
        {"height", "depth", "slope", "stairs", "speed", "width", "double_support", "swing_height"},
        makeRequests<StairsOptions>(planStairs, {{"paper", kPaper, setPaperWeights}})},
@@ -103,7 +102,7 @@ const std::vector<MotionEntry>& getMotions() {
        {"rim", "single_support", "double_support", "swing_height"},
        makeFootholdsRequest},
       {"box",
-       "a step onto a box, and down again if asked",
+       "a step onto a box, and down again if requested",
        "bielle solve box --robot bipetto --height 0.1 --down 1 -o box",
        {"height", "length", "width", "distance", "down", "single_support", "swing_height"},
        makeRequests<BoxOptions>(planBox)},
@@ -113,7 +112,7 @@ const std::vector<MotionEntry>& getMotions() {
        {"width", "distance", "depth", "single_support", "swing_height"},
        makeRequests<GapOptions>(planGap)},
       {"jump",
-       "push, fly for a given time, land: the height of the centre of mass at mid-flight follows from the time",
+       "push off, fly for a given time, land; the time determines the height of the centre of mass at mid-flight",
        "bielle solve jump --robot bipetto --flight 0.3 --length 0.2 -o jump",
        {"flight", "length"},
        makeRequests<JumpOptions>(planJump, {{"paper", kPaperJump, setPaperWeights}})},
@@ -123,7 +122,7 @@ const std::vector<MotionEntry>& getMotions() {
        {"speed", "steps", "flight", "stance", "swing_height"},
        makeRequests<RunOptions>(planRun)},
       {"hop",
-       "one foot is lifted, the other one takes off and lands again",
+       "lift one foot, take off and land on the other one",
        "bielle solve hop --robot bipetto --foot left --flight 0.15 -o hop",
        {"foot", "hops", "flight", "length", "stance", "swing_height"},
        makeRequests<HopOptions>(planHop)},
@@ -162,23 +161,23 @@ MotionRequest makeSequenceRequest(const std::vector<std::string>& motions) {
 Motion makeRequested(const MotionRequest& request, const Model& model, const ProblemOptions& problem) {
   Motion motion = makeMotion(model, request.plan(model, makeStandingPosture(model)), problem);
   const LimitOptions& limits = problem.limits;
-  for (const auto& [motor, value] : limits.efforts) motion.requested.emplace_back(kEffortLimit + motor, value);
-  for (const auto& [motor, value] : limits.velocities) motion.requested.emplace_back(kVelocityLimit + motor, value);
-  for (const auto& [motor, value] : limits.powers) motion.requested.emplace_back(kPowerLimit + motor, value);
+  for (const auto& [motor, value] : limits.efforts) motion.options.emplace_back(kEffortLimit + motor, value);
+  for (const auto& [motor, value] : limits.velocities) motion.options.emplace_back(kVelocityLimit + motor, value);
+  for (const auto& [motor, value] : limits.powers) motion.options.emplace_back(kPowerLimit + motor, value);
   if (limits.dead_point_margin != LimitOptions().dead_point_margin)
-    motion.requested.emplace_back(kDeadPointMargin, limits.dead_point_margin);
+    motion.options.emplace_back(kDeadPointMargin, limits.dead_point_margin);
   return motion;
 }
 
 MotionRequest remakeRequest(const MotionSummary& summary) {
-  const MotionRequest request = summary.motion == kSequence ? makeSequenceRequest(listParts(summary.requested))
+  const MotionRequest request = summary.motion == kSequence ? makeSequenceRequest(listParts(summary.options))
                                                             : findMotion(summary.file, summary.motion).makeRequest();
   const auto isLimit = [](const std::string& name) {
     for (const char* prefix : {kEffortLimit, kVelocityLimit, kPowerLimit, kDeadPointMargin})
       if (name.rfind(prefix, 0) == 0) return true;
     return false;
   };
-  for (const auto& [name, value] : summary.requested)
+  for (const auto& [name, value] : summary.options)
     if (!isLimit(name)) setOption(request.options, name, value);
   return request;
 }

@@ -72,15 +72,15 @@ NpyArray parseNpy(const std::string& path, const std::string& element, const std
     if (!ok) throw ModelError(path, element, problem, "give a trajectory that Bielle wrote");
   };
   require(bytes.size() >= kPrelude && bytes.compare(0, sizeof kMagic, kMagic, sizeof kMagic) == 0,
-          "it is no array of the .npy format 1.0");
+          "it is not an array in .npy format 1.0");
   const size_t length = static_cast<unsigned char>(bytes[8]) + 256u * static_cast<unsigned char>(bytes[9]);
-  require(bytes.size() >= kPrelude + length, "it is cut short");
+  require(bytes.size() >= kPrelude + length, "it is truncated");
   require(length <= kLongestHeader, "its header is too long");  // std::regex recurses
   const std::string header = bytes.substr(kPrelude, length);
   static const std::regex pattern(
       R"(\{\s*'descr':\s*'<(f8|U\d{1,6})',\s*'fortran_order':\s*False,\s*'shape':\s*\(([\d, ]*)\),?\s*\}\s*)");
   std::smatch match;
-  require(std::regex_match(header, match, pattern), "its header is not understood: " + header);
+  require(std::regex_match(header, match, pattern), "its header is not supported: " + header);
   NpyArray array;
   static const std::regex number(R"(\d{1,9})");
   const std::string shape = match[2];
@@ -91,7 +91,7 @@ NpyArray parseNpy(const std::string& path, const std::string& element, const std
   const size_t width = array.is_text ? std::stoul(type.substr(1)) : 1;
   const size_t item = array.is_text ? sizeof(char32_t) * width : sizeof(double);
   const std::optional<size_t> elements = calcCount(array.shape, bytes.size());
-  require(elements && bytes.size() - kPrelude - length == *elements * item, "its data do not fit its shape");
+  require(elements && bytes.size() - kPrelude - length == *elements * item, "its size does not match its shape");
   const size_t count = *elements;
   const char* data = bytes.data() + kPrelude + length;
   if (!array.is_text) {

@@ -20,7 +20,7 @@ constexpr size_t kLargest = size_t{1} << 28;  // all arrays together, bytes
 
 // Errors of libzip that cannot occur: everything is in memory and we set the sizes.
 [[noreturn]] void failInMemory(const char* message) {
-  throw std::runtime_error(std::string("a NumPy archive cannot be made: ") + message);
+  throw std::runtime_error(std::string("a NumPy archive could not be created: ") + message);
 }
 
 struct ArchiveDeleter {
@@ -56,7 +56,7 @@ std::string readEntry(zip_t* archive, zip_int64_t index, const std::string& path
   zip_int64_t count = 0;
   while ((count = zip_fread(file.get(), buffer, sizeof buffer)) > 0) {
     bytes.append(buffer, static_cast<size_t>(count));
-    if (bytes.size() > largest) fail(path, name, "it is larger than a trajectory may be (256 MiB)");
+    if (bytes.size() > largest) fail(path, name, "it exceeds the largest size of a trajectory (256 MiB)");
   }
   if (count < 0) fail(path, name, "it is damaged");
   return bytes;
@@ -108,7 +108,7 @@ NpyArrays readArchive(const std::string& path) {
     const std::string name = entry, bytes = readEntry(archive.get(), i, path, name, left);
     left -= bytes.size();
     const size_t stem = name.size() > 4 ? name.size() - 4 : 0;
-    if (name.substr(stem) != ".npy") fail(path, name, "it is no .npy file");
+    if (name.substr(stem) != ".npy") fail(path, name, "it is not a .npy file");
     arrays[name.substr(0, stem)] = parseNpy(path, name, bytes);
   }
   return arrays;

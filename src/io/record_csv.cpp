@@ -18,7 +18,7 @@ constexpr size_t kMostColumns = 1 << 20;
 
 std::string nameLine(int node) { return "line " + std::to_string(node + 2); }
 
-// A name with a comma, a quote or a line break is quoted, as usual in CSV.
+// A name with a comma, a quoteCsv or a line break is quoted, as usual in CSV.
 std::string quoteCsv(const std::string& name) {
   if (name.find_first_of(",\"\n\r") == std::string::npos) return name;
   std::string text = "\"";
@@ -99,14 +99,14 @@ MotionRecord readCsv(const std::string& path) {
   MotionRecord record;
   const std::vector<std::string> header = readLine(text, at, kMostColumns);
   for (const std::string& column : header) addName(column, record);
-  if (makeHeader(record) != header) failCsv(path, "header", "its columns are not those of a trajectory");
+  if (makeHeader(record) != header) failCsv(path, "header", "it does not have the columns of a trajectory");
   // Counted before memory is allocated for them.
   const size_t first_row = at;
   int nodes = 0;
   for (; at < text.size(); ++nodes)
     if (readLine(text, at, header.size()).size() != header.size())
-      failCsv(path, nameLine(nodes), "it has not the " + std::to_string(header.size()) + " cells of the header");
-  if (nodes == 0) failCsv(path, "file", "it has no node");
+      failCsv(path, nameLine(nodes), "expected " + std::to_string(header.size()) + " cells as in the header");
+  if (nodes == 0) failCsv(path, "file", "it has no nodes");
 
   resizeRecord(nodes - 1, record);
   const std::vector<RecordTable> tables = listTables(record);

@@ -52,18 +52,18 @@ Multipliers takeMultipliers(const std::string& path, size_t nodes, NpyArrays& ar
   const auto refuse = [&path](const char* problem) {
     throw ModelError(path, "array 'multipliers'", problem, "give a trajectory that Bielle wrote");
   };
-  if (rows.size() != nodes) refuse("it does not say how many each node has");
+  if (rows.size() != nodes) refuse("it does not give the number of multipliers of each node");
   if (penalty.size() != 1 || !(penalty[0] > 0) || !std::isfinite(penalty[0])) refuse("its penalty is not positive");
   size_t used = 0;
   for (double count : rows) {
     if (!(count >= 0 && count <= static_cast<double>(values.size() - used)) || count != std::floor(count))
-      refuse("its length does not fit the rows of the nodes");
+      refuse("its length does not match the rows of the nodes");
     const size_t size = static_cast<size_t>(count);
     out.values.push_back(VectorXd::Map(values.data() + used, static_cast<Eigen::Index>(size)));
-    if (!out.values.back().allFinite()) refuse("it has numbers that are not finite");
+    if (!out.values.back().allFinite()) refuse("it contains numbers that are not finite");
     used += size;
   }
-  if (used != values.size()) refuse("its length does not fit the rows of the nodes");
+  if (used != values.size()) refuse("its length does not match the rows of the nodes");
   out.penalty = penalty[0];
   return out;
 }
@@ -72,7 +72,7 @@ RowMatrixXd takeFootholds(const std::string& path, size_t nodes, size_t contacts
   if (arrays.count("footholds") == 0) return {};
   const NpyArray array = takeArray(path, "footholds", false, arrays);
   if (array.shape != std::vector<size_t>{nodes, contacts, MotionRecord::kFootholdEntries})
-    throw ModelError(path, "array 'footholds'", "its shape does not fit the contacts and the nodes",
+    throw ModelError(path, "array 'footholds'", "its shape does not match the contacts and nodes",
                      "give a trajectory that Bielle wrote");
   return RowMatrixXd::Map(array.numbers.data(), nodes, contacts * MotionRecord::kFootholdEntries);
 }
@@ -104,14 +104,15 @@ MotionRecord readNpz(const std::string& path) {
   record.has_midpoints = arrays.count("q_mid") > 0;
   const NpyArray time = takeArray(path, "time", false, arrays);
   if (time.shape.size() != 1 || time.numbers.empty())
-    throw ModelError(path, "array 'time'", "it is not a list of nodes", "give a trajectory that Bielle wrote");
+    throw ModelError(path, "array 'time'", "it is not a list with one number per node",
+                     "give a trajectory that Bielle wrote");
   const size_t nodes = time.numbers.size();
   record.time = VectorXd::Map(time.numbers.data(), nodes);
   for (const RecordTable& table : listTables(record)) {
     const size_t rows = table.per == RecordTable::Per::Node ? nodes : nodes - 1;
     const NpyArray array = takeArray(path, table.array, false, arrays);
     if (array.shape != makeShape(table, rows))
-      throw ModelError(path, "array '" + table.array + "'", "its shape does not fit the names and the nodes",
+      throw ModelError(path, "array '" + table.array + "'", "its shape does not match the names and nodes",
                        "give a trajectory that Bielle wrote");
     record.*table.data = RowMatrixXd::Map(array.numbers.data(), rows, table.columns.size());
   }

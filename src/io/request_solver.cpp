@@ -50,9 +50,9 @@ MotionResult RequestSolver::solve(const RunInfo& run) {
   result.record.multipliers = std::move(multipliers);
   if (!result.converged()) return result;
   std::optional<Motion> refined = refineStages(request_, model_, options_.problem, motion_, result);
-  if (refined) improve(*refined, again, "in stages half as long", run, result);
+  if (refined) improve(*refined, again, "with stages half as long", run, result);
   refined = avoidDeadPoints(request_, model_, options_.problem, result.record);
-  if (refined) improve(*refined, from_plan, "with linkages farther from their dead points", run, result);
+  if (refined) improve(*refined, from_plan, "with linkages farther from dead points", run, result);
   refuseLongStages(result);
   return result;
 }
@@ -63,16 +63,16 @@ void RequestSolver::refuseLongStages(MotionResult& result) const {
   if (!(error > kAllowedStepError)) return;
   result.solver.termination = FddpTermination::Failed;
   result.solver.message =
-      "its stages are too long for how quickly it moves: across a stage the velocities differ from what the "
-      "accelerations give by up to " +
+      "the time step is too coarse for this motion: across a stage, velocities differ from the integrated "
+      "accelerations by up to " +
       formatNumber(100 * error, "%.2g") +
-      " % of the largest acceleration; ask for a slower or shorter motion, or set a shorter time_step";
+      " % of the largest acceleration; request a slower or shorter motion, or set a shorter time_step";
 }
 
 // Solves a motion in place of one whose stages are too long, and takes it if its own are less so.
 void RequestSolver::improve(Motion& motion, const FddpOptions& solver, const std::string& how, const RunInfo& run,
                             MotionResult& result) const {
-  tell("stages are too long for how quickly it moves: once more, " + how);
+  tell("the time step is too coarse for this motion: solving again " + how);
   Multipliers multipliers;
   const FddpSummary summary = solveMotion(motion, solver, observer_.motion, &multipliers);
   MotionResult improved = makeResult(run, motion, motion.guess, addUp(result.solver, summary));
@@ -83,8 +83,8 @@ void RequestSolver::improve(Motion& motion, const FddpOptions& solver, const std
   }
   result.solver = addUp(summary, result.solver);
   if (observer_.warn)
-    observer_.warn(how + ": " + getName(summary.termination) + (improved.converged() ? ", no better" : "") +
-                   "; the motion before is kept");
+    observer_.warn(how + ": " + getName(summary.termination) + (improved.converged() ? ", but not better" : "") +
+                   "; the previous motion is kept");
 }
 
 // Solves each motion of a sequence by itself.
@@ -94,7 +94,7 @@ void RequestSolver::startFromParts() {
   parts.solver = options_.solver;
   parts.observer = observer_.part;
   parts.report = [this](const std::string& part, const FddpSummary& summary) {
-    tell("by itself, " + part + ": " + format(summary));
+    tell(part + " alone: " + format(summary));
   };
   motion_.guess = solveParts(model_, request_.parts, makeStandingPosture(model_), parts);
   fitTimings(*motion_.problem, motion_.guess);
@@ -103,10 +103,10 @@ void RequestSolver::startFromParts() {
 // Replaces the motion of least effort by that of the objective, which starts from there, or from a given result.
 void RequestSolver::startFromEffort(const FddpOptions& solver) {
   if (!options_.warm_start) {
-    tell("first, the motion of least effort:");
+    tell("starting with the motion of least effort:");
     const FddpSummary summary = solveMotion(motion_, solver, observer_.motion);
     tell("least effort: " + format(summary));
-    tell(std::string("from there, ") + getName(objective_.objective) + ":");
+    tell(std::string("continuing with ") + getName(objective_.objective) + ":");
   }
   options_.problem.objective = scaleObjective(motion_, objective_, options_.problem.limits);
   Motion motion = makeRequested(request_, model_, options_.problem);

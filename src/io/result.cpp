@@ -112,9 +112,9 @@ Json makeGoals(const MotionResult& result) {
   Json goals = Json::array();
   for (const GoalOutcome& outcome : result.goals) {
     const Goal& goal = outcome.goal;
-    Json json = {{"name", goal.name},    {"kind", getName(goal.kind)},  {"unit", getUnit(goal.kind)},
-                 {"asked", goal.asked},  {"tolerance", goal.tolerance}, {"came_out", outcome.came_out},
-                 {"met", outcome.met()}, {"first_node", goal.first},    {"last_node", goal.last}};
+    Json json = {{"name", goal.name},           {"kind", getName(goal.kind)},  {"unit", getUnit(goal.kind)},
+                 {"requested", goal.requested}, {"tolerance", goal.tolerance}, {"achieved", outcome.achieved},
+                 {"met", outcome.met()},        {"first_node", goal.first},    {"last_node", goal.last}};
     if (goal.kind == GoalKind::Speed || goal.kind == GoalKind::Displacement) json["direction"] = list(goal.direction);
     if (!goal.contacts.empty()) json["contacts"] = goal.contacts;
     for (const Foothold& foothold : goal.footholds)
@@ -149,7 +149,7 @@ Json makeSummary(const MotionResult& result) {
           {"step", getName(result.step)},
           {"command", result.run.command},
           {"goals", makeGoals(result)},
-          {"requested", listByName(result.requested)},
+          {"options", listByName(result.options)},
           {"versions", {{"bielle", build.bielle}, {"eigen", build.eigen}, {"compiler", build.compiler}}},
           {"converged", result.converged()},
           {"interrupted", result.interrupted()},
@@ -233,7 +233,7 @@ MotionResult makeResult(const RunInfo& run, const Motion& motion, const Shooting
   result.motion = motion.name;
   result.formulation = motion.problem->formulation();
   result.step = motion.problem->spec(0).step;
-  result.requested = motion.requested;
+  result.options = motion.options;
   result.schedule = motion.schedule;
   result.timings = listTimings(*motion.problem, motion.schedule, trajectory);
   int node = 0;

@@ -74,7 +74,8 @@ class YamlWriter {
       }
       const char a = getAxisLetter(joint.axis), b = getAxisLetter(joint.axis2);
       if (!a || !b)
-        refuseToWrite(model_, "universal joint '" + joint.name + "'", "its axes are not among x, y and z of its frame");
+        refuseToWrite(model_, "universal joint '" + joint.name + "'",
+                      "its axes are not two of x, y and z of its frame");
       types += std::string("  - UJOINT_") + a + b + "\n";
     }
     if (!names.empty()) out << "\njoint_name:\n" << names << "joint_type:\n" << types;
@@ -234,7 +235,7 @@ void writeRobot(const Model& model, const std::string& directory, const std::str
   std::error_code error;
   fs::create_directories(path, error);
   if (error)
-    throw ModelError(directory, "directory", "it cannot be made: " + error.message(), "give another one with -o");
+    throw ModelError(directory, "directory", "it cannot be created: " + error.message(), "give another one with -o");
   writeTextFile((path / (name + ".urdf")).string(), text.urdf);
   writeTextFile((path / (name + ".yaml")).string(), text.yaml);
 }

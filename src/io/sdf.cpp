@@ -45,7 +45,7 @@ class SdfWriter {
   std::string getLink(int body) const { return body == 0 ? "world" : escapeXml(model_.bodies()[body].name); }
 
   [[noreturn]] void refuse(const Joint& joint, const std::string& problem) const {
-    throw ModelError(model_.name(), "joint '" + joint.name + "'", problem + ": SDF cannot say that",
+    throw ModelError(model_.name(), "joint '" + joint.name + "'", problem + ", which SDF cannot express",
                      "write another format, or change the model");
   }
 
@@ -75,7 +75,7 @@ class SdfWriter {
     write("iyy", I(1, 1)), write("iyz", I(1, 2)), write("izz", I(2, 2));
     out_ << "</inertia>\n      </inertial>\n";
     if (!(inertia.mass > 0))
-      warn("link '" + model_.bodies()[i].name + "'", "it has no mass, which SDF wants to be positive");
+      warn("link '" + model_.bodies()[i].name + "'", "it has no mass, which SDF requires to be positive");
     int count = 0;
     for (const Visual& visual : model_.visuals())
       if (visual.body == i) writeVisual(visual, ++count);
@@ -138,7 +138,8 @@ class SdfWriter {
                        : joint.kind == JointKind::Revolute  ? "revolute"
                                                             : "continuous";
     const std::string name = makeName(joint.name, "_joint");
-    if (name != joint.name) warn("joint '" + joint.name + "'", "it is named '" + name + "': a link has its name");
+    if (name != joint.name)
+      warn("joint '" + joint.name + "'", "it is renamed to '" + name + "' because a link has its name");
     out_ << "    <joint name=\"" << escapeXml(name) << "\" type=\"" << type << "\">\n      <parent>"
          << getLink(joint.parent) << "</parent>\n      <child>" << getLink(i) << "</child>\n";
     // The frame of the joint is that of its child, where the axes of ours are given at neutral.
@@ -187,7 +188,7 @@ class SdfWriter {
          << "</spring_stiffness></dynamics>\n";
     if (force.stiffness == 0 && force.preload != 0)
       warn("joint '" + joint.name + "'", "its preload without a spring is left out");
-    if (force.friction != 0) warn("joint '" + joint.name + "'", "its friction is that of the simulator there");
+    if (force.friction != 0) warn("joint '" + joint.name + "'", "its friction becomes that of the simulator");
   }
 
   void reportLimits(const Joint& joint) {
@@ -211,9 +212,9 @@ class SdfWriter {
 
   void writeClosure(const Closure& closure) {
     const std::string element = "closure '" + closure.name + "'";
-    if (closure.kind == ClosureKind::Coupler) return warn(element, "it is left out: SDF couples no joints");
+    if (closure.kind == ClosureKind::Coupler) return warn(element, "it is left out: SDF cannot couple joints");
     const std::string name = makeName(closure.name, "_closure");
-    if (name != closure.name) warn(element, "it is named '" + name + "': something else has its name");
+    if (name != closure.name) warn(element, "it is renamed to '" + name + "' because its name is taken");
     // The child may not be the world.
     const bool swap = closure.body2 == 0;
     const int parent = swap ? closure.body2 : closure.body1, child = swap ? closure.body1 : closure.body2;
@@ -234,7 +235,7 @@ class SdfWriter {
   void warn(const std::string& element, const std::string& problem) { warnings_.add(element, problem); }
 
   void listOmissions() {
-    if (!shifted_.empty()) warn("joints " + shifted_, "their coordinates count from these values, rad or m");
+    if (!shifted_.empty()) warn("joints " + shifted_, "their coordinates are measured from these values, rad or m");
     for (const Visual& visual : model_.visuals())
       if (visual.body == 0) {
         warn("shapes of the ground", "they are left out");

@@ -12,7 +12,7 @@ namespace {
 // A number of nodes, or the index of one.
 int readCount(const Json& json) {
   if (!json.is_number_integer() || json < 0 || json > std::numeric_limits<int>::max())
-    throw std::runtime_error(json.dump(-1, ' ', true, Json::error_handler_t::replace) + " is no number of nodes");
+    throw std::runtime_error(json.dump(-1, ' ', true, Json::error_handler_t::replace) + " is not a number of nodes");
   return json;
 }
 
@@ -42,11 +42,11 @@ GoalOutcome readGoal(const Json& json) {
   Goal& goal = outcome.goal;
   goal.name = json.at("name");
   goal.kind = parseGoalKind(json.at("kind"));
-  goal.asked = json.at("asked");
+  goal.requested = json.at("requested");
   goal.tolerance = json.at("tolerance");
   // JSON has no infinity or NaN.
-  outcome.came_out =
-      json.at("came_out").is_null() ? std::numeric_limits<double>::quiet_NaN() : json.at("came_out").get<double>();
+  outcome.achieved =
+      json.at("achieved").is_null() ? std::numeric_limits<double>::quiet_NaN() : json.at("achieved").get<double>();
   goal.first = readCount(json.at("first_node"));
   goal.last = readCount(json.at("last_node"));
   if (json.contains("direction")) goal.direction = readVector(json.at("direction"));
@@ -83,7 +83,7 @@ MotionSummary read(const Json& json) {
     summary.objective.regeneration = json.at("electrical_energy").at("regeneration");
   }
   summary.converged = json.at("converged");
-  for (const auto& [name, value] : json.at("requested").items()) summary.requested.emplace_back(name, value);
+  for (const auto& [name, value] : json.at("options").items()) summary.options.emplace_back(name, value);
   if (json.contains("goals"))  // older results have none
     for (const Json& entry : json.at("goals")) summary.goals.push_back(readGoal(entry));
   for (const Json& entry : json.at("phases")) {
@@ -111,7 +111,7 @@ MotionSummary readSummary(const std::string& directory) {
     summary.file = path;
     return summary;
   } catch (const std::exception& error) {
-    throw ModelError(path, "file", error.what(), "make it anew with `bielle solve`");
+    throw ModelError(path, "file", error.what(), "recreate it with `bielle solve`");
   }
 }
 

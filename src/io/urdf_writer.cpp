@@ -40,7 +40,7 @@ class UrdfWriter {
       const JointKind kind = model_.joints()[i].kind;
       if (!dialect.for_drake && (kind == JointKind::Spherical || kind == JointKind::Universal))
         refuseToWrite(model_, std::string(getName(kind)) + " joint '" + model_.joints()[i].name + "'",
-                      "a URDF has no such joints");
+                      "URDF does not support such joints");
     }
     for (const Closure& c : model_.closures()) {
       if (dialect.for_drake && c.kind != ClosureKind::Coupler) continue;
@@ -49,7 +49,7 @@ class UrdfWriter {
       if (c.terms.size() == 2 && mimics_.count(c.terms[1].joint)) y = 0;
       if (c.terms.size() != 2 || mimics_.count(c.terms[y].joint))
         warn("closure '" + c.name + "'", dialect.for_drake ? "it is left out: <mimic> couples a joint to one other"
-                                                           : "it is left out, a URDF is a tree");
+                                                           : "it is left out because a URDF is a tree");
       else
         mimics_[c.terms[y].joint] = {c.terms[1 - y].joint, -c.terms[1 - y].coefficient / c.terms[y].coefficient,
                                      c.offset / c.terms[y].coefficient};
@@ -176,7 +176,7 @@ class UrdfWriter {
     const bool slow = velocity.allFinite();
     if ((!ranged && !open) || (joint.nv != 1 && (ranged || slow)))
       refuseToWrite(model_, "joint '" + joint.name + "'",
-                    "it is limited on one side, or has several coordinates with limits");
+                    "it has a limit on one side only, or several coordinates with limits");
     const double effort = dialect_ ? getEffortLimit(joint) : HUGE_VAL;
     if (!ranged && !slow && std::isinf(effort) && (joint.kind == JointKind::Continuous || joint.nv != 1)) return;
     out << "    <limit";
@@ -220,7 +220,7 @@ class UrdfWriter {
             << formatRobotNumber(force.friction, "%.17g") << "\"/>\n";
       if (force.friction != 0 && force.friction_speed != JointForce().friction_speed)
         warn(element, "its friction_speed is left out");
-      if (force.friction != 0 && isForDrake()) warn(element, "its friction is written, but Drake leaves it out");
+      if (force.friction != 0 && isForDrake()) warn(element, "its friction is written, but Drake ignores it");
       if (force.stiffness != 0 || force.preload != 0) warn(element, "its spring is left out");
     }
   }

@@ -20,7 +20,7 @@ int matchRow(int i, int count, Eigen::Index rows) {
 
 void requireSame(const std::vector<std::string>& recorded, const std::vector<std::string>& names, const char* what) {
   if (recorded != names)
-    throw ModelError("", "warm start", std::string("the recorded motion has other ") + what + " than the robot",
+    throw ModelError("", "warm start", std::string("the recorded motion and the robot have different ") + what,
                      "give a result of the same robot");
 }
 
@@ -79,8 +79,8 @@ void setGuess(const MotionRecord& record, Motion& motion) {
   requireSame(record.u_names, getNames(model.motors()), "motors");
   if (record.q.rows() < 2 || record.u.rows() < 1 || !record.q.allFinite() || !record.v.allFinite() ||
       !record.u.allFinite())
-    throw ModelError("", "warm start", "the recorded motion is empty or has numbers that are not finite",
-                     "give the result of a solve that went through");
+    throw ModelError("", "warm start", "the recorded motion is empty or contains numbers that are not finite",
+                     "give the result of a successful solve");
   const int nodes = motion.problem->numStages() + 1;
   for (int k = 0; k < nodes; ++k) {
     const int row = matchRow(k, nodes, record.q.rows());
@@ -100,7 +100,7 @@ MotionRecord readResultRecord(const std::string& directory) {
     std::error_code error;
     if (fs::exists(path, error)) return readRecord(path.string());
   }
-  throw ModelError(directory, "directory", "there is neither trajectory.npz nor trajectory.csv in it",
+  throw ModelError(directory, "directory", "it contains neither trajectory.npz nor trajectory.csv",
                    "give the output directory of a solve");
 }
 

@@ -35,7 +35,7 @@ void ModelBuilder::addLink(const std::string& link, const std::string& parent_li
   const std::string element = "joint '" + joint.name + "'";
   if (link.empty()) fail(element, "its child link has no name", "name it");
   if (frames_.count(link))
-    fail("link '" + link + "'", "it is declared twice", "give every link and frame its own name");
+    fail("link '" + link + "'", "it is declared twice", "give every link and frame a unique name");
   const FramePlace parent = getFrame(parent_link, element);
   if (joint.kind == JointKind::Fixed) {
     const SE3 X_BF = parent.X_BF * joint.X_PJ;
@@ -86,7 +86,7 @@ void ModelBuilder::addInertia(const std::string& link, const Inertia& inertia) {
 
 void ModelBuilder::addFrame(const std::string& name, const std::string& link, const SE3& X_LF) {
   if (frames_.count(name))
-    fail("frame '" + name + "'", "it is declared twice", "give every link and frame its own name");
+    fail("frame '" + name + "'", "it is declared twice", "give every link and frame a unique name");
   const FramePlace place = getFrame(link, "frame '" + name + "'");
   frames_[name] = {place.body, place.X_BF * X_LF};
   model_.frames_.push_back({name, place.body, place.X_BF * X_LF});
@@ -115,7 +115,8 @@ void ModelBuilder::addMotor(Motor motor) {
   if (motor.torque_loss && !(*motor.torque_loss >= 0 && std::isfinite(*motor.torque_loss)))
     fail(element, "its torque_loss is not a finite number of 0 or more", "give W/(N m)^2, or leave it out");
   if (!(motor.continuous_effort > 0))
-    fail(element, "its continuous effort is not positive", "give what it bears for ever, or leave it out");
+    fail(element, "its continuous effort is not positive",
+         "give the effort it can sustain indefinitely, or leave it out");
   applyDrive(element, motor);
   model_.motors_.push_back(std::move(motor));
 }
@@ -135,7 +136,7 @@ void ModelBuilder::applyDrive(const std::string& element, Motor& motor) const {
   if (motor.armature == 0) motor.armature = drive.ratio * drive.ratio * drive.rotor_inertia;
   if (!drive.hasWinding()) {
     if (drive.resistance > 0 || std::isfinite(std::min({drive.voltage, drive.current, drive.continuous_current})))
-      fail(element, "its resistance, voltage or currents mean nothing without its torque constant",
+      fail(element, "its resistance, voltage or currents have no meaning without its torque constant",
            "add torque_constant, N m/A");
     return;
   }
@@ -203,7 +204,7 @@ void ModelBuilder::addContact(const std::string& name, const std::string& frame,
   if (model_.findContact(name) >= 0) fail(element, "it is declared twice", "rename one of them");
   const FramePlace place = getFrame(frame, element);
   if (!(half_length >= 0) || !(half_width >= 0) || !std::isfinite(half_length + half_width))
-    fail(element, "its sole is not made of two sizes of 0 or more", "give length and width in metres");
+    fail(element, "its sole is not given by two sizes of 0 or more", "give length and width in metres");
   model_.contacts_.push_back({name, place.body, place.X_BF, kind, half_length, half_width});
 }
 
@@ -284,7 +285,7 @@ void ModelBuilder::setArmature(const std::string& joint, double armature) {
 }
 
 Model ModelBuilder::build(std::vector<std::string>* warnings) const {
-  if (model_.nv_ == 0) fail("robot '" + model_.name_ + "'", "it has no moving joint", "declare at least one");
+  if (model_.nv_ == 0) fail("robot '" + model_.name_ + "'", "it has no moving joints", "declare at least one");
   checkInertias(warnings);
   Model model = model_;
   finishDofs(model);
@@ -316,7 +317,7 @@ void ModelBuilder::checkInertias(std::vector<std::string>* warnings) const {
     const double slack = 1e-6 * moments.cwiseAbs().maxCoeff() + 1e-12;
     if (moments[0] < -slack) fail(element, "its inertia matrix has a negative principal moment", "correct <inertia>");
     if (moments[2] > moments[0] + moments[1] + slack)
-      fail(element, "its principal moments break the triangle inequality, no body has such an inertia",
+      fail(element, "its principal moments violate the triangle inequality, so no body can have them",
            "correct <inertia>");
     if (inertia.mass == 0 && moments[2] > slack)
       fail(element, "it has rotational inertia but no mass", "give it a mass, or no inertia");

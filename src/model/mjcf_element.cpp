@@ -24,7 +24,7 @@ void merge(const TiXmlElement& element, const std::string& path, MjcfAttributes&
     attributes[a->Name()] = {a->Value(), element.Row()};
   if (attributes.size() > kMostAttributes)
     throw ModelError(path, "<" + element.ValueStr() + "> (line " + std::to_string(element.Row()) + ")",
-                     "it has more than " + std::to_string(kMostAttributes) + " attributes", "remove those without use");
+                     "it has more than " + std::to_string(kMostAttributes) + " attributes", "remove the unused ones");
 }
 
 bool parseNumbers(const std::string& text, std::vector<double>& numbers) {
@@ -195,7 +195,7 @@ Matrix3d MjcfElement::getRotation() {
   if (!quat.empty()) {
     const Eigen::Vector4d q(quat[1], quat[2], quat[3], quat[0]);
     const double norm = q.stableNorm();
-    if (!(norm > 1e-12) || !std::isfinite(norm)) fail("its quat has no length", "give a unit quaternion w x y z");
+    if (!(norm > 1e-12) || !std::isfinite(norm)) fail("its quat has zero length", "give a unit quaternion w x y z");
     return Eigen::Quaterniond(q / norm).toRotationMatrix();
   }
   if (!turn.empty()) return makeAxisRotation(normalize({turn[0], turn[1], turn[2]}), getAngle(turn[3]));
@@ -227,7 +227,7 @@ bool MjcfElement::isLimited(const std::string& limited, const std::string& range
     return has_range && settings_.auto_limits;
   }
   if (said != "true" && said != "false") fail("its '" + limited + "' is '" + said + "'", "use true, false or auto");
-  if (said == "true" && !has_range) fail("it is limited, without a " + range, "give one");
+  if (said == "true" && !has_range) fail("it is limited but has no " + range, "give one");
   return said == "true";
 }
 

@@ -8,7 +8,8 @@ namespace {
 
 void require(bool ok, const ModelParts& parts, const std::string& element) {
   if (!ok)
-    throw ModelError("", "robot '" + parts.name + "'", "its " + element + " do not fit", "take them from a model");
+    throw ModelError("", "robot '" + parts.name + "'", "its " + element + " are inconsistent",
+                     "take them from a model");
 }
 
 void checkParts(const ModelParts& parts) {

@@ -15,7 +15,7 @@ Model addPayload(const Model& model, const Payload& payload) {
   if (payload.mass == 0) return model;
   const auto moves_first = [](const Motor& motor) { return motor.joint == kTrunk; };
   if (std::any_of(model.motors().begin(), model.motors().end(), moves_first))
-    throw ModelError(model.name(), "payload", "the robot stands on the ground, it has no trunk to carry it",
+    throw ModelError(model.name(), "payload", "the robot is fixed to the ground and has no trunk to carry it",
                      "leave it out");
   ModelParts parts = takeParts(model);
   Inertia& trunk = parts.bodies[kTrunk].inertia;

@@ -22,8 +22,8 @@ void retypeJoints(const YamlFile& yaml, UrdfFile& urdf) {
   for (const auto& [name, type] : yaml.joint_types) {
     const auto it = findJoint(urdf.joints, name);
     if (it == urdf.joints.end()) {
-      urdf.warnings.push_back(yaml.path + ": key 'joint_name': a listed joint that is absent from the URDF, '" + name +
-                              "', is skipped; correct its name or remove it");
+      urdf.warnings.push_back(yaml.path + ": key 'joint_name': joint '" + name +
+                              "' is not in the URDF and is skipped; correct its name or remove it");
       continue;
     }
     // The limits and the friction of the file belong to its own coordinate.
@@ -127,7 +127,7 @@ RobotFiles readUrdfAndYaml(const std::filesystem::path& path) {
   const YamlFile own = readYaml(settings.string());
   if (!own.models.empty())
     throw ModelError(own.path, "key 'model'", "there is a URDF beside this file, " + path.string(),
-                     "remove the key, or put the file where there is none");
+                     "remove the key, or move the file to another directory");
   complete(own, files.yaml);
   return files;
 }
@@ -141,8 +141,8 @@ RobotFiles readRobotFiles(const std::filesystem::path& path) {
     for (const std::string& model : own.models) models += (models.empty() ? "" : ", ") + model;
     throw ModelError(own.path, "key 'model'",
                      models.empty() ? "it is missing, and there is no URDF beside this file"
-                                    : "the robot that this file completes is not there: " + models,
-                     "put its directory into one of those that BIELLE_ROBOTS names, or correct the key");
+                                    : "the robot that this file completes was not found: " + models,
+                     "put its directory into one of those in BIELLE_ROBOTS, or correct the key");
   }
   RobotFiles files = readUrdfAndYaml(urdf);
   complete(own, files.yaml);

@@ -126,15 +126,16 @@ class DrakeReader {
     const std::string type = kind ? getText(*kind) : getAttribute(&e, "type");
     if (type.empty()) fail(e, "it has no <type>", "give transmission_interface/SimpleTransmission");
     if (type.find("SimpleTransmission") == std::string::npos)
-      return warn(e, "it is left out: it is no SimpleTransmission");
+      return warn(e, "it is left out: it is not a SimpleTransmission");
     const TiXmlElement &driven = getChild(e, "joint"), &actuator = getChild(e, "actuator");
     const std::string name = getAttribute(&driven, "name");
     const UrdfJoint* joint = findJoint(name);
     if (!joint) fail(driven, "there is no joint '" + name + "'", "correct the name");
-    if (getNv(joint->joint.kind) != 1) return warn(e, "it is left out: joint '" + name + "' has not one coordinate");
-    if (effortless_.count(name)) return warn(e, "it is left out: the limit of effort of joint '" + name + "' is 0");
+    if (getNv(joint->joint.kind) != 1)
+      return warn(e, "it is left out: joint '" + name + "' does not have exactly one coordinate");
+    if (effortless_.count(name)) return warn(e, "it is left out: the effort limit of joint '" + name + "' is 0");
     for (const MotorSpec& other : settings_.motors)
-      if (other.joint == name) return warn(e, "it is left out: joint '" + name + "' has a motor already");
+      if (other.joint == name) return warn(e, "it is left out: joint '" + name + "' already has a motor");
     MotorSpec motor;
     motor.joint = name;
     const double inertia =
@@ -202,7 +203,7 @@ class DrakeReader {
     spec.spring.stiffness = getChildNumber(e, tag + "_stiffness", true);
     spec.spring.damping = getChildNumber(e, tag + "_damping", true);
     if (spec.spring.stiffness == 0 && spec.spring.damping == 0)
-      return warn(e, "it is left out: it is neither spring nor damper");
+      return warn(e, "it is left out: it has neither stiffness nor damping");
     settings_.point_springs.push_back(spec);
   }
 

@@ -72,7 +72,7 @@ bool completesModel(const fs::path& path) {
 std::string readRobotText(const std::string& path) {
   std::error_code unknown;
   if (const auto size = fs::file_size(path, unknown); !unknown && size > kLargestFile)
-    throw ModelError(path, "file", "it is larger than a robot may be (256 MB)", "give a URDF or YAML file");
+    throw ModelError(path, "file", "it exceeds the largest size of a robot file (256 MB)", "give a URDF or YAML file");
   return readTextFile(path);
 }
 
@@ -139,8 +139,9 @@ std::string findRobotFile(const std::string& name_or_path) {
   if (isDirectory(path)) return findInDirectory(path);
   if (isFile(path)) return name_or_path;
   throw ModelError("", "robot '" + name_or_path + "'",
-                   is_name ? "there is none of this name in " + listItems(getRobotDirectories()) + ", nor such a path"
-                           : "there is no such file or directory",
+                   is_name
+                       ? "there is no robot of this name in " + listItems(getRobotDirectories()) + ", and no such path"
+                       : "there is no such file or directory",
                    "give a path, or one of the known names: " + listItems(listRobots()));
 }
 

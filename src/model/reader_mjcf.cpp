@@ -93,7 +93,8 @@ void MjcfReader::readCompiler(const TiXmlElement& e) {
     compiler.fail("its eulerseq is '" + euler + "'", "give three of x, y, z, X, Y and Z");
   settings_.euler = euler;
   if (compiler.getText("coordinate", "local") != "local")
-    compiler.fail("its coordinates are global", "save the model by a version of MuJoCo before 2.3.4, in local ones");
+    compiler.fail("its coordinates are global",
+                  "save the model in local coordinates with a version of MuJoCo before 2.3.4");
   settings_.auto_limits = compiler.getFlag("autolimits", settings_.auto_limits);
   inertia_from_geom_ = compiler.getText("inertiafromgeom", inertia_from_geom_);
   if (inertia_from_geom_ != "true" && inertia_from_geom_ != "false" && inertia_from_geom_ != "auto")
@@ -122,7 +123,8 @@ void MjcfReader::noteSection(const TiXmlElement& e) {
   const std::string& tag = e.ValueStr();
   if (read.count(tag)) return;
   if (unable.count(tag))
-    refuse(e, "such elements are not read", "save the model by MuJoCo as one file (mj_saveLastXML), or remove it");
+    refuse(e, "such elements are not supported",
+           "save the model with MuJoCo as one file (mj_saveLastXML), or remove it");
   if (!e.FirstChildElement()) return noteElement(e);
   for (const TiXmlElement* c = e.FirstChildElement(); c; c = c->NextSiblingElement())
     settings_.notes.add("<" + tag + "> <" + c->ValueStr() + ">", c->Row(), "left out");
@@ -167,7 +169,7 @@ void MjcfReader::readContents(const std::vector<Child>& children, const BodyPlac
 void MjcfReader::readBody(const Child& child, const BodyPlace& parent) {
   const TiXmlElement& e = *child.element;
   MjcfElement body(e, "", settings_);
-  if (body.getFlag("mocap", false)) body.note("it is not moved from outside here");
+  if (body.getFlag("mocap", false)) body.note("it cannot be moved from outside");
   std::string file_name = getAttribute(&e, "name");
   const std::string name = makeName(file_name.empty() ? "body_" + std::to_string(e.Row()) : file_name);
   if (!file_name.empty() && name != file_name) body.fail("its name is taken", "rename it");
@@ -195,7 +197,8 @@ SE3 MjcfReader::addJoints(const MjcfElement& body, const std::string& link, cons
   }
   if (elements.front().type == "free") {
     if (elements.size() > 1 || parent.link != "world")
-      body.fail("it has a free joint beside another joint, or on a moving body", "only bodies of the world are free");
+      body.fail("it has a free joint together with another joint, or on a moving body",
+                "give free joints only to bodies of the world");
     addFree(elements.front(), link, X_PB);
     return {};
   }
@@ -204,7 +207,7 @@ SE3 MjcfReader::addJoints(const MjcfElement& body, const std::string& link, cons
   std::string above = parent.link;
   for (size_t i = 0; i < elements.size(); ++i) {
     const Element& element = elements[i];
-    if (element.type == "free") body.fail("it has a free joint beside another joint", "remove one");
+    if (element.type == "free") body.fail("it has a free joint together with another joint", "remove one");
     const std::string below = i + 1 < elements.size() ? makeName(link + "/" + element.name) : link;
     addSingle(element, below, above, X * translate(element.pos));
     X = translate(-element.pos);
@@ -413,18 +416,19 @@ void MjcfReader::readJointClamp(MjcfElement& e, const Element& joint) {
   if (!e.isLimited("actuatorfrclimited", "actuatorfrcrange")) return;
   const std::vector<double> range = e.getNumbers("actuatorfrcrange", 2, 2);
   clamps_[joint.name] = std::min(std::abs(range[0]), std::abs(range[1]));
-  if (range[0] != -range[1]) e.note("its actuatorfrcrange is not symmetric: the smaller side counts for both");
+  if (range[0] != -range[1]) e.note("its actuatorfrcrange is not symmetric: the smaller side is used for both");
 }
 
 MjcfFile readMjcf(const std::string& path) {
   const std::string xml = readRobotText(path);
   if (xml.size() > kMostBytes)
-    throw ModelError(path, "file", "it is larger than a file of MuJoCo may be (16 MB)", "give one without data");
+    throw ModelError(path, "file", "it exceeds the largest size of a MuJoCo file (16 MB)",
+                     "give one without embedded data");
   TiXmlDocument document;
   parseXml(xml, path, document);
   const TiXmlElement* root = document.RootElement();
   if (!root || root->ValueStr() != "mujoco")
-    throw ModelError(path, "document", "its outermost element is not <mujoco>", "give a file of MuJoCo (MJCF)");
+    throw ModelError(path, "document", "its outermost element is not <mujoco>", "give a MuJoCo file (MJCF)");
   return MjcfReader(path, *root).read();
 }
 

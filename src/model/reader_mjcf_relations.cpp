@@ -29,7 +29,7 @@ void MjcfReader::readEquality(const TiXmlElement& element) {
   if (e.tag() == "connect" || e.tag() == "weld") return readTie(e, name);
   if (e.tag() == "joint") return readJointEquality(e, name);
   if (e.tag() == "tendon") return readTendonEquality(e, name);
-  e.fail("such equalities are not read", "use connect, weld, joint or a tendon of joints, or remove it");
+  e.fail("such equalities are not supported", "use connect, weld, joint or a tendon of joints, or remove it");
 }
 
 void MjcfReader::readTie(MjcfElement& e, const std::string& name) {
@@ -132,7 +132,7 @@ std::array<double, 2> MjcfReader::readLine(MjcfElement& e) {
   if (p.empty()) p = {0, 1};
   p.resize(5);
   if (p[2] != 0 || p[3] != 0 || p[4] != 0)
-    e.fail("its polycoef is of degree 2 or more", "only y = a + b x can be said here: linearise it, or remove it");
+    e.fail("its polycoef is of degree 2 or more", "only y = a + b x is supported: linearise it, or remove it");
   return {p[0], p[1]};
 }
 
@@ -142,7 +142,7 @@ void MjcfReader::readJointEquality(MjcfElement& e, const std::string& name) {
   const auto [a, b] = readLine(e);
   if (y.empty()) e.fail("it has no joint1", "name one");
   const double y_ref = findSlot(e, y).q_ref[0];
-  if (x.empty() || b == 0) e.fail("it holds one joint alone", "remove the joint, so that the body is fixed");
+  if (x.empty() || b == 0) e.fail("it constrains a single joint", "remove the joint to fix the body");
   const double x_ref = findSlot(e, x).q_ref[0];
   if (x == y) e.fail("it couples a joint with itself", "name two joints");
   ClosureSpec coupler;
@@ -163,7 +163,7 @@ void MjcfReader::readTendon(const TiXmlElement& element) {
     findSlot(term, joint);
     if (!term.find("coef")) term.fail("it has no coef", "give one");
     if (!tendon.coefficients.emplace(joint, term.getNumber("coef", 0)).second)
-      term.fail("the tendon has this joint twice", "add the coefficients up");
+      term.fail("the tendon lists this joint twice", "add the coefficients up");
   }
   const std::string name = getAttribute(&element, "name");
   if (name.empty()) return noteElement(element, "the tendon is left out");
@@ -195,7 +195,7 @@ void MjcfReader::readSpatialTendon(const TiXmlElement& element) {
   spring.rest = lengths.empty() || lengths[0] < 0 ? (two.X_WB.p - one.X_WB.p).norm() : lengths[0];
   for (const char* without_meaning : {"width", "material", "rgba", "group", "user"}) e.find(without_meaning);
   if (lengths.size() == 2 && lengths[1] != lengths[0])
-    return e.leaveOut("its spring is slack between two lengths, and it is left out");
+    return e.leaveOut("its spring is slack between two lengths; it is left out");
   if (spring.stiffness == 0 && spring.damping == 0) return e.leaveOut("it has no spring or damper, and is left out");
   if (e.isLimited("limited", "range")) e.note("the limits of its length are left out"), e.find("range");
   if (e.getNumber("frictionloss", 0) != 0) e.note("its frictionloss is left out");
@@ -237,7 +237,7 @@ void MjcfReader::readActuator(const TiXmlElement& element) {
   MjcfElement e(element, "", settings_);
   const std::string joint = e.getText("joint", e.getText("jointinparent"));
   if (joint.empty() || (e.tag() != "motor" && !servos.count(e.tag())))
-    return e.leaveOut("the actuator is left out: motors drive joints here");
+    return e.leaveOut("the actuator is left out: motors can only drive joints");
   const auto slot = std::find_if(slots_.begin(), slots_.end(), [&](const Slot& s) { return s.joint == joint; });
   if (slot == slots_.end()) e.fail("there is no joint '" + joint + "'", "correct the name");
   if (slot->q_ref.size() != 1) return e.leaveOut("the actuator is left out: its joint has several coordinates");
@@ -246,12 +246,12 @@ void MjcfReader::readActuator(const TiXmlElement& element) {
   const std::vector<double> gears = e.getNumbers("gear", 1, 6);
   const double gear = gears.empty() ? 1 : gears[0];
   if (gear == 0) return e.leaveOut("an actuator of gear 0 is left out");
-  if (gear != 1) e.note("its input is the torque or force of its joint here, not that before the gear");
+  if (gear != 1) e.note("its input becomes the torque or force at its joint, not that before the gear");
   const bool is_general = e.tag() == "general";
   const bool is_ideal =
       e.tag() == "motor" || (is_general && e.getText("dyntype", "none") == "none" &&
                              e.getText("biastype", "none") == "none" && e.getText("gaintype", "fixed") == "fixed");
-  if (!is_ideal) e.note("its servo is left out: it is a motor of ideal torque here");
+  if (!is_ideal) e.note("its servo is left out: it becomes an ideal torque motor");
   const std::vector<double> gains = is_general ? e.getNumbers("gainprm", 1, 10) : std::vector<double>();
   const double gain = gains.empty() ? 1 : std::abs(gains[0]);
 
@@ -260,7 +260,7 @@ void MjcfReader::readActuator(const TiXmlElement& element) {
   double effort = std::numeric_limits<double>::infinity();
   const auto limit = [&](const char* range, double factor) {
     const std::vector<double> values = e.getNumbers(range, 2, 2);
-    if (values[0] != -values[1]) e.note(std::string("its ") + range + " is not symmetric: the smaller side counts");
+    if (values[0] != -values[1]) e.note(std::string("its ") + range + " is not symmetric: the smaller side is used");
     effort = std::min(effort, factor * std::min(std::abs(values[0]), std::abs(values[1])));
   };
   if (e.isLimited("forcelimited", "forcerange")) limit("forcerange", std::abs(gear));
@@ -272,13 +272,13 @@ void MjcfReader::readActuator(const TiXmlElement& element) {
   }
   if (const auto clamp = clamps_.find(joint); clamp != clamps_.end()) effort = std::min(effort, clamp->second);
   if (!(effort > 0)) {
-    e.note("its limits leave it no torque on one side; they are left out");
+    e.note("its limits allow no torque on one side; they are left out");
   } else if (std::isfinite(effort)) {
     motor.effort = effort;
   }
   yaml_.motors.push_back(motor);
   const std::string name = getAttribute(&element, "name");
-  if (!name.empty() && name != joint) e.note("it is named after its joint here");
+  if (!name.empty() && name != joint) e.note("it is renamed after its joint");
 }
 
 void MjcfReader::readKey(const TiXmlElement& element) {
@@ -301,7 +301,7 @@ void MjcfReader::readKey(const TiXmlElement& element) {
       const Eigen::Vector4d xyzw(q[k + 1], q[k + 2], q[k + 3], q[k]);
       const double norm = xyzw.stableNorm();
       if (!(norm > 1e-12) || !std::isfinite(norm))
-        e.fail("the quaternion of joint '" + slot.joint + "' has no length", "correct it");
+        e.fail("the quaternion of joint '" + slot.joint + "' has zero length", "correct it");
       const Eigen::Vector4d turned =
           (Eigen::Quaterniond(slot.R_ref) * Eigen::Quaterniond(Eigen::Vector4d(xyzw / norm))).normalized().coeffs();
       std::copy(turned.data(), turned.data() + 4, q.begin() + static_cast<std::ptrdiff_t>(k));

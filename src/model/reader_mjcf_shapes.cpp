@@ -77,7 +77,7 @@ MjcfReader::Shape MjcfReader::readShape(MjcfElement& e, const SE3& X_BF) {
   if (!ends.empty() && is_long) {
     const Vector3d from(ends[0], ends[1], ends[2]), to(ends[3], ends[4], ends[5]), along = from - to;
     const double length = along.stableNorm();
-    if (!(length > 1e-12) || !std::isfinite(length)) e.fail("the two points of its fromto are one", "move one");
+    if (!(length > 1e-12) || !std::isfinite(length)) e.fail("the two points of its fromto coincide", "move one");
     X.p = (from + to) / 2;
     X.R = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), along / length).toRotationMatrix();
     const bool is_round = out.type == "capsule" || out.type == "cylinder";
@@ -99,8 +99,8 @@ Inertia MjcfReader::readSolid(const Child& child) {
   if ((given && !(*given >= 0)) || !(density >= 0)) e.fail("its mass or density is negative", "give 0 or more");
   if ((given ? *given : density) == 0 || shape.type == "plane" || shape.type == "hfield") return {};
   if (shape.type == "mesh" || shape.type == "sdf")
-    e.fail("the mass of the body comes from this " + shape.type + ", which is not read",
-           "give the body an <inertial>, as MuJoCo writes when it saves the model");
+    e.fail("the mass of the body comes from this " + shape.type + ", which is not supported",
+           "give the body an <inertial>, as MuJoCo does when it saves the model");
   const double a = shape.size[0], b = shape.size[1], c = shape.size[2];
   double volume = 0;
   Vector3d moments = Vector3d::Zero();  // per mass
@@ -154,7 +154,7 @@ void MjcfReader::readSite(const Child& child, const BodyPlace& place, const std:
                           std::set<std::string>& soles) {
   MjcfElement e(*child.element, child.childclass, settings_);
   for (const char* drawn : {"type", "size", "rgba", "material"}) e.find(drawn);
-  if (e.find("fromto")) e.fail("sites by fromto are not read", "give its pos and quat");
+  if (e.find("fromto")) e.fail("sites with fromto are not supported", "give its pos and quat");
   const SE3 X_BS = child.X_BF * e.getPose();
   const std::string site = getAttribute(child.element, "name");
   const std::string name = makeName(site.empty() ? "site_" + std::to_string(e.line()) : site);
@@ -213,12 +213,12 @@ void MjcfReader::readVisual(const Child& child, const BodyPlace& place) {
     visual.size = mesh->second.size;
     visual.mesh = mesh->second.mesh;
     visual.bounds = fitMesh(visual.mesh, std::filesystem::path(settings_.path).parent_path().string(), visual.size);
-    if (!visual.bounds) e.note("its mesh cannot be read: it has no shape, distances leave it out");
+    if (!visual.bounds) e.note("its mesh cannot be read: it has no shape, so distances ignore it");
   } else {
     return e.leaveOut("a geom of type '" + shape.type + "' is left out");
   }
   if (touches && addShape(shape.type == "capsule", size, visual, tree_.links[place.link]))
-    e.note("distances count its shape; it touches nothing here (feet: the key contacts of a YAML file)");
+    e.note("its shape is used for distances only, not for contact (feet: the key contacts of a YAML file)");
   if (!is_drawn) return;
   if (shape.type == "capsule") e.note("a capsule is drawn as a cylinder");
   tree_.links[place.link].visuals.push_back(visual);

@@ -120,11 +120,11 @@ void checkJoint(const TiXmlElement& joint, const std::string& path, std::vector<
     throw ModelError(path, element, "its type '" + type + "' is unknown", "use one of " + known);
   }
   if (joint.FirstChildElement("mimic") && kinds.at(type) == JointKind::Fixed)
-    warnings.push_back(path + ": " + element + ": it is fixed, <mimic> is ignored");
+    warnings.push_back(path + ": " + element + ": it is fixed, so <mimic> is ignored");
   const TiXmlElement* dynamics = joint.FirstChildElement("dynamics");
   if (dynamics && getNv(kinds.at(type)) != 1 && (isGiven(*dynamics, "damping") || isGiven(*dynamics, "friction")))
     warnings.push_back(path + ": " + element + ": its <dynamics> (line " + std::to_string(dynamics->Row()) +
-                       ") is left out: joints of one coordinate have damping and friction");
+                       ") is left out: only joints of one coordinate have damping and friction");
 }
 
 const TiXmlElement& getRobot(const TiXmlDocument& document, const std::string& path) {
@@ -168,7 +168,7 @@ std::vector<Edge> collectEdges(const TiXmlElement& robot, const std::set<std::st
 
 Tree makeTree(const TiXmlElement& robot, const std::string& path) {
   const std::set<std::string> links = collectNames(robot, "link", path);
-  if (links.empty()) throw ModelError(path, "element 'robot'", "it has no link", "declare at least one");
+  if (links.empty()) throw ModelError(path, "element 'robot'", "it has no links", "declare at least one");
   collectNames(robot, "joint", path);
   Tree tree;
   tree.robot = getAttribute(&robot, "name");
@@ -197,7 +197,7 @@ Tree makeTree(const TiXmlElement& robot, const std::string& path) {
     stack.insert(stack.end(), next.rbegin(), next.rend());
   }
   if (!unreached.empty())
-    throw ModelError(path, "link '" + *unreached.begin() + "'", "the joints over it form a cycle that no root carries",
+    throw ModelError(path, "link '" + *unreached.begin() + "'", "the joints above it form a cycle without a root",
                      "cut the loop and declare it as a closure");
   return tree;
 }
@@ -321,9 +321,8 @@ UrdfJoint makeJoint(const urdf::Joint& joint, JointKind kind, const std::string&
 
 std::string warnOfMeshes(const std::vector<std::string>& unread, const std::string& path) {
   return path + ": " + std::to_string(unread.size()) + " mesh(es) cannot be read, among them '" + unread.front() +
-         "': what they show has no shape, distances leave it out; put STL or OBJ files in their places or give "
-         "<collision> "
-         "with boxes, cylinders or spheres";
+         "': their bodies have no shape from them, so distances ignore them; replace them by STL or OBJ files or give "
+         "<collision> with boxes, cylinders or spheres";
 }
 
 }  // namespace

@@ -75,14 +75,14 @@ void readPublishedClosures(const Fields& fields, const Entry& root, YamlFile& fi
     closure.frame2 = frames[1];
     closure.kind = readClosureKind(kinds[i]);
     if (closure.kind == ClosureKind::Coupler)
-      kinds[i].fail("a coupler does not tie frames", "list it under `closures`, with its joints");
+      kinds[i].fail("a coupler does not connect frames", "list it under `closures` with its joints");
     file.closures.push_back(closure);
   }
 }
 
 void readCoupler(const Fields& fields, const Entry& entry, ClosureSpec& closure) {
   if (const Entry* frames = find(fields, "frames"))
-    frames->fail("a coupler ties coordinates, not frames", "give its joints with their coefficients");
+    frames->fail("a coupler connects coordinates, not frames", "give its joints with their coefficients");
   closure.name = require(fields, "name", entry).getText();
   for (const auto& [joint, coefficient] : require(fields, "joints", entry).getMap())
     if (!closure.coefficients.emplace(joint, coefficient.getNumber()).second)
@@ -193,7 +193,7 @@ void readPointSprings(const Entry& map, YamlFile& file) {
     read("preload", spring.preload);
     read("damping", spring.damping);
     if (spring.stiffness != 0 && !find(fields, "rest"))
-      entry.fail("it has a stiffness but no rest", "give its length without load, m, or at its preload");
+      entry.fail("it has a stiffness but no rest", "give its length [m] without load, or at its preload");
     file.point_springs.push_back(std::move(spec));
   }
 }

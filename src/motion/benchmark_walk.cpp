@@ -43,8 +43,8 @@ std::vector<BenchmarkPhase> makePhases(const Model& model, const BenchmarkWalkOp
   if (!possible || used > o.total_nodes)
     throw ModelError(model.name(), "benchmark walk",
                      "its phases do not fit into " + std::to_string(o.total_nodes) + " nodes (they need " +
-                         std::to_string(used) + ", each at least one)",
-                     "give fewer or shorter ones");
+                         std::to_string(used) + ", at least one each)",
+                     "give fewer or shorter phases");
   if (used < o.total_nodes) phases.push_back({PhaseKind::Double, o.total_nodes - used});
   return phases;
 }
@@ -53,7 +53,7 @@ int findFoot(const Model& model, const std::string& name) {
   const int contact = model.findContact(name);
   if (contact < 0)
     throw ModelError(model.name(), "contact '" + name + "'",
-                     "the benchmark walk needs it, the robot has no such contact",
+                     "the benchmark walk needs it, but the robot has no such contact",
                      "name the contacts of its left and right foot");
   return contact;
 }
@@ -172,7 +172,7 @@ Motion makeBenchmarkWalk(const Model& model, const BenchmarkWalkOptions& o, Form
   plan.guess.xs.assign(stages.size(), x0);
   plan.q_start = plan.q_end = scene.q0;
   plan.limited = false;
-  plan.requested = {{"speed", o.speed}, {"step_height", o.step_height}, {"total_nodes", double(o.total_nodes)}};
+  plan.options = {{"speed", o.speed}, {"step_height", o.step_height}, {"total_nodes", double(o.total_nodes)}};
   return makeMotion(model, std::move(plan), {formulation, StepRule::Euler});
 }
 

@@ -33,10 +33,10 @@ std::vector<TimedCommand> readCommands(const std::string& path) {
         for (const YamlEntry& entry : list.getList()) {
           commands.push_back(readCommand(entry));
           if (commands.size() > 1 && commands.back().time <= (commands.end() - 2)->time)
-            entry.fail("its time is not after that of the entry before", "list commands in the order of time");
+            entry.fail("its time is not later than that of the previous entry", "list commands in order of time");
         }
         if (commands.empty())
-          list.fail("it has no command", "give one entry per velocity, e.g. {time: 0.5, forward: 0.4}");
+          list.fail("it has no commands", "give one entry per velocity, e.g. {time: 0.5, forward: 0.4}");
       });
   return commands;
 }

@@ -51,7 +51,7 @@ void check(const Model& model, const Stance& stance, const Course& course, const
     for (int k = kSamples / 4; k <= 3 * kSamples / 4; ++k)
       if (calcSoleHeights(course.ground, sole, calcSwing(shape, before, step.X_WF, static_cast<double>(k) / kSamples))
               .least < kClearance)
-        refuse("its swing would touch the ground on the way",
+        refuse("the swing foot would touch the ground on its way",
                "raise swing_height, or move horizontally later (swing_leave) or earlier (swing_arrive)");
   }
 }
@@ -73,9 +73,9 @@ MotionPlan planCourse(const Model& model, const Stance& stance, const Course& co
   return planLocomotion(model, stance, task, gait);
 }
 
-Goal makeCourseGoal(const Model& model, const Stance& stance, const std::string& name, double asked,
+Goal makeCourseGoal(const Model& model, const Stance& stance, const std::string& name, double requested,
                     const Vector3d& direction, int last) {
-  Goal goal{GoalKind::Displacement, name, asked, calcTolerance(asked, 0.01), 0, last};
+  Goal goal{GoalKind::Displacement, name, requested, calcTolerance(requested, 0.01), 0, last};
   goal.direction = direction;
   for (int contact : stance.contacts) goal.contacts.push_back(model.contacts()[contact].name);
   return goal;

@@ -19,7 +19,7 @@ GroundStep makeStone(const ContactFrame& sole, const SE3& X_WF, double rim);
 MotionPlan planCourse(const Model& model, const Stance& stance, const Course& course, const LocomotionOptions& gait);
 
 // Displacement of the middle of the feet between two nodes along a unit vector.
-Goal makeCourseGoal(const Model& model, const Stance& stance, const std::string& name, double asked,
+Goal makeCourseGoal(const Model& model, const Stance& stance, const std::string& name, double requested,
                     const Vector3d& direction, int last);
 
 }  // namespace bielle

@@ -21,7 +21,7 @@ constexpr double kSunken = 0.05;  // of the plane under the lowest stone, m
 Footstep readFoothold(const YamlEntry& entry) {
   const YamlFields fields = entry.getFields({"foot", "x", "y", "z", "yaw", "pitch", "roll"});
   const YamlEntry& foot = require(fields, "foot", entry);
-  if (!foot.isWord("left") && !foot.isWord("right")) foot.fail("it is no foot", "give left or right");
+  if (!foot.isWord("left") && !foot.isWord("right")) foot.fail("it is not a foot", "give left or right");
   const auto get = [&](const std::string& key) {
     const YamlEntry* number = find(fields, key);
     return number ? number->getNumber() : 0;
@@ -47,7 +47,7 @@ std::vector<Footstep> makeSteps(const Stance& stance, const std::vector<Footstep
     if (!steps.empty() && steps.back().side == foothold.side)
       throw ModelError("", "foothold " + std::to_string(steps.size() + 1),
                        std::string("the ") + getName(foothold.side) + " steps twice in a row",
-                       "let the feet step in turn");
+                       "let the feet step alternately");
     steps.push_back({foothold.side, start * foothold.X_WF});
   }
   const Footstep& last = steps.back();
@@ -55,8 +55,8 @@ std::vector<Footstep> makeSteps(const Stance& stance, const std::vector<Footstep
   const SE3 moved = last.X_WF * foot.inverse();
   if (std::abs(moved.R(2, 2) - 1) > kSamePlace * kSamePlace)
     throw ModelError("", "foothold " + std::to_string(steps.size()),
-                     "it is inclined, but the motion ends there, standing on both feet",
-                     "let the last foothold be level: no pitch, no roll");
+                     "it is inclined, but the motion ends there with both feet on the ground",
+                     "make the last foothold level: no pitch, no roll");
   const Side other = getOther(last.side);
   const SE3 beside = moved * stance.feet[static_cast<int>(other)];
   const SE3 there = FootstepPlan{stance.feet, steps}.getStance(static_cast<int>(steps.size()))[static_cast<int>(other)];
@@ -108,7 +108,7 @@ LocomotionOptions FootholdsOptions::makeGaitDefaults() {
 }
 
 std::vector<OptionEntry> listOptions(FootholdsOptions& o) {
-  std::vector<OptionEntry> entries = {{"rim", &o.rim, "m", "of the stones around the soles"}};
+  std::vector<OptionEntry> entries = {{"rim", &o.rim, "m", "width of the stones around the soles"}};
   for (OptionEntry& entry : listOptions(o.gait)) entries.push_back(std::move(entry));
   return entries;
 }
@@ -121,7 +121,7 @@ std::vector<Footstep> readFootholds(const std::string& path) {
                      const YamlEntry& list = require(fields, "footholds", document);
                      for (const YamlEntry& entry : list.getList()) footholds.push_back(readFoothold(entry));
                      if (footholds.empty() || footholds.size() > kMostSteps)
-                       list.fail("it has no foothold, or more than 200",
+                       list.fail("it has no footholds, or more than 200",
                                  "give one entry per step, e.g. {foot: right, x: 0.2, y: -0.1}");
                    });
   return footholds;
@@ -129,14 +129,14 @@ std::vector<Footstep> readFootholds(const std::string& path) {
 
 MotionPlan planFootholds(const Model& model, const FootholdsOptions& o, const VectorXd& q0) {
   if (o.footholds.empty())
-    throw ModelError("", "footholds", "none are given", "name a file of footholds (`--footholds FILE.yaml`)");
+    throw ModelError("", "footholds", "none are given", "give a file with footholds (`--footholds FILE.yaml`)");
   requireOption(o.rim >= 0 && o.rim <= 1, "rim", "it is outside 0 .. 1 m", "give metres, e.g. 0.02");
   const Stance stance = makeStance(model, o.gait, q0);
   Course course{"footholds", makeSteps(stance, o.footholds), {}};
   course.ground = makeGround(model, stance, course.steps, o.rim);
   MotionPlan plan = planCourse(model, stance, course, o.gait);
   FootholdsOptions copy = o;
-  plan.requested = listValues(listOptions(copy));
+  plan.options = listValues(listOptions(copy));
   return plan;
 }
 

@@ -95,7 +95,7 @@ GoalKind parseGoalKind(const std::string& name) {
   throw std::invalid_argument("there is no kind of goal '" + name + "'");
 }
 
-double calcTolerance(double asked, double least) { return std::max(0.05 * std::abs(asked), least); }
+double calcTolerance(double requested, double least) { return std::max(0.05 * std::abs(requested), least); }
 
 double measureGoal(const Goal& goal, const MotionTrack& track) {
   const int nodes = static_cast<int>(track.time.size());
@@ -120,18 +120,18 @@ double measureGoal(const Goal& goal, const MotionTrack& track) {
   throw std::logic_error("a kind of goal is not measured");
 }
 
-bool GoalOutcome::met() const { return std::abs(came_out - goal.asked) <= goal.tolerance; }
+bool GoalOutcome::met() const { return std::abs(achieved - goal.requested) <= goal.tolerance; }
 
 std::string formatOutcome(const GoalOutcome& outcome) {
   const Goal& goal = outcome.goal;
   const std::string name = getUnit(goal.kind), unit = name == "1" ? "" : " " + name;
   const auto format = [](double value) { return formatNumber(value, "%.4g"); };
   const bool exact = goal.kind == GoalKind::Footholds;  // the requested distance is zero
-  std::string text = exact ? "asked within " + format(goal.tolerance) : "asked " + format(goal.asked);
-  text += unit + ", came out " + format(outcome.came_out) + unit;
+  std::string text = exact ? "requested within " + format(goal.tolerance) : "requested " + format(goal.requested);
+  text += unit + ", achieved " + format(outcome.achieved) + unit;
   // A percentage of a ratio of heights would be misleading.
-  if (!exact && goal.kind != GoalKind::Height && goal.asked != 0 && std::isfinite(outcome.came_out))
-    text += ": " + std::to_string(std::lround(100 * outcome.came_out / goal.asked)) + " %";
+  if (!exact && goal.kind != GoalKind::Height && goal.requested != 0 && std::isfinite(outcome.achieved))
+    text += ": " + std::to_string(std::lround(100 * outcome.achieved / goal.requested)) + " %";
   if (!outcome.met()) text += exact ? ", missed" : ", missed (tolerance " + format(goal.tolerance) + unit + ")";
   return text;
 }

@@ -211,7 +211,7 @@ void check(const Model& model, const JumpOptions& o) {
   requireStages(o.stand + o.push + o.flight + o.land + o.settle, o.time_step);
   requireOption(std::abs(o.length) <= 2, "length", "it is not within 2 m", "give metres, negative to jump backwards");
   if (model.contacts().empty())
-    throw ModelError(model.name(), "contacts", "a jump needs feet, the robot names no contact frame",
+    throw ModelError(model.name(), "contacts", "a jump needs feet, but the robot has no contact frames",
                      "add `contacts` to its YAML file");
 }
 
@@ -242,33 +242,36 @@ JumpHeight calcJumpHeight(const JumpOptions& o, double gravity, double t) {
 }
 
 std::vector<OptionEntry> listOptions(JumpOptions& o) {
-  return {{"flight", &o.flight, "s", "time in the air, rounded to an even number of time steps; the height follows"},
-          {"length", &o.length, "m", "how far ahead the feet land"},
-          {"stand", &o.stand, "s", "before the push"},
-          {"push", &o.push, "s", "feet on the ground, faster and faster"},
-          {"land", &o.land, "s", "feet on the ground again, until the body is caught"},
-          {"settle", &o.settle, "s", "back to rest"},
-          {"stretch", &o.stretch, "m", "height of the centre of mass at take-off and touchdown over that at the start"},
-          {"clearance", &o.clearance, "m", "least height of the soles at mid-flight"},
-          {"friction", &o.friction, "1", "friction coefficient"},
-          {"cone_margin", &o.cone_margin, "1", "part of friction and soles that wrenches leave free"},
-          {"time_step", &o.time_step, "s", "length of a shooting stage"},
-          {"published", &o.published, "0 or 1", "1: the paper's problem: feet are free in flight; 0: by our costs"},
-          {"apex_weight", &o.apex_weight, "1/m^2", "height of the centre of mass at mid-flight"},
-          {"com_weight", &o.com_weight, "1/m^2", "height of the centre of mass on the ground"},
-          {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
-          {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
-          {"motor_weight", &o.motor_weight, "1", "keep motors slow, within the state regularization"},
-          {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
-          {"force_weight", &o.force_weight, "1", "share the load evenly between feet and in time, over (m g)^2"},
-          {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
-          {"swing_weight", &o.swing_weight, "1/m^2", "path of the feet in flight"},
-          {"swing_rotation_weight", &o.swing_rotation_weight, "1", "soles stay level in flight"},
-          {"terminal_weight", &o.terminal_weight, "1/m^2", "place of the centre of mass at the end"},
-          {"contact_kp", &o.contact_kp, "1/s^2",
-           "stabilisation of contacts and closures, position (limited to 1/(3 h^2), h the time step; Euler steps: "
-           "1/(2 h^2))"},
-          {"contact_kd", &o.contact_kd, "1/s", "stabilisation of contacts and closures, velocity (limited to 1/h)"}};
+  return {
+      {"flight", &o.flight, "s", "time in the air, rounded to an even number of time steps; the height follows"},
+      {"length", &o.length, "m", "distance from take-off to landing, forward"},
+      {"stand", &o.stand, "s", "time at rest before the push"},
+      {"push", &o.push, "s", "time of acceleration with the feet on the ground"},
+      {"land", &o.land, "s", "time from touchdown until the body is braked"},
+      {"settle", &o.settle, "s", "time to come back to rest"},
+      {"stretch", &o.stretch, "m", "height of the centre of mass at take-off and touchdown above that at the start"},
+      {"clearance", &o.clearance, "m", "least height of the soles at mid-flight"},
+      {"friction", &o.friction, "1", "friction coefficient"},
+      {"cone_margin", &o.cone_margin, "1", "share of friction and soles that wrenches leave unused"},
+      {"time_step", &o.time_step, "s", "length of a shooting stage"},
+      {"published", &o.published, "0 or 1", "1: the paper's problem, with feet free in flight; 0: Bielle's costs"},
+      {"apex_weight", &o.apex_weight, "1/m^2", "height of the centre of mass at mid-flight"},
+      {"com_weight", &o.com_weight, "1/m^2", "height of the centre of mass on the ground"},
+      {"state_weight", &o.state_weight, "1", "stay near the standing posture, at rest"},
+      {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
+      {"motor_weight", &o.motor_weight, "1", "keep motors slow, within the state regularization"},
+      {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
+      {"force_weight", &o.force_weight, "1",
+       "share the load evenly between the feet and over time, relative to (m g)^2"},
+      {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
+      {"swing_weight", &o.swing_weight, "1/m^2", "follow the path of the feet in flight"},
+      {"swing_rotation_weight", &o.swing_rotation_weight, "1", "keep the soles level in flight"},
+      {"terminal_weight", &o.terminal_weight, "1/m^2", "position of the centre of mass at the end"},
+      {"contact_kp", &o.contact_kp, "1/s^2",
+       "position gain of the stabilisation of contacts and closures (at most 1/(3 h^2) with the time step h; Euler "
+       "steps: 1/(2 h^2))"},
+      {"contact_kd", &o.contact_kd, "1/s",
+       "velocity gain of the stabilisation of contacts and closures (at most 1/h)"}};
 }
 
 void setPaperWeights(JumpOptions& o) {
@@ -333,7 +336,7 @@ MotionPlan planJump(const Model& model, const JumpOptions& options, const Vector
   plan.q_start = q0;
   plan.q_end = carryPosture(model, q0, {Matrix3d::Identity(), scene.shift});
   JumpOptions copy = options;
-  plan.requested = listValues(listOptions(copy));
+  plan.options = listValues(listOptions(copy));
   plan.goals = makeGoals(scene, plan.schedule.numStages());
   return plan;
 }

@@ -24,7 +24,7 @@ inline constexpr double kLeastTransmission = 0.15;
 
 /// How high the centre of mass can be over a foot with a flat sole while the base keeps its rotation: as far as joints have range
 /// and linkages are well before their dead points (transmissions from 0.5 to 2). Found by moving the base of a stance, as far ahead and
-/// behind as is asked for.
+/// behind as requested.
 class LegReach {
  public:
   struct Heights {

@@ -51,12 +51,12 @@ std::vector<Bound> listRanges(const Model& model, const VectorXd& q0) {
     if (joint.nv != 1 || !(std::isfinite(lower) || std::isfinite(upper))) continue;
     const std::string element = "joint '" + joint.name + "'";
     if (lower == upper)
-      throw ModelError(model.name(), element, "its range has no width, so that no constraint can keep it",
+      throw ModelError(model.name(), element, "its range has zero width, so no constraint can enforce it",
                        "make the joint fixed, or widen its range");
     const double q = q0[joint.idx_q];
     if (q < lower || q > upper)
       throw ModelError(model.name(), element,
-                       "its range does not hold the starting posture, where it is at " + std::to_string(q),
+                       "its range excludes the starting posture, where the joint is at " + std::to_string(q),
                        "widen its range, or start elsewhere");
     bounds.push_back({"range of " + joint.name, k, lower, upper});
   }

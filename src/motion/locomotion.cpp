@@ -24,10 +24,10 @@ void check(const LocomotionOptions& o) {
   requireOption(o.swing.apex > 0 && o.swing.apex < 1, "swing_apex", "it is not between 0 and 1", "e.g. 0.5");
   requireOption(o.swing.leave < o.swing.arrive, "swing_leave", "it is not before swing_arrive", "e.g. 0 and 1");
   requireOption(o.landing_speed == 0 || o.rigid_landing != 0, "landing_speed",
-                "without an impact nothing stops a foot that lands", "add rigid_landing=1, or leave it out");
+                "without an impact nothing stops a landing foot", "add rigid_landing=1, or leave it out");
   requireOption(o.landing_speed < 0.1, "landing_speed", "feet that land at 0.1 m/s or more do not pass the check",
                 "give a lower speed, e.g. 0.05");
-  requireOption(o.swing.arrive <= 1, "swing_arrive", "it is over 1", "give a part of the swing, e.g. 1");
+  requireOption(o.swing.arrive <= 1, "swing_arrive", "it is over 1", "give a fraction of the swing, e.g. 1");
 }
 
 // Rejects requests that no motor torques can satisfy.
@@ -54,9 +54,8 @@ void check(const Scene& scene) {
     const int side = phase.stands(Side::Left) ? 0 : 1, i = phase.steps_done;
     const Vector3d apart = scene.task.plan.steps[i].X_WF.p - scene.task.plan.getStance(i)[side].p;
     if (std::hypot(apart.head<2>().norm() / 2, kCrouch * height + std::abs(apart.z()) / 2) > kStretch * strut)
-      refuse(i + 1,
-             "its foothold is out of the legs' reach: the feet would be " + std::to_string(apart.norm()) + " m apart",
-             "ask for a lower speed, or for shorter, lower or more steps");
+      refuse(i + 1, "its foothold is out of reach: the feet would be " + std::to_string(apart.norm()) + " m apart",
+             "request a lower speed, or shorter, lower or more steps");
   }
 }
 
@@ -165,7 +164,7 @@ std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, 
 
 Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0) {
   if (!model.hasFreeFlyer())
-    throw ModelError(model.name(), "root joint", "the robot cannot walk, its base is fixed",
+    throw ModelError(model.name(), "root joint", "the robot cannot walk because its base is fixed",
                      "load it with a free base");
   Stance stance;
   stance.q = q0;
@@ -176,7 +175,7 @@ Stance makeStance(const Model& model, const LocomotionOptions& options, const Ve
     const std::string& name = i == 0 ? options.left : options.right;
     stance.contacts[i] = model.findContact(name);
     if (stance.contacts[i] < 0)
-      throw ModelError(model.name(), "contact '" + name + "'", "a walk needs it, the robot has no such contact",
+      throw ModelError(model.name(), "contact '" + name + "'", "a walk needs it, but the robot has no such contact",
                        "name the contacts of its left and right foot");
     const ContactFrame& contact = model.contacts()[stance.contacts[i]];
     stance.feet[i] = getPlacement(ws, contact.body, contact.X_BF);

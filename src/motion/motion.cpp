@@ -35,7 +35,7 @@ std::vector<std::pair<std::string, double>> listValues(const std::vector<OptionE
 }
 
 void requireStages(double seconds, double time_step) {
-  requireOption(seconds <= 1e5 * time_step, "time_step", "it makes more than 100000 stages of the motion",
+  requireOption(seconds <= 1e5 * time_step, "time_step", "it divides the motion into more than 100000 stages",
                 "give longer stages, e.g. 0.01 s, or a shorter motion");
 }
 
@@ -54,7 +54,8 @@ void requireNotNegative(const std::vector<OptionEntry>& options, const std::vect
 void requirePositive(const std::vector<OptionEntry>& options, const std::vector<std::string>& names) {
   for (const OptionEntry& option : options)
     if (std::find(names.begin(), names.end(), option.name) != names.end())
-      requireOption(*option.value > 0, option.name, "it is not positive", "give a number over 0 [" + option.unit + "]");
+      requireOption(*option.value > 0, option.name, "it is not positive",
+                    "give a number above 0 [" + option.unit + "]");
 }
 
 namespace {
@@ -70,7 +71,8 @@ Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& opt
   const StepRule step = options.step.value_or(plan.limited ? StepRule::Midpoint : StepRule::Euler);
   for (StageSpec& stage : plan.stages) stage.step = step;
   Motion motion;
-  requireOption(plan.limited || !options.limits.areGiven(), "limit", "the paper's problem has none", "leave it out");
+  requireOption(plan.limited || !options.limits.areGiven(), "limit", "the paper's problem has no limits",
+                "leave it out");
   if (plan.limited) motion.bounded = addLimits(model, options.limits, plan.q_start, plan.stages);
   freeTimings(options.timings, plan.schedule, plan.stages);
   for (StageSpec& stage : plan.stages)  // at an impact h vanishes, and gains have no effect
@@ -89,7 +91,7 @@ Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& opt
                                                   std::move(plan.stages), options.formulation);
   motion.guess = std::move(plan.guess);
   fitTimings(*motion.problem, motion.guess);
-  motion.requested = std::move(plan.requested);
+  motion.options = std::move(plan.options);
   motion.goals = std::move(plan.goals);
   return motion;
 }

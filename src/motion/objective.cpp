@@ -37,7 +37,7 @@ void weaken(double share, StageSpec& stage) {
 
 void setObjective(const Model& model, const ObjectiveOptions& options, std::vector<StageSpec>& stages) {
   requireOption(options.regeneration >= 0 && options.regeneration <= 1, "regeneration", "it is outside 0 .. 1",
-                "give the share of what flows back that is used again");
+                "give the share of the regenerated energy that is reused");
   requireOption(options.getRegularization() > 0 && std::isfinite(options.getRegularization()), "regularization",
                 "it is not positive", "give a share of the other costs, e.g. 0.1");
   if (options.objective == Objective::Effort) return;

@@ -33,23 +33,23 @@ void checkBox(const Model& model, const Stance& stance, const BoxOptions& o) {
   requireOption(o.height > 0 && o.height <= 10, "height", "it is outside 0 .. 10 m", "give metres, e.g. 0.1");
   const ContactFrame& foot = model.contacts()[stance.contacts[0]];
   requireOption(o.length >= 2 * calcHalfLength(model, stance) && o.length <= 10, "length",
-                "the sole is longer than the box, or it is over 10 m", "give metres, e.g. 0.2");
+                "the box is shorter than the sole, or longer than 10 m", "give metres, e.g. 0.2");
   requireOption(o.width > (stance.feet[0].p - stance.feet[1].p).norm() + 2 * foot.half_width && o.width <= 100, "width",
-                "the feet do not fit on the box, or it is over 100 m", "give metres, e.g. 0.8");
+                "the box is too narrow for the feet, or wider than 100 m", "give metres, e.g. 0.8");
   requireOption(o.distance >= 0 && std::isfinite(o.distance), "distance", "it is negative or not finite",
-                "give metres from the soles to the box, e.g. 0.05");
-  requireOption(o.down == 0 || o.down == 1, "down", "it is neither 0 nor 1", "give 1 to go down again");
+                "give the distance from the soles to the box in metres, e.g. 0.05");
+  requireOption(o.down == 0 || o.down == 1, "down", "it is neither 0 nor 1", "give 1 to step down again");
 }
 
 void checkGap(const GapOptions& o) {
   requireOption(o.width > 0 && o.width < kBank, "width", "it is outside 0 .. 1.2 m", "give metres, e.g. 0.15");
   requireOption(o.distance >= 0 && std::isfinite(o.distance), "distance", "it is negative or not finite",
-                "give metres from the soles to the gap, e.g. 0.02");
+                "give the distance from the soles to the gap in metres, e.g. 0.02");
   requireOption(o.depth > 0 && o.depth <= 100, "depth", "it is outside 0 .. 100 m", "give metres, e.g. 0.3");
 }
 
 template <typename Options>
-std::vector<std::pair<std::string, double>> listRequested(Options options) {
+std::vector<std::pair<std::string, double>> listOptionValues(Options options) {
   return listValues(listOptions(options));
 }
 
@@ -64,19 +64,20 @@ LocomotionOptions BoxOptions::makeGaitDefaults() {
 }
 
 std::vector<OptionEntry> listOptions(BoxOptions& o) {
-  std::vector<OptionEntry> entries = {{"height", &o.height, "m", "of the box"},
-                                      {"length", &o.length, "m", "of its top; the feet stand on its middle"},
-                                      {"width", &o.width, "m", "of the box"},
-                                      {"distance", &o.distance, "m", "from the soles to the box"},
-                                      {"down", &o.down, "0 or 1", "1: and down again behind the box"}};
+  std::vector<OptionEntry> entries = {{"height", &o.height, "m", "height of the box"},
+                                      {"length", &o.length, "m", "length of its top; the feet stand in the middle"},
+                                      {"width", &o.width, "m", "width of the box"},
+                                      {"distance", &o.distance, "m", "distance from the soles to the box"},
+                                      {"down", &o.down, "0 or 1", "1: step down again behind the box"}};
   for (OptionEntry& entry : listOptions(o.gait)) entries.push_back(std::move(entry));
   return entries;
 }
 
 std::vector<OptionEntry> listOptions(GapOptions& o) {
-  std::vector<OptionEntry> entries = {{"width", &o.width, "m", "of the gap, along the way"},
-                                      {"distance", &o.distance, "m", "of the soles from its edges, on both sides"},
-                                      {"depth", &o.depth, "m", "of the ground in the gap under its banks"}};
+  std::vector<OptionEntry> entries = {
+      {"width", &o.width, "m", "width of the gap in the direction of travel"},
+      {"distance", &o.distance, "m", "distance of the soles from its edges, on both sides"},
+      {"depth", &o.depth, "m", "depth of the gap's floor below its banks"}};
   for (OptionEntry& entry : listOptions(o.gait)) entries.push_back(std::move(entry));
   return entries;
 }
@@ -92,7 +93,7 @@ MotionPlan planBox(const Model& model, const BoxOptions& o, const VectorXd& q0) 
   course.ground.height = start.p.z();
   course.ground.steps = {{start.act(top), o.length, o.width, calcHeading(start)}};
   MotionPlan plan = planCourse(model, stance, course, o.gait);
-  plan.requested = listRequested(o);
+  plan.options = listOptionValues(o);
   const Goal height =
       makeCourseGoal(model, stance, "height", o.height, Vector3d::UnitZ(), listLandings(plan.schedule)[1]);
   plan.goals.insert(plan.goals.begin(), height);
@@ -109,7 +110,7 @@ MotionPlan planGap(const Model& model, const GapOptions& o, const VectorXd& q0) 
   for (double middle : {edge - kBank / 2, edge + o.width + kBank / 2})
     course.ground.steps.push_back({start.act(Vector3d(middle, 0, 0)), kBank, kBankWidth, calcHeading(start)});
   MotionPlan plan = planCourse(model, stance, course, o.gait);
-  plan.requested = listRequested(o);
+  plan.options = listOptionValues(o);
   const Goal across = makeCourseGoal(model, stance, "across", stride, start.R.col(0), plan.schedule.numStages());
   plan.goals.insert(plan.goals.begin(), across);
   return plan;

@@ -16,8 +16,8 @@ std::vector<OptionEntry> joinGait(std::vector<OptionEntry> entries, LocomotionOp
   for (OptionEntry& entry : listOptions(gait))
     if (entry.name != "single_support" && entry.name != "double_support" && entry.name != "published")
       entries.push_back(std::move(entry));
-  entries.push_back(
-      {"stretch", &gait.stretch, "m", "height of the centre of mass at take-off and touchdown over that at the start"});
+  entries.push_back({"stretch", &gait.stretch, "m",
+                     "height of the centre of mass at take-off and touchdown above that at the start"});
   return entries;
 }
 
@@ -47,7 +47,7 @@ MotionPlan planFlights(const Model& model, const Stance& stance, LocomotionTask 
   task.ground.height = start.p.z();
   task.direction = start.R.col(0);
   MotionPlan plan = planLocomotion(model, stance, task, gait);
-  plan.requested = listValues(listOptions(options));
+  plan.options = listValues(listOptions(options));
   return plan;
 }
 
@@ -75,20 +75,20 @@ LocomotionOptions HopOptions::makeGaitDefaults() {
 }
 
 std::vector<OptionEntry> listOptions(RunOptions& o) {
-  return joinGait({{"speed", &o.speed, "m/s", "of the steady steps; negative: backward"},
-                   {"steps", &o.steps, "1", "number of steps, the last one brings the feet together"},
-                   {"flight", &o.flight, "s", "both feet in the air between two steps"},
-                   {"stance", &o.stance, "s", "one foot on the ground"}},
+  return joinGait({{"speed", &o.speed, "m/s", "speed of the steady steps; negative: backward"},
+                   {"steps", &o.steps, "1", "number of steps; the last one brings the feet together"},
+                   {"flight", &o.flight, "s", "time in the air between two steps"},
+                   {"stance", &o.stance, "s", "time with one foot on the ground"}},
                   o.gait);
 }
 
 std::vector<OptionEntry> listOptions(HopOptions& o) {
   return joinGait(
-      {{"foot", &o.foot, "0 or 1", "to hop on; 0: left, 1: right", {"left", "right"}},
+      {{"foot", &o.foot, "0 or 1", "foot to hop on; 0: left, 1: right", {"left", "right"}},
        {"hops", &o.hops, "1", "number of flights"},
-       {"flight", &o.flight, "s", "time in the air of each"},
-       {"length", &o.length, "m", "of each hop, forward; negative: backward"},
-       {"stance", &o.stance, "s", "on one foot before the first flight, between flights and after the last one"}},
+       {"flight", &o.flight, "s", "time in the air of each hop"},
+       {"length", &o.length, "m", "length of each hop, forward; negative: backward"},
+       {"stance", &o.stance, "s", "time on one foot before the first flight, between flights and after the last one"}},
       o.gait);
 }
 
@@ -116,7 +116,7 @@ MotionPlan planRun(const Model& model, const RunOptions& o, const VectorXd& q0) 
 
 MotionPlan planHop(const Model& model, const HopOptions& o, const VectorXd& q0) {
   requireOption(o.foot == 0 || o.foot == 1, "foot", "it is neither 0 nor 1",
-                "give 0 for the left, 1 for the right foot");
+                "give 0 for the left foot, 1 for the right foot");
   requireOption(o.hops >= 1 && o.hops <= 100 && o.hops == std::floor(o.hops), "hops",
                 "it is not a whole number from 1 to 100", "give one, e.g. 1");
   const Stance stance = makeStance(model, o.gait, q0);

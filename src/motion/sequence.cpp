@@ -44,7 +44,7 @@ Ground joinGrounds(const Model& model, const std::vector<MotionPlan>& plans) {
   for (const MotionPlan& plan : plans) {
     ground.height = std::min(ground.height, plan.ground.height);
     if (plan.ground.friction != ground.friction)
-      throw ModelError("", "option '" + plan.name + ".friction'", "the ground has another one for the motions before",
+      throw ModelError("", "option '" + plan.name + ".friction'", "it differs from that of the previous motions",
                        "give the same friction for all motions of the sequence");
   }
   for (const MotionPlan& plan : plans) {
@@ -65,9 +65,10 @@ void checkSoles(const Model& model, const MotionPlan& plan, const Ground& ground
         for (double y : {-frame.half_width, frame.half_width}) {
           const Vector3d corner = sole.X_WT.act(Vector3d(x, y, 0));
           if (ground.calcHeight(corner.x(), corner.y()) > corner.z() + kSameLevel)
-            throw ModelError("", "motion '" + plan.name + "' of the sequence",
-                             "its '" + phase.name + "' stands where another motion of the sequence has higher ground",
-                             "lead away from there first, e.g. by a walk");
+            throw ModelError(
+                "", "motion '" + plan.name + "' of the sequence",
+                "its phase '" + phase.name + "' stands where another motion of the sequence has higher ground",
+                "move away from there first, e.g. by a walk");
         }
     }
 }
@@ -88,7 +89,7 @@ void join(ShootingTrajectory& part, ShootingTrajectory& whole) {
 
 MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0) {
   if (parts.empty())
-    throw ModelError("", "sequence", "it has no motion", "name at least one, e.g. squat, walk, stairs or jump");
+    throw ModelError("", "sequence", "it has no motions", "give at least one, e.g. squat, walk, stairs or jump");
   std::vector<MotionPlan> plans;
   for (const SequencePart& part : parts) {
     plans.push_back(part.plan(model, plans.empty() ? q0 : plans.back().q_end));
@@ -121,7 +122,7 @@ MotionPlan planSequence(const Model& model, const std::vector<SequencePart>& par
       phase.name = plan.name + ": " + phase.name;
       sequence.schedule.phases.push_back(std::move(phase));
     }
-    for (auto& [name, value] : plan.requested) sequence.requested.emplace_back(plan.name + "." + name, value);
+    for (auto& [name, value] : plan.options) sequence.options.emplace_back(plan.name + "." + name, value);
   }
   return sequence;
 }

@@ -13,15 +13,15 @@ namespace {
 
 void check(const Model& model, const SquatOptions& o) {
   requireOption(o.depth >= 0.05 && o.depth <= 2, "depth", "it is outside 0.05 .. 2",
-                "give the lowest height of the centre of mass over its initial height, e.g. 0.7");
+                "give the lowest height of the centre of mass divided by its initial height, e.g. 0.7");
   SquatOptions copy = o;
   requireNotNegative(listOptions(copy));
   requirePositive(listOptions(copy), {"duration", "time_step", "friction"});
-  requireOption(o.time_step <= o.duration / 4, "time_step", "it is over a quarter of the motion",
+  requireOption(o.time_step <= o.duration / 4, "time_step", "it exceeds a quarter of the motion",
                 "give seconds, e.g. 0.015");
   requireStages(o.duration + 2 * o.settle, o.time_step);
   if (model.contacts().empty())
-    throw ModelError(model.name(), "contacts", "a squat needs feet, the robot names no contact frame",
+    throw ModelError(model.name(), "contacts", "a squat needs feet, but the robot has no contact frames",
                      "add `contacts` to its YAML file");
 }
 
@@ -47,7 +47,7 @@ StageSpec makeStage(const Model& model, const SquatOptions& o, const std::vector
 }  // namespace
 
 std::vector<OptionEntry> listOptions(SquatOptions& o) {
-  return {{"depth", &o.depth, "1", "lowest height of the centre of mass over its initial height"},
+  return {{"depth", &o.depth, "1", "lowest height of the centre of mass divided by its initial height"},
           {"duration", &o.duration, "s", "time to go down and come back"},
           {"settle", &o.settle, "s", "time at rest before and after"},
           {"time_step", &o.time_step, "s", "length of a shooting stage"},
@@ -56,15 +56,15 @@ std::vector<OptionEntry> listOptions(SquatOptions& o) {
           {"torso_weight", &o.torso_weight, "1", "keep the torso upright, within the state regularization"},
           {"motor_weight", &o.motor_weight, "1", "keep motors slow, within the state regularization"},
           {"control_weight", &o.control_weight, "1/(N m)^2", "keep motor torques small"},
-          {"force_weight", &o.force_weight, "1", "share the weight evenly between the feet, over (m g)^2"},
+          {"force_weight", &o.force_weight, "1", "share the weight evenly between the feet, relative to (m g)^2"},
           {"pressure_weight", &o.pressure_weight, "1", "keep the centre of pressure in the middle of the sole"},
           {"friction", &o.friction, "1", "friction coefficient"},
-          {"cone_margin", &o.cone_margin, "1", "part of friction and soles that wrenches leave free"},
+          {"cone_margin", &o.cone_margin, "1", "share of friction and soles that wrenches leave unused"},
           {"contact_kp", &o.contact_kp, "1/s^2",
-           "stabilisation of the contacts, position (limited to 1/(3 h^2), h the time step; Euler: 1/(2 h^2))"},
-          {"contact_kd", &o.contact_kd, "1/s", "stabilisation of the contacts, velocity (limited to 1/h)"},
-          {"closure_kp", &o.closure_kp, "1/s^2", "stabilisation of the closures, position"},
-          {"closure_kd", &o.closure_kd, "1/s", "stabilisation of the closures, velocity"}};
+           "position gain of the stabilisation of contacts (at most 1/(3 h^2) with the time step h; Euler: 1/(2 h^2))"},
+          {"contact_kd", &o.contact_kd, "1/s", "velocity gain of the stabilisation of contacts (at most 1/h)"},
+          {"closure_kp", &o.closure_kp, "1/s^2", "position gain of the stabilisation of closures"},
+          {"closure_kd", &o.closure_kd, "1/s", "velocity gain of the stabilisation of closures"}};
 }
 
 double calcSquatHeight(const SquatOptions& o, double t) {
@@ -109,7 +109,7 @@ MotionPlan planSquat(const Model& model, const SquatOptions& options, const Vect
   plan.guess.us.assign(nodes, calcStaticTorques(model, makeConstraintSet(model, contacts), q0).u);
   plan.q_start = plan.q_end = q0;
   SquatOptions copy = options;
-  plan.requested = listValues(listOptions(copy));
+  plan.options = listValues(listOptions(copy));
   Goal depth{GoalKind::Height, "depth", options.depth, calcTolerance(1 - options.depth, 0.01), 0, nodes};
   depth.contacts = getContactNames(model, contacts);
   plan.goals = {depth};

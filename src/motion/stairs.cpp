@@ -10,15 +10,15 @@ namespace {
 int check(const Model& model, const Stance& stance, const StairsOptions& o) {
   const ContactFrame& foot = model.contacts()[stance.contacts[0]];
   requireOption(std::isfinite(o.height), "height", "it is not finite", "give metres, e.g. 0.06, or -0.06 to go down");
-  requireOption(o.depth > 2 * foot.half_length, "depth", "the sole is longer than a step", "give metres, e.g. 0.2");
+  requireOption(o.depth > 2 * foot.half_length, "depth", "it is shorter than the sole", "give metres, e.g. 0.2");
   requireOption(o.stairs >= 1 && o.stairs <= 100 && o.stairs == std::floor(o.stairs), "stairs",
                 "it is not a whole number from 1 to 100", "give a number of steps");
   requireOption(o.speed > 0, "speed", "it is not positive", "give m/s, e.g. 0.3");
   requireOption(o.width > (stance.feet[0].p - stance.feet[1].p).norm() + 2 * foot.half_width, "width",
-                "the feet do not fit on the stairs", "give metres, e.g. 0.8");
+                "the stairs are too narrow for the feet", "give metres, e.g. 0.8");
   const double single = o.depth / o.speed - o.gait.timing.both;
   requireOption(single >= 0.2 && single <= 3, "speed",
-                "a step of this depth would be " + std::to_string(single) + " s on one foot, outside 0.2 .. 3 s",
+                "a step of this depth takes " + std::to_string(single) + " s on one foot, outside 0.2 .. 3 s",
                 "change speed, depth or double_support");
   return static_cast<int>(o.stairs);
 }
@@ -57,12 +57,12 @@ LocomotionOptions StairsOptions::makeGaitDefaults() {
 
 std::vector<OptionEntry> listOptions(StairsOptions& o) {
   std::vector<OptionEntry> entries = {
-      {"height", &o.height, "m", "of a step; negative: down"},
-      {"depth", &o.depth, "m", "of a step"},
-      {"slope", &o.slope, "1", "height over depth; unless 0, it takes the place of the height"},
-      {"stairs", &o.stairs, "1", "number of steps of the stairs"},
-      {"speed", &o.speed, "m/s", "forward velocity; with the depth it gives the duration of a step"},
-      {"width", &o.width, "m", "of the stairs"}};
+      {"height", &o.height, "m", "height of a step; negative: down"},
+      {"depth", &o.depth, "m", "depth of a step"},
+      {"slope", &o.slope, "1", "height over depth; replaces the height unless 0"},
+      {"stairs", &o.stairs, "1", "number of steps of the staircase"},
+      {"speed", &o.speed, "m/s", "forward speed; with the depth it determines the duration of a step"},
+      {"width", &o.width, "m", "width of the stairs"}};
   for (OptionEntry& entry : listOptions(o.gait))
     if (entry.name != "single_support") entries.push_back(std::move(entry));
   return entries;
@@ -111,7 +111,7 @@ MotionPlan planStairs(const Model& model, const StairsOptions& options, const Ve
   task.direction = start.R * Vector3d::UnitX();
   task.speed = o.speed;
   MotionPlan plan = planLocomotion(model, stance, task, o.gait);
-  plan.requested = listValues(listOptions(o));
+  plan.options = listValues(listOptions(o));
   const std::vector<Goal> speed = makeSpeedGoals(plan.schedule, o.speed, start.R.col(0));
   plan.goals.insert(plan.goals.begin(), speed.begin(), speed.end());
   plan.goals.insert(plan.goals.begin(), makeClimbGoal(model, stance, stairs * o.height, plan.schedule.numStages()));

@@ -25,12 +25,12 @@ void check(const TimingOptions& options, const ContactSchedule& schedule) {
   for (const auto& [name, bounds] : options.phases) {
     const std::string element = "free timing of '" + name + "'";
     if (!(bounds.lower > 0 && bounds.lower <= bounds.upper && std::isfinite(bounds.upper)))
-      throw ModelError("", element, "its bounds are not positive, or exchanged", "give e.g. 0.6:1.6");
+      throw ModelError("", element, "its bounds are not positive, or in the wrong order", "give e.g. 0.6:1.6");
     if (isNamed(name, schedule)) continue;
     std::string known = kAllPhases;
     for (const ContactPhase& phase : schedule.phases)
       if (phase.dt > 0 && known.find(getOwnName(phase)) == std::string::npos) known += ", " + getOwnName(phase);
-    throw ModelError("", element, "the motion has no such phase", "choose among: " + known);
+    throw ModelError("", element, "the motion has no such phase", "choose one of: " + known);
   }
 }
 
@@ -49,7 +49,7 @@ const TimingBounds* findBounds(const TimingOptions& options, const ContactPhase&
 void freeTimings(const TimingOptions& options, const ContactSchedule& schedule, std::vector<StageSpec>& stages) {
   check(options, schedule);
   requireOption(options.time_weight >= 0 && std::isfinite(options.time_weight), "time-weight",
-                "it is negative or not finite", "give the cost of a second, e.g. 0.5");
+                "it is negative or not finite", "give the cost per second, e.g. 0.5");
   requireOption(options.time_weight == 0 || options.areGiven(), "time-weight", "no duration is free",
                 "give --free-timings as well");
   int node = 0;

@@ -28,7 +28,7 @@ StepsPlan planSteps(const Model& model, const char* name, const StepCommand& com
   task.speed = speed;
   MotionPlan plan = planLocomotion(model, stance, task, options.gait);
   Options copy = options;
-  plan.requested = listValues(listOptions(copy));
+  plan.options = listValues(listOptions(copy));
   return {std::move(plan), start};
 }
 
@@ -44,21 +44,21 @@ std::vector<OptionEntry> joinGaitOptions(std::vector<OptionEntry> entries, Locom
 }  // namespace
 
 std::vector<OptionEntry> listOptions(WalkOptions& o) {
-  return joinGaitOptions({{"speed", &o.speed, "m/s", "of the steady steps; negative: backward"},
-                          {"steps", &o.steps, "1", "number of steps, the last one brings the feet together"}},
+  return joinGaitOptions({{"speed", &o.speed, "m/s", "speed of the steady steps; negative: backward"},
+                          {"steps", &o.steps, "1", "number of steps; the last one brings the feet together"}},
                          o.gait);
 }
 
 std::vector<OptionEntry> listOptions(SideWalkOptions& o) {
-  return joinGaitOptions({{"speed", &o.speed, "m/s", "to the left, of the steady steps; negative: to the right"},
+  return joinGaitOptions({{"speed", &o.speed, "m/s", "speed of the steady steps to the left; negative: to the right"},
                           {"steps", &o.steps, "1", "number of steps: one opens the stance, the next one closes it"}},
                          o.gait);
 }
 
 std::vector<OptionEntry> listOptions(TurnOptions& o) {
-  return joinGaitOptions({{"angle", &o.angle, "rad", "to turn to the left; negative: to the right"},
-                          {"radius", &o.radius, "m", "of the arc to walk along; 0: on the spot"},
-                          {"steps", &o.steps, "1", "number of steps, the last one brings the feet together"}},
+  return joinGaitOptions({{"angle", &o.angle, "rad", "angle to turn to the left; negative: to the right"},
+                          {"radius", &o.radius, "m", "radius of the arc to walk along; 0: turn on the spot"},
+                          {"steps", &o.steps, "1", "number of steps; the last one brings the feet together"}},
                          o.gait);
 }
 
@@ -93,7 +93,8 @@ MotionPlan planSideWalk(const Model& model, const SideWalkOptions& o, const Vect
 
 MotionPlan planTurn(const Model& model, const TurnOptions& o, const VectorXd& q0) {
   if (!(o.radius >= 0))
-    throw ModelError("", "option 'radius'", "it is negative", "give metres, and a negative angle to turn to the right");
+    throw ModelError("", "option 'radius'", "it is negative",
+                     "give metres; to turn to the right, give a negative angle");
   const double yaw = o.angle / std::max(1, countSteps("steps", o.steps) - 1);
   StepsPlan plan = planSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(), 0,
                              yaw > 0 ? Side::Left : Side::Right, o, q0);

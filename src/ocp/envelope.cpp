@@ -89,7 +89,7 @@ Envelope::Envelope(const Model& model, const ShootingProblem& problem, const Sho
   if (data_->y.empty()) data_->y.resize(N + 1);
   bool same = optimum.xs.size() == N + 1 && optimum.us.size() == N && data_->y.size() == N + 1;
   for (size_t k = 0; same && k <= N; ++k) same = data_->y[k].size() == problem.constraintSize(static_cast<int>(k));
-  if (!same) throw std::invalid_argument("Envelope: the optimum or its multipliers are not of this problem");
+  if (!same) throw std::invalid_argument("Envelope: the optimum or its multipliers do not belong to this problem");
   data_->evaluate();
   data_->updateCostates(multipliers.penalty);
 }

@@ -157,7 +157,7 @@ BodyFrame getBodyFrame(const Model& model, const std::string& name) {
   if (const int frame = model.findFrame(name); frame >= 0)
     return {model.frames()[frame].body, model.frames()[frame].X_BF};
   throw ModelError(model.name(), "frame '" + name + "'", "the robot has no such link, frame or contact",
-                   "see `bielle info` for the names it has");
+                   "see `bielle info` for its names");
 }
 
 std::unique_ptr<Residual> makeFramePlacement(const BodyFrame& frame, const SE3& X_WT) {

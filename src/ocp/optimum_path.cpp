@@ -21,7 +21,7 @@ void requireSameSizes(const ShootingProblem& a, const ShootingProblem& b) {
   for (int k = 0; same && k <= a.numStages(); ++k)
     same = a.tangentSize(k) == b.tangentSize(k) && a.constraintSize(k) == b.constraintSize(k) &&
            (k == a.numStages() || a.controlSize(k) == b.controlSize(k));
-  if (!same) throw std::invalid_argument("the changed problem has other stages, states, controls or constraints");
+  if (!same) throw std::invalid_argument("the changed problem differs in stages, states, controls or constraints");
 }
 
 namespace {

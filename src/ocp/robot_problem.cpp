@@ -27,26 +27,26 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool ter
     require(spec.dt > 0 && std::isfinite(spec.dt), "its time step is not positive", "give seconds, e.g. 0.015");
   const FreeTiming& timing = spec.timing;
   if (timing.phase >= 0) {
-    require(spec.kind == StageKind::Dynamics && !terminal, "a free duration of what takes no time",
-            "give steps alone a phase of free duration");
+    require(spec.kind == StageKind::Dynamics && !terminal, "an impact or the terminal node cannot have a free duration",
+            "put only dynamic steps into a phase of free duration");
     require(timing.lower > 0 && timing.lower <= timing.upper && std::isfinite(timing.upper),
-            "the bounds of its time scale are not positive, or exchanged", "e.g. 0.6 and 1.6");
+            "the bounds of its time scale are not positive, or in the wrong order", "e.g. 0.6 and 1.6");
   }
-  require(spec.time_weight >= 0, "its cost of a second is negative", "give 0 or more");
+  require(spec.time_weight >= 0, "its cost per second is negative", "give 0 or more");
   if (spec.state.weight != 0)
     require(spec.state.q_ref.size() == model.nq() && spec.state.v_ref.size() == model.nv() &&
                 spec.state.weights.size() == 2 * model.nv(),
-            "the state cost has wrong sizes", "q_ref: nq, v_ref: nv, weights: 2 nv");
+            "the state cost has the wrong size", "q_ref: nq, v_ref: nv, weights: 2 nv");
   if (spec.control.weight != 0)
     require(spec.control.reference.size() == model.nu() && spec.control.weights.size() == model.nu(),
-            "the control cost has wrong sizes", "reference and weights: nu");
+            "the control cost has the wrong size", "reference and weights: nu");
   require(spec.effort_limits.size() == 0 || spec.effort_limits.size() == model.nu(),
-          "its effort limits have a wrong size", "effort_limits: nu, or empty");
+          "its effort limits have the wrong size", "effort_limits: nu, or empty");
   const auto requireForces = [&](const Residual& residual, const char* kind, const std::string& name) {
     requireOf(!terminal || !(residual.needsForces() || residual.needsControls()), kind, name,
-              " is about forces or controls, of which the terminal node has none", "leave it out there");
+              " depends on forces or controls, which the terminal node does not have", "leave it out there");
     requireOf(spec.kind == StageKind::Dynamics || !residual.needsSpeeds(), kind, name,
-              " is about speeds under torques, of which an impact has none", "leave it out there");
+              " depends on speeds under torques, which an impact does not have", "leave it out there");
   };
   for (const Cost& cost : spec.costs) {
     requireOf(cost.residual && cost.activation.hasSize(cost.residual->size()), "cost", cost.name,
@@ -61,7 +61,7 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool ter
     requireIt(constraint.residual && constraint.hasSize(constraint.residual->size()),
               ": bounds or scale do not have the size of the residual", "give one of each per row");
     requireIt((constraint.scale.array() > 0).all(), ": a scale is not positive",
-              "give what counts as a violation of 1");
+              "give the value that counts as a violation of 1");
     requireIt((constraint.lower.array() <= constraint.upper.array()).all(), ": a lower bound exceeds the upper",
               "exchange them");
     requireForces(*constraint.residual, "path constraint", constraint.name);
@@ -77,15 +77,14 @@ std::vector<TimeScalePlace> placeTimeScales(const Model& model, const std::vecto
     if (!places[k].in_state) places[k].in_controls = true;
     const std::string element = "stage " + std::to_string(k);
     if (std::find(ended.begin(), ended.end(), timing.phase) != ended.end())
-      throw ModelError(model.name(), element, "its phase of free duration has ended before",
-                       "give it a number of its own");
+      throw ModelError(model.name(), element, "its phase of free duration ended earlier", "give it a separate number");
     if (next.phase != timing.phase) {
       ended.push_back(timing.phase);
       continue;
     }
     if (next.lower != timing.lower || next.upper != timing.upper)
-      throw ModelError(model.name(), element, "the next step of its phase has other bounds of the time scale",
-                       "give all steps of the phase the same");
+      throw ModelError(model.name(), element, "the next step of its phase has different bounds of the time scale",
+                       "give all steps of the phase the same bounds");
     places[k].in_next = places[k + 1].in_state = true;
   }
   return places;
@@ -172,7 +171,8 @@ void NodeSizes::include(const StageSpec& spec, const NodeCosts& costs) {
 
 void NodeSizes::require(const StageSpec& spec, const NodeCosts& costs) const {
   if (costs.rows() > rows || costs.numBlocks() > blocks || spec.constraints.rows > constraint_rows)
-    throw std::invalid_argument("RobotProblem: a stage has more costs or constraints than any had at first");
+    throw std::invalid_argument(
+        "RobotProblem: a stage has more costs or constraints than any stage had at construction");
 }
 
 // As allFinite(), but vectorized: a value that is not finite makes the sum NaN. The Hessian is a sum of squares, so any
@@ -183,9 +183,9 @@ RobotProblem::RobotProblem(const Model& model, const VectorXd& q0, const VectorX
                            Formulation formulation)
     : model_(model), formulation_(formulation), specs_(std::move(stages)) {
   if (specs_.empty())
-    throw ModelError(model.name(), "shooting problem", "it has no stage", "give at least the terminal one");
+    throw ModelError(model.name(), "shooting problem", "it has no stages", "give at least the terminal stage");
   if (q0.size() != model.nq() || v0.size() != model.nv())
-    throw ModelError(model.name(), "shooting problem", "the initial state has a wrong size", "q0: nq, v0: nv");
+    throw ModelError(model.name(), "shooting problem", "the initial state has the wrong size", "q0: nq, v0: nv");
   for (size_t k = 0; k < specs_.size(); ++k) checkSpec(model, specs_[k], k, k + 1 == specs_.size());
   places_ = placeTimeScales(model, specs_);
   const NodeList nodes{specs_, places_};

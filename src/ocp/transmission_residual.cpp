@@ -25,7 +25,7 @@ class TransmissionMap {
     reference_ = scratch.Q.determinant();
     constexpr double kSingular = 1e-9;
     if (!(std::abs(reference_) > kSingular && std::abs(reference_) < 1 / kSingular))
-      throw ModelError(model.name(), describe(model), "the posture given is a dead point", "give another one");
+      throw ModelError(model.name(), describe(model), "the given posture is a dead point", "give another posture");
   }
 
   // rho at q (nq of the whole model); 0 where the closures have no tangent, which no solver may choose.

@@ -1,6 +1,6 @@
 'use strict';
 // Pictures instead of the page, for `#film=0,0.5,1`: one per time, side by side in one image, or one image each. They are
-// left in the document as data for whoever asked.
+// left in the document as data for the caller.
 
 // Options of the address, after #: t (s), play, view, apart (0: one place), through (1: bodies are), show and hide
 // (layers, with commas), film (times, s), size (800x600 of one picture), columns, separate (1: one image per time).

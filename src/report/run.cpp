@@ -39,8 +39,8 @@ MotionRecord readRecordOf(const LoadedRobot& robot, const fs::path& path) {
   if (record.q_names != makePositionNames(model) || record.v_names != makeVelocityNames(model) ||
       record.u_names != getNames(model.motors()) || record.closure_names != getNames(model.closures()) ||
       record.contact_names != getNames(model.contacts()))
-    throw ModelError(path.string(), "columns", "they are not those of the robot in " + robot.directory,
-                     "solve again, or bring back the robot as it was");
+    throw ModelError(path.string(), "columns", "they differ from those of the robot in " + robot.directory,
+                     "solve again, or restore the robot");
   return record;
 }
 

@@ -30,7 +30,7 @@ function makeTitle(runs) {
   return Array.from(new Set(names)).join(' · ');
 }
 
-// Goals of a run: what was asked and what came out.
+// Goals of a run: requested and achieved values.
 function getGoals(run) {
   const goals = Array.isArray(run.summary.goals) ? run.summary.goals : [];
   return goals.filter(goal => goal && typeof goal === 'object');
@@ -59,7 +59,7 @@ function fillBadges(parent, runs) {
   }
 }
 
-// Asked and came out side by side.
+// Requested and achieved values side by side.
 function fillGoals(parent, runs) {
   for (const run of runs.filter(r => getGoals(r).length)) {
     parent.hidden = false;
@@ -69,10 +69,10 @@ function fillGoals(parent, runs) {
     const rows = getGoals(run).map(
         goal =>
             [goal.name,
-             goal.kind === 'footholds' ? 'within ' + withUnit(goal.tolerance, goal) : withUnit(goal.asked, goal),
-             withUnit(goal.came_out, goal),
+             goal.kind === 'footholds' ? 'within ' + withUnit(goal.tolerance, goal) : withUnit(goal.requested, goal),
+             withUnit(goal.achieved, goal),
              {text: goal.met ? 'met' : 'MISSED', className: goal.met ? 'pass' : 'fail'}]);
-    addTable(parent, ['', 'asked', 'came out', ''], rows);
+    addTable(parent, ['', 'requested', 'achieved', ''], rows);
   }
 }
 
@@ -89,7 +89,7 @@ function fillSummary(parent, runs) {
     ['world', run => run.summary.world],
     ['control', run => run.summary.control],
     ['ground', run => run.summary.terrain],
-    ['trunk off its plan', run => units(run.summary.largest_deviation, 'm at most')],
+    ['trunk deviation', run => units(run.summary.largest_deviation, 'm at most')],
     ['energy balance', run => units(dig(run.summary, 'books', 'imbalance_J'), 'J')],
     ['minimized', solved(run => dig(run.summary, 'objective', 'kind'))],
     ['cost', solved(run => run.summary.cost)],
@@ -163,10 +163,10 @@ function fillIterations(parent, runs) {
 }
 
 function fillOptions(parent, runs) {
-  const names = Array.from(new Set([].concat(...runs.map(run => Object.keys(run.summary.requested || {})))));
+  const names = Array.from(new Set([].concat(...runs.map(run => Object.keys(run.summary.options || {})))));
   addTable(
       parent, runs.length > 1 ? ['', ...runs.map(run => run.label)] : null,
-      names.map(name => [name, ...runs.map(run => dig(run.summary, 'requested', name))]));
+      names.map(name => [name, ...runs.map(run => dig(run.summary, 'options', name))]));
   for (const run of runs) {
     const command = run.summary.command;
     if (Array.isArray(command) && command.length) addElement(addElement(parent, 'p'), 'code', '', command.join(' '));

@@ -128,7 +128,7 @@ class RobotViewer {
     if (missing.length)
       addElement(
           parent, 'p', 'status',
-          'No slider, for their loops have too many motors: ' + missing.map(motor => motor.name).join(', '));
+          'No slider because their loops have too many motors: ' + missing.map(motor => motor.name).join(', '));
     const reset = addElement(parent, 'button', '', 'back to the start');
     reset.onclick = () => this.grids.forEach((grid, g) => {
       grid.motors.forEach((entry, i) => {

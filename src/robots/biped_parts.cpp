@@ -17,20 +17,20 @@ Joint makeHip(const std::string& name, const Vector3d& place, const Vector3d& ax
 
 std::vector<Parameter> listSerialParameters(SerialBipedParameters& p) {
   return {
-      {"hip_offset", &p.hip_offset, "m", 0.05, 0.4, "of a hip from the middle plane"},
-      {"trunk_height", &p.trunk_height, "m", 0, 0.5, "of the trunk's frame over the hips"},
-      {"thigh_length", &p.thigh_length, "m", 0.05, 1, "hip to knee"},
-      {"shank_length", &p.shank_length, "m", 0.05, 1, "knee to ankle"},
-      {"ankle_height", &p.ankle_height, "m", 0.03, 0.3, "of the ankle over the sole"},
-      {"hip_height", &p.hip_height, "m", 0.1, 2, "of the hips over the soles in the reference half_sitting"},
-      {"sole_length", &p.sole_length, "m", 0.02, 0.5, "along x"},
-      {"sole_offset", &p.sole_offset, "m", -0.2, 0.2, "of the middle of the sole before the ankle"},
-      {"sole_width", &p.sole_width, "m", 0.02, 0.3, "along y"},
-      {"trunk_mass", &p.trunk_mass, "kg", 0.1, 100, "without motors"},
-      {"motor_mass", &p.motor_mass, "kg", 0.01, 10, "of each motor"},
-      {"hip_link_mass", &p.hip_link_mass, "kg", 0.01, 10, "each of two links per hip, without motors"},
-      {"link_density", &p.link_density, "kg/m", 0.01, 50, "of thigh and shank, without motors"},
-      {"foot_mass", &p.foot_mass, "kg", 0.01, 10, "of one foot"},
+      {"hip_offset", &p.hip_offset, "m", 0.05, 0.4, "distance of a hip from the middle plane"},
+      {"trunk_height", &p.trunk_height, "m", 0, 0.5, "height of the trunk's frame above the hips"},
+      {"thigh_length", &p.thigh_length, "m", 0.05, 1, "distance from hip to knee"},
+      {"shank_length", &p.shank_length, "m", 0.05, 1, "distance from knee to ankle"},
+      {"ankle_height", &p.ankle_height, "m", 0.03, 0.3, "height of the ankle above the sole"},
+      {"hip_height", &p.hip_height, "m", 0.1, 2, "height of the hips above the soles in the reference half_sitting"},
+      {"sole_length", &p.sole_length, "m", 0.02, 0.5, "length of the sole, along x"},
+      {"sole_offset", &p.sole_offset, "m", -0.2, 0.2, "distance of the middle of the sole in front of the ankle"},
+      {"sole_width", &p.sole_width, "m", 0.02, 0.3, "width of the sole, along y"},
+      {"trunk_mass", &p.trunk_mass, "kg", 0.1, 100, "mass of the trunk without motors"},
+      {"motor_mass", &p.motor_mass, "kg", 0.01, 10, "mass of each motor"},
+      {"hip_link_mass", &p.hip_link_mass, "kg", 0.01, 10, "mass of each of the two links of a hip, without motors"},
+      {"link_density", &p.link_density, "kg/m", 0.01, 50, "mass per length of thigh and shank, without motors"},
+      {"foot_mass", &p.foot_mass, "kg", 0.01, 10, "mass of one foot"},
       {"armature", &p.armature, "kg m^2", 0, 1, "rotor inertia of every motor"},
   };
 }
@@ -87,8 +87,8 @@ std::vector<Solid> makeFoot(const SerialBipedParameters& p) {
 Reference makeSerialHalfSitting(const std::string& robot, const SerialBipedParameters& p) {
   const double a = p.thigh_length, b = p.shank_length, reach = p.hip_height - p.ankle_height;
   if (!(reach > std::abs(a - b) && reach < a + b))
-    throw ModelError(robot, "parameter 'hip_height'", "the legs do not reach the ground from there",
-                     "give a height between what thigh and shank can bridge, over ankle_height");
+    throw ModelError(robot, "parameter 'hip_height'", "the legs do not reach the ground from this height",
+                     "give a height above ankle_height that thigh and shank can span");
   const double thigh = std::acos((reach * reach + a * a - b * b) / (2 * reach * a));
   const double shank = std::acos((reach * reach + b * b - a * a) / (2 * reach * b));
   Reference reference = makeStanding(p.hip_offset, p.hip_height + p.trunk_height);

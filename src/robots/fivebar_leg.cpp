@@ -23,13 +23,13 @@ void addSide(const FiveBarLegParameters& p, const std::string& name, double sign
 }  // namespace
 
 std::vector<Parameter> listParameters(FiveBarLegParameters& p) {
-  return {{"upper_length", &p.upper_length, "m", 0.01, 2, "motor to knee"},
-          {"lower_length", &p.lower_length, "m", 0.01, 2, "knee to foot"},
-          {"stand_angle", &p.stand_angle, "rad", 0.05, 3, "of the upper rods from straight down, standing"},
-          {"body_mass", &p.body_mass, "kg", 0.01, 100, "on the rail, without motors"},
-          {"motor_mass", &p.motor_mass, "kg", 0.01, 10, "of each motor"},
-          {"rod_density", &p.rod_density, "kg/m", 0.01, 20, "of the rods"},
-          {"foot_mass", &p.foot_mass, "kg", 0.001, 5, "of the foot"},
+  return {{"upper_length", &p.upper_length, "m", 0.01, 2, "distance from motor to knee"},
+          {"lower_length", &p.lower_length, "m", 0.01, 2, "distance from knee to foot"},
+          {"stand_angle", &p.stand_angle, "rad", 0.05, 3, "angle of the upper rods from straight down, standing"},
+          {"body_mass", &p.body_mass, "kg", 0.01, 100, "mass of the body on the rail, without motors"},
+          {"motor_mass", &p.motor_mass, "kg", 0.01, 10, "mass of each motor"},
+          {"rod_density", &p.rod_density, "kg/m", 0.01, 20, "mass per length of the rods"},
+          {"foot_mass", &p.foot_mass, "kg", 0.001, 5, "mass of the foot"},
           {"armature", &p.armature, "kg m^2", 0, 1, "rotor inertia of every motor"}};
 }
 

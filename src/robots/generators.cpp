@@ -34,21 +34,21 @@ struct FourBarChainParameters {
 
 std::vector<Parameter> listParameters(FourBarChainParameters& p) {
   FourBarChainOptions& o = p.options;
-  return {{"count", &p.count, "1", 1, 1000, "four-bars, a whole number"},
-          {"ground", &o.ground, "m", 0.01, 10, "between the pivots of crank and rocker"},
+  return {{"count", &p.count, "1", 1, 1000, "number of four-bars"},
+          {"ground", &o.ground, "m", 0.01, 10, "distance between the pivots of crank and rocker"},
           {"crank", &o.crank, "m", 0.01, 10, "length of the crank"},
           {"coupler", &o.coupler, "m", 0.01, 10, "length of the coupler, the ground of the next four-bar"},
           {"rocker", &o.rocker, "m", 0.01, 10, "length of the rocker"},
-          {"crank_angle", &o.crank_angle, "rad", -3.15, 3.15, "from the ground, in the reference `closed`"},
-          {"density", &o.density, "kg/m", 0.01, 100, "of the rods"},
-          {"radius", &o.radius, "m", 0.001, 0.1, "of the rods"}};
+          {"crank_angle", &o.crank_angle, "rad", -3.15, 3.15, "angle from the ground in the reference `closed`"},
+          {"density", &o.density, "kg/m", 0.01, 100, "mass per length of the rods"},
+          {"radius", &o.radius, "m", 0.001, 0.1, "radius of the rods"}};
 }
 
 Model makeChain(const FourBarChainParameters& parameters) {
   FourBarChainParameters p = parameters;
   checkParameters("fourbar_chain", listParameters(p));
   if (p.count != std::floor(p.count))
-    throw ModelError("fourbar_chain", "parameter 'count'", "it is no whole number", "give 1, 2, 3, ...");
+    throw ModelError("fourbar_chain", "parameter 'count'", "it is not a whole number", "give 1, 2, 3, ...");
   p.options.count = static_cast<int>(p.count);
   return makeFourBarChain(p.options).model;
 }
@@ -60,8 +60,8 @@ const std::vector<Generator>& getGenerators() {
       {"cleobot", "biped with parallel legs: 3-RRS lower legs, hips turned by three crank-and-rod chains",
        makeRequests<CleobotParameters>(makeCleobot)},
       {"leg_biped",
-       "biped composed of parts: hips by motors or 3-RRS limbs, knees by motors, belts or four-bars, ankles by motors, "
-       "differentials or rods",
+       "biped composed of parts: hips driven by motors or 3-RRS limbs, knees by motors, belts or four-bars, ankles by "
+       "motors, differentials or rods",
        makeRequests<LegBipedParameters>(makeLegBiped)},
       {"rsu_biped", "biped with serial hips and knees, ankles driven by two rods with spherical ends (RSU)",
        makeRequests<RsuBipedParameters>(makeRsuBiped)},
@@ -69,13 +69,13 @@ const std::vector<Generator>& getGenerators() {
        makeRequests<HumanoidParameters>(makeHumanoid)},
       {"belt_biped", "biped with serial hips, knees driven by belts, ankles by differentials",
        makeRequests<BeltBipedParameters>(makeBeltBiped)},
-      {"belt_knee", "biped with knees driven by belts, all else serial",
+      {"belt_knee", "biped with knees driven by belts, otherwise serial",
        makeRequests<BeltKneeParameters>(makeBeltKnee)},
-      {"differential_ankle", "biped with ankles driven by differentials, all else serial",
+      {"differential_ankle", "biped with ankles driven by differentials, otherwise serial",
        makeRequests<DifferentialAnkleParameters>(makeDifferentialAnkle)},
-      {"kangaroo", "biped moved by ball screws alone: hip differentials, parallelograms; 96 redundant rows",
+      {"kangaroo", "biped driven only by ball screws: hip differentials, parallelograms; 96 redundant rows",
        makeRequests<KangarooParameters>(makeKangaroo)},
-      {"kangaroo_leg", "its left leg, the trunk on a vertical rail; 48 redundant rows",
+      {"kangaroo_leg", "left leg of kangaroo with the trunk on a vertical rail; 48 redundant rows",
        makeRequests<KangarooParameters>(makeKangarooLeg)},
       {"fivebar_leg", "planar leg on a rail: two coaxial motors, four rods, a point foot",
        makeRequests<FiveBarLegParameters>(makeFiveBarLeg)},
@@ -83,8 +83,8 @@ const std::vector<Generator>& getGenerators() {
        makeRequests<SpringBipedParameters>(makeSpringBiped)},
       {"spring_leg", "leg like Cassie's with rigid springs: tarsus and toe moved by four-bars",
        makeRequests<SpringLegParameters>(makeSpringLeg)},
-      {"delta", "Clavel's delta, all of hinges: many more rows than rank", makeRequests<DeltaParameters>(makeDelta)},
-      {"fourbar_chain", "chain of planar four-bars, each on the coupler of the one before",
+      {"delta", "Clavel's delta with hinges only: many more rows than rank", makeRequests<DeltaParameters>(makeDelta)},
+      {"fourbar_chain", "chain of planar four-bars, each on the coupler of the previous one",
        makeRequests<FourBarChainParameters>(makeChain)},
   };
   return generators;

@@ -51,18 +51,18 @@ void addArm(const HumanoidArm& arm, ModelBuilder& builder) {
 std::vector<Parameter> listParameters(HumanoidParameters& p) {
   std::vector<Parameter> parameters = listRsuParameters(p);
   for (Parameter& parameter : parameters)
-    if (parameter.name == "motor_mass") parameter.help = "of each motor of the legs";
+    if (parameter.name == "motor_mass") parameter.help = "mass of each motor of the legs";
   const std::vector<Parameter> own = {
-      {"shoulder_height", &p.shoulder_height, "m", 0, 1, "of the shoulders over the trunk's frame"},
-      {"shoulder_offset", &p.shoulder_offset, "m", 0.05, 0.5, "of a shoulder from the middle plane"},
-      {"upper_arm_length", &p.upper_arm_length, "m", 0.05, 1, "shoulder to elbow"},
-      {"forearm_length", &p.forearm_length, "m", 0.05, 1, "elbow to the hand"},
-      {"finger_length", &p.finger_length, "m", 0.01, 0.2, "of each of the two links of a finger"},
+      {"shoulder_height", &p.shoulder_height, "m", 0, 1, "height of the shoulders above the trunk's frame"},
+      {"shoulder_offset", &p.shoulder_offset, "m", 0.05, 0.5, "distance of a shoulder from the middle plane"},
+      {"upper_arm_length", &p.upper_arm_length, "m", 0.05, 1, "distance from shoulder to elbow"},
+      {"forearm_length", &p.forearm_length, "m", 0.05, 1, "distance from elbow to hand"},
+      {"finger_length", &p.finger_length, "m", 0.01, 0.2, "length of each of the two links of a finger"},
       {"finger_ratio", &p.finger_ratio, "1", 0.1, 3,
-       "turns of a fingertip back per turn of its finger; 1: tips stay parallel"},
-      {"arm_density", &p.arm_density, "kg/m", 0.01, 50, "of upper arm and forearm, without motors"},
-      {"arm_motor_mass", &p.arm_motor_mass, "kg", 0.01, 10, "of each motor of an arm; a hand weighs half of it"},
-      {"finger_mass", &p.finger_mass, "kg", 0.001, 1, "of each link of a finger"},
+       "backward turns of a fingertip per turn of its finger; 1: tips stay parallel"},
+      {"arm_density", &p.arm_density, "kg/m", 0.01, 50, "mass per length of upper arm and forearm, without motors"},
+      {"arm_motor_mass", &p.arm_motor_mass, "kg", 0.01, 10, "mass of each motor of an arm; a hand has half of it"},
+      {"finger_mass", &p.finger_mass, "kg", 0.001, 1, "mass of each link of a finger"},
       {"finger_armature", &p.finger_armature, "kg m^2", 0, 1, "rotor inertia of the gripper's motor"},
   };
   parameters.insert(parameters.end(), own.begin(), own.end());

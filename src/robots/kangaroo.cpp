@@ -207,7 +207,7 @@ void check(const std::string& robot, KangarooParameters& p) {
     throw ModelError(robot, "parameter 'upper_crank_height'", "the upper cranks are not between lower cranks and knee",
                      "give more than lower_crank_height, and less than shank_length without ankle_arm");
   if (!(p.knee_screw_drop + p.knee_crank_height + p.knee_arm < p.thigh_length))
-    throw ModelError(robot, "parameter 'knee_screw_drop'", "the screw of the knee has no room on the thigh",
+    throw ModelError(robot, "parameter 'knee_screw_drop'", "the thigh has no room for the knee screw",
                      "make the sum of it, knee_crank_height and knee_arm less than thigh_length");
 }
 
@@ -241,25 +241,28 @@ std::vector<Parameter> listParameters(KangarooParameters& p) {
   std::vector<Parameter> parameters = listSerialParameters(p);
   for (Parameter& parameter : parameters) {
     if (parameter.name != "armature") continue;
-    parameter = {"armature", &p.armature, "kg", 0, 1000, "of every motor, felt at its screw: (2 pi / lead)^2 J"};
+    parameter = {"armature", &p.armature, "kg",
+                 0,          1000,        "rotor inertia of every motor, reflected to its screw: (2 pi / lead)^2 J"};
   }
   const std::vector<Parameter> own = {
-      {"yaw_arm", &p.yaw_arm, "m", 0.02, 0.2, "of the yaw link beside its axis"},
+      {"yaw_arm", &p.yaw_arm, "m", 0.02, 0.2, "distance of the yaw link from its axis"},
       {"yaw_screw", &p.yaw_screw, "m", 0.05, 0.5, "length of the yaw screw, neutral"},
-      {"hip_screw_place", &p.hip_screw_place, "m", 0.02, 0.3, "of the hip screws before the hip"},
-      {"hip_screw_width", &p.hip_screw_width, "m", 0.01, 0.2, "of the hip screws beside the middle of the thigh"},
-      {"hip_screw_top", &p.hip_screw_top, "m", 0.02, 0.5, "of their upper ends over the hip"},
-      {"hip_screw_drop", &p.hip_screw_drop, "m", 0.02, 0.5, "of their lower ends under the hip"},
-      {"knee_arm", &p.knee_arm, "m", 0.01, 0.2, "of bell crank and shank"},
-      {"knee_angle", &p.knee_angle, "rad", -1.2, 1.2, "of these arms below the horizontal, legs straight"},
-      {"knee_crank_height", &p.knee_crank_height, "m", 0.02, 0.5, "of the bell crank over the knee"},
-      {"knee_screw_drop", &p.knee_screw_drop, "m", 0, 0.5, "of the knee screw's upper end under the hip"},
-      {"ankle_arm", &p.ankle_arm, "m", 0.01, 0.2, "of the cranks of the ankle and of the heel"},
-      {"ankle_angle", &p.ankle_angle, "rad", -1.2, 1.2, "of these arms over the horizontal, legs straight"},
-      {"ankle_half_width", &p.ankle_half_width, "m", 0.01, 0.2, "of the links beside the ankle"},
-      {"upper_crank_height", &p.upper_crank_height, "m", 0.03, 0.9, "over the ankle"},
-      {"lower_crank_height", &p.lower_crank_height, "m", 0.02, 0.9, "over the ankle"},
-      {"rod_density", &p.rod_density, "kg/m", 0.01, 20, "of rods and cranks, half that of screws"},
+      {"hip_screw_place", &p.hip_screw_place, "m", 0.02, 0.3, "distance of the hip screws in front of the hip"},
+      {"hip_screw_width", &p.hip_screw_width, "m", 0.01, 0.2,
+       "sideways distance of the hip screws from the middle of the thigh"},
+      {"hip_screw_top", &p.hip_screw_top, "m", 0.02, 0.5, "height of their upper ends above the hip"},
+      {"hip_screw_drop", &p.hip_screw_drop, "m", 0.02, 0.5, "distance of their lower ends below the hip"},
+      {"knee_arm", &p.knee_arm, "m", 0.01, 0.2, "lever arms of bell crank and shank"},
+      {"knee_angle", &p.knee_angle, "rad", -1.2, 1.2, "angle of these arms below the horizontal, legs straight"},
+      {"knee_crank_height", &p.knee_crank_height, "m", 0.02, 0.5, "height of the bell crank above the knee"},
+      {"knee_screw_drop", &p.knee_screw_drop, "m", 0, 0.5, "distance of the knee screw's upper end below the hip"},
+      {"ankle_arm", &p.ankle_arm, "m", 0.01, 0.2, "length of the cranks of ankle and heel"},
+      {"ankle_angle", &p.ankle_angle, "rad", -1.2, 1.2, "angle of these arms above the horizontal, legs straight"},
+      {"ankle_half_width", &p.ankle_half_width, "m", 0.01, 0.2, "sideways distance of the links from the ankle"},
+      {"upper_crank_height", &p.upper_crank_height, "m", 0.03, 0.9, "height of the upper cranks above the ankle"},
+      {"lower_crank_height", &p.lower_crank_height, "m", 0.02, 0.9, "height of the lower cranks above the ankle"},
+      {"rod_density", &p.rod_density, "kg/m", 0.01, 20,
+       "mass per length of rods and cranks; screws have twice as much"},
   };
   parameters.insert(parameters.end(), own.begin(), own.end());
   return parameters;

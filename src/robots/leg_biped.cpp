@@ -273,30 +273,32 @@ std::vector<Parameter> listSome(LegBipedParameters& p, const std::set<std::strin
 std::vector<Parameter> listParameters(LegBipedParameters& p) {
   std::vector<Parameter> parameters = listSerialParameters(p);
   for (Parameter& parameter : parameters)
-    if (parameter.name == "motor_mass") parameter.help = "of each motor of the hips";
+    if (parameter.name == "motor_mass") parameter.help = "mass of each motor of the hips";
   const std::vector<Parameter> own = {
       {"knee", &p.knee, "1", 0, 2, "part that moves the knee", {"serial", "belt", "four_bar"}},
       {"ankle", &p.ankle, "1", 0, 2, "part that moves the ankle", {"serial", "differential", "rsu"}},
       {"hip", &p.hip, "1", 0, 1, "part that moves the hip", {"serial", "three_rrs"}},
-      {"knee_motor_mass", &p.knee_motor_mass, "kg", 0.01, 10, "of each motor of the knees"},
-      {"ankle_motor_mass", &p.ankle_motor_mass, "kg", 0.01, 10, "of each motor of the ankles"},
-      {"hip_radius", &p.hip_radius, "m", 0.03, 0.2, "of three RRS limbs: of their hinges and balls about the hip"},
-      {"hip_middle", &p.hip_middle, "rad", -1.5, 1.5, "of three RRS limbs: hipy where all of them are square"},
-      {"knee_ratio", &p.knee_ratio, "1", 0.1, 20, "of a belt: turns of the knee's motor per turn of the knee"},
-      {"knee_crank", &p.knee_crank, "m", 0.01, 0.2, "of a four-bar: length of the crank at the hip"},
-      {"knee_arm", &p.knee_arm, "m", 0.01, 0.2, "of a four-bar: length of the arm at the knee"},
-      {"knee_middle", &p.knee_middle, "rad", 0, 2, "of a four-bar: angle of the knee where both are square to the rod"},
+      {"knee_motor_mass", &p.knee_motor_mass, "kg", 0.01, 10, "mass of each motor of the knees"},
+      {"ankle_motor_mass", &p.ankle_motor_mass, "kg", 0.01, 10, "mass of each motor of the ankles"},
+      {"hip_radius", &p.hip_radius, "m", 0.03, 0.2, "3-RRS limbs: distance of their hinges and balls from the hip"},
+      {"hip_middle", &p.hip_middle, "rad", -1.5, 1.5, "3-RRS limbs: angle of hipy at which all are at right angles"},
+      {"knee_ratio", &p.knee_ratio, "1", 0.1, 20, "belt: turns of the knee's motor per turn of the knee"},
+      {"knee_crank", &p.knee_crank, "m", 0.01, 0.2, "four-bar: length of the crank at the hip"},
+      {"knee_arm", &p.knee_arm, "m", 0.01, 0.2, "four-bar: length of the arm at the knee"},
+      {"knee_middle", &p.knee_middle, "rad", 0, 2,
+       "four-bar: angle of the knee at which crank and arm are perpendicular to the rod"},
       {"ankle_ratio", &p.ankle_ratio, "1", 0.1, 20,
-       "of a differential: mean turns of the ankle's motors per turn of the ankle"},
-      {"ankle_motor_drop", &p.ankle_motor_drop, "m", 0, 0.5, "of a differential: of the ankle motors below the knee"},
-      {"pulley_mass", &p.pulley_mass, "kg", 0.001, 2, "of each motor's pulley, with belt and differential"},
-      {"ankle_arm", &p.ankle_arm, "m", 0.01, 0.2, "of rods (RSU): of their balls behind the ankle"},
-      {"ankle_crank", &p.ankle_crank, "m", 0.01, 0.2, "of rods (RSU): length of the cranks"},
-      {"ankle_half_width", &p.ankle_half_width, "m", 0.01, 0.2, "of rods (RSU): beside the ankle"},
-      {"motor_height", &p.motor_height, "m", 0.05, 0.8, "of rods (RSU): of the ankle motors over the ankle"},
+       "differential: mean turns of the ankle's motors per turn of the ankle"},
+      {"ankle_motor_drop", &p.ankle_motor_drop, "m", 0, 0.5,
+       "differential: distance of the ankle motors below the knee"},
+      {"pulley_mass", &p.pulley_mass, "kg", 0.001, 2, "belt and differential: mass of each motor's pulley"},
+      {"ankle_arm", &p.ankle_arm, "m", 0.01, 0.2, "rods (RSU): distance of their balls behind the ankle"},
+      {"ankle_crank", &p.ankle_crank, "m", 0.01, 0.2, "rods (RSU): length of the cranks"},
+      {"ankle_half_width", &p.ankle_half_width, "m", 0.01, 0.2, "rods (RSU): sideways distance from the ankle"},
+      {"motor_height", &p.motor_height, "m", 0.05, 0.8, "rods (RSU): height of the ankle motors above the ankle"},
       {"arm_angle", &p.arm_angle, "rad", -1.2, 1.2,
-       "of rods (RSU): cranks and arms over the horizontal, legs straight"},
-      {"rod_density", &p.rod_density, "kg/m", 0.01, 20, "of cranks and rods"},
+       "rods (RSU): angle of cranks and arms above the horizontal, legs straight"},
+      {"rod_density", &p.rod_density, "kg/m", 0.01, 20, "mass per length of cranks and rods"},
   };
   parameters.insert(parameters.end(), own.begin(), own.end());
   return parameters;

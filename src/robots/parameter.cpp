@@ -12,7 +12,7 @@ double findChoice(const Parameter& parameter, const std::string& name) {
     if (parameter.choices[i] == name) return static_cast<double>(i);
     known += (known.empty() ? "" : ", ") + parameter.choices[i];
   }
-  throw ModelError("", "parameter '" + parameter.name + "'", "'" + name + "' is none of its choices",
+  throw ModelError("", "parameter '" + parameter.name + "'", "'" + name + "' is not one of its choices",
                    known.empty() ? "give a number" : "choose one of: " + known);
 }
 

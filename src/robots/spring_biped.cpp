@@ -74,20 +74,19 @@ SpringBipedParameters::SpringBipedParameters() {
 std::vector<Parameter> listParameters(SpringBipedParameters& p) {
   std::vector<Parameter> parameters = listParameters(static_cast<SpringLegParameters&>(p));
   for (Parameter& parameter : parameters)
-    if (parameter.name == "armature")
-      parameter.help = "rotor inertia of the motors of roll and yaw, behind their gears";
+    if (parameter.name == "armature") parameter.help = "rotor inertia of the roll and yaw motors, after their gears";
   const std::vector<Parameter> own = {
-      {"crank_spread", &p.crank_spread, "m", 0.01, 0.3, "between the two cranks of a toe"},
-      {"toe_cross_mass", &p.toe_cross_mass, "kg", 0.001, 5, "of the part between the axes of a toe"},
-      {"trunk_mass", &p.trunk_mass, "kg", 0.1, 100, "without legs"},
-      {"hip_offset", &p.hip_offset, "m", 0.05, 0.4, "of a hip from the middle plane"},
-      {"hip_place", &p.hip_place, "m", -0.5, 0.5, "of the hips before the trunk's frame"},
-      {"trunk_place", &p.trunk_place, "m", -0.5, 0.5, "of the trunk's centre of mass before its frame"},
-      {"trunk_height", &p.trunk_height, "m", -0.5, 0.5, "of it over its frame"},
+      {"crank_spread", &p.crank_spread, "m", 0.01, 0.3, "distance between the two cranks of a toe"},
+      {"toe_cross_mass", &p.toe_cross_mass, "kg", 0.001, 5, "mass of the part between the axes of a toe"},
+      {"trunk_mass", &p.trunk_mass, "kg", 0.1, 100, "mass of the trunk without legs"},
+      {"hip_offset", &p.hip_offset, "m", 0.05, 0.4, "distance of a hip from the middle plane"},
+      {"hip_place", &p.hip_place, "m", -0.5, 0.5, "distance of the hips in front of the trunk's frame"},
+      {"trunk_place", &p.trunk_place, "m", -0.5, 0.5, "distance of the trunk's centre of mass in front of its frame"},
+      {"trunk_height", &p.trunk_height, "m", -0.5, 0.5, "height of the trunk's centre of mass above its frame"},
       {"stand_height", &p.stand_height, "m", 0.1, 3,
-       "of the trunk's frame over the soles in the reference half_sitting"},
-      {"leg_armature", &p.leg_armature, "kg m^2", 0, 1, "of the motors of hip pitch and knee"},
-      {"toe_armature", &p.toe_armature, "kg m^2", 0, 1, "of each of the toe's motors"},
+       "height of the trunk's frame above the soles in the reference half_sitting"},
+      {"leg_armature", &p.leg_armature, "kg m^2", 0, 1, "rotor inertia of the hip pitch and knee motors"},
+      {"toe_armature", &p.toe_armature, "kg m^2", 0, 1, "rotor inertia of each toe motor"},
   };
   parameters.insert(parameters.end(), own.begin(), own.end());
   return parameters;

@@ -102,7 +102,7 @@ std::string BackwardPass::checkModel(const ShootingProblem& problem, int k) cons
   }
   const int N = problem.numStages(), nu = k < N ? problem.controlSize(k) : 0;
   if (!model.hasSizes(problem.tangentSize(k), nu, k < N ? problem.tangentSize(k + 1) : 0))
-    return "the quadratic model has other sizes than the problem says";
+    return "the sizes of the quadratic model differ from those of the problem";
   if (!std::isfinite(model.cost) || !model.gap.allFinite()) return "the cost or the gap is not finite";
   return {};
 }

@@ -23,12 +23,12 @@ void checkOptions(const FddpOptions& o) {
   require(o.initial_regularization >= o.min_regularization && o.initial_regularization <= o.max_regularization,
           "initial_regularization must lie between min_regularization and max_regularization");
   require(o.regularization_increase > 1 && o.regularization_decrease >= 1,
-          "regularization_increase must exceed 1, regularization_decrease must not be below");
+          "regularization_increase must exceed 1, and regularization_decrease must be at least 1");
   require(o.acceptable_decrease >= 0, "acceptable_decrease must not be negative");
   require(o.state_regularization_ratio >= 0, "state_regularization_ratio must not be negative");
   require(o.rollout_segments >= 1, "rollout_segments must be at least 1");
   require(o.constraints.inequalities == Inequalities::AugmentedLagrangian || o.last_rollout == LastRollout::Closed,
-          "a receding horizon has no interior point");
+          "a receding horizon does not support the interior point method");
   require(o.constraints.final_barrier > 0 && o.constraints.initial_barrier >= o.constraints.final_barrier,
           "final_barrier must be positive and not exceed initial_barrier");
   require(o.acceptance > 0 && o.acceptance < 1, "acceptance must lie between 0 and 1");
@@ -36,7 +36,7 @@ void checkOptions(const FddpOptions& o) {
 
 void checkSizes(const ShootingProblem& problem, const ShootingTrajectory& trajectory) {
   const int N = problem.numStages();
-  if (N < 1) throw std::invalid_argument("Fddp: the problem has no stage");
+  if (N < 1) throw std::invalid_argument("Fddp: the problem has no stages");
   if (static_cast<int>(trajectory.xs.size()) != N + 1 || static_cast<int>(trajectory.us.size()) != N) {
     throw std::invalid_argument("Fddp: the guess has " + std::to_string(trajectory.xs.size()) + " states and " +
                                 std::to_string(trajectory.us.size()) + " controls, the problem needs " +

@@ -10,9 +10,9 @@ const char* getName(FddpTermination termination) {
     case FddpTermination::Converged:
       return "converged";
     case FddpTermination::MaxIterations:
-      return "maximum of iterations";
+      return "iteration limit";
     case FddpTermination::RegularizationMax:
-      return "maximum of regularization";
+      return "regularization limit";
     case FddpTermination::Infeasible:
       return "locally infeasible";
     case FddpTermination::Interrupted:

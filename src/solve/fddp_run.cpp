@@ -146,7 +146,7 @@ FddpRun::End FddpRun::findStep() {
     if (isInterrupted()) return FddpTermination::Interrupted;
     if (const End end = updateStep()) return end;
     if (settling_ > 0 && isClosed() && work_.lagrangian.isSatisfied()) {
-      summary_.message = "the constraints hold, and the cost hardly falls any more; it is not stationary";
+      summary_.message = "the constraints are satisfied and the cost hardly decreases; the iterate is not stationary";
       summary_.acceptable = true;
       return FddpTermination::Converged;
     }
@@ -183,7 +183,8 @@ FddpRun::End FddpRun::updateMultipliers() {
       closing_ = updated_ = true;
       return {};
     }
-    summary_.message = "near here the constraints cannot all be kept: " + work_.lagrangian.describeWorst(problem_);
+    summary_.message =
+        "near this iterate the constraints cannot all be satisfied: " + work_.lagrangian.describeWorst(problem_);
     return work_.lagrangian.dominates(line_.cost) ? FddpTermination::Infeasible : FddpTermination::RegularizationMax;
   }
   closing_ = stalled_ = swept_ = false;
@@ -342,12 +343,12 @@ FddpSummary FddpRun::finish(FddpTermination termination) {
       summary_.message = "the gradient vanishes and the gaps are closed";
       break;
     case FddpTermination::MaxIterations:
-      summary_.message = "the largest number of iterations is reached";
+      summary_.message = "the iteration limit was reached";
       if (work_.lagrangian.getViolation() > options_.constraints.tolerance)
         summary_.message += "; " + work_.lagrangian.describeWorst(problem_);
       break;
     case FddpTermination::Interrupted:
-      summary_.message = "stopped from outside";
+      summary_.message = "stopped by the caller";
       break;
     case FddpTermination::RegularizationMax:
     case FddpTermination::Infeasible:

@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 namespace bielle::study {
 namespace {
 
-constexpr const char* kRemedy = "remove its directory, so that the case is done anew";
+constexpr const char* kRemedy = "remove its directory to repeat the case";
 constexpr double kLeastDistance = 0.2;  // m, for a cost of transport
 
 MotorTrace readTrace(const MotionRecord& record) {
@@ -105,7 +105,7 @@ Feat readFeat(const ArchitectureSpec& spec, const Contender& contender, const st
               const CaseOutcome& outcome) {
   Feat feat;
   if (!outcome.complete || outcome.steps.empty()) {
-    feat.outcome = "broke down";
+    feat.outcome = "failed";
     return feat;
   }
   if (outcome.steps[0].status >= 2) {

@@ -107,8 +107,7 @@ std::string describeLargest(const ArchitectureSpec& spec, const std::vector<Feat
 void printSpeeds(std::ostream& page, const ArchitectureSpec& spec, const std::vector<Contender>& contenders,
                  const ArchitectureResults& results) {
   if (spec.speeds.empty()) return;
-  page
-      << "## Speed\n\nPeak torque of all motors [N m], electrical cost of transport, iterations; or what is wrong.\n\n";
+  page << "## Speed\n\nPeak torque of all motors [N m], electrical cost of transport, iterations; or the failure.\n\n";
   printHead(page, spec.speeds[0].motion + ": " + spec.speeds[0].settings[0].first, contenders);
   for (size_t i = 0; i < spec.speeds.size(); ++i) {
     page << "| " << formatCell(spec.speed_values[i], 2) << " |";
@@ -206,7 +205,7 @@ std::vector<std::string> writeArchitectures(const std::string& directory, const 
   page << "# Robots compared\n\nMade by `bielle compare` from " << std::filesystem::path(spec.path).filename().string()
        << ". " << kExplanation << formatCell(spec.drive.motor_constant, 2) << " N m/sqrt(W), "
        << formatCell(100 * spec.drive.regeneration, 0)
-       << " % of what braking leaves given back; cost of transport: over weight and distance.\n\n";
+       << " % of the braking energy regenerated; cost of transport: energy over weight and distance.\n\n";
   printRobots(page, contenders);
   const auto draw = [&](const std::string& name, const std::string& caption, const std::vector<Plot>& plots) {
     const std::string path = directory + "/" + name;
@@ -214,7 +213,7 @@ std::vector<std::string> writeArchitectures(const std::string& directory, const 
       paths.push_back(path);
       page << "![" << caption << "](" << name << ")\n\n";
     } else {
-      notes.push_back(name + ": not drawn, there is no gnuplot (package gnuplot-nox)");
+      notes.push_back(name + ": not drawn: gnuplot is not installed (package gnuplot-nox)");
     }
   };
   for (size_t i = 0; i < spec.motions.size(); ++i) {

@@ -34,7 +34,8 @@ void readSpeeds(const Entry& entry, ArchitectureSpec& spec) {
   const auto getNumber = [&](const char* key) { return require(fields, key, entry).getNumber(); };
   const double from = getNumber("from"), to = getNumber("to"), step = getNumber("step");
   if (!(from <= to && step > 0 && (to - from) / step < 1000))
-    entry.fail("its steps do not lead from one to the other", "give from <= to, step > 0 and less than 1000 steps");
+    entry.fail("its steps do not lead from the first to the last value",
+               "give from <= to, step > 0 and less than 1000 steps");
   const Entry *motion = find(fields, "motion"), *option = find(fields, "option"), *set = find(fields, "set");
   for (int i = 0; from + i * step <= to + 1e-9 * step; ++i) {
     // The decimal number, not the sum of steps.
@@ -70,7 +71,7 @@ void readRoot(const Entry& root, ArchitectureSpec& spec) {
     if (const Entry* share = find(drive, "regeneration")) {
       spec.drive.regeneration = share->getNumber();
       if (!(spec.drive.regeneration >= 0 && spec.drive.regeneration <= 1))
-        share->fail("it is outside 0 .. 1", "give the share that is given back");
+        share->fail("it is outside 0 .. 1", "give the share that is regenerated");
     }
   }
 }
@@ -79,13 +80,12 @@ void readRoot(const Entry& root, ArchitectureSpec& spec) {
 double calcTrunkFactor(const ArchitectureSpec& spec, const std::string& name, const Model& model) {
   if (spec.mass == 0) return 1;
   if (!model.hasFreeFlyer())
-    throw ModelError(spec.path, "robot '" + name + "'", "it has no trunk that is free to move",
-                     "leave `mass` out, or the robot");
+    throw ModelError(spec.path, "robot '" + name + "'", "it has no free trunk", "leave out `mass` or the robot");
   const double trunk = model.bodies()[1].inertia.mass, factor = 1 + (spec.mass - model.mass()) / trunk;
   if (!(factor > 0))
     throw ModelError(spec.path, "robot '" + name + "'",
-                     "without its trunk it weighs " + formatValue(model.mass() - trunk) + " kg already",
-                     "ask for a larger `mass`");
+                     "its mass without the trunk is already " + formatValue(model.mass() - trunk) + " kg",
+                     "give a larger `mass`");
   return factor;
 }
 

@@ -91,8 +91,8 @@ class CampaignRunner {
         const Json json = parseJson(line);
         results_[{json.at("motion"), json.at("run")}] = json.at("result");
       } catch (const std::exception&) {
-        throw ModelError(log_.getPath(), "log", "one of its lines is not as it was written",
-                         "remove the file: the runs are done anew");
+        throw ModelError(log_.getPath(), "log", "one of its lines was changed or damaged",
+                         "remove the file to repeat the runs");
       }
     }
   }
@@ -210,7 +210,7 @@ class CampaignRunner {
       result = readCampaignResult(entry.task, end.status);
     } catch (const std::exception& error) {
       const bool again = entry.attempt < options_.engine->attempts();
-      report(entry.key + ": " + error.what() + (again ? "; once more" : ""), again);
+      report(entry.key + ": " + error.what() + (again ? "; retrying" : ""), again);
       if (again) {
         ++entry.attempt;
         submit(std::move(entry));

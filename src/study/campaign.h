@@ -2,7 +2,7 @@
 /// \file The runs of a campaign: each a task, a run of `bielle-simulate`, each written to a log when it ends.
 ///
 /// The log DIR/runs.jsonl has one line per finished run, in the order in which they ended. Runs in the log are not done
-/// again, and what is not asked for any more does no harm: axes and motions may be added between two calls, and the runs
+/// again, and what is no longer requested does no harm: axes and motions may be added between two calls, and the runs
 /// of a motion that has changed are done anew. All else follows from outcomes in the order of the axes, and thus does not
 /// depend on where the tasks are done and how many at a time.
 #include <functional>
@@ -23,7 +23,7 @@ struct CampaignOptions {
 
 constexpr const char *kStood = "stood", *kFell = "fell", *kRefused = "refused";
 
-/// One finished run. Under `outcome` of its result: stood, fell, broke off, or, not in the log, refused.
+/// One finished run. Under `outcome` of its result: stood, fell, failed, or, not in the log, refused.
 struct CampaignRun {
   std::vector<std::string> values;  ///< of the columns
   std::string command;              ///< arguments of `bielle simulate` after the motion
@@ -38,7 +38,7 @@ struct CampaignResults {
   std::vector<CampaignRun> runs;  ///< in the order of the axes, the last column varying first
   bool searched = false;          ///< for the largest impulses
   bool interrupted = false;       ///< by the user
-  bool complete = true;           ///< false if runs broke down, or returned what is no result
+  bool complete = true;           ///< false if runs failed, or returned an invalid result
 };
 
 /// Checks options by dry runs, solves the motions that are to be solved (in DIR/motions), and does what the log lacks.

@@ -55,7 +55,7 @@ std::string findComplaint(const std::string& simulate, const std::vector<std::st
   const CampaignAxis* guilty = &varied;
   for (const CampaignAxis& axis : spec.axes)
     if (axis.kind == Kind::Option && complaint.find("--" + axis.name) != std::string::npos) guilty = &axis;
-  guilty->entry.fail("`bielle simulate` refuses it: " + complaint, "see `bielle simulate --help`");
+  guilty->entry.fail("`bielle simulate` rejects it: " + complaint, "see `bielle simulate --help`");
 }
 
 }  // namespace

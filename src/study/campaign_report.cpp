@@ -141,7 +141,7 @@ void printImpulses(std::ostream& page, const CampaignResults& results) {
   std::vector<std::string> head;
   for (const size_t column : listVaried(results)) head.push_back(results.columns[column]);
   for (const std::string& value : directions) head.push_back(value + "°");
-  page << "\nLargest impulse that was survived, N s, by direction (0: along x, 90: along y):\n\n";
+  page << "\nLargest impulse without a fall, N s, by direction (0: along x, 90: along y):\n\n";
   printHead(page, head);
   for (const auto& [key, impulses] : groups) {
     std::vector<std::string> cells = key;
@@ -172,7 +172,7 @@ std::string formatPage(const CampaignResults& results, bool has_map) {
   page << ". Each run is a line of [runs.csv](runs.csv).\n";
   printShares(page, results);
   printImpulses(page, results);
-  if (has_map) page << "\n![largest impulse that was survived, by direction](map.svg)\n";
+  if (has_map) page << "\n![largest impulse without a fall, by direction](map.svg)\n";
   return page.str();
 }
 
@@ -200,10 +200,20 @@ Json makeSummary(const CampaignResults& results) {
 // Seen from above, x upwards, y to the left.
 std::string makeMapScript(const Groups& groups, size_t direction) {
   std::ostringstream script;
-  script << "set encoding utf8\nset polar\nset angles degrees\nset theta top ccw\nset grid polar 45\nunset border\n"
-            "unset xtics\nunset ytics\nset rrange [0:*]\nset rtics\nset size square\nset lmargin 8\nset key outside "
-            "right top\n"
-            "set title 'Largest impulse that was survived, N s, by direction' noenhanced\n"
+  script << "set encoding utf8\n"
+            "set polar\n"
+            "set angles degrees\n"
+            "set theta top ccw\n"
+            "set grid polar 45\n"
+            "unset border\n"
+            "unset xtics\n"
+            "unset ytics\n"
+            "set rrange [0:*]\n"
+            "set rtics\n"
+            "set size square\n"
+            "set lmargin 8\n"
+            "set key outside right top\n"
+            "set title 'Largest impulse without a fall, N s, by direction' noenhanced\n"
             "set ttics 0, 45 format '%g°'\n";
   for (size_t i = 0; i < groups.size(); ++i) {
     std::vector<std::pair<double, double>> points;

@@ -14,7 +14,7 @@ constexpr std::size_t kLongestSummary = 4'000'000;
 constexpr const char *kTexts[] = {"outcome", "outcome_message"},
                      *kNumbers[] = {"duration",     "distance",    "mean_speed",     "largest_deviation",
                                     "largest_slip", "largest_gap", "energy_balance", "saturated_share"};
-constexpr const char* kBrokeOff = "broke off";
+constexpr const char* kBrokeOff = "failed";
 
 // JSON has no NaN: a number that is none is null, which is right only where the world broke off.
 bool isNumber(const Json& value, bool broke_off) {
@@ -25,7 +25,7 @@ Json readRunSummary(const std::string& text, int status) {
   const Json summary = parseJson(text);
   Json result = Json::object();
   for (const char* field : kTexts) {
-    if (!summary.at(field).is_string()) throw std::runtime_error(std::string(field) + " is no text");
+    if (!summary.at(field).is_string()) throw std::runtime_error(std::string(field) + " is not text");
     result[field] = summary.at(field);
   }
   const std::string outcome = result["outcome"];
@@ -35,7 +35,7 @@ Json readRunSummary(const std::string& text, int status) {
     throw std::runtime_error("it " + outcome + ", and the exit status was " + std::to_string(status));
   for (const char* field : kNumbers) {
     if (!isNumber(summary.at(field), outcome == kBrokeOff))
-      throw std::runtime_error(std::string(field) + " is no number");
+      throw std::runtime_error(std::string(field) + " is not a number");
     result[field] = summary.at(field);
   }
   return result;
@@ -47,12 +47,13 @@ Json readCampaignResult(const tasks::Task& task, int status) {
   const std::string log = tasks::getOutput(task, task.log), error = findError(log);
   if (status == 2 && !error.empty()) return {{"outcome", kRefused}, {"outcome_message", error}};
   if (status == 127) throw std::runtime_error("it could not be started" + describeLog(log));
-  if (status >= 128) throw std::runtime_error("ended by signal " + std::to_string(status - 128) + describeLog(log));
+  if (status >= 128)
+    throw std::runtime_error("terminated by signal " + std::to_string(status - 128) + describeLog(log));
   if (status >= 2 || status < 0) throw std::runtime_error("exit status " + std::to_string(status) + describeLog(log));
   try {
     return readRunSummary(tasks::readOutput(tasks::getOutput(task, "out/summary.json"), kLongestSummary), status);
   } catch (const std::exception& problem) {
-    throw std::runtime_error(std::string("what it returned is no result: ") + problem.what());
+    throw std::runtime_error(std::string("it returned an invalid result: ") + problem.what());
   }
 }
 

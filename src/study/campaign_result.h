@@ -6,7 +6,7 @@
 namespace bielle::study {
 
 // The fields of its summary that are kept, or the reason for which the program refused it.
-// \throws std::exception saying what is wrong, when the task broke down, or its outputs are no result of the program
+// \throws std::exception saying what is wrong, when the task failed, or its outputs are not a result of the program
 Json readCampaignResult(const tasks::Task& task, int status);
 
 }  // namespace bielle::study

@@ -70,7 +70,7 @@ CampaignMotion readRequest(const YamlEntry& entry, const std::string& file) {
   if (const YamlEntry* options = find(fields, "options"))
     for (const auto& [name, value] : options->getMap()) {
       if (name == "output" || name == "set" || name == "robot")
-        value.fail("it cannot be set here", name == "output" ? "remove it" : "use the key beside `options`");
+        value.fail("it cannot be set here", name == "output" ? "remove it" : "use the key next to `options`");
       addOption(name, value.getText(), motion.solve);
     }
   return motion;
@@ -103,9 +103,9 @@ ImpulseSearch readSearch(const YamlEntry& entry) {
 void readPush(const YamlEntry& entry, CampaignSpec& spec) {
   const YamlFields fields = entry.getFields({"time", "phase", "direction", "duration", "impulse", "largest_impulse"});
   if (fields.count("time") + fields.count("phase") != 1)
-    entry.fail("it has neither `time` nor `phase`, or both", "give one of them");
+    entry.fail("it does not have exactly one of `time` and `phase`", "give one of them");
   if (fields.count("impulse") + fields.count("largest_impulse") != 1)
-    entry.fail("it has neither `impulse` nor `largest_impulse`, or both", "give one of them");
+    entry.fail("it does not have exactly one of `impulse` and `largest_impulse`", "give one of them");
   const std::pair<const char*, Kind> kinds[] = {{"time", Kind::PushTime},
                                                 {"phase", Kind::PushPhase},
                                                 {"direction", Kind::PushDirection},
@@ -135,7 +135,7 @@ CampaignSpec readCampaignSpec(const std::string& path) {
     if (const YamlEntry* options = find(fields, "options"))
       for (const auto& [name, entry] : options->getMap()) {
         if (name == "output" || name == "push")
-          entry.fail("it cannot be set here", name == "push" ? "use the key `push` beside `options`" : "remove it");
+          entry.fail("it cannot be set here", name == "push" ? "use the key `push` next to `options`" : "remove it");
         spec.axes.push_back(makeAxis(Kind::Option, name, entry));
       }
     if (const YamlEntry* push = find(fields, "push")) readPush(*push, spec);

@@ -36,7 +36,7 @@ class DirectoryLock {
     if (file_ < 0) failToWrite(path, "it cannot be opened");
     if (flock(file_, LOCK_EX | LOCK_NB) != 0) {
       close(file_);
-      throw ModelError(directory, "directory", "another study is at work there", "wait for it, or give another one");
+      throw ModelError(directory, "directory", "another study is using it", "wait for it, or give another one");
     }
   }
   ~DirectoryLock() { close(file_); }
@@ -81,12 +81,12 @@ std::string describeOutcome(const CaseOutcome& outcome) {
   for (const StepOutcome& step : outcome.steps) seconds += step.seconds;
   char time[32];
   std::snprintf(time, sizeof time, " (%.1f s)", seconds);
-  if (last.status >= 128) return "ended by signal " + std::to_string(last.status - 128) + time;
+  if (last.status >= 128) return "terminated by signal " + std::to_string(last.status - 128) + time;
   if (last.status == 127) return std::string("the command could not be started") + time;
   if (last.status == kNoResult) return "no result: " + last.error + time;
   if (last.status >= 2) return "refused: " + last.error + time;
   for (const StepOutcome& step : outcome.steps)
-    if (step.status != 0) return std::string("done, with a failure") + time;
+    if (step.status != 0) return std::string("done with a failure") + time;
   return std::string("done") + time;
 }
 
@@ -162,7 +162,7 @@ class CaseRunner {
     if (options_.engine->isRemote())
       if (const std::string problem = findProblem(entry.task, status); !problem.empty()) {
         if (entry.attempt < options_.engine->attempts()) {
-          report(cases_[entry.index].name + ": " + problem + "; once more");
+          report(cases_[entry.index].name + ": " + problem + "; retrying");
           ++entry.attempt;
           submit(std::move(entry));
           return;

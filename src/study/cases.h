@@ -59,7 +59,7 @@ std::string makeIdentity(const std::vector<std::filesystem::path>& files);
 
 // The last error message in the output of a run of the command, without its prefix; empty if there is none.
 std::string findError(const std::string& log);
-// ": " and its last line, for a program that broke down; empty if it printed nothing.
+// ": " and its last line, for a program that failed; empty if it printed nothing.
 std::string describeLog(const std::string& log);
 
 // Runs the cases in directory/NAME. \throws ModelError when directories or files cannot be made, or another study uses

@@ -264,7 +264,7 @@ RatioFinding readRatio(const std::string& directory) {
   RatioFinding finding;
   const std::string file = directory + "/ratio.json";
   if (!std::filesystem::exists(file)) return finding;
-  readJsonFile(file, "remove its directory, so that the case is done anew", [&finding](const Json& json) {
+  readJsonFile(file, "remove its directory to repeat the case", [&finding](const Json& json) {
     finding.joint = json.at("swept");
     for (const Json& sample : json.at("samples")) {
       const double angle = sample.at("joints").at(0);

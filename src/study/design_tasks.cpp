@@ -25,19 +25,19 @@ LoggedEvaluation readResult(const tasks::Task& task, const DesignRequest& reques
   if (status != 0) throw std::runtime_error("it ended with status " + std::to_string(status) + describeLog(log));
   const LoggedEvaluation e = readEvaluation(tasks::readOutput(tasks::getOutput(task, kResult), kLongestAnswer));
   const auto demand = [](bool holds, const char* what) {
-    if (!holds) throw std::runtime_error(std::string("what it returned is no result: ") + what);
+    if (!holds) throw std::runtime_error(std::string("it returned an invalid result: ") + what);
   };
   demand(e.stage == getName(request.stage) && e.x.size() == request.x.size() && e.x == request.x,
-         "it is of another design");
+         "it belongs to another design");
   demand(e.seconds >= 0, "its time is negative");
-  demand(isComplete(e, terms, constraints), "its measures are not those asked for");
+  demand(isComplete(e, terms, constraints), "its measures are not the requested ones");
   demand(e.terms.empty() || (needsGradient(request.stage) && e.terms.size() == terms),
-         "its terms are not those asked for");
+         "its terms are not the requested ones");
   demand(!e.terms.empty() || !needsGradient(request.stage) || e.status != DesignStatus::Feasible, "it lacks gradients");
   for (const MeasurePieces& term : e.terms)
-    demand(term.values.size() > 0 && term.gradients.cols() == request.x.size(), "its gradients are of another size");
+    demand(term.values.size() > 0 && term.gradients.cols() == request.x.size(), "its gradients have the wrong size");
   demand(e.limits.values.size() == 0 || e.limits.gradients.cols() == request.x.size(),
-         "its gradients are of another size");
+         "its gradients have the wrong size");
   return e;
 }
 
@@ -127,7 +127,7 @@ void DesignTasks::work() {
         waiting_.clear();
       }
       const std::optional<tasks::TaskEnd> end = options_.engine->wait();
-      if (!end) throw std::runtime_error("interrupted; the same command goes on from here");
+      if (!end) throw std::runtime_error("interrupted; run the same command again to continue");
       const std::lock_guard<std::mutex> lock(mutex_);
       if (const auto found = running_.find(end->id); found != running_.end()) {
         Order& order = *found->second;
@@ -169,8 +169,8 @@ void DesignTasks::finish(Order& order, int status) {
   } catch (const std::exception& error) {
     const std::string text = std::string("a task failed: ") + error.what();
     if (order.attempt >= options_.engine->attempts())
-      throw std::runtime_error(text + "; the same command goes on from here");
-    options_.progress(text + "; once more");
+      throw std::runtime_error(text + "; run the same command again to continue");
+    options_.progress(text + "; retrying");
     submit(order);
   }
 }

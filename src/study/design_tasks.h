@@ -16,7 +16,7 @@
 
 namespace bielle::study {
 
-/// What is asked for: the design, for a stage of a search, and the path of the robot where it is evaluated (empty: that of the
+/// The request: the design, for a stage of a search, and the path of the robot where it is evaluated (empty: that of the
 /// specification).
 struct DesignRequest {
   SearchAlgorithm stage = SearchAlgorithm::Crs;

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 namespace bielle::study {
 namespace {
 
-constexpr const char* kCaseRemedy = "remove its directory, so that the case is done anew";
+constexpr const char* kCaseRemedy = "remove its directory to repeat the case";
 
 // Nodes of the window.
 std::pair<int, int> findWindow(Window window, const MotionSummary& summary, int nodes) {
@@ -106,7 +106,7 @@ Performance readPerformance(const Study& study, const CaseOutcome& outcome, size
   const bool lift = step > 0;
   Performance result;
   if (outcome.steps.size() <= step || !outcome.complete) {
-    result.outcome = outcome.steps.empty() || outcome.complete ? "not done" : "broke down";
+    result.outcome = outcome.steps.empty() || outcome.complete ? "not done" : "failed";
     return result;
   }
   const StepOutcome& run = outcome.steps[step];

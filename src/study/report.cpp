@@ -162,7 +162,7 @@ StudyPage writeStudy(const std::string& directory, const StudyResult& result, co
       page.files.push_back(directory + "/" + file);
       text << "![" << figure.caption << "](" << file << ")\n\n" << figure.caption << ".\n\n";
     } else {
-      page.notes.push_back(file + ": not drawn, there is no gnuplot (package gnuplot-nox)");
+      page.notes.push_back(file + ": not drawn: gnuplot is not installed (package gnuplot-nox)");
       text << "(" << page.notes.back() << ")\n\n";
     }
   }
@@ -177,17 +177,16 @@ std::string writeReport(const std::string& directory, const std::string& robot, 
                         const std::vector<StudyPage>& pages) {
   std::ostringstream text;
   text
-      << "# The paper's comparison, done again\n\n"
+      << "# The paper's comparison, reproduced\n\n"
       << "*Optimal Control of Walkers with Parallel Actuation* compares motions made with a closed-chain model against "
          "motions made with an approximate serial model and lifted back. Here both are made for "
-      << robot << ", with the same costs for both models, and put beside what the paper says.\n\n"
+      << robot << ", with the same costs for both models, and compared with the paper's statements.\n\n"
       << "    " << command << "\n\n"
       << "*Closed*: the closed model's own motion. *Serial*: the serial model's, its torques on the joints. *Lifted*: "
          "motor torques that make the closed model follow the serial motion. Torques are absolute values over both "
          "legs, of walks over the steady steps. `agrees`, `partly`, `differs` follow from the numbers by the rule in "
-         "the "
-         "row; `open`: no numbers. Numbers in parentheses are of a motion that did "
-         "not converge, or of what was lifted until the lift failed.\n\n";
+         "the row; `open`: no numbers. Numbers in parentheses belong to a motion that did not converge, or to the part "
+         "lifted before the lift failed.\n\n";
   for (const StudyPage& page : pages) text << page.text;
   const std::string path = directory + "/report.md";
   writeTextFile(path, text.str());

@@ -86,7 +86,7 @@ std::vector<int> readStatuses(const std::string& output, size_t count) {
 }
 
 [[noreturn]] void failWith(const std::string& problem) {
-  throw ModelError("", "bielle-workers", problem, "the same command goes on from here");
+  throw ModelError("", "bielle-workers", problem, "run the same command again to continue");
 }
 
 }  // namespace
@@ -153,7 +153,7 @@ std::optional<TaskEnd> WorkerTasks::wait() {
     if (!receive(line)) return std::nullopt;
     const Json answer = parseJson(line);
     const auto bundle = bundles_.find(answer.at("task"));
-    if (bundle == bundles_.end()) failWith("it returned a task that nobody has asked for");
+    if (bundle == bundles_.end()) failWith("it returned a task that was not sent");
     const std::vector<int>& ids = bundle->second;
     const std::vector<int> statuses = readStatuses(answer.at("output"), ids.size());
     const double seconds = answer.at("seconds").get<double>() / static_cast<double>(ids.size());

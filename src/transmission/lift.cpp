@@ -22,7 +22,7 @@ double calcLargest(const VectorXd& x) { return x.size() ? x.cwiseAbs().maxCoeff(
 
 std::string describe(const char* what, double value, double tolerance) {
   std::ostringstream text;
-  text << what << " is off by " << value << ", more than " << tolerance;
+  text << what << " has an error of " << value << ", more than " << tolerance;
   return text.str();
 }
 
@@ -253,7 +253,8 @@ LiftResult lift(const Model& closed, const SerialModel& serial, const SerialTraj
            (k == stages || (trajectory.a[k].size() == serial.model.nv() && trajectory.a[k].allFinite() &&
                             trajectory.forces[k].size() == trajectory.constraints[k].rows));
   if (!fits)
-    throw ModelError(closed.name(), "trajectory", "its sizes are not those of the serial model, or it is not finite",
+    throw ModelError(closed.name(), "trajectory",
+                     "its sizes differ from those of the serial model, or it is not finite",
                      "give a motion of the serial model of this robot");
   return Lifter(closed, serial, trajectory, options).run();
 }

@@ -82,7 +82,7 @@ Linkage makeLoopLinkage(const Model& model, const ReducedCluster& cluster, std::
   if (static_cast<int>(joints.size()) != cluster.size)
     throw ModelError(model.name(), element,
                      mobility + ", driven by " + listItems(motor_names) + "; " + std::to_string(joints.size()) +
-                         " joint(s) of it are named or listed as serial joints",
+                         " of its joints are named or listed as serial joints",
                      "name " + std::to_string(cluster.size) + " joints of this linkage");
   linkage.joints = std::move(joints);
   for (int i : linkage.joints) addPlaces(linkage, i, linkage.joint_dofs, linkage.joint_positions);
@@ -126,12 +126,12 @@ Linkage makeLinkage(const Model& model, const Reduction& reduction, const std::v
     if (!joints.empty() && (owner != cluster || owner < 0))
       throw ModelError(model.name(), "joint '" + name + "'",
                        "it is not in the linkage of '" + model.joints()[joints.front()].name + "'",
-                       "ask for joints of one linkage at a time");
+                       "name joints of one linkage at a time");
     if (contains(joints, joint)) throw ModelError(model.name(), "joint '" + name + "'", "it is named twice", "");
     cluster = owner;
     joints.push_back(joint);
   }
-  if (joints.empty()) throw ModelError(model.name(), "joints", "none is named", "name a joint");
+  if (joints.empty()) throw ModelError(model.name(), "joints", "none are named", "name a joint");
   Linkage linkage = cluster < 0 ? makeDirectLinkage(model, joints.front())
                                 : makeLoopLinkage(model, reduction.clusters[cluster], std::move(joints));
   for (int i : linkage.joints) linkage.joint_names.push_back(model.joints()[i].name);

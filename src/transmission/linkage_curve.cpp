@@ -167,7 +167,7 @@ bool LinkageCurve::findRankLoss(const CurvePoint& from, const CurvePoint& to, do
   CurvePoint at;
   if (advance(from, root, at) && hasRank(at.q)) return false;  // other rows keep the rank
   why_ = "closure '" + linkage_.cluster->closures.closures.front().name +
-         "': its loops lose rank, they can go on in several ways";
+         "': its loops lose rank and can continue in several ways";
   h = root;
   return true;
 }

@@ -86,8 +86,8 @@ LiftStatus PostureLift::closeDrive(Drive& drive, const VectorXd& target) {
   Eigen::Index worst;
   miss.cwiseAbs().maxCoeff(&worst);
   std::ostringstream text;
-  text << "joint '" << linkage.joint_names[worst] << "' is asked for " << target[worst] << ", its linkage comes to "
-       << target[worst] - miss[worst];
+  text << "joint '" << linkage.joint_names[worst] << "' must reach " << target[worst]
+       << ", but its linkage only reaches " << target[worst] - miss[worst];
   return fail(LiftStatus::UnreachablePosture, linkage.joint_names[worst], text.str());
 }
 

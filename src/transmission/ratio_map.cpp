@@ -53,7 +53,7 @@ RatioMap mapRatio(const Model& model, const Linkage& linkage, ConstVectorRef q, 
                   const SweepOptions& options) {
   if (linkage.size() != 2)
     throw ModelError(model.name(), "linkage of joint '" + linkage.joint_names.front() + "'",
-                     "it has mobility " + std::to_string(linkage.size()) + ", a map is drawn over two joints",
+                     "it has mobility " + std::to_string(linkage.size()) + ", but a map needs two joints",
                      "sweep one joint");
   RatioMap map;
   const RatioSweep spine = sweepRatio(model, linkage, q, 0, options);

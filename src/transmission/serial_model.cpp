@@ -33,12 +33,11 @@ std::vector<Linkage> listLinkages(const Model& closed, const Reduction& reductio
     if (joints.empty() || coordinates != cluster.size)
       throw ModelError(closed.name(), "closures " + listItems(closures),
                        "there is no equivalent serial chain: their linkage has mobility " +
-                           std::to_string(cluster.size) + ", the serial joints in it (" + listItems(joints) +
-                           ") have " + std::to_string(coordinates) + " coordinates",
-                       joints.empty()
-                           ? "use the closed model; if one-axis joints of the linkage do determine it, as a knee or "
-                             "an ankle would, list them as serial_joints"
-                           : "list serial joints that determine the linkage, or use the closed model");
+                           std::to_string(cluster.size) + ", but its serial joints (" + listItems(joints) + ") have " +
+                           std::to_string(coordinates) + " coordinates",
+                       joints.empty() ? "use the closed model; or if one-axis joints determine the linkage, such as a "
+                                        "knee or an ankle, list them as serial_joints"
+                                      : "list serial joints that determine the linkage, or use the closed model");
     linkages.push_back(makeLinkage(closed, reduction, joints));
   }
   return linkages;
@@ -126,8 +125,9 @@ void addJointForces(const Model& closed, const std::vector<bool>& frozen, ModelB
   for (const JointForce& force : closed.jointForces()) {
     const std::string& name = closed.joints()[force.joint].name;
     if (frozen[force.joint])
-      throw ModelError(closed.name(), "force on joint '" + name + "'", "the serial model freezes this joint",
-                       "use the closed model, or move spring, damper and friction to joints that it keeps");
+      throw ModelError(
+          closed.name(), "force on joint '" + name + "'", "the serial model freezes this joint",
+          "use the closed model, or move spring, damper and friction to joints that the serial model keeps");
     builder.addJointForce(name, force);
   }
 }
@@ -164,7 +164,7 @@ void forCommonJoints(const Model& from, const Model& model, const Copy& copy) {
     const int index = from.findJoint(joint.name);
     if (index < 0 || from.joints()[index].kind != joint.kind)
       throw ModelError(from.name(), "joint '" + joint.name + "'", "the other model has no such joint",
-                       "map between a closed model and the serial one made of it");
+                       "map between a closed model and the serial model made from it");
     copy(from.joints()[index], joint);
   }
 }
@@ -204,7 +204,7 @@ SerialModel makeSerialModel(const Model& closed, ConstVectorRef q, const SerialM
     if (!point.update(*linkage.cluster, q_cluster) || !calcLinkageTangent(linkage, point, T, &margin) ||
         margin < kSmallestMargin || !calcLinkageRatio(linkage, point, ratio))
       throw ModelError(closed.name(), "joints " + listItems(linkage.joint_names),
-                       "their linkage is at a dead point at the reference, they do not determine it",
+                       "their linkage is at a dead point at the reference, so they do not determine it",
                        "freeze it at another configuration");
     out.replacements.push_back({linkage.motor_names, linkage.joint_names, ratio.R});
   }

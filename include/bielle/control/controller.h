@@ -1,10 +1,10 @@
 #pragma once
-/// \file The interface of feedback laws: from what is measured to torques.
+/// \file The interface of feedback laws: from measurements to torques.
 #include "bielle/model/model.h"
 
 namespace bielle {
 
-/// What is known of a robot at an instant of control.
+/// The measured state of a robot at an instant of control.
 struct Measurement {
   double time = 0;  ///< since the start of the controller, s
   VectorXd q, v;    ///< nq, nv: coordinates of the model, from an estimator or a simulated world
@@ -15,9 +15,9 @@ struct Measurement {
   double getActionTime() const { return time + delay; }  ///< when they act, s
 };
 
-/// Where a foot is foreseen to stand next.
+/// The predicted next foothold of a foot.
 struct PredictedFoothold {
-  int contact = 0;  ///< of the model
+  int contact = 0;  ///< index into the model's contacts
   double time = 0;  ///< of its landing, since the start of the controller, s
   SE3 X_WF;         ///< of the contact's frame in the world
 };
@@ -26,12 +26,12 @@ struct PredictedFoothold {
 class Controller {
  public:
   virtual ~Controller() = default;
-  /// Torques of the motors in their order (nu, N m or N), not cut at their limits. It does not throw, and allocates
-  /// nothing unless a controller says so.
+  /// Torques of the motors in their order (nu, N m or N), not limited. Does not throw, and allocates nothing unless a
+  /// controller's documentation says otherwise.
   virtual void update(const Measurement& measurement, VectorRef u) = 0;
-  /// The instant of its plan at which a controller is, s: feet that land early or late bring it ahead or hold it back.
+  /// The current time in the controller's plan, s. Early landings advance it, late ones hold it back.
   virtual double getPlanTime(double time) const { return time; }
-  /// Of the feet that are to land within the time for which a controller plans; empty if it plans nothing itself.
+  /// For the feet that land within the controller's horizon; empty if it does not plan.
   virtual const std::vector<PredictedFoothold>& getFootholds() const {
     static const std::vector<PredictedFoothold> none;
     return none;

@@ -1,10 +1,10 @@
 #pragma once
 /// \file The state of a robot from its own sensors: encoders of the motors and an inertial measurement unit in the trunk.
 ///
-/// **Joints.** The passive joints follow from the motors by closing the loops; status and margin say when a linkage is near a
-/// dead point, where they do not. Speeds of the motors are those of observers that follow the encoders,
+/// **Joints.** The passive joints follow from the motors by closing the loops; status and margin tell when a linkage is
+/// near a dead point, where they do not. Motor speeds come from observers that follow the encoders,
 ///     e = y - x,    x' = w + 2 s e,    w' = s^2 e,    s = bandwidth                                                 (1)
-/// which lag behind by 2/s and let pass s^(3/2) sqrt(h)/2 of the deviation of the readings, h apart.
+/// which lag by 2/s and pass s^(3/2) sqrt(h)/2 of the noise of readings that are h apart.
 ///
 /// **Trunk.** Its pose and velocity come from an invariant extended Kalman filter of the IMU and the standing feet, offsets of
 /// the IMU included (src/control/contact_filter.h gives its equations and sources). Position and heading are known from the
@@ -12,8 +12,8 @@
 ///
 /// **Contacts.** The forces on the feet follow from the torques of the motors, the motion of the robot and its dynamics, at
 /// accelerations behind a low-pass filter. A foot stands when its normal force exceeds a share of the weight of the robot,
-/// until it falls below half of it; where a contact is planned a smaller share suffices. So feet that land early or late are
-/// noticed. A standing foot that moves by far more than the filter expects has slipped, and is put down anew.
+/// until it falls below half of it; where a contact is planned a smaller share suffices. Early and late landings are
+/// thus detected. A standing foot that moves far more than the filter expects has slipped, and gets a new place.
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,13 +22,13 @@
 
 namespace bielle {
 
-/// What is read at an instant of control. The IMU gives means since the instant before.
+/// Sensor readings at one instant of control. IMU readings are means since the previous instant.
 struct SensorReadings {
   double time = 0;                               ///< s
   VectorXd motor_positions;                      ///< nu, rad or m
-  VectorXd motor_torques;                        ///< nu, that acted since the instant before, N m or N
+  VectorXd motor_torques;                        ///< nu, torques that acted since the previous instant, N m or N
   Vector3d angular_velocity = Vector3d::Zero();  ///< of the IMU in its frame, rad/s
-  Vector3d specific_force = Vector3d::Zero();    ///< acceleration less gravity in its frame, m/s^2
+  Vector3d specific_force = Vector3d::Zero();    ///< acceleration minus gravity in its frame, m/s^2
 };
 
 struct EstimatorOptions {
@@ -41,26 +41,26 @@ struct EstimatorOptions {
   double accelerometer_noise = 3e-3;  ///< m/s^2/sqrt(Hz)
   double gyro_offset = 0.02;          ///< at the start, rad/s
   double accelerometer_offset = 0.2;  ///< at the start, m/s^2
-  double gyro_walk = 1e-4;            ///< of the offsets in a second, rad/s
+  double gyro_walk = 1e-4;            ///< change of the offset in one second, rad/s
   double accelerometer_walk = 1e-3;   ///< m/s^2
   double tilt = 3e-3;                 ///< of the trunk at the start, rad
-  double foot_position = 3e-4;        ///< of a foot seen by the encoders, m
+  double foot_position = 3e-4;        ///< position of a foot from the encoders, m
   double foot_attitude = 1e-3;        ///< rad
-  double foot_slide = 5e-4;           ///< of a foot that stands, in a second, m
+  double foot_slide = 5e-4;           ///< motion of a standing foot in one second, m
   double foot_turn = 2e-3;            ///< rad
 
-  double planned_contact = 0.08, surprising_contact = 0.25;  ///< normal forces of feet that stand, over the weight
-  double slip = 60;  ///< a foot has slipped if y' S^-1 y of its deviation, 6 in the mean, exceeds this
+  double planned_contact = 0.08, surprising_contact = 0.25;  ///< normal forces of standing feet relative to the weight
+  double slip = 60;  ///< a foot has slipped if y' S^-1 y of its deviation, 6 on average, exceeds this
 };
 
 enum class EstimatorStatus {
   Ok,
   NearDeadPoint,  ///< a linkage hardly follows its motors: getMessage() names it
-  NotClosed,      ///< no closed configuration belongs to the motors: the last one is kept
+  NotClosed,      ///< no closed configuration fits the motors: the last one is kept
   NotFinite       ///< readings were not finite and are ignored
 };
 
-/// No simulator in it: the same object would run on the robot. update() neither allocates nor throws.
+/// Independent of any simulator: the same object can run on a robot. update() neither allocates nor throws.
 class Estimator {
  public:
   /// \param model  must outlive it   \param q  closed configuration, e.g. a posture
@@ -71,7 +71,7 @@ class Estimator {
 
   /// Starts from a closed configuration (nq) and velocity (nv), standing on the given contacts of the model.
   void reset(double time, ConstVectorRef q, ConstVectorRef v, const std::vector<int>& contacts);
-  /// \param planned  contacts that the plan has now; empty if there is no plan
+  /// \param planned  contacts in the plan at this time; empty if there is no plan
   EstimatorStatus update(const SensorReadings& readings, const std::vector<int>& planned);
 
   const Measurement& getMeasurement() const;        ///< as of the last update()

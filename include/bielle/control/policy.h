@@ -11,9 +11,10 @@
 ///     K_k = K_k^solver d(x (-) x_k)/d(dq, dv)                                                                       (2)
 ///
 /// (nu x 2 nv): in the reduced formulation a state that is not closed is thus projected on the closed ones. After its end the
-/// policy holds the last posture with the torques u_hold that carry it at rest, and with the gains of the first stage of the
-/// last phase: those of its last stages look ahead too little to care for where the robot is. Where torques act later than
-/// the state was measured, u* and K are those of the time when they act, the deviation is that of the time of the measurement.
+/// policy holds the last posture with the torques u_hold that carry it at rest, and with the gains of the first stage
+/// of the last phase, because the last stages look ahead too little to correct the robot's position. Where torques act
+/// later than the state was measured, u* and K are those of the time when they act, the deviation is that of the time
+/// of the measurement.
 #include <vector>
 
 #include "bielle/control/controller.h"
@@ -24,7 +25,7 @@ namespace bielle {
 
 class Policy : public Controller {
  public:
-  /// One stage; an impact, which takes no time, is none.
+  /// One stage; impacts, which take no time, are omitted.
   struct Stage {
     double start = 0, duration = 0;  ///< t_k, h_k, s
     int phase = 0;                   ///< stages of different phases are not interpolated
@@ -38,13 +39,14 @@ class Policy : public Controller {
   /// \param u_hold  nu
   Policy(const Model& model, std::vector<Stage> stages, const VectorXd& u_hold);
 
-  /// K of stages that begin less than `duration` (s) before the end of their phase is that of the last stage before them in
-  /// the phase. Where a foot must land exactly, the gains of the last stages would remove any deviation within the time that
-  /// is left, and grow without bound: no estimated state bears them. 0, the default: no stage is replaced.
+  /// Stages that begin less than `duration` (s) before the end of their phase reuse K of the last earlier stage in the
+  /// phase. Where a foot must land exactly, gains grow without bound towards the end of the phase, because they remove
+  /// any deviation within the remaining time; estimated states are too noisy for them. 0, the default: no stage is
+  /// replaced.
   void setLookAhead(double duration);
 
   void update(const Measurement& measurement, VectorRef u) override;
-  /// Takes other stages and torques u_hold, as many and of the same sizes, and gives its own for them. Allocates nothing.
+  /// Swaps stages and torques u_hold with others of the same number and sizes. Allocates nothing.
   void exchange(std::vector<Stage>& stages, VectorXd& u_hold);
   /// q* and v* of Eq. (1).
   void getReference(double time, VectorRef q, VectorRef v) const;
@@ -68,7 +70,7 @@ class Policy : public Controller {
   VectorXd q_, error_;         // nq, 2 nv
 };
 
-/// The torques and states of a trajectory of a motion without free durations.
+/// The torques and states of a motion's trajectory, without feedback. The motion must not have free durations.
 Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory);
 /// The same with gains. \param solver  whose last solve returned the trajectory
 Policy makePolicy(const Motion& motion, const ShootingTrajectory& trajectory, const Fddp& solver);

@@ -1,5 +1,5 @@
 #pragma once
-/// \file Predictive control: a plan of the next second or so, made anew at every stage from the measured state.
+/// \file Predictive control: at every stage a new plan of about the next second, from the measured state.
 ///
 /// The problem is the motion's, through a window of N of its stages. Let stage k begin at t_k. From what is measured at t_k
 /// and the torques of that instant the model predicts the state at the next stage,
@@ -8,26 +8,27 @@
 ///
 /// and while stage k lasts, the window from k+1 on is solved from there, in a few iterations that start from the last
 /// solution, its multipliers moved on by a stage. The window ends near the state that the motion passes at t_{k+1+N}. From
-/// t_{k+1} on the first stages of the solution are a policy (policy.h, Eq. 1). A solution thus takes one stage to come into
-/// force, however fast it is found; if none is found the last policy, which reaches some stages farther, stays.
+/// t_{k+1} on the first stages of the solution are a policy (policy.h, Eq. 1). A solution thus takes effect one stage
+/// later, however fast it is found. If none is found, the previous policy, which extends some stages farther, remains
+/// in force.
 ///
 /// Either update() waits for the solve at the beginning of a stage: the same measurements then give the same torques, on any
-/// machine. Or, for a robot, solves run in a thread of their own, and update() never waits: a solution that is found after t_{k+1}
-/// comes into force when it is found, and stages that begin meanwhile are not solved for.
+/// machine. Or, for a robot, solves run in a separate thread, and update() never waits: a solution found after t_{k+1}
+/// takes effect on arrival, and stages that begin in the meantime are skipped.
 ///
-/// A foot that is on the ground in the second half of its swing (Measurement::contacts), where it may land, has landed: the
-/// motion goes on with the stage of its landing, and stays ahead of the plan by what the swing was cut short. A foot that is not
-/// on the ground one stage after its landing, while another one carries, is lowered at 0.3 m/s until it is, by 5 cm at most: the
-/// last stages of its swing are rewritten and come into force again, and the motion stays behind the plan by as much. Meanwhile
-/// getPlanTime() is the instant of the landing.
+/// Early landing: a foot on the ground in the second half of its swing (Measurement::contacts) has landed. The motion
+/// continues with the stage of its landing, and stays ahead of the plan by the time saved. Late landing: a foot still
+/// in the air one stage after its planned landing, while another foot carries the robot, is lowered at 0.3 m/s, by 5 cm
+/// at most, until it touches the ground. The last stages of its swing are rewritten and executed again, and the motion
+/// stays behind the plan by the time lost. Meanwhile getPlanTime() is the instant of the landing.
 ///
 /// Motors brake before dead points of their linkages, at every instant of control (src/control/dead_point_stop.h).
 ///
-/// After its last stage the motion is followed by as many copies of that stage as the window is long: the robot stands there.
+/// The motion is extended by copies of its last stage, as many as the window is long: the robot stands there.
 ///
-/// In place of a solved motion, a walk by command (commanded_walk.h) may be given. Its stages are made when the window reaches
-/// them; nothing is solved before but the first window. A window ends near the pose and the velocity of the trunk that the path
-/// of the centre of mass foresees; joints hardly count there.
+/// Instead of a solved motion, a commanded walk (commanded_walk.h) may be given. Its stages are made when the window
+/// reaches them; only the first window is solved beforehand. A window ends near the pose and velocity of the trunk on
+/// the planned path of the centre of mass; joints have little weight there.
 #include <memory>
 
 #include "bielle/control/policy.h"
@@ -40,14 +41,14 @@ struct PredictiveOptions {
   int iterations = 2;            ///< of the solver, at every stage
   double regularization = 1e-5;  ///< of its sweeps
   double penalty = 1;            ///< of violated constraints (fddp.h, Eq. 10)
-  /// Stages that begin less than this before the end of their phase of contacts take the gains of the last stage before them
-  /// that did not, if need be of an earlier solution (Policy::setLookAhead() says why), s; 0: each stage has its own.
+  /// Near the end of a contact phase, reuse the last gains computed at least this long before it, if necessary from an
+  /// earlier solution (reason: Policy::setLookAhead()), s; 0: each stage has its own gains.
   double look_ahead = 0;
   /// Motors brake before the transmission of a linkage falls below this share of that at the start, or exceeds its reciprocal.
-  /// It should be less than the margin that the motion keeps (LimitOptions::dead_point_margin); 0: they do not brake.
+  /// Use a smaller value than the motion's margin (LimitOptions::dead_point_margin); 0: they do not brake.
   double dead_point_stop = 0.075;
   int threads = 0;  ///< 0: all. Results are bitwise independent of it.
-  /// Solves run in a thread of their own; results then depend on how fast it is.
+  /// Solves run in a separate thread; results then depend on its speed.
   bool own_thread = false;
   /// Weights of the difference between the end of the window and the motion there: of heading and place over the ground, of the
   /// other coordinates, of the velocities; 1/m^2 or 1, s^2/m^2 or s^2.
@@ -60,17 +61,18 @@ struct PredictiveCounts {
   int failed = 0;  ///< the last policy stayed in force
   int early = 0;   ///< feet that landed in the second half of their swing
   int late = 0;    ///< feet that had not landed when they should have stood
-  /// Stages that began without their policy in real time: solves took longer than the stage before. Without a thread of
-  /// their own it came into force all the same; with one the last policy stayed, and there was no solve in this stage.
+  /// Stages that would begin without a new policy in real time, because the solve took longer than the previous stage.
+  /// Without a separate thread the policy takes effect anyway; with one the previous policy stays, and this stage has
+  /// no solve.
   int missed = 0;
-  std::vector<double> seconds;  ///< of the last 100000, until their policy was ready
+  std::vector<double> seconds;  ///< of the last 100000 solves, until their policy was ready
 
-  /// The least time that is not exceeded by this share of the solves, s; 0 if there are none.
+  /// The time within which this share of the solves finished (a quantile), s; 0 without solves.
   double calcQuantile(double share) const;
 };
 
-/// The motion that predictive control solves: `plan`, then as many copies of its last stage as the window is long, which ends
-/// as the weights of PredictiveOptions say.
+/// The motion that predictive control solves: `plan`, followed by copies of its last stage, as many as the window is
+/// long, with terminal weights from PredictiveOptions.
 /// \throws ModelError as makeMotion() does
 Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOptions& problem,
                             const PredictiveOptions& options);

@@ -10,13 +10,14 @@ namespace bielle {
 /// Derivatives of the optimal cost by all variables, by the envelope theorem (ocp/envelope.h): two models, two motions
 /// and two evaluations of their stages per variable; nothing is solved.
 /// \param x       for which the motion of the envelope is optimal
-/// \param make    a motion like it for another robot: same options, posture, footholds and references planned for anew
-/// \return (variables), zero of choices
+/// \param make    the same motion for another robot: same options; posture, footholds and references planned again
+/// \return (variables), zero for choices
 /// \throws ModelError when a neighbour of x has no such motion
 VectorXd calcCostGradient(const Parametrization& robot, const VectorXd& x, const MotionEnvelope& envelope,
                           const std::function<Motion(const Model&)>& make);
 
-/// Half of a central difference, over the width of the bounds: its error grows with the square, rounding with the inverse.
+/// Half the step of a central difference, relative to the width of the bounds: its error grows with the square,
+/// rounding with the inverse.
 inline constexpr double kDesignStep = 2e-5;
 
 }  // namespace bielle

@@ -1,6 +1,6 @@
 #pragma once
 /// \file A robot as a function of named, bounded numbers: parameters of a generator, lengths and shifts of a given robot, ratios of
-/// gears, and choices: of parts of a generator, which are architectures, and of motors out of a catalogue.
+/// gears, and choices: of parts of a generator, which are architectures, and of motors from a catalogue.
 #include <optional>
 #include <string>
 #include <vector>
@@ -37,7 +37,7 @@ struct DesignVariable {
   std::vector<std::string> choices;
   std::vector<Motor> types;     ///< of choices of motors, in their order
   std::string mass;             ///< parameter of the generator that is the mass of one motor of the type, or empty
-  std::optional<double> start;  ///< of ratios and choices, where it is not that of the robot
+  std::optional<double> start;  ///< of ratios and choices, if it differs from the robot's value
 
   bool isChoice() const { return !choices.empty(); }
   bool isArchitecture() const { return isChoice() && !parameter.empty(); }
@@ -63,11 +63,11 @@ class Parametrization {
   const VectorXd& upper() const { return upper_; }
   const Model& startModel() const { return model_; }
 
-  /// Numbers of the parts that a generator puts together at x: models of the same ones have the same bodies, joints and motors.
+  /// Choices of parts of a generator at x: models with the same parts have the same bodies, joints and motors.
   std::vector<int> getArchitecture(const VectorXd& x) const;
-  /// Variables that are no choices, by their numbers.
+  /// Indices of the variables that are not choices.
   std::vector<Eigen::Index> listContinuous() const;
-  /// Every combination of all choices, each with the other variables at their start; that of the start comes first.
+  /// Every combination of choices, with the other variables at their start values; the start design comes first.
   std::vector<VectorXd> listCombinations() const;
 
   /// A given robot is changed in the order of the variables. Choices are rounded to whole numbers.
@@ -88,9 +88,10 @@ class Parametrization {
   VectorXd start_, lower_, upper_;
 };
 
-/// Derivative of the model with respect to every variable at x, zero of choices. Placements, inertias and armatures are smooth functions
-/// of the numbers, polynomials of at most the third degree for lengths and shifts; they are differenced by the
-/// five-point rule over a thousandth of the bounds, which is exact for polynomials up to the fourth degree.
+/// Derivative of the model with respect to every variable at x, zero for choices. Placements, inertias and armatures
+/// are smooth functions of the numbers, polynomials of at most the third degree for lengths and shifts; they are
+/// differenced by the five-point rule over a thousandth of the bounds, which is exact for polynomials up to the fourth
+/// degree.
 /// \throws ModelError when a variable changes anything but placements, inertias and armatures (an axis, a gain)
 std::vector<ModelVariation> calcDesignVariations(const Parametrization& robot, const VectorXd& x);
 

@@ -15,10 +15,10 @@ enum class SearchAlgorithm {
   Crs,     ///< controlled random search with local mutation; global
   Isres,   ///< improved stochastic ranking evolution strategy; global
   Bobyqa,  ///< quadratic models; local
-  Sbplx,   ///< simplex on subspaces; local, takes kinks
+  Sbplx,   ///< simplex on subspaces; local, tolerates kinks
   Slsqp,   ///< sequential quadratic programs (Kraft 1994); local, needs gradients
   Mma,     ///< moving asymptotes (Svanberg 2002); local, needs gradients
-  Nsga2,   ///< non-dominated sorting (Deb et al. 2002); of several objectives kept apart, not for minimizeByStages()
+  Nsga2,   ///< non-dominated sorting (Deb et al. 2002); for several separate objectives, not for minimizeByStages()
   Moead    ///< decomposition (Zhang and Li 2007); likewise
 };
 const char* getName(SearchAlgorithm algorithm);
@@ -26,7 +26,7 @@ bool needsGradient(SearchAlgorithm algorithm);
 
 struct SearchStage {
   SearchAlgorithm algorithm = SearchAlgorithm::Crs;
-  int evaluations = 100;    ///< at most, plus the few that an algorithm makes in one batch
+  int evaluations = 100;    ///< at most, plus the few that an algorithm evaluates in one batch
   double tolerance = 1e-3;  ///< done when steps are smaller, relative to the width of the bounds
 };
 
@@ -55,7 +55,7 @@ struct SearchResult {
 };
 
 /// Each stage starts from the best point so far, the first one from the start. A stage with gradients is skipped if
-/// that point is infeasible, and steps back from infeasible points as from worse ones. The same seed gives the same
+/// that point is infeasible, and retreats from infeasible points as from worse ones. The same seed gives the same
 /// points, in any thread. Exceptions of the objective propagate.
 /// \throws std::invalid_argument for algorithms of several objectives
 SearchResult minimizeByStages(const SearchProblem& problem, const std::vector<SearchStage>& stages, unsigned seed);

@@ -30,19 +30,19 @@ struct AssemblyProblem {
 };
 
 enum class AssemblyStep {
-  Wishful,  ///< Eq. (1), by a singular value decomposition
+  Preferred,  ///< Eq. (1), by a singular value decomposition
   Shortest  ///< z = 0: the least change per step, by a complete orthogonal decomposition, many times cheaper
 };
 
 struct AssemblyOptions {
-  AssemblyStep step = AssemblyStep::Wishful;
+  AssemblyStep step = AssemblyStep::Preferred;
   double tolerance = 1e-12;  ///< on every closure and target, m and rad
   double step_limit = 0.2;   ///< largest change of a coordinate per step, m or rad
   int max_iterations = 200;  ///< per continuation step
   int continuation_steps = 20;
   /// Singular values of H below this, relative to the largest, count as zero. It is above the square root of rounding,
-  /// where second-order residuals would be taken for directions, and a tenth of kRankTolerance (reduction.h), so that a
-  /// linkage that counts as movable can be moved.
+  /// where second-order residuals would be mistaken for directions, and a tenth of kRankTolerance (reduction.h), so
+  /// that a linkage that counts as movable can be moved.
   double rank_tolerance = 1e-7;
 };
 
@@ -62,8 +62,9 @@ AssemblyResult assemble(const Model& model, const AssemblyProblem& problem, cons
 /// Nearest closed configuration to q, without other targets.
 AssemblyResult closeConfiguration(const Model& model, ConstVectorRef q, const AssemblyOptions& options = {});
 
-/// A closed configuration of the robot: its references, the configuration nearest to neutral, then starts ever farther
-/// from neutral (the same at every call) are tried in turn. If none closes, the attempt with the smallest gap.
+/// A closed configuration of the robot. Starts from its references, the configuration nearest to neutral, then from
+/// points farther and farther from neutral (the same at every call). If none closes, returns the attempt with the
+/// smallest gap.
 AssemblyResult findClosedConfiguration(const Model& model, const AssemblyOptions& options = {});
 
 /// The assembly problem of a reference of the robot's file: preferred joint values, feet flat at their places, height.

@@ -62,8 +62,7 @@ struct ConstrainedWorkspace {
 };
 
 /// Rows contradict each other when |J a + gamma| exceeds this share of |gamma| + |J| |a|, both the largest over all
-/// rows. Loops of redundant rows that drift open in the full formulation, by millimetres in tenths of a metre, stay
-/// below it.
+/// rows. Redundant loops that drift open in the full formulation, by millimetres in tenths of a metre, stay below it.
 constexpr double kContradiction = 0.05;
 
 /// Accelerations and forces for generalized forces tau (nv) at (q, v). Fills `ws` up to the accelerations.

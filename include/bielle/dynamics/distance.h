@@ -7,9 +7,9 @@
 /// whose nearest point d n, |n| = 1, is found by active sets (Stark and Parker, "Bounded-variable least-squares", 1995), exactly
 /// up to rounding. Where cores overlap, d is negative: the least displacement that parts them is to a face of Eq. (1), and
 ///     d = max over n of |n c| - sum_i |n G_i|,  n normal to two columns of G                                        (2)
-/// (the separating axes of Gottschalk, Lin, Manocha, "OBBTree", 1996). The distance is d less both radii. Eq. (1) is ours and
-/// not a library's for convex shapes at large: rounded boxes are all that robots have here, and derivatives want exact
-/// nearest points, where general methods iterate to a tolerance.
+/// (the separating axes of Gottschalk, Lin, Manocha, "OBBTree", 1996). The distance is d less both radii. Eq. (1) is
+/// used instead of a library for general convex shapes because robots here have only rounded boxes, and derivatives
+/// need exact nearest points, whereas general methods iterate to a tolerance.
 ///
 /// Moving the nearest points within their shapes changes nothing to first order, so that with D the displacement of a body
 /// (variation.h)
@@ -43,8 +43,8 @@ double calcDistanceVariation(const Model& model, const Workspace& ws, int a, int
 /// bodies without shapes. Bodies that a closure welds together count as one.
 struct ShapePair {
   int a = 0, b = 0;  ///< indices of shapes
-  /// Whether they belong to two legs: parts of the robot with feet that joints and closures connect through the trunk alone,
-  /// which is what carries several feet.
+  /// Whether they belong to two legs: parts of the robot with feet that are connected by joints and closures only
+  /// through the trunk, the part that carries several feet.
   bool of_two_legs = false;
 };
 std::vector<ShapePair> listShapePairs(const Model& model);

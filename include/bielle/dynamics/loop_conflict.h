@@ -1,13 +1,13 @@
 #pragma once
-/// \file Why loops do not close: a smallest set of closures that conflict, and the least change of one place of the
-/// mechanism that would close them.
+/// \file Why loops do not close: a smallest set of conflicting closures, and the smallest change of one place of the
+/// mechanism that closes them.
 ///
 /// Let r(q) be the residuals of the closures of a cluster, angles taken times a length L so that all are in m. Where
 /// they cannot close, |r|^2 has a minimum other than zero,
 ///     J^T r = 0,    J = dr/dq                                                                                      (1)
-/// so that r is a self-stress: forces of the closures that no joint feels. Closures without a part in it do not matter
-/// there. Of the others, those are left out one after the other without which the rest still does not close (a deletion
-/// filter): what remains is a smallest conflict, in the sense that it closes without any one of its closures.
+/// so that r is a self-stress: forces of the closures that no joint feels. Closures without a share in it do not
+/// matter. From the others, each closure is removed in turn if the rest still does not close without it (a deletion
+/// filter). The remaining set is a smallest conflict: it closes without any one of its closures.
 ///
 /// A change p of one place (m; angles times L) alters the residuals by P p to first order (variation.h). Multiplying
 /// r + J dq + P p = 0 by r^T, by Eq. (1),
@@ -55,7 +55,7 @@ Model applyRemedy(const Model& model, const LoopRemedy& remedy);
 std::string describeConflict(const Model& model, const LoopConflict& conflict);
 std::string describeRemedies(const Model& model, const LoopConflict& conflict);
 
-/// The error that a robot deserves of which findClosedConfiguration() finds no closed configuration.
+/// The error for a robot without a closed configuration according to findClosedConfiguration().
 /// \param source  file or name of the robot
 ModelError makeClosingError(const Model& model, const std::string& source, const AssemblyResult& open);
 

@@ -8,10 +8,10 @@ namespace bielle {
 struct ElectricalEnergy {
   VectorXd by_motor;             ///< nu, J
   double total = 0;              ///< J
-  double regeneration = 0;       ///< share of what flows back that was taken off
-  int num_assumed = 0;           ///< motors whose loss is not known: kDefaultTorqueLoss is assumed
+  double regeneration = 0;       ///< share of the regenerated energy that is subtracted
+  int num_assumed = 0;           ///< motors without a known loss, for which kDefaultTorqueLoss is assumed
   double distance = 0;           ///< of the centre of mass on the ground, from start to end, m
-  double cost_of_transport = 0;  ///< total over weight and distance; NaN for less than kLeastDistance
+  double cost_of_transport = 0;  ///< total divided by weight and distance; NaN for less than kLeastDistance
 
   static constexpr double kLeastDistance = 0.2;  ///< m
 };

@@ -47,7 +47,7 @@ const MotionEntry& findMotion(const std::string& file, const std::string& name);
 inline constexpr const char* kSequence = "sequence";
 MotionRequest makeSequenceRequest(const std::vector<std::string>& motions);
 
-/// Prefixes of limits given by motor among the requested values, followed by the name of the motor.
+/// Prefixes of limits given by motor among the options of a motion, followed by the name of the motor.
 inline constexpr const char *kEffortLimit = "limit ", *kVelocityLimit = "velocity-limit ",
                             *kPowerLimit = "power-limit ";
 inline constexpr const char* kDeadPointMargin = "dead-point-margin";

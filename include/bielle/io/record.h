@@ -27,8 +27,8 @@ struct MotionRecord {
   RowMatrixXd q_mid, v_mid;      ///< N x nq, N x nv; of an impact, which takes no time, q and v of its node
   RowMatrixXd com;               ///< N + 1 x 3, m
   RowMatrixXd gap;               ///< N + 1 x 2, largest closing error: norms of position (m) and of angle (rad)
-  /// Of motions under predictive control, else empty: N + 1 x 8 per contact, where it is foreseen to stand next: when (s),
-  /// position (m) and quaternion x, y, z, w of its frame in the world. NaN: within its window it is not to land.
+  /// Predicted footholds of motions under predictive control, else empty: N + 1 x 8 per contact: time of landing (s),
+  /// position (m) and quaternion x, y, z, w of its frame in the world. NaN: no landing within the window.
   RowMatrixXd footholds;
   static constexpr int kFootholdEntries = 8;  ///< columns of `footholds` per contact
   Multipliers multipliers;  ///< of the constraints, for warm starts; without penalty if they are not known

@@ -1,5 +1,5 @@
 #pragma once
-/// \file From a request to a result: what `bielle solve` does, and `solve()` of the Python package.
+/// \file From a request to a result, as `bielle solve` and the Python function `solve()` do.
 #include <functional>
 #include <optional>
 #include <string>
@@ -12,21 +12,22 @@ namespace bielle {
 
 struct RequestOptions {
   ProblemOptions problem;
-  /// For objectives other than effort no cost is acceptable before it is stationary.
+  /// For objectives other than effort, acceptable_decrease does not apply.
   FddpOptions solver = makeMotionSolverOptions();
   std::optional<MotionRecord> warm_start;  ///< a motion of the same robot to start from
 };
 
 struct RequestObserver {
-  FddpObserver motion;                           ///< of every solve but these:
-  FddpObserver part;                             ///< of the motions of a sequence, which are first solved one by one
-  std::function<void(const std::string&)> tell;  ///< takes a line on what comes next or how it came out; or null
-  std::function<void(const std::string&)> warn;  ///< likewise, on what was not hoped for; or null
+  FddpObserver motion;                           ///< of every solve except those of parts
+  FddpObserver part;                             ///< of the parts of a sequence, which are first solved separately
+  std::function<void(const std::string&)> tell;  ///< receives lines of progress; may be null
+  std::function<void(const std::string&)> warn;  ///< receives warnings; may be null
 };
 
-/// Solves one request, once. A sequence starts from its motions, each solved by itself; a motion of another objective from
-/// that of least effort, by which it is scaled; stages that turn out too long are halved (refineStages()), and where that
-/// does not help, linkages stay farther from their dead points (avoidDeadPoints()). What is still too long then ends as Failed.
+/// Solves one request, once. A sequence starts from its motions, each solved separately. A motion with another
+/// objective starts from that of least effort, which also scales it. Stages that are too long are halved
+/// (refineStages()); if that does not help, linkages are kept farther from their dead points (avoidDeadPoints()). A
+/// result whose stages are still too long ends as Failed.
 class RequestSolver {
  public:
   /// Makes the motion and its guess. \throws ModelError as makeRequested() and setGuess() do

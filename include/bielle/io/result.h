@@ -23,17 +23,17 @@ struct MotionResult {
   std::string motion;
   Formulation formulation = Formulation::Full;
   StepRule step = StepRule::Euler;
-  std::vector<std::pair<std::string, double>> requested;  ///< every option by name
-  std::vector<GoalOutcome> goals;                         ///< requested and achieved values
-  ContactSchedule schedule;                               ///< with the time steps that came out
-  std::vector<PhaseTiming> timings;                       ///< of the phases of free duration
+  std::vector<std::pair<std::string, double>> options;  ///< every option of the motion by name
+  std::vector<GoalOutcome> goals;                       ///< requested and achieved values
+  ContactSchedule schedule;                             ///< with the final time steps
+  std::vector<PhaseTiming> timings;                     ///< of the phases of free duration
   Ground ground;
   FddpSummary solver;
   MotionRecord record;
 
-  std::vector<std::pair<std::string, double>> peak_torques;        ///< largest |u| by motor, largest first, N m or N
-  std::vector<std::pair<std::string, double>> rms_torques;         ///< calcRmsEfforts() by motor, N m or N
-  std::vector<std::pair<std::string, double>> continuous_torques;  ///< that motors bear for ever, where known, N m or N
+  std::vector<std::pair<std::string, double>> peak_torques;  ///< largest |u| by motor, largest first, N m or N
+  std::vector<std::pair<std::string, double>> rms_torques;   ///< calcRmsEfforts() by motor, N m or N
+  std::vector<std::pair<std::string, double>> continuous_torques;  ///< thermal limits, where known, N m or N
   ObjectiveOptions objective;
   ElectricalEnergy energy;
   double gap_position = 0, gap_angle = 0;    ///< largest closing error of the motion, m and rad
@@ -73,7 +73,7 @@ struct MotionSummary {
   StepRule step = StepRule::Euler;
   ObjectiveOptions objective;
   bool converged = false;
-  std::vector<std::pair<std::string, double>> requested;
+  std::vector<std::pair<std::string, double>> options;
   std::vector<GoalOutcome> goals;
   std::vector<Phase> phases;
   std::vector<PhaseTiming> timings;  ///< of the phases of free duration
@@ -101,11 +101,11 @@ BuildInfo getBuildInfo();
 
 // Starting a solve from a previous result.
 
-/// Replaces the guess of a motion by states and torques of a record of the same robot: node by node if the lengths
-/// agree, with the durations of phases where they are free; otherwise each node takes the recorded one at the same
-/// fraction of the duration. The base is moved so that the stance feet are at the places of the new motion, if they are more
-/// than 0.5 mm away anywhere. Multipliers are for solveMotion() to take.
-/// \throws ModelError when the coordinates or motors differ, or the record has numbers that are not finite
+/// Replaces the guess of a motion by states and torques of a record of the same robot. If the lengths agree, node by
+/// node, with the recorded durations where phases are free; otherwise each node takes the recorded one at the same
+/// fraction of the duration. If stance feet are more than 0.5 mm away from their places in the new motion, the base is
+/// moved there. Multipliers are not set; pass them to solveMotion().
+/// \throws ModelError when the coordinates or motors differ, or the record contains numbers that are not finite
 void setGuess(const MotionRecord& record, Motion& motion);
 
 /// The record in a directory written by writeResult().

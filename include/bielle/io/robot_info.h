@@ -1,5 +1,5 @@
 #pragma once
-/// \file What a robot consists of, and whether its loops close: what `bielle info` prints.
+/// \file The parts of a robot and whether its loops close, as `bielle info` prints them.
 #include <string>
 
 #include "bielle/model/reader.h"

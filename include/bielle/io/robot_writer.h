@@ -24,8 +24,8 @@ struct UrdfText {
   std::vector<std::string> warnings;  ///< each names something that is left out
 };
 
-/// A URDF alone, for programs that read no more: couplers of two joints as <mimic>, dampers and friction as <dynamics>,
-/// limits of motors as those of their joints.
+/// A URDF alone, for programs that read nothing else: couplers of two joints as <mimic>, dampers and friction as
+/// <dynamics>, motor limits as joint limits.
 /// \throws ModelError naming a joint that URDF does not have (universal, spherical), or as above
 UrdfText formatUrdf(const Model& model);
 
@@ -33,8 +33,8 @@ UrdfText formatUrdf(const Model& model);
 /// \throws ModelError as above, or when they cannot be written
 void writeRobot(const Model& model, const std::string& directory, const std::string& remark = "");
 
-/// What the entry of a motor in a YAML file says beside its armature and limits: its loss, its drive and what it bears for ever,
-/// each as ", key: value".
+/// The entry of a motor in a YAML file besides its armature and limits: its loss, drive and continuous effort, each as
+/// ", key: value".
 std::string formatMotorData(const Motor& motor);
 
 }  // namespace bielle

@@ -12,7 +12,7 @@ struct JointLimits {
   VectorXd lower, upper, velocity;  ///< per dof of the joint, or empty for none; rad, m, rad/s, m/s
 };
 
-/// What a model consists of, as its accessors give it: to store a model, or to compare two.
+/// The parts of a model, as its accessors return them; for storing a model, or comparing two.
 struct ModelParts {
   std::string name;
   Vector3d gravity = Vector3d::Zero();
@@ -63,8 +63,8 @@ class ModelBuilder {
                 double effort_limit = std::numeric_limits<double>::infinity(),
                 double velocity_limit = std::numeric_limits<double>::infinity(),
                 std::optional<double> torque_loss = {});
-  /// A motor on the joint of its name; its indices are filled here. What its drive says of limits, armature and loss holds where
-  /// they are not given: limits are the smaller of both, and an armature of 0 counts as not given.
+  /// A motor on the joint of its name; its indices are filled here. Limits, armature and loss that are not given follow
+  /// from its drive: limits are the smaller of both, and an armature of 0 counts as not given.
   void addMotor(Motor motor);
   /// Spring, damper and friction on a joint of one coordinate; its indices are filled here. Not kept if all are zero.
   void addJointForce(const std::string& joint, JointForce force);
@@ -88,7 +88,7 @@ class ModelBuilder {
   /// Validates and makes the model. Implausible data are reported in `warnings`, if given.
   Model build(std::vector<std::string>* warnings = nullptr) const;
 
-  /// The model of these parts, to the last bit the one that they were taken from.
+  /// The model of these parts, bitwise equal to the one that they were taken from.
   /// \throws ModelError when an index or a size among them does not fit
   static Model restore(ModelParts parts);
 

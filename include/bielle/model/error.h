@@ -7,7 +7,7 @@
 namespace bielle {
 
 /// Invalid input at the boundary. what() reads "file: element: what is wrong; remedy", on one line, without control
-/// characters and with long parts truncated. The parts by themselves are as they were given.
+/// characters and with long parts truncated. The separate parts are unchanged.
 class ModelError : public std::runtime_error {
  public:
   /// \param source file (or "" for a model built in code)   \param element e.g. `joint 'knee'`

@@ -89,7 +89,7 @@ struct JointForce {
 /// Spring and damper between a point of body 1 and a point of body 2. With l their distance and l' its rate, the tension
 ///     f = preload + stiffness (l - rest) + damping l'
 /// pulls both points towards each other along their line; a negative one, as that of a compressed spring, pushes them
-/// apart. The preload is the tension at the rest length. So that nothing is undefined where the points meet, the distance is
+/// apart. The preload is the tension at the rest length. To stay defined where the points meet, the distance is
 /// l = sqrt(|r|^2 + kShortestLine^2), r being the vector between the points, and the direction of the force r / l.
 struct PointSpring {
   std::string name;
@@ -125,12 +125,12 @@ struct MotorDrive {
   double resistance = 0;       ///< R, ohm
   double voltage = std::numeric_limits<double>::infinity();             ///< most |U|, that of the supply, V
   double current = std::numeric_limits<double>::infinity();             ///< most |i|, A
-  double continuous_current = std::numeric_limits<double>::infinity();  ///< that the winding bears for ever, A
+  double continuous_current = std::numeric_limits<double>::infinity();  ///< thermal limit of the winding, A
   double efficiency = 1, back_efficiency = 1;                           ///< e and e_b, above 0 and up to 1
-  double mass = 0;  ///< kg, that the robot has already; 0: not known
+  double mass = 0;  ///< kg, already included in the robot's links; 0: not known
 
   bool hasWinding() const { return torque_constant > 0; }
-  bool isGiven() const;  ///< whether anything differs from the ideal motor that it is without data
+  bool isGiven() const;  ///< whether anything differs from an ideal motor
 };
 
 /// An actuator on one dof.
@@ -163,7 +163,7 @@ struct Motor {
   double clampEffort(double u, double w) const;
 };
 
-/// Ours, of the order of geared motors of 0.8 kg that hold some 15 N m with 50 W of heat, W/(N m)^2.
+/// Assumed value, typical of geared motors of 0.8 kg that hold about 15 N m with 50 W of heat, W/(N m)^2.
 inline constexpr double kDefaultTorqueLoss = 0.25;
 inline double Motor::getTorqueLoss() const { return torque_loss.value_or(kDefaultTorqueLoss); }
 
@@ -188,14 +188,14 @@ struct Reference {
   std::map<std::string, Vector3d> feet;  ///< contact frame -> position of its origin, m (world)
 };
 
-/// The room that a body takes up: a box with rounded edges, all points within `radius` of those with |x_i| <= half_i in
-/// the frame of the shape. A sphere has half = 0, a capsule half = (0, 0, l), a box radius = 0.
+/// The shape of a body, for distances: a box with rounded edges, all points within `radius` of those with |x_i| <=
+/// half_i in the frame of the shape. A sphere has half = 0, a capsule half = (0, 0, l), a box radius = 0.
 struct Shape {
   int body = 0;
   SE3 X_BS;
   Vector3d half = Vector3d::Zero();  ///< m
   double radius = 0;                 ///< m
-  bool fitted = false;               ///< to a visual, because the files of the robot give its body no shape
+  bool fitted = false;               ///< fitted to a visual, because the robot's files give its body no shape
 };
 /// A shape drawn for a body, from the visuals of the URDF.
 struct Visual {
@@ -245,7 +245,7 @@ class Model {
   const std::vector<ContactFrame>& contacts() const { return contacts_; }
   const std::vector<Reference>& references() const { return references_; }
   const std::vector<Visual>& visuals() const { return visuals_; }
-  /// Those that the files give, then those fitted to the visuals of bodies without.
+  /// Shapes from the files, then shapes fitted to the visuals of bodies without any.
   const std::vector<Shape>& shapes() const { return shapes_; }
   /// Indices of the joints of the equivalent serial chain (hips, knee, ankles).
   const std::vector<int>& serialJoints() const { return serial_joints_; }

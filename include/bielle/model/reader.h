@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// Robots from files: a URDF and, optionally, a YAML file with the same stem beside it for data that URDF cannot
-/// express; or one file of MuJoCo.
+/// express; or one MuJoCo file.
 ///
 /// ## The URDF
 /// Links and joints of one tree. Bodies are added depth first, the children of a link in the order of their joints in
@@ -11,7 +11,8 @@
 ///   there: override them by `motors`); 0 means none. `lower` = `upper` = 0, like a missing pair, means none. Joints
 ///   whose number of coordinates is changed by the YAML have no limits.
 /// - <mimic> becomes a coupler named as the joint, after the closures of the YAML; <dynamics> its damping and friction, unless
-///   `joint_forces` names it; meshes need not exist. Files for Drake (io/drake.h) also say loops, springs, motors, other joints.
+///   `joint_forces` names it; meshes need not exist. Files for Drake (io/drake.h) can also define loops,
+///   springs, motors and other joints.
 /// - Attributes are finite numbers; inertias are those of a body (no negative mass, triangle inequality), up to 1e-6
 ///   of rounding.
 ///
@@ -30,11 +31,11 @@
 ///   in frame 1 (default z); kp in 1/s^2, kd in 1/s (default 0). A coupler: `{name, type: coupler, joints: {joint:
 ///   coefficient, ...}, offset, kp, kd}`, sum of coefficient times coordinate = offset (default 0)
 /// - `motors: {joint: {armature, effort, velocity, torque_loss}, ...}` instead of `name_mot`; its limits (.inf for none)
-///   replace those of the URDF; `torque_loss` in W/(N m)^2 (model.h). Of winding and gear, as in MotorDrive (model.h): `ratio`,
+///   replace those of the URDF; `torque_loss` in W/(N m)^2 (model.h). Winding and gear, as in MotorDrive (model.h): `ratio`,
 ///   `rotor_inertia`, `torque_constant`, `resistance`, `voltage`, `current`, `continuous_current`, `efficiency`,
-///   `back_efficiency`, `mass`; what follows from them holds where it is not given, and the smaller of two limits.
-///   `continuous_effort` is the thermal limit, N m. `type: NAME` takes all of this from a catalogue, and keys beside it
-///   replace its entries; with another `ratio`, its effort and velocity are those behind that gear
+///   `back_efficiency`, `mass`; quantities that are not given follow from them, and the smaller of two limits applies.
+///   `continuous_effort` is the thermal limit, N m. `type: NAME` takes all of this from a catalogue, and keys next to it
+///   replace its entries; with another `ratio`, effort and velocity are converted to that gear
 /// - `motor_catalogue: FILE`, or a list of them, relative to this file; then comes the file motors.yaml in each directory of
 ///   robots. A catalogue is `motors: {NAME: {source: where its figures are from, ...}, ...}` with the keys of winding and gear, and
 ///   `effort` and `velocity` at the shaft of its gear
@@ -55,18 +56,19 @@
 ///   first of these published robots that exists; names are looked up in the directories of robots. Its keys take
 ///   precedence over those of that robot's YAML file. It may be one in MuJoCo's format.
 ///
-/// ## Files of MuJoCo (MJCF, .xml), of version 2.2.2 and today's
-/// Read are bodies and <frame>; inertias, or those of shapes without <inertial>; joints of all kinds with range, ref,
-/// armature, stiffness, springref, damping and frictionloss; the equalities connect, weld, joint and tendon (of fixed
-/// tendons) with polynomials of degree 1; springs and dampers of spatial tendons between two sites; motors with gear and limits
-/// (servos become motors); classes of defaults; gravity; keyframes as references; sites as frames; geoms as shapes. Ranges
-/// hold unless `limited` is false.
+/// ## MuJoCo files (MJCF, .xml), of version 2.2.2 and later
+/// The reader supports bodies and <frame>; inertias, or those of shapes without <inertial>; joints of all kinds with
+/// range, ref, armature, stiffness, springref, damping and frictionloss; the equalities connect, weld, joint and tendon
+/// (of fixed tendons) with polynomials of degree 1; springs and dampers of spatial tendons between two sites; motors
+/// with gear and limits (servos become motors); classes of defaults; gravity; keyframes as references; sites as frames;
+/// geoms as shapes. Ranges hold unless `limited` is false.
 /// - The frame of a body has its origin on its joint; a body with several joints becomes a chain of links BODY/JOINT
 ///   without mass. Quaternions of balls count from the pose in the file. Motors are named after their joints and give the
 ///   force of the joint. Without keyframes, the reference `qpos0` is the posture of the file, where MuJoCo closes loops.
 /// - What io/mjcf.h writes is put together again: connects NAME.1 and NAME.2 to a hinge, the elements of a universal, planar
 ///   or free joint, the spheres of a sole at their site.
-/// - What is left out is told in `warnings`, with its lines; what would be another mechanism without it is an error:
+/// - Elements that are left out are listed in `warnings` with their lines. Elements without which the mechanism
+///   would be another one are errors:
 ///   <include>, <attach>, <replicate> and <composite>, other equalities, polynomials of higher degree, masses of meshes.
 ///   At most 16 MB and 3000 bodies and sites.
 #include <optional>

@@ -1,5 +1,5 @@
 #pragma once
-/// \file What a walk is told: a velocity over time.
+/// \file Commands of a walk: a velocity over time.
 ///
 /// A file of commands is YAML. Each velocity holds from its time on, until the next one; before the first the robot stands.
 ///

@@ -1,14 +1,14 @@
 #pragma once
-/// \file A walk without an end: its stages are made one after the other, as a velocity commands.
+/// \file A walk without an end, whose stages are made one by one from a commanded velocity.
 ///
 /// Costs and constraints are those of locomotion.h, on level ground, for steps by footsteps.h Eq. (1) with
 ///     D_i = T (forward, sideways, turning),    T the duration of a step,                                         (1)
-/// of the command at the beginning of step i. While the command is rest the robot stands; after a last step, which brings the
-/// feet together.
+/// of the command at the beginning of step i. At zero command the robot takes a last step that brings its feet
+/// together, then stands.
 ///
 /// The stages of one step are made together. The centre of mass follows the pendulum of gait.h, Eq. (1), through this step and
-/// the two that would follow it under the same command, to rest. It starts where the step before has led to; what is foreseen
-/// beyond a step matters by exp(-2 T / tau), tau the pendulum's time constant, about 0.06.
+/// the two that would follow it under the same command, to rest. It starts at the end of the previous step. The
+/// prediction beyond a step counts with a factor exp(-2 T / tau), about 0.06, with tau the pendulum's time constant.
 #include <deque>
 #include <functional>
 
@@ -16,8 +16,8 @@
 
 namespace bielle {
 
-/// The velocity that is commanded at a time, s. Called once per step and, while the robot stands, every few stages, each time
-/// for a later time.
+/// The commanded velocity at a time, s. Called once per step and, while the robot stands, every few stages, with
+/// increasing times.
 using CommandSource = std::function<VelocityCommand(double)>;
 
 class CommandedWalk {
@@ -43,7 +43,7 @@ class CommandedWalk {
   /// The next stage.
   Stage makeNext();
   double getTimeStep() const { return options_.timing.time_step; }  ///< s
-  /// The stages of a step on the spot, as large as any stage of the walk: for memory that must hold them.
+  /// The stages of a step on the spot, which are as large as any stage of the walk; for allocating memory.
   std::vector<StageSpec> makeExamples() const;
   /// Whether torques are limited, so that a solver must enforce bounds.
   bool isBounded() const { return bounded_; }
@@ -74,7 +74,7 @@ class CommandedWalk {
   std::array<bool, 2> standing_feet_{};
   int made_ = 0, phase_ = 0;
   bool bounded_ = false;
-  std::deque<Stage> stages_;  // made, but not asked for yet
+  std::deque<Stage> stages_;  // made, but not requested yet
 };
 
 }  // namespace bielle

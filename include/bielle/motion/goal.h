@@ -30,7 +30,7 @@ struct Foothold {
 struct Goal {
   GoalKind kind = GoalKind::Speed;
   std::string name;                        ///< e.g. "speed"; in a sequence "walk.speed"
-  double asked = 0;                        ///< in the unit of getUnit()
+  double requested = 0;                    ///< in the unit of getUnit()
   double tolerance = 0;                    ///< largest difference that still meets the goal
   int first = 0, last = 0;                 ///< nodes
   Vector3d direction = Vector3d::UnitX();  ///< e of Eqs. (1), (6)
@@ -44,7 +44,7 @@ const char* getUnit(GoalKind kind);  ///< "m/s", "1", "m", "s", "rad"
 GoalKind parseGoalKind(const std::string& name);
 
 /// The tolerance of most goals: five per cent of the requested value, but not less than `least`.
-double calcTolerance(double asked, double least);
+double calcTolerance(double requested, double least);
 
 /// Data of a trajectory that the measurements above need.
 struct MotionTrack {
@@ -61,11 +61,11 @@ double measureGoal(const Goal& goal, const MotionTrack& track);
 
 struct GoalOutcome {
   Goal goal;
-  double came_out = 0;
-  bool met() const;  ///< false when came_out is not a number
+  double achieved = 0;
+  bool met() const;  ///< false when achieved is not a number
 };
 
-/// E.g. "asked 0.5 m/s, came out 0.4213 m/s: 84 %"; for a missed goal also its tolerance.
+/// E.g. "requested 0.5 m/s, achieved 0.4213 m/s: 84 %"; for a missed goal also its tolerance.
 std::string formatOutcome(const GoalOutcome& outcome);
 
 }  // namespace bielle

@@ -17,11 +17,11 @@
 /// - feet on the ground: force by Eq. (2), shared evenly, centre of pressure;
 /// - feet in flight: placement by Eq. (3);
 /// - at the end: posture, and the centre of mass over the feet as at the start.
-/// What must hold are path constraints:
+/// Path constraints:
 /// - wrench cones of the soles on the ground;
 /// - feet in flight: no corner below the ground, and 6 mm over it in the middle half of the flight;
-/// - touchdown, at the first node of the landing: the feet are at their places, flat and at rest: the legs fold as fast
-///   as the body falls;
+/// - touchdown, at the first node of the landing: the feet are at their places, flat and at rest, so that the legs fold
+///   as fast as the body falls;
 /// - at the end the centre of mass is at rest and the torso does not turn.
 ///
 /// With `published`, the problem is that of the paper's example code: there are no constraints; feet are free in
@@ -33,7 +33,7 @@
 
 namespace bielle {
 
-/// Of the published problem alone, which has no constraints.
+/// Only for the published problem, which has no constraints.
 struct PaperJumpWeights {
   LandingWeights touchdown{1e5, 1e3, 1e3};  ///< over h
   double terminal = 1e3;                    ///< of the final velocities
@@ -46,7 +46,7 @@ struct JumpOptions {
   double push = 0.3;                 ///< D, s
   double land = 0.3;                 ///< s
   double settle = 0.4;               ///< until the end, s
-  double stretch = 0.02;             ///< height of the CoM at take-off and touchdown over that at the start, m
+  double stretch = 0.02;             ///< height of the CoM at take-off and touchdown above that at the start, m
   double clearance = 0.04;           ///< least height of the soles at mid-flight, m
   double friction = 0.7;             ///< coefficient, 1
   double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
@@ -72,7 +72,8 @@ struct JumpOptions {
 /// Every number of the options by name, pointing into `options`.
 std::vector<OptionEntry> listOptions(JumpOptions& options);
 
-/// The paper's problem with the weights and durations of its jump (its example code), as far as its figures show them.
+/// The paper's problem with the weights and durations of its jump (its example code), as far as they can be read from
+/// its figures.
 void setPaperWeights(JumpOptions& options);
 
 /// Figures of a jump by Eq. (1), with durations rounded to the time step.

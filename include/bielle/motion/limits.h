@@ -6,7 +6,7 @@
 ///   node but the first, whose state is given. A violation of 1 is half the width of a range (1 rad or 1 m where one
 ///   side is open), or the limit of a velocity or power.
 /// - Voltages of motors whose winding and supply are known (Motor::hasEnvelope()), in every step: the faster a motor turns, the
-///   less torque it has. A violation of 1 is the voltage of the supply.
+///   smaller its largest torque. A violation of 1 is the voltage of the supply.
 /// - Dead points of linkages: the transmission of each (makeTransmission) stays within margin .. 1/margin of that at the
 ///   start, at the same nodes. Beyond a dead point a linkage snaps into another configuration.
 #include <map>
@@ -27,13 +27,13 @@ struct LimitOptions {
   bool areGiven() const { return !(efforts.empty() && velocities.empty() && powers.empty()); }
 };
 
-/// Effort limits by motor (nu), those of the model or given in their place. \throws ModelError as addLimits() does
+/// Effort limits by motor (nu), those of the model or the given replacements. \throws ModelError as addLimits() does
 VectorXd getEffortLimits(const Model& model, const LimitOptions& options);
 
 /// Sets the effort limits of the stages and adds the path constraints to them. Returns whether a torque is limited.
 /// \param q0  configuration of the first node (nq)
-/// \throws ModelError for an unknown motor, a limit that is not positive, a margin outside 0 .. 1, a joint whose range has no
-/// width or does not hold q0
+/// \throws ModelError for an unknown motor, a limit that is not positive, a margin outside 0 .. 1, a joint whose range
+/// has zero width or excludes q0
 bool addLimits(const Model& model, const LimitOptions& options, const VectorXd& q0, std::vector<StageSpec>& stages);
 
 }  // namespace bielle

@@ -1,27 +1,27 @@
 #pragma once
 /// \file Steps as an optimal control problem, shared by walk, side walk, turn, stairs, run and hop.
 ///
-/// Wishes are costs of a stage; those with zero weight are omitted. References of body and feet are those of gait.h; but without
-/// flights the centre of mass is raised where a leg with a flat sole would have to bend too far, as on high stairs, and lowered
-/// where one would be too short.
+/// Soft objectives are costs of a stage; costs with zero weight are omitted. References of body and feet are those of
+/// gait.h. Without flights, the centre of mass is also raised where a leg with a flat sole would bend too far, as on
+/// high stairs, and lowered where it would be too short.
 /// - state regularization about the standing posture at rest, the base heading as the feet do; motor torques;
 /// - centre of mass: position and velocity;
 /// - swing foot: placement along its path, and its velocity;
 /// - forces of stance feet: share of the weight, centre of pressure.
-/// What must hold are path constraints:
+/// Path constraints:
 /// - wrench cones of the soles on the ground;
 /// - landing, at the first node of a double support or at the impact before it: the foot is on its foothold, flat and
-///   at rest, so that the impulses of an impact vanish; with `foothold_room` it may be that far off along x and y of the
-///   foothold, and turned by that over the reach of a sole; then costs of the foothold and, less than otherwise, of the
-///   horizontal path of the swing keep it near;
+///   at rest, so that the impulses of an impact vanish; with `foothold_room` it may deviate by that much along x and y of
+///   the foothold, and turn by that over the reach of a sole; costs of the foothold and, with less weight than otherwise,
+///   of the horizontal swing path then keep it near;
 /// - swing foot: no corner below the ground, and 6 mm over it in the middle half of the swing; distance from the other
 ///   foot;
 /// - at the end the centre of mass is at rest and the torso does not turn.
 ///
 /// With `timing.flight` the robot is in the air between single supports: a foot that has landed stands alone until it
-/// takes off or until the foot of the last step lands beside it. If feet alternate that is a run, if one foot takes
-/// all steps but the last a hop on that foot. Feet in flight have the costs and constraints of swing feet, and forces
-/// follow the load of gait.h Eq. (3).
+/// takes off or until the foot of the last step lands beside it. With alternating feet that is a run; with one foot
+/// taking all steps but the last it is a hop on that foot. Feet in flight have the costs and constraints of swing feet,
+/// and forces follow the load of gait.h Eq. (3).
 ///
 /// The pendulum of gait.h starts with a velocity v, but the robot starts at rest. With the time constant
 /// tau = sqrt(z / g), a centre of pressure held back by d for a time T brings the robot onto the pendulum's path if
@@ -49,7 +49,7 @@ struct GaitTiming {
   double both = 0.045;   ///< double support between steps, s
   double flight = 0;     ///< between single supports, in place of double support, s; 0: a walk
   double end = 0.45;     ///< double support after the last step, s
-  /// Length of a stage, s; 0: by the swings (chooseTimeStep). What steps of order p leave grows with its power p.
+  /// Length of a stage, s; 0: by the swings (chooseTimeStep). The error of steps of order p grows with its power p.
   double time_step = 0;
 
   double stepDuration() const { return single + (flight > 0 ? flight : both); }  ///< s
@@ -62,7 +62,7 @@ struct SwingShape {
   double leave = 0, arrive = 0.95;  ///< the horizontal motion takes place between these
 };
 
-/// Of the published problem alone, which has no constraints.
+/// Only for the published problem, which has no constraints.
 struct PaperWeights {
   double fly_high = 100;                  ///< s^2/m^2
   double fly_high_slope = 75;             ///< 1/m
@@ -81,10 +81,10 @@ struct LocomotionOptions {
   double cone_margin = kConeMargin;  ///< of the wrench cones (addWrenchCones), 1
   double published = 0;              ///< 1: the paper's problem, see above; 0: on footholds
   /// 1: every landing is a rigid impact (StageKind::Impact), a stage of its own that takes no time. 0: the contact's
-  /// stabilisation stops what velocity a foot may have left.
+  /// stabilisation stops any remaining velocity of a foot.
   double rigid_landing = 0;
   double landing_speed = 0;  ///< with rigid_landing: at which a foot comes down, m/s; 0: at rest
-  double foothold_room = 0;  ///< how far from its foothold a foot may land, along each of its axes, m
+  double foothold_room = 0;  ///< largest distance of a landing foot from its foothold along each of its axes, m
 
   double state_weight = 0.1;           ///< of the state regularization
   double torso_weight = 1e4;           ///< of the torso's roll and pitch within the state regularization

@@ -52,8 +52,8 @@ struct MotionPlan {
   ShootingTrajectory guess;       ///< quasi-static
   VectorXd q_start, q_end;        ///< standing postures, nq
   bool limited = true;            ///< whether limits of the robot apply: not in the paper's problems
-  std::vector<std::pair<std::string, double>> requested;  ///< every option by name
-  std::vector<Goal> goals;                                ///< what is to come out, to be measured on the trajectory
+  std::vector<std::pair<std::string, double>> options;  ///< every option of the motion by name
+  std::vector<Goal> goals;                              ///< requested quantities, to be measured on the trajectory
 };
 
 /// A problem ready to be solved, with the data that reports need.
@@ -62,9 +62,9 @@ struct Motion {
   ContactSchedule schedule;
   Ground ground;
   std::unique_ptr<RobotProblem> problem;
-  ShootingTrajectory guess;                               ///< quasi-static
-  std::vector<std::pair<std::string, double>> requested;  ///< every option by name
-  std::vector<Goal> goals;                                ///< what is to come out, to be measured on the trajectory
+  ShootingTrajectory guess;                             ///< quasi-static
+  std::vector<std::pair<std::string, double>> options;  ///< every option of the motion by name
+  std::vector<Goal> goals;                              ///< requested quantities, to be measured on the trajectory
   bool bounded = false;  ///< a torque or a duration is limited: to be solved with ControlBounds::Enforce
   ObjectiveOptions objective{};
   VectorXd peak_limits{};      ///< of the peak torque, nu (getPeakLimits); empty for other objectives
@@ -75,23 +75,23 @@ struct Motion {
 /// its guess; \param limits  those of the motion
 ObjectiveOptions scaleObjective(const Motion& effort, const ObjectiveOptions& options, const LimitOptions& limits = {});
 
-/// Those of FddpOptions, but that a cost that has changed by less than 1e-4 of itself in 20 iterations is acceptable: motions of
-/// least effort near the limits of friction or of a linkage need that.
+/// FddpOptions with one change: a cost that changed by less than 1e-4 of itself in 20 iterations is acceptable. Motions
+/// of least effort near the limits of friction or of a linkage need that.
 FddpOptions makeMotionSolverOptions();
 
 /// Solves a motion from its guess, and leaves the solution there: by Fddp, with bounds enforced where there are any. For the
-/// least peak torque it solves the PeakProblem of motion.problem. The guess should then be the motion of least effort: from a
-/// quasi-static guess, motors that share a load have nothing to gain by it.
-/// A solve that ends as infeasible says so of its neighbourhood alone. It is then tried again from the guess, with shorter first
-/// steps (regularization 1e-2); iterations, times and log are those of both attempts. Where the guess cannot be evaluated, such as
-/// with a leg that is nearly straight, the posture at the start takes its place.
+/// least peak torque it solves the PeakProblem of motion.problem. The guess should then be the motion of least effort:
+/// from a quasi-static guess, motors that share a load gain nothing by sharing it better. An infeasible end is only a
+/// local statement. The solve is then repeated from the guess, with shorter first steps (regularization 1e-2);
+/// iterations, times and log are those of both attempts. Where the guess cannot be evaluated, such as with a leg that
+/// is nearly straight, the posture at the start takes its place.
 /// \param multipliers  if given, those of the constraints, which MotionEnvelope needs: to start from, where the motion has
 ///   constraints of as many rows at every node, and those of the solution
 FddpSummary solveMotion(Motion& motion, const FddpOptions& options, const FddpObserver& observer = {},
                         Multipliers* multipliers = nullptr);
 
-/// FddpOptions::initial_regularization for solves from Motion::guess. That guess stands still: undamped, the first steps
-/// throw the swing legs so far that dozens of short ones follow. A solution to start from needs none.
+/// FddpOptions::initial_regularization for solves from Motion::guess. That guess is at rest: without damping, the first
+/// steps move the swing legs so far that dozens of short steps follow. Solves from a solution need no damping.
 constexpr double kGuessRegularization = 1e-5;
 
 /// Options of a problem besides those of the motion.
@@ -108,7 +108,8 @@ struct ProblemOptions {
 };
 
 /// Turns a plan into a problem that starts at rest, adding limits, free durations, objective and step rule to its stages.
-/// Gains are limited to what a step can bear (limitGains), except in the paper's problems of fixed durations.
+/// Gains are limited to values that are stable for a step (limitGains), except in the paper's problems of fixed
+/// durations.
 /// \throws ModelError as addLimits(), freeTimings() and setObjective() do, or when limits are given for a problem of the
 /// paper, which has none
 Motion makeMotion(const Model& model, MotionPlan plan, const ProblemOptions& options);
@@ -122,8 +123,9 @@ struct StaticTorques {
 };
 StaticTorques calcStaticTorques(const Model& model, const ConstraintSet& constraints, ConstVectorRef q);
 
-/// The starting posture: the reference `half_sitting`, or the only one; springs that it does not name and no motor holds are
-/// bent until the robot stands still, if it can. \throws ModelError when there is no reference, or it cannot be closed
+/// The starting posture: the reference `half_sitting`, or the only one; springs that it does not name and that no motor
+/// holds are deflected until the robot stands still, if possible. \throws ModelError when there is no reference, or it
+/// cannot be closed
 VectorXd makeStandingPosture(const Model& model);
 
 /// The posture q moved over the ground by X, a displacement and a rotation about the vertical. A robot without a
@@ -134,8 +136,8 @@ VectorXd carryPosture(const Model& model, ConstVectorRef q, const SE3& X);
 struct ContactGains {
   double kp = 0, kd = 0;
 };
-/// Limits gains to what a step of length h can bear. With D = h kd and K = h^2 kp, a displacement d of a foot and its
-/// velocity e become, in one step,
+/// Limits gains to values that are stable for a step of length h. With D = h kd and K = h^2 kp, a displacement d of a
+/// foot and its velocity e become, in one step,
 ///     Euler:     h e+ = (1 - D) h e - K d,    d+ = d + h e+                                                        (1)
 ///     midpoint:  h e+ = (1 - D) h e - K d,    d+ = d + h/2 (e + e+)                                                (2)
 /// The limits are D <= 1, beyond which a velocity would change its sign, and K <= 1/2 or, of midpoint steps, 1/3. There
@@ -178,14 +180,15 @@ struct LandingWeights {
 void addFreeLanding(const BodyFrame& foot, const SE3& X_WF, const LandingWeights& weights, StageSpec& stage,
                     const std::string& suffix = "");
 
-/// Adds a path constraint for every active contact: the wrench cone of its sole (residual.h), drawn in by `margin`, in
-/// friction and in size, and by a thousandth of the robot's weight in the normal force. Its pyramids of friction/sqrt(2) are
-/// inscribed in round cones. A violation of 1 is the weight of the robot.
-/// \param friction  coefficient of the ground, positive   \param margin  part of 1 that is left free; at least a hundredth, or
-/// rounding of a result may leave the cone
+/// Adds a path constraint for every active contact: the wrench cone of its sole (residual.h), reduced by `margin` in
+/// friction and in size, and by a thousandth of the robot's weight in the normal force. Its pyramids of
+/// friction/sqrt(2) are inscribed in round cones. A violation of 1 is the weight of the robot.
+/// \param friction  coefficient of the ground, positive   \param margin  relative reduction; at least a hundredth,
+/// otherwise rounded results may leave the cone
 void addWrenchCones(const Model& model, double friction, double margin, StageSpec& stage);
-/// The same of the impulses of an impact, where a violation of 1 is the mass of the robot times 1 m/s. Feet that stood
-/// before may get next to none, so that their cones are lowered by 1e-4 of that: at the apex a cone has no interior.
+/// The same of the impulses of an impact, where a violation of 1 is the mass of the robot times 1 m/s. Feet that
+/// already stood may receive almost no impulse, so that their cones are lowered by 1e-4 of that: a cone has no interior
+/// at its apex.
 /// \param landing  index of the contact that lands, not at rest
 void addImpulseCones(const Model& model, double friction, double margin, int landing, StageSpec& stage);
 inline constexpr double kConeMargin = 0.01;

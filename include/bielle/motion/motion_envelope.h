@@ -1,5 +1,5 @@
 #pragma once
-/// \file Derivatives of an optimal motion, of its cost and of itself, with respect to the robot and to what is asked for.
+/// \file Derivatives of an optimal motion, of its cost and of itself, with respect to the robot and to the request.
 #include "bielle/motion/motion.h"
 #include "bielle/ocp/envelope.h"
 #include "bielle/ocp/followed_optimum.h"
@@ -35,8 +35,9 @@ class MotionEnvelope {
 std::optional<ShootingTrajectory> followOptimum(const Motion& optimum, const Multipliers& multipliers,
                                                 const Motion& changed, int sweeps = 2);
 
-/// The derivative of what is read from the optimum of a motion (ocp/followed_optimum.h). \param ahead, behind  motions like it
-/// \param read  numbers made of a trajectory of a motion's problem
+/// The derivative of numbers computed from the optimum of a motion (ocp/followed_optimum.h). \param ahead, behind
+/// motions like it
+/// \param read  numbers computed from a trajectory of a motion's problem
 std::optional<OptimumDerivative> differentiateOptimum(
     const Motion& optimum, const Multipliers& multipliers, const Motion& ahead, const Motion& behind, double step,
     const std::function<VectorXd(const Motion&, const ShootingTrajectory&)>& read);

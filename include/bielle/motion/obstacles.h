@@ -12,7 +12,7 @@ struct BoxOptions {
   double length = 0.2;     ///< of its top, m
   double width = 0.8;      ///< m
   double distance = 0.05;  ///< from the soles at the start to the front of the box, m
-  double down = 0;         ///< 1: and down again on the other side, as far from its back
+  double down = 0;         ///< 1: step down again on the other side, as far from its back
   LocomotionOptions gait = makeGaitDefaults();
 
   static LocomotionOptions makeGaitDefaults();
@@ -20,7 +20,7 @@ struct BoxOptions {
 
 /// The ground is missing between two banks of the same height.
 struct GapOptions {
-  double width = 0.15;     ///< of the gap, along the way, m
+  double width = 0.15;     ///< of the gap in the direction of travel, m
   double distance = 0.02;  ///< of the soles from its edges, before and behind, m
   double depth = 0.3;      ///< of the ground in the gap under the banks, m
   LocomotionOptions gait;

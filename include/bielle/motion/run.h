@@ -7,10 +7,10 @@
 ///
 /// In a run of n steps of the length L = speed (stance + flight), step i lands (i - 1/2) L ahead of where its foot
 /// stood at the start, and each of the last two (n - 2) L ahead, where the feet come together: the first step and the
-/// last but one are half as long as the others. The first single support pushes off, the last one, before a step
-/// without flight, catches the body. The speed is a goal of runs of eight or more steps; shorter ones do not reach it.
+/// last but one are half as long as the others. The first single support pushes off; the last one, before a step
+/// without flight, brakes the body. The speed is a goal of runs of eight or more steps; shorter ones do not reach it.
 ///
-/// In a hop the robot lifts one foot, takes off from the other one and lands on it again, as often as asked; then the
+/// In a hop the robot lifts one foot, takes off from the other one and lands on it again, as often as requested; then the
 /// foot in the air lands beside it.
 #include "bielle/motion/locomotion.h"
 

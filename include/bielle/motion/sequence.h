@@ -27,7 +27,7 @@ struct PartsOptions {
 };
 
 /// An initial guess for the sequence: each motion solved separately. From a quasi-static guess a long sequence may fail
-/// to converge, because one step length applies to all motions, so that the hardest one slows the closing of all gaps.
+/// to converge, because all motions share one step length, and the hardest one slows the closing of all gaps.
 /// Parts that do not converge contribute their last iterate.
 ShootingTrajectory solveParts(const Model& model, const std::vector<SequencePart>& parts, const VectorXd& q0,
                               const PartsOptions& options = {});

@@ -13,7 +13,7 @@ struct StairsOptions {
   double depth = 0.2;    ///< of a step, m
   double slope = 0;      ///< height over depth, replaces the height unless it is 0, 1
   double stairs = 4;     ///< number of steps of the stairs
-  double speed = 0.3;    ///< forward velocity of the CoM, which with the depth gives the duration of a step, m/s
+  double speed = 0.3;    ///< forward speed of the CoM; with the depth it determines the duration of a step, m/s
   double width = 0.8;    ///< of the stairs, m
   LocomotionOptions gait = makeGaitDefaults();
 

@@ -10,9 +10,10 @@ enum class ActivationKind { Quadratic, Barrier, Energy };
 ///   Quadratic:  1/2 sum_i w_i r_i^2
 ///   Barrier:    1/2 sum_i w_i (max(0, lower_i - r_i)^2 + max(0, r_i - upper_i)^2)
 ///   Energy:     sum_i w_i (share P_i + (1 - share) (P_i + sqrt(P_i^2 + e^2)) / 2),   r = (P, u) of makeElectricalPower():
-///               what motors take, less the share of what flows back. It exceeds max(P, 0) + share min(P, 0) by at most
-///               (1 - share) e/2 per motor, and by e^2 / (4 |P|) where |P| is large. The second derivative of the term
-///               loss u^2 counts in the rows of u, whose gradient is zero; that of u w does not.
+///               energy drawn by the motors, minus the reused share of the regenerated energy. It exceeds
+///               max(P, 0) + share min(P, 0) by at most (1 - share) e/2 per motor, and by e^2 / (4 |P|) where |P| is
+///               large. The second derivative of the term loss u^2 counts in the rows of u, whose gradient is zero;
+///               that of u w does not.
 struct Activation {
   ActivationKind kind = ActivationKind::Quadratic;
   VectorXd weights;       ///< n
@@ -39,7 +40,7 @@ struct Cost {
   double weight = 1;
   Activation activation;
   std::shared_ptr<const Residual> residual;
-  bool defines = false;  ///< it says what the motion is, and keeps its weight whatever is minimized beside it
+  bool defines = false;  ///< it defines the motion, and keeps its weight for every objective
 };
 
 /// lower <= r <= upper, row by row; equal bounds make an equation, infinite ones leave a side open. The solver sees r and its

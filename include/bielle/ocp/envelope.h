@@ -17,7 +17,7 @@
 ///
 ///     lambda_k = Vx_k + Vxx_k dx_k,                                                                                (3)
 ///
-/// with dx what is left of the way to the optimum, of the size of the gaps. Along any smooth path x(p), u(p) on which x_0
+/// with dx the remaining step to the optimum, of the size of the gaps. Along any smooth path x(p), u(p) on which x_0
 /// is the initial state of P(p), states are states of P(p), and controls at a bound stay at it, therefore
 ///
 ///     dJ*/dp = d/dp L(p, x(p), u(p))    at p = 0:                                                                  (4)
@@ -27,16 +27,16 @@
 ///     x_0(p) = initial state of P(p),    x_k(p) = x_k (+) 0 in P(p),    u_k(p) = u_k, or its bound in P(p).         (5)
 ///
 /// In the reduced formulation x (+) 0 closes the loops of the changed mechanism by the least motion (reduction.h, Eq. 2)
-/// and turns the velocity into them; in the full one it is x. P is made by the caller: what P(p) holds is held, what moves
-/// in P(p) moves. If a motion is planned anew for the changed robot, then the posture at the start and references,
-/// footholds and bounds taken from it move with the mechanism, and their share is in (4).
+/// and turns the velocity into them; in the full one it is x. The caller defines P(p); quantities it keeps fixed are
+/// treated as fixed. If a motion is planned again for the changed robot, its starting posture, references, footholds
+/// and bounds move with the mechanism, and (4) includes their share.
 ///
 /// The differences in (1) are of first order in p. Taken joint by joint, d = (f (-) x)(p), their coordinates about the
 /// optimum are those of (x_{k+1} (+) d) (-) x_{k+1} in P(0), to which lambda belongs, up to terms of second order that are
 /// even in p. (4) is the central difference of (1), one evaluation of all nodes on each side, and so is exact up to the
-/// square of the step: every residual, also of one's own, every constraint and every parameter is covered.
+/// square of the step: every residual, user-defined ones included, every constraint and every parameter is covered.
 ///
-/// An error of the optimum counts: (4) is off by dL/du . du*/dp, that is in proportion to what is left of the gradient
+/// Errors of the optimum matter: (4) is wrong by dL/du . du*/dp, that is in proportion to the remaining gradient
 /// (fddp.h, Eq. 6), and by the error of the multipliers times the change of their constraints.
 #include "bielle/ocp/robot_problem.h"
 #include "bielle/solve/fddp.h"

@@ -14,7 +14,7 @@
 
 namespace bielle {
 
-/// Data that a residual may read: one node with its kinematics (and, at a stage, its dynamics) up to date.
+/// Data that a residual may read: one node with up-to-date kinematics (and, at a stage, dynamics).
 struct NodeView {
   const Model& model;
   /// In calc(): q, v, X_WB, V and hc, at the stage Bodies; in calcJacobian() also J, dV, h, YJ and Yc, at the stage
@@ -80,7 +80,7 @@ std::unique_ptr<Residual> makeFlyHigh(const BodyFrame& frame, double slope, doub
 /// Horizontal distance between two frames (1), m.
 std::unique_ptr<Residual> makeFrameDistance(const BodyFrame& a, const BodyFrame& b);
 /// Heights of the corners of a sole over the ground (4), of its origin if it has no size (1), m. Around a step the
-/// ground is taken to rise to its top over `ramp` m, so that the residual is continuous, and nowhere more than the true
+/// ground is taken to rise to its top over `ramp` m, so that the residual is continuous, and never exceeds the true
 /// height.
 std::unique_ptr<Residual> makeSoleClearance(const BodyFrame& sole, double half_length, double half_width,
                                             const Ground& ground, double ramp);

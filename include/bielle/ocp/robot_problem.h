@@ -7,10 +7,10 @@
 ///     Euler:     v <- v + h a(q, v),  drift h                                                                      (1)
 ///     midpoint:  drift h/2,  v <- v + h a(q, v + h/2 a(q, v)),  drift h/2                                          (2)
 ///
-/// The midpoint step is of second order: both accelerations are taken half way, the first only to foresee the velocity
-/// there. They have one mass matrix. The stabilisation of contacts and closures (closure.h) is that of the node's state
-/// in both rules: half way along the straight line of the first drift even a foot that stands is off its place, and
-/// moves. The acceleration that foresees has none.
+/// The midpoint step is of second order: both accelerations are evaluated at the midpoint, the first only to predict
+/// the velocity there. They share one mass matrix. The stabilisation of contacts and closures (closure.h) is that of
+/// the node's state in both rules: at the midpoint, after a straight drift, even a standing foot is off its place, and
+/// moves. The predicting acceleration has no stabilisation.
 ///
 /// Full formulation (the paper): x = (q, v) of the spanning tree, tangent size 2 nv. A drift, with its derivatives (J_q,
 /// J_d those of (+) at d = h v):
@@ -36,8 +36,8 @@
 /// variables of a stage in both cases. Derivatives by s are exact. The running cost l = s dt sum_i 1/2 w_i r_i^2 counts
 /// as a sum of squares of sqrt(s) r_i, so that, with g its gradient at a fixed factor s, its Hessian receives
 ///     l_ss += l / (2 s^2) + g_s / s,    l_sz += g_z / (2 s)                                                        (6)
-/// where g_s is due to residuals that depend on s: references of velocities, and forces of midpoint steps. Costs that are no
-/// squares count in l and its gradient, but not in g.
+/// where g_s is due to residuals that depend on s: references of velocities, and forces of midpoint steps. Costs that
+/// are not squares count in l and its gradient, but not in g.
 ///
 /// The speeds of the motors belong to the velocity that a is taken at: v, or v + h/2 a of a midpoint step.
 ///
@@ -73,7 +73,7 @@ struct StageSpec {
   StepRule step = StepRule::Euler;
   double dt = 0.015;  ///< s, at time scale 1; 0 for an impact
   FreeTiming timing;
-  double time_weight = 0;  ///< cost of a second, not negative
+  double time_weight = 0;  ///< cost per second, not negative
   ConstraintSet constraints;
   StateCost state;
   ControlCost control;
@@ -102,7 +102,7 @@ struct TimeScalePlace {
 };
 
 /// A node of a robot's problem, with the accelerations and forces behind its next state. Those of a midpoint step belong
-/// to (q_mid, v_mid), the point after half the drift with the velocity foreseen there.
+/// to (q_mid, v_mid), the point after half the drift with the predicted velocity.
 struct RobotEvaluation : NodeEvaluation {
   double time_scale = 1;  ///< s of Eq. (5)
   double dt = 0;          ///< length of the step, s; 0 at an impact and at the terminal node
@@ -150,11 +150,12 @@ class RobotProblem : public ShootingProblem {
   const Model& model() const { return model_; }
   Formulation formulation() const { return formulation_; }
   const StageSpec& spec(int node) const { return specs_[node]; }
-  /// Replaces a stage, for horizons that recede without end: evaluations of other nodes stay valid, solves must not be under
-  /// way. \throws ModelError as the constructor does   \throws std::invalid_argument when the duration of the stage is free,
-  /// or it has more costs, constraints or rows of them than any stage of the constructor had, or other bodies in contact
+  /// Replaces a stage, for endless receding horizons. Evaluations of other nodes stay valid; no solve may be running.
+  /// \throws ModelError as the constructor does   \throws std::invalid_argument when the duration of the stage is free,
+  /// or it has more costs, constraints or rows of them than any stage of the constructor had, or other bodies in
+  /// contact
   void replaceStage(int stage, StageSpec spec);
-  /// Changes the reference of the state cost of the terminal node: where a horizon that recedes is to end.
+  /// Changes the reference of the terminal state cost: the target of a receding horizon.
   /// \param q  nq   \param v  nv
   void setTerminalReference(ConstVectorRef q, ConstVectorRef v);
   bool hasFreeTimings() const { return stateSize() > model_.nq() + model_.nv(); }

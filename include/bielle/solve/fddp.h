@@ -13,7 +13,7 @@
 ///        dx_{k+1} = difference(xs_{k+1}, f_k(x'_k, u'_k)) + (alpha - 1) gap_k,   x'_{k+1} = xs_{k+1} (+) dx_{k+1} (3)
 ///    so that the gaps contract to (1 - alpha) gap_k (to first order on a curved manifold); a full step closes them and
 ///    x'_{k+1} = f_k(x'_k, u'_k) exactly. The paper integrates (alpha - 1) gap_k from f_k(x'_k, u'_k) instead: the same
-///    on a vector space, but on a manifold it would apply the gap at a point to whose coordinates it does not belong.
+///    on a vector space, but on a manifold it would apply the gap in the coordinates of another point.
 /// 4. Line search over alpha on the merit J + nu c, with J the cost and c = sum_k |gap_k|_1, predicted to fall by
 ///        decrease(alpha) = -change(alpha) + nu alpha c,                                                            (4)
 ///    positive on the whole of (0, 1] for rho = 1/2 and
@@ -34,10 +34,10 @@
 /// (The penalty nu c alone would not suffice: gaps and decrease are both of second order, so that it would reject full
 /// steps however close to the solution.) A trial for which (8) exceeds half of (4) is rejected, whatever its merit; after
 /// another full step, so is one whose J + closing has not fallen from that of the last by `acceptance` times what the
-/// models foresee between the two: between gaps of second order, (4) alone would let steps pass that go too far by all of
-/// their length. A full step that is rejected in segments is tried again in one piece, and so are all shorter ones; steps
-/// that follow a shortened one are rolled out in one piece. With LastRollout::Segments, for receding horizons, steps of all
-/// lengths are rolled out in segments: then an iteration takes about the same time whatever its step.
+/// models foresee between the two: with gaps of second order, (4) alone would accept steps that overshoot by their
+/// whole length. A full step that is rejected in segments is tried again in one piece, and so are all shorter ones;
+/// steps that follow a shortened one are rolled out in one piece. With LastRollout::Segments, for receding horizons,
+/// steps of all lengths are rolled out in segments: then an iteration takes about the same time whatever its step.
 ///
 /// The last step must close the gaps. If it is short it is rolled out twice, the second time from
 ///     dx'_j = e_j + (Fx + Fu K)_{j-1} .. (Fx + Fu K)_i (dx'_i - dx_i),                                             (9)
@@ -92,14 +92,15 @@
 /// are then held at their bounds, like equations (a primal-dual active set: Hintermueller, Ito, Kunisch, SIAM Journal on
 /// Optimization 13, 2002): in (10) and (11) they have
 ///     d_k = z_k - upper (y_k > 0) or z_k - lower (y_k < 0).                                                          (18)
-/// By (10) and (11) alone a violated row is drawn inside by as much as it was violated, is free there since it is farther from its
-/// bound than y_k / rho, and is violated again: in a walk's window, wrench cones by 0.5 after every other iteration.
+/// With (10) and (11) alone a violated row moves inside by as much as it was violated. There it is free, since it is
+/// farther from its bound than y_k / rho, and is then violated again: in a walk's window, wrench cones by 0.5 in every
+/// other iteration.
 ///
 /// Models without second derivatives may be too flat along some directions, by a factor that stays the same from step to step.
 /// After two steps alpha < 1 in a row, close to the constraints and with closed gaps, the curvature b of the merit along the
 /// last one is taken from its values. Where it is more than 1.5 times the curvature a of (1), the next line search starts at
 /// a / b instead of 1 (Barzilai and Borwein, "Two-point step size gradient methods", IMA Journal of Numerical Analysis 8,
-/// 1988, in the metric of the models): such a direction then dies out, where it would only change its sign.
+/// 1988, in the metric of the models): such a direction then decays instead of only changing its sign.
 #include <atomic>
 #include <functional>
 #include <iosfwd>
@@ -119,7 +120,7 @@ enum class ControlBounds { Ignore, Enforce };
 enum class LastRollout { Closed, Segments };
 
 /// How inequalities are enforced; equations are by the augmented Lagrangian in any case. The interior point is for solves until
-/// convergence: it cannot make use of multipliers that are kept, and there is none with LastRollout::Segments.
+/// convergence: it cannot use given multipliers, and is not available with LastRollout::Segments.
 enum class Inequalities { AugmentedLagrangian, InteriorPoint };
 const char* getName(Inequalities inequalities);
 
@@ -146,11 +147,11 @@ struct FddpOptions {
   double gradient_tolerance = 1e-9;
   /// The gaps are closed if every entry is below this, in units of the tangent space.
   double gap_tolerance = 1e-10;
-  /// Also converged if a full step at the smallest regularization changes J by less than this times |J|; 0: never. In any
-  /// case if no such step decreases J, and (1) foresees less than the rounding of all nodes may hide, N 1e-14 |J|.
+  /// Also converged if a full step at the smallest regularization changes J by less than this times |J|; 0: never. It
+  /// also converges if no such step decreases J and (1) predicts less than the rounding of all nodes, N 1e-14 |J|.
   double cost_tolerance = 1e-13;
 
-  /// Share of J; 0: never. Accepts a trajectory that keeps all constraints where J hardly falls any more.
+  /// Share of J; 0: never. Accepts a trajectory that satisfies all constraints once J hardly decreases.
   double acceptable_decrease = 0;
 
   double initial_regularization = 1e-9;  ///< mu_u of the first sweep; from a guess far from the optimum start higher
@@ -168,7 +169,7 @@ struct FddpOptions {
   ControlBounds bounds = ControlBounds::Ignore;
   ConstraintOptions constraints;
   /// Largest number of segments of a rollout, Eq. (7); none is shorter than 6 stages. Results depend on it, within the
-  /// tolerances: therefore it is not the number of threads.
+  /// tolerances, so it is independent of the number of threads.
   int rollout_segments = 16;
   LastRollout last_rollout = LastRollout::Closed;
   int threads = 0;  ///< 0: all. Results are bitwise independent of it.
@@ -236,7 +237,7 @@ class Fddp {
  public:
   struct Workspace;  ///< memory of a solve, kept between solves
 
-  /// Throws std::invalid_argument on options that make no sense, naming them.
+  /// Throws std::invalid_argument naming invalid options.
   explicit Fddp(const FddpOptions& options = {});
   ~Fddp();
   Fddp(Fddp&&) noexcept;
@@ -253,8 +254,9 @@ class Fddp {
   /// The last state and control are repeated.
   void advance(ShootingTrajectory& trajectory);
 
-  /// Those that the last solve() ended with; and those that the next one is to start from, instead of zero, with all its nodes
-  /// evaluated anew. advance() moves them on. \throws std::invalid_argument when the penalty is not positive
+  /// The multipliers at the end of the last solve(); and those from which the next one starts, instead of zero, with
+  /// all its nodes evaluated again. advance() moves them on. \throws std::invalid_argument when the penalty is not
+  /// positive
   Multipliers getMultipliers() const;
   void setMultipliers(const Multipliers& multipliers);
 

@@ -5,15 +5,15 @@
 ///
 ///     min  sum_k l_k(x_k, u_k) + l_N(x_N) + weight s^2    s.t.  |u_i| <= s L_i  at every stage,    s <= most        (1)
 ///
-/// beside what the inner problem asks for. The share s is a control of the first stage and a state of all other nodes,
-/// and the other controls are replaced by
+/// besides the requirements of the inner problem. The share s is a control of the first stage and a state of all other
+/// nodes, and the other controls are replaced by
 ///
 ///     u_i = s L_i w_i,   -1 <= w_i <= 1    (u_i = w_i, within its own bounds, where L_i is infinite).               (2)
 ///
-/// Bounds of w do not change with s, so that a solver with ControlBounds::Enforce keeps them exactly. The model of (2) is
-/// that of first order: its second derivative, by s and w_i, belongs to the derivative of the Lagrangian by u_i, which at a
-/// solution vanishes, unless w_i is at a bound and does not move. The cost is quadratic in s because the model of s takes its
-/// curvature from there.
+/// Bounds of w do not depend on s, so that a solver with ControlBounds::Enforce satisfies them exactly. (2) is modelled
+/// to first order: its second derivative, by s and w_i, belongs to the derivative of the Lagrangian by u_i, which at a
+/// solution vanishes, unless w_i is at a bound and does not move. The cost is quadratic in s to give the model of s its
+/// curvature.
 #include <cmath>
 #include <memory>
 

@@ -47,7 +47,7 @@ struct EvaluateTask {
   NodeEvaluation* out = nullptr;  ///< from makeEvaluation() of this problem; its content is overwritten
 };
 
-/// What a solver adds to the cost of a node for the sake of its constraints: to second order about the evaluated c,
+/// The terms that a solver adds to the cost of a node for its constraints: to second order about the evaluated c,
 ///     gradient . dc + 1/2 dc . diag(hessian) . dc.
 struct ConstraintWeights {
   VectorXd gradient, hessian;  ///< constraintSize; both are zero in rows that do not matter at present

@@ -23,8 +23,8 @@
 /// the start until a joint reaches its limit, the closures lose rank or do not close, or the linkage comes back to its
 /// start after a full turn. It passes smoothly through dead points, which are roots along s of
 ///     joint:  v_j(s) = N_j C,        motor:  det [N_M C, N_M H](s),   N_held H = I,                                (5)
-/// found by bracketing. At a dead point of the joint the angle turns back: there another branch of the ratio as a
-/// function of the joint angle begins. Branch 0 contains the start.
+/// found by bracketing. At a dead point of the joint the angle reverses, and another branch of the ratio as a function
+/// of the joint angle begins. Branch 0 contains the start.
 #include <memory>
 #include <string>
 #include <vector>

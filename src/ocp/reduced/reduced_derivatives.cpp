@@ -136,7 +136,7 @@ void ReducedKernel::updateDrifts(LinearizeItem* items, int count) {
       if (turned[l] || !items[l].ok) continue;
       items[l].ok = false;
       *items[l].failure =
-          "closure '" + c.cluster.closures.closures.front().name + "': the step turns its loops too far";
+          "closure '" + c.cluster.closures.closures.front().name + "': the step rotates its loops too far";
     }
   }
 }

@@ -73,7 +73,8 @@ ContactLayout ReducedLayout::makeContacts(const StageSpec& spec) const {
     }
     size_t slot = 0;
     while (slot < slots.size() && (taken[slot] || tips[slots[slot]] != closure.body1)) ++slot;
-    if (slot == slots.size()) throw std::invalid_argument("RobotProblem: a stage has contacts that none had at first");
+    if (slot == slots.size())
+      throw std::invalid_argument("RobotProblem: a stage has contacts that no stage had at construction");
     taken[slot] = true;
     layout.contacts.push_back({&closure, static_cast<int>(slot), layout.rows, rows, makeTurn(closure)});
     layout.rows += rows;
