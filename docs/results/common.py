@@ -9,6 +9,7 @@ import datetime
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -122,6 +123,13 @@ def show(value, form="{:.3g}", scale=1.0):
     return "–" if value is None else form.format(value * scale)
 
 
+def fill(text):
+    """Wraps a paragraph, but no code within it."""
+    blank = "\0"
+    text = re.sub("`[^`]*`", lambda code: code[0].replace(" ", blank), " ".join(text.split()))
+    return textwrap.fill(text, 120, break_long_words=False, break_on_hyphens=False).replace(blank, " ")
+
+
 class Page:
     def __init__(self, script, title, run):
         self.path = HERE / (pathlib.Path(script).stem + ".md")
@@ -129,9 +137,7 @@ class Page:
 
     def add(self, *paragraphs):
         for text in paragraphs:
-            if not text.startswith("|"):
-                text = textwrap.fill(" ".join(text.split()), 120, break_long_words=False, break_on_hyphens=False)
-            self.lines += ["", text]
+            self.lines += ["", text if text.startswith("|") else fill(text)]
 
     def heading(self, text):
         self.add("## " + text)

@@ -117,7 +117,7 @@ def measure_gains(runner):
             s = simulate(runner, result.directory, "--world", world)
             rows.append([title, world, tell_fall(s), f"{1e3 * s['largest_deviation']:.1f}",
                          f"{1e3 * s['largest_slip']:.2f}", f"{1e6 * s['largest_gap']:.1g}"])
-    return ["motion", "world", "stands", "trunk off its plan [mm]", "slip [mm]", "closures open by [µm]"], rows
+    return ["motion", "world", "outcome", "trunk off its plan [mm]", "slip [mm]", "closures open by [µm]"], rows
 
 
 def measure_sensors(runner):
@@ -130,7 +130,7 @@ def measure_sensors(runner):
             rows.append([title, world, tell_fall(s), f"{1e3 * e['position_error']['rms']:.1f}",
                          f"{1e3 * e['velocity_error']['rms']:.1f}", show(e["drift_share"], "{:.2f}", 100),
                          f"{100 * e['contact_errors']:.2f}"])
-    return ["motion", "world", "stands", "position [mm]", "velocity [mm/s]", "drift [% of the way]",
+    return ["motion", "world", "outcome", "position [mm]", "velocity [mm/s]", "drift [% of the way]",
             "contacts wrong [% of the time]"], rows
 
 
@@ -143,7 +143,7 @@ def measure_errors(runner):
         for more in ([], ["--look-ahead", 36]):
             runs = [simulate(runner, plan, *error, *more, "--seed", seed) for seed in range(1, 6)]
             counts.append(sum(run["outcome"] == STOOD for run in runs))
-        rows.append([" ".join(map(str, error)), *counts])
+        rows.append([f"`{' '.join(map(str, error))}`", *counts])
     return ["error", "gains", "gains, look-ahead 36"], rows
 
 
@@ -168,7 +168,7 @@ def measure_minutes(runner):
                              "--threads", 1, "--world", world)
                 rows.append([robot, speed, world, tell_fall(s), f"{s['distance']:.1f}",
                              f"{1e3 * s['largest_slip']:.2f}", s["solves"]["failed"]])
-    return ["robot", "speed [m/s]", "world", "stands", "distance [m]", "slip [mm]", "solves that failed"], rows
+    return ["robot", "speed [m/s]", "world", "outcome", "distance [m]", "slip [mm]", "solves that failed"], rows
 
 
 def measure_real_time(runner):
@@ -179,7 +179,7 @@ def measure_real_time(runner):
         c = s["solves"]
         rows.append([iterations, tell_fall(s), c["count"], c["failed"], c["missed"], f"{c['median_ms']:.1f}",
                      f"{c['p99_ms']:.1f}", f"{c['worst_ms']:.1f}", f"{1e3 * s['largest_deviation']:.0f}"])
-    return ["iterations", "stands", "solves", "failed", "stages without a solve", "median [ms]", "99 % [ms]",
+    return ["iterations", "outcome", "solves", "failed", "stages without a solve", "median [ms]", "99 % [ms]",
             "worst [ms]", "trunk off its plan [mm]"], rows
 
 
@@ -216,13 +216,13 @@ def share(name):
 
 
 SECTIONS = [
-    ("Feedback by gains", "gains", lambda: """`--control gains`, to the end of the plan and one second more. *Stands*,
+    ("Feedback by gains", "gains", lambda: """`--control gains`, to the end of the plan and one second more: *stands*,
 or the seconds until the robot falls; how far the trunk leaves its plan, the largest slip of a sole since its
 touchdown, and the largest opening of a closure. Bielle's world closes loops exactly; in MuJoCo's they are soft."""),
     ("Torques alone, gains and predictive control", "worlds", lambda: """Two robots, eleven motions, three worlds:
 seconds until a robot falls by the torques of its plan alone (`open`), by gains and by predictive control (`mpc`)."""),
-    ("Real sensors", "sensors", lambda: """`--sensors real`, seed 1, gains. Errors are those of the estimated trunk,
-root mean squares; drift is that over the ground at the end."""),
+    ("Real sensors", "sensors", lambda: """`--sensors real`, seed 1, gains; outcomes as above. Errors are
+those of the estimated trunk, root mean squares; drift is that over the ground at the end."""),
     ("Errors of the robot", "errors", lambda: """Bipetto's walk at 0.4 m/s in Bielle's world: how many of five runs
 stand, seeds 1 to 5."""),
     ("Delay", "delays", lambda: """Gains in Bielle's world, `--jitter 1`: *stands*, or seconds until the robot falls,
