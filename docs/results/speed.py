@@ -3,10 +3,11 @@
 
     docs/results/speed.py [--bielle build/bin/bielle] [--shifts 10000] [--quick]
 
-Takes some minutes. Other programs on the machine lengthen all times.
+Takes some minutes of a machine with nothing else to do. A busy machine is refused: other programs lengthen all times.
 """
 import json
 import os
+import sys
 
 import common
 
@@ -33,14 +34,14 @@ def main():
     parser.add_argument("--shifts", type=int, default=10000, help="shifts of the receding horizon")
     arguments = parser.parse_args()
     load = os.getloadavg()[0]
+    if load > QUIET and not arguments.quick:
+        sys.exit(f"the load average is {load:.1f}, and other programs lengthen all times; try again below {QUIET}")
     runner = common.Runner(arguments.bielle)
     options = ["--quick"] if arguments.quick else ["--shifts", arguments.shifts]
     report = json.loads(runner.run("bench", "--json", *options).stdout)
     page = common.Page(__file__, "Speed", common.describe_run(arguments.commit))
     page.add(f"""{report['compiler']}, `{report['flags'].strip()}`. One unit is a product of two 108 × 108 matrices by
 Eigen on one thread, {report['unit [us]']:.3g} µs in this run. The load average was {load:.1f} when the run began.""")
-    if load > QUIET:
-        page.add("Other programs shared the cores: on a quiet machine times are shorter, above all on two threads.")
     for key, title in TITLES.items():
         rows = report.get(key)
         if not rows:
