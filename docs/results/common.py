@@ -105,10 +105,10 @@ class Result:
         return max(value for name, value in self.summary["peak_torques"].items() if part in name)
 
     def outcome(self):
-        if not self.summary["converged"]:
-            return "not converged"
+        """The verdict of the check, and whether the solver did not converge."""
         failed = [row["name"] for row in self.check["rows"] if not row["pass"]]
-        return "fails: " + "; ".join(failed) if failed else "passes"
+        verdict = "fails: " + "; ".join(failed) if failed else "passes"
+        return verdict if self.summary["converged"] else "not converged; " + verdict
 
     def columns(self, prefix):
         """{name: [value, ...]} of the columns of trajectory.csv that begin so."""

@@ -3,7 +3,7 @@
 
     docs/results/motions.py [--bielle build/bin/bielle] [--quick]
 
-Takes about three minutes on one core.
+Takes about seven minutes on one core.
 """
 import common
 from common import show
@@ -71,8 +71,8 @@ COLUMNS = ["", "goals: requested → achieved", "iterations", "cost", "violation
 
 
 def describe_goals(result):
-    return ", ".join(f"{name} {requested:.4g} → {achieved:.4g} {unit}".removesuffix(" 1")
-                     for name, requested, achieved, unit in result.goals() if name != "footholds") or "–"
+    return ", ".join(f"{name} {requested:.4g} → {round(achieved, 6):.4g} {unit}".removesuffix(" 1").replace("-0 ", "0 ")
+                     for name, requested, achieved, unit in result.goals() if not name.endswith("footholds")) or "–"
 
 
 def describe(title, result):
