@@ -3,7 +3,7 @@
 
     docs/results/formulations.py [--bielle build/bin/bielle] [--quick]
 
-Takes about two minutes on one core.
+Takes about four minutes on one core.
 """
 import common
 from common import show
