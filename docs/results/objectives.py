@@ -3,7 +3,7 @@
 
     docs/results/objectives.py [--bielle build/bin/bielle] [--quick]
 
-Takes about three minutes on one core.
+Takes about five minutes on one core.
 """
 import common
 from common import show
@@ -23,15 +23,15 @@ def main():
     arguments = common.make_parser(__doc__).parse_args()
     runner = common.Runner(arguments.bielle)
     page = common.Page(__file__, "Objectives", common.describe_run(arguments.commit))
-    page.add("""Every motion of least energy or peak torque starts from the same motion of least effort; its
-iterations are those after that one. Energies assume a torque loss of 0.25 W/(N m)² for every motor. The cost of
-transport is energy over weight and distance. The check is [that of every motion](../checks.md).""")
+    page.add("""Every motion of least energy or peak torque starts from the motion of least effort; its iterations are
+those after that one. Energies assume a torque loss of 0.25 W/(N m)² for every motor. The cost of transport is energy
+over weight and distance. The check is [that of every motion](../checks.md).""")
     rows = []
     for title, robot, motion, options in MOTIONS[-2:-1] if arguments.quick else MOTIONS:
         effort = runner.solve(motion, robot, options)
         for objective in ["effort", "energy"] if arguments.quick else ["effort", "energy", "peak-torque"]:
             result = effort if objective == "effort" else runner.solve(
-                motion, robot, [*options, "--objective", objective, "--warm-start", effort.directory])
+                motion, robot, [*options, "--objective", objective])
             energy = result.summary["electrical_energy"]
             rows.append([title if objective == "effort" else "", objective, f"{energy['total_J']:.1f}",
                          show(energy["cost_of_transport"] or None, "{:.2f}"), f"{result.torque():.1f}",
