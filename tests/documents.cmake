@@ -1,5 +1,5 @@
 # Runs every command of the pages as a reader would and compares its output.
-set(pages tutorial modelling signs new_robot motions objectives linkages checks execution speed design)
+set(pages tutorial modelling signs new_robot motions objectives constraints linkages checks execution speed design)
 if(BIELLE_BUILD_EXAMPLES)
   list(APPEND pages new_motion)
 endif()
@@ -16,6 +16,12 @@ if(BIELLE_BUILD_VALIDATION)
     add_test(NAME documents_${page} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_documents.py
       ${PROJECT_BINARY_DIR}/bin ${PROJECT_SOURCE_DIR} docs/${page}.md)
     set_tests_properties(documents_${page} PROPERTIES LABELS system)
+  endforeach()
+  # A few rows of each page of results.
+  foreach(page checks execution formulations motions objectives speed)
+    add_test(NAME results_${page} COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/docs/results/${page}.py --quick
+      --bielle ${PROJECT_BINARY_DIR}/bin/bielle)
+    set_tests_properties(results_${page} PROPERTIES LABELS system)
   endforeach()
   # The figure of the jump with and without springs, by coarser stages and without the second solve of each.
   add_test(NAME springs_figure COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/examples/springs/jump.py

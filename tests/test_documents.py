@@ -77,6 +77,8 @@ def check_by_hand(text, source, place):
 def check_program(text, source, place):
     folder = os.path.join(source, "examples")
     for name in sorted(os.listdir(folder)):
+        if not name.endswith(".cpp"):
+            continue
         with open(os.path.join(folder, name), encoding="utf-8") as file:
             if text in file.read():
                 return

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints the table of docs/checks.md: Bielle's dynamics against Simbody's and MuJoCo's, for every element and robot.
+"""Prints the table of docs/results/checks.md: Bielle's dynamics against Simbody's and MuJoCo's, for every element and robot.
 
     validation/table.py [--bielle build/bin/bielle] [ROBOT ...]
 

@@ -18,7 +18,7 @@ constexpr size_t kMostColumns = 1 << 20;
 
 std::string nameLine(int node) { return "line " + std::to_string(node + 2); }
 
-// A name with a comma, a quoteCsv or a line break is quoted, as usual in CSV.
+// A name with a comma, a quote or a line break is quoted, as usual in CSV.
 std::string quoteCsv(const std::string& name) {
   if (name.find_first_of(",\"\n\r") == std::string::npos) return name;
   std::string text = "\"";

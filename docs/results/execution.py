@@ -1,0 +1,300 @@
+#!/usr/bin/env python3
+"""Writes docs/results/execution.md from the tables in docs/results/data, after measuring or recording some of them.
+
+    docs/results/execution.py                               writes the page
+    docs/results/execution.py --measure sensors errors      measures these tables first (minutes each)
+    docs/results/execution.py --measure minutes real_time   these take hours and minutes
+    docs/results/execution.py --record unknown=DIR          takes a table from a campaign: `bielle campaign SPEC -o DIR`
+
+The campaigns are worlds, pushes, pushes_predictive, pushes_felt and unknown, each from examples/campaign/NAME.yaml;
+they take hours. Every table keeps the commit, the date and the machine of its figures. `--quick` runs and records a
+small campaign.
+"""
+import csv
+import json
+import os
+import pathlib
+import sys
+import tempfile
+
+import common
+from common import show
+
+DATA = common.HERE / "data"
+SPECS = "examples/campaign"
+STOOD = "stood"
+WORLDS = ("bielle", "mujoco", "simbody")
+
+
+# Tables are files of comma-separated values below comments that say where they are from.
+
+def write_data(name, run, columns, rows, directory=DATA):
+    with open(pathlib.Path(directory) / f"{name}.csv", "w", encoding="utf-8", newline="") as file:
+        file.write(f"# {run}\n")
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+
+
+def read_data(name, directory=DATA):
+    """(comments, columns, rows)"""
+    with open(pathlib.Path(directory) / f"{name}.csv", encoding="utf-8", newline="") as file:
+        lines = file.read().splitlines()
+    comments = [line[1:].strip() for line in lines if line.startswith("#")]
+    columns, *rows = csv.reader(line for line in lines if not line.startswith("#"))
+    return comments, columns, rows
+
+
+# Campaigns
+
+def read_runs(directory):
+    with open(pathlib.Path(directory) / "runs.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def count_by(column):
+    def reduce(directory):
+        counts = {}
+        for run in read_runs(directory):
+            stood, runs = counts.get(run[column], (0, 0))
+            counts[run[column]] = (stood + (run["outcome"] == STOOD), runs + 1)
+        return [column, "stood", "runs"], [[value, *counts[value]] for value in sorted(counts, key=float)]
+    return reduce
+
+
+def list_falls(directory):
+    """Seconds until a robot falls, by motion and by world and control; `stands` where it does not."""
+    cells = {}
+    for run in read_runs(directory):
+        time = "stands" if run["outcome"] == STOOD else f"{float(run['duration']):.2f}"
+        cells.setdefault(run["motion"], {})[f"{run['world']} {run['control']}"] = time
+    columns = list(dict.fromkeys(column for row in cells.values() for column in row))
+    rows = [[motion, *(row.get(column, "") for column in columns)] for motion, row in cells.items()]
+    return ["motion", *columns], rows
+
+
+def list_impulses(directory):
+    summary = json.loads((pathlib.Path(directory) / "summary.json").read_text(encoding="utf-8"))
+    cells = {}
+    for found in summary["largest_impulses"]:
+        cells.setdefault(found["push phase"], {})[found["push direction"]] = found["survived_Ns"]
+    columns = list(next(iter(cells.values())))
+    return ["phase", *columns], [[phase, *(row[column] for column in columns)] for phase, row in cells.items()]
+
+
+CAMPAIGNS = {"worlds": list_falls, "pushes": list_impulses, "pushes_predictive": count_by("push time"),
+             "pushes_felt": count_by("push time"), "unknown": count_by("friction")}
+
+
+# Measurements
+
+MOTIONS = [(f"{robot}: {title}", robot, motion, options)
+           for robot in ("bipetto", "cleobot")
+           for title, motion, options in [
+               ("squat to 0.8", "squat", ["--depth", 0.8]), ("squat to 0.7", "squat", ["--depth", 0.7]),
+               *((f"walk at {speed} m/s", "walk", ["--speed", speed]) for speed in (0.2, 0.4, 0.6, 0.8)),
+               ("stairs of 5 cm", "stairs", ["--height", 0.05]), ("jump, 0.3 s in the air", "jump", ["--flight", 0.3])]]
+WALK = ("walk", "bipetto", ["--speed", 0.4])
+
+
+def simulate(runner, target, *options):
+    """The summary of a motion carried out."""
+    directory = runner.place()
+    print("simulate", target, *options, file=sys.stderr, flush=True)
+    runner.run("simulate", target, "-o", directory, "--summary-only", *options)
+    return json.loads((pathlib.Path(directory) / "summary.json").read_text(encoding="utf-8"))
+
+
+def tell_fall(summary):
+    return "stands" if summary["outcome"] == STOOD else f"{summary['duration']:.2f}"
+
+
+def measure_gains(runner):
+    rows = []
+    for title, robot, motion, options in MOTIONS:
+        result = runner.solve(motion, robot, options)
+        for world in WORLDS[:2]:
+            s = simulate(runner, result.directory, "--world", world)
+            rows.append([title, world, tell_fall(s), f"{1e3 * s['largest_deviation']:.1f}",
+                         f"{1e3 * s['largest_slip']:.2f}", f"{1e6 * s['largest_gap']:.1g}"])
+    return ["motion", "world", "outcome", "trunk off its plan [mm]", "slip [mm]", "closures open by [µm]"], rows
+
+
+def measure_sensors(runner):
+    rows = []
+    for title, robot, motion, options in MOTIONS:
+        result = runner.solve(motion, robot, options)
+        for world in WORLDS[:2]:
+            s = simulate(runner, result.directory, "--world", world, "--sensors", "real")
+            e = s["estimator"]
+            rows.append([title, world, tell_fall(s), f"{1e3 * e['position_error']['rms']:.1f}",
+                         f"{1e3 * e['velocity_error']['rms']:.1f}", show(e["drift_share"], "{:.2f}", 100),
+                         f"{100 * e['contact_errors']:.2f}"])
+    return ["motion", "world", "outcome", "position [mm]", "velocity [mm/s]", "drift [% of the way]",
+            "contacts wrong [% of the time]"], rows
+
+
+def measure_errors(runner):
+    motion, robot, options = WALK
+    plan = runner.solve(motion, robot, options).directory
+    rows = []
+    for error in (["--mass-error", 0.1], ["--rod-error", 0.0005]):
+        counts = []
+        for more in ([], ["--look-ahead", 36]):
+            runs = [simulate(runner, plan, *error, *more, "--seed", seed) for seed in range(1, 6)]
+            counts.append(sum(run["outcome"] == STOOD for run in runs))
+        rows.append([f"`{' '.join(map(str, error))}`", *counts])
+    return ["error", "gains", "gains, look-ahead 36"], rows
+
+
+def measure_delays(runner):
+    delays = (5, 8, 12, 16, 20, 25, 30)
+    rows = []
+    for robot in ("bipetto", "cleobot"):
+        for title, motion, options in (("walk at 0.4 m/s", "walk", ["--speed", 0.4]),
+                                       ("squat to 0.8", "squat", ["--depth", 0.8])):
+            plan = runner.solve(motion, robot, options).directory
+            rows.append([f"{robot}: {title}",
+                         *(tell_fall(simulate(runner, plan, "--delay", delay, "--jitter", 1)) for delay in delays)])
+    return ["motion", *map(str, delays)], rows
+
+
+def measure_minutes(runner):
+    rows = []
+    for robot in ("bipetto", "cleobot"):
+        for speed in (0, 0.4, 0.6, 0.8):
+            for world in WORLDS:
+                s = simulate(runner, "walk", "--robot", robot, "--speed", speed, "--duration", 60, "--control", "mpc",
+                             "--threads", 1, "--world", world)
+                rows.append([robot, speed, world, tell_fall(s), f"{s['distance']:.1f}",
+                             f"{1e3 * s['largest_slip']:.2f}", s["solves"]["failed"]])
+    return ["robot", "speed [m/s]", "world", "outcome", "distance [m]", "slip [mm]", "solves that failed"], rows
+
+
+def measure_real_time(runner):
+    rows = []
+    for iterations in (2, 1):
+        s = simulate(runner, "walk", "--robot", "bipetto", "--speed", 0.4, "--duration", 60, "--control", "mpc",
+                     "--real-time", "--threads", 2, "--iterations", iterations)
+        c = s["solves"]
+        rows.append([iterations, tell_fall(s), c["count"], c["failed"], c["missed"], f"{c['median_ms']:.1f}",
+                     f"{c['p99_ms']:.1f}", f"{c['worst_ms']:.1f}", f"{1e3 * s['largest_deviation']:.0f}"])
+    return ["iterations", "outcome", "solves", "failed", "stages without a solve", "median [ms]", "99 % [ms]",
+            "worst [ms]", "trunk off its plan [mm]"], rows
+
+
+MEASUREMENTS = {"gains": measure_gains, "sensors": measure_sensors, "errors": measure_errors, "delays": measure_delays,
+                "minutes": measure_minutes, "real_time": measure_real_time}
+
+
+# The page
+
+def add_table(page, name, directory=DATA):
+    """One table with its origin and how to repeat it."""
+    if not (pathlib.Path(directory) / f"{name}.csv").exists():
+        page.add("Not measured.")
+        return
+    comments, columns, rows = read_data(name, directory)
+    page.table(columns, [[cell or "–" for cell in row] for row in rows])
+    repeat = f"`docs/results/execution.py --measure {name}`"
+    if name in CAMPAIGNS:
+        repeat = (f"`bielle campaign {SPECS}/{name}.yaml -o {name}`, then "
+                  f"`docs/results/execution.py --record {name}={name}`")
+    page.add("*" + "; ".join(comments) + f".* To repeat: {repeat}.")
+
+
+def count_all(name):
+    """(stood, runs) of a table of counts."""
+    _, columns, rows = read_data(name)
+    stood, runs = columns.index("stood"), columns.index("runs")
+    return sum(int(row[stood]) for row in rows), sum(int(row[runs]) for row in rows)
+
+
+def share(name):
+    stood, runs = count_all(name)
+    return f"{stood} of {runs} runs stand, {100 * stood / runs:.0f} %"
+
+
+SECTIONS = [
+    ("Feedback by gains", "gains", lambda: """`--control gains`, to the end of the plan and one second more: *stands*,
+or the seconds until the robot falls; how far the trunk leaves its plan, the largest slip of a sole since its
+touchdown, and the largest opening of a closure. Bielle's world closes loops exactly; in MuJoCo's they are soft."""),
+    ("Torques alone, gains and predictive control", "worlds", lambda: """Two robots, eleven motions, three worlds:
+seconds until a robot falls by the torques of its plan alone (`open`), by gains and by predictive control (`mpc`)."""),
+    ("Real sensors", "sensors", lambda: """`--sensors real`, seed 1, gains; outcomes as above. Errors are
+those of the estimated trunk, root mean squares; drift is that over the ground at the end."""),
+    ("Errors of the robot", "errors", lambda: """Bipetto's walk at 0.4 m/s in Bielle's world: how many of five runs
+stand, seeds 1 to 5."""),
+    ("Delay", "delays", lambda: """Gains in Bielle's world, `--jitter 1`: *stands*, or seconds until the robot falls,
+by `--delay` in ms."""),
+    ("Pushes under gains", "pushes", lambda: """The largest impulse [N s] that Bipetto survives, walking at 0.4 m/s,
+by phase of the plan and direction [°] (0: from behind, 90: to the left), with all smaller ones survived, too. Phases:
+5.1, 5.5 and 5.9 are early, half-way and late on the left foot, 6.5 on both feet. A push lasts 0.1 s; impulses are
+found by bisection to 0.25 N s."""),
+    ("Pushes under predictive control", "pushes_predictive", lambda: f"""Pushes of 10 N s (0.39 N s per kg) from eight
+directions at ten instants [s] of one step, true state: {share("pushes_predictive")}."""),
+    ("Pushes, real sensors and late torques", "pushes_felt", lambda: f"""The same pushes with real sensors and torques
+that are 5 ± 1 ms late: {share("pushes_felt")}."""),
+    ("Unknown ground", "unknown", lambda: f"""Bipetto walks for 20 s at 0.2 m/s on tiles of 25 cm, up to 2 cm above
+and below the planned ground, with masses off by up to 10 %, rods by up to 0.5 mm, and friction as in the table; its
+plan assumes 0.4. {share("unknown")}. A run takes 15 to 20 s of one core."""),
+    ("Minutes", "minutes", lambda: """`bielle simulate walk --duration 60 --control mpc`, true state, largest slip of
+a sole since its touchdown. Takes hours, most of them in Simbody's world."""),
+    ("Real time", "real_time", lambda: """`bielle simulate walk --robot bipetto --speed 0.4 --duration 60 --control
+mpc --real-time --threads 2`: 5000 stages of 12 ms. A stage without a solve of its own acts by the policy of an
+earlier one."""),
+]
+
+
+def make_page():
+    page = common.Page(__file__, "Motions carried out", "Each table names its commit, date and machine")
+    page.add("""[Motions carried out](../execution.md) explains the options and the words. Tables are as old as their
+commits; `git log COMMIT..` lists what has changed since. Campaigns under predictive control take hours.""")
+    for title, name, describe in SECTIONS:
+        page.heading(title)
+        page.add(describe())
+        add_table(page, name)
+    return page
+
+
+QUICK_SPEC = """motions:
+  - {name: squat, solve: squat, robot: bipetto, set: {depth: 0.9}}
+options:
+  world: bielle
+  control: [open, gains]
+"""
+
+
+def run_quick(runner, run):
+    spec, directory = runner.place("spec.yaml"), runner.place()
+    pathlib.Path(spec).write_text(QUICK_SPEC, encoding="utf-8")
+    runner.run("campaign", spec, "-o", directory, allowed=(0,))
+    with tempfile.TemporaryDirectory() as data:
+        write_data("worlds", run, *list_falls(directory), data)
+        page = common.Page(__file__, "A small campaign", run)
+        add_table(page, "worlds", data)
+    page.write(True)
+
+
+def main():
+    parser = common.make_parser(__doc__)
+    parser.add_argument("--measure", nargs="+", default=[], choices=MEASUREMENTS, metavar="TABLE",
+                        help="measure these first")
+    parser.add_argument("--record", nargs="+", default=[], metavar="NAME=DIR", help="take these from campaigns")
+    arguments = parser.parse_args()
+    runner, run = common.Runner(arguments.bielle), common.describe_run(arguments.commit)
+    if arguments.quick:
+        run_quick(runner, run)
+        return
+    for name in arguments.measure:
+        write_data(name, run, *MEASUREMENTS[name](runner))
+    for entry in arguments.record:
+        name, _, directory = entry.partition("=")
+        if name not in CAMPAIGNS or not os.path.isdir(directory):
+            parser.error(f"--record {entry}: expected one of {', '.join(CAMPAIGNS)}, and the directory of its campaign")
+        write_data(name, run, *CAMPAIGNS[name](directory))
+    make_page().write(False)
+
+
+if __name__ == "__main__":
+    main()
