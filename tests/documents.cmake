@@ -1,10 +1,11 @@
 # Runs every command of the pages as a reader would and compares its output.
-set(pages tutorial modelling signs new_robot motions objectives constraints linkages checks execution speed design)
+set(pages tutorial modelling springs signs new_robot formats motions objectives constraints linkages checks execution speed
+  design_reference)
 if(BIELLE_BUILD_EXAMPLES)
   list(APPEND pages new_motion)
 endif()
 if(PAGMO_LIBRARY AND PAGMO_INCLUDE_DIR)
-  list(APPEND pages fronts designer)
+  list(APPEND pages design)
 endif()
 if(TARGET bielle-workers)
   list(APPEND pages workers)

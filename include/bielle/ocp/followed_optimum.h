@@ -21,8 +21,8 @@
 ///     s_{j+1} = s_j - K^-1 (H s_j + dgrad L/dp),                                                                   (3)
 ///
 /// is linear, and converges where the eigenvalues of K^-1 H are in (0, 2), slowly where they are near the ends. s_1 alone is
-/// the implicit derivative with the solver's K in place of H, which may have the wrong sign (docs/design.md). Reduced rank
-/// extrapolation, the same as GMRES preconditioned by K where s has all of dz (Sidi, "Vector Extrapolation Methods", 2017,
+/// the implicit derivative with the solver's K in place of H, which may have the wrong sign (docs/design_reference.md). Reduced
+/// rank extrapolation, the same as GMRES preconditioned by K where s has all of dz (Sidi, "Vector Extrapolation Methods", 2017,
 /// ch. 2), combines sweeps such that the remaining step is as small as possible:
 ///
 ///     s = sum_j g_j s_{j+1},    min_g |sum_j g_j (s_{j+1} - s_j)|,    sum_j g_j = 1.                               (4)
