@@ -93,9 +93,9 @@ function(bielle_fast target)
 endfunction()
 
 # bielle_plain(TARGET): everything else. -O1 takes three quarters of the time to compile; GCC 12 then reports its AVX-512
-# intrinsics once more.
+# intrinsics once more, and takes a source within a unity for a header.
 function(bielle_plain target)
-  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1> $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized>)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1> $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized;-Wno-subobject-linkage>)
   bielle_precompile(${target} plain <nlohmann/json.hpp> <CLI/CLI.hpp>)
 endfunction()
 
@@ -107,9 +107,10 @@ function(bielle_tune target fast)
   endif()
 endfunction()
 
-# bielle_layer(NAME [FAST] SOURCES... INCLUDE DIRECTORIES... PUBLIC LIBRARIES... PRIVATE LIBRARIES...): the target bielle_NAME.
+# bielle_layer(NAME [FAST] SOURCES... PLAIN SOURCES... INCLUDE DIRECTORIES... PUBLIC LIBRARIES... PRIVATE LIBRARIES...): the
+# target bielle_NAME. PLAIN are the sources of a fast room that no benchmark shows.
 function(bielle_layer name)
-  cmake_parse_arguments(ARG "FAST" "" "SOURCES;INCLUDE;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "FAST" "" "SOURCES;PLAIN;INCLUDE;PUBLIC;PRIVATE" ${ARGN})
   set_property(GLOBAL APPEND PROPERTY BIELLE_LAYERS bielle_${name})
   if(BUILD_SHARED_LIBS)
     add_library(bielle_${name} INTERFACE)
@@ -118,7 +119,7 @@ function(bielle_layer name)
     foreach(level IN ITEMS "" LISTS BIELLE_LEVELS)
       string(JOIN _ suffix "" ${level})
       set(objects bielle_${name}_objects${suffix})
-      add_library(${objects} OBJECT ${ARG_SOURCES})
+      add_library(${objects} OBJECT ${ARG_SOURCES} ${ARG_PLAIN})
       target_include_directories(${objects} PRIVATE ${PROJECT_SOURCE_DIR}/src ${ARG_INCLUDE})
       target_link_libraries(${objects} PRIVATE bielle_headers ${ARG_PUBLIC} ${ARG_PRIVATE} bielle_warnings)
       bielle_tune(${objects} ${ARG_FAST})
@@ -138,6 +139,13 @@ function(bielle_layer name)
     target_link_libraries(bielle_${name}
       PUBLIC bielle_headers ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:bielle_warnings>)
     bielle_tune(bielle_${name} ${ARG_FAST})
+    if(ARG_PLAIN)
+      add_library(bielle_${name}_plain OBJECT ${ARG_PLAIN})
+      target_include_directories(bielle_${name}_plain PRIVATE ${PROJECT_SOURCE_DIR}/src ${ARG_INCLUDE})
+      target_link_libraries(bielle_${name}_plain PRIVATE bielle_headers ${ARG_PUBLIC} ${ARG_PRIVATE} bielle_warnings)
+      bielle_plain(bielle_${name}_plain)
+      target_sources(bielle_${name} PRIVATE $<TARGET_OBJECTS:bielle_${name}_plain>)
+    endif()
   endif()
   add_library(bielle::${name} ALIAS bielle_${name})
   set_target_properties(bielle_${name} PROPERTIES EXPORT_NAME ${name})

@@ -1,5 +1,3 @@
 bielle_test(policy SOURCES test_policy.cpp LIBS bielle_control)
-target_link_options(test_policy PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 bielle_test(contact_filter SOURCES test_contact_filter.cpp LIBS bielle_control)
 bielle_test(estimator SOURCES test_estimator.cpp LIBS bielle_control)
-target_link_options(test_estimator PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)

@@ -12,11 +12,11 @@ if(TARGET bielle-workers)
 endif()
 if(BIELLE_BUILD_VALIDATION)
   add_test(NAME documents_readme COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_documents.py
-    ${PROJECT_BINARY_DIR}/bin ${PROJECT_SOURCE_DIR} README.md)
+    ${PROJECT_BINARY_DIR}/bin ${PROJECT_SOURCE_DIR} README.md ${CMAKE_CURRENT_BINARY_DIR}/solved)
   foreach(page ${pages})
     add_test(NAME documents_${page} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_documents.py
-      ${PROJECT_BINARY_DIR}/bin ${PROJECT_SOURCE_DIR} docs/${page}.md)
-    set_tests_properties(documents_${page} PROPERTIES LABELS system)
+      ${PROJECT_BINARY_DIR}/bin ${PROJECT_SOURCE_DIR} docs/${page}.md ${CMAKE_CURRENT_BINARY_DIR}/solved)
+    set_tests_properties(documents_${page} PROPERTIES LABELS system FIXTURES_REQUIRED solved_motions)
   endforeach()
   # A few rows of each page of results.
   foreach(page checks execution formulations motions objectives speed)
@@ -29,7 +29,7 @@ if(BIELLE_BUILD_VALIDATION)
     --objective effort --time-step 0.005 -o ${CMAKE_CURRENT_BINARY_DIR}/springs.png)
   set_tests_properties(springs_figure PROPERTIES LABELS system SKIP_RETURN_CODE 77
     ENVIRONMENT "PATH=${PROJECT_BINARY_DIR}/bin:$ENV{PATH}")
-  set_tests_properties(documents_readme PROPERTIES LABELS system TIMEOUT 900)
+  set_tests_properties(documents_readme PROPERTIES LABELS system TIMEOUT 900 FIXTURES_SETUP solved_motions)
 endif()
 
 # The pages of Doxygen: no warning, and their formulas appear.

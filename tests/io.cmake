@@ -1,8 +1,6 @@
 bielle_test(io SOURCES test_io.cpp LIBS bielle_io)
-target_compile_definitions(test_io PRIVATE BIELLE_PYTHON="${Python3_EXECUTABLE}")
 bielle_test(warm_start SOURCES test_warm_start.cpp LIBS bielle_io)
 bielle_test(hostile_files SOURCES test_hostile_files.cpp LIBS bielle_io)
-target_compile_definitions(test_hostile_files PRIVATE BIELLE_PYTHON="${Python3_EXECUTABLE}")
 if(TARGET bielle_mujoco)
   bielle_test(mujoco SOURCES test_mujoco.cpp LIBS bielle_mujoco)
 endif()

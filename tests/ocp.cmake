@@ -1,13 +1,10 @@
 bielle_test(ocp_residuals SOURCES test_ocp_residuals.cpp LIBS bielle_ocp)
 bielle_test(ocp_problem SOURCES test_ocp_problem.cpp LIBS bielle_motion)
 bielle_test(ocp_contract SOURCES test_ocp_contract.cpp LIBS bielle_motion)
-# The test counts allocations: malloc, and operator new(size_t) by its mangled name.
-target_link_options(test_ocp_contract PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 bielle_test(lanes SOURCES test_lanes.cpp LIBS bielle_motion)
 bielle_test(reduced SOURCES test_reduced.cpp LIBS bielle_motion bielle_robots)
 bielle_test(path_constraints SOURCES test_path_constraints.cpp LIBS bielle_motion)
 bielle_test(timings SOURCES test_timings.cpp LIBS bielle_motion)
-target_link_options(test_timings PRIVATE -Wl,--wrap=malloc -Wl,--wrap=_Znwm)
 # Every duration is optimized again and again: many minutes under sanitizers.
 set_tests_properties(timings PROPERTIES LABELS system)
 bielle_test(energy SOURCES test_energy.cpp LIBS bielle_motion)

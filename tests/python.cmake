@@ -16,12 +16,12 @@ if(TARGET bielle_python)
   function(bielle_python_test name label)
     add_test(NAME python_${name} COMMAND ${Python3_EXECUTABLE} -m pytest -q -p no:cacheprovider
       ${PROJECT_SOURCE_DIR}/python/tests/test_${name}.py)
-    set_tests_properties(python_${name} PROPERTIES LABELS ${label}
+    set_tests_properties(python_${name} PROPERTIES LABELS "${label}"
       ENVIRONMENT "${environment};BIELLE_COMMAND=$<TARGET_FILE:bielle_command>")
   endfunction()
-  bielle_python_test(model unit)
-  bielle_python_test(values unit)
-  bielle_python_test(names unit)
+  bielle_python_test(model "unit;memory")
+  bielle_python_test(values "unit;memory")
+  bielle_python_test(names "unit;memory")
   bielle_python_test(motions system)
   bielle_python_test(residuals system)
   bielle_python_test(worlds system)

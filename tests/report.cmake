@@ -1,5 +1,4 @@
 bielle_test(report SOURCES test_report.cpp LIBS bielle_report)
-target_link_libraries(test_report PRIVATE nlohmann_json::nlohmann_json)
 # In a browser; skipped where there is no Chromium.
 if(TARGET bielle_command)
   add_test(NAME report_page COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/test_report_page.py

@@ -1,13 +1,17 @@
-"""test_documents.py BINARIES SOURCE PAGE: runs the commands of a page (README.md or one of docs/) as a reader would.
+"""test_documents.py BINARIES SOURCE PAGE [SOLVED]: runs the commands of a page (README.md or one of docs/) as a reader would.
 
 Blocks of ```sh are run by bash, one after the other, in one empty directory, with `bielle` on the path. A block of ```text
 after them shows what they print: its lines must come in this order in what was printed, numbers to the digits
 shown, and tiny ones (below 1e-9) as tiny ones; a line may be longer in print, `...` stands for lines left out.
 Blocks of ```bash are for the reader alone (builds); what they start must exist. A block of ```cpp must stand, as it is, in
 one of the examples, which are built and run by themselves, unless it is the program of README.md (test `install`).
+
+README.md keeps the motions that it solves in the directory SOLVED; other pages take from there what they would solve again by the
+same command.
 """
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -15,8 +19,23 @@ import time
 
 NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 BY_HAND = ("BIELLE_ROBOTS=path/to/", "scripts/", "cmake ", "ctest ", "ninja ", "apt ", "sudo apt ", "python3 examples/")
-# These take minutes; a shorter command of the same kind replaces them.
-IN_PLACE_OF = {"bielle study all -o study --jobs 2": "bielle study ratio -o study"}
+
+
+# `bielle` as a function of the shell, around the command: its argument -o comes last in the pages.
+KEY = """key() { printf '%s' "$*" | tr ' /' '__'; }
+"""
+KEEP = KEY + """bielle() {
+  if [ "$1" != solve ]; then command bielle "$@"; return; fi
+  command bielle "$@" 2>&1 | tee "$SOLVED/$(key "$@").txt"
+  cp -r "${@: -1}" "$SOLVED/$(key "$@")"
+}
+"""
+TAKE = KEY + """bielle() {
+  if [ ! -d "$SOLVED/$(key "$@")" ]; then command bielle "$@"; return; fi
+  cp -r "$SOLVED/$(key "$@")" "${@: -1}"
+  cat "$SOLVED/$(key "$@").txt"
+}
+"""
 
 
 def read_blocks(path):
@@ -86,18 +105,23 @@ def check_program(text, source, place):
 
 
 def main():
-    binaries, source, page = sys.argv[1:]
+    binaries, source, page = sys.argv[1:4]
     environment = {**os.environ, "PATH": binaries + ":" + os.environ["PATH"], "LC_ALL": "C.UTF-8"}
     environment.pop("BIELLE_ROBOTS", None)
+    prelude = ""
+    if len(sys.argv) > 4:
+        environment["SOLVED"] = sys.argv[4]
+        prelude = KEEP if page == "README.md" else TAKE
+        if page == "README.md":
+            shutil.rmtree(sys.argv[4], ignore_errors=True)
+            os.makedirs(sys.argv[4])
     run, printed = 0, ""
     with tempfile.TemporaryDirectory() as directory:
         for language, text, line in read_blocks(os.path.join(source, page)):
             place = f"{page}:{line}"
             if language == "sh":
-                for command, short in IN_PLACE_OF.items():
-                    text = text.replace(command, short)
                 begin = time.time()
-                result = subprocess.run(["bash", "-euo", "pipefail", "-c", text], cwd=directory, env=environment,
+                result = subprocess.run(["bash", "-euo", "pipefail", "-c", prelude + text], cwd=directory, env=environment,
                                         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
                 assert result.returncode == 0, f"{place}: status {result.returncode}\n{text}\n{result.stdout}"
                 printed, run = result.stdout, run + 1

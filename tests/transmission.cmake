@@ -1,4 +1,3 @@
 bielle_test(ratio SOURCES test_ratio.cpp LIBS bielle_transmission bielle_robots)
 bielle_test(serial SOURCES test_serial.cpp LIBS bielle_transmission)
 bielle_command_test(transmission_cli SOURCES test_transmission_cli.cpp LIBS bielle_io)
-target_link_libraries(test_transmission_cli PRIVATE nlohmann_json::nlohmann_json)

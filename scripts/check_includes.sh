@@ -1,0 +1,25 @@
+#!/bin/bash
+# check_includes.sh [--all]: compiles sources without precompiled headers, each by itself, so that a file that forgets an include
+# is noticed. Without --all it takes every twelfth file, other ones for each commit. Needs build/test (scripts/test.sh).
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
+cd "$bielle_root"
+turn=0 turns=12
+if [ "${1:-}" = --all ]; then turns=1; else turn=$((16#$(git rev-parse HEAD | head -c 6) % turns)); fi
+cmake -S . -B build/includes -G Ninja -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-fsyntax-only -DBIELLE_PRECOMPILE=OFF \
+  -DCMAKE_UNITY_BUILD=OFF -DBIELLE_BUILD_TESTS=OFF -DBIELLE_BUILD_EXAMPLES=OFF -DBIELLE_BUILD_BENCHMARKS=OFF >/dev/null
+ninja -C build/includes -t targets all | awk -F: '/\.cpp\.o:/ {print $1}' | sort |
+  awk -v turn="$turn" -v turns="$turns" 'NR % turns == turn' >build/includes/objects
+echo "includes: $(wc -l <build/includes/objects) files by themselves"
+python3 - <<'PROGRAM'
+import json, os, subprocess, sys
+from concurrent.futures import ThreadPoolExecutor
+
+objects = open("build/includes/objects").read().split()
+commands = subprocess.run(["ninja", "-C", "build/includes", "-t", "compdb"], stdout=subprocess.PIPE, text=True, check=True).stdout
+commands = {entry["output"]: entry["command"] for entry in json.loads(commands) if entry["output"] in objects}
+os.chdir("build/includes")
+with ThreadPoolExecutor(os.cpu_count()) as pool:
+    statuses = pool.map(lambda name: subprocess.run(commands[name], shell=True).returncode, objects)
+sys.exit(any(list(statuses)))
+PROGRAM
