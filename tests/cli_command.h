@@ -7,14 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "bielle/io/record.h"
-#include "run_command.h"
+#include "run_bielle.h"
 
 namespace bielle::testing {
-
-inline CommandResult run(std::vector<std::string> arguments, const std::string& input = "") {
-  arguments.insert(arguments.begin(), BIELLE_COMMAND);
-  return runCommand(arguments, input);
-}
 
 // Bad input: status 2, nothing on the standard output, one line of error.
 inline void checkRefused(const CommandResult& result, const std::string& text) {

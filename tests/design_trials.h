@@ -16,6 +16,8 @@ inline DesignMotion makeSquat(double depth, double duration = 0.8, double settle
   return {"squat", [options](const Model& model, const VectorXd& q0) { return planSquat(model, options, q0); }};
 }
 
+inline double square(double x) { return x * x; }
+
 // Of hardly any depth, short: the cheapest motion there is.
 inline DesignMotion makeSmallSquat() { return makeSquat(0.95, 0.6, 0.06, 0.03); }
 

@@ -52,6 +52,8 @@ Mechanism makePlanarFourBar(double ground, double crank, double coupler, double 
 MatrixXd differentiateTangent(const Model& model, const VectorXd& q, double h,
                               const std::function<VectorXd(const VectorXd&)>& f);
 MatrixXd differentiate(const VectorXd& x, double h, const std::function<VectorXd(const VectorXd&)>& f);
+/// A step for dynamics.
+inline constexpr double kDynamicsStep = 1e-3;
 
 /// Largest entry of |a - b| over the largest of |b| (or 1 when b is tiny).
 double calcRelativeError(const MatrixXd& a, const MatrixXd& b);

@@ -16,6 +16,8 @@ Model addContactsEverywhere(const Model& model);
 /// Central differences of fourth order of f(moved model), one column per direction.
 MatrixXd differentiateModel(const Model& model, const std::vector<ModelVariation>& directions, double h,
                             const std::function<VectorXd(const Model&)>& f);
+/// A step for it.
+inline constexpr double kModelStep = 2e-4;
 
 /// As many dofs as the loops leave free, those that determine the others best.
 std::vector<int> chooseKept(const Model& model, const VectorXd& q);

@@ -4,17 +4,14 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/model/reader.h"
+#include "math/constants.h"
 #include "mechanisms.h"
+#include "own_robots.h"
 
 using namespace bielle;
 using namespace bielle::testing;
 
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
-
-Model loadOwn(const std::string& name) { return loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/" + name).model; }
 
 SE3 getFrame(const Model& model, const Workspace& ws, const std::string& name) {
   REQUIRE(model.findFrame(name) >= 0);
@@ -22,7 +19,7 @@ SE3 getFrame(const Model& model, const Workspace& ws, const std::string& name) {
   return getPlacement(ws, frame.body, frame.X_BF);
 }
 
-double calcGap(const Model& model, Workspace& ws, const VectorXd& q) {
+double calcLoopGap(const Model& model, Workspace& ws, const VectorXd& q) {
   updatePositions(model, ws, q);
   return calcLargestGap(ws, makeConstraintSet(model));
 }
@@ -30,13 +27,13 @@ double calcGap(const Model& model, Workspace& ws, const VectorXd& q) {
 }  // namespace
 
 TEST_CASE("assembly: Bipetto half sitting, from scratch") {
-  const Model model = loadOwn("bipetto");
+  const Model model = loadOwn("bipetto").model;
   Workspace ws(model);
-  REQUIRE(calcGap(model, ws, model.makeNeutral()) > 1e-3);  // there is something to close
+  REQUIRE(calcLoopGap(model, ws, model.makeNeutral()) > 1e-3);  // there is something to close
   const AssemblyResult result = assembleReference(model, "half_sitting");
   CAPTURE(result.message);
   REQUIRE(result.status == AssemblyStatus::Closed);
-  CHECK(calcGap(model, ws, result.q) < 1e-12);
+  CHECK(calcLoopGap(model, ws, result.q) < 1e-12);
   CHECK(result.gap < 1e-12);
   CHECK(std::abs(getFrame(model, ws, "torso").p.z() - 0.575) < 1e-12);
   for (const auto& [foot, y] : {std::pair<std::string, double>{"foot_left", 0.125}, {"foot_right", -0.125}}) {
@@ -51,7 +48,7 @@ TEST_CASE("assembly: Bipetto half sitting, from scratch") {
 }
 
 TEST_CASE("assembly: the torso at every height within reach; far outside, what stays open is named") {
-  const Model model = loadOwn("bipetto");
+  const Model model = loadOwn("bipetto").model;
   Reference reference = model.references().front();
   Workspace ws(model);
   for (double height : {0.45, 0.5, 0.55, 0.6, 0.62}) {
@@ -59,7 +56,7 @@ TEST_CASE("assembly: the torso at every height within reach; far outside, what s
     const AssemblyResult result = assemble(model, makeReferenceProblem(model, reference));
     CAPTURE(height, result.message);
     REQUIRE(result.status == AssemblyStatus::Closed);
-    CHECK(calcGap(model, ws, result.q) < 1e-12);
+    CHECK(calcLoopGap(model, ws, result.q) < 1e-12);
     CHECK(std::abs(getFrame(model, ws, "torso").p.z() - height) < 1e-12);
   }
   for (double height : {0.9, 2.0}) {
@@ -71,7 +68,7 @@ TEST_CASE("assembly: the torso at every height within reach; far outside, what s
     CHECK(!result.worst.empty());
     CHECK(result.message.find(result.worst) != std::string::npos);
     CHECK(result.message.find("stays open by") != std::string::npos);
-    CHECK(result.gap == Approx(calcGap(model, ws, result.q)));
+    CHECK(result.gap == Approx(calcLoopGap(model, ws, result.q)));
   }
   CHECK_THROWS_AS(assembleReference(model, "lotus"), ModelError);
 }
@@ -98,7 +95,7 @@ TEST_CASE("assembly: a four-bar against its closed form over the full turn of th
 }
 
 TEST_CASE("assembly: the shortest steps close the same robot, and change nothing without need") {
-  const Model model = loadOwn("bipetto");
+  const Model model = loadOwn("bipetto").model;
   const VectorXd closed = assembleReference(model, "half_sitting").q;
   AssemblyProblem problem;
   problem.q_ref = model.integrate(closed, 0.02 * VectorXd::Random(model.nv()));
@@ -107,7 +104,7 @@ TEST_CASE("assembly: the shortest steps close the same robot, and change nothing
   const AssemblyResult result = assemble(model, problem, options);
   REQUIRE(result.status == AssemblyStatus::Closed);
   Workspace ws(model);
-  CHECK(calcGap(model, ws, result.q) < 1e-12);
+  CHECK(calcLoopGap(model, ws, result.q) < 1e-12);
   CHECK(result.iterations < 10);
   // No closed configuration nearby is closer to the start, to first order: the way there is across the closed motions.
   const ConstraintSet set = makeConstraintSet(model);

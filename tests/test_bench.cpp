@@ -5,15 +5,14 @@
 
 #include "bench/receding_horizon.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
+#include "own_robots.h"
 #include "solve/window.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
-Model loadOwn(const std::string& name) { return loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/" + name).model; }
-
-BenchmarkWalkOptions makeShortWalk() {
+BenchmarkWalkOptions makeShortBenchmark() {
   BenchmarkWalkOptions walk;
   walk.start_nodes = 4;
   walk.swing_nodes = 6;
@@ -28,7 +27,7 @@ TEST_CASE("bench: every work is measured, in both formulations") {
   options.extent = BenchExtent::Quick;
   std::vector<std::string> told;
   options.progress = [&told](const std::string& what) { told.push_back(what); };
-  const BenchReport report = runBench(loadOwn("bipetto"), options);
+  const BenchReport report = runBench(loadOwn("bipetto").model, options);
   CHECK(told.size() == 14);
   CHECK(report.robot == "bipetto");
   CHECK_FALSE(report.processor.empty());
@@ -63,12 +62,12 @@ TEST_CASE("bench: every work is measured, in both formulations") {
 }
 
 TEST_CASE("bench: a robot that cannot walk is refused") {
-  CHECK_THROWS_AS(runBench(loadOwn("fourbar"), {}), ModelError);
-  CHECK_THROWS_WITH(runBench(loadOwn("fourbar"), {}), Catch::Contains("foot_left"));
+  CHECK_THROWS_AS(runBench(loadOwn("fourbar").model, {}), ModelError);
+  CHECK_THROWS_WITH(runBench(loadOwn("fourbar").model, {}), Catch::Contains("foot_left"));
 }
 
 TEST_CASE("bench: a window has the bounds of the stages that it shows") {
-  const Model model = loadOwn("bipetto");
+  const Model model = loadOwn("bipetto").model;
   const auto makeLimits = [&](int stage) -> VectorXd {
     return VectorXd::LinSpaced(model.nu(), 10 + stage, 20 + stage);
   };
@@ -77,7 +76,7 @@ TEST_CASE("bench: a window has the bounds of the stages that it shows") {
     stages[k].constraints = makeConstraintSet(model);
     stages[k].effort_limits = makeLimits(static_cast<int>(k));
   }
-  const VectorXd x0 = makeBenchmarkWalk(model, makeShortWalk()).problem->initialState();
+  const VectorXd x0 = makeBenchmarkWalk(model, makeShortBenchmark()).problem->initialState();
   RobotProblem whole(model, x0.head(model.nq()), x0.tail(model.nv()), std::move(stages));
   Window window(whole, 12);
   window.move(5, whole.initialState());
@@ -91,11 +90,11 @@ TEST_CASE("bench: a window has the bounds of the stages that it shows") {
 }
 
 TEST_CASE("bench: a window over all of a problem is that problem") {
-  const Model model = loadOwn("bipetto");
+  const Model model = loadOwn("bipetto").model;
   for (const Formulation formulation : {Formulation::Full, Formulation::Reduced}) {
     FddpOptions options;
     options.max_iterations = 3;
-    Motion motion = makeBenchmarkWalk(model, makeShortWalk(), formulation);
+    Motion motion = makeBenchmarkWalk(model, makeShortBenchmark(), formulation);
     ShootingTrajectory whole = motion.guess, seen = motion.guess;
     const FddpSummary expected = Fddp(options).solve(*motion.problem, whole);
     Window window(*motion.problem, motion.problem->numStages());
@@ -106,9 +105,9 @@ TEST_CASE("bench: a window over all of a problem is that problem") {
 }
 
 TEST_CASE("bench: a horizon that cannot recede is refused") {
-  const Model model = loadOwn("bipetto");
+  const Model model = loadOwn("bipetto").model;
   RecedingOptions options;
-  options.walk = makeShortWalk();
+  options.walk = makeShortBenchmark();
   options.nodes = 24;
   CHECK_THROWS_AS(runRecedingHorizon(model, Formulation::Reduced, options), std::invalid_argument);
   options.nodes = 12;

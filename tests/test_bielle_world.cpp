@@ -7,6 +7,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/motion/motion.h"
 #include "count_allocations.h"
+#include "own_robots.h"
 #include "simulation/bielle_world.h"
 #include "simulation/make_world.h"
 #include "world_trials.h"
@@ -14,10 +15,7 @@
 namespace bielle::simulation {
 namespace {
 
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
-  return robot.model;
-}
+using bielle::testing::getBipetto;
 
 std::unique_ptr<World> makeTestWorld(double time_step = 0) {
   BielleWorldOptions options;
@@ -25,7 +23,7 @@ std::unique_ptr<World> makeTestWorld(double time_step = 0) {
   return makeBielleWorld(getBipetto(), options);
 }
 
-const testing::TrialTolerances kTolerances{1e-3, 1e-6, 1e-10};
+const testing::TrialTolerances kBielleTolerances{1e-3, 1e-6, 1e-10};
 
 // A robot in the air that moves in all coordinates.
 struct Flight {
@@ -45,19 +43,19 @@ Flight makeFlight() {
 }  // namespace
 
 TEST_CASE("bielle world: a robot stands without creeping") {
-  testing::checkStanding(*makeTestWorld(), getBipetto(), kTolerances);
+  testing::checkStanding(*makeTestWorld(), getBipetto(), kBielleTolerances);
 }
 
 TEST_CASE("bielle world: a robot is dropped, and the books balance") {
-  testing::checkDropped(*makeTestWorld(), getBipetto(), kTolerances);
+  testing::checkDropped(*makeTestWorld(), getBipetto(), kBielleTolerances);
 }
 
 TEST_CASE("bielle world: a robot is pushed, and the work of the push is booked") {
-  testing::checkPushed(*makeTestWorld(), getBipetto(), kTolerances);
+  testing::checkPushed(*makeTestWorld(), getBipetto(), kBielleTolerances);
 }
 
 TEST_CASE("bielle world: a stop holds a joint, and takes energy") {
-  testing::checkStopped(*makeTestWorld(), getBipetto(), kTolerances);
+  testing::checkStopped(*makeTestWorld(), getBipetto(), kBielleTolerances);
 }
 
 TEST_CASE("bielle world: springs and dampers between points move a linkage, and are booked") {

@@ -4,21 +4,16 @@
 #include <filesystem>
 #include <fstream>
 
-#include "bielle/model/reader.h"
 #include "bielle/motion/commanded_walk.h"
 #include "get_error.h"
+#include "own_robots.h"
 
 using namespace bielle;
 using namespace bielle::testing;
 
 namespace {
 
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
-  return robot.model;
-}
-
-CommandedWalk makeWalk(const std::vector<TimedCommand>& commands) {
+CommandedWalk makeCommandedWalk(const std::vector<TimedCommand>& commands) {
   return {getBipetto(),
           {},
           {},
@@ -32,7 +27,7 @@ struct Walked {
   std::vector<SE3> middles;  // at double supports
 };
 Walked walk(const std::vector<TimedCommand>& commands, double duration) {
-  CommandedWalk walk = makeWalk(commands);
+  CommandedWalk walk = makeCommandedWalk(commands);
   Walked out;
   for (double time = 0; time < duration; time += walk.getTimeStep()) {
     out.stages.push_back(walk.makeNext());
@@ -120,7 +115,7 @@ TEST_CASE("commanded walk: from step to step its path has no jumps") {
   // From rest the pendulum of gait.h starts at once; on the way and to rest it changes its velocity steadily.
   const Walked walked = walk({{0, {0.4, 0, 0}}, {2.5, {0.2, 0.1, 0.4}}, {5, {}}}, 8);
   const Model& model = getBipetto();
-  const double h = makeWalk({}).getTimeStep();
+  const double h = makeCommandedWalk({}).getTimeStep();
   for (size_t k = 0; k + 1 < walked.stages.size(); ++k) {
     const CommandedWalk::Stage &now = walked.stages[k], &next = walked.stages[k + 1];
     const VectorXd v = model.difference(now.x.head(model.nq()), next.x.head(model.nq())) / h;

@@ -3,13 +3,12 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <map>
-#include <sstream>
 
 #include "bielle/io/record.h"
 #include "bielle/model/reader.h"
+#include "read_table.h"
 #include "robot_directory.h"
 #include "run_command.h"
 
@@ -30,30 +29,6 @@ speeds: {motion: squat, option: depth, from: 0.9, to: 0.95, step: 0.05, set: {du
 groups: {hips: [hip], knees and ankles: [knee, ankle]}
 drives: {motor_constant: 1.5, regeneration: 1}
 )";
-
-// Lines of compare.csv by column; no cell holds a comma.
-std::vector<std::map<std::string, std::string>> readTable(const fs::path& path) {
-  const auto split = [](const std::string& line) {
-    std::vector<std::string> cells;
-    std::istringstream stream(line);
-    for (std::string cell; std::getline(stream, cell, ',');) {
-      cell.erase(std::remove(cell.begin(), cell.end(), '"'), cell.end());
-      cells.push_back(cell);
-    }
-    return cells;
-  };
-  std::ifstream file(path);
-  std::string line;
-  std::getline(file, line);
-  const std::vector<std::string> names = split(line);
-  std::vector<std::map<std::string, std::string>> rows;
-  while (std::getline(file, line)) {
-    rows.emplace_back();
-    const std::vector<std::string> cells = split(line);
-    for (size_t i = 0; i < cells.size() && i < names.size(); ++i) rows.back()[names[i]] = cells[i];
-  }
-  return rows;
-}
 
 // Sums over the stages of one result, with all given back: the power at the terminals itself.
 struct Sums {

@@ -43,7 +43,7 @@ Written write(const Model& model) {
   return {formatMjcf(model, q_ref).xml, q_ref};
 }
 
-void checkRoundTrip(const Model& model, ConstVectorRef q_ref) {
+void checkMjcfRoundTrip(const Model& model, ConstVectorRef q_ref) {
   const Difference d = compare(model, readMjcfText(formatMjcf(model, q_ref).xml), q_ref);
   CHECK(d.missing == "");
   CHECK(d.mass_matrix < kTolerance);
@@ -61,7 +61,7 @@ TEST_CASE("every robot comes back from MJCF with its mass matrix, closures, moto
     CAPTURE(name);
     const Model model = loadRobot(name).model;
     const Written written = write(model);
-    checkRoundTrip(model, written.q_ref);
+    checkMjcfRoundTrip(model, written.q_ref);
     // The loops close from the postures that came along.
     const Model back = readMjcfText(written.xml);
     CHECK(findClosedConfiguration(back).status == AssemblyStatus::Closed);
@@ -77,7 +77,7 @@ TEST_CASE("generated robots come back from MJCF") {
   for (const Generator& generator : getGenerators()) {
     CAPTURE(generator.name);
     const Model model = generator.makeRequest().make();
-    checkRoundTrip(model, findClosedConfiguration(model).q);
+    checkMjcfRoundTrip(model, findClosedConfiguration(model).q);
   }
 }
 
@@ -89,9 +89,9 @@ TEST_CASE("random mechanisms come back from MJCF: every joint, closure, base, sp
         CAPTURE(getName(joint), getName(closure), base == MechanismBase::FreeFlyer);
         std::mt19937 rng(++seed);
         const Mechanism plain = makeRandomMechanism(rng, joint, closure, base);
-        checkRoundTrip(plain.model, plain.q_closed);
+        checkMjcfRoundTrip(plain.model, plain.q_closed);
         const Mechanism belted = makeBeltedMechanism(rng, joint, closure, base, true);
-        checkRoundTrip(belted.model, belted.q_closed);
+        checkMjcfRoundTrip(belted.model, belted.q_closed);
         const Mechanism sprung = makeSprungMechanism(rng, joint, closure, base);
         const Model back = readMjcfText(formatMjcf(sprung.model, sprung.q_closed).xml);
         REQUIRE(back.jointForces().size() == sprung.model.jointForces().size());
@@ -109,7 +109,7 @@ TEST_CASE("random mechanisms come back from MJCF: every joint, closure, base, sp
         ModelParts parts = takeParts(plain.model);  // without friction, which MuJoCo has otherwise
         parts.point_springs = sprung.model.pointSprings();
         REQUIRE(parts.point_springs.size() >= 3);
-        checkRoundTrip(ModelBuilder::restore(parts), plain.q_closed);
+        checkMjcfRoundTrip(ModelBuilder::restore(parts), plain.q_closed);
       }
 }
 

@@ -34,7 +34,7 @@ struct Solved {
   VectorXd a, lambda;
 };
 
-Solved solve(const Model& model, const VectorXd& q, const VectorXd& tau) {
+Solved solveAtRest(const Model& model, const VectorXd& q, const VectorXd& tau) {
   Workspace ws(model);
   ConstrainedWorkspace cws;
   REQUIRE(updateConstrainedDynamics(model, ws, cws, makeConstraintSet(model), q, VectorXd::Zero(model.nv()), tau) ==
@@ -63,7 +63,7 @@ TEST_CASE("a pair of gears: accelerations and force in closed form") {
   ModelBuilder builder = makeRotors({I1, I2});
   builder.addCoupler("gears", {{"r1", 1}, {"r2", n}}, 0.4);  // r1 = 0.4 - n r2
   const Model model = builder.build();
-  const Solved out = solve(model, Eigen::Vector2d(0.4, 0), Eigen::Vector2d(torque, 0));
+  const Solved out = solveAtRest(model, Eigen::Vector2d(0.4, 0), Eigen::Vector2d(torque, 0));
   const double a1 = torque / (I1 + I2 / (n * n));
   CHECK(out.a[0] == Approx(a1).epsilon(1e-12));
   CHECK(out.a[1] == Approx(-a1 / n).epsilon(1e-12));
@@ -81,7 +81,7 @@ TEST_CASE("a differential: two motors turn pitch by their mean, roll by half the
   CHECK(model.clusters()[0].rows == 2);
   CHECK(calcMobility(model, VectorXd::Zero(4)).mobility == 2);
   const Eigen::Vector2d torque(3, -1);
-  const Solved out = solve(model, VectorXd::Zero(4), Eigen::Vector4d(torque[0], torque[1], 0, 0));
+  const Solved out = solveAtRest(model, VectorXd::Zero(4), Eigen::Vector4d(torque[0], torque[1], 0, 0));
   // By virtual work: pitch sees the sum of the torques and two rotors, roll their difference and the same rotors.
   const double pitch = torque.sum() / (Ip + 2 * Im), roll = (torque[0] - torque[1]) / (Ir + 2 * Im);
   CHECK(out.a[2] == Approx(pitch).epsilon(1e-12));
@@ -192,7 +192,7 @@ TEST_CASE("a coupler said twice leaves the accelerations as they are") {
       makeBeltedMechanism(same, JointKind::Revolute, ClosureKind::Ball3D, MechanismBase::Fixed, true);
   REQUIRE(once.q_closed == twice.q_closed);
   const VectorXd tau = randomVector(rng, once.model.nv(), 10);
-  const Solved a = solve(once.model, once.q_closed, tau), b = solve(twice.model, once.q_closed, tau);
+  const Solved a = solveAtRest(once.model, once.q_closed, tau), b = solveAtRest(twice.model, once.q_closed, tau);
   CHECK(calcRelativeError(b.a, a.a) < 1e-9);
   CHECK(calcRelativeError(calcJacobian(twice.model, once.q_closed).transpose() * b.lambda,
                           calcJacobian(once.model, once.q_closed).transpose() * a.lambda) < 1e-8);

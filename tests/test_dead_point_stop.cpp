@@ -6,18 +6,17 @@
 #include "bielle/motion/motion.h"
 #include "control/dead_point_stop.h"
 #include "control/passive_joints.h"
+#include "own_robots.h"
 #include "simulation/bielle_world.h"
 
 namespace bielle {
 namespace {
 
-constexpr double kPeriod = 1e-3;  // s
+using bielle::testing::getBipetto;
+
+constexpr double kControlPeriod = 1e-3;  // s
 constexpr double kStop = 0.08;
 
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
-  return robot.model;
-}
 const Model& getFourBar() {
   static const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/fourbar");
   return robot.model;
@@ -38,14 +37,14 @@ double driveCrank(double torque, double stop, double delay) {
   const auto world = simulation::makeBielleWorld(model);
   world->reset(q0, VectorXd::Zero(model.nv()));
   VectorXd u(model.nu()), gradient(model.nu());
-  std::vector<VectorXd> sent(static_cast<size_t>(std::lround(delay / kPeriod)), VectorXd::Zero(model.nu()));
+  std::vector<VectorXd> sent(static_cast<size_t>(std::lround(delay / kControlPeriod)), VectorXd::Zero(model.nu()));
   double least = 1;
   for (int tick = 0; tick < 1000; ++tick) {
     u.setConstant(torque);
     dead_point_stop.add({world->getTime(), world->getConfiguration(), world->getVelocity(), {}, delay}, u);
     sent.push_back(u);
     world->setTorques(sent[tick]);
-    REQUIRE(world->advance(kPeriod));
+    REQUIRE(world->advance(kControlPeriod));
     least = std::min(least, calcTransmission(transmission, model, world->getConfiguration(), gradient));
   }
   return least;
@@ -103,7 +102,7 @@ TEST_CASE("dead point stop: torques far from dead points are left alone") {
   const VectorXd q = makeStandingPosture(model), u0 = VectorXd::LinSpaced(model.nu(), -3, 3);
   DeadPointStop stop(model, q, kStop);
   VectorXd u = u0;
-  for (double time : {0.0, kPeriod}) stop.add({time, q, VectorXd::Zero(model.nv())}, u);
+  for (double time : {0.0, kControlPeriod}) stop.add({time, q, VectorXd::Zero(model.nv())}, u);
   CHECK(u == u0);
 }
 

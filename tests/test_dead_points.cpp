@@ -9,13 +9,13 @@
 #include "bielle/ocp/robot_problem.h"
 #include "bielle/robots/fourbar_chain.h"
 #include "bielle/solve/fddp.h"
+#include "math/constants.h"
 #include "problem_probe.h"
 
 using namespace bielle;
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr int kRocker = 0, kCrank = 1, kCoupler = 2;  // joints of a single four-bar
 
 FourBarChainOptions makeParallelogram() {

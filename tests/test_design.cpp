@@ -276,7 +276,7 @@ TEST_CASE("evaluations: what is not one is refused") {
 
 namespace {
 
-const char* const kSpec = R"(robot: ROBOT
+const char* const kCrankSpec = R"(robot: ROBOT
 variables:
   - name: crank
     bounds: [0.03, 0.08]
@@ -297,13 +297,13 @@ search:
     - {algorithm: sbplx, evaluations: 10}
 )";
 
-std::string makeSpec() { return replaceOnce(kSpec, "ROBOT", kRobots + "bipetto"); }
+std::string makeCrankSpec() { return replaceOnce(kCrankSpec, "ROBOT", kRobots + "bipetto"); }
 
 }  // namespace
 
 TEST_CASE("design: a search that is killed goes on and ends the same way") {
   const RobotDirectory directory;
-  const std::string spec = directory.write("spec.yaml", makeSpec());
+  const std::string spec = directory.write("spec.yaml", makeCrankSpec());
   const std::string whole = directory.path() + "/whole", killed = directory.path() + "/killed";
   const CommandResult first = runCommand({BIELLE_COMMAND, "design", spec, "-o", whole, "--jobs", "1"});
   INFO(first.err);
@@ -348,7 +348,7 @@ TEST_CASE("design: a search that is killed goes on and ends the same way") {
   CHECK(runCommand({BIELLE_COMMAND, "info", whole + "/best"}).status == 0);
 
   // The log of another problem is refused.
-  directory.write("spec.yaml", replaceOnce(makeSpec(), "evaluations: 40", "evaluations: 41"));
+  directory.write("spec.yaml", replaceOnce(makeCrankSpec(), "evaluations: 40", "evaluations: 41"));
   const CommandResult other = runCommand({BIELLE_COMMAND, "design", spec, "-o", killed});
   CHECK(other.status == 2);
   CHECK_THAT(other.err, Contains("the log is of another design problem"));
@@ -357,7 +357,7 @@ TEST_CASE("design: a search that is killed goes on and ends the same way") {
 TEST_CASE("design: errors are reported with their places and remedies") {
   const RobotDirectory directory;
   const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
-    const std::string spec = directory.write("spec.yaml", replaceOnce(makeSpec(), from, to));
+    const std::string spec = directory.write("spec.yaml", replaceOnce(makeCrankSpec(), from, to));
     const CommandResult result = runCommand({BIELLE_COMMAND, "design", spec, "-o", directory.path() + "/out"});
     CAPTURE(to, result.err);
     CHECK(result.status == 2);

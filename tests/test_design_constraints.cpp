@@ -20,8 +20,6 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-double square(double x) { return x * x; }
-
 // A four-bar knee with motors of the catalogue, and what it is bounded by. Gears change limits and losses, lengths the rest.
 const char* const kBounded = R"(generator: leg_biped
 set: {knee: four_bar, knee_crank: 0.042, knee_middle: 1.26}

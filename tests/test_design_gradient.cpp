@@ -27,8 +27,6 @@ DesignMotion makeShortWalk() {
   return {"walk", [options](const Model& model, const VectorXd& q0) { return planWalk(model, options, q0); }};
 }
 
-double square(double x) { return x * x; }
-
 Eigen::Index findActive(const MeasurePieces& term) {
   Eigen::Index active = 0;
   term.values.maxCoeff(&active);
@@ -228,7 +226,7 @@ TEST_CASE("design gradient: searches with gradients take kinks and limits") {
 namespace {
 
 // Bipetto's knee with a short squat, searched by one algorithm.
-std::string makeSpec(const std::string& algorithm) {
+std::string makeKneeSpec(const std::string& algorithm) {
   std::string text = readFile(kKnee);
   text = replaceOnce(text, "robot: bipetto", "robot: " + std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
   text = replaceOnce(text, "{depth: 0.6}", "{depth: 0.8, duration: 0.6, settle: 0.1, time_step: 0.02}");
@@ -249,7 +247,7 @@ double readValue(const std::string& page) {
 TEST_CASE("design gradient: bielle design by gradients, resumed, in fewer evaluations") {
   const RobotDirectory directory;
   const auto run = [&](const std::string& algorithm, const std::string& out) {
-    const std::string spec = directory.write("spec.yaml", makeSpec(algorithm));
+    const std::string spec = directory.write("spec.yaml", makeKneeSpec(algorithm));
     const CommandResult result = runCommand({BIELLE_COMMAND, "design", spec, "-o", out});
     INFO(result.err);
     REQUIRE(result.status == 0);
@@ -336,7 +334,7 @@ TEST_CASE("design gradient: motions made anew, against motions made anew for nei
 
 TEST_CASE("design gradient: bielle design by gradients of motions made anew") {
   const RobotDirectory directory;
-  std::string text = makeSpec("slsqp");
+  std::string text = makeKneeSpec("slsqp");
   text = replaceOnce(text, "mode: kept\nmargin: 0.15", "mode: reoptimized\nmargin: 0.1");
   const std::string spec = directory.write("spec.yaml", text), out = directory.path() + "/out";
   const auto run = [&] { return runCommand({BIELLE_COMMAND, "design", spec, "-o", out}); };
@@ -355,7 +353,7 @@ TEST_CASE("design gradient: bielle design by gradients of motions made anew") {
 TEST_CASE("design gradient: stages that need gradients are refused where there are none") {
   const RobotDirectory directory;
   const auto check = [&](const std::string& from, const std::string& to, const std::string& problem) {
-    const std::string spec = directory.write("spec.yaml", replaceOnce(makeSpec("slsqp"), from, to));
+    const std::string spec = directory.write("spec.yaml", replaceOnce(makeKneeSpec("slsqp"), from, to));
     const CommandResult result = runCommand({BIELLE_COMMAND, "design", spec, "-o", directory.path() + "/out"});
     CAPTURE(to, result.err);
     CHECK(result.status == 2);

@@ -12,8 +12,6 @@ using namespace bielle::testing;
 
 namespace {
 
-constexpr double kStep = 2e-4;
-
 Shape makeBox(const Vector3d& half, double radius = 0) {
   Shape shape;
   shape.half = half;
@@ -40,7 +38,7 @@ double calcReach(const Shape& shape, const SE3& X_WB, const Vector3d& direction)
 }
 
 // By how much a shape is in front of another along a direction, negative if they overlap.
-double calcGap(const Shape& a, const SE3& X_WA, const Shape& b, const SE3& X_WB, const Vector3d& direction) {
+double calcGapAlong(const Shape& a, const SE3& X_WA, const Shape& b, const SE3& X_WB, const Vector3d& direction) {
   return -calcReach(a, X_WA, -direction) - calcReach(b, X_WB, direction);
 }
 
@@ -101,12 +99,12 @@ TEST_CASE("distance: points and a direction prove that it is the least, whatever
         CHECK(isPointOf(a, X_WA, d.point_a));
         CHECK(isPointOf(b, X_WB, d.point_b));
         // Apart: no points are nearer. Overlapping: a displacement of that size along n parts them.
-        CHECK(std::abs(calcGap(a, X_WA, b, X_WB, d.normal) - d.distance) < 1e-10);
+        CHECK(std::abs(calcGapAlong(a, X_WA, b, X_WB, d.normal) - d.distance) < 1e-10);
         (d.distance > 0 ? apart : overlapping) += 1;
         if (d.distance > 0) continue;
         double least = 1e9;  // of displacements that part them
         for (int j = 0; j < 200; ++j)
-          least = std::min(least, -calcGap(a, X_WA, b, X_WB, randomVector(rng, 3).normalized()));
+          least = std::min(least, -calcGapAlong(a, X_WA, b, X_WB, randomVector(rng, 3).normalized()));
         CHECK(-d.distance <= least + 1e-12);
       }
   CHECK(apart > 300);
@@ -176,7 +174,8 @@ VectorXd calcDistances(const Model& model, const std::vector<ShapePair>& pairs, 
 }
 
 // Joints, closures and shapes, each along a direction of its own, and everything at once.
-std::vector<ModelVariation> listVariations(std::mt19937& rng, const Model& model, const std::vector<ShapePair>& pairs) {
+std::vector<ModelVariation> listShapeVariations(std::mt19937& rng, const Model& model,
+                                                const std::vector<ShapePair>& pairs) {
   std::vector<ModelVariation> out;
   ModelVariation all(model);
   for (int i = 1; i < model.numBodies(); ++i) {
@@ -228,17 +227,17 @@ TEST_CASE("distance: derivatives by the state and by the mechanism, every joint 
           distances.push_back(calcDistance(a, ws.X_WB[a.body], b, ws.X_WB[b.body]));
           addDistanceGradient(model, ws, a, b, distances.back(), gradient.middleRows(i, 1));
         }
-        checkDerivative(
-            gradient,
-            differentiateTangent(model, q, kStep, [&](const VectorXd& x) { return calcDistances(model, pairs, x); }),
-            "by the tangent of q");
+        checkDerivative(gradient,
+                        differentiateTangent(model, q, kModelStep,
+                                             [&](const VectorXd& x) { return calcDistances(model, pairs, x); }),
+                        "by the tangent of q");
 
         // Along the closed configurations, by the coordinates that determine them.
         const std::vector<int> kept = chooseKept(model, q);
         const Closing closing(model, ws, makeConstraintSet(model), kept);
         const MatrixXd tangent = closing.calcTangent();
         checkDerivative(gradient * tangent,
-                        differentiate(VectorXd::Zero(tangent.cols()), kStep,
+                        differentiate(VectorXd::Zero(tangent.cols()), kModelStep,
                                       [&](const VectorXd& t) {
                                         const VectorXd near = model.integrate(q, tangent * t);
                                         VectorXd fixed = closeHeld(model, near, kept);
@@ -247,7 +246,7 @@ TEST_CASE("distance: derivatives by the state and by the mechanism, every joint 
                         "along the loops");
 
         // By the mechanism, which stays closed.
-        const std::vector<ModelVariation> directions = listVariations(rng, model, pairs);
+        const std::vector<ModelVariation> directions = listShapeVariations(rng, model, pairs);
         MatrixXd analytic(n, static_cast<Eigen::Index>(directions.size()));
         VariationWorkspace variation(model);
         for (size_t d = 0; d < directions.size(); ++d) {
@@ -259,7 +258,7 @@ TEST_CASE("distance: derivatives by the state and by the mechanism, every joint 
                 calcDistanceVariation(model, ws, pairs[i].a, pairs[i].b, distances[i], directions[d], variation);
         }
         checkDerivative(analytic,
-                        differentiateModel(model, directions, kStep,
+                        differentiateModel(model, directions, kModelStep,
                                            [&](const Model& moved) {
                                              const VectorXd x = moved.integrate(q, closeHeld(moved, q, kept));
                                              return calcDistances(moved, pairs, x);

@@ -144,7 +144,7 @@ int countLostCouplers(const Model& model, const Model& back, const std::vector<s
   return lost;
 }
 
-void checkRoundTrip(const Model& model, ConstVectorRef q_closed) {
+void checkDrakeRoundTrip(const Model& model, ConstVectorRef q_closed) {
   const UrdfText text = formatDrake(model);
   const Model back = readDrake(text.urdf);
   const Difference d = compareWithDrake(model, back);
@@ -189,7 +189,7 @@ TEST_CASE("every robot comes back from Drake's URDF as the same mechanism, with 
     if (!published && (name == "battobot" || name == "digit")) continue;
     CAPTURE(name);
     const Model model = loadRobot(name).model;
-    checkRoundTrip(model, findClosedConfiguration(model).q);
+    checkDrakeRoundTrip(model, findClosedConfiguration(model).q);
     const UrdfText text = formatDrake(model);
     for (const ContactFrame& contact : model.contacts()) CHECK(contains(text.warnings, "'" + contact.name + "'"));
     for (const Reference& reference : model.references()) CHECK(contains(text.warnings, "'" + reference.name + "'"));
@@ -200,7 +200,7 @@ TEST_CASE("generated robots come back from Drake's URDF") {
   for (const Generator& generator : getGenerators()) {
     CAPTURE(generator.name);
     const Model model = generator.makeRequest().make();
-    checkRoundTrip(model, findClosedConfiguration(model).q);
+    checkDrakeRoundTrip(model, findClosedConfiguration(model).q);
   }
 }
 
@@ -212,11 +212,11 @@ TEST_CASE("random mechanisms come back from Drake's URDF: every joint, closure, 
         CAPTURE(getName(joint), getName(closure), base == MechanismBase::FreeFlyer);
         std::mt19937 rng(++seed);
         const Mechanism plain = makeSquare(makeRandomMechanism(rng, joint, closure, base));
-        checkRoundTrip(plain.model, plain.q_closed);
+        checkDrakeRoundTrip(plain.model, plain.q_closed);
         const Mechanism belted = makeSquare(makeBeltedMechanism(rng, joint, closure, base, true));
-        checkRoundTrip(belted.model, belted.q_closed);
+        checkDrakeRoundTrip(belted.model, belted.q_closed);
         const Mechanism sprung = makeSquare(makeSprungMechanism(rng, joint, closure, base));
-        checkRoundTrip(sprung.model, sprung.q_closed);
+        checkDrakeRoundTrip(sprung.model, sprung.q_closed);
       }
 }
 

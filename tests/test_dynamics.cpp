@@ -13,12 +13,6 @@
 using namespace bielle;
 using namespace bielle::testing;
 
-namespace {
-
-constexpr double kStep = 1e-3;
-
-}  // namespace
-
 TEST_CASE("inverse dynamics: M, b and RNEA agree, and its derivatives agree with differences") {
   std::mt19937 rng(1);
   for (JointKind kind : kJointKinds) {
@@ -35,11 +29,11 @@ TEST_CASE("inverse dynamics: M, b and RNEA agree, and its derivatives agree with
     updateBias(model, ws);
     CHECK(calcRelativeError(ws.M * a + ws.b, tau) < 1e-12);
     CHECK(0.5 * v.dot(ws.M * v) == Approx(calcKineticEnergy(model, ws)).epsilon(1e-12));
-    checkDerivative(dq, differentiateTangent(model, q, kStep, [&](const VectorXd& x) {
+    checkDerivative(dq, differentiateTangent(model, q, kDynamicsStep, [&](const VectorXd& x) {
                       return calcInverseDynamics(model, ws, x, v, a);
                     }));
-    checkDerivative(
-        dv, differentiate(v, kStep, [&](const VectorXd& x) { return calcInverseDynamics(model, ws, q, x, a); }));
+    checkDerivative(dv, differentiate(v, kDynamicsStep,
+                                      [&](const VectorXd& x) { return calcInverseDynamics(model, ws, q, x, a); }));
   }
 }
 
@@ -59,11 +53,11 @@ TEST_CASE("centre of mass: Jacobian and velocity derivative") {
     calcComVelocityDerivative(model, ws, dv_dq);
     CHECK((J * v - calcComVelocity(model, ws)).norm() < 1e-12);
     Workspace other(model);
-    checkDerivative(J, differentiateTangent(model, mechanism.q_closed, kStep, [&](const VectorXd& x) {
+    checkDerivative(J, differentiateTangent(model, mechanism.q_closed, kDynamicsStep, [&](const VectorXd& x) {
                       updatePositions(model, other, x);
                       return VectorXd(calcCom(model, other));
                     }));
-    checkDerivative(dv_dq, differentiateTangent(model, mechanism.q_closed, kStep, [&](const VectorXd& x) {
+    checkDerivative(dv_dq, differentiateTangent(model, mechanism.q_closed, kDynamicsStep, [&](const VectorXd& x) {
                       updatePositions(model, other, x);
                       updateVelocities(model, other, v);
                       return VectorXd(calcComVelocity(model, other));

@@ -14,35 +14,35 @@ using namespace bielle::testing;
 
 namespace {
 
-struct Discretization {
+struct TimedDiscretization {
   Formulation formulation;
   StepRule step;
   bool free;  // whether durations are variables
 };
-std::vector<Discretization> listDiscretizations() {
-  std::vector<Discretization> out;
+std::vector<TimedDiscretization> listTimedDiscretizations() {
+  std::vector<TimedDiscretization> out;
   for (Formulation formulation : {Formulation::Full, Formulation::Reduced})
     for (StepRule step : {StepRule::Euler, StepRule::Midpoint})
       for (bool free : {false, true}) out.push_back({formulation, step, free});
   return out;
 }
-std::ostream& operator<<(std::ostream& out, const Discretization& d) {
+std::ostream& operator<<(std::ostream& out, const TimedDiscretization& d) {
   return out << getName(d.formulation) << ", " << getName(d.step) << (d.free ? ", free" : "");
 }
 
-constexpr double kWeight = 0.7, kStep = 0.02;
+constexpr double kWeight = 0.7, kTimeStep = 0.02;
 
 VectorXd makeLosses(const Model& model) { return VectorXd::LinSpaced(model.nu(), 0.2, 0.5); }
 
 // Three steps with this cost alone, and powers bounded as well.
-RobotProblem makeProblem(const Model& model, const VectorXd& q0, const VectorXd& v0,
-                         const std::vector<ContactTarget>& contacts, const Discretization& how) {
+RobotProblem makeEnergyProblem(const Model& model, const VectorXd& q0, const VectorXd& v0,
+                               const std::vector<ContactTarget>& contacts, const TimedDiscretization& how) {
   std::vector<StageSpec> stages(4);
   const VectorXd losses = makeLosses(model), ones = VectorXd::Ones(model.nu()), bounds = VectorXd::Ones(2 * model.nu());
   for (int k = 0; k < 3; ++k) {
     StageSpec& stage = stages[k];
     stage.step = how.step;
-    stage.dt = kStep;
+    stage.dt = kTimeStep;
     if (how.free) stage.timing = {0, 0.5, 2};
     stage.constraints = makeConstraintSet(model, contacts);
     stage.costs.push_back(
@@ -63,7 +63,7 @@ VectorXd calcPowers(const Model& model, const RobotEvaluation& at) {
   return out;
 }
 
-void checkStage(const RobotProblem& problem, int k, const VectorXd& x, const VectorXd& u, std::mt19937& rng) {
+void checkEnergyStage(const RobotProblem& problem, int k, const VectorXd& x, const VectorXd& u, std::mt19937& rng) {
   RobotEvaluator evaluator(problem), moved(problem), node(problem);
   const Model& model = problem.model();
   const int ndx = problem.tangentSize(k), nu = problem.controlSize(k), rows = problem.constraintSize(k);
@@ -99,7 +99,7 @@ void checkStage(const RobotProblem& problem, int k, const VectorXd& x, const Vec
   const VectorXd r = calcPowers(model, static_cast<const RobotEvaluation&>(*at));
   VectorXd slope(r.size()), curvature(r.size());
   energy.calcDerivatives(r, slope, curvature);
-  const VectorXd diagonal = kStep * kWeight * curvature + weights.hessian / 9;
+  const VectorXd diagonal = kTimeStep * kWeight * curvature + weights.hessian / 9;
   const auto by = J.bottomRows(r.size());
   checkDerivative(MatrixXd(stage.hessian().selfadjointView<Eigen::Lower>()),
                   by.transpose() * diagonal.asDiagonal() * by, "Hessian");
@@ -108,7 +108,7 @@ void checkStage(const RobotProblem& problem, int k, const VectorXd& x, const Vec
 }  // namespace
 
 TEST_CASE("energy: derivatives by states, torques and durations, every joint kind times every closure kind") {
-  const Discretization how = GENERATE(from_range(listDiscretizations()));
+  const TimedDiscretization how = GENERATE(from_range(listTimedDiscretizations()));
   std::mt19937 rng(17);
   for (JointKind kind : kJointKinds)
     for (ClosureKind closure : kClosureKinds)
@@ -122,13 +122,13 @@ TEST_CASE("energy: derivatives by states, torques and durations, every joint kin
         Workspace ws(model);
         const VectorXd& q = mechanism.q_closed;
         const VectorXd v = projectVelocity(model, ws, makeConstraintSet(model), q, randomVector(rng, model.nv()));
-        const RobotProblem problem = makeProblem(model, q, v, contacts, how);
+        const RobotProblem problem = makeEnergyProblem(model, q, v, contacts, how);
         for (int k : {0, 1}) {
           CAPTURE(k);
           VectorXd x = problem.initialState(), u = randomVector(rng, problem.controlSize(k), 5);
           if (how.free && k == 0) u[model.nu()] = 0.8;
           if (how.free && k == 1) x[x.size() - 1] = 1.3;
-          checkStage(problem, k, x, u, rng);
+          checkEnergyStage(problem, k, x, u, rng);
         }
       }
 }
@@ -154,7 +154,7 @@ Model addDrives(const Model& model) {
 }  // namespace
 
 TEST_CASE("energy: derivatives of voltages, and of powers behind lossy gears, in every discretization") {
-  const Discretization how = GENERATE(from_range(listDiscretizations()));
+  const TimedDiscretization how = GENERATE(from_range(listTimedDiscretizations()));
   std::mt19937 rng(18);
   for (JointKind kind : kJointKinds) {
     CAPTURE(how, getName(kind));
@@ -170,7 +170,7 @@ TEST_CASE("energy: derivatives of voltages, and of powers behind lossy gears, in
     std::vector<StageSpec> stages(2);
     StageSpec& stage = stages[0];
     stage.step = how.step;
-    stage.dt = kStep;
+    stage.dt = kTimeStep;
     if (how.free) stage.timing = {0, 0.5, 2};
     stage.constraints = makeConstraintSet(model);
     stage.costs.push_back({"energy", kWeight, Activation::makeEnergy(VectorXd::Ones(nu), makeLosses(model), 0.3, 4),

@@ -110,7 +110,7 @@ Parametrization makeCleobot() {
            makeVariable("ankle_height", 0.04, 0.08), makeVariable("leg_motor_mass", 0.5, 1)}};
 }
 
-MakeMotion makeSmallSquat(const ProblemOptions& problem) {
+MakeMotion makeSquatMaker(const ProblemOptions& problem) {
   return [=](const Model& model) {
     SquatOptions options;
     options.depth = 0.8, options.duration = 0.8, options.settle = 0.1, options.time_step = 0.02;
@@ -118,7 +118,7 @@ MakeMotion makeSmallSquat(const ProblemOptions& problem) {
   };
 }
 
-MakeMotion makeShortWalk(const ProblemOptions& problem) {
+MakeMotion makeWalkMaker(const ProblemOptions& problem) {
   return [=](const Model& model) {
     WalkOptions options;
     options.speed = 0.4, options.steps = 2;
@@ -131,42 +131,42 @@ MakeMotion makeShortWalk(const ProblemOptions& problem) {
 TEST_CASE("envelope: squats of three robots, in both formulations, against motions solved again") {
   for (Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
     const std::string suffix = std::string(", ") + getName(formulation);
-    check("five-bar leg" + suffix, makeFivebar(), makeSmallSquat(formulation));
-    check("Bipetto" + suffix, makeBipetto(), makeSmallSquat(formulation));
-    check("Cleobot" + suffix, makeCleobot(), makeSmallSquat(formulation));
+    check("five-bar leg" + suffix, makeFivebar(), makeSquatMaker(formulation));
+    check("Bipetto" + suffix, makeBipetto(), makeSquatMaker(formulation));
+    check("Cleobot" + suffix, makeCleobot(), makeSquatMaker(formulation));
   }
 }
 
 TEST_CASE("envelope: walks, and Euler steps") {
-  check("Bipetto walks", makeBipetto(1), makeShortWalk(Formulation::Reduced));
-  check("Bipetto walks, full", makeBipetto(1), makeShortWalk(Formulation::Full));
-  check("Bipetto walks, Euler", makeBipetto(1), makeShortWalk({Formulation::Reduced, StepRule::Euler}));
-  check("Cleobot walks", {"cleobot", {}, {makeVariable("hip_crank", 0.04, 0.1)}}, makeShortWalk(Formulation::Reduced));
+  check("Bipetto walks", makeBipetto(1), makeWalkMaker(Formulation::Reduced));
+  check("Bipetto walks, full", makeBipetto(1), makeWalkMaker(Formulation::Full));
+  check("Bipetto walks, Euler", makeBipetto(1), makeWalkMaker({Formulation::Reduced, StepRule::Euler}));
+  check("Cleobot walks", {"cleobot", {}, {makeVariable("hip_crank", 0.04, 0.1)}}, makeWalkMaker(Formulation::Reduced));
 }
 
 TEST_CASE("envelope: controls at bounds, free durations, the least peak torque") {
   const Parametrization robot = makeFivebar();
-  const Optimum free(robot.startModel(), makeSmallSquat(Formulation::Reduced));
+  const Optimum free(robot.startModel(), makeSquatMaker(Formulation::Reduced));
   double most = 0;
   for (const VectorXd& u : free.motion.guess.us) most = std::max(most, u.lpNorm<Eigen::Infinity>());
 
   ProblemOptions bounded(Formulation::Reduced);
   for (const Motor& motor : robot.startModel().motors()) bounded.limits.efforts[motor.name] = 0.95 * most;
-  const Optimum at_bounds(robot.startModel(), makeSmallSquat(bounded));
+  const Optimum at_bounds(robot.startModel(), makeSquatMaker(bounded));
   int touching = 0;
   for (const VectorXd& u : at_bounds.motion.guess.us) touching += u.lpNorm<Eigen::Infinity>() == 0.95 * most;
   CHECK(touching > 0);
   // Where a torque reaches its bound the second derivative jumps, so that differences have to stay on one side.
-  check("bounded torques", robot, makeSmallSquat(bounded), nullptr, 1e-4);
+  check("bounded torques", robot, makeSquatMaker(bounded), nullptr, 1e-4);
 
   ProblemOptions timed(Formulation::Reduced);
   timed.timings.phases = {{kAllPhases, {}}};
-  check("free durations", robot, makeSmallSquat(timed));
+  check("free durations", robot, makeSquatMaker(timed));
 
   ProblemOptions peak(Formulation::Reduced);
   peak.objective.objective = Objective::PeakTorque;
   peak.objective = scaleObjective(free.motion, peak.objective);
-  check("least peak torque", robot, makeSmallSquat(peak), &free.motion.guess);
+  check("least peak torque", robot, makeSquatMaker(peak), &free.motion.guess);
 }
 
 namespace {
@@ -273,11 +273,11 @@ TEST_CASE("envelope: an optimum followed to first order, against optima of chang
     poisoned[largest] *= -1;
     CHECK(motors.getError(poisoned) > 3 * kFollowTolerance);
   };
-  check(makeFivebar(), makeSmallSquat(Formulation::Reduced), 0);
-  check(makeBipetto(), makeSmallSquat(Formulation::Reduced), 0);
-  check(makeBipetto(), makeSmallSquat(Formulation::Full), 2);
-  check(makeBipetto(), makeShortWalk(Formulation::Reduced), 0);
-  check(makeCleobot(), makeShortWalk(Formulation::Reduced), 1);
+  check(makeFivebar(), makeSquatMaker(Formulation::Reduced), 0);
+  check(makeBipetto(), makeSquatMaker(Formulation::Reduced), 0);
+  check(makeBipetto(), makeSquatMaker(Formulation::Full), 2);
+  check(makeBipetto(), makeWalkMaker(Formulation::Reduced), 0);
+  check(makeCleobot(), makeWalkMaker(Formulation::Reduced), 1);
 }
 
 TEST_CASE("envelope: where Gauss-Newton Hessians point the wrong way, second-order terms do not") {
@@ -303,8 +303,8 @@ TEST_CASE("envelope: where Gauss-Newton Hessians point the wrong way, second-ord
       {"five-bar leg jumps", makeFivebar(), jump, 2, Measure::RmsTorque, 0},
       {"five-bar leg jumps", makeFivebar(), jump, 2, Measure::Energy, 0},
       {"five-bar leg squats", makeFivebar(), squat, 0, Measure::Energy, 1},
-      {"Bipetto squats", makeBipetto(1), makeSmallSquat(Formulation::Reduced), 0, Measure::PeakTorque, 4},
-      {"Bipetto walks", makeBipetto(1), makeShortWalk(Formulation::Reduced), 0, Measure::RmsTorque, 4}};
+      {"Bipetto squats", makeBipetto(1), makeSquatMaker(Formulation::Reduced), 0, Measure::PeakTorque, 4},
+      {"Bipetto walks", makeBipetto(1), makeWalkMaker(Formulation::Reduced), 0, Measure::RmsTorque, 4}};
   for (const Case& c : cases) {
     const FollowedMotors motors(c.robot, c.make, c.variable);
     const OptimumDerivative derivative = motors.differentiate();
@@ -324,7 +324,7 @@ TEST_CASE("envelope: where Gauss-Newton Hessians point the wrong way, second-ord
 
 TEST_CASE("envelope: problems that do not fit the optimum are refused") {
   const Parametrization robot = makeFivebar();
-  const Optimum optimum(robot.startModel(), makeSmallSquat(Formulation::Reduced));
+  const Optimum optimum(robot.startModel(), makeSquatMaker(Formulation::Reduced));
   const MotionEnvelope envelope(optimum.motion, optimum.multipliers);
   CHECK(envelope.calcLagrangian(optimum.motion) == Approx(optimum.summary.cost).epsilon(1e-9));
   CHECK_THROWS_AS(envelope.calcLagrangian(makeSquat(optimum.model)), std::invalid_argument);

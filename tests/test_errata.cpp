@@ -12,7 +12,7 @@ using namespace bielle::testing;
 
 namespace {
 
-constexpr double kStep = 1e-3, kEqual = 1e-7, kDiffers = 1e-2;
+constexpr double kEqual = 1e-7, kDiffers = 1e-2;
 
 // The matrix of eq. 20.
 Matrix6d makeForceCross(const Vector6d& f) {
@@ -65,12 +65,12 @@ struct Case {
   const Model& model() const { return mechanism.model; }
   // d/dt of f(q, v) at the open configuration, along (v, a).
   MatrixXd differentiateInTime(const VectorXd& at, const std::function<VectorXd(const VectorXd&, const VectorXd&)>& f) {
-    return differentiate(VectorXd::Zero(1), kStep,
+    return differentiate(VectorXd::Zero(1), kDynamicsStep,
                          [&](const VectorXd& t) { return f(model().integrate(at, t[0] * v), v + t[0] * a); });
   }
   // By q in the tangent, v and a fixed.
   MatrixXd differentiateByPosition(const std::function<VectorXd(const State&)>& f) {
-    return differentiateTangent(model(), q_open, kStep,
+    return differentiateTangent(model(), q_open, kDynamicsStep,
                                 [&](const VectorXd& at) { return f(State(model(), at, v, a)); });
   }
   std::mt19937 rng;
@@ -129,7 +129,7 @@ TEST_CASE("Eq. 5: a minus, and the whole acceleration of the closure") {
     const Kkt at(model, c.q, c.v, tau);
     const VectorXd lambda = at.y.head(6), a = at.y.tail(n);
     const auto by_q = [&](const std::function<VectorXd(const VectorXd&)>& f) {
-      return differentiateTangent(model, c.q, kStep, f);
+      return differentiateTangent(model, c.q, kDynamicsStep, f);
     };
     const MatrixXd dy = by_q([&](const VectorXd& q) { return Kkt(model, q, c.v, tau).y; });
     const MatrixXd da_c = by_q([&](const VectorXd& q) { return State(model, q, c.v, a).a_c; });

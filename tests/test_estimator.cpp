@@ -11,13 +11,14 @@
 #include "control/foot_model.h"
 #include "count_allocations.h"
 #include "math/so3.h"
+#include "own_robots.h"
 
 namespace bielle {
 namespace {
 
-constexpr double kPeriod = 2e-3;  // s
+using bielle::testing::loadOwn;
 
-LoadedRobot load(const std::string& name) { return loadRobot(BIELLE_SOURCE_DIR "/robots/" + name); }
+constexpr double kReadingPeriod = 2e-3;  // s
 
 SE3 getTrunk(const VectorXd& q) { return {Eigen::Quaterniond(q[6], q[3], q[4], q[5]).toRotationMatrix(), q.head<3>()}; }
 
@@ -80,11 +81,12 @@ SensorReadings read(const Model& model, Swing& swing, const SE3& imu, double tim
     const SE3 X = getTrunk(swing.calcConfiguration(t)) * imu;
     return Vector3d(X.R * imu.actInvMotion(Vector6d(swing.calcVelocity(t).head<6>())).head<3>());
   };
-  const Matrix3d R = (getTrunk(q) * imu).R, before = (getTrunk(swing.calcConfiguration(time - kPeriod)) * imu).R;
+  const Matrix3d R = (getTrunk(q) * imu).R, before = (getTrunk(swing.calcConfiguration(time - kReadingPeriod)) * imu).R;
   const Vector3d turn = log3(Matrix3d(before.transpose() * R));
-  out.angular_velocity = turn / kPeriod;
-  out.specific_force = (before * exp3(Vector3d(0.5 * turn))).transpose() *
-                       ((calcImuVelocity(time) - calcImuVelocity(time - kPeriod)) / kPeriod - model.gravity());
+  out.angular_velocity = turn / kReadingPeriod;
+  out.specific_force =
+      (before * exp3(Vector3d(0.5 * turn))).transpose() *
+      ((calcImuVelocity(time) - calcImuVelocity(time - kReadingPeriod)) / kReadingPeriod - model.gravity());
   return out;
 }
 
@@ -95,7 +97,7 @@ double getLargest(const VectorXd& x) { return x.cwiseAbs().maxCoeff(); }
 TEST_CASE("estimator: exact sensors give the state of a robot on one foot") {
   for (const char* name : {"bipetto", "cleobot", "rsu_biped", "belt_biped"}) {
     CAPTURE(name);
-    const LoadedRobot robot = load(name);
+    const LoadedRobot robot = loadOwn(name);
     const Model& model = robot.model;
     Swing swing(model, 5);
     EstimatorOptions options;
@@ -103,8 +105,8 @@ TEST_CASE("estimator: exact sensors give the state of a robot on one foot") {
     Estimator estimator(model, swing.getStart(), options);
     estimator.reset(0, swing.getStart(), VectorXd::Zero(model.nv()), {0});
     for (int i = 1; i <= 150; ++i)
-      REQUIRE(estimator.update(read(model, swing, options.imu, i * kPeriod), {0}) == EstimatorStatus::Ok);
-    const double time = 150 * kPeriod;
+      REQUIRE(estimator.update(read(model, swing, options.imu, i * kReadingPeriod), {0}) == EstimatorStatus::Ok);
+    const double time = 150 * kReadingPeriod;
     const VectorXd q = swing.calcConfiguration(time), v = swing.calcVelocity(time);
     const Measurement& found = estimator.getMeasurement();
     CHECK(found.time == time);
@@ -126,7 +128,7 @@ TEST_CASE("estimator: exact sensors give the state of a robot on one foot") {
 TEST_CASE("estimator: a push on the trunk is no force of the ground on a foot in the air") {
   for (const char* name : {"bipetto", "cleobot"}) {
     CAPTURE(name);
-    const LoadedRobot robot = load(name);
+    const LoadedRobot robot = loadOwn(name);
     const Model& model = robot.model;
     const VectorXd q = makeStandingPosture(model), rest = VectorXd::Zero(model.nv());
     const double weight = model.mass() * 9.81;
@@ -155,7 +157,7 @@ TEST_CASE("estimator: a push on the trunk is no force of the ground on a foot in
     Estimator estimator(model, q);
     estimator.reset(0, q, rest, {0});
     for (int i = 1; i <= 100; ++i) {
-      readings.time = i * kPeriod;
+      readings.time = i * kReadingPeriod;
       estimator.update(readings, {0});
       REQUIRE(estimator.getContacts() == std::vector<char>{1, 0});
     }
@@ -166,7 +168,7 @@ TEST_CASE("estimator: a push on the trunk is no force of the ground on a foot in
 }
 
 TEST_CASE("estimator: feet that stand are at rest, unless they roll") {
-  const LoadedRobot robot = load("bipetto");
+  const LoadedRobot robot = loadOwn("bipetto");
   const Model& model = robot.model;
   const VectorXd q = makeStandingPosture(model), rest = VectorXd::Zero(model.nv());
   const PassiveJoints joints(model, q);
@@ -182,18 +184,18 @@ TEST_CASE("estimator: feet that stand are at rest, unless they roll") {
 }
 
 TEST_CASE("estimator: passive joints of a fixed linkage follow its motors") {
-  const LoadedRobot robot = load("fivebar");
+  const LoadedRobot robot = loadOwn("fivebar");
   Swing swing(robot.model, 3);
   Estimator estimator(robot.model, swing.getStart());
   for (int i = 1; i <= 200; ++i) {
-    REQUIRE(estimator.update(read(robot.model, swing, {}, i * kPeriod), {}) == EstimatorStatus::Ok);
-    CHECK(getLargest(estimator.getMeasurement().q - swing.calcConfiguration(i * kPeriod)) < 1e-9);
+    REQUIRE(estimator.update(read(robot.model, swing, {}, i * kReadingPeriod), {}) == EstimatorStatus::Ok);
+    CHECK(getLargest(estimator.getMeasurement().q - swing.calcConfiguration(i * kReadingPeriod)) < 1e-9);
   }
-  CHECK(getLargest(estimator.getMeasurement().v - swing.calcVelocity(200 * kPeriod)) < 0.02);
+  CHECK(getLargest(estimator.getMeasurement().v - swing.calcVelocity(200 * kReadingPeriod)) < 0.02);
 }
 
 TEST_CASE("estimator: near a dead point the status says so") {
-  const LoadedRobot robot = load("fivebar");
+  const LoadedRobot robot = loadOwn("fivebar");
   const Model& model = robot.model;
   const VectorXd q = makeStandingPosture(model);
   Estimator estimator(model, q);
@@ -203,7 +205,7 @@ TEST_CASE("estimator: near a dead point the status says so") {
   bool warned = false;
   EstimatorStatus status = EstimatorStatus::Ok;
   for (int i = 0; i < 2000 && status != EstimatorStatus::NotClosed; ++i) {  // the motors move apart
-    readings.time = i * kPeriod;
+    readings.time = i * kReadingPeriod;
     readings.motor_positions += Eigen::Vector2d(-1e-3, 1e-3);
     status = estimator.update(readings, {});
     CHECK(estimator.getMeasurement().q.allFinite());
@@ -222,12 +224,12 @@ TEST_CASE("estimator: near a dead point the status says so") {
 }
 
 TEST_CASE("estimator: readings that are not finite change nothing") {
-  const LoadedRobot robot = load("bipetto");
+  const LoadedRobot robot = loadOwn("bipetto");
   const Model& model = robot.model;
   Swing swing(model, 1);
   Estimator estimator(model, swing.getStart());
   estimator.reset(0, swing.getStart(), VectorXd::Zero(model.nv()), {0});
-  SensorReadings readings = read(model, swing, {}, kPeriod);
+  SensorReadings readings = read(model, swing, {}, kReadingPeriod);
   estimator.update(readings, {0});
   const Measurement before = estimator.getMeasurement();
   for (int part = 0; part < 5; ++part) {
@@ -242,25 +244,25 @@ TEST_CASE("estimator: readings that are not finite change nothing") {
     CHECK(estimator.getMeasurement().q == before.q);
     CHECK(estimator.getMeasurement().v == before.v);
   }
-  readings.time = 2 * kPeriod;
+  readings.time = 2 * kReadingPeriod;
   CHECK(estimator.update(readings, {0}) == EstimatorStatus::Ok);
 }
 
 TEST_CASE("estimator: robots with joints that no motor determines are refused") {
-  const LoadedRobot rail = load("fivebar_leg");
+  const LoadedRobot rail = loadOwn("fivebar_leg");
   CHECK_THROWS_AS(Estimator(rail.model, makeStandingPosture(rail.model)), ModelError);
-  const LoadedRobot chain = load("spring_leg");
+  const LoadedRobot chain = loadOwn("spring_leg");
   CHECK_THROWS_AS(Estimator(chain.model, makeStandingPosture(chain.model)), ModelError);
 }
 
 TEST_CASE("estimator: an update does not allocate") {
-  const LoadedRobot robot = load("bipetto");
+  const LoadedRobot robot = loadOwn("bipetto");
   const Model& model = robot.model;
   Swing swing(model, 2);
   Estimator estimator(model, swing.getStart());
   estimator.reset(0, swing.getStart(), VectorXd::Zero(model.nv()), {0});
   std::vector<SensorReadings> readings;
-  for (int i = 1; i <= 20; ++i) readings.push_back(read(model, swing, {}, i * kPeriod));
+  for (int i = 1; i <= 20; ++i) readings.push_back(read(model, swing, {}, i * kReadingPeriod));
   const std::vector<int> planned = {0, 1};
   const long before = num_allocations;
   for (const SensorReadings& reading : readings) estimator.update(reading, planned);

@@ -14,20 +14,20 @@ using namespace bielle;
 
 namespace {
 
-struct Solution {
+struct SquatSolution {
   FddpSummary summary;
   ShootingTrajectory trajectory;
   double gap = 0;  // largest closing error at any node, m or rad
 };
 
-Solution solveSquat(const Model& model, double depth, double dt, Formulation formulation) {
+SquatSolution solveSquat(const Model& model, double depth, double dt, Formulation formulation) {
   SquatOptions options;
   options.depth = depth;
   options.time_step = dt;
   options.contact_kp = 400;
   options.contact_kd = 40;  // critical damping; the default is for steps of 15 ms and below
   Motion motion = makeSquat(model, options, {formulation, StepRule::Euler});
-  Solution out;
+  SquatSolution out;
   out.summary = Fddp().solve(*motion.problem, motion.guess);
   out.trajectory = std::move(motion.guess);
   Workspace ws(model);
@@ -45,7 +45,7 @@ double calcLargestTorque(const std::vector<VectorXd>& us) {
 }
 
 // At the same nodes.
-double calcTorqueDifference(const Solution& a, const Solution& b) {
+double calcTorqueDifference(const SquatSolution& a, const SquatSolution& b) {
   REQUIRE(a.trajectory.us.size() == b.trajectory.us.size());
   double largest = 0;
   for (size_t k = 0; k < a.trajectory.us.size(); ++k)
@@ -54,7 +54,7 @@ double calcTorqueDifference(const Solution& a, const Solution& b) {
 }
 
 struct Comparison {
-  Solution full, reduced;
+  SquatSolution full, reduced;
   double torque = 0, difference = 0;  // N m
 };
 

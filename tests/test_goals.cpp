@@ -5,18 +5,18 @@
 #include <tuple>
 
 #include "bielle/io/result.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/sequence.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
+#include "math/constants.h"
+#include "own_robots.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // Two feet, eleven nodes, 0.1 s apart.
 MotionTrack makeTrackOfTwoFeet() {
@@ -36,12 +36,7 @@ Goal makeGoal(GoalKind kind, double requested, double tolerance, int first = 0, 
   return {kind, getName(kind), requested, tolerance, first, last};
 }
 
-const Model& getBipetto() {
-  static const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto").model;
-  return model;
-}
-
-MotionResult solve(Motion motion) {
+MotionResult solveForResult(Motion motion) {
   const FddpSummary summary = Fddp().solve(*motion.problem, motion.guess);
   return makeResult({"bipetto", "", {}}, motion, motion.guess, summary);
 }
@@ -165,18 +160,19 @@ TEST_CASE("goals: motions of Bipetto achieve what was requested") {
   };
   SquatOptions up;
   up.depth = 1.05;
-  expect(solve(makeSquat(getBipetto())), {{"depth", 0.7}});
-  expect(solve(makeSquat(getBipetto(), up)), {{"depth", 1.05}});
+  expect(solveForResult(makeSquat(getBipetto())), {{"depth", 0.7}});
+  expect(solveForResult(makeSquat(getBipetto(), up)), {{"depth", 1.05}});
   WalkOptions backward;
   backward.speed = -0.3;
-  expect(solve(makeWalk(getBipetto())), {{"speed", 0.5}, {"footholds", 0}});
-  expect(solve(makeWalk(getBipetto(), backward)), {{"speed", -0.3}, {"footholds", 0}});
-  expect(solve(makeSideWalk(getBipetto())), {{"speed", 0.2}, {"footholds", 0}});
-  expect(solve(makeTurn(getBipetto())), {{"angle", 1.57}, {"footholds", 0}});
-  expect(solve(makeStairs(getBipetto())), {{"climb", 0.24}, {"speed", 0.3}, {"footholds", 0}});
+  expect(solveForResult(makeWalk(getBipetto())), {{"speed", 0.5}, {"footholds", 0}});
+  expect(solveForResult(makeWalk(getBipetto(), backward)), {{"speed", -0.3}, {"footholds", 0}});
+  expect(solveForResult(makeSideWalk(getBipetto())), {{"speed", 0.2}, {"footholds", 0}});
+  expect(solveForResult(makeTurn(getBipetto())), {{"angle", 1.57}, {"footholds", 0}});
+  expect(solveForResult(makeStairs(getBipetto())), {{"climb", 0.24}, {"speed", 0.3}, {"footholds", 0}});
   JumpOptions jump;
   jump.length = 0.2;
-  expect(solve(makeJump(getBipetto(), jump)), {{"flight", 0.3}, {"height", 0.02 + 9.81 * 0.09 / 8}, {"length", 0.2}});
+  expect(solveForResult(makeJump(getBipetto(), jump)),
+         {{"flight", 0.3}, {"height", 0.02 + 9.81 * 0.09 / 8}, {"length", 0.2}});
 }
 
 TEST_CASE("goals: a sequence has those of its motions, at their nodes") {
@@ -233,7 +229,7 @@ TEST_CASE("goals: trajectories that miss are reported") {
   // Weights that pull towards something else: the squat converges and is too shallow.
   SquatOptions lazy;
   lazy.com_weight = 10;
-  const MotionResult shallow = solve(makeSquat(getBipetto(), lazy));
+  const MotionResult shallow = solveForResult(makeSquat(getBipetto(), lazy));
   CHECK(shallow.converged());
   CHECK(find(shallow, "depth").achieved > 0.72);
   CHECK_FALSE(find(shallow, "depth").met());

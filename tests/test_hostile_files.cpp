@@ -10,7 +10,7 @@
 
 #include "bielle/io/record.h"
 #include "bielle/model/error.h"
-#include "get_error.h"
+#include "get_error_of_reading.h"
 #include "io/text_file.h"
 #include "robot_directory.h"
 
@@ -19,10 +19,6 @@ using namespace bielle;
 using namespace bielle::testing;
 
 namespace {
-
-std::string getErrorOfReading(const std::string& path) {
-  return getError([&] { readRecord(path); });
-}
 
 // Arguments: where to write. Each archive is a whole trajectory of one joint but for one array, which is replaced.
 const char* const kMakeArchives = R"(

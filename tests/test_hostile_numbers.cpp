@@ -16,6 +16,7 @@
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
 #include "bielle/robots/fourbar_chain.h"
+#include "infinity.h"
 #include "mechanisms.h"
 
 using namespace bielle;
@@ -24,7 +25,6 @@ using namespace bielle::testing;
 namespace {
 
 using Random = std::mt19937;
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 int choose(Random& rng, int count) { return std::uniform_int_distribution<int>(0, count - 1)(rng); }
 template <typename T>
@@ -179,7 +179,7 @@ StageSpec makeStage(Random& rng, Range range, const Model& model, const VectorXd
   return stage;
 }
 
-FddpOptions makeOptions(Random& rng) {
+FddpOptions makeHostileOptions(Random& rng) {
   FddpOptions options;
   options.max_iterations = 1 + choose(rng, 8);
   options.threads = 1 + choose(rng, 2);
@@ -226,7 +226,7 @@ TEST_CASE("optimal control of random mechanisms with random options") {
     trajectory.xs.assign(stages + 1, motion.problem->initialState());
     trajectory.us.assign(stages, randomVector(rng, model.nu()) *
                                      (range == Range::Usual ? 1.0 : pick(rng, {0.0, 1.0, 1e5, 1e150, 1e300})));
-    const FddpSummary summary = Fddp(makeOptions(rng)).solve(*motion.problem, trajectory);
+    const FddpSummary summary = Fddp(makeHostileOptions(rng)).solve(*motion.problem, trajectory);
     ++count[summary.termination];
     CAPTURE(getName(summary.termination), summary.message);
     CHECK_FALSE(summary.message.empty());

@@ -15,6 +15,7 @@
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "get_error.h"
+#include "get_error_of_reading.h"
 #include "io/npz.h"
 #include "io/opensim.h"
 #include "io/text_file.h"
@@ -90,10 +91,6 @@ bool areEqual(const Multipliers& a, const Multipliers& b) {
   return a.penalty == b.penalty && a.values.size() == b.values.size() &&
          std::equal(a.values.begin(), a.values.end(), b.values.begin(),
                     [](const VectorXd& x, const VectorXd& y) { return x.size() == y.size() && x == y; });
-}
-
-std::string getErrorOfReading(const std::string& path) {
-  return getError([&] { readRecord(path); });
 }
 
 }  // namespace

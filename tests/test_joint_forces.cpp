@@ -14,8 +14,6 @@ using namespace bielle::testing;
 
 namespace {
 
-constexpr double kStep = 1e-3;
-
 Joint makeSlide() {
   Joint joint;
   joint.name = "slide";
@@ -143,10 +141,10 @@ TEST_CASE("joint forces: inverse and constrained dynamics against differences, e
       Workspace ws(model), other(model);
       const VectorXd inverse = calcInverseDynamics(model, ws, q, v, a);
       updateInverseDynamicsDerivatives(model, ws, {});
-      checkDerivative(ws.dID_dq, differentiateTangent(model, q, kStep, [&](const VectorXd& x) {
+      checkDerivative(ws.dID_dq, differentiateTangent(model, q, kDynamicsStep, [&](const VectorXd& x) {
                         return calcInverseDynamics(model, other, x, v, a);
                       }));
-      checkDerivative(ws.dID_dv, differentiate(v, kStep, [&](const VectorXd& x) {
+      checkDerivative(ws.dID_dv, differentiate(v, kDynamicsStep, [&](const VectorXd& x) {
                         return calcInverseDynamics(model, other, q, x, a);
                       }));
       updateMassMatrix(model, ws);
@@ -161,8 +159,9 @@ TEST_CASE("joint forces: inverse and constrained dynamics against differences, e
         REQUIRE(updateConstrainedDynamics(model, other, ocws, set, x, y, tau) == DynamicsStatus::Ok);
         return ocws.a;
       };
-      checkDerivative(cws.da_dq, differentiateTangent(model, q, kStep, [&](const VectorXd& x) { return solve(x, v); }));
-      checkDerivative(cws.da_dv, differentiate(v, kStep, [&](const VectorXd& x) { return solve(q, x); }));
+      checkDerivative(cws.da_dq,
+                      differentiateTangent(model, q, kDynamicsStep, [&](const VectorXd& x) { return solve(x, v); }));
+      checkDerivative(cws.da_dv, differentiate(v, kDynamicsStep, [&](const VectorXd& x) { return solve(q, x); }));
 
       // Along a change of the motion, the change of inverse dynamics is that of its derivatives.
       calcInverseDynamics(model, ws, q, v, a);

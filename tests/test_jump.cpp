@@ -6,15 +6,12 @@
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/jump.h"
+#include "own_robots.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
-
-const Model& getBipetto() {
-  static const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto").model;
-  return model;
-}
 
 int findPhase(const ContactSchedule& schedule, const std::string& name) {
   int node = 0;
@@ -26,7 +23,7 @@ int findPhase(const ContactSchedule& schedule, const std::string& name) {
   return -1;
 }
 
-struct Outcome {
+struct JumpOutcome {
   double lowest_corner = 1e9, clearance = 0;      // of the soles over the ground: at any time; at mid-flight, m
   double touchdown = 0;                           // largest speed of a foot as it comes down, m/s
   double misplaced = 0;                           // largest distance of a foot from where it should land, m
@@ -41,7 +38,7 @@ struct Outcome {
   Vector3d travel;                                // of the CoM from start to end, m
 };
 
-void measureFeet(const Motion& motion, const ShootingTrajectory& t, Outcome& out) {
+void measureFeet(const Motion& motion, const ShootingTrajectory& t, JumpOutcome& out) {
   const Model& model = motion.problem->model();
   Workspace ws(model);
   const int flight = findPhase(motion.schedule, "flight"), land = findPhase(motion.schedule, "land");
@@ -68,7 +65,7 @@ void measureFeet(const Motion& motion, const ShootingTrajectory& t, Outcome& out
   }
 }
 
-void measureBody(const Motion& motion, const ShootingTrajectory& t, Outcome& out) {
+void measureBody(const Motion& motion, const ShootingTrajectory& t, JumpOutcome& out) {
   const Model& model = motion.problem->model();
   Workspace ws(model);
   const int flight = findPhase(motion.schedule, "flight"), land = findPhase(motion.schedule, "land");
@@ -96,7 +93,7 @@ void measureBody(const Motion& motion, const ShootingTrajectory& t, Outcome& out
   out.travel = com.back() - com.front();
 }
 
-void measureForces(const Motion& motion, const ShootingTrajectory& t, Outcome& out) {
+void measureForces(const Motion& motion, const ShootingTrajectory& t, JumpOutcome& out) {
   const Model& model = motion.problem->model();
   RobotEvaluator evaluator(*motion.problem);
   for (size_t k = 0; k < t.us.size(); ++k) {
@@ -115,11 +112,11 @@ void measureForces(const Motion& motion, const ShootingTrajectory& t, Outcome& o
   }
 }
 
-Outcome solveAndMeasure(Motion& motion, FddpSummary& summary) {
+JumpOutcome solveJump(Motion& motion, FddpSummary& summary) {
   FddpOptions solver;
   solver.max_iterations = 100;
   summary = Fddp(solver).solve(*motion.problem, motion.guess);
-  Outcome out;
+  JumpOutcome out;
   measureFeet(motion, motion.guess, out);
   measureBody(motion, motion.guess, out);
   measureForces(motion, motion.guess, out);
@@ -135,7 +132,7 @@ TEST_CASE("jump: the paper's problem has a solution, which flies as a stone") {
   options.flight = 0.3;  // in its own 0.39 s the push goes through the knee's dead point
   Motion motion = makeJump(getBipetto(), options);
   FddpSummary summary;
-  const Outcome out = solveAndMeasure(motion, summary);
+  const JumpOutcome out = solveJump(motion, summary);
   CAPTURE(summary.message, summary.iterations);
   CHECK(summary.termination == FddpTermination::Converged);
   CHECK(out.stone < 1e-2);
@@ -157,7 +154,7 @@ TEST_CASE("jump: Bipetto flies as long and as far as requested, and lands softly
     options.length = row.length;
     Motion motion = makeJump(getBipetto(), options, row.formulation);
     FddpSummary summary;
-    const Outcome out = solveAndMeasure(motion, summary);
+    const JumpOutcome out = solveJump(motion, summary);
     CAPTURE(summary.message, summary.iterations);
     CHECK(summary.termination == FddpTermination::Converged);
     CHECK(out.lowest_corner > -2e-3);

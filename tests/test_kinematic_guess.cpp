@@ -4,25 +4,21 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/stairs.h"
 #include "bielle/motion/walk.h"
 #include "motion/kinematic_guess.h"
+#include "own_robots.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
-
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
-  return robot.model;
-}
 
 // Largest distance of a standing foot from its place, and gap of a closure, at the nodes of the guess.
 struct Errors {
   double feet = 0, closures = 0;
 };
-Errors measure(const Motion& motion) {
+Errors measureErrors(const Motion& motion) {
   const Model& model = getBipetto();
   const ConstraintSet closures = makeConstraintSet(model);
   Workspace ws(model);
@@ -67,7 +63,7 @@ TEST_CASE("guess: loops are closed, and standing feet are where they stand") {
   stairs.height = 0.05;
   for (const Motion& motion : {makeWalk(getBipetto(), walk), makeStairs(getBipetto(), stairs)}) {
     INFO(motion.name);
-    const Errors errors = measure(motion);
+    const Errors errors = measureErrors(motion);
     CHECK(errors.closures < 1e-10);
     CHECK(errors.feet < 1e-10);
   }

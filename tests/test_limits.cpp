@@ -11,18 +11,15 @@
 #include "bielle/motion/jump.h"
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
+#include "own_robots.h"
 #include "robot_directory.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
 
-const Model& getBipetto() {
-  static const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto").model;
-  return model;
-}
-
-FddpSummary solve(Motion& motion) {
+FddpSummary solveWithinLimits(Motion& motion) {
   FddpOptions options;
   if (motion.bounded) options.bounds = ControlBounds::Enforce;
   return Fddp(options).solve(*motion.problem, motion.guess);
@@ -66,14 +63,14 @@ template <typename Make>
 void checkKneesAtFourFifths(const Make& make) {
   const char* const knees[] = {"motor_knee_left", "motor_knee_right"};
   Motion free = make(ProblemOptions());
-  const FddpSummary without = solve(free);
+  const FddpSummary without = solveWithinLimits(free);
   REQUIRE(without.termination == FddpTermination::Converged);
   LimitOptions limits;
   for (const char* knee : knees) limits.efforts[knee] = 0.8 * calcPeakTorque(free, knee);
   Motion bounded = make(ProblemOptions(Formulation::Reduced, limits));
   CHECK(bounded.bounded);
   CHECK(!free.bounded);
-  const FddpSummary with = solve(bounded);
+  const FddpSummary with = solveWithinLimits(bounded);
   CAPTURE(with.message, with.iterations);
   CHECK(with.termination == FddpTermination::Converged);
   CHECK(with.cost > without.cost);
@@ -104,7 +101,7 @@ TEST_CASE("limits: motors keep to their velocity, and use it") {
   options.duration = 1.2;
   const std::string motor = "motor_knee_right";
   Motion free = makeSquat(getBipetto(), options);
-  const FddpSummary without = solve(free);
+  const FddpSummary without = solveWithinLimits(free);
   REQUIRE(without.termination == FddpTermination::Converged);
   const double limit = 0.7 * calcPeakVelocity(free, motor);
   for (Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
@@ -112,7 +109,7 @@ TEST_CASE("limits: motors keep to their velocity, and use it") {
     LimitOptions limits;
     limits.velocities = {{motor, limit}, {"motor_knee_left", limit}};
     Motion slow = makeSquat(getBipetto(), options, {formulation, limits});
-    const FddpSummary with = solve(slow);
+    const FddpSummary with = solveWithinLimits(slow);
     CHECK(with.termination == FddpTermination::Converged);
     CHECK(with.cost > without.cost);
     CHECK(calcPeakVelocity(slow, motor) <= (1 + 1e-8) * limit);
@@ -125,13 +122,13 @@ TEST_CASE("limits: motors keep to their power, and use it") {
   options.time_step = 0.01;
   const std::vector<std::string> knees = {"motor_knee_left", "motor_knee_right"};
   Motion free = makeJump(getBipetto(), options);
-  const FddpSummary without = solve(free);
+  const FddpSummary without = solveWithinLimits(free);
   REQUIRE(without.termination == FddpTermination::Converged);
   const double limit = 0.8 * calcPeakPower(free, knees[0]);
   LimitOptions limits;
   for (const std::string& knee : knees) limits.powers[knee] = limit;
   Motion weak = makeJump(getBipetto(), options, {Formulation::Reduced, limits});
-  const FddpSummary with = solve(weak);
+  const FddpSummary with = solveWithinLimits(weak);
   CAPTURE(with.message, with.iterations);
   CHECK(with.termination == FddpTermination::Converged);
   CHECK(with.cost > without.cost);
@@ -166,7 +163,7 @@ TEST_CASE("limits: a joint stays within its range, and uses it") {
   WalkOptions options;
   options.steps = 3;
   Motion wide = makeWalk(getBipetto(), options);
-  REQUIRE(solve(wide).termination == FddpTermination::Converged);
+  REQUIRE(solveWithinLimits(wide).termination == FddpTermination::Converged);
   const int q = getBipetto().joints()[getBipetto().findJoint("hipx_left")].idx_q;
   const auto calcLargest = [q](const Motion& motion) {
     double largest = -1;
@@ -179,7 +176,7 @@ TEST_CASE("limits: a joint stays within its range, and uses it") {
   const Model model =
       loadRobot(replaceRange(directory, "lower=\"-0.523599\" upper=\"" + std::to_string(limit) + "\"")).model;
   Motion narrow = makeWalk(model, options);
-  const FddpSummary summary = solve(narrow);
+  const FddpSummary summary = solveWithinLimits(narrow);
   CAPTURE(summary.message, summary.iterations, limit);
   CHECK(summary.termination == FddpTermination::Converged);
   CHECK(calcLargest(narrow) <= limit + 1e-6);
@@ -266,14 +263,14 @@ TEST_CASE("limits: motors keep to the voltage of their supply, and use it") {
   drive.back_efficiency = 0.8;
   const Model plenty = makeDriven(drive);
   Motion free = makeSquat(plenty, options);
-  const FddpSummary without = solve(free);
+  const FddpSummary without = solveWithinLimits(free);
   REQUIRE(without.termination == FddpTermination::Converged);
   drive.voltage = 0.8 * 1e3 * calcVoltageUse(free);
   const Model tight = makeDriven(drive);
   for (Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
     CAPTURE(getName(formulation), drive.voltage);
     Motion limited = makeSquat(tight, options, {formulation, {}});
-    const FddpSummary with = solve(limited);
+    const FddpSummary with = solveWithinLimits(limited);
     CHECK(with.termination == FddpTermination::Converged);
     CHECK(with.cost > without.cost);
     CHECK(calcVoltageUse(limited) <= 1 + 1e-7);
@@ -281,7 +278,7 @@ TEST_CASE("limits: motors keep to the voltage of their supply, and use it") {
     LimitOptions none;
     none.enforced = false;
     Motion again = makeSquat(tight, options, {formulation, none});
-    CHECK(solve(again).termination == FddpTermination::Converged);
+    CHECK(solveWithinLimits(again).termination == FddpTermination::Converged);
     CHECK(calcVoltageUse(again) > 1.1);
   }
 }

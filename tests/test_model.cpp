@@ -4,14 +4,13 @@
 
 #include "bielle/model/builder.h"
 #include "get_error.h"
+#include "infinity.h"
 #include "math/so3.h"
 
 using namespace bielle;
 using namespace bielle::testing;
 
 namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 Joint makeJoint(const std::string& name, JointKind kind, const Vector3d& p = Vector3d::Zero()) {
   Joint joint;

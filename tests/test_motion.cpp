@@ -11,26 +11,26 @@
 #include "bielle/motion/squat.h"
 #include "bielle/motion/walk.h"
 #include "motion/benchmark_walk.h"
+#include "own_robots.h"
 #include "problem_probe.h"
 #include "robot_directory.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
 
-Model loadOwn(const std::string& name) { return loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/" + name).model; }
-
-struct Outcome {
+struct SquatOutcome {
   double gap = 0;                                 ///< largest closure residual at any node, m or rad
   double slide = 0;                               ///< largest displacement of a contact, m
   double lowest = 1e9, highest = -1e9, last = 0;  ///< height of the CoM over its initial height
   double worst_height = 0;                        ///< largest distance of the CoM from the requested height, m
 };
 
-Outcome measure(const Model& model, const SquatOptions& options, const std::vector<VectorXd>& xs) {
+SquatOutcome measureSquat(const Model& model, const SquatOptions& options, const std::vector<VectorXd>& xs) {
   Workspace ws(model);
   const ConstraintSet set = makeConstraintSet(model);
-  Outcome out;
+  SquatOutcome out;
   std::vector<Vector3d> places;
   double initial = 0;
   for (size_t k = 0; k < xs.size(); ++k) {
@@ -67,7 +67,7 @@ double calcDefect(const RobotProblem& problem, const ShootingTrajectory& t) {
 }  // namespace
 
 TEST_CASE("squat: Bipetto goes down or up as requested, loops closed, feet in place") {
-  const Model model = loadOwn("bipetto");
+  const Model model = loadOwn("bipetto").model;
   struct Row {
     Formulation formulation;
     double depth;
@@ -87,7 +87,7 @@ TEST_CASE("squat: Bipetto goes down or up as requested, loops closed, feet in pl
     CAPTURE(summary.message, summary.iterations);
     CHECK(summary.termination == FddpTermination::Converged);
     CHECK(calcDefect(*motion.problem, motion.guess) < 1e-9);
-    const Outcome outcome = measure(model, options, motion.guess.xs);
+    const SquatOutcome outcome = measureSquat(model, options, motion.guess.xs);
     CHECK(outcome.gap < row.gap);
     CHECK(outcome.slide < 2e-3);
     CHECK(outcome.worst_height < row.height_tolerance);
@@ -97,7 +97,7 @@ TEST_CASE("squat: Bipetto goes down or up as requested, loops closed, feet in pl
 }
 
 TEST_CASE("a leg on a rail squats and jumps, and comes to rest") {
-  const Model model = loadOwn("fivebar_leg");
+  const Model model = loadOwn("fivebar_leg").model;
   SquatOptions squat;
   squat.depth = 0.8;
   std::vector<Motion> motions;
@@ -112,7 +112,7 @@ TEST_CASE("a leg on a rail squats and jumps, and comes to rest") {
 }
 
 TEST_CASE("squat: impossible options are refused, unknown ones are named") {
-  const Model model = loadOwn("bipetto");
+  const Model model = loadOwn("bipetto").model;
   const auto make = [&](const std::string& option, double value) {
     SquatOptions options;
     setOption(listOptions(options), option, value);
@@ -136,11 +136,11 @@ TEST_CASE("squat: impossible options are refused, unknown ones are named") {
     CHECK_THROWS_AS(make(option, value), ModelError);
     CHECK_THROWS_WITH(make(option, value), Catch::Contains(option));
   }
-  CHECK_THROWS_AS(makeSquat(loadOwn("fourbar"), {}), ModelError);  // no feet
+  CHECK_THROWS_AS(makeSquat(loadOwn("fourbar").model, {}), ModelError);  // no feet
 }
 
 TEST_CASE("weights by joint come with the robot's file, whatever the joints are called") {
-  const Model bipetto = loadOwn("bipetto");
+  const Model bipetto = loadOwn("bipetto").model;
   const VectorXd weights = makeStateWeights(bipetto);
   const auto getWeights = [&](const std::string& joint) {
     const int k = bipetto.joints()[bipetto.findJoint(joint)].idx_v;
@@ -160,7 +160,7 @@ TEST_CASE("weights by joint come with the robot's file, whatever the joints are 
 }
 
 TEST_CASE("contact gains and wrench cones follow one rule in all motions") {
-  const Model model = loadOwn("bipetto");
+  const Model model = loadOwn("bipetto").model;
   SquatOptions squat;
   JumpOptions jump;
   WalkOptions walk;
@@ -202,7 +202,7 @@ TEST_CASE("contact gains and wrench cones follow one rule in all motions") {
 }
 
 TEST_CASE("a foot beside its place returns as the limits of the gains have it") {
-  const Model model = loadOwn("bipetto");
+  const Model model = loadOwn("bipetto").model;
   const auto rule = GENERATE(StepRule::Euler, StepRule::Midpoint);
   const auto formulation = GENERATE(Formulation::Full, Formulation::Reduced);
   CAPTURE(getName(rule), getName(formulation));
@@ -238,7 +238,7 @@ TEST_CASE("a foot beside its place returns as the limits of the gains have it") 
 }
 
 TEST_CASE("standing posture: springs that no motor holds are bent by the weight") {
-  const Model model = loadOwn("spring_biped");
+  const Model model = loadOwn("spring_biped").model;
   const VectorXd unloaded = assembleReference(model, "half_sitting").q, q = makeStandingPosture(model);
   const ConstraintSet set = makeConstraintSet(model, makeContactTargets(model, unloaded, {0, 1}, 0, 0));
   CHECK(calcStaticTorques(model, set, unloaded).residual > 1);  // N m
@@ -251,11 +251,12 @@ TEST_CASE("standing posture: springs that no motor holds are bent by the weight"
     CHECK(std::abs(q[spring.idx_q]) > 0.01);
     CHECK(std::abs(q[spring.idx_q]) < 0.1);
   }
-  CHECK(makeStandingPosture(loadOwn("belt_biped")) == assembleReference(loadOwn("belt_biped"), "half_sitting").q);
+  CHECK(makeStandingPosture(loadOwn("belt_biped").model) ==
+        assembleReference(loadOwn("belt_biped").model, "half_sitting").q);
 }
 
 TEST_CASE("contacts keep their index in the constraints of a stage") {
-  const Model model = loadOwn("bipetto");
+  const Model model = loadOwn("bipetto").model;
   const ConstraintSet set = makeConstraintSet(model, {{1, {}, 0, 0}, {0, {}, 0, 0}});
   CHECK(set.contacts == std::vector<int>{1, 0});
   for (int c = set.num_loops; c < static_cast<int>(set.closures.size()); ++c)
@@ -263,7 +264,7 @@ TEST_CASE("contacts keep their index in the constraints of a stage") {
 }
 
 TEST_CASE("benchmark walk: the schedule that speed is measured on") {
-  const Model model = loadOwn("bipetto");
+  const Model model = loadOwn("bipetto").model;
   const auto formulation = GENERATE(Formulation::Full, Formulation::Reduced);
   CAPTURE(getName(formulation));
   Motion motion = makeBenchmarkWalk(model, {}, formulation);
@@ -312,5 +313,5 @@ TEST_CASE("benchmark walk: the schedule that speed is measured on") {
   BenchmarkWalkOptions options;
   options.total_nodes = 100;
   CHECK_THROWS_AS(makeBenchmarkWalk(model, options), ModelError);
-  CHECK_THROWS_AS(makeBenchmarkWalk(loadOwn("fourbar")), ModelError);
+  CHECK_THROWS_AS(makeBenchmarkWalk(loadOwn("fourbar").model), ModelError);
 }

@@ -17,10 +17,8 @@
 namespace bielle::simulation {
 namespace {
 
-using namespace testing;
-
 // Measured: 1.4e-3 (half a step of free fall is missing from the work of gravity), 6e-8 and 9e-8 m.
-constexpr TrialTolerances kTolerances{0.005, 1e-6, 1e-6};
+constexpr testing::TrialTolerances kMujocoTolerances{0.005, 1e-6, 1e-6};
 
 Inertia makeBob() {
   Inertia inertia;
@@ -41,23 +39,23 @@ std::unique_ptr<World> makeFineWorld(const Model& model, double time_step) {
 
 TEST_CASE("mujoco world: a robot stands") {
   const Model model = loadRobot("bipetto").model;
-  checkStanding(*makeMujocoWorld(model), model, kTolerances);
+  testing::checkStanding(*makeMujocoWorld(model), model, kMujocoTolerances);
 }
 
 TEST_CASE("mujoco world: a robot is dropped, and the books balance") {
   const Model model = loadRobot("bipetto").model;
-  checkDropped(*makeMujocoWorld(model), model, kTolerances);
+  testing::checkDropped(*makeMujocoWorld(model), model, kMujocoTolerances);
 }
 
 TEST_CASE("mujoco world: a robot is pushed, and the work of the push is booked") {
   const Model model = loadRobot("bipetto").model;
-  checkPushed(*makeMujocoWorld(model), model, kTolerances);
+  testing::checkPushed(*makeMujocoWorld(model), model, kMujocoTolerances);
 }
 
 TEST_CASE("mujoco world: springs and dampers between points move a linkage, and are booked") {
-  const Model model = makeSprungFivebar();
-  const double coarse = checkSprung(*makeFineWorld(model, 5e-5), model, 5e-3),
-               fine = checkSprung(*makeFineWorld(model, 1.25e-5), model, 5e-3);
+  const Model model = testing::makeSprungFivebar();
+  const double coarse = testing::checkSprung(*makeFineWorld(model, 5e-5), model, 5e-3),
+               fine = testing::checkSprung(*makeFineWorld(model, 1.25e-5), model, 5e-3);
   CAPTURE(coarse, fine);
   CHECK(fine < 5e-4);
   CHECK(fine < 0.35 * coarse);  // first order: a quarter
@@ -65,7 +63,7 @@ TEST_CASE("mujoco world: springs and dampers between points move a linkage, and 
 
 TEST_CASE("mujoco world: a robot stands on a box that is turned and inclined, one of hundreds") {
   const Model model = loadRobot("bipetto").model;
-  const PostureHold posture(model);
+  const testing::PostureHold posture(model);
   MujocoWorldOptions options;
   options.world.ground.height = -0.2;
   for (int i = 0; i < 300; ++i) options.world.ground.steps.push_back({{2 + 0.1 * i, 0, 1}, 0.1, 0.1, 0, 0, 0});
@@ -74,7 +72,7 @@ TEST_CASE("mujoco world: a robot stands on a box that is turned and inclined, on
   q[2] += 0.17;
   const auto world = makeMujocoWorld(model, options);
   world->reset(q, VectorXd::Zero(model.nv()));
-  REQUIRE(hold(*world, posture, 1));
+  REQUIRE(testing::hold(*world, posture, 1));
   double load = 0;
   Workspace ws(model);
   updatePositions(model, ws, world->getConfiguration());
@@ -99,7 +97,7 @@ TEST_CASE("mujoco world: a ground of more boxes under the soles than it can have
 
 TEST_CASE("mujoco world: it advances without allocation") {
   const Model model = loadRobot("bipetto").model;
-  const PostureHold posture(model);
+  const testing::PostureHold posture(model);
   MujocoWorldOptions options;
   options.world.ground = makeTiles({0.001, 0.25, -1, 2, 2, 1});
   const auto world = makeMujocoWorld(model, options);
@@ -215,7 +213,7 @@ TEST_CASE("mujoco world: a push in the air gives the robot its impulse and its w
   const Books books = world->getBooks();
   CHECK(books.push_work > 1);
   CHECK(books.contact_loss == 0);
-  CHECK(calcImbalance(start, books) < 0.01);
+  CHECK(testing::calcImbalance(start, books) < 0.01);
   for (const FootReport& foot : world->getFeet()) {
     CHECK(!foot.touches);
     CHECK(foot.wrench.isZero(0));
@@ -232,7 +230,7 @@ TEST_CASE("mujoco world: reset takes a state as it is, and the same torques make
     CHECK(world->getTime() == 0);
     CHECK(world->getConfiguration() == q);
     CHECK(world->getBooks().motor_work == 0);
-    REQUIRE(hold(*world, PostureHold(model), 0.2));
+    REQUIRE(testing::hold(*world, testing::PostureHold(model), 0.2));
     end = world->getConfiguration();
   }
   CHECK(ends[0] == ends[1]);

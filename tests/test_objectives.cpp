@@ -10,15 +10,15 @@ using namespace bielle;
 
 namespace {
 
-struct Solved {
+struct SolvedSquat {
   Motion motion;
   FddpSummary summary;
   MotionResult result;
 };
 
-Solved finish(Motion motion, const ShootingTrajectory* guess) {
+SolvedSquat finish(Motion motion, const ShootingTrajectory* guess) {
   if (guess) motion.guess = *guess;
-  Solved out{std::move(motion), {}, {}};
+  SolvedSquat out{std::move(motion), {}, {}};
   out.summary = solveMotion(out.motion, {});
   CAPTURE(out.summary.message);
   REQUIRE(out.summary.termination == FddpTermination::Converged);
@@ -28,8 +28,8 @@ Solved finish(Motion motion, const ShootingTrajectory* guess) {
 }
 
 // From the motion of least effort.
-Solved solve(const Solved& effort, const Model& model, const SquatOptions& squat, Objective objective,
-             double regeneration = 0) {
+SolvedSquat solveFromEffort(const SolvedSquat& effort, const Model& model, const SquatOptions& squat,
+                            Objective objective, double regeneration = 0) {
   ProblemOptions options;
   options.objective.objective = objective;
   options.objective.regeneration = regeneration;
@@ -37,7 +37,7 @@ Solved solve(const Solved& effort, const Model& model, const SquatOptions& squat
   return finish(makeSquat(model, squat, options), &effort.motion.guess);
 }
 
-double getPeak(const Solved& solved) { return solved.result.peak_torques.front().second; }
+double getPeak(const SolvedSquat& solved) { return solved.result.peak_torques.front().second; }
 
 }  // namespace
 
@@ -46,8 +46,8 @@ TEST_CASE("objectives: a squat of least energy, with and without what flows back
   SquatOptions squat;
   squat.depth = 0.8;
   squat.time_step = 0.02;
-  const Solved effort = finish(makeSquat(model, squat), nullptr);
-  const Solved least = solve(effort, model, squat, Objective::Energy);
+  const SolvedSquat effort = finish(makeSquat(model, squat), nullptr);
+  const SolvedSquat least = solveFromEffort(effort, model, squat, Objective::Energy);
   CAPTURE(effort.result.energy.total, least.result.energy.total);
   CHECK(least.result.energy.total < 0.8 * effort.result.energy.total);
   CHECK(least.result.energy.num_assumed == model.nu());
@@ -73,7 +73,7 @@ TEST_CASE("objectives: a squat of least energy, with and without what flows back
   CHECK(in_cost < total + model.nu() * duration * kPowerSmoothing / 2);
 
   // Half of what flows back used again: less than the first motion takes on the same terms.
-  const Solved half = solve(effort, model, squat, Objective::Energy, 0.5);
+  const SolvedSquat half = solveFromEffort(effort, model, squat, Objective::Energy, 0.5);
   CHECK(half.result.energy.total < least.result.energy.total);
   CHECK(calcElectricalEnergy(model, least.result.record, 0.5).total > half.result.energy.total);
 }
@@ -83,8 +83,8 @@ TEST_CASE("objectives: a squat of least peak torque, in both formulations") {
   SquatOptions squat;
   squat.depth = 0.8;
   squat.time_step = 0.02;
-  const Solved effort = finish(makeSquat(model, squat), nullptr);
-  const Solved least = solve(effort, model, squat, Objective::PeakTorque);
+  const SolvedSquat effort = finish(makeSquat(model, squat), nullptr);
+  const SolvedSquat least = solveFromEffort(effort, model, squat, Objective::PeakTorque);
   CHECK(getPeak(least) < 0.95 * getPeak(effort));
   // At least one motor is at the peak for more than an instant.
   int at_peak = 0;
@@ -94,14 +94,14 @@ TEST_CASE("objectives: a squat of least peak torque, in both formulations") {
   // The effort within limits of that peak exists; it is the regularization that keeps the peak above the least one.
   ProblemOptions limited;
   for (const Motor& motor : model.motors()) limited.limits.efforts[motor.name] = getPeak(least);
-  const Solved bounded = finish(makeSquat(model, squat, limited), &effort.motion.guess);
+  const SolvedSquat bounded = finish(makeSquat(model, squat, limited), &effort.motion.guess);
   CHECK(getPeak(bounded) <= getPeak(least) * (1 + 1e-12));
   CHECK(bounded.summary.cost > effort.summary.cost);
 
   ProblemOptions full(Formulation::Full);
-  const Solved effort_full = finish(makeSquat(model, squat, full), nullptr);
+  const SolvedSquat effort_full = finish(makeSquat(model, squat, full), nullptr);
   full.objective.objective = Objective::PeakTorque;
   full.objective = scaleObjective(effort_full.motion, full.objective);
-  const Solved least_full = finish(makeSquat(model, squat, full), &effort_full.motion.guess);
+  const SolvedSquat least_full = finish(makeSquat(model, squat, full), &effort_full.motion.guess);
   CHECK(getPeak(least_full) == Approx(getPeak(least)).epsilon(0.01));
 }

@@ -2,10 +2,10 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/footholds.h"
 #include "bielle/motion/obstacles.h"
 #include "measure_steps.h"
+#include "own_robots.h"
 #include "robot_directory.h"
 
 using namespace bielle;
@@ -13,12 +13,7 @@ using namespace bielle::testing;
 
 namespace {
 
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
-  return robot.model;
-}
-
-StepMeasures solve(Motion& motion) {
+StepMeasures solveAndMeasure(Motion& motion) {
   FddpOptions solver;
   solver.initial_regularization = kGuessRegularization;
   solver.max_iterations = 150;
@@ -66,7 +61,7 @@ TEST_CASE("footholds: Bipetto walks over inclined stones of a file") {
   CHECK(beside.x() == Approx(last.x()));
   CHECK(beside.z() == Approx(last.z()));
   CHECK(motion.ground.height < last.z() - 0.04);  // stones go down below the start, so that it has a platform
-  const StepMeasures m = solve(motion);
+  const StepMeasures m = solveAndMeasure(motion);
   checkFeet(m);
   CHECK(m.tilt < 0.15);
   CHECK(m.bend > 0.3);
@@ -119,7 +114,7 @@ TEST_CASE("box: Bipetto steps onto it and down again") {
   checkGround(motion);
   const Goal& height = motion.goals.at(0);
   CHECK(height.requested == options.height);
-  const StepMeasures m = solve(motion);
+  const StepMeasures m = solveAndMeasure(motion);
   checkFeet(m);
   CHECK(m.tilt < 0.2);
   CHECK(m.bend > 0.2);
@@ -138,7 +133,7 @@ TEST_CASE("gap: the ground is missing where it was requested, and no foot stands
   for (double x = -0.3; x < 0.8; x += 1e-3)
     if (motion.ground.calcHeight(x, 0) < level - 0.1) before = std::min(before, x), after = std::max(after, x);
   CHECK(after - before == Approx(options.width).margin(3e-3));
-  const StepMeasures m = solve(motion);
+  const StepMeasures m = solveAndMeasure(motion);
   checkFeet(m);
   CHECK(m.tilt < 0.15);
   CHECK(m.end.x() - m.start.x() == Approx(0.2 + 2 * (0.05 + options.distance)).margin(0.01));

@@ -103,7 +103,7 @@ void checkGaussNewton(ProblemProbe& problem, int node, const Point& point, const
 }
 
 // h: step in x; the one in u can be longer, as forces are linear in it.
-void checkStage(ProblemProbe& problem, const Point& point, double h) {
+void checkProbedStage(ProblemProbe& problem, const Point& point, double h) {
   StageModel model;
   REQUIRE(problem.linearize(0, point.x, point.u, point.x_node, model) == StepStatus::Ok);
   const VectorXd no_dx = VectorXd::Zero(problem.tangentSize(0)), no_du = VectorXd::Zero(point.u.size());
@@ -164,7 +164,7 @@ TEST_CASE("shooting problem: random mechanisms of every joint kind, gaps closed,
     const VectorXd x = join(q, randomVector(rng, model.nv())), u = randomVector(rng, model.nu(), 5);
     for (double gap : {0.0, 1e-3, 0.6}) {
       CAPTURE(getName(step), getName(kind), gap);
-      checkStage(problem, {x, u, makeNextNode(rng, problem, x, u, gap)}, 2e-4);
+      checkProbedStage(problem, {x, u, makeNextNode(rng, problem, x, u, gap)}, 2e-4);
     }
     CAPTURE(getName(kind));
     checkTerminal(problem, x, 5e-4);
@@ -192,7 +192,7 @@ TEST_CASE("shooting problem: a redundant planar four-bar") {
   // Off the closures too: the four angles keep the loop planar, so the redundant rows never contradict one another.
   const VectorXd v = randomVector(rng, 4), u = VectorXd::Constant(1, 0.4);
   const VectorXd x = join(mechanism.q_closed, v);
-  checkStage(problem, {x, u, makeNextNode(rng, problem, x, u, 0.3)}, 2e-4);
+  checkProbedStage(problem, {x, u, makeNextNode(rng, problem, x, u, 0.3)}, 2e-4);
   checkTerminal(problem, x, 5e-4);
 }
 
@@ -260,7 +260,7 @@ TEST_CASE("shooting problem: forces alone, at the midpoint of a step") {
     ProblemProbe problem(whole);
     const VectorXd q = model.integrate(mechanism.q_closed, randomVector(rng, model.nv(), 0.1));
     const VectorXd x = join(q, randomVector(rng, model.nv())), u = randomVector(rng, model.nu(), 5);
-    checkStage(problem, {x, u, makeNextNode(rng, problem, x, u, 0)}, 2e-4);
+    checkProbedStage(problem, {x, u, makeNextNode(rng, problem, x, u, 0)}, 2e-4);
   }
 }
 
@@ -280,7 +280,7 @@ TEST_CASE("shooting problem: the squat of Bipetto, half sitting with velocities 
   const VectorXd x = join(q, v), u = motion.guess.us[0] + randomVector(rng, model.nu(), 1);
   for (double gap : {0.0, 0.2}) {
     CAPTURE(gap);
-    checkStage(problem, {x, u, makeNextNode(rng, problem, x, u, gap)}, 2e-4);
+    checkProbedStage(problem, {x, u, makeNextNode(rng, problem, x, u, gap)}, 2e-4);
   }
   checkTerminal(problem, x, 5e-4);
 }

@@ -17,7 +17,7 @@ using namespace bielle::testing;
 
 namespace {
 
-constexpr double kStep = 5e-4;
+constexpr double kResidualStep = 5e-4;
 
 // A node at (q, v) with forces lambda.
 struct TestNode {
@@ -114,10 +114,11 @@ void checkResidual(const Model& model, const ConstraintSet& set, const Residual&
   node.u = u;
   node.speeds = randomVector(rng, model.nu());
   residual.calcJacobian(node.view(), {dq, dv, dlambda, du, dspeeds, ds});
+  checkDerivative(dq, differentiateTangent(model, q, kResidualStep,
+                                           [&](const VectorXd& x) { return node.calc(residual, x, v, lambda); }));
   checkDerivative(
-      dq, differentiateTangent(model, q, kStep, [&](const VectorXd& x) { return node.calc(residual, x, v, lambda); }));
-  checkDerivative(dv, differentiate(v, kStep, [&](const VectorXd& x) { return node.calc(residual, q, x, lambda); }));
-  checkDerivative(ds, differentiate(VectorXd::Constant(1, node.time_scale), kStep, [&](const VectorXd& s) {
+      dv, differentiate(v, kResidualStep, [&](const VectorXd& x) { return node.calc(residual, q, x, lambda); }));
+  checkDerivative(ds, differentiate(VectorXd::Constant(1, node.time_scale), kResidualStep, [&](const VectorXd& s) {
                     TestNode other = node;
                     other.time_scale = s[0];
                     return other.calc(residual, q, v, lambda);
@@ -125,13 +126,13 @@ void checkResidual(const Model& model, const ConstraintSet& set, const Residual&
   CHECK(residual.needsControls() == !du.isZero(0));
   CHECK(residual.needsSpeeds() == !dspeeds.isZero(0));
   if (model.nu() > 0)
-    checkDerivative(dspeeds, differentiate(node.speeds, kStep, [&](const VectorXd& x) {
+    checkDerivative(dspeeds, differentiate(node.speeds, kResidualStep, [&](const VectorXd& x) {
                       TestNode other = node;
                       other.speeds = x;
                       return other.calc(residual, q, v, lambda);
                     }));
   if (model.nu() > 0)
-    checkDerivative(du, differentiate(u, kStep, [&](const VectorXd& x) {
+    checkDerivative(du, differentiate(u, kResidualStep, [&](const VectorXd& x) {
                       node.u = x;
                       return node.calc(residual, q, v, lambda);
                     }));

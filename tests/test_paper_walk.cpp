@@ -75,12 +75,13 @@ std::optional<PaperWalk> readReference() {
   return out;
 }
 
-Motion makeWalk(const PaperWalk& reference, const WalkOptions& options, Formulation formulation = Formulation::Full) {
+Motion makePaperWalk(const PaperWalk& reference, const WalkOptions& options,
+                     Formulation formulation = Formulation::Full) {
   const VectorXd q0 = reference.guess.xs.front().head(reference.model.nq());
   return makeMotion(reference.model, planWalk(reference.model, options, q0), formulation);
 }
 
-WalkOptions makeOptions() {
+WalkOptions makePaperOptions() {
   WalkOptions options;
   setPaperWeights(options);
   return options;
@@ -177,7 +178,7 @@ double calcSteadySpeed(const Motion& walk, const ShootingTrajectory& t) {
 TEST_CASE("the paper's walk: every cost term at the guess and at the solution") {
   const std::optional<PaperWalk> reference = readReference();
   if (!reference) return;
-  Motion walk = makeWalk(*reference, makeOptions());
+  Motion walk = makePaperWalk(*reference, makePaperOptions());
   for (size_t k = 0; k + 1 < reference->standing.size(); ++k) {
     int standing = 0;
     for (const ContactTarget& contact : walk.schedule.getPhase(static_cast<int>(k)).contacts)
@@ -199,7 +200,7 @@ TEST_CASE("the paper's walk: every cost term at the guess and at the solution") 
 TEST_CASE("the paper's walk: solved from its first guess, it ends below the paper's cost, at its speed") {
   const std::optional<PaperWalk> reference = readReference();
   if (!reference) return;
-  Motion walk = makeWalk(*reference, makeOptions());
+  Motion walk = makePaperWalk(*reference, makePaperOptions());
   walk.guess = reference->guess;
   FddpOptions solver;
   solver.gradient_tolerance = 1e-10;
@@ -218,9 +219,9 @@ TEST_CASE("the paper's walk: a wrong weight is noticed") {
   if (!reference) return;
   const auto expectNotice = [&](const std::string& name, const std::function<void(WalkOptions&)>& change) {
     CAPTURE(name);
-    WalkOptions options = makeOptions();
+    WalkOptions options = makePaperOptions();
     change(options);
-    Motion walk = makeWalk(*reference, options);
+    Motion walk = makePaperWalk(*reference, options);
     CHECK(compareTerms(walk, reference->solution, reference->terms_of_solution).relative > 1e-6);
   };
   for (const char* name : {"state_weight", "torso_weight", "control_weight", "com_height_weight", "com_velocity_weight",

@@ -12,7 +12,7 @@
 #include "measure_steps.h"
 #include "model/text_file.h"
 #include "robot_directory.h"
-#include "run_command.h"
+#include "run_bielle.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -57,13 +57,9 @@ void widen(const Model& model, Workspace& ws, const VectorXd& q, Margin& margin)
   }
 }
 
-CommandResult run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), BIELLE_COMMAND);
-  return runCommand(arguments);
-}
-
 // Runs bielle solve MOTION with its check, which must pass; returns the written motion.
-MotionRecord solve(const std::string& robot, const std::vector<std::string>& motion, const RobotDirectory& directory) {
+MotionRecord solveByCommand(const std::string& robot, const std::vector<std::string>& motion,
+                            const RobotDirectory& directory) {
   std::vector<std::string> arguments = {"solve"};
   arguments.insert(arguments.end(), motion.begin(), motion.end());
   arguments.insert(arguments.end(), {"--robot", robot, "-o", directory.path() + "/result", "--no-report"});
@@ -87,7 +83,7 @@ void checkMotions(const std::string& robot, const std::vector<Request>& requests
   for (const Request& request : requests) {
     CAPTURE(request.motion);
     const RobotDirectory directory;
-    const MotionRecord record = solve(robot, request.motion, directory);
+    const MotionRecord record = solveByCommand(robot, request.motion, directory);
     CHECK(record.gap.maxCoeff() < 1e-10);
     CHECK(record.com.col(2).minCoeff() == Approx(request.com_lowest).margin(0.01));
     CHECK(record.com.col(2).maxCoeff() == Approx(request.com_highest).margin(0.012));
@@ -144,7 +140,7 @@ TEST_CASE(
   const Model model = loadRobot(robot).model;
   for (const std::string motion : {"squat", "walk"}) {
     CAPTURE(motion);
-    const MotionRecord record = solve(robot, {motion}, directory);
+    const MotionRecord record = solveByCommand(robot, {motion}, directory);
     CHECK(record.gap.maxCoeff() < 1e-10);
     CHECK(record.com.col(2).minCoeff() == Approx(motion == "squat" ? 0.7 * 0.395 : 0.393).margin(0.005));
     CHECK(record.u.cwiseAbs().maxCoeff() < 50);
@@ -171,7 +167,7 @@ TEST_CASE("Kangaroo on ball screws: squat and walk are solved and checked, with 
   for (const Case& each : {Case{"squat", 0.7 * standing, 0.4}, Case{"walk", 0.998 * standing, 0.25}}) {
     CAPTURE(each.motion);
     const RobotDirectory directory;
-    const MotionRecord record = solve("kangaroo", {each.motion}, directory);
+    const MotionRecord record = solveByCommand("kangaroo", {each.motion}, directory);
     CHECK(record.gap.maxCoeff() < 1e-10);
     CHECK(record.com.col(2).minCoeff() == Approx(each.lowest).margin(0.01));
     CHECK(record.u.cwiseAbs().maxCoeff() < 2500);  // N
@@ -181,7 +177,7 @@ TEST_CASE("Kangaroo on ball screws: squat and walk are solved and checked, with 
     }
   }
   const RobotDirectory directory;
-  const MotionRecord record = solve("kangaroo_leg", {"squat"}, directory);
+  const MotionRecord record = solveByCommand("kangaroo_leg", {"squat"}, directory);
   CHECK(record.com.col(2).minCoeff() == Approx(0.7 * record.com(0, 2)).margin(0.015));
 }
 
@@ -203,7 +199,7 @@ TEST_CASE("spring biped: squat, walks and a hop are solved and checked; its leav
                            {{"hop"}, 0.952 * standing}}) {
     CAPTURE(each.motion);
     const RobotDirectory directory;
-    const MotionRecord record = solve("spring_biped", each.motion, directory);
+    const MotionRecord record = solveByCommand("spring_biped", each.motion, directory);
     CHECK(record.gap.maxCoeff() < 1e-10);
     CHECK(record.com.col(2).minCoeff() == Approx(each.lowest).margin(0.01));
     double most = 0;
@@ -239,7 +235,7 @@ TEST_CASE("belt biped: springs, dampers and friction are in the energy that the 
   for (const std::vector<std::string>& motion :
        {std::vector<std::string>{"squat"}, {"walk"}, {"walk", "--step", "euler"}}) {
     const RobotDirectory directory;
-    solve(robot, motion, directory);
+    solveByCommand(robot, motion, directory);
   }
 }
 
@@ -247,7 +243,7 @@ TEST_CASE("Cleobot, the RSU biped and the belt biped walk at 0.9 m/s") {
   for (const std::string robot : {"cleobot", "rsu_biped", "belt_biped"}) {
     CAPTURE(robot);
     const RobotDirectory directory;
-    const MotionRecord record = solve(robot, {"walk", "--speed", "0.9"}, directory);
+    const MotionRecord record = solveByCommand(robot, {"walk", "--speed", "0.9"}, directory);
     CHECK(record.com(record.com.rows() - 1, 0) - record.com(0, 0) > 1.7);
   }
 }

@@ -20,7 +20,7 @@ PathConstraint makeConstraint(const std::string& name, std::unique_ptr<Residual>
 }
 
 // A step or an impact with both feet on the ground, and a terminal node, with rows that look at q, v and the forces.
-RobotProblem makeProblem(const Model& model, const VectorXd& q, StageKind kind, Formulation formulation) {
+RobotProblem makeConstrainedProblem(const Model& model, const VectorXd& q, StageKind kind, Formulation formulation) {
   std::vector<StageSpec> stages(2);
   StageSpec& stage = stages[0];
   stage.kind = kind;
@@ -110,7 +110,7 @@ TEST_CASE("path constraints: rows and their derivatives, at a step, an impact an
   std::mt19937 rng(5);
   const Formulation formulation = GENERATE(Formulation::Full, Formulation::Reduced);
   const StageKind kind = GENERATE(StageKind::Dynamics, StageKind::Impact);
-  const RobotProblem problem = makeProblem(model, q, kind, formulation);
+  const RobotProblem problem = makeConstrainedProblem(model, q, kind, formulation);
   RobotEvaluator standing(problem);
   standing.evaluate(1, problem.initialState());
   const VectorXd x = standing.integrate(randomVector(rng, problem.tangentSize(1), 0.05));
@@ -143,7 +143,7 @@ TEST_CASE("path constraints: rows and their derivatives, at a step, an impact an
 TEST_CASE("path constraints: scaled bounds and names") {
   const Model model = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto").model;
   const VectorXd q = makeStandingPosture(model);
-  const RobotProblem problem = makeProblem(model, q, StageKind::Dynamics, Formulation::Reduced);
+  const RobotProblem problem = makeConstrainedProblem(model, q, StageKind::Dynamics, Formulation::Reduced);
   VectorXd lower(problem.constraintSize(0)), upper(lower.size());
   problem.getConstraintBounds(0, lower, upper);
   CHECK(lower[0] == Approx(-1.0 / 20));

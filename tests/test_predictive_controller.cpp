@@ -6,9 +6,10 @@
 
 #include "bielle/control/predictive_controller.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "count_allocations.h"
+#include "own_robots.h"
+#include "predictive_trials.h"
 #include "simulation/bielle_world.h"
 #include "simulation/execution.h"
 #include "simulation/make_world.h"
@@ -16,10 +17,8 @@
 namespace bielle::simulation {
 namespace {
 
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
-  return robot.model;
-}
+using bielle::testing::getBipetto;
+using bielle::testing::kStageTicks;
 
 // A squat, its solution, and the policy of its gains.
 struct Solved {
@@ -71,7 +70,7 @@ Execution carryOut(const Solved& solved, Controller& controller, const Execution
   return execute(getBipetto(), *solved.gains, controller, *world, options);
 }
 
-const Solved& getSquat() {
+const Solved& getShortSquat() {
   static const Solved squat = solve(planSquat, makeShortSquat());
   return squat;
 }
@@ -81,9 +80,9 @@ const Solved& getSquat() {
 TEST_CASE("predictive control: a squat stands to its end and beyond, to the same bytes for every number of threads") {
   ExecutionOptions options;
   options.duration = 60 * kStage;
-  const auto one = makeController(planSquat, makeShortSquat(), getSquat(), makeShortWindow(1)),
-             two = makeController(planSquat, makeShortSquat(), getSquat(), makeShortWindow(2));
-  const Execution a = carryOut(getSquat(), *one, options), b = carryOut(getSquat(), *two, options);
+  const auto one = makeController(planSquat, makeShortSquat(), getShortSquat(), makeShortWindow(1)),
+             two = makeController(planSquat, makeShortSquat(), getShortSquat(), makeShortWindow(2));
+  const Execution a = carryOut(getShortSquat(), *one, options), b = carryOut(getShortSquat(), *two, options);
   CHECK(a.outcome == Outcome::Stood);
   CHECK(a.largest_deviation < 5e-3);
   CHECK(one->getCounts().failed == 0);
@@ -94,7 +93,7 @@ TEST_CASE("predictive control: a squat stands to its end and beyond, to the same
 
 TEST_CASE("predictive control: on the plan its torques are those of the plan") {
   const Model& model = getBipetto();
-  const Solved& squat = getSquat();
+  const Solved& squat = getShortSquat();
   const auto controller = makeController(planSquat, makeShortSquat(), squat, makeShortWindow(0));
   Measurement at{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
   VectorXd u(model.nu()), planned(model.nu());
@@ -112,7 +111,7 @@ TEST_CASE("predictive control: on the plan its torques are those of the plan") {
 
 TEST_CASE("predictive control: states that cannot be solved from leave the last policy in force, and are counted") {
   const Model& model = getBipetto();
-  const Solved& squat = getSquat();
+  const Solved& squat = getShortSquat();
   const auto controller = makeController(planSquat, makeShortSquat(), squat, makeShortWindow(0));
   Measurement at{0, model.makeNeutral(), VectorXd::Zero(model.nv())};
   squat.gains->getReference(0, at.q, at.v);
@@ -152,7 +151,7 @@ TEST_CASE("predictive control: a walk by command is made on the way, to the same
   PredictiveController one(makeWalk(), predictive);
   predictive.threads = 2;
   PredictiveController two(makeWalk(), predictive);
-  const Execution a = carryOut(getSquat(), one, options), b = carryOut(getSquat(), two, options);
+  const Execution a = carryOut(getShortSquat(), one, options), b = carryOut(getShortSquat(), two, options);
   CHECK(a.outcome == Outcome::Stood);
   CHECK(a.distance > 0.1);
   CHECK(one.getCounts().failed == 0);
@@ -210,8 +209,6 @@ struct Standing {
   VectorXd u;
   std::unique_ptr<PredictiveController> controller;
 };
-
-constexpr int kStageTicks = 12;  // of a walk by command
 
 }  // namespace
 
@@ -294,7 +291,7 @@ namespace {
 // Gains of a squat; a controller that is not beyond an instant of its plan.
 class HeldBack : public Controller {
  public:
-  explicit HeldBack(double longest) : policy_(*getSquat().gains), longest_(longest) {}
+  explicit HeldBack(double longest) : policy_(*getShortSquat().gains), longest_(longest) {}
   void update(const Measurement& measurement, VectorRef u) override { policy_.update(measurement, u); }
   double getPlanTime(double time) const override { return std::min(time, longest_); }
 
@@ -313,14 +310,14 @@ TEST_CASE("estimator: contacts are expected where the controller is in its plan,
   options.perception.planned.phases = {{"double support", 10, 0.01, {{0, {}, 0, 0}, {1, {}, 0, 0}}},
                                        {"flight", 30, 0.01, {}}};
   HeldBack held(0.05), on_time(1);
-  CHECK(carryOut(getSquat(), held, options).estimation.contact_errors < 0.05);
-  CHECK(carryOut(getSquat(), on_time, options).estimation.contact_errors > 0.5);
+  CHECK(carryOut(getShortSquat(), held, options).estimation.contact_errors < 0.05);
+  CHECK(carryOut(getShortSquat(), on_time, options).estimation.contact_errors > 0.5);
 }
 
 TEST_CASE("predictive control: it refuses a plan that is not one of its motion") {
   const Model& model = getBipetto();
   const PredictiveOptions options = makeShortWindow(1);
-  ShootingTrajectory shorter = getSquat().motion.guess;
+  ShootingTrajectory shorter = getShortSquat().motion.guess;
   shorter.xs.pop_back();
   shorter.us.pop_back();
   CHECK_THROWS_AS(

@@ -3,17 +3,14 @@
 
 #include "bielle/control/predictive_controller.h"
 #include "bielle/dynamics/kinematics.h"
-#include "bielle/model/reader.h"
+#include "own_robots.h"
+#include "predictive_trials.h"
 
 namespace bielle {
 namespace {
 
-constexpr int kStageTicks = 12;
-
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
-  return robot.model;
-}
+using bielle::testing::getBipetto;
+using bielle::testing::kStageTicks;
 
 // Lets a walk by command follow its own policy, while the contacts that it is told are scripted.
 struct Walking {

@@ -37,14 +37,14 @@ LoadedRobot loadCompleted(const std::string& name) {
   return robot;
 }
 
-FddpSummary solve(Motion& motion) {
+FddpSummary solvePublished(Motion& motion) {
   FddpOptions solver;
   solver.max_iterations = 60;
   return Fddp(solver).solve(*motion.problem, motion.guess);
 }
 
 void checkSteps(Motion& motion) {
-  const FddpSummary summary = solve(motion);
+  const FddpSummary summary = solvePublished(motion);
   CAPTURE(motion.name, summary.message, summary.iterations);
   CHECK(summary.termination == FddpTermination::Converged);
   const StepMeasures m = StepMeter(motion, motion.guess).measure();
@@ -162,7 +162,7 @@ TEST_CASE("Digit squats, walks and climbs stairs with the feet and the posture t
   SquatOptions squat;
   squat.depth = 0.6;
   Motion down = makeSquat(model, squat);
-  const FddpSummary summary = solve(down);
+  const FddpSummary summary = solvePublished(down);
   CHECK(summary.termination == FddpTermination::Converged);
   Workspace ws(model);
   double start = 0, lowest = 1e9;
@@ -197,7 +197,7 @@ TEST_CASE("the published model of Bipetto, completed, squats as Bipetto does") {
   LimitOptions none;  // the published ranges do not hold the posture
   none.enforced = false;
   Motion a = makeSquat(published.model, options, {Formulation::Reduced, none}), b = makeSquat(ours, options);
-  const FddpSummary of_published = solve(a), of_ours = solve(b);
+  const FddpSummary of_published = solvePublished(a), of_ours = solvePublished(b);
   CHECK(of_published.termination == FddpTermination::Converged);
   CHECK(of_published.cost == Approx(of_ours.cost).epsilon(1e-4));
   // The bodies are listed in another order: compare by name.
@@ -218,7 +218,7 @@ TEST_CASE("Digit's published model, adopted, squats") {
   SquatOptions options;
   options.depth = 0.8;
   Motion squat = makeSquat(model, options);
-  const FddpSummary summary = solve(squat);
+  const FddpSummary summary = solvePublished(squat);
   CAPTURE(adoption.yaml, summary.message);
   CHECK(summary.termination == FddpTermination::Converged);
 }

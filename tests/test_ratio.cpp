@@ -14,6 +14,7 @@
 #include "bielle/robots/fourbar_chain.h"
 #include "bielle/transmission/ratio.h"
 #include "check_derivative.h"
+#include "math/constants.h"
 #include "robot_directory.h"
 #include "transmission/linkage.h"
 
@@ -22,7 +23,6 @@ using namespace bielle::testing;
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kA = 0.15, kB = 0.35, kC = 0.30, kD = 0.40;  // robots/fourbar/README.md
 
 struct Robot {

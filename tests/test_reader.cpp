@@ -11,14 +11,13 @@
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "get_error.h"
+#include "infinity.h"
 #include "robot_directory.h"
 
 using namespace bielle;
 using namespace bielle::testing;
 
 namespace {
-
-constexpr double kInf = std::numeric_limits<double>::infinity();
 
 const Joint& getJoint(const Model& model, const std::string& name) {
   REQUIRE(model.findJoint(name) >= 0);

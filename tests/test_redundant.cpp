@@ -8,6 +8,7 @@
 #include "bielle/model/reader.h"
 #include "check_derivative.h"
 #include "dynamics/saddle_point.h"
+#include "math/constants.h"
 #include "math/so3.h"
 
 using namespace bielle;
@@ -16,7 +17,6 @@ using namespace bielle::testing;
 namespace {
 
 using Eigen::Vector2d;
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kGround = 0.4, kCrank = 0.15, kCoupler = 0.35, kRocker = 0.3;
 constexpr double kPinArmature = 1e-4;  // of makePlanarFourBar: turns as fast as the rocker
 
@@ -48,7 +48,7 @@ struct ClosedForm {
 struct Energy {
   double inertia, potential;
 };
-Energy calcEnergy(double alpha) {
+Energy calcLinkageEnergy(double alpha) {
   const ClosedForm form(alpha);
   const double lengths[] = {kCrank, kCoupler, kRocker};
   Vector2d start = Vector2d::Zero(), dstart = Vector2d::Zero();
@@ -67,10 +67,10 @@ Energy calcEnergy(double alpha) {
 // alpha'' of inertia alpha'' + 1/2 inertia' alpha'^2 + potential' = torque on alpha.
 double calcCrankAcceleration(double alpha, double rate, double torque) {
   const MatrixXd slopes = differentiate(VectorXd::Constant(1, alpha), 1e-3, [](const VectorXd& a) {
-    const Energy energy = calcEnergy(a[0]);
+    const Energy energy = calcLinkageEnergy(a[0]);
     return VectorXd(Vector2d(energy.inertia, energy.potential));
   });
-  return (torque - 0.5 * slopes(0, 0) * rate * rate - slopes(1, 0)) / calcEnergy(alpha).inertia;
+  return (torque - 0.5 * slopes(0, 0) * rate * rate - slopes(1, 0)) / calcLinkageEnergy(alpha).inertia;
 }
 
 // The same linkage without the pin's body: the rocker's end is tied to the ground by a ball or a hinge.
@@ -106,7 +106,7 @@ struct Solution {
   VectorXd a, lambda;
   bool redundant;
 };
-Solution solve(const Model& model, const VectorXd& q, const VectorXd& v, double torque) {
+Solution solveLinkage(const Model& model, const VectorXd& q, const VectorXd& v, double torque) {
   Workspace ws(model);
   ConstrainedWorkspace cws;
   const VectorXd tau = calcMotorForces(model, VectorXd::Constant(1, torque));
@@ -139,12 +139,12 @@ TEST_CASE("four-bar: rank, mobility and accelerations over the whole turn, for e
 
     // The motor turns q_0 = -alpha.
     const double expected = -calcCrankAcceleration(alpha, rate, -torque);
-    const Solution by_weld = solve(weld, q, v, torque);
+    const Solution by_weld = solveLinkage(weld, q, v, torque);
     CHECK(by_weld.redundant);
     CHECK(by_weld.a[0] == Approx(expected).epsilon(1e-7));
     CHECK(by_weld.a[0] != Approx(-calcCrankAcceleration(alpha, rate, -1.001 * torque)).epsilon(1e-7));
     for (const Model* model : {&ball, &hinge}) {
-      const Solution other = solve(*model, q.head<3>(), v.head<3>(), torque);
+      const Solution other = solveLinkage(*model, q.head<3>(), v.head<3>(), torque);
       CHECK(other.redundant);
       CHECK(calcRelativeError(other.a, by_weld.a.head<3>()) < 1e-8);
       // The force of the pin, in frame 1: the rod's end, or the pin's body, which stays parallel to the world.
@@ -171,7 +171,7 @@ TEST_CASE("four-bar: derivatives along the motion that the closure leaves, again
       return VectorXd(differentiate(VectorXd::Constant(1, alpha), 1e-3, [&](const VectorXd& at) { return f(at[0]); }));
     };
     const VectorXd da = cws.da_dq * ClosedForm(alpha).dq() + cws.da_dv * along(v);
-    checkDerivative(da, along([&](double at) { return solve(model, q(at), v(at), torque).a; }), "alpha");
+    checkDerivative(da, along([&](double at) { return solveLinkage(model, q(at), v(at), torque).a; }), "alpha");
     CHECK(da[0] ==
           Approx(along([&](double at) { return VectorXd::Constant(1, -calcCrankAcceleration(at, rate, -torque)); })[0])
               .epsilon(1e-4));
@@ -179,12 +179,12 @@ TEST_CASE("four-bar: derivatives along the motion that the closure leaves, again
                     differentiate(VectorXd::Constant(1, rate), 1e-2,
                                   [&](const VectorXd& r) {
                                     const VectorXd at = r[0] * ClosedForm(alpha).dq();
-                                    return solve(model, q(alpha), at, torque).a;
+                                    return solveLinkage(model, q(alpha), at, torque).a;
                                   }),
                     "rate");
     checkDerivative(cws.da_du,
                     differentiate(VectorXd::Constant(1, torque), 1,
-                                  [&](const VectorXd& u) { return solve(model, q(alpha), v(alpha), u[0]).a; }),
+                                  [&](const VectorXd& u) { return solveLinkage(model, q(alpha), v(alpha), u[0]).a; }),
                     "torque");
   }
 }
@@ -197,7 +197,9 @@ TEST_CASE("four-bar: energy of a free motion over a second, by RK4 at two steps"
     const double start = calcTotalEnergy(model, q, v);
     const int steps = static_cast<int>(std::round(1 / h));
     for (int i = 0; i < steps; ++i) {
-      const auto accelerate = [&](const VectorXd& at, const VectorXd& rate) { return solve(model, at, rate, 0).a; };
+      const auto accelerate = [&](const VectorXd& at, const VectorXd& rate) {
+        return solveLinkage(model, at, rate, 0).a;
+      };
       const VectorXd a1 = accelerate(q, v);
       const VectorXd v2 = v + h / 2 * a1, a2 = accelerate(q + h / 2 * v, v2);
       const VectorXd v3 = v + h / 2 * a2, a3 = accelerate(q + h / 2 * v2, v3);
@@ -210,7 +212,7 @@ TEST_CASE("four-bar: energy of a free motion over a second, by RK4 at two steps"
     CHECK(calcLargestGap(ws, makeConstraintSet(model)) < 1e-4);
     return std::abs(calcTotalEnergy(model, q, v) - start);
   };
-  const double kinetic = 0.5 * calcEnergy(0.5).inertia * 16;
+  const double kinetic = 0.5 * calcLinkageEnergy(0.5).inertia * 16;
   const double coarse = simulate(2e-3), fine = simulate(1e-3);
   CAPTURE(coarse, fine, kinetic);
   CHECK(fine < 1e-6 * kinetic);

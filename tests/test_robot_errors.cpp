@@ -6,18 +6,15 @@
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/motion.h"
+#include "own_robots.h"
 #include "simulation/robot_errors.h"
 
 namespace bielle::simulation {
-namespace {
-
-LoadedRobot load(const std::string& name) { return loadRobot(BIELLE_SOURCE_DIR "/robots/" + name); }
-
-}  // namespace
+using bielle::testing::loadOwn;
 
 TEST_CASE("robot errors: without errors the machine is the model") {
   for (const char* name : {"bipetto", "cleobot"}) {
-    const LoadedRobot robot = load(name);
+    const LoadedRobot robot = loadOwn(name);
     const Model& model = robot.model;
     const Model machine = makeMachine(model, {});
     CHECK(machine.mass() == model.mass());
@@ -37,7 +34,7 @@ TEST_CASE("robot errors: without errors the machine is the model") {
 }
 
 TEST_CASE("robot errors: masses and rods differ within their bounds, as the seed says") {
-  const LoadedRobot robot = load("bipetto");
+  const LoadedRobot robot = loadOwn("bipetto");
   const Model& model = robot.model;
   const Model machine = makeMachine(model, {0.1, 5e-4, 1}), same = makeMachine(model, {0.1, 5e-4, 1}),
               other = makeMachine(model, {0.1, 5e-4, 2});
@@ -63,7 +60,7 @@ TEST_CASE("robot errors: masses and rods differ within their bounds, as the seed
 
 TEST_CASE("robot errors: the machine is closed, its motors and its lowest sole where the controller believes them") {
   for (const char* name : {"bipetto", "cleobot"}) {
-    const LoadedRobot robot = load(name);
+    const LoadedRobot robot = loadOwn(name);
     const Model& model = robot.model;
     const Model machine = makeMachine(model, {0.1, 1e-3, 3});
     const VectorXd believed = makeStandingPosture(model), q = assembleMachine(model, machine, believed);
@@ -87,7 +84,7 @@ TEST_CASE("robot errors: the machine is closed, its motors and its lowest sole w
 }
 
 TEST_CASE("robot errors: impossible ones are refused") {
-  const LoadedRobot robot = load("fivebar");
+  const LoadedRobot robot = loadOwn("fivebar");
   CHECK_THROWS_AS(makeMachine(robot.model, {1, 0, 1}), ModelError);
   // A planar linkage whose hinge leaves the plane cannot be closed: its rows are redundant.
   const Model machine = makeMachine(robot.model, {0, 1e-3, 1});

@@ -6,12 +6,12 @@
 
 #include "bielle/model/reader.h"
 #include "model/joint.h"
+#include "own_robots.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
-
-LoadedRobot loadOwn(const std::string& name) { return loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/" + name); }
 
 // Directory of the published files, or empty (with a warning).
 std::string findPublished(const std::string& name) {
@@ -102,7 +102,7 @@ Inertia calcTotalInertia(const Model& model, const VectorXd& q) {
   return total;
 }
 
-const std::vector<std::string> kMotors = {
+const std::vector<std::string> kBipettoMotors = {
     "hipz_left",  "hipy_left",  "hipx_left",  "motor_knee_left",  "motor_ankle1_left",  "motor_ankle2_left",
     "hipz_right", "hipy_right", "hipx_right", "motor_knee_right", "motor_ankle1_right", "motor_ankle2_right"};
 
@@ -140,7 +140,7 @@ TEST_CASE("Bipetto: sizes, motors, clusters, mass") {
   CHECK(model.name() == "bipetto");
   CHECK(model.nv() == 54);
   CHECK(model.nq() == 61);
-  CHECK(getMotorNames(model) == kMotors);
+  CHECK(getMotorNames(model) == kBipettoMotors);
   CHECK(model.closures().size() == 6);
   CHECK(model.closures()[0].name == "closure_knee_left");
   CHECK(model.closures()[2].name == "closure_ankle1_right");
@@ -214,7 +214,7 @@ TEST_CASE("the four published files load unchanged") {
   REQUIRE(battobot.warnings.size() == 1);  // its meshes are elsewhere
   CHECK_THAT(battobot.warnings[0], Catch::Contains("174 mesh(es) cannot be read"));
   CHECK(battobot.model.nv() == 54);
-  CHECK(getMotorNames(battobot.model) == kMotors);
+  CHECK(getMotorNames(battobot.model) == kBipettoMotors);
   CHECK(battobot.model.mass() == Approx(25.67604671).epsilon(1e-9));
   CHECK(battobot.model.findClosure("closedloop_knee_left") == 0);
   CHECK(battobot.model.findClosure("closedloop_ankle_right_1") == 2);

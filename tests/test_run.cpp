@@ -3,20 +3,16 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/run.h"
 #include "measure_steps.h"
 #include "motion/gait.h"
 #include "motion/quintic.h"
+#include "own_robots.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
-
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
-  return robot.model;
-}
 
 // Contacts of each phase, by the first letters of the feet; "-" in flight.
 std::string describe(const ContactSchedule& schedule) {
@@ -64,17 +60,17 @@ double calcClearance(const Motion& motion) {
   return least;
 }
 
-struct Solved {
+struct SolvedRun {
   FddpSummary summary;
   StepMeasures measures;
   double clearance = 0;
   std::vector<Vector3d> coms;  // at every node
 };
 
-Solved solve(Motion& motion) {
+SolvedRun solveRun(Motion& motion) {
   FddpOptions options;
   options.max_iterations = 150;
-  Solved solved;
+  SolvedRun solved;
   solved.summary = Fddp(options).solve(*motion.problem, motion.guess);
   solved.measures = StepMeter(motion, motion.guess).measure();
   solved.clearance = calcClearance(motion);
@@ -86,7 +82,7 @@ Solved solve(Motion& motion) {
   return solved;
 }
 
-void checkSteps(const Solved& solved) {
+void checkRun(const SolvedRun& solved) {
   const StepMeasures& m = solved.measures;
   CAPTURE(solved.summary.message, solved.summary.iterations);
   CHECK(solved.summary.termination == FddpTermination::Converged);
@@ -214,8 +210,8 @@ TEST_CASE("run: stages are as short as the fastest swing needs") {
 TEST_CASE("run: Bipetto runs as fast as requested, flies in between, and lands softly") {
   const RunOptions options;
   Motion motion = makeRun(getBipetto(), options, {Formulation::Reduced, StepRule::Midpoint});
-  const Solved solved = solve(motion);
-  checkSteps(solved);
+  const SolvedRun solved = solveRun(motion);
+  checkRun(solved);
   checkBallistics(motion, solved.coms);
   const StepMeasures& m = solved.measures;
   REQUIRE(m.touchdown_times.size() == 8);
@@ -233,8 +229,8 @@ TEST_CASE("hop: Bipetto hops on the requested foot, and ahead") {
     options.foot = foot;
     options.length = length;
     Motion motion = makeHop(getBipetto(), options, {Formulation::Reduced, StepRule::Midpoint});
-    const Solved solved = solve(motion);
-    checkSteps(solved);
+    const SolvedRun solved = solveRun(motion);
+    checkRun(solved);
     checkBallistics(motion, solved.coms);
     CHECK(solved.measures.end.x() - solved.measures.start.x() == Approx(length).margin(0.01));
     CHECK(solved.measures.torque < 100);

@@ -1,18 +1,15 @@
 // Sensors in a world: exact ones read what happens, real ones err as their data sheets say.
 #include <catch2/catch.hpp>
 
-#include "bielle/model/reader.h"
 #include "bielle/motion/motion.h"
+#include "own_robots.h"
 #include "simulation/bielle_world.h"
 #include "simulation/sensors.h"
 
 namespace bielle::simulation {
 namespace {
 
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
-  return robot.model;
-}
+using bielle::testing::getBipetto;
 
 // Bipetto in the air, turning and falling.
 std::unique_ptr<World> makeFall() {

@@ -3,7 +3,6 @@
 
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/footsteps.h"
 #include "bielle/motion/jump.h"
 #include "bielle/motion/sequence.h"
@@ -13,16 +12,12 @@
 #include "get_error.h"
 #include "math/so3.h"
 #include "measure_steps.h"
+#include "own_robots.h"
 
 using namespace bielle;
 using namespace bielle::testing;
 
 namespace {
-
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
-  return robot.model;
-}
 
 template <typename Options>
 SequencePart makePart(const std::string& name, MotionPlan (*plan)(const Model&, const Options&, const VectorXd&),

@@ -54,7 +54,7 @@ SerialTrajectory makeTrajectory(const Motion& motion) {
 }
 
 // The rocker of the four-bar at a constant speed from where it stands.
-SerialTrajectory makeSwing(const SerialModel& serial, int stages, double dt, double speed) {
+SerialTrajectory makeRockerSwing(const SerialModel& serial, int stages, double dt, double speed) {
   SerialTrajectory out;
   out.dt.assign(stages, dt);
   const double start = serial.q_reference[2];
@@ -244,7 +244,7 @@ TEST_CASE("a lift fails where the linkage ends, and says so") {
   const Model fourbar = loadRobot("fourbar").model;
   const SerialModel serial = makeSerialModel(fourbar, assembleReference(fourbar, "crank_at_60_degrees").q);
   const double start = serial.q_reference[2];
-  const SerialTrajectory swing = makeSwing(serial, 60, 0.02, 1);
+  const SerialTrajectory swing = makeRockerSwing(serial, 60, 0.02, 1);
   const LiftResult lifted = lift(fourbar, serial, swing);
   CHECK_FALSE(lifted.lifted());
   const size_t beyond = static_cast<size_t>(std::ceil((kRockerEnd - start) / 0.02));
@@ -264,7 +264,7 @@ TEST_CASE("a lift fails where the linkage ends, and says so") {
   // The motor turns ever faster.
   CHECK(lifted.trajectory.xs.back()[4] > 5 * lifted.trajectory.xs.front()[4]);
 
-  SerialTrajectory to_the_end = makeSwing(serial, 10, 0.1, (kRockerEnd - 1e-8 - start) / 1.0);
+  SerialTrajectory to_the_end = makeRockerSwing(serial, 10, 0.1, (kRockerEnd - 1e-8 - start) / 1.0);
   const LiftResult singular = lift(fourbar, serial, to_the_end);
   CHECK(singular.nodes.back().status == LiftStatus::SingularLinkage);
   CHECK(singular.nodes.size() == 11);

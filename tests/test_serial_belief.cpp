@@ -5,15 +5,16 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/reader.h"
 #include "bielle/motion/motion.h"
+#include "own_robots.h"
 #include "simulation/serial_belief.h"
 #include "transmission/posture_lift.h"
 
 namespace bielle::simulation {
 namespace {
 
-constexpr double kSingular = 1e-3;
+using bielle::testing::loadOwn;
 
-LoadedRobot load() { return loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto"); }
+constexpr double kSingular = 1e-3;
 
 // Always asks for the same torques.
 class Constant : public Controller {
@@ -31,7 +32,7 @@ class Constant : public Controller {
 
 struct Trial {
   explicit Trial(double bend)
-      : robot(load()), q0(makeStandingPosture(robot.model)), serial(makeSerialModel(robot.model, q0)) {
+      : robot(loadOwn("bipetto")), q0(makeStandingPosture(robot.model)), serial(makeSerialModel(robot.model, q0)) {
     const Model &closed = robot.model, &model = serial.model;
     q_s = restrictConfiguration(closed, model, q0);
     v_s = VectorXd::LinSpaced(model.nv(), -1, 1);

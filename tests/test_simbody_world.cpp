@@ -3,6 +3,7 @@
 
 #include "bielle/control/policy.h"
 #include "bielle/motion/walk.h"
+#include "own_robots.h"
 #include "simulation/bielle_world.h"
 #include "simulation/simbody_world.h"
 #include "world_trials.h"
@@ -10,12 +11,9 @@
 namespace bielle::simulation {
 namespace {
 
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(BIELLE_SOURCE_DIR "/robots/bipetto");
-  return robot.model;
-}
+using bielle::testing::getBipetto;
 
-const testing::TrialTolerances kTolerances{0.01, 1e-6, 1e-6};
+const testing::TrialTolerances kSimbodyTolerances{0.01, 1e-6, 1e-6};
 
 Policy makeWalkPolicy(const Model& model) {
   WalkOptions options;
@@ -47,19 +45,19 @@ VectorXd follow(World& world, Policy& policy, const Model& model, double duratio
 }  // namespace
 
 TEST_CASE("simbody world: a robot stands without creeping") {
-  testing::checkStanding(*makeSimbodyWorld(getBipetto()), getBipetto(), kTolerances);
+  testing::checkStanding(*makeSimbodyWorld(getBipetto()), getBipetto(), kSimbodyTolerances);
 }
 
 TEST_CASE("simbody world: a robot is dropped, and the books balance") {
-  testing::checkDropped(*makeSimbodyWorld(getBipetto()), getBipetto(), kTolerances);
+  testing::checkDropped(*makeSimbodyWorld(getBipetto()), getBipetto(), kSimbodyTolerances);
 }
 
 TEST_CASE("simbody world: a robot is pushed, and the work of the push is booked") {
-  testing::checkPushed(*makeSimbodyWorld(getBipetto()), getBipetto(), kTolerances);
+  testing::checkPushed(*makeSimbodyWorld(getBipetto()), getBipetto(), kSimbodyTolerances);
 }
 
 TEST_CASE("simbody world: a stop holds a joint, and takes energy") {
-  testing::checkStopped(*makeSimbodyWorld(getBipetto()), getBipetto(), kTolerances);
+  testing::checkStopped(*makeSimbodyWorld(getBipetto()), getBipetto(), kSimbodyTolerances);
 }
 
 TEST_CASE("simbody world: springs and dampers between points move a linkage, and are booked") {

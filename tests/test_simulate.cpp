@@ -18,7 +18,7 @@ using testing::CommandResult;
 using testing::readFile;
 using testing::runCommand;
 
-nlohmann::json readSummary(const fs::path& directory) {
+nlohmann::json parseSummary(const fs::path& directory) {
   return nlohmann::json::parse(readFile(directory / "summary.json"));
 }
 
@@ -55,7 +55,7 @@ TEST_CASE("simulate: with gains a walk stands, and its numbers are written") {
   const CommandResult result = simulate(output, {});
   CAPTURE(result.out, result.err);
   REQUIRE(result.status == 0);
-  const nlohmann::json summary = readSummary(output);
+  const nlohmann::json summary = parseSummary(output);
   CHECK(summary["fell"] == false);
   CHECK(summary["fall_time"].is_null());
   CHECK(summary["distance"].get<double>() > 0.1);
@@ -80,7 +80,7 @@ TEST_CASE("simulate: a controller may believe in another model than that of the 
     CHECK(result.status <= 1);  // it may well fall
     CHECK(result.err.empty());
     CHECK_THAT(result.out, Catch::Contains("with model " + model));
-    const nlohmann::json summary = readSummary(output);
+    const nlohmann::json summary = parseSummary(output);
     CHECK(summary["believed_model"] == model);
     CHECK(summary["duration"].get<double>() > 0.5);
     CHECK(summary["fell"] == (result.status == 1));
@@ -103,7 +103,7 @@ TEST_CASE("simulate: the plan lies beside what happened, and the page shows both
   REQUIRE(solved.time[5] == Approx(plan.time[12]).margin(1e-12));  // 0.06 s: steps of 12 and of 5 ms
   CHECK(plan.q.row(12).isApprox(solved.q.row(5), 1e-6));
   CHECK(plan.u.allFinite());
-  const nlohmann::json pushes = readSummary(output)["pushes"];
+  const nlohmann::json pushes = parseSummary(output)["pushes"];
   REQUIRE(pushes.size() == 1);
   CHECK(pushes[0]["direction_deg"] == 90);
   CHECK(readFile(output + "/report.html").find("\"plan\":{") != std::string::npos);
@@ -118,7 +118,7 @@ TEST_CASE("simulate: the summary alone is that of the whole result; a dry run on
   REQUIRE(simulate(whole, {"--duration", "0.3", "--no-report"}).status == 0);
   REQUIRE(simulate(alone, {"--duration", "0.3", "--summary-only"}).status == 0);
   CHECK(std::distance(fs::directory_iterator(alone), fs::directory_iterator()) == 1);
-  nlohmann::json summaries[] = {readSummary(whole), readSummary(alone)};
+  nlohmann::json summaries[] = {parseSummary(whole), parseSummary(alone)};
   for (nlohmann::json& summary : summaries)
     for (const char* of_the_run : {"command", "real_time_factor"}) summary.erase(of_the_run);
   CHECK(summaries[0] == summaries[1]);
@@ -139,7 +139,7 @@ TEST_CASE("simulate: without gains the walk falls, with status 1") {
   const std::string output = (scratch.path / "open").string();
   const CommandResult result = simulate(output, {"--control", "open"});
   CHECK(result.status == 1);
-  const nlohmann::json summary = readSummary(output);
+  const nlohmann::json summary = parseSummary(output);
   CHECK(summary["fell"] == true);
   CHECK(summary["fall_time"] == summary["duration"]);
   CHECK(summary["duration"].get<double>() < 2);
@@ -156,7 +156,7 @@ TEST_CASE("simulate: with real sensors a walk stands on flat and on uneven groun
       CAPTURE(result.out, result.err);
       CHECK(result.status == 0);
       CHECK(result.out.find("estimated trunk") != std::string::npos);
-      const nlohmann::json summary = readSummary(output);
+      const nlohmann::json summary = parseSummary(output);
       CHECK(summary["sensors"] == "real");
       CHECK(summary["noise"] == 1);
       const nlohmann::json& estimator = summary["estimator"];
@@ -218,11 +218,11 @@ TEST_CASE("simulate: a motion of least energy is carried out as such; one of lea
     return runCommand(arguments);
   };
   const auto getEnergy = [](const std::string& directory) {
-    return readSummary(directory)["electrical_energy"]["total_J"].get<double>();
+    return parseSummary(directory)["electrical_energy"]["total_J"].get<double>();
   };
   const std::string least = solve("energy");
   REQUIRE(simulate(least, {"--hold", "0"}).status == 0);
-  CHECK(readSummary(least + "/carried-out")["objective"]["kind"] == "energy");
+  CHECK(parseSummary(least + "/carried-out")["objective"]["kind"] == "energy");
   CHECK(getEnergy(least + "/carried-out") == Approx(getEnergy(least)).epsilon(0.02));
   const std::string peak = solve("peak-torque");
   const CommandResult refused = simulate(peak, {});
@@ -240,7 +240,7 @@ TEST_CASE("simulate: predictive control survives a push that gains do not") {
                     "0.4", "--duration", "2.8", "--control", control, "--push", "t=1.15,impulse=5,direction=180", "-o",
                     directory, "--no-report"});
     CAPTURE(result.err);
-    const auto summary = readSummary(directory);
+    const auto summary = parseSummary(directory);
     CHECK(result.status == (summary["fell"].get<bool>() ? 1 : 0));
     CHECK(summary["commanded_speed"] == 0.4);
     return summary;
@@ -285,7 +285,7 @@ TEST_CASE("simulate: a walk follows commands, turns on the way and stops") {
   const CommandResult result = walk({"--command", commands, "--duration", "4.2", "--control", "mpc"});
   CAPTURE(result.out, result.err);
   REQUIRE(result.status == 0);
-  const auto summary = readSummary(output);
+  const auto summary = parseSummary(output);
   CHECK(summary["solves"]["failed"] == 0);
   CHECK(summary["commanded_speed"].get<double>() == Approx((1.1 * 0.3 + 1.2 * 0.2) / 4.2));
   CHECK(summary["commands"].size() == 3);

@@ -2,20 +2,12 @@
 #include <catch2/catch.hpp>
 
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/stairs.h"
 #include "measure_steps.h"
+#include "own_robots.h"
 
 using namespace bielle;
-
-namespace {
-
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
-  return robot.model;
-}
-
-}  // namespace
+using namespace bielle::testing;
 
 TEST_CASE("stairs: Bipetto goes up and down, every foot on its step") {
   for (double height : {0.06, -0.06, 0.12, -0.12}) {

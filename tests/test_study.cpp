@@ -11,10 +11,10 @@
 #include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <thread>
 
 #include "bielle/io/record.h"
+#include "read_table.h"
 #include "robot_directory.h"
 #include "run_command.h"
 
@@ -47,37 +47,6 @@ class StudyDirectory {
  private:
   fs::path path_;
 };
-
-// Cells of a line of CSV, without their quotation marks.
-std::vector<std::string> splitCells(const std::string& line) {
-  std::vector<std::string> cells(1);
-  bool quoted = false;
-  for (const char c : line) {
-    if (c == '"')
-      quoted = !quoted;
-    else if (c == ',' && !quoted)
-      cells.emplace_back();
-    else
-      cells.back() += c;
-  }
-  return cells;
-}
-
-// Lines of a table by column.
-std::vector<std::map<std::string, std::string>> readTable(const fs::path& path) {
-  std::ifstream file(path);
-  std::string line;
-  std::getline(file, line);
-  const std::vector<std::string> names = splitCells(line);
-  std::vector<std::map<std::string, std::string>> rows;
-  while (std::getline(file, line)) {
-    const std::vector<std::string> cells = splitCells(line);
-    REQUIRE(cells.size() == names.size());
-    rows.emplace_back();
-    for (size_t i = 0; i < names.size(); ++i) rows.back()[names[i]] = cells[i];
-  }
-  return rows;
-}
 
 double calcPeak(const MotionRecord& record, const std::vector<std::string>& motors) {
   double peak = 0;

@@ -15,24 +15,24 @@ namespace {
 
 const TimingOptions kAll{{{kAllPhases, {}}}, 0};
 
-struct Solution {
+struct TimedSolution {
   Motion motion;
   FddpSummary summary;
   std::vector<PhaseTiming> timings;
 };
 
-Solution solve(Motion motion, int threads = 0) {
+TimedSolution solveTimed(Motion motion, int threads = 0) {
   FddpOptions options;
   options.bounds = ControlBounds::Enforce;
   options.threads = threads;
-  Solution out{std::move(motion), {}, {}};
+  TimedSolution out{std::move(motion), {}, {}};
   out.summary = Fddp(options).solve(*out.motion.problem, out.motion.guess);
   REQUIRE(out.summary.termination == FddpTermination::Converged);
   out.timings = listTimings(*out.motion.problem, out.motion.schedule, out.motion.guess);
   return out;
 }
 
-WalkOptions makeOptions() {
+WalkOptions makeTwoSteps() {
   WalkOptions options;
   options.steps = 2;
   options.gait.timing.time_step = 0.018;
@@ -40,8 +40,8 @@ WalkOptions makeOptions() {
 }
 
 // A walk with all durations free or, given a solution, one of them at a multiple of what was chosen, from that solution.
-Motion makeTimedWalk(const Model& model, const Solution* solution = nullptr, size_t fixed = 0, double factor = 1) {
-  MotionPlan plan = planWalk(model, makeOptions(), makeStandingPosture(model));
+Motion makeTimedWalk(const Model& model, const TimedSolution* solution = nullptr, size_t fixed = 0, double factor = 1) {
+  MotionPlan plan = planWalk(model, makeTwoSteps(), makeStandingPosture(model));
   const ContactSchedule schedule = plan.schedule;
   freeTimings(kAll, schedule, plan.stages);
   double scale = 1;
@@ -65,7 +65,7 @@ Motion makeTimedWalk(const Model& model, const Solution* solution = nullptr, siz
 
 TEST_CASE("a walk chooses the best duration of each phase") {
   const Model model = loadRobot("bipetto").model;
-  const Solution best = solve(makeTimedWalk(model));
+  const TimedSolution best = solveTimed(makeTimedWalk(model));
   REQUIRE(best.timings.size() == 5);
   int inside = 0;
   for (size_t i = 0; i < best.timings.size(); ++i) {
@@ -77,8 +77,8 @@ TEST_CASE("a walk chooses the best duration of each phase") {
     REQUIRE(timing.chosen >= timing.lower);
     REQUIRE(timing.chosen <= timing.upper);
     constexpr double kStep = 0.02;
-    const double cost = best.summary.cost, less = solve(makeTimedWalk(model, &best, i, 1 - kStep)).summary.cost,
-                 more = solve(makeTimedWalk(model, &best, i, 1 + kStep)).summary.cost;
+    const double cost = best.summary.cost, less = solveTimed(makeTimedWalk(model, &best, i, 1 - kStep)).summary.cost,
+                 more = solveTimed(makeTimedWalk(model, &best, i, 1 + kStep)).summary.cost;
     const bool at_lower = timing.chosen<1.001 * timing.lower, at_upper = timing.chosen> 0.999 * timing.upper;
     CHECK((less > cost) == !at_lower);
     CHECK((more > cost) == !at_upper);
@@ -92,7 +92,7 @@ TEST_CASE("a walk chooses the best duration of each phase") {
 
 TEST_CASE("a result has the final durations, and a warm start goes on from them") {
   const Model model = loadRobot("bipetto").model;
-  const Solution walk = solve(makeTimedWalk(model));
+  const TimedSolution walk = solveTimed(makeTimedWalk(model));
   const MotionResult result = makeResult({"bipetto", "", {}}, walk.motion, walk.motion.guess, walk.summary);
   REQUIRE(result.timings.size() == 5);
   int node = 0;
@@ -123,13 +123,13 @@ TEST_CASE("a result has the final durations, and a warm start goes on from them"
     const std::vector<PhaseTiming> guessed = listTimings(*again.problem, again.schedule, again.guess);
     CHECK(guessed[i].chosen == Approx(result.timings[i].chosen));
   }
-  CHECK(solve(std::move(again)).summary.cost == Approx(walk.summary.cost).epsilon(1e-7));
+  CHECK(solveTimed(std::move(again)).summary.cost == Approx(walk.summary.cost).epsilon(1e-7));
 }
 
 TEST_CASE("a plan with the final durations makes the same steps") {
   const Model model = loadRobot("bipetto").model;
-  const Solution walk = solve(makeTimedWalk(model));
-  MotionPlan plan = planWalk(model, makeOptions(), makeStandingPosture(model));
+  const TimedSolution walk = solveTimed(makeTimedWalk(model));
+  MotionPlan plan = planWalk(model, makeTwoSteps(), makeStandingPosture(model));
   fixTimings(walk.timings, StepRule::Midpoint, plan.schedule, plan.stages);
   const Motion fixed = makeMotion(model, std::move(plan), {Formulation::Reduced, StepRule::Midpoint});
   CHECK(!fixed.problem->hasFreeTimings());
@@ -145,7 +145,7 @@ TEST_CASE("a plan with the final durations makes the same steps") {
 
 TEST_CASE("the same motion for every number of threads") {
   const Model model = loadRobot("bipetto").model;
-  const Solution one = solve(makeTimedWalk(model), 1), three = solve(makeTimedWalk(model), 3);
+  const TimedSolution one = solveTimed(makeTimedWalk(model), 1), three = solveTimed(makeTimedWalk(model), 3);
   CHECK(one.motion.guess.xs == three.motion.guess.xs);
   CHECK(one.motion.guess.us == three.motion.guess.us);
 }

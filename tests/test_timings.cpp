@@ -47,8 +47,9 @@ StageSpec makeStage(const Model& model, const VectorXd& q_ref, const std::vector
 }
 
 // A phase of three steps of free duration, the second of another length, and a fixed step.
-RobotProblem makeProblem(const Model& model, const VectorXd& q0, const VectorXd& v0,
-                         const std::vector<ContactTarget>& contacts, const Discretization& how, std::mt19937& rng) {
+RobotProblem makeTimedProblem(const Model& model, const VectorXd& q0, const VectorXd& v0,
+                              const std::vector<ContactTarget>& contacts, const Discretization& how,
+                              std::mt19937& rng) {
   std::vector<StageSpec> stages;
   for (int k = 0; k <= 4; ++k) {
     stages.push_back(makeStage(model, q0, contacts, k < 4, how.step, rng));
@@ -85,8 +86,8 @@ VectorXd calcRoots(const RobotProblem& problem, int node, const RobotEvaluation&
 }
 
 // Every block of the linearization of a stage about (x, u), with the next node at x_node.
-void checkStage(const RobotProblem& problem, int k, const VectorXd& x, const VectorXd& u, const VectorXd& x_node,
-                std::mt19937& rng) {
+void checkTimedStage(const RobotProblem& problem, int k, const VectorXd& x, const VectorXd& u, const VectorXd& x_node,
+                     std::mt19937& rng) {
   RobotEvaluator evaluator(problem), node(problem), moved(problem);
   const int ndx = problem.tangentSize(k), nu = problem.controlSize(k), next = problem.tangentSize(k + 1);
   node.evaluate(k + 1, x_node, k + 1 < problem.numStages() ? VectorXd::Ones(problem.controlSize(k + 1)) : VectorXd());
@@ -147,7 +148,7 @@ TEST_CASE("free timings: derivatives by the length of a step, every joint kind t
           return projectVelocity(model, ws, makeConstraintSet(model), q, randomVector(rng, model.nv()));
         };
         const VectorXd& q = mechanism.q_closed;
-        const RobotProblem problem = makeProblem(model, q, makeVelocity(q), contacts, how, rng);
+        const RobotProblem problem = makeTimedProblem(model, q, makeVelocity(q), contacts, how, rng);
         REQUIRE(problem.hasFreeTimings());
         CHECK(problem.controlSize(0) == model.nu() + 1);
         CHECK(problem.tangentSize(1) == problem.tangentSize(0) + 1);
@@ -163,7 +164,7 @@ TEST_CASE("free timings: derivatives by the length of a step, every joint kind t
           CHECK(at.dt == Approx(problem.spec(k).dt * (k == 0 ? 0.8 : k < 3 ? 1.3 : 1)));
           const VectorXd x_next = at.x_next;
           CHECK(x_next[x_next.size() - 1] == (k == 0 ? 0.8 : k == 1 ? 1.3 : 1));
-          checkStage(problem, k, x, u, x_next, rng);
+          checkTimedStage(problem, k, x, u, x_next, rng);
           VectorXd open = x_next;
           const AssemblyResult closed =
               closeConfiguration(model, model.integrate(x_next.head(model.nq()), randomVector(rng, model.nv(), 0.05)));
@@ -171,7 +172,7 @@ TEST_CASE("free timings: derivatives by the length of a step, every joint kind t
           open.head(model.nq()) = closed.q;
           open.segment(model.nq(), model.nv()) = makeVelocity(closed.q);
           if (k < 2) open[open.size() - 1] += 0.1;
-          checkStage(problem, k, x, u, open, rng);
+          checkTimedStage(problem, k, x, u, open, rng);
         }
       }
 }
@@ -300,7 +301,7 @@ TEST_CASE("free timings: steps and linearizations allocate nothing after the fir
   const Model model = loadRobot("bipetto").model;
   const VectorXd q = makeStandingPosture(model);
   const RobotProblem problem =
-      makeProblem(model, q, VectorXd::Zero(model.nv()), makeContactTargets(model, q, {0, 1}, 0, 100), how, rng);
+      makeTimedProblem(model, q, VectorXd::Zero(model.nv()), makeContactTargets(model, q, {0, 1}, 0, 100), how, rng);
   std::vector<std::unique_ptr<NodeEvaluation>> nodes;
   std::vector<EvaluateTask> evaluations;
   std::vector<StageModel> models(5);

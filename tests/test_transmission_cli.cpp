@@ -10,7 +10,7 @@
 #include "bielle/model/reader.h"
 #include "bielle/transmission/ratio.h"
 #include "robot_directory.h"
-#include "run_command.h"
+#include "run_bielle.h"
 
 namespace fs = std::filesystem;
 using namespace bielle;
@@ -18,11 +18,6 @@ using namespace bielle::testing;
 using nlohmann::json;
 
 namespace {
-
-CommandResult run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), BIELLE_COMMAND);
-  return runCommand(arguments);
-}
 
 void checkRefused(const CommandResult& result, const std::string& text) {
   INFO(result.err);

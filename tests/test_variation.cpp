@@ -17,8 +17,6 @@ using namespace bielle::testing;
 
 namespace {
 
-constexpr double kStep = 2e-4;
-
 // Both frames of the loop in all six directions, the first contact, the placements of the joints (each along a
 // direction of its own), an inertia, armature, and everything at once.
 std::vector<ModelVariation> listVariations(std::mt19937& rng, const Model& model) {
@@ -119,7 +117,7 @@ void checkForwardDynamics(std::mt19937& rng, const Model& model, const std::vect
   REQUIRE(updateConstrainedDynamics(model, ws, cws, set, q, v, tau) == DynamicsStatus::Ok);
   const std::vector<ModelVariation> directions = listVariations(rng, model);
   const DynamicsVariation analytic = calcConstrainedVariation(model, ws, cws, set, directions);
-  const MatrixXd numeric = differentiateModel(model, directions, kStep, [&](const Model& moved) {
+  const MatrixXd numeric = differentiateModel(model, directions, kModelStep, [&](const Model& moved) {
     Workspace other(moved);
     ConstrainedWorkspace ocws;
     REQUIRE(updateConstrainedDynamics(moved, other, ocws, makeConstraintSet(moved, contacts), q, v, tau) ==
@@ -201,7 +199,7 @@ TEST_CASE("variation: redundant rows, changes that leave them so") {
     CHECK(closing.calcMotion(model, ws, direction, motions.back()) < 1e-9);
   }
   const DynamicsVariation analytic = calcConstrainedVariation(model, ws, cws, set, directions, motions);
-  const MatrixXd numeric = differentiateModel(model, directions, kStep, [&](const Model& moved) {
+  const MatrixXd numeric = differentiateModel(model, directions, kModelStep, [&](const Model& moved) {
     const VectorXd x = moved.integrate(q, closeHeld(moved, q, {0}));
     Workspace other(moved);
     updatePositions(moved, other, x);
@@ -261,7 +259,7 @@ TEST_CASE("variation: motor torques, forces and closing of a kept motion") {
 
       const std::vector<ModelVariation> directions = listVariations(rng, model);
       const int nv = model.nv(), nu = model.nu();
-      const MatrixXd numeric = differentiateModel(model, directions, kStep, [&](const Model& moved) {
+      const MatrixXd numeric = differentiateModel(model, directions, kModelStep, [&](const Model& moved) {
         const VectorXd d = closeHeld(moved, q, kept);
         KeptMotion other(moved, kept);
         REQUIRE(other.update(makeConstraintSet(moved, contacts), moved.integrate(q, d), v, a, forces) ==
@@ -314,7 +312,7 @@ TEST_CASE("variation: Bipetto on one foot with its motors held, when its rods ch
   }
   CHECK(analytic.topRows(6).cwiseAbs().maxCoeff() > 10);  // a longer rod of the stance leg moves the trunk
   for (int dof : motors) CHECK(analytic.row(dof).cwiseAbs().maxCoeff() < 1e-9);
-  checkDerivative(analytic, differentiateModel(bipetto, directions, kStep, [&](const Model& moved) {
+  checkDerivative(analytic, differentiateModel(bipetto, directions, kModelStep, [&](const Model& moved) {
                     return closeHeld(moved, q, motors, stance);
                   }));
 }

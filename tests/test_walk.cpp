@@ -8,26 +8,23 @@
 #include "bielle/motion/walk.h"
 #include "measure_steps.h"
 #include "motion/gait.h"
+#include "own_robots.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
 
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
-  return robot.model;
-}
-
-struct Solved {
+struct SolvedWalk {
   FddpSummary summary;
   StepMeasures measures;
 };
 
-Solved solve(Motion motion) {
+SolvedWalk solveWalk(Motion motion) {
   FddpOptions options;
   options.initial_regularization = kGuessRegularization;
   options.max_iterations = 100;
-  Solved solved;
+  SolvedWalk solved;
   solved.summary = Fddp(options).solve(*motion.problem, motion.guess);
   solved.measures = StepMeter(motion, motion.guess).measure();
   return solved;
@@ -40,7 +37,7 @@ Vector3d calcSpeed(const StepMeasures& m) {
 }
 
 // Requirements for every motion with steps.
-void checkSteps(const Solved& solved) {
+void checkWalk(const SolvedWalk& solved) {
   const StepMeasures& m = solved.measures;
   CAPTURE(solved.summary.message, solved.summary.iterations);
   CHECK(solved.summary.termination == FddpTermination::Converged);
@@ -145,8 +142,8 @@ TEST_CASE("walk: Bipetto walks as fast as requested, on its feet") {
     CAPTURE(speed);
     WalkOptions options;
     options.speed = speed;
-    const Solved solved = solve(makeWalk(getBipetto(), options));
-    checkSteps(solved);
+    const SolvedWalk solved = solveWalk(makeWalk(getBipetto(), options));
+    checkWalk(solved);
     const Vector3d velocity = calcSpeed(solved.measures);
     CHECK(velocity.x() == Approx(speed).epsilon(0.05));
     CHECK(std::abs(solved.measures.end.y() - solved.measures.start.y()) < 0.02);
@@ -232,16 +229,16 @@ TEST_CASE("walk: the first double support is as long as the soles need to set of
 }
 
 TEST_CASE("walk: the full formulation walks alike") {
-  const Solved full = solve(makeWalk(getBipetto(), {}, Formulation::Full));
-  checkSteps(full);
+  const SolvedWalk full = solveWalk(makeWalk(getBipetto(), {}, Formulation::Full));
+  checkWalk(full);
   CHECK(calcSpeed(full.measures).x() == Approx(0.5).epsilon(0.05));
 }
 
 TEST_CASE("side walk and turns: where they were requested to go") {
   SideWalkOptions side;
   side.speed = -0.4;
-  const Solved right = solve(makeSideWalk(getBipetto(), side));
-  checkSteps(right);
+  const SolvedWalk right = solveWalk(makeSideWalk(getBipetto(), side));
+  checkWalk(right);
   CHECK(calcSpeed(right.measures).y() == Approx(-0.4).epsilon(0.05));
   CHECK(std::abs(right.measures.end.x() - right.measures.start.x()) < 0.02);
 
@@ -251,8 +248,8 @@ TEST_CASE("side walk and turns: where they were requested to go") {
   turn.steps = 6;
   Motion motion = makeTurn(getBipetto(), turn);
   const ContactPhase last = motion.schedule.phases.back();
-  const Solved arc = solve(std::move(motion));
-  checkSteps(arc);
+  const SolvedWalk arc = solveWalk(std::move(motion));
+  checkWalk(arc);
   const Vector3d moved = arc.measures.end - arc.measures.start;
   CHECK(moved.x() == Approx(0.4 * std::sin(1.2)).margin(0.02));
   CHECK(moved.y() == Approx(-0.4 * (1 - std::cos(1.2))).margin(0.02));
@@ -262,7 +259,7 @@ TEST_CASE("side walk and turns: where they were requested to go") {
 TEST_CASE("walk: with the published weights the feet land where they like") {
   WalkOptions options;
   setPaperWeights(options);
-  const Solved solved = solve(makeWalk(getBipetto(), options));
+  const SolvedWalk solved = solveWalk(makeWalk(getBipetto(), options));
   CAPTURE(solved.summary.message, solved.summary.iterations);
   CHECK(solved.summary.termination == FddpTermination::Converged);
   const double speed = calcSpeed(solved.measures).x();
@@ -282,7 +279,7 @@ TEST_CASE("walk: feet that have room land near their footholds, and stand where 
                                  [](const Goal& each) { return each.kind == GoalKind::Footholds; });
   REQUIRE(goal != motion.goals.end());
   CHECK(goal->tolerance == Approx(0.03 * std::sqrt(2)));
-  const Solved solved = solve(makeWalk(getBipetto(), options));
+  const SolvedWalk solved = solveWalk(makeWalk(getBipetto(), options));
   CHECK(solved.summary.termination == FddpTermination::Converged);
   CHECK(solved.measures.foothold > 1e-3);
   CHECK(solved.measures.foothold < 0.03 * std::sqrt(2) + 1e-6);
@@ -360,7 +357,7 @@ TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with i
         landing = static_cast<int>(k);
       }
   REQUIRE(landing > 0);
-  const Solved far = solve(makeMotion(getBipetto(), std::move(plan), {}));
+  const SolvedWalk far = solveWalk(makeMotion(getBipetto(), std::move(plan), {}));
   CAPTURE(far.summary.message, far.summary.iterations);
   CHECK(far.summary.termination == FddpTermination::Infeasible);
   CHECK_THAT(far.summary.message,

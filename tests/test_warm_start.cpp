@@ -4,17 +4,13 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
-#include "bielle/model/reader.h"
 #include "bielle/motion/walk.h"
+#include "own_robots.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 
 namespace {
-
-const Model& getBipetto() {
-  static const LoadedRobot robot = loadRobot(std::string(BIELLE_SOURCE_DIR) + "/robots/bipetto");
-  return robot.model;
-}
 
 Motion makeShortWalk(double speed, double end = 0.3) {
   WalkOptions options;

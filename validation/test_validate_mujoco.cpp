@@ -1,9 +1,9 @@
 // MuJoCo against random mechanisms of every joint and closure kind; wrong models must be seen.
 #include <catch2/catch.hpp>
-#include <sstream>
 
 #include "mechanisms.h"
 #include "model_copy.h"
+#include "print_report.h"
 #include "validate_mujoco.h"
 
 using namespace bielle;
@@ -13,12 +13,6 @@ using namespace bielle::validation;
 namespace {
 
 constexpr const char* kComplete = "accelerations, rigid closures, dJ/dt v added";
-
-std::string print(const ValidationReport& report) {
-  std::ostringstream text;
-  printReport(text, report);
-  return text.str();
-}
 
 }  // namespace
 

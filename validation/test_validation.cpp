@@ -3,7 +3,6 @@
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <set>
-#include <sstream>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
@@ -13,22 +12,13 @@
 #include "model/joint.h"
 #include "model_copy.h"
 #include "motion.h"
+#include "print_report.h"
 #include "simbody_bridge.h"
 #include "validate.h"
 
 using namespace bielle;
 using namespace bielle::testing;
 using namespace bielle::validation;
-
-namespace {
-
-std::string print(const ValidationReport& report) {
-  std::ostringstream text;
-  printReport(text, report);
-  return text.str();
-}
-
-}  // namespace
 
 TEST_CASE("every joint kind with every closure kind agrees with Simbody") {
   std::mt19937 rng(11);

@@ -1,0 +1,14 @@
+#pragma once
+// The error message of reading a recorded motion.
+#include <string>
+
+#include "bielle/io/record.h"
+#include "get_error.h"
+
+namespace bielle::testing {
+
+inline std::string getErrorOfReading(const std::string& path) {
+  return getError([&] { readRecord(path); });
+}
+
+}  // namespace bielle::testing

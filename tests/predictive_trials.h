@@ -1,0 +1,8 @@
+#pragma once
+// What the trials of the predictive controller share.
+
+namespace bielle::testing {
+
+inline constexpr int kStageTicks = 12;  // control steps of 1 ms in a stage of a walk by command
+
+}  // namespace bielle::testing
