@@ -17,6 +17,7 @@
 #include "io/mjcf.h"
 #include "io/mjcf_coordinates.h"
 #include "mechanisms.h"
+#include "published_robots.h"
 #include "robot_difference.h"
 #include "robot_directory.h"
 #include "robot_trial.h"
@@ -54,10 +55,8 @@ void checkMjcfRoundTrip(const Model& model, ConstVectorRef q_ref) {
 }  // namespace
 
 TEST_CASE("every robot comes back from MJCF with its mass matrix, closures, motors and soles") {
-  const bool published = fs::is_directory(std::string(BIELLE_SOURCE_DIR) + "/../shared/robots");
-  if (!published) WARN("skipped: battobot and digit, whose published models are not at hand");
+  for (const char* published : {"battobot_6d", "digit_like_2legs"}) findPublished(published);  // warns without them
   for (const std::string& name : listRobots()) {
-    if (!published && (name == "battobot" || name == "digit")) continue;
     CAPTURE(name);
     const Model model = loadRobot(name).model;
     const Written written = write(model);

@@ -13,14 +13,16 @@
 #include "bielle/motion/walk.h"
 #include "bielle/solve/fddp.h"
 #include "problem_probe.h"
+#include "published_robots.h"
 
 using namespace bielle;
+using namespace bielle::testing;
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 namespace {
 
-const std::string kSource = BIELLE_SOURCE_DIR, kShared = kSource + "/../shared";
+const std::string kSource = BIELLE_SOURCE_DIR;
 
 // The reference, its states in the order of the model.
 struct PaperWalk {
@@ -53,14 +55,13 @@ VectorXd readTorques(const Model& model, const Json& motors, const Json& numbers
 }
 
 std::optional<PaperWalk> readReference() {
-  const std::string file = kShared + "/paper/walk-reference.json";
-  if (!fs::exists(file) || !fs::is_directory(kShared + "/robots/battobot_6d")) {
-    WARN("skipped: the paper's walk and its model are not at hand");
+  if (findPublished("battobot_6d").empty()) return std::nullopt;
+  const fs::path file = fs::path(findPublishedDirectory("battobot_6d")) / "../paper/walk-reference.json";
+  if (!fs::exists(file)) {
+    WARN("skipped: the paper's walk, paper/walk-reference.json, is not beside the published robots");
     return std::nullopt;
   }
-  REQUIRE(setenv("BIELLE_ROBOTS", (kShared + "/robots").c_str(), 1) == 0);
   PaperWalk out{loadRobot(kSource + "/robots/battobot").model, {}, {}, {}, {}, {}, 0};
-  unsetenv("BIELLE_ROBOTS");
   std::ifstream stream(file);
   const Json json = Json::parse(stream);
   const Json& joints = json.at("joints");

@@ -12,6 +12,7 @@
 #include "bielle/motion/walk.h"
 #include "io/adopt.h"
 #include "measure_steps.h"
+#include "published_robots.h"
 #include "robot_directory.h"
 #include "robots/spring_leg.h"
 
@@ -21,21 +22,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const std::string kSource = BIELLE_SOURCE_DIR, kPublished = kSource + "/../shared/robots";
-
-bool isAtHand(const std::string& name) {
-  if (fs::is_directory(kPublished + "/" + name)) return true;
-  WARN("skipped: the published model " + name + " is not at hand");
-  return false;
-}
+const std::string kSource = BIELLE_SOURCE_DIR;
 
 // A robot here that completes a published one.
-LoadedRobot loadCompleted(const std::string& name) {
-  REQUIRE(setenv("BIELLE_ROBOTS", kPublished.c_str(), 1) == 0);
-  LoadedRobot robot = loadRobot(kSource + "/robots/" + name);
-  unsetenv("BIELLE_ROBOTS");
-  return robot;
-}
+LoadedRobot loadCompleted(const std::string& name) { return loadRobot(kSource + "/robots/" + name); }
 
 FddpSummary solvePublished(Motion& motion) {
   FddpOptions solver;
@@ -68,11 +58,12 @@ TEST_CASE("published models load and close, with the rank and mobility that they
                                                      {"digit_like_2legs", {36, 36, 12}},
                                                      {"battobot_6d", {36, 36, 12}}};
   for (const auto& [name, expected] : published) {
-    if (!isAtHand(name)) continue;
+    const std::string directory = findPublished(name);
+    if (directory.empty()) continue;
     CAPTURE(name);
     LoadOptions options;
     options.base = BaseKind::Fixed;
-    const Model model = loadRobot(kPublished + "/" + name, options).model;
+    const Model model = loadRobot(directory, options).model;
     const AssemblyResult closed = findClosedConfiguration(model);
     CHECK(closed.status == AssemblyStatus::Closed);
     CHECK(closed.gap < 1e-10);
@@ -84,10 +75,10 @@ TEST_CASE("published models load and close, with the rank and mobility that they
 }
 
 TEST_CASE("the spring leg has the lengths, angles and masses of Digit's published leg") {
-  if (!isAtHand("digit_like_2legs")) return;
+  if (findPublished("digit_like_2legs").empty()) return;
   LoadOptions options;
   options.base = BaseKind::Fixed;
-  const Model digit = loadRobot(kPublished + "/digit_like_2legs", options).model;
+  const Model digit = loadRobot(findPublished("digit_like_2legs"), options).model;
   Workspace ws(digit);
   updatePositions(digit, ws, digit.makeNeutral());
   const auto find = [&](const std::string& name) {
@@ -151,7 +142,7 @@ TEST_CASE("the spring leg has the lengths, angles and masses of Digit's publishe
 }
 
 TEST_CASE("Digit squats, walks and climbs stairs with the feet and the posture that come along") {
-  if (!isAtHand("digit_like_2legs")) return;
+  if (findPublished("digit_like_2legs").empty()) return;
   const LoadedRobot robot = loadCompleted("digit");
   const Model& model = robot.model;
   CHECK(robot.warnings.size() == 1);  // its meshes are elsewhere
@@ -189,7 +180,7 @@ TEST_CASE("Digit squats, walks and climbs stairs with the feet and the posture t
 }
 
 TEST_CASE("the published model of Bipetto, completed, squats as Bipetto does") {
-  if (!isAtHand("battobot_6d")) return;
+  if (findPublished("battobot_6d").empty()) return;
   const LoadedRobot published = loadCompleted("battobot");
   const Model ours = loadRobot(kSource + "/robots/bipetto").model;
   SquatOptions options;
@@ -209,8 +200,8 @@ TEST_CASE("the published model of Bipetto, completed, squats as Bipetto does") {
 }
 
 TEST_CASE("Digit's published model, adopted, squats") {
-  if (!isAtHand("digit_like_2legs")) return;
-  const fs::path published = fs::absolute(kPublished + "/digit_like_2legs/robot.urdf").lexically_normal();
+  if (findPublished("digit_like_2legs").empty()) return;
+  const fs::path published = fs::absolute(findPublished("digit_like_2legs") + "/robot.urdf").lexically_normal();
   const Adoption adoption = adoptRobot(loadRobot(published.string()), published.string());
   const RobotDirectory directory;
   const Model model = loadRobot(directory.write("mine/mine.yaml", adoption.yaml)).model;

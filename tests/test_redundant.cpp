@@ -10,6 +10,7 @@
 #include "dynamics/saddle_point.h"
 #include "math/constants.h"
 #include "math/so3.h"
+#include "published_robots.h"
 
 using namespace bielle;
 using namespace bielle::testing;
@@ -220,11 +221,8 @@ TEST_CASE("four-bar: energy of a free motion over a second, by RK4 at two steps"
 }
 
 TEST_CASE("a published delta robot: redundant loops close, and accelerations obey them") {
-  const std::string directory = std::string(BIELLE_SOURCE_DIR) + "/../shared/robots/robot_delta";
-  if (!std::filesystem::is_directory(directory)) {
-    WARN("skipped: the published model robot_delta is not at hand");
-    return;
-  }
+  const std::string directory = findPublished("robot_delta");
+  if (directory.empty()) return;
   LoadOptions options;
   options.base = BaseKind::Fixed;
   const Model model = loadRobot(directory, options).model;

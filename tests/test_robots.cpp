@@ -7,19 +7,12 @@
 #include "bielle/model/reader.h"
 #include "model/joint.h"
 #include "own_robots.h"
+#include "published_robots.h"
 
 using namespace bielle;
 using namespace bielle::testing;
 
 namespace {
-
-// Directory of the published files, or empty (with a warning).
-std::string findPublished(const std::string& name) {
-  const std::string directory = std::string(BIELLE_SOURCE_DIR) + "/../shared/robots/" + name;
-  if (std::filesystem::is_directory(directory)) return directory;
-  WARN("skipped: the published model " + name + " is not at hand");
-  return "";
-}
 
 std::vector<SE3> calcPlacements(const Model& model, const VectorXd& q) {
   std::vector<SE3> X(model.numBodies());
