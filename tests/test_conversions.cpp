@@ -265,8 +265,8 @@ TEST_CASE("what the reader of MJCF leaves out is reported with its line, and wha
   };
   checkError("<mujoco>", "document", "it is not well-formed XML");
   checkError("<robot/>", "document", "its outermost element is not <mujoco>");
-  checkError(makeSwing("", "<include file=\"a.xml\"/>"), "<include> (line 1)", "such elements are not read");
-  checkError(makeSwing("<replicate/>"), "<replicate> (line 1)", "such elements are not read");
+  checkError(makeSwing("", "<include file=\"a.xml\"/>"), "<include> (line 1)", "such elements are not supported");
+  checkError(makeSwing("<replicate/>"), "<replicate> (line 1)", "such elements are not supported");
   checkError(makeSwing("\n<joint name=\"swing\"/>"), "joint 'swing' (line 2)", "two joints have this name");
   checkError(makeSwing("\n<joint name=\"x\" type=\"free\"/>"), "body 'tip' (line 1)", "it has a free joint");
   checkError(makeSwing("\n<joint name=\"x\" axis=\"0 0 0\"/>"), "joint 'x' (line 2)", "its axis is not a direction");

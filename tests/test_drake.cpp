@@ -307,7 +307,7 @@ TEST_CASE("Drake's URDF in its words, and what they lose") {
   for (Joint& joint : parts.joints)
     if (joint.kind == JointKind::Universal) joint.axis2 = Vector3d(0, 1, 1).normalized();
   CHECK_THAT(getError([&] { formatDrake(ModelBuilder::restore(parts)); }),
-             Catch::Contains("universal joint 'cross': its axes are not at right angles"));
+             Catch::Contains("universal joint 'cross': its axes are not perpendicular"));
 }
 
 TEST_CASE("a number of Drake's URDF that is wrong by a millionth shows") {

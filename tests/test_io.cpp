@@ -212,7 +212,7 @@ TEST_CASE("predicted footholds come back from NumPy files, and are refused where
   arrays["footholds"].shape.front() = arrays["footholds"].shape.front() * arrays["footholds"].shape[1];
   arrays["footholds"].shape[1] = 1;
   writeTextFile(directory / "t.npz", formatArchive(arrays));
-  CHECK_THAT(getErrorOfReading(directory / "t.npz"), Catch::Contains("'footholds': its shape does not fit"));
+  CHECK_THAT(getErrorOfReading(directory / "t.npz"), Catch::Contains("'footholds': its shape does not match"));
 }
 
 TEST_CASE("midpoint steps are recorded with the points to which their accelerations belong") {

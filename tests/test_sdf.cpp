@@ -129,7 +129,7 @@ TEST_CASE("SDF: limits, springs and names move or change as told, and planar joi
                            "<spring_stiffness>4</spring_stiffness>"})
     CHECK_THAT(text.xml, Catch::Contains(part));
   REQUIRE(text.warnings.size() == 3);
-  CHECK_THAT(text.warnings[0], Catch::Contains("joint 'a': it is named 'a_joint'"));
+  CHECK_THAT(text.warnings[0], Catch::Contains("joint 'a': it is renamed to 'a_joint'"));
   CHECK_THAT(text.warnings[1], Catch::Contains("joints 'a' 0.5: their coordinates are measured from these values"));
   CHECK_THAT(text.warnings[2], Catch::Contains("motors"));
   joint.name = "slide", joint.kind = JointKind::Planar;

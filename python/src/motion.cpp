@@ -262,7 +262,7 @@ void bindHeldMotion(py::module_& module) {
           py::arg("model"), py::arg("request"),
           "The plan of a request, e.g. to add costs and constraints to its stages.")
       .def_readonly("model", &HeldMotion::model, "Model")
-      .def_readonly("options", &HeldMotion::options, "ProblemOptions")
+      .def_readonly("problem_options", &HeldMotion::options, "ProblemOptions")
       .def_property_readonly(
           "request", [](const HeldMotion& h) { return h.request; }, "Request, or None")
       .def_property_readonly(

@@ -87,7 +87,7 @@ std::optional<int> runCompanion(const std::string& name, std::vector<std::string
   };
   const auto [error, status] = runProgram(program, std::move(arguments), false);
   if (error == ENOENT && program == name) return {};  // beside this program it exists
-  if (error != 0) return fail(std::string("did not run: ") + std::strerror(error));
+  if (error != 0) return fail(std::string("cannot be started: ") + std::strerror(error));
   if (WIFEXITED(status)) return WEXITSTATUS(status);
   return fail("was terminated by signal " + std::to_string(WTERMSIG(status)));
 }

@@ -49,8 +49,9 @@ void readMjcfDefaults(const TiXmlElement& element, const std::string& parent, Mj
 /// An element with the defaults of its class. Attributes that were not asked for until the end are noted.
 class MjcfElement {
  public:
-  /// \param childclass  class of elements that name none   \param kind  whose defaults hold for it: its tag
+  /// \param childclass  class of elements that name none
   MjcfElement(const TiXmlElement& element, const std::string& childclass, MjcfSettings& settings);
+  /// \param kind  whose defaults hold for it, in place of its tag
   MjcfElement(const TiXmlElement& element, const std::string& childclass, MjcfSettings& settings,
               const std::string& kind);
   ~MjcfElement();

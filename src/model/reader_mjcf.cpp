@@ -157,8 +157,8 @@ void MjcfReader::readContents(const std::vector<Child>& children, const BodyPlac
     static const std::set<std::string> read = {"geom", "site", "joint", "freejoint", "inertial"};
     static const std::set<std::string> unable = {"include", "attach", "replicate", "composite", "flexcomp", "plugin"};
     if (unable.count(tag))
-      refuse(*child.element, "such elements are not read",
-             "save the model by MuJoCo as one file (mj_saveLastXML), or remove it");
+      refuse(*child.element, "such elements are not supported",
+             "save the model with MuJoCo as one file (mj_saveLastXML), or remove it");
     if (tag == "body")
       readBody(child, place);
     else if (!read.count(tag))
