@@ -2411,7 +2411,7 @@ class Motion:
         """Model"""
         ...
     @property
-    def options(self) -> ProblemOptions:
+    def problem_options(self) -> ProblemOptions:
         """ProblemOptions"""
         ...
     @property

@@ -13,7 +13,7 @@ def solve_request(robot: Union[str, Robot], request: Request, problem: ProblemOp
 def solve_sequence(robot: Union[str, Robot], sequence: Iterable[str], options: Mapping[str, float] = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result: ...
 
 def solve_squat(robot: Union[str, Robot], *, depth: float = ..., duration: float = ..., settle: float = ..., time_step: float = ..., com_weight: float = ..., state_weight: float = ..., torso_weight: float = ..., motor_weight: float = ..., control_weight: float = ..., force_weight: float = ..., pressure_weight: float = ..., friction: float = ..., cone_margin: float = ..., contact_kp: float = ..., contact_kd: float = ..., closure_kp: float = ..., closure_kd: float = ..., problem: ProblemOptions = ..., solver: SolverOptions = ..., warm_start: Optional[WarmStart] = ..., callback: Optional[Callback] = ...) -> Result:
-    """down and up again, feet flat: the height of the centre of mass follows a sine.
+    """go down and up again with feet flat; the height of the centre of mass follows a sine.
 
     robot: a Robot, or the name of one
     problem: ProblemOptions: formulation, limits, free durations, objective
