@@ -16,23 +16,20 @@ import time
 import common
 
 RELEASE = "cmake --preset release -G Ninja >/dev/null && "
-EDITED = "echo '// edited' >> src/motion/walk.cpp && "
-# What runs once before and is not counted; what is counted.
+# What runs once before and is not counted; what is counted, by its title.
 STEPS = {
-    "demo": ("scripts/demo.sh", "", "scripts/demo.sh"),
-    "build": ("scripts/test.sh, building alone", "",
-              "sed -i '/^run_tests/d' scripts/test.sh && scripts/test.sh"),
-    "tests": ("scripts/test.sh, tests alone", "sed -i '/^run_tests/d' scripts/test.sh && scripts/test.sh",
-              "source scripts/setup.sh && run_tests build/test"),
-    "edit": ("one source of motion edited: its test built", RELEASE + "ninja -C build {target}",
-             EDITED + "ninja -C build {target}"),
-    "pip": ("pip install . in a fresh virtual environment", "python3 -m venv --system-site-packages environment",
-            "environment/bin/pip install --no-build-isolation ."),
+    "demo": ("", {"`scripts/demo.sh`": "scripts/demo.sh"}),
+    "test": ("", {"`scripts/test.sh`, building": "sed -i '/^run_tests/d' scripts/test.sh && scripts/test.sh",
+                  "`scripts/test.sh`, testing": "source scripts/setup.sh && run_tests build/test"}),
+    "edit": (RELEASE + "ninja -C build {target}",
+             {"one source of `motion` edited, its test built": "echo '// edited' >> src/motion/walk.cpp && ninja -C build {target}"}),
+    "pip": ("python3 -m venv --system-site-packages environment",
+            {"`pip install .` in a fresh virtual environment": "environment/bin/pip install --no-build-isolation ."}),
 }
 
 
 def run(command, directory, log):
-    """Seconds of processor and clock."""
+    """Minutes of processor and clock."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("BIELLE", "CCACHE"))}
     environment.update(CMAKE_CXX_COMPILER_LAUNCHER="", CCACHE_DISABLE="1")
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.time()
@@ -41,11 +38,12 @@ def run(command, directory, log):
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if status:
         print(f"{command}: exit status {status} (see {log.name})", file=sys.stderr)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, time.time() - begin
+    return (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime) / 60, (time.time() - begin) / 60
 
 
 def measure(step, revision, directory, log):
-    _, before, command = STEPS[step]
+    """[(title, (minutes of processor, of clock)), ...] in a fresh clone."""
+    before, commands = STEPS[step]
     clone = pathlib.Path(directory) / revision[:12] / "clone"
     if not clone.exists():
         clone.parent.mkdir(parents=True)
@@ -56,7 +54,7 @@ def measure(step, revision, directory, log):
     target = "test_motion" if "test_${area}" in targets else "test_walk"
     if before:
         run(before.format(target=target), clone, log)
-    return run(command.format(target=target), clone, log)
+    return [(title, run(command.format(target=target), clone, log)) for title, command in commands.items()]
 
 
 def main():
@@ -69,13 +67,12 @@ def main():
     rows = []
     with tempfile.TemporaryDirectory(prefix="bielle-wait-") as directory, open("wait.log", "w", encoding="utf-8") as log:
         for step in arguments.steps:
-            (here, clock), (there, old_clock) = [measure(step, revision, directory, log) for revision in revisions]
-            rows.append((STEPS[step][0], f"{there / 60:.1f}, {old_clock / 60:.1f}", f"{here / 60:.1f}, {clock / 60:.1f}",
-                         f"{here / there:.2f}"))
-            print(rows[-1], file=sys.stderr)
+            for (title, here), (_, there) in zip(*[measure(step, revision, directory, log) for revision in revisions]):
+                rows.append((title, *(f"{minutes:.1f}" for minutes in (*there, *here)), f"{here[0] / there[0]:.2f}"))
+                print(rows[-1], file=sys.stderr)
     page = common.Page(__file__, "The wait", common.describe_run())
     page.add("Minutes of processor and of clock on all cores, each in a fresh clone and without a compiler cache.")
-    page.table(("", f"processor, clock at {arguments.against}", "processor, clock", "ratio of processor times"), rows)
+    page.table(("", f"{arguments.against}: processor", "clock", "this commit: processor", "clock", "ratio of processor times"), rows)
     page.write(False)
 
 
