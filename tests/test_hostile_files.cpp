@@ -2,6 +2,7 @@
 // a recursive parser. Each is rejected with one error that names the file. The archives are made by Python's zipfile.
 // Also: devices and pipes are written to and not replaced.
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <cstdlib>
@@ -139,4 +140,18 @@ TEST_CASE("a pipe is written to, a file is replaced, a directory is refused") {
   for (const auto& entry : fs::directory_iterator(directory.path()))
     left += entry.path().string().find(".part") != std::string::npos;
   CHECK(left == 0);
+}
+
+TEST_CASE("files: what a process that was killed has left of a file goes when the file is written") {
+  const RobotDirectory directory;
+  const std::string file = directory.path() + "/file", nobody = ".part99999999";  // more than there can be processes
+  const std::string living = ".part" + std::to_string(getppid());
+  for (const std::string& name : {"file" + nobody, "file" + living, std::string("file.part"), "file" + nobody + "x",
+                                  std::string("file.part0"), "other" + nobody})
+    directory.write(name, "x");
+  writeTextFile(file, "whole");
+  CHECK_FALSE(fs::exists(file + nobody));
+  for (const std::string& name :
+       {"file" + living, std::string("file.part"), "file" + nobody + "x", std::string("file.part0"), "other" + nobody})
+    CHECK(fs::exists(directory.path() + "/" + name));
 }

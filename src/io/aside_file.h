@@ -6,6 +6,7 @@ namespace bielle {
 
 class AsideFile {
  public:
+  /// Removes the temporary files of this path that processes which no longer run have left.
   explicit AsideFile(const std::string& path);
   /// Removes what was not committed.
   ~AsideFile();
