@@ -2,7 +2,9 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -12,6 +14,7 @@
 
 #include "robot_directory.h"
 #include "run_command.h"
+#include "study/campaign_command.h"
 #include "study/campaign_report.h"
 
 namespace fs = std::filesystem;
@@ -130,6 +133,69 @@ TEST_CASE("campaign: after an interruption only what is missing is done") {
   CHECK(countProgress(runCampaign(other, out)) == 0);
   std::ofstream(out + "/motions/walk/motion/summary.json", std::ios::app) << "\n";
   CHECK(countProgress(runCampaign(other, out)) == 1);
+
+  // A line that was changed by hand is named, whatever is wrong with it.
+  const std::string whole = readFile(log);
+  for (const auto& [from, to, problem] : std::vector<std::array<std::string, 3>>{
+           {"\"outcome\":\"stood\"", "\"outcome\":5", "outcome is not text"},
+           {"\"outcome\":\"stood\"", "\"outcome\":\"flew\"", "no outcome 'flew'"},
+           {"\"energy_balance\":", "\"energy_balance\":\"?\",\"old\":", "energy_balance is not a number"},
+           {"\"result\":", "\"results\":", "it has no entry 'result'"},
+           {"\"run\":\"", "\"run\":3,\"old\":\"", "type must be string"},
+           {"\"run\":\"", "\"run\":", "it is not JSON: parse error at line 1"}}) {
+    std::string text = whole;
+    const size_t at = text.find(from);
+    REQUIRE(at != std::string::npos);
+    text.replace(at, from.size(), to);
+    std::ofstream(log) << text;
+    const CommandResult refused = runCampaign(spec, out);
+    CAPTURE(to, refused.err);
+    CHECK(refused.status == 2);
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+    CHECK_THAT(refused.err, Contains("runs.jsonl: line " + std::to_string(line) + ": it was changed or damaged: ") &&
+                                Contains(problem) && Contains("remove the line") && !Contains("json.exception"));
+  }
+}
+
+TEST_CASE("campaign: dry runs stop at once when the user asks for it, and equal ones are done once") {
+  const RobotDirectory directory;
+  const std::string out = directory.path() + "/out", squat = "{name: NAME, solve: squat, robot: bipetto}";
+  std::string seeds = "1";
+  std::string frictions = "0.1";
+  for (int seed = 2; seed <= 3000; ++seed) {
+    seeds += ", " + std::to_string(seed);
+    frictions += ", 0." + std::to_string(seed) + "1";
+  }
+  const std::string spec = directory.write("spec.yaml", "motions: [" + squat + "]\noptions: {seed: [" + seeds + "]}\n");
+  {
+    Command command({BIELLE_COMMAND, "campaign", spec, "-o", out});
+    while (!fs::exists(out + "/check.log")) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    const auto start = std::chrono::steady_clock::now();
+    command.sendSignal(SIGINT);
+    const CommandResult result = command.wait();
+    CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(2));
+    CHECK(result.status == 1);
+    CHECK_THAT(result.err, Contains("interrupted"));
+    CHECK_FALSE(fs::exists(out + "/motions"));
+    CHECK_FALSE(fs::exists(out + "/check.log"));
+  }
+  // What there would be too much of is refused before it is tried.
+  const std::string large = directory.write(
+      "large.yaml", "motions: [" + squat + "]\noptions: {seed: [" + seeds + "], friction: [" + frictions + "]}\n");
+  const CommandResult refused = runCampaign(large, directory.path() + "/large");
+  CHECK(refused.status == 2);
+  CHECK_THAT(refused.err, Contains("more than a million combinations"));
+  CHECK_FALSE(fs::exists(directory.path() + "/large"));
+
+  // Motions and phases are not part of a dry run: of these 12 combinations two differ.
+  const std::string calls = directory.path() + "/calls";
+  const std::string program = directory.write("simulate", "#!/bin/sh\necho >> " + calls + "\n");
+  fs::permissions(program, fs::perms::owner_all);
+  const study::CampaignSpec few = study::readCampaignSpec(directory.write(
+      "few.yaml", "motions: [" + replaceOnce(squat, "NAME", "a") + ", " + replaceOnce(squat, "NAME", "b") +
+                      "]\noptions: {seed: [1, 2]}\npush: {phase: [0.5, 1.5, 2.5], impulse: 1}\n"));
+  CHECK(study::checkCommands(few, program, directory.path() + "/log"));
+  CHECK(countLines(calls) == 2);
 }
 
 TEST_CASE("campaign: the largest impulse that is survived, by bisection") {
@@ -165,6 +231,9 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
       {head + "options:\n  friction: [0.5, -1]\n", {"key 'friction' (line 3)", "friction"}},
       {head + "options: {world: [bielle, moon]}\n", {"key 'world' (line 2)", "moon"}},
       {head + "options: {friction: [0.5, 0.5]}\n", {"friction", "given twice"}},
+      {head + "options: {help: true}\n", {"key 'help' (line 2)", "would not execute anything"}},
+      {head + "options: {dry-run: true}\n", {"key 'dry-run' (line 2)", "would not execute anything"}},
+      {head + "options: {live: true}\n", {"key 'live' (line 2)", "summary-only"}},
       {head + "options: {push: t=1}\n", {"key 'push' (line 2)", "next to `options`"}},
       {head + "push: {time: 1, phase: 1, impulse: 1}\n", {"key 'push' (line 2)", "give one of them"}},
       {head + "push: {time: soon, impulse: 1}\n", {"key 'time' (line 2)", "not a number"}},
@@ -172,7 +241,9 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
       {head + "push: {time: 1, largest_impulse: {up_to: 1, step: 2}}\n", {"(line 2)", "up_to"}},
       {"motions: [{name: w, solve: wakl, robot: bipetto}]\n", {"wakl"}},
       {"motions: [{name: w, solve: walk, robot: bipetto, set: {sped: 1}}]\n", {"sped"}},
-      {"motions: [{name: w, solve: walk, robot: bipetto, options: {set: 1}}]\n", {"key 'set' (line 1)", "next to"}}};
+      {"motions: [{name: w, solve: walk, robot: bipetto, options: {set: 1}}]\n", {"key 'set' (line 1)", "next to"}},
+      {"motions: [{name: w, solve: walk, robot: bipetto, options: {help: true}}]\n",
+       {"key 'help' (line 1)", "remove"}}};
   for (const auto& [text, words] : cases) {
     const CommandResult result = runCampaign(directory.write("spec.yaml", text), out);
     CAPTURE(text, result.err);

@@ -9,6 +9,7 @@
 
 #include "bielle/io/names.h"
 #include "bielle/model/error.h"
+#include "io/json_text.h"
 #include "model/listing.h"
 #include "model/text_file.h"
 
@@ -72,7 +73,7 @@ class StateReader {
     try {
       return json::parse(text, check);
     } catch (const json::exception& error) {
-      fail("JSON", error.what(), "see bielle eval --help for an example");
+      fail("JSON", describeJsonError(error), "see bielle eval --help for an example");
     }
   }
 

@@ -32,6 +32,21 @@ Json parseJson(const std::string& text) {
   });
 }
 
+std::string describeJsonError(const std::exception& error) {
+  const std::string text = error.what();
+  const auto* json = dynamic_cast<const Json::exception*>(&error);
+  if (!json) return text;
+  const size_t begin = text.find("] ");  // the library's name of the error comes before
+  const std::string plain = begin == std::string::npos ? text : text.substr(begin + 2);
+  if (dynamic_cast<const Json::parse_error*>(json)) return "it is not JSON: " + plain.substr(0, plain.find(": "));
+  constexpr int kNoSuchKey = 403;
+  if (json->id == kNoSuchKey) {
+    const size_t quote = plain.find('\'');
+    return "it has no entry " + plain.substr(quote, plain.rfind('\'') + 1 - quote);
+  }
+  return "one of its entries is not what it should be: " + plain;
+}
+
 void readJsonFile(const std::string& path, const std::string& remedy, const std::function<void(const Json&)>& read) {
   const std::string text = readTextFile(path, remedy);
   try {
@@ -39,7 +54,7 @@ void readJsonFile(const std::string& path, const std::string& remedy, const std:
     if (!json.is_object()) throw std::runtime_error("it is not an object");
     read(json);
   } catch (const std::exception& error) {
-    throw ModelError(path, "JSON", error.what(), remedy);
+    throw ModelError(path, "JSON", describeJsonError(error), remedy);
   }
 }
 

@@ -111,7 +111,7 @@ MotionSummary readSummary(const std::string& directory) {
     summary.file = path;
     return summary;
   } catch (const std::exception& error) {
-    throw ModelError(path, "file", error.what(), "recreate it with `bielle solve`");
+    throw ModelError(path, "file", describeJsonError(error), "recreate it with `bielle solve`");
   }
 }
 

@@ -17,6 +17,7 @@
 #include "study/campaign_result.h"
 #include "study/cases.h"
 #include "study/shipping.h"
+#include "tasks/child.h"
 
 namespace fs = std::filesystem;
 
@@ -40,15 +41,19 @@ void clearFiles(const fs::path& directory) {
   for (const fs::path& file : files) fs::remove(file, ignored);
 }
 
-std::vector<CampaignCell> listCells(const CampaignSpec& spec) {
+size_t countCells(const CampaignSpec& spec) {
   size_t count = 1;
   for (const CampaignAxis& axis : spec.axes) {
     count *= axis.values.size();
     if (count > kMostCells)
       throw ModelError(spec.path, "campaign", "it has more than a million combinations", "give fewer values");
   }
-  std::vector<CampaignCell> cells(count, CampaignCell(spec.axes.size()));
-  for (size_t i = 0; i < count; ++i) {
+  return count;
+}
+
+std::vector<CampaignCell> listCells(const CampaignSpec& spec) {
+  std::vector<CampaignCell> cells(countCells(spec), CampaignCell(spec.axes.size()));
+  for (size_t i = 0; i < cells.size(); ++i) {
     size_t rest = i;
     for (size_t axis = spec.axes.size(); axis-- > 0; rest /= spec.axes[axis].values.size())
       cells[i][axis] = rest % spec.axes[axis].values.size();
@@ -86,15 +91,7 @@ class CampaignRunner {
       shipped_.push_back(
           shipMotion(motions[i], directory + "/running/motion" + std::to_string(i), options.engine->isRemote()));
     }
-    for (const std::string& line : log_.getLines()) {
-      try {
-        const Json json = parseJson(line);
-        results_[{json.at("motion"), json.at("run")}] = json.at("result");
-      } catch (const std::exception&) {
-        throw ModelError(log_.getPath(), "log", "one of its lines was changed or damaged",
-                         "remove the file to repeat the runs");
-      }
-    }
+    readLog();
   }
   ~CampaignRunner() {
     if (!running_.empty()) options_.engine->stop();
@@ -107,10 +104,13 @@ class CampaignRunner {
   CampaignResults run() {
     CampaignResults out;
     std::deque<size_t> waiting;
-    for (size_t i = 0; i < cells_.size(); ++i) {
-      waiting.push_back(i);
-      done_ += follow(i).done.size();
+    for (size_t i = 0; i < cells_.size() && !out.interrupted; ++i) {
+      const Progress progress = follow(i);
+      done_ += progress.done.size();
+      if (progress.next > 0) waiting.push_back(i);
+      out.interrupted = i % 1000 == 0 && tasks::SignalWatch::isEndAsked();
     }
+    if (out.interrupted) return out;
     while (true) {
       while (!waiting.empty() && options_.engine->hasRoom()) {
         const size_t cell = waiting.front();
@@ -131,6 +131,21 @@ class CampaignRunner {
   }
 
  private:
+  void readLog() {
+    int number = 1;  // of the line; the first one is the header
+    for (const std::string& line : log_.getLines()) {
+      ++number;
+      try {
+        const Json json = parseJson(line);
+        results_[{json.at("motion"), json.at("run")}] = pickCampaignResult(json.at("result"));
+      } catch (const std::exception& error) {
+        throw ModelError(log_.getPath(), "line " + std::to_string(number),
+                         "it was changed or damaged: " + describeJsonError(error),
+                         "remove the line to repeat that run");
+      }
+    }
+  }
+
   struct Running {
     size_t cell = 0;
     int slot = 0;  // of its directory
@@ -301,11 +316,13 @@ std::vector<std::string> solveMotions(const CampaignSpec& spec, const std::strin
 }  // namespace
 
 CampaignResults runCampaign(const CampaignSpec& spec, const std::string& directory, const CampaignOptions& options) {
+  countCells(spec);  // \throws that there are too many
   makeOutputDirectory(directory);
   const std::string check = directory + "/check.log";
-  checkCommands(spec, options.simulate, check);
+  const bool is_checked = checkCommands(spec, options.simulate, check);
   fs::remove(check);
-  const std::vector<std::string> motions = solveMotions(spec, directory, options);
+  std::vector<std::string> motions;
+  if (is_checked) motions = solveMotions(spec, directory, options);
   if (motions.empty()) {
     CampaignResults out;
     out.interrupted = true;

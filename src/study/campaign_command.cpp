@@ -1,9 +1,8 @@
 #include "study/campaign_command.h"
 
-#include <sys/wait.h>
-
 #include <cmath>
 #include <fstream>
+#include <set>
 
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
@@ -35,14 +34,15 @@ double calcPhaseTime(const CampaignAxis& axis, const std::string& value, const s
   return std::round(1e6 * (start + (phase - index) * (end - start))) / 1e6;
 }
 
-// What a dry run complains about; empty if it does not.
-std::string findComplaint(const std::string& simulate, const std::vector<std::string>& arguments,
-                          const std::string& log) {
-  std::vector<std::string> command = {simulate, "motion", "-o", "none", "--dry-run"};
+// What a dry run complains about, or "" if it does not. None: the user asks for the end.
+std::optional<std::string> findComplaint(const std::string& simulate, const std::vector<std::string>& arguments,
+                                         const std::string& log) {
+  std::vector<std::string> command = {simulate, "motion", "-o", "none", "--summary-only", "--dry-run"};
   command.insert(command.end(), arguments.begin(), arguments.end());
-  int state = 0;
-  waitpid(tasks::startChild(command, log), &state, 0);
-  if (WIFEXITED(state) && WEXITSTATUS(state) == 0) return "";
+  tasks::SignalWatch watch;
+  const std::optional<int> status = watch.waitForChild(tasks::startChild(command, log));
+  if (!status) return std::nullopt;
+  if (*status == 0) return "";
   std::string complaint = findError(log);
   if (complaint.empty()) {
     std::ifstream file(log);
@@ -111,21 +111,26 @@ std::vector<std::string> CampaignCommands::make(const CampaignCell& cell, const 
   return arguments;
 }
 
-void checkCommands(const CampaignSpec& spec, const std::string& simulate, const std::string& log) {
+bool checkCommands(const CampaignSpec& spec, const std::string& simulate, const std::string& log) {
   const CampaignCommands commands(spec, {});
   const std::string impulse = spec.search ? formatImpulse(*spec.search, 1) : "";
+  std::set<std::vector<std::string>> tried;  // cells may differ in nothing that options are made of, as in the motion
   const auto check = [&](const CampaignCell& cell, const CampaignAxis& varied) {
-    const std::string complaint = findComplaint(simulate, commands.make(cell, impulse), log);
-    if (!complaint.empty()) refuse(spec, varied, complaint);
+    const std::vector<std::string> arguments = commands.make(cell, impulse);
+    if (!tried.insert(arguments).second) return true;
+    const std::optional<std::string> complaint = findComplaint(simulate, arguments, log);
+    if (complaint && !complaint->empty()) refuse(spec, varied, *complaint);
+    return complaint.has_value();
   };
   const CampaignCell base(spec.axes.size(), 0);
-  check(base, spec.axes.back());
+  if (!check(base, spec.axes.back())) return false;
   for (size_t i = 0; i < spec.axes.size(); ++i)
     for (size_t value = 1; value < spec.axes[i].values.size(); ++value) {
       CampaignCell cell = base;
       cell[i] = value;
-      check(cell, spec.axes[i]);
+      if (!check(cell, spec.axes[i])) return false;
     }
+  return true;
 }
 
 }  // namespace bielle::study

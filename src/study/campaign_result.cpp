@@ -23,25 +23,33 @@ bool isNumber(const Json& value, bool broke_off) {
 
 Json readRunSummary(const std::string& text, int status) {
   const Json summary = parseJson(text);
-  Json result = Json::object();
-  for (const char* field : kTexts) {
-    if (!summary.at(field).is_string()) throw std::runtime_error(std::string(field) + " is not text");
-    result[field] = summary.at(field);
-  }
+  const Json result = pickCampaignResult(summary);
   const std::string outcome = result["outcome"];
-  if (outcome != kStood && outcome != kFell && outcome != kBrokeOff)
-    throw std::runtime_error("there is no outcome '" + outcome + "'");
   if ((status == 0) != (outcome == kStood))
     throw std::runtime_error("it " + outcome + ", and the exit status was " + std::to_string(status));
-  for (const char* field : kNumbers) {
-    if (!isNumber(summary.at(field), outcome == kBrokeOff))
-      throw std::runtime_error(std::string(field) + " is not a number");
-    result[field] = summary.at(field);
-  }
   return result;
 }
 
 }  // namespace
+
+Json pickCampaignResult(const Json& summary) {
+  if (!summary.is_object()) throw std::runtime_error("it is not an object");
+  Json result = Json::object();
+  for (const char* field : kTexts) {
+    if (!summary.contains(field) || !summary[field].is_string())
+      throw std::runtime_error(std::string(field) + " is not text");
+    result[field] = summary[field];
+  }
+  const std::string outcome = result["outcome"];
+  if (outcome != kStood && outcome != kFell && outcome != kBrokeOff)
+    throw std::runtime_error("there is no outcome '" + outcome + "'");
+  for (const char* field : kNumbers) {
+    if (!summary.contains(field) || !isNumber(summary[field], outcome == kBrokeOff))
+      throw std::runtime_error(std::string(field) + " is not a number");
+    result[field] = summary[field];
+  }
+  return result;
+}
 
 Json readCampaignResult(const tasks::Task& task, int status) {
   const std::string log = tasks::getOutput(task, task.log), error = findError(log);
@@ -53,7 +61,7 @@ Json readCampaignResult(const tasks::Task& task, int status) {
   try {
     return readRunSummary(tasks::readOutput(tasks::getOutput(task, "out/summary.json"), kLongestSummary), status);
   } catch (const std::exception& problem) {
-    throw std::runtime_error(std::string("it returned an invalid result: ") + problem.what());
+    throw std::runtime_error("it returned an invalid result: " + describeJsonError(problem));
   }
 }
 

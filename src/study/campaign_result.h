@@ -5,7 +5,11 @@
 
 namespace bielle::study {
 
-// The fields of its summary that are kept, or the reason for which the program refused it.
+// The fields of a summary that are kept, in it or in a line of the log.
+// \throws std::runtime_error saying which of them is not what it should be
+Json pickCampaignResult(const Json& summary);
+
+// Those of the summary of a task, or the reason for which the program refused it.
 // \throws std::exception saying what is wrong, when the task failed, or its outputs are not a result of the program
 Json readCampaignResult(const tasks::Task& task, int status);
 

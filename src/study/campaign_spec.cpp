@@ -50,6 +50,12 @@ CampaignMotion readSolvedMotion(const YamlEntry& entry, const std::string& file)
   return {directory.filename().string(), directory.string(), "", {}};
 }
 
+// With one of these a program does nothing else.
+void refuseEndings(const std::string& name, const YamlEntry& entry) {
+  for (const char* ending : {"help", "version", "dry-run"})
+    if (name == ending) entry.fail("with it the program would not execute anything", "remove it");
+}
+
 CampaignMotion readRequest(const YamlEntry& entry, const std::string& file) {
   const YamlFields fields = entry.getFields({"name", "solve", "robot", "set", "options"});
   CampaignMotion motion;
@@ -69,6 +75,7 @@ CampaignMotion readRequest(const YamlEntry& entry, const std::string& file) {
     }
   if (const YamlEntry* options = find(fields, "options"))
     for (const auto& [name, value] : options->getMap()) {
+      refuseEndings(name, value);
       if (name == "output" || name == "set" || name == "robot")
         value.fail("it cannot be set here", name == "output" ? "remove it" : "use the key next to `options`");
       addOption(name, value.getText(), motion.solve);
@@ -134,6 +141,7 @@ CampaignSpec readCampaignSpec(const std::string& path) {
     readMotions(require(fields, "motions", document), spec);
     if (const YamlEntry* options = find(fields, "options"))
       for (const auto& [name, entry] : options->getMap()) {
+        refuseEndings(name, entry);
         if (name == "output" || name == "push")
           entry.fail("it cannot be set here", name == "push" ? "use the key `push` next to `options`" : "remove it");
         spec.axes.push_back(makeAxis(Kind::Option, name, entry));

@@ -74,7 +74,7 @@ std::string findProblem(const tasks::Task& task, int status) {
       checkOutput(tasks::getOutput(task, output));
     }
   } catch (const std::exception& error) {
-    return error.what();
+    return describeJsonError(error);
   }
   return "";
 }

@@ -31,6 +31,17 @@ namespace {
   _exit(127);
 }
 
+// By which the user asks for the end.
+sigset_t getEndSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int number : {SIGINT, SIGTERM}) sigaddset(&signals, number);
+  return signals;
+}
+
+// Of what waitpid() tells.
+int getStatus(int state) { return WIFEXITED(state) ? WEXITSTATUS(state) : 128 + WTERMSIG(state); }
+
 template <typename Become>
 pid_t startProgram(const std::vector<std::string>& arguments, const Become& become) {
   std::vector<std::string> copy = arguments;
@@ -73,8 +84,8 @@ PipedChild startPipedChild(const std::vector<std::string>& arguments) {
 
 SignalWatch::SignalWatch() {
   signal(SIGCHLD, SIG_DFL);  // if ignored, children would leave no status
-  sigemptyset(&watched_);
-  for (const int number : {SIGINT, SIGTERM, SIGCHLD}) sigaddset(&watched_, number);
+  watched_ = getEndSignals();
+  sigaddset(&watched_, SIGCHLD);
   sigprocmask(SIG_BLOCK, &watched_, &before_);
 }
 
@@ -88,9 +99,7 @@ bool SignalWatch::wait() {
 }
 
 bool SignalWatch::waitForFile(int file) {
-  sigset_t asked;
-  sigemptyset(&asked);
-  sigaddset(&asked, SIGINT), sigaddset(&asked, SIGTERM);
+  const sigset_t asked = getEndSignals();
   const int signals = signalfd(-1, &asked, SFD_CLOEXEC);
   pollfd files[] = {{file, POLLIN, 0}, {signals, POLLIN, 0}};
   while (poll(files, 2, -1) < 0 && errno == EINTR) {
@@ -101,11 +110,27 @@ bool SignalWatch::waitForFile(int file) {
   return is_asked;
 }
 
+std::optional<int> SignalWatch::waitForChild(pid_t pid) {
+  int state = 0;
+  while (waitpid(pid, &state, WNOHANG) == 0)
+    if (wait()) {
+      killChild(pid);
+      return std::nullopt;
+    }
+  return getStatus(state);
+}
+
+bool SignalWatch::isEndAsked() {
+  const sigset_t asked = getEndSignals();
+  const timespec now{};
+  return sigtimedwait(&asked, nullptr, &now) > 0;
+}
+
 std::vector<ChildEnd> SignalWatch::collect() {
   std::vector<ChildEnd> ends;
   int state = 0;
   for (pid_t pid = waitpid(-1, &state, WNOHANG); pid > 0; pid = waitpid(-1, &state, WNOHANG))
-    ends.push_back({pid, WIFEXITED(state) ? WEXITSTATUS(state) : 128 + WTERMSIG(state)});
+    ends.push_back({pid, getStatus(state)});
   return ends;
 }
 
