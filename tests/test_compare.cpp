@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <iterator>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "bielle/io/record.h"
 #include "bielle/model/reader.h"
@@ -43,7 +44,7 @@ Sums addUp(const MotionRecord& record) {
     for (size_t m = 0; m < record.u_names.size(); ++m) {
       const auto column = std::find(record.v_names.begin(), record.v_names.end(), record.u_names[m]);
       REQUIRE(column != record.v_names.end());
-      const double u = record.u(k, m), v = record.v(k, column - record.v_names.begin());
+      const double u = record.u(k, m), v = record.v_mid(k, column - record.v_names.begin());
       if (record.u_names[m].find("hip") != std::string::npos) sums.peak_hips = std::max(sums.peak_hips, std::abs(u));
       sums.peak = std::max(sums.peak, std::abs(u));
       sums.squares += h * u * u / static_cast<double>(record.u_names.size());
@@ -93,6 +94,38 @@ TEST_CASE("compare: same mass, same motion, numbers of the cases, and only what 
   for (size_t at = text.find(": kept"); at != std::string::npos; at = text.find(": kept", at + 1)) ++kept;
   CHECK(kept == 3);
   CHECK(readFile(out + "/compare.md") == page);
+}
+
+TEST_CASE(
+    "compare: energies of the robots' own windings and gears are those of `bielle solve`, and missed goals are told") {
+  const RobotDirectory directory;
+  const std::string driven = directory.path() + "/driven";
+  REQUIRE(runCommand({BIELLE_COMMAND, "convert", "bipetto", "-o", driven}).status == 0);
+  directory.write("driven/driven.yaml",
+                  replaceOnce(readFile(driven + "/driven.yaml"), "motor_knee_left: {armature: 0.001}",
+                              "motor_knee_left: {type: ak80-9, efficiency: 0.8}"));
+  const std::string spec = directory.write("spec.yaml", R"(robots: {driven: {robot: ./driven}, plain: {robot: bipetto}}
+motions:
+  - {motion: squat, set: {depth: 0.95, duration: 0.6, settle: 0.06, time_step: 0.03}}
+  - {motion: squat, set: {depth: 0.6, duration: 0.6, settle: 0.06, time_step: 0.03, com_weight: 1e-3}}
+)");
+  const std::string out = directory.path() + "/out";
+  const CommandResult result = runCommand({BIELLE_COMMAND, "compare", spec, "-o", out, "--jobs", "2"});
+  INFO(result.err);
+  REQUIRE(result.status == 0);
+  for (auto row : readTable(out + "/compare.csv")) {
+    const std::string name = row["robot"] + "-" + row["motion"];
+    CAPTURE(name, row["outcome"]);
+    const auto summary = nlohmann::json::parse(readFile(out + "/cases/" + name + "/motion/summary.json"));
+    const double energy = summary["electrical_energy"]["total_J"];
+    CHECK(std::stod(row["electrical_energy_J"]) == Approx(energy).epsilon(1e-7));
+    CHECK(summary["electrical_energy"]["motors_of_assumed_loss"] == (row["robot"] == "driven" ? 11 : 12));
+    if (row["motion"].find("depth-0.6") == std::string::npos) continue;
+    CHECK_THAT(row["outcome"], Contains("depth: requested 0.6, achieved") && Contains("missed"));
+  }
+  const std::string page = readFile(out + "/compare.md");
+  CHECK_THAT(page, Contains("K_m by its winding, or 2.00 N m/sqrt(W) where that is not known") &&
+                       Contains("| motors of unknown winding | 11 | 12 |") && Contains("missed (tolerance"));
 }
 
 TEST_CASE("compare: errors are reported with their places and remedies") {

@@ -100,6 +100,32 @@ TEST_CASE("measures: electrical energy of stages by hand") {
         calcMotorMeasures(trace, {MotorConversion()})[0].electrical_energy);
 }
 
+TEST_CASE("measures: losses of gears, as in the energies of results, and their gradient") {
+  MotorConversion drive;
+  drive.motor_constant = 2, drive.regeneration = 0.3, drive.efficiency = 0.9, drive.back_efficiency = 0.8;
+  Motor motor;
+  motor.torque_loss = 0.25, motor.drive.efficiency = 0.9, motor.drive.back_efficiency = 0.8;
+  MotorSlopes motion;
+  motion.dt = {0.1, 0.3, 0.2};
+  motion.u = Eigen::RowVector3d(3, -1, -4), motion.v = Eigen::RowVector3d(2, 3, -5);
+  const auto calc = [&](const MatrixXd& u, const MatrixXd& v) {
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) sum += motion.dt[k] * calcElectricalPower(motor, u(0, k), v(0, k), 0.3);
+    return sum;
+  };
+  const MotorTrace trace = makeTrace(motion.dt, {3, -1, -4}, {2, 3, -5});
+  CHECK(calcMotorMeasures(trace, {drive})[0].electrical_energy == Approx(calc(motion.u, motion.v)));
+  motion.du = {Eigen::RowVector3d(0.5, -0.2, 0.7)}, motion.dv = {Eigen::RowVector3d(0.1, 0.4, -0.3)};
+  RobotSlopes robot;
+  robot.drives = {drive};
+  const MeasurePieces pieces = calcMeasurePieces(Measure::ElectricalEnergy, {0}, {motion}, {}, robot);
+  const double h = 1e-4, numeric = (calc(motion.u + h * motion.du[0], motion.v + h * motion.dv[0]) -
+                                    calc(motion.u - h * motion.du[0], motion.v - h * motion.dv[0])) /
+                                   (2 * h);
+  CHECK(pieces.values[0] == Approx(calc(motion.u, motion.v)));
+  CHECK(pieces.gradients(0, 0) == Approx(numeric).epsilon(1e-6));
+}
+
 TEST_CASE("measures: electrical energy of a harmonic motion") {
   // u = U cos wt, v = V cos(wt - phi) over a period T: T (U V cos(phi) / 2 + U^2 / (2 K^2)) with all given back; sums
   // over equal steps are exact.

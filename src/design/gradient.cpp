@@ -53,12 +53,12 @@ void addElectricalEnergy(const MotorSlopes& motion, int m, const RobotSlopes& ro
   const double heat = 1 / (drive.motor_constant * drive.motor_constant);
   const auto getChange = [&](size_t i) { return robot.dfactors.empty() ? 0 : robot.dfactors[i](kLoss, m); };
   for (int k = 0; k < countNodes(motion); ++k) {
-    const double u = motion.u(m, k), v = motion.v(m, k), P = u * v + heat * u * u;
-    const double weight = motion.dt[k] * (P < 0 ? drive.regeneration : 1);
+    const double v = motion.v(m, k), c = drive.getEffortFactor(motion.u(m, k) * v), u = c * motion.u(m, k);
+    const double P = u * v + heat * u * u, weight = motion.dt[k] * (P < 0 ? drive.regeneration : 1);
     out.values[0] += weight * P;
     for (size_t i = 0; i < motion.du.size(); ++i)
       out.gradients(0, i) +=
-          weight * ((v + 2 * heat * u) * motion.du[i](m, k) + u * motion.dv[i](m, k) + u * u * getChange(i));
+          weight * ((v + 2 * heat * u) * c * motion.du[i](m, k) + u * motion.dv[i](m, k) + u * u * getChange(i));
   }
 }
 

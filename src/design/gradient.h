@@ -9,6 +9,7 @@
 ///     rms torque of one motor in one motion     p = (sum h u^2 / T)^1/2,  dp = sum h u du / (T p)                  (1)
 ///     energy                                    p = sum h |u v|,          dp = sum h sign(u v) (du v + u dv)       (2)
 ///     electrical energy, Eq. (1) of measures.h  p = sum h r P,  dp = sum h r (du v + u dv + 2 u du / K_m^2 + u^2 d(1/K_m^2))
+///                                               of c u in place of u
 ///     peak torque in a stretch of the motion    p = |u(k)|,               dp = sign(u(k)) du(k)                    (3)
 /// with r = 1 where P is positive, else the share that is recovered, and k the node of the largest |u| in the stretch.
 /// A peak torque has a piece for every motor, motion and stretch: when one peak falls another becomes the largest, and
@@ -27,6 +28,7 @@
 #include "bielle/design/parametrization.h"
 #include "bielle/design/search.h"
 #include "bielle/dynamics/kept_motion.h"
+#include "bielle/motion/goal.h"
 #include "bielle/transmission/lift.h"
 #include "design/measures.h"
 #include "design/robot_slopes.h"
@@ -48,7 +50,9 @@ struct MotorSlopes {
   std::vector<Eigen::RowVectorXd> ddistance;  ///< only at the entries that listLeast() names
   double cost = 0;                            ///< of motions that were optimized for the design, and its derivatives
   VectorXd dcost;
-  std::string failure;  ///< reason if there are none, or empty
+  std::vector<GoalOutcome> goals;  ///< of motions made anew
+  MatrixXd dgoals;                 ///< goals x variables: of achieved less requested values
+  std::string failure;             ///< reason if there are none, or empty
 };
 /// \param kept_dofs  of the model, in the order of the velocities of the serial trajectory
 /// \param lifted  the whole trajectory, lifted to the model

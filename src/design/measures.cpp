@@ -18,7 +18,8 @@ MotorMeasures calcMeasures(const MotorTrace& trace, Eigen::Index motor, const Mo
   for (size_t k = 0; k < trace.dt.size(); ++k) {
     const Eigen::Index stage = static_cast<Eigen::Index>(k);
     const double h = trace.dt[k], u = trace.torque(motor, stage), v = trace.speed(motor, stage);
-    const double power = u * v + std::pow(u / drive.motor_constant, 2);  // Eq. (1)
+    const double c = drive.getEffortFactor(u * v);
+    const double power = c * (u * v) + std::pow(c * u / drive.motor_constant, 2);  // Eq. (1)
     out.peak_torque = std::max(out.peak_torque, std::abs(u));
     out.peak_speed = std::max(out.peak_speed, std::abs(v));
     out.energy += h * std::abs(u * v);
@@ -61,7 +62,8 @@ std::vector<MotorConversion> makeDrives(const Model& model, const DriveTable& ta
           "give the share that is given back");
   std::vector<MotorConversion> drives;
   for (const Motor& motor : model.motors())
-    drives.push_back({table.motor_constant.value_or(1 / std::sqrt(motor.getTorqueLoss())), table.regeneration});
+    drives.push_back({table.motor_constant.value_or(1 / std::sqrt(motor.getTorqueLoss())), table.regeneration,
+                      motor.drive.efficiency, motor.drive.back_efficiency});
   for (const auto& [name, constant] : table.motor_constants) {
     const std::vector<int> motors = findMotors(model, {name});
     require(!motors.empty(), "motor '" + name + "'", "there is no such motor", "`bielle info` lists them");

@@ -16,8 +16,10 @@ namespace {
 constexpr const char* kRemedy = "remove its directory to repeat the case";
 constexpr double kLeastDistance = 0.2;  // m, for a cost of transport
 
+// Speeds in the middle of steps where there are such, as in the energies of a result.
 MotorTrace readTrace(const MotionRecord& record) {
   MotorTrace trace;
+  const RowMatrixXd& velocities = record.has_midpoints ? record.v_mid : record.v;
   const Eigen::Index stages = record.u.rows();
   trace.torque = trace.speed = MatrixXd::Zero(record.u.cols(), stages);
   for (Eigen::Index k = 0; k < stages; ++k) {
@@ -27,7 +29,7 @@ MotorTrace readTrace(const MotionRecord& record) {
   }
   for (size_t m = 0; m < record.u_names.size(); ++m)
     trace.speed.row(static_cast<Eigen::Index>(m)) =
-        record.v.col(findColumn(record.v_names, record.u_names[m])).head(stages).transpose();
+        velocities.col(findColumn(record.v_names, record.u_names[m])).head(stages).transpose();
   return trace;
 }
 
@@ -62,8 +64,8 @@ GroupLoad calcLoad(const std::vector<int>& members, const std::vector<MotorMeasu
 void measure(const ArchitectureSpec& spec, const Contender& contender, const MotionRecord& record, Feat& out) {
   out.exists = true;
   out.trace = readTrace(record);
-  const std::vector<MotorMeasures> motors =
-      calcMotorMeasures(out.trace, std::vector<MotorConversion>(record.u_names.size(), spec.drive));
+  const Model& model = contender.robot.model;
+  const std::vector<MotorMeasures> motors = calcMotorMeasures(out.trace, makeDrives(model, spec.drives));
   for (const std::vector<int>& members : groupMotors(spec.groups, record.u_names))
     out.groups.push_back(calcLoad(members, motors));
   for (const MotorMeasures& motor : motors) {
@@ -78,10 +80,16 @@ void measure(const ArchitectureSpec& spec, const Contender& contender, const Mot
   for (Eigen::Index k = 0; k <= last; ++k) out.com_height.emplace_back(record.time[k], record.com(k, 2));
   out.distance = (record.com.row(last).head<2>() - record.com.row(0).head<2>()).norm();
   out.duration = record.time[last] - record.time[0];
-  const Model& model = contender.robot.model;
   out.cost_of_transport = out.distance < kLeastDistance
                               ? kMissing
                               : out.electrical_energy / (model.mass() * model.gravity().norm() * out.distance);
+}
+
+// The first goal that is missed, or an empty text.
+std::string findMissedGoal(const std::vector<GoalOutcome>& goals) {
+  for (const GoalOutcome& goal : goals)
+    if (!goal.met()) return goal.goal.name + ": " + formatOutcome(goal);
+  return "";
 }
 
 // The first row of the check that fails, or an empty text.
@@ -117,7 +125,8 @@ Feat readFeat(const ArchitectureSpec& spec, const Contender& contender, const st
   readJsonFile(summary.file, kRemedy, [&feat](const Json& json) { feat.iterations = json.value("iterations", 0); });
   const std::string check = directory + "/check.json";
   const bool is_checked = fs::exists(check);
-  const std::string failure = is_checked ? findFailure(check) : "";
+  std::string failure = findMissedGoal(summary.goals);
+  if (failure.empty() && is_checked) failure = findFailure(check);
   feat.done = summary.converged && failure.empty();
   feat.outcome = !summary.converged ? "not converged"
                  : !failure.empty() ? failure

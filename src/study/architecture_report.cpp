@@ -60,7 +60,13 @@ void printHead(std::ostream& page, const std::string& first, const std::vector<C
   page << "\n" << rule << "\n";
 }
 
-void printRobots(std::ostream& page, const std::vector<Contender>& contenders) {
+std::string countUnknown(const Contender& one) {
+  const std::vector<Motor>& motors = one.robot.model.motors();
+  return std::to_string(
+      std::count_if(motors.begin(), motors.end(), [](const Motor& motor) { return !motor.torque_loss; }));
+}
+
+void printRobots(std::ostream& page, const ArchitectureSpec& spec, const std::vector<Contender>& contenders) {
   printHead(page, "", contenders);
   const auto print = [&](const std::string& name, const std::function<std::string(const Contender&)>& get) {
     page << "| " << name << " |";
@@ -70,6 +76,7 @@ void printRobots(std::ostream& page, const std::vector<Contender>& contenders) {
   print("mass [kg]", [](const Contender& one) { return formatCell(one.robot.model.mass(), 3); });
   print("trunk times", [](const Contender& one) { return formatCell(one.trunk_factor, 4); });
   print("motors", [](const Contender& one) { return std::to_string(one.robot.model.nu()); });
+  if (!spec.drives.motor_constant) print("motors of unknown winding", countUnknown);
   print("joint velocities, closure rows", [](const Contender& one) {
     return std::to_string(one.robot.model.nv()) + ", " + std::to_string(one.robot.model.numClosureRows());
   });
@@ -193,7 +200,13 @@ std::vector<Plot> makeSpeedPlots(const ArchitectureSpec& spec, const std::vector
 
 constexpr const char* kExplanation =
     "Peaks are over all motors of a group and the whole motion, rms torques over time and the motors of the group. "
-    "Electrical energy: mechanical power and heat (u / K_m)^2 of every motor, K_m = ";
+    "Electrical energy: mechanical power, losses of the gear and heat (u / K_m)^2 of every motor, K_m ";
+
+std::string describeConstant(const DriveTable& drives) {
+  if (drives.motor_constant) return "= " + formatCell(*drives.motor_constant, 2) + " N m/sqrt(W) for all";
+  return "by its winding, or " + formatCell(1 / std::sqrt(kDefaultTorqueLoss), 2) +
+         " N m/sqrt(W) where that is not known";
+}
 
 }  // namespace
 
@@ -203,10 +216,9 @@ std::vector<std::string> writeArchitectures(const std::string& directory, const 
   std::vector<std::string> paths;
   std::ostringstream page;
   page << "# Robots compared\n\nMade by `bielle compare` from " << std::filesystem::path(spec.path).filename().string()
-       << ". " << kExplanation << formatCell(spec.drive.motor_constant, 2) << " N m/sqrt(W), "
-       << formatCell(100 * spec.drive.regeneration, 0)
+       << ". " << kExplanation << describeConstant(spec.drives) << ", " << formatCell(100 * spec.drives.regeneration, 0)
        << " % of the braking energy regenerated; cost of transport: energy over weight and distance.\n\n";
-  printRobots(page, contenders);
+  printRobots(page, spec, contenders);
   const auto draw = [&](const std::string& name, const std::string& caption, const std::vector<Plot>& plots) {
     const std::string path = directory + "/" + name;
     if (drawPlots(path, plots)) {

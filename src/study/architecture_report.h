@@ -18,7 +18,7 @@ struct GroupLoad {
 // One motion of one robot.
 struct Feat {
   std::string outcome;  // passed, not checked, or the problem
-  bool done = false;    // converged and passed (or not checked, if there is no check)
+  bool done = false;    // converged, met its goals and passed (or not checked, if there is no check)
   bool exists = false;  // there is a motion, done or not, with the numbers below
   int iterations = 0;
   MotorTrace trace;

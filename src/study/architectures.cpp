@@ -65,12 +65,12 @@ void readRoot(const Entry& root, ArchitectureSpec& spec) {
   if (const Entry* drives = find(fields, "drives")) {
     const Fields drive = drives->getFields({"motor_constant", "regeneration"});
     if (const Entry* constant = find(drive, "motor_constant")) {
-      spec.drive.motor_constant = constant->getNumber();
-      if (!(spec.drive.motor_constant > 0)) constant->fail("it is not positive", "give N m/sqrt(W)");
+      spec.drives.motor_constant = constant->getNumber();
+      if (!(*spec.drives.motor_constant > 0)) constant->fail("it is not positive", "give N m/sqrt(W)");
     }
     if (const Entry* share = find(drive, "regeneration")) {
-      spec.drive.regeneration = share->getNumber();
-      if (!(spec.drive.regeneration >= 0 && spec.drive.regeneration <= 1))
+      spec.drives.regeneration = share->getNumber();
+      if (!(spec.drives.regeneration >= 0 && spec.drives.regeneration <= 1))
         share->fail("it is outside 0 .. 1", "give the share that is regenerated");
     }
   }

@@ -8,9 +8,9 @@
 //   mass: 25.7                     # kg, of every robot, set by its trunk; omitted: unchanged
 //   motions:
 //     - {motion: squat, set: {depth: 0.6}}
-//   speeds: {motion: walk, option: speed, from: 0.3, to: 1.0, step: 0.1}     # the largest that converges and passes
+//   speeds: {motion: walk, option: speed, from: 0.3, to: 1.0, step: 0.1}     # the largest that passes
 //   groups: {hips: [hip], "knees and ankles": [knee, ankle]}     # motors by parts of their names, the first that fits
-//   drives: {motor_constant: 2, regeneration: 0}                 # of all motors (design/measures.h)
+//   drives: {motor_constant: 2, regeneration: 0}                 # of all motors (design/measures.h); omitted: each robot's own
 #include <string>
 #include <vector>
 
@@ -41,7 +41,7 @@ struct ArchitectureSpec {
   std::vector<MotionSpec> speeds;  // slowest first; may be empty
   std::vector<double> speed_values;
   std::vector<MotorGroup> groups;  // the last one has no words: all motors
-  MotorConversion drive;
+  DriveTable drives;               // without constants of single motors
 };
 
 // \throws ModelError naming the file, the key with its line, and the remedy
