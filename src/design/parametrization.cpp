@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 #include <sstream>
 
@@ -33,6 +34,38 @@ void setLength(RobotDraft& draft, const LengthChange& change, double length, dou
   const double now = line.along.norm();
   draft.setPlace(change.to, line.from + line.aside + length / now * line.along);
   if (!change.stretched.empty()) draft.stretch(change.stretched, line.from, line.along / now, length / original);
+}
+
+std::string describeRange(double lower, double upper) {
+  return formatNumber(lower, "%.5g") + " .. " + formatNumber(upper, "%.5g");
+}
+
+// Without its sign.
+std::string describeDirection(const std::string& word, const Vector3d& direction) {
+  if (direction.isZero()) return "";
+  Eigen::Index largest = 0;
+  direction.cwiseAbs().maxCoeff(&largest);
+  const Vector3d d = direction[largest] < 0 ? Vector3d(-direction) : direction;
+  std::string text;
+  for (const double component : d) text += (text.empty() ? "" : ", ") + formatNumber(component + 0.0, "%.4g");
+  return word + " [" + text + "]";
+}
+
+// What the variable sets, and no other one may.
+std::vector<std::string> listTargets(const DesignVariable& variable, const Model& robot) {
+  std::vector<std::string> out;
+  for (const std::string& parameter : {variable.parameter, variable.mass})
+    if (!parameter.empty()) out.push_back("parameter '" + parameter + "'");
+  for (const int m : findMotors(robot, variable.motors))
+    out.push_back((variable.isChoice() ? "the type of motor '" : "the ratio of motor '") +
+                  robot.motors()[static_cast<size_t>(m)].name + "'");
+  for (const LengthChange& change : variable.lengths) {
+    const auto [first, second] = std::minmax(change.from, change.to);
+    out.push_back("the distance of '" + first + "' and '" + second + "'" + describeDirection(" across", change.across));
+  }
+  for (const ShiftChange& shift : variable.shifts)
+    out.push_back("the place of '" + shift.of + "'" + describeDirection(" along", shift.along));
+  return out;
 }
 
 int getChoice(const DesignVariable& variable, double value) {
@@ -96,6 +129,13 @@ Parametrization::Parametrization(const std::string& generator, std::vector<std::
     for (const Parameter& parameter : request.parameters) {
       if (parameter.name != variable.parameter) continue;
       start = *parameter.value;
+      if (!variable.isChoice() && !(variable.lower >= parameter.lower && variable.upper <= parameter.upper))
+        throw ModelError(source_, "variable '" + variable.name + "'",
+                         "its bounds " + describeRange(variable.lower, variable.upper) +
+                             " go beyond those of parameter '" + parameter.name + "', " +
+                             describeRange(parameter.lower, parameter.upper) +
+                             (parameter.unit == "1" ? "" : " " + parameter.unit),
+                         "narrow them");
       for (size_t k = 0; k < variable.choices.size(); ++k)
         if (findChoice(parameter, variable.choices[k]) == *parameter.value) start = static_cast<double>(k);
       if (variable.isChoice() && variable.choices[static_cast<size_t>(getChoice(variable, start))] !=
@@ -145,9 +185,21 @@ Model Parametrization::changeMotors(Model model, const VectorXd& x) const {
   return draft.build();
 }
 
+void Parametrization::refuseSharedTargets(const Model& robot) const {
+  std::map<std::string, std::string> owners;
+  for (const DesignVariable& variable : variables_)
+    for (const std::string& target : listTargets(variable, robot)) {
+      const std::string& owner = owners.emplace(target, variable.name).first->second;
+      if (owner != variable.name)
+        throw ModelError(source_, "variables '" + owner + "' and '" + variable.name + "'", "both set " + target,
+                         "keep one of them");
+    }
+}
+
 // Of variables of motors: what is given, or that of the first of them. A type brings its ratio.
 void Parametrization::readStart() {
   const Model robot = generator_.empty() ? model_ : generate(start_);
+  refuseSharedTargets(robot);
   std::vector<Motor> motors = robot.motors();
   for (const bool choices : {true, false})
     for (size_t i = 0; i < variables_.size(); ++i) {

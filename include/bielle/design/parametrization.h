@@ -51,9 +51,11 @@ class Parametrization {
  public:
   /// A given robot.
   /// \param source  file that defines the variables, named in errors
-  /// \throws ModelError for unknown names, places on different bodies, bounds that cross or exclude the given robot
+  /// \throws ModelError for unknown names, places on different bodies, bounds that cross or exclude the given robot, two variables
+  ///   that set the same thing
   Parametrization(Model model, std::vector<DesignVariable> variables, std::string source = "");
-  /// A generated robot; `settings` are the values of other parameters of the generator.
+  /// A generated robot; `settings` are the values of other parameters of the generator. Bounds beyond those of a parameter are refused
+  /// as well.
   Parametrization(const std::string& generator, std::vector<std::pair<std::string, double>> settings,
                   std::vector<DesignVariable> variables, std::string source = "");
 
@@ -76,6 +78,7 @@ class Parametrization {
 
  private:
   void readStart();
+  void refuseSharedTargets(const Model& robot) const;
   Model generate(const VectorXd& x) const;
   Model changePlaces(const VectorXd& x) const;
   Model changeMotors(Model model, const VectorXd& x) const;
