@@ -1,5 +1,6 @@
 bielle_command_test(design SOURCES test_design.cpp LIBS bielle_design)
 bielle_command_test(design_parts SOURCES test_design_parts.cpp LIBS bielle_design)
+bielle_command_test(design_goals SOURCES test_design_goals.cpp LIBS bielle_design)
 bielle_command_test(design_fronts SOURCES test_design_fronts.cpp LIBS bielle_design)
 bielle_command_test(design_gradient SOURCES test_design_gradient.cpp LIBS bielle_design)
 bielle_command_test(design_constraints SOURCES test_design_constraints.cpp LIBS bielle_design)

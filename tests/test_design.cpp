@@ -321,7 +321,9 @@ TEST_CASE("design: a search that is killed goes on and ends the same way") {
   const int done = countLines(log) - 1;
   CHECK(done > 0);
   CHECK(done < 50);
-  std::ofstream(log, std::ios::app) << "{\"stage\": \"cr";  // a line that was not finished
+  std::ofstream(log, std::ios::app) << "{\"stage\": \"cr";                    // a line that was not finished
+  for (const char* file : {"design.md", "best/best.urdf", "best/best.yaml"})  // as if it was killed while it wrote
+    directory.write(std::string("killed/") + file + ".part99999999", "half");
   const CommandResult second = runCommand({BIELLE_COMMAND, "design", spec, "-o", killed});
   INFO(second.err);
   REQUIRE(second.status == 0);
@@ -339,6 +341,8 @@ TEST_CASE("design: a search that is killed goes on and ends the same way") {
     if (is_drawn) CHECK_THAT(readFile(whole + figure), Contains("before") || Contains("best of search 2"));
   }
   CHECK(countLines(log) == countLines(whole + "/search1.jsonl"));
+  for (const auto& entry : fs::recursive_directory_iterator(killed))
+    CHECK_THAT(entry.path().string(), !Contains(".part"));
 
   // The design is a robot, better than the start.
   const std::string page = readFile(whole + "/design.md"), row = "| value | 1 | ";
@@ -371,6 +375,9 @@ TEST_CASE("design: errors are reported with their places and remedies") {
   check("from: motor_knee_right", "from: knee_left", "not to 'knee_crank_right'");
   check("stretch: knee_crank_right", "stretch: crank", "there is no such body");
   check("- name: motor\n", "- name: crank\n", "given twice");
+  check("motions:\n", "  - {name: x, bounds: [-1, 1], shift: {of: motor_knee_left, along: [-1, 0, 0]}}\nmotions:\n",
+        "variables 'motor' and 'x': both set the place of 'motor_knee_left' along [1, 0, 0]");
+  check("[0.03, 0.08]", "[-5, 0.08]", "zero, or would become zero");
   check("motion: squat", "motion: dance", "there is no such motion");
   check("depth: 0.95", "dept: 0.95", "dept");
   check("measure: peak_torque", "measure: peak", "use one of peak_torque, rms_torque");

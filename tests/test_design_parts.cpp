@@ -7,6 +7,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
+#include "design/draft.h"
 #include "design/front_search.h"
 #include "design/motor_change.h"
 #include "design/run.h"
@@ -56,6 +57,14 @@ TEST_CASE("design: a gear scales what is behind it, a type brings what is in it"
   CHECK_THROWS_WITH(Parametrization(bipetto, {gear}), Contains("or give `start`"));
   gear.start = 2.5;
   CHECK(Parametrization(bipetto, {gear}).startModel().motors()[findMotors(bipetto, gear.motors)[0]].drive.ratio == 2.5);
+  // The mass that a catalogue gives for a motor of a robot's own files is in its links already.
+  RobotDraft draft(bipetto);
+  Motor heavy = bipetto.motors()[0];
+  heavy.drive.mass = 0.5;
+  draft.setMotor(0, heavy);
+  const Parametrization catalogued(draft.build(), {gear});
+  CHECK(catalogued.make(catalogued.start()).mass() == bipetto.mass());
+  CHECK(calcMassInLinks(catalogued, catalogued.start()) == 0.5);
   gear.motors = {"elbow"};
   CHECK_THROWS_WITH(Parametrization(bipetto, {gear}), Contains("no such motor"));
 }
@@ -115,6 +124,7 @@ TEST_CASE("design: architectures and motors are chosen, with what belongs to the
     CHECK(motor.effort_limit == Approx(strong ? 30 : 22 * 6.0 / 9));
     VectorXd other = x;
     other[4] = 1 - x[4];
+    CHECK(calcMassInLinks(robot, x) == 0);  // a variable gives them
     CHECK(model.mass() - robot.make(other).mass() == Approx((strong ? 1 : -1) * 2 * (1.1 - 0.49)));
   }
   CHECK(architectures.size() == 4);
@@ -244,6 +254,18 @@ TEST_CASE("design: choices and constraints that cannot be are refused with their
   check("bounds: [5, 20]", "bounds: [-5, 20]", "not positive");
   check("bounds: [5, 20]", "bounds: [7, 20]", "or give `start`");
   check("ratio: \"*knee*\"", "ratio: knee", "no such motor");
+  check("bounds: [0.2, 0.26]", "bounds: [-5, 0.26]", "bounds -5 .. 0.26 go beyond those of parameter 'shank_length'");
+  const auto check_twice = [&](const std::string& other, const std::string& problem) {
+    check("  - {name: gear,", "  - {name: other, " + other + "}\n  - {name: gear,", problem);
+  };
+  check_twice("parameter: shank_length, bounds: [0.2, 0.26]",
+              "variables 'shank' and 'other': both set parameter 'shank_length'");
+  check_twice("ratio: motor_knee_left, bounds: [5, 20]",
+              "variables 'other' and 'gear': both set the ratio of motor 'motor_knee_left'");
+  check_twice("motor: motor_knee_left, choices: [ak80-9]",
+              "variables 'other' and 'motor': both set the type of motor 'motor_knee_left'");
+  check_twice("parameter: knee_motor_mass, unit: kg, bounds: [0.3, 2]",
+              "variables 'other' and 'motor': both set parameter 'knee_motor_mass'");
   check("at_most: 26.5", "", "it does not have exactly one bound");
   check("mass, at_most: 26.5", "margin, at_most: 0.1", "give `at_least`");
   check("mass, at_most: 26.5", "cost, at_most: 0.1", "use one of envelope");

@@ -31,8 +31,14 @@ DesignMotion makeDesignMotion(const std::string& file, const MotionSpec& motion)
     return request;
   };
   make();  // names are checked now
+  const auto make_usual = [file, motion] {
+    const MotionRequest request = findMotion(file, motion.motion).makeRequest();
+    for (const auto& [name, value] : motion.settings)
+      if (name != "time_step") setOption(request.options, name, value);
+    return request;
+  };
   return {motion.motion, [make](const Model& model, const VectorXd& q0) { return make().plan(model, q0); },
-          motion.weight, motion.payload};
+          motion.weight, motion.payload, make_usual};
 }
 
 // One design, for others that search.
@@ -58,6 +64,48 @@ DesignRun runSearches(const DesignArguments& arguments, const DesignEvaluator& e
   return runDesign(evaluator, spec, options);
 }
 
+// By the usual steps of `bielle solve`.
+std::string describeUsual(const bielle::Evaluation& usual) {
+  if (usual.status == DesignStatus::Feasible)
+    return formatNumber(usual.value, "%.4f") + " by the usual steps of `bielle solve`";
+  return getName(usual.status) + std::string(" by the usual steps of `bielle solve`: ") + usual.message;
+}
+
+// Of a design that does not make its motions, on the standard error.
+void warn(const std::string& design, const bielle::Evaluation& evaluation) {
+  if (evaluation.status != DesignStatus::Feasible && evaluation.status != DesignStatus::Violated)
+    std::cerr << "bielle: warning: " << design << ": " << getName(evaluation.status) << ": " << evaluation.message
+              << std::endl;
+}
+
+void printRun(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRun& run) {
+  const int count = std::accumulate(run.counts.begin(), run.counts.end(), 0);
+  std::vector<Row> rows = {
+      {"value", formatNumber(evaluator.start().value, "%.4f") + " -> " + formatNumber(run.value, "%.4f")}};
+  if (run.usual) rows.push_back({"as solved", describeUsual(*run.usual)});
+  rows.insert(
+      rows.end(),
+      {{"evaluations", std::to_string(count) + ", " + std::to_string(run.replayed) + " of them from the logs; " +
+                           formatNumber(run.seconds, "%.0f") + " s of processor time"},
+       {"infeasible",
+        std::to_string(run.counts[1]) + " loop open, " + std::to_string(run.counts[2]) + " motion failed" +
+            (evaluator.start().goals.empty() ? "" : ", " + std::to_string(run.counts[4]) + " goal missed") +
+            (spec.constraints.empty() ? "" : ", " + std::to_string(run.counts[3]) + " constraint violated")}});
+  const Parametrization& robot = evaluator.robot();
+  for (size_t i = 0; i < robot.variables().size(); ++i) {
+    const Eigen::Index k = static_cast<Eigen::Index>(i);
+    const DesignVariable& variable = robot.variables()[i];
+    const std::string from =
+        variable.isChoice() ? describeValue(variable, robot.start()[k]) : formatNumber(robot.start()[k], "%.5g");
+    rows.push_back({variable.name, from + " -> " + describeValue(variable, run.best[k])});
+  }
+  if (const double mass = calcMassInLinks(robot, run.best); mass > 0)
+    rows.push_back(
+        {"motor masses", formatNumber(mass, "%.4g") + " kg of the catalogue, included in the links as they are"});
+  if (spec.front) rows.push_back({"front", std::to_string(run.front.size()) + " non-dominated designs"});
+  printTable(std::cout, rows);
+}
+
 int run(const DesignArguments& arguments) {
   DesignSpec spec = readDesignSpec(arguments.spec);
   std::optional<study::DesignRequest> request;
@@ -66,7 +114,7 @@ int run(const DesignArguments& arguments) {
     if (!request->robot.empty()) spec.robot.name = request->robot;
   }
   // Before there are threads: the engine blocks signals, which none of them may take.
-  const auto engine = arguments.tasks.workers.empty() ? nullptr : makeTaskEngine(arguments.tasks);
+  auto engine = arguments.tasks.workers.empty() ? nullptr : makeTaskEngine(arguments.tasks);
   const Parametrization robot = makeParametrization(spec);
   std::vector<DesignMotion> motions;
   for (const MotionSpec& motion : spec.motions) motions.push_back(makeDesignMotion(spec.path, motion));
@@ -77,27 +125,17 @@ int run(const DesignArguments& arguments) {
   options.constraints = spec.constraints;
   const DesignEvaluator evaluator(robot, motions, spec.objective, options);
   if (request) return evaluateRequest(evaluator, *request, arguments.directory);
-  const DesignRun run = runSearches(arguments, evaluator, spec, engine.get());
-
-  const int count = std::accumulate(run.counts.begin(), run.counts.end(), 0);
-  std::vector<Row> rows = {
-      {"value", formatNumber(evaluator.start().value, "%.4f") + " -> " + formatNumber(run.value, "%.4f")},
-      {"evaluations", std::to_string(count) + ", " + std::to_string(run.replayed) + " of them from the logs; " +
-                          formatNumber(run.seconds, "%.0f") + " s of processor time"},
-      {"infeasible",
-       std::to_string(run.counts[1]) + " loop open, " + std::to_string(run.counts[2]) + " motion failed" +
-           (spec.constraints.empty() ? "" : ", " + std::to_string(run.counts[3]) + " constraint violated")}};
-  for (size_t i = 0; i < robot.variables().size(); ++i) {
-    const Eigen::Index k = static_cast<Eigen::Index>(i);
-    const DesignVariable& variable = robot.variables()[i];
-    const std::string from =
-        variable.isChoice() ? describeValue(variable, robot.start()[k]) : formatNumber(robot.start()[k], "%.5g");
-    rows.push_back({variable.name, from + " -> " + describeValue(variable, run.best[k])});
-  }
-  if (spec.front) rows.push_back({"front", std::to_string(run.front.size()) + " non-dominated designs"});
-  printTable(std::cout, rows);
+  warn("the start design", evaluator.start());
+  DesignRun run = runSearches(arguments, evaluator, spec, engine.get());
+  engine.reset();  // signals have their usual effect again
+  if (!motions.empty()) run.usual = evaluator.solveUsually(run.best);
+  printRun(evaluator, spec, run);
   for (const std::string& path : writeDesign(arguments.directory, evaluator, spec, run))
     std::cout << "  " << path << "\n";
+  std::cout.flush();
+  if (run.evaluation.status != DesignStatus::Feasible)
+    std::cerr << "bielle: warning: no design is feasible; the best one is the start design\n";
+  if (run.usual) warn("the motions of the best design, as `bielle solve` makes them", *run.usual);
   return kOk;
 }
 
@@ -164,7 +202,9 @@ void addDesign(CLI::App& app, Action& action) {
       "      {algorithm: nsga2, population: 24, generations: 10, refine: {algorithm: slsqp, evaluations: 6}}\n"
       "Every evaluation is logged: after Ctrl-C or a crash, run the same command again to continue; the result is the "
       "same.\n"
-      "Designs whose loops do not close, or whose motion fails, are penalized and counted.\n"
+      "Designs whose loops do not close, or whose motion fails or misses its goal, are penalized and counted. In the "
+      "end the\n"
+      "motions of the best one are made by the usual steps of `bielle solve`, and what that gives is told.\n"
       "Exit status: 0 done, 1 interrupted (with workers) or a task failed, 2 bad input.\n"
       "Example:\n"
       "  bielle design examples/knee_design/knee.yaml -o knee");

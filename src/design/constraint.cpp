@@ -12,10 +12,18 @@ double getScale(const DesignConstraint& constraint) {
   return constraint.measure == Measure::Distance || constraint.bound == 0 ? kCentimetre : std::abs(constraint.bound);
 }
 
+constexpr double kMost = 1e6;  // linkages at a singularity are infinitely far beyond their bound
+
 }  // namespace
 
+double calcMiss(const GoalOutcome& outcome) {
+  const Goal& goal = outcome.goal;
+  if (outcome.met()) return 0;
+  const double beyond = (std::abs(outcome.achieved - goal.requested) - goal.tolerance) / goal.tolerance;
+  return beyond < kMost ? beyond : kMost;  // as is what cannot be measured
+}
+
 double calcViolation(const DesignConstraint& constraint, double value) {
-  constexpr double kMost = 1e6;  // linkages at a singularity are infinitely far beyond
   const double beyond =
       (constraint.at_least ? constraint.bound - value : value - constraint.bound) / getScale(constraint);
   return beyond > kConstraintSlack ? std::min(beyond, kMost) : 0;
@@ -41,6 +49,20 @@ MeasurePieces calcConstraintPieces(const DesignConstraint& constraint, const std
   const double sign = constraint.at_least ? -1 : 1, scale = sign / getScale(constraint);
   out.values = scale * (out.values.array() - bound);
   out.gradients *= scale;
+  return out;
+}
+
+MeasurePieces calcGoalPieces(const std::vector<MotorSlopes>& motions) {
+  constexpr double kShare = 0.99;  // of the tolerance
+  MeasurePieces out;
+  for (const MotorSlopes& motion : motions)
+    for (size_t i = 0; i < motion.goals.size(); ++i) {
+      const Goal& goal = motion.goals[i].goal;
+      const double off = motion.goals[i].achieved - goal.requested, sign = off < 0 ? -1 : 1;
+      append({VectorXd::Constant(1, sign * off / goal.tolerance - kShare),
+              sign / goal.tolerance * motion.dgoals.row(static_cast<Eigen::Index>(i))},
+             out);
+    }
   return out;
 }
 

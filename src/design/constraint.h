@@ -26,11 +26,18 @@ inline constexpr double kConstraintSlack = 1e-3;
 /// How far a value is beyond the bound, over the bound (a distance: over a centimetre); 0 within the slack.
 double calcViolation(const DesignConstraint& constraint, double value);
 
-/// The same of the pieces of its measure, as p <= 0.
+/// How far a goal is missed beyond its tolerance, over the tolerance; 0 if it is met.
+double calcMiss(const GoalOutcome& outcome);
+
+/// The same of the pieces of a measure, as p <= 0.
 /// \param motors  those of the constraint, by their numbers   \param motions  with distances and, of motions made anew, margins
 /// \param weights  as of getMeasure()
 MeasurePieces calcConstraintPieces(const DesignConstraint& constraint, const std::vector<int>& motors,
                                    const std::vector<MotorSlopes>& motions, const std::vector<double>& weights,
                                    const RobotSlopes& robot);
+
+/// Goals of motions made anew as pieces p <= 0: how far they are from what is requested, over their tolerance, within a hundredth of
+/// it, so that searches that end at a tolerance end inside it.
+MeasurePieces calcGoalPieces(const std::vector<MotorSlopes>& motions);
 
 }  // namespace bielle

@@ -3,8 +3,10 @@
 #include <algorithm>
 
 #include "bielle/dynamics/assembly.h"
-#include "bielle/io/result.h"
+#include "bielle/dynamics/kinematics.h"
+#include "bielle/io/request_solver.h"
 #include "bielle/model/error.h"
+#include "bielle/motion/footsteps.h"
 #include "bielle/transmission/serial_model.h"
 #include "model/number_text.h"
 
@@ -38,13 +40,52 @@ std::vector<double> listSteps(const RobotProblem& problem) {
   return dt;
 }
 
+}  // namespace
+
+std::vector<GoalOutcome> measureGoals(const Model& model, const std::vector<Goal>& goals,
+                                      const ContactSchedule& schedule, const std::vector<double>& dt,
+                                      const std::vector<VectorXd>& xs) {
+  MotionTrack track;
+  for (const ContactFrame& contact : model.contacts()) track.contacts.push_back(contact.name);
+  Workspace ws(model);
+  double time = 0;
+  for (size_t k = 0; k < xs.size() && !goals.empty(); ++k) {
+    updatePlacements(model, ws, xs[k].head(model.nq()));
+    track.time.push_back(time);
+    track.com.push_back(calcCom(model, ws));
+    track.heading.push_back(calcHeading(ws.X_WB[static_cast<size_t>(std::min(1, model.numBodies() - 1))]));
+    track.feet.emplace_back();
+    for (const ContactFrame& contact : model.contacts())
+      track.feet.back().push_back(getPlacement(ws, contact.body, contact.X_BF));
+    if (k == dt.size()) break;
+    time += dt[k];
+    track.load.push_back(static_cast<double>(schedule.getPhase(static_cast<int>(k)).contacts.size()));
+  }
+  std::vector<GoalOutcome> out;
+  for (const Goal& goal : goals) out.push_back({goal, measureGoal(goal, track)});
+  return out;
+}
+
+std::vector<GoalOutcome> measureGoals(const Motion& motion, const ShootingTrajectory& trajectory) {
+  return measureGoals(motion.problem->model(), motion.goals, motion.schedule, listSteps(*motion.problem),
+                      trajectory.xs);
+}
+
+namespace {
+
+// The message of a motion that was not solved.
+std::string describeFailure(const std::string& motion, const FddpSummary& summary) {
+  return motion + ": " + getName(summary.termination) + (summary.message.empty() ? "" : ": " + summary.message);
+}
+
 // Solves from the guess. \param out  with the loaded robot, that of the motion
 void solve(Motion motion, const FddpOptions& options, const std::vector<MotorConversion>& drives, MotionOutcome& out) {
   const FddpSummary summary = solveMotion(motion, options, {}, &out.multipliers);
-  out.message = motion.name + ": " + getName(summary.termination) + " " + summary.message;
+  out.message = describeFailure(motion.name, summary);
   if (summary.termination != FddpTermination::Converged) return;
   out.measures = calcMotionMeasures(motion.problem->model(), listSteps(*motion.problem), motion.guess, drives);
   out.measures.cost = summary.cost;
+  out.goals = measureGoals(motion, motion.guess);
   out.missing = 0;
   out.motion = std::make_unique<Motion>(std::move(motion));
 }
@@ -115,7 +156,7 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
   if (outcome.missing > 0)
     throw ModelError(model.name(), "start design", outcome.message, "request a motion that the robot can make");
   const ShootingTrajectory& solution = outcome.motion->guess;
-  SolvedMotion out{makeRecord(*outcome.motion, solution), {}, {}, {}};
+  SolvedMotion out{makeRecord(*outcome.motion, solution), outcome.motion->goals, outcome.motion->schedule, {}, {}, {}};
   const int last = static_cast<int>(solution.us.size());
   for (int p = 0; p < postures; ++p)
     out.postures.push_back(solution.xs[p * last / std::max(1, postures - 1)].head(model.nq()));
@@ -136,9 +177,37 @@ MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const
   return out;
 }
 
-MotionOutcome keepMotion(const Model& model, const DesignMotion& motion, const SerialTrajectory& kept,
+MotionOutcome solveUsually(const Model& model, const DesignMotion& motion, const std::vector<MotorConversion>& drives,
+                           ShootingTrajectory& trajectory) {
+  MotionOutcome out = load(model, motion);
+  MotionRequest request;
+  request.plan = motion.plan;
+  if (motion.request) request = motion.request();
+  const MotionResult result = RequestSolver(request, *out.loaded, {}).solve({model.name(), "", {}});
+  out.message = describeFailure(motion.name, result.solver);
+  if (!result.converged()) return out;
+  out.missing = 0;
+  out.goals = result.goals;
+  const MotionRecord& record = result.record;
+  std::vector<double> dt;
+  for (Eigen::Index k = 0; k < record.time.size(); ++k) {
+    const bool is_stage = k < record.u.rows(), has_middle = is_stage && record.has_midpoints;
+    VectorXd x(model.nq() + model.nv());
+    x << record.q.row(k).transpose(), (has_middle ? record.v_mid : record.v).row(k).transpose();
+    trajectory.xs.push_back(x);
+    if (!is_stage) continue;
+    trajectory.us.emplace_back(record.u.row(k));
+    dt.push_back(record.time[k + 1] - record.time[k]);
+  }
+  out.measures = calcMotionMeasures(*out.loaded, dt, trajectory, drives);
+  out.measures.cost = result.solver.cost;
+  return out;
+}
+
+MotionOutcome keepMotion(const Model& model, const DesignMotion& motion, const SolvedMotion& start,
                          const std::vector<MotorConversion>& drives, double margin) {
   MotionOutcome out = load(model, motion);
+  const SerialTrajectory& kept = *start.serial;
   out.lifted = liftMotion(*out.loaded, kept);
   const LiftResult& lifted = out.lifted;
   out.missing = 1 - static_cast<double>(lifted.dt.size()) / static_cast<double>(kept.dt.size() + 1);
@@ -147,6 +216,7 @@ MotionOutcome keepMotion(const Model& model, const DesignMotion& motion, const S
     return out;
   }
   out.measures = calcMotionMeasures(*out.loaded, lifted.dt, lifted.trajectory, drives);
+  out.goals = measureGoals(*out.loaded, start.goals, start.schedule, lifted.dt, lifted.trajectory.xs);
   out.missing = 0;
   const auto near = std::find_if(lifted.nodes.begin(), lifted.nodes.end(),
                                  [margin](const LiftNode& node) { return node.margin < margin; });

@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "bielle/io/record.h"
-#include "bielle/motion/motion.h"
+#include "bielle/io/motion_registry.h"
 #include "bielle/transmission/lift.h"
 #include "design/measures.h"
 #include "model/payload.h"
@@ -19,6 +18,8 @@ struct DesignMotion {
   std::function<MotionPlan(const Model&, const VectorXd& q0)> plan;  ///< called by several threads; the model is loaded
   double weight = 1;     ///< its share in objectives and in sums over motions, 0 or more
   Payload payload = {};  ///< that the robot carries in it
+  /// As `bielle solve` makes it without being told the length of steps; called by one thread. None: of the plan alone.
+  std::function<MotionRequest()> request = {};
 };
 
 /// With its payload, and its weight unless that is 1.
@@ -31,9 +32,17 @@ std::vector<size_t> groupByPayload(const std::vector<DesignMotion>& motions);
 /// alone can be; the others are comparable with them.
 Motion makeDesignMotion(const Model& model, const DesignMotion& motion, const VectorXd& posture);
 
+/// The goals of a motion, measured on states and schedule: a foot that stands counts as loaded.
+std::vector<GoalOutcome> measureGoals(const Model& model, const std::vector<Goal>& goals,
+                                      const ContactSchedule& schedule, const std::vector<double>& dt,
+                                      const std::vector<VectorXd>& xs);
+std::vector<GoalOutcome> measureGoals(const Motion& motion, const ShootingTrajectory& trajectory);
+
 /// A motion of the start design.
 struct SolvedMotion {
   MotionRecord record;
+  std::vector<Goal> goals;
+  ContactSchedule schedule;
   std::vector<VectorXd> postures;
   std::optional<SerialTrajectory> serial;  ///< of its equivalent serial chain, where there is one
   std::vector<int> kept_dofs;              ///< of the closed model: those of the chain, in its order
@@ -45,6 +54,7 @@ struct MotionOutcome {
   double missing = 1;             ///< share of the motion
   std::string message;
   MotionMeasures measures;
+  std::vector<GoalOutcome> goals;  ///< of the whole motion
   LiftResult lifted;               ///< of a kept motion
   std::unique_ptr<Motion> motion;  ///< of one that was made anew: the optimum, of the loaded robot
   Multipliers multipliers;
@@ -60,8 +70,14 @@ SolvedMotion solveStartMotion(const Model& model, const DesignMotion& motion, co
 MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const SolvedMotion* start,
                            const FddpOptions& options, const std::vector<MotorConversion>& drives);
 
-/// Postures and accelerations of the start design, motors recomputed. \param margin  EvaluationOptions::margin
-MotionOutcome keepMotion(const Model& model, const DesignMotion& motion, const SerialTrajectory& kept,
+/// Postures and accelerations of the start design, which has a serial equivalent, motors recomputed.
+/// \param margin  EvaluationOptions::margin
+MotionOutcome keepMotion(const Model& model, const DesignMotion& motion, const SolvedMotion& start,
                          const std::vector<MotorConversion>& drives, double margin);
+
+/// As `bielle solve` gives it: by its own steps, from its own guess, solved again where it does so. Without `lifted`, `motion` and
+/// `multipliers`. \param trajectory  of the closed model, with the velocities at which motors count
+MotionOutcome solveUsually(const Model& model, const DesignMotion& motion, const std::vector<MotorConversion>& drives,
+                           ShootingTrajectory& trajectory);
 
 }  // namespace bielle

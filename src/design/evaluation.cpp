@@ -28,6 +28,8 @@ const char* getName(DesignStatus status) {
       return "loop open";
     case DesignStatus::Violated:
       return "constraint violated";
+    case DesignStatus::GoalMissed:
+      return "goal missed";
     case DesignStatus::MotionFailed:
       break;
   }
@@ -130,22 +132,29 @@ void DesignEvaluator::Data::makeMotions(const ArchitectureStart& base, const Mod
       throw ModelError(model.name(), motions[i].name, "the start design with these parts cannot make it",
                        "leave them out");
     MotionOutcome outcome = options.mode == MotionMode::Kept
-                                ? keepMotion(model, motions[i], *from->serial, drives, options.margin)
+                                ? keepMotion(model, motions[i], *from, drives, options.margin)
                                 : remakeMotion(model, motions[i], from, options.solver, drives);
     missing += outcome.missing / static_cast<double>(motions.size());
-    const bool failed = outcome.missing > 0 || !std::isfinite(outcome.measures.conditioning);
-    if (failed && out.status == DesignStatus::Feasible) {
-      out.status = DesignStatus::MotionFailed;
-      out.message = outcome.missing > 0 ? outcome.message : "a dead point of the motors";
-      out.value = weight * (1.5 + 0.5 * std::max(missing, 1e-3));
-    }
-    if (failed && !outcomes) return;
-    if (!failed)
-      addLimitMeasures(model, outcome.motion ? outcome.motion->guess : outcome.lifted.trajectory, requested,
-                       base.left_out, outcome.measures);
-    out.motions.push_back(outcome.measures);
+    const bool made = addMotion(motions[i].name, base, missing,
+                                outcome.motion ? outcome.motion->guess : outcome.lifted.trajectory, outcome, out);
+    if (!made && !outcomes) return;
     if (outcomes) outcomes->push_back(std::move(outcome));
   }
+}
+
+bool DesignEvaluator::Data::addMotion(const std::string& name, const ArchitectureStart& base, double missing,
+                                      const ShootingTrajectory& trajectory, MotionOutcome& outcome,
+                                      Evaluation& out) const {
+  const bool failed = outcome.missing > 0 || !std::isfinite(outcome.measures.conditioning);
+  if (failed && out.status == DesignStatus::Feasible) {
+    out.status = DesignStatus::MotionFailed;
+    out.message = outcome.missing > 0 ? outcome.message : name + ": a dead point of the motors";
+    out.value = weight * (1.5 + 0.5 * std::max(missing, 1e-3));
+  }
+  if (!failed) addLimitMeasures(*outcome.loaded, trajectory, requested, base.left_out, outcome.measures);
+  out.motions.push_back(outcome.measures);
+  for (const GoalOutcome& goal : outcome.goals) out.goals.push_back({name, goal});
+  return !failed;
 }
 
 bool DesignEvaluator::Data::checkPostures(const ArchitectureStart& base, const Model& model, Evaluation& out) const {
@@ -191,10 +200,19 @@ void DesignEvaluator::Data::checkConstraints(const ArchitectureStart& base, cons
                      (constraint.measure == Measure::Distance ? " (" + getNearest(out.motions) + ")" : "");
     sum += violation;
   }
+  if (sum > 0) out.status = DesignStatus::Violated;
+  for (const DesignGoal& goal : out.goals) {
+    const double miss = calcMiss(goal.outcome);
+    if (miss == 0) continue;
+    out.message += (sum > 0 ? ", " : "") + describeGoal(goal) + ": " + formatOutcome(goal.outcome);
+    out.status = DesignStatus::GoalMissed;
+    sum += miss;
+  }
   if (sum == 0) return;
-  out.status = DesignStatus::Violated;
   out.value = weight * (1.5 + 0.5 / static_cast<double>(motions.size() + 1) * sum / (1 + sum));  // Eq. (4)
 }
+
+std::string describeGoal(const DesignGoal& goal) { return goal.motion + ": " + goal.outcome.goal.name; }
 
 void DesignEvaluator::Data::sumUp(const ArchitectureStart& base, const Model& model, Evaluation& out) const {
   for (size_t i = 0; i < objective.size(); ++i) {
@@ -243,5 +261,24 @@ Evaluation DesignEvaluator::Data::evaluate(const VectorXd& x, std::vector<Motion
 }
 
 Evaluation DesignEvaluator::evaluate(const VectorXd& x) const { return data_->evaluate(x); }
+
+Evaluation DesignEvaluator::solveUsually(const VectorXd& x) const {
+  Evaluation out;
+  const Model model = data_->robot.make(x);
+  const ArchitectureStart& base = data_->getBase(x);
+  const std::vector<MotorConversion> drives = makeDrives(model, data_->options.drives);
+  for (const DesignMotion& motion : data_->motions) {
+    MotionOutcome outcome;
+    ShootingTrajectory trajectory;
+    try {
+      outcome = bielle::solveUsually(model, motion, drives, trajectory);
+    } catch (const ModelError& error) {  // there is no guess to start from
+      outcome.message = motion.name + ": " + error.what();
+    }
+    if (!data_->addMotion(motion.name, base, 1, trajectory, outcome, out)) return out;
+  }
+  data_->sumUp(base, model, out);
+  return out;
+}
 
 }  // namespace bielle

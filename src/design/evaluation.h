@@ -10,12 +10,13 @@
 ///     f = 2 W + W mean_p min(1, 10 g_p)      some posture p of the start's motions is infeasible                   (2)
 ///     f = 1.5 W + 0.5 W s                    all are feasible, but a motion failed                                 (3)
 ///     f = 1.5 W + 0.5 W / (n + 1) V / (1 + V)        all n motions are made, but constraints are violated          (4)
-/// with V the sum of the violations of constraints, each relative to its bound (in centimetres for a distance), and
-/// with g_p (m or rad) the largest closing error that remains when loops, base and feet are moved to posture p, and s
+///                                                    or goals are missed
+/// with V the sum of the violations of constraints, each relative to its bound (in centimetres for a distance), and of goals
+/// (bielle/motion/goal.h), by how much they are missed beyond their tolerance, relative to it; and with g_p (m or rad) the largest closing error that remains when loops, base and feet are moved to posture p, and s
 /// in (0, 1] the missing share of the motion (kept motions), else 1. (2) is continuous in the design, so that searches
 /// return to designs whose loops close. So designs that violate constraints less are better than those that violate them more, and
 /// these better than those without motions (Deb 2000, "An efficient constraint handling method for genetic algorithms"). The start
-/// may violate constraints.
+/// may violate constraints and miss goals.
 ///
 /// Designs of other parts of a generator (Parametrization::getArchitecture) are other robots: postures and first motions are those of
 /// the start with these parts, made when they are needed. Where the start with these parts cannot make a motion, it is solved for each
@@ -71,16 +72,30 @@ struct GradientObstacle {
 std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std::vector<ObjectiveTerm>& objective,
                                                      const std::vector<DesignConstraint>& constraints);
 
-enum class DesignStatus { Feasible, LoopOpen, MotionFailed, Violated };
+enum class DesignStatus { Feasible, LoopOpen, MotionFailed, Violated, GoalMissed };
+/// The last of them, whether constraints are violated as well or not.
+constexpr int kDesignStatuses = 5;
+/// Whether the motions of such a design were made and measured.
+inline bool isMeasured(DesignStatus status) {
+  return status != DesignStatus::LoopOpen && status != DesignStatus::MotionFailed;
+}
 const char* getName(DesignStatus status);
+
+/// Of one of the motions.
+struct DesignGoal {
+  std::string motion;
+  GoalOutcome outcome;
+};
+std::string describeGoal(const DesignGoal& goal);  ///< e.g. "squat: depth"
 
 struct Evaluation {
   DesignStatus status = DesignStatus::Feasible;
   double value = 0;                     ///< f
-  std::vector<double> terms;            ///< m_i, if feasible or violated
+  std::vector<double> terms;            ///< m_i, if isMeasured(status)
   std::vector<MotionMeasures> motions;  ///< likewise
   std::vector<double> constraints;      ///< their measures, likewise
   std::string message;                  ///< reason if infeasible
+  std::vector<DesignGoal> goals;        ///< requested and achieved, as the measures
 };
 
 /// An evaluation and the gradients of its terms.
@@ -89,7 +104,8 @@ struct SlopedEvaluation {
   /// w_i m_i / m_i0 of Eq. (1) in pieces; also for designs whose motions come too near to dead points or that violate constraints,
   /// but empty for other infeasible ones.
   std::vector<MeasurePieces> terms;
-  MeasurePieces limits;  ///< a hundredth tighter than EvaluationOptions::margin, and constraints; <= 0
+  /// EvaluationOptions::margin and, of motions made anew, tolerances of goals, both a hundredth tighter; and constraints; <= 0
+  MeasurePieces limits;
 };
 
 /// The constructor makes the motions of the start design. Designs are then evaluated independently, so that results do
@@ -106,7 +122,10 @@ class DesignEvaluator {
   /// motion fails.
   /// \throws ModelError when a measure has no gradient
   SlopedEvaluation differentiate(const VectorXd& x) const;
-  const Evaluation& start() const;  ///< of the start design, feasible or violated
+  /// The same with every motion as `bielle solve` makes it, by its usual steps and not from a motion of the start design. Its
+  /// cost is that of another discretization.
+  Evaluation solveUsually(const VectorXd& x) const;
+  const Evaluation& start() const;  ///< of the start design, measured
   /// Pairs of bodies that constraints on distances leave out, of the architecture of x.
   std::vector<std::string> listLeftOut(const VectorXd& x) const;
   const Parametrization& robot() const;

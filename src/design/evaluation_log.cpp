@@ -1,6 +1,7 @@
 #include "design/evaluation_log.h"
 
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "bielle/model/error.h"
@@ -10,8 +11,8 @@ namespace bielle {
 namespace {
 
 DesignStatus readStatus(const std::string& name) {
-  for (DesignStatus status :
-       {DesignStatus::Feasible, DesignStatus::LoopOpen, DesignStatus::MotionFailed, DesignStatus::Violated})
+  for (DesignStatus status : {DesignStatus::Feasible, DesignStatus::LoopOpen, DesignStatus::MotionFailed,
+                              DesignStatus::Violated, DesignStatus::GoalMissed})
     if (name == getName(status)) return status;
   throw std::runtime_error("there is no status '" + name + "'");
 }
@@ -48,15 +49,45 @@ Json formatPieces(const MeasurePieces& pieces) {
   return {{"pieces", formatVector(pieces.values)}, {"gradients", rows}};
 }
 
+Json formatGoals(const std::vector<DesignGoal>& goals) {
+  Json out = Json::array();
+  for (const auto& [motion, outcome] : goals)
+    out.push_back({{"motion", motion},
+                   {"goal", outcome.goal.name},
+                   {"kind", getName(outcome.goal.kind)},
+                   {"requested", outcome.goal.requested},
+                   {"tolerance", outcome.goal.tolerance},
+                   {"achieved", outcome.achieved}});
+  return out;
+}
+
+// What could not be measured is null.
+std::vector<DesignGoal> readGoals(const Json& json) {
+  std::vector<DesignGoal> goals;
+  for (const Json& entry : json) {
+    DesignGoal goal{entry.at("motion"), {}};
+    goal.outcome.goal.name = entry.at("goal");
+    goal.outcome.goal.kind = parseGoalKind(entry.at("kind"));
+    goal.outcome.goal.requested = readNumber(entry.at("requested"));
+    goal.outcome.goal.tolerance = readNumber(entry.at("tolerance"));
+    const Json& achieved = entry.at("achieved");
+    goal.outcome.achieved = achieved.is_null() ? std::numeric_limits<double>::quiet_NaN() : readNumber(achieved);
+    goals.push_back(goal);
+  }
+  return goals;
+}
+
 }  // namespace
 
 std::string formatEvaluation(const LoggedEvaluation& e) {
   Json json = {{"stage", e.stage}, {"x", formatVector(e.x)}, {"status", getName(e.status)},
                {"value", e.value}, {"seconds", e.seconds},   {"measures", e.measures}};
   if (!e.constraints.empty()) json["constraints"] = e.constraints;
+  if (!e.goals.empty()) json["goals"] = formatGoals(e.goals);
+  if (!e.message.empty()) json["message"] = e.message;
   if (!e.terms.empty()) json["limits"] = formatPieces(e.limits);
   for (const MeasurePieces& term : e.terms) json["terms"].push_back(formatPieces(term));
-  return json.dump();
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 LoggedEvaluation readEvaluation(const std::string& line) {
@@ -69,25 +100,31 @@ LoggedEvaluation readEvaluation(const std::string& line) {
                        {},
                        {},
                        {},
-                       {}};
+                       {},
+                       {},
+                       json.value("message", "")};
   for (const Json& measure : json.at("measures")) out.measures.push_back(readNumber(measure));
   if (json.contains("constraints"))
     for (const Json& measure : json.at("constraints")) out.constraints.push_back(readNumber(measure));
+  if (json.contains("goals")) out.goals = readGoals(json.at("goals"));
   if (!json.contains("terms")) return out;
   for (const Json& term : json.at("terms")) out.terms.push_back(readPieces(term));
   out.limits = readPieces(json.at("limits"));
   return out;
 }
 
-EvaluationLog::EvaluationLog(const std::string& path, const std::string& header)
+EvaluationLog::EvaluationLog(const std::string& path, const std::string& header, const DesignEvaluator& evaluator)
     : log_(path, header, "the log is of another design problem, robot or version") {
   int line = 1;
   for (const std::string& text : log_.getLines()) {
     ++line;
     try {
       left_.push_back(readEvaluation(text));
-    } catch (const std::exception&) {
-      throw ModelError(path, "line " + std::to_string(line), "it was changed or damaged",
+      const std::string flaw = findFlaw(left_.back(), evaluator.robot().variables().size(),
+                                        evaluator.objective().size(), evaluator.constraints().size());
+      if (!flaw.empty()) throw std::runtime_error(flaw);
+    } catch (const std::exception& error) {
+      throw ModelError(path, "line " + std::to_string(line), "it was changed or damaged: " + describeJsonError(error),
                        "remove the file to repeat the search");
     }
   }

@@ -10,7 +10,6 @@
 #include <thread>
 
 #include "bielle/io/result.h"
-#include "bielle/model/error.h"
 #include "design/evaluation_log.h"
 
 namespace bielle {
@@ -29,14 +28,9 @@ class FrontRunner {
   FrontRunner(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options)
       : evaluator_(evaluator), spec_(spec), options_(options) {
     makeOutputDirectory(options.directory);
-    log_ = std::make_unique<EvaluationLog>(options.directory + "/front.jsonl", makeLogHeader(evaluator, spec, "front"));
-    for (LoggedEvaluation& e : log_->takeAll()) {
-      if (!isComplete(e, evaluator.objective().size(), evaluator.constraints().size()))
-        throw ModelError(options.directory + "/front.jsonl", "log",
-                         "an evaluation does not have the measures of the objective and constraints",
-                         "remove the file to repeat the search");
-      known_.emplace(makeKey(e.stage, e.x), std::move(e));
-    }
+    log_ = std::make_unique<EvaluationLog>(options.directory + "/front.jsonl", makeLogHeader(evaluator, spec, "front"),
+                                           evaluator);
+    for (LoggedEvaluation& e : log_->takeAll()) known_.emplace(makeKey(e.stage, e.x), std::move(e));
     run_.replayed = static_cast<int>(known_.size());
     run_.searches.resize(1);
   }
@@ -147,7 +141,7 @@ class FrontRunner {
     }
     run_.front.clear();
     for (size_t i : selectFront(objectives, static_cast<size_t>(spec_.front->options.population)))
-      run_.front.push_back({designs[i]->x, designs[i]->measures});
+      run_.front.push_back({designs[i]->x, designs[i]->measures, designs[i]->goals});
   }
 
   // From every point of the front: the least sum of all objectives of which none may become larger.

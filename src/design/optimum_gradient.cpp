@@ -59,6 +59,8 @@ class OptimumSlopes {
     out_.dv = out_.du;
     out_.cost = outcome.measures.cost;
     out_.dcost.setZero(variables);
+    out_.goals = outcome.goals;
+    out_.dgoals.setZero(static_cast<Eigen::Index>(outcome.goals.size()), variables);
     addStates();
     out_.dmargin.assign(count, MatrixXd::Zero(out_.margin.rows(), out_.margin.cols()));
     out_.ddistance.assign(count, Eigen::RowVectorXd::Zero(out_.distance.size()));
@@ -69,11 +71,11 @@ class OptimumSlopes {
     const double dcost = envelope_.calcDerivative(ahead, behind, step);
     StateMeasures at_ahead(ahead.problem->model(), ahead.problem->initialState(), requested_, left_out_),
         at_behind(behind.problem->model(), behind.problem->initialState(), requested_, left_out_);
-    const auto derivative = differentiateOptimum(*outcome_.motion, outcome_.multipliers, ahead, behind, step,
-                                                 [&](const Motion& motion, const ShootingTrajectory& trajectory) {
-                                                   return read(motion.problem->model(), trajectory,
-                                                               &motion == &ahead ? at_ahead : at_behind);
-                                                 });
+    const auto derivative =
+        differentiateOptimum(*outcome_.motion, outcome_.multipliers, ahead, behind, step,
+                             [&](const Motion& motion, const ShootingTrajectory& trajectory) {
+                               return read(motion, trajectory, &motion == &ahead ? at_ahead : at_behind);
+                             });
     if (!std::isfinite(dcost) || !derivative) return false;
     out_.dcost[i] = dcost;
     write(derivative->value, static_cast<size_t>(i));
@@ -102,11 +104,13 @@ class OptimumSlopes {
     distances_ = listLeast(out_.distance);
   }
 
-  // Torques, speeds, margins, distances.
-  VectorXd read(const Model& model, const ShootingTrajectory& trajectory, StateMeasures& at) const {
-    const MotorTrace trace = makeMotorTrace(model, out_.dt, trajectory);
+  // Torques, speeds, margins, distances, goals.
+  VectorXd read(const Motion& motion, const ShootingTrajectory& trajectory, StateMeasures& at) const {
+    const MotorTrace trace = makeMotorTrace(motion.problem->model(), out_.dt, trajectory);
+    const std::vector<GoalOutcome> goals = measureGoals(motion, trajectory);
+    if (goals.size() != out_.goals.size()) throw std::invalid_argument("a neighbour has other goals");
     const Eigen::Index size = trace.torque.size();
-    VectorXd out(2 * size + static_cast<Eigen::Index>(margins_.size() + distances_.size()));
+    VectorXd out(2 * size + static_cast<Eigen::Index>(margins_.size() + distances_.size() + goals.size()));
     out.head(size) = trace.torque.reshaped();
     out.segment(size, size) = trace.speed.reshaped();
     Eigen::Index next = 2 * size;
@@ -114,6 +118,7 @@ class OptimumSlopes {
       out[next++] = at.calcMargins(trajectory.xs[static_cast<size_t>(node)])[cluster];
     for (const auto& [row, node] : distances_)
       out[next++] = at.calcDistance(trajectory.xs[static_cast<size_t>(node)], pairs_[static_cast<size_t>(node)]);
+    for (const GoalOutcome& goal : goals) out[next++] = goal.achieved - goal.goal.requested;
     return out;
   }
 
@@ -124,6 +129,7 @@ class OptimumSlopes {
     Eigen::Index next = 2 * size;
     for (const auto& [cluster, node] : margins_) out_.dmargin[i](cluster, node) = derivative[next++];
     for (const auto& [row, node] : distances_) out_.ddistance[i](row, node) = derivative[next++];
+    out_.dgoals.col(static_cast<Eigen::Index>(i)) = derivative.tail(out_.dgoals.rows());
   }
 
   const MotionOutcome& outcome_;

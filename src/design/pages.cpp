@@ -1,12 +1,14 @@
 // The output of a design run: the robot, the table, the figures.
 #include <algorithm>
 #include <filesystem>
+#include <numeric>
 #include <sstream>
 
 #include "bielle/io/result.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/error.h"
 #include "design/figures.h"
+#include "design/motor_change.h"
 #include "design/run.h"
 #include "io/text_file.h"
 #include "model/number_text.h"
@@ -80,9 +82,44 @@ void writeConstraints(std::ostream& out, const DesignEvaluator& evaluator, const
     out << (&pair == &left_out.front() ? "\nThe distance ignores bodies that overlap as drawn, or by name: " : "; ")
         << pair;
   if (!left_out.empty()) out << ".\n";
-  if (run.evaluation.status == DesignStatus::Violated)
-    out << "\n**No design satisfies all constraints**; this is the start design, where " << run.evaluation.message
-        << ".\n";
+}
+
+// Of a goal that was missed, that it was.
+std::string formatAchieved(const GoalOutcome& outcome) {
+  return format(outcome.achieved) + (outcome.met() ? "" : ", **missed**");
+}
+
+std::string formatRequested(const Goal& goal) {
+  const std::string unit = getUnit(goal.kind);
+  return format(goal.requested) + " ± " + format(goal.tolerance) + (unit == "1" ? "" : " " + unit);
+}
+
+void writeGoals(std::ostream& out, const std::vector<DesignGoal>& before, const std::vector<DesignGoal>& after) {
+  for (size_t i = 0; i < std::min(before.size(), after.size()); ++i)
+    out << (i == 0 ? "\n| goal | requested | before | after |\n|---|---|---|---|\n" : "") << "| "
+        << describeGoal(after[i]) << " | " << formatRequested(after[i].outcome.goal) << " | "
+        << formatAchieved(before[i].outcome) << " | " << formatAchieved(after[i].outcome) << " |\n";
+}
+
+// The best design as `bielle solve` makes its motions, beside what the search made of it.
+void writeUsual(std::ostream& out, const DesignEvaluator& evaluator, const DesignRun& run) {
+  if (!run.usual) return;
+  const Evaluation &search = run.evaluation, &usual = *run.usual;
+  out << "\n## By the usual steps\n\n"
+         "The motions of `best` as `bielle solve` makes them, by steps of the length and kind that it takes by itself";
+  if (usual.status != DesignStatus::Feasible) out << ": **" << getName(usual.status) << "**, " << usual.message;
+  out << ".\n";
+  if (!isMeasured(usual.status) || !isMeasured(search.status)) return;
+  out << "\n| | search | `bielle solve` | change |\n|---|---|---|---|\n";
+  for (size_t i = 0; i < evaluator.objective().size(); ++i)
+    writeRow(out, describeTerm(evaluator.objective()[i]), search.terms[i], usual.terms[i]);
+  for (size_t i = 0; i < evaluator.constraints().size(); ++i) {
+    const DesignConstraint& constraint = evaluator.constraints()[i];
+    writeRow(out, describeMeasure(constraint.measure, constraint.motors), search.constraints[i], usual.constraints[i]);
+  }
+  for (size_t i = 0; i < std::min(search.goals.size(), usual.goals.size()); ++i)
+    out << "| " << describeGoal(usual.goals[i]) << " | " << formatAchieved(search.goals[i].outcome) << " | "
+        << formatAchieved(usual.goals[i].outcome) << " | |\n";
 }
 
 // What the best design has of a variable that is no choice: nearer to a bound than a thousandth of the way between them, the bound
@@ -102,6 +139,22 @@ void writeVariables(std::ostream& out, const Parametrization& robot, const Vecto
     out << "| " << v.name << " | " << (v.isChoice() ? "" : v.unit) << " | " << formatBounds(v) << " | "
         << formatOwn(robot, robot.start(), i) << " | " << formatOwn(robot, best, i)
         << (matters(robot, best, i) ? markBound(v, best[k]) : "") << " |\n";
+  }
+}
+
+// The goals of the designs of a front, which all of them meet.
+void writeFrontGoals(std::ostream& out, const std::vector<FrontDesign>& front) {
+  if (front.empty() || front.front().goals.empty()) return;
+  out << "\n| achieved";
+  for (const DesignGoal& goal : front.front().goals)
+    out << " | " << describeGoal(goal) << ", " << formatRequested(goal.outcome.goal);
+  out << " |\n|---";
+  for (size_t i = 0; i < front.front().goals.size(); ++i) out << "|---";
+  out << "|\n";
+  for (size_t i = 0; i < front.size(); ++i) {
+    out << "| " << getFrontName(i);
+    for (const DesignGoal& goal : front[i].goals) out << " | " << formatAchieved(goal.outcome);
+    out << " |\n";
   }
 }
 
@@ -127,6 +180,7 @@ void writeFront(std::ostream& out, const DesignEvaluator& evaluator, const Desig
   };
   write("start", evaluator.start().terms, robot.start());
   for (size_t i = 0; i < run.front.size(); ++i) write(getFrontName(i), run.front[i].measures, run.front[i].x);
+  writeFrontGoals(out, run.front);
 }
 
 // Keeps the table short: only changes of at least a thousandth are listed.
@@ -156,27 +210,45 @@ std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec,
       << fs::path(spec.path).filename().string() << ", motions " << getName(spec.mode)
       << ". The robot is in `best`; rows of motors that change by less than a thousandth are left out.\n\n";
   writeVariables(out, robot, run.best);
+  if (const double mass = calcMassInLinks(robot, run.best); mass > 0)
+    out << "\nThe masses that the catalogue gives for motors, " << format(mass)
+        << " kg together, count as included in the links that carry them; nothing was added.\n";
   out << "\n| objective | before | after | change |\n|---|---|---|---|\n";
   for (size_t i = 0; i < evaluator.objective().size() && i < run.evaluation.terms.size(); ++i)
     writeRow(out, describeTerm(evaluator.objective()[i]), evaluator.start().terms[i], run.evaluation.terms[i]);
   writeRow(out, "value", evaluator.start().value, run.value);
   writeConstraints(out, evaluator, run);
+  writeGoals(out, evaluator.start().goals, run.evaluation.goals);
+  if (run.evaluation.status != DesignStatus::Feasible)
+    out << "\n**No design is feasible**; this is the start design, where " << run.evaluation.message << ".\n";
   if (spec.front) writeFront(out, evaluator, run);
   out << "\n"
-      << run.counts[0] + run.counts[1] + run.counts[2] + run.counts[3]
+      << std::accumulate(run.counts.begin(), run.counts.end(), 0)
       << (spec.front ? " evaluations of designs: "
                      : " designs in " + std::to_string(run.searches.size()) + " searches: ")
       << run.counts[0] << " feasible, " << run.counts[1] << " whose loops do not close, " << run.counts[2]
       << " whose motion fails"
+      << (evaluator.start().goals.empty() ? "" : ", " + std::to_string(run.counts[4]) + " that miss a goal")
       << (evaluator.constraints().empty() ? "" : ", " + std::to_string(run.counts[3]) + " that violate constraints")
       << ".\n";
   for (size_t i = 0; i < run.evaluation.motions.size(); ++i)
     writeMotion(out, robot.startModel(), robot.make(run.best), describeMotion(evaluator.motions()[i]),
                 evaluator.start().motions[i], run.evaluation.motions[i]);
+  writeUsual(out, evaluator, run);
   return out.str();
 }
 
 }  // namespace
+
+double calcMassInLinks(const Parametrization& robot, const VectorXd& x) {
+  const Model model = robot.make(x);
+  double mass = 0;
+  for (const Motor& motor : model.motors()) mass += motor.drive.mass;
+  for (const DesignVariable& variable : robot.variables())
+    if (!variable.mass.empty())
+      for (const int m : findMotors(model, variable.motors)) mass -= model.motors()[static_cast<size_t>(m)].drive.mass;
+  return dropNoise(mass);
+}
 
 std::vector<std::string> writeDesign(const std::string& directory, const DesignEvaluator& evaluator,
                                      const DesignSpec& spec, const DesignRun& run) {

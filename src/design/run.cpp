@@ -33,7 +33,8 @@ class DesignRunner {
       starts_.insert(starts_.end(), static_cast<size_t>(spec.searches), combination);
     for (size_t i = 0; i < starts_.size(); ++i)
       logs_.push_back(std::make_unique<EvaluationLog>(options.directory + "/search" + std::to_string(i + 1) + ".jsonl",
-                                                      makeLogHeader(evaluator, spec, std::to_string(i + 1))));
+                                                      makeLogHeader(evaluator, spec, std::to_string(i + 1)),
+                                                      evaluator));
     run_.searches.resize(logs_.size());
     const Evaluation& start = evaluator.start();
     best_shown_ = start.status == DesignStatus::Feasible ? start.value : HUGE_VAL;
@@ -192,12 +193,27 @@ LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorith
           sloped.terms,
           sloped.limits,
           evaluation.terms,
-          listFinite(evaluation.constraints)};
+          listFinite(evaluation.constraints),
+          isMeasured(evaluation.status) ? evaluation.goals : std::vector<DesignGoal>(),
+          evaluation.message};
 }
 
-bool isComplete(const LoggedEvaluation& e, size_t objectives, size_t constraints) {
-  const bool measured = e.status == DesignStatus::Feasible || e.status == DesignStatus::Violated;
-  return e.measures.size() == (measured ? objectives : 0) && e.constraints.size() == (measured ? constraints : 0);
+std::string findFlaw(const LoggedEvaluation& e, size_t variables, size_t objectives, size_t constraints) {
+  const bool measured = isMeasured(e.status), feasible = e.status == DesignStatus::Feasible;
+  const auto count = static_cast<Eigen::Index>(variables);
+  const auto fits = [count](const MeasurePieces& pieces) {
+    return pieces.values.size() > 0 && pieces.gradients.cols() == count;
+  };
+  const auto is_met = [](const DesignGoal& goal) { return goal.outcome.met(); };
+  if (e.x.size() != count) return "it belongs to another design";
+  if (e.seconds < 0) return "its time is negative";
+  if (e.measures.size() != (measured ? objectives : 0) || e.constraints.size() != (measured ? constraints : 0))
+    return "its measures are not the requested ones";
+  if (feasible && !std::all_of(e.goals.begin(), e.goals.end(), is_met)) return "it is feasible and misses a goal";
+  if (!e.terms.empty() && e.terms.size() != objectives) return "its terms are not the requested ones";
+  if (!std::all_of(e.terms.begin(), e.terms.end(), fits) || (e.limits.values.size() > 0 && !fits(e.limits)))
+    return "its gradients have the wrong size";
+  return "";
 }
 
 DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options) {

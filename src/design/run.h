@@ -8,6 +8,7 @@
 /// in which the evaluations of a generation are in the order in which they were ready.
 #include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,15 +24,17 @@ struct LoggedEvaluation {
   double seconds = 0;                     ///< processor time at its end
   std::vector<MeasurePieces> terms = {};  ///< SlopedEvaluation, in stages that need gradients
   MeasurePieces limits = {};
-  std::vector<double> measures = {};     ///< Evaluation::terms: if feasible or violated, one for each of the objective
+  std::vector<double> measures = {};     ///< Evaluation::terms: if isMeasured(status), one for each of the objective
   std::vector<double> constraints = {};  ///< likewise, one for each constraint
+  std::vector<DesignGoal> goals = {};    ///< likewise; without nodes and places
+  std::string message = {};              ///< reason if infeasible
 };
 
 /// The evaluation of a design as a stage of a search needs it, with its gradients or without.
 LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorithm stage, const VectorXd& x);
 
-/// Whether it has as many numbers as its status asks for.
-bool isComplete(const LoggedEvaluation& evaluation, size_t objectives, size_t constraints);
+/// What is wrong with an evaluation that comes from elsewhere, for so many variables, objectives and constraints; empty if nothing is.
+std::string findFlaw(const LoggedEvaluation& evaluation, size_t variables, size_t objectives, size_t constraints);
 
 /// Its line in a log.
 std::string formatEvaluation(const LoggedEvaluation& evaluation);
@@ -61,21 +64,28 @@ struct DesignRunOptions {
 struct FrontDesign {
   VectorXd x;
   std::vector<double> measures;  ///< as in LoggedEvaluation
+  std::vector<DesignGoal> goals;
 };
 
 struct DesignRun {
   std::vector<std::vector<LoggedEvaluation>> searches;
   VectorXd best;     ///< the feasible design with the least value; the start if none is better, or none is feasible
   double value = 0;  ///< its value
-  Evaluation evaluation;           ///< of the best design, repeated
-  std::array<int, 4> counts{};     ///< evaluations by status
-  int replayed = 0;                ///< evaluations found in the logs
-  double seconds = 0;              ///< processor time of all evaluations, including those of earlier runs
-  std::vector<FrontDesign> front;  ///< if one is requested, by increasing first measure
+  Evaluation evaluation;  ///< of the best design, repeated
+  std::optional<Evaluation>
+      usual;  ///< of the best design, its motions by the usual steps of `bielle solve`, if that was asked for
+  std::array<int, kDesignStatuses> counts{};  ///< evaluations by status
+  int replayed = 0;                           ///< evaluations found in the logs
+  double seconds = 0;                         ///< processor time of all evaluations, including those of earlier runs
+  std::vector<FrontDesign> front;             ///< if one is requested, by increasing first measure
 };
 
 /// \throws ModelError when a log belongs to another problem, is used by another process, or cannot be written
 DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options);
+
+/// The masses of a design's motors which are known from a catalogue and which no variable gives to its links, where they count as
+/// included, kg.
+double calcMassInLinks(const Parametrization& robot, const VectorXd& x);
 
 /// Writes DIR/best (a robot), DIR/front/01 and so on (those of the front, if there is one), design.md (before and after) and, if gnuplot is installed, design.svg (values over the
 /// evaluations), design_front.svg, design_MOTION.svg (torques and speeds before and after) and design_mechanism.svg (both

@@ -64,7 +64,7 @@ MeasurePieces DesignEvaluator::Data::calcStartMargins(const ArchitectureStart& b
   std::vector<MotionOutcome> outcomes;
   for (size_t i = 0; i < motions.size(); ++i) {
     if (!base.solved[i]) return {};
-    outcomes.push_back(keepMotion(model, motions[i], *base.solved[i]->serial, drives, 0));
+    outcomes.push_back(keepMotion(model, motions[i], *base.solved[i], drives, 0));
     if (!outcomes.back().lifted.lifted()) return {};
   }
   const std::vector<MotorSlopes> slopes = calcKeptSlopes(base, x, outcomes);
@@ -113,7 +113,7 @@ SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
       kept ? data.calcKeptSlopes(base, x, outcomes)
            : calcOptimumSlopes(data.robot, x, data.motions, outcomes, data.requested, base.left_out);
   if (const std::string& failure = getFailure(slopes); !failure.empty()) {
-    out.evaluation = {DesignStatus::MotionFailed, 2 * data.weight, {}, {}, {}, failure};
+    out.evaluation = {DesignStatus::MotionFailed, 2 * data.weight, {}, {}, {}, failure, {}};
     return out;
   }
   const RobotSlopes robot_slopes = calcRobotSlopes(data.robot, x, data.options.drives);
@@ -128,6 +128,7 @@ SlopedEvaluation DesignEvaluator::differentiate(const VectorXd& x) const {
     }
   }
   append(data.calcLimits(base, slopes, robot_slopes), out.limits);
+  append(calcGoalPieces(slopes), out.limits);
   return out;
 }
 

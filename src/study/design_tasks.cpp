@@ -24,20 +24,14 @@ LoggedEvaluation readResult(const tasks::Task& task, const DesignRequest& reques
   const std::string log = tasks::getOutput(task, task.log);
   if (status != 0) throw std::runtime_error("it ended with status " + std::to_string(status) + describeLog(log));
   const LoggedEvaluation e = readEvaluation(tasks::readOutput(tasks::getOutput(task, kResult), kLongestAnswer));
-  const auto demand = [](bool holds, const char* what) {
-    if (!holds) throw std::runtime_error(std::string("it returned an invalid result: ") + what);
+  const auto demand = [](bool holds, const std::string& what) {
+    if (!holds) throw std::runtime_error("it returned an invalid result: " + what);
   };
-  demand(e.stage == getName(request.stage) && e.x.size() == request.x.size() && e.x == request.x,
-         "it belongs to another design");
-  demand(e.seconds >= 0, "its time is negative");
-  demand(isComplete(e, terms, constraints), "its measures are not the requested ones");
-  demand(e.terms.empty() || (needsGradient(request.stage) && e.terms.size() == terms),
-         "its terms are not the requested ones");
+  const std::string flaw = findFlaw(e, static_cast<size_t>(request.x.size()), terms, constraints);
+  demand(flaw.empty(), flaw);
+  demand(e.stage == getName(request.stage) && e.x == request.x, "it belongs to another design");
+  demand(e.terms.empty() || needsGradient(request.stage), "its terms are not the requested ones");
   demand(!e.terms.empty() || !needsGradient(request.stage) || e.status != DesignStatus::Feasible, "it lacks gradients");
-  for (const MeasurePieces& term : e.terms)
-    demand(term.values.size() > 0 && term.gradients.cols() == request.x.size(), "its gradients have the wrong size");
-  demand(e.limits.values.size() == 0 || e.limits.gradients.cols() == request.x.size(),
-         "its gradients have the wrong size");
   return e;
 }
 
@@ -167,7 +161,7 @@ void DesignTasks::finish(Order& order, int status) {
     std::error_code ignored;
     fs::remove_all(order.task.directory, ignored);
   } catch (const std::exception& error) {
-    const std::string text = std::string("a task failed: ") + error.what();
+    const std::string text = "a task failed: " + describeJsonError(error);
     if (order.attempt >= options_.engine->attempts())
       throw std::runtime_error(text + "; run the same command again to continue");
     options_.progress(text + "; retrying");
