@@ -120,9 +120,21 @@ TEST_CASE("design goals: the log has what was requested and achieved, and why a 
   CHECK_THAT(formatEvaluation(failed), Contains("\"message\":\"") && Contains("the lower rods do not meet"));
   FddpOptions hasty = EvaluationOptions::makeSolverOptions();
   hasty.max_iterations = 1;
-  EvaluationOptions options;
   const MotionOutcome stopped = remakeMotion(robot.startModel(), makeAskedSquat(0.8, 0.02), nullptr, hasty, {});
   CHECK(stopped.missing == 1);
+  DesignMotion odd = makeAskedSquat(0.8, 0.02);
+  odd.request = [] {
+    MotionRequest request;
+    request.plan = [](const Model&, const VectorXd&) -> MotionPlan {
+      throw ModelError("leg", "depth", "it is too large");
+    };
+    return request;
+  };
+  const DesignEvaluator impossible(robot, {odd}, kPeak);
+  CHECK(impossible.start().status == DesignStatus::Feasible);
+  const Evaluation usual = impossible.solveUsually(robot.start());
+  CHECK(usual.status == DesignStatus::MotionFailed);
+  CHECK_THAT(usual.message, Contains("squat: leg: depth: it is too large"));
   CHECK_THAT(stopped.message, Contains("squat: ") && Contains("iteration"));
 }
 
