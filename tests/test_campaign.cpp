@@ -278,6 +278,15 @@ TEST_CASE("campaign: motions are solved with the options that they are given") {
   REQUIRE(motions.size() == 1);
   CHECK(motions[0].solve == std::vector<std::string>{"solve", "walk", "--robot", "bipetto", "--set", "steps=2",
                                                      "--no-limits", "--dead-point-margin", "0.25"});
+
+  // That such a motion misses its goal is told.
+  const std::string shallow =
+      directory.write("shallow.yaml",
+                      "motions:\n  - {name: low, solve: squat, robot: bipetto, set: {depth: 0.6, duration: 0.6, "
+                      "time_step: 0.03, com_weight: 1e-3}}\noptions: {duration: 0.1}\n");
+  const CommandResult result = runCampaign(shallow, directory.path() + "/out");
+  CHECK(result.status == 0);
+  CHECK_THAT(result.err, Contains("warning: motion low: depth: requested 0.6, achieved"));
 }
 
 TEST_CASE("campaign: an impulse counts as survived if all smaller ones were") {

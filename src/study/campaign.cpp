@@ -309,6 +309,9 @@ std::vector<std::string> solveMotions(const CampaignSpec& spec, const std::strin
     if (!solved.complete || solved.steps.empty() || solved.steps.back().status != 0)
       throw ModelError(spec.path, "motion '" + motion.name + "'", "it was not solved",
                        "see step1.log in " + directory + "/motions/" + motion.name);
+    for (const GoalOutcome& goal : readSummary(directories.back()).goals)
+      if (!goal.met() && options.progress)
+        options.progress("warning: motion " + motion.name + ": " + goal.goal.name + ": " + formatOutcome(goal));
   }
   return directories;
 }
