@@ -1454,7 +1454,7 @@ class Cost:
         ...
     @property
     def weight(self) -> float:
-        """not negative"""
+        """finite, not negative"""
         ...
     @property
     def activation(self) -> Activation:

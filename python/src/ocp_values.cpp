@@ -59,7 +59,7 @@ void bindCosts(py::module_& module) {
           "1/2 sum w d^2, where d is how far r is outside of its bounds; all (n,), in the unit of r.");
   Value<Cost>(module, "Cost", "weight * activation(residual).")
       .field("name", &Cost::name, "for reports")
-      .field("weight", &Cost::weight, "not negative")
+      .field("weight", &Cost::weight, "finite, not negative")
       .field("activation", &Cost::activation, "Activation")
       .field("residual", &Cost::residual, "residual of the library (bielle.residuals), or a Residual written in Python")
       .field("defines", &Cost::defines, "it defines the motion, and keeps its weight for every objective");
