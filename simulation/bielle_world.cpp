@@ -65,6 +65,7 @@ class BielleWorld : public World {
 
   const Model& model_;
   const double time_step_;
+  const std::atomic<bool>* const interrupt_;
   const Terrain terrain_;
   const ConstraintSet loops_;
   ClosedTree tree_;
@@ -89,6 +90,7 @@ class BielleWorld : public World {
 BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
     : model_(model),
       time_step_(options.world.time_step > 0 ? options.world.time_step : kBielleTimeStep),
+      interrupt_(options.world.interrupt),
       terrain_(options.world.ground),
       loops_(makeConstraintSet(model)),
       tree_(model, findPosture(model), listTips(model)),
@@ -107,6 +109,7 @@ BielleWorld::BielleWorld(const Model& model, const BielleWorldOptions& options)
 }
 
 void BielleWorld::reset(ConstVectorRef q, ConstVectorRef v) {
+  requireFinite(q, v);
   message_.clear();
   if (!tree_.set(q, v)) message_ = tree_.getFailure();
   time_ = motor_work_ = push_work_ = contact_work_ = stop_work_ = joint_work_ = 0;
@@ -139,16 +142,19 @@ bool BielleWorld::fail(const std::string& why) {
 bool BielleWorld::advance(double duration) {
   if (!message_.empty()) return false;
   if (!(duration > 0)) return true;
-  const int steps = std::max(1, static_cast<int>(std::ceil(duration / time_step_ - 1e-9)));
+  const double steps = std::max(1.0, std::ceil(duration / time_step_ - 1e-9));  // maybe more than an integer holds
   const double h = duration / steps;
-  for (int i = 0; i < steps; ++i) {
-    if (!tree_.drift(i == 0 ? h / 2 : h)) return fail(tree_.getFailure());
+  double taken = 0;
+  while (taken < steps && !(taken > 0 && interrupt_ && *interrupt_)) {
+    if (!tree_.drift(taken == 0 ? h / 2 : h)) return fail(tree_.getFailure());
     if (!kick(h)) return fail("the velocities are no longer finite");
+    ++taken;
   }
-  time_ += duration;
+  const bool is_done = taken == steps;
+  time_ += is_done ? duration : taken * h;
   if (!tree_.drift(h / 2)) return fail(tree_.getFailure());
   soles_.update([this](int body) { return tree_.getPlacement(body); });
-  return true;
+  return is_done;
 }
 
 // Eqs. (1) and (2)

@@ -37,6 +37,7 @@ class MujocoWorld : public World {
       : model_(model),
         ground_(model, options.world.ground),
         options_(makeRobotOptions(options, ground_)),
+        interrupt_(options.world.interrupt),
         mujoco_(model, findPosture(model), options_),
         data_(mujoco_.makeData()),
         contact_of_geom_(mujoco_.get()->ngeom, -1),
@@ -78,6 +79,7 @@ class MujocoWorld : public World {
   const Model& model_;
   MujocoGround ground_;
   const MjcfOptions options_;
+  const std::atomic<bool>* const interrupt_;
   MujocoModel mujoco_;
   std::unique_ptr<mjData, void (*)(mjData*)> data_;
   std::vector<int> contact_of_geom_;  // of the model, -1 if the geom is not one of a sole
@@ -91,6 +93,7 @@ class MujocoWorld : public World {
 };
 
 void MujocoWorld::reset(ConstVectorRef q, ConstVectorRef v) {
+  requireFinite(q, v);
   mj_resetData(mujoco_.get(), data_.get());
   mujoco_.setState(q, v, *data_);
   mj_kinematics(mujoco_.get(), data_.get());
@@ -116,13 +119,15 @@ void MujocoWorld::setPush(const Vector3d& force) {
 bool MujocoWorld::advance(double duration) {
   if (!message_.empty()) return false;
   if (!(duration > 0)) return true;
-  const int steps = std::max(1, static_cast<int>(std::ceil(duration / options_.time_step - 1e-9)));
+  const double steps =
+      std::max(1.0, std::ceil(duration / options_.time_step - 1e-9));  // maybe more than an integer holds
   const double h = duration / steps;
   mujoco_.get()->opt.timestep = h;
   soles_.clearForces();
-  const int box_steps = std::max(1, static_cast<int>(kBoxPeriod / h));
-  for (int i = 0; i < steps && message_.empty(); ++i) {
-    if (i % box_steps == 0 && !ground_.update(*mujoco_.get(), *data_))
+  const double box_steps = std::max(1.0, std::floor(kBoxPeriod / h));
+  double taken = 0;
+  for (; taken < steps && !(taken > 0 && interrupt_ && *interrupt_); ++taken) {
+    if (std::fmod(taken, box_steps) == 0 && !ground_.update(*mujoco_.get(), *data_))
       message_ = "there are too many boxes under the soles";
     if (!message_.empty() || !step()) break;
     book(h);
@@ -132,7 +137,7 @@ bool MujocoWorld::advance(double duration) {
   mujoco_.getState(*data_, q_, v_);
   updatePositions(model_, ws_, q_);
   soles_.update([this](int body) { return ws_.X_WB[body]; });
-  return message_.empty();
+  return taken == steps;
 }
 
 bool MujocoWorld::step() {

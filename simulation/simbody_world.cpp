@@ -180,6 +180,7 @@ class SimbodyWorld : public World {
   SimTK::RungeKutta3Integrator integrator_;
   SoleTrack soles_;
   VectorXd q_, v_;
+  const std::atomic<bool>* const interrupt_;
   double time_ = 0;
   Powers last_, work_;  // at the end of the last step; J
   double elastic_start_ = 0, stops_start_ = 0;
@@ -192,7 +193,8 @@ SimbodyWorld::SimbodyWorld(const Model& model, const SimbodyWorldOptions& option
       tree_(model, model.closures(), options.as_modelled ? LoopCut::AsModelled : LoopCut::FewestRows),
       forces_(new WorldForces(tree_, options)),
       integrator_(tree_.system),
-      soles_(model) {
+      soles_(model),
+      interrupt_(options.world.interrupt) {
   SimTK::Force::Custom(tree_.forces, forces_);
   addRotors();
   tree_.finish();
@@ -227,6 +229,7 @@ void SimbodyWorld::addRotors() {
 }
 
 void SimbodyWorld::reset(ConstVectorRef q, ConstVectorRef v) {
+  requireFinite(q, v);
   message_.clear();
   time_ = 0;
   work_ = {};
@@ -284,21 +287,23 @@ void SimbodyWorld::noteChange() {
 
 bool SimbodyWorld::advance(double duration) {
   if (!message_.empty()) return false;
-  const double end = time_ + duration;
+  const double start = integrator_.getTime(), end = time_ + duration;
   try {
     noteChange();
     for (double before = integrator_.getTime(); before < end - 1e-12; before = integrator_.getTime()) {
       integrator_.stepTo(end, end);
       finishStep(integrator_.getTime() - before);
+      if (integrator_.getTime() > start && interrupt_ && *interrupt_) break;  // the first return may be before any step
     }
   } catch (const std::exception& error) {
     message_ = error.what();
     std::replace(message_.begin(), message_.end(), '\n', ' ');
     return false;
   }
-  time_ = end;
+  const bool is_done = integrator_.getTime() >= end - 1e-12;
+  time_ = is_done ? end : integrator_.getTime();
   readState();
-  return true;
+  return is_done;
 }
 
 void SimbodyWorld::finishStep(double duration) {

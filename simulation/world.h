@@ -4,7 +4,9 @@
 /// A motion that was solved is a plan: its feet stand because constraints hold them. In a world they stand because the
 /// ground pushes, or they slip. Worlds differ in how they integrate; robot, ground and numbers that they report are the
 /// same. The robot's rotors weigh their armature, joints have stops at their limits, loops are closed.
+#include <atomic>
 #include <limits>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -16,6 +18,8 @@ namespace bielle::simulation {
 struct WorldOptions {
   Ground ground;         ///< with its coefficient of friction
   double time_step = 0;  ///< of worlds with fixed steps, s; 0: the world's own
+  /// Polled after every step, so that a signal handler can set it: ends an advance(), however short the steps.
+  const std::atomic<bool>* interrupt = nullptr;
 };
 
 /// Energies at present and work since reset(), J. With E = kinetic + potential + elastic,
@@ -46,7 +50,7 @@ class World {
   virtual ~World() = default;
 
   /// Sets a closed configuration q (nq) and a velocity v (nv) that keeps it closed; time, work and slip start from zero,
-  /// torques and push are zero.
+  /// torques and push are zero. \throws std::invalid_argument when a number is not finite; nothing has changed then
   virtual void reset(ConstVectorRef q, ConstVectorRef v) = 0;
   /// Torques of the motors in their order (nu, N m or N), cut at their limits and held until the next call.
   virtual void setTorques(ConstVectorRef u) = 0;
@@ -54,9 +58,9 @@ class World {
   virtual void setPush(const Vector3d& force) = 0;
   /// Advances by a duration, s.
   /// \returns false if the integration broke off; the state is then the last one that is finite, and getMessage() says
-  ///   why. Exceptions of an engine do not pass.
+  ///   why. Exceptions of an engine do not pass. Also false if it was interrupted, without a message; it can go on.
   virtual bool advance(double duration) = 0;
-  virtual const std::string& getMessage() const = 0;  ///< empty unless advance() returned false
+  virtual const std::string& getMessage() const = 0;  ///< empty unless the integration broke off
 
   virtual double getTime() const = 0;                          ///< since reset(), s
   virtual const VectorXd& getConfiguration() const = 0;        ///< nq, coordinates of the model
@@ -65,6 +69,13 @@ class World {
   virtual const std::vector<FootReport>& getFeet() const = 0;  ///< per contact of the model
   virtual Books getBooks() const = 0;
   virtual double getGap() const = 0;  ///< opening of the closures at present: the largest distance of their points, m
+
+ protected:
+  static void requireFinite(ConstVectorRef q, ConstVectorRef v) {
+    if (!q.allFinite() || !v.allFinite())
+      throw std::invalid_argument(
+          "world: the state has a number that is not finite; give a closed configuration and a velocity");
+  }
 };
 
 }  // namespace bielle::simulation

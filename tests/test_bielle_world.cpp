@@ -1,5 +1,6 @@
 // The world of Bielle's own dynamics: the trials of all worlds, forward dynamics of the full system as an oracle, the order
 // of its steps, and no allocation.
+#include <atomic>
 #include <catch2/catch.hpp>
 
 #include "bielle/dynamics/assembly.h"
@@ -148,6 +149,29 @@ TEST_CASE("bielle world: it advances without allocation") {
   const long allocations = num_allocations - before;
   CHECK(advanced);
   CHECK(allocations == 0);
+}
+
+TEST_CASE("worlds: an interrupt ends a period of many steps, and the world can go on") {
+  const Model& model = getBipetto();
+  const testing::PostureHold posture(model);
+  std::atomic<bool> interrupt{true};
+  for (const std::string& name : listWorlds()) {
+    CAPTURE(name);
+    const auto world = makeWorld(name, model, {Ground(), name == "simbody" ? 0 : 1e-12, &interrupt});
+    world->reset(posture.getPosture(), VectorXd::Zero(model.nv()));
+    CHECK_FALSE(world->advance(0.1));
+    CHECK(world->getMessage().empty());
+    CHECK(world->getTime() > 0);
+    CHECK(world->getTime() < 0.1);
+    CHECK(world->getConfiguration().allFinite());
+  }
+  const auto world = makeWorld("bielle", model, {Ground(), 1e-4, &interrupt});
+  world->reset(posture.getPosture(), VectorXd::Zero(model.nv()));
+  CHECK_FALSE(world->advance(1e-3));
+  CHECK(world->getTime() == Approx(1e-4));
+  interrupt = false;
+  CHECK(world->advance(9e-4));
+  CHECK(world->getTime() == Approx(1e-3));
 }
 
 TEST_CASE("worlds: an unknown one is refused by name") {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
+#include <stdexcept>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
@@ -80,6 +82,17 @@ void checkStanding(World& world, const Model& model, const TrialTolerances& tole
   CHECK((world.getConfiguration().head<3>() - posture.getPosture().head<3>()).norm() < 0.01);
   CHECK(world.getGap() < tolerances.gap);
   CHECK(world.getTime() == Approx(2.0));
+  // A state that is none is refused, and the world is where it was.
+  const VectorXd stood = world.getConfiguration(), rest = VectorXd::Zero(model.nv());
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    VectorXd q = stood, v = rest;
+    q[9] = v[7] = bad;
+    CHECK_THROWS_AS(world.reset(q, rest), std::invalid_argument);
+    CHECK_THROWS_AS(world.reset(stood, v), std::invalid_argument);
+  }
+  CHECK(world.getConfiguration() == stood);
+  CHECK(world.getTime() == Approx(2.0));
+  CHECK(hold(world, posture, 0.01));
 }
 
 void checkDropped(World& world, const Model& model, const TrialTolerances& tolerances) {

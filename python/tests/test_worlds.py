@@ -51,6 +51,17 @@ def test_squat_stands_in_the_world(controller, model):
     assert world.wrenches[:, 2].sum() == pytest.approx(9.81 * model.mass, rel=0.05)
 
 
+def test_a_state_that_is_none_is_refused(controller, model):
+    world = bielle.World(model)
+    q, v = controller.reference(0)
+    for bad in (np.nan, np.inf):
+        with pytest.raises(ValueError, match="not finite"):
+            world.reset(q + bad, v)
+        with pytest.raises(ValueError, match="not finite"):
+            world.reset(q, v * 0 + bad)
+    world.reset(q, v)
+
+
 def test_a_robot_without_torques_falls(controller, model):
     world = bielle.World(model)
     state = world.reset(*controller.reference(0))
