@@ -13,6 +13,7 @@
 #include "bielle/motion/motion.h"
 #include "bielle/motion/squat.h"
 #include "cli_command.h"
+#include "robot_directory.h"
 
 namespace fs = std::filesystem;
 using namespace bielle;
@@ -85,6 +86,76 @@ TEST_CASE("bad input is one line of error and status 2") {
   checkRefused(run({"solve", "squat", "--robot", "fourbar", "-o", directory.str()}), "needs feet");
   CHECK_FALSE(fs::exists(directory.str()));
   checkRefused(run(makeShortSquat("/dev/null/results")), "results cannot be written there");
+}
+
+TEST_CASE("numbers of every command are finite, and messages show bounds in a few digits") {
+  const OutputDirectory directory;
+  const std::vector<std::vector<std::string>> commands = {
+      {"solve", "squat", "--robot", "bipetto", "-o", directory.str(), "--depth"},
+      {"solve", "squat", "--robot", "bipetto", "-o", directory.str(), "--dead-point-margin"},
+      {"solve", "squat", "--robot", "bipetto", "-o", directory.str(), "--time-weight"},
+      {"solve", "squat", "--robot", "bipetto", "-o", directory.str(), "--regularization"},
+      {"convert", "bipetto", "-o", directory.str(), "--payload"},
+      {"convert", "bipetto", "-o", directory.str(), "--payload", "1", "--payload-at", "0", "0"},
+      {"report", directory.str(), "--rate"},
+      {"report", directory.str(), "--times"},
+      {"lift", directory.str(), "-o", directory.str(), "--singular"},
+      {"lift", directory.str(), "-o", directory.str(), "--velocity-tolerance"},
+      {"ratio", "bipetto", "--joint", "knee_right", "--step"},
+      {"study", "walk", "-o", directory.str(), "--values"}};
+  for (std::vector<std::string> command : commands)
+    for (const std::string value : {"nan", "inf", "1e400"}) {
+      command.push_back(value);
+      const CommandResult result = run(command);
+      checkRefused(result, "'" + value + "' is not a ");
+      CHECK(result.err.size() < 200);
+      command.pop_back();
+    }
+  for (const std::string value : {"1e300", "-1"})
+    checkRefused(run({"convert", "bipetto", "-o", directory.str(), "--payload", value}),
+                 "not a number from 0 to 1e+06");
+  checkRefused(run({"lift", directory.str(), "-o", directory.str(), "--velocity-tolerance", "0"}),
+               "finite positive number");
+  CHECK_FALSE(fs::exists(directory.str()));
+}
+
+TEST_CASE("an output that is an input is refused, by whatever path") {
+  const OutputDirectory directory;
+  const fs::path place = fs::path(directory.str()).parent_path();
+  const std::string squat = (place / "squat").string(), link = (place / "link").string();
+  REQUIRE(run(makeShortSquat(squat, {"--quiet", "--no-report"})).status == 0);
+  fs::create_directory_symlink(squat, link);
+  const std::string robot = (place / "robot").string(), urdf = robot + "/robot.urdf";
+  REQUIRE(run({"convert", "bipetto", "-o", robot}).status == 0);
+  const std::string spec = (place / "spec.yaml").string();
+  std::ofstream(spec) << "motions: [squat]\npush: {time: 0.1, direction: 0, impulse: 1}\n";
+  const std::vector<std::vector<std::string>> commands = {
+      makeShortSquat(squat, {"--warm-start", squat}),
+      makeShortSquat(link, {"--warm-start", squat + "/."}),
+      {"export", squat, "-o", link + "/trajectory.npz"},
+      {"report", squat, "-o", squat + "/../squat/summary.json"},
+      {"report", squat, "--png", squat + "/trajectory.csv"},
+      {"lift", squat, "-o", link},
+      {"convert", robot, "-o", robot},
+      {"convert", urdf, "--to", "urdf", "-o", urdf},
+      {"convert", robot, "--to", "mjcf", "-o", robot + "/robot.yaml"},
+      {"export", robot, "--format", "mjcf", "-o", urdf},
+      {"view", robot, "-o", robot + "/../robot/robot.urdf"},
+      {"campaign", spec, "-o", link},
+      {"design", BIELLE_SOURCE_DIR "/examples/knee_design/knee.yaml", "--evaluate", spec, "-o", spec}};
+  const auto readAll = [&] {
+    std::string text;
+    for (const char* name : {"squat/trajectory.npz", "squat/trajectory.csv", "squat/summary.json", "robot/robot.urdf",
+                             "robot/robot.yaml", "spec.yaml"})
+      text += readFile(place / name);
+    return text;
+  };
+  const std::string before = readAll();
+  for (const std::vector<std::string>& command : commands) {
+    CAPTURE(command);
+    checkRefused(run(command), "it is also an input");
+  }
+  CHECK(readAll() == before);
 }
 
 TEST_CASE("a loop that cannot be closed is refused with the file, the closure and its gap") {

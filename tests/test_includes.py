@@ -35,7 +35,7 @@ OTHERS = {
     "zip.h": ["src/io/npz.cpp"],
     "nlopt": ["src/transmission/slsqp.cpp", "src/design/nlopt_search.h"],
     "pagmo/": ["src/design/front_search.cpp"],
-    "CLI/": ["src/cli/", "simulation/", "validation/"],
+    "CLI/": ["src/cli/", "src/io/number_option.h", "simulation/", "validation/"],
     "nlohmann/": ["src/", "simulation/", "validation/", "workers/", "tests/"],
     "cctools/": ["workers/"],
     "Simbody": ["engines/", "simulation/", "validation/"],

@@ -5,6 +5,7 @@
 
 #include "bielle/model/error.h"
 #include "bielle/model/reader.h"
+#include "io/number_option.h"
 #include "io/standard_output.h"
 #include "validate.h"
 #ifdef BIELLE_WITH_MUJOCO
@@ -60,18 +61,18 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--seed", options.seed, "seed of the random states")->capture_default_str();
   app.add_option("--tolerance", options.tolerance, "relative difference allowed")
-      ->check(CLI::PositiveNumber)
+      ->check(isPositive())
       ->capture_default_str();
   app.add_option("--derivatives", options.derivative_samples, "number of states whose derivatives are compared")
-      ->check(CLI::NonNegativeNumber)
+      ->check(isNotNegative())
       ->capture_default_str();
   app.add_option("--motion", options.motion_duration,
                  "duration of a free motion integrated by both programs [s]; 0: none")
-      ->check(CLI::Range(0.0, 60.0))
+      ->check(isWithin(0, 60))
       ->capture_default_str();
   app.add_option("--motion-step", options.motion_step,
                  "time step of Bielle's integrator for it [s]; fast mechanisms need less")
-      ->check(CLI::Range(1e-6, 0.1))
+      ->check(isWithin(1e-6, 0.1))
       ->capture_default_str();
   app.add_option("--base", base, "base to use instead of the robot's own")->check(CLI::IsMember({"free", "fixed"}));
   std::vector<std::string> engines = {"simbody"};

@@ -6,6 +6,7 @@
 #include "cli/case_run.h"
 #include "cli/commands.h"
 #include "cli/task_options.h"
+#include "io/output_place.h"
 #include "study/campaign_report.h"
 
 namespace bielle::cli {
@@ -20,6 +21,7 @@ struct CampaignArguments {
 
 int run(const CampaignArguments& arguments) {
   const CampaignSpec spec = readCampaignSpec(arguments.spec);
+  for (const CampaignMotion& motion : spec.motions) requireApart(arguments.directory, {motion.directory});
   CampaignOptions options;
   options.bielle = std::filesystem::read_symlink("/proc/self/exe");
   options.simulate = findCompanion("bielle-simulate");

@@ -51,6 +51,8 @@ struct RobotArgument {
   // Loads the robot and prints its warnings to the standard error.
   LoadedRobot load() const;
 };
+// The directory of a robot and its files, which no output may replace.
+std::vector<std::string> listFiles(const LoadedRobot& robot);
 void addFixedBase(CLI::App& command, RobotArgument& robot);
 
 // An option of a motion: a number, or a choice by name.

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 
 #include "bielle/dynamics/loop_conflict.h"
@@ -25,6 +26,11 @@ LoadedRobot RobotArgument::load() const {
   const AssemblyResult closed = findClosedConfiguration(robot.model);
   if (closed.status != AssemblyStatus::Closed) throw makeClosingError(robot.model, robot.directory, closed);
   return robot;
+}
+
+std::vector<std::string> listFiles(const LoadedRobot& robot) {
+  const std::filesystem::path file = robot.file;
+  return {robot.directory, robot.file, std::filesystem::path(file).replace_extension(".yaml").string()};
 }
 
 void addFixedBase(CLI::App& command, RobotArgument& robot) {

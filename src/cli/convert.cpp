@@ -8,6 +8,8 @@
 #include "cli/commands.h"
 #include "io/drake.h"
 #include "io/mjcf.h"
+#include "io/number_option.h"
+#include "io/output_place.h"
 #include "io/sdf.h"
 #include "io/text_file.h"
 #include "model/payload.h"
@@ -28,6 +30,7 @@ void warn(const std::vector<std::string>& warnings) {
 
 int convert(const ConvertArguments& arguments) {
   LoadedRobot robot = arguments.robot.load();
+  requireApart(arguments.output, listFiles(robot));
   Payload payload{arguments.payload, {}};
   if (!arguments.payload_at.empty()) payload.at = Eigen::Map<const Vector3d>(arguments.payload_at.data());
   robot.model = addPayload(robot.model, payload);
@@ -69,7 +72,7 @@ void addConvert(CLI::App& app, Action& action) {
       ->capture_default_str();
   addFixedBase(command, arguments->robot);
   CLI::Option* payload = command.add_option("--payload", arguments->payload, "mass fixed to the trunk [kg]")
-                             ->check(CLI::Range(0.0, 1e6))
+                             ->check(isWithin(0, 1e6))
                              ->capture_default_str();
   command
       .add_option("--payload-at", arguments->payload_at,

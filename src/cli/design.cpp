@@ -10,6 +10,8 @@
 #include "cli/table.h"
 #include "cli/task_options.h"
 #include "design/run.h"
+#include "design/spec_parts.h"
+#include "io/output_place.h"
 #include "io/text_file.h"
 #include "study/design_tasks.h"
 
@@ -107,6 +109,7 @@ void printRun(const DesignEvaluator& evaluator, const DesignSpec& spec, const De
 }
 
 int run(const DesignArguments& arguments) {
+  requireApart(arguments.directory, {arguments.spec, arguments.request});
   DesignSpec spec = readDesignSpec(arguments.spec);
   std::optional<study::DesignRequest> request;
   if (!arguments.request.empty()) {
@@ -123,6 +126,7 @@ int run(const DesignArguments& arguments) {
   options.drives = spec.drives;
   options.margin = spec.margin;
   options.constraints = spec.constraints;
+  requireApart(arguments.directory + "/best", {findRobotDirectory(spec.robot, spec.path)});
   const DesignEvaluator evaluator(robot, motions, spec.objective, options);
   if (request) return evaluateRequest(evaluator, *request, arguments.directory);
   warn("the start design", evaluator.start());

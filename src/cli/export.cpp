@@ -7,6 +7,8 @@
 #include "cli/commands.h"
 #include "io/mjcf.h"
 #include "io/opensim.h"
+#include "io/output_place.h"
+#include "io/result_files.h"
 #include "io/text_file.h"
 
 namespace fs = std::filesystem;
@@ -21,9 +23,10 @@ struct ExportArguments {
 
 int exportRobot(const ExportArguments& arguments) {
   const LoadedRobot robot = arguments.robot.load();
+  const std::string path = arguments.output.empty() ? fs::path(robot.file).stem().string() + ".xml" : arguments.output;
+  requireApart(path, listFiles(robot));
   const MjcfText text = formatMjcf(robot.model, findClosedConfiguration(robot.model).q);
   for (const std::string& warning : text.warnings) std::cerr << "bielle: warning: " << warning << "\n";
-  const std::string path = arguments.output.empty() ? fs::path(robot.file).stem().string() + ".xml" : arguments.output;
   writeTextFile(path, text.xml);
   std::cout << path << "\n";
   return kOk;
@@ -34,6 +37,7 @@ int exportTrajectory(const ExportArguments& arguments) {
   const MotionRecord record = readRecord((place / "trajectory.npz").string());
   const fs::path path =
       arguments.output.empty() ? place / ("trajectory." + arguments.format) : fs::path(arguments.output);
+  requireApart(path.string(), listResultFiles(place.string()));
   writeTextFile(path.string(), arguments.format == "mot" ? formatMot(record) : formatSto(record));
   std::cout << path.string() << "\n";
   return kOk;

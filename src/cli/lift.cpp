@@ -11,6 +11,8 @@
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "cli/table.h"
+#include "io/number_option.h"
+#include "io/output_place.h"
 
 namespace fs = std::filesystem;
 
@@ -59,6 +61,7 @@ void printOutcome(const LiftArguments& arguments, const LiftResult& lifted, cons
 }
 
 int run(const LiftArguments& arguments) {
+  requireApart(arguments.directory, {arguments.serial_directory});
   const MotionSummary summary = readSummary(arguments.serial_directory);
   if (summary.model != "serial")
     throw ModelError(summary.file, "model '" + summary.model + "'", "it is not a motion of the serial model",
@@ -115,17 +118,17 @@ void addLift(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"newton", "nlopt"}))
       ->default_str("newton");
   command.add_option("--singular", arguments->options.singular, "margin below which a linkage is at a dead point [1]")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(isWithin(0, 1))
       ->capture_default_str();
   command
       .add_option("--position-tolerance", arguments->options.position_tolerance,
                   "tolerance of nlopt's positions [rad, m]")
-      ->check(CLI::PositiveNumber)
+      ->check(isPositive())
       ->capture_default_str();
   command
       .add_option("--velocity-tolerance", arguments->options.velocity_tolerance,
                   "tolerance of nlopt's velocities [rad/s, m/s]")
-      ->check(CLI::PositiveNumber)
+      ->check(isPositive())
       ->capture_default_str();
   command.footer(
       "The closed robot takes on the serial model's postures, velocities and accelerations wherever its linkages "

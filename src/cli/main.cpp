@@ -6,6 +6,7 @@
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
+#include "io/number_option.h"
 #include "io/standard_output.h"
 
 namespace {
@@ -70,6 +71,7 @@ int run(int argc, char** argv) {
   addCampaign(app, action);
   addBench(app, action);
   addCompanions(app);
+  bielle::requireFiniteNumbers(app);
   app.callback([&action] {
     if (!action) throw CLI::RequiredError("A command");
   });

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "cli/table.h"
+#include "io/number_option.h"
 
 namespace bielle::cli {
 
@@ -22,10 +23,10 @@ void addObjectiveOptions(CLI::App& sub, ObjectiveOptions& options) {
       ->default_str(getName(options.objective));
   sub.add_option("--regeneration", options.regeneration,
                  "share of the regenerated electrical energy that is reused [1]")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(isWithin(0, 1))
       ->capture_default_str();
   sub.add_option("--regularization", options.regularization, "share of the other costs that is kept; default: 0.2 [1]")
-      ->check(CLI::PositiveNumber);
+      ->check(isPositive());
 }
 
 std::string formatEnergy(const ElectricalEnergy& energy) {

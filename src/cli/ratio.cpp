@@ -9,6 +9,7 @@
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "cli/ratio_report.h"
+#include "io/number_option.h"
 
 namespace fs = std::filesystem;
 
@@ -82,7 +83,7 @@ void addRatio(CLI::App& app, Action& action) {
   command.add_option("-o,--output", arguments->directory,
                      "directory for ratio.csv, ratio.json, ratio.svg (and map.csv)");
   command.add_option("--step", arguments->sweep.step, "largest step along the linkage, all its joints together [rad]")
-      ->check(CLI::Range(1e-4, 0.2))
+      ->check(isWithin(1e-4, 0.2))
       ->capture_default_str();
   command
       .add_option("--grid", arguments->grid,

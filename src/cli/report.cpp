@@ -10,6 +10,9 @@
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "cli/film.h"
+#include "io/number_option.h"
+#include "io/output_place.h"
+#include "io/result_files.h"
 
 namespace fs = std::filesystem;
 
@@ -57,6 +60,9 @@ int writePages(const ReportArguments& arguments) {
   film.side_by_side = !arguments.ghosts;
   const auto first = fs::path(arguments.directories.front());
   const std::string page = arguments.output.empty() ? (first / "report.html").string() : arguments.output;
+  for (const std::string& directory : arguments.directories)
+    for (const std::string& output : {page, arguments.png, arguments.mp4})
+      requireApart(output, listResultFiles(directory));
   bielle::writeReport(page, arguments.directories);
   std::cout << page << "\n";
   if (!arguments.png.empty()) {
@@ -81,12 +87,12 @@ void addFilmOptions(CLI::App& command, ReportArguments& arguments) {
       .add_option("--times", arguments.film.times,
                   "times of the pictures [s], separated by commas; default: six over the motion")
       ->delimiter(',')
-      ->check(CLI::NonNegativeNumber);
+      ->check(isNotNegative());
   command.add_option("--columns", arguments.film.columns, "pictures in a row; default: all, at most six")
       ->check(CLI::Range(1, 100));
   command.add_option("--mp4", arguments.mp4, "also make a film in real time; needs chromium and ffmpeg");
   command.add_option("--rate", arguments.rate, "frame rate of the film [1/s]")
-      ->check(CLI::Range(1.0, 240.0))
+      ->check(isWithin(1, 240))
       ->capture_default_str();
   command.add_option("--size", arguments.size, "size of one picture [pixels]")->capture_default_str();
   command.add_option("--view", arguments.film.view, "direction of view")

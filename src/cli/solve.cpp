@@ -18,6 +18,7 @@
 #include "cli/objective.h"
 #include "cli/table.h"
 #include "io/interrupt.h"
+#include "io/output_place.h"
 #include "io/setting.h"
 
 namespace bielle::cli {
@@ -169,9 +170,7 @@ int solve(const SolveArguments& arguments, const MotionRequest& request) {
     const auto [name, value] = parseSetting("--set", setting, "com_weight=1e5");
     setOption(request.options, name, value);
   }
-  for (const OptionEntry& option : request.options)
-    if (!std::isfinite(*option.value))
-      throw ModelError("", "option '" + option.name + "'", "it is not finite", "give a number");
+  requireApart(arguments.directory, {arguments.warm_start});
   const LoadedRobot robot = arguments.robot.load();
   std::optional<SerialModel> serial;
   if (arguments.serial) {

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "cli/commands.h"
+#include "io/output_place.h"
 
 namespace bielle::cli {
 namespace {
@@ -19,6 +20,7 @@ int view(const ViewArguments& arguments) {
   const LoadedRobot robot = arguments.robot.load();
   const std::string path =
       arguments.output.empty() ? std::filesystem::path(robot.file).stem().string() + ".html" : arguments.output;
+  requireApart(path, listFiles(robot));
   writeView(path, robot);
   std::cout << path << "\n";
   return kOk;

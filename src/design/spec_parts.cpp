@@ -76,6 +76,10 @@ std::string locateRobot(const RobotSpec& spec, const std::string& file) {
   return is_path ? beside.string() : spec.name;
 }
 
+std::string findRobotDirectory(const RobotSpec& spec, const std::string& file) {
+  return spec.generator.empty() ? fs::path(findRobotFile(locateRobot(spec, file))).parent_path().string() : "";
+}
+
 Model makeRobot(const RobotSpec& spec, const std::string& file) {
   if (spec.generator.empty()) return loadRobot(locateRobot(spec, file)).model;
   const GeneratorRequest request = findGenerator(spec.generator).makeRequest();

@@ -21,5 +21,7 @@ std::vector<MotionSpec> readMotionSpecs(const YamlEntry& entry, bool weighed = f
 // \throws ModelError when there is no such robot, generator or parameter
 std::string locateRobot(const RobotSpec& spec, const std::string& file);
 Model makeRobot(const RobotSpec& spec, const std::string& file);
+// The directory of its files; empty for one of a generator.
+std::string findRobotDirectory(const RobotSpec& spec, const std::string& file);
 
 }  // namespace bielle

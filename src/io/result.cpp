@@ -14,6 +14,8 @@
 #include "io/aside_file.h"
 #include "io/json_text.h"
 #include "io/record_tables.h"
+#include "io/result_files.h"
+#include "io/text_file.h"
 #include "math/so3.h"
 
 namespace fs = std::filesystem;
@@ -133,6 +135,8 @@ Json makeConstraints(const FddpSummary& solver) {
           {"multiplier_updates", solver.multiplier_updates}};
 }
 
+}  // namespace
+
 Json makeSummary(const MotionResult& result) {
   const BuildInfo build = getBuildInfo();
   Json log = Json::array();
@@ -180,8 +184,6 @@ Json makeSummary(const MotionResult& result) {
           {"log_columns", {"iteration", "cost", "gap", "violation", "gradient", "step", "regularization", "seconds"}},
           {"log", log}};
 }
-
-}  // namespace
 
 MotionTrack makeTrack(const Model& model, const MotionRecord& record) {
   MotionTrack track;
@@ -265,14 +267,18 @@ void makeOutputDirectory(const std::string& directory) {
 }
 
 std::vector<std::string> writeResult(const std::string& directory, const MotionResult& result) {
+  return writeResult(directory, result.record, makeSummary(result));
+}
+
+std::vector<std::string> writeResult(const std::string& directory, const MotionRecord& record, const Json& json) {
   makeOutputDirectory(directory);
   std::vector<std::string> paths;
   for (const char* name : {"trajectory.csv", "trajectory.npz", "summary.json"})
     paths.push_back((fs::path(directory) / name).string());
   AsideFile csv(paths[0]), npz(paths[1]), summary(paths[2]);
-  csv.write(formatCsv(result.record));
-  npz.write(formatNpz(result.record));
-  summary.write(formatJson(makeSummary(result)) + "\n");
+  csv.write(formatCsv(record));
+  npz.write(formatNpz(record));
+  summary.write(formatJson(json) + "\n");
   // Files derived from the old summary are removed before it, and the new summary is written last, so that an
   // interruption never leaves a mixture of two results.
   std::error_code error;
@@ -283,10 +289,19 @@ std::vector<std::string> writeResult(const std::string& directory, const MotionR
 }
 
 void writeSummary(const std::string& directory, const MotionResult& result) {
+  writeSummary(directory, makeSummary(result));
+}
+
+void writeSummary(const std::string& directory, const Json& summary) {
   makeOutputDirectory(directory);
-  AsideFile summary((fs::path(directory) / "summary.json").string());
-  summary.write(formatJson(makeSummary(result)) + "\n");
-  summary.commit();
+  writeTextFile((fs::path(directory) / "summary.json").string(), formatJson(summary) + "\n");
+}
+
+std::vector<std::string> listResultFiles(const std::string& directory) {
+  std::vector<std::string> paths;
+  for (const char* name : {"trajectory.npz", "trajectory.csv", "summary.json", "check.json", "plan.npz"})
+    paths.push_back((fs::path(directory) / name).string());
+  return paths;
 }
 
 BuildInfo getBuildInfo() {

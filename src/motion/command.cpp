@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "math/constants.h"
 #include "model/text_file.h"
 #include "model/yaml_entry.h"
 #include "motion/locomotion_stages.h"
@@ -63,6 +64,10 @@ void checkCommand(const Model& model, const LocomotionOptions& options, const Ve
   if (command.isRest()) return;
   const double T = options.timing.stepDuration();
   const StepCommand step{T * command.forward, T * command.sideways, T * command.turning};
+  // Placements of feet do not tell a full turn from none.
+  if (!(std::abs(step.yaw) <= kPi))
+    throw ModelError(model.name(), element, "it turns by more than half a turn in a step",
+                     "give a lower rate of turning, e.g. 0.4 rad/s");
   const Stance stance = makeStance(model, options, makeStandingPosture(model));
   for (const Side first : {Side::Left, Side::Right}) {
     LocomotionTask task;

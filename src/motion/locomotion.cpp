@@ -8,6 +8,7 @@
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/model/error.h"
 #include "math/so3.h"
+#include "model/number_text.h"
 #include "motion/foot_constraints.h"
 #include "motion/kinematic_guess.h"
 #include "motion/locomotion_stages.h"
@@ -54,7 +55,7 @@ void check(const Scene& scene) {
     const int side = phase.stands(Side::Left) ? 0 : 1, i = phase.steps_done;
     const Vector3d apart = scene.task.plan.steps[i].X_WF.p - scene.task.plan.getStance(i)[side].p;
     if (std::hypot(apart.head<2>().norm() / 2, kCrouch * height + std::abs(apart.z()) / 2) > kStretch * strut)
-      refuse(i + 1, "its foothold is out of reach: the feet would be " + std::to_string(apart.norm()) + " m apart",
+      refuse(i + 1, "its foothold is out of reach: the feet would be " + formatNumber(apart.norm()) + " m apart",
              "request a lower speed, or shorter, lower or more steps");
   }
 }

@@ -20,6 +20,7 @@ void setOption(const std::vector<OptionEntry>& options, const std::string& name,
   std::string known;
   for (const OptionEntry& option : options) {
     if (option.name == name) {
+      requireOption(std::isfinite(value), name, "it is not finite", "give a number");
       *option.value = value;
       return;
     }

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "model/number_text.h"
 
 namespace bielle {
 namespace {
@@ -18,7 +19,7 @@ int check(const Model& model, const Stance& stance, const StairsOptions& o) {
                 "the stairs are too narrow for the feet", "give metres, e.g. 0.8");
   const double single = o.depth / o.speed - o.gait.timing.both;
   requireOption(single >= 0.2 && single <= 3, "speed",
-                "a step of this depth takes " + std::to_string(single) + " s on one foot, outside 0.2 .. 3 s",
+                "a step of this depth takes " + formatNumber(single) + " s on one foot, outside 0.2 .. 3 s",
                 "change speed, depth or double_support");
   return static_cast<int>(o.stairs);
 }

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "math/constants.h"
 
 namespace bielle {
 namespace {
@@ -96,6 +97,8 @@ MotionPlan planTurn(const Model& model, const TurnOptions& o, const VectorXd& q0
     throw ModelError("", "option 'radius'", "it is negative",
                      "give metres; to turn to the right, give a negative angle");
   const double yaw = o.angle / std::max(1, countSteps("steps", o.steps) - 1);
+  requireOption(std::abs(yaw) <= kPi, "angle", "it is more than half a turn per step",
+                "give a smaller one, or more steps");
   StepsPlan plan = planSteps(model, "turn", {2 * o.radius * std::sin(std::abs(yaw) / 2), 0, yaw}, Vector3d::Zero(), 0,
                              yaw > 0 ? Side::Left : Side::Right, o, q0);
   const int nodes = plan.motion.schedule.numStages();

@@ -6,6 +6,7 @@
 #include "bielle/model/error.h"
 #include "design/draft.h"
 #include "design/spec_parts.h"
+#include "io/output_place.h"
 #include "model/number_text.h"
 #include "model/text_file.h"
 
@@ -115,6 +116,7 @@ std::vector<Contender> makeContenders(const ArchitectureSpec& spec, const std::s
     contender.trunk_factor = calcTrunkFactor(spec, architecture.name, model);
     RobotDraft draft(model);
     if (contender.trunk_factor != 1) draft.scaleMass(model.bodies()[1].name, contender.trunk_factor);
+    requireApart(contender.directory, {findRobotDirectory(architecture.robot, spec.path)});
     writeRobot(draft.build(), contender.directory, "Written by `bielle compare`.");
     contender.robot = loadRobot(contender.directory);
     contenders.push_back(std::move(contender));
