@@ -31,6 +31,7 @@ void foresee(CommandedWalk walk, double duration, Plan& plan) {
   CommandedWalk::Stage now = walk.makeNext();
   int phase = -1;
   for (int k = 0; k < count; ++k) {
+    requireNoInterrupt();
     if (now.phase != phase) plan.schedule.phases.push_back({now.phase_name, 0, h, now.contacts});
     phase = now.phase;
     ++plan.schedule.phases.back().nodes;

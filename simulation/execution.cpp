@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <limits>
 #include <thread>
 
@@ -99,17 +98,12 @@ class Recorder {
   int node_ = 0;
 };
 
-// Time that this thread has had a processor, s: other load on the machine does not count.
-double getProcessorTime() {
-  timespec time;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
-// Keeps a world from running ahead of the clock.
+// The clock beside a world.
 class Pace {
  public:
-  // \returns how far it is behind, s
+  // s since the start
+  double getElapsed() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+  // Keeps the world from running ahead. \returns how far it is behind, s
   double await(double time) const {
     const Clock::time_point due =
         start_ + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(time));
@@ -192,9 +186,10 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
   recorder.addNode(world, controller.getFootholds());
   const Vector3d com_start = recorder.getCom();
   int cut = 0, tick = 0;
-  double seconds = 0, exchanged = 0;
-  bool advances = true, goes_on = true;
+  double exchanged = 0;
+  bool advances = true, is_stopped = false;
   std::string fall;
+  const Pace pace;
   const auto describe = [&](double since) {
     Execution so_far = out;
     so_far.outcome = Outcome::Running;
@@ -203,43 +198,46 @@ Execution execute(const Model& model, const Policy& plan, Controller& controller
     so_far.imbalance = calcImbalance(so_far.start, so_far.end);
     so_far.energy_balance = exchanged > 0 ? so_far.imbalance / exchanged : 0;
     so_far.saturated_share = static_cast<double>(cut) / (std::max(1, tick) * std::max(1, model.nu()));
-    so_far.real_time_factor = seconds > 0 ? so_far.duration / seconds : 0;
+    so_far.whole_seconds = pace.getElapsed();
     so_far.estimation = perception.getErrors();
     so_far.record = recorder.getRecord(since);
     return so_far;
   };
-  const Pace pace;
-  for (; tick < ticks && advances && goes_on && fall.empty(); ++tick) {
+  for (; tick < ticks && !is_stopped && fall.empty(); ++tick) {
     if (o.real_time) out.largest_lag = std::max(out.largest_lag, pace.await(world.getTime()));
+    const double start = pace.getElapsed();
     measurement = perception.update(world, controller.getPlanTime(world.getTime()));
     measurement.delay = o.delay.delay;
     controller.update(measurement, u);
     delay.send(measurement.time, u);
     world.setPush(calcPush(o.pushes, measurement.time));
-    const double start = getProcessorTime();
+    const double controlled = pace.getElapsed();
     advances = advance(world, delay, measurement.time, o.control_period);
-    seconds += getProcessorTime() - start;
+    out.control_seconds += controlled - start;
+    out.world_seconds += pace.getElapsed() - controlled;
+    is_stopped = o.interrupt && *o.interrupt;
     for (int m = 0; m < model.nu(); ++m) cut += delay.getActing()[m] != world.getTorques()[m];
     for (const FootReport& foot : world.getFeet()) out.largest_slip = std::max(out.largest_slip, foot.slip);
     out.largest_gap = std::max(out.largest_gap, world.getGap());
-    if (!advances) break;
+    if (!world.getMessage().empty()) break;
     if (tick % ticks_per_row == 0) recorder.addStage(world);
     fall = detector.find(world.getTime(), controller.getPlanTime(world.getTime()), world.getConfiguration());
     out.largest_deviation = std::max(out.largest_deviation, detector.getDeviation());
     out.largest_joint_deviation = std::max(out.largest_joint_deviation, detector.getJointDeviation());
-    if ((tick + 1) % ticks_per_row != 0 && tick + 1 != ticks && fall.empty()) continue;
+    if ((tick + 1) % ticks_per_row != 0 && tick + 1 != ticks && !is_stopped && fall.empty()) continue;
     recorder.addNode(world, controller.getFootholds());
     const Books books = world.getBooks();
     exchanged += calcExchange(out.end, books);
     out.end = books;
-    if (observer && fall.empty() && tick + 1 < ticks) goes_on = observer(world.getTime(), duration, describe);
+    if (observer && !is_stopped && fall.empty() && tick + 1 < ticks) observer(world.getTime(), duration, describe);
   }
   out = describe(0);
-  out.outcome = !advances       ? Outcome::BrokeOff
-                : !fall.empty() ? Outcome::Fell
-                : tick == ticks ? Outcome::Stood
-                                : Outcome::Stopped;
-  out.message = advances ? fall : world.getMessage();
+  const bool breaks = !world.getMessage().empty();
+  out.outcome = breaks                      ? Outcome::BrokeOff
+                : !fall.empty()             ? Outcome::Fell
+                : advances && tick == ticks ? Outcome::Stood
+                                            : Outcome::Stopped;
+  out.message = breaks ? world.getMessage() : fall;
   return out;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 /// \file Carrying a plan out: a controller and a world, instant by instant, and what came of it.
+#include <atomic>
 #include <functional>
 #include <string>
 #include <vector>
@@ -33,6 +34,8 @@ struct ExecutionOptions {
   std::vector<Push> pushes;
   FallCriterion fall;
   Ground ground, planned_ground;  ///< of the world; that the plan was made for
+  /// Ends the motion where it is, as WorldOptions::interrupt does within a period of control.
+  const std::atomic<bool>* interrupt = nullptr;
 };
 
 enum class Outcome { Running, Stood, Fell, BrokeOff, Stopped };
@@ -50,20 +53,23 @@ struct Execution {
   double imbalance = 0;                ///< Books' Eq. (1), left less right side, J
   /// The imbalance over the energy that motors, pushes and losses moved, row by row of the record.
   double energy_balance = 0;
-  double saturated_share = 0;   ///< of motors and time: torques that were cut at their limits
-  double real_time_factor = 0;  ///< simulated time over the processor time of the world
-  double largest_lag = 0;       ///< with `real_time`: of an instant of control behind the clock, s
+  double saturated_share = 0;  ///< of motors and time: torques that were cut at their limits
+  /// Time on the clock, s: all in all, of which in the world, and in the controller with its sensors.
+  double whole_seconds = 0, world_seconds = 0, control_seconds = 0;
+  double largest_lag = 0;  ///< with `real_time`: of an instant of control behind the clock, s
   EstimationErrors estimation;
   Books start, end;
   MotionRecord record;  ///< of what happened; forces of closures are not known (NaN), accelerations are means
 
   double getMeanSpeed() const { return duration > 0 ? distance / duration : 0; }  ///< m/s
+  /// Simulated time over time on the clock.
+  double getRealTimeFactor() const { return whole_seconds > 0 ? duration / whole_seconds : 0; }
 };
 
 /// What has happened up to now, with the rows of its record from an instant [s] on.
 using ExecutionSoFar = std::function<Execution(double since)>;
-/// Looks on: is called after every row of the record, at `time` of `duration`, s. \returns whether to go on
-using ExecutionObserver = std::function<bool(double time, double duration, const ExecutionSoFar& so_far)>;
+/// Looks on: is called after every row of the record, at `time` of `duration`, s.
+using ExecutionObserver = std::function<void(double time, double duration, const ExecutionSoFar& so_far)>;
 
 /// From the state in which the policy starts.
 /// \param model  of the world's robot; that of the policy may differ from it in its dimensions (robot_errors.h)

@@ -6,6 +6,7 @@
 
 #include "bielle/io/motion_registry.h"
 #include "bielle/model/error.h"
+#include "io/interrupt.h"
 
 namespace bielle::simulation {
 namespace {
@@ -53,20 +54,29 @@ LoadedRobot loadRobotOf(const MotionSummary& summary) {
   return loadRobot(std::filesystem::is_regular_file(summary.robot_file, error) ? summary.robot_file : summary.robot);
 }
 
+FddpSummary solveUnlessInterrupted(Fddp& solver, Motion& motion) {
+  FddpObserver observer;
+  observer.interrupt = &isInterrupted();
+  const FddpSummary summary = solver.solve(*motion.problem, motion.guess, observer);
+  requireNoInterrupt();
+  return summary;
+}
+
 void solveFromRest(FddpOptions options, Motion& motion) {
   options.initial_regularization = kGuessRegularization;
-  Fddp(options).solve(*motion.problem, motion.guess);
+  Fddp solver(options);
+  solveUnlessInterrupted(solver, motion);
 }
 
 // A motion, and the solver whose last sweep is about its solution. \returns iterations
 int solveForGains(const std::string& source, Fddp& solver, Motion& motion) {
-  const FddpSummary solved = solver.solve(*motion.problem, motion.guess);
+  const FddpSummary solved = solveUnlessInterrupted(solver, motion);
   if (solved.termination != FddpTermination::Converged)
     throw ModelError(source, "motion '" + motion.name + "'",
                      std::string("the solve for its gains ended as: ") + getName(solved.termination),
                      "give a motion that converges, or --control open");
   // The sweep is about the trajectory unless the last iteration still took a step.
-  if (!solved.log.empty() && solved.log.back().step > 0) solver.solve(*motion.problem, motion.guess);
+  if (!solved.log.empty() && solved.log.back().step > 0) solveUnlessInterrupted(solver, motion);
   return solved.iterations;
 }
 
@@ -107,6 +117,7 @@ void finishPlan(const MotionRequest& request, const std::string& guess, PlanCont
   Motion motion = makeMotion(model, makeStages(), options);
   plan.ground = motion.ground;
   plan.schedule = motion.schedule;
+  plan.goals = motion.goals;
   if (!guess.empty()) setGuess(readResultRecord(guess), motion);
   // A solution in the files is only solved again for its gains; predictive control has its own.
   const bool is_open = control == PlanControl::Open;
@@ -162,6 +173,10 @@ void chooseSteps(double duration, const MotionRequest& request) {
 }
 
 }  // namespace
+
+void requireNoInterrupt() {
+  if (isInterrupted()) throw InterruptedPlan();
+}
 
 std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control, const PredictiveOptions& predictive,
                                std::optional<Belief> belief) {

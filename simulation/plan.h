@@ -2,6 +2,7 @@
 /// \file A motion ready to be carried out: read from its files, or solved on the spot.
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 #include "bielle/control/predictive_controller.h"
@@ -23,6 +24,7 @@ struct Plan {
   MotionSummary summary;
   Ground ground;  ///< that the motion was planned for
   ContactSchedule schedule;
+  std::vector<Goal> goals;             ///< of the plan
   std::vector<TimedCommand> commands;  ///< of a walk by command
   Belief belief = Belief::Closed;
   std::unique_ptr<SerialModel> serial;               ///< null for Belief::Closed
@@ -34,6 +36,11 @@ struct Plan {
 
   /// Of the model that is believed in.
   const Model& getModel() const { return serial ? serial->model : robot.model; }
+  /// When a node of the plan comes, s.
+  double getTime(int node) const {
+    const size_t k = static_cast<size_t>(node);
+    return k < policy->getStages().size() ? policy->getStages()[k].start : policy->getDuration();
+  }
   /// The plan in states of the closed robot.
   const Policy& getReference() const { return reference.policy ? *reference.policy : *policy; }
   Controller& getController() {
@@ -42,10 +49,17 @@ struct Plan {
   }
 };
 
+/// Ctrl-C (io/interrupt.h) came before the motion began.
+struct InterruptedPlan : std::runtime_error {
+  InterruptedPlan() : std::runtime_error("interrupted before the motion began; nothing is written") {}
+};
+/// \throws InterruptedPlan if it did
+void requireNoInterrupt();
+
 /// Makes the motion again from its request. For gains it is solved again, from the solution in the files, which do not
 /// hold them; for predictive control only if that has not converged.
 /// \param belief  what the controller takes the robot for; empty: the model of the motion, which is solved anew for another
-/// \throws ModelError when the files cannot be read, the motion does not converge, or has the least peak torque or the full formulation, and gains or predictive control are wanted that need others
+/// \throws InterruptedPlan, as makePlan() does; ModelError when the files cannot be read, the motion does not converge, or has the least peak torque or the full formulation, and gains or predictive control are wanted that need others
 std::unique_ptr<Plan> readPlan(const std::string& directory, PlanControl control,
                                const PredictiveOptions& predictive = {}, std::optional<Belief> belief = {});
 

@@ -1,40 +1,47 @@
 #include "simulation/simulate_arguments.h"
 
 #include <cmath>
+#include <map>
+#include <set>
 #include <sstream>
 
 #include "bielle/model/error.h"
+#include "io/number_option.h"
 #include "io/setting.h"
+#include "model/number_text.h"
 #include "simulation/make_world.h"
 #include "simulation/terrain.h"
 
 namespace bielle::simulation {
 namespace {
 
-// "t=3,impulse=6,direction=90,duration=0.1"
-Push parsePush(const std::string& text) {
-  constexpr const char* kExample = "t=3,impulse=6,direction=90,duration=0.1";
+constexpr const char* kPushExample = "t=3,impulse=6,direction=90,duration=0.1";
+
+[[noreturn]] void refusePush(const std::string& text, const std::string& problem) {
+  throw ModelError("", "--push '" + text + "'", problem, std::string("e.g. --push ") + kPushExample);
+}
+
+// E.g. kPushExample. \param shortest  that acts at an instant of control, s
+Push parsePush(const std::string& text, double shortest) {
+  constexpr double kLongest = 1e4, kLargest = 1e4;  // s, N s
   Push push;
+  const std::map<std::string, double*> places{
+      {"t", &push.time}, {"impulse", &push.impulse}, {"direction", &push.direction}, {"duration", &push.duration}};
+  std::set<std::string> given;
   std::istringstream parts(text);
   for (std::string part; std::getline(parts, part, ',');) {
-    const auto [name, value] = parseSetting("--push", part, kExample);
-    if (name == "t")
-      push.time = value;
-    else if (name == "impulse")
-      push.impulse = value;
-    else if (name == "direction")
-      push.direction = value;
-    else if (name == "duration")
-      push.duration = value;
-    else
-      throw ModelError("", "--push '" + part + "'", "there is no '" + name + "'",
-                       std::string("e.g. --push ") + kExample);
+    const auto [name, value] = parseSetting("--push", part, kPushExample);
+    const auto place = places.find(name);
+    if (place == places.end()) refusePush(text, "there is no '" + name + "'");
+    if (!given.insert(name).second) refusePush(text, "'" + name + "' is given twice");
+    *place->second = value;
   }
-  if (!(push.duration > 0 && push.time >= 0 &&
-        std::isfinite(push.duration + push.time + push.impulse + push.direction)))
-    throw ModelError("", "--push '" + text + "'",
-                     "the duration is not positive, the time is negative, or a number is not finite",
-                     std::string("e.g. --push ") + kExample);
+  if (!given.count("impulse")) refusePush(text, "it has no impulse");
+  if (!(push.time >= 0 && push.time <= kLongest)) refusePush(text, "its time is not within 0 .. 10000 s");
+  if (!(std::abs(push.impulse) <= kLargest)) refusePush(text, "its impulse is not within 10000 N s");
+  if (!(std::abs(push.direction) <= 360)) refusePush(text, "its direction is not within 360 degrees");
+  if (!(push.duration >= shortest && push.duration <= kLongest))
+    refusePush(text, "its duration is not within a period of control, " + formatNumber(shortest) + " s, and 10000 s");
   return push;
 }
 
@@ -67,7 +74,8 @@ Ground makeGround(const SimulateArguments& arguments, const Ground& planned) {
 }
 
 void parseOptions(SimulateArguments& arguments) {
-  for (const std::string& push : arguments.pushes) arguments.execution.pushes.push_back(parsePush(push));
+  for (const std::string& push : arguments.pushes)
+    arguments.execution.pushes.push_back(parsePush(push, arguments.execution.control_period));
   if (!arguments.commands.empty()) {
     if (arguments.robot.empty() || arguments.control != "mpc")
       throw ModelError("", "--command", "only predictive control can follow commands, with a walk that it plans itself",
@@ -89,7 +97,6 @@ void parseOptions(SimulateArguments& arguments) {
 }
 
 void addOptions(CLI::App& app, SimulateArguments& a) {
-  const auto positive = CLI::PositiveNumber;
   app.add_option(
          "DIR", a.directory,
          "result of `bielle solve` for the closed robot; with --robot the name of a motion, which is solved first")
@@ -143,7 +150,7 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
                  "likewise, from -HEIGHT to HEIGHT")
       ->capture_default_str();
   app.add_option("--friction", a.friction, "coefficient of friction of the ground [1]; 0: the plan's")
-      ->check(CLI::NonNegativeNumber)
+      ->check(isWithin(0, 100))
       ->capture_default_str();
   app.add_option("--seed", a.seed, "seed of the tiles' heights, the jitter, the noise and the robot's errors")
       ->capture_default_str();
@@ -152,16 +159,16 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
                  "s], direction [degrees; 0: along x, 90: along y] and duration [s]; may be repeated")
       ->allow_extra_args(false);
   app.add_option("--duration", a.execution.duration, "duration of the simulation [s]; 0: that of the plan plus --hold")
-      ->check(CLI::Range(0.0, 1e4))
+      ->check(isWithin(0, 1e4))
       ->capture_default_str();
   app.add_option("--hold", a.execution.hold, "time that the robot stands in its last posture after the plan [s]")
-      ->check(CLI::Range(0.0, 1e4))
+      ->check(isWithin(0, 1e4))
       ->capture_default_str();
   app.add_option("--time-step", a.time_step, "time step of worlds with fixed steps [s]; 0: the world's default")
-      ->check(CLI::Range(0.0, 0.1))
+      ->check(isWithin(0, 0.1))
       ->capture_default_str();
   app.add_option("--control-period", a.execution.control_period, "period of torque updates [s]")
-      ->check(positive)
+      ->check(isWithin(1e-5, 1))
       ->capture_default_str();
   app.add_option("--sensors", a.sensors,
                  "ideal: the controller receives the true state; real: an estimate from motor encoders and an inertial "
@@ -169,30 +176,30 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
       ->check(CLI::IsMember({"ideal", "real"}))
       ->capture_default_str();
   app.add_option("--noise", a.noise, "noise of real sensors, relative to their data sheets [1]; 0: exact")
-      ->check(CLI::Range(0.0, 1000.0))
+      ->check(isWithin(0, 1000))
       ->capture_default_str();
   app.add_option("--look-ahead", a.look_ahead,
                  "reuse the gains from this long before each contact change, since later gains need a more precise "
                  "state than an estimated one [ms] (default: 36 with real sensors, else 0)")
-      ->check(CLI::Range(0.0, 1000.0));
+      ->check(isWithin(0, 1000));
   app.add_option("--mass-error", a.errors.mass,
                  "largest relative error of masses [1]: the simulated robot's masses and inertias are the "
                  "controller's, times a random factor within 1 plus or minus this")
-      ->check(CLI::Range(0.0, 0.99))
+      ->check(isWithin(0, 0.99))
       ->capture_default_str();
   app.add_option("--rod-error", a.errors.rod,
                  "largest error of rods [m]: in the simulated robot one frame of each closure is moved at random by up "
                  "to this along each axis")
-      ->check(CLI::Range(0.0, 0.1))
+      ->check(isWithin(0, 0.1))
       ->capture_default_str();
   app.add_option("--delay", a.delay, "delay between a measurement and the torques computed from it [ms]")
-      ->check(CLI::Range(0.0, 1000.0))
+      ->check(isWithin(0, 1000))
       ->capture_default_str();
   app.add_option("--jitter", a.jitter, "largest random deviation of each delay from --delay [ms]; at most --delay")
-      ->check(CLI::Range(0.0, 1000.0))
+      ->check(isWithin(0, 1000))
       ->capture_default_str();
   app.add_option("--record-period", a.execution.record_period, "period of the recorded rows [s]")
-      ->check(positive)
+      ->check(isWithin(1e-5, 1e4))
       ->capture_default_str();
   CLI::Option* live = app.add_flag(
       "--live", a.live,
@@ -200,6 +207,7 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
   app.add_flag("--no-report", a.no_report, "do not write report.html")->excludes(live);
   app.add_flag("--summary-only", a.summary_only, "write only summary.json")->excludes(live);
   app.add_flag("--dry-run", a.dry_run, "check the options only: read no motion, execute nothing, write nothing");
+  requireFiniteNumbers(app);
 }
 
 }  // namespace bielle::simulation

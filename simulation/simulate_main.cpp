@@ -4,8 +4,11 @@
 #include <memory>
 
 #include "bielle/model/error.h"
+#include "io/interrupt.h"
+#include "io/output_place.h"
 #include "io/setting.h"
 #include "io/standard_output.h"
+#include "model/number_text.h"
 #include "simulation/commanded_plan.h"
 #include "simulation/make_world.h"
 #include "simulation/simulate_output.h"
@@ -43,27 +46,48 @@ std::unique_ptr<Plan> obtainPlan(const SimulateArguments& arguments) {
   return makePlan(request, control, arguments.predictive);
 }
 
+// A robot that is not quite the one that its controller knows, if errors are given.
+std::optional<Model> makeOtherRobot(const Plan& plan, const SimulateArguments& arguments) {
+  RobotErrors errors = arguments.errors;
+  errors.seed = arguments.seed;
+  if (errors.isZero()) return std::nullopt;
+  Model machine = makeMachine(plan.robot.model, errors);
+  VectorXd q = plan.robot.model.makeNeutral(), v = VectorXd::Zero(plan.robot.model.nv());
+  plan.getReference().getReference(0, q, v);
+  try {
+    if (!machine.references().empty()) makeStandingPosture(machine);
+    assembleMachine(plan.robot.model, machine, q);
+  } catch (const ModelError& error) {  // which names the robot's file, where nothing is wrong
+    if (errors.rod == 0) throw;
+    throw ModelError("", "--rod-error " + formatNumber(errors.rod),
+                     std::string("the loops of such a robot do not close: ") + error.what(), "give a smaller error");
+  }
+  return machine;
+}
+
 int simulate(SimulateArguments arguments, const std::vector<std::string>& command) {
   parseOptions(arguments);
   if (arguments.dry_run) return kStood;
+  if (arguments.robot.empty()) requireApart(arguments.output, {arguments.directory});
+  watchInterrupts();
   const double look_ahead = 1e-3 * arguments.look_ahead.value_or(arguments.sensors == "real" ? kRealLookAhead : 0);
   arguments.predictive.look_ahead = look_ahead;
   const auto plan = obtainPlan(arguments);
   const Model& model = plan->robot.model;
   plan->policy->setLookAhead(look_ahead);
+  ExecutionOptions& options = arguments.execution;
   if (arguments.sensors == "real") {
-    arguments.execution.perception.sensors = SensorOptions{makeRealParts(), arguments.noise, arguments.seed, {}};
-    arguments.execution.perception.planned = plan->schedule;
+    options.perception.sensors = SensorOptions{makeRealParts(), arguments.noise, arguments.seed, {}};
+    options.perception.planned = plan->schedule;
   }
   const Ground ground = makeGround(arguments, plan->ground);
-  arguments.execution.ground = ground;
-  arguments.execution.planned_ground = plan->ground;
-  arguments.execution.fall.only_whirling = plan->predictive != nullptr;
-  arguments.errors.seed = arguments.seed;
-  std::optional<Model> machine;
-  if (!arguments.errors.isZero()) machine.emplace(makeMachine(model, arguments.errors));
+  options.ground = ground;
+  options.planned_ground = plan->ground;
+  options.fall.only_whirling = plan->predictive != nullptr;
+  options.interrupt = &isInterrupted();
+  const std::optional<Model> machine = makeOtherRobot(*plan, arguments);
   const Model& robot = machine ? *machine : model;
-  const auto world = makeWorld(arguments.world, robot, {ground, arguments.time_step});
+  const auto world = makeWorld(arguments.world, robot, {ground, arguments.time_step, options.interrupt});
   makeOutputDirectory(arguments.output);
   const auto writeFiles = [&](const Execution& execution) {
     return write(arguments, *plan, ground, execution, command);
@@ -72,11 +96,11 @@ int simulate(SimulateArguments arguments, const std::vector<std::string>& comman
   if (!arguments.summary_only) {  // a campaign's, which looks at nothing else
     const auto watch = std::make_shared<Watch>(arguments.live ? writeFiles : Watch::Show());
     observer = [watch](double time, double duration, const ExecutionSoFar& so_far) {
-      return watch->update(time, duration, so_far);
+      watch->update(time, duration, so_far);
     };
   }
-  const Execution execution =
-      execute(robot, plan->getReference(), plan->getController(), *world, arguments.execution, observer);
+  requireNoInterrupt();
+  const Execution execution = execute(robot, plan->getReference(), plan->getController(), *world, options, observer);
   print(arguments, *plan, execution);
   for (const std::string& path : writeFiles(execution)) std::cout << "  " << path << "\n";
   return execution.outcome == Outcome::Stood ? kStood : kFell;
@@ -99,7 +123,7 @@ int main(int argc, char** argv) {
       "half\n"
       "a turn away. Exit status: 0 it stood to the end, 1 it fell, was stopped by Ctrl-C, or the simulation failed "
       "(files\n"
-      "are written all the same), 2 bad input.\n"
+      "are written all the same, unless Ctrl-C comes while the motion is still solved), 2 bad input.\n"
       "Examples:\n"
       "  bielle solve walk --robot bipetto --speed 0.4 -o walk\n"
       "  bielle simulate walk -o carried-out\n"
@@ -115,6 +139,9 @@ int main(int argc, char** argv) {
     const int status = simulate(arguments, {argv, argv + argc});
     finishStandardOutput();
     return status;
+  } catch (const InterruptedPlan& error) {
+    std::cerr << "bielle: error: " << error.what() << std::endl;
+    return kFell;
   } catch (const std::exception& error) {
     std::cerr << "bielle: error: " << error.what() << std::endl;
   }

@@ -1,14 +1,17 @@
 #include "simulation/simulate_output.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
-#include <nlohmann/json.hpp>
+#include <iterator>
 
 #include "bielle/report/report.h"
+#include "control/clock.h"
 #include "io/npz.h"
-#include "io/text_file.h"
-#include "model/text_file.h"
+#include "io/result_files.h"
+#include "model/number_text.h"
 #include "simulation/planned_record.h"
 
 namespace bielle::simulation {
@@ -25,9 +28,6 @@ MotionResult makeResult(const SimulateArguments& arguments, const Plan& plan, co
   const int stages = static_cast<int>(execution.record.u.rows());
   result.schedule.phases.push_back({"simulated", stages, arguments.execution.record_period, {}});
   result.ground = ground;
-  result.solver.termination =
-      execution.outcome == Outcome::Stood ? FddpTermination::Converged : FddpTermination::Failed;
-  result.solver.message = std::string("executed: it ") + getName(execution.outcome);
   result.record = execution.record;
   result.objective = plan.summary.objective;
   setFigures(plan.robot.model, result);
@@ -36,7 +36,7 @@ MotionResult makeResult(const SimulateArguments& arguments, const Plan& plan, co
   return result;
 }
 
-nlohmann::ordered_json listBooks(const Execution& e) {
+Json listBooks(const Execution& e) {
   return {{"energy_start_J", e.start.getEnergy()}, {"energy_end_J", e.end.getEnergy()},
           {"motor_work_J", e.end.motor_work},      {"push_work_J", e.end.push_work},
           {"contact_loss_J", e.end.contact_loss},  {"stop_loss_J", e.end.stop_loss},
@@ -44,9 +44,9 @@ nlohmann::ordered_json listBooks(const Execution& e) {
 }
 
 // The drift of a robot that went nowhere is no share of its way.
-nlohmann::ordered_json listEstimation(const EstimationErrors& e) {
+Json listEstimation(const EstimationErrors& e) {
   constexpr double kShortestWay = 0.1;  // m
-  const nlohmann::ordered_json share = e.way > kShortestWay ? nlohmann::ordered_json(e.drift / e.way) : nullptr;
+  const Json share = e.way > kShortestWay ? Json(e.drift / e.way) : nullptr;
   return {{"position_error", {{"rms", e.position_rms}, {"max", e.position_max}}},
           {"velocity_error", {{"rms", e.velocity_rms}, {"max", e.velocity_max}}},
           {"tilt_error", {{"rms", e.tilt_rms}, {"max", e.tilt_max}}},
@@ -55,7 +55,7 @@ nlohmann::ordered_json listEstimation(const EstimationErrors& e) {
           {"contact_errors", e.contact_errors}};
 }
 
-nlohmann::ordered_json listSolves(const PredictiveCounts& counts) {
+Json listSolves(const PredictiveCounts& counts) {
   return {{"count", counts.solves},
           {"missed", counts.missed},
           {"failed", counts.failed},
@@ -66,8 +66,8 @@ nlohmann::ordered_json listSolves(const PredictiveCounts& counts) {
           {"worst_ms", 1e3 * counts.calcQuantile(1)}};
 }
 
-nlohmann::ordered_json listCommands(const std::vector<TimedCommand>& commands) {
-  auto list = nlohmann::ordered_json::array();
+Json listCommands(const std::vector<TimedCommand>& commands) {
+  auto list = Json::array();
   for (const auto& [time, velocity] : commands)
     list.push_back({{"time_s", time},
                     {"forward", velocity.forward},
@@ -76,8 +76,8 @@ nlohmann::ordered_json listCommands(const std::vector<TimedCommand>& commands) {
   return list;
 }
 
-nlohmann::ordered_json listPushes(const std::vector<Push>& pushes) {
-  auto list = nlohmann::ordered_json::array();
+Json listPushes(const std::vector<Push>& pushes) {
+  auto list = Json::array();
   for (const Push& push : pushes)
     list.push_back({{"time_s", push.time},
                     {"impulse_Ns", push.impulse},
@@ -86,15 +86,41 @@ nlohmann::ordered_json listPushes(const std::vector<Push>& pushes) {
   return list;
 }
 
-// Adds what happened to the summary of the result.
-void extendSummary(const std::string& path, const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
-  auto summary = nlohmann::ordered_json::parse(readTextFile(path));
+// The mean speed in the steps in which the plan's own counts: without the time that the robot stands, starts and stops. Empty
+// where a plan has none, or the motion did not come that far.
+std::optional<double> calcSteadySpeed(const Plan& plan, const Execution& e) {
+  const VectorXd& time = e.record.time;
+  const auto findRow = [&time](double at) {
+    return static_cast<Eigen::Index>(std::lower_bound(time.begin(), time.end(), at - kClockTolerance) - time.begin());
+  };
+  for (const Goal& goal : plan.goals) {
+    if (goal.kind != GoalKind::Speed) continue;
+    const double start = plan.getTime(goal.first), end = plan.getTime(goal.last);
+    if (time[0] > start + kClockTolerance || time[time.size() - 1] < end - kClockTolerance) return {};
+    const Eigen::Index first = findRow(start), last = findRow(end);
+    const Vector3d way = (e.record.com.row(last) - e.record.com.row(first)).transpose();
+    return goal.direction.dot(way) / (time[last] - time[first]);
+  }
+  return {};
+}
+
+std::string describeSteadySpeed(const Plan& plan, const Execution& e) {
+  const std::optional<double> speed = calcSteadySpeed(plan, e);
+  return speed ? " with the time that it stands, " + formatNumber(*speed, "%.3f") + " m/s in its steady steps" : "";
+}
+
+// The summary of a result, with what happened in place of how it was solved.
+Json makeSummary(const MotionResult& result, const SimulateArguments& arguments, const Plan& plan, const Execution& e) {
+  Json summary = bielle::makeSummary(result);
+  for (const char* of_solving :
+       {"formulation", "step", "goals", "converged", "interrupted", "termination", "message", "acceptable", "cost",
+        "iterations", "seconds", "solver_gap", "constraints", "free_timings", "log_columns", "log"})
+    summary.erase(of_solving);
   summary["world"] = arguments.world;
   summary["control"] = arguments.control;
   summary["believed_model"] = getName(plan.belief);
   if (plan.belief != Belief::Closed)
-    summary["plan_reachable_until"] =
-        plan.reference.first_missed < 0 ? nullptr : nlohmann::ordered_json(plan.reference.first_missed);
+    summary["plan_reachable_until"] = plan.reference.first_missed < 0 ? nullptr : Json(plan.reference.first_missed);
   if (plan.predictive) summary["solves"] = listSolves(plan.predictive->getCounts());
   for (const auto& [name, value] : plan.summary.options)
     if (name == "speed") summary["commanded_speed"] = value;
@@ -116,10 +142,12 @@ void extendSummary(const std::string& path, const SimulateArguments& arguments, 
   summary["outcome"] = getName(e.outcome);
   summary["outcome_message"] = e.message;
   summary["fell"] = e.outcome == Outcome::Fell;
-  summary["fall_time"] = e.outcome == Outcome::Fell ? nlohmann::ordered_json(e.duration) : nullptr;
+  summary["fall_time"] = e.outcome == Outcome::Fell ? Json(e.duration) : nullptr;
   summary["duration"] = e.duration;
   summary["distance"] = e.distance;
   summary["mean_speed"] = e.getMeanSpeed();
+  const std::optional<double> steady = calcSteadySpeed(plan, e);
+  summary["steady_speed"] = steady ? Json(*steady) : Json();
   summary["largest_deviation"] = e.largest_deviation;
   summary["largest_gap"] = e.largest_gap;
   summary["largest_joint_deviation"] = e.largest_joint_deviation;
@@ -127,9 +155,44 @@ void extendSummary(const std::string& path, const SimulateArguments& arguments, 
   summary["energy_balance"] = e.energy_balance;
   summary["books"] = listBooks(e);
   summary["saturated_share"] = e.saturated_share;
-  summary["real_time_factor"] = e.real_time_factor;
+  summary["real_time_factor"] = e.getRealTimeFactor();
+  summary["seconds"] = {{"whole", e.whole_seconds}, {"world", e.world_seconds}, {"control", e.control_seconds}};
   if (arguments.execution.real_time) summary["largest_lag_ms"] = 1e3 * e.largest_lag;
-  writeTextFile(path, summary.dump(2) + "\n");
+  return summary;
+}
+
+// Files that cannot be written leave those of before, which still say that the motion is running. The word is changed where it
+// is, which a full disk permits.
+void markAsFailed(const std::filesystem::path& directory) {
+  const std::string failed = "\"failed\" ";
+  for (const char* name : {"summary.json", "report.html"}) {
+    std::fstream file(directory / name, std::ios::binary | std::ios::in | std::ios::out);
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    for (const std::string running : {"\"outcome\": \"running\"", "\"outcome\":\"running\""}) {
+      const size_t at = text.find(running);
+      if (at == std::string::npos) continue;
+      file.clear();
+      file.seekp(static_cast<std::streamoff>(at + running.size() - failed.size()));
+      file << failed << std::flush;
+    }
+  }
+}
+
+std::vector<std::string> writeFiles(const SimulateArguments& arguments, const Plan& plan, const MotionResult& result,
+                                    const Json& summary) {
+  const std::filesystem::path output = arguments.output;
+  if (arguments.summary_only) {
+    writeSummary(arguments.output, summary);
+    return {(output / "summary.json").string()};
+  }
+  std::vector<std::string> paths = writeResult(arguments.output, result.record, summary);
+  paths.push_back((output / "plan.npz").string());
+  writeNpz(paths.back(), makePlannedRecord(plan.robot.model, plan.getReference(), result.record));
+  if (!arguments.no_report) {
+    paths.push_back((output / "report.html").string());
+    writeReport(paths.back(), {arguments.output});
+  }
+  return paths;
 }
 
 }  // namespace
@@ -140,20 +203,25 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
   if (plan.belief != Belief::Closed) std::cout << " with model " << getName(plan.belief);
   std::cout << ": it " << getName(e.outcome);
   if (!e.message.empty()) std::cout << " (" << e.message << ")";
-  char text[600];
+  char text[1000];
   std::snprintf(text, sizeof text,
                 "\n"
                 "  duration            %.3f s\n"
-                "  distance            %.3f m, %.3f m/s\n"
+                "  distance            %.3f m, %.3f m/s%s\n"
                 "  trunk deviation     %.4f m at most\n"
                 "  closures            gap %.1e m at most\n"
                 "  soles               slip %.1e m at most\n"
                 "  energy balance      %.1e J, %.1e of the energy exchanged\n"
                 "  torques             %.2f %% saturated\n"
-                "  speed               %.2g times real time\n",
-                e.duration, e.distance, e.getMeanSpeed(), e.largest_deviation, e.largest_gap, e.largest_slip,
-                e.imbalance, e.energy_balance, 100 * e.saturated_share, e.real_time_factor);
+                "  computing time      %.2f s, %.2g times real time; world %.2f s, control %.2f s\n",
+                e.duration, e.distance, e.getMeanSpeed(), describeSteadySpeed(plan, e).c_str(), e.largest_deviation,
+                e.largest_gap, e.largest_slip, e.imbalance, e.energy_balance, 100 * e.saturated_share, e.whole_seconds,
+                e.getRealTimeFactor(), e.world_seconds, e.control_seconds);
   std::cout << text;
+  for (const Push& push : arguments.execution.pushes)
+    std::cout << "  push                " << formatNumber(push.impulse) << " N s at " << formatNumber(push.time)
+              << " s, for " << formatNumber(push.duration) << " s, direction " << formatNumber(push.direction)
+              << " degrees\n";
   if (plan.reference.first_missed >= 0)
     std::cout << "  the linkages cannot follow the plan from " << plan.reference.first_missed
               << " s on: " << plan.reference.message << "\n";
@@ -178,23 +246,13 @@ void print(const SimulateArguments& arguments, const Plan& plan, const Execution
 
 std::vector<std::string> write(const SimulateArguments& arguments, const Plan& plan, const Ground& ground,
                                const Execution& execution, const std::vector<std::string>& command) {
-  const MotionResult result = makeResult(arguments, plan, ground, execution, command);
-  const std::filesystem::path output = arguments.output;
-  const std::string summary = (output / "summary.json").string();
-  if (arguments.summary_only) {
-    writeSummary(arguments.output, result);
-    extendSummary(summary, arguments, plan, execution);
-    return {summary};
+  try {
+    const MotionResult result = makeResult(arguments, plan, ground, execution, command);
+    return writeFiles(arguments, plan, result, makeSummary(result, arguments, plan, execution));
+  } catch (...) {
+    markAsFailed(arguments.output);
+    throw;
   }
-  std::vector<std::string> paths = writeResult(arguments.output, result);
-  extendSummary(summary, arguments, plan, execution);
-  paths.push_back((output / "plan.npz").string());
-  writeNpz(paths.back(), makePlannedRecord(plan.robot.model, plan.getReference(), execution.record));
-  if (!arguments.no_report) {
-    paths.push_back((output / "report.html").string());
-    writeReport(paths.back(), {arguments.output});
-  }
-  return paths;
 }
 
 }  // namespace bielle::simulation

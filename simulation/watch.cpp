@@ -2,7 +2,6 @@
 
 #include <iostream>
 
-#include "io/interrupt.h"
 #include "model/number_text.h"
 
 namespace bielle::simulation {
@@ -14,22 +13,30 @@ constexpr double kShown = 10;  // last part of the motion, s: a page costs the s
 
 }  // namespace
 
-Watch::Watch(Show show) : show_(std::move(show)), next_page_(Clock::now()), next_line_(Clock::now() + kBetweenLines) {
-  watchInterrupts();
+Watch::Watch(Show show) : show_(std::move(show)), next_page_(Clock::now()), next_line_(Clock::now() + kBetweenLines) {}
+
+void Watch::show(const Execution& execution) {
+  try {
+    show_(execution);
+  } catch (const std::exception& error) {
+    if (!has_failed_)
+      std::cerr << "bielle: warning: " << error.what() << "; the motion goes on, and its files are tried again"
+                << std::endl;
+    has_failed_ = true;
+  }
 }
 
-bool Watch::update(double time, double duration, const ExecutionSoFar& so_far) {
+void Watch::update(double time, double duration, const ExecutionSoFar& so_far) {
   const Clock::time_point now = Clock::now();
   if (now >= next_line_) {
     std::cerr << "bielle: " << formatNumber(time, "%.1f") << " of " << formatNumber(duration, "%.1f") << " s\n";
     next_line_ = now + kBetweenLines;
   }
   if (show_ && now >= next_page_) {
-    show_(so_far(time - kShown));
+    show(so_far(time - kShown));
     const Clock::time_point end = Clock::now();
     next_page_ = end + std::max<Clock::duration>(kBetweenPages, kShare * (end - now));
   }
-  return !isInterrupted();
 }
 
 }  // namespace bielle::simulation

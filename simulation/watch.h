@@ -1,5 +1,5 @@
 #pragma once
-// What a person sees of a motion while it is carried out, and how he ends it.
+// What a person sees of a motion while it is carried out.
 #include <chrono>
 #include <functional>
 
@@ -7,22 +7,25 @@
 
 namespace bielle::simulation {
 
-// From its construction on the first SIGINT or SIGTERM ends the motion after the row under way, such that its files can be
-// written; the second one has its usual effect. Long runs tell how far they are, on the standard error.
+// Long runs tell how far they are, on the standard error.
 class Watch {
  public:
   // Writes the files of what has happened up to now.
   using Show = std::function<void(const Execution&)>;
-  // \param show  called every other second, or less often where it takes longer than a tenth of the time; or empty
+  // \param show  called every other second, or less often where it takes longer than a tenth of the time; or empty. The motion
+  //   goes on if it throws an exception, which is told once.
   explicit Watch(Show show);
 
   // An ExecutionObserver.
-  bool update(double time, double duration, const ExecutionSoFar& so_far);
+  void update(double time, double duration, const ExecutionSoFar& so_far);
 
  private:
   using Clock = std::chrono::steady_clock;
+  void show(const Execution& execution);
+
   const Show show_;
   Clock::time_point next_page_, next_line_;
+  bool has_failed_ = false;
 };
 
 }  // namespace bielle::simulation

@@ -7,6 +7,7 @@ import csv
 import json
 import os
 import random
+import re
 import resource
 import shutil
 import signal
@@ -212,6 +213,89 @@ def test_motions_carried_out():
             times = [float(row["time"]) for row in csv.DictReader(file)]
         assert times[0] == 0 and abs(times[-1] - summary["duration"]) < 1e-9 and times[-1] < 100
     run(*command, "--live", "--real-time", "--control", "mpc", status=2, error="leave out --real-time")
+
+
+def await_(condition, child):
+    begin = time.time()
+    while not condition():
+        assert time.time() - begin < 60 and child.poll() is None, child.communicate()
+        time.sleep(0.01)
+
+
+def catches(child, number):
+    with open(f"/proc/{child.pid}/status") as file:
+        return int(file.read().split("SigCgt:")[1].split()[0], 16) >> (number - 1) & 1
+
+
+def test_stopped_at_once():
+    """SIGINT while the gains are solved, and within a period of control of a thousand million steps."""
+    if not os.access(os.path.join(os.path.dirname(program), "bielle-simulate"), os.X_OK):
+        return
+    run(*SQUAT, "--quiet", "--no-report", "-o", "planned", status=0)
+    child = subprocess.Popen([program, "simulate", "planned", "-o", "early"], stdout=subprocess.PIPE,
+                             stderr=subprocess.PIPE, text=True)
+    await_(lambda: catches(child, signal.SIGINT), child)
+    child.send_signal(signal.SIGINT)
+    out, error = child.communicate(timeout=10)
+    assert child.returncode == 1, (child.returncode, error)
+    assert error == "bielle: error: interrupted before the motion began; nothing is written\n", error
+    assert not os.path.exists("early")
+    help_text = subprocess.check_output([program, "simulate", "--help"], text=True)
+    worlds = re.search(r"--world TEXT:{([^}]*)}", help_text).group(1).split(",")
+    worlds.remove("simbody")  # which chooses its steps
+    assert "bielle" in worlds
+    for world in worlds:
+        for options in (["--time-step", "1e-12"], ["--record-period", "100", "--hold", "1000", "--summary-only"]):
+            shutil.rmtree("tiny", ignore_errors=True)
+            child = subprocess.Popen([program, "simulate", "planned", "--world", world, *options, "-o", "tiny"],
+                                     stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            await_(lambda: os.path.exists("tiny"), child)
+            time.sleep(1)
+            child.send_signal(signal.SIGINT)
+            out, error = child.communicate(timeout=10)
+            assert child.returncode == 1 and "it was stopped" in out, (child.returncode, error)
+            summary = read_summary("tiny")
+            assert summary["outcome"] == "was stopped" and 0 < summary["duration"] < 1000, summary
+            if "--summary-only" not in options:
+                check_whole("tiny")
+                with open("tiny/trajectory.csv") as file:
+                    times = [float(row["time"]) for row in csv.DictReader(file)]
+                assert times[0] == 0 and times[-1] == summary["duration"], (times, summary["duration"])
+
+
+def test_live_on_a_full_disk():
+    """A page that cannot be written is told at once, and once; nothing says any longer that the motion is running."""
+    if not os.access(os.path.join(os.path.dirname(program), "bielle-simulate"), os.X_OK):
+        return
+    run(*SQUAT, "--quiet", "--no-report", "-o", "planned", status=0)
+    os.mkdir("tight")
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1400k", "tmpfs", "tight"],
+                      stderr=subprocess.DEVNULL).returncode:
+        print("  (no file system can be mounted here)")
+        return
+    try:
+        child = subprocess.Popen([program, "simulate", "planned", "--hold", "1000", "--live", "-o", "tight/out"],
+                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        await_(lambda: os.path.exists("tight/out/report.html"), child)
+        assert read_summary("tight/out")["outcome"] == "running"
+        lines = []
+        while not lines or "warning" not in lines[-1]:  # tells how far it is, too
+            lines.append(child.stderr.readline())
+            assert lines[-1], lines
+        assert "No space left on device; " in lines[-1] and "the motion goes on" in lines[-1], lines
+        assert child.poll() is None
+        assert read_summary("tight/out")["outcome"] == "failed"
+        with open("tight/out/report.html") as file:
+            page = file.read()
+        assert '"outcome":"failed"' in page and '"outcome":"running"' not in page
+        time.sleep(5)  # further pages fail in silence
+        child.send_signal(signal.SIGINT)
+        out, error = child.communicate(timeout=60)
+        assert child.returncode == 2 and "warning" not in error, (child.returncode, error)
+        assert "bielle: error: tight/out/" in error and "No space left on device" in error, error
+        assert read_summary("tight/out")["outcome"] == "failed"
+    finally:
+        subprocess.run(["umount", "tight"], check=True)
 
 
 def test_deep_json():

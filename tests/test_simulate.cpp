@@ -65,10 +65,73 @@ TEST_CASE("simulate: with gains a walk stands, and its numbers are written") {
   CHECK(summary["largest_gap"].get<double>() < 1e-9);
   CHECK(summary["largest_slip"].get<double>() < 0.005);
   CHECK(summary["saturated_share"].get<double>() == 0);
-  CHECK(summary["real_time_factor"].get<double>() > 0);
+  // Of the whole, on the clock; world and control are parts of it.
+  const nlohmann::json& seconds = summary["seconds"];
+  const double whole = seconds["whole"], world = seconds["world"], control = seconds["control"];
+  CHECK(summary["real_time_factor"].get<double>() == Approx(summary["duration"].get<double>() / whole));
+  CHECK((world > 0 && control > 0 && world + control < whole));
+  CHECK_THAT(result.out, Catch::Contains("times real time; world "));
+  // Nothing is left of how the plan was solved.
+  for (const char* of_solving :
+       {"formulation", "step", "goals", "converged", "interrupted", "termination", "acceptable", "cost", "iterations",
+        "solver_gap", "constraints", "free_timings", "log"})
+    CHECK_FALSE(summary.contains(of_solving));
   const MotionRecord record = readRecord(output + "/trajectory.npz");
   CHECK(record.time[record.time.size() - 1] == Approx(summary["duration"].get<double>()));
   CHECK(record.q.allFinite());
+}
+
+TEST_CASE("simulate: the speed in steady steps is told beside that of the whole; pushes are told") {
+  const Scratch scratch;
+  const std::string plan = (scratch.path / "plan").string(), output = (scratch.path / "walked").string();
+  const std::string robot = BIELLE_SOURCE_DIR "/robots/bipetto";
+  REQUIRE(runCommand({BIELLE_COMMAND, "solve", "walk", "--robot", robot, "--speed", "0.4", "--steps", "4", "-o", plan,
+                      "--quiet", "--no-report", "--no-check"})
+              .status == 0);
+  const CommandResult walked = runCommand({BIELLE_COMMAND, "simulate", plan, "-o", output, "--summary-only", "--push",
+                                           "t=0.5,impulse=0.25,direction=90,duration=0.2"});
+  CAPTURE(walked.out, walked.err);
+  REQUIRE(walked.status == 0);
+  CHECK_THAT(walked.out, Catch::Contains("with the time that it stands, 0."));
+  CHECK_THAT(walked.out, Catch::Contains("0.25 N s at 0.5 s, for 0.2 s, direction 90 degrees"));
+  const nlohmann::json summary = parseSummary(output), goal = parseSummary(plan)["goals"][0];
+  REQUIRE(goal["name"] == "speed");
+  CHECK(summary["steady_speed"].get<double>() == Approx(goal["achieved"].get<double>()).epsilon(0.03));
+  CHECK(summary["mean_speed"].get<double>() < 0.7 * summary["steady_speed"].get<double>());
+  REQUIRE(runCommand({BIELLE_COMMAND, "simulate", plan, "-o", output, "--summary-only", "--duration", "0.3"}).status ==
+          0);
+  CHECK(parseSummary(output)["steady_speed"].is_null());
+}
+
+TEST_CASE("simulate: the plan is not overwritten, and a motion carried out is no plan") {
+  const Scratch scratch;
+  const std::string plan = (scratch.path / "plan").string(), link = (scratch.path / "link").string();
+  fs::copy(getWalk(), plan);
+  fs::create_directory_symlink(plan, link);
+  const std::string before = readFile(plan + "/summary.json");
+  for (const std::string& same : {plan, link, plan + "/", plan + "/../plan", link + "/."})
+    for (const bool is_input : {false, true}) {
+      const CommandResult result = runCommand(
+          {BIELLE_COMMAND, "simulate", is_input ? same : plan, "-o", is_input ? plan : same, "--duration", "0.05"});
+      CAPTURE(same, result.err);
+      CHECK(result.status == 2);
+      CHECK_THAT(result.err, Catch::Contains("it is also an input") && Catch::Contains("-o"));
+    }
+  CHECK(readFile(plan + "/summary.json") == before);
+  const std::string output = (scratch.path / "output").string(), again = (scratch.path / "again").string();
+  REQUIRE(simulate(output, {"--duration", "0.05"}).status == 0);
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"simulate", output, "-o", again}, {"lift", output, "-o", again}, {"check", output}}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.begin(), BIELLE_COMMAND);
+    const CommandResult result = runCommand(arguments);
+    CAPTURE(command[0], result.out, result.err);
+    CHECK(result.status == 2);
+    CHECK_THAT(result.err, Catch::Contains("output/summary.json") &&
+                               Catch::Contains("a motion carried out, not a plan") &&
+                               Catch::Contains("give the directory of `bielle solve`"));
+  }
+  CHECK_FALSE(fs::exists(again));
 }
 
 TEST_CASE("simulate: a controller may believe in another model than that of the motion") {
@@ -120,7 +183,7 @@ TEST_CASE("simulate: the summary alone is that of the whole result; a dry run on
   CHECK(std::distance(fs::directory_iterator(alone), fs::directory_iterator()) == 1);
   nlohmann::json summaries[] = {parseSummary(whole), parseSummary(alone)};
   for (nlohmann::json& summary : summaries)
-    for (const char* of_the_run : {"command", "real_time_factor"}) summary.erase(of_the_run);
+    for (const char* of_the_run : {"command", "real_time_factor", "seconds"}) summary.erase(of_the_run);
   CHECK(summaries[0] == summaries[1]);
   const std::string none = (scratch.path / "none").string();
   const auto check = [&](std::vector<std::string> options) {
@@ -302,10 +365,15 @@ TEST_CASE("simulate: a walk follows commands, turns on the way and stops") {
   CHECK(record.v.row(last / 2).head(6).norm() > 0.1);  // it walked
   CHECK(walk({"--command", commands, "--control", "gains"}).err.find("mpc") != std::string::npos);
   CHECK(walk({"--command", commands, "--control", "mpc", "--speed", "1"}).err.find("--speed") != std::string::npos);
-  std::ofstream(commands) << "commands:\n  - {time: 0, forward: 7}\n";
-  const CommandResult refused = walk({"--command", commands, "--control", "mpc"});
-  CHECK(refused.status == 2);
-  CHECK(refused.err.find("commands.yaml, command 1") != std::string::npos);
+  for (const std::string velocity :
+       {"forward: 7", "forward: 1e300", "sideways: 1e300", "turning: 5", "turning: 1e300"}) {
+    std::ofstream(commands) << "commands:\n  - {time: 0, " + velocity + "}\n";
+    const CommandResult refused = walk({"--command", commands, "--control", "mpc"});
+    CAPTURE(velocity, refused.err);
+    CHECK(refused.status == 2);
+    CHECK(refused.err.find("commands.yaml, command 1") != std::string::npos);
+    CHECK(refused.err.size() < 400);
+  }
 }
 
 TEST_CASE("simulate: bad input is refused in one line, with status 2") {
@@ -315,6 +383,15 @@ TEST_CASE("simulate: bad input is refused in one line, with status 2") {
       {{"--push", "t=1,force=3"}, "force"},
       {{"--push", "t=-1,impulse=3"}, "--push"},
       {{"--push", "t=1,impulse=inf"}, "--push"},
+      {{"--push", "t=1,impulse=nan"}, "--push"},
+      {{"--push", ""}, "it has no impulse"},
+      {{"--push", "t=1"}, "it has no impulse"},
+      {{"--push", "t=1,impulse="}, "--push 'impulse='"},
+      {{"--push", "t=1,impulse=2,impulse=3"}, "'impulse' is given twice"},
+      {{"--push", "t=1,impulse=1e300,duration=1e-300"}, "its impulse is not within"},
+      {{"--push", "t=1,impulse=1,duration=1e-300"}, "its duration is not within"},
+      {{"--push", "t=1,impulse=1,direction=1e300"}, "its direction is not within"},
+      {{"--rod-error", "0.1"}, "--rod-error"},
       {{"--terrain", "tiles=nan"}, "tiles"},
       {{"--speed", "0.3"}, "--speed"},
       {{"--terrain", "hills=3"}, "hills"},
@@ -328,6 +405,17 @@ TEST_CASE("simulate: bad input is refused in one line, with status 2") {
     CHECK(result.status == 2);
     CHECK(result.err.find(named) != std::string::npos);
   }
+  for (const std::string number : {"friction", "duration", "hold", "time-step", "control-period", "record-period",
+                                   "noise", "look-ahead", "mass-error", "rod-error", "delay", "jitter", "speed"})
+    for (const std::string value : {"nan", "-nan", "inf", "-inf", "1e400", "1e300", "much"}) {
+      const CommandResult result = simulate(output, {"--" + number, value, "--dry-run"});
+      CAPTURE(number, value, result.err);
+      if (number == "speed" && value == "1e300")
+        continue;  // finite; without a robot there is nothing to compare it with
+      CHECK(result.status == 2);
+      CHECK_THAT(result.err, Catch::Contains("--" + number) && Catch::Contains("'" + value + "' is not a "));
+      CHECK(result.err.size() < 200);
+    }
   const std::string full = (scratch.path / "full").string();
   REQUIRE(runCommand({BIELLE_COMMAND, "solve", "squat", "--robot", BIELLE_SOURCE_DIR "/robots/bipetto", "--depth",
                       "0.95", "--formulation", "full", "-o", full, "--quiet", "--no-report", "--no-check"})

@@ -107,12 +107,16 @@ MotionSummary readSummary(const std::string& directory) {
   const std::string path = (std::filesystem::path(directory) / "summary.json").string();
   const std::string text = readTextFile(path, "give a directory that `bielle solve` wrote");
   try {
-    MotionSummary summary = read(parseJson(text));
-    summary.file = path;
-    return summary;
+    const Json json = parseJson(text);
+    if (!json.contains("outcome")) {
+      MotionSummary summary = read(json);
+      summary.file = path;
+      return summary;
+    }
   } catch (const std::exception& error) {
     throw ModelError(path, "file", describeJsonError(error), "recreate it with `bielle solve`");
   }
+  throw ModelError(path, "motion", "it is a motion carried out, not a plan", "give the directory of `bielle solve`");
 }
 
 }  // namespace bielle
