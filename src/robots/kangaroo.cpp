@@ -211,11 +211,15 @@ void check(const std::string& robot, KangarooParameters& p) {
                      "make the sum of it, knee_crank_height and knee_arm less than thigh_length");
 }
 
-std::vector<Solid> makeTrunk(const KangarooParameters& p) {
+// Columns, drawn but without mass, carry the shell and the plate over the yaw links.
+std::vector<Solid> makeTrunk(const KangarooParameters& p, const std::vector<Vector3d>& hips) {
   const double plate = -p.trunk_height + p.hip_screw_top + 0.03;
-  return {makeBox({-0.02, 0, 0.12}, {0.16, 0.26, 0.30}, 0.75 * p.trunk_mass, colors::kShell),
-          makeBox({-0.05, 0, plate}, {0.16, 0.26, 0.02}, 0.2 * p.trunk_mass, colors::kSteel),
-          makeSphere({0, 0, 0.33}, 0.06, 0.05 * p.trunk_mass, colors::kShell)};
+  std::vector<Solid> solids = {makeBox({-0.02, 0, 0.12}, {0.16, 0.26, 0.30}, 0.75 * p.trunk_mass, colors::kShell),
+                               makeBox({-0.05, 0, plate}, {0.16, 0.26, 0.02}, 0.2 * p.trunk_mass, colors::kSteel),
+                               makeSphere({0, 0, 0.33}, 0.06, 0.05 * p.trunk_mass, colors::kShell)};
+  for (const Vector3d& hip : hips)
+    solids.push_back(makeRod(hip + 0.045 * kZ, Vector3d(hip.x(), hip.y(), 0), 0.018, 0, colors::kSteel));
+  return solids;
 }
 
 }  // namespace
@@ -272,9 +276,9 @@ Model makeKangaroo(const KangarooParameters& parameters) {
   KangarooParameters p = parameters;
   check("kangaroo", p);
   ModelBuilder builder("kangaroo");
-  addTrunk(makeTrunk(p), builder);
   KangarooLeg legs[] = {{p, 1, builder}, {p, -1, builder}};
   const auto getHip = [&](const KangarooLeg& leg) { return Vector3d(0, leg.s * p.hip_offset, -p.trunk_height); };
+  addTrunk(makeTrunk(p, {getHip(legs[0]), getHip(legs[1])}), builder);
   for (KangarooLeg& leg : legs) addLeg(leg, getHip(leg));
   for (KangarooLeg& leg : legs) addYaw(leg, getHip(leg));
   builder.addReference(makeSerialHalfSitting("kangaroo", p));
@@ -290,18 +294,20 @@ Model makeKangarooLeg(const KangarooParameters& parameters) {
   rail.kind = JointKind::Prismatic;
   rail.axis = kZ;
   rail.X_PJ.p = (p.trunk_height + p.thigh_length + p.shank_length + p.ankle_height) * kZ;
-  addSolidLink("trunk", "world", rail, makeTrunk(p), builder);
+  const Vector3d hip = -p.trunk_height * kZ;
+  addSolidLink("trunk", "world", rail, makeTrunk(p, {hip}), builder);
   KangarooLeg leg(p, 1, builder);
-  addLeg(leg, -p.trunk_height * kZ);
-  addYaw(leg, -p.trunk_height * kZ);
+  addLeg(leg, hip);
+  addYaw(leg, hip);
   Reference standing = makeSerialHalfSitting("kangaroo_leg", p);
   Reference reference;
   reference.name = standing.name;
   reference.feet["foot_left"] = kOrigin;
   reference.height_frame = standing.height_frame;
   reference.height = standing.height;
-  for (const auto& [joint, values] : standing.joints)
-    if (joint.find("_left") != std::string::npos) reference.joints[joint] = values;
+  // The sole, not the ankle, is under the hip: pitch of hip and ankle follow.
+  for (const char* joint : {"hipz_left", "hipx_left", "knee_left", "anklex_left"})
+    reference.joints[joint] = standing.joints.at(joint);
   builder.addReference(reference);
   return builder.build();
 }
