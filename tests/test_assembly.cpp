@@ -47,6 +47,27 @@ TEST_CASE("assembly: Bipetto half sitting, from scratch") {
     CHECK(std::abs(result.q[model.joints()[model.findJoint(joint)].idx_q] - angle) < 0.02);
 }
 
+TEST_CASE("assembly: a given angle out of reach is listed with where it ends, one within reach stays") {
+  const Model model = loadOwn("fourbar").model;
+  Reference reference{"bent", {{"crank_joint", {1.047198}}, {"rocker_joint", {0.2}}}, "", 0, {}};
+  const AssemblyResult result = assemble(model, makeReferenceProblem(model, reference));
+  REQUIRE(result.status == AssemblyStatus::Closed);
+  const std::vector<ReferenceJoint> joints = listReferenceJoints(model, reference, result.q);
+  REQUIRE(joints.size() == 2);
+  double moved = 0;
+  for (const ReferenceJoint& joint : joints) {
+    const Joint& of = model.joints()[joint.joint];
+    CHECK(joint.given[0] == reference.joints.at(of.name)[0]);
+    CHECK(joint.assembled[0] == result.q[of.idx_q]);
+    CHECK(joint.moved == std::abs(joint.assembled[0] - joint.given[0]));
+    moved = std::max(moved, joint.moved);
+  }
+  CHECK(moved > 0.1);
+  reference = model.references().front();
+  const AssemblyResult as_given = assemble(model, makeReferenceProblem(model, reference));
+  for (const ReferenceJoint& joint : listReferenceJoints(model, reference, as_given.q)) CHECK(joint.moved < 1e-5);
+}
+
 TEST_CASE("assembly: the torso at every height within reach; far outside, what stays open is named") {
   const Model model = loadOwn("bipetto").model;
   Reference reference = model.references().front();

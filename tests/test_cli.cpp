@@ -213,6 +213,43 @@ TEST_CASE("info describes the model, in words and in JSON") {
   CHECK(json::parse(run({"info", "fourbar", "--json"}).out)["mobility"]["mobility"] == 1);
 }
 
+TEST_CASE("info lists the joints of references as given and as assembled, and tells where these differ") {
+  const RobotDirectory directory;
+  const fs::path fourbar = fs::path(BIELLE_SOURCE_DIR) / "robots/fourbar";
+  const std::string urdf = readFile(fourbar / "fourbar.urdf"), yaml = readFile(fourbar / "fourbar.yaml");
+  const auto inform = [&](const std::string& limit, const std::string& reference) {
+    const std::string axis = "<child link=\"rocker\"/>\n    <axis xyz=\"0 -1 0\"/>\n    <limit ";
+    return run({"info", directory.writeRobot(replaceOnce(urdf, axis, axis + limit), yaml + reference), "--json"});
+  };
+  const CommandResult as_it_is = run({"info", fourbar.string()});
+  CHECK(as_it_is.err.empty());
+  CHECK_THAT(as_it_is.out, Catch::Contains("  crank_at_60_degrees  crank_joint     1.0472     1.0472"));
+
+  // Loops come first: the angle moves, the robot says so.
+  const std::string bent = "  bent: {joints: {crank_joint: 1.047198, rocker_joint: 0.2}}\n";
+  const CommandResult result = inform("", bent);
+  CHECK(result.status == 0);
+  CHECK_THAT(result.err, Catch::Contains("robot.yaml: reference 'bent': it is assembled with") &&
+                             Catch::Contains("'rocker_joint' at ") && Catch::Contains(" instead of 0.2"));
+  const json info = json::parse(result.out);
+  CHECK(info["warnings"].size() == 1);
+  const auto joint = std::find_if(info["reference_joints"].begin(), info["reference_joints"].end(), [](const json& of) {
+    return of["reference"] == "bent" && of["joint"] == "rocker_joint";
+  });
+  REQUIRE(joint != info["reference_joints"].end());
+  CHECK((*joint)["given"] == 0.2);
+  CHECK((*joint)["assembled"].get<double>() > 0.21);
+
+  // Out of its range and not reached it is a mistake; reached, a warning.
+  checkRefused(
+      inform("lower=\"0.5\" upper=\"3\" ", bent),
+      "robot.yaml: reference 'bent': joint 'rocker_joint' cannot be at 0.2, outside its range of 0.5 to 3; give a");
+  CHECK(inform("lower=\"0.1\" upper=\"3\" ", bent).status == 0);
+  const CommandResult reached = inform("lower=\"-1\" upper=\"1\" ", "");
+  CHECK(reached.status == 0);
+  CHECK_THAT(reached.err, Catch::Contains("'rocker_joint' is outside its range of -1 to 1"));
+}
+
 TEST_CASE("eval gives the library's dynamics, forces and derivatives") {
   const Model model = loadRobot("bipetto").model;
   const VectorXd q = makeStandingPosture(model), v = VectorXd::LinSpaced(model.nv(), -0.3, 0.4);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "bielle/dynamics/assembly.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
@@ -297,13 +298,31 @@ search:
     - {algorithm: sbplx, evaluations: 10}
 )";
 
-std::string makeCrankSpec() { return replaceOnce(kCrankSpec, "ROBOT", kRobots + "bipetto"); }
+std::string makeCrankSpec(const std::string& robot = kRobots + "bipetto") {
+  return replaceOnce(kCrankSpec, "ROBOT", robot);
+}
+
+// Bipetto, whose reference also gives the angles of rods that depend on the crank's length.
+std::string writeBipettoWithRods(const RobotDirectory& directory) {
+  const Model model = loadRobot(kRobots + "bipetto").model;
+  const AssemblyResult standing = assembleReference(model, "half_sitting");
+  std::string yaml = readFile(kRobots + "bipetto/bipetto.yaml");
+  for (const std::string& side : {"left", "right"}) {
+    const std::string knee = "      knee_" + side + ":", rod = "transmission_knee_" + side;
+    const double angle = standing.q[model.joints()[model.findJoint(rod)].idx_q];
+    yaml = replaceOnce(yaml, knee, "      " + rod + ": " + std::to_string(angle) + "\n" + knee);
+  }
+  directory.write("rods/rods.yaml", yaml);
+  directory.write("rods/rods.urdf", readFile(kRobots + "bipetto/bipetto.urdf"));
+  return directory.path() + "/rods";
+}
 
 }  // namespace
 
 TEST_CASE("design: a search that is killed goes on and ends the same way") {
   const RobotDirectory directory;
-  const std::string spec = directory.write("spec.yaml", makeCrankSpec());
+  const std::string robot = writeBipettoWithRods(directory);
+  const std::string spec = directory.write("spec.yaml", makeCrankSpec(robot));
   const std::string whole = directory.path() + "/whole", killed = directory.path() + "/killed";
   const CommandResult first = runCommand({BIELLE_COMMAND, "design", spec, "-o", whole, "--jobs", "1"});
   INFO(first.err);
@@ -349,10 +368,12 @@ TEST_CASE("design: a search that is killed goes on and ends the same way") {
   REQUIRE_THAT(page, Contains(row));
   CHECK(std::strtod(page.c_str() + page.find(row) + row.size(), nullptr) < 1);
   CHECK_NOTHROW(loadRobot(whole + "/best"));
-  CHECK(runCommand({BIELLE_COMMAND, "info", whole + "/best"}).status == 0);
+  const CommandResult info = runCommand({BIELLE_COMMAND, "info", whole + "/best"});
+  CHECK(info.status == 0);
+  CHECK(info.err.empty());  // its reference has the angles of its own rods
 
   // The log of another problem is refused.
-  directory.write("spec.yaml", replaceOnce(makeCrankSpec(), "evaluations: 40", "evaluations: 41"));
+  directory.write("spec.yaml", replaceOnce(makeCrankSpec(robot), "evaluations: 40", "evaluations: 41"));
   const CommandResult other = runCommand({BIELLE_COMMAND, "design", spec, "-o", killed});
   CHECK(other.status == 2);
   CHECK_THAT(other.err, Contains("the log is of another design problem"));

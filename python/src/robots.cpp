@@ -18,6 +18,8 @@ Robot load(const std::string& name, const std::optional<std::string>& base) {
     throw py::value_error("base: 'free' or 'fixed', got '" + *base + "'");
   if (base) options.base = *base == "free" ? BaseKind::Free : BaseKind::Fixed;
   LoadedRobot loaded = loadRobot(name, options);
+  const std::vector<std::string> moved = checkReferences(loaded);
+  loaded.warnings.insert(loaded.warnings.end(), moved.begin(), moved.end());
   return {name, std::make_shared<Model>(std::move(loaded.model)), loaded.file, loaded.directory, loaded.warnings};
 }
 

@@ -3,6 +3,7 @@
 #include <iostream>
 
 #include "bielle/dynamics/loop_conflict.h"
+#include "bielle/io/robot_info.h"
 #include "cli/commands.h"
 
 namespace bielle::cli {
@@ -22,6 +23,8 @@ LoadedRobot RobotArgument::load() const {
   LoadOptions options;
   if (fixed_base) options.base = BaseKind::Fixed;
   LoadedRobot robot = loadRobot(name, options);
+  const std::vector<std::string> moved = checkReferences(robot);
+  robot.warnings.insert(robot.warnings.end(), moved.begin(), moved.end());
   for (const std::string& warning : robot.warnings) std::cerr << "bielle: warning: " << warning << "\n";
   const AssemblyResult closed = findClosedConfiguration(robot.model);
   if (closed.status != AssemblyStatus::Closed) throw makeClosingError(robot.model, robot.directory, closed);

@@ -46,6 +46,8 @@ void printInfo(const Json& robot) {
                             shapes["fitted"].dump() + " fitted to visuals";
   printSection(robot, "distances", title.c_str(), {"between", "distance", "body1", "body2", "posture"});
   printSection(robot, "references", "references", {"name", "closed", "message"});
+  printSection(robot, "reference_joints", "joints of references, as given and as assembled (rad, m)",
+               {"reference", "joint", "given", "assembled"});
 }
 
 }  // namespace

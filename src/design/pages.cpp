@@ -4,8 +4,10 @@
 #include <numeric>
 #include <sstream>
 
+#include "bielle/dynamics/assembly.h"
 #include "bielle/io/result.h"
 #include "bielle/io/robot_writer.h"
+#include "bielle/model/builder.h"
 #include "bielle/model/error.h"
 #include "design/figures.h"
 #include "design/motor_change.h"
@@ -238,6 +240,19 @@ std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec,
   return out.str();
 }
 
+// The robot of a design, whose references give the angles that its own lengths allow instead of those of the start.
+Model makeWritten(const Parametrization& robot, const VectorXd& x) {
+  const Model model = robot.make(x);
+  ModelParts parts = takeParts(model);
+  for (Reference& reference : parts.references) {
+    const AssemblyResult result = assembleReference(model, reference.name);
+    if (result.status != AssemblyStatus::Closed) continue;
+    for (const ReferenceJoint& joint : listReferenceJoints(model, reference, result.q))
+      reference.joints[model.joints()[joint.joint].name].assign(joint.assembled.begin(), joint.assembled.end());
+  }
+  return ModelBuilder::restore(std::move(parts));
+}
+
 }  // namespace
 
 double calcMassInLinks(const Parametrization& robot, const VectorXd& x) {
@@ -253,12 +268,12 @@ double calcMassInLinks(const Parametrization& robot, const VectorXd& x) {
 std::vector<std::string> writeDesign(const std::string& directory, const DesignEvaluator& evaluator,
                                      const DesignSpec& spec, const DesignRun& run) {
   const std::string best = directory + "/best", page = directory + "/design.md";
-  writeRobot(evaluator.robot().make(run.best), best, "Written by `bielle design`.");
+  writeRobot(makeWritten(evaluator.robot(), run.best), best, "Written by `bielle design`.");
   writeTextFile(page, formatPage(evaluator, spec, run));
   std::vector<std::string> paths = {best, page};
   for (size_t i = 0; i < run.front.size(); ++i) {
     paths.push_back(directory + "/front/" + getFrontName(i));
-    writeRobot(evaluator.robot().make(run.front[i].x), paths.back(), "Written by `bielle design`.");
+    writeRobot(makeWritten(evaluator.robot(), run.front[i].x), paths.back(), "Written by `bielle design`.");
   }
   for (const DesignFigure& figure : makeDesignFigures(evaluator, run)) {
     const std::string path = directory + "/" + figure.name + ".svg";

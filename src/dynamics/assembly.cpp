@@ -320,6 +320,19 @@ AssemblyResult assembleReference(const Model& model, const std::string& name, co
                    known.empty() ? "add one under `references` in its YAML file" : "it has: " + known);
 }
 
+std::vector<ReferenceJoint> listReferenceJoints(const Model& model, const Reference& reference, ConstVectorRef q) {
+  std::vector<ReferenceJoint> joints;
+  const VectorXd difference = model.difference(makeReferenceProblem(model, reference).q_ref, q);
+  for (const auto& [name, values] : reference.joints) {
+    const int index = model.findJoint(name);
+    const Joint& joint = model.joints()[index];
+    if (joint.kind == JointKind::FreeFlyer) continue;
+    joints.push_back({index, Eigen::Map<const VectorXd>(values.data(), joint.nq), q.segment(joint.idx_q, joint.nq),
+                      difference.segment(joint.idx_v, joint.nv).cwiseAbs().maxCoeff()});
+  }
+  return joints;
+}
+
 VectorXd projectVelocity(const Model& model, Workspace& ws, const ConstraintSet& constraints, ConstVectorRef q,
                          ConstVectorRef v) {
   updatePositions(model, ws, q);

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <set>
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/constrained.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/io/names.h"
+#include "bielle/model/error.h"
 #include "bielle/ocp/ground_distance.h"
 #include "dynamics/point_spring.h"
 #include "io/json_text.h"
@@ -35,6 +37,9 @@ std::vector<Posture> makePostures(const Model& model) {
 }
 
 Json orNull(double limit) { return std::isfinite(limit) ? Json(limit) : Json(nullptr); }
+
+// A number for a joint of one coordinate, else a list.
+Json toJson(const VectorXd& q) { return q.size() == 1 ? Json(q[0]) : Json(std::vector<double>(q.begin(), q.end())); }
 
 // "motor - 2 knee"
 std::string describeTerms(const Model& model, const Closure& coupler) {
@@ -177,7 +182,57 @@ Json describeDrive(const Motor& motor) {
           {"mass", drive.mass}};
 }
 
+std::string format(const VectorXd& q) {
+  std::string text;
+  for (double value : q) text += (text.empty() ? "" : " ") + formatNumber(value, "%.4g");
+  return text;
+}
+
+// "its range of -1 to 0.98", if a given value is outside; else empty.
+std::string describeMissedRange(const Model& model, const ReferenceJoint& of) {
+  constexpr double kRounding = 1e-3;  // rad or m: 1.571 for a quarter turn
+  const Joint& joint = model.joints()[of.joint];
+  if (joint.nq != joint.nv) return "";
+  const VectorXd lower = model.lowerLimits().segment(joint.idx_v, joint.nv),
+                 upper = model.upperLimits().segment(joint.idx_v, joint.nv);
+  if ((of.given - lower).minCoeff() >= -kRounding && (upper - of.given).minCoeff() >= -kRounding) return "";
+  return "its range of " + format(lower) + " to " + format(upper);
+}
+
 }  // namespace
+
+std::vector<std::string> checkReferences(const LoadedRobot& robot) {
+  const Model& model = robot.model;
+  std::filesystem::path file = robot.file;
+  if (file.extension() == ".urdf") file.replace_extension(".yaml");
+  std::vector<std::string> warnings;
+  for (const Reference& reference : model.references()) {
+    const AssemblyResult result = assembleReference(model, reference.name);
+    const bool closed = result.status == AssemblyStatus::Closed;
+    const std::string element = "reference '" + reference.name + "'";
+    std::string moved, outside;
+    for (const ReferenceJoint& of : listReferenceJoints(model, reference, result.q)) {
+      const std::string joint = "'" + model.joints()[of.joint].name + "'", range = describeMissedRange(model, of);
+      const bool is_met = closed && of.moved <= kReferenceTolerance;
+      if (!range.empty() && !is_met)
+        throw ModelError(file.string(), element,
+                         "joint " + joint + " cannot be at " + format(of.given) + ", outside " + range,
+                         "give a value that it can have, or correct the range");
+      if (!range.empty()) outside += (outside.empty() ? "" : ", ") + joint + " is outside " + range;
+      if (closed && !is_met)
+        moved +=
+            (moved.empty() ? "" : ", ") + joint + " at " + format(of.assembled) + " instead of " + format(of.given);
+    }
+    if (!outside.empty())
+      warnings.push_back(file.string() + ": " + element + ": " + outside +
+                         "; motions that start there need --no-limits");
+    if (!moved.empty())
+      warnings.push_back(file.string() + ": " + element + ": it is assembled with " + moved +
+                         ", because loops, height and feet come before given angles; give angles that the robot can "
+                         "have together, or omit them");
+  }
+  return warnings;
+}
 
 std::string makeRobotInfo(const LoadedRobot& robot) {
   const Model& model = robot.model;
@@ -203,6 +258,7 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
                {"distances", describeDistances(model, chooseStanding(postures))},
                {"contacts", Json::array()},
                {"references", Json::array()},
+               {"reference_joints", Json::array()},
                {"warnings", robot.warnings}};
   for (int i = 1; i < model.numBodies(); ++i) {
     const Joint& joint = model.joints()[i];
@@ -231,9 +287,15 @@ std::string makeRobotInfo(const LoadedRobot& robot) {
                                 {"kind", contact.kind == ContactKind::Surface6D ? "6d" : "3d"},
                                 {"body", model.bodies()[contact.body].name},
                                 {"sole", {2 * contact.half_length, 2 * contact.half_width}}});
-  for (size_t i = 1; i < postures.size(); ++i)
+  for (size_t i = 1; i < postures.size(); ++i) {
     json["references"].push_back(
         {{"name", postures[i].name}, {"closed", postures[i].closed}, {"message", postures[i].message}});
+    for (const ReferenceJoint& joint : listReferenceJoints(model, model.references()[i - 1], postures[i].q))
+      json["reference_joints"].push_back({{"reference", postures[i].name},
+                                          {"joint", model.joints()[joint.joint].name},
+                                          {"given", toJson(joint.given)},
+                                          {"assembled", toJson(joint.assembled)}});
+  }
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

@@ -31,7 +31,7 @@ struct AssemblyProblem {
 
 enum class AssemblyStep {
   Preferred,  ///< Eq. (1), by a singular value decomposition
-  Shortest  ///< z = 0: the least change per step, by a complete orthogonal decomposition, many times cheaper
+  Shortest    ///< z = 0: the least change per step, by a complete orthogonal decomposition, many times cheaper
 };
 
 struct AssemblyOptions {
@@ -72,6 +72,17 @@ AssemblyProblem makeReferenceProblem(const Model& model, const Reference& refere
 /// Assembled reference by name.
 /// \throws ModelError when there is no such reference
 AssemblyResult assembleReference(const Model& model, const std::string& name, const AssemblyOptions& options = {});
+
+/// A joint that a reference gives: its q there and in an assembled configuration.
+struct ReferenceJoint {
+  int joint = 0;  ///< body/joint index
+  VectorXd given, assembled;
+  double moved = 0;  ///< largest difference of a coordinate, rad or m
+};
+
+/// The joints of a reference but for the free-flyer, which stands where height and feet put it. Their values are preferences:
+/// closures, height and feet come first.
+std::vector<ReferenceJoint> listReferenceJoints(const Model& model, const Reference& reference, ConstVectorRef q);
 
 /// Closest velocity (in the least-squares sense over v) that keeps all closures of the set closed.
 VectorXd projectVelocity(const Model& model, Workspace& ws, const ConstraintSet& constraints, ConstVectorRef q,
