@@ -56,6 +56,8 @@ const std::vector<Mistake> kUrdfMistakes = {
     {"<parent link=\"arm\"/>", "<parent link=\"hand\"/>", "link 'hand'", "cycle", "closure"},
     {"<mass value=\"3\"/>", "<mass value=\"nan\"/>", "link 'base'", "<mass value=\"nan\"> (line 5)", "correct"},
     {"<mass value=\"3\"/>", "<mass value=\"1e999\"/>", "link 'base'", "finite", "correct"},
+    {"<mass value=\"3\"/>", "<mass value=\"1e308\"/>", "link 'base'", "its mass (1e+308 kg)", "correct"},
+    {"xyz=\"0 0 0.5\"", "xyz=\"0 0 1e300\"", "joint 'shoulder'", "its origin is not within 1e+12 m", "correct"},
     {"<mass value=\"3\"/>", "<mass value=\"three\"/>", "link 'base'", "<mass value=\"three\">", "correct"},
     {"<mass value=\"3\"/>", "<mass value=\"-3\"/>", "link 'base'", "mass is negative (-3", "0 or more"},
     {"<mass value=\"3\"/>", "", "robot 'toy'", "Link [base]", "correct"},
@@ -249,6 +251,42 @@ TEST_CASE("files that are no robot at all are errors") {
   CHECK(getErrorOfLoading(directory.writeRobot(deep, "")).find("nested deeper") != std::string::npos);
   CHECK(getErrorOfLoading(directory.writeRobot(kToyUrdf, std::string(100000, '['))).find("robot.yaml") !=
         std::string::npos);
+}
+
+TEST_CASE("names that are not in UTF-8 are refused where they are, in every format") {
+  const RobotDirectory directory;
+  const std::string urdf = kToyUrdf, yaml = kToyYaml;
+  const std::string mjcf = "<mujoco>\n<worldbody>\n<body name='arm'><joint name='knee'/></body></worldbody></mujoco>";
+  const auto check = [](const std::string& error, const std::string& place) {
+    CAPTURE(error);
+    CHECK(error.compare(0, place.size(), place) == 0);
+    CHECK(error.find("UTF-8") != std::string::npos);
+  };
+  // A letter of Latin-1, an overlong form, half a surrogate pair, a lead byte without its successors.
+  for (const std::string& bad : {"\xe9", "\xc0\xaf", "\xed\xa0\x80", "\xf5\x80\x80\x80", "\xe2\x82"}) {
+    check(getErrorOfLoading(directory.writeRobot(replaceOnce(urdf, "\"wrist\"", "\"wr" + bad + "st\""), yaml)),
+          directory.path() + "/robot.urdf: line 30: ");
+    check(getErrorOfLoading(directory.writeRobot(urdf, yaml + "# " + bad + "\n")),
+          directory.path() + "/robot.yaml: line 4: ");
+    check(getErrorOfLoading(directory.write("robot.xml", replaceOnce(mjcf, "knee", "kn" + bad))),
+          directory.path() + "/robot.xml: line 3: ");
+  }
+  for (const char* good : {"\xc3\xa9", "\xe2\x82\xac", "\xf0\x9f\xa6\xb5", "&#233;"})
+    CHECK(getErrorOfLoading(
+              directory.writeRobot(replaceOnce(urdf, "\"wrist\"", std::string("\"") + good + "\""), yaml)) == "");
+  check(getErrorOfLoading(directory.writeRobot(replaceOnce(urdf, "\"wrist\"", "\"&#xd800;\""), yaml)),
+        directory.path() + "/robot.urdf: <joint> (line 30): its attribute 'name'");
+}
+
+TEST_CASE("XML entities are refused for what they are") {
+  const RobotDirectory directory;
+  const std::string declared = "<?xml version=\"1.0\"?>\n<!DOCTYPE robot [\n<!ENTITY m \"3\">\n]>\n";
+  for (const char* root : {"robot", "mujoco"}) {
+    const std::string text = declared + "<" + root + " name=\"&m;\"/>";
+    const std::string path = directory.write(std::string("it") + (root[0] == 'r' ? ".urdf" : ".xml"), text);
+    CHECK(getErrorOfLoading(path).find(path + ": <!DOCTYPE> (line 2): it declares entities, which are not read; ") ==
+          0);
+  }
 }
 
 // For any bytes, loadRobot returns a model or throws a ModelError.

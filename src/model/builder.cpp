@@ -4,8 +4,15 @@
 #include <cmath>
 
 #include "math/decompositions.h"
+#include "model/number_text.h"
 
 namespace bielle {
+namespace {
+
+// kg, m, kg m^2: far beyond any robot, and far below what overflows in products of a few such numbers.
+constexpr double kBeyondRobots = 1e12;
+
+}  // namespace
 
 ModelBuilder::ModelBuilder(std::string name, std::string source) : source_(std::move(source)) {
   model_.name_ = std::move(name);
@@ -37,6 +44,9 @@ void ModelBuilder::addLink(const std::string& link, const std::string& parent_li
   if (frames_.count(link))
     fail("link '" + link + "'", "it is declared twice", "give every link and frame a unique name");
   const FramePlace parent = getFrame(parent_link, element);
+  if (!(joint.X_PJ.p.cwiseAbs().maxCoeff() <= kBeyondRobots))
+    fail(element, "its origin is not within " + formatNumber(kBeyondRobots) + " m of its parent link",
+         "correct its <origin>, in m");
   if (joint.kind == JointKind::Fixed) {
     const SE3 X_BF = parent.X_BF * joint.X_PJ;
     frames_[link] = {parent.body, X_BF};
@@ -308,8 +318,14 @@ void ModelBuilder::checkInertias(std::vector<std::string>* warnings) const {
     const std::string element = "link '" + link + "'";
     if (!std::isfinite(inertia.mass) || !inertia.com.allFinite() || !inertia.I_com.allFinite())
       fail(element, "its inertia is not a finite number", "correct the <inertial> element");
+    if (std::max({inertia.mass, inertia.com.cwiseAbs().maxCoeff(), inertia.I_com.cwiseAbs().maxCoeff()}) >
+        kBeyondRobots)
+      fail(element,
+           "its mass (" + formatNumber(inertia.mass) + " kg), its centre of mass or its inertia exceeds " +
+               formatNumber(kBeyondRobots) + " kg, m or kg m^2",
+           "correct the <inertial> element");
     if (inertia.mass < 0)
-      fail(element, "its mass is negative (" + std::to_string(inertia.mass) + " kg)", "give 0 or more");
+      fail(element, "its mass is negative (" + formatNumber(inertia.mass) + " kg)", "give 0 or more");
     const Vector3d moments =
         Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia.I_com, Eigen::EigenvaluesOnly).eigenvalues();
     // A body's principal moments are sums of two non-negative second moments: none negative, none above the sum of the
@@ -323,7 +339,7 @@ void ModelBuilder::checkInertias(std::vector<std::string>* warnings) const {
       fail(element, "it has rotational inertia but no mass", "give it a mass, or no inertia");
     if (warnings && inertia.mass >= 1000)
       warnings->push_back((source_.empty() ? "" : source_ + ": ") + element + ": a mass of " +
-                          std::to_string(inertia.mass) + " kg is implausible for a leg");
+                          formatNumber(inertia.mass) + " kg is implausible for a leg");
   }
 }
 

@@ -7,4 +7,9 @@ namespace bielle {
 /// \throws ModelError naming the file when it cannot be read
 std::string readTextFile(const std::string& path, const std::string& remedy = "check the path and its permissions");
 
+/// \throws ModelError naming `path` and the line of the first byte that is not UTF-8, in which names are printed and passed on
+void requireUtf8(const std::string& text, const std::string& path);
+/// The place of the first byte that is not UTF-8; std::string::npos for none.
+size_t findNotUtf8(const std::string& text);
+
 }  // namespace bielle

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "bielle/model/error.h"
+#include "model/text_file.h"
 
 namespace bielle {
 namespace {
@@ -40,15 +41,33 @@ void checkDepth(const std::string& xml, const std::string& path) {
   }
 }
 
+// References to characters may stand for what is none.
+void checkAttributes(const TiXmlElement& element, const std::string& path) {
+  for (const TiXmlAttribute* a = element.FirstAttribute(); a; a = a->Next())
+    if (findNotUtf8(a->ValueStr()) != std::string::npos)
+      throw ModelError(path, "<" + element.ValueStr() + "> (line " + std::to_string(element.Row()) + ")",
+                       std::string("its attribute '") + a->Name() + "' refers to a character that is not in UTF-8",
+                       "write the character itself, in UTF-8");
+  for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement()) checkAttributes(*e, path);
+}
+
 }  // namespace
 
 void parseXml(const std::string& xml, const std::string& path, TiXmlDocument& document) {
+  requireUtf8(xml, path);
   checkDepth(xml, path);
   document.Parse(xml.c_str());
   const int row = document.ErrorRow();  // 0 at the end of the text
   if (document.Error())
     throw ModelError(path, row > 0 ? "line " + std::to_string(row) : "document",
                      std::string("it is not well-formed XML: ") + document.ErrorDesc(), "correct the syntax");
+  if (document.RootElement()) return checkAttributes(*document.RootElement(), path);
+  const size_t declaration = xml.find("<!DOCTYPE");
+  if (declaration != std::string::npos)
+    throw ModelError(
+        path, "<!DOCTYPE> (line " + std::to_string(1 + std::count(xml.begin(), xml.begin() + declaration, '\n')) + ")",
+        "it declares entities, which are not read",
+        "have them replaced, as by `xmllint --noent --dropdtd`, or use properties of xacro");
 }
 
 std::string getAttribute(const TiXmlElement* element, const char* attribute) {

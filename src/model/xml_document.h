@@ -6,7 +6,8 @@
 
 namespace bielle {
 
-/// \throws ModelError naming `path` for text that is not well-formed XML, or that nests deeper than any robot
+/// \throws ModelError naming `path` for text that is not UTF-8 or not well-formed XML, that declares entities, or that nests deeper
+///   than any robot
 void parseXml(const std::string& xml, const std::string& path, TiXmlDocument& document);
 
 /// Attribute of an element, empty without it or without the element.

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "bielle/model/error.h"
+#include "model/text_file.h"
 
 namespace bielle {
 
@@ -103,6 +104,7 @@ const YamlEntry& require(const YamlFields& fields, const std::string& key, const
 
 void readYamlDocument(const std::string& path, const std::string& text,
                       const std::function<void(const YamlEntry&)>& read) {
+  requireUtf8(text, path);
   try {
     read(YamlEntry(path, "", YAML::Load(text)));
   } catch (const YAML::Exception& error) {

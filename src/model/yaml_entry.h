@@ -52,7 +52,7 @@ const YamlEntry* find(const YamlFields& fields, const std::string& key);
 /// \throws ModelError naming the owner, if the key is missing
 const YamlEntry& require(const YamlFields& fields, const std::string& key, const YamlEntry& owner);
 
-/// Passes the document to `read`. \throws ModelError if `text`, of the file `path`, is not YAML
+/// Passes the document to `read`. \throws ModelError if `text`, of the file `path`, is not YAML in UTF-8
 void readYamlDocument(const std::string& path, const std::string& text,
                       const std::function<void(const YamlEntry&)>& read);
 
