@@ -9,13 +9,16 @@
 #include "bielle/dynamics/assembly.h"
 #include "bielle/dynamics/kinematics.h"
 #include "bielle/dynamics/rnea.h"
+#include "bielle/io/robot_info.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/reader.h"
 #include "bielle/robots/generators.h"
 #include "get_error.h"
 #include "io/adopt.h"
+#include "io/drake.h"
 #include "io/mjcf.h"
 #include "io/mjcf_coordinates.h"
+#include "io/sdf.h"
 #include "mechanisms.h"
 #include "published_robots.h"
 #include "robot_difference.h"
@@ -334,39 +337,72 @@ TEST_CASE("a robot of MuJoCo becomes one of ours and stays the same") {
   }
 }
 
-TEST_CASE("windings and gears of motors go out and come in again, and other formats tell that they are lost") {
+TEST_CASE(
+    "windings, gears and speeds of motors go out and come in again, and other formats tell that energies change") {
   ModelParts parts = takeParts(loadRobot("bipetto").model);
   Motor &first = parts.motors[0], &second = parts.motors[3];
-  first.drive = {"", 9, 5.79e-5, 0.095, 0.16, 48, 28, 12, 0.9, 0.8, 0.49};
+  first.drive = {"rotor \"a\" & <b>", 9, 5.79e-5, 0.095, 0.16, 48, 28, 12, 0.9, 0.8, 0.49};
   first.torque_loss = 0.123456789012;
   first.continuous_effort = 7;
   second.drive.efficiency = 0.7;
+  parts.velocity_limits[first.dof] = first.velocity_limit = 4.25;
   const Model a = ModelBuilder::restore(parts);
   const RobotDirectory directory;
   const RobotText text = formatRobot(a);
-  const Model b = loadRobot(directory.writeRobot(text.urdf, text.yaml)).model;
-  for (int m : {0, 3, 4}) {
-    const Motor &before = a.motors()[m], &after = b.motors()[m];
-    const MotorDrive &x = before.drive, &y = after.drive;
-    CAPTURE(before.name);
-    CHECK(x.isGiven() == y.isGiven());
-    for (auto field :
-         {&MotorDrive::ratio, &MotorDrive::rotor_inertia, &MotorDrive::torque_constant, &MotorDrive::resistance,
-          &MotorDrive::voltage, &MotorDrive::current, &MotorDrive::continuous_current, &MotorDrive::efficiency,
-          &MotorDrive::back_efficiency, &MotorDrive::mass})
-      CHECK(areSame(x.*field, y.*field));
-    CHECK(before.torque_loss.has_value() == after.torque_loss.has_value());
-    CHECK(areSame(before.getTorqueLoss(), after.getTorqueLoss()));
-    CHECK(areSame(before.continuous_effort, after.continuous_effort));
-    CHECK(after.armature == before.armature);
-  }
+  const Model ours = loadRobot(directory.writeRobot(text.urdf, text.yaml)).model;
+  for (const Model& b : {ours, readMjcfText(write(a).xml)})
+    for (int m : {0, 3, 4}) {
+      const Motor &before = a.motors()[m], &after = b.motors()[m];
+      const MotorDrive &x = before.drive, &y = after.drive;
+      CAPTURE(before.name);
+      CHECK(x.isGiven() == y.isGiven());
+      CHECK(x.type == y.type);
+      for (auto field :
+           {&MotorDrive::ratio, &MotorDrive::rotor_inertia, &MotorDrive::torque_constant, &MotorDrive::resistance,
+            &MotorDrive::voltage, &MotorDrive::current, &MotorDrive::continuous_current, &MotorDrive::efficiency,
+            &MotorDrive::back_efficiency, &MotorDrive::mass})
+        CHECK(areSame(x.*field, y.*field));
+      CHECK(before.torque_loss.has_value() == after.torque_loss.has_value());
+      CHECK(areSame(before.getTorqueLoss(), after.getTorqueLoss()));
+      CHECK(areSame(before.continuous_effort, after.continuous_effort));
+      CHECK(areSame(a.velocityLimits()[before.dof], b.velocityLimits()[after.dof]));
+      CHECK(after.armature == before.armature);
+    }
   // Written again it is the same file: what follows from the drive is now given.
-  CHECK(formatRobot(b).yaml == formatRobot(loadRobot(directory.writeRobot(text.urdf, formatRobot(b).yaml)).model).yaml);
+  CHECK(formatRobot(ours).yaml ==
+        formatRobot(loadRobot(directory.writeRobot(text.urdf, formatRobot(ours).yaml)).model).yaml);
   using Catch::Contains;
-  std::string warnings;
-  for (const std::string& warning : formatMjcf(a, write(a).q_ref).warnings) warnings += warning + "\n";
-  CHECK_THAT(warnings, Contains("motor '" + first.name + "': its winding and gear") &&
-                           Contains("motor '" + second.name + "': its winding and gear"));
+  const auto join = [](const std::vector<std::string>& warnings) {
+    std::string all;
+    for (const std::string& warning : warnings) all += warning + "\n";
+    return all;
+  };
+  CHECK_THAT(join(formatMjcf(a, write(a).q_ref).warnings), !Contains("motor '"));
+  for (const std::string& warnings : {join(formatSdf(a, write(a).q_ref).warnings), join(formatDrake(a).warnings)})
+    CHECK_THAT(warnings, Contains("motor '" + first.name + "': its winding") &&
+                             Contains("so electrical energies change") &&
+                             Contains("motor '" + second.name + "': its winding"));
+}
+
+TEST_CASE("what a file of MuJoCo says of our motors in its own texts is checked as in a YAML file, with its line") {
+  ModelParts parts = takeParts(loadRobot("belt_biped").model);
+  parts.motors.front().torque_loss = 0.3;
+  const std::string xml = write(ModelBuilder::restore(parts)).xml, name = parts.motors.front().name;
+  const size_t end = xml.find("  </custom>");
+  const RobotDirectory directory;
+  const auto load = [&](const std::string& text) { return loadRobot(directory.write("robot.xml", text)); };
+  REQUIRE(end != std::string::npos);
+  const auto insert = [&](const std::string& text) { return std::string(xml).insert(end, text); };
+  const auto line = std::to_string(1 + std::count(xml.begin(), xml.begin() + static_cast<std::ptrdiff_t>(end), '\n'));
+  CHECK_THAT(getError([&] { load(insert("<text name='bielle:motor:" + name + "' data='resistance: much'/>")); }),
+             Catch::Contains("'resistance' (line " + line + "): it is not a number"));
+  const auto warns = [&](const std::string& text) {
+    std::string all;
+    for (const std::string& warning : load(insert(text)).warnings) all += warning + "\n";
+    return all;
+  };
+  CHECK_THAT(warns("<text name='bielle:motor:no' data='mass: 1'/>"), Catch::Contains("<custom> <text>"));
+  CHECK_THAT(warns("<numeric name='n' data='1'/>"), Catch::Contains("<custom> <numeric>"));
 }
 
 TEST_CASE("shapes go out and come in again") {

@@ -54,7 +54,7 @@ class DrakeWriter {
     warnMassless();
     warnings_.addArmature(false);
     warnings_.addTargets();
-    warnings_.addYamlOnly(true);
+    warnings_.addYamlOnly(MotorData::Gears);
     return {text, warnings_.get()};
   }
 

@@ -2,25 +2,32 @@
 
 #include <cmath>
 
+#include "model/number_text.h"
+
 namespace bielle {
 
 void FormatWarnings::add(const std::string& element, const std::string& problem) {
   warnings_.push_back(model_.name() + ": " + element + ": " + problem);
 }
 
-void FormatWarnings::addYamlOnly(bool has_gears) {
+void FormatWarnings::addYamlOnly(MotorData written) {
   if (!model_.serialJoints().empty()) add("serial joints", "they are left out");
   for (const Joint& joint : model_.joints())
     if (joint.position_importance != 1 || joint.velocity_importance != 1)
       add("joint '" + joint.name + "'", "its importance is left out");
+  if (written == MotorData::All) return;
+  const std::string consequence = ", so electrical energies change: without them a loss of " +
+                                  formatNumber(kDefaultTorqueLoss) + " W/(N m)^2 is assumed";
   for (const Motor& motor : model_.motors()) {
     MotorDrive drive = motor.drive;
-    if (has_gears) drive.ratio = 1, drive.rotor_inertia = 0;
+    if (written == MotorData::Gears) drive.ratio = 1, drive.rotor_inertia = 0;
     if (drive.isGiven() || std::isfinite(motor.continuous_effort))
       add("motor '" + motor.name + "'",
-          has_gears ? "its winding and the losses of its gear are left out" : "its winding and gear are left out");
+          (written == MotorData::Gears ? "its winding and the losses of its gear are left out"
+                                       : "its winding and gear are left out") +
+              consequence);
     else if (motor.torque_loss)
-      add("motor '" + motor.name + "'", "its torque_loss is left out");
+      add("motor '" + motor.name + "'", "its torque_loss is left out" + consequence);
   }
 }
 

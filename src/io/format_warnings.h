@@ -7,15 +7,18 @@
 
 namespace bielle {
 
+/// What a file says of motors beyond their joints and limits: the ratio and the rotor's inertia, or all that ours says.
+enum class MotorData { None, Gears, All };
+
 class FormatWarnings {
  public:
   explicit FormatWarnings(const Model& model) : model_(model) {}
 
   /// "robot: element: problem"
   void add(const std::string& element, const std::string& problem);
-  /// What our YAML file alone says: serial joints, importance of joints, windings, gears and losses of motors.
-  /// \param has_gears  whether the file says the ratio and the rotor's inertia
-  void addYamlOnly(bool has_gears = false);
+  /// What our YAML file alone says: serial joints, importance of joints, and of windings, gears and losses of motors what is not
+  /// `written`.
+  void addYamlOnly(MotorData written = MotorData::None);
   /// Armature of joints. \param of_motors  also of those with a motor
   void addArmature(bool of_motors);
   /// Contacts, references and gravity.

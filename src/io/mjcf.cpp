@@ -7,12 +7,14 @@
 #include <tuple>
 
 #include "bielle/dynamics/assembly.h"
+#include "bielle/io/robot_writer.h"
 #include "io/format_warnings.h"
 #include "io/mjcf_coordinates.h"
 #include "io/xml_text.h"
 #include "math/decompositions.h"
 #include "math/so3.h"
 #include "model/joint.h"
+#include "model/reader_mjcf.h"
 
 namespace bielle {
 namespace {
@@ -66,6 +68,7 @@ class MjcfWriter {
     writeTendons();
     writeClosures();
     writeMotors();
+    writeMotorData();
     writeKeyframes();
     out_ << "</mujoco>\n";
     listOmissions();
@@ -390,6 +393,20 @@ class MjcfWriter {
     out_ << "  </actuator>\n";
   }
 
+  // Windings, gears, losses and limits of speed are what our YAML file says of them, as text that MuJoCo keeps and does not use.
+  void writeMotorData() {
+    std::string texts;
+    for (const Motor& motor : model_.motors()) {
+      std::string data = formatMotorData(motor);
+      if (std::isfinite(model_.velocityLimits()[motor.dof]))
+        data += ", velocity: " + formatMjcf(model_.velocityLimits()[motor.dof]);
+      if (!data.empty())
+        texts +=
+            "    <text" + attribute("name", kMjcfMotorData + motor.name) + attribute("data", data.substr(2)) + "/>\n";
+    }
+    if (!texts.empty()) out_ << "  <custom>\n" << texts << "  </custom>\n";
+  }
+
   void writeKeyframes() {
     if (model_.references().empty()) return;
     out_ << "  <keyframe>\n";
@@ -429,7 +446,7 @@ class MjcfWriter {
     std::string speeds, meshes;
     for (const Joint& joint : model_.joints()) {
       const auto limits = model_.velocityLimits().segment(joint.idx_v, joint.nv);
-      if ((limits.array() < std::numeric_limits<double>::infinity()).any())
+      if ((limits.array() < std::numeric_limits<double>::infinity()).any() && model_.findMotor(joint.name) < 0)
         speeds += (speeds.empty() ? "'" : ", '") + joint.name + "'";
       if ((joint.kind == JointKind::Planar || joint.kind == JointKind::FreeFlyer) &&
           model_.armature()[joint.idx_v] != 0)
@@ -438,7 +455,7 @@ class MjcfWriter {
     for (const Reference& reference : model_.references())
       if (!reference.height_frame.empty() || !reference.feet.empty())
         warn("reference '" + reference.name + "'", "only its assembled posture is written, as a keyframe");
-    warnings_.addYamlOnly();
+    warnings_.addYamlOnly(MotorData::All);
     if (!speeds.empty()) warn("joints " + speeds, "their speed limits are left out");
     for (const std::string& mesh : meshes_) meshes += (meshes.empty() ? "'" : ", '") + mesh + "'";
     if (!meshes.empty()) warn("meshes " + meshes, "they are left out");

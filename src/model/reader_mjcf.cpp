@@ -42,6 +42,7 @@ MjcfFile MjcfReader::read() {
   joinHinges();
   addClosures();
   forEach("actuator", [this](const TiXmlElement& e) { readActuator(e); });
+  forEach("custom", [this](const TiXmlElement& e) { readCustom(e); });
   forEach("keyframe", [this](const TiXmlElement& e) { readKey(e); });
   addStart();
   for (const TiXmlElement* e = root_.FirstChildElement(); e; e = e->NextSiblingElement()) noteSection(*e);
@@ -117,8 +118,8 @@ void MjcfReader::readAsset(const TiXmlElement& e) {
 
 // Sections that are not read.
 void MjcfReader::noteSection(const TiXmlElement& e) {
-  static const std::set<std::string> read = {"compiler", "option",   "default",  "asset",   "worldbody",
-                                             "tendon",   "equality", "actuator", "keyframe"};
+  static const std::set<std::string> read = {"compiler", "option",   "default",  "asset",  "worldbody",
+                                             "tendon",   "equality", "actuator", "custom", "keyframe"};
   static const std::set<std::string> unable = {"include", "deformable", "extension"};
   const std::string& tag = e.ValueStr();
   if (read.count(tag)) return;

@@ -12,6 +12,9 @@
 
 namespace bielle {
 
+/// Before the name of a motor: the name of a text of <custom> that says of it what our YAML file would.
+inline const std::string kMjcfMotorData = "bielle:motor:";
+
 constexpr double kSamePlace = 1e-9;  // of axes and places that the writer made equal
 
 inline SE3 translate(const Vector3d& p) { return {Matrix3d::Identity(), p}; }
@@ -148,6 +151,7 @@ class MjcfReader {
   void readTendonEquality(MjcfElement& e, const std::string& name);
   void listDriven(const TiXmlElement& section);
   void readActuator(const TiXmlElement& element);
+  void readCustom(const TiXmlElement& element);
   void readKey(const TiXmlElement& element);
   void addStart();
 

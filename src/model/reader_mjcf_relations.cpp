@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "bielle/model/error.h"
+#include "model/motor_catalogue.h"
 #include "model/reader_mjcf.h"
 
 namespace bielle {
@@ -279,6 +280,23 @@ void MjcfReader::readActuator(const TiXmlElement& element) {
   yaml_.motors.push_back(motor);
   const std::string name = getAttribute(&element, "name");
   if (!name.empty() && name != joint) e.note("it is renamed after its joint");
+}
+
+void MjcfReader::readCustom(const TiXmlElement& element) {
+  const std::string name = getAttribute(&element, "name"),
+                    joint = name.substr(std::min(name.size(), kMjcfMotorData.size()));
+  const auto motor =
+      std::find_if(yaml_.motors.begin(), yaml_.motors.end(), [&joint](const MotorSpec& m) { return m.joint == joint; });
+  if (element.ValueStr() != "text" || name != kMjcfMotorData + joint || motor == yaml_.motors.end())
+    return settings_.notes.add("<custom> <" + element.ValueStr() + ">", element.Row(), "left out");
+  const std::string lines_above(std::max(0, element.Row() - 1), '\n');  // so that errors name the line of the file
+  readYamlDocument(settings_.path, lines_above + "{'" + kMjcfMotorData + "': {" + getAttribute(&element, "data") + "}}",
+                   [&](const YamlEntry& root) {
+                     const std::optional<double> effort = motor->effort;
+                     *motor = readMotorSpecs(root, settings_.path, nullptr).front();
+                     motor->joint = joint;
+                     motor->effort = effort;
+                   });
 }
 
 void MjcfReader::readKey(const TiXmlElement& element) {
