@@ -530,3 +530,30 @@ TEST_CASE("an adopted robot has the feet, the serial joints and a posture of the
   CHECK_THAT(getError([&] { adoptRobot(delta, "delta"); }),
              Catch::Contains("it has a fixed base; only robots that stand"));
 }
+
+TEST_CASE("an adopted robot bends its knees the way that their ranges allow") {
+  for (const auto& [lower, upper] : {std::pair{0.02, 2.0}, {-2.0, -0.02}}) {
+    CAPTURE(lower);
+    ModelParts parts = takeParts(loadRobot("rsu_biped").model);
+    parts.contacts.clear();
+    parts.references.clear();
+    for (const Joint& joint : parts.joints)
+      if (joint.name.rfind("knee", 0) == 0)
+        parts.lower_limits[joint.idx_v] = lower, parts.upper_limits[joint.idx_v] = upper;
+    const RobotText bare = formatRobot(ModelBuilder::restore(parts));
+    const RobotDirectory directory;
+    const Adoption adoption = adoptRobot(loadRobot(directory.writeRobot(bare.urdf, bare.yaml)), "../robot.urdf");
+    CAPTURE(adoption.yaml);
+    const LoadedRobot adopted = loadRobot(directory.write("mine/mine.yaml", adoption.yaml));
+    REQUIRE(adopted.model.references().size() == 1);
+    CHECK(checkReferences(adopted).empty());
+    const AssemblyResult posture = assembleReference(adopted.model, "half_sitting");
+    REQUIRE(posture.status == AssemblyStatus::Closed);
+    for (const char* knee : {"knee_left", "knee_right"}) {
+      const double q = posture.q[adopted.model.joints()[adopted.model.findJoint(knee)].idx_q];
+      CHECK(q > lower);
+      CHECK(q < upper);
+    }
+    CHECK(2 * std::asin(posture.q.segment<3>(3).norm()) < 0.1);  // the trunk is upright
+  }
+}

@@ -50,7 +50,8 @@ class Adopter {
   Adopter(const LoadedRobot& robot, const std::string& path) : model_(robot.model), path_(path), ws_(robot.model) {
     if (!model_.hasFreeFlyer())
       fail("it has a fixed base",
-           "only robots that stand on feet can be adopted; `bielle solve` accepts others unchanged");
+           "only robots that stand on feet can be adopted; complete others by hand, with a YAML file that has the key "
+           "`model`, motors and a reference");
     const AssemblyResult closed = findClosedConfiguration(model_);
     if (closed.status != AssemblyStatus::Closed) fail("its loops do not close: " + closed.message, "correct the robot");
     updatePositions(model_, ws_, closed.q);
@@ -201,13 +202,24 @@ class Adopter {
     return reference;
   }
 
-  // Whether it closes within the ranges of the joints; moves the base so that the centre of mass is over the feet.
+  // Legs bend within the ranges of their joints, if these say which way.
+  void preferRanges(Reference& reference) const {
+    for (const Joint& joint : model_.joints())
+      if (joint.nv == 1 && std::isfinite(model_.upperLimits()[joint.idx_v] - model_.lowerLimits()[joint.idx_v]))
+        reference.joints[joint.name] = {(model_.lowerLimits()[joint.idx_v] + model_.upperLimits()[joint.idx_v]) / 2};
+  }
+
+  // Whether it closes within the ranges of the joints; moves the base so that the centre of mass is over the feet. The base weighs
+  // more than other joints that are given; if there are any, all get the values that they have there.
   bool stand(Reference& reference) const {
+    constexpr double kJointWeight = 0.01;
     Workspace ws(*with_feet_);
-    std::vector<double>& base = reference.joints.begin()->second;
+    std::vector<double>& base = reference.joints.at(model_.joints()[1].name);
     double off = 0;
     for (int i = 0; i < kShifts; ++i) {
-      const AssemblyResult result = assemble(*with_feet_, makeReferenceProblem(*with_feet_, reference));
+      AssemblyProblem problem = makeReferenceProblem(*with_feet_, reference);
+      problem.weights.tail(model_.nv() - 6) = problem.weights.tail(model_.nv() - 6).cwiseMin(kJointWeight);
+      const AssemblyResult result = assemble(*with_feet_, problem);
       if (result.status != AssemblyStatus::Closed) return false;
       for (const Joint& joint : model_.joints())
         if (joint.nv == 1 && (result.q[joint.idx_q] < model_.lowerLimits()[joint.idx_v] ||
@@ -215,32 +227,45 @@ class Adopter {
           return false;
       updatePositions(*with_feet_, ws, result.q);
       off = calcCom(*with_feet_, ws).x();
-      if (std::abs(off) < kOver) return true;
+      if (std::abs(off) < kOver) {
+        for (auto& [name, values] : reference.joints) {
+          const Joint& joint = model_.joints()[model_.findJoint(name)];
+          for (int k = 0; k < joint.nq && reference.joints.size() > 1; ++k)
+            values[k] = round(result.q[joint.idx_q + k]);
+        }
+        return true;
+      }
       base[0] = round(base[0] - off);
     }
     return false;
   }
 
   void writePosture() {
-    for (double share = kHighest; share > kLowest; share -= kStep) {
-      Reference r = makePosture(share);
-      if (!stand(r)) continue;
-      guess(
-          "Posture: feet flat below the centre of mass, as far apart as in the neutral configuration but at least two "
-          "soles;");
-      const std::string more =
-          "the base at " + format(100 * share) +
-          " % of its height there. Its loops close; angles under `joints` determine how the legs bend.";
-      guesses_.back() += " " + more;
-      const std::vector<double>& base = r.joints.begin()->second;
-      out_ << "# " << more << "\nreferences:\n  half_sitting:\n    joints:\n      "
-           << quoteYaml(r.joints.begin()->first) << ": [" << format(base[0]) << ", 0, " << format(base[2])
-           << ", 0, 0, 0, 1]\n    height: {frame: " << quoteYaml(r.height_frame) << ", value: " << format(r.height)
-           << "}\n    feet:\n";
-      for (const auto& [name, place] : r.feet) out_ << "      " << name << ": [0, " << format(place.y()) << ", 0]\n";
-      return;
-    }
+    for (bool within_ranges : {false, true})
+      for (double share = kHighest; share > kLowest; share -= kStep) {
+        Reference r = makePosture(share);
+        if (within_ranges) preferRanges(r);
+        if (stand(r)) return writePosture(r, share);
+      }
     guess("Posture: none was found with flat feet and joints within their ranges. Give one under `references`.");
+  }
+
+  void writePosture(const Reference& r, double share) {
+    guess(
+        "Posture: feet flat below the centre of mass, as far apart as in the neutral configuration but at least two "
+        "soles;");
+    const std::string more =
+        "the base at " + format(100 * share) +
+        " % of its height there. Its loops close; angles under `joints` determine how the legs bend.";
+    guesses_.back() += " " + more;
+    out_ << "# " << more << "\nreferences:\n  half_sitting:\n    joints:\n";
+    for (const auto& [name, values] : r.joints) {
+      std::string list;
+      for (double value : values) list += (list.empty() ? "" : ", ") + format(value);
+      out_ << "      " << quoteYaml(name) << ": " << (values.size() == 1 ? list : "[" + list + "]") << "\n";
+    }
+    out_ << "    height: {frame: " << quoteYaml(r.height_frame) << ", value: " << format(r.height) << "}\n    feet:\n";
+    for (const auto& [name, place] : r.feet) out_ << "      " << name << ": [0, " << format(place.y()) << ", 0]\n";
   }
 
   void writeSerialJoints() {
