@@ -40,11 +40,18 @@ Worst findNotFinite(const CheckedMotion& motion) {
 
 }  // namespace
 
-std::string formatNumber(double value) {
-  char text[32];
+std::string formatNumber(double value, int more) {
+  char text[64];
   const bool plain = value == 0 || (std::abs(value) >= 1e-3 && std::abs(value) < 1e4);
-  std::snprintf(text, sizeof text, plain ? "%.4f" : "%.2e", value);
+  std::snprintf(text, sizeof text, plain ? "%.*f" : "%.*e", (plain ? 4 : 2) + more, value);
   return text;
+}
+
+int countMoreDigits(double a, double b) {
+  constexpr int kMost = 16;
+  int more = 0;
+  while (a != b && more < kMost && formatNumber(a, more) == formatNumber(b, more)) ++more;
+  return more;
 }
 
 std::string Worst::describePlace(const CheckedMotion& motion) const {
@@ -122,10 +129,12 @@ std::string countRows(std::ptrdiff_t rows, const char* one) {
 void printRow(std::ostream& out, const CheckRow& row) {
   const bool goal = row.kind == CheckRow::Kind::Goal, judged = row.kind != CheckRow::Kind::Note && row.value;
   const char* relation = goal ? "== " : row.kind == CheckRow::Kind::AtMost ? "<= " : ">= ";
-  const char* verdict = goal ? (row.isMissedGoal() ? "MISS" : "met") : (row.passed() ? "pass" : "FAIL");
+  const bool met = goal ? !row.isMissedGoal() : row.passed();
+  const int more = judged && !met ? countMoreDigits(*row.value, row.bound) : 0;
+  const char* verdict = goal ? (met ? "met" : "MISS") : (met ? "pass" : "FAIL");
   out << "  " << std::left << std::setw(34) << row.name << std::right << std::setw(9)
-      << (row.value ? formatNumber(*row.value) : "-") << "  " << std::left << std::setw(12)
-      << (judged ? relation + formatNumber(row.bound) : "") << std::setw(12) << (row.value ? row.unit : "")
+      << (row.value ? formatNumber(*row.value, more) : "-") << "  " << std::left << std::setw(12)
+      << (judged ? relation + formatNumber(row.bound, more) + " " : "") << std::setw(12) << (row.value ? row.unit : "")
       << std::setw(6) << (judged ? verdict : "") << row.note << "\n";
 }
 

@@ -44,7 +44,9 @@ class LimitUse {
   void add(double value, double limit, const std::string& unit, int node, const std::string& name) {
     if (!std::isfinite(limit)) return;
     const double use = std::abs(value) / limit;
-    worst_.add(use, node, name + " " + formatNumber(std::abs(value)) + " of " + formatNumber(limit) + " " + unit);
+    const double size = std::abs(value);
+    const int more = size > limit ? countMoreDigits(size, limit) : 0;
+    worst_.add(use, node, name + " " + formatNumber(size, more) + " of " + formatNumber(limit, more) + " " + unit);
   }
   const Worst& worst() const { return worst_; }
 

@@ -62,6 +62,9 @@ void addForceRows(CheckContext& context);
 void addLimitRows(CheckContext& context);
 void addGoalRows(CheckContext& context);
 
-std::string formatNumber(double value);
+// \param more  digits beside the usual ones
+std::string formatNumber(double value, int more = 0);
+// How many more digits it takes to tell two numbers apart.
+int countMoreDigits(double a, double b);
 
 }  // namespace bielle::validation

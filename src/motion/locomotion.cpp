@@ -165,8 +165,9 @@ std::vector<Goal> makeSpeedGoals(const ContactSchedule& schedule, double speed, 
 
 Stance makeStance(const Model& model, const LocomotionOptions& options, const VectorXd& q0) {
   if (!model.hasFreeFlyer())
-    throw ModelError(model.name(), "root joint", "the robot cannot walk because its base is fixed",
-                     "load it with a free base");
+    throw ModelError(model.name(), "root joint",
+                     "its base is fixed, or moves on a rail, but a motion with steps needs a free one over two feet",
+                     "take `squat` or `jump`, which need no steps, or a robot with a free base");
   Stance stance;
   stance.q = q0;
   Workspace ws(model);

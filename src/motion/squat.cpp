@@ -44,6 +44,10 @@ StageSpec makeStage(const Model& model, const SquatOptions& o, const std::vector
   return stage;
 }
 
+std::string nameSupport(size_t feet) {
+  return feet == 1 ? "single support" : feet == 2 ? "double support" : "support by " + std::to_string(feet) + " feet";
+}
+
 }  // namespace
 
 std::vector<OptionEntry> listOptions(SquatOptions& o) {
@@ -90,7 +94,7 @@ MotionPlan planSquat(const Model& model, const SquatOptions& options, const Vect
   plan.ground.height = level;
   plan.ground.friction = options.friction;
   const int nodes = static_cast<int>(std::ceil((options.duration + 2 * options.settle) / options.time_step - 1e-9));
-  plan.schedule.phases = {{"double support", nodes, options.time_step, contacts}};
+  plan.schedule.phases = {{nameSupport(contacts.size()), nodes, options.time_step, contacts}};
   for (int k = 0; k <= nodes; ++k) {
     const double height = (com0.z() - level) * calcSquatHeight(options, k * options.time_step);
     const Vector3d com(com0.x(), com0.y(), level + height);

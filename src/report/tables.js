@@ -126,15 +126,22 @@ function describeVerdict(row) {
   return {text: row.pass ? 'pass' : 'FAIL', className: row.pass ? 'pass' : 'fail'};
 }
 
+// Value and bound with as many digits as a verdict of failure needs.
+function formatCompared(row) {
+  const numbers = [row.value, row.bound];
+  let digits = 6;
+  const format = value => (typeof value === 'number' ? formatNumber(value, digits) : '–');
+  while (!row.pass && digits < 17 && numbers[0] !== numbers[1] && format(numbers[0]) === format(numbers[1])) ++digits;
+  return numbers.map(value => ({text: format(value), className: typeof value === 'number' ? 'number' : ''}));
+}
+
 function fillCheck(parent, runs) {
   for (const run of runs.filter(r => r.check)) {
     parent.hidden = false;
     if (runs.length > 1) addElement(parent, 'h2', '', run.label);
-    const rows = (run.check.rows || [])
-                     .map(
-                         row =>
-                             [row.name, row.value, row.bound === null || row.bound === undefined ? '–' : row.bound,
-                              row.unit || '', describeVerdict(row), row.note || '']);
+    const rows =
+        (run.check.rows ||
+         []).map(row => [row.name, ...formatCompared(row), row.unit || '', describeVerdict(row), row.note || '']);
     addTable(parent, ['what', 'value', 'bound', 'unit', '', ''], rows);
   }
 }
