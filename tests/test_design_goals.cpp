@@ -1,5 +1,5 @@
-// Designs whose motions miss their goals. Oracles: the goals of plans that ask for something else than their costs; central
-// differences of what neighbours achieve; `bielle solve`, run by itself.
+// Designs whose motions miss their goals. Oracles: the goals of plans that ask for something else than their costs;
+// central differences of what neighbours achieve; `bielle solve`, run by itself.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>

@@ -34,8 +34,9 @@ void printInfo(const Json& robot) {
                {"name", "kind", "frame1", "frame2", "rows", "loop_dofs"});
   printSection(robot, "clusters", "clusters of closures", {"closures", "rows", "dofs"});
   printSection(robot, "motors", "motors", {"name", "armature", "effort_limit", "velocity_limit"});
-  printSection(robot, "drives", "windings and gears of motors (N m/A, ohm, V, A, N m; kg, part of the links)",
-               {"name", "type", "ratio", "torque_constant", "resistance", "voltage", "current", "continuous_effort", "mass"});
+  printSection(
+      robot, "drives", "windings and gears of motors (N m/A, ohm, V, A, N m; kg, part of the links)",
+      {"name", "type", "ratio", "torque_constant", "resistance", "voltage", "current", "continuous_effort", "mass"});
   printSection(robot, "joint_forces", "springs, dampers and friction on joints (N m, rad, s; N, m, s where prismatic)",
                {"name", "stiffness", "rest", "preload", "damping", "friction", "friction_speed"});
   printSection(robot, "point_springs", "springs and dampers between points (N/m, m, N, N s/m)",

@@ -36,8 +36,8 @@ MeasurePieces calcConstraintPieces(const DesignConstraint& constraint, const std
                                    const std::vector<MotorSlopes>& motions, const std::vector<double>& weights,
                                    const RobotSlopes& robot);
 
-/// Goals of motions made anew as pieces p <= 0: how far they are from what is requested, over their tolerance, within a hundredth of
-/// it, so that searches that end at a tolerance end inside it.
+/// Goals of motions made anew as pieces p <= 0: how far they are from what is requested, over their tolerance, within a
+/// hundredth of it, so that searches that end at a tolerance end inside it.
 MeasurePieces calcGoalPieces(const std::vector<MotorSlopes>& motions);
 
 }  // namespace bielle

@@ -75,8 +75,8 @@ MotionOutcome remakeMotion(const Model& model, const DesignMotion& motion, const
 MotionOutcome keepMotion(const Model& model, const DesignMotion& motion, const SolvedMotion& start,
                          const std::vector<MotorConversion>& drives, double margin);
 
-/// As `bielle solve` gives it: by its own steps, from its own guess, solved again where it does so. Without `lifted`, `motion` and
-/// `multipliers`. \param trajectory  of the closed model, with the velocities at which motors count
+/// As `bielle solve` gives it: by its own steps, from its own guess, solved again where it does so. Without `lifted`,
+/// `motion` and `multipliers`. \param trajectory  of the closed model, with the velocities at which motors count
 MotionOutcome solveUsually(const Model& model, const DesignMotion& motion, const std::vector<MotorConversion>& drives,
                            ShootingTrajectory& trajectory);
 

@@ -11,12 +11,13 @@
 ///     f = 1.5 W + 0.5 W s                    all are feasible, but a motion failed                                 (3)
 ///     f = 1.5 W + 0.5 W / (n + 1) V / (1 + V)        all n motions are made, but constraints are violated          (4)
 ///                                                    or goals are missed
-/// with V the sum of the violations of constraints, each relative to its bound (in centimetres for a distance), and of goals
-/// (bielle/motion/goal.h), by how much they are missed beyond their tolerance, relative to it; and with g_p (m or rad) the largest closing error that remains when loops, base and feet are moved to posture p, and s
-/// in (0, 1] the missing share of the motion (kept motions), else 1. (2) is continuous in the design, so that searches
-/// return to designs whose loops close. So designs that violate constraints less are better than those that violate them more, and
-/// these better than those without motions (Deb 2000, "An efficient constraint handling method for genetic algorithms"). The start
-/// may violate constraints and miss goals.
+/// with V the sum of the violations of constraints, each relative to its bound (in centimetres for a distance), and of
+/// goals (bielle/motion/goal.h), by how much they are missed beyond their tolerance, relative to it; and with g_p (m or
+/// rad) the largest closing error that remains when loops, base and feet are moved to posture p, and s in (0, 1] the
+/// missing share of the motion (kept motions), else 1. (2) is continuous in the design, so that searches return to
+/// designs whose loops close. So designs that violate constraints less are better than those that violate them more,
+/// and these better than those without motions (Deb 2000, "An efficient constraint handling method for genetic
+/// algorithms"). The start may violate constraints and miss goals.
 ///
 /// Designs of other parts of a generator (Parametrization::getArchitecture) are other robots: postures and first motions are those of
 /// the start with these parts, made when they are needed. Where the start with these parts cannot make a motion, it is solved for each
@@ -72,8 +73,8 @@ struct GradientObstacle {
 std::optional<GradientObstacle> findGradientObstacle(MotionMode mode, const std::vector<ObjectiveTerm>& objective,
                                                      const std::vector<DesignConstraint>& constraints);
 
+/// A design that misses a goal may violate constraints as well.
 enum class DesignStatus { Feasible, LoopOpen, MotionFailed, Violated, GoalMissed };
-/// The last of them, whether constraints are violated as well or not.
 constexpr int kDesignStatuses = 5;
 /// Whether the motions of such a design were made and measured.
 inline bool isMeasured(DesignStatus status) {
@@ -104,7 +105,8 @@ struct SlopedEvaluation {
   /// w_i m_i / m_i0 of Eq. (1) in pieces; also for designs whose motions come too near to dead points or that violate constraints,
   /// but empty for other infeasible ones.
   std::vector<MeasurePieces> terms;
-  /// EvaluationOptions::margin and, of motions made anew, tolerances of goals, both a hundredth tighter; and constraints; <= 0
+  /// EvaluationOptions::margin and, of motions made anew, tolerances of goals, both a hundredth tighter; and
+  /// constraints; <= 0
   MeasurePieces limits;
 };
 
@@ -122,8 +124,8 @@ class DesignEvaluator {
   /// motion fails.
   /// \throws ModelError when a measure has no gradient
   SlopedEvaluation differentiate(const VectorXd& x) const;
-  /// The same with every motion as `bielle solve` makes it, by its usual steps and not from a motion of the start design. Its
-  /// cost is that of another discretization.
+  /// The same with every motion as `bielle solve` makes it, by its usual steps and not from a motion of the start
+  /// design. Its cost is that of another discretization.
   Evaluation solveUsually(const VectorXd& x) const;
   const Evaluation& start() const;  ///< of the start design, measured
   /// Pairs of bodies that constraints on distances leave out, of the architecture of x.

@@ -39,8 +39,8 @@ struct DesignEvaluator::Data {
   const ArchitectureStart& getBase(const VectorXd& x);
   void makeMotions(const ArchitectureStart& base, const Model& model, Evaluation& out,
                    std::vector<MotionOutcome>* outcomes = nullptr) const;
-  // Adds a motion with the measures of its limits, or why it was not made, which the result tells. `missing`: the share of all
-  // motions so far.
+  // Adds a motion with the measures of its limits, or why it was not made, which the result tells. `missing`: the share
+  // of all motions so far.
   bool addMotion(const std::string& name, const ArchitectureStart& base, double missing,
                  const ShootingTrajectory& trajectory, MotionOutcome& outcome, Evaluation& out) const;
   // \param made  the robot without payload, if it is requested

@@ -32,8 +32,8 @@ enum class Measure {
 /// Conversion of electrical into mechanical power. For a motor with motor constant K (torque over the square root of
 /// the heat it makes) behind a gear of ratio n, the model's motor has K_m = n K. The power at its terminals is
 ///     P = c u v + (c u / K_m)^2                                                                                    (1)
-/// with c of MotorDrive Eq. (1), which is 1 for a gear without losses. It consumes max(P, 0) and recovers the share r of the
-/// negative part, so that braking first covers its own heat. No iron losses, no standby.
+/// with c of MotorDrive Eq. (1), which is 1 for a gear without losses. It consumes max(P, 0) and recovers the share r
+/// of the negative part, so that braking first covers its own heat. No iron losses, no standby.
 struct MotorConversion {
   /// K_m, N m/sqrt(W) (N/sqrt(W) of a linear motor). The default is ours, of the order of geared motors of 0.8 kg that
   /// hold some 15 N m with 50 W of heat.
@@ -45,8 +45,8 @@ struct MotorConversion {
   double getEffortFactor(double power) const { return power >= 0 ? 1 / efficiency : back_efficiency; }
 };
 
-/// Drives by motor: constants by name, else one for all, else those of the robot's motors, 1 / sqrt(Motor::getTorqueLoss()). The
-/// gears are always the robot's.
+/// Drives by motor: constants by name, else one for all, else those of the robot's motors, 1 /
+/// sqrt(Motor::getTorqueLoss()). The gears are always the robot's.
 struct DriveTable {
   std::optional<double> motor_constant;
   double regeneration = 0;

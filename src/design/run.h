@@ -33,7 +33,8 @@ struct LoggedEvaluation {
 /// The evaluation of a design as a stage of a search needs it, with its gradients or without.
 LoggedEvaluation evaluateDesign(const DesignEvaluator& evaluator, SearchAlgorithm stage, const VectorXd& x);
 
-/// What is wrong with an evaluation that comes from elsewhere, for so many variables, objectives and constraints; empty if nothing is.
+/// What is wrong with an evaluation that comes from elsewhere, for so many variables, objectives and constraints; empty
+/// if nothing is.
 std::string findFlaw(const LoggedEvaluation& evaluation, size_t variables, size_t objectives, size_t constraints);
 
 /// Its line in a log.
@@ -83,8 +84,8 @@ struct DesignRun {
 /// \throws ModelError when a log belongs to another problem, is used by another process, or cannot be written
 DesignRun runDesign(const DesignEvaluator& evaluator, const DesignSpec& spec, const DesignRunOptions& options);
 
-/// The masses of a design's motors which are known from a catalogue and which no variable gives to its links, where they count as
-/// included, kg.
+/// The masses of a design's motors which are known from a catalogue and which no variable gives to its links, where
+/// they count as included, kg.
 double calcMassInLinks(const Parametrization& robot, const VectorXd& x);
 
 /// Writes DIR/best (a robot), DIR/front/01 and so on (those of the front, if there is one), design.md (before and after) and, if gnuplot is installed, design.svg (values over the

@@ -17,7 +17,8 @@ constexpr int kDeepestJson = 100;
 /// \throws std::exception when it is not JSON, or nested too deep
 Json parseJson(const std::string& text);
 
-/// What is wrong with a text or its entries, without the names that the library gives to its errors. Other errors as they are.
+/// What is wrong with a text or its entries, without the names that the library gives to its errors. Other errors as
+/// they are.
 std::string describeJsonError(const std::exception& error);
 
 /// Passes the object in a file to `read`, which may access missing elements.

@@ -26,8 +26,8 @@ class CampaignCommands {
   std::vector<std::vector<std::string>> phase_times_;  // per motion, per value of the axis of phases, s
 };
 
-// Dry runs of one cell and of those that differ from it in one value, equal ones once. `log`: a file for the outputs. False if the
-// user asks for the end before they are done.
+// Dry runs of one cell and of those that differ from it in one value, equal ones once. `log`: a file for the outputs.
+// False if the user asks for the end before they are done.
 // \throws ModelError naming the file and the key that is refused
 bool checkCommands(const CampaignSpec& spec, const std::string& simulate, const std::string& log);
 

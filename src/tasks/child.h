@@ -40,8 +40,8 @@ class SignalWatch {
   bool wait();
   // Sleeps until the file can be read or has been closed; true if the user asks for the end before.
   bool waitForFile(int file);
-  // Sleeps until a child has ended, and returns its status (ChildEnd); empty if the user asks for the end before, which is also
-  // that of the child.
+  // Sleeps until a child has ended, and returns its status (ChildEnd); empty if the user asks for the end before, which
+  // is also that of the child.
   std::optional<int> waitForChild(pid_t pid);
   // Whether the user has asked for the end, without waiting.
   static bool isEndAsked();

@@ -51,11 +51,11 @@ class Parametrization {
  public:
   /// A given robot.
   /// \param source  file that defines the variables, named in errors
-  /// \throws ModelError for unknown names, places on different bodies, bounds that cross or exclude the given robot, two variables
-  ///   that set the same thing
+  /// \throws ModelError for unknown names, places on different bodies, bounds that cross or exclude the given robot,
+  ///   two variables that set the same thing
   Parametrization(Model model, std::vector<DesignVariable> variables, std::string source = "");
-  /// A generated robot; `settings` are the values of other parameters of the generator. Bounds beyond those of a parameter are refused
-  /// as well.
+  /// A generated robot; `settings` are the values of other parameters of the generator. Bounds beyond those of a
+  /// parameter are refused as well.
   Parametrization(const std::string& generator, std::vector<std::pair<std::string, double>> settings,
                   std::vector<DesignVariable> variables, std::string source = "");
 
