@@ -237,7 +237,7 @@ TEST_CASE("campaign: a specification that is wrong is refused with file, line, k
       {head + "options: {push: t=1}\n", {"key 'push' (line 2)", "next to `options`"}},
       {head + "push: {time: 1, phase: 1, impulse: 1}\n", {"key 'push' (line 2)", "give one of them"}},
       {head + "push: {time: soon, impulse: 1}\n", {"key 'time' (line 2)", "not a number"}},
-      {head + "push: {time: -1, impulse: 1}\n", {"(line 2)", "not positive"}},
+      {head + "push: {time: -1, impulse: 1}\n", {"(line 2)", "its time is not within"}},
       {head + "push: {time: 1, largest_impulse: {up_to: 1, step: 2}}\n", {"(line 2)", "up_to"}},
       {"motions: [{name: w, solve: wakl, robot: bipetto}]\n", {"wakl"}},
       {"motions: [{name: w, solve: walk, robot: bipetto, set: {sped: 1}}]\n", {"sped"}},

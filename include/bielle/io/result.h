@@ -80,7 +80,7 @@ struct MotionSummary {
   Ground ground;
 };
 
-/// \throws ModelError naming the file, the entry and what is wrong with it
+/// \throws ModelError naming the file, the entry and what is wrong with it: a motion carried out is no plan
 MotionSummary readSummary(const std::string& directory);
 
 /// Creates the directory with its parents and verifies that files can be written there.

@@ -39,7 +39,8 @@ VelocityCommand findCommand(const std::vector<TimedCommand>& commands, double ti
 /// The mean over [0, duration] of the speed over the ground, m/s.
 double calcMeanSpeed(const std::vector<TimedCommand>& commands, double duration);
 
-/// Checks that legs reach the footholds of steps at this velocity, and that soles do not collide.
+/// Checks that legs reach the footholds of steps at this velocity, that none turns by more than half a turn, and that soles do
+/// not collide.
 /// \param element  names the command in messages   \throws ModelError unless they do
 void checkCommand(const Model& model, const LocomotionOptions& options, const VelocityCommand& command,
                   const std::string& element);

@@ -25,7 +25,7 @@ struct OptionEntry {
 };
 
 /// Sets an option by name.
-/// \throws ModelError listing the options
+/// \throws ModelError listing the options, or when the value is not finite
 void setOption(const std::vector<OptionEntry>& options, const std::string& name, double value);
 
 /// The current values of the options.

@@ -120,7 +120,8 @@ class RobotProblem : public ShootingProblem {
   /// \param model  must outlive the problem
   /// \param q0, v0  initial state; for the reduced formulation closed, with a velocity that keeps it closed
   /// \param stages  N running stages, then the terminal one
-  /// \throws ModelError on sizes that do not match, or an open configuration in the reduced formulation
+  /// \throws ModelError on sizes that do not match, a weight that is negative or not finite, or an open
+  /// configuration in the reduced formulation
   RobotProblem(const Model& model, const VectorXd& q0, const VectorXd& v0, std::vector<StageSpec> stages,
                Formulation formulation = Formulation::Full);
   ~RobotProblem() override;
