@@ -12,6 +12,7 @@
 #include "bielle/model/reader.h"
 #include "bielle/motion/squat.h"
 #include "cli_command.h"
+#include "robot_directory.h"
 
 namespace fs = std::filesystem;
 using namespace bielle;
@@ -215,6 +216,80 @@ TEST_CASE("motions that miss their differences where a linkage is near its dead 
   ProblemOptions wide;
   wide.limits.dead_point_margin = kWideDeadPointMargin;
   CHECK_FALSE(avoidDeadPoints(request, model, wide, disturb(deepest)));
+}
+
+// The crank and the coupler of robots/fourbar are one rod where cos crank = (0.5^2 + 0.4^2 - 0.3^2) / (2 * 0.5 * 0.4).
+TEST_CASE("the distance of a linkage from its dead points is that of its closed form, of the joint and of the motor") {
+  const RobotDirectory directory;
+  const std::filesystem::path fourbar = std::filesystem::path(BIELLE_SOURCE_DIR) / "robots/fourbar";
+  const std::string yaml = readFile(fourbar / "fourbar.yaml");
+  const std::string swapped = replaceOnce(replaceOnce(yaml, "  crank_joint: {effort", "  rocker_joint: {effort"),
+                                          "serial_joints: [rocker_joint]", "serial_joints: [crank_joint]");
+  for (const std::string& text : {yaml, swapped}) {
+    const Model model = loadRobot(directory.writeRobot(readFile(fourbar / "fourbar.urdf"), text)).model;
+    for (double off : {0.2, 0.02, 0.007, -0.007}) {
+      const double a = 0.15, b = 0.35, c = 0.3, d = 0.4, crank = std::acos(0.8) + off;
+      const Vector3d A(a * std::cos(crank), 0, a * std::sin(crank)), to_pivot = Vector3d(d, 0, 0) - A;
+      const double e = to_pivot.norm(), corner = std::acos((b * b + e * e - c * c) / (2 * b * e));
+      const double coupler = std::atan2(to_pivot.z(), to_pivot.x()) + corner;
+      const Vector3d B = A + b * Vector3d(std::cos(coupler), 0, std::sin(coupler));
+      const double rocker = std::atan2(B.z(), B.x() - d);
+      VectorXd q(4);
+      for (const auto& [name, value] : {std::pair{"crank_joint", crank},
+                                        {"crank_coupler", coupler - crank},
+                                        {"rocker_joint", rocker},
+                                        {"rocker_coupler", coupler + EIGEN_PI - rocker}})
+        q[model.joints()[model.findJoint(name)].idx_q] = value;
+      const std::vector<DeadPoint> found = findDeadPoints(model, q);
+      REQUIRE(found.size() == 1);
+      CHECK(found[0].joints == model.joints()[model.serialJoints()[0]].name);
+      CHECK(found[0].distance == Approx(std::abs(off)).epsilon(0.7 * std::abs(off) + 1e-4));
+    }
+  }
+}
+
+TEST_CASE("a motion that starts near a dead point says so at its start and in its failure") {
+  const RobotDirectory directory;
+  const OutputDirectory out;
+  const auto solve = [&](const std::string& robot) {
+    return run({"solve", "squat", "--robot", robot, "--depth", "0.95", "--max-iterations", "1", "--no-check",
+                "--no-report", "-o", out.str()});
+  };
+  const std::string told = "dead points are, by the slopes of transmissions, this far from the start (rad, or m): ";
+  const CommandResult usual = solve("bipetto");
+  CHECK(usual.status == 1);
+  CHECK_THAT(usual.out, Catch::Contains(told + "knee_") && !Catch::Contains("starts near one") &&
+                            !Catch::Contains("come near dead points"));
+
+  // Knees bent to 0.01 rad before their four-bar's dead point at 1.325 rad.
+  const fs::path bipetto = fs::path(BIELLE_SOURCE_DIR) / "robots/bipetto";
+  std::string yaml = readFile(bipetto / "bipetto.yaml");
+  for (const auto& [from, to] : {std::pair{"value: 0.575", "value: 0.35"},
+                                 {"knee_right: 0.4913", "knee_right: 1.3"},
+                                 {"knee_left: -0.4890", "knee_left: -1.3"}})
+    yaml = replaceOnce(yaml, from, to);
+  const CommandResult bent = solve(directory.writeRobot(readFile(bipetto / "bipetto.urdf"), yaml));
+  CHECK(bent.status == 1);
+  CHECK_THAT(bent.out, Catch::Contains("this motion starts near one (knee_") &&
+                           Catch::Contains("come near dead points") &&
+                           Catch::Contains(" at the start; start farther from them"));
+  CHECK_THAT(out.readSummary()["message"], Catch::Contains("knee_left 0.07"));
+}
+
+TEST_CASE("a leg on a rail squats on one foot, and is told what steps need") {
+  const OutputDirectory directory;
+  const std::vector<std::string> rest = {"--robot", "fivebar_leg", "--max-iterations", "1", "--no-check", "--no-report",
+                                         "--quiet", "-o",          directory.str()};
+  const auto solve = [&rest](const std::string& motion) {
+    std::vector<std::string> arguments = {"solve", motion};
+    arguments.insert(arguments.end(), rest.begin(), rest.end());
+    return run(arguments);
+  };
+  solve("squat");
+  CHECK(directory.readSummary()["phases"][0]["name"] == "single support");
+  for (const char* motion : {"hop", "run", "walk"})
+    checkRefused(solve(motion),
+                 "moves on a rail, but a motion with steps needs a free one over two feet; take `squat`");
 }
 
 TEST_CASE("scripts that name a kind of barrier get the limits that motions keep anyway") {

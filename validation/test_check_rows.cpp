@@ -44,6 +44,18 @@ std::vector<std::pair<std::string, RowMatrixXd*>> listTables(MotionRecord& recor
 
 }  // namespace
 
+TEST_CASE("check: a value that fails is printed with the digits that tell it from its bound") {
+  CheckReport report{"squat", "robot", 1, {}};
+  report.rows.push_back({"over", CheckRow::Kind::AtMost, 1.0000001, 1, "1", ""});
+  report.rows.push_back({"under", CheckRow::Kind::AtMost, 0.9999999, 1, "1", ""});
+  report.rows.push_back({"aside", CheckRow::Kind::Goal, 0.70001, 0.7, "1", "", 1e-6});
+  std::ostringstream out;
+  printReport(out, report);
+  CHECK_THAT(out.str(), Catch::Contains("1.0000001  <= 1.0000000 1           FAIL") &&
+                            Catch::Contains("1.0000  <= 1.0000   1           pass") &&
+                            Catch::Contains("0.70001  == 0.70000  1           MISS"));
+}
+
 TEST_CASE("check: shapes of the files are judged, those fitted to visuals inform") {
   const CheckedMotion good = getSquat().checked;
   const Model& model = good.model;

@@ -79,6 +79,36 @@ bool isNearDeadPoint(const Model& model, const MotionRecord& record, Eigen::Inde
   return false;
 }
 
+// Of each linkage, by the slope of its transmission: the motion of the motors that takes it to zero or, as much, to infinity, and
+// what the serial joints do meanwhile.
+VectorXd calcDistances(const Model& model, const std::vector<Transmission>& transmissions, ConstVectorRef q) {
+  constexpr double kRankTolerance = 1e-9;
+  const ConstraintSet closures = makeConstraintSet(model);
+  Workspace ws(model);
+  updatePositions(model, ws, q);
+  MatrixXd A = MatrixXd::Zero(closures.rows + model.nu(), model.nv());
+  for (size_t c = 0; c < closures.closures.size(); ++c)
+    calcClosureJacobian(ws, closures.closures[c],
+                        A.middleRows(closures.offsets[c], getRows(closures.closures[c].kind)));
+  for (int m = 0; m < model.nu(); ++m) A(closures.rows + m, model.motors()[m].dof) = 1;
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> factors;
+  factors.setThreshold(kRankTolerance);
+  factors.compute(A);
+  VectorXd distances = VectorXd::Constant(transmissions.size(), HUGE_VAL), gradient(model.nu()),
+           way = VectorXd::Zero(A.rows());
+  for (size_t t = 0; t < transmissions.size(); ++t) {
+    const double value = calcTransmission(transmissions[t], model, q, gradient);
+    if (!(gradient.squaredNorm() > 0)) continue;
+    way.tail(model.nu()) = gradient * (value / gradient.squaredNorm());
+    const VectorXd v = factors.solve(way);
+    double largest = way.cwiseAbs().maxCoeff();
+    for (int i : model.serialJoints())
+      largest = std::max(largest, v.segment(model.joints()[i].idx_v, model.joints()[i].nv).cwiseAbs().maxCoeff());
+    distances[static_cast<Eigen::Index>(t)] = largest;
+  }
+  return distances;
+}
+
 }  // namespace
 
 double calcStepError(const Model& model, const MotionRecord& record) { return findStepError(model, record).share; }
@@ -113,6 +143,30 @@ std::optional<Motion> avoidDeadPoints(const MotionRequest& request, const Model&
   if (error.share <= kLargestStepError || !isNearDeadPoint(model, record, error.stage, margin)) return {};
   margin = kWideDeadPointMargin;
   return makeRequested(request, model, problem);
+}
+
+std::vector<DeadPoint> findDeadPoints(const Model& model, const MotionRecord& record, Eigen::Index first,
+                                      Eigen::Index last) {
+  const std::vector<Transmission> transmissions = listTransmissions(model, record.q.row(0).transpose());
+  std::vector<DeadPoint> nearest;
+  for (Eigen::Index k = first; k <= last; ++k) {
+    const VectorXd distances = calcDistances(model, transmissions, record.q.row(k).transpose());
+    for (size_t t = 0; t < transmissions.size(); ++t) {
+      const DeadPoint here = {transmissions[t].joints, distances[static_cast<Eigen::Index>(t)], record.time[k]};
+      if (k == first)
+        nearest.push_back(here);
+      else if (here.distance < nearest[t].distance)
+        nearest[t] = here;
+    }
+  }
+  return nearest;
+}
+
+std::vector<DeadPoint> findDeadPoints(const Model& model, ConstVectorRef q) {
+  MotionRecord record;
+  record.q = q.transpose();
+  record.time = VectorXd::Zero(1);
+  return findDeadPoints(model, record, 0, 0);
 }
 
 }  // namespace bielle

@@ -14,6 +14,13 @@ std::string format(const FddpSummary& summary) {
          formatNumber(summary.seconds, "%.2f") + " s";
 }
 
+bool areKeptFromDeadPoints(const LimitOptions& limits) { return limits.enforced && limits.dead_point_margin > 0; }
+
+std::string formatDistance(const DeadPoint& of) {
+  constexpr double kFar = 1;  // where slopes say nothing
+  return of.distance < kFar ? formatNumber(of.distance, "%.2g") : "over 1";
+}
+
 // The second solve, with the iterations and the time of both.
 FddpSummary addUp(const FddpSummary& first, FddpSummary second) {
   second.iterations += first.iterations;
@@ -33,6 +40,7 @@ RequestSolver::RequestSolver(const MotionRequest& request, const Model& model, R
 }
 
 MotionResult RequestSolver::solve(const RunInfo& run) {
+  tellDeadPoints();
   FddpOptions from_plan = options_.solver;
   from_plan.initial_regularization = kGuessRegularization;
   FddpOptions solver = !options_.warm_start && request_.parts.empty() ? from_plan : options_.solver;
@@ -48,7 +56,11 @@ MotionResult RequestSolver::solve(const RunInfo& run) {
   const FddpSummary summary = solveMotion(motion_, solver, observer_.motion, &multipliers);
   MotionResult result = makeResult(run, motion_, motion_.guess, summary);
   result.record.multipliers = std::move(multipliers);
-  if (!result.converged()) return result;
+  if (!result.converged()) {
+    if (result.solver.termination != FddpTermination::Interrupted)
+      result.solver.message += describeDeadPoints(result.record);
+    return result;
+  }
   std::optional<Motion> refined = refineStages(request_, model_, options_.problem, motion_, result);
   if (refined) improve(*refined, again, "with stages half as long", run, result);
   refined = avoidDeadPoints(request_, model_, options_.problem, result.record);
@@ -57,16 +69,51 @@ MotionResult RequestSolver::solve(const RunInfo& run) {
   return result;
 }
 
+void RequestSolver::tellDeadPoints() const {
+  if (!areKeptFromDeadPoints(options_.problem.limits)) return;
+  std::string list, near;
+  for (const DeadPoint& start : findDeadPoints(model_, motion_.problem->initialState().head(model_.nq()))) {
+    list += (list.empty() ? "" : "; ") + start.joints + " " + formatDistance(start);
+    if (start.distance < kNearDeadPoint)
+      near += (near.empty() ? "" : "; ") + start.joints + " " + formatDistance(start);
+  }
+  if (!list.empty())
+    tell("dead points are, by the slopes of transmissions, this far from the start (rad, or m): " + list);
+  const double margin = options_.problem.limits.dead_point_margin;
+  if (!near.empty() && observer_.warn)
+    observer_.warn(
+        "warning: near a dead point motors and joint hardly move each other, and this motion starts near one (" + near +
+        "): transmissions stay within " + formatNumber(margin, "%.2g") + " to " + formatNumber(1 / margin, "%.2g") +
+        " of that at the start; give a reference farther from it");
+}
+
+// What a failure may come from: linkages that are near a dead point where the motion is nearest to one; empty for none.
+std::string RequestSolver::describeDeadPoints(const MotionRecord& record) const {
+  if (!areKeptFromDeadPoints(options_.problem.limits) || !record.q.allFinite()) return "";
+  const std::vector<DeadPoint> start = findDeadPoints(model_, record, 0, 0),
+                               nearest = findDeadPoints(model_, record, 0, record.q.rows() - 1);
+  std::string near;
+  for (size_t i = 0; i < start.size(); ++i)
+    if (nearest[i].distance < kNearDeadPoint)
+      near += (near.empty() ? "" : ", ") + nearest[i].joints + " " + formatDistance(nearest[i]) + " at " +
+              formatNumber(nearest[i].time, "%.3g") + " s, " + formatDistance(start[i]) + " at the start";
+  return near.empty()
+             ? ""
+             : "; linkages come near dead points, where motors and joints hardly move each other (rad, or m): " + near +
+                   "; start farther from them, or request less motion towards them";
+}
+
 // An optimum whose stages are still too long is one of equations that the robot does not obey: it has not converged to a motion.
 void RequestSolver::refuseLongStages(MotionResult& result) const {
   const double error = calcStepError(model_, result.record);
   if (!(error > kAllowedStepError)) return;
+  const std::string near = describeDeadPoints(result.record);
   result.solver.termination = FddpTermination::Failed;
   result.solver.message =
       "the time step is too coarse for this motion: across a stage, velocities differ from the integrated "
       "accelerations by up to " +
-      formatNumber(100 * error, "%.2g") +
-      " % of the largest acceleration; request a slower or shorter motion, or set a shorter time_step";
+      formatNumber(100 * error, "%.2g") + " % of the largest acceleration" +
+      (near.empty() ? "; request a slower or shorter motion, or set a shorter time_step" : near);
 }
 
 // Solves a motion in place of one whose stages are too long, and takes it if its own are less so.

@@ -27,7 +27,8 @@ struct RequestObserver {
 /// Solves one request, once. A sequence starts from its motions, each solved separately. A motion with another
 /// objective starts from that of least effort, which also scales it. Stages that are too long are halved
 /// (refineStages()); if that does not help, linkages are kept farther from their dead points (avoidDeadPoints()). A
-/// result whose stages are still too long ends as Failed.
+/// result whose stages are still too long ends as Failed. How far linkages are from their dead points is told at the start, and
+/// added to the message of a failure near one.
 class RequestSolver {
  public:
   /// Makes the motion and its guess. \throws ModelError as makeRequested() and setGuess() do
@@ -40,6 +41,8 @@ class RequestSolver {
  private:
   void startFromParts();
   void refuseLongStages(MotionResult& result) const;
+  void tellDeadPoints() const;
+  std::string describeDeadPoints(const MotionRecord& record) const;
   void startFromEffort(const FddpOptions& solver);
   void improve(Motion& motion, const FddpOptions& solver, const std::string& how, const RunInfo& run,
                MotionResult& result) const;
