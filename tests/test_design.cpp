@@ -302,26 +302,26 @@ std::string makeCrankSpec(const std::string& robot = kRobots + "bipetto") {
   return replaceOnce(kCrankSpec, "ROBOT", robot);
 }
 
-// Bipetto, whose reference also gives the angles of rods that depend on the crank's length.
-std::string writeBipettoWithRods(const RobotDirectory& directory) {
+// Bipetto, whose reference also gives the angles of the knees' motors, which depend on the length of the crank.
+std::string writeBipettoWithMotors(const RobotDirectory& directory) {
   const Model model = loadRobot(kRobots + "bipetto").model;
   const AssemblyResult standing = assembleReference(model, "half_sitting");
   std::string yaml = readFile(kRobots + "bipetto/bipetto.yaml");
   for (const std::string& side : {"left", "right"}) {
-    const std::string knee = "      knee_" + side + ":", rod = "transmission_knee_" + side;
-    const double angle = standing.q[model.joints()[model.findJoint(rod)].idx_q];
-    yaml = replaceOnce(yaml, knee, "      " + rod + ": " + std::to_string(angle) + "\n" + knee);
+    const std::string knee = "      knee_" + side + ":", motor = "motor_knee_" + side;
+    const double angle = standing.q[model.joints()[model.findJoint(motor)].idx_q];
+    yaml = replaceOnce(yaml, knee, "      " + motor + ": " + std::to_string(angle) + "\n" + knee);
   }
-  directory.write("rods/rods.yaml", yaml);
-  directory.write("rods/rods.urdf", readFile(kRobots + "bipetto/bipetto.urdf"));
-  return directory.path() + "/rods";
+  directory.write("driven/driven.yaml", yaml);
+  directory.write("driven/driven.urdf", readFile(kRobots + "bipetto/bipetto.urdf"));
+  return directory.path() + "/driven";
 }
 
 }  // namespace
 
 TEST_CASE("design: a search that is killed goes on and ends the same way") {
   const RobotDirectory directory;
-  const std::string robot = writeBipettoWithRods(directory);
+  const std::string robot = writeBipettoWithMotors(directory);
   const std::string spec = directory.write("spec.yaml", makeCrankSpec(robot));
   const std::string whole = directory.path() + "/whole", killed = directory.path() + "/killed";
   const CommandResult first = runCommand({BIELLE_COMMAND, "design", spec, "-o", whole, "--jobs", "1"});
@@ -370,7 +370,7 @@ TEST_CASE("design: a search that is killed goes on and ends the same way") {
   CHECK_NOTHROW(loadRobot(whole + "/best"));
   const CommandResult info = runCommand({BIELLE_COMMAND, "info", whole + "/best"});
   CHECK(info.status == 0);
-  CHECK(info.err.empty());  // its reference has the angles of its own rods
+  CHECK(info.err.empty());  // its reference has the angles of its own linkages
 
   // The log of another problem is refused.
   directory.write("spec.yaml", replaceOnce(makeCrankSpec(robot), "evaluations: 40", "evaluations: 41"));

@@ -6,6 +6,7 @@
 
 #include "bielle/dynamics/assembly.h"
 #include "bielle/io/result.h"
+#include "bielle/io/robot_info.h"
 #include "bielle/io/robot_writer.h"
 #include "bielle/model/builder.h"
 #include "bielle/model/error.h"
@@ -240,15 +241,20 @@ std::string formatPage(const DesignEvaluator& evaluator, const DesignSpec& spec,
   return out.str();
 }
 
-// The robot of a design, whose references give the angles that its own lengths allow instead of those of the start.
+// The robot of a design. Where its lengths do not allow the angles that a reference of the start gives, this gives those that it is
+// assembled with, and the place of its base, which would pull at them.
 Model makeWritten(const Parametrization& robot, const VectorXd& x) {
   const Model model = robot.make(x);
   ModelParts parts = takeParts(model);
   for (Reference& reference : parts.references) {
     const AssemblyResult result = assembleReference(model, reference.name);
-    if (result.status != AssemblyStatus::Closed) continue;
-    for (const ReferenceJoint& joint : listReferenceJoints(model, reference, result.q))
+    const std::vector<ReferenceJoint> joints = listReferenceJoints(model, reference, result.q);
+    const bool moves = std::any_of(joints.begin(), joints.end(),
+                                   [](const ReferenceJoint& joint) { return joint.moved > kReferenceTolerance; });
+    if (!moves || result.status != AssemblyStatus::Closed) continue;
+    for (const ReferenceJoint& joint : joints)
       reference.joints[model.joints()[joint.joint].name].assign(joint.assembled.begin(), joint.assembled.end());
+    if (model.hasFreeFlyer()) reference.joints[model.joints()[1].name].assign(result.q.begin(), result.q.begin() + 7);
   }
   return ModelBuilder::restore(std::move(parts));
 }
