@@ -1,5 +1,5 @@
 // The full and the reduced formulation have the same optimum as the time step vanishes: they differ by a discretization
-// of first order. docs/results/formulations.md has a larger table; `test_formulations "[.table]"` prints
+// of first order. docs/results/formulations.md has a larger table; `test_motion "[.table]"` prints
 // that of the squat.
 #include <catch2/catch.hpp>
 #include <cmath>
