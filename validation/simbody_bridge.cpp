@@ -21,44 +21,6 @@ VectorXd toVector(const SimTK::Vector& v) {
   return out;
 }
 
-// M a + J^T m = force, J a = target, for any number of columns.
-struct SaddleTerms {
-  MatrixXd M, J, force, target;
-};
-
-// With unit diagonal of D M D and rows E J D of unit length (links of a few milligrams beside others of kilograms are
-// usual): a = D z, m = E y. By the null space N of E J D, z = z_J + N w with E J D z_J = E target; N^T then leaves
-//     N^T D M D N w = N^T D (force - M D z_J),    (E J D)^T y = D (force - M D z).
-template <typename Real>
-void solveSaddle(const SaddleTerms& terms, MatrixXd& a, MatrixXd& multipliers) {
-  using MatrixXr = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
-  using VectorXr = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
-  const MatrixXd &M = terms.M, &J = terms.J;
-  const int nv = static_cast<int>(M.rows()), m = static_cast<int>(J.rows());
-  const VectorXd D = M.diagonal().cwiseSqrt().cwiseInverse();
-  VectorXr E = J.rowwise().norm().template cast<Real>();
-  const Real largest = m > 0 ? E.maxCoeff() : 0;
-  for (int i = 0; i < m; ++i) E[i] = E[i] > kMapRankThreshold * largest ? 1 / (J.row(i) * D.asDiagonal()).norm() : 0;
-  const VectorXr D_r = D.template cast<Real>();
-  const auto scale = D_r.asDiagonal();
-  const MatrixXr DMD = scale * M.template cast<Real>() * scale;
-  const MatrixXr EJD = E.asDiagonal() * J.template cast<Real>() * scale;
-  const MatrixXr force = scale * terms.force.template cast<Real>();
-  MatrixXr z = MatrixXr::Zero(nv, force.cols()), y = MatrixXr::Zero(m, force.cols());
-  MatrixXr N = MatrixXr::Identity(nv, nv);
-  Eigen::CompleteOrthogonalDecomposition<MatrixXr> rows, columns;
-  for (auto* factor : {&rows, &columns}) factor->setThreshold(kMapRankThreshold);
-  if (m > 0) {
-    columns.compute(EJD.transpose());
-    N = MatrixXr(columns.householderQ()).rightCols(nv - columns.rank());
-    z = rows.compute(EJD).solve(E.asDiagonal() * terms.target.template cast<Real>());
-  }
-  z += N * (N.transpose() * DMD * N).ldlt().solve(N.transpose() * (force - DMD * z));
-  if (m > 0) y = columns.solve(force - DMD * z);
-  a = D.asDiagonal() * z.template cast<double>();
-  multipliers = (E.asDiagonal() * y).template cast<double>();
-}
-
 // Residual of notation.h, whose directions are used below.
 Vector6d calcClosureGap(const Closure& closure, const SE3& X_12) {
   if (closure.kind == ClosureKind::Weld6D) return log6(X_12);
@@ -84,13 +46,55 @@ MatrixXd listDirections(const Closure& closure) {
   return directions;
 }
 
+template <typename Real>
+const SaddleSolver<Real>& getSaddle(const SimbodyBridge& simbody, std::optional<SaddleSolver<Real>>& kept) {
+  return kept ? *kept : kept.emplace(simbody.calcMassMatrix(), simbody.calcConstraintJacobian());
+}
+
 }  // namespace
+
+template <typename Real>
+SaddleSolver<Real>::SaddleSolver(const MatrixXd& M, const MatrixXd& J)
+    : D_(M.diagonal().cwiseSqrt().cwiseInverse()), E_(J.rowwise().norm().template cast<Real>()) {
+  const int nv = static_cast<int>(M.rows()), m = static_cast<int>(J.rows());
+  const Real largest = m > 0 ? E_.maxCoeff() : 0;
+  for (int i = 0; i < m; ++i) E_[i] = E_[i] > kMapRankThreshold * largest ? 1 / (J.row(i) * D_.asDiagonal()).norm() : 0;
+  const VectorXr D = D_.template cast<Real>();
+  DMD_ = D.asDiagonal() * M.template cast<Real>() * D.asDiagonal();
+  N_ = MatrixXr::Identity(nv, nv);
+  for (auto* factor : {&rows_, &columns_}) factor->setThreshold(kMapRankThreshold);
+  if (m > 0) {
+    const MatrixXr EJD = E_.asDiagonal() * J.template cast<Real>() * D.asDiagonal();
+    columns_.compute(EJD.transpose());
+    N_ = MatrixXr(columns_.householderQ()).rightCols(nv - columns_.rank());
+    rows_.compute(EJD);
+  }
+  within_.compute(N_.transpose() * DMD_ * N_);
+}
+
+template <typename Real>
+void SaddleSolver<Real>::solve(const MatrixXd& force, const MatrixXd& target, MatrixXd& a,
+                               MatrixXd& multipliers) const {
+  const MatrixXr scaled = D_.template cast<Real>().asDiagonal() * force.template cast<Real>();
+  MatrixXr z = MatrixXr::Zero(D_.size(), force.cols()), y = MatrixXr::Zero(E_.size(), force.cols());
+  if (E_.size() > 0) z = rows_.solve(E_.asDiagonal() * target.template cast<Real>());
+  z += N_ * within_.solve(N_.transpose() * (scaled - DMD_ * z));
+  if (E_.size() > 0) y = columns_.solve(scaled - DMD_ * z);
+  a = D_.asDiagonal() * z.template cast<double>();
+  multipliers = (E_.asDiagonal() * y).template cast<double>();
+}
+
+void SimbodyBridge::System::setPlace(const VectorXd& place) {
+  if (q.size() == 0 || q != place) at_q = {};
+  q = place;
+}
 
 SimbodyBridge::SimbodyBridge(const Model& model, const std::vector<Closure>& closures)
     : s_(std::make_unique<System>(model, closures)) {}
 SimbodyBridge::~SimbodyBridge() = default;
 
 void SimbodyBridge::setState(ConstVectorRef q, ConstVectorRef v, ConstVectorRef tau) {
+  s_->setPlace(q);
   s_->setCoordinates(q);
   s_->updateVelocityMap(q, v);
   s_->tau = tau;
@@ -125,6 +129,7 @@ Vector3d SimbodyBridge::calcCom() const { return toEigen(s_->matter.calcSystemMa
 double SimbodyBridge::calcPotentialEnergy() const { return s_->system.calcPotentialEnergy(s_->state); }
 
 MatrixXd SimbodyBridge::calcMassMatrix() const {
+  if (s_->at_q.M) return *s_->at_q.M;
   SimTK::Matrix M_s;
   s_->matter.calcM(s_->state, M_s);
   const int nv = s_->model.nv();
@@ -133,6 +138,7 @@ MatrixXd SimbodyBridge::calcMassMatrix() const {
     for (int j = 0; j < nv; ++j) M(i, j) = M_s(s_->u_index[i], s_->u_index[j]);
   M = s_->T.transpose() * M * s_->T;
   M.diagonal() += s_->model.armature();
+  s_->at_q.M = M;
   return M;
 }
 
@@ -147,13 +153,15 @@ VectorXd SimbodyBridge::calcInverseDynamics(ConstVectorRef a) const {
 VectorXd SimbodyBridge::calcBias() const { return calcInverseDynamics(VectorXd::Zero(s_->model.nv())); }
 
 MatrixXd SimbodyBridge::calcConstraintJacobian() const {
+  if (s_->at_q.J) return *s_->at_q.J;
   const int nv = s_->model.nv();
   SimTK::Matrix G_s;
   s_->matter.calcG(s_->state, G_s);
   MatrixXd J(G_s.nrow(), nv);
   for (int i = 0; i < J.rows(); ++i)
     for (int j = 0; j < nv; ++j) J(i, j) = G_s(i, s_->u_index[j]);
-  return J * s_->T;
+  s_->at_q.J = J * s_->T;
+  return *s_->at_q.J;
 }
 
 VectorXd SimbodyBridge::calcWrenchForces(const std::vector<Vector6d>& wrenches) const {
@@ -208,13 +216,12 @@ VectorXd SimbodyBridge::calcConstraintAcceleration(ConstVectorRef a) const {
 }
 
 OracleSolution SimbodyBridge::solveWithArmature(Precision precision) const {
-  const SaddleTerms terms{calcMassMatrix(), calcConstraintJacobian(), s_->tau - calcBias(),
-                          -calcConstraintAcceleration(VectorXd::Zero(s_->model.nv()))};
+  const MatrixXd force = s_->tau - calcBias(), target = -calcConstraintAcceleration(VectorXd::Zero(s_->model.nv()));
   MatrixXd a, m;
   if (precision == Precision::Double)
-    solveSaddle<double>(terms, a, m);
+    getSaddle(*this, s_->at_q.saddle).solve(force, target, a, m);
   else
-    solveSaddle<long double>(terms, a, m);
+    getSaddle(*this, s_->at_q.extended_saddle).solve(force, target, a, m);
   return s_->makeSolution(a, m);
 }
 
@@ -247,14 +254,13 @@ ClosureRows SimbodyBridge::calcClosureRows() const {
 
 MatrixXd SimbodyBridge::calcResponse(const MatrixXd& J, const MatrixXd& targets) const {
   MatrixXd a, m;
-  solveSaddle<double>({calcMassMatrix(), J, MatrixXd::Zero(J.cols(), targets.cols()), targets}, a, m);
+  SaddleSolver<double>(calcMassMatrix(), J).solve(MatrixXd::Zero(J.cols(), targets.cols()), targets, a, m);
   return a;
 }
 
 OracleSolution SimbodyBridge::solveImpact(ConstVectorRef rates) const {
-  const MatrixXd M = calcMassMatrix();
   MatrixXd v, m;
-  solveSaddle<double>({M, calcConstraintJacobian(), M * s_->v, rates}, v, m);
+  getSaddle(*this, s_->at_q.saddle).solve(calcMassMatrix() * s_->v, rates, v, m);
   return s_->makeSolution(v, m);
 }
 
@@ -301,6 +307,7 @@ void SimbodyBridge::integrate(double duration, double accuracy, VectorXd& q, Vec
   s_->state = integrator.getState();
   s_->system.realize(s_->state, Stage::Dynamics);
   s_->readState(s_->state, q, v);
+  s_->setPlace(q);
 }
 
 }  // namespace bielle::validation

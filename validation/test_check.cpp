@@ -30,7 +30,7 @@ TEST_CASE("check: the squat of Bipetto passes at its defaults, in both formulati
 
 TEST_CASE("check: the same squat by midpoint steps, and each number of its midpoints poisoned") {
   for (const Formulation formulation : {Formulation::Reduced, Formulation::Full}) {
-    const SolvedSquat squat(formulation, StepRule::Midpoint);
+    const SolvedSquat& squat = getSquat(formulation, StepRule::Midpoint);
     CHECK(squat.summary.termination == FddpTermination::Converged);
     const CheckReport report = checkMotion(squat.checked), euler = checkMotion(getSquat(formulation).checked);
     INFO(print(report) << print(euler));

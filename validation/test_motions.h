@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <set>
 #include <sstream>
 
@@ -58,15 +59,12 @@ struct SolvedSquat {
   CheckedMotion checked;
 };
 
-inline const SolvedSquat& getSquat(Formulation formulation = Formulation::Reduced) {
-  static const SolvedSquat reduced(Formulation::Reduced), full(Formulation::Full);
-  return formulation == Formulation::Reduced ? reduced : full;
+inline const SolvedSquat& getSquat(Formulation formulation = Formulation::Reduced, StepRule step = StepRule::Euler) {
+  static std::map<std::pair<Formulation, StepRule>, SolvedSquat> solved;
+  return solved.try_emplace({formulation, step}, formulation, step).first->second;
 }
 
-inline const SolvedSquat& getMidpointSquat() {
-  static const SolvedSquat squat(Formulation::Reduced, StepRule::Midpoint);
-  return squat;
-}
+inline const SolvedSquat& getMidpointSquat() { return getSquat(Formulation::Reduced, StepRule::Midpoint); }
 
 // A motion without contacts, from its states and torques.
 inline CheckedMotion makeFreeMotion(const Model& model, double h, Formulation formulation, int stages) {
