@@ -18,7 +18,8 @@ import time
 import zipfile
 
 program = sys.argv[1]
-SQUAT = [program, "solve", "squat", "--robot", "bipetto", "--depth", "0.9", "--set", "duration=0.6"]
+SQUAT = [program, "solve", "squat", "--robot", "bipetto", "--depth", "0.9", "--set", "duration=0.6", "--set", "settle=0",
+         "--set", "time_step=0.02"]
 NOBODY = 65534
 
 

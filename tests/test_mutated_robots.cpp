@@ -50,17 +50,19 @@ std::string join(const std::vector<std::string>& lines) {
   return text;
 }
 
-// Places that match a pattern; one of them, replaced.
-std::string replaceOneOf(const std::string& text, const std::regex& pattern, const std::string& by, Random& rng) {
-  std::vector<std::smatch> found{std::sregex_iterator(text.begin(), text.end(), pattern), std::sregex_iterator()};
-  if (found.empty()) return text;
-  const std::smatch& match = found[choose(rng, static_cast<int>(found.size()))];
-  return text.substr(0, match.position()) + by + text.substr(match.position() + match.length());
+// The first place that matches a pattern after one chosen at random: two iterators, or the end twice.
+std::pair<std::string::const_iterator, std::string::const_iterator> findOneOf(const std::string& text,
+                                                                              const std::regex& pattern, Random& rng) {
+  std::smatch match;
+  const auto begin = text.begin() + choose(rng, static_cast<int>(text.size()) + 1);
+  if (!std::regex_search(begin, text.end(), match, pattern) && !std::regex_search(text, match, pattern))
+    return {text.end(), text.end()};
+  return {match[0].first, match[0].second};
 }
 
-std::string findOneOf(const std::string& text, const std::regex& pattern, Random& rng) {
-  std::vector<std::smatch> found{std::sregex_iterator(text.begin(), text.end(), pattern), std::sregex_iterator()};
-  return found.empty() ? "" : found[choose(rng, static_cast<int>(found.size()))].str();
+std::string replaceOneOf(const std::string& text, const std::regex& pattern, const std::string& by, Random& rng) {
+  const auto [begin, end] = findOneOf(text, pattern, rng);
+  return begin == end ? text : std::string(text.begin(), begin) + by + std::string(end, text.end());
 }
 
 std::string changeNumber(const std::string& text, Random& rng) {
@@ -74,7 +76,8 @@ std::string changeNumber(const std::string& text, Random& rng) {
 
 std::string exchangeName(const std::string& text, Random& rng) {
   static const std::regex name(R"([A-Za-z_]\w{2,})");
-  const std::string other = choose(rng, 8) ? findOneOf(text, name, rng) : "world";
+  const auto [begin, end] = findOneOf(text, name, rng);
+  const std::string other = choose(rng, 8) ? std::string(begin, end) : "world";
   return replaceOneOf(text, name, other, rng);
 }
 
