@@ -1,5 +1,6 @@
 // FDDP when interrupted, with failing problems, and with invalid options.
 #include <catch2/catch.hpp>
+#include <limits>
 #include <sstream>
 
 #include "fddp_oracle.h"
@@ -185,6 +186,17 @@ TEST_CASE("options without sense are refused by name") {
   options = FddpOptions();
   options.regularization_increase = 1;
   CHECK_THROWS_WITH(Fddp(options), Catch::Contains("regularization_increase"));
+  for (int threads : {-1, 1025, 100000}) {
+    options = FddpOptions();
+    options.threads = threads;
+    CHECK_THROWS_WITH(Fddp(options), Catch::Contains("threads must lie between 0, which means all, and 1024"));
+  }
+  options.threads = 1024;
+  CHECK_NOTHROW(Fddp(options));
+  for (int iterations : {0, 1000001, std::numeric_limits<int>::max()}) {
+    options.max_iterations = iterations;
+    CHECK_THROWS_WITH(Fddp(options), Catch::Contains("max_iterations"));
+  }
 }
 
 TEST_CASE("guesses of wrong sizes are refused with the sizes") {

@@ -327,4 +327,23 @@ TEST_CASE("predictive control: it refuses a plan that is not one of its motion")
       std::invalid_argument);
 }
 
+TEST_CASE("predictive control: windows, threads and iterations without sense are refused by name") {
+  const Model& model = getBipetto();
+  const MotionPlan plan = planSquat(model, makeShortSquat(), makeStandingPosture(model));
+  const auto make = [&](const PredictiveOptions& options) {
+    PredictiveController(makePredictiveMotion(model, plan, ProblemOptions(), options), getShortSquat().motion.guess,
+                         options);
+  };
+  for (int nodes : {-1, 0, 9, 1001, 2000000000}) {
+    PredictiveOptions options = makeShortWindow(1);
+    options.nodes = nodes;
+    CHECK_THROWS_WITH(make(options), Catch::Contains("nodes must lie between 10 and 1000"));
+  }
+  for (int threads : {-1, 20000}) CHECK_THROWS_WITH(make(makeShortWindow(threads)), Catch::Contains("threads"));
+  PredictiveOptions options = makeShortWindow(1);
+  options.iterations = 0;
+  CHECK_THROWS_WITH(make(options), Catch::Contains("max_iterations"));
+  CHECK_THROWS_AS(makePredictiveMotion(model, MotionPlan(), ProblemOptions(), makeShortWindow(1)), ModelError);
+}
+
 }  // namespace bielle::simulation

@@ -20,6 +20,7 @@
 #include "io/interrupt.h"
 #include "io/output_place.h"
 #include "io/setting.h"
+#include "solve/fddp_checks.h"
 
 namespace bielle::cli {
 namespace {
@@ -290,7 +291,7 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
   addTimingOptions(sub, arguments->timings);
   addObjectiveOptions(sub, arguments->problem.objective);
   sub.add_option("--max-iterations", arguments->solver.max_iterations, "largest number of iterations")
-      ->check(CLI::Range(1, 1000000))
+      ->check(CLI::Range(1, kMostIterations))
       ->capture_default_str();
   sub.add_option_function<std::string>(
          "--inequalities",
@@ -303,7 +304,7 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
       ->check(CLI::IsMember({getName(Inequalities::AugmentedLagrangian), getName(Inequalities::InteriorPoint)}))
       ->default_str(getName(arguments->solver.constraints.inequalities));
   sub.add_option("--threads", arguments->solver.threads, "number of threads; 0: all; results do not depend on it")
-      ->check(CLI::Range(0, 1024))
+      ->check(CLI::Range(0, kMostThreads))
       ->capture_default_str();
   sub.add_option("--warm-start", arguments->warm_start,
                  "directory of another result of this robot as the initial guess, resampled if its length differs");

@@ -8,6 +8,13 @@
 namespace bielle {
 namespace {
 
+constexpr int kLeastNodes = 10, kMostNodes = 1000;
+
+void checkNodes(const PredictiveOptions& options) {
+  if (options.nodes < kLeastNodes || options.nodes > kMostNodes)
+    throw std::invalid_argument("PredictiveOptions: nodes must lie between 10 and 1000");
+}
+
 // Of the weights of joints at the end of a walk's window, whose postures are not foreseen: without any, the last stages would
 // throw the swing leg about.
 constexpr double kJointShare = 0.01;
@@ -33,7 +40,7 @@ class MotionHorizon : public Horizon {
         plan_(plan) {
     if (problem_.formulation() != Formulation::Reduced || problem_.hasFreeTimings())
       throw std::invalid_argument("PredictiveController: the problem is not reduced, or its durations are free");
-    if (static_cast<int>(plan.us.size()) != last_)
+    if (static_cast<int>(plan.us.size()) != last_ || plan.xs.size() != plan.us.size() + 1)
       throw std::invalid_argument("PredictiveController: the plan does not belong to the motion");
     double time = 0;
     for (int k = 0; k < problem_.numStages(); ++k) {
@@ -84,6 +91,7 @@ class MotionHorizon : public Horizon {
 class WalkHorizon : public Horizon {
  public:
   WalkHorizon(CommandedWalk walk, const PredictiveOptions& options) : nodes_(options.nodes), walk_(std::move(walk)) {
+    checkNodes(options);
     const Model& model = walk_.getModel();
     std::vector<StageSpec> specs;
     for (int s = 0; s <= nodes_; ++s) specs.push_back(keep(walk_.makeNext()));
@@ -158,6 +166,10 @@ class WalkHorizon : public Horizon {
 
 Motion makePredictiveMotion(const Model& model, MotionPlan plan, const ProblemOptions& problem,
                             const PredictiveOptions& options) {
+  checkNodes(options);
+  if (plan.stages.size() < 2 || plan.schedule.phases.empty() || plan.guess.us.empty() || plan.guess.xs.empty())
+    throw ModelError(model.name(), "motion '" + plan.name + "'", "its plan has no stage, phase or guess",
+                     "fill them in, e.g. by planSquat()");
   const size_t copies = static_cast<size_t>(options.nodes);
   const StageSpec last = *(plan.stages.end() - 2);
   if (last.kind != StageKind::Dynamics)

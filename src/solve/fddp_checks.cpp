@@ -17,7 +17,9 @@ void checkOptions(const FddpOptions& o) {
   const auto require = [](bool holds, const char* what) {
     if (!holds) throw std::invalid_argument(std::string("FddpOptions: ") + what);
   };
-  require(o.max_iterations >= 1, "max_iterations must be at least 1");
+  require(o.max_iterations >= 1 && o.max_iterations <= kMostIterations,
+          "max_iterations must lie between 1 and 1000000");
+  require(o.threads >= 0 && o.threads <= kMostThreads, "threads must lie between 0, which means all, and 1024");
   require(o.num_step_lengths >= 1, "num_step_lengths must be at least 1");
   require(o.min_regularization > 0, "min_regularization must be positive, or it could never be raised");
   require(o.initial_regularization >= o.min_regularization && o.initial_regularization <= o.max_regularization,

@@ -4,6 +4,9 @@
 
 namespace bielle {
 
+/// Of FddpOptions. More threads than that would take all memory for nothing.
+inline constexpr int kMostIterations = 1000000, kMostThreads = 1024;
+
 /// Throws std::invalid_argument on options that make no sense, naming them.
 void checkOptions(const FddpOptions& options);
 /// Throws std::invalid_argument if the sizes of the trajectory are not those of the problem.

@@ -32,7 +32,8 @@ FddpSummary FddpRun::solve() {
 void FddpRun::start() {
   N_ = problem_.numStages();
   checkSizes(problem_, trajectory_);
-  threads_ = options_.threads > 0 ? options_.threads : omp_get_max_threads();
+  // Each has memory of its own, and no more than one a node has work.
+  threads_ = std::min(options_.threads > 0 ? options_.threads : omp_get_max_threads(), N_ + 1);
   work_.resize(problem_, options_, threads_);
   trajectory_.xs[0] = problem_.initialState();
   for (size_t k = 0; k < work_.bounds.size(); ++k) {

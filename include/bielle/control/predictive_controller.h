@@ -37,7 +37,7 @@
 namespace bielle {
 
 struct PredictiveOptions {
-  int nodes = 100;               ///< N
+  int nodes = 100;               ///< N, 10 to 1000
   int iterations = 2;            ///< of the solver, at every stage
   double regularization = 1e-5;  ///< of its sweeps
   double penalty = 1;            ///< of violated constraints (fddp.h, Eq. 10)
@@ -47,7 +47,7 @@ struct PredictiveOptions {
   /// Motors brake before the transmission of a linkage falls below this share of that at the start, or exceeds its reciprocal.
   /// Use a smaller value than the motion's margin (LimitOptions::dead_point_margin); 0: they do not brake.
   double dead_point_stop = 0.075;
-  int threads = 0;  ///< 0: all. Results are bitwise independent of it.
+  int threads = 0;  ///< 0: all; at most 1024. Results are bitwise independent of it.
   /// Solves run in a separate thread; results then depend on its speed.
   bool own_thread = false;
   /// Weights of the difference between the end of the window and the motion there: of heading and place over the ground, of the

@@ -142,7 +142,7 @@ struct Multipliers {
 };
 
 struct FddpOptions {
-  int max_iterations = 300;
+  int max_iterations = 300;  ///< at most 1000000
   /// Converged if Eq. (6) is below this, in (units of cost per unit of control)^2, and the gaps are closed.
   double gradient_tolerance = 1e-9;
   /// The gaps are closed if every entry is below this, in units of the tangent space.
@@ -172,7 +172,7 @@ struct FddpOptions {
   /// tolerances, so it is independent of the number of threads.
   int rollout_segments = 16;
   LastRollout last_rollout = LastRollout::Closed;
-  int threads = 0;  ///< 0: all. Results are bitwise independent of it.
+  int threads = 0;  ///< 0: all; at most 1024. Results are bitwise independent of it.
 };
 
 /// One line of the log: the iterate that the iteration started from and the step it took.
