@@ -3,6 +3,7 @@
 #include "bielle/motion/squat.h"
 #include "check_derivative.h"
 #include "count_allocations.h"
+#include "get_error.h"
 #include "problem_probe.h"
 #include "random_problem.h"
 
@@ -146,6 +147,18 @@ TEST_CASE("shooting problem: what does not fit is refused, what is not finite fa
   }
   CHECK_THROWS_AS(make([](StageSpec& s) { s.control.reference.resize(0); }), ModelError);
   CHECK_THROWS_AS(make([](StageSpec& s) { s.costs[0].activation.weights.resize(2); }), ModelError);
+  for (double weight : {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    const auto refuse = [&](const auto& spoil, const std::string& what) {
+      CHECK_THAT(getError([&] { make([&](StageSpec& s) { spoil(s) = weight; }); }), Catch::Contains(what));
+    };
+    refuse([](StageSpec& s) -> double& { return s.costs[0].weight; }, "cost 'com': a weight is negative or not finite");
+    refuse([](StageSpec& s) -> double& { return s.costs[0].activation.weights[1]; }, "cost 'com': a weight is");
+    refuse([](StageSpec& s) -> double& { return s.state.weight; }, "a weight of the state cost is");
+    refuse([](StageSpec& s) -> double& { return s.state.weights[2]; }, "a weight of the state cost is");
+    refuse([](StageSpec& s) -> double& { return s.control.weight; }, "a weight of the control cost is");
+    refuse([](StageSpec& s) -> double& { return s.control.weights[0]; }, "a weight of the control cost is");
+    refuse([](StageSpec& s) -> double& { return s.time_weight; }, "its cost per second is");
+  }
   CHECK_THROWS_AS(RobotProblem(model, mechanism.q_closed, VectorXd::Zero(3), {}), ModelError);
   CHECK_THROWS_AS(RobotProblem(model, mechanism.q_closed, v, {}), ModelError);
   const RobotProblem whole = make([](StageSpec&) {});

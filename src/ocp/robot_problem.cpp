@@ -10,6 +10,9 @@
 namespace bielle {
 namespace {
 
+bool isWeight(double weight) { return weight >= 0 && std::isfinite(weight); }
+bool areWeights(const VectorXd& weights) { return std::all_of(weights.begin(), weights.end(), isWeight); }
+
 void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool terminal) {
   // Messages are put together when they are needed: a problem has thousands of these.
   const auto refuse = [&](const std::string& what, const char* remedy) {
@@ -32,12 +35,12 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool ter
     require(timing.lower > 0 && timing.lower <= timing.upper && std::isfinite(timing.upper),
             "the bounds of its time scale are not positive, or in the wrong order", "e.g. 0.6 and 1.6");
   }
-  const auto isWeight = [](double weight) { return weight >= 0 && std::isfinite(weight); };
-  require(isWeight(spec.time_weight), "its cost per second is negative or not finite", "give 0 or more");
-  require(isWeight(spec.state.weight) && spec.state.weights.allFinite(),
-          "a weight of the state cost is negative or not finite", "give 0 or more");
-  require(isWeight(spec.control.weight) && spec.control.weights.allFinite(),
-          "a weight of the control cost is negative or not finite", "give 0 or more");
+  constexpr const char* kRemedy = "give finite numbers of 0 or more";
+  require(isWeight(spec.time_weight), "its cost per second is negative or not finite", kRemedy);
+  require(isWeight(spec.state.weight) && areWeights(spec.state.weights),
+          "a weight of the state cost is negative or not finite", kRemedy);
+  require(isWeight(spec.control.weight) && areWeights(spec.control.weights),
+          "a weight of the control cost is negative or not finite", kRemedy);
   if (spec.state.weight != 0)
     require(spec.state.q_ref.size() == model.nq() && spec.state.v_ref.size() == model.nv() &&
                 spec.state.weights.size() == 2 * model.nv(),
@@ -54,11 +57,11 @@ void checkSpec(const Model& model, const StageSpec& spec, size_t index, bool ter
               " depends on speeds under torques, which an impact does not have", "leave it out there");
   };
   for (const Cost& cost : spec.costs) {
-    requireOf(isWeight(cost.weight) && cost.activation.weights.allFinite(), "cost", cost.name,
-              ": a weight is negative or not finite", "give 0 or more");
     requireOf(cost.residual && cost.activation.hasSize(cost.residual->size()), "cost", cost.name,
               ": weights or bounds do not have the size of the residual",
               "give one weight per row of the residual and, for a barrier, one lower and one upper bound");
+    requireOf(isWeight(cost.weight) && areWeights(cost.activation.weights), "cost", cost.name,
+              ": a weight is negative or not finite", kRemedy);
     requireForces(*cost.residual, "cost", cost.name);
   }
   for (const PathConstraint& constraint : spec.path_constraints) {

@@ -6,7 +6,7 @@ namespace bielle {
 
 enum class ActivationKind { Quadratic, Barrier, Energy };
 
-/// Scalar function of a residual r (n).
+/// Scalar function of a residual r (n). Weights, here and below, are finite and not negative: RobotProblem refuses others.
 ///   Quadratic:  1/2 sum_i w_i r_i^2
 ///   Barrier:    1/2 sum_i w_i (max(0, lower_i - r_i)^2 + max(0, r_i - upper_i)^2)
 ///   Energy:     sum_i w_i (share P_i + (1 - share) (P_i + sqrt(P_i^2 + e^2)) / 2),   r = (P, u) of makeElectricalPower():
