@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <sstream>
 
@@ -163,6 +164,25 @@ TEST_CASE("trajectories come back from CSV and NumPy files to the last bit") {
   MotionRecord other = record;
   other.u(1, 1) = std::nextafter(other.u(1, 1), 1e9);
   CHECK_FALSE(areEqual(other.u, record.u));  // the comparison sees the last bit
+}
+
+TEST_CASE("a record whose tables do not fit its names and times is refused by name, not read beyond its end") {
+  const ShortSquat squat;
+  const MotionRecord whole = makeRecord(squat.motion, squat.motion.guess);
+  const auto check = [&](const char* array, const std::function<void(MotionRecord&)>& spoil) {
+    MotionRecord record = whole;
+    spoil(record);
+    for (const auto& write : {writeCsv, writeNpz})
+      CHECK_THAT(getError([&] { write(TemporaryDirectory() / "t", record); }),
+                 Catch::Contains("record, array '" + std::string(array) + "'"));
+  };
+  check("time", [](MotionRecord& r) { r = MotionRecord(); });
+  check("q", [](MotionRecord& r) { r.q_names.push_back("more"); });
+  check("v", [](MotionRecord& r) { r.v.conservativeResize(r.v.rows() - 1, Eigen::NoChange); });
+  check("u", [](MotionRecord& r) { r.u.resize(0, 0); });
+  check("contact_wrenches", [](MotionRecord& r) { r.contact_names.pop_back(); });
+  check("q_mid", [](MotionRecord& r) { r.has_midpoints = true; });
+  check("footholds", [](MotionRecord& r) { r.footholds.resize(1, 1); });
 }
 
 TEST_CASE("multipliers come back from NumPy files, and are refused where their rows do not fit") {

@@ -68,6 +68,25 @@ void resizeRecord(int stages, MotionRecord& record) {
     (record.*table.data).resize(stages + (table.per == RecordTable::Per::Node ? 1 : 0), table.columns.size());
 }
 
+void requireWhole(const MotionRecord& record) {
+  const Eigen::Index nodes = record.time.size();
+  const auto require = [](bool holds, const std::string& array) {
+    if (!holds)
+      throw ModelError("", "record, array '" + array + "'", "its shape does not match the names and the times",
+                       "give one row per node, or per stage, and one column per name");
+  };
+  require(nodes > 0, "time");
+  for (const RecordTable& table : listTables(record)) {
+    const RowMatrixXd& data = record.*table.data;
+    require(data.rows() == nodes - (table.per == RecordTable::Per::Stage ? 1 : 0) &&
+                data.cols() == static_cast<Eigen::Index>(table.columns.size()),
+            table.array);
+  }
+  const Eigen::Index entries = MotionRecord::kFootholdEntries * static_cast<Eigen::Index>(record.contact_names.size());
+  require(record.footholds.size() == 0 || (record.footholds.rows() == nodes && record.footholds.cols() == entries),
+          "footholds");
+}
+
 std::vector<RecordTable> listTables(const MotionRecord& r) {
   using Per = RecordTable::Per;
   using R = MotionRecord;

@@ -76,6 +76,7 @@ void addName(const std::string& column, MotionRecord& record) {
 }  // namespace
 
 std::string formatCsv(const MotionRecord& record) {
+  requireWhole(record);
   std::string text;
   for (const std::string& column : makeHeader(record)) text += (text.empty() ? "" : ",") + quoteCsv(column);
   const std::vector<RecordTable> tables = listTables(record);

@@ -80,6 +80,7 @@ RowMatrixXd takeFootholds(const std::string& path, size_t nodes, size_t contacts
 }  // namespace
 
 std::string formatNpz(const MotionRecord& record) {
+  requireWhole(record);
   NpyArrays arrays;
   const size_t nodes = record.time.size();
   arrays["time"] = {{nodes}, {record.time.data(), record.time.data() + nodes}, {}, false};

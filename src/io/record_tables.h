@@ -18,6 +18,9 @@ std::vector<RecordTable> listTables(const MotionRecord& record);
 // Sets the size of every table; the names must be set.
 void resizeRecord(int stages, MotionRecord& record);
 
+// Throws ModelError unless every table has as many rows and columns as times and names ask for.
+void requireWhole(const MotionRecord& record);
+
 std::string formatCsv(const MotionRecord& record);
 std::string formatNpz(const MotionRecord& record);
 MotionRecord readCsv(const std::string& path);

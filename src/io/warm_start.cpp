@@ -6,6 +6,7 @@
 #include "bielle/io/names.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
+#include "io/record_tables.h"
 
 namespace fs = std::filesystem;
 
@@ -77,6 +78,7 @@ void setGuess(const MotionRecord& record, Motion& motion) {
   requireSame(record.q_names, makePositionNames(model), "coordinates");
   requireSame(record.v_names, makeVelocityNames(model), "velocities");
   requireSame(record.u_names, getNames(model.motors()), "motors");
+  requireWhole(record);
   if (record.q.rows() < 2 || record.u.rows() < 1 || !record.q.allFinite() || !record.v.allFinite() ||
       !record.u.allFinite())
     throw ModelError("", "warm start", "the recorded motion is empty or contains numbers that are not finite",
