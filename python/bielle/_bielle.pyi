@@ -1878,7 +1878,7 @@ class SolverOptions:
         ...
     @property
     def threads(self) -> int:
-        """0: all; results are bitwise independent of it"""
+        """0: all; at most 1024; results are bitwise independent of it"""
         ...
 
 class Termination:
@@ -3128,7 +3128,7 @@ class PredictiveOptions:
     def __eq__(self, other: object) -> bool: ...
     @property
     def nodes(self) -> int:
-        """number of stages of a window"""
+        """number of stages of a window, 10 to 1000"""
         ...
     @property
     def iterations(self) -> int:
@@ -3152,7 +3152,7 @@ class PredictiveOptions:
         ...
     @property
     def threads(self) -> int:
-        """0: all; results are bitwise independent of it"""
+        """0: all; at most 1024; results are bitwise independent of it"""
         ...
     @property
     def own_thread(self) -> bool:

@@ -24,11 +24,15 @@ std::shared_ptr<HeldController> makeHeldPolicy(const std::shared_ptr<HeldMotion>
 std::shared_ptr<HeldController> makePredictive(const std::shared_ptr<Model>& model, const MotionPlan& plan,
                                                const ShootingTrajectory& solved, const ProblemOptions& problem,
                                                const PredictiveOptions& options) {
-  const py::gil_scoped_release release;
+  const MotionPlan whole = completePlan(*model, plan);
+  std::unique_ptr<PredictiveController> predictive;
+  {
+    const py::gil_scoped_release release;
+    predictive =
+        std::make_unique<PredictiveController>(makePredictiveMotion(*model, whole, problem, options), solved, options);
+  }
   auto held = std::make_shared<HeldController>();
   held->model = model;
-  auto predictive =
-      std::make_unique<PredictiveController>(makePredictiveMotion(*model, plan, problem, options), solved, options);
   held->predictive = predictive.get();
   held->controller = std::move(predictive);
   return held;
@@ -63,7 +67,7 @@ std::vector<PredictedFoothold> getFootholds(HeldController& self) {
 
 void bindControllers(py::module_& module) {
   Value<PredictiveOptions>(module, "PredictiveOptions", "Options of predictive control.")
-      .field("nodes", &PredictiveOptions::nodes, "number of stages of a window")
+      .field("nodes", &PredictiveOptions::nodes, "number of stages of a window, 10 to 1000")
       .field("iterations", &PredictiveOptions::iterations, "solver iterations at every stage")
       .field("regularization", &PredictiveOptions::regularization, "regularization of its sweeps")
       .field("penalty", &PredictiveOptions::penalty, "penalty of violated constraints")
@@ -72,7 +76,7 @@ void bindControllers(py::module_& module) {
       .field("dead_point_stop", &PredictiveOptions::dead_point_stop,
              "motors brake before the transmission of a linkage reaches this share of that at the start, or the "
              "reciprocal")
-      .field("threads", &PredictiveOptions::threads, "0: all; results are bitwise independent of it")
+      .field("threads", &PredictiveOptions::threads, "0: all; at most 1024; results are bitwise independent of it")
       .field("own_thread", &PredictiveOptions::own_thread,
              "solves run in parallel with control; results then depend on their speed")
       .field("end_place", &PredictiveOptions::end_place,
@@ -86,7 +90,7 @@ void bindControllers(py::module_& module) {
   py::class_<HeldController, std::shared_ptr<HeldController>>(
       module, "Controller",
       "A feedback law: from measured states to torques. Controller.policy and .predictive make them.")
-      .def_static("policy", &makeHeldPolicy, py::arg("motion"), py::arg("gains") = true,
+      .def_static("policy", &makeHeldPolicy, py::arg("motion"), py::arg("gains").none(false) = true,
                   "Torques of a solved Motion, and feedback with the gains of its last sweep.")
       .def_static("predictive", &makePredictive, py::arg("model"), py::arg("plan"), py::arg("solved"),
                   py::arg("problem") = ProblemOptions(), py::arg("options") = PredictiveOptions(),

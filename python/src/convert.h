@@ -35,6 +35,7 @@ struct Convert {
   }
   static M read(py::handle value, const std::string& what) {
     try {
+      if (value.is_none()) throw py::cast_error();  // which pybind11 takes for False
       return value.cast<M>();
     } catch (const py::cast_error&) {
       throw py::type_error(what + ": expected " + std::string(py::type_id<M>()) + ", got " +

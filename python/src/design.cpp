@@ -32,11 +32,11 @@ std::shared_ptr<HeldParametrization> parametrizeGenerated(const std::string& gen
 }
 
 py::array costGradient(HeldMotion& held, const HeldParametrization& robot, const py::object& x) {
+  const VectorXd point = readVector(x, robot.robot.start().size(), "x");
   if (!held.request)
     throw std::runtime_error(
         "motion: a motion made from a plan cannot be made for other robots; make it from a Request");
   if (!held.multipliers) throw std::runtime_error("motion: solve it first; gradients need an optimum");
-  const VectorXd point = readVector(x, robot.robot.start().size(), "x");
   const BusyGuard guard(held.is_busy, "motion");
   VectorXd gradient;
   {

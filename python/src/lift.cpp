@@ -47,10 +47,10 @@ Lift liftMotion(const Robot& robot, const NamedSerial& named, HeldMotion& motion
   const SerialModel serial = {*named.model,           named.q_reference,  named.frozen_joints,
                               named.dropped_closures, named.replacements, named.dropped_targets};
   const MotionResult solved = makeResult({robot.name, robot.file, {}}, motion.motion, motion.motion.guess, {});
-  const LiftResult lifted = lift(*robot.model, serial, makeSerialTrajectory(motion.motion, solved.record), options);
+  const LiftResult lifted = lift(robot.get(), serial, makeSerialTrajectory(motion.motion, solved.record), options);
   Lift out = {lifted.lifted(), lifted.nodes, {}};
   if (!lifted.trajectory.us.empty())
-    out.result = makeLiftedResult({robot.name, robot.file, {}, "closed", ""}, *robot.model, motion.motion, lifted, 0);
+    out.result = makeLiftedResult({robot.name, robot.file, {}, "closed", ""}, robot.get(), motion.motion, lifted, 0);
   return out;
 }
 

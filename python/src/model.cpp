@@ -19,19 +19,23 @@ Frame findFrame(const Model& model, const std::string& name) {
   return {name, frame.body, frame.X_BF};
 }
 
-// \throws ValueError when the set is not one of the model
 ConstraintSet requireFit(const Model& model, const ConstraintSet& set) {
-  bool fits = set.offsets.size() == set.closures.size();
-  int rows = 0;
-  for (size_t c = 0; fits && c < set.closures.size(); ++c) {
-    const Closure& closure = set.closures[c];
-    fits = set.offsets[c] == rows && closure.dofs.size() == closure.signs.size();
-    for (int body : {closure.body1, closure.body2}) fits = fits && body >= 0 && body < model.numBodies();
-    for (int dof : closure.dofs) fits = fits && dof >= 0 && dof < model.nv();
-    rows += getRows(closure.kind);
+  bool fits = set.num_loops == static_cast<int>(model.closures().size()) &&
+              set.closures.size() == model.closures().size() + set.contacts.size();
+  std::vector<ContactTarget> targets;
+  for (size_t c = 0; fits && c < set.contacts.size(); ++c) {
+    fits = set.contacts[c] >= 0 && set.contacts[c] < static_cast<int>(model.contacts().size());
+    targets.push_back({set.contacts[c], set.closures[model.closures().size() + c].X_B2});
   }
-  if (!fits || rows != set.rows || set.num_loops + set.contacts.size() != set.closures.size())
-    throw py::value_error("contacts: this ConstraintSet does not belong to the model; make it with Model.constraints");
+  if (fits) {
+    ConstraintSet own = makeConstraintSet(model, targets);
+    for (size_t c = 0; c < own.closures.size(); ++c)
+      own.closures[c].kp = set.closures[c].kp, own.closures[c].kd = set.closures[c].kd;
+    fits = same(set, own);
+  }
+  if (!fits)
+    throw py::value_error(
+        "constraints: this ConstraintSet does not belong to the model; make it with Model.constraints");
   return set;
 }
 

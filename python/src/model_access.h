@@ -17,6 +17,7 @@ struct Convert<std::shared_ptr<Model>> {
   static std::string type() { return "Model"; }
   static py::object show(const std::shared_ptr<Model>& member, py::handle) { return py::cast(member); }
   static std::shared_ptr<Model> read(py::handle value, const std::string& what) {
+    if (value.is_none()) return nullptr;  // of a value that was made without one
     if (!py::isinstance<Model>(value)) throw py::type_error(what + ": expected a Model");
     return value.cast<std::shared_ptr<Model>>();
   }
@@ -28,6 +29,10 @@ Frame findFrame(const Model& model, const std::string& name);
 
 /// Index of a contact. \throws ModelError when the robot has none of this name
 int findContact(const Model& model, const std::string& name);
+
+/// A set of the model: its closures and contacts, with places of the contacts and gains that may be any.
+/// \throws ValueError when it is none
+ConstraintSet requireFit(const Model& model, const ConstraintSet& set);
 
 /// Closures and contacts in force, from a ConstraintSet, or from a sequence of names of contacts and ContactTargets.
 ConstraintSet readConstraints(const Model& model, py::handle contacts);

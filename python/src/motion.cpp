@@ -92,15 +92,25 @@ ContactSchedule makeSchedule(const std::vector<StageSpec>& stages) {
   return schedule;
 }
 
-// Plans that were made from nothing need no schedule: results tell that of their stages.
-std::shared_ptr<HeldMotion> makeFromPlan(std::shared_ptr<Model> model, MotionPlan plan, const ProblemOptions& options) {
+}  // namespace
+
+MotionPlan completePlan(const Model& model, MotionPlan plan) {
+  if (plan.stages.empty()) throw py::value_error("stages: expected some, and the terminal one");
+  for (size_t k = 0; k + 1 < plan.stages.size(); ++k) requireFit(model, plan.stages[k].constraints);
   if (plan.schedule.phases.empty()) plan.schedule = makeSchedule(plan.stages);
   if (const int nodes = plan.schedule.numStages(); nodes + 1 != static_cast<int>(plan.stages.size()))
     throw py::value_error("schedule: " + std::to_string(nodes) + " stages in its phases, and " +
                           std::to_string(plan.stages.size()) + " of the plan, the terminal one among them");
+  return plan;
+}
+
+namespace {
+
+std::shared_ptr<HeldMotion> makeFromPlan(std::shared_ptr<Model> model, const MotionPlan& plan,
+                                         const ProblemOptions& options) {
   auto held = std::make_shared<HeldMotion>();
   held->model = std::move(model);
-  held->plan = std::move(plan);
+  held->plan = completePlan(*held->model, plan);
   held->options = options;
   held->motion = makeMotion(*held->model, *held->plan, options);
   return held;
@@ -310,7 +320,7 @@ void bindHeldMotion(py::module_& module) {
         const auto options = state[3].cast<ProblemOptions>();
         auto held = state[1].is_none() ? makeFromPlan(model, state[2].cast<const MotionPlan&>(), options)
                                        : makeHeldMotion(model, state[1].cast<const Request&>(), options);
-        held->motion.guess = state[4].cast<ShootingTrajectory>();
+        setTrajectory(*held, state[4].cast<ShootingTrajectory>());
         return held;
       }));
   type.def("__repr__", [](const HeldMotion& h) {
@@ -324,7 +334,7 @@ void bindHeldMotion(py::module_& module) {
 void bindMotions(py::module_& module) {
   bindRequests(module);
   bindHeldMotion(module);
-  module.def("_make_residuals", &makeResiduals);
+  module.def("_make_residuals", &makeResiduals, py::arg("model"), py::arg("made_of"), py::arg("options") = py::none());
 }
 
 }  // namespace bielle::python

@@ -42,6 +42,10 @@ void requireStill(const HeldMotion& held);
 std::shared_ptr<HeldMotion> makeHeldMotion(std::shared_ptr<Model> model, const Request& request,
                                            const ProblemOptions& options);
 
+/// A plan whose stages fit the model, with the schedule that its stages follow where it has none: those made from nothing.
+/// \throws ValueError when stages are missing, belong to another model, or are not as many as in the schedule
+MotionPlan completePlan(const Model& model, MotionPlan plan);
+
 /// Lets `callback(iteration)` observe a solve that runs without the interpreter's lock, and signals end it: their
 /// exceptions leave it. False from the callback stops it.
 /// \param is_called  true while it is; or null

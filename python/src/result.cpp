@@ -103,7 +103,7 @@ MotionResult solveRequest(const Robot& robot, const Request& request, const Prob
   const FddpObserver observer = makeObserver(callback);
   const py::gil_scoped_release release;
   const MotionRequest motion_request = request.make();
-  RequestSolver solver(motion_request, *robot.model, {problem, options, warm_start}, {observer, observer, {}, {}});
+  RequestSolver solver(motion_request, robot.get(), {problem, options, warm_start}, {observer, observer, {}, {}});
   return solver.solve({robot.name, robot.file, {}});
 }
 

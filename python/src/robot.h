@@ -11,6 +11,12 @@ struct Robot {
   std::shared_ptr<Model> model;  // shared with all that is made of it
   std::string file, directory;   // empty: not from files
   std::vector<std::string> warnings;
+
+  /// \throws ValueError when it was made without one
+  const Model& get() const {
+    if (!model) throw py::value_error("robot: it has no model; load_robot and generate_robot make robots");
+    return *model;
+  }
 };
 
 }  // namespace bielle::python

@@ -52,7 +52,7 @@ py::dict describeGenerators() {
   return out;
 }
 
-LoadedRobot toLoaded(const Robot& robot) { return {*robot.model, robot.warnings, robot.directory, robot.file}; }
+LoadedRobot toLoaded(const Robot& robot) { return {robot.get(), robot.warnings, robot.directory, robot.file}; }
 
 py::object describe(const Robot& robot) {
   std::string text;
@@ -80,7 +80,7 @@ void bindRobots(py::module_& module) {
       .field("warnings", &Robot::warnings, "valid but suspicious: \"file: element: problem\"")
       .type()
       .def(
-          "write", [](const Robot& robot, const std::string& directory) { writeRobot(*robot.model, directory); },
+          "write", [](const Robot& robot, const std::string& directory) { writeRobot(robot.get(), directory); },
           py::arg("directory"), py::call_guard<py::gil_scoped_release>(),
           "Writes DIRECTORY/NAME.urdf and .yaml, where NAME is the last component of DIRECTORY.")
       .def("info", &describe,

@@ -48,7 +48,7 @@ void bindOptions(py::module_& module) {
       .field("constraints", &FddpOptions::constraints, "ConstraintOptions")
       .field("rollout_segments", &FddpOptions::rollout_segments, "largest number of segments of a rollout")
       .field("last_rollout", &FddpOptions::last_rollout, "LastRollout")
-      .field("threads", &FddpOptions::threads, "0: all; results are bitwise independent of it");
+      .field("threads", &FddpOptions::threads, "0: all; at most 1024; results are bitwise independent of it");
 }
 
 void bindSummary(py::module_& module) {

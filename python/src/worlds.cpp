@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cmath>
 #include <exception>
 #include <optional>
 
@@ -106,6 +108,8 @@ class HeldWorlds {
   // One column per world.
   MatrixXd readRows(py::handle value, Eigen::Index size, const std::string& what, bool shared) const {
     const Array array = readArray(value, what);
+    if (!std::all_of(array.data(), array.data() + array.size(), [](double x) { return std::isfinite(x); }))
+      throw py::value_error(what + ": expected finite numbers");
     const auto count = static_cast<Eigen::Index>(worlds_.size());
     if (many_ && !(shared && array.ndim() == 1)) {
       requireShape(array, {count, size}, what);
