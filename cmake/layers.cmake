@@ -93,9 +93,10 @@ function(bielle_fast target)
 endfunction()
 
 # bielle_plain(TARGET): everything else. -O1 takes three quarters of the time to compile; GCC 12 then reports its AVX-512
-# intrinsics once more, and takes a source within a unity for a header.
+# intrinsics once more, and takes a source within a unity for a header. Programs are compiled as libraries are (-fPIC), or else
+# their precompiled headers would not fit.
 function(bielle_plain target)
-  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1> $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized;-Wno-subobject-linkage>)
+  target_compile_options(${target} PRIVATE -fPIC $<$<CONFIG:Release>:-O1> $<$<CXX_COMPILER_ID:GNU>:-Wno-uninitialized;-Wno-subobject-linkage>)
   bielle_precompile(${target} plain <nlohmann/json.hpp> <CLI/CLI.hpp>)
 endfunction()
 
