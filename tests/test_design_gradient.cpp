@@ -65,12 +65,12 @@ TEST_CASE("design gradient: Bipetto's knee, torques and energy of kept motions")
     here.limits.gradients.rowwise().norm().maxCoeff(&knee);
     analytic.row(4) = here.limits.gradients.row(knee);
     const MatrixXd numeric = differentiate(x, 1e-4, [&](const VectorXd& other) {
-      const Evaluation evaluation = evaluator.evaluate(other);
-      REQUIRE(evaluation.status == DesignStatus::Feasible);
+      const SlopedEvaluation there = evaluator.differentiate(other);
+      REQUIRE(there.evaluation.status == DesignStatus::Feasible);
       VectorXd terms(5);
       for (int i = 0; i < 4; ++i)
-        terms[i] = evaluator.objective()[i].weight / evaluator.start().terms[i] * evaluation.terms[i];
-      terms[4] = evaluator.differentiate(other).limits.values[knee];
+        terms[i] = evaluator.objective()[i].weight / evaluator.start().terms[i] * there.evaluation.terms[i];
+      terms[4] = there.limits.values[knee];
       return terms;
     });
     INFO(analytic << "\n\n" << numeric);

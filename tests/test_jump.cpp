@@ -152,6 +152,7 @@ TEST_CASE("jump: Bipetto flies as long and as far as requested, and lands softly
     JumpOptions options;
     options.flight = row.flight;
     options.length = row.length;
+    options.time_step = 0.01;
     Motion motion = makeJump(getBipetto(), options, row.formulation);
     FddpSummary summary;
     const JumpOutcome out = solveJump(motion, summary);
@@ -207,6 +208,7 @@ TEST_CASE("jump: its height follows from its time, its load from its height") {
 TEST_CASE("jump: what no leg can do does not pass for done, and stays finite") {
   JumpOptions options;
   options.flight = 1;
+  options.time_step = 0.01;
   Motion motion = makeJump(getBipetto(), options);
   FddpOptions solver;
   solver.max_iterations = 30;

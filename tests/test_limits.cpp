@@ -85,7 +85,7 @@ void checkKneesAtFourFifths(const Make& make) {
 
 TEST_CASE("limits: a walk with four fifths of the torque that its knees would like") {
   WalkOptions options;
-  options.steps = 3;
+  options.steps = 2;
   checkKneesAtFourFifths([&](const ProblemOptions& problem) { return makeWalk(getBipetto(), options, problem); });
 }
 
@@ -99,6 +99,7 @@ TEST_CASE("limits: a jump with four fifths of the torque that its knees would li
 TEST_CASE("limits: motors keep to their velocity, and use it") {
   SquatOptions options;
   options.duration = 1.2;
+  options.settle = 0.1;
   const std::string motor = "motor_knee_right";
   Motion free = makeSquat(getBipetto(), options);
   const FddpSummary without = solveWithinLimits(free);
@@ -161,7 +162,7 @@ TEST_CASE("limits: joint ranges hold at every node but the first, and none witho
 
 TEST_CASE("limits: a joint stays within its range, and uses it") {
   WalkOptions options;
-  options.steps = 3;
+  options.steps = 2;
   Motion wide = makeWalk(getBipetto(), options);
   REQUIRE(solveWithinLimits(wide).termination == FddpTermination::Converged);
   const int q = getBipetto().joints()[getBipetto().findJoint("hipx_left")].idx_q;
@@ -254,6 +255,7 @@ double calcVoltageUse(const Motion& motion) {
 TEST_CASE("limits: motors keep to the voltage of their supply, and use it") {
   SquatOptions options;
   options.duration = 1.2;
+  options.settle = 0.1;
   MotorDrive drive;
   drive.ratio = 9;
   drive.torque_constant = 0.1;

@@ -128,14 +128,20 @@ TEST_CASE("sequence: up, over the top and down again, on one ground") {
 
 TEST_CASE("sequence: unlike motions are solved as one problem") {
   TurnOptions turn;
-  turn.angle = 0.6;
-  turn.steps = 4;
+  turn.angle = 0.3;
+  turn.steps = 2;
+  turn.gait.timing.time_step = 0.02;
   WalkOptions walk;
-  walk.steps = 4;
+  walk.steps = 2;
+  walk.gait.timing.time_step = 0.02;
+  StairsOptions stairs = makeStairsOf(0.1);
+  stairs.stairs = 1;
+  stairs.gait.timing.time_step = 0.02;
+  JumpOptions jump;
+  jump.time_step = 0.01;
   const std::vector<SequencePart> parts = {makePart("squat", planSquat, makeShortSquat()),
                                            makePart("turn", planTurn, turn), makePart("walk", planWalk, walk),
-                                           makePart("stairs", planStairs, makeStairsOf(0.05)),
-                                           makePart("jump", planJump, JumpOptions())};
+                                           makePart("stairs", planStairs, stairs), makePart("jump", planJump, jump)};
   const Model& model = getBipetto();
   Motion motion = makeSequence(model, parts);
   std::vector<std::string> solved;
