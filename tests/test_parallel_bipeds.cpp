@@ -107,7 +107,7 @@ TEST_CASE("Cleobot: bielle solve squat, walk and jump converge, are checked and 
   checkMotions("cleobot",
                {{{"squat"}, 0.7 * standing, standing},
                 {{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
-                {{"walk"}, 0.98 * standing, 1.02 * standing},
+                {{"walk", "--steps", "4"}, 0.98 * standing, 1.02 * standing},
                 {{"jump"}, 0.88 * standing, standing + 0.02 + rise}},
                45, 0.25, {0.015, 0.2});
 }
@@ -117,7 +117,7 @@ TEST_CASE("RSU biped: bielle solve squat, walk and jump converge, are checked an
   checkMotions("rsu_biped",
                {{{"squat"}, 0.7 * standing, standing},
                 {{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
-                {{"walk"}, 0.98 * standing, 1.02 * standing},
+                {{"walk", "--steps", "4"}, 0.98 * standing, 1.02 * standing},
                 {{"jump"}, 0.83 * standing, standing + 0.02 + rise}},
                70, 0.25, {0.015, 0.2});
 }
@@ -127,7 +127,7 @@ TEST_CASE("belt biped: bielle solve squat, walk and jump converge and are checke
   checkMotions("belt_biped",
                {{{"squat"}, 0.7 * standing, standing},
                 {{"squat", "--depth", "0.6"}, 0.6 * standing, standing},
-                {{"walk"}, 0.98 * standing, 1.055 * standing},
+                {{"walk", "--steps", "4"}, 0.98 * standing, 1.055 * standing},
                 {{"jump"}, 0.83 * standing, standing + 0.02 + rise}},
                70, 0.25, {0.015, 0.2});
 }
@@ -153,8 +153,9 @@ TEST_CASE("belt knee and differential ankle: bielle solve squat and walk converg
   const double standing = 0.403;
   for (const char* name : {"belt_knee", "differential_ankle"}) {
     CAPTURE(name);
-    checkMotions(name, {{{"squat"}, 0.7 * standing, standing}, {{"walk"}, 0.98 * standing, 1.055 * standing}}, 70, 0.25,
-                 {0.015, 0.2});
+    checkMotions(name,
+                 {{{"squat"}, 0.7 * standing, standing}, {{"walk", "--steps", "4"}, 0.98 * standing, 1.055 * standing}},
+                 70, 0.25, {0.015, 0.2});
   }
 }
 

@@ -14,6 +14,7 @@ TEST_CASE("stairs: Bipetto goes up and down, every foot on its step") {
     CAPTURE(height);
     StairsOptions options;
     options.height = height;
+    options.stairs = 2;
     Motion motion = makeStairs(getBipetto(), options);
     for (const ContactPhase& phase : motion.schedule.phases)
       for (const ContactTarget& foot : phase.contacts)

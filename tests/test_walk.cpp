@@ -138,7 +138,7 @@ TEST_CASE("gait: swings start and end at rest, the pendulum's zero-moment point 
 }
 
 TEST_CASE("walk: Bipetto walks as fast as requested, on its feet") {
-  for (double speed : {0.3, 0.5, 0.8, 1.0}) {
+  for (double speed : {0.5, 1.0}) {  // tests check_walk_* have others
     CAPTURE(speed);
     WalkOptions options;
     options.speed = speed;
@@ -174,6 +174,7 @@ TEST_CASE("walk: stages are as short as the fastest swing needs, unless their le
   const auto getStep = [&](double speed, double single, double height, double time_step) {
     WalkOptions options;
     options.speed = speed;
+    options.steps = 3;  // the second is a whole stride
     options.gait.timing.single = single;
     options.gait.timing.time_step = time_step;
     options.gait.swing.height = height;
@@ -274,12 +275,12 @@ TEST_CASE("walk: feet that have room land near their footholds, and stand where 
   WalkOptions options;
   options.speed = 0.4;
   options.gait.foothold_room = 0.03;
-  const Motion motion = makeWalk(getBipetto(), options);
+  Motion motion = makeWalk(getBipetto(), options);
   const auto goal = std::find_if(motion.goals.begin(), motion.goals.end(),
                                  [](const Goal& each) { return each.kind == GoalKind::Footholds; });
   REQUIRE(goal != motion.goals.end());
   CHECK(goal->tolerance == Approx(0.03 * std::sqrt(2)));
-  const SolvedWalk solved = solveWalk(makeWalk(getBipetto(), options));
+  const SolvedWalk solved = solveWalk(std::move(motion));
   CHECK(solved.summary.termination == FddpTermination::Converged);
   CHECK(solved.measures.foothold > 1e-3);
   CHECK(solved.measures.foothold < 0.03 * std::sqrt(2) + 1e-6);
@@ -344,11 +345,15 @@ TEST_CASE("walk: feet that come down strike within the cone of friction") {
   CHECK_THROWS_WITH(planWalk(model, walk, makeStandingPosture(model)), Catch::Contains("landing_speed"));
 }
 
-TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with its node") {
+namespace {
+
+// A walk of two steps, the first of which should land a metre up. \param landing  its node
+Motion makeFarLanding(int& landing) {
   WalkOptions options;
   options.steps = 2;
+  options.gait.timing.time_step = 0.03;
   MotionPlan plan = planWalk(getBipetto(), options, makeStandingPosture(getBipetto()));
-  int landing = -1;
+  landing = -1;
   for (size_t k = 0; k < plan.stages.size() && landing < 0; ++k)
     for (PathConstraint& constraint : plan.stages[k].path_constraints)
       if (constraint.name.rfind("landing of ", 0) == 0) {
@@ -357,7 +362,14 @@ TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with i
         landing = static_cast<int>(k);
       }
   REQUIRE(landing > 0);
-  const SolvedWalk far = solveWalk(makeMotion(getBipetto(), std::move(plan), {}));
+  return makeMotion(getBipetto(), std::move(plan), {});
+}
+
+}  // namespace
+
+TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with its node") {
+  int landing = -1;
+  const SolvedWalk far = solveWalk(makeFarLanding(landing));
   CAPTURE(far.summary.message, far.summary.iterations);
   CHECK(far.summary.termination == FddpTermination::Infeasible);
   CHECK_THAT(far.summary.message,
@@ -365,16 +377,8 @@ TEST_CASE("walk: a foothold out of reach ends as infeasible, and is named with i
 }
 
 TEST_CASE("walk: it is called infeasible after two attempts") {
-  WalkOptions options;
-  options.steps = 2;
-  options.gait.timing.time_step = 0.03;
-  MotionPlan plan = planWalk(getBipetto(), options, makeStandingPosture(getBipetto()));
-  for (StageSpec& stage : plan.stages)
-    for (PathConstraint& constraint : stage.path_constraints)
-      if (constraint.name.rfind("landing of ", 0) == 0)
-        constraint.residual = makeFramePlacement(getBodyFrame(getBipetto(), constraint.name.substr(11)),
-                                                 SE3{Matrix3d::Identity(), Vector3d(0, 0, 1)});
-  Motion motion = makeMotion(getBipetto(), std::move(plan), {});
+  int landing = -1;
+  Motion motion = makeFarLanding(landing);
   FddpOptions solver;
   solver.initial_regularization = kGuessRegularization;
   const FddpSummary summary = solveMotion(motion, solver);
