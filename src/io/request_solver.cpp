@@ -78,13 +78,12 @@ void RequestSolver::tellDeadPoints() const {
       near += (near.empty() ? "" : "; ") + start.joints + " " + formatDistance(start);
   }
   if (!list.empty())
-    tell("dead points are, by the slopes of transmissions, this far from the start (rad, or m): " + list);
+    tell("distance from dead points at the start (rad or m, extrapolated from the transmission): " + list);
   const double margin = options_.problem.limits.dead_point_margin;
   if (!near.empty() && observer_.warn)
-    observer_.warn(
-        "warning: near a dead point motors and joint hardly move each other, and this motion starts near one (" + near +
-        "): transmissions stay within " + formatNumber(margin, "%.2g") + " to " + formatNumber(1 / margin, "%.2g") +
-        " of that at the start; give a reference farther from it");
+    observer_.warn("warning: this motion starts near a dead point, where motor and joint hardly move each other (" +
+                   near + "): the transmission ratio is kept within " + formatNumber(margin, "%.2g") + " to " +
+                   formatNumber(1 / margin, "%.2g") + " times that at the start; give a reference farther from it");
 }
 
 // What a failure may come from: linkages that are near a dead point where the motion is nearest to one; empty for none.
@@ -99,7 +98,7 @@ std::string RequestSolver::describeDeadPoints(const MotionRecord& record) const 
               formatNumber(nearest[i].time, "%.3g") + " s, " + formatDistance(start[i]) + " at the start";
   return near.empty()
              ? ""
-             : "; linkages come near dead points, where motors and joints hardly move each other (rad, or m): " + near +
+             : "; linkages come near dead points, where motor and joint hardly move each other (rad or m): " + near +
                    "; start farther from them, or request less motion towards them";
 }
 

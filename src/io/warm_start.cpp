@@ -6,7 +6,6 @@
 #include "bielle/io/names.h"
 #include "bielle/io/result.h"
 #include "bielle/model/error.h"
-#include "io/record_tables.h"
 
 namespace fs = std::filesystem;
 
@@ -78,8 +77,12 @@ void setGuess(const MotionRecord& record, Motion& motion) {
   requireSame(record.q_names, makePositionNames(model), "coordinates");
   requireSame(record.v_names, makeVelocityNames(model), "velocities");
   requireSame(record.u_names, getNames(model.motors()), "motors");
-  requireWhole(record);
-  if (record.q.rows() < 2 || record.u.rows() < 1 || !record.q.allFinite() || !record.v.allFinite() ||
+  const Eigen::Index rows = record.q.rows();  // maybe more than times: steps are halved
+  if (record.q.cols() != model.nq() || record.v.cols() != model.nv() || record.u.cols() != model.nu() ||
+      record.v.rows() != rows || record.u.rows() != rows - 1)
+    throw ModelError("", "warm start", "the shapes of the recorded q, v and u do not match the robot",
+                     "give one row per node, or per stage, and one column per name");
+  if (rows < 2 || record.u.rows() < 1 || !record.q.allFinite() || !record.v.allFinite() ||
       !record.u.allFinite())
     throw ModelError("", "warm start", "the recorded motion is empty or contains numbers that are not finite",
                      "give the result of a successful solve");

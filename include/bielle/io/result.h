@@ -31,8 +31,8 @@ struct MotionResult {
   FddpSummary solver;
   MotionRecord record;
 
-  std::vector<std::pair<std::string, double>> peak_torques;  ///< largest |u| by motor, largest first, N m or N
-  std::vector<std::pair<std::string, double>> rms_torques;   ///< calcRmsEfforts() by motor, N m or N
+  std::vector<std::pair<std::string, double>> peak_torques;        ///< largest |u| by motor, largest first, N m or N
+  std::vector<std::pair<std::string, double>> rms_torques;         ///< calcRmsEfforts() by motor, N m or N
   std::vector<std::pair<std::string, double>> continuous_torques;  ///< thermal limits, where known, N m or N
   ObjectiveOptions objective;
   ElectricalEnergy energy;
