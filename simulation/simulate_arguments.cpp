@@ -11,6 +11,7 @@
 #include "model/number_text.h"
 #include "simulation/make_world.h"
 #include "simulation/terrain.h"
+#include "solve/fddp_checks.h"
 
 namespace bielle::simulation {
 namespace {
@@ -139,7 +140,7 @@ void addOptions(CLI::App& app, SimulateArguments& a) {
       ->capture_default_str();
   app.add_option("--threads", a.predictive.threads,
                  "number of threads of predictive control; 0: all; results do not depend on it")
-      ->check(CLI::Range(0, 1024))
+      ->check(CLI::Range(0, kMostThreads))
       ->capture_default_str();
   app.add_flag("--real-time", a.execution.real_time,
                "run the world in real time while predictive control solves in a separate thread. Late policies take "

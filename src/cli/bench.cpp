@@ -6,6 +6,7 @@
 
 #include "cli/commands.h"
 #include "cli/table.h"
+#include "solve/fddp_checks.h"
 
 namespace bielle::cli {
 namespace {
@@ -144,7 +145,7 @@ void addBench(CLI::App& app, Action& action) {
                   "name, directory, .urdf or MuJoCo .xml file of a robot with two feet")
       ->capture_default_str();
   command.add_option("--threads", arguments->options.threads, "number of threads to compare with one")
-      ->check(CLI::Range(1, 1024))
+      ->check(CLI::Range(1, kMostThreads))
       ->capture_default_str();
   command
       .add_option("--shifts", arguments->options.shifts,

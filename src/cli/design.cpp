@@ -208,7 +208,7 @@ void addDesign(CLI::App& app, Action& action) {
       "same.\n"
       "Designs whose loops do not close, or whose motion fails or misses its goal, are penalized and counted. In the "
       "end the\n"
-      "motions of the best one are made by the usual steps of `bielle solve`, and what that gives is told.\n"
+      "motions of the best one are made by the usual steps of `bielle solve`, and the result is reported.\n"
       "Exit status: 0 done, 1 interrupted (with workers) or a task failed, 2 bad input.\n"
       "Example:\n"
       "  bielle design examples/knee_design/knee.yaml -o knee");

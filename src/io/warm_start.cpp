@@ -82,8 +82,7 @@ void setGuess(const MotionRecord& record, Motion& motion) {
       record.v.rows() != rows || record.u.rows() != rows - 1)
     throw ModelError("", "warm start", "the shapes of the recorded q, v and u do not match the robot",
                      "give one row per node, or per stage, and one column per name");
-  if (rows < 2 || record.u.rows() < 1 || !record.q.allFinite() || !record.v.allFinite() ||
-      !record.u.allFinite())
+  if (rows < 2 || record.u.rows() < 1 || !record.q.allFinite() || !record.v.allFinite() || !record.u.allFinite())
     throw ModelError("", "warm start", "the recorded motion is empty or contains numbers that are not finite",
                      "give the result of a successful solve");
   const int nodes = motion.problem->numStages() + 1;
