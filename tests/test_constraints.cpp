@@ -12,9 +12,6 @@ using namespace bielle::test;
 
 namespace {
 
-// Both ways to enforce inequalities.
-const auto kAll = {Inequalities::AugmentedLagrangian, Inequalities::InteriorPoint};
-
 // Values of all constraints along the rollout of us, node after node.
 std::vector<VectorXd> calcConstraints(const ShootingProblem& problem, const std::vector<VectorXd>& us) {
   std::vector<VectorXd> out;
@@ -48,7 +45,7 @@ double calcViolations(const ShootingProblem& problem, const std::vector<VectorXd
   return sum;
 }
 
-// Multipliers above this are those of rows that bind; the barrier leaves a little to the others.
+// Multipliers above this are those of rows that bind.
 constexpr double kBinding = 1e-5;
 
 struct Conditions {
@@ -82,13 +79,10 @@ Conditions calcConditions(const ShootingProblem& problem, const ShootingTrajecto
 }  // namespace
 
 TEST_CASE("constraints: a cart catches its pole within bounds, and the conditions of an optimum hold") {
-  const Inequalities inequalities = GENERATE(values(kAll));
-  CAPTURE(getName(inequalities));
   auto problem = makeBoundedCartPole();
   ShootingTrajectory t = makeGuess(problem);
   FddpOptions options;
   options.gradient_tolerance = 1e-14;
-  options.constraints.inequalities = inequalities;
   Fddp solver(options);
   const FddpSummary summary = solver.solve(problem, t);
   CAPTURE(summary.message, summary.iterations, summary.violation, summary.penalty, summary.multiplier_updates);
@@ -128,11 +122,7 @@ TEST_CASE("constraints: a quadratic program has the solution of its dense condit
   problem.rows.push_back({"end", N, N, 0.25, 0.25, [](const Complex* x, const Complex*) { return x[0]; }});
   problem.rows.push_back({"mix", 3, 9, -kFree, 0.8, [](const Complex* x, const Complex* u) { return u[1] - x[2]; }});
   ShootingTrajectory t = makeGuess(problem);
-  FddpOptions options = makeTightOptions();
-  options.constraints.inequalities = GENERATE(values(kAll));
-  options.constraints.final_barrier = 1e-11;  // a slack then tells at a glance whether its row binds
-  CAPTURE(getName(options.constraints.inequalities));
-  Fddp solver(options);
+  Fddp solver(makeTightOptions());
   const FddpSummary summary = solver.solve(problem, t);
   CAPTURE(summary.message, summary.iterations);
   REQUIRE(summary.termination == FddpTermination::Converged);
@@ -208,7 +198,6 @@ TEST_CASE("constraints: with bounds on the control they hold together") {
   problem.bound = 0.8 * most;
   FddpOptions options;
   options.bounds = ControlBounds::Enforce;
-  options.constraints.inequalities = GENERATE(values(kAll));
   ShootingTrajectory t = makeGuess(problem);
   const FddpSummary summary = Fddp(options).solve(problem, t);
   CAPTURE(summary.message, summary.iterations, summary.violation, most);
@@ -237,9 +226,7 @@ TEST_CASE("constraints that contradict each other are named, with what is left o
   problem.rows.erase(problem.rows.begin() + 1);  // the push
   problem.rows.push_back({"wall", 60, 60, kFarthest + 0.1, kFree, getTip});
   ShootingTrajectory t = makeGuess(problem);
-  FddpOptions options;
-  options.constraints.inequalities = GENERATE(values(kAll));
-  const FddpSummary summary = Fddp(options).solve(problem, t);
+  const FddpSummary summary = Fddp().solve(problem, t);
   CAPTURE(summary.message, summary.iterations);
   const auto namesOne = [](const FddpSummary& of) {
     return of.message.find("tip at node 60") != std::string::npos ||
@@ -247,7 +234,7 @@ TEST_CASE("constraints that contradict each other are named, with what is left o
   };
   CHECK(summary.termination == FddpTermination::Infeasible);
   CHECK(namesOne(summary));
-  FddpOptions few = options;  // a solve that is cut off before names them too
+  FddpOptions few;  // a solve that is cut off before names them too
   few.max_iterations = summary.iterations - 1;
   ShootingTrajectory unfinished = makeGuess(problem);
   const FddpSummary cut_off = Fddp(few).solve(problem, unfinished);
@@ -257,9 +244,7 @@ TEST_CASE("constraints that contradict each other are named, with what is left o
   CHECK(summary.violation > 0.05 - 1e-6);
   CHECK(summary.violation < 0.1);
   const auto violations = [&](const std::vector<VectorXd>& us) { return calcViolations(problem, us); };
-  // The barrier is left farther away from there, where the sum of squares is flat: its least is found less exactly.
-  if (options.constraints.inequalities == Inequalities::AugmentedLagrangian)
-    CHECK(calcControlGradient(t.us, violations).norm() < 1e-4);
+  CHECK(calcControlGradient(t.us, violations).norm() < 1e-4);
   CHECK(calcControlGradient(makeGuess(problem).us, violations).norm() > 1e-2);
 }
 
@@ -330,13 +315,11 @@ TEST_CASE("where the cost creeps along curved constraints, it is accepted within
 
 TEST_CASE("an iteration with constraints allocates nothing after the first, and threads change no bit") {
   auto problem = makeBoundedCartPole();
-  const Inequalities inequalities = GENERATE(values(kAll));
   std::vector<ShootingTrajectory> results;
   for (int threads : {1, 2, 7}) {
     ShootingTrajectory t = makeGuess(problem);
     FddpOptions options;
     options.threads = threads;
-    options.constraints.inequalities = inequalities;
     const std::vector<long> counts = countAllocations(options, problem, t);
     REQUIRE(counts.size() > 5);
     CHECK(counts.back() == counts.front());

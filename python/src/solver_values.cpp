@@ -12,19 +12,11 @@ void bindOptions(py::module_& module) {
   py::enum_<LastRollout>(module, "LastRollout")
       .value("CLOSED", LastRollout::Closed)
       .value("SEGMENTS", LastRollout::Segments);
-  py::enum_<Inequalities>(module, "Inequalities")
-      .value("AUGMENTED_LAGRANGIAN", Inequalities::AugmentedLagrangian, "as equations where they are active")
-      .value("INTERIOR_POINT", Inequalities::InteriorPoint,
-             "kept away from their bounds by a barrier that decreases from sweep to sweep");
   Value<ConstraintOptions>(module, "ConstraintOptions", "How constraints are enforced.")
       .field("tolerance", &ConstraintOptions::tolerance, "largest violation of a converged solve")
       .field("initial_penalty", &ConstraintOptions::initial_penalty, "cost over squared violation")
       .field("penalty_increase", &ConstraintOptions::penalty_increase, "factor when the violation falls too slowly")
-      .field("max_penalty", &ConstraintOptions::max_penalty, "largest")
-      .field("inequalities", &ConstraintOptions::inequalities, "Inequalities")
-      .field("initial_barrier", &ConstraintOptions::initial_barrier,
-             "initial barrier of the interior point method, in the unit of the cost")
-      .field("final_barrier", &ConstraintOptions::final_barrier, "barrier of a converged solve");
+      .field("max_penalty", &ConstraintOptions::max_penalty, "largest");
   Value<FddpOptions>(module, "SolverOptions", "Options of FDDP.")
       .field("max_iterations", &FddpOptions::max_iterations, "the solver stops there")
       .field("gradient_tolerance", &FddpOptions::gradient_tolerance, "(cost per unit of control)^2")

@@ -191,12 +191,6 @@ def test_own_constraint(model, height):
     assert find_farthest(bounded) == pytest.approx(most, abs=1e-8)
     assert max(y.max() for y in bounded.multipliers.values if y.size) > 0
 
-    bounded.guess = free.guess
-    interior = bielle.ConstraintOptions(inequalities=bielle.Inequalities.INTERIOR_POINT)
-    within = bounded.solve(bielle.SolverOptions(constraints=interior))
-    assert within.converged and find_farthest(bounded) <= most + 1e-8
-    assert within.cost == pytest.approx(summary.cost, rel=1e-5) and within.cost != summary.cost
-
 
 def test_residuals_of_the_library_compare_and_pickle(model):
     feet = model.constraints(("foot_left",))

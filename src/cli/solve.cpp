@@ -293,16 +293,6 @@ void addSolverOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argu
   sub.add_option("--max-iterations", arguments->solver.max_iterations, "largest number of iterations")
       ->check(CLI::Range(1, kMostIterations))
       ->capture_default_str();
-  sub.add_option_function<std::string>(
-         "--inequalities",
-         [arguments](const std::string& name) {
-           arguments->solver.constraints.inequalities = name == getName(Inequalities::InteriorPoint)
-                                                            ? Inequalities::InteriorPoint
-                                                            : Inequalities::AugmentedLagrangian;
-         },
-         "how the solver enforces inequality constraints")
-      ->check(CLI::IsMember({getName(Inequalities::AugmentedLagrangian), getName(Inequalities::InteriorPoint)}))
-      ->default_str(getName(arguments->solver.constraints.inequalities));
   sub.add_option("--threads", arguments->solver.threads, "number of threads; 0: all; results do not depend on it")
       ->check(CLI::Range(0, kMostThreads))
       ->capture_default_str();

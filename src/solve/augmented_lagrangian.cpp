@@ -18,10 +18,6 @@ constexpr double kHalf = 0.5;   // the same by a step of settle()
 constexpr double kNear = 0.03, kNearPenalty = 1e3;  // the latter over the initial penalty, at most
 // Foreseen decrease over the gain of new multipliers at which they are due; and while violations alone are minimized.
 constexpr double kShare = 0.1, kRestorationShare = 1e-6;
-// The same for a new parameter of the barrier, whose gain is less than mu times the number of slacks: kShare times this share of
-// it. The parameter falls by kBarrierFall or, when it is small, to its power of 3/2, once slacks are off by less than kSlackGap mu.
-constexpr double kBarrierShare = 0.01, kBarrierFall = 0.2, kSlackGap = 10;
-constexpr double kGapWeight = 2;  // least w of Eq. (17), and its factor
 // Penalty times squared violations over the cost, while violations alone are minimized.
 constexpr double kRestorationWeight = 1e6;
 constexpr double kDominance = 100;  // the same ratio, from which on the least violations are known to a per cent
@@ -38,11 +34,6 @@ void AugmentedLagrangian::resize(const ShootingProblem& problem, const Constrain
     kept_ = false;
   }
   rows_ = 0;
-  const bool interior = options.inequalities == Inequalities::InteriorPoint;
-  barrier_.resize(interior ? num_nodes : 0);
-  barrier_.setParameter(options.initial_barrier);
-  slacks_ = {};
-  has_slacks_ = false;
   for (int k = 0; k < num_nodes; ++k) {
     Node& node = nodes_[k];
     const int rows = problem.constraintSize(k);
@@ -52,7 +43,6 @@ void AugmentedLagrangian::resize(const ShootingProblem& problem, const Constrain
     if (!(node.lower.array() <= node.upper.array()).all())
       throw std::invalid_argument("Fddp: a lower bound of the constraints of node " + std::to_string(k) +
                                   " exceeds the upper");
-    if (interior) barrier_.setBounds(k, node.lower, node.upper);
     rows_ += rows;
   }
   if (!kept_) far_penalty_ = options.initial_penalty;
@@ -73,24 +63,12 @@ double AugmentedLagrangian::calcContribution(double d, double multiplier) const 
   return 0.5 * penalty_ * d * d - 0.5 * multiplier * multiplier / penalty_;
 }
 
-double AugmentedLagrangian::calc(int node, const VectorXd& c, double alpha) const {
+double AugmentedLagrangian::calc(int node, const VectorXd& c) const {
   const Node& own = nodes_[node];
-  double sum = hasBarrier() ? barrier_.calc(node, c, alpha) : 0;
+  double sum = 0;
   for (Eigen::Index i = 0; i < own.lower.size(); ++i)
-    if (isPenalized(own, i)) sum += calcContribution(calcDistance(own, i, c[i]), own.multipliers[i]);
+    sum += calcContribution(calcDistance(own, i, c[i]), own.multipliers[i]);
   return sum;
-}
-
-// The step that led to this iterate is made only once.
-void AugmentedLagrangian::moveSlacks(const EvaluationList& iterate) {
-  for (size_t k = 0; k < nodes_.size(); ++k) {
-    const VectorXd& c = iterate[k]->constraints;
-    if (!has_slacks_)
-      barrier_.start(static_cast<int>(k), c, nodes_[k].multipliers);
-    else if (step_ > 0)
-      barrier_.step(static_cast<int>(k), c, step_);
-  }
-  has_slacks_ = true;
 }
 
 void AugmentedLagrangian::evaluate(const EvaluationList& iterate) {
@@ -105,9 +83,6 @@ void AugmentedLagrangian::hold(const EvaluationList& iterate) {
 
 void AugmentedLagrangian::measure(const EvaluationList& iterate) {
   at_ = {};
-  slacks_ = {};
-  if (hasBarrier()) moveSlacks(iterate);
-  step_ = 0;
   for (size_t k = 0; k < nodes_.size(); ++k) {
     Node& node = nodes_[k];
     const VectorXd& c = iterate[k]->constraints;
@@ -119,11 +94,6 @@ void AugmentedLagrangian::measure(const EvaluationList& iterate) {
         at_.worst_node = static_cast<int>(k);
         at_.worst_row = static_cast<int>(i);
       }
-      if (!isPenalized(node, i)) {
-        node.weights.gradient[i] = node.weights.hessian[i] = node.multipliers[i] = 0;
-        continue;
-      }
-      at_.penalized = std::max(at_.penalized, violation);
       const double d = calcDistance(node, i, c[i]), y = penalty_ * d, change = y - node.multipliers[i];
       node.weights.gradient[i] = y;
       node.weights.hessian[i] = d != 0 || isHeld(node, i) || node.lower[i] == node.upper[i] ? penalty_ : 0;
@@ -133,18 +103,7 @@ void AugmentedLagrangian::measure(const EvaluationList& iterate) {
         at_.complementarity =
             std::max(at_.complementarity, std::abs(y * ((y > 0 ? node.upper : node.lower)[i] - c[i])));
     }
-    if (hasBarrier()) barrier_.addWeights(static_cast<int>(k), node.weights, node.multipliers, slacks_);
   }
-  const double weight = slacks_.gap > 0 ? kGapWeight * std::max(1.0, slacks_.offset / slacks_.gap) : kGapWeight;
-  barrier_.setGapWeight(weight);
-  slacks_.offset -= weight * slacks_.gap;
-  at_.value += slacks_.value + weight * slacks_.gap;
-  at_.complementarity = std::max(at_.complementarity, slacks_.complementarity);
-}
-
-bool AugmentedLagrangian::isSatisfied() const {
-  return std::max(at_.violation, slacks_.largest_gap) <= options_.tolerance &&
-         (!hasBarrier() || barrier_.getParameter() <= options_.final_barrier);
 }
 
 bool AugmentedLagrangian::isNear() const {
@@ -157,29 +116,23 @@ bool AugmentedLagrangian::dominates(double cost) const {
 }
 
 bool AugmentedLagrangian::isDue(double foreseen) const {
-  if (hasBarrier() && isExhausted()) return false;
-  const double barrier = hasBarrier() ? barrier_.getParameter() * barrier_.getSize() : 0;
-  return foreseen <= (restoring_ ? kRestorationShare : kShare) * (at_.gain + kBarrierShare * barrier);
+  return foreseen <= (restoring_ ? kRestorationShare : kShare) * at_.gain;
 }
 
 bool AugmentedLagrangian::updateMultipliers(const EvaluationList& iterate, double cost) {
-  const bool falls = at_.penalized <= std::max(kFall * last_violation_, options_.tolerance);
+  const bool falls = at_.violation <= std::max(kFall * last_violation_, options_.tolerance);
   if (restoring_ && !falls) return false;
-  last_violation_ = at_.penalized;
+  last_violation_ = at_.violation;
   ++num_updates_;
-  const double mu = barrier_.getParameter();
-  if ((!falls && penalty_ >= options_.max_penalty) || (hasBarrier() && isExhausted())) {
+  if (!falls && penalty_ >= options_.max_penalty) {
     startRestoration(cost);
   } else {
-    if (restoring_) has_slacks_ = false;
     restoring_ = false;
     adoptMultipliers(iterate);
-    if (slacks_.largest_gap <= kSlackGap * mu || at_.penalized <= options_.tolerance)
-      barrier_.setParameter(std::max(options_.final_barrier, std::min(kBarrierFall * mu, std::pow(mu, 1.5))));
     if (!falls) {
       far_penalty_ = std::min(options_.max_penalty, options_.penalty_increase * far_penalty_);
       penalty_ = std::min(options_.max_penalty, options_.penalty_increase * penalty_);
-    } else if (at_.penalized < kNear) {
+    } else if (at_.violation < kNear) {
       const double most = std::min(options_.max_penalty, kNearPenalty * options_.initial_penalty);
       penalty_ = std::max(penalty_, std::min(most, options_.penalty_increase * penalty_));
     }
@@ -190,15 +143,15 @@ bool AugmentedLagrangian::updateMultipliers(const EvaluationList& iterate, doubl
 
 bool AugmentedLagrangian::restore(const EvaluationList& iterate, double cost) {
   if (restoring_) return false;
-  last_violation_ = at_.penalized;
+  last_violation_ = at_.violation;
   startRestoration(cost);
   evaluate(iterate);
   return true;
 }
 
 bool AugmentedLagrangian::settle(const EvaluationList& iterate, bool full) {
-  const bool falls = at_.penalized <= kHalf * last_violation_;
-  last_violation_ = at_.penalized;
+  const bool falls = at_.violation <= kHalf * last_violation_;
+  last_violation_ = at_.violation;
   if (penalty_ < options_.max_penalty) {
     penalty_ = std::min(options_.max_penalty, options_.penalty_increase * penalty_);
   } else if (full && !falls) {

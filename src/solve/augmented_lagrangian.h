@@ -1,9 +1,7 @@
 #pragma once
-// The constraints of a shooting problem, by an augmented Lagrangian (fddp.h, Eqs. 10 to 13); the inequalities among them
-// likewise, or by a barrier (Eqs. 14 to 17).
+// The constraints of a shooting problem, by an augmented Lagrangian (fddp.h, Eqs. 10 to 14).
 #include "bielle/solve/fddp.h"
 #include "solve/node_evaluations.h"
-#include "solve/slack_barrier.h"
 
 namespace bielle {
 
@@ -15,10 +13,8 @@ class AugmentedLagrangian {
   void resize(const ShootingProblem& problem, const ConstraintOptions& options);
   bool isEmpty() const { return rows_ == 0; }
 
-  /// Contribution of one node to the merit of a trial of length alpha, Eqs. (10), (14) and (15).
-  double calc(int node, const VectorXd& c, double alpha) const;
-  /// The next iterate to be evaluated is a trial of length alpha.
-  void acceptStep(double alpha) { step_ = alpha; }
+  /// Contribution of one node to the merit, Eq. (10).
+  double calc(int node, const VectorXd& c) const;
   /// Computes the weights of Eq. (11) and the measures below at the current iterate.
   void evaluate(const EvaluationList& iterate);
   /// Null if the node has no constraints.
@@ -27,10 +23,7 @@ class AugmentedLagrangian {
   double getValue() const { return at_.value; }                      ///< sum of the contributions to Eq. (10)
   double getViolation() const { return at_.violation; }              ///< the largest
   double getComplementarity() const { return at_.complementarity; }  ///< Eq. (13), of the multipliers after Eq. (12)
-  /// Of slacks: the sum of y r, and what a full step adds to the change of the merit foreseen by the sweep, Eq. (17).
-  double getGap() const { return slacks_.gap; }
-  double getOffset() const { return slacks_.offset; }
-  bool isSatisfied() const;
+  bool isSatisfied() const { return at_.violation <= options_.tolerance; }
   /// Whether constraints are violated, but so little that multipliers under a growing penalty should mend it.
   bool isNear() const;
   /// Whether violations alone are minimized, and outweigh `cost` so far that the least of them has been found.
@@ -42,12 +35,12 @@ class AugmentedLagrangian {
   /// and evaluates again. Once the penalty has reached its maximum, the violations alone are minimized: without multipliers,
   /// under a penalty that dominates `cost`. Returns false if that has been done and has not reduced them: infeasible.
   bool updateMultipliers(const EvaluationList& iterate, double cost);
-  /// Holds the rows that have a multiplier at their bounds (fddp.h, Eq. 18) until the next evaluate().
+  /// Holds the rows that have a multiplier at their bounds (fddp.h, Eq. 14) until the next evaluate().
   void hold(const EvaluationList& iterate);
   /// Minimizes the violations alone from now on, as updateMultipliers() does in the end. False if that was so already.
   bool restore(const EvaluationList& iterate, double cost);
-  /// Whether settle() makes sense: no barrier, and violations are not minimized on their own.
-  bool canSettle() const { return !isEmpty() && barrier_.isEmpty() && !restoring_; }
+  /// Whether settle() makes sense: violations are not minimized on their own.
+  bool canSettle() const { return !isEmpty() && !restoring_; }
   /// Raises the penalty; once it is at its maximum, updates the multipliers if a full step has not halved the violation.
   /// Returns whether the violation has been halved.
   bool settle(const EvaluationList& iterate, bool full);
@@ -74,38 +67,25 @@ class AugmentedLagrangian {
   };
   struct Measures {
     double value = 0, violation = 0, complementarity = 0;
-    double penalized = 0;  // largest violation of the rows that Eq. (10) enforces
-    double gain = 0;       // increase of `value` by Eq. (12), to first order: |y+ - y|^2 / (2 rho)
-    double squares = 0;    // sum of the squared violations
+    double gain = 0;     // increase of `value` by Eq. (12), to first order: |y+ - y|^2 / (2 rho)
+    double squares = 0;  // sum of the squared violations
     int worst_node = 0, worst_row = 0;
   };
   bool isHeld(const Node& node, Eigen::Index row) const { return holds_ && node.multipliers[row] != 0; }
-  double calcDistance(const Node& node, Eigen::Index row, double c) const;  // d of Eq. (10) or (18)
+  double calcDistance(const Node& node, Eigen::Index row, double c) const;  // d of Eq. (10) or (14)
   double calcContribution(double d, double multiplier) const;
   void startRestoration(double cost);
-  // Whether inequalities are enforced by the barrier at present, and whether Eq. (10) enforces a row.
-  bool hasBarrier() const { return !barrier_.isEmpty() && !restoring_; }
-  bool isPenalized(const Node& node, Eigen::Index i) const { return !hasBarrier() || node.lower[i] == node.upper[i]; }
-  // Whether the barrier is at its least and the equations hold, so that an update changes nothing.
-  bool isExhausted() const {
-    return barrier_.getParameter() <= options_.final_barrier && at_.penalized <= options_.tolerance;
-  }
   void measure(const EvaluationList& iterate);
-  void moveSlacks(const EvaluationList& iterate);
 
   ConstraintOptions options_;
   std::vector<Node> nodes_;
   Eigen::Index rows_ = 0;   // of all nodes
-  bool holds_ = false;      // by Eq. (18)
+  bool holds_ = false;      // by Eq. (14)
   bool restoring_ = false;  // minimizes the violations alone
   bool kept_ = false;       // the next resize() keeps multipliers and penalty
   double penalty_ = 1;
   double far_penalty_ = 1;  // without what was added close to the solution; where the next solve starts
   Measures at_;
-  SlackBarrier barrier_;  // empty unless inequalities are enforced by it
-  SlackBarrier::Measures slacks_;
-  bool has_slacks_ = false;
-  double step_ = 0;            // that led to an iterate whose slacks are still those of the one before
   double last_violation_ = 0;  // at the last update of the multipliers
   int num_updates_ = 0;
 };

@@ -29,10 +29,6 @@ void checkOptions(const FddpOptions& o) {
   require(o.acceptable_decrease >= 0, "acceptable_decrease must not be negative");
   require(o.state_regularization_ratio >= 0, "state_regularization_ratio must not be negative");
   require(o.rollout_segments >= 1, "rollout_segments must be at least 1");
-  require(o.constraints.inequalities == Inequalities::AugmentedLagrangian || o.last_rollout == LastRollout::Closed,
-          "a receding horizon does not support the interior point method");
-  require(o.constraints.final_barrier > 0 && o.constraints.initial_barrier >= o.constraints.final_barrier,
-          "final_barrier must be positive and not exceed initial_barrier");
   require(o.acceptance > 0 && o.acceptance < 1, "acceptance must lie between 0 and 1");
 }
 

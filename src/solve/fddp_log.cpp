@@ -23,10 +23,6 @@ const char* getName(FddpTermination termination) {
   return "";
 }
 
-const char* getName(Inequalities inequalities) {
-  return inequalities == Inequalities::InteriorPoint ? "interior-point" : "augmented-lagrangian";
-}
-
 void printFddpHeader(std::ostream& out) {
   char text[128];
   std::snprintf(text, sizeof text, "%5s %15s %10s %10s %10s %10s %10s %9s\n", "iter", "cost", "gap", "violation",

@@ -69,7 +69,6 @@ FddpRun::End FddpRun::linearize() {
   if (const End end = linearizeAndSweep()) return end;
   updateGaps();
   line_.violation = work_.lagrangian.getViolation();
-  if (work_.lagrangian.getGap() > 0) closed_merit_.reset();
   summary_.cost = line_.cost;
   summary_.gap = line_.gap;
   return {};
@@ -240,7 +239,7 @@ void FddpRun::chooseFirstStep() {
   const double alpha = accepted_->alpha;
   first_step_ = 1;
   const bool creeps = alpha < 1 && last_step_ < 1 && line_.violation < kClose;
-  if (!creeps || line_.gap > kSmallGap || work_.lagrangian.getGap() > 0) return;
+  if (!creeps || line_.gap > kSmallGap) return;
   const double curvature =
       2 * (accepted_->merit - calcMerit() - alpha * slope_) / (alpha * alpha);  // of Eq. (1), as it is
   if (curvature_ > 0 && curvature > kSteep * curvature_) first_step_ = std::max(kShortestFirst, curvature_ / curvature);
@@ -255,7 +254,6 @@ void FddpRun::acceptStep() {
     work_.evaluations.outdate();
   }
   line_.step = accepted_->alpha;
-  work_.lagrangian.acceptStep(accepted_->alpha);
   accepted_merit_ = accepted_->merit;
   closed_merit_.reset();
   if (accepted_->alpha == 1) closed_merit_ = accepted_->merit + accepted_->closing_cost;

@@ -74,7 +74,7 @@ class FddpRun {
   bool isClosed() const { return line_.gap <= options_.gap_tolerance; }
   bool isStationary() const { return isClosed() && (stalled_ || line_.gradient <= options_.gradient_tolerance); }
   // Decrease by a full step.
-  double calcForeseen() const { return -slope_ - 0.5 * curvature_ - work_.lagrangian.getOffset(); }
+  double calcForeseen() const { return -slope_ - 0.5 * curvature_; }
   double calcMerit() const { return line_.cost + work_.lagrangian.getValue(); }
   double calcGradient() const;
 

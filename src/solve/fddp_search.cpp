@@ -117,8 +117,7 @@ bool FddpRun::accept(Trial& trial, double nu) {
 // Whether the merit of a trial has fallen enough, Eqs. (4) and (8).
 bool FddpRun::isAcceptable(const Trial& trial, double nu) const {
   const double alpha = trial.alpha;
-  const double foreseen =
-      -alpha * (slope_ + work_.lagrangian.getOffset()) - 0.5 * alpha * alpha * curvature_ + nu * alpha * gap_sum_;
+  const double foreseen = -alpha * slope_ - 0.5 * alpha * alpha * curvature_ + nu * alpha * gap_sum_;
   const double real = calcMerit() - trial.merit - trial.closing_cost + nu * (gap_sum_ - trial.gap_sum);
   const double rounding = calcRounding();
   const double decrease = std::max(0.0, foreseen);  // boxes make Eq. (4) an approximation

@@ -195,7 +195,7 @@ void Rollout::evaluateNodes(const RolloutInput& input, int step, Group& group) {
     const int k = group.evaluations[i].node;
     const bool ok = out.status == StepStatus::Ok;
     if (ok) track.cost += out.cost;
-    if (ok) track.merit += out.cost + input.lagrangian.calc(k, out.constraints, track.trial->alpha);
+    if (ok) track.merit += out.cost + input.lagrangian.calc(k, out.constraints);
     if (!ok || !std::isfinite(track.merit) || (k < N_ && !out.x_next.allFinite())) track.fail(k, out.failure);
   }
 }

@@ -71,27 +71,10 @@
 /// not stationary. (An acceptable level, as in Waechter and Biegler, "On the implementation of an interior-point filter
 /// line-search algorithm", Mathematical Programming 106, 2006.) Otherwise it goes on as before.
 ///
-/// Inequalities can be enforced by a primal-dual interior point instead (Inequalities::InteriorPoint; Pavlov, Shames, Manzie,
-/// "Interior point differential dynamic programming", IEEE Transactions on Control Systems Technology 29, 2021, with infeasible
-/// starts); equations keep Eqs. (10) to (12). Every finite bound has a slack s > 0 and a multiplier y > 0. With c the excess over
-/// the bound, e.g. c_i - upper_i, and r = c + s its gap, J becomes
-///     J - mu sum log s,   of gradient mu / s + (y / s) r and Hessian y / s by c,                                     (14)
-/// which are those of Newton's method for c + s = 0 and s y = mu after ds and dy are eliminated. A step of length alpha that
-/// leads to c' makes
-///     s' = (1 - alpha) r - c',                                                                                       (15)
-///     y' = y + alpha (mu / s - y + (y / s) r) + (y / s) (c' - c),                                                    (16)
-/// so that gaps contract like others, but neither falls below 0.005 of what it was, nor s' below mu / (2 y) or half of what it was,
-/// whichever is less: where c' goes too far, a gap stays open in place of a shorter step. y' is kept within a factor of 2 of
-/// mu / s'. (The paper shortens the step until all slacks remain positive.) A full step changes J by what the sweep foresees and
-///     offset = sum (mu / s) r + 1/2 (y / s) r^2;                                                                     (17)
-/// the merit has w sum y r besides, with w = max(2, 2 offset / sum y r) and y from before the step.
-/// Eq. (12) is accompanied by mu <- min(mu / 5, mu^(3/2)), unless a gap exceeds 10 mu. Converged means, besides, that mu is at its
-/// least and no gap exceeds the tolerance. Violations are minimized on their own by Eq. (10).
-///
 /// With LastRollout::Segments (12) comes before every linearization, where (10) is not at its minimum. Rows with y_k != 0 after it
 /// are then held at their bounds, like equations (a primal-dual active set: Hintermueller, Ito, Kunisch, SIAM Journal on
 /// Optimization 13, 2002): in (10) and (11) they have
-///     d_k = z_k - upper (y_k > 0) or z_k - lower (y_k < 0).                                                          (18)
+///     d_k = z_k - upper (y_k > 0) or z_k - lower (y_k < 0).                                                          (14)
 /// With (10) and (11) alone a violated row moves inside by as much as it was violated. There it is free, since it is
 /// farther from its bound than y_k / rho, and is then violated again: in a walk's window, wrench cones by 0.5 in every
 /// other iteration.
@@ -119,20 +102,12 @@ enum class ControlBounds { Ignore, Enforce };
 /// iterations; all steps are then rolled out in segments, and Eq. (12) comes before every linearization, which is made once.
 enum class LastRollout { Closed, Segments };
 
-/// How inequalities are enforced; equations are by the augmented Lagrangian in any case. The interior point is for solves until
-/// convergence: it cannot use given multipliers, and is not available with LastRollout::Segments.
-enum class Inequalities { AugmentedLagrangian, InteriorPoint };
-const char* getName(Inequalities inequalities);
-
 /// How constraints are enforced; without effect on problems that have none.
 struct ConstraintOptions {
-  Inequalities inequalities = Inequalities::AugmentedLagrangian;
   double tolerance = 1e-8;       ///< largest violation of a converged solve, in the units of c
   double initial_penalty = 0.1;  ///< rho, in the unit of the cost over that of c squared
   double penalty_increase = 10;  ///< factor when the violation falls too slowly, or is small
   double max_penalty = 1e8;
-  double initial_barrier = 1e-3;  ///< mu of Eq. (14), in the unit of the cost
-  double final_barrier = 1e-8;    ///< that of a converged solve: complementarity
 };
 
 /// y of Eq. (10), node by node, and rho.
