@@ -1,5 +1,5 @@
 #pragma once
-/// \file A Model in MuJoCo, by the file that `bielle export` writes (io/mjcf.h), and its coordinates there.
+/// \file A Model in MuJoCo, by the file that `bielle convert` writes (io/mjcf.h), and its coordinates there.
 #include <mujoco/mujoco.h>
 
 #include <memory>

@@ -139,7 +139,6 @@ TEST_CASE("an output that is an input is refused, by whatever path") {
       {"convert", robot, "-o", robot},
       {"convert", urdf, "--to", "urdf", "-o", urdf},
       {"convert", robot, "--to", "mjcf", "-o", robot + "/robot.yaml"},
-      {"export", robot, "--format", "mjcf", "-o", urdf},
       {"view", robot, "-o", robot + "/../robot/robot.urdf"},
       {"campaign", spec, "-o", link},
       {"design", BIELLE_SOURCE_DIR "/examples/knee_design/knee.yaml", "--evaluate", spec, "-o", spec}};

@@ -1,4 +1,4 @@
-"""test_mjcf.py BIELLE SOURCE: `bielle export --format mjcf` writes XML with a robot's names, and names omissions."""
+"""test_mjcf.py BIELLE SOURCE: `bielle convert --to mjcf` writes XML with a robot's names, and names omissions."""
 import json
 import math
 import os
@@ -17,7 +17,7 @@ def names(tree, *tags):
 
 
 def check_robot(bielle, robot, path):
-    result = run(bielle, "export", robot, "--format", "mjcf", "-o", path)
+    result = run(bielle, "convert", robot, "--to", "mjcf", "-o", path)
     assert result.returncode == 0, result.stderr
     info = json.loads(run(bielle, "info", robot, "--json").stdout)
     tree = ElementTree.parse(path).getroot()
@@ -46,9 +46,6 @@ def main(bielle, source):
     with tempfile.TemporaryDirectory() as place:
         for robot in robots:
             check_robot(bielle, os.path.join(source, "robots", robot), os.path.join(place, robot + ".xml"))
-        # By default the file is named after the robot and stands here.
-        result = run(bielle, "export", "bipetto", "--format", "mjcf", cwd=place)
-        assert result.stdout == "bipetto.xml\n" and os.path.exists(os.path.join(place, "bipetto.xml")), result
         # What cannot be said is named.
         with open(os.path.join(place, "pendulum.urdf"), "w", encoding="utf-8") as file:
             file.write("""<robot name="pendulum"><link name="world"/><link name="bob"><inertial><mass value="1"/>
@@ -62,9 +59,9 @@ def main(bielle, source):
         warnings = check_robot(bielle, os.path.join(place, "pendulum.urdf"), os.path.join(place, "pendulum.xml"))
         for element in ("'swing'", "bob.stl", "'tip'"):
             assert element in warnings, warnings
-        result = run(bielle, "export", "no_such_robot", "--format", "mjcf", cwd=place)
+        result = run(bielle, "convert", "no_such_robot", "--to", "mjcf", "-o", "none.xml", cwd=place)
         assert result.returncode == 2 and "no_such_robot" in result.stderr, result
-        result = run(bielle, "export", "bipetto", "--format", "mjcf", "-o", os.path.join(place, "no", "such.xml"))
+        result = run(bielle, "convert", "bipetto", "--to", "mjcf", "-o", os.path.join(place, "no", "such.xml"))
         assert result.returncode == 2, result
     print("robots as MJCF are XML with their names")
 

@@ -85,6 +85,7 @@ void addConvert(CLI::App& app, Action& action) {
       ->required();
   command.footer(
       "Lost elements are listed as warnings; a conversion that would change the mechanism is refused.\n"
+      "MuJoCo closes loops by soft constraints, which are so stiff that they need steps of 0.25 ms.\n"
       "In SDF, coordinates are measured from the posture in the file; couplers are left out.\n"
       "For Drake, loops are ball constraints: one for a ball, two for a hinge, three for a weld.\n"
       "A URDF alone is a tree: loops are left out, couplers of two joints become <mimic>.\n"
