@@ -292,14 +292,9 @@ TEST_CASE("a leg on a rail squats on one foot, and is told what steps need") {
                  "moves on a rail, but a motion with steps needs a free one over two feet; take `squat`");
 }
 
-TEST_CASE("scripts that name a kind of barrier get the limits that motions keep anyway") {
+TEST_CASE("without limits there is none for one motor either") {
   const OutputDirectory directory;
-  for (const char* kind : {"quadratic", "log"})
-    CHECK(run(makeShortSquat(directory.str(), {"--limits", kind, "--limit", "motor_knee_right=80"})).status == 0);
-  // Without limits there is none for one motor either.
-  checkRefused(run(makeShortSquat(directory.str(), {"--limits", "none", "--limit", "motor_knee_right=80"})), "limit");
   checkRefused(run(makeShortSquat(directory.str(), {"--no-limits", "--limit", "motor_knee_right=80"})), "limit");
-  checkRefused(run(makeShortSquat(directory.str(), {"--limits", "soft"})), "soft");
 }
 
 TEST_CASE("durations are free within the bounds given, or as planned") {

@@ -232,11 +232,6 @@ void addLimitOptions(CLI::App& sub, const std::shared_ptr<SolveArguments>& argum
                  "least transmission of a linkage (joint speed over motor speed), relative to that at the start; the "
                  "largest is its inverse; 0: no bounds")
       ->capture_default_str();
-  // Lets scripts run that name a kind of barrier: limits are kept by constraints. No group: --help leaves it out.
-  sub.add_option_function<std::string>("--limits",
-                                       [&limits](const std::string& kind) { limits.enforced = kind != "none"; })
-      ->check(CLI::IsMember({"none", "quadratic", "log"}))
-      ->group("");
   sub.add_option("--limit", arguments->effort_limits,
                  "motor=largest torque [N m], instead of the robot's; may be repeated")
       ->allow_extra_args(false);

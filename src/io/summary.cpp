@@ -33,7 +33,7 @@ Ground readGround(const Json& json) {
   ground.friction = json.at("friction");
   for (const Json& step : json.at("steps"))
     ground.steps.push_back({readVector(step.at("top")), step.at("length"), step.at("width"), step.at("yaw"),
-                            step.value("pitch", 0.0), step.value("roll", 0.0)});
+                            step.at("pitch"), step.at("roll")});
   return ground;
 }
 
@@ -72,20 +72,17 @@ MotionSummary read(const Json& json) {
   summary.motion = json.at("motion");
   summary.robot = json.at("robot");
   summary.robot_file = json.at("robot_file");
-  summary.model = json.value("model", "closed");
-  summary.serial_armature = json.value("serial_armature", "");
+  summary.model = json.at("model");
+  summary.serial_armature = json.at("serial_armature");
   const std::string formulation = json.at("formulation");
   summary.formulation = formulation == getName(Formulation::Full) ? Formulation::Full : Formulation::Reduced;
-  const std::string step = json.value("step", getName(StepRule::Euler));  // older results have none
+  const std::string step = json.at("step");
   summary.step = step == getName(StepRule::Midpoint) ? StepRule::Midpoint : StepRule::Euler;
-  if (json.contains("objective")) {  // older results have none
-    summary.objective = readObjective(json.at("objective"));
-    summary.objective.regeneration = json.at("electrical_energy").at("regeneration");
-  }
+  summary.objective = readObjective(json.at("objective"));
+  summary.objective.regeneration = json.at("electrical_energy").at("regeneration");
   summary.converged = json.at("converged");
   for (const auto& [name, value] : json.at("options").items()) summary.options.emplace_back(name, value);
-  if (json.contains("goals"))  // older results have none
-    for (const Json& entry : json.at("goals")) summary.goals.push_back(readGoal(entry));
+  for (const Json& entry : json.at("goals")) summary.goals.push_back(readGoal(entry));
   for (const Json& entry : json.at("phases")) {
     MotionSummary::Phase phase{
         entry.at("name"), readCount(entry.at("start_node")), readCount(entry.at("nodes")), entry.at("time_step_s"), {}};
@@ -93,10 +90,9 @@ MotionSummary read(const Json& json) {
       phase.stances.push_back({contact.at("name"), readPlacement(contact)});
     summary.phases.push_back(phase);
   }
-  if (json.contains("free_timings"))  // older results have none
-    for (const Json& entry : json.at("free_timings"))
-      summary.timings.push_back({entry.at("phase"), readCount(entry.at("start_node")), entry.at("nominal_s"),
-                                 entry.at("chosen_s"), entry.at("lower_s"), entry.at("upper_s")});
+  for (const Json& entry : json.at("free_timings"))
+    summary.timings.push_back({entry.at("phase"), readCount(entry.at("start_node")), entry.at("nominal_s"),
+                               entry.at("chosen_s"), entry.at("lower_s"), entry.at("upper_s")});
   summary.ground = readGround(json.at("ground"));
   return summary;
 }
