@@ -45,6 +45,9 @@ columns = [
     ("com", "com.", ["x", "y", "z"]),
     ("gap", "gap.", ["position", "angle"]),
 ]
+for mid, kind in ("q_mid", "q"), ("v_mid", "v"):
+    if mid in arrays:
+        columns.append((mid, mid + ".", names[kind]))
 seen = 0
 for array, prefix, suffixes in columns:
     shape, values = arrays[array]

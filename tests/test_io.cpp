@@ -6,6 +6,7 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "bielle/dynamics/assembly.h"
@@ -147,9 +148,9 @@ TEST_CASE("a record holds what the dynamics say at each node") {
   CHECK(record.gap.row(k).maxCoeff() >= calcLargestGap(ws, makeConstraintSet(model)));
 }
 
-TEST_CASE("trajectories come back from CSV and NumPy files to the last bit") {
-  const TemporaryDirectory directory;
-  const ShortSquat squat;
+// A record with numbers that need all their digits, and names that CSV must quote.
+MotionRecord makeHardRecord(StepRule step = StepRule::Euler) {
+  const ShortSquat squat(step);
   MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
   record.v(0, 0) = 1.0 / 3;
   record.v(0, 1) = -0.0;
@@ -157,9 +158,13 @@ TEST_CASE("trajectories come back from CSV and NumPy files to the last bit") {
   record.v(0, 3) = 1.7976931348623157e308;
   record.closure_names[0] = "a, \"quoted\" name";
   record.closure_names[1] = "bièlle";
-  writeCsv(directory / "t.csv", record);
+  return record;
+}
+
+TEST_CASE("trajectories come back from NumPy files to the last bit") {
+  const TemporaryDirectory directory;
+  const MotionRecord record = makeHardRecord();
   writeNpz(directory / "t.npz", record);
-  checkEqual(readRecord(directory / "t.csv"), record);
   checkEqual(readRecord(directory / "t.npz"), record);
   MotionRecord other = record;
   other.u(1, 1) = std::nextafter(other.u(1, 1), 1e9);
@@ -247,21 +252,12 @@ TEST_CASE("midpoint steps are recorded with the points to which their accelerati
     CHECK(record.v_mid.row(k).transpose() == at.v_mid);
     CHECK((record.q_mid.row(k) - record.q.row(k)).norm() > 1e-6);
   }
-  writeCsv(directory / "t.csv", record);
   writeNpz(directory / "t.npz", record);
-  checkEqual(readRecord(directory / "t.csv"), record);
   checkEqual(readRecord(directory / "t.npz"), record);
 
   const MotionResult result = makeResult({"bipetto", "/r.urdf", {}}, squat.motion, squat.motion.guess, {});
   writeResult(directory / "", result);
   CHECK(readSummary(directory / "").step == StepRule::Midpoint);
-  // Summaries of Euler steps may leave the rule out.
-  std::string text = readFile(directory / "summary.json");
-  const std::string entry = "\"step\": \"midpoint\",";
-  REQUIRE(text.find(entry) != std::string::npos);
-  text.replace(text.find(entry), entry.size(), "");
-  writeText(directory / "summary.json", text);
-  CHECK(readSummary(directory / "").step == StepRule::Euler);
 }
 
 TEST_CASE("a robot without closures, motors or feet gives files that can be read back") {
@@ -274,16 +270,13 @@ TEST_CASE("a robot without closures, motors or feet gives files that can be read
   record.u = record.closure_wrenches = record.contact_wrenches = RowMatrixXd(1, 0);
   record.com = RowMatrixXd::Zero(2, 3);
   record.gap = RowMatrixXd::Zero(2, 2);
-  writeCsv(directory / "t.csv", record);
   writeNpz(directory / "t.npz", record);
-  checkEqual(readRecord(directory / "t.csv"), record);
   checkEqual(readRecord(directory / "t.npz"), record);
 }
 
-TEST_CASE("Python reads the NumPy archive and finds the numbers of the CSV") {
+TEST_CASE("Python reads the NumPy archive and finds the numbers of the CSV, to the last bit") {
   const TemporaryDirectory directory;
-  const ShortSquat squat;
-  const MotionRecord record = makeRecord(squat.motion, squat.motion.guess);
+  const MotionRecord record = makeHardRecord(GENERATE(StepRule::Euler, StepRule::Midpoint));
   writeCsv(directory / "t.csv", record);
   writeNpz(directory / "t.npz", record);
   const auto compare = [&] {
@@ -294,7 +287,7 @@ TEST_CASE("Python reads the NumPy archive and finds the numbers of the CSV") {
   };
   CHECK(compare() == 0);
   MotionRecord poisoned = record;
-  poisoned.contact_wrenches(2, 7) += 1e-9;
+  poisoned.contact_wrenches(2, 7) = std::nextafter(poisoned.contact_wrenches(2, 7), 1e9);
   writeNpz(directory / "t.npz", poisoned);
   CHECK(compare() != 0);
 }
@@ -340,25 +333,12 @@ TEST_CASE("files of OpenSim have the rows and columns that their header tells, a
 TEST_CASE("files that are no trajectories are refused with the file and the place") {
   const TemporaryDirectory directory;
   const ShortSquat squat;
-  writeCsv(directory / "good.csv", makeRecord(squat.motion, squat.motion.guess));
   writeNpz(directory / "good.npz", makeRecord(squat.motion, squat.motion.guess));
-  const std::string csv = readFile(directory / "good.csv"), npz = readFile(directory / "good.npz");
+  const std::string npz = readFile(directory / "good.npz");
 
-  CHECK_THAT(getErrorOfReading(directory / "none.csv"), Catch::Contains("none.csv: file: it cannot be read"));
   CHECK_THAT(getErrorOfReading(directory / "none.npz"), Catch::Contains("none.npz: file: it cannot be read"));
-  CHECK_THAT(getErrorOfReading(directory / "none.txt"), Catch::Contains("neither .csv nor .npz"));
-  writeText(directory / "a.csv", "");
-  CHECK_THAT(getErrorOfReading(directory / "a.csv"), Catch::Contains("header"));
-  writeText(directory / "a.csv", csv.substr(0, csv.find('\n') + 1));
-  CHECK_THAT(getErrorOfReading(directory / "a.csv"), Catch::Contains("no node"));
-  writeText(directory / "a.csv", csv.substr(0, csv.size() / 2));
-  CHECK_THAT(getErrorOfReading(directory / "a.csv"), Catch::Contains("line "));
-  std::string wrong = csv;
-  wrong.replace(wrong.find('\n') + 1, 1, "x");
-  writeText(directory / "a.csv", wrong);
-  CHECK_THAT(getErrorOfReading(directory / "a.csv"), Catch::Contains("line 2, column 'time': 'x' is not a number"));
-  writeText(directory / "a.csv", "q.a,time\n1,2\n");
-  CHECK_THAT(getErrorOfReading(directory / "a.csv"), Catch::Contains("columns"));
+  writeCsv(directory / "t.csv", makeRecord(squat.motion, squat.motion.guess));
+  CHECK_THAT(getErrorOfReading(directory / "t.csv"), Catch::Contains("t.csv: file: it cannot be read"));
   for (size_t size : {size_t(0), size_t(100), npz.size() / 2, npz.size() - 1}) {
     writeText(directory / "a.npz", npz.substr(0, size));
     CHECK_THAT(getErrorOfReading(directory / "a.npz"), Catch::Contains("a.npz: "));
@@ -385,7 +365,6 @@ TEST_CASE("a result is three whole files, written again over the old ones") {
     const std::vector<std::string> paths = writeResult(place, result);
     CHECK(paths.size() == 3);
     CHECK(std::distance(fs::directory_iterator(place), fs::directory_iterator()) == 3);
-    checkEqual(readRecord(paths[0]), result.record);
     checkEqual(readRecord(paths[1]), result.record);
     CHECK_THAT(readFile(paths[2]), Catch::Contains("\"termination\": \"interrupted\"") &&
                                        Catch::Contains("\"interrupted\": true") && Catch::Contains("\"cost\": 2.5"));
@@ -432,12 +411,18 @@ TEST_CASE("a summary reads back: phases, stances, ground; what is none is refuse
   CHECK(summary.ground.calcHeight(0.5, 0.1) == 0.15);
   CHECK(summary.ground.calcHeight(0.5, 0.5) == -0.25);
 
+  const std::string whole = readFile(directory / "summary.json");
   const auto getErrorOf = [&](const std::string& text) {
     writeText(directory / "summary.json", text);
     return getError([&] { readSummary(directory / ""); });
   };
   CHECK_THAT(getErrorOf(""), Catch::Contains("summary.json: file: "));
-  CHECK_THAT(getErrorOf("{}"), Catch::Contains("'motion'"));
+  for (const char* key : {"motion", "step", "objective", "goals", "free_timings"}) {
+    nlohmann::json json = nlohmann::json::parse(whole);
+    REQUIRE(json.erase(key) == 1);
+    CHECK_THAT(getErrorOf(json.dump()),
+               Catch::Contains("summary.json: file: it has no entry '" + std::string(key) + "'"));
+  }
   CHECK_THAT(getErrorOf("[1]"), Catch::Contains("summary.json"));
   fs::remove(directory / "summary.json");
   CHECK_THROWS_WITH(readSummary(directory / ""), Catch::Contains("it cannot be read"));

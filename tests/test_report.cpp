@@ -254,7 +254,7 @@ TEST_CASE("a directory that is none of ours is refused with the file and the rem
   writeStillResult(place, "nobody", getArmNames(), {{"robot_file", robot}});
   CHECK_NOTHROW(makeReport({place}));
   fs::remove(place + "/trajectory.npz");
-  refuse("trajectory.csv: file: it cannot be read");
+  refuse("trajectory.npz: file: it cannot be read");
   CHECK_THROWS_AS(makeReport({}), ModelError);
-  CHECK_THROWS_WITH(writeReport("/nonexistent/report.html", {place}), Catch::Contains("trajectory.csv"));
+  CHECK_THROWS_WITH(writeReport("/nonexistent/report.html", {place}), Catch::Contains("trajectory.npz"));
 }

@@ -64,12 +64,20 @@ def write_hostile_result(directory):
     corners = struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)
     (directory / "part.stl").write_bytes(bytes(80) + struct.pack("<I", 2) + corners + corners)
     (directory / "torn.stl").write_bytes(bytes(80) + struct.pack("<I", 2000) + corners)
-    with open(directory / "trajectory.csv", "w", newline="") as file:
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow(["time", "q." + HOSTILE, "v." + HOSTILE, "a." + HOSTILE, "com.x", "com.y", "com.z",
-                      "gap.position", "gap.angle"])
-        for k in range(11):
-            out.writerow([k / 10, k / 20, 0.5, "" if k == 10 else 0, 0, 0, -1, 0, 0])
+    archive = directory / "trajectory.npz"
+    for kind in ("q", "v"):
+        add_names(archive, kind + "_names", [HOSTILE])
+    for kind in ("u", "closure", "contact"):
+        add_names(archive, kind + "_names", [])
+    add_array(archive, "time", (11,), [k / 10 for k in range(11)])
+    add_array(archive, "q", (11, 1), [k / 20 for k in range(11)])
+    add_array(archive, "v", (11, 1), 11 * [0.5])
+    add_array(archive, "a", (10, 1), 10 * [0])
+    add_array(archive, "u", (10, 0), [])
+    for kind in ("closure", "contact"):
+        add_array(archive, kind + "_wrenches", (10, 0, 6), [])
+    add_array(archive, "com", (11, 3), 11 * [0, 0, -1])
+    add_array(archive, "gap", (11, 2), 22 * [0])
     summary = {"robot": str(directory / "robot.urdf"), "motion": HOSTILE, "termination": HOSTILE,
                "message": "</script>" + HOSTILE, "options": {HOSTILE: 1}, "command": [HOSTILE],
                "goals": [None, {"name": HOSTILE, "kind": HOSTILE, "unit": HOSTILE, "requested": 1, "achieved": None}],
@@ -88,13 +96,21 @@ def differ(a, b):
     return sum(abs(x - y) > 5 for x, y in zip(a, b))
 
 
-def add_array(archive, name, shape, numbers):
-    """To a NumPy archive, of float64."""
-    header = str({"descr": "<f8", "fortran_order": False, "shape": shape}).encode()
+def add_npy(archive, name, kind, shape, body):
+    """To a NumPy archive."""
+    header = str({"descr": kind, "fortran_order": False, "shape": shape}).encode()
     header += b" " * (-(len(header) + 11) % 64) + b"\n"
     with zipfile.ZipFile(archive, "a") as file:
-        file.writestr(name + ".npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header +
-                      struct.pack(f"<{len(numbers)}d", *numbers))
+        file.writestr(name + ".npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + body)
+
+
+def add_array(archive, name, shape, numbers):
+    add_npy(archive, name, "<f8", shape, struct.pack(f"<{len(numbers)}d", *numbers))
+
+
+def add_names(archive, name, texts):
+    width = max([1, *map(len, texts)])
+    add_npy(archive, name, f"<U{width}", (len(texts),), b"".join(t.ljust(width, "\0").encode("utf-32-le") for t in texts))
 
 
 class ReportPage(unittest.TestCase):

@@ -100,7 +100,7 @@ void checkConsistency(const CheckedMotion& motion) {
 CheckedMotion readMotion(const std::string& directory) {
   CheckedMotion motion;
   motion.summary = readSummary(directory);
-  motion.record = readRecord((std::filesystem::path(directory) / "trajectory.npz").string());
+  motion.record = readResultRecord(directory);
   std::error_code error;
   const bool file_exists = std::filesystem::exists(motion.summary.robot_file, error);
   motion.model = loadRobot(file_exists ? motion.summary.robot_file : motion.summary.robot).model;

@@ -2536,7 +2536,7 @@ class Record:
         ...
 
 def read_record(path: str) -> Record:
-    """Reads trajectory.csv or trajectory.npz."""
+    """Reads trajectory.npz."""
     ...
 
 def read_result_record(directory: str) -> Record:

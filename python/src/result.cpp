@@ -35,7 +35,7 @@ void bindRecord(py::module_& module) {
       .field("multipliers", &MotionRecord::multipliers,
              "multipliers of the constraints, for warm starts; penalty 0 if not known");
   module.def("read_record", &readRecord, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
-             "Reads trajectory.csv or trajectory.npz.");
+             "Reads trajectory.npz.");
   module.def("read_result_record", &readResultRecord, py::arg("directory"), py::call_guard<py::gil_scoped_release>(),
              "The Record in a directory of a result.");
 }

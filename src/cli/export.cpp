@@ -3,7 +3,7 @@
 #include <iostream>
 #include <memory>
 
-#include "bielle/io/record.h"
+#include "bielle/io/result.h"
 #include "cli/commands.h"
 #include "io/opensim.h"
 #include "io/output_place.h"
@@ -21,7 +21,7 @@ struct ExportArguments {
 
 int exportTrajectory(const ExportArguments& arguments) {
   const fs::path place = arguments.directory;
-  const MotionRecord record = readRecord((place / "trajectory.npz").string());
+  const MotionRecord record = readResultRecord(place.string());
   const fs::path path =
       arguments.output.empty() ? place / ("trajectory." + arguments.format) : fs::path(arguments.output);
   requireApart(path.string(), listResultFiles(place.string()));

@@ -70,7 +70,7 @@ int run(const LiftArguments& arguments) {
     throw ModelError(summary.file, std::string("step '") + getName(summary.step) + "'",
                      "only motions with Euler steps, which have accelerations at their nodes, can be lifted",
                      "make one with `bielle solve " + summary.motion + " --model serial --step euler`");
-  const MotionRecord record = readRecord((fs::path(arguments.serial_directory) / "trajectory.npz").string());
+  const MotionRecord record = readResultRecord(arguments.serial_directory);
   RobotArgument robot_argument;
   std::error_code error;
   robot_argument.name = fs::is_regular_file(summary.robot_file, error) ? summary.robot_file : summary.robot;

@@ -6,7 +6,7 @@
 #include <iostream>
 #include <memory>
 
-#include "bielle/io/record.h"
+#include "bielle/io/result.h"
 #include "bielle/model/error.h"
 #include "cli/commands.h"
 #include "cli/film.h"
@@ -32,9 +32,7 @@ struct ReportArguments {
 double calcDuration(const std::vector<std::string>& directories) {
   double end = 0;
   for (const std::string& directory : directories) {
-    const fs::path archive = fs::path(directory) / "trajectory.npz";
-    const MotionRecord record =
-        readRecord((fs::exists(archive) ? archive : fs::path(directory) / "trajectory.csv").string());
+    const MotionRecord record = readResultRecord(directory);
     end = std::max(end, record.time[record.time.size() - 1]);
   }
   return end;

@@ -138,13 +138,4 @@ void writeNpz(const std::string& path, const MotionRecord& record) {
   file.commit();
 }
 
-MotionRecord readRecord(const std::string& path) {
-  const auto endsWith = [&path](const std::string& end) {
-    return path.size() >= end.size() && path.compare(path.size() - end.size(), end.size(), end) == 0;
-  };
-  if (endsWith(".csv")) return readCsv(path);
-  if (endsWith(".npz")) return readNpz(path);
-  throw ModelError(path, "file", "it is neither .csv nor .npz", "give a trajectory that Bielle wrote");
-}
-
 }  // namespace bielle

@@ -98,7 +98,7 @@ std::string formatNpz(const MotionRecord& record) {
   return formatArchive(arrays);
 }
 
-MotionRecord readNpz(const std::string& path) {
+MotionRecord readRecord(const std::string& path) {
   NpyArrays arrays = readArchive(path);
   MotionRecord record;
   for (const auto& [name, member] : kNames) record.*member = takeArray(path, name, true, arrays).texts;

@@ -23,7 +23,5 @@ void requireWhole(const MotionRecord& record);
 
 std::string formatCsv(const MotionRecord& record);
 std::string formatNpz(const MotionRecord& record);
-MotionRecord readCsv(const std::string& path);
-MotionRecord readNpz(const std::string& path);
 
 }  // namespace bielle

@@ -99,13 +99,7 @@ void setGuess(const MotionRecord& record, Motion& motion) {
 }
 
 MotionRecord readResultRecord(const std::string& directory) {
-  for (const char* name : {"trajectory.npz", "trajectory.csv"}) {
-    const fs::path path = fs::path(directory) / name;
-    std::error_code error;
-    if (fs::exists(path, error)) return readRecord(path.string());
-  }
-  throw ModelError(directory, "directory", "it contains neither trajectory.npz nor trajectory.csv",
-                   "give the output directory of a solve");
+  return readRecord((fs::path(directory) / "trajectory.npz").string());
 }
 
 }  // namespace bielle

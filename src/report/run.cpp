@@ -57,8 +57,8 @@ ReportRun readRun(const std::string& directory) {
   run.summary.erase("robot_file");  // pages are given away, and need no path of this machine
   if (getText(run.summary, "model") == "serial")
     run.robot.model = makeSerialModel(run.robot.model, makeStandingPosture(run.robot.model)).model;
-  const fs::path archive = place / "trajectory.npz", plan = place / "plan.npz";
-  run.record = readRecordOf(run.robot, fs::exists(archive, error) ? archive : place / "trajectory.csv");
+  const fs::path plan = place / "plan.npz";
+  run.record = readRecordOf(run.robot, place / "trajectory.npz");
   if (run.summary.contains("outcome") && fs::exists(plan, error)) run.plan = readRecordOf(run.robot, plan);
   return run;
 }

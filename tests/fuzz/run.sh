@@ -7,14 +7,14 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 seconds=${1:-600}
 shift || true
 targets=("$@")
-[ ${#targets[@]} -gt 0 ] || targets=(urdf drake yaml motors mjcf mesh json csv npz)
+[ ${#targets[@]} -gt 0 ] || targets=(urdf drake yaml motors mjcf mesh json npz)
 build=$root/build-fuzz
 bielle=${BIELLE:-$root/build/bin/bielle}
 mkdir -p "$build/findings" "$build/seeds"
 
 # Seeds: the robots of the source tree, a small robot's YAML with every key, and a result that the command makes.
 if [ ! -e "$build/seeds/done" ]; then
-  mkdir -p "$build"/seeds/{urdf,drake,yaml,motors,mjcf,mesh,json,csv,npz}
+  mkdir -p "$build"/seeds/{urdf,drake,yaml,motors,mjcf,mesh,json,npz}
   cp "$root"/robots/*/*.urdf "$build/seeds/urdf"
   cp "$root"/robots/*/*.yaml "$root"/tests/fuzz/toy.yaml "$build/seeds/yaml"
   sed 's/^  ak80-9:/  m:/' "$root/robots/motors.yaml" >"$build/seeds/motors/all.yaml"
@@ -31,11 +31,9 @@ if [ ! -e "$build/seeds/done" ]; then
   "$bielle" convert "$root/validation/elements/point_spring.yaml" --to drake -o "$build/seeds/drake/springs.urdf" >/dev/null 2>&1
   "$bielle" solve squat --robot bipetto --depth 0.95 --set duration=0.4 --set settle=0 \
     --set time_step=0.1 --max-iterations 1 --quiet --no-check --no-report -o "$build/seeds/result" >/dev/null || true
-  cp "$build/seeds/result/trajectory.csv" "$build/seeds/csv"
   cp "$build/seeds/result/trajectory.npz" "$build/seeds/npz"
   cp "$build/seeds/result/summary.json" "$build/seeds/json"
   echo '{"joints": {"crank1": {"q": 0.5, "v": [0.1]}}, "torques": {"crank1": 3.5}, "contacts": []}' >"$build/seeds/json/state.json"
-  printf 'time,q.a,v.a,a.a,u.m,closure.c.fx,closure.c.fy,closure.c.fz,closure.c.nx,closure.c.ny,closure.c.nz,com.x,com.y,com.z,gap.position,gap.angle\n0,1,2,3,4,1,2,3,4,5,6,1,2,3,0,0\n1,1e300,nan,,,,,,,,,inf,-0,3,0,0\n' >"$build/seeds/csv/small.csv"
   touch "$build/seeds/done"
 fi
 

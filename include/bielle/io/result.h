@@ -109,7 +109,7 @@ BuildInfo getBuildInfo();
 void setGuess(const MotionRecord& record, Motion& motion);
 
 /// The record in a directory written by writeResult().
-/// \throws ModelError naming the directory or file, and why it cannot be read
+/// \throws ModelError naming the file and why it cannot be read
 MotionRecord readResultRecord(const std::string& directory);
 
 // Lifting: reads a serial motion and writes its lift to the closed model.

@@ -2,7 +2,7 @@
 /// \file A report: solved motions as one HTML page that needs only a browser, without a network.
 ///
 /// It replays the robot in three dimensions and plots its quantities over time, from the files in a result's directory
-/// (result.h): trajectory.npz, else trajectory.csv; summary.json; check.json if it is there. Keys of
+/// (result.h): trajectory.npz, summary.json, check.json if it is there. Keys of
 /// summary.json beyond those of a bare run are used if present: `robot_file`, `phases`, `ground`. Of a motion that `bielle simulate`
 /// carried out, its outcome, its pushes and, from plan.npz, its plan are shown as well. Several directories are compared on
 /// one page. Names from the files are escaped and shown as text.
