@@ -47,8 +47,7 @@ OTHERS = {
 PUBLIC = "include/bielle/"
 OUTSIDE = ("examples/", "python/", "tests/consumer/")  # they see what users see
 GENERATED = ("assets.inc",)
-FOLDERS = ("include/", "src/", "engines/", "simulation/", "validation/", "workers/", "tests/", "examples/",
-           "benchmarks/", "python/")
+FOLDERS = ("include/", "src/", "engines/", "simulation/", "validation/", "workers/", "tests/", "examples/", "python/")
 
 
 def collect(room):
