@@ -1,16 +1,11 @@
 // The programs that use physics engines, installed beside `bielle`: bielle-validate, bielle-check, bielle-simulate.
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <iostream>
 
 #include "cli/commands.h"
-
-extern char** environ;
+#include "io/process.h"
 
 namespace bielle::cli {
 
@@ -29,28 +24,6 @@ void addCompanions(CLI::App& app) {
 
 namespace {
 
-// The program and its arguments until it ends: the value of wait(), or the error of posix_spawn().
-struct Ended {
-  int error = 0, status = 0;
-};
-Ended runProgram(const std::string& program, std::vector<std::string> arguments, bool quiet) {
-  std::vector<char*> argv = {const_cast<char*>(program.c_str())};
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  std::cout.flush();
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  if (quiet) posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
-  pid_t child = 0;
-  Ended ended;
-  ended.error = posix_spawnp(&child, program.c_str(), &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (ended.error != 0) return ended;
-  while (waitpid(child, &ended.status, 0) < 0)
-    if (errno != EINTR) return {errno, 0};
-  return ended;
-}
-
 // Where this program was built and the other one was not, it is built: scripts/demo.sh builds only what its motion needs.
 bool buildCompanion(const std::string& name) {
   std::error_code error;
@@ -58,8 +31,9 @@ bool buildCompanion(const std::string& name) {
       std::filesystem::read_symlink("/proc/self/exe", error).parent_path().parent_path();
   if (error || !std::filesystem::exists(build / "CMakeCache.txt", error)) return false;
   std::cerr << "bielle: building " << name << ", which is not in " << build.string() << " yet; this happens once\n";
-  const Ended ended = runProgram("cmake", {"--build", build.string(), "--target", name}, true);
-  return ended.error == 0 && ended.status == 0;
+  ProcessOptions options;
+  options.out = STDERR_FILENO;
+  return waitForProcess(startProcess({"cmake", "--build", build.string(), "--target", name}, options)) == 0;
 }
 
 }  // namespace
@@ -85,11 +59,13 @@ std::optional<int> runCompanion(const std::string& name, std::vector<std::string
     std::cerr << "bielle: error: " << name << " " << why << std::endl;
     return kFailed;
   };
-  const auto [error, status] = runProgram(program, std::move(arguments), false);
-  if (error == ENOENT && program == name) return {};  // beside this program it exists
-  if (error != 0) return fail(std::string("cannot be started: ") + std::strerror(error));
-  if (WIFEXITED(status)) return WEXITSTATUS(status);
-  return fail("was terminated by signal " + std::to_string(WTERMSIG(status)));
+  if (program == name && !isOnPath(name)) return {};
+  arguments.insert(arguments.begin(), program);
+  std::cout.flush();
+  const int status = waitForProcess(startProcess(arguments));
+  if (status == kNotStarted) return fail("cannot be started");
+  if (status > kSignalled) return fail("was terminated by signal " + std::to_string(status - kSignalled));
+  return status;
 }
 
 }  // namespace bielle::cli

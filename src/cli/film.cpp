@@ -7,9 +7,9 @@
 #include <fstream>
 
 #include "bielle/model/error.h"
-#include "cli/subprocess.h"
 #include "cli/table.h"
 #include "io/aside_file.h"
+#include "io/process.h"
 
 namespace fs = std::filesystem;
 
@@ -90,7 +90,7 @@ std::string decodeBase64(const std::string& text) {
 std::vector<std::string> takePictures(const std::string& page, const FilmOptions& options, bool separate) {
   const ScratchDirectory scratch;
   const double seconds = 60 + 4.0 * static_cast<double>(options.times.size());
-  const SubprocessResult result = runSubprocess(
+  const ProcessOutput result = runProcess(
       {findBrowser(), "--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader",
        "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking",
        "--disable-component-update", "--disable-sync", "--user-data-dir=" + (scratch / "profile").string(),
@@ -129,7 +129,7 @@ void writeFilm(const std::string& page, const FilmOptions& options, double rate,
     std::ofstream(scratch / name, std::ios::binary) << pictures[i];
   }
   const std::string made = (scratch / "film.mp4").string();
-  const SubprocessResult result = runSubprocess(
+  const ProcessOutput result = runProcess(
       {"ffmpeg", "-loglevel", "error", "-framerate", formatNumber(rate), "-i", (scratch / "%06d.jpg").string(), "-c:v",
        "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart", made},
       600);

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <sys/prctl.h>
 #include <sys/signalfd.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -11,25 +10,15 @@
 #include <cstring>
 
 #include "bielle/model/error.h"
+#include "io/process.h"
 
 namespace bielle::tasks {
 namespace {
 
-// From the fork to the new program: calls that are safe there only.
-[[noreturn]] void becomeProgram(char** argv, pid_t parent, int in, int out, int error) {
-  setpgid(0, 0);
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != parent) _exit(127);  // it ended before the call
-  sigset_t none;
-  sigemptyset(&none);
-  sigprocmask(SIG_SETMASK, &none, nullptr);
-  if (in < 0 || out < 0) _exit(127);
-  dup2(in, STDIN_FILENO);
-  dup2(out, STDOUT_FILENO);
-  dup2(error, STDERR_FILENO);
-  execv(argv[0], argv);
-  _exit(127);
-}
+struct OpenFile {
+  ~OpenFile() { close(file); }
+  int file;
+};
 
 // By which the user asks for the end.
 sigset_t getEndSignals() {
@@ -39,28 +28,12 @@ sigset_t getEndSignals() {
   return signals;
 }
 
-// Of what waitpid() tells.
-int getStatus(int state) { return WIFEXITED(state) ? WEXITSTATUS(state) : 128 + WTERMSIG(state); }
-
-template <typename Become>
-pid_t startProgram(const std::vector<std::string>& arguments, const Become& become) {
-  std::vector<std::string> copy = arguments;
-  std::vector<char*> argv;
-  for (std::string& argument : copy) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  const pid_t parent = getpid(), child = fork();
-  if (child == 0) become(argv.data(), parent);
-  if (child < 0) throw ModelError("", "new process", std::strerror(errno), "run fewer jobs");
-  return child;
-}
-
 }  // namespace
 
 pid_t startChild(const std::vector<std::string>& arguments, const std::string& log) {
-  return startProgram(arguments, [&log](char** argv, pid_t parent) {
-    const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
-    becomeProgram(argv, parent, open("/dev/null", O_RDONLY), out, out);
-  });
+  const OpenFile in{open("/dev/null", O_RDONLY | O_CLOEXEC)};
+  const OpenFile out{open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)};
+  return startProcess(arguments, {in.file, out.file, out.file, true});  // without a log it is not started
 }
 
 PipedChild startPipedChild(const std::vector<std::string>& arguments) {
@@ -72,8 +45,7 @@ PipedChild startPipedChild(const std::vector<std::string>& arguments) {
   }
   PipedChild child{0, in[1], out[0]};
   try {
-    child.pid = startProgram(
-        arguments, [&](char** argv, pid_t parent) { becomeProgram(argv, parent, in[0], out[1], STDERR_FILENO); });
+    child.pid = startProcess(arguments, {in[0], out[1], STDERR_FILENO, true});
   } catch (...) {
     for (const int file : {in[0], in[1], out[0], out[1]}) close(file);
     throw;
@@ -136,8 +108,7 @@ std::vector<ChildEnd> SignalWatch::collect() {
 
 void killChild(pid_t pid) {
   kill(pid, SIGKILL);
-  while (waitpid(pid, nullptr, 0) < 0 && errno == EINTR) {
-  }
+  waitForProcess(pid);
 }
 
 }  // namespace bielle::tasks

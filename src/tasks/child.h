@@ -1,5 +1,5 @@
 #pragma once
-// Child processes: started, awaited together with the user's signals, and never left running.
+// Child processes that are awaited together with the user's signals, and never left running.
 #include <signal.h>
 #include <sys/types.h>
 
@@ -9,8 +9,7 @@
 
 namespace bielle::tasks {
 
-// Starts a program (arguments[0] is its path) with both outputs in the file `log` and no input. It is in a separate
-// process group, so that Ctrl-C does not reach it, and dies with its parent, however that ends.
+// Starts a program apart (io/process.h), with both outputs in the file `log` and no input.
 // \throws ModelError when there can be no new process
 pid_t startChild(const std::vector<std::string>& arguments, const std::string& log);
 
@@ -25,7 +24,7 @@ PipedChild startPipedChild(const std::vector<std::string>& arguments);
 
 struct ChildEnd {
   pid_t pid = 0;
-  int status = 0;  // of the exit, or 128 + the signal that ended it
+  int status = 0;  // io/process.h
 };
 
 // During its lifetime, SIGINT, SIGTERM and SIGCHLD are blocked and awaited. Children get the previous signal mask.
