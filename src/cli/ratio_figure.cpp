@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
-
-#include "io/figure.h"
+#include <functional>
 
 namespace bielle::cli {
 namespace {
@@ -18,71 +16,65 @@ double calcMedianRatio(const RatioReport& report) {
   return values[values.size() / 2];
 }
 
-std::string makeCurveScript(const RatioReport& report) {
-  const double top = std::max(4 * calcMedianRatio(report), 2.0);
-  std::ostringstream script;
-  script << "set encoding utf8\n";
-  const auto writeBlock = [&](const char* name, const auto& keep) {
-    script << "$" << name << " << EOD\n";
-    int previous = 0;
-    for (const RatioSample& sample : report.sweep.samples) {
-      if (!keep(sample)) continue;
-      if (sample.branch != previous) script << "\n";  // lines stop between branches
-      previous = sample.branch;
-      script << sample.joints[0] << " " << (std::isfinite(sample.ratio.R(0, 0)) ? sample.ratio.R(0, 0) : 0) << "\n";
-    }
-    script << "EOD\n";
-  };
-  const auto alive = [](const RatioSample& sample) { return sample.dead == DeadPointKind::None; };
-  writeBlock("main", [&](const RatioSample& sample) { return alive(sample) && sample.branch == 0; });
-  writeBlock("other", [&](const RatioSample& sample) { return alive(sample) && sample.branch != 0; });
-  writeBlock("start", [&](const RatioSample& sample) { return alive(sample) && sample.s == 0; });
-  bool lowest_negative = false, others = false;
+// R of the samples that `keep` accepts; a line stops between branches.
+Curve makeCurve(const RatioReport& report, const std::string& title, const std::string& color, CurveStyle style,
+                const std::function<bool(const RatioSample&)>& keep) {
+  Curve curve{title, color, style, false, {}};
+  int branch = 0;
   for (const RatioSample& sample : report.sweep.samples) {
-    lowest_negative |= alive(sample) && sample.ratio.R(0, 0) < 0;
-    others |= alive(sample) && sample.branch != 0;
+    if (sample.dead != DeadPointKind::None || !keep(sample)) continue;
+    if (sample.branch != branch) curve.points.emplace_back(NAN, NAN);
+    branch = sample.branch;
+    curve.points.emplace_back(sample.joints[0], sample.ratio.R(0, 0));
   }
-  script << "set xlabel " << quoteGnuplot(report.linkage.joint_names[0] + " [rad]") << " noenhanced\n"
-         << "set ylabel "
-         << quoteGnuplot("ratio " + report.linkage.motor_names[0] + " / " + report.linkage.joint_names[0])
-         << " noenhanced\n"
-         << "set yrange [" << (lowest_negative ? -top : 0) << ":" << top << "]\nset grid\nset key top center\n"
-         << "set xzeroaxis lt -1\n";
-  for (const RatioSample& dead : report.sweep.getDeadPoints())
-    script << "set arrow from " << dead.joints[0] << ", graph 0 to " << dead.joints[0]
-           << ", graph 1 nohead dashtype 2 lc rgb '" << (dead.dead == DeadPointKind::Joint ? "#b02020" : "#2060b0")
-           << "'\n";
-  script << "plot $main with lines lw 2 lc rgb '#1f77b4' title 'from the start', ";
-  if (others) script << "$other with lines lw 1 lc rgb '#aaaaaa' title 'other branches', ";
-  script << "NaN with lines dashtype 2 lc rgb '#b02020' title 'dead points', "
-         << "$start with points pt 7 ps 0.8 lc rgb 'black' title 'start'\n";
-  return script.str();
+  return curve;
 }
 
-std::string makeMapScript(const RatioReport& report) {
+Plot makeCurvePlot(const RatioReport& report) {
+  const double top = std::max(4 * calcMedianRatio(report), 2.0);
+  const Linkage& linkage = report.linkage;
+  Plot plot{"", linkage.joint_names[0] + " [rad]", "ratio " + linkage.motor_names[0] + " / " + linkage.joint_names[0]};
+  plot.curves = {
+      makeCurve(report, "from the start", kClosedColor, CurveStyle::Lines,
+                [](const auto& at) { return at.branch == 0; }),
+      makeCurve(report, "other branches", "#aaaaaa", CurveStyle::Lines, [](const auto& at) { return at.branch != 0; }),
+      makeCurve(report, "start", "#000000", CurveStyle::Crosses, [](const auto& at) { return at.s == 0; })};
+  bool negative = false;
+  for (const Curve& curve : plot.curves)
+    for (const auto& [angle, ratio] : curve.points) negative |= ratio < 0;
+  plot.y_range = {negative ? -top : 0, top};
+  for (const DeadPointKind kind : {DeadPointKind::Joint, DeadPointKind::Motor}) {
+    const bool joint = kind == DeadPointKind::Joint;
+    Curve dead{joint ? "dead points of the joint" : "dead points of the motors",
+               joint ? "#b02020" : "#2060b0",
+               CurveStyle::Lines,
+               true,
+               {}};
+    for (const RatioSample& sample : report.sweep.getDeadPoints())
+      if ((sample.dead == DeadPointKind::Joint) == joint)
+        dead.points.insert(
+            dead.points.end(),
+            {{sample.joints[0], plot.y_range->first}, {sample.joints[0], plot.y_range->second}, {NAN, NAN}});
+    plot.curves.push_back(dead);
+  }
+  return plot;
+}
+
+Plot makeMapPlot(const RatioReport& report) {
   const RatioMap& map = *report.map;
-  std::ostringstream script;
-  script << "set encoding utf8\n$map << EOD\n";
+  Plot plot{"", report.linkage.joint_names[0] + " [rad]", report.linkage.joint_names[1] + " [rad]"};
+  plot.shades = {"condition number of R", map.first[1] - map.first[0], {}};
   for (const std::vector<RatioSample>& row : map.rows)
     for (const RatioSample& sample : row)
-      script << sample.joints[0] << " " << sample.joints[1] << " " << sample.ratio.condition << "\n";
-  script << "EOD\n$dead << EOD\n";
-  for (const RatioSample& dead : map.dead_points) script << dead.joints[0] << " " << dead.joints[1] << "\n";
-  script << "EOD\n"
-         << "set xlabel " << quoteGnuplot(report.linkage.joint_names[0] + " [rad]") << " noenhanced\n"
-         << "set ylabel " << quoteGnuplot(report.linkage.joint_names[1] + " [rad]") << " noenhanced\n"
-         << "set cblabel 'condition number of R'\nset logscale cb\nset key outside top center horizontal\n"
-         << "set palette defined (0 '#f7fbff', 1 '#6baed6', 2 '#08306b')\nset grid\n"
-         << "half = " << (map.first[1] - map.first[0]) / 2 << "\n"
-         << "plot $map using 1:2:(half):(half):3 with boxxyerror fillcolor palette fillstyle solid noborder notitle, "
-         << "$dead with points pt 2 ps 0.8 lc rgb '#b02020' title 'dead points'\n";
-  return script.str();
+      plot.shades.squares.push_back({sample.joints[0], sample.joints[1], sample.ratio.condition});
+  Curve dead{"dead points", "#b02020", CurveStyle::Crosses, false, {}};
+  for (const RatioSample& sample : map.dead_points) dead.points.emplace_back(sample.joints[0], sample.joints[1]);
+  plot.curves = {dead};
+  return plot;
 }
 
 }  // namespace
 
-std::string makeRatioScript(const RatioReport& report) {
-  return report.map ? makeMapScript(report) : makeCurveScript(report);
-}
+Plot makeRatioPlot(const RatioReport& report) { return report.map ? makeMapPlot(report) : makeCurvePlot(report); }
 
 }  // namespace bielle::cli

@@ -9,7 +9,7 @@
 #include "cli/ratio_figure.h"
 #include "cli/table.h"
 #include "io/aside_file.h"
-#include "io/figure.h"
+#include "io/plot.h"
 #include "io/text_file.h"
 #include "model/listing.h"
 
@@ -193,7 +193,7 @@ std::vector<std::string> writeReport(const std::string& directory, const RatioRe
     written.push_back(place("map.csv"));
   }
   json.commit();
-  written.push_back(drawSvg(place("ratio.svg"), makeRatioScript(report))
+  written.push_back(drawPlots(place("ratio.svg"), {makeRatioPlot(report)})
                         ? place("ratio.svg")
                         : "no figure: gnuplot is not installed (Debian: gnuplot-nox)");
   return written;

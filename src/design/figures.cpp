@@ -15,15 +15,13 @@ namespace {
 
 constexpr double kGap = std::numeric_limits<double>::quiet_NaN();  // interrupts a line
 constexpr size_t kMostMotors = 4;                                  // of one plot
-const char* const kColors[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#e377c2", "#17becf"};
-constexpr size_t kNumColors = std::size(kColors);
 
 // Values of feasible designs as points, the least so far as a line, one colour per search. Outliers are left out.
 Plot makeCourse(const DesignEvaluator& evaluator, const DesignRun& run) {
   const double start = evaluator.start().value;
   Plot plot{"Value of the designs", "evaluation", "value", PlotScale::Free, {}};
   for (size_t i = 0; i < run.searches.size(); ++i) {
-    const char* color = kColors[i % kNumColors];
+    const char* color = getCurveColor(i);
     Curve values{"", color, CurveStyle::Points, false, {}};
     Curve best{"best of search " + std::to_string(i + 1), color, CurveStyle::Lines, false, {}};
     double least = start;
@@ -90,7 +88,7 @@ std::vector<int> chooseMotors(const DesignEvaluator& evaluator, const MotionMeas
 
 Curve makeCurve(const MotorTrace& trace, const MatrixXd& values, int motor, const std::string& title, size_t color,
                 bool dashed) {
-  Curve curve{title, kColors[color % kNumColors], CurveStyle::Lines, dashed, {}};
+  Curve curve{title, getCurveColor(color), CurveStyle::Lines, dashed, {}};
   for (size_t k = 0; k < trace.time.size(); ++k)
     if (trace.dt[k] > 0) curve.points.emplace_back(trace.time[k], values(motor, static_cast<Eigen::Index>(k)));
   return curve;

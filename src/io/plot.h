@@ -1,5 +1,7 @@
 #pragma once
-// Curves over numbers, as scripts for gnuplot.
+// Figures, drawn by gnuplot.
+#include <array>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,18 +18,35 @@ struct Curve {
   std::vector<std::pair<double, double>> points;  // points that are not finite interrupt the line
 };
 
-enum class PlotScale { Free, Logarithmic /* y */, Equal /* a metre is a metre in x and y */ };
+enum class PlotScale {
+  Free,
+  Logarithmic,  // y
+  Equal,        // a metre is a metre in x and y
+  Polar         // x: angle in degrees, 0 upwards and 90 to the left; y: radius. No labels of axes
+};
+
+// Squares in shades of blue, a logarithmic scale of which stands beside the plot.
+struct Shades {
+  std::string label;
+  double size = 0;
+  std::vector<std::array<double, 3>> squares;  // x, y and the value
+};
 
 struct Plot {
-  std::string title, x_label, y_label;
+  std::string title, x_label, y_label;  // free text
   PlotScale scale = PlotScale::Free;
   std::vector<Curve> curves;
+  std::optional<std::pair<double, double>> y_range = std::nullopt;  // empty: that of the curves
+  Shades shades = {};                                               // behind the curves
 };
 
 // The colours of the models, the same in all figures.
 constexpr const char *kClosedColor = "#1f77b4", *kLiftedColor = "#d62728", *kSerialColor = "#7f7f7f";
+// Of one of several curves.
+const char* getCurveColor(size_t index);
 
-// Draws the plots one below the other. False if gnuplot is not installed. \throws ModelError when it cannot be drawn
+// Draws the plots one below the other, to a temporary file that is renamed. False if gnuplot is not installed.
+// \throws ModelError when it cannot draw or the file cannot be written
 bool drawPlots(const std::string& path, const std::vector<Plot>& plots);
 
 }  // namespace bielle

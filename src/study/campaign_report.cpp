@@ -6,7 +6,7 @@
 #include <optional>
 #include <sstream>
 
-#include "io/figure.h"
+#include "io/plot.h"
 #include "io/text_file.h"
 #include "study/report.h"
 
@@ -17,9 +17,6 @@ namespace {
 
 constexpr const char *kImpulse = "push impulse", *kDirection = "push direction";
 constexpr size_t kLeastDirections = 3;  // of a map
-constexpr int kMapSize = 620;
-const char* const kOutcomeColors[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd",
-                                      "#ff7f0e", "#8c564b", "#e377c2", "#17becf"};
 
 // Values of a column in the order of the runs.
 std::vector<std::string> listAxisValues(const CampaignResults& results, size_t column) {
@@ -198,41 +195,18 @@ Json makeSummary(const CampaignResults& results) {
 }
 
 // Seen from above, x upwards, y to the left.
-std::string makeMapScript(const Groups& groups, size_t direction) {
-  std::ostringstream script;
-  script << "set encoding utf8\n"
-            "set polar\n"
-            "set angles degrees\n"
-            "set theta top ccw\n"
-            "set grid polar 45\n"
-            "unset border\n"
-            "unset xtics\n"
-            "unset ytics\n"
-            "set rrange [0:*]\n"
-            "set rtics\n"
-            "set size square\n"
-            "set lmargin 8\n"
-            "set key outside right top\n"
-            "set title 'Largest impulse without a fall, N s, by direction' noenhanced\n"
-            "set ttics 0, 45 format '%g°'\n";
-  for (size_t i = 0; i < groups.size(); ++i) {
-    std::vector<std::pair<double, double>> points;
-    for (const SurvivedImpulse& found : groups[i].second)
-      points.emplace_back(std::stod(found.values[direction]), found.impulse);
-    std::sort(points.begin(), points.end());
-    points.push_back(points.front());
-    script << "$g" << i << " << EOD\n";
-    for (const auto& [angle, impulse] : points) script << angle << " " << impulse << "\n";
-    script << "EOD\n";
-  }
-  for (size_t i = 0; i < groups.size(); ++i) {
+Plot makeMap(const Groups& groups, size_t direction) {
+  Plot plot{"Largest impulse without a fall, N s, by direction", "", "", PlotScale::Polar};
+  for (const auto& [condition, found] : groups) {
     std::string title;
-    for (const std::string& value : groups[i].first) title += (title.empty() ? "" : ", ") + value;
-    script << (i ? ", " : "plot ") << "$g" << i << " with linespoints pt 7 ps 0.6 lw 2 lc rgb '"
-           << kOutcomeColors[i % std::size(kOutcomeColors)] << "'"
-           << (title.empty() ? " notitle" : " title " + quoteGnuplot(title) + " noenhanced");
+    for (const std::string& value : condition) title += (title.empty() ? "" : ", ") + value;
+    Curve curve{title, getCurveColor(plot.curves.size()), CurveStyle::LinesPoints, false, {}};
+    for (const SurvivedImpulse& one : found) curve.points.emplace_back(std::stod(one.values[direction]), one.impulse);
+    std::sort(curve.points.begin(), curve.points.end());
+    curve.points.push_back(curve.points.front());
+    plot.curves.push_back(curve);
   }
-  return script.str();
+  return plot;
 }
 
 }  // namespace
@@ -270,7 +244,7 @@ std::vector<std::string> writeCampaign(const std::string& directory, const Campa
   const std::optional<size_t> direction = findAxis(results, kDirection);
   const Groups groups = groupImpulses(results);
   bool has_map = direction && !groups.empty() && listAxisValues(results, *direction).size() >= kLeastDirections;
-  if (has_map && !drawSvg(locate("map.svg"), makeMapScript(groups, *direction), kMapSize + 160, kMapSize)) {
+  if (has_map && !drawPlots(locate("map.svg"), {makeMap(groups, *direction)})) {
     notes.push_back("map.svg was not drawn: gnuplot is not installed");
     has_map = false;
   }

@@ -39,8 +39,8 @@ MotionRecord makeRecord(const Motion& motion, const ShootingTrajectory& trajecto
 /// One row per node under one header: time, q.<name>, v.<name>, a.<name>, u.<motor>, closure.<name>.<entry>,
 /// contact.<name>.<entry>, com.x, com.y, com.z, gap.position, gap.angle and, of midpoint steps, q_mid.<name> and
 /// v_mid.<name>. No stage starts at the last node: its cells of a, u, q_mid, v_mid and of the wrenches are empty.
-/// Numbers are the shortest that read back to the same bits. Footholds and multipliers are left out. Spreadsheets and plotting
-/// programs read it; Bielle reads the archive below.
+/// Numbers are the shortest that read back to the same bits. Footholds and multipliers are left out. It is for other
+/// programs; Bielle reads the archive below.
 void writeCsv(const std::string& path, const MotionRecord& record);
 
 /// NumPy archive of the members above by the same names; wrenches are N x closures x 6 and N x contacts x 6, footholds, if there
